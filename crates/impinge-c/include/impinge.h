@@ -1,0 +1,619 @@
+/* impinge.h: exact collision detection for deforming meshes.
+ *
+ * A scene holds bodies, a query says which pairs and how, a detector answers. Every pair is decided exactly: touching counts, and there is
+ * no tolerance. Answers are sorted and depend on the input alone.
+ *
+ * Ownership. A handle that a function creates belongs to the caller, who ends it with the `_destroy` of its type; `_destroy(NULL)` does
+ *   nothing. Nothing that is passed in is kept after a call returns, but for lent positions and the callbacks of a detector.
+ *   An answer outlives the scene, the detector and later questions. A view of a handle ends when the handle is destroyed or changed.
+ * Errors. Most functions return a status: IMPINGE_OK, or what is wrong, and impinge_error_message() says which body, row and value. Then
+ *   a handle that the call should have made is NULL, other results are unchanged, and a scene is as it was before. NULL where no NULL
+ *   is allowed is IMPINGE_ERROR_INVALID. After IMPINGE_ERROR_INTERNAL the handle, a scene or a detector, refuses everything but its end.
+ * Threads. A handle may move between threads, and one thread at a time may change it. A detector is changed by each question. A scene
+ *   is only read by a question, so threads with a detector each may ask about one scene at the same time; answers are only read too.
+ * Units. Lengths are in the unit of the scene. Times are fractions of a step, from 0 to 1.
+ * The library prints nothing, reads no environment variables, and installs no signal handlers.
+ */
+#ifndef IMPINGE_H
+#define IMPINGE_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* ---- Statuses ---- */
+
+/* What became of a call: one of the following. */
+typedef int32_t impinge_status;
+
+#define IMPINGE_OK 0                  /* It did what it says. */
+#define IMPINGE_ERROR_INVALID 1       /* An argument, or positions that were lent, are refused. */
+#define IMPINGE_ERROR_OUT_OF_MEMORY 2 /* There is no memory for the input or the answer. */
+#define IMPINGE_ERROR_BUDGET 3        /* The memory budget of the settings is too small for this question. */
+#define IMPINGE_ERROR_TOO_MANY_PAIRS 4 /* More pairs than the settings allow. */
+#define IMPINGE_ERROR_CANCELLED 5     /* The callback `cancelled` stopped it. */
+#define IMPINGE_ERROR_DEVICE 6        /* There is no such GPU, or it failed. */
+#define IMPINGE_ERROR_INTERNAL 7      /* A defect of this library. The handle refuses further use. */
+
+/* The message of the last call of this thread that failed, in English. Never NULL; empty if none has failed. Valid until this thread's
+ * next call that fails. */
+const char *impinge_error_message(void);
+
+/* The version of the library, such as "0.1.0". It lives as long as the program. */
+const char *impinge_version(void);
+
+/* The version of the binary interface that the library has. */
+uint32_t impinge_abi_version(void);
+
+/* The version that this header describes: equal to impinge_abi_version(), if header and library belong together. */
+#define IMPINGE_ABI_VERSION 1
+
+/* ---- Arrays ---- */
+
+/* Types of numbers. U8 is that of some columns of answers, and never of input. */
+#define IMPINGE_F32 1
+#define IMPINGE_F64 2
+#define IMPINGE_U32 3
+#define IMPINGE_I32 4
+#define IMPINGE_U64 5
+#define IMPINGE_I64 6
+#define IMPINGE_U8 7
+
+/* Rows of numbers anywhere in memory: 3 in a row of positions, 1 to 4 in a row of elements, as each function says.
+ *
+ * The number in row i and column j lies at (char *)data + i * row_stride + j * column_stride. So rows may be parts of larger structures,
+ * matrices may be row-major or column-major, and blocks of them need no copy. If both strides are 0, the rows are packed: each follows
+ * the one before without a gap. Strides must be multiples of the size of a number, and data aligned to it. data may be NULL if there are
+ * no rows. */
+typedef struct impinge_array {
+  const void *data;
+  size_t rows;
+  ptrdiff_t row_stride;    /* bytes; may be negative */
+  ptrdiff_t column_stride; /* bytes; may be negative */
+  uint32_t type;           /* IMPINGE_F32 … */
+} impinge_array;
+
+/* ---- Scenes ---- */
+
+/* Bodies: topology once, positions every frame. */
+typedef struct impinge_scene impinge_scene;
+
+/* A body of a scene is a number: 0 for the first that was added, and so on. The number of a body that was removed is given to a later one.
+ * Answers name bodies by these numbers. This one names no body. */
+#define IMPINGE_ANY_BODY UINT32_C(0xffffffff)
+
+/* What bodies are made of. */
+#define IMPINGE_POINTS 1
+#define IMPINGE_EDGES 2
+#define IMPINGE_TRIANGLES 3
+#define IMPINGE_TETRAHEDRA 4
+
+/* Makes an empty scene. */
+impinge_status impinge_scene_create(impinge_scene **scene);
+
+/* Ends a scene. Positions that were lent are released, unless an answer still needs them. */
+void impinge_scene_destroy(impinge_scene *scene);
+
+/* Adds a body of triangles. `faces` has 3 columns of vertex indices of any integer type, `positions` 3 columns of F32 or F64; both are
+ * copied. `body` gets the number of the body and may be NULL.
+ * INVALID: an index out of range, a position that is not finite, a type that does not fit, strides that do not fit the type. */
+impinge_status impinge_scene_add_triangles(impinge_scene *scene, impinge_array faces, impinge_array positions, uint32_t *body);
+
+/* Adds a body of tetrahedra, as impinge_scene_add_triangles. `tetrahedra` has 4 columns. Orientation does not matter; a flat one is the
+ * flat set that it is. */
+impinge_status impinge_scene_add_tetrahedra(impinge_scene *scene, impinge_array tetrahedra, impinge_array positions, uint32_t *body);
+
+/* Adds a body of edges, such as strands of hair, as impinge_scene_add_triangles. `edges` has 2 columns. */
+impinge_status impinge_scene_add_edges(impinge_scene *scene, impinge_array edges, impinge_array positions, uint32_t *body);
+
+/* Adds a body of points, one per row of positions, as impinge_scene_add_triangles. */
+impinge_status impinge_scene_add_points(impinge_scene *scene, impinge_array positions, uint32_t *body);
+
+/* Removes a body. A later body may get its number. INVALID: no such body. */
+impinge_status impinge_scene_remove(impinge_scene *scene, uint32_t body);
+
+/* Gives a body new elements and positions under its number. `kind` is IMPINGE_TRIANGLES …; for IMPINGE_POINTS `elements` has no rows.
+ * Its filter and thickness stay; the end of its step, its transform and the caller's numbers of edges are forgotten.
+ * INVALID: as impinge_scene_add_triangles, and no such body. */
+impinge_status impinge_scene_remesh(impinge_scene *scene, uint32_t body, uint32_t kind, impinge_array elements, impinge_array positions);
+
+/* Sets the caller's own numbering of the edges of a body: `edges` has 2 columns, vertex indices in either order. Steps, candidates and
+ * near pairs
+ * then name edge i for row i, and are sorted by these numbers. Every edge of the body must be there, and none twice; rows that are no
+ * edge of the body are allowed and never named. No rows: back to the library's own numbers, which impinge_scene_edges shows.
+ * INVALID: no such body, an edge that is missing or there twice, a body of edges, whose numbers are the caller's already. */
+impinge_status impinge_scene_set_edges(impinge_scene *scene, uint32_t body, impinge_array edges);
+
+/* Moves the vertices of a body: as many rows as it has vertices, 3 columns of F32 or F64, copied. The type may differ from call to call.
+ * A new step
+ * starts: the body stands still until its end positions are set.
+ * INVALID: no such body, another number of rows, a position that is not finite. */
+impinge_status impinge_scene_set_positions(impinge_scene *scene, uint32_t body, impinge_array positions);
+
+/* Sets where the vertices are at the end of the step, to which they move on straight lines at constant speed. As
+ * impinge_scene_set_positions
+ * otherwise. No rows: the body stands still. If start and end differ in type, the F32 one is widened. */
+impinge_status impinge_scene_set_end_positions(impinge_scene *scene, uint32_t body, impinge_array positions);
+
+/* Moves the vertices without a copy: the scene reads `positions` where they lie. They must neither change nor move until `release` is
+ * called with
+ * `user`, which happens once: when the body gets other positions or is removed, when the scene is destroyed, or when the last answer
+ * that needs them is; on whatever thread does that. `release` may be NULL and must not call this library.
+ * Nothing is copied if rows are packed (3 numbers of F32 or F64 without a gap). Other rows, such as columns of a column-major matrix, are
+ * copied, and `release` is called
+ * before this function returns. If it fails, `release` is not called.
+ * INVALID: as impinge_scene_set_positions. */
+impinge_status impinge_scene_lend_positions(impinge_scene *scene, uint32_t body, impinge_array positions, void (*release)(void *user),
+    void *user);
+
+/* Sets where the vertices are at the end of the step, without a copy, as impinge_scene_lend_positions. */
+impinge_status impinge_scene_lend_end_positions(impinge_scene *scene, uint32_t body, impinge_array positions,
+    void (*release)(void *user), void *user);
+
+/* Moves a body by an affine matrix without passing its vertices again. `matrix` has 4 rows and 4 columns of F32 or F64, and takes
+ * the column (x, y, z, 1) to the moved one; its last row is 0 0 0 1. It moves the positions given last; a second transform replaces the
+ * first. End positions are cleared.
+ * INVALID: no such body, a matrix that is not as described, a moved position that is not finite. */
+impinge_status impinge_scene_set_transform(impinge_scene *scene, uint32_t body, impinge_array matrix);
+
+/* Sets whom a body meets in queries that name no two bodies: two bodies meet if the category of each shares a bit with the mask of the
+ * other. By default category is 1 and mask has all bits. INVALID: no such body. */
+impinge_status impinge_scene_set_filter(impinge_scene *scene, uint32_t body, uint64_t category, uint64_t mask);
+
+/* Sets how thick a body is, a length: what its elements add to the distance of impinge_find_near. Finite, 0 or more; 0 by default.
+ * INVALID: no such body, another number. */
+impinge_status impinge_scene_set_thickness(impinge_scene *scene, uint32_t body, double thickness);
+
+/* The number of bodies; 0 for NULL. */
+size_t impinge_scene_n_bodies(const impinge_scene *scene);
+
+/* Views of a body, valid until the scene is changed: its positions (3 columns of F32 or F64, as they were given), its end positions (no
+ * rows if it stands still),
+ * its elements as they were given (U32), its edges (U32, 2 columns) and its faces (U32, 3 columns): those of tetrahedra are its
+ * boundary, by tetrahedron and then by the opposite corner. INVALID: no such body. */
+impinge_status impinge_scene_positions(const impinge_scene *scene, uint32_t body, impinge_array *view);
+impinge_status impinge_scene_end_positions(const impinge_scene *scene, uint32_t body, impinge_array *view);
+impinge_status impinge_scene_elements(const impinge_scene *scene, uint32_t body, impinge_array *view);
+impinge_status impinge_scene_edges(const impinge_scene *scene, uint32_t body, impinge_array *view);
+impinge_status impinge_scene_faces(const impinge_scene *scene, uint32_t body, impinge_array *view);
+
+/* Finds vertices whose positions are equal (3 columns of F32 or F64), as along the seams of a mesh for drawing. `map` gets one number
+ * per row: the vertex after welding. `firsts` gets one number per vertex after welding: the first row at its position; it has room
+ * for as many numbers as there are rows, and may be NULL. `n_vertices` gets the number of vertices after welding. */
+impinge_status impinge_weld(impinge_array positions, uint32_t *map, uint32_t *firsts, size_t *n_vertices);
+
+/* ---- Queries ---- */
+
+/* Kinds of pairs, as bits: vertices, edges and faces. The first letter is the element `a`. */
+#define IMPINGE_VF 1
+#define IMPINGE_EE 2
+#define IMPINGE_EV 4
+#define IMPINGE_VV 8
+#define IMPINGE_EF 16
+#define IMPINGE_FF 32
+
+/* Pairs of one body that share vertices. RESOLVE: reported if they meet in more than the parts that they share. SKIP: not reported.
+ * Pairs of edges or points, and all pairs of steps, candidates and near pairs, are not reported if they share a vertex. */
+#define IMPINGE_SKIP 0
+#define IMPINGE_RESOLVE 1
+
+/* Pairs that touch at the start of a step. START_REPORT: reported with the time 0. START_SKIP: left out, whatever they do later.
+ * START_VERIFY:
+ * as START_REPORT, and the start is asked for intersections: a step that starts with any is not free, and none of it can be taken. */
+#define IMPINGE_START_REPORT 0
+#define IMPINGE_START_SKIP 1
+#define IMPINGE_START_VERIFY 2
+
+/* Flags of a query. DISTANCES and CLOSEST_POINTS: near pairs come with them. CELL: only pairs of the cell. SIGNED: not known to this
+ * version. */
+#define IMPINGE_DISTANCES 1
+#define IMPINGE_CLOSEST_POINTS 2
+#define IMPINGE_SIGNED 4
+#define IMPINGE_CELL 8
+
+/* Which hits of a ray are sought. Not known to this version, but for the default. */
+#define IMPINGE_HITS_FIRST 0
+#define IMPINGE_HITS_ANY 1
+#define IMPINGE_HITS_ALL 2
+
+/* Pairs to leave out. This version knows EXCLUDE_BODIES: the pairs of bodies `a` and `b`, or with a == b the self-collision of `a`.
+ * Other fields are 0. */
+#define IMPINGE_EXCLUDE_BODIES 0
+#define IMPINGE_EXCLUDE_RINGS 1
+#define IMPINGE_EXCLUDE_GROUPS 2
+#define IMPINGE_EXCLUDE_VERTICES 3
+typedef struct impinge_exclusion {
+  uint32_t kind, a, b, n;
+  impinge_array offsets, vertices;
+} impinge_exclusion;
+
+/* One query for all questions: fill it by impinge_query_default, then change fields. Where a query is an argument, NULL is the default one.
+ *
+ * Which pairs: a question that cannot honour one of these fields refuses it by name.
+ *   between, self       1 or 0: pairs of different bodies, pairs of one body. Default: both.
+ *   a, b                IMPINGE_ANY_BODY, or a body. Both: pairs between these two, whatever between, self and filters say. `a` alone with
+ *                       between = 1, self = 0: pairs of `a` and any other, whatever filters say; with between = 0, self = 1: its
+ * self-collision.
+ *   shared_vertex       Default: IMPINGE_RESOLVE.
+ *   kinds               Bits of IMPINGE_VF …, for candidates and near pairs. 0, the default: VF and EE; near pairs also EF; EV and VV
+ * where bodies have no faces.
+ *   flags IMPINGE_CELL, cell_low, cell_high
+ *                       Only the pairs of the half-open box [low, high): those for which it holds the larger of the lower
+ *                       corners of the boxes of both elements, axis by axis. Cells that cover space have each pair once. Bounds may be
+ * infinite.
+ *   exclusions, n_exclusions
+ *                       Pairs to leave out. They are read during the call.
+ * How: a question without use for one of these fields ignores it.
+ *   start               IMPINGE_START_REPORT …
+ *   precision           IMPINGE_F32 (default) or IMPINGE_F64: that of times, which are rounded down.
+ *   separation          A length, 0 or more: elements that are so near count as touching. Of steps.
+ *   clearance           A length, 0 or more: what a step leaves. A pair at the distance d at the start keeps
+ *                       separation + min(clearance, clearance_share * (d - separation)).
+ *   clearance_share     From 0 to less than 1. Default: 0.2.
+ *   flags IMPINGE_DISTANCES, IMPINGE_CLOSEST_POINTS
+ *                       Columns that near pairs come with.
+ *   hits, n_nearest, fixed, n_fixed
+ *                       Not known to this version: anything but the default is refused. */
+typedef struct impinge_query {
+  uint32_t size; /* sizeof(impinge_query) of the caller */
+  uint32_t between, self, shared_vertex;
+  uint32_t a, b;
+  uint32_t kinds, start, precision, hits, n_nearest, flags;
+  double separation, clearance, clearance_share;
+  double cell_low[3], cell_high[3];
+  const impinge_exclusion *exclusions;
+  size_t n_exclusions;
+  const uint32_t *fixed;
+  size_t n_fixed;
+} impinge_query;
+
+/* A query of a step: the same structure. */
+typedef impinge_query impinge_step;
+
+/* Fill in the defaults, and `size`. NULL is ignored. */
+void impinge_query_default(impinge_query *query);
+void impinge_step_default(impinge_step *step);
+
+/* ---- Detectors ---- */
+
+/* Finds pairs, question after question, and keeps what makes the next question about the same bodies fast. */
+typedef struct impinge_detector impinge_detector;
+
+/* Where the work is done. AUTO: a GPU if there is one and the library was built for it, else the CPU. */
+#define IMPINGE_BACKEND_AUTO 0
+#define IMPINGE_BACKEND_CPU 1
+#define IMPINGE_BACKEND_GPU 2
+
+/* How candidates are found. All methods give the same pairs. NAIVE compares every box with every box. */
+#define IMPINGE_METHOD_AUTO 0
+#define IMPINGE_METHOD_CLUSTERS 1
+#define IMPINGE_METHOD_CELLS 2
+#define IMPINGE_METHOD_NAIVE 3
+
+/* Levels of the log. */
+#define IMPINGE_LOG_ERROR 1
+#define IMPINGE_LOG_INFO 2
+
+/* The settings of a detector: fill them by impinge_settings_default, then change fields.
+ *   backend, method     As above. Default: AUTO.
+ *   threads             Threads of the CPU, 0 for one per core. With 1, no other thread is started.
+ *   memory_budget       Bytes that the detector may hold, the answer included; 0, the default, for as many as it takes.
+ *   max_pairs           The most pairs that an answer may have; 0, the default, for any number.
+ *   cancelled           Called now and then during a question: anything but 0 stops it with IMPINGE_ERROR_CANCELLED. May be NULL.
+ *   progress            Called now and then with units of work done and of all, which differ by stage. May be NULL.
+ *   log                 Called with the message of every question that fails, and how a detector was opened. The text is valid during the
+ * call. May be NULL.
+ *   user                The first argument of these callbacks. They are called by the thread that asks, and must not call this library with
+ *                       the same detector.
+ *   device              Part of a GPU's name, to choose among several; NULL for any. It is copied. */
+typedef struct impinge_settings {
+  uint32_t size; /* sizeof(impinge_settings) of the caller */
+  uint32_t backend, method, threads;
+  uint64_t memory_budget, max_pairs;
+  int (*cancelled)(void *user);
+  void *user;
+  void (*progress)(void *user, uint64_t done, uint64_t total);
+  void (*log)(void *user, uint32_t level, const char *message);
+  const char *device;
+} impinge_settings;
+
+/* Fills in the defaults, and `size`. NULL is ignored. */
+void impinge_settings_default(impinge_settings *settings);
+
+/* Makes a detector. `settings` may be NULL for the default ones.
+ * INVALID: a setting out of its range. DEVICE: no such GPU, or a library without the GPU backend. */
+impinge_status impinge_detector_create(const impinge_settings *settings, impinge_detector **detector);
+
+/* Ends a detector and its threads. */
+void impinge_detector_destroy(impinge_detector *detector);
+
+/* ---- What answers are made of ---- */
+
+/* Two elements: numbers of bodies, and of elements in their bodies. */
+typedef struct impinge_pair {
+  uint32_t body_a, element_a, body_b, element_b;
+} impinge_pair;
+
+/* Two elements that touch during a step. `toi` is the first time, rounded down; `kind` one of IMPINGE_VF …; `at_start` 1 if they touch at
+ * the
+ * start, else 0. Vertices are numbered as positions are, faces as impinge_scene_faces, edges as impinge_scene_edges. */
+typedef struct impinge_impact {
+  double toi;
+  uint32_t kind, body_a, element_a, body_b, element_b, at_start;
+} impinge_impact;
+
+/* The nearest two elements of two bodies. `distance` is 0 if and only if they touch. `points`: one of each element, rounded to nearest. */
+typedef struct impinge_nearest {
+  double distance, points[2][3];
+  uint32_t body_a, element_a, body_b, element_b;
+} impinge_nearest;
+
+/* A connected region in which two bodies overlap: see impinge_find_penetration. */
+typedef struct impinge_region {
+  double position[3];   /* the middle */
+  double bounds[2][3];  /* the lowest and the highest coordinates */
+  double length;        /* of the curves in which the surfaces cross */
+  double patch_area;    /* of faces of both bodies in one plane */
+  double area[3];       /* the area that the curves span, as a vector */
+  double normal[3];     /* unit direction in which to push body_a so that the overlap shrinks fastest; zero if there is none */
+  double depth;         /* how far the region extends along the normal; NaN if unknown */
+  double volume;        /* of what the bodies have in common; NaN if unknown */
+  uint32_t body_a, body_b;
+  uint64_t n_contacts;  /* pairs in the region */
+  uint64_t n_inside[2]; /* vertices of body_a inside body_b, and of body_b inside body_a */
+} impinge_region;
+
+/* Counts and times of an answer. Set `size`; the library fills as much as that. Strings live as long as the handle that was asked. */
+typedef struct impinge_stats {
+  uint32_t size;         /* sizeof(impinge_stats) of the caller */
+  uint32_t n_threads;    /* threads used */
+  double total_ms;       /* wall time of the question */
+  uint64_t n_candidates; /* pairs whose boxes overlap */
+  uint64_t n_unsure;     /* of these, left to exact arithmetic */
+  uint64_t n_work_items; /* pairs of groups of elements */
+  uint64_t n_clusters;   /* clusters of all bodies */
+  uint64_t n_remote;     /* of these, proven remote from all other bodies */
+  uint64_t n_clustered;  /* bodies clustered in this question */
+  uint64_t n_slabs;      /* parts in which the work was done */
+  uint64_t n_reruns;     /* stages run again because a buffer had to grow */
+  uint64_t bytes_held;   /* bytes that the detector held, the answer included */
+  const char *backend;   /* "cpu", or the name of the GPU */
+  const char *method;    /* "clusters", "cells", "naive", or empty */
+} impinge_stats;
+
+/* Columns of answers, as views without a copy that are valid as long as the answer. n is the number of pairs, impacts or contacts.
+ *   KIND        n x 1 U8       one of IMPINGE_VF …              near pairs, candidates; n x 1 U32 of impacts
+ *   ROWS        n x 4 U32      body_a, element_a, body_b, element_b   all
+ *   DISTANCE    n x 1 F64      with IMPINGE_DISTANCES or IMPINGE_CLOSEST_POINTS          near pairs
+ *   POINTS      n x 6 F64      with IMPINGE_CLOSEST_POINTS: a point of a, one of b       near pairs
+ *   FEATURES    n x 2 U8       the nearest feature of a and of b: 0 to 2 a vertex, 8 to 10 an edge (from that vertex to the next), 16 the
+ * face
+ *   PARALLEL    n x 1 U8       1 if there may be several nearest points                  near pairs
+ *   TOI, AT_START  n x 1 F64, n x 1 U32                          impacts
+ *   SHAPE       n x 1 U8       IMPINGE_SHAPE_… of each contact                          contacts
+ *   STARTS      n + 1 x 1 U64  where the corners of each contact start                  contacts
+ *   CORNERS     m x 1 U32      numbers of points                                        contacts
+ *   CONTACT_POINTS p x 3 F64   where they are, each rounded to nearest                  contacts
+ *   CURVE_STARTS c + 1 x 1 U64 where the points of each curve start                     contacts
+ *   CURVE_POINTS k x 1 U32     numbers of points, along each curve                      contacts
+ *   CURVE_CLOSED c x 1 U8      1 if it is a loop, which does not repeat its first point  contacts
+ *   CURVE_LENGTH c x 1 F64     its length                                               contacts
+ *   INSIDE_A, INSIDE_B  U32    vertices of one body inside the other, sorted            penetrations */
+#define IMPINGE_COLUMN_KIND 1
+#define IMPINGE_COLUMN_ROWS 2
+#define IMPINGE_COLUMN_DISTANCE 3
+#define IMPINGE_COLUMN_POINTS 4
+#define IMPINGE_COLUMN_FEATURES 5
+#define IMPINGE_COLUMN_PARALLEL 6
+#define IMPINGE_COLUMN_TOI 7
+#define IMPINGE_COLUMN_AT_START 8
+#define IMPINGE_COLUMN_SHAPE 9
+#define IMPINGE_COLUMN_STARTS 10
+#define IMPINGE_COLUMN_CORNERS 11
+#define IMPINGE_COLUMN_CONTACT_POINTS 12
+#define IMPINGE_COLUMN_CURVE_STARTS 13
+#define IMPINGE_COLUMN_CURVE_POINTS 14
+#define IMPINGE_COLUMN_CURVE_CLOSED 15
+#define IMPINGE_COLUMN_CURVE_LENGTH 16
+#define IMPINGE_COLUMN_INSIDE_A 17
+#define IMPINGE_COLUMN_INSIDE_B 18
+
+/* The shape of a contact: a pair that is no pair of triangles; nothing, because bodies have moved since; a point; a segment; a polygon
+ * of two triangles in one plane. */
+#define IMPINGE_SHAPE_SOLID 0
+#define IMPINGE_SHAPE_EMPTY 1
+#define IMPINGE_SHAPE_POINT 2
+#define IMPINGE_SHAPE_SEGMENT 3
+#define IMPINGE_SHAPE_POLYGON 4
+
+/* ---- Questions ----
+ * All read the scene and change the detector. All may fail with any status: INVALID for a query that names no body of the scene, or lent
+ * positions
+ * that are not finite; the others as the statuses say. After every failure but INTERNAL the detector can be used again. */
+
+/* Sorted pairs of elements that intersect. */
+typedef struct impinge_pairs impinge_pairs;
+
+/* All pairs of elements, as bodies were given, that intersect at the positions of the scene. */
+impinge_status impinge_detect(impinge_detector *detector, const impinge_scene *scene, const impinge_query *query, impinge_pairs **pairs);
+
+/* How many pairs impinge_detect would find. None of them is held. */
+impinge_status impinge_count(impinge_detector *detector, const impinge_scene *scene, const impinge_query *query, uint64_t *n);
+
+/* Whether impinge_detect would find any: `any` gets 1 or 0. It ends with the first that is certain. */
+impinge_status impinge_any(impinge_detector *detector, const impinge_scene *scene, const impinge_query *query, int32_t *any);
+
+/* Sorted pairs that touch during a step, with their times. */
+typedef struct impinge_impacts impinge_impacts;
+
+/* All pairs of vertices and faces, of edges and edges, and where bodies have no faces of edges and vertices, that touch during the step,
+ * while
+ * vertices move on straight lines from their positions to their end positions. */
+impinge_status impinge_find_impacts(impinge_detector *detector, const impinge_scene *scene, const impinge_step *step,
+    impinge_impacts **impacts);
+
+/* The first of them: `found` gets 1 and `impact` the impact, or 0 if nothing touches. Of several at the same time the first row. */
+impinge_status impinge_find_earliest(impinge_detector *detector, const impinge_scene *scene, const impinge_step *step,
+    impinge_impact *impact, int32_t *found);
+
+/* Whether nothing touches during the step: `is_free` gets 1 or 0. If the start was free of intersections, so is every moment of a free
+ * step; IMPINGE_START_VERIFY asks that too. */
+impinge_status impinge_is_free(impinge_detector *detector, const impinge_scene *scene, const impinge_step *step, int32_t *is_free);
+
+/* Positions to which a step can be taken. */
+typedef struct impinge_motion impinge_motion;
+
+/* How far the step can be taken: `fraction` gets a number from 0 to 1, for which the straight way to the rounded positions is free, if the
+ * start was. `motion` gets these positions. Either may be NULL, but not both. With a clearance, the fraction also holds for positions
+ * that the caller computes as
+ * x0 + a * (x1 - x0) or x0 + a * dx, for every a up to it. Pairs that touch at the start allow no step, unless IMPINGE_START_SKIP leaves
+ * them out.
+ * INVALID: also the seams of a mesh that was not welded, where they allow no step, and a cell. */
+impinge_status impinge_advance(impinge_detector *detector, const impinge_scene *scene, const impinge_step *step, double *fraction,
+    impinge_motion **motion);
+
+/* Sorted pairs whose boxes overlap. */
+typedef struct impinge_candidates impinge_candidates;
+
+/* Pairs of elements whose boxes over the whole step, each inflated by `inflation` on all sides, overlap. `inflation` is a length, 0 or
+ * more. Of bodies that stand still: whose boxes overlap now. */
+impinge_status impinge_find_candidates(impinge_detector *detector, const impinge_scene *scene, double inflation,
+    const impinge_query *query, impinge_candidates **candidates);
+
+/* The same in sorted runs of at most `most` pairs of one kind (IMPINGE_VF …), for answers larger than memory. `each` gets one run after
+ * the other, whose rows
+ * are valid during the call; anything but 0 from it stops the search. `n` gets the number of pairs handed out and may be NULL. */
+impinge_status impinge_find_candidates_in_runs(impinge_detector *detector, const impinge_scene *scene, double inflation,
+    const impinge_query *query, uint64_t most,
+                                               int (*each)(void *user, uint32_t kind, const impinge_pair *rows, size_t n), void *user,
+    uint64_t *n);
+
+/* Sorted pairs of elements that are near each other. */
+typedef struct impinge_near impinge_near;
+
+/* Pairs of elements at most `distance` apart, a length of 0 or more, plus the thickness of both bodies; decided exactly, at the positions
+ * of the scene. */
+impinge_status impinge_find_near(impinge_detector *detector, const impinge_scene *scene, double distance, const impinge_query *query,
+    impinge_near **near_pairs);
+
+/* The smallest distance of two bodies: `found` gets 1 and `nearest` the pair that has it, or 0 if one body has no elements. Tetrahedra
+ * are solid. */
+impinge_status impinge_find_distance(impinge_detector *detector, const impinge_scene *scene, uint32_t a, uint32_t b,
+    impinge_nearest *nearest, int32_t *found);
+
+/* Where the triangles of each pair meet. */
+typedef struct impinge_contacts impinge_contacts;
+
+/* Where the triangles of each pair meet, and the curves in which surfaces cross. `pairs` are those of this scene at its positions. */
+impinge_status impinge_find_contacts(impinge_detector *detector, const impinge_scene *scene, const impinge_pairs *pairs,
+    impinge_contacts **contacts);
+
+/* How deep two closed bodies are in each other. */
+typedef struct impinge_penetration impinge_penetration;
+
+/* How deep two closed bodies of triangles are in each other, from contacts among which are all of these two.
+ * INVALID: also a surface that is not closed. */
+impinge_status impinge_find_penetration(impinge_detector *detector, const impinge_scene *scene, const impinge_contacts *contacts,
+    uint32_t a, uint32_t b, impinge_penetration **penetration);
+
+/* Counts and times of the last question. INVALID: NULL, or a size of 0. */
+impinge_status impinge_detector_stats(const impinge_detector *detector, impinge_stats *stats);
+
+/* Whether elements intersect at the start of the last step: 1 or 0, or -1 if nobody asked, which only IMPINGE_START_VERIFY does. */
+int32_t impinge_detector_start_intersects(const impinge_detector *detector);
+
+/* ---- Answers ----
+ * count: the number of rows; 0 for NULL. data: the rows, sorted; NULL if there are none. hash: a hash of the set, the same in every
+ * language, which does
+ * not depend on order, and is that of the library's own numbers of edges. column: a view, see IMPINGE_COLUMN_…; INVALID: no such column.
+ * stats: what the answer cost. */
+
+size_t impinge_pairs_count(const impinge_pairs *pairs);
+const impinge_pair *impinge_pairs_data(const impinge_pairs *pairs);
+uint64_t impinge_pairs_hash(const impinge_pairs *pairs);
+impinge_status impinge_pairs_column(const impinge_pairs *pairs, uint32_t column, impinge_array *view);
+impinge_status impinge_pairs_stats(const impinge_pairs *pairs, impinge_stats *stats);
+void impinge_pairs_destroy(impinge_pairs *pairs);
+
+/* Sorted by kind, then by row. */
+size_t impinge_impacts_count(const impinge_impacts *impacts);
+const impinge_impact *impinge_impacts_data(const impinge_impacts *impacts);
+uint64_t impinge_impacts_hash(const impinge_impacts *impacts);
+impinge_status impinge_impacts_column(const impinge_impacts *impacts, uint32_t column, impinge_array *view);
+impinge_status impinge_impacts_stats(const impinge_impacts *impacts, impinge_stats *stats);
+/* Whether elements intersect at the start: 1 or 0, or -1 if nobody asked. */
+int32_t impinge_impacts_start_intersects(const impinge_impacts *impacts);
+void impinge_impacts_destroy(impinge_impacts *impacts);
+
+/* Sorted by kind, then by row. */
+size_t impinge_candidates_count(const impinge_candidates *candidates);
+const impinge_pair *impinge_candidates_data(const impinge_candidates *candidates);
+uint64_t impinge_candidates_hash(const impinge_candidates *candidates);
+impinge_status impinge_candidates_column(const impinge_candidates *candidates, uint32_t column, impinge_array *view);
+impinge_status impinge_candidates_stats(const impinge_candidates *candidates, impinge_stats *stats);
+void impinge_candidates_destroy(impinge_candidates *candidates);
+
+/* Sorted by kind, then by row. */
+size_t impinge_near_count(const impinge_near *near_pairs);
+const impinge_pair *impinge_near_data(const impinge_near *near_pairs);
+uint64_t impinge_near_hash(const impinge_near *near_pairs);
+impinge_status impinge_near_column(const impinge_near *near_pairs, uint32_t column, impinge_array *view);
+impinge_status impinge_near_stats(const impinge_near *near_pairs, impinge_stats *stats);
+void impinge_near_destroy(impinge_near *near_pairs);
+
+/* One contact per row of the pairs. */
+size_t impinge_contacts_count(const impinge_contacts *contacts);
+const impinge_pair *impinge_contacts_data(const impinge_contacts *contacts);
+/* The hash of the pairs. */
+uint64_t impinge_contacts_hash(const impinge_contacts *contacts);
+impinge_status impinge_contacts_column(const impinge_contacts *contacts, uint32_t column, impinge_array *view);
+impinge_status impinge_contacts_stats(const impinge_contacts *contacts, impinge_stats *stats);
+void impinge_contacts_destroy(impinge_contacts *contacts);
+
+/* One row per region. */
+size_t impinge_penetration_count(const impinge_penetration *penetration);
+const impinge_region *impinge_penetration_data(const impinge_penetration *penetration);
+impinge_status impinge_penetration_column(const impinge_penetration *penetration, uint32_t column, impinge_array *view);
+impinge_status impinge_penetration_stats(const impinge_penetration *penetration, impinge_stats *stats);
+/* The volume of all regions together; NaN if that of any is unknown. */
+double impinge_penetration_volume(const impinge_penetration *penetration);
+void impinge_penetration_destroy(impinge_penetration *penetration);
+
+/* The part of the step that can be taken: 1 for all of it, 0 for none, and for NULL. */
+double impinge_motion_fraction(const impinge_motion *motion);
+/* The first contact of the whole step: `found` gets 1 and `impact` the impact, or 0 if nothing touches. */
+impinge_status impinge_motion_first(const impinge_motion *motion, impinge_impact *impact, int32_t *found);
+/* Whether elements intersect at the start: 1 or 0, or -1 if nobody asked. */
+int32_t impinge_motion_start_intersects(const impinge_motion *motion);
+/* Where the vertices of a body are at that fraction: a view, valid as long as the motion. No rows for a body that stands still. */
+impinge_status impinge_motion_positions(const impinge_motion *motion, uint32_t body, impinge_array *view);
+/* Takes the step: these positions become those of the scene, and its bodies stand still until they get end positions again.
+ * INVALID: a body that was removed, or that has another number of vertices now. */
+impinge_status impinge_motion_apply(const impinge_motion *motion, impinge_scene *scene);
+impinge_status impinge_motion_stats(const impinge_motion *motion, impinge_stats *stats);
+void impinge_motion_destroy(impinge_motion *motion);
+
+/* ---- Hashes ----
+ * The hash of rows from elsewhere: equal to that of an answer with the same rows. The order of rows does not matter; the lower (body,
+ * element) comes first in each. 0 for no rows. */
+uint64_t impinge_hash_pairs(const impinge_pair *rows, size_t n);
+uint64_t impinge_hash_impacts(const impinge_impact *rows, size_t n);
+
+/* ---- One pair of elements ---- */
+
+/* The first time at which two elements touch that no scene holds. `kind` is IMPINGE_VF, IMPINGE_EE, IMPINGE_EV or IMPINGE_VV; `start` and
+ * `end` have one row per vertex (3 columns of
+ * F32 or F64), those of `a` first. separation and clearance are those of `query`, other fields of it are ignored. `found` gets 1 and
+ * `toi` the first time, rounded down
+ * to F64, or 0 if they do not touch. INVALID: a position that is not finite, another number of rows. */
+impinge_status impinge_first_contact(uint32_t kind, impinge_array start, impinge_array end, const impinge_step *query, double *toi,
+    int32_t *found);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif /* IMPINGE_H */

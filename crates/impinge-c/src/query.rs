@@ -1,0 +1,232 @@
+//! What an `impinge_query` asks, in the words of the crate `impinge`. The only place that knows them.
+
+use impinge::{
+    CandidateQuery, Clearance, NearQuery, PairKind, PairKinds, Query, SharedVertex, Start, Step,
+    Toi,
+};
+
+use crate::scene::impinge_scene;
+use crate::status::Failure;
+use crate::types::*;
+
+/// A query of a caller, checked: its size, its flags and what this version does not know.
+pub struct Asked<'a> {
+    given: impinge_query,
+    scene: &'a impinge_scene,
+}
+
+fn refuse<T>(field: &str, given: impl std::fmt::Display, allowed: &str) -> Result<T, Failure> {
+    Err(Failure::invalid(format!(
+        "{field}: {given} given, {allowed}"
+    )))
+}
+
+impl<'a> Asked<'a> {
+    /// # Safety
+    /// `query` is NULL or points to a query as `impinge.h` describes it.
+    pub unsafe fn read(
+        query: *const impinge_query,
+        scene: &'a impinge_scene,
+    ) -> Result<Self, Failure> {
+        // SAFETY: the caller's promise.
+        let given = unsafe { read_sized(query) }?;
+        let known = DISTANCES | CLOSEST_POINTS | CELL;
+        if given.flags & !known != 0 {
+            return refuse(
+                "flags",
+                given.flags,
+                "IMPINGE_DISTANCES, IMPINGE_CLOSEST_POINTS and IMPINGE_CELL allowed in this version",
+            );
+        }
+        for (field, given) in [("between", given.between), ("self", given.own)] {
+            if given > 1 {
+                return refuse(field, given, "0 or 1 allowed");
+            }
+        }
+        for (field, given, default) in [
+            ("hits", given.hits, HITS_FIRST),
+            ("n_nearest", given.n_nearest, 0),
+            ("n_fixed", u32::from(given.n_fixed > 0), 0),
+        ] {
+            if given != default {
+                return refuse(field, given, "this version knows the default alone");
+            }
+        }
+        Ok(Asked { given, scene })
+    }
+
+    /// The pairs of a question that knows no kinds of pairs.
+    pub fn pairs(&self) -> Result<Query, Failure> {
+        if self.given.kinds != 0 {
+            return refuse(
+                "kinds",
+                self.given.kinds,
+                "this question has its own: 0 allowed",
+            );
+        }
+        self.bodies()
+    }
+
+    fn bodies(&self) -> Result<Query, Failure> {
+        let query = self.scope()?.shared_vertex(match self.given.shared_vertex {
+            SKIP => SharedVertex::Skip,
+            RESOLVE => SharedVertex::Resolve,
+            other => {
+                return refuse(
+                    "shared_vertex",
+                    other,
+                    "IMPINGE_RESOLVE or IMPINGE_SKIP allowed",
+                );
+            }
+        });
+        let query = match self.given.flags & CELL {
+            0 => query,
+            _ => query.owned_by(self.given.cell_low, self.given.cell_high),
+        };
+        self.exclusions()?
+            .iter()
+            .enumerate()
+            .try_fold(query, |query, (ix, exclusion)| {
+                if exclusion.kind != EXCLUDE_BODIES {
+                    return refuse(
+                        &format!("exclusions[{ix}].kind"),
+                        exclusion.kind,
+                        "IMPINGE_EXCLUDE_BODIES allowed in this version",
+                    );
+                }
+                let [a, b] = [exclusion.a, exclusion.b].map(|body| self.scene.id(body));
+                Ok(query.ignore(a?, b?))
+            })
+    }
+
+    fn exclusions(&self) -> Result<&[impinge_exclusion], Failure> {
+        match (self.given.exclusions, self.given.n_exclusions) {
+            (_, 0) => Ok(&[]),
+            (list, n) if list.is_null() => refuse("exclusions", "NULL", &format!("{n} needed")),
+            (list, _) if !list.is_aligned() => refuse(
+                "exclusions",
+                "a pointer that is not aligned",
+                "an array needed",
+            ),
+            // SAFETY: the caller says how many there are, and that they are there during the call.
+            (list, n) => Ok(unsafe { std::slice::from_raw_parts(list, n) }),
+        }
+    }
+
+    fn scope(&self) -> Result<Query, Failure> {
+        let impinge_query {
+            a, b, between, own, ..
+        } = self.given;
+        match (a, b, between, own) {
+            (ANY_BODY, ANY_BODY, 1, 1) => Ok(Query::everything()),
+            (ANY_BODY, ANY_BODY, 1, 0) => Ok(Query::all()),
+            (ANY_BODY, ANY_BODY, 0, 1) => Ok(Query::all_within()),
+            (_, _, 0, 0) => refuse("between and self", "0", "one of them needed"),
+            (ANY_BODY, b, _, _) => refuse("b", b, "without a: name one body by a alone"),
+            (a, ANY_BODY, 1, 0) => Ok(Query::across([self.scene.id(a)?])),
+            (a, ANY_BODY, 0, _) => Ok(Query::within(self.scene.id(a)?)),
+            (a, ANY_BODY, _, _) => refuse(
+                "a",
+                a,
+                "alone with between = 1 and self = 1: one of them allowed in this version",
+            ),
+            (a, b, _, _) => Ok(Query::between(self.scene.id(a)?, self.scene.id(b)?)),
+        }
+    }
+
+    /// The kinds that were said.
+    fn kinds(&self) -> Result<Option<PairKinds>, Failure> {
+        let bits = self.given.kinds;
+        if bits >> PairKind::ALL.len() != 0 {
+            return refuse(
+                "kinds",
+                bits,
+                "a sum of IMPINGE_VF, _EE, _EV, _VV, _EF and _FF allowed",
+            );
+        }
+        Ok((bits != 0).then(|| listed(bits).collect()))
+    }
+
+    /// A step of these pairs.
+    pub fn step(&self) -> Result<Step, Failure> {
+        self.how(Step::new(self.pairs()?))
+    }
+
+    /// What a step keeps, whatever its pairs are.
+    fn how(&self, step: Step) -> Result<Step, Failure> {
+        let impinge_query {
+            separation,
+            clearance,
+            clearance_share,
+            ..
+        } = self.given;
+        Ok(step
+            .start(match self.given.start {
+                START_REPORT => Start::Report,
+                START_SKIP => Start::Skip,
+                START_VERIFY => Start::Verify,
+                other => {
+                    return refuse(
+                        "start",
+                        other,
+                        "IMPINGE_START_REPORT, _SKIP or _VERIFY allowed",
+                    );
+                }
+            })
+            .toi(self.precision()?)
+            .separation(separation)
+            .clearance(Clearance::new(clearance).share(clearance_share)))
+    }
+
+    fn precision(&self) -> Result<Toi, Failure> {
+        match self.given.precision {
+            F32 => Ok(Toi::F32),
+            F64 => Ok(Toi::F64),
+            other => refuse("precision", other, "IMPINGE_F32 or IMPINGE_F64 allowed"),
+        }
+    }
+
+    /// Candidates with boxes that are inflated.
+    pub fn candidates(&self, inflation: f64) -> Result<CandidateQuery, Failure> {
+        check_length("inflation", inflation)?;
+        let query = CandidateQuery::new(self.bodies()?).distance(inflation);
+        Ok(match self.kinds()? {
+            None => query,
+            Some(_) => query.kinds(listed(self.given.kinds)),
+        })
+    }
+
+    /// Pairs within a distance.
+    pub fn near(&self, distance: f64) -> Result<NearQuery, Failure> {
+        check_length("distance", distance)?;
+        let mut query = NearQuery::new(self.bodies()?).distance(distance);
+        if self.kinds()?.is_some() {
+            query = query.kinds(listed(self.given.kinds));
+        }
+        for (body, thickness) in self.scene.thickness() {
+            query = query.thickness(body, thickness);
+        }
+        if self.given.flags & DISTANCES != 0 {
+            query = query.distances();
+        }
+        if self.given.flags & CLOSEST_POINTS != 0 {
+            query = query.closest_points();
+        }
+        Ok(query)
+    }
+}
+
+/// Refuses a length that is negative or not finite.
+pub fn check_length(name: &str, length: f64) -> Result<(), Failure> {
+    match length.is_finite() && length >= 0.0 {
+        true => Ok(()),
+        false => refuse(name, length, "a finite number that is not below 0 allowed"),
+    }
+}
+
+/// The kinds of a bit mask.
+fn listed(bits: u32) -> impl Iterator<Item = PairKind> {
+    PairKind::ALL
+        .into_iter()
+        .filter(move |&kind| bits & bit(kind) != 0)
+}

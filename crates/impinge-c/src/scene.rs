@@ -1,0 +1,564 @@
+//! Scenes: `impinge_scene_*` and `impinge_weld`.
+
+use std::borrow::Cow;
+use std::ffi::c_void;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use impinge::{Body, BodyId, Filter, Part, PositionRows, Positions, Scene, Weld};
+
+use crate::arrays::{self, Floats, elements_view, no_rows, positions_view};
+use crate::edges::EdgeNumbers;
+use crate::status::{Failure, Handle, broken, change, destroy, guard, held, put};
+use crate::types::*;
+
+/// A scene, and what callers say about its bodies beside.
+#[derive(Default)]
+pub struct impinge_scene {
+    pub scene: Scene,
+    /// By the number of the body.
+    bodies: Vec<Option<Known>>,
+    n_with_edges: usize,
+    is_broken: bool,
+}
+
+/// A body as the caller knows it.
+struct Known {
+    id: BodyId,
+    edges: Option<EdgeNumbers>,
+    thickness: f64,
+}
+
+impl Handle for impinge_scene {
+    const NAME: &'static str = "scene";
+    fn is_broken(&mut self) -> &mut bool {
+        &mut self.is_broken
+    }
+}
+
+impl impinge_scene {
+    fn known(&self, body: u32) -> Result<&Known, Failure> {
+        let known = self.bodies.get(body as usize).and_then(Option::as_ref);
+        known.ok_or_else(|| self.no_such(body))
+    }
+
+    fn known_mut(&mut self, body: u32) -> Result<&mut Known, Failure> {
+        let unknown = self.no_such(body);
+        let known = self.bodies.get_mut(body as usize);
+        known.and_then(Option::as_mut).ok_or(unknown)
+    }
+
+    fn no_such(&self, body: u32) -> Failure {
+        Failure::invalid(format!(
+            "there is no body {body} among the {} of this scene",
+            self.scene.n_bodies()
+        ))
+    }
+
+    /// The scene, unless an internal error has left it half changed.
+    pub fn sound(&self) -> Result<&Self, Failure> {
+        match self.is_broken {
+            true => Err(broken(Self::NAME)),
+            false => Ok(self),
+        }
+    }
+
+    /// The id of a body.
+    pub fn id(&self, body: u32) -> Result<BodyId, Failure> {
+        Ok(self.known(body)?.id)
+    }
+
+    fn body(&self, body: u32) -> Result<&Body, Failure> {
+        Ok(self.scene.body(self.id(body)?)?)
+    }
+
+    /// The caller's numbers of the edges of a body.
+    pub fn edge_numbers(&self, body: u32) -> Option<&EdgeNumbers> {
+        self.bodies.get(body as usize)?.as_ref()?.edges.as_ref()
+    }
+
+    /// Whether edges of any body have the caller's numbers.
+    pub fn renames_edges(&self) -> bool {
+        self.n_with_edges > 0
+    }
+
+    /// The bodies that are thick.
+    pub fn thickness(&self) -> impl Iterator<Item = (BodyId, f64)> + '_ {
+        let known = self.bodies.iter().flatten();
+        known
+            .filter(|body| body.thickness > 0.0)
+            .map(|body| (body.id, body.thickness))
+    }
+
+    /// Adds a body.
+    ///
+    /// # Safety
+    /// The arrays are as described.
+    unsafe fn add(
+        &mut self,
+        kind: u32,
+        elements: &impinge_array,
+        positions: &impinge_array,
+        body: *mut u32,
+    ) -> Result<(), Failure> {
+        // SAFETY: the caller's promise.
+        let at = unsafe { arrays::floats::<3>(positions, "positions") }?;
+        // SAFETY: the caller's promise.
+        let elements = unsafe { arrays::elements(kind, elements, at.len()) }?;
+        let id = self.scene.add(elements, at.into_owned()?)?;
+        let number = id.index();
+        if number >= self.bodies.len() {
+            self.bodies.resize_with(number + 1, || None);
+        }
+        self.bodies[number] = Some(Known {
+            id,
+            edges: None,
+            thickness: 0.0,
+        });
+        if !body.is_null() {
+            // SAFETY: the caller's promise.
+            unsafe { body.write(number as u32) };
+        }
+        Ok(())
+    }
+
+    fn forget_edges(&mut self, body: u32) -> Result<(), Failure> {
+        let had = self.known_mut(body)?.edges.take().is_some();
+        self.n_with_edges -= usize::from(had);
+        Ok(())
+    }
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn impinge_scene_create(scene: *mut *mut impinge_scene) -> Status {
+    guard(|| {
+        // SAFETY: `impinge.h` says what pointers are, here and in all functions below.
+        unsafe { put(scene, "scene", Box::into_raw(Box::default())) }
+    })
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn impinge_scene_destroy(scene: *mut impinge_scene) {
+    // SAFETY: see `impinge_scene_create`.
+    unsafe { destroy(scene) }
+}
+
+macro_rules! add {
+    ($name:ident, $kind:ident) => {
+        #[unsafe(no_mangle)]
+        pub unsafe extern "C" fn $name(
+            scene: *mut impinge_scene,
+            elements: impinge_array,
+            positions: impinge_array,
+            body: *mut u32,
+        ) -> Status {
+            // SAFETY: see `impinge_scene_create`.
+            unsafe { change(scene, |scene| scene.add($kind, &elements, &positions, body)) }
+        }
+    };
+}
+add!(impinge_scene_add_triangles, TRIANGLES);
+add!(impinge_scene_add_tetrahedra, TETRAHEDRA);
+add!(impinge_scene_add_edges, EDGES);
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn impinge_scene_add_points(
+    scene: *mut impinge_scene,
+    positions: impinge_array,
+    body: *mut u32,
+) -> Status {
+    // SAFETY: see `impinge_scene_create`.
+    unsafe {
+        change(scene, |scene| {
+            scene.add(POINTS, &no_rows(U32), &positions, body)
+        })
+    }
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn impinge_scene_remove(scene: *mut impinge_scene, body: u32) -> Status {
+    // SAFETY: see `impinge_scene_create`.
+    unsafe {
+        change(scene, |scene| {
+            scene.scene.remove(scene.id(body)?)?;
+            scene.forget_edges(body)?;
+            scene.bodies[body as usize] = None;
+            Ok(())
+        })
+    }
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn impinge_scene_remesh(
+    scene: *mut impinge_scene,
+    body: u32,
+    kind: u32,
+    elements: impinge_array,
+    positions: impinge_array,
+) -> Status {
+    // SAFETY: see `impinge_scene_create`.
+    unsafe {
+        change(scene, |scene| {
+            let id = scene.id(body)?;
+            let at = arrays::floats::<3>(&positions, "positions")?;
+            let elements = arrays::elements(kind, &elements, at.len())?;
+            scene.scene.remesh(id, elements, at.into_owned()?)?;
+            scene.forget_edges(body)
+        })
+    }
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn impinge_scene_set_edges(
+    scene: *mut impinge_scene,
+    body: u32,
+    edges: impinge_array,
+) -> Status {
+    // SAFETY: see `impinge_scene_create`.
+    unsafe {
+        change(scene, |scene| {
+            if edges.rows == 0 {
+                return scene.forget_edges(body);
+            }
+            let rows = arrays::indices::<2>(&edges, "edges")?;
+            let numbers = EdgeNumbers::new(body, scene.body(body)?, rows)?;
+            scene.forget_edges(body)?;
+            scene.known_mut(body)?.edges = Some(numbers);
+            scene.n_with_edges += 1;
+            Ok(())
+        })
+    }
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn impinge_scene_set_positions(
+    scene: *mut impinge_scene,
+    body: u32,
+    positions: impinge_array,
+) -> Status {
+    // SAFETY: see `impinge_scene_create`.
+    unsafe {
+        change(scene, |scene| {
+            let id = scene.id(body)?;
+            match arrays::floats::<3>(&positions, "positions")? {
+                Floats::F32(rows) => scene.scene.set_positions(id, &rows)?,
+                Floats::F64(rows) => scene.scene.set_positions(id, &rows)?,
+            }
+            Ok(())
+        })
+    }
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn impinge_scene_set_end_positions(
+    scene: *mut impinge_scene,
+    body: u32,
+    positions: impinge_array,
+) -> Status {
+    // SAFETY: see `impinge_scene_create`.
+    unsafe {
+        change(scene, |scene| {
+            let id = scene.id(body)?;
+            if positions.rows == 0 {
+                return Ok(scene.scene.clear_end_positions(id)?);
+            }
+            match arrays::floats::<3>(&positions, "positions")? {
+                Floats::F32(rows) => scene.scene.set_end_positions(id, &rows)?,
+                Floats::F64(rows) => scene.scene.set_end_positions(id, &rows)?,
+            }
+            Ok(())
+        })
+    }
+}
+
+/// Rows of a caller, who waits for `release` before changing them.
+struct Lent<R> {
+    rows: *const [[R; 3]],
+    release: Option<ReleaseCallback>,
+    user: *mut c_void,
+    /// Whether the scene has taken them. Until then nobody is called.
+    is_taken: AtomicBool,
+}
+
+// SAFETY: the rows are only read, and `impinge.h` says that `release` is called from any thread.
+unsafe impl<R: Sync> Send for Lent<R> {}
+// SAFETY: as above.
+unsafe impl<R: Sync> Sync for Lent<R> {}
+
+impl<R> AsRef<[[R; 3]]> for Lent<R> {
+    fn as_ref(&self) -> &[[R; 3]] {
+        // SAFETY: the caller lets the rows lie until `release` is called.
+        unsafe { &*self.rows }
+    }
+}
+
+impl<R> Drop for Lent<R> {
+    fn drop(&mut self) {
+        if let (Some(release), true) = (self.release, *self.is_taken.get_mut()) {
+            // SAFETY: the caller's function, with the caller's argument; called once.
+            unsafe { release(self.user) };
+        }
+    }
+}
+
+/// Where lent positions go.
+type Set = fn(&mut Scene, BodyId, Positions) -> Result<(), impinge::Error>;
+
+/// Hands positions to the scene where they lie, or a copy where rows are not packed.
+///
+/// # Safety
+/// `positions` is as described and lies unchanged until `release` is called.
+unsafe fn lend(
+    scene: &mut impinge_scene,
+    body: u32,
+    positions: &impinge_array,
+    (release, user): (Option<ReleaseCallback>, *mut c_void),
+    set: Set,
+) -> Result<(), Failure> {
+    let id = scene.id(body)?;
+    let mut share = |at| set(&mut scene.scene, id, at);
+    // SAFETY: the caller's promise.
+    match unsafe { arrays::floats::<3>(positions, "positions") }? {
+        Floats::F32(Cow::Borrowed(rows)) => lend_rows(rows, release, user, &mut share)?,
+        Floats::F64(Cow::Borrowed(rows)) => lend_rows(rows, release, user, &mut share)?,
+        copy => {
+            share(copy.into_owned()?)?;
+            if let Some(release) = release {
+                // SAFETY: the caller's function, with the caller's argument; called once.
+                unsafe { release(user) };
+            }
+        }
+    }
+    Ok(())
+}
+
+fn lend_rows<R: impinge::Real>(
+    rows: &[[R; 3]],
+    release: Option<ReleaseCallback>,
+    user: *mut c_void,
+    share: impl FnOnce(Positions) -> Result<(), impinge::Error>,
+) -> Result<(), Failure> {
+    let owner = Arc::new(Lent {
+        rows,
+        release,
+        user,
+        is_taken: AtomicBool::new(false),
+    });
+    share(PositionRows::shared(Arc::clone(&owner)).into())?;
+    owner.is_taken.store(true, Ordering::Relaxed);
+    Ok(())
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn impinge_scene_lend_positions(
+    scene: *mut impinge_scene,
+    body: u32,
+    positions: impinge_array,
+    release: Option<ReleaseCallback>,
+    user: *mut c_void,
+) -> Status {
+    let set: Set = |scene, body, at| scene.lend_positions(body, at);
+    // SAFETY: see `impinge_scene_create`.
+    unsafe {
+        change(scene, |scene| {
+            lend(scene, body, &positions, (release, user), set)
+        })
+    }
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn impinge_scene_lend_end_positions(
+    scene: *mut impinge_scene,
+    body: u32,
+    positions: impinge_array,
+    release: Option<ReleaseCallback>,
+    user: *mut c_void,
+) -> Status {
+    let set: Set = |scene, body, at| scene.lend_end_positions(body, at);
+    // SAFETY: see `impinge_scene_create`.
+    unsafe {
+        change(scene, |scene| {
+            lend(scene, body, &positions, (release, user), set)
+        })
+    }
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn impinge_scene_set_transform(
+    scene: *mut impinge_scene,
+    body: u32,
+    matrix: impinge_array,
+) -> Status {
+    // SAFETY: see `impinge_scene_create`.
+    unsafe {
+        change(scene, |scene| {
+            let id = scene.id(body)?;
+            let rows = arrays::floats::<4>(&matrix, "matrix")?;
+            if rows.len() != 4 {
+                let given = rows.len();
+                return Err(Failure::invalid(format!(
+                    "matrix: {given} rows of 4 given, 4 needed"
+                )));
+            }
+            let rows = std::array::from_fn(|row| rows.wide(row));
+            Ok(scene.scene.set_transform(id, &rows)?)
+        })
+    }
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn impinge_scene_set_filter(
+    scene: *mut impinge_scene,
+    body: u32,
+    category: u64,
+    mask: u64,
+) -> Status {
+    // SAFETY: see `impinge_scene_create`.
+    unsafe {
+        change(scene, |scene| {
+            let id = scene.id(body)?;
+            Ok(scene.scene.set_filter(id, Filter { category, mask })?)
+        })
+    }
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn impinge_scene_set_thickness(
+    scene: *mut impinge_scene,
+    body: u32,
+    thickness: f64,
+) -> Status {
+    // SAFETY: see `impinge_scene_create`.
+    unsafe {
+        change(scene, |scene| {
+            let known = scene.known_mut(body)?;
+            if !(thickness.is_finite() && thickness >= 0.0) {
+                return Err(Failure::invalid(format!(
+                    "thickness of body {body}: {thickness} given, a finite number that is not below 0 allowed"
+                )));
+            }
+            known.thickness = thickness;
+            Ok(())
+        })
+    }
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn impinge_scene_n_bodies(scene: *const impinge_scene) -> usize {
+    // SAFETY: see `impinge_scene_create`.
+    unsafe { scene.as_ref() }.map_or(0, |scene| scene.scene.n_bodies())
+}
+
+/// Shows a part of a body.
+///
+/// # Safety
+/// As `impinge.h` says of views.
+unsafe fn show(
+    scene: *const impinge_scene,
+    body: u32,
+    to: *mut impinge_array,
+    view: impl FnOnce(&impinge_scene, &Body) -> impinge_array,
+) -> Status {
+    guard(|| {
+        // SAFETY: the caller's promise.
+        let scene = unsafe { held(scene, "scene") }?.sound()?;
+        // SAFETY: the caller's promise.
+        unsafe { put(to, "view", view(scene, scene.body(body)?)) }
+    })
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn impinge_scene_positions(
+    scene: *const impinge_scene,
+    body: u32,
+    view: *mut impinge_array,
+) -> Status {
+    // SAFETY: see `impinge_scene_create`.
+    unsafe {
+        show(scene, body, view, |_, body| {
+            positions_view(body.positions())
+        })
+    }
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn impinge_scene_end_positions(
+    scene: *const impinge_scene,
+    body: u32,
+    view: *mut impinge_array,
+) -> Status {
+    let end = |_: &impinge_scene, body: &Body| match body.end_positions() {
+        Some(end) => positions_view(end),
+        None => no_rows(positions_view(body.positions()).r#type),
+    };
+    // SAFETY: see `impinge_scene_create`.
+    unsafe { show(scene, body, view, end) }
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn impinge_scene_elements(
+    scene: *const impinge_scene,
+    body: u32,
+    view: *mut impinge_array,
+) -> Status {
+    // SAFETY: see `impinge_scene_create`.
+    unsafe { show(scene, body, view, |_, body| elements_view(body.elements())) }
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn impinge_scene_edges(
+    scene: *const impinge_scene,
+    body: u32,
+    view: *mut impinge_array,
+) -> Status {
+    let edges = |scene: &impinge_scene, held: &Body| match scene.edge_numbers(body) {
+        Some(numbers) => arrays::view(&numbers.rows),
+        None => elements_view(held.part(Part::Edges)),
+    };
+    // SAFETY: see `impinge_scene_create`.
+    unsafe { show(scene, body, view, edges) }
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn impinge_scene_faces(
+    scene: *const impinge_scene,
+    body: u32,
+    view: *mut impinge_array,
+) -> Status {
+    // SAFETY: see `impinge_scene_create`.
+    unsafe {
+        show(scene, body, view, |_, body| {
+            elements_view(body.part(Part::Faces))
+        })
+    }
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn impinge_weld(
+    positions: impinge_array,
+    map: *mut u32,
+    firsts: *mut u32,
+    n_vertices: *mut usize,
+) -> Status {
+    guard(|| {
+        // SAFETY: see `impinge_scene_create`.
+        let weld = match unsafe { arrays::floats::<3>(&positions, "positions") }? {
+            Floats::F32(rows) => Weld::by_position(&rows),
+            Floats::F64(rows) => Weld::by_position(&rows),
+        };
+        if map.is_null() && positions.rows > 0 {
+            return Err(Failure::null("map"));
+        }
+        // SAFETY: the caller has room for as many numbers as there are positions, and there are no more vertices after welding.
+        unsafe {
+            put(n_vertices, "n_vertices", weld.firsts().len())?;
+            if positions.rows > 0 {
+                map.copy_from_nonoverlapping(weld.map().as_ptr(), weld.map().len());
+            }
+            if !firsts.is_null() {
+                firsts.copy_from_nonoverlapping(weld.firsts().as_ptr(), weld.firsts().len());
+            }
+        }
+        Ok(())
+    })
+}

@@ -1,0 +1,336 @@
+//! The structures and constants of `impinge.h`, with the same layout. `tests/layout.c` holds both against each other.
+
+#![allow(non_camel_case_types)]
+
+use std::ffi::{c_char, c_int, c_void};
+
+use impinge::PairKind;
+
+use crate::status::Failure;
+
+/// An `impinge_status`.
+pub type Status = i32;
+pub const OK: Status = 0;
+pub const INVALID: Status = 1;
+pub const OUT_OF_MEMORY: Status = 2;
+pub const BUDGET: Status = 3;
+pub const TOO_MANY_PAIRS: Status = 4;
+pub const CANCELLED: Status = 5;
+pub const DEVICE: Status = 6;
+pub const INTERNAL: Status = 7;
+
+pub const ABI_VERSION: u32 = 1;
+
+pub const F32: u32 = 1;
+pub const F64: u32 = 2;
+pub const U32: u32 = 3;
+pub const I32: u32 = 4;
+pub const U64: u32 = 5;
+pub const I64: u32 = 6;
+pub const U8: u32 = 7;
+
+pub const POINTS: u32 = 1;
+pub const EDGES: u32 = 2;
+pub const TRIANGLES: u32 = 3;
+pub const TETRAHEDRA: u32 = 4;
+
+pub const ANY_BODY: u32 = u32::MAX;
+
+pub const SKIP: u32 = 0;
+pub const RESOLVE: u32 = 1;
+
+pub const START_REPORT: u32 = 0;
+pub const START_SKIP: u32 = 1;
+pub const START_VERIFY: u32 = 2;
+
+pub const DISTANCES: u32 = 1;
+pub const CLOSEST_POINTS: u32 = 2;
+pub const CELL: u32 = 8;
+
+pub const HITS_FIRST: u32 = 0;
+
+pub const EXCLUDE_BODIES: u32 = 0;
+
+pub const LOG_ERROR: u32 = 1;
+pub const LOG_INFO: u32 = 2;
+
+pub const COLUMN_KIND: u32 = 1;
+pub const COLUMN_ROWS: u32 = 2;
+pub const COLUMN_DISTANCE: u32 = 3;
+pub const COLUMN_POINTS: u32 = 4;
+pub const COLUMN_FEATURES: u32 = 5;
+pub const COLUMN_PARALLEL: u32 = 6;
+pub const COLUMN_TOI: u32 = 7;
+pub const COLUMN_AT_START: u32 = 8;
+pub const COLUMN_SHAPE: u32 = 9;
+pub const COLUMN_STARTS: u32 = 10;
+pub const COLUMN_CORNERS: u32 = 11;
+pub const COLUMN_CONTACT_POINTS: u32 = 12;
+pub const COLUMN_CURVE_STARTS: u32 = 13;
+pub const COLUMN_CURVE_POINTS: u32 = 14;
+pub const COLUMN_CURVE_CLOSED: u32 = 15;
+pub const COLUMN_CURVE_LENGTH: u32 = 16;
+pub const COLUMN_INSIDE_A: u32 = 17;
+pub const COLUMN_INSIDE_B: u32 = 18;
+
+/// The bit of a kind of pairs, `IMPINGE_VF` and so on.
+pub fn bit(kind: PairKind) -> u32 {
+    1 << kind as u32
+}
+
+/// The kind of a bit.
+pub fn kind_of(bit: u32) -> Option<PairKind> {
+    PairKind::ALL
+        .into_iter()
+        .find(|&kind| self::bit(kind) == bit)
+}
+
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct impinge_array {
+    pub data: *const c_void,
+    pub rows: usize,
+    pub row_stride: isize,
+    pub column_stride: isize,
+    pub r#type: u32,
+}
+
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct impinge_exclusion {
+    pub kind: u32,
+    pub a: u32,
+    pub b: u32,
+    pub n: u32,
+    pub offsets: impinge_array,
+    pub vertices: impinge_array,
+}
+
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct impinge_query {
+    pub size: u32,
+    pub between: u32,
+    /// `self` in C.
+    pub own: u32,
+    pub shared_vertex: u32,
+    pub a: u32,
+    pub b: u32,
+    pub kinds: u32,
+    pub start: u32,
+    pub precision: u32,
+    pub hits: u32,
+    pub n_nearest: u32,
+    pub flags: u32,
+    pub separation: f64,
+    pub clearance: f64,
+    pub clearance_share: f64,
+    pub cell_low: [f64; 3],
+    pub cell_high: [f64; 3],
+    pub exclusions: *const impinge_exclusion,
+    pub n_exclusions: usize,
+    pub fixed: *const u32,
+    pub n_fixed: usize,
+}
+
+impl Default for impinge_query {
+    fn default() -> Self {
+        impinge_query {
+            size: size_of::<Self>() as u32,
+            between: 1,
+            own: 1,
+            shared_vertex: RESOLVE,
+            a: ANY_BODY,
+            b: ANY_BODY,
+            kinds: 0,
+            start: START_REPORT,
+            precision: F32,
+            hits: HITS_FIRST,
+            n_nearest: 0,
+            flags: 0,
+            separation: 0.0,
+            clearance: 0.0,
+            clearance_share: 0.2,
+            cell_low: [0.0; 3],
+            cell_high: [0.0; 3],
+            exclusions: std::ptr::null(),
+            n_exclusions: 0,
+            fixed: std::ptr::null(),
+            n_fixed: 0,
+        }
+    }
+}
+
+pub type CancelledCallback = unsafe extern "C" fn(*mut c_void) -> c_int;
+pub type ProgressCallback = unsafe extern "C" fn(*mut c_void, u64, u64);
+pub type LogCallback = unsafe extern "C" fn(*mut c_void, u32, *const c_char);
+pub type RunCallback = unsafe extern "C" fn(*mut c_void, u32, *const impinge_pair, usize) -> c_int;
+pub type ReleaseCallback = unsafe extern "C" fn(*mut c_void);
+
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct impinge_settings {
+    pub size: u32,
+    pub backend: u32,
+    pub method: u32,
+    pub threads: u32,
+    pub memory_budget: u64,
+    pub max_pairs: u64,
+    pub cancelled: Option<CancelledCallback>,
+    pub user: *mut c_void,
+    pub progress: Option<ProgressCallback>,
+    pub log: Option<LogCallback>,
+    pub device: *const c_char,
+}
+
+impl Default for impinge_settings {
+    fn default() -> Self {
+        impinge_settings {
+            size: size_of::<Self>() as u32,
+            backend: 0,
+            method: 0,
+            threads: 0,
+            memory_budget: 0,
+            max_pairs: 0,
+            cancelled: None,
+            user: std::ptr::null_mut(),
+            progress: None,
+            log: None,
+            device: std::ptr::null(),
+        }
+    }
+}
+
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct impinge_pair {
+    pub body_a: u32,
+    pub element_a: u32,
+    pub body_b: u32,
+    pub element_b: u32,
+}
+
+impl From<[u32; 4]> for impinge_pair {
+    fn from([body_a, element_a, body_b, element_b]: [u32; 4]) -> Self {
+        impinge_pair {
+            body_a,
+            element_a,
+            body_b,
+            element_b,
+        }
+    }
+}
+
+impl impinge_pair {
+    pub fn row(self) -> [u32; 4] {
+        [self.body_a, self.element_a, self.body_b, self.element_b]
+    }
+}
+
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct impinge_impact {
+    pub toi: f64,
+    pub kind: u32,
+    pub body_a: u32,
+    pub element_a: u32,
+    pub body_b: u32,
+    pub element_b: u32,
+    pub at_start: u32,
+}
+
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct impinge_nearest {
+    pub distance: f64,
+    pub points: [[f64; 3]; 2],
+    pub body_a: u32,
+    pub element_a: u32,
+    pub body_b: u32,
+    pub element_b: u32,
+}
+
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct impinge_region {
+    pub position: [f64; 3],
+    pub bounds: [[f64; 3]; 2],
+    pub length: f64,
+    pub patch_area: f64,
+    pub area: [f64; 3],
+    pub normal: [f64; 3],
+    pub depth: f64,
+    pub volume: f64,
+    pub body_a: u32,
+    pub body_b: u32,
+    pub n_contacts: u64,
+    pub n_inside: [u64; 2],
+}
+
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct impinge_stats {
+    pub size: u32,
+    pub n_threads: u32,
+    pub total_ms: f64,
+    pub n_candidates: u64,
+    pub n_unsure: u64,
+    pub n_work_items: u64,
+    pub n_clusters: u64,
+    pub n_remote: u64,
+    pub n_clustered: u64,
+    pub n_slabs: u64,
+    pub n_reruns: u64,
+    pub bytes_held: u64,
+    pub backend: *const c_char,
+    pub method: *const c_char,
+}
+
+/// A structure that callers pass with its size, and that grows at its end only.
+///
+/// # Safety
+/// `#[repr(C)]`, the first field is `size: u32`, and all bytes that a caller may give are a valid value.
+pub unsafe trait Sized32: Copy + Default {
+    const NAME: &'static str;
+}
+
+// SAFETY: numbers and pointers; a callback that is not NULL is the caller's function.
+unsafe impl Sized32 for impinge_query {
+    const NAME: &'static str = "impinge_query";
+}
+
+// SAFETY: as above.
+unsafe impl Sized32 for impinge_settings {
+    const NAME: &'static str = "impinge_settings";
+}
+
+/// The structure of a caller, whose header may be older: the defaults stand for what it lacks. NULL is all defaults.
+///
+/// # Safety
+/// `given` is NULL or points to a structure of as many bytes as its first field says.
+pub unsafe fn read_sized<T: Sized32>(given: *const T) -> Result<T, Failure> {
+    let mut read = T::default();
+    if given.is_null() {
+        return Ok(read);
+    }
+    // SAFETY: the first field is a `u32`, and the caller says that it is there.
+    let size = unsafe { given.cast::<u32>().read_unaligned() } as usize;
+    let least = size_of::<u32>();
+    if size <= least || size > size_of::<T>() {
+        return Err(Failure::invalid(format!(
+            "{}: its size is {size}, and this library knows {} bytes: fill it by {}_default first, and use the header of this library",
+            T::NAME,
+            size_of::<T>(),
+            T::NAME
+        )));
+    }
+    // SAFETY: both have at least `size` bytes.
+    unsafe {
+        std::ptr::copy_nonoverlapping(
+            given.cast::<u8>(),
+            std::ptr::from_mut(&mut read).cast::<u8>(),
+            size,
+        );
+    }
+    Ok(read)
+}
