@@ -73,7 +73,7 @@ typedef struct impinge_array {
   size_t rows;
   ptrdiff_t row_stride;    /* bytes; may be negative */
   ptrdiff_t column_stride; /* bytes; may be negative */
-  uint32_t type;           /* IMPINGE_F32 … */
+  uint32_t type;           /* IMPINGE_F32 ... */
 } impinge_array;
 
 /* ---- Scenes ---- */
@@ -115,7 +115,7 @@ impinge_status impinge_scene_add_points(impinge_scene *scene, impinge_array posi
 /* Removes a body. A later body may get its number. INVALID: no such body. */
 impinge_status impinge_scene_remove(impinge_scene *scene, uint32_t body);
 
-/* Gives a body new elements and positions under its number. `kind` is IMPINGE_TRIANGLES …; for IMPINGE_POINTS `elements` has no rows.
+/* Gives a body new elements and positions under its number. `kind` is IMPINGE_TRIANGLES ...; for IMPINGE_POINTS `elements` has no rows.
  * Its filter and thickness stay; the end of its step, its transform and the caller's numbers of edges are forgotten.
  * INVALID: as impinge_scene_add_triangles, and no such body. */
 impinge_status impinge_scene_remesh(impinge_scene *scene, uint32_t body, uint32_t kind, impinge_array elements, impinge_array positions);
@@ -238,7 +238,7 @@ typedef struct impinge_exclusion {
  *                       between = 1, self = 0: pairs of `a` and any other, whatever filters say; with between = 0, self = 1: its
  * self-collision.
  *   shared_vertex       Default: IMPINGE_RESOLVE.
- *   kinds               Bits of IMPINGE_VF …, for candidates and near pairs. 0, the default: VF and EE; near pairs also EF; EV and VV
+ *   kinds               Bits of IMPINGE_VF ..., for candidates and near pairs. 0, the default: VF and EE; near pairs also EF; EV and VV
  * where bodies have no faces.
  *   flags IMPINGE_CELL, cell_low, cell_high
  *                       Only the pairs of the half-open box [low, high): those for which it holds the larger of the lower
@@ -247,7 +247,7 @@ typedef struct impinge_exclusion {
  *   exclusions, n_exclusions
  *                       Pairs to leave out. They are read during the call.
  * How: a question without use for one of these fields ignores it.
- *   start               IMPINGE_START_REPORT …
+ *   start               IMPINGE_START_REPORT ...
  *   precision           IMPINGE_F32 (default) or IMPINGE_F64: that of times, which are rounded down.
  *   separation          A length, 0 or more: elements that are so near count as touching. Of steps.
  *   clearance           A length, 0 or more: what a step leaves. A pair at the distance d at the start keeps
@@ -337,7 +337,7 @@ typedef struct impinge_pair {
   uint32_t body_a, element_a, body_b, element_b;
 } impinge_pair;
 
-/* Two elements that touch during a step. `toi` is the first time, rounded down; `kind` one of IMPINGE_VF …; `at_start` 1 if they touch at
+/* Two elements that touch during a step. `toi` is the first time, rounded down; `kind` one of IMPINGE_VF ...; `at_start` 1 if they touch at
  * the
  * start, else 0. Vertices are numbered as positions are, faces as impinge_scene_faces, edges as impinge_scene_edges. */
 typedef struct impinge_impact {
@@ -385,7 +385,7 @@ typedef struct impinge_stats {
 } impinge_stats;
 
 /* Columns of answers, as views without a copy that are valid as long as the answer. n is the number of pairs, impacts or contacts.
- *   KIND        n x 1 U8       one of IMPINGE_VF …              near pairs, candidates; n x 1 U32 of impacts
+ *   KIND        n x 1 U8       one of IMPINGE_VF ...              near pairs, candidates; n x 1 U32 of impacts
  *   ROWS        n x 4 U32      body_a, element_a, body_b, element_b   all
  *   DISTANCE    n x 1 F64      with IMPINGE_DISTANCES or IMPINGE_CLOSEST_POINTS          near pairs
  *   POINTS      n x 6 F64      with IMPINGE_CLOSEST_POINTS: a point of a, one of b       near pairs
@@ -393,7 +393,7 @@ typedef struct impinge_stats {
  * face
  *   PARALLEL    n x 1 U8       1 if there may be several nearest points                  near pairs
  *   TOI, AT_START  n x 1 F64, n x 1 U32                          impacts
- *   SHAPE       n x 1 U8       IMPINGE_SHAPE_… of each contact                          contacts
+ *   SHAPE       n x 1 U8       IMPINGE_SHAPE_... of each contact                          contacts
  *   STARTS      n + 1 x 1 U64  where the corners of each contact start                  contacts
  *   CORNERS     m x 1 U32      numbers of points                                        contacts
  *   CONTACT_POINTS p x 3 F64   where they are, each rounded to nearest                  contacts
@@ -483,7 +483,7 @@ typedef struct impinge_candidates impinge_candidates;
 impinge_status impinge_find_candidates(impinge_detector *detector, const impinge_scene *scene, double inflation,
     const impinge_query *query, impinge_candidates **candidates);
 
-/* The same in sorted runs of at most `most` pairs of one kind (IMPINGE_VF …), for answers larger than memory. `each` gets one run after
+/* The same in sorted runs of at most `most` pairs of one kind (IMPINGE_VF ...), for answers larger than memory. `each` gets one run after
  * the other, whose rows
  * are valid during the call; anything but 0 from it stops the search. `n` gets the number of pairs handed out and may be NULL. */
 impinge_status impinge_find_candidates_in_runs(impinge_detector *detector, const impinge_scene *scene, double inflation,
@@ -528,7 +528,7 @@ int32_t impinge_detector_start_intersects(const impinge_detector *detector);
 /* ---- Answers ----
  * count: the number of rows; 0 for NULL. data: the rows, sorted; NULL if there are none. hash: a hash of the set, the same in every
  * language, which does
- * not depend on order, and is that of the library's own numbers of edges. column: a view, see IMPINGE_COLUMN_…; INVALID: no such column.
+ * not depend on order, and is that of the library's own numbers of edges. column: a view, see IMPINGE_COLUMN_...; INVALID: no such column.
  * stats: what the answer cost. */
 
 size_t impinge_pairs_count(const impinge_pairs *pairs);

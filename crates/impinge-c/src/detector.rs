@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 
 use impinge::{Backend, CancelToken, Control, Detector, Error, Method, Progress, Settings};
 
+use crate::sized::read_sized;
 use crate::stats::{Texts, fill};
 use crate::status::{Failure, Handle, change, clear, destroy, guard, held, put};
 use crate::types::*;

@@ -19,6 +19,7 @@ mod motion;
 mod query;
 mod questions;
 mod scene;
+mod sized;
 mod stats;
 mod status;
 mod types;

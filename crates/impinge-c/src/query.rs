@@ -6,6 +6,7 @@ use impinge::{
 };
 
 use crate::scene::impinge_scene;
+use crate::sized::read_sized;
 use crate::status::Failure;
 use crate::types::*;
 

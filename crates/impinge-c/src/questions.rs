@@ -15,6 +15,7 @@ use crate::detector::{ask, impinge_detector};
 use crate::motion::{impinge_motion, put_found};
 use crate::query::{Asked, check_length};
 use crate::scene::impinge_scene;
+use crate::sized::read_sized;
 use crate::status::{Failure, clear, guard, held, put};
 use crate::types::*;
 
