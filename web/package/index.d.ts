@@ -42,12 +42,23 @@ export interface StepOptions {
   bodies?: readonly [] | readonly [Body] | readonly [Body, Body];
   /** Without `bodies`: all pairs (`"all"`, the default), or those of different bodies alone (`"between"`). */
   which?: "all" | "between";
-  /** Pairs that touch at the start: reported with the time 0 (`"report"`, the default) or not at all (`"skip"`). */
-  start?: "report" | "skip";
+  /**
+   * Pairs that touch at the start: reported with the time 0 (`"report"`, the default) or not at all (`"skip"`). Surfaces that already
+   * pass through each other need not touch at all; with `"verify"` the start is asked for intersections, too, and answers say
+   * `startIntersects`. A step whose start intersects is then not free, and `advance` allows none of it.
+   */
+  start?: "report" | "skip" | "verify";
   /** The precision to which times are rounded down: `"f32"` by default. */
   toi?: "f32" | "f64";
   /** The distance that elements must keep, in the unit of the scene: 0 by default. */
   separation?: number;
+  /**
+   * What a step leaves between elements, in the unit of the scene: 0 by default. A pair counts as in contact when its distance is at
+   * most this, but a pair that is near at the start keeps only a share of its distance there (`clearanceShare`, 0.2 by default).
+   */
+  clearance?: number;
+  /** From 0 to less than 1. */
+  clearanceShare?: number;
 }
 
 /**
@@ -80,7 +91,57 @@ export interface Impacts extends Iterable<Impact> {
   readonly names: readonly Impact["kind"][];
   /** 1 for impacts at the start, else 0. */
   readonly atStart: Uint8Array;
+  /** Whether elements intersect at the start of the step; `null` unless `start: "verify"` asked. */
+  readonly startIntersects: boolean | null;
 }
+
+/** How far a step can be taken. */
+export interface Advance {
+  /** The part of the step that can be taken: 1 for all of it, 0 for none. */
+  readonly fraction: number;
+  /** The first contact of the whole step, if any; with a clearance, the first time at which a pair is as near as it may come. */
+  readonly first: Impact | null;
+  /** As in `Impacts`. If it is true, the fraction is 0. */
+  readonly startIntersects: boolean | null;
+  /** How many fractions were tried. */
+  readonly nTried: number;
+  /**
+   * The positions of a body at that fraction, rounded to the precision in which it has them; `null` for a body that does not move. The
+   * straight path to them is free, if the start was free of intersections, and except for pairs that touch at the start.
+   */
+  positions(body: Body): Positions | null;
+  /** Moves the bodies of a detector to these positions. */
+  apply(detector: { setPositions(body: Body, positions: Positions): void }): void;
+}
+
+/** Vertices, and what they are the corners of. */
+export interface Mesh {
+  positions: Positions;
+  faces?: Index;
+  tetrahedra?: Index;
+  edges?: Index;
+}
+
+/** A mesh of which vertices at the same position have become one. */
+export interface Welded<P extends Positions = Positions> {
+  mesh: { positions: P; faces?: Uint32Array; tetrahedra?: Uint32Array; edges?: Uint32Array };
+  /** For each vertex before the welding, its number after it. */
+  map: Uint32Array;
+  /** The positions of the welded vertices, taken from those of all vertices, of any frame. */
+  positions<Q extends Positions>(positions: Q): Q;
+}
+
+/**
+ * Welds vertices whose coordinates are equal, without a tolerance. A `BufferGeometry` repeats vertices along seams, and the faces
+ * on both sides of a seam touch but are neighbours only once it is welded. Primitives keep their number and order.
+ *
+ * ```js
+ * const { mesh, positions } = weld({ faces: geometry.index.array, positions: geometry.attributes.position.array });
+ * const body = detector.add(mesh.faces, mesh.positions);
+ * detector.setPositions(body, positions(nextFrame));
+ * ```
+ */
+export function weld<P extends Positions>(mesh: Mesh & { positions: P }): Welded<P>;
 
 /** Everything that a WebAssembly module can be loaded from. */
 export type Module = WebAssembly.Module | BufferSource | Response | URL | string;
@@ -128,6 +189,12 @@ export declare class Detector {
   impacts(options?: StepOptions): Impacts;
   /** The earliest impact of a step, or `null` if nothing touches. Faster than `impacts`. */
   earliest(options?: StepOptions): Impact | null;
+  /** Whether nothing touches during a step. */
+  isFree(options?: StepOptions): boolean;
+  /** How far a step can be taken. */
+  advance(options?: StepOptions): Advance;
+  /** Whether elements intersect at the start of the step that was asked about last; `null` unless `start: "verify"` asked. */
+  readonly startIntersects: boolean | null;
   /** The hash of the last set of pairs or impacts, 16 hexadecimal digits: the same on every method, backend and machine. */
   readonly hash: string;
   /** Statistics of the last answer. */

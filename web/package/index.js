@@ -1,17 +1,24 @@
 // impinge on the CPU: WebAssembly with SIMD, synchronous.
 
-import load, { Engine, kind_names } from "./cpu/impinge.js";
-import { Bodies, bodies, chosen, loader } from "./shared.js";
+import load, { Engine, StepQuestion, kind_names, weld_f32, weld_f64 } from "./cpu/impinge.js";
+import { Bodies, bodies, chosen, loader, welder } from "./shared.js";
 
 const [init, mustBeReady] = loader(load, new URL("./cpu/impinge_bg.wasm", import.meta.url));
 export default init;
+
+const welded = welder(weld_f32, weld_f64);
+
+export function weld(mesh) {
+  mustBeReady();
+  return welded(mesh);
+}
 
 export class Detector {
   #bodies;
 
   constructor(options) {
     mustBeReady();
-    this.#bodies = new Bodies(new Engine(...chosen(options)));
+    this.#bodies = new Bodies(new Engine(...chosen(options)), { StepQuestion, kind_names });
   }
 
   add(index, positions) {
@@ -55,11 +62,23 @@ export class Detector {
   }
 
   impacts(options) {
-    return this.#bodies.impacts(kind_names(), options);
+    return this.#bodies.impacts(options);
   }
 
   earliest(options) {
-    return this.#bodies.earliest(kind_names(), options);
+    return this.#bodies.earliest(options);
+  }
+
+  isFree(options) {
+    return this.#bodies.isFree(options);
+  }
+
+  advance(options) {
+    return this.#bodies.advance(options);
+  }
+
+  get startIntersects() {
+    return this.#bodies.startIntersects;
   }
 
   get hash() {

@@ -63,12 +63,25 @@ export function chosen({ method = "auto", sharedVertex = "resolve", ...others } 
   return [String(method), String(sharedVertex)];
 }
 
-function step({ bodies: given = [], which = "all", start = "report", toi = "f32", separation = 0, ...others } = {}) {
-  mustBeNone(others, '"bodies", "which", "start", "toi" or "separation"');
+const STEP_OPTIONS = '"bodies", "which", "start", "toi", "separation", "clearance" or "clearanceShare"';
+
+// The arguments of a question about a step.
+function step({
+  bodies: given = [],
+  which = "all",
+  start = "report",
+  toi = "f32",
+  separation = 0,
+  clearance = 0,
+  clearanceShare = 0.2,
+  ...others
+} = {}) {
+  mustBeNone(others, STEP_OPTIONS);
   if (which !== "all" && which !== "between") {
     throw new RangeError(`which: "${which}" given, "all" or "between" allowed`);
   }
-  return [bodies(...given), which === "all", String(start), String(toi), Number(separation)];
+  const distances = [separation, clearance, clearanceShare].map(Number);
+  return [bodies(...given), which === "all", String(start), String(toi), ...distances];
 }
 
 function impact(impacts, ix) {
@@ -79,8 +92,8 @@ function impact(impacts, ix) {
 }
 
 class Impacts {
-  constructor(names, [kinds, rows, times, atStart]) {
-    Object.assign(this, { names, kinds, rows, times, atStart });
+  constructor(names, [kinds, rows, times, atStart], startIntersects = null) {
+    Object.assign(this, { names, kinds, rows, times, atStart, startIntersects });
   }
 
   get length() {
@@ -97,12 +110,58 @@ class Impacts {
   }
 }
 
+class Advance {
+  #positions;
+
+  constructor(names, [fraction, nTried, first, moving, positions], startIntersects) {
+    Object.assign(this, { fraction, nTried, startIntersects, first: new Impacts(names, first).at(0) ?? null });
+    this.#positions = new Map([...moving].map((body, ix) => [body, positions[ix]]));
+  }
+
+  positions(which) {
+    return this.#positions.get(body(which)) ?? null;
+  }
+
+  apply(detector) {
+    for (const [body, positions] of this.#positions) detector.setPositions(body, positions);
+  }
+}
+
+// Makes `weld` of the two functions of a module.
+export function welder(weld_f32, weld_f64) {
+  return ({ positions, faces, tetrahedra, edges, ...others }) => {
+    mustBeNone(others, '"positions", "faces", "tetrahedra" or "edges"');
+    const map = isSingle(positions) ? weld_f32(positions) : weld_f64(positions);
+    // The first vertex of each welded one.
+    const firsts = [];
+    for (const [vertex, welded] of map.entries()) if (welded === firsts.length) firsts.push(vertex);
+    const weldedPositions = (given) => {
+      isSingle(given);
+      if (given.length !== 3 * map.length) {
+        throw new RangeError(`positions: ${given.length} numbers given for a weld of ${map.length} vertices`);
+      }
+      const kept = new given.constructor(3 * firsts.length);
+      for (const [to, from] of firsts.entries()) kept.set(given.subarray(3 * from, 3 * from + 3), 3 * to);
+      return kept;
+    };
+    const mesh = { positions: weldedPositions(positions) };
+    for (const [name, index] of Object.entries({ faces, tetrahedra, edges })) {
+      // Numbers that no vertex has stay so: the detector refuses them.
+      if (index !== undefined) mesh[name] = wide(index).map((vertex) => map[vertex] ?? vertex);
+    }
+    return { mesh, map, positions: weldedPositions };
+  };
+}
+
 // The bodies of a detector of either build, and its last answer.
 export class Bodies {
   #engine;
+  #module;
 
-  constructor(engine) {
+  // `module`: `kind_names` and `StepQuestion`, if steps are asked about.
+  constructor(engine, module) {
     this.#engine = engine;
+    this.#module = module;
   }
 
   get engine() {
@@ -145,12 +204,31 @@ export class Bodies {
     return { primitives, vertices };
   }
 
-  impacts(names, options) {
-    return new Impacts(names, this.engine.impacts(...step(options)));
+  impacts(options) {
+    const found = this.engine.impacts(this.#question(options));
+    return new Impacts(this.#module.kind_names(), found, this.startIntersects);
   }
 
-  earliest(names, options) {
-    return new Impacts(names, this.engine.earliest(...step(options))).at(0) ?? null;
+  earliest(options) {
+    const found = this.engine.earliest(this.#question(options));
+    return new Impacts(this.#module.kind_names(), found).at(0) ?? null;
+  }
+
+  isFree(options) {
+    return this.engine.is_free(this.#question(options));
+  }
+
+  advance(options) {
+    const found = this.engine.advance(this.#question(options));
+    return new Advance(this.#module.kind_names(), found, this.startIntersects);
+  }
+
+  #question(options) {
+    return new this.#module.StepQuestion(...step(options));
+  }
+
+  get startIntersects() {
+    return this.engine.start_intersects() ?? null;
   }
 
   get hash() {

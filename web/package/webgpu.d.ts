@@ -3,6 +3,8 @@ import type { Body, Index, Module, Options, Positions, Statistics } from "./inde
 /** Loads the WebAssembly module. Later calls wait for the first. */
 export default function init(module?: Module | Promise<Module>): Promise<void>;
 
+export { weld } from "./index.js";
+
 /** An answer of the GPU: the same pairs and the same hash as on the CPU. */
 export interface Answer {
   pairs: Uint32Array;

@@ -1,10 +1,17 @@
 // impinge on WebGPU, asynchronous; and the readers of mesh files.
 
-import load, { Engine, MeshFile, read_frames } from "./gpu/impinge.js";
-import { Bodies, bodies, chosen, loader, mustBeNone } from "./shared.js";
+import load, { Engine, MeshFile, read_frames, weld_f32, weld_f64 } from "./gpu/impinge.js";
+import { Bodies, bodies, chosen, loader, mustBeNone, welder } from "./shared.js";
 
 const [init, mustBeReady] = loader(load, new URL("./gpu/impinge_bg.wasm", import.meta.url));
 export default init;
+
+const welded = welder(weld_f32, weld_f64);
+
+export function weld(mesh) {
+  mustBeReady();
+  return welded(mesh);
+}
 
 // The module cannot be entered while it awaits an answer, so later calls wait for their turn.
 export class GpuDetector {

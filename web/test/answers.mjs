@@ -101,7 +101,8 @@ export async function refusals(module) {
   said.self = await refusal(() => detector.between(a, a));
   said.method = await refusal(() => new Detector({ method: "octree" }));
   said.option = await refusal(() => new Detector({ metod: "cells" }));
-  said.clearance = await refusal(() => detector.impacts({ clearance: 0.1 }));
+  said.clearance = await refusal(() => detector.impacts({ clearance: -1 }));
+  said.start = await refusal(() => detector.isFree({ start: "never" }));
   said.earliest = await refusal(() => detector.earliest({ bodies: [a], seperation: 5 }));
   said.which = await refusal(() => detector.impacts({ which: "self" }));
   said.separation = await refusal(() => detector.impacts({ separation: NaN }));
@@ -127,8 +128,10 @@ export const REFUSALS = {
   self: "Error: a query between body 0 and itself: ask for collisions within it instead",
   method: 'Error: method: "octree" given, "auto", "clusters", "cells" or "naive" allowed',
   option: 'TypeError: options: "metod" given, "method" or "sharedVertex" allowed',
-  clearance: 'TypeError: options: "clearance" given, "bodies", "which", "start", "toi" or "separation" allowed',
-  earliest: 'TypeError: options: "seperation" given, "bodies", "which", "start", "toi" or "separation" allowed',
+  clearance: "Error: clearance: -1 given, a finite number that is not below 0 allowed",
+  start: 'Error: start: "never" given, "report", "skip" or "verify" allowed',
+  earliest:
+    'TypeError: options: "seperation" given, "bodies", "which", "start", "toi", "separation", "clearance" or "clearanceShare" allowed',
   which: 'RangeError: which: "self" given, "all" or "between" allowed',
   separation: "Error: separation: NaN given, a finite number that is not below 0 allowed",
   pairs: [0, 0],
@@ -136,12 +139,85 @@ export const REFUSALS = {
   disposed: "Error: this detector has been disposed of",
 };
 
+// A triangle whose edge is inside another, and a third that falls on both; and a welded seam.
+export async function steps(module) {
+  const { default: init, Detector, weld } = await import(module);
+  await init();
+  const detector = new Detector();
+  const index = new Uint8Array([0, 1, 2]);
+  const flat = detector.add(index, new Float32Array([0, 0, 0, 1, 0, 0, 0, 1, 0]));
+  const across = detector.add(index, new Float32Array([0.25, 0.25, -1, 0.25, 0.25, 1, 2, 2, 0]));
+  const start = "verify";
+  const unasked = [detector.impacts().startIntersects, detector.startIntersects, detector.isFree()];
+  const asked = [detector.impacts({ start }).startIntersects, detector.startIntersects, detector.isFree({ start })];
+  const { fraction: stuck, startIntersects, first: none } = detector.advance({ start });
+  detector.earliest({ bodies: [flat], start });
+  const clean = detector.startIntersects;
+  detector.remove(across);
+  const falling = detector.add(index, new Float64Array([0.25, 0.25, 1, 0.5, 0.25, 2, 0.25, 0.5, 2]));
+  detector.setEndPositions(falling, new Float64Array([0.25, 0.25, -1, 0.5, 0.25, 0, 0.25, 0.5, 0]));
+  const { time } = detector.earliest({ toi: "f64", clearance: 0.5, clearanceShare: 0.75 });
+  const advance = detector.advance({ start, toi: "f64", clearance: 10, clearanceShare: 0.25 });
+  const { first, nTried, fraction } = advance;
+  const height = advance.positions(falling)[2];
+  advance.apply(detector);
+  const still = detector.isFree();
+  detector.dispose();
+  // Two triangles that share an edge, with its vertices repeated; the second in another frame.
+  const seam = new Float32Array([0, 0, 0, 1, 0, 0, 0, 1, 0, 1, 0, 0, 0, 1, -0, 1, 1, 0]);
+  const { mesh, map, positions } = weld({ positions: seam, faces: new Uint16Array([0, 1, 2, 3, 5, 4]), edges: new Uint8Array([1, 9]) });
+  const moved = positions(Float64Array.from(seam, (x) => x + 1));
+  return {
+    unasked,
+    asked,
+    stuck: [stuck, startIntersects, none],
+    clean,
+    time,
+    // With a clearance the time has a margin for rounding.
+    first: [first.kind, first.bodyA, first.bodyB, first.time > 0.37 && first.time <= 0.375],
+    isTried: nTried > 0,
+    reached: [fraction > 0.37 && fraction <= 0.375, Math.abs(height - (1 - 2 * fraction)) < 1e-9],
+    others: [advance.startIntersects, advance.positions(flat), still],
+    welded: [...mesh.positions],
+    faces: [...mesh.faces],
+    edges: [...mesh.edges],
+    isSolid: "tetrahedra" in mesh,
+    map: [...map],
+    moved: [moved.constructor.name, ...moved],
+    short: await refusal(() => positions(seam.subarray(3))),
+    ragged: await refusal(() => weld({ positions: seam.subarray(1) })),
+    misspelt: await refusal(() => weld({ positions: seam, index: new Uint8Array(3) })),
+  };
+}
+
+export const STEPS = {
+  unasked: [null, null, true],
+  asked: [true, true, false],
+  stuck: [0, true, null],
+  clean: false,
+  time: 0.25,
+  first: ["vf", 2, 0, true],
+  isTried: true,
+  reached: [true, true],
+  others: [false, null, true],
+  welded: [0, 0, 0, 1, 0, 0, 0, 1, 0, 1, 1, 0],
+  faces: [0, 1, 2, 1, 3, 2],
+  edges: [1, 9],
+  isSolid: false,
+  map: [0, 1, 2, 1, 2, 3],
+  moved: ["Float64Array", 1, 1, 1, 2, 1, 1, 1, 2, 1, 2, 2, 1],
+  short: "RangeError: positions: 15 numbers given for a weld of 6 vertices",
+  ragged: "Error: positions: 17 numbers given, not a multiple of 3",
+  misspelt: 'TypeError: options: "index" given, "positions", "faces", "tetrahedra" or "edges" allowed',
+};
+
 if (globalThis.process?.argv?.[1]?.endsWith("answers.mjs")) {
   const { readFile, readdir } = await import("node:fs/promises");
   const scenes = JSON.parse(await readFile("scenes.json", "utf8"));
   const said = await refusals("impinge");
   const answers = await cpu("impinge", scenes);
-  const { default: init, GpuDetector, readBodies, readFrames, readMesh } = await import("impinge/webgpu");
+  const taken = await steps("impinge");
+  const { default: init, GpuDetector, readBodies, readFrames, readMesh, weld } = await import("impinge/webgpu");
   const { Detector } = await import("impinge");
   await init();
   const doors = {};
@@ -166,6 +242,7 @@ if (globalThis.process?.argv?.[1]?.endsWith("answers.mjs")) {
   const misspelt = [readMesh, readBodies].map((read) => refusal(() => read("triangle.obj", new TextEncoder().encode(text), { wield: false })));
   const options = await Promise.all(misspelt);
   const { corners } = mesh;
-  const read = { index: [...mesh.index], positions: [...mesh.positions], corners, map: [...mesh.map], frames, noGpu, broken, cut, options };
-  process.stdout.write(JSON.stringify({ said, answers, read, doors }));
+  const { map: welded } = weld({ positions: new Float64Array([1, 2, 3, 1, 2, 3]) });
+  const read = { welded: [...welded], index: [...mesh.index], positions: [...mesh.positions], corners, map: [...mesh.map], frames, noGpu, broken, cut, options };
+  process.stdout.write(JSON.stringify({ said, answers, taken, read, doors }));
 }

@@ -1,6 +1,6 @@
 // Uses all of the package's types; tsc checks it.
 
-import init, { Detector, type Body, type Impact, type Statistics } from "impinge";
+import init, { Detector, weld, type Advance, type Body, type Impact, type Statistics, type StepOptions } from "impinge";
 import initGpu, { GpuDetector, readBodies, readFrames, readMesh, type FileMesh } from "impinge/webgpu";
 
 await init();
@@ -16,6 +16,14 @@ const different: Uint32Array = detector.betweenAll();
 const first: Impact | null = detector.earliest({ bodies: [a, b], start: "skip", toi: "f64", separation: 0.5 });
 const times: number[] = [...detector.impacts({ which: "between" })].map(({ time }) => time);
 const kind: "vf" | undefined | string = detector.impacts().at(0)?.kind;
+const options: StepOptions = { start: "verify", clearance: 1e-4, clearanceShare: 0.2 };
+const free: boolean = detector.isFree(options);
+const advance: Advance = detector.advance(options);
+advance.apply(detector);
+const known: (boolean | null)[] = [detector.startIntersects, detector.impacts(options).startIntersects, advance.startIntersects];
+const { mesh: whole, positions: frame } = weld({ positions: new Float32Array(9), faces: new Uint16Array([0, 1, 2]) });
+const next: Float64Array = frame(new Float64Array(9));
+const single: Float32Array = whole.positions;
 const statistics: Statistics = detector.statistics;
 const told: string = `${detector.hash} ${statistics.totalMs} ${statistics.stages["pairing"]}`;
 const { primitives, vertices } = detector.size(b);
@@ -34,4 +42,4 @@ const mesh = readMesh("a.ply", new Uint8Array(), { weld: true });
 const bodies: FileMesh[] = readBodies("a.glb", new Uint8Array());
 const frames: Float32Array[] = readFrames("a.pc2", new Uint8Array());
 const map: Uint32Array = mesh.map;
-console.log(bodies[0]?.name, frames, map, different, await gpu.betweenAll(), pairs, own, all, first, times, kind, told, primitives, vertices, answer.hash, answer.pairs, mesh.corners);
+console.log(free, known, next, single, whole.faces, advance.positions(a)?.length, bodies[0]?.name, frames, map, different, await gpu.betweenAll(), pairs, own, all, first, times, kind, told, primitives, vertices, answer.hash, answer.pairs, mesh.corners);

@@ -1,12 +1,12 @@
 //! The functions that JavaScript calls. `web/package` wraps them; their names are private to the package.
 
-use impinge::{Backend, Detector, PairKind, Settings, Statistics};
-use js_sys::{Array, Float64Array, Object, Reflect, Uint8Array, Uint32Array};
+use impinge::{Backend, Detector, PairKind, Positions, Settings, Statistics};
+use js_sys::{Array, Float32Array, Float64Array, Object, Reflect, Uint8Array, Uint32Array};
 use wasm_bindgen::prelude::*;
 
 use crate::error::Error;
 use crate::step::{FlatImpacts, StepOptions};
-use crate::world::{Asked, World};
+use crate::world::{Asked, World, welded};
 
 fn thrown(error: Error) -> JsError {
     JsError::new(&error.to_string())
@@ -129,36 +129,57 @@ impl Engine {
     }
 
     /// See [`World::impacts`]: `[kinds, rows, times, at_start]`.
-    pub fn impacts(
-        &mut self,
-        bodies: &[u32],
-        with_self: bool,
-        start: &str,
-        toi: &str,
-        separation: f64,
-    ) -> Result<Array, JsError> {
-        let asked = Asked::of(bodies, with_self).map_err(thrown)?;
-        let options = StepOptions::new(start, toi, separation).map_err(thrown)?;
-        let (impacts, hash) = self.world.impacts(asked, options).map_err(thrown)?;
+    pub fn impacts(&mut self, step: StepQuestion) -> Result<Array, JsError> {
+        let (impacts, hash) = self
+            .world
+            .impacts(step.asked, step.options)
+            .map_err(thrown)?;
         self.hash = hash;
         self.statistics = statistics(self.world.step_stats())?;
         Ok(arrays(&impacts))
     }
 
     /// See [`World::earliest`]: `[kinds, rows, times, at_start]`. The hash stays that of the answer before.
-    pub fn earliest(
-        &mut self,
-        bodies: &[u32],
-        with_self: bool,
-        start: &str,
-        toi: &str,
-        separation: f64,
-    ) -> Result<Array, JsError> {
-        let asked = Asked::of(bodies, with_self).map_err(thrown)?;
-        let options = StepOptions::new(start, toi, separation).map_err(thrown)?;
-        let earliest = self.world.earliest(asked, options).map_err(thrown)?;
+    pub fn earliest(&mut self, step: StepQuestion) -> Result<Array, JsError> {
+        let earliest = self
+            .world
+            .earliest(step.asked, step.options)
+            .map_err(thrown)?;
         self.statistics = statistics(self.world.step_stats())?;
         Ok(arrays(&earliest))
+    }
+
+    /// See [`World::is_free`].
+    pub fn is_free(&mut self, step: StepQuestion) -> Result<bool, JsError> {
+        let is_free = self
+            .world
+            .is_free(step.asked, step.options)
+            .map_err(thrown)?;
+        self.statistics = statistics(self.world.step_stats())?;
+        Ok(is_free)
+    }
+
+    /// See [`World::advance`]: `[fraction, n_tried, first, bodies, positions]`.
+    pub fn advance(&mut self, step: StepQuestion) -> Result<Array, JsError> {
+        let answer = self.world.advance(step.asked, step.options);
+        let (advance, first, moving) = answer.map_err(thrown)?;
+        self.statistics = statistics(self.world.step_stats())?;
+        let reached = advance.positions.iter().map(|(_, rows)| match rows {
+            Positions::F32(rows) => JsValue::from(Float32Array::from(rows.as_flattened())),
+            Positions::F64(rows) => Float64Array::from(rows.as_flattened()).into(),
+        });
+        Ok(Array::of5(
+            &JsValue::from_f64(advance.fraction),
+            &JsValue::from_f64(f64::from(advance.n_tried)),
+            &arrays(&first),
+            &Uint32Array::from(&moving[..]),
+            &reached.collect::<Array>(),
+        ))
+    }
+
+    /// See [`World::start_intersects`].
+    pub fn start_intersects(&self) -> Option<bool> {
+        self.world.start_intersects()
     }
 
     /// The hash of the last answer, 16 hexadecimal digits.
@@ -172,10 +193,50 @@ impl Engine {
     }
 }
 
+/// A question about a step.
+#[wasm_bindgen]
+pub struct StepQuestion {
+    asked: Asked,
+    options: StepOptions,
+}
+
+#[wasm_bindgen]
+impl StepQuestion {
+    /// `bodies` and `with_self` as in [`Asked::of`]; the rest as in [`StepOptions::new`].
+    #[wasm_bindgen(constructor)]
+    pub fn new(
+        bodies: &[u32],
+        with_self: bool,
+        start: &str,
+        toi: &str,
+        separation: f64,
+        clearance: f64,
+        clearance_share: f64,
+    ) -> Result<StepQuestion, JsError> {
+        let distances = [separation, clearance, clearance_share];
+        Ok(StepQuestion {
+            asked: Asked::of(bodies, with_self).map_err(thrown)?,
+            options: StepOptions::new(start, toi, distances).map_err(thrown)?,
+        })
+    }
+}
+
 /// The names of the kinds that impacts refer to by number.
 #[wasm_bindgen]
 pub fn kind_names() -> Vec<String> {
     PairKind::ALL.map(|kind| kind.name().to_owned()).into()
+}
+
+/// Welds vertices at the same position: for each vertex, its number after the welding.
+#[wasm_bindgen]
+pub fn weld_f32(positions: &[f32]) -> Result<Vec<u32>, JsError> {
+    welded(positions).map_err(thrown)
+}
+
+/// [`weld_f32`] in double precision.
+#[wasm_bindgen]
+pub fn weld_f64(positions: &[f64]) -> Result<Vec<u32>, JsError> {
+    welded(positions).map_err(thrown)
 }
 
 fn arrays(impacts: &FlatImpacts) -> Array {
@@ -271,7 +332,7 @@ pub fn read_frames(name: &str, bytes: Vec<u8>) -> Result<Array, JsError> {
 fn coordinates(positions: &impinge_io::Positions) -> JsValue {
     use impinge_io::Positions;
     match positions {
-        Positions::F32(rows) => js_sys::Float32Array::from(rows.as_flattened()).into(),
+        Positions::F32(rows) => Float32Array::from(rows.as_flattened()).into(),
         Positions::F64(rows) => Float64Array::from(rows.as_flattened()).into(),
     }
 }

@@ -16,4 +16,4 @@ pub use error::Error;
 #[cfg(feature = "io")]
 pub use meshes::{FileMesh, read, read_bodies, read_frames};
 pub use step::{FlatImpacts, StepOptions};
-pub use world::{Asked, World};
+pub use world::{Asked, World, welded};

@@ -1,23 +1,30 @@
 //! Questions about steps, and their answers as flat arrays.
 
-use impinge::{Impact, Query, Start, Step, Toi};
+use impinge::{Clearance, Impact, Query, Start, Step, Toi};
 
 use crate::error::Error;
 
 /// Everything about a step's question except its bodies.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StepOptions {
     start: Start,
     toi: Toi,
     separation: f64,
+    clearance: f64,
+    clearance_share: f64,
 }
 
 impl StepOptions {
-    /// `start` is `"report"` or `"skip"`, `toi` is `"f32"` or `"f64"`, `separation` a distance in the unit of the scene.
+    /// `start` is `"report"`, `"skip"` or `"verify"`, `toi` is `"f32"` or `"f64"`. Separation and clearance are distances in the
+    /// unit of the scene.
     ///
     /// # Errors
-    /// Another word. A bad separation is refused when the question is asked.
-    pub fn new(start: &str, toi: &str, separation: f64) -> Result<Self, Error> {
+    /// Another word. Bad numbers are refused when the question is asked.
+    pub fn new(
+        start: &str,
+        toi: &str,
+        [separation, clearance, clearance_share]: [f64; 3],
+    ) -> Result<Self, Error> {
         let word = |what, given: &str, allowed| Error::Word {
             what,
             given: given.to_owned(),
@@ -27,7 +34,11 @@ impl StepOptions {
             start: match start {
                 "report" => Start::Report,
                 "skip" => Start::Skip,
-                _ => return Err(word("start", start, "\"report\" or \"skip\"")),
+                "verify" => Start::Verify,
+                _ => {
+                    let allowed = "\"report\", \"skip\" or \"verify\"";
+                    return Err(word("start", start, allowed));
+                }
             },
             toi: match toi {
                 "f32" => Toi::F32,
@@ -35,14 +46,18 @@ impl StepOptions {
                 _ => return Err(word("toi", toi, "\"f32\" or \"f64\"")),
             },
             separation,
+            clearance,
+            clearance_share,
         })
     }
 
     pub(crate) fn step(self, query: Query) -> Step {
+        let clearance = Clearance::new(self.clearance).share(self.clearance_share);
         Step::new(query)
             .start(self.start)
             .toi(self.toi)
             .separation(self.separation)
+            .clearance(clearance)
     }
 }
 

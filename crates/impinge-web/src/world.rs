@@ -1,7 +1,8 @@
 //! A scene whose bodies are numbered 0, 1, 2 … in the order in which they were added, and its detector.
 
 use impinge::{
-    BodyId, Detector, Method, Pairs, Query, Real, Scene, Settings, SharedVertex, Statistics,
+    Advance, BodyId, Detector, Method, Pairs, Query, Real, Scene, Settings, SharedVertex,
+    Statistics, Weld,
 };
 
 use crate::error::Error;
@@ -213,6 +214,41 @@ impl World {
         Ok(FlatImpacts::new(&earliest, self.bodies.numbers()))
     }
 
+    /// Whether nothing touches during a step.
+    ///
+    /// # Errors
+    /// As [`impacts`](World::impacts).
+    pub fn is_free(&mut self, asked: Asked, options: StepOptions) -> Result<bool, Error> {
+        let step = options.step(self.query(asked)?);
+        Ok(self.detector.is_free(&self.scene, &step)?)
+    }
+
+    /// How far a step can be taken; its first contact, if any, as one row; and the number of each body that moves, in the order of
+    /// the positions.
+    ///
+    /// # Errors
+    /// As [`impacts`](World::impacts), and those of [`Detector::advance`].
+    pub fn advance(
+        &mut self,
+        asked: Asked,
+        options: StepOptions,
+    ) -> Result<(Advance, FlatImpacts, Vec<u32>), Error> {
+        let step = options.step(self.query(asked)?);
+        let advance = self.detector.advance(&self.scene, &step)?;
+        let number = self.bodies.numbers();
+        let first = FlatImpacts::new(&advance.first, &number);
+        let moving = advance.positions.iter();
+        let moving = moving
+            .map(|(body, _)| number(body.index() as u32))
+            .collect();
+        Ok((advance, first, moving))
+    }
+
+    /// Whether elements intersect at the start of the step that was asked about last; `None` if that was not asked.
+    pub fn start_intersects(&self) -> Option<bool> {
+        self.detector.start_intersects()
+    }
+
     /// Statistics of the last answer about a step.
     pub fn step_stats(&self) -> &Statistics {
         self.detector.step_stats()
@@ -270,6 +306,15 @@ impl Bodies {
         }
         move |slot| numbers.get(slot as usize).copied().unwrap_or(slot)
     }
+}
+
+/// Welds vertices at the same position: for each vertex of `positions` (x, y, z per vertex), its number after the welding.
+///
+/// # Errors
+/// An array that is not whole rows.
+pub fn welded<R: Real>(positions: &[R]) -> Result<Vec<u32>, Error> {
+    let weld = Weld::by_position(rows(positions, "positions")?);
+    Ok(weld.map().to_vec())
 }
 
 fn flat(bodies: &Bodies, asked: Asked, pairs: &Pairs) -> Result<Vec<u32>, Error> {

@@ -6,7 +6,7 @@ use std::{fs, io};
 
 use impinge::{Backend, Detector, Elements, Positions, Query, Scene, Settings, SharedVertex, Step};
 use impinge_scenes::{Model, solids, soup, surfaces};
-use impinge_web::{Asked, Error, StepOptions, World};
+use impinge_web::{Asked, Error, StepOptions, World, welded};
 
 fn world() -> Result<World, Error> {
     let settings = Settings {
@@ -14,6 +14,11 @@ fn world() -> Result<World, Error> {
         ..World::settings("clusters")?
     };
     World::new(Detector::with_settings(settings)?, "skip")
+}
+
+/// Without a clearance.
+fn options(start: &str, toi: &str, separation: f64) -> Result<StepOptions, Error> {
+    StepOptions::new(start, toi, [separation, 0.0, 0.2])
 }
 
 const TRIANGLE: [f32; 9] = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
@@ -27,7 +32,7 @@ fn pairs_are_those_of_the_bodies_asked_for_in_the_order_asked() -> Result<(), Er
     let b = world.add(&[0, 1, 2], &ACROSS, 3)?;
     assert_eq!(world.detect(Asked::Between(a, b))?.0, [1, 0]);
     assert_eq!(world.detect(Asked::Between(b, a))?.0, [0, 1]);
-    assert_eq!(world.detect(Asked::Within(a))?.0, []);
+    assert!(world.detect(Asked::Within(a))?.0.is_empty());
     assert_eq!(world.detect(Asked::Everything)?.0, [a, 1, b, 0]);
     assert_eq!(Asked::of(&[], true)?, Asked::Everything);
     assert_eq!(Asked::of(&[], false)?, Asked::Different);
@@ -85,27 +90,92 @@ fn impacts_of_a_step() -> Result<(), Error> {
     let sunk: Vec<f64> = above.chunks(3).flat_map(|p| [p[0], p[1], -3.0]).collect();
     world.remove(gone)?;
     let b = world.add(&[0, 1, 2], &lifted, 3)?;
-    let options = StepOptions::new("report", "f32", 0.0)?;
-    assert!(
-        world
-            .impacts(Asked::Everything, options)?
-            .0
-            .kinds
-            .is_empty()
-    );
+    let report = options("report", "f32", 0.0)?;
+    assert!(world.impacts(Asked::Everything, report)?.0.kinds.is_empty());
     world.set_end_positions(b, &sunk)?;
-    let (impacts, _) = world.impacts(Asked::Between(a, b), options)?;
+    let (impacts, _) = world.impacts(Asked::Between(a, b), report)?;
     // The vertices of b meet the face of a. The library calls b body 0, so a pair has b first wherever kinds are alike.
     assert_eq!(impacts.rows[..4], [b, 0, a, 0]);
     assert!(impacts.times.iter().all(|&time| time == 0.25));
     assert!(impacts.at_start.iter().all(|&at_start| at_start == 0));
-    let earliest = world.earliest(Asked::Everything, options)?;
+    let earliest = world.earliest(Asked::Everything, report)?;
     assert_eq!(
         (earliest.kinds, earliest.rows, earliest.times),
         (vec![0], vec![b, 0, a, 0], vec![0.25])
     );
-    let near = StepOptions::new("skip", "f64", 0.5)?;
+    let near = options("skip", "f64", 0.5)?;
     assert_eq!(world.earliest(Asked::Everything, near)?.times, [0.125]);
+    Ok(())
+}
+
+#[test]
+fn steps_know_whether_their_start_intersects() -> Result<(), Error> {
+    let mut world = world()?;
+    world.add(&[0, 1, 2], &TRIANGLE, 3)?;
+    let across = world.add(&[0, 1, 2], &ACROSS, 3)?;
+    world.set_end_positions(across, &ACROSS)?;
+    let verify = options("verify", "f32", 0.0)?;
+    let report = options("report", "f32", 0.0)?;
+    // An edge inside a face: no contact, but no free start.
+    assert!(world.is_free(Asked::Everything, report)?);
+    assert_eq!(world.start_intersects(), None);
+    assert_eq!(world.advance(Asked::Everything, report)?.0.fraction, 1.0);
+    assert!(!world.is_free(Asked::Everything, verify)?);
+    assert_eq!(world.start_intersects(), Some(true));
+    let (advance, first, moving) = world.advance(Asked::Everything, verify)?;
+    assert_eq!(
+        (advance.fraction, advance.start_intersects),
+        (0.0, Some(true))
+    );
+    assert!(first.kinds.is_empty());
+    assert_eq!(moving, [across]);
+    assert!(world.impacts(Asked::Everything, verify)?.0.kinds.is_empty());
+    assert_eq!(world.start_intersects(), Some(true));
+    world.earliest(Asked::Within(across), verify)?;
+    assert_eq!(world.start_intersects(), Some(false));
+    Ok(())
+}
+
+#[test]
+fn a_step_leaves_its_clearance() -> Result<(), Error> {
+    let mut world = world()?;
+    let gone = world.add(&[0, 1, 2], &TRIANGLE, 3)?;
+    world.add(&[0, 1, 2], &TRIANGLE, 3)?;
+    world.remove(gone)?;
+    // A triangle of which one corner is far below the others, at height 1.
+    let above = [0.25, 0.25, 1.0, 0.5, 0.25, 2.0, 0.25, 0.5, 2.0];
+    let sunk = above.map(|x: f64| x - 2.0 * f64::from(u8::from(x >= 1.0)));
+    let falling = world.add(&[0, 1, 2], &above, 3)?;
+    world.set_end_positions(falling, &sunk)?;
+    let half = StepOptions::new("report", "f64", [0.0, 0.5, 0.75])?;
+    let share = StepOptions::new("report", "f64", [0.0, 10.0, 0.25])?;
+    let time = |world: &mut World, options| {
+        Ok::<_, Error>(world.earliest(Asked::Everything, options)?.times)
+    };
+    assert_eq!(time(&mut world, half)?, [0.25]);
+    assert_eq!(time(&mut world, share)?, [0.375]);
+    assert!(!world.is_free(Asked::Everything, half)?);
+    let (advance, first, moving) = world.advance(Asked::Everything, half)?;
+    assert!((0.249..=0.25).contains(&advance.fraction), "{advance:?}");
+    assert_eq!((first.rows.len(), moving), (4, vec![falling]));
+    let Positions::F64(reached) = &advance.positions[0].1 else {
+        panic!("in the precision in which they are stored");
+    };
+    assert!((0.5..0.502).contains(&reached[0][2]), "{reached:?}");
+    let whole = StepOptions::new("report", "f64", [0.0, 0.5, 1.0])?;
+    let error = world.is_free(Asked::Everything, whole).expect_err("share");
+    assert_eq!(
+        error.to_string(),
+        "clearance_share: 1 given, a number from 0 to less than 1 allowed"
+    );
+    Ok(())
+}
+
+#[test]
+fn vertices_at_one_position_are_welded() -> Result<(), Error> {
+    let seam = [TRIANGLE, TRIANGLE.map(|x| -x)].concat();
+    assert_eq!(welded(&seam)?, [0, 1, 2, 0, 3, 4]);
+    assert!(welded(&seam[1..]).is_err());
     Ok(())
 }
 
@@ -144,12 +214,10 @@ fn bad_input_is_refused_by_name() -> Result<(), Error> {
         "bodies: 3 given, 0 (everything), 1 (within it) or 2 (between them) allowed"
     );
     assert_eq!(
-        StepOptions::new("never", "f32", 0.0)
-            .expect_err("word")
-            .to_string(),
-        "start: \"never\" given, \"report\" or \"skip\" allowed"
+        options("never", "f32", 0.0).expect_err("word").to_string(),
+        "start: \"never\" given, \"report\", \"skip\" or \"verify\" allowed"
     );
-    let negative = StepOptions::new("report", "f64", -1.0)?;
+    let negative = options("report", "f64", -1.0)?;
     assert_eq!(
         world
             .impacts(Asked::Everything, negative)
@@ -158,7 +226,7 @@ fn bad_input_is_refused_by_name() -> Result<(), Error> {
         "separation: -1 given, a finite number that is not below 0 allowed"
     );
     // The refused calls changed nothing.
-    assert_eq!(world.detect(Asked::Within(a))?.0, []);
+    assert!(world.detect(Asked::Within(a))?.0.is_empty());
     assert_eq!(world.size(a)?, (1, 3));
     Ok(())
 }
