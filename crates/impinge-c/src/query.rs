@@ -126,11 +126,12 @@ impl<'a> Asked<'a> {
             (ANY_BODY, b, _, _) => refuse("b", b, "without a: name one body by a alone"),
             (a, ANY_BODY, 1, 0) => Ok(Query::across([self.scene.id(a)?])),
             (a, ANY_BODY, 0, _) => Ok(Query::within(self.scene.id(a)?)),
-            (a, ANY_BODY, _, _) => refuse(
-                "a",
-                a,
-                "alone with between = 1 and self = 1: one of them allowed in this version",
-            ),
+            (a, ANY_BODY, _, _) => {
+                self.scene.id(a)?;
+                let allowed =
+                    "alone with between = 1 and self = 1: one of them allowed in this version";
+                refuse("a", a, allowed)
+            }
             (a, b, _, _) => Ok(Query::between(self.scene.id(a)?, self.scene.id(b)?)),
         }
     }

@@ -9,7 +9,7 @@ use impinge::{Body, BodyId, Filter, Part, PositionRows, Positions, Scene, Weld};
 
 use crate::arrays::{self, Floats, elements_view, no_rows, positions_view};
 use crate::edges::EdgeNumbers;
-use crate::status::{Failure, Handle, broken, change, destroy, guard, held, put};
+use crate::status::{Failure, Handle, broken, change, clear, destroy, guard, held, put};
 use crate::types::*;
 
 /// A scene, and what callers say about its bodies beside.
@@ -133,7 +133,10 @@ impl impinge_scene {
 pub unsafe extern "C" fn impinge_scene_create(scene: *mut *mut impinge_scene) -> Status {
     guard(|| {
         // SAFETY: `impinge.h` says what pointers are, here and in all functions below.
-        unsafe { put(scene, "scene", Box::into_raw(Box::default())) }
+        unsafe {
+            clear(scene, "scene")?;
+            put(scene, "scene", Box::into_raw(Box::default()))
+        }
     })
 }
 

@@ -1,0 +1,208 @@
+/* A table of wrong arguments: each is refused with a message that names what is wrong, and changes nothing. */
+#include "common.h"
+
+int main(void) {
+  static ball one;
+  impinge_scene *scene = NULL;
+  impinge_detector *detector = open_detector(1);
+  impinge_pairs *pairs = (impinge_pairs *)detector;
+  impinge_query query;
+  impinge_settings settings;
+  impinge_detector *refused = detector;
+  impinge_exclusion exclusion;
+  impinge_array faces, at, bad;
+  impinge_impact impact;
+  double number = 0;
+  int64_t wide[3] = {0, 1, -2};
+  uint32_t fixed = 0, beyond[3] = {0, 1, VERTICES};
+  int32_t found = -1;
+  uint64_t n = 7;
+  size_t size = 0;
+  make_ball(&one, 0);
+  faces = faces_of(&one);
+  at = positions_of(&one);
+  GOOD(impinge_scene_create(&scene));
+  GOOD(impinge_scene_add_triangles(scene, faces, at, NULL));
+
+  /* NULL. */
+  REFUSED(impinge_scene_create(NULL), "scene is NULL");
+  REFUSED(impinge_scene_add_triangles(NULL, faces, at, NULL), "scene is NULL");
+  REFUSED(impinge_detect(NULL, scene, NULL, &pairs), "detector is NULL");
+  CHECK(pairs == NULL);
+  REFUSED(impinge_detect(detector, NULL, NULL, &pairs), "scene is NULL");
+  REFUSED(impinge_detect(detector, scene, NULL, NULL), "pairs is NULL");
+  REFUSED(impinge_count(detector, scene, NULL, NULL), "n is NULL");
+  REFUSED(impinge_find_earliest(detector, scene, NULL, &impact, NULL), "found is NULL");
+  REFUSED(impinge_advance(detector, scene, NULL, NULL, NULL), "NULL");
+  REFUSED(impinge_find_contacts(detector, scene, NULL, (impinge_contacts **)&pairs), "pairs is NULL");
+  REFUSED(impinge_find_candidates_in_runs(detector, scene, 0, NULL, 10, NULL, NULL, &n), "each is NULL");
+  REFUSED(impinge_pairs_column(NULL, IMPINGE_COLUMN_ROWS, &bad), "pairs is NULL");
+  REFUSED(impinge_motion_apply(NULL, scene), "motion is NULL");
+  REFUSED(impinge_detector_stats(detector, NULL), "stats is NULL");
+  REFUSED(impinge_scene_positions(scene, 0, NULL), "view is NULL");
+  REFUSED(impinge_weld(at, NULL, NULL, &size), "map is NULL");
+  impinge_scene_destroy(NULL);
+  impinge_detector_destroy(NULL);
+  impinge_pairs_destroy(NULL);
+  impinge_query_default(NULL);
+  CHECK(impinge_pairs_count(NULL) == 0 && impinge_pairs_data(NULL) == NULL && impinge_pairs_hash(NULL) == 0);
+  CHECK(impinge_scene_n_bodies(NULL) == 0 && impinge_hash_pairs(NULL, 0) == 0);
+
+  /* Arrays. */
+  REFUSED(impinge_scene_add_triangles(scene, at, faces, NULL), "IMPINGE_U32, where IMPINGE_F32 or IMPINGE_F64");
+  REFUSED(impinge_scene_add_triangles(scene, at, at, NULL), "swapped");
+  bad = at;
+  bad.data = NULL;
+  REFUSED(impinge_scene_set_positions(scene, 0, bad), "data is NULL");
+  bad.data = (const char *)at.data + 1;
+  REFUSED(impinge_scene_set_positions(scene, 0, bad), "not aligned");
+  bad = at;
+  bad.row_stride = 3;
+  bad.column_stride = 1;
+  REFUSED(impinge_scene_set_positions(scene, 0, bad), "strides are in bytes");
+  bad.row_stride = 24;
+  bad.column_stride = 0;
+  REFUSED(impinge_scene_set_positions(scene, 0, bad), "column_stride is 0");
+  bad.column_stride = PTRDIFF_MAX - 7;
+  REFUSED(impinge_scene_set_positions(scene, 0, bad), "more than memory has");
+  bad = at;
+  bad.type = 99;
+  REFUSED(impinge_scene_set_positions(scene, 0, bad), "99");
+  bad = at;
+  --bad.rows;
+  REFUSED(impinge_scene_set_positions(scene, 0, bad), "body 0");
+  REFUSED(impinge_scene_set_end_positions(scene, 0, bad), "body 0");
+  bad = packed(wide, 1, IMPINGE_I64);
+  REFUSED(impinge_scene_add_triangles(scene, bad, at, NULL), "row 0 has -2");
+  wide[2] = INT64_C(1) << 32;
+  REFUSED(impinge_scene_add_triangles(scene, bad, at, NULL), "row 0 has 4294967296");
+  bad = packed(beyond, 1, IMPINGE_U32);
+  REFUSED(impinge_scene_add_triangles(scene, bad, at, NULL), "1154");
+  CHECK(strstr(impinge_error_message(), "body 1") != NULL);
+  number = one.positions[7][1];
+  one.positions[7][1] = NAN;
+  REFUSED(impinge_scene_set_positions(scene, 0, at), "body 0: vertex 7");
+  CHECK(strstr(impinge_error_message(), "NaN") != NULL);
+  REFUSED(impinge_scene_lend_positions(scene, 0, at, NULL, NULL), "vertex 7");
+  one.positions[7][1] = number;
+  REFUSED(impinge_scene_remesh(scene, 0, 9, faces, at), "kind: 9");
+  REFUSED(impinge_scene_remesh(scene, 0, IMPINGE_POINTS, faces, at), "points have one element per position");
+  REFUSED(impinge_scene_set_transform(scene, 0, packed(one.positions, 3, IMPINGE_F64)), "3 rows");
+  REFUSED(impinge_scene_set_transform(scene, 0, packed(one.positions, 4, IMPINGE_F64)), "transform");
+
+  /* Bodies and numbers. */
+  REFUSED(impinge_scene_set_positions(scene, 1, at), "no body 1 among the 1");
+  REFUSED(impinge_scene_set_filter(scene, IMPINGE_ANY_BODY, 1, 1), "no body");
+  REFUSED(impinge_scene_set_thickness(scene, 0, -1), "thickness of body 0: -1");
+  REFUSED(impinge_scene_set_edges(scene, 0, packed(beyond, 1, IMPINGE_U32)), "is not among the 1 rows");
+  {
+    static const uint32_t twice[2][2] = {{0, 1}, {1, 0}};
+    REFUSED(impinge_scene_set_edges(scene, 0, packed(twice, 2, IMPINGE_U32)), "row 1 has vertices 1 and 0");
+  }
+  REFUSED(impinge_find_distance(detector, scene, 0, 0, NULL, &found), "body 0");
+  REFUSED(impinge_find_distance(detector, scene, 0, 3, NULL, &found), "no body 3");
+  REFUSED(impinge_find_near(detector, scene, NAN, NULL, (impinge_near **)&pairs), "distance: NaN");
+  REFUSED(impinge_find_candidates(detector, scene, -1, NULL, (impinge_candidates **)&pairs), "inflation: -1");
+  CHECK(found == -1);
+
+  /* Queries. */
+#define QUERY(field, value, text)                                                                                       \
+  impinge_query_default(&query);                                                                                        \
+  query.field = (value);                                                                                                \
+  REFUSED(impinge_detect(detector, scene, &query, &pairs), (text))
+  QUERY(size, 0, "size is 0");
+  QUERY(size, sizeof query + 8, "impinge_query");
+  QUERY(between, 2, "between: 2");
+  QUERY(shared_vertex, 2, "shared_vertex: 2");
+  QUERY(a, 3, "no body 3");
+  QUERY(b, 0, "b: 0");
+  QUERY(a, 0, "between = 1 and self = 1");
+  QUERY(kinds, IMPINGE_VF, "kinds: 1");
+  QUERY(hits, IMPINGE_HITS_ALL, "hits: 2");
+  QUERY(n_nearest, 3, "n_nearest: 3");
+  QUERY(flags, IMPINGE_SIGNED, "flags: 4");
+  QUERY(flags, 1u << 20, "flags");
+  impinge_query_default(&query);
+  query.fixed = &fixed;
+  query.n_fixed = 1;
+  REFUSED(impinge_detect(detector, scene, &query, &pairs), "n_fixed");
+  impinge_query_default(&query);
+  query.n_exclusions = 1;
+  REFUSED(impinge_detect(detector, scene, &query, &pairs), "exclusions: NULL");
+  memset(&exclusion, 0, sizeof exclusion);
+  exclusion.kind = IMPINGE_EXCLUDE_RINGS;
+  query.exclusions = &exclusion;
+  REFUSED(impinge_detect(detector, scene, &query, &pairs), "exclusions[0].kind: 1");
+  impinge_query_default(&query);
+  query.between = query.self = 0;
+  REFUSED(impinge_count(detector, scene, &query, &n), "between and self");
+  query.self = 1;
+  query.start = 9;
+  REFUSED(impinge_is_free(detector, scene, &query, &found), "start: 9");
+  query.start = IMPINGE_START_REPORT;
+  query.separation = -0.5;
+  REFUSED(impinge_is_free(detector, scene, &query, &found), "separation: -0.5");
+  query.separation = 0;
+  query.clearance_share = 1;
+  REFUSED(impinge_is_free(detector, scene, &query, &found), "clearance_share: 1");
+  query.precision = 77;
+  REFUSED(impinge_is_free(detector, scene, &query, &found), "precision: 77");
+  impinge_query_default(&query);
+  query.kinds = 64;
+  REFUSED(impinge_find_near(detector, scene, 0, &query, (impinge_near **)&pairs), "kinds: 64");
+  query.kinds = 0;
+  query.flags = IMPINGE_CELL;
+  REFUSED(impinge_advance(detector, scene, &query, &number, NULL), "owned_by");
+
+  /* Settings. */
+#define SETTING(field, value, text)                                                                                     \
+  impinge_settings_default(&settings);                                                                                  \
+  settings.field = (value);                                                                                             \
+  REFUSED(impinge_detector_create(&settings, &refused), (text));                                                        \
+  CHECK(refused == NULL)
+  SETTING(size, 0, "size is 0");
+  SETTING(backend, 7, "backend: 7");
+  SETTING(method, 4, "method: 4");
+  SETTING(threads, 100000, "threads");
+#ifndef WITH_GPU
+  impinge_settings_default(&settings);
+  settings.backend = IMPINGE_BACKEND_GPU;
+  CHECK(impinge_detector_create(&settings, &refused) == IMPINGE_ERROR_DEVICE);
+#endif
+
+  /* One pair. */
+  REFUSED(impinge_first_contact(IMPINGE_FF, at, at, NULL, &number, &found), "kind: 32");
+  REFUSED(impinge_first_contact(IMPINGE_VF, at, at, NULL, &number, &found), "start: 1154 rows given, 4 needed");
+
+  /* Nothing has changed. */
+  CHECK(n == 7 && impinge_scene_n_bodies(scene) == 1 && hash_of(detector, scene, NULL) == 0);
+  {
+    /* A query of a shorter header: what it lacks is as by default. */
+    impinge_query_default(&query);
+    query.size = offsetof(impinge_query, kinds);
+    query.kinds = 12345;
+    CHECK(hash_of(detector, scene, &query) == 0);
+  }
+  {
+    /* A vertex falls onto a face. */
+    static const float start[4][3] = {{0.25f, 0.25f, 1}, {0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+    static const float end[4][3] = {{0.25f, 0.25f, -1}, {0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+    GOOD(impinge_first_contact(IMPINGE_VF, packed(start, 4, IMPINGE_F32), packed(end, 4, IMPINGE_F32), NULL, &number, &found));
+    CHECK(found == 1 && number == 0.5);
+    GOOD(impinge_first_contact(IMPINGE_VF, packed(start, 4, IMPINGE_F32), packed(start, 4, IMPINGE_F32), NULL, &number, &found));
+    CHECK(found == 0);
+    /* The edge comes first: here the edge from (0, 0, 0) to (1, 0, 0), and a vertex that crosses it. */
+    {
+      static const float from[3][3] = {{0, 0, 0}, {1, 0, 0}, {0.5f, 0, 1}}, to[3][3] = {{0, 0, 0}, {1, 0, 0}, {0.5f, 0, -3}};
+      GOOD(impinge_first_contact(IMPINGE_EV, packed(from, 3, IMPINGE_F32), packed(to, 3, IMPINGE_F32), NULL, &number, &found));
+      CHECK(found == 1 && number == 0.25);
+      impinge_query_default(&query);
+      query.separation = 0.5;
+      GOOD(impinge_first_contact(IMPINGE_EV, packed(from, 3, IMPINGE_F32), packed(to, 3, IMPINGE_F32), &query, &number, &found));
+      CHECK(found == 1 && number == 0.125);
+    }
+  }
+  impinge_detector_destroy(detector);
+  impinge_scene_destroy(scene);
+  return finish("arguments");
+}

@@ -1,0 +1,103 @@
+/* What is lent is not copied, and what cannot be had is an error. Linked with --wrap for malloc and the like, so that all of the library's allocations are seen. */
+#include "common.h"
+
+void *__real_malloc(size_t size);
+void *__real_calloc(size_t n, size_t size);
+void *__real_realloc(void *at, size_t size);
+int __real_posix_memalign(void **at, size_t alignment, size_t size);
+
+static size_t most = SIZE_MAX, n_bytes = 0;
+static int refuse(size_t size) {
+  n_bytes += size;
+  return size > most;
+}
+void *__wrap_malloc(size_t size) { return refuse(size) ? NULL : __real_malloc(size); }
+void *__wrap_calloc(size_t n, size_t size) { return refuse(n * size) ? NULL : __real_calloc(n, size); }
+void *__wrap_realloc(void *at, size_t size) { return refuse(size) ? NULL : __real_realloc(at, size); }
+int __wrap_posix_memalign(void **at, size_t alignment, size_t size) {
+  return refuse(size) ? 12 : __real_posix_memalign(at, alignment, size);
+}
+
+static int n_released = 0;
+static void release(void *user) {
+  ++n_released;
+  ++*(int *)user;
+}
+
+int main(void) {
+  static ball one, other, far_away;
+  static double columns[3][VERTICES];
+  int releases[3] = {0, 0, 0};
+  impinge_scene *scene = NULL;
+  impinge_detector *detector = open_detector(1);
+  impinge_pairs *pairs = NULL;
+  impinge_motion *motion = NULL;
+  impinge_array view, by_column;
+  uint64_t hash;
+  size_t i, j;
+  make_ball(&one, 0);
+  make_ball(&other, 0.9);
+  make_ball(&far_away, 5);
+  for (i = 0; i < VERTICES; ++i)
+    for (j = 0; j < 3; ++j) columns[j][i] = other.positions[i][j];
+  GOOD(impinge_scene_create(&scene));
+  GOOD(impinge_scene_add_triangles(scene, faces_of(&one), positions_of(&one), NULL));
+  GOOD(impinge_scene_add_triangles(scene, faces_of(&one), positions_of(&other), NULL));
+  hash = hash_of(detector, scene, NULL);
+
+  /* Lent rows are read where they lie. */
+  n_bytes = 0;
+  GOOD(impinge_scene_lend_positions(scene, 1, positions_of(&far_away), release, &releases[0]));
+  CHECK(n_bytes > 0 && n_bytes < 200);
+  GOOD(impinge_scene_positions(scene, 1, &view));
+  CHECK(view.data == far_away.positions && n_released == 0);
+  CHECK(hash_of(detector, scene, NULL) == 0);
+  GOOD(impinge_scene_lend_end_positions(scene, 1, positions_of(&other), release, &releases[1]));
+  GOOD(impinge_scene_end_positions(scene, 1, &view));
+  CHECK(view.data == other.positions && n_released == 0);
+  GOOD(impinge_advance(detector, scene, NULL, NULL, &motion));
+  /* The scene forgets both; the motion needs neither. */
+  GOOD(impinge_motion_apply(motion, scene));
+  impinge_motion_destroy(motion);
+  CHECK(releases[0] == 1);
+  /* Rows that are not packed are copied, and released at once. */
+  by_column = packed(columns, VERTICES, IMPINGE_F64);
+  by_column.row_stride = sizeof(double);
+  by_column.column_stride = VERTICES * sizeof(double);
+  GOOD(impinge_scene_lend_positions(scene, 1, by_column, release, &releases[2]));
+  CHECK(releases[2] == 1 && hash_of(detector, scene, NULL) == hash);
+  /* Nothing is released that was not taken. */
+  i = (size_t)n_released;
+  view = positions_of(&other);
+  --view.rows;
+  REFUSED(impinge_scene_lend_positions(scene, 1, view, release, &releases[2]), "body 1");
+  CHECK(n_released == (int)i);
+  GOOD(impinge_scene_lend_positions(scene, 1, positions_of(&other), release, &releases[2]));
+  CHECK(n_released == (int)i);
+  GOOD(impinge_scene_remove(scene, 1));
+  CHECK(releases[2] == 2 && releases[0] == 1);
+
+  /* Set positions: packed rows are copied into memory that is there already. */
+  GOOD(impinge_scene_add_triangles(scene, faces_of(&one), positions_of(&other), NULL));
+  CHECK(hash_of(detector, scene, NULL) == hash && hash_of(detector, scene, NULL) == hash);
+  n_bytes = 0;
+  GOOD(impinge_scene_set_positions(scene, 1, positions_of(&far_away)));
+  CHECK(n_bytes == 0);
+  GOOD(impinge_scene_set_positions(scene, 1, positions_of(&other)));
+
+  /* An allocator that refuses: the arrays of the input, then those of the answer. */
+  most = 20000;
+  CHECK(impinge_scene_add_triangles(scene, faces_of(&one), positions_of(&one), NULL) == IMPINGE_ERROR_OUT_OF_MEMORY);
+  CHECK(strstr(impinge_error_message(), "out of memory") != NULL);
+  CHECK(impinge_scene_set_positions(scene, 1, by_column) == IMPINGE_ERROR_OUT_OF_MEMORY);
+  most = SIZE_MAX;
+  CHECK(impinge_scene_n_bodies(scene) == 2 && hash_of(detector, scene, NULL) == hash);
+  most = 2000;
+  pairs = (impinge_pairs *)scene;
+  CHECK(impinge_detect(detector, scene, NULL, &pairs) == IMPINGE_ERROR_OUT_OF_MEMORY && pairs == NULL);
+  most = SIZE_MAX;
+  CHECK(hash_of(detector, scene, NULL) == hash);
+  impinge_scene_destroy(scene);
+  impinge_detector_destroy(detector);
+  return finish("memory");
+}

@@ -1,0 +1,432 @@
+/* Every question once, on two balls whose answers are known from geometry or from another question. */
+#include "common.h"
+
+static ball balls[2];
+
+static impinge_scene *two_balls(void) {
+  impinge_scene *scene = NULL;
+  uint32_t body = 7, which;
+  GOOD(impinge_scene_create(&scene));
+  for (which = 0; which < 2; ++which) {
+    GOOD(impinge_scene_add_triangles(scene, faces_of(&balls[which]), positions_of(&balls[which]), &body));
+    CHECK(body == which);
+  }
+  CHECK(impinge_scene_n_bodies(scene) == 2);
+  return scene;
+}
+
+/* The same numbers in other places and types give the same pairs. */
+static void arrays(impinge_detector *detector) {
+  static double columns[3][VERTICES], wide[VERTICES][5];
+  static float narrow[VERTICES][3];
+  static int64_t faces[FACES][4];
+  static int32_t by_column[3][FACES];
+  impinge_scene *scene = two_balls(), *other = NULL;
+  uint64_t hash = hash_of(detector, scene, NULL);
+  impinge_array at, of;
+  size_t i, j;
+  CHECK(hash != 0);
+  for (i = 0; i < VERTICES; ++i)
+    for (j = 0; j < 3; ++j) {
+      columns[j][i] = wide[VERTICES - 1 - i][j + 1] = balls[0].positions[i][j];
+      narrow[i][j] = (float)balls[0].positions[i][j];
+    }
+  for (i = 0; i < FACES; ++i)
+    for (j = 0; j < 3; ++j) faces[i][j + 1] = by_column[j][i] = (int32_t)balls[0].faces[i][j];
+  GOOD(impinge_scene_create(&other));
+  at = packed(columns, VERTICES, IMPINGE_F64);
+  at.row_stride = sizeof(double);
+  at.column_stride = VERTICES * sizeof(double);
+  of = packed(&faces[0][1], FACES, IMPINGE_I64);
+  of.row_stride = 4 * sizeof(int64_t);
+  of.column_stride = sizeof(int64_t);
+  GOOD(impinge_scene_add_triangles(other, of, at, NULL));
+  GOOD(impinge_scene_add_triangles(other, faces_of(&balls[1]), positions_of(&balls[1]), NULL));
+  CHECK(hash_of(detector, other, NULL) == hash);
+  /* Rows from the last to the first, in wider rows. */
+  at = packed(&wide[VERTICES - 1][1], VERTICES, IMPINGE_F64);
+  at.row_stride = -(ptrdiff_t)sizeof wide[0];
+  at.column_stride = sizeof(double);
+  GOOD(impinge_scene_set_positions(other, 0, at));
+  CHECK(hash_of(detector, other, NULL) == hash);
+  of = packed(by_column, FACES, IMPINGE_I32);
+  of.row_stride = sizeof(int32_t);
+  of.column_stride = FACES * sizeof(int32_t);
+  GOOD(impinge_scene_remesh(other, 0, IMPINGE_TRIANGLES, of, positions_of(&balls[0])));
+  CHECK(hash_of(detector, other, NULL) == hash);
+  /* Rounded positions are others, and may be of another type. */
+  GOOD(impinge_scene_set_positions(other, 0, packed(narrow, VERTICES, IMPINGE_F32)));
+  GOOD(impinge_scene_positions(other, 0, &at));
+  CHECK(at.type == IMPINGE_F32 && at.rows == VERTICES && ((const float *)at.data)[3] == narrow[1][0]);
+  GOOD(impinge_scene_elements(other, 0, &of));
+  CHECK(of.type == IMPINGE_U32 && of.rows == FACES && memcmp(of.data, balls[0].faces, sizeof balls[0].faces) == 0);
+  GOOD(impinge_scene_edges(other, 0, &of));
+  CHECK(of.rows == FACES * 3 / 2);
+  GOOD(impinge_scene_end_positions(other, 0, &of));
+  CHECK(of.rows == 0);
+  impinge_scene_destroy(other);
+  impinge_scene_destroy(scene);
+}
+
+static void pairs_of_bodies(impinge_detector *detector) {
+  impinge_scene *scene = two_balls();
+  impinge_query query;
+  impinge_exclusion exclusion;
+  impinge_stats stats;
+  impinge_pairs *pairs = NULL;
+  impinge_array rows;
+  uint64_t n = 0, all = hash_of(detector, scene, NULL);
+  int32_t any = -1;
+  impinge_query_default(&query);
+  CHECK(query.between == 1 && query.self == 1 && query.shared_vertex == IMPINGE_RESOLVE && query.a == IMPINGE_ANY_BODY);
+  CHECK(hash_of(detector, scene, &query) == all);
+  query.a = 0;
+  query.b = 1;
+  CHECK(hash_of(detector, scene, &query) == all);
+  GOOD(impinge_detect(detector, scene, &query, &pairs));
+  CHECK(impinge_pairs_count(pairs) > 100 && impinge_pairs_data(pairs)->body_a == 0 && impinge_pairs_data(pairs)->body_b == 1);
+  GOOD(impinge_pairs_column(pairs, IMPINGE_COLUMN_ROWS, &rows));
+  CHECK(rows.data == impinge_pairs_data(pairs) && rows.rows == impinge_pairs_count(pairs) && rows.type == IMPINGE_U32);
+  GOOD(impinge_count(detector, scene, NULL, &n));
+  CHECK(n == impinge_pairs_count(pairs));
+  memset(&stats, 0, sizeof stats);
+  stats.size = sizeof stats;
+  GOOD(impinge_pairs_stats(pairs, &stats));
+  CHECK(stats.n_candidates >= n && strcmp(stats.backend, "cpu") == 0 && stats.total_ms > 0 && stats.bytes_held > 0);
+  stats.size = offsetof(impinge_stats, n_unsure);
+  stats.n_unsure = 12345;
+  GOOD(impinge_detector_stats(detector, &stats));
+  CHECK(stats.n_unsure == 12345 && stats.n_threads == 2);
+  impinge_pairs_destroy(pairs);
+  /* No ball meets itself. */
+  query.b = IMPINGE_ANY_BODY;
+  query.between = 0;
+  GOOD(impinge_any(detector, scene, &query, &any));
+  CHECK(any == 0);
+  query.between = 1;
+  query.self = 0;
+  CHECK(hash_of(detector, scene, &query) == all);
+  query.a = IMPINGE_ANY_BODY;
+  memset(&exclusion, 0, sizeof exclusion);
+  exclusion.kind = IMPINGE_EXCLUDE_BODIES;
+  exclusion.b = 1;
+  query.exclusions = &exclusion;
+  query.n_exclusions = 1;
+  CHECK(hash_of(detector, scene, &query) == 0);
+  query.n_exclusions = 0;
+  /* Two cells have each pair once. */
+  query.flags = IMPINGE_CELL;
+  query.cell_low[0] = query.cell_low[1] = query.cell_low[2] = -HUGE_VAL;
+  query.cell_high[0] = query.cell_high[1] = HUGE_VAL;
+  query.cell_high[2] = 0.1;
+  n = hash_of(detector, scene, &query);
+  CHECK(n != 0 && n != all);
+  query.cell_low[2] = 0.1;
+  query.cell_high[2] = HUGE_VAL;
+  CHECK(n + hash_of(detector, scene, &query) == all);
+  /* Bodies that do not meet, a body that moved away, and one that is gone. */
+  GOOD(impinge_scene_set_filter(scene, 0, 2, 1));
+  GOOD(impinge_scene_set_filter(scene, 1, 2, 1));
+  GOOD(impinge_any(detector, scene, NULL, &any));
+  CHECK(any == 0);
+  GOOD(impinge_scene_set_filter(scene, 0, 1, UINT64_MAX));
+  GOOD(impinge_scene_set_filter(scene, 1, 1, UINT64_MAX));
+  CHECK(hash_of(detector, scene, NULL) == all);
+  {
+    double away[4][4] = {{1, 0, 0, 9}, {0, 1, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, 1}}, back[4][4];
+    impinge_array matrix = packed(away, 4, IMPINGE_F64);
+    GOOD(impinge_scene_set_transform(scene, 1, matrix));
+    CHECK(hash_of(detector, scene, NULL) == 0);
+    /* Its transpose, read by columns. */
+    memset(back, 0, sizeof back);
+    back[0][0] = back[1][1] = back[2][2] = back[3][3] = 1;
+    matrix = packed(back, 4, IMPINGE_F64);
+    matrix.row_stride = sizeof(double);
+    matrix.column_stride = 4 * sizeof(double);
+    GOOD(impinge_scene_set_transform(scene, 1, matrix));
+    CHECK(hash_of(detector, scene, NULL) == all);
+  }
+  GOOD(impinge_scene_remove(scene, 0));
+  CHECK(impinge_scene_n_bodies(scene) == 1 && hash_of(detector, scene, NULL) == 0);
+  REFUSED(impinge_scene_remove(scene, 0), "no body 0");
+  {
+    uint32_t body = 9;
+    GOOD(impinge_scene_add_triangles(scene, faces_of(&balls[0]), positions_of(&balls[0]), &body));
+    CHECK(body == 0 && hash_of(detector, scene, NULL) == all);
+  }
+  impinge_scene_destroy(scene);
+}
+
+/* The second ball comes from afar: it stops 1e-3 before the first one. */
+static void steps(impinge_detector *detector) {
+  static ball far_away;
+  impinge_scene *scene = two_balls();
+  impinge_step step;
+  impinge_impacts *impacts = NULL;
+  impinge_impact first, again;
+  impinge_motion *motion = NULL;
+  impinge_nearest nearest;
+  impinge_array view;
+  double fraction = -1;
+  int32_t found = -1, is_free = -1;
+  make_ball(&far_away, 5);
+  impinge_step_default(&step);
+  /* As they are, the balls touch at the start, and the start intersects. */
+  GOOD(impinge_scene_set_end_positions(scene, 1, positions_of(&far_away)));
+  step.start = IMPINGE_START_VERIFY;
+  GOOD(impinge_is_free(detector, scene, &step, &is_free));
+  CHECK(is_free == 0 && impinge_detector_start_intersects(detector) == 1);
+  GOOD(impinge_advance(detector, scene, &step, &fraction, NULL));
+  CHECK(fraction == 0);
+  GOOD(impinge_scene_set_positions(scene, 1, positions_of(&far_away)));
+  GOOD(impinge_find_distance(detector, scene, 0, 1, &nearest, &found));
+  CHECK(found == 1 && fabs(nearest.distance - 3) < 0.01 && nearest.body_a == 0 && nearest.body_b == 1);
+  CHECK(fabs(nearest.points[1][0] - nearest.points[0][0] - nearest.distance) < 1e-9);
+  GOOD(impinge_is_free(detector, scene, &step, &is_free));
+  CHECK(is_free == 1 && impinge_detector_start_intersects(detector) == 0);
+  GOOD(impinge_scene_set_end_positions(scene, 1, positions_of(&balls[1])));
+  GOOD(impinge_is_free(detector, scene, &step, &is_free));
+  CHECK(is_free == 0);
+  step.precision = IMPINGE_F64;
+  GOOD(impinge_find_impacts(detector, scene, &step, &impacts));
+  CHECK(impinge_impacts_count(impacts) > 100 && impinge_impacts_start_intersects(impacts) == 0);
+  CHECK(impinge_impacts_hash(impacts) == impinge_hash_impacts(impinge_impacts_data(impacts), impinge_impacts_count(impacts)));
+  GOOD(impinge_find_earliest(detector, scene, &step, &first, &found));
+  CHECK(found == 1 && fabs(first.toi * 4.1 - nearest.distance) < 1e-6 && first.at_start == 0);
+  GOOD(impinge_impacts_column(impacts, IMPINGE_COLUMN_TOI, &view));
+  {
+    size_t i;
+    double least = 2;
+    for (i = 0; i < view.rows; ++i) {
+      double toi = *(const double *)((const char *)view.data + (ptrdiff_t)i * view.row_stride);
+      if (toi < least) least = toi;
+    }
+    CHECK(least == first.toi);
+  }
+  GOOD(impinge_impacts_column(impacts, IMPINGE_COLUMN_ROWS, &view));
+  CHECK(((const uint32_t *)view.data)[0] == impinge_impacts_data(impacts)->body_a);
+  REFUSED(impinge_impacts_column(impacts, IMPINGE_COLUMN_SHAPE, &view), "no column");
+  impinge_impacts_destroy(impacts);
+  step.clearance = 1e-3;
+  GOOD(impinge_advance(detector, scene, &step, &fraction, &motion));
+  CHECK(fraction == impinge_motion_fraction(motion) && fraction < first.toi && fraction > first.toi - 1e-3);
+  CHECK(impinge_motion_start_intersects(motion) == 0);
+  GOOD(impinge_motion_first(motion, &again, &found));
+  CHECK(found == 1 && again.kind == first.kind);
+  GOOD(impinge_motion_positions(motion, 0, &view));
+  CHECK(view.rows == 0);
+  GOOD(impinge_motion_positions(motion, 1, &view));
+  CHECK(view.rows == VERTICES && view.type == IMPINGE_F64);
+  GOOD(impinge_motion_apply(motion, scene));
+  GOOD(impinge_find_distance(detector, scene, 1, 0, &nearest, &found));
+  CHECK(found == 1 && nearest.distance >= 1e-3 && nearest.distance < 1.001e-3 && nearest.body_a == 1);
+  impinge_motion_destroy(motion);
+  /* Nobody moves after a step was taken. */
+  GOOD(impinge_find_earliest(detector, scene, &step, &first, &found));
+  CHECK(found == 0);
+  GOOD(impinge_scene_set_end_positions(scene, 1, positions_of(&balls[1])));
+  GOOD(impinge_scene_set_end_positions(scene, 1, packed(NULL, 0, IMPINGE_F64)));
+  GOOD(impinge_is_free(detector, scene, &step, &is_free));
+  CHECK(is_free == 1);
+  impinge_scene_destroy(scene);
+}
+
+static int stop_after(void *user, uint32_t kind, const impinge_pair *rows, size_t n) {
+  size_t *left = user;
+  CHECK(n > 0 && rows != NULL && kind == IMPINGE_EE);
+  *left = n < *left ? *left - n : 0;
+  return *left == 0;
+}
+
+static void near_and_candidates(impinge_detector *detector) {
+  impinge_scene *scene = two_balls();
+  impinge_candidates *candidates = NULL;
+  impinge_near *near_pairs = NULL, *thick = NULL;
+  impinge_array view;
+  impinge_query query;
+  uint64_t n = 0;
+  size_t left = 500, i;
+  impinge_query_default(&query);
+  query.self = 0;
+  query.kinds = IMPINGE_EE;
+  GOOD(impinge_find_candidates(detector, scene, 0.01, &query, &candidates));
+  CHECK(impinge_candidates_count(candidates) > 500);
+  GOOD(impinge_candidates_column(candidates, IMPINGE_COLUMN_KIND, &view));
+  CHECK(view.type == IMPINGE_U8 && ((const uint8_t *)view.data)[0] == IMPINGE_EE);
+  GOOD(impinge_find_candidates_in_runs(detector, scene, 0.01, &query, 100, stop_after, &left, &n));
+  CHECK(left == 0 && n >= 500 && n < impinge_candidates_count(candidates));
+  impinge_candidates_destroy(candidates);
+  query.kinds = 0;
+  query.flags = IMPINGE_CLOSEST_POINTS;
+  GOOD(impinge_find_near(detector, scene, 0.01, &query, &near_pairs));
+  CHECK(impinge_near_count(near_pairs) > 100);
+  GOOD(impinge_near_column(near_pairs, IMPINGE_COLUMN_DISTANCE, &view));
+  for (i = 0; i < view.rows; ++i) CHECK(((const double *)view.data)[i] <= 0.01 + 1e-15);
+  GOOD(impinge_near_column(near_pairs, IMPINGE_COLUMN_POINTS, &view));
+  CHECK(view.rows == impinge_near_count(near_pairs) && view.row_stride == 48);
+  /* A body as thick as the distance. */
+  GOOD(impinge_scene_set_thickness(scene, 0, 0.01));
+  query.flags = 0;
+  GOOD(impinge_find_near(detector, scene, 0, &query, &thick));
+  CHECK(impinge_near_hash(thick) == impinge_near_hash(near_pairs));
+  REFUSED(impinge_near_column(thick, IMPINGE_COLUMN_DISTANCE, &view), "did not ask");
+  impinge_near_destroy(thick);
+  impinge_near_destroy(near_pairs);
+  impinge_scene_destroy(scene);
+}
+
+/* Two balls at a distance of 0.9 cross in one circle, and share a lens. */
+static void contacts(impinge_detector *detector) {
+  impinge_scene *scene = two_balls();
+  impinge_pairs *pairs = NULL;
+  impinge_contacts *of = NULL;
+  impinge_penetration *deep = NULL;
+  impinge_array view, lengths;
+  impinge_stats stats;
+  const impinge_region *region;
+  /* Not so that edges meet edges, where the volume would be unknown. */
+  static ball beside;
+  size_t i;
+  beside = balls[1];
+  for (i = 0; i < VERTICES; ++i) {
+    beside.positions[i][1] += 0.0123;
+    beside.positions[i][2] += 0.0234;
+  }
+  GOOD(impinge_scene_set_positions(scene, 1, positions_of(&beside)));
+  GOOD(impinge_detect(detector, scene, NULL, &pairs));
+  GOOD(impinge_find_contacts(detector, scene, pairs, &of));
+  CHECK(impinge_contacts_count(of) == impinge_pairs_count(pairs) && impinge_contacts_hash(of) == impinge_pairs_hash(pairs));
+  CHECK(memcmp(impinge_contacts_data(of), impinge_pairs_data(pairs), impinge_pairs_count(pairs) * sizeof(impinge_pair)) == 0);
+  impinge_pairs_destroy(pairs);
+  GOOD(impinge_contacts_column(of, IMPINGE_COLUMN_CURVE_STARTS, &view));
+  CHECK(view.rows == 2 && view.type == IMPINGE_U64);
+  GOOD(impinge_contacts_column(of, IMPINGE_COLUMN_CURVE_CLOSED, &view));
+  CHECK(view.rows == 1 && *(const uint8_t *)view.data == 1);
+  GOOD(impinge_contacts_column(of, IMPINGE_COLUMN_CURVE_LENGTH, &lengths));
+  CHECK(fabs(*(const double *)lengths.data - 2 * 3.14159 * sqrt(1 - 0.45 * 0.45)) < 0.1);
+  GOOD(impinge_contacts_column(of, IMPINGE_COLUMN_STARTS, &view));
+  CHECK(view.rows == impinge_contacts_count(of) + 1);
+  GOOD(impinge_contacts_column(of, IMPINGE_COLUMN_SHAPE, &view));
+  CHECK(((const uint8_t *)view.data)[0] == IMPINGE_SHAPE_SEGMENT);
+  GOOD(impinge_find_penetration(detector, scene, of, 0, 1, &deep));
+  CHECK(impinge_penetration_count(deep) == 1);
+  region = impinge_penetration_data(deep);
+  CHECK(region && fabs(fabs(region->normal[0]) - 1) < 1e-2 && fabs(region->depth - 1.1) < 0.05 && region->n_inside[0] > 100);
+  /* The lens of two balls of radius 1: pi (4 + d) (2 - d)^2 / 12. */
+  CHECK(fabs(impinge_penetration_volume(deep) - 3.14159 * 4.9 * 1.1 * 1.1 / 12) < 0.1);
+  GOOD(impinge_penetration_column(deep, IMPINGE_COLUMN_INSIDE_A, &view));
+  CHECK(view.rows == region->n_inside[0]);
+  stats.size = sizeof stats;
+  GOOD(impinge_penetration_stats(deep, &stats));
+  impinge_penetration_destroy(deep);
+  impinge_contacts_destroy(of);
+  impinge_scene_destroy(scene);
+}
+
+static void other_bodies(impinge_detector *detector) {
+  static const float solid[4][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  static const float hair[2][3] = {{0.2f, 0.2f, -1}, {0.2f, 0.2f, 1}};
+  static const double seam[4][3] = {{0, 0, 0}, {1, 0, 0}, {-0.0, 0, 0}, {1, 0, 1}};
+  static const uint32_t tetrahedron[4] = {0, 1, 2, 3}, edge[2] = {0, 1};
+  uint32_t map[4] = {9, 9, 9, 9}, firsts[4] = {9, 9, 9, 9};
+  size_t n = 0;
+  impinge_scene *scene = NULL;
+  impinge_query query;
+  impinge_array view;
+  int32_t any = -1;
+  GOOD(impinge_scene_create(&scene));
+  GOOD(impinge_scene_add_tetrahedra(scene, packed(tetrahedron, 1, IMPINGE_U32), packed(solid, 4, IMPINGE_F32), NULL));
+  GOOD(impinge_scene_add_edges(scene, packed(edge, 1, IMPINGE_U32), packed(hair, 2, IMPINGE_F32), NULL));
+  GOOD(impinge_scene_add_points(scene, packed(hair[1], 1, IMPINGE_F32), NULL));
+  GOOD(impinge_scene_faces(scene, 0, &view));
+  CHECK(view.rows == 4);
+  impinge_query_default(&query);
+  query.a = 0;
+  query.b = 1;
+  GOOD(impinge_any(detector, scene, &query, &any));
+  CHECK(any == 1);
+  query.b = 2;
+  GOOD(impinge_any(detector, scene, &query, &any));
+  CHECK(any == 0);
+  impinge_scene_destroy(scene);
+  GOOD(impinge_weld(packed(seam, 4, IMPINGE_F64), map, firsts, &n));
+  CHECK(n == 3 && map[0] == 0 && map[1] == 1 && map[2] == 0 && map[3] == 2 && firsts[2] == 3);
+}
+
+static int n_progress = 0, n_logged = 0;
+static int cancel(void *user) { return *(int *)user; }
+static void progress(void *user, uint64_t done, uint64_t total) {
+  (void)user;
+  CHECK(done <= total);
+  ++n_progress;
+}
+static void logged(void *user, uint32_t level, const char *message) {
+  (void)user;
+  n_logged += level == IMPINGE_LOG_ERROR && strlen(message) > 0;
+}
+
+static void callbacks(void) {
+  int stop = 0;
+  impinge_settings settings;
+  impinge_detector *detector = NULL;
+  impinge_scene *scene = two_balls();
+  impinge_pairs *pairs = (impinge_pairs *)scene;
+  impinge_settings_default(&settings);
+  settings.backend = IMPINGE_BACKEND_CPU;
+  settings.cancelled = cancel;
+  settings.progress = progress;
+  settings.log = logged;
+  settings.user = &stop;
+  settings.max_pairs = 10;
+  GOOD(impinge_detector_create(&settings, &detector));
+  CHECK(impinge_detect(detector, scene, NULL, &pairs) == IMPINGE_ERROR_TOO_MANY_PAIRS && pairs == NULL);
+  CHECK(n_progress > 0 && n_logged == 1);
+  stop = 1;
+  CHECK(impinge_detect(detector, scene, NULL, &pairs) == IMPINGE_ERROR_CANCELLED && n_logged == 2);
+  stop = 0;
+  CHECK(impinge_detect(detector, scene, NULL, &pairs) == IMPINGE_ERROR_TOO_MANY_PAIRS);
+  impinge_detector_destroy(detector);
+  settings.max_pairs = 0;
+  settings.memory_budget = 1000;
+  GOOD(impinge_detector_create(&settings, &detector));
+  CHECK(impinge_detect(detector, scene, NULL, &pairs) == IMPINGE_ERROR_BUDGET);
+  impinge_detector_destroy(detector);
+  impinge_scene_destroy(scene);
+}
+
+#ifdef TEST_PANIC
+impinge_status impinge_test_panic(impinge_detector *detector);
+/* A defect breaks the handle, and nothing else. */
+static void panics(void) {
+  impinge_detector *detector = open_detector(1), *other = open_detector(1);
+  impinge_scene *scene = two_balls();
+  int32_t any = -1;
+  CHECK(impinge_test_panic(detector) == IMPINGE_ERROR_INTERNAL && strstr(impinge_error_message(), "as a test asked"));
+  CHECK(impinge_any(detector, scene, NULL, &any) == IMPINGE_ERROR_INTERNAL && strstr(impinge_error_message(), "broken"));
+  CHECK(any == -1);
+  impinge_detector_destroy(detector);
+  GOOD(impinge_any(other, scene, NULL, &any));
+  CHECK(any == 1);
+  impinge_detector_destroy(other);
+  impinge_scene_destroy(scene);
+}
+#endif
+
+int main(void) {
+  impinge_detector *detector = open_detector(2);
+  CHECK(impinge_abi_version() == IMPINGE_ABI_VERSION && strlen(impinge_version()) >= 5);
+  make_ball(&balls[0], 0);
+  make_ball(&balls[1], 0.9);
+  arrays(detector);
+  pairs_of_bodies(detector);
+  steps(detector);
+  near_and_candidates(detector);
+  contacts(detector);
+  other_bodies(detector);
+  callbacks();
+#ifdef TEST_PANIC
+  panics();
+#endif
+  impinge_detector_destroy(detector);
+  return finish("questions");
+}
