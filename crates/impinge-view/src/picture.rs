@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use impinge::{Method, SharedVertex};
+use impinge::{Method, Pairs, SharedVertex};
 use impinge_render::{Orbit, Picture, Projection, Renderer, Surface, UpAxis, wgpu};
 
 use crate::content::Content;
@@ -157,12 +157,13 @@ fn command_options(
     words
 }
 
-/// Draws a content as a PNG file, as a window that begins with these options saves it, but without a window.
+/// Draws a content as a PNG file, as a window that begins with these options saves it, but without a window. Returns the pairs that
+/// the picture shows.
 ///
 /// # Errors
 /// A message for the user: a frame that cannot be read, a refused position, no device to draw with, a file that cannot be
 /// written.
-pub fn write_png(content: Content, options: &Options, path: &Path) -> Result<(), String> {
+pub fn write_png(content: Content, options: &Options, path: &Path) -> Result<Pairs, String> {
     let renderer = Renderer::new().map_err(|error| error.to_string())?;
     draw_png(content, options, renderer, path)
 }
@@ -176,7 +177,7 @@ pub fn draw_png(
     options: &Options,
     renderer: Renderer,
     path: &Path,
-) -> Result<(), String> {
+) -> Result<Pairs, String> {
     let n_frames = content.n_frames();
     let frame = options.frame.unwrap_or(0);
     if frame >= n_frames {
@@ -196,5 +197,6 @@ pub fn draw_png(
         backend: Backend::Cpu,
     };
     let answer = Finder::default().find_on_cpu(&stage, &question)?;
-    draw(&stage, Some(&answer), options, renderer, path)
+    draw(&stage, Some(&answer), options, renderer, path)?;
+    Ok(answer.pairs)
 }

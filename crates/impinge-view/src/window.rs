@@ -51,8 +51,30 @@ pub fn show(
         Ok(Box::new(Viewer::new(render, load, options)))
     });
     eframe::run_native("impinge view", native, create).map_err(|error| Error {
-        what: error.to_string(),
+        what: without_source(&error.to_string()),
     })
+}
+
+/// A message of the window's libraries without the lines of their sources, ` at some/file.rs:12: `, which tell a user nothing.
+fn without_source(text: &str) -> String {
+    let mut kept = String::new();
+    let mut rest = text;
+    while let Some((before, after)) = rest.split_once(".rs:") {
+        let number = after.trim_start_matches(|c: char| c.is_ascii_digit() || c == ':');
+        match before.rfind(" at ") {
+            Some(start) if number.len() < after.len() => {
+                kept += &before[..start];
+                rest = number;
+                kept += if rest.is_empty() { "" } else { ":" };
+            }
+            _ => {
+                kept += before;
+                kept += ".rs:";
+                rest = after;
+            }
+        }
+    }
+    kept + rest
 }
 
 /// A device whose buffers may be as large as the adapter allows, so that large meshes fit.
@@ -66,5 +88,26 @@ fn device(offered: &wgpu::Limits) -> wgpu::DeviceDescriptor<'static> {
             ..wgpu::Limits::default()
         },
         ..Default::default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::without_source;
+
+    #[test]
+    fn messages_name_no_source() {
+        for (text, said) in [
+            (
+                "winit EventLoopError: os error at /home/a b/winit-0.30.13/src/linux/mod.rs:808: neither WAYLAND_DISPLAY nor DISPLAY is set",
+                "winit EventLoopError: os error: neither WAYLAND_DISPLAY nor DISPLAY is set",
+            ),
+            ("lost at src/a.rs:3:14", "lost"),
+            ("one at a.rs:1: two at b.rs:22: three", "one: two: three"),
+            ("a file x.rs: gone", "a file x.rs: gone"),
+            ("", ""),
+        ] {
+            assert_eq!(without_source(text), said);
+        }
     }
 }

@@ -1,10 +1,11 @@
 //! `impinge view`: meshes in a window.
 
-use std::path::PathBuf;
+use std::io::Write;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use impinge::{BodyId, CancelToken, Positions};
-use impinge_io::{ReadOptions, Weld};
+use impinge::{BodyId, CancelToken, Pairs, Positions};
+use impinge_io::{ReadOptions, Weld, printable};
 use impinge_render::{Camera, Colors, Focus, Projection};
 use impinge_view::{Command, Content, Opener, Options, Shown, show, write_png};
 
@@ -12,12 +13,14 @@ use super::sequence::{Frames, welded};
 use super::step::Frames as _;
 use crate::apart::Inputs;
 use crate::args::ViewArgs;
+use crate::asked::Asked;
 use crate::commands::demo_scene::DemoScene;
 use crate::error::Error;
 use crate::files::{Files, FrameFiles};
-use crate::load::{Bodies, Loading};
-use crate::palette;
+use crate::load::{Bodies, Loading, Nouns, Vertices};
+use crate::output::out;
 use crate::watch::go_on;
+use crate::{headline, palette};
 
 /// Frames of the built-in scene.
 const DEMO_FRAMES: u32 = 300;
@@ -27,11 +30,7 @@ pub fn view(args: &ViewArgs, cancel: &CancelToken) -> Result<(), Error> {
     let mut options = options(args);
     if let Some(file) = &args.png {
         Inputs::new(&args.meshes).check("--png", &file.0)?;
-        let content = content(args, cancel)?;
-        if let Some(missing) = content.missing {
-            return Err(Error::View(missing));
-        }
-        return write_png(content, &options, &file.0).map_err(Error::View);
+        return save(args, &options, &file.0, cancel);
     }
     let (args, cancel) = (args.clone(), cancel.clone());
     let (again, token) = (args.clone(), cancel.clone());
@@ -42,11 +41,49 @@ pub fn view(args: &ViewArgs, cancel: &CancelToken) -> Result<(), Error> {
             bodies: false,
             ..again.clone()
         };
-        let content = content(&args, &token).map_err(|error| error.line())?;
+        let (content, _) = content(&args, &token).map_err(|error| error.line())?;
         Ok((content, command(&args)))
     })));
-    let load = move || content(&args, &cancel).map_err(|error| error.line());
+    let load = move || {
+        let content = content(&args, &cancel).map_err(|error| error.line());
+        content.map(|(content, _)| content)
+    };
     Ok(show(load, options)?)
+}
+
+/// Saves a picture, and prints what it shows.
+fn save(
+    args: &ViewArgs,
+    options: &Options,
+    path: &Path,
+    cancel: &CancelToken,
+) -> Result<(), Error> {
+    let (content, vertices) = content(args, cancel)?;
+    let (scene, bodies) = (content.scene.clone(), content.bodies.clone());
+    let pairs = picture(content, options, path)?;
+    let nouns = Nouns::default();
+    let names: Vec<(BodyId, &str)> = bodies
+        .iter()
+        .map(|body| (body.id, body.name.as_str()))
+        .collect();
+    let mut to = out();
+    headline::write(&mut to, (&scene, &nouns), &names, &pairs, None)?;
+    writeln!(to, "wrote {}", printable(path))?;
+    let asked = Asked {
+        between: true,
+        within: args.within || bodies.len() == 1,
+        shared_vertex: args.shared_vertex.into(),
+        ignores: false,
+    };
+    writeln!(to, "{}", asked.line(&vertices, &nouns))?;
+    Ok(())
+}
+
+fn picture(content: Content, options: &Options, path: &Path) -> Result<Pairs, Error> {
+    match content.missing {
+        Some(missing) => Err(Error::View(missing)),
+        None => write_png(content, options, path).map_err(Error::View),
+    }
 }
 
 fn options(args: &ViewArgs) -> Options {
@@ -100,9 +137,12 @@ fn command(args: &ViewArgs) -> Command {
     Command(words)
 }
 
-fn content(args: &ViewArgs, cancel: &CancelToken) -> Result<Content, Error> {
+/// What is shown, and what was welded of each body.
+fn content(args: &ViewArgs, cancel: &CancelToken) -> Result<(Content, Vec<Vertices>), Error> {
     if args.meshes.is_empty() {
-        return demo(args);
+        let content = demo(args)?;
+        let vertices = vec![Vertices::default(); content.bodies.len()];
+        return Ok((content, vertices));
     }
     let files = Files::of(&args.meshes, args.sequence, args.bodies)?;
     // Self-collision may be asked for in the window.
@@ -142,12 +182,13 @@ fn content(args: &ViewArgs, cancel: &CancelToken) -> Result<Content, Error> {
         .zip(bodies.names)
         .enumerate()
         .map(|(ix, (&id, name))| shown(ix, id, name));
-    Ok(Content {
+    let content = Content {
         bodies: shown.collect(),
         scene: bodies.scene,
         frames,
         missing: (!missing.is_empty()).then(|| missing.join("\n")),
-    })
+    };
+    Ok((content, bodies.vertices))
 }
 
 fn shown(ix: usize, id: BodyId, name: String) -> Shown {
@@ -230,5 +271,51 @@ impl impinge_view::Frames for Demo {
             Ok((id, body.positions().clone()))
         };
         ids.into_iter().map(positions).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+    use serde_json::{Value, json};
+
+    use super::*;
+
+    #[derive(Parser)]
+    struct Line {
+        #[command(flatten)]
+        args: ViewArgs,
+    }
+
+    /// What a picture of a file shows, and how many vertices were welded.
+    fn shown_of(words: &[&str], folder: &Path) -> (Value, usize) {
+        let words = ["view"].iter().chain(words);
+        let args = Line::try_parse_from(words).unwrap().args;
+        let (content, vertices) = content(&args, &CancelToken::new()).unwrap();
+        let pairs = picture(content, &options(&args), &folder.join("a.png")).unwrap();
+        let n_welded = vertices.iter().map(|of| of.n_welded).sum();
+        let hash = format!("{:016x}", pairs.hash());
+        (json!({ "pairs": pairs.len(), "hash": hash }), n_welded)
+    }
+
+    /// As every other door: `tests/cli/doors.rs`.
+    #[test]
+    fn files_have_the_answers_of_all_doors() {
+        let doors = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doors"));
+        let text = std::fs::read_to_string(doors.join("answers.json")).unwrap();
+        let answers: Value = serde_json::from_str(&text).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        for (name, answer) in answers.as_object().unwrap() {
+            let path = doors.join(name);
+            let size = ["--size", "32x32"];
+            let words = [&[path.to_str().unwrap()][..], &size].concat();
+            let (shown, n_welded) = shown_of(&words, folder.path());
+            let expected = json!({ "pairs": answer["pairs"], "hash": answer["hash"] });
+            assert_eq!(shown, expected, "{name}");
+            let welded = impinge_io::read(&path, &ReadOptions::default()).unwrap();
+            let whole = impinge_io::read(&path, &ReadOptions::as_they_are()).unwrap();
+            assert_eq!(n_welded, whole.n_vertices() - welded.n_vertices(), "{name}");
+        }
+        assert_eq!(answers.as_object().unwrap().len(), 8);
     }
 }

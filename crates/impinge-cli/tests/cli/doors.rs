@@ -154,6 +154,29 @@ fn a_picture_comes_with_the_same_answer() {
     }
 }
 
+/// Without a window, `view` prints what its picture shows.
+#[cfg(feature = "view")]
+#[test]
+fn the_picture_of_the_window_says_what_was_asked() {
+    let folder = Folder::new();
+    for name in FILES {
+        std::fs::copy(file(name), folder.path(name)).unwrap();
+    }
+    let small = ["--png", "a.png", "--size", "32x32"];
+    for meshes in [&["nodes.gltf"][..], &["strip.obj", "groups.obj"]] {
+        let lines = |command| {
+            let words = [&[command][..], meshes, &small].concat();
+            let text = folder.run(words).printed();
+            let last = text.lines().last().unwrap().to_owned();
+            (text.lines().next().unwrap().to_owned(), last)
+        };
+        let (first, last) = lines("view");
+        let (whole, same) = lines("render");
+        assert!(whole.starts_with(&first), "{first}: {whole}");
+        assert_eq!(last, same);
+    }
+}
+
 #[test]
 fn parts_of_files_are_bodies_where_they_are_asked_for() {
     let folder = Folder::new();

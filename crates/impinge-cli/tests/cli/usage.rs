@@ -1,5 +1,7 @@
 //! Help, exit codes and error lines.
 
+#[cfg(all(feature = "view", target_os = "linux"))]
+use crate::harness::Run;
 use crate::harness::{Folder, program};
 use impinge_scenes::surfaces::ball;
 
@@ -149,6 +151,23 @@ fn a_part_that_was_not_built_says_how_to_get_it() {
         let line = folder.run(["devices", "--json"]).error();
         assert!(line.contains("--features gpu"), "{line}");
     }
+}
+
+/// The libraries of the window say where in their sources an error came up.
+#[cfg(all(feature = "view", target_os = "linux"))]
+#[test]
+fn without_a_display_the_error_names_no_source() {
+    let folder = Folder::new();
+    folder.ply("a.ply", &ball(20));
+    let mut command = folder.command(["view", "a.ply"]);
+    for name in ["DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"] {
+        command.env_remove(name);
+    }
+    let line = Run::from(command.output().unwrap()).error();
+    assert!(
+        line.contains("no window: ") && line.contains("DISPLAY") && !line.contains(".rs"),
+        "{line}"
+    );
 }
 
 #[test]
