@@ -160,7 +160,7 @@ fn refuse(error: Error) -> PyErr {
                 .next()
                 .unwrap_or_default()
                 .to_owned();
-            PyOSError::new_err((source.raw_os_error(), text, path))
+            PyOSError::new_err((source.raw_os_error(), text, path.into_os_string()))
         }
         Error::Io { .. } => PyOSError::new_err(error.to_string()),
         error => PyValueError::new_err(error.to_string()),

@@ -72,8 +72,10 @@ def test_a_box_of_a_renderer_is_clean_once_it_is_welded():
 
 
 def test_what_cannot_be_read_is_refused_by_name(tmp_path):
-    with pytest.raises(FileNotFoundError, match="missing.ply"):
-        impinge.read(tmp_path / "missing.ply")
+    for read in [impinge.read, impinge.read_bodies]:
+        for path in [tmp_path / "missing.ply", str(tmp_path / "missing.ply")]:
+            with pytest.raises(FileNotFoundError, match=r"directory: '.*missing.ply'$"):
+                read(path)
     (tmp_path / "odd.obj").write_text("v 0 0 0\nf 1 2 3\n")
     for read in [impinge.read, impinge.read_bodies]:
         with pytest.raises(ValueError, match="odd.obj"):

@@ -13,6 +13,19 @@ use crate::mesh::Positions;
 use crate::text::{Line, Text, number};
 
 pub(crate) fn read<'a>(bytes: &[u8], name: Name<'a>) -> Result<Collector<'a>, Error> {
+    let read = statements(bytes, name);
+    let has_vertices = read.as_ref().is_ok_and(|parts| !parts.positions.is_empty());
+    match !has_vertices && bytes.iter().take(HEAD).any(|&byte| byte == 0) {
+        // Some lines of other data begin as statements do, and what is wrong with them is of no use.
+        true => Err(name.syntax(Place::File, "the text of an OBJ file", "other data")),
+        false => read,
+    }
+}
+
+/// The bytes in which a file that is no text has a zero: all but one of ten million.
+const HEAD: usize = 4096;
+
+fn statements<'a>(bytes: &[u8], name: Name<'a>) -> Result<Collector<'a>, Error> {
     let mut parts = Collector::new(name);
     let mut positions: Vec<[f64; 3]> = Vec::new();
     // The greatest index of all faces and its place: checked once all vertices are known.
