@@ -38,7 +38,7 @@ static void make_ball(ball *to, double x) {
   uint32_t ring, segment, n = 0;
   for (ring = 0; ring < RINGS; ++ring)
     for (segment = 0; segment < SEGMENTS; ++segment) {
-      double up = pi * (ring + 1) / (RINGS + 1), around = 2 * pi * segment / SEGMENTS;
+      double up = pi * (ring + 1) / (RINGS + 1), around = 2 * pi * segment / (int)SEGMENTS;
       double *at = to->positions[ring * SEGMENTS + segment];
       at[0] = x + sin(up) * cos(around);
       at[1] = sin(up) * sin(around);

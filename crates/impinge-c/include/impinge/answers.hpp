@@ -1,0 +1,199 @@
+/// impinge/answers.hpp: the answers of a detector. Part of impinge.hpp, which says how to use it.
+#ifndef IMPINGE_ANSWERS_HPP
+#define IMPINGE_ANSWERS_HPP
+
+#include <impinge/scene.hpp>
+
+namespace impinge {
+
+/// What an answer has: rows, a hash, columns, and what it cost.
+template <class Handle, class Row, auto count_of, auto data_of, auto column_of, auto stats_of, auto destroy> class answer {
+public:
+  using value_type = Row;
+  answer() = default;
+  explicit answer(Handle *handle) : handle_(handle) {}
+  std::size_t size() const noexcept { return count_of(raw()); }
+  bool empty() const noexcept { return size() == 0; }
+  const Row *data() const noexcept { return data_of(raw()); }
+  const Row *begin() const noexcept { return data(); }
+  const Row *end() const noexcept { return data() + size(); }
+  const Row &operator[](std::size_t ix) const { return data()[ix]; }
+  view<Row> rows() const noexcept { return {data(), size()}; }
+  /// IMPINGE_COLUMN_KIND and so on.
+  result<array> column(std::uint32_t column) const {
+    array view{};
+    return detail::give(column_of(raw(), column, &view), std::move(view));
+  }
+  /// Its strings live as long as this answer.
+  impinge_stats stats() const {
+    impinge_stats stats{};
+    stats.size = sizeof stats;
+    if (stats_of(raw(), &stats) != IMPINGE_OK) stats = {};
+    return stats;
+  }
+  Handle *raw() noexcept { return handle_.get(); }
+  const Handle *raw() const noexcept { return handle_.get(); }
+
+protected:
+  /// A column of packed numbers; nothing if it was not asked for.
+  template <class T> view<T> packed(std::uint32_t column) const {
+    array view{};
+    if (column_of(raw(), column, &view) != IMPINGE_OK) return {};
+    return {static_cast<const T *>(view.data), view.rows};
+  }
+
+private:
+  detail::handle<Handle, destroy> handle_;
+};
+
+namespace detail {
+using pairs_answer = answer<impinge_pairs, pair, impinge_pairs_count, impinge_pairs_data, impinge_pairs_column, impinge_pairs_stats, impinge_pairs_destroy>;
+using impacts_answer =
+    answer<impinge_impacts, impact, impinge_impacts_count, impinge_impacts_data, impinge_impacts_column, impinge_impacts_stats, impinge_impacts_destroy>;
+using candidates_answer = answer<impinge_candidates, pair, impinge_candidates_count, impinge_candidates_data, impinge_candidates_column,
+                                 impinge_candidates_stats, impinge_candidates_destroy>;
+using near_answer = answer<impinge_near, pair, impinge_near_count, impinge_near_data, impinge_near_column, impinge_near_stats, impinge_near_destroy>;
+using contacts_answer = answer<impinge_contacts, pair, impinge_contacts_count, impinge_contacts_data, impinge_contacts_column, impinge_contacts_stats,
+                               impinge_contacts_destroy>;
+using penetration_answer = answer<impinge_penetration, region, impinge_penetration_count, impinge_penetration_data, impinge_penetration_column,
+                                  impinge_penetration_stats, impinge_penetration_destroy>;
+
+/// The rows of one kind, of rows that are sorted by kind.
+template <class Row> view<Row> of_kind(view<Row> rows, view<std::uint8_t> kinds, pair_kind kind) {
+  std::size_t first = 0, last = rows.size();
+  while (first < last && kinds[first] < static_cast<std::uint32_t>(kind)) ++first;
+  while (last > first && kinds[last - 1] > static_cast<std::uint32_t>(kind)) --last;
+  return {rows.data() + first, last - first};
+}
+} // namespace detail
+
+/// Sorted pairs of elements that intersect.
+class pairs : public detail::pairs_answer {
+public:
+  using answer::answer;
+  std::uint64_t hash() const noexcept { return impinge_pairs_hash(raw()); }
+  /// The elements of `a` and of `b` of each pair of these two bodies.
+  std::vector<std::array<std::uint32_t, 2>> between(body a, body b) const {
+    std::vector<std::array<std::uint32_t, 2>> found;
+    for (const auto &row : *this) {
+      if (a < b && row.body_a == a && row.body_b == b) found.push_back({row.element_a, row.element_b});
+      if (b < a && row.body_a == b && row.body_b == a) found.push_back({row.element_b, row.element_a});
+    }
+    return found;
+  }
+  /// Pairs of elements of one body, the lower one first.
+  std::vector<std::array<std::uint32_t, 2>> self_of(body of) const {
+    std::vector<std::array<std::uint32_t, 2>> found;
+    for (const auto &row : *this)
+      if (row.body_a == of && row.body_b == of) found.push_back({row.element_a, row.element_b});
+    return found;
+  }
+};
+
+/// Sorted pairs that touch during a step.
+class impacts : public detail::impacts_answer {
+public:
+  using answer::answer;
+  std::uint64_t hash() const noexcept { return impinge_impacts_hash(raw()); }
+  /// Whether elements intersect at the start; nothing if nobody asked.
+  std::optional<bool> start_intersects() const { return detail::asked(impinge_impacts_start_intersects(raw())); }
+  /// Those of one kind.
+  view<impact> of(pair_kind kind) const {
+    const auto bit = static_cast<std::uint32_t>(kind);
+    auto first = begin(), last = end();
+    while (first != last && first->kind < bit) ++first;
+    while (last != first && (last - 1)->kind > bit) --last;
+    return {first, static_cast<std::size_t>(last - first)};
+  }
+};
+
+/// Sorted pairs whose boxes overlap.
+class candidates : public detail::candidates_answer {
+public:
+  using answer::answer;
+  std::uint64_t hash() const noexcept { return impinge_candidates_hash(raw()); }
+  /// The kind of each, as the number of a `pair_kind`.
+  view<std::uint8_t> kinds() const { return packed<std::uint8_t>(IMPINGE_COLUMN_KIND); }
+  view<pair> of(pair_kind kind) const { return detail::of_kind(rows(), kinds(), kind); }
+};
+
+/// Sorted pairs of elements that are near each other.
+class near_pairs : public detail::near_answer {
+public:
+  using answer::answer;
+  std::uint64_t hash() const noexcept { return impinge_near_hash(raw()); }
+  view<std::uint8_t> kinds() const { return packed<std::uint8_t>(IMPINGE_COLUMN_KIND); }
+  view<pair> of(pair_kind kind) const { return detail::of_kind(rows(), kinds(), kind); }
+  /// The nearest features of `a` and of `b`: see IMPINGE_COLUMN_FEATURES.
+  view<std::array<std::uint8_t, 2>> features() const { return packed<std::array<std::uint8_t, 2>>(IMPINGE_COLUMN_FEATURES); }
+  /// With `query::distances`.
+  view<double> distances() const { return packed<double>(IMPINGE_COLUMN_DISTANCE); }
+  /// With `query::closest_points`: a point of `a`, and one of `b`.
+  view<std::array<std::array<double, 3>, 2>> closest_points() const { return packed<std::array<std::array<double, 3>, 2>>(IMPINGE_COLUMN_POINTS); }
+};
+
+/// Where the triangles of each pair meet.
+class contacts : public detail::contacts_answer {
+public:
+  using answer::answer;
+  std::uint64_t hash() const noexcept { return impinge_contacts_hash(raw()); }
+  /// Where they meet; corners and curves name these points by their numbers.
+  view<std::array<double, 3>> points() const { return packed<std::array<double, 3>>(IMPINGE_COLUMN_CONTACT_POINTS); }
+  /// The corners of contact i are those from `starts()[i]` to `starts()[i + 1]`.
+  view<std::uint64_t> starts() const { return packed<std::uint64_t>(IMPINGE_COLUMN_STARTS); }
+  view<std::uint32_t> corners() const { return packed<std::uint32_t>(IMPINGE_COLUMN_CORNERS); }
+  /// The points of curve i are those from `curve_starts()[i]` to `curve_starts()[i + 1]`.
+  view<std::uint64_t> curve_starts() const { return packed<std::uint64_t>(IMPINGE_COLUMN_CURVE_STARTS); }
+  view<std::uint32_t> curve_points() const { return packed<std::uint32_t>(IMPINGE_COLUMN_CURVE_POINTS); }
+  view<std::uint8_t> curve_closed() const { return packed<std::uint8_t>(IMPINGE_COLUMN_CURVE_CLOSED); }
+  view<double> curve_lengths() const { return packed<double>(IMPINGE_COLUMN_CURVE_LENGTH); }
+};
+
+/// How deep two closed bodies are in each other: one row per region.
+class penetration : public detail::penetration_answer {
+public:
+  using answer::answer;
+  /// NaN if unknown.
+  double volume() const noexcept { return impinge_penetration_volume(raw()); }
+  /// Vertices of the first body inside the second, and of the second inside the first.
+  view<std::uint32_t> inside_a() const { return packed<std::uint32_t>(IMPINGE_COLUMN_INSIDE_A); }
+  view<std::uint32_t> inside_b() const { return packed<std::uint32_t>(IMPINGE_COLUMN_INSIDE_B); }
+};
+
+/// How far a step can be taken.
+class advance {
+public:
+  advance() = default;
+  explicit advance(impinge_motion *handle) : handle_(handle) {}
+  /// 1 for the whole step, 0 for none.
+  double fraction() const noexcept { return impinge_motion_fraction(raw()); }
+  /// The first contact of the whole step.
+  std::optional<impact> first() const {
+    impact impact{};
+    std::int32_t found = 0;
+    if (impinge_motion_first(raw(), &impact, &found) != IMPINGE_OK || found == 0) return std::nullopt;
+    return impact;
+  }
+  std::optional<bool> start_intersects() const { return detail::asked(impinge_motion_start_intersects(raw())); }
+  /// Where the vertices of a body are then; no rows for one that stands still.
+  result<array> positions(body of) const {
+    array view{};
+    return detail::give(impinge_motion_positions(raw(), of, &view), std::move(view));
+  }
+  /// Takes the step.
+  result<void> apply(scene &to) const { return detail::give(impinge_motion_apply(raw(), to.raw())); }
+  impinge_stats stats() const {
+    impinge_stats stats{};
+    stats.size = sizeof stats;
+    if (impinge_motion_stats(raw(), &stats) != IMPINGE_OK) stats = {};
+    return stats;
+  }
+  const impinge_motion *raw() const noexcept { return handle_.get(); }
+
+private:
+  detail::handle<impinge_motion, impinge_motion_destroy> handle_;
+};
+
+} // namespace impinge
+
+#endif // IMPINGE_ANSWERS_HPP

@@ -1,0 +1,51 @@
+/// impinge/eigen.hpp: matrices of Eigen as arrays of impinge, without a copy: row-major, column-major, blocks and `Eigen::Ref` of them, and maps.
+/// And answers of impinge as matrices.
+#ifndef IMPINGE_EIGEN_HPP
+#define IMPINGE_EIGEN_HPP
+
+#include <impinge/impinge.hpp>
+
+#include <Eigen/Core>
+
+namespace impinge {
+
+/// Everything of Eigen that lies in memory: one row per position or element.
+template <class T>
+struct as_array<T, std::enable_if_t<std::is_base_of_v<Eigen::MatrixBase<T>, T> || std::is_base_of_v<Eigen::ArrayBase<T>, T>>> {
+  static_assert((static_cast<int>(T::Flags) & Eigen::DirectAccessBit) != 0, "an expression of Eigen has no memory: evaluate it first");
+  static array of(const T &matrix, std::size_t columns) {
+    using number = typename T::Scalar;
+    const auto size = static_cast<std::ptrdiff_t>(sizeof(number));
+    const auto n = static_cast<std::size_t>(matrix.rows());
+    // An empty matrix, such as one without edges, may have any number of columns. Rows of another length are refused: strides of 1 byte
+    // fit no number.
+    const bool fits = n == 0 || static_cast<std::size_t>(matrix.cols()) == columns;
+    return {matrix.data(), n, fits ? matrix.rowStride() * size : 1, fits ? matrix.colStride() * size : 1, detail::type_of<number>()};
+  }
+};
+
+/// The rows of pairs as a matrix of n x 4 unsigned numbers: body_a, element_a, body_b, element_b. A view.
+inline Eigen::Map<const Eigen::Matrix<std::uint32_t, Eigen::Dynamic, 4, Eigen::RowMajor>> as_matrix(view<pair> rows) {
+  static_assert(sizeof(pair) == 4 * sizeof(std::uint32_t), "rows are packed");
+  return {reinterpret_cast<const std::uint32_t *>(rows.data()), static_cast<Eigen::Index>(rows.size()), 4};
+}
+
+/// Positions or points as a matrix of n x 3 numbers in double precision. A copy.
+inline Eigen::MatrixXd to_matrix(const array &positions) {
+  using strides = Eigen::Stride<Eigen::Dynamic, Eigen::Dynamic>;
+  using wide = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>;
+  using narrow = Eigen::Matrix<float, Eigen::Dynamic, 3, Eigen::RowMajor>;
+  const auto n = static_cast<Eigen::Index>(positions.rows);
+  const auto stride = [&](std::size_t size) {
+    const auto bytes = static_cast<std::ptrdiff_t>(size);
+    return strides(positions.row_stride / bytes, positions.column_stride / bytes);
+  };
+  if (n == 0) return Eigen::MatrixXd(0, 3);
+  if (positions.type == IMPINGE_F64)
+    return Eigen::Map<const wide, Eigen::Unaligned, strides>(static_cast<const double *>(positions.data), n, 3, stride(sizeof(double)));
+  return Eigen::Map<const narrow, Eigen::Unaligned, strides>(static_cast<const float *>(positions.data), n, 3, stride(sizeof(float))).cast<double>();
+}
+
+} // namespace impinge
+
+#endif // IMPINGE_EIGEN_HPP

@@ -1,0 +1,266 @@
+/// impinge.hpp: exact collision detection for deforming meshes, in C++17. A layer of classes over impinge.h, which says what each question
+/// means; nothing but the standard library is needed, and nothing is compiled but this header.
+///
+/// Ownership. Scenes, detectors and answers own their handle and can be moved. An answer outlives its scene and its detector; the views that it
+///   gives live as long as it does. Arrays that are passed in are read during the call, but for those of `lend_positions`.
+/// Errors. A call that fails throws `impinge::error`. Where exceptions are off, or IMPINGE_NO_EXCEPTIONS is defined, each call gives a
+///   `result<T>` instead, which is false after a failure.
+/// Threads. As in impinge.h: one thread at a time changes a handle, and each question changes its detector.
+#ifndef IMPINGE_HPP
+#define IMPINGE_HPP
+
+#include <impinge/answers.hpp>
+
+#include <functional>
+
+namespace impinge {
+
+/// The settings of a detector, and the callbacks that its questions call on the thread that asks.
+class settings {
+public:
+  settings() { impinge_settings_default(&raw_); }
+  settings(impinge::backend of) : settings() { backend(of); }
+  settings &backend(impinge::backend of) { return set(raw_.backend, static_cast<std::uint32_t>(of)); }
+  settings &method(impinge::method of) { return set(raw_.method, static_cast<std::uint32_t>(of)); }
+  /// Threads of the CPU; 0 for one per core.
+  settings &threads(std::uint32_t n) { return set(raw_.threads, n); }
+  settings &memory_budget(std::uint64_t bytes) { return set(raw_.memory_budget, bytes); }
+  settings &max_pairs(std::uint64_t n) { return set(raw_.max_pairs, n); }
+  settings &device(std::string name) { return set(device_, std::move(name)); }
+  /// Stops a question when it gives true. What a callback throws stops the question too, and comes out of it.
+  settings &cancelled(std::function<bool()> call) { return set(cancelled_, std::move(call)); }
+  settings &progress(std::function<void(std::uint64_t done, std::uint64_t total)> call) { return set(progress_, std::move(call)); }
+  settings &log(std::function<void(std::uint32_t level, const char *message)> call) { return set(log_, std::move(call)); }
+
+private:
+  friend class detector;
+  template <class T> settings &set(T &field, T value) {
+    field = std::move(value);
+    return *this;
+  }
+  impinge_settings raw_;
+  std::string device_;
+  std::function<bool()> cancelled_;
+  std::function<void(std::uint64_t, std::uint64_t)> progress_;
+  std::function<void(std::uint32_t, const char *)> log_;
+};
+
+/// Finds pairs, question after question. What each means is said in impinge.h.
+class detector {
+public:
+  detector(settings of = {}) {
+    if (of.cancelled_ || of.progress_ || of.log_) watch_ = std::make_unique<watch>();
+    impinge_settings raw = of.raw_;
+    if (!of.device_.empty()) raw.device = of.device_.c_str();
+    raw.user = watch_.get();
+    if (of.cancelled_ || of.progress_) raw.cancelled = watch::stop;
+    if (of.progress_) raw.progress = watch::step;
+    if (of.log_) raw.log = watch::say;
+    if (watch_) {
+      watch_->cancelled = std::move(of.cancelled_);
+      watch_->progress = std::move(of.progress_);
+      watch_->log = std::move(of.log_);
+    }
+    detail::made<impinge_detector> made;
+    const auto status = impinge_detector_create(&raw, made.out());
+    handle_.reset(made.take());
+#ifndef IMPINGE_NO_EXCEPTIONS
+    give(status);
+#else
+    (void)status; // Without a handle every question fails.
+#endif
+  }
+  detector(impinge::backend of) : detector(settings(of)) {}
+
+  result<pairs> detect(const scene &in, const query &of = {}) { return ask<pairs, impinge_pairs>(impinge_detect, in, of); }
+  result<std::uint64_t> count(const scene &in, const query &of = {}) { return value<std::uint64_t>(impinge_count, in, of); }
+  result<bool> any(const scene &in, const query &of = {}) { return yes(impinge_any, in, of); }
+  result<impinge::impacts> impacts(const scene &in, const query &of = {}) { return ask<impinge::impacts, impinge_impacts>(impinge_find_impacts, in, of); }
+  result<std::optional<impact>> earliest(const scene &in, const query &of = {}) {
+    const impinge_query raw = of.raw();
+    impact first{};
+    std::int32_t found = 0;
+    const auto status = impinge_find_earliest(this->raw(), in.raw(), &raw, &first, &found);
+    return give(status, found != 0 ? std::optional<impact>(first) : std::nullopt);
+  }
+  result<bool> is_free(const scene &in, const query &of = {}) { return yes(impinge_is_free, in, of); }
+  result<impinge::advance> advance(const scene &in, const query &of = {}) {
+    const impinge_query raw = of.raw();
+    detail::made<impinge_motion> made;
+    const auto status = impinge_advance(this->raw(), in.raw(), &raw, nullptr, made.out());
+    return give(status, impinge::advance(made.take()));
+  }
+  /// Only the fraction: no positions are kept.
+  result<double> advance_fraction(const scene &in, const query &of = {}) {
+    const impinge_query raw = of.raw();
+    double fraction = 0;
+    const auto status = impinge_advance(this->raw(), in.raw(), &raw, &fraction, nullptr);
+    return give(status, std::move(fraction));
+  }
+  result<impinge::candidates> candidates(const scene &in, double inflation, const query &of = {}) {
+    const impinge_query raw = of.raw();
+    detail::made<impinge_candidates> made;
+    const auto status = impinge_find_candidates(this->raw(), in.raw(), inflation, &raw, made.out());
+    return give(status, impinge::candidates(made.take()));
+  }
+  /// `each(kind, rows)` gets runs of at most `most` candidates, and stops the search by giving false. The number of candidates handed out.
+  template <class Each> result<std::uint64_t> candidates_in_runs(const scene &in, double inflation, std::uint64_t most, Each each, const query &of = {}) {
+    struct run {
+      Each *each;
+#ifndef IMPINGE_NO_EXCEPTIONS
+      std::exception_ptr thrown;
+#endif
+      static int hand_out(void *user, std::uint32_t kind, const pair *rows, std::size_t n) {
+        auto &of = *static_cast<run *>(user);
+#ifndef IMPINGE_NO_EXCEPTIONS
+        try {
+          return (*of.each)(static_cast<pair_kind>(kind), view<pair>(rows, n)) ? 0 : 1;
+        } catch (...) {
+          of.thrown = std::current_exception();
+          return 1;
+        }
+#else
+        return (*of.each)(static_cast<pair_kind>(kind), view<pair>(rows, n)) ? 0 : 1;
+#endif
+      }
+    };
+    run user{};
+    user.each = &each;
+    std::uint64_t n = 0;
+    const impinge_query raw = of.raw();
+    const auto status = impinge_find_candidates_in_runs(this->raw(), in.raw(), inflation, &raw, most, run::hand_out, &user, &n);
+#ifndef IMPINGE_NO_EXCEPTIONS
+    if (user.thrown) std::rethrow_exception(user.thrown);
+#endif
+    return give(status, std::move(n));
+  }
+  result<near_pairs> near(const scene &in, double distance, const query &of = {}) {
+    const impinge_query raw = of.raw();
+    detail::made<impinge_near> made;
+    const auto status = impinge_find_near(this->raw(), in.raw(), distance, &raw, made.out());
+    return give(status, near_pairs(made.take()));
+  }
+  /// The smallest distance of two bodies; nothing if one has no elements.
+  result<std::optional<nearest>> distance(const scene &in, body a, body b) {
+    nearest least{};
+    std::int32_t found = 0;
+    const auto status = impinge_find_distance(raw(), in.raw(), a, b, &least, &found);
+    return give(status, found != 0 ? std::optional<nearest>(least) : std::nullopt);
+  }
+  result<impinge::contacts> contacts(const scene &in, const pairs &of) {
+    detail::made<impinge_contacts> made;
+    const auto status = impinge_find_contacts(raw(), in.raw(), of.raw(), made.out());
+    return give(status, impinge::contacts(made.take()));
+  }
+  result<impinge::penetration> penetration(const scene &in, const impinge::contacts &of, body a, body b) {
+    detail::made<impinge_penetration> made;
+    const auto status = impinge_find_penetration(raw(), in.raw(), of.raw(), a, b, made.out());
+    return give(status, impinge::penetration(made.take()));
+  }
+  /// Whether the start of the last step intersects; nothing if nobody asked.
+  std::optional<bool> start_intersects() const { return detail::asked(impinge_detector_start_intersects(raw())); }
+  /// What the last question cost. Its strings live as long as the detector.
+  impinge_stats stats() const {
+    impinge_stats stats{};
+    stats.size = sizeof stats;
+    if (impinge_detector_stats(raw(), &stats) != IMPINGE_OK) stats = {};
+    return stats;
+  }
+  impinge_detector *raw() noexcept { return handle_.get(); }
+  const impinge_detector *raw() const noexcept { return handle_.get(); }
+
+private:
+  struct watch {
+    std::function<bool()> cancelled;
+    std::function<void(std::uint64_t, std::uint64_t)> progress;
+    std::function<void(std::uint32_t, const char *)> log;
+#ifndef IMPINGE_NO_EXCEPTIONS
+    std::exception_ptr thrown;
+    template <class Call> void guarded(Call call) {
+      if (thrown) return;
+      try {
+        call();
+      } catch (...) {
+        thrown = std::current_exception();
+      }
+    }
+    bool is_broken() const { return static_cast<bool>(thrown); }
+#else
+    template <class Call> void guarded(Call call) { call(); }
+    bool is_broken() const { return false; }
+#endif
+    static int stop(void *user) {
+      auto &of = *static_cast<watch *>(user);
+      bool stops = false;
+      if (of.cancelled) of.guarded([&] { stops = of.cancelled(); });
+      return stops || of.is_broken();
+    }
+    static void step(void *user, std::uint64_t done, std::uint64_t total) {
+      auto &of = *static_cast<watch *>(user);
+      of.guarded([&] { of.progress(done, total); });
+    }
+    static void say(void *user, std::uint32_t level, const char *message) {
+      auto &of = *static_cast<watch *>(user);
+      of.guarded([&] { of.log(level, message); });
+    }
+  };
+
+#ifndef IMPINGE_NO_EXCEPTIONS
+  void give(impinge_status status) {
+    if (watch_ && watch_->thrown) std::rethrow_exception(std::exchange(watch_->thrown, nullptr));
+    detail::give(status);
+  }
+  template <class T> T give(impinge_status status, T &&value) {
+    give(status);
+    return std::forward<T>(value);
+  }
+#else
+  template <class T> result<std::decay_t<T>> give(impinge_status status, T &&value) { return detail::give(status, std::forward<T>(value)); }
+#endif
+
+  template <class Answer, class Handle, class Call> result<Answer> ask(Call call, const scene &in, const query &of) {
+    const impinge_query raw = of.raw();
+    detail::made<Handle> made;
+    const auto status = call(this->raw(), in.raw(), &raw, made.out());
+    return give(status, Answer(made.take()));
+  }
+  template <class T, class Call> result<T> value(Call call, const scene &in, const query &of) {
+    const impinge_query raw = of.raw();
+    T value{};
+    const auto status = call(this->raw(), in.raw(), &raw, &value);
+    return give(status, std::move(value));
+  }
+  template <class Call> result<bool> yes(Call call, const scene &in, const query &of) {
+    const impinge_query raw = of.raw();
+    std::int32_t answer = 0;
+    const auto status = call(this->raw(), in.raw(), &raw, &answer);
+    return give(status, answer != 0);
+  }
+
+  std::unique_ptr<watch> watch_;
+  detail::handle<impinge_detector, impinge_detector_destroy> handle_;
+};
+
+/// Vertices at equal positions as one.
+struct weld_map {
+  /// For each vertex before, its number after.
+  std::vector<std::uint32_t> map;
+  /// For each vertex after, the first one before that is at its position.
+  std::vector<std::uint32_t> firsts;
+};
+
+/// Finds vertices whose positions are equal, as along the seams of a mesh for drawing.
+template <class P> result<weld_map> weld(const P &positions) {
+  const array at = detail::rows_of(positions, 3);
+  weld_map of;
+  of.map.resize(at.rows);
+  of.firsts.resize(at.rows);
+  std::size_t n = 0;
+  const auto status = impinge_weld(at, of.map.data(), of.firsts.data(), &n);
+  of.firsts.resize(n);
+  return detail::give(status, std::move(of));
+}
+
+} // namespace impinge
+
+#endif // IMPINGE_HPP

@@ -1,0 +1,398 @@
+/// impinge/scene.hpp: arrays, errors, queries and scenes. Part of impinge.hpp, which says how to use it.
+#ifndef IMPINGE_SCENE_HPP
+#define IMPINGE_SCENE_HPP
+
+#include <impinge.h>
+
+#include <array>
+#include <cstdint>
+#include <initializer_list>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <string>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#if !defined(IMPINGE_NO_EXCEPTIONS) && !defined(__cpp_exceptions) && !defined(_CPPUNWIND)
+#define IMPINGE_NO_EXCEPTIONS
+#endif
+
+// Old macros of windows.h.
+#undef near
+
+#ifndef IMPINGE_NO_EXCEPTIONS
+#include <exception>
+#include <stdexcept>
+#endif
+
+namespace impinge {
+
+/// A body of a scene.
+using body = std::uint32_t;
+/// Two elements: `body_a, element_a, body_b, element_b`.
+using pair = impinge_pair;
+/// Two elements that touch during a step.
+using impact = impinge_impact;
+/// The nearest elements of two bodies.
+using nearest = impinge_nearest;
+/// A region in which two bodies overlap.
+using region = impinge_region;
+/// Rows of numbers anywhere in memory.
+using array = impinge_array;
+
+#ifndef IMPINGE_NO_EXCEPTIONS
+
+/// A call that failed. `what()` names body, row and value.
+class error : public std::runtime_error {
+public:
+  error(impinge_status status, const char *message) : std::runtime_error(message), status_(status) {}
+  /// IMPINGE_ERROR_INVALID and so on.
+  impinge_status status() const noexcept { return status_; }
+
+private:
+  impinge_status status_;
+};
+
+/// What a call gives.
+template <class T> using result = T;
+
+#else
+
+/// What a call gives, or why it failed.
+template <class T> class result {
+public:
+  result(T value) : value_(std::move(value)) {}
+  result(impinge_status status, const char *message) : status_(status), message_(message) {}
+  /// Whether there is a value.
+  explicit operator bool() const noexcept { return value_.has_value(); }
+  /// The value, if there is one.
+  T &operator*() { return *value_; }
+  const T &operator*() const { return *value_; }
+  T *operator->() { return &*value_; }
+  const T *operator->() const { return &*value_; }
+  /// IMPINGE_OK, or what failed.
+  impinge_status status() const noexcept { return status_; }
+  const std::string &message() const noexcept { return message_; }
+
+private:
+  std::optional<T> value_;
+  impinge_status status_ = IMPINGE_OK;
+  std::string message_;
+};
+
+template <> class result<void> {
+public:
+  result() = default;
+  result(impinge_status status, const char *message) : status_(status), message_(message) {}
+  explicit operator bool() const noexcept { return status_ == IMPINGE_OK; }
+  impinge_status status() const noexcept { return status_; }
+  const std::string &message() const noexcept { return message_; }
+
+private:
+  impinge_status status_ = IMPINGE_OK;
+  std::string message_;
+};
+
+#endif
+
+/// Numbers that lie one after the other and belong to an answer. Converts to `std::span`.
+template <class T> class view {
+public:
+  using value_type = T;
+  view() = default;
+  view(const T *data, std::size_t size) : data_(data), size_(size) {}
+  const T *data() const noexcept { return data_; }
+  std::size_t size() const noexcept { return size_; }
+  bool empty() const noexcept { return size_ == 0; }
+  const T *begin() const noexcept { return data_; }
+  const T *end() const noexcept { return data_ + size_; }
+  const T &operator[](std::size_t ix) const { return data_[ix]; }
+
+private:
+  const T *data_ = nullptr;
+  std::size_t size_ = 0;
+};
+
+namespace detail {
+
+#ifndef IMPINGE_NO_EXCEPTIONS
+inline void give(impinge_status status) {
+  if (status != IMPINGE_OK) throw error(status, impinge_error_message());
+}
+template <class T> T give(impinge_status status, T &&value) {
+  give(status);
+  return std::forward<T>(value);
+}
+[[noreturn]] inline void refuse(const char *message) { throw error(IMPINGE_ERROR_INVALID, message); }
+#else
+inline result<void> give(impinge_status status) {
+  return status == IMPINGE_OK ? result<void>() : result<void>(status, impinge_error_message());
+}
+template <class T> result<std::decay_t<T>> give(impinge_status status, T &&value) {
+  if (status != IMPINGE_OK) return {status, impinge_error_message()};
+  return {std::forward<T>(value)};
+}
+#endif
+
+/// The type code of a number.
+template <class T> constexpr std::uint32_t type_of() {
+  static_assert(std::is_arithmetic_v<T>, "numbers are float, double, or integers of 32 or 64 bits");
+  if constexpr (std::is_same_v<T, float>) return IMPINGE_F32;
+  else if constexpr (std::is_same_v<T, double>) return IMPINGE_F64;
+  else if constexpr (sizeof(T) == 4) return std::is_signed_v<T> ? IMPINGE_I32 : IMPINGE_U32;
+  else {
+    static_assert(sizeof(T) == 8, "integers have 32 or 64 bits");
+    return std::is_signed_v<T> ? IMPINGE_I64 : IMPINGE_U64;
+  }
+}
+
+template <auto destroy> struct deleter {
+  template <class T> void operator()(T *handle) const { destroy(handle); }
+};
+template <class T, auto destroy> using handle = std::unique_ptr<T, deleter<destroy>>;
+
+/// A handle that a call of C makes.
+template <class T> class made {
+public:
+  T **out() { return &handle_; }
+  T *take() { return std::exchange(handle_, nullptr); }
+
+private:
+  T *handle_ = nullptr;
+};
+
+inline std::optional<bool> asked(std::int32_t answer) {
+  if (answer < 0) return std::nullopt;
+  return answer != 0;
+}
+
+} // namespace detail
+
+/// `n` rows of numbers from `data` on; `row_stride` bytes from one row to the next, or 0 for packed rows.
+template <class T> array rows(const T *data, std::size_t n, std::ptrdiff_t row_stride = 0) {
+  const auto column_stride = row_stride == 0 ? 0 : static_cast<std::ptrdiff_t>(sizeof(T));
+  return {data, n, row_stride, column_stride, detail::type_of<T>()};
+}
+
+/// How objects of a type are read as rows of `columns` numbers. Specialise it for types of your own, as impinge/eigen.hpp does.
+template <class T, class = void> struct as_array;
+
+template <> struct as_array<array> {
+  static array of(const array &given, std::size_t) { return given; }
+};
+
+namespace detail {
+/// Types with `data()`, `size()` and `value_type`. Matrices of Eigen, which have a `Scalar`, are none.
+template <class T, class = void> struct is_container : std::false_type {};
+template <class T>
+struct is_container<T, std::void_t<decltype(std::declval<const T &>().data()), decltype(std::declval<const T &>().size()), typename T::value_type>>
+    : std::true_type {};
+template <class T, class = void> struct has_scalar : std::false_type {};
+template <class T> struct has_scalar<T, std::void_t<typename T::Scalar>> : std::true_type {};
+} // namespace detail
+
+/// Containers with `data()` and `size()`: of numbers (each row after the other), or of `std::array`.
+template <class T> struct as_array<T, std::enable_if_t<detail::is_container<T>::value && !detail::has_scalar<T>::value>> {
+  template <class V, class = void> struct row {
+    using number = V;
+    static constexpr std::size_t n = 0;
+  };
+  template <class V, std::size_t N> struct row<std::array<V, N>> {
+    using number = V;
+    static constexpr std::size_t n = N;
+  };
+  static array of(const T &given, std::size_t columns) {
+    using of_row = row<std::remove_cv_t<typename T::value_type>>;
+    using number = typename of_row::number;
+    // Rows of another length make an array that the library refuses.
+    constexpr std::ptrdiff_t odd = 1;
+    const auto data = static_cast<const void *>(given.data());
+    if constexpr (of_row::n > 0) {
+      return {data, given.size(), of_row::n == columns ? 0 : odd, of_row::n == columns ? 0 : odd, detail::type_of<number>()};
+    } else {
+      const std::ptrdiff_t stride = given.size() % columns == 0 ? 0 : odd;
+      return {data, given.size() / columns, stride, stride, detail::type_of<number>()};
+    }
+  }
+};
+
+namespace detail {
+template <class T> array rows_of(const T &given, std::size_t columns) { return as_array<T>::of(given, columns); }
+} // namespace detail
+
+/// What happens to pairs that touch at the start of a step.
+enum class start : std::uint32_t { report = IMPINGE_START_REPORT, skip = IMPINGE_START_SKIP, verify = IMPINGE_START_VERIFY };
+/// Pairs of one body that share vertices.
+enum class shared_vertex : std::uint32_t { skip = IMPINGE_SKIP, resolve = IMPINGE_RESOLVE };
+/// The precision of times.
+enum class precision : std::uint32_t { f32 = IMPINGE_F32, f64 = IMPINGE_F64 };
+/// Kinds of pairs; the first letter is the element `a`.
+enum class pair_kind : std::uint32_t { vf = IMPINGE_VF, ee = IMPINGE_EE, ev = IMPINGE_EV, vv = IMPINGE_VV, ef = IMPINGE_EF, ff = IMPINGE_FF };
+/// Where the work is done.
+enum class backend : std::uint32_t { automatic = IMPINGE_BACKEND_AUTO, cpu = IMPINGE_BACKEND_CPU, gpu = IMPINGE_BACKEND_GPU };
+/// How candidates are found.
+enum class method : std::uint32_t { automatic = IMPINGE_METHOD_AUTO, clusters = IMPINGE_METHOD_CLUSTERS, cells = IMPINGE_METHOD_CELLS, naive = IMPINGE_METHOD_NAIVE };
+
+/// Which pairs, and how: one query for all questions. `impinge_query` in impinge.h describes each option.
+class query {
+public:
+  /// Everything: pairs of different bodies and self-collision.
+  query() { impinge_query_default(&raw_); }
+  static query all() { return {}; }
+  /// Pairs of different bodies.
+  static query between_all() { return of_bodies(1, 0, IMPINGE_ANY_BODY, IMPINGE_ANY_BODY); }
+  /// Self-collision of all bodies.
+  static query self_all() { return of_bodies(0, 1, IMPINGE_ANY_BODY, IMPINGE_ANY_BODY); }
+  /// Pairs between two bodies, whatever their filters say.
+  static query between(body a, body b) { return of_bodies(1, 1, a, b); }
+  /// Self-collision of one body.
+  static query self_of(body a) { return of_bodies(0, 1, a, IMPINGE_ANY_BODY); }
+  /// Pairs of one body and any other, whatever their filters say.
+  static query of(body a) { return of_bodies(1, 0, a, IMPINGE_ANY_BODY); }
+
+  query &kinds(std::initializer_list<pair_kind> kinds) {
+    raw_.kinds = 0;
+    for (const auto kind : kinds) raw_.kinds |= static_cast<std::uint32_t>(kind);
+    return *this;
+  }
+  query &shared_vertex(impinge::shared_vertex rule) { return set(raw_.shared_vertex, static_cast<std::uint32_t>(rule)); }
+  /// Leaves out the pairs of two bodies, or the self-collision of one.
+  query &exclude(body a, body b) {
+    impinge_exclusion exclusion{};
+    exclusion.kind = IMPINGE_EXCLUDE_BODIES;
+    exclusion.a = a;
+    exclusion.b = b;
+    exclusions_.push_back(exclusion);
+    return *this;
+  }
+  /// Only the pairs of a half-open box of space.
+  query &owned_by(const std::array<double, 3> &low, const std::array<double, 3> &high) {
+    raw_.flags |= IMPINGE_CELL;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      raw_.cell_low[axis] = low[axis];
+      raw_.cell_high[axis] = high[axis];
+    }
+    return *this;
+  }
+  query &start(impinge::start rule) { return set(raw_.start, static_cast<std::uint32_t>(rule)); }
+  query &precision(impinge::precision of) { return set(raw_.precision, static_cast<std::uint32_t>(of)); }
+  /// The distance that counts as touching, a length.
+  query &separation(double length) { return set(raw_.separation, length); }
+  /// What a step leaves, a length, and the share of its distance that a pair keeps at most.
+  query &clearance(double length, double share = 0.2) {
+    raw_.clearance_share = share;
+    return set(raw_.clearance, length);
+  }
+  query &distances() { return set(raw_.flags, raw_.flags | IMPINGE_DISTANCES); }
+  query &closest_points() { return set(raw_.flags, raw_.flags | IMPINGE_CLOSEST_POINTS); }
+
+  /// The query of C. It lives as long as this one is not changed.
+  impinge_query raw() const {
+    impinge_query raw = raw_;
+    raw.exclusions = exclusions_.data();
+    raw.n_exclusions = exclusions_.size();
+    return raw;
+  }
+
+private:
+  static query of_bodies(std::uint32_t between, std::uint32_t self, body a, body b) {
+    query of;
+    of.raw_.between = between;
+    of.raw_.self = self;
+    of.raw_.a = a;
+    of.raw_.b = b;
+    return of;
+  }
+  template <class T> query &set(T &field, T value) {
+    field = value;
+    return *this;
+  }
+  impinge_query raw_;
+  std::vector<impinge_exclusion> exclusions_;
+};
+
+/// Bodies: topology once, positions every frame. Elements and positions are anything that `as_array` reads: vectors of numbers or of
+/// `std::array`, `rows(pointer, n)`, an `impinge::array` with strides, matrices with impinge/eigen.hpp.
+class scene {
+public:
+  scene() {
+    detail::made<impinge_scene> made;
+    const auto status = impinge_scene_create(made.out());
+    handle_.reset(made.take());
+#ifndef IMPINGE_NO_EXCEPTIONS
+    detail::give(status);
+#else
+    (void)status; // Without a handle every call fails.
+#endif
+  }
+
+  template <class F, class P> result<body> add_triangles(const F &faces, const P &positions) {
+    body added = IMPINGE_ANY_BODY;
+    return detail::give(impinge_scene_add_triangles(raw(), detail::rows_of(faces, 3), detail::rows_of(positions, 3), &added), std::move(added));
+  }
+  template <class F, class P> result<body> add_tetrahedra(const F &tetrahedra, const P &positions) {
+    body added = IMPINGE_ANY_BODY;
+    return detail::give(impinge_scene_add_tetrahedra(raw(), detail::rows_of(tetrahedra, 4), detail::rows_of(positions, 3), &added), std::move(added));
+  }
+  template <class F, class P> result<body> add_edges(const F &edges, const P &positions) {
+    body added = IMPINGE_ANY_BODY;
+    return detail::give(impinge_scene_add_edges(raw(), detail::rows_of(edges, 2), detail::rows_of(positions, 3), &added), std::move(added));
+  }
+  template <class P> result<body> add_points(const P &positions) {
+    body added = IMPINGE_ANY_BODY;
+    return detail::give(impinge_scene_add_points(raw(), detail::rows_of(positions, 3), &added), std::move(added));
+  }
+  result<void> remove(body of) { return detail::give(impinge_scene_remove(raw(), of)); }
+  /// New elements (`kind` is IMPINGE_TRIANGLES and so on) and positions under the old number.
+  template <class F, class P> result<void> remesh(body of, std::uint32_t kind, const F &elements, const P &positions) {
+    return detail::give(impinge_scene_remesh(raw(), of, kind, detail::rows_of(elements, kind), detail::rows_of(positions, 3)));
+  }
+  /// The caller's own numbers of the edges of a body.
+  template <class E> result<void> set_edges(body of, const E &edges) { return detail::give(impinge_scene_set_edges(raw(), of, detail::rows_of(edges, 2))); }
+  template <class P> result<void> set_positions(body of, const P &positions) {
+    return detail::give(impinge_scene_set_positions(raw(), of, detail::rows_of(positions, 3)));
+  }
+  template <class P> result<void> set_end_positions(body of, const P &positions) {
+    return detail::give(impinge_scene_set_end_positions(raw(), of, detail::rows_of(positions, 3)));
+  }
+  /// The body stands still.
+  result<void> clear_end_positions(body of) { return detail::give(impinge_scene_set_end_positions(raw(), of, array{nullptr, 0, 0, 0, IMPINGE_F64})); }
+  /// Positions that the scene reads where they lie, and shares the owner of.
+  template <class P> result<void> lend_positions(body of, std::shared_ptr<P> owner) { return lend(impinge_scene_lend_positions, of, std::move(owner)); }
+  template <class P> result<void> lend_end_positions(body of, std::shared_ptr<P> owner) { return lend(impinge_scene_lend_end_positions, of, std::move(owner)); }
+  /// Four rows of four numbers.
+  template <class M> result<void> set_transform(body of, const M &matrix) { return detail::give(impinge_scene_set_transform(raw(), of, detail::rows_of(matrix, 4))); }
+  result<void> set_filter(body of, std::uint64_t category, std::uint64_t mask) { return detail::give(impinge_scene_set_filter(raw(), of, category, mask)); }
+  result<void> set_thickness(body of, double thickness) { return detail::give(impinge_scene_set_thickness(raw(), of, thickness)); }
+
+  std::size_t n_bodies() const noexcept { return impinge_scene_n_bodies(raw()); }
+  /// Views, which live until the scene is changed.
+  result<array> positions(body of) const { return look(impinge_scene_positions, of); }
+  result<array> end_positions(body of) const { return look(impinge_scene_end_positions, of); }
+  result<array> elements(body of) const { return look(impinge_scene_elements, of); }
+  result<array> edges(body of) const { return look(impinge_scene_edges, of); }
+  result<array> faces(body of) const { return look(impinge_scene_faces, of); }
+
+  impinge_scene *raw() noexcept { return handle_.get(); }
+  const impinge_scene *raw() const noexcept { return handle_.get(); }
+
+private:
+  template <class Lend, class P> result<void> lend(Lend call, body of, std::shared_ptr<P> owner) {
+    const array at = detail::rows_of<std::remove_const_t<P>>(*owner, 3);
+    auto kept = std::make_unique<std::shared_ptr<P>>(std::move(owner));
+    const auto status = call(raw(), of, at, [](void *user) { delete static_cast<std::shared_ptr<P> *>(user); }, kept.get());
+    if (status == IMPINGE_OK) kept.release();
+    return detail::give(status);
+  }
+  template <class Look> result<array> look(Look call, body of) const {
+    array view{};
+    return detail::give(call(raw(), of, &view), std::move(view));
+  }
+  detail::handle<impinge_scene, impinge_scene_destroy> handle_;
+};
+
+} // namespace impinge
+
+#endif // IMPINGE_SCENE_HPP

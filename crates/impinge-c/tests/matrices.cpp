@@ -1,0 +1,78 @@
+// Matrices of Eigen in any layout give the same pairs, and are not copied on the way. Linked with --wrap=malloc, so that copies are seen.
+#include "common.h"
+#include <impinge/igl.hpp>
+
+extern "C" {
+void *__real_malloc(size_t size);
+static size_t largest = 0;
+void *__wrap_malloc(size_t size) {
+  if (size > largest) largest = size;
+  return __real_malloc(size);
+}
+}
+
+using by_row = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>;
+using faces_by_row = Eigen::Matrix<std::int32_t, Eigen::Dynamic, 3, Eigen::RowMajor>;
+
+// A function of a solver: whatever it is given, a reference.
+static std::uint64_t hash_at(impinge::detector &detector, impinge::scene &scene, impinge::body of, Eigen::Ref<const Eigen::MatrixXd, 0, Eigen::Stride<Eigen::Dynamic, Eigen::Dynamic>> positions) {
+  scene.set_positions(of, positions);
+  return detector.detect(scene).hash();
+}
+
+int main() {
+  static ball balls[2];
+  make_ball(&balls[0], 0);
+  make_ball(&balls[1], 0.9);
+  const Eigen::Map<const by_row> first(&balls[0].positions[0][0], VERTICES, 3), second(&balls[1].positions[0][0], VERTICES, 3);
+  const faces_by_row faces = Eigen::Map<const Eigen::Matrix<std::uint32_t, Eigen::Dynamic, 3, Eigen::RowMajor>>(&balls[0].faces[0][0], FACES, 3).cast<std::int32_t>();
+  const Eigen::MatrixXi by_column = faces;
+  impinge::scene scene;
+  impinge::detector detector(impinge::settings(impinge::backend::cpu).threads(1));
+  scene.add_triangles(faces, first);
+  const auto body = scene.add_triangles(by_column, second);
+  const auto hash = detector.detect(scene).hash();
+  CHECK(hash != 0);
+  // Column-major, and blocks of larger matrices of either order.
+  const Eigen::MatrixXd columns = second;
+  Eigen::MatrixXd wide = Eigen::MatrixXd::Random(VERTICES + 5, 7);
+  wide.block(2, 3, VERTICES, 3) = second;
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> wide_rows = wide;
+  Eigen::Matrix<float, 3, Eigen::Dynamic> turned = second.transpose().cast<float>();
+  CHECK(hash_at(detector, scene, body, columns) == hash);
+  CHECK(hash_at(detector, scene, body, wide.block(2, 3, VERTICES, 3)) == hash);
+  scene.set_positions(body, wide_rows.block(2, 3, VERTICES, 3));
+  CHECK(detector.detect(scene).hash() == hash);
+  scene.set_positions(body, wide.middleCols(3, 3).middleRows(2, VERTICES));
+  CHECK(detector.detect(scene).hash() == hash);
+  // Packed rows go straight into the scene: no allocation at all is as large as the positions.
+  largest = 0;
+  scene.set_positions(body, second);
+  CHECK(largest < 1000);
+  // Other layouts are gathered once, into memory of the library, and never by Eigen.
+  largest = 0;
+  (void)impinge::detail::rows_of(wide.block(2, 3, VERTICES, 3), 3);
+  CHECK(largest == 0);
+  scene.set_positions(body, turned.transpose());
+  CHECK(scene.positions(body).type == IMPINGE_F32 && scene.positions(body).rows == VERTICES);
+  scene.set_positions(body, columns);
+  CHECK(impinge::to_matrix(scene.positions(body)) == columns);
+  const auto pairs = detector.detect(scene);
+  const auto rows = impinge::as_matrix(pairs.rows());
+  CHECK(rows.rows() == static_cast<Eigen::Index>(pairs.size()) && rows(0, 2) == pairs[0].body_b);
+  try {
+    scene.set_positions(body, wide);
+    CHECK(!"it has thrown");
+  } catch (const impinge::error &error) {
+    CHECK(error.status() == IMPINGE_ERROR_INVALID);
+  }
+  // As libigl asks.
+  Eigen::MatrixXi found;
+  CHECK(impinge::igl::intersect_other(first, faces, columns, by_column, found));
+  CHECK(found.rows() == static_cast<Eigen::Index>(pairs.size()) && found(0, 1) == static_cast<int>(pairs[0].element_b));
+  CHECK(!impinge::igl::self_intersections(first, faces, found) && found.rows() == 0);
+  by_row folded = first;
+  folded.row(0) *= -1;
+  CHECK(impinge::igl::self_intersections(folded, faces, found) && found(0, 0) < found(0, 1));
+  return finish("matrices");
+}
