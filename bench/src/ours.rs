@@ -130,7 +130,7 @@ impl Runner for Ours {
             "work_items": stats.n_work_items,
             "candidates": stats.n_candidates,
             "unsure": stats.n_unsure,
-            "slabs": stats.n_slabs,
+            "slabs": stats.n_batches,
             "bytes_held": stats.bytes_held,
             "bytes_scene": self.scene.bytes(),
             "stages_ms": stages,

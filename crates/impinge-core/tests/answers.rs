@@ -488,7 +488,7 @@ fn runs_of_candidates_keep_the_budget() {
             });
             assert_eq!(all, Ok(ControlFlow::Continue((n * n) as u64)));
             assert_eq!(next as usize, n * n);
-            // The scene's layers and the threads' stacks of the search are not counted.
+            // The scene's parts and the threads' stacks of the search are not counted.
             assert!(
                 held as u64 <= budget + (1 << 20),
                 "{method:?}: {held} of {budget}"

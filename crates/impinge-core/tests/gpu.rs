@@ -126,7 +126,7 @@ fn a_crowded_cell_is_worked_in_tiles() {
         assert_eq!((stats.method, stats.grid), ("cells", Some([1; 3])));
         assert!(n >= 300, "{stats:?}");
         assert_eq!(stats.n_work_items, n * (n + 1) / 2);
-        assert!(stats.n_slabs > 1, "{stats:?}");
+        assert!(stats.n_batches > 1, "{stats:?}");
     }
     // Buffers that grow between tiles must not change the list.
     let mut tiny = Capacities::default();
@@ -164,7 +164,7 @@ fn a_crowded_cell_keeps_to_the_budget_or_is_left_to_clusters() {
         let stats = pairs.stats();
         assert_eq!(stats.method, method, "{budget:?} {stats:?}");
         assert!(is_kept(budget, stats, expected.len()), "{stats:?}");
-        assert!(stats.n_slabs > 1, "{stats:?}");
+        assert!(stats.n_batches > 1, "{stats:?}");
         // A smaller frame uses the requested method again.
         let mut small = Scene::new();
         let id = soup::triangles(50, 0.4, 1).add_to(&mut small).unwrap();
@@ -267,14 +267,14 @@ fn buffers_that_overflow_grow_and_nothing_is_lost() {
 }
 
 #[test]
-fn a_memory_budget_is_kept_by_working_in_slabs() {
+fn a_memory_budget_is_kept_by_working_in_batches() {
     let case = large();
     let mut cpu = Detector::with_settings(cpu(Method::Clusters)).unwrap();
     let expected = rows(cpu.detect(&case.scene, &case.query).unwrap());
     let mut free = Detector::with_settings(gpu(Method::Clusters)).unwrap();
     assert_agree("free", &expected, &mut free, &case);
     for method in [Method::Clusters, Method::Cells] {
-        let mut seen_slabs = false;
+        let mut seen_batches = false;
         for budget in [1_500_000, 1_000_000, 700_000, 300_000] {
             let mut detector = Detector::with_settings(Settings {
                 memory_budget: Some(budget),
@@ -285,10 +285,10 @@ fn a_memory_budget_is_kept_by_working_in_slabs() {
             let pairs = detector.detect(&case.scene, &case.query).unwrap();
             let stats = pairs.stats();
             assert!(is_kept(Some(budget), stats, expected.len()), "{stats:?}");
-            seen_slabs |= stats.n_slabs > 1 && stats.n_pieces == 0;
+            seen_batches |= stats.n_batches > 1 && stats.n_pieces == 0;
             assert_eq!(stats.n_pieces > 0, budget == 300_000, "{stats:?}");
         }
-        assert!(seen_slabs, "{method:?}");
+        assert!(seen_batches, "{method:?}");
         let mut detector = Detector::with_settings(Settings {
             memory_budget: Some(100_000),
             ..gpu(method)
@@ -465,7 +465,7 @@ fn web(n: u32, n_vertices: u32, seed: u64) -> impinge_scenes::Model {
 }
 
 #[test]
-fn neighbours_are_settled_on_the_device() {
+fn neighbours_are_decided_on_the_device() {
     let model = web(500, 60, 5);
     let folded = soup::lattice_web(400, 3, 2);
     // Nearly coplanar, nearly touching.
@@ -506,7 +506,7 @@ fn neighbours_are_settled_on_the_device() {
 }
 
 #[test]
-fn regular_meshes_are_settled_on_the_device() {
+fn regular_meshes_are_decided_on_the_device() {
     let mut detectors = [Method::Clusters, Method::Cells]
         .map(|method| Detector::with_settings(gpu(method)).unwrap());
     for surface in regular::ALL {

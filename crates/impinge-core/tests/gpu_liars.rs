@@ -115,13 +115,13 @@ const OF_CLUSTERS: &[Damage] = &[
         "return min(min(x, y), z) > above || max(max(x, y), z) < below;",
         "return max(max(x, y), z) > above || min(min(x, y), z) < below;",
     ),
-    ("dispatch", "&& !is_ignored(min(a, b), max(a, b))", ""),
+    ("traversal", "&& !is_ignored(min(a, b), max(a, b))", ""),
     (
-        "dispatch",
+        "traversal",
         "found.a == found.b || extents_meet(node_extent(found.a), node_extent(found.b));",
         "found.a != found.b && extents_meet(node_extent(found.a), node_extent(found.b));",
     ),
-    ("dispatch", "i <= j && j < n_a", "j < n_a"),
+    ("traversal", "i <= j && j < n_a", "j < n_a"),
     ("pairing", "walked &= after;", ""),
     ("pairing", "any(a == b.yzwx)", "false"),
     (
@@ -153,9 +153,9 @@ const OF_CELLS: &[Damage] = &[
         "let high = fine >> (shift + vec3<u32>(16u));",
         "let high = low;",
     ),
-    ("dispatch_cells", "column = row;", "column = row + 1u;"),
+    ("traversal_cells", "column = row;", "column = row + 1u;"),
     (
-        "dispatch_scatter",
+        "traversal_scatter",
         "entries[at] = ix;",
         "entries[at] = ix ^ 1u;",
     ),
@@ -170,7 +170,7 @@ const OF_CELLS: &[Damage] = &[
         "partners |= membership[32u + firstTrailingBit(rest)];",
         "",
     ),
-    ("dispatch_tile", "row <= column", "row < column"),
+    ("traversal_tile", "row <= column", "row < column"),
 ];
 
 fn questions() -> Vec<(Case, Vec<[u32; 4]>)> {

@@ -147,7 +147,7 @@ fn recordings_are_printed_one_line_per_launch() {
             _ => &[
                 "bounds_keep",
                 "grid_count",
-                "dispatch_scatter",
+                "traversal_scatter",
                 "pairing_cells",
             ],
         };

@@ -116,11 +116,11 @@ fn numbers(found: &ResidentStep, kind: PairKind, elements: [(BodyId, u32); 2]) -
     for ((part, (body, element)), number) in
         kind.parts().into_iter().zip(elements).zip(&mut numbers)
     {
-        let mut layers = found.layers.iter();
-        let layer = layers.find(|layer| layer.part == part && layer.body == body);
-        let layer = layer.expect("a layer of each part that takes part");
-        assert!(element < layer.len);
-        *number = layer.first + element;
+        let mut parts = found.parts.iter();
+        let part = parts.find(|each| each.part == part && each.body == body);
+        let part = part.expect("a part of each part that takes part");
+        assert!(element < part.len);
+        *number = part.first + element;
     }
     numbers
 }
@@ -346,7 +346,7 @@ fn numbers_name_elements_of_every_kind_of_body() {
                 .count();
             assert!(n > 10, "{kind_of:?}: {n}");
         }
-        let parts = found.layers.iter().map(|layer| layer.part);
+        let parts = found.parts.iter().map(|part| part.part);
         let parts = Vec::from_iter(parts);
         assert!(parts.is_sorted_by_key(|part| match part {
             Part::Edges => 0,

@@ -282,7 +282,7 @@ fn surfaces_of_many_clusters_are_answered_alike() {
     assert!(!device.is_free(&scene, &Step::default()).expect("good"));
     let n_any = device.step_stats().n_unsure;
     assert!(n_any < n_left / 2, "{n_any} of {n_left} for any");
-    for stage in ["clustering", "upload", "settle", "collect"] {
+    for stage in ["clustering", "upload", "decide", "collect"] {
         assert!(
             on_device.stages.iter().any(|held| held.name == stage),
             "{stage}"
@@ -589,7 +589,7 @@ fn cells_are_answered_alike() {
 }
 
 #[test]
-fn a_memory_budget_is_kept_in_slabs_or_by_the_cpu() {
+fn a_memory_budget_is_kept_in_batches_or_by_the_cpu() {
     // Large triangles in a small room.
     let mut random = Random::new(5);
     let n = 900;
@@ -614,7 +614,7 @@ fn a_memory_budget_is_kept_in_slabs_or_by_the_cpu() {
             Ok(impacts) => {
                 assert_eq!(impacts.hash(), expected, "{budget}");
                 let stats = impacts.stats();
-                backends.push((budget, stats.backend != "cpu", stats.n_slabs));
+                backends.push((budget, stats.backend != "cpu", stats.n_batches));
                 // Times that one part has proven hold for all.
                 let found = device.earliest(&scene, &step).expect("as before");
                 assert_eq!(found, earliest, "{budget}");
@@ -627,13 +627,13 @@ fn a_memory_budget_is_kept_in_slabs_or_by_the_cpu() {
     assert!(
         backends
             .iter()
-            .any(|&(_, on_device, n_slabs)| on_device && n_slabs > 1),
+            .any(|&(_, on_device, n_batches)| on_device && n_batches > 1),
         "{backends:?}"
     );
     assert!(
         backends
             .iter()
-            .any(|&(_, on_device, n_slabs)| on_device && n_slabs == 1),
+            .any(|&(_, on_device, n_batches)| on_device && n_batches == 1),
         "{backends:?}"
     );
 }
@@ -723,7 +723,7 @@ fn limits_and_cancellation_end_a_step() {
     assert_alike("after that", &mut device, &scene, &Step::default());
 }
 
-/// Every instruction set and number of threads settles the same.
+/// Every instruction set and number of threads decides the same.
 #[test]
 fn threads_and_methods_do_not_matter() {
     let scene = balls(800);
@@ -792,7 +792,7 @@ fn damaged_kernels_are_noticed() {
         .each_ref()
         .map(|(scene, step)| Ok(answers(&mut on_cpu(), scene, step).expect("good")));
     for harmless in [
-        ("dispatch_moving", "let a_first =", "let  a_first ="),
+        ("traversal_moving", "let a_first =", "let  a_first ="),
         // A device that drops nothing is slow, not wrong.
         (
             "narrow_moving",
@@ -822,13 +822,13 @@ fn damaged_kernels_are_noticed() {
         ),
         ("bounds_top_moving", "end < ENDS; end++", "end < 1u; end++"),
         (
-            "dispatch_moving",
+            "traversal_moving",
             "return !any(a_first | b_first);",
             "return !any(a_first | b_first | (a.start.high < b.start.low));",
         ),
-        ("dispatch_moving", "return part_a == EDGES ||", "return"),
+        ("traversal_moving", "return part_a == EDGES ||", "return"),
         (
-            "dispatch_moving",
+            "traversal_moving",
             "|| is_ignored(min(body_a, body_b), max(body_a, body_b))",
             "",
         ),
@@ -839,7 +839,7 @@ fn damaged_kernels_are_noticed() {
         ),
         (
             "pairing_moving",
-            "(bodies[a.body].layer & PART) == EDGES",
+            "(bodies[a.body].part & PART) == EDGES",
             "false",
         ),
         (

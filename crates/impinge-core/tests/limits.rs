@@ -220,7 +220,7 @@ fn settings_out_of_range_are_refused() {
 }
 
 #[test]
-fn budgets_are_kept_by_slabs() {
+fn budgets_are_kept_by_batches() {
     let built = adversarial::coincident(30_000).unwrap();
     let query = Query::everything().shared_vertex(SharedVertex::Skip);
     for method in [Method::Clusters, Method::Cells] {
@@ -237,7 +237,7 @@ fn budgets_are_kept_by_slabs() {
         let held = free.stats().bytes_held;
         // Bisect between a budget that is refused and one that is enough, to the least sufficient budget.
         let (mut refused, mut enough) = (1_000, held);
-        let mut most_slabs = 0;
+        let mut most_batches = 0;
         while enough - refused > held / 200 {
             let budget = (refused + enough) / 2;
             let settings = Settings {
@@ -251,7 +251,7 @@ fn budgets_are_kept_by_slabs() {
                     let stats = detector.stats();
                     let held = stats.bytes_held;
                     assert!(held <= budget, "{method:?}: {held} held, {budget} allowed");
-                    most_slabs = most_slabs.max(stats.n_slabs);
+                    most_batches = most_batches.max(stats.n_batches);
                     let budget_of_pairs = budget + of_answer;
                     let mut detector = Detector::with_settings(Settings {
                         memory_budget: Some(budget_of_pairs),
@@ -276,7 +276,7 @@ fn budgets_are_kept_by_slabs() {
         }
         assert!(refused > 1_000, "a kilobyte is never enough");
         assert!(enough < held, "{method:?}: {enough} of {held} needed");
-        assert!(most_slabs > 1, "{method:?}: {most_slabs} slabs");
+        assert!(most_batches > 1, "{method:?}: {most_batches} batches");
     }
 }
 

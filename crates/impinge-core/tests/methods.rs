@@ -259,9 +259,9 @@ fn bodies_that_flow_away_are_clustered_again() {
 #[test]
 fn a_frame_that_failed_leaves_nothing_behind() {
     let ball = surfaces::bumpy_ball(3_000, 0.2);
-    for (method, settled) in [
+    for (method, decided) in [
         (Method::Clusters, 1),
-        // Enough frames for remote clusters to be left out.
+        // Enough frames for culled clusters to be left out.
         (Method::Clusters, 6),
         (Method::Cells, 1),
     ] {
@@ -270,7 +270,7 @@ fn a_frame_that_failed_leaves_nothing_behind() {
         let b = ball.translated([0.8, 0.1, 0.0]).add_to(&mut scene).unwrap();
         let query = Query::between(a, b);
         let mut detector = Detector::with_settings(cpu(method, 1)).unwrap();
-        for _ in 0..settled {
+        for _ in 0..decided {
             scene.set_positions(a, &ball.positions).unwrap();
             let place = ball.translated([0.8, 0.1, 0.0]).positions;
             scene.set_positions(b, &place).unwrap();
@@ -291,7 +291,7 @@ fn a_frame_that_failed_leaves_nothing_behind() {
                 let expected = fresh.detect(&scene, &query).unwrap();
                 assert!(!expected.is_empty());
                 let found = detector.detect(&scene, &query).unwrap();
-                assert!(found.same_as(expected), "{method:?} {settled} {offset:?}");
+                assert!(found.same_as(expected), "{method:?} {decided} {offset:?}");
                 let place = ball.translated(offset).positions;
                 scene.set_positions(b, &place).unwrap();
             }
@@ -387,7 +387,7 @@ fn auto_finds_the_same_in_the_grid_as_clusters_do() {
         .unwrap();
     // And one that meets no other.
     ball.translated([3.0, 0.0, 0.0]).add_to(&mut scene).unwrap();
-    // Under `Resolve`, clusters settle neighbours per vertex, and the grid does not: then the first frame takes clusters.
+    // Under `Resolve`, clusters decide neighbours per vertex, and the grid does not: then the first frame takes clusters.
     for query in [
         Query::all(),
         Query::everything().shared_vertex(SharedVertex::Skip),

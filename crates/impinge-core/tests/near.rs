@@ -74,7 +74,7 @@ fn four(points: &[&[Point]]) -> [Point; 4] {
 }
 
 /// Whether two elements are near, and the features if one predicate names them.
-fn settle(kind: PairKind, a: &[Point], b: &[Point], distance: f64) -> Option<Option<Row>> {
+fn decide(kind: PairKind, a: &[Point], b: &[Point], distance: f64) -> Option<Option<Row>> {
     let simple = |pair, points: [Point; 4], swap: bool| {
         are_within(pair, &points, distance).then(|| {
             let nearest = nearest_features(pair, &points);
@@ -120,7 +120,7 @@ fn expected(scene: &Scene, distance: f64) -> Vec<Row> {
                     b.body.index() as u32,
                     b.number,
                 ];
-                match settle(kind, &a.corners, &b.corners, distance) {
+                match decide(kind, &a.corners, &b.corners, distance) {
                     Some(Some((kind, _, features, parallel))) => {
                         expected.push((kind, row, features, parallel));
                     }

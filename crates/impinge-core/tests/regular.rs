@@ -33,7 +33,7 @@ fn cases(name: &str, model: &Model, rule: SharedVertex) -> [Case; 2] {
 }
 
 #[test]
-fn regular_meshes_are_settled_by_filters() {
+fn regular_meshes_are_decided_by_filters() {
     for surface in regular::ALL {
         let model = (surface.build)(1_500);
         for rule in [SharedVertex::Skip, SharedVertex::Resolve] {
@@ -61,9 +61,9 @@ fn regular_meshes_are_settled_by_filters() {
 #[test]
 fn folded_sheets_are_answered_as_by_the_oracle() {
     for surface in regular::ALL {
-        for fold in [4.0, 4.25, 4.5] {
+        for crease in [4.0, 4.25, 4.5] {
             let model = (surface.build)(600);
-            let model = model.mapped(|[x, y, z]| [(x - fold).abs(), y, z]);
+            let model = model.mapped(|[x, y, z]| [(x - crease).abs(), y, z]);
             for rule in [SharedVertex::Skip, SharedVertex::Resolve] {
                 for case in cases(surface.name, &model, rule) {
                     check(&case, &naive(&case), settings(Method::Clusters));

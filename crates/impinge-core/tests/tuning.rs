@@ -31,8 +31,8 @@ fn settings(method: Method, threads: usize, tuning: Tuning) -> Settings {
 /// All thresholds where most of the code behind them is entered.
 fn eager() -> Tuning {
     let late = [
-        "remote_one_in",
-        "remote_lasts",
+        "culled_one_in",
+        "culled_lasts",
         "most_maps",
         "auto_most_crowded",
     ];
@@ -74,8 +74,8 @@ fn extremes() -> Vec<Tuned> {
 fn each_of(name: &str, tuning: Tuning) -> Vec<Tuned> {
     let ends = |threshold: &&str| {
         let methods: &[Method] = match *threshold {
-            "kept_parallel_from" | "most_maps" | "map_cell" | "most_marked" => &[Method::Cells],
-            "wake_from" | "most_per_task" | "most_slab_items" | "settle_from" => {
+            "cull_parallel_from" | "most_maps" | "map_cell" | "most_marked" => &[Method::Cells],
+            "wake_from" | "most_per_task" | "most_batch_items" | "decide_from" => {
                 &[Method::Clusters, Method::Cells]
             }
             auto if auto.starts_with("auto") => &[Method::Auto],
@@ -394,7 +394,7 @@ impl Watched {
         let more_at_zero: fn(u64, u64) -> bool = |zero, infinity| zero > infinity;
         let only_at_infinity: fn(u64, u64) -> bool = |zero, infinity| zero == 0 && infinity > 0;
         let n_shared: fn(&Statistics) -> u64 = |stats| stats.ways.n_shared;
-        let n_remote: fn(&Statistics) -> u64 = |stats| stats.n_remote;
+        let n_culled: fn(&Statistics) -> u64 = |stats| stats.n_culled;
         let in_grid: fn(&Statistics) -> u64 = |stats| u64::from(stats.method == "cells");
         let (clusters, cells, auto) = (Method::Clusters, Method::Cells, Method::Auto);
         let new = Watched::new;
@@ -411,16 +411,16 @@ impl Watched {
             "most_per_task" => new(clusters, &[], |stats| stats.ways.n_tasks, more_at_zero),
             "bounds_parallel_from" => new(clusters, &[], n_shared, only_at_zero),
             "stale_from" => new(clusters, &[], |stats| stats.n_reclustered, only_at_zero),
-            "remote_from" => new(clusters, &[], n_remote, only_at_zero),
-            "remote_one_in" => new(clusters, &["remote_from"], n_remote, only_at_infinity),
-            "remote_cost" => new(
+            "culled_from" => new(clusters, &[], n_culled, only_at_zero),
+            "culled_one_in" => new(clusters, &["culled_from"], n_culled, only_at_infinity),
+            "culled_cost" => new(
                 clusters,
-                &["remote_from"],
+                &["culled_from"],
                 |stats| stats.ways.n_came_back,
                 more_at_zero,
             ),
-            "remote_lasts" => new(clusters, &["remote_from"], n_remote, only_at_infinity),
-            "kept_parallel_from" => new(cells, &[], n_shared, more_at_zero),
+            "culled_lasts" => new(clusters, &["culled_from"], n_culled, only_at_infinity),
+            "cull_parallel_from" => new(cells, &[], n_shared, more_at_zero),
             "most_maps" => new(cells, &[], |stats| stats.ways.n_mapped, only_at_infinity),
             // A finer map drops more primitives.
             "map_cell" => new(
@@ -430,16 +430,16 @@ impl Watched {
                 |zero, infinity| zero < infinity,
             ),
             "most_marked" => new(cells, &[], |stats| stats.ways.n_everywhere, only_at_zero),
-            "most_slab_items" => new(
+            "most_batch_items" => new(
                 clusters,
                 &[],
-                |stats| stats.n_slabs,
+                |stats| stats.n_batches,
                 |zero, infinity| zero > 2 * infinity,
             ),
             "pairing_parallel_from" => new(clusters, &[], n_shared, only_at_zero),
             "most_cached" => new(clusters, &[], |stats| stats.ways.n_evicted, more_at_zero),
             "directions_from" => new(clusters, &[], |stats| stats.ways.n_parted, only_at_zero),
-            "settle_from" => new(cells, &[], |stats| stats.ways.n_full, only_at_zero),
+            "decide_from" => new(cells, &[], |stats| stats.ways.n_full, only_at_zero),
             "auto_from" => new(auto, &["auto_body_from"], in_grid, only_at_zero),
             "auto_body_from" => new(auto, &["auto_from"], in_grid, only_at_zero),
             "auto_most_crowded" => new(
@@ -483,8 +483,8 @@ fn the_code_behind_each_threshold_is_entered() {
             count
         });
         let [zero, infinity] = counts;
-        let is_remote = threshold.starts_with("remote");
-        if is_remote && !leaves_out() {
+        let is_culled = threshold.starts_with("culled");
+        if is_culled && !leaves_out() {
             assert_eq!(counts, [0, 0]);
             continue;
         }
@@ -516,7 +516,7 @@ fn the_code_behind_thresholds_of_steps_is_entered() {
     let [zero, infinity] = counts("sort_from", |stats| stats.ways.n_counted);
     assert!(zero > 0 && infinity == 0, "{zero}, {infinity}");
     let tuned = |end: usize| {
-        let tuning = Tuning::ENDS[INFINITY].with("settle_from", &Tuning::ENDS[end]);
+        let tuning = Tuning::ENDS[INFINITY].with("decide_from", &Tuning::ENDS[end]);
         let mut detector = detector(Method::Clusters, 2, tuning);
         let step = Step::new(Query::all());
         detector.impacts(&scene, &step).unwrap().stats().ways.n_full

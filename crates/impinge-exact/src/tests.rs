@@ -74,41 +74,41 @@ fn classify(pairs: &TrianglePairs8) -> Verdict {
     )
 }
 
-/// Two groups of triangles in f32, and the places of a batch of pairs.
+/// Two groups of triangles in f32, and the slots of a batch of pairs.
 struct InTables {
     tables: [Triangles64; 2],
-    places: [[u8; BATCH]; 2],
+    slots: [[u8; BATCH]; 2],
 }
 
 impl InTables {
-    /// Two groups from a generator, and random places.
+    /// Two groups from a generator, and random slots.
     fn new(random: &mut Random, mut triangle: impl FnMut(&mut Random) -> [Point; 3]) -> Self {
         let mut tables = [[[[0.0f32; TABLE]; 3]; 3]; 2];
         for table in &mut tables {
-            for place in 0..TABLE {
+            for slot in 0..TABLE {
                 for (corner, point) in table.iter_mut().zip(triangle(random)) {
                     for (row, x) in corner.iter_mut().zip(point) {
-                        row[place] = x as f32;
+                        row[slot] = x as f32;
                     }
                 }
             }
         }
-        let places = [(); 2].map(|()| [(); BATCH].map(|()| (random.bits() % TABLE as u64) as u8));
-        InTables { tables, places }
+        let slots = [(); 2].map(|()| [(); BATCH].map(|()| (random.bits() % TABLE as u64) as u8));
+        InTables { tables, slots }
     }
 
     /// The triangles of a pair.
     fn get(&self, lane: usize) -> [[Point; 3]; 2] {
         std::array::from_fn(|side| {
-            let place = usize::from(self.places[side][lane]);
-            self.tables[side].map(|corner| corner.map(|row| f64::from(row[place])))
+            let slot = usize::from(self.slots[side][lane]);
+            self.tables[side].map(|corner| corner.map(|row| f64::from(row[slot])))
         })
     }
 
     fn classify<V: number::Lookup>(&self) -> Verdict16 {
-        let InTables { tables, places } = self;
-        let (tables, places) = ([&tables[0], &tables[1]], [&places[0], &places[1]]);
-        filter::classify_in_tables::<V>(tables, places, u16::MAX)
+        let InTables { tables, slots } = self;
+        let (tables, slots) = ([&tables[0], &tables[1]], [&slots[0], &slots[1]]);
+        filter::classify_in_tables::<V>(tables, slots, u16::MAX)
     }
 }
 

@@ -71,8 +71,8 @@ impl Statistics {
 
     /// int : ``"clusters"`` on the CPU: those proven to lie beside all other bodies, whose boxes were not needed.
     #[getter]
-    fn n_remote(&self) -> u64 {
-        self.inner.n_remote
+    fn n_culled(&self) -> u64 {
+        self.inner.n_culled
     }
 
     /// int : pairs of groups that were paired.
@@ -118,8 +118,8 @@ impl Statistics {
 
     /// int : runs over parts of the work; 1 when the memory budget allowed for all at once.
     #[getter]
-    fn n_slabs(&self) -> u64 {
-        self.inner.n_slabs
+    fn n_batches(&self) -> u64 {
+        self.inner.n_batches
     }
 
     /// int : GPU: pieces that a scene was cut into because the device or the budget could not hold it
@@ -157,14 +157,14 @@ impl Statistics {
         all.set_item("n_subdivided", self.n_subdivided())?;
         all.set_item("n_entries", self.n_entries())?;
         all.set_item("n_clusters", self.n_clusters())?;
-        all.set_item("n_remote", self.n_remote())?;
+        all.set_item("n_culled", self.n_culled())?;
         all.set_item("n_work_items", self.n_work_items())?;
         all.set_item("n_candidates", self.n_candidates())?;
         all.set_item("n_unsure", self.n_unsure())?;
         all.set_item("unsure_share", self.unsure_share())?;
         all.set_item("n_clustered", self.n_clustered())?;
         all.set_item("n_reclustered", self.n_reclustered())?;
-        all.set_item("n_slabs", self.n_slabs())?;
+        all.set_item("n_batches", self.n_batches())?;
         all.set_item("n_pieces", self.n_pieces())?;
         all.set_item("n_reruns", self.n_reruns())?;
         all.set_item("bytes_held", self.bytes_held())?;

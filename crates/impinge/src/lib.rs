@@ -142,7 +142,7 @@ pub use impinge_core::{
 };
 #[cfg(feature = "gpu")]
 pub use impinge_core::{
-    DeviceInfo, ResidentLayer, ResidentPairs, ResidentStep, devices, devices_async,
+    DeviceInfo, ResidentPairs, ResidentPart, ResidentStep, devices, devices_async,
 };
 pub use impinge_core::{contact, exact, proximity};
 

@@ -28,9 +28,9 @@ mod rules;
 use std::sync::Arc;
 
 use impinge_core::cpu::cells::Cells;
-use impinge_core::cpu::simd::Isa;
 use impinge_core::host::Host;
-use impinge_core::sink::Answer;
+use impinge_core::search::sink::Answer;
+use impinge_core::simd::Isa;
 use impinge_core::{BodyId, InstructionSet, Pairs, Query, Scene};
 
 use crate::{Error, check_lambda, check_threads};
@@ -213,7 +213,7 @@ impl TwoLevels {
             .detect(scene, &query, "two levels, DJB2", |job, answer, stats| {
                 stats.time("table", |_| table.clear(table_size))?;
                 cells.run(job, answer, &settings, &table.rule(possible), stats)?;
-                table.settle(job, answer, stats)
+                table.decide(job, answer, stats)
             })
     }
 
@@ -232,7 +232,7 @@ impl TwoLevels {
             .detect(scene, &query, "two levels, counted", |job, _, stats| {
                 let rule = Recorded {
                     possible,
-                    frame: job.frame,
+                    plan: job.plan,
                 };
                 cells.run(job, &tests, &settings, &rule, stats)
             })?;

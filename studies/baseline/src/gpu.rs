@@ -1,6 +1,6 @@
 //! The uniform grid on a GPU: the same stages in WGSL, on any adapter.
 //!
-//! Pairs that the filter on the device leaves unsure are settled exactly on the CPU, as in impinge. So the pairs
+//! Pairs that the filter on the device leaves unsure are decided exactly on the CPU, as in impinge. So the pairs
 //! are those of [`crate::UniformGrid`] on every device.
 //!
 //! ```no_run
@@ -18,7 +18,7 @@ mod plan;
 use std::sync::Arc;
 
 use impinge_core::gpu::cells::Guest;
-use impinge_core::gpu::room::Capacities;
+use impinge_core::gpu::pass_buffers::Capacities;
 use impinge_core::host::gpu::Host;
 use impinge_core::{BodyId, Query, Scene};
 
@@ -104,7 +104,7 @@ impl UniformGrid {
 
     /// Finds all intersecting pairs of primitives of two different bodies, in the current state of the scene.
     ///
-    /// The device times its stages if it has a clock; `upload`, `settle` and `collect` are stages of the host.
+    /// The device times its stages if it has a clock; `upload`, `decide` and `collect` are stages of the host.
     ///
     /// # Errors
     /// A stale id, one body named twice, refused positions; more than the device can hold.

@@ -5,7 +5,7 @@
 //! grid      resolution by eq. (1) with λ = 5, ranges of cells by eq. (3), entries counted
 //! fill      exclusive sum of the counts; one entry (cell, primitive) for every cell that a box touches
 //! sort      radix sort by cell
-//! compact   cells that have primitives of both bodies, and the places of their entries
+//! compact   cells that have primitives of both bodies, and the slots of their entries
 //! pairing   box tests of all pairs of a cell
 //! narrow    the exact test
 //! collect   sorted, repetitions dropped
@@ -14,14 +14,14 @@
 use std::sync::{Arc, Mutex};
 use std::time::Instant;
 
+use impinge_core::bvh::bounds::Bounds;
+use impinge_core::bvh::grid::Grid;
 use impinge_core::cpu::cells::{MOST_ENTRIES_EACH, for_cells};
-use impinge_core::cpu::kept::{Kept, KeptList};
-use impinge_core::cpu::simd::Isa;
+use impinge_core::cpu::cull_map::{Kept, KeptList};
 use impinge_core::cpu::world::World;
-use impinge_core::grouping::bounds::Bounds;
-use impinge_core::grouping::grid::Grid;
-use impinge_core::run::Job;
-use impinge_core::sink::Answer;
+use impinge_core::search::runner::Job;
+use impinge_core::search::sink::Answer;
+use impinge_core::simd::Isa;
 use impinge_core::{InstructionSet, Statistics};
 
 use crate::pairing::{Lists, Run, Scratch};
@@ -33,7 +33,7 @@ const PRIMITIVES: usize = 4096;
 const ENTRIES: usize = 1 << 14;
 const RUNS: usize = 64;
 /// Primitives of body `a` in one run.
-const GROUP: u32 = impinge_core::grouping::GROUP as u32;
+const GROUP: u32 = impinge_core::bvh::GROUP as u32;
 
 /// The stages and their memory.
 pub(crate) struct Method {
@@ -41,7 +41,7 @@ pub(crate) struct Method {
     reaching: KeptList,
     /// The number of entries of each task; after the prefix sum, their beginnings.
     firsts: Vec<Mutex<u64>>,
-    /// `cell << 32 | place in kept`.
+    /// `cell << 32 | slot in kept`.
     entries: Vec<u64>,
     radix: Radix,
     parts: Vec<Mutex<Part>>,
@@ -82,14 +82,14 @@ impl Method {
         settings: &Settings,
         stats: &mut Statistics,
     ) -> Result<(), Error> {
-        let world = World::new(job.scene, job.frame);
+        let world = World::new(job.scene, job.plan);
         self.counts = Counts::default();
         self.scratches
             .resize_with(job.workers.n(), Scratch::default);
         for scratch in &mut self.scratches {
             scratch.begin(answer);
         }
-        stats.n_slabs = 1;
+        stats.n_batches = 1;
         let Method {
             reaching,
             scratches,
@@ -121,7 +121,7 @@ impl Method {
         stats.time("compact", |_| self.compact(job));
         self.pair(job, world, &grid, settings, stats);
         for scratch in &mut self.scratches {
-            scratch.settler.end();
+            scratch.decider.end();
         }
         answer.check()?;
         self.book(&grid, stats);
@@ -187,25 +187,25 @@ impl Method {
         // The count was checked to fit in 32 bits.
         self.entries.clear();
         self.entries.resize(self.counts.n_entries as usize, 0);
-        let mut places = Vec::with_capacity(n_tasks);
+        let mut slots = Vec::with_capacity(n_tasks);
         let mut rest = &mut self.entries[..];
         let mut first = 0;
         for next in &mut self.firsts[..n_tasks] {
             let next = *next.get_mut().expect("no task panics") as usize;
             let (task, others) = rest.split_at_mut(next - first);
             (rest, first) = (others, next);
-            places.push(Mutex::new(task));
+            slots.push(Mutex::new(task));
         }
         // The part that was split off belongs to the task before.
-        places.push(Mutex::new(rest));
+        slots.push(Mutex::new(rest));
         job.workers.for_each(&mut self.scratches, n_tasks, |_, ix| {
-            let mut places = places[ix + 1].lock().expect("no task panics");
-            let mut places = places.iter_mut();
+            let mut slots = slots[ix + 1].lock().expect("no task panics");
+            let mut slots = slots.iter_mut();
             let first = ix * PRIMITIVES;
-            for (place, kept) in (first as u64..).zip(kept[first..].iter().take(PRIMITIVES)) {
+            for (slot, kept) in (first as u64..).zip(kept[first..].iter().take(PRIMITIVES)) {
                 for_cells(&kept.range, |cell| {
-                    let entry = places.next().expect("counted before");
-                    *entry = (grid.index(cell) as u64) << 32 | place;
+                    let entry = slots.next().expect("counted before");
+                    *entry = (grid.index(cell) as u64) << 32 | slot;
                 });
             }
         });
@@ -219,7 +219,7 @@ impl Method {
             .resize_with(n_tasks.max(self.parts.len()), Mutex::default);
         // Kept primitives of the first body come first.
         let kept = &self.reaching.kept;
-        let first_of_b = kept.partition_point(|kept| kept.layer.index() == 0) as u64;
+        let first_of_b = kept.partition_point(|kept| kept.part.index() == 0) as u64;
         let parts = &self.parts;
         let cell = |ix: usize| entries[ix] >> 32;
         job.workers
@@ -283,7 +283,7 @@ impl Method {
                 scratch.pair(isa, lists, runs);
             });
         let ms = start.elapsed().as_secs_f64() * 1e3;
-        let busy = self.scratches.iter().map(|s| s.settler.busy.as_secs_f64());
+        let busy = self.scratches.iter().map(|s| s.decider.busy.as_secs_f64());
         let narrow_ms = (busy.sum::<f64>() * 1e3 / job.workers.n() as f64).min(ms);
         stats.add_ms("pairing", ms - narrow_ms);
         stats.add_ms("narrow", narrow_ms);
@@ -295,8 +295,8 @@ impl Method {
         counts.n_reaching = self.reaching.kept.len() as u64;
         for scratch in &self.scratches {
             counts.n_box_tests += scratch.n_box_tests;
-            counts.n_tests += scratch.settler.n_candidates;
-            counts.n_unsure += scratch.settler.n_unsure;
+            counts.n_tests += scratch.decider.n_candidates;
+            counts.n_unsure += scratch.decider.n_unsure;
         }
         stats.grid = Some(counts.resolution);
         stats.n_entries = counts.n_entries;

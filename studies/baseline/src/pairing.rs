@@ -1,6 +1,6 @@
 //! All pairs of a cell: every primitive of one body against every primitive of the other.
 //!
-//! In: runs of the sorted entries. Out: candidates, which the exact test settles in runs of about a
+//! In: runs of the sorted entries. Out: candidates, which the exact test decides in runs of about a
 //! thousand, while they are in the cache.
 //! A small cell is two loops of box tests. In a larger one the boxes of 64 primitives of `b` are laid out in
 //! lanes, and a primitive of `a` is tested against 8 or 16 of them at a time.
@@ -8,14 +8,14 @@
 
 use std::sync::Arc;
 
-use impinge_core::cpu::kept::Kept;
-use impinge_core::cpu::narrow::{Candidate, Settler};
-use impinge_core::cpu::simd::{Isa, LaneBounds, masks};
+use impinge_core::bvh::GROUP;
+use impinge_core::bvh::bounds::Bounds;
+use impinge_core::bvh::grid::Grid;
+use impinge_core::cpu::cull_map::Kept;
+use impinge_core::cpu::narrow::{Candidate, Decider};
 use impinge_core::cpu::world::World;
-use impinge_core::grouping::GROUP;
-use impinge_core::grouping::bounds::Bounds;
-use impinge_core::grouping::grid::Grid;
-use impinge_core::sink::Answer;
+use impinge_core::search::sink::Answer;
+use impinge_core::simd::{Isa, LaneBounds, masks};
 
 /// Up to this many box tests, laying out lanes does not pay.
 const FEW: usize = 24;
@@ -38,7 +38,7 @@ pub(crate) struct Lists<'a> {
     pub world: World<'a>,
     pub grid: &'a Grid,
     pub kept: &'a [Kept],
-    /// `cell << 32 | place in kept`, sorted.
+    /// `cell << 32 | slot in kept`, sorted.
     pub entries: &'a [u64],
     /// Whether a pair is tested in only one of its cells.
     pub owner_rule: bool,
@@ -47,7 +47,7 @@ pub(crate) struct Lists<'a> {
 /// Scratch memory of one worker.
 #[derive(Debug)]
 pub(crate) struct Scratch {
-    pub settler: Settler,
+    pub decider: Decider,
     pub n_box_tests: u64,
     lanes: LaneBounds,
     boxes: Vec<Bounds>,
@@ -57,7 +57,7 @@ pub(crate) struct Scratch {
 impl Default for Scratch {
     fn default() -> Self {
         Scratch {
-            settler: Settler::default(),
+            decider: Decider::default(),
             n_box_tests: 0,
             lanes: LaneBounds::EMPTY,
             boxes: Vec::with_capacity(GROUP),
@@ -68,15 +68,15 @@ impl Default for Scratch {
 
 impl Scratch {
     pub fn begin(&mut self, answer: &Arc<Answer>) {
-        self.settler.begin(answer, &impinge_core::Tuning::default());
+        self.decider.begin(answer, &impinge_core::Tuning::default());
         self.n_box_tests = 0;
     }
 
     pub fn bytes(&self) -> usize {
-        size_of::<Scratch>() + self.settler.bytes() + size_of::<Bounds>() * self.boxes.capacity()
+        size_of::<Scratch>() + self.decider.bytes() + size_of::<Bounds>() * self.boxes.capacity()
     }
 
-    /// Tests the boxes of all pairs of these cells, and settles the candidates.
+    /// Tests the boxes of all pairs of these cells, and decides the candidates.
     pub fn pair(&mut self, isa: Isa, lists: Lists<'_>, runs: &[Run]) {
         for run in runs {
             let a = &lists.entries[run.first_a as usize..run.end_a as usize];
@@ -87,9 +87,9 @@ impl Scratch {
             } else {
                 self.pair_many(isa, lists, run.cell, a, b);
             }
-            self.settler.settle_when_full(isa, lists.world);
+            self.decider.decide_when_full(isa, lists.world);
         }
-        self.settler.settle(isa, lists.world);
+        self.decider.decide(isa, lists.world);
     }
 
     fn pair_few(&mut self, lists: Lists<'_>, cell: u32, a: &[u64], b: &[u64]) {
@@ -123,7 +123,7 @@ impl Scratch {
                     self.put(lists, cell, lists.kept(entry_a), lists.kept(entry_b));
                 }
             }
-            self.settler.settle_when_full(isa, lists.world);
+            self.decider.decide_when_full(isa, lists.world);
         }
     }
 
@@ -132,11 +132,11 @@ impl Scratch {
         if lists.owner_rule && lists.owner(a, b) != cell as usize {
             return;
         }
-        self.settler.push(Candidate {
-            a: a.layer,
-            b: b.layer,
-            place_a: a.place(),
-            place_b: b.place(),
+        self.decider.push(Candidate {
+            a: a.part,
+            b: b.part,
+            slot_a: a.slot(),
+            slot_b: b.slot(),
         });
     }
 }

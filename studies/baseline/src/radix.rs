@@ -12,13 +12,13 @@
 //!
 //! A round counts the digits of each task's run of entries, sums up the counts (digit by digit, and within
 //! a digit task by task), and scatters. After the sums every task knows where its entries go, and no two
-//! tasks write to the same place. Cost: per round each entry is read twice and written once.
+//! tasks write to the same slot. Cost: per round each entry is read twice and written once.
 
 use std::sync::Mutex;
 
 use impinge_core::workers::Workers;
 
-/// The most bits of a digit: a round writes to up to 2,048 places.
+/// The most bits of a digit: a round writes to up to 2,048 slots.
 const MOST_BITS: u32 = 11;
 /// The fewest entries of a task.
 const TASK: usize = 1 << 14;
@@ -33,16 +33,16 @@ pub(crate) struct Radix {
     counts: Vec<Mutex<Vec<u32>>>,
 }
 
-/// The destination of entries; each task writes to places of its own.
+/// The destination of entries; each task writes to slots of its own.
 #[derive(Clone, Copy)]
-struct Places(*mut u64);
+struct Slots(*mut u64);
 
 // SAFETY: a pointer does nothing by itself; `put` states the duties of its callers.
-unsafe impl Send for Places {}
+unsafe impl Send for Slots {}
 // SAFETY: as above.
-unsafe impl Sync for Places {}
+unsafe impl Sync for Slots {}
 
-impl Places {
+impl Slots {
     /// # Safety
     /// `at` must lie within the memory pointed to, and no other task may write to it in the same round.
     #[inline(always)]
@@ -107,26 +107,26 @@ impl Radix {
             }
         });
         // Entries are fewer than 2^32, see `UniformGrid`.
-        let mut place = 0u32;
+        let mut slot = 0u32;
         for digit in 0..n_digits {
             for counts in &mut self.counts[..n_tasks] {
                 let count = &mut counts.get_mut().expect("no task panics")[digit];
-                place += std::mem::replace(count, place);
+                slot += std::mem::replace(count, slot);
             }
         }
         let counts = &self.counts;
-        let sorted = Places(self.sorted.as_mut_ptr());
+        let sorted = Slots(self.sorted.as_mut_ptr());
         let n = self.sorted.len();
         assert_eq!(n, entries.len());
         workers.for_each(scratches, n_tasks, |_, ix| {
-            let mut places = counts[ix].lock().expect("no task panics");
+            let mut slots = counts[ix].lock().expect("no task panics");
             for &entry in run(ix) {
-                let place = &mut places[digit(entry)];
-                debug_assert!((*place as usize) < n);
+                let slot = &mut slots[digit(entry)];
+                debug_assert!((*slot as usize) < n);
                 // SAFETY: the counts of all tasks and digits add up to `n`, and each task takes as many
-                // places of a digit as it has counted, starting where the task before it ends.
-                unsafe { sorted.put(*place as usize, entry) };
-                *place += 1;
+                // slots of a digit as it has counted, starting where the task before it ends.
+                unsafe { sorted.put(*slot as usize, entry) };
+                *slot += 1;
             }
         });
     }

@@ -56,7 +56,7 @@ fn works_in_parts_where_room_is_short() {
                     outcome.pairs.rows().eq(expected.iter().copied()),
                     "{budget}"
                 );
-                most_parts = most_parts.max(outcome.pairs.stats().n_slabs);
+                most_parts = most_parts.max(outcome.pairs.stats().n_batches);
             }
             Err(error) => {
                 let is_short = matches!(error, impinge_core::Error::MemoryBudget { .. });

@@ -1,15 +1,15 @@
-//! How well clusters fit the pose at hand, and have fitted at best.
+//! How well clusters fit the sweep at hand, and have fitted at best.
 
-use crate::grouping::bounds::Bounds;
 #[cfg(feature = "gpu")]
-use crate::grouping::clusters::Clustering;
+use crate::boxes;
+use crate::bvh::bounds::Bounds;
 #[cfg(feature = "gpu")]
-use crate::hull;
+use crate::bvh::clusters::Clustering;
+use crate::query::tuning::Tuning;
 #[cfg(feature = "gpu")]
-use crate::index::ClusterIx;
+use crate::scene::index::ClusterIx;
 #[cfg(feature = "gpu")]
-use crate::positions::Positions;
-use crate::tuning::Tuning;
+use crate::scene::positions::Positions;
 
 /// How well clusters have fitted their body at best.
 #[derive(Debug, Clone, Copy)]
@@ -29,12 +29,12 @@ impl Fit {
         best_spread: f64::INFINITY,
     };
 
-    /// Takes note of the spread in the pose at hand.
+    /// Takes note of the spread in the sweep at hand.
     pub fn note(&mut self, spread: f64) {
         self.best_spread = self.best_spread.min(spread);
     }
 
-    /// Takes note of the spread in the pose at hand; whether the body has flowed away from its clusters.
+    /// Takes note of the spread in the sweep at hand; whether the body has flowed away from its clusters.
     pub fn is_stale(&mut self, spread: f64, tuning: &Tuning) -> bool {
         let is_stale = spread > tuning.stale_from * self.best_spread;
         self.note(spread);
@@ -55,14 +55,14 @@ pub(crate) fn sampled_spread(clustering: &Clustering, positions: &Positions) -> 
     let mut sum = 0.0;
     for sample in 0..n_samples {
         let cluster = ClusterIx::from_usize(sample * n / n_samples);
-        let bounds = hull::of_vertices(positions, clustering.vertices(cluster));
+        let bounds = boxes::of_vertices(positions, clustering.vertices(cluster));
         sum += bounds.half_area();
         whole.join(&bounds);
     }
     spread(sum, &whole)
 }
 
-/// The clusters' summed surface over that of the whole: how well they fit the pose at hand. Both are halves.
+/// The clusters' summed surface over that of the whole: how well they fit the sweep at hand. Both are halves.
 pub(crate) fn spread(surface: f64, whole: &Bounds) -> f64 {
     let whole = whole.half_area();
     if whole > 0.0 && whole.is_finite() && surface.is_finite() {

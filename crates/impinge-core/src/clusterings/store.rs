@@ -2,14 +2,14 @@
 
 use std::sync::Arc;
 
-use super::{Asked, Clusterings};
-use crate::elements::Part;
-use crate::error::Error;
-use crate::grouping::clusters::Clustering;
-use crate::plan::Layer;
-use crate::run::Job;
+use super::{BodyPart, Clusterings};
+use crate::bvh::clusters::Clustering;
+use crate::plan::QueryPart;
+use crate::scene::elements::Part;
+use crate::scene::error::Error;
 use crate::scene::{Body, Scene};
-use crate::stats::Statistics;
+use crate::search::runner::Job;
+use crate::search::stats::Statistics;
 
 /// What a backend keeps of a body, or of a part of it: boxes, and whatever else belongs to a clustering.
 pub(crate) trait Clustered: Send {
@@ -44,23 +44,23 @@ impl<T, const PARTS: usize> Store<T, PARTS> {
         ix.min(PARTS - 1)
     }
 
-    /// What is kept of a layer of the frame that was last [updated](Store::update).
+    /// What is kept of a part of the frame that was last [updated](Store::update).
     ///
     /// # Panics
-    /// If the layer is of another frame.
+    /// If the part is of another frame.
     #[inline(always)]
-    pub fn at(&self, layer: &Layer) -> &T {
-        self.slots[layer.id.index()][Self::ix(layer.part)]
+    pub fn at(&self, part: &QueryPart) -> &T {
+        self.slots[part.id.index()][Self::ix(part.part)]
             .as_deref()
-            .expect("every layer was clustered")
+            .expect("every part was clustered")
     }
 
     /// The same, to be changed.
     #[inline(always)]
-    pub fn at_mut(&mut self, layer: &Layer) -> &mut T {
-        self.slots[layer.id.index()][Self::ix(layer.part)]
+    pub fn at_mut(&mut self, part: &QueryPart) -> &mut T {
+        self.slots[part.id.index()][Self::ix(part.part)]
             .as_deref_mut()
-            .expect("every layer was clustered")
+            .expect("every part was clustered")
     }
 
     /// All that is kept.
@@ -106,12 +106,12 @@ impl<T: Clustered, const PARTS: usize> Store<T, PARTS> {
     ) -> Result<(), Error> {
         let Job {
             scene,
-            frame,
+            plan,
             workers,
             control,
         } = job;
-        // Layers come part after part: the last one need not be of the last body.
-        let slots = frame.layers.iter().map(|layer| layer.id.index() + 1);
+        // Parts come part after part: the last one need not be of the last body.
+        let slots = plan.parts.iter().map(|part| part.id.index() + 1);
         let n_slots = slots.max().unwrap_or(0);
         if self.slots.len() < n_slots {
             self.slots.resize_with(n_slots, || [const { None }; PARTS]);
@@ -124,22 +124,22 @@ impl<T: Clustered, const PARTS: usize> Store<T, PARTS> {
             }
         }
         let mut known = clusterings.open(scene);
-        for (ix, layer) in frame.numbered_layers() {
-            let body = frame.body(scene, ix);
-            let asked = Asked::new(layer.id, body, layer.part).with_local_faces(local_faces);
-            let kept = &mut self.slots[layer.id.index()][Self::ix(layer.part)];
+        for (ix, part) in plan.numbered_parts() {
+            let body = plan.body(scene, ix);
+            let body_part = BodyPart::new(part.id, body, part.part).with_local_faces(local_faces);
+            let kept = &mut self.slots[part.id.index()][Self::ix(part.part)];
             let own = kept.as_deref();
             let own = own.filter(|own| own.topology_stamp() == body.topology_stamp());
             let own = own.map(Clustered::clustering);
-            let clustering = match known.find(asked, own) {
+            let clustering = match known.find(body_part, own) {
                 Some(clustering) => clustering,
                 None => {
-                    control.step(ix.raw().into(), frame.layers.len() as u64)?;
-                    known.make(asked, workers, stats)?
+                    control.step(ix.raw().into(), plan.parts.len() as u64)?;
+                    known.make(body_part, workers, stats)?
                 }
             };
             if own.is_none_or(|own| !Arc::ptr_eq(own, clustering)) {
-                asked.complete(clustering, workers)?;
+                body_part.complete(clustering, workers)?;
                 *kept = Some(Box::new(make(body, clustering)));
             }
             stats.n_clusters += clustering.n_clusters() as u64;

@@ -1,15 +1,15 @@
 use std::sync::{Arc, Weak};
 
-use super::{Asked, Clusterings, PARTS};
+use super::{BodyPart, Clusterings, PARTS};
+use crate::bvh::clusters::Clustering;
 use crate::detector::Detector;
-use crate::elements::{Elements, Part};
-use crate::grouping::clusters::Clustering;
-use crate::ids::BodyId;
-use crate::near::NearQuery;
 use crate::query::Query;
+use crate::query::near::NearQuery;
+use crate::query::settings::{Backend, InstructionSet, Method, Settings};
+use crate::query::step::Step;
 use crate::scene::Scene;
-use crate::settings::{Backend, InstructionSet, Method, Settings};
-use crate::step::Step;
+use crate::scene::elements::{Elements, Part};
+use crate::scene::ids::BodyId;
 
 /// A sheet of `2 n n` triangles with waves.
 fn sheet(n: u32, height: f32) -> (Elements, Vec<[f32; 3]>) {
@@ -62,7 +62,7 @@ fn n_known(clusterings: &Clusterings) -> usize {
 
 fn given(clusterings: &Clusterings, id: BodyId) -> Arc<Clustering> {
     let [given, ..] = of(clusterings, id);
-    given.expect("it was asked for")
+    given.expect("it was body_part for")
 }
 
 /// All questions that need clusters, of two bodies; which of these each of them made.
@@ -181,7 +181,7 @@ fn a_body_that_flowed_away_is_clustered_again_once_for_all() {
     let query = Query::between(a, b);
     let turned = |positions: &[[f32; 3]]| -> Vec<[f32; 3]> {
         let n = positions.len();
-        // Another place for each vertex: neighbours lie far apart.
+        // Another slot for each vertex: neighbours lie far apart.
         (0..n).map(|ix| positions[ix * 97 % n]).collect()
     };
     let (_, positions) = sheet(40, 0.3);
@@ -233,9 +233,9 @@ fn questions_of_two_scenes_take_turns() {
 #[test]
 fn local_faces_are_the_same_whether_found_at_once_or_later() {
     let (scene, [a, _]) = two_sheets();
-    let asked = Asked::new(a, scene.body(a).unwrap(), Part::Faces);
-    let at_once = asked.with_local_faces(true).cluster();
-    let later = asked.cluster();
+    let body_part = BodyPart::new(a, scene.body(a).unwrap(), Part::Faces);
+    let at_once = body_part.with_local_faces(true).cluster();
+    let later = body_part.cluster();
     assert!(at_once.knows_local_faces() && !later.knows_local_faces());
     later.find_local_faces();
     assert_eq!(at_once.bytes(), later.bytes());
@@ -256,7 +256,7 @@ fn clusters_that_distance_made_serve_intersections() {
                 Detector::with_settings(Settings {
                     instruction_set,
                     method,
-                    tuning: crate::tuning::Tuning {
+                    tuning: crate::query::tuning::Tuning {
                         auto_from: 0,
                         ..Default::default()
                     },

@@ -9,14 +9,14 @@ use super::meet::{Local, ends, meet};
 use super::parts::ByBodies;
 use super::work::{Equal, Work};
 use super::{Contacts, Doubles, Feature, PointName, Shape, lowest};
-use crate::elements::{Elements, Kind};
-use crate::error::Error;
-use crate::ids::BodyId;
-use crate::index::VertexIx;
-use crate::pairs::Pairs;
-use crate::positions::{Positions, check_positions};
+use crate::answers::pairs::Pairs;
+use crate::scene::elements::{Elements, Kind};
+use crate::scene::error::Error;
+use crate::scene::ids::BodyId;
+use crate::scene::index::VertexIx;
+use crate::scene::positions::{Positions, check_positions};
 use crate::scene::{Body, Scene};
-use crate::sink::{self, grow, reserve};
+use crate::search::sink::{self, grow, reserve};
 use impinge_exact::Point;
 
 /// Pairs per task.
@@ -29,8 +29,8 @@ const FACES: usize = 8 * 1024;
 const WHAT: &str = "contacts";
 
 /// A list with room for so many.
-fn room<T>(n: usize) -> Result<Vec<T>, Error> {
-    sink::room(n, WHAT)
+fn with_capacity<T>(n: usize) -> Result<Vec<T>, Error> {
+    sink::with_capacity(n, WHAT)
 }
 
 pub(super) fn contacts(scene: &Scene, pairs: &Pairs, work: Work<'_>) -> Result<Contacts, Error> {
@@ -38,9 +38,9 @@ pub(super) fn contacts(scene: &Scene, pairs: &Pairs, work: Work<'_>) -> Result<C
     let n = pairs.len();
     let mut rows: Vec<[u32; 4]> = sink::filled([0; 4], n, WHAT)?;
     let n_chunks = n.div_ceil(CHUNK);
-    let mut met: Vec<ChunkContacts> = room(n_chunks)?;
+    let mut met: Vec<ChunkContacts> = with_capacity(n_chunks)?;
     met.resize_with(n_chunks, ChunkContacts::default);
-    let mut chunks: Vec<(&mut [[u32; 4]], &mut ChunkContacts)> = room(n_chunks)?;
+    let mut chunks: Vec<(&mut [[u32; 4]], &mut ChunkContacts)> = with_capacity(n_chunks)?;
     chunks.extend(rows.chunks_mut(CHUNK).zip(&mut met));
     work.each(&mut chunks, |chunk, (rows, met)| {
         reserve(&mut met.contacts, rows.len(), WHAT)?;
@@ -53,7 +53,7 @@ pub(super) fn contacts(scene: &Scene, pairs: &Pairs, work: Work<'_>) -> Result<C
     drop(chunks);
 
     let n_corners = met.iter().map(|met| met.names.len()).sum();
-    let mut runs: Vec<Vec<PointName>> = room(n_chunks.div_ceil(CHUNKS_PER_RUN))?;
+    let mut runs: Vec<Vec<PointName>> = with_capacity(n_chunks.div_ceil(CHUNKS_PER_RUN))?;
     runs.resize_with(n_chunks.div_ceil(CHUNKS_PER_RUN), Vec::new);
     work.each(&mut runs, |ix, run| {
         let first = ix * CHUNKS_PER_RUN;
@@ -75,7 +75,7 @@ pub(super) fn contacts(scene: &Scene, pairs: &Pairs, work: Work<'_>) -> Result<C
     let number = |name: &PointName| names.partition_point(|held| held < name) as u32;
     let mut corners: Vec<u32> = sink::filled(0, n_corners, WHAT)?;
     let mut rest = &mut corners[..];
-    let mut of_chunks: Vec<(&ChunkContacts, &mut [u32])> = room(n_chunks)?;
+    let mut of_chunks: Vec<(&ChunkContacts, &mut [u32])> = with_capacity(n_chunks)?;
     for met in &met {
         let (of_chunk, others) = rest.split_at_mut(met.names.len());
         of_chunks.push((met, of_chunk));
@@ -88,7 +88,8 @@ pub(super) fn contacts(scene: &Scene, pairs: &Pairs, work: Work<'_>) -> Result<C
         Ok(())
     })?;
     let mut points: Vec<[f64; 3]> = sink::filled([0.0; 3], names.len(), WHAT)?;
-    let mut of_chunks: Vec<(&[PointName], &mut [[f64; 3]])> = room(names.len().div_ceil(CHUNK))?;
+    let mut of_chunks: Vec<(&[PointName], &mut [[f64; 3]])> =
+        with_capacity(names.len().div_ceil(CHUNK))?;
     of_chunks.extend(names.chunks(CHUNK).zip(points.chunks_mut(CHUNK)));
     work.each(&mut of_chunks, |_, (names, points)| {
         for (point, name) in points.iter_mut().zip(*names) {
@@ -101,9 +102,9 @@ pub(super) fn contacts(scene: &Scene, pairs: &Pairs, work: Work<'_>) -> Result<C
 
     let mut contacts = Contacts {
         rows,
-        shapes: room(n)?,
-        directed: room(n)?,
-        starts: room(n + 1)?,
+        shapes: with_capacity(n)?,
+        directed: with_capacity(n)?,
+        starts: with_capacity(n + 1)?,
         corners,
         names,
         points,

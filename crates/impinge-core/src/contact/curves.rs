@@ -8,8 +8,8 @@
 //! Only the names of points are compared, so no tolerance decides what is connected. Cost: `O(n log n)`.
 
 use super::{Contacts, Shape};
-use crate::error::Error;
-use crate::sink::{filled, grow, room};
+use crate::scene::error::Error;
+use crate::search::sink::{filled, grow, with_capacity};
 
 /// What memory is for.
 const WHAT: &str = "curves of contact";
@@ -187,7 +187,7 @@ pub(super) fn distance(p: [f64; 3], q: [f64; 3]) -> f64 {
 /// All segments, each once, sorted.
 fn links(contacts: &Contacts) -> Result<Vec<Link>, Error> {
     let segments = || (0..contacts.len()).filter(|&ix| contacts.shape(ix) == Shape::Segment);
-    let mut links: Vec<Link> = room(segments().count(), WHAT)?;
+    let mut links: Vec<Link> = with_capacity(segments().count(), WHAT)?;
     links.extend(segments().filter_map(|contact| {
         let &[from, to] = contacts.corners(contact) else {
             return None;
@@ -207,7 +207,7 @@ fn links(contacts: &Contacts) -> Result<Vec<Link>, Error> {
         })
     }));
     links.sort_unstable_by_key(|link| (link.ends, link.direction));
-    let mut once = room(links.chunk_by(|x, y| x.ends == y.ends).count(), WHAT)?;
+    let mut once = with_capacity(links.chunk_by(|x, y| x.ends == y.ends).count(), WHAT)?;
     once.extend(links.chunk_by(|x, y| x.ends == y.ends).map(|same| {
         // Pairs without a direction do not count where other pairs have one.
         let has = |direction: i8| same.iter().any(|link| link.direction == direction);
@@ -228,7 +228,7 @@ fn isolated(contacts: &Contacts) -> Result<Vec<u32>, Error> {
             }
         }
     }
-    let mut isolated = room(
+    let mut isolated = with_capacity(
         is_corner.iter().filter(|&&is_corner| !is_corner).count(),
         WHAT,
     )?;

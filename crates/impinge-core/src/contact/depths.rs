@@ -7,7 +7,7 @@
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
-use crate::index::{ElementIx, VertexIx};
+use crate::scene::index::{ElementIx, VertexIx};
 use impinge_exact::Point;
 
 /// A vertex in the queue: nearest first, ties by number.

@@ -14,8 +14,8 @@ use std::sync::{Mutex, PoisonError};
 
 use super::topology::EdgesAround;
 use super::work::Work;
-use crate::error::Error;
-use crate::index::VertexIx;
+use crate::scene::error::Error;
+use crate::scene::index::VertexIx;
 use crate::scene::{Body, Elements};
 use impinge_exact::{Point, Sign, orient2d, orient3d};
 

@@ -58,11 +58,11 @@ pub(crate) use work::Work;
 
 use std::sync::Arc;
 
-use crate::error::Error;
-use crate::index::VertexIx;
-use crate::pairs::Pairs;
+use crate::answers::pairs::Pairs;
 use crate::scene::Scene;
-use crate::sets::Sets;
+use crate::scene::error::Error;
+use crate::scene::index::VertexIx;
+use crate::search::sets::Sets;
 
 /// The vertex, edge or face of a body in whose relative interior a point of contact lies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]

@@ -7,8 +7,8 @@ use std::ops::Range;
 
 use super::work::Work;
 use super::{Contacts, PointName};
-use crate::error::Error;
-use crate::sink::{filled, room};
+use crate::scene::error::Error;
+use crate::search::sink::{filled, with_capacity};
 
 /// What memory is for.
 const WHAT: &str = "contacts by bodies";
@@ -28,7 +28,7 @@ impl ByBodies {
             [a, b]
         };
         // A list per first body, whose rows are consecutive: sorting is stable, so numbers ascend.
-        let mut contacts: Vec<u32> = room(rows.len(), WHAT)?;
+        let mut contacts: Vec<u32> = with_capacity(rows.len(), WHAT)?;
         contacts.extend((0u32..).take(rows.len()));
         for of_first in contacts.chunk_by_mut(|&x, &y| bodies_of(x)[0] == bodies_of(y)[0]) {
             work.step()?;
@@ -60,9 +60,9 @@ impl Contacts {
         let first = self.names.partition_point(|name| at(name) < bodies);
         let end = self.names.partition_point(|name| at(name) <= bodies);
         let mut part = Contacts {
-            rows: room(numbers.len(), WHAT)?,
-            shapes: room(numbers.len(), WHAT)?,
-            directed: room(numbers.len(), WHAT)?,
+            rows: with_capacity(numbers.len(), WHAT)?,
+            shapes: with_capacity(numbers.len(), WHAT)?,
+            directed: with_capacity(numbers.len(), WHAT)?,
             starts: filled(0, 1, WHAT)?,
             names: self.names[first..end].to_vec(),
             points: self.points[first..end].to_vec(),

@@ -22,11 +22,11 @@ use super::regions::{
 use super::topology::EdgesAround;
 use super::work::Work;
 use super::{Contacts, Feature, PointName, Shape};
-use crate::error::Error;
-use crate::index::VertexIx;
+use crate::scene::error::Error;
+use crate::scene::index::VertexIx;
 use crate::scene::{Body, BodyId, Elements, Kind, Scene};
-use crate::sets::Sets;
-use crate::sink::grow;
+use crate::search::sets::Sets;
+use crate::search::sink::grow;
 use impinge_exact::{Sign, orient3d};
 
 /// The topologies of closed bodies, from call to call.

@@ -11,9 +11,9 @@
 
 use super::curves::{Curves, distance};
 use super::{Contacts, Shape};
-use crate::error::Error;
-use crate::sets::Sets;
-use crate::sink::{filled, grow};
+use crate::scene::error::Error;
+use crate::search::sets::Sets;
+use crate::search::sink::{filled, grow};
 
 /// What memory is for.
 pub(super) const WHAT: &str = "regions of contact";

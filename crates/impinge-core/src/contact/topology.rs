@@ -6,9 +6,9 @@
 //! Cost: `O(n log n)` once per topology.
 
 use super::work::{Equal, Work};
-use crate::error::Error;
-use crate::index::VertexIx;
 use crate::scene::BodyId;
+use crate::scene::error::Error;
+use crate::scene::index::VertexIx;
 
 /// Faces whose edges are sorted by one task.
 const FACES: usize = 8 * 1024;

@@ -2,9 +2,9 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use crate::error::Error;
-use crate::progress::Control;
-use crate::sink::{reserve, room};
+use crate::query::progress::Control;
+use crate::scene::error::Error;
+use crate::search::sink::{reserve, with_capacity};
 use crate::workers::Workers;
 
 /// The threads, and what stops them.
@@ -95,7 +95,7 @@ impl Work<'_> {
         equal: Equal,
         what: &'static str,
     ) -> Result<Vec<T>, Error> {
-        let mut merged = room(first.len() + second.len(), what)?;
+        let mut merged = with_capacity(first.len() + second.len(), what)?;
         let (mut first, mut second) = (first, second);
         while let ([x, rest_x @ ..], [y, rest_y @ ..]) = (first, second) {
             if merged.len().is_multiple_of(BLOCK) {
@@ -121,7 +121,7 @@ impl Work<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::progress::CancelToken;
+    use crate::query::progress::CancelToken;
 
     #[test]
     fn lists_are_merged_whatever_their_number() {

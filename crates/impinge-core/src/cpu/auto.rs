@@ -4,12 +4,12 @@
 //! `Cells`. It pays as soon as the body comes back. So a frame whose primitives are mostly of new bodies goes through
 //! the grid, except: bodies that another question has clustered already; so few primitives that neither takes long; small bodies, which are few clusters each; cells that turn out
 //! crowded (the grid is uniform, so small details in a large scene can all be in one cell); neighbours that must be
-//! resolved, which `Clusters` settles per vertex; and memory budgets, which the grid would need more of.
+//! resolved, which `Clusters` decides per vertex; and memory budgets, which the grid would need more of.
 
 use crate::clusterings::Clusterings;
 use crate::plan::Plan;
+use crate::query::tuning::Tuning;
 use crate::scene::Scene;
-use crate::tuning::Tuning;
 
 /// The bodies that were in a frame before.
 #[derive(Debug, Default)]
@@ -23,26 +23,26 @@ impl Acquaintances {
     pub fn prefer_grid(
         &mut self,
         scene: &Scene,
-        frame: &Plan,
+        plan: &Plan,
         tuning: &Tuning,
         clusterings: &Clusterings,
     ) -> bool {
         let mut n_new = 0;
-        for (ix, layer) in frame.numbered_layers() {
-            let slot = layer.id.index();
+        for (ix, part) in plan.numbered_parts() {
+            let slot = part.id.index();
             if self.stamps.len() <= slot {
                 self.stamps.resize(slot + 1, 0);
             }
-            let body = frame.body(scene, ix);
+            let body = plan.body(scene, ix);
             let stamp = body.topology_stamp();
             let is_new = std::mem::replace(&mut self.stamps[slot], stamp) != stamp;
             if is_new
-                && layer.n_primitives >= tuning.auto_body_from
-                && !clusterings.has(layer.id, body)
+                && part.n_primitives >= tuning.auto_body_from
+                && !clusterings.has(part.id, body)
             {
-                n_new += u64::from(layer.n_primitives);
+                n_new += u64::from(part.n_primitives);
             }
         }
-        n_new >= tuning.auto_from && n_new > frame.n_primitives() / 2 && !frame.resolves()
+        n_new >= tuning.auto_from && n_new > plan.n_primitives() / 2 && !plan.resolves()
     }
 }

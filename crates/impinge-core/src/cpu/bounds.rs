@@ -5,12 +5,12 @@
 //! Cost: every vertex of a body once per cluster that has it (1.35 times on average in a closed mesh).
 //! Invariant: a box holds all its vertices; f64 positions are rounded outward.
 
-use crate::grouping::bounds::{Bounds, BoundsArray, RawBoundsArray};
-use crate::grouping::clusters::Clustering;
-use crate::grouping::hierarchy::TreeShape;
-use crate::hull::{self, ReadVertices};
-use crate::index::ClusterIx;
-use crate::positions::Positions;
+use crate::boxes::{self, ReadVertices};
+use crate::bvh::bounds::{Bounds, BoundsArray, RawBoundsArray};
+use crate::bvh::clusters::Clustering;
+use crate::bvh::tree::TreeShape;
+use crate::scene::index::ClusterIx;
+use crate::scene::positions::Positions;
 
 /// A summary of some clusters.
 #[derive(Debug, Clone, Copy)]
@@ -54,7 +54,7 @@ pub(crate) unsafe fn of_clusters<S: ReadVertices>(
 ) -> Summary {
     let mut summary = Summary::EMPTY;
     for cluster in clusters {
-        let (bounds, all_finite) = hull::of_cluster(simd, positions, clustering, cluster);
+        let (bounds, all_finite) = boxes::of_cluster(simd, positions, clustering, cluster);
         let [x, y, z] = [0, 1, 2].map(|axis| bounds.max[axis] - bounds.min[axis]);
         summary.join(&Summary {
             bounds,

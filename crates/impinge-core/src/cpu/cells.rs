@@ -4,7 +4,7 @@
 //! bounds      box of each body; where bodies overlap; primitives that reach there and have primitives of
 //!             another body near them, and their boxes
 //! grid        eq. (1) resolution, eq. (3) ranges; count, prefix sum, scatter into cell lists
-//! dispatch    cells with primitives of bodies that meet; lists cut into groups of at most 64;
+//! traversal    cells with primitives of bodies that meet; lists cut into groups of at most 64;
 //!             Cartesian product of groups, eq. (4): work items
 //! pairing     4x4x4 sub-cells, axis by axis; owner rule; boxes
 //! narrow      filters, then exact arithmetic
@@ -18,29 +18,29 @@
 
 use std::sync::Arc;
 
-use crate::clock::Instant;
+use crate::workers::clock::Instant;
 
-use crate::error::Error;
-use crate::grouping::bounds::Bounds;
-pub use crate::grouping::grid::MOST_ENTRIES_EACH;
-use crate::grouping::grid::{FineRange, Grid};
-use crate::index::LayerIx;
-use crate::progress::Control;
+use crate::bvh::bounds::Bounds;
+pub use crate::bvh::grid::MOST_ENTRIES_EACH;
+use crate::bvh::grid::{FineRange, Grid};
 use crate::query::SharedVertex;
-use crate::settings::Settings;
-use crate::stats::Statistics;
+use crate::query::progress::Control;
+use crate::query::settings::Settings;
+use crate::scene::error::Error;
+use crate::scene::index::PartIx;
+use crate::search::stats::Statistics;
 
-use super::kept::{Kept, KeptList};
-use super::narrow::{Candidate, Settler};
-use super::simd::Isa;
-use super::simd::Lanes;
-use super::subcells::{Asked, GroupPair, Lanes64};
+use super::cull_map::{Kept, KeptList};
+use super::narrow::{Candidate, Decider};
+use super::subcells::{GroupPair, Lanes64, SubcellQuery};
 use super::world::World;
-use crate::run::Job;
-use crate::sink::Answer;
+use crate::search::runner::Job;
+use crate::search::sink::Answer;
+use crate::simd::Isa;
+use crate::simd::Lanes;
 
-/// Work items per slab, and per task.
-const SLAB_ITEMS: usize = 1 << 18;
+/// Work items per batch, and per task.
+const BATCH_ITEMS: usize = 1 << 18;
 const PAIRING_TASK: usize = 32;
 
 /// Decides about two primitives of one cell that touch a common sub-cell.
@@ -49,7 +49,7 @@ const PAIRING_TASK: usize = 32;
 /// of what the owner rule replaces.
 pub trait Rule: Sync {
     /// The pairs that the rule is asked about.
-    fn asked(&self) -> Asked;
+    fn query(&self) -> SubcellQuery;
 
     /// Whether such a pair is a candidate here. Keys that the rule appends to `keys` become part of the answer.
     fn admits(&self, a: &Kept, b: &Kept, keys: &mut Vec<u64>) -> bool;
@@ -61,8 +61,8 @@ pub struct Owner;
 
 impl Rule for Owner {
     #[inline(always)]
-    fn asked(&self) -> Asked {
-        Asked {
+    fn query(&self) -> SubcellQuery {
+        SubcellQuery {
             boxes: true,
             owned: true,
             adjacent: false,
@@ -94,7 +94,7 @@ pub struct Cells {
     /// The cell lists: indices in `kept`, ascending within a cell, so that those of one body are together.
     entries: Vec<u32>,
     items: Vec<CellItem>,
-    scratches: Vec<Settler>,
+    scratches: Vec<Decider>,
 }
 
 impl Cells {
@@ -114,7 +114,7 @@ impl Cells {
     /// Hands over the keys of all pairs that the frame asks for and the rule admits.
     ///
     /// # Errors
-    /// A memory budget too small for a slab; cancellation.
+    /// A memory budget too small for a batch; cancellation.
     pub fn run<R: Rule>(
         &mut self,
         job: Job<'_>,
@@ -124,7 +124,7 @@ impl Cells {
         stats: &mut Statistics,
     ) -> Result<(), Error> {
         match self.divide(job, answer, settings, stats)? {
-            Some(grid) => self.settle(job, answer, settings, rule, grid, stats),
+            Some(grid) => self.decide(job, answer, settings, rule, grid, stats),
             None => Ok(()),
         }
     }
@@ -139,16 +139,16 @@ impl Cells {
     ) -> Result<Option<Grid>, Error> {
         let Job {
             scene,
-            frame,
+            plan,
             workers,
             control,
         } = job;
-        self.scratches.resize_with(workers.n(), Settler::default);
+        self.scratches.resize_with(workers.n(), Decider::default);
         for scratch in &mut self.scratches {
             scratch.begin(answer, &settings.tuning);
         }
         self.items.clear();
-        let world = World::new(scene, frame);
+        let world = World::new(scene, plan);
         let Cells {
             reaching,
             scratches,
@@ -159,7 +159,7 @@ impl Cells {
         });
         self.reaching.report(&mut stats.ways);
         let Some(region) = self.reaching.region() else {
-            stats.n_slabs = 1;
+            stats.n_batches = 1;
             return Ok(None);
         };
         let grid = stats.time("grid", |stats| {
@@ -177,7 +177,7 @@ impl Cells {
     }
 
     /// Pairs the primitives of each cell, and hands over the keys.
-    pub(super) fn settle<R: Rule>(
+    pub(super) fn decide<R: Rule>(
         &mut self,
         job: Job<'_>,
         answer: &Arc<Answer>,
@@ -187,15 +187,15 @@ impl Cells {
         stats: &mut Statistics,
     ) -> Result<(), Error> {
         let items = size_of::<CellItem>() * self.items.capacity();
-        answer.share(self.bytes() - items as u64 + slab_bytes(settings));
+        answer.share(self.bytes() - items as u64 + batch_bytes(settings));
         answer.check()?;
         let task = Task {
             job,
             answer,
-            world: World::new(job.scene, job.frame),
+            world: World::new(job.scene, job.plan),
             rule,
         };
-        self.dispatch_items(task, grid, settings, stats)?;
+        self.traverse_items(task, grid, settings, stats)?;
         for scratch in &mut self.scratches {
             scratch.end();
             stats.n_candidates += scratch.n_candidates;
@@ -212,7 +212,7 @@ impl Cells {
         let bytes = self.reaching.bytes()
             + size_of::<u32>() * (self.starts.capacity() + self.entries.capacity())
             + size_of::<CellItem>() * self.items.capacity()
-            + self.scratches.iter().map(Settler::bytes).sum::<usize>();
+            + self.scratches.iter().map(Decider::bytes).sum::<usize>();
         bytes as u64
     }
 
@@ -233,11 +233,11 @@ impl Cells {
             // Bytes held by now, mainly the boxes of primitives, without the lists that are sized below.
             let sized_later = size_of::<u32>() * (self.starts.capacity() + self.entries.capacity())
                 + size_of::<CellItem>() * self.items.capacity();
-            let fixed = self.bytes() - sized_later as u64 + slab_bytes(settings) + 8;
+            let fixed = self.bytes() - sized_later as u64 + batch_bytes(settings) + 8;
             let needed = fixed + 4 * n + 12;
             if needed > budget {
                 return Err(Error::MemoryBudget {
-                    what: "primitives' boxes, cell lists and a slab of work items",
+                    what: "primitives' boxes, cell lists and a batch of work items",
                     needed,
                     budget,
                 });
@@ -287,8 +287,8 @@ impl Cells {
         Ok(grid)
     }
 
-    /// Makes the work items of all cells, one slab at a time.
-    fn dispatch_items<R: Rule>(
+    /// Makes the work items of all cells, one batch at a time.
+    fn traverse_items<R: Rule>(
         &mut self,
         task: Task<'_, R>,
         grid: Grid,
@@ -297,7 +297,7 @@ impl Cells {
     ) -> Result<(), Error> {
         let start = Instant::now();
         let mut paired_ms = 0.0;
-        let most_items = task.answer.most_items(slab_items(settings));
+        let most_items = task.answer.most_items(batch_items(settings));
         if settings.memory_budget.is_some() {
             self.items.reserve_exact(most_items);
         }
@@ -329,7 +329,7 @@ impl Cells {
                     let at = (ix as u64, n_cells as u64);
                     paired_ms += pair(*isa, lists, items, scratches, task, at)?;
                     stats.n_work_items += items.len() as u64;
-                    stats.n_slabs += 1;
+                    stats.n_batches += 1;
                     items.clear();
                 }
                 items.push(CellItem {
@@ -346,30 +346,30 @@ impl Cells {
         let at = (n_cells as u64, n_cells as u64);
         paired_ms += pair(*isa, lists, items, scratches, task, at)?;
         stats.n_work_items += items.len() as u64;
-        stats.n_slabs += 1;
+        stats.n_batches += 1;
         items.clear();
         let busy: f64 = scratches.iter().map(|s| s.busy.as_secs_f64() * 1e3).sum();
         let narrow_ms = (busy / task.job.workers.n() as f64).min(paired_ms);
-        stats.add_ms("dispatch", start.elapsed().as_secs_f64() * 1e3 - paired_ms);
+        stats.add_ms("traversal", start.elapsed().as_secs_f64() * 1e3 - paired_ms);
         stats.add_ms("pairing", paired_ms - narrow_ms);
         stats.add_ms("narrow", narrow_ms);
         Ok(())
     }
 }
 
-fn slab_items(settings: &Settings) -> usize {
+fn batch_items(settings: &Settings) -> usize {
     let most = match settings.memory_budget {
-        None => SLAB_ITEMS,
+        None => BATCH_ITEMS,
         // A small share of the budget; the rest is for boxes and lists.
         Some(budget) => {
-            (budget as usize / 16 / size_of::<CellItem>()).clamp(PAIRING_TASK, SLAB_ITEMS)
+            (budget as usize / 16 / size_of::<CellItem>()).clamp(PAIRING_TASK, BATCH_ITEMS)
         }
     };
-    most.min(settings.tuning.most_slab_items).max(1)
+    most.min(settings.tuning.most_batch_items).max(1)
 }
 
-fn slab_bytes(settings: &Settings) -> u64 {
-    (slab_items(settings) * size_of::<CellItem>()) as u64
+fn batch_bytes(settings: &Settings) -> u64 {
+    (batch_items(settings) * size_of::<CellItem>()) as u64
 }
 
 /// A frame and the rule for its pairs.
@@ -431,11 +431,11 @@ impl Lists<'_> {
         group_size: usize,
         mut emit: impl FnMut(std::ops::Range<usize>, std::ops::Range<usize>) -> Result<(), Error>,
     ) -> Result<(), Error> {
-        let frame = self.world.frame;
+        let plan = self.world.plan;
         let mut a = list.start;
         while a < list.end {
-            let (layer_a, run_a) = self.run(a, list.end);
-            if frame.layer(layer_a).within && run_a.len() > 1 {
+            let (part_a, run_a) = self.run(a, list.end);
+            if plan.part(part_a).within && run_a.len() > 1 {
                 for group_a in groups(run_a.clone(), group_size) {
                     for group_b in groups(group_a.start..run_a.end, group_size) {
                         emit(group_a.clone(), group_b)?;
@@ -443,9 +443,9 @@ impl Lists<'_> {
                 }
             }
             let mut b = run_a.end;
-            while b < list.end && frame.between() {
-                let (layer_b, run_b) = self.run(b, list.end);
-                if frame.test(layer_a, layer_b).is_some() {
+            while b < list.end && plan.between() {
+                let (part_b, run_b) = self.run(b, list.end);
+                if plan.test(part_a, part_b).is_some() {
                     for group_a in groups(run_a.clone(), group_size) {
                         for group_b in groups(run_b.clone(), group_size) {
                             emit(group_a.clone(), group_b)?;
@@ -459,15 +459,15 @@ impl Lists<'_> {
         Ok(())
     }
 
-    /// The layer of an entry of a list, and the run of its entries from there on.
-    fn run(&self, start: usize, end: usize) -> (LayerIx, std::ops::Range<usize>) {
-        let owner = |entry: u32| self.kept[entry as usize].layer;
-        let layer = owner(self.entries[start]);
-        if owner(self.entries[end - 1]) == layer {
-            return (layer, start..end);
+    /// The part of an entry of a list, and the run of its entries from there on.
+    fn run(&self, start: usize, end: usize) -> (PartIx, std::ops::Range<usize>) {
+        let owner = |entry: u32| self.kept[entry as usize].part;
+        let part = owner(self.entries[start]);
+        if owner(self.entries[end - 1]) == part {
+            return (part, start..end);
         }
-        let len = self.entries[start..end].partition_point(|&entry| owner(entry) == layer);
-        (layer, start..start + len)
+        let len = self.entries[start..end].partition_point(|&entry| owner(entry) == part);
+        (part, start..start + len)
     }
 }
 
@@ -480,12 +480,12 @@ fn groups(
         .map(move |start| start..run.end.min(start + group_size))
 }
 
-/// Pairs and settles a slab of work items; returns the milliseconds it took.
+/// Pairs and decides a batch of work items; returns the milliseconds it took.
 fn pair<R: Rule>(
     isa: Isa,
     lists: Lists<'_>,
     items: &[CellItem],
-    scratches: &mut [Settler],
+    scratches: &mut [Decider],
     task: Task<'_, R>,
     (done, total): (u64, u64),
 ) -> Result<f64, Error> {
@@ -498,13 +498,13 @@ fn pair<R: Rule>(
     } = job;
     let n_each = workers.task(PAIRING_TASK);
     let n_tasks = items.len().div_ceil(n_each);
-    workers.for_each(scratches, n_tasks, |settler, ix| {
+    workers.for_each(scratches, n_tasks, |decider, ix| {
         if answer.is_over() || control.step(done, total).is_err() {
             return;
         }
         let first = ix * n_each;
         let items = &items[first..items.len().min(first + n_each)];
-        pair_items(isa, lists, items, rule, settler);
+        pair_items(isa, lists, items, rule, decider);
     });
     control.step(done, total)?;
     answer.check()?;
@@ -516,17 +516,17 @@ fn pair_items<R: Rule>(
     lists: Lists<'_>,
     items: &[CellItem],
     rule: &R,
-    settler: &mut Settler,
+    decider: &mut Decider,
 ) {
     let mut lanes = Lanes64::default();
     for item in items {
-        if settler.is_over() {
+        if decider.is_over() {
             break;
         }
-        pair_item(isa, lists, item, rule, &mut lanes, settler);
-        settler.settle_when_full(isa, lists.world);
+        pair_item(isa, lists, item, rule, &mut lanes, decider);
+        decider.decide_when_full(isa, lists.world);
     }
-    settler.settle(isa, lists.world);
+    decider.decide(isa, lists.world);
 }
 
 /// The second level of one work item.
@@ -537,15 +537,15 @@ fn pair_item<R: Rule>(
     item: &CellItem,
     rule: &R,
     lanes: &mut Lanes64,
-    settler: &mut Settler,
+    decider: &mut Decider,
 ) {
     let (first_a, first_b) = (item.first_a as usize, item.first_b as usize);
     let kept = |entry: u32| &lists.kept[entry as usize];
     let group_a = &lists.entries[first_a..first_a + usize::from(item.n_a)];
     let group_b = &lists.entries[first_b..first_b + usize::from(item.n_b)];
     // A group's primitives are of one body.
-    let owner = kept(group_a[0]).layer;
-    let one_body = owner == kept(group_b[0]).layer;
+    let owner = kept(group_a[0]).part;
+    let one_body = owner == kept(group_b[0]).part;
     let groups = GroupPair {
         kept: lists.kept,
         a: group_a,
@@ -554,29 +554,29 @@ fn pair_item<R: Rule>(
         same: first_a == first_b,
         body: one_body.then(|| lists.world.body(owner)),
     };
-    let asked = rule.asked();
-    lanes.find(isa, groups, asked);
-    let resolve = lists.world.frame.shared_vertex == SharedVertex::Resolve;
+    let query = rule.query();
+    lanes.find(isa, groups, query);
+    let resolve = lists.world.plan.shared_vertex == SharedVertex::Resolve;
     for (i, &entry_a) in group_a.iter().enumerate() {
         let a = kept(entry_a);
         for j in Lanes(lanes.partners[i] & !lanes.adjacent[i]) {
             let b = kept(group_b[j]);
-            if rule.admits(a, b, &mut settler.keys) {
-                settler.push(Candidate {
-                    a: a.layer,
-                    b: b.layer,
-                    place_a: a.place(),
-                    place_b: b.place(),
+            if rule.admits(a, b, &mut decider.keys) {
+                decider.push(Candidate {
+                    a: a.part,
+                    b: b.part,
+                    slot_a: a.slot(),
+                    slot_b: b.slot(),
                 });
             }
         }
-        let Some(body) = groups.body.filter(|_| resolve || asked.adjacent) else {
+        let Some(body) = groups.body.filter(|_| resolve || query.adjacent) else {
             continue;
         };
         for j in Lanes(lanes.adjacent[i]) {
             let b = kept(group_b[j]);
-            if rule.admits(a, b, &mut settler.keys) && resolve {
-                settler.settle_shared(&body, a.place(), b.place());
+            if rule.admits(a, b, &mut decider.keys) && resolve {
+                decider.decide_shared(&body, a.slot(), b.slot());
             }
         }
     }

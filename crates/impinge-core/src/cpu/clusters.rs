@@ -2,40 +2,40 @@
 //!
 //! ```text
 //! bounds      boxes of the clusters of bodies that moved, and of the trees above them
-//! dispatch    bodies whose boxes meet (more than two: a tree over bodies), then tree against tree
-//! folds       under `SharedVertex::Resolve`: triangles that may meet a neighbour
+//! traversal    bodies whose boxes meet (more than two: a tree over bodies), then tree against tree
+//! creases       under `SharedVertex::Resolve`: triangles that may meet a neighbour
 //! pairing     boxes of the primitives of clusters that take part; candidates per work item
 //! narrow      filters, then exact arithmetic
 //! ```
 //!
-//! This file keeps the caches; `slabs` runs the stages from `dispatch` on.
+//! This file keeps the caches; `batches` runs the stages from `traversal` on.
 //!
-//! Memory: a cache per body, and a slab of work items. A full slab is paired and settled, then dispatch
+//! Memory: a cache per body, and a batch of work items. A full batch is paired and decided, then traversal
 //! goes on.
 
 use std::sync::Arc;
 
+use crate::boxes;
+use crate::bvh::bounds::Bounds;
+use crate::bvh::clusters::Clustering;
 use crate::clusterings::{Clusterings, Fit, spread};
-use crate::elements::Kind;
-use crate::error::Error;
-use crate::grouping::bounds::Bounds;
-use crate::grouping::clusters::Clustering;
-use crate::hull;
-use crate::positions::Positions;
+use crate::query::settings::{InstructionSet, Settings};
+use crate::query::tuning::Tuning;
+use crate::scene::elements::Kind;
+use crate::scene::error::Error;
+use crate::scene::positions::Positions;
 use crate::scene::{Body, Scene};
-use crate::settings::{InstructionSet, Settings};
-use crate::stats::Statistics;
-use crate::tuning::Tuning;
+use crate::search::stats::Statistics;
 
+use super::batches::{self, BatchScratch};
 use super::bounds::TreeBounds;
+use super::culled::body::Culled;
 use super::pairing::Worker;
 use super::refit::Refit;
-use super::remote::body::Remote;
-use super::simd::Isa;
-use super::slabs::{self, Room};
 use super::world::{BodyCache, Caches, World};
-use crate::run::Job;
-use crate::sink::Answer;
+use crate::search::runner::Job;
+use crate::search::sink::Answer;
+use crate::simd::Isa;
 use crate::workers::Workers;
 
 /// Caches and scratch of the method; kept from frame to frame.
@@ -45,7 +45,7 @@ pub(crate) struct Clusters {
     caches: Caches,
     refit: Refit,
     scratches: Vec<Worker>,
-    room: Room,
+    scratch: BatchScratch,
 }
 
 impl Clusters {
@@ -56,7 +56,7 @@ impl Clusters {
             caches: Caches::default(),
             refit: Refit::default(),
             scratches: Vec::new(),
-            room: Room::default(),
+            scratch: BatchScratch::default(),
         }
     }
 
@@ -72,7 +72,7 @@ impl Clusters {
         stats.time("clustering", |stats| {
             self.cluster(job, &settings.tuning, stats)
         })?;
-        if job.frame.n_primitives() >= settings.tuning.call_from {
+        if job.plan.n_primitives() >= settings.tuning.call_from {
             job.workers.call_all();
         }
         stats.time("bounds", |stats| {
@@ -81,50 +81,50 @@ impl Clusters {
             self.refit
                 .run(self.isa, job, settings, clustered, scratches, stats)
         })?;
-        if job.frame.resolves() && settings.memory_budget.is_none() {
-            stats.time("folds", |_| self.find_folds(job))?;
+        if job.plan.resolves() && settings.memory_budget.is_none() {
+            stats.time("creases", |_| self.find_creases(job))?;
         }
         for worker in &mut self.scratches {
             worker.begin(stats.n_clusters, settings, answer);
         }
-        let held = self.bytes_besides_room();
+        let held = self.bytes_besides_scratch();
         let Clusters {
             caches,
-            room,
+            scratch,
             scratches,
             ..
         } = self;
-        let task = slabs::Task {
+        let task = batches::Task {
             isa: self.isa,
             job,
             answer,
             world: World {
                 scene: job.scene,
-                frame: job.frame,
+                plan: job.plan,
                 caches: Some(caches),
             },
             scratches,
             settings,
             held,
         };
-        room.run(task, stats)?;
+        scratch.run(task, stats)?;
         stats.bytes_held = self.bytes();
         Ok(())
     }
 
     /// Bytes held.
     pub fn bytes(&self) -> u64 {
-        (self.bytes_besides_room() + self.room.bytes()) as u64
+        (self.bytes_besides_scratch() + self.scratch.bytes()) as u64
     }
 
-    fn bytes_besides_room(&self) -> usize {
+    fn bytes_besides_scratch(&self) -> usize {
         let caches: usize = self
             .caches
             .iter()
             .map(|cache| {
-                let remote = cache.remote.as_ref().map_or(0, |remote| remote.bytes());
-                let folds = cache.folds.as_ref().map_or(0, |folds| folds.bytes());
-                size_of::<BodyCache>() + cache.bounds.bytes() + remote + folds
+                let culled = cache.culled.as_ref().map_or(0, |culled| culled.bytes());
+                let creases = cache.creases.as_ref().map_or(0, |creases| creases.bytes());
+                size_of::<BodyCache>() + cache.bounds.bytes() + culled + creases
             })
             .sum();
         let scratches: usize = self.scratches.iter().map(Worker::bytes).sum();
@@ -148,9 +148,9 @@ impl Clusters {
         self.caches.update(job, shared, stats, |body, clustering| {
             BodyCache::new(body, Arc::clone(clustering), tuning)
         })?;
-        let layers = job.frame.layers.iter();
-        for layer in layers.filter(|layer| layer.within) {
-            self.caches.at(layer).find_adjacency(job.workers)?;
+        let parts = job.plan.parts.iter();
+        for part in parts.filter(|part| part.within) {
+            self.caches.at(part).find_adjacency(job.workers)?;
         }
         Ok(())
     }
@@ -158,14 +158,14 @@ impl Clusters {
 
 impl Clusters {
     /// Finds the triangles that may meet a neighbour, in bodies that are tested against themselves.
-    fn find_folds(&mut self, job: Job<'_>) -> Result<(), Error> {
-        for (ix, layer) in job.frame.numbered_layers() {
-            if layer.within {
-                let body = job.frame.body(job.scene, ix);
+    fn find_creases(&mut self, job: Job<'_>) -> Result<(), Error> {
+        for (ix, part) in job.plan.numbered_parts() {
+            if part.within {
+                let body = job.plan.body(job.scene, ix);
                 let isa = self.isa;
                 self.caches
-                    .at_mut(layer)
-                    .find_folds(isa, body, job.workers)?;
+                    .at_mut(part)
+                    .find_creases(isa, body, job.workers)?;
             }
         }
         Ok(())
@@ -183,9 +183,9 @@ impl BodyCache {
             clustering,
             bounds,
             whole: Bounds::EMPTY,
-            folds: None,
-            remote: (body.n_primitives() >= tuning.remote_from)
-                .then(|| Box::new(Remote::new(tuning))),
+            creases: None,
+            culled: (body.n_primitives() >= tuning.culled_from)
+                .then(|| Box::new(Culled::new(tuning))),
             surface: 0.0,
             fit: Fit::UNKNOWN,
         }
@@ -204,8 +204,8 @@ impl BodyCache {
         Ok(())
     }
 
-    /// Finds the triangles that may meet a neighbour in the body's current pose.
-    fn find_folds(&mut self, isa: Isa, body: &Body, workers: &Workers) -> Result<(), Error> {
+    /// Finds the triangles that may meet a neighbour in the body's current sweep.
+    fn find_creases(&mut self, isa: Isa, body: &Body, workers: &Workers) -> Result<(), Error> {
         if body.kind() != Kind::Triangles {
             return Ok(());
         }
@@ -213,9 +213,9 @@ impl BodyCache {
         if clustering.rings().is_none() {
             workers.install(clustering.order.len(), || clustering.find_rings())?;
         }
-        let pose = (body.positions(), body.positions_stamp());
-        let folds = self.folds.get_or_insert_default();
-        folds.find(isa, workers, clustering, pose);
+        let sweep = (body.positions(), body.positions_stamp());
+        let creases = self.creases.get_or_insert_default();
+        creases.find(isa, workers, clustering, sweep);
         Ok(())
     }
 
@@ -224,7 +224,7 @@ impl BodyCache {
         self.surface = 0.0;
         for cluster in self.clustering.clusters() {
             let vertices = self.clustering.vertices(cluster);
-            let bounds = hull::of_vertices(body.positions(), vertices);
+            let bounds = boxes::of_vertices(body.positions(), vertices);
             self.surface += bounds.half_area();
             self.bounds.levels[0].put(cluster.index(), &bounds);
         }
@@ -233,10 +233,10 @@ impl BodyCache {
         self.fit.note(self.spread());
     }
 
-    /// The remote clusters, if the clusters are sorted.
+    /// The culled clusters, if the clusters are sorted.
     #[inline(always)]
-    pub(super) fn sorted(&self) -> Option<&Remote> {
-        self.remote.as_deref().filter(|remote| remote.is_sorted())
+    pub(super) fn sorted(&self) -> Option<&Culled> {
+        self.culled.as_deref().filter(|culled| culled.is_sorted())
     }
 
     /// Whether the positions can be read in memory order: they are in single precision, and the primitives name every
@@ -246,12 +246,12 @@ impl BodyCache {
         is_single && self.clustering.n_vertices_covered == Some(body.n_vertices())
     }
 
-    /// From now on, the boxes belong to no pose.
+    /// From now on, the boxes belong to no sweep.
     pub(super) fn forget_boxes(&mut self) {
         self.positions_stamp = 0;
     }
 
-    /// The clusters' summed surface divided by the body's: how well the clusters fit the current pose.
+    /// The clusters' summed surface divided by the body's: how well the clusters fit the current sweep.
     pub(super) fn spread(&self) -> f64 {
         spread(self.surface, &self.bounds.root())
     }

@@ -7,29 +7,29 @@
 //! Cost: nothing where few boxes overlap, as between clusters of short elements. Else 1 ns per pair, and 2 µs per cluster when it is first
 //! needed, with 3.8 KB.
 
-use crate::elements::with_corners;
-use crate::grouping::GROUP;
-use crate::grouping::clusters::Clustering;
-use crate::index::{ClusterIx, LayerIx};
-use crate::positions::Positions;
-use crate::settings::Settings;
+use crate::bvh::GROUP;
+use crate::bvh::clusters::Clustering;
+use crate::query::settings::Settings;
+use crate::scene::elements::with_corners;
+use crate::scene::index::{ClusterIx, PartIx};
+use crate::scene::positions::Positions;
 use impinge_exact::internal::filter::Directions64;
 
 use super::group_cache::{GroupCache, PerCluster};
-use super::met::{Side, WorkItem};
-use super::simd::{Lanes, Masks, Simd};
+use super::lane_pairs::{Side, WorkItem};
 use super::world::World;
+use crate::simd::{Lanes, Masks, Simd};
 
-/// Where the elements of a layer are.
+/// Where the elements of a part are.
 pub(super) trait Placed: Copy {
-    /// The clusters of a layer, and the positions of its body's vertices.
-    fn placed(&self, layer: LayerIx) -> (&Clustering, &Positions);
+    /// The clusters of a part, and the positions of its body's vertices.
+    fn placed(&self, part: PartIx) -> (&Clustering, &Positions);
 }
 
 impl Placed for World<'_> {
     #[inline(always)]
-    fn placed(&self, layer: LayerIx) -> (&Clustering, &Positions) {
-        (&self.cache(layer).clustering, self.body(layer).positions)
+    fn placed(&self, part: PartIx) -> (&Clustering, &Positions) {
+        (&self.cache(part).clustering, self.body(part).positions)
     }
 }
 
@@ -49,12 +49,12 @@ impl<W: Placed> PerCluster<W> for Directions64 {
     const EMPTY: Self = Directions64::EMPTY;
 
     #[inline(always)]
-    fn fill<S: Simd>(&mut self, _: S, world: W, layer: LayerIx, cluster: ClusterIx) {
-        let (clustering, positions) = world.placed(layer);
-        let places = clustering.places(cluster);
+    fn fill<S: Simd>(&mut self, _: S, world: W, part: PartIx, cluster: ClusterIx) {
+        let (clustering, positions) = world.placed(part);
+        let slots = clustering.slots(cluster);
         with_corners!(&clustering.corners, |corners| put(
             self,
-            &corners[places],
+            &corners[slots],
             positions
         ));
     }
@@ -71,7 +71,7 @@ fn put<const N: usize>(group: &mut Directions64, corners: &[[u32; N]], positions
 impl Directions {
     /// Prepares for a frame of `n_clusters` clusters.
     pub fn begin<W: Placed>(&mut self, n_clusters: u64, settings: &Settings) {
-        self.n = GroupCache::<Directions64>::room(n_clusters, settings);
+        self.n = GroupCache::<Directions64>::capacity(n_clusters, settings);
         self.from = settings.tuning.directions_from;
         self.n_parted = 0;
         self.groups.clear();
@@ -118,13 +118,13 @@ impl Directions {
         if self.groups.is_empty() {
             self.groups.reset::<W>(self.n);
         }
-        let place_a = self
+        let slot_a = self
             .groups
-            .place(simd, world, (item.a, item.cluster_a), usize::MAX);
-        let place_b = self
+            .slot(simd, world, (item.a, item.cluster_a), usize::MAX);
+        let slot_b = self
             .groups
-            .place(simd, world, (item.b, item.cluster_b), place_a);
-        let [a, b] = [place_a, place_b].map(|place| self.groups.at(place));
+            .slot(simd, world, (item.b, item.cluster_b), slot_a);
+        let [a, b] = [slot_a, slot_b].map(|slot| self.groups.at(slot));
         let (of_rows, of_lanes) = match side {
             Side::A => (a, b),
             Side::B => (b, a),
@@ -133,17 +133,18 @@ impl Directions {
             return 0;
         }
         let mut n_parted = 0;
-        let near = match place_a == place_b {
+        let near = match slot_a == slot_b {
             true => [rows, lanes],
             false => of_rows.near::<S::F32>(of_lanes, [rows, lanes], distance),
         };
         for row in Lanes(rows) {
             let open = masks.0[row] & !aside[row];
-            let met = match near[0] >> row & 1 {
+            let lane_pairs = match near[0] >> row & 1 {
                 1 => open & near[1],
                 _ => 0,
             };
-            let beyond = of_lanes.beyond::<S::F32>(met, (of_rows, row), distance) | open & !met;
+            let beyond = of_lanes.beyond::<S::F32>(lane_pairs, (of_rows, row), distance)
+                | open & !lane_pairs;
             masks.0[row] &= !beyond;
             n_parted += u64::from(beyond.count_ones());
         }

@@ -4,17 +4,17 @@
 //! corners as tables, so that the filter reads them from the first-level cache and not from all over the
 //! body. Cost: each corner of a cluster once, when it is first needed; 3.8 KB per cluster.
 
-use crate::elements::Elements;
-use crate::grouping::GROUP;
-use crate::grouping::bounds::Bounds;
-use crate::hull;
-use crate::index::{ClusterIx, LayerIx};
-use crate::positions::Positions;
-use crate::settings::Settings;
+use crate::boxes;
+use crate::bvh::GROUP;
+use crate::bvh::bounds::Bounds;
+use crate::query::settings::Settings;
+use crate::scene::elements::Elements;
+use crate::scene::index::{ClusterIx, PartIx};
+use crate::scene::positions::Positions;
 use impinge_exact::internal::filter::{LARGEST_F32, Triangles64};
 
-use super::simd::{ClusterFaces, LaneBounds, Simd};
 use super::world::World;
+use crate::simd::{ClusterFaces, LaneBounds, Simd};
 
 /// One cluster's primitives.
 #[derive(Debug, Clone)]
@@ -36,18 +36,18 @@ impl PerCluster<World<'_>> for Group {
     };
 
     #[inline(always)]
-    fn fill<S: Simd>(&mut self, simd: S, world: World<'_>, layer: LayerIx, cluster: ClusterIx) {
-        let positions = world.body(layer).positions;
-        let cache = world.cache(layer);
+    fn fill<S: Simd>(&mut self, simd: S, world: World<'_>, part: PartIx, cluster: ClusterIx) {
+        let positions = world.body(part).positions;
+        let cache = world.cache(part);
         let clustering = &cache.clustering;
         let (Positions::F32(points), Elements::Triangles(faces)) = (positions, &clustering.corners)
         else {
             self.in_tables = false;
-            return hull::fill(positions, clustering, cluster, &mut self.boxes);
+            return boxes::fill(positions, clustering, cluster, &mut self.boxes);
         };
         let size = clustering.size(cluster);
         let faces = ClusterFaces {
-            faces: &faces[clustering.places(cluster)],
+            faces: &faces[clustering.slots(cluster)],
             vertices: clustering.vertices(cluster),
             local: clustering.local_faces(cluster),
         };
@@ -68,19 +68,19 @@ pub(super) trait PerCluster<W>: Clone {
     /// The data of no cluster.
     const EMPTY: Self;
 
-    /// Computes the data of a cluster of a layer.
-    fn fill<S: Simd>(&mut self, simd: S, world: W, layer: LayerIx, cluster: ClusterIx);
+    /// Computes the data of a cluster of a part.
+    fn fill<S: Simd>(&mut self, simd: S, world: W, part: PartIx, cluster: ClusterIx);
 }
 
 /// The clusters that a worker has seen last.
 ///
-/// A cluster has two possible places, `h` and `h ^ 1`; a new one replaces the cluster that is not in use.
+/// A cluster has two possible slots, `h` and `h ^ 1`; a new one replaces the cluster that is not in use.
 #[derive(Debug)]
 pub(super) struct GroupCache<G> {
-    /// Layer and cluster of each place.
+    /// Part and cluster of each slot.
     keys: Vec<u64>,
     groups: Vec<G>,
-    /// Clusters that took the place of others.
+    /// Clusters that took the slot of others.
     pub n_evicted: u64,
 }
 
@@ -94,7 +94,7 @@ impl<G> Default for GroupCache<G> {
     }
 }
 
-/// The key of an empty place: there are fewer than 2^32 layers.
+/// The key of an empty slot: there are fewer than 2^32 parts.
 const NOBODY: u64 = u64::MAX;
 /// Clusters kept under a memory budget, 31 KB: hardly slower, for neighbouring clusters come in a row.
 const MOST_IN_BUDGET: u64 = 8;
@@ -106,11 +106,11 @@ impl<G> GroupCache<G> {
         G: PerCluster<W>,
     {
         self.n_evicted = 0;
-        self.reset(Self::room(n_clusters, settings));
+        self.reset(Self::capacity(n_clusters, settings));
     }
 
     /// How many clusters are kept in a frame of `n_clusters`.
-    pub fn room(n_clusters: u64, settings: &Settings) -> usize {
+    pub fn capacity(n_clusters: u64, settings: &Settings) -> usize {
         let most = match settings.memory_budget {
             Some(_) => MOST_IN_BUDGET,
             None => settings.tuning.most_cached.max(2),
@@ -144,51 +144,51 @@ impl<G> GroupCache<G> {
         size_of::<u64>() * self.keys.capacity() + size_of::<G>() * self.groups.capacity()
     }
 
-    fn key((layer, cluster): (LayerIx, ClusterIx)) -> u64 {
-        u64::from(layer.raw()) << 32 | u64::from(cluster.raw())
+    fn key((part, cluster): (PartIx, ClusterIx)) -> u64 {
+        u64::from(part.raw()) << 32 | u64::from(cluster.raw())
     }
 
-    fn first_place(&self, (layer, cluster): (LayerIx, ClusterIx)) -> usize {
-        let hash = layer.raw().wrapping_mul(67).wrapping_add(cluster.raw()) as usize;
+    fn first_slot(&self, (part, cluster): (PartIx, ClusterIx)) -> usize {
+        let hash = part.raw().wrapping_mul(67).wrapping_add(cluster.raw()) as usize;
         hash & (self.keys.len() - 1)
     }
 
-    /// Whether a cluster of a layer is cached.
+    /// Whether a cluster of a part is cached.
     #[inline(always)]
-    pub fn holds(&self, whose: (LayerIx, ClusterIx)) -> bool {
-        let (key, first) = (Self::key(whose), self.first_place(whose));
+    pub fn holds(&self, whose: (PartIx, ClusterIx)) -> bool {
+        let (key, first) = (Self::key(whose), self.first_slot(whose));
         self.keys[first] == key || self.keys[first ^ 1] == key
     }
 
-    /// The place of a cluster of a layer; computes its data if it is not cached. The cluster at the place `pinned`
+    /// The slot of a cluster of a part; computes its data if it is not cached. The cluster at the slot `pinned`
     /// stays.
     #[inline(always)]
-    pub fn place<S: Simd, W>(
+    pub fn slot<S: Simd, W>(
         &mut self,
         simd: S,
         world: W,
-        whose: (LayerIx, ClusterIx),
+        whose: (PartIx, ClusterIx),
         pinned: usize,
     ) -> usize
     where
         G: PerCluster<W>,
     {
-        let (key, first) = (Self::key(whose), self.first_place(whose));
-        for place in [first, first ^ 1] {
-            if self.keys[place] == key {
-                return place;
+        let (key, first) = (Self::key(whose), self.first_slot(whose));
+        for slot in [first, first ^ 1] {
+            if self.keys[slot] == key {
+                return slot;
             }
         }
-        let place = if first == pinned { first ^ 1 } else { first };
-        self.n_evicted += u64::from(self.keys[place] != NOBODY);
-        self.keys[place] = key;
-        self.groups[place].fill(simd, world, whose.0, whose.1);
-        place
+        let slot = if first == pinned { first ^ 1 } else { first };
+        self.n_evicted += u64::from(self.keys[slot] != NOBODY);
+        self.keys[slot] = key;
+        self.groups[slot].fill(simd, world, whose.0, whose.1);
+        slot
     }
 
-    /// The cluster at a place.
+    /// The cluster at a slot.
     #[inline(always)]
-    pub fn at(&self, place: usize) -> &G {
-        &self.groups[place]
+    pub fn at(&self, slot: usize) -> &G {
+        &self.groups[slot]
     }
 }

@@ -24,13 +24,13 @@
 //! Cost: `O(n log n)` per hub for n primitives, and one exact test per pair whose cones' boxes overlap.
 //! Reason for each discard: cones without a common direction. `docs/exactness.md`, "Hubs", has the proof and the bound.
 
-use crate::grouping::bounds::{Bounds, round_down, round_up};
-use crate::grouping::hubs::{HubSet, Hubs};
-use crate::index::Place;
+use crate::bvh::bounds::{Bounds, round_down, round_up};
+use crate::bvh::hubs::{HubSet, Hubs};
+use crate::scene::index::Slot;
 use impinge_exact::Point;
 use impinge_exact::internal::{collinear, strictly_between};
 
-use super::narrow::Settler;
+use super::narrow::Decider;
 use super::world::BodyRef;
 
 /// Entries per leaf.
@@ -49,8 +49,8 @@ const EVERYWHERE: Bounds = Bounds {
 /// Scratch; kept from frame to frame.
 #[derive(Debug, Default)]
 pub(super) struct HubScratch {
-    /// Places of primitives; those with the same vertices follow each other.
-    places: Vec<Place>,
+    /// Slots of primitives; those with the same vertices follow each other.
+    slots: Vec<Slot>,
     entries: Vec<ConeEntry>,
     nodes: Vec<ConeNode>,
     stack: Vec<ConePair>,
@@ -58,7 +58,7 @@ pub(super) struct HubScratch {
     beyond: [Vec<Alike>; 2],
 }
 
-/// Primitives with the same vertices: the range of their places in `HubScratch::places`.
+/// Primitives with the same vertices: the range of their places in `HubScratch::slots`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 struct Alike {
     start: u32,
@@ -66,8 +66,8 @@ struct Alike {
 }
 
 impl Alike {
-    fn of(self, places: &[Place]) -> &[Place] {
-        &places[self.start as usize..self.end as usize]
+    fn of(self, slots: &[Slot]) -> &[Slot] {
+        &slots[self.start as usize..self.end as usize]
     }
 }
 
@@ -102,39 +102,39 @@ enum SeenFrom {
 
 impl HubScratch {
     pub fn bytes(&self) -> usize {
-        size_of::<Place>() * self.places.capacity()
+        size_of::<Slot>() * self.slots.capacity()
             + size_of::<ConeEntry>() * self.entries.capacity()
             + size_of::<ConeNode>() * self.nodes.capacity()
             + size_of::<ConePair>() * self.stack.capacity()
             + size_of::<Alike>() * (self.beyond[0].capacity() + self.beyond[1].capacity())
     }
 
-    /// Settles the pairs that share a hub, or an axis.
-    pub fn settle(
+    /// Decides the pairs that share a hub, or an axis.
+    pub fn decide(
         &mut self,
         body: &BodyRef<'_>,
         hubs: &Hubs,
         shared: &[u32],
-        places: &[Place],
-        settler: &mut Settler,
+        slots: &[Slot],
+        decider: &mut Decider,
     ) {
         self.entries.clear();
         self.beyond.iter_mut().for_each(Vec::clear);
-        self.places.clear();
-        self.places.extend_from_slice(places);
-        (self.places).sort_unstable_by_key(|&place| (sorted_ids(body.corners(place)), place));
+        self.slots.clear();
+        self.slots.extend_from_slice(slots);
+        (self.slots).sort_unstable_by_key(|&slot| (sorted_ids(body.corners(slot)), slot));
         let same =
-            |&a: &Place, &b: &Place| sorted_ids(body.corners(a)) == sorted_ids(body.corners(b));
+            |&a: &Slot, &b: &Slot| sorted_ids(body.corners(a)) == sorted_ids(body.corners(b));
         let mut start = 0;
-        for places in self.places.chunk_by(same) {
-            let end = start + places.len() as u32;
+        for slots in self.slots.chunk_by(same) {
+            let end = start + slots.len() as u32;
             let alike = Alike { start, end };
             start = end;
-            let corners = body.corners(places[0]);
+            let corners = body.corners(slots[0]);
             if hubs.owns(shared, corners, corners) {
-                settler.settle_alike(body, places);
+                decider.decide_alike(body, slots);
             }
-            match seen(body, shared, places[0]) {
+            match seen(body, shared, slots[0]) {
                 // By the rule, such a primitive meets only primitives with the same vertices.
                 SeenFrom::Nowhere => {}
                 SeenFrom::Beyond(end) => self.beyond[end].push(alike),
@@ -148,19 +148,19 @@ impl HubScratch {
                 }),
             }
         }
-        let places = std::mem::take(&mut self.places);
-        let mut settle = |a: Alike, b: Alike| {
-            let (a, b) = (a.of(&places), b.of(&places));
+        let slots = std::mem::take(&mut self.slots);
+        let mut decide = |a: Alike, b: Alike| {
+            let (a, b) = (a.of(&slots), b.of(&slots));
             if hubs.owns(shared, body.corners(a[0]), body.corners(b[0])) {
-                settler.settle_shared_by_all(body, a, b);
+                decider.decide_shared_by_all(body, a, b);
             }
         };
         // All of these meet beyond the shared axis.
         for on_line in &self.beyond {
-            each_pair(on_line, &mut settle);
+            each_pair(on_line, &mut decide);
         }
-        self.meet(&mut settle);
-        self.places = places;
+        self.meet(&mut decide);
+        self.slots = slots;
     }
 
     /// Calls `emit` for all pairs of entries whose cones' boxes overlap and that have no common partner.
@@ -290,8 +290,8 @@ fn sorted_ids(corners: &[u32]) -> [u32; 4] {
 }
 
 /// Where a primitive lies as seen from a hub or from an axis.
-fn seen(body: &BodyRef<'_>, shared: &[u32], place: Place) -> SeenFrom {
-    let corners = body.corners(place);
+fn seen(body: &BodyRef<'_>, shared: &[u32], slot: Slot) -> SeenFrom {
+    let corners = body.corners(slot);
     let point = |id: u32| body.positions.point(id as usize);
     let rest = corners
         .iter()

@@ -1,39 +1,37 @@
 //! The CPU backend. Most stages have a file of their name; SIMD is chosen at run time.
 
 mod auto;
+pub(crate) mod batches;
 pub(crate) mod bounds;
 pub mod cells;
 pub(crate) mod clusters;
+mod creases;
 pub(crate) mod cull;
+pub mod cull_map;
+mod culled;
 mod directions;
-pub(crate) mod dispatch;
-mod folds;
 mod group_cache;
 mod hubs;
-pub mod kept;
-pub(crate) mod met;
+pub(crate) mod lane_pairs;
 pub mod narrow;
 pub(crate) mod pairing;
 mod refit;
-mod remote;
-pub(crate) mod runs;
-pub mod simd;
-pub(crate) mod slabs;
 pub(crate) mod steps;
 pub mod subcells;
 pub(crate) mod top_level;
+pub(crate) mod traversal;
 pub mod world;
 
 use std::sync::Arc;
 
 use crate::clusterings::Clusterings;
-use crate::error::Error;
-use crate::naive;
-use crate::narrow::Intersection;
-use crate::run::{Finder, Job};
-use crate::settings::{Method, Settings};
-use crate::sink::{Answer, BLOCK};
-use crate::stats::Statistics;
+use crate::query::settings::{Method, Settings};
+use crate::scene::error::Error;
+use crate::search::naive;
+use crate::search::narrow::Intersection;
+use crate::search::runner::{Finder, Job};
+use crate::search::sink::{Answer, BLOCK};
+use crate::search::stats::Statistics;
 
 use auto::Acquaintances;
 use cells::Cells;
@@ -78,7 +76,7 @@ impl Cpu {
         }
         let prefers_grid =
             self.acquaintances
-                .prefer_grid(job.scene, job.frame, tuning, &self.clusterings);
+                .prefer_grid(job.scene, job.plan, tuning, &self.clusterings);
         let has_room = self.settings.memory_budget.is_none();
         if prefers_grid && has_room && self.find_in_grid(job, answer, stats)? {
             stats.method = Method::Cells.name();
@@ -98,7 +96,7 @@ impl Cpu {
         answer: &Arc<Answer>,
         stats: &mut Statistics,
     ) -> Result<bool, Error> {
-        job.frame.check(job.scene)?;
+        job.plan.check(job.scene)?;
         let settings = &self.settings;
         let mut cells = Cells::new(settings);
         let Some(grid) = cells.divide(job, answer, settings, stats)? else {
@@ -107,7 +105,7 @@ impl Cpu {
         if cells.crowding() > settings.tuning.auto_most_crowded {
             return Ok(false);
         }
-        cells.settle(job, answer, settings, &cells::Owner, grid, stats)?;
+        cells.decide(job, answer, settings, &cells::Owner, grid, stats)?;
         Ok(true)
     }
 }
@@ -148,12 +146,12 @@ impl Finder for Cpu {
 fn run_naive(job: Job<'_>, answer: &Answer, stats: &mut Statistics) -> Result<(), Error> {
     let Job {
         scene,
-        frame,
+        plan,
         control,
         ..
     } = job;
     let mut keys = Vec::with_capacity(BLOCK);
-    naive::run(&Intersection, scene, frame, control, stats, |_, key, ()| {
+    naive::run(&Intersection, scene, plan, control, stats, |_, key, ()| {
         keys.push(key);
         if keys.len() < BLOCK {
             return Ok(());

@@ -6,50 +6,50 @@
 //! Tetrahedron pairs are classified by their faces, then the open ones by faces and edges. Pairs of which the filters
 //! are unsure go to exact arithmetic, and so do pairs of a triangle and a tetrahedron; that code filters too.
 
-use crate::clock::Instant;
+use crate::workers::clock::Instant;
 use std::sync::Arc;
 use std::time::Duration;
 
-use crate::elements::Elements;
-use crate::grouping::GROUP;
-use crate::index::{LayerIx, Number, Place};
-use crate::narrow::{intersect, intersect_shared};
+use crate::bvh::GROUP;
 use crate::plan::pair_key;
-use crate::positions::Positions;
-use crate::sink::{Answer, BLOCK};
-use crate::tuning::Tuning;
+use crate::query::tuning::Tuning;
+use crate::scene::elements::Elements;
+use crate::scene::index::{Number, PartIx, Slot};
+use crate::scene::positions::Positions;
+use crate::search::narrow::{intersect, intersect_shared};
+use crate::search::sink::{Answer, BLOCK};
 use impinge_exact::internal::filter::{
     self, BATCH, LANES, TetrahedronPairs8, TrianglePairs8, Verdict, Verdict16,
 };
 
 use super::group_cache::Group;
-use super::met::{Met, Side, WorkItem};
-use super::simd::{Isa, Lanes, Simd, dispatch};
+use super::lane_pairs::{LanePairs, Side, WorkItem};
 use super::world::{BodyRef, World};
+use crate::simd::{Isa, Lanes, Simd, with_isa};
 
-/// Two primitives whose boxes overlap: layers, and places in their clusters' orders.
+/// Two primitives whose boxes overlap: parts, and slots in their clusters' orders.
 #[derive(Debug, Clone, Copy)]
 pub struct Candidate {
-    /// The first layer.
-    pub a: LayerIx,
-    /// The second layer.
-    pub b: LayerIx,
-    /// Place of the primitive of `a`.
-    pub place_a: Place,
-    /// Place of the primitive of `b`.
-    pub place_b: Place,
+    /// The first part.
+    pub a: PartIx,
+    /// The second part.
+    pub b: PartIx,
+    /// Slot of the primitive of `a`.
+    pub slot_a: Slot,
+    /// Slot of the primitive of `b`.
+    pub slot_b: Slot,
 }
 
 /// Room for the candidates that wait: the last work item may add a full group product to those that are not enough yet.
 pub(super) fn room_to_wait(tuning: &Tuning) -> usize {
     // A test may ask for more than memory holds.
-    tuning.settle_from.min(1 << 16) + GROUP * GROUP
+    tuning.decide_from.min(1 << 16) + GROUP * GROUP
 }
 
 /// One worker's candidates, pairs and counts.
 #[derive(Debug, Default)]
 #[repr(align(128))]
-pub struct Settler {
+pub struct Decider {
     /// Keys of pairs that intersect, handed over in blocks.
     pub keys: Vec<u64>,
     answer: Option<Arc<Answer>>,
@@ -57,11 +57,11 @@ pub struct Settler {
     block: usize,
     /// Whether only the lowest pair is wanted, and then whether by its second element.
     seeks_lowest: Option<bool>,
-    /// Candidates that were settled.
+    /// Candidates that were decided.
     pub n_candidates: u64,
     /// Candidates left to exact arithmetic.
     pub n_unsure: u64,
-    /// How often a full batch of candidates was settled.
+    /// How often a full batch of candidates was decided.
     pub n_full: u64,
     /// Number of waiting candidates that triggers a batch.
     full: usize,
@@ -74,10 +74,10 @@ pub struct Settler {
     open: Vec<Candidate>,
 }
 
-impl Settler {
+impl Decider {
     /// Prepares for a frame. Candidates and keys get all the room that they may ever need.
     pub fn begin(&mut self, answer: &Arc<Answer>, tuning: &Tuning) {
-        self.full = tuning.settle_from;
+        self.full = tuning.decide_from;
         self.n_full = 0;
         self.answer = Some(Arc::clone(answer));
         self.block = answer.block();
@@ -146,77 +146,77 @@ impl Settler {
         self.candidates.push(candidate);
     }
 
-    /// Takes the candidates of a work item. The filter in f32 settles triangles in f32, except for a few of which it is
+    /// Takes the candidates of a work item. The filter in f32 decides triangles in f32, except for a few of which it is
     /// unsure; these and all other candidates are [pushed](Self::push).
     #[inline(always)]
-    pub(super) fn settle_item<S: Simd>(
+    pub(super) fn decide_item<S: Simd>(
         &mut self,
         _: S,
         world: World<'_>,
         item: &WorkItem,
         [group_a, group_b]: [&Group; 2],
-        met: &Met,
+        lane_pairs: &LanePairs,
     ) {
         let (cluster_a, cluster_b) = (item.cluster_a, item.cluster_b);
         let in_tables = group_a.in_tables && group_b.in_tables;
         let (body_a, body_b) = (world.body(item.a), world.body(item.b));
-        for first in (0..met.len()).step_by(BATCH) {
-            let batch = met.batch(first);
-            let lanes = u64::MAX >> (64 - (met.len() - first).min(BATCH));
+        for first in (0..lane_pairs.len()).step_by(BATCH) {
+            let batch = lane_pairs.batch(first);
+            let lanes = u64::MAX >> (64 - (lane_pairs.len() - first).min(BATCH));
             let verdict = if in_tables {
                 let tables = [&group_a.corners, &group_b.corners];
                 filter::classify_in_tables::<S::F32>(tables, batch, lanes as u16)
             } else {
                 Verdict16::default()
             };
-            let places = |lane: usize| {
+            let slots = |lane: usize| {
                 let [lane_a, lane_b] = batch.map(|lanes| u32::from(lanes[lane]));
-                (cluster_a.place(lane_a), cluster_b.place(lane_b))
+                (cluster_a.slot(lane_a), cluster_b.slot(lane_b))
             };
             for lane in Lanes(u64::from(verdict.yes) & lanes) {
-                let (place_a, place_b) = places(lane);
+                let (slot_a, slot_b) = slots(lane);
                 self.keys
-                    .push(pair_key(body_a.global(place_a), body_b.global(place_b)));
+                    .push(pair_key(body_a.global(slot_a), body_b.global(slot_b)));
             }
             let open = u64::from(!(verdict.yes | verdict.no)) & lanes;
             self.n_candidates += u64::from((lanes & !open).count_ones());
             for lane in Lanes(open) {
-                let (place_a, place_b) = places(lane);
+                let (slot_a, slot_b) = slots(lane);
                 self.push(Candidate {
                     a: item.a,
                     b: item.b,
-                    place_a,
-                    place_b,
+                    slot_a,
+                    slot_b,
                 });
             }
         }
     }
 
-    /// Settles the candidates once there are enough.
+    /// Decides the candidates once there are enough.
     #[inline(always)]
-    pub fn settle_when_full(&mut self, isa: Isa, world: World<'_>) {
+    pub fn decide_when_full(&mut self, isa: Isa, world: World<'_>) {
         if self.candidates.len() >= self.full {
             self.n_full += u64::from(!self.candidates.is_empty());
-            self.settle(isa, world);
+            self.decide(isa, world);
         }
         self.hand_over();
     }
 
-    /// Settles a pair of one body that shares a vertex, under `SharedVertex::Resolve`.
-    pub fn settle_shared(&mut self, body: &BodyRef<'_>, place_a: Place, place_b: Place) {
-        self.settle_shared_by_all(body, &[place_a], &[place_b]);
+    /// Decides a pair of one body that shares a vertex, under `SharedVertex::Resolve`.
+    pub fn decide_shared(&mut self, body: &BodyRef<'_>, slot_a: Slot, slot_b: Slot) {
+        self.decide_shared_by_all(body, &[slot_a], &[slot_b]);
     }
 
-    /// Settles all pairs of a primitive of the one list with one of the other, under `SharedVertex::Resolve`. Primitives
+    /// Decides all pairs of a primitive of the one list with one of the other, under `SharedVertex::Resolve`. Primitives
     /// of one list have the same vertices, and a vertex is in both.
-    pub fn settle_shared_by_all(&mut self, body: &BodyRef<'_>, a: &[Place], b: &[Place]) {
+    pub fn decide_shared_by_all(&mut self, body: &BodyRef<'_>, a: &[Slot], b: &[Slot]) {
         let n_pairs = a.len() as u64 * b.len() as u64;
         let pairs = a.iter().flat_map(|&a| b.iter().map(move |&b| (a, b)));
-        self.settle_as_one(body, [a[0], b[0]], n_pairs, pairs);
+        self.decide_as_one(body, [a[0], b[0]], n_pairs, pairs);
     }
 
-    /// Settles all pairs of a list, under `SharedVertex::Resolve`. Its primitives have the same vertices.
-    pub fn settle_alike(&mut self, body: &BodyRef<'_>, list: &[Place]) {
+    /// Decides all pairs of a list, under `SharedVertex::Resolve`. Its primitives have the same vertices.
+    pub fn decide_alike(&mut self, body: &BodyRef<'_>, list: &[Slot]) {
         let &[first, second, ..] = list else {
             return;
         };
@@ -224,25 +224,25 @@ impl Settler {
         let rest = |ix: usize| &list[ix + 1..];
         let pairs =
             (list.iter().enumerate()).flat_map(|(ix, &a)| rest(ix).iter().map(move |&b| (a, b)));
-        self.settle_as_one(body, [first, second], n_pairs, pairs);
+        self.decide_as_one(body, [first, second], n_pairs, pairs);
     }
 
-    /// Settles pairs that share vertices and have one answer: that of the pair `example`.
-    fn settle_as_one(
+    /// Decides pairs that share vertices and have one answer: that of the pair `example`.
+    fn decide_as_one(
         &mut self,
         body: &BodyRef<'_>,
-        example: [Place; 2],
+        example: [Slot; 2],
         n_pairs: u64,
-        pairs: impl Iterator<Item = (Place, Place)>,
+        pairs: impl Iterator<Item = (Slot, Slot)>,
     ) {
         if self.is_over() {
             return;
         }
         self.n_candidates += n_pairs;
-        let [a, b] = example.map(|place| body.points(place));
-        let [ids_a, ids_b] = example.map(|place| body.corners(place));
+        let [a, b] = example.map(|slot| body.points(slot));
+        let [ids_a, ids_b] = example.map(|slot| body.corners(slot));
         let rule = crate::SharedVertex::Resolve;
-        if !intersect_shared(rule, body.layer.kind, (&a, ids_a), (&b, ids_b)) {
+        if !intersect_shared(rule, body.part.kind, (&a, ids_a), (&b, ids_b)) {
             return;
         }
         // So many may be far more than memory holds.
@@ -258,16 +258,16 @@ impl Settler {
         }
     }
 
-    /// Settles all candidates. Compiled once per instruction set, not once per caller.
-    pub fn settle(&mut self, isa: Isa, world: World<'_>) {
+    /// Decides all candidates. Compiled once per instruction set, not once per caller.
+    pub fn decide(&mut self, isa: Isa, world: World<'_>) {
         if self.candidates.is_empty() {
             return;
         }
         let start = Instant::now();
         self.n_candidates += self.candidates.len() as u64;
-        dispatch!(isa, reject, (settler: &mut Settler = self, world: World<'_> = world));
-        dispatch!(isa, classify_triangles, (settler: &mut Settler = self, world: World<'_> = world));
-        dispatch!(isa, classify_tetrahedra, (settler: &mut Settler = self, world: World<'_> = world));
+        with_isa!(isa, reject, (decider: &mut Decider = self, world: World<'_> = world));
+        with_isa!(isa, classify_triangles, (decider: &mut Decider = self, world: World<'_> = world));
+        with_isa!(isa, classify_tetrahedra, (decider: &mut Decider = self, world: World<'_> = world));
         self.candidates.clear();
         self.survivors.clear();
         self.open.clear();
@@ -276,7 +276,7 @@ impl Settler {
     }
 
     /// Passes on triangle pairs that planes do not separate, and tetrahedron pairs that are open after the test of
-    /// faces. Settles batches of mixed kinds right away.
+    /// faces. Decides batches of mixed kinds right away.
     #[inline(always)]
     fn reject<S: Simd>(&mut self, simd: S, world: World<'_>) {
         let mut lookup = BodyLookup::new(world);
@@ -294,7 +294,7 @@ impl Settler {
             } else {
                 for &candidate in chunk {
                     lookup.go_to(candidate);
-                    self.settle_exactly(&lookup.a, &lookup.b, candidate);
+                    self.decide_exactly(&lookup.a, &lookup.b, candidate);
                 }
             }
         }
@@ -335,14 +335,14 @@ impl Settler {
         self.open = open;
     }
 
-    /// Records the verdict on a batch; settles its unsure pairs exactly.
+    /// Records the verdict on a batch; decides its unsure pairs exactly.
     #[inline(always)]
     fn take(&mut self, lookup: &mut BodyLookup<'_>, chunk: &[Candidate], verdict: Verdict) {
         self.take_pairs(lookup, chunk, verdict.yes);
         for lane in lanes(chunk, !(verdict.yes | verdict.no)) {
             lookup.go_to(chunk[lane]);
             self.n_unsure += 1;
-            self.settle_exactly(&lookup.a, &lookup.b, chunk[lane]);
+            self.decide_exactly(&lookup.a, &lookup.b, chunk[lane]);
         }
     }
 
@@ -352,20 +352,20 @@ impl Settler {
         for lane in lanes(chunk, yes) {
             let candidate = chunk[lane];
             lookup.go_to(candidate);
-            let key_a = lookup.a.global(candidate.place_a);
-            let key_b = lookup.b.global(candidate.place_b);
+            let key_a = lookup.a.global(candidate.slot_a);
+            let key_b = lookup.b.global(candidate.slot_b);
             self.keys.push(pair_key(key_a, key_b));
         }
     }
 
     #[inline(never)]
-    fn settle_exactly(&mut self, a: &BodyRef<'_>, b: &BodyRef<'_>, candidate: Candidate) {
-        let points_a = a.points(candidate.place_a);
-        let points_b = b.points(candidate.place_b);
-        if intersect(a.layer.kind, &points_a, b.layer.kind, &points_b) {
+    fn decide_exactly(&mut self, a: &BodyRef<'_>, b: &BodyRef<'_>, candidate: Candidate) {
+        let points_a = a.points(candidate.slot_a);
+        let points_b = b.points(candidate.slot_b);
+        if intersect(a.part.kind, &points_a, b.part.kind, &points_b) {
             self.keys.push(pair_key(
-                a.global(candidate.place_a),
-                b.global(candidate.place_b),
+                a.global(candidate.slot_a),
+                b.global(candidate.slot_b),
             ));
         }
     }
@@ -387,32 +387,32 @@ fn keep(list: &mut Vec<Candidate>, chunk: &[Candidate], mask: u8) {
 // Kernels of their own: without optimisation, one for all of them would need more stack than a thread has.
 
 #[inline(always)]
-fn reject<S: Simd>(simd: S, settler: &mut Settler, world: World<'_>) {
-    settler.reject(simd, world);
+fn reject<S: Simd>(simd: S, decider: &mut Decider, world: World<'_>) {
+    decider.reject(simd, world);
 }
 
 #[inline(always)]
-fn classify_triangles<S: Simd>(simd: S, settler: &mut Settler, world: World<'_>) {
-    settler.classify_triangles(simd, world);
+fn classify_triangles<S: Simd>(simd: S, decider: &mut Decider, world: World<'_>) {
+    decider.classify_triangles(simd, world);
 }
 
 #[inline(always)]
-fn classify_tetrahedra<S: Simd>(simd: S, settler: &mut Settler, world: World<'_>) {
-    settler.classify_tetrahedra(simd, world);
+fn classify_tetrahedra<S: Simd>(simd: S, decider: &mut Decider, world: World<'_>) {
+    decider.classify_tetrahedra(simd, world);
 }
 
 /// The two bodies of the current candidate; candidates of the same bodies come in runs.
 struct BodyLookup<'a> {
     world: World<'a>,
-    a_ix: LayerIx,
-    b_ix: LayerIx,
+    a_ix: PartIx,
+    b_ix: PartIx,
     a: BodyRef<'a>,
     b: BodyRef<'a>,
 }
 
 impl<'a> BodyLookup<'a> {
     fn new(world: World<'a>) -> Self {
-        let ix = LayerIx::new(0);
+        let ix = PartIx::new(0);
         let first = world.body(ix);
         BodyLookup {
             world,
@@ -474,7 +474,7 @@ impl<'a> BodyLookup<'a> {
         [side_a, side_b]: [&mut [[[f64; LANES]; 3]; N]; 2],
         corners_of: impl Fn(&'a Elements) -> Option<&'a [[u32; N]]>,
     ) -> bool {
-        let common = places_in_common(chunk);
+        let common = slots_in_common(chunk);
         for (lane, &candidate) in chunk.iter().enumerate() {
             self.go_to(candidate);
             let (a, b) = (&self.a, &self.b);
@@ -483,31 +483,31 @@ impl<'a> BodyLookup<'a> {
             else {
                 return false;
             };
-            if let Some((places_a, places_b)) = common {
-                put_all(simd, side_a, a.positions, corners_a, places_a);
-                put_all(simd, side_b, b.positions, corners_b, places_b);
+            if let Some((slots_a, slots_b)) = common {
+                put_all(simd, side_a, a.positions, corners_a, slots_a);
+                put_all(simd, side_b, b.positions, corners_b, slots_b);
                 return true;
             }
-            let (place_a, place_b) = (candidate.place_a.index(), candidate.place_b.index());
-            put(side_a, lane, a.positions, &corners_a[place_a]);
-            put(side_b, lane, b.positions, &corners_b[place_b]);
+            let (slot_a, slot_b) = (candidate.slot_a.index(), candidate.slot_b.index());
+            put(side_a, lane, a.positions, &corners_a[slot_a]);
+            put(side_b, lane, b.positions, &corners_b[slot_b]);
         }
         true
     }
 }
 
-/// The places of candidates of the same two bodies; unused lanes repeat the first.
+/// The slots of candidates of the same two bodies; unused lanes repeat the first.
 #[inline(always)]
-fn places_in_common(chunk: &[Candidate]) -> Option<([Place; LANES], [Place; LANES])> {
+fn slots_in_common(chunk: &[Candidate]) -> Option<([Slot; LANES], [Slot; LANES])> {
     let first = chunk[0];
-    let mut places = ([first.place_a; LANES], [first.place_b; LANES]);
+    let mut slots = ([first.slot_a; LANES], [first.slot_b; LANES]);
     let mut same = true;
     for (lane, candidate) in chunk.iter().enumerate() {
         same &= (candidate.a == first.a) & (candidate.b == first.b);
-        places.0[lane] = candidate.place_a;
-        places.1[lane] = candidate.place_b;
+        slots.0[lane] = candidate.slot_a;
+        slots.1[lane] = candidate.slot_b;
     }
-    same.then_some(places)
+    same.then_some(slots)
 }
 
 /// Puts primitives of one body into all lanes.
@@ -517,13 +517,13 @@ fn put_all<S: Simd, const N: usize>(
     side: &mut [[[f64; LANES]; 3]; N],
     positions: &Positions,
     corners: &[[u32; N]],
-    places: [Place; LANES],
+    slots: [Slot; LANES],
 ) {
     match positions {
         Positions::F32(positions) => {
             let mut ids = [[0; LANES]; N];
-            for (lane, &place) in places.iter().enumerate() {
-                let corners = &corners[place.index()];
+            for (lane, &slot) in slots.iter().enumerate() {
+                let corners = &corners[slot.index()];
                 for k in 0..N {
                     ids[k][lane] = corners[k];
                 }
@@ -534,8 +534,8 @@ fn put_all<S: Simd, const N: usize>(
         }
         Positions::F64(positions) => {
             let positions = &positions[..];
-            for (lane, &place) in places.iter().enumerate() {
-                let corners = &corners[place.index()];
+            for (lane, &slot) in slots.iter().enumerate() {
+                let corners = &corners[slot.index()];
                 for k in 0..N {
                     put_vertex(&mut side[k], lane, &positions[corners[k] as usize]);
                 }

@@ -1,6 +1,6 @@
 //! Stage `pairing`: which primitives of two clusters have boxes that meet.
 //!
-//! In: work items (two clusters). Out: candidates, which `narrow` settles item by item, while both groups are in
+//! In: work items (two clusters). Out: candidates, which `narrow` decides item by item, while both groups are in
 //! the cache.
 //!
 //! 0. The boxes of a cluster's primitives, and their corners, are computed when first needed; a worker caches
@@ -10,29 +10,29 @@
 //! 2. Each survivor of the smaller side is tested against the survivors of the other, 16 (or 8)
 //!    lanes at a time: one 64-bit mask per primitive.
 //!    Where these are very many, `directions` clears most of them.
-//! 3. Within one body the adjacency masks clear the lanes that share a vertex, or set apart those that `folds` leaves
-//!    open. Pairs that share a hub are cleared under any rule: `hubs` settles them.
+//! 3. Within one body the adjacency masks clear the lanes that share a vertex, or set apart those that `creases` leaves
+//!    open. Pairs that share a hub are cleared under any rule: `hubs` decides them.
 //!
 //! Invariant: a pair of primitives lies in one work item only, so no candidate comes twice.
 //! On a CPU these box tests beat the 4x4x4 sub-cell masks of the paper, see `docs/lab/intersections.md`.
 
-use crate::clock::Instant;
+use crate::workers::clock::Instant;
 use std::sync::Arc;
 
-use crate::grouping::GROUP;
-use crate::grouping::hubs::Hubs;
-use crate::index::{ClusterIx, LayerIx, Number};
+use crate::bvh::GROUP;
+use crate::bvh::hubs::Hubs;
 use crate::query::SharedVertex;
-use crate::settings::Settings;
-use crate::sink::Answer;
+use crate::query::settings::Settings;
+use crate::scene::index::{ClusterIx, Number, PartIx};
+use crate::search::sink::Answer;
 
 use super::directions::Directions;
 use super::group_cache::{Group, GroupCache};
 use super::hubs::HubScratch;
-use super::met::{Met, Side, WorkItem};
-use super::narrow::Settler;
-use super::simd::{Isa, Lanes, Masks, Simd};
+use super::lane_pairs::{LanePairs, Side, WorkItem};
+use super::narrow::Decider;
 use super::world::{BodyCache, BodyRef, World};
+use crate::simd::{Isa, Lanes, Masks, Simd};
 
 /// The narrow stage is timed for one work item in this many: reading the clock takes longer than some items.
 const SAMPLED: u32 = 16;
@@ -41,24 +41,24 @@ const SAMPLED: u32 = 16;
 #[derive(Debug, Default)]
 #[repr(align(128))]
 pub(crate) struct Worker {
-    pub settler: Settler,
+    pub decider: Decider,
     /// Scratch for pairs that share a hub.
     pub(super) around: HubScratch,
     groups: GroupCache<Group>,
     directions: Directions,
-    met: Met,
+    lane_pairs: LanePairs,
     masks: Masks,
     /// For each row of `masks` in one body, the lanes that share a vertex with it.
     shared: Masks,
-    /// The number of work items whose candidates were settled.
-    n_settled: u32,
+    /// The number of work items whose candidates were decided.
+    n_decided: u32,
 }
 
 impl Worker {
     /// Prepares for a frame of `n_clusters` clusters.
     pub fn begin(&mut self, n_clusters: u64, settings: &Settings, answer: &Arc<Answer>) {
-        self.settler.begin(answer, &settings.tuning);
-        self.n_settled = 0;
+        self.decider.begin(answer, &settings.tuning);
+        self.n_decided = 0;
         self.groups.begin::<World<'_>>(n_clusters, settings);
         self.directions.begin::<World<'_>>(n_clusters, settings);
     }
@@ -68,17 +68,17 @@ impl Worker {
         self.directions.n_parted
     }
 
-    /// Clusters that took the place of others in the cache, in this frame.
+    /// Clusters that took the slot of others in the cache, in this frame.
     pub fn n_evicted(&self) -> u64 {
         self.groups.n_evicted
     }
 
     pub fn bytes(&self) -> usize {
-        self.settler.bytes()
+        self.decider.bytes()
             + self.groups.bytes()
             + self.directions.bytes()
             + self.around.bytes()
-            + Met::BYTES
+            + LanePairs::BYTES
     }
 }
 
@@ -88,7 +88,7 @@ pub(crate) fn full(size: usize) -> u64 {
     u64::MAX >> (GROUP - size)
 }
 
-/// Pairs the primitives of some work items and settles the candidates.
+/// Pairs the primitives of some work items and decides the candidates.
 #[inline(always)]
 pub(crate) fn run<S: Simd>(
     simd: S,
@@ -98,29 +98,29 @@ pub(crate) fn run<S: Simd>(
     worker: &mut Worker,
 ) {
     let Worker {
-        settler,
+        decider,
         groups,
         directions,
-        met,
+        lane_pairs,
         masks,
         shared,
-        n_settled,
+        n_decided,
         ..
     } = worker;
     for item in items {
-        if settler.is_over() {
+        if decider.is_over() {
             break;
         }
-        let wanted = match settler.up_to() {
+        let wanted = match decider.up_to() {
             None => [u64::MAX; 2],
             Some((Side::A, to)) => [lanes_up_to(world, item.a, item.cluster_a, to), u64::MAX],
             Some((Side::B, to)) => [u64::MAX, lanes_up_to(world, item.b, item.cluster_b, to)],
         };
-        let Some(Culled { places, lanes }) = cull(simd, world, item, wanted, groups) else {
+        let Some(Culled { slots, lanes }) = cull(simd, world, item, wanted, groups) else {
             continue;
         };
-        let groups = places.map(|place| groups.at(place));
-        met.clear();
+        let groups = slots.map(|slot| groups.at(slot));
+        lane_pairs.clear();
         let (side, rows) = overlap(simd, item, (groups, lanes), masks);
         let is_same_body = item.a == item.b;
         if is_same_body {
@@ -136,7 +136,7 @@ pub(crate) fn run<S: Simd>(
             let aside = if is_same_body { &shared.0 } else { &[0; GROUP] };
             let rows = (side, rows);
             // Their boxes overlap: they count as candidates.
-            settler.n_candidates += directions.thin(simd, world, item, rows, 0.0, aside, masks);
+            decider.n_candidates += directions.thin(simd, world, item, rows, 0.0, aside, masks);
         }
         if is_same_body {
             within_body(
@@ -145,41 +145,41 @@ pub(crate) fn run<S: Simd>(
                 item,
                 (side, rows),
                 (masks, &shared.0),
-                met,
-                settler,
+                lane_pairs,
+                decider,
             );
         } else {
             for row in Lanes(rows) {
-                met.push_row(simd, side, row, masks.0[row]);
+                lane_pairs.push_row(simd, side, row, masks.0[row]);
             }
         }
-        if met.len() > 0 {
-            *n_settled += 1;
-            let is_sample = n_settled.is_multiple_of(SAMPLED);
+        if lane_pairs.len() > 0 {
+            *n_decided += 1;
+            let is_sample = n_decided.is_multiple_of(SAMPLED);
             let start = is_sample.then(Instant::now);
-            settler.settle_item(simd, world, item, groups, met);
+            decider.decide_item(simd, world, item, groups, lane_pairs);
             if let Some(start) = start {
-                settler.busy += start.elapsed() * SAMPLED;
+                decider.busy += start.elapsed() * SAMPLED;
             }
         }
-        settler.settle_when_full(isa, world);
+        decider.decide_when_full(isa, world);
     }
-    settler.settle(isa, world);
+    decider.decide(isa, world);
 }
 
-/// The places of a work item's groups, and the lanes of each that meet the intersection of the two clusters' boxes.
+/// The slots of a work item's groups, and the lanes of each that meet the intersection of the two clusters' boxes.
 struct Culled {
-    places: [usize; 2],
+    slots: [usize; 2],
     lanes: [u64; 2],
 }
 
 /// The lanes of a cluster whose elements have numbers up to one.
 #[inline(never)]
-fn lanes_up_to(world: World<'_>, layer: LayerIx, cluster: ClusterIx, to: Number) -> u64 {
-    let elements = world.cache(layer).clustering.primitives(cluster);
-    let layer = world.frame.layer(layer);
+fn lanes_up_to(world: World<'_>, part: PartIx, cluster: ClusterIx, to: Number) -> u64 {
+    let elements = world.cache(part).clustering.primitives(cluster);
+    let part = world.plan.part(part);
     (0..).zip(elements).fold(0, |lanes, (lane, &element)| {
-        lanes | u64::from(layer.number(element) <= to) << lane
+        lanes | u64::from(part.number(element) <= to) << lane
     })
 }
 
@@ -198,7 +198,7 @@ fn cull<S: Simd>(
     let size = |side: usize| caches[side].clustering.size(sides[side].1);
     let leaf = |side: usize| caches[side].bounds.levels[0].at(sides[side].1.index());
     let both = leaf(0).intersection(&leaf(1));
-    let mut places = [NOWHERE; 2];
+    let mut slots = [NOWHERE; 2];
     let mut lanes = [0; 2];
     if wanted[0] == 0 || wanted[1] == 0 {
         return None;
@@ -206,19 +206,19 @@ fn cull<S: Simd>(
     // Test a cached group first: if no lane of it is left, the other group need not be computed.
     let first = usize::from(!groups.holds(sides[0]) && groups.holds(sides[1]));
     for side in [first, 1 - first] {
-        places[side] = groups.place(simd, world, sides[side], places[1 - side]);
+        slots[side] = groups.slot(simd, world, sides[side], slots[1 - side]);
         let all = full(size(side)) & wanted[side];
         if sides[0] == sides[1] {
-            places = [places[side]; 2];
+            slots = [slots[side]; 2];
             lanes = [all; 2];
             break;
         }
-        lanes[side] = simd.overlaps_64(&groups.at(places[side]).boxes, &both, all);
+        lanes[side] = simd.overlaps_64(&groups.at(slots[side]).boxes, &both, all);
         if lanes[side] == 0 {
             return None;
         }
     }
-    Some(Culled { places, lanes })
+    Some(Culled { slots, lanes })
 }
 
 /// Finds the pairs of lanes whose boxes overlap: one mask per row, which is a lane of the side that is returned.
@@ -255,8 +255,8 @@ fn within_body<S: Simd>(
     item: &WorkItem,
     (side, rows): (Side, u64),
     (masks, shared): (&Masks, &[u64; GROUP]),
-    met: &mut Met,
-    settler: &mut Settler,
+    lane_pairs: &mut LanePairs,
+    decider: &mut Decider,
 ) {
     let cache = world.cache(item.a);
     let (cluster_a, cluster_b) = (item.cluster_a, item.cluster_b);
@@ -264,14 +264,22 @@ fn within_body<S: Simd>(
         body: world.body(item.a),
         cluster_a,
         cluster_b,
-        shared_vertex: world.frame.shared_vertex,
+        shared_vertex: world.plan.shared_vertex,
         folded: [cluster_a, cluster_b].map(|cluster| {
-            let folds = cache.folds.as_ref();
-            folds.map_or(u64::MAX, |folds| folds.of(cluster))
+            let creases = cache.creases.as_ref();
+            creases.map_or(u64::MAX, |creases| creases.of(cluster))
         }),
     };
     for row in Lanes(rows) {
-        rule.put_row(simd, side, row, masks.0[row], shared[row], met, settler);
+        rule.put_row(
+            simd,
+            side,
+            row,
+            masks.0[row],
+            shared[row],
+            lane_pairs,
+            decider,
+        );
     }
 }
 
@@ -338,10 +346,10 @@ impl VertexRule<'_> {
         row: usize,
         mask: u64,
         shared: u64,
-        met: &mut Met,
-        settler: &mut Settler,
+        lane_pairs: &mut LanePairs,
+        decider: &mut Decider,
     ) {
-        met.push_row(simd, side, row, mask & !shared);
+        lane_pairs.push_row(simd, side, row, mask & !shared);
         if self.shared_vertex == SharedVertex::Skip {
             return;
         }
@@ -354,15 +362,15 @@ impl VertexRule<'_> {
             1 => neighbors & folded_lanes,
             _ => 0,
         };
-        settler.n_candidates += u64::from((neighbors & !open).count_ones());
+        decider.n_candidates += u64::from((neighbors & !open).count_ones());
         for lane in Lanes(open) {
             let (lane_a, lane_b) = match side {
                 Side::A => (row, lane),
                 Side::B => (lane, row),
             };
-            let place_a = self.cluster_a.place(lane_a as u32);
-            let place_b = self.cluster_b.place(lane_b as u32);
-            settler.settle_shared(&self.body, place_a, place_b);
+            let slot_a = self.cluster_a.slot(lane_a as u32);
+            let slot_b = self.cluster_b.slot(lane_b as u32);
+            decider.decide_shared(&self.body, slot_a, slot_b);
         }
     }
 }

@@ -3,32 +3,32 @@
 //! ```text
 //! read    all boxes of a body whose clusters are not sorted; else its positions in memory order, and the boxes of
 //!         clusters in no group
-//! prove   whether its groups are beside all bodies that it could meet (see `remote`)
+//! prove   whether its groups are beside all bodies that it could meet (see `culled`)
 //! back    if not, also the boxes of clusters that have come back
 //! above   nodes; bodies that have flowed away from their clusters are clustered again
-//! learn   clusters are sorted for the next frame (see `remote`)
+//! learn   clusters are sorted for the next frame (see `culled`)
 //! ```
 
 use std::sync::{Mutex, PoisonError};
 
-use crate::clusterings::{Asked, Clusterings};
-use crate::error::Error;
-use crate::grouping::bounds::{Bounds, BoundsArray, RawBoundsArray};
-use crate::index::LayerIx;
-use crate::positions::Positions;
-use crate::settings::Settings;
-use crate::stats::Statistics;
-use crate::tuning::Tuning;
+use crate::bvh::bounds::{Bounds, BoundsArray, RawBoundsArray};
+use crate::clusterings::{BodyPart, Clusterings};
+use crate::query::settings::Settings;
+use crate::query::tuning::Tuning;
+use crate::scene::error::Error;
+use crate::scene::index::PartIx;
+use crate::scene::positions::Positions;
+use crate::search::stats::Statistics;
 use crate::workers::Workers;
 
 use super::bounds::{self, Summary};
+use super::culled::body::Children;
+use super::culled::extents::Extents;
+use super::culled::{self, Needed};
 use super::pairing::Worker;
-use super::remote::body::Children;
-use super::remote::extents::Extents;
-use super::remote::{self, Needed};
-use super::simd::{Isa, Simd, dispatch};
 use super::world::{BodyCache, Caches, World};
-use crate::run::Job;
+use crate::search::runner::Job;
+use crate::simd::{Isa, Simd, with_isa};
 
 /// Nodes per task, of up to eight clusters each.
 const NODES: usize = 32;
@@ -56,7 +56,7 @@ enum What {
 
 #[derive(Debug, Clone, Copy)]
 struct Task {
-    layer: LayerIx,
+    part: PartIx,
     what: What,
     first: u32,
     end: u32,
@@ -85,46 +85,46 @@ impl Refit {
     ) -> Result<(), Error> {
         let Job {
             scene,
-            frame,
+            plan,
             workers,
             ..
         } = job;
         let tuning = &settings.tuning;
-        let is_allowed = remote::is_allowed(isa, frame, settings);
+        let is_allowed = culled::is_allowed(isa, plan, settings);
         self.tasks.clear();
-        for (ix, layer) in frame.numbered_layers() {
-            let body = frame.body(scene, ix);
-            let cache = caches.at_mut(layer);
-            let needed = remote::plan(cache, body, is_allowed && !layer.within);
+        for (ix, part) in plan.numbered_parts() {
+            let body = plan.body(scene, ix);
+            let cache = caches.at_mut(part);
+            let needed = culled::plan(cache, body, is_allowed && !part.within);
             if needed == Needed::None {
                 continue;
             }
-            // If this frame ends early, for whatever reason, the boxes belong to no pose.
+            // If this frame ends early, for whatever reason, the boxes belong to no sweep.
             cache.forget_boxes();
             if !cache.can_be_read(body) {
-                frame.check_one(scene, ix)?;
+                plan.check_one(scene, ix)?;
             }
             cache.whole = Bounds::EMPTY;
-            self.push_needed(workers, ix, frame.layers.len(), cache, needed);
+            self.push_needed(workers, ix, plan.parts.len(), cache, needed);
         }
         if !self.work(isa, job, tuning, caches, scratches) {
-            frame.check(scene)?;
+            plan.check(scene)?;
         }
         if is_allowed {
             self.tasks.clear();
-            for (ix, layer) in frame.numbered_layers() {
-                let needed = remote::prove(job, caches, ix, stats);
+            for (ix, part) in plan.numbered_parts() {
+                let needed = culled::prove(job, caches, ix, stats);
                 if needed != Needed::None {
-                    let cache = caches.at_mut(layer);
+                    let cache = caches.at_mut(part);
                     cache.forget_boxes();
-                    self.push_needed(workers, ix, frame.layers.len(), cache, needed);
+                    self.push_needed(workers, ix, plan.parts.len(), cache, needed);
                 }
             }
             self.work(isa, job, tuning, caches, scratches);
         }
         self.above(isa, job, tuning, (clusterings, caches), stats)?;
         if is_allowed {
-            remote::learn(job, caches, for_boxes(job, tuning, scratches));
+            culled::learn(job, caches, for_boxes(job, tuning, scratches));
         }
         Ok(())
     }
@@ -133,7 +133,7 @@ impl Refit {
     fn push_needed(
         &mut self,
         workers: &Workers,
-        layer: LayerIx,
+        part: PartIx,
         n_bodies: usize,
         cache: &mut BodyCache,
         needed: Needed,
@@ -142,17 +142,17 @@ impl Refit {
             Needed::None => {}
             Needed::All => {
                 let n_nodes = cache.bounds.levels.get(1).map_or(1, BoundsArray::len);
-                self.push(workers, layer, cache, What::All, n_nodes);
+                self.push(workers, part, cache, What::All, n_nodes);
             }
             Needed::Near { n_nodes, n_runs } => {
                 // Order tasks so that one thread tends to read a body and compute its boxes: `work` reverses this list,
                 // so the caller starts at its end and helpers at its front.
                 let mut parts = [(What::Read, n_runs), (What::Near, n_nodes)];
-                if 2 * layer.index() >= n_bodies {
+                if 2 * part.index() >= n_bodies {
                     parts.reverse();
                 }
                 for (what, n) in parts {
-                    self.push(workers, layer, cache, what, n);
+                    self.push(workers, part, cache, what, n);
                 }
             }
         }
@@ -162,7 +162,7 @@ impl Refit {
     fn push(
         &mut self,
         workers: &Workers,
-        layer: LayerIx,
+        part: PartIx,
         cache: &mut BodyCache,
         what: What,
         n: usize,
@@ -181,7 +181,7 @@ impl Refit {
         };
         let step = workers.task(step);
         let tasks = (0..n).step_by(step).map(|first| Task {
-            layer,
+            part,
             what,
             first: first as u32,
             end: n.min(first + step) as u32,
@@ -202,7 +202,7 @@ impl Refit {
     ) -> bool {
         let Job {
             scene,
-            frame,
+            plan,
             workers,
             ..
         } = job;
@@ -216,11 +216,11 @@ impl Refit {
         let (tasks, found) = (&self.tasks, &self.found);
         let world = World {
             scene,
-            frame,
+            plan,
             caches: Some(caches),
         };
         let work = |_: &mut Worker, ix: usize| {
-            let result = dispatch!(isa, work, (
+            let result = with_isa!(isa, work, (
                 world: World<'_> = world,
                 task: Task = tasks[ix],
             ) -> FoundBoxes);
@@ -231,11 +231,11 @@ impl Refit {
         for (task, found) in self.tasks.iter().zip(&mut self.found) {
             let found = found.get_mut().unwrap_or_else(PoisonError::into_inner);
             all_finite &= found.extents.all_finite;
-            let cache = caches.at_mut(frame.layer(task.layer));
+            let cache = caches.at_mut(plan.part(task.part));
             cache.surface += f64::from(found.surface);
             cache.whole.join(&found.extents.whole);
-            if let (What::Read, Some(remote)) = (task.what, &mut cache.remote) {
-                remote.add(&found.extents);
+            if let (What::Read, Some(culled)) = (task.what, &mut cache.culled) {
+                culled.add(&found.extents);
             }
         }
         all_finite
@@ -252,14 +252,14 @@ impl Refit {
     ) -> Result<(), Error> {
         let Job {
             scene,
-            frame,
+            plan,
             workers,
             ..
         } = job;
         let mut known = clusterings.lock();
-        for (ix, layer) in frame.numbered_layers() {
-            let body = frame.body(scene, ix);
-            let cache = caches.at_mut(layer);
+        for (ix, part) in plan.numbered_parts() {
+            let body = plan.body(scene, ix);
+            let cache = caches.at_mut(part);
             if cache.positions_stamp == body.positions_stamp() {
                 continue;
             }
@@ -268,13 +268,14 @@ impl Refit {
             if cache.sorted().is_some() {
                 continue;
             }
-            let asked =
-                Asked::new(layer.id, body, layer.part).with_local_faces(isa.looks_corners_up());
+            let body_part =
+                BodyPart::new(part.id, body, part.part).with_local_faces(isa.looks_corners_up());
             let spread = cache.spread();
-            let renewed = known.renew_if_stale(asked, (&mut cache.fit, spread), workers, stats)?;
+            let renewed =
+                known.renew_if_stale(body_part, (&mut cache.fit, spread), workers, stats)?;
             if let Some(clustering) = renewed {
                 *cache = BodyCache::new(body, clustering, tuning);
-                if layer.within {
+                if part.within {
                     cache.find_adjacency(workers)?;
                 }
                 cache.refit_all(body);
@@ -287,7 +288,7 @@ impl Refit {
 
 /// The scratches of the workers that compute boxes.
 fn for_boxes<'a>(job: Job<'_>, tuning: &Tuning, scratches: &'a mut [Worker]) -> &'a mut [Worker] {
-    let parallel = job.frame.n_primitives() >= tuning.bounds_parallel_from;
+    let parallel = job.plan.n_primitives() >= tuning.bounds_parallel_from;
     let n_workers = if parallel { job.workers.n() } else { 1 };
     &mut scratches[..n_workers]
 }
@@ -302,8 +303,8 @@ impl FoundBoxes {
 /// Does one task.
 #[inline(always)]
 fn work<S: Simd>(simd: S, world: World<'_>, task: Task) -> FoundBoxes {
-    let positions = world.body(task.layer).positions;
-    let cache = world.cache(task.layer);
+    let positions = world.body(task.part).positions;
+    let cache = world.cache(task.part);
     let (clustering, run) = (&cache.clustering, task.first as usize..task.end as usize);
     let mut summary = Summary::EMPTY;
     let near = match (task.what, cache.sorted(), positions) {

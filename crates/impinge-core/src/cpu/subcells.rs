@@ -13,16 +13,16 @@
 //! The owner rule is a mask, too: of all cells that two boxes share, the pair belongs to the one in which
 //! one of the two boxes begins along each axis.
 
-use crate::grouping::GROUP;
+use crate::bvh::GROUP;
 
-use super::kept::Kept;
+use super::cull_map::Kept;
 use super::pairing::full;
-use super::simd::{Isa, LaneBounds, Lanes32, Simd, dispatch};
 use super::world::BodyRef;
+use crate::simd::{Isa, LaneBounds, Lanes32, Simd, with_isa};
 
 /// Which pairs of primitives that share a sub-cell are wanted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Asked {
+pub struct SubcellQuery {
     /// Only pairs whose boxes overlap.
     pub boxes: bool,
     /// Only pairs that the cell owns.
@@ -67,11 +67,11 @@ impl Default for Lanes64 {
 
 impl Lanes64 {
     /// Finds the partners in b of each primitive of a.
-    pub fn find(&mut self, isa: Isa, groups: GroupPair<'_>, asked: Asked) {
-        dispatch!(isa, find, (
+    pub fn find(&mut self, isa: Isa, groups: GroupPair<'_>, query: SubcellQuery) {
+        with_isa!(isa, find, (
             lanes: &mut Lanes64 = self,
             groups: GroupPair<'_> = groups,
-            asked: Asked = asked,
+            query: SubcellQuery = query,
         ));
     }
 }
@@ -87,7 +87,7 @@ fn along(kept: &Kept, cell: [u32; 3], axis: usize) -> (usize, usize) {
 }
 
 #[inline(always)]
-fn find<S: Simd>(simd: S, lanes: &mut Lanes64, groups: GroupPair<'_>, asked: Asked) {
+fn find<S: Simd>(simd: S, lanes: &mut Lanes64, groups: GroupPair<'_>, query: SubcellQuery) {
     let GroupPair {
         kept,
         a,
@@ -109,7 +109,7 @@ fn find<S: Simd>(simd: S, lanes: &mut Lanes64, groups: GroupPair<'_>, asked: Ask
     }
     if let Some(body) = &body {
         for (lane, &entry) in b.iter().enumerate() {
-            let corners = body.corners(kept[entry as usize].place());
+            let corners = body.corners(kept[entry as usize].slot());
             for (row, &corner) in lanes.corners.iter_mut().zip(corners) {
                 row.0[lane] = corner;
             }
@@ -134,11 +134,11 @@ fn find<S: Simd>(simd: S, lanes: &mut Lanes64, groups: GroupPair<'_>, asked: Ask
         for axis in 0..3 {
             let (first, last) = along(kept, cell, axis);
             partners &= begins[axis][last] & ends[axis][first];
-            if asked.owned && first == 0 {
+            if query.owned && first == 0 {
                 partners &= owned[axis];
             }
         }
-        if asked.boxes && partners != 0 {
+        if query.boxes && partners != 0 {
             partners = simd.overlaps_64(&lanes.boxes, &kept.bounds, partners);
         }
         lanes.partners[lane] = partners;
@@ -146,7 +146,7 @@ fn find<S: Simd>(simd: S, lanes: &mut Lanes64, groups: GroupPair<'_>, asked: Ask
         if let Some(body) = &body
             && partners != 0
         {
-            let corners = body.corners(kept.place());
+            let corners = body.corners(kept.slot());
             for row in &lanes.corners[..corners.len()] {
                 for &corner in corners {
                     adjacent |= simd.equals_64(row, corner, partners);
@@ -160,10 +160,10 @@ fn find<S: Simd>(simd: S, lanes: &mut Lanes64, groups: GroupPair<'_>, asked: Ask
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::grouping::bounds::Bounds;
-    use crate::grouping::grid::{Grid, owns};
-    use crate::index::{ElementIx, LayerIx};
-    use crate::settings::InstructionSet;
+    use crate::bvh::bounds::Bounds;
+    use crate::bvh::grid::{Grid, owns};
+    use crate::query::settings::InstructionSet;
+    use crate::scene::index::{ElementIx, PartIx};
 
     #[test]
     fn partners_are_those_of_the_occupancy_bits() {
@@ -188,7 +188,7 @@ mod tests {
                 Kept {
                     bounds,
                     range: grid.range(&bounds),
-                    layer: LayerIx::new(0),
+                    part: PartIx::new(0),
                     primitive,
                 }
             })
@@ -215,14 +215,14 @@ mod tests {
                 body: None,
             };
             for (boxes, owned) in [(false, false), (true, false), (false, true), (true, true)] {
-                let asked = Asked {
+                let query = SubcellQuery {
                     boxes,
                     owned,
                     adjacent: false,
                 };
                 for isa in [Isa::Portable, Isa::detect(InstructionSet::Avx512)] {
                     let mut lanes = Lanes64::default();
-                    lanes.find(isa, groups, asked);
+                    lanes.find(isa, groups, query);
                     for (i, &entry_a) in a.iter().enumerate() {
                         for (j, &entry_b) in b.iter().enumerate() {
                             let (a, b) = (&kept[entry_a as usize], &kept[entry_b as usize]);

@@ -1,40 +1,40 @@
 //! Which bodies' boxes meet, for frames of more than two bodies.
 
+use crate::bvh::bounds::Bounds;
+use crate::bvh::tree::{Entry, TreeShape, order};
 use crate::clusterings::Fit;
-use crate::grouping::bounds::Bounds;
-use crate::grouping::hierarchy::{Entry, TreeShape, order};
-use crate::index::LayerIx;
-use crate::tuning::Tuning;
+use crate::query::tuning::Tuning;
+use crate::scene::index::PartIx;
 
 use super::bounds::TreeBounds;
-use super::dispatch::{self, NodePair, Tree};
-use super::simd::Simd;
+use super::traversal::{self, NodePair, Tree};
+use crate::simd::Simd;
 
-/// A tree over the layers' boxes, for frames of more than two bodies. Its order is kept from
+/// A tree over the parts' boxes, for frames of more than two bodies. Its order is kept from
 /// frame to frame and made again when bodies have moved away from their neighbours in it.
 #[derive(Default)]
 pub(crate) struct TopLevel {
     shape: TreeShape,
-    order: Vec<LayerIx>,
+    order: Vec<PartIx>,
     bounds: TreeBounds,
     entries: Vec<Entry>,
     fit: Fit,
 }
 
 impl TopLevel {
-    /// Calls `emit(a, b)`, `a < b`, once for each pair of layers whose boxes overlap.
+    /// Calls `emit(a, b)`, `a < b`, once for each pair of parts whose boxes overlap.
     #[inline(always)]
     pub fn pairs<S: Simd, E>(
         &self,
         simd: S,
         stack: &mut Vec<NodePair>,
-        mut emit: impl FnMut(LayerIx, LayerIx) -> Result<(), E>,
+        mut emit: impl FnMut(PartIx, PartIx) -> Result<(), E>,
     ) -> Result<(), E> {
         let tree = Tree {
             shape: &self.shape,
             bounds: &self.bounds,
         };
-        dispatch::within(simd, tree, None, stack, |i, j| {
+        traversal::within(simd, tree, None, stack, |i, j| {
             let (a, b) = (self.order[i as usize], self.order[j as usize]);
             if a == b {
                 return Ok(());
@@ -50,23 +50,22 @@ impl TopLevel {
             + self.bounds.bytes()
     }
 
-    /// Updates the tree to the current boxes of `n` layers.
-    pub fn refit(&mut self, n: usize, tuning: &Tuning, root: impl Fn(LayerIx) -> Bounds) {
+    /// Updates the tree to the current boxes of `n` parts.
+    pub fn refit(&mut self, n: usize, tuning: &Tuning, root: impl Fn(PartIx) -> Bounds) {
         let is_new = self.order.len() != n;
         if is_new {
             self.shape = TreeShape::new(n);
             self.bounds.resize(&self.shape);
-            self.order = LayerIx::up_to(n).collect();
+            self.order = PartIx::up_to(n).collect();
         }
         self.refit_boxes(&root);
         if self.fit.is_stale(self.spread(), tuning) || is_new {
             self.entries.clear();
-            self.entries.extend(
-                LayerIx::up_to(n).map(|layer| Entry::new(root(layer).center(), layer.raw())),
-            );
+            self.entries
+                .extend(PartIx::up_to(n).map(|part| Entry::new(root(part).center(), part.raw())));
             order(&self.shape, 1, None, &mut self.entries);
-            for (layer, entry) in self.order.iter_mut().zip(&self.entries) {
-                *layer = LayerIx::new(entry.number);
+            for (part, entry) in self.order.iter_mut().zip(&self.entries) {
+                *part = PartIx::new(entry.number);
             }
             self.refit_boxes(&root);
             self.fit = Fit::UNKNOWN;
@@ -74,9 +73,9 @@ impl TopLevel {
         }
     }
 
-    fn refit_boxes(&mut self, root: &impl Fn(LayerIx) -> Bounds) {
-        for (leaf, &layer) in self.order.iter().enumerate() {
-            self.bounds.levels[0].put(leaf, &root(layer));
+    fn refit_boxes(&mut self, root: &impl Fn(PartIx) -> Bounds) {
+        for (leaf, &part) in self.order.iter().enumerate() {
+            self.bounds.levels[0].put(leaf, &root(part));
         }
         self.bounds.refit_above(0, &self.shape);
     }

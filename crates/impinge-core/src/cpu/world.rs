@@ -1,21 +1,21 @@
-//! Read-only view shared by all stages: the scene, its layers, and the cache kept per body.
+//! Read-only view shared by all stages: the scene, its parts, and the cache kept per body.
 
 use std::sync::Arc;
 
+use crate::bvh::bounds::Bounds;
+use crate::bvh::clusters::Clustering;
 use crate::clusterings::{Clustered, Fit, Store};
-use crate::elements::Elements;
-use crate::grouping::bounds::Bounds;
-use crate::grouping::clusters::Clustering;
-use crate::index::{ElementIx, LayerIx, Number, Place};
-use crate::plan::{Layer, Plan};
-use crate::positions::Positions;
+use crate::plan::{Plan, QueryPart};
 use crate::scene::Scene;
+use crate::scene::elements::Elements;
+use crate::scene::index::{ElementIx, Number, PartIx, Slot};
+use crate::scene::positions::Positions;
 use impinge_exact::Point;
 
 use super::bounds::TreeBounds;
-use super::dispatch::Tree;
-use super::folds::Folds;
-use super::remote::body::Remote;
+use super::creases::Creases;
+use super::culled::body::Culled;
+use super::traversal::Tree;
 
 /// The data kept per body from frame to frame.
 #[derive(Debug)]
@@ -29,9 +29,9 @@ pub(crate) struct BodyCache {
     /// The box of all primitives.
     pub whole: Bounds,
     /// The clusters that lie beside all bodies that this one could meet; only for bodies that are large enough.
-    pub remote: Option<Box<Remote>>,
+    pub culled: Option<Box<Culled>>,
     /// The triangles that may meet a neighbour; found under `SharedVertex::Resolve` only.
-    pub folds: Option<Box<Folds>>,
+    pub creases: Option<Box<Creases>>,
     /// Half the summed surface of the clusters.
     pub surface: f64,
     /// How well the clusters have fitted the body.
@@ -56,55 +56,55 @@ pub(crate) type Caches = Store<BodyCache>;
 pub struct World<'a> {
     /// The bodies.
     pub scene: &'a Scene,
-    /// The layers.
-    pub frame: &'a Plan,
-    /// `Clusters` only: places of primitives are places in the clusters' orders.
+    /// The parts.
+    pub plan: &'a Plan,
+    /// `Clusters` only: slots of primitives are slots in the clusters' orders.
     pub(crate) caches: Option<&'a Caches>,
 }
 
-/// One layer's data. A *place* names a primitive: in the order of the clusters if there
+/// One part's data. A *slot* names a primitive: in the order of the clusters if there
 /// are any, else as the body numbers it.
 #[derive(Clone, Copy)]
 pub struct BodyRef<'a> {
-    /// The layer.
-    pub layer: &'a Layer,
+    /// The part.
+    pub part: &'a QueryPart,
     /// The positions of its vertices.
     pub positions: &'a Positions,
-    /// The corners at each place.
+    /// The corners at each slot.
     pub elements: &'a Elements,
     order: Option<&'a [ElementIx]>,
 }
 
 impl<'a> World<'a> {
-    /// A view in which places are the bodies' own numbers of primitives.
-    pub fn new(scene: &'a Scene, frame: &'a Plan) -> Self {
+    /// A view in which slots are the bodies' own numbers of primitives.
+    pub fn new(scene: &'a Scene, plan: &'a Plan) -> Self {
         World {
             scene,
-            frame,
+            plan,
             caches: None,
         }
     }
 
-    /// Looks up a layer.
+    /// Looks up a part.
     #[inline(always)]
-    pub fn body(&self, layer_ix: LayerIx) -> BodyRef<'a> {
-        let layer = self.frame.layer(layer_ix);
-        let body = self.scene.body_in(layer.id.slot());
-        let clustering = self.caches.map(|_| &self.cache(layer_ix).clustering);
+    pub fn body(&self, part_ix: PartIx) -> BodyRef<'a> {
+        let part = self.plan.part(part_ix);
+        let body = self.scene.body_in(part.id.slot());
+        let clustering = self.caches.map(|_| &self.cache(part_ix).clustering);
         BodyRef {
-            layer,
+            part,
             positions: body.positions(),
             elements: clustering.map_or(body.elements(), |clustering| &clustering.corners),
             order: clustering.map(|clustering| &clustering.order[..]),
         }
     }
 
-    /// `Clusters` only: the cache of a layer.
+    /// `Clusters` only: the cache of a part.
     #[inline(always)]
-    pub(crate) fn cache(&self, layer: LayerIx) -> &'a BodyCache {
+    pub(crate) fn cache(&self, part: PartIx) -> &'a BodyCache {
         self.caches
             .expect("by the method `Clusters` only")
-            .at(self.frame.layer(layer))
+            .at(self.plan.part(part))
     }
 }
 
@@ -119,25 +119,25 @@ impl BodyCache {
 }
 
 impl<'a> BodyRef<'a> {
-    /// The global number of the primitive at a place.
+    /// The global number of the primitive at a slot.
     #[inline(always)]
-    pub fn global(&self, place: Place) -> Number {
-        self.layer.number(match self.order {
-            Some(order) => order[place.index()],
-            None => ElementIx::new(place.raw()),
+    pub fn global(&self, slot: Slot) -> Number {
+        self.part.number(match self.order {
+            Some(order) => order[slot.index()],
+            None => ElementIx::new(slot.raw()),
         })
     }
 
-    /// The vertex ids of the primitive at a place.
+    /// The vertex ids of the primitive at a slot.
     #[inline(always)]
-    pub fn corners(&self, place: Place) -> &'a [u32] {
-        self.elements.corners(place.index())
+    pub fn corners(&self, slot: Slot) -> &'a [u32] {
+        self.elements.corners(slot.index())
     }
 
-    /// The corners at a place in double precision; an element with fewer than four repeats its last.
+    /// The corners at a slot in double precision; an element with fewer than four repeats its last.
     #[inline(always)]
-    pub fn points(&self, place: Place) -> [Point; 4] {
-        let corners = self.elements.four_corners(place.index());
+    pub fn points(&self, slot: Slot) -> [Point; 4] {
+        let corners = self.elements.four_corners(slot.index());
         corners.map(|corner| self.positions.point(corner as usize))
     }
 }

@@ -2,20 +2,20 @@
 
 use super::Detector;
 use super::steps::StartAnswer;
-use crate::advance::Advance;
-use crate::error::Error;
-use crate::found::PairList;
-use crate::ids::BodyId;
-use crate::impacts::Impact;
-use crate::index::pair_numbers;
-use crate::narrow::{Element, FirstContact};
-use crate::pair_kind::PairKind;
+use crate::answers::advance::Advance;
+use crate::answers::impacts::Impact;
 use crate::plan::{Plan, TestId};
-use crate::positions::Positions;
-use crate::progress::Control;
+use crate::query::pair_kind::PairKind;
+use crate::query::progress::Control;
+use crate::query::settings::Method;
+use crate::query::step::{Start, Step};
 use crate::scene::Scene;
-use crate::settings::Method;
-use crate::step::{Start, Step};
+use crate::scene::error::Error;
+use crate::scene::ids::BodyId;
+use crate::scene::index::pair_numbers;
+use crate::scene::positions::Positions;
+use crate::search::found::PairList;
+use crate::search::narrow::{Element, FirstContact};
 
 impl Detector {
     /// How far the step can be taken: a fraction of it, backed off from the first contact hardly more than the precision of positions
@@ -70,12 +70,12 @@ impl Detector {
             positions: Vec::new(),
             n_tried: 1,
         };
-        self.place(scene, step, &plan, seen.close, control, &mut advance)?;
+        self.take_positions(scene, step, &plan, seen.close, control, &mut advance)?;
         Ok(advance)
     }
 
-    /// Places the bodies as far on their ways as they can be.
-    fn place(
+    /// Slots the bodies as far on their ways as they can be.
+    fn take_positions(
         &mut self,
         scene: &Scene,
         step: &Step,
@@ -186,7 +186,7 @@ impl Detector {
             .filter(|(_, found)| found.value.at_start);
         let seams = at_start.filter_map(|(kind, found)| {
             let [a, b] = pair_numbers(found.key).map(|number| plan.locate(number));
-            let [of_a, of_b] = [a.0, b.0].map(|layer| plan.layer(layer));
+            let [of_a, of_b] = [a.0, b.0].map(|part| plan.part(part));
             if of_a.id != of_b.id {
                 return None;
             }
@@ -242,15 +242,15 @@ fn touch(scene: &Scene, plan: &Plan, (kind, key): (PairKind, u64), fraction: f64
         return false;
     }
     let located = pair_numbers(key).map(|number| plan.locate(number));
-    let [a, b] = located.each_ref().map(|(layer, element)| Element {
+    let [a, b] = located.each_ref().map(|(part, element)| Element {
         scene,
-        frame: plan,
-        layer: *layer,
+        plan,
+        part: *part,
         corners: plan
-            .body(scene, *layer)
-            .corners(plan.layer(*layer).part, element),
+            .body(scene, *part)
+            .corners(plan.part(*part).part, element),
     });
-    let contact = FirstContact::settle_part(TestId::Elements(kind), a, b, fraction);
+    let contact = FirstContact::decide_part(TestId::Elements(kind), a, b, fraction);
     contact.is_some_and(|contact| !(plan.start == Start::Skip && contact.at_start))
 }
 

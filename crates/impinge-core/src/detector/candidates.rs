@@ -8,20 +8,21 @@ use std::ops::ControlFlow;
 
 use super::in_step::{InStep, Keys, Seen};
 use super::{Detector, Last};
-use crate::candidates::Candidates;
-use crate::error::Error;
-use crate::found::KeysByKind;
-use crate::key_ranges::{KeyRanges, Run, Tally};
-use crate::pair_kind::PairKinds;
+use crate::answers::candidates::Candidates;
 use crate::plan::Plan;
-use crate::progress::Control;
-use crate::run::{Runner, ready};
-use crate::scene::Scene;
+use crate::query::goal::Limits;
+use crate::query::pair_kind::PairKinds;
+use crate::query::progress::Control;
 #[cfg(doc)]
-use crate::settings::Settings;
-use crate::sink::{self, BLOCK, Limits};
-use crate::stats::Statistics;
-use crate::step::CandidateQuery;
+use crate::query::settings::Settings;
+use crate::query::step::CandidateQuery;
+use crate::scene::Scene;
+use crate::scene::error::Error;
+use crate::search::found::KeysByKind;
+use crate::search::key_ranges::{KeyRanges, Run, Tally};
+use crate::search::runner::{Runner, ready};
+use crate::search::sink::{self, BLOCK};
+use crate::search::stats::Statistics;
 
 /// A search for candidates, run by run.
 struct RunSearch<'a> {
@@ -265,7 +266,7 @@ impl RunSearch<'_> {
         let needed = held + each * most.min(BLOCK as u64);
         if needed > budget {
             return Err(Error::MemoryBudget {
-                what: "clusters, their boxes, the smallest slab and the shortest run",
+                what: "clusters, their boxes, the smallest batch and the shortest run",
                 needed,
                 budget,
             });
@@ -302,9 +303,9 @@ impl RunSearch<'_> {
         let plan = self.plan.of_kinds(run.ranges.kinds());
         let mut rooms = KeysByKind::default();
         for (room, &n) in rooms.iter_mut().zip(&run.counts) {
-            *room = sink::room(n as usize, "candidates")?;
+            *room = sink::with_capacity(n as usize, "candidates")?;
         }
-        candidates.put_rooms(rooms);
+        candidates.put_buffers(rooms);
         self.find(&plan, Keys::In(&run.ranges), candidates)?;
         Ok(())
     }

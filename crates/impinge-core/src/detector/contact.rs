@@ -1,12 +1,12 @@
 //! A detector's answers about contact: where pairs meet, and how deep bodies are in each other.
 
 use super::{Detector, Last};
+use crate::answers::pairs::Pairs;
 use crate::contact::{Contacts, Penetration, Work};
-use crate::error::Error;
-use crate::ids::BodyId;
-use crate::pairs::Pairs;
-use crate::progress::Control;
+use crate::query::progress::Control;
 use crate::scene::Scene;
+use crate::scene::error::Error;
+use crate::scene::ids::BodyId;
 
 impl Detector {
     /// Where the triangles of each pair meet: points, segments and polygons. The scene must not have changed since the pairs
@@ -29,7 +29,7 @@ impl Detector {
     ///
     /// # Errors
     /// A body of the pairs is no longer in the scene, is of another kind or has too few primitives; positions written in
-    /// place since then are refused.
+    /// slot since then are refused.
     pub fn contacts(&mut self, scene: &Scene, pairs: &Pairs) -> Result<Contacts, Error> {
         self.contacts_with(scene, pairs, &Control::new())
     }

@@ -6,21 +6,22 @@
 use std::sync::Arc;
 
 use super::{Detector, Last};
+use crate::answers::pairs::Pairs;
 use crate::cpu::Cpu;
 use crate::cpu::clusters::Clusters;
-use crate::error::Error;
-use crate::ids::BodyId;
-use crate::index::pair_numbers;
-use crate::pairs::Pairs;
 use crate::plan::Plan;
-use crate::progress::Control;
 use crate::proximity::{Distances, Nearest};
 use crate::query::Query;
-use crate::run::{Finder, Job, Runner, ready};
+use crate::query::goal::{Goal, Limits};
+use crate::query::progress::Control;
+use crate::query::settings::{Method, Settings};
 use crate::scene::Scene;
-use crate::settings::{Method, Settings};
-use crate::sink::{Answer, Goal, Limits};
-use crate::stats::Statistics;
+use crate::scene::error::Error;
+use crate::scene::ids::BodyId;
+use crate::scene::index::pair_numbers;
+use crate::search::runner::{Finder, Job, Runner, ready};
+use crate::search::sink::Answer;
+use crate::search::stats::Statistics;
 use crate::workers::Workers;
 
 impl Detector {
@@ -126,7 +127,7 @@ impl Detector {
         }
         let plan = Plan::intersections(scene, query, Goal::Any, self.settings.limits())?;
         plan.check(scene)?;
-        match plan.layers.iter().any(|layer| layer.within) {
+        match plan.parts.iter().any(|part| part.within) {
             true => refused("query", "self-collision"),
             false => Ok(plan),
         }
@@ -188,7 +189,7 @@ impl Touching {
             max_pairs: None,
             ..settings.limits()
         };
-        // Layers are in the order of the bodies.
+        // QueryParts are in the order of the bodies.
         let by_second = b < a;
         let goal = Goal::Lowest { by_second };
         let plan = Plan::intersections(scene, &Query::between(a, b), goal, limits)?;

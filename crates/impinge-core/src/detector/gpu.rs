@@ -7,19 +7,20 @@ use super::{Backend, Detector, Settings};
 use crate::clusterings::Clusterings;
 use crate::cpu::Cpu;
 use crate::cpu::steps::{ByDevice, StepClusters};
-use crate::error::Error;
-use crate::found::StepAnswer;
 use crate::gpu::recording::{Ran, Recording};
 use crate::gpu::{Capacities, Engine, Gpu, ResidentPairs, WantedAdapter};
-use crate::ids::BodyId;
 use crate::plan::Plan;
-use crate::progress::Control;
 use crate::query::Query;
-use crate::run::{Finder, Job};
+use crate::query::goal::Goal;
+use crate::query::progress::Control;
+use crate::query::settings::Method;
 use crate::scene::Scene;
-use crate::settings::Method;
-use crate::sink::{Answer, Goal};
-use crate::stats::Statistics;
+use crate::scene::error::Error;
+use crate::scene::ids::BodyId;
+use crate::search::found::StepAnswer;
+use crate::search::runner::{Finder, Job};
+use crate::search::sink::Answer;
+use crate::search::stats::Statistics;
 use crate::workers::is_forked;
 
 /// Opens the GPU that the settings ask for, if they ask for one.
@@ -73,7 +74,7 @@ fn engine_of(
     }
 }
 
-/// Has the device find the pairs of a step that may touch, and settles them on the CPU. Returns [`ByDevice::Not`] if there is no device,
+/// Has the device find the pairs of a step that may touch, and decides them on the CPU. Returns [`ByDevice::Not`] if there is no device,
 /// or if the CPU has to answer: steps with a separation, a clearance or a filter, steps that the device cannot hold, any step in a browser, which
 /// cannot wait for a device here. With `Backend::Auto` the CPU takes over for good if the device fails.
 pub(super) fn find_in_step(
@@ -83,15 +84,15 @@ pub(super) fn find_in_step(
     answer: StepAnswer<'_>,
     stats: &mut Statistics,
 ) -> Result<ByDevice, Error> {
-    if cfg!(target_family = "wasm") || job.frame.bound() > 0.0 || job.frame.has_filter() {
+    if cfg!(target_family = "wasm") || job.plan.bound() > 0.0 || job.plan.has_filter() {
         return Ok(ByDevice::Not);
     }
     let Some(on_device) = engine else {
         return Ok(ByDevice::Not);
     };
     // Which pairs a cell owns is not known on a device, so a pair that certainly touches may be another cell's.
-    let sought = match job.frame.has_cell() {
-        false => job.frame.goal,
+    let sought = match job.plan.has_cell() {
+        false => job.plan.goal,
         true => Goal::All,
     };
     let gpu = Arc::clone(on_device.gpu());
@@ -293,7 +294,7 @@ impl Detector {
         if query.cell.is_some() {
             return Err(Error::Setting {
                 setting: "owned_by",
-                given: "a cell in a frame that stays on a device".to_owned(),
+                given: "a cell in a plan that stays on a device".to_owned(),
                 allowed: "only detect, count and any",
             });
         }

@@ -2,22 +2,22 @@
 
 use std::sync::Arc;
 
+use crate::answers::near::Labels;
 use crate::cpu::steps::{ByDevice, StepClusters};
-use crate::error::Error;
-use crate::found::{ContactAnswer, Found, KeyAnswer, PairList, StepAnswer};
 #[cfg(feature = "gpu")]
 use crate::gpu::Engine;
-use crate::key_ranges::{KeyRanges, Tally};
-use crate::naive;
-use crate::narrow::{BoxOverlap, FirstContact, Within};
-use crate::near::Labels;
-use crate::pair_kind::PairKind;
 use crate::plan::{Question, TestId};
-use crate::run::{Finder, Job};
-use crate::settings::{Method, Settings};
-use crate::sink::Ending;
-use crate::stats::Statistics;
-use crate::step::Start;
+use crate::query::pair_kind::PairKind;
+use crate::query::settings::{Method, Settings};
+use crate::query::step::Start;
+use crate::scene::error::Error;
+use crate::search::found::{ContactAnswer, Found, KeyAnswer, PairList, StepAnswer};
+use crate::search::key_ranges::{KeyRanges, Tally};
+use crate::search::naive;
+use crate::search::narrow::{BoxOverlap, FirstContact, Within};
+use crate::search::runner::{Finder, Job};
+use crate::search::sink::Ending;
+use crate::search::stats::Statistics;
 use impinge_exact::Contact;
 
 /// Which keys to find.
@@ -58,7 +58,7 @@ impl InStep<'_> {
         stats: &mut Statistics,
     ) -> Result<(), Error> {
         if self.settings.method == Method::Naive {
-            let skips = job.frame.start == Start::Skip;
+            let skips = job.plan.start == Start::Skip;
             return run_naive(&FirstContact, job, stats, |kind, key, value: Contact| {
                 if !(skips && value.at_start) {
                     answer.extend(kind as usize, [Found { key, value }].into_iter());
@@ -73,7 +73,7 @@ impl InStep<'_> {
             ByDevice::Not => {
                 answer.forget();
                 self.clusters.run(job, self.settings, found, stats)?;
-                if job.frame.is_rounded() {
+                if job.plan.is_rounded() {
                     self.seen.close = self.clusters.close();
                 }
             }
@@ -126,10 +126,10 @@ impl InStep<'_> {
             answer.take_keys(kind, &mut block);
             answer.check()
         };
-        if job.frame.question == Question::Overlap {
+        if job.plan.question == Question::Overlap {
             return run_naive(&BoxOverlap, job, stats, |kind, key, ()| emit(kind, key));
         }
-        let labels = Labels::new(job.frame.n_primitives());
+        let labels = Labels::new(job.plan.n_primitives());
         run_naive(&Within, job, stats, |kind, key, ()| {
             emit(kind, labels.put(key, Labels::UNKNOWN))
         })
@@ -146,7 +146,7 @@ impl InStep<'_> {
 }
 
 /// The oracle's pairs, as far as they count.
-fn run_naive<T: crate::narrow::Test>(
+fn run_naive<T: crate::search::narrow::Test>(
     test: &T,
     job: Job<'_>,
     stats: &mut Statistics,
@@ -154,7 +154,7 @@ fn run_naive<T: crate::narrow::Test>(
 ) -> Result<(), Error> {
     let Job {
         scene,
-        frame,
+        plan,
         control,
         ..
     } = job;
@@ -162,11 +162,11 @@ fn run_naive<T: crate::narrow::Test>(
         naive::run(
             test,
             scene,
-            frame,
+            plan,
             control,
             stats,
             |id, key, value| match id {
-                TestId::Elements(kind) if frame.counts(scene, key) => emit(kind, key, value),
+                TestId::Elements(kind) if plan.counts(scene, key) => emit(kind, key, value),
                 _ => Ok(()),
             },
         )

@@ -1,24 +1,24 @@
 //! A detector's answers about intersections: which pairs, how many, whether any.
 
 use super::{Detector, Last};
-use crate::error::Error;
-use crate::pairs::Pairs;
+use crate::answers::pairs::Pairs;
 use crate::plan::Plan;
-use crate::progress::Control;
-use crate::query::{Query, Scope};
-use crate::run::{Outcome, ready};
-use crate::scene::Scene;
+use crate::query::goal::Goal;
+use crate::query::progress::Control;
 #[cfg(feature = "gpu")]
-use crate::settings::Backend;
-use crate::settings::{Method, Settings};
-use crate::sink::Goal;
+use crate::query::settings::Backend;
+use crate::query::settings::{Method, Settings};
+use crate::query::{Query, Scope};
+use crate::scene::Scene;
+use crate::scene::error::Error;
+use crate::search::runner::{Outcome, ready};
 
 impl Detector {
     /// All pairs that the query asks for, in the current state of the scene.
     ///
     /// # Errors
     /// A stale id, refused positions, more pairs than allowed, no memory for the answer, a memory budget too small for
-    /// one slab and the answer, a GPU failure.
+    /// one batch and the answer, a GPU failure.
     pub fn detect(&mut self, scene: &Scene, query: &Query) -> Result<&Pairs, Error> {
         self.detect_with(scene, query, &Control::new())
     }
@@ -108,7 +108,7 @@ impl Detector {
         plan: &Plan,
         control: &Control<'_>,
     ) -> Result<Option<bool>, Error> {
-        if plan.layers.len() <= 2 || !self.may_know_soon(query) {
+        if plan.parts.len() <= 2 || !self.may_know_soon(query) {
             return Ok(None);
         }
         control.step(0, 1)?;

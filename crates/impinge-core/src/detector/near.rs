@@ -5,20 +5,21 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::in_step::{InStep, Keys, Seen};
 use super::{Detector, Last};
-use crate::clock::Instant;
-use crate::elements::Part;
-use crate::error::Error;
-use crate::found::KeysByKind;
-use crate::index::ElementIx;
-use crate::narrow::{Corners, exact_kind};
-use crate::near::{ClosestPoints, Labels, NearPairs, NearQuery, Unnamed};
-use crate::pair_kind::PairKind;
-use crate::pairs::Primitive;
+use crate::answers::near::{ClosestPoints, Labels, NearPairs, Unnamed};
+use crate::answers::pairs::Primitive;
 use crate::plan::{Plan, TestId};
-use crate::progress::Control;
-use crate::run::{Job, Outcome, ready};
+use crate::query::near::NearQuery;
+use crate::query::pair_kind::PairKind;
+use crate::query::progress::Control;
 use crate::scene::Scene;
-use crate::stats::Statistics;
+use crate::scene::elements::Part;
+use crate::scene::error::Error;
+use crate::scene::index::ElementIx;
+use crate::search::found::KeysByKind;
+use crate::search::narrow::{Corners, exact_kind};
+use crate::search::runner::{Job, Outcome, ready};
+use crate::search::stats::Statistics;
+use crate::workers::clock::Instant;
 use impinge_exact::internal::{NearestOfElements, closest_of_elements, nearest_of_elements};
 
 /// Pairs whose features a task finds.
@@ -50,7 +51,7 @@ impl Detector {
     ///
     /// # Errors
     /// A stale id, refused positions, a distance or thickness that is negative or not finite, a memory budget too small for
-    /// even one slab.
+    /// even one batch.
     pub fn within_distance(
         &mut self,
         scene: &Scene,
@@ -69,7 +70,7 @@ impl Detector {
         query: &NearQuery,
         control: &Control<'_>,
     ) -> Result<&NearPairs, Error> {
-        let plan = query.plan(scene, self.settings.limits())?;
+        let plan = Plan::of_near(query, scene, self.settings.limits())?;
         self.last = Last::Near;
         let mut finder = InStep {
             clusters: &mut self.steps.clusters,
@@ -109,19 +110,19 @@ impl Outcome<u64, { PairKind::ALL.len() }> for WithFeatures<'_> {
         self.near.stats_mut()
     }
 
-    fn take_rooms(&mut self) -> KeysByKind {
-        self.near.take_room()
+    fn take_buffers(&mut self) -> KeysByKind {
+        self.near.take_buffers()
     }
 
     fn fill(&mut self, job: Job<'_>, keys: KeysByKind) -> Result<(), Error> {
         let features = Instant::now();
         let Job {
             scene,
-            frame,
+            plan,
             workers,
             control,
         } = job;
-        let labels = Labels::new(frame.n_primitives());
+        let labels = Labels::new(plan.n_primitives());
         let query = self.query;
         let (unnamed, numbering) = self.near.fill(keys, query, workers.task(TASK))?;
         let tasks: Vec<Mutex<Unnamed<'_>>> = unnamed.into_iter().map(Mutex::new).collect();

@@ -3,15 +3,15 @@
 use std::collections::BTreeMap;
 
 use super::Detector;
-use crate::error::Error;
 use crate::gpu::ResidentStep;
-use crate::ids::BodyId;
 use crate::plan::Plan;
-use crate::progress::Control;
+use crate::query::goal::Goal;
+use crate::query::progress::Control;
+use crate::query::step::Step;
 use crate::scene::Scene;
-use crate::sink::Goal;
-use crate::stats::Statistics;
-use crate::step::Step;
+use crate::scene::error::Error;
+use crate::scene::ids::BodyId;
+use crate::search::stats::Statistics;
 
 impl Detector {
     /// Encodes a whole step into the caller's encoder: positions at the start and at the end come from buffers on the device,

@@ -3,25 +3,25 @@
 
 use super::in_step::{InStep, Keys, Seen};
 use super::{Detector, Last};
-use crate::candidates::Candidates;
-use crate::clock::Instant;
+use crate::answers::candidates::Candidates;
+use crate::answers::impacts::{Impact, Impacts};
+use crate::answers::near::NearPairs;
+use crate::answers::pairs::Primitive;
 use crate::clusterings::Clusterings;
 use crate::cpu::steps::StepClusters;
-use crate::error::Error;
-use crate::found::{Found, FoundByKind};
-use crate::impacts::{Impact, Impacts};
-use crate::near::NearPairs;
-use crate::pair_kind::PairKind;
-use crate::pairs::Primitive;
 use crate::plan::Plan;
-use crate::progress::Control;
 use crate::query::SharedVertex;
-use crate::run::{Job, Outcome, ready};
+use crate::query::goal::{Goal, Limits};
+use crate::query::pair_kind::PairKind;
+use crate::query::progress::Control;
+use crate::query::settings::Settings;
+use crate::query::step::{Start, Step, Toi};
 use crate::scene::Scene;
-use crate::settings::Settings;
-use crate::sink::{Goal, Limits};
-use crate::stats::Statistics;
-use crate::step::{Start, Step, Toi};
+use crate::scene::error::Error;
+use crate::search::found::{Found, FoundByKind};
+use crate::search::runner::{Job, Outcome, ready};
+use crate::search::stats::Statistics;
+use crate::workers::clock::Instant;
 use impinge_exact::Contact;
 
 /// The memory kept from step to step.
@@ -92,14 +92,14 @@ impl Outcome<Found<Contact>, { PairKind::ALL.len() }> for Contacts {
         self.impacts.stats_mut()
     }
 
-    fn take_rooms(&mut self) -> FoundByKind {
+    fn take_buffers(&mut self) -> FoundByKind {
         std::mem::take(&mut self.found)
     }
 
     fn fill(&mut self, job: Job<'_>, found: FoundByKind) -> Result<(), Error> {
         self.found = found;
         match self.names {
-            true => self.impacts.fill(job.frame.toi, &self.found),
+            true => self.impacts.fill(job.plan.toi, &self.found),
             false => Ok(()),
         }
     }
@@ -146,7 +146,7 @@ impl Detector {
     ///
     /// # Errors
     /// A stale id, refused positions, more pairs than allowed, no memory for the answer, a memory budget too small for
-    /// one slab and the answer.
+    /// one batch and the answer.
     pub fn impacts(&mut self, scene: &Scene, step: &Step) -> Result<&Impacts, Error> {
         self.impacts_with(scene, step, &Control::new())
     }

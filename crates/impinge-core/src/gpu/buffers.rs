@@ -14,7 +14,7 @@ use bytemuck::Pod;
 
 use super::device::Device;
 use super::layout::Params;
-use crate::error::Error;
+use crate::scene::error::Error;
 
 /// A device buffer of `T`, at least one element long.
 #[derive(Debug)]

@@ -3,26 +3,26 @@
 //! ```text
 //! bounds     as in Clusters, for the boxes of bodies · reach · primitives within reach
 //! grid       resolution, eq. (1) · ranges, eq. (3) · shift · count
-//! dispatch   room for lists and work items, eq. (4) · scatter
+//! traversal   room for lists and work items, eq. (4) · scatter
 //! pairing    prepare · level 2
 //! narrow     prepare · narrow
 //! ```
 //!
 //! A cell too crowded for one pass takes several: one fills its list, then each of the others pairs
-//! one tile of the product of its groups, dispatch · pairing · narrow.
+//! one tile of the product of its groups, traversal · pairing · narrow.
 
 use std::fmt;
 
 use super::buffers::Uniform;
 use super::collect::Collected;
 use super::kernels::{
-    BoundsKeep, BoundsReach, DispatchCells, DispatchScatter, DispatchTile, GridCount, GridRanges,
-    GridResolution, GridShift, PairingCells,
+    BoundsKeep, BoundsReach, GridCount, GridRanges, GridResolution, GridShift, PairingCells,
+    TraversalCells, TraversalScatter, TraversalTile,
 };
 use super::layout::{NO_ROOT, Params};
+use super::pass_buffers::Capacities;
 use super::recording::{Recorder, Workgroups};
-use super::room::Capacities;
-use crate::error::Error;
+use crate::scene::error::Error;
 
 /// Slot of the arguments for launches over kept primitives, 64 per workgroup.
 const KEPT: u32 = 0;
@@ -169,7 +169,7 @@ impl Tile {
             n_groups,
             row: 0,
             column: 0,
-            // Places have 31 bits, so this power of two fits.
+            // Slots have 31 bits, so this power of two fits.
             side: n_groups.next_power_of_two(),
         }
     }
@@ -199,7 +199,7 @@ impl Tile {
 
 /// The method's parameters for a pass.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Told {
+pub(super) struct CellPass {
     pub lambda: f64,
     pub group_size: u32,
     pub resolve: bool,
@@ -248,25 +248,25 @@ impl Guest {
 
 impl Recorder<'_> {
     /// All stages.
-    pub(super) fn cells(&mut self, told: Told) {
-        let (gpu, world, view, room) = (self.gpu, self.world, self.view, self.room);
+    pub(super) fn cells(&mut self, of_pass: CellPass) {
+        let (gpu, world, view, pass_buffers) = (self.gpu, self.world, self.view, self.pass_buffers);
         let kernels = &gpu.kernels;
-        let counters = || room.counters.write_to();
-        let cells = told.work.cells();
+        let counters = || pass_buffers.counters.write_to();
+        let cells = of_pass.work.cells();
         let params = Params {
             first: cells.first,
             count: cells.count,
-            group_size: told.group_size,
+            group_size: of_pass.group_size,
             ..Params::default()
         };
-        if let CellWork::Tile(_, tile) = told.work {
+        if let CellWork::Tile(_, tile) = of_pass.work {
             // Boxes, grid and the list exist already: their stages are empty.
-            for stage in ["bounds", "grid", "dispatch"] {
+            for stage in ["bounds", "grid", "traversal"] {
                 self.recording.stage(stage);
             }
-            let bindings = DispatchTile {
-                grid: room.grid.read(),
-                items: room.cell_items.write_to(),
+            let bindings = TraversalTile {
+                grid: pass_buffers.grid.read(),
+                items: pass_buffers.cell_items.write_to(),
                 counters: counters(),
                 params: Uniform(Params {
                     n_entries: tile.n_entries,
@@ -279,46 +279,46 @@ impl Recorder<'_> {
             let groups = (u64::from(tile.side) * u64::from(tile.side)).div_ceil(64);
             let groups = Workgroups::Known(groups);
             self.recording
-                .launch(&kernels.dispatch_tile, &bindings, groups);
+                .launch(&kernels.traversal_tile, &bindings, groups);
         } else {
-            self.recording.clear(room.cells.all());
+            self.recording.clear(pass_buffers.cells.all());
             self.bounds_within_reach();
-            self.grid(told.lambda);
+            self.grid(of_pass.lambda);
             let count = GridCount {
-                grid: room.grid.read(),
-                kept: room.kept.write_to(),
+                grid: pass_buffers.grid.read(),
+                kept: pass_buffers.kept.write_to(),
                 counters: counters(),
-                cells: room.cells.write_to(),
+                cells: pass_buffers.cells.write_to(),
             };
             let kept = self.over_kept();
             self.recording.launch(&kernels.grid_count, &count, kept);
-            self.recording.stage("dispatch");
-            let dispatch = DispatchCells {
-                grid: room.grid.read(),
+            self.recording.stage("traversal");
+            let traversal = TraversalCells {
+                grid: pass_buffers.grid.read(),
                 bodies: view.bodies.read(),
-                cells: room.cells.write_to(),
-                starts: room.starts.write_to(),
-                items: room.cell_items.write_to(),
+                cells: pass_buffers.cells.write_to(),
+                starts: pass_buffers.starts.write_to(),
+                items: pass_buffers.cell_items.write_to(),
                 counters: counters(),
                 params: Uniform(Params {
-                    lists_only: u32::from(matches!(told.work, CellWork::List(_))),
+                    lists_only: u32::from(matches!(of_pass.work, CellWork::List(_))),
                     ..params
                 }),
             };
             let groups = self.indirect(CELLS);
             self.recording
-                .launch(&kernels.dispatch_cells, &dispatch, groups);
-            let scatter = DispatchScatter {
-                grid: room.grid.read(),
-                kept: room.kept.read(),
-                starts: room.starts.read(),
-                cells: room.cells.write_to(),
-                entries: room.entries.write_to(),
+                .launch(&kernels.traversal_cells, &traversal, groups);
+            let scatter = TraversalScatter {
+                grid: pass_buffers.grid.read(),
+                kept: pass_buffers.kept.read(),
+                starts: pass_buffers.starts.read(),
+                cells: pass_buffers.cells.write_to(),
+                entries: pass_buffers.entries.write_to(),
                 counters: counters(),
             };
             let kept = self.over_kept();
             self.recording
-                .launch(&kernels.dispatch_scatter, &scatter, kept);
+                .launch(&kernels.traversal_scatter, &scatter, kept);
         }
         self.recording.stage("pairing");
         let groups = self.counted_items();
@@ -326,14 +326,14 @@ impl Recorder<'_> {
             bodies: view.bodies.read(),
             ignored: view.ignored.read(),
             corners: world.corners.read(),
-            kept: room.kept.read(),
-            entries: room.entries.read(),
-            items: room.cell_items.read(),
-            candidates: room.candidates.write_to(),
+            kept: pass_buffers.kept.read(),
+            entries: pass_buffers.entries.read(),
+            items: pass_buffers.cell_items.read(),
+            candidates: pass_buffers.candidates.write_to(),
             counters: counters(),
             params: Uniform(Params {
                 n_ignored: view.n_ignored(),
-                resolve: u32::from(told.resolve),
+                resolve: u32::from(of_pass.resolve),
                 ..Params::default()
             }),
         };
@@ -350,15 +350,15 @@ impl Recorder<'_> {
 
     /// Stage `bounds` of methods that work in a grid: the boxes of bodies, their reach, and the primitives within reach.
     pub fn bounds_within_reach(&mut self) {
-        let (gpu, world, view, room) = (self.gpu, self.world, self.view, self.room);
-        self.recording.clear(room.tallies.all());
+        let (gpu, world, view, pass_buffers) = (self.gpu, self.world, self.view, self.pass_buffers);
+        self.recording.clear(pass_buffers.tallies.all());
         self.bounds();
         let reach = BoundsReach {
             nodes: world.nodes.read(),
             bodies: view.bodies.read(),
             ignored: view.ignored.read(),
-            reaches: room.reaches.write_to(),
-            tallies: room.tallies.write_to(),
+            reaches: pass_buffers.reaches.write_to(),
+            tallies: pass_buffers.tallies.write_to(),
             // Counts fit 32 bits.
             params: Uniform(Params {
                 first: view.top().unwrap_or(NO_ROOT),
@@ -376,9 +376,9 @@ impl Recorder<'_> {
             bodies: view.bodies.read(),
             corners: world.corners.read(),
             positions: world.positions.read(),
-            reaches: room.reaches.read(),
-            kept: room.kept.write_to(),
-            counters: room.counters.write_to(),
+            reaches: pass_buffers.reaches.read(),
+            kept: pass_buffers.kept.write_to(),
+            counters: pass_buffers.counters.write_to(),
         };
         let groups = Workgroups::Known(world.clusters.len());
         self.recording
@@ -388,19 +388,19 @@ impl Recorder<'_> {
     /// Stage `grid`, up to the ranges of kept primitives and their shift, with cells as dense as `lambda`.
     pub fn grid(&mut self, lambda: f64) {
         self.recording.stage("grid");
-        let (gpu, room) = (self.gpu, self.room);
+        let (gpu, pass_buffers) = (self.gpu, self.pass_buffers);
         let over_kept = Params {
             // Capacities and counts fit 32 bits.
-            capacity: room.capacities().kept as u32,
+            capacity: pass_buffers.capacities().kept as u32,
             lambda: (lambda as f32).clamp(f32::MIN_POSITIVE, f32::MAX).to_bits(),
-            most_cells: room.cells.len() as u32,
+            most_cells: pass_buffers.cells.len() as u32,
             ..Params::default()
         };
         let resolution = GridResolution {
-            counters: room.counters.write_to(),
-            tallies: room.tallies.write_to(),
-            grid: room.grid.write_to(),
-            arguments: room.arguments.write_to(),
+            counters: pass_buffers.counters.write_to(),
+            tallies: pass_buffers.tallies.write_to(),
+            grid: pass_buffers.grid.write_to(),
+            arguments: pass_buffers.arguments.write_to(),
             params: Uniform(Params {
                 slot: KEPT,
                 ..over_kept
@@ -410,19 +410,19 @@ impl Recorder<'_> {
         self.recording
             .launch(&gpu.kernels.grid_resolution, &resolution, one);
         let ranges = GridRanges {
-            grid: room.grid.read(),
-            kept: room.kept.write_to(),
-            counters: room.counters.write_to(),
-            tallies: room.tallies.write_to(),
+            grid: pass_buffers.grid.read(),
+            kept: pass_buffers.kept.write_to(),
+            counters: pass_buffers.counters.write_to(),
+            tallies: pass_buffers.tallies.write_to(),
         };
         let kept = self.over_kept();
         self.recording
             .launch(&gpu.kernels.grid_ranges, &ranges, kept);
         let shift = GridShift {
-            counters: room.counters.write_to(),
-            tallies: room.tallies.write_to(),
-            grid: room.grid.write_to(),
-            arguments: room.arguments.write_to(),
+            counters: pass_buffers.counters.write_to(),
+            tallies: pass_buffers.tallies.write_to(),
+            grid: pass_buffers.grid.write_to(),
+            arguments: pass_buffers.arguments.write_to(),
             params: Uniform(Params {
                 slot: CELLS,
                 ..over_kept

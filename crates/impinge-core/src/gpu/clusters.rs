@@ -2,22 +2,22 @@
 //!
 //! ```text
 //! bounds     clusters · wide levels, one launch each · all narrow levels in one
-//! dispatch   round 0 · (prepare · round r) for r = 1 …
+//! traversal   round 0 · (prepare · round r) for r = 1 …
 //! pairing    prepare · pairing
 //! narrow     prepare · narrow;    in a step: · prepare · search
 //! ```
 
 use super::buffers::Uniform;
 use super::kernels::{
-    BoundsClusters, BoundsLevel, BoundsTop, Dispatch, Narrow, NarrowMoving, NarrowSearch, Pairing,
-    Prepare,
+    BoundsClusters, BoundsLevel, BoundsTop, Narrow, NarrowMoving, NarrowSearch, Pairing, Prepare,
+    Traversal,
 };
 use super::layout::{
     N_CANDIDATES, N_ITEMS, N_PAIRS, Params, ROUNDS, SEEK_ALL, SEEK_ANY, SEEK_EARLIEST,
 };
 use super::recording::{Recorder, Workgroups};
 use super::world::Motion;
-use crate::sink::Goal;
+use crate::query::goal::Goal;
 
 /// Levels of up to this many nodes are refitted by one workgroup, in one launch with the levels above them.
 const NARROW_LEVEL: u32 = 2048;
@@ -30,7 +30,7 @@ const SEARCH: u32 = ROUNDS + 2;
 
 /// What a pass is told.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Told {
+pub(super) struct ClusterPass {
     pub n_seeds: u64,
     /// The rounds of the traversal.
     pub n_rounds: u32,
@@ -54,19 +54,19 @@ pub struct Counted {
 
 impl Recorder<'_> {
     /// All stages.
-    pub(super) fn clusters(&mut self, told: Told) {
+    pub(super) fn clusters(&mut self, of_pass: ClusterPass) {
         self.bounds();
-        self.dispatch(told);
+        self.traversal(of_pass);
         self.recording.stage("pairing");
-        self.pairing(told.resolve);
+        self.pairing(of_pass.resolve);
         self.recording.stage("narrow");
         match self.motion {
-            Motion::Moving => self.narrow_step(told.sought),
+            Motion::Moving => self.narrow_step(of_pass.sought),
             Motion::Still => self.narrow(),
         }
     }
 
-    /// Stage `bounds`: the boxes of clusters and of the forest above them, if anything has moved.
+    /// Stage `bounds`: the boxes of clusters and of the trees above them, if anything has moved.
     pub fn bounds(&mut self) {
         self.recording.stage("bounds");
         let (gpu, world, view) = (self.gpu, self.world, self.view);
@@ -132,34 +132,34 @@ impl Recorder<'_> {
         }
     }
 
-    /// Stage `dispatch`: tree against tree, a round per level.
-    fn dispatch(&mut self, told: Told) {
-        self.recording.stage("dispatch");
-        let (gpu, world, view, room) = (self.gpu, self.world, self.view, self.room);
+    /// Stage `traversal`: tree against tree, a round per level.
+    fn traversal(&mut self, of_pass: ClusterPass) {
+        self.recording.stage("traversal");
+        let (gpu, world, view, pass_buffers) = (self.gpu, self.world, self.view, self.pass_buffers);
         let kernel = match self.motion {
-            Motion::Moving => &gpu.kernels.dispatch_moving,
-            Motion::Still => &gpu.kernels.dispatch,
+            Motion::Moving => &gpu.kernels.traversal_moving,
+            Motion::Still => &gpu.kernels.traversal,
         };
-        for round in 0..told.n_rounds {
+        for round in 0..of_pass.n_rounds {
             let groups = match round {
-                0 => Workgroups::Known(told.n_seeds),
+                0 => Workgroups::Known(of_pass.n_seeds),
                 _ => self.counted(Counted {
                     counter: round,
                     per_group: 1,
-                    capacity: room.capacities().queue,
+                    capacity: pass_buffers.capacities().queue,
                     slot: round,
                 }),
             };
             // From queue a to b, and from b to a.
             let from = (round % 2) as usize;
-            let bindings = Dispatch {
+            let bindings = Traversal {
                 nodes: world.nodes.read(),
                 bodies: view.bodies.read(),
                 ignored: view.ignored.read(),
-                queue: room.queues[from].read(),
-                next_queue: room.queues[1 - from].write_to(),
-                items: room.items.write_to(),
-                counters: room.counters.write_to(),
+                queue: pass_buffers.queues[from].read(),
+                next_queue: pass_buffers.queues[1 - from].write_to(),
+                items: pass_buffers.items.write_to(),
+                counters: pass_buffers.counters.write_to(),
                 params: Uniform(Params {
                     first: round,
                     n_ignored: view.n_ignored(),
@@ -172,7 +172,7 @@ impl Recorder<'_> {
 
     /// Work items to candidates.
     fn pairing(&mut self, resolve: bool) {
-        let (gpu, world, view, room) = (self.gpu, self.world, self.view, self.room);
+        let (gpu, world, view, pass_buffers) = (self.gpu, self.world, self.view, self.pass_buffers);
         let groups = self.counted_items();
         let kernel = match self.motion {
             Motion::Moving => &gpu.kernels.pairing_moving,
@@ -184,9 +184,9 @@ impl Recorder<'_> {
             bodies: view.bodies.read(),
             corners: world.corners.read(),
             positions: world.positions.read(),
-            items: room.items.read(),
-            candidates: room.candidates.write_to(),
-            counters: room.counters.write_to(),
+            items: pass_buffers.items.read(),
+            candidates: pass_buffers.candidates.write_to(),
+            counters: pass_buffers.counters.write_to(),
             params: Uniform(Params {
                 resolve: u32::from(resolve),
                 ..Params::default()
@@ -198,8 +198,8 @@ impl Recorder<'_> {
     /// Launches `prepare`, which writes the number of workgroups of a later launch. Returns it.
     pub fn counted(&mut self, counted: Counted) -> Workgroups {
         let bindings = Prepare {
-            counters: self.room.counters.write_to(),
-            arguments: self.room.arguments.write_to(),
+            counters: self.pass_buffers.counters.write_to(),
+            arguments: self.pass_buffers.arguments.write_to(),
             params: Uniform(Params {
                 counter: counted.counter,
                 per_group: counted.per_group,
@@ -220,7 +220,7 @@ impl Recorder<'_> {
         self.counted(Counted {
             counter: N_ITEMS,
             per_group: 1,
-            capacity: self.room.capacities().items,
+            capacity: self.pass_buffers.capacities().items,
             slot: PAIRING,
         })
     }
@@ -229,14 +229,14 @@ impl Recorder<'_> {
         self.counted(Counted {
             counter: N_CANDIDATES,
             per_group: GROUP,
-            capacity: self.room.capacities().candidates,
+            capacity: self.pass_buffers.capacities().candidates,
             slot: NARROW,
         })
     }
 
     /// Stage `narrow`: the filter over all candidates.
     pub fn narrow(&mut self) {
-        let (gpu, world, view, room) = (self.gpu, self.world, self.view, self.room);
+        let (gpu, world, view, pass_buffers) = (self.gpu, self.world, self.view, self.pass_buffers);
         let groups = self.counted_candidates();
         // Scenes without tetrahedra use a kernel without the code for solids, and the registers it needs.
         let kernel = match world.has_solids {
@@ -244,13 +244,13 @@ impl Recorder<'_> {
             false => &gpu.kernels.narrow,
         };
         let bindings = Narrow {
-            candidates: room.candidates.read(),
+            candidates: pass_buffers.candidates.read(),
             corners: world.corners.read(),
             positions: world.positions.read(),
             order: world.order.read(),
-            pairs: room.pairs.write_to(),
-            unsure: room.unsure.write_to(),
-            counters: room.counters.write_to(),
+            pairs: pass_buffers.pairs.write_to(),
+            unsure: pass_buffers.unsure.write_to(),
+            counters: pass_buffers.counters.write_to(),
             bodies: view.bodies.read(),
         };
         self.recording.launch(kernel, &bindings, groups);
@@ -259,31 +259,31 @@ impl Recorder<'_> {
     /// Stage `narrow` of a step: the filter over all candidates, and a search of the pairs that it leaves. `sought`: which contacts the
     /// host seeks; none if the results stay on the device, where pairs are named by global numbers.
     fn narrow_step(&mut self, sought: Option<Goal>) {
-        let (gpu, world, view, room) = (self.gpu, self.world, self.view, self.room);
+        let (gpu, world, view, pass_buffers) = (self.gpu, self.world, self.view, self.pass_buffers);
         let groups = self.counted_candidates();
         let bindings = NarrowMoving {
-            candidates: room.candidates.read(),
+            candidates: pass_buffers.candidates.read(),
             corners: world.corners.read(),
             positions: world.positions.read(),
-            pairs: room.pairs.write_to(),
-            counters: room.counters.write_to(),
+            pairs: pass_buffers.pairs.write_to(),
+            counters: pass_buffers.counters.write_to(),
         };
         self.recording
             .launch(&gpu.kernels.narrow_moving, &bindings, groups);
         let groups = self.counted(Counted {
             counter: N_PAIRS,
             per_group: GROUP,
-            capacity: room.capacities().pairs,
+            capacity: pass_buffers.capacities().pairs,
             slot: SEARCH,
         });
         let bindings = NarrowSearch {
-            pairs: room.pairs.read(),
+            pairs: pass_buffers.pairs.read(),
             corners: world.corners.read(),
             positions: world.positions.read(),
             order: world.order.read(),
-            unsure: room.unsure.write_to(),
-            times: room.times.write_to(),
-            counters: room.counters.write_to(),
+            unsure: pass_buffers.unsure.write_to(),
+            times: pass_buffers.times.write_to(),
+            counters: pass_buffers.counters.write_to(),
             params: Uniform(Params {
                 by_number: u32::from(sought.is_none()),
                 sought: match sought {

@@ -10,11 +10,11 @@
 use super::buffers::map;
 use super::layout::{Counter, Grid, N_COUNTERS, NEVER, PairKey, PairTimes, UnsureKey, time_by};
 use super::open::Gpu;
+use super::pass_buffers::{PassBuffers, PassCounts};
 use super::recording::Recording;
-use super::room::{PassCounts, Room};
-use crate::error::Error;
-use crate::sink::Goal;
-use crate::undecided::LeftPair;
+use crate::query::goal::Goal;
+use crate::scene::error::Error;
+use crate::search::undecided::UndecidedPair;
 
 const COUNTERS: u64 = N_COUNTERS as u64 * size_of::<Counter>() as u64;
 const GRID: u64 = size_of::<Grid>() as u64;
@@ -71,7 +71,7 @@ pub struct Collected {
     pub pairs: Vec<PairKey>,
     pub unsure: Vec<UnsureKey>,
     /// In a step: the unsure pairs with their times, none if the step is answered without them.
-    pub left: Vec<LeftPair>,
+    pub undecided: Vec<UndecidedPair>,
 }
 
 impl Collector {
@@ -112,8 +112,13 @@ impl Collector {
     }
 
     /// Records what is read back: counters, the grid, and about as many keys as last time. `sought`: which contacts of a step are.
-    pub fn record(&self, room: &Room, sought: Option<Goal>, recording: &mut Recording) -> Guess {
-        let capacities = room.capacities();
+    pub fn record(
+        &self,
+        pass_buffers: &PassBuffers,
+        sought: Option<Goal>,
+        recording: &mut Recording,
+    ) -> Guess {
+        let capacities = pass_buffers.capacities();
         let guess = |last: u64, capacity: u64| (last + last / 4).max(LEAST).min(capacity);
         let unsure = guess(self.n_unsure, capacities.unsure);
         let guess = Guess {
@@ -129,11 +134,11 @@ impl Collector {
             },
             sought,
         };
-        recording.read(room.counters.all());
-        recording.read(room.grid.all());
-        recording.read(room.pairs.first(guess.pairs));
-        recording.read(room.unsure.first(guess.unsure));
-        recording.read(room.times.first(guess.times));
+        recording.read(pass_buffers.counters.all());
+        recording.read(pass_buffers.grid.all());
+        recording.read(pass_buffers.pairs.first(guess.pairs));
+        recording.read(pass_buffers.unsure.first(guess.unsure));
+        recording.read(pass_buffers.times.first(guess.times));
         guess
     }
 
@@ -157,7 +162,7 @@ impl Collector {
     pub async fn take(
         &mut self,
         gpu: &Gpu,
-        room: &Room,
+        pass_buffers: &PassBuffers,
         n_stages: usize,
         guess: Guess,
     ) -> Result<Collected, Error> {
@@ -173,7 +178,7 @@ impl Collector {
             let grid: Grid = bytemuck::pod_read_unaligned(at(COUNTERS, GRID));
             let ticks: Vec<u64> = bytemuck::pod_collect_to_vec(at(guess.bytes(), TIMES));
             let counts = PassCounts::new(&counters);
-            let capacities = room.capacities();
+            let capacities = pass_buffers.capacities();
             let n_pairs = match guess.sought {
                 Some(_) => 0,
                 None => counts.needed.pairs.min(capacities.pairs),
@@ -216,11 +221,11 @@ impl Collector {
                 encoder.copy_buffer_to_buffer(from, first, &staging, to, size);
             };
             let of_pairs = KEY * more_pairs;
-            copy(room.pairs.buffer(), KEY * guess.pairs, 0, of_pairs);
+            copy(pass_buffers.pairs.buffer(), KEY * guess.pairs, 0, of_pairs);
             let (first, size) = (KEY * guess.unsure, KEY * more_unsure);
-            copy(room.unsure.buffer(), first, of_pairs, size);
+            copy(pass_buffers.unsure.buffer(), first, of_pairs, size);
             let (first, size) = (TIMES_OF_PAIR * guess.times, TIMES_OF_PAIR * more_times);
-            copy(room.times.buffer(), first, keys, size);
+            copy(pass_buffers.times.buffer(), first, keys, size);
             gpu.queue.submit([encoder.finish()]);
             {
                 let view = map(&staging, bytes).await?;
@@ -237,22 +242,22 @@ impl Collector {
             let span = |stage: usize| ticks[2 * stage + 1].saturating_sub(ticks[2 * stage]);
             (0..n_stages).map(|stage| span(stage) as f64 * ms).collect()
         });
-        let mut left = Vec::new();
+        let mut undecided = Vec::new();
         if guess.sought.is_some() {
-            reserve_all(&mut left, n_unsure)?;
+            reserve_all(&mut undecided, n_unsure)?;
             let nothing = PairTimes {
                 free_until: 0,
                 touches_by: NEVER.to_bits(),
             };
             let times = until.iter().chain(std::iter::repeat(&nothing));
-            left.extend(unsure.iter().zip(times).map(|(pair, times)| LeftPair {
-                places: [pair.low, pair.high],
+            undecided.extend(unsure.iter().zip(times).map(|(pair, times)| UndecidedPair {
+                slots: [pair.low, pair.high],
                 free_until: f32::from_bits(times.free_until),
                 touches_by: time_by(times.touches_by),
             }));
         }
         Ok(Collected {
-            left,
+            undecided,
             counts,
             grid,
             stage_ms,

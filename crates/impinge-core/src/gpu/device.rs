@@ -5,7 +5,7 @@ use std::future::Future;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use super::waiting::drive;
-use crate::error::Error;
+use crate::scene::error::Error;
 
 /// A GPU on this machine, or a software driver that emulates one.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -95,11 +95,11 @@ impl Device {
 
     /// Registers a callback that records the loss of the device.
     pub(super) fn listen(&self) {
-        let told = Arc::clone(&self.lost);
+        let of_pass = Arc::clone(&self.lost);
         self.device
             .set_device_lost_callback(move |reason, message| {
-                let mut told = told.lock().unwrap_or_else(PoisonError::into_inner);
-                *told = Some(format!("device lost ({reason:?}): {message}"));
+                let mut of_pass = of_pass.lock().unwrap_or_else(PoisonError::into_inner);
+                *of_pass = Some(format!("device lost ({reason:?}): {message}"));
             });
     }
 

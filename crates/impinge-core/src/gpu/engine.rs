@@ -2,7 +2,7 @@
 //!
 //! [`passes`](super::passes) runs the passes of a frame.
 
-use crate::clock::Instant;
+use crate::workers::clock::Instant;
 use std::sync::Arc;
 
 use super::buffers::{Storage, count};
@@ -11,30 +11,30 @@ use super::collect::Collector;
 use super::device::Scopes;
 use super::layout::Cell;
 use super::open::Gpu;
+use super::pass_buffers::{Capacities, CellsWanted, PassBuffers, PassCounts};
 use super::pieces;
 use super::recording::{Launcher, Ran, Recording};
-use super::room::{Capacities, CellsWanted, PassCounts, Room};
 use super::topology::Most;
 use super::world::{Motion, ResidentEnds, World, weigh};
+use crate::bvh::clusters::Clustering;
 use crate::clusterings::Clusterings;
-use crate::error::Error;
-use crate::grouping::clusters::Clustering;
-use crate::ids::BodyId;
-use crate::index::LayerIx;
-use crate::plan::Plan as Frame;
-use crate::run::{Finder, Job};
-use crate::settings::{Backend, Method, Settings};
-use crate::sink::Answer;
-use crate::sink::Goal;
-use crate::stats::Statistics;
-use crate::undecided::Left;
+use crate::plan::Plan;
+use crate::query::goal::Goal;
+use crate::query::settings::{Backend, Method, Settings};
+use crate::scene::error::Error;
+use crate::scene::ids::BodyId;
+use crate::scene::index::PartIx;
+use crate::search::runner::{Finder, Job};
+use crate::search::sink::Answer;
+use crate::search::stats::Statistics;
+use crate::search::undecided::Undecided;
 
 /// The most cells, for any lambda.
 const MOST_CELLS: u64 = 1 << 25;
 /// The share of a memory budget that cells may have.
 const SHARE_OF_CELLS: u64 = 8;
 
-/// The largest buffer that 32 bits can number: positions by words, places with a flag.
+/// The largest buffer that 32 bits can number: positions by words, slots with a flag.
 const WIDEST: u64 = 1 << 34;
 
 /// The GPU backend of one detector.
@@ -57,8 +57,8 @@ pub struct Engine {
     pub(super) other: Lane,
     /// The counts of each complete pass of the last question.
     pub complete: Vec<PassCounts>,
-    /// Keys that each worker has settled, until they are appended to the answer.
-    pub(super) settled: Vec<Vec<u64>>,
+    /// Keys that each worker has decided, until they are appended to the answer.
+    pub(super) decided: Vec<Vec<u64>>,
     /// Which contacts of a step the host seeks, and the least time by which some pair certainly touches, as far as passes have said.
     pub(super) sought: Goal,
     pub(super) touches_by: Option<f32>,
@@ -74,7 +74,7 @@ pub struct Lane {
     pub(super) method: Method,
     /// The room to begin with.
     pub(super) first: Capacities,
-    pub(super) room: Room,
+    pub(super) pass_buffers: PassBuffers,
     pub(super) launcher: Launcher,
     pub(super) collector: Collector,
     /// Whether the last pass was encoded for the caller, who has its results on the device.
@@ -91,7 +91,7 @@ impl Lane {
             motion,
             method,
             first,
-            room: Room::new(),
+            pass_buffers: PassBuffers::new(),
             launcher: Launcher::default(),
             collector: Collector::default(),
             is_encoded: false,
@@ -108,14 +108,14 @@ impl Lane {
 }
 
 /// Takes what the device says about a part of a step. Returns whether more is wanted.
-pub(crate) type TakeLeft<'a> = dyn FnMut(Left<'_>) -> Result<bool, Error> + 'a;
+pub(crate) type TakeUndecided<'a> = dyn FnMut(Undecided<'_>) -> Result<bool, Error> + 'a;
 
 /// Takes the results of complete passes.
-pub(super) enum Taker<'a, 'b> {
+pub(super) enum PassSink<'a, 'b> {
     /// Pairs that intersect.
     Answer(&'a Answer),
     /// Pairs of a step that may touch.
-    Left(&'a mut TakeLeft<'b>),
+    Undecided(&'a mut TakeUndecided<'b>),
 }
 
 /// How a list of work ended.
@@ -163,7 +163,7 @@ impl Engine {
             world: World::new(),
             guest,
             complete: Vec::new(),
-            settled: Vec::new(),
+            decided: Vec::new(),
             sought: Goal::All,
             touches_by: None,
             is_traced: false,
@@ -202,12 +202,12 @@ impl Engine {
         answer: &Answer,
         stats: &mut Statistics,
     ) -> Result<(), Error> {
-        let Job { frame, .. } = job;
+        let Job { plan, .. } = job;
         self.gpu.check_lost()?;
         self.turn_to(Motion::Still);
         // The engine's own bytes are on the device.
         answer.share(0);
-        if self.too_much.is_some_and(|n| frame.n_primitives() < n) {
+        if self.too_much.is_some_and(|n| plan.n_primitives() < n) {
             self.too_much = None;
             self.take(self.settings.method);
         }
@@ -215,7 +215,7 @@ impl Engine {
         let clusterings = self.cluster(job, &[], stats)?;
         let clusterings = &clusterings[..];
         if !self.is_held(job, clusterings) && self.falls_back() {
-            self.take_clusters(frame);
+            self.take_clusters(plan);
         }
         if !self.is_held(job, clusterings) && self.guest.is_none() {
             stats.add_ms("upload", start.elapsed().as_secs_f64() * 1e3);
@@ -225,23 +225,23 @@ impl Engine {
         self.send(job, clusterings, stats).await?;
         stats.add_ms("upload", start.elapsed().as_secs_f64() * 1e3);
         let before = self.falls_back().then(|| stats.clone());
-        let work = Vec::from_iter(self.whole(frame));
-        let outcome = self.work_off(job, Taker::Answer(answer), work, stats);
+        let work = Vec::from_iter(self.whole(plan));
+        let outcome = self.work_off(job, PassSink::Answer(answer), work, stats);
         if let Outcome::Crowded(error) = outcome.await? {
             let Some(before) = before else {
                 return Err(error);
             };
             // Drop the keys found so far: `Clusters` finds them again.
             answer.forget();
-            let n_reruns = stats.n_slabs + stats.n_reruns;
+            let n_reruns = stats.n_batches + stats.n_reruns;
             *stats = before;
             stats.n_reruns = n_reruns;
-            self.take_clusters(frame);
+            self.take_clusters(plan);
             if !self.is_held(job, clusterings) {
                 return self.in_pieces(job, clusterings, answer, stats).await;
             }
-            let work = Vec::from_iter(self.whole(frame));
-            let outcome = self.work_off(job, Taker::Answer(answer), work, stats);
+            let work = Vec::from_iter(self.whole(plan));
+            let outcome = self.work_off(job, PassSink::Answer(answer), work, stats);
             if let Outcome::Crowded(error) = outcome.await? {
                 return Err(error);
             }
@@ -259,7 +259,7 @@ impl Engine {
         &mut self,
         job: Job<'_>,
         clusterings: &[Arc<Clustering>],
-        (sought, take): (Goal, &mut TakeLeft<'_>),
+        (sought, take): (Goal, &mut TakeUndecided<'_>),
         stats: &mut Statistics,
     ) -> Result<bool, Error> {
         let result = self
@@ -275,7 +275,7 @@ impl Engine {
         &mut self,
         job: Job<'_>,
         clusterings: &[Arc<Clustering>],
-        (sought, take): (Goal, &mut TakeLeft<'_>),
+        (sought, take): (Goal, &mut TakeUndecided<'_>),
         stats: &mut Statistics,
     ) -> Result<bool, Error> {
         self.gpu.check_lost()?;
@@ -287,8 +287,8 @@ impl Engine {
         }
         self.send(job, clusterings, stats).await?;
         stats.add_ms("upload", start.elapsed().as_secs_f64() * 1e3);
-        let work = Vec::from_iter(self.whole(job.frame));
-        let outcome = self.work_off(job, Taker::Left(take), work, stats);
+        let work = Vec::from_iter(self.whole(job.plan));
+        let outcome = self.work_off(job, PassSink::Undecided(take), work, stats);
         match outcome.await? {
             Outcome::Complete => {
                 stats.bytes_held += self.bytes();
@@ -298,7 +298,7 @@ impl Engine {
         }
     }
 
-    /// The clusters of all bodies of a frame. The host does not know the pose of `resident` bodies, so it does not judge their clusters.
+    /// The clusters of all bodies of a frame. The host does not know the sweep of `resident` bodies, so it does not judge their clusters.
     pub(super) fn cluster(
         &mut self,
         job: Job<'_>,
@@ -325,11 +325,11 @@ impl Engine {
         let closed = scopes.close();
         updated?;
         closed.await?;
-        if self.first_room(self.cells_wanted(job.frame)).is_err() {
+        if self.first_capacities(self.cells_wanted(job.plan)).is_err() {
             // What is held for the other kind of question, or the buffers' spare room, exceeds the budget.
             self.world.forget();
             if !self.other.is_encoded {
-                self.other.room = Room::new();
+                self.other.pass_buffers = PassBuffers::new();
             }
             self.update(job, clusterings, &none, stats)?;
         }
@@ -364,7 +364,7 @@ impl Engine {
         answer: &Answer,
         stats: &mut Statistics,
     ) -> Result<(), Error> {
-        let Job { scene, frame, .. } = job;
+        let Job { scene, plan, .. } = job;
         if !self.has_pieces {
             // The buffers are sized for a whole frame.
             self.world.forget();
@@ -378,7 +378,7 @@ impl Engine {
         };
         let n_clusters = clusterings.iter().map(|held| held.n_clusters());
         stats.n_clusters = n_clusters.map(count).sum();
-        let clustering = |layer: LayerIx| &*clusterings[layer.index()];
+        let clustering = |part: PartIx| &*clusterings[part.index()];
         let chunks = pieces::cut(job, most, clustering)?;
         for (ix, a) in chunks.iter().enumerate() {
             for b in &chunks[ix..] {
@@ -388,7 +388,7 @@ impl Engine {
                 } else {
                     &both
                 };
-                let pairs = pieces::meeting(frame, piece);
+                let pairs = pieces::meeting(plan, piece);
                 if pairs.is_empty() {
                     continue;
                 }
@@ -396,14 +396,14 @@ impl Engine {
                 let scopes = Scopes::open(&self.gpu.device);
                 let sent = self
                     .world
-                    .send_piece(&self.gpu, scene, frame, piece, clustering);
+                    .send_piece(&self.gpu, scene, plan, piece, clustering);
                 let closed = scopes.close();
                 sent?;
                 closed.await?;
                 stats.add_ms("upload", start.elapsed().as_secs_f64() * 1e3);
                 stats.n_pieces += 1;
-                let work = self.seeds_in_batches(frame, &pairs);
-                let outcome = self.work_off(job, Taker::Answer(answer), work, stats);
+                let work = self.seeds_in_batches(plan, &pairs);
+                let outcome = self.work_off(job, PassSink::Answer(answer), work, stats);
                 if let Outcome::Crowded(error) = outcome.await? {
                     return Err(error);
                 }
@@ -422,7 +422,7 @@ impl Engine {
 
     /// Bytes held on the device.
     pub fn bytes(&self) -> u64 {
-        self.bytes_of_world() + self.lane.room.bytes() + self.other.room.bytes()
+        self.bytes_of_world() + self.lane.pass_buffers.bytes() + self.other.pass_buffers.bytes()
     }
 
     /// Bytes of topology and positions on the device.
@@ -442,7 +442,7 @@ impl Engine {
 
     /// Whether topology and positions of a whole frame, or step, fit the device and the budget.
     pub(super) fn is_held(&self, job: Job<'_>, clusterings: &[Arc<Clustering>]) -> bool {
-        let cells = self.cells_wanted(job.frame);
+        let cells = self.cells_wanted(job.plan);
         let cells = cells.map_or(0, |cells| cells.bytes());
         let most = self.most();
         let most = Most {
@@ -480,21 +480,21 @@ impl Engine {
     }
 
     /// Answers this frame, and later ones with at least as many primitives, by `Clusters`.
-    fn take_clusters(&mut self, frame: &Frame) {
-        self.too_much = Some(frame.n_primitives());
+    fn take_clusters(&mut self, plan: &Plan) {
+        self.too_much = Some(plan.n_primitives());
         self.take(Method::Clusters);
     }
 
     /// Switches to a built-in method.
     fn take(&mut self, method: Method) {
         self.lane.method = method;
-        self.lane.room = Room::new();
+        self.lane.pass_buffers = PassBuffers::new();
     }
 
     /// The part of the budget that is left for buffers that grow.
-    pub(super) fn budget_for_room(&self) -> Option<u64> {
-        let other = self.other.room.bytes();
-        let fixed = self.world.bytes() + other + self.lane.room.bytes_of_cells();
+    pub(super) fn budget_for_buffers(&self) -> Option<u64> {
+        let other = self.other.pass_buffers.bytes();
+        let fixed = self.world.bytes() + other + self.lane.pass_buffers.bytes_of_cells();
         let budget = self.settings.memory_budget;
         budget.map(|budget| budget.saturating_sub(fixed))
     }
@@ -505,7 +505,7 @@ impl Engine {
     }
 
     /// Room for the grid: as many cells as equation (1) can give.
-    pub(super) fn cells_wanted(&self, frame: &Frame) -> Option<CellsWanted> {
+    pub(super) fn cells_wanted(&self, plan: &Plan) -> Option<CellsWanted> {
         if self.lane.method != Method::Cells {
             return None;
         }
@@ -514,21 +514,21 @@ impl Engine {
             most.min(budget / SHARE_OF_CELLS / CellsWanted::CELL)
         });
         // Below 2^25, so the cast back is exact enough.
-        let asked = (frame.n_primitives() as f64 * self.settings.lambda).min(MOST_CELLS as f64);
+        let asked = (plan.n_primitives() as f64 * self.settings.lambda).min(MOST_CELLS as f64);
         Some(CellsWanted {
             n_cells: (asked.ceil() as u64).min(most).max(1),
-            n_bodies: count(frame.layers.len()).max(self.world.n_parts()),
+            n_bodies: count(plan.parts.len()).max(self.world.n_parts()),
         })
     }
 
     /// Room for the first pass: the present room, unless the budget allows less.
-    pub(super) fn first_room(&self, cells: Option<CellsWanted>) -> Result<Capacities, Error> {
-        let held = self.lane.room.capacities();
+    pub(super) fn first_capacities(&self, cells: Option<CellsWanted>) -> Result<Capacities, Error> {
+        let held = self.lane.pass_buffers.capacities();
         let wanted = self.lane.first.of(self.lane.method).max(held);
         let Some(budget) = self.settings.memory_budget else {
             return Ok(wanted);
         };
-        let other = self.other.room.bytes();
+        let other = self.other.pass_buffers.bytes();
         let fixed = self.world.bytes() + other + cells.map_or(0, |cells| cells.bytes());
         for wanted in [wanted, held.max(Capacities::LEAST)] {
             if fixed + wanted.bytes() <= budget {

@@ -48,8 +48,8 @@ bindings! {
 }
 
 bindings! {
-    /// `dispatch.wgsl`
-    Dispatch {
+    /// `traversal.wgsl`
+    Traversal {
         nodes: Read<Node>,
         bodies: Read<Body>,
         ignored: Read<NodePair>,
@@ -185,8 +185,8 @@ bindings! {
 }
 
 bindings! {
-    /// `dispatch_cells.wgsl`
-    DispatchCells {
+    /// `traversal_cells.wgsl`
+    TraversalCells {
         grid: Read<Grid>,
         bodies: Read<Body>,
         cells: Write<Cell>,
@@ -198,8 +198,8 @@ bindings! {
 }
 
 bindings! {
-    /// `dispatch_tile.wgsl`
-    DispatchTile {
+    /// `traversal_tile.wgsl`
+    TraversalTile {
         grid: Read<Grid>,
         items: Write<CellItem>,
         counters: Write<Counter>,
@@ -208,8 +208,8 @@ bindings! {
 }
 
 bindings! {
-    /// `dispatch_scatter.wgsl`
-    DispatchScatter {
+    /// `traversal_scatter.wgsl`
+    TraversalScatter {
         grid: Read<Grid>,
         kept: Read<Kept>,
         starts: Read<Start>,
@@ -268,8 +268,8 @@ kernels! {
         from "bounds_level" ("boxes", "still", "refit", "groups");
     bounds_top: BoundsTop = BOUNDS_TOP [] from "bounds_top" ("boxes", "still", "refit");
     prepare: Prepare = PREPARE [] from "prepare" ("arguments");
-    dispatch: Dispatch = DISPATCH []
-        from "dispatch" ("boxes", "still", "filters", "meets", "reserve", "groups");
+    traversal: Traversal = TRAVERSAL []
+        from "traversal" ("boxes", "still", "filters", "meets", "reserve", "groups");
     pairing: Pairing = PAIRING []
         from "pairing" ("boxes", "still", "still_groups", "vertices", "ids", "reserve", "groups");
     bounds_clusters_moving: BoundsClusters = BOUNDS_CLUSTERS_MOVING []
@@ -278,33 +278,33 @@ kernels! {
         from "bounds_level" as "bounds_level_moving" ("boxes", "moving", "refit", "groups");
     bounds_top_moving: BoundsTop = BOUNDS_TOP_MOVING []
         from "bounds_top" as "bounds_top_moving" ("boxes", "moving", "refit");
-    dispatch_moving: Dispatch = DISPATCH_MOVING []
-        from "dispatch" as "dispatch_moving"
-        ("boxes", "moving", "filters", "meets_layers", "reserve", "groups");
+    traversal_moving: Traversal = TRAVERSAL_MOVING []
+        from "traversal" as "traversal_moving"
+        ("boxes", "moving", "filters", "meets_parts", "reserve", "groups");
     pairing_moving: Pairing = PAIRING_MOVING []
         from "pairing" as "pairing_moving"
         ("boxes", "moving", "moving_groups", "vertices", "ids", "reserve", "groups");
     narrow_moving: NarrowMoving = NARROW_MOVING []
-        from "narrow_moving" ("filter", "polygon", "pair", "reserve", "places", "groups");
+        from "narrow_moving" ("filter", "polygon", "pair", "reserve", "slots", "groups");
     narrow_search: NarrowSearch = NARROW_SEARCH []
-        from "narrow_search" ("filter", "polygon", "pair", "numbers", "reserve", "places", "groups");
+        from "narrow_search" ("filter", "polygon", "pair", "numbers", "reserve", "slots", "groups");
     narrow: Narrow = NARROW [("WITH_SOLIDS", 0.0)]
         from "narrow" ("filter", "projections", "triangles", "neighbours", "solids", "numbers", "reserve", "groups");
     narrow_solids: Narrow = NARROW_SOLIDS [("WITH_SOLIDS", 1.0)]
         from "narrow" ("filter", "projections", "triangles", "neighbours", "solids", "numbers", "reserve", "groups");
     bounds_reach: BoundsReach = BOUNDS_REACH [] from "bounds_reach" ("boxes", "filters", "meets", "groups");
     bounds_keep: BoundsKeep = BOUNDS_KEEP []
-        from "bounds_keep" ("boxes", "vertices", "reserve", "places", "groups");
+        from "bounds_keep" ("boxes", "vertices", "reserve", "slots", "groups");
     grid_resolution: GridResolution = GRID_RESOLUTION []
         from "grid_resolution" ("region", "arguments");
     grid_ranges: GridRanges = GRID_RANGES [] from "grid_ranges" ("region", "groups");
     grid_shift: GridShift = GRID_SHIFT [] from "grid_shift" ("arguments");
     grid_count: GridCount = GRID_COUNT [] from "grid_count" ("coarse", "groups");
-    dispatch_cells: DispatchCells = DISPATCH_CELLS [] from "dispatch_cells" ("reserve", "groups");
-    dispatch_scatter: DispatchScatter = DISPATCH_SCATTER []
-        from "dispatch_scatter" ("coarse", "groups");
-    dispatch_tile: DispatchTile = DISPATCH_TILE []
-        from "dispatch_tile" ("reserve", "places", "groups");
+    traversal_cells: TraversalCells = TRAVERSAL_CELLS [] from "traversal_cells" ("reserve", "groups");
+    traversal_scatter: TraversalScatter = TRAVERSAL_SCATTER []
+        from "traversal_scatter" ("coarse", "groups");
+    traversal_tile: TraversalTile = TRAVERSAL_TILE []
+        from "traversal_tile" ("reserve", "slots", "groups");
     pairing_cells: PairingCells = PAIRING_CELLS []
         from "pairing_cells" ("boxes", "filters", "meets", "ids", "reserve", "groups");
 }

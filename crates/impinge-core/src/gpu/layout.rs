@@ -26,27 +26,27 @@ macro_rules! words {
 }
 
 words! {
-    /// A node of the forest.
+    /// A node of the trees.
     Node { low: [u32; 3], first_child: u32, high: [u32; 3], shape: u32 }
-    /// One layer of a frame.
+    /// One part of a frame.
     Body {
-        root: u32, slack: u32, within: u32, layer: u32,
+        root: u32, slack: u32, within: u32, part: u32,
         category: [u32; 2], mask: [u32; 2],
-        first_place: u32, first_number: u32,
+        first_slot: u32, first_number: u32,
     }
     /// A run of primitives and its unique vertices.
-    Cluster { first_place: u32, first_vertex: u32, sizes: u32, body: u32 }
+    Cluster { first_slot: u32, first_vertex: u32, sizes: u32, body: u32 }
     /// The nodes of one height.
     Level { first: u32, count: u32 }
-    /// Two nodes whose boxes may overlap; in the list of ignored pairs, two layers.
+    /// Two nodes whose boxes may overlap; in the list of ignored pairs, two parts.
     NodePair { a: u32, b: u32 }
     /// Two clusters.
     WorkItem { a: u32, b: u32 }
-    /// Two places, with flags.
+    /// Two slots, with flags.
     Candidate { a: u32, b: u32 }
-    /// Two global primitive numbers that certainly intersect; in a step, two places of a pair that is searched, with flags.
+    /// Two global primitive numbers that certainly intersect; in a step, two slots of a pair that is searched, with flags.
     PairKey { low: u32, high: u32 }
-    /// Two global primitive numbers left to exact arithmetic; in a step that the host settles, two places.
+    /// Two global primitive numbers left to exact arithmetic; in a step that the host decides, two slots.
     UnsureKey { low: u32, high: u32 }
     /// Until when a pair of a step certainly does not touch, and by when it certainly does: the bits of two f32.
     PairTimes { free_until: u32, touches_by: u32 }
@@ -60,7 +60,7 @@ words! {
         by_number: u32, sought: u32,
     }
     /// A primitive within its body's reach.
-    Kept { low: [u32; 3], place: u32, high: [u32; 3], body: u32, range: [u32; 3], unused: u32 }
+    Kept { low: [u32; 3], slot: u32, high: [u32; 3], body: u32, range: [u32; 3], unused: u32 }
     /// The box in which a body may meet others.
     Reach { low: [u32; 3], gap: u32, high: [u32; 3], gap_too: u32 }
     /// The grid; the host never reads the floats.
@@ -86,7 +86,7 @@ words! {
     Corners { vertices: [u32; 4] }
     /// A vertex of a cluster.
     ClusterVertex { vertex: u32 }
-    /// The number of the primitive at a place, within its layer; in a piece the global one.
+    /// The number of the primitive at a slot, within its part; in a piece the global one.
     Order { number: u32 }
     /// How much of something was needed.
     Counter { n: u32 }
@@ -126,17 +126,17 @@ pub const N_BOX_TESTS: u32 = 40;
 pub const N_BOX_TESTS_HIGH: u32 = 41;
 /// The number of words for the region and the entries per shift.
 pub const N_TALLIES: u32 = 37;
-/// Parts of bodies, in `Body::layer`.
+/// Parts of bodies, in `Body::part`.
 pub const EDGES: u32 = 0;
 pub const VERTICES: u32 = 1;
 pub const FACES: u32 = 2;
-/// Marks layers of bodies without faces, in `Body::layer`.
+/// Marks parts of bodies without faces, in `Body::part`.
 pub const BARE: u32 = 4;
-/// Marks layers of bodies without edges, in `Body::layer`.
+/// Marks parts of bodies without edges, in `Body::part`.
 pub const POINTS: u32 = 8;
-/// Marks layers whose pairs with other layers of the same body are asked for, in `Body::layer`.
-pub const OWN_LAYERS: u32 = 16;
-/// Where the number of the body is, in `Body::layer`.
+/// Marks parts whose pairs with other parts of the same body are asked for, in `Body::part`.
+pub const OWN_PARTS: u32 = 16;
+/// Where the number of the body is, in `Body::part`.
 pub const BODY_SHIFT: u32 = 5;
 /// The root of a body without primitives, and the top if there is no tree over bodies.
 pub const NO_ROOT: u32 = u32::MAX;

@@ -2,7 +2,7 @@
 //!
 //! Stages have the same names as on the CPU; each kernel file begins with a card. If all buffers are large enough, a
 //! frame is one submission: positions go up, counters and results come back, see `clusters` and `cells`. Pairs of
-//! which the filter on the device is unsure are settled exactly on the CPU, from the numbers as given. Only
+//! which the filter on the device is unsure are decided exactly on the CPU, from the numbers as given. Only
 //! `waiting` blocks.
 //!
 //! A step runs through the same stages, with two boxes per node, up to a filter. The device drops pairs that certainly do not touch, and
@@ -10,11 +10,11 @@
 
 mod collect;
 mod device;
-mod forest;
 mod open;
 mod passes;
 mod pieces;
 mod resident;
+mod top_level;
 
 // Types are documented; internal fields and small methods are self-explanatory.
 #[allow(missing_docs)]
@@ -29,19 +29,19 @@ mod kernels;
 #[allow(missing_docs)]
 pub mod layout;
 #[allow(missing_docs)]
+pub mod pass_buffers;
+#[allow(missing_docs)]
 pub mod pipeline;
 #[allow(missing_docs)]
 pub mod recording;
-#[allow(missing_docs)]
-pub mod room;
 mod topology;
 mod waiting;
 #[allow(missing_docs)]
 pub mod world;
 
 pub use device::{Device, DeviceInfo};
-pub use resident::{ResidentLayer, ResidentPairs, ResidentStep};
-pub use room::Capacities;
+pub use pass_buffers::Capacities;
+pub use resident::{ResidentPairs, ResidentPart, ResidentStep};
 
 pub(crate) use engine::Engine;
 pub use kernels::shaders;

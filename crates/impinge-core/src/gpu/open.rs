@@ -8,7 +8,7 @@ use super::device::{Device, DeviceInfo, STORAGE_BUFFERS, describe, suffices};
 use super::kernels::Kernels;
 use super::pipeline::Source;
 use super::waiting::wait;
-use crate::error::Error;
+use crate::scene::error::Error;
 
 /// The adapters on this machine that can run the kernels, hardware first. Empty in a browser, where a program cannot
 /// wait for the answer: use [`devices_async`].

@@ -16,29 +16,29 @@ use super::cells::{self, CellWork};
 use super::clusters;
 use super::collect::{Collected, Guess};
 use super::device::Scopes;
-use super::engine::{Engine, Outcome, Taker};
+use super::engine::{Engine, Outcome, PassSink};
 use super::layout::NodePair;
+use super::pass_buffers::{Capacities, CellsWanted, NextPass};
 use super::recording::{Recorder, Recording};
-use super::room::{Capacities, CellsWanted, NextPass};
 use super::world::Motion;
-use crate::error::Error;
-use crate::index::Number;
-use crate::narrow::settle;
-use crate::plan::{Plan as Frame, pair_key};
+use crate::plan::{Plan, pair_key};
 use crate::query::SharedVertex;
-use crate::run::Job;
-use crate::settings::Method;
-use crate::sink::Goal;
-use crate::sink::{Answer, BLOCK};
-use crate::stats::Statistics;
-use crate::undecided::Left;
+use crate::query::goal::Goal;
+use crate::query::settings::Method;
+use crate::scene::error::Error;
+use crate::scene::index::Number;
+use crate::search::narrow::decide;
+use crate::search::runner::Job;
+use crate::search::sink::{Answer, BLOCK};
+use crate::search::stats::Statistics;
+use crate::search::undecided::Undecided;
 
 /// The host descends before the first launch while there are at most this many seeds: each step saves two launches.
 const SEEDS: usize = 512;
-/// From this many unsure pairs on, several threads settle them.
+/// From this many unsure pairs on, several threads decide them.
 const PARALLEL_FROM: usize = 512;
 /// Unsure pairs per task.
-const SETTLED_BY_A_TASK: usize = 64;
+const DECIDED_BY_A_TASK: usize = 64;
 
 /// The work of a pass.
 #[derive(Debug, Clone)]
@@ -52,13 +52,13 @@ impl Engine {
     pub(super) async fn work_off(
         &mut self,
         job: Job<'_>,
-        mut taker: Taker<'_, '_>,
+        mut sink: PassSink<'_, '_>,
         mut waiting: Vec<Work>,
         stats: &mut Statistics,
     ) -> Result<Outcome, Error> {
-        let Job { frame, control, .. } = job;
-        let cells = self.cells_wanted(frame);
-        let mut capacities = self.first_room(cells)?;
+        let Job { plan, control, .. } = job;
+        let cells = self.cells_wanted(plan);
+        let mut capacities = self.first_capacities(cells)?;
         while let Some(work) = waiting.pop() {
             if let Work::Cells(cells) = work
                 && let Some(parts) = cells.parts()
@@ -66,14 +66,14 @@ impl Engine {
                 waiting.extend(parts.into_iter().map(Work::Cells));
                 continue;
             }
-            let done = stats.n_slabs;
+            let done = stats.n_batches;
             control.step(done, done + count(waiting.len()) + 1)?;
-            let mut collected = self.pass(frame, &work, capacities, cells, stats).await?;
-            if let Taker::Answer(answer) = &taker {
+            let mut collected = self.pass(plan, &work, capacities, cells, stats).await?;
+            if let PassSink::Answer(answer) = &sink {
                 // Even where a buffer was too small for them, certain pairs are pairs.
                 answer.foresee(collected.counts.needed.pairs)?;
             }
-            let room = self.budget_for_room();
+            let pass_buffers = self.budget_for_buffers();
             // Times are proven, whether all pairs had room or not.
             self.touches_by = match self.sought {
                 Goal::Earliest | Goal::Any => collected.counts.touches_by,
@@ -81,19 +81,19 @@ impl Engine {
             };
             let next = match collected.counts.answer(self.sought) {
                 true => NextPass::Complete,
-                false => collected.counts.judge(&self.gpu, capacities, room),
+                false => collected.counts.judge(&self.gpu, capacities, pass_buffers),
             };
             match next {
                 NextPass::Complete => {
                     book(&collected, self.lane.method, stats);
                     self.complete.push(collected.counts);
-                    let settled = &mut self.settled;
-                    let goes_on = stats.time("settle", |_| match &mut taker {
-                        Taker::Answer(answer) => {
-                            settle_all(job, answer, &collected, settled).map(|()| true)
+                    let decided = &mut self.decided;
+                    let goes_on = stats.time("decide", |_| match &mut sink {
+                        PassSink::Answer(answer) => {
+                            decide_all(job, answer, &collected, decided).map(|()| true)
                         }
-                        Taker::Left(take) => take(Left {
-                            pairs: &mut collected.left,
+                        PassSink::Undecided(take) => take(Undecided {
+                            pairs: &mut collected.undecided,
                             touches_by: self.touches_by,
                         }),
                     })?;
@@ -112,11 +112,11 @@ impl Engine {
                 }
                 NextPass::Split => {
                     stats.n_reruns += 1;
-                    if let Some(parts) = self.split(frame, &work, &collected)? {
+                    if let Some(parts) = self.split(plan, &work, &collected)? {
                         waiting.extend(parts);
                         continue;
                     }
-                    match self.lean(&work, &collected, capacities, room) {
+                    match self.lean(&work, &collected, capacities, pass_buffers) {
                         Ok(lean) => capacities = lean,
                         Err(error) => return Ok(Outcome::Crowded(error)),
                     }
@@ -128,33 +128,33 @@ impl Engine {
     }
 
     /// The whole work of a frame, if there is any.
-    pub(super) fn whole(&self, frame: &Frame) -> Option<Work> {
-        let seeds = self.world.seeds(frame, self.lane.motion);
+    pub(super) fn whole(&self, plan: &Plan) -> Option<Work> {
+        let seeds = self.world.seeds(plan, self.lane.motion);
         if seeds.is_empty() {
             return None;
         }
         Some(match self.lane.method {
             Method::Cells => Work::Cells(CellWork::WHOLE),
-            _ => Work::Seeds(self.descend(frame, seeds)),
+            _ => Work::Seeds(self.descend(plan, seeds)),
         })
     }
 
     /// The work of a piece: pairs of its runs, in batches that a queue can hold.
-    pub(super) fn seeds_in_batches(&self, frame: &Frame, pairs: &[[u32; 2]]) -> Vec<Work> {
-        let most = (self.lane.room.capacities().queue as usize).max(SEEDS);
+    pub(super) fn seeds_in_batches(&self, plan: &Plan, pairs: &[[u32; 2]]) -> Vec<Work> {
+        let most = (self.lane.pass_buffers.capacities().queue as usize).max(SEEDS);
         let batches = pairs.chunks(most);
         batches
-            .map(|batch| Work::Seeds(self.descend(frame, self.world.seeds_of_runs(batch))))
+            .map(|batch| Work::Seeds(self.descend(plan, self.world.seeds_of_runs(batch))))
             .collect()
     }
 
     /// Replaces seeds by their children's pairs, for as long as there are at most [`SEEDS`].
-    fn descend(&self, frame: &Frame, mut seeds: Vec<NodePair>) -> Vec<NodePair> {
+    fn descend(&self, plan: &Plan, mut seeds: Vec<NodePair>) -> Vec<NodePair> {
         let mut below = Vec::new();
         loop {
             below.clear();
             for &seed in &seeds {
-                if !self.world.expand(frame, self.lane.motion, seed, &mut below) {
+                if !self.world.expand(plan, self.lane.motion, seed, &mut below) {
                     below.push(seed);
                 }
             }
@@ -168,14 +168,14 @@ impl Engine {
     /// Smaller parts, or the children of a single pair of nodes; `None` if splitting does not help.
     fn split(
         &self,
-        frame: &Frame,
+        plan: &Plan,
         work: &Work,
         collected: &Collected,
     ) -> Result<Option<Vec<Work>>, Error> {
         let seeds = match work {
             Work::Seeds(seeds) => seeds,
             &Work::Cells(cells) => {
-                let parts = cells.split(collected, self.lane.room.capacities().kept);
+                let parts = cells.split(collected, self.lane.pass_buffers.capacities().kept);
                 // Lists and tiles are our own: a method of another crate has no parts of a cell.
                 let is_list = |parts: &[CellWork]| matches!(parts, [CellWork::List(_)]);
                 let parts = parts.filter(|parts| self.guest.is_none() || !is_list(parts));
@@ -190,7 +190,7 @@ impl Engine {
         }
         let mut below = Vec::new();
         for &seed in seeds {
-            if !self.world.expand(frame, self.lane.motion, seed, &mut below) {
+            if !self.world.expand(plan, self.lane.motion, seed, &mut below) {
                 return Err(self.too_small("two clusters", Capacities::LEAST));
             }
         }
@@ -206,7 +206,7 @@ impl Engine {
         work: &Work,
         collected: &Collected,
         now: Capacities,
-        room: Option<u64>,
+        pass_buffers: Option<u64>,
     ) -> Result<Capacities, Error> {
         let needed = &collected.counts.needed;
         let least = Capacities::LEAST.of(self.lane.method);
@@ -214,7 +214,7 @@ impl Engine {
             Work::Cells(cells) => cells.lean(needed, now, least),
             Work::Seeds(_) => CellWork::WHOLE.lean(needed, now, least),
         };
-        let is_allowed = room.is_none_or(|room| lean.bytes() <= room);
+        let is_allowed = pass_buffers.is_none_or(|pass_buffers| lean.bytes() <= pass_buffers);
         if lean == now || !is_allowed || !lean.fit(&self.gpu) {
             return Err(self.too_small("the primitives of one cell", lean));
         }
@@ -224,7 +224,7 @@ impl Engine {
     /// One submission and its results.
     async fn pass(
         &mut self,
-        frame: &Frame,
+        plan: &Plan,
         work: &Work,
         capacities: Capacities,
         cells: Option<CellsWanted>,
@@ -234,11 +234,11 @@ impl Engine {
         let gpu = Arc::clone(&self.gpu);
         if self.is_traced {
             // The same before, launch by launch.
-            let recording = self.record(frame, Some(work), capacities, cells)?;
+            let recording = self.record(plan, Some(work), capacities, cells)?;
             self.lane.ran = self.lane.launcher.run_each(&gpu, &recording).await?;
         }
         let scopes = Scopes::open(&gpu.device);
-        let submitted = self.submit(frame, work, capacities, cells);
+        let submitted = self.submit(plan, work, capacities, cells);
         let closed = scopes.close();
         let (recording, guess) = submitted?;
         closed.await?;
@@ -246,7 +246,7 @@ impl Engine {
         let collected = self
             .lane
             .collector
-            .take(&gpu, &self.lane.room, names.len(), guess)
+            .take(&gpu, &self.lane.pass_buffers, names.len(), guess)
             .await?;
         for (&name, &ms) in names.iter().zip(collected.stage_ms.iter().flatten()) {
             stats.add_ms(name, ms);
@@ -258,15 +258,17 @@ impl Engine {
 
     fn submit(
         &mut self,
-        frame: &Frame,
+        plan: &Plan,
         work: &Work,
         capacities: Capacities,
         cells: Option<CellsWanted>,
     ) -> Result<(Recording, Guess), Error> {
-        let mut recording = self.record(frame, Some(work), capacities, cells)?;
+        let mut recording = self.record(plan, Some(work), capacities, cells)?;
         let (gpu, lane) = (&*self.gpu, &mut self.lane);
         let seeks = (lane.motion == Motion::Moving).then_some(self.sought);
-        let guess = lane.collector.record(&lane.room, seeks, &mut recording);
+        let guess = lane
+            .collector
+            .record(&lane.pass_buffers, seeks, &mut recording);
         let mut encoder = gpu
             .device
             .create_command_encoder(&wgpu::CommandEncoderDescriptor {
@@ -282,7 +284,7 @@ impl Engine {
     /// Records all stages; without work, only counters of zero.
     pub(super) fn record(
         &mut self,
-        frame: &Frame,
+        plan: &Plan,
         work: Option<&Work>,
         mut capacities: Capacities,
         cells: Option<CellsWanted>,
@@ -294,12 +296,12 @@ impl Engine {
         capacities.queue = capacities.queue.max(count(seeds.len()));
         // Buffers that are replaced should be free.
         self.lane.recording = Recording::default();
-        self.lane.room.resize(&self.gpu, &capacities, cells);
+        self.lane.pass_buffers.resize(&self.gpu, &capacities, cells);
         let mut recording = Recording::default();
         // The caller's step begins with nothing known.
         let sought = (!self.lane.is_encoded).then_some(self.sought);
         let touches_by = sought.and(self.touches_by);
-        let start = self.lane.room.start(&self.gpu, seeds, touches_by)?;
+        let start = self.lane.pass_buffers.start(&self.gpu, seeds, touches_by)?;
         for (from, to) in start {
             recording.copy(from, to);
         }
@@ -308,14 +310,14 @@ impl Engine {
             world: &self.world,
             view: self.world.view(self.lane.motion),
             motion: self.lane.motion,
-            room: &self.lane.room,
+            pass_buffers: &self.lane.pass_buffers,
             recording,
         };
         let (lambda, group_size) = (self.settings.lambda, self.settings.group_size);
-        let resolve = frame.shared_vertex == SharedVertex::Resolve;
+        let resolve = plan.shared_vertex == SharedVertex::Resolve;
         match (work, &mut self.guest) {
             (None, _) => {}
-            (Some(Work::Seeds(seeds)), _) => recorder.clusters(clusters::Told {
+            (Some(Work::Seeds(seeds)), _) => recorder.clusters(clusters::ClusterPass {
                 n_seeds: count(seeds.len()),
                 n_rounds: self.world.rounds(seeds),
                 resolve,
@@ -324,7 +326,7 @@ impl Engine {
             (Some(Work::Cells(work)), Some(guest)) => {
                 guest.record(&mut recorder, lambda, work.cells())?;
             }
-            (Some(&Work::Cells(work)), None) => recorder.cells(cells::Told {
+            (Some(&Work::Cells(work)), None) => recorder.cells(cells::CellPass {
                 lambda,
                 group_size,
                 resolve,
@@ -338,7 +340,7 @@ impl Engine {
 /// Adds the counts of a complete pass to the statistics.
 fn book(collected: &Collected, method: Method, stats: &mut Statistics) {
     let needed = &collected.counts.needed;
-    stats.n_slabs += 1;
+    stats.n_batches += 1;
     stats.n_work_items += needed.items;
     stats.n_candidates += needed.candidates;
     stats.n_unsure += needed.unsure;
@@ -350,36 +352,36 @@ fn book(collected: &Collected, method: Method, stats: &mut Statistics) {
 }
 
 /// Hands over the certain pairs, and those of the others that exact arithmetic says to intersect.
-fn settle_all(
+fn decide_all(
     job: Job<'_>,
     answer: &Answer,
     collected: &Collected,
-    settled: &mut Vec<Vec<u64>>,
+    decided: &mut Vec<Vec<u64>>,
 ) -> Result<(), Error> {
     let Job {
         scene,
-        frame,
+        plan,
         workers,
         ..
     } = job;
-    settled.resize_with(workers.n(), Vec::new);
+    decided.resize_with(workers.n(), Vec::new);
     let key = |a: u32, b: u32| pair_key(Number::new(a), Number::new(b));
     for certain in collected.pairs.chunks(BLOCK) {
-        let keys = &mut settled[0];
+        let keys = &mut decided[0];
         keys.extend(certain.iter().map(|pair| key(pair.low, pair.high)));
         answer.take(keys);
     }
     let unsure = &collected.unsure[..];
     let n_workers = match unsure.len() < PARALLEL_FROM {
         true => 1,
-        false => settled.len(),
+        false => decided.len(),
     };
-    let n_tasks = unsure.len().div_ceil(SETTLED_BY_A_TASK);
-    workers.for_each(&mut settled[..n_workers], n_tasks, |keys, ix| {
-        let first = ix * SETTLED_BY_A_TASK;
-        for pair in &unsure[first..unsure.len().min(first + SETTLED_BY_A_TASK)] {
+    let n_tasks = unsure.len().div_ceil(DECIDED_BY_A_TASK);
+    workers.for_each(&mut decided[..n_workers], n_tasks, |keys, ix| {
+        let first = ix * DECIDED_BY_A_TASK;
+        for pair in &unsure[first..unsure.len().min(first + DECIDED_BY_A_TASK)] {
             let key = key(pair.low, pair.high);
-            if settle(scene, frame, key) {
+            if decide(scene, plan, key) {
                 keys.push(key);
             }
         }
@@ -387,7 +389,7 @@ fn settle_all(
             answer.take(keys);
         }
     });
-    for keys in settled {
+    for keys in decided {
         answer.take(keys);
     }
     answer.check()

@@ -1,6 +1,6 @@
 //! Frames that are too large for the device, answered piece by piece.
 //!
-//! The clusters of all layers, body after body, are cut into chunks of which two fit on the device. The pieces
+//! The clusters of all parts, body after body, are cut into chunks of which two fit on the device. The pieces
 //! are every chunk by itself, and every two chunks whose boxes meet. Each piece is a separate query, for which its
 //! topology and positions are sent.
 //!
@@ -22,27 +22,27 @@ use std::ops::Range;
 
 use super::buffers::count;
 use super::topology::{DeviceClusters, Most, Weight, narrowed};
-use crate::error::Error;
-use crate::grouping::bounds::Bounds;
-use crate::grouping::clusters::Clustering;
-use crate::grouping::for_each;
-use crate::grouping::hierarchy::TreeShape;
-use crate::hull;
-use crate::index::{ClusterIx, LayerIx};
-use crate::plan::Plan as Frame;
-use crate::positions::Positions;
-use crate::run::Job;
+use crate::boxes;
+use crate::bvh::bounds::Bounds;
+use crate::bvh::clusters::Clustering;
+use crate::bvh::for_each;
+use crate::bvh::tree::TreeShape;
+use crate::plan::Plan;
 use crate::scene::Scene;
+use crate::scene::error::Error;
+use crate::scene::index::{ClusterIx, PartIx};
+use crate::scene::positions::Positions;
+use crate::search::runner::Job;
 
-/// Consecutive clusters of one layer.
+/// Consecutive clusters of one part.
 #[derive(Debug)]
 pub struct ClusterRun {
-    layer: LayerIx,
+    part: PartIx,
     clusters: Range<usize>,
     bounds: Bounds,
 }
 
-/// Consecutive runs, at most one per layer.
+/// Consecutive runs, at most one per part.
 #[derive(Debug)]
 pub struct Chunk {
     pub runs: Vec<ClusterRun>,
@@ -56,18 +56,18 @@ pub struct Chunk {
 pub fn cut<'a>(
     job: Job<'_>,
     most: Most,
-    clustering: impl Fn(LayerIx) -> &'a Clustering + Sync,
+    clustering: impl Fn(PartIx) -> &'a Clustering + Sync,
 ) -> Result<Vec<Chunk>, Error> {
     let Job {
         scene,
-        frame,
+        plan,
         workers,
         ..
     } = job;
     let mut chunks: Vec<Chunk> = Vec::new();
     let mut weight = Weight::default();
-    for layer in frame.layer_ixs() {
-        let clustering = clustering(layer);
+    for part in plan.part_ixs() {
+        let clustering = clustering(part);
         for cluster in clustering.clusters() {
             let (n, n_vertices) = (clustering.size(cluster), clustering.vertices(cluster).len());
             weight.add_cluster(count(n), count(n_vertices));
@@ -81,9 +81,9 @@ pub fn cut<'a>(
             }
             let runs = &mut chunks.last_mut().expect("just pushed").runs;
             match runs.last_mut() {
-                Some(run) if run.layer == layer => run.clusters.end = cluster.index() + 1,
+                Some(run) if run.part == part => run.clusters.end = cluster.index() + 1,
                 _ => runs.push(ClusterRun {
-                    layer,
+                    part,
                     clusters: cluster.index()..cluster.index() + 1,
                     bounds: Bounds::EMPTY,
                 }),
@@ -92,16 +92,16 @@ pub fn cut<'a>(
     }
     let find_boxes = |chunk: &mut Chunk| {
         for run in &mut chunk.runs {
-            let clustering = clustering(run.layer);
-            let positions = frame.body(scene, run.layer).positions();
+            let clustering = clustering(run.part);
+            let positions = plan.body(scene, run.part).positions();
             for cluster in ClusterIx::each(run.clusters.clone()) {
-                let bounds = hull::of_vertices(positions, clustering.vertices(cluster));
+                let bounds = boxes::of_vertices(positions, clustering.vertices(cluster));
                 run.bounds.join(&bounds);
             }
             chunk.bounds.join(&run.bounds);
         }
     };
-    let n_primitives = frame.n_primitives() as usize;
+    let n_primitives = plan.n_primitives() as usize;
     workers.install(n_primitives, || {
         for_each(chunks.iter_mut().collect(), find_boxes);
     })?;
@@ -112,7 +112,7 @@ pub fn cut<'a>(
 /// chunk come before those of the second. For a single chunk, the pairs within it.
 ///
 /// Two primitives can only meet if the boxes of their runs do. Cost: a sweep along x.
-pub fn meeting(frame: &Frame, chunks: &[&Chunk]) -> Vec<[u32; 2]> {
+pub fn meeting(plan: &Plan, chunks: &[&Chunk]) -> Vec<[u32; 2]> {
     let mut pairs = Vec::new();
     if let [a, b] = chunks
         && !a.bounds.overlaps(&b.bounds)
@@ -128,7 +128,7 @@ pub fn meeting(frame: &Frame, chunks: &[&Chunk]) -> Vec<[u32; 2]> {
     let mut runs: Vec<(usize, u32, &ClusterRun)> = (0..chunks.len()).flat_map(numbered).collect();
     runs.sort_by(|a, b| a.2.bounds.min[0].total_cmp(&b.2.bounds.min[0]));
     for (ix, &(chunk_a, a, run_a)) in runs.iter().enumerate() {
-        if chunks.len() == 1 && frame.layer(run_a.layer).within {
+        if chunks.len() == 1 && plan.part(run_a.part).within {
             pairs.push([a, a]);
         }
         for &(chunk_b, b, run_b) in &runs[ix + 1..] {
@@ -136,7 +136,7 @@ pub fn meeting(frame: &Frame, chunks: &[&Chunk]) -> Vec<[u32; 2]> {
                 break;
             }
             let is_asked = chunks.len() == 1 || chunk_a != chunk_b;
-            if is_asked && run_a.bounds.overlaps(&run_b.bounds) && meets(frame, run_a, run_b) {
+            if is_asked && run_a.bounds.overlaps(&run_b.bounds) && meets(plan, run_a, run_b) {
                 pairs.push([a.min(b), a.max(b)]);
             }
         }
@@ -144,11 +144,11 @@ pub fn meeting(frame: &Frame, chunks: &[&Chunk]) -> Vec<[u32; 2]> {
     pairs
 }
 
-fn meets(frame: &Frame, a: &ClusterRun, b: &ClusterRun) -> bool {
-    if a.layer == b.layer {
-        frame.layer(a.layer).within
+fn meets(plan: &Plan, a: &ClusterRun, b: &ClusterRun) -> bool {
+    if a.part == b.part {
+        plan.part(a.part).within
     } else {
-        frame.test(a.layer, b.layer).is_some()
+        plan.test(a.part, b.part).is_some()
     }
 }
 
@@ -165,18 +165,18 @@ pub struct Loaded {
 }
 
 impl Loaded {
-    /// Runs of one layer become one body, in the order of the chunks.
+    /// Runs of one part become one body, in the order of the chunks.
     pub fn new<'a>(
         scene: &Scene,
-        frame: &Frame,
+        plan: &Plan,
         chunks: &[&Chunk],
-        clustering: impl Fn(LayerIx) -> &'a Clustering,
+        clustering: impl Fn(PartIx) -> &'a Clustering,
     ) -> Self {
         let mut loaded = Loaded::default();
         let runs: Vec<&ClusterRun> = chunks.iter().flat_map(|chunk| &chunk.runs).collect();
-        for runs in runs.chunk_by(|a, b| a.layer == b.layer) {
-            let layer = runs[0].layer;
-            loaded.push(scene, frame, layer, runs, clustering(layer));
+        for runs in runs.chunk_by(|a, b| a.part == b.part) {
+            let part = runs[0].part;
+            loaded.push(scene, plan, part, runs, clustering(part));
         }
         loaded
     }
@@ -184,12 +184,12 @@ impl Loaded {
     fn push(
         &mut self,
         scene: &Scene,
-        frame: &Frame,
-        layer: LayerIx,
+        plan: &Plan,
+        part: PartIx,
         runs: &[&ClusterRun],
         clustering: &Clustering,
     ) {
-        let positions = frame.body(scene, layer).positions();
+        let positions = plan.body(scene, part).positions();
         // Where each vertex of the body is on the device.
         let mut on_device = vec![u32::MAX; positions.len()];
         for run in runs {
@@ -215,7 +215,7 @@ impl Loaded {
         }
         let body = self.is_rounded.len() as u32;
         self.is_rounded.push(matches!(positions, Positions::F64(_)));
-        let first = frame.layer(layer).first;
+        let first = plan.part(part).first;
         for run in runs {
             self.topology
                 .push(clustering, run.clusters.clone(), first, body, |vertex| {

@@ -10,10 +10,10 @@ use std::sync::Arc;
 use super::buffers::{Access, Bound, Slice, Storage, count, read};
 use super::layout::{Arguments, Params, Step};
 use super::open::Gpu;
+use super::pass_buffers::PassBuffers;
 use super::pipeline::{Bindings, Entry, Kernel, Program};
-use super::room::Room;
 use super::world::{Motion, View, World};
-use crate::error::Error;
+use crate::scene::error::Error;
 
 /// The widest row of workgroups; `shared/arguments.wgsl` has the same.
 pub(super) const WIDEST: u64 = 32_768;
@@ -197,7 +197,7 @@ pub struct Recorder<'a> {
     /// Whether that is a frame or a step.
     pub motion: Motion,
     /// The buffers for results.
-    pub room: &'a Room,
+    pub pass_buffers: &'a PassBuffers,
     /// What has been recorded so far.
     pub recording: Recording,
 }
@@ -205,7 +205,7 @@ pub struct Recorder<'a> {
 impl Recorder<'_> {
     /// As many workgroups as the arguments in this slot say.
     pub fn indirect(&self, slot: u32) -> Workgroups {
-        Workgroups::Indirect(self.room.arguments.buffer().clone(), slot)
+        Workgroups::Indirect(self.pass_buffers.arguments.buffer().clone(), slot)
     }
 }
 

@@ -6,23 +6,23 @@ use std::sync::Arc;
 use super::buffers::{count, read};
 use super::engine::Engine;
 use super::layout::{Counter, N_PAIRS, N_UNSURE, TOUCHES_BY};
-use super::room::{Capacities, NextPass, PassCounts};
+use super::pass_buffers::{Capacities, NextPass, PassCounts};
 use super::world::{Motion, ResidentEnds};
-use crate::elements::Part;
-use crate::error::Error;
-use crate::grouping::clusters::Clustering;
-use crate::ids::BodyId;
-use crate::plan::Plan as Frame;
-use crate::positions::Positions;
-use crate::run::Job;
+use crate::bvh::clusters::Clustering;
+use crate::plan::Plan;
+use crate::scene::elements::Part;
+use crate::scene::error::Error;
+use crate::scene::ids::BodyId;
+use crate::scene::positions::Positions;
 use crate::scene::{Body, Scene};
-use crate::stats::Statistics;
+use crate::search::runner::Job;
+use crate::search::stats::Statistics;
 
 /// The buffers that hold the pairs of an encoded frame once its commands have run.
 ///
 /// Both lists hold two `u32` per pair: the numbers of its primitives, the lower one first. Primitives are
 /// numbered consecutively, body after body in the order of their ids: primitive `i` of a body has the number
-/// `first + i`, where `first` is the number of primitives of all layers before it. The order of
+/// `first + i`, where `first` is the number of primitives of all parts before it. The order of
 /// pairs is not specified.
 ///
 /// A count may be larger than its list: the list then holds as many pairs as fit, and
@@ -68,7 +68,7 @@ pub struct ResidentPairs {
 /// | two vertices | a vertex | below `first_face` |
 /// | a vertex and a face | a vertex | from `first_face` on |
 ///
-/// Element `i` of a part of a body has the number `first + i` of its [layer](ResidentLayer). Vertices are numbered as positions are,
+/// Element `i` of a part of a body has the number `first + i` of its [part](ResidentPart). Vertices are numbered as positions are,
 /// whether an element uses them or not; edges and faces as [`Body::part`](crate::Body::part) lists them. The order of pairs is not specified.
 ///
 /// The count may be larger than the list: the list then holds as many pairs as fit, and
@@ -96,13 +96,13 @@ pub struct ResidentStep {
     /// The number of the first face.
     pub first_face: u32,
     /// The numbers of each part of each body that takes part, in their order.
-    pub layers: Vec<ResidentLayer>,
+    pub parts: Vec<ResidentPart>,
 }
 
 /// The numbers of one part of one body in an encoded step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
-pub struct ResidentLayer {
+pub struct ResidentPart {
     /// The body.
     pub body: BodyId,
     /// Edges, vertices or faces. Tetrahedra have those of their surface.
@@ -135,12 +135,12 @@ impl Engine {
         let starts = positions.iter().copied().collect();
         let resident = ResidentEnds([starts, BTreeMap::new()]);
         self.encode_whole(job, &clusterings, &resident, encoder)?;
-        let room = &self.lane.room;
-        let capacities = room.capacities();
+        let pass_buffers = &self.lane.pass_buffers;
+        let capacities = pass_buffers.capacities();
         Ok(ResidentPairs {
-            pairs: room.pairs.buffer().clone(),
-            unsure: room.unsure.buffer().clone(),
-            counts: room.counters.buffer().clone(),
+            pairs: pass_buffers.pairs.buffer().clone(),
+            unsure: pass_buffers.unsure.buffer().clone(),
+            counts: pass_buffers.counters.buffer().clone(),
             n_pairs_offset: u64::from(N_PAIRS) * COUNTER,
             n_unsure_offset: u64::from(N_UNSURE) * COUNTER,
             pairs_capacity: capacities.pairs,
@@ -159,7 +159,7 @@ impl Engine {
         [starts, ends]: [&[(BodyId, &wgpu::Buffer)]; 2],
         encoder: &mut wgpu::CommandEncoder,
     ) -> Result<ResidentStep, Error> {
-        let Job { scene, frame, .. } = job;
+        let Job { scene, plan, .. } = job;
         self.gpu.check_lost()?;
         for (buffers, what) in [(starts, "positions"), (ends, "end positions")] {
             for &(body, buffer) in buffers {
@@ -180,22 +180,22 @@ impl Engine {
             return Err(self.too_small("the step at once", Capacities::LEAST));
         }
         self.encode_whole(job, clusterings, &resident, encoder)?;
-        let room = &self.lane.room;
-        let of_parts = |parts: &[Part]| {
-            let layers = frame.layers.iter();
-            let numbers = layers.filter(|layer| parts.contains(&layer.part));
-            numbers.map(|layer| layer.n_primitives).sum()
+        let pass_buffers = &self.lane.pass_buffers;
+        let of_kinds = |kinds: &[Part]| {
+            let parts = plan.parts.iter();
+            let numbers = parts.filter(|part| kinds.contains(&part.part));
+            numbers.map(|part| part.n_primitives).sum()
         };
         Ok(ResidentStep {
-            pairs: room.unsure.buffer().clone(),
-            times: room.times.buffer().clone(),
+            pairs: pass_buffers.unsure.buffer().clone(),
+            times: pass_buffers.times.buffer().clone(),
             touches_by_offset: u64::from(TOUCHES_BY) * COUNTER,
-            counts: room.counters.buffer().clone(),
+            counts: pass_buffers.counters.buffer().clone(),
             n_pairs_offset: u64::from(N_UNSURE) * COUNTER,
-            pairs_capacity: room.capacities().unsure,
-            first_vertex: of_parts(&[Part::Edges]),
-            first_face: of_parts(&[Part::Edges, Part::Vertices]),
-            layers: layers(frame),
+            pairs_capacity: pass_buffers.capacities().unsure,
+            first_vertex: of_kinds(&[Part::Edges]),
+            first_face: of_kinds(&[Part::Edges, Part::Vertices]),
+            parts: parts(plan),
         })
     }
 
@@ -209,11 +209,11 @@ impl Engine {
     ) -> Result<(), Error> {
         self.update(job, clusterings, resident, &mut Statistics::default())?;
         self.world.copy_positions(resident, encoder);
-        let cells = self.cells_wanted(job.frame);
-        let capacities = self.first_room(cells)?;
-        let work = self.whole(job.frame);
+        let cells = self.cells_wanted(job.plan);
+        let capacities = self.first_capacities(cells)?;
+        let work = self.whole(job.plan);
         self.lane.is_encoded = true;
-        let recording = self.record(job.frame, work.as_ref(), capacities, cells)?;
+        let recording = self.record(job.plan, work.as_ref(), capacities, cells)?;
         let launcher = &mut self.lane.launcher;
         launcher.encode(&self.gpu, &recording, None, encoder)
     }
@@ -235,26 +235,26 @@ impl Engine {
         self.gpu().check_lost()?;
         let mut is_complete = true;
         for _ in 0..2 {
-            is_complete &= self.make_own_room().await?;
+            is_complete &= self.make_own_buffers().await?;
             std::mem::swap(&mut self.lane, &mut self.other);
         }
         Ok(is_complete)
     }
 
-    async fn make_own_room(&mut self) -> Result<bool, Error> {
+    async fn make_own_buffers(&mut self) -> Result<bool, Error> {
         if !self.lane.is_encoded {
             return Ok(true);
         }
-        let capacities = self.lane.room.capacities();
-        let counters = read(&self.gpu, &self.lane.room.counters.all()).await?;
+        let capacities = self.lane.pass_buffers.capacities();
+        let counters = read(&self.gpu, &self.lane.pass_buffers.counters.all()).await?;
         let counts = PassCounts::new(&bytemuck::pod_collect_to_vec::<u8, Counter>(&counters));
-        match counts.judge(self.gpu(), capacities, self.budget_for_room()) {
+        match counts.judge(self.gpu(), capacities, self.budget_for_buffers()) {
             NextPass::Complete => Ok(true),
             NextPass::Grow(larger) => {
                 self.grow_to(larger);
                 Ok(false)
             }
-            NextPass::Split => Err(self.too_small("the frame at once", counts.needed)),
+            NextPass::Split => Err(self.too_small("the plan at once", counts.needed)),
         }
     }
 }
@@ -283,13 +283,13 @@ fn check_buffer(
     Ok(())
 }
 
-/// The numbers of all layers.
-fn layers(frame: &Frame) -> Vec<ResidentLayer> {
-    let layers = frame.layers.iter().map(|layer| ResidentLayer {
-        body: layer.id,
-        part: layer.part,
-        first: layer.first.raw(),
-        len: layer.n_primitives,
+/// The numbers of all parts.
+fn parts(plan: &Plan) -> Vec<ResidentPart> {
+    let parts = plan.parts.iter().map(|part| ResidentPart {
+        body: part.id,
+        part: part.part,
+        first: part.first.raw(),
+        len: part.n_primitives,
     });
-    layers.collect()
+    parts.collect()
 }

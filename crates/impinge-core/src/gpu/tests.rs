@@ -7,7 +7,7 @@ use super::buffers::Access;
 use super::kernels::*;
 use super::layout::*;
 use super::pipeline::Source;
-use crate::grouping::grid;
+use crate::bvh::grid;
 
 fn parse(source: &Source) -> Module {
     let text = source.text();
@@ -116,11 +116,11 @@ macro_rules! assert_twins {
 #[test]
 fn structs_are_laid_out_as_on_the_host() {
     // Every kernel begins with the whole layout.
-    let module = parse(&DISPATCH);
+    let module = parse(&TRAVERSAL);
     assert_twins!(&module,
         Node { low, first_child, high, shape }
-        Body { root, slack, within, layer, category, mask, first_place, first_number }
-        Cluster { first_place, first_vertex, sizes, body }
+        Body { root, slack, within, part, category, mask, first_slot, first_number }
+        Cluster { first_slot, first_vertex, sizes, body }
         Level { first, count }
         NodePair { a, b }
         WorkItem { a, b }
@@ -133,7 +133,7 @@ fn structs_are_laid_out_as_on_the_host() {
             lambda, most_cells, owner_rule, lists_only, n_entries, tile_row, tile_column, tile_side,
             by_number, sought
         }
-        Kept { low, place, high, body, range, unused }
+        Kept { low, slot, high, body, range, unused }
         Grid { origin, shift, scale, n_cells, finest, unused, resolution, unused_too }
         Cell { n_entries, highest, lowest }
         CellItem { cell, sizes, first_a, first_b }
@@ -191,7 +191,7 @@ fn constants_are_those_of_the_host() {
         ("FACES", FACES),
         ("BARE", BARE),
         ("POINTS", POINTS),
-        ("OWN_LAYERS", OWN_LAYERS),
+        ("OWN_PARTS", OWN_PARTS),
         ("BODY_SHIFT", BODY_SHIFT),
     ] {
         assert_eq!(constant(&module, name), f64::from(host), "{name}");

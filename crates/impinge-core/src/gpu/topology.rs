@@ -3,9 +3,9 @@
 use std::ops::Range;
 
 use super::layout::{Body, Cluster, ClusterVertex, Coordinate, Corners, Node, Order};
-use crate::elements::Kind;
-use crate::grouping::clusters::Clustering;
-use crate::index::{ClusterIx, Number};
+use crate::bvh::clusters::Clustering;
+use crate::scene::elements::Kind;
+use crate::scene::index::{ClusterIx, Number};
 
 /// Clusters as kernels read them.
 #[derive(Debug, Default)]
@@ -29,13 +29,13 @@ impl DeviceClusters {
         body: u32,
         on_device: impl Fn(u32) -> u32,
     ) {
-        let places = clustering.places_of_run(&clusters);
+        let slots = clustering.slots_of_run(&clusters);
         for cluster in ClusterIx::each(clusters) {
             let vertices = clustering.vertices(cluster);
-            let first_place = self.corners.len() + cluster.place(0).index() - places.start;
+            let first_slot = self.corners.len() + cluster.slot(0).index() - slots.start;
             self.clusters.push(Cluster {
-                // Places and vertices fit 32 bits: the caller has checked the sizes.
-                first_place: first_place as u32,
+                // Slots and vertices fit 32 bits: the caller has checked the sizes.
+                first_slot: first_slot as u32,
                 first_vertex: self.cluster_vertices.len() as u32,
                 sizes: clustering.size(cluster) as u32 | (vertices.len() as u32) << 16,
                 body,
@@ -46,13 +46,13 @@ impl DeviceClusters {
             self.cluster_vertices.extend(vertices);
         }
         let is_solid = clustering.corners.kind() == Kind::Tetrahedra;
-        self.has_solids |= is_solid && !places.is_empty();
+        self.has_solids |= is_solid && !slots.is_empty();
         // Edges and points become degenerate triangles.
-        let corners = places.clone().map(|ix| Corners {
+        let corners = slots.clone().map(|ix| Corners {
             vertices: clustering.corners.four_corners(ix).map(&on_device),
         });
         self.corners.extend(corners);
-        let order = clustering.order[places].iter();
+        let order = clustering.order[slots].iter();
         self.numbers.extend(order.map(|&primitive| Order {
             number: first.plus(primitive).raw(),
         }));

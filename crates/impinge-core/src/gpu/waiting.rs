@@ -5,7 +5,7 @@
 
 use std::future::Future;
 
-use crate::error::Error;
+use crate::scene::error::Error;
 
 #[cfg(target_family = "wasm")]
 fn cannot_wait<T>() -> Result<T, Error> {

@@ -1,4 +1,4 @@
-//! The parts of bodies on the device: a forest of clusters, and positions. One world for frames and for steps.
+//! The parts of bodies on the device: a trees of clusters, and positions. One world for frames and for steps.
 //!
 //! ```text
 //! parts       edges of all bodies | vertices | faces | elements as given that are none of these
@@ -28,34 +28,34 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use crate::elements::Part;
-use crate::error::Error;
-use crate::grouping::clusters::Clustering;
-use crate::grouping::hierarchy::TreeShape;
-use crate::ids::BodyId;
-use crate::index::{LayerIx, Number};
-use crate::plan::{Layer, Plan as Frame};
-use crate::positions::Positions;
-use crate::run::Job;
+use crate::bvh::clusters::Clustering;
+use crate::bvh::tree::TreeShape;
+use crate::plan::{Plan, QueryPart};
+use crate::scene::elements::Part;
+use crate::scene::error::Error;
+use crate::scene::ids::BodyId;
+use crate::scene::index::{Number, PartIx};
+use crate::scene::positions::Positions;
 use crate::scene::{Filter, Scene};
-use crate::stats::Statistics;
+use crate::search::runner::Job;
+use crate::search::stats::Statistics;
 
 use super::buffers::{Storage, count};
-use super::forest::{Forest, Top};
 use super::layout::{
     BARE, BODY_SHIFT, Body, Cluster, ClusterVertex, Coordinate, Corners, EDGES, FACES, Level,
-    NO_ROOT, Node, NodePair, OWN_LAYERS, Order, POINTS, VERTICES,
+    NO_ROOT, Node, NodePair, OWN_PARTS, Order, POINTS, VERTICES,
 };
 use super::open::Gpu;
 use super::pieces::{Chunk, Loaded};
+use super::top_level::{Top, Trees};
 use super::topology::{DeviceClusters, Most, Weight, narrowed};
 
-/// Bit 31 of a place is a flag.
+/// Bit 31 of a slot is a flag.
 pub const MOST_PRIMITIVES: u64 = 1 << 31;
 /// By how many keys the boxes of rounded positions are widened: see `boxes.wgsl`.
 const SLACK: u32 = 2;
 /// Marks a part that does not take part.
-const NO_LAYER: u32 = u32::MAX;
+const NO_PART: u32 = u32::MAX;
 /// Bytes of a vertex.
 const VERTEX: u64 = 3 * size_of::<Coordinate>() as u64;
 
@@ -107,10 +107,10 @@ struct Held {
 /// What a frame, or a step, sees of the world.
 #[derive(Debug)]
 pub struct View {
-    /// By layer: its part.
+    /// By query_part: its part.
     parts: Vec<u32>,
-    /// By part: its layer.
-    layers: Vec<u32>,
+    /// By part: its query_part.
+    query_parts: Vec<u32>,
     top: Option<Top>,
     /// The nodes of each height, first those of the trees, then those of the tree over them.
     pub levels: Vec<Level>,
@@ -136,7 +136,7 @@ pub struct World {
     n_vertices: u64,
     n_ends: u64,
     /// The nodes on the device, without their boxes.
-    forest: Forest,
+    trees: Trees,
     words: Vec<u32>,
     views: [Option<View>; 2],
     pub has_solids: bool,
@@ -148,14 +148,14 @@ pub struct World {
     pub positions: Storage<Coordinate>,
 }
 
-/// The size of the layers of a frame on the device; `None` if 32 bits do not number its vertices, primitives or bodies.
+/// The size of the query_parts of a frame on the device; `None` if 32 bits do not number its vertices, primitives or bodies.
 pub(crate) fn weigh(
     job: Job<'_>,
     motion: Motion,
     clusterings: &[Arc<Clustering>],
 ) -> Option<Weight> {
-    let layers = job.frame.layers.iter().map(|layer| layer.id);
-    weigh_parts(job.scene, motion, layers.zip(clusterings))
+    let query_parts = job.plan.parts.iter().map(|query_part| query_part.id);
+    weigh_parts(job.scene, motion, query_parts.zip(clusterings))
 }
 
 fn weigh_parts<'a>(
@@ -197,7 +197,7 @@ impl World {
             parts: Vec::new(),
             n_vertices: 0,
             n_ends: 1,
-            forest: Forest::default(),
+            trees: Trees::default(),
             words: Vec::new(),
             views: [None, None],
             has_solids: false,
@@ -268,11 +268,11 @@ impl World {
         (resident, most): (&ResidentEnds<'_>, Most),
         stats: &mut Statistics,
     ) -> Result<(), Error> {
-        let Job { scene, frame, .. } = job;
+        let Job { scene, plan, .. } = job;
         if !self.is_seen(job, (motion, clusterings)) {
-            let layers = frame.layers.iter().zip(clusterings);
-            let wanted = layers.map(|(layer, clustering)| Held {
-                id: layer.id,
+            let query_parts = plan.parts.iter().zip(clusterings);
+            let wanted = query_parts.map(|(query_part, clustering)| Held {
+                id: query_part.id,
                 clustering: Arc::clone(clustering),
             });
             self.send_parts(gpu, scene, (motion, wanted.collect()), most)?;
@@ -290,13 +290,13 @@ impl World {
         job: Job<'_>,
         (motion, clusterings): (Motion, &[Arc<Clustering>]),
     ) -> bool {
-        let layers = job.frame.layers.iter().zip(clusterings);
+        let query_parts = job.plan.parts.iter().zip(clusterings);
         self.views[motion as usize].as_ref().is_some_and(|view| {
             let parts = view.parts.iter().map(|&part| &self.parts[part as usize]);
-            let is_it = |(part, (layer, clustering)): (&Held, (&Layer, _))| {
-                part.id == layer.id && Arc::ptr_eq(&part.clustering, clustering)
+            let is_it = |(part, (query_part, clustering)): (&Held, (&QueryPart, _))| {
+                part.id == query_part.id && Arc::ptr_eq(&part.clustering, clustering)
             };
-            view.parts.len() == clusterings.len() && parts.zip(layers).all(is_it)
+            view.parts.len() == clusterings.len() && parts.zip(query_parts).all(is_it)
         })
     }
 
@@ -375,14 +375,14 @@ impl World {
             });
         }
         let shapes: Vec<&TreeShape> = parts.iter().map(|part| &part.clustering.shape).collect();
-        self.forest = Forest::of_trees(&shapes);
+        self.trees = Trees::of_trees(&shapes);
         let sample = |part: u32| sample(scene, parts[part as usize].id);
         let numbers: BTreeMap<_, u32> = parts.iter().map(key).zip(0..).collect();
         let mut views = [None, None];
         for (view, seen) in views.iter_mut().zip(&seen) {
             let Some(seen) = seen else { continue };
             let seen = seen.iter().map(|part| numbers[&key(part)]).collect();
-            *view = Some(View::new(gpu, &mut self.forest, seen, parts.len(), sample)?);
+            *view = Some(View::new(gpu, &mut self.trees, seen, parts.len(), sample)?);
         }
         self.send_trees(gpu, &topology)?;
         self.positions.resize(gpu, 3 * self.n_ends * n_vertices)?;
@@ -399,7 +399,7 @@ impl World {
             .upload(gpu, &topology.cluster_vertices)?;
         self.corners.upload(gpu, &topology.corners)?;
         self.order.upload(gpu, &topology.numbers)?;
-        let nodes = &self.forest.nodes;
+        let nodes = &self.trees.nodes;
         match self.n_ends {
             1 => self.nodes.upload(gpu, nodes),
             _ => self.nodes.upload(gpu, &[&nodes[..], &nodes[..]].concat()),
@@ -414,22 +414,22 @@ impl World {
         &mut self,
         gpu: &Gpu,
         scene: &Scene,
-        frame: &Frame,
+        plan: &Plan,
         chunks: &[&Chunk],
-        clustering: impl Fn(LayerIx) -> &'a Clustering,
+        clustering: impl Fn(PartIx) -> &'a Clustering,
     ) -> Result<(), Error> {
         (self.parts, self.bodies, self.n_ends) = (Vec::new(), Vec::new(), 1);
         let view = self.views[Motion::Still as usize].take();
         self.views[Motion::Moving as usize] = None;
-        let loaded = Loaded::new(scene, frame, chunks, clustering);
-        self.forest = Forest::of_trees(&Vec::from_iter(&loaded.shapes));
+        let loaded = Loaded::new(scene, plan, chunks, clustering);
+        self.trees = Trees::of_trees(&Vec::from_iter(&loaded.shapes));
         self.send_trees(gpu, &loaded.topology)?;
         let words: &[Coordinate] = bytemuck::cast_slice(&loaded.words);
         self.positions.upload(gpu, words)?;
         let mut view = view.unwrap_or_default();
         view.top = None;
         view.parts.clear();
-        view.levels = self.forest.levels(None);
+        view.levels = self.trees.levels(None);
         view.table.upload(gpu, &view.levels)?;
         let records = loaded.is_rounded.iter().map(|&is_rounded| Body {
             root: NO_ROOT,
@@ -532,7 +532,7 @@ impl World {
         motion: Motion,
         resident: &ResidentEnds<'_>,
     ) -> Result<(), Error> {
-        let Job { scene, frame, .. } = job;
+        let Job { scene, plan, .. } = job;
         let is_rounded = |id: BodyId| {
             let body = scene.body_in(id.slot());
             let of_ends = [Some(body.positions()), body.end_positions()];
@@ -544,29 +544,29 @@ impl World {
                 matches!(end, Some(Positions::F64(_))) && !held.contains_key(&id)
             })
         };
-        let mut first_place = 0;
+        let mut first_slot = 0;
         let mut records = Vec::with_capacity(self.parts.len());
         for part in &self.parts {
             records.push(Body {
                 root: NO_ROOT,
                 // The boxes of parts that do not take part may be refitted too.
                 slack: if is_rounded(part.id) { SLACK } else { 0 },
-                first_place,
+                first_slot,
                 ..Body::default()
             });
-            // Places fit 31 bits.
-            first_place += part.clustering.order.len() as u32;
+            // Slots fit 31 bits.
+            first_slot += part.clustering.order.len() as u32;
         }
         let meets_bodies = match motion {
-            Motion::Still => frame.between(),
-            Motion::Moving => frame.meets_bodies(),
+            Motion::Still => plan.between(),
+            Motion::Moving => plan.meets_bodies(),
         };
         let view = self.views[motion as usize].as_ref().expect("just sent");
         let number = |id: BodyId| self.number(id).map(|number| number as u32);
-        for ((ix, layer), &part) in frame.numbered_layers().zip(&view.parts) {
+        for ((ix, query_part), &part) in plan.numbered_parts().zip(&view.parts) {
             // Bodies without a category meet no other body.
             let filter = match meets_bodies {
-                true => frame.filter(ix),
+                true => plan.filter(ix),
                 false => Filter {
                     category: 0,
                     mask: 0,
@@ -574,25 +574,27 @@ impl World {
             };
             let record = &mut records[part as usize];
             *record = Body {
-                root: self.forest.roots[part as usize],
+                root: self.trees.roots[part as usize],
                 within: u32::from(match motion {
-                    Motion::Still => layer.within,
-                    Motion::Moving => frame.test(ix, ix).is_some(),
+                    Motion::Still => query_part.within,
+                    Motion::Moving => plan.test(ix, ix).is_some(),
                 }),
-                layer: match motion {
+                part: match motion {
                     Motion::Still => 0,
-                    Motion::Moving => flags(layer) | number(layer.id).unwrap_or(0) << BODY_SHIFT,
+                    Motion::Moving => {
+                        flags(query_part) | number(query_part.id).unwrap_or(0) << BODY_SHIFT
+                    }
                 },
                 category: words(filter.category),
                 mask: words(filter.mask),
-                first_number: layer.first.raw(),
+                first_number: query_part.first.raw(),
                 ..*record
             };
         }
         let mut ignored: Vec<NodePair> = match motion {
             Motion::Still => {
-                let part = |layer: LayerIx| view.parts[layer.index()];
-                let pairs = frame.ignored_pairs().map(|(a, b)| [part(a), part(b)]);
+                let part = |query_part: PartIx| view.parts[query_part.index()];
+                let pairs = plan.ignored_pairs().map(|(a, b)| [part(a), part(b)]);
                 let pair = |[a, b]: [u32; 2]| NodePair {
                     a: a.min(b),
                     b: a.max(b),
@@ -600,7 +602,7 @@ impl World {
                 pairs.map(pair).collect()
             }
             Motion::Moving => {
-                let pairs = frame.ignored_bodies();
+                let pairs = plan.ignored_bodies();
                 let pair = |(a, b)| {
                     Some(NodePair {
                         a: number(a)?,
@@ -615,16 +617,16 @@ impl World {
         let sample = |part: u32| sample(scene, parts[part as usize].id);
         let view = self.views[motion as usize].as_mut().expect("just sent");
         if let Some(top) = &mut view.top
-            && top.reorder(&mut self.forest.nodes, sample)
+            && top.reorder(&mut self.trees.nodes, sample)
         {
-            let gates = top.gates(&self.forest.nodes);
+            let gates = top.gates(&self.trees.nodes);
             self.nodes.write(gpu, u64::from(top.first_gate), gates);
             view.is_moved = true;
         }
         view.send(gpu, records, ignored)
     }
 
-    /// Where the positions of a body are on the device, if they are those of the pose with this stamp: the buffer and the
+    /// Where the positions of a body are on the device, if they are those of the sweep with this stamp: the buffer and the
     /// first byte.
     pub fn positions_of(&self, body: BodyId, stamp: u64) -> Option<(&wgpu::Buffer, u64)> {
         let held = &self.bodies[self.number(body)?];
@@ -633,24 +635,24 @@ impl World {
     }
 
     fn root(&self, part: u32) -> u32 {
-        self.forest.roots[part as usize]
+        self.trees.roots[part as usize]
     }
 
     /// The seeds of a traversal: pairs of nodes, whose boxes need not overlap.
-    pub fn seeds(&self, frame: &Frame, motion: Motion) -> Vec<NodePair> {
+    pub fn seeds(&self, plan: &Plan, motion: Motion) -> Vec<NodePair> {
         let view = self.view(motion);
-        let root = |layer: LayerIx| self.root(view.parts[layer.index()]);
-        let is_filled = |layer: &LayerIx| root(*layer) != NO_ROOT;
+        let root = |query_part: PartIx| self.root(view.parts[query_part.index()]);
+        let is_filled = |query_part: &PartIx| root(*query_part) != NO_ROOT;
         let mut seeds = Vec::new();
         if let Some(top) = view.top()
-            && frame.between()
+            && plan.between()
         {
             return vec![NodePair { a: top, b: top }];
         }
-        if frame.between() {
-            let filled: Vec<LayerIx> = frame.layer_ixs().filter(is_filled).collect();
+        if plan.between() {
+            let filled: Vec<PartIx> = plan.part_ixs().filter(is_filled).collect();
             if let [a, b] = filled[..]
-                && frame.test(a, b).is_some()
+                && plan.test(a, b).is_some()
             {
                 seeds.push(NodePair {
                     a: root(a),
@@ -658,8 +660,8 @@ impl World {
                 });
             }
         }
-        for (ix, layer) in frame.numbered_layers() {
-            let is_asked = layer.within && frame.test(ix, ix).is_some();
+        for (ix, query_part) in plan.numbered_parts() {
+            let is_asked = query_part.within && plan.test(ix, ix).is_some();
             if is_asked && is_filled(&ix) {
                 seeds.push(NodePair {
                     a: root(ix),
@@ -680,24 +682,24 @@ impl World {
     }
 
     /// Appends the pairs of children of two nodes, whether their boxes overlap or not. Returns false, and appends
-    /// nothing, for two clusters. The same steps as `dispatch.wgsl`.
+    /// nothing, for two clusters. The same steps as `traversal.wgsl`.
     pub fn expand(
         &self,
-        frame: &Frame,
+        plan: &Plan,
         motion: Motion,
         pair: NodePair,
         into: &mut Vec<NodePair>,
     ) -> bool {
-        let nodes = &self.forest.nodes;
+        let nodes = &self.trees.nodes;
         let (a, b) = (&nodes[pair.a as usize], &nodes[pair.b as usize]);
         if a.height() == 0 && b.height() == 0 {
             return false;
         }
         if a.is_gate() && b.is_gate() {
             let parts = [a, b].map(|gate| gate.first_child);
-            let layers = parts.map(|part| self.view(motion).layers[part as usize]);
-            let [layer_a, layer_b] = layers.map(LayerIx::new);
-            if frame.test(layer_a, layer_b).is_some() {
+            let query_parts = parts.map(|part| self.view(motion).query_parts[part as usize]);
+            let [part_a, part_b] = query_parts.map(PartIx::new);
+            if plan.test(part_a, part_b).is_some() {
                 let [a, b] = parts.map(|part| self.root(part));
                 into.push(NodePair { a, b });
             }
@@ -722,7 +724,7 @@ impl World {
 
     /// The number of rounds that a traversal from these pairs takes.
     pub fn rounds(&self, seeds: &[NodePair]) -> u32 {
-        self.forest.rounds(seeds)
+        self.trees.rounds(seeds)
     }
 }
 
@@ -730,7 +732,7 @@ impl Default for View {
     fn default() -> Self {
         View {
             parts: Vec::new(),
-            layers: Vec::new(),
+            query_parts: Vec::new(),
             top: None,
             levels: Vec::new(),
             is_moved: true,
@@ -747,21 +749,21 @@ impl View {
     /// A view of some of `n_parts` parts, with a tree over them if there are more than a few.
     fn new(
         gpu: &Gpu,
-        forest: &mut Forest,
+        trees: &mut Trees,
         parts: Vec<u32>,
         n_parts: usize,
         sample: impl Fn(u32) -> [f32; 3],
     ) -> Result<Self, Error> {
-        let mut layers = vec![NO_LAYER; n_parts];
-        for (layer, &part) in (0..).zip(&parts) {
-            layers[part as usize] = layer;
+        let mut query_parts = vec![NO_PART; n_parts];
+        for (query_part, &part) in (0..).zip(&parts) {
+            query_parts[part as usize] = query_part;
         }
-        let top = forest.push_top(&parts, sample);
-        let mut levels = forest.levels(Some(&parts));
+        let top = trees.push_top(&parts, sample);
+        let mut levels = trees.levels(Some(&parts));
         levels.extend(top.iter().flat_map(|top| &top.levels));
         let mut view = View {
             parts,
-            layers,
+            query_parts,
             top,
             levels,
             ..View::default()
@@ -843,15 +845,15 @@ fn sample(scene: &Scene, id: BodyId) -> [f32; 3] {
     body.positions().point(vertex as usize).map(|x| x as f32)
 }
 
-/// What `meets_layers.wgsl` needs to know of a layer besides its body.
-fn flags(layer: &Layer) -> u32 {
-    let part = match layer.part {
+/// What `meets_parts.wgsl` needs to know of a query_part besides its body.
+fn flags(query_part: &QueryPart) -> u32 {
+    let part = match query_part.part {
         Part::Edges => EDGES,
         Part::Vertices => VERTICES,
         Part::Faces | Part::Given => FACES,
     };
     let flag = |is_set: bool, flag: u32| if is_set { flag } else { 0 };
-    part | flag(layer.is_bare, BARE)
-        | flag(layer.is_points, POINTS)
-        | flag(layer.within, OWN_LAYERS)
+    part | flag(query_part.is_bare, BARE)
+        | flag(query_part.is_points, POINTS)
+        | flag(query_part.within, OWN_PARTS)
 }

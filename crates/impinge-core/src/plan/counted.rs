@@ -1,11 +1,11 @@
 //! Which pairs count: those of a cell of space, and those that a filter lets pass.
 
-use crate::error::Error;
-use crate::hull::Extent;
-use crate::index::{Number, pair_numbers};
+use crate::boxes::Extent;
 use crate::query::Cell;
+use crate::query::step::PairFilter;
 use crate::scene::Scene;
-use crate::step::PairFilter;
+use crate::scene::error::Error;
+use crate::scene::index::{Number, pair_numbers};
 
 use super::{Plan, Question};
 
@@ -47,9 +47,9 @@ impl Plan {
 
     /// The lower corner of the box of an element: over the whole step, if the question is about one.
     fn lower_corner(&self, scene: &Scene, number: Number) -> [f64; 3] {
-        let (layer, element) = self.locate(number);
-        let body = self.body(scene, layer);
-        let corners = body.corners(self.layer(layer).part, &element);
+        let (part, element) = self.locate(number);
+        let body = self.body(scene, part);
+        let corners = body.corners(self.part(part).part, &element);
         let end = body.end_positions().filter(|_| self.sweep.until > 0.0);
         let ends = std::iter::once(body.positions()).chain(end);
         let points = ends.flat_map(|at| corners.iter().map(|&corner| at.point(corner as usize)));
@@ -83,11 +83,11 @@ impl Plan {
             return true;
         };
         let [a, b] = pair_numbers(key).map(|number| self.locate(number));
-        let [a, b] = [&a, &b].map(|(layer, element)| {
+        let [a, b] = [&a, &b].map(|(part, element)| {
             let corners = self
-                .body(scene, *layer)
-                .corners(self.layer(*layer).part, element);
-            (self.layer(*layer).id, corners)
+                .body(scene, *part)
+                .corners(self.part(*part).part, element);
+            (self.part(*part).id, corners)
         });
         filter.passes([a, b])
     }

@@ -4,20 +4,46 @@
 //! distance      what is asked: of a query for near pairs, or the separation of a step
 //! thickness     what a body adds to it; of candidates, the distance by which each box is inflated
 //! bound         what any pair of a step keeps at most: the separation, and a clearance
-//! inflation     how far the boxes of a layer reach beyond its elements: its thickness, and half of the bound
+//! inflation     how far the boxes of a part reach beyond its elements: its thickness, and half of the bound
 //! ```
 
 use std::collections::BTreeMap;
 
-use crate::hull::Pose;
-use crate::index::LayerIx;
+use crate::boxes::Sweep;
+use crate::query::goal::Limits;
+use crate::query::near::NearQuery;
+use crate::query::step::check_distance;
 use crate::scene::Scene;
+use crate::scene::error::Error;
+use crate::scene::index::PartIx;
 use impinge_exact::internal::{Keep, Reach};
 use impinge_exact::{Contact, ElementPair, Point};
 
 use super::Plan;
 
 impl Plan {
+    /// What a query for near pairs asks of a scene.
+    pub(crate) fn of_near(query: &NearQuery, scene: &Scene, limits: Limits) -> Result<Plan, Error> {
+        let numbers = query
+            .thickness
+            .values()
+            .map(|&number| ("thickness", number));
+        for (setting, number) in numbers.chain([("distance", query.distance)]) {
+            check_distance(setting, number)?;
+        }
+        for &body in query.thickness.keys() {
+            scene.body(body)?;
+        }
+        let of_distance = size_of::<f64>() * usize::from(query.distances);
+        let of_points = size_of::<[[f64; 3]; 2]>() * usize::from(query.closest);
+        let limits = Limits {
+            besides: (1 + of_distance + of_points) as u64,
+            ..limits
+        };
+        let of_pairs = (&query.query, query.kinds);
+        Plan::nearness(scene, of_pairs, query.distance, &query.thickness, limits)
+    }
+
     /// Makes elements keep a separation, and a clearance if there is one.
     pub(super) fn keep(&mut self, scene: &Scene, keep: Keep) {
         self.keep = keep;
@@ -54,28 +80,28 @@ impl Plan {
         self.bound
     }
 
-    /// What a pair of two layers keeps, by its points at both ends.
+    /// What a pair of two parts keeps, by its points at both ends.
     pub(crate) fn kept(
         &self,
         scene: &Scene,
-        layers: [LayerIx; 2],
+        parts: [PartIx; 2],
         pair: ElementPair,
         ends: [&[Point; 4]; 2],
     ) -> f64 {
         self.keep
-            .distance(pair, ends, self.unit_roundoff(scene, layers))
+            .distance(pair, ends, self.unit_roundoff(scene, parts))
     }
 
-    /// When a pair of two layers is first as near as it may come.
+    /// When a pair of two parts is first as near as it may come.
     pub(crate) fn first(
         &self,
         scene: &Scene,
-        layers: [LayerIx; 2],
+        parts: [PartIx; 2],
         pair: ElementPair,
         ends: [&[Point; 4]; 2],
     ) -> Option<Contact> {
         self.keep
-            .first(pair, ends, self.unit_roundoff(scene, layers))
+            .first(pair, ends, self.unit_roundoff(scene, parts))
     }
 
     /// The contact of a pair that is as near as it may come from the start on.
@@ -83,26 +109,26 @@ impl Plan {
         self.keep.at_start(pair, start)
     }
 
-    /// The unit roundoff of the positions of two layers that move; the larger one.
-    fn unit_roundoff(&self, scene: &Scene, layers: [LayerIx; 2]) -> f64 {
-        let units = layers.map(|layer| {
-            let body = self.body(scene, layer);
+    /// The unit roundoff of the positions of two parts that move; the larger one.
+    fn unit_roundoff(&self, scene: &Scene, parts: [PartIx; 2]) -> f64 {
+        let units = parts.map(|part| {
+            let body = self.body(scene, part);
             let end = body.end_positions();
             end.map_or(0.0, |end| body.positions().unit_roundoff(end))
         });
         units[0].max(units[1])
     }
 
-    /// Within which distance elements of two layers are near.
-    pub(crate) fn reach(&self, a: LayerIx, b: LayerIx) -> Reach {
-        let [a, b] = [a, b].map(|layer| self.layer(layer).thickness);
+    /// Within which distance elements of two parts are near.
+    pub(crate) fn reach(&self, a: PartIx, b: PartIx) -> Reach {
+        let [a, b] = [a, b].map(|part| self.part(part).thickness);
         Reach::of_sum([self.distance, a, b])
     }
 
-    /// How far the boxes of a layer must reach beyond its elements, so that those of near elements overlap: those of two
-    /// layers reach at least as far together as their elements may be apart.
-    pub(crate) fn inflation(&self, layer: LayerIx) -> f64 {
-        let thickness = self.layer(layer).thickness;
+    /// How far the boxes of a part must reach beyond its elements, so that those of near elements overlap: those of two
+    /// parts reach at least as far together as their elements may be apart.
+    pub(crate) fn inflation(&self, part: PartIx) -> f64 {
+        let thickness = self.part(part).thickness;
         match (self.bound, thickness) {
             (0.0, thickness) => thickness,
             (distance, thickness) => (thickness + (distance / 2.0).next_up()).next_up(),
@@ -111,31 +137,31 @@ impl Plan {
 
     /// Makes this a question about all ways that end at rounded positions, at any time of the step.
     pub(super) fn round(&mut self, scene: &Scene) {
-        // The layers of a body share its positions.
+        // The parts of a body share its positions.
         let mut of_bodies = BTreeMap::new();
-        for ix in 0..self.layers.len() {
-            let body = self.body(scene, LayerIx::from_usize(ix));
-            let rounded = of_bodies.entry(self.layers[ix].id).or_insert_with(|| {
+        for ix in 0..self.parts.len() {
+            let body = self.body(scene, PartIx::from_usize(ix));
+            let rounded = of_bodies.entry(self.parts[ix].id).or_insert_with(|| {
                 let end = body.end_positions();
                 end.map_or(0.0, |end| body.positions().most_rounded(end))
             });
-            self.layers[ix].rounded = *rounded;
+            self.parts[ix].rounded = *rounded;
         }
     }
 
-    /// How far vertices of two layers may be from their ways, because positions on these are rounded.
-    pub(crate) fn rounded(&self, a: LayerIx, b: LayerIx) -> f64 {
-        f64::max(self.layer(a).rounded, self.layer(b).rounded)
+    /// How far vertices of two parts may be from their ways, because positions on these are rounded.
+    pub(crate) fn rounded(&self, a: PartIx, b: PartIx) -> f64 {
+        f64::max(self.part(a).rounded, self.part(b).rounded)
     }
 
     /// Whether positions on the ways of vertices are rounded.
     pub(crate) fn is_rounded(&self) -> bool {
-        self.layers.iter().any(|layer| layer.rounded > 0.0)
+        self.parts.iter().any(|part| part.rounded > 0.0)
     }
 
-    /// The pose of a layer: its boxes also reach by its [`inflation`](Plan::inflation), and as far as positions are rounded.
+    /// The sweep of a part: its boxes also reach by its [`inflation`](Plan::inflation), and as far as positions are rounded.
     #[inline(always)]
-    pub(crate) fn pose(&self, pose: Pose, layer: LayerIx) -> Pose {
-        pose.inflated_by(self.inflation(layer) + self.layer(layer).rounded)
+    pub(crate) fn sweep_of(&self, sweep: Sweep, part: PartIx) -> Sweep {
+        sweep.inflated_by(self.inflation(part) + self.part(part).rounded)
     }
 }

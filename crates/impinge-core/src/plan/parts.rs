@@ -1,14 +1,14 @@
 //! Which parts of bodies take part, and whether their positions are fit for it.
 
-use crate::elements::{Kind, Part};
-use crate::error::Error;
-use crate::ids::BodyId;
-use crate::index::{LayerIx, Number};
-use crate::positions::{Positions, check_positions};
 use crate::query::{Query, Scope};
+use crate::scene::elements::{Kind, Part};
+use crate::scene::error::Error;
+use crate::scene::ids::BodyId;
+use crate::scene::index::{Number, PartIx};
+use crate::scene::positions::{Positions, check_positions};
 use crate::scene::{Filter, Scene};
 
-use super::{Layer, Plan};
+use super::{Plan, QueryPart};
 
 impl Plan {
     pub(super) fn push_part(
@@ -51,17 +51,17 @@ impl Plan {
 
     /// Refuses positions that were written in place and are not finite or out of range.
     pub fn check(&self, scene: &Scene) -> Result<(), Error> {
-        self.layer_ixs()
-            .try_for_each(|layer| self.check_one(scene, layer))
+        self.part_ixs()
+            .try_for_each(|part| self.check_one(scene, part))
     }
 
-    /// As [`check`](Plan::check), for one layer.
-    pub fn check_one(&self, scene: &Scene, layer: LayerIx) -> Result<(), Error> {
-        let body = self.body(scene, layer);
+    /// As [`check`](Plan::check), for one part.
+    pub fn check_one(&self, scene: &Scene, part: PartIx) -> Result<(), Error> {
+        let body = self.body(scene, part);
         if body.is_checked() {
             return Ok(());
         }
-        let id = self.layer(layer).id;
+        let id = self.part(part).id;
         match body.positions() {
             Positions::F32(positions) => check_positions(id, positions),
             Positions::F64(positions) => check_positions(id, positions),
@@ -94,7 +94,7 @@ impl Plan {
                 limit,
             });
         }
-        self.layers.push(Layer {
+        self.parts.push(QueryPart {
             id,
             part,
             first: Number::new(first as u32),

@@ -10,12 +10,12 @@
 //! (`docs/exactness.md`, "The smallest distance of two bodies").
 
 use super::features::dot;
-use crate::hull::Extent;
+use crate::boxes::Extent;
 
 use super::scale::Scale;
 use super::tree::{Node, Tree};
-use crate::index::ClusterIx;
 use crate::scene::Body;
+use crate::scene::index::ClusterIx;
 use impinge_exact::Point;
 
 /// Three directions at right angles and of length 1, but for rounding.

@@ -17,22 +17,22 @@ use super::axes::{Axes, View};
 use super::features::{Gap, gap};
 use super::scale::Scale;
 use super::shared::shared_point;
-use crate::hull::Extent;
+use crate::boxes::Extent;
 
 use super::many::{Allowance, Bodies, are_apart, meet};
 use super::tree::{Node, Tree, box_along, corners};
-use crate::clusterings::{Asked, Clusterings};
-use crate::elements::{Kind, Part};
-use crate::error::Error;
-use crate::grouping::bounds::round_up;
-use crate::ids::BodyId;
-use crate::index::{ElementIx, LayerIx};
-use crate::narrow::intersect;
+use crate::bvh::bounds::round_up;
+use crate::clusterings::{BodyPart, Clusterings};
 use crate::plan::Plan;
-use crate::positions::{Positions, check_positions};
-use crate::progress::Control;
+use crate::query::progress::Control;
+use crate::scene::elements::{Kind, Part};
+use crate::scene::error::Error;
+use crate::scene::ids::BodyId;
+use crate::scene::index::{ElementIx, PartIx};
+use crate::scene::positions::{Positions, check_positions};
 use crate::scene::{Body, Scene};
-use crate::stats::Statistics;
+use crate::search::narrow::intersect;
+use crate::search::stats::Statistics;
 use crate::workers::Workers;
 use impinge_exact::Point;
 use impinge_exact::internal::filter::Directions64;
@@ -99,8 +99,8 @@ impl Distances {
     ///
     /// # Errors
     /// A body that is not in the scene, the same body twice, bad positions that were written in place; cancellation; errors of
-    /// `touching`, which is asked for the lowest pair that touches where boxes of many clusters overlap: it may settle by pairs of clusters
-    /// what this search would settle one by one.
+    /// `touching`, which is asked for the lowest pair that touches where boxes of many clusters overlap: it may decide by pairs of clusters
+    /// what this search would decide one by one.
     pub fn between(
         &mut self,
         scene: &Scene,
@@ -197,41 +197,41 @@ impl Distances {
     pub fn nearest(
         &mut self,
         scene: &Scene,
-        frame: &Plan,
+        plan: &Plan,
         workers: &Workers,
         control: &Control<'_>,
         mut touching: impl FnMut([BodyId; 2]) -> Result<Option<[u32; 2]>, Error>,
     ) -> Result<Option<Nearest>, Error> {
         self.begin(scene);
         let mut many = std::mem::take(&mut self.many);
-        many.update(scene, frame);
+        many.update(scene, plan);
         // The bodies that were nearest last are a good bound.
         let likely = self
             .nearest
-            .map(|ids| ids.map(|id| frame.layers.binary_search_by_key(&id, |layer| layer.id)));
+            .map(|ids| ids.map(|id| plan.parts.binary_search_by_key(&id, |part| part.id)));
         let scale = Scale::of(many.magnitude(), || {
-            let bodies = frame
-                .layers
+            let bodies = plan
+                .parts
                 .iter()
-                .filter_map(|layer| scene.body(layer.id).ok());
+                .filter_map(|part| scene.body(part.id).ok());
             bodies.fold(0.0, |most, body| body.positions().magnitude().max(most))
         });
         // Squares of distances are in this scale.
         let mut best: Option<(f64, Nearest)> = None;
         let error = ROUNDING_TURNED * many.magnitude();
         let mut n_asked = 0;
-        let mut ask = |best: &mut Option<(f64, Nearest)>, boxes: &Bodies, [a, b]: [LayerIx; 2]| {
-            if frame.test(a, b).is_none() {
+        let mut ask = |best: &mut Option<(f64, Nearest)>, boxes: &Bodies, [a, b]: [PartIx; 2]| {
+            if plan.test(a, b).is_none() {
                 return Ok(());
             }
-            let ids = [a, b].map(|layer| frame.layer(layer).id);
+            let ids = [a, b].map(|part| plan.part(part).id);
             let most = best.map_or(f64::INFINITY, |(squared, _)| squared);
             // Nothing is nearer than 0, and no lower pair of bodies is asked later.
             if most == 0.0 && best.is_some_and(|(_, best)| best.bodies <= ids) {
                 return Ok(());
             }
             let pair = [a, b];
-            let bodies = pair.map(|layer| frame.body(scene, layer));
+            let bodies = pair.map(|part| plan.body(scene, part));
             if scale.is_one() && are_apart(bodies, boxes.boxes(pair), most.sqrt(), error) {
                 return Ok(());
             }
@@ -253,13 +253,13 @@ impl Distances {
         };
         let found: Result<(), Error> = (|| {
             if let Some([Ok(a), Ok(b)]) = likely {
-                ask(&mut best, &many, [a, b].map(LayerIx::from_usize))?;
+                ask(&mut best, &many, [a, b].map(PartIx::from_usize))?;
             }
             let mut overlapping = Vec::new();
             // If two touch, only lower ones that touch are left to be found.
             let least = touching_ones(best);
             many.overlapping(|pair| {
-                let is_lower = |least: [BodyId; 2]| pair.map(|layer| frame.layer(layer).id) < least;
+                let is_lower = |least: [BodyId; 2]| pair.map(|part| plan.part(part).id) < least;
                 if least.is_none_or(is_lower) {
                     overlapping.push(pair);
                 }
@@ -298,26 +298,26 @@ impl Distances {
     pub fn any(
         &mut self,
         scene: &Scene,
-        frame: &Plan,
+        plan: &Plan,
         workers: &Workers,
         control: &Control<'_>,
     ) -> Result<Option<bool>, Error> {
         self.begin(scene);
         let mut many = std::mem::take(&mut self.many);
-        many.update(scene, frame);
+        many.update(scene, plan);
         let mut allowance = Allowance(ALLOWANCE);
         let mut any = Some(false);
         let found = many.overlapping(|pair| {
             let [a, b] = pair;
-            if frame.test(a, b).is_none() {
+            if plan.test(a, b).is_none() {
                 return Ok(false);
             }
             control.step(0, 1)?;
-            let ids = pair.map(|layer| frame.layer(layer).id);
+            let ids = pair.map(|part| plan.part(part).id);
             for id in ids {
                 self.know(scene, id, workers)?;
             }
-            let bodies = pair.map(|layer| frame.body(scene, layer));
+            let bodies = pair.map(|part| plan.body(scene, part));
             let trees = ids.map(|id| &self.trees[&id.index()]);
             any = meet(bodies, trees, &mut allowance, &mut self.stack);
             Ok(any != Some(false))
@@ -342,19 +342,19 @@ impl Distances {
                 Positions::F64(positions) => check_positions(id, positions)?,
             }
         }
-        let asked = Asked::new(id, body, Part::Given);
+        let body_part = BodyPart::new(id, body, Part::Given);
         let (slot, stats) = (id.index(), &mut self.stats);
         let known = self.trees.remove(&slot).filter(|tree| tree.fits(body));
         if known.is_none() {
             self.last.retain(|numbers, _| !numbers.contains(&slot));
         }
         let own = known.as_ref().map(|tree| &tree.clustering);
-        let clustering = self.clusterings.of(asked, own, workers, stats)?;
+        let clustering = self.clusterings.of(body_part, own, workers, stats)?;
         let known = known.filter(|tree| Arc::ptr_eq(&tree.clustering, &clustering));
         let mut tree = known.unwrap_or_else(|| Tree::new(body, clustering));
         if tree.refit(body) {
             let (spread, mut all) = (tree.spread(), self.clusterings.lock());
-            let renewed = all.renew_if_stale(asked, (&mut tree.fit, spread), workers, stats)?;
+            let renewed = all.renew_if_stale(body_part, (&mut tree.fit, spread), workers, stats)?;
             if let Some(clustering) = renewed {
                 tree = Tree::new(body, clustering);
                 tree.refit(body);

@@ -11,13 +11,13 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-use crate::grouping::bounds::Bounds;
-use crate::grouping::hierarchy::{Entry, TreeShape, order};
-use crate::hull::{self, Extent};
-use crate::index::LayerIx;
-use crate::narrow::intersect;
+use crate::boxes::{self, Extent};
+use crate::bvh::bounds::Bounds;
+use crate::bvh::tree::{Entry, TreeShape, order};
 use crate::plan::Plan;
+use crate::scene::index::PartIx;
 use crate::scene::{Body, Scene};
+use crate::search::narrow::intersect;
 
 use super::axes::Axes;
 use super::features::dot;
@@ -28,12 +28,12 @@ use super::tree::{Node, Tree, box_of, corners};
 pub(super) struct Bodies {
     /// The stamp of the scene.
     scene: u64,
-    /// The slot and the stamp of the positions of each layer's body.
+    /// The slot and the stamp of the positions of each part's body.
     stamps: Vec<(u32, u64)>,
     boxes: Vec<Bounds>,
     shape: TreeShape,
-    /// The layer at each leaf.
-    order: Vec<LayerIx>,
+    /// The part at each leaf.
+    order: Vec<PartIx>,
     /// The boxes of each level's nodes, from the leaves up.
     levels: Vec<Vec<Bounds>>,
     /// The summed surface of the nodes above the leaves when the order was made.
@@ -46,9 +46,9 @@ const STALE: f64 = 1.5;
 
 impl Bodies {
     /// Brings boxes and tree up to the scene; the boxes of bodies that have not moved are kept.
-    pub fn update(&mut self, scene: &Scene, frame: &Plan) {
-        let n = frame.layers.len();
-        let slots = frame.layers.iter().map(|layer| layer.id.slot());
+    pub fn update(&mut self, scene: &Scene, plan: &Plan) {
+        let n = plan.parts.len();
+        let slots = plan.parts.iter().map(|part| part.id.slot());
         if self.scene == scene.stamp() && slots.eq(self.stamps.iter().map(|&(slot, _)| slot)) {
             return;
         }
@@ -57,21 +57,21 @@ impl Bodies {
         let mut has_moved = is_new;
         self.stamps.resize(n, (u32::MAX, 0));
         self.boxes.resize(n, Bounds::EMPTY);
-        for (ix, layer) in frame.numbered_layers() {
-            let body = frame.body(scene, ix);
-            let stamp = (layer.id.slot(), body.positions_stamp());
+        for (ix, part) in plan.numbered_parts() {
+            let body = plan.body(scene, ix);
+            let stamp = (part.id.slot(), body.positions_stamp());
             let known = &mut self.stamps[ix.index()];
             if *known != stamp {
                 is_new |= known.0 != stamp.0;
                 has_moved = true;
                 *known = stamp;
-                self.boxes[ix.index()] = hull::of_run(body.positions(), 0..body.n_vertices());
+                self.boxes[ix.index()] = boxes::of_run(body.positions(), 0..body.n_vertices());
             }
         }
         if is_new {
             self.shape = TreeShape::new(n);
             self.order.clear();
-            self.order.extend(LayerIx::up_to(n));
+            self.order.extend(PartIx::up_to(n));
             let n_levels = self.shape.n_levels();
             self.levels.resize_with(n_levels, Vec::new);
             for (level, boxes) in self.levels.iter_mut().enumerate() {
@@ -82,12 +82,11 @@ impl Bodies {
             self.refit();
         }
         if is_new || self.surface_now() > STALE * self.surface {
-            let entry =
-                |layer: LayerIx| Entry::new(self.boxes[layer.index()].center(), layer.raw());
-            let mut entries: Vec<Entry> = LayerIx::up_to(n).map(entry).collect();
+            let entry = |part: PartIx| Entry::new(self.boxes[part.index()].center(), part.raw());
+            let mut entries: Vec<Entry> = PartIx::up_to(n).map(entry).collect();
             order(&self.shape, 1, None, &mut entries);
-            for (layer, entry) in self.order.iter_mut().zip(&entries) {
-                *layer = LayerIx::new(entry.number);
+            for (part, entry) in self.order.iter_mut().zip(&entries) {
+                *part = PartIx::new(entry.number);
             }
             self.refit();
             self.surface = self.surface_now();
@@ -98,8 +97,8 @@ impl Bodies {
         let Some(leaves) = self.levels.first_mut() else {
             return;
         };
-        for (leaf, layer) in leaves.iter_mut().zip(&self.order) {
-            *leaf = self.boxes[layer.index()];
+        for (leaf, part) in leaves.iter_mut().zip(&self.order) {
+            *leaf = self.boxes[part.index()];
         }
         for level in 1..self.levels.len() {
             let (below, above) = self.levels.split_at_mut(level);
@@ -138,15 +137,15 @@ impl Bodies {
         })
     }
 
-    /// The layers of two leaves, the lower one first.
-    fn layers(&self, [a, b]: [Node; 2]) -> [LayerIx; 2] {
+    /// The parts of two leaves, the lower one first.
+    fn parts(&self, [a, b]: [Node; 2]) -> [PartIx; 2] {
         let [a, b] = [a, b].map(|leaf| self.order[leaf.number as usize]);
         [a.min(b), a.max(b)]
     }
 
-    /// The boxes of two layers' bodies.
-    pub fn boxes(&self, layers: [LayerIx; 2]) -> [&Bounds; 2] {
-        layers.map(|layer| &self.boxes[layer.index()])
+    /// The boxes of two parts' bodies.
+    pub fn boxes(&self, parts: [PartIx; 2]) -> [&Bounds; 2] {
+        parts.map(|part| &self.boxes[part.index()])
     }
 
     /// The largest magnitude of a coordinate.
@@ -155,10 +154,10 @@ impl Bodies {
         root.map_or(0.0, |root| root.magnitude())
     }
 
-    /// Calls `each` for the pairs of layers whose boxes have a point in common, until it returns true.
+    /// Calls `each` for the pairs of parts whose boxes have a point in common, until it returns true.
     pub fn overlapping<E>(
         &mut self,
-        mut each: impl FnMut([LayerIx; 2]) -> Result<bool, E>,
+        mut each: impl FnMut([PartIx; 2]) -> Result<bool, E>,
     ) -> Result<(), E> {
         let mut stack = std::mem::take(&mut self.stack);
         stack.clear();
@@ -167,7 +166,7 @@ impl Bodies {
         while let Some([x, y]) = stack.pop() {
             if x.level == 0 {
                 if x != y {
-                    found = each(self.layers([x, y]));
+                    found = each(self.parts([x, y]));
                     if !matches!(found, Ok(false)) {
                         break;
                     }
@@ -196,7 +195,7 @@ impl Bodies {
         }
     }
 
-    /// Pairs of layers whose boxes are apart, nearest boxes first.
+    /// Pairs of parts whose boxes are apart, nearest boxes first.
     pub fn apart(&self) -> Apart<'_> {
         let mut apart = Apart {
             bodies: self,
@@ -224,7 +223,7 @@ impl Apart<'_> {
     }
 
     /// The next pair, if the squared distance of its boxes is at most `most`.
-    pub fn next(&mut self, most: f64) -> Option<[LayerIx; 2]> {
+    pub fn next(&mut self, most: f64) -> Option<[PartIx; 2]> {
         while let Some(Reverse((squared, nodes))) = self.waiting.pop() {
             let squared = f64::from_bits(squared);
             if squared > most {
@@ -236,7 +235,7 @@ impl Apart<'_> {
             } else if nodes[0] != nodes[1] {
                 let [x, y] = nodes.map(|node| self.bodies.bounds(node));
                 if !x.overlaps(y) {
-                    return Some(self.bodies.layers(nodes));
+                    return Some(self.bodies.parts(nodes));
                 }
             }
         }

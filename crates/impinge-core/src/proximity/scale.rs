@@ -4,7 +4,7 @@
 //! the largest is between 2^-80 and 2^30. That is exact but for coordinates that are very much smaller than the largest; what those
 //! lose is far below the error that the search allows for. Anywhere else the factor is 1.
 
-use crate::hull::Extent;
+use crate::boxes::Extent;
 use impinge_exact::Point;
 
 /// A power of two.

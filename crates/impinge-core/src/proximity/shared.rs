@@ -3,8 +3,8 @@
 use impinge_exact::Point;
 use impinge_exact::internal::closest_of_elements;
 
-use crate::elements::Kind;
-use crate::narrow::intersect;
+use crate::scene::elements::Kind;
+use crate::search::narrow::intersect;
 
 /// A point that two elements share which intersect, rounded: where their borders or surfaces meet; else, as one is inside
 /// the other, a corner of the inner one.

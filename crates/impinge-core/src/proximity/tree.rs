@@ -1,16 +1,16 @@
 //! The boxes of a body's clusters, and of the tree nodes above them.
 //!
-//! The clusters are those that all questions share. Their boxes are found once per pose, from each cluster's vertices; boxes
+//! The clusters are those that all questions share. Their boxes are found once per sweep, from each cluster's vertices; boxes
 //! of primitives only when a cluster is compared. Cost: `O(n)`.
 
 use std::sync::Arc;
 
+use crate::boxes::{self, Extent};
+use crate::bvh::bounds::Bounds;
+use crate::bvh::clusters::Clustering;
 use crate::clusterings::{Fit, spread};
-use crate::grouping::bounds::Bounds;
-use crate::grouping::clusters::Clustering;
-use crate::hull::{self, Extent};
-use crate::index::{ClusterIx, ElementIx};
 use crate::scene::Body;
+use crate::scene::index::{ClusterIx, ElementIx};
 use impinge_exact::Point;
 
 /// A body's clusters and boxes.
@@ -51,7 +51,7 @@ impl Tree {
         self.levels.clear();
         let clusters = self.clustering.clusters();
         let of_clusters = clusters
-            .map(|cluster| hull::of_vertices(body.positions(), self.clustering.vertices(cluster)))
+            .map(|cluster| boxes::of_vertices(body.positions(), self.clustering.vertices(cluster)))
             .collect();
         self.levels.push(of_clusters);
         for level in 1..self.clustering.shape.n_levels() {
@@ -72,7 +72,7 @@ impl Tree {
         true
     }
 
-    /// How well the clusters fit the pose of the boxes.
+    /// How well the clusters fit the sweep of the boxes.
     pub fn spread(&self) -> f64 {
         let (Some(clusters), Some(root)) = (self.levels.first(), self.root()) else {
             return 1.0;

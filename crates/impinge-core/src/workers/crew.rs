@@ -91,8 +91,7 @@ impl Crew {
         let work_ptr =
             unsafe { std::mem::transmute::<*const Work<'_>, *const Work<'static>>(work) };
         // SAFETY: the gate is closed and no helper is inside; `busy` excludes other callers.
-        self.work
-            .with_mut(|place| unsafe { *place = Some(work_ptr) });
+        self.work.with_mut(|slot| unsafe { *slot = Some(work_ptr) });
         let number = self.gate.load(Ordering::Relaxed) & !(REGION - 1);
         self.gate
             .store(number.wrapping_add(REGION) | OPEN, Ordering::Release);
@@ -126,7 +125,7 @@ impl Crew {
             return false;
         }
         // SAFETY: the helper is inside, so the caller waits for it and the work is alive.
-        let work = self.work.with(|place| unsafe { *place });
+        let work = self.work.with(|slot| unsafe { *slot });
         if let Some(work) = work {
             // SAFETY: as above.
             let run = AssertUnwindSafe(|| unsafe { (*work)(seat) });

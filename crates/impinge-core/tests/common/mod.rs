@@ -30,7 +30,7 @@ pub fn naive(case: &Case) -> Vec<[u32; 4]> {
     rows(detector.detect(&case.scene, &case.query).unwrap())
 }
 
-/// Whether remote clusters are left out on this processor: without AVX2 this would gain nothing.
+/// Whether culled clusters are left out on this processor: without AVX2 this would gain nothing.
 pub fn leaves_out() -> bool {
     #[cfg(target_arch = "x86_64")]
     {

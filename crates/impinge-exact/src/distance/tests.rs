@@ -18,22 +18,22 @@ type Step = [[Point; 4]; 2];
 struct Asked {
     pair: ElementPair,
     tables: [Box<Moving64>; 2],
-    places: [u8; BATCH],
+    slots: [u8; BATCH],
     until: f32,
     reach: [f32; 2],
 }
 
 impl Asked {
     fn new(pair: ElementPair, steps: &[Step], until: f32, reach: [f32; 2]) -> Self {
-        // Elements at odd places, in reverse.
-        let places: [u8; BATCH] = std::array::from_fn(|lane| (2 * (BATCH - lane) - 1) as u8);
+        // Elements at odd slots, in reverse.
+        let slots: [u8; BATCH] = std::array::from_fn(|lane| (2 * (BATCH - lane) - 1) as u8);
         let table = |points: std::ops::Range<usize>| {
             let mut table: Box<Moving64> = Box::new([[[[0.0; TABLE]; 3]; 3]; 2]);
             for (lane, step) in steps.iter().enumerate() {
                 for (end, corners) in table.iter_mut().enumerate() {
                     for (point, corner) in points.clone().zip(corners) {
                         for (axis, row) in corner.iter_mut().enumerate() {
-                            row[places[lane] as usize] = step[end][point][axis] as f32;
+                            row[slots[lane] as usize] = step[end][point][axis] as f32;
                         }
                     }
                 }
@@ -48,7 +48,7 @@ impl Asked {
         Asked {
             pair,
             tables: [table(0..n), table(n..4)],
-            places,
+            slots,
             until,
             reach,
         }
@@ -57,11 +57,11 @@ impl Asked {
     #[inline(always)]
     fn answer<V: number::Lookup>(&self) -> (Near16, u16) {
         let [a, b] = &self.tables;
-        let (groups, places) = ([&**a, &**b], [&self.places; 2]);
-        let within = are_within_in_tables::<V>(self.pair, groups, places, self.reach);
+        let (groups, slots) = ([&**a, &**b], [&self.slots; 2]);
+        let within = are_within_in_tables::<V>(self.pair, groups, slots, self.reach);
         let high = self.reach[1];
-        let stay = stay_beyond_in_tables::<V>(self.pair, groups, places, self.until, high);
-        let mut near = nearest_in_tables::<V>(self.pair, groups, places, self.reach);
+        let stay = stay_beyond_in_tables::<V>(self.pair, groups, slots, self.until, high);
+        let mut near = nearest_in_tables::<V>(self.pair, groups, slots, self.reach);
         assert_eq!(near.verdict, within);
         // Parts of pairs that are not certainly near depend on the length of registers.
         for bits in &mut near.parts {

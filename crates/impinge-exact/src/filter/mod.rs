@@ -6,7 +6,7 @@
 //! [`projections`]; pairs that touch, or overlap in one plane, are always unsure.
 //!
 //! In: [`TrianglePairs8`], eight pairs with one array per coordinate ("structure of arrays"), in `f64`; or, in
-//! `f32`, the corners of two groups as tables ([`Triangles64`]) and the places of sixteen pairs in them.
+//! `f32`, the corners of two groups as tables ([`Triangles64`]) and the slots of sixteen pairs in them.
 //! Out: bit masks, bit k for pair k. Cost: [`reject_by_planes`] about 120 and [`classify`] about
 //! 330 operations, without a branch, for all eight lanes at once. Both are generic over the vector
 //! registers that they use ([`number`]) and `#[inline(always)]`, so that a caller compiles them for an
@@ -68,7 +68,7 @@ pub const TABLE: usize = 64;
 /// determinant grows with the square of the coordinates.
 pub const LARGEST_F32: f32 = f32::from_bits((127 + 24) << 23);
 
-/// The triangles of a group: `[vertex][axis][place]`.
+/// The triangles of a group: `[vertex][axis][slot]`.
 pub type Triangles64 = [[[f32; TABLE]; 3]; 3];
 
 /// One triangle per lane: `[vertex][axis][lane]`.

@@ -12,7 +12,7 @@ use crate::{ElementPair, Point};
 #[repr(align(64))]
 pub struct Steps8(pub [[[[f64; LANES]; 3]; 4]; 2]);
 
-/// The moving elements of a group: `[start or end][corner][axis][place]`.
+/// The moving elements of a group: `[start or end][corner][axis][slot]`.
 pub type Moving64 = [[[[f32; TABLE]; 3]; 3]; 2];
 
 /// An interval of time for each of eight pairs.
@@ -257,19 +257,19 @@ pub(super) fn are_edges(pair: ElementPair) -> bool {
 }
 
 /// Which of sixteen pairs are certainly apart from t = 0 to `until`, by the cheapest test. The elements are those of two
-/// groups, named by their places, with a margin as in [`are_apart`]. In `f32`: for coordinates of any size, but differences above 2^16 are never certain.
+/// groups, named by their slots, with a margin as in [`are_apart`]. In `f32`: for coordinates of any size, but differences above 2^16 are never certain.
 #[cfg_attr(target_family = "wasm", inline(never))]
 #[cfg_attr(not(target_family = "wasm"), inline(always))]
 #[must_use]
 pub fn are_far_in_tables<V: Lookup>(
     pair: ElementPair,
     groups: [&Moving64; 2],
-    places: [&[u8; BATCH]; 2],
+    slots: [&[u8; BATCH]; 2],
     (until, margin): (f32, f64),
 ) -> u16 {
     let mut no = 0;
     for first in (0..BATCH).step_by(V::N) {
-        let motion = look_up_motion::<V>(pair, groups, places, first).with_margin(margin);
+        let motion = look_up_motion::<V>(pair, groups, slots, first).with_margin(margin);
         no |= V::bits(motion.are_far(f64::from(until))) << first;
     }
     no
@@ -282,12 +282,12 @@ pub fn are_far_in_tables<V: Lookup>(
 pub fn are_across_in_tables<V: Lookup>(
     pair: ElementPair,
     groups: [&Moving64; 2],
-    places: [&[u8; BATCH]; 2],
+    slots: [&[u8; BATCH]; 2],
     (until, margin): (f32, f64),
 ) -> u16 {
     let mut no = 0;
     for first in (0..BATCH).step_by(V::N) {
-        let motion = look_up_motion::<V>(pair, groups, places, first).with_margin(margin);
+        let motion = look_up_motion::<V>(pair, groups, slots, first).with_margin(margin);
         no |= V::bits(motion.are_across(f64::from(until))) << first;
     }
     no
@@ -300,12 +300,12 @@ pub fn are_across_in_tables<V: Lookup>(
 pub fn are_aside_in_tables<V: Lookup>(
     pair: ElementPair,
     groups: [&Moving64; 2],
-    places: [&[u8; BATCH]; 2],
+    slots: [&[u8; BATCH]; 2],
     (until, margin): (f32, f64),
 ) -> u16 {
     let mut no = 0;
     for first in (0..BATCH).step_by(V::N) {
-        let motion = look_up_motion::<V>(pair, groups, places, first).with_margin(margin);
+        let motion = look_up_motion::<V>(pair, groups, slots, first).with_margin(margin);
         no |= V::bits(motion.are_aside(f64::from(until))) << first;
     }
     no
@@ -315,10 +315,10 @@ pub fn are_aside_in_tables<V: Lookup>(
 fn look_up_motion<V: Lookup>(
     pair: ElementPair,
     [group_a, group_b]: [&Moving64; 2],
-    [places_a, places_b]: [&[u8; BATCH]; 2],
+    [slots_a, slots_b]: [&[u8; BATCH]; 2],
     first: usize,
 ) -> Motion<V> {
-    let (a, b) = (V::places(places_a, first), V::places(places_b, first));
+    let (a, b) = (V::slots(slots_a, first), V::slots(slots_b, first));
     if are_edges(pair) {
         Motion::new(
             true,
@@ -337,9 +337,9 @@ fn look_up_motion<V: Lookup>(
 #[inline(always)]
 pub(super) fn vertex_and_face<V: Lookup>(
     [p, ..]: &[[[f32; TABLE]; 3]; 3],
-    a: V::Places,
+    a: V::Slots,
     [q, r, s]: &[[[f32; TABLE]; 3]; 3],
-    b: V::Places,
+    b: V::Slots,
 ) -> [[V; 3]; 4] {
     [look_up(p, a), look_up(q, b), look_up(r, b), look_up(s, b)]
 }
@@ -347,19 +347,19 @@ pub(super) fn vertex_and_face<V: Lookup>(
 #[inline(always)]
 pub(super) fn two_edges<V: Lookup>(
     [p, q, _]: &[[[f32; TABLE]; 3]; 3],
-    a: V::Places,
+    a: V::Slots,
     [r, s, _]: &[[[f32; TABLE]; 3]; 3],
-    b: V::Places,
+    b: V::Slots,
 ) -> [[V; 3]; 4] {
     [look_up(p, a), look_up(q, a), look_up(r, b), look_up(s, b)]
 }
 
 #[inline(always)]
-pub(super) fn look_up<V: Lookup>([x, y, z]: &[[f32; TABLE]; 3], places: V::Places) -> [V; 3] {
+pub(super) fn look_up<V: Lookup>([x, y, z]: &[[f32; TABLE]; 3], slots: V::Slots) -> [V; 3] {
     [
-        V::look_up(x, places),
-        V::look_up(y, places),
-        V::look_up(z, places),
+        V::look_up(x, slots),
+        V::look_up(y, slots),
+        V::look_up(z, slots),
     ]
 }
 

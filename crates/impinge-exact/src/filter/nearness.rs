@@ -375,7 +375,7 @@ fn select<T: Number>(mask: T::Mask, yes: &Vector<T>, no: &Vector<T>) -> Vector<T
     ]
 }
 
-/// Which of sixteen pairs are within a distance at the start. The elements are those of two groups, named by their places;
+/// Which of sixteen pairs are within a distance at the start. The elements are those of two groups, named by their slots;
 /// the distance is between two numbers.
 #[cfg_attr(target_family = "wasm", inline(never))]
 #[cfg_attr(not(target_family = "wasm"), inline(always))]
@@ -383,13 +383,13 @@ fn select<T: Number>(mask: T::Mask, yes: &Vector<T>, no: &Vector<T>) -> Vector<T
 pub fn are_within_in_tables<V: Lookup>(
     pair: ElementPair,
     groups: [&Moving64; 2],
-    places: [&[u8; BATCH]; 2],
+    slots: [&[u8; BATCH]; 2],
     reach: [f32; 2],
 ) -> Verdict16 {
     let [low, high] = [V::splat(f64::from(reach[0])), V::splat(f64::from(reach[1]))];
     let mut verdict = Verdict16::default();
     for first in (0..BATCH).step_by(V::N) {
-        let (are_edges, points) = look_up::<V>(pair, groups, places, first, 0);
+        let (are_edges, points) = look_up::<V>(pair, groups, slots, first, 0);
         let (yes, no) = Polygon::new(are_edges, &points).verdict(low, high);
         verdict.yes |= V::bits(yes) << first;
         verdict.no |= V::bits(no) << first;
@@ -417,7 +417,7 @@ impl Near16 {
     }
 }
 
-/// The number of a part of the difference polygon of two edges, by its number where the edges change places.
+/// The number of a part of the difference polygon of two edges, by its number where the edges change slots.
 ///
 /// ```text
 ///  corner 3 (a0, b1) --- edge 2 (a, b1) --- corner 2 (a1, b1)
@@ -435,13 +435,13 @@ pub const SWAPPED_PARTS: [u8; 16] = [0, 3, 2, 1, 7, 6, 5, 4, 8, 9, 10, 11, 12, 1
 pub fn nearest_in_tables<V: Lookup>(
     pair: ElementPair,
     groups: [&Moving64; 2],
-    places: [&[u8; BATCH]; 2],
+    slots: [&[u8; BATCH]; 2],
     reach: [f32; 2],
 ) -> Near16 {
     let [low, high] = [V::splat(f64::from(reach[0])), V::splat(f64::from(reach[1]))];
     let mut near = Near16::default();
     for first in (0..BATCH).step_by(V::N) {
-        let (are_edges, points) = look_up::<V>(pair, groups, places, first, 0);
+        let (are_edges, points) = look_up::<V>(pair, groups, slots, first, 0);
         let polygon = Polygon::new(are_edges, &points);
         let (yes, no) = polygon.verdict(low, high);
         let yes = V::bits(yes);
@@ -461,22 +461,22 @@ pub fn nearest_in_tables<V: Lookup>(
 }
 
 /// Which of sixteen pairs certainly stay farther apart than a distance from t = 0 to `until`. The elements are those of two
-/// groups, named by their places; the distance is at most the number given.
+/// groups, named by their slots; the distance is at most the number given.
 #[cfg_attr(target_family = "wasm", inline(never))]
 #[cfg_attr(not(target_family = "wasm"), inline(always))]
 #[must_use]
 pub fn stay_beyond_in_tables<V: Lookup>(
     pair: ElementPair,
     groups: [&Moving64; 2],
-    places: [&[u8; BATCH]; 2],
+    slots: [&[u8; BATCH]; 2],
     until: f32,
     distance: f32,
 ) -> u16 {
     let (until, distance) = (V::splat(f64::from(until)), V::splat(f64::from(distance)));
     let mut stay = 0;
     for first in (0..BATCH).step_by(V::N) {
-        let (are_edges, start) = look_up::<V>(pair, groups, places, first, 0);
-        let (_, end) = look_up::<V>(pair, groups, places, first, 1);
+        let (are_edges, start) = look_up::<V>(pair, groups, slots, first, 0);
+        let (_, end) = look_up::<V>(pair, groups, slots, first, 1);
         let start = Polygon::new(are_edges, &start);
         let end = Polygon::new(are_edges, &end);
         let last = start.at(&end, until);
@@ -490,11 +490,11 @@ pub fn stay_beyond_in_tables<V: Lookup>(
 fn look_up<V: Lookup>(
     pair: ElementPair,
     [group_a, group_b]: [&Moving64; 2],
-    [places_a, places_b]: [&[u8; BATCH]; 2],
+    [slots_a, slots_b]: [&[u8; BATCH]; 2],
     first: usize,
     end: usize,
 ) -> (bool, [Vector<V>; 4]) {
-    let (a, b) = (V::places(places_a, first), V::places(places_b, first));
+    let (a, b) = (V::slots(slots_a, first), V::slots(slots_b, first));
     let are_edges = are_edges(pair);
     let points = if are_edges {
         two_edges::<V>(&group_a[end], a, &group_b[end], b)

@@ -86,15 +86,15 @@ pub trait Lookup: Number {
     /// Numbers in a register: a divisor of [`BATCH`].
     const N: usize;
     /// Which numbers of a table to take.
-    type Places: Copy;
+    type Slots: Copy;
 
-    /// Places from memory, from lane `first` on, modulo the table's length.
-    fn places(places: &[u8; BATCH], first: usize) -> Self::Places;
-    /// The numbers at some places.
-    fn look_up(table: &[f32; TABLE], places: Self::Places) -> Self;
-    /// `N` numbers of a table, from place `first` on.
+    /// Slots from memory, from lane `first` on, modulo the table's length.
+    fn slots(slots: &[u8; BATCH], first: usize) -> Self::Slots;
+    /// The numbers at some slots.
+    fn look_up(table: &[f32; TABLE], slots: Self::Slots) -> Self;
+    /// `N` numbers of a table, from slot `first` on.
     fn row(table: &[f32; TABLE], first: usize) -> Self;
-    /// Writes the numbers into a table, from place `first` on.
+    /// Writes the numbers into a table, from slot `first` on.
     fn put(self, table: &mut [f32; TABLE], first: usize);
     /// Bit k for number k.
     fn bits(mask: Self::Mask) -> u16;
@@ -348,22 +348,22 @@ impl Vector for Portable {
 
 impl Lookup for Portable32 {
     const N: usize = PORTABLE_F32;
-    type Places = [u8; PORTABLE_F32];
+    type Slots = [u8; PORTABLE_F32];
 
     #[inline(always)]
-    fn places(places: &[u8; BATCH], first: usize) -> Self::Places {
-        let four: &[u8; PORTABLE_F32] = places[first..].first_chunk().expect("four lanes");
+    fn slots(slots: &[u8; BATCH], first: usize) -> Self::Slots {
+        let four: &[u8; PORTABLE_F32] = slots[first..].first_chunk().expect("four lanes");
         *four
     }
     #[inline(always)]
-    fn look_up(table: &[f32; TABLE], places: Self::Places) -> Self {
-        let [a, b, c, d] = places;
-        let at = |place: u8| table[place as usize % TABLE];
+    fn look_up(table: &[f32; TABLE], slots: Self::Slots) -> Self {
+        let [a, b, c, d] = slots;
+        let at = |slot: u8| table[slot as usize % TABLE];
         Portable32([at(a), at(b), at(c), at(d)])
     }
     #[inline(always)]
     fn row(table: &[f32; TABLE], first: usize) -> Self {
-        let four: &[f32; PORTABLE_F32] = table[first..].first_chunk().expect("four places");
+        let four: &[f32; PORTABLE_F32] = table[first..].first_chunk().expect("four slots");
         Portable32(*four)
     }
     #[inline(always)]
@@ -394,7 +394,7 @@ mod x86 {
 
     // SAFETY (all below): these types are used inside functions compiled for, and called on
     // processors with, their instruction set; the intrinsics touch no memory but that of `load`,
-    // whose array has eight numbers, and of `places` and `look_up`.
+    // whose array has eight numbers, and of `slots` and `look_up`.
     macro_rules! register {
         (
             $(#[$doc:meta])* $type:ident($register:ty), $mask:ident($bits:ty),
@@ -607,31 +607,31 @@ mod x86 {
 
     impl Lookup for Avx2F32 {
         const N: usize = 8;
-        type Places = __m256i;
+        type Slots = __m256i;
 
         #[inline(always)]
-        fn places(places: &[u8; BATCH], first: usize) -> __m256i {
-            let eight: &[u8; 8] = places[first..].first_chunk().expect("eight lanes");
+        fn slots(slots: &[u8; BATCH], first: usize) -> __m256i {
+            let eight: &[u8; 8] = slots[first..].first_chunk().expect("eight lanes");
             // SAFETY: see above; one load of eight bytes.
             unsafe {
-                let places = _mm256_cvtepu8_epi32(_mm_loadl_epi64(eight.as_ptr().cast()));
-                _mm256_and_si256(places, _mm256_set1_epi32(TABLE as i32 - 1))
+                let slots = _mm256_cvtepu8_epi32(_mm_loadl_epi64(eight.as_ptr().cast()));
+                _mm256_and_si256(slots, _mm256_set1_epi32(TABLE as i32 - 1))
             }
         }
         #[inline(always)]
-        fn look_up(table: &[f32; TABLE], places: __m256i) -> Self {
-            // SAFETY: see above; every place is below `TABLE`, as `places` made it.
-            Avx2F32(unsafe { _mm256_i32gather_ps::<4>(table.as_ptr(), places) })
+        fn look_up(table: &[f32; TABLE], slots: __m256i) -> Self {
+            // SAFETY: see above; every slot is below `TABLE`, as `slots` made it.
+            Avx2F32(unsafe { _mm256_i32gather_ps::<4>(table.as_ptr(), slots) })
         }
         #[inline(always)]
         fn row(table: &[f32; TABLE], first: usize) -> Self {
-            let eight: &[f32; 8] = table[first..].first_chunk().expect("eight places");
+            let eight: &[f32; 8] = table[first..].first_chunk().expect("eight slots");
             // SAFETY: see above; one load of eight.
             Avx2F32(unsafe { _mm256_loadu_ps(eight.as_ptr()) })
         }
         #[inline(always)]
         fn put(self, table: &mut [f32; TABLE], first: usize) {
-            let eight: &mut [f32; 8] = table[first..].first_chunk_mut().expect("eight places");
+            let eight: &mut [f32; 8] = table[first..].first_chunk_mut().expect("eight slots");
             // SAFETY: see above; one store of eight.
             unsafe { _mm256_storeu_ps(eight.as_mut_ptr(), self.0) }
         }
@@ -644,46 +644,46 @@ mod x86 {
 
     impl Lookup for Avx512F32 {
         const N: usize = BATCH;
-        type Places = __m512i;
+        type Slots = __m512i;
 
         #[inline(always)]
-        fn places(places: &[u8; BATCH], _: usize) -> __m512i {
+        fn slots(slots: &[u8; BATCH], _: usize) -> __m512i {
             // SAFETY: see above; one load of sixteen bytes.
-            unsafe { _mm512_cvtepu8_epi32(_mm_loadu_si128(places.as_ptr().cast())) }
+            unsafe { _mm512_cvtepu8_epi32(_mm_loadu_si128(slots.as_ptr().cast())) }
         }
         #[inline(always)]
-        fn look_up(table: &[f32; TABLE], places: __m512i) -> Self {
+        fn look_up(table: &[f32; TABLE], slots: __m512i) -> Self {
             const {
                 assert!(TABLE == 64, "two permutations of 32 and a choice");
             }
             let first = table.as_ptr();
             // SAFETY: see above; four loads of sixteen from a table of 64. A permutation reads the five
-            // lowest bits of a place, the blend reads the sixth.
+            // lowest bits of a slot, the blend reads the sixth.
             unsafe {
                 let low = _mm512_permutex2var_ps(
                     _mm512_loadu_ps(first),
-                    places,
+                    slots,
                     _mm512_loadu_ps(first.add(16)),
                 );
                 let high = _mm512_permutex2var_ps(
                     _mm512_loadu_ps(first.add(32)),
-                    places,
+                    slots,
                     _mm512_loadu_ps(first.add(48)),
                 );
-                let is_high = _mm512_test_epi32_mask(places, _mm512_set1_epi32(32));
+                let is_high = _mm512_test_epi32_mask(slots, _mm512_set1_epi32(32));
                 Avx512F32(_mm512_mask_blend_ps(is_high, low, high))
             }
         }
         #[inline(always)]
         fn row(table: &[f32; TABLE], first: usize) -> Self {
-            let sixteen: &[f32; BATCH] = table[first..].first_chunk().expect("sixteen places");
+            let sixteen: &[f32; BATCH] = table[first..].first_chunk().expect("sixteen slots");
             // SAFETY: see above; one load of sixteen.
             Avx512F32(unsafe { _mm512_loadu_ps(sixteen.as_ptr()) })
         }
         #[inline(always)]
         fn put(self, table: &mut [f32; TABLE], first: usize) {
             let sixteen: &mut [f32; BATCH] =
-                table[first..].first_chunk_mut().expect("sixteen places");
+                table[first..].first_chunk_mut().expect("sixteen slots");
             // SAFETY: see above; one store of sixteen.
             unsafe { _mm512_storeu_ps(sixteen.as_mut_ptr(), self.0) }
         }

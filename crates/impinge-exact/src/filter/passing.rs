@@ -1,6 +1,6 @@
 //! Edges and faces: those that certainly meet, and those that certainly do not.
 //!
-//! In: the tables of two groups, and the places of sixteen pairs in them. Out: masks. Cost: about 130 operations for all lanes, 60 where
+//! In: the tables of two groups, and the slots of sixteen pairs in them. Out: masks. Cost: about 130 operations for all lanes, 60 where
 //! every edge is on one side of its face.
 //!
 //! Method: an edge with both ends strictly on one side of a face's plane misses it. Else the line pq of the edge passes each
@@ -15,21 +15,21 @@ use super::moving::look_up;
 use super::number::Lookup;
 use super::{BATCH, TABLE, Verdict16};
 
-/// Edges or faces of a group: `[corner][axis][place]`.
+/// Edges or faces of a group: `[corner][axis][slot]`.
 type Table = [[[f32; TABLE]; 3]; 3];
 
-/// Which of sixteen edges and faces certainly share a point. The elements are those of two groups, named by their places.
+/// Which of sixteen edges and faces certainly share a point. The elements are those of two groups, named by their slots.
 /// Coordinate magnitudes must not exceed [`LARGEST_F32`](super::LARGEST_F32).
 #[cfg_attr(target_family = "wasm", inline(never))]
 #[cfg_attr(not(target_family = "wasm"), inline(always))]
 #[must_use]
 pub fn meet_in_tables<V: Lookup>(
     [edges, faces]: [&Table; 2],
-    [places_a, places_b]: [&[u8; BATCH]; 2],
+    [slots_a, slots_b]: [&[u8; BATCH]; 2],
 ) -> Verdict16 {
     let mut verdict = Verdict16::default();
     for first in (0..BATCH).step_by(V::N) {
-        let (edge, face) = (V::places(places_a, first), V::places(places_b, first));
+        let (edge, face) = (V::slots(slots_a, first), V::slots(slots_b, first));
         let (p, q) = (look_up::<V>(&edges[0], edge), look_up::<V>(&edges[1], edge));
         let (a, b, c) = (
             look_up(&faces[0], face),

@@ -48,19 +48,19 @@ pub fn classify<V: Vector>(pairs: &TrianglePairs8) -> Verdict {
     verdict
 }
 
-/// [`classify`] in `f32`, for triangles of two groups that are named by their places in the groups' tables. Only the
+/// [`classify`] in `f32`, for triangles of two groups that are named by their slots in the groups' tables. Only the
 /// lanes of `among` are needed. Coordinate magnitudes must not exceed [`LARGEST_F32`](super::LARGEST_F32).
 #[inline(always)]
 #[must_use]
 pub fn classify_in_tables<V: Lookup>(
     [a, b]: [&Triangles64; 2],
-    [places_a, places_b]: [&[u8; BATCH]; 2],
+    [slots_a, slots_b]: [&[u8; BATCH]; 2],
     among: u16,
 ) -> Verdict16 {
     let mut verdict = Verdict16::default();
     for first in (0..BATCH).step_by(V::N) {
-        let a = look_up::<V>(a, V::places(places_a, first));
-        let b = look_up::<V>(b, V::places(places_b, first));
+        let a = look_up::<V>(a, V::slots(slots_a, first));
+        let b = look_up::<V>(b, V::slots(slots_b, first));
         let sides = Sides::new(&a, &b);
         let (apart, sure) = (sides.are_apart(), sides.are_sure());
         let among = among >> first & u16::MAX >> (BATCH - V::N);
@@ -99,20 +99,20 @@ fn load<V: Vector>([p, q, r]: &Triangles8, first: usize) -> [[V; 3]; 3] {
 }
 
 #[inline(always)]
-fn look_up<V: Lookup>([p, q, r]: &Triangles64, places: V::Places) -> [[V; 3]; 3] {
+fn look_up<V: Lookup>([p, q, r]: &Triangles64, slots: V::Slots) -> [[V; 3]; 3] {
     [
-        look_up_vertex(p, places),
-        look_up_vertex(q, places),
-        look_up_vertex(r, places),
+        look_up_vertex(p, slots),
+        look_up_vertex(q, slots),
+        look_up_vertex(r, slots),
     ]
 }
 
 #[inline(always)]
-fn look_up_vertex<V: Lookup>([x, y, z]: &[[f32; TABLE]; 3], places: V::Places) -> [V; 3] {
+fn look_up_vertex<V: Lookup>([x, y, z]: &[[f32; TABLE]; 3], slots: V::Slots) -> [V; 3] {
     [
-        V::look_up(x, places),
-        V::look_up(y, places),
-        V::look_up(z, places),
+        V::look_up(x, slots),
+        V::look_up(y, slots),
+        V::look_up(z, slots),
     ]
 }
 

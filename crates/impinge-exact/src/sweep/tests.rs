@@ -193,16 +193,16 @@ fn ask_tables<V: number::Lookup>(
     steps: &[[[Point; 4]; 2]],
     within: (f32, f64),
 ) -> u16 {
-    // Elements at odd places, in reverse.
-    let place = |lane: usize| (2 * (BATCH - lane) - 1) as u8;
-    let places: [u8; BATCH] = std::array::from_fn(place);
+    // Elements at odd slots, in reverse.
+    let slot = |lane: usize| (2 * (BATCH - lane) - 1) as u8;
+    let slots: [u8; BATCH] = std::array::from_fn(slot);
     let table = |points: std::ops::Range<usize>| {
         let mut table: Moving64 = [[[[0.0; TABLE]; 3]; 3]; 2];
         for (lane, step) in steps.iter().enumerate() {
             for (end, corners) in table.iter_mut().enumerate() {
                 for (point, corner) in points.clone().zip(corners) {
                     for (axis, row) in corner.iter_mut().enumerate() {
-                        row[places[lane] as usize] = step[end][point][axis] as f32;
+                        row[slots[lane] as usize] = step[end][point][axis] as f32;
                     }
                 }
             }
@@ -213,10 +213,10 @@ fn ask_tables<V: number::Lookup>(
         ElementPair::VertexFace => [table(0..1), table(1..4)],
         _ => [table(0..2), table(2..4)],
     };
-    let (tables, places) = ([&a, &b], [&places, &places]);
-    filter::are_far_in_tables::<V>(pair, tables, places, within)
-        | filter::are_across_in_tables::<V>(pair, tables, places, within)
-        | filter::are_aside_in_tables::<V>(pair, tables, places, within)
+    let (tables, slots) = ([&a, &b], [&slots, &slots]);
+    filter::are_far_in_tables::<V>(pair, tables, slots, within)
+        | filter::are_across_in_tables::<V>(pair, tables, slots, within)
+        | filter::are_aside_in_tables::<V>(pair, tables, slots, within)
 }
 
 #[cfg(target_arch = "x86_64")]

@@ -9,14 +9,14 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use impinge_core::cpu::cells::Rule;
-use impinge_core::cpu::kept::Kept;
-use impinge_core::cpu::narrow::{Candidate, Settler};
-use impinge_core::cpu::simd::Isa;
-use impinge_core::cpu::subcells::Asked;
+use impinge_core::cpu::cull_map::Kept;
+use impinge_core::cpu::narrow::{Candidate, Decider};
+use impinge_core::cpu::subcells::SubcellQuery;
 use impinge_core::cpu::world::World;
-use impinge_core::index::{LayerIx, Place};
-use impinge_core::run::Job;
-use impinge_core::sink::Answer;
+use impinge_core::scene::index::{PartIx, Slot};
+use impinge_core::search::runner::Job;
+use impinge_core::search::sink::Answer;
+use impinge_core::simd::Isa;
 use impinge_core::{Error, Statistics};
 
 use super::Possible;
@@ -31,7 +31,7 @@ pub(super) struct Table {
     isa: Isa,
     /// `primitive of a << 32 | primitive of b`.
     slots: Vec<AtomicU64>,
-    settlers: Vec<Settler>,
+    deciders: Vec<Decider>,
 }
 
 impl Table {
@@ -39,7 +39,7 @@ impl Table {
         Table {
             isa,
             slots: Vec::new(),
-            settlers: Vec::new(),
+            deciders: Vec::new(),
         }
     }
 
@@ -68,7 +68,7 @@ impl Table {
     }
 
     /// Tests the pairs in the table.
-    pub fn settle(
+    pub fn decide(
         &mut self,
         job: Job<'_>,
         answer: &Arc<Answer>,
@@ -77,36 +77,36 @@ impl Table {
         let Table {
             isa,
             slots,
-            settlers,
+            deciders,
         } = self;
-        settlers.resize_with(job.workers.n(), Settler::default);
-        for settler in settlers.iter_mut() {
-            settler.begin(answer, &impinge_core::Tuning::default());
+        deciders.resize_with(job.workers.n(), Decider::default);
+        for decider in deciders.iter_mut() {
+            decider.begin(answer, &impinge_core::Tuning::default());
         }
-        let world = World::new(job.scene, job.frame);
+        let world = World::new(job.scene, job.plan);
         let (isa, slots) = (*isa, &slots[..]);
         stats.time("narrow", |_| {
             let n_tasks = slots.len().div_ceil(TASK);
-            job.workers.for_each(settlers, n_tasks, |settler, ix| {
+            job.workers.for_each(deciders, n_tasks, |decider, ix| {
                 for slot in slots[ix * TASK..].iter().take(TASK) {
                     let pair = slot.load(Ordering::Relaxed);
                     if pair != FREE {
-                        settler.push(Candidate {
-                            a: LayerIx::new(0),
-                            b: LayerIx::new(1),
-                            place_a: Place::new((pair >> 32) as u32),
-                            place_b: Place::new(pair as u32),
+                        decider.push(Candidate {
+                            a: PartIx::new(0),
+                            b: PartIx::new(1),
+                            slot_a: Slot::new((pair >> 32) as u32),
+                            slot_b: Slot::new(pair as u32),
                         });
                     }
-                    settler.settle_when_full(isa, world);
+                    decider.decide_when_full(isa, world);
                 }
-                settler.settle(isa, world);
+                decider.decide(isa, world);
             });
         });
-        for settler in settlers {
-            settler.end();
-            stats.n_candidates += settler.n_candidates;
-            stats.n_unsure += settler.n_unsure;
+        for decider in deciders {
+            decider.end();
+            stats.n_candidates += decider.n_candidates;
+            stats.n_unsure += decider.n_unsure;
         }
         stats.bytes_held += size_of_val(slots) as u64;
         answer.check()
@@ -120,8 +120,8 @@ pub(super) struct Insert<'a> {
 }
 
 impl Rule for Insert<'_> {
-    fn asked(&self) -> Asked {
-        self.possible.asked()
+    fn query(&self) -> SubcellQuery {
+        self.possible.query()
     }
 
     #[inline(always)]

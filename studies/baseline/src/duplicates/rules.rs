@@ -1,16 +1,16 @@
 //! Rules for a pair found in a cell, in place of impinge's owner rule.
 
 use impinge_core::cpu::cells::Rule;
-use impinge_core::cpu::kept::Kept;
-use impinge_core::cpu::subcells::Asked;
+use impinge_core::cpu::cull_map::Kept;
+use impinge_core::cpu::subcells::SubcellQuery;
 use impinge_core::plan::{Plan, pair_key};
 
 use super::Possible;
 
 impl Possible {
     /// Which pairs that touch a common sub-cell are possible, in any cell.
-    pub(super) fn asked(self) -> Asked {
-        Asked {
+    pub(super) fn query(self) -> SubcellQuery {
+        SubcellQuery {
             boxes: self != Possible::Masks,
             owned: false,
             adjacent: true,
@@ -22,8 +22,8 @@ impl Possible {
 pub(super) struct Every(pub Possible);
 
 impl Rule for Every {
-    fn asked(&self) -> Asked {
-        self.0.asked()
+    fn query(&self) -> SubcellQuery {
+        self.0.query()
     }
 
     #[inline(always)]
@@ -35,17 +35,17 @@ impl Rule for Every {
 /// Tests nothing; records the key of every pair that would be tested.
 pub(super) struct Recorded<'a> {
     pub possible: Possible,
-    pub frame: &'a Plan,
+    pub plan: &'a Plan,
 }
 
 impl Rule for Recorded<'_> {
-    fn asked(&self) -> Asked {
-        self.possible.asked()
+    fn query(&self) -> SubcellQuery {
+        self.possible.query()
     }
 
     #[inline(always)]
     fn admits(&self, a: &Kept, b: &Kept, keys: &mut Vec<u64>) -> bool {
-        let [a, b] = [a, b].map(|kept| self.frame.layer(kept.layer).number(kept.primitive));
+        let [a, b] = [a, b].map(|kept| self.plan.part(kept.part).number(kept.primitive));
         keys.push(pair_key(a, b));
         false
     }

@@ -19,8 +19,8 @@ use impinge_core::gpu::buffers::{Storage, Uniform};
 use impinge_core::gpu::cells::CellRange;
 use impinge_core::gpu::clusters::Counted;
 use impinge_core::gpu::layout::{N_ENTRIES, Params};
+use impinge_core::gpu::pass_buffers::PassBuffers;
 use impinge_core::gpu::recording::{Recorder, Workgroups};
-use impinge_core::gpu::room::Room;
 
 use super::kernels::{
     Compact, DigitCount, DigitTotal, Entry, FillCount, FillEntries, FillScan, First, Kernels,
@@ -61,8 +61,8 @@ impl Buffers {
     }
 
     /// Resizes the buffers to the engine's capacities.
-    fn resize(&mut self, gpu: &Gpu, room: &Room) -> Result<(), Error> {
-        let capacities = room.capacities();
+    fn resize(&mut self, gpu: &Gpu, pass_buffers: &PassBuffers) -> Result<(), Error> {
+        let capacities = pass_buffers.capacities();
         let n_blocks = capacities.entries.div_ceil(u64::from(BLOCK));
         self.firsts.resize(gpu, capacities.kept)?;
         self.sums.resize(gpu, capacities.kept.div_ceil(SUM))?;
@@ -82,8 +82,8 @@ impl Buffers {
         lambda: f64,
         cells: CellRange,
     ) -> Result<(), Error> {
-        let room = recorder.room;
-        self.resize(recorder.gpu, room)?;
+        let pass_buffers = recorder.pass_buffers;
+        self.resize(recorder.gpu, pass_buffers)?;
         recorder.bounds_within_reach();
         recorder.grid(lambda);
         self.fill(kernels, recorder);
@@ -98,11 +98,11 @@ impl Buffers {
                 ..Params::default()
             })
         };
-        let over_entries = recorder.counted(over_entries(room, COMPACT, ENTRIES));
+        let over_entries = recorder.counted(over_entries(pass_buffers, COMPACT, ENTRIES));
         let compact = Compact {
             entries: entries.read(),
-            items: room.cell_items.write_to(),
-            counters: room.counters.write_to(),
+            items: pass_buffers.cell_items.write_to(),
+            counters: pass_buffers.counters.write_to(),
             params: work(),
         };
         let recording = &mut recorder.recording;
@@ -110,12 +110,12 @@ impl Buffers {
         recording.stage("pairing");
         let over_items = recorder.counted_items();
         let pairing = Pairing {
-            grid: room.grid.read(),
-            kept: room.kept.read(),
+            grid: pass_buffers.grid.read(),
+            kept: pass_buffers.kept.read(),
             entries: entries.read(),
-            items: room.cell_items.read(),
-            candidates: room.candidates.write_to(),
-            counters: room.counters.write_to(),
+            items: pass_buffers.cell_items.read(),
+            candidates: pass_buffers.candidates.write_to(),
+            counters: pass_buffers.counters.write_to(),
             params: work(),
         };
         let recording = &mut recorder.recording;
@@ -126,15 +126,15 @@ impl Buffers {
     }
 
     fn fill(&self, kernels: &Kernels, recorder: &mut Recorder<'_>) {
-        let room = recorder.room;
-        let counters = || room.counters.write_to();
+        let pass_buffers = recorder.pass_buffers;
+        let counters = || pass_buffers.counters.write_to();
         let over_kept = [(); 2].map(|()| recorder.over_kept());
         let [counted, filled] = over_kept;
         let recording = &mut recorder.recording;
         recording.stage("fill");
         let count = FillCount {
-            grid: room.grid.read(),
-            kept: room.kept.write_to(),
+            grid: pass_buffers.grid.read(),
+            kept: pass_buffers.kept.write_to(),
             firsts: self.firsts.write_to(),
             sums: self.sums.write_to(),
             counters: counters(),
@@ -145,14 +145,14 @@ impl Buffers {
             counters: counters(),
             params: Uniform(Params {
                 // Capacities fit in 32 bits.
-                capacity: room.capacities().kept as u32,
+                capacity: pass_buffers.capacities().kept as u32,
                 ..Params::default()
             }),
         };
         recording.launch(&kernels.fill_scan, &scan, Workgroups::Known(1));
         let fill = FillEntries {
-            grid: room.grid.read(),
-            kept: room.kept.read(),
+            grid: pass_buffers.grid.read(),
+            kept: pass_buffers.kept.read(),
             firsts: self.firsts.read(),
             sums: self.sums.read(),
             entries: self.entries[0].write_to(),
@@ -163,20 +163,20 @@ impl Buffers {
 
     /// Sorts the entries digit by digit, the lowest first. Returns in which buffer they end.
     fn sort(&self, kernels: &Kernels, recorder: &mut Recorder<'_>) -> usize {
-        let room = recorder.room;
-        let counters = || room.counters.write_to();
+        let pass_buffers = recorder.pass_buffers;
+        let counters = || pass_buffers.counters.write_to();
         recorder.recording.stage("sort");
-        let over_blocks = recorder.counted(over_entries(room, BLOCK, BLOCKS));
+        let over_blocks = recorder.counted(over_entries(pass_buffers, BLOCK, BLOCKS));
         let recording = &mut recorder.recording;
         // A key consists of a cell and one bit for the body.
-        let key_bits = u64::BITS - (2 * room.cells.len() - 1).leading_zeros();
+        let key_bits = u64::BITS - (2 * pass_buffers.cells.len() - 1).leading_zeros();
         let mut from = 0;
         for first in (0..key_bits).step_by(DIGIT_BITS as usize) {
             let params = || {
                 Uniform(Params {
                     first,
                     // Capacities fit in 32 bits.
-                    capacity: room.capacities().entries as u32,
+                    capacity: pass_buffers.capacities().entries as u32,
                     ..Params::default()
                 })
             };
@@ -209,11 +209,11 @@ impl Buffers {
     }
 }
 
-fn over_entries(room: &Room, per_group: u32, slot: u32) -> Counted {
+fn over_entries(pass_buffers: &PassBuffers, per_group: u32, slot: u32) -> Counted {
     Counted {
         counter: N_ENTRIES,
         per_group,
-        capacity: room.capacities().entries,
+        capacity: pass_buffers.capacities().entries,
         slot,
     }
 }

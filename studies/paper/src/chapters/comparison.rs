@@ -180,7 +180,7 @@ fn where_time_goes(scenes: &[Scene], is_gpu: bool) -> Table {
             };
             let known = [
                 stage(&["bounds"]),
-                stage(&["grid", "dispatch", "fill", "sort", "compact"]),
+                stage(&["grid", "traversal", "fill", "sort", "compact"]),
                 stage(&["pairing"]),
                 stage(&["narrow"]),
             ];

@@ -1,9 +1,9 @@
 //! The cells of a coarse map that vertices lie in, one byte per axis: x + 2^8 y + 2^16 z.
 
-use crate::grouping::bounds::{greater, lesser};
-use crate::positions::Positions;
+use crate::bvh::bounds::{greater, lesser};
+use crate::scene::positions::Positions;
 
-use crate::cpu::simd::{Isa, Simd, dispatch};
+use crate::simd::{Isa, Simd, with_isa};
 
 /// The function from coordinates to cells of the map.
 #[derive(Debug, Clone, Copy, Default)]
@@ -61,7 +61,7 @@ impl Codes {
         };
         match positions {
             Positions::F32(positions) => {
-                dispatch!(isa, quantise, (
+                with_isa!(isa, quantise, (
                     positions: &[[f32; 3]] = &positions[range],
                     function: Function = self.function,
                     into: &mut [u32] = into,

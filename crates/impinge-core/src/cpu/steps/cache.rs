@@ -1,44 +1,44 @@
-//! The cache of a layer: its clusters, and their boxes at the start and at the end of a step.
+//! The cache of a part: its clusters, and their boxes at the start and at the end of a step.
 
 use std::sync::Arc;
 
-use crate::clusterings::{Asked, Clustered, Clusterings, Fit, Store, spread};
+use crate::boxes::{BoxSource, Sweep};
+use crate::bvh::bounds::{Bounds, BoundsArray, RawBoundsArray};
+use crate::bvh::clusters::Clustering;
+use crate::clusterings::{BodyPart, Clustered, Clusterings, Fit, Store, spread};
 use crate::cpu::bounds::TreeBounds;
-use crate::cpu::dispatch::Tree;
-use crate::cpu::simd::{Isa, Simd, dispatch};
-use crate::error::Error;
-use crate::grouping::bounds::{Bounds, BoundsArray, RawBoundsArray};
-use crate::grouping::clusters::Clustering;
-use crate::hull::{Hull, Pose};
-use crate::index::{ClusterIx, LayerIx};
-use crate::run::Job;
+use crate::cpu::traversal::Tree;
+use crate::query::settings::Settings;
 use crate::scene::Body;
-use crate::settings::Settings;
-use crate::stats::Statistics;
+use crate::scene::error::Error;
+use crate::scene::index::{ClusterIx, PartIx};
+use crate::search::runner::Job;
+use crate::search::stats::Statistics;
+use crate::simd::{Isa, Simd, with_isa};
 
 /// Clusters per task.
 const CLUSTERS: usize = 128;
 
 /// By slot of the body, then by part: vertices, edges and faces.
-pub(super) type Caches = Store<LayerCache, 3>;
+pub(super) type Caches = Store<PartCache, 3>;
 
-/// The data kept per layer from step to step.
+/// The data kept per part from step to step.
 #[derive(Debug)]
-pub(super) struct LayerCache {
+pub(super) struct PartCache {
     /// The stamp of the topology that was clustered.
     pub topology_stamp: u64,
-    /// The stamp of the step that the boxes belong to, and their pose.
-    of: Option<(u64, Pose)>,
+    /// The stamp of the step that the boxes belong to, and their sweep.
+    of: Option<(u64, Sweep)>,
     pub clustering: Arc<Clustering>,
     /// Boxes that hold the start and the end.
     bounds: TreeBounds,
     /// The clusters' boxes at the start, and at the end.
     ends: [BoundsArray; 2],
-    /// How well the clusters have fitted the layer.
+    /// How well the clusters have fitted the part.
     fit: Fit,
 }
 
-impl LayerCache {
+impl PartCache {
     /// What is kept beside the clusters of a part of a body; no boxes yet.
     pub fn new(body: &Body, clustering: Arc<Clustering>) -> Self {
         let mut bounds = TreeBounds::default();
@@ -47,7 +47,7 @@ impl LayerCache {
         for end in &mut ends {
             end.resize(clustering.n_clusters());
         }
-        LayerCache {
+        PartCache {
             topology_stamp: body.topology_stamp(),
             of: None,
             clustering,
@@ -74,10 +74,10 @@ impl LayerCache {
     /// Bytes held beside the clusters.
     pub fn bytes(&self) -> usize {
         let ends: usize = self.ends.iter().map(BoundsArray::bytes).sum();
-        size_of::<LayerCache>() + self.bounds.bytes() + ends
+        size_of::<PartCache>() + self.bounds.bytes() + ends
     }
 
-    /// How well the clusters fit the current pose: the clusters' summed surface divided by the layer's.
+    /// How well the clusters fit the current sweep: the clusters' summed surface divided by the part's.
     fn spread(&self) -> f64 {
         let clusters = 0..self.clustering.n_clusters();
         let surface: f64 = clusters.map(|ix| self.ends[0].at(ix).half_area()).sum();
@@ -85,7 +85,7 @@ impl LayerCache {
     }
 }
 
-impl Clustered for LayerCache {
+impl Clustered for PartCache {
     fn topology_stamp(&self) -> u64 {
         self.topology_stamp
     }
@@ -95,10 +95,10 @@ impl Clustered for LayerCache {
     }
 }
 
-/// Some clusters of a layer.
+/// Some clusters of a part.
 #[derive(Debug, Clone, Copy)]
 struct Task {
-    layer: LayerIx,
+    part: PartIx,
     first: usize,
     end: usize,
     /// Where boxes are written.
@@ -106,46 +106,46 @@ struct Task {
     ends: [RawBoundsArray; 2],
 }
 
-/// Computes the boxes of all layers that have moved, or whose boxes were made for another [`Pose`]; layers that have flowed
+/// Computes the boxes of all parts that have moved, or whose boxes were made for another [`Sweep`]; parts that have flowed
 /// away from their clusters are clustered again.
 pub(super) fn refit<S: Send>(
     isa: Isa,
     job: Job<'_>,
     settings: &Settings,
-    pose: Pose,
+    sweep: Sweep,
     (clusterings, caches): (&Clusterings, &mut Caches),
     scratches: &mut [S],
     stats: &mut Statistics,
 ) -> Result<(), Error> {
-    find_boxes(isa, job, settings, pose, caches, scratches);
+    find_boxes(isa, job, settings, sweep, caches, scratches);
     let Job {
         scene,
-        frame,
+        plan,
         workers,
         ..
     } = job;
     let mut is_stale = false;
-    for (ix, layer) in frame.numbered_layers() {
-        let body = frame.body(scene, ix);
-        let cache = caches.at_mut(layer);
-        let pose = frame.pose(pose, ix);
-        if cache.of == Some((body.step_stamp(), pose)) {
+    for (ix, part) in plan.numbered_parts() {
+        let body = plan.body(scene, ix);
+        let cache = caches.at_mut(part);
+        let sweep = plan.sweep_of(sweep, ix);
+        if cache.of == Some((body.step_stamp(), sweep)) {
             continue;
         }
         cache.bounds.refit_above(0, &cache.clustering.shape);
-        cache.of = Some((body.step_stamp(), pose));
+        cache.of = Some((body.step_stamp(), sweep));
         let spread = cache.spread();
-        let (asked, fit) = (Asked::new(layer.id, body, layer.part), &mut cache.fit);
+        let (body_part, fit) = (BodyPart::new(part.id, body, part.part), &mut cache.fit);
         let mut known = clusterings.lock();
-        if let Some(clustering) = known.renew_if_stale(asked, (fit, spread), workers, stats)? {
-            *cache = LayerCache::new(body, clustering);
+        if let Some(clustering) = known.renew_if_stale(body_part, (fit, spread), workers, stats)? {
+            *cache = PartCache::new(body, clustering);
             is_stale = true;
         }
     }
     if is_stale {
         // New clusters have the best spread so far, so this recursion ends.
         let clustered = (clusterings, caches);
-        refit(isa, job, settings, pose, clustered, scratches, stats)?;
+        refit(isa, job, settings, sweep, clustered, scratches, stats)?;
     }
     Ok(())
 }
@@ -154,25 +154,25 @@ fn find_boxes<S: Send>(
     isa: Isa,
     job: Job<'_>,
     settings: &Settings,
-    pose: Pose,
+    sweep: Sweep,
     caches: &mut Caches,
     scratches: &mut [S],
 ) {
     let Job {
         scene,
-        frame,
+        plan,
         workers,
         ..
     } = job;
     let mut tasks = Vec::new();
-    for (ix, layer) in frame.numbered_layers() {
-        let body = frame.body(scene, ix);
-        let cache = caches.at_mut(layer);
-        if cache.of == Some((body.step_stamp(), frame.pose(pose, ix))) {
+    for (ix, part) in plan.numbered_parts() {
+        let body = plan.body(scene, ix);
+        let cache = caches.at_mut(part);
+        if cache.of == Some((body.step_stamp(), plan.sweep_of(sweep, ix))) {
             continue;
         }
         cache.of = None;
-        let LayerCache {
+        let PartCache {
             clustering,
             bounds,
             ends: [start, end],
@@ -183,7 +183,7 @@ fn find_boxes<S: Send>(
         };
         let n = clustering.n_clusters();
         let task = Task {
-            layer: ix,
+            part: ix,
             first: 0,
             end: 0,
             leaves: leaves.raw(),
@@ -196,27 +196,27 @@ fn find_boxes<S: Send>(
             ..task
         }));
     }
-    let parallel = frame.n_primitives() >= settings.tuning.step_bounds_parallel_from;
+    let parallel = plan.n_primitives() >= settings.tuning.step_bounds_parallel_from;
     let n_workers = if parallel { workers.n() } else { 1 };
     let caches = &*caches;
     workers.for_each(&mut scratches[..n_workers], tasks.len(), |_, ix| {
         let task = tasks[ix];
-        let layer = frame.layer(task.layer);
-        let clustering = &caches.at(layer).clustering;
-        let body = frame.body(scene, task.layer);
-        let hull = Hull::new(body, frame.pose(pose, task.layer));
-        dispatch!(isa, find, (
+        let part = plan.part(task.part);
+        let clustering = &caches.at(part).clustering;
+        let body = plan.body(scene, task.part);
+        let source = BoxSource::new(body, plan.sweep_of(sweep, task.part));
+        with_isa!(isa, find, (
             clustering: &Clustering = clustering,
-            hull: Hull<'_> = hull,
+            source: BoxSource<'_> = source,
             task: Task = task,
         ));
     });
 }
 
 #[inline(always)]
-fn find<S: Simd>(simd: S, clustering: &Clustering, hull: Hull<'_>, task: Task) {
+fn find<S: Simd>(simd: S, clustering: &Clustering, source: BoxSource<'_>, task: Task) {
     for cluster in task.first..task.end {
-        let ends = hull.of_cluster(simd, clustering, ClusterIx::from_usize(cluster));
+        let ends = source.of_cluster(simd, clustering, ClusterIx::from_usize(cluster));
         let mut both = ends[0];
         both.join(&ends[1]);
         // SAFETY: no two tasks have the same cluster, and no thread reads boxes before all tasks are done.

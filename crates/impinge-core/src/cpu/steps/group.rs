@@ -2,14 +2,14 @@
 //!
 //! Cost: each corner of a cluster once, when it is first needed; 8.8 KB per cluster.
 
+use crate::boxes::Extent;
+use crate::bvh::GROUP;
+use crate::bvh::bounds::Bounds;
 use crate::cpu::group_cache::PerCluster;
-use crate::cpu::simd::{LaneBounds, Lanes32, Simd};
-use crate::elements::with_corners;
-use crate::grouping::GROUP;
-use crate::grouping::bounds::Bounds;
-use crate::hull::Extent;
-use crate::index::{ClusterIx, LayerIx};
-use crate::positions::Positions;
+use crate::scene::elements::with_corners;
+use crate::scene::index::{ClusterIx, PartIx};
+use crate::scene::positions::Positions;
+use crate::simd::{LaneBounds, Lanes32, Simd};
 use impinge_exact::internal::filter::Moving64;
 
 use super::world::World;
@@ -56,13 +56,13 @@ impl<'a> PerCluster<World<'a>> for Group {
     };
 
     #[inline(always)]
-    fn fill<S: Simd>(&mut self, simd: S, world: World<'a>, layer: LayerIx, cluster: ClusterIx) {
-        let clustering = &world.cache(layer).clustering;
+    fn fill<S: Simd>(&mut self, simd: S, world: World<'a>, part: PartIx, cluster: ClusterIx) {
+        let clustering = &world.cache(part).clustering;
         self.size = clustering.size(cluster);
-        self.ends = world.ends(layer, cluster);
-        let places = clustering.places(cluster);
+        self.ends = world.ends(part, cluster);
+        let slots = clustering.slots(cluster);
         with_corners!(&clustering.corners, |elements| {
-            let elements = &elements[places];
+            let elements = &elements[slots];
             // Tetrahedra, which steps never have, would have no list for their fourth corner.
             self.n_corners = elements.first().map_or(0, |corners| corners.len().min(3));
             for (k, lanes) in self.corners.iter_mut().enumerate().take(self.n_corners) {
@@ -74,15 +74,15 @@ impl<'a> PerCluster<World<'a>> for Group {
                 lanes.0[self.size..].fill(of_first);
             }
         });
-        let first = world.frame.layer(layer).first;
+        let first = world.plan.part(part).first;
         let elements = clustering.primitives(cluster);
         for (number, &element) in self.numbers.0.iter_mut().zip(elements) {
             *number = first.plus(element).raw();
         }
-        let hull = world.hull(layer);
-        let ends = hull.ends();
+        let source = world.source(part);
+        let ends = source.ends();
         let are_single = ends.iter().all(|end| matches!(end, Positions::F32(_)));
-        let boxes = world.cache(layer).ends(cluster);
+        let boxes = world.cache(part).ends(cluster);
         let largest = boxes.map(|bounds| Extent::from(&bounds).magnitude());
         self.largest = f64::max(largest[0], largest[1]);
         self.rounded = if are_single {
@@ -97,9 +97,9 @@ impl<'a> PerCluster<World<'a>> for Group {
             // Rounding keeps the order of coordinates: boxes that are apart then are so of the points as they are.
             self.put_points(simd, ends);
         } else {
-            hull.fill(clustering, cluster, [&mut self.start, &mut self.end]);
+            source.fill(clustering, cluster, [&mut self.start, &mut self.end]);
         }
-        hull.close([&mut self.start, &mut self.end], self.size);
+        source.close([&mut self.start, &mut self.end], self.size);
     }
 }
 

@@ -3,7 +3,7 @@
 //! ```text
 //! clustering  the vertices, edges and faces of each body, once per topology
 //! bounds      two boxes per cluster, at the start and at the end; the tree above holds both
-//! dispatch    layers whose boxes meet, then tree against tree: as for intersections
+//! traversal    parts whose boxes meet, then tree against tree: as for intersections
 //! pairing     boxes of elements at both ends; candidates per work item
 //! narrow      filters, then exact arithmetic
 //! ```
@@ -13,48 +13,48 @@
 
 mod cache;
 mod group;
-#[cfg(feature = "gpu")]
-mod left;
 mod narrow;
 mod pairing;
+#[cfg(feature = "gpu")]
+mod undecided;
 mod unsure;
 mod world;
 
 use std::sync::Arc;
 
+#[cfg(feature = "gpu")]
+use crate::bvh::clusters::Clustering;
+use crate::bvh::hubs::Hubs;
 use crate::clusterings::Clusterings;
-use crate::error::Error;
-use crate::found::StepAnswer;
+use crate::query::pair_kind::PairKind;
+use crate::query::settings::InstructionSet;
+use crate::scene::error::Error;
+use crate::scene::index::PartIx;
+use crate::search::found::StepAnswer;
+use crate::search::stats::Statistics;
 #[cfg(feature = "gpu")]
-use crate::grouping::clusters::Clustering;
-use crate::grouping::hubs::Hubs;
-use crate::index::LayerIx;
-use crate::pair_kind::PairKind;
-use crate::settings::InstructionSet;
-use crate::stats::Statistics;
-#[cfg(feature = "gpu")]
-use crate::undecided::Left;
+use crate::search::undecided::Undecided;
 
-use super::dispatch::Tree;
-use super::met::WorkItem;
-use super::simd::{Isa, Simd};
-use super::slabs::{self, Counts, Room, SlabStages};
-use crate::run::Job;
-use crate::settings::Settings;
+use super::batches::{self, BatchScratch, BatchStages, Counts};
+use super::lane_pairs::WorkItem;
+use super::traversal::Tree;
+use crate::query::settings::Settings;
+use crate::search::runner::Job;
 #[cfg(feature = "gpu")]
-use crate::sink::Ending;
+use crate::search::sink::Ending;
+use crate::simd::{Isa, Simd};
 
-use cache::{Caches, LayerCache};
+use cache::{Caches, PartCache};
 use pairing::Worker;
-use world::{Known, World};
+use world::{SharedBound, World};
 
-impl<'a> SlabStages for World<'a> {
+impl<'a> BatchStages for World<'a> {
     type Worker = Worker;
     type Answer = StepAnswer<'a>;
 
     #[inline(always)]
-    fn tree(&self, layer: LayerIx) -> Tree<'_> {
-        self.cache(layer).tree()
+    fn tree(&self, part: PartIx) -> Tree<'_> {
+        self.cache(part).tree()
     }
 
     #[inline(always)]
@@ -63,8 +63,8 @@ impl<'a> SlabStages for World<'a> {
     }
 
     #[inline(always)]
-    fn hubs(&self, layer: LayerIx) -> Option<&Hubs> {
-        self.cache(layer).clustering.hubs()
+    fn hubs(&self, part: PartIx) -> Option<&Hubs> {
+        self.cache(part).clustering.hubs()
     }
 
     fn finish(
@@ -76,7 +76,7 @@ impl<'a> SlabStages for World<'a> {
     ) -> Result<(), Error> {
         // Stages are listed in the order of their first times.
         stats.add_ms("pairing", 0.0);
-        stats.time("narrow", |_| unsure::settle(job, *self, workers));
+        stats.time("narrow", |_| unsure::decide(job, *self, workers));
         Ok(())
     }
 
@@ -110,7 +110,7 @@ pub(crate) struct StepClusters {
     clusterings: Clusterings,
     caches: Caches,
     scratches: Vec<Worker>,
-    room: Room,
+    scratch: BatchScratch,
 }
 
 impl StepClusters {
@@ -120,7 +120,7 @@ impl StepClusters {
             clusterings,
             caches: Caches::default(),
             scratches: Vec::new(),
-            room: Room::default(),
+            scratch: BatchScratch::default(),
         }
     }
 
@@ -137,20 +137,20 @@ impl StepClusters {
         stats.time("clustering", |stats| self.cluster(job, stats))?;
         stats.time("bounds", |stats| self.refit(job, settings, stats))?;
         for worker in &mut self.scratches {
-            worker.begin(stats.n_clusters, job.frame, settings);
+            worker.begin(stats.n_clusters, job.plan, settings);
         }
-        let held = self.bytes_besides_room();
-        let known = Known::new(job.control);
-        let task = slabs::Task {
+        let held = self.bytes_besides_scratch();
+        let known = SharedBound::new(job.control);
+        let task = batches::Task {
             isa: self.isa,
             job,
             answer,
             world: World {
                 isa: self.isa,
                 scene: job.scene,
-                frame: job.frame,
-                pose: job.frame.sweep(),
-                boxes: job.frame.sweep(),
+                plan: job.plan,
+                sweep: job.plan.sweep(),
+                boxes: job.plan.sweep(),
                 answer,
                 known: &known,
                 caches: &self.caches,
@@ -159,8 +159,8 @@ impl StepClusters {
             settings,
             held,
         };
-        self.room.run(task, stats)?;
-        stats.bytes_held = (self.bytes_besides_room() + self.room.bytes()) as u64;
+        self.scratch.run(task, stats)?;
+        stats.bytes_held = (self.bytes_besides_scratch() + self.scratch.bytes()) as u64;
         Ok(())
     }
 
@@ -174,8 +174,8 @@ impl StepClusters {
         Some(close)
     }
 
-    /// As [`run`](Self::run), where a device finds the candidates: `find` gets the clusters of all layers and hands over the
-    /// places of pairs that may touch.
+    /// As [`run`](Self::run), where a device finds the candidates: `find` gets the clusters of all parts and hands over the
+    /// slots of pairs that may touch.
     #[cfg(feature = "gpu")]
     pub fn run_on_device(
         &mut self,
@@ -185,7 +185,7 @@ impl StepClusters {
         stats: &mut Statistics,
         find: impl FnOnce(
             &[Arc<Clustering>],
-            &mut dyn FnMut(Left<'_>) -> Result<bool, Error>,
+            &mut dyn FnMut(Undecided<'_>) -> Result<bool, Error>,
             &mut Statistics,
         ) -> Result<bool, Error>,
     ) -> Result<ByDevice, Error> {
@@ -195,36 +195,40 @@ impl StepClusters {
             self.cluster(job, stats)?;
             all
         })?;
-        let mut first_places = vec![0];
+        let mut first_slots = vec![0];
         for clustering in &clusterings {
             // All elements of a frame are numbered in 32 bits.
-            first_places.push(first_places[first_places.len() - 1] + clustering.order.len() as u32);
+            first_slots.push(first_slots[first_slots.len() - 1] + clustering.order.len() as u32);
         }
         self.scratches.resize_with(job.workers.n(), Worker::default);
         for worker in &mut self.scratches {
-            worker.begin(stats.n_clusters, job.frame, settings);
+            worker.begin(stats.n_clusters, job.plan, settings);
         }
-        answer.share(self.bytes_besides_room() as u64);
-        let known = Known::new(job.control);
-        let mut settling = left::Settling {
+        answer.share(self.bytes_besides_scratch() as u64);
+        let known = SharedBound::new(job.control);
+        let mut deciding = undecided::Deciding {
             job,
             world: World {
                 isa: self.isa,
                 scene: job.scene,
-                frame: job.frame,
-                pose: job.frame.sweep(),
-                boxes: job.frame.sweep(),
+                plan: job.plan,
+                sweep: job.plan.sweep(),
+                boxes: job.plan.sweep(),
                 answer,
                 known: &known,
                 caches: &self.caches,
             },
             answer,
             workers: &mut self.scratches,
-            first_places,
+            first_slots,
         };
-        let is_done = find(&clusterings, &mut |left| settling.settle(left), stats)?;
-        settling.end()?;
-        stats.bytes_held += self.bytes_besides_room() as u64;
+        let is_done = find(
+            &clusterings,
+            &mut |undecided| deciding.decide(undecided),
+            stats,
+        )?;
+        deciding.end()?;
+        stats.bytes_held += self.bytes_besides_scratch() as u64;
         Ok(match is_done {
             false => ByDevice::Not,
             true if known.is_over() => ByDevice::Touches,
@@ -232,21 +236,21 @@ impl StepClusters {
         })
     }
 
-    fn bytes_besides_room(&self) -> usize {
-        let caches: usize = self.caches.iter().map(LayerCache::bytes).sum();
+    fn bytes_besides_scratch(&self) -> usize {
+        let caches: usize = self.caches.iter().map(PartCache::bytes).sum();
         let scratches: usize = self.scratches.iter().map(Worker::bytes).sum();
         self.clusterings.bytes() + caches + scratches
     }
 
-    /// Clusters layers that are new or were re-meshed; forgets layers of removed bodies.
+    /// Clusters parts that are new or were re-meshed; forgets parts of removed bodies.
     fn cluster(&mut self, job: Job<'_>, stats: &mut Statistics) -> Result<(), Error> {
         let shared = (&self.clusterings, false);
         self.caches.update(job, shared, stats, |body, clustering| {
-            LayerCache::new(body, Arc::clone(clustering))
+            PartCache::new(body, Arc::clone(clustering))
         })
     }
 
-    /// Computes the boxes of layers that have moved.
+    /// Computes the boxes of parts that have moved.
     fn refit(
         &mut self,
         job: Job<'_>,
@@ -257,7 +261,7 @@ impl StepClusters {
             self.isa,
             job,
             settings,
-            job.frame.sweep(),
+            job.plan.sweep(),
             (&self.clusterings, &mut self.caches),
             &mut self.scratches,
             stats,

@@ -1,5 +1,5 @@
 //! Stages `pairing` and `narrow` of steps: finds the elements of two clusters that are not beside each other at both ends,
-//! and settles them.
+//! and decides them.
 //!
 //! 1. Elements of either cluster that do not meet the other cluster's box drop out.
 //! 2. The boxes of the larger side's survivors are put side by side, and each survivor of the smaller side is
@@ -9,23 +9,23 @@
 
 use std::time::Duration;
 
-use crate::clock::Instant;
+use crate::boxes::Sweep;
+use crate::bvh::GROUP;
+use crate::bvh::bounds::Bounds;
+use crate::cpu::batches::{BatchStages, Counts};
 use crate::cpu::directions::Directions;
 use crate::cpu::group_cache::GroupCache;
-use crate::cpu::met::{Met, Side, WorkItem};
+use crate::cpu::lane_pairs::{LanePairs, Side, WorkItem};
 use crate::cpu::pairing::full;
-use crate::cpu::simd::{Isa, LaneBounds, Lanes, Masks, Simd};
-use crate::cpu::slabs::{Counts, SlabStages};
-use crate::found::StepAnswer;
-use crate::grouping::GROUP;
-use crate::grouping::bounds::Bounds;
-use crate::hull::Pose;
-use crate::index::{ClusterIx, LayerIx, Number};
 use crate::plan::{Plan, Question, TestId};
-use crate::settings::Settings;
+use crate::query::settings::Settings;
+use crate::scene::index::{ClusterIx, Number, PartIx};
+use crate::search::found::StepAnswer;
+use crate::simd::{Isa, LaneBounds, Lanes, Masks, Simd};
+use crate::workers::clock::Instant;
 
 use super::group::Group;
-use super::narrow::{Batch, Between, NarrowCounts, Settler};
+use super::narrow::{Batch, Between, Decider, NarrowCounts};
 use super::world::World;
 
 /// The narrow stage is timed for one work item in this many.
@@ -40,17 +40,17 @@ pub(crate) struct Worker {
     /// Whether only the start is asked about, so that directions at the start tell.
     is_still: bool,
     /// The part of the step that the cached boxes in `groups` cover.
-    pose: Pose,
+    sweep: Sweep,
     shorter_from: f64,
     n_shortened: u64,
-    met: Met,
+    lane_pairs: LanePairs,
     /// The boxes of one side's survivors at the start and at the end.
     survivors: Box<[LaneBounds; 2]>,
     /// Which lanes each row meets, where boxes are single.
     masks: Masks,
-    settler: Settler,
+    decider: Decider,
     busy: Duration,
-    n_settled: u32,
+    n_decided: u32,
 }
 
 impl Default for Worker {
@@ -59,15 +59,15 @@ impl Default for Worker {
             groups: GroupCache::default(),
             directions: Directions::default(),
             is_still: false,
-            pose: Pose::WHOLE,
+            sweep: Sweep::WHOLE,
             shorter_from: 0.0,
             n_shortened: 0,
-            met: Met::default(),
+            lane_pairs: LanePairs::default(),
             survivors: Box::new([LaneBounds::EMPTY, LaneBounds::EMPTY]),
             masks: Masks::default(),
-            settler: Settler::default(),
+            decider: Decider::default(),
             busy: Duration::ZERO,
-            n_settled: 0,
+            n_decided: 0,
         }
     }
 }
@@ -78,39 +78,39 @@ impl Worker {
         self.groups.begin::<World<'_>>(n_clusters, settings);
         self.directions.begin::<World<'_>>(n_clusters, settings);
         self.is_still = plan.question == Question::Nearness;
-        self.pose = plan.sweep();
+        self.sweep = plan.sweep();
         self.shorter_from = settings.tuning.step_shorter_from;
         self.n_shortened = 0;
-        self.settler.begin(n_clusters, plan, &settings.tuning);
-        self.n_settled = 0;
+        self.decider.begin(n_clusters, plan, &settings.tuning);
+        self.n_decided = 0;
         self.busy = Duration::ZERO;
     }
 
     /// The contacts that the worker has found.
     pub fn contacts(&mut self) -> &mut super::narrow::FirstContacts {
-        self.settler.contacts()
+        self.decider.contacts()
     }
 
     /// Ends a step: hands over the remaining contacts.
     pub fn end(&mut self, answer: StepAnswer<'_>) {
-        self.settler.end(answer);
+        self.decider.end(answer);
     }
 
     /// Examines less of the step from now on, if a contact is known that is early enough.
     fn shorten(&mut self, world: World<'_>) {
-        let until = self.settler.until(world);
-        if until < (self.shorter_from * self.pose.until).min(self.pose.until) {
-            self.pose = Pose::up_to(until);
+        let until = self.decider.until(world);
+        if until < (self.shorter_from * self.sweep.until).min(self.sweep.until) {
+            self.sweep = Sweep::up_to(until);
             self.groups.clear();
             self.n_shortened += 1;
         }
     }
 
     pub fn counts(&self) -> Counts {
-        let NarrowCounts { n_unsure, n_full } = self.settler.counts();
+        let NarrowCounts { n_unsure, n_full } = self.decider.counts();
         Counts {
             busy: self.busy,
-            n_candidates: self.settler.n_candidates,
+            n_candidates: self.decider.n_candidates,
             n_unsure,
             n_evicted: self.groups.n_evicted,
             n_full,
@@ -123,13 +123,13 @@ impl Worker {
         let survivors = size_of::<[LaneBounds; 2]>();
         self.groups.bytes()
             + self.directions.bytes()
-            + self.settler.bytes()
-            + Met::BYTES
+            + self.decider.bytes()
+            + LanePairs::BYTES
             + survivors
     }
 }
 
-/// Pairs the elements of some work items and settles the candidates.
+/// Pairs the elements of some work items and decides the candidates.
 #[inline(always)]
 pub(super) fn run<S: Simd>(
     simd: S,
@@ -140,14 +140,14 @@ pub(super) fn run<S: Simd>(
 ) {
     worker.shorten(world);
     let world = World {
-        pose: worker.pose,
+        sweep: worker.sweep,
         ..world
     };
     for item in items {
         if world.is_over() || world.known.is_cancelled() {
             break;
         }
-        let test = world.frame.test(item.a, item.b);
+        let test = world.plan.test(item.a, item.b);
         let Some(TestId::Elements(kind)) = test else {
             continue;
         };
@@ -158,11 +158,11 @@ pub(super) fn run<S: Simd>(
                 lower => lower,
             },
         };
-        let Some(places) = pair(simd, world, item, lower, worker) else {
+        let Some(slots) = pair(simd, world, item, lower, worker) else {
             continue;
         };
-        worker.n_settled += 1;
-        let is_sample = worker.n_settled.is_multiple_of(SAMPLED);
+        worker.n_decided += 1;
+        let is_sample = worker.n_decided.is_multiple_of(SAMPLED);
         let start = is_sample.then(Instant::now);
         let between = Between {
             a: item.a,
@@ -170,29 +170,29 @@ pub(super) fn run<S: Simd>(
             kind,
         };
         let Worker {
-            settler,
-            met,
+            decider,
+            lane_pairs,
             groups,
             ..
         } = worker;
-        let groups = places.map(|place| groups.at(place));
+        let groups = slots.map(|slot| groups.at(slot));
         let batch = Batch {
             item,
             between,
             groups,
-            met,
+            lane_pairs,
         };
-        settler.take(isa, world, batch);
+        decider.take(isa, world, batch);
         if let Some(start) = start {
             worker.busy += start.elapsed() * SAMPLED;
         }
     }
     let start = Instant::now();
-    worker.settler.settle(isa, world);
+    worker.decider.decide(isa, world);
     worker.busy += start.elapsed();
 }
 
-/// Lists the candidates of a work item. Returns the places of its groups; `None` if there are no candidates. Where only
+/// Lists the candidates of a work item. Returns the slots of its groups; `None` if there are no candidates. Where only
 /// keys with some lower numbers are wanted, most others are left out.
 #[inline(always)]
 fn pair<S: Simd>(
@@ -206,16 +206,16 @@ fn pair<S: Simd>(
         groups,
         directions,
         is_still,
-        met,
+        lane_pairs,
         survivors,
         masks,
-        settler,
+        decider,
         ..
     } = worker;
-    met.clear();
+    lane_pairs.clear();
     let sides = [(item.a, item.cluster_a), (item.b, item.cluster_b)];
     let is_own = sides[0] == sides[1];
-    let boxes = sides.map(|(layer, cluster)| world.cache(layer).ends(cluster));
+    let boxes = sides.map(|(part, cluster)| world.cache(part).ends(cluster));
     if !is_own && !meet(&boxes[0], &boxes[1]) {
         return None;
     }
@@ -223,12 +223,12 @@ fn pair<S: Simd>(
         Some(lower) => Some(lanes_with_lower(world, item, lower)?),
         None => None,
     };
-    let place_a = groups.place(simd, world, sides[0], usize::MAX);
-    let place_b = groups.place(simd, world, sides[1], place_a);
-    let (a, b) = (groups.at(place_a), groups.at(place_b));
+    let slot_a = groups.slot(simd, world, sides[0], usize::MAX);
+    let slot_b = groups.slot(simd, world, sides[1], slot_a);
+    let (a, b) = (groups.at(slot_a), groups.at(slot_b));
     let ends = [&a.ends, &b.ends];
     let (mut lanes_a, mut lanes_b) = (full(a.size), full(b.size));
-    let is_single = world.pose.is_single();
+    let is_single = world.sweep.is_single();
     if !is_own {
         // Boxes of clusters: where they are single, both ends have the same.
         lanes_a = if is_single {
@@ -255,7 +255,7 @@ fn pair<S: Simd>(
             }
         }
     }
-    let ids = [item.a, item.b].map(|layer| world.frame.layer(layer).id);
+    let ids = [item.a, item.b].map(|part| world.plan.part(part).id);
     let same_body = ids[0] == ids[1];
     // The lanes of the side with fewer of them are the rows.
     let (side, rows, lanes, [own, other]) = if lanes_a.count_ones() <= lanes_b.count_ones() {
@@ -287,8 +287,8 @@ fn pair<S: Simd>(
         (false, false) => simd.meets_rows(boxes, among, [&own.start, &own.end], rows, masks),
     }
     if may_part {
-        let reach = world.frame.reach(item.a, item.b).enclosing_f32();
-        settler.n_candidates += directions.thin(
+        let reach = world.plan.reach(item.a, item.b).enclosing_f32();
+        decider.n_candidates += directions.thin(
             simd,
             world,
             item,
@@ -300,15 +300,15 @@ fn pair<S: Simd>(
     }
     for row in Lanes(simd.rows_with_lanes(masks)) {
         match is_whole {
-            true => met.push_row(simd, side, row, masks.0[row]),
-            false => met.push_mapped_row(simd, (side, row), masks.0[row], &map),
+            true => lane_pairs.push_row(simd, side, row, masks.0[row]),
+            false => lane_pairs.push_mapped_row(simd, (side, row), masks.0[row], &map),
         }
     }
     if same_body {
         let corners = [&a.corners[..a.n_corners], &b.corners[..b.n_corners]];
-        met.drop_sharing(simd, corners);
+        lane_pairs.drop_sharing(simd, corners);
     }
-    (met.len() > 0).then_some([place_a, place_b])
+    (lane_pairs.len() > 0).then_some([slot_a, slot_b])
 }
 
 /// The lanes of two clusters that may have a key whose lower number is in a range, ends included; `None` if no pair has.
@@ -318,9 +318,9 @@ fn lanes_with_lower(
     item: &WorkItem,
     [low, high]: [Number; 2],
 ) -> Option<[u64; 2]> {
-    let lanes = |layer: LayerIx, cluster: ClusterIx, [low, high]: [Number; 2]| {
-        let first = world.frame.layer(layer).first;
-        let elements = world.cache(layer).clustering.primitives(cluster);
+    let lanes = |part: PartIx, cluster: ClusterIx, [low, high]: [Number; 2]| {
+        let first = world.plan.part(part).first;
+        let elements = world.cache(part).clustering.primitives(cluster);
         let mut are_in = [0u8; GROUP];
         for (is_in, &element) in are_in.iter_mut().zip(elements) {
             let number = first.plus(element);
@@ -335,7 +335,7 @@ fn lanes_with_lower(
     };
     let in_a = lanes(item.a, item.cluster_a, [low, high]);
     if item.a != item.b {
-        // The elements of the lower layer have lower numbers.
+        // The elements of the lower part have lower numbers.
         return (in_a != 0).then_some([in_a, u64::MAX]);
     }
     let in_b = lanes(item.b, item.cluster_b, [low, high]);

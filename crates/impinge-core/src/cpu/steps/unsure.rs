@@ -1,10 +1,10 @@
-//! Pairs that filters have left to exact arithmetic, settled last where the answer is one contact.
+//! Pairs that filters have left to exact arithmetic, decided last where the answer is one contact.
 //!
 //! Reason: one such pair costs as much as a thousand pairs in a filter. The search for the earliest contact ends with an earlier time
 //! limit than it had when these pairs were found; up to that limit, the filter drops most of them. The search for any contact has
 //! usually found one by then.
 
-use crate::run::Job;
+use crate::search::runner::Job;
 
 use super::pairing::Worker;
 use super::world::World;
@@ -12,18 +12,18 @@ use super::world::World;
 /// Pairs per task.
 const TASK: usize = 8;
 
-/// Settles the unsure pairs of all workers.
-pub(super) fn settle(job: Job<'_>, world: World<'_>, workers: &mut [Worker]) {
+/// Decides the unsure pairs of all workers.
+pub(super) fn decide(job: Job<'_>, world: World<'_>, workers: &mut [Worker]) {
     let mut unsure = Vec::new();
     for worker in &mut *workers {
         unsure.append(worker.contacts().unsure());
     }
-    // They come in runs of two layers, as workers find them.
+    // They come in runs of two parts, as workers find them.
     let runs = unsure.chunk_by(|(between, _), (next, _)| between == next);
     let tasks: Vec<_> = runs.flat_map(|run| run.chunks(TASK)).collect();
     job.workers.for_each(workers, tasks.len(), |worker, ix| {
         if !world.known.is_over() {
-            worker.contacts().settle_unsure(world.isa, world, tasks[ix]);
+            worker.contacts().decide_unsure(world.isa, world, tasks[ix]);
         }
     });
 }

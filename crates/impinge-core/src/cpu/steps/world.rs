@@ -1,34 +1,34 @@
-//! Read-only view shared by all stages of a step: the layers, and what is known of the answer so far.
+//! Read-only view shared by all stages of a step: the parts, and what is known of the answer so far.
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
+use crate::boxes::{BoxSource, Sweep};
+use crate::bvh::bounds::Bounds;
+use crate::bvh::clusters::Clustering;
 use crate::cpu::directions::Placed;
-use crate::cpu::simd::Isa;
-use crate::found::StepAnswer;
-use crate::grouping::bounds::Bounds;
-use crate::grouping::clusters::Clustering;
-use crate::hull::{Hull, Pose};
-use crate::index::{ClusterIx, LayerIx};
 use crate::plan::Plan;
-use crate::positions::Positions;
-use crate::progress::{CancelToken, Control};
+use crate::query::goal::Goal;
+use crate::query::progress::{CancelToken, Control};
 use crate::scene::Scene;
-use crate::sink::Goal;
+use crate::scene::index::{ClusterIx, PartIx};
+use crate::scene::positions::Positions;
+use crate::search::found::StepAnswer;
+use crate::simd::Isa;
 
-use super::cache::{Caches, LayerCache};
+use super::cache::{Caches, PartCache};
 
 /// What is known of the answer while workers look for it.
 #[derive(Debug)]
-pub(crate) struct Known {
+pub(crate) struct SharedBound {
     /// The earliest time found, as the bits of a nonnegative number.
     earliest: AtomicU64,
     is_over: AtomicBool,
     cancel: Option<CancelToken>,
 }
 
-impl Known {
+impl SharedBound {
     pub fn new(control: &Control<'_>) -> Self {
-        Known {
+        SharedBound {
             earliest: AtomicU64::new(f64::INFINITY.to_bits()),
             is_over: AtomicBool::new(false),
             cancel: control.token().cloned(),
@@ -67,50 +67,50 @@ impl Known {
 pub(crate) struct World<'a> {
     pub isa: Isa,
     pub scene: &'a Scene,
-    pub frame: &'a Plan,
+    pub plan: &'a Plan,
     /// The part of the step that is examined. Never longer than the part that the clusters' boxes cover.
-    pub pose: Pose,
+    pub sweep: Sweep,
     /// The part of the step that the clusters' boxes cover.
-    pub(super) boxes: Pose,
+    pub(super) boxes: Sweep,
     pub(super) answer: StepAnswer<'a>,
-    pub(super) known: &'a Known,
+    pub(super) known: &'a SharedBound,
     pub(super) caches: &'a Caches,
 }
 
 impl Placed for World<'_> {
     #[inline(always)]
-    fn placed(&self, layer: LayerIx) -> (&Clustering, &Positions) {
-        let body = self.frame.body(self.scene, layer);
-        (&self.cache(layer).clustering, body.positions())
+    fn placed(&self, part: PartIx) -> (&Clustering, &Positions) {
+        let body = self.plan.body(self.scene, part);
+        (&self.cache(part).clustering, body.positions())
     }
 }
 
 impl<'a> World<'a> {
-    /// What makes the boxes of a layer.
+    /// What makes the boxes of a part.
     #[inline(always)]
-    pub(super) fn hull(&self, layer: LayerIx) -> Hull<'a> {
-        let body = self.frame.body(self.scene, layer);
-        Hull::new(body, self.frame.pose(self.pose, layer))
+    pub(super) fn source(&self, part: PartIx) -> BoxSource<'a> {
+        let body = self.plan.body(self.scene, part);
+        BoxSource::new(body, self.plan.sweep_of(self.sweep, part))
     }
 
     /// The boxes of a cluster at the start and at the end.
     #[inline(always)]
-    pub(super) fn ends(&self, layer: LayerIx, cluster: ClusterIx) -> [Bounds; 2] {
-        let ends = self.cache(layer).ends(cluster);
-        if self.pose == self.boxes {
+    pub(super) fn ends(&self, part: PartIx, cluster: ClusterIx) -> [Bounds; 2] {
+        let ends = self.cache(part).ends(cluster);
+        if self.sweep == self.boxes {
             return ends;
         }
         // They are inflated already.
-        let pose = Pose {
+        let sweep = Sweep {
             inflation: 0.0,
-            ..self.pose
+            ..self.sweep
         };
-        pose.close(ends)
+        sweep.close(ends)
     }
 
-    /// The cache of a layer.
+    /// The cache of a part.
     #[inline(always)]
-    pub(super) fn cache(&self, layer: LayerIx) -> &'a LayerCache {
-        self.caches.at(self.frame.layer(layer))
+    pub(super) fn cache(&self, part: PartIx) -> &'a PartCache {
+        self.caches.at(self.plan.part(part))
     }
 }

@@ -30,13 +30,13 @@ fn main(
     var is_kept = false;
     let slack = bodies[cluster.body].slack;
     if is_near && lane < (cluster.sizes & 0xffffu) {
-        own = primitive_box(corners[cluster.first_place + lane], slack);
+        own = primitive_box(corners[cluster.first_slot + lane], slack);
         is_kept = overlap(own, reach);
     }
-    let place = place_in(N_KEPT, is_kept, lane);
-    if is_kept && place < arrayLength(&kept) {
+    let slot = slot_in(N_KEPT, is_kept, lane);
+    if is_kept && slot < arrayLength(&kept) {
         let rounded = select(0u, FLAG, slack != 0u);
-        kept[place] = Kept(own.low, (cluster.first_place + lane) | rounded, own.high, cluster.body,
+        kept[slot] = Kept(own.low, (cluster.first_slot + lane) | rounded, own.high, cluster.body,
             vec3<u32>(0u), 0u);
     }
 }

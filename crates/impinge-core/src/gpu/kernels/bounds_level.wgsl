@@ -1,4 +1,4 @@
-// Stage `bounds`, second kernel: the boxes of one wide level of the forest from the level below.
+// Stage `bounds`, second kernel: the boxes of one wide level of the trees from the level below.
 //
 // In and out: nodes `first .. first + count`, one thread each. Cost: at most eight boxes read.
 

@@ -1,6 +1,6 @@
 // Stage `bounds` of `Cells`: each body's reach, the box in which it may meet others, and the region of all reaches.
 //
-// In: boxes of bodies (roots of the forest), the tree over bodies if there is one. Out: one reach per
+// In: boxes of bodies (roots of the trees), the tree over bodies if there is one. Out: one reach per
 // body; the region, by atomic maxima of keys and of their complements.
 // One thread per body walks the tree over bodies. Cost: the nodes whose boxes meet the body's box. Beyond a limit
 // the whole box becomes the reach: that discards less, which is always right.

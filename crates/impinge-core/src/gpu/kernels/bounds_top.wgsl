@@ -1,4 +1,4 @@
-// Stage `bounds`, third kernel: all the narrow levels at the top of the forest in one launch.
+// Stage `bounds`, third kernel: all the narrow levels at the top of the trees in one launch.
 //
 // One workgroup walks levels `first .. first + count` upward, with a barrier between levels instead of
 // one launch per level. Cost: the boxes of these levels, read and written once.

@@ -32,7 +32,7 @@ fn magnitude(bits: vec3<u32>) -> vec3<u32> {
     return bits & vec3<u32>(0x7fffffffu);
 }
 
-fn settle(candidate: Candidate) -> i32 {
+fn decide(candidate: Candidate) -> i32 {
     let are_neighbours = (candidate.b & FLAG) != 0u;
     let a = corners[candidate.a & ~FLAG];
     let b = corners[candidate.b & ~FLAG];
@@ -93,10 +93,10 @@ fn main(
     var answer = NO;
     var low = 0u;
     var high = 0u;
-    var place = 0u;
+    var slot = 0u;
     if ix < n {
         let candidate = candidates[ix];
-        answer = settle(candidate);
+        answer = decide(candidate);
         if answer != NO {
             let a = number_at(candidate.a & ~FLAG);
             let b = number_at(candidate.b & ~FLAG);
@@ -105,9 +105,9 @@ fn main(
         }
     }
     if answer == YES {
-        place = atomicAdd(&n_yes, 1u);
+        slot = atomicAdd(&n_yes, 1u);
     } else if answer == UNSURE {
-        place = atomicAdd(&n_unsure, 1u);
+        slot = atomicAdd(&n_unsure, 1u);
     }
     workgroupBarrier();
     if lane == 0u {
@@ -116,14 +116,14 @@ fn main(
     }
     workgroupBarrier();
     if answer == YES {
-        place += first_yes;
-        if place < arrayLength(&pairs) {
-            pairs[place] = PairKey(low, high);
+        slot += first_yes;
+        if slot < arrayLength(&pairs) {
+            pairs[slot] = PairKey(low, high);
         }
     } else if answer == UNSURE {
-        place += first_unsure;
-        if place < arrayLength(&unsure) {
-            unsure[place] = UnsureKey(low, high);
+        slot += first_unsure;
+        if slot < arrayLength(&unsure) {
+            unsure[slot] = UnsureKey(low, high);
         }
     }
 }

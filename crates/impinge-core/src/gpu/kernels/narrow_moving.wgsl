@@ -36,8 +36,8 @@ fn main(
         candidate = candidates[ix];
         is_left = may_touch(candidate);
     }
-    let place = place_in(N_PAIRS, is_left, lane);
-    if is_left && place < arrayLength(&pairs) {
-        pairs[place] = PairKey(candidate.a, candidate.b);
+    let slot = slot_in(N_PAIRS, is_left, lane);
+    if is_left && slot < arrayLength(&pairs) {
+        pairs[slot] = PairKey(candidate.a, candidate.b);
     }
 }

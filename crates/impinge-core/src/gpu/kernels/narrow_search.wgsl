@@ -1,6 +1,6 @@
 // Stage `narrow` of a step: which pairs certainly do not touch, and which certainly do, by tests of intervals of time.
 //
-// In: pairs that `narrow_moving` has left. Out: all that may touch, by their places for the host, which settles them, or by global
+// In: pairs that `narrow_moving` has left. Out: all that may touch, by their places for the host, which decides them, or by global
 // numbers for the caller's shaders. For each a time until which it certainly does not touch, and one by which it certainly does, if
 // there is one. For the whole step the least of the latter. One thread per pair.
 // Cost: 32 bytes of corners and 96 of positions read; up to N_INTERVALS intervals tested.
@@ -141,9 +141,9 @@ fn main(
         pair = pairs[ix];
         bracket = bracket_of(Candidate(pair.low, pair.high));
     }
-    let place = place_in(N_UNSURE, bracket.is_left, lane);
-    if bracket.is_left && place < arrayLength(&unsure) {
-        unsure[place] = name_of(pair);
-        times[place] = PairTimes(time_of(bracket.free_until), time_of(bracket.touches_by));
+    let slot = slot_in(N_UNSURE, bracket.is_left, lane);
+    if bracket.is_left && slot < arrayLength(&unsure) {
+        unsure[slot] = name_of(pair);
+        times[slot] = PairTimes(time_of(bracket.free_until), time_of(bracket.touches_by));
     }
 }

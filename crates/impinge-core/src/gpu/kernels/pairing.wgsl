@@ -41,7 +41,7 @@ fn load(cluster: Cluster, lane: u32, entry: u32, others: Extent) -> bool {
     if lane >= (cluster.sizes & 0xffffu) {
         return false;
     }
-    let corner = corners[cluster.first_place + lane];
+    let corner = corners[cluster.first_slot + lane];
     let own = primitive_extent(corner, bodies[cluster.body].slack);
     put_extent(entry, own);
     ids[entry] = corner;
@@ -49,9 +49,9 @@ fn load(cluster: Cluster, lane: u32, entry: u32, others: Extent) -> bool {
 }
 
 // Writes candidates: the lane's primitive with each partner in one word of its mask.
-fn put(mask: u32, first_partner: u32, mine: u32, flags: vec2<u32>, swap: bool, room: u32) -> u32 {
+fn put(mask: u32, first_partner: u32, mine: u32, flags: vec2<u32>, swap: bool, pass_buffers: u32) -> u32 {
     var rest = mask;
-    var at = room;
+    var at = pass_buffers;
     while rest != 0u {
         let partner = first_partner + firstTrailingBit(rest);
         rest &= rest - 1u;
@@ -141,21 +141,21 @@ fn main(
     }
     let n_mine = countOneBits(met.x) + countOneBits(met.y)
         + countOneBits(shared_ids.x) + countOneBits(shared_ids.y);
-    var place = atomicAdd(&n_found, n_mine);
+    var slot = atomicAdd(&n_found, n_mine);
     workgroupBarrier();
     if lane == 0u {
         first_found = reserve(N_CANDIDATES, atomicLoad(&n_found));
     }
     workgroupBarrier();
-    place += first_found;
+    slot += first_found;
     let slack = bodies[cluster_a.body].slack + bodies[cluster_b.body].slack;
     let rounded = select(0u, FLAG, slack != 0u);
-    let my_place = lane + select(cluster_a.first_place, cluster_b.first_place, swap);
-    let first_partner = select(cluster_b.first_place, cluster_a.first_place, swap);
+    let my_slot = lane + select(cluster_a.first_slot, cluster_b.first_slot, swap);
+    let first_partner = select(cluster_b.first_slot, cluster_a.first_slot, swap);
     let plain = vec2<u32>(rounded, flag_of(cluster_a));
     let marked = vec2<u32>(rounded, FLAG);
-    place = put(met.x, first_partner, my_place, plain, swap, place);
-    place = put(met.y, first_partner + 32u, my_place, plain, swap, place);
-    place = put(shared_ids.x, first_partner, my_place, marked, swap, place);
-    place = put(shared_ids.y, first_partner + 32u, my_place, marked, swap, place);
+    slot = put(met.x, first_partner, my_slot, plain, swap, slot);
+    slot = put(met.y, first_partner + 32u, my_slot, plain, swap, slot);
+    slot = put(shared_ids.x, first_partner, my_slot, marked, swap, slot);
+    slot = put(shared_ids.y, first_partner + 32u, my_slot, marked, swap, slot);
 }

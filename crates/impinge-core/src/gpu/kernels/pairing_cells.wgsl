@@ -72,7 +72,7 @@ fn is_owner(cell: vec3<u32>, a: vec3<u32>, b: vec3<u32>) -> bool {
 }
 
 // Of the partners in one word of a mask: those that stay, and those that share a vertex and are to be resolved.
-fn settle_partners(partners: u32, first: u32, own: Kept, cell: vec3<u32>) -> vec2<u32> {
+fn decide_partners(partners: u32, first: u32, own: Kept, cell: vec3<u32>) -> vec2<u32> {
     var rest = partners;
     var stay = vec2<u32>(0u);
     while rest != 0u {
@@ -84,7 +84,7 @@ fn settle_partners(partners: u32, first: u32, own: Kept, cell: vec3<u32>) -> vec
             continue;
         }
         if own.body == other.body
-            && shares_vertex(corners[own.place & ~FLAG], corners[other.place & ~FLAG]) {
+            && shares_vertex(corners[own.slot & ~FLAG], corners[other.slot & ~FLAG]) {
             stay.y |= bit * params.resolve;
         } else {
             stay.x |= bit;
@@ -93,14 +93,14 @@ fn settle_partners(partners: u32, first: u32, own: Kept, cell: vec3<u32>) -> vec
     return stay;
 }
 
-fn put(mask: u32, first: u32, own: Kept, flag: u32, room: u32) -> u32 {
+fn put(mask: u32, first: u32, own: Kept, flag: u32, pass_buffers: u32) -> u32 {
     var rest = mask;
-    var at = room;
+    var at = pass_buffers;
     while rest != 0u {
-        let other = group_b[first + firstTrailingBit(rest)].place;
+        let other = group_b[first + firstTrailingBit(rest)].slot;
         rest &= rest - 1u;
         if at < arrayLength(&candidates) {
-            candidates[at] = Candidate(own.place | (other & FLAG), (other & ~FLAG) | flag);
+            candidates[at] = Candidate(own.slot | (other & FLAG), (other & ~FLAG) | flag);
         }
         at++;
     }
@@ -158,20 +158,20 @@ fn main(
             let after = ~(((1u << (lane & 31u)) << 1u) - 1u);
             partners &= select(vec2<u32>(after, 0xffffffffu), vec2<u32>(0u, after), lane >= 32u);
         }
-        low_stay = settle_partners(partners.x, 0u, own, cell);
-        high_stay = settle_partners(partners.y, 32u, own, cell);
+        low_stay = decide_partners(partners.x, 0u, own, cell);
+        high_stay = decide_partners(partners.y, 32u, own, cell);
     }
     let n_mine = countOneBits(low_stay.x) + countOneBits(low_stay.y)
         + countOneBits(high_stay.x) + countOneBits(high_stay.y);
-    var place = atomicAdd(&n_found, n_mine);
+    var slot = atomicAdd(&n_found, n_mine);
     workgroupBarrier();
     if lane == 0u {
         first_found = reserve(N_CANDIDATES, atomicLoad(&n_found));
     }
     workgroupBarrier();
-    place += first_found;
-    place = put(low_stay.x, 0u, own, 0u, place);
-    place = put(high_stay.x, 32u, own, 0u, place);
-    place = put(low_stay.y, 0u, own, FLAG, place);
-    place = put(high_stay.y, 32u, own, FLAG, place);
+    slot += first_found;
+    slot = put(low_stay.x, 0u, own, 0u, slot);
+    slot = put(high_stay.x, 32u, own, 0u, slot);
+    slot = put(low_stay.y, 0u, own, FLAG, slot);
+    slot = put(high_stay.y, 32u, own, FLAG, slot);
 }

@@ -114,28 +114,28 @@ impl Vector for Wasm {
 
 impl Lookup for WasmF32 {
     const N: usize = 4;
-    type Places = [u8; 4];
+    type Slots = [u8; 4];
 
     #[inline(always)]
-    fn places(places: &[u8; BATCH], first: usize) -> Self::Places {
-        let four: &[u8; 4] = places[first..].first_chunk().expect("four lanes");
+    fn slots(slots: &[u8; BATCH], first: usize) -> Self::Slots {
+        let four: &[u8; 4] = slots[first..].first_chunk().expect("four lanes");
         *four
     }
     #[inline(always)]
-    fn look_up(table: &[f32; TABLE], places: Self::Places) -> Self {
-        let [a, b, c, d] = places;
-        let at = |place: u8| table[place as usize % TABLE];
+    fn look_up(table: &[f32; TABLE], slots: Self::Slots) -> Self {
+        let [a, b, c, d] = slots;
+        let at = |slot: u8| table[slot as usize % TABLE];
         WasmF32(f32x4(at(a), at(b), at(c), at(d)))
     }
     #[inline(always)]
     fn row(table: &[f32; TABLE], first: usize) -> Self {
-        let four: &[f32; 4] = table[first..].first_chunk().expect("four places");
+        let four: &[f32; 4] = table[first..].first_chunk().expect("four slots");
         // SAFETY: the four numbers are 16 readable bytes; loads need no alignment.
         WasmF32(unsafe { v128_load(four.as_ptr().cast()) })
     }
     #[inline(always)]
     fn put(self, table: &mut [f32; TABLE], first: usize) {
-        let four: &mut [f32; 4] = table[first..].first_chunk_mut().expect("four places");
+        let four: &mut [f32; 4] = table[first..].first_chunk_mut().expect("four slots");
         // SAFETY: the four numbers are 16 writable bytes; stores need no alignment.
         unsafe { v128_store(four.as_mut_ptr().cast(), self.0) }
     }

@@ -1,4 +1,4 @@
-// Stage `compact`: finds the cells with primitives of both bodies, and the places of their entries.
+// Stage `compact`: finds the cells with primitives of both bodies, and the slots of their entries.
 //
 // In: sorted entries. Out: work items of at most 64 primitives of each body: a large cell becomes all pairs of
 // such groups. One thread per entry; the thread of the first entry of the first body in a cell does
@@ -87,9 +87,9 @@ fn main(
             mine = rows * columns;
         }
     }
-    var place = 0u;
+    var slot = 0u;
     if mine > 0u {
-        place = atomicAdd(&n_items, mine);
+        slot = atomicAdd(&n_items, mine);
         atomicAdd(&n_cells, 1u);
     }
     workgroupBarrier();
@@ -98,10 +98,10 @@ fn main(
         atomicAdd(&counters[N_SUBDIVIDED], atomicLoad(&n_cells));
     }
     workgroupBarrier();
-    place += first_item;
+    slot += first_item;
     var first_a = ix;
     var first_b = middle;
-    for (var at = place; at < min(place + mine, arrayLength(&items)); at++) {
+    for (var at = slot; at < min(slot + mine, arrayLength(&items)); at++) {
         let n_a = min(GROUP, middle - first_a);
         let n_b = min(GROUP, end - first_b);
         items[at] = CellItem(cell, (n_a - 1u) | ((n_b - 1u) << 7u), first_a, first_b);

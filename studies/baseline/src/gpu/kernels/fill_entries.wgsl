@@ -1,6 +1,6 @@
 // Stage `fill`, third kernel: one entry for every cell that a primitive's box touches.
 //
-// In: kept primitives with their ranges, and the places of their first entries. Out: entries; those that do not
+// In: kept primitives with their ranges, and the slots of their first entries. Out: entries; those that do not
 // fit have already been counted. One thread per kept primitive.
 
 @group(0) @binding(0) var<storage, read> grid: array<Grid>;

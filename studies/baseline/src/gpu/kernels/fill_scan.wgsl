@@ -20,11 +20,11 @@ fn main(@builtin(local_invocation_index) lane: u32) {
         own += sums[ix];
     }
     let sum = sum_up_to(lane, own, 256u);
-    var place = sum - own;
+    var slot = sum - own;
     for (var ix = first; ix < end; ix++) {
         let n = sums[ix];
-        sums[ix] = place;
-        place += n;
+        sums[ix] = slot;
+        slot += n;
     }
     if lane == 255u {
         atomicStore(&counters[N_ENTRIES], sum);

@@ -22,7 +22,7 @@ var<workgroup> lows: array<vec3<u32>, 128>;
 var<workgroup> highs: array<vec3<u32>, 128>;
 // The first coarse cells that they touch.
 var<workgroup> cells: array<vec3<u32>, 128>;
-var<workgroup> places: array<u32, 128>;
+var<workgroup> slots: array<u32, 128>;
 var<workgroup> n_found: atomic<u32>;
 var<workgroup> first_found: u32;
 
@@ -31,7 +31,7 @@ fn load(to: u32, entry: u32) {
     lows[to] = own.low;
     highs[to] = own.high;
     cells[to] = coarse(own.range).first;
-    places[to] = own.place;
+    slots[to] = own.slot;
 }
 
 fn is_candidate(a: u32, b: u32, cell: u32) -> bool {
@@ -76,7 +76,7 @@ fn main(
         }
         k++;
     }
-    var place = atomicAdd(&n_found, countOneBits(hits.x) + countOneBits(hits.y));
+    var slot = atomicAdd(&n_found, countOneBits(hits.x) + countOneBits(hits.y));
     workgroupBarrier();
     if lane == 0u {
         first_found = reserve(N_CANDIDATES, atomicLoad(&n_found));
@@ -86,17 +86,17 @@ fn main(
         }
     }
     workgroupBarrier();
-    place += first_found;
+    slot += first_found;
     for (var word = 0u; word < 2u; word++) {
         for (var rest = select(hits.x, hits.y, word == 1u); rest != 0u; rest &= rest - 1u) {
             let test = 64u * (32u * word + firstTrailingBit(rest)) + lane;
-            let a = places[test / n_b];
-            let b = places[64u + test % n_b];
-            if place < arrayLength(&candidates) {
+            let a = slots[test / n_b];
+            let b = slots[64u + test % n_b];
+            if slot < arrayLength(&candidates) {
                 // Bit 31 of either number says that positions were rounded; it is stored with the first.
-                candidates[place] = Candidate(a | (b & FLAG), b & ~FLAG);
+                candidates[slot] = Candidate(a | (b & FLAG), b & ~FLAG);
             }
-            place++;
+            slot++;
         }
     }
 }

@@ -1,6 +1,6 @@
 // Stage `sort`, second kernel of a round: exclusive sums of each digit's counts over the blocks.
 //
-// In: counts. Out: sums in the same places, and the total of each digit. One workgroup per digit; each lane takes
+// In: counts. Out: sums in the same slots, and the total of each digit. One workgroup per digit; each lane takes
 // a run of blocks.
 
 @group(0) @binding(0) var<storage, read_write> counts: array<u32>;
@@ -24,11 +24,11 @@ fn main(
         own += counts[row + block];
     }
     let sum = sum_up_to(lane, own, 256u);
-    var place = sum - own;
+    var slot = sum - own;
     for (var block = first; block < end; block++) {
         let n = counts[row + block];
-        counts[row + block] = place;
-        place += n;
+        counts[row + block] = slot;
+        slot += n;
     }
     if lane == 255u {
         totals[group.x] = sum;

@@ -1,4 +1,4 @@
-// Stage `sort`, third kernel of a round: moves entries to the places of their digits, in their original order.
+// Stage `sort`, third kernel of a round: moves entries to the slots of their digits, in their original order.
 //
 // In: entries, sums of the counts, totals of the digits. Out: entries. One workgroup per block, 256 entries at a
 // time. Each lane sets its bit in the row of its digit; the bits before its own give its rank among equal digits:
@@ -16,7 +16,7 @@
 
 var<workgroup> rows: array<atomic<u32>, 2048>;
 // Where the next entry of each digit goes.
-var<workgroup> places: array<u32, 256>;
+var<workgroup> slots: array<u32, 256>;
 
 // `params.first`: the lowest bit of the digit.
 @compute @workgroup_size(256)
@@ -33,7 +33,7 @@ fn main(
     if block < n_blocks {
         first += counts[lane * n_blocks + block];
     }
-    places[lane] = first;
+    slots[lane] = first;
     for (var word = 0u; word < 8u; word++) {
         atomicStore(&rows[256u * word + lane], 0u);
     }
@@ -63,12 +63,12 @@ fn main(
                     rank += countOneBits(bits & (my_bit - 1u));
                 }
             }
-            sorted[places[digit] + rank] = entry;
+            sorted[slots[digit] + rank] = entry;
         }
         workgroupBarrier();
         // The last of the lanes with equal digits clears the row for the next round.
         if is_there && rank + 1u == n_equal {
-            places[digit] += n_equal;
+            slots[digit] += n_equal;
             for (var word = 0u; word < 8u; word++) {
                 atomicStore(&rows[8u * digit + word], 0u);
             }

@@ -1,15 +1,15 @@
 //! What the tests of stage `narrow` share: the candidates of a work item, keys, and the points of a pair.
 
-use crate::cpu::met::{Met, WorkItem};
-use crate::cpu::simd::Isa;
-use crate::found::{KeysByKind, StepAnswer};
-use crate::grouping::bounds::{round_down, round_up};
-use crate::index::{LayerIx, Number, Place};
-use crate::narrow::exact_kind;
-use crate::pair_kind::PairKind;
+use crate::bvh::bounds::{round_down, round_up};
+use crate::cpu::lane_pairs::{LanePairs, WorkItem};
 use crate::plan::{TestId, pair_key};
-use crate::positions::Positions;
-use crate::sink::BLOCK;
+use crate::query::pair_kind::PairKind;
+use crate::scene::index::{Number, PartIx, Slot};
+use crate::scene::positions::Positions;
+use crate::search::found::{KeysByKind, StepAnswer};
+use crate::search::narrow::exact_kind;
+use crate::search::sink::BLOCK;
+use crate::simd::Isa;
 use impinge_exact::internal::Reach;
 use impinge_exact::{ElementPair, Point};
 
@@ -21,8 +21,8 @@ pub(crate) trait Narrow {
     /// Takes the candidates of a work item; some may wait for more.
     fn take(&mut self, isa: Isa, world: World<'_>, batch: Batch<'_>);
 
-    /// Settles the candidates that wait.
-    fn settle(&mut self, _: Isa, _: World<'_>) {}
+    /// Decides the candidates that wait.
+    fn decide(&mut self, _: Isa, _: World<'_>) {}
 
     /// Ends a step: hands over what is left of the answer.
     fn end(&mut self, answer: StepAnswer<'_>);
@@ -44,20 +44,20 @@ pub(crate) struct Batch<'a> {
     pub item: &'a WorkItem,
     pub between: Between,
     pub groups: [&'a Group; 2],
-    pub met: &'a mut Met,
+    pub lane_pairs: &'a mut LanePairs,
 }
 
 impl Batch<'_> {
-    /// The places of a candidate.
+    /// The slots of a candidate.
     #[inline(always)]
-    pub fn places(&self, ix: usize) -> Places {
-        let [lane_a, lane_b] = self.met.lanes(ix).map(u32::from);
+    pub fn slots(&self, ix: usize) -> Slots {
+        let [lane_a, lane_b] = self.lane_pairs.lanes(ix).map(u32::from);
         let WorkItem {
             cluster_a,
             cluster_b,
             ..
         } = self.item;
-        [cluster_a.place(lane_a), cluster_b.place(lane_b)]
+        [cluster_a.slot(lane_a), cluster_b.slot(lane_b)]
     }
 
     /// By how much coordinates in the tables of either group are rounded at most; infinite if one has no tables.
@@ -90,16 +90,16 @@ impl Batch<'_> {
     }
 }
 
-/// Two layers, and the kind of their pairs.
+/// Two parts, and the kind of their pairs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Between {
-    pub a: LayerIx,
-    pub b: LayerIx,
+    pub a: PartIx,
+    pub b: PartIx,
     pub kind: PairKind,
 }
 
-/// Places of two elements in their clusters' orders.
-pub(crate) type Places = [Place; 2];
+/// Slots of two elements in their clusters' orders.
+pub(crate) type Slots = [Slot; 2];
 
 /// Keys of pairs without a value, handed over in blocks.
 #[derive(Debug, Default)]
@@ -142,10 +142,10 @@ pub(super) fn exact_pair(kind: PairKind) -> Option<ElementPair> {
 
 /// The key of a pair.
 #[inline(always)]
-pub(super) fn key(world: World<'_>, between: Between, places: Places) -> u64 {
-    let [a, b] = [(between.a, places[0]), (between.b, places[1])].map(|(layer, place)| {
-        let element = world.cache(layer).clustering.primitive(place);
-        world.frame.layer(layer).number(element)
+pub(super) fn key(world: World<'_>, between: Between, slots: Slots) -> u64 {
+    let [a, b] = [(between.a, slots[0]), (between.b, slots[1])].map(|(part, slot)| {
+        let element = world.cache(part).clustering.primitive(slot);
+        world.plan.part(part).number(element)
     });
     pair_key(a, b)
 }
@@ -168,10 +168,9 @@ pub(super) fn key_in(groups: [&Group; 2], lanes: [u8; 2]) -> u64 {
 
 /// Whether a pair counts: it belongs to the cell whose pairs are wanted, if only those of one are, and the filter lets it pass.
 #[inline(always)]
-pub(super) fn counts(world: World<'_>, between: Between, places: Places) -> bool {
-    let frame = world.frame;
-    !(frame.has_cell() || frame.has_filter())
-        || frame.counts(world.scene, key(world, between, places))
+pub(super) fn counts(world: World<'_>, between: Between, slots: Slots) -> bool {
+    let plan = world.plan;
+    !(plan.has_cell() || plan.has_filter()) || plan.counts(world.scene, key(world, between, slots))
 }
 
 /// The points of a pair at the start and at the end, in the order of the exact test.
@@ -179,17 +178,17 @@ pub(super) fn points(
     world: World<'_>,
     between: Between,
     pair: ElementPair,
-    places: Places,
+    slots: Slots,
 ) -> [[Point; 4]; 2] {
-    let mut sides = [(between.a, places[0]), (between.b, places[1])];
+    let mut sides = [(between.a, slots[0]), (between.b, slots[1])];
     if pair == ElementPair::VertexEdge {
         // Such pairs are named edge first, but tested vertex first.
         sides.reverse();
     }
     let mut points: [[Point; 4]; 2] = Default::default();
     let mut n = 0;
-    for (layer, place) in sides {
-        let (corners, [start, end]) = element(world, layer, place);
+    for (part, slot) in sides {
+        let (corners, [start, end]) = element(world, part, slot);
         for &corner in corners {
             points[0][n] = start.point(corner as usize);
             points[1][n] = end.point(corner as usize);
@@ -202,11 +201,11 @@ pub(super) fn points(
 /// The corners of an element, and its body's positions at both ends.
 pub(super) fn element<'a>(
     world: World<'a>,
-    layer: LayerIx,
-    place: Place,
+    part: PartIx,
+    slot: Slot,
 ) -> (&'a [u32], [&'a Positions; 2]) {
-    let body = world.frame.body(world.scene, layer);
-    let corners = world.cache(layer).clustering.corners.corners(place.index());
+    let body = world.plan.body(world.scene, part);
+    let corners = world.cache(part).clustering.corners.corners(slot.index());
     let start = body.positions();
     (corners, [start, body.end_positions().unwrap_or(start)])
 }

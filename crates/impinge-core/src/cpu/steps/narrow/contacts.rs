@@ -1,21 +1,21 @@
 //! The contacts that one worker has found in a step, and the pairs whose contacts are still sought.
 
 use crate::cpu::narrow::room_to_wait;
-use crate::cpu::simd::Isa;
-use crate::found::{Found, FoundByKind, StepAnswer};
-use crate::pair_kind::PairKind;
 use crate::plan::Plan;
-use crate::sink::BLOCK;
-use crate::sink::Goal;
-use crate::step::{Start, Toi};
-use crate::tuning::Tuning;
+use crate::query::goal::Goal;
+use crate::query::pair_kind::PairKind;
+use crate::query::step::{Start, Toi};
+use crate::query::tuning::Tuning;
+use crate::search::found::{Found, FoundByKind, StepAnswer};
+use crate::search::sink::BLOCK;
+use crate::simd::Isa;
 use impinge_exact::internal::filter::{Search, time_between};
 use impinge_exact::{Contact, ElementPair};
 
 use super::super::world::World;
-use super::batch::{Between, Narrow, NarrowCounts, Places, counts, key, points};
+use super::batch::{Between, Narrow, NarrowCounts, Slots, counts, key, points};
 
-/// The most pairs of one worker that are settled last.
+/// The most pairs of one worker that are decided last.
 const MOST_UNSURE: usize = 4096;
 /// The most close pairs that one worker remembers: this many, or two per cluster if that is more. With more of them, a search of all
 /// pairs is as fast.
@@ -24,7 +24,7 @@ const MOST_CLOSE: usize = 4096;
 /// A pair whose first contact is sought.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Open {
-    pub places: Places,
+    pub slots: Slots,
     pub search: Search,
 }
 
@@ -39,16 +39,16 @@ pub(crate) struct FirstContacts {
     pub(super) counts: NarrowCounts,
     /// Number of open pairs that triggers a search.
     pub(super) full: usize,
-    /// Pairs of the current two layers that wait for root isolation; if `is_first`, for the separation tests before it.
+    /// Pairs of the current two parts that wait for root isolation; if `is_first`, for the separation tests before it.
     pub(super) open: Vec<Open>,
     /// Pairs that wait for the next round of root isolation.
     pub(super) later: Vec<Open>,
     /// Pairs with one candidate for a contact.
     pub(super) single: Vec<Open>,
     pub(super) between: Option<Between>,
-    /// Pairs for exact arithmetic, which are settled last where one contact is sought.
-    unsure: Vec<(Between, Places)>,
-    /// Whether the pairs of `unsure` are being settled.
+    /// Pairs for exact arithmetic, which are decided last where one contact is sought.
+    unsure: Vec<(Between, Slots)>,
+    /// Whether the pairs of `unsure` are being decided.
     is_last: bool,
     /// Most pairs in `close`.
     most_close: usize,
@@ -64,7 +64,7 @@ impl FirstContacts {
     pub fn begin(&mut self, n_clusters: u64, plan: &Plan, tuning: &Tuning) {
         (self.goal, self.start, self.toi) = (plan.goal, plan.start, plan.toi);
         self.most_close = MOST_CLOSE.max(2 * n_clusters as usize);
-        self.full = tuning.settle_from;
+        self.full = tuning.decide_from;
         self.counts = NarrowCounts::default();
         self.found.iter_mut().for_each(Vec::clear);
         for list in [&mut self.open, &mut self.later, &mut self.single] {
@@ -81,7 +81,7 @@ impl FirstContacts {
         let found: usize = self.found.iter().map(Vec::capacity).sum();
         let lists = [&self.open, &self.later, &self.single];
         size_of::<Open>() * lists.iter().map(|list| list.capacity()).sum::<usize>()
-            + size_of::<(Between, Places)>() * self.unsure.capacity()
+            + size_of::<(Between, Slots)>() * self.unsure.capacity()
             + size_of::<(PairKind, u64)>() * self.close.capacity()
             + size_of::<Found<Contact>>() * found
     }
@@ -122,17 +122,17 @@ impl FirstContacts {
     /// By how much rounding may move two vertices relative to each other; 0 if close pairs are not wanted.
     #[inline(always)]
     pub(super) fn margin(&self, world: World<'_>, between: Between) -> f64 {
-        // Pairs that are settled last are remembered already.
+        // Pairs that are decided last are remembered already.
         if self.is_last {
             return 0.0;
         }
-        2.0 * world.frame.rounded(between.a, between.b)
+        2.0 * world.plan.rounded(between.a, between.b)
     }
 
     /// Remembers a pair that is not certainly farther apart than the margin.
-    pub(super) fn remember_close(&mut self, world: World<'_>, between: Between, places: Places) {
+    pub(super) fn remember_close(&mut self, world: World<'_>, between: Between, slots: Slots) {
         if self.margin(world, between) > 0.0 && self.close.len() <= self.most_close {
-            self.close.push((between.kind, key(world, between, places)));
+            self.close.push((between.kind, key(world, between, slots)));
         }
     }
 
@@ -141,63 +141,63 @@ impl FirstContacts {
         (self.close.len() <= self.most_close).then_some(&self.close)
     }
 
-    /// The pairs to be settled last.
-    pub fn unsure(&mut self) -> &mut Vec<(Between, Places)> {
+    /// The pairs to be decided last.
+    pub fn unsure(&mut self) -> &mut Vec<(Between, Slots)> {
         &mut self.unsure
     }
 
-    /// Settles a pair about which nothing is certain, now or last.
+    /// Decides a pair about which nothing is certain, now or last.
     #[inline(always)]
     pub(super) fn leave(
         &mut self,
         world: World<'_>,
         between: Between,
         pair: ElementPair,
-        places: Places,
+        slots: Slots,
     ) {
         let waits = self.goal != Goal::All && !self.is_last;
         if waits && self.unsure.len() < MOST_UNSURE {
-            self.unsure.push((between, places));
+            self.unsure.push((between, slots));
         } else {
-            self.settle_exactly(world, between, pair, places);
+            self.decide_exactly(world, between, pair, slots);
         }
     }
 
-    /// Settles pairs of two layers that were left.
-    pub fn settle_unsure(&mut self, isa: Isa, world: World<'_>, pairs: &[(Between, Places)]) {
+    /// Decides pairs of two parts that were left.
+    pub fn decide_unsure(&mut self, isa: Isa, world: World<'_>, pairs: &[(Between, Slots)]) {
         let until = self.until(world);
-        if world.frame.keeps_distance() {
+        if world.plan.keeps_distance() {
             self.is_last = true;
-            for &(between, places) in pairs {
-                self.settle_kept(world, between, places);
+            for &(between, slots) in pairs {
+                self.decide_kept(world, between, slots);
             }
             return;
         }
-        self.open.extend(pairs.iter().map(|&(_, places)| Open {
-            places,
+        self.open.extend(pairs.iter().map(|&(_, slots)| Open {
+            slots,
             search: Search::new(until),
         }));
         self.between = pairs.first().map(|(between, _)| *between);
         (self.is_first, self.is_last) = (true, true);
-        self.settle(isa, world);
+        self.decide(isa, world);
     }
 
     #[inline(never)]
-    pub(super) fn settle_exactly(
+    pub(super) fn decide_exactly(
         &mut self,
         world: World<'_>,
         between: Between,
         pair: ElementPair,
-        places: Places,
+        slots: Slots,
     ) {
-        if world.frame.has_filter() && !counts(world, between, places) {
+        if world.plan.has_filter() && !counts(world, between, slots) {
             return;
         }
         self.counts.n_unsure += 1;
-        let ends = points(world, between, pair, places);
-        let layers = [between.a, between.b];
-        if let Some(contact) = (world.frame).first(world.scene, layers, pair, ends.each_ref()) {
-            self.report(world, between, places, contact);
+        let ends = points(world, between, pair, slots);
+        let parts = [between.a, between.b];
+        if let Some(contact) = (world.plan).first(world.scene, parts, pair, ends.each_ref()) {
+            self.report(world, between, slots, contact);
         }
     }
 
@@ -207,24 +207,24 @@ impl FirstContacts {
         &mut self,
         world: World<'_>,
         between: Between,
-        places: Places,
+        slots: Slots,
         contact: Contact,
     ) {
         if self.start == Start::Skip && contact.at_start {
             return;
         }
-        if contact.time > self.until(world) || !counts(world, between, places) {
+        if contact.time > self.until(world) || !counts(world, between, slots) {
             return;
         }
         world.known.found(self.goal, contact.time);
-        self.push(world, between, places, contact);
+        self.push(world, between, slots, contact);
     }
 
     #[inline(always)]
-    fn push(&mut self, world: World<'_>, between: Between, places: Places, contact: Contact) {
+    fn push(&mut self, world: World<'_>, between: Between, slots: Slots, contact: Contact) {
         let found = &mut self.found[between.kind as usize];
         found.push(Found {
-            key: key(world, between, places),
+            key: key(world, between, slots),
             value: contact,
         });
         if found.len() >= BLOCK {
@@ -238,10 +238,10 @@ impl FirstContacts {
         &mut self,
         world: World<'_>,
         (between, pair): (Between, ElementPair),
-        places: Places,
+        slots: Slots,
         span: [f64; 2],
     ) {
-        if span[0] > self.until(world) || !counts(world, between, places) {
+        if span[0] > self.until(world) || !counts(world, between, slots) {
             return;
         }
         // Other pairs need not be searched beyond this time.
@@ -252,13 +252,13 @@ impl FirstContacts {
             (_, Toi::F64) => None,
         };
         let Some(time) = time else {
-            return self.settle_exactly(world, between, pair, places);
+            return self.decide_exactly(world, between, pair, slots);
         };
         let contact = Contact {
             time,
             is_exact: false,
             at_start: false,
         };
-        self.report(world, between, places, contact);
+        self.report(world, between, slots, contact);
     }
 }

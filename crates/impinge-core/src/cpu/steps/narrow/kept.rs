@@ -7,17 +7,17 @@
 //!
 //! Reason for each discard: no pair keeps more than the bound of the frame (`Plan::bound`).
 
-use crate::cpu::simd::{Lanes, Simd};
-use crate::grouping::bounds::round_up;
+use crate::bvh::bounds::round_up;
+use crate::simd::{Lanes, Simd};
 use impinge_exact::Contact;
 use impinge_exact::internal::filter::{self, BATCH};
 use impinge_exact::internal::{Approach, Reach, approach};
 
 use super::super::world::World;
-use super::batch::{Batch, Between, Places, counts, exact_pair, points};
+use super::batch::{Batch, Between, Slots, counts, exact_pair, points};
 use super::contacts::FirstContacts;
 
-/// Settles the candidates of a work item.
+/// Decides the candidates of a work item.
 #[inline(always)]
 pub(super) fn take<S: Simd>(
     _: S,
@@ -26,24 +26,24 @@ pub(super) fn take<S: Simd>(
     batch: Batch<'_>,
 ) {
     let between = batch.between;
-    let in_tables = batch.near_in_tables(&Reach::from(world.frame.bound()));
+    let in_tables = batch.near_in_tables(&Reach::from(world.plan.bound()));
     let tables = batch.groups.map(|group| &group.points);
     let until = round_up(contacts.until(world));
     // With a clearance, what a pair keeps is less than the bound.
-    let is_at_bound = !world.frame.has_clearance();
-    for first in (0..batch.met.len()).step_by(BATCH) {
+    let is_at_bound = !world.plan.has_clearance();
+    for first in (0..batch.lane_pairs.len()).step_by(BATCH) {
         if world.known.is_cancelled() {
             return;
         }
-        let lanes = batch.met.batch(first);
-        let n = (batch.met.len() - first).min(BATCH);
+        let lanes = batch.lane_pairs.batch(first);
+        let n = (batch.lane_pairs.len() - first).min(BATCH);
         let mut open = u16::MAX >> (BATCH - n);
         if let Some((pair, reach)) = in_tables {
             if is_at_bound {
                 let verdict = filter::are_within_in_tables::<S::F32>(pair, tables, lanes, reach);
                 for lane in Lanes(u64::from(verdict.yes & open)) {
-                    let places = batch.places(first + lane);
-                    contacts.report(world, between, places, Contact::AT_START);
+                    let slots = batch.slots(first + lane);
+                    contacts.report(world, between, slots, Contact::AT_START);
                 }
                 open &= !verdict.yes;
             }
@@ -53,31 +53,31 @@ pub(super) fn take<S: Simd>(
             }
         }
         for lane in Lanes(u64::from(open)) {
-            contacts.settle_kept(world, between, batch.places(first + lane));
+            contacts.decide_kept(world, between, batch.slots(first + lane));
         }
     }
 }
 
 impl FirstContacts {
-    /// Settles a pair in `f64`, or leaves it.
+    /// Decides a pair in `f64`, or leaves it.
     #[inline(never)]
-    pub(super) fn settle_kept(&mut self, world: World<'_>, between: Between, places: Places) {
+    pub(super) fn decide_kept(&mut self, world: World<'_>, between: Between, slots: Slots) {
         let Some(pair) = exact_pair(between.kind) else {
             return;
         };
-        if world.frame.filters_early() && !counts(world, between, places) {
+        if world.plan.filters_early() && !counts(world, between, slots) {
             return;
         }
-        let [start, end] = points(world, between, pair, places);
-        let layers = [between.a, between.b];
-        let kept = (world.frame).kept(world.scene, layers, pair, [&start, &end]);
+        let [start, end] = points(world, between, pair, slots);
+        let parts = [between.a, between.b];
+        let kept = (world.plan).kept(world.scene, parts, pair, [&start, &end]);
         match approach(pair, &start, &end, kept, self.until(world)) {
             Approach::Apart => {}
             Approach::AtStart => {
-                self.report(world, between, places, world.frame.at_start(pair, &start));
+                self.report(world, between, slots, world.plan.at_start(pair, &start));
             }
-            Approach::Between(span) => self.report_within(world, (between, pair), places, span),
-            Approach::Unsure => self.leave(world, between, pair, places),
+            Approach::Between(span) => self.report_within(world, (between, pair), slots, span),
+            Approach::Unsure => self.leave(world, between, pair, slots),
         }
     }
 }

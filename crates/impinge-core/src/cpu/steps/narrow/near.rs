@@ -1,22 +1,22 @@
 //! Whether elements are within a distance at the start of a step.
 //!
-//! In: candidates, whose boxes overlap when each reaches half as far. Sixteen pairs at a time are settled in `f32` from the tables
+//! In: candidates, whose boxes overlap when each reaches half as far. Sixteen pairs at a time are decided in `f32` from the tables
 //! (`impinge_exact::filter::nearness`), with the nearest features of most; other pairs in `f64` with bounds (`impinge_exact::distance`), the rest in
 //! exact arithmetic. Features that are not known here are named when the pairs are sorted. Edges and faces are tested for a common point alone.
 
-use crate::cpu::simd::{Isa, Lanes, Simd, dispatch};
-use crate::elements::Elements;
-use crate::found::StepAnswer;
-use crate::index::pair_key;
-use crate::narrow::Corners;
-use crate::near::Labels;
-use crate::pair_kind::PairKind;
-use crate::positions::Positions;
+use crate::answers::near::Labels;
+use crate::query::pair_kind::PairKind;
+use crate::scene::elements::Elements;
+use crate::scene::index::pair_key;
+use crate::scene::positions::Positions;
+use crate::search::found::StepAnswer;
+use crate::search::narrow::Corners;
+use crate::simd::{Isa, Lanes, Simd, with_isa};
 use impinge_exact::internal::filter::{self, BATCH, LARGEST_F32};
 use impinge_exact::internal::{Reach, are_within_certainly, elements_meet, unsure_are_within};
 
 use super::super::world::World;
-use super::batch::{Batch, Between, Keys, Narrow, NarrowCounts, Places, numbers_in};
+use super::batch::{Batch, Between, Keys, Narrow, NarrowCounts, Slots, numbers_in};
 
 /// The test of one worker.
 #[derive(Debug, Default)]
@@ -39,7 +39,7 @@ impl NearElements {
 
 impl Narrow for NearElements {
     fn take(&mut self, isa: Isa, world: World<'_>, batch: Batch<'_>) {
-        dispatch!(isa, take, (
+        with_isa!(isa, take, (
             near: &mut NearElements = self,
             world: World<'_> = world,
             batch: Batch<'_> = batch,
@@ -65,13 +65,13 @@ fn take<S: Simd>(_: S, near: &mut NearElements, world: World<'_>, batch: Batch<'
         take_edges_and_faces::<S>(near, world, &batch);
         return;
     }
-    let pairs = LayerPair::new(world, between);
+    let pairs = PartPair::new(world, between);
     let in_tables = batch.near_in_tables(&pairs.reach);
     let is_exact = batch.rounded() == 0.0;
     let tables = batch.groups.map(|group| &group.points);
-    for first in (0..batch.met.len()).step_by(BATCH) {
-        let lanes = batch.met.batch(first);
-        let n = (batch.met.len() - first).min(BATCH);
+    for first in (0..batch.lane_pairs.len()).step_by(BATCH) {
+        let lanes = batch.lane_pairs.batch(first);
+        let n = (batch.lane_pairs.len() - first).min(BATCH);
         let mut open = u16::MAX >> (BATCH - n);
         if let Some((pair, reach)) = in_tables {
             let found = filter::nearest_in_tables::<S::F32>(pair, tables, lanes, reach);
@@ -87,7 +87,7 @@ fn take<S: Simd>(_: S, near: &mut NearElements, world: World<'_>, batch: Batch<'
             }
         }
         for lane in Lanes(u64::from(open)) {
-            if near.settle_open(&pairs, batch.places(first + lane)) {
+            if near.decide_open(&pairs, batch.slots(first + lane)) {
                 near.put(world, &batch, first + lane, Labels::UNKNOWN);
             }
         }
@@ -98,13 +98,13 @@ fn take<S: Simd>(_: S, near: &mut NearElements, world: World<'_>, batch: Batch<'
 /// An edge and a face are in the answer if they meet, whatever the distance.
 #[inline(always)]
 fn take_edges_and_faces<S: Simd>(near: &mut NearElements, world: World<'_>, batch: &Batch<'_>) {
-    let pairs = LayerPair::new(world, batch.between);
+    let pairs = PartPair::new(world, batch.between);
     let largest = f64::max(batch.groups[0].largest, batch.groups[1].largest);
     let in_tables = batch.rounded() == 0.0 && largest <= f64::from(LARGEST_F32);
     let tables = batch.groups.map(|group| &group.points[0]);
-    for first in (0..batch.met.len()).step_by(BATCH) {
-        let lanes = batch.met.batch(first);
-        let n = (batch.met.len() - first).min(BATCH);
+    for first in (0..batch.lane_pairs.len()).step_by(BATCH) {
+        let lanes = batch.lane_pairs.batch(first);
+        let n = (batch.lane_pairs.len() - first).min(BATCH);
         let mut open = u16::MAX >> (BATCH - n);
         if in_tables {
             let verdict = filter::meet_in_tables::<S::F32>(tables, lanes);
@@ -115,7 +115,7 @@ fn take_edges_and_faces<S: Simd>(near: &mut NearElements, world: World<'_>, batc
             }
         }
         for lane in Lanes(u64::from(open)) {
-            if near.settle_meeting(&pairs, batch.places(first + lane)) {
+            if near.decide_meeting(&pairs, batch.slots(first + lane)) {
                 near.put(world, batch, first + lane, Labels::UNKNOWN);
             }
         }
@@ -127,32 +127,32 @@ impl NearElements {
     /// Adds a candidate to the answer, with the part that is nearest.
     #[inline(always)]
     fn put(&mut self, world: World<'_>, batch: &Batch<'_>, ix: usize, part: u8) {
-        let numbers = numbers_in(batch.groups, batch.met.lanes(ix));
-        // Only edges meet others of the same layer, where the second may have the lower number.
+        let numbers = numbers_in(batch.groups, batch.lane_pairs.lanes(ix));
+        // Only edges meet others of the same part, where the second may have the lower number.
         let is_swapped = numbers[0] > numbers[1];
         let part = match is_swapped {
             true => filter::SWAPPED_PARTS[usize::from(part) % filter::SWAPPED_PARTS.len()],
             false => part,
         };
         let key = pair_key(numbers[0], numbers[1]);
-        if world.frame.is_owned(world.scene, key) {
-            let labels = Labels::new(world.frame.n_primitives());
+        if world.plan.is_owned(world.scene, key) {
+            let labels = Labels::new(world.plan.n_primitives());
             self.keys.push(batch.between.kind, labels.put(key, part));
         }
     }
 
-    /// Whether an edge and a face at two places meet, exactly.
+    /// Whether an edge and a face at two slots meet, exactly.
     #[inline(never)]
-    fn settle_meeting(&mut self, pairs: &LayerPair<'_>, places: Places) -> bool {
-        let [edge, face] = pairs.corners(places);
+    fn decide_meeting(&mut self, pairs: &PartPair<'_>, slots: Slots) -> bool {
+        let [edge, face] = pairs.corners(slots);
         self.n_unsure += 1;
         elements_meet(edge.points(), face.points())
     }
 
-    /// Whether the elements at two places are near, in `f64` or exactly.
+    /// Whether the elements at two slots are near, in `f64` or exactly.
     #[inline(never)]
-    fn settle_open(&mut self, pairs: &LayerPair<'_>, places: Places) -> bool {
-        let [a, b] = pairs.corners(places);
+    fn decide_open(&mut self, pairs: &PartPair<'_>, slots: Slots) -> bool {
+        let [a, b] = pairs.corners(slots);
         are_within_certainly(a.points(), b.points(), &pairs.reach).unwrap_or_else(|| {
             self.n_unsure += 1;
             unsure_are_within(a.points(), b.points(), &pairs.reach)
@@ -160,27 +160,27 @@ impl NearElements {
     }
 }
 
-/// Two layers, and within which distance their elements are near.
-struct LayerPair<'a> {
+/// Two parts, and within which distance their elements are near.
+struct PartPair<'a> {
     sides: [(&'a Elements, &'a Positions); 2],
     reach: Reach,
 }
 
-impl<'a> LayerPair<'a> {
+impl<'a> PartPair<'a> {
     fn new(world: World<'a>, between: Between) -> Self {
-        let sides = [between.a, between.b].map(|layer| {
-            let body = world.frame.body(world.scene, layer);
-            (&world.cache(layer).clustering.corners, body.positions())
+        let sides = [between.a, between.b].map(|part| {
+            let body = world.plan.body(world.scene, part);
+            (&world.cache(part).clustering.corners, body.positions())
         });
-        let reach = world.frame.reach(between.a, between.b);
-        LayerPair { sides, reach }
+        let reach = world.plan.reach(between.a, between.b);
+        PartPair { sides, reach }
     }
 
     #[inline(always)]
-    fn corners(&self, places: Places) -> [Corners; 2] {
+    fn corners(&self, slots: Slots) -> [Corners; 2] {
         [0, 1].map(|side| {
             let (elements, positions) = self.sides[side];
-            Corners::new(positions, elements.corners(places[side].index()))
+            Corners::new(positions, elements.corners(slots[side].index()))
         })
     }
 }

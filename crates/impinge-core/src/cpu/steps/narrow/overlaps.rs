@@ -2,13 +2,13 @@
 //!
 //! Stage `pairing` has tested boxes of points rounded to `f32`. Pairs whose boxes overlap by less than rounding are tested again in `f64`.
 
-use crate::cpu::simd::{Isa, LaneBounds, Simd, dispatch};
-use crate::elements::Elements;
-use crate::found::StepAnswer;
-use crate::grouping::bounds::round_up;
-use crate::hull::{Extent, Hull};
-use crate::index::Place;
-use crate::narrow::are_near;
+use crate::boxes::{BoxSource, Extent};
+use crate::bvh::bounds::round_up;
+use crate::scene::elements::Elements;
+use crate::scene::index::Slot;
+use crate::search::found::StepAnswer;
+use crate::search::narrow::are_near;
+use crate::simd::{Isa, LaneBounds, Simd, with_isa};
 use impinge_exact::internal::filter::BATCH;
 use impinge_exact::internal::filter::number::Lookup;
 
@@ -35,17 +35,17 @@ impl Overlaps {
 
 impl Narrow for Overlaps {
     fn take(&mut self, isa: Isa, world: World<'_>, batch: Batch<'_>) {
-        let inflation = world.frame.inflation(batch.between.a);
-        if batch.rounded() > 0.0 || inflation > 0.0 || world.frame.has_cell() {
-            return dispatch!(isa, take, (
+        let inflation = world.plan.inflation(batch.between.a);
+        if batch.rounded() > 0.0 || inflation > 0.0 || world.plan.has_cell() {
+            return with_isa!(isa, take, (
                 overlaps: &mut Overlaps = self,
                 world: World<'_> = world,
                 batch: Batch<'_> = batch,
             ));
         }
         // The boxes of the groups are those of the elements.
-        for ix in 0..batch.met.len() {
-            let key = key_in(batch.groups, batch.met.lanes(ix));
+        for ix in 0..batch.lane_pairs.len() {
+            let key = key_in(batch.groups, batch.lane_pairs.lanes(ix));
             self.keys.push(batch.between.kind, key);
         }
         self.keys.hand_over(world, batch.between.kind);
@@ -63,27 +63,27 @@ impl Narrow for Overlaps {
 #[inline(always)]
 fn take<S: Simd>(_: S, overlaps: &mut Overlaps, world: World<'_>, batch: Batch<'_>) {
     let between = batch.between;
-    // That of all layers.
-    let distance = world.frame.inflation(between.a);
+    // That of all parts.
+    let distance = world.plan.inflation(between.a);
     let boxes = batch.groups.map(|group| &group.start);
     let farther_out = farther_out(batch.groups, distance);
-    let sides = [between.a, between.b].map(|layer| LayerSide {
-        elements: &world.cache(layer).clustering.corners,
-        hull: world.hull(layer),
+    let sides = [between.a, between.b].map(|part| PartSide {
+        elements: &world.cache(part).clustering.corners,
+        source: world.source(part),
     });
-    for first in (0..batch.met.len()).step_by(BATCH) {
-        let sure = overlap_by::<S::F32>(boxes, batch.met.batch(first), farther_out);
-        let n = (batch.met.len() - first).min(BATCH);
+    for first in (0..batch.lane_pairs.len()).step_by(BATCH) {
+        let sure = overlap_by::<S::F32>(boxes, batch.lane_pairs.batch(first), farther_out);
+        let n = (batch.lane_pairs.len() - first).min(BATCH);
         for lane in 0..n {
             let ix = first + lane;
             if sure >> lane & 1 == 0 {
-                let [a, b] = batch.places(ix);
+                let [a, b] = batch.slots(ix);
                 if !are_near(&sides[0].extent(a), &sides[1].extent(b), distance) {
                     continue;
                 }
             }
-            let key = key_in(batch.groups, batch.met.lanes(ix));
-            if world.frame.is_owned(world.scene, key) {
+            let key = key_in(batch.groups, batch.lane_pairs.lanes(ix));
+            if world.plan.is_owned(world.scene, key) {
                 overlaps.keys.push(between.kind, key);
             }
         }
@@ -94,7 +94,7 @@ fn take<S: Simd>(_: S, overlaps: &mut Overlaps, world: World<'_>, batch: Batch<'
 /// By how much two boxes of groups together reach at most beyond the inflated boxes of elements, on one axis.
 ///
 /// An end is off by the rounding of points, at most 2^-24 of the largest coordinate, and moved outward by the distance, 2^-20 of all, and
-/// 2^-126 (`hull::Pose`): less than 2^-19 of the largest coordinate and of the distance, and 2^-125.
+/// 2^-126 (`boxes::Sweep`): less than 2^-19 of the largest coordinate and of the distance, and 2^-125.
 fn farther_out([a, b]: [&Group; 2], distance: f64) -> f32 {
     let largest = f64::max(a.largest, b.largest) + distance;
     if largest * (1.0 + 2f64.powi(-18)) > f64::from(f32::MAX) {
@@ -108,13 +108,13 @@ fn farther_out([a, b]: [&Group; 2], distance: f64) -> f32 {
 #[inline(always)]
 fn overlap_by<V: Lookup>(
     [a, b]: [&LaneBounds; 2],
-    places: [&[u8; BATCH]; 2],
+    slots: [&[u8; BATCH]; 2],
     farther_out: f32,
 ) -> u16 {
     let bound = V::splat(farther_out.into());
     let mut yes = 0;
     for first in (0..BATCH).step_by(V::N) {
-        let (of_a, of_b) = (V::places(places[0], first), V::places(places[1], first));
+        let (of_a, of_b) = (V::slots(slots[0], first), V::slots(slots[1], first));
         let mut all = !bound.gt(bound);
         for axis in 0..3 {
             let before = V::look_up(&a.max[axis], of_a) - V::look_up(&b.min[axis], of_b);
@@ -126,16 +126,16 @@ fn overlap_by<V: Lookup>(
     yes
 }
 
-/// The elements of a layer, and what makes their boxes.
-struct LayerSide<'a> {
+/// The elements of a part, and what makes their boxes.
+struct PartSide<'a> {
     elements: &'a Elements,
-    hull: Hull<'a>,
+    source: BoxSource<'a>,
 }
 
-impl LayerSide<'_> {
+impl PartSide<'_> {
     /// The box of an element over the whole step.
     #[inline(always)]
-    fn extent(&self, place: Place) -> Extent {
-        self.hull.extent(self.elements.corners(place.index()))
+    fn extent(&self, slot: Slot) -> Extent {
+        self.source.extent(self.elements.corners(slot.index()))
     }
 }

@@ -8,16 +8,16 @@
 //! The two alternate on lists of a thousand pairs, so that no lane waits for another pair's search. If close pairs are wanted too,
 //! pairs that stay beyond the margin are dropped first.
 
-use crate::cpu::simd::{Lanes, Simd};
-use crate::positions::Positions;
+use crate::scene::positions::Positions;
+use crate::simd::{Lanes, Simd};
 use impinge_exact::ElementPair;
 use impinge_exact::internal::filter::{self, Enclosed8, LANES, Look8, Next, Spans8, Steps8};
 
 use super::super::world::World;
-use super::batch::{Between, Places, exact_pair};
+use super::batch::{Between, Slots, exact_pair};
 use super::contacts::{FirstContacts, Open};
 
-/// Settles the open pairs of the current layers.
+/// Decides the open pairs of the current parts.
 #[inline(always)]
 pub(super) fn search<S: Simd>(simd: S, contacts: &mut FirstContacts, world: World<'_>) {
     let Some(between) = contacts.between else {
@@ -102,7 +102,7 @@ impl FirstContacts {
                 Next::Apart => {}
                 Next::Look => later.push(next),
                 Next::Enclose | Next::Contact | Next::Unsure => {
-                    self.remember_close(world, between, open.places);
+                    self.remember_close(world, between, open.slots);
                     close.push(open);
                 }
             }
@@ -128,7 +128,7 @@ impl FirstContacts {
                 Next::Look => later.push(open),
                 Next::Enclose => single.push(open),
                 Next::Contact | Next::Unsure => {
-                    self.leave(world, between, pair, open.places);
+                    self.leave(world, between, pair, open.slots);
                 }
             }
         }
@@ -152,21 +152,21 @@ impl FirstContacts {
                 Next::Look => later.push(open),
                 Next::Contact => {
                     let span = [found.span.low[lane], found.span.high[lane]];
-                    self.report_within(world, (between, pair), open.places, span);
+                    self.report_within(world, (between, pair), open.slots, span);
                 }
                 Next::Enclose | Next::Unsure => {
-                    self.leave(world, between, pair, open.places);
+                    self.leave(world, between, pair, open.slots);
                 }
             }
         }
     }
 }
 
-/// The corners and positions of two layers' elements.
+/// The corners and positions of two parts' elements.
 struct PairSides<'a> {
-    /// The corners at each place: of vertices and faces, or of edges.
+    /// The corners at each slot: of vertices and faces, or of edges.
     corners: PairCorners<'a>,
-    /// The positions of each layer, at the start and at the end.
+    /// The positions of each part, at the start and at the end.
     positions: [[&'a Positions; 2]; 2],
 }
 
@@ -178,17 +178,17 @@ enum PairCorners<'a> {
 
 impl<'a> PairSides<'a> {
     fn new(world: World<'a>, between: Between) -> Self {
-        use crate::elements::Elements::{Edges, Points, Triangles};
-        let layers = [between.a, between.b];
-        let elements = layers.map(|layer| &world.cache(layer).clustering.corners);
+        use crate::scene::elements::Elements::{Edges, Points, Triangles};
+        let parts = [between.a, between.b];
+        let elements = parts.map(|part| &world.cache(part).clustering.corners);
         PairSides {
             corners: match elements {
                 [Points(vertices), Triangles(faces)] => PairCorners::VertexFace(vertices, faces),
                 [Edges(a), Edges(b)] => PairCorners::EdgeEdge(a, b),
                 _ => PairCorners::None,
             },
-            positions: layers.map(|layer| {
-                let body = world.frame.body(world.scene, layer);
+            positions: parts.map(|part| {
+                let body = world.plan.body(world.scene, part);
                 let start = body.positions();
                 [start, body.end_positions().unwrap_or(start)]
             }),
@@ -198,10 +198,10 @@ impl<'a> PairSides<'a> {
     /// Loads the points and intervals of up to eight pairs; unused lanes get those of the first.
     #[inline(always)]
     fn fill<S: Simd>(&self, simd: S, chunk: &[Open], steps: &mut Steps8, spans: &mut Spans8) {
-        let mut batch = [chunk[0].places; LANES];
+        let mut batch = [chunk[0].slots; LANES];
         for lane in 0..LANES {
             let open = chunk[if lane < chunk.len() { lane } else { 0 }];
-            batch[lane] = open.places;
+            batch[lane] = open.slots;
             [spans.low[lane], spans.high[lane]] = open.search.span();
         }
         let batch = &batch;
@@ -225,12 +225,12 @@ fn fill<S: Simd, const N: usize>(
     simd: S,
     (corners, side, first): (&[[u32; N]], usize, usize),
     ends: [&Positions; 2],
-    batch: &[Places; LANES],
+    batch: &[Slots; LANES],
     Steps8(steps): &mut Steps8,
 ) {
     let mut ids = [[0; LANES]; N];
-    for (lane, places) in batch.iter().enumerate() {
-        let corners = &corners[places[side].index()];
+    for (lane, slots) in batch.iter().enumerate() {
+        let corners = &corners[slots[side].index()];
         for k in 0..N {
             ids[k][lane] = corners[k];
         }

@@ -12,21 +12,21 @@
 //!
 //! Unsure pairs go to exact arithmetic, and so do pairs of bare edges and points, and all times in double precision.
 
-use crate::cpu::met::Met;
-use crate::cpu::simd::{Isa, Simd, dispatch};
-use crate::found::StepAnswer;
-use crate::grouping::bounds::round_up;
-use crate::pair_kind::PairKind;
+use crate::bvh::bounds::round_up;
+use crate::cpu::lane_pairs::LanePairs;
 #[cfg(feature = "gpu")]
-use crate::positions::Positions;
+use crate::query::goal::Goal;
+use crate::query::pair_kind::PairKind;
 #[cfg(feature = "gpu")]
-use crate::sink::Goal;
+use crate::scene::positions::Positions;
+use crate::search::found::StepAnswer;
+use crate::simd::{Isa, Simd, with_isa};
 use impinge_exact::ElementPair;
 use impinge_exact::internal::filter::{self, BATCH, Moving64, Search};
 
 use super::super::world::World;
 #[cfg(feature = "gpu")]
-use super::batch::Places;
+use super::batch::Slots;
 use super::batch::{Batch, Between, Narrow, NarrowCounts, counts, exact_pair};
 use super::contacts::{FirstContacts, Open};
 use super::kept;
@@ -36,9 +36,9 @@ impl Narrow for FirstContacts {
     fn take(&mut self, isa: Isa, world: World<'_>, batch: Batch<'_>) {
         let between = batch.between;
         self.go_to(isa, world, between);
-        let has_clearance = world.frame.has_clearance();
-        if world.frame.keeps_distance() && !has_clearance {
-            return dispatch!(isa, kept, (
+        let has_clearance = world.plan.has_clearance();
+        if world.plan.keeps_distance() && !has_clearance {
+            return with_isa!(isa, kept, (
                 contacts: &mut FirstContacts = self,
                 world: World<'_> = world,
                 batch: Batch<'_> = batch,
@@ -46,13 +46,13 @@ impl Narrow for FirstContacts {
         }
         if !matches!(between.kind, PairKind::VertexFace | PairKind::EdgeEdge) {
             if has_clearance {
-                for ix in 0..batch.met.len() {
-                    self.settle_kept(world, between, batch.places(ix));
+                for ix in 0..batch.lane_pairs.len() {
+                    self.decide_kept(world, between, batch.slots(ix));
                 }
             } else if let Some(pair) = exact_pair(between.kind) {
-                for ix in 0..batch.met.len() {
-                    self.remember_close(world, between, batch.places(ix));
-                    self.settle_exactly(world, between, pair, batch.places(ix));
+                for ix in 0..batch.lane_pairs.len() {
+                    self.remember_close(world, between, batch.slots(ix));
+                    self.decide_exactly(world, between, pair, batch.slots(ix));
                 }
             }
             return;
@@ -69,55 +69,55 @@ impl Narrow for FirstContacts {
             // With a clearance, an element that is moved by what a pair keeps may be in contact: then coordinates of the
             // polygon's corners, not of its edges, differ by up to that.
             let kept = if has_clearance {
-                world.frame.bound()
+                world.plan.bound()
             } else {
                 0.0
             };
             let margin = self.margin(world, between) + kept + 2.0 * rounded;
-            let (limits, met) = ((round_up(until), margin), &mut *batch.met);
+            let (limits, lane_pairs) = ((round_up(until), margin), &mut *batch.lane_pairs);
             match between.kind {
-                PairKind::VertexFace => dispatch!(isa, drop_vertices_and_faces, (
+                PairKind::VertexFace => with_isa!(isa, drop_vertices_and_faces, (
                     tables: [&Moving64; 2] = tables,
                     limits: (f32, f64) = limits,
-                    met: &mut Met = met,
+                    lane_pairs: &mut LanePairs = lane_pairs,
                 )),
-                _ => dispatch!(isa, drop_edges, (
+                _ => with_isa!(isa, drop_edges, (
                     tables: [&Moving64; 2] = tables,
                     limits: (f32, f64) = limits,
-                    met: &mut Met = met,
+                    lane_pairs: &mut LanePairs = lane_pairs,
                 )),
             }
         }
         if has_clearance {
-            return dispatch!(isa, kept, (
+            return with_isa!(isa, kept, (
                 contacts: &mut FirstContacts = self,
                 world: World<'_> = world,
                 batch: Batch<'_> = batch,
             ));
         }
-        let filters_early = world.frame.filters_early();
-        for ix in 0..batch.met.len() {
-            if filters_early && !counts(world, between, batch.places(ix)) {
+        let filters_early = world.plan.filters_early();
+        for ix in 0..batch.lane_pairs.len() {
+            if filters_early && !counts(world, between, batch.slots(ix)) {
                 continue;
             }
             self.open.push(Open {
-                places: batch.places(ix),
+                slots: batch.slots(ix),
                 search: Search::new(until),
             });
         }
         if self.open.len() >= self.full {
             self.counts.n_full += u64::from(!self.open.is_empty());
-            self.settle(isa, world);
+            self.decide(isa, world);
         }
     }
 
     /// Searches the open pairs for first contacts.
     #[inline(never)]
-    fn settle(&mut self, isa: Isa, world: World<'_>) {
+    fn decide(&mut self, isa: Isa, world: World<'_>) {
         if self.open.is_empty() && self.single.is_empty() {
             return;
         }
-        dispatch!(isa, search, (contacts: &mut FirstContacts = self, world: World<'_> = world));
+        with_isa!(isa, search, (contacts: &mut FirstContacts = self, world: World<'_> = world));
         self.open.clear();
     }
 
@@ -131,16 +131,16 @@ impl Narrow for FirstContacts {
 }
 
 impl FirstContacts {
-    /// Turns to the pairs of two layers.
+    /// Turns to the pairs of two parts.
     #[inline(always)]
     fn go_to(&mut self, isa: Isa, world: World<'_>, between: Between) {
         if self.between != Some(between) {
-            self.settle(isa, world);
+            self.decide(isa, world);
             self.between = Some(between);
         }
     }
 
-    /// Takes pairs of two layers that a device has not dropped, by their places. Each comes with a time until which it certainly does not
+    /// Takes pairs of two parts that a device has not dropped, by their places. Each comes with a time until which it certainly does not
     /// touch, and a later one by which it certainly does, at one time only, if there is one.
     #[cfg(feature = "gpu")]
     pub fn take_left(
@@ -148,22 +148,22 @@ impl FirstContacts {
         isa: Isa,
         world: World<'_>,
         between: Between,
-        pairs: impl Iterator<Item = (Places, f64, Option<f64>)>,
+        pairs: impl Iterator<Item = (Slots, f64, Option<f64>)>,
     ) {
         self.go_to(isa, world, between);
         if !matches!(between.kind, PairKind::VertexFace | PairKind::EdgeEdge) {
             if let Some(pair) = exact_pair(between.kind) {
-                pairs.for_each(|(places, ..)| self.settle_exactly(world, between, pair, places));
+                pairs.for_each(|(slots, ..)| self.decide_exactly(world, between, pair, slots));
             }
             return;
         }
-        let are_single = [between.a, between.b].iter().all(|&layer| {
-            let body = world.frame.body(world.scene, layer);
+        let are_single = [between.a, between.b].iter().all(|&part| {
+            let body = world.plan.body(world.scene, part);
             matches!(body.positions(), Positions::F32(_))
         });
         // Over the whole step, the device has taken the filter's first step for positions in single precision.
         self.is_first = !are_single || matches!(self.goal, Goal::Earliest);
-        for (places, free_until, touches_by) in pairs {
+        for (slots, free_until, touches_by) in pairs {
             let until = self.until(world);
             // Meanwhile another pair was found to touch before.
             if free_until > until {
@@ -175,11 +175,11 @@ impl FirstContacts {
             };
             let high = touches_by.unwrap_or(until);
             list.push(Open {
-                places,
+                slots,
                 search: Search::within([free_until, high]),
             });
             if self.open.len() + self.single.len() >= self.full {
-                self.settle(isa, world);
+                self.decide(isa, world);
             }
         }
     }
@@ -197,14 +197,19 @@ fn drop_vertices_and_faces<S: Simd>(
     simd: S,
     tables: [&Moving64; 2],
     limits: (f32, f64),
-    met: &mut Met,
+    lane_pairs: &mut LanePairs,
 ) {
-    drop_apart(simd, ElementPair::VertexFace, tables, limits, met);
+    drop_apart(simd, ElementPair::VertexFace, tables, limits, lane_pairs);
 }
 
 #[inline(always)]
-fn drop_edges<S: Simd>(simd: S, tables: [&Moving64; 2], limits: (f32, f64), met: &mut Met) {
-    drop_apart(simd, ElementPair::EdgeEdge, tables, limits, met);
+fn drop_edges<S: Simd>(
+    simd: S,
+    tables: [&Moving64; 2],
+    limits: (f32, f64),
+    lane_pairs: &mut LanePairs,
+) {
+    drop_apart(simd, ElementPair::EdgeEdge, tables, limits, lane_pairs);
 }
 
 /// Drops the candidates that are certainly apart from t = 0 to a time, by more than a margin: the two limits.
@@ -214,24 +219,26 @@ fn drop_apart<S: Simd>(
     pair: ElementPair,
     tables: [&Moving64; 2],
     limits: (f32, f64),
-    met: &mut Met,
+    lane_pairs: &mut LanePairs,
 ) {
     let mut n_kept = 0;
-    for first in (0..met.len()).step_by(BATCH) {
-        let no = filter::are_far_in_tables::<S::F32>(pair, tables, met.batch(first), limits);
-        n_kept = met.keep_batch(simd, first, !no, n_kept);
+    for first in (0..lane_pairs.len()).step_by(BATCH) {
+        let no = filter::are_far_in_tables::<S::F32>(pair, tables, lane_pairs.batch(first), limits);
+        n_kept = lane_pairs.keep_batch(simd, first, !no, n_kept);
     }
-    met.truncate(n_kept);
+    lane_pairs.truncate(n_kept);
     let mut n_kept = 0;
-    for first in (0..met.len()).step_by(BATCH) {
-        let no = filter::are_across_in_tables::<S::F32>(pair, tables, met.batch(first), limits);
-        n_kept = met.keep_batch(simd, first, !no, n_kept);
+    for first in (0..lane_pairs.len()).step_by(BATCH) {
+        let no =
+            filter::are_across_in_tables::<S::F32>(pair, tables, lane_pairs.batch(first), limits);
+        n_kept = lane_pairs.keep_batch(simd, first, !no, n_kept);
     }
-    met.truncate(n_kept);
+    lane_pairs.truncate(n_kept);
     let mut n_kept = 0;
-    for first in (0..met.len()).step_by(BATCH) {
-        let no = filter::are_aside_in_tables::<S::F32>(pair, tables, met.batch(first), limits);
-        n_kept = met.keep_batch(simd, first, !no, n_kept);
+    for first in (0..lane_pairs.len()).step_by(BATCH) {
+        let no =
+            filter::are_aside_in_tables::<S::F32>(pair, tables, lane_pairs.batch(first), limits);
+        n_kept = lane_pairs.keep_batch(simd, first, !no, n_kept);
     }
-    met.truncate(n_kept);
+    lane_pairs.truncate(n_kept);
 }

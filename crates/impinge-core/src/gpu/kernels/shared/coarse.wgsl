@@ -26,7 +26,7 @@ fn next_cell(cell: vec3<u32>, touched: Coarse) -> vec3<u32> {
     return next;
 }
 
-// Equation (2): the cell's place in the linear array.
+// Equation (2): the cell's slot in the linear array.
 fn cell_number(cell: vec3<u32>, resolution: vec3<u32>) -> u32 {
     return (cell.z * resolution.y + cell.y) * resolution.x + cell.x;
 }

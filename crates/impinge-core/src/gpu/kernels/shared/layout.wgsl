@@ -1,7 +1,7 @@
 // The data that host and device exchange. The Rust twins are in `gpu/layout.rs`; a test
 // parses this file and compares sizes, offsets and constants.
 
-// A node of the forest: a box in ordered keys (see boxes.wgsl) and where its children are.
+// A node of the trees: a box in ordered keys (see boxes.wgsl) and where its children are.
 //
 //   shape  31           13   12   11       4 3        0
 //         +---------------+------+----------+----------+
@@ -23,24 +23,24 @@ const GATE: u32 = 0x1000u;
 // The nodes of one height.
 struct Level { first: u32, count: u32 }
 
-// One layer of the frame: of a body one, in a step up to three. `slack`: by how many keys its boxes are widened, for
-// rounded positions. In a step, the bits of `layer`:
+// One part of the frame: of a body one, in a step up to three. `slack`: by how many keys its boxes are widened, for
+// rounded positions. In a step, the bits of `part`:
 //
-//   layer  31             5      4        3       2     1   0
+//   part  31             5      4        3       2     1   0
 //         +----------------+------------+--------+------+------+
-//         |  body number   | own layers | points | bare | part |
+//         |  body number   | own parts | points | bare | part |
 //         +----------------+------------+--------+------+------+
 //
-// Own layers: pairs with other layers of the same body are asked for. Points, bare: the body has no edges, no faces.
-// `first_place`, `first_number`: those of its first primitive; records are in the order of their places.
+// Own parts: pairs with other parts of the same body are asked for. Points, bare: the body has no edges, no faces.
+// `first_slot`, `first_number`: those of its first primitive; records are in the order of their places.
 struct Body {
     root: u32,
     slack: u32,
     within: u32,
-    layer: u32,
+    part: u32,
     category: vec2<u32>,
     mask: vec2<u32>,
-    first_place: u32,
+    first_slot: u32,
     first_number: u32,
 }
 
@@ -50,7 +50,7 @@ const VERTICES: u32 = 1u;
 const FACES: u32 = 2u;
 const BARE: u32 = 4u;
 const POINTS: u32 = 8u;
-const OWN_LAYERS: u32 = 16u;
+const OWN_PARTS: u32 = 16u;
 const BODY_SHIFT: u32 = 5u;
 
 // A run of at most 64 primitives and the run of its unique vertices.
@@ -60,7 +60,7 @@ const BODY_SHIFT: u32 = 5u;
 //         |  vertices   | primitives  |
 //         +-------------+-------------+
 struct Cluster {
-    first_place: u32,
+    first_slot: u32,
     first_vertex: u32,
     sizes: u32,
     body: u32,
@@ -69,11 +69,11 @@ struct Cluster {
 struct NodePair { a: u32, b: u32 }
 struct WorkItem { a: u32, b: u32 }
 
-// Two places. Bit 31 of `a`: positions were rounded. Bit 31 of `b`: the two share a vertex; in a step, `a` is an edge.
+// Two slots. Bit 31 of `a`: positions were rounded. Bit 31 of `b`: the two share a vertex; in a step, `a` is an edge.
 struct Candidate { a: u32, b: u32 }
 
-// Two global primitive numbers, the lower one first. In a step, a pair key is a candidate; and an unsure key has two places, if the
-// host settles it.
+// Two global primitive numbers, the lower one first. In a step, a pair key is a candidate; and an unsure key has two slots, if the
+// host decides it.
 struct PairKey { low: u32, high: u32 }
 struct UnsureKey { low: u32, high: u32 }
 
@@ -82,7 +82,7 @@ struct PairTimes { free_until: f32, touches_by: f32 }
 
 // Parameters of one dispatch.
 struct Params {
-    // bounds: the clusters, nodes or levels to refit. dispatch: the round.
+    // bounds: the clusters, nodes or levels to refit. traversal: the round.
     first: u32,
     count: u32,
     // prepare: the counter to read, elements per workgroup, the most elements, the slot for the arguments.
@@ -107,7 +107,7 @@ struct Params {
     tile_row: u32,
     tile_column: u32,
     tile_side: u32,
-    // Steps: 1 when pairs are named by global numbers, 0 when by places.
+    // Steps: 1 when pairs are named by global numbers, 0 when by slots.
     by_number: u32,
     // Steps: which contacts are sought.
     sought: u32,
@@ -126,7 +126,7 @@ const SEEK_ANY: u32 = 2u;
 //           +-----------+-----------+
 struct Kept {
     low: vec3<u32>,
-    place: u32,
+    slot: u32,
     high: vec3<u32>,
     body: u32,
     range: vec3<u32>,

@@ -20,10 +20,10 @@ fn extent_at(entry: u32) -> Extent {
 }
 
 fn are_of_one_body(a: Cluster, b: Cluster) -> bool {
-    return bodies[a.body].layer >> BODY_SHIFT == bodies[b.body].layer >> BODY_SHIFT;
+    return bodies[a.body].part >> BODY_SHIFT == bodies[b.body].part >> BODY_SHIFT;
 }
 
-// Bit 31 of the second place of a candidate: the first place is that of an edge.
+// Bit 31 of the second slot of a candidate: the first slot is that of an edge.
 fn flag_of(a: Cluster) -> u32 {
-    return select(0u, FLAG, (bodies[a.body].layer & PART) == EDGES);
+    return select(0u, FLAG, (bodies[a.body].part & PART) == EDGES);
 }

@@ -17,7 +17,7 @@ fn are_of_one_body(a: Cluster, b: Cluster) -> bool {
     return a.body == b.body;
 }
 
-// Bit 31 of the second place of a candidate that shares no vertex.
+// Bit 31 of the second slot of a candidate that shares no vertex.
 fn flag_of(a: Cluster) -> u32 {
     return 0u;
 }

@@ -1,0 +1,104 @@
+//! The answer about candidates.
+
+use crate::answers::numbering::{Numbering, row};
+use crate::answers::pairs::{Primitive, hash_row, mix};
+use crate::plan::Plan;
+use crate::query::pair_kind::PairKind;
+use crate::scene::error::Error;
+#[cfg(doc)]
+use crate::scene::ids::BodyId;
+use crate::search::found::KeysByKind;
+use crate::search::runner::{Job, Outcome};
+use crate::search::stats::Statistics;
+
+/// Pairs of elements whose boxes overlap during a step, sorted by `(kind, body_a, element_a, body_b, element_b)`.
+#[derive(Clone, Default)]
+pub struct Candidates {
+    numbering: Numbering,
+    keys: KeysByKind,
+    stats: Statistics,
+}
+
+impl std::fmt::Debug for Candidates {
+    /// Their number and the first of them, however many there are.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let mut short = f.debug_struct("Candidates");
+        short.field("len", &self.len());
+        short.field("first", &self.iter().next());
+        short.finish_non_exhaustive()
+    }
+}
+
+impl Candidates {
+    /// Gives it memory for the keys of the next answer.
+    pub(crate) fn put_buffers(&mut self, rooms: KeysByKind) {
+        self.keys = rooms;
+    }
+
+    /// The number of candidates of all kinds.
+    pub fn len(&self) -> usize {
+        self.keys.iter().map(Vec::len).sum()
+    }
+
+    /// Whether there are no candidates.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The candidates of one kind: `(a, b)`, where `a` is the element that the kind names first.
+    pub fn of(&self, kind: PairKind) -> impl ExactSizeIterator<Item = (Primitive, Primitive)> + '_ {
+        let keys = self.keys[kind as usize].iter();
+        keys.map(|&key| self.numbering.pair(key))
+    }
+
+    /// Rows `[body_a, element_a, body_b, element_b]` of one kind, with bodies by their [`index`](BodyId::index).
+    pub fn rows(&self, kind: PairKind) -> impl ExactSizeIterator<Item = [u32; 4]> + '_ {
+        self.of(kind).map(|(a, b)| row(a, b))
+    }
+
+    /// All candidates.
+    pub fn iter(&self) -> impl Iterator<Item = (PairKind, Primitive, Primitive)> + '_ {
+        let kinds = PairKind::ALL.into_iter();
+        kinds.flat_map(|kind| self.of(kind).map(move |(a, b)| (kind, a, b)))
+    }
+
+    /// A hash of the set that does not depend on its order.
+    pub fn hash(&self) -> u64 {
+        PairKind::ALL.into_iter().fold(0, |sum, kind| {
+            self.rows(kind).fold(sum, |sum: u64, row| {
+                sum.wrapping_add(mix(hash_row(row) ^ kind as u64))
+            })
+        })
+    }
+
+    /// How the answer was found.
+    pub fn stats(&self) -> &Statistics {
+        &self.stats
+    }
+}
+
+impl Outcome<u64, { PairKind::ALL.len() }> for Candidates {
+    fn begin(&mut self, plan: &Plan) {
+        self.numbering.begin(plan);
+        self.keys.iter_mut().for_each(Vec::clear);
+        self.stats.clear();
+    }
+
+    fn stats_mut(&mut self) -> &mut Statistics {
+        &mut self.stats
+    }
+
+    fn take_buffers(&mut self) -> KeysByKind {
+        std::mem::take(&mut self.keys)
+    }
+
+    fn fill(&mut self, _: Job<'_>, keys: KeysByKind) -> Result<(), Error> {
+        self.keys = keys;
+        Ok(())
+    }
+
+    fn bytes(&self) -> u64 {
+        let n: usize = self.keys.iter().map(Vec::capacity).sum();
+        (size_of::<u64>() * n) as u64
+    }
+}

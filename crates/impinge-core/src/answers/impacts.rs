@@ -1,0 +1,208 @@
+//! The answer about a step: impacts, with their times.
+
+use crate::answers::numbering::{Numbering, row};
+use crate::answers::pairs::{Primitive, hash_row, mix};
+use crate::plan::Plan;
+use crate::query::pair_kind::PairKind;
+use crate::query::step::Toi;
+use crate::scene::error::Error;
+#[cfg(doc)]
+use crate::scene::ids::BodyId;
+use crate::search::found::{Found, FoundByKind};
+use crate::search::sink::reserve;
+use crate::search::stats::Statistics;
+use impinge_exact::Contact;
+
+/// Two elements that touch during a step, and when first.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Impact {
+    /// The kinds of the two elements.
+    pub kind: PairKind,
+    /// The element that the kind names first: the vertex of a vertex and a face, the edge of an edge and a vertex.
+    ///
+    /// Vertices are numbered as positions are. Faces are numbered as they were given; those of tetrahedra by tetrahedron,
+    /// then by the opposite corner. Edges are numbered as they were given; those of faces as unique pairs `(low, high)` in
+    /// the order of `(high, low)`. [`Body::part`](crate::Body::part) lists them.
+    pub a: Primitive,
+    /// The other element. If both are of the same kind, it belongs to the body with the higher id, or is the higher element
+    /// of the same body.
+    pub b: Primitive,
+    /// The first time in [0, 1] at which they touch, rounded down to `f32` or `f64`, as [`Step::toi`](crate::Step::toi) says.
+    pub toi: f64,
+    /// Whether they touch at the start, at time 0.
+    pub at_start: bool,
+}
+
+impl Impact {
+    /// The row `[body_a, element_a, body_b, element_b]`, with bodies by their [`index`](BodyId::index).
+    pub fn row(&self) -> [u32; 4] {
+        row(self.a, self.b)
+    }
+
+    /// The order of rows.
+    fn order(&self) -> (PairKind, [u32; 4]) {
+        (self.kind, self.row())
+    }
+
+    /// The earlier impact; of two at the same time, the one whose row comes first.
+    pub(crate) fn earlier(self, other: Impact) -> Impact {
+        let is_later = self.toi.total_cmp(&other.toi);
+        match is_later.then_with(|| self.order().cmp(&other.order())) {
+            std::cmp::Ordering::Greater => other,
+            _ => self,
+        }
+    }
+}
+
+fn name(numbering: &Numbering, kind: PairKind, toi: Toi, found: &Found<Contact>) -> Impact {
+    let (a, b) = numbering.pair(found.key);
+    Impact {
+        kind,
+        a,
+        b,
+        toi: toi.round(&found.value),
+        at_start: found.value.at_start,
+    }
+}
+
+/// [`Impacts::hash`] of impacts given as kind, `[body_a, element_a, body_b, element_b]` and time. The hash of several sets
+/// with no impact in common is the wrapping sum of their hashes.
+pub fn hash_impact_rows(rows: impl IntoIterator<Item = (PairKind, [u32; 4], f64)>) -> u64 {
+    rows.into_iter().fold(0, |sum, (kind, row, toi)| {
+        let time = mix(toi.to_bits() ^ kind as u64);
+        sum.wrapping_add(mix(hash_row(row) ^ time))
+    })
+}
+
+/// All pairs of elements that touch during a step, sorted by `(kind, body_a, element_a, body_b, element_b)`.
+///
+/// The same input gives the same bytes on every method, backend, thread count and budget.
+#[derive(Clone, Default)]
+pub struct Impacts {
+    numbering: Numbering,
+    impacts: Vec<Impact>,
+    start_intersects: Option<bool>,
+    stats: Statistics,
+}
+
+impl std::fmt::Debug for Impacts {
+    /// Their number and the first of them, however many there are.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let mut short = f.debug_struct("Impacts");
+        short.field("len", &self.len());
+        short.field("first", &self.iter().next());
+        short.finish_non_exhaustive()
+    }
+}
+
+impl Impacts {
+    /// Takes over the frame's numbering.
+    pub(crate) fn begin(&mut self, plan: &Plan) {
+        self.numbering.begin(plan);
+        self.impacts.clear();
+        self.start_intersects = None;
+        self.stats.clear();
+    }
+
+    pub(crate) fn set_start_intersects(&mut self, start_intersects: Option<bool>) {
+        self.start_intersects = start_intersects;
+    }
+
+    pub(crate) fn stats_mut(&mut self) -> &mut Statistics {
+        &mut self.stats
+    }
+
+    /// All that was found, each kind in the order of the keys.
+    ///
+    /// # Errors
+    /// There is no memory for them.
+    pub(crate) fn fill(&mut self, toi: Toi, found: &FoundByKind) -> Result<(), Error> {
+        let n: usize = found.iter().map(Vec::len).sum();
+        let Impacts {
+            numbering, impacts, ..
+        } = self;
+        reserve(impacts, n, "impacts")?;
+        for (kind, found) in PairKind::ALL.into_iter().zip(found) {
+            impacts.extend(found.iter().map(|found| name(numbering, kind, toi, found)));
+        }
+        Ok(())
+    }
+
+    /// Bytes of the answer.
+    pub(crate) fn bytes(&self) -> u64 {
+        (size_of::<Impact>() * self.impacts.capacity()) as u64
+    }
+
+    /// What was found, by its names.
+    pub(crate) fn impact(&self, kind: PairKind, toi: Toi, found: &Found<Contact>) -> Impact {
+        name(&self.numbering, kind, toi, found)
+    }
+
+    /// The number of pairs that touch.
+    pub fn len(&self) -> usize {
+        self.impacts.len()
+    }
+
+    /// Whether nothing touches during the step.
+    pub fn is_empty(&self) -> bool {
+        self.impacts.is_empty()
+    }
+
+    /// Whether elements intersect at the start of the step. `None` if nobody asked: only
+    /// [`Start::Verify`](crate::Start::Verify) does.
+    pub fn start_intersects(&self) -> Option<bool> {
+        self.start_intersects
+    }
+
+    /// All of them, sorted.
+    pub fn as_slice(&self) -> &[Impact] {
+        &self.impacts
+    }
+
+    /// All of them, sorted.
+    pub fn iter(&self) -> std::slice::Iter<'_, Impact> {
+        self.impacts.iter()
+    }
+
+    /// The impacts of one kind.
+    pub fn of(&self, kind: PairKind) -> &[Impact] {
+        let start = self.impacts.partition_point(|impact| impact.kind < kind);
+        let end = self.impacts.partition_point(|impact| impact.kind <= kind);
+        &self.impacts[start..end]
+    }
+
+    /// The earliest impact; of several at the same time, the one whose row comes first.
+    pub fn earliest(&self) -> Option<Impact> {
+        self.impacts.iter().copied().reduce(Impact::earlier)
+    }
+
+    /// The number of pairs that touch at the start.
+    pub fn touching_at_start(&self) -> usize {
+        let at_start = self.impacts.iter().filter(|impact| impact.at_start);
+        at_start.count()
+    }
+
+    /// A hash of the set of impacts, times included, that does not depend on their order: the wrapping sum of a mixed
+    /// 64-bit word per impact.
+    pub fn hash(&self) -> u64 {
+        hash_impact_rows(
+            self.impacts
+                .iter()
+                .map(|impact| (impact.kind, impact.row(), impact.toi)),
+        )
+    }
+
+    /// How the answer was found.
+    pub fn stats(&self) -> &Statistics {
+        &self.stats
+    }
+}
+
+impl<'a> IntoIterator for &'a Impacts {
+    type Item = &'a Impact;
+    type IntoIter = std::slice::Iter<'a, Impact>;
+
+    fn into_iter(self) -> Self::IntoIter {
+        self.iter()
+    }
+}

@@ -1,0 +1,9 @@
+//! Answers: what a detector hands to its user, one file per kind of question.
+
+pub(crate) mod advance;
+pub(crate) mod candidates;
+pub(crate) mod impacts;
+pub(crate) mod near;
+pub(crate) mod numbering;
+pub(crate) mod pairs;
+pub(crate) mod places;

@@ -1,0 +1,350 @@
+//! The answer about pairs within a distance.
+
+mod labels;
+
+use crate::answers::numbering::{Numbering, row};
+use crate::answers::pairs::{Primitive, hash_row, mix};
+use crate::plan::Plan;
+use crate::query::near::NearQuery;
+use crate::query::pair_kind::PairKind;
+use crate::scene::error::Error;
+use crate::search::found::KeysByKind;
+use crate::search::sink::reserve;
+use crate::search::stats::Statistics;
+use impinge_exact::internal::NearestOfElements;
+use impinge_exact::{ElementPair, Feature};
+
+pub(crate) use labels::Labels;
+
+/// Two elements that are near each other.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NearPair {
+    /// What they are.
+    pub kind: PairKind,
+    /// The element that the kind names first, numbered as in [`Impact::a`](crate::Impact::a).
+    pub a: Primitive,
+    /// The other element. Where both are of the same kind, it is of a body with a higher id, or the higher element.
+    pub b: Primitive,
+    /// The features of `a` and of `b` that are nearest to each other, decided exactly: those with the nearest points
+    /// in their inside. Of several at the same distance, the first of the smallest.
+    pub features: [Feature; 2],
+    /// Whether nearest points may not be the only ones: edges are parallel, or an element is degenerate, or faces are
+    /// parallel.
+    pub is_parallel: bool,
+    /// The distance, where [`NearQuery::distances`] or [`NearQuery::closest_points`] asks for it: that of the nearest points.
+    pub distance: Option<f64>,
+    /// Distance and nearest points, where [`NearQuery::closest_points`] asks for them.
+    pub closest: Option<ClosestPoints>,
+}
+
+/// Nearest points of two elements and their distance, rounded.
+///
+/// They are computed from exact quotients in one order of operations, so they have the same bits on every machine. Whether
+/// a pair is near is decided exactly, not by these numbers: a distance may be rounded to a number above the one asked for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ClosestPoints {
+    /// The distance, wrong by a few units in the last place at most. 0 for elements that touch.
+    pub distance: f64,
+    /// A point of `a` and one of `b`, x, y, z each.
+    pub points: [[f64; 3]; 2],
+}
+
+impl NearPair {
+    /// The row `[body_a, element_a, body_b, element_b]`, with bodies by their [`index`](BodyId::index).
+    pub fn row(&self) -> [u32; 4] {
+        row(self.a, self.b)
+    }
+
+    /// ipc-toolkit's name of the distance type: `P_T`, `P_E0`, `P_T0` of a vertex and a face; `EA_EB`, `EA_EB0`, `EA0_EB1`
+    /// of edges; `P_E`, `P_E0`, `P_E1` of an edge and a vertex; `P_P` of vertices. Of an edge and a face, or of faces, the
+    /// kinds of the features: `P_P`, `P_E`, `P_T`, `E_E`, and `E_T` where an edge passes through a face.
+    pub fn name(&self) -> &'static str {
+        let pair = match self.kind {
+            PairKind::VertexFace => Some((ElementPair::VertexFace, false)),
+            PairKind::EdgeEdge => Some((ElementPair::EdgeEdge, false)),
+            // The edge is named first.
+            PairKind::EdgeVertex => Some((ElementPair::VertexEdge, true)),
+            PairKind::VertexVertex => Some((ElementPair::VertexVertex, false)),
+            PairKind::EdgeFace | PairKind::FaceFace => None,
+        };
+        let nearest = NearestOfElements {
+            features: self.features,
+            is_parallel: self.is_parallel,
+        };
+        nearest.name(pair)
+    }
+}
+
+/// All pairs of elements that are near, sorted by `(kind, body_a, element_a, body_b, element_b)`.
+///
+/// The same input gives the same bytes on every method, backend, thread count and budget. A pair takes nine bytes, 8 more
+/// with its distance, and 56 more with its nearest points.
+#[derive(Clone, Default)]
+pub struct NearPairs {
+    numbering: Numbering,
+    keys: KeysByKind,
+    /// The features of each key, packed.
+    nearest: [Vec<u8>; PairKind::ALL.len()],
+    /// Of all pairs, kind after kind, if they were asked for.
+    distances: Vec<f64>,
+    points: Vec<[[f64; 3]; 2]>,
+    stats: Statistics,
+}
+
+/// Some pairs of one kind whose features are not all known.
+pub(crate) struct Unnamed<'a> {
+    pub kind: PairKind,
+    keys: &'a mut [u64],
+    nearest: &'a mut [u8],
+    /// Empty, if they were not asked for.
+    distances: &'a mut [f64],
+    points: &'a mut [[[f64; 3]; 2]],
+}
+
+impl NearPairs {
+    /// Takes over the frame's numbering.
+    pub(crate) fn begin(&mut self, plan: &Plan) {
+        self.numbering.begin(plan);
+        self.keys.iter_mut().for_each(Vec::clear);
+        self.nearest.iter_mut().for_each(Vec::clear);
+        self.distances.clear();
+        self.points.clear();
+        self.stats.clear();
+    }
+
+    /// The room of the last answer's keys.
+    pub(crate) fn take_buffers(&mut self) -> KeysByKind {
+        std::mem::take(&mut self.keys)
+    }
+
+    pub(crate) fn stats_mut(&mut self) -> &mut Statistics {
+        &mut self.stats
+    }
+
+    /// Takes what was found: sorted keys with their [`Labels`]. Parts of about `n_each` pairs are to be
+    /// [named](Unnamed::name) next.
+    ///
+    /// # Errors
+    /// There is no memory for the features and nearest points.
+    pub(crate) fn fill(
+        &mut self,
+        keys: KeysByKind,
+        query: &NearQuery,
+        n_each: usize,
+    ) -> Result<(Vec<Unnamed<'_>>, &Numbering), Error> {
+        const WHAT: &str = "nearest features";
+        self.keys = keys;
+        for (nearest, keys) in self.nearest.iter_mut().zip(&self.keys) {
+            reserve(nearest, keys.len(), WHAT)?;
+            nearest.resize(keys.len(), 0);
+        }
+        let n = self.keys.iter().map(Vec::len).sum();
+        if query.distances {
+            reserve(&mut self.distances, n, "distances")?;
+            self.distances.resize(n, 0.0);
+        }
+        if query.closest {
+            reserve(&mut self.points, n, "nearest points")?;
+            self.points.resize(n, [[0.0; 3]; 2]);
+        }
+        let mut distances = &mut self.distances[..];
+        let mut points = &mut self.points[..];
+        let mut unnamed = Vec::new();
+        let lists = self.keys.iter_mut().zip(&mut self.nearest);
+        for (kind, (keys, nearest)) in PairKind::ALL.into_iter().zip(lists) {
+            for (keys, nearest) in keys.chunks_mut(n_each).zip(nearest.chunks_mut(n_each)) {
+                let n = keys.len();
+                unnamed.push(Unnamed {
+                    kind,
+                    keys,
+                    nearest,
+                    distances: first(&mut distances, n),
+                    points: first(&mut points, n),
+                });
+            }
+        }
+        Ok((unnamed, &self.numbering))
+    }
+
+    /// Bytes of the answer.
+    pub(crate) fn bytes(&self) -> u64 {
+        let keys: usize = self.keys.iter().map(Vec::capacity).sum();
+        let nearest: usize = self.nearest.iter().map(Vec::capacity).sum();
+        let distances = size_of::<f64>() * self.distances.capacity();
+        let points = size_of::<[[f64; 3]; 2]>() * self.points.capacity();
+        (size_of::<u64>() * keys + nearest + distances + points) as u64
+    }
+
+    /// How many pairs are near.
+    pub fn len(&self) -> usize {
+        self.keys.iter().map(Vec::len).sum()
+    }
+
+    /// Whether no pair is.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// All of them, sorted.
+    pub fn iter(&self) -> NearIter<'_> {
+        NearIter {
+            pairs: self,
+            kinds: &PairKind::ALL,
+            ix: 0,
+            n_left: self.len(),
+        }
+    }
+
+    /// Those of one kind.
+    pub fn of(&self, kind: PairKind) -> NearIter<'_> {
+        NearIter {
+            pairs: self,
+            kinds: &PairKind::ALL[kind as usize..=kind as usize],
+            ix: 0,
+            n_left: self.keys[kind as usize].len(),
+        }
+    }
+
+    /// One pair of a kind.
+    fn at(&self, kind: PairKind, ix: usize) -> Option<NearPair> {
+        let &key = self.keys[kind as usize].get(ix)?;
+        let before: usize = self.keys[..kind as usize].iter().map(Vec::len).sum();
+        let (a, b) = self.numbering.pair(key);
+        let nearest = NearestOfElements::unpacked(self.nearest[kind as usize][ix]);
+        let distance = self.distances.get(before + ix).copied();
+        let points = self.points.get(before + ix).copied();
+        Some(NearPair {
+            kind,
+            a,
+            b,
+            features: nearest.features,
+            is_parallel: nearest.is_parallel,
+            distance,
+            closest: distance
+                .zip(points)
+                .map(|(distance, points)| ClosestPoints { distance, points }),
+        })
+    }
+
+    /// A hash of the set of pairs and their features that does not depend on their order: the wrapping sum of a mixed
+    /// 64-bit word per pair. Distances and points are not part of it.
+    pub fn hash(&self) -> u64 {
+        self.iter().hash()
+    }
+
+    /// How the answer was found.
+    pub fn stats(&self) -> &Statistics {
+        &self.stats
+    }
+}
+
+impl std::fmt::Debug for NearPairs {
+    /// Their number and the first of them, however many there are.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let mut short = f.debug_struct("NearPairs");
+        short.field("len", &self.len());
+        short.field("first", &self.iter().next());
+        short.finish_non_exhaustive()
+    }
+}
+
+impl<'a> IntoIterator for &'a NearPairs {
+    type Item = NearPair;
+    type IntoIter = NearIter<'a>;
+
+    fn into_iter(self) -> NearIter<'a> {
+        self.iter()
+    }
+}
+
+/// Goes through pairs that are near, in order: [`NearPairs::iter`], [`NearPairs::of`].
+#[derive(Debug, Clone)]
+pub struct NearIter<'a> {
+    pairs: &'a NearPairs,
+    /// The kind at hand, and those after it.
+    kinds: &'a [PairKind],
+    /// The next pair of the kind at hand.
+    ix: usize,
+    n_left: usize,
+}
+
+impl NearIter<'_> {
+    /// [`NearPairs::hash`] of the pairs that are left.
+    pub fn hash(self) -> u64 {
+        self.fold(0, |sum, pair| {
+            let [a, b] = pair.features.map(|feature| match feature {
+                Feature::Vertex(ix) => u64::from(ix),
+                Feature::Edge(ix) => 8 + u64::from(ix),
+                Feature::Face => 16,
+            });
+            let word = pair.kind as u64 | a << 8 | b << 16 | u64::from(pair.is_parallel) << 24;
+            sum.wrapping_add(mix(hash_row(pair.row()) ^ mix(word)))
+        })
+    }
+}
+
+impl Iterator for NearIter<'_> {
+    type Item = NearPair;
+
+    fn next(&mut self) -> Option<NearPair> {
+        loop {
+            let (&kind, rest) = self.kinds.split_first()?;
+            if let Some(pair) = self.pairs.at(kind, self.ix) {
+                self.ix += 1;
+                self.n_left -= 1;
+                return Some(pair);
+            }
+            (self.kinds, self.ix) = (rest, 0);
+        }
+    }
+
+    fn size_hint(&self) -> (usize, Option<usize>) {
+        (self.n_left, Some(self.n_left))
+    }
+}
+
+impl ExactSizeIterator for NearIter<'_> {}
+
+/// The first `n` of a list, or all if there are fewer; the list loses them.
+fn first<'a, T>(list: &mut &'a mut [T], n: usize) -> &'a mut [T] {
+    let all = std::mem::take(list);
+    let (own, rest) = all.split_at_mut(n.min(all.len()));
+    *list = rest;
+    own
+}
+
+impl Unnamed<'_> {
+    /// Names the features of all pairs. Features that keys do not carry come from `find`, with nearest points where they were asked
+    /// for.
+    pub fn name(
+        &mut self,
+        labels: Labels,
+        pair: Option<ElementPair>,
+        mut find: impl FnMut(u64) -> (NearestOfElements, Option<ClosestPoints>),
+    ) {
+        let of_parts: [Option<u8>; 1 + Labels::UNKNOWN as usize] = std::array::from_fn(|part| {
+            NearestOfElements::of_part(pair?, part as u8).map(NearestOfElements::packed)
+        });
+        let has_distances = !self.distances.is_empty();
+        for (ix, (key, nearest)) in self.keys.iter_mut().zip(&mut *self.nearest).enumerate() {
+            let (own, part) = labels.split(*key);
+            *key = own;
+            let known = of_parts[usize::from(part) % of_parts.len()];
+            if let (Some(known), false) = (known, has_distances) {
+                *nearest = known;
+                continue;
+            }
+            let (found, closest) = find(own);
+            *nearest = found.packed();
+            let Some(closest) = closest else {
+                continue;
+            };
+            if let Some(to) = self.distances.get_mut(ix) {
+                *to = closest.distance;
+            }
+            if let Some(to) = self.points.get_mut(ix) {
+                *to = closest.points;
+            }
+        }
+    }
+}

@@ -1,0 +1,103 @@
+//! Stage `narrow` of steps: answers what is asked about the candidates of work items, many at a time.
+//!
+//! One file per test. Each gives the answers of a [`Test`](crate::search::narrow::Test), with which the oracle decides pairs one by one:
+//!
+//! ```text
+//! touching   FirstContact: whether two elements touch during the step, and when first (search: the times)
+//! kept       the same where elements keep a separation, or each pair a clearance of its own
+//! overlaps   BoxOverlap: whether the boxes over the whole step overlap
+//! near       Within: whether two elements are within a distance at the start
+//! ```
+
+mod batch;
+mod contacts;
+mod kept;
+mod near;
+mod overlaps;
+mod search;
+mod touching;
+
+use crate::plan::{Plan, Question};
+use crate::query::tuning::Tuning;
+use crate::search::found::StepAnswer;
+use crate::simd::Isa;
+
+use super::world::World;
+
+pub(super) use batch::{Batch, Between, Narrow, NarrowCounts};
+pub(super) use contacts::FirstContacts;
+use near::NearElements;
+use overlaps::Overlaps;
+
+/// One worker's tests, of which each step needs one.
+#[derive(Debug, Default)]
+pub(super) struct Decider {
+    question: Question,
+    contacts: FirstContacts,
+    overlaps: Overlaps,
+    near: NearElements,
+    pub n_candidates: u64,
+}
+
+impl Decider {
+    /// Prepares for a step of `n_clusters` clusters.
+    pub fn begin(&mut self, n_clusters: u64, plan: &Plan, tuning: &Tuning) {
+        self.question = plan.question;
+        self.n_candidates = 0;
+        match self.question {
+            Question::Contact => self.contacts.begin(n_clusters, plan, tuning),
+            Question::Overlap => self.overlaps.begin(),
+            Question::Nearness | Question::Intersection => self.near.begin(),
+        }
+    }
+
+    fn test(&mut self) -> &mut dyn Narrow {
+        match self.question {
+            Question::Contact => &mut self.contacts,
+            Question::Overlap => &mut self.overlaps,
+            Question::Nearness | Question::Intersection => &mut self.near,
+        }
+    }
+
+    /// The contacts of the step.
+    pub fn contacts(&mut self) -> &mut FirstContacts {
+        &mut self.contacts
+    }
+
+    /// Contacts after this time cannot change the answer.
+    pub fn until(&self, world: World<'_>) -> f64 {
+        match self.question {
+            Question::Contact => self.contacts.until(world),
+            _ => world.sweep.until,
+        }
+    }
+
+    /// Takes the candidates of a work item.
+    #[inline(always)]
+    pub fn take(&mut self, isa: Isa, world: World<'_>, batch: Batch<'_>) {
+        self.n_candidates += batch.lane_pairs.len() as u64;
+        self.test().take(isa, world, batch);
+    }
+
+    /// Decides the candidates that wait.
+    pub fn decide(&mut self, isa: Isa, world: World<'_>) {
+        self.test().decide(isa, world);
+    }
+
+    /// Ends a step: hands over what is left of the answer.
+    pub fn end(&mut self, answer: StepAnswer<'_>) {
+        self.test().end(answer);
+    }
+
+    pub fn counts(&self) -> NarrowCounts {
+        match self.question {
+            Question::Contact => self.contacts.counts(),
+            Question::Overlap => self.overlaps.counts(),
+            Question::Nearness | Question::Intersection => self.near.counts(),
+        }
+    }
+
+    pub fn bytes(&self) -> usize {
+        self.contacts.bytes() + self.overlaps.bytes() + self.near.bytes()
+    }
+}

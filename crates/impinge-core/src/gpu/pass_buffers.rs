@@ -1,0 +1,362 @@
+//! Buffers for the results of a pass: queues, work items, candidates, pairs, unsure pairs.
+//!
+//! Their sizes are not known in advance. Kernels count what they need, even if it does not fit. Buffers that
+//! were too small grow, and the pass runs again. If the device or the memory budget
+//! allows no more, the engine splits the pass instead.
+
+use super::buffers::{Slice, Storage, count};
+use super::layout::{
+    Arguments, Candidate, Cell, CellItem, Counter, Grid, Kept, ListEntry, N_BOX_TESTS,
+    N_BOX_TESTS_HIGH, N_CANDIDATES, N_COUNTERS, N_ENTRIES, N_ITEMS, N_KEPT, N_PAIRS, N_SUBDIVIDED,
+    N_TALLIES, N_UNSURE, NEVER, NodePair, PairKey, PairTimes, ROUNDS, Reach, Start, TOO_MUCH,
+    TOUCHES_BY, Tally, UnsureKey, WorkItem, time_by,
+};
+use super::open::Gpu;
+use crate::query::goal::Goal;
+use crate::query::settings::Method;
+use crate::scene::error::Error;
+
+/// The number of elements that each buffer has room for. The answer never depends on it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Capacities {
+    /// Pairs of tree nodes waiting in one round.
+    pub queue: u64,
+    /// Work items.
+    pub items: u64,
+    /// `Cells`: primitives within reach of another body.
+    pub kept: u64,
+    /// `Cells`: entries of the cell lists.
+    pub entries: u64,
+    /// Candidates.
+    pub candidates: u64,
+    /// Pairs that certainly intersect. In a step, pairs that tests of the whole step leave.
+    pub pairs: u64,
+    /// Pairs left to exact arithmetic. In a step, all that the device leaves.
+    pub unsure: u64,
+}
+
+impl Default for Capacities {
+    fn default() -> Self {
+        Capacities {
+            queue: 1 << 15,
+            items: 1 << 15,
+            kept: 1 << 15,
+            entries: 1 << 16,
+            candidates: 1 << 18,
+            pairs: 1 << 16,
+            unsure: 1 << 14,
+        }
+    }
+}
+
+/// Candidates of two full clusters: the least that a pass must be able to hold.
+const ONE_ITEM: u64 = 64 * 64;
+
+impl Capacities {
+    /// Enough for a pass of one pair of clusters.
+    pub const LEAST: Capacities = Capacities {
+        queue: 512,
+        items: 64,
+        kept: 64,
+        entries: 64,
+        candidates: ONE_ITEM,
+        pairs: ONE_ITEM,
+        unsure: ONE_ITEM,
+    };
+
+    pub const NONE: Capacities = Capacities {
+        queue: 0,
+        items: 0,
+        kept: 0,
+        entries: 0,
+        candidates: 0,
+        pairs: 0,
+        unsure: 0,
+    };
+
+    /// Without the room that only the other method needs.
+    pub fn of(self, method: Method) -> Self {
+        match method {
+            Method::Cells => Capacities { queue: 1, ..self },
+            _ => Capacities {
+                kept: 1,
+                entries: 1,
+                ..self
+            },
+        }
+    }
+
+    /// Bytes on the device, read-back included.
+    pub fn bytes(&self) -> u64 {
+        let item = size_of::<WorkItem>().max(size_of::<CellItem>());
+        2 * self.queue * size_of::<NodePair>() as u64
+            + self.items * item as u64
+            + self.kept * size_of::<Kept>() as u64
+            + self.entries * size_of::<ListEntry>() as u64
+            + self.candidates * size_of::<Candidate>() as u64
+            + 2 * self.pairs * size_of::<PairKey>() as u64
+            + 2 * self.unsure * (size_of::<UnsureKey>() + size_of::<PairTimes>()) as u64
+    }
+
+    fn zip(self, other: Self, pick: impl Fn(u64, u64) -> u64) -> Self {
+        Capacities {
+            queue: pick(self.queue, other.queue),
+            items: pick(self.items, other.items),
+            kept: pick(self.kept, other.kept),
+            entries: pick(self.entries, other.entries),
+            candidates: pick(self.candidates, other.candidates),
+            pairs: pick(self.pairs, other.pairs),
+            unsure: pick(self.unsure, other.unsure),
+        }
+    }
+
+    pub fn max(self, other: Self) -> Self {
+        self.zip(other, u64::max)
+    }
+
+    fn fits(self, pass_buffers: Self) -> bool {
+        self.max(pass_buffers) == pass_buffers
+    }
+
+    /// Whether the device can bind this much.
+    pub fn fit(self, gpu: &Gpu) -> bool {
+        self.fits(Capacities::limit(gpu))
+    }
+
+    /// The most that one binding of the device may hold.
+    fn limit(gpu: &Gpu) -> Self {
+        Capacities {
+            queue: Storage::<NodePair>::limit(gpu),
+            items: Storage::<CellItem>::limit(gpu),
+            kept: Storage::<Kept>::limit(gpu),
+            entries: Storage::<ListEntry>::limit(gpu),
+            candidates: Storage::<Candidate>::limit(gpu),
+            pairs: Storage::<PairKey>::limit(gpu),
+            unsure: Storage::<UnsureKey>::limit(gpu),
+        }
+    }
+}
+
+/// The buffers. Those that only the other method needs have one element each.
+#[derive(Debug)]
+pub struct PassBuffers {
+    pub queues: [Storage<NodePair>; 2],
+    pub items: Storage<WorkItem>,
+    pub candidates: Storage<Candidate>,
+    pub pairs: Storage<PairKey>,
+    pub unsure: Storage<UnsureKey>,
+    pub times: Storage<PairTimes>,
+    pub counters: Storage<Counter>,
+    pub arguments: Storage<Arguments>,
+    pub cell_items: Storage<CellItem>,
+    pub kept: Storage<Kept>,
+    pub entries: Storage<ListEntry>,
+    pub cells: Storage<Cell>,
+    pub starts: Storage<Start>,
+    pub reaches: Storage<Reach>,
+    pub tallies: Storage<Tally>,
+    pub grid: Storage<Grid>,
+    /// The initial counters and queue of a pass, copied by its encoder.
+    start_counters: Storage<Counter>,
+    start_queue: Storage<NodePair>,
+    started: Option<(Vec<NodePair>, Option<f32>)>,
+    sizes: Option<(Capacities, CellsWanted)>,
+}
+
+/// Room that `Cells` needs besides the buffers that grow; zero for `Clusters`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct CellsWanted {
+    pub n_cells: u64,
+    pub n_bodies: u64,
+}
+
+impl CellsWanted {
+    /// Bytes per cell, the start of its list included.
+    pub const CELL: u64 = (size_of::<Cell>() + size_of::<Start>()) as u64;
+
+    pub fn bytes(&self) -> u64 {
+        self.n_cells * Self::CELL + self.n_bodies * size_of::<Reach>() as u64
+    }
+}
+
+impl PassBuffers {
+    pub(crate) fn new() -> Self {
+        let indirect = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::INDIRECT;
+        PassBuffers {
+            queues: ["queue a", "queue b"].map(Storage::plain),
+            items: Storage::plain("work items"),
+            candidates: Storage::plain("candidates"),
+            pairs: Storage::plain("pairs"),
+            unsure: Storage::plain("unsure"),
+            times: Storage::plain("times of pairs"),
+            counters: Storage::plain("counters"),
+            arguments: Storage::new("arguments", indirect),
+            cell_items: Storage::plain("work items of cells"),
+            kept: Storage::plain("kept"),
+            entries: Storage::plain("entries"),
+            cells: Storage::plain("cells"),
+            starts: Storage::plain("starts"),
+            reaches: Storage::plain("reaches"),
+            tallies: Storage::plain("tallies"),
+            grid: Storage::plain("grid"),
+            start_counters: Storage::plain("first counters"),
+            start_queue: Storage::plain("first queue"),
+            started: None,
+            sizes: None,
+        }
+    }
+
+    /// Makes exactly this much room.
+    pub fn resize(&mut self, gpu: &Gpu, wanted: &Capacities, cells: Option<CellsWanted>) {
+        let is_cells = cells.is_some();
+        let cells = cells.unwrap_or_default();
+        let sizes = Some((*wanted, cells));
+        if self.sizes == sizes {
+            return;
+        }
+        self.sizes = sizes;
+        let (of_clusters, of_cells) = match is_cells {
+            true => (1, wanted.items),
+            false => (wanted.items, 1),
+        };
+        let [a, b] = &mut self.queues;
+        a.resize_exactly(gpu, wanted.queue);
+        b.resize_exactly(gpu, wanted.queue);
+        self.items.resize_exactly(gpu, of_clusters);
+        self.candidates.resize_exactly(gpu, wanted.candidates);
+        self.pairs.resize_exactly(gpu, wanted.pairs);
+        self.unsure.resize_exactly(gpu, wanted.unsure);
+        self.times.resize_exactly(gpu, wanted.unsure);
+        self.counters.resize_exactly(gpu, u64::from(N_COUNTERS));
+        self.arguments.resize_exactly(gpu, u64::from(ROUNDS) + 3);
+        self.cell_items.resize_exactly(gpu, of_cells);
+        self.kept.resize_exactly(gpu, wanted.kept);
+        self.entries.resize_exactly(gpu, wanted.entries);
+        self.cells.resize_exactly(gpu, cells.n_cells);
+        self.starts.resize_exactly(gpu, cells.n_cells);
+        self.reaches.resize_exactly(gpu, cells.n_bodies);
+        self.tallies.resize_exactly(gpu, u64::from(N_TALLIES));
+        self.grid.resize_exactly(gpu, 1);
+    }
+
+    /// The copies that start a pass: the seeds, which must fit the queue, and counters at zero except the number of seeds and
+    /// the time by which some pair certainly touches, if there is one.
+    ///
+    /// # Errors
+    /// As [`Storage::resize`].
+    pub fn start(
+        &mut self,
+        gpu: &Gpu,
+        seeds: &[NodePair],
+        touches_by: Option<f32>,
+    ) -> Result<[(Slice, Slice); 2], Error> {
+        let is_started = |(held, time): &(Vec<NodePair>, _)| held == seeds && *time == touches_by;
+        if !self.started.as_ref().is_some_and(is_started) {
+            let mut counters = [Counter::default(); N_COUNTERS as usize];
+            // Seeds fit a queue, which 32 bits can number.
+            counters[0].n = seeds.len() as u32;
+            counters[TOUCHES_BY as usize].n = touches_by.unwrap_or(NEVER).to_bits();
+            self.start_counters.upload(gpu, &counters)?;
+            self.start_queue.upload(gpu, seeds)?;
+            self.started = Some((seeds.to_vec(), touches_by));
+        }
+        let seeds = self.start_queue.first(count(seeds.len()));
+        Ok([
+            (self.start_counters.all(), self.counters.all()),
+            (seeds, self.queues[0].all()),
+        ])
+    }
+
+    /// Bytes of the buffers that do not grow: those of [`CellsWanted`].
+    pub fn bytes_of_cells(&self) -> u64 {
+        self.sizes.map_or(0, |(_, cells)| cells.bytes())
+    }
+
+    pub fn capacities(&self) -> Capacities {
+        self.sizes.map_or(Capacities::NONE, |(wanted, _)| wanted)
+    }
+
+    /// Bytes on the device.
+    pub fn bytes(&self) -> u64 {
+        self.sizes
+            .map_or(0, |(wanted, cells)| wanted.bytes() + cells.bytes())
+    }
+}
+
+/// The counts of a pass.
+#[derive(Debug, Clone, Copy)]
+pub struct PassCounts {
+    /// The capacities that would have been enough; a lower bound for stages after one that overflowed.
+    pub needed: Capacities,
+    /// Cells that went through the second level.
+    pub n_subdivided: u64,
+    /// Box tests; only some methods count them.
+    pub n_box_tests: u64,
+    /// The least time by which some pair of a step certainly touches, after the start.
+    pub touches_by: Option<f32>,
+    too_much: bool,
+}
+
+/// What to do after a pass.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum NextPass {
+    /// Everything fitted.
+    Complete,
+    /// Run again with this much room.
+    Grow(Capacities),
+    /// No more room is available: split the work.
+    Split,
+}
+
+impl PassCounts {
+    pub fn new(counters: &[Counter]) -> Self {
+        let at = |ix: u32| u64::from(counters[ix as usize].n);
+        PassCounts {
+            needed: Capacities {
+                queue: (0..ROUNDS).map(at).max().unwrap_or(0),
+                items: at(N_ITEMS),
+                kept: at(N_KEPT),
+                entries: at(N_ENTRIES),
+                candidates: at(N_CANDIDATES),
+                pairs: at(N_PAIRS),
+                unsure: at(N_UNSURE),
+            },
+            n_subdivided: at(N_SUBDIVIDED),
+            n_box_tests: at(N_BOX_TESTS_HIGH) << 32 | at(N_BOX_TESTS),
+            touches_by: time_by(counters[TOUCHES_BY as usize].n),
+            too_much: at(TOO_MUCH) != 0,
+        }
+    }
+
+    /// Whether a pass ends a step, however much room it had: any contact is sought, and there is one.
+    pub(super) fn answer(&self, sought: Goal) -> bool {
+        sought == Goal::Any && self.touches_by.is_some()
+    }
+
+    /// Compares the counts with the room that the pass had. `bytes`: the most that these buffers may take together.
+    pub fn judge(&self, gpu: &Gpu, pass_buffers: Capacities, bytes: Option<u64>) -> NextPass {
+        if self.too_much {
+            return NextPass::Split;
+        }
+        if self.needed.fits(pass_buffers) {
+            return NextPass::Complete;
+        }
+        let limit = Capacities::limit(gpu);
+        // Too small buffers get a quarter more than needed: the next frame may need a little more.
+        let larger = self.needed.zip(pass_buffers, |needed, pass_buffers| {
+            if needed > pass_buffers {
+                needed + needed / 4
+            } else {
+                pass_buffers
+            }
+        });
+        let larger = larger.zip(limit, u64::min);
+        let is_allowed = bytes.is_none_or(|bytes| larger.bytes() <= bytes);
+        if self.needed.fits(larger) && is_allowed {
+            NextPass::Grow(larger)
+        } else {
+            NextPass::Split
+        }
+    }
+}

@@ -1,0 +1,523 @@
+//! What a question asks, resolved for one scene: which parts take part, in what order, which of them meet and under which
+//! test, how elements move, what of the pairs is wanted, and within which limits.
+//!
+//! A plan is made from a scene and a query, by one function per question, and never changes.
+//!
+//! A *part* is a part of a body whose elements are of one kind. For intersections each body has one part: the
+//! elements that it was given as. For steps it has up to three: its edges, its vertices and its faces.
+//!
+//! The elements of all parts are numbered consecutively, part after part and body after body in slot order: element `i` of
+//! part `l` has the global number `first(l) + i`. A pair is then one 64-bit key, `lower << 32 | higher`, and sorting
+//! the keys of one test sorts rows `(body_a, element_a, body_b, element_b)`.
+//!
+//! ```text
+//!  63            32 31             0
+//! +----------------+----------------+
+//! | global number  | global number  |   key of a pair, lower number first
+//! +----------------+----------------+
+//! ```
+
+mod counted;
+mod distances;
+mod parts;
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
+
+use crate::boxes::Sweep;
+use crate::query::goal::{Goal, Limits};
+use crate::query::pair_kind::{PairKind, PairKinds};
+use crate::query::step::{CandidateQuery, PairFilter, Start, Step, Toi};
+use crate::query::{Cell, Query, Scope, SharedVertex};
+use crate::scene::elements::{Kind, Part};
+use crate::scene::error::Error;
+use crate::scene::ids::BodyId;
+pub use crate::scene::index::pair_key;
+use crate::scene::index::{ElementIx, Number, PartIx};
+use crate::scene::{Body, Filter, Scene};
+use crate::workers::clock::Instant;
+use impinge_exact::internal::Keep;
+
+/// One part of one body that takes part in a frame.
+#[derive(Debug, Clone, Copy)]
+pub struct QueryPart {
+    /// The body.
+    pub id: BodyId,
+    /// Which of its elements.
+    pub part: Part,
+    /// Global number of its first element.
+    pub first: Number,
+    /// How many numbers its elements take up. Vertices are numbered as positions are, whether they take part or not.
+    pub n_primitives: u32,
+    /// The kind of its elements.
+    pub kind: Kind,
+    /// Whether its self-collision is queried.
+    pub within: bool,
+    /// Whether the body has no faces.
+    pub(crate) is_bare: bool,
+    /// Whether the body has no edges either.
+    pub(crate) is_points: bool,
+    filter: Filter,
+    /// How thick the body is: what its elements add to the distance that is asked.
+    thickness: f64,
+    /// How far vertices may be from their ways, because positions on these are rounded.
+    rounded: f64,
+}
+
+impl QueryPart {
+    /// The global number of an element.
+    #[inline(always)]
+    pub fn number(&self, element: ElementIx) -> Number {
+        self.first.plus(element)
+    }
+
+    /// The element that has a global number.
+    #[inline(always)]
+    pub fn element(&self, number: Number) -> ElementIx {
+        number.minus(self.first)
+    }
+
+    /// The global numbers of its elements.
+    pub fn numbers(&self) -> Range<Number> {
+        self.first..self.number(ElementIx::new(self.n_primitives))
+    }
+}
+
+/// The question about pairs of elements.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Question {
+    /// Whether elements that bodies were given as share a point.
+    #[default]
+    Intersection,
+    /// Whether and when vertices, edges and faces first touch during a step, or come as near as they may.
+    Contact,
+    /// Which vertices, edges and faces are within a distance, at the positions that bodies have.
+    Nearness,
+    /// Which vertices, edges and faces have boxes that overlap during a step.
+    Overlap,
+}
+
+impl Question {
+    /// The parts of bodies that take part, in the order of their parts. In this order, the lower number of a pair belongs to
+    /// the element that its kind names first: edges come before vertices, and vertices before faces.
+    fn parts(self) -> &'static [Part] {
+        match self {
+            Question::Intersection => &[Part::Given],
+            Question::Contact | Question::Nearness | Question::Overlap => {
+                &[Part::Edges, Part::Vertices, Part::Faces]
+            }
+        }
+    }
+
+    /// What of a step is examined.
+    fn sweep(self) -> Sweep {
+        match self {
+            Question::Intersection | Question::Nearness => Sweep::STILL,
+            Question::Contact => Sweep::WHOLE,
+            Question::Overlap => Sweep {
+                is_swept: true,
+                ..Sweep::WHOLE
+            },
+        }
+    }
+}
+
+/// The test of a pair of elements.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TestId {
+    /// Whether the elements that bodies were given as share a point.
+    Intersection,
+    /// The question about vertices, edges and faces.
+    Elements(PairKind),
+}
+
+/// What a question asks. See the [module](self).
+#[derive(Debug, Clone)]
+pub struct Plan {
+    /// Part after part, in slot order.
+    pub parts: Vec<QueryPart>,
+    /// The question about pairs.
+    pub question: Question,
+    /// The kinds of pairs, if the query names them.
+    kinds: Option<PairKinds>,
+    /// The adjacency rule of self-collision.
+    pub shared_vertex: SharedVertex,
+    between: bool,
+    ignored: BTreeSet<(BodyId, BodyId)>,
+    cell: Option<Cell>,
+    /// What of a step is examined. Boxes are inflated besides, see [`sweep`](Plan::sweep).
+    sweep: Sweep,
+    /// The distance within which elements are near, besides what their bodies add.
+    distance: f64,
+    /// What the elements of a step keep, at most: the distance, and a clearance if there is one.
+    bound: f64,
+    keep: Keep,
+    /// Which pairs of a step count.
+    filter: Option<PairFilter>,
+    /// What happens to pairs that touch at the start of a step.
+    pub(crate) start: Start,
+    /// The precision of times.
+    pub(crate) toi: Toi,
+    /// What of the pairs is wanted.
+    pub goal: Goal,
+    /// What the answer may be.
+    pub limits: Limits,
+    /// When the question was asked.
+    pub since: Instant,
+}
+
+impl Plan {
+    /// The question which elements intersect. Positions that were written in place are not checked yet.
+    ///
+    /// # Errors
+    /// A stale id, one body twice, a cell without room, too many elements.
+    pub fn intersections(
+        scene: &Scene,
+        query: &Query,
+        goal: Goal,
+        limits: Limits,
+    ) -> Result<Self, Error> {
+        let limits = match goal {
+            // Any number of pairs is allowed.
+            Goal::Any => Limits {
+                max_pairs: None,
+                ..limits
+            },
+            _ => limits,
+        };
+        Plan::of(scene, query, Question::Intersection, goal, limits)
+    }
+
+    /// The question about the contacts of a step.
+    pub(crate) fn contacts(
+        scene: &Scene,
+        step: &Step,
+        goal: Goal,
+        limits: Limits,
+    ) -> Result<Self, Error> {
+        Plan::of_step(scene, step, step.keep(), goal, limits)
+    }
+
+    /// The question how far a step can be taken: about its earliest contact, at a time in `f64`, or in `f32` if elements keep a
+    /// clearance. With one, rounding is part of what they keep. Without, `with_close` makes it a question about all ways that end
+    /// at rounded positions, at any time of the step.
+    pub(crate) fn advance(
+        scene: &Scene,
+        step: &Step,
+        with_close: bool,
+        limits: Limits,
+    ) -> Result<Self, Error> {
+        let keep = Keep {
+            is_rounded: true,
+            ..step.keep()
+        };
+        let has_clearance = !keep.is_plain();
+        let keep = if has_clearance { keep } else { step.keep() };
+        let mut plan = Plan::of_step(scene, step, keep, Goal::Earliest, limits)?;
+        // With a clearance, a time in single precision is as good, and decided by filters.
+        plan.toi = if has_clearance { Toi::F32 } else { Toi::F64 };
+        if !has_clearance && step.separation == 0.0 && with_close {
+            plan.round(scene);
+        }
+        Ok(plan)
+    }
+
+    /// The question which elements touch on the way to the end positions of a scene, which are those at a fraction of a step. Times
+    /// are not needed.
+    pub(crate) fn trial(
+        scene: &Scene,
+        step: &Step,
+        fraction: f64,
+        limits: Limits,
+    ) -> Result<Self, Error> {
+        let plan = Plan::of_step(scene, step, step.keep(), Goal::All, limits)?;
+        Ok(Plan {
+            sweep: Sweep {
+                is_swept: fraction <= Sweep::NEARLY_STILL,
+                ..plan.sweep
+            },
+            toi: Toi::F32,
+            ..plan
+        })
+    }
+
+    fn of_step(
+        scene: &Scene,
+        step: &Step,
+        keep: Keep,
+        goal: Goal,
+        limits: Limits,
+    ) -> Result<Self, Error> {
+        step.check()?;
+        let mut plan = Plan::of(scene, &step.query, Question::Contact, goal, limits)?;
+        plan.filter.clone_from(&step.filter);
+        (plan.start, plan.toi) = (step.start, step.toi);
+        plan.keep(scene, keep);
+        Ok(plan)
+    }
+
+    /// The question which elements are within a distance: the sum of `distance` and the thickness of both bodies.
+    pub(crate) fn nearness(
+        scene: &Scene,
+        (query, kinds): (&Query, Option<PairKinds>),
+        distance: f64,
+        thickness: &BTreeMap<BodyId, f64>,
+        limits: Limits,
+    ) -> Result<Self, Error> {
+        let mut plan = Plan::of(scene, query, Question::Nearness, Goal::All, limits)?;
+        plan.kinds = kinds;
+        (plan.distance, plan.bound) = (distance, distance);
+        for part in &mut plan.parts {
+            part.thickness = thickness.get(&part.id).copied().unwrap_or(0.0);
+        }
+        Ok(plan)
+    }
+
+    /// The question which boxes overlap. Each body is as thick as the query's distance.
+    pub(crate) fn candidates(
+        scene: &Scene,
+        query: &CandidateQuery,
+        limits: Limits,
+    ) -> Result<Self, Error> {
+        query.check()?;
+        let mut plan = Plan::of(scene, &query.query, Question::Overlap, Goal::All, limits)?;
+        plan.kinds = Some(query.kinds);
+        for part in &mut plan.parts {
+            part.thickness = query.distance;
+        }
+        Ok(plan)
+    }
+
+    /// The same question about some kinds of pairs only, asked now, with an answer of any length.
+    pub(crate) fn of_kinds(&self, kinds: PairKinds) -> Self {
+        Plan {
+            kinds: Some(kinds),
+            limits: Limits::default(),
+            since: Instant::now(),
+            ..self.clone()
+        }
+    }
+
+    fn of(
+        scene: &Scene,
+        query: &Query,
+        question: Question,
+        goal: Goal,
+        limits: Limits,
+    ) -> Result<Self, Error> {
+        let mut plan = Plan {
+            parts: Vec::with_capacity(match query.scope {
+                Scope::Between(..) | Scope::Within(_) => 2,
+                Scope::Across | Scope::All { .. } => scene.n_bodies() * question.parts().len(),
+            }),
+            question,
+            kinds: None,
+            // Vertices, edges and faces that share a vertex never count.
+            shared_vertex: match question {
+                Question::Intersection => query.shared_vertex,
+                Question::Contact | Question::Nearness | Question::Overlap => SharedVertex::Skip,
+            },
+            between: false,
+            ignored: query.ignored.clone(),
+            cell: query.cell,
+            sweep: question.sweep(),
+            distance: 0.0,
+            bound: 0.0,
+            keep: Keep::default(),
+            filter: None,
+            start: Start::default(),
+            toi: Toi::default(),
+            goal,
+            limits,
+            since: Instant::now(),
+        };
+        plan.check_cell()?;
+        for &id in &query.across {
+            scene.body(id)?;
+        }
+        if let Scope::Between(a, b) = query.scope {
+            scene.body(a)?;
+            scene.body(b)?;
+            if a == b {
+                return Err(Error::SameBody { body: a });
+            }
+        }
+        for &part in question.parts() {
+            plan.push_part(scene, query, part)?;
+        }
+        Ok(plan)
+    }
+
+    /// What is to become of the pairs that are found: all are held where it is known in the end only which of them count, or which
+    /// one is the earliest.
+    pub(crate) fn held(&self) -> Goal {
+        match self.question {
+            Question::Intersection if self.cell.is_none() => self.goal,
+            _ => Goal::All,
+        }
+    }
+
+    /// What of a step is examined, with boxes as they are.
+    pub(crate) fn sweep(&self) -> Sweep {
+        self.sweep
+    }
+
+    /// Whether pairs of one body that share a vertex are asked for.
+    pub fn resolves(&self) -> bool {
+        self.shared_vertex == SharedVertex::Resolve && self.parts.iter().any(|part| part.within)
+    }
+
+    /// The number of elements of all parts together.
+    pub fn n_primitives(&self) -> u64 {
+        self.parts
+            .last()
+            .map_or(0, |last| u64::from(last.numbers().end.raw()))
+    }
+
+    /// The numbers that the lower number of a pair of some kind, or of an intersection, may be: those of the elements that the kind names first. Parts follow
+    /// each other, so there are few others between them.
+    pub(crate) fn lower_numbers(&self, kind: Option<PairKind>) -> Range<Number> {
+        let of_part = |part: &&QueryPart| kind.is_none_or(|kind| part.part == kind.parts()[0]);
+        let parts = self.parts.iter().filter(of_part);
+        let ranges = parts.map(QueryPart::numbers);
+        ranges
+            .reduce(|all, own| all.start.min(own.start)..all.end.max(own.end))
+            .unwrap_or(Number::new(0)..Number::new(0))
+    }
+
+    /// Whether any pairs of two different parts are wanted.
+    pub fn between(&self) -> bool {
+        self.parts.len() > 1 && (self.between || self.question != Question::Intersection)
+    }
+
+    /// The test for pairs of elements of two parts, or of one with itself; `None` if no pair of them is wanted.
+    #[inline]
+    pub fn test(&self, a: PartIx, b: PartIx) -> Option<TestId> {
+        let (a, b) = (self.part(a), self.part(b));
+        let is_asked = if a.id == b.id {
+            a.within
+        } else {
+            self.meet(a, b)
+        };
+        if !is_asked {
+            return None;
+        }
+        if self.question == Question::Intersection {
+            return Some(TestId::Intersection);
+        }
+        let kind = PairKind::of(a.part, b.part)?;
+        let is_asked = match self.kinds {
+            Some(kinds) => kinds.contains(kind),
+            // Vertices against faces and edges against edges cover every body with faces. Only bodies without faces need
+            // edges against vertices, and only bodies of points need vertices against vertices.
+            None => match kind {
+                PairKind::VertexFace | PairKind::EdgeEdge => true,
+                PairKind::EdgeVertex => a.is_bare && b.is_bare,
+                PairKind::VertexVertex => a.is_points && b.is_points,
+                PairKind::EdgeFace => self.question == Question::Nearness,
+                PairKind::FaceFace => false,
+            },
+        };
+        is_asked.then_some(TestId::Elements(kind))
+    }
+
+    #[inline]
+    fn meet(&self, a: &QueryPart, b: &QueryPart) -> bool {
+        self.between
+            && a.filter.meets(b.filter)
+            && (self.ignored.is_empty()
+                || !self.ignored.contains(&(a.id.min(b.id), a.id.max(b.id))))
+    }
+
+    /// The filter of a part.
+    #[cfg(feature = "gpu")]
+    pub fn filter(&self, part: PartIx) -> Filter {
+        self.part(part).filter
+    }
+
+    /// Whether pairs of different bodies are wanted.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn meets_bodies(&self) -> bool {
+        self.between
+    }
+
+    /// Pairs of bodies, lower first and sorted, that do not meet whatever their filters say.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn ignored_bodies(&self) -> impl Iterator<Item = (BodyId, BodyId)> + '_ {
+        self.ignored.iter().copied().filter(|(a, b)| a != b)
+    }
+
+    /// Pairs of parts, lower first and sorted, that do not meet whatever their filters say.
+    #[cfg(feature = "gpu")]
+    pub fn ignored_pairs(&self) -> impl Iterator<Item = (PartIx, PartIx)> + '_ {
+        let find = |id: BodyId| {
+            let found = self.parts.binary_search_by_key(&id, |part| part.id);
+            found.ok().map(PartIx::from_usize)
+        };
+        self.ignored
+            .iter()
+            .filter(|(a, b)| a != b)
+            .filter_map(move |&(a, b)| Some((find(a)?, find(b)?)))
+    }
+
+    /// The elements of a part, and their numbers.
+    pub(crate) fn elements<'a>(
+        &self,
+        scene: &'a Scene,
+        part: PartIx,
+    ) -> impl Iterator<Item = (Number, &'a [u32])> + use<'a> {
+        let QueryPart {
+            part: kind, first, ..
+        } = *self.part(part);
+        let elements = self.body(scene, part).part(kind);
+        ElementIx::up_to(elements.len()).map(move |ix| {
+            let corners = elements.corners(ix.index());
+            let element = match kind {
+                // Vertices are numbered as positions are.
+                Part::Vertices => ElementIx::new(corners[0]),
+                _ => ix,
+            };
+            (first.plus(element), corners)
+        })
+    }
+
+    /// All parts, by their indices.
+    pub fn part_ixs(&self) -> impl ExactSizeIterator<Item = PartIx> + Clone + use<> {
+        PartIx::up_to(self.parts.len())
+    }
+
+    /// All parts, with their indices.
+    pub fn numbered_parts(&self) -> impl ExactSizeIterator<Item = (PartIx, &QueryPart)> + Clone {
+        self.part_ixs().zip(&self.parts)
+    }
+
+    /// A part.
+    #[inline(always)]
+    pub fn part(&self, part: PartIx) -> &QueryPart {
+        &self.parts[part.index()]
+    }
+
+    /// The body of a part.
+    #[inline]
+    pub fn body<'a>(&self, scene: &'a Scene, part: PartIx) -> &'a Body {
+        scene.body_in(self.part(part).id.slot())
+    }
+
+    /// The part and the element that a global number belongs to.
+    #[inline]
+    pub fn locate(&self, number: Number) -> (PartIx, ElementIx) {
+        let ix = owner_by_first(&self.parts, number, |part| part.first);
+        (PartIx::from_usize(ix), self.parts[ix].element(number))
+    }
+}
+
+/// Index of the last entry whose `first` is at most `number`. Empty parts share the `first`
+/// of their successor; the last one of the run is the one that holds the element.
+#[inline]
+pub(crate) fn owner_by_first<T, N: Ord>(
+    entries: &[T],
+    number: N,
+    first: impl Fn(&T) -> N,
+) -> usize {
+    entries.partition_point(|entry| first(entry) <= number) - 1
+}

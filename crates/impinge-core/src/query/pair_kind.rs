@@ -1,0 +1,98 @@
+//! Kinds of pairs of elements.
+
+use crate::scene::elements::Part;
+
+/// The kinds of a pair's elements. A pair's `a` is the element that the kind names first. So a vertex and a face are always
+/// in this order, whatever their bodies.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum PairKind {
+    /// A vertex and a face.
+    VertexFace,
+    /// Two edges.
+    EdgeEdge,
+    /// An edge and a vertex.
+    EdgeVertex,
+    /// Two vertices.
+    VertexVertex,
+    /// An edge and a face.
+    EdgeFace,
+    /// Two faces.
+    FaceFace,
+}
+
+impl PairKind {
+    /// All kinds, in their order.
+    pub const ALL: [PairKind; 6] = [
+        PairKind::VertexFace,
+        PairKind::EdgeEdge,
+        PairKind::EdgeVertex,
+        PairKind::VertexVertex,
+        PairKind::EdgeFace,
+        PairKind::FaceFace,
+    ];
+
+    /// `"vf"`, `"ee"`, `"ev"`, `"vv"`, `"ef"` or `"ff"`.
+    pub fn name(self) -> &'static str {
+        match self {
+            PairKind::VertexFace => "vf",
+            PairKind::EdgeEdge => "ee",
+            PairKind::EdgeVertex => "ev",
+            PairKind::VertexVertex => "vv",
+            PairKind::EdgeFace => "ef",
+            PairKind::FaceFace => "ff",
+        }
+    }
+
+    /// The parts of bodies that the elements belong to, in the order of the name.
+    ///
+    /// ```
+    /// use impinge_core::{PairKind, Part};
+    /// assert_eq!(PairKind::VertexFace.parts(), [Part::Vertices, Part::Faces]);
+    /// ```
+    pub fn parts(self) -> [Part; 2] {
+        use Part::{Edges, Faces, Vertices};
+        match self {
+            PairKind::VertexFace => [Vertices, Faces],
+            PairKind::EdgeEdge => [Edges, Edges],
+            PairKind::EdgeVertex => [Edges, Vertices],
+            PairKind::VertexVertex => [Vertices, Vertices],
+            PairKind::EdgeFace => [Edges, Faces],
+            PairKind::FaceFace => [Faces, Faces],
+        }
+    }
+
+    /// The kind of a pair of elements of two parts.
+    pub(crate) fn of(a: Part, b: Part) -> Option<PairKind> {
+        use Part::{Edges, Faces, Vertices};
+        match (a, b) {
+            (Vertices, Faces) | (Faces, Vertices) => Some(PairKind::VertexFace),
+            (Edges, Edges) => Some(PairKind::EdgeEdge),
+            (Edges, Vertices) | (Vertices, Edges) => Some(PairKind::EdgeVertex),
+            (Vertices, Vertices) => Some(PairKind::VertexVertex),
+            (Edges, Faces) | (Faces, Edges) => Some(PairKind::EdgeFace),
+            (Faces, Faces) => Some(PairKind::FaceFace),
+            (Part::Given, _) | (_, Part::Given) => None,
+        }
+    }
+}
+
+/// A set of kinds of pairs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct PairKinds(u8);
+
+impl PairKinds {
+    /// All six kinds.
+    pub const ALL: PairKinds = PairKinds(0b11_1111);
+
+    /// Whether the set contains a kind.
+    pub fn contains(self, kind: PairKind) -> bool {
+        self.0 >> kind as u8 & 1 == 1
+    }
+}
+
+impl FromIterator<PairKind> for PairKinds {
+    fn from_iter<I: IntoIterator<Item = PairKind>>(kinds: I) -> Self {
+        let bits = kinds.into_iter().map(|kind| 1 << kind as u8);
+        PairKinds(bits.fold(0, std::ops::BitOr::bitor))
+    }
+}

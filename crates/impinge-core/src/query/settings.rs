@@ -1,0 +1,199 @@
+//! The settings of a detector.
+
+use crate::query::goal::Limits;
+use crate::query::tuning::Tuning;
+use crate::scene::error::Error;
+
+/// How candidates are found. All methods give the same pairs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Method {
+    /// `Cells` for a frame whose bodies are mostly new to the detector, if that is cheaper, and `Clusters` as soon as
+    /// they come back: their second frame makes the clusters. [`Statistics::method`](crate::Statistics::method) says which one answered. With a memory
+    /// budget, and for steps and distances always `Clusters`.
+    ///
+    /// With `Backend::Auto`, a detector on a GPU answers such a first frame on the CPU, and [`Statistics::backend`](crate::Statistics::backend) says so: all methods of a device
+    /// work on clusters, and making them takes the CPU longer than the whole frame in its grid.
+    #[default]
+    Auto,
+    /// Groups are fixed by topology; in each frame only their boxes move. The fastest method for bodies that are asked
+    /// about more than once: the first frame pays for the groups.
+    Clusters,
+    /// The two-level grid of the paper: the primitives of a cell form groups, made anew each frame.
+    Cells,
+    /// Every box against every box: the oracle, quadratic in primitives.
+    Naive,
+}
+
+impl Method {
+    /// Every method, the default first.
+    pub const ALL: [Method; 4] = [Method::Auto, Method::Clusters, Method::Cells, Method::Naive];
+
+    /// `"auto"`, `"clusters"`, `"cells"` or `"naive"`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Method::Auto => "auto",
+            Method::Clusters => "clusters",
+            Method::Cells => "cells",
+            Method::Naive => "naive",
+        }
+    }
+
+    /// The method that `Auto` uses for bodies that it has met before. Other methods are returned unchanged.
+    pub fn in_the_long_run(self) -> Method {
+        match self {
+            Method::Auto => Method::Clusters,
+            other => other,
+        }
+    }
+}
+
+/// Where the work is done.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Backend {
+    /// A hardware GPU if there is one, else the CPU. The CPU also takes over if the GPU fails or cannot
+    /// hold the scene.
+    #[default]
+    Auto,
+    /// The CPU, with one thread per core or as many as [`Settings::threads`] says.
+    Cpu,
+    /// A GPU; an error if there is none.
+    Gpu,
+}
+
+/// Whether a body is clustered again after it has flowed far from the sweep in which it was clustered.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Recluster {
+    /// Yes, when the summed surface of its cluster boxes has grown so much that it pays. A GPU judges by a sample of
+    /// the boxes, and only bodies whose positions are in the scene, not in a buffer of the caller's.
+    #[default]
+    Auto,
+    /// Never: no frame pays for clustering again, but boxes may grow and frames get slower.
+    Never,
+}
+
+/// The widest vector instructions that the CPU backend may use, if the processor has them.
+/// The pairs do not depend on it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
+pub enum InstructionSet {
+    /// Plain loops, vectorised by the compiler for the target's baseline.
+    Portable,
+    /// 256 bits on x86-64.
+    Avx2,
+    /// 512 bits on x86-64, where the processor has AVX-512 with its extensions VL, DQ, BW and VBMI2 (Ice Lake, Zen 4
+    /// and later); else 256.
+    #[default]
+    Avx512,
+}
+
+/// Which cores the helper threads of the CPU backend may run on. The answer does not depend on it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Placement {
+    /// On Linux, with up to 8 threads: every core that the helper was started with, except the one on which the calling
+    /// thread is running. Otherwise as `Inherited`.
+    ///
+    /// The system often wakes a helper on the caller's core, where it runs only after the caller is done. A frame then takes
+    /// as long as with fewer threads.
+    #[default]
+    Auto,
+    /// Those that the system chooses: no thread's affinity is ever set. A helper starts with the affinity of the
+    /// thread that asked the first question.
+    ///
+    /// For programs that place threads themselves: ranks of MPI, real-time threads, containers whose cores are changed while
+    /// they run, `taskset` on a running process. `Auto` would overwrite what they set for a helper.
+    Inherited,
+}
+
+/// The settings of a detector.
+#[derive(Debug, Clone)]
+pub struct Settings {
+    /// How candidates are found.
+    pub method: Method,
+    /// Where the work is done.
+    pub backend: Backend,
+    /// CPU threads; 0 means one per core.
+    pub threads: usize,
+    /// Which cores the helper threads may run on.
+    pub placement: Placement,
+    /// The widest vector instructions that the CPU backend may use.
+    pub instruction_set: InstructionSet,
+    /// `Cells`: the density coefficient λ of the paper's equation (1), above 0.
+    pub lambda: f64,
+    /// `Cells`: the most primitives a group may hold, 1 to 64.
+    pub group_size: u32,
+    /// Bytes the detector may hold, the answer included; `None` for as many as it takes. While an answer is found that
+    /// is larger than the one before, it takes up to twice its size. On a GPU: bytes of buffers on the device, and as
+    /// many again for the answer on the host.
+    pub memory_budget: Option<u64>,
+    /// The most pairs that an answer may have: with more, detection ends with
+    /// [`Error::TooManyPairs`](crate::Error::TooManyPairs) as soon as that is certain. `None` for any number.
+    pub max_pairs: Option<u64>,
+    /// `Clusters`: whether bodies are clustered again.
+    pub recluster: Recluster,
+    /// GPU: part of an adapter's name, to choose among several.
+    pub device: Option<String>,
+    /// Not for users: the thresholds of the CPU backend.
+    #[doc(hidden)]
+    pub tuning: Tuning,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Settings {
+            method: Method::default(),
+            backend: Backend::default(),
+            threads: 0,
+            placement: Placement::default(),
+            instruction_set: InstructionSet::default(),
+            lambda: 1.0,
+            group_size: 64,
+            memory_budget: None,
+            max_pairs: None,
+            recluster: Recluster::default(),
+            device: None,
+            tuning: Tuning::default(),
+        }
+    }
+}
+
+impl Settings {
+    /// Limits on the size of an answer.
+    pub(crate) fn limits(&self) -> Limits {
+        Limits {
+            max_pairs: self.max_pairs,
+            memory_budget: self.memory_budget,
+            besides: 0,
+        }
+    }
+
+    /// Refuses settings that are out of range.
+    pub(crate) fn check(&self) -> Result<(), Error> {
+        let refuse = |setting, given: String, allowed| {
+            Err(Error::Setting {
+                setting,
+                given,
+                allowed,
+            })
+        };
+        if !(self.lambda.is_finite() && self.lambda > 0.0) {
+            return refuse("lambda", self.lambda.to_string(), "a number above 0");
+        }
+        if !(1..=64).contains(&self.group_size) {
+            return refuse("group size", self.group_size.to_string(), "1 to 64");
+        }
+        if self.backend == Backend::Gpu {
+            if !cfg!(feature = "gpu") {
+                return Err(Error::NoAdapter {
+                    found: "impinge was built without its feature `gpu`".to_owned(),
+                });
+            }
+            if self.method == Method::Naive {
+                let given = self.method.name().to_owned();
+                return refuse("method on a GPU", given, "auto, clusters or cells");
+            }
+        }
+        if self.threads > 1024 {
+            return refuse("threads", self.threads.to_string(), "0 to 1024");
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,341 @@
+//! The elements of bodies, given and derived: vertices, edges, boundary faces.
+
+use std::collections::HashMap;
+use std::sync::OnceLock;
+
+/// The kind of elements of a body, or of one of its parts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Kind {
+    /// Points, one vertex index each.
+    Points,
+    /// Edges, two vertex indices each.
+    Edges,
+    /// Surface triangles, three vertex indices each.
+    Triangles,
+    /// Solid tetrahedra, four vertex indices each.
+    Tetrahedra,
+}
+
+impl Kind {
+    /// All kinds, by the number of corners.
+    pub const ALL: [Kind; 4] = [Kind::Points, Kind::Edges, Kind::Triangles, Kind::Tetrahedra];
+
+    /// `"points"`, `"edges"`, `"triangles"` or `"tetrahedra"`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Kind::Points => "points",
+            Kind::Edges => "edges",
+            Kind::Triangles => "triangles",
+            Kind::Tetrahedra => "tetrahedra",
+        }
+    }
+
+    /// How many corners an element of this kind has: 1 to 4.
+    pub fn n_corners(self) -> usize {
+        self as usize + 1
+    }
+}
+
+/// The elements of a body, or of one part of it, as vertex indices.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Elements {
+    /// `(n, 1)` vertex indices.
+    Points(Vec<[u32; 1]>),
+    /// `(n, 2)` vertex indices.
+    Edges(Vec<[u32; 2]>),
+    /// `(n, 3)` vertex indices.
+    Triangles(Vec<[u32; 3]>),
+    /// `(n, 4)` vertex indices.
+    Tetrahedra(Vec<[u32; 4]>),
+}
+
+/// Runs the same code for every kind: `with_corners!(elements, |corners| …)`, where `corners` is a
+/// `Vec<[u32; N]>` or a reference to one.
+macro_rules! with_corners {
+    ($elements:expr, |$corners:ident| $body:expr) => {
+        match $elements {
+            $crate::scene::elements::Elements::Points($corners) => $body,
+            $crate::scene::elements::Elements::Edges($corners) => $body,
+            $crate::scene::elements::Elements::Triangles($corners) => $body,
+            $crate::scene::elements::Elements::Tetrahedra($corners) => $body,
+        }
+    };
+}
+pub(crate) use with_corners;
+
+impl Elements {
+    /// The number of elements.
+    pub fn len(&self) -> usize {
+        with_corners!(self, |corners| corners.len())
+    }
+
+    /// Whether there are no elements.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Points, edges, triangles or tetrahedra.
+    pub fn kind(&self) -> Kind {
+        match self {
+            Elements::Points(_) => Kind::Points,
+            Elements::Edges(_) => Kind::Edges,
+            Elements::Triangles(_) => Kind::Triangles,
+            Elements::Tetrahedra(_) => Kind::Tetrahedra,
+        }
+    }
+
+    /// The vertex indices of one element, one to four of them.
+    #[inline(always)]
+    pub fn corners(&self, element: usize) -> &[u32] {
+        with_corners!(self, |corners| &corners[element])
+    }
+
+    /// The vertex indices of one element; one with fewer than four corners repeats its last.
+    #[inline(always)]
+    pub(crate) fn four_corners(&self, element: usize) -> [u32; 4] {
+        match self {
+            Elements::Points(points) => {
+                let [a] = points[element];
+                [a; 4]
+            }
+            Elements::Edges(edges) => {
+                let [a, b] = edges[element];
+                [a, b, b, b]
+            }
+            Elements::Triangles(faces) => {
+                let [a, b, c] = faces[element];
+                [a, b, c, c]
+            }
+            Elements::Tetrahedra(tets) => tets[element],
+        }
+    }
+
+    /// The first element with a vertex index that is not below `n_vertices`, and that index.
+    pub(crate) fn first_bad_index(&self, n_vertices: usize) -> Option<(usize, u32)> {
+        with_corners!(self, |elements| elements.iter().enumerate().find_map(
+            |(element, corners)| {
+                corners
+                    .iter()
+                    .find(|&&index| index as usize >= n_vertices)
+                    .map(|&index| (element, index))
+            }
+        ))
+    }
+
+    pub(crate) fn bytes(&self) -> usize {
+        with_corners!(self, |corners| size_of_val(&corners[..]))
+    }
+}
+
+impl From<Vec<[u32; 1]>> for Elements {
+    fn from(points: Vec<[u32; 1]>) -> Self {
+        Elements::Points(points)
+    }
+}
+
+impl From<Vec<[u32; 2]>> for Elements {
+    fn from(edges: Vec<[u32; 2]>) -> Self {
+        Elements::Edges(edges)
+    }
+}
+
+impl From<Vec<[u32; 3]>> for Elements {
+    fn from(faces: Vec<[u32; 3]>) -> Self {
+        Elements::Triangles(faces)
+    }
+}
+
+impl From<Vec<[u32; 4]>> for Elements {
+    fn from(tets: Vec<[u32; 4]>) -> Self {
+        Elements::Tetrahedra(tets)
+    }
+}
+
+/// Which elements of a body a part holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Part {
+    /// The elements that the body was given as.
+    Given,
+    /// The vertices that some element names; for tetrahedra, those that a boundary face names. Answers number them as
+    /// positions are numbered.
+    Vertices,
+    /// The edges of the surface, or those that the body was given as.
+    Edges,
+    /// The faces of the surface: triangles as given, or the boundary of tetrahedra.
+    Faces,
+}
+
+/// The elements that a body was given as, and the elements derived from them, each kind found when first needed.
+#[derive(Debug, Clone)]
+pub(crate) struct Topology {
+    given: Elements,
+    vertices: OnceLock<Elements>,
+    edges: OnceLock<Elements>,
+    boundary: OnceLock<Elements>,
+}
+
+impl Topology {
+    pub fn new(given: Elements) -> Self {
+        Topology {
+            given,
+            vertices: OnceLock::new(),
+            edges: OnceLock::new(),
+            boundary: OnceLock::new(),
+        }
+    }
+
+    pub fn given(&self) -> &Elements {
+        &self.given
+    }
+
+    /// One name for equal parts: the faces of a body given as triangles, or the edges of one given as edges, are `Given`.
+    pub fn canonical(&self, part: Part) -> Part {
+        match (part, self.given.kind()) {
+            (Part::Faces, Kind::Triangles) | (Part::Edges, Kind::Edges) => Part::Given,
+            _ => part,
+        }
+    }
+
+    /// The elements of a part; empty if the body has none, as points have no edges.
+    pub fn part(&self, part: Part) -> &Elements {
+        match self.canonical(part) {
+            Part::Given => &self.given,
+            Part::Vertices => self.vertices.get_or_init(|| self.find_vertices()),
+            Part::Edges => self.edges.get_or_init(|| self.find_edges()),
+            Part::Faces => self.boundary.get_or_init(|| self.find_boundary()),
+        }
+    }
+
+    /// The boundary of tetrahedra, else the given elements.
+    fn surface(&self) -> &Elements {
+        match self.given.kind() {
+            Kind::Tetrahedra => self.part(Part::Faces),
+            _ => &self.given,
+        }
+    }
+
+    fn find_vertices(&self) -> Elements {
+        let named = with_corners!(self.surface(), |corners| corners.as_flattened());
+        let n = named.iter().max().map_or(0, |&last| last as usize + 1);
+        let mut takes_part = vec![false; n];
+        for &vertex in named {
+            takes_part[vertex as usize] = true;
+        }
+        let vertices = (0u32..).zip(takes_part).filter(|&(_, takes)| takes);
+        Elements::Points(vertices.map(|(vertex, _)| [vertex]).collect())
+    }
+
+    /// Unique pairs `[low, high]` in the order of `(high, low)`, as `igl::edges` numbers them. The same vertex twice is not
+    /// an edge.
+    fn find_edges(&self) -> Elements {
+        let mut keys: Vec<u64> = match self.surface() {
+            Elements::Triangles(faces) => faces
+                .iter()
+                .flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)])
+                .filter(|(a, b)| a != b)
+                .map(|(a, b)| u64::from(a.max(b)) << 32 | u64::from(a.min(b)))
+                .collect(),
+            _ => Vec::new(),
+        };
+        keys.sort_unstable();
+        keys.dedup();
+        Elements::Edges(
+            keys.into_iter()
+                .map(|key| [key as u32, (key >> 32) as u32])
+                .collect(),
+        )
+    }
+
+    /// All faces except those between two different tetrahedra, each once, in the order of the first tetrahedron that has it
+    /// and of the opposite corner. A face points outward if that tetrahedron is oriented positively. A face that more than
+    /// two tetrahedra share counts as surface, and so does one shared by two tetrahedra with the same vertices: nothing may
+    /// pass through it unseen.
+    fn find_boundary(&self) -> Elements {
+        let Elements::Tetrahedra(tets) = &self.given else {
+            return Elements::Triangles(Vec::new());
+        };
+        let sides = |&[a, b, c, d]: &[u32; 4]| {
+            let sides = [[b, c, d], [a, d, c], [a, b, d], [a, c, b]];
+            sides.into_iter().zip([a, b, c, d])
+        };
+        let sorted = |mut face: [u32; 3]| {
+            face.sort_unstable();
+            face
+        };
+        /// How many tetrahedra share a face, and the corner opposite it in the first.
+        struct Shared {
+            n: u32,
+            opposite: u32,
+            is_surface: bool,
+        }
+        let mut shared: HashMap<[u32; 3], Shared> = HashMap::with_capacity(2 * tets.len());
+        for (face, opposite) in tets.iter().flat_map(sides) {
+            let shared = shared.entry(sorted(face)).or_insert(Shared {
+                n: 0,
+                opposite,
+                is_surface: true,
+            });
+            shared.n += 1;
+            shared.is_surface = shared.n != 2 || shared.opposite == opposite;
+        }
+        let mut boundary = Vec::new();
+        for (face, _) in tets.iter().flat_map(sides) {
+            let is_surface = match shared.get_mut(&sorted(face)) {
+                Some(shared) => std::mem::take(&mut shared.is_surface),
+                None => false,
+            };
+            if is_surface {
+                boundary.push(face);
+            }
+        }
+        Elements::Triangles(boundary)
+    }
+
+    pub fn bytes(&self) -> usize {
+        let found = [&self.vertices, &self.edges, &self.boundary];
+        let found = found.into_iter().filter_map(OnceLock::get);
+        self.given.bytes() + found.map(Elements::bytes).sum::<usize>()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn edges_are_numbered_by_their_higher_vertex() {
+        let faces = Elements::from(vec![[2, 0, 1], [1, 3, 2], [5, 5, 0]]);
+        let topology = Topology::new(faces);
+        let expected = vec![[0, 1], [0, 2], [1, 2], [1, 3], [2, 3], [0, 5]];
+        assert_eq!(*topology.part(Part::Edges), Elements::from(expected));
+        let vertices = vec![[0], [1], [2], [3], [5]];
+        assert_eq!(*topology.part(Part::Vertices), Elements::from(vertices));
+        assert_eq!(topology.part(Part::Faces), topology.given());
+    }
+
+    #[test]
+    fn what_lies_inside_tetrahedra_takes_no_part() {
+        // One vertex inside a tetrahedron, joined to its four sides; another vertex that no element names.
+        let tets = vec![[5, 1, 2, 3], [0, 5, 2, 3], [0, 1, 5, 3], [0, 1, 2, 5]];
+        let topology = Topology::new(Elements::from(tets));
+        let vertices = vec![[0], [1], [2], [3]];
+        assert_eq!(*topology.part(Part::Vertices), Elements::from(vertices));
+        assert_eq!(topology.part(Part::Faces).len(), 4);
+        assert_eq!(topology.part(Part::Edges).len(), 6);
+        for ix in 0..4 {
+            assert!(!topology.part(Part::Faces).corners(ix).contains(&5));
+        }
+    }
+
+    #[test]
+    fn edges_and_points_have_what_they_were_given_as() {
+        let edges = Topology::new(Elements::from(vec![[3, 1], [1, 0]]));
+        assert_eq!(edges.part(Part::Edges), edges.given());
+        assert_eq!(edges.part(Part::Vertices).len(), 3);
+        assert!(edges.part(Part::Faces).is_empty());
+        let points = Topology::new(Elements::from(vec![[4], [2], [4]]));
+        let vertices = vec![[2], [4]];
+        assert_eq!(*points.part(Part::Vertices), Elements::from(vertices));
+        assert!(points.part(Part::Edges).is_empty());
+    }
+}

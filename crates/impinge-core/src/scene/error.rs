@@ -1,0 +1,194 @@
+//! What can go wrong, and what to check then.
+
+use crate::scene::ids::BodyId;
+
+/// All errors. Each names the body, the index, and both numbers where it has them.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A position holds NaN or an infinity. Check the step that produced this vertex.
+    #[error("body {body}: vertex {vertex} has a non-finite position ({}, {}, {})", value[0], value[1], value[2])]
+    NonFinitePosition {
+        /// The body, or the one that was about to be added.
+        body: BodyId,
+        /// Index of the vertex within the body.
+        vertex: usize,
+        /// The position as given.
+        value: [f64; 3],
+    },
+    /// A primitive names a vertex that does not exist. Check the index buffer's base.
+    #[error(
+        "body {body}: primitive {primitive} names vertex {index}, but there are {n_vertices} vertices"
+    )]
+    VertexIndexOutOfRange {
+        /// The body, or the one that was about to be added.
+        body: BodyId,
+        /// Index of the primitive within the body.
+        primitive: usize,
+        /// The vertex index it names.
+        index: u32,
+        /// How many vertices the body has.
+        n_vertices: usize,
+    },
+    /// The number of new positions is not the body's number of vertices. Only re-meshing changes topology.
+    #[error("body {body}: {given} positions given, but it has {expected} vertices")]
+    WrongNumberOfPositions {
+        /// The body.
+        body: BodyId,
+        /// How many positions were given.
+        given: usize,
+        /// How many vertices the body has.
+        expected: usize,
+    },
+    /// Positions were requested in a precision in which the body does not store them.
+    #[error("body {body}: positions are stored as {stored}, not as {asked}")]
+    WrongPrecision {
+        /// The body.
+        body: BodyId,
+        /// The stored precision: `"f32"` or `"f64"`.
+        stored: &'static str,
+        /// The requested precision.
+        asked: &'static str,
+    },
+    /// The id names no body of this scene: the body was removed, or belongs to another scene.
+    #[error(
+        "there is no such body {body} among the {n_bodies} of this scene: it was removed, or is another scene's"
+    )]
+    UnknownBody {
+        /// The id as given.
+        body: BodyId,
+        /// How many bodies the scene has.
+        n_bodies: usize,
+    },
+    /// A query between two bodies names one body twice. Use `within` instead.
+    #[error("a query between body {body} and itself: ask for collisions within it instead")]
+    SameBody {
+        /// The body named twice.
+        body: BodyId,
+    },
+    /// Pairs of another scene, or from before a body was re-meshed. Detect again.
+    #[error(
+        "body {body}: a pair names primitive {primitive}, but the body has {n_primitives} {kind} now"
+    )]
+    ForeignPair {
+        /// The body.
+        body: BodyId,
+        /// The highest primitive that a pair names.
+        primitive: u32,
+        /// How many primitives the body has.
+        n_primitives: usize,
+        /// The kind of the body's primitives, such as `"triangles"`.
+        kind: &'static str,
+    },
+    /// A surface with a border, or with faces whose orientations disagree. Weld vertices, fill holes, orient faces.
+    #[error(
+        "body {body}: the surface is not closed: the edge of vertices {} and {} has {n_forward} faces along it and {n_backward} against it",
+        edge[0], edge[1]
+    )]
+    NotClosed {
+        /// The body.
+        body: BodyId,
+        /// An edge by its vertices.
+        edge: [u32; 2],
+        /// How many faces run from its first vertex to its second.
+        n_forward: usize,
+        /// How many faces run the other way.
+        n_backward: usize,
+    },
+    /// Elements of one body touch at the start of a step at vertices that are at one position but not shared, as along the
+    /// seams of a mesh that was not welded. No part of such a step could ever be taken. Weld the mesh
+    /// ([`Weld`](crate::Weld)), or skip what touches at the start ([`Start::Skip`](crate::Start::Skip)).
+    #[error(
+        "body {body}: vertices {} and {} are at one position but not shared, so what they belong to touches at the start, and no \
+         step can be taken: weld the mesh ({n_coincident} of its vertices lie at positions of others), or skip pairs that touch at \
+         the start",
+        vertices[0], vertices[1]
+    )]
+    Seam {
+        /// The body.
+        body: BodyId,
+        /// Two vertices at one position, of elements that touch.
+        vertices: [u32; 2],
+        /// How many vertices of the body lie at positions of others: as many as welding would remove.
+        n_coincident: usize,
+    },
+    /// A body of the other kind is needed here.
+    #[error("body {body} is made of {kind}, where {expected} are needed")]
+    WrongKind {
+        /// The body.
+        body: BodyId,
+        /// The kind of its primitives.
+        kind: &'static str,
+        /// The kind that is needed.
+        expected: &'static str,
+    },
+    /// More primitives or vertices than 32-bit indices can name.
+    #[error("{what}: {given} given, at most {limit} can be held")]
+    TooMany {
+        /// What there are too many of.
+        what: &'static str,
+        /// How many were given.
+        given: u64,
+        /// The most that can be held.
+        limit: u64,
+    },
+    /// A setting lies outside its range.
+    #[error("{setting}: {given} given, {allowed} allowed")]
+    Setting {
+        /// The setting's name.
+        setting: &'static str,
+        /// The value as given.
+        given: String,
+        /// What is allowed.
+        allowed: &'static str,
+    },
+    /// Even one batch at a time does not fit the memory budget. Raise the budget.
+    #[error("the memory budget is {budget} bytes, but {needed} bytes are needed for {what}")]
+    MemoryBudget {
+        /// What needs the memory.
+        what: &'static str,
+        /// Bytes needed.
+        needed: u64,
+        /// Bytes allowed.
+        budget: u64,
+    },
+    /// More pairs than [`Settings::max_pairs`](crate::Settings::max_pairs) allows.
+    #[error("{found} pairs and more were found, and at most {limit} are allowed")]
+    TooManyPairs {
+        /// How many were certain by then; this number may differ from run to run.
+        found: u64,
+        /// The most that are allowed.
+        limit: u64,
+    },
+    /// There is no memory for the answer. Ask for parts of the scene, limit the pairs or count them.
+    #[error("out of memory: {needed} bytes more are needed with {n} {what} found")]
+    OutOfMemory {
+        /// What the memory was for.
+        what: &'static str,
+        /// How many were found by then.
+        n: u64,
+        /// Bytes that could not be had.
+        needed: u64,
+    },
+    /// The caller cancelled the run; the detector stays usable.
+    #[error("cancelled")]
+    Cancelled,
+    /// No GPU adapter fits the request; the text lists the adapters found.
+    #[error("no GPU adapter: {found}")]
+    NoAdapter {
+        /// What was requested and what is available.
+        found: String,
+    },
+    /// The GPU refused: out of memory, a lost device, a shader that does not compile.
+    #[error("GPU: {what}")]
+    Gpu {
+        /// The driver's message.
+        what: String,
+    },
+    /// Not as many positions as were welded. Weld each mesh by its own map.
+    #[error(transparent)]
+    Weld(#[from] impinge_weld::WrongNumber),
+    /// The threads of the pool could not be started.
+    #[error("thread pool: {0}")]
+    Threads(String),
+}

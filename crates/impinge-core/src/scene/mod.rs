@@ -1,0 +1,12 @@
+//! Bodies: topology once, positions every frame; and the numbers that name them and their elements.
+
+mod bodies;
+pub(crate) mod elements;
+pub(crate) mod error;
+pub(crate) mod ids;
+pub mod index;
+pub(crate) mod position_rows;
+pub(crate) mod positions;
+pub(crate) mod transform;
+
+pub use bodies::*;

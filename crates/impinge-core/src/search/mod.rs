@@ -1,0 +1,15 @@
+//! The search: the loop that answers every question, the test of one pair, and where the pairs go.
+
+pub(crate) mod found;
+pub(crate) mod key_ranges;
+pub(crate) mod naive;
+pub(crate) mod narrow;
+#[allow(missing_docs)]
+pub mod runner;
+pub(crate) mod sets;
+#[allow(missing_docs)]
+pub mod sink;
+pub(crate) mod sort;
+pub(crate) mod stats;
+#[cfg(feature = "gpu")]
+pub(crate) mod undecided;

@@ -1,0 +1,105 @@
+//! Counts and times of a frame.
+
+use crate::query::tuning::Ways;
+use crate::workers::clock::Instant;
+
+/// Time spent in one stage.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Stage {
+    /// The stage's name, the same on every backend: `bounds`, `traversal`, `pairing`, …
+    pub name: &'static str,
+    /// Wall time in milliseconds.
+    pub ms: f64,
+}
+
+/// Counts and times of one frame. The pairs never depend on any of this.
+#[derive(Debug, Clone, Default, PartialEq)]
+#[non_exhaustive]
+pub struct Statistics {
+    /// `"cpu"` or the GPU's name.
+    pub backend: String,
+    /// `"clusters"`, `"cells"` or `"naive"`.
+    pub method: &'static str,
+    /// Threads used.
+    pub n_threads: usize,
+    /// The stages in the order in which they ran.
+    pub stages: Vec<Stage>,
+    /// Wall time of the whole frame in milliseconds.
+    pub total_ms: f64,
+    /// `Cells`: cells of the first level along x, y, z.
+    pub grid: Option<[u32; 3]>,
+    /// `Cells`: cells that went through the second level.
+    pub n_subdivided: u64,
+    /// `Cells`: entries of the cell lists, where a primitive counts once per cell. Primitives that no other body
+    /// comes near may have none.
+    pub n_entries: u64,
+    /// `Clusters`: clusters of all bodies that take part.
+    pub n_clusters: u64,
+    /// `Clusters` on the CPU: clusters that were proven to lie beside all other bodies, so that their boxes were not
+    /// needed.
+    pub n_culled: u64,
+    /// Work items: pairs of groups whose primitives were paired.
+    pub n_work_items: u64,
+    /// Pairs whose boxes overlap and that the adjacency rule admits.
+    pub n_candidates: u64,
+    /// Candidates that the floating-point filter left to exact arithmetic. On a GPU: that the filter on the device left to
+    /// the CPU, which decides them with a filter in `f64` and then exactly.
+    pub n_unsure: u64,
+    /// Bodies that were clustered in this frame, for the first time or again.
+    pub n_clustered: u64,
+    /// Of those, bodies clustered again because they had flowed away from the sweep in which they were clustered.
+    pub n_reclustered: u64,
+    /// Parts in which the work was done; 1 if the memory budget allowed all of it at once.
+    pub n_batches: u64,
+    /// GPU: pieces in which the scene was answered because the device or the memory budget cannot hold all of
+    /// it; 0 if it can.
+    pub n_pieces: u64,
+    /// Stages that were run again because a buffer had to grow.
+    pub n_reruns: u64,
+    /// Bytes that the detector holds, the answer included.
+    pub bytes_held: u64,
+    /// Not for users: the ways that the frame went.
+    #[doc(hidden)]
+    pub ways: Ways,
+}
+
+impl Statistics {
+    /// Clears everything, but keeps the allocated memory.
+    pub(crate) fn clear(&mut self) {
+        let mut stages = std::mem::take(&mut self.stages);
+        let mut backend = std::mem::take(&mut self.backend);
+        stages.clear();
+        backend.clear();
+        *self = Statistics {
+            stages,
+            backend,
+            ..Statistics::default()
+        };
+    }
+
+    /// Adds time to a stage; appends the stage if it is new.
+    #[doc(hidden)]
+    pub fn add_ms(&mut self, name: &'static str, ms: f64) {
+        match self.stages.iter_mut().find(|stage| stage.name == name) {
+            Some(stage) => stage.ms += ms,
+            None => self.stages.push(Stage { name, ms }),
+        }
+    }
+
+    /// Runs one stage and adds its wall time.
+    #[doc(hidden)]
+    pub fn time<T>(&mut self, name: &'static str, stage: impl FnOnce(&mut Self) -> T) -> T {
+        let start = Instant::now();
+        let result = stage(self);
+        self.add_ms(name, start.elapsed().as_secs_f64() * 1e3);
+        result
+    }
+
+    /// Milliseconds of a stage; 0 if it did not run.
+    pub fn stage_ms(&self, name: &str) -> f64 {
+        self.stages
+            .iter()
+            .find(|stage| stage.name == name)
+            .map_or(0.0, |stage| stage.ms)
+    }
+}

@@ -1,0 +1,164 @@
+//! Where helpers run: not on the caller's core, if there is another, unless users place threads themselves.
+//!
+//! A helper that wakes on the core of the busy caller runs only when the caller is done, which is too late, and the
+//! system does not soon move one of two busy threads to another core. (Linux wakes threads on the caller's core when it
+//! thinks that the other cores are busy, and one busy core of two is enough for that: on the machine of the records every
+//! second burst of frames began so, with 1.0 ms per frame instead of 0.55.) So helpers are kept off the caller's core: the
+//! core's number is read once per region, and if it has changed there is one system call per helper.
+//!
+//! Helpers run where the system puts them with [`Placement::Inherited`](crate::Placement::Inherited), if there is no such
+//! call, if the call fails, or if there are many helpers, for whom a core is free then.
+
+#[cfg(target_os = "linux")]
+pub(super) use linux::Places;
+#[cfg(not(target_os = "linux"))]
+pub(super) use other::Places;
+
+#[cfg(target_os = "linux")]
+mod linux {
+    use std::sync::OnceLock;
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
+    use crate::query::settings::Placement;
+    use rustix::thread::{CpuSet, Pid, gettid, sched_getaffinity, sched_getcpu, sched_setaffinity};
+
+    /// The caller's core, and the helpers' threads.
+    pub(crate) struct Places {
+        caller: AtomicUsize,
+        helpers: Box<[OnceLock<Helper>]>,
+        /// The process of the threads: a forked process has none of them.
+        process: u32,
+    }
+
+    struct Helper {
+        thread: Pid,
+        /// The cores on which it may run.
+        cores: CpuSet,
+    }
+
+    const UNKNOWN: usize = usize::MAX;
+    /// From this many helpers on, they are left alone.
+    const MANY: usize = 8;
+
+    impl Places {
+        pub fn new(n_helpers: usize, placement: Placement) -> Self {
+            let n = match placement {
+                Placement::Auto if n_helpers < MANY => n_helpers,
+                _ => 0,
+            };
+            Places {
+                caller: AtomicUsize::new(UNKNOWN),
+                helpers: (0..n).map(|_| OnceLock::new()).collect(),
+                process: std::process::id(),
+            }
+        }
+
+        /// To be called by the caller before it calls helpers.
+        pub fn caller_is_here(&self) {
+            if self.helpers.is_empty() {
+                return;
+            }
+            let core = sched_getcpu();
+            if self.caller.swap(core, Ordering::SeqCst) == core
+                || self.process != std::process::id()
+            {
+                return;
+            }
+            for helper in self.helpers.iter().filter_map(OnceLock::get) {
+                helper.keep_off(core);
+            }
+        }
+
+        /// To be called by a helper when it starts.
+        pub fn helper_is_here(&self, seat: usize) {
+            let Some(place) = self.helpers.get(seat - 1) else {
+                return;
+            };
+            let Ok(cores) = sched_getaffinity(None) else {
+                return;
+            };
+            let helper = place.get_or_init(|| Helper {
+                thread: gettid(),
+                cores,
+            });
+            // From here on the caller sees the helper. Apply the caller's core until it has not changed meanwhile.
+            let mut core = UNKNOWN;
+            loop {
+                let now = self.caller.load(Ordering::SeqCst);
+                if now == core {
+                    return;
+                }
+                core = now;
+                helper.keep_off(core);
+            }
+        }
+    }
+
+    impl Helper {
+        /// Excludes one core from those on which the helper may run, unless it is the only one.
+        fn keep_off(&self, core: usize) {
+            let mut cores = self.cores;
+            if core < CpuSet::MAX_CPU {
+                cores.unset(core);
+            }
+            if cores.count() > 0 {
+                // If the system refuses, only speed suffers.
+                let _ = sched_setaffinity(Some(self.thread), &cores);
+            }
+        }
+    }
+
+    #[cfg(test)]
+    mod tests {
+        use super::*;
+        use std::sync::mpsc;
+
+        #[test]
+        fn helpers_keep_off_the_callers_core() {
+            let allowed = sched_getaffinity(None).expect("has a set of cores");
+            let places = Places::new(1, Placement::Auto);
+            places.caller_is_here();
+            let (started, is_started) = mpsc::channel();
+            let (end, ended) = mpsc::channel::<()>();
+            std::thread::scope(|scope| {
+                let places = &places;
+                scope.spawn(move || {
+                    places.helper_is_here(1);
+                    started.send(()).expect("somebody waits");
+                    let _ = ended.recv();
+                });
+                is_started.recv().expect("it starts");
+                let helper = places.helpers[0].get().expect("it has said so").thread;
+                for _ in 0..2 {
+                    let core = places.caller.load(Ordering::SeqCst);
+                    let cores = sched_getaffinity(Some(helper)).expect("it lives");
+                    assert_eq!(cores.is_set(core), allowed.count() == 1);
+                    let mut others = (0..CpuSet::MAX_CPU).filter(|&other| other != core);
+                    assert!(others.all(|other| cores.is_set(other) == allowed.is_set(other)));
+                    // As if the caller had moved from another core.
+                    places.caller.store(UNKNOWN - 1, Ordering::SeqCst);
+                    places.caller_is_here();
+                }
+                drop(end);
+            });
+        }
+    }
+}
+
+#[cfg(not(target_os = "linux"))]
+mod other {
+    use crate::query::settings::Placement;
+
+    /// Does nothing: cores are not known.
+    pub(crate) struct Places;
+
+    impl Places {
+        pub fn new(_: usize, _: Placement) -> Self {
+            Places
+        }
+
+        pub fn caller_is_here(&self) {}
+
+        pub fn helper_is_here(&self, _: usize) {}
+    }
+}
