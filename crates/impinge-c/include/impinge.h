@@ -375,9 +375,9 @@ typedef struct impinge_stats {
   uint64_t n_unsure;     /* of these, left to exact arithmetic */
   uint64_t n_work_items; /* pairs of groups of elements */
   uint64_t n_clusters;   /* clusters of all bodies */
-  uint64_t n_remote;     /* of these, proven remote from all other bodies */
+  uint64_t n_culled;     /* of these, proven apart from all other bodies */
   uint64_t n_clustered;  /* bodies clustered in this question */
-  uint64_t n_slabs;      /* parts in which the work was done */
+  uint64_t n_batches;    /* parts in which the work was done */
   uint64_t n_reruns;     /* stages run again because a buffer had to grow */
   uint64_t bytes_held;   /* bytes that the detector held, the answer included */
   const char *backend;   /* "cpu", or the name of the GPU */

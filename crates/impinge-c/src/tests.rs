@@ -49,7 +49,7 @@ fn layout_in_rust() -> BTreeMap<String, usize> {
     structure!(impinge_impact: toi, kind, body_a, element_a, body_b, element_b, at_start);
     structure!(impinge_nearest: distance, points, body_a, element_a, body_b, element_b);
     structure!(impinge_region: position, bounds, length, patch_area, area, normal, depth, volume, body_a, body_b, n_contacts, n_inside);
-    structure!(impinge_stats: size, n_threads, total_ms, n_candidates, n_unsure, n_work_items, n_clusters, n_remote, n_clustered, n_slabs, n_reruns, bytes_held, backend, method);
+    structure!(impinge_stats: size, n_threads, total_ms, n_candidates, n_unsure, n_work_items, n_clusters, n_culled, n_clustered, n_batches, n_reruns, bytes_held, backend, method);
     constants!(
         OK,
         INVALID,

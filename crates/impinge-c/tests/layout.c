@@ -39,8 +39,8 @@ int main(void) {
   FIELD(impinge_region, body_a); FIELD(impinge_region, body_b); FIELD(impinge_region, n_contacts); FIELD(impinge_region, n_inside);
   SIZE(impinge_stats);
   FIELD(impinge_stats, size); FIELD(impinge_stats, n_threads); FIELD(impinge_stats, total_ms); FIELD(impinge_stats, n_candidates);
-  FIELD(impinge_stats, n_unsure); FIELD(impinge_stats, n_work_items); FIELD(impinge_stats, n_clusters); FIELD(impinge_stats, n_remote);
-  FIELD(impinge_stats, n_clustered); FIELD(impinge_stats, n_slabs); FIELD(impinge_stats, n_reruns); FIELD(impinge_stats, bytes_held);
+  FIELD(impinge_stats, n_unsure); FIELD(impinge_stats, n_work_items); FIELD(impinge_stats, n_clusters); FIELD(impinge_stats, n_culled);
+  FIELD(impinge_stats, n_clustered); FIELD(impinge_stats, n_batches); FIELD(impinge_stats, n_reruns); FIELD(impinge_stats, bytes_held);
   FIELD(impinge_stats, backend); FIELD(impinge_stats, method);
   VALUE(OK); VALUE(ERROR_INVALID); VALUE(ERROR_OUT_OF_MEMORY); VALUE(ERROR_BUDGET); VALUE(ERROR_TOO_MANY_PAIRS);
   VALUE(ERROR_CANCELLED); VALUE(ERROR_DEVICE); VALUE(ERROR_INTERNAL); VALUE(ABI_VERSION);
