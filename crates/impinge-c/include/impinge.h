@@ -230,6 +230,12 @@ typedef struct impinge_exclusion {
   impinge_array offsets, vertices;
 } impinge_exclusion;
 
+/* The vertices of an element, in the order in which it names them, and its body. */
+typedef struct impinge_element {
+  const uint32_t *vertices;
+  uint32_t n_vertices, body;
+} impinge_element;
+
 /* One query for all questions: fill it by impinge_query_default, then change fields. Where a query is an argument, NULL is the default one.
  *
  * Which pairs: a question that cannot honour one of these fields refuses it by name.
@@ -246,6 +252,9 @@ typedef struct impinge_exclusion {
  * infinite.
  *   exclusions, n_exclusions
  *                       Pairs to leave out. They are read during the call.
+ *   passes, passes_user Which pairs of elements may collide, of steps: 0 for those to leave out. It is asked about pairs that are in
+ *                       contact, or might be, by several threads at the same time, and must always say the same of one pair. The first
+ *                       element is the one that the kind of the pair names first. NULL, the default: all.
  * How: a question without use for one of these fields ignores it.
  *   start               IMPINGE_START_REPORT ...
  *   precision           IMPINGE_F32 (default) or IMPINGE_F64: that of times, which are rounded down.
@@ -268,6 +277,8 @@ typedef struct impinge_query {
   size_t n_exclusions;
   const uint32_t *fixed;
   size_t n_fixed;
+  int (*passes)(void *user, const impinge_element *a, const impinge_element *b);
+  void *passes_user;
 } impinge_query;
 
 /* A query of a step: the same structure. */

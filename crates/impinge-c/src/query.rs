@@ -1,8 +1,10 @@
 //! What an `impinge_query` asks, in the words of the crate `impinge`. The only place that knows them.
 
+use std::ffi::c_void;
+
 use impinge::{
-    CandidateQuery, Clearance, NearQuery, PairKind, PairKinds, Query, SharedVertex, Start, Step,
-    Toi,
+    CandidateQuery, Clearance, NearQuery, PairFilter, PairKind, PairKinds, Query, SharedVertex,
+    Start, Step, Toi,
 };
 
 use crate::scene::impinge_scene;
@@ -56,8 +58,21 @@ impl<'a> Asked<'a> {
         Ok(Asked { given, scene })
     }
 
-    /// The pairs of a question that knows no kinds of pairs.
+    /// The pairs of a question about intersections.
     pub fn pairs(&self) -> Result<Query, Failure> {
+        self.refuse_filter()?;
+        self.with_own_kinds()
+    }
+
+    fn refuse_filter(&self) -> Result<(), Failure> {
+        match self.given.passes {
+            None => Ok(()),
+            Some(_) => refuse("passes", "a function", "NULL allowed but for steps"),
+        }
+    }
+
+    /// The pairs of a question that knows no kinds of pairs.
+    fn with_own_kinds(&self) -> Result<Query, Failure> {
         if self.given.kinds != 0 {
             return refuse(
                 "kinds",
@@ -151,7 +166,7 @@ impl<'a> Asked<'a> {
 
     /// A step of these pairs.
     pub fn step(&self) -> Result<Step, Failure> {
-        self.how(Step::new(self.pairs()?))
+        self.how(Step::new(self.with_own_kinds()?))
     }
 
     /// What a step keeps, whatever its pairs are.
@@ -162,6 +177,10 @@ impl<'a> Asked<'a> {
             clearance_share,
             ..
         } = self.given;
+        let step = match self.given.passes {
+            None => step,
+            Some(passes) => step.filter(pair_filter(passes, self.given.passes_user)),
+        };
         Ok(step
             .start(match self.given.start {
                 START_REPORT => Start::Report,
@@ -191,6 +210,7 @@ impl<'a> Asked<'a> {
     /// Candidates with boxes that are inflated.
     pub fn candidates(&self, inflation: f64) -> Result<CandidateQuery, Failure> {
         check_length("inflation", inflation)?;
+        self.refuse_filter()?;
         let query = CandidateQuery::new(self.bodies()?).distance(inflation);
         Ok(match self.kinds()? {
             None => query,
@@ -201,6 +221,7 @@ impl<'a> Asked<'a> {
     /// Pairs within a distance.
     pub fn near(&self, distance: f64) -> Result<NearQuery, Failure> {
         check_length("distance", distance)?;
+        self.refuse_filter()?;
         let mut query = NearQuery::new(self.bodies()?).distance(distance);
         if self.kinds()?.is_some() {
             query = query.kinds(listed(self.given.kinds));
@@ -216,6 +237,30 @@ impl<'a> Asked<'a> {
         }
         Ok(query)
     }
+}
+
+/// A filter that asks a function of the caller.
+fn pair_filter(passes: PassesCallback, user: *mut c_void) -> PairFilter {
+    struct User(*mut c_void);
+    // SAFETY: `impinge.h` says that threads call the function at the same time.
+    unsafe impl Send for User {}
+    // SAFETY: as above.
+    unsafe impl Sync for User {}
+    impl User {
+        fn get(&self) -> *mut c_void {
+            self.0
+        }
+    }
+    let user = User(user);
+    PairFilter::new(move |pair| {
+        let [a, b] = pair.map(|(body, vertices)| impinge_element {
+            vertices: vertices.as_ptr(),
+            n_vertices: vertices.len() as u32,
+            body: body.index() as u32,
+        });
+        // SAFETY: the caller's function, with the caller's argument and elements that live as long as the call.
+        unsafe { passes(user.get(), &a, &b) != 0 }
+    })
 }
 
 /// Refuses a length that is negative or not finite.

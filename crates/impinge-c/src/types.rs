@@ -129,6 +129,8 @@ pub struct impinge_query {
     pub n_exclusions: usize,
     pub fixed: *const u32,
     pub n_fixed: usize,
+    pub passes: Option<PassesCallback>,
+    pub passes_user: *mut c_void,
 }
 
 impl Default for impinge_query {
@@ -155,10 +157,22 @@ impl Default for impinge_query {
             n_exclusions: 0,
             fixed: std::ptr::null(),
             n_fixed: 0,
+            passes: None,
+            passes_user: std::ptr::null_mut(),
         }
     }
 }
 
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct impinge_element {
+    pub vertices: *const u32,
+    pub n_vertices: u32,
+    pub body: u32,
+}
+
+pub type PassesCallback =
+    unsafe extern "C" fn(*mut c_void, *const impinge_element, *const impinge_element) -> c_int;
 pub type CancelledCallback = unsafe extern "C" fn(*mut c_void) -> c_int;
 pub type ProgressCallback = unsafe extern "C" fn(*mut c_void, u64, u64);
 pub type LogCallback = unsafe extern "C" fn(*mut c_void, u32, *const c_char);

@@ -20,7 +20,10 @@ int main(void) {
   FIELD(impinge_query, precision); FIELD(impinge_query, hits); FIELD(impinge_query, n_nearest); FIELD(impinge_query, flags);
   FIELD(impinge_query, separation); FIELD(impinge_query, clearance); FIELD(impinge_query, clearance_share);
   FIELD(impinge_query, cell_low); FIELD(impinge_query, cell_high); FIELD(impinge_query, exclusions);
-  FIELD(impinge_query, n_exclusions); FIELD(impinge_query, fixed); FIELD(impinge_query, n_fixed);
+  FIELD(impinge_query, n_exclusions); FIELD(impinge_query, fixed); FIELD(impinge_query, n_fixed); FIELD(impinge_query, passes);
+  FIELD(impinge_query, passes_user);
+  SIZE(impinge_element);
+  FIELD(impinge_element, vertices); FIELD(impinge_element, n_vertices); FIELD(impinge_element, body);
   SIZE(impinge_settings);
   FIELD(impinge_settings, size); FIELD(impinge_settings, backend); FIELD(impinge_settings, method); FIELD(impinge_settings, threads);
   FIELD(impinge_settings, memory_budget); FIELD(impinge_settings, max_pairs); FIELD(impinge_settings, cancelled);

@@ -157,6 +157,17 @@ static void pairs_of_bodies(impinge_detector *detector) {
   impinge_scene_destroy(scene);
 }
 
+/* Lets no vertex of the upper half of the first ball touch anything. */
+static int lower_half(void *user, const impinge_element *a, const impinge_element *b) {
+  uint32_t i;
+  CHECK(user == &balls && a->n_vertices + b->n_vertices == 4);
+  for (i = 0; i < a->n_vertices; ++i)
+    if (a->body == 0 && balls[0].positions[a->vertices[i]][2] > 0) return 0;
+  for (i = 0; i < b->n_vertices; ++i)
+    if (b->body == 0 && balls[0].positions[b->vertices[i]][2] > 0) return 0;
+  return 1;
+}
+
 /* The second ball comes from afar: it stops 1e-3 before the first one. */
 static void steps(impinge_detector *detector) {
   static ball far_away;
@@ -206,6 +217,21 @@ static void steps(impinge_detector *detector) {
   GOOD(impinge_impacts_column(impacts, IMPINGE_COLUMN_ROWS, &view));
   CHECK(((const uint32_t *)view.data)[0] == impinge_impacts_data(impacts)->body_a);
   REFUSED(impinge_impacts_column(impacts, IMPINGE_COLUMN_SHAPE, &view), "no column");
+  {
+    impinge_impacts *lower = NULL;
+    size_t i, n = 0;
+    step.passes = lower_half;
+    step.passes_user = &balls;
+    GOOD(impinge_find_impacts(detector, scene, &step, &lower));
+    for (i = 0; i < impinge_impacts_count(lower); ++i) {
+      const impinge_impact *of = &impinge_impacts_data(lower)[i];
+      if (of->kind == IMPINGE_VF && of->body_a == 0) CHECK(balls[0].positions[of->element_a][2] <= 0 && ++n);
+    }
+    CHECK(n > 10 && impinge_impacts_count(lower) < impinge_impacts_count(impacts));
+    impinge_impacts_destroy(lower);
+    REFUSED(impinge_count(detector, scene, &step, &(uint64_t){0}), "passes");
+    step.passes = NULL;
+  }
   impinge_impacts_destroy(impacts);
   step.clearance = 1e-3;
   GOOD(impinge_advance(detector, scene, &step, &fraction, &motion));

@@ -288,6 +288,13 @@ public:
   query &distances() { return set(raw_.flags, raw_.flags | IMPINGE_DISTANCES); }
   query &closest_points() { return set(raw_.flags, raw_.flags | IMPINGE_CLOSEST_POINTS); }
 
+  /// Which pairs of elements may collide, of steps: see `impinge_query`. `user` must live as long as the query is asked.
+  query &passes(int (*function)(void *user, const impinge_element *a, const impinge_element *b), void *user) {
+    raw_.passes_user = user;
+    raw_.passes = function;
+    return *this;
+  }
+
   /// The query of C. It lives as long as this one is not changed.
   impinge_query raw() const {
     impinge_query raw = raw_;

@@ -1,0 +1,442 @@
+/// impinge/ipc.hpp: impinge in the place of ipc-toolkit's collision stage, for programs that have ipc-toolkit 1.6 and Eigen 3.4.
+///
+///     impinge::ipc::BroadPhase broad_phase;
+///     collisions.build(mesh, vertices, dhat, 0, &broad_phase);                                      // and everything else that takes one
+///     step = impinge::ipc::compute_collision_free_stepsize(mesh, vertices_t0, vertices_t1, dmin);   // the whole step at once
+///
+/// docs/from-ipc-toolkit.md says what differs. Everything here throws `impinge::error`.
+#ifndef IMPINGE_IPC_HPP
+#define IMPINGE_IPC_HPP
+
+#include <impinge/eigen.hpp>
+
+#include <ipc/broad_phase/broad_phase.hpp>
+#include <ipc/broad_phase/default_broad_phase.hpp>
+#include <ipc/ccd/narrow_phase_ccd.hpp>
+#include <ipc/collision_mesh.hpp>
+
+#include <algorithm>
+#include <atomic>
+#include <exception>
+#include <list>
+
+namespace impinge::ipc {
+
+/// What a `BroadPhase` finds. `boxes`: pairs whose inflated boxes overlap, as ipc-toolkit's own do. `exact`: only pairs that come within
+/// twice the inflation radius at some time of the step, at least within 1e-4; nothing that needs them asks for others.
+enum class mode { boxes, exact };
+
+/// `conservative_rescaling` of ipc-toolkit's continuous detection.
+constexpr double default_rescaling = 0.8;
+/// The largest distance that a step leaves, as in ipc-toolkit.
+constexpr double default_clearance = 1e-4;
+
+namespace detail {
+
+using ids = std::vector<std::uint32_t>;
+
+/// Vertices, edges and faces of ipc-toolkit as up to three bodies of a scene: faces, with the edges of the caller; edges of no face; vertices of
+/// neither.
+class bodies {
+public:
+  bodies(Eigen::Index n, const Eigen::MatrixXi &edges, const Eigen::MatrixXi &faces, settings of)
+      : n_(n), edges_(edges), faces_(faces), on_faces_(static_cast<std::size_t>(n)), detector_(std::move(of)) {
+    std::vector<char> is_used(static_cast<std::size_t>(n));
+    std::vector<std::array<int, 2>> sides;
+    for (Eigen::Index f = 0; f < faces.rows(); ++f)
+      for (int k = 0; k < 3; ++k) {
+        on_faces_[static_cast<std::size_t>(faces(f, k))] = is_used[static_cast<std::size_t>(faces(f, k))] = 1;
+        const auto [a, b] = std::minmax(faces(f, k), faces(f, (k + 1) % 3));
+        sides.push_back({a, b});
+      }
+    std::sort(sides.begin(), sides.end());
+    for (Eigen::Index e = 0; e < edges.rows(); ++e) {
+      const auto [a, b] = std::minmax(edges(e, 0), edges(e, 1));
+      if (std::binary_search(sides.begin(), sides.end(), std::array<int, 2>{a, b})) continue;
+      loose_edges_.push_back(static_cast<std::uint32_t>(e));
+      is_used[static_cast<std::size_t>(a)] = is_used[static_cast<std::size_t>(b)] = 1;
+    }
+    for (std::size_t v = 0; v < is_used.size(); ++v)
+      if (!is_used[v]) points_.push_back(static_cast<std::uint32_t>(v));
+  }
+
+  bool are_of(Eigen::Index n, const Eigen::MatrixXi &edges, const Eigen::MatrixXi &faces) const {
+    const auto same = [](const Eigen::MatrixXi &a, const Eigen::MatrixXi &b) { return a.rows() == b.rows() && (a.rows() == 0 || a == b); };
+    return n == n_ && same(edges, edges_) && same(faces, faces_);
+  }
+
+  /// All vertices stand still.
+  void place(Eigen::Ref<const Eigen::MatrixXd> at) {
+    if (scene_.n_bodies() == 0) return add(at);
+    for_parts(at, [&](body of, const auto &part) { scene_.set_positions(of, part); });
+  }
+  /// They move.
+  void place(Eigen::Ref<const Eigen::MatrixXd> start, Eigen::Ref<const Eigen::MatrixXd> end) {
+    place(start);
+    for_parts(end, [&](body of, const auto &part) { scene_.set_end_positions(of, part); });
+  }
+
+  /// The caller's numbers of an element: of `part` 0 for vertices, 1 for edges, 2 for faces.
+  std::uint32_t number(int part, body of, std::uint32_t element) const {
+    if (part == 0 && of == of_points_) return points_[element];
+    if (part == 1 && of == of_loose_edges_) return loose_edges_[element];
+    return element;
+  }
+  /// Whether an element is a vertex that another body has too, with all that it meets.
+  bool is_repeated(int part, body of, std::uint32_t element) const { return part == 0 && of == of_loose_edges_ && on_faces_[element] != 0; }
+  /// The vertices of an element by the caller's number.
+  view<int> corners(int part, std::uint32_t number, std::array<int, 3> &room) const {
+    if (part == 0) room[0] = static_cast<int>(number);
+    const Eigen::MatrixXi &of = part == 2 ? faces_ : edges_;
+    for (int k = 0; part > 0 && k <= part; ++k) room[static_cast<std::size_t>(k)] = of(static_cast<Eigen::Index>(number), k);
+    return {room.data(), static_cast<std::size_t>(part) + 1};
+  }
+  /// The caller's number of a vertex of an element that a filter is asked about.
+  int vertex(const impinge_element &of, std::uint32_t k) const {
+    return static_cast<int>(of.body == of_points_ ? points_[of.vertices[k]] : of.vertices[k]);
+  }
+
+  /// What a body was given as: 0 for vertices, 1 for edges, 2 for faces.
+  int given(body of) const { return of == of_faces_ ? 2 : of == of_loose_edges_ ? 1 : 0; }
+
+  const impinge::scene &scene() const { return scene_; }
+  impinge::detector &detector() { return detector_; }
+  bool has_faces() const { return faces_.rows() > 0; }
+
+private:
+  template <class Set> void for_parts(Eigen::Ref<const Eigen::MatrixXd> at, Set set) {
+    if (at.rows() != n_ || at.cols() != 3) impinge::detail::refuse("vertices: another number of rows than before, or not 3 columns");
+    if (of_faces_ != IMPINGE_ANY_BODY) set(of_faces_, at);
+    if (of_loose_edges_ != IMPINGE_ANY_BODY) set(of_loose_edges_, at);
+    if (of_points_ != IMPINGE_ANY_BODY) set(of_points_, points(at));
+  }
+  Eigen::MatrixXd points(Eigen::Ref<const Eigen::MatrixXd> at) const {
+    Eigen::MatrixXd rows(static_cast<Eigen::Index>(points_.size()), 3);
+    for (std::size_t ix = 0; ix < points_.size(); ++ix) rows.row(static_cast<Eigen::Index>(ix)) = at.row(static_cast<Eigen::Index>(points_[ix]));
+    return rows;
+  }
+  void add(Eigen::Ref<const Eigen::MatrixXd> at) {
+    if (at.rows() != n_ || at.cols() != 3) impinge::detail::refuse("vertices: not 3 columns");
+    impinge::scene made;
+    if (has_faces()) {
+      of_faces_ = made.add_triangles(faces_, at);
+      if (edges_.rows() > 0) made.set_edges(of_faces_, edges_);
+    }
+    if (!loose_edges_.empty()) {
+      Eigen::MatrixXi rows(static_cast<Eigen::Index>(loose_edges_.size()), 2);
+      for (std::size_t ix = 0; ix < loose_edges_.size(); ++ix) rows.row(static_cast<Eigen::Index>(ix)) = edges_.row(static_cast<Eigen::Index>(loose_edges_[ix]));
+      of_loose_edges_ = made.add_edges(rows, at);
+    }
+    if (!points_.empty()) of_points_ = made.add_points(points(at));
+    scene_ = std::move(made);
+  }
+
+  Eigen::Index n_;
+  Eigen::MatrixXi edges_, faces_;
+  std::vector<char> on_faces_;
+  ids loose_edges_, points_;
+  body of_faces_ = IMPINGE_ANY_BODY, of_loose_edges_ = IMPINGE_ANY_BODY, of_points_ = IMPINGE_ANY_BODY;
+  impinge::scene scene_;
+  impinge::detector detector_;
+};
+
+/// The bodies of the meshes that were asked about last.
+class known_bodies {
+public:
+  explicit known_bodies(settings of = backend::cpu) : settings_(std::move(of)) {}
+  bodies &of(Eigen::Index n, const Eigen::MatrixXi &edges, const Eigen::MatrixXi &faces) {
+    for (auto at = known_.begin(); at != known_.end(); ++at)
+      if (at->are_of(n, edges, faces)) {
+        known_.splice(known_.begin(), known_, at);
+        return known_.front();
+      }
+    // A mesh with its codimensional vertices and edges is three.
+    if (known_.size() >= 4) known_.pop_back();
+    known_.emplace_front(n, edges, faces, settings_);
+    return known_.front();
+  }
+
+private:
+  settings settings_;
+  std::list<bodies> known_;
+};
+
+/// Whether any vertex of one element may collide with any of another.
+template <class Filter> bool may_collide(view<int> a, view<int> b, const Filter &filter) {
+  for (const int x : a)
+    for (const int y : b)
+      if (filter(static_cast<std::size_t>(x), static_cast<std::size_t>(y))) return true;
+  return false;
+}
+
+inline bool share_vertex(view<int> a, view<int> b) {
+  return std::any_of(a.begin(), a.end(), [&](int x) { return std::find(b.begin(), b.end(), x) != b.end(); });
+}
+
+/// The filter of a mesh, for questions about whole steps. It is called by several threads.
+class step_filter {
+public:
+  step_filter(const bodies &of, const ::ipc::CollisionFilter &filter) : bodies_(of), filter_(filter) {}
+  static int passes(void *user, const impinge_element *a, const impinge_element *b) {
+    auto &of = *static_cast<step_filter *>(user);
+    try {
+      return of.pass(*a, *b);
+    } catch (...) {
+      if (!of.is_thrown_.exchange(true)) of.thrown_ = std::current_exception();
+      return 0;
+    }
+  }
+  void rethrow() const {
+    if (thrown_) std::rethrow_exception(thrown_);
+  }
+
+private:
+  bool pass(const impinge_element &a, const impinge_element &b) const {
+    std::array<int, 4> of_a{}, of_b{};
+    for (std::uint32_t k = 0; k < a.n_vertices; ++k) of_a[k] = bodies_.vertex(a, k);
+    for (std::uint32_t k = 0; k < b.n_vertices; ++k) of_b[k] = bodies_.vertex(b, k);
+    const view<int> first(of_a.data(), a.n_vertices), second(of_b.data(), b.n_vertices);
+    // Within a body the detector sees to neighbours.
+    if (a.body != b.body && share_vertex(first, second)) return false;
+    return may_collide(first, second, filter_);
+  }
+  const bodies &bodies_;
+  const ::ipc::CollisionFilter &filter_;
+  std::atomic<bool> is_thrown_{false};
+  std::exception_ptr thrown_;
+};
+
+/// The bodies of this thread's meshes, for the functions below.
+inline bodies &of_mesh(const ::ipc::CollisionMesh &mesh, Eigen::Index n) {
+  if (!mesh.planes.empty()) impinge::detail::refuse("mesh: planes are not served; give the mesh faces in their place");
+  if (n != static_cast<Eigen::Index>(mesh.num_vertices())) impinge::detail::refuse("vertices: another number of rows than the mesh has");
+  static thread_local known_bodies known;
+  return known.of(n, mesh.edges(), mesh.faces());
+}
+
+} // namespace detail
+
+/// Whether elements of a mesh intersect: faces with faces, loose edges and vertices with all. Exact, and touching counts. Faces that share a
+/// vertex count where they meet in more than that: ipc-toolkit does not look at these.
+inline bool has_intersections(const ::ipc::CollisionMesh &mesh, Eigen::Ref<const Eigen::MatrixXd> vertices) {
+  auto &of = detail::of_mesh(mesh, vertices.rows());
+  of.place(vertices);
+  const auto pairs = of.detector().detect(of.scene());
+  std::array<int, 3> room_a{}, room_b{};
+  return std::any_of(pairs.begin(), pairs.end(), [&](const pair &row) {
+    const int part_a = of.given(row.body_a), part_b = of.given(row.body_b);
+    const auto a = of.corners(part_a, of.number(part_a, row.body_a, row.element_a), room_a);
+    const auto b = of.corners(part_b, of.number(part_b, row.body_b, row.element_b), room_b);
+    return (row.body_a == row.body_b || !detail::share_vertex(a, b)) && detail::may_collide(a, b, mesh.can_collide);
+  });
+}
+
+/// Whether nothing intersects at the start, and nothing comes nearer than `min_distance` on straight lines to the end. Exact. ipc-toolkit
+/// takes it that the start is free.
+inline bool is_step_collision_free(const ::ipc::CollisionMesh &mesh, Eigen::Ref<const Eigen::MatrixXd> vertices_t0, Eigen::Ref<const Eigen::MatrixXd> vertices_t1,
+                                   double min_distance = 0) {
+  auto &of = detail::of_mesh(mesh, vertices_t0.rows());
+  of.place(vertices_t0, vertices_t1);
+  detail::step_filter filter(of, mesh.can_collide);
+  const bool is_free =
+      of.detector().is_free(of.scene(), query::all().separation(min_distance).start(start::verify).passes(detail::step_filter::passes, &filter));
+  filter.rethrow();
+  return is_free;
+}
+
+/// How far all vertices can move on straight lines from one pose towards another: the largest step in [0, 1] for which every pair keeps
+/// min_distance + min((1 - conservative_rescaling) * (d - min_distance), 1e-4), where d is its distance at the start. This holds for positions that
+/// the caller computes, rounding included, and for every smaller step. 0 if elements touch at the start.
+///
+/// As in ipc-toolkit, the start must be free of intersections, and is not asked. Throws for a mesh whose vertices at one position are not
+/// shared where they touch: every step would be 0.
+inline double compute_collision_free_stepsize(const ::ipc::CollisionMesh &mesh, Eigen::Ref<const Eigen::MatrixXd> vertices_t0,
+                                              Eigen::Ref<const Eigen::MatrixXd> vertices_t1, double min_distance = 0,
+                                              double conservative_rescaling = default_rescaling) {
+  auto &of = detail::of_mesh(mesh, vertices_t0.rows());
+  of.place(vertices_t0, vertices_t1);
+  detail::step_filter filter(of, mesh.can_collide);
+  // With all of its distance to lose, a pair still keeps what rounding moves.
+  const double share = std::max(1 - conservative_rescaling, 1e-9);
+  const auto step = query::all().separation(min_distance).clearance(default_clearance, share).passes(detail::step_filter::passes, &filter);
+  double fraction = 0;
+  try {
+    fraction = of.detector().advance_fraction(of.scene(), step);
+  } catch (const error &) {
+    // Parts that have come to touch at a vertex are no seam of the mesh: there is no step, as for all that touches.
+    if (!of.detector().is_free(of.scene(), step) && weld(mesh.rest_positions()).firsts.size() == mesh.num_vertices()) return 0;
+    throw;
+  }
+  filter.rethrow();
+  return fraction;
+}
+
+/// Finds the pairs that ipc-toolkit asks for. In two dimensions ipc-toolkit's own default does.
+class BroadPhase : public ::ipc::BroadPhase {
+public:
+  explicit BroadPhase(ipc::mode of = mode::exact, settings how = backend::cpu) : mode_(of), known_(std::move(how)) {}
+
+  std::string name() const override { return mode_ == mode::exact ? "impinge" : "impinge (boxes)"; }
+
+  using ::ipc::BroadPhase::build;
+  void build(Eigen::ConstRef<Eigen::MatrixXd> vertices, Eigen::ConstRef<Eigen::MatrixXi> edges, Eigen::ConstRef<Eigen::MatrixXi> faces,
+             const double inflation_radius = 0) override {
+    if (vertices.cols() == 2) return flat_with([&](::ipc::BroadPhase &flat) { flat.build(vertices, edges, faces, inflation_radius); });
+    start(vertices.rows(), edges, faces, inflation_radius);
+    bodies_->place(vertices);
+    is_still_ = true;
+  }
+  void build(Eigen::ConstRef<Eigen::MatrixXd> vertices_t0, Eigen::ConstRef<Eigen::MatrixXd> vertices_t1, Eigen::ConstRef<Eigen::MatrixXi> edges,
+             Eigen::ConstRef<Eigen::MatrixXi> faces, const double inflation_radius = 0) override {
+    if (vertices_t0.cols() == 2) return flat_with([&](::ipc::BroadPhase &flat) { flat.build(vertices_t0, vertices_t1, edges, faces, inflation_radius); });
+    start(vertices_t0.rows(), edges, faces, inflation_radius);
+    bodies_->place(vertices_t0, vertices_t1);
+  }
+  /// Of boxes alone, candidates are pairs of boxes, whatever the mode.
+  void build(const ::ipc::AABBs &boxes, Eigen::ConstRef<Eigen::MatrixXi> edges, Eigen::ConstRef<Eigen::MatrixXi> faces, const uint8_t dimension) override {
+    if (dimension == 2) return flat_with([&](::ipc::BroadPhase &flat) { flat.build(boxes, edges, faces, dimension); });
+    const auto n = static_cast<Eigen::Index>(boxes.size());
+    start(n, edges, faces, 0);
+    // A vertex that moves from one corner of its box to the other has this box.
+    Eigen::MatrixXd low(n, 3), high(n, 3);
+    for (Eigen::Index v = 0; v < n; ++v) {
+      low.row(v) = boxes[static_cast<std::size_t>(v)].min.transpose();
+      high.row(v) = boxes[static_cast<std::size_t>(v)].max.transpose();
+    }
+    bodies_->place(low, high);
+    are_boxes_ = true;
+  }
+
+  void clear() override {
+    ::ipc::BroadPhase::clear();
+    bodies_ = nullptr;
+    flat_.reset();
+    near_ = {};
+    impacts_ = {};
+    is_still_ = are_boxes_ = false;
+  }
+
+  void detect_vertex_vertex_candidates(std::vector<::ipc::VertexVertexCandidate> &found) const override {
+    if (flat_) return flat_->detect_vertex_vertex_candidates(found);
+    each(pair_kind::vv, 0, 0, [&](::ipc::index_t a, ::ipc::index_t b) { found.emplace_back(a, b); });
+  }
+  void detect_edge_vertex_candidates(std::vector<::ipc::EdgeVertexCandidate> &found) const override {
+    if (flat_) return flat_->detect_edge_vertex_candidates(found);
+    each(pair_kind::ev, 1, 0, [&](::ipc::index_t a, ::ipc::index_t b) { found.emplace_back(a, b); });
+  }
+  void detect_edge_edge_candidates(std::vector<::ipc::EdgeEdgeCandidate> &found) const override {
+    if (flat_) return flat_->detect_edge_edge_candidates(found);
+    each(pair_kind::ee, 1, 1, [&](::ipc::index_t a, ::ipc::index_t b) { found.emplace_back(a, b); });
+  }
+  void detect_face_vertex_candidates(std::vector<::ipc::FaceVertexCandidate> &found) const override {
+    if (flat_) return flat_->detect_face_vertex_candidates(found);
+    each(pair_kind::vf, 0, 2, [&](::ipc::index_t a, ::ipc::index_t b) { found.emplace_back(b, a); });
+  }
+  void detect_edge_face_candidates(std::vector<::ipc::EdgeFaceCandidate> &found) const override {
+    if (flat_) return flat_->detect_edge_face_candidates(found);
+    each(pair_kind::ef, 1, 2, [&](::ipc::index_t a, ::ipc::index_t b) { found.emplace_back(a, b); });
+  }
+  void detect_face_face_candidates(std::vector<::ipc::FaceFaceCandidate> &found) const override {
+    if (flat_) return flat_->detect_face_face_candidates(found);
+    each(pair_kind::ff, 2, 2, [&](::ipc::index_t a, ::ipc::index_t b) { found.emplace_back(a, b); });
+  }
+
+private:
+  template <class Build> void flat_with(Build build) {
+    clear();
+    flat_ = ::ipc::make_default_broad_phase();
+    flat_->can_vertices_collide = can_vertices_collide;
+    build(*flat_);
+    dim = 2;
+  }
+  void start(Eigen::Index n, Eigen::ConstRef<Eigen::MatrixXi> edges, Eigen::ConstRef<Eigen::MatrixXi> faces, double inflation_radius) {
+    clear();
+    bodies_ = &known_.of(n, edges, faces);
+    inflation_ = inflation_radius;
+    dim = 3;
+  }
+
+  /// Hands out the pairs of one kind that share no vertex and pass the filter.
+  template <class Found> void each(pair_kind kind, int part_a, int part_b, Found found) const {
+    if (bodies_ == nullptr) return;
+    const auto hand_out = [&](const auto &row) {
+      const auto &of = *bodies_;
+      if (of.is_repeated(part_a, row.body_a, row.element_a) || of.is_repeated(part_b, row.body_b, row.element_b)) return;
+      const auto a = of.number(part_a, row.body_a, row.element_a), b = of.number(part_b, row.body_b, row.element_b);
+      std::array<int, 3> room_a{}, room_b{};
+      const auto corners_a = of.corners(part_a, a, room_a), corners_b = of.corners(part_b, b, room_b);
+      if (detail::share_vertex(corners_a, corners_b) || !detail::may_collide(corners_a, corners_b, can_vertices_collide)) return;
+      found(static_cast<::ipc::index_t>(a), static_cast<::ipc::index_t>(b));
+    };
+    const auto all = [&](const auto &rows) { std::for_each(rows.begin(), rows.end(), hand_out); };
+    const bool is_of_step = kind == pair_kind::vf || kind == pair_kind::ee || (!bodies_->has_faces() && kind != pair_kind::ef && kind != pair_kind::ff);
+    auto &on = bodies_->detector();
+    // Edges and faces, and faces and faces, are near where others are: their boxes are all that is asked for.
+    if (mode_ == mode::boxes || are_boxes_ || !is_of_step) return all(on.candidates(bodies_->scene(), inflation_, query::all().kinds({kind})));
+    const double reach = 2 * inflation_;
+    if (is_still_) {
+      if (!near_) near_ = on.near(bodies_->scene(), reach, query::all().kinds({pair_kind::vf, pair_kind::ee, pair_kind::ev, pair_kind::vv}));
+      return all(near_->of(kind));
+    }
+    if (!impacts_) impacts_ = on.impacts(bodies_->scene(), query::all().separation(std::max(reach, default_clearance)));
+    all(impacts_->of(kind));
+  }
+
+  ipc::mode mode_;
+  mutable detail::known_bodies known_;
+  mutable detail::bodies *bodies_ = nullptr;
+  std::unique_ptr<::ipc::BroadPhase> flat_;
+  double inflation_ = 0;
+  bool is_still_ = false, are_boxes_ = false;
+  mutable std::optional<near_pairs> near_;
+  mutable std::optional<impacts> impacts_;
+};
+
+/// The exact first contact of one pair. What a pair keeps is as in `compute_collision_free_stepsize`.
+class NarrowPhaseCCD : public ::ipc::NarrowPhaseCCD {
+public:
+  NarrowPhaseCCD() { conservative_rescaling = default_rescaling; }
+
+  bool point_point_ccd(Eigen::ConstRef<::ipc::VectorMax3d> p0_t0, Eigen::ConstRef<::ipc::VectorMax3d> p1_t0, Eigen::ConstRef<::ipc::VectorMax3d> p0_t1,
+                       Eigen::ConstRef<::ipc::VectorMax3d> p1_t1, double &toi, const double min_distance = 0.0, const double tmax = 1.0) const override {
+    return ask<2>(pair_kind::vv, {wide(p0_t0), wide(p1_t0)}, {wide(p0_t1), wide(p1_t1)}, toi, min_distance, tmax);
+  }
+  bool point_edge_ccd(Eigen::ConstRef<::ipc::VectorMax3d> p_t0, Eigen::ConstRef<::ipc::VectorMax3d> e0_t0, Eigen::ConstRef<::ipc::VectorMax3d> e1_t0,
+                      Eigen::ConstRef<::ipc::VectorMax3d> p_t1, Eigen::ConstRef<::ipc::VectorMax3d> e0_t1, Eigen::ConstRef<::ipc::VectorMax3d> e1_t1,
+                      double &toi, const double min_distance = 0.0, const double tmax = 1.0) const override {
+    return ask<3>(pair_kind::ev, {wide(e0_t0), wide(e1_t0), wide(p_t0)}, {wide(e0_t1), wide(e1_t1), wide(p_t1)}, toi, min_distance, tmax);
+  }
+  bool point_triangle_ccd(Eigen::ConstRef<Eigen::Vector3d> p_t0, Eigen::ConstRef<Eigen::Vector3d> t0_t0, Eigen::ConstRef<Eigen::Vector3d> t1_t0,
+                          Eigen::ConstRef<Eigen::Vector3d> t2_t0, Eigen::ConstRef<Eigen::Vector3d> p_t1, Eigen::ConstRef<Eigen::Vector3d> t0_t1,
+                          Eigen::ConstRef<Eigen::Vector3d> t1_t1, Eigen::ConstRef<Eigen::Vector3d> t2_t1, double &toi, const double min_distance = 0.0,
+                          const double tmax = 1.0) const override {
+    return ask<4>(pair_kind::vf, {wide(p_t0), wide(t0_t0), wide(t1_t0), wide(t2_t0)}, {wide(p_t1), wide(t0_t1), wide(t1_t1), wide(t2_t1)}, toi, min_distance,
+                  tmax);
+  }
+  bool edge_edge_ccd(Eigen::ConstRef<Eigen::Vector3d> ea0_t0, Eigen::ConstRef<Eigen::Vector3d> ea1_t0, Eigen::ConstRef<Eigen::Vector3d> eb0_t0,
+                     Eigen::ConstRef<Eigen::Vector3d> eb1_t0, Eigen::ConstRef<Eigen::Vector3d> ea0_t1, Eigen::ConstRef<Eigen::Vector3d> ea1_t1,
+                     Eigen::ConstRef<Eigen::Vector3d> eb0_t1, Eigen::ConstRef<Eigen::Vector3d> eb1_t1, double &toi, const double min_distance = 0.0,
+                     const double tmax = 1.0) const override {
+    return ask<4>(pair_kind::ee, {wide(ea0_t0), wide(ea1_t0), wide(eb0_t0), wide(eb1_t0)}, {wide(ea0_t1), wide(ea1_t1), wide(eb0_t1), wide(eb1_t1)}, toi,
+                  min_distance, tmax);
+  }
+
+private:
+  using point = std::array<double, 3>;
+  template <class V> static point wide(const V &p) { return {p(0), p(1), p.size() > 2 ? p(2) : 0}; }
+  template <std::size_t n>
+  bool ask(pair_kind kind, const std::array<point, n> &from, const std::array<point, n> &to, double &toi, double min_distance, double tmax) const {
+    const auto raw = query::all().separation(min_distance).clearance(default_clearance, std::max(1 - conservative_rescaling, 0.0)).raw();
+    double time = 0;
+    std::int32_t found = 0;
+    impinge::detail::give(
+        impinge_first_contact(static_cast<std::uint32_t>(kind), rows(from[0].data(), n), rows(to[0].data(), n), &raw, &time, &found));
+    if (found == 0 || time > tmax) return false;
+    toi = time;
+    return true;
+  }
+};
+
+} // namespace impinge::ipc
+
+#endif // IMPINGE_IPC_HPP

@@ -1,0 +1,145 @@
+// impinge/ipc.hpp beside ipc-toolkit itself: the same candidates, fewer of them where they are exact, and the same steps.
+#include "common.h"
+#include <impinge/ipc.hpp>
+
+#include <ipc/broad_phase/lbvh.hpp>
+#include <ipc/candidates/candidates.hpp>
+#include <ipc/ccd/tight_inclusion_ccd.hpp>
+
+#include <set>
+
+namespace {
+
+using pairs_of_ids = std::set<std::array<long, 2>>;
+
+template <class List, class Ids> pairs_of_ids ids(const List &list, Ids of, bool is_ordered) {
+  pairs_of_ids found;
+  for (const auto &each : list) {
+    auto [a, b] = of(each);
+    CHECK(found.insert(is_ordered ? std::array<long, 2>{a, b} : std::array<long, 2>{std::min(a, b), std::max(a, b)}).second);
+  }
+  return found;
+}
+
+struct all_ids {
+  pairs_of_ids ee, fv, ev, vv;
+  explicit all_ids(const ::ipc::Candidates &of) {
+    ee = ids(of.ee_candidates, [](const auto &c) { return std::array<long, 2>{c.edge0_id, c.edge1_id}; }, false);
+    fv = ids(of.fv_candidates, [](const auto &c) { return std::array<long, 2>{c.face_id, c.vertex_id}; }, true);
+    ev = ids(of.ev_candidates, [](const auto &c) { return std::array<long, 2>{c.edge_id, c.vertex_id}; }, true);
+    vv = ids(of.vv_candidates, [](const auto &c) { return std::array<long, 2>{c.vertex0_id, c.vertex1_id}; }, false);
+  }
+  std::size_t size() const { return ee.size() + fv.size() + ev.size() + vv.size(); }
+  bool holds(const all_ids &other) const {
+    const auto in = [](const pairs_of_ids &all, const pairs_of_ids &some) { return std::includes(all.begin(), all.end(), some.begin(), some.end()); };
+    return in(ee, other.ee) && in(fv, other.fv) && in(ev, other.ev) && in(vv, other.vv);
+  }
+};
+
+// Two balls of faces, strands of loose edges, and loose vertices: edges are numbered from the last face to the first.
+struct model {
+  Eigen::MatrixXd start, end;
+  Eigen::MatrixXi edges, faces;
+};
+
+model make_model() {
+  static ball balls[2];
+  make_ball(&balls[0], 0);
+  make_ball(&balls[1], 2.05);
+  constexpr int n_strands = 40, n_points = 60, first_strand = 2 * VERTICES, first_point = first_strand + 2 * n_strands;
+  model of;
+  of.start.resize(first_point + n_points, 3);
+  of.faces.resize(2 * FACES, 3);
+  for (int which = 0; which < 2; ++which) {
+    for (int v = 0; v < VERTICES; ++v) of.start.row(which * VERTICES + v) = Eigen::Map<const Eigen::RowVector3d>(balls[which].positions[v]);
+    for (int f = 0; f < FACES; ++f)
+      for (int k = 0; k < 3; ++k) of.faces(which * FACES + f, k) = static_cast<int>(balls[which].faces[f][k]) + which * VERTICES;
+  }
+  std::srand(5);
+  of.start.bottomRows(2 * n_strands + n_points).setRandom();
+  for (Eigen::Index v = first_strand; v < of.start.rows(); ++v) of.start.row(v) = of.start.row(v).normalized() * 1.2;
+  std::set<std::array<int, 2>> sides;
+  for (Eigen::Index f = 0; f < of.faces.rows(); ++f)
+    for (int k = 0; k < 3; ++k) {
+      const auto [a, b] = std::minmax(of.faces(f, k), of.faces(f, (k + 1) % 3));
+      sides.insert({b, a});
+    }
+  of.edges.resize(static_cast<Eigen::Index>(sides.size()) + n_strands, 2);
+  Eigen::Index e = of.edges.rows();
+  for (const auto &[a, b] : sides) of.edges.row(--e) << a, b;
+  for (int s = 0; s < n_strands; ++s) of.edges.row(--e) << first_strand + 2 * s, first_strand + 2 * s + 1;
+  of.end = of.start;
+  for (Eigen::Index v = 0; v < of.end.rows(); ++v) of.end(v, 0) -= v < VERTICES ? -0.05 : 0.1;
+  return of;
+}
+
+void candidates(const ::ipc::CollisionMesh &mesh, const model &of) {
+  const auto ask = [&](::ipc::BroadPhase &with, bool moves, double radius) {
+    ::ipc::Candidates found;
+    if (moves)
+      found.build(mesh, of.start, of.end, radius, &with);
+    else
+      found.build(mesh, of.start, radius, &with);
+    return all_ids(found);
+  };
+  ::ipc::LBVH lbvh;
+  impinge::ipc::BroadPhase exact, boxes(impinge::ipc::mode::boxes);
+  CHECK(exact.name() != boxes.name());
+  for (const bool moves : {false, true}) {
+    const auto expected = ask(lbvh, moves, 0.01), in_boxes = ask(boxes, moves, 0.01), near = ask(exact, moves, 0.01);
+    std::printf("%s: LBVH %zu, boxes %zu, exact %zu\n", moves ? "moving" : "still", expected.size(), in_boxes.size(), near.size());
+    // Theirs may round boxes up by a little.
+    CHECK(expected.holds(in_boxes) && in_boxes.size() * 1.01 > expected.size());
+    CHECK(in_boxes.holds(near) && !near.ee.empty() && !near.fv.empty() && near.size() < in_boxes.size());
+    // Nothing within twice the radius at the start is missing.
+    ::ipc::Candidates all;
+    all.build(mesh, of.start, 0.01, &lbvh);
+    for (const auto &c : all.ee_candidates)
+      if (c.compute_distance(of.start, mesh.edges(), mesh.faces()) < 0.02 * 0.02 * (1 - 1e-12))
+        CHECK(near.ee.count({std::min(c.edge0_id, c.edge1_id), std::max(c.edge0_id, c.edge1_id)}) == 1);
+    for (const auto &c : all.fv_candidates)
+      if (c.compute_distance(of.start, mesh.edges(), mesh.faces()) < 0.02 * 0.02 * (1 - 1e-12)) CHECK(near.fv.count({c.face_id, c.vertex_id}) == 1);
+  }
+}
+
+void steps(const ::ipc::CollisionMesh &mesh, const model &of) {
+  impinge::ipc::BroadPhase exact;
+  const impinge::ipc::NarrowPhaseCCD ccd;
+  const auto step = [&](::ipc::BroadPhase *with, const ::ipc::NarrowPhaseCCD &narrow) {
+    ::ipc::Candidates found;
+    found.build(mesh, of.start, of.end, 0, with);
+    return found.compute_collision_free_stepsize(mesh, of.start, of.end, 0, narrow);
+  };
+  ::ipc::LBVH lbvh;
+  const double theirs = step(&lbvh, ::ipc::TightInclusionCCD()), with_pairs = step(&lbvh, ccd), in_exact = step(&exact, ccd);
+  const double whole = impinge::ipc::compute_collision_free_stepsize(mesh, of.start, of.end);
+  std::printf("steps: Tight Inclusion %.9g, exact per pair %.9g and %.9g, whole %.9g\n", theirs, with_pairs, in_exact, whole);
+  CHECK(with_pairs == in_exact && whole > 0 && whole < 1);
+  // Rounded down to 24 bits, and for rounded positions.
+  CHECK(whole <= with_pairs && whole > with_pairs - 1e-6 && theirs <= with_pairs * (1 + 1e-9) && theirs > 0.9 * with_pairs);
+  const Eigen::MatrixXd reached = of.start + whole * (of.end - of.start);
+  CHECK(impinge::ipc::is_step_collision_free(mesh, of.start, reached) && !impinge::ipc::is_step_collision_free(mesh, of.start, of.end));
+  CHECK(!impinge::ipc::has_intersections(mesh, reached) && impinge::ipc::has_intersections(mesh, of.end));
+}
+
+} // namespace
+
+int main() {
+  const model of = make_model();
+  ::ipc::CollisionMesh mesh(of.start, of.edges, of.faces);
+  CHECK(mesh.num_codim_edges() == 40 && mesh.num_codim_vertices() == 60);
+  candidates(mesh, of);
+  steps(mesh, of);
+  // A filter: the second ball collides with nothing.
+  mesh.can_collide = [](std::size_t a, std::size_t b) { return (a < VERTICES || a >= 2 * VERTICES) && (b < VERTICES || b >= 2 * VERTICES); };
+  candidates(mesh, of);
+  CHECK(impinge::ipc::compute_collision_free_stepsize(mesh, of.start, of.end) > 0.9);
+  mesh.can_collide = [](std::size_t, std::size_t) -> bool { throw std::runtime_error("from a filter"); };
+  try {
+    impinge::ipc::compute_collision_free_stepsize(mesh, of.start, of.end);
+    CHECK(!"it has thrown");
+  } catch (const std::runtime_error &error) {
+    CHECK(strcmp(error.what(), "from a filter") == 0);
+  }
+  return finish("ipc");
+}
