@@ -67,13 +67,13 @@ impl NearQuery {
         self
     }
 
-    /// Asks for distances as `f64`, too: [`NearPair::distance`], 8 bytes per pair.
+    /// Asks for distances as `f64`, too: [`NearPair::distance`](crate::NearPair::distance), 8 bytes per pair.
     pub fn distances(mut self) -> Self {
         self.distances = true;
         self
     }
 
-    /// Asks for distances and nearest points as `f64`, too: [`NearPair::closest`], 56 bytes per pair.
+    /// Asks for distances and nearest points as `f64`, too: [`NearPair::closest`](crate::NearPair::closest), 56 bytes per pair.
     pub fn closest_points(mut self) -> Self {
         (self.distances, self.closest) = (true, true);
         self

@@ -50,7 +50,7 @@ pub struct ClosestPoints {
 }
 
 impl NearPair {
-    /// The row `[body_a, element_a, body_b, element_b]`, with bodies by their [`index`](BodyId::index).
+    /// The row `[body_a, element_a, body_b, element_b]`, with bodies by their [`index`](crate::BodyId::index).
     pub fn row(&self) -> [u32; 4] {
         row(self.a, self.b)
     }
