@@ -76,7 +76,7 @@ fn the_launch_that_goes_wrong_is_found() {
             "high = nodes[child].high;",
         ),
         (
-            "dispatch",
+            "traversal",
             "if !extents_meet(node_extent(pair.a), node_extent(pair.b)) {",
             "if extents_meet(node_extent(pair.a), node_extent(pair.b)) {",
         ),
@@ -139,7 +139,7 @@ fn recordings_are_printed_one_line_per_launch() {
         let of_method: &[&str] = match method {
             Method::Clusters => &[
                 "bounds_clusters",
-                "dispatch",
+                "traversal",
                 "prepare",
                 "pairing",
                 "narrow",
