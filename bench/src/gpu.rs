@@ -16,7 +16,7 @@ use crate::{Failure, Options, files};
 /// Untimed frames before the timed ones.
 const N_WARM: usize = 4;
 /// Stages of the host; all others run on the device, which times them if it can.
-const ON_HOST: [&str; 4] = ["upload", "clustering", "settle", "collect"];
+const ON_HOST: [&str; 4] = ["upload", "clustering", "decide", "collect"];
 
 /// The adapter that the options choose.
 pub fn device(options: &Options) -> Result<DeviceInfo, Failure> {
