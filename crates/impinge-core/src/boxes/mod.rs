@@ -2,7 +2,7 @@
 //! `kernels/moving.wgsl`.)
 //!
 //! ```text
-//! vertices of a sweep  ->  box of some vertices   of_vertices, of_run, of_cluster; BoxSource::of_cluster: at both ends of a step
+//! vertices of a pose  ->  box of some vertices   of_vertices, of_run, of_cluster; BoxSource::of_cluster: at both ends of a step
 //! corners in tables   ->  boxes of a group       LaneBounds::hold, fill; Sweep: what of a step they must hold
 //! ```
 //!

@@ -1,6 +1,6 @@
-//! Clusters: groups fixed by topology, found once in the current sweep.
+//! Clusters: groups fixed by topology, found once in the current pose.
 //!
-//! In: the primitives' corners and one sweep. Out: an order of the primitives in which cluster `c`
+//! In: the primitives' corners and one pose. Out: an order of the primitives in which cluster `c`
 //! is the run `64 c .. 64 c + 64` (the last one may be shorter), the tree over clusters, the corners in
 //! that order, and each cluster's unique vertices. A frame computes a cluster's box from these, each
 //! read once (64 triangles of a closed mesh have about 45 unique vertices, not 192).
@@ -65,7 +65,7 @@ impl From<Vec<Entry>> for ToOrder {
 pub(crate) type LocalFaces = LocalCorners<3>;
 
 impl Clustering {
-    /// Clusters primitives by the centres of their boxes in the current sweep, which are given in the order of the primitives. Those
+    /// Clusters primitives by the centres of their boxes in the current pose, which are given in the order of the primitives. Those
     /// of one class of sizes follow each other. Their [local faces](Self::local_faces) are found at the same time if they are needed.
     pub fn new(elements: &Elements, to_order: impl Into<ToOrder>, with_local_faces: bool) -> Self {
         Self::make(elements, to_order.into(), with_local_faces)

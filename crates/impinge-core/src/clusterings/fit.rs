@@ -1,4 +1,4 @@
-//! How well clusters fit the sweep at hand, and have fitted at best.
+//! How well clusters fit the pose at hand, and have fitted at best.
 
 #[cfg(feature = "gpu")]
 use crate::boxes;
@@ -29,12 +29,12 @@ impl Fit {
         best_spread: f64::INFINITY,
     };
 
-    /// Takes note of the spread in the sweep at hand.
+    /// Takes note of the spread in the pose at hand.
     pub fn note(&mut self, spread: f64) {
         self.best_spread = self.best_spread.min(spread);
     }
 
-    /// Takes note of the spread in the sweep at hand; whether the body has flowed away from its clusters.
+    /// Takes note of the spread in the pose at hand; whether the body has flowed away from its clusters.
     pub fn is_stale(&mut self, spread: f64, tuning: &Tuning) -> bool {
         let is_stale = spread > tuning.stale_from * self.best_spread;
         self.note(spread);
@@ -62,7 +62,7 @@ pub(crate) fn sampled_spread(clustering: &Clustering, positions: &Positions) -> 
     spread(sum, &whole)
 }
 
-/// The clusters' summed surface over that of the whole: how well they fit the sweep at hand. Both are halves.
+/// The clusters' summed surface over that of the whole: how well they fit the pose at hand. Both are halves.
 pub(crate) fn spread(surface: f64, whole: &Bounds) -> f64 {
     let whole = whole.half_area();
     if whole > 0.0 && whole.is_finite() && surface.is_finite() {

@@ -16,7 +16,7 @@
 //! decides that. Whoever has boxes judges by them, after finding all of a frame; for a device, which computes boxes itself, a
 //! sample of the clusters is judged before.
 //!
-//! No answer depends on the sweep in which a body was clustered. So questions of several scenes may take turns.
+//! No answer depends on the pose in which a body was clustered. So questions of several scenes may take turns.
 
 mod fit;
 mod store;
@@ -116,7 +116,7 @@ impl<'a> BodyPart<'a> {
         }
     }
 
-    /// Clusters the part in the body's current sweep. Nobody else does that.
+    /// Clusters the part in the body's current pose. Nobody else does that.
     fn cluster(&self) -> Clustering {
         let (elements, positions) = (self.body.part(self.part), self.body.positions());
         let centers = boxes::centers(elements, positions);
@@ -185,7 +185,7 @@ impl Clusterings {
     }
 
     /// The clusters of all parts of a frame, for a device, which computes boxes itself. Whether a body has flowed away from its
-    /// clusters is judged by a sample of them, if `judges` says so: the host does not know the sweep of all bodies.
+    /// clusters is judged by a sample of them, if `judges` says so: the host does not know the pose of all bodies.
     ///
     /// # Errors
     /// Threads that do not start; cancellation.
@@ -317,7 +317,7 @@ impl Entries {
     }
 
     /// Clusters a part anew, for all who share it, if it has flowed away from its clusters, and books that. `spread` says how
-    /// well they fit the sweep at hand, `fit` how well they have fitted at best.
+    /// well they fit the pose at hand, `fit` how well they have fitted at best.
     ///
     /// # Errors
     /// Threads that do not start.

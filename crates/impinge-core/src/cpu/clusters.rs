@@ -204,7 +204,7 @@ impl BodyCache {
         Ok(())
     }
 
-    /// Finds the triangles that may meet a neighbour in the body's current sweep.
+    /// Finds the triangles that may meet a neighbour in the body's current pose.
     fn find_creases(&mut self, isa: Isa, body: &Body, workers: &Workers) -> Result<(), Error> {
         if body.kind() != Kind::Triangles {
             return Ok(());
@@ -246,12 +246,12 @@ impl BodyCache {
         is_single && self.clustering.n_vertices_covered == Some(body.n_vertices())
     }
 
-    /// From now on, the boxes belong to no sweep.
+    /// From now on, the boxes belong to no pose.
     pub(super) fn forget_boxes(&mut self) {
         self.positions_stamp = 0;
     }
 
-    /// The clusters' summed surface divided by the body's: how well the clusters fit the current sweep.
+    /// The clusters' summed surface divided by the body's: how well the clusters fit the current pose.
     pub(super) fn spread(&self) -> f64 {
         spread(self.surface, &self.bounds.root())
     }

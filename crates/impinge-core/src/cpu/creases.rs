@@ -32,7 +32,7 @@ use crate::simd::{ClusterFaces, Isa, Simd, with_isa};
 /// Words of 64 vertices, or clusters of 64 triangles, per task.
 const TASK: usize = 32;
 
-/// The creases of one body in one sweep.
+/// The creases of one body in one pose.
 #[derive(Debug, Default)]
 pub(crate) struct Creases {
     /// The stamp of the positions; 0 for none.
@@ -57,7 +57,7 @@ impl Creases {
         self.lanes[cluster.index()].load(Ordering::Relaxed)
     }
 
-    /// Finds the creases of a sweep, unless they are known.
+    /// Finds the creases of a pose, unless they are known.
     pub fn find(
         &mut self,
         isa: Isa,

@@ -99,7 +99,7 @@ impl Refit {
             if needed == Needed::None {
                 continue;
             }
-            // If this frame ends early, for whatever reason, the boxes belong to no sweep.
+            // If this frame ends early, for whatever reason, the boxes belong to no pose.
             cache.forget_boxes();
             if !cache.can_be_read(body) {
                 plan.check_one(scene, ix)?;

@@ -189,7 +189,7 @@ impl Touching {
             max_pairs: None,
             ..settings.limits()
         };
-        // QueryParts are in the order of the bodies.
+        // Parts are in the order of the bodies.
         let by_second = b < a;
         let goal = Goal::Lowest { by_second };
         let plan = Plan::intersections(scene, &Query::between(a, b), goal, limits)?;

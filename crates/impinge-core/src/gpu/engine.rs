@@ -298,7 +298,7 @@ impl Engine {
         }
     }
 
-    /// The clusters of all bodies of a frame. The host does not know the sweep of `resident` bodies, so it does not judge their clusters.
+    /// The clusters of all bodies of a frame. The host does not know the pose of `resident` bodies, so it does not judge their clusters.
     pub(super) fn cluster(
         &mut self,
         job: Job<'_>,

@@ -626,7 +626,7 @@ impl World {
         view.send(gpu, records, ignored)
     }
 
-    /// Where the positions of a body are on the device, if they are those of the sweep with this stamp: the buffer and the
+    /// Where the positions of a body are on the device, if they are those of the pose with this stamp: the buffer and the
     /// first byte.
     pub fn positions_of(&self, body: BodyId, stamp: u64) -> Option<(&wgpu::Buffer, u64)> {
         let held = &self.bodies[self.number(body)?];

@@ -1,6 +1,6 @@
 //! The boxes of a body's clusters, and of the tree nodes above them.
 //!
-//! The clusters are those that all questions share. Their boxes are found once per sweep, from each cluster's vertices; boxes
+//! The clusters are those that all questions share. Their boxes are found once per pose, from each cluster's vertices; boxes
 //! of primitives only when a cluster is compared. Cost: `O(n)`.
 
 use std::sync::Arc;
@@ -72,7 +72,7 @@ impl Tree {
         true
     }
 
-    /// How well the clusters fit the sweep of the boxes.
+    /// How well the clusters fit the pose of the boxes.
     pub fn spread(&self) -> f64 {
         let (Some(clusters), Some(root)) = (self.levels.first(), self.root()) else {
             return 1.0;

@@ -60,7 +60,7 @@ pub enum Backend {
     Gpu,
 }
 
-/// Whether a body is clustered again after it has flowed far from the sweep in which it was clustered.
+/// Whether a body is clustered again after it has flowed far from the pose in which it was clustered.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Recluster {
     /// Yes, when the summed surface of its cluster boxes has grown so much that it pays. A GPU judges by a sample of

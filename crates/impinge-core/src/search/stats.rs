@@ -47,7 +47,7 @@ pub struct Statistics {
     pub n_unsure: u64,
     /// Bodies that were clustered in this frame, for the first time or again.
     pub n_clustered: u64,
-    /// Of those, bodies clustered again because they had flowed away from the sweep in which they were clustered.
+    /// Of those, bodies clustered again because they had flowed away from the pose in which they were clustered.
     pub n_reclustered: u64,
     /// Parts in which the work was done; 1 if the memory budget allowed all of it at once.
     pub n_batches: u64,

@@ -31,7 +31,7 @@ pub(crate) struct Culled {
     /// The groups of each vertex, run by run.
     members: Vec<Members>,
     n_vertices: usize,
-    /// The intervals of the groups in the current sweep.
+    /// The intervals of the groups in the current pose.
     groups: Intervals,
     /// Groups whose clusters are to be sorted again at the frame's end.
     unsorted: Sides,

@@ -64,7 +64,7 @@ pub(super) fn is_allowed(isa: Isa, plan: &Plan, settings: &Settings) -> bool {
         && settings.memory_budget.is_none()
 }
 
-/// The boxes that a body needs in its new sweep. Known boxes become outdated if they are those of near clusters only and the
+/// The boxes that a body needs in its new pose. Known boxes become outdated if they are those of near clusters only and the
 /// frame needs more.
 pub(super) fn plan(cache: &mut BodyCache, body: &Body, is_allowed: bool) -> Needed {
     if !is_allowed {

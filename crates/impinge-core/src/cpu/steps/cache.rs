@@ -77,7 +77,7 @@ impl PartCache {
         size_of::<PartCache>() + self.bounds.bytes() + ends
     }
 
-    /// How well the clusters fit the current sweep: the clusters' summed surface divided by the part's.
+    /// How well the clusters fit the current pose: the clusters' summed surface divided by the part's.
     fn spread(&self) -> f64 {
         let clusters = 0..self.clustering.n_clusters();
         let surface: f64 = clusters.map(|ix| self.ends[0].at(ix).half_area()).sum();
