@@ -870,8 +870,8 @@ fn damaged_kernels_are_noticed() {
         ),
         (
             "narrow_moving",
-            "first_place = reserve(counter, atomicLoad(&n_entries));",
-            "first_place = reserve(counter, atomicLoad(&n_entries) / 2u);",
+            "first_slot = reserve(counter, atomicLoad(&n_entries));",
+            "first_slot = reserve(counter, atomicLoad(&n_entries) / 2u);",
         ),
         (
             "narrow_search",
@@ -895,8 +895,8 @@ fn damaged_kernels_are_noticed() {
         ),
         (
             "narrow_search",
-            "if bracket.is_left && place",
-            "if bracket.is_left && lane != 7u && place",
+            "if bracket.is_left && slot",
+            "if bracket.is_left && lane != 7u && slot",
         ),
         (
             "narrow_search",
@@ -905,8 +905,8 @@ fn damaged_kernels_are_noticed() {
         ),
         (
             "narrow_search",
-            "first_place = reserve(counter, atomicLoad(&n_entries));",
-            "first_place = reserve(counter, atomicLoad(&n_entries) / 2u);",
+            "first_slot = reserve(counter, atomicLoad(&n_entries));",
+            "first_slot = reserve(counter, atomicLoad(&n_entries) / 2u);",
         ),
         // What is certain of contact: the sign of f changes, and all edges are passed on the inner side.
         (
