@@ -84,7 +84,7 @@ class Ours:
         """The self-intersections of each file: a list of arrays (n, 2)."""
         rows = self.folder / "pairs.npy"
         paths = [str(file.path) for file in files]
-        self.output("self", *paths, "--pairs", str(rows), "--no-progress", "--json")
+        self.output("self", *paths, "--rows", str(rows), "--no-progress", "--json")
         rows = np.load(rows)
         starts = np.searchsorted(rows[:, 0], np.arange(len(files) + 1))
         return [rows[start:end][:, [1, 3]].astype(np.int64) for start, end in zip(starts, starts[1:])]

@@ -96,7 +96,7 @@ def run(name, data, n_rounds, n_threads, broad_phases):
     mesh = ipctk.CollisionMesh(doubles[0], edges, faces)
     scene = impinge.Scene()
     body = scene.add(start, faces)
-    detector = impinge.Detector(backend="cpu", threads=n_threads)
+    detector = impinge.Detector("cpu", threads=n_threads)
 
     def hand_over():
         scene.set_positions(body, start)
@@ -122,7 +122,7 @@ def run(name, data, n_rounds, n_threads, broad_phases):
 
     def first():
         hand_over()
-        found = detector.earliest(scene, toi="f64")
+        found = detector.earliest(scene, precision="f64")
         return found.toi if found else 1.0
 
     trial, _ = fastest(1, {phase: (lambda phase=phase: listed(phase)) for phase in broad_phases})
@@ -137,7 +137,7 @@ def run(name, data, n_rounds, n_threads, broad_phases):
     for kind, rows in zip(("vf", "ee"), theirs):
         keys, n_dropped = overlapping(rows, sides[kind], ends)
         n_more += n_dropped
-        mine = np.asarray(found.rows(kind), np.int64)[:, [1, 3]]
+        mine = np.asarray(found.of(kind).rows, np.int64)[:, [1, 3]]
         mine = np.unique(mine[:, 0] << 32 | mine[:, 1])
         if not np.array_equal(keys, mine):
             raise AssertionError(f"{name}: {len(mine)} pairs {kind} here, {len(keys)} there")

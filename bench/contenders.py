@@ -96,7 +96,7 @@ class Impinge(Contender):
         return self.clustering
 
     def pairs(self):
-        return self.result.pairs()
+        return self.result.between(self.a, self.b)
 
 
 class Libigl(Contender):

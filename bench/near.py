@@ -51,7 +51,7 @@ class Ours:
         self.label = "impinge" + "".join(f", {k}={v}" for k, v in settings.items())
         self.scene = impinge.Scene()
         self.ids = [self.scene.add(vertices, faces) for vertices, faces in bodies]
-        self.detector = impinge.Detector(backend="cpu", **settings)
+        self.detector = impinge.Detector("cpu", **settings)
 
     def arrays(self, positions):
         return positions
@@ -269,18 +269,18 @@ def near(name, vertices, faces, part, rounds, missing):
     for threads in [0, 1]:
         scene = impinge.Scene()
         body = scene.add(vertices, faces)
-        detector = impinge.Detector(backend="cpu", threads=threads) if threads else impinge.Detector(backend="cpu")
+        detector = impinge.Detector("cpu", threads=threads) if threads else impinge.Detector("cpu")
         times = []
         for round_ in range(rounds + 1):
             scene.set_positions(body, mirrored([(vertices, faces)], round_ % 2)[0])
-            found, wall, cpu = clock(lambda: detector.within_distance(scene, distance, within=body))
+            found, wall, cpu = clock(lambda: detector.near(scene, distance, self_of=body))
             times.append((wall, cpu))
         label = "impinge" + (", threads=1" if threads else "")
         row["pairs"] = len(found)
-        _, arrays, _ = clock(lambda: (found.kinds, found.elements, found.types))
+        _, arrays, _ = clock(lambda: (found.kinds, found.rows, found.types))
         # The set is that of the original, which is mirrored in every second round.
         scene.set_positions(body, np.ascontiguousarray(vertices))
-        plain = detector.within_distance(scene, distance, within=body)
+        plain = detector.near(scene, distance, self_of=body)
         assert len(plain) == len(found), (len(plain), len(found))
         stats = found.stats
         row["rows"][label] = medians(times) | {
@@ -332,7 +332,7 @@ def compared(found, collisions, vertices, faces, edges, distance):
     corners_of = faces.tolist()
     ours, of_rows = {}, {}
     for kind, (a, b), type_ in zip(
-        found.kinds.tolist(), found.elements.tolist(), found.types.tolist(), strict=True
+        found.kinds.tolist(), found.rows[:, 1::2].tolist(), found.types.tolist(), strict=True
     ):
         kind, type_ = impinge.KINDS[kind], impinge.TYPES[type_]
         if kind == "vf":

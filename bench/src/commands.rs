@@ -72,7 +72,7 @@ impl Peers {
 }
 
 /// The library's contestants; the others are compared with the first one. `variants` adds positions
-/// copied on the clock, and a single thread. Other placements of helper threads follow the first contestant.
+/// copied on the clock, and a single thread. Other affinities of helper threads follow the first contestant.
 fn ours(
     problem: &Problem,
     options: &Options,
@@ -81,9 +81,9 @@ fn ours(
     let clusters = options.settings(Method::Clusters);
     let in_place = Ours::new(problem, clusters.clone(), Feed::InPlace)?;
     let mut runners: Vec<Box<dyn Runner>> = vec![Box::new(in_place)];
-    for &placement in &options.placements[1..] {
+    for &affinity in &options.affinities[1..] {
         let other = Settings {
-            placement,
+            affinity,
             ..clusters.clone()
         };
         runners.push(Box::new(Ours::new(problem, other, Feed::InPlace)?));

@@ -36,11 +36,11 @@ struct Ours {
 impl Ours {
     fn new(scans: [&Scan; 2], options: &Options) -> Result<Self, Failure> {
         let mut scene = Scene::new();
-        let add = |(positions, faces): &Scan| scene.add(faces.clone(), positions.clone());
+        let add = |(positions, faces): &Scan| scene.add((faces.clone(), positions.clone()));
         Ok(Ours {
             bodies: scans.into_iter().map(add).collect::<Result<_, _>>()?,
             scene,
-            detector: Detector::with_settings(Settings {
+            detector: Detector::new(Settings {
                 threads: options.threads,
                 ..Settings::default()
             })?,

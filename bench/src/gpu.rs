@@ -6,7 +6,7 @@
 use std::time::Instant;
 
 use impinge::wgpu::{self, util::DeviceExt};
-use impinge::{Backend, Detector, DeviceInfo, Method, Settings, Statistics, devices};
+use impinge::{Backend, Detector, DeviceInfo, Method, Settings, Stats, devices};
 use serde_json::json;
 
 use crate::problem::{Ask, Problem};
@@ -83,7 +83,7 @@ fn row(
 ) -> Result<(), Failure> {
     let (mut scene, ids, query) = problem.scene()?;
     let detector = |backend: Backend| {
-        Detector::with_settings(Settings {
+        Detector::new(Settings {
             method,
             backend,
             device: options.device.clone(),
@@ -93,7 +93,7 @@ fn row(
     let mut gpu = detector(Backend::Gpu)?;
     let mut cpu = detector(Backend::Cpu)?;
     let n_frames = options.frames.unwrap_or(40).max(1);
-    let mut frames: Vec<Statistics> = Vec::with_capacity(n_frames);
+    let mut frames: Vec<Stats> = Vec::with_capacity(n_frames);
     for frame in 0..N_WARM + n_frames {
         for (&id, body) in ids.iter().zip(&problem.bodies) {
             scene
@@ -195,7 +195,7 @@ impl Rates {
     }
 
     /// The time of the bytes that must move, at full bandwidth, plus the launches of one pass, as counted in docs/lab/gpu.md.
-    fn floor_ms(&self, problem: &Problem, stats: &Statistics) -> f64 {
+    fn floor_ms(&self, problem: &Problem, stats: &Stats) -> f64 {
         const CLUSTER: u64 = 45 * (4 + 12);
         const BOX: u64 = 2 * 24;
         const ITEM: u64 = 128 * (16 + 3 * 12);

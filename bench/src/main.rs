@@ -36,7 +36,7 @@ mod tune;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use impinge::{Backend, Method, Placement, Settings};
+use impinge::{Affinity, Backend, Method, Settings};
 
 /// Anything that ends a run.
 pub type Failure = Box<dyn std::error::Error + Send + Sync>;
@@ -73,7 +73,7 @@ options:
   --size N           adversarial, regular: primitives (default 1,000,000 and 80,000); sizes, step-sizes, bodies:
                      the largest size
   --threads N        threads of impinge (default: all)
-  --placement NAME   where its helper threads run: auto (default), inherited; in a contest also both, which take turns
+  --affinity NAME   where its helper threads run: auto (default), inherited; in a contest also both, which take turns
   --backend NAME     cpu (default), gpu or auto
   --device NAME      part of a GPU's name, to choose among several
   --no-cells         without impinge's other method, Cells
@@ -93,7 +93,7 @@ pub struct Options {
     size: Option<usize>,
     threads: usize,
     /// At least one. The further ones are compared with the first.
-    placements: Vec<Placement>,
+    affinities: Vec<Affinity>,
     backend: Backend,
     device: Option<String>,
     cells: bool,
@@ -110,7 +110,7 @@ impl Options {
             backend: self.backend,
             device: self.device.clone(),
             threads: self.threads,
-            placement: self.placements[0],
+            affinity: self.affinities[0],
             ..Settings::default()
         }
     }
@@ -124,7 +124,7 @@ fn parse() -> Result<Option<(String, Options)>, lexopt::Error> {
         turn: 10,
         size: None,
         threads: 0,
-        placements: vec![Placement::Auto],
+        affinities: vec![Affinity::Auto],
         backend: Backend::Cpu,
         device: None,
         cells: true,
@@ -142,11 +142,11 @@ fn parse() -> Result<Option<(String, Options)>, lexopt::Error> {
             Long("turn") => options.turn = parser.value()?.parse()?,
             Long("size") => options.size = Some(parser.value()?.parse()?),
             Long("threads") => options.threads = parser.value()?.parse()?,
-            Long("placement") => {
-                options.placements = parser.value()?.parse_with(|name| match name {
-                    "auto" => Ok(vec![Placement::Auto]),
-                    "inherited" => Ok(vec![Placement::Inherited]),
-                    "both" => Ok(vec![Placement::Auto, Placement::Inherited]),
+            Long("affinity") => {
+                options.affinities = parser.value()?.parse_with(|name| match name {
+                    "auto" => Ok(vec![Affinity::Auto]),
+                    "inherited" => Ok(vec![Affinity::Inherited]),
+                    "both" => Ok(vec![Affinity::Auto, Affinity::Inherited]),
                     _ => Err("auto, inherited or both"),
                 })?;
             }

@@ -13,7 +13,7 @@ mod parry;
 
 use std::time::Instant;
 
-use impinge::{BodyId, Detector, NearPairs, NearQuery, PairKind, Query, Scene, Settings};
+use impinge::{BodyId, Detector, NearPairs, PairKind, Query, Scene, Settings};
 use serde_json::json;
 
 use crate::report::{Report, figures, grouped};
@@ -151,7 +151,7 @@ fn measure(known: &Known, options: &Options, report: &mut Report) -> Result<(), 
     let (faces, poses) = load(known)?;
     let distance = known.part * diagonal(&poses[0]);
     let mut scene = Scene::new();
-    let body = scene.add(faces.clone(), poses[0].clone())?;
+    let body = scene.add((faces.clone(), poses[0].clone()))?;
     report.say(&format!(
         "### {}, {} faces, distance {distance:.6}: {} pairs\n",
         known.name,
@@ -165,11 +165,10 @@ fn measure(known: &Known, options: &Options, report: &mut Report) -> Result<(), 
         0 => vec![1, 0],
         n => vec![n],
     };
-    let question = NearQuery::new(Query::everything()).distance(distance);
     for n_threads in threads {
-        let mut detector = Detector::with_settings(Settings {
+        let mut detector = Detector::new(Settings {
             threads: n_threads,
-            placement: options.placements[0],
+            affinity: options.affinities[0],
             backend: options.backend,
             ..Settings::default()
         })?;
@@ -178,16 +177,17 @@ fn measure(known: &Known, options: &Options, report: &mut Report) -> Result<(), 
             &[PairKind::VertexFace],
             &[PairKind::EdgeEdge],
         ] {
-            let question = question.clone().kinds(kinds.iter().copied());
-            let (mut times, mut best) = (Vec::new(), None);
+            let query = Query::all().kinds(kinds.iter().copied());
+            let (mut times, mut best, mut n) = (Vec::new(), None, 0);
             for frame in 0..N_WARM + n_frames {
                 scene.set_positions(body, &poses[frame % 2])?;
                 let start = Instant::now();
-                let near = detector.within_distance(&scene, &question)?;
+                let near = detector.near(&scene, distance, &query)?;
                 let ms = start.elapsed().as_secs_f64() * 1e3;
                 if kinds.len() == 2 && (near.len(), near.hash()) != (known.n_pairs, known.hash) {
                     return Err(format!("{}: {} pairs are wrong", known.name, near.len()).into());
                 }
+                n = near.len();
                 if frame >= N_WARM {
                     if times.iter().all(|&other| ms < other) {
                         best = Some(near.stats().clone());
@@ -200,7 +200,6 @@ fn measure(known: &Known, options: &Options, report: &mut Report) -> Result<(), 
             let stages: Vec<_> = stages
                 .map(|stage| format!("{} {}", stage.name, figures(stage.ms)))
                 .collect();
-            let n = detector.take_near().len();
             row(
                 report,
                 known,
@@ -213,15 +212,7 @@ fn measure(known: &Known, options: &Options, report: &mut Report) -> Result<(), 
         }
     }
     if options.peers {
-        against_peers(
-            known,
-            (&mut scene, body),
-            &faces,
-            &poses,
-            &question,
-            options,
-            report,
-        )?;
+        against_peers(known, (&mut scene, body), &faces, &poses, options, report)?;
     }
     report.say("");
     Ok(())
@@ -233,14 +224,13 @@ fn against_peers(
     (scene, body): (&mut Scene, BodyId),
     faces: &[[u32; 3]],
     poses: &[Vec<[f32; 3]>; 2],
-    question: &NearQuery,
     options: &Options,
     report: &mut Report,
 ) -> Result<(), Failure> {
     let distance = known.part * diagonal(&poses[0]);
     scene.set_positions(body, &poses[0])?;
-    let mut detector = Detector::with_settings(Settings::default())?;
-    let near = detector.within_distance(scene, question)?;
+    let mut detector = Detector::new(Settings::default())?;
+    let near = detector.near(scene, distance, &Query::all())?;
     let part = scene.body(body)?.part(impinge::Part::Edges);
     let edges: Vec<[u32; 2]> = (0..part.len())
         .map(|ix| part.corners(ix).try_into())
@@ -267,7 +257,7 @@ fn against_peers(
         // The first frame warms up.
         times.remove(0);
         let n = rows.len();
-        let said = differences(near, kind, rows);
+        let said = differences(&near, kind, rows);
         row(
             report,
             known,
@@ -286,7 +276,7 @@ fn differences(near: &NearPairs, kind: PairKind, mut rows: Vec<Row>) -> String {
     rows.sort_unstable();
     let mut own: Vec<Row> = near
         .of(kind)
-        .map(|pair| [pair.a.primitive, pair.b.primitive])
+        .map(|pair| [pair.a.element, pair.b.element])
         .collect();
     own.sort_unstable();
     let only = |a: &[Row], b: &[Row]| a.iter().filter(|row| b.binary_search(row).is_err()).count();

@@ -64,7 +64,7 @@ fn measure(problem: &Problem, options: &Options, report: &mut Report) -> Result<
     let mut answered_by = "";
     for _ in 0..n_frames {
         for (method, ms) in METHODS.into_iter().zip(&mut ms) {
-            let mut detector = Detector::with_settings(options.settings(method))?;
+            let mut detector = Detector::new(options.settings(method))?;
             let start = Instant::now();
             let pairs = detector.detect(&scene, &query)?;
             ms.push(start.elapsed().as_secs_f64() * 1e3);

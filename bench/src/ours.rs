@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use impinge::{BodyId, Detector, Method, Placement, Query, Scene, Settings, Statistics};
+use impinge::{Affinity, BodyId, Detector, Method, Query, Scene, Settings, Stats};
 use serde_json::json;
 
 use crate::Failure;
@@ -31,7 +31,7 @@ pub struct Ours {
     next: Vec<Arc<[[f32; 3]]>>,
     /// The positions that it copies, pose by pose.
     poses: Vec<Vec<Arc<[[f32; 3]]>>>,
-    stats: Statistics,
+    stats: Stats,
 }
 
 impl Ours {
@@ -49,11 +49,11 @@ impl Ours {
             scene,
             ids,
             query,
-            detector: Detector::with_settings(settings)?,
+            detector: Detector::new(settings)?,
             feed,
             next: Vec::new(),
             poses: (0..problem.n_poses()).map(pose).collect(),
-            stats: Statistics::default(),
+            stats: Stats::default(),
         })
     }
 }
@@ -68,7 +68,7 @@ impl Runner for Ours {
                 name.push('s');
             }
         }
-        if settings.placement == Placement::Inherited {
+        if settings.affinity == Affinity::Inherited {
             name += ", helpers anywhere";
         }
         if self.feed == Feed::Copied {
@@ -82,7 +82,7 @@ impl Runner for Ours {
         match settings.method {
             Method::Cells => format!(
                 "lambda {}, groups of {}",
-                settings.lambda, settings.group_size
+                settings.density, settings.group_size
             ),
             _ => "default".to_owned(),
         }
@@ -105,7 +105,7 @@ impl Runner for Ours {
     fn frame(&mut self, verify: bool) -> Result<Answer, Failure> {
         let start = Instant::now();
         for (&id, positions) in self.ids.iter().zip(&self.next) {
-            self.scene.set_positions(id, positions)?;
+            self.scene.set_positions(id, &positions[..])?;
         }
         let pairs = self.detector.detect(&self.scene, &self.query)?;
         let ms = start.elapsed().as_secs_f64() * 1e3;

@@ -132,7 +132,7 @@ impl Problem {
             return Ok(self);
         }
         let (scene, _, query) = self.scene()?;
-        let mut oracle = Detector::with_settings(Settings {
+        let mut oracle = Detector::new(Settings {
             method: Method::Naive,
             backend: Backend::Cpu,
             ..Settings::default()
@@ -158,13 +158,13 @@ impl Problem {
         let ids = self
             .bodies
             .iter()
-            .map(|body| scene.add(Elements::clone(&body.elements), body.poses[0].clone()))
+            .map(|body| scene.add((Elements::clone(&body.elements), body.poses[0].clone())))
             .collect::<Result<Vec<_>, _>>()?;
         let query = match (self.ask, &ids[..]) {
             (Ask::Between, [a, b]) => Query::between(*a, *b),
-            (Ask::Within, [a]) => Query::within(*a).shared_vertex(SharedVertex::Skip),
-            (Ask::Resolved, [a]) => Query::within(*a).shared_vertex(SharedVertex::Resolve),
-            (Ask::All, _) => Query::all(),
+            (Ask::Within, [a]) => Query::self_of(*a).shared_vertex(SharedVertex::Skip),
+            (Ask::Resolved, [a]) => Query::self_of(*a).shared_vertex(SharedVertex::Resolve),
+            (Ask::All, _) => Query::between_all(),
             (ask, _) => return Err(format!("{ask:?} does not fit {} bodies", ids.len()).into()),
         };
         Ok((scene, ids, query))

@@ -6,7 +6,7 @@
 
 use std::time::Instant;
 
-use impinge::{BodyId, CandidateQuery, Detector, Query, Scene, Settings, Step};
+use impinge::{BodyId, Detector, Query, Scene, Settings};
 use impinge_scenes::deform::{Deform, Wave};
 use impinge_scenes::surfaces;
 use serde_json::json;
@@ -125,20 +125,20 @@ fn measure(mut layers: Layers, options: &Options, report: &mut Report) -> Result
     let default = (3_000_000 / layers.n_faces).clamp(5, 100);
     let n_frames = options.frames.unwrap_or(default).max(1);
     let detector = || {
-        Detector::with_settings(Settings {
+        Detector::new(Settings {
             threads: options.threads,
-            placement: options.placements[0],
+            affinity: options.affinities[0],
             backend: options.backend,
             ..Settings::default()
         })
     };
-    let step = Step::default();
+    let query = Query::all();
     let n_faces = layers.n_faces as f64;
     let n_elements = layers.n_elements as f64;
 
     let mut all = detector()?;
     let (impacts_ms, (impacts, first, bytes)) = best(&mut layers, n_frames, |scene| {
-        let impacts = all.impacts(scene, &step)?;
+        let impacts = all.impacts(scene, &query)?;
         Ok((
             impacts.len(),
             impacts.earliest(),
@@ -163,10 +163,10 @@ fn measure(mut layers: Layers, options: &Options, report: &mut Report) -> Result
         let mut detector = detector()?;
         let (ms, is_right) = best(&mut layers, n_frames, |scene| {
             Ok(match question {
-                "earliest" => detector.earliest(scene, &step)? == first,
-                "is_free" => detector.is_free(scene, &step)? == first.is_none(),
+                "earliest" => detector.earliest(scene, &query)? == first,
+                "is_free" => detector.is_free(scene, &query)? == first.is_none(),
                 _ => {
-                    let fraction = detector.advance(scene, &step)?.fraction;
+                    let fraction = detector.advance(scene, &query)?.fraction;
                     // The time is an f32 rounded down; the fraction is an f64.
                     let most = first.map_or(1.0, |first| (first.toi as f32).next_up().into());
                     fraction <= most
@@ -180,9 +180,8 @@ fn measure(mut layers: Layers, options: &Options, report: &mut Report) -> Result
     }
 
     let mut boxes = detector()?;
-    let query = CandidateQuery::new(Query::everything());
     let (ms, (n_candidates, candidate_bytes)) = best(&mut layers, n_frames, |scene| {
-        let candidates = boxes.candidates(scene, &query)?;
+        let candidates = boxes.candidates(scene, 0.0, &query)?;
         Ok((candidates.len(), candidates.stats().bytes_held))
     })?;
     if n_candidates < impacts {

@@ -6,9 +6,7 @@
 
 use std::time::Instant;
 
-use impinge::{
-    BodyId, CandidateQuery, Detector, Positions, Query, Scene, Settings, Statistics, Step,
-};
+use impinge::{BodyId, Detector, Positions, Query, Scene, Settings, Stats};
 use serde_json::json;
 
 use crate::report::{Report, figures, grouped};
@@ -72,11 +70,11 @@ impl Moving {
         let mut scene = Scene::new();
         let (body, ends) = match (start, end) {
             (impinge_io::Positions::F32(start), impinge_io::Positions::F32(end)) => {
-                let body = scene.add(faces, start.clone())?;
+                let body = scene.add((faces, start.clone()))?;
                 (body, [start.into(), end.into()])
             }
             (impinge_io::Positions::F64(start), impinge_io::Positions::F64(end)) => {
-                let body = scene.add(faces, start.clone())?;
+                let body = scene.add((faces, start.clone()))?;
                 (body, [start.into(), end.into()])
             }
             _ => return Err(format!("{}: two precisions", known.name).into()),
@@ -107,7 +105,7 @@ struct Frame {
     ms: f64,
     /// Time on the processor, where the system says and one thread worked: other programs do not disturb it.
     cpu_ms: Option<f64>,
-    stats: Statistics,
+    stats: Stats,
     said: String,
 }
 
@@ -130,9 +128,9 @@ fn measure(known: &Known, options: &Options, report: &mut Report) -> Result<(), 
     };
     for question in QUESTIONS {
         for &n_threads in &threads {
-            let mut detector = Detector::with_settings(Settings {
+            let mut detector = Detector::new(Settings {
                 threads: n_threads,
-                placement: options.placements[0],
+                affinity: options.affinities[0],
                 backend: options.backend,
                 ..Settings::default()
             })?;
@@ -191,11 +189,11 @@ fn ask(
     detector: &mut Detector,
     scene: &Scene,
 ) -> Result<Frame, Failure> {
-    let step = Step::default();
+    let query = Query::all();
     let (start, cpu_start) = (Instant::now(), on_processor_ms());
-    let (said, is_right, stats) = match question {
+    let (said, is_right) = match question {
         "impacts" => {
-            let impacts = detector.impacts(scene, &step)?;
+            let impacts = detector.impacts(scene, &query)?;
             let (ms, cpu) = (start.elapsed(), cpu_start);
             let cpu_ms = on_processor_ms().zip(cpu).map(|(end, start)| end - start);
             // The hash is not on the clock.
@@ -211,30 +209,28 @@ fn ask(
             });
         }
         "earliest" => {
-            let toi = detector.earliest(scene, &step)?.map(|impact| impact.toi);
+            let toi = detector.earliest(scene, &query)?.map(|impact| impact.toi);
             let said = toi.map_or("none".to_owned(), |toi| format!("{toi:e}"));
-            (said, toi == Some(known.earliest), None)
+            (said, toi == Some(known.earliest))
         }
         "is_free" => {
-            let is_free = detector.is_free(scene, &step)?;
-            (is_free.to_string(), !is_free, None)
+            let is_free = detector.is_free(scene, &query)?;
+            (is_free.to_string(), !is_free)
         }
         "advance" => {
-            let advance = detector.advance(scene, &step)?;
+            let advance = detector.advance(scene, &query)?;
             let said = format!(
                 "{:e} of the step, {} tried",
                 advance.fraction, advance.n_tried
             );
             let first = advance.first.map_or(1.0, |first| first.toi);
             let is_right = advance.fraction > 0.9 * first && advance.fraction <= first;
-            (said, is_right, None)
+            (said, is_right)
         }
         _ => {
-            let candidates =
-                detector.candidates(scene, &CandidateQuery::new(Query::everything()))?;
+            let candidates = detector.candidates(scene, 0.0, &query)?;
             let n = candidates.len();
-            let stats = Some(candidates.stats().clone());
-            (grouped(n as u64), n == known.n_candidates, stats)
+            (grouped(n as u64), n == known.n_candidates)
         }
     };
     let ms = start.elapsed().as_secs_f64() * 1e3;
@@ -247,7 +243,7 @@ fn ask(
     Ok(Frame {
         ms,
         cpu_ms,
-        stats: stats.unwrap_or_else(|| detector.step_stats().clone()),
+        stats: detector.stats().clone(),
         said,
     })
 }

@@ -62,9 +62,9 @@ def main():
         nearer = np.float32([2.5 - 2 * time, 0, 0.1])
         scene.set_positions(a, twisted(vertices, 3 * time) + nearer)
         scene.set_positions(b, torus(n_along, n_around, thickness=0.35 + 0.8 * time)[0])
-        result = detector.detect(scene, between=True, within=True)
+        result = detector.detect(scene)
         between.append(len(result.between(a, b)))
-        within.append(len(result.within(a)) + len(result.within(b)))
+        within.append(len(result.self_of(a)) + len(result.self_of(b)))
 
     figure, axes = plt.subplots(figsize=(8, 4), layout="constrained")
     axes.plot(times, between, label="between the bodies")

@@ -5,8 +5,7 @@
 //! also end positions.
 
 use impinge::{
-    Backend, BodyId, CandidateQuery, Detector, Elements, Error, Method, Query, Scene, Settings,
-    SharedVertex, Start, Step,
+    Backend, BodyId, Detector, Elements, Error, Method, Query, Scene, Settings, SharedVertex, Start,
 };
 
 const MOST_BODIES: usize = 4;
@@ -58,9 +57,7 @@ impl Bytes<'_> {
 fn accepted<T>(result: Result<T, Error>) -> Option<T> {
     match result {
         Ok(value) => Some(value),
-        Err(
-            Error::NonFinitePosition { .. } | Error::VertexIndexOutOfRange { .. },
-        ) => None,
+        Err(Error::NonFinitePosition { .. } | Error::VertexIndexOutOfRange { .. }) => None,
         Err(error) => panic!("{error}"),
     }
 }
@@ -87,8 +84,8 @@ fn add_body(scene: &mut Scene, bytes: &mut Bytes<'_>, mode: u8, moves: bool) -> 
     };
     let is_double = what & 0x20 != 0;
     let added = match is_double {
-        true => scene.add(elements, positions),
-        false => scene.add(elements, narrow(&positions)),
+        true => scene.add((elements, positions)),
+        false => scene.add((elements, narrow(&positions))),
     };
     let end = match moves {
         true => Some(bytes.positions(n_vertices, mode)?),
@@ -119,7 +116,7 @@ fn build(data: &[u8], moves: bool) -> Option<(Scene, u8)> {
 }
 
 fn detector(method: Method) -> Detector {
-    Detector::with_settings(Settings {
+    Detector::new(Settings {
         method,
         backend: Backend::Cpu,
         threads: 1,
@@ -137,17 +134,15 @@ pub fn pairs(data: &[u8]) -> usize {
         0 => SharedVertex::Skip,
         _ => SharedVertex::Resolve,
     };
-    let query = Query::everything().shared_vertex(rule);
+    let query = Query::all().shared_vertex(rule);
     let answer = |method| {
-        let mut detector = detector(method);
-        detector
-            .detect(&scene, &query)
-            .expect("a checked scene is answered")
-            .clone()
+        let pairs = detector(method).detect(&scene, &query);
+        let pairs = pairs.expect("a checked scene is answered");
+        pairs.rows().collect::<Vec<_>>()
     };
     let expected = answer(Method::Naive);
     for method in [Method::Auto, Method::Clusters, Method::Cells] {
-        assert!(expected.same_as(&answer(method)), "{method:?}");
+        assert_eq!(expected, answer(method), "{method:?}");
     }
     expected.len()
 }
@@ -163,22 +158,21 @@ pub fn steps(data: &[u8]) -> usize {
         0 => Start::Report,
         _ => Start::Skip,
     };
-    let step = Step::default().start(start);
+    let query = Query::all().start(start);
     let (mut fast, mut naive) = (detector(Method::Clusters), detector(Method::Naive));
-    let expected = naive.impacts(&scene, &step).expect(CHECKED).clone();
-    let found = fast.impacts(&scene, &step).expect(CHECKED);
-    assert_eq!(found.as_slice(), expected.as_slice());
+    let expected = naive.impacts(&scene, &query).expect(CHECKED);
+    let found = fast.impacts(&scene, &query).expect(CHECKED);
+    assert!(found.iter().eq(&expected));
     assert_eq!(
-        fast.earliest(&scene, &step).expect(CHECKED),
+        fast.earliest(&scene, &query).expect(CHECKED),
         expected.earliest()
     );
     assert_eq!(
-        fast.is_free(&scene, &step).expect(CHECKED),
+        fast.is_free(&scene, &query).expect(CHECKED),
         expected.is_empty()
     );
-    let query = CandidateQuery::new(Query::everything());
     let [by_fast, by_naive] = [&mut fast, &mut naive].map(|detector| {
-        let candidates = detector.candidates(&scene, &query).expect(CHECKED);
+        let candidates = detector.candidates(&scene, 0.0, &query).expect(CHECKED);
         candidates.iter().collect::<Vec<_>>()
     });
     assert_eq!(by_fast, by_naive);

@@ -17,7 +17,7 @@ import { AVERAGE, CENTER, MeshBVH, SAH } from "three-mesh-bvh";
 import { ball } from "../page/shapes.js";
 
 const [folder, option, record] = process.argv.slice(2);
-const { default: init, Detector } = await import(resolve(folder, "index.js"));
+const { default: init, Detector, Scene } = await import(resolve(folder, "index.js"));
 await init();
 
 const TURN = 10;
@@ -60,16 +60,16 @@ function pose(contestant, bodies, ix) {
 
 function impinge(bodies) {
   const geometries = bodies.map(({ geometry }) => geometry());
-  const detector = new Detector();
+  const [scene, detector] = [new Scene(), new Detector()];
   const start = performance.now();
-  const ids = geometries.map(({ index, attributes }) => detector.add(index.array, attributes.position.array));
+  const ids = geometries.map(({ index, attributes }) => scene.addTriangles(index.array, attributes.position.array));
   return {
     name: "impinge",
     geometries,
     built: performance.now() - start,
     frame() {
-      for (const id of ids) detector.setPositions(id, geometries[id].attributes.position.array);
-      return detector.between(ids[0], ids[1]);
+      for (const id of ids) scene.setPositions(id, geometries[id].attributes.position.array);
+      return detector.detect(scene, { between: ids }).between(...ids);
     },
   };
 }

@@ -1,6 +1,6 @@
 // Two deforming BufferGeometries collide: colliding triangles turn red. The part about collisions is marked.
 import * as THREE from "three";
-import init, { Detector } from "impinge";
+import init, { Detector, Scene } from "impinge";
 
 const renderer = new THREE.WebGLRenderer({ antialias: true });
 renderer.setSize(innerWidth, innerHeight);
@@ -12,21 +12,21 @@ scene.add(new THREE.HemisphereLight("white", "gray", 3));
 const geometries = [new THREE.TorusKnotGeometry(0.8, 0.25, 200, 24), new THREE.SphereGeometry(0.8, 64, 48)];
 const rest = geometries.map((geometry) => geometry.attributes.position.array.slice());
 
-// ---- collisions: two detectors of one body each would do as well; all bodies of one detector meet
+// ---- collisions
 await init();
-const detector = new Detector();
-const bodies = geometries.map(({ index, attributes }) => detector.add(index.array, attributes.position.array));
+const [colliding, detector] = [new Scene(), new Detector()];
+const bodies = geometries.map(({ index, attributes }) => colliding.addTriangles(index.array, attributes.position.array));
 
 function collide() {
-  for (const body of bodies) detector.setPositions(body, geometries[body].attributes.position.array);
-  const pairs = detector.between(bodies[0], bodies[1]); // [triangle of 0, triangle of 1, …], sorted, exact
+  for (const body of bodies) colliding.setPositions(body, geometries[body].attributes.position.array);
+  const pairs = detector.detect(colliding, { between: bodies }); // sorted, exact
   for (const body of bodies) {
-    const { index, groups } = geometries[body];
-    const hit = pairs.filter((_, ix) => ix % 2 === body);
-    const corners = [...new Set(hit)].flatMap((triangle) => [...index.array.subarray(3 * triangle, 3 * triangle + 3)]);
+    const { index } = geometries[body];
+    const hit = [...pairs.colliding(body)];
+    const corners = hit.flatMap((triangle) => [...index.array.subarray(3 * triangle, 3 * triangle + 3)]);
     overlays[body].geometry.setIndex(corners);
   }
-  return pairs.length / 2;
+  return pairs.length;
 }
 // ----
 

@@ -1,96 +1,291 @@
 /// <reference lib="esnext.disposable" />
 
-/** Vertex numbers, three per triangle or four per tetrahedron. */
+/** Vertex numbers: two per edge, three per triangle, four per tetrahedron. */
 export type Index = Uint32Array | Uint16Array | Uint8Array;
 
-/** x, y, z per vertex, read as the real numbers that they are. */
+/** x, y, z per vertex, in the unit of the scene, read as the real numbers that they are. */
 export type Positions = Float32Array | Float64Array;
 
-/** The number of a body: 0 for the first one added, and so on. Numbers are not used again. */
+/** x, y, z. */
+export type Vec3 = readonly [number, number, number];
+
+/** The number of a body of a scene: 0 for the first one added, and so on. Numbers are not used again. */
 export type Body = number;
 
-export interface Options {
-  /** How candidates are found. All methods give the same pairs. `"auto"` by default: `"cells"` for large bodies that are new, else `"clusters"`. */
-  method?: "auto" | "clusters" | "cells" | "naive";
-  /**
-   * Self-collision of pairs that share a vertex: reported if they meet in more than the parts that they share
-   * (`"resolve"`, the default), or not at all (`"skip"`).
-   */
-  sharedVertex?: "skip" | "resolve";
+/**
+ * Which elements a pair has: vertex and face (`"vf"`), two edges (`"ee"`), edge and vertex (`"ev"`), two vertices (`"vv"`), edge and
+ * face (`"ef"`), two faces (`"ff"`). The first letter is that of `elementA`.
+ */
+export type PairKind = "vf" | "ee" | "ev" | "vv" | "ef" | "ff";
+
+/** The kinds that `kinds` of an answer refer to by number. */
+export declare const KINDS: readonly PairKind[];
+
+/** The shapes that `shapes` of contacts refer to by number. */
+export declare const SHAPES: readonly ["solid", "apart", "point", "segment", "polygon"];
+
+/** Why a call failed. After every error but `"internal"`, scenes and detectors stay usable. */
+export declare class ImpingeError extends Error {
+  readonly code: "invalid" | "out_of_memory" | "budget" | "too_many_pairs" | "cancelled" | "device" | "internal";
 }
 
-/** Counts and times of the last answer. The answer never depends on them. */
-export interface Statistics {
+/** Vertices, and what they are the corners of: faces, tetrahedra, edges, or without any of these each vertex is a point. */
+export interface Mesh {
+  faces?: Index;
+  tetrahedra?: Index;
+  edges?: Index;
+  positions: Positions;
+}
+
+/** A mesh of which vertices at the same position have become one. */
+export interface Welded<P extends Positions = Positions> {
+  mesh: { positions: P; faces?: Uint32Array; tetrahedra?: Uint32Array; edges?: Uint32Array };
+  /** For each vertex before the welding, its number after it. */
+  map: Uint32Array;
+  /** The positions of the welded vertices, taken from those of all vertices, of any frame. */
+  positions<Q extends Positions>(positions: Q): Q;
+}
+
+/**
+ * Welds vertices whose coordinates are equal, without a tolerance. A `BufferGeometry` repeats vertices along seams, and the faces
+ * on both sides of a seam touch but are neighbours only once it is welded. Elements keep their number and order.
+ *
+ * ```js
+ * const { mesh, positions } = weld({ faces: geometry.index.array, positions: geometry.attributes.position.array });
+ * const body = scene.add(mesh);
+ * scene.setPositions(body, positions(nextFrame));
+ * ```
+ */
+export function weld<P extends Positions>(mesh: Mesh & { positions: P }): Welded<P>;
+
+/** Everything that a WebAssembly module can be loaded from. */
+export type Module = WebAssembly.Module | BufferSource | Response | URL | string;
+
+/**
+ * Loads the WebAssembly module. Later calls wait for the first. Without an argument the module is loaded from the
+ * folder of this file, in Node too.
+ */
+export default function init(module?: Module | Promise<Module>): Promise<void>;
+
+/** What watches a question while it is answered. */
+export interface Control {
+  /** Looked at before the question and at least every 100 ms: once it is aborted, the question fails with the code `"cancelled"`. */
+  signal?: AbortSignal;
+  /** Called from time to time with units of work, done and all; `false` stops the question. Units differ by stage. */
+  progress?: (done: number, total: number) => boolean | void;
+}
+
+/**
+ * Which pairs are asked for, and how: one value for every question. A question that cannot honour one of the options of which pairs
+ * refuses it by name; one that has no use for one of the others ignores it. Fields that do not exist are refused.
+ */
+export interface Query extends Control {
+  /** All pairs (the default), those of different bodies, or self-collision. At most one of `which`, `between`, `selfOf` and `of`. */
+  which?: "all" | "between" | "self";
+  /** Pairs between two bodies, whatever their filters say. */
+  between?: readonly [Body, Body];
+  /** Self-collision of one body. */
+  selfOf?: Body;
+  /** All pairs of one body: with the others, whatever their filters say, and with itself. */
+  of?: Body;
+  /**
+   * Kinds of pairs; `detect`, `count` and `any` have their own. Otherwise `"vf"` and `"ee"`, and `"ev"` and `"vv"` where bodies have no
+   * faces; `near` has `"ef"`, too. Steps have no `"ef"` and `"ff"`.
+   */
+  kinds?: readonly PairKind[];
+  /**
+   * Pairs of one body that share a vertex: reported if they meet in more than what they share (`"resolve"`, the default), or not at
+   * all (`"skip"`). Vertices, edges and faces of `near`, `candidates` and steps that share a vertex never count.
+   */
+  sharedVertex?: "resolve" | "skip";
+  /** Bodies whose pairs are left out; with the same body twice, its self-collision. */
+  exclude?: readonly (readonly [Body, Body])[];
+  /** Only pairs of the half-open box from a low to a high corner: that of the larger of the lower corners of both elements' boxes. */
+  ownedBy?: readonly [Vec3, Vec3];
+  /**
+   * Pairs that touch at the start of a step: reported with the time 0 (`"report"`, the default) or not at all (`"skip"`). Surfaces that
+   * already pass through each other need not touch at all; with `"verify"` the start is asked for intersections, too, and answers say
+   * `startIntersects`. A step whose start intersects is then not free, and `advance` allows none of it.
+   */
+  start?: "report" | "skip" | "verify";
+  /** A length, 0 by default: in a step, a pair this near counts as touching. */
+  separation?: number;
+  /**
+   * A length, 0 by default: what a step leaves between elements. A pair counts as in contact when its distance is at most this, but a
+   * pair that is near at the start keeps only a share of its distance there.
+   */
+  clearance?: number;
+  /** That share: from 0 to less than 1, 0.2 by default. */
+  clearanceShare?: number;
+  /** The precision to which times are rounded down: `"f32"` by default. */
+  precision?: "f32" | "f64";
+  /** `near`: with the distance of each pair. */
+  distances?: boolean;
+  /** `near`: with distances and nearest points. */
+  closestPoints?: boolean;
+}
+
+/**
+ * Bodies, and where their vertices are. Topology is given once, positions each frame. Arrays are copied.
+ *
+ * ```js
+ * import init, { Detector, Scene } from "impinge";
+ * await init();
+ * const scene = new Scene(), detector = new Detector();
+ * const a = scene.addTriangles(geometry.index.array, geometry.attributes.position.array);
+ * ```
+ */
+export declare class Scene {
+  constructor();
+  /** Adds a body. A mesh that was read can be given as it is. */
+  add(mesh: Mesh): Body;
+  addTriangles(faces: Index, positions: Positions): Body;
+  addTetrahedra(tetrahedra: Index, positions: Positions): Body;
+  /** Edges such as strands of hair. */
+  addEdges(edges: Index, positions: Positions): Body;
+  addPoints(positions: Positions): Body;
+  remove(body: Body): void;
+  /** Gives a body new elements and positions. Its filter and thickness stay. */
+  remesh(body: Body, mesh: Mesh): void;
+  /** Moves the vertices of a body: as many positions as it has vertices. It stands still until it gets end positions. */
+  setPositions(body: Body, positions: Positions): void;
+  /** Sets the positions at the end of a step, to which each vertex moves on a straight line from time 0 to time 1; `null`: it stands still. */
+  setEndPositions(body: Body, positions: Positions | null): void;
+  /** Moves a body from the positions that were given last: 16 numbers, column by column, as `elements` of a `Matrix4`; affine. */
+  setTransform(body: Body, matrix: ArrayLike<number>): void;
+  /** Bodies meet if the category of each shares a bit with the mask of the other; 64 bits. Category 1 and all bits by default. */
+  setFilter(body: Body, category?: number | bigint, mask?: number | bigint): void;
+  /** A length that `near` adds to the distance for each element of this body. */
+  setThickness(body: Body, thickness: number): void;
+  kind(body: Body): "points" | "edges" | "triangles" | "tetrahedra";
+  nElements(body: Body): number;
+  nVertices(body: Body): number;
+  /** Copies of what the body has. */
+  positions(body: Body): Positions;
+  /** `null` for a body that stands still. */
+  endPositions(body: Body): Positions | null;
+  /** The positions that were given last, before any transform. */
+  restPositions(body: Body): Positions;
+  /** The vertices of the elements that the body was given as. */
+  elements(body: Body): Uint32Array;
+  /** The vertices of its edges: two per edge, in the order of their numbers. */
+  edges(body: Body): Uint32Array;
+  /** The vertices of its faces: three per face, in the order of their numbers. */
+  faces(body: Body): Uint32Array;
+  /** The numbers of all bodies. */
+  readonly bodies: Body[];
+  /** Frees the memory. */
+  dispose(): void;
+  [Symbol.dispose](): void;
+}
+
+export interface Settings {
+  /** How candidates are found. All methods give the same pairs. `"auto"` by default: `"cells"` for large bodies that are new, else `"clusters"`. */
+  method?: "auto" | "clusters" | "cells" | "naive";
+  /** Whether bodies are clustered again after they have flowed far: `"auto"` by default. */
+  recluster?: "auto" | "never";
+  /** Bytes that the detector may hold, the answer included. */
+  memoryBudget?: number;
+  /** The most pairs that an answer may have: with more, the question fails with the code `"too_many_pairs"`. */
+  maxPairs?: number;
+}
+
+/** Counts and times of an answer. The answer never depends on them. */
+export interface Stats {
   /** `"cpu"` or the name of the GPU. */
   backend: string;
   method: string;
-  /** Pairs whose boxes overlap. */
-  candidates: number;
-  /** Candidates that exact arithmetic decided. */
-  unsure: number;
-  clusters: number;
-  /** Bytes that the detector holds. */
-  bytesHeld: number;
   /** Milliseconds for the whole answer. */
   totalMs: number;
+  nThreads: number;
+  /** Pairs whose boxes overlap. */
+  nCandidates: number;
+  /** Candidates that exact arithmetic decided. */
+  nUnsure: number;
+  nWorkItems: number;
+  nClusters: number;
+  nCulled: number;
+  nClustered: number;
+  nReclustered: number;
+  nBatches: number;
+  nPieces: number;
+  nReruns: number;
+  /** Bytes that the detector holds. */
+  bytesHeld: number;
   /** Milliseconds per stage. */
   stages: Record<string, number>;
 }
 
-export interface StepOptions {
-  /** Which bodies: none for all bodies and their self-collision (the default), one for its self-collision, two for pairs between them. */
-  bodies?: readonly [] | readonly [Body] | readonly [Body, Body];
-  /** Without `bodies`: all pairs (`"all"`, the default), or those of different bodies alone (`"between"`). */
-  which?: "all" | "between";
-  /**
-   * Pairs that touch at the start: reported with the time 0 (`"report"`, the default) or not at all (`"skip"`). Surfaces that already
-   * pass through each other need not touch at all; with `"verify"` the start is asked for intersections, too, and answers say
-   * `startIntersects`. A step whose start intersects is then not free, and `advance` allows none of it.
-   */
-  start?: "report" | "skip" | "verify";
-  /** The precision to which times are rounded down: `"f32"` by default. */
-  toi?: "f32" | "f64";
-  /** The distance that elements must keep, in the unit of the scene: 0 by default. */
-  separation?: number;
-  /**
-   * What a step leaves between elements, in the unit of the scene: 0 by default. A pair counts as in contact when its distance is at
-   * most this, but a pair that is near at the start keeps only a share of its distance there (`clearanceShare`, 0.2 by default).
-   */
-  clearance?: number;
-  /** From 0 to less than 1. */
-  clearanceShare?: number;
+/** Entries with a row each, sorted. They are copied out of the module: they stay as they are, and nothing has to be freed. */
+export interface List<Entry> extends Iterable<Entry> {
+  readonly length: number;
+  /** `[bodyA, elementA, bodyB, elementB]` per entry. */
+  readonly rows: Uint32Array;
+  /** One entry; counted from the end if `ix` is negative. */
+  at(ix: number): Entry | undefined;
+}
+
+export interface Answer {
+  /** 16 hexadecimal digits: the same on every method, backend and machine. */
+  readonly hash: string;
+  readonly stats: Stats;
+}
+
+/** Pairs that intersect, sorted by bodies and elements. */
+export interface Pairs extends Answer, List<[Body, number, Body, number]> {
+  /** `[i0, j0, i1, j1, …]`: element i of `a` and element j of `b`. */
+  between(a: Body, b: Body): Uint32Array;
+  /** `[i0, j0, i1, j1, …]`: elements of one body, i < j. */
+  selfOf(body: Body): Uint32Array;
+  /** The elements of a body that are in any pair: sorted, each once. */
+  colliding(body: Body): Uint32Array;
 }
 
 /**
- * Two elements that touch during a step. The kind says which elements: vertex and face (`"vf"`), two edges (`"ee"`). Vertices are
- * numbered as positions are, faces as they were given, edges as unique pairs of vertices `(low, high)` in the order of
- * `(high, low)`.
+ * Two elements. Vertices are numbered as positions are; faces as they were given, those of tetrahedra by tetrahedron, then by the
+ * opposite corner; edges as they were given, those of faces as unique pairs of vertices `(low, high)` in the order of `(high, low)`.
  */
-export interface Impact {
-  kind: "vf" | "ee" | "ev" | "vv" | "ef" | "ff";
+export interface Candidate {
+  kind: PairKind;
   bodyA: Body;
   elementA: number;
   bodyB: Body;
   elementB: number;
+}
+
+/** Entries sorted by kind, bodies and elements. */
+export interface OfKinds<Entry> extends List<Entry> {
+  /** One index into `KINDS` per entry. */
+  readonly kinds: Uint8Array;
+}
+
+export interface CandidateList extends OfKinds<Candidate> {
+  /** Those of one kind, a part of this list. */
+  of(kind: PairKind): CandidateList;
+}
+
+/** Pairs of elements whose boxes overlap. */
+export interface Candidates extends Answer, CandidateList {}
+
+/** Two elements that touch during a step. */
+export interface Impact extends Candidate {
   /** The first time in [0, 1] at which they touch, rounded down. */
-  time: number;
+  toi: number;
   /** Whether they touch at the start. */
   atStart: boolean;
 }
 
-/** All impacts of a step, sorted by kind, bodies and elements. */
-export interface Impacts extends Iterable<Impact> {
-  readonly length: number;
-  at(ix: number): Impact | undefined;
-  /** `[bodyA, elementA, bodyB, elementB]` per impact. */
-  readonly rows: Uint32Array;
+export interface ImpactList extends OfKinds<Impact> {
   /** One time per impact. */
-  readonly times: Float64Array;
-  /** One index into `names` per impact. */
-  readonly kinds: Uint8Array;
-  readonly names: readonly Impact["kind"][];
+  readonly toi: Float64Array;
   /** 1 for impacts at the start, else 0. */
   readonly atStart: Uint8Array;
+  /** Those of one kind, a part of this list. */
+  of(kind: PairKind): ImpactList;
+}
+
+/** All impacts of a step. */
+export interface Impacts extends Answer, ImpactList {
   /** Whether elements intersect at the start of the step; `null` unless `start: "verify"` asked. */
   readonly startIntersects: boolean | null;
 }
@@ -105,100 +300,161 @@ export interface Advance {
   readonly startIntersects: boolean | null;
   /** How many fractions were tried. */
   readonly nTried: number;
+  readonly stats: Stats;
   /**
    * The positions of a body at that fraction, rounded to the precision in which it has them; `null` for a body that does not move. The
    * straight path to them is free, if the start was free of intersections, and except for pairs that touch at the start.
    */
   positions(body: Body): Positions | null;
-  /** Moves the bodies of a detector to these positions. */
-  apply(detector: { setPositions(body: Body, positions: Positions): void }): void;
+  /** Moves the bodies of the scene to these positions. */
+  apply(scene: Scene): void;
 }
 
-/** Vertices, and what they are the corners of. */
-export interface Mesh {
-  positions: Positions;
-  faces?: Index;
-  tetrahedra?: Index;
-  edges?: Index;
+/** Two elements that are near each other. */
+export interface NearPair extends Candidate {
+  /** The nearest feature of each: 0 to 3 for a vertex of the element, 8 to 10 for an edge, 16 for the face. */
+  features: [number, number];
+  /** Whether nearest points may not be the only ones. */
+  parallel: boolean;
+  /** If `distances` or `closestPoints` asked. */
+  distance?: number;
+  /** If `closestPoints` asked: a point of each. */
+  points?: [[number, number, number], [number, number, number]];
 }
 
-/** A mesh of which vertices at the same position have become one. */
-export interface Welded<P extends Positions = Positions> {
-  mesh: { positions: P; faces?: Uint32Array; tetrahedra?: Uint32Array; edges?: Uint32Array };
-  /** For each vertex before the welding, its number after it. */
-  map: Uint32Array;
-  /** The positions of the welded vertices, taken from those of all vertices, of any frame. */
-  positions<Q extends Positions>(positions: Q): Q;
+export interface NearList extends OfKinds<NearPair> {
+  /** Two per pair. */
+  readonly features: Uint8Array;
+  /** 1 or 0 per pair. */
+  readonly parallel: Uint8Array;
+  readonly distances: Float64Array | null;
+  /** Six numbers per pair. */
+  readonly points: Float64Array | null;
+  /** Those of one kind, a part of this list. */
+  of(kind: PairKind): NearList;
+}
+
+/** All pairs of elements within a distance. */
+export interface NearPairs extends Answer, NearList {}
+
+/** The nearest elements of two bodies. */
+export interface Nearest {
+  /** A length, 0 if and only if they share a point. */
+  distance: number;
+  bodyA: Body;
+  elementA: number;
+  bodyB: Body;
+  elementB: number;
+  /** The point of each that is nearest to the other; where they touch, one that they share, twice. */
+  points: [[number, number, number], [number, number, number]];
+}
+
+/** How two triangles meet. */
+export interface Contact {
+  bodyA: Body;
+  elementA: number;
+  bodyB: Body;
+  elementB: number;
+  shape: "solid" | "apart" | "point" | "segment" | "polygon";
+  /** Numbers of points: one, a segment's two, or a polygon's. */
+  corners: Uint32Array;
+}
+
+/** Segments of contacts as loops and open curves, by numbers of points. */
+export interface Curves {
+  readonly length: number;
+  /** Where each curve starts in `points`, and one past the last. */
+  readonly starts: Uint32Array;
+  readonly points: Uint32Array;
+  /** 1 for loops, else 0. */
+  readonly closed: Uint8Array;
+  /** 1 if all segments point the same way along the curve. */
+  readonly directed: Uint8Array;
+  readonly lengths: Float64Array;
+}
+
+/** Connected contacts of two bodies. */
+export interface Region {
+  bodies: [Body, Body];
+  /** Numbers of contacts. */
+  contacts: Uint32Array;
+  position: [number, number, number];
+  bounds: [[number, number, number], [number, number, number]];
+  /** Of its curves. */
+  length: number;
+  /** Of its patches, where faces lie in one plane. */
+  patchArea: number;
+  /** What its curves span, as a vector. */
+  area: [number, number, number];
+  /** The direction in which to push the first body; `null` if the curves span no area. */
+  normal: [number, number, number] | null;
+  /** Of `penetration`: how far the region extends along the normal. */
+  depth: number | null;
+  /** Of `penetration`: what both bodies have in common, if that is known. */
+  volume: number | null;
+  /** Of `penetration`: vertices of the first body inside the second, and of the second inside the first. */
+  inside: [Uint32Array, Uint32Array];
+}
+
+/** Where the triangles of pairs meet: contact i is that of row i. The hash is that of the pairs. */
+export interface Contacts extends Answer, List<Contact> {
+  /** One index into `SHAPES` per contact. */
+  readonly shapes: Uint8Array;
+  /** 1 for segments with a direction. */
+  readonly directed: Uint8Array;
+  /** Where the corners of each contact start, and one past the last. */
+  readonly starts: Uint32Array;
+  /** Numbers of points. */
+  readonly corners: Uint32Array;
+  /** x, y, z per point, rounded to nearest. */
+  readonly points: Float64Array;
+  curves(): Curves;
+  regions(): Region[];
+}
+
+/** How deep two closed bodies are in each other. */
+export interface Penetration {
+  readonly bodies: [Body, Body];
+  /** Vertices of the first of `bodies` strictly inside the second, and of the second inside the first: sorted. */
+  readonly inside: [Uint32Array, Uint32Array];
+  readonly regions: Region[];
+  /** Of all regions together, if it is known. */
+  readonly volume: number | null;
+  readonly stats: Stats;
 }
 
 /**
- * Welds vertices whose coordinates are equal, without a tolerance. A `BufferGeometry` repeats vertices along seams, and the faces
- * on both sides of a seam touch but are neighbours only once it is welded. Primitives keep their number and order.
- *
- * ```js
- * const { mesh, positions } = weld({ faces: geometry.index.array, positions: geometry.attributes.position.array });
- * const body = detector.add(mesh.faces, mesh.positions);
- * detector.setPositions(body, positions(nextFrame));
- * ```
- */
-export function weld<P extends Positions>(mesh: Mesh & { positions: P }): Welded<P>;
-
-/** Everything that a WebAssembly module can be loaded from. */
-export type Module = WebAssembly.Module | BufferSource | Response | URL | string;
-
-/**
- * Loads the WebAssembly module. Later calls wait for the first. Without an argument the module is loaded from the
- * folder of this file, in Node too.
- */
-export default function init(module?: Module | Promise<Module>): Promise<void>;
-
-/**
- * Finds the primitives that intersect, exactly: touching counts, and there is no tolerance. Errors are `Error`s that
- * name the body, the index and both numbers.
- *
- * ```js
- * import init, { Detector } from "impinge";
- * await init();
- * const detector = new Detector();
- * const a = detector.add(geometry.index.array, geometry.attributes.position.array);
- * ```
+ * Answers questions about scenes, exactly: touching counts, and there is no tolerance. It owns memory that it uses again. Errors are
+ * `ImpingeError`s that name the body, the index and both numbers.
  */
 export declare class Detector {
-  constructor(options?: Options);
-  /** Adds a body of triangles and returns its number. */
-  add(index: Index, positions: Positions): Body;
-  /** Adds a body of tetrahedra and returns its number. */
-  addTetrahedra(index: Index, positions: Positions): Body;
-  /** Moves the vertices of a body: as many positions as it has vertices. It stands still until it gets end positions. */
-  setPositions(body: Body, positions: Positions): void;
-  /** Sets the positions at the end of a step. Each vertex moves there on a straight line, from time 0 to time 1. */
-  setEndPositions(body: Body, positions: Positions): void;
-  /** Removes a body. */
-  remove(body: Body): void;
-  /** The numbers of primitives and of vertices of a body. */
-  size(body: Body): { primitives: number; vertices: number };
-  /** Pairs between two bodies: `[i0, j0, i1, j1, …]`, primitive i of `a` and j of `b`, sorted. */
-  between(a: Body, b: Body): Uint32Array;
-  /** All pairs of different bodies: `[bodyA, i, bodyB, j, …]`, sorted. */
-  betweenAll(): Uint32Array;
-  /** Self-collision of a body: `[i0, j0, i1, j1, …]`, sorted. */
-  within(body: Body): Uint32Array;
-  /** All pairs, self-collision included: `[bodyA, i, bodyB, j, …]`, sorted. */
-  everything(): Uint32Array;
+  constructor(settings?: Settings);
+  /** Of the last question. */
+  readonly stats: Stats;
+  /** All pairs of elements that intersect. */
+  detect(scene: Scene, query?: Query): Pairs;
+  /** How many pairs `detect` would find. */
+  count(scene: Scene, query?: Query): number;
+  /** Whether `detect` would find any. */
+  any(scene: Scene, query?: Query): boolean;
   /** Which elements touch during a step, and when first. */
-  impacts(options?: StepOptions): Impacts;
+  impacts(scene: Scene, query?: Query): Impacts;
   /** The earliest impact of a step, or `null` if nothing touches. Faster than `impacts`. */
-  earliest(options?: StepOptions): Impact | null;
-  /** Whether nothing touches during a step. */
-  isFree(options?: StepOptions): boolean;
+  earliest(scene: Scene, query?: Query): Impact | null;
+  /** Whether nothing touches during a step: free, if the start was. */
+  isFree(scene: Scene, query?: Query): boolean;
   /** How far a step can be taken. */
-  advance(options?: StepOptions): Advance;
-  /** Whether elements intersect at the start of the step that was asked about last; `null` unless `start: "verify"` asked. */
-  readonly startIntersects: boolean | null;
-  /** The hash of the last set of pairs or impacts, 16 hexadecimal digits: the same on every method, backend and machine. */
-  readonly hash: string;
-  /** Statistics of the last answer. */
-  readonly statistics: Statistics;
+  advance(scene: Scene, query?: Query): Advance;
+  /** Pairs of elements whose boxes overlap during a step, inflated by a length on all sides. */
+  candidates(scene: Scene, inflation: number, query?: Query): Candidates;
+  /** Pairs of elements at most a length apart, thickness besides; decided exactly. */
+  near(scene: Scene, distance: number, query?: Query): NearPairs;
+  /** The smallest distance of two bodies; `null` if one of them has no elements. Tetrahedra are solid. */
+  distance(scene: Scene, a: Body, b: Body, control?: Control): Nearest | null;
+  /** Where the triangles of pairs meet. The scene must not have changed since they were found. */
+  contacts(scene: Scene, pairs: Pairs, control?: Control): Contacts;
+  /** How deep two closed bodies are in each other, given contacts among which are all of theirs. */
+  penetration(scene: Scene, contacts: Contacts, a: Body, b: Body, control?: Control): Penetration;
   /** Frees the memory. */
   dispose(): void;
   [Symbol.dispose](): void;

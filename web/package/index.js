@@ -1,96 +1,46 @@
 // impinge on the CPU: WebAssembly with SIMD, synchronous.
 
-import load, { Engine, StepQuestion, kind_names, weld_f32, weld_f64 } from "./cpu/impinge.js";
-import { Bodies, bodies, chosen, loader, welder } from "./shared.js";
+import load, * as module from "./cpu/impinge.js";
+import { statsOf } from "./answers.js";
+import { answering, ask, disposable, makeScene, settings } from "./classes.js";
+import { watch } from "./query.js";
+import { call, loader, refuse, welder } from "./shared.js";
 
-const [init, mustBeReady] = loader(load, new URL("./cpu/impinge_bg.wasm", import.meta.url));
+export { KINDS, SHAPES } from "./answers.js";
+export { ImpingeError } from "./shared.js";
+
+const beside = new URL("./cpu/impinge_bg.wasm", import.meta.url);
+const [init, mustBeReady] = loader(load, beside, () => module.set_watch(watch));
 export default init;
 
-const welded = welder(weld_f32, weld_f64);
+export const weld = welder(mustBeReady, module);
 
-export function weld(mesh) {
-  mustBeReady();
-  return welded(mesh);
-}
+const { Scene, handleOf } = makeScene(module, mustBeReady);
+export { Scene };
 
 export class Detector {
-  #bodies;
+  #handle;
 
-  constructor(options) {
+  static {
+    answering(Detector, (detector, question, scene, asked) => ask(detector.#held, handleOf(scene), asked()));
+    disposable(Detector);
+  }
+
+  constructor(given) {
     mustBeReady();
-    this.#bodies = new Bodies(new Engine(...chosen(options)), { StepQuestion, kind_names });
+    this.#handle = call(() => new module.DetectorHandle(...settings(given)));
   }
 
-  add(index, positions) {
-    return this.#bodies.add(index, positions);
+  get #held() {
+    return this.#handle ?? refuse("this detector has been disposed of");
   }
 
-  addTetrahedra(index, positions) {
-    return this.#bodies.addTetrahedra(index, positions);
-  }
-
-  setPositions(body, positions) {
-    this.#bodies.setPositions(body, positions);
-  }
-
-  setEndPositions(body, positions) {
-    this.#bodies.setEndPositions(body, positions);
-  }
-
-  remove(body) {
-    this.#bodies.remove(body);
-  }
-
-  size(body) {
-    return this.#bodies.size(body);
-  }
-
-  between(a, b) {
-    return this.#bodies.engine.detect(bodies(a, b), true);
-  }
-
-  betweenAll() {
-    return this.#bodies.engine.detect(bodies(), false);
-  }
-
-  within(body) {
-    return this.#bodies.engine.detect(bodies(body), true);
-  }
-
-  everything() {
-    return this.#bodies.engine.detect(bodies(), true);
-  }
-
-  impacts(options) {
-    return this.#bodies.impacts(options);
-  }
-
-  earliest(options) {
-    return this.#bodies.earliest(options);
-  }
-
-  isFree(options) {
-    return this.#bodies.isFree(options);
-  }
-
-  advance(options) {
-    return this.#bodies.advance(options);
-  }
-
-  get startIntersects() {
-    return this.#bodies.startIntersects;
-  }
-
-  get hash() {
-    return this.#bodies.hash;
-  }
-
-  get statistics() {
-    return this.#bodies.statistics;
+  get stats() {
+    return statsOf(this.#held.stats(false));
   }
 
   dispose() {
-    this.#bodies.dispose();
+    this.#handle?.free();
+    this.#handle = null;
   }
 }
-if (Symbol.dispose) Detector.prototype[Symbol.dispose] = Detector.prototype.dispose;

@@ -1,53 +1,46 @@
-import type { Body, Index, Module, Options, Positions, Statistics } from "./index.js";
+import type { Advance, Body, Candidates, Contacts, Control, Impact, Impacts, Mesh, Module, NearPairs, Nearest, Pairs, Penetration, Positions, Query, Scene, Settings, Stats } from "./index.js";
 
-/** Loads the WebAssembly module. Later calls wait for the first. */
+/** Loads the WebAssembly module, which is another one than that of `impinge`. Later calls wait for the first. */
 export default function init(module?: Module | Promise<Module>): Promise<void>;
 
-export { weld } from "./index.js";
-
-/** An answer of the GPU: the same pairs and the same hash as on the CPU. */
-export interface Answer {
-  pairs: Uint32Array;
-  hash: string;
-  statistics: Statistics;
-}
+export { ImpingeError, KINDS, SHAPES, Scene, weld } from "./index.js";
+export type * from "./index.js";
 
 /**
- * A detector on the browser's WebGPU device. Nothing blocks: every call returns a promise. Calls are answered in the
- * order in which they were made, and arrays are copied at once.
+ * A detector on the browser's WebGPU device. Nothing blocks: every question returns a promise, is about the scene as it is when it is
+ * asked, and is answered in the order in which questions were asked. The device finds the pairs that intersect; all other
+ * questions are answered on the CPU. Answers and hashes are those of `impinge`.
  */
-export declare class GpuDetector {
+export declare class Detector {
   private constructor();
-  /** Opens the device. Rejected if the browser offers none. */
-  static open(options?: Options): Promise<GpuDetector>;
-  /** Adds a body of triangles and returns its number. */
-  add(index: Index, positions: Positions): Promise<Body>;
-  /** Adds a body of tetrahedra and returns its number. */
-  addTetrahedra(index: Index, positions: Positions): Promise<Body>;
-  /** Moves the vertices of a body. */
-  setPositions(body: Body, positions: Positions): Promise<void>;
-  /** Removes a body. */
-  remove(body: Body): Promise<void>;
-  /** The numbers of primitives and of vertices of a body. */
-  size(body: Body): Promise<{ primitives: number; vertices: number }>;
-  /** Pairs between two bodies: `[i0, j0, i1, j1, …]`. */
-  between(a: Body, b: Body): Promise<Answer>;
-  /** All pairs of different bodies: `[bodyA, i, bodyB, j, …]`. */
-  betweenAll(): Promise<Answer>;
-  /** Self-collision of a body: `[i0, j0, i1, j1, …]`. */
-  within(body: Body): Promise<Answer>;
-  /** All pairs, self-collision included: `[bodyA, i, bodyB, j, …]`. */
-  everything(): Promise<Answer>;
-  /** Frees the memory once all earlier calls are answered. */
+  /** Opens the device. Rejected with the code `"device"` if the browser offers none. */
+  static open(settings?: Settings): Promise<Detector>;
+  /** Of the last question that was answered; `null` before the first. */
+  readonly stats: Stats | null;
+  detect(scene: Scene, query?: Query): Promise<Pairs>;
+  count(scene: Scene, query?: Query): Promise<number>;
+  any(scene: Scene, query?: Query): Promise<boolean>;
+  impacts(scene: Scene, query?: Query): Promise<Impacts>;
+  earliest(scene: Scene, query?: Query): Promise<Impact | null>;
+  isFree(scene: Scene, query?: Query): Promise<boolean>;
+  advance(scene: Scene, query?: Query): Promise<Advance>;
+  candidates(scene: Scene, inflation: number, query?: Query): Promise<Candidates>;
+  near(scene: Scene, distance: number, query?: Query): Promise<NearPairs>;
+  distance(scene: Scene, a: Body, b: Body, control?: Control): Promise<Nearest | null>;
+  contacts(scene: Scene, pairs: Pairs, control?: Control): Promise<Contacts>;
+  penetration(scene: Scene, contacts: Contacts, a: Body, b: Body, control?: Control): Promise<Penetration>;
+  /** Frees the memory once all earlier questions are answered. */
   dispose(): Promise<void>;
+  [Symbol.dispose](): void;
 }
 
 /** A mesh from a file. `name` is that of the file, or of a node or a group in it. */
-export interface FileMesh {
+export interface FileMesh extends Mesh {
   name: string;
-  index: Uint32Array;
-  positions: Float32Array | Float64Array;
-  corners: 3 | 4;
+  faces?: Uint32Array;
+  tetrahedra?: Uint32Array;
+  edges?: undefined;
+  positions: Positions;
   /** For each vertex of the file, its number in the mesh: they differ if vertices were welded. */
   map: Uint32Array;
 }
@@ -56,7 +49,7 @@ export interface FileMesh {
  * Reads a mesh file. The extension of its name is that of its format: obj, ply, stl, off, gltf, glb, msh, vtk, vtu or mesh.
  * Vertices at the same position become one, unless `weld` is false. Needs no GPU.
  */
-export function readMesh(name: string, bytes: Uint8Array, options?: { weld?: boolean }): FileMesh;
+export function read(name: string, bytes: Uint8Array, options?: { weld?: boolean }): FileMesh;
 
 /**
  * Reads the bodies of a mesh file, each as a mesh of its own: the nodes of a glTF file that have a mesh, the objects of an OBJ

@@ -1,129 +1,119 @@
 // impinge on WebGPU, asynchronous; and the readers of mesh files.
 
-import load, { Engine, MeshFile, read_frames, weld_f32, weld_f64 } from "./gpu/impinge.js";
-import { Bodies, bodies, chosen, loader, mustBeNone, welder } from "./shared.js";
+import load, * as module from "./gpu/impinge.js";
+import { Pairs, statsOf } from "./answers.js";
+import { answering, ask, disposable, makeScene, settings } from "./classes.js";
+import { watch } from "./query.js";
+import { ImpingeError, call, loader, mustBeNone, named, refuse, welder } from "./shared.js";
 
-const [init, mustBeReady] = loader(load, new URL("./gpu/impinge_bg.wasm", import.meta.url));
+export { KINDS, SHAPES } from "./answers.js";
+export { ImpingeError } from "./shared.js";
+
+const beside = new URL("./gpu/impinge_bg.wasm", import.meta.url);
+const [init, mustBeReady] = loader(load, beside, () => module.set_watch(watch));
 export default init;
 
-const welded = welder(weld_f32, weld_f64);
+export const weld = welder(mustBeReady, module);
 
-export function weld(mesh) {
-  mustBeReady();
-  return welded(mesh);
-}
+const { Scene, handleOf } = makeScene(module, mustBeReady);
+export { Scene };
 
-// The module cannot be entered while it awaits an answer, so later calls wait for their turn.
-export class GpuDetector {
-  #bodies;
+// Questions that the device answers: all are about the pairs.
+const ON_DEVICE = {
+  detect: (pairs) => pairs,
+  count: (pairs) => pairs.length,
+  any: (pairs) => pairs.length > 0,
+};
+
+// The module cannot be entered while it awaits an answer, so later questions wait for their turn.
+export class Detector {
+  #handle;
+  #stats = null;
   #last = Promise.resolve();
 
-  constructor(bodies) {
-    if (!(bodies instanceof Bodies)) throw new TypeError("use await GpuDetector.open()");
-    this.#bodies = bodies;
+  static {
+    answering(Detector, (detector, question, scene, asked) => detector.#ask(question, scene, asked));
+    disposable(Detector);
   }
 
-  static async open(options) {
+  constructor(handle) {
+    if (!(handle instanceof module.DetectorHandle)) refuse("use await Detector.open()");
+    this.#handle = handle;
+  }
+
+  static async open(given) {
     mustBeReady();
+    const of = settings(given);
     if (!globalThis.navigator?.gpu) {
       const isSafe = globalThis.isSecureContext !== false;
       const why = isSafe ? "" : ": pages have it over https or from localhost only";
-      throw new Error(`there is no WebGPU here${why}`);
+      throw new ImpingeError("device", `there is no WebGPU here${why}`);
     }
-    return new GpuDetector(new Bodies(await Engine.webgpu(...chosen(options))));
+    return new Detector(await awaited(module.DetectorHandle.open(...of)));
   }
 
   #turn(work) {
-    const turn = this.#last.then(() => work(this.#bodies));
+    const turn = this.#last.then(() => work(this.#handle ?? refuse("this detector has been disposed of")));
     this.#last = turn.catch(() => undefined);
     return turn;
   }
 
-  // Arrays are copied at once: the caller may write to them while the call waits.
-  add(index, positions) {
-    const copies = [copy(index), copy(positions)];
-    return this.#turn((bodies) => bodies.add(...copies));
+  // About the scene as it is now: the caller may move bodies while the question waits.
+  async #ask(question, scene, asked) {
+    const held = handleOf(scene);
+    const take = ON_DEVICE[question];
+    const about = asked();
+    const now = call(() => held.snapshot());
+    return this.#turn(async (handle) => {
+      try {
+        return take ? take(await detect(handle, now, about)) : ask(handle, now, about);
+      } finally {
+        this.#stats = statsOf(handle.stats(take !== undefined));
+        if (!take) now.free();
+      }
+    });
   }
 
-  addTetrahedra(index, positions) {
-    const copies = [copy(index), copy(positions)];
-    return this.#turn((bodies) => bodies.addTetrahedra(...copies));
-  }
-
-  setPositions(body, positions) {
-    const copied = copy(positions);
-    return this.#turn((bodies) => bodies.setPositions(body, copied));
-  }
-
-  remove(body) {
-    return this.#turn((bodies) => bodies.remove(body));
-  }
-
-  size(body) {
-    return this.#turn((bodies) => bodies.size(body));
-  }
-
-  between(a, b) {
-    return this.#answer([a, b]);
-  }
-
-  betweenAll() {
-    return this.#answer([], false);
-  }
-
-  within(body) {
-    return this.#answer([body]);
-  }
-
-  everything() {
-    return this.#answer([]);
-  }
-
-  #answer(which, withSelf = true) {
-    return this.#turn(async (held) => ({
-      pairs: await held.engine.detect_async(bodies(...which), withSelf),
-      hash: held.hash,
-      statistics: held.statistics,
-    }));
+  get stats() {
+    return this.#stats;
   }
 
   dispose() {
-    return this.#turn((bodies) => bodies.dispose());
+    return this.#turn((handle) => {
+      handle.free();
+      this.#handle = null;
+    });
   }
 }
 
-// Other things than arrays are refused by the call itself, when its turn comes.
-function copy(array) {
-  return ArrayBuffer.isView(array) ? array.slice() : array;
+const awaited = (promise) => promise.catch((error) => Promise.reject(named(error)));
+
+// The module takes the scene over.
+async function detect(handle, scene, { words, numbers, watch }) {
+  const lists = await watch.duringAsync((id) => awaited(handle.detect(scene, id, words, numbers)));
+  return new Pairs(lists, statsOf(handle.stats(true)));
 }
 
-function taken(file) {
-  try {
-    return {
-      name: file.name(),
-      index: file.index(),
-      positions: file.positions(),
-      corners: file.corners(),
-      map: file.map(),
-    };
-  } finally {
-    file.free();
-  }
-}
-
-export function readMesh(name, bytes, { weld = true, ...others } = {}) {
+function readers(name, bytes, options, inBodies) {
   mustBeReady();
-  mustBeNone(others, '"weld"');
-  return taken(new MeshFile(String(name), bytes, Boolean(weld)));
+  const { weld = true, ...others } = options ?? {};
+  mustBeNone("options", others, ["weld"]);
+  const meshes = call(() => module.read(String(name), bytes, Boolean(weld), inBodies));
+  return meshes.map(([name, corners, index, positions, map]) => {
+    return { name, [corners === 4 ? "tetrahedra" : "faces"]: index, positions, map };
+  });
 }
 
-export function readBodies(name, bytes, { weld = true, ...others } = {}) {
-  mustBeReady();
-  mustBeNone(others, '"weld"');
-  return MeshFile.bodies(String(name), bytes, Boolean(weld)).map(taken);
+export function read(name, bytes, options) {
+  const [mesh] = readers(name, bytes, options, false);
+  return mesh;
+}
+
+export function readBodies(name, bytes, options) {
+  return readers(name, bytes, options, true);
 }
 
 export function readFrames(name, bytes) {
   mustBeReady();
-  return read_frames(String(name), bytes);
+  return call(() => module.read_frames(String(name), bytes));
 }

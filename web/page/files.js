@@ -9,7 +9,7 @@ const mayHaveParts = ({ name }) => /\.(obj|gltf|glb)$/i.test(name);
 const byName = new Intl.Collator("en", { numeric: true }).compare;
 
 // Reads files. Those that cannot be read are left out, and `refused` says why.
-export async function read({ readMesh, readBodies, readFrames }, list) {
+export async function read({ read: readMesh, readBodies, readFrames }, list) {
   const [meshes, caches, refused] = [[], [], []];
   for (const file of list) {
     try {
@@ -19,9 +19,9 @@ export async function read({ readMesh, readBodies, readFrames }, list) {
         continue;
       }
       // Vertices at one position become one, as for the program, and coordinates keep their precision.
-      const mesh = readMesh(file.name, bytes, { weld: true });
+      const mesh = indexed(readMesh(file.name, bytes, { weld: true }));
       if (mesh.index.length === 0) throw new Error(`${file.name} has no triangles and no tetrahedra`);
-      const parts = mayHaveParts(file) ? readBodies(file.name, bytes, { weld: true }) : [];
+      const parts = mayHaveParts(file) ? readBodies(file.name, bytes, { weld: true }).map(indexed) : [];
       meshes.push({ ...mesh, name: file.name, parts });
     } catch (error) {
       refused.push(String(error.message ?? error));
@@ -29,6 +29,8 @@ export async function read({ readMesh, readBodies, readFrames }, list) {
   }
   return { meshes, caches, refused };
 }
+
+const indexed = ({ faces, tetrahedra, ...mesh }) => ({ ...mesh, index: tetrahedra ?? faces, corners: tetrahedra ? 4 : 3 });
 
 const isSameMesh = (a, b) => a.map.length === b.map.length && a.index.length === b.index.length;
 

@@ -1,5 +1,7 @@
 // The same question for WebGPU: always about the latest frame, and never two at once.
 
+import { meshOf } from "./motion.js";
+
 let loading = null;
 
 // The build with WebGPU and the readers of files is loaded when it is first needed.
@@ -19,13 +21,15 @@ export async function lookForAdapter() {
   return isSoftware ? "software" : "hardware";
 }
 
-// Frees a detector that nobody waits for. One that has failed may fail at this, too: that is no news.
-function letGo(detector) {
+// Frees a detector that nobody waits for, and its scene. One that has failed may fail at this, too: that is no news.
+function letGo(detector, scene) {
+  scene?.dispose();
   detector?.dispose().catch(() => undefined);
 }
 
 export class Gpu {
   #detector = null;
+  #scene = null;
   #isBusy = false;
   // Counts changes of the bodies. An answer about other bodies is not shown.
   #era = 0;
@@ -45,6 +49,8 @@ export class Gpu {
     this.#era += 1;
     const previous = this.#detector;
     this.#detector = null;
+    this.#scene?.dispose();
+    this.#scene = null;
     await previous?.dispose();
   }
 
@@ -56,33 +62,35 @@ export class Gpu {
     if (era !== this.#era) return;
     this.on.note("WebGPU compiles its kernels …");
     let opened = null;
+    let scene = null;
     try {
-      const { GpuDetector } = await this.load();
-      opened = await GpuDetector.open(options);
-      for (const body of bodies) {
-        await (body.corners === 4 ? opened.addTetrahedra(body.index, body.now) : opened.add(body.index, body.now));
-      }
-      if (era !== this.#era) return letGo(opened);
+      const { Detector, Scene } = await this.load();
+      opened = await Detector.open(options);
+      scene = new Scene();
+      for (const body of bodies) scene.add(meshOf(body));
+      if (era !== this.#era) return letGo(opened, scene);
       this.#detector = opened;
+      this.#scene = scene;
       this.on.stale();
     } catch (error) {
-      letGo(opened);
+      letGo(opened, scene);
       if (era === this.#era) this.on.note(`WebGPU failed: ${error.message}`, true);
     }
   }
 
   // Asks about the bodies as they are. `asked` is handed back with the answer.
-  async ask(bodies, withSelf, asked) {
-    const [detector, era] = [this.#detector, this.#era];
+  async ask(bodies, which, asked) {
+    const [detector, scene, era] = [this.#detector, this.#scene, this.#era];
     this.#isBusy = true;
     try {
-      for (const [ix, { now }] of bodies.entries()) void detector.setPositions(ix, now);
-      const { pairs, hash, statistics } = await (withSelf ? detector.everything() : detector.betweenAll());
-      if (era === this.#era) this.on.answer(pairs.length / 4, statistics.totalMs, hash, asked);
+      for (const [ix, { now }] of bodies.entries()) scene.setPositions(ix, now);
+      const { length, hash, stats } = await detector.detect(scene, { which });
+      if (era === this.#era) this.on.answer(length, stats.totalMs, hash, asked);
     } catch (error) {
       if (era === this.#era) {
         this.#detector = null;
-        letGo(detector);
+        this.#scene = null;
+        letGo(detector, scene);
         this.on.note(`WebGPU failed: ${error.message}`, true);
       }
     } finally {

@@ -1,10 +1,10 @@
 // The page: bodies of a scene or of dropped files, and the exact answer about them as they are.
 
-import init, { Detector } from "impinge";
+import init, { Detector, Scene } from "impinge";
 import { bodiesOf, hasParts, looksNumbered, mayBePoses, read } from "./files.js";
 import { Gpu, lookForAdapter, withReaders } from "./gpu.js";
 import { fromLink, toLink } from "./link.js";
-import { extentOf, pose } from "./motion.js";
+import { extentOf, meshOf, pose } from "./motion.js";
 import * as panel from "./panel.js";
 import { ballAround, places as placesOf } from "./places.js";
 import { SCENES } from "./shapes.js";
@@ -39,6 +39,8 @@ let direction = 1;
 let isPlaying = false;
 
 let detector = null;
+// The bodies as the detector is asked about them.
+let world = null;
 let rows = new Uint32Array();
 let places = [];
 let place = -1;
@@ -102,12 +104,12 @@ function say(id, text) {
 }
 
 const complain = (text) => say("message", text);
-const options = () => ({ sharedVertex: "resolve", method: method.value });
+const options = () => ({ method: method.value });
 // Where files say nothing, y points up, as for the program. The scenes of the page, and the view, have z there.
 const isYUp = () => files !== null && up.value === "y";
-const withSelf = () => bodies.length === 1 || self.checked;
+const which = () => (bodies.length === 1 || self.checked ? "all" : "between");
 
-// Replaces the bodies. Throws, and changes nothing, if the detector refuses them.
+// Replaces the bodies. Throws, and changes nothing, if they are refused.
 function setBodies(given, { centre, radius } = {}) {
   const made = given.map((body) => {
     const all = body.frames ?? [body.positions];
@@ -115,9 +117,10 @@ function setBodies(given, { centre, radius } = {}) {
     const now = new (isDouble ? Float64Array : Float32Array)(body.positions.length);
     return { corners: 3, ...body, offset: [0, 0, 0], now };
   });
-  const opened = openDetector(made);
-  detector?.dispose();
-  detector = opened;
+  const filled = sceneOf(made);
+  world?.dispose();
+  world = filled;
+  openDetector();
   bodies = made;
   isFramed = bodies.some(({ frames }) => frames?.length > 1);
   end = isFramed ? Math.max(...bodies.map(({ frames }) => (frames?.length ?? 1) - 1)) : 0;
@@ -142,19 +145,23 @@ function setBodies(given, { centre, radius } = {}) {
   void openGpu();
 }
 
-function openDetector(given) {
-  const opened = new Detector(options());
+function sceneOf(given) {
+  const filled = new Scene();
   try {
     for (const body of given) {
-      const at = pose(body, 0, body.now);
-      if (body.corners === 4) opened.addTetrahedra(body.index, at);
-      else opened.add(body.index, at);
+      pose(body, 0, body.now);
+      filled.add(meshOf(body));
     }
-    return opened;
+    return filled;
   } catch (error) {
-    opened.dispose();
+    filled.dispose();
     throw error;
   }
+}
+
+function openDetector() {
+  detector?.dispose();
+  detector = new Detector(options());
 }
 
 function openGpu() {
@@ -228,17 +235,16 @@ function draw() {
   time.setAttribute("aria-valuetext", text);
 }
 
-const pairs = () => (withSelf() ? detector.everything() : detector.betweenAll());
-
 function answer() {
   const start = performance.now();
-  for (const [ix, body] of bodies.entries()) detector.setPositions(ix, body.now);
-  rows = pairs();
+  for (const [ix, body] of bodies.entries()) world.setPositions(ix, body.now);
+  const { rows: found, length, hash } = detector.detect(world, { which: which() });
+  rows = found;
   nAnswers += 1;
-  show("cpu", rows.length / 4, performance.now() - start, detector.hash);
+  show("cpu", length, performance.now() - start, hash);
   showQuestion();
   panel.showColliding(view.draw(rows));
-  if (gpu.isReady) void gpu.ask(bodies, withSelf(), { hash: detector.hash, nAnswers });
+  if (gpu.isReady) void gpu.ask(bodies, which(), { hash, nAnswers });
 }
 
 // What is asked, in words.
@@ -302,10 +308,10 @@ function showStep() {
   element("step").hidden = !isAsked;
   if (!isAsked) return;
   const from = Math.floor(now);
-  const key = JSON.stringify([from, withSelf(), bodies.map(({ offset }) => offset)]);
+  const key = JSON.stringify([from, which(), bodies.map(({ offset }) => offset)]);
   if (step?.key === key) return;
   step = { key, from, first: null, text: "This is the last frame." };
-  if (from < end) Object.assign(step, askStep(detector, bodies, from, withSelf(), pairs));
+  if (from < end) Object.assign(step, askStep(detector, world, bodies, from, which()));
   say("step-text", step.text);
   // A face of a tetrahedron has a number of its own, which the page does not know.
   const isHere = step.first && [step.first.bodyA, step.first.bodyB].every((ix) => bodies[ix].corners === 3);
@@ -315,7 +321,7 @@ function showStep() {
 // Goes to the moment and the place of the step's first contact, and outlines a triangle of each side.
 function showContact() {
   choose(null);
-  setTime(step.from + step.first.time);
+  setTime(step.from + step.first.toi);
   draw();
   const { box, triangles } = contactAt(step.first, bodies);
   touching = triangles;
@@ -494,8 +500,7 @@ element("back").addEventListener("click", () => {
   isMoved = true;
 });
 method.addEventListener("change", () => {
-  detector.dispose();
-  detector = openDetector(bodies);
+  openDetector();
   step = null;
   isMoved = true;
   void openGpu();

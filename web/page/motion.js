@@ -16,6 +16,9 @@ export function pose({ pose: steady, frames, positions, offset }, at, to) {
   return to;
 }
 
+// A body as a scene takes it.
+export const meshOf = ({ index, corners, now }) => ({ [corners === 4 ? "tetrahedra" : "faces"]: index, positions: now });
+
 // The box around all frames of all bodies.
 export function extentOf(given) {
   const box = emptyBox();

@@ -4,24 +4,23 @@ import { pose } from "./motion.js";
 import { counted, grouped } from "./panel.js";
 import { cornersOf, emptyBox, extend } from "./places.js";
 
-// Asks a detector about the step from frame `from` on. `startPairs` asks it for the pairs of what it holds. Returns the number of contacts,
-// their hash, the first one or `null`, and all of this in words.
-export function askStep(detector, bodies, from, withSelf, startPairs) {
+// Asks a detector about the step of a scene from frame `from` on. Returns the number of contacts, their hash, the first one or `null`, and
+// all of this in words.
+export function askStep(detector, scene, bodies, from, which) {
   for (const [ix, body] of bodies.entries()) {
-    detector.setPositions(ix, pose(body, from, body.now.slice()));
-    if (body.frames) detector.setEndPositions(ix, pose(body, from + 1, body.now.slice()));
+    scene.setPositions(ix, pose(body, from, body.now.slice()));
+    if (body.frames) scene.setEndPositions(ix, pose(body, from + 1, body.now.slice()));
   }
-  const nStart = startPairs().length / 4;
-  const impacts = detector.impacts({ which: withSelf ? "all" : "between" });
-  const { hash } = detector;
-  const n = impacts.length;
-  const first = [...impacts].reduce((least, impact) => (impact.time < (least?.time ?? 2) ? impact : least), null);
+  const nStart = detector.count(scene, { which });
+  const impacts = detector.impacts(scene, { which });
+  const { length: n, hash } = impacts;
+  const first = [...impacts].reduce((least, impact) => (impact.toi < (least?.toi ?? 2) ? impact : least), null);
   const before = nStart > 0 ? `Frame ${from} intersects already. ` : "";
   const way = `${before}On the way to frame ${from + 1}`;
   if (first === null) return { n, hash, first, text: `${way} nothing ${nStart > 0 ? "else " : ""}touches.` };
-  const { kind, bodyA, elementA, bodyB, elementB, time, atStart } = first;
+  const { kind, bodyA, elementA, bodyB, elementB, toi, atStart } = first;
   const who = `${elementName(bodies, kind[0], bodyA, elementA)} and ${elementName(bodies, kind[1], bodyB, elementB)}`;
-  const when = atStart ? "at the start" : `at ${Number(time.toPrecision(6))} of the way`;
+  const when = atStart ? "at the start" : `at ${Number(toi.toPrecision(6))} of the way`;
   return { n, hash, first, text: `${way}: ${counted(n, "contact")}. First ${when}, ${who}.` };
 }
 

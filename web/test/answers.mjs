@@ -1,180 +1,269 @@
 // Answers the scenes with the installed package. package.mjs runs this file in Node and imports it in a page.
 
-function arrays({ index, positions }) {
-  return [Uint32Array.from(index), Float32Array.from(positions)];
+function addAll(scene, bodies) {
+  for (const { corners, index, positions, end } of bodies) {
+    const kind = corners === 4 ? "tetrahedra" : "faces";
+    const body = scene.add({ [kind]: Uint32Array.from(index), positions: Float32Array.from(positions) });
+    scene.setEndPositions(body, Float32Array.from(end));
+  }
 }
 
-// `betweenAll` gives the rows of `everything` whose bodies differ.
-function mustBeDifferent(all, between) {
-  const rows = [];
-  for (let at = 0; at < all.length; at += 4) if (all[at] !== all[at + 2]) rows.push(...all.subarray(at, at + 4));
-  if (String(rows) !== String([...between])) throw new Error(`${between.length / 4} pairs of different bodies, not ${rows.length / 4}`);
+function mustBe(is, text) {
+  if (!is) throw new Error(text);
+}
+
+// Pairs of different bodies are the rows of all pairs whose bodies differ, and parts of an answer are its rows.
+function mustFit(all, between, scene) {
+  const rows = [...all].filter(([a, , b]) => a !== b);
+  mustBe(String(rows) === String([...between]), `${between.length} pairs of different bodies, not ${rows.length}`);
+  let n = 0;
+  for (const a of scene.bodies) {
+    n += all.selfOf(a).length / 2;
+    for (const b of scene.bodies.filter((b) => b > a)) n += all.between(a, b).length / 2;
+    const hit = new Set([...all].flatMap(([c, i, d, j]) => [[c, i], [d, j]]).filter(([c]) => c === a).map(([, i]) => i));
+    mustBe(all.colliding(a).length === hit.size, `${hit.size} elements of ${a} are in a pair`);
+  }
+  mustBe(n === all.length, `${n} pairs by bodies, not ${all.length}`);
 }
 
 export async function cpu(module, scenes) {
-  const { default: init, Detector } = await import(module);
+  const { default: init, Detector, Scene } = await import(module);
   await init();
   const answers = [];
   for (const { name, sharedVertex, bodies } of scenes) {
-    // "resolve" is what a detector does unless it is told.
-    const rule = sharedVertex === "resolve" ? {} : { sharedVertex };
+    // "resolve" is what a query does unless it is told.
+    const query = sharedVertex === "resolve" ? {} : { sharedVertex };
+    const scene = new Scene();
+    addAll(scene, bodies);
     for (const method of ["auto", "clusters", "cells"]) {
-      const detector = new Detector({ ...rule, method });
-      for (const [ix, body] of bodies.entries()) {
-        if (body.corners === 4) detector.addTetrahedra(...arrays(body));
-        else detector.add(...arrays(body));
-        detector.setEndPositions(ix, Float32Array.from(body.end));
-      }
-      const all = detector.everything();
-      const pairs = all.length / 4;
-      const { hash } = detector;
-      mustBeDifferent(all, detector.betweenAll());
-      const impacts = detector.impacts();
-      const impactsHash = detector.hash;
-      const { kind, time } = [...impacts].find(({ atStart }) => !atStart);
-      answers.push({ name, pairs, hash, impacts: impacts.length, impactsHash, first: { kind, time } });
+      const detector = new Detector({ method });
+      const pairs = detector.detect(scene, query);
+      mustFit(pairs, detector.detect(scene, { ...query, which: "between" }), scene);
+      mustBe(detector.count(scene, query) === pairs.length && detector.any(scene, query), "count and any");
+      const impacts = detector.impacts(scene);
+      const { kind, toi } = [...impacts].find(({ atStart }) => !atStart);
+      const first = { kind, toi };
+      answers.push({ name, pairs: pairs.length, hash: pairs.hash, impacts: impacts.length, impactsHash: impacts.hash, first });
       detector.dispose();
     }
+    scene.dispose();
   }
   return answers;
 }
 
 export async function webgpu(module, scenes, method) {
-  const { default: init, GpuDetector } = await import(module);
+  const { default: init, Detector, Scene } = await import(module);
   await init();
   const answers = [];
   for (const { name, sharedVertex, bodies } of scenes) {
-    const detector = await GpuDetector.open({ sharedVertex, method });
-    // Nothing is awaited before the answer: calls keep their order.
-    for (const body of bodies) {
-      if (body.corners === 4) void detector.addTetrahedra(...arrays(body));
-      else void detector.add(...arrays(body));
-    }
-    const { pairs, hash, statistics } = await detector.everything();
-    if (statistics.backend === "cpu" || statistics.method !== method) {
-      throw new Error(`answered by ${statistics.backend} with ${statistics.method}`);
-    }
-    mustBeDifferent(pairs, (await detector.betweenAll()).pairs);
+    const detector = await Detector.open({ method });
+    const scene = new Scene();
+    addAll(scene, bodies);
+    const query = { sharedVertex };
+    // Nothing is awaited: questions keep their order, and each is about the scene as it was.
+    const asked = [detector.detect(scene, query), detector.detect(scene, { ...query, which: "between" }), detector.count(scene, query)];
+    const steps = [detector.impacts(scene), detector.isFree(scene)];
+    const before = scene.bodies.map((body) => scene.positions(body));
+    for (const body of scene.bodies) scene.setPositions(body, before[body].map((x) => x + 1000 * body));
+    const [pairs, between, n] = await Promise.all(asked);
+    const [impacts, isFree] = await Promise.all(steps);
+    const { stats } = pairs;
+    mustBe(stats.backend !== "cpu" && stats.method === method, `answered by ${stats.backend} with ${stats.method}`);
+    mustFit(pairs, between, scene);
+    mustBe(n === pairs.length && !isFree, "count and isFree");
     await detector.dispose();
-    answers.push({ name, pairs: pairs.length / 4, hash });
+    answers.push({ name, pairs: pairs.length, hash: pairs.hash, impacts: impacts.length, impactsHash: impacts.hash });
   }
   return answers;
 }
 
 // Where a mesh from a file meets itself.
-function found(Detector, { index, positions, corners }) {
-  const detector = new Detector();
-  const body = corners === 4 ? detector.addTetrahedra(index, positions) : detector.add(index, positions);
-  const pairs = detector.within(body).length / 2;
-  const { hash } = detector;
+function found({ Detector, Scene }, { faces, tetrahedra, positions }) {
+  const [detector, scene] = [new Detector(), new Scene()];
+  const selfOf = scene.add({ faces, tetrahedra, positions });
+  const { length: pairs, hash } = detector.detect(scene, { selfOf });
   detector.dispose();
+  scene.dispose();
   return { pairs, hash };
 }
 
-// The text of the error that a call throws, or of its rejection.
+// The text of the error that a call throws, or of its rejection; of those of the package with their code.
 async function refusal(call) {
   try {
     await call();
   } catch (error) {
-    return `${error.constructor.name}: ${error.message}`;
+    return `${error.code ?? error.constructor.name}: ${error.message}`;
   }
   return "nothing was refused";
 }
 
+const TRIANGLE = [0, 0, 0, 1, 0, 0, 0, 1, 0];
+
 // Calls that must be refused, and what they say.
 export async function refusals(module) {
-  const { default: init, Detector } = await import(module);
+  const { default: init, Detector, ImpingeError, Scene } = await import(module);
   const said = {};
   said.early = await refusal(() => new Detector());
   await init();
-  const detector = new Detector();
+  const [detector, scene] = [new Detector(), new Scene()];
   const index = new Uint16Array([0, 1, 2]);
-  const triangle = new Float64Array([0, 0, 0, 1, 0, 0, 0, 1, 0]);
-  const a = detector.add(index, triangle);
-  said.number = await refusal(() => detector.setPositions(a, new Float32Array([0, 0, NaN, 1, 0, 0, 0, 1, 0])));
-  said.index = await refusal(() => detector.add(new Uint32Array([0, 1, 7]), triangle));
-  said.ragged = await refusal(() => detector.add(index, triangle.subarray(1)));
-  said.plain = await refusal(() => detector.add([0, 1, 2], triangle));
-  said.list = await refusal(() => detector.add(index, [...triangle]));
-  said.unknown = await refusal(() => detector.within(4));
-  said.wrong = await refusal(() => detector.between(a, "b"));
-  said.self = await refusal(() => detector.between(a, a));
+  const triangle = new Float64Array(TRIANGLE);
+  const a = scene.addTriangles(index, triangle);
+  const ask = (question, ...rest) => refusal(() => detector[question](scene, ...rest));
+  said.number = await refusal(() => scene.setPositions(a, new Float32Array([0, 0, NaN, 1, 0, 0, 0, 1, 0])));
+  said.index = await refusal(() => scene.addTriangles(new Uint32Array([0, 1, 7]), triangle));
+  said.ragged = await refusal(() => scene.addTriangles(index, triangle.subarray(1)));
+  said.plain = await refusal(() => scene.addTriangles([0, 1, 2], triangle));
+  said.list = await refusal(() => scene.addPoints([...triangle]));
+  said.kinds = await refusal(() => scene.add({ faces: index, edges: index, positions: triangle }));
+  said.mesh = await refusal(() => scene.add({ index, positions: triangle }));
+  said.matrix = await refusal(() => scene.setTransform(a, [1, 0, 0]));
+  said.thickness = await refusal(() => scene.setThickness(a, -1));
+  said.unknown = await ask("detect", { selfOf: 4 });
+  said.wrong = await ask("detect", { between: [a, "b"] });
+  said.two = await ask("detect", { between: [a] });
+  said.self = await ask("detect", { between: [a, a] });
   said.method = await refusal(() => new Detector({ method: "octree" }));
-  said.option = await refusal(() => new Detector({ metod: "cells" }));
-  said.clearance = await refusal(() => detector.impacts({ clearance: -1 }));
-  said.start = await refusal(() => detector.isFree({ start: "never" }));
-  said.earliest = await refusal(() => detector.earliest({ bodies: [a], seperation: 5 }));
-  said.which = await refusal(() => detector.impacts({ which: "self" }));
-  said.separation = await refusal(() => detector.impacts({ separation: NaN }));
+  said.setting = await refusal(() => new Detector({ metod: "cells" }));
+  said.clearance = await ask("impacts", { clearance: -1 });
+  said.start = await ask("isFree", { start: "never" });
+  said.field = await ask("earliest", { selfOf: a, seperation: 5 });
+  said.which = await ask("impacts", { which: "none" });
+  said.both = await ask("impacts", { which: "self", of: a });
+  said.separation = await ask("impacts", { separation: NaN });
+  said.text = await ask("near", "1");
+  said.inflation = await ask("candidates", -1);
+  said.control = await ask("distance", a, a, { start: "skip" });
+  said.scene = await refusal(() => detector.detect({}));
+  said.pairs = await ask("contacts", []);
+  said.kind = await refusal(() => detector.near(scene, 1).of("fv"));
+  // Which pairs: a question that cannot honour an option says so. All others give an answer.
+  const which = { kinds: ["ef"], sharedVertex: "skip", exclude: [[a, a]], ownedBy: [[0, 0, 0], [1, 1, 1]], which: "between", of: a };
+  const questions = { detect: [], count: [], any: [], impacts: [], earliest: [], isFree: [], advance: [], candidates: [0], near: [0] };
+  said.options = {};
+  for (const [question, rest] of Object.entries(questions)) {
+    for (const [option, value] of Object.entries(which)) {
+      const text = await ask(question, ...rest, { [option]: value });
+      if (text !== "nothing was refused") said.options[`${question} ${option}`] = text.replace(/ given.*/, "");
+    }
+  }
+  // Signals and progress.
+  const reason = new Error("enough");
+  said.aborted = await ask("detect", { signal: AbortSignal.abort(reason) });
+  said.reason = await refusal(() => {
+    try {
+      detector.distance(scene, a, a, { signal: AbortSignal.abort(reason) });
+    } catch (error) {
+      throw error instanceof ImpingeError ? error.cause : error;
+    }
+  });
+  said.signal = await ask("detect", { signal: true });
   // The refused calls left it as it was.
-  const b = detector.add(new Uint8Array([0, 1, 2]), Float32Array.from(triangle));
-  said.pairs = [...detector.between(a, b)];
-  detector.setPositions(b, triangle.map((x) => x + 4));
-  said.apart = [...detector.between(a, b)];
+  const b = scene.addTriangles(new Uint8Array([0, 1, 2]), Float32Array.from(triangle));
+  said.found = [...detector.detect(scene, { between: [a, b] }).rows];
+  scene.setPositions(b, triangle.map((x) => x + 4));
+  said.apart = detector.any(scene);
+  const least = await refusal(() => new Detector({ memoryBudget: 1 }).detect(scene));
+  said.budget = least.replace(/, but.*/, "");
+  scene.setPositions(b, triangle);
+  scene.addTriangles(index, triangle);
+  const most = await refusal(() => new Detector({ maxPairs: 1 }).detect(scene));
+  said.most = most.replace(/ \d pairs/, " pairs");
+  scene.dispose();
+  said.gone = await ask("detect");
   detector.dispose();
-  said.disposed = await refusal(() => detector.within(a));
+  said.disposed = await ask("detect");
   return said;
 }
 
 export const REFUSALS = {
-  early: "Error: impinge is not loaded yet: await init() first",
-  number: "Error: body 0: vertex 0 has a non-finite position (0, 0, NaN)",
-  index: "Error: body 1: primitive 0 names vertex 7, but there are 3 vertices",
-  ragged: "Error: positions: 8 numbers given, not a multiple of 3",
-  plain: "TypeError: index: a Uint32Array, a Uint16Array or a Uint8Array is needed",
-  list: "TypeError: positions: a Float32Array or a Float64Array is needed",
-  unknown: "Error: there is no body 4: 1 have been added, and 0 of them removed",
-  wrong: "RangeError: body: b given, a number that add() returned is needed",
-  self: "Error: a query between body 0 and itself: ask for collisions within it instead",
-  method: 'Error: method: "octree" given, "auto", "clusters", "cells" or "naive" allowed',
-  option: 'TypeError: options: "metod" given, "method" or "sharedVertex" allowed',
-  clearance: "Error: clearance: -1 given, a finite number that is not below 0 allowed",
-  start: 'Error: start: "never" given, "report", "skip" or "verify" allowed',
-  earliest:
-    'TypeError: options: "seperation" given, "bodies", "which", "start", "toi", "separation", "clearance" or "clearanceShare" allowed',
-  which: 'RangeError: which: "self" given, "all" or "between" allowed',
-  separation: "Error: separation: NaN given, a finite number that is not below 0 allowed",
-  pairs: [0, 0],
-  apart: [],
-  disposed: "Error: this detector has been disposed of",
+  early: "invalid: impinge is not loaded yet: await init() first",
+  number: "invalid: body 0: vertex 0 has a non-finite position (0, 0, NaN)",
+  index: "invalid: body 1: primitive 0 names vertex 7, but there are 3 vertices",
+  ragged: "invalid: positions: 8 numbers given, not a multiple of 3",
+  plain: "invalid: index: a Uint32Array, a Uint16Array or a Uint8Array is needed",
+  list: "invalid: positions: a Float32Array or a Float64Array is needed",
+  kinds: "invalid: mesh: elements of several kinds given, one of faces, tetrahedra and edges allowed",
+  mesh: 'invalid: mesh: "index" given, positions, faces, tetrahedra or edges allowed',
+  matrix: "invalid: transform: 3 numbers given, 16 allowed, column by column",
+  thickness: "invalid: thickness: -1 given, a finite number that is not below 0 allowed",
+  unknown: "invalid: there is no body 4: 1 have been added, and 0 of them removed",
+  wrong: "invalid: body: b given, a number that a scene returned is needed",
+  two: "invalid: between: 0 given, two bodies are needed",
+  self: "invalid: a query between body 0 and itself: ask for collisions within it instead",
+  method: 'invalid: method: "octree" given, "auto", "clusters", "cells" or "naive" allowed',
+  setting: 'invalid: settings: "metod" given, method, recluster, memoryBudget or maxPairs allowed',
+  clearance: "invalid: clearance: -1 given, a finite number that is not below 0 allowed",
+  start: 'invalid: start: "never" given, "report", "skip" or "verify" allowed',
+  field:
+    'invalid: query: "seperation" given, which, between, selfOf, of, kinds, sharedVertex, exclude, ownedBy, start, separation, clearance, ' +
+    "clearanceShare, precision, distances, closestPoints, signal or progress allowed",
+  which: 'invalid: which: "none" given, "all", "between" or "self" allowed',
+  both: 'invalid: query: "which" and "of" given, one of them allowed',
+  separation: "invalid: separation: NaN given, a finite number that is not below 0 allowed",
+  text: "invalid: distance: 1 given, a number is needed",
+  inflation: "invalid: inflation: -1 given, a finite number that is not below 0 allowed",
+  control: 'invalid: control: "start" given, signal or progress allowed',
+  scene: "invalid: scene: a Scene of the same module is needed",
+  pairs: "invalid: pairs: what detect() returned is needed",
+  kind: 'invalid: kind: "fv" given, "vf", "ee", "ev", "vv", "ef" or "ff" allowed',
+  options: {
+    "detect kinds": "invalid: kinds: kinds of pairs of vertices, edges and faces",
+    "count kinds": "invalid: kinds: kinds of pairs of vertices, edges and faces",
+    "any kinds": "invalid: kinds: kinds of pairs of vertices, edges and faces",
+    "impacts kinds": "invalid: kinds: ef",
+    "earliest kinds": "invalid: kinds: ef",
+    "isFree kinds": "invalid: kinds: ef",
+    "advance kinds": "invalid: kinds: ef",
+    "advance ownedBy": "invalid: owned_by: a cell for the way that a step can be taken",
+  },
+  aborted: "cancelled: cancelled",
+  reason: "Error: enough",
+  signal: "invalid: signal: an AbortSignal is needed",
+  found: [0, 0, 1, 0],
+  apart: false,
+  budget: "budget: the memory budget is 1 bytes",
+  most: "too_many_pairs: pairs and more were found, and at most 1 are allowed",
+  gone: "invalid: this scene has been disposed of",
+  disposed: "invalid: this detector has been disposed of",
 };
 
 // A triangle whose edge is inside another, and a third that falls on both; and a welded seam.
 export async function steps(module) {
-  const { default: init, Detector, weld } = await import(module);
+  const { default: init, Detector, Scene, weld } = await import(module);
   await init();
-  const detector = new Detector();
+  const [detector, scene] = [new Detector(), new Scene()];
   const index = new Uint8Array([0, 1, 2]);
-  const flat = detector.add(index, new Float32Array([0, 0, 0, 1, 0, 0, 0, 1, 0]));
-  const across = detector.add(index, new Float32Array([0.25, 0.25, -1, 0.25, 0.25, 1, 2, 2, 0]));
+  const flat = scene.addTriangles(index, new Float32Array(TRIANGLE));
+  const across = scene.addTriangles(index, new Float32Array([0.25, 0.25, -1, 0.25, 0.25, 1, 2, 2, 0]));
   const start = "verify";
-  const unasked = [detector.impacts().startIntersects, detector.startIntersects, detector.isFree()];
-  const asked = [detector.impacts({ start }).startIntersects, detector.startIntersects, detector.isFree({ start })];
-  const { fraction: stuck, startIntersects, first: none } = detector.advance({ start });
-  detector.earliest({ bodies: [flat], start });
-  const clean = detector.startIntersects;
-  detector.remove(across);
-  const falling = detector.add(index, new Float64Array([0.25, 0.25, 1, 0.5, 0.25, 2, 0.25, 0.5, 2]));
-  detector.setEndPositions(falling, new Float64Array([0.25, 0.25, -1, 0.5, 0.25, 0, 0.25, 0.5, 0]));
-  const { time } = detector.earliest({ toi: "f64", clearance: 0.5, clearanceShare: 0.75 });
-  const advance = detector.advance({ start, toi: "f64", clearance: 10, clearanceShare: 0.25 });
+  const unasked = [detector.impacts(scene).startIntersects, detector.isFree(scene)];
+  const asked = [detector.impacts(scene, { start }).startIntersects, detector.isFree(scene, { start })];
+  const { fraction: stuck, startIntersects, first: none } = detector.advance(scene, { start });
+  const clean = detector.impacts(scene, { selfOf: flat, start }).startIntersects;
+  scene.remove(across);
+  const falling = scene.addTriangles(index, new Float64Array([0.25, 0.25, 1, 0.5, 0.25, 2, 0.25, 0.5, 2]));
+  scene.setEndPositions(falling, new Float64Array([0.25, 0.25, -1, 0.5, 0.25, 0, 0.25, 0.5, 0]));
+  const { toi } = detector.earliest(scene, { precision: "f64", clearance: 0.5, clearanceShare: 0.75 });
+  const advance = detector.advance(scene, { start, precision: "f64", clearance: 10, clearanceShare: 0.25 });
   const { first, nTried, fraction } = advance;
   const height = advance.positions(falling)[2];
-  advance.apply(detector);
-  const still = detector.isFree();
-  detector.dispose();
+  advance.apply(scene);
+  const still = detector.isFree(scene);
   // Two triangles that share an edge, with its vertices repeated; the second in another frame.
   const seam = new Float32Array([0, 0, 0, 1, 0, 0, 0, 1, 0, 1, 0, 0, 0, 1, -0, 1, 1, 0]);
   const { mesh, map, positions } = weld({ positions: seam, faces: new Uint16Array([0, 1, 2, 3, 5, 4]), edges: new Uint8Array([1, 9]) });
   const moved = positions(Float64Array.from(seam, (x) => x + 1));
+  detector.dispose();
+  scene.dispose();
   return {
     unasked,
     asked,
     stuck: [stuck, startIntersects, none],
     clean,
-    time,
+    toi,
     // With a clearance the time has a margin for rounding.
-    first: [first.kind, first.bodyA, first.bodyB, first.time > 0.37 && first.time <= 0.375],
+    first: [first.kind, first.bodyA, first.bodyB, first.toi > 0.37 && first.toi <= 0.375],
     isTried: nTried > 0,
     reached: [fraction > 0.37 && fraction <= 0.375, Math.abs(height - (1 - 2 * fraction)) < 1e-9],
     others: [advance.startIntersects, advance.positions(flat), still],
@@ -191,11 +280,11 @@ export async function steps(module) {
 }
 
 export const STEPS = {
-  unasked: [null, null, true],
-  asked: [true, true, false],
+  unasked: [null, true],
+  asked: [true, false],
   stuck: [0, true, null],
   clean: false,
-  time: 0.25,
+  toi: 0.25,
   first: ["vf", 2, 0, true],
   isTried: true,
   reached: [true, true],
@@ -206,9 +295,111 @@ export const STEPS = {
   isSolid: false,
   map: [0, 1, 2, 1, 2, 3],
   moved: ["Float64Array", 1, 1, 1, 2, 1, 1, 1, 2, 1, 2, 2, 1],
-  short: "RangeError: positions: 15 numbers given for a weld of 6 vertices",
-  ragged: "Error: positions: 17 numbers given, not a multiple of 3",
-  misspelt: 'TypeError: options: "index" given, "positions", "faces", "tetrahedra" or "edges" allowed',
+  short: "invalid: positions: 15 numbers given for a weld of 6 vertices",
+  ragged: "invalid: positions: 17 numbers given, not a multiple of 3",
+  misspelt: 'invalid: mesh: "index" given, positions, faces, tetrahedra or edges allowed',
+};
+
+// A strand and points above a triangle, and two tetrahedra as closed surfaces of which one's tip is in the other. The scene is that of
+// either module, and so is the detector: each answer is awaited.
+export async function others(module) {
+  const { default: init, Detector, Scene } = await import(module);
+  await init();
+  const detector = Detector.open ? await Detector.open() : new Detector();
+  let scene = new Scene();
+  const index = new Uint8Array([0, 1, 2]);
+  const flat = scene.addTriangles(index, new Float32Array(TRIANGLE));
+  const strand = scene.addEdges(new Uint8Array([0, 1]), new Float32Array([0.25, 0.25, 1, 0.25, 0.25, 2]));
+  const cloud = scene.addPoints(new Float64Array([5, 5, 5, 0.5, 0.25, 3]));
+  const near = await detector.near(scene, 1, { which: "between", closestPoints: true });
+  const [pair] = near;
+  const candidates = await detector.candidates(scene, 0.5, { kinds: ["vf", "ee"] });
+  const nearest = await detector.distance(scene, strand, flat);
+  scene.setThickness(strand, 1);
+  const thick = await detector.near(scene, 0, { between: [flat, strand] });
+  scene.setTransform(cloud, [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, -3, 1]);
+  const onFlat = [...(await detector.detect(scene)).rows];
+  const [now, rest] = [scene.positions(cloud)[5], scene.restPositions(cloud)[5]];
+  scene.setFilter(cloud, 2, 2n);
+  const filtered = await detector.any(scene, { which: "between" });
+  scene.setFilter(cloud);
+  const excluded = await detector.count(scene, { exclude: [[flat, cloud]] });
+  scene.remesh(cloud, { edges: new Uint8Array([0, 1]), positions: new Float32Array([0, 0, -1, 0.5, 0.5, 1]) });
+  const described = [scene.kind(cloud), scene.nElements(cloud), scene.nVertices(cloud), [...scene.elements(cloud)], [...scene.edges(flat)]];
+  scene.setEndPositions(strand, new Float32Array(6));
+  const end = [scene.endPositions(strand)?.length, scene.endPositions(flat)];
+  scene.setEndPositions(strand, null);
+  end.push(scene.endPositions(strand));
+  scene.dispose();
+  scene = new Scene();
+  const faces = new Uint8Array([0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3]);
+  const solid = new Float32Array([0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1]);
+  const low = scene.addTriangles(faces, solid);
+  const tip = scene.addTriangles(faces, solid.map((x, ix) => x + [0.1, 0.125, -0.875][ix % 3]));
+  const pairs = await detector.detect(scene);
+  const contacts = await detector.contacts(scene, pairs);
+  const [curves, [region]] = [contacts.curves(), contacts.regions()];
+  const penetration = await detector.penetration(scene, contacts, tip, low);
+  const [deep] = penetration.regions;
+  const none = await detector.contacts(scene, await detector.detect(scene, { which: "self" }));
+  let n = 0;
+  let stopped = null;
+  try {
+    await detector.near(scene, 1, { progress: () => ((n += 1), false) });
+  } catch ({ code }) {
+    stopped = code;
+  }
+  const controller = new AbortController();
+  const aborted = await refusal(() => detector.impacts(scene, { signal: controller.signal, progress: () => controller.abort() }));
+  const thrown = await refusal(() => detector.impacts(scene, { progress: () => { throw new Error("mine"); } }));
+  const { backend, totalMs } = contacts.stats;
+  return {
+    near: [near.length, pair.kind, pair.bodyA, pair.elementA, pair.bodyB, pair.distance, pair.points, pair.features],
+    columns: [near.distances.length, near.points.length / 6, near.kinds.length, near.of("ee").length, near.of("vf").at(-1).distance],
+    noColumns: [thick.length, thick.distances, thick.points],
+    candidates: [candidates.length, [...candidates.of("ee").rows].length / 4, candidates.at(0)?.kind ?? null],
+    nearest,
+    onFlat,
+    moved: [now, rest],
+    filtered,
+    excluded,
+    described,
+    end,
+    contacts: [contacts.length === pairs.length, contacts.hash === pairs.hash, contacts.at(0).shape, contacts.at(0).corners.length],
+    curves: [curves.length, [...curves.closed], [...curves.directed], curves.starts.length, curves.points.length === contacts.points.length / 3],
+    region: [region.bodies, region.contacts.length, region.depth, region.normal[2] > 0.9, region.length === curves.lengths[0]],
+    penetration: [penetration.bodies, penetration.inside.map((inside) => [...inside]), penetration.volume > 0, penetration.regions.length],
+    deep: [deep.depth > 0 && deep.depth <= 0.125, deep.volume === penetration.volume, deep.inside.map((inside) => [...inside])],
+    none: [none.length, none.hash, none.points.length, none.curves().length, none.regions()],
+    stopped: [n > 0, stopped],
+    aborted,
+    thrown,
+    stats: [backend, totalMs >= 0],
+  };
+}
+
+export const OTHERS = {
+  near: [1, "vf", 1, 0, 0, 1, [[0.25, 0.25, 1], [0.25, 0.25, 0]], [0, 16]],
+  columns: [1, 1, 1, 0, 1],
+  noColumns: [1, null, null],
+  candidates: [4, 3, "vf"],
+  nearest: { distance: 1, bodyA: 1, elementA: 0, bodyB: 0, elementB: 0, points: [[0.25, 0.25, 1], [0.25, 0.25, 0]] },
+  onFlat: [0, 0, 2, 1],
+  moved: [0, 3],
+  filtered: false,
+  excluded: 0,
+  described: ["edges", 1, 2, [0, 1], [0, 1, 0, 2, 1, 2]],
+  end: [6, null, null],
+  contacts: [true, true, "segment", 2],
+  curves: [1, [1], [1], 2, true],
+  region: [[0, 1], 3, null, true, true],
+  penetration: [[0, 1], [[], [3]], true, 1],
+  deep: [true, true, [[], [3]]],
+  none: [0, "0000000000000000", 0, 0, []],
+  stopped: [true, "cancelled"],
+  aborted: "cancelled: cancelled",
+  thrown: "Error: mine",
+  stats: ["cpu", true],
 };
 
 if (globalThis.process?.argv?.[1]?.endsWith("answers.mjs")) {
@@ -217,32 +408,32 @@ if (globalThis.process?.argv?.[1]?.endsWith("answers.mjs")) {
   const said = await refusals("impinge");
   const answers = await cpu("impinge", scenes);
   const taken = await steps("impinge");
-  const { default: init, GpuDetector, readBodies, readFrames, readMesh, weld } = await import("impinge/webgpu");
-  const { Detector } = await import("impinge");
+  const more = await others("impinge");
+  const { default: init, Detector, read, readBodies, readFrames, weld } = await import("impinge/webgpu");
+  const onCpu = await import("impinge");
   await init();
   const doors = {};
   for (const name of await readdir("doors")) {
     if (name.endsWith(".json")) continue;
     const bytes = await readFile(`doors/${name}`);
-    doors[name] = found(Detector, readMesh(name, bytes));
+    doors[name] = found(onCpu, read(name, bytes));
     const bodies = readBodies(name, bytes);
     if (bodies.length > 1) doors[name].bodies = bodies.map((body) => body.name);
   }
   const text = "v 0 0 0\nv 1 0 0\nv 0 0 0\nv 0 1 0\nf 1 2 4\n";
-  const mesh = readMesh("triangle.obj", new TextEncoder().encode(text));
+  const mesh = read("triangle.obj", new TextEncoder().encode(text));
   // Two frames of one vertex.
   const mdd = new Uint8Array(40);
   const view = new DataView(mdd.buffer);
   for (const [at, n] of [[0, 2], [4, 1]]) view.setInt32(at, n);
   for (const [ix, x] of [1, 2, 3, 4, 5, 6].entries()) view.setFloat32(16 + 4 * ix, x);
   const frames = readFrames("run.mdd", mdd).map((frame) => [...frame]);
-  const noGpu = await refusal(() => GpuDetector.open());
-  const broken = await refusal(() => readMesh("a.txt", new Uint8Array()));
+  const noGpu = await refusal(() => Detector.open());
+  const broken = await refusal(() => read("a.txt", new Uint8Array()));
   const cut = await refusal(() => readFrames("cut.mdd", mdd.subarray(1)));
-  const misspelt = [readMesh, readBodies].map((read) => refusal(() => read("triangle.obj", new TextEncoder().encode(text), { wield: false })));
+  const misspelt = [read, readBodies].map((read) => refusal(() => read("triangle.obj", new TextEncoder().encode(text), { wield: false })));
   const options = await Promise.all(misspelt);
-  const { corners } = mesh;
   const { map: welded } = weld({ positions: new Float64Array([1, 2, 3, 1, 2, 3]) });
-  const read = { welded: [...welded], index: [...mesh.index], positions: [...mesh.positions], corners, map: [...mesh.map], frames, noGpu, broken, cut, options };
-  process.stdout.write(JSON.stringify({ said, answers, taken, read, doors }));
+  const files = { welded: [...welded], faces: [...mesh.faces], positions: [...mesh.positions], map: [...mesh.map], frames };
+  process.stdout.write(JSON.stringify({ said, answers, taken, more, read: { ...files, noGpu, broken, cut, options }, doors }));
 }

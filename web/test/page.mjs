@@ -103,7 +103,7 @@ function native(command, ...args) {
 async function sameAsProgram(page, command, names, ...more) {
   const paths = names.map((name) => (name.includes("/") ? name : join(files, name)));
   const { hash, pairs: n, n_regions: nRegions } = JSON.parse(native(command, ...paths, ...more, "--json"));
-  const csv = native(command, ...paths, ...more, "--pairs", "-").trim().split("\n").slice(1);
+  const csv = native(command, ...paths, ...more, "--rows", "-").trim().split("\n").slice(1);
   const rows = csv.map((line) => line.split(",").map(Number)).flat();
   assert.equal(await hashOf(page, "cpu"), hash, `${command} ${names}: the hash`);
   assert.equal(await pairs(page), typeof n === "number" ? n : csv.length);
@@ -302,14 +302,14 @@ async function frames(browser) {
       const { hash: stepHash, impacts, earliest } = steps[ix];
       const step = await page.evaluate(() => window.page.step);
       assert.deepEqual([step.hash, step.n], [stepHash, impacts], `the step from frame ${ix}`);
-      assert.equal(step.first?.time ?? null, earliest?.toi ?? null, `the first contact after frame ${ix}`);
+      assert.equal(step.first?.toi ?? null, earliest?.toi ?? null, `the first contact after frame ${ix}`);
     }
     return steps.filter(({ earliest }) => earliest !== null && earliest.toi > 0).length;
   };
-  // Bodies that the detector refuses leave the scene as it is, and playing. No small file is refused by it alone.
+  // Bodies that are refused leave the scene as it is, and playing. No small file is refused by it alone.
   await page.locator("#self").check();
   await page.evaluate(async () => {
-    const { prototype } = (await import("impinge")).Detector;
+    const { prototype } = (await import("impinge")).Scene;
     const { add } = prototype;
     prototype.add = () => {
       prototype.add = add;
@@ -336,7 +336,7 @@ async function frames(browser) {
   await page.locator("#step-show").click();
   await settled(page);
   const { step, at } = await page.evaluate(() => ({ step: window.page.step, at: document.getElementById("time-text").textContent }));
-  assert.equal(at, `${Number((2 + step.first.time).toFixed(3))} of 4`);
+  assert.equal(at, `${Number((2 + step.first.toi).toFixed(3))} of 4`);
   await page.waitForTimeout(700);
   await page.screenshot({ path: join(shots, "contact.png") });
   await page.locator("#view").focus();
@@ -656,33 +656,40 @@ function links() {
 // Whatever is opened meanwhile, and however long a detector takes to go, the last one asked for stays, and no other one is held.
 async function latest() {
   const made = [];
-  class GpuDetector {
-    bodies = [];
+  class Detector {
     isDisposed = false;
     slow = new Promise((done) => (this.finish = done));
     static async open() {
-      made.push(new GpuDetector());
+      made.push(new Detector());
       return made.at(-1);
     }
-    async add(index) {
-      if (index === "refused") throw new Error("a bad body");
-      this.bodies.push(index);
-    }
-    async setPositions() {}
-    async betweenAll() {
-      if (this.bodies.includes("lost")) throw new Error("a lost device");
-      return { pairs: [], hash: this.bodies.join(), statistics: {} };
+    async detect({ bodies }) {
+      if (bodies.includes("lost")) throw new Error("a lost device");
+      return { length: 0, hash: bodies.join(), stats: {} };
     }
     async dispose() {
       this.isDisposed = true;
       await this.slow;
     }
   }
+  class Scene {
+    bodies = [];
+    constructor() {
+      made.at(-1).scene = this;
+    }
+    add({ faces }) {
+      if (faces === "refused") throw new Error("a bad body");
+      this.bodies.push(faces);
+    }
+    dispose() {
+      this.isDisposed = true;
+    }
+  }
   const said = [];
   const on = { answer: (n, ms, hash) => said.push(hash), note: (text, isBad) => isBad && said.push(text), stale() {} };
-  const gpu = new Gpu(on, async () => ({ GpuDetector }));
+  const gpu = new Gpu(on, async () => ({ Detector, Scene }));
   const body = (index) => [{ index, corners: 3 }];
-  const held = () => made.filter(({ isDisposed }) => !isDisposed).map(({ bodies }) => bodies.join());
+  const held = () => made.filter(({ isDisposed, scene }) => !isDisposed && !scene.isDisposed).map(({ scene }) => scene.bodies.join());
 
   await gpu.open({}, body("first"));
   // The second waits for the first one to go, and the third does not.
@@ -690,14 +697,14 @@ async function latest() {
   await both[1];
   made[0].finish();
   await both[0];
-  await gpu.ask([], false);
+  await gpu.ask([], "between");
   assert.deepEqual([said, held()], [["third"], ["third"]]);
 
   for (const { finish } of made) finish();
   await gpu.open({}, body("refused"));
   assert.deepEqual([said.pop(), held(), gpu.isReady], ["WebGPU failed: a bad body", [], false]);
   await gpu.open({}, body("lost"));
-  await gpu.ask([], false);
+  await gpu.ask([], "between");
   assert.deepEqual([said.pop(), held(), gpu.isReady], ["WebGPU failed: a lost device", [], false]);
 }
 

@@ -1,45 +1,76 @@
 // Uses all of the package's types; tsc checks it.
 
-import init, { Detector, weld, type Advance, type Body, type Impact, type Statistics, type StepOptions } from "impinge";
-import initGpu, { GpuDetector, readBodies, readFrames, readMesh, type FileMesh } from "impinge/webgpu";
+import init, { Detector, ImpingeError, KINDS, SHAPES, Scene, weld } from "impinge";
+import type { Advance, Body, Contacts, Impact, Nearest, NearPairs, PairKind, Pairs, Penetration, Query, Region, Stats } from "impinge";
+import initGpu, { Detector as GpuDetector, Scene as GpuScene, read, readBodies, readFrames, type FileMesh } from "impinge/webgpu";
 
 await init();
-using detector = new Detector({ method: "cells", sharedVertex: "resolve" });
-const a: Body = detector.add(new Uint16Array([0, 1, 2]), new Float32Array(9));
-const b: Body = detector.addTetrahedra(new Uint32Array([0, 1, 2, 3]), new Float64Array(12));
-detector.setPositions(a, new Float32Array(9));
-detector.setEndPositions(b, new Float64Array(12));
-const pairs: Uint32Array = detector.between(a, b);
-const own: Uint32Array = detector.within(a);
-const all: Uint32Array = detector.everything();
-const different: Uint32Array = detector.betweenAll();
-const first: Impact | null = detector.earliest({ bodies: [a, b], start: "skip", toi: "f64", separation: 0.5 });
-const times: number[] = [...detector.impacts({ which: "between" })].map(({ time }) => time);
-const kind: "vf" | undefined | string = detector.impacts().at(0)?.kind;
-const options: StepOptions = { start: "verify", clearance: 1e-4, clearanceShare: 0.2 };
-const free: boolean = detector.isFree(options);
-const advance: Advance = detector.advance(options);
-advance.apply(detector);
-const known: (boolean | null)[] = [detector.startIntersects, detector.impacts(options).startIntersects, advance.startIntersects];
+using scene = new Scene();
+using detector = new Detector({ method: "cells", recluster: "never", memoryBudget: 2 ** 30, maxPairs: 1e6 });
+const a: Body = scene.addTriangles(new Uint16Array([0, 1, 2]), new Float32Array(9));
+const b: Body = scene.addTetrahedra(new Uint32Array([0, 1, 2, 3]), new Float64Array(12));
+const strand: Body = scene.addEdges(new Uint8Array([0, 1]), new Float32Array(6));
+const cloud: Body = scene.addPoints(new Float32Array(6));
+scene.setPositions(a, new Float32Array(9));
+scene.setEndPositions(b, new Float64Array(12));
+scene.setEndPositions(b, null);
+scene.setTransform(strand, [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]);
+scene.setFilter(cloud, 2, 0xffn);
+scene.setThickness(cloud, 0.5);
+scene.remesh(cloud, { positions: new Float32Array(3) });
+const pairs: Pairs = detector.detect(scene, { between: [a, b] });
+const rows: Uint32Array[] = [pairs.rows, pairs.between(a, b), pairs.selfOf(a), pairs.colliding(b)];
+const numbers: number[] = [...pairs].map(([, i, , j]) => i + j);
+const query: Query = { which: "between", start: "verify", clearance: 1e-4, clearanceShare: 0.2, exclude: [[a, b]] };
+const first: Impact | null = detector.earliest(scene, { of: a, start: "skip", precision: "f64", separation: 0.5 });
+const times: number[] = [...detector.impacts(scene, query).of("vf")].map(({ toi }) => toi);
+const kind: PairKind | undefined = detector.candidates(scene, 0.5, { kinds: ["vf", "ee"] }).at(0)?.kind;
+const free: boolean = detector.isFree(scene, { ...query, signal: AbortSignal.timeout(100), progress: (done, total) => done < total });
+const advance: Advance = detector.advance(scene, query);
+advance.apply(scene);
+const known: (boolean | null)[] = [detector.impacts(scene, query).startIntersects, advance.startIntersects];
+const near: NearPairs = detector.near(scene, 0.5, { closestPoints: true });
+const lengths: (number | undefined)[] = [near.distances?.[0], near.at(-1)?.points?.[1][2]];
+const nearest: Nearest | null = detector.distance(scene, a, b, { progress: () => undefined });
+const contacts: Contacts = detector.contacts(scene, pairs);
+const regions: Region[] = contacts.regions();
+const penetration: Penetration = detector.penetration(scene, contacts, a, b);
+const loops: Uint8Array = contacts.curves().closed;
 const { mesh: whole, positions: frame } = weld({ positions: new Float32Array(9), faces: new Uint16Array([0, 1, 2]) });
 const next: Float64Array = frame(new Float64Array(9));
 const single: Float32Array = whole.positions;
-const statistics: Statistics = detector.statistics;
-const told: string = `${detector.hash} ${statistics.totalMs} ${statistics.stages["pairing"]}`;
-const { primitives, vertices } = detector.size(b);
-detector.remove(b);
+const stats: Stats = detector.stats;
+const told: string = `${pairs.hash} ${stats.totalMs} ${stats.nCandidates} ${stats.stages["pairing"]}`;
+const sizes = [scene.nElements(b), scene.nVertices(b), scene.edges(b).length, scene.faces(b).length, scene.elements(b).length];
+const bodies: Body[] = scene.bodies;
+const held = [scene.positions(a), scene.endPositions(a)?.length, scene.restPositions(a), scene.kind(a)];
+scene.remove(b);
+try {
+  detector.count(scene);
+} catch (error) {
+  if (error instanceof ImpingeError && error.code === "too_many_pairs") console.log(detector.any(scene));
+}
 // @ts-expect-error: positions are not plain arrays
-detector.setPositions(a, [0, 0, 0]);
+scene.setPositions(a, [0, 0, 0]);
 // @ts-expect-error: not a method
 new Detector({ method: "octree" });
-// @ts-expect-error: a question is about two bodies at most
-detector.impacts({ bodies: [0, 1, 2] });
+// @ts-expect-error: pairs are between two bodies
+detector.impacts(scene, { between: [0, 1, 2] });
+// @ts-expect-error: no such field
+detector.detect(scene, { bodies: [0, 1] });
+// @ts-expect-error: a code that there is not
+if (new ImpingeError().code === "wrong") console.log(KINDS, SHAPES);
 
 await initGpu(new URL("impinge_bg.wasm", "http://localhost/"));
 const gpu = await GpuDetector.open();
-const answer = await gpu.between(await gpu.add(new Uint8Array(3), new Float32Array(9)), 1);
-const mesh = readMesh("a.ply", new Uint8Array(), { weld: true });
-const bodies: FileMesh[] = readBodies("a.glb", new Uint8Array());
+const theirs = new GpuScene();
+const mesh: FileMesh = read("a.ply", new Uint8Array(), { weld: true });
+const c: Body = theirs.add(mesh);
+const answer: Pairs = await gpu.detect(theirs, { selfOf: c });
+const any: Promise<boolean> = gpu.any(theirs);
+const parts: FileMesh[] = readBodies("a.glb", new Uint8Array());
 const frames: Float32Array[] = readFrames("a.pc2", new Uint8Array());
 const map: Uint32Array = mesh.map;
-console.log(free, known, next, single, whole.faces, advance.positions(a)?.length, bodies[0]?.name, frames, map, different, await gpu.betweenAll(), pairs, own, all, first, times, kind, told, primitives, vertices, answer.hash, answer.pairs, mesh.corners);
+console.log(rows, numbers, first, times, kind, free, known, lengths, nearest, regions, penetration, loops, next, single, told, sizes, bodies, held);
+console.log(answer.hash, any, parts[0]?.name, frames, map, (await gpu.impacts(theirs)).length, gpu.stats?.backend);
+await gpu.dispose();

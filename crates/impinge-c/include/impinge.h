@@ -240,12 +240,11 @@ typedef struct impinge_element {
  *
  * Which pairs: a question that cannot honour one of these fields refuses it by name.
  *   between, self       1 or 0: pairs of different bodies, pairs of one body. Default: both.
- *   a, b                IMPINGE_ANY_BODY, or a body. Both: pairs between these two, whatever between, self and filters say. `a` alone with
- *                       between = 1, self = 0: pairs of `a` and any other, whatever filters say; with between = 0, self = 1: its
- * self-collision.
+ *   a, b                IMPINGE_ANY_BODY, or a body. Both: pairs between these two, whatever between, self and filters say. `a` alone:
+ *                       pairs of `a` and any other, whatever filters say, its self-collision, or both, as between and self say.
  *   shared_vertex       Default: IMPINGE_RESOLVE.
- *   kinds               Bits of IMPINGE_VF ..., for candidates and near pairs. 0, the default: VF and EE; near pairs also EF; EV and VV
- * where bodies have no faces.
+ *   kinds               Bits of IMPINGE_VF ..., for steps (but EF and FF), candidates and near pairs. 0, the default: VF and EE; near pairs
+ *                       also EF; EV and VV where bodies have no faces.
  *   flags IMPINGE_CELL, cell_low, cell_high
  *                       Only the pairs of the half-open box [low, high): those for which it holds the larger of the lower
  *                       corners of the boxes of both elements, axis by axis. Cells that cover space have each pair once. Bounds may be

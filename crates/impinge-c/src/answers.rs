@@ -4,8 +4,7 @@ use std::mem::offset_of;
 
 use impinge::exact::Feature;
 use impinge::{
-    Candidates, Impact, Impacts, NearPairs, PairKind, Pairs, Statistics, hash_impact_rows,
-    hash_rows,
+    Candidates, Impact, Impacts, NearPairs, PairKind, Pairs, Stats, hash_impact_rows, hash_rows,
 };
 
 use crate::arrays::{self, collect, reserve};
@@ -237,7 +236,7 @@ pub trait Answer {
     const NAME: &'static str;
     fn rows(&self) -> &[Self::Row];
     fn column(&self, column: u32) -> Option<impinge_array>;
-    fn stats(&self) -> (&Statistics, &Texts);
+    fn stats(&self) -> (&Stats, &Texts);
 }
 
 /// A column that an answer has only if it was asked for.
@@ -258,7 +257,7 @@ impl Answer for impinge_pairs {
     fn column(&self, column: u32) -> Option<impinge_array> {
         (column == COLUMN_ROWS).then(|| arrays::field::<_, u32>(&self.rows, 0))
     }
-    fn stats(&self) -> (&Statistics, &Texts) {
+    fn stats(&self) -> (&Stats, &Texts) {
         (self.pairs.stats(), &self.texts)
     }
 }
@@ -279,7 +278,7 @@ impl Answer for impinge_impacts {
             _ => return None,
         })
     }
-    fn stats(&self) -> (&Statistics, &Texts) {
+    fn stats(&self) -> (&Stats, &Texts) {
         (self.impacts.stats(), &self.texts)
     }
 }
@@ -297,7 +296,7 @@ impl Answer for impinge_candidates {
             _ => return None,
         })
     }
-    fn stats(&self) -> (&Statistics, &Texts) {
+    fn stats(&self) -> (&Stats, &Texts) {
         (self.candidates.stats(), &self.texts)
     }
 }
@@ -323,7 +322,7 @@ impl Answer for impinge_near {
             _ => return None,
         })
     }
-    fn stats(&self) -> (&Statistics, &Texts) {
+    fn stats(&self) -> (&Stats, &Texts) {
         (self.near.stats(), &self.texts)
     }
 }

@@ -2,7 +2,7 @@
 
 use std::sync::OnceLock;
 
-use impinge::Statistics;
+use impinge::Stats;
 use impinge::contact::{Contacts, Curves, Penetration, Region, Shape};
 
 use crate::answers::{Answer, answer, impinge_pairs};
@@ -23,7 +23,7 @@ pub struct impinge_contacts {
     hash: u64,
     /// Found when a column of them is first looked at.
     curves: OnceLock<Option<CurveColumns>>,
-    stats: Statistics,
+    stats: Stats,
     texts: Texts,
 }
 
@@ -39,7 +39,7 @@ fn wide(starts: &[usize]) -> Result<Vec<u64>, Failure> {
 }
 
 impl impinge_contacts {
-    fn new(contacts: Contacts, hash: u64, stats: Statistics) -> Result<Self, Failure> {
+    fn new(contacts: Contacts, hash: u64, stats: Stats) -> Result<Self, Failure> {
         let rows = contacts.rows().iter().map(|&row| row.into());
         let shapes = contacts.shapes().iter().map(|shape| match shape {
             Shape::Solid => 0,
@@ -98,7 +98,7 @@ impl Answer for impinge_contacts {
         };
         Some(view)
     }
-    fn stats(&self) -> (&Statistics, &Texts) {
+    fn stats(&self) -> (&Stats, &Texts) {
         (&self.stats, &self.texts)
     }
 }
@@ -130,9 +130,7 @@ pub unsafe extern "C" fn impinge_find_contacts(
     unsafe {
         question(about, (contacts, "contacts"), |of| {
             let pairs = &held(pairs, "pairs")?.pairs;
-            let found = of
-                .detector
-                .contacts_with(&of.scene.scene, pairs, of.control)?;
+            let found = of.detector.contacts(&of.scene.scene, pairs)?;
             impinge_contacts::new(found, pairs.hash(), of.detector.stats().clone())
         })
     }
@@ -142,7 +140,7 @@ pub unsafe extern "C" fn impinge_find_contacts(
 pub struct impinge_penetration {
     penetration: Penetration,
     rows: Vec<impinge_region>,
-    stats: Statistics,
+    stats: Stats,
     texts: Texts,
 }
 
@@ -176,7 +174,7 @@ impl Answer for impinge_penetration {
             _ => None,
         }
     }
-    fn stats(&self) -> (&Statistics, &Texts) {
+    fn stats(&self) -> (&Stats, &Texts) {
         (&self.stats, &self.texts)
     }
 }
@@ -216,10 +214,8 @@ pub unsafe extern "C" fn impinge_find_penetration(
         question(about, (penetration, "penetration"), |of| {
             let contacts = &held(contacts, "contacts")?.contacts;
             let [a, b] = [of.scene.id(a)?, of.scene.id(b)?];
-            let (scene, control) = (&of.scene.scene, of.control);
-            let found = of
-                .detector
-                .penetration_with(scene, contacts, a, b, control)?;
+            let scene = &of.scene.scene;
+            let found = of.detector.penetration(scene, contacts, a, b)?;
             let rows = collect(found.regions.iter().map(region_row), "regions of contact")?;
             Ok::<_, Failure>(impinge_penetration {
                 penetration: found,

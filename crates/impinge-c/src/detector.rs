@@ -2,7 +2,7 @@
 
 use std::cell::Cell;
 use std::ffi::{CStr, CString, c_void};
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex};
 use std::thread::ThreadId;
 use std::time::{Duration, Instant};
 
@@ -98,7 +98,7 @@ impl Watch {
 /// `detector` is NULL or a detector that nobody else uses at the same time.
 pub unsafe fn ask(
     detector: *mut impinge_detector,
-    question: impl FnOnce(&mut Detector, &Control<'_>) -> Result<(), Failure>,
+    question: impl FnOnce(&mut Detector) -> Result<(), Failure>,
 ) -> Status {
     let callbacks = Cell::new(None);
     // SAFETY: the caller's promise.
@@ -107,22 +107,23 @@ pub unsafe fn ask(
             let callbacks_of = held.callbacks;
             callbacks.set(Some(callbacks_of));
             if callbacks_of.cancelled.is_none() && callbacks_of.progress.is_none() {
-                return question(&mut held.detector, &Control::new());
+                return question(&mut held.detector);
             }
-            let watch = Watch {
+            let watch = Arc::new(Watch {
                 callbacks: callbacks_of,
                 caller: std::thread::current().id(),
                 stop: CancelToken::new(),
                 called: Mutex::new(None),
-            };
+            });
             // A question may look only once, and a short one not at all.
             watch.step(Progress { done: 0, total: 1 });
-            let step = |at| watch.step(at);
-            let control = Control::new().cancel(&watch.stop).progress(&step);
             if watch.stop.is_cancelled() {
                 return Err(Error::Cancelled.into());
             }
-            question(&mut held.detector, &control)
+            let control = Control::new().cancel(&watch.stop);
+            let control = control.progress(move |at| watch.step(at));
+            held.detector.set_control(control);
+            question(&mut held.detector)
         })
     };
     if let (Some(callbacks), true) = (callbacks.get(), status != OK) {
@@ -197,8 +198,7 @@ pub unsafe extern "C" fn impinge_detector_create(
             user: given.user,
         };
         // SAFETY: as above.
-        let opened =
-            unsafe { settings(&given) }.and_then(|settings| Ok(Detector::with_settings(settings)?));
+        let opened = unsafe { settings(&given) }.and_then(|settings| Ok(Detector::new(settings)?));
         let made = opened.inspect_err(|failure| callbacks.log(LOG_ERROR, &failure.message))?;
         callbacks.log(
             LOG_INFO,
@@ -256,5 +256,5 @@ pub fn asked(answer: Option<bool>) -> i32 {
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn impinge_test_panic(detector: *mut impinge_detector) -> Status {
     // SAFETY: see `impinge_settings_default`.
-    unsafe { ask(detector, |_, _| panic!("as a test asked")) }
+    unsafe { ask(detector, |_| panic!("as a test asked")) }
 }

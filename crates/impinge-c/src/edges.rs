@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use impinge::{Body, Elements, Kind, PairKind, Part};
+use impinge::{Body, BodyKind, Elements, PairKind, Part};
 
 use crate::arrays::collect;
 use crate::status::Failure;
@@ -19,7 +19,7 @@ pub struct EdgeNumbers {
 impl EdgeNumbers {
     /// Finds each edge of a body among the caller's rows.
     pub fn new(number: u32, body: &Body, rows: Vec<[u32; 2]>) -> Result<Self, Failure> {
-        if body.kind() == Kind::Edges {
+        if body.kind() == BodyKind::Edges {
             return Err(Failure::invalid(format!(
                 "edges: body {number} was given as edges, which have the numbers of their rows already"
             )));

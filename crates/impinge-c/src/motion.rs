@@ -1,6 +1,6 @@
 //! How far a step can be taken: `impinge_motion_*`.
 
-use impinge::{Advance, Positions, Statistics};
+use impinge::{Advance, Positions, Stats};
 
 use crate::answers::impact_row;
 use crate::arrays;
@@ -14,12 +14,12 @@ use crate::types::*;
 pub struct impinge_motion {
     advance: Advance,
     first: Option<impinge_impact>,
-    stats: Statistics,
+    stats: Stats,
     texts: Texts,
 }
 
 impl impinge_motion {
-    pub fn new(advance: Advance, stats: Statistics, scene: &impinge_scene) -> Self {
+    pub fn new(advance: Advance, stats: Stats, scene: &impinge_scene) -> Self {
         impinge_motion {
             first: advance.first.map(|impact| impact_row(&impact, scene)),
             advance,

@@ -2,10 +2,7 @@
 
 use std::ffi::c_void;
 
-use impinge::{
-    CandidateQuery, Clearance, NearQuery, PairFilter, PairKind, PairKinds, Query, SharedVertex,
-    Start, Step, Toi,
-};
+use impinge::{Clearance, PairFilter, PairKind, Precision, Query, SharedVertex, Start};
 
 use crate::scene::impinge_scene;
 use crate::sized::read_sized;
@@ -58,29 +55,21 @@ impl<'a> Asked<'a> {
         Ok(Asked { given, scene })
     }
 
-    /// The pairs of a question about intersections.
-    pub fn pairs(&self) -> Result<Query, Failure> {
-        self.refuse_filter()?;
-        self.with_own_kinds()
+    /// The query of a question about a step.
+    pub fn step(&self) -> Result<Query, Failure> {
+        let query = self.how(self.bodies()?)?;
+        Ok(match self.given.passes {
+            None => query,
+            Some(passes) => query.filter(pair_filter(passes, self.given.passes_user)),
+        })
     }
 
-    fn refuse_filter(&self) -> Result<(), Failure> {
+    /// The query of any other question.
+    pub fn query(&self) -> Result<Query, Failure> {
         match self.given.passes {
-            None => Ok(()),
+            None => self.how(self.bodies()?),
             Some(_) => refuse("passes", "a function", "NULL allowed but for steps"),
         }
-    }
-
-    /// The pairs of a question that knows no kinds of pairs.
-    fn with_own_kinds(&self) -> Result<Query, Failure> {
-        if self.given.kinds != 0 {
-            return refuse(
-                "kinds",
-                self.given.kinds,
-                "this question has its own: 0 allowed",
-            );
-        }
-        self.bodies()
     }
 
     fn bodies(&self) -> Result<Query, Failure> {
@@ -99,6 +88,17 @@ impl<'a> Asked<'a> {
             0 => query,
             _ => query.owned_by(self.given.cell_low, self.given.cell_high),
         };
+        let query = match self.given.kinds {
+            0 => query,
+            bits if bits >> PairKind::ALL.len() == 0 => query.kinds(listed(bits)),
+            bits => {
+                return refuse(
+                    "kinds",
+                    bits,
+                    "a sum of IMPINGE_VF, _EE, _EV, _VV, _EF and _FF allowed",
+                );
+            }
+        };
         self.exclusions()?
             .iter()
             .enumerate()
@@ -111,7 +111,7 @@ impl<'a> Asked<'a> {
                     );
                 }
                 let [a, b] = [exclusion.a, exclusion.b].map(|body| self.scene.id(body));
-                Ok(query.ignore(a?, b?))
+                Ok(query.exclude((a?, b?)))
             })
     }
 
@@ -134,54 +134,33 @@ impl<'a> Asked<'a> {
             a, b, between, own, ..
         } = self.given;
         match (a, b, between, own) {
-            (ANY_BODY, ANY_BODY, 1, 1) => Ok(Query::everything()),
-            (ANY_BODY, ANY_BODY, 1, 0) => Ok(Query::all()),
-            (ANY_BODY, ANY_BODY, 0, 1) => Ok(Query::all_within()),
+            (ANY_BODY, ANY_BODY, 1, 1) => Ok(Query::all()),
+            (ANY_BODY, ANY_BODY, 1, 0) => Ok(Query::between_all()),
+            (ANY_BODY, ANY_BODY, 0, 1) => Ok(Query::self_all()),
             (_, _, 0, 0) => refuse("between and self", "0", "one of them needed"),
             (ANY_BODY, b, _, _) => refuse("b", b, "without a: name one body by a alone"),
             (a, ANY_BODY, 1, 0) => Ok(Query::across([self.scene.id(a)?])),
-            (a, ANY_BODY, 0, _) => Ok(Query::within(self.scene.id(a)?)),
-            (a, ANY_BODY, _, _) => {
-                self.scene.id(a)?;
-                let allowed =
-                    "alone with between = 1 and self = 1: one of them allowed in this version";
-                refuse("a", a, allowed)
-            }
+            (a, ANY_BODY, 0, _) => Ok(Query::self_of(self.scene.id(a)?)),
+            (a, ANY_BODY, _, _) => Ok(Query::of(self.scene.id(a)?)),
             (a, b, _, _) => Ok(Query::between(self.scene.id(a)?, self.scene.id(b)?)),
         }
     }
 
-    /// The kinds that were said.
-    fn kinds(&self) -> Result<Option<PairKinds>, Failure> {
-        let bits = self.given.kinds;
-        if bits >> PairKind::ALL.len() != 0 {
-            return refuse(
-                "kinds",
-                bits,
-                "a sum of IMPINGE_VF, _EE, _EV, _VV, _EF and _FF allowed",
-            );
-        }
-        Ok((bits != 0).then(|| listed(bits).collect()))
-    }
-
-    /// A step of these pairs.
-    pub fn step(&self) -> Result<Step, Failure> {
-        self.how(Step::new(self.with_own_kinds()?))
-    }
-
-    /// What a step keeps, whatever its pairs are.
-    fn how(&self, step: Step) -> Result<Step, Failure> {
+    /// Adds what is not about which pairs.
+    fn how(&self, query: Query) -> Result<Query, Failure> {
         let impinge_query {
             separation,
             clearance,
             clearance_share,
+            flags,
             ..
         } = self.given;
-        let step = match self.given.passes {
-            None => step,
-            Some(passes) => step.filter(pair_filter(passes, self.given.passes_user)),
+        let query = match flags & (DISTANCES | CLOSEST_POINTS) {
+            0 => query,
+            DISTANCES => query.distances(),
+            _ => query.closest_points(),
         };
-        Ok(step
+        Ok(query
             .start(match self.given.start {
                 START_REPORT => Start::Report,
                 START_SKIP => Start::Skip,
@@ -194,48 +173,13 @@ impl<'a> Asked<'a> {
                     );
                 }
             })
-            .toi(self.precision()?)
+            .precision(match self.given.precision {
+                F32 => Precision::F32,
+                F64 => Precision::F64,
+                other => return refuse("precision", other, "IMPINGE_F32 or IMPINGE_F64 allowed"),
+            })
             .separation(separation)
             .clearance(Clearance::new(clearance).share(clearance_share)))
-    }
-
-    fn precision(&self) -> Result<Toi, Failure> {
-        match self.given.precision {
-            F32 => Ok(Toi::F32),
-            F64 => Ok(Toi::F64),
-            other => refuse("precision", other, "IMPINGE_F32 or IMPINGE_F64 allowed"),
-        }
-    }
-
-    /// Candidates with boxes that are inflated.
-    pub fn candidates(&self, inflation: f64) -> Result<CandidateQuery, Failure> {
-        check_length("inflation", inflation)?;
-        self.refuse_filter()?;
-        let query = CandidateQuery::new(self.bodies()?).distance(inflation);
-        Ok(match self.kinds()? {
-            None => query,
-            Some(_) => query.kinds(listed(self.given.kinds)),
-        })
-    }
-
-    /// Pairs within a distance.
-    pub fn near(&self, distance: f64) -> Result<NearQuery, Failure> {
-        check_length("distance", distance)?;
-        self.refuse_filter()?;
-        let mut query = NearQuery::new(self.bodies()?).distance(distance);
-        if self.kinds()?.is_some() {
-            query = query.kinds(listed(self.given.kinds));
-        }
-        for (body, thickness) in self.scene.thickness() {
-            query = query.thickness(body, thickness);
-        }
-        if self.given.flags & DISTANCES != 0 {
-            query = query.distances();
-        }
-        if self.given.flags & CLOSEST_POINTS != 0 {
-            query = query.closest_points();
-        }
-        Ok(query)
     }
 }
 

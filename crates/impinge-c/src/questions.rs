@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 
 use impinge::exact::ElementPair;
 use impinge::exact::internal::Keep;
-use impinge::{Control, Detector, PairKind};
+use impinge::{Detector, PairKind};
 
 use crate::answers::{
     append_rows, impact_row, impinge_candidates, impinge_impacts, impinge_near, impinge_pairs,
@@ -20,9 +20,8 @@ use crate::status::{Failure, clear, guard, held, put};
 use crate::types::*;
 
 /// A question of a caller.
-pub struct Question<'a, 'b> {
+pub struct Question<'a> {
     pub detector: &'a mut Detector,
-    pub control: &'a Control<'b>,
     pub scene: &'a impinge_scene,
     pub asked: Asked<'a>,
 }
@@ -38,19 +37,18 @@ pub unsafe fn question<A>(
         *const impinge_query,
     ),
     (answer, what): (*mut *mut A, &str),
-    find: impl FnOnce(Question<'_, '_>) -> Result<A, Failure>,
+    find: impl FnOnce(Question<'_>) -> Result<A, Failure>,
 ) -> Status {
     // SAFETY: the caller's promise, in all calls.
     unsafe {
         if !answer.is_null() {
             answer.write(std::ptr::null_mut());
         }
-        ask(detector, |detector, control| {
+        ask(detector, |detector| {
             clear(answer, what)?;
             let scene = held(scene, "scene")?.sound()?;
             let found = find(Question {
                 detector,
-                control,
                 scene,
                 asked: Asked::read(query, scene)?,
             })?;
@@ -69,15 +67,14 @@ unsafe fn value(
         *const impinge_scene,
         *const impinge_query,
     ),
-    find: impl FnOnce(Question<'_, '_>) -> Result<(), Failure>,
+    find: impl FnOnce(Question<'_>) -> Result<(), Failure>,
 ) -> Status {
     // SAFETY: the caller's promise, in all calls.
     unsafe {
-        ask(detector, |detector, control| {
+        ask(detector, |detector| {
             let scene = held(scene, "scene")?.sound()?;
             find(Question {
                 detector,
-                control,
                 scene,
                 asked: Asked::read(query, scene)?,
             })
@@ -107,10 +104,8 @@ pub unsafe extern "C" fn impinge_detect(
     // SAFETY: see `impinge_query_default`.
     unsafe {
         question((detector, scene, query), (pairs, "pairs"), |of| {
-            let query = of.asked.pairs()?;
-            of.detector
-                .detect_with(&of.scene.scene, &query, of.control)?;
-            impinge_pairs::new(of.detector.take_pairs())
+            let query = of.asked.query()?;
+            impinge_pairs::new(of.detector.detect(&of.scene.scene, &query)?)
         })
     }
 }
@@ -125,10 +120,8 @@ pub unsafe extern "C" fn impinge_count(
     // SAFETY: see `impinge_query_default`.
     unsafe {
         value((detector, scene, query), |of| {
-            let query = of.asked.pairs()?;
-            let found = of
-                .detector
-                .count_with(&of.scene.scene, &query, of.control)?;
+            let query = of.asked.query()?;
+            let found = of.detector.count(&of.scene.scene, &query)?;
             put(n, "n", found)
         })
     }
@@ -144,8 +137,8 @@ pub unsafe extern "C" fn impinge_any(
     // SAFETY: see `impinge_query_default`.
     unsafe {
         value((detector, scene, query), |of| {
-            let query = of.asked.pairs()?;
-            let found = of.detector.any_with(&of.scene.scene, &query, of.control)?;
+            let query = of.asked.query()?;
+            let found = of.detector.any(&of.scene.scene, &query)?;
             put(any, "any", i32::from(found))
         })
     }
@@ -162,9 +155,8 @@ pub unsafe extern "C" fn impinge_find_impacts(
     unsafe {
         question((detector, scene, step), (impacts, "impacts"), |of| {
             let step = of.asked.step()?;
-            of.detector
-                .impacts_with(&of.scene.scene, &step, of.control)?;
-            impinge_impacts::new(of.detector.take_impacts(), of.scene)
+            let impacts = of.detector.impacts(&of.scene.scene, &step)?;
+            impinge_impacts::new(impacts, of.scene)
         })
     }
 }
@@ -181,9 +173,7 @@ pub unsafe extern "C" fn impinge_find_earliest(
     unsafe {
         value((detector, scene, step), |of| {
             let step = of.asked.step()?;
-            let first = of
-                .detector
-                .earliest_with(&of.scene.scene, &step, of.control)?;
+            let first = of.detector.earliest(&of.scene.scene, &step)?;
             let row = first.map(|impact| impact_row(&impact, of.scene));
             put_found(row, (impact, "impact"), found)
         })
@@ -201,9 +191,7 @@ pub unsafe extern "C" fn impinge_is_free(
     unsafe {
         value((detector, scene, step), |of| {
             let step = of.asked.step()?;
-            let found = of
-                .detector
-                .is_free_with(&of.scene.scene, &step, of.control)?;
+            let found = of.detector.is_free(&of.scene.scene, &step)?;
             put(is_free, "is_free", i32::from(found))
         })
     }
@@ -227,9 +215,7 @@ pub unsafe extern "C" fn impinge_advance(
                 return Err(Failure::null("fraction and motion: each"));
             }
             let step = of.asked.step()?;
-            let found = of
-                .detector
-                .advance_with(&of.scene.scene, &step, of.control)?;
+            let found = of.detector.advance(&of.scene.scene, &step)?;
             if !fraction.is_null() {
                 fraction.write(found.fraction);
             }
@@ -254,10 +240,10 @@ pub unsafe extern "C" fn impinge_find_candidates(
     // SAFETY: see `impinge_query_default`.
     unsafe {
         question((detector, scene, query), (candidates, "candidates"), |of| {
-            let query = of.asked.candidates(inflation)?;
-            of.detector
-                .candidates_with(&of.scene.scene, &query, of.control)?;
-            impinge_candidates::new(of.detector.take_candidates(), of.scene)
+            let query = of.asked.query()?;
+            let scene = &of.scene.scene;
+            let candidates = of.detector.candidates(scene, inflation, &query)?;
+            impinge_candidates::new(candidates, of.scene)
         })
     }
 }
@@ -277,7 +263,7 @@ pub unsafe extern "C" fn impinge_find_candidates_in_runs(
     unsafe {
         value((detector, scene, query), |of| {
             let each = each.ok_or_else(|| Failure::null("each"))?;
-            let query = of.asked.candidates(inflation)?;
+            let query = of.asked.query()?;
             let mut rows = Vec::new();
             let mut n_given = 0;
             let hand_out = |run: impinge::Candidates| {
@@ -296,10 +282,10 @@ pub unsafe extern "C" fn impinge_find_candidates_in_runs(
                 }
                 ControlFlow::Continue(())
             };
-            let (scene, control) = (&of.scene.scene, of.control);
+            let scene = &of.scene.scene;
             let end = of
                 .detector
-                .candidates_in_runs_with(scene, &query, most, hand_out, control)?;
+                .candidates_in_runs(scene, inflation, &query, most, hand_out)?;
             if let ControlFlow::Break(end) = end {
                 end?;
             }
@@ -322,10 +308,9 @@ pub unsafe extern "C" fn impinge_find_near(
     // SAFETY: see `impinge_query_default`.
     unsafe {
         question((detector, scene, query), (near_pairs, "near_pairs"), |of| {
-            let query = of.asked.near(distance)?;
-            of.detector
-                .within_distance_with(&of.scene.scene, &query, of.control)?;
-            impinge_near::new(of.detector.take_near(), of.scene)
+            let query = of.asked.query()?;
+            let near = of.detector.near(&of.scene.scene, distance, &query)?;
+            impinge_near::new(near, of.scene)
         })
     }
 }
@@ -343,15 +328,14 @@ pub unsafe extern "C" fn impinge_find_distance(
     unsafe {
         value((detector, scene, std::ptr::null()), |of| {
             let [of_a, of_b] = [of.scene.id(a)?, of.scene.id(b)?];
-            let (scene, control) = (&of.scene.scene, of.control);
-            let closest = of.detector.distance_with(scene, of_a, of_b, control)?;
+            let closest = of.detector.distance(&of.scene.scene, of_a, of_b)?;
             let row = closest.map(|of| impinge_nearest {
                 distance: of.distance,
                 points: of.points,
                 body_a: a,
-                element_a: of.primitives[0],
+                element_a: of.a.element,
                 body_b: b,
-                element_b: of.primitives[1],
+                element_b: of.b.element,
             });
             put_found(row, (nearest, "nearest"), found)
         })

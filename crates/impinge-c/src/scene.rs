@@ -5,7 +5,7 @@ use std::ffi::c_void;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use impinge::{Body, BodyId, Filter, Part, PositionRows, Positions, Scene, Weld};
+use impinge::{Body, BodyId, Filter, Part, Positions, Scene, Weld};
 
 use crate::arrays::{self, Floats, elements_view, no_rows, positions_view};
 use crate::edges::EdgeNumbers;
@@ -26,7 +26,6 @@ pub struct impinge_scene {
 struct Known {
     id: BodyId,
     edges: Option<EdgeNumbers>,
-    thickness: f64,
 }
 
 impl Handle for impinge_scene {
@@ -82,14 +81,6 @@ impl impinge_scene {
         self.n_with_edges > 0
     }
 
-    /// The bodies that are thick.
-    pub fn thickness(&self) -> impl Iterator<Item = (BodyId, f64)> + '_ {
-        let known = self.bodies.iter().flatten();
-        known
-            .filter(|body| body.thickness > 0.0)
-            .map(|body| (body.id, body.thickness))
-    }
-
     /// Adds a body.
     ///
     /// # Safety
@@ -105,16 +96,12 @@ impl impinge_scene {
         let at = unsafe { arrays::floats::<3>(positions, "positions") }?;
         // SAFETY: the caller's promise.
         let elements = unsafe { arrays::elements(kind, elements, at.len()) }?;
-        let id = self.scene.add(elements, at.into_owned()?)?;
+        let id = self.scene.add((elements, at.into_owned()?))?;
         let number = id.index();
         if number >= self.bodies.len() {
             self.bodies.resize_with(number + 1, || None);
         }
-        self.bodies[number] = Some(Known {
-            id,
-            edges: None,
-            thickness: 0.0,
-        });
+        self.bodies[number] = Some(Known { id, edges: None });
         if !body.is_null() {
             // SAFETY: the caller's promise.
             unsafe { body.write(number as u32) };
@@ -205,7 +192,7 @@ pub unsafe extern "C" fn impinge_scene_remesh(
             let id = scene.id(body)?;
             let at = arrays::floats::<3>(&positions, "positions")?;
             let elements = arrays::elements(kind, &elements, at.len())?;
-            scene.scene.remesh(id, elements, at.into_owned()?)?;
+            scene.scene.remesh(id, (elements, at.into_owned()?))?;
             scene.forget_edges(body)
         })
     }
@@ -244,8 +231,8 @@ pub unsafe extern "C" fn impinge_scene_set_positions(
         change(scene, |scene| {
             let id = scene.id(body)?;
             match arrays::floats::<3>(&positions, "positions")? {
-                Floats::F32(rows) => scene.scene.set_positions(id, &rows)?,
-                Floats::F64(rows) => scene.scene.set_positions(id, &rows)?,
+                Floats::F32(rows) => scene.scene.set_positions(id, &rows[..])?,
+                Floats::F64(rows) => scene.scene.set_positions(id, &rows[..])?,
             }
             Ok(())
         })
@@ -266,8 +253,8 @@ pub unsafe extern "C" fn impinge_scene_set_end_positions(
                 return Ok(scene.scene.clear_end_positions(id)?);
             }
             match arrays::floats::<3>(&positions, "positions")? {
-                Floats::F32(rows) => scene.scene.set_end_positions(id, &rows)?,
-                Floats::F64(rows) => scene.scene.set_end_positions(id, &rows)?,
+                Floats::F32(rows) => scene.scene.set_end_positions(id, &rows[..])?,
+                Floats::F64(rows) => scene.scene.set_end_positions(id, &rows[..])?,
             }
             Ok(())
         })
@@ -347,7 +334,7 @@ fn lend_rows<R: impinge::Real>(
         user,
         is_taken: AtomicBool::new(false),
     });
-    share(PositionRows::shared(Arc::clone(&owner)).into())?;
+    share(Positions::shared(Arc::clone(&owner)))?;
     owner.is_taken.store(true, Ordering::Relaxed);
     Ok(())
 }
@@ -360,7 +347,7 @@ pub unsafe extern "C" fn impinge_scene_lend_positions(
     release: Option<ReleaseCallback>,
     user: *mut c_void,
 ) -> Status {
-    let set: Set = |scene, body, at| scene.lend_positions(body, at);
+    let set: Set = |scene, body, at| scene.set_positions(body, at);
     // SAFETY: see `impinge_scene_create`.
     unsafe {
         change(scene, |scene| {
@@ -377,7 +364,7 @@ pub unsafe extern "C" fn impinge_scene_lend_end_positions(
     release: Option<ReleaseCallback>,
     user: *mut c_void,
 ) -> Status {
-    let set: Set = |scene, body, at| scene.lend_end_positions(body, at);
+    let set: Set = |scene, body, at| scene.set_end_positions(body, at);
     // SAFETY: see `impinge_scene_create`.
     unsafe {
         change(scene, |scene| {
@@ -434,14 +421,8 @@ pub unsafe extern "C" fn impinge_scene_set_thickness(
     // SAFETY: see `impinge_scene_create`.
     unsafe {
         change(scene, |scene| {
-            let known = scene.known_mut(body)?;
-            if !(thickness.is_finite() && thickness >= 0.0) {
-                return Err(Failure::invalid(format!(
-                    "thickness of body {body}: {thickness} given, a finite number that is not below 0 allowed"
-                )));
-            }
-            known.thickness = thickness;
-            Ok(())
+            let id = scene.id(body)?;
+            Ok(scene.scene.set_thickness(id, thickness)?)
         })
     }
 }

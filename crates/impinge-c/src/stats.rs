@@ -1,9 +1,9 @@
-//! Statistics, as `impinge_stats`.
+//! Stats, as `impinge_stats`.
 
 use std::ffi::{CString, c_char};
 use std::sync::{Mutex, PoisonError};
 
-use impinge::Statistics;
+use impinge::Stats;
 
 use crate::status::Failure;
 use crate::types::*;
@@ -29,11 +29,7 @@ impl Texts {
 ///
 /// # Safety
 /// `to` is NULL or has as many bytes as its field `size` says.
-pub unsafe fn fill(
-    stats: &Statistics,
-    texts: &Texts,
-    to: *mut impinge_stats,
-) -> Result<(), Failure> {
+pub unsafe fn fill(stats: &Stats, texts: &Texts, to: *mut impinge_stats) -> Result<(), Failure> {
     if to.is_null() {
         return Err(Failure::null("stats"));
     }

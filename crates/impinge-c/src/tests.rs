@@ -7,10 +7,7 @@ use std::path::Path;
 use std::process::Command;
 use std::ptr::{null, null_mut};
 
-use impinge::{
-    Backend, CandidateQuery, Detector, Elements, NearQuery, PairKind, Part, Positions, Query,
-    Scene, Step,
-};
+use impinge::{Backend, Detector, Elements, PairKind, Part, Positions, Query, Scene};
 use impinge_scenes::{BuiltScene, Model, adversarial, soup, surfaces};
 
 use crate::answers::*;
@@ -288,7 +285,7 @@ fn answers_have_the_hashes_of_rust() {
         let (on, of) = (built.detector, built.scene.cast_const());
         // SAFETY: as in `through_c`.
         unsafe {
-            let everything = Query::everything();
+            let everything = Query::all();
             let mut pairs = null_mut();
             assert_eq!(impinge_detect(on, of, null(), &mut pairs), OK);
             let expected = detector.detect(&scene, &everything).expect("pairs");
@@ -315,10 +312,9 @@ fn answers_have_the_hashes_of_rust() {
             impinge_contacts_destroy(contacts);
             impinge_pairs_destroy(pairs);
 
-            let step = Step::new(everything.clone());
             let mut impacts = null_mut();
             assert_eq!(impinge_find_impacts(on, of, null(), &mut impacts), OK);
-            let expected = detector.impacts(&scene, &step).expect("impacts");
+            let expected = detector.impacts(&scene, &everything).expect("impacts");
             assert_eq!(impinge_impacts_hash(impacts), expected.hash(), "{name}");
             let n = impinge_impacts_count(impacts);
             assert_eq!(
@@ -332,8 +328,8 @@ fn answers_have_the_hashes_of_rust() {
                 impinge_find_candidates(on, of, 0.01, null(), &mut candidates),
                 OK
             );
-            let query = CandidateQuery::new(everything.clone()).distance(0.01);
-            let expected = detector.candidates(&scene, &query).expect("candidates");
+            let expected = detector.candidates(&scene, 0.01, &everything);
+            let expected = expected.expect("candidates");
             assert_eq!(
                 impinge_candidates_hash(candidates),
                 expected.hash(),
@@ -351,10 +347,8 @@ fn answers_have_the_hashes_of_rust() {
 
             let mut near = null_mut();
             assert_eq!(impinge_find_near(on, of, 0.02, null(), &mut near), OK);
-            let query = NearQuery::new(everything).distance(0.02);
-            let expected = detector
-                .within_distance(&scene, &query)
-                .expect("near pairs");
+            let expected = detector.near(&scene, 0.02, &everything);
+            let expected = expected.expect("near pairs");
             assert_eq!(impinge_near_hash(near), expected.hash(), "{name}");
             assert_eq!(impinge_near_count(near), expected.len());
             impinge_near_destroy(near);
@@ -362,7 +356,7 @@ fn answers_have_the_hashes_of_rust() {
             // Pairs at the start allow no step, or are seams: both say the same.
             let (mut fraction, mut motion) = (-1.0, null_mut());
             let status = impinge_advance(on, of, null(), &mut fraction, &mut motion);
-            match detector.advance(&scene, &step) {
+            match detector.advance(&scene, &everything) {
                 Ok(expected) => assert_eq!((status, fraction), (OK, expected.fraction), "{name}"),
                 Err(_) => assert_eq!((status, fraction), (INVALID, -1.0), "{name}"),
             }

@@ -4,7 +4,7 @@
 //! The steps are welding, self-intersections, facets, union of neighbours and zero areas; each is exact.
 
 use impinge::exact::{Point, orient2d, orient3d};
-use impinge::{Backend, Detector, Error, Query, Scene, Settings, SharedVertex};
+use impinge::{Backend, Detector, Error, Query, Scene, Settings};
 use impinge_io::{Elements, Mesh, Positions, weld};
 
 use crate::copies::Copies;
@@ -109,7 +109,7 @@ fn intersections(
         Positions::F32(positions) => positions.clone().into(),
         Positions::F64(positions) => positions.clone().into(),
     };
-    let body = scene.add(elements, positions)?;
+    let body = scene.add((elements, positions))?;
     // The scene has refused indices out of range.
     let copies = match &mesh.elements {
         Elements::Triangles(triangles) => Copies::new(triangles, mesh.n_vertices()),
@@ -133,25 +133,24 @@ fn intersections(
             }
         };
         let positions = scene.body(body)?.positions().clone();
-        scene.remesh(body, elements, positions)?;
+        scene.remesh(body, (elements, positions))?;
     }
-    let mut detector = Detector::with_settings(Settings {
+    let mut detector = Detector::new(Settings {
         backend: Backend::Cpu,
         threads: options.threads,
         ..Settings::default()
     })?;
-    let query = Query::within(body).shared_vertex(SharedVertex::Resolve);
-    let pairs = detector.detect(&scene, &query)?;
+    let pairs = detector.detect(&scene, &Query::self_of(body))?;
     match &few {
         None => {
             counts.self_intersections = pairs.len() as u64;
             counts.hash = Some(pairs.hash());
-            for primitive in pairs.within(body).flat_map(|(a, b)| [a, b]) {
+            for primitive in pairs.self_of(body).flatten() {
                 marks[primitive as usize].add(Problem::SelfIntersection);
             }
         }
         Some(few) => {
-            let found: Vec<(u32, u32)> = pairs.within(body).collect();
+            let found: Vec<[u32; 2]> = pairs.self_of(body).collect();
             (counts.self_intersections, counts.hash) = few.count(found.iter().copied());
             for side in found.iter().flat_map(|&pair| few.pairs(pair).sides()) {
                 // Either all of a side are marked or none.

@@ -109,8 +109,8 @@ pub enum Pairs<'a> {
 
 impl Few<'_> {
     /// The pairs for which a pair of [`kept`](Few::kept) places speaks.
-    pub fn pairs(&self, (a, b): (u32, u32)) -> Pairs<'_> {
-        let [a, b] = [a, b].map(|place| &self.kept[place as usize]);
+    pub fn pairs(&self, pair: [u32; 2]) -> Pairs<'_> {
+        let [a, b] = pair.map(|place| &self.kept[place as usize]);
         let [set_a, set_b] = [a, b].map(|primitive| self.set_of[*primitive as usize]);
         let set = |ix: u32| &self.copies.members[self.copies.sets[ix as usize].clone()];
         if set_a == set_b && set_a != ALONE {
@@ -126,7 +126,7 @@ impl Few<'_> {
     }
 
     /// How many pairs these pairs speak for, and the hash of those pairs unless they are too many.
-    pub fn count(&self, pairs: impl Iterator<Item = (u32, u32)> + Clone) -> (u64, Option<u64>) {
+    pub fn count(&self, pairs: impl Iterator<Item = [u32; 2]> + Clone) -> (u64, Option<u64>) {
         let n = pairs.clone().map(|pair| self.pairs(pair).len()).sum();
         let hash = |pair| self.pairs(pair).hash();
         let hashes = (n <= MOST_HASHED).then(|| pairs.map(hash).fold(0, u64::wrapping_add));

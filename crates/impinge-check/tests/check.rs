@@ -394,13 +394,13 @@ fn copies_are_counted_as_if_each_were_tested() {
             Elements::Triangles(faces) => scene.add_triangles(faces, &positions),
             Elements::Tetrahedra(tets) => scene.add_tetrahedra(tets, &positions),
         };
-        let query = Query::within(body.unwrap()).shared_vertex(SharedVertex::Resolve);
+        let query = Query::self_of(body.unwrap()).shared_vertex(SharedVertex::Resolve);
         let settings = Settings {
             method: Method::Naive,
             backend: Backend::Cpu,
             ..Settings::default()
         };
-        let mut naive = Detector::with_settings(settings).unwrap();
+        let mut naive = Detector::new(settings).unwrap();
         let pairs = naive.detect(&scene, &query).unwrap();
         let counts = checked.counts;
         assert_eq!(

@@ -4,6 +4,7 @@ mod choices;
 mod help;
 mod near;
 mod picture;
+mod rows;
 mod step;
 #[cfg(feature = "view")]
 mod view;
@@ -17,14 +18,15 @@ use impinge_fem::scenes::SceneName;
 use crate::commands::{CHECK_EXAMPLES, CheckArgs, CheckWorkerArgs, TILES_EXAMPLES, TilesArgs};
 use crate::values::PngFile;
 use crate::values::{
-    CurvesFile, FrameRange, FramesFile, MeshFile, RowsFile, RowsFormat, at_least_one, body_numbers,
-    bytes, lambda, mesh_format,
+    CurvesFile, FrameRange, FramesFile, MeshFile, RowsFile, at_least_one, body_numbers, bytes,
+    lambda, mesh_format, two_bodies,
 };
 
-pub use choices::{BackendArg, BodiesArg, MethodArg, SharedVertexArg, StartArg, ToiArg};
+pub use choices::{BackendArg, BodiesArg, MethodArg, PrecisionArg, SharedVertexArg, StartArg};
 pub use help::parse;
-pub use near::NearArgs;
+pub use near::{KindArg, NearArgs};
 pub use picture::PictureArgs;
+pub use rows::RowsArgs;
 pub use step::{StepArgs, StepHow};
 #[cfg(feature = "view")]
 pub use view::ViewArgs;
@@ -40,10 +42,10 @@ pub struct Cli {
 const EXAMPLES: &str = "\
 Examples:
   impinge demo                                  a built-in scene: no files needed
-  impinge pairs a.obj b.obj                     which primitives of two meshes intersect
+  impinge pairs a.obj b.obj                     which elements of two meshes intersect
   impinge self cloth.ply                        where a mesh intersects itself
   impinge self part.stl --fail-on-hit           the same as a check: exit code 3 if it does
-  impinge pairs a.obj b.obj --pairs -           the pairs themselves, as CSV
+  impinge pairs a.obj b.obj --rows -            the pairs themselves, as CSV
   impinge near a.obj b.obj --distance 0.01      which elements are nearer than that
   impinge check parts/*.stl                     what is wrong with each mesh
   impinge sequence body.ply run.pc2 --self      the pairs of every frame of an animation
@@ -61,10 +63,10 @@ pub enum Command {
     /// Run a built-in scene of deforming bodies and show its pairs and times
     #[command(after_help = DEMO_EXAMPLES)]
     Demo(DemoArgs),
-    /// Find the pairs of primitives that intersect, between different meshes
+    /// Find the pairs of elements that intersect, between different meshes
     #[command(after_help = PAIRS_EXAMPLES)]
     Pairs(PairsArgs),
-    /// Find the pairs of primitives that intersect, within each mesh
+    /// Find the pairs of elements that intersect, within each mesh
     #[command(name = "self", after_help = SELF_EXAMPLES)]
     Within(WithinArgs),
     /// Find the smallest distance between two meshes, and where it is
@@ -76,7 +78,8 @@ pub enum Command {
     /// Find the pairs in every frame of a deforming mesh
     #[command(
         after_help = SEQUENCE_EXAMPLES,
-        mut_arg("toi", |toi| toi.requires("ccd")),
+        mut_arg("precision", |precision| precision.requires("ccd")),
+        mut_arg("kinds", |kinds| kinds.requires("ccd")),
         mut_arg("start", |start| start.requires("ccd")),
         mut_arg("separation", |separation| separation.requires("ccd")),
         mut_arg("clearance", |clearance| clearance.requires("ccd"))
@@ -100,7 +103,7 @@ pub enum Command {
     /// Print one row for each path on standard input: a child process of `check`
     #[command(hide = true)]
     CheckWorker(CheckWorkerArgs),
-    /// Draw meshes with colliding primitives in red and blue
+    /// Draw meshes with colliding elements in red and blue
     #[command(after_help = RENDER_EXAMPLES)]
     Render(RenderArgs),
     /// Show meshes and what collides in them in a window, live; without a mesh, the built-in scene
@@ -154,12 +157,13 @@ The written mesh and the picture show the frame with the most pairs. Colliding t
 const PAIRS_EXAMPLES: &str = "\
 Examples:
   impinge pairs a.obj b.obj
-  impinge pairs a.stl b.ply c.msh --self --pairs pairs.npy
-  impinge pairs a.ply b.ply --pairs -
+  impinge pairs a.stl b.ply c.msh --self --rows pairs.npy
+  impinge pairs a.ply b.ply --rows -
   impinge pairs a.ply b.ply --json | jq .pairs
   impinge pairs a.ply b.ply --any --fail-on-hit
   impinge pairs a.ply b.ply --repeat 100 --threads 2
-  impinge pairs a.ply b.ply c.ply --ignore 0,1 --out seen.glb
+  impinge pairs a.ply b.ply c.ply --exclude 0,1 --out seen.glb
+  impinge pairs a.ply b.ply c.ply --between 0,2
   impinge pairs a.ply b.ply --curves curves.obj --contacts contacts.csv
   impinge pairs machine.glb                     the nodes of one file with each other
   impinge pairs a.glb b.obj --bodies nodes      each node of a.glb, and all of b.obj";
@@ -175,13 +179,13 @@ of triangles are surfaces: a mesh that lies completely inside another one has a 
 const SELF_EXAMPLES: &str = "\
 Examples:
   impinge self cow.off
-  impinge self cow.off --pairs pairs.csv --out seen.ply
+  impinge self cow.off --rows pairs.csv --out seen.ply
   impinge self part.stl --fail-on-hit
-  cat cow.off | impinge self - --format off --pairs - --pairs-format jsonl
+  cat cow.off | impinge self - --format off --rows - --rows-format jsonl
   impinge self cow.off --no-weld --shared-vertex skip
 
 Many files repeat a vertex for each face that uses it, so vertices at the same position are welded into one.
-Neighbours (primitives that share vertices) are reported only if they also meet elsewhere, as folded faces
+Neighbours (elements that share vertices) are reported only if they also meet elsewhere, as folded faces
 do. --no-weld turns welding off; with --shared-vertex skip neighbours are never reported.";
 
 const SEQUENCE_EXAMPLES: &str = "\
@@ -190,7 +194,7 @@ Examples:
   impinge sequence body.ply run.pc2 --other floor.obj --self
   impinge sequence body.obj frames_0001.obj --frames 10..20 --json
   impinge sequence body.obj 'frames_%04d.obj' --json | head
-  impinge sequence body.ply run.pc2 --pairs pairs.csv --out seen_%04d.ply
+  impinge sequence body.ply run.pc2 --rows pairs.csv --out seen_%04d.ply
   impinge sequence body.ply run.pc2 --ccd       one line per step from a frame to the next
 
 FRAMES is a .pc2 or .mdd file, the first of numbered mesh files, or a pattern of their names.
@@ -226,7 +230,7 @@ pub struct DetectorArgs {
     /// Density coefficient of the grid of `--method cells`
     #[arg(long, value_name = "X", value_parser = lambda, default_value = "1")]
     pub lambda: f64,
-    /// The most primitives in a group of `--method cells`, 1 to 64
+    /// The most elements in a group of `--method cells`, 1 to 64
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=64), default_value = "64")]
     pub group_size: u32,
     /// Memory for the detector and the answer, such as 512M or 2GiB [default: no limit]
@@ -271,14 +275,14 @@ impl ReadArgs {
 /// Options of reading meshes and of the query.
 #[derive(Debug, Clone, Args)]
 pub struct AskArgs {
-    /// Which neighbours are reported: pairs of primitives of one body that share a vertex
+    /// Which neighbours are reported: pairs of elements of one body that share a vertex
     #[arg(long, value_enum, value_name = "RULE", default_value_t = SharedVertexArg::Resolve)]
     pub shared_vertex: SharedVertexArg,
     #[command(flatten)]
     pub read: ReadArgs,
-    /// Ignore the pairs of bodies A and B, numbered from 0 as given (A,A: the self-collision of A)
-    #[arg(long, value_name = "A,B", value_parser = body_numbers)]
-    pub ignore: Vec<(usize, usize)>,
+    /// Leave out the pairs of bodies A and B, numbered from 0 as given (A,A: the self-collision of A)
+    #[arg(long, value_name = "A,B", value_parser = body_numbers, alias = "ignore")]
+    pub exclude: Vec<(usize, usize)>,
     /// End with exit code 3 if anything is found
     #[arg(long)]
     pub fail_on_hit: bool,
@@ -302,22 +306,18 @@ pub struct AnswerArgs {
     /// Run N frames, rewriting positions before each, and show median times; with N above 1, the method auto is clusters
     #[arg(long, value_name = "N", default_value = "1", value_parser = at_least_one)]
     pub repeat: NonZeroUsize,
-    /// Write the pairs (.csv, .jsonl or .npy; "-" is standard output, as CSV unless --pairs-format says otherwise)
-    #[arg(long, value_name = "FILE")]
-    pub pairs: Option<RowsFile>,
-    /// The format of the pairs, whatever the name of the file
-    #[arg(long, value_enum, value_name = "FORMAT", requires = "pairs")]
-    pub pairs_format: Option<RowsFormat>,
-    /// Write where the triangles of each pair meet, one row per corner (.npy or .csv)
+    #[command(flatten)]
+    pub rows: RowsArgs,
+    /// Write where the triangles of each pair meet, one row per corner (.csv, .jsonl or .npy)
     #[arg(long, value_name = "FILE")]
     pub contacts: Option<RowsFile>,
     /// Write the curves in which surfaces cross (.ply, .obj or .vtu)
     #[arg(long, value_name = "FILE")]
     pub curves: Option<CurvesFile>,
-    /// Write the meshes with colliding primitives coloured (.ply, .glb or .vtu)
+    /// Write the meshes with colliding elements coloured (.ply, .glb or .vtu)
     #[arg(long, value_name = "FILE")]
     pub out: Option<MeshFile>,
-    /// Draw the meshes with colliding primitives coloured (.png)
+    /// Draw the meshes with colliding elements coloured (.png)
     #[arg(long, value_name = "FILE")]
     pub png: Option<PngFile>,
     #[command(flatten)]
@@ -325,27 +325,15 @@ pub struct AnswerArgs {
 }
 
 impl AnswerArgs {
-    /// The output files, each with its option.
+    /// The output files without the rows, each with its option.
     pub fn outputs(&self) -> Vec<(&'static str, &Path)> {
-        let rows = self.pairs.as_ref().filter(|file| !file.is_stdout());
-        let pairs = rows.map(|file| ("--pairs", file.path.as_path()));
         let contacts = self.contacts.as_ref();
         let contacts = contacts.map(|file| ("--contacts", file.path.as_path()));
         let curves = self.curves.as_ref();
         let curves = curves.map(|file| ("--curves", file.path.as_path()));
         let out = self.out.as_ref().map(|file| ("--out", file.path.as_path()));
         let png = self.png.as_ref().map(|file| ("--png", file.0.as_path()));
-        [pairs, contacts, curves, out, png]
-            .into_iter()
-            .flatten()
-            .collect()
-    }
-
-    /// The file of the pairs, with the requested format.
-    pub fn rows(&self) -> Option<RowsFile> {
-        let file = self.pairs.clone()?;
-        let format = self.pairs_format.unwrap_or(file.format);
-        Some(RowsFile { format, ..file })
+        [contacts, curves, out, png].into_iter().flatten().collect()
     }
 }
 
@@ -377,6 +365,9 @@ pub struct PairsArgs {
     /// Also find the pairs within each body
     #[arg(long = "self")]
     pub within: bool,
+    /// Find only the pairs of bodies A and B, numbered from 0 as given
+    #[arg(long, value_name = "A,B", value_parser = two_bodies, conflicts_with_all = ["within", "exclude"])]
+    pub between: Option<(usize, usize)>,
     #[command(flatten)]
     pub ask: AskArgs,
     #[command(flatten)]
@@ -428,18 +419,16 @@ pub struct SequenceArgs {
     /// Frames from A up to, but not including, B, counted from 0; either may be omitted
     #[arg(long, value_name = "A..B", default_value = "..")]
     pub frames: FrameRange,
-    /// Write the pairs of all frames, with the frame's number first (.csv or .jsonl; "-" is standard output, as CSV)
-    #[arg(long, value_name = "FILE")]
-    pub pairs: Option<RowsFile>,
-    /// Write the meshes of each frame with colliding primitives coloured (seen_%04d.ply, .glb or .vtu)
+    #[command(flatten)]
+    pub rows: RowsArgs,
+    /// Write the meshes of each frame with colliding elements coloured (seen_%04d.ply, .glb or .vtu)
     #[arg(long, value_name = "FILE")]
     pub out: Option<FramesFile<MeshFile>>,
     /// Draw each frame (seen_%04d.png)
     #[arg(long, value_name = "FILE")]
     pub png: Option<FramesFile<PngFile>>,
     /// Find what touches on the way from each frame to the next, and when first; vertices move on straight lines
-    #[arg(long, conflicts_with_all = ["pairs", "out"])]
-    #[arg(conflicts_with = "png")]
+    #[arg(long, conflicts_with_all = ["out", "png"])]
     pub ccd: bool,
     #[command(flatten)]
     pub step: StepHow,
@@ -507,7 +496,7 @@ impl From<SceneArg> for SceneName {
 /// The format of a simulated sequence.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum SequenceFormatArg {
-    /// One mesh (.ply), its positions (.pc2), and a table of colliding primitives
+    /// One mesh (.ply), its positions (.pc2), and a table of colliding elements
     Pc2,
     /// One VTU file per step, with a field `colliding`
     Vtu,

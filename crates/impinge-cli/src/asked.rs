@@ -1,32 +1,56 @@
 //! What an answer is about: its last line, and an object in JSON.
 
-use impinge::{Query, SharedVertex};
+use impinge::{BodyId, Query, SharedVertex};
 use serde_json::{Value, json};
 
+use crate::error::Error;
 use crate::load::{Nouns, Vertices};
 use crate::text::{counted, grouped};
 
-/// Which pairs of primitives were asked for.
+/// Which pairs were asked for.
 #[derive(Debug, Clone, Copy)]
 pub struct Asked {
     /// Pairs of different bodies.
     pub between: bool,
     /// Pairs within each body.
     pub within: bool,
+    /// The only two bodies whose pairs were asked for, by their numbers.
+    pub only: Option<(usize, usize)>,
     pub shared_vertex: SharedVertex,
+    pub question: Question,
+    /// Whether the command has the option --self.
+    pub has_self: bool,
     /// Whether pairs of bodies were left out by their numbers.
-    pub ignores: bool,
+    pub excludes: bool,
+    /// Whether kinds of pairs were chosen.
+    pub has_kinds: bool,
+}
+
+/// What was asked of the pairs: it decides which neighbours can be among them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Question {
+    /// Whether they intersect.
+    Pairs,
+    /// Whether they are near, and besides whether they intersect.
+    Near,
+    /// Whether they touch during a step, and besides whether they intersect at its start.
+    Step { start: bool },
+    /// Whether their boxes overlap.
+    Candidates,
 }
 
 impl Asked {
-    /// The query, before bodies are left out.
-    pub fn query(self) -> Query {
-        match (self.between, self.within) {
-            (true, true) => Query::everything(),
-            (false, true) => Query::all_within(),
-            (_, false) => Query::all(),
-        }
-        .shared_vertex(self.shared_vertex)
+    /// The query, before anything is left out.
+    pub fn query(self, bodies: &[BodyId]) -> Result<Query, Error> {
+        let query = match (self.only, self.between, self.within) {
+            (Some((a, b)), ..) => {
+                Query::between(body("--between", bodies, a)?, body("--between", bodies, b)?)
+            }
+            (None, true, true) => Query::all(),
+            (None, false, true) => Query::self_all(),
+            (None, _, false) => Query::between_all(),
+        };
+        Ok(query.shared_vertex(self.shared_vertex))
     }
 
     /// `between 2 meshes, 12 vertices welded, neighbours resolved; not asked: self-collision (--self)`
@@ -37,44 +61,79 @@ impl Asked {
             format!(" of {}", impinge_io::printable(file))
         });
         let whom = match (vertices.len(), self.between, self.within) {
+            (n, ..) if n > 2 && self.only.is_some() => {
+                let (a, b) = self.only.unwrap_or_default();
+                format!("between {many} {a} and {b} of {n}{of}")
+            }
             (1, _, true) => format!("within 1 {one}"),
             (1, _, false) => format!("1 {one}"),
             (_, true, false) => format!("between {n} {many}{of}"),
             (_, false, _) => format!("within each of {n} {many}{of}"),
             (_, true, true) => format!("between {n} {many}{of} and within each"),
         };
-        let rule = match self.shared_vertex {
-            SharedVertex::Resolve => "neighbours resolved",
-            SharedVertex::Skip => "neighbours skipped",
-        };
         let mut not_asked = Vec::new();
         if !self.within {
-            not_asked.push("self-collision (--self)".to_owned());
+            let option = if self.has_self { " (--self)" } else { "" };
+            not_asked.push(format!("self-collision{option}"));
         }
         if !self.between && vertices.len() > 1 {
             not_asked.push(format!("pairs of different {many} (impinge pairs --self)"));
         }
-        if self.ignores {
-            not_asked.push("what --ignore names".to_owned());
+        if self.only.is_some() && vertices.len() > 2 {
+            not_asked.push(format!("pairs of other {many}"));
+        }
+        if self.excludes {
+            not_asked.push("what --exclude names".to_owned());
+        }
+        if self.has_kinds {
+            not_asked.push("other kinds of pairs (--kinds)".to_owned());
+        }
+        if self.question == (Question::Step { start: false }) {
+            not_asked.push("whether the start intersects (--start verify)".to_owned());
         }
         let rest = match not_asked.is_empty() {
             true => String::new(),
             false => format!("; not asked: {}", not_asked.join(", ")),
         };
-        format!("{whom}, {}, {rule}{rest}", welded(vertices))
+        format!("{whom}, {}, {}{rest}", welded(vertices), self.neighbours())
+    }
+
+    /// Which pairs of one body that share a vertex are in the answer.
+    fn neighbours(self) -> &'static str {
+        match (self.question, self.shared_vertex) {
+            (Question::Pairs, SharedVertex::Resolve) => "neighbours resolved",
+            (Question::Near, SharedVertex::Resolve) => {
+                "neighbours resolved where they intersect, else never near"
+            }
+            (Question::Step { start: true }, _) => {
+                "neighbours resolved at the start, else left out"
+            }
+            _ => "neighbours left out",
+        }
     }
 
     /// The same as an object.
     pub fn json(self) -> Value {
-        json!({
-            "between": self.between,
-            "self": self.within,
-            "shared_vertex": match self.shared_vertex {
-                SharedVertex::Resolve => "resolve",
-                SharedVertex::Skip => "skip",
-            },
-        })
+        let mut object = json!({ "between": self.between, "self": self.within });
+        if matches!(self.question, Question::Pairs | Question::Near) {
+            object["shared_vertex"] = match self.shared_vertex {
+                SharedVertex::Resolve => "resolve".into(),
+                SharedVertex::Skip => "skip".into(),
+            };
+        }
+        object
     }
+}
+
+/// The body that an option names by its number.
+pub fn body(option: &str, bodies: &[BodyId], number: usize) -> Result<BodyId, Error> {
+    bodies.get(number).copied().ok_or_else(|| {
+        let given = match bodies.len() {
+            1 => "1 body is given, numbered 0".to_owned(),
+            n => format!("{n} bodies are given, numbered from 0"),
+        };
+        Error::Usage(format!("{option} names body {number}, but {given}"))
+    })
 }
 
 /// How many vertices were welded, and how many were not though they coincide with another one.
@@ -96,6 +155,17 @@ fn welded(vertices: &[Vertices]) -> String {
 mod tests {
     use super::*;
 
+    const ASKED: Asked = Asked {
+        between: true,
+        within: false,
+        only: None,
+        shared_vertex: SharedVertex::Resolve,
+        question: Question::Pairs,
+        has_self: true,
+        excludes: false,
+        has_kinds: false,
+    };
+
     #[test]
     fn lines_say_what_was_asked_and_what_was_not() {
         let of = |n_welded: Option<usize>, n_coincident| Vertices {
@@ -107,8 +177,7 @@ mod tests {
             let asked = Asked {
                 between,
                 within,
-                shared_vertex: SharedVertex::Resolve,
-                ignores: false,
+                ..ASKED
             };
             asked.line(vertices, &Nouns::default())
         };
@@ -135,10 +204,9 @@ mod tests {
             "within 1 mesh, coinciding vertices: 3 not welded (--no-weld), neighbours resolved"
         );
         let skipped = Asked {
-            between: true,
-            within: false,
             shared_vertex: SharedVertex::Skip,
-            ignores: true,
+            excludes: true,
+            ..ASKED
         };
         assert_eq!(
             skipped.line(
@@ -149,8 +217,53 @@ mod tests {
                     file: Some("a.glb".to_owned()),
                 }
             ),
-            "between 2 nodes of a.glb, vertices as in the files, neighbours skipped; not asked: self-collision (--self), what --ignore \
+            "between 2 nodes of a.glb, vertices as in the files, neighbours left out; not asked: self-collision (--self), what --exclude \
              names"
         );
+        let three = [of(Some(0), Some(0)); 3];
+        let only = Asked {
+            only: Some((0, 2)),
+            ..ASKED
+        };
+        assert_eq!(
+            only.line(&three, &Nouns::default()),
+            "between meshes 0 and 2 of 3, 0 vertices welded, neighbours resolved; not asked: self-collision (--self), pairs of other \
+             meshes"
+        );
+    }
+
+    /// No line says that neighbours are resolved and left out.
+    #[test]
+    fn neighbours_are_told_once() {
+        let line = |question, has_kinds| {
+            let asked = Asked {
+                within: true,
+                question,
+                has_kinds,
+                ..ASKED
+            };
+            asked.line(&[Vertices::default(); 2], &Nouns::default())
+        };
+        let whom = "between 2 meshes and within each, vertices as in the files, ";
+        for (question, has_kinds, rest) in [
+            (
+                Question::Near,
+                true,
+                "neighbours resolved where they intersect, else never near; not asked: other kinds of pairs (--kinds)",
+            ),
+            (
+                Question::Step { start: true },
+                false,
+                "neighbours resolved at the start, else left out",
+            ),
+            (
+                Question::Step { start: false },
+                false,
+                "neighbours left out; not asked: whether the start intersects (--start verify)",
+            ),
+            (Question::Candidates, false, "neighbours left out"),
+        ] {
+            assert_eq!(line(question, has_kinds), format!("{whom}{rest}"));
+        }
     }
 }

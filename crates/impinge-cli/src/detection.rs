@@ -1,18 +1,16 @@
 //! Runs a detector with the options of the command line, and collects its times over many frames.
 
 use impinge::{
-    Backend, BodyId, CancelToken, Control, Detector, Pairs, Positions, Query, Scene, Settings,
-    Statistics,
+    Affinity, Backend, BodyId, Detector, PairKind, Pairs, Positions, Query, Scene, Settings, Stats,
 };
 
-use crate::args::{AskArgs, BackendArg, DetectorArgs};
-use crate::asked::Asked;
+use crate::args::{AskArgs, BackendArg, DetectorArgs, KindArg};
+use crate::asked::{Asked, Question, body};
 use crate::error::Error;
-use crate::watch::Watch;
 
 /// A detector with the options of the command line.
 pub fn detector(args: &DetectorArgs) -> Result<Detector, Error> {
-    Ok(Detector::with_settings(settings(args))?)
+    Ok(Detector::new(settings(args))?)
 }
 
 /// The settings of a detector.
@@ -21,11 +19,13 @@ pub fn settings(args: &DetectorArgs) -> Settings {
         method: args.method.into(),
         backend: backend(args),
         threads: args.threads.map_or(0, Into::into),
-        lambda: args.lambda,
+        density: args.lambda,
         group_size: args.group_size,
         memory_budget: args.memory_budget,
         max_pairs: args.max_pairs,
         device: args.device.clone(),
+        // All threads of this process are its own.
+        affinity: Affinity::Auto,
         ..Settings::default()
     }
 }
@@ -65,34 +65,30 @@ pub fn asked((between, within): (bool, bool), args: &AskArgs) -> Asked {
     Asked {
         between,
         within,
+        only: None,
         shared_vertex: args.shared_vertex.into(),
-        ignores: !args.ignore.is_empty(),
+        question: Question::Pairs,
+        has_self: true,
+        excludes: !args.exclude.is_empty(),
+        has_kinds: false,
     }
 }
 
-/// The query without the pairs of bodies to ignore.
-pub fn query(asked: Asked, args: &AskArgs, bodies: &[BodyId]) -> Result<Query, Error> {
-    without(asked.query(), &args.ignore, bodies)
+/// The query without the pairs of bodies that `--exclude` names.
+pub fn query(asked: Asked, excluded: &[(usize, usize)], bodies: &[BodyId]) -> Result<Query, Error> {
+    let body = |number| body("--exclude", bodies, number);
+    let query = asked.query(bodies)?;
+    excluded.iter().try_fold(query, |query, &(a, b)| {
+        Ok(query.exclude((body(a)?, body(b)?)))
+    })
 }
 
-/// The query without the pairs of bodies that `--ignore` names.
-pub fn without(
-    query: Query,
-    ignored: &[(usize, usize)],
-    bodies: &[BodyId],
-) -> Result<Query, Error> {
-    let body = |number: usize| {
-        bodies.get(number).copied().ok_or_else(|| {
-            let given = match bodies.len() {
-                1 => "1 body is given, numbered 0".to_owned(),
-                n => format!("{n} bodies are given, numbered from 0"),
-            };
-            Error::Usage(format!("--ignore names body {number}, but {given}"))
-        })
-    };
-    ignored
-        .iter()
-        .try_fold(query, |query, &(a, b)| Ok(query.ignore(body(a)?, body(b)?)))
+/// The query with the kinds of pairs that `--kinds` names.
+pub fn of_kinds(query: Query, kinds: &[KindArg]) -> Query {
+    match kinds.is_empty() {
+        true => query,
+        false => query.kinds(kinds.iter().copied().map(PairKind::from)),
+    }
 }
 
 /// Fails if anything was found and `--fail-on-hit` was given.
@@ -103,68 +99,14 @@ pub fn hit(fail_on_hit: bool, is_found: bool) -> Result<(), Error> {
     }
 }
 
-/// One detection, with progress and cancellation.
-pub fn detect<'d>(
-    detector: &'d mut Detector,
-    scene: &Scene,
-    query: &Query,
-    cancel: &CancelToken,
-    watch: &Watch,
-) -> Result<&'d Pairs, Error> {
-    watched(cancel, watch, |control| {
-        Ok(detector.detect_with(scene, query, control)?)
-    })
-}
-
-/// How many pairs there are.
-pub fn count(
-    detector: &mut Detector,
-    scene: &Scene,
-    query: &Query,
-    cancel: &CancelToken,
-    watch: &Watch,
-) -> Result<u64, Error> {
-    watched(cancel, watch, |control| {
-        Ok(detector.count_with(scene, query, control)?)
-    })
-}
-
-/// Whether there is any pair.
-pub fn any(
-    detector: &mut Detector,
-    scene: &Scene,
-    query: &Query,
-    cancel: &CancelToken,
-    watch: &Watch,
-) -> Result<bool, Error> {
-    watched(cancel, watch, |control| {
-        Ok(detector.any_with(scene, query, control)?)
-    })
-}
-
-fn watched<T>(
-    cancel: &CancelToken,
-    watch: &Watch,
-    run: impl FnOnce(&Control<'_>) -> Result<T, Error>,
-) -> Result<T, Error> {
-    let report = |progress| watch.report(progress);
-    let mut control = Control::new().cancel(cancel);
-    if watch.is_shown() {
-        control = control.progress(&report);
-    }
-    run(&control)
-}
-
 /// Runs the same frame `n_frames` times. All positions are rewritten before each run, so that no result
 /// of the frame before can be reused.
-pub fn repeat<'d>(
-    detector: &'d mut Detector,
+pub fn repeat(
+    detector: &mut Detector,
     scene: &mut Scene,
     query: &Query,
     n_frames: usize,
-    cancel: &CancelToken,
-    watch: &Watch,
-) -> Result<(&'d Pairs, Times), Error> {
+) -> Result<(Pairs, Times), Error> {
     let mut times = Times::default();
     if n_frames > 1 {
         let rest: Vec<(BodyId, Positions)> = scene
@@ -172,14 +114,14 @@ pub fn repeat<'d>(
             .map(|(id, body)| (id, body.positions().clone()))
             .collect();
         for _ in 1..n_frames {
-            let pairs = detect(detector, scene, query, cancel, watch)?;
+            let pairs = detector.detect(scene, query)?;
             times.add(pairs.stats());
             for (id, positions) in &rest {
                 set_positions(scene, *id, positions)?;
             }
         }
     }
-    let pairs = detect(detector, scene, query, cancel, watch)?;
+    let pairs = detector.detect(scene, query)?;
     times.add(pairs.stats());
     Ok((pairs, times))
 }
@@ -206,7 +148,7 @@ pub struct Times {
 
 impl Times {
     /// Adds the times of a frame.
-    pub fn add(&mut self, stats: &Statistics) {
+    pub fn add(&mut self, stats: &Stats) {
         for stage in &stats.stages {
             if !self.stages.iter().any(|(name, _)| *name == stage.name) {
                 self.stages.push((stage.name, vec![0.0; self.total.len()]));
@@ -219,7 +161,7 @@ impl Times {
     }
 
     /// The same and one more.
-    pub fn and(mut self, stats: &Statistics) -> Self {
+    pub fn and(mut self, stats: &Stats) -> Self {
         self.add(stats);
         self
     }

@@ -1,6 +1,6 @@
 //! The answer as a JSON object.
 
-use impinge::{BodyId, Error, Pairs, Scene, Statistics};
+use impinge::{BodyId, Error, PairKind, Pairs, Scene, Stats};
 use serde_json::{Map, Value, json};
 
 use crate::asked::Asked;
@@ -25,34 +25,17 @@ pub fn answer(
         .iter()
         .zip(vertices)
         .map(|(&(id, name), vertices)| {
-            let body = scene.body(id)?;
-            Ok(json!({
-                "name": name,
-                "kind": body.kind().name(),
-                "primitives": body.n_primitives(),
-                "vertices": body.n_vertices(),
-                "colliding": pairs.colliding(id).len(),
-                "welded": vertices.n_welded,
-                "coincident": vertices.n_coincident,
-            }))
+            let mut object = body(scene, id, name, vertices)?;
+            object["colliding"] = pairs.colliding(id).len().into();
+            Ok(object)
         })
         .collect::<Result<_, Error>>()?;
-    let stages: Map<String, Value> = times
-        .stages_ms()
-        .map(|(name, ms)| (name.to_owned(), rounded(ms).into()))
-        .collect();
     let mut object = Map::new();
     object.insert("pairs".into(), pairs.len().into());
     object.insert("hash".into(), hash(pairs).into());
-    object.insert("backend".into(), pairs.stats().backend.as_str().into());
-    object.insert("method".into(), pairs.stats().method.into());
+    add_how(&mut object, pairs.stats(), ms(times));
     object.insert("asked".into(), asked.json());
     object.insert("bodies".into(), described.into());
-    object.insert(
-        "ms".into(),
-        json!({ "total": rounded(times.total_ms(50)), "stages": stages }),
-    );
-    object.insert("stats".into(), counters(pairs.stats()));
     object.insert("n_regions".into(), regions.map(<[_]>::len).into());
     let most = regions.unwrap_or_default().iter().take(MOST_REGIONS);
     let described: Vec<Value> = most
@@ -74,16 +57,50 @@ pub fn answer(
 pub fn without_pairs(
     asked: Asked,
     (name, found): (&str, Value),
-    stats: &Statistics,
+    stats: &Stats,
 ) -> Map<String, Value> {
     let mut object = Map::new();
     object.insert(name.into(), found);
     object.insert("asked".into(), asked.json());
+    let ms = json!({ "total": rounded(stats.total_ms) });
+    add_how(&mut object, stats, ms);
+    object
+}
+
+/// What every answer says of a body.
+pub fn body(scene: &Scene, id: BodyId, name: &str, vertices: &Vertices) -> Result<Value, Error> {
+    let body = scene.body(id)?;
+    Ok(json!({
+        "name": name,
+        "kind": body.kind().name(),
+        "elements": body.n_primitives(),
+        "vertices": body.n_vertices(),
+        "welded": vertices.n_welded,
+        "coincident": vertices.n_coincident,
+    }))
+}
+
+/// Adds how an answer was found: backend, method, times and counters.
+pub fn add_how(object: &mut Map<String, Value>, stats: &Stats, ms: Value) {
     object.insert("backend".into(), stats.backend.as_str().into());
     object.insert("method".into(), stats.method.into());
-    object.insert("ms".into(), json!({ "total": rounded(stats.total_ms) }));
+    object.insert("ms".into(), ms);
     object.insert("stats".into(), counters(stats));
-    object
+}
+
+/// Times of the stages, and the total time: medians, if the question was asked more than once.
+pub fn ms(times: &Times) -> Value {
+    let stages = times
+        .stages_ms()
+        .map(|(name, ms)| (name.to_owned(), Value::from(rounded(ms))));
+    let stages: Map<String, Value> = stages.collect();
+    json!({ "total": rounded(times.total_ms(50)), "stages": stages })
+}
+
+/// How many pairs of each kind there are.
+pub fn kinds<const N: usize>(kinds: [(PairKind, u64); N]) -> Value {
+    let counts = kinds.map(|(kind, n)| (kind.name().to_owned(), n.into()));
+    Value::Object(counts.into_iter().collect())
 }
 
 /// Adds the files that could not be read, if there are any.
@@ -103,7 +120,7 @@ pub fn rounded(ms: f64) -> f64 {
 }
 
 /// Every counter of the statistics under its own name.
-pub fn counters(stats: &Statistics) -> Value {
+pub fn counters(stats: &Stats) -> Value {
     json!({
         "n_threads": stats.n_threads,
         "grid": stats.grid,
@@ -128,7 +145,7 @@ mod tests {
     use super::*;
 
     /// The names of the fields, from the derived `Debug` of a value whose own values hold no colon.
-    fn fields(stats: &Statistics) -> Vec<String> {
+    fn fields(stats: &Stats) -> Vec<String> {
         let text = format!("{stats:?}");
         let parts: Vec<&str> = text.split(": ").collect();
         parts[..parts.len() - 1]
@@ -142,7 +159,7 @@ mod tests {
 
     #[test]
     fn no_counter_is_left_out() {
-        let stats = Statistics::default();
+        let stats = Stats::default();
         let counters = counters(&stats);
         let elsewhere = ["backend", "method", "stages", "total_ms"];
         let expected: Vec<String> = fields(&stats)

@@ -98,11 +98,6 @@ impl<'a> Loading<'a> {
         }
     }
 
-    /// What the user wants as bodies.
-    pub fn of_bodies(self, bodies: Option<BodiesArg>) -> Self {
-        Loading { bodies, ..self }
-    }
-
     /// What the parts of a file of this format are called, if they are to be bodies. There are `n` files.
     fn parts(&self, format: Format, n: usize) -> Option<[&'static str; 2]> {
         let (kind, nouns) = match format {
@@ -218,7 +213,7 @@ impl Bodies {
             let _ = writeln!(stderr(), "not read: {why}");
         }
         let nothing = impinge::Elements::Triangles(Vec::new());
-        let id = self.scene.add(nothing, Vec::<[f32; 3]>::new())?;
+        let id = self.scene.add((nothing, Vec::<[f32; 3]>::new()))?;
         self.unread.push((self.ids.len(), why));
         self.ids.push(id);
         self.names.push(path.display().to_string());
@@ -306,7 +301,7 @@ impl Bodies {
         } = mesh;
         let id = self
             .scene
-            .add(to_elements(elements), to_positions(positions))
+            .add((to_elements(elements), to_positions(positions)))
             .map_err(|source| Error::Refused {
                 what: name.clone(),
                 source,

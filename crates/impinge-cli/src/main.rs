@@ -19,7 +19,6 @@ mod picture;
 mod regions;
 mod rows;
 mod stop;
-mod target;
 mod text;
 mod values;
 mod watch;

@@ -1,18 +1,46 @@
 //! Text output.
 
-use std::io::{self, StdoutLock, Write, stdout};
+use std::io::{self, StdoutLock, Write, stderr, stdout};
 
 use comfy_table::{CellAlignment, Table, presets};
-use impinge::{BodyId, Pairs, Scene};
+use impinge::{BodyId, Pairs, Scene, Stats};
 use impinge_io::printable;
 
 use crate::detection::Times;
 use crate::error::Error;
 use crate::text::{counted, grouped, hash, shown_bytes};
+use crate::values::RowsFile;
 
 /// Standard output. If the reader closes it, writing is an error, not a panic.
 pub fn out() -> StdoutLock<'static> {
     stdout().lock()
+}
+
+/// Prints the text of an answer: on standard error, if its rows have standard output.
+pub fn say(text: &[u8], rows: Option<&RowsFile>) -> Result<(), Error> {
+    if rows.is_some_and(RowsFile::is_stdout) {
+        // If standard error is closed, nobody reads the summary.
+        let _ = stderr().write_all(text);
+        return Ok(());
+    }
+    Ok(out().write_all(text)?)
+}
+
+/// How an answer was found, in one line: `clusters on cpu, 2 threads; 10 candidates, 0 unsure; 0.365 ms`.
+pub fn how(stats: &Stats, times: &Times) -> String {
+    let of = match times.n_frames() {
+        1 => String::new(),
+        n => format!(", median of {n}"),
+    };
+    format!(
+        "{} on {}, {}; {}, {} unsure; {:.3} ms{of}",
+        stats.method,
+        stats.backend,
+        counted(stats.n_threads as u64, "thread"),
+        counted(stats.n_candidates, "candidate"),
+        grouped(stats.n_unsure),
+        times.total_ms(50)
+    )
 }
 
 /// A table without lines; the columns in `text` are aligned left, all others right.
@@ -66,14 +94,7 @@ pub fn body_table(
             grouped(pairs.colliding(id).len() as u64),
         ]);
     }
-    let header = [
-        "body",
-        "name",
-        "kind",
-        "primitives",
-        "vertices",
-        "colliding",
-    ];
+    let header = ["body", "name", "kind", "elements", "vertices", "colliding"];
     Ok(table(&header, &[1, 2], rows))
 }
 

@@ -43,7 +43,7 @@ impl<'a> Drawer<'a> {
                 Err(error) => return Err(error.into()),
             },
         };
-        let detector = Detector::with_settings(Settings {
+        let detector = Detector::new(Settings {
             backend: Backend::Cpu,
             threads,
             ..Settings::default()

@@ -77,9 +77,9 @@ mod tests {
             .add_triangles(&[[0, 1, 2]], &upright(4.5, 4.375))
             .unwrap();
         let mut detector = Detector::new(Backend::Cpu).unwrap();
-        let pairs = detector.detect(&scene, &Query::all()).unwrap();
+        let pairs = detector.detect(&scene, &Query::between_all()).unwrap();
         let bodies = [(a, "a"), (b, "b"), (c, "c")];
-        let regions = regions(&scene, &bodies, pairs).unwrap().unwrap();
+        let regions = regions(&scene, &bodies, &pairs).unwrap().unwrap();
         let found: Vec<_> = regions
             .iter()
             .map(|r| (r.bodies, r.n_pairs, r.first))

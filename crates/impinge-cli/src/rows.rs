@@ -1,130 +1,169 @@
-//! Rows of pairs: CSV, lines of JSON, NumPy arrays.
+//! Files of rows: one writer for all answers. A file exists whole or not at all; "-" is standard output.
 
-use std::io::{self, Write};
+use std::io::{BufWriter, Write};
+use std::path::PathBuf;
 
-use impinge::Pairs;
-use impinge_io::npy_header;
+use impinge::exact::Feature;
+use impinge::{Impact, NearPair, NearPairs};
+use impinge_io::{AtomicFile, Cell, Column, ELEMENTS, Holds, KIND, Table, TableFormat};
 
 use crate::error::Error;
-use crate::target::Target;
-use crate::values::{RowsFile, RowsFormat};
+use crate::output::out;
+use crate::values::RowsFile;
 
-/// Writes rows `body_a, primitive_a, body_b, primitive_b`, sorted.
-pub fn write(file: &RowsFile, pairs: &Pairs) -> Result<(), Error> {
-    Target::fill(file, |to| put(to, file.format, pairs))
+/// A file of rows that is being written.
+pub struct Rows {
+    table: Table,
+    path: PathBuf,
+    /// `None` for standard output.
+    file: Option<AtomicFile>,
+    /// The rows written, if their number was not known before.
+    n_late: Option<u64>,
 }
 
-fn put(to: &mut dyn Write, format: RowsFormat, pairs: &Pairs) -> io::Result<()> {
-    match format {
-        RowsFormat::Npy => npy(to, pairs.rows()),
-        RowsFormat::Csv => csv(to, pairs.rows()),
-        RowsFormat::Jsonl => jsonl(to, pairs.rows()),
-    }
-}
-
-/// The rows of the frames of a sequence, each preceded by the number of its frame.
-pub struct FrameRows {
-    format: RowsFormat,
-    to: Target,
-}
-
-impl FrameRows {
-    /// Starts a file.
-    pub fn create(file: &RowsFile) -> Result<Self, Error> {
-        if file.format == RowsFormat::Npy {
-            let text = "--pairs: the pairs of a sequence are written as .csv or .jsonl";
+impl Rows {
+    /// Starts a file. `n`: the number of rows, if it is known.
+    pub fn create(file: &RowsFile, columns: Vec<Column>, n: Option<u64>) -> Result<Self, Error> {
+        if file.is_stdout() && n.is_none() && file.format == TableFormat::Npy {
+            let text = "--rows-format npy: such a file begins with the number of its rows, which is not known yet: \
+                        name a file instead of -";
             return Err(Error::Usage(text.to_owned()));
         }
-        let mut to = Target::create(file)?;
-        if file.format == RowsFormat::Csv {
-            to.write(|to| writeln!(to, "frame,body_a,primitive_a,body_b,primitive_b"))?;
-        }
-        Ok(FrameRows {
-            format: file.format,
-            to,
-        })
+        let mut rows = Rows {
+            table: Table::new(file.format, columns),
+            path: file.path.clone(),
+            file: match file.is_stdout() {
+                true => None,
+                false => Some(AtomicFile::create(&file.path)?),
+            },
+            n_late: n.is_none().then_some(0),
+        };
+        let header = rows.table.header(n);
+        rows.act(|_, to| to.write_all(&header))?;
+        Ok(rows)
     }
 
-    /// Adds the pairs of a frame.
-    pub fn frame(&mut self, frame_ix: usize, pairs: &Pairs) -> Result<(), Error> {
-        let is_csv = self.format == RowsFormat::Csv;
-        self.to.write(|to| {
-            for [body_a, a, body_b, b] in pairs.rows() {
-                if is_csv {
-                    writeln!(to, "{frame_ix},{body_a},{a},{body_b},{b}")?;
-                } else {
-                    write!(to, "{{\"frame\":{frame_ix},")?;
-                    members(to, [body_a, a, body_b, b])?;
-                }
+    /// Adds rows.
+    pub fn put<'a, const N: usize>(
+        &mut self,
+        rows: impl IntoIterator<Item = [Cell<'a>; N]>,
+    ) -> Result<(), Error> {
+        let mut n = 0;
+        self.act(|table, to| {
+            rows.into_iter().try_for_each(|row| {
+                n += 1;
+                table.row(to, &row)
+            })
+        })?;
+        self.n_late = self.n_late.map(|before| before + n);
+        Ok(())
+    }
+
+    fn act(
+        &mut self,
+        act: impl FnOnce(&Table, &mut dyn Write) -> std::io::Result<()>,
+    ) -> Result<(), Error> {
+        match &mut self.file {
+            Some(file) => act(&self.table, file).map_err(|source| Error::Write {
+                path: self.path.clone(),
+                source,
+            }),
+            None => {
+                let mut to = BufWriter::new(out());
+                act(&self.table, &mut to)?;
+                Ok(to.flush()?)
             }
-            Ok(())
-        })
+        }
     }
 
     /// Gives the file its name.
     pub fn finish(self) -> Result<(), Error> {
-        self.to.finish()
+        let Some(mut file) = self.file else {
+            return Ok(());
+        };
+        if let Some(header) = self.n_late.and_then(|n| self.table.late_header(n)) {
+            file.patch(0, &header)?;
+        }
+        Ok(file.finish()?)
     }
 }
 
-fn npy(to: &mut dyn Write, rows: impl ExactSizeIterator<Item = [u32; 4]>) -> io::Result<()> {
-    to.write_all(&npy_header("'<u4'", &format!("({}, 4)", rows.len())))?;
-    for row in rows {
-        to.write_all(row.map(u32::to_le_bytes).as_flattened())?;
-    }
-    Ok(())
+/// Writes all rows of an answer.
+pub fn write<'a, const N: usize>(
+    file: &RowsFile,
+    columns: Vec<Column>,
+    n: usize,
+    rows: impl IntoIterator<Item = [Cell<'a>; N]>,
+) -> Result<(), Error> {
+    let mut to = Rows::create(file, columns, Some(n as u64))?;
+    to.put(rows)?;
+    to.finish()
 }
 
-fn csv(to: &mut dyn Write, rows: impl Iterator<Item = [u32; 4]>) -> io::Result<()> {
-    writeln!(to, "body_a,primitive_a,body_b,primitive_b")?;
-    for [body_a, a, body_b, b] in rows {
-        writeln!(to, "{body_a},{a},{body_b},{b}")?;
-    }
-    Ok(())
+/// Some columns after the number of the frame.
+pub fn of_frames(columns: &[Column]) -> Vec<Column> {
+    [&[Column::new("frame", Holds::U32)], columns].concat()
 }
 
-fn jsonl(to: &mut dyn Write, rows: impl Iterator<Item = [u32; 4]>) -> io::Result<()> {
-    for row in rows {
-        to.write_all(b"{")?;
-        members(to, row)?;
-    }
-    Ok(())
+/// The number of a frame.
+pub fn frame(frame_ix: usize) -> Cell<'static> {
+    Cell::Number(u32::try_from(frame_ix).unwrap_or(u32::MAX))
 }
 
-/// The members of a JSON object, and its end.
-fn members(to: &mut (impl Write + ?Sized), [body_a, a, body_b, b]: [u32; 4]) -> io::Result<()> {
-    writeln!(
-        to,
-        "\"body_a\":{body_a},\"primitive_a\":{a},\"body_b\":{body_b},\"primitive_b\":{b}}}"
+/// The row of an impact.
+pub fn impact(impact: &Impact) -> [Cell<'static>; 6] {
+    Cell::impact(impact.kind.name(), impact.row(), impact.toi)
+}
+
+/// Writes near pairs; distances and nearest points were asked for.
+pub fn write_near(file: &RowsFile, near: &NearPairs) -> Result<(), Error> {
+    let more = [
+        // The longest is `EA0_EB1`.
+        Column::new("type", Holds::Text(7)),
+        Column::new("feature_a", Holds::Text(2)),
+        Column::new("feature_b", Holds::Text(2)),
+        Column::new("parallel", Holds::Bool),
+        Column::new("distance", Holds::F64),
+        Column::new("point_a", Holds::Point(["ax", "ay", "az"])),
+        Column::new("point_b", Holds::Point(["bx", "by", "bz"])),
+    ];
+    let columns = [&[KIND][..], &ELEMENTS, &more].concat();
+    write(
+        file,
+        columns,
+        near.len(),
+        near.iter().map(|pair| of_near(&pair)),
     )
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
+fn of_near(pair: &NearPair) -> [Cell<'static>; 12] {
+    let [body_a, a, body_b, b] = pair.row().map(Cell::Number);
+    let [feature_a, feature_b] = pair.features.map(|feature| Cell::Text(name(feature)));
+    let (distance, [point_a, point_b]) = pair
+        .closest
+        .map_or((f64::NAN, [[f64::NAN; 3]; 2]), |closest| {
+            (closest.distance, closest.points)
+        });
+    [
+        Cell::Text(pair.kind.name()),
+        body_a,
+        a,
+        body_b,
+        b,
+        Cell::Text(pair.name()),
+        feature_a,
+        feature_b,
+        Cell::Bool(pair.is_parallel),
+        Cell::Float(distance),
+        Cell::Point(point_a),
+        Cell::Point(point_b),
+    ]
+}
 
-    #[test]
-    fn npy_bytes() {
-        for n_rows in [0, 2, 1000] {
-            let mut bytes = Vec::new();
-            npy(&mut bytes, vec![[0, 7, 1, 0x0102_0304]; n_rows].into_iter()).unwrap();
-            assert_eq!(&bytes[..8], b"\x93NUMPY\x01\x00");
-            let start = 10 + usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
-            assert_eq!(start % 64, 0);
-            let header = std::str::from_utf8(&bytes[10..start]).unwrap();
-            assert!(header.contains(&format!("'shape': ({n_rows}, 4)")) && header.ends_with('\n'));
-            assert_eq!(bytes.len(), start + 16 * n_rows);
-            if n_rows > 0 {
-                let row = &bytes[start..start + 16];
-                assert_eq!(row, [0, 0, 0, 0, 7, 0, 0, 0, 1, 0, 0, 0, 4, 3, 2, 1]);
-            }
-        }
-    }
-
-    #[test]
-    fn csv_text() {
-        let mut bytes = Vec::new();
-        csv(&mut bytes, [[0, 7, 1, 3]].into_iter()).unwrap();
-        assert_eq!(bytes, b"body_a,primitive_a,body_b,primitive_b\n0,7,1,3\n");
+fn name(feature: Feature) -> &'static str {
+    match feature {
+        Feature::Vertex(ix) => ["v0", "v1", "v2"][usize::from(ix)],
+        Feature::Edge(ix) => ["e0", "e1", "e2"][usize::from(ix)],
+        Feature::Face => "f",
     }
 }

@@ -1,6 +1,6 @@
 //! Numbers and hashes as text.
 
-use impinge::Pairs;
+use impinge::{PairKind, Pairs};
 
 /// A number with a comma after every three digits.
 pub fn grouped(n: u64) -> String {
@@ -18,6 +18,15 @@ pub fn grouped(n: u64) -> String {
 /// `n` with a noun, in the plural unless `n` is 1.
 pub fn counted(n: u64, one: &str) -> String {
     format!("{} {one}{}", grouped(n), if n == 1 { "" } else { "s" })
+}
+
+/// How many pairs of each kind there are, without those of which there are none: `2 vf, 6 ee`.
+pub fn kinds(kinds: impl IntoIterator<Item = (PairKind, u64)>) -> String {
+    let found = kinds.into_iter().filter(|&(_, n)| n > 0);
+    let counts: Vec<String> = found
+        .map(|(kind, n)| format!("{} {}", grouped(n), kind.name()))
+        .collect();
+    counts.join(", ")
 }
 
 /// Bytes in a unit that keeps the number short.

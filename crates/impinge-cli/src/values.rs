@@ -7,12 +7,13 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use clap::ValueEnum;
+use impinge_io::TableFormat;
 
-/// A file for rows of pairs.
+/// A file for rows.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RowsFile {
     pub path: PathBuf,
-    pub format: RowsFormat,
+    pub format: TableFormat,
 }
 
 /// The format of rows of pairs.
@@ -26,8 +27,34 @@ pub enum RowsFormat {
     Npy,
 }
 
+impl From<RowsFormat> for TableFormat {
+    fn from(format: RowsFormat) -> Self {
+        match format {
+            RowsFormat::Csv => TableFormat::Csv,
+            RowsFormat::Jsonl => TableFormat::Jsonl,
+            RowsFormat::Npy => TableFormat::Npy,
+        }
+    }
+}
+
 impl RowsFile {
-    /// Whether the pairs go to standard output.
+    /// A file whose name gives the format, unless that is told.
+    pub fn new(path: &Path, format: Option<RowsFormat>) -> Result<Self, String> {
+        let format = match format {
+            Some(format) => format.into(),
+            None => match extension(&path.to_string_lossy()).as_str() {
+                "npy" => TableFormat::Npy,
+                "csv" => TableFormat::Csv,
+                "jsonl" | "ndjson" => TableFormat::Jsonl,
+                _ if path == Path::new("-") => TableFormat::Csv,
+                _ => return Err("rows are written as .csv, .jsonl or .npy".to_owned()),
+            },
+        };
+        let path = path.to_owned();
+        Ok(RowsFile { path, format })
+    }
+
+    /// Whether the rows go to standard output.
     pub fn is_stdout(&self) -> bool {
         self.path == Path::new("-")
     }
@@ -37,17 +64,7 @@ impl FromStr for RowsFile {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let format = match extension(text).as_str() {
-            "npy" => RowsFormat::Npy,
-            "csv" => RowsFormat::Csv,
-            "jsonl" | "ndjson" => RowsFormat::Jsonl,
-            _ if text == "-" => RowsFormat::Csv,
-            _ => return Err("rows are written as .csv, .jsonl or .npy".to_owned()),
-        };
-        Ok(RowsFile {
-            path: text.into(),
-            format,
-        })
+        RowsFile::new(Path::new(text), None)
     }
 }
 
@@ -123,6 +140,27 @@ impl FromStr for MeshFile {
             path: text.into(),
             format,
         })
+    }
+}
+
+/// A file for a body at the end of a step, exactly.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ReachedFile {
+    pub path: PathBuf,
+    pub is_obj: bool,
+}
+
+impl FromStr for ReachedFile {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let is_obj = match extension(text).as_str() {
+            "obj" => true,
+            "ply" => false,
+            _ => return Err("bodies are written as .ply or .obj".to_owned()),
+        };
+        let path = text.into();
+        Ok(ReachedFile { path, is_obj })
     }
 }
 
@@ -287,6 +325,24 @@ pub fn body_numbers(text: &str) -> Result<(usize, usize), String> {
     text.split_once(',')
         .and_then(|(a, b)| Some((a.trim().parse().ok()?, b.trim().parse().ok()?)))
         .ok_or_else(|| "expected two body numbers, such as 0,1".to_owned())
+}
+
+/// The numbers of two different bodies with a comma between them.
+pub fn two_bodies(text: &str) -> Result<(usize, usize), String> {
+    match body_numbers(text)? {
+        (a, b) if a == b => {
+            Err("these are one body: `impinge self` finds where it meets itself".to_owned())
+        }
+        numbers => Ok(numbers),
+    }
+}
+
+/// A body's number and a length with a comma between them.
+pub fn body_length(text: &str) -> Result<(usize, f64), String> {
+    let expected = || "expected a body's number and a length, such as 0,0.5".to_owned();
+    let (body, length) = text.split_once(',').ok_or_else(expected)?;
+    let body = body.trim().parse().map_err(|_| expected())?;
+    Ok((body, distance(length.trim())?))
 }
 
 /// A count above 0, with an optional suffix: `k`, `M`, `G` are powers of 1000.
@@ -461,11 +517,17 @@ mod tests {
 
     #[test]
     fn files_by_extension() {
-        assert_eq!("a.NPY".parse::<RowsFile>().unwrap().format, RowsFormat::Npy);
-        assert_eq!("a.csv".parse::<RowsFile>().unwrap().format, RowsFormat::Csv);
+        assert_eq!(
+            "a.NPY".parse::<RowsFile>().unwrap().format,
+            TableFormat::Npy
+        );
+        assert_eq!(
+            "a.csv".parse::<RowsFile>().unwrap().format,
+            TableFormat::Csv
+        );
         assert_eq!(
             "a.jsonl".parse::<RowsFile>().unwrap().format,
-            RowsFormat::Jsonl
+            TableFormat::Jsonl
         );
         assert!("-".parse::<RowsFile>().unwrap().is_stdout());
         assert!("a.txt".parse::<RowsFile>().is_err());

@@ -3,7 +3,7 @@
 use std::io::{IsTerminal, stderr, stdout};
 use std::time::{Duration, Instant};
 
-use impinge::{CancelToken, Progress};
+use impinge::{CancelToken, Control, Progress};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::error::Error;
@@ -65,18 +65,22 @@ impl Watch {
         }
     }
 
-    /// Whether a bar is shown; if not, progress need not be reported.
-    pub fn is_shown(&self) -> bool {
-        self.bar.is_some()
+    /// Stops a detector's questions with the token, and shows their progress.
+    pub fn control(&self, cancel: &CancelToken) -> Control {
+        let control = Control::new().cancel(cancel);
+        match self.bar.clone() {
+            None => control,
+            Some(bar) => {
+                let started = self.started;
+                control.progress(move |progress| report(&bar, started, progress))
+            }
+        }
     }
 
     /// Shows the progress of a detection, once it has taken a while.
     pub fn report(&self, progress: Progress) {
-        if let Some(bar) = &self.bar
-            && self.started.elapsed() >= PATIENCE
-        {
-            bar.set_length(progress.total);
-            bar.set_position(progress.done);
+        if let Some(bar) = &self.bar {
+            report(bar, self.started, progress);
         }
     }
 
@@ -85,6 +89,13 @@ impl Watch {
         if let Some(bar) = &self.bar {
             bar.inc(1);
         }
+    }
+}
+
+fn report(bar: &ProgressBar, started: Instant, progress: Progress) {
+    if started.elapsed() >= PATIENCE {
+        bar.set_length(progress.total);
+        bar.set_position(progress.done);
     }
 }
 

@@ -4,7 +4,7 @@
 
 #[cfg(feature = "gpu")]
 fn main() -> Result<(), impinge_core::Error> {
-    use impinge_core::{Backend, Detector, Method, Query, Scene, Settings, Step};
+    use impinge_core::{Backend, Detector, Method, Query, Scene, Settings};
     use impinge_scenes::surfaces;
 
     let mut scene = Scene::new();
@@ -18,14 +18,14 @@ fn main() -> Result<(), impinge_core::Error> {
             backend: Backend::Gpu,
             ..Settings::default()
         };
-        let mut detector = Detector::with_settings(settings)?;
-        detector.detect(&scene, &Query::all())?;
+        let mut detector = Detector::new(settings)?;
+        detector.detect(&scene, &Query::between_all())?;
         if let Some(recording) = detector.recording() {
             println!("{}\n{recording}", method.name());
         }
     }
     let mut detector = Detector::new(Backend::Gpu)?;
-    detector.impacts(&scene, &Step::default())?;
+    detector.impacts(&scene, &Query::all())?;
     if let Some(recording) = detector.recording() {
         println!("a step\n{recording}");
     }

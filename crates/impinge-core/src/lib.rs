@@ -29,8 +29,10 @@ pub use answers::advance::Advance;
 pub use answers::candidates::Candidates;
 pub use answers::impacts::{Impact, Impacts, hash_impact_rows};
 pub use answers::near::{ClosestPoints, NearIter, NearPair, NearPairs};
-pub use answers::pairs::{Pairs, Primitive, hash_rows};
+pub use answers::pairs::{Element, Pairs, hash_rows};
 pub use answers::places::Place;
+#[cfg(feature = "gpu")]
+pub use detector::Gpu;
 pub use detector::{Detector, host};
 #[cfg(feature = "gpu")]
 pub use gpu::Capacities;
@@ -38,19 +40,19 @@ pub use gpu::Capacities;
 pub use gpu::{DeviceInfo, ResidentPairs, ResidentPart, ResidentStep, devices, devices_async};
 pub use impinge_exact as exact;
 pub use impinge_weld::{Coordinate, Weld, WrongNumber};
-pub use query::near::NearQuery;
 pub use query::pair_kind::{PairKind, PairKinds};
 pub use query::progress::{CancelToken, Control, Progress};
-pub use query::settings::{Backend, InstructionSet, Method, Placement, Recluster, Settings};
-pub use query::step::{CandidateQuery, Clearance, ElementVertices, PairFilter, Start, Step, Toi};
+pub use query::settings::{Affinity, Backend, InstructionSet, Method, Recluster, Settings};
+pub use query::step::{Clearance, ElementVertices, PairFilter, Precision, Start};
 pub use query::tuning::{Tuning, Ways};
-pub use query::{Query, SharedVertex};
-pub use scene::elements::{Elements, Kind, Part};
+pub use query::{Exclusion, Query, SharedVertex};
+pub use scene::elements::{BodyKind, Elements, Part};
 pub use scene::error::Error;
 pub use scene::ids::BodyId;
+pub use scene::mesh::Mesh;
 pub use scene::position_rows::PositionRows;
-pub use scene::positions::{Positions, Real};
+pub use scene::positions::{NewPositions, Positions, Real};
 pub use scene::{Body, Filter, Scene};
-pub use search::stats::{Stage, Statistics};
+pub use search::stats::{Stage, Stats};
 #[cfg(feature = "gpu")]
 pub use wgpu;

@@ -43,14 +43,14 @@ fn steady_frames_allocate_a_plan_and_no_lists() {
             ball.positions.clone(),
             ball.translated([0.0, 0.0, 0.125]).positions,
         ];
-        let mut detector = Detector::with_settings(Settings {
+        let mut detector = Detector::new(Settings {
             method,
             threads: 1,
             backend: Backend::Cpu,
             ..Settings::default()
         })
         .unwrap();
-        for query in [Query::between(a, b), Query::everything()] {
+        for query in [Query::between(a, b), Query::all()] {
             let mut n_pairs = 0;
             for frame in 0..6 {
                 let pose = &poses[frame % 2];

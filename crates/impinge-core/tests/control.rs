@@ -10,13 +10,13 @@ use std::ops::ControlFlow;
 use std::os::unix::process::CommandExt;
 use std::path::Path;
 use std::process::{Command, exit};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use impinge_core::contact::Contacts;
 use impinge_core::{
-    Backend, BodyId, CancelToken, CandidateQuery, Control, Detector, Error, NearQuery, Pairs,
-    Query, Scene, Settings, Step,
+    Backend, BodyId, CancelToken, Control, Detector, Error, Pairs, Query, Scene, Settings,
 };
 use impinge_scenes::surfaces;
 
@@ -33,7 +33,7 @@ fn detector(threads: usize) -> Detector {
 }
 
 fn budgeted(threads: usize, memory_budget: Option<u64>) -> Detector {
-    Detector::with_settings(Settings {
+    Detector::new(Settings {
         backend: Backend::Cpu,
         threads,
         memory_budget,
@@ -55,8 +55,7 @@ impl World {
         });
         // One thread: the process has no others yet.
         let mut detector = detector(1);
-        detector.detect(&scene, &Query::all()).unwrap();
-        let pairs = detector.take_pairs();
+        let pairs = detector.detect(&scene, &Query::between_all()).unwrap();
         let contacts = detector.contacts(&scene, &pairs).unwrap();
         World {
             scene,
@@ -68,7 +67,7 @@ impl World {
 }
 
 /// A question, and a number that stands for its answer.
-type Ask = fn(&mut Detector, &World, &Control<'_>) -> Result<u64, Error>;
+type Ask = fn(&mut Detector, &World) -> Result<u64, Error>;
 
 fn bits(points: &[[f64; 3]]) -> u64 {
     let bits = points.as_flattened().iter().map(|x| x.to_bits());
@@ -77,73 +76,70 @@ fn bits(points: &[[f64; 3]]) -> u64 {
 
 /// By the names of the methods; where one is asked twice, with more after a space.
 const ALL: [(&str, Ask); 15] = [
-    ("detect", |d, w, c| {
-        Ok(d.detect_with(&w.scene, &Query::everything(), c)?.hash())
+    ("detect", |d, w| {
+        Ok(d.detect(&w.scene, &Query::all())?.hash())
     }),
-    ("count", |d, w, c| d.count_with(&w.scene, &Query::all(), c)),
-    ("any", |d, w, c| {
-        Ok(d.any_with(&w.scene, &Query::everything(), c)?.into())
+    ("count", |d, w| d.count(&w.scene, &Query::between_all())),
+    ("any", |d, w| Ok(d.any(&w.scene, &Query::all())?.into())),
+    ("any of many", |d, w| {
+        Ok(d.any(&w.scene, &Query::between_all())?.into())
     }),
-    ("any of many", |d, w, c| {
-        Ok(d.any_with(&w.scene, &Query::all(), c)?.into())
+    ("impacts", |d, w| {
+        let step = Query::between(w.bodies[0], w.bodies[1]);
+        Ok(d.impacts(&w.scene, &step)?.hash())
     }),
-    ("impacts", |d, w, c| {
-        let step = Step::new(Query::between(w.bodies[0], w.bodies[1]));
-        Ok(d.impacts_with(&w.scene, &step, c)?.hash())
-    }),
-    ("earliest", |d, w, c| {
-        let first = d.earliest_with(&w.scene, &Step::default(), c)?;
+    ("earliest", |d, w| {
+        let first = d.earliest(&w.scene, &Query::all())?;
         Ok(first.map_or(0, |first| first.toi.to_bits()))
     }),
-    ("is_free", |d, w, c| {
-        Ok(d.is_free_with(&w.scene, &Step::default(), c)?.into())
+    ("is_free", |d, w| {
+        Ok(d.is_free(&w.scene, &Query::all())?.into())
     }),
-    ("advance", |d, w, c| {
-        let step = Step::new(Query::between(w.bodies[0], w.bodies[2]));
-        Ok(d.advance_with(&w.scene, &step, c)?.fraction.to_bits())
+    ("advance", |d, w| {
+        let step = Query::between(w.bodies[0], w.bodies[2]);
+        Ok(d.advance(&w.scene, &step)?.fraction.to_bits())
     }),
-    ("candidates", |d, w, c| {
-        let query = CandidateQuery::new(Query::between(w.bodies[0], w.bodies[1]));
-        Ok(d.candidates_with(&w.scene, &query, c)?.len() as u64)
+    ("candidates", |d, w| {
+        let query = Query::between(w.bodies[0], w.bodies[1]);
+        Ok(d.candidates(&w.scene, 0.0, &query)?.len() as u64)
     }),
-    ("candidates_in_runs", |d, w, c| {
-        let query = CandidateQuery::new(Query::between(w.bodies[0], w.bodies[1]));
+    ("candidates_in_runs", |d, w| {
+        let query = Query::between(w.bodies[0], w.bodies[1]);
         let each = |_| ControlFlow::<()>::Continue(());
-        match d.candidates_in_runs_with(&w.scene, &query, 100_000, each, c)? {
+        match d.candidates_in_runs(&w.scene, 0.0, &query, 100_000, each)? {
             ControlFlow::Continue(n) => Ok(n),
             ControlFlow::Break(()) => Ok(0),
         }
     }),
-    ("within_distance", |d, w, c| {
-        let query = NearQuery::new(Query::all()).distance(0.001);
-        Ok(d.within_distance_with(&w.scene, &query, c)?.hash())
+    ("near", |d, w| {
+        let query = Query::between_all();
+        Ok(d.near(&w.scene, 0.0, &query)?.hash())
     }),
-    ("nearest", |d, w, c| {
+    ("nearest", |d, w| {
         let [a, ..] = w.bodies;
-        let nearest = d.nearest_with(&w.scene, &Query::across([a]), c)?;
+        let nearest = d.nearest(&w.scene, &Query::across([a]))?;
         let nearest = nearest.expect("elements");
-        Ok(nearest.distance.to_bits() ^ u64::from(nearest.primitives[0]))
+        Ok(nearest.distance.to_bits() ^ u64::from(nearest.a.element))
     }),
-    ("distance", |d, w, c| {
+    ("distance", |d, w| {
         let [a, _, b] = w.bodies;
-        let nearest = d.distance_with(&w.scene, a, b, c)?.expect("elements");
-        Ok(nearest.distance.to_bits() ^ u64::from(nearest.primitives[0]))
+        let nearest = d.distance(&w.scene, a, b)?.expect("elements");
+        Ok(nearest.distance.to_bits() ^ u64::from(nearest.a.element))
     }),
-    ("contacts", |d, w, c| {
-        Ok(bits(d.contacts_with(&w.scene, &w.pairs, c)?.points()))
+    ("contacts", |d, w| {
+        Ok(bits(d.contacts(&w.scene, &w.pairs)?.points()))
     }),
-    ("penetration", |d, w, c| {
+    ("penetration", |d, w| {
         let [a, b, _] = w.bodies;
-        let found = d.penetration_with(&w.scene, &w.contacts, a, b, c)?;
+        let found = d.penetration(&w.scene, &w.contacts, a, b)?;
         Ok(found.inside[0].len() as u64 + bits(&[found.regions[0].position]))
     }),
 ];
 
 /// Methods of the detector that ask nothing, or what is asked above in another way.
-const NO_QUESTIONS: [&str; 25] = [
+const NO_QUESTIONS: [&str; 16] = [
     "new",
-    "with_settings",
-    "with_settings_async",
+    "open",
     "with_device",
     "with_damage",
     "with_capacities",
@@ -151,18 +147,10 @@ const NO_QUESTIONS: [&str; 25] = [
     "settings",
     "start_intersects",
     "stats",
-    "step_stats",
-    "take_pairs",
-    "take_impacts",
-    "take_candidates",
-    "take_near",
-    "reuse_candidates",
+    "set_control",
     // On a device.
     "detect_async",
-    "encode",
-    "encode_step",
-    "positions_on_device",
-    "make_room",
+    "gpu",
     "bytes_on_device",
     "trace",
     "recording",
@@ -192,18 +180,16 @@ fn methods(folder: &Path, found: &mut BTreeSet<String>) {
     }
 }
 
-/// Every method is asked, with a control and without, or is no question.
+/// Every method is asked, or is no question.
 fn assert_none_is_forgotten() {
     let mut all = BTreeSet::new();
     methods(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src"), &mut all);
-    assert!(all.len() > 30, "{all:?}");
+    assert!(all.len() > 25, "{all:?}");
     let mut known: BTreeSet<String> = NO_QUESTIONS.map(str::to_owned).into();
-    known.insert("make_room_async".to_owned());
     for (name, _) in ALL {
         let method = name.split(' ').next().unwrap();
         assert!(all.contains(method), "there is no method {method}");
         known.insert(method.to_owned());
-        known.insert(format!("{method}_with"));
     }
     let forgotten: Vec<_> = all.difference(&known).collect();
     assert!(forgotten.is_empty(), "not asked here: {forgotten:?}");
@@ -219,7 +205,7 @@ fn answers(world: &World, threads: usize) -> Vec<u64> {
     let mut detector = detector(threads);
     ALL.iter()
         .map(|(name, ask)| {
-            let answer = ask(&mut detector, world, &Control::new());
+            let answer = ask(&mut detector, world);
             answer.unwrap_or_else(|error| panic!("{name}: {error}"))
         })
         .collect()
@@ -237,12 +223,12 @@ fn every_question() {
     assert_eq!(answers(&world, 0), expected);
     let mut kept = detector(2);
     for (name, ask) in ALL {
-        let answer = ask(&mut kept, &world, &Control::new()).unwrap();
+        let answer = ask(&mut kept, &world).unwrap();
         assert_eq!(Some(answer), at(name, &expected), "{name} on two threads");
     }
     in_fork(|| {
         // A new detector, one of the parent's, and again.
-        let ask = |(_, ask): &(&str, Ask)| ask(&mut kept, &world, &Control::new()).ok();
+        let ask = |(_, ask): &(&str, Ask)| ask(&mut kept, &world).ok();
         answers(&world, 0) == expected
             && answers(&world, 2) == expected
             && ALL.iter().map(ask).eq(expected.iter().copied().map(Some))
@@ -251,7 +237,7 @@ fn every_question() {
     for (name, ask) in ALL {
         // The statistics are those of this question.
         let mut new = detector(2);
-        ask(&mut new, &world, &Control::new()).unwrap();
+        ask(&mut new, &world).unwrap();
         let stats = new.stats();
         assert!(stats.total_ms > 0.0, "{name}: {stats:?}");
         assert_eq!(
@@ -262,7 +248,7 @@ fn every_question() {
         assert!(!stats.method.is_empty(), "{name}");
 
         // No question is answered without memory, and each is with enough.
-        let refused = ask(&mut budgeted(1, Some(1)), &world, &Control::new());
+        let refused = ask(&mut budgeted(1, Some(1)), &world);
         assert!(
             matches!(
                 refused,
@@ -274,34 +260,40 @@ fn every_question() {
             ),
             "{name}: {refused:?}"
         );
-        let enough = ask(&mut budgeted(1, Some(1 << 30)), &world, &Control::new());
+        let enough = ask(&mut budgeted(1, Some(1 << 30)), &world);
         assert_eq!(enough.ok(), at(name, &expected), "{name} within a budget");
 
         let token = CancelToken::new();
         token.cancel();
-        let cancelled = ask(&mut kept, &world, &Control::new().cancel(&token));
+        kept.set_control(Control::new().cancel(&token));
+        let cancelled = ask(&mut kept, &world);
+        kept.set_control(Control::new());
         assert!(
             matches!(cancelled, Err(Error::Cancelled)),
             "{name}: {cancelled:?}"
         );
         // What is long looks often: stopped at its third look.
         let token = CancelToken::new();
-        let n_looks = AtomicU64::new(0);
-        let look = |_| {
-            if n_looks.fetch_add(1, Ordering::Relaxed) == 2 {
-                token.cancel();
+        let n_looks = Arc::new(AtomicU64::new(0));
+        let look = {
+            let (token, n_looks) = (token.clone(), Arc::clone(&n_looks));
+            move |_| {
+                if n_looks.fetch_add(1, Ordering::Relaxed) == 2 {
+                    token.cancel();
+                }
             }
         };
-        let control = Control::new().cancel(&token).progress(&look);
-        let cancelled = ask(&mut detector(1), &world, &control);
-        let n_looks = n_looks.into_inner();
+        let mut watched = detector(1);
+        watched.set_control(Control::new().cancel(&token).progress(look));
+        let cancelled = ask(&mut watched, &world);
+        let n_looks = n_looks.load(Ordering::Relaxed);
         if n_looks > 3 || cancelled.is_err() {
             assert!(matches!(cancelled, Err(Error::Cancelled)), "{name}");
             assert_eq!(n_looks, 3, "{name} went on");
         } else {
             assert!(name.starts_with("any"), "{name} looks {n_looks} times");
         }
-        let after = ask(&mut kept, &world, &Control::new()).ok();
+        let after = ask(&mut kept, &world).ok();
         assert_eq!(after, at(name, &expected), "{name} after it was cancelled");
     }
 }

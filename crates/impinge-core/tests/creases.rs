@@ -63,15 +63,15 @@ fn random_fans_are_answered_as_the_oracle_does() {
         for double in [false, true] {
             let mut scene = Scene::new();
             let body = if double {
-                scene.add(faces.clone(), positions.clone())
+                scene.add((faces.clone(), positions.clone()))
             } else {
                 let narrow = positions.iter().map(|p| p.map(|x| x as f32));
-                scene.add(faces.clone(), narrow.collect::<Vec<_>>())
+                scene.add((faces.clone(), narrow.collect::<Vec<_>>()))
             };
             let case = Case {
                 name: format!("round {round}, f64 {double}: {faces:?} {positions:?}"),
                 scene,
-                query: Query::within(body.unwrap()).shared_vertex(SharedVertex::Resolve),
+                query: Query::self_of(body.unwrap()).shared_vertex(SharedVertex::Resolve),
             };
             let expected = naive(&case);
             match expected.is_empty() {
@@ -109,13 +109,13 @@ fn creases_follow_the_positions() {
             .collect()
     };
     let mut scene = Scene::new();
-    let body = scene.add(faces, strip(-1.0)).unwrap();
+    let body = scene.add((faces, strip(-1.0))).unwrap();
     for threads in [1, 2] {
-        let mut detector = Detector::with_settings(settings(threads)).unwrap();
+        let mut detector = Detector::new(settings(threads)).unwrap();
         for (turn, meets) in [(-1.0, false), (1.0, true), (-0.5, false), (0.5, true)] {
-            scene.set_positions(body, &strip(turn)).unwrap();
+            scene.set_positions(body, strip(turn)).unwrap();
             for rule in [SharedVertex::Skip, SharedVertex::Resolve] {
-                let query = Query::within(body).shared_vertex(rule);
+                let query = Query::self_of(body).shared_vertex(rule);
                 let case = Case {
                     name: format!("{turn} {rule:?}"),
                     scene: scene.clone(),
@@ -123,7 +123,7 @@ fn creases_follow_the_positions() {
                 };
                 let expected = naive(&case);
                 let pairs = detector.detect(&scene, &query).unwrap();
-                assert_eq!(rows(pairs), expected, "{}", case.name);
+                assert_eq!(rows(&pairs), expected, "{}", case.name);
                 assert_eq!(!expected.is_empty(), meets, "{}", case.name);
             }
         }

@@ -34,7 +34,7 @@ fn detectors() -> Vec<Detector> {
                 threads: 2,
                 ..Settings::default()
             };
-            detectors.push(Detector::with_settings(settings).expect("these tests need an adapter"));
+            detectors.push(Detector::new(settings).expect("these tests need an adapter"));
         }
     }
     detectors
@@ -61,8 +61,8 @@ fn add(scene: &mut Scene, mesh: &Mesh) -> BodyId {
         impinge_io::Elements::Tetrahedra(tets) => tets.clone().into(),
     };
     match &mesh.positions {
-        impinge_io::Positions::F32(positions) => scene.add(elements, positions.clone()),
-        impinge_io::Positions::F64(positions) => scene.add(elements, positions.clone()),
+        impinge_io::Positions::F32(positions) => scene.add((elements, positions.clone())),
+        impinge_io::Positions::F64(positions) => scene.add((elements, positions.clone())),
     }
     .unwrap()
 }
@@ -118,11 +118,11 @@ fn two_bodies_meet_as_the_exact_kernel_says() {
         let mut scene = Scene::new();
         let a = add(&mut scene, &mesh);
         let elements = scene.body(a).unwrap().elements().clone();
-        let b = scene.add(elements, moved).unwrap();
+        let b = scene.add((elements, moved)).unwrap();
         for mut detector in detectors() {
             let pairs = detector.detect(&scene, &Query::between(a, b)).unwrap();
             assert_eq!(pairs.hash(), hash_rows(expected.iter().copied()), "{name}");
-            agree(&expected, &rows(pairs), pairs.hash()).unwrap();
+            agree(&expected, &rows(&pairs), pairs.hash()).unwrap();
             for (body, count) in [(a, "colliding_triangles_a"), (b, "colliding_triangles_b")] {
                 assert_eq!(
                     pairs.colliding(body).len() as u64,
@@ -146,7 +146,7 @@ fn welded_meshes_intersect_themselves_as_published() {
         let body = add(&mut scene, &mesh);
         for (rule, expected) in [(SharedVertex::Skip, skip), (SharedVertex::Resolve, resolve)] {
             for mut detector in detectors() {
-                let query = Query::within(body).shared_vertex(rule);
+                let query = Query::self_of(body).shared_vertex(rule);
                 let pairs = detector.detect(&scene, &query).unwrap();
                 let stats = pairs.stats();
                 assert_eq!(pairs.len(), expected, "{path} {rule:?} {stats:?}");
@@ -173,12 +173,12 @@ fn a_dancer_is_answered_as_the_oracle_says() {
         let case = Case {
             name: format!("rumba {frame}"),
             scene: scene.clone(),
-            query: Query::within(body),
+            query: Query::self_of(body),
         };
         let expected = naive(&case);
         for detector in &mut detectors {
             let pairs = detector.detect(&scene, &case.query).unwrap();
-            agree(&expected, &rows(pairs), pairs.hash()).unwrap();
+            agree(&expected, &rows(&pairs), pairs.hash()).unwrap();
         }
     }
 }
@@ -208,7 +208,7 @@ fn tetrahedra_of_real_solids_are_answered_as_the_oracle_says() {
     assert!(expected.len() > 1000);
     for mut detector in detectors() {
         let pairs = detector.detect(&case.scene, &case.query).unwrap();
-        agree(&expected, &rows(pairs), pairs.hash()).unwrap();
+        agree(&expected, &rows(&pairs), pairs.hash()).unwrap();
     }
 }
 
@@ -230,7 +230,7 @@ fn published_triangle_pairs_are_answered_as_bodies() {
         }
         for detector in &mut detectors {
             let pairs = detector.detect(&case.scene, &case.query).unwrap();
-            agree(&expected, &rows(pairs), pairs.hash()).unwrap();
+            agree(&expected, &rows(&pairs), pairs.hash()).unwrap();
         }
     }
 }
@@ -240,7 +240,7 @@ fn side_by_side(cases: &[Published]) -> Case {
     let mut scene = Scene::new();
     for (ix, case) in cases.iter().enumerate() {
         for triangle in case.triangles {
-            let body = scene.add(vec![[0, 1, 2]], triangle.to_vec()).unwrap();
+            let body = scene.add((vec![[0, 1, 2]], triangle.to_vec())).unwrap();
             let class = 1 << (ix % 64);
             let filter = Filter {
                 category: class,
@@ -252,6 +252,6 @@ fn side_by_side(cases: &[Published]) -> Case {
     Case {
         name: "published".into(),
         scene,
-        query: Query::all(),
+        query: Query::between_all(),
     }
 }

@@ -44,12 +44,12 @@ fn is_the_same_for_1_to_16_threads(name: &str) {
     let &(_, n_pairs, hash) = golden.expect("a pinned scene");
     let mut scene = scene(name);
     let query = match name {
-        "web, neighbours skipped" => Query::everything().shared_vertex(SharedVertex::Skip),
-        _ => Query::everything(),
+        "web, neighbours skipped" => Query::all().shared_vertex(SharedVertex::Skip),
+        _ => Query::all(),
     };
     for method in [Method::Clusters, Method::Cells] {
         for threads in 1..=16 {
-            let mut detector = Detector::with_settings(Settings {
+            let mut detector = Detector::new(Settings {
                 backend: Backend::Cpu,
                 method,
                 threads,

@@ -22,7 +22,7 @@ fn answers_tampered_with_are_caught() {
     let truth = naive(&case);
     let mut detector = Detector::new(Backend::Gpu).unwrap();
     let pairs = detector.detect(&case.scene, &case.query).unwrap();
-    let answer = rows(pairs);
+    let answer = rows(&pairs);
     assert!(answer.len() > 10);
     assert_eq!(agree(&truth, &answer, pairs.hash()), Ok(()));
     type Lie = fn(&mut Vec<[u32; 4]>);
@@ -191,11 +191,11 @@ fn questions() -> Vec<(Case, Vec<[u32; 4]>)> {
             surfaces::cube(corner, 1.0).add_to(&mut cubes).unwrap()
         })
         .collect();
-    let of_cubes = Query::everything().ignore(ids[0], ids[1]);
+    let of_cubes = Query::all().exclude((ids[0], ids[1]));
     let of_scene = [
         Query::between(a, b),
-        Query::everything().shared_vertex(SharedVertex::Skip),
-        Query::everything(),
+        Query::all().shared_vertex(SharedVertex::Skip),
+        Query::all(),
     ];
     let asked = of_scene.map(|query| (&scene, query)).into_iter();
     asked
@@ -219,7 +219,8 @@ fn is_caught(settings: &Settings, damage: Damage, questions: &[(Case, Vec<[u32; 
     let mut detector = Detector::with_damage(device, queue, settings.clone(), damage).unwrap();
     questions.iter().any(|(case, truth)| {
         let pairs = detector.detect(&case.scene, &case.query);
-        pairs.is_err() || pairs.is_ok_and(|pairs| agree(truth, &rows(pairs), pairs.hash()).is_err())
+        pairs.is_err()
+            || pairs.is_ok_and(|pairs| agree(truth, &rows(&pairs), pairs.hash()).is_err())
     })
 }
 
@@ -252,7 +253,7 @@ fn damaged_kernels_of_cells_are_caught() {
     assert_all_are_caught(&settings, of_cells, &questions);
     // One cell, processed in tiles.
     let crowded = Settings {
-        lambda: 1e-9,
+        density: 1e-9,
         group_size: 25,
         ..settings
     };

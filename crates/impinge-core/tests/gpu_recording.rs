@@ -2,9 +2,7 @@
 #![cfg(feature = "gpu")]
 
 use impinge_core::gpu::recording::Ran;
-use impinge_core::{
-    Backend, BodyId, Detector, Method, Positions, Query, Scene, Settings, Step, wgpu,
-};
+use impinge_core::{Backend, BodyId, Detector, Method, Positions, Query, Scene, Settings, wgpu};
 use impinge_scenes::{Random, soup, surfaces};
 
 fn device() -> (wgpu::Device, wgpu::Queue) {
@@ -31,11 +29,11 @@ type Ask = fn(&mut Detector, &Scene);
 
 const PAIRS: Ask = |detector, scene| {
     // A damaged kernel may make any error.
-    let _ = detector.detect(scene, &Query::all());
+    let _ = detector.detect(scene, &Query::between_all());
 };
 
 const IMPACTS: Ask = |detector, scene| {
-    let _ = detector.impacts(scene, &Step::default());
+    let _ = detector.impacts(scene, &Query::all());
 };
 
 /// The first launch that writes something else than it does with good kernels.
@@ -124,7 +122,7 @@ fn recordings_are_printed_one_line_per_launch() {
             backend: Backend::Gpu,
             ..Settings::default()
         };
-        let mut detector = Detector::with_settings(settings).expect("an adapter");
+        let mut detector = Detector::new(settings).expect("an adapter");
         let asks: [Ask; 2] = [PAIRS, IMPACTS];
         let [still, moving] = asks.map(|ask| {
             ask(&mut detector, &scene);
@@ -174,7 +172,7 @@ fn parts_and_positions_are_on_the_device_once() {
             backend: Backend::Gpu,
             ..Settings::default()
         };
-        let mut detector = Detector::with_settings(settings).expect("an adapter");
+        let mut detector = Detector::new(settings).expect("an adapter");
         for ask in asks {
             ask(&mut detector, &scene);
         }
@@ -236,16 +234,16 @@ fn frames_and_steps_take_turns() {
                 backend,
                 ..Settings::default()
             };
-            Detector::with_settings(settings).expect("an adapter")
+            Detector::new(settings).expect("an adapter")
         });
         let (mut scene, bodies) = mixed();
-        let some = Query::all().ignore(bodies[2], bodies[3]);
+        let some = Query::between_all().exclude((bodies[2], bodies[3]));
         let two = Query::between(bodies[0], bodies[1]);
         let mut n = [0; 2];
         for turn in 0..8 {
             let query = match turn % 4 {
-                0 => Query::everything(),
-                1 => Query::all(),
+                0 => Query::all(),
+                1 => Query::between_all(),
                 2 => some.clone(),
                 _ => two.clone(),
             };
@@ -258,7 +256,7 @@ fn frames_and_steps_take_turns() {
                 n[0] += found.0;
             }
             if turn != 4 {
-                let step = Step::new(query);
+                let step = query;
                 let [found, expected] = [&mut device, &mut host].map(|detector| {
                     let impacts = detector.impacts(&scene, &step).expect("good");
                     (impacts.len(), impacts.hash())

@@ -6,8 +6,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use impinge_core::{
-    Backend, BodyId, CandidateQuery, Detector, Error, PairKind, Part, Query, ResidentStep, Scene,
-    Settings, Step, wgpu,
+    Backend, BodyId, Detector, Error, PairKind, Part, Query, ResidentStep, Scene, Settings, wgpu,
 };
 use impinge_scenes::{Random, surfaces};
 
@@ -81,15 +80,21 @@ impl Caller {
         &self,
         detector: &mut Detector,
         scene: &Scene,
-        step: &Step,
+        step: &Query,
         [starts, ends]: [&[(BodyId, &wgpu::Buffer)]; 2],
     ) -> (ResidentStep, Listed, u32) {
         for n_tries in 1..9 {
             let mut encoder = self.encoder();
-            let found = detector.encode_step(scene, step, starts, ends, &mut encoder);
+            let found = detector.gpu().expect("a device").encode_step(
+                scene,
+                step,
+                starts,
+                ends,
+                &mut encoder,
+            );
             let found = found.expect("good buffers");
             self.queue.submit([encoder.finish()]);
-            if !detector.make_room().expect("room") {
+            if !detector.gpu().expect("a device").grow().expect("room") {
                 continue;
             }
             let n = self.read(&found.counts)[found.n_pairs_offset as usize / 4] as usize;
@@ -152,14 +157,14 @@ fn assert_between(
     found: &ResidentStep,
     pairs: &Listed,
     truth: &Scene,
-    step: &Step,
+    step: &Query,
     query: &Query,
 ) -> usize {
     let mut cpu = Detector::new(Backend::Cpu).expect("settings");
     let impacts = cpu.impacts(truth, step).expect(name).clone();
     let mut n_certain = 0;
     for impact in &impacts {
-        let elements = [impact.a, impact.b].map(|at| (at.body, at.primitive));
+        let elements = [impact.a, impact.b].map(|at| (at.body, at.element));
         let pair = numbers(found, impact.kind, elements);
         let times = pairs.get(&pair);
         let [until, by] = *times.unwrap_or_else(|| panic!("{name}: {impact:?} is missing"));
@@ -180,11 +185,11 @@ fn assert_between(
         n_listed, n_certain,
         "{name}: only pairs that touch are certain to"
     );
-    let asked = CandidateQuery::new(query.clone()).kinds(KINDS);
-    let candidates = cpu.candidates(truth, &asked).expect(name);
+    let asked = query.clone().kinds(KINDS);
+    let candidates = cpu.candidates(truth, 0.0, &asked).expect(name);
     let candidates = candidates
         .iter()
-        .map(|(kind, a, b)| numbers(found, kind, [a, b].map(|at| (at.body, at.primitive))));
+        .map(|(kind, a, b)| numbers(found, kind, [a, b].map(|at| (at.body, at.element))));
     let candidates = BTreeSet::from_iter(candidates);
     let are_candidates = pairs.keys().all(|pair| candidates.contains(pair));
     assert!(are_candidates, "{name}");
@@ -233,12 +238,12 @@ fn pairs_that_may_touch_stay_on_the_device() {
     let ends = Vec::from_iter(buffers.iter().map(|(body, _, end)| (*body, end)));
     let mut counts = Vec::new();
     for query in [
-        Query::everything(),
         Query::all(),
-        Query::within(moving[0].0),
+        Query::between_all(),
+        Query::self_of(moving[0].0),
     ] {
         let name = format!("{query:?}");
-        let step = Step::new(query.clone());
+        let step = query.clone();
         let (found, pairs, _) = caller.pairs(&mut detector, &known, &step, [&starts, &ends]);
         let n = assert_between(&name, &found, &pairs, &truth, &step, &query);
         // The same as from the host's positions, and as many as the host would be handed over.
@@ -273,11 +278,11 @@ fn pairs_that_may_touch_stay_on_the_device() {
     for (body, _) in &moving {
         still.clear_end_positions(*body).expect("known");
     }
-    let step = Step::default();
+    let step = Query::all();
     let (_, pairs, _) = caller.pairs(&mut detector, &known, &step, [&ends, &[]]);
     let (found, by_host, _) = caller.pairs(&mut detector, &still, &step, [&[], &[]]);
     assert!(pairs == by_host);
-    let query = Query::everything();
+    let query = Query::all();
     assert_between("still", &found, &pairs, &still, &step, &query);
 }
 
@@ -332,13 +337,13 @@ fn numbers_name_elements_of_every_kind_of_body() {
             let each = bodies.iter().zip(&buffers);
             Vec::from_iter(each.map(|(&(_, body), ends)| (body, &ends[end])))
         };
-        let step = Step::default();
+        let step = Query::all();
         let (_, pairs, _) = caller.pairs(&mut detector, &known, &step, [&at(0), &at(1)]);
         // Numbers do not depend on the scene's precision.
         let (found, by_host, _) = caller.pairs(&mut detector, &truth, &step, [&[], &[]]);
         assert!(pairs == by_host, "{seed}");
         let name = format!("bare {seed}");
-        assert!(assert_between(&name, &found, &pairs, &truth, &step, &Query::everything()) > 100);
+        assert!(assert_between(&name, &found, &pairs, &truth, &step, &Query::all()) > 100);
         for kind_of in KINDS {
             let n = pairs
                 .keys()
@@ -370,30 +375,43 @@ fn lists_that_are_too_small_grow() {
     let n = 600;
     let mut scene = Scene::new();
     let body = scene
-        .add(faces(n), lattice(&mut random, n, 9))
+        .add((faces(n), lattice(&mut random, n, 9)))
         .expect("good");
     let end = lattice(&mut random, n, 9);
     scene.set_end_positions(body, &end).expect("good");
-    let (step, none): (_, [&[_]; 2]) = (Step::default(), [&[], &[]]);
+    let (step, none): (_, [&[_]; 2]) = (Query::all(), [&[], &[]]);
     let mut detector = caller.detector(Settings::default());
-    assert!(detector.make_room().expect("nothing was encoded"));
+    assert!(
+        detector
+            .gpu()
+            .expect("a device")
+            .grow()
+            .expect("nothing was encoded")
+    );
     let (found, pairs, n_tries) = caller.pairs(&mut detector, &scene, &step, none);
     assert!(
         n_tries > 1 && pairs.len() > 1 << 14,
         "{n_tries} {}",
         pairs.len()
     );
-    let query = Query::everything();
+    let query = Query::all();
     assert_between("web", &found, &pairs, &scene, &step, &query);
     let (_, again, n_tries) = caller.pairs(&mut detector, &scene, &step, none);
     assert_eq!(n_tries, 1, "it has grown");
     assert!(again == pairs);
     // A frame and a step in one submission.
     let mut encoder = caller.encoder();
-    let frame = detector.encode(&scene, &query, &[], &mut encoder);
-    let found = detector.encode_step(&scene, &step, &[], &[], &mut encoder);
+    let frame = detector
+        .gpu()
+        .expect("a device")
+        .encode(&scene, &query, &[], &mut encoder);
+    let found =
+        detector
+            .gpu()
+            .expect("a device")
+            .encode_step(&scene, &step, &[], &[], &mut encoder);
     caller.queue.submit([encoder.finish()]);
-    assert!(detector.make_room().expect("room"));
+    assert!(detector.gpu().expect("a device").grow().expect("room"));
     let (frame, found) = (frame.expect("good"), found.expect("good"));
     let n = caller.read(&found.counts)[found.n_pairs_offset as usize / 4] as usize;
     assert_eq!(n, pairs.len());
@@ -405,7 +423,11 @@ fn lists_that_are_too_small_grow() {
     };
     let mut detector = caller.detector(small);
     let mut encoder = caller.encoder();
-    let refused = detector.encode_step(&scene, &step, &[], &[], &mut encoder);
+    let refused =
+        detector
+            .gpu()
+            .expect("a device")
+            .encode_step(&scene, &step, &[], &[], &mut encoder);
     assert!(
         matches!(refused, Err(Error::MemoryBudget { .. })),
         "{refused:?}"
@@ -425,12 +447,16 @@ fn what_does_not_fit_is_refused_by_name() {
     let small = caller.buffer(32, Usage::COPY_SRC);
     let useless = caller.buffer(36, Usage::COPY_DST);
     let mut detector = caller.detector(Settings::default());
-    let mut refused = |step: &Step, starts: &[_], ends: &[_]| {
+    let mut refused = |step: &Query, starts: &[_], ends: &[_]| {
         let mut encoder = caller.encoder();
-        let refused = detector.encode_step(&scene, step, starts, ends, &mut encoder);
+        let refused =
+            detector
+                .gpu()
+                .expect("a device")
+                .encode_step(&scene, step, starts, ends, &mut encoder);
         refused.expect_err("refused").to_string()
     };
-    let step = Step::default();
+    let step = Query::all();
     for (starts, ends, texts) in [
         (
             [(body, &small)],
@@ -475,22 +501,18 @@ fn what_does_not_fit_is_refused_by_name() {
         error.contains("separation") && error.contains("0.5"),
         "{error}"
     );
-    let cell = Query::everything().owned_by([0.0; 3], [1.0; 3]);
-    let error = refused(&Step::new(cell), &[], &[]);
+    let cell = Query::all().owned_by([0.0; 3], [1.0; 3]);
+    let error = refused(&cell, &[], &[]);
     assert!(error.contains("owned_by"), "{error}");
     let mut cpu = Detector::new(Backend::Cpu).expect("settings");
-    let refused = cpu.encode_step(&scene, &step, &[], &[], &mut caller.encoder());
-    assert!(
-        matches!(refused, Err(Error::NoAdapter { .. })),
-        "{refused:?}"
-    );
+    assert!(cpu.gpu().is_none());
 }
 
 #[test]
 fn damaged_names_are_noticed() {
     let caller = Caller::new();
     let (truth, _, _) = balls(600);
-    let step = Step::default();
+    let step = Query::all();
     let mut sound = caller.detector(Settings::default());
     let (_, expected, _) = caller.pairs(&mut sound, &truth, &step, [&[], &[]]);
     assert!(!expected.is_empty());
@@ -510,7 +532,11 @@ fn damaged_names_are_noticed() {
         let detector = Detector::with_damage(device, queue, Settings::default(), damage);
         let mut encoder = caller.encoder();
         let mut detector = detector.expect("a line");
-        let found = detector.encode_step(&truth, &step, &[], &[], &mut encoder);
+        let found =
+            detector
+                .gpu()
+                .expect("a device")
+                .encode_step(&truth, &step, &[], &[], &mut encoder);
         caller.queue.submit([encoder.finish()]);
         let found = found.expect("good");
         let n = caller.read(&found.counts)[found.n_pairs_offset as usize / 4] as usize;

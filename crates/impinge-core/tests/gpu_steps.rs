@@ -7,7 +7,7 @@ use std::sync::{Mutex, OnceLock};
 
 use impinge_core::{
     Backend, BodyId, CancelToken, Capacities, Control, Detector, Error, Impact, Method, PairKind,
-    Query, Real, Recluster, Scene, Settings, Start, Step, Toi, wgpu,
+    Precision, Query, Real, Recluster, Scene, Settings, Start, wgpu,
 };
 use impinge_scenes::{Random, solids, soup, surfaces};
 
@@ -24,7 +24,7 @@ fn gpu() -> Settings {
 }
 
 fn on_gpu() -> Detector {
-    Detector::with_settings(gpu()).expect("settings")
+    Detector::new(gpu()).expect("settings")
 }
 
 fn on_cpu() -> Detector {
@@ -32,7 +32,7 @@ fn on_cpu() -> Detector {
 }
 
 /// Asserts that both answer a step alike, the first one on its device. Returns the number of impacts.
-fn assert_alike(name: &str, device: &mut Detector, scene: &Scene, step: &Step) -> usize {
+fn assert_alike(name: &str, device: &mut Detector, scene: &Scene, step: &Query) -> usize {
     let mut cpu = on_cpu();
     let expected = cpu.impacts(scene, step).expect(name).clone();
     let impacts = device.impacts(scene, step).expect(name);
@@ -46,10 +46,10 @@ fn assert_alike(name: &str, device: &mut Detector, scene: &Scene, step: &Step) -
     assert_eq!(impacts.hash(), expected.hash(), "{name}");
     let earliest = device.earliest(scene, step).expect(name);
     assert_eq!(earliest, expected.earliest(), "{name}");
-    assert_ne!(device.step_stats().backend, "cpu", "{name}");
+    assert_ne!(device.stats().backend, "cpu", "{name}");
     let is_free = device.is_free(scene, step).expect(name);
     assert_eq!(is_free, expected.is_empty(), "{name}");
-    assert_ne!(device.step_stats().backend, "cpu", "{name}");
+    assert_ne!(device.stats().backend, "cpu", "{name}");
     expected.len()
 }
 
@@ -78,7 +78,7 @@ where
     impinge_core::Positions: From<Vec<[R; 3]>>,
 {
     let start: Vec<[R; 3]> = lattice(random, n, side);
-    let body = scene.add(faces(n), start).expect("good");
+    let body = scene.add((faces(n), start)).expect("good");
     let end: Vec<[R; 3]> = lattice(random, n, side);
     scene.set_end_positions(body, &end).expect("good");
     body
@@ -99,8 +99,8 @@ fn lattices_where_much_is_degenerate_are_answered_alike() {
             };
             let name = format!("lattice {seed} of {n}");
             for step in [
-                Step::default(),
-                Step::default().start(Start::Skip).toi(Toi::F64),
+                Query::all(),
+                Query::all().start(Start::Skip).precision(Precision::F64),
             ] {
                 n_found += assert_alike(&name, &mut device, &scene, &step);
             }
@@ -125,10 +125,10 @@ fn whatever_moves_in_a_plane_or_not_at_all_is_answered_alike() {
             (flat(&start), end),
         ] {
             let mut scene = Scene::new();
-            let body = scene.add(faces(n), start).expect("good");
+            let body = scene.add((faces(n), start)).expect("good");
             scene.set_end_positions(body, &end).expect("good");
             let name = format!("flat {seed}");
-            assert_alike(&name, &mut device, &scene, &Step::default());
+            assert_alike(&name, &mut device, &scene, &Query::all());
         }
     }
 }
@@ -145,7 +145,7 @@ fn five_bodies() -> (Scene, Vec<BodyId>) {
         });
     }
     let still = lattice::<f32>(&mut random, 30, 8);
-    bodies.push(scene.add(faces(30), still).expect("good"));
+    bodies.push(scene.add((faces(30), still)).expect("good"));
     (scene, bodies)
 }
 
@@ -156,13 +156,13 @@ fn several_bodies_meet_as_the_query_and_their_filters_say() {
         panic!("five");
     };
     let queries = [
-        Query::everything(),
         Query::all(),
-        Query::all_within(),
-        Query::within(b),
+        Query::between_all(),
+        Query::self_all(),
+        Query::self_of(b),
         Query::between(c, a),
-        Query::everything().ignore(a, b).ignore(c, c),
-        Query::all().ignore(b, c),
+        Query::all().exclude((a, b)).exclude((c, c)),
+        Query::between_all().exclude((b, c)),
     ];
     let mut device = on_gpu();
     let mut counts = Vec::new();
@@ -175,7 +175,7 @@ fn several_bodies_meet_as_the_query_and_their_filters_say() {
         }
         for query in &queries {
             let name = format!("{query:?} {filtered}");
-            let step = Step::new(query.clone());
+            let step = query.clone();
             counts.push(assert_alike(&name, &mut device, &scene, &step));
         }
     }
@@ -220,12 +220,12 @@ fn edges_and_points_are_answered_alike() {
             }
         }
         add_web::<f32>(&mut scene, &mut random, 30, 3);
-        for query in [Query::everything(), Query::all(), Query::all_within()] {
+        for query in [Query::all(), Query::between_all(), Query::self_all()] {
             let name = format!("bare {seed} {query:?}");
-            assert_alike(&name, &mut device, &scene, &Step::new(query));
+            assert_alike(&name, &mut device, &scene, &query);
         }
-        let impacts = device.impacts(&scene, &Step::default()).expect("good");
-        for impact in impacts {
+        let impacts = device.impacts(&scene, &Query::all()).expect("good");
+        for impact in &impacts {
             kinds[impact.kind as usize] += 1;
         }
     }
@@ -259,13 +259,13 @@ fn balls(n: usize) -> Scene {
 fn surfaces_of_many_clusters_are_answered_alike() {
     let mut device = on_gpu();
     let scene = balls(3000);
-    for step in [Step::default(), Step::new(Query::all()).toi(Toi::F64)] {
+    for step in [Query::all(), Query::between_all().precision(Precision::F64)] {
         assert!(assert_alike("balls", &mut device, &scene, &step) > 100);
     }
-    let impacts = device.impacts(&scene, &Step::default()).expect("good");
+    let impacts = device.impacts(&scene, &Query::all()).expect("good");
     let on_device = impacts.stats().clone();
     let mut cpu = on_cpu();
-    let impacts = cpu.impacts(&scene, &Step::default()).expect("good");
+    let impacts = cpu.impacts(&scene, &Query::all()).expect("good");
     let stats = impacts.stats();
     assert_eq!(
         on_device.n_candidates, stats.n_candidates,
@@ -275,12 +275,12 @@ fn surfaces_of_many_clusters_are_answered_alike() {
     let (n, n_left) = (on_device.n_candidates, on_device.n_unsure);
     assert!(n_left < n / 2, "{n_left} of {n} are left to the CPU");
     // Most pairs touch later than one that certainly touches, or do not matter once one does.
-    let earliest = device.earliest(&scene, &Step::default()).expect("good");
+    let earliest = device.earliest(&scene, &Query::all()).expect("good");
     assert!(earliest.is_some());
-    let n_first = device.step_stats().n_unsure;
+    let n_first = device.stats().n_unsure;
     assert!(n_first < n_left / 10, "{n_first} of {n_left} may be first");
-    assert!(!device.is_free(&scene, &Step::default()).expect("good"));
-    let n_any = device.step_stats().n_unsure;
+    assert!(!device.is_free(&scene, &Query::all()).expect("good"));
+    let n_any = device.stats().n_unsure;
     assert!(n_any < n_left / 2, "{n_any} of {n_left} for any");
     for stage in ["clustering", "upload", "decide", "collect"] {
         assert!(
@@ -304,7 +304,7 @@ fn tetrahedra_take_part_with_their_surface() {
             .positions;
         scene.set_end_positions(body, &end).expect("good");
     }
-    assert!(assert_alike("tetrahedra", &mut device, &scene, &Step::default()) > 10);
+    assert!(assert_alike("tetrahedra", &mut device, &scene, &Query::all()) > 10);
 }
 
 /// Boxes that run into each other; some stand still.
@@ -330,18 +330,18 @@ fn many_bodies() -> (Scene, Vec<BodyId>) {
 fn many_bodies_are_found_by_the_tree_over_them() {
     let mut device = on_gpu();
     let (scene, bodies) = many_bodies();
-    let all = Query::all();
+    let all = Query::between_all();
     let pairs = bodies.iter().zip(&bodies[1..]);
-    let some = pairs.fold(all.clone(), |query, (&a, &b)| query.ignore(a, b));
-    let counts = [Query::everything(), all, some].map(|query| {
-        let step = Step::new(query);
+    let some = pairs.fold(all.clone(), |query, (&a, &b)| query.exclude((a, b)));
+    let counts = [Query::all(), all, some].map(|query| {
+        let step = query;
         assert_alike("boxes", &mut device, &scene, &step)
     });
     assert!(
         counts[0] == counts[1] && counts[1] > counts[2] && counts[2] > 100,
         "{counts:?}"
     );
-    let within = Step::new(Query::all_within());
+    let within = Query::self_all();
     let nothing = assert_alike("boxes", &mut device, &scene, &within);
     assert_eq!(nothing, 0, "a box that moves as a whole never meets itself");
 }
@@ -361,10 +361,10 @@ fn numbers_of_all_sizes_are_answered_alike() {
             };
             let (start, end) = (points(), points());
             let mut scene = Scene::new();
-            let body = scene.add(faces(n), start).expect("good");
+            let body = scene.add((faces(n), start)).expect("good");
             scene.set_end_positions(body, &end).expect("good");
             let name = format!("2^{exponent} + {shift}");
-            assert_alike(&name, &mut device, &scene, &Step::default());
+            assert_alike(&name, &mut device, &scene, &Query::all());
         }
         // The same in f64, farther away from the origin.
         for shift in [0.0, 1e6] {
@@ -376,10 +376,10 @@ fn numbers_of_all_sizes_are_answered_alike() {
             };
             let (start, end) = (points(), points());
             let mut scene = Scene::new();
-            let body = scene.add(faces(n), start).expect("good");
+            let body = scene.add((faces(n), start)).expect("good");
             scene.set_end_positions(body, &end).expect("good");
             let name = format!("f64 2^{exponent} + {shift}");
-            assert_alike(&name, &mut device, &scene, &Step::default());
+            assert_alike(&name, &mut device, &scene, &Query::all());
         }
     }
 }
@@ -390,7 +390,7 @@ fn one_detector_answers_step_after_step() {
     let (mut scene, bodies) = five_bodies();
     let others = balls(400);
     let mut random = Random::new(3);
-    let step = Step::default();
+    let step = Query::all();
     assert_alike("first", &mut device, &scene, &step);
     let end: Vec<[f32; 3]> = lattice(&mut random, 60, 8);
     scene.set_end_positions(bodies[2], &end).expect("good");
@@ -401,20 +401,14 @@ fn one_detector_answers_step_after_step() {
     scene.clear_end_positions(bodies[3]).expect("known");
     assert_alike("one that stays", &mut device, &scene, &step);
     scene
-        .remesh(bodies[2], faces(45), end[..45].to_vec())
+        .remesh(bodies[2], (faces(45), end[..45].to_vec()))
         .expect("good");
     assert_alike("re-meshed", &mut device, &scene, &step);
     scene.remove(bodies[1]).expect("known");
     assert_alike("removed", &mut device, &scene, &step);
     // Intersections use other buffers of the same device.
-    let pairs = device
-        .detect(&scene, &Query::everything())
-        .expect("good")
-        .clone();
-    let expected = on_cpu()
-        .detect(&scene, &Query::everything())
-        .expect("good")
-        .hash();
+    let pairs = device.detect(&scene, &Query::all()).expect("good").clone();
+    let expected = on_cpu().detect(&scene, &Query::all()).expect("good").hash();
     assert_eq!(pairs.hash(), expected);
     assert_alike("after pairs", &mut device, &scene, &step);
     let empty = Scene::new();
@@ -425,7 +419,7 @@ fn one_detector_answers_step_after_step() {
 #[test]
 fn rooms_that_are_too_small_grow() {
     let scene = balls(1500);
-    let step = Step::default();
+    let step = Query::all();
     let expected = on_cpu().impacts(&scene, &step).expect("good").clone();
     let (earliest, expected) = (expected.earliest(), expected.hash());
     type Shrink = fn(&mut Capacities);
@@ -460,7 +454,7 @@ fn rooms_that_are_too_small_grow() {
 }
 
 /// The scene with the positions to which it can be moved without contact: nearly to the first one.
-fn moved_until_contact(scene: &Scene, step: &Step) -> Scene {
+fn moved_until_contact(scene: &Scene, step: &Query) -> Scene {
     let advance = on_cpu().advance(scene, step).expect("good");
     let mut scene = scene.clone();
     for (body, positions) in &advance.positions {
@@ -476,7 +470,7 @@ fn moved_until_contact(scene: &Scene, step: &Step) -> Scene {
 #[test]
 fn certain_contacts_are_the_only_ones() {
     let mut device = on_gpu();
-    let step = Step::default();
+    let step = Query::all();
     for scene in [passing_points(99), turning_edge()] {
         assert_eq!(assert_alike("passing", &mut device, &scene, &step), 0);
     }
@@ -485,7 +479,7 @@ fn certain_contacts_are_the_only_ones() {
     for scene in [balls(400), balls(3000)] {
         let free = moved_until_contact(&scene, &step);
         assert_eq!(assert_alike("free", &mut device, &free, &step), 0);
-        assert!(device.step_stats().n_candidates > 10, "they come near");
+        assert!(device.stats().n_candidates > 10, "they come near");
     }
 }
 
@@ -504,7 +498,7 @@ fn triangle_and_points(n: usize, way: impl Fn(f32) -> [[f32; 2]; 2]) -> Scene {
         points.collect()
     };
     let points = scene.add_points(&at(0)).expect("good");
-    scene.set_end_positions(points, &at(1)).expect("good");
+    scene.set_end_positions(points, at(1)).expect("good");
     scene
 }
 
@@ -551,8 +545,8 @@ fn three_contacts() -> Scene {
 fn pairs_that_touch_at_the_start_bound_no_time() {
     let mut device = on_gpu();
     let mut scene = leaving_points(200);
-    let skip = Step::default().start(Start::Skip);
-    assert_alike("reported", &mut device, &scene, &Step::default());
+    let skip = Query::all().start(Start::Skip);
+    assert_alike("reported", &mut device, &scene, &Query::all());
     assert_eq!(assert_alike("skipped", &mut device, &scene, &skip), 0);
     // One that does not touch at the start crosses the triangle late.
     let late = scene.add_points(&[[20.0f32, 20.0, 7.0]]).expect("good");
@@ -567,7 +561,7 @@ fn cells_are_answered_alike() {
     let scene = balls(800);
     let mut cpu = on_cpu();
     let mut device = on_gpu();
-    let all = Step::new(Query::all());
+    let all = Query::between_all();
     let expected = cpu.impacts(&scene, &all).expect("good").clone();
     let first = expected.earliest().expect("they touch");
     let (mut n, mut n_later, mut n_free) = (0, 0, 0);
@@ -575,7 +569,7 @@ fn cells_are_answered_alike() {
     for x in cuts.windows(2) {
         for y in cuts.windows(2) {
             let (low, high) = ([x[0], y[0], -10.0], [x[1], y[1], 10.0]);
-            let step = Step::new(Query::all().owned_by(low, high));
+            let step = Query::between_all().owned_by(low, high);
             let name = format!("{low:?} {high:?}");
             n += assert_alike(&name, &mut device, &scene, &step);
             match device.earliest(&scene, &step).expect("good") {
@@ -597,9 +591,9 @@ fn a_memory_budget_is_kept_in_batches_or_by_the_cpu() {
     let end = start.iter().map(|p| p.map(|x| x + random.range(0.0, 0.01)));
     let end = Vec::from_iter(end);
     let mut scene = Scene::new();
-    let body = scene.add(faces(n), start).expect("good");
+    let body = scene.add((faces(n), start)).expect("good");
     scene.set_end_positions(body, &end).expect("good");
-    let step = Step::default();
+    let step = Query::all();
     let expected = on_cpu().impacts(&scene, &step).expect("good").clone();
     let (earliest, expected) = (expected.earliest(), expected.hash());
     let mut backends = Vec::new();
@@ -609,7 +603,7 @@ fn a_memory_budget_is_kept_in_batches_or_by_the_cpu() {
             threads: 1,
             ..gpu()
         };
-        let mut device = Detector::with_settings(settings).expect("settings");
+        let mut device = Detector::new(settings).expect("settings");
         match device.impacts(&scene, &step) {
             Ok(impacts) => {
                 assert_eq!(impacts.hash(), expected, "{budget}");
@@ -642,16 +636,16 @@ fn a_memory_budget_is_kept_in_batches_or_by_the_cpu() {
 fn what_the_device_cannot_hold_or_answer_the_cpu_does() {
     let scene = balls(1500);
     let expected = on_cpu()
-        .impacts(&scene, &Step::default())
+        .impacts(&scene, &Query::all())
         .expect("good")
         .hash();
     let mut device = Detector::with_most_bound(gpu(), 20_000).expect("settings");
-    let impacts = device.impacts(&scene, &Step::default()).expect("good");
+    let impacts = device.impacts(&scene, &Query::all()).expect("good");
     assert_eq!(
         (impacts.hash(), &*impacts.stats().backend),
         (expected, "cpu")
     );
-    let apart = Step::default().separation(0.001);
+    let apart = Query::all().separation(0.001);
     let expected = on_cpu().impacts(&scene, &apart).expect("good").hash();
     let mut device = on_gpu();
     let impacts = device.impacts(&scene, &apart).expect("good");
@@ -666,10 +660,9 @@ fn a_body_that_flows_away_from_its_clusters_is_clustered_again() {
     let mut scene = Scene::new();
     let cloth = surfaces::cloth(40, 40, 1.0);
     let body = cloth.add_to(&mut scene).expect("good");
-    let mut devices = [Recluster::Auto, Recluster::Never].map(|recluster| {
-        Detector::with_settings(Settings { recluster, ..gpu() }).expect("settings")
-    });
-    let step = Step::default();
+    let mut devices = [Recluster::Auto, Recluster::Never]
+        .map(|recluster| Detector::new(Settings { recluster, ..gpu() }).expect("settings"));
+    let step = Query::all();
     for device in &mut devices {
         assert_alike("as it was", device, &scene, &step);
     }
@@ -689,7 +682,7 @@ fn a_body_that_flows_away_from_its_clusters_is_clustered_again() {
 #[test]
 fn steps_advance_as_on_the_cpu() {
     let scene = balls(400);
-    let step = Step::default().start(Start::Skip);
+    let step = Query::all().start(Start::Skip);
     let expected = on_cpu().advance(&scene, &step).expect("good");
     let found = on_gpu().advance(&scene, &step).expect("good");
     assert_eq!(
@@ -706,8 +699,8 @@ fn limits_and_cancellation_end_a_step() {
         max_pairs: Some(10),
         ..gpu()
     };
-    let mut device = Detector::with_settings(settings).expect("settings");
-    let refused = device.impacts(&scene, &Step::default()).err();
+    let mut device = Detector::new(settings).expect("settings");
+    let refused = device.impacts(&scene, &Query::all()).err();
     assert!(
         matches!(refused, Some(Error::TooManyPairs { limit: 10, .. })),
         "{refused:?}"
@@ -716,11 +709,11 @@ fn limits_and_cancellation_end_a_step() {
     token.cancel();
     let control = Control::new().cancel(&token);
     let mut device = on_gpu();
-    let stopped = device
-        .impacts_with(&scene, &Step::default(), &control)
-        .err();
+    device.set_control(control);
+    let stopped = device.impacts(&scene, &Query::all()).err();
     assert_eq!(stopped, Some(Error::Cancelled));
-    assert_alike("after that", &mut device, &scene, &Step::default());
+    device.set_control(Control::new());
+    assert_alike("after that", &mut device, &scene, &Query::all());
 }
 
 /// Every instruction set and number of threads decides the same.
@@ -728,7 +721,7 @@ fn limits_and_cancellation_end_a_step() {
 fn threads_and_methods_do_not_matter() {
     let scene = balls(800);
     let expected = on_cpu()
-        .impacts(&scene, &Step::default())
+        .impacts(&scene, &Query::all())
         .expect("good")
         .hash();
     for (threads, method) in [(1, Method::Auto), (3, Method::Cells), (2, Method::Clusters)] {
@@ -737,8 +730,8 @@ fn threads_and_methods_do_not_matter() {
             method,
             ..gpu()
         };
-        let mut device = Detector::with_settings(settings).expect("settings");
-        let impacts = device.impacts(&scene, &Step::default()).expect("good");
+        let mut device = Detector::new(settings).expect("settings");
+        let impacts = device.impacts(&scene, &Query::all()).expect("good");
         assert_eq!(impacts.hash(), expected);
         assert_eq!(impacts.stats().n_threads, threads);
     }
@@ -755,15 +748,15 @@ fn device() -> (wgpu::Device, wgpu::Queue) {
 type Answers = Result<(u64, Option<Impact>, bool), Error>;
 
 /// The answers about some steps, on a device one of whose kernels has one line replaced.
-fn damaged(steps: &[(Scene, Step)], damage: (&str, &str, &str)) -> Vec<Answers> {
+fn damaged(steps: &[(Scene, Query)], damage: (&str, &str, &str)) -> Vec<Answers> {
     let (open, queue) = device();
     let device = Detector::with_damage(open, queue, Settings::default(), damage);
     let mut device = device.expect("a line");
-    let ask = |(scene, step): &(Scene, Step)| answers(&mut device, scene, step);
+    let ask = |(scene, step): &(Scene, Query)| answers(&mut device, scene, step);
     steps.iter().map(ask).collect()
 }
 
-fn answers(detector: &mut Detector, scene: &Scene, step: &Step) -> Answers {
+fn answers(detector: &mut Detector, scene: &Scene, step: &Query) -> Answers {
     let hash = detector.impacts(scene, step)?.hash();
     let earliest = detector.earliest(scene, step)?;
     Ok((hash, earliest, detector.is_free(scene, step)?))
@@ -773,20 +766,22 @@ fn answers(detector: &mut Detector, scene: &Scene, step: &Step) -> Answers {
 fn damaged_kernels_are_noticed() {
     let (boxes, ids) = many_bodies();
     let pairs = ids.iter().zip(&ids[1..]);
-    let some = pairs.fold(Query::all(), |query, (&a, &b)| query.ignore(a, b));
+    let some = pairs.fold(Query::between_all(), |query, (&a, &b)| {
+        query.exclude((a, b))
+    });
     let scenes = [
-        (balls(6000), Step::default()),
-        (five_bodies().0, Step::default()),
-        (many_edges(), Step::default()),
-        (boxes, Step::new(some)),
+        (balls(6000), Query::all()),
+        (five_bodies().0, Query::all()),
+        (many_edges(), Query::all()),
+        (boxes, some),
         (
-            moved_until_contact(&balls(3000), &Step::default()),
-            Step::default(),
+            moved_until_contact(&balls(3000), &Query::all()),
+            Query::all(),
         ),
-        (leaving_points(100), Step::default().start(Start::Skip)),
-        (passing_points(100), Step::default()),
-        (turning_edge(), Step::default()),
-        (three_contacts(), Step::default()),
+        (leaving_points(100), Query::all().start(Start::Skip)),
+        (passing_points(100), Query::all()),
+        (turning_edge(), Query::all()),
+        (three_contacts(), Query::all()),
     ];
     let truth = scenes
         .each_ref()

@@ -4,7 +4,7 @@ mod common;
 
 use common::{Case, check, naive};
 use impinge_core::{
-    Backend, Detector, Elements, Error, Method, Query, Scene, Settings, SharedVertex, Statistics,
+    Backend, Detector, Elements, Error, Method, Query, Scene, Settings, SharedVertex, Stats,
 };
 
 const RULES: [SharedVertex; 2] = [SharedVertex::Skip, SharedVertex::Resolve];
@@ -20,11 +20,11 @@ fn settings() -> Settings {
 
 fn case(name: &str, elements: Elements, positions: &[[f64; 3]], rule: SharedVertex) -> Case {
     let mut scene = Scene::new();
-    let body = scene.add(elements, positions.to_vec()).unwrap();
+    let body = scene.add((elements, positions.to_vec())).unwrap();
     Case {
         name: format!("{name}, {rule:?}"),
         scene,
-        query: Query::within(body).shared_vertex(rule),
+        query: Query::self_of(body).shared_vertex(rule),
     }
 }
 
@@ -162,13 +162,9 @@ fn lattices_with_hubs_are_answered_as_by_the_oracle() {
     }
 }
 
-fn statistics(
-    elements: Elements,
-    positions: &[[f64; 3]],
-    rule: SharedVertex,
-) -> (usize, Statistics) {
+fn statistics(elements: Elements, positions: &[[f64; 3]], rule: SharedVertex) -> (usize, Stats) {
     let case = case("large", elements, positions, rule);
-    let mut detector = Detector::with_settings(settings()).unwrap();
+    let mut detector = Detector::new(settings()).unwrap();
     let pairs = detector.detect(&case.scene, &case.query).unwrap();
     (pairs.len(), pairs.stats().clone())
 }
@@ -204,7 +200,7 @@ fn a_million_faces_with_the_same_vertices_cost_nothing() {
     let triangle = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
     let of_face =
         |face: [u32; 3], rule| case("same", vec![face; 1_000_000].into(), &triangle, rule);
-    let mut detector = Detector::with_settings(settings()).unwrap();
+    let mut detector = Detector::new(settings()).unwrap();
     for face in [[0; 3], [0, 1, 2]] {
         let skipped = of_face(face, SharedVertex::Skip);
         let pairs = detector.detect(&skipped.scene, &skipped.query).unwrap();
@@ -218,7 +214,7 @@ fn a_million_faces_with_the_same_vertices_cost_nothing() {
     }
     let case = of_face([0, 1, 2], SharedVertex::Resolve);
     let refused = |settings: Settings| {
-        let mut detector = Detector::with_settings(settings).unwrap();
+        let mut detector = Detector::new(settings).unwrap();
         detector.detect(&case.scene, &case.query).unwrap_err()
     };
     let memory = refused(settings());

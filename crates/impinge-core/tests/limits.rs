@@ -2,6 +2,7 @@
 
 mod common;
 
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use common::{agree, naive, rows};
@@ -82,22 +83,17 @@ fn bad_bodies_are_refused_by_name() {
     ));
     // None of these bodies was added.
     assert_eq!(scene.n_bodies(), 1);
-    let mut detector = Detector::with_settings(cpu(Method::Clusters)).unwrap();
+    let mut detector = Detector::new(cpu(Method::Clusters)).unwrap();
     assert!(matches!(
         detector.detect(&scene, &Query::between(good, good)),
         Err(Error::SameBody { .. })
     ));
     scene.remove(good).unwrap();
     assert!(matches!(
-        detector.detect(&scene, &Query::within(good)),
+        detector.detect(&scene, &Query::self_of(good)),
         Err(Error::UnknownBody { .. })
     ));
-    assert!(
-        detector
-            .detect(&scene, &Query::everything())
-            .unwrap()
-            .is_empty()
-    );
+    assert!(detector.detect(&scene, &Query::all()).unwrap().is_empty());
 }
 
 #[test]
@@ -115,8 +111,8 @@ fn bodies_of_other_scenes_are_refused() {
     is_refused(ours.set_positions(other, &TRIANGLE));
     is_refused(ours.remove(other));
     is_refused(ours.body(other).map(|_| ()));
-    let mut detector = Detector::with_settings(cpu(Method::Clusters)).unwrap();
-    for query in [Query::within(other), Query::between(a, other)] {
+    let mut detector = Detector::new(cpu(Method::Clusters)).unwrap();
+    for query in [Query::self_of(other), Query::between(a, other)] {
         is_refused(detector.detect(&ours, &query).map(|_| ()));
     }
     // A clone has the same bodies, but bodies added to it later are its own.
@@ -144,8 +140,8 @@ fn positions_written_in_place_are_checked_wherever_the_vertex_is() {
             }
             let last = model.positions.len() - 1;
             let a = model.add_to(&mut scene).unwrap();
-            let mut detector = Detector::with_settings(cpu(method)).unwrap();
-            let query = Query::within(a);
+            let mut detector = Detector::new(cpu(method)).unwrap();
+            let query = Query::self_of(a);
             let n_pairs = detector.detect(&scene, &query).unwrap().len();
             for vertex in [0, 77, last] {
                 for bad in [f32::NAN, f32::INFINITY] {
@@ -179,7 +175,7 @@ fn the_largest_and_smallest_coordinates_are_answered() {
     let case = common::Case {
         name: "range".into(),
         scene,
-        query: Query::everything(),
+        query: Query::all(),
     };
     let expected = naive(&case);
     assert!(expected.len() >= 3);
@@ -192,11 +188,11 @@ fn the_largest_and_smallest_coordinates_are_answered() {
 fn settings_out_of_range_are_refused() {
     for settings in [
         Settings {
-            lambda: 0.0,
+            density: 0.0,
             ..Settings::default()
         },
         Settings {
-            lambda: f64::NAN,
+            density: f64::NAN,
             ..Settings::default()
         },
         Settings {
@@ -213,7 +209,7 @@ fn settings_out_of_range_are_refused() {
         },
     ] {
         assert!(matches!(
-            Detector::with_settings(settings),
+            Detector::new(settings),
             Err(Error::Setting { .. })
         ));
     }
@@ -222,11 +218,11 @@ fn settings_out_of_range_are_refused() {
 #[test]
 fn budgets_are_kept_by_batches() {
     let built = adversarial::coincident(30_000).unwrap();
-    let query = Query::everything().shared_vertex(SharedVertex::Skip);
+    let query = Query::all().shared_vertex(SharedVertex::Skip);
     for method in [Method::Clusters, Method::Cells] {
-        let mut free = Detector::with_settings(cpu(method)).unwrap();
+        let mut free = Detector::new(cpu(method)).unwrap();
         let pairs = free.detect(&built.scene, &query).unwrap();
-        let expected = rows(pairs);
+        let expected = rows(&pairs);
         // While it is found, the answer takes twice its size, and a part of a chunk more. The grid may take half of a budget.
         let of_answer = 2 * (2 * 8 * pairs.len() as u64 + (1 << 20));
         // Counting holds no answer: what is left is all of the method.
@@ -244,7 +240,7 @@ fn budgets_are_kept_by_batches() {
                 memory_budget: Some(budget),
                 ..cpu(method)
             };
-            let mut detector = Detector::with_settings(settings).unwrap();
+            let mut detector = Detector::new(settings).unwrap();
             match detector.count(&built.scene, &query) {
                 Ok(n) => {
                     assert_eq!(n, expected.len() as u64);
@@ -253,13 +249,13 @@ fn budgets_are_kept_by_batches() {
                     assert!(held <= budget, "{method:?}: {held} held, {budget} allowed");
                     most_batches = most_batches.max(stats.n_batches);
                     let budget_of_pairs = budget + of_answer;
-                    let mut detector = Detector::with_settings(Settings {
+                    let mut detector = Detector::new(Settings {
                         memory_budget: Some(budget_of_pairs),
                         ..cpu(method)
                     })
                     .unwrap();
                     let pairs = detector.detect(&built.scene, &query).unwrap();
-                    agree(&expected, &rows(pairs), pairs.hash()).unwrap();
+                    agree(&expected, &rows(&pairs), pairs.hash()).unwrap();
                     assert!(pairs.stats().bytes_held <= budget_of_pairs);
                     enough = budget;
                 }
@@ -300,7 +296,7 @@ fn adversarial_scenes_hold_memory_in_proportion() {
     ] {
         let built = built.unwrap();
         for (method, most_each) in [(Method::Clusters, 400), (Method::Cells, 400)] {
-            let mut detector = Detector::with_settings(cpu(method)).unwrap();
+            let mut detector = Detector::new(cpu(method)).unwrap();
             let pairs = detector.detect(&built.scene, &built.query).unwrap();
             let (n, n_bodies) = (built.n_primitives() as u64, built.bodies.len() as u64);
             let most = most_each * n + 2_000 * n_bodies + (16 << 20);
@@ -318,7 +314,7 @@ fn adversarial_scenes_hold_memory_in_proportion() {
 #[test]
 fn directions_tell_long_elements_apart() {
     let built = adversarial::machine_parts(20_000).unwrap();
-    let mut detector = Detector::with_settings(cpu(Method::Clusters)).unwrap();
+    let mut detector = Detector::new(cpu(Method::Clusters)).unwrap();
     let pairs = detector.detect(&built.scene, &built.query).unwrap();
     let (n, n_parted) = (pairs.stats().n_candidates, pairs.stats().ways.n_parted);
     assert!(4 * n_parted > n, "{n_parted} of {n} candidates");
@@ -332,22 +328,22 @@ fn runs_can_be_watched_and_cancelled() {
         (Method::Naive, 2_000),
     ] {
         let built = adversarial::plain(n).unwrap();
-        let mut detector = Detector::with_settings(cpu(method)).unwrap();
-        let (calls, token) = (AtomicU64::new(0), CancelToken::new());
-        let count = |progress: impinge_core::Progress| {
+        let mut detector = Detector::new(cpu(method)).unwrap();
+        let (calls, token) = (Arc::new(AtomicU64::new(0)), CancelToken::new());
+        let counted = Arc::clone(&calls);
+        let count = move |progress: impinge_core::Progress| {
             assert!(progress.done <= progress.total);
-            calls.fetch_add(1, Ordering::Relaxed);
+            counted.fetch_add(1, Ordering::Relaxed);
         };
-        let control = Control::new().cancel(&token).progress(&count);
-        let n_pairs = detector
-            .detect_with(&built.scene, &built.query, &control)
-            .unwrap()
-            .len();
+        detector.set_control(Control::new().cancel(&token).progress(count));
+        let n_pairs = detector.detect(&built.scene, &built.query).unwrap().len();
         assert!(calls.load(Ordering::Relaxed) > 1);
-        let stop = |_: impinge_core::Progress| token.cancel();
-        let control = Control::new().cancel(&token).progress(&stop);
-        let result = detector.detect_with(&built.scene, &built.query, &control);
+        let stopping = token.clone();
+        let stop = move |_: impinge_core::Progress| stopping.cancel();
+        detector.set_control(Control::new().cancel(&token).progress(stop));
+        let result = detector.detect(&built.scene, &built.query);
         assert!(matches!(result, Err(Error::Cancelled)), "{method:?}");
+        detector.set_control(Control::new());
         // After a cancellation, the detector works as before.
         assert_eq!(
             detector.detect(&built.scene, &built.query).unwrap().len(),

@@ -7,7 +7,7 @@ use impinge_core::{
 use impinge_scenes::{Model, Random, solids, soup, surfaces};
 
 fn cpu(method: Method) -> Detector {
-    Detector::with_settings(Settings {
+    Detector::new(Settings {
         backend: Backend::Cpu,
         method,
         ..Settings::default()
@@ -66,7 +66,7 @@ fn the_nearest_two_are_those_of_all_pairs() {
         let (mut scene, mut bodies) = scatter(24, 3.0 + 2.5 * seed as f32, seed);
         for round in 0..3 {
             let expected = one_by_one(&scene, &bodies, |_, _| true);
-            let found = kept.nearest(&scene, &Query::all()).unwrap();
+            let found = kept.nearest(&scene, &Query::between_all()).unwrap();
             assert_eq!(found, expected, "{seed} {round}");
             match found.unwrap().distance {
                 0.0 => n_touching += 1,
@@ -100,7 +100,9 @@ fn ties_are_the_lowest_pair() {
             cube.translated(at).add_to(&mut scene).unwrap()
         })
         .collect();
-    let found = cpu(Method::Auto).nearest(&scene, &Query::all()).unwrap();
+    let found = cpu(Method::Auto)
+        .nearest(&scene, &Query::between_all())
+        .unwrap();
     assert_eq!(found, one_by_one(&scene, &row, |_, _| true));
     assert_eq!(found.unwrap().distance, 1.0);
 }
@@ -117,7 +119,7 @@ fn filters_and_queries_say_which_bodies_are_asked() {
         scene.set_filter(body, filter).unwrap();
     }
     let is_odd = |body: BodyId| body.index() % 2 == 1;
-    let found = detector.nearest(&scene, &Query::all()).unwrap();
+    let found = detector.nearest(&scene, &Query::between_all()).unwrap();
     assert_eq!(
         found,
         one_by_one(&scene, &bodies, |a, b| is_odd(a) != is_odd(b))
@@ -126,7 +128,7 @@ fn filters_and_queries_say_which_bodies_are_asked() {
     let found = detector.nearest(&scene, &Query::across(some)).unwrap();
     let across = |a, b| some.contains(&a) != some.contains(&b);
     assert_eq!(found, one_by_one(&scene, &bodies, across));
-    let query = Query::all().ignore(found.unwrap().bodies[0], found.unwrap().bodies[1]);
+    let query = Query::between_all().exclude((found.unwrap().a.body, found.unwrap().b.body));
     assert_ne!(detector.nearest(&scene, &query).unwrap(), found);
     let pair = Query::between(bodies[7], bodies[4]);
     let [found, expected] = [
@@ -135,19 +137,22 @@ fn filters_and_queries_say_which_bodies_are_asked() {
     ];
     assert_eq!(found, expected);
 
-    for query in [Query::everything(), Query::within(bodies[0])] {
+    for query in [Query::all(), Query::self_of(bodies[0])] {
         let refused = detector.nearest(&scene, &query).unwrap_err().to_string();
         assert!(refused.contains("self-collision"), "{refused}");
     }
-    let cell = Query::all().owned_by([0.0; 3], [1.0; 3]);
+    let cell = Query::between_all().owned_by([0.0; 3], [1.0; 3]);
     assert!(detector.nearest(&scene, &cell).is_err());
     let token = CancelToken::new();
     token.cancel();
-    let control = Control::new().cancel(&token);
-    let cancelled = detector.nearest_with(&scene, &Query::all(), &control);
+    detector.set_control(Control::new().cancel(&token));
+    let cancelled = detector.nearest(&scene, &Query::between_all());
     assert!(matches!(cancelled, Err(Error::Cancelled)));
+    detector.set_control(Control::new());
     assert_eq!(
-        detector.nearest(&Scene::new(), &Query::all()).unwrap(),
+        detector
+            .nearest(&Scene::new(), &Query::between_all())
+            .unwrap(),
         None
     );
 }
@@ -160,7 +165,11 @@ fn across_two_sets_and_any() {
     for seed in 0..16 {
         let (scene, bodies) = scatter(30, 2.0 + 3.0 * seed as f32, seed);
         let some: Vec<BodyId> = bodies.iter().copied().step_by(4).collect();
-        let all: Vec<[u32; 4]> = kept.detect(&scene, &Query::all()).unwrap().rows().collect();
+        let all: Vec<[u32; 4]> = kept
+            .detect(&scene, &Query::between_all())
+            .unwrap()
+            .rows()
+            .collect();
         let is_some = |body: u32| body.is_multiple_of(4);
         let across = all.iter().copied();
         let across: Vec<[u32; 4]> = across
@@ -173,11 +182,14 @@ fn across_two_sets_and_any() {
             assert!(rows == across, "{method:?} {seed}");
             assert_eq!(detector.any(&scene, &query).unwrap(), !across.is_empty());
             assert_eq!(
-                detector.any(&scene, &Query::all()).unwrap(),
+                detector.any(&scene, &Query::between_all()).unwrap(),
                 !all.is_empty()
             );
         }
-        assert_eq!(kept.any(&scene, &Query::all()).unwrap(), !all.is_empty());
+        assert_eq!(
+            kept.any(&scene, &Query::between_all()).unwrap(),
+            !all.is_empty()
+        );
         assert!(kept.stats().n_threads > 0);
         match all.is_empty() {
             true => n_none += 1,
@@ -196,6 +208,6 @@ fn across_two_sets_and_any() {
             .add_to(&mut scene)
             .unwrap();
     }
-    assert!(!kept.any(&scene, &Query::all()).unwrap());
-    assert_eq!(kept.detect(&scene, &Query::all()).unwrap().len(), 0);
+    assert!(!kept.any(&scene, &Query::between_all()).unwrap());
+    assert_eq!(kept.detect(&scene, &Query::between_all()).unwrap().len(), 0);
 }

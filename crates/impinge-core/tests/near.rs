@@ -5,15 +5,15 @@ use impinge_core::exact::{
     nearest_features, touch, triangles_intersect,
 };
 use impinge_core::{
-    Backend, BodyId, Control, Detector, Elements, Error, InstructionSet, Kind, Method, NearPair,
-    NearPairs, NearQuery, PairKind, Part, Query, Scene, Settings,
+    Backend, BodyId, BodyKind, Control, Detector, Elements, Error, InstructionSet, Method,
+    NearPair, NearPairs, PairKind, Part, Query, Scene, Settings,
 };
 use impinge_scenes::{Random, adversarial, soup, surfaces};
 
 type Point = [f64; 3];
 
 fn detector(method: Method) -> Detector {
-    Detector::with_settings(Settings {
+    Detector::new(Settings {
         method,
         backend: Backend::Cpu,
         ..Settings::default()
@@ -144,10 +144,8 @@ fn without_compound_features(rows: Vec<Row>) -> Vec<Row> {
         .collect()
 }
 
-fn all_kinds(distance: f64) -> NearQuery {
-    NearQuery::new(Query::everything())
-        .kinds(PairKind::ALL)
-        .distance(distance)
+fn all_kinds() -> Query {
+    Query::all().kinds(PairKind::ALL)
 }
 
 /// Faces on a lattice, bare edges and points; a third of the elements is degenerate.
@@ -199,11 +197,9 @@ fn lattices_are_answered_as_pair_by_pair() {
             }
             let expected = expected(&scene, distance);
             for mut detector in detectors() {
-                let near = detector
-                    .within_distance(&scene, &all_kinds(distance))
-                    .expect("good");
+                let near = detector.near(&scene, distance, &all_kinds()).expect("good");
                 assert_eq!(
-                    without_compound_features(rows(near)),
+                    without_compound_features(rows(&near)),
                     expected,
                     "seed {seed}, {distance}"
                 );
@@ -223,9 +219,9 @@ fn a_distance_that_occurs_counts_and_one_below_does_not() {
     };
     for mut detector in detectors() {
         let mut count = |distance: f64| {
-            let query = NearQuery::new(Query::all()).kinds(PairKind::ALL);
-            let query = query.distance(distance).closest_points();
-            let near = detector.within_distance(&scene, &query).expect("good");
+            let query = Query::between_all().kinds(PairKind::ALL);
+            let query = query.closest_points();
+            let near = detector.near(&scene, distance, &query).expect("good");
             assert!(near.iter().all(|pair| {
                 let closest = pair.closest.expect("asked for");
                 closest.distance == 3.0 && closest.points[0][2] != closest.points[1][2]
@@ -246,9 +242,9 @@ fn what_is_reported_by_default_depends_on_what_bodies_are() {
     scene.add_edges(&[[0, 1]], &at(0.5)[..2]).expect("good");
     scene.add_points(&at(1.0)[..1]).expect("good");
     scene.add_points(&at(1.5)[..1]).expect("good");
-    let query = NearQuery::new(Query::everything()).distance(2.0);
+    let query = Query::all();
     for mut detector in detectors() {
-        let near = detector.within_distance(&scene, &query).expect("good");
+        let near = detector.near(&scene, 2.0, &query).expect("good");
         let kinds = PairKind::ALL.map(|kind| near.of(kind).len());
         // Four vertices over the face; the bare edge and all three edges of the face; the bare edge and both points; those.
         assert_eq!(kinds, [4, 3, 2, 1, 0, 0], "{near:?}");
@@ -261,22 +257,20 @@ fn thickness_is_added_as_real_numbers() {
     let mut scene = Scene::new();
     let a = scene.add_points(&[[0.0f64; 3]]).expect("good");
     let b = scene.add_points(&[[0.1 + 0.2, 0.0, 0.0]]).expect("good");
-    let thick = |r: f64, s: f64| {
-        let query = NearQuery::new(Query::between(a, b)).thickness(a, r);
-        query.thickness(b, s)
-    };
     for mut detector in detectors() {
-        let mut count = |query: NearQuery| {
-            let near = detector.within_distance(&scene, &query).expect("good");
-            near.len()
+        let mut count = |r: f64, s: f64, distance: f64| {
+            scene.set_thickness(a, r).expect("good");
+            scene.set_thickness(b, s).expect("good");
+            let near = detector.near(&scene, distance, &Query::between(a, b));
+            near.expect("good").len()
         };
-        assert_eq!(count(thick(0.1, 0.2)), 0);
-        assert_eq!(count(thick(0.1, 0.2_f64.next_up())), 1);
-        assert_eq!(count(thick(0.1 + 0.2, 0.0)), 1);
-        assert_eq!(count(thick(0.1, 0.1).distance(0.1)), 0);
-        assert_eq!(count(thick(0.1, 0.1).distance(0.11)), 1);
+        assert_eq!(count(0.1, 0.2, 0.0), 0);
+        assert_eq!(count(0.1, 0.2_f64.next_up(), 0.0), 1);
+        assert_eq!(count(0.1 + 0.2, 0.0, 0.0), 1);
+        assert_eq!(count(0.1, 0.1, 0.1), 0);
+        assert_eq!(count(0.1, 0.1, 0.11), 1);
         assert_eq!(
-            count(thick(f64::MAX, f64::MAX)),
+            count(f64::MAX, f64::MAX, 0.0),
             1,
             "the sum overflows a float"
         );
@@ -288,8 +282,10 @@ fn thickness_is_added_as_real_numbers() {
         .expect("good");
     for mut detector in detectors() {
         for (thickness, n) in [(0.5_f64.next_down(), 0), (0.5, 1)] {
-            let query = NearQuery::new(Query::within(body)).thickness(body, thickness);
-            let near = detector.within_distance(&scene, &query).expect("good");
+            scene.set_thickness(body, thickness).expect("good");
+            let near = detector
+                .near(&scene, 0.0, &Query::self_of(body))
+                .expect("good");
             assert_eq!(near.len(), n);
         }
     }
@@ -314,12 +310,11 @@ fn edges_and_faces_are_as_far_as_their_nearest_parts() {
         };
         a.add_to(&mut scene).expect("good");
         b.add_to(&mut scene).expect("good");
-        let query = NearQuery::new(Query::all())
+        let query = Query::between_all()
             .kinds([PairKind::EdgeFace, PairKind::FaceFace])
-            .distance(1.0)
             .closest_points();
         let mut detector = detector(Method::Clusters);
-        let near = detector.within_distance(&scene, &query).expect("good");
+        let near = detector.near(&scene, 1.0, &query).expect("good");
         for pair in near.iter() {
             let corners = |part, body: BodyId, number: u32| -> Vec<Point> {
                 let body = scene.body(body).expect("known");
@@ -328,8 +323,8 @@ fn edges_and_faces_are_as_far_as_their_nearest_parts() {
                 ids.collect()
             };
             let [of_a, of_b] = pair.kind.parts();
-            let a = corners(of_a, pair.a.body, pair.a.primitive);
-            let b = corners(of_b, pair.b.body, pair.b.primitive);
+            let a = corners(of_a, pair.a.body, pair.a.element);
+            let b = corners(of_b, pair.b.body, pair.b.element);
             let closest = pair.closest.expect("asked for");
             let mut least = f64::INFINITY;
             let mut measure = |pair: ElementPair, points: [Point; 4]| {
@@ -412,12 +407,11 @@ fn the_answer_depends_on_the_input_alone() {
         for model in &models {
             model.add_to(&mut scene).expect("good");
         }
-        let plain = NearQuery::new(Query::everything()).distance(distance);
+        let plain = Query::all();
         let query = plain.clone().closest_points();
         let naive = detector(Method::Naive)
-            .within_distance(&scene, &query)
-            .expect("good")
-            .clone();
+            .near(&scene, distance, &query)
+            .expect("good");
         assert!(naive.len() > 100, "{}", naive.len());
         let sets = [
             InstructionSet::Portable,
@@ -430,7 +424,7 @@ fn the_answer_depends_on_the_input_alone() {
             (3, sets[2], Some(4_000_000)),
             (16, sets[2], None),
         ] {
-            let mut detector = Detector::with_settings(Settings {
+            let mut detector = Detector::new(Settings {
                 backend: Backend::Cpu,
                 threads,
                 instruction_set,
@@ -439,21 +433,19 @@ fn the_answer_depends_on_the_input_alone() {
             })
             .expect("settings");
             for frame in 0..2 {
-                let near = detector.within_distance(&scene, &query).expect("good");
+                let near = detector.near(&scene, distance, &query).expect("good");
                 assert!(near.iter().eq(naive.iter()), "{threads}, {frame}");
                 assert_eq!(near.hash(), naive.hash());
             }
             // Without nearest points, most features are named where pairs are decided.
-            let near = detector.within_distance(&scene, &plain).expect("good");
-            assert!(rows(near) == rows(&naive), "{threads}");
+            let near = detector.near(&scene, distance, &plain).expect("good");
+            assert!(rows(&near) == rows(&naive), "{threads}");
             assert!(near.iter().all(|pair| pair.closest.is_none()));
         }
         // One pair more changes the hash.
-        let fewer = NearQuery::new(Query::everything()).distance(distance / 2.0);
         let fewer = detector(Method::Clusters)
-            .within_distance(&scene, &fewer)
-            .expect("good")
-            .clone();
+            .near(&scene, distance / 2.0, &Query::all())
+            .expect("good");
         assert!(fewer.len() < naive.len() && fewer.hash() != naive.hash());
     }
 }
@@ -467,19 +459,17 @@ fn a_distance_of_zero_is_intersection_and_larger_ones_only_add() {
         model.add_to(&mut scene).expect("good");
     }
     let mut detector = detector(Method::Clusters);
-    let pairs = detector.detect(&scene, &Query::all()).expect("good");
-    let pairs: Vec<[u32; 2]> = pairs
-        .iter()
-        .map(|(a, b)| [a.primitive, b.primitive])
-        .collect();
-    let faces = NearQuery::new(Query::all()).kinds([PairKind::FaceFace]);
+    let pairs = detector
+        .detect(&scene, &Query::between_all())
+        .expect("good");
+    let pairs: Vec<[u32; 2]> = pairs.iter().map(|(a, b)| [a.element, b.element]).collect();
+    let faces = Query::between_all().kinds([PairKind::FaceFace]);
     let mut last: Vec<[u32; 2]> = Vec::new();
     for distance in [0.0, 1e-9, 0.01, 0.1, 0.3] {
-        let query = faces.clone().distance(distance);
-        let near = detector.within_distance(&scene, &query).expect("good");
+        let near = detector.near(&scene, distance, &faces).expect("good");
         let now: Vec<[u32; 2]> = near
             .iter()
-            .map(|pair| [pair.a.primitive, pair.b.primitive])
+            .map(|pair| [pair.a.element, pair.b.element])
             .collect();
         if distance == 0.0 {
             assert_eq!(now, pairs);
@@ -500,15 +490,14 @@ fn bodies_stand_still() {
     scene
         .set_end_positions(moving, &[[-5.0f32, 0.0, 0.0]])
         .expect("good");
-    let query = |distance| NearQuery::new(Query::all()).distance(distance);
     for mut detector in detectors() {
         for _ in 0..2 {
             let mut count = |d| {
-                let near = detector.within_distance(&scene, &query(d)).expect("good");
-                near.len()
+                let near = detector.near(&scene, d, &Query::between_all());
+                near.expect("good").len()
             };
             assert_eq!((count(4.9), count(5.0)), (0, 1));
-            let step = impinge_core::Step::default();
+            let step = impinge_core::Query::all();
             assert_eq!(detector.impacts(&scene, &step).expect("good").len(), 1);
         }
     }
@@ -520,30 +509,27 @@ fn bad_distances_are_refused_by_name() {
     let body = scene.add_points(&[[0.0f32; 3]]).expect("good");
     let gone = scene.add_points(&[[1.0f32; 3]]).expect("good");
     scene.remove(gone).expect("known");
-    let query = || NearQuery::new(Query::everything());
+    assert!(scene.set_thickness(gone, 1.0).is_err());
+    let query = Query::all();
     for mut detector in detectors() {
         for bad in [-1.0, f64::NAN, f64::INFINITY, -f64::MIN_POSITIVE] {
-            for (query, name) in [
-                (query().distance(bad), "distance"),
-                (query().thickness(body, bad), "thickness"),
-            ] {
-                let refused = detector.within_distance(&scene, &query);
+            let near = detector.near(&scene, bad, &query).map(|_| ());
+            let thick = scene.set_thickness(body, bad);
+            for (refused, name) in [(near, "distance"), (thick, "thickness")] {
                 let Err(Error::Setting { setting, given, .. }) = refused else {
                     panic!("{bad} was accepted");
                 };
                 assert_eq!((setting, given), (name, bad.to_string()));
             }
         }
-        let stale = detector.within_distance(&scene, &query().thickness(gone, 1.0));
-        assert!(stale.is_err());
-        let stopped = Control::new();
         let token = impinge_core::CancelToken::new();
         token.cancel();
-        let stopped = stopped.cancel(&token);
-        let result = detector.within_distance_with(&scene, &query(), &stopped);
+        detector.set_control(Control::new().cancel(&token));
+        let result = detector.near(&scene, 0.0, &query);
         assert!(matches!(result, Err(Error::Cancelled)));
+        detector.set_control(Control::new());
         // A huge distance is no error.
-        let near = detector.within_distance(&scene, &query().distance(f64::MAX));
+        let near = detector.near(&scene, f64::MAX, &query);
         assert!(near.expect("good").is_empty());
     }
 }
@@ -559,9 +545,12 @@ fn solids_and_numbers_of_any_size() {
         [0.0, 0.0, 4.0],
     ];
     let solid = scene
-        .add(vec![[0u32, 1, 2, 3]], solid.to_vec())
+        .add((vec![[0u32, 1, 2, 3]], solid.to_vec()))
         .expect("good");
-    assert_eq!(scene.body(solid).expect("known").kind(), Kind::Tetrahedra);
+    assert_eq!(
+        scene.body(solid).expect("known").kind(),
+        BodyKind::Tetrahedra
+    );
     let far = scene
         .add_points(&[
             [1e70f64, 1e70, 1e70],
@@ -571,12 +560,10 @@ fn solids_and_numbers_of_any_size() {
         .expect("good");
     for mut detector in detectors() {
         let mut faces = |distance: f64| -> Vec<u32> {
-            let query = NearQuery::new(Query::between(solid, far)).distance(distance);
-            let near = detector.within_distance(&scene, &query).expect("good");
-            let mut vertices: Vec<u32> = near
-                .of(PairKind::VertexFace)
-                .map(|p| p.a.primitive)
-                .collect();
+            let query = Query::between(solid, far);
+            let near = detector.near(&scene, distance, &query).expect("good");
+            let mut vertices: Vec<u32> =
+                near.of(PairKind::VertexFace).map(|p| p.a.element).collect();
             vertices.dedup();
             vertices
         };
@@ -596,14 +583,14 @@ fn long_elements_are_near_as_the_oracle_says() {
     for (_, body) in built.scene.bodies() {
         let points = (0..body.n_vertices()).map(|ix| body.positions().point(ix));
         let far: Vec<[f64; 3]> = points.map(|p| p.map(|x| x + 20_000.1)).collect();
-        double.add(body.elements().clone(), far).unwrap();
+        double.add((body.elements().clone(), far)).unwrap();
     }
     for scene in [&built.scene, &double] {
         for distance in [0.0, 0.001, 0.05] {
-            let query = NearQuery::new(Query::everything()).distance(distance);
+            let query = Query::all();
             let [expected, found] = [Method::Naive, Method::Clusters].map(|method| {
                 let mut detector = detector(method);
-                rows(detector.within_distance(scene, &query).unwrap())
+                rows(&detector.near(scene, distance, &query).unwrap())
             });
             assert_eq!(expected, found, "{distance}");
         }

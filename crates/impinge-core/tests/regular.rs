@@ -20,14 +20,14 @@ fn cases(name: &str, model: &Model, rule: SharedVertex) -> [Case; 2] {
     [false, true].map(|double| {
         let mut scene = Scene::new();
         let body = if double {
-            scene.add(model.elements.clone(), model.positions_f64())
+            scene.add((model.elements.clone(), model.positions_f64()))
         } else {
-            scene.add(model.elements.clone(), model.positions.clone())
+            scene.add((model.elements.clone(), model.positions.clone()))
         };
         Case {
             name: format!("{name}, {rule:?}, f64 {double}"),
             scene,
-            query: Query::within(body.unwrap()).shared_vertex(rule),
+            query: Query::self_of(body.unwrap()).shared_vertex(rule),
         }
     })
 }
@@ -42,7 +42,7 @@ fn regular_meshes_are_decided_by_filters() {
                 assert!(expected.is_empty(), "{}", case.name);
                 check(&case, &expected, settings(Method::Clusters));
                 check(&case, &expected, settings(Method::Cells));
-                let mut detector = Detector::with_settings(settings(Method::Clusters)).unwrap();
+                let mut detector = Detector::new(settings(Method::Clusters)).unwrap();
                 let pairs = detector.detect(&case.scene, &case.query).unwrap();
                 let stats = pairs.stats();
                 assert!(

@@ -6,12 +6,12 @@ use std::collections::BTreeMap;
 use impinge_core::exact::{Contact, ElementPair, Point, are_within, closest_points, first_within};
 use impinge_core::{
     Backend, BodyId, Clearance, Detector, Error, Impact, InstructionSet, Method, PairFilter,
-    PairKind, Part, Positions, Query, Scene, Settings, Start, Step, Toi,
+    PairKind, Part, Positions, Precision, Query, Scene, Settings, Start,
 };
 use impinge_scenes::Random;
 
 fn detector(method: Method) -> Detector {
-    Detector::with_settings(Settings {
+    Detector::new(Settings {
         method,
         backend: Backend::Cpu,
         ..Settings::default()
@@ -23,9 +23,9 @@ fn detectors() -> [Detector; 2] {
     [Method::Clusters, Method::Naive].map(detector)
 }
 
-fn impacts(detector: &mut Detector, scene: &Scene, step: &Step) -> Vec<Impact> {
+fn impacts(detector: &mut Detector, scene: &Scene, step: &Query) -> Vec<Impact> {
     let impacts = detector.impacts(scene, step).expect("good");
-    impacts.as_slice().to_vec()
+    impacts.iter().copied().collect()
 }
 
 /// A body of triangles on a lattice that goes anywhere, bare edges, and points.
@@ -40,13 +40,13 @@ fn lattice(seed: u64) -> Scene {
         .collect();
     let mut scene = Scene::new();
     let body = scene.add_triangles(&faces, &points(15)).expect("good");
-    scene.set_end_positions(body, &points(15)).expect("good");
+    scene.set_end_positions(body, points(15)).expect("good");
     let body = scene
         .add_edges(&[[0, 1], [1, 2]], &points(3))
         .expect("good");
-    scene.set_end_positions(body, &points(3)).expect("good");
+    scene.set_end_positions(body, points(3)).expect("good");
     let body = scene.add_points(&points(3)).expect("good");
-    scene.set_end_positions(body, &points(3)).expect("good");
+    scene.set_end_positions(body, points(3)).expect("good");
     scene.add_points(&points(2)).expect("good");
     scene
 }
@@ -189,7 +189,9 @@ fn lattices_are_answered_as_pair_by_pair() {
         for separation in [0.0, 0.5, 1.0, 2.0_f64.sqrt()] {
             let expected = expected(&scene, separation);
             assert!(!expected.is_empty());
-            let step = Step::default().separation(separation).toi(Toi::F64);
+            let step = Query::all()
+                .separation(separation)
+                .precision(Precision::F64);
             for mut detector in detectors() {
                 let found = impacts(&mut detector, &scene, &step);
                 assert_eq!(rows(&found), expected, "seed {seed}, {separation}");
@@ -209,7 +211,7 @@ fn more_separation_is_never_later() {
     for seed in 10..14 {
         let scene = lattice(seed);
         let mut detector = detector(Method::Clusters);
-        let step = Step::default().toi(Toi::F64);
+        let step = Query::all().precision(Precision::F64);
         let without = impacts(&mut detector, &scene, &step);
         let mut last: BTreeMap<(PairKind, [u32; 4]), f64> = BTreeMap::new();
         for separation in [0.0, 1e-12, 0.01, 0.3, 1.0, 3.0] {
@@ -242,10 +244,10 @@ fn a_clearance_is_kept_pair_by_pair() {
             let expected = contacts(&scene, |pair, start, end| {
                 first_kept(pair, [start, end], separation, (clearance, share))
             });
-            let step = Step::default()
+            let step = Query::all()
                 .separation(separation)
                 .clearance(Clearance::new(clearance).share(share))
-                .toi(Toi::F64);
+                .precision(Precision::F64);
             for mut detector in detectors() {
                 let found = impacts(&mut detector, &scene, &step);
                 assert_eq!(
@@ -271,7 +273,7 @@ fn more_clearance_is_never_later() {
     for seed in 10..13 {
         let scene = lattice(seed);
         let mut detector = detector(Method::Clusters);
-        let step = Step::default().separation(0.25).toi(Toi::F64);
+        let step = Query::all().separation(0.25).precision(Precision::F64);
         let without = rows(&impacts(&mut detector, &scene, &step));
         let mut last: BTreeMap<(PairKind, [u32; 4]), f64> = BTreeMap::new();
         for (clearance, share) in [(0.0, 0.2), (1.0, 0.0), (1e-12, 0.2), (0.3, 0.2), (0.3, 0.5)] {
@@ -330,7 +332,7 @@ fn every_part_of_an_advanced_step_keeps_the_clearance() {
         let mut random = Random::new(5);
         let mut detector = detector(Method::Clusters);
         // What intersects at the start is none of this test's business.
-        let step = Step::default().clearance(1e-2).start(Start::Skip);
+        let step = Query::all().clearance(1e-2).start(Start::Skip);
         let mut fractions = Vec::new();
         for _ in 0..8 {
             let advance = detector.advance(&scene, &step).expect("good");
@@ -382,7 +384,7 @@ fn every_part_of_an_advanced_step_keeps_the_clearance() {
                         .collect()
                 };
                 match is_double {
-                    true => scene.set_end_positions(body, &third(&end.positions)),
+                    true => scene.set_end_positions(body, third(&end.positions)),
                     false => scene.set_end_positions(body, &end.positions),
                 }
                 .expect("good");
@@ -415,7 +417,7 @@ fn elements_nearer_than_rounding_allow_no_step() {
         let upper = scene
             .add_triangles(&[[0, 1, 2]], &at(gap as f32))
             .expect("good");
-        let step = Step::default().clearance(1e-4);
+        let step = Query::all().clearance(1e-4);
         for mut detector in detectors() {
             assert_eq!(detector.advance(&scene, &step).expect("good").fraction, 1.0);
             scene.set_end_positions(upper, &at(1.0)).expect("good");
@@ -439,7 +441,7 @@ fn a_filter_leaves_out_pairs() {
     for seed in 0..3 {
         let scene = lattice(seed);
         for clearance in [0.0, 0.25] {
-            let step = Step::default().clearance(clearance).toi(Toi::F64);
+            let step = Query::all().clearance(clearance).precision(Precision::F64);
             let filtered = step.clone().filter(match clearance > 0.0 || seed == 0 {
                 true => filter.clone().early(),
                 false => filter.clone(),
@@ -480,7 +482,11 @@ fn falling(end: f32) -> Scene {
 fn a_triangle_that_comes_near_is_told_when() {
     for mut detector in detectors() {
         let scene = falling(0.5);
-        let step = |separation: f64| Step::default().separation(separation).toi(Toi::F64);
+        let step = |separation: f64| {
+            Query::all()
+                .separation(separation)
+                .precision(Precision::F64)
+        };
         assert!(detector.is_free(&scene, &step(0.0)).expect("good"));
         assert!(
             detector
@@ -508,7 +514,7 @@ fn a_triangle_that_comes_near_is_told_when() {
 fn a_step_that_is_advanced_keeps_the_distance() {
     for mut detector in detectors() {
         let mut scene = falling(-2.0);
-        let step = Step::default().separation(0.1);
+        let step = Query::all().separation(0.1);
         let advance = detector.advance(&scene, &step).expect("good");
         // From 4 down to 0.1, of 6.
         let most = 3.9 / 6.0;
@@ -517,20 +523,10 @@ fn a_step_that_is_advanced_keeps_the_distance() {
             "{advance:?}"
         );
         advance.apply(&mut scene).expect("same bodies");
-        let near = impinge_core::NearQuery::new(Query::everything()).distance(0.1);
-        assert!(
-            detector
-                .within_distance(&scene, &near)
-                .expect("good")
-                .is_empty()
-        );
-        let near = near.distance(0.1001);
-        assert!(
-            !detector
-                .within_distance(&scene, &near)
-                .expect("good")
-                .is_empty()
-        );
+        let near = Query::all();
+        assert!(detector.near(&scene, 0.1, &near).expect("good").is_empty());
+        let near = detector.near(&scene, 0.1001, &near).expect("good");
+        assert!(!near.is_empty());
     }
 }
 
@@ -540,15 +536,12 @@ fn the_answer_depends_on_the_input_alone() {
     let [a, b] = [1, 2].map(|seed| impinge_scenes::soup::triangles(24, 0.3, seed));
     let body = a.add_to(&mut scene).expect("good");
     scene.set_end_positions(body, &b.positions).expect("good");
-    for step in [
-        Step::default().separation(0.02),
-        Step::default().clearance(0.02),
-    ] {
+    for step in [Query::all().separation(0.02), Query::all().clearance(0.02)] {
         is_the_same_everywhere(&scene, &step);
     }
 }
 
-fn is_the_same_everywhere(scene: &Scene, step: &Step) {
+fn is_the_same_everywhere(scene: &Scene, step: &Query) {
     let expected = rows(&impacts(&mut detector(Method::Naive), scene, step));
     assert!(expected.len() > 50, "{}", expected.len());
     for (threads, instruction_set, memory_budget) in [
@@ -556,7 +549,7 @@ fn is_the_same_everywhere(scene: &Scene, step: &Step) {
         (2, InstructionSet::Avx2, Some(3_000_000)),
         (7, InstructionSet::Avx512, None),
     ] {
-        let mut detector = Detector::with_settings(Settings {
+        let mut detector = Detector::new(Settings {
             backend: Backend::Cpu,
             threads,
             instruction_set,
@@ -579,7 +572,7 @@ fn bad_clearances_are_refused_by_name() {
     let mut detector = detector(Method::Clusters);
     let scene = falling(0.0);
     let mut refused = |clearance: Clearance| match detector
-        .impacts(&scene, &Step::default().clearance(clearance))
+        .impacts(&scene, &Query::all().clearance(clearance))
         .err()
     {
         Some(Error::Setting { setting, .. }) => Some(setting),
@@ -604,7 +597,7 @@ fn bad_separations_are_refused_by_name() {
     for mut detector in detectors() {
         let scene = falling(0.0);
         for bad in [-0.5, f64::NAN, f64::INFINITY] {
-            let step = Step::default().separation(bad);
+            let step = Query::all().separation(bad);
             let setting = "separation";
             let is_refused = |error: Option<Error>| match error {
                 Some(Error::Setting {

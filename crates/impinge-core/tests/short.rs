@@ -2,7 +2,7 @@
 
 use std::fmt::Debug;
 
-use impinge_core::{Backend, CandidateQuery, Detector, NearQuery, Query, Scene, Settings, Step};
+use impinge_core::{Backend, Detector, Query, Scene, Settings};
 use impinge_scenes::surfaces;
 
 /// More than any answer needs, and far less than a list of what these hold.
@@ -23,7 +23,7 @@ fn answers_print_short() {
     let b = other.add_to(&mut scene).unwrap();
     let end = other.translated([0.2, 0.0, 0.0]);
     scene.set_end_positions(b, &end.positions).unwrap();
-    let mut detector = Detector::with_settings(Settings {
+    let mut detector = Detector::new(Settings {
         backend: Backend::Cpu,
         ..Settings::default()
     })
@@ -38,17 +38,15 @@ fn answers_print_short() {
     let penetration = detector.penetration(&scene, &contacts, a, b).unwrap();
     assert!(penetration.inside[0].len() > 100);
     check(&penetration);
-    let step = Step::new(query.clone());
+    let step = query.clone();
     let impacts = detector.impacts(&scene, &step).unwrap();
     assert!(impacts.len() > 100);
-    check(impacts);
+    check(&impacts);
     check(&detector.earliest(&scene, &step).unwrap());
-    let near = NearQuery::new(query.clone())
-        .distance(0.01)
-        .closest_points();
-    let near = detector.within_distance(&scene, &near).unwrap();
+    let near = query.clone().closest_points();
+    let near = detector.near(&scene, 0.01, &near).unwrap();
     assert!(near.len() > 100);
-    check(near);
+    check(&near);
     check(&detector.distance(&scene, a, b).unwrap());
     let far = other.translated([5.0, 0.0, 0.0]);
     scene.set_positions(b, &far.positions).unwrap();
@@ -56,9 +54,9 @@ fn answers_print_short() {
     let advance = detector.advance(&scene, &step).unwrap();
     assert_eq!(advance.positions.len(), 1);
     check(&advance);
-    let candidates = detector.candidates(&scene, &CandidateQuery::new(query));
+    let candidates = detector.candidates(&scene, 0.0, &query);
     let candidates = candidates.unwrap();
     assert!(candidates.len() > 100);
-    check(candidates);
-    check(&detector.step_stats());
+    check(&candidates);
+    check(&detector.stats());
 }

@@ -1,8 +1,8 @@
 //! What a step knows of its start: intersections that touch nothing, and seams of meshes that were not welded.
 
 use impinge::{
-    Backend, BodyId, Detector, Error, Method, NearQuery, PairFilter, PairKind, Query, Scene,
-    Settings, Start, Step, Weld,
+    Backend, BodyId, Detector, Error, Method, PairFilter, PairKind, Query, Scene, Settings, Start,
+    Weld,
 };
 
 fn detectors() -> Vec<Detector> {
@@ -13,7 +13,7 @@ fn detectors() -> Vec<Detector> {
                 method,
                 ..Settings::default()
             };
-            Detector::with_settings(settings).expect("settings")
+            Detector::new(settings).expect("settings")
         })
         .into()
 }
@@ -57,13 +57,11 @@ fn rod_through_plate() -> (Scene, [BodyId; 2]) {
 fn a_rod_through_a_plate_is_near_it() {
     let (scene, [plate, rod]) = rod_through_plate();
     for mut detector in detectors() {
-        let n_pairs = detector.count(&scene, &Query::all()).expect("good");
+        let n_pairs = detector.count(&scene, &Query::between_all()).expect("good");
         assert_eq!(n_pairs, 8);
         for distance in [0.0, 2.0] {
-            let query = NearQuery::new(Query::all())
-                .distance(distance)
-                .closest_points();
-            let near = detector.within_distance(&scene, &query).expect("good");
+            let query = Query::between_all().closest_points();
+            let near = detector.near(&scene, distance, &query).expect("good");
             // Four sides and four diagonals pass through the one face of the plate.
             assert_eq!(near.len(), 8, "{distance}");
             for pair in near.iter() {
@@ -97,14 +95,14 @@ fn a_start_that_intersects_is_not_free_if_asked() {
     scene.set_end_positions(rod, &end).expect("good");
     for mut detector in detectors() {
         // Nothing touches on the way.
-        let report = Step::default();
+        let report = Query::all();
         assert!(detector.is_free(&scene, &report).expect("good"));
         let advance = detector.advance(&scene, &report).expect("good");
         assert_eq!((advance.fraction, advance.start_intersects), (1.0, None));
         let impacts = detector.impacts(&scene, &report).expect("good");
         assert_eq!((impacts.len(), impacts.start_intersects()), (0, None));
 
-        let verify = Step::default().start(Start::Verify);
+        let verify = Query::all().start(Start::Verify);
         assert!(!detector.is_free(&scene, &verify).expect("good"));
         let advance = detector.advance(&scene, &verify).expect("good");
         assert_eq!((advance.fraction, advance.first), (0.0, None));
@@ -128,14 +126,14 @@ fn a_start_that_intersects_is_not_free_if_asked() {
         }
         // Each body alone is fine.
         for body in [plate, rod] {
-            let alone = Step::new(Query::within(body)).start(Start::Verify);
+            let alone = Query::self_of(body).start(Start::Verify);
             assert!(detector.is_free(&scene, &alone).expect("good"));
             let impacts = detector.impacts(&scene, &alone).expect("good");
             assert_eq!(impacts.start_intersects(), Some(false));
             assert_eq!(detector.earliest(&scene, &alone).expect("good"), None);
             assert_eq!(detector.start_intersects(), Some(false));
         }
-        let ignoring = Step::new(Query::everything().ignore(plate, rod)).start(Start::Verify);
+        let ignoring = Query::all().exclude((plate, rod)).start(Start::Verify);
         assert!(detector.is_free(&scene, &ignoring).expect("good"));
         assert_eq!(
             detector
@@ -167,16 +165,16 @@ fn a_face_through_its_neighbour_is_near_it_and_an_intersection_of_the_start() {
             let end = positions.map(|[x, y, z]| [x, y, z + 1.0]);
             let body = scene.bodies().next().expect("one").0;
             scene.set_end_positions(body, &end).expect("good");
-            assert!(detector.is_free(&scene, &Step::default()).expect("good"));
-            let verify = Step::default().start(Start::Verify);
+            assert!(detector.is_free(&scene, &Query::all()).expect("good"));
+            let verify = Query::all().start(Start::Verify);
             assert_eq!(
                 detector.is_free(&scene, &verify).expect("good"),
                 !intersects
             );
             let impacts = detector.impacts(&scene, &verify).expect("good");
             assert_eq!(impacts.start_intersects(), Some(intersects));
-            let query = NearQuery::new(Query::everything()).distance(0.5);
-            let near = detector.within_distance(&scene, &query).expect("good");
+            let query = Query::all();
+            let near = detector.near(&scene, 0.5, &query).expect("good");
             assert_eq!(near.len(), usize::from(intersects));
             assert_eq!(near.of(PairKind::EdgeFace).len(), near.len());
         }
@@ -203,7 +201,7 @@ fn seams_are_refused_by_name_and_welding_mends_them() {
         scene.add_triangles(&[[0, 1, 2]], &far).expect("good");
         let body = scene.add_triangles(&SEAM_FACES, &SEAM).expect("good");
         scene.set_end_positions(body, &lifted).expect("good");
-        let error = detector.advance(&scene, &Step::default()).unwrap_err();
+        let error = detector.advance(&scene, &Query::all()).unwrap_err();
         let expected = Error::Seam {
             body,
             vertices: [1, 3],
@@ -216,13 +214,15 @@ fn seams_are_refused_by_name_and_welding_mends_them() {
             "{text}"
         );
         // Who has touching starts on purpose goes on.
-        let skip = Step::default().start(Start::Skip);
+        let skip = Query::all().start(Start::Skip);
         assert_eq!(detector.advance(&scene, &skip).expect("good").fraction, 1.0);
         assert_eq!(
             detector
-                .impacts(&scene, &Step::default())
+                .impacts(&scene, &Query::all())
                 .expect("good")
-                .touching_at_start(),
+                .iter()
+                .filter(|impact| impact.at_start)
+                .count(),
             11
         );
 
@@ -233,10 +233,10 @@ fn seams_are_refused_by_name_and_welding_mends_them() {
             .add_triangles(&weld.apply(&SEAM_FACES), &positions)
             .expect("good");
         scene
-            .set_end_positions(body, &weld.positions(&lifted).expect("as many"))
+            .set_end_positions(body, weld.positions(&lifted).expect("as many"))
             .expect("good");
         let advance = detector
-            .advance(&scene, &Step::default().start(Start::Verify))
+            .advance(&scene, &Query::all().start(Start::Verify))
             .expect("good");
         assert_eq!(
             (advance.fraction, advance.start_intersects),
@@ -256,7 +256,7 @@ fn touching_starts_that_are_no_seams_are_answered() {
             let end = [a, b, c].map(|[x, y, z]| [x, y, z + 1.0]);
             scene.set_end_positions(body, &end).expect("good");
         }
-        let advance = detector.advance(&scene, &Step::default()).expect("good");
+        let advance = detector.advance(&scene, &Query::all()).expect("good");
         assert!(advance.fraction == 0.0 && advance.first.expect("touches").at_start);
 
         let mut scene = Scene::new();
@@ -273,7 +273,7 @@ fn touching_starts_that_are_no_seams_are_answered() {
             .expect("good");
         let end = corners.map(|[x, y, z]| [x + 1.0, y, z]);
         scene.set_end_positions(body, &end).expect("good");
-        let advance = detector.advance(&scene, &Step::default()).expect("good");
+        let advance = detector.advance(&scene, &Query::all()).expect("good");
         assert!(advance.fraction == 0.0 && advance.first.expect("touches").at_start);
     }
 }

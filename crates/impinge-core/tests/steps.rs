@@ -6,9 +6,8 @@ use std::ops::ControlFlow;
 
 use impinge_core::exact::{ElementPair, first_contact};
 use impinge_core::{
-    Backend, BodyId, CancelToken, CandidateQuery, Candidates, Control, Detector, Elements, Error,
-    Method, NearQuery, PairKind, Part, Positions, Primitive, Query, Scene, Settings, Start, Step,
-    Toi,
+    Backend, BodyId, CancelToken, Candidates, Control, Detector, Element, Elements, Error, Method,
+    PairKind, Part, Positions, Precision, Query, Scene, Settings, Start,
 };
 
 const FACE: [[u32; 3]; 1] = [[0, 1, 2]];
@@ -21,7 +20,7 @@ fn detectors() -> Vec<Detector> {
         ..Settings::default()
     });
     settings
-        .map(|settings| Detector::with_settings(settings).expect("settings"))
+        .map(|settings| Detector::new(settings).expect("settings"))
         .into()
 }
 
@@ -42,7 +41,7 @@ fn falling() -> (Scene, BodyId, BodyId) {
 fn a_triangle_that_falls_through_another_touches_it_at_a_quarter() {
     for mut detector in detectors() {
         let (scene, floor, other) = falling();
-        let impacts = detector.impacts(&scene, &Step::default()).expect("good");
+        let impacts = detector.impacts(&scene, &Query::all()).expect("good");
         assert!(
             impacts
                 .iter()
@@ -53,18 +52,18 @@ fn a_triangle_that_falls_through_another_touches_it_at_a_quarter() {
         let vf = impacts.of(PairKind::VertexFace);
         assert_eq!(vf.len(), 1, "{rows:?}");
         assert_eq!(
-            (vf[0].a.body, vf[0].a.primitive, vf[0].b.body),
+            (vf[0].a.body, vf[0].a.element, vf[0].b.body),
             (other, 0, floor)
         );
         assert_eq!(impacts.of(PairKind::EdgeEdge).len(), 2, "{rows:?}");
         let hash = impacts.hash();
-        let earliest = detector.earliest(&scene, &Step::default()).expect("good");
+        let earliest = detector.earliest(&scene, &Query::all()).expect("good");
         assert_eq!(
             earliest.map(|impact| impact.kind),
             Some(PairKind::VertexFace)
         );
-        assert!(!detector.is_free(&scene, &Step::default()).expect("good"));
-        let between = Step::new(Query::between(other, floor)).toi(Toi::F64);
+        assert!(!detector.is_free(&scene, &Query::all()).expect("good"));
+        let between = Query::between(other, floor).precision(Precision::F64);
         let impacts = detector.impacts(&scene, &between).expect("good");
         assert_eq!(impacts.hash(), hash, "1/4 is the same in both precisions");
     }
@@ -75,12 +74,12 @@ fn a_body_without_end_positions_stands_still() {
     for mut detector in detectors() {
         let (mut scene, _, other) = falling();
         scene.clear_end_positions(other).expect("known");
-        assert!(detector.is_free(&scene, &Step::default()).expect("good"));
+        assert!(detector.is_free(&scene, &Query::all()).expect("good"));
         scene.set_end_positions(other, &lifted(-3.0)).expect("good");
-        assert!(!detector.is_free(&scene, &Step::default()).expect("good"));
+        assert!(!detector.is_free(&scene, &Query::all()).expect("good"));
         scene.set_positions(other, &lifted(1.0)).expect("good");
         assert!(scene.body(other).expect("known").end_positions().is_none());
-        assert!(detector.is_free(&scene, &Step::default()).expect("good"));
+        assert!(detector.is_free(&scene, &Query::all()).expect("good"));
     }
 }
 
@@ -90,11 +89,14 @@ fn what_touches_at_the_start_is_reported_at_zero_or_left_out() {
         let (mut scene, _, other) = falling();
         scene.set_positions(other, &lifted(0.0)).expect("good");
         scene.set_end_positions(other, &lifted(1.0)).expect("good");
-        let impacts = detector.impacts(&scene, &Step::default()).expect("good");
-        assert_eq!(impacts.touching_at_start(), impacts.len());
+        let impacts = detector.impacts(&scene, &Query::all()).expect("good");
+        assert_eq!(
+            impacts.iter().filter(|impact| impact.at_start).count(),
+            impacts.len()
+        );
         assert_eq!(impacts.len(), 3);
         assert!(impacts.iter().all(|impact| impact.toi == 0.0));
-        let skip = Step::default().start(Start::Skip);
+        let skip = Query::all().start(Start::Skip);
         assert!(detector.is_free(&scene, &skip).expect("good"));
     }
 }
@@ -110,7 +112,7 @@ fn points_and_edges_meet_each_other_and_surfaces() {
         let edge = [[-1.0f64, 0.0, 0.0], [1.0, 0.0, 0.0]];
         let edge = scene.add_edges(&[[0, 1]], &edge).expect("good");
         let resting = scene.add_points(&[[0.0f64, 0.0, -0.5]]).expect("good");
-        let impacts = detector.impacts(&scene, &Step::default()).expect("good");
+        let impacts = detector.impacts(&scene, &Query::all()).expect("good");
         let rows: Vec<_> = impacts
             .iter()
             .map(|i| (i.kind, i.a.body, i.b.body, i.toi))
@@ -127,7 +129,7 @@ fn points_and_edges_meet_each_other_and_surfaces() {
 fn a_step_that_is_advanced_is_free_to_its_rounded_end() {
     for mut detector in detectors() {
         let (mut scene, _, other) = falling();
-        let advance = detector.advance(&scene, &Step::default()).expect("good");
+        let advance = detector.advance(&scene, &Query::all()).expect("good");
         assert!(
             advance.fraction > 0.249_999 && advance.fraction < 0.25,
             "{advance:?}"
@@ -135,17 +137,17 @@ fn a_step_that_is_advanced_is_free_to_its_rounded_end() {
         advance.apply(&mut scene).expect("same bodies");
         assert!(
             detector
-                .detect(&scene, &Query::all())
+                .detect(&scene, &Query::between_all())
                 .expect("good")
                 .is_empty()
         );
         // The body goes on from there, but never passes through.
         scene.set_end_positions(other, &lifted(-3.0)).expect("good");
-        let next = detector.advance(&scene, &Step::default()).expect("good");
+        let next = detector.advance(&scene, &Query::all()).expect("good");
         assert!(next.fraction < 1e-6, "{next:?}");
         // Upwards the whole step is free.
         scene.set_end_positions(other, &lifted(2.0)).expect("good");
-        let up = detector.advance(&scene, &Step::default()).expect("good");
+        let up = detector.advance(&scene, &Query::all()).expect("good");
         assert_eq!((up.fraction, up.first), (1.0, None));
         up.apply(&mut scene).expect("same bodies");
         assert_eq!(
@@ -163,7 +165,7 @@ fn a_step_is_advanced_as_far_as_by_testing_all_pairs() {
         let mut random = impinge_scenes::Random::new(seed);
         let (far, n) = ([3000.0, 40_000.0, 7.0][seed as usize % 3], 24);
         let (faces, [start, end]) = common::landing(&mut random, n, 2.0, far);
-        let step = Step::default().start(Start::Skip);
+        let step = Query::all().start(Start::Skip);
         for is_single in [true, false] {
             let mut scene = Scene::new();
             if is_single {
@@ -201,14 +203,14 @@ fn a_step_is_advanced_freely_where_very_many_pairs_are_close() {
         let mut scene = Scene::new();
         let body = scene.add_triangles(&faces, &start).expect("good");
         scene.set_end_positions(body, &end).expect("good");
-        let step = Step::default().start(Start::Skip);
+        let step = Query::all().start(Start::Skip);
         let advances = [1, 4].map(|threads| {
             let settings = Settings {
                 backend: Backend::Cpu,
                 threads,
                 ..Settings::default()
             };
-            let mut detector = Detector::with_settings(settings).expect("settings");
+            let mut detector = Detector::new(settings).expect("settings");
             detector.advance(&scene, &step).expect("good")
         });
         assert_eq!(advances[0], advances[1], "{seed}");
@@ -247,25 +249,25 @@ fn elements_in_double_precision_are_answered_as_pair_by_pair() {
         };
         let mut scene = Scene::new();
         let body = scene.add_triangles(&faces, &at(0.0)).expect("good");
-        scene.set_end_positions(body, &at(0.5 + tie)).expect("good");
+        scene.set_end_positions(body, at(0.5 + tie)).expect("good");
         let mut still = Scene::new();
         still
             .add_triangles(&faces, &at(0.5 - 2.0 * tie))
             .expect("good");
         let kinds = [PairKind::VertexFace, PairKind::EdgeEdge];
-        let near = NearQuery::new(Query::everything())
-            .distance(0.2 * tie)
-            .kinds(kinds);
-        let candidates = CandidateQuery::new(Query::everything()).distance(0.01);
+        let near = Query::all().kinds(kinds);
+        let candidates = Query::all();
         let answers = Vec::from_iter(detectors().into_iter().map(|mut detector| {
-            let impacts = detector.impacts(&scene, &Step::default()).expect("good");
+            let impacts = detector.impacts(&scene, &Query::all()).expect("good");
             let impacts = (impacts.len(), impacts.hash());
-            let near = detector.within_distance(&still, &near).expect("good");
+            let near = detector.near(&still, 0.2 * tie, &near).expect("good");
             let near = (near.len(), near.hash());
-            let keep = (Step::default()).separation(0.1 * tie);
+            let keep = (Query::all()).separation(0.1 * tie);
             let kept = detector.impacts(&scene, &keep).expect("good");
             let kept = (kept.len(), kept.hash());
-            let candidates = detector.candidates(&scene, &candidates).expect("good");
+            let candidates = detector
+                .candidates(&scene, 0.01, &candidates)
+                .expect("good");
             let candidates = (candidates.len(), candidates.hash());
             [impacts, near, kept, candidates]
         }));
@@ -296,7 +298,7 @@ fn differences_that_overflow_hide_no_contact() {
         let body = scene.add_triangles(&FACE, &start).expect("good");
         scene.set_end_positions(body, &end).expect("good");
     }
-    let step = Step::default();
+    let step = Query::all();
     let found = Vec::from_iter(detectors().iter_mut().map(|detector| {
         let impacts = detector.impacts(&scene, &step).expect("good");
         (impacts.len(), impacts.hash())
@@ -332,28 +334,25 @@ fn numbers_of_any_size_are_answered_as_pair_by_pair() {
             common::Size::Axes([exponent, ..]) => common::times_power(1.0, exponent),
             _ => 1.0,
         };
-        let step = Step::default();
+        let step = Query::all();
         let answers = Vec::from_iter(detectors().into_iter().map(|mut detector| {
             let impacts = detector.impacts(&scene, &step).expect("good");
             let impacts = (impacts.len(), impacts.hash());
-            let query = NearQuery::new(Query::everything())
-                .distance(unit)
-                .kinds(PairKind::ALL)
-                .closest_points();
-            let near = detector.within_distance(&scene, &query).expect("good");
+            let query = Query::all().kinds(PairKind::ALL).closest_points();
+            let near = detector.near(&scene, unit, &query).expect("good");
             for pair in near.iter() {
                 let closest = pair.closest.expect("asked for");
                 assert!(closest.points.as_flattened().iter().all(|x| x.is_finite()));
             }
             let near = (near.len(), near.hash());
-            let keep = Step::default().separation(unit);
+            let keep = Query::all().separation(unit);
             let kept = detector.impacts(&scene, &keep).expect("good");
             let kept = (kept.len(), kept.hash());
-            let query = CandidateQuery::new(Query::everything()).distance(unit);
-            let candidates = detector.candidates(&scene, &query).expect("good");
+            let query = Query::all();
+            let candidates = detector.candidates(&scene, unit, &query).expect("good");
             let candidates = (candidates.len(), candidates.hash());
             let earliest = detector.earliest(&scene, &step).expect("good");
-            let skip = Step::default().start(Start::Skip);
+            let skip = Query::all().start(Start::Skip);
             let is_free = detector.is_free(&scene, &skip).expect("good");
             // What is left of the way is free, to the rounded positions.
             let advance = detector.advance(&scene, &skip).expect("good");
@@ -409,16 +408,10 @@ fn a_motion_that_dies_away_goes_on() {
         scene
             .set_positions(body, &shrinking)
             .expect("every finite number is taken");
-        let hash = detector
-            .detect(&scene, &Query::everything())
-            .expect("good")
-            .hash();
+        let hash = detector.detect(&scene, &Query::all()).expect("good").hash();
         hashes.insert(hash);
         if frame % 500 == 0 || frame == 1_622 {
-            let expected = naive
-                .detect(&scene, &Query::everything())
-                .expect("good")
-                .hash();
+            let expected = naive.detect(&scene, &Query::all()).expect("good").hash();
             assert_eq!(hash, expected, "{frame}");
         }
     }
@@ -442,13 +435,13 @@ fn bad_end_positions_are_refused_by_name() {
     ));
     let kept = scene.body(other).expect("known").end_positions();
     assert_eq!(kept, Some(&lifted(-3.0).to_vec().into()));
-    let distance = CandidateQuery::new(Query::all()).distance(-1.0);
+    let distance = Query::between_all();
     for mut detector in detectors() {
-        let refused = detector.candidates(&scene, &distance);
+        let refused = detector.candidates(&scene, -1.0, &distance);
         assert!(matches!(
             refused,
             Err(Error::Setting {
-                setting: "distance",
+                setting: "inflation",
                 ..
             })
         ));
@@ -461,10 +454,12 @@ fn candidates_are_boxes_that_overlap_within_twice_the_distance() {
         let mut scene = Scene::new();
         scene.add_points(&[[0.0f32, 0.0, 0.0]]).expect("good");
         let far = scene.add_points(&[[3.0f32, 0.0, 0.0]]).expect("good");
-        let query = CandidateQuery::new(Query::everything()).kinds([PairKind::VertexVertex]);
+        let query = Query::all().kinds([PairKind::VertexVertex]);
         let mut count = |scene: &Scene, distance: f64| {
-            let query = query.clone().distance(distance);
-            detector.candidates(scene, &query).expect("good").len()
+            detector
+                .candidates(scene, distance, &query)
+                .expect("good")
+                .len()
         };
         assert_eq!(
             [0.0, 1.0, 1.5_f64.next_down(), 1.5].map(|d| count(&scene, d)),
@@ -499,23 +494,24 @@ fn crowd(is_double: bool) -> Scene {
         let moved = moved.map(|(p, q)| std::array::from_fn(|axis| p[axis] + q[axis]));
         let end: Vec<[f32; 3]> = moved.collect();
         if is_double {
-            let body = scene.add(elements, wide(&start)).expect("good");
-            scene.set_end_positions(body, &wide(&end)).expect("good");
+            let body = scene.add((elements, wide(&start))).expect("good");
+            scene.set_end_positions(body, wide(&end)).expect("good");
         } else {
-            let body = scene.add(elements, start).expect("good");
+            let body = scene.add((elements, start)).expect("good");
             scene.set_end_positions(body, &end).expect("good");
         }
     }
     scene
 }
 
-type Candidate = (PairKind, Primitive, Primitive);
+type Candidate = (PairKind, Element, Element);
 
 /// All candidates run by run, and the lengths of the runs.
 fn in_runs(
     detector: &mut Detector,
     scene: &Scene,
-    query: &CandidateQuery,
+    inflation: f64,
+    query: &Query,
     most: u64,
 ) -> (Vec<Candidate>, Vec<usize>) {
     let (mut all, mut lengths) = (Vec::new(), Vec::new());
@@ -524,7 +520,7 @@ fn in_runs(
         lengths.push(run.len());
         ControlFlow::<()>::Continue(())
     };
-    let n = detector.candidates_in_runs(scene, query, most, &mut each);
+    let n = detector.candidates_in_runs(scene, inflation, query, most, &mut each);
     assert_eq!(n, Ok(ControlFlow::Continue(all.len() as u64)));
     (all, lengths)
 }
@@ -537,23 +533,21 @@ fn candidates_in_runs_are_all_candidates_in_their_order() {
             &PairKind::ALL[..],
             &[PairKind::FaceFace, PairKind::VertexVertex],
         ] {
-            let query = CandidateQuery::new(Query::everything())
-                .kinds(kinds.iter().copied())
-                .distance(0.0625);
+            let query = Query::all().kinds(kinds.iter().copied());
             let mut expected = None;
             for (method, threads) in [
                 (Method::Naive, 1),
                 (Method::Clusters, 1),
                 (Method::Clusters, 3),
             ] {
-                let mut detector = Detector::with_settings(Settings {
+                let mut detector = Detector::new(Settings {
                     method,
                     threads,
                     backend: Backend::Cpu,
                     ..Settings::default()
                 })
                 .expect("settings");
-                let whole = detector.candidates(&scene, &query).expect("good");
+                let whole = detector.candidates(&scene, 0.0625, &query).expect("good");
                 let hash = whole.hash();
                 let whole: Vec<Candidate> = whole.iter().collect();
                 let expected = &*expected.get_or_insert_with(|| whole.clone());
@@ -564,7 +558,7 @@ fn candidates_in_runs_are_all_candidates_in_their_order() {
                 }
                 for most in [n as u64 / 60, n as u64 - 1, n as u64, u64::MAX] {
                     let most = most.max(1);
-                    let (all, lengths) = in_runs(&mut detector, &scene, &query, most);
+                    let (all, lengths) = in_runs(&mut detector, &scene, 0.0625, &query, most);
                     assert!(
                         all == whole,
                         "{method:?}, {threads} threads, {most} per run"
@@ -573,11 +567,12 @@ fn candidates_in_runs_are_all_candidates_in_their_order() {
                     assert_eq!(lengths.len() == 1, most >= n as u64);
                 }
                 let mut sum = 0u64;
-                let all = detector.candidates_in_runs(&scene, &query, 1 + n as u64 / 5, |run| {
-                    sum = sum.wrapping_add(run.hash());
-                    assert!(run.stats().total_ms > 0.0 && run.stats().n_threads == threads);
-                    ControlFlow::<()>::Continue(())
-                });
+                let all =
+                    detector.candidates_in_runs(&scene, 0.0625, &query, 1 + n as u64 / 5, |run| {
+                        sum = sum.wrapping_add(run.hash());
+                        assert!(run.stats().total_ms > 0.0 && run.stats().n_threads == threads);
+                        ControlFlow::<()>::Continue(())
+                    });
                 assert_eq!((all, sum), (Ok(ControlFlow::Continue(n as u64)), hash));
             }
         }
@@ -630,14 +625,14 @@ fn octants(middle: [f64; 3]) -> impl Iterator<Item = [[f64; 3]; 2]> {
 /// Whether the box of an element over a step, inflated, has points in a cell.
 fn touches_cell(
     scene: &Scene,
-    (part, element): (Part, Primitive),
+    (part, element): (Part, Element),
     margin: f64,
     [low, high]: [[f64; 3]; 2],
 ) -> bool {
     let body = scene.body(element.body).expect("known");
     let corners = match part {
-        Part::Vertices => vec![element.primitive],
-        _ => body.part(part).corners(element.primitive as usize).to_vec(),
+        Part::Vertices => vec![element.element],
+        _ => body.part(part).corners(element.element as usize).to_vec(),
     };
     let end = body.end_positions().expect("all move");
     (0..3).all(|axis| {
@@ -671,31 +666,22 @@ fn pairs_of_all_cells_are_the_pairs_of_the_whole() {
     for (is_double, separation) in [(false, 0.0), (true, 0.0), (false, 0.0625), (true, 0.0625)] {
         // Backwards: boxes over the step begin where elements end.
         let scene = reversed(&crowd(is_double));
-        let whole = Step::default().separation(separation);
-        let near = |query| {
-            NearQuery::new(query)
-                .kinds(PairKind::ALL)
-                .distance(separation)
-        };
-        let boxes = |query| {
-            CandidateQuery::new(query)
-                .kinds(PairKind::ALL)
-                .distance(0.0625)
-        };
+        let whole = Query::all().separation(separation);
         for mut detector in detectors() {
             let expected = detector.impacts(&scene, &whole).expect("good");
             let (n, hash) = (expected.len(), expected.hash());
             assert!(n > 100, "{n}");
             let first = detector.earliest(&scene, &whole).expect("good");
-            let everything = Query::everything();
-            let pairs = detector.within_distance(&scene, &near(everything.clone()));
+            let everything = Query::all().kinds(PairKind::ALL);
+            let pairs = detector.near(&scene, separation, &everything);
             let of_near = pairs.expect("good").hash();
-            let of_boxes = detector.candidates(&scene, &boxes(everything));
+            let of_boxes = detector.candidates(&scene, 0.0625, &everything);
             let of_boxes = of_boxes.expect("good").hash();
             let (mut sums, mut n_found, mut firsts) = ([0u64; 3], 0, Vec::new());
             for cell @ [low, high] in octants(middle) {
-                let query = Query::everything().owned_by(low, high);
-                let step = Step::new(query.clone()).separation(separation);
+                let query = Query::all().owned_by(low, high);
+                let kinds = query.clone().kinds(PairKind::ALL);
+                let step = query.separation(separation);
                 let found = detector.impacts(&scene, &step).expect("good");
                 n_found += found.len();
                 let (is_empty, hash) = (found.is_empty(), found.hash());
@@ -712,11 +698,9 @@ fn pairs_of_all_cells_are_the_pairs_of_the_whole() {
                 }
                 assert_eq!(detector.is_free(&scene, &step).expect("good"), is_empty);
                 firsts.extend(detector.earliest(&scene, &step).expect("good"));
-                let pairs = detector.within_distance(&scene, &near(query.clone()));
+                let pairs = detector.near(&scene, separation, &kinds);
                 let of_near = pairs.expect("good").hash();
-                let found = detector
-                    .candidates(&scene, &boxes(query.clone()))
-                    .expect("good");
+                let found = detector.candidates(&scene, 0.0625, &kinds).expect("good");
                 for (kind, a, b) in found.iter() {
                     let [of_a, of_b] = parts(kind);
                     assert!(touches_cell(&scene, (of_a, a), 0.125, cell));
@@ -724,7 +708,7 @@ fn pairs_of_all_cells_are_the_pairs_of_the_whole() {
                 }
                 let of_boxes = found.hash();
                 let found: Vec<Candidate> = found.iter().collect();
-                let (runs, _) = in_runs(&mut detector, &scene, &boxes(query), 97);
+                let (runs, _) = in_runs(&mut detector, &scene, 0.0625, &kinds, 97);
                 assert_eq!(runs, found);
                 for (sum, hash) in sums.iter_mut().zip([hash, of_near, of_boxes]) {
                     *sum = sum.wrapping_add(hash);
@@ -741,7 +725,7 @@ fn pairs_of_all_cells_are_the_pairs_of_the_whole() {
 #[test]
 fn the_way_that_a_step_can_be_taken_has_no_cell() {
     let (scene, ..) = falling();
-    let step = Step::new(Query::all().owned_by([0.0; 3], [1.0; 3]));
+    let step = Query::between_all().owned_by([0.0; 3], [1.0; 3]);
     for mut detector in detectors() {
         let error = detector.advance(&scene, &step).unwrap_err().to_string();
         assert!(error.starts_with("owned_by: "), "{error}");
@@ -755,13 +739,11 @@ fn one_element_with_many_candidates_is_divided_too() {
     scene.add_points(&[[0.0f32; 3]]).expect("good");
     let many: Vec<[f32; 3]> = (0..1000).map(|i| [i as f32 / 1000.0, 0.0, 0.0]).collect();
     scene.add_points(&many).expect("good");
-    let query = CandidateQuery::new(Query::all())
-        .kinds([PairKind::VertexVertex])
-        .distance(1.0);
+    let query = Query::between_all().kinds([PairKind::VertexVertex]);
     for mut detector in detectors() {
-        let (all, lengths) = in_runs(&mut detector, &scene, &query, 7);
+        let (all, lengths) = in_runs(&mut detector, &scene, 1.0, &query, 7);
         assert!(lengths.iter().all(|n| (1..=7).contains(n)));
-        let others = all.iter().map(|row| row.2.primitive);
+        let others = all.iter().map(|row| row.2.element);
         assert!(others.eq(0..1000));
     }
 }
@@ -769,9 +751,12 @@ fn one_element_with_many_candidates_is_divided_too() {
 #[test]
 fn runs_of_candidates_end_when_they_are_told_to() {
     let scene = crowd(false);
-    let query = CandidateQuery::new(Query::everything());
+    let query = Query::all();
     for mut detector in detectors() {
-        let whole = detector.candidates(&scene, &query).expect("good").len() as u64;
+        let whole = detector
+            .candidates(&scene, 0.0, &query)
+            .expect("good")
+            .len() as u64;
         let mut n_runs = 0;
         let mut third = |run: Candidates| {
             n_runs += 1;
@@ -780,23 +765,24 @@ fn runs_of_candidates_end_when_they_are_told_to() {
                 _ => ControlFlow::Continue(()),
             }
         };
-        let found = detector.candidates_in_runs(&scene, &query, 20, &mut third);
+        let found = detector.candidates_in_runs(&scene, 0.0, &query, 20, &mut third);
         assert!(matches!(found, Ok(ControlFlow::Break(1..=20))), "{found:?}");
         assert_eq!(n_runs, 3);
 
         let token = CancelToken::new();
-        let control = Control::new().cancel(&token);
+        detector.set_control(Control::new().cancel(&token));
         let mut n_runs = 0;
         let cancel = |_| {
             n_runs += 1;
             token.cancel();
             ControlFlow::<()>::Continue(())
         };
-        let found = detector.candidates_in_runs_with(&scene, &query, 20, cancel, &control);
+        let found = detector.candidates_in_runs(&scene, 0.0, &query, 20, cancel);
         assert_eq!((found, n_runs), (Err(Error::Cancelled), 1));
+        detector.set_control(Control::new());
 
         let nothing = |_| -> ControlFlow<()> { panic!("no run") };
-        let refused = detector.candidates_in_runs(&scene, &query, 0, nothing);
+        let refused = detector.candidates_in_runs(&scene, 0.0, &query, 0, nothing);
         assert!(matches!(
             refused,
             Err(Error::Setting {
@@ -804,19 +790,19 @@ fn runs_of_candidates_end_when_they_are_told_to() {
                 ..
             })
         ));
-        let apart = CandidateQuery::new(Query::everything()).kinds([]);
-        let none = detector.candidates_in_runs(&scene, &apart, 20, nothing);
+        let apart = Query::all().kinds([]);
+        let none = detector.candidates_in_runs(&scene, 0.0, &apart, 20, nothing);
         assert_eq!(none, Ok(ControlFlow::Continue(0)));
 
         // The limit of pairs is for all runs together.
         for (limit, most) in [(whole - 1, 20), (whole - 1, whole), (10, 20), (whole, 20)] {
-            let mut limited = Detector::with_settings(Settings {
+            let mut limited = Detector::new(Settings {
                 max_pairs: Some(limit),
                 ..detector.settings().clone()
             })
             .expect("settings");
             let mut n = 0;
-            let found = limited.candidates_in_runs(&scene, &query, most, |run| {
+            let found = limited.candidates_in_runs(&scene, 0.0, &query, most, |run| {
                 n += run.len() as u64;
                 ControlFlow::<()>::Continue(())
             });
@@ -829,7 +815,7 @@ fn runs_of_candidates_end_when_they_are_told_to() {
         }
         // The detector goes on.
         assert_eq!(
-            in_runs(&mut detector, &scene, &query, 50).0.len() as u64,
+            in_runs(&mut detector, &scene, 0.0, &query, 50).0.len() as u64,
             whole
         );
     }
@@ -840,20 +826,22 @@ fn a_cancelled_question_about_a_step_ends_and_the_detector_goes_on() {
     let token = CancelToken::new();
     token.cancel();
     let control = Control::new().cancel(&token);
-    let step = Step::default();
+    let step = Query::all();
     for mut detector in detectors() {
         let (scene, _, _) = falling();
-        let impacts = detector.impacts_with(&scene, &step, &control).err();
+        detector.set_control(control.clone());
+        let impacts = detector.impacts(&scene, &step).err();
         assert_eq!(impacts, Some(Error::Cancelled));
-        let earliest = detector.earliest_with(&scene, &step, &control).err();
+        let earliest = detector.earliest(&scene, &step).err();
         assert_eq!(earliest, Some(Error::Cancelled));
-        let is_free = detector.is_free_with(&scene, &step, &control).err();
+        let is_free = detector.is_free(&scene, &step).err();
         assert_eq!(is_free, Some(Error::Cancelled));
-        let advance = detector.advance_with(&scene, &step, &control).err();
+        let advance = detector.advance(&scene, &step).err();
         assert_eq!(advance, Some(Error::Cancelled));
-        let query = CandidateQuery::new(Query::everything());
-        let candidates = detector.candidates_with(&scene, &query, &control).err();
+        let query = Query::all();
+        let candidates = detector.candidates(&scene, 0.0, &query).err();
         assert_eq!(candidates, Some(Error::Cancelled));
+        detector.set_control(Control::new());
         assert_eq!(detector.is_free(&scene, &step), Ok(false));
     }
 }
@@ -873,7 +861,7 @@ fn lattices_are_answered_as_pair_by_pair() {
             .map(|f| [3 * f, 3 * f + 1, (3 * f + 5) % 24])
             .collect();
         let mut scene = Scene::new();
-        let body = scene.add(faces.clone(), start.clone()).expect("good");
+        let body = scene.add((faces.clone(), start.clone())).expect("good");
         scene.set_end_positions(body, &end).expect("good");
         let edges = scene.body(body).expect("known").part(Part::Edges).clone();
         let wide = |p: [f32; 3]| p.map(f64::from);
@@ -917,18 +905,15 @@ fn lattices_are_answered_as_pair_by_pair() {
         }
         expected.sort_by_key(|row| (row.0, row.1, row.2));
         for mut detector in detectors() {
-            let impacts = detector.impacts(&scene, &Step::default()).expect("good");
+            let impacts = detector.impacts(&scene, &Query::all()).expect("good");
             let found: Vec<_> = impacts
                 .iter()
-                .map(|i| (i.kind, i.a.primitive, i.b.primitive, i.toi, i.at_start))
+                .map(|i| (i.kind, i.a.element, i.b.element, i.toi, i.at_start))
                 .collect();
             assert_eq!(found, expected, "seed {seed}");
             let all = impacts.earliest();
-            assert_eq!(
-                detector.earliest(&scene, &Step::default()).expect("good"),
-                all
-            );
-            let is_free = detector.is_free(&scene, &Step::default()).expect("good");
+            assert_eq!(detector.earliest(&scene, &Query::all()).expect("good"), all);
+            let is_free = detector.is_free(&scene, &Query::all()).expect("good");
             assert_eq!(is_free, expected.is_empty());
         }
     }
@@ -968,18 +953,18 @@ impl Twins {
         let mut first = None;
         for ix in order {
             let body = scene
-                .add(self.faces[ix].clone(), self.start[ix].clone())
+                .add((self.faces[ix].clone(), self.start[ix].clone()))
                 .expect("good");
             scene.set_end_positions(body, &self.end[ix]).expect("good");
             first = first.or(Some(body));
         }
-        let impacts = detector.impacts(&scene, &Step::default()).expect("good");
+        let impacts = detector.impacts(&scene, &Query::all()).expect("good");
         let side = |body: BodyId| (Some(body) == first) == swapped;
         let mut rows: Vec<Row> = impacts
             .iter()
             .map(|i| {
-                let mut a = (side(i.a.body), i.a.primitive);
-                let mut b = (side(i.b.body), i.b.primitive);
+                let mut a = (side(i.a.body), i.a.element);
+                let mut b = (side(i.b.body), i.b.element);
                 if i.kind == PairKind::EdgeEdge && b < a {
                     (a, b) = (b, a);
                 }

@@ -4,8 +4,7 @@
 use std::ops::ControlFlow;
 
 use impinge_core::{
-    Backend, CandidateQuery, Detector, Impact, InstructionSet, PairKind, Query, Scene, Settings,
-    Start, Step, Toi,
+    Backend, Detector, Impact, InstructionSet, PairKind, Precision, Query, Scene, Settings, Start,
 };
 use impinge_scenes::data::test_file;
 
@@ -59,11 +58,11 @@ impl Scenario {
         let mut scene = Scene::new();
         match (start.positions, end.positions) {
             (impinge_io::Positions::F32(start), impinge_io::Positions::F32(end)) => {
-                let body = scene.add(faces, start).expect("good");
+                let body = scene.add((faces, start)).expect("good");
                 scene.set_end_positions(body, &end).expect("good");
             }
             (impinge_io::Positions::F64(start), impinge_io::Positions::F64(end)) => {
-                let body = scene.add(faces, start).expect("good");
+                let body = scene.add((faces, start)).expect("good");
                 scene.set_end_positions(body, &end).expect("good");
             }
             _ => panic!("one precision"),
@@ -72,14 +71,14 @@ impl Scenario {
     }
 
     /// Pairs and times of one kind.
-    fn expected(&self, kind: PairKind, toi: Toi) -> Vec<(u32, u32, f64)> {
+    fn expected(&self, kind: PairKind, toi: Precision) -> Vec<(u32, u32, f64)> {
         let path = |what: &str| format!("ccd/{}/{}_{what}.npy", self.name, kind.name());
         let numbers = npy(&path("contacts"), "<u4", u32::from_le_bytes);
         let times: Vec<f64> = match toi {
-            Toi::F32 => npy(&path("toi_f32"), "<f4", |b| {
+            Precision::F32 => npy(&path("toi_f32"), "<f4", |b| {
                 f64::from(f32::from_le_bytes(b))
             }),
-            Toi::F64 => npy(&path("toi_f64"), "<f8", f64::from_le_bytes),
+            Precision::F64 => npy(&path("toi_f64"), "<f8", f64::from_le_bytes),
         };
         let pairs = numbers.chunks_exact(2).zip(times);
         pairs.map(|(pair, time)| (pair[0], pair[1], time)).collect()
@@ -88,8 +87,7 @@ impl Scenario {
 
 fn rows(impacts: &[Impact]) -> Vec<(u32, u32, f64)> {
     let rows = impacts.iter();
-    rows.map(|i| (i.a.primitive, i.b.primitive, i.toi))
-        .collect()
+    rows.map(|i| (i.a.element, i.b.element, i.toi)).collect()
 }
 
 fn detector(threads: usize, instruction_set: InstructionSet, budget: Option<u64>) -> Detector {
@@ -100,15 +98,15 @@ fn detector(threads: usize, instruction_set: InstructionSet, budget: Option<u64>
         memory_budget: budget,
         ..Settings::default()
     };
-    Detector::with_settings(settings).expect("settings")
+    Detector::new(settings).expect("settings")
 }
 
 #[test]
 fn every_pair_and_every_time_is_that_of_the_exact_prototype() {
     for (scenario, scene) in scenarios() {
-        for toi in [Toi::F32, Toi::F64] {
+        for toi in [Precision::F32, Precision::F64] {
             let mut detector = detector(2, InstructionSet::default(), None);
-            let step = Step::default().toi(toi);
+            let step = Query::all().precision(toi);
             let impacts = detector.impacts(&scene, &step).expect("good").clone();
             for kind in [PairKind::VertexFace, PairKind::EdgeEdge] {
                 let (found, expected) = (rows(impacts.of(kind)), scenario.expected(kind, toi));
@@ -147,7 +145,7 @@ fn a_device_leaves_every_pair_that_touches() {
     let device = Detector::with_capacities(settings, room);
     let mut device = device.expect("a GPU or a software driver");
     for (scenario, scene) in scenarios() {
-        let step = Step::default();
+        let step = Query::all();
         let impacts = device.impacts(&scene, &step).expect("good").clone();
         let stats = impacts.stats();
         assert_ne!(stats.backend, "cpu");
@@ -157,7 +155,10 @@ fn a_device_leaves_every_pair_that_touches() {
         let n_most = impacts.len() as u64 * 101 / 100 + 600;
         assert!(n_left < n_most, "{}: {n_left} of {n}", scenario.name);
         for kind in [PairKind::VertexFace, PairKind::EdgeEdge] {
-            let (found, expected) = (rows(impacts.of(kind)), scenario.expected(kind, Toi::F32));
+            let (found, expected) = (
+                rows(impacts.of(kind)),
+                scenario.expected(kind, Precision::F32),
+            );
             assert_eq!(found.len(), expected.len(), "{}", scenario.name);
             for (found, expected) in found.iter().zip(&expected) {
                 assert_eq!(found, expected, "{} {}", scenario.name, kind.name());
@@ -166,14 +167,16 @@ fn a_device_leaves_every_pair_that_touches() {
         let earliest = device.earliest(&scene, &step).expect("good");
         assert_eq!(earliest, impacts.earliest());
         // Other pairs touch later than one that certainly touches.
-        let n_left = device.step_stats().n_unsure;
+        let n_left = device.stats().n_unsure;
         println!("{}: {n_left} may be the earliest", scenario.name);
         assert!(n_left < 600, "{}: {n_left} of {n}", scenario.name);
         assert!(!device.is_free(&scene, &step).expect("good"));
         if scenario.name == "cloth-funnel" {
-            let exact = device.impacts(&scene, &step.toi(Toi::F64)).expect("good");
+            let exact = device
+                .impacts(&scene, &step.precision(Precision::F64))
+                .expect("good");
             let found = rows(exact.of(PairKind::EdgeEdge));
-            assert_eq!(found, scenario.expected(PairKind::EdgeEdge, Toi::F64));
+            assert_eq!(found, scenario.expected(PairKind::EdgeEdge, Precision::F64));
         }
     }
 }
@@ -181,7 +184,7 @@ fn a_device_leaves_every_pair_that_touches() {
 #[test]
 fn bytes_are_the_same_for_all_instruction_sets_threads_and_budgets() {
     for (_, scene) in scenarios() {
-        let step = Step::default();
+        let step = Query::all();
         let all = detector(2, InstructionSet::default(), None)
             .impacts(&scene, &step)
             .expect("good")
@@ -193,10 +196,7 @@ fn bytes_are_the_same_for_all_instruction_sets_threads_and_budgets() {
         ] {
             let mut other = detector(threads, set, budget);
             let impacts = other.impacts(&scene, &step).expect("good");
-            assert!(
-                impacts.as_slice() == all.as_slice(),
-                "{threads} {set:?} {budget:?}"
-            );
+            assert!(impacts.iter().eq(&all), "{threads} {set:?} {budget:?}");
             let earliest = other.earliest(&scene, &step).expect("good");
             assert_eq!(earliest, all.earliest(), "{threads} {set:?} {budget:?}");
         }
@@ -212,8 +212,8 @@ fn boxes_overlap_as_often_as_others_counted() {
     let counts: serde_json::Value = serde_json::from_reader(counts).expect("JSON");
     for (scenario, scene) in scenarios() {
         let mut detector = detector(2, InstructionSet::default(), None);
-        let query = CandidateQuery::new(Query::everything());
-        let candidates = detector.candidates(&scene, &query).expect("good");
+        let query = Query::all();
+        let candidates = detector.candidates(&scene, 0.0, &query).expect("good");
         for kind in [PairKind::VertexFace, PairKind::EdgeEdge] {
             let expected = counts[scenario.name]["recomputed_f64"][kind.name()].as_u64();
             assert_eq!(
@@ -229,7 +229,7 @@ fn boxes_overlap_as_often_as_others_counted() {
         let all: Vec<_> = candidates.iter().collect();
         let mut detector = self::detector(2, InstructionSet::default(), Some(30_000_000));
         let (mut rest, mut n_runs) = (&all[..], 0);
-        let found = detector.candidates_in_runs(&scene, &query, all.len() as u64 / 3, |run| {
+        let found = detector.candidates_in_runs(&scene, 0.0, &query, all.len() as u64 / 3, |run| {
             let (own, others) = rest.split_at(run.len());
             assert!(run.iter().eq(own.iter().copied()), "{}", scenario.name);
             (rest, n_runs) = (others, n_runs + 1);
@@ -244,9 +244,9 @@ fn boxes_overlap_as_often_as_others_counted() {
 fn a_step_of_cloth_can_be_taken_up_to_its_first_contact() {
     for (scenario, mut scene) in scenarios() {
         let mut detector = detector(2, InstructionSet::default(), None);
-        let step = Step::default().start(Start::Skip);
+        let step = Query::all().start(Start::Skip);
         let first = detector
-            .earliest(&scene, &step.clone().toi(Toi::F64))
+            .earliest(&scene, &step.clone().precision(Precision::F64))
             .expect("good");
         let advance = detector.advance(&scene, &step).expect("good");
         assert_eq!(advance.first, first);

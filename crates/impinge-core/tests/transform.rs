@@ -124,23 +124,17 @@ fn answers_are_those_of_the_moved_vertices() {
             backend: Backend::Cpu,
             ..Settings::default()
         };
-        let mut detector = Detector::with_settings(settings).expect("good");
+        let mut detector = Detector::new(settings).expect("good");
         let mut hashes = Vec::new();
         for frame in 0..4 {
             moved
                 .set_transform(body, &turn(f64::from(frame)))
                 .expect("good");
             given
-                .set_positions(same, &points(&moved, body))
+                .set_positions(same, points(&moved, body))
                 .expect("good");
-            let ours = detector
-                .detect(&moved, &Query::everything())
-                .expect("good")
-                .hash();
-            let theirs = detector
-                .detect(&given, &Query::everything())
-                .expect("good")
-                .hash();
+            let ours = detector.detect(&moved, &Query::all()).expect("good").hash();
+            let theirs = detector.detect(&given, &Query::all()).expect("good").hash();
             assert_eq!(ours, theirs);
             hashes.push(ours);
         }
@@ -243,7 +237,7 @@ fn many_bodies_are_those_that_are_added_one_by_one() {
     }
     let mut detector = Detector::new(Backend::Cpu).expect("good");
     let rows = |detector: &mut Detector, scene: &Scene| -> Vec<[u32; 4]> {
-        let pairs = detector.detect(scene, &Query::all()).expect("good");
+        let pairs = detector.detect(scene, &Query::between_all()).expect("good");
         pairs.rows().collect()
     };
     let ours = rows(&mut detector, &many);
@@ -326,7 +320,7 @@ fn a_filter_of_the_callers_own_is_asked_once_per_pair_in_order() {
         .expect("good");
     let mut detector = Detector::new(Backend::Cpu).expect("good");
     let pairs = detector
-        .detect(&scene, &Query::all())
+        .detect(&scene, &Query::between_all())
         .expect("good")
         .clone();
     let mut asked = Vec::new();
@@ -334,9 +328,9 @@ fn a_filter_of_the_callers_own_is_asked_once_per_pair_in_order() {
     kept.retain(|a, b| {
         asked.push([
             a.body.index() as u32,
-            a.primitive,
+            a.element,
             b.body.index() as u32,
-            b.primitive,
+            b.element,
         ]);
         (a.body.index() + b.body.index()).is_multiple_of(3)
     });
@@ -359,7 +353,9 @@ fn the_colliding_primitives_of_all_bodies_are_found_in_one_pass() {
     let lonely = TRIANGLE.map(|[x, y, z]| [x, y, z + 9.0]);
     scene.add_triangles(&FACE, &lonely).expect("good");
     let mut detector = Detector::new(Backend::Cpu).expect("good");
-    let pairs = detector.detect(&scene, &Query::all()).expect("good");
+    let pairs = detector
+        .detect(&scene, &Query::between_all())
+        .expect("good");
     let all = pairs.all_colliding();
     assert_eq!(all.len(), 250);
     for (id, (body, colliding)) in ids.iter().zip(&all) {

@@ -6,8 +6,8 @@ use std::time::Duration;
 
 use common::{agree, cases, check, landing, leaves_out, naive, rows};
 use impinge_core::{
-    Backend, BodyId, CandidateQuery, Detector, Impact, Method, NearPair, NearQuery, PairKind,
-    Pairs, Positions, Primitive, Query, Scene, Settings, SharedVertex, Statistics, Step, Tuning,
+    Backend, BodyId, Detector, Element, Impact, Method, NearPair, PairKind, Pairs, Positions,
+    Query, Scene, Settings, SharedVertex, Stats, Tuning,
 };
 use impinge_scenes::{Model, Random, solids, soup, surfaces};
 
@@ -15,7 +15,7 @@ const ZERO: usize = 0;
 const INFINITY: usize = 1;
 
 fn detector(method: Method, threads: usize, tuning: Tuning) -> Detector {
-    Detector::with_settings(settings(method, threads, tuning)).unwrap()
+    Detector::new(settings(method, threads, tuning)).unwrap()
 }
 
 fn settings(method: Method, threads: usize, tuning: Tuning) -> Settings {
@@ -126,7 +126,7 @@ impl Film {
         let bodies = self.bodies.iter().enumerate();
         let add = bodies.map(|(ix, body)| match self.double && ix == 0 {
             true => scene
-                .add(body.elements.clone(), body.positions_f64())
+                .add((body.elements.clone(), body.positions_f64()))
                 .unwrap(),
             false => body.add_to(&mut scene).unwrap(),
         });
@@ -148,7 +148,7 @@ impl Film {
     fn show(&self, scene: &mut Scene, bodies: &[BodyId], frame: usize) {
         for (ix, (&body, positions)) in bodies.iter().zip(self.pose(frame)).enumerate() {
             match self.double && ix == 0 {
-                true => scene.set_positions(body, &wide(&positions)).unwrap(),
+                true => scene.set_positions(body, wide(&positions)).unwrap(),
                 false => scene.set_positions(body, &positions).unwrap(),
             }
         }
@@ -202,8 +202,7 @@ fn hop(body: usize, frame: usize, [x, y, z]: [f32; 3]) -> [f32; 3] {
 
 fn films() -> Vec<Film> {
     let between: fn(&[BodyId]) -> Query = |bodies| Query::between(bodies[0], bodies[1]);
-    let resolved: fn(&[BodyId]) -> Query =
-        |_| Query::everything().shared_vertex(SharedVertex::Resolve);
+    let resolved: fn(&[BodyId]) -> Query = |_| Query::all().shared_vertex(SharedVertex::Resolve);
     let mut films = Vec::new();
     for double in [false, true] {
         let film = |name, bodies: [Model; 2], query, motion| Film {
@@ -252,7 +251,7 @@ fn films() -> Vec<Film> {
             name: "many that drift",
             bodies: vec![ball(), ball(), soup::tetrahedra(300, 0.3, 1), ball()],
             double,
-            query: |_| Query::all(),
+            query: |_| Query::between_all(),
             motion: drift,
         });
     }
@@ -273,7 +272,7 @@ fn no_threshold_changes_the_answer_to_a_frame() {
         let mut oracle = detector(Method::Naive, 1, Tuning::default());
         film.for_frames(|_, scene, query| {
             let pairs = oracle.detect(scene, query).unwrap();
-            expected.push((rows(pairs), pairs.stats().n_candidates));
+            expected.push((rows(&pairs), pairs.stats().n_candidates));
         });
         assert!(expected.iter().any(|(rows, _)| !rows.is_empty()));
         // Every threshold in each second film, in turn. There are seven films in either precision, so in one of the two
@@ -285,7 +284,7 @@ fn no_threshold_changes_the_answer_to_a_frame() {
                 film.for_frames(|frame, scene, query| {
                     let what = || format!("{} {frame}, {}, {method:?}", film.name, tuned.name);
                     let (expected, n_candidates) = &expected[frame];
-                    let pairs: &Pairs = detector.detect(scene, query).unwrap();
+                    let pairs: &Pairs = &detector.detect(scene, query).unwrap();
                     if let Err(error) = agree(expected, &rows(pairs), pairs.hash()) {
                         panic!("{}: {error}", what());
                     }
@@ -306,19 +305,23 @@ fn no_threshold_changes_the_answer_to_a_frame() {
 struct Answers {
     impacts: Vec<Impact>,
     earliest: Option<Impact>,
-    candidates: Vec<(PairKind, Primitive, Primitive)>,
+    candidates: Vec<(PairKind, Element, Element)>,
     near: Vec<NearPair>,
 }
 
 fn answers(detector: &mut Detector, scene: &Scene, query: &Query) -> Answers {
-    let step = Step::new(query.clone());
-    let near = NearQuery::new(query.clone()).distance(0.02);
-    let candidates = CandidateQuery::new(query.clone()).distance(0.02);
+    let step = query.clone();
+    let near = query.clone();
+    let candidates = query.clone();
     Answers {
-        impacts: detector.impacts(scene, &step).unwrap().as_slice().into(),
+        impacts: (detector.impacts(scene, &step).unwrap().iter().copied()).collect(),
         earliest: detector.earliest(scene, &step).unwrap(),
-        candidates: (detector.candidates(scene, &candidates).unwrap().iter()).collect(),
-        near: (detector.within_distance(scene, &near).unwrap().iter()).collect(),
+        candidates: (detector
+            .candidates(scene, 0.02, &candidates)
+            .unwrap()
+            .iter())
+        .collect(),
+        near: (detector.near(scene, 0.02, &near).unwrap().iter()).collect(),
     }
 }
 
@@ -336,7 +339,7 @@ fn no_threshold_changes_the_answer_to_a_step() {
     };
     for film in [
         film(false, |bodies| Query::between(bodies[0], bodies[1])),
-        film(true, |_| Query::everything()),
+        film(true, |_| Query::all()),
     ] {
         let (mut scene, bodies) = film.scene();
         let query = (film.query)(&bodies);
@@ -349,7 +352,7 @@ fn no_threshold_changes_the_answer_to_a_step() {
             film.show(&mut scene, &bodies, frame);
             for (ix, (&body, positions)) in bodies.iter().zip(film.pose(frame + 1)).enumerate() {
                 match film.double && ix == 0 {
-                    true => scene.set_end_positions(body, &wide(&positions)).unwrap(),
+                    true => scene.set_end_positions(body, wide(&positions)).unwrap(),
                     false => scene.set_end_positions(body, &positions).unwrap(),
                 }
             }
@@ -369,7 +372,7 @@ struct Watched {
     method: Method,
     /// Thresholds that must be at 0 for this one to matter; all others are at infinity.
     at_zero: &'static [&'static str],
-    count: fn(&Statistics) -> u64,
+    count: fn(&Stats) -> u64,
     expected: fn(u64, u64) -> bool,
 }
 
@@ -377,7 +380,7 @@ impl Watched {
     fn new(
         method: Method,
         at_zero: &'static [&'static str],
-        count: fn(&Statistics) -> u64,
+        count: fn(&Stats) -> u64,
         expected: fn(u64, u64) -> bool,
     ) -> Watched {
         Watched {
@@ -393,9 +396,9 @@ impl Watched {
         let only_at_zero: fn(u64, u64) -> bool = |zero, infinity| zero > 0 && infinity == 0;
         let more_at_zero: fn(u64, u64) -> bool = |zero, infinity| zero > infinity;
         let only_at_infinity: fn(u64, u64) -> bool = |zero, infinity| zero == 0 && infinity > 0;
-        let n_shared: fn(&Statistics) -> u64 = |stats| stats.ways.n_shared;
-        let n_culled: fn(&Statistics) -> u64 = |stats| stats.n_culled;
-        let in_grid: fn(&Statistics) -> u64 = |stats| u64::from(stats.method == "cells");
+        let n_shared: fn(&Stats) -> u64 = |stats| stats.ways.n_shared;
+        let n_culled: fn(&Stats) -> u64 = |stats| stats.n_culled;
+        let in_grid: fn(&Stats) -> u64 = |stats| u64::from(stats.method == "cells");
         let (clusters, cells, auto) = (Method::Clusters, Method::Cells, Method::Auto);
         let new = Watched::new;
         Some(match threshold {
@@ -503,12 +506,12 @@ fn the_code_behind_thresholds_of_steps_is_entered() {
     let b = ball.translated([0.2, 0.1, 0.0]).add_to(&mut scene).unwrap();
     let to = ball.translated([0.1, 0.1, 0.0]);
     scene.set_end_positions(b, &to.positions).unwrap();
-    let query = CandidateQuery::new(Query::all()).distance(0.1);
-    let counts = |threshold: &str, count: fn(&Statistics) -> u64| {
+    let query = Query::between_all();
+    let counts = |threshold: &str, count: fn(&Stats) -> u64| {
         Tuning::ENDS.map(|end| {
             let tuning = Tuning::ENDS[INFINITY].with(threshold, &end);
             let mut detector = detector(Method::Clusters, 2, tuning);
-            count(detector.candidates(&scene, &query).unwrap().stats())
+            count(detector.candidates(&scene, 0.1, &query).unwrap().stats())
         })
     };
     let [zero, infinity] = counts("step_bounds_parallel_from", |stats| stats.ways.n_shared);
@@ -518,7 +521,7 @@ fn the_code_behind_thresholds_of_steps_is_entered() {
     let tuned = |end: usize| {
         let tuning = Tuning::ENDS[INFINITY].with("decide_from", &Tuning::ENDS[end]);
         let mut detector = detector(Method::Clusters, 2, tuning);
-        let step = Step::new(Query::all());
+        let step = Query::between_all();
         detector.impacts(&scene, &step).unwrap().stats().ways.n_full
     };
     assert!(tuned(ZERO) > 0 && tuned(INFINITY) == 0);
@@ -527,9 +530,9 @@ fn the_code_behind_thresholds_of_steps_is_entered() {
         let tuning = Tuning::ENDS[INFINITY].with("most_per_task", &zero);
         let tuning = tuning.with("step_shorter_from", &Tuning::ENDS[end]);
         let mut detector = detector(Method::Clusters, 2, tuning);
-        let step = Step::new(Query::all());
+        let step = Query::between_all();
         detector.earliest(&scene, &step).unwrap().expect("contacts");
-        detector.step_stats().ways.n_shortened
+        detector.stats().ways.n_shortened
     };
     assert!(shortened(ZERO) == 0 && shortened(INFINITY) > 0);
 }
@@ -561,14 +564,14 @@ fn the_earliest_contact_is_found_however_early_boxes_end() {
         for (body_ix, &body) in bodies.iter().enumerate() {
             let ends = [put(body_ix, 0.0), put(body_ix, -speed * body_ix as f32)];
             if double && body_ix == 0 {
-                scene.set_positions(body, &wide(&ends[0])).unwrap();
-                scene.set_end_positions(body, &wide(&ends[1])).unwrap();
+                scene.set_positions(body, wide(&ends[0])).unwrap();
+                scene.set_end_positions(body, wide(&ends[1])).unwrap();
             } else {
                 scene.set_positions(body, &ends[0]).unwrap();
                 scene.set_end_positions(body, &ends[1]).unwrap();
             }
         }
-        let step = Step::new((film.query)(&bodies));
+        let step = (film.query)(&bodies);
         let mut first = None;
         for threads in 1..3 {
             let mut detector = detector(Method::Clusters, threads, tuning);
@@ -580,7 +583,7 @@ fn the_earliest_contact_is_found_however_early_boxes_end() {
                 "scene {ix}"
             );
             if threads == 1 {
-                assert!(detector.step_stats().ways.n_shortened > 1, "scene {ix}");
+                assert!(detector.stats().ways.n_shortened > 1, "scene {ix}");
             }
             assert_eq!(*first.get_or_insert(expected), expected);
         }
@@ -599,12 +602,12 @@ fn a_step_is_advanced_freely_however_early_boxes_end() {
         let mut scene = Scene::new();
         let body = scene.add_triangles(&faces, &start).unwrap();
         scene.set_end_positions(body, &end).unwrap();
-        let step = Step::default();
+        let step = Query::all();
         let mut detector = detector(Method::Clusters, 1, tuning);
         let advance = detector.advance(&scene, &step).unwrap();
         assert!(advance.fraction > 0.0);
         assert!(
-            detector.step_stats().ways.n_shortened > 1,
+            detector.stats().ways.n_shortened > 1,
             "seed {seed}: {advance:?}"
         );
         n_backed_off += u32::from(advance.n_tried > 2);

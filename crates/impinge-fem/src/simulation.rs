@@ -1,6 +1,6 @@
 //! The simulation loop: detection, then a step of backward Euler.
 
-use impinge::{BodyId, Control, Detector, Pairs, Query, Scene, Statistics};
+use impinge::{BodyId, Detector, Pairs, Query, Scene, Stats};
 use rayon::prelude::*;
 use web_time::Instant;
 
@@ -99,7 +99,7 @@ pub struct StepReport {
     /// solver ran out of iterations.
     pub residual: f64,
     /// Counts and times of the detection.
-    pub detection: Statistics,
+    pub detection: Stats,
 }
 
 /// Energies in joule.
@@ -136,7 +136,7 @@ impl Simulation {
         let mut scene = Scene::new();
         let bodies = solids
             .iter()
-            .map(|solid| scene.add(solid.tets.clone(), rounded(&solid.positions)))
+            .map(|solid| scene.add((solid.tets.clone(), rounded(&solid.positions))))
             .collect::<Result<_, _>>()?;
         let all = |of: fn(&Solid) -> &Vec<[f64; 3]>| -> Vec<Vec3> {
             solids.iter().flat_map(of).map(|&v| v.into()).collect()
@@ -150,9 +150,9 @@ impl Simulation {
             matrix: BlockMatrix::new(&mesh),
             fingerprint: fingerprint(solids, &settings),
             query: if settings.self_contact {
-                Query::everything()
-            } else {
                 Query::all()
+            } else {
+                Query::between_all()
             },
             mesh,
             settings,
@@ -266,21 +266,17 @@ impl Simulation {
     /// # Errors
     /// As [`detect`](Simulation::detect) and [`advance`](Simulation::advance).
     pub fn step(&mut self, detector: &mut Detector) -> Result<StepReport, Error> {
-        let pairs = self.detect(detector, &Control::new())?;
-        self.advance(pairs)
+        let pairs = self.detect(detector)?;
+        self.advance(&pairs)
     }
 
     /// Finds the pairs of tetrahedra that intersect now: the first half of a step. Use it to see the
     /// pairs together with the positions at which they were found.
     ///
     /// # Errors
-    /// As [`Detector::detect_with`].
-    pub fn detect<'d>(
-        &self,
-        detector: &'d mut Detector,
-        control: &Control<'_>,
-    ) -> Result<&'d Pairs, Error> {
-        Ok(detector.detect_with(&self.scene, &self.query, control)?)
+    /// As [`Detector::detect`].
+    pub fn detect(&self, detector: &mut Detector) -> Result<Pairs, Error> {
+        Ok(detector.detect(&self.scene, &self.query)?)
     }
 
     /// Advances by one time step, with contacts from the pairs found by this simulation's

@@ -5,8 +5,8 @@
 //! second sheet falls on it, folded double.
 
 use impinge::{
-    Backend, BodyId, Detector, Elements, Impact, PairKind, Part, Positions, Query, Scene,
-    SharedVertex, Start, Step, Toi,
+    Backend, BodyId, Detector, Elements, Impact, PairKind, Part, Positions, Precision, Query,
+    Scene, SharedVertex, Start,
 };
 use impinge_scenes::surfaces::{cloth, cuboid};
 
@@ -30,7 +30,7 @@ struct World {
     scene: Scene,
     sheets: Vec<Sheet>,
     detector: Detector,
-    step: Step,
+    step: Query,
     query: Query,
     n_contacts: usize,
     n_cut: usize,
@@ -100,14 +100,14 @@ impl World {
             .collect();
         sheets.push(Sheet::new(&mut scene, &faces, &upper));
         let mut detector = Detector::new(Backend::Cpu).expect("a CPU");
-        let query = Query::everything().shared_vertex(SharedVertex::Resolve);
+        let query = Query::all().shared_vertex(SharedVertex::Resolve);
         let any = detector.any(&scene, &query).expect("good");
         assert!(!any, "the first state intersects");
         World {
             scene,
             sheets,
             detector,
-            step: Step::default().start(Start::Report),
+            step: Query::all().start(Start::Report),
             query,
             n_contacts: 0,
             n_cut: 0,
@@ -154,7 +154,6 @@ impl World {
             if impacts.is_empty() {
                 break;
             }
-            let impacts = impacts.as_slice().to_vec();
             // Vertices that meet a fixed body stop; those of two sheets, or of one, move alike.
             let groups: Vec<Vec<(usize, usize)>> =
                 impacts.iter().map(|impact| self.vertices(impact)).collect();
@@ -204,7 +203,7 @@ impl World {
 
     /// What a solver does that knows the exact time of the first contact, but not what rounding does: goes there.
     fn take_rounded(&mut self, before: &[Vec<Point>], wished: &[Vec<Point>]) {
-        let step = self.step.clone().toi(Toi::F64);
+        let step = self.step.clone().precision(Precision::F64);
         let first = self.detector.earliest(&self.scene, &step).expect("good");
         let time = first.map_or(1.0, |first| first.toi);
         for ((sheet, before), wished) in self.sheets.iter().zip(before).zip(wished) {
@@ -234,9 +233,9 @@ impl World {
             };
             let body = self.scene.body(element.body).expect("it is there");
             if part == Part::Vertices {
-                vertices.push((sheet, element.primitive as usize));
+                vertices.push((sheet, element.element as usize));
             } else {
-                let corners = body.part(part).corners(element.primitive as usize);
+                let corners = body.part(part).corners(element.element as usize);
                 vertices.extend(corners.iter().map(|&ix| (sheet, ix as usize)));
             }
         }

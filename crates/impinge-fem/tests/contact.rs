@@ -3,7 +3,7 @@
 mod common;
 
 use common::{cpu, cross, distance, no_gravity, still, sum};
-use impinge::{Control, Detector, Method};
+use impinge::{Detector, Method};
 use impinge_fem::scenes::{SceneName, block, drop_scene};
 use impinge_fem::{Damping, Error, Ground, Material, Settings, Simulation, Solid, State};
 
@@ -38,8 +38,8 @@ fn contact_forces_are_opposite_and_twist_nothing() {
     let settings = no_gravity();
     let simulation = Simulation::new(&[lower, upper], settings.clone()).unwrap();
     let mut detector = cpu();
-    let pairs = simulation.detect(&mut detector, &Control::new()).unwrap();
-    let forces = simulation.contact_forces(pairs).unwrap();
+    let pairs = simulation.detect(&mut detector).unwrap();
+    let forces = simulation.contact_forces(&pairs).unwrap();
     let positions = simulation.positions();
     let n = forces.len() / 2;
     let (below, above) = (sum(forces[..n].to_vec()), sum(forces[n..].to_vec()));
@@ -61,8 +61,8 @@ fn contact_forces_are_opposite_and_twist_nothing() {
         settings,
     )
     .unwrap();
-    let pairs = swapped.detect(&mut detector, &Control::new()).unwrap();
-    let again = swapped.contact_forces(pairs).unwrap();
+    let pairs = swapped.detect(&mut detector).unwrap();
+    let again = swapped.contact_forces(&pairs).unwrap();
     for (a, b) in forces.iter().zip(again[n..].iter().chain(&again[..n])) {
         assert!(distance(*a, *b) < 1e-9 * above[1]);
     }
@@ -178,11 +178,11 @@ fn without_contact_they_would_pass() {
     )
     .unwrap();
     apart.step(&mut detector).unwrap();
-    let nothing = apart.detect(&mut detector, &Control::new()).unwrap();
+    let nothing = apart.detect(&mut detector).unwrap();
     assert!(nothing.is_empty());
     let mut nearest = f64::INFINITY;
     for _ in 0..100 {
-        simulation.advance(nothing).unwrap();
+        simulation.advance(&nothing).unwrap();
         let [lower, upper] = heights(&simulation);
         nearest = nearest.min(upper - lower);
     }
@@ -241,7 +241,7 @@ fn blocks_state(threads: usize, method: Method) -> State {
         ..scene.settings
     };
     let mut simulation = Simulation::new(&scene.solids, settings).unwrap();
-    let mut detector = Detector::with_settings(impinge::Settings {
+    let mut detector = Detector::new(impinge::Settings {
         method,
         threads,
         ..impinge::Settings::default()
@@ -315,10 +315,10 @@ fn pairs_of_another_scene_are_refused() {
     )
     .unwrap();
     let mut detector = cpu();
-    let pairs = other.detect(&mut detector, &Control::new()).unwrap();
+    let pairs = other.detect(&mut detector).unwrap();
     let before = simulation.state();
     assert!(matches!(
-        simulation.advance(pairs),
+        simulation.advance(&pairs),
         Err(Error::ForeignPair { .. })
     ));
     assert!(simulation.state() == before);

@@ -53,6 +53,7 @@ mod options;
 mod polygon;
 mod read;
 mod sequence;
+mod table;
 mod text;
 mod write;
 
@@ -60,14 +61,15 @@ pub use bodies::NamedMesh;
 pub use error::{Error, Location, Place, printable};
 pub use format::Format;
 pub use mesh::{Elements, Mesh, Positions, Weld, weld};
-pub use npy::{npy_header, npy_header_in, write_impacts_npy};
+pub use npy::npy_header;
 pub use options::{Prefer, ReadOptions, Summary};
 pub use read::{
     read, read_bodies, read_bodies_bytes, read_bytes, read_bytes_with_summary, read_tetgen_bytes,
     read_with_summary,
 };
 pub use sequence::{Sequence, SequenceFormat};
+pub use table::{Cell, Column, ELEMENTS, Holds, KIND, Table, TableFormat, impact_columns};
 pub use write::{
     AtomicFile, ColoredMesh, GrowingPc2, Pc2Writer, Polylines, remove_temporary_files, write_glb,
-    write_ply, write_polylines_obj, write_polylines_ply, write_polylines_vtu, write_vtu,
+    write_obj, write_ply, write_polylines_obj, write_polylines_ply, write_polylines_vtu, write_vtu,
 };

@@ -6,13 +6,15 @@
 
 use std::collections::HashMap;
 
-use impinge::{Elements, Kind, Positions};
+use impinge::{BodyKind, Elements, Positions};
 use numpy::{
     Element, PyArray1, PyArray2, PyArrayDescrMethods, PyArrayMethods, PyReadonlyArray2,
     PyUntypedArray, PyUntypedArrayMethods,
 };
 use pyo3::exceptions::{PyIndexError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
+
+use crate::errors::{invalid, number};
 
 /// Positions in the precision in which they are answered, in C order.
 pub enum PositionArray<'py> {
@@ -61,7 +63,7 @@ impl<'py> PositionArray<'py> {
 /// What the rows of an index array are.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum RowKind {
-    Of(Kind),
+    Of(BodyKind),
     /// Faces of four corners, each cut into two triangles.
     Quads,
 }
@@ -75,10 +77,10 @@ pub fn elements(
 ) -> PyResult<Elements> {
     let allowed: &[usize] = match kind {
         None => &[3, 4],
-        Some(RowKind::Of(Kind::Points)) => &[1],
-        Some(RowKind::Of(Kind::Edges)) => &[2],
-        Some(RowKind::Of(Kind::Triangles)) => &[3],
-        Some(RowKind::Of(Kind::Tetrahedra) | RowKind::Quads) => &[4],
+        Some(RowKind::Of(BodyKind::Points)) => &[1],
+        Some(RowKind::Of(BodyKind::Edges)) => &[2],
+        Some(RowKind::Of(BodyKind::Triangles)) => &[3],
+        Some(RowKind::Of(BodyKind::Tetrahedra) | RowKind::Quads) => &[4],
     };
     let (indices, n_columns) = index_rows(argument, name, allowed, n_vertices)?;
     Ok(match (n_columns, kind) {
@@ -87,7 +89,7 @@ pub fn elements(
         (3, _) => Elements::Triangles(indices.as_chunks().0.to_vec()),
         (_, Some(RowKind::Quads)) => Elements::Triangles(cut_quads(indices.as_chunks().0)),
         (_, None) if !are_tetrahedra(indices.as_chunks().0) => {
-            return Err(PyValueError::new_err(format!(
+            return Err(invalid(format!(
                 "{name}: rows of four are tetrahedra or quads, and no two of them share three vertices, which would \
                  tell: say kind=\"tetrahedra\", or kind=\"quads\" to cut each into two triangles"
             )));
@@ -127,7 +129,7 @@ pub fn matrix<const ROWS: usize, const COLUMNS: usize>(
     let kind = NumberKind::of(&array, name)?;
     if array.shape() != [ROWS, COLUMNS] {
         let given = array.getattr("shape")?.str()?;
-        return Err(PyValueError::new_err(format!(
+        return Err(invalid(format!(
             "{name}: shape ({ROWS}, {COLUMNS}) expected, {given} given"
         )));
     }
@@ -156,7 +158,7 @@ pub fn mask(answer: &Bound<'_, PyAny>, name: &str, n: usize) -> PyResult<Vec<boo
         let given = array.getattr("shape").and_then(|shape| shape.str());
         let dtype = array.dtype().str();
         match (given, dtype) {
-            (Ok(shape), Ok(dtype)) => PyValueError::new_err(format!(
+            (Ok(shape), Ok(dtype)) => invalid(format!(
                 "{name}: shape ({n},) of bool expected as the answer, {shape} of {dtype} given"
             )),
             (Err(error), _) | (_, Err(error)) => error,
@@ -175,7 +177,7 @@ pub fn offsets(argument: &Bound<'_, PyAny>, name: &str) -> PyResult<Vec<usize>> 
     let kind = NumberKind::of(&array, name)?;
     let shape = array.shape();
     if shape.len() != 1 || matches!(kind, NumberKind::Float(_)) {
-        return Err(PyValueError::new_err(format!(
+        return Err(invalid(format!(
             "{name}: a row of whole numbers expected, {} of {} given",
             array.getattr("shape")?.str()?,
             array.dtype().str()?
@@ -187,7 +189,7 @@ pub fn offsets(argument: &Bound<'_, PyAny>, name: &str) -> PyResult<Vec<usize>> 
     let convert = |&x: &i64| usize::try_from(x).ok();
     let numbers = numbers.as_slice()?;
     match numbers.iter().position(|x| convert(x).is_none()) {
-        Some(at) => Err(PyValueError::new_err(format!(
+        Some(at) => Err(invalid(format!(
             "{name}[{at}] = {}: an offset is 0 or more",
             numbers[at]
         ))),
@@ -225,7 +227,7 @@ fn check_indices(indices: &[u32], n_columns: usize, name: &str, n_vertices: usiz
         return Ok(());
     };
     let place = format!("{name}[{}, {}]", at / n_columns, at % n_columns);
-    Err(PyValueError::new_err(format!(
+    Err(invalid(format!(
         "{place} = {}: there are {n_vertices} vertices",
         indices[at]
     )))
@@ -282,7 +284,7 @@ fn as_array<'py>(argument: &Bound<'py, PyAny>, name: &str) -> PyResult<Bound<'py
         if array.is_instance(&masked.getattr("MaskedArray")?)?
             && masked.call_method1("is_masked", (array,))?.is_truthy()?
         {
-            return Err(PyValueError::new_err(format!(
+            return Err(invalid(format!(
                 "{name}: a masked array with masked entries; fill or drop them first"
             )));
         }
@@ -301,7 +303,7 @@ fn as_array<'py>(argument: &Bound<'py, PyAny>, name: &str) -> PyResult<Bound<'py
             let py = argument.py();
             let message = format!("{name}: not usable as an array: {}", cause.value(py));
             let error = if cause.is_instance_of::<PyValueError>(py) {
-                PyValueError::new_err(message)
+                invalid(message)
             } else {
                 PyTypeError::new_err(message)
             };
@@ -317,7 +319,7 @@ fn check_columns(array: &Bound<'_, PyUntypedArray>, name: &str, allowed: &[usize
         return Ok(());
     }
     let expected: Vec<String> = allowed.iter().map(|n| format!("(n, {n})")).collect();
-    Err(PyValueError::new_err(format!(
+    Err(invalid(format!(
         "{name}: shape {} expected, {} given",
         expected.join(" or "),
         array.getattr("shape")?.str()?
@@ -353,7 +355,7 @@ fn check_exact<T: Element + std::fmt::Display>(
 ) -> PyResult<()> {
     match array.as_array().indexed_iter().find(|(_, x)| !exact(x)) {
         None => Ok(()),
-        Some(((row, column), x)) => Err(PyValueError::new_err(format!(
+        Some(((row, column), x)) => Err(invalid(format!(
             "{name}[{row}, {column}] = {x}: not representable in float64 without loss"
         ))),
     }
@@ -377,7 +379,7 @@ fn extended_to_double<'py>(
     let place = places.get_item(0)?;
     let (row, column): (usize, usize) =
         (place.get_item(0)?.extract()?, place.get_item(1)?.extract()?);
-    Err(PyValueError::new_err(format!(
+    Err(invalid(format!(
         "{name}[{row}, {column}] = {}: not representable in float64 without loss",
         array.get_item((row, column))?.str()?
     )))
@@ -443,7 +445,7 @@ fn collect<T: Element>(
             Some(ix) => indices.push(ix),
             None => {
                 let n_columns = array.shape()[1];
-                return Err(PyValueError::new_err(format!(
+                return Err(invalid(format!(
                     "{name}[{}, {}] = {}",
                     at / n_columns,
                     at % n_columns,
@@ -453,13 +455,4 @@ fn collect<T: Element>(
         }
     }
     Ok(indices)
-}
-
-/// A float as Python writes it.
-pub fn number(x: f64) -> String {
-    if x.is_nan() {
-        "nan".into()
-    } else {
-        format!("{x:?}")
-    }
 }

@@ -4,9 +4,11 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use impinge::BodyId;
 use pyo3::basic::CompareOp;
-use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::PyBool;
+
+use crate::errors::invalid;
 
 use crate::settings::unexpected;
 
@@ -85,7 +87,7 @@ pub fn body_id(
     if let Ok(body) = argument.cast::<Body>() {
         let body = body.get();
         if body.scene != scene {
-            return Err(PyValueError::new_err(format!(
+            return Err(invalid(format!(
                 "{name}: body {} belongs to another scene",
                 body.id
             )));
@@ -99,7 +101,7 @@ pub fn body_id(
     known
         .into_iter()
         .find(|id| usize::try_from(index) == Ok(id.index()))
-        .ok_or_else(|| PyValueError::new_err(format!("{name}: there is no body {index}")))
+        .ok_or_else(|| invalid(format!("{name}: there is no body {index}")))
 }
 
 fn not_a_body(argument: &Bound<'_, PyAny>, name: &str) -> PyErr {

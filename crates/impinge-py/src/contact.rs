@@ -7,11 +7,10 @@ use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::columns::strings;
+use crate::answers::to_array;
 use crate::errors::raise;
-use crate::result::to_array;
 
-/// Where the triangles of each pair of a `Result` meet: points, segments, and polygons where both lie in one
+/// Where the triangles of each pair of `Pairs` meet: points, segments, and polygons where both lie in one
 /// plane; and the curves in which surfaces cross. `Detector.contacts` finds them.
 ///
 /// Which features meet where, and which points are one, is exact. Coordinates are the exact numbers rounded: to
@@ -63,7 +62,7 @@ impl Contacts {
             Shape::Segment => "segment",
             Shape::Polygon => "polygon",
         });
-        strings::<7>(py, self.inner.shapes().len(), names)
+        strings::<7>(py, names)
     }
 
     /// numpy.ndarray of float64, shape (p, 3) : the points of contact, each once.
@@ -105,7 +104,7 @@ impl Contacts {
             Feature::Edge(_) => "e",
             Feature::Face(_) => "f",
         });
-        strings::<1>(py, 2 * self.inner.names().len(), kinds)?.call_method1("reshape", ((-1, 2),))
+        strings::<1>(py, kinds)?.call_method1("reshape", ((-1, 2),))
     }
 
     /// numpy.ndarray of uint32, shape (p, 2, 2) : the numbers of these features: the two vertices of an edge, the
@@ -238,4 +237,21 @@ fn to_dict<'py>(py: Python<'py>, region: &Region) -> PyResult<Bound<'py, PyDict>
         .map(|normal| PyArray1::from_slice(py, &normal));
     dict.set_item("normal", normal)?;
     Ok(dict)
+}
+
+/// Short names as NumPy holds them: one 32-bit number per letter, filled up with zeros.
+fn strings<const WIDTH: usize>(
+    py: Python<'_>,
+    names: impl Iterator<Item = &'static str>,
+) -> PyResult<Bound<'_, PyAny>> {
+    let letters = |name: &str| -> [u32; WIDTH] {
+        let name = name.as_bytes();
+        std::array::from_fn(|at| name.get(at).copied().map_or(0, u32::from))
+    };
+    let letters: Vec<u32> = names.flat_map(letters).collect();
+    let dtype = format!("U{WIDTH}");
+    if letters.is_empty() {
+        return py.import("numpy")?.call_method1("empty", (0, dtype));
+    }
+    PyArray1::from_vec(py, letters).call_method1("view", (dtype,))
 }

@@ -6,15 +6,15 @@ use std::process::Command;
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
 
-use impinge::{Backend, CancelToken, Control, Settings};
+use impinge::{Backend, CancelToken, Control, Precision, Settings, SharedVertex, Start};
 use impinge_check::{Limits, Options, Pool, PoolError, apply_limits, serve};
 use impinge_tiles::{Ask, Error, Plan, PlanOptions, RunOptions, ScatterOptions};
-use pyo3::exceptions::{PyOSError, PyRuntimeError, PyValueError};
+use pyo3::exceptions::{PyOSError, PyRuntimeError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
-use crate::errors::{Cancelled, raise};
-use crate::settings::{self, Argument};
+use crate::errors::{Cancelled, invalid, raise};
+use crate::settings::{WHICH, choose_one, words};
 
 /// How often Python gets a look while work goes on in another thread.
 const INTERVAL: Duration = Duration::from_millis(50);
@@ -81,7 +81,7 @@ pub fn _check(
     row: Py<PyAny>,
 ) -> PyResult<()> {
     let timeout = timeout.map(Duration::try_from_secs_f64).transpose();
-    let timeout = timeout.map_err(|error| PyValueError::new_err(format!("timeout: {error}")))?;
+    let timeout = timeout.map_err(|error| invalid(format!("timeout: {error}")))?;
     let start = || {
         let mut child = Command::new(&command[0]);
         child.args(&command[1..]);
@@ -129,7 +129,7 @@ fn refuse(error: Error) -> PyErr {
             impinge::Error::Cancelled => raise(impinge::Error::Cancelled),
             source => PyRuntimeError::new_err(format!("tile {tile}: {source}")),
         },
-        error => PyValueError::new_err(error.to_string()),
+        error => invalid(error.to_string()),
     }
 }
 
@@ -230,23 +230,23 @@ pub fn _tiles_run<'py>(
     py: Python<'py>,
     folder: PathBuf,
     tiles: Vec<u32>,
-    between: bool,
-    within: bool,
-    shared_vertex: Argument<'_, '_>,
-    start: Argument<'_, '_>,
-    toi: Argument<'_, '_>,
+    which: &Bound<'_, PyAny>,
+    shared_vertex: &Bound<'_, PyAny>,
+    start: &Bound<'_, PyAny>,
+    precision: &Bound<'_, PyAny>,
     threads: usize,
     memory_budget: Option<u64>,
     again: bool,
     done: Option<Py<PyAny>>,
 ) -> PyResult<Bound<'py, PyList>> {
+    let [between, within] = choose_one(which, "which", &WHICH)?;
     let options = RunOptions {
         ask: Ask {
             between,
             within,
-            shared_vertex: settings::shared_vertex(shared_vertex)?,
-            start: settings::start(start)?,
-            toi: settings::toi(toi)?,
+            shared_vertex: choose_one(shared_vertex, "shared_vertex", words!(SharedVertex))?,
+            start: choose_one(start, "start", words!(Start))?,
+            precision: choose_one(precision, "precision", words!(Precision))?,
         },
         settings: Settings {
             backend: Backend::Cpu,
@@ -267,9 +267,7 @@ pub fn _tiles_run<'py>(
     };
     watched(py, each, |cancel, send| {
         let control = Control::new().cancel(cancel);
-        plan.run(tiles, &options, &control, &mut |result| {
-            send(result.clone())
-        })
+        plan.run(tiles, &options, control, &mut |result| send(result.clone()))
     })?
     .map_err(refuse)?;
     let rows = results.iter().map(|result: &impinge_tiles::TileResult| {

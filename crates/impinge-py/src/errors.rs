@@ -1,33 +1,22 @@
 //! The library's errors as Python exceptions that name the argument at fault.
 
 use impinge::Error;
-use pyo3::create_exception;
-use pyo3::exceptions::{PyException, PyMemoryError, PyRuntimeError, PyValueError};
+use pyo3::import_exception;
 use pyo3::prelude::*;
 
-use crate::arrays::number;
+import_exception!(impinge._errors, Budget);
+import_exception!(impinge._errors, Cancelled);
+import_exception!(impinge._errors, DeviceError);
+import_exception!(impinge._errors, InternalError);
+import_exception!(impinge._errors, InvalidError);
+import_exception!(impinge._errors, OutOfMemory);
+import_exception!(impinge._errors, Seam);
+import_exception!(impinge._errors, TooManyPairs);
 
-create_exception!(
-    impinge,
-    Cancelled,
-    PyException,
-    "A detection was stopped by its CancelToken. The detector stays usable."
-);
-
-create_exception!(
-    impinge,
-    TooManyPairs,
-    PyException,
-    "More pairs were found than `max_pairs` allows. The detector stays usable."
-);
-
-create_exception!(
-    impinge,
-    Seam,
-    PyValueError,
-    "Elements of one body touch at the start of a step at vertices that are at one position but not shared. Weld the mesh \
-     (`weld`), or skip pairs that touch at the start."
-);
+/// An argument, or a state of a scene, that no question can be answered with.
+pub fn invalid(message: impl Into<String>) -> PyErr {
+    InvalidError::new_err(message.into())
+}
 
 /// What the arguments of the failing call are called.
 #[derive(Clone, Copy)]
@@ -40,17 +29,16 @@ pub struct Names<'a> {
 
 /// An error of a call that took no arrays.
 pub fn raise(error: Error) -> PyErr {
+    let message = error.to_string();
     match error {
-        Error::MemoryBudget { .. } | Error::OutOfMemory { .. } => {
-            PyMemoryError::new_err(error.to_string())
-        }
-        Error::TooManyPairs { .. } => TooManyPairs::new_err(error.to_string()),
-        Error::Seam { .. } => Seam::new_err(error.to_string()),
+        Error::MemoryBudget { .. } => Budget::new_err(message),
+        Error::OutOfMemory { .. } => OutOfMemory::new_err(message),
+        Error::TooManyPairs { .. } => TooManyPairs::new_err(message),
+        Error::Seam { .. } => Seam::new_err(message),
         Error::Cancelled => Cancelled::new_err("the detection was cancelled"),
-        Error::NoAdapter { .. } | Error::Gpu { .. } | Error::Threads(_) => {
-            PyRuntimeError::new_err(error.to_string())
-        }
-        _ => PyValueError::new_err(error.to_string()),
+        Error::NoAdapter { .. } | Error::Gpu { .. } => DeviceError::new_err(message),
+        Error::Threads(_) => InternalError::new_err(message),
+        _ => InvalidError::new_err(message),
     }
 }
 
@@ -80,5 +68,14 @@ pub fn refuse(error: Error, names: Names<'_>) -> PyErr {
         ),
         _ => return raise(error),
     };
-    PyValueError::new_err(message)
+    invalid(message)
+}
+
+/// A float as Python writes it.
+pub fn number(x: f64) -> String {
+    if x.is_nan() {
+        "nan".into()
+    } else {
+        format!("{x:?}")
+    }
 }

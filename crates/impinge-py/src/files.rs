@@ -4,8 +4,10 @@ use std::path::PathBuf;
 
 use impinge_io::{Elements, Error, NamedMesh, Positions, ReadOptions};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
-use pyo3::exceptions::{PyOSError, PyValueError};
+use pyo3::exceptions::PyOSError;
 use pyo3::prelude::*;
+
+use crate::errors::invalid;
 
 use crate::arrays::{RowKind, positions_array};
 
@@ -14,7 +16,7 @@ use crate::arrays::{RowKind, positions_array};
 pub struct Mesh {
     vertices: Py<PyAny>,
     faces: Py<PyArray2<u32>>,
-    kind: impinge::Kind,
+    kind: impinge::BodyKind,
     name: String,
     n_welded: usize,
 }
@@ -163,7 +165,7 @@ fn refuse(error: Error) -> PyErr {
             PyOSError::new_err((source.raw_os_error(), text, path.into_os_string()))
         }
         Error::Io { .. } => PyOSError::new_err(error.to_string()),
-        error => PyValueError::new_err(error.to_string()),
+        error => invalid(error.to_string()),
     }
 }
 
@@ -174,8 +176,8 @@ fn to_python(py: Python<'_>, body: NamedMesh, file: &str, n_welded: usize) -> Py
         Positions::F64(positions) => positions.into(),
     };
     let (kind, n_columns) = match mesh.elements {
-        Elements::Triangles(_) => (impinge::Kind::Triangles, 3),
-        Elements::Tetrahedra(_) => (impinge::Kind::Tetrahedra, 4),
+        Elements::Triangles(_) => (impinge::BodyKind::Triangles, 3),
+        Elements::Tetrahedra(_) => (impinge::BodyKind::Tetrahedra, 4),
     };
     let indices = PyArray1::from_slice(py, mesh.elements.indices());
     let faces = indices.reshape([mesh.elements.len(), n_columns])?;

@@ -2,11 +2,12 @@
 
 use std::sync::Arc;
 
-use impinge::{PositionRows, Positions, Real};
+use impinge::{Positions, Real};
 use numpy::{Element, PyReadonlyArray2, PyUntypedArray};
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
+
+use crate::errors::invalid;
 
 use crate::arrays::{PositionArray, slice_rows};
 
@@ -39,8 +40,8 @@ pub fn positions(
 ) -> PyResult<Positions> {
     check(argument, name)?;
     match array {
-        PositionArray::F32(array) => Ok(share(argument, array, name)?.into()),
-        PositionArray::F64(array) => Ok(share(argument, array, name)?.into()),
+        PositionArray::F32(array) => share(argument, array, name),
+        PositionArray::F64(array) => share(argument, array, name),
     }
 }
 
@@ -48,14 +49,14 @@ fn share<R: Real + Element>(
     argument: &Bound<'_, PyAny>,
     array: &PyReadonlyArray2<'_, R>,
     name: &str,
-) -> PyResult<PositionRows<R>> {
+) -> PyResult<Positions> {
     if !array.is(argument) {
-        return Err(PyValueError::new_err(format!(
+        return Err(invalid(format!(
             "{name}: not an array that can be read as it is; lend a numpy.ndarray of float32 or float64 in C order, aligned"
         )));
     }
     let rows: &[[R; 3]] = slice_rows(array)?;
-    Ok(PositionRows::shared(Arc::new(Lent {
+    Ok(Positions::shared(Arc::new(Lent {
         _array: argument.clone().unbind(),
         first: rows.as_ptr(),
         n: rows.len(),
@@ -64,7 +65,7 @@ fn share<R: Real + Element>(
 
 /// Refuses an array that can be written, or that is a view of memory that can be.
 fn check(argument: &Bound<'_, PyAny>, name: &str) -> PyResult<()> {
-    let refused = |what: &str| Err(PyValueError::new_err(format!("{name}: {what}")));
+    let refused = |what: &str| Err(invalid(format!("{name}: {what}")));
     let mut owner = argument.clone();
     while let Ok(array) = owner.cast::<PyUntypedArray>() {
         if array.getattr("flags")?.getattr("writeable")?.is_truthy()? {

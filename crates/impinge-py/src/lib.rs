@@ -1,11 +1,11 @@
 //! The Python module `impinge`: the library's scenes, detectors and answers on NumPy arrays.
 //!
-//! What Python users read stands in the docstrings of the classes and in `docs/python.md`. This
-//! crate converts arguments, names what it refuses, and lets go of the interpreter while it works.
+//! What Python users read is written in Python, in the package's own modules, and in `docs/python.md`. This crate converts
+//! arguments, names what it refuses, and lets go of the interpreter while it works.
 
+mod answers;
 mod arrays;
 mod bodies;
-mod columns;
 mod contact;
 mod datasets;
 mod detector;
@@ -16,13 +16,10 @@ mod functions;
 mod lent;
 mod meshes;
 mod near;
-mod proximity;
-mod question;
-mod result;
+mod options;
 mod scene;
 mod settings;
 mod statistics;
-mod steps;
 mod vertex_filter;
 mod watch;
 
@@ -38,6 +35,8 @@ mod _impinge {
     use super::near::{FEATURES, TYPES};
 
     #[pymodule_export]
+    use super::answers::{Advance, Candidates, Impacts, Pairs};
+    #[pymodule_export]
     use super::bodies::Body;
     #[pymodule_export]
     use super::contact::{Contacts, Penetration};
@@ -47,27 +46,19 @@ mod _impinge {
         _tiles_scatter,
     };
     #[pymodule_export]
-    use super::detector::Detector;
+    use super::detector::DetectorBase;
     #[pymodule_export]
-    use super::devices::{Device, devices};
-    #[pymodule_export]
-    use super::errors::{Cancelled, Seam, TooManyPairs};
+    use super::devices::_devices;
     #[pymodule_export]
     use super::files::{Mesh, read, read_bodies};
     #[pymodule_export]
-    use super::functions::{hash_rows, pairs, self_pairs, weld};
+    use super::functions::{_hash_rows, _weld};
     #[pymodule_export]
-    use super::near::NearPairs;
+    use super::near::Near;
     #[pymodule_export]
-    use super::proximity::Nearest;
-    #[pymodule_export]
-    use super::result::Answer;
+    use super::options::_check_options;
     #[pymodule_export]
     use super::scene::Scene;
-    #[pymodule_export]
-    use super::statistics::Statistics;
-    #[pymodule_export]
-    use super::steps::{Advance, Candidates, Impact, Impacts};
     #[pymodule_export]
     use super::vertex_filter::VertexFilter;
     #[pymodule_export]

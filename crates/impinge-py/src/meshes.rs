@@ -1,12 +1,12 @@
 //! Meshes of other libraries as vertices and faces.
 
-use impinge::Kind;
-use pyo3::exceptions::{PyTypeError, PyValueError};
+use impinge::BodyKind;
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::arrays::RowKind;
-use crate::errors::Names;
+use crate::errors::{Names, invalid};
 use crate::files::Mesh;
 
 /// What `Scene.add` takes from a mesh.
@@ -61,11 +61,11 @@ pub fn parts<'py>(mesh: &Bound<'py, PyAny>, kind: Option<RowKind>) -> PyResult<P
 
 /// The cells of meshio that are taken.
 const CELLS: [(&str, RowKind); 5] = [
-    ("triangle", RowKind::Of(Kind::Triangles)),
-    ("tetra", RowKind::Of(Kind::Tetrahedra)),
+    ("triangle", RowKind::Of(BodyKind::Triangles)),
+    ("tetra", RowKind::Of(BodyKind::Tetrahedra)),
     ("quad", RowKind::Quads),
-    ("line", RowKind::Of(Kind::Edges)),
-    ("vertex", RowKind::Of(Kind::Points)),
+    ("line", RowKind::Of(BodyKind::Edges)),
+    ("vertex", RowKind::Of(BodyKind::Points)),
 ];
 
 fn cell_type(
@@ -88,11 +88,11 @@ fn cell_type(
     }
     let unknown = names.iter().any(|name| known(name).is_none());
     match (&found[..], unknown) {
-        ([("quad", _)], false) => Err(PyValueError::new_err(
+        ([("quad", _)], false) => Err(invalid(
             "mesh.cells: quads, which are no triangles: say kind=\"quads\" to cut each into two",
         )),
         ([one], false) => Ok(*one),
-        _ => Err(PyValueError::new_err(format!(
+        _ => Err(invalid(format!(
             "mesh.cells: {} given, one of triangle and tetra expected: say which by kind=",
             if names.is_empty() {
                 "none".to_owned()
@@ -109,7 +109,7 @@ fn types(cells: &Bound<'_, PyDict>) -> Vec<String> {
 }
 
 fn nothing(cells: &Bound<'_, PyDict>, name: &str) -> PyErr {
-    PyValueError::new_err(format!(
+    invalid(format!(
         "mesh.cells: {name} expected, {} given",
         types(cells).join(", ")
     ))

@@ -1,35 +1,25 @@
 //! `impinge.Scene`: bodies, their topology and positions.
 
-use impinge::{BodyId, Elements, Filter, Kind, Positions, Real, Weld};
+use impinge::{BodyId, BodyKind, Elements, Filter, Positions, Real, Weld};
 use numpy::{PyArray1, PyArrayMethods};
-use pyo3::exceptions::{PyRuntimeError, PyValueError};
+use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyList, PyTuple};
 
 use crate::arrays::{self, PositionArray, RowKind, positions_array, slice_rows};
 use crate::bodies::{Body, body_id, new_scene_number};
-use crate::errors::{Names, raise, refuse};
+use crate::errors::{Names, invalid, raise, refuse};
 use crate::lent;
 use crate::meshes;
-use crate::settings::{self, Argument, unsigned};
+use crate::settings::{self, Argument, number, unsigned};
 
 const ARGUMENTS: Names<'static> = Names {
     vertices: "vertices",
     elements: "faces",
 };
 
-/// Bodies with fixed topology, and where their vertices are now.
-///
-/// Examples
-/// --------
-/// >>> import numpy as np, impinge
-/// >>> corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)
-/// >>> scene = impinge.Scene()
-/// >>> a = scene.add(corners, [[0, 1, 2]])
-/// >>> b = scene.add(corners[:, [0, 2, 1]] + [0, 0.25, -0.25], [[0, 1, 2]])
-/// >>> impinge.Detector().detect(scene, between=(a, b)).pairs()
-/// array([[0, 0]], dtype=uint32)
-#[pyclass(module = "impinge")]
+/// What `impinge.Scene` is made of.
+#[pyclass(module = "impinge._impinge", name = "SceneBase", subclass)]
 pub struct Scene {
     pub inner: impinge::Scene,
     pub number: u64,
@@ -97,7 +87,7 @@ impl Scene {
             stored(&positions)?
         };
         self.inner
-            .add(elements, held)
+            .add((elements, held))
             .map_err(|error| refuse(error, names))
     }
 }
@@ -134,6 +124,18 @@ fn stored(positions: &PositionArray<'_>) -> PyResult<Positions> {
     })
 }
 
+/// Elements as an array of vertex indices.
+fn of_elements<'py>(py: Python<'py>, elements: &Elements) -> PyResult<Bound<'py, PyAny>> {
+    let (flat, n_columns) = match elements {
+        Elements::Points(points) => (points.as_flattened(), 1),
+        Elements::Edges(edges) => (edges.as_flattened(), 2),
+        Elements::Triangles(faces) => (faces.as_flattened(), 3),
+        Elements::Tetrahedra(tets) => (tets.as_flattened(), 4),
+    };
+    let shape = [elements.len(), n_columns];
+    Ok(PyArray1::from_slice(py, flat).reshape(shape)?.into_any())
+}
+
 /// How deep two convex bodies overlap, which way, and where.
 type Overlap = (f64, [f64; 3], [f64; 3]);
 
@@ -151,38 +153,7 @@ impl Scene {
         Scene::empty()
     }
 
-    /// Adds a body of triangles or tetrahedra. The arrays are copied.
-    ///
-    /// Parameters
-    /// ----------
-    /// vertices : array_like, shape (v, 3), or a mesh
-    ///     Positions. float32 and float64 are taken as they are and answered exactly; other
-    ///     dtypes are converted where that loses nothing. Or, without `faces`, an object with ``vertices`` and
-    ///     ``faces`` (trimesh and many others) or ``triangles`` (Open3D), or with ``points`` and ``cells_dict``
-    ///     (meshio).
-    /// faces : array_like of int, shape (n, 3) or (n, 4), optional
-    ///     Vertex indices: three per triangle, four per tetrahedron. Orientation does not matter.
-    /// kind : {"points", "edges", "triangles", "tetrahedra", "quads"}, optional
-    ///     What the rows of `faces` are. ``"quads"`` cuts row ``i`` into the triangles ``2 * i`` and ``2 * i + 1``,
-    ///     along the diagonal from its first corner. By default three columns are triangles, and four are
-    ///     tetrahedra if two rows share exactly three vertices, as neighbours in a mesh of tetrahedra do and quads do
-    ///     not; else four columns are refused.
-    ///
-    /// Returns
-    /// -------
-    /// Body
-    ///     The handle by which the body is named from now on.
-    ///
-    /// Raises
-    /// ------
-    /// ValueError
-    ///     A wrong shape, an index out of range, a position that is not finite or outside the
-    ///     range in which answers are exact, a number that a conversion would change, rows of four that may be quads,
-    ///     a mesh with cells of several kinds.
-    /// TypeError
-    ///     An array that holds no real numbers, an object that is no mesh.
-    #[pyo3(signature = (vertices, faces=None, kind=None))]
-    fn add(
+    fn _add(
         slf: &Bound<'_, Self>,
         vertices: &Bound<'_, PyAny>,
         faces: Argument<'_, '_>,
@@ -199,40 +170,25 @@ impl Scene {
         Ok(slf.try_borrow()?.handle(id))
     }
 
-    /// Adds many bodies in one call: all of them, or none. The arrays are copied.
-    ///
-    /// Parameters
-    /// ----------
-    /// vertices : array_like, shape (v, 3)
-    ///     The positions of all bodies, one after the other.
-    /// faces : array_like of int, shape (n, 3) or (n, 4)
-    ///     The elements of all bodies, one after the other. Each names the vertices of its own body, from 0.
-    /// vertex_offsets, face_offsets : array_like of int, shape (m + 1,)
-    ///     Body ``i`` of ``m`` has the rows ``offsets[i]`` to ``offsets[i + 1]``: they begin with 0, never fall, and end
-    ///     with the number of rows.
-    /// kind : str, optional
-    ///     As for `add`, but for ``"quads"``, which is refused.
-    ///
-    /// Returns
-    /// -------
-    /// list of Body
-    ///
-    /// Raises
-    /// ------
-    /// ValueError, TypeError
-    ///     As `add`; the scene is unchanged then. Bodies are named by the number that they would have had.
-    ///
-    /// Examples
-    /// --------
-    /// >>> import numpy as np, impinge
-    /// >>> corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)
-    /// >>> scene = impinge.Scene()
-    /// >>> parts = scene.add_many(np.tile(corners, (1000, 1)), [[0, 1, 2]] * 1000,
-    /// ...                        np.arange(1001) * 3, np.arange(1001))
-    /// >>> len(parts), parts[999]
-    /// (1000, Body(999))
-    #[pyo3(signature = (vertices, faces, vertex_offsets, face_offsets, kind=None))]
-    fn add_many(
+    /// For functions whose arguments have other names; with `weld`, vertices at the same position become one.
+    fn _add_named(
+        slf: &Bound<'_, Self>,
+        vertices: &Bound<'_, PyAny>,
+        elements: &Bound<'_, PyAny>,
+        kind: Argument<'_, '_>,
+        names: (String, String),
+        weld: bool,
+    ) -> PyResult<()> {
+        let names = Names {
+            vertices: &names.0,
+            elements: &names.1,
+        };
+        let kind = settings::kind(kind)?;
+        change(slf)?.add_welded(vertices, elements, kind, names, weld)?;
+        Ok(())
+    }
+
+    fn _add_many(
         slf: &Bound<'_, Self>,
         vertices: &Bound<'_, PyAny>,
         faces: &Bound<'_, PyAny>,
@@ -242,7 +198,7 @@ impl Scene {
     ) -> PyResult<Vec<Body>> {
         let kind = settings::kind(kind)?;
         if kind == Some(RowKind::Quads) {
-            return Err(PyValueError::new_err(
+            return Err(invalid(
                 "kind: \"quads\" given, which would move the offsets; cut them into triangles first",
             ));
         }
@@ -267,30 +223,13 @@ impl Scene {
                 setting: "element_offsets",
                 given,
                 allowed,
-            } => PyValueError::new_err(format!("face_offsets: {given} given, {allowed} allowed")),
+            } => invalid(format!("face_offsets: {given} given, {allowed} allowed")),
             error => raise(error),
         })?;
         Ok(ids.into_iter().map(|id| scene.handle(id)).collect())
     }
 
-    /// Adds a body of edges, such as strands of hair. The arrays are copied.
-    ///
-    /// Parameters
-    /// ----------
-    /// vertices : array_like, shape (v, 3)
-    ///     As for `add`.
-    /// edges : array_like of int, shape (n, 2)
-    ///     Vertex indices.
-    ///
-    /// Returns
-    /// -------
-    /// Body
-    ///
-    /// Raises
-    /// ------
-    /// ValueError, TypeError
-    ///     As `add`.
-    fn add_edges(
+    fn _add_edges(
         slf: &Bound<'_, Self>,
         vertices: &Bound<'_, PyAny>,
         edges: &Bound<'_, PyAny>,
@@ -300,26 +239,11 @@ impl Scene {
             elements: "edges",
         };
         let mut scene = change(slf)?;
-        let id = scene.add_named(vertices, edges, Some(RowKind::Of(Kind::Edges)), names)?;
+        let id = scene.add_named(vertices, edges, Some(RowKind::Of(BodyKind::Edges)), names)?;
         Ok(scene.handle(id))
     }
 
-    /// Adds a body of points, one per row. The array is copied.
-    ///
-    /// Parameters
-    /// ----------
-    /// vertices : array_like, shape (v, 3)
-    ///     As for `add`.
-    ///
-    /// Returns
-    /// -------
-    /// Body
-    ///
-    /// Raises
-    /// ------
-    /// ValueError, TypeError
-    ///     As `add`.
-    fn add_points(slf: &Bound<'_, Self>, vertices: &Bound<'_, PyAny>) -> PyResult<Body> {
+    fn _add_points(slf: &Bound<'_, Self>, vertices: &Bound<'_, PyAny>) -> PyResult<Body> {
         let mut scene = change(slf)?;
         let positions = PositionArray::new(vertices, "vertices")?;
         let id = match &positions {
@@ -330,160 +254,52 @@ impl Scene {
         Ok(scene.handle(id))
     }
 
-    /// Moves the vertices of a body. The array is copied; the precision may change. A new step starts: the
-    /// body has no end positions until they are set.
-    ///
-    /// Parameters
-    /// ----------
-    /// body : Body or int
-    /// vertices : array_like, shape (v, 3)
-    ///     As many positions as the body has vertices.
-    ///
-    /// Raises
-    /// ------
-    /// ValueError, TypeError
-    ///     As `add`; the body keeps its old positions then.
-    fn set_positions(
+    /// With `copy`, the array may change afterwards; without, it is read where it lies.
+    fn _set_positions(
         slf: &Bound<'_, Self>,
         body: &Bound<'_, PyAny>,
         vertices: &Bound<'_, PyAny>,
-    ) -> PyResult<()> {
-        let mut scene = change(slf)?;
-        let id = scene.id(body, "body")?;
-        let positions = PositionArray::new(vertices, "vertices")?;
-        match &positions {
-            PositionArray::F32(array) => scene.inner.set_positions::<f32>(id, slice_rows(array)?),
-            PositionArray::F64(array) => scene.inner.set_positions::<f64>(id, slice_rows(array)?),
-        }
-        .map_err(|error| refuse(error, ARGUMENTS))
-    }
-
-    /// Moves the vertices of a body to those of a read-only array, which is neither copied nor let go of: the scene
-    /// reads it where it lies until the body gets other positions or is removed, or the scene is gone. As `set_positions` otherwise;
-    /// the positions are checked now.
-    ///
-    /// The array must not change while it is lent. Arrays that can be written, and views of such, are refused. That
-    /// is all that can be checked: whoever writes to the memory in another way, through a view made before or by making the
-    /// array writeable again, gets answers about no one pose, and may read torn numbers.
-    ///
-    /// Parameters
-    /// ----------
-    /// body : Body or int
-    /// vertices : numpy.ndarray of float32 or float64, shape (v, 3)
-    ///     In C order, with ``vertices.flags.writeable`` False, and so for the array that it is a view of.
-    ///
-    /// Raises
-    /// ------
-    /// ValueError, TypeError
-    ///     As `add`; an array that can be written or would have to be copied. The body keeps its old positions then.
-    ///
-    /// Examples
-    /// --------
-    /// >>> import numpy as np, impinge
-    /// >>> scene = impinge.Scene()
-    /// >>> corners = np.eye(3, dtype=np.float32)
-    /// >>> body = scene.add(corners, [[0, 1, 2]])
-    /// >>> frame = corners + np.float32(1)
-    /// >>> frame.flags.writeable = False
-    /// >>> scene.lend_positions(body, frame)
-    /// >>> scene.positions(body)[0].tolist()
-    /// [2.0, 1.0, 1.0]
-    fn lend_positions(
-        slf: &Bound<'_, Self>,
-        body: &Bound<'_, PyAny>,
-        vertices: &Bound<'_, PyAny>,
-    ) -> PyResult<()> {
-        let mut scene = change(slf)?;
-        let id = scene.id(body, "body")?;
-        let positions = PositionArray::new(vertices, "vertices")?;
-        let lent = lent::positions(vertices, &positions, "vertices")?;
-        let lending = scene.inner.lend_positions(id, lent);
-        lending.map_err(|error| refuse(error, ARGUMENTS))
-    }
-
-    /// Says where the vertices of a body are at the end of a step, as `set_end_positions` does, by a read-only array that
-    /// is not copied, as for `lend_positions`. Where start and end come in different precisions, the single one is copied.
-    ///
-    /// Parameters
-    /// ----------
-    /// body : Body or int
-    /// vertices : numpy.ndarray of float32 or float64, shape (v, 3)
-    ///     As for `lend_positions`.
-    ///
-    /// Raises
-    /// ------
-    /// ValueError, TypeError
-    ///     As `lend_positions`; the body keeps its old end positions then.
-    fn lend_end_positions(
-        slf: &Bound<'_, Self>,
-        body: &Bound<'_, PyAny>,
-        vertices: &Bound<'_, PyAny>,
-    ) -> PyResult<()> {
-        let mut scene = change(slf)?;
-        let id = scene.id(body, "body")?;
-        let positions = PositionArray::new(vertices, "vertices")?;
-        let lent = lent::positions(vertices, &positions, "vertices")?;
-        let lending = scene.inner.lend_end_positions(id, lent);
-        lending.map_err(|error| refuse(error, ARGUMENTS))
-    }
-
-    /// Says where the vertices of a body are at the end of a step: between its positions and these, each moves
-    /// on a straight line at constant speed. They hold until the next `set_positions`, `remesh` or
-    /// `clear_end_positions`. A body without end positions stands still.
-    ///
-    /// Where start and end come in different precisions, the single one is widened, which is exact.
-    ///
-    /// Parameters
-    /// ----------
-    /// body : Body or int
-    /// vertices : array_like, shape (v, 3)
-    ///     As many positions as the body has vertices. The array is copied.
-    ///
-    /// Raises
-    /// ------
-    /// ValueError, TypeError
-    ///     As `add`; the body keeps its old end positions then.
-    fn set_end_positions(
-        slf: &Bound<'_, Self>,
-        body: &Bound<'_, PyAny>,
-        vertices: &Bound<'_, PyAny>,
+        copy: bool,
     ) -> PyResult<()> {
         let mut scene = change(slf)?;
         let id = scene.id(body, "body")?;
         let positions = PositionArray::new(vertices, "vertices")?;
         let inner = &mut scene.inner;
         match &positions {
-            PositionArray::F32(array) => inner.set_end_positions::<f32>(id, slice_rows(array)?),
-            PositionArray::F64(array) => inner.set_end_positions::<f64>(id, slice_rows(array)?),
+            _ if !copy => {
+                inner.set_positions(id, lent::positions(vertices, &positions, "vertices")?)
+            }
+            PositionArray::F32(array) => inner.set_positions(id, slice_rows::<f32, 3>(array)?),
+            PositionArray::F64(array) => inner.set_positions(id, slice_rows::<f64, 3>(array)?),
         }
         .map_err(|error| refuse(error, ARGUMENTS))
     }
 
-    /// Forgets where a body is at the end of a step: it stands still.
-    ///
-    /// Parameters
-    /// ----------
-    /// body : Body or int
-    fn clear_end_positions(slf: &Bound<'_, Self>, body: &Bound<'_, PyAny>) -> PyResult<()> {
+    /// As `_set_positions`; `None` forgets them.
+    fn _set_end_positions(
+        slf: &Bound<'_, Self>,
+        body: &Bound<'_, PyAny>,
+        vertices: Argument<'_, '_>,
+        copy: bool,
+    ) -> PyResult<()> {
         let mut scene = change(slf)?;
         let id = scene.id(body, "body")?;
-        scene.inner.clear_end_positions(id).map_err(raise)
+        let inner = &mut scene.inner;
+        let Some(vertices) = vertices else {
+            return inner.clear_end_positions(id).map_err(raise);
+        };
+        let positions = PositionArray::new(vertices, "vertices")?;
+        match &positions {
+            _ if !copy => {
+                inner.set_end_positions(id, lent::positions(vertices, &positions, "vertices")?)
+            }
+            PositionArray::F32(array) => inner.set_end_positions(id, slice_rows::<f32, 3>(array)?),
+            PositionArray::F64(array) => inner.set_end_positions(id, slice_rows::<f64, 3>(array)?),
+        }
+        .map_err(|error| refuse(error, ARGUMENTS))
     }
 
-    /// Gives a body new topology and positions under its old handle.
-    ///
-    /// Parameters
-    /// ----------
-    /// body : Body or int
-    /// vertices, faces, kind
-    ///     As in `add`.
-    ///
-    /// Raises
-    /// ------
-    /// ValueError, TypeError
-    ///     As `add`; the body is unchanged then.
-    #[pyo3(signature = (body, vertices, faces, kind=None))]
-    fn remesh(
+    fn _remesh(
         slf: &Bound<'_, Self>,
         body: &Bound<'_, PyAny>,
         vertices: &Bound<'_, PyAny>,
@@ -497,41 +313,11 @@ impl Scene {
         let elements = arrays::elements(faces, ARGUMENTS.elements, kind, positions.len())?;
         scene
             .inner
-            .remesh(id, elements, stored(&positions)?)
+            .remesh(id, (elements, stored(&positions)?))
             .map_err(|error| refuse(error, ARGUMENTS))
     }
 
-    /// Moves a body by an affine matrix, such as a rigid motion, without its vertices being given again.
-    ///
-    /// The body moves from its rest positions, which are those that were given last (`add`, `set_positions`, `remesh`);
-    /// a second transform replaces the first. Answers are exact as if the moved vertices had been given, and these are
-    /// rounded in one way: row ``a, b, c, d`` of the matrix takes ``(x, y, z)`` to ``((a*x + b*y) + c*z) + d``, each
-    /// product and each sum rounded to float64 in this order, the last sum rounded once more to the dtype of the
-    /// rest positions. End positions are forgotten.
-    ///
-    /// Parameters
-    /// ----------
-    /// body : Body or int
-    /// matrix : array_like, shape (4, 4)
-    ///     In float64. The last row is ``0, 0, 0, 1``.
-    ///
-    /// Raises
-    /// ------
-    /// ValueError, TypeError
-    ///     A matrix of another shape, not finite, or not affine; a moved position that is refused. The body is
-    ///     unchanged then.
-    ///
-    /// Examples
-    /// --------
-    /// >>> import numpy as np, impinge
-    /// >>> scene = impinge.Scene()
-    /// >>> body = scene.add(np.eye(3, dtype=np.float32), [[0, 1, 2]])
-    /// >>> up = np.eye(4)
-    /// >>> up[2, 3] = 0.5
-    /// >>> scene.set_transform(body, up)
-    /// >>> scene.positions(body)[2].tolist(), scene.rest_positions(body)[2].tolist()
-    /// ([0.0, 0.0, 1.5], [0.0, 0.0, 1.0])
-    fn set_transform(
+    fn _set_transform(
         slf: &Bound<'_, Self>,
         body: &Bound<'_, PyAny>,
         matrix: &Bound<'_, PyAny>,
@@ -544,19 +330,13 @@ impl Scene {
             .set_transform(id, &matrix)
             .map_err(|error| match error {
                 impinge::Error::Setting { given, allowed, .. } => {
-                    PyValueError::new_err(format!("matrix: {given} given, {allowed} allowed"))
+                    invalid(format!("matrix: {given} given, {allowed} allowed"))
                 }
                 error => raise(error),
             })
     }
 
-    /// How a body was moved by `set_transform`.
-    ///
-    /// Returns
-    /// -------
-    /// numpy.ndarray of float64, shape (4, 4), or None
-    ///     ``None`` for a body that was not, or whose positions were given since.
-    fn transform<'py>(
+    fn _transform<'py>(
         &self,
         py: Python<'py>,
         body: &Bound<'py, PyAny>,
@@ -567,13 +347,7 @@ impl Scene {
             .transpose()
     }
 
-    /// The positions that were given last, before any transform.
-    ///
-    /// Returns
-    /// -------
-    /// numpy.ndarray, shape (v, 3), float32 or float64
-    ///     A copy.
-    fn rest_positions<'py>(
+    fn _rest_positions<'py>(
         &self,
         py: Python<'py>,
         body: &Bound<'py, PyAny>,
@@ -581,30 +355,13 @@ impl Scene {
         positions_array(py, self.body(body)?.rest_positions())
     }
 
-    /// Removes a body. Its handle is refused from now on; its number may be used again.
-    ///
-    /// Parameters
-    /// ----------
-    /// body : Body or int
-    fn remove(slf: &Bound<'_, Self>, body: &Bound<'_, PyAny>) -> PyResult<()> {
+    fn _remove(slf: &Bound<'_, Self>, body: &Bound<'_, PyAny>) -> PyResult<()> {
         let mut scene = change(slf)?;
         let id = scene.id(body, "body")?;
         scene.inner.remove(id).map_err(raise)
     }
 
-    /// Sets who a body meets when a question is about all bodies.
-    ///
-    /// Two bodies meet when each one's `category` shares a bit with the other one's `mask`.
-    ///
-    /// Parameters
-    /// ----------
-    /// body : Body or int
-    /// category : int, 64 bits
-    ///     The groups to which the body belongs.
-    /// mask : int, 64 bits
-    ///     The groups that it meets; all of them by default.
-    #[pyo3(signature = (body, category=None, mask=None))]
-    fn set_filter(
+    fn _set_filter(
         slf: &Bound<'_, Self>,
         body: &Bound<'_, PyAny>,
         category: Argument<'_, '_>,
@@ -622,13 +379,18 @@ impl Scene {
         scene.inner.set_filter(id, filter).map_err(raise)
     }
 
-    /// The current positions of a body.
-    ///
-    /// Returns
-    /// -------
-    /// numpy.ndarray, shape (v, 3), float32 or float64
-    ///     A copy, in the precision in which they were given.
-    fn positions<'py>(
+    fn _set_thickness(
+        slf: &Bound<'_, Self>,
+        body: &Bound<'_, PyAny>,
+        thickness: &Bound<'_, PyAny>,
+    ) -> PyResult<()> {
+        let mut scene = change(slf)?;
+        let id = scene.id(body, "body")?;
+        let thickness = number(thickness, "thickness")?;
+        scene.inner.set_thickness(id, thickness).map_err(raise)
+    }
+
+    fn _positions<'py>(
         &self,
         py: Python<'py>,
         body: &Bound<'py, PyAny>,
@@ -636,13 +398,7 @@ impl Scene {
         positions_array(py, self.body(body)?.positions())
     }
 
-    /// The end positions of a body.
-    ///
-    /// Returns
-    /// -------
-    /// numpy.ndarray, shape (v, 3), float32 or float64, or None
-    ///     A copy; ``None`` for a body that stands still.
-    fn end_positions<'py>(
+    fn _end_positions<'py>(
         &self,
         py: Python<'py>,
         body: &Bound<'py, PyAny>,
@@ -651,51 +407,38 @@ impl Scene {
         end.map(|end| positions_array(py, end)).transpose()
     }
 
-    /// The elements of a body as vertex indices.
-    ///
-    /// Parameters
-    /// ----------
-    /// body : Body or int
-    /// part : {"given", "vertices", "edges", "faces"}
-    ///     Those that it was given as, or its vertices, edges or faces, as `Impacts.elements` numbers the last
-    ///     two. Edges are the unique pairs (low, high) of vertices in the order of (high, low), as
-    ///     ``igl.edges`` has them; of tetrahedra the surface counts. ``"vertices"`` are those that some element
-    ///     names; impacts number vertices as positions are.
-    ///
-    /// Returns
-    /// -------
-    /// numpy.ndarray of uint32, shape (n, 1), (n, 2), (n, 3) or (n, 4)
-    ///     A copy.
-    #[pyo3(signature = (body, part=None), text_signature = "($self, body, part=\"given\")")]
-    fn elements<'py>(
+    fn _elements<'py>(
         &self,
         py: Python<'py>,
         body: &Bound<'py, PyAny>,
-        part: Argument<'py, 'py>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let elements = self.body(body)?.part(settings::part(part)?);
-        let (flat, n_columns) = match elements {
-            Elements::Points(points) => (points.as_flattened(), 1),
-            Elements::Edges(edges) => (edges.as_flattened(), 2),
-            Elements::Triangles(faces) => (faces.as_flattened(), 3),
-            Elements::Tetrahedra(tets) => (tets.as_flattened(), 4),
-        };
-        let shape = [elements.len(), n_columns];
-        Ok(PyArray1::from_slice(py, flat).reshape(shape)?.into_any())
+        of_elements(py, self.body(body)?.elements())
     }
 
-    /// ``"points"``, ``"edges"``, ``"triangles"`` or ``"tetrahedra"``: what a body is made of.
-    fn kind(&self, body: &Bound<'_, PyAny>) -> PyResult<&'static str> {
+    fn _edges<'py>(
+        &self,
+        py: Python<'py>,
+        body: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        of_elements(py, self.body(body)?.edges())
+    }
+
+    fn _faces<'py>(
+        &self,
+        py: Python<'py>,
+        body: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        of_elements(py, self.body(body)?.faces())
+    }
+
+    fn _kind(&self, body: &Bound<'_, PyAny>) -> PyResult<&'static str> {
         Ok(self.body(body)?.kind().name())
     }
 
-    /// How many primitives a body has.
-    fn n_primitives(&self, body: &Bound<'_, PyAny>) -> PyResult<usize> {
+    fn _n_elements(&self, body: &Bound<'_, PyAny>) -> PyResult<usize> {
         Ok(self.body(body)?.n_primitives())
     }
 
-    /// The shortest way that takes two convex bodies apart, for `CollisionManager`: its length, its direction for the second body,
-    /// and the position of the vertex of the first that is farthest along it. ``None`` where they are flat.
     fn _convex_overlap(
         &self,
         py: Python<'_>,
@@ -713,20 +456,15 @@ impl Scene {
         }))
     }
 
-    /// How many vertices a body has.
-    fn n_vertices(&self, body: &Bound<'_, PyAny>) -> PyResult<usize> {
+    fn _n_vertices(&self, body: &Bound<'_, PyAny>) -> PyResult<usize> {
         Ok(self.body(body)?.n_vertices())
     }
 
-    /// list of Body : the bodies in the order of their numbers.
-    #[getter]
-    fn bodies(&self) -> Vec<Body> {
+    fn _bodies(&self) -> Vec<Body> {
         self.inner.bodies().map(|(id, _)| self.handle(id)).collect()
     }
 
-    /// int : bytes held for topology and positions.
-    #[getter]
-    fn nbytes(&self) -> usize {
+    fn _nbytes(&self) -> usize {
         self.inner.bytes()
     }
 
@@ -746,7 +484,7 @@ impl Scene {
             let each = counts.map(|(id, n, kind)| format!("{id}: {n} {kind}"));
             return format!("Scene({})", each.collect::<Vec<_>>().join(", "));
         }
-        let mut totals = Kind::ALL.map(|kind| (kind.name(), 0));
+        let mut totals = BodyKind::ALL.map(|kind| (kind.name(), 0));
         for (_, n, kind) in counts {
             for total in totals.iter_mut().filter(|total| total.0 == kind) {
                 total.1 += n;
@@ -761,8 +499,6 @@ impl Scene {
         )
     }
 
-    /// Pickles, and copies, hold all bodies under their numbers. Handles of the bodies are those of the scene that they
-    /// came from.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
         let py = slf.py();
         let scene = slf.try_borrow()?;
@@ -774,11 +510,12 @@ impl Scene {
                 id.index(),
                 body.kind().name(),
                 positions_array(py, body.rest_positions())?,
-                scene.elements(py, &number, None)?,
-                scene.transform(py, &number)?,
-                scene.end_positions(py, &number)?,
+                scene._elements(py, &number)?,
+                scene._transform(py, &number)?,
+                scene._end_positions(py, &number)?,
                 filter.category,
                 filter.mask,
+                body.thickness(),
             ))?;
         }
         (slf.get_type(), (), bodies).into_pyobject(py)
@@ -805,12 +542,12 @@ impl Scene {
             }
             if !end.is_none() {
                 match PositionArray::new(&end, "vertices")? {
-                    PositionArray::F32(end) => {
-                        scene.inner.set_end_positions::<f32>(id, slice_rows(&end)?)
-                    }
-                    PositionArray::F64(end) => {
-                        scene.inner.set_end_positions::<f64>(id, slice_rows(&end)?)
-                    }
+                    PositionArray::F32(end) => scene
+                        .inner
+                        .set_end_positions(id, slice_rows::<f32, 3>(&end)?),
+                    PositionArray::F64(end) => scene
+                        .inner
+                        .set_end_positions(id, slice_rows::<f64, 3>(&end)?),
                 }
                 .map_err(raise)?;
             }
@@ -819,6 +556,8 @@ impl Scene {
                 mask: item(7)?.extract()?,
             };
             scene.inner.set_filter(id, filter).map_err(raise)?;
+            let thickness = item(8)?.extract()?;
+            scene.inner.set_thickness(id, thickness).map_err(raise)?;
         }
         for id in gaps.into_iter().rev() {
             scene.inner.remove(id).map_err(raise)?;

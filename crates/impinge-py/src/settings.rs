@@ -1,29 +1,15 @@
 //! Keyword arguments as the library's settings.
 
-use impinge::{
-    Backend, InstructionSet, Kind, Method, Part, Placement, Recluster, Settings, SharedVertex,
-    Start, Toi,
-};
-use pyo3::exceptions::{PyTypeError, PyValueError};
+use impinge::{Affinity, Backend, BodyKind, InstructionSet, Method, Recluster, Settings};
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
-use pyo3::types::PyBool;
+use pyo3::types::{PyBool, PyDict};
 
 use crate::arrays::RowKind;
+use crate::errors::invalid;
 
 /// An argument of Python's side that may be left out.
 pub type Argument<'a, 'py> = Option<&'a Bound<'py, PyAny>>;
-
-/// Picks the value that goes with a name, or lists the names. Without an argument, the default.
-fn choose<T: Copy + Default>(
-    argument: Argument<'_, '_>,
-    name: &str,
-    choices: &[(&str, T)],
-) -> PyResult<T> {
-    match argument {
-        Some(argument) => choose_one(argument, name, choices),
-        None => Ok(T::default()),
-    }
-}
 
 /// Picks the value that goes with a name, or lists the names.
 pub fn choose_one<T: Copy>(
@@ -39,7 +25,7 @@ pub fn choose_one<T: Copy>(
         .iter()
         .map(|(choice, _)| format!("{choice:?}"))
         .collect();
-    Err(PyValueError::new_err(format!(
+    Err(invalid(format!(
         "{name}: {given:?} given, {} allowed",
         choices.join(", ")
     )))
@@ -61,9 +47,19 @@ pub fn unexpected(argument: &Bound<'_, PyAny>, name: &str, expected: &str) -> Py
     }
 }
 
+/// A number; the library refuses those that are out of range.
+pub fn number(value: &Bound<'_, PyAny>, name: &str) -> PyResult<f64> {
+    value.extract().map_err(
+        |error: PyErr| match error.is_instance_of::<PyTypeError>(value.py()) {
+            true => unexpected(value, name, "a number"),
+            false => error,
+        },
+    )
+}
+
 /// What the rows of an index array are; `None` leaves it to their length.
 pub fn kind(argument: Argument<'_, '_>) -> PyResult<Option<RowKind>> {
-    let mut kinds = Kind::ALL
+    let mut kinds = BodyKind::ALL
         .map(|kind| (kind.name(), Some(RowKind::Of(kind))))
         .to_vec();
     kinds.push(("quads", Some(RowKind::Quads)));
@@ -71,47 +67,6 @@ pub fn kind(argument: Argument<'_, '_>) -> PyResult<Option<RowKind>> {
         Some(argument) => choose_one(argument, "kind", &kinds),
         None => Ok(None),
     }
-}
-
-/// What becomes of primitives that share a vertex.
-pub fn shared_vertex(argument: Argument<'_, '_>) -> PyResult<SharedVertex> {
-    choose(
-        argument,
-        "shared_vertex",
-        &[
-            ("skip", SharedVertex::Skip),
-            ("resolve", SharedVertex::Resolve),
-        ],
-    )
-}
-
-/// What becomes of pairs that touch at the start of a step.
-pub fn start(argument: Argument<'_, '_>) -> PyResult<Start> {
-    let choices = [
-        ("report", Start::Report),
-        ("skip", Start::Skip),
-        ("verify", Start::Verify),
-    ];
-    choose(argument, "start", &choices)
-}
-
-/// To which precision times are rounded down.
-pub fn toi(argument: Argument<'_, '_>) -> PyResult<Toi> {
-    choose(argument, "toi", &[("f32", Toi::F32), ("f64", Toi::F64)])
-}
-
-/// Which elements of a body.
-pub fn part(argument: Argument<'_, '_>) -> PyResult<Part> {
-    let Some(argument) = argument else {
-        return Ok(Part::Given);
-    };
-    let choices = [
-        ("given", Part::Given),
-        ("vertices", Part::Vertices),
-        ("edges", Part::Edges),
-        ("faces", Part::Faces),
-    ];
-    choose_one(argument, "part", &choices)
 }
 
 /// A whole number from 0 to `most`.
@@ -126,105 +81,72 @@ pub fn unsigned(argument: &Bound<'_, PyAny>, name: &str, most: u64) -> PyResult<
     };
     match integer.extract::<u64>() {
         Ok(number) if number <= most => Ok(number),
-        _ => Err(PyValueError::new_err(format!(
+        _ => Err(invalid(format!(
             "{name}: {} given, 0 to {most} allowed",
             integer.str()?
         ))),
     }
 }
 
-const BACKENDS: [(&str, Backend); 3] = [
-    ("auto", Backend::Auto),
-    ("cpu", Backend::Cpu),
-    ("gpu", Backend::Gpu),
-];
-const PLACEMENTS: [(&str, Placement); 2] = [
-    ("auto", Placement::Auto),
-    ("inherited", Placement::Inherited),
-];
-const RECLUSTER: [(&str, Recluster); 2] = [("auto", Recluster::Auto), ("never", Recluster::Never)];
-const INSTRUCTION_SETS: [(&str, InstructionSet); 3] = [
-    ("portable", InstructionSet::Portable),
-    ("avx2", InstructionSet::Avx2),
-    ("avx512", InstructionSet::Avx512),
+/// Whether pairs of different bodies count, and those of one body.
+pub const WHICH: [(&str, [bool; 2]); 3] = [
+    ("all", [true, true]),
+    ("between", [true, false]),
+    ("self", [false, true]),
 ];
 
-/// The name by which a value is chosen.
-fn name_of<T: PartialEq>(value: T, choices: &[(&'static str, T)]) -> Option<&'static str> {
-    let found = choices.iter().find(|(_, choice)| *choice == value);
-    found.map(|(name, _)| *name)
+/// The words of a choice of the library, for [`choose_one`].
+macro_rules! words {
+    ($choice:ty) => {
+        &<$choice>::ALL.map(|one| (one.name(), one))
+    };
 }
+pub(crate) use words;
 
-/// The name of a backend.
-pub fn backend_name(backend: Backend) -> Option<&'static str> {
-    name_of(backend, &BACKENDS)
-}
-
-/// The name of a placement of helper threads.
-pub fn placement_name(placement: Placement) -> Option<&'static str> {
-    name_of(placement, &PLACEMENTS)
-}
-
-/// The name of a rule of clustering again.
-pub fn recluster_name(recluster: Recluster) -> Option<&'static str> {
-    name_of(recluster, &RECLUSTER)
-}
-
-/// The name of an instruction set.
-pub fn instruction_set_name(instruction_set: InstructionSet) -> Option<&'static str> {
-    name_of(instruction_set, &INSTRUCTION_SETS)
-}
-
-/// What the detector's constructor was told, in its order.
-pub struct Told<'a, 'py> {
-    pub method: Argument<'a, 'py>,
-    pub backend: Argument<'a, 'py>,
-    pub device: Argument<'a, 'py>,
-    pub threads: Argument<'a, 'py>,
-    pub memory_budget: Argument<'a, 'py>,
-    pub max_pairs: Argument<'a, 'py>,
-    pub lambda: Argument<'a, 'py>,
-    pub group_size: Argument<'a, 'py>,
-    pub recluster: Argument<'a, 'py>,
-    pub instruction_set: Argument<'a, 'py>,
-    pub placement: Argument<'a, 'py>,
-}
-
-impl Told<'_, '_> {
-    /// The library's settings.
-    pub fn settings(self) -> PyResult<Settings> {
-        let mut settings = Settings {
-            method: choose(
-                self.method,
-                "method",
-                &Method::ALL.map(|method| (method.name(), method)),
-            )?,
-            backend: choose(self.backend, "backend", &BACKENDS)?,
-            placement: choose(self.placement, "placement", &PLACEMENTS)?,
-            recluster: choose(self.recluster, "recluster", &RECLUSTER)?,
-            instruction_set: choose(self.instruction_set, "instruction_set", &INSTRUCTION_SETS)?,
-            ..Settings::default()
-        };
-        if let Some(device) = self.device {
-            settings.device = Some(text(device, "device")?);
+/// The library's settings, from Python's keywords. Those that are `None` were not given.
+pub fn read(keywords: &Bound<'_, PyDict>) -> PyResult<Settings> {
+    let mut settings = Settings::default();
+    for (name, value) in keywords {
+        if value.is_none() {
+            continue;
         }
-        if let Some(threads) = self.threads {
-            settings.threads = unsigned(threads, "threads", 1024)? as usize;
+        let name = name.extract::<String>()?;
+        match name.as_str() {
+            "backend" => settings.backend = choose_one(&value, &name, words!(Backend))?,
+            "method" => settings.method = choose_one(&value, &name, words!(Method))?,
+            "device" => settings.device = Some(text(&value, &name)?),
+            "threads" => settings.threads = unsigned(&value, &name, 1024)? as usize,
+            "memory_budget" => {
+                settings.memory_budget = Some(unsigned(&value, &name, u64::MAX)?);
+            }
+            "max_pairs" => settings.max_pairs = Some(unsigned(&value, &name, u64::MAX)?),
+            "recluster" => settings.recluster = choose_one(&value, &name, words!(Recluster))?,
+            "instruction_set" => {
+                settings.instruction_set = choose_one(&value, &name, words!(InstructionSet))?;
+            }
+            "density" => settings.density = number(&value, &name)?,
+            "affinity" => settings.affinity = choose_one(&value, &name, words!(Affinity))?,
+            _ => settings.group_size = unsigned(&value, &name, 64)? as u32,
         }
-        if let Some(budget) = self.memory_budget {
-            settings.memory_budget = Some(unsigned(budget, "memory_budget", u64::MAX)?);
-        }
-        if let Some(limit) = self.max_pairs {
-            settings.max_pairs = Some(unsigned(limit, "max_pairs", u64::MAX)?);
-        }
-        if let Some(lambda) = self.lambda {
-            settings.lambda = lambda
-                .extract()
-                .map_err(|_| unexpected(lambda, "lambda_", "a number"))?;
-        }
-        if let Some(group_size) = self.group_size {
-            settings.group_size = unsigned(group_size, "group_size", 64)? as u32;
-        }
-        Ok(settings)
     }
+    Ok(settings)
+}
+
+/// The keywords that give these settings.
+pub fn to_dict<'py>(py: Python<'py>, settings: &Settings) -> PyResult<Bound<'py, PyDict>> {
+    let all = PyDict::new(py);
+    all.set_item("backend", settings.backend.name())?;
+    all.set_item("method", settings.method.name())?;
+    all.set_item("device", &settings.device)?;
+    let threads = (settings.threads > 0).then_some(settings.threads);
+    all.set_item("threads", threads)?;
+    all.set_item("memory_budget", settings.memory_budget)?;
+    all.set_item("max_pairs", settings.max_pairs)?;
+    all.set_item("recluster", settings.recluster.name())?;
+    let instruction_set = settings.instruction_set.name();
+    all.set_item("instruction_set", instruction_set)?;
+    all.set_item("density", settings.density)?;
+    all.set_item("affinity", settings.affinity.name())?;
+    all.set_item("_group_size", settings.group_size)?;
+    Ok(all)
 }

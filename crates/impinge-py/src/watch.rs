@@ -37,7 +37,7 @@ impl CancelToken {
 
     /// bool : whether somebody asked.
     #[getter]
-    fn cancelled(&self) -> bool {
+    fn is_cancelled(&self) -> bool {
         self.inner.is_cancelled()
     }
 }
@@ -124,10 +124,11 @@ impl Watch {
     }
 
     /// The exception that stopped the detection, if one did.
-    pub fn raised(self) -> Option<PyErr> {
-        self.state
-            .into_inner()
+    pub fn raised(&self) -> Option<PyErr> {
+        let state = self.state.lock();
+        state
             .unwrap_or_else(std::sync::PoisonError::into_inner)
             .raised
+            .take()
     }
 }

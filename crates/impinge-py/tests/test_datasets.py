@@ -96,7 +96,7 @@ def bodies(tmp_path_factory):
         vertices, faces = soup(700, 0.1, ix)
         scene.add(vertices, faces)
         paths.append(write_obj(folder / f"{ix}.obj", vertices, faces))
-    truth = impinge.Detector(backend="cpu").detect(scene, between=True, within=True)
+    truth = impinge.Detector("cpu").detect(scene)
     assert len(truth) > 300
     return paths, truth
 
@@ -121,8 +121,8 @@ def test_tiles_have_the_answer_of_the_whole(bodies, tmp_path):
     assert np.array_equal(impinge.tiles.rows(folder), truth.rows)
 
 
-@pytest.mark.parametrize("toi", ["f32", "f64"])
-def test_tiles_of_a_step_have_the_impacts_of_the_whole(tmp_path, toi):
+@pytest.mark.parametrize("precision", ["f32", "f64"])
+def test_tiles_of_a_step_have_the_impacts_of_the_whole(tmp_path, precision):
     scene = impinge.Scene()
     paths = []
     for ix in range(2):
@@ -131,25 +131,25 @@ def test_tiles_of_a_step_have_the_impacts_of_the_whole(tmp_path, toi):
         body = scene.add(start, faces)
         scene.set_end_positions(body, end)
         paths += [write_obj(tmp_path / f"{ix}-{pose}.obj", at, faces) for pose, at in enumerate((start, end))]
-    truth = impinge.Detector(backend="cpu").impacts(scene, toi=toi, start="skip")
+    truth = impinge.Detector("cpu").impacts(scene, precision=precision, start="skip")
     folder = tmp_path / "tiles"
     plan = impinge.tiles.plan(folder, paths, cap=300, chunk=128, step=True)
     assert plan["step"] and plan["tiles"] > 2 and plan["primitives"] == 1000
     impinge.tiles.scatter(folder)
-    impinge.tiles.run(folder, threads=1, start="skip", toi=toi)
+    impinge.tiles.run(folder, threads=1, start="skip", precision=precision)
     # Neighbours never count in a step, so the rule for them is the same question.
-    again = impinge.tiles.run(folder, threads=1, start="skip", toi=toi, shared_vertex="skip")
+    again = impinge.tiles.run(folder, threads=1, start="skip", precision=precision, shared_vertex="skip")
     assert all(row["kept"] for row in again)
     merged = impinge.tiles.merge(folder)
     assert merged["pairs"] == len(truth) > 300 and merged["hash"] == f"{truth.hash:016x}"
     first = truth.earliest()
     kind, (_, a, _, b), toi = merged["earliest"]
-    assert (kind, (a, b), toi) == (first.kind, first.elements, first.toi)
+    assert (kind, (a, b), toi) == (first.kind, (first.element_a, first.element_b), first.toi)
     rows = impinge.tiles.rows(folder)
     assert rows.dtype["toi"] == truth.toi.dtype and np.array_equal(rows["toi"], truth.toi)
     bodies = np.stack([rows["body_a"], rows["body_b"]], axis=1)
     elements = np.stack([rows["element_a"], rows["element_b"]], axis=1)
-    assert np.array_equal(bodies, truth.bodies) and np.array_equal(elements, truth.elements)
+    assert np.array_equal(bodies, truth.rows[:, ::2]) and np.array_equal(elements, truth.rows[:, 1::2])
     assert np.array_equal(rows["kind"], np.array(impinge.KINDS)[truth.kinds])
     assert merged["touching_at_start"] == 0 and sum(merged["kinds"].values()) == len(truth)
 
@@ -166,7 +166,7 @@ def test_tiles_of_a_step_keep_a_separation_and_weld(tmp_path):
     welded = faces % (n // 2)
     body = scene.add(both[: n // 2], welded)
     scene.set_end_positions(body, ends[: n // 2])
-    truth = impinge.Detector(backend="cpu").impacts(scene, separation=0.01)
+    truth = impinge.Detector("cpu").impacts(scene, separation=0.01)
     folder = tmp_path / "tiles"
     plan = impinge.tiles.plan(folder, paths, cap=100, step=True, weld=True, separation=0.01)
     assert plan["separation"] == 0.01 and plan["tiles"] > 2
@@ -187,8 +187,8 @@ def test_tiles_refuse_by_name(bodies, tmp_path):
     impinge.tiles.plan(tmp_path / "b", paths, cap=500)
     with pytest.raises((OSError, ValueError)):
         impinge.tiles.run(tmp_path / "b")
-    with pytest.raises(ValueError, match="^between and within"):
-        impinge.tiles.run(tmp_path / "b", between=False, within=False)
+    with pytest.raises(ValueError, match='^which: "none" given, "all", "between", "self" allowed'):
+        impinge.tiles.run(tmp_path / "b", which="none")
     with pytest.raises(ValueError, match="^shared_vertex: \"leave\" given"):
         impinge.tiles.run(tmp_path / "b", shared_vertex="leave")
     with pytest.raises((OSError, ValueError)):

@@ -23,10 +23,10 @@ def test_every_door_answers_alike(name, tmp_path):
     mesh = impinge.read(path)
     scene = impinge.Scene()
     body = scene.add(mesh)
-    assert scene.kind(body) == mesh.kind and scene.n_primitives(body) == len(mesh.faces)
-    result = impinge.Detector("naive").detect(scene, within=body)
+    assert scene.kind(body) == mesh.kind and scene.n_elements(body) == len(mesh.faces)
+    result = impinge.Detector(method="naive").detect(scene, self_of=body)
     assert hexadecimal(result) == expected
-    pairs = result.pairs().tolist()
+    pairs = result.self_of(body).tolist()
     assert impinge.self_pairs(mesh.vertices, mesh.faces, kind=mesh.kind).tolist() == pairs
 
     # Arrays that are not welded are asked about as they are, unless it is said.
@@ -40,7 +40,7 @@ def test_every_door_answers_alike(name, tmp_path):
     assert {"pairs": row["self_intersections"], "hash": row["hash"]} == expected
     impinge.tiles.plan(tmp_path / "tiles", [path], cap=10)
     impinge.tiles.scatter(tmp_path / "tiles")
-    impinge.tiles.run(tmp_path / "tiles", between=False)
+    impinge.tiles.run(tmp_path / "tiles", which="self")
     merged = impinge.tiles.merge(tmp_path / "tiles")
     assert {"pairs": merged["pairs"], "hash": merged["hash"]} == expected
 
@@ -53,8 +53,8 @@ def test_every_door_answers_alike(name, tmp_path):
     scene = impinge.Scene()
     for one in bodies:
         scene.add(one)
-    assert hexadecimal(impinge.Detector().detect(scene, between=True)) == answer["between"]
-    assert impinge.Detector().count(scene, between=True, within=True) == answer["pairs"]
+    assert hexadecimal(impinge.Detector().detect(scene, which="between")) == answer["between"]
+    assert impinge.Detector().count(scene) == answer["pairs"]
 
 
 def test_a_box_of_a_renderer_is_clean_once_it_is_welded():

@@ -31,6 +31,12 @@ def test_every_example_is_run_here(root):
     assert names == {"check_mesh.py", "sequence.py", "color_trimesh.py"}
 
 
+def test_the_same_program_in_every_language(root):
+    folder = root / "examples" / "cloth-on-ball"
+    out = subprocess.run([sys.executable, str(folder / "cloth_on_ball.py")], capture_output=True, text=True, timeout=120)
+    assert out.stdout == (folder / "expected.txt").read_text(), out.stderr
+
+
 def test_check_mesh(run, tmp_path):
     out = run("check_mesh.py", "--report", "pairs.csv")
     assert out.returncode == 1 and "pairs of faces intersect" in out.stdout, out.stderr

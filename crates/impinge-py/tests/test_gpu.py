@@ -33,8 +33,8 @@ def test_the_same_bytes_as_the_cpu(device, method, dtype):
     moving = scene.add(vertices.astype(dtype) + dtype(0.3), faces)
     scene.add(*soup(300, 0.2, 5, dtype))
     scene.add(*lattice_tetrahedra(100, 3, 4), kind="tetrahedra")
-    gpu = impinge.Detector(method, backend="gpu", device=device.name)
-    cpu = impinge.Detector(backend="cpu")
+    gpu = impinge.Detector(method=method, backend="gpu", device=device.name)
+    cpu = impinge.Detector("cpu")
     for shift in [0.3, 0.1]:
         scene.set_positions(moving, vertices.astype(dtype) + dtype(shift))
         answer, truth = gpu.detect(scene), cpu.detect(scene)
@@ -49,5 +49,5 @@ def test_the_same_bytes_as_the_cpu(device, method, dtype):
 def test_a_device_that_is_not_there(backend):
     with pytest.raises(RuntimeError, match="no such adapter"):
         impinge.Detector(backend=backend, device="no such adapter")
-    detector = impinge.Detector(backend="cpu", device="no such adapter")
+    detector = impinge.Detector("cpu", device="no such adapter")
     assert detector.detect(impinge.Scene()).stats.backend == "cpu"

@@ -63,12 +63,12 @@ def test_the_step_is_the_earliest_impact(seed):
     scene = impinge.Scene()
     scene.add(start, faces)
     scene.set_end_positions(0, end)
-    first = impinge.Detector("naive", backend="cpu").earliest(scene, toi="f64").toi
+    first = impinge.Detector(method="naive", backend="cpu").earliest(scene, precision="f64").toi
     step = ipc.compute_collision_free_stepsize(mesh, start, end)
     assert 0 < step < first and step > 0.99 * first
-    detector = impinge.Detector("naive", backend="cpu")
+    detector = impinge.Detector(method="naive", backend="cpu")
     assert step == detector.advance(scene, clearance=1e-4, clearance_share=1 - 0.8).fraction
-    assert step <= detector.earliest(scene, clearance=1e-4, toi="f64").toi
+    assert step <= detector.earliest(scene, clearance=1e-4, precision="f64").toi
     # Every shorter step keeps the clearance, by the formula of a line search too.
     dx = end - start
     end = start + dx
@@ -186,11 +186,11 @@ def test_filters_leave_out_pairs_as_a_list_would(seed):
     scene = impinge.Scene()
     scene.add(start, faces)
     scene.set_end_positions(0, end)
-    detector = impinge.Detector(backend="cpu")
-    edges = scene.elements(0, "edges")
+    detector = impinge.Detector("cpu")
+    edges = scene.edges(0)
     counts = []
-    for hit in detector.impacts(scene, clearance=1e-4, toi="f64"):
-        a, b = hit.elements
+    for hit in detector.impacts(scene, clearance=1e-4, precision="f64"):
+        a, b = hit.element_a, hit.element_b
         corners = [a, *faces[b]] if hit.kind == "vf" else [*edges[a], *edges[b]]
         if len(set(labels[corners])) > 1:
             counts.append(hit.toi)
@@ -394,8 +394,8 @@ def test_side_by_side_with_ipc_toolkit(seed, distance):
     scene = impinge.Scene()
     scene.add(start, faces)
     scene.set_end_positions(0, end)
-    naive = impinge.Detector("naive", backend="cpu")
-    true = naive.earliest(scene, toi="f64", separation=distance).toi
+    naive = impinge.Detector(method="naive", backend="cpu")
+    true = naive.earliest(scene, precision="f64", separation=distance).toi
     # Ours is never beyond the first contact, and close to theirs, which has tolerances besides.
     assert ours[0] <= true and theirs[0] <= ours[0] + 1e-6
     assert ours[0] - theirs[0] < 1e-3 + 0.25 * ours[0]

@@ -161,14 +161,17 @@ def test_distances():
     detector = impinge.Detector(**SETTINGS)
     nearest = detector.distance(scene, a, b)
     assert abs(nearest.distance - 1) < 0.2 and nearest.points.shape == (2, 3)
-    assert nearest.bodies == (a, b) and len(nearest.primitives) == 2
+    assert nearest[1::2][:2] == (a, b) and nearest._fields == (
+        "distance", "body_a", "element_a", "body_b", "element_b", "points"
+    )
     assert detector.nearest(scene).distance == nearest.distance
     scene.set_positions(b, vertices + [1, 0, 0])
     touching = detector.distance(scene, a, b)
     assert touching.distance == 0 and np.array_equal(*touching.points)
     assert abs(np.linalg.norm(touching.points[0]) - 1) < 0.2
     scene.set_positions(b, vertices + [3, 0, 0])
-    assert detector.nearest(scene, across=[a]).bodies == (a, b)
+    found = detector.nearest(scene, across=[a])
+    assert (found.body_a, found.body_b) == (a, b)
     assert detector.nearest(scene, across=[a, b]) is None
     with pytest.raises(ValueError, match="itself"):
         detector.distance(scene, a, a)

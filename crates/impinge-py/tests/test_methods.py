@@ -14,8 +14,8 @@ SETTINGS = [
     {"method": "clusters", "instruction_set": "portable"},
     {"method": "clusters", "instruction_set": "avx2", "backend": "cpu"},
     {"method": "cells", "threads": 1},
-    {"method": "cells", "threads": 2, "lambda_": 20.0},
-    {"method": "cells", "lambda_": 0.01, "group_size": 5, "instruction_set": "portable"},
+    {"method": "cells", "threads": 2, "density": 20.0},
+    {"method": "cells", "density": 0.01, "_group_size": 5, "instruction_set": "portable"},
     {"memory_budget": 1 << 22},
     {"method": "cells", "memory_budget": 1 << 22},
 ]

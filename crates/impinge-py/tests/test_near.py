@@ -1,5 +1,7 @@
 """Elements within a distance, and contact geometry."""
 
+import pickle
+
 import numpy as np
 import pytest
 
@@ -24,14 +26,13 @@ def two():
 
 
 def test_columns(detector, two):
-    near = detector.within_distance(two, 3.0, between=True, closest_points=True)
+    near = detector.near(two, 3.0, which="between", closest_points=True)
     assert [impinge.KINDS[kind] for kind in near.kinds] == ["vf"] * 6 + ["ee"] * 9
     assert {near.kinds.dtype, near.types.dtype, near.features.dtype} == {np.dtype(np.uint8)}
-    assert np.array_equal(near.rows[:, ::2], near.bodies)
-    assert np.array_equal(near.rows[:, 1::2], near.elements)
-    assert near.bodies.dtype == np.uint32 and near.bodies.shape == (15, 2)
-    assert near.elements[:3].tolist() == [[0, 0], [1, 0], [2, 0]]
-    assert near.bodies[:6].tolist() == [[0, 1]] * 3 + [[1, 0]] * 3
+    assert near.rows.dtype == np.uint32 and near.rows.shape == (15, 4)
+    assert near.rows is near.rows and not near.rows.flags.writeable and near.kinds is near.kinds
+    assert near.rows[:3, 1::2].tolist() == [[0, 0], [1, 0], [2, 0]]
+    assert near.rows[:6, ::2].tolist() == [[0, 1]] * 3 + [[1, 0]] * 3
     # Each vertex is above a vertex of the face.
     assert sorted(impinge.TYPES[ix] for ix in near.types[:3]) == ["P_T0", "P_T1", "P_T2"]
     assert near.features.shape == (15, 2)
@@ -42,19 +43,19 @@ def test_columns(detector, two):
     assert gaps.tolist() == [3.0] * 15
     assert near.parallel.dtype == bool and near.parallel.sum() == 3
     assert repr(near) == "NearPairs(vf: 6, ee: 9)"
-    assert near.stats.method == detector.within_distance(two, 3.0).stats.method
-    below = detector.within_distance(two, np.nextafter(3.0, 0), between=True)
+    assert near.stats.method == detector.near(two, 3.0).stats.method
+    below = detector.near(two, np.nextafter(3.0, 0), which="between")
     assert len(below) == 0 and below.kinds.shape == (0,) and below.features.shape == (0, 2)
     assert below.hash != near.hash
     # Distances alone.
-    only = detector.within_distance(two, 3.0, between=True, distances=True)
+    only = detector.near(two, 3.0, which="between", distances=True)
     assert only.hash == near.hash and only.distances.tolist() == near.distances.tolist()
     with pytest.raises(ValueError, match="^points were not asked for: pass closest_points=True"):
         only.points  # noqa: B018
 
 
 def test_one_kind(detector, two):
-    near = detector.within_distance(two, 3.0, between=True, closest_points=True)
+    near = detector.near(two, 3.0, which="between", closest_points=True)
     parts = [near.of(kind) for kind in impinge.KINDS]
     assert [len(part) for part in parts] == [6, 9, 0, 0, 0, 0]
     for name in ["rows", "kinds", "types", "features", "parallel", "distances", "points"]:
@@ -73,46 +74,50 @@ def test_types_have_names(detector):
     scene = impinge.Scene()
     for _ in range(2):
         scene.add(random.integers(0, 4, (90, 3)).astype(float), np.arange(90).reshape(-1, 3))
-    near = detector.within_distance(scene, 1.0, kinds=impinge.KINDS)
+    near = detector.near(scene, 1.0, kinds=impinge.KINDS)
     seen = {impinge.TYPES[ix] for ix in near.types}
     assert {"P_P", "P_E", "P_T", "P_T0", "P_E2", "EA_EB", "EA1_EB", "EA0_EB1", "E_E"} <= seen
     assert set(impinge.FEATURES) == {impinge.FEATURES[ix] for ix in near.features.flat}
 
 
 def test_kinds_and_thickness(detector, two):
-    faces = detector.within_distance(two, 3.0, kinds=["ff"])
+    faces = detector.near(two, 3.0, kinds=["ff"])
     assert [impinge.KINDS[ix] for ix in faces.kinds] == ["ff"]
     assert [impinge.TYPES[ix] for ix in faces.types] == ["P_P"]
     a, b = two.bodies
     thick = dict(between=(a, b), kinds=["ff"])
-    assert len(detector.within_distance(two, thickness={a: 1.0, b: 2.0}, **thick)) == 1
-    assert len(detector.within_distance(two, 0.5, thickness={a: 1.0, 1: 1.5}, **thick)) == 1
-    assert len(detector.within_distance(two, 0.4, thickness={a: 1.0, 1: 1.5}, **thick)) == 0
+    two.set_thickness(a, 1.0)
+    two.set_thickness(b, 2.0)
+    assert len(detector.near(two, 0.0, **thick)) == 1
+    two.set_thickness(1, 1.5)
+    assert len(detector.near(two, 0.5, **thick)) == 1
+    assert len(detector.near(two, 0.4, **thick)) == 0
+    assert len(detector.near(pickle.loads(pickle.dumps(two)), 0.5, between=(0, 1), kinds=["ff"])) == 1
     # Added without rounding: 0.1 + 0.2 is less than the float 0.1 + 0.2.
     scene = impinge.Scene()
     scene.add_points(np.array([[0.0, 0, 0]]))
     scene.add_points(np.array([[0.1 + 0.2, 0, 0]]))
-    assert len(detector.within_distance(scene, thickness={0: 0.1, 1: 0.2})) == 0
-    assert len(detector.within_distance(scene, 0.1 + 0.2)) == 1
+    assert len(detector.near(scene, 0.1 + 0.2)) == 1
+    scene.set_thickness(0, 0.1)
+    scene.set_thickness(1, 0.2)
+    assert len(detector.near(scene, 0)) == 0
 
 
 def test_refusals(detector, two):
-    near = detector.within_distance(two, 3.0)
+    near = detector.near(two, 3.0)
     for name, keyword in [("distances", "distances"), ("points", "closest_points")]:
         with pytest.raises(ValueError, match=f"^{name} were not asked for: pass {keyword}=True"):
             getattr(near, name)
     with pytest.raises(ValueError, match="distance"):
-        detector.within_distance(two, -1.0)
+        detector.near(two, -1.0)
     with pytest.raises(ValueError, match="thickness"):
-        detector.within_distance(two, thickness={0: float("nan")})
-    with pytest.raises(
-        TypeError, match="^thickness: a dictionary of bodies and numbers expected, list given"
-    ):
-        detector.within_distance(two, thickness=[1.0])
+        two.set_thickness(0, float("nan"))
+    with pytest.raises(TypeError, match="^thickness: a number expected, list given"):
+        two.set_thickness(0, [1.0])
     with pytest.raises(ValueError, match='^kinds\\[0\\]: "xy" given'):
-        detector.within_distance(two, kinds=["xy"])
+        detector.near(two, 1.0, kinds=["xy"])
     with pytest.raises(TypeError, match="^distance: a number expected, str given"):
-        detector.within_distance(two, "3")
+        detector.near(two, "3")
 
 
 def test_contacts(detector):
@@ -152,7 +157,7 @@ def test_loops_end_where_they_start(detector):
         assert np.linalg.norm(steps, axis=1).sum() == pytest.approx(length)
     with pytest.raises(ValueError, match="^pairs: of another scene"):
         detector.contacts(impinge.Scene(), result)
-    with pytest.raises(TypeError, match="^pairs: a Result expected"):
+    with pytest.raises(TypeError, match="^pairs: Pairs expected, int given"):
         detector.contacts(scene, 3)
     found = detector.penetration(scene, contacts, 1, 0)
     [region] = found.regions()

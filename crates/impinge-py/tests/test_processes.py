@@ -20,15 +20,15 @@ vertices = random.random((3 * n, 3))
 faces = np.arange(3 * n).reshape(n, 3)
 scene = impinge.Scene()
 body = scene.add(vertices, faces)
-detector = impinge.Detector(sys.argv[1], threads=int(sys.argv[2]))
+detector = impinge.Detector(method=sys.argv[1], threads=int(sys.argv[2]))
 print("ready", flush=True)
 try:
-    detector.detect(scene, within=body)
+    detector.detect(scene, self_of=body)
 except KeyboardInterrupt:
     scene.remesh(body, vertices[:300], faces[:100])
-    again = detector.detect(scene, within=body)
+    again = detector.detect(scene, self_of=body)
     oracle = impinge.self_pairs(vertices[:300], faces[:100], method="naive")
-    assert len(oracle) and np.array_equal(again.pairs(), oracle)
+    assert len(oracle) and np.array_equal(again.self_of(body), oracle)
     print("interrupted and usable", flush=True)
 """
 
@@ -69,7 +69,7 @@ scene = impinge.Scene()
 scene.add(random.random((90_000, 3)), np.arange(90_000).reshape(-1, 3))
 signal.setitimer(signal.ITIMER_REAL, 0.2)
 try:
-    impinge.Detector("naive").detect(scene, within=0)
+    impinge.Detector(method="naive").detect(scene, self_of=0)
     print("ran to the end")
 except Enough:
     print("enough")
@@ -130,7 +130,7 @@ def test_spawned_workers():
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="affinities are set on Linux only")
-def test_placement_of_helper_threads():
+def test_affinity_of_helper_threads():
     def helpers(before):
         """The threads started since, by their names: helpers, not those of the pool for clustering."""
         for thread in set(os.listdir("/proc/self/task")) - before:
@@ -143,9 +143,9 @@ def test_placement_of_helper_threads():
         scene.add(*soup(20_000, 0.05, seed))
     everywhere = os.sched_getaffinity(0)
     answers = set()
-    for placement, n_left_out in [("auto", min(1, len(everywhere) - 1)), ("inherited", 0)]:
+    for affinity, n_left_out in [("auto", min(1, len(everywhere) - 1)), ("inherited", 0)]:
         before = set(os.listdir("/proc/self/task"))
-        detector = impinge.Detector("clusters", "cpu", threads=3, placement=placement)
+        detector = impinge.Detector("cpu", method="clusters", threads=3, affinity=affinity)
         deadline = time.monotonic() + 60
         n_each = None
         while n_each != 2 * [n_left_out]:
@@ -188,14 +188,14 @@ def questions(detector):
     contacts = detector.contacts(scene, pairs)
     yield "detect", lambda **control: pairs.hash and detector.detect(scene, **control).hash
     yield "count", lambda **control: detector.count(scene, **control)
-    yield "any", lambda **control: detector.any(scene, within=True, between=True, **control)
+    yield "any", lambda **control: detector.any(scene, **control)
     yield "impacts", lambda **control: detector.impacts(scene, between=(a, b), **control).hash
     yield "earliest", lambda **control: detector.earliest(scene, **control).toi
     yield "is_free", lambda **control: detector.is_free(scene, **control)
     yield "advance", lambda **control: detector.advance(scene, between=(a, c), **control).fraction
     yield "candidates", lambda **control: detector.candidates(scene, between=(a, b), **control).hash
-    yield "within_distance", lambda **control: detector.within_distance(
-        scene, 0.001, between=True, distances=True, **control).hash
+    yield "near", lambda **control: detector.near(
+        scene, 0.001, which="between", distances=True, **control).hash
     yield "distance", lambda **control: detector.distance(scene, a, c, **control).distance
     yield "nearest", lambda **control: detector.nearest(scene, across=[c], **control).distance
     yield "contacts", lambda **control: detector.contacts(scene, pairs, **control).points.tobytes()
@@ -203,7 +203,7 @@ def questions(detector):
         scene, contacts, a, b, **control).volume
 
 def answers(threads):
-    return [ask() for _, ask in questions(impinge.Detector(backend="cpu", threads=threads))]
+    return [ask() for _, ask in questions(impinge.Detector("cpu", threads=threads))]
 """
 
 

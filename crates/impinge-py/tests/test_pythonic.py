@@ -27,7 +27,7 @@ def result():
         vertices, faces = soup(400, 0.3, shift)
         scene.add(vertices, faces)
     scene.add(TRIANGLE + np.float32(50), FACE)
-    return impinge.Detector(backend="cpu").detect(scene, between=True, within=True)
+    return impinge.Detector("cpu").detect(scene)
 
 
 def test_a_result_is_a_sequence_of_rows(result):
@@ -51,8 +51,10 @@ def test_a_result_is_an_array(result):
     assert np.asarray(result, np.int64).dtype == np.int64
     assert np.array_equal(np.unique(result, axis=0), result.rows)
     if np.lib.NumpyVersion(np.__version__) >= "2.0.0":
-        with pytest.raises(ValueError, match="^copy=False"):
-            np.array(result, copy=False)
+        assert np.shares_memory(np.array(result, copy=False), result.rows)
+        assert not np.shares_memory(np.array(result, copy=True), result.rows)
+        with pytest.raises(ValueError, match="^copy=False: rows are uint32, int64 asked for"):
+            np.array(result, np.int64, copy=False)
 
 
 def test_all_colliding_primitives_in_one_pass(result):
@@ -69,30 +71,19 @@ def test_filters_of_the_users_own():
     scene = impinge.Scene()
     for seed in range(3):
         scene.add(*soup(300, 0.3, seed))
-    detector = impinge.Detector(backend="cpu")
+    detector = impinge.Detector("cpu")
     everything = detector.detect(scene).rows
     layer = [np.arange(300) % 2, np.arange(300) % 3, np.zeros(300, int)]
-    asked = []
-
-    def keep(rows):
-        asked.append(rows)
-        of = [[layer[body][face] for body, face in rows[:, pair]] for pair in ([0, 1], [2, 3])]
-        return np.equal(*map(np.array, of))
-
-    kept = detector.detect(scene, filter=keep)
-    [rows] = asked
-    assert np.array_equal(rows, everything)
+    pairs = detector.detect(scene)
+    of = [[layer[body][face] for body, face in everything[:, pair]] for pair in ([0, 1], [2, 3])]
+    kept = pairs.retain(np.equal(*map(np.array, of)))
     expected = everything[[layer[a][i] == layer[b][j] for a, i, b, j in everything]]
     assert 0 < len(expected) < len(everything) and np.array_equal(kept.rows, expected)
-    assert kept.hash == impinge.hash_rows(expected)
-    assert len(detector.detect(scene, between=(0, 1), filter=lambda rows: rows[:, 1] > 900)) == 0
-    with pytest.raises(TypeError, match="^filter: a callable expected, int given"):
-        detector.detect(scene, filter=1)
-    for answer in [lambda rows: rows, lambda rows: np.ones(len(rows)), lambda rows: [True]]:
-        with pytest.raises(ValueError, match=r"^filter: shape \(\d+,\) of bool expected"):
-            detector.detect(scene, filter=answer)
-    with pytest.raises(ZeroDivisionError):
-        detector.detect(scene, filter=lambda rows: 1 // 0)
+    assert kept.hash == impinge.hash_rows(expected) and np.array_equal(pairs.rows, everything)
+    assert len(pairs.retain(np.zeros(len(pairs), bool))) == 0
+    for answer in [everything, np.ones(len(pairs)), [True]]:
+        with pytest.raises(ValueError, match=r"^keep: shape \(\d+,\) of bool expected"):
+            pairs.retain(answer)
 
 
 def a_scene():
@@ -123,8 +114,8 @@ def test_scenes_pickle(duplicate):
             assert (ours is None) == (theirs is None)
             if ours is not None:
                 assert ours.dtype == theirs.dtype and np.array_equal(ours, theirs), (body, of)
-    detector = impinge.Detector(backend="cpu")
-    for question in [{}, {"within": True}]:
+    detector = impinge.Detector("cpu")
+    for question in [{}, {"which": "self"}]:
         assert detector.detect(other, **question).hash == detector.detect(scene, **question).hash
     assert detector.impacts(other).hash == detector.impacts(scene).hash
     # They are two scenes from now on.
@@ -135,22 +126,26 @@ def test_scenes_pickle(duplicate):
 
 
 def test_settings_pickle():
-    settings = dict(method="cells", backend="cpu", threads=2, memory_budget=1 << 30, max_pairs=1000, lambda_=2.0)
-    detector = impinge.Detector(**settings, group_size=32, recluster="never", instruction_set="avx2", placement="inherited")
+    settings = dict(method="cells", backend="cpu", threads=2, memory_budget=1 << 30, max_pairs=1000, density=2.0)
+    detector = impinge.Detector(**settings, _group_size=32, recluster="never", instruction_set="avx2", affinity="auto")
     other = pickle.loads(pickle.dumps(detector))
-    assert repr(other) == repr(detector) == 'Detector(method="cells", backend="cpu", threads=2, memory_budget=1073741824, max_pairs=1000)'
+    assert repr(other) == repr(detector) == (
+        "Detector(backend='cpu', method='cells', threads=2, memory_budget=1073741824, max_pairs=1000, "
+        "recluster='never', instruction_set='avx2', density=2.0, affinity='auto')"
+    )
     arguments, keywords = other.__getnewargs_ex__()
-    assert arguments == () and {**settings, "group_size": 32, "recluster": "never"}.items() <= keywords.items()
-    assert keywords["instruction_set"] == "avx2" and keywords["placement"] == "inherited"
+    assert arguments == () and {**settings, "_group_size": 32, "recluster": "never"}.items() <= keywords.items()
+    assert keywords["instruction_set"] == "avx2" and keywords["affinity"] == "auto"
+    assert other.settings == {name: value for name, value in keywords.items() if name != "_group_size"}
     scene = a_scene()
     assert copy.deepcopy(detector).detect(scene).hash == detector.detect(scene).hash
 
 
 def test_what_does_not_pickle_says_why(result):
     scene = a_scene()
-    detector = impinge.Detector(backend="cpu")
+    detector = impinge.Detector("cpu")
     for thing, words in [
-        (result, r"pickle result\.rows"),
+        (result, r"pickle pairs\.rows"),
         (scene.bodies[0], r"int\(body\)"),
         (detector.impacts(scene), "pickle their arrays"),
         (detector.candidates(scene), "pickle their arrays"),
@@ -184,7 +179,7 @@ def test_many_bodies_at_once():
     for body in range(n):
         rows = slice(of_faces[body], of_faces[body + 1])
         one_by_one.add(vertices[3 * rows.start : 3 * rows.stop], faces[rows], kind="triangles")
-    assert [scene.n_primitives(body) for body in bodies[:50]] == sizes[:50].tolist()
+    assert [scene.n_elements(body) for body in bodies[:50]] == sizes[:50].tolist()
     assert all(np.array_equal(scene.positions(b), one_by_one.positions(int(b))) for b in bodies[::97])
     small = impinge.Scene()
     for words, change in [
@@ -248,7 +243,7 @@ def test_rows_of_four():
     assert pairs.tolist() == [[0, 0], [1, 0]]
     assert len(impinge.self_pairs(GRID, QUADS, kind="quads")) == 0
     empty = scene.add(GRID, np.empty((0, 4), np.uint32))
-    assert scene.n_primitives(empty) == 0
+    assert scene.n_elements(empty) == 0
     # A mesh of tetrahedra of any size tells by its first rows.
     vertices, tets = lattice_tetrahedra(40, 3, 2, shared=True)
     assert scene.kind(scene.add(vertices, tets, kind="tetrahedra")) == "tetrahedra"
@@ -259,7 +254,7 @@ def test_meshes_of_trimesh():
     box = trimesh.creation.box()
     scene = impinge.Scene()
     body = scene.add(box)
-    assert scene.n_primitives(body) == 12 and np.array_equal(scene.elements(body), box.faces)
+    assert scene.n_elements(body) == 12 and np.array_equal(scene.elements(body), box.faces)
     with pytest.raises(ValueError, match=r"^mesh\.faces: shape \(n, 4\) expected, \(12, 3\) given"):
         scene.add(box, kind="tetrahedra")
 
@@ -284,7 +279,7 @@ def test_meshes_of_meshio():
     quads = mesh(("quad", QUADS))
     with pytest.raises(ValueError, match="^mesh.cells: quads, which are no triangles"):
         scene.add(quads)
-    assert scene.n_primitives(scene.add(quads, kind="quads")) == 4
+    assert scene.n_elements(scene.add(quads, kind="quads")) == 4
     with pytest.raises(ValueError, match="^mesh.cells: tetra expected, quad given"):
         scene.add(quads, kind="tetrahedra")
     with pytest.raises(ValueError, match="^mesh.cells: hexahedron given"):
@@ -296,9 +291,9 @@ def test_meshes_of_meshio():
 def test_anything_with_vertices_and_faces():
     scene = impinge.Scene()
     mesh = types.SimpleNamespace(vertices=TRIANGLE.tolist(), faces=[[0, 1, 2]])
-    assert scene.n_primitives(scene.add(mesh)) == 1
+    assert scene.n_elements(scene.add(mesh)) == 1
     mesh = types.SimpleNamespace(vertices=TRIANGLE, triangles=FACE)
-    assert scene.n_primitives(scene.add(mesh)) == 1
+    assert scene.n_elements(scene.add(mesh)) == 1
     with pytest.raises(ValueError, match=r"^mesh\.vertices\[0, 0\] = nan"):
         scene.add(types.SimpleNamespace(vertices=[[np.nan, 0, 0]] * 3, faces=FACE))
     with pytest.raises(TypeError, match="^faces: none given with a ndarray, which is no mesh"):
@@ -332,7 +327,7 @@ def answers(shift):
     assert np.array_equal(pairs[0], pairs[1]) and np.array_equal(pairs[0], default)
     scene = impinge.Scene()
     scene.add(vertices, faces)
-    auto = len(impinge.Detector().detect(scene, within=True))
+    auto = len(impinge.Detector().detect(scene, which="self"))
     return len(default), len(own), auto
 
 
@@ -351,15 +346,15 @@ import os, sys, impinge
 corners, face = [[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]
 scene = impinge.Scene()
 scene.add(corners, face)
-detector = impinge.Detector(backend="cpu", threads=2)
-detector.detect(scene, within=True)
+detector = impinge.Detector("cpu", threads=2)
+detector.detect(scene, which="self")
 if os.fork() == 0:
     try:
-        detector.detect(scene, within=True)
+        detector.detect(scene, which="self")
     except RuntimeError as error:
         print(error, flush=True)
     del detector
-    print(len(impinge.Detector(backend="cpu").detect(scene, within=True)), flush=True)
+    print(len(impinge.Detector("cpu").detect(scene, which="self")), flush=True)
     sys.exit(0)
 sys.exit(os.waitstatus_to_exitcode(os.wait()[1]))
 """

@@ -37,7 +37,7 @@ def test_kinds(scene):
     body = scene.add(vertices, tets, "tetrahedra")
     assert scene.kind(body) == "tetrahedra" and scene.kind(0) == "triangles"
     assert np.array_equal(scene.elements(body), tets) and scene.elements(body).dtype == np.uint32
-    assert (scene.n_primitives(body), scene.n_vertices(body)) == (5, 20)
+    assert (scene.n_elements(body), scene.n_vertices(body)) == (5, 20)
     scene.add(vertices, tets, kind="tetrahedra")
     with pytest.raises(ValueError, match=r"^faces: shape \(n, 3\) expected, \(5, 4\) given"):
         scene.add(vertices, tets, kind="triangles")
@@ -54,7 +54,7 @@ def test_bodies_come_go_and_change(scene):
     assert len(detector.detect(scene)) == 0
     vertices, faces = ball()
     scene.remesh(b, vertices * np.float32(0.5), faces)
-    assert scene.n_primitives(b) == len(faces)
+    assert scene.n_elements(b) == len(faces)
     assert len(detector.detect(scene)) > 1
     scene.remove(a)
     assert len(scene) == 1 and a not in scene and b in scene
@@ -66,7 +66,7 @@ def test_bodies_come_go_and_change(scene):
     with pytest.raises(ValueError, match="there is no such body 0"):
         scene.positions(a)
     with pytest.raises(ValueError, match="there is no such body 0"):
-        detector.detect(scene, within=a)
+        detector.detect(scene, self_of=a)
     assert len(detector.detect(scene)) > 1
 
 
@@ -77,7 +77,7 @@ def test_handles_know_their_scene(scene):
     for call in [
         lambda: scene.set_positions(stranger, TRIANGLE),
         lambda: scene.remove(stranger),
-        lambda: impinge.Detector().detect(scene, within=stranger),
+        lambda: impinge.Detector().detect(scene, self_of=stranger),
         lambda: impinge.Detector().detect(scene).colliding(stranger),
     ]:
         with pytest.raises(ValueError, match="body 0 belongs to another scene"):
@@ -120,7 +120,7 @@ def locked(array):
 def test_lent_positions_are_read_where_they_lie(scene, dtype):
     frame = locked(TRIANGLE.astype(dtype) + dtype(0.5))
     n_references = sys.getrefcount(frame)
-    scene.lend_positions(1, frame)
+    scene.set_positions(1, frame, copy=False)
     assert sys.getrefcount(frame) == n_references + 1
     assert np.array_equal(scene.positions(1), frame) and scene.positions(1).dtype == dtype
     # What the contract forbids shows that nothing was copied.
@@ -131,14 +131,14 @@ def test_lent_positions_are_read_where_they_lie(scene, dtype):
     assert sys.getrefcount(frame) == n_references
     # The scene keeps a frame that nobody else knows any more.
     across = np.ascontiguousarray(ACROSS, dtype)
-    scene.lend_positions(1, locked(across.copy()))
-    scene.lend_end_positions(1, locked(across + dtype(1)))
+    scene.set_positions(1, locked(across.copy()), copy=False)
+    scene.set_end_positions(1, locked(across + dtype(1)), copy=False)
     gc.collect()
     other = impinge.Scene()
     for vertices in (TRIANGLE, ACROSS):
         other.add(vertices, FACE)
     other.set_end_positions(1, ACROSS + 1)
-    detector = impinge.Detector(backend="cpu")
+    detector = impinge.Detector("cpu")
     assert len(detector.detect(scene)) == 1 and detector.detect(scene).hash == detector.detect(other).hash
     assert detector.impacts(scene).hash == detector.impacts(other).hash
     assert np.array_equal(scene.end_positions(1), ACROSS + 1)
@@ -149,9 +149,9 @@ def test_lent_positions_are_read_where_they_lie(scene, dtype):
 
 def test_views_of_read_only_arrays_are_lent(scene):
     frames = locked(np.stack([TRIANGLE, ACROSS]).astype(np.float32))
-    scene.lend_positions(1, frames[1])
+    scene.set_positions(1, frames[1], copy=False)
     of_bytes = np.frombuffer(TRIANGLE.astype(np.float32).tobytes(), np.float32).reshape(-1, 3)
-    scene.lend_positions(0, of_bytes)
+    scene.set_positions(0, of_bytes, copy=False)
     assert np.array_equal(scene.positions(0), TRIANGLE) and np.array_equal(scene.positions(1), ACROSS)
     scene.remove(1)
 
@@ -171,9 +171,9 @@ def test_arrays_that_can_be_written_are_not_lent(scene):
         (locked(np.full((3, 3), np.nan)), r"^vertices\[0, 0\] = nan: a position must be finite"),
         (locked(np.zeros((3, 2))), r"^vertices: shape \(n, 3\) expected"),
     ]:
-        for lend in (scene.lend_positions, scene.lend_end_positions):
+        for lend in (scene.set_positions, scene.set_end_positions):
             with pytest.raises(ValueError, match=words):
-                lend(1, array)
+                lend(1, array, copy=False)
     assert np.array_equal(scene.positions(1), ACROSS) and scene.end_positions(1) is None
 
 

@@ -21,7 +21,7 @@ def scene():
 
 
 def test_a_rod_through_a_plate_is_near_it(scene):
-    near = impinge.Detector(backend="cpu").within_distance(scene, 2.0, between=True, distances=True, closest_points=True)
+    near = impinge.Detector("cpu").near(scene, 2.0, which="between", distances=True, closest_points=True)
     assert len(near.of("ef")) == len(near) == 8
     assert not near.distances.any()
     assert {impinge.TYPES[number] for number in near.types} == {"E_T"}
@@ -29,7 +29,7 @@ def test_a_rod_through_a_plate_is_near_it(scene):
 
 
 def test_a_start_that_intersects_is_not_free_if_asked(scene):
-    detector = impinge.Detector(backend="cpu")
+    detector = impinge.Detector("cpu")
     assert detector.is_free(scene)
     assert not detector.is_free(scene, start="verify")
     assert detector.earliest(scene, start="verify") is None and detector.start_intersects is True
@@ -44,13 +44,13 @@ def test_a_start_that_intersects_is_not_free_if_asked(scene):
     assert advance.fraction == 0.0 and advance.start_intersects is True and advance.first is None
     advance.apply(scene)
     assert np.array_equal(scene.positions(1), ROD)
-    assert detector.advance(scene, start="verify", ignore=[(0, 1)]).start_intersects is False
+    assert detector.advance(scene, start="verify", exclude=[(0, 1)]).start_intersects is False
 
 
 def test_seams_are_refused_by_name():
     vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float)
     faces = [[0, 1, 2], [3, 4, 5]]
-    detector = impinge.Detector(backend="cpu")
+    detector = impinge.Detector("cpu")
     scene = impinge.Scene()
     scene.set_end_positions(scene.add(vertices, faces), vertices + [0, 0, 1])
     with pytest.raises(impinge.Seam, match="vertices 1 and 3 are at one position but not shared.*weld"):

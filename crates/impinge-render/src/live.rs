@@ -334,7 +334,7 @@ impl Live {
 
     /// Takes the positions of a body's vertices, `(v, 3)` f32 tightly packed, from a buffer of the same device with the usage
     /// `COPY_SRC`, from this byte on: such as that of
-    /// [`Detector::positions_on_device`](impinge::Detector::positions_on_device). They are copied when the encoder's commands run.
+    /// the `positions` of a detector's `Gpu`. They are copied when the encoder's commands run.
     ///
     /// # Errors
     /// No such body; a buffer that ends before the last vertex or lacks its usage; an offset that is no multiple of 4; bounds so

@@ -29,13 +29,13 @@ impl BuiltScene {
         let mut scene = Scene::new();
         let bodies = models
             .into_iter()
-            .map(|model| scene.add(model.elements, model.positions))
+            .map(|model| scene.add((model.elements, model.positions)))
             .collect::<Result<_, _>>()?;
         Ok(BuiltScene {
             name: name.into(),
             scene,
             bodies,
-            query: Query::all(),
+            query: Query::between_all(),
         })
     }
 
@@ -67,7 +67,7 @@ impl BuiltScene {
     /// As [`Scene::add`].
     pub fn within(name: impl Into<String>, model: Model) -> Result<Self, Error> {
         let mut built = BuiltScene::all(name, [model])?;
-        built.query = Query::within(built.bodies[0]);
+        built.query = Query::self_of(built.bodies[0]);
         Ok(built)
     }
 

@@ -65,7 +65,7 @@ impl Model {
     /// # Errors
     /// As [`Scene::add`].
     pub fn add_to(&self, scene: &mut Scene) -> Result<BodyId, Error> {
-        scene.add(self.elements.clone(), self.positions.clone())
+        scene.add((self.elements.clone(), self.positions.clone()))
     }
 }
 

@@ -4,7 +4,7 @@ use impinge::{Detector, Method, Settings};
 use impinge_scenes::{BuiltScene, adversarial, data, solids, surfaces};
 
 fn n_pairs(built: &BuiltScene) -> usize {
-    let mut detector = Detector::with_settings(Settings {
+    let mut detector = Detector::new(Settings {
         method: Method::Naive,
         ..Settings::default()
     })

@@ -34,7 +34,7 @@ pub struct Merged {
     /// The query that all tiles answered, in words.
     pub asked: String,
     /// The rows `file_a, primitive_a, file_b, primitive_b` (u32, sorted); in a step, a structured array of `kind`, `body_a`,
-    /// `element_a`, `body_b`, `element_b` and `toi`, as `impinge step --impacts` writes it.
+    /// `element_a`, `body_b`, `element_b` and `toi`, as `impinge step --rows` writes it.
     pub rows: PathBuf,
     /// What else is known of a step.
     pub step: Option<MergedStep>,

@@ -40,7 +40,7 @@ pub struct PlanOptions {
     /// Whether the scene moves: a body is then two files with the same elements, its start and its end, and tiles find the
     /// first contacts between them.
     pub step: bool,
-    /// In a step: the distance that elements must keep, as [`impinge::Step::separation`].
+    /// In a step: the distance that elements must keep, as [`impinge::Query::separation`].
     pub separation: f64,
     /// Cells to use instead of those that the plan would choose.
     pub cells: Option<Cells>,

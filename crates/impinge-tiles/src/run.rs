@@ -9,7 +9,9 @@ use std::fs;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use impinge::{Backend, Control, Detector, Query, Settings, SharedVertex, Start, Toi, hash_rows};
+use impinge::{
+    Backend, Control, Detector, Precision, Query, Settings, SharedVertex, Start, hash_rows,
+};
 use serde_json::{Value, json};
 
 use self::ranges::both;
@@ -31,7 +33,7 @@ pub struct Ask {
     /// In a step: what happens to pairs that touch at its start.
     pub start: Start,
     /// In a step: the precision to which times are rounded down.
-    pub toi: Toi,
+    pub precision: Precision,
 }
 
 impl Default for Ask {
@@ -41,7 +43,7 @@ impl Default for Ask {
             within: true,
             shared_vertex: SharedVertex::default(),
             start: Start::Report,
-            toi: Toi::F32,
+            precision: Precision::F32,
         }
     }
 }
@@ -61,7 +63,7 @@ impl Ask {
         if self.start == Start::Skip {
             name += ", contacts at the start skipped";
         }
-        if self.toi == Toi::F64 {
+        if self.precision == Precision::F64 {
             name += ", times in f64";
         }
         name
@@ -69,9 +71,9 @@ impl Ask {
 
     fn query(self) -> Query {
         match (self.between, self.within) {
-            (true, true) => Query::everything(),
-            (true, false) => Query::all(),
-            (false, _) => Query::all_within(),
+            (true, true) => Query::all(),
+            (true, false) => Query::between_all(),
+            (false, _) => Query::self_all(),
         }
         .shared_vertex(self.shared_vertex)
     }
@@ -117,7 +119,7 @@ pub(crate) struct OfStep {
     /// The elements that the tile lists so that merging can number them, and the hash of that list.
     pub n_names: u64,
     pub names_hash: u64,
-    pub toi: Toi,
+    pub toi: Precision,
 }
 
 impl Plan {
@@ -144,12 +146,12 @@ impl Plan {
     /// are kept. `done` gets the result of each tile.
     ///
     /// # Errors
-    /// No such tile; parts that are missing, stale or damaged; errors of [`Detector::detect_with`]; cancellation.
+    /// No such tile; parts that are missing, stale or damaged; errors of [`Detector::detect`]; cancellation.
     pub fn run(
         &self,
         tiles: impl IntoIterator<Item = u32>,
         options: &RunOptions,
-        control: &Control<'_>,
+        control: Control,
         done: &mut dyn FnMut(&TileResult),
     ) -> Result<(), Error> {
         self.check_ask(options.ask)?;
@@ -163,7 +165,8 @@ impl Plan {
             settings.backend = Backend::Cpu;
         }
         let refused = |source| Error::Detection { tile: 0, source };
-        let mut detector = Detector::with_settings(settings).map_err(refused)?;
+        let mut detector = Detector::new(settings).map_err(refused)?;
+        detector.set_control(control);
         self.check_parts()?;
         disk::folder(&self.folder().join("results"))?;
         for tile in tiles {
@@ -182,7 +185,7 @@ impl Plan {
                     was_kept: true,
                     ..held
                 },
-                None => self.run_tile(tile, ask, &mut detector, control)?,
+                None => self.run_tile(tile, ask, &mut detector)?,
             };
             done(&result);
         }
@@ -207,7 +210,9 @@ impl Plan {
             false if ask.start == Start::Skip => {
                 refuse("start", "skip", "only report without a step")
             }
-            false if ask.toi == Toi::F64 => refuse("toi", "f64", "only f32 without a step"),
+            false if ask.precision == Precision::F64 => {
+                refuse("precision", "f64", "only f32 without a step")
+            }
             _ => Ok(()),
         }
     }
@@ -228,32 +233,23 @@ impl Plan {
         }
     }
 
-    fn run_tile(
-        &self,
-        tile: u32,
-        ask: Ask,
-        detector: &mut Detector,
-        control: &Control<'_>,
-    ) -> Result<TileResult, Error> {
+    fn run_tile(&self, tile: u32, ask: Ask, detector: &mut Detector) -> Result<TileResult, Error> {
         let mut records = Records::default();
         for (unit_ix, unit) in self.units().enumerate() {
             records.add(self.read_segment(unit_ix, unit, tile)?);
         }
         if self.is_step() {
-            return self.run_step_tile(tile, &records, ask, detector, control);
+            return self.run_step_tile(tile, &records, ask, detector);
         }
         let n = records.len();
         let pieces = self.pieces(n);
         let (mut rows, mut n_elsewhere) = (Vec::new(), 0);
-        let refused = refused(tile);
+        let (query, refused) = (ask.query(), refused(tile));
         for (ix, a) in pieces.iter().enumerate() {
             for b in &pieces[ix..] {
                 let ranges = both(a, b);
                 let part = records.scene(&ranges, self.weld).map_err(refused)?;
-                let query = ask.query();
-                let pairs = detector
-                    .detect_with(&part.scene, &query, control)
-                    .map_err(refused)?;
+                let pairs = detector.detect(&part.scene, &query).map_err(refused)?;
                 for row in pairs.rows() {
                     let (first, second) =
                         (part.record(row[0], row[1]), part.record(row[2], row[3]));
@@ -326,7 +322,7 @@ impl Plan {
         if let Some(step) = result.step {
             object["names"] = json!(step.n_names);
             object["names_hash"] = json!(format!("{:016x}", step.names_hash));
-            object["toi_bytes"] = json!(if step.toi == Toi::F64 { 8 } else { 4 });
+            object["toi_bytes"] = json!(if step.toi == Precision::F64 { 8 } else { 4 });
         }
         disk::replace(&self.result_path(result.tile), |to| {
             writeln!(to, "{object}")
@@ -353,8 +349,8 @@ impl Plan {
                         n_names: n.as_u64()?,
                         names_hash: hex("names_hash")?,
                         toi: match number("toi_bytes")? {
-                            4 => Toi::F32,
-                            8 => Toi::F64,
+                            4 => Precision::F32,
+                            8 => Precision::F64,
                             _ => return None,
                         },
                     }),

@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use impinge::{Detector, Method, NearQuery, PairKind, Pairs, Scene, Settings, Step};
+use impinge::{Detector, Method, PairKind, Pairs, Scene, Settings};
 use impinge_render::wgpu;
 
 use crate::options::{Backend, Question};
@@ -47,8 +47,8 @@ impl Finder {
     }
 
     /// The detector, if it answers on the device of the window.
-    pub fn on_device(&self) -> Option<&Detector> {
-        let ((_, backend), detector) = self.detector.as_ref()?;
+    pub fn on_device(&mut self) -> Option<&mut Detector> {
+        let ((_, backend), detector) = self.detector.as_mut()?;
         (*backend == Backend::Gpu).then_some(detector)
     }
 
@@ -67,12 +67,11 @@ impl Finder {
         }
         let started = Instant::now();
         let detector = self.detector(question, device)?;
-        if let Err(error) = detector.detect(scene, &question.query()) {
+        let pairs = detector.detect(scene, &question.query()).map_err(|error| {
             // A detector whose device is lost finds nothing again.
             self.detector = None;
-            return Err(error.to_string());
-        }
-        let pairs = detector.take_pairs();
+            error.to_string()
+        })?;
         let ms = started.elapsed().as_secs_f64() * 1e3;
         let stats = pairs.stats();
         Ok(Answer {
@@ -107,7 +106,7 @@ impl Finder {
                     (Backend::Gpu, Some((device, queue))) => {
                         Detector::with_device(device.clone(), queue.clone(), settings)
                     }
-                    _ => Detector::with_settings(settings),
+                    _ => Detector::new(settings),
                 }
                 .map_err(|error| error.to_string())?
             }
@@ -118,17 +117,12 @@ impl Finder {
 
 /// A detector on one thread of the CPU: for work beside the window.
 pub(crate) fn quiet_detector() -> Result<Detector, impinge::Error> {
-    Detector::with_settings(Settings {
+    Detector::new(Settings {
         backend: impinge::Backend::Cpu,
         threads: 1,
         max_pairs: Some(MAX_PAIRS),
         ..Settings::default()
     })
-}
-
-/// The step of a question.
-pub(crate) fn step(question: &Question) -> Step {
-    Step::new(question.query())
 }
 
 /// The intersection curves as segments.
@@ -150,25 +144,23 @@ pub(crate) fn near(
     question: &Question,
     distance: f64,
 ) -> Result<(Vec<Vec<u32>>, usize), String> {
-    let query = NearQuery::new(question.query())
-        .kinds([PairKind::FaceFace])
-        .distance(distance);
+    let query = question.query().kinds([PairKind::FaceFace]);
     let mut detector = quiet_detector().map_err(|error| error.to_string())?;
     let pairs = detector
-        .within_distance(stage.scene(), &query)
+        .near(stage.scene(), distance, &query)
         .map_err(|error| error.to_string())?;
     let near = stage.content.bodies.iter().map(|shown| {
         let elements = pairs
             .iter()
             .flat_map(|pair| [pair.a, pair.b])
             .filter(|element| element.body == shown.id);
-        let mut faces: Vec<u32> = elements.map(|element| element.primitive).collect();
+        let mut faces: Vec<u32> = elements.map(|element| element.element).collect();
         faces.sort_unstable();
         faces.dedup();
         let is_tetrahedra = stage
             .scene()
             .body(shown.id)
-            .is_ok_and(|body| body.kind() == impinge::Kind::Tetrahedra);
+            .is_ok_and(|body| body.kind() == impinge::BodyKind::Tetrahedra);
         // Boundary faces of tetrahedra have numbers of their own; such bodies keep their colours.
         match is_tetrahedra {
             true => Vec::new(),

@@ -130,8 +130,8 @@ pub(crate) struct Question {
 impl Question {
     pub fn query(&self) -> Query {
         let query = match self.within {
-            true => Query::everything(),
-            false => Query::all(),
+            true => Query::all(),
+            false => Query::between_all(),
         };
         query.shared_vertex(self.shared_vertex)
     }

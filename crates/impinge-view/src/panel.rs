@@ -305,12 +305,12 @@ fn selection(ui: &mut Ui, session: &mut Session) {
     }
 }
 
-fn kind(kind: impinge::Kind) -> &'static str {
+fn kind(kind: impinge::BodyKind) -> &'static str {
     match kind {
-        impinge::Kind::Tetrahedra => "tetrahedron",
-        impinge::Kind::Triangles => "triangle",
-        impinge::Kind::Edges => "edge",
-        impinge::Kind::Points => "point",
+        impinge::BodyKind::Tetrahedra => "tetrahedron",
+        impinge::BodyKind::Triangles => "triangle",
+        impinge::BodyKind::Edges => "edge",
+        impinge::BodyKind::Points => "point",
     }
 }
 

@@ -88,7 +88,7 @@ impl Screen {
     pub fn send_positions(
         &mut self,
         stage: &Stage,
-        detector: Option<&Detector>,
+        mut detector: Option<&mut Detector>,
     ) -> Result<(), String> {
         let device = &self.state.device;
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
@@ -97,10 +97,10 @@ impl Screen {
                 .scene()
                 .body(shown.id)
                 .map_err(|error| error.to_string())?;
-            let there =
-                detector.and_then(|detector| detector.positions_on_device(stage.scene(), shown.id));
+            let gpu = detector.as_deref_mut().and_then(Detector::gpu);
+            let there = gpu.and_then(|gpu| gpu.positions(stage.scene(), shown.id));
             let copied = there.is_some_and(|(buffer, offset)| {
-                let copied = self.live.copy_positions(&mut encoder, ix, buffer, offset);
+                let copied = self.live.copy_positions(&mut encoder, ix, &buffer, offset);
                 copied.is_ok()
             });
             if !copied {

@@ -4,12 +4,12 @@ use std::path::PathBuf;
 
 use eframe::egui;
 use egui_wgpu::RenderState;
-use impinge::{Method, Primitive};
+use impinge::{Element, Method};
 use impinge_render::{Focus, Look, Orbit};
 
 use crate::content::Content;
 use crate::drag::Drag;
-use crate::find::{Answer, Finder, curves, near, quiet_detector, step};
+use crate::find::{Answer, Finder, curves, near, quiet_detector};
 use crate::flight::Flight;
 use crate::options::{Backend, Options, Question, Shows};
 use crate::pick::{Hit, pick};
@@ -345,16 +345,16 @@ impl Session {
         let Some(id) = self.stage.id(body) else {
             return Vec::new();
         };
-        let own = Primitive {
+        let own = Element {
             body: id,
-            primitive,
+            element: primitive,
         };
-        let number = |other: Primitive| {
+        let number = |other: Element| {
             let bodies = &self.stage.content.bodies;
             let body = bodies.iter().position(|shown| shown.id == other.body)?;
-            Some((body, other.primitive))
+            Some((body, other.element))
         };
-        let other = |(a, b): (Primitive, Primitive)| match (a == own, b == own) {
+        let other = |(a, b): (Element, Element)| match (a == own, b == own) {
             (true, _) => number(b),
             (_, true) => number(a),
             _ => None,
@@ -611,7 +611,7 @@ impl Session {
         }
         let mut detector = quiet_detector().map_err(|error| error.to_string())?;
         let impacts = detector
-            .impacts(self.stage.scene(), &step(&self.question))
+            .impacts(self.stage.scene(), &self.question.query())
             .map_err(|error| error.to_string())?;
         for (ix, shown) in self.stage.content.bodies.iter().enumerate() {
             let body = self
@@ -619,7 +619,7 @@ impl Session {
                 .scene()
                 .body(shown.id)
                 .map_err(|error| error.to_string())?;
-            let times = first_times(body, shown.id, impacts);
+            let times = first_times(body, shown.id, &impacts);
             marks[ix] = times.iter().map(|&(primitive, _)| primitive).collect();
             colors[ix].extend(
                 times

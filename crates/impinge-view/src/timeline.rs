@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use impinge::{CancelToken, Control};
 
-use crate::find::{quiet_detector, step};
+use crate::find::quiet_detector;
 use crate::options::Question;
 use crate::stage::Stage;
 
@@ -156,7 +156,7 @@ impl Worker {
         };
         let query = self.question.query();
         let cancel = self.cancel.clone();
-        let control = Control::new().cancel(&cancel);
+        detector.set_control(Control::new().cancel(&cancel));
         for frame_ix in 0..n_frames {
             if cancel.is_cancelled() {
                 return;
@@ -165,7 +165,7 @@ impl Worker {
             let posed = self.stage.pose(frame_ix);
             let count = posed.and_then(|()| {
                 let scene = self.stage.scene();
-                let n = detector.count_with(scene, &query, &control);
+                let n = detector.count(scene, &query);
                 n.map_err(|error| error.to_string())
             });
             self.tell(News::Count(
@@ -177,7 +177,6 @@ impl Worker {
         if !with_impacts {
             return;
         }
-        let step = step(&self.question);
         let mut scratch = self.stage.clone();
         for frame_ix in 0..n_frames.saturating_sub(1) {
             if cancel.is_cancelled() {
@@ -192,7 +191,7 @@ impl Worker {
                 continue;
             }
             // A step that is refused stays unknown: its frames show why.
-            if let Ok(first) = detector.earliest_with(self.stage.scene(), &step, &control) {
+            if let Ok(first) = detector.earliest(self.stage.scene(), &query) {
                 self.tell(News::Earliest(frame_ix, first.map(|impact| impact.toi)));
             }
             self.rest(started);

@@ -14,11 +14,11 @@ pub(crate) fn first_times(body: &Body, id: BodyId, impacts: &Impacts) -> Vec<(u3
             if element.body != id {
                 continue;
             }
-            let ix = element.primitive as usize;
+            let ix = element.element as usize;
             let corners = match part {
                 Part::Edges => edges.corners(ix),
                 Part::Faces => faces.corners(ix),
-                _ => &[element.primitive],
+                _ => &[element.element],
             };
             let first = times.entry(key(corners)).or_insert(impact.toi);
             *first = first.min(impact.toi);
@@ -76,7 +76,7 @@ pub(crate) fn color(toi: f64) -> [u8; 3] {
 
 #[cfg(test)]
 mod tests {
-    use impinge::{Backend, Detector, Query, Scene, Step};
+    use impinge::{Backend, Detector, Query, Scene};
 
     use super::*;
 
@@ -97,9 +97,9 @@ mod tests {
         scene.set_end_positions(high, &end).expect("as many");
         let mut detector = Detector::new(Backend::Cpu).expect("a detector");
         let impacts = detector
-            .impacts(&scene, &Step::new(Query::all()))
+            .impacts(&scene, &Query::between_all())
             .expect("an answer");
-        let of = |id| first_times(scene.body(id).expect("there"), id, impacts);
+        let of = |id| first_times(scene.body(id).expect("there"), id, &impacts);
         assert_eq!(of(high), [(0, 0.25), (1, 0.5)]);
         assert_eq!(of(low), [(0, 0.25)]);
         assert_eq!(color(0.0), [214, 39, 40]);

@@ -11,7 +11,7 @@ use egui_kittest::kittest::Queryable as _;
 use egui_kittest::wgpu::{WgpuTestRenderer, create_render_state, default_wgpu_setup};
 use egui_wgpu::wgpu::PollType;
 use egui_wgpu::{RenderState, RendererOptions};
-use impinge::{Backend, BodyId, Detector, Positions, Query, Scene, SharedVertex, Step};
+use impinge::{Backend, BodyId, Detector, Positions, Query, Scene, SharedVertex};
 use impinge_io::Sequence;
 use impinge_render::{Colors, Focus};
 use impinge_scenes::surfaces::ball;
@@ -201,7 +201,7 @@ fn drag(harness: &mut Harness<'static, Viewer>, from: Pos2, by: [f32; 2]) {
 fn expected(content: &Content) -> Vec<(u64, u64)> {
     let mut detector = Detector::new(Backend::Cpu).expect("a detector");
     let mut scene = content.scene.clone();
-    let query = Query::all().shared_vertex(SharedVertex::Resolve);
+    let query = Query::between_all().shared_vertex(SharedVertex::Resolve);
     let frames = content.frames.clone().expect("it moves");
     (0..frames.n_frames())
         .map(|frame_ix| {
@@ -223,7 +223,7 @@ fn the_answer_is_that_of_the_library() {
     let content = still(600, 0.5);
     let mut detector = Detector::new(Backend::Cpu).expect("a detector");
     let pairs = detector
-        .detect(&content.scene, &Query::all())
+        .detect(&content.scene, &Query::between_all())
         .expect("an answer");
     let (n, hash) = (pairs.len(), pairs.hash());
     assert!(n > 0);
@@ -325,7 +325,7 @@ fn self_collision_and_neighbours_change_the_answer_as_the_library_says() {
         .expect("a body");
     let mut detector = Detector::new(Backend::Cpu).expect("a detector");
     let mut count = |rule| {
-        let query = Query::everything().shared_vertex(rule);
+        let query = Query::all().shared_vertex(rule);
         detector.detect(&scene, &query).expect("an answer").len()
     };
     let (resolved, skipped) = (count(SharedVertex::Resolve), count(SharedVertex::Skip));
@@ -435,7 +435,7 @@ fn the_earliest_impacts_are_those_of_the_library() {
         };
         scene.set_positions(id, &start).expect("accepted");
         scene.set_end_positions(id, &end).expect("accepted");
-        let step = Step::new(Query::all());
+        let step = Query::between_all();
         let first = detector.earliest(&scene, &step).expect("an answer");
         expected.push(Some(first.map(|impact| impact.toi)));
     }
@@ -1043,7 +1043,9 @@ fn places_are_listed_as_the_program_numbers_them_and_can_be_clicked() {
     }
     scene.add_triangles(&faces, &positions).expect("balls");
     let mut detector = Detector::new(Backend::Cpu).expect("a detector");
-    let pairs = detector.detect(&scene, &Query::all()).expect("an answer");
+    let pairs = detector
+        .detect(&scene, &Query::between_all())
+        .expect("an answer");
     let expected: Vec<usize> = pairs
         .places(&scene)
         .expect("places")

@@ -1,335 +1,382 @@
 //! The functions that JavaScript calls. `web/package` wraps them; their names are private to the package.
+//!
+//! An error is thrown as a string: its code, a line break, its text.
 
-use impinge::{Backend, Detector, PairKind, Positions, Settings, Statistics};
-use js_sys::{Array, Float32Array, Float64Array, Object, Reflect, Uint8Array, Uint32Array};
+use std::cell::RefCell;
+
+use impinge::{
+    Backend, BodyKind, CancelToken, Control, Method, Part, Positions, Real, Recluster, Settings,
+    Stats,
+};
+use js_sys::{Array, Float32Array, Float64Array, Function, Uint8Array, Uint32Array};
 use wasm_bindgen::prelude::*;
 
+use crate::answer::Answer;
+use crate::ask::{Asker, Question};
 use crate::error::Error;
-use crate::step::{FlatImpacts, StepOptions};
-use crate::world::{Asked, World, welded};
+use crate::world::{Put, World, welded};
 
-fn thrown(error: Error) -> JsError {
-    JsError::new(&error.to_string())
+type Thrown<T> = Result<T, JsValue>;
+
+fn thrown(error: impl Into<Error>) -> JsValue {
+    let error = error.into();
+    JsValue::from_str(&format!("{}\n{error}", error.code()))
 }
 
-/// A world, and the hash and the statistics of its last answer.
-#[wasm_bindgen]
-pub struct Engine {
-    world: World,
-    hash: u64,
-    statistics: Object,
+/// An entry of a list by the number that the package has for it.
+fn entry<T: Copy, const N: usize>(list: [T; N], number: u32) -> Thrown<T> {
+    let found = list.get(number as usize).copied();
+    found.ok_or_else(|| thrown(Error::Foreign))
 }
 
+thread_local! {
+    /// `(watcher, done, total)`: whether to stop the question that this watcher watches.
+    static WATCH: RefCell<Option<Function>> = const { RefCell::new(None) };
+}
+
+/// Sets the function that looks at questions while they are answered.
 #[wasm_bindgen]
-impl Engine {
-    /// An engine on the CPU.
-    #[wasm_bindgen(constructor)]
-    pub fn new(method: &str, shared_vertex: &str) -> Result<Engine, JsError> {
-        let settings = Settings {
-            backend: Backend::Cpu,
-            ..World::settings(method).map_err(thrown)?
-        };
-        Engine::of(Detector::with_settings(settings)?, shared_vertex)
-    }
+pub fn set_watch(watch: Function) {
+    WATCH.set(Some(watch));
+}
 
-    /// An engine on the browser's WebGPU device. Software devices are allowed.
-    #[cfg(feature = "gpu")]
-    pub async fn webgpu(method: String, shared_vertex: String) -> Result<Engine, JsError> {
-        let settings = Settings {
-            backend: Backend::Gpu,
-            ..World::settings(&method).map_err(thrown)?
-        };
-        let detector = Detector::with_settings_async(settings).await?;
-        Engine::of(detector, &shared_vertex)
+/// What a question with this watcher heeds; nothing if it is 0.
+fn control(watcher: u32) -> Control {
+    if watcher == 0 {
+        return Control::new();
     }
+    let stop = CancelToken::new();
+    let stopped = stop.clone();
+    Control::new().cancel(&stop).progress(move |at| {
+        let stops = WATCH.with_borrow(|watch| {
+            let (done, total) = (
+                JsValue::from(at.done as f64),
+                JsValue::from(at.total as f64),
+            );
+            let said = watch
+                .as_ref()?
+                .call3(&JsValue::NULL, &watcher.into(), &done, &total);
+            said.ok()
+        });
+        if stops.is_some_and(|stops| stops.is_truthy()) {
+            stopped.cancel();
+        }
+    })
+}
 
-    fn of(detector: Detector, shared_vertex: &str) -> Result<Engine, JsError> {
-        Ok(Engine {
-            world: World::new(detector, shared_vertex).map_err(thrown)?,
-            hash: 0,
-            statistics: Object::new(),
-        })
-    }
+/// A scene.
+#[wasm_bindgen]
+pub struct SceneHandle(World);
 
-    /// Adds a body in single precision; see [`World::add`].
-    pub fn add_f32(
+impl SceneHandle {
+    fn put<R: Real>(
         &mut self,
+        [what, body, kind]: [u32; 3],
+        index: &[u32],
+        positions: &[R],
+    ) -> Thrown<u32>
+    where
+        Vec<[R; 3]>: Into<Positions>,
+    {
+        let (what, kind) = (entry(Put::ALL, what)?, entry(BodyKind::ALL, kind)?);
+        let put = self.0.put(what, body, kind, index, positions);
+        put.map_err(thrown)
+    }
+}
+
+#[wasm_bindgen]
+impl SceneHandle {
+    /// An empty scene.
+    #[wasm_bindgen(constructor)]
+    pub fn new() -> SceneHandle {
+        SceneHandle(World::new())
+    }
+
+    /// See [`World::put`].
+    pub fn put_f32(
+        &mut self,
+        what: u32,
+        body: u32,
+        kind: u32,
         index: &[u32],
         positions: &[f32],
-        corners: usize,
-    ) -> Result<u32, JsError> {
-        self.world.add(index, positions, corners).map_err(thrown)
+    ) -> Thrown<u32> {
+        self.put([what, body, kind], index, positions)
     }
 
-    /// Adds a body in double precision; see [`World::add`].
-    pub fn add_f64(
+    /// See [`World::put`].
+    pub fn put_f64(
         &mut self,
+        what: u32,
+        body: u32,
+        kind: u32,
         index: &[u32],
         positions: &[f64],
-        corners: usize,
-    ) -> Result<u32, JsError> {
-        self.world.add(index, positions, corners).map_err(thrown)
+    ) -> Thrown<u32> {
+        self.put([what, body, kind], index, positions)
     }
 
-    /// See [`World::set_positions`].
-    pub fn set_positions_f32(&mut self, body: u32, positions: &[f32]) -> Result<(), JsError> {
-        self.world.set_positions(body, positions).map_err(thrown)
+    /// See [`World::clear_end_positions`].
+    pub fn clear_end_positions(&mut self, body: u32) -> Thrown<()> {
+        self.0.clear_end_positions(body).map_err(thrown)
     }
 
-    /// See [`World::set_positions`].
-    pub fn set_positions_f64(&mut self, body: u32, positions: &[f64]) -> Result<(), JsError> {
-        self.world.set_positions(body, positions).map_err(thrown)
+    /// See [`World::set_transform`].
+    pub fn set_transform(&mut self, body: u32, columns: &[f64]) -> Thrown<()> {
+        let columns = columns.try_into().map_err(|_| thrown(Error::Foreign))?;
+        self.0.set_transform(body, columns).map_err(thrown)
     }
 
-    /// See [`World::set_end_positions`].
-    pub fn set_end_positions_f32(&mut self, body: u32, positions: &[f32]) -> Result<(), JsError> {
-        let set = self.world.set_end_positions(body, positions);
-        set.map_err(thrown)
+    /// See [`World::set_filter`].
+    pub fn set_filter(&mut self, body: u32, category: u64, mask: u64) -> Thrown<()> {
+        self.0.set_filter(body, category, mask).map_err(thrown)
     }
 
-    /// See [`World::set_end_positions`].
-    pub fn set_end_positions_f64(&mut self, body: u32, positions: &[f64]) -> Result<(), JsError> {
-        let set = self.world.set_end_positions(body, positions);
-        set.map_err(thrown)
+    /// See [`World::set_thickness`].
+    pub fn set_thickness(&mut self, body: u32, thickness: f64) -> Thrown<()> {
+        self.0.set_thickness(body, thickness).map_err(thrown)
     }
 
     /// See [`World::remove`].
-    pub fn remove(&mut self, body: u32) -> Result<(), JsError> {
-        self.world.remove(body).map_err(thrown)
+    pub fn remove(&mut self, body: u32) -> Thrown<()> {
+        self.0.remove(body).map_err(thrown)
     }
 
-    /// The numbers of primitives and of vertices of a body.
-    pub fn size(&self, body: u32) -> Result<Vec<u32>, JsError> {
-        let (n_primitives, n_vertices) = self.world.size(body).map_err(thrown)?;
+    /// The number of corners of the elements of a body, of its elements, of its vertices.
+    pub fn size(&self, body: u32) -> Thrown<Vec<u32>> {
+        let body = self.0.body(body).map_err(thrown)?;
+        let corners = body.kind().n_corners();
         // The library refuses bodies with more than 32 bits can count.
-        Ok(vec![n_primitives as u32, n_vertices as u32])
+        let numbers = [corners, body.elements().len(), body.n_vertices()];
+        Ok(numbers.map(|n| n as u32).to_vec())
     }
 
-    /// See [`World::detect`]; `bodies` and `with_self` as in [`Asked::of`].
-    pub fn detect(&mut self, bodies: &[u32], with_self: bool) -> Result<Vec<u32>, JsError> {
-        let asked = Asked::of(bodies, with_self).map_err(thrown)?;
-        let (numbers, pairs) = self.world.detect(asked).map_err(thrown)?;
-        self.hash = pairs.hash();
-        self.statistics = statistics(pairs.stats())?;
-        Ok(numbers)
+    /// The vertices of the elements of a part: 0 as given, 1 edges, 2 faces.
+    pub fn index(&self, body: u32, part: u32) -> Thrown<Vec<u32>> {
+        let part = entry([Part::Given, Part::Edges, Part::Faces], part)?;
+        self.0.index(body, part).map_err(thrown)
     }
 
-    /// [`detect`](Engine::detect) without blocking.
-    #[cfg(feature = "gpu")]
-    pub async fn detect_async(
-        &mut self,
-        bodies: Vec<u32>,
-        with_self: bool,
-    ) -> Result<Vec<u32>, JsError> {
-        let asked = Asked::of(&bodies, with_self).map_err(thrown)?;
-        let (numbers, pairs) = self.world.detect_async(asked).await.map_err(thrown)?;
-        self.hash = pairs.hash();
-        self.statistics = statistics(pairs.stats())?;
-        Ok(numbers)
-    }
-
-    /// See [`World::impacts`]: `[kinds, rows, times, at_start]`.
-    pub fn impacts(&mut self, step: StepQuestion) -> Result<Array, JsError> {
-        let (impacts, hash) = self
-            .world
-            .impacts(step.asked, step.options)
-            .map_err(thrown)?;
-        self.hash = hash;
-        self.statistics = statistics(self.world.step_stats())?;
-        Ok(arrays(&impacts))
-    }
-
-    /// See [`World::earliest`]: `[kinds, rows, times, at_start]`. The hash stays that of the answer before.
-    pub fn earliest(&mut self, step: StepQuestion) -> Result<Array, JsError> {
-        let earliest = self
-            .world
-            .earliest(step.asked, step.options)
-            .map_err(thrown)?;
-        self.statistics = statistics(self.world.step_stats())?;
-        Ok(arrays(&earliest))
-    }
-
-    /// See [`World::is_free`].
-    pub fn is_free(&mut self, step: StepQuestion) -> Result<bool, JsError> {
-        let is_free = self
-            .world
-            .is_free(step.asked, step.options)
-            .map_err(thrown)?;
-        self.statistics = statistics(self.world.step_stats())?;
-        Ok(is_free)
-    }
-
-    /// See [`World::advance`]: `[fraction, n_tried, first, bodies, positions]`.
-    pub fn advance(&mut self, step: StepQuestion) -> Result<Array, JsError> {
-        let answer = self.world.advance(step.asked, step.options);
-        let (advance, first, moving) = answer.map_err(thrown)?;
-        self.statistics = statistics(self.world.step_stats())?;
-        let reached = advance.positions.iter().map(|(_, rows)| match rows {
-            Positions::F32(rows) => JsValue::from(Float32Array::from(rows.as_flattened())),
-            Positions::F64(rows) => Float64Array::from(rows.as_flattened()).into(),
-        });
-        Ok(Array::of5(
-            &JsValue::from_f64(advance.fraction),
-            &JsValue::from_f64(f64::from(advance.n_tried)),
-            &arrays(&first),
-            &Uint32Array::from(&moving[..]),
-            &reached.collect::<Array>(),
-        ))
-    }
-
-    /// See [`World::start_intersects`].
-    pub fn start_intersects(&self) -> Option<bool> {
-        self.world.start_intersects()
-    }
-
-    /// The hash of the last answer, 16 hexadecimal digits.
-    pub fn hash(&self) -> String {
-        format!("{:016x}", self.hash)
-    }
-
-    /// Statistics of the last answer.
-    pub fn statistics(&self) -> Object {
-        self.statistics.clone()
-    }
-}
-
-/// A question about a step.
-#[wasm_bindgen]
-pub struct StepQuestion {
-    asked: Asked,
-    options: StepOptions,
-}
-
-#[wasm_bindgen]
-impl StepQuestion {
-    /// `bodies` and `with_self` as in [`Asked::of`]; the rest as in [`StepOptions::new`].
-    #[wasm_bindgen(constructor)]
-    pub fn new(
-        bodies: &[u32],
-        with_self: bool,
-        start: &str,
-        toi: &str,
-        separation: f64,
-        clearance: f64,
-        clearance_share: f64,
-    ) -> Result<StepQuestion, JsError> {
-        let distances = [separation, clearance, clearance_share];
-        Ok(StepQuestion {
-            asked: Asked::of(bodies, with_self).map_err(thrown)?,
-            options: StepOptions::new(start, toi, distances).map_err(thrown)?,
+    /// The positions of a body: 0 now, 1 at the end of the step (`undefined` if it stands still), 2 at rest.
+    pub fn positions(&self, body: u32, which: u32) -> Thrown<JsValue> {
+        let body = self.0.body(body).map_err(thrown)?;
+        Ok(match which {
+            0 => coordinates(body.positions()),
+            1 => body.end_positions().map_or(JsValue::UNDEFINED, coordinates),
+            _ => coordinates(body.rest_positions()),
         })
     }
+
+    /// The numbers of all bodies.
+    pub fn bodies(&self) -> Vec<u32> {
+        self.0.bodies()
+    }
+
+    /// The scene as it is now, for a question that is answered later.
+    #[cfg(feature = "gpu")]
+    pub fn snapshot(&self) -> SceneHandle {
+        SceneHandle(self.0.clone())
+    }
 }
 
-/// The names of the kinds that impacts refer to by number.
+fn coordinates(positions: &Positions) -> JsValue {
+    match positions {
+        Positions::F32(rows) => Float32Array::from(rows.as_flattened()).into(),
+        Positions::F64(rows) => Float64Array::from(rows.as_flattened()).into(),
+    }
+}
+
+/// A detector. One on a device asks it which elements intersect; all else is answered on the CPU.
 #[wasm_bindgen]
-pub fn kind_names() -> Vec<String> {
-    PairKind::ALL.map(|kind| kind.name().to_owned()).into()
+pub struct DetectorHandle {
+    asker: Asker,
+    #[cfg(feature = "gpu")]
+    device: Option<impinge::Detector>,
+}
+
+/// The method and the rule of new clusterings by their number; the memory budget and the most pairs, -1 for none.
+fn settings(backend: Backend, [method, recluster]: [u32; 2], limits: [f64; 2]) -> Thrown<Settings> {
+    let [memory_budget, max_pairs] = limits.map(|limit| (limit >= 0.0).then_some(limit as u64));
+    Ok(Settings {
+        backend,
+        method: entry(Method::ALL, method)?,
+        recluster: entry([Recluster::Auto, Recluster::Never], recluster)?,
+        memory_budget,
+        max_pairs,
+        ..Settings::default()
+    })
+}
+
+#[wasm_bindgen]
+impl DetectorHandle {
+    /// A detector on the CPU; arguments as in [`settings`].
+    #[wasm_bindgen(constructor)]
+    pub fn new(
+        method: u32,
+        recluster: u32,
+        memory_budget: f64,
+        max_pairs: f64,
+    ) -> Thrown<DetectorHandle> {
+        let settings = settings(
+            Backend::Cpu,
+            [method, recluster],
+            [memory_budget, max_pairs],
+        )?;
+        Ok(DetectorHandle {
+            asker: Asker::new(settings).map_err(thrown)?,
+            #[cfg(feature = "gpu")]
+            device: None,
+        })
+    }
+
+    /// A detector on the browser's WebGPU device. Software devices are allowed.
+    #[cfg(feature = "gpu")]
+    pub async fn open(
+        method: u32,
+        recluster: u32,
+        memory_budget: f64,
+        max_pairs: f64,
+    ) -> Thrown<DetectorHandle> {
+        let (words, limits) = ([method, recluster], [memory_budget, max_pairs]);
+        let on_device = settings(Backend::Gpu, words, limits)?;
+        let device = impinge::Detector::open(on_device).await.map_err(thrown)?;
+        let on_cpu = settings(Backend::Cpu, words, limits)?;
+        Ok(DetectorHandle {
+            asker: Asker::new(on_cpu).map_err(thrown)?,
+            device: Some(device),
+        })
+    }
+
+    /// See [`Asker::ask`]: `[rows, bytes, numbers, words, positions, hash]`.
+    pub fn ask(
+        &mut self,
+        question: u32,
+        scene: &SceneHandle,
+        watcher: u32,
+        words: &[u32],
+        numbers: &[f64],
+    ) -> Thrown<Array> {
+        let question = entry(Question::ALL, question)?;
+        let numbers = numbers.try_into().map_err(|_| thrown(Error::Foreign))?;
+        self.asker.set_control(control(watcher));
+        let answer = self.asker.ask(question, &scene.0, words, numbers);
+        answer.map(|answer| lists(&answer)).map_err(thrown)
+    }
+
+    /// Which elements intersect, found on the device.
+    #[cfg(feature = "gpu")]
+    pub async fn detect(
+        &mut self,
+        scene: SceneHandle,
+        watcher: u32,
+        words: Vec<u32>,
+        numbers: Vec<f64>,
+    ) -> Thrown<Array> {
+        let numbers = &numbers[..].try_into().map_err(|_| thrown(Error::Foreign))?;
+        let query = crate::ask::query(&scene.0, &words, numbers).map_err(thrown)?;
+        let device = self.device.as_mut().ok_or_else(|| thrown(Error::Foreign))?;
+        device.set_control(control(watcher));
+        let pairs = device.detect_async(&scene.0.scene, &query).await;
+        let pairs = pairs.map_err(thrown)?;
+        Ok(lists(&crate::answer::of_pairs(&pairs, &scene.0)))
+    }
+
+    /// How the last question was answered, on the device or on the CPU: texts and numbers.
+    pub fn stats(&self, on_device: bool) -> Array {
+        #[cfg(feature = "gpu")]
+        if let (true, Some(device)) = (on_device, &self.device) {
+            return measured(device.stats());
+        }
+        let _ = on_device;
+        measured(self.asker.stats())
+    }
+}
+
+fn lists(answer: &Answer) -> Array {
+    let positions: Array = answer.positions.iter().map(coordinates).collect();
+    let lists: [JsValue; 6] = [
+        Uint32Array::from(&answer.rows[..]).into(),
+        Uint8Array::from(&answer.bytes[..]).into(),
+        Float64Array::from(&answer.numbers[..]).into(),
+        Uint32Array::from(&answer.words[..]).into(),
+        positions.into(),
+        answer.hash.into(),
+    ];
+    lists.iter().collect()
+}
+
+/// `[backend, method, stage…]` and numbers: total, counts, and the time of each stage.
+fn measured(stats: &Stats) -> Array {
+    let texts = [&stats.backend[..], stats.method].into_iter();
+    let texts = texts.chain(stats.stages.iter().map(|stage| stage.name));
+    // Counts stay far below 2^53.
+    let counts = [
+        stats.n_threads as u64,
+        stats.n_candidates,
+        stats.n_unsure,
+        stats.n_work_items,
+        stats.n_clusters,
+        stats.n_culled,
+        stats.n_clustered,
+        stats.n_reclustered,
+        stats.n_batches,
+        stats.n_pieces,
+        stats.n_reruns,
+        stats.bytes_held,
+    ];
+    let numbers = std::iter::once(stats.total_ms).chain(counts.map(|n| n as f64));
+    let numbers: Vec<f64> = numbers
+        .chain(stats.stages.iter().map(|stage| stage.ms))
+        .collect();
+    Array::of2(
+        &texts.map(JsValue::from_str).collect::<Array>(),
+        &Float64Array::from(&numbers[..]),
+    )
 }
 
 /// Welds vertices at the same position: for each vertex, its number after the welding.
 #[wasm_bindgen]
-pub fn weld_f32(positions: &[f32]) -> Result<Vec<u32>, JsError> {
+pub fn weld_f32(positions: &[f32]) -> Thrown<Vec<u32>> {
     welded(positions).map_err(thrown)
 }
 
 /// [`weld_f32`] in double precision.
 #[wasm_bindgen]
-pub fn weld_f64(positions: &[f64]) -> Result<Vec<u32>, JsError> {
+pub fn weld_f64(positions: &[f64]) -> Thrown<Vec<u32>> {
     welded(positions).map_err(thrown)
 }
 
-fn arrays(impacts: &FlatImpacts) -> Array {
-    Array::of4(
-        &Uint8Array::from(&impacts.kinds[..]),
-        &Uint32Array::from(&impacts.rows[..]),
-        &Float64Array::from(&impacts.times[..]),
-        &Uint8Array::from(&impacts.at_start[..]),
-    )
-}
-
-/// Statistics as an object of JavaScript.
-fn statistics(stats: &Statistics) -> Result<Object, JsError> {
-    let put = |object: &Object, name: &str, value: JsValue| {
-        Reflect::set(object, &JsValue::from_str(name), &value)
-            .map(|_| ())
-            .map_err(|_| JsError::new("statistics cannot be written"))
+/// The mesh of a file, or with `in_bodies` each body in it: `[name, corners, index, positions, map]`.
+#[cfg(feature = "io")]
+#[wasm_bindgen]
+pub fn read(name: &str, bytes: &[u8], weld: bool, in_bodies: bool) -> Thrown<Array> {
+    let meshes = match in_bodies {
+        true => crate::meshes::read_bodies(name, bytes, weld),
+        false => crate::meshes::read(name, bytes, weld).map(|mesh| vec![mesh]),
     };
-    // Counts stay far below 2^53.
-    let count = |n: u64| JsValue::from_f64(n as f64);
-    let object = Object::new();
-    put(&object, "backend", JsValue::from_str(&stats.backend))?;
-    put(&object, "method", JsValue::from_str(stats.method))?;
-    put(&object, "candidates", count(stats.n_candidates))?;
-    put(&object, "unsure", count(stats.n_unsure))?;
-    put(&object, "clusters", count(stats.n_clusters))?;
-    put(&object, "bytesHeld", count(stats.bytes_held))?;
-    put(&object, "totalMs", JsValue::from_f64(stats.total_ms))?;
-    let stages = Object::new();
-    for stage in &stats.stages {
-        put(&stages, stage.name, JsValue::from_f64(stage.ms))?;
-    }
-    put(&object, "stages", stages.into())?;
-    Ok(object)
-}
-
-/// A mesh that was read from a file.
-#[cfg(feature = "io")]
-#[wasm_bindgen]
-pub struct MeshFile(crate::meshes::FileMesh);
-
-#[cfg(feature = "io")]
-#[wasm_bindgen]
-impl MeshFile {
-    /// Reads the bytes of a file. The extension of its name is that of its format.
-    #[wasm_bindgen(constructor)]
-    pub fn new(name: &str, bytes: &[u8], weld: bool) -> Result<MeshFile, JsError> {
-        let mesh = crate::meshes::read(name, bytes, weld);
-        mesh.map(MeshFile).map_err(thrown)
-    }
-
-    /// Reads the bodies of a file: nodes of glTF, objects or groups of OBJ.
-    pub fn bodies(name: &str, bytes: &[u8], weld: bool) -> Result<Vec<MeshFile>, JsError> {
-        let bodies = crate::meshes::read_bodies(name, bytes, weld).map_err(thrown)?;
-        Ok(bodies.into_iter().map(MeshFile).collect())
-    }
-
-    /// The name of the file, or of a node or a group in it.
-    pub fn name(&self) -> String {
-        self.0.name.clone()
-    }
-
-    /// Vertex numbers, [`corners`](MeshFile::corners) per primitive.
-    pub fn index(&self) -> Vec<u32> {
-        self.0.index.clone()
-    }
-
-    /// x, y, z per vertex, as a `Float32Array` if the file is in single precision, else as a `Float64Array`.
-    pub fn positions(&self) -> JsValue {
-        coordinates(&self.0.positions)
-    }
-
-    /// For each vertex of the file, its number in the mesh.
-    pub fn map(&self) -> Vec<u32> {
-        self.0.map.clone()
-    }
-
-    /// 3 for triangles, 4 for tetrahedra.
-    pub fn corners(&self) -> u32 {
-        self.0.corners
-    }
+    let meshes = meshes.map_err(thrown)?;
+    let lists = meshes.iter().map(|mesh| {
+        Array::of5(
+            &JsValue::from_str(&mesh.name),
+            &mesh.corners.into(),
+            &Uint32Array::from(&mesh.index[..]),
+            &read_coordinates(&mesh.positions),
+            &Uint32Array::from(&mesh.map[..]),
+        )
+    });
+    Ok(lists.collect())
 }
 
 /// The frames of a point cache; see [`read_frames`](crate::meshes::read_frames).
 #[cfg(feature = "io")]
 #[wasm_bindgen]
-pub fn read_frames(name: &str, bytes: Vec<u8>) -> Result<Array, JsError> {
+pub fn read_frames(name: &str, bytes: Vec<u8>) -> Thrown<Array> {
     let frames = crate::meshes::read_frames(name, bytes).map_err(thrown)?;
-    Ok(frames.iter().map(coordinates).collect())
+    Ok(frames.iter().map(read_coordinates).collect())
 }
 
 #[cfg(feature = "io")]
-fn coordinates(positions: &impinge_io::Positions) -> JsValue {
+fn read_coordinates(positions: &impinge_io::Positions) -> JsValue {
     use impinge_io::Positions;
     match positions {
         Positions::F32(rows) => Float32Array::from(rows.as_flattened()).into(),

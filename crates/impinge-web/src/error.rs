@@ -1,6 +1,6 @@
-//! Errors, with the text that JavaScript sees.
+//! Errors, with the code and the text that JavaScript sees.
 
-/// Why a call from JavaScript failed. Its text is that of the `Error` thrown there.
+/// Why a call from JavaScript failed.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -14,12 +14,6 @@ pub enum Error {
         number: u32,
         /// The library's error.
         error: impinge::Error,
-    },
-    /// More bodies than a question can name.
-    #[error("bodies: {given} given, 0 (everything), 1 (within it) or 2 (between them) allowed")]
-    Bodies {
-        /// How many were given.
-        given: usize,
     },
     /// A number that no body has.
     #[error("there is no body {number}: {added} have been added, and {removed} of them removed")]
@@ -41,18 +35,25 @@ pub enum Error {
         /// Numbers in a row.
         row: usize,
     },
-    /// An unknown word for a setting.
-    #[error("{what}: \"{given}\" given, {allowed} allowed")]
-    Word {
-        /// Which setting.
-        what: &'static str,
-        /// The word given.
-        given: String,
-        /// The known words.
-        allowed: &'static str,
-    },
+    /// Words that the package does not send.
+    #[error("the package and its module do not fit together")]
+    Foreign,
+    /// An extension that is not that of a point cache.
+    #[cfg(feature = "io")]
+    #[error("the extension of a point cache: \"{0}\" given, \"pc2\" or \"mdd\" allowed")]
+    PointCache(String),
     /// An error of the mesh reader.
     #[cfg(feature = "io")]
     #[error("{0}")]
     Mesh(#[from] impinge_io::Error),
+}
+
+impl Error {
+    /// The code that callers tell errors apart by.
+    pub fn code(&self) -> &'static str {
+        match self {
+            Error::Library(error) | Error::Renumbered { error, .. } => error.code(),
+            _ => "invalid",
+        }
+    }
 }

@@ -88,11 +88,7 @@ impl FileMesh {
 pub fn read_frames(name: &str, bytes: Vec<u8>) -> Result<Vec<Positions>, Error> {
     let extension = name.rsplit('.').next().unwrap_or_default();
     let Some(format) = SequenceFormat::from_extension(extension) else {
-        return Err(Error::Word {
-            what: "the extension of a point cache",
-            given: extension.to_owned(),
-            allowed: "\"pc2\" or \"mdd\"",
-        });
+        return Err(Error::PointCache(extension.to_owned()));
     };
     let sequence = Sequence::from_bytes(bytes, format, name)?;
     let frames = (0..sequence.n_frames()).map(|frame| sequence.frame(frame));

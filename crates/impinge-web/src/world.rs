@@ -1,150 +1,134 @@
-//! A scene whose bodies are numbered 0, 1, 2 … in the order in which they were added, and its detector.
+//! A scene whose bodies are numbered 0, 1, 2 … in the order in which they were added. Numbers are not used again.
 
-use impinge::{
-    Advance, BodyId, Detector, Method, Pairs, Query, Real, Scene, Settings, SharedVertex,
-    Statistics, Weld,
-};
+use impinge::{Body, BodyId, BodyKind, Elements, Filter, Part, Positions, Real, Scene, Weld};
 
 use crate::error::Error;
-use crate::step::{FlatImpacts, StepOptions};
 
-/// Which bodies a question is about.
+/// What arrays are for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Asked {
-    /// Pairs between two bodies.
-    Between(u32, u32),
-    /// Self-collision of one body.
-    Within(u32),
-    /// Pairs of different bodies.
-    Different,
-    /// Pairs of different bodies and self-collision of each.
-    Everything,
+pub enum Put {
+    /// A new body.
+    Add,
+    /// New elements and positions of a body.
+    Remesh,
+    /// New positions of a body.
+    Positions,
+    /// Its positions at the end of a step.
+    EndPositions,
 }
 
-impl Asked {
-    /// No body: everything, or without `with_self` the pairs of different bodies. One: within it. Two: between them.
-    ///
-    /// # Errors
-    /// More than two bodies.
-    pub fn of(bodies: &[u32], with_self: bool) -> Result<Self, Error> {
-        match *bodies {
-            [] if with_self => Ok(Asked::Everything),
-            [] => Ok(Asked::Different),
-            [body] => Ok(Asked::Within(body)),
-            [a, b] => Ok(Asked::Between(a, b)),
-            _ => Err(Error::Bodies {
-                given: bodies.len(),
-            }),
-        }
-    }
+impl Put {
+    /// All of them, by their number in the package.
+    pub const ALL: [Put; 4] = [Put::Add, Put::Remesh, Put::Positions, Put::EndPositions];
 }
 
-/// Bodies by number, and a detector.
+/// A scene, and the numbers of its bodies.
+#[derive(Debug, Clone, Default)]
 pub struct World {
-    scene: Scene,
-    detector: Detector,
-    bodies: Bodies,
-    shared_vertex: SharedVertex,
+    pub(crate) scene: Scene,
+    /// Ids by number; `None` once removed.
+    ids: Vec<Option<BodyId>>,
 }
 
 impl World {
-    /// An empty world with this detector. `shared_vertex` is the rule for pairs of one body that share a vertex:
-    /// `"skip"` or `"resolve"`.
-    ///
-    /// # Errors
-    /// Another word.
-    pub fn new(detector: Detector, shared_vertex: &str) -> Result<Self, Error> {
-        let shared_vertex = match shared_vertex {
-            "skip" => SharedVertex::Skip,
-            "resolve" => SharedVertex::Resolve,
-            given => {
-                return Err(Error::Word {
-                    what: "sharedVertex",
-                    given: given.to_owned(),
-                    allowed: "\"skip\" or \"resolve\"",
-                });
-            }
-        };
-        Ok(World {
-            scene: Scene::new(),
-            detector,
-            bodies: Bodies::default(),
-            shared_vertex,
-        })
+    /// An empty scene.
+    pub fn new() -> Self {
+        World::default()
     }
 
-    /// Settings with this method: `"auto"`, `"clusters"`, `"cells"` or `"naive"`.
+    /// Gives arrays to a body, whose number is returned. `index` holds `kind.n_corners()` vertex numbers per element (none for points:
+    /// each vertex is one), `positions` x, y, z per vertex.
     ///
     /// # Errors
-    /// Another word.
-    pub fn settings(method: &str) -> Result<Settings, Error> {
-        match Method::ALL.into_iter().find(|known| known.name() == method) {
-            Some(method) => Ok(Settings {
-                method,
-                ..Settings::default()
-            }),
-            None => Err(Error::Word {
-                what: "method",
-                given: method.to_owned(),
-                allowed: "\"auto\", \"clusters\", \"cells\" or \"naive\"",
+    /// No such body; arrays that are not whole rows; those of [`Scene::add`] and [`Scene::set_positions`].
+    pub fn put<R: Real>(
+        &mut self,
+        what: Put,
+        body: u32,
+        kind: BodyKind,
+        index: &[u32],
+        positions: &[R],
+    ) -> Result<u32, Error>
+    where
+        Vec<[R; 3]>: Into<Positions>,
+    {
+        let name = match what {
+            Put::EndPositions => "end positions",
+            _ => "positions",
+        };
+        let positions = rows(positions, name)?;
+        if what == Put::Add {
+            let number = self.next_number()?;
+            let elements = elements(kind, index, positions.len())?;
+            // The library may give the new body the slot of a removed one.
+            let id = match self.scene.add((elements, positions.to_vec())) {
+                Err(error) if self.n_removed() > 0 => {
+                    return Err(Error::Renumbered { number, error });
+                }
+                added => added?,
+            };
+            self.ids.push(Some(id));
+            return Ok(number);
+        }
+        let id = self.id(body)?;
+        let set = match what {
+            Put::Remesh => {
+                let elements = elements(kind, index, positions.len())?;
+                self.scene.remesh(id, (elements, positions.to_vec()))
+            }
+            Put::EndPositions => self.scene.set_end_positions(id, positions),
+            _ => self.scene.set_positions(id, positions),
+        };
+        self.renumbered(body, set)
+    }
+
+    /// Says of which body an error is in the caller's numbers.
+    fn renumbered(&self, body: u32, set: Result<(), impinge::Error>) -> Result<u32, Error> {
+        match set {
+            Ok(()) => Ok(body),
+            Err(error) if self.id(body)?.index() == body as usize => Err(Error::Library(error)),
+            Err(error) => Err(Error::Renumbered {
+                number: body,
+                error,
             }),
         }
     }
 
-    /// Adds a body and returns its number. `index` holds `corners` (3: triangles, 4: tetrahedra) vertex numbers
-    /// per primitive, `positions` x, y, z per vertex.
+    /// Lets a body stand still.
     ///
     /// # Errors
-    /// Arrays that are not whole rows; those of [`Scene::add_triangles`].
-    pub fn add<R: Real>(
-        &mut self,
-        index: &[u32],
-        positions: &[R],
-        corners: usize,
-    ) -> Result<u32, Error> {
-        let number = self.bodies.next_number()?;
-        let positions = rows(positions, "positions")?;
-        let added = match corners {
-            4 => {
-                let tetrahedra = rows::<_, 4>(index, "index")?;
-                self.scene.add_tetrahedra(tetrahedra, positions)
-            }
-            _ => {
-                let triangles = rows::<_, 3>(index, "index")?;
-                self.scene.add_triangles(triangles, positions)
-            }
-        };
-        // The library may give the new body the slot of a removed one.
-        let id = match added {
-            Err(error) if self.bodies.n_removed() > 0 => {
-                return Err(Error::Renumbered { number, error });
-            }
-            added => added?,
-        };
-        self.bodies.0.push(Some(id));
-        Ok(number)
+    /// No such body.
+    pub fn clear_end_positions(&mut self, body: u32) -> Result<(), Error> {
+        Ok(self.scene.clear_end_positions(self.id(body)?)?)
     }
 
-    /// Moves the vertices of a body: as many positions as it has vertices, in either precision. It stands still until
-    /// it gets end positions.
+    /// Moves the rest positions of a body by a matrix, column by column.
     ///
     /// # Errors
-    /// No such body; an array that is not whole rows; those of [`Scene::set_positions`].
-    pub fn set_positions<R: Real>(&mut self, body: u32, positions: &[R]) -> Result<(), Error> {
-        let id = self.bodies.id(body)?;
-        let set = self.scene.set_positions(id, rows(positions, "positions")?);
-        set.map_err(|error| renumbered(body, id, error))
+    /// No such body; those of [`Scene::set_transform`].
+    pub fn set_transform(&mut self, body: u32, columns: &[f64; 16]) -> Result<(), Error> {
+        let row = |row: usize| [0, 4, 8, 12].map(|column| columns[row + column]);
+        let matrix = [0, 1, 2, 3].map(row);
+        let set = self.scene.set_transform(self.id(body)?, &matrix);
+        self.renumbered(body, set).map(|_| ())
     }
 
-    /// Sets where the vertices of a body are at the end of a step.
+    /// Sets which bodies a body meets.
     ///
     /// # Errors
-    /// No such body; an array that is not whole rows; those of [`Scene::set_end_positions`].
-    pub fn set_end_positions<R: Real>(&mut self, body: u32, positions: &[R]) -> Result<(), Error> {
-        let id = self.bodies.id(body)?;
-        let positions = rows(positions, "end positions")?;
-        let set = self.scene.set_end_positions(id, positions);
-        set.map_err(|error| renumbered(body, id, error))
+    /// No such body.
+    pub fn set_filter(&mut self, body: u32, category: u64, mask: u64) -> Result<(), Error> {
+        let filter = Filter { category, mask };
+        Ok(self.scene.set_filter(self.id(body)?, filter)?)
+    }
+
+    /// Sets how thick a body is.
+    ///
+    /// # Errors
+    /// No such body; those of [`Scene::set_thickness`].
+    pub fn set_thickness(&mut self, body: u32, thickness: f64) -> Result<(), Error> {
+        let set = self.scene.set_thickness(self.id(body)?, thickness);
+        self.renumbered(body, set).map(|_| ())
     }
 
     /// Removes a body. Its number is not used again.
@@ -152,127 +136,41 @@ impl World {
     /// # Errors
     /// No such body.
     pub fn remove(&mut self, body: u32) -> Result<(), Error> {
-        let id = self.bodies.id(body)?;
+        let id = self.id(body)?;
         self.scene.remove(id)?;
-        self.bodies.0[body as usize] = None;
+        self.ids[body as usize] = None;
         Ok(())
     }
 
-    /// The numbers of primitives and of vertices of a body.
+    /// A body.
     ///
     /// # Errors
     /// No such body.
-    pub fn size(&self, body: u32) -> Result<(usize, usize), Error> {
-        let body = self.scene.body(self.bodies.id(body)?)?;
-        Ok((body.n_primitives(), body.n_vertices()))
+    pub fn body(&self, body: u32) -> Result<&Body, Error> {
+        Ok(self.scene.body(self.id(body)?)?)
     }
 
-    /// All pairs, sorted, as flat numbers. Two per pair: the primitives of the bodies asked for. For
-    /// [`Asked::Everything`] and [`Asked::Different`] four: a body before each primitive.
+    /// The vertex numbers of the elements of a part, one element after the other.
     ///
     /// # Errors
-    /// No such body; those of [`Detector::detect`].
-    pub fn detect(&mut self, asked: Asked) -> Result<(Vec<u32>, &Pairs), Error> {
-        let query = self.query(asked)?;
-        let pairs = self.detector.detect(&self.scene, &query)?;
-        Ok((flat(&self.bodies, asked, pairs)?, pairs))
+    /// No such body.
+    pub fn index(&self, body: u32, part: Part) -> Result<Vec<u32>, Error> {
+        Ok(match self.body(body)?.part(part) {
+            Elements::Points(of) => of.as_flattened().to_vec(),
+            Elements::Edges(of) => of.as_flattened().to_vec(),
+            Elements::Triangles(of) => of.as_flattened().to_vec(),
+            Elements::Tetrahedra(of) => of.as_flattened().to_vec(),
+        })
     }
 
-    /// [`detect`](World::detect) without blocking.
-    ///
-    /// # Errors
-    /// As `detect`.
-    #[cfg(feature = "gpu")]
-    pub async fn detect_async(&mut self, asked: Asked) -> Result<(Vec<u32>, &Pairs), Error> {
-        let query = self.query(asked)?;
-        let pairs = self.detector.detect_async(&self.scene, &query).await?;
-        Ok((flat(&self.bodies, asked, pairs)?, pairs))
+    /// The numbers of all bodies.
+    pub fn bodies(&self) -> Vec<u32> {
+        let held = (0u32..).zip(&self.ids).filter(|(_, id)| id.is_some());
+        held.map(|(number, _)| number).collect()
     }
 
-    /// All impacts of a step, and their hash.
-    ///
-    /// # Errors
-    /// No such body; those of [`Detector::impacts`].
-    pub fn impacts(
-        &mut self,
-        asked: Asked,
-        options: StepOptions,
-    ) -> Result<(FlatImpacts, u64), Error> {
-        let step = options.step(self.query(asked)?);
-        let impacts = self.detector.impacts(&self.scene, &step)?;
-        let flat = FlatImpacts::new(impacts, self.bodies.numbers());
-        Ok((flat, impacts.hash()))
-    }
-
-    /// The earliest impact of a step: one, or none if the step is free.
-    ///
-    /// # Errors
-    /// As [`impacts`](World::impacts).
-    pub fn earliest(&mut self, asked: Asked, options: StepOptions) -> Result<FlatImpacts, Error> {
-        let step = options.step(self.query(asked)?);
-        let earliest = self.detector.earliest(&self.scene, &step)?;
-        Ok(FlatImpacts::new(&earliest, self.bodies.numbers()))
-    }
-
-    /// Whether nothing touches during a step.
-    ///
-    /// # Errors
-    /// As [`impacts`](World::impacts).
-    pub fn is_free(&mut self, asked: Asked, options: StepOptions) -> Result<bool, Error> {
-        let step = options.step(self.query(asked)?);
-        Ok(self.detector.is_free(&self.scene, &step)?)
-    }
-
-    /// How far a step can be taken; its first contact, if any, as one row; and the number of each body that moves, in the order of
-    /// the positions.
-    ///
-    /// # Errors
-    /// As [`impacts`](World::impacts), and those of [`Detector::advance`].
-    pub fn advance(
-        &mut self,
-        asked: Asked,
-        options: StepOptions,
-    ) -> Result<(Advance, FlatImpacts, Vec<u32>), Error> {
-        let step = options.step(self.query(asked)?);
-        let advance = self.detector.advance(&self.scene, &step)?;
-        let number = self.bodies.numbers();
-        let first = FlatImpacts::new(&advance.first, &number);
-        let moving = advance.positions.iter();
-        let moving = moving
-            .map(|(body, _)| number(body.index() as u32))
-            .collect();
-        Ok((advance, first, moving))
-    }
-
-    /// Whether elements intersect at the start of the step that was asked about last; `None` if that was not asked.
-    pub fn start_intersects(&self) -> Option<bool> {
-        self.detector.start_intersects()
-    }
-
-    /// Statistics of the last answer about a step.
-    pub fn step_stats(&self) -> &Statistics {
-        self.detector.step_stats()
-    }
-
-    fn query(&self, asked: Asked) -> Result<Query, Error> {
-        let id = |number| self.bodies.id(number);
-        let query = match asked {
-            Asked::Between(a, b) => Query::between(id(a)?, id(b)?),
-            Asked::Within(body) => Query::within(id(body)?),
-            Asked::Different => Query::all(),
-            Asked::Everything => Query::everything(),
-        };
-        Ok(query.shared_vertex(self.shared_vertex))
-    }
-}
-
-/// Ids by number; `None` once removed. Numbers are not used again.
-#[derive(Default)]
-struct Bodies(Vec<Option<BodyId>>);
-
-impl Bodies {
     fn next_number(&self) -> Result<u32, Error> {
-        let n = self.0.len();
+        let n = self.ids.len();
         u32::try_from(n).map_err(|_| {
             Error::Library(impinge::Error::TooMany {
                 what: "bodies",
@@ -283,22 +181,23 @@ impl Bodies {
     }
 
     fn n_removed(&self) -> usize {
-        self.0.iter().filter(|body| body.is_none()).count()
+        self.ids.iter().filter(|body| body.is_none()).count()
     }
 
-    fn id(&self, number: u32) -> Result<BodyId, Error> {
-        let held = self.0.get(number as usize).copied().flatten();
+    /// The library's id of a body.
+    pub(crate) fn id(&self, number: u32) -> Result<BodyId, Error> {
+        let held = self.ids.get(number as usize).copied().flatten();
         held.ok_or_else(|| Error::NoBody {
             number,
-            added: self.0.len(),
+            added: self.ids.len(),
             removed: self.n_removed(),
         })
     }
 
-    /// Maps the library's body indices to numbers. They differ once a body was added after a removal.
-    fn numbers(&self) -> impl Fn(u32) -> u32 + use<> {
+    /// Maps the library's indices of bodies to numbers. They differ once a body was added after a removal.
+    pub(crate) fn numbers(&self) -> impl Fn(u32) -> u32 + use<> {
         let mut numbers = Vec::new();
-        for (number, id) in (0u32..).zip(&self.0) {
+        for (number, id) in (0u32..).zip(&self.ids) {
             if let Some(id) = id {
                 numbers.resize(numbers.len().max(id.index() + 1), 0);
                 numbers[id.index()] = number;
@@ -317,34 +216,23 @@ pub fn welded<R: Real>(positions: &[R]) -> Result<Vec<u32>, Error> {
     Ok(weld.map().to_vec())
 }
 
-fn flat(bodies: &Bodies, asked: Asked, pairs: &Pairs) -> Result<Vec<u32>, Error> {
-    let two = |(a, b): (u32, u32)| [a, b];
-    Ok(match asked {
-        Asked::Between(a, b) => {
-            let pairs = pairs.between(bodies.id(a)?, bodies.id(b)?);
-            pairs.flat_map(two).collect()
+fn elements(kind: BodyKind, index: &[u32], n_vertices: usize) -> Result<Elements, Error> {
+    const WHAT: &str = "index";
+    Ok(match kind {
+        BodyKind::Points => {
+            let each = (0u32..).zip(0..n_vertices);
+            Elements::Points(each.map(|(vertex, _)| [vertex]).collect())
         }
-        Asked::Within(body) => {
-            let pairs = pairs.within(bodies.id(body)?);
-            pairs.flat_map(two).collect()
-        }
-        Asked::Everything | Asked::Different => {
-            let number = bodies.numbers();
-            let rows = pairs.rows();
-            rows.flat_map(|[body_a, a, body_b, b]| [number(body_a), a, number(body_b), b])
-                .collect()
-        }
+        BodyKind::Edges => Elements::Edges(rows(index, WHAT)?.to_vec()),
+        BodyKind::Triangles => Elements::Triangles(rows(index, WHAT)?.to_vec()),
+        BodyKind::Tetrahedra => Elements::Tetrahedra(rows(index, WHAT)?.to_vec()),
     })
 }
 
-fn renumbered(number: u32, id: BodyId, error: impinge::Error) -> Error {
-    if id.index() == number as usize {
-        return Error::Library(error);
-    }
-    Error::Renumbered { number, error }
-}
-
-fn rows<'a, T, const N: usize>(flat: &'a [T], what: &'static str) -> Result<&'a [[T; N]], Error> {
+pub(crate) fn rows<'a, T, const N: usize>(
+    flat: &'a [T],
+    what: &'static str,
+) -> Result<&'a [[T; N]], Error> {
     match flat.as_chunks() {
         (rows, []) => Ok(rows),
         _ => Err(Error::Ragged {

@@ -5,24 +5,17 @@
 use std::fs;
 use std::path::Path;
 
-use impinge::{Backend, Detector, Settings};
+use impinge::{Backend, BodyKind};
 use impinge_io::Positions;
-use impinge_web::{Asked, FileMesh, World, read, read_bodies};
+use impinge_web::{Asker, FileMesh, Put, Question, World, read, read_bodies};
 
 fn add(world: &mut World, mesh: &FileMesh) -> u32 {
-    let (index, corners) = (&mesh.index, mesh.corners as usize);
+    let (index, kind) = (&mesh.index, BodyKind::ALL[mesh.corners as usize - 1]);
     match &mesh.positions {
-        Positions::F32(p) => world.add(index, p.as_flattened(), corners).unwrap(),
-        Positions::F64(p) => world.add(index, p.as_flattened(), corners).unwrap(),
+        Positions::F32(p) => world.put(Put::Add, 0, kind, index, p.as_flattened()),
+        Positions::F64(p) => world.put(Put::Add, 0, kind, index, p.as_flattened()),
     }
-}
-
-fn world() -> World {
-    let settings = Settings {
-        backend: Backend::Cpu,
-        ..Settings::default()
-    };
-    World::new(Detector::with_settings(settings).unwrap(), "resolve").unwrap()
+    .unwrap()
 }
 
 #[test]
@@ -41,10 +34,13 @@ fn files_have_the_answers_of_the_program() {
         }
         n_files += 1;
         let bytes = fs::read(&path).unwrap();
-        let mut world = world();
+        let mut world = World::new();
         let body = add(&mut world, &read(name, &bytes, true).unwrap());
-        let (pairs, found) = world.detect(Asked::Within(body)).unwrap();
-        let (n_pairs, hash) = (pairs.len() / 2, found.hash());
+        let mut asker = Asker::new(Backend::Cpu.into()).unwrap();
+        let words = [4, body, 0, 0, 0, 0, 0, 0];
+        let found = asker.ask(Question::Detect, &world, &words, &[0.0; 10]);
+        let found = found.unwrap();
+        let (n_pairs, hash) = (found.rows.len() / 4, found.hash);
         // The file of answers is JSON of one form: no reader is needed for it.
         let start = answers.find(&format!("\"{name}\": {{")).unwrap();
         let answer = &answers[start..];

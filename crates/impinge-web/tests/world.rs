@@ -4,169 +4,263 @@ use std::fmt::Write as _;
 use std::path::Path;
 use std::{fs, io};
 
-use impinge::{Backend, Detector, Elements, Positions, Query, Scene, Settings, SharedVertex, Step};
+use impinge::{
+    Backend, BodyKind, Detector, Elements, PairKind, Part, Positions, Query, Real, Scene, Settings,
+    SharedVertex, Start,
+};
 use impinge_scenes::{Model, solids, soup, surfaces};
-use impinge_web::{Asked, Error, StepOptions, World, welded};
+use impinge_web::{Answer, Asker, Error, Put, Question, World, query, welded};
 
-fn world() -> Result<World, Error> {
-    let settings = Settings {
-        backend: Backend::Cpu,
-        ..World::settings("clusters")?
-    };
-    World::new(Detector::with_settings(settings)?, "skip")
+fn asker() -> Result<Asker, Error> {
+    Asker::new(Backend::Cpu.into())
 }
 
-/// Without a clearance.
-fn options(start: &str, toi: &str, separation: f64) -> Result<StepOptions, Error> {
-    StepOptions::new(start, toi, [separation, 0.0, 0.2])
+/// The words of a query with a scope, and nothing else said.
+fn words(scope: [u32; 3]) -> [u32; 8] {
+    let [which, a, b] = scope;
+    [which, a, b, 0, 0, 0, 0, 0]
+}
+
+const ALL: [u32; 3] = [0, 0, 0];
+const NUMBERS: [f64; 10] = [0.0, 0.0, 0.2, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+
+fn rows(asker: &mut Asker, world: &World, scope: [u32; 3]) -> Result<Vec<u32>, Error> {
+    Ok(asker
+        .ask(Question::Detect, world, &words(scope), &NUMBERS)?
+        .rows)
+}
+
+fn add<R: Real>(world: &mut World, positions: &[R]) -> Result<u32, Error>
+where
+    Vec<[R; 3]>: Into<Positions>,
+{
+    let n = positions.len() as u32 / 3;
+    let index: Vec<u32> = (0..n).collect();
+    world.put(Put::Add, 0, BodyKind::Triangles, &index, positions)
+}
+
+fn put<R: Real>(world: &mut World, what: Put, body: u32, positions: &[R]) -> Result<u32, Error>
+where
+    Vec<[R; 3]>: Into<Positions>,
+{
+    world.put(what, body, BodyKind::Points, &[], positions)
 }
 
 const TRIANGLE: [f32; 9] = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
 const ACROSS: [f32; 9] = [0.25, 0.25, -1.0, 0.25, 0.25, 1.0, 2.0, 2.0, 0.0];
 
 #[test]
-fn pairs_are_those_of_the_bodies_asked_for_in_the_order_asked() -> Result<(), Error> {
-    let mut world = world()?;
-    let two = [TRIANGLE.map(|x| x + 8.0), TRIANGLE].concat();
-    let a = world.add(&[0, 1, 2, 3, 4, 5], &two, 3)?;
-    let b = world.add(&[0, 1, 2], &ACROSS, 3)?;
-    assert_eq!(world.detect(Asked::Between(a, b))?.0, [1, 0]);
-    assert_eq!(world.detect(Asked::Between(b, a))?.0, [0, 1]);
-    assert!(world.detect(Asked::Within(a))?.0.is_empty());
-    assert_eq!(world.detect(Asked::Everything)?.0, [a, 1, b, 0]);
-    assert_eq!(Asked::of(&[], true)?, Asked::Everything);
-    assert_eq!(Asked::of(&[], false)?, Asked::Different);
-    assert_eq!(world.detect(Asked::Different)?.0, [a, 1, b, 0]);
-    let upon = world.add(&[0, 1, 2, 3, 4, 5], &[TRIANGLE, ACROSS].concat(), 3)?;
-    let all = world.detect(Asked::Everything)?.0;
-    assert!(all.chunks(4).any(|row| row == [upon, 0, upon, 1]));
-    let different = all.chunks(4).filter(|row| row[0] != row[2]);
-    let different: Vec<u32> = different.flatten().copied().collect();
-    assert_eq!(world.detect(Asked::Different)?.0, different);
-    world.set_positions(b, &ACROSS.map(|x| x + 8.0))?;
-    assert_eq!(world.detect(Asked::Between(a, b))?.0, [0, 0]);
+fn queries_are_what_the_package_writes() -> Result<(), Error> {
+    let mut world = World::new();
+    let gone = add(&mut world, &TRIANGLE)?;
+    let a = add(&mut world, &TRIANGLE)?;
+    world.remove(gone)?;
+    // It gets the first slot.
+    let b = add(&mut world, &ACROSS)?;
+    let mut scene = Scene::new();
+    let own = scene.add_triangles(&[[0, 1, 2]], &[[0.0f32; 3]; 3])?;
+    assert_eq!(query(&world, &words(ALL), &NUMBERS)?, Query::all());
+    let between_all = query(&world, &words([1, 0, 0]), &NUMBERS)?;
+    assert_eq!(between_all, Query::between_all());
+    assert_eq!(
+        query(&world, &words([2, 0, 0]), &NUMBERS)?,
+        Query::self_all()
+    );
+    for (scope, made) in [
+        ([3, a, b], Query::between(own, own)),
+        ([4, b, 0], Query::self_of(own)),
+        ([5, a, 0], Query::of(own)),
+    ] {
+        let said = query(&world, &words(scope), &NUMBERS)?;
+        // Of other bodies, and so another query; but of the same sort.
+        assert_ne!(said, made);
+        let sort = |query: &Query| {
+            format!("{query:?}")
+                .split(['(', '{'])
+                .nth(1)
+                .map(str::to_owned)
+        };
+        assert_eq!(sort(&said), sort(&made));
+    }
+    let numbers = [0.5, 0.25, 0.125, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 0.0];
+    let said = query(&world, &[0, 0, 0, 1, 2, 1, 64 | 1 | 2, 1 | 2 | 4], &numbers)?;
+    let expected = Query::all()
+        .shared_vertex(SharedVertex::Skip)
+        .start(Start::Verify)
+        .precision(impinge::Precision::F64)
+        .kinds([PairKind::VertexFace, PairKind::EdgeEdge])
+        .closest_points()
+        .owned_by([1.0, 2.0, 3.0], [4.0, 5.0, 6.0])
+        .separation(0.5)
+        .clearance(impinge::Clearance::new(0.25).share(0.125));
+    assert_eq!(said, expected);
+    let mut asker = asker()?;
+    assert_eq!(rows(&mut asker, &world, [5, a, 0])?, [b, 0, a, 0]);
+    let excluded = [&words(ALL)[..], &[a, b]].concat();
+    let answer = asker.ask(Question::Detect, &world, &excluded, &NUMBERS)?;
+    assert!(answer.rows.is_empty());
     Ok(())
 }
 
 #[test]
 fn numbers_of_bodies_are_not_used_again() -> Result<(), Error> {
-    let mut world = world()?;
-    let a = world.add(&[0, 1, 2], &TRIANGLE, 3)?;
-    let b = world.add(&[0, 1, 2], &ACROSS, 3)?;
+    let (mut world, mut asker) = (World::new(), asker()?);
+    let a = add(&mut world, &TRIANGLE)?;
+    let b = add(&mut world, &ACROSS)?;
     world.remove(a)?;
-    let c = world.add(&[0, 1, 2], &TRIANGLE, 3)?;
+    let c = add(&mut world, &TRIANGLE)?;
     assert_eq!((a, b, c), (0, 1, 2));
-    assert_eq!(world.detect(Asked::Between(c, b))?.0, [0, 0]);
+    assert_eq!(world.bodies(), [b, c]);
     // The library has the new body in the slot of the old one, and so before body 1.
-    assert_eq!(world.detect(Asked::Everything)?.0, [c, 0, b, 0]);
-    let error = world
-        .detect(Asked::Within(a))
-        .map(|_| ())
-        .expect_err("removed");
+    assert_eq!(rows(&mut asker, &world, ALL)?, [c, 0, b, 0]);
+    let said = |result: Result<u32, Error>| result.expect_err("refused").to_string();
+    let error = rows(&mut asker, &world, [4, a, 0]).map(|_| 0);
     assert_eq!(
-        error.to_string(),
+        said(error),
         "there is no body 0: 3 have been added, and 1 of them removed"
     );
-    let error = world.set_positions(c, &TRIANGLE[..3]).expect_err("too few");
     assert_eq!(
-        error.to_string(),
+        said(put(&mut world, Put::Positions, c, &TRIANGLE[..3])),
         "body 2, in the library's words: body 0: 1 positions given, but it has 3 vertices"
     );
-    let error = world.add(&[0, 1, 9], &TRIANGLE, 3).expect_err("index");
+    let wrong = world.put(Put::Add, 0, BodyKind::Triangles, &[0, 1, 9], &TRIANGLE);
     assert_eq!(
-        error.to_string(),
+        said(wrong),
         "body 3, in the library's words: body 2: primitive 0 names vertex 9, but there are 3 vertices"
     );
     Ok(())
 }
 
 #[test]
-fn impacts_of_a_step() -> Result<(), Error> {
-    let mut world = world()?;
-    let gone = world.add(&[0, 1, 2], &TRIANGLE, 3)?;
-    let a = world.add(&[0, 1, 2], &TRIANGLE, 3)?;
-    let above = TRIANGLE.map(|x| f64::from(x) * 0.25);
-    let lifted: Vec<f64> = above.chunks(3).flat_map(|p| [p[0], p[1], 1.0]).collect();
-    let sunk: Vec<f64> = above.chunks(3).flat_map(|p| [p[0], p[1], -3.0]).collect();
+fn bodies_are_of_every_kind_and_get_new_elements() -> Result<(), Error> {
+    let mut world = World::new();
+    let points = world.put(Put::Add, 0, BodyKind::Points, &[], &TRIANGLE)?;
+    let edges = world.put(Put::Add, 0, BodyKind::Edges, &[0, 1, 1, 2], &TRIANGLE)?;
+    assert_eq!(world.index(points, Part::Given)?, [0, 1, 2]);
+    assert_eq!(world.body(edges)?.elements().len(), 2);
+    let four = [TRIANGLE.to_vec(), vec![0.0, 0.0, 1.0]].concat();
+    world.put(
+        Put::Remesh,
+        edges,
+        BodyKind::Tetrahedra,
+        &[0, 1, 2, 3],
+        &four,
+    )?;
+    assert_eq!(world.index(edges, Part::Given)?, [0, 1, 2, 3]);
+    assert_eq!(world.index(edges, Part::Edges)?.len(), 12);
+    assert_eq!(world.index(edges, Part::Faces)?.len(), 12);
+    let mut turn = [0.0; 16];
+    for (at, x) in [(0, 1.0), (5, 1.0), (10, 1.0), (15, 1.0), (12, 8.0)] {
+        turn[at] = x;
+    }
+    world.set_transform(points, &turn)?;
+    let body = world.body(points)?;
+    assert_eq!(body.positions().point(1), [9.0, 0.0, 0.0]);
+    assert_eq!(body.rest_positions().point(1), [1.0, 0.0, 0.0]);
+    put(&mut world, Put::EndPositions, points, &TRIANGLE)?;
+    assert!(world.body(points)?.end_positions().is_some());
+    world.clear_end_positions(points)?;
+    assert!(world.body(points)?.end_positions().is_none());
+    world.set_thickness(points, 0.5)?;
+    assert_eq!(world.body(points)?.thickness(), 0.5);
+    world.set_filter(points, 2, 4)?;
+    assert_eq!(world.body(points)?.filter().mask, 4);
+    Ok(())
+}
+
+#[test]
+fn answers_about_steps() -> Result<(), Error> {
+    let (mut world, mut asker) = (World::new(), asker()?);
+    let gone = add(&mut world, &TRIANGLE)?;
+    let a = add(&mut world, &TRIANGLE)?;
     world.remove(gone)?;
-    let b = world.add(&[0, 1, 2], &lifted, 3)?;
-    let report = options("report", "f32", 0.0)?;
-    assert!(world.impacts(Asked::Everything, report)?.0.kinds.is_empty());
-    world.set_end_positions(b, &sunk)?;
-    let (impacts, _) = world.impacts(Asked::Between(a, b), report)?;
+    let lifted = [0.0, 0.0, 1.0, 0.25, 0.0, 1.0, 0.0, 0.25, 1.0f64];
+    let b = add(&mut world, &lifted)?;
+    let sunk = lifted.map(|x| if x >= 1.0 { -3.0 } else { x });
+    let all = words(ALL);
+    assert_eq!(
+        asker.ask(Question::IsFree, &world, &all, &NUMBERS)?.numbers,
+        [1.0]
+    );
+    put(&mut world, Put::EndPositions, b, &sunk)?;
+    let impacts = asker.ask(Question::Impacts, &world, &all, &NUMBERS)?;
     // The vertices of b meet the face of a. The library calls b body 0, so a pair has b first wherever kinds are alike.
     assert_eq!(impacts.rows[..4], [b, 0, a, 0]);
-    assert!(impacts.times.iter().all(|&time| time == 0.25));
-    assert!(impacts.at_start.iter().all(|&at_start| at_start == 0));
-    let earliest = world.earliest(Asked::Everything, report)?;
-    assert_eq!(
-        (earliest.kinds, earliest.rows, earliest.times),
-        (vec![0], vec![b, 0, a, 0], vec![0.25])
-    );
-    let near = options("skip", "f64", 0.5)?;
-    assert_eq!(world.earliest(Asked::Everything, near)?.times, [0.125]);
+    let n = impacts.rows.len() / 4;
+    assert_eq!(impacts.numbers, vec![0.25; n]);
+    assert_eq!((impacts.bytes.len(), impacts.bytes[2 * n]), (2 * n + 1, 2));
+    let verify = [0, 0, 0, 0, 2, 1, 0, 0];
+    let advance = asker.ask(Question::Advance, &world, &verify, &NUMBERS)?;
+    assert_eq!((advance.rows.len(), &advance.words[..]), (4, &[b][..]));
+    assert_eq!((advance.bytes[2], advance.positions.len()), (0, 1));
+    let [toi, fraction, n_tried] = advance.numbers[..] else {
+        panic!("three numbers");
+    };
+    assert!(toi == 0.25 && (0.2499..=0.25).contains(&fraction) && n_tried >= 1.0);
+    let mut near = NUMBERS;
+    near[0] = 0.5;
+    let skip = [0, 0, 0, 0, 1, 1, 0, 0];
+    let earliest = asker.ask(Question::Earliest, &world, &skip, &near)?;
+    assert_eq!(earliest.numbers, [0.125]);
     Ok(())
 }
 
 #[test]
-fn steps_know_whether_their_start_intersects() -> Result<(), Error> {
-    let mut world = world()?;
-    world.add(&[0, 1, 2], &TRIANGLE, 3)?;
-    let across = world.add(&[0, 1, 2], &ACROSS, 3)?;
-    world.set_end_positions(across, &ACROSS)?;
-    let verify = options("verify", "f32", 0.0)?;
-    let report = options("report", "f32", 0.0)?;
-    // An edge inside a face: no contact, but no free start.
-    assert!(world.is_free(Asked::Everything, report)?);
-    assert_eq!(world.start_intersects(), None);
-    assert_eq!(world.advance(Asked::Everything, report)?.0.fraction, 1.0);
-    assert!(!world.is_free(Asked::Everything, verify)?);
-    assert_eq!(world.start_intersects(), Some(true));
-    let (advance, first, moving) = world.advance(Asked::Everything, verify)?;
-    assert_eq!(
-        (advance.fraction, advance.start_intersects),
-        (0.0, Some(true))
-    );
-    assert!(first.kinds.is_empty());
-    assert_eq!(moving, [across]);
-    assert!(world.impacts(Asked::Everything, verify)?.0.kinds.is_empty());
-    assert_eq!(world.start_intersects(), Some(true));
-    world.earliest(Asked::Within(across), verify)?;
-    assert_eq!(world.start_intersects(), Some(false));
-    Ok(())
-}
+fn answers_about_distances_and_contacts() -> Result<(), Error> {
+    let (mut world, mut asker) = (World::new(), asker()?);
+    let a = add(&mut world, &TRIANGLE)?;
+    let b = add(&mut world, &TRIANGLE.map(|x| x + 0.5))?;
+    let mut numbers = NUMBERS;
+    numbers[9] = 0.5;
+    let points = [0, 0, 0, 0, 0, 0, 0, 2];
+    let near = asker.ask(Question::Near, &world, &points, &numbers)?;
+    let n = near.rows.len() / 4;
+    assert!(n > 0);
+    assert_eq!((near.bytes.len(), near.numbers.len()), (4 * n, 7 * n));
+    let candidates = asker.ask(Question::Candidates, &world, &words(ALL), &numbers)?;
+    assert!(candidates.bytes.is_sorted() && candidates.bytes.len() >= n);
+    let nearest = asker.ask(Question::Distance, &world, &[b, a], &NUMBERS)?;
+    assert_eq!(nearest.rows, [b, 0, a, 0]);
+    assert_eq!(nearest.numbers[..1], [0.5]);
 
-#[test]
-fn a_step_leaves_its_clearance() -> Result<(), Error> {
-    let mut world = world()?;
-    let gone = world.add(&[0, 1, 2], &TRIANGLE, 3)?;
-    world.add(&[0, 1, 2], &TRIANGLE, 3)?;
+    // Two tetrahedra, as closed surfaces: the tip of one is in the other.
+    let faces = [0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3];
+    let solid = [
+        0.0f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0,
+    ];
+    let moved: Vec<f32> = solid
+        .as_chunks::<3>()
+        .0
+        .iter()
+        .flat_map(|[x, y, z]| [x + 0.1, y + 0.125, z - 0.875])
+        .collect();
+    let (mut world, gone) = (World::new(), 0);
+    add(&mut world, &TRIANGLE)?;
+    let low = world.put(Put::Add, 0, BodyKind::Triangles, &faces, &solid)?;
     world.remove(gone)?;
-    // A triangle of which one corner is far below the others, at height 1.
-    let above = [0.25, 0.25, 1.0, 0.5, 0.25, 2.0, 0.25, 0.5, 2.0];
-    let sunk = above.map(|x: f64| x - 2.0 * f64::from(u8::from(x >= 1.0)));
-    let falling = world.add(&[0, 1, 2], &above, 3)?;
-    world.set_end_positions(falling, &sunk)?;
-    let half = StepOptions::new("report", "f64", [0.0, 0.5, 0.75])?;
-    let share = StepOptions::new("report", "f64", [0.0, 10.0, 0.25])?;
-    let time = |world: &mut World, options| {
-        Ok::<_, Error>(world.earliest(Asked::Everything, options)?.times)
+    // It is the first for the library.
+    let tip = world.put(Put::Add, 0, BodyKind::Triangles, &faces, &moved)?;
+    let pairs = rows(&mut asker, &world, ALL)?;
+    let about = |number, bodies: &[u32], rows: &[u32]| [&[number], bodies, rows].concat();
+    let contacts = asker.ask(Question::Contacts, &world, &about(7, &[], &pairs), &NUMBERS)?;
+    let n = pairs.len() / 4;
+    assert_eq!(contacts.bytes[..n], vec![3; n], "segments");
+    assert_eq!(contacts.bytes[2 * n..], [1, 1], "one loop with a direction");
+    assert_eq!(contacts.words[0] as usize, n + 1);
+    let ask = |asker: &mut Asker, number| {
+        let words = about(number, &[low, tip], &pairs);
+        asker.ask(Question::Penetration, &world, &words, &NUMBERS)
     };
-    assert_eq!(time(&mut world, half)?, [0.25]);
-    assert_eq!(time(&mut world, share)?, [0.375]);
-    assert!(!world.is_free(Asked::Everything, half)?);
-    let (advance, first, moving) = world.advance(Asked::Everything, half)?;
-    assert!((0.249..=0.25).contains(&advance.fraction), "{advance:?}");
-    assert_eq!((first.rows.len(), moving), (4, vec![falling]));
-    let Positions::F64(reached) = &advance.positions[0].1 else {
-        panic!("in the precision in which they are stored");
-    };
-    assert!((0.5..0.502).contains(&reached[0][2]), "{reached:?}");
-    let whole = StepOptions::new("report", "f64", [0.0, 0.5, 1.0])?;
-    let error = world.is_free(Asked::Everything, whole).expect_err("share");
+    let known = ask(&mut asker, 7)?;
+    assert_eq!(known.rows, [tip, low]);
+    assert_eq!(known.words[..2], [1, 3], "the tip");
+    assert!(known.numbers.len() == 22 && known.numbers[0] > 0.0);
+    // Contacts that are not the last ones are found again.
+    assert_eq!(ask(&mut asker, 8)?, known);
+    let foreign = asker.ask(Question::Contacts, &world, &[9, tip, 0, low, 4], &NUMBERS);
     assert_eq!(
-        error.to_string(),
-        "clearance_share: 1 given, a number from 0 to less than 1 allowed"
+        foreign.expect_err("no face 4").to_string(),
+        "pairs: row 0: 0, 0, 1, 4 given, sorted rows of elements of the scene allowed"
     );
     Ok(())
 }
@@ -181,53 +275,56 @@ fn vertices_at_one_position_are_welded() -> Result<(), Error> {
 
 #[test]
 fn bad_input_is_refused_by_name() -> Result<(), Error> {
-    let mut world = world()?;
-    let a = world.add(&[0, 1, 2], &TRIANGLE, 3)?;
+    let (mut world, mut asker) = (World::new(), asker()?);
+    let a = add(&mut world, &TRIANGLE)?;
     let said = |result: Result<u32, Error>| result.expect_err("refused").to_string();
+    let triangles = |world: &mut World, index: &[u32], positions: &[f32]| {
+        world.put(Put::Add, 0, BodyKind::Triangles, index, positions)
+    };
     assert_eq!(
-        said(world.add(&[0, 1, 2, 0], &TRIANGLE, 3)),
+        said(triangles(&mut world, &[0, 1, 2, 0], &TRIANGLE)),
         "index: 4 numbers given, not a multiple of 3"
     );
     assert_eq!(
-        said(world.add(&[0, 1, 2], &TRIANGLE[..8], 3)),
+        said(triangles(&mut world, &[0, 1, 2], &TRIANGLE[..8])),
         "positions: 8 numbers given, not a multiple of 3"
-    );
-    assert_eq!(
-        said(world.add(&[0, 1, 2], &TRIANGLE, 4)),
-        "index: 3 numbers given, not a multiple of 4"
     );
     let mut not_a_number = TRIANGLE;
     not_a_number[4] = f32::NAN;
-    let error = world
-        .set_positions(a, &not_a_number)
-        .expect_err("not finite");
+    let refused = said(put(&mut world, Put::Positions, a, &not_a_number));
     assert!(
-        error
-            .to_string()
-            .starts_with("body 0: vertex 1 has a non-finite"),
-        "{error}"
+        refused.starts_with("body 0: vertex 1 has a non-finite"),
+        "{refused}"
     );
-    assert!(World::settings("slabs").is_err());
-    assert!(World::new(Detector::new(Backend::Cpu)?, "").is_err());
+    let mut ask = |question, words: &[u32], numbers: &[f64; 10]| {
+        let answer: Result<Answer, Error> = asker.ask(question, &world, words, numbers);
+        let error = answer.expect_err("refused");
+        (error.code(), error.to_string())
+    };
+    let mut negative = NUMBERS;
+    negative[0] = -1.0;
     assert_eq!(
-        Asked::of(&[0, 1, 2], true).expect_err("three").to_string(),
-        "bodies: 3 given, 0 (everything), 1 (within it) or 2 (between them) allowed"
-    );
-    assert_eq!(
-        options("never", "f32", 0.0).expect_err("word").to_string(),
-        "start: \"never\" given, \"report\", \"skip\" or \"verify\" allowed"
-    );
-    let negative = options("report", "f64", -1.0)?;
-    assert_eq!(
-        world
-            .impacts(Asked::Everything, negative)
-            .expect_err("separation")
-            .to_string(),
+        ask(Question::Impacts, &words(ALL), &negative).1,
         "separation: -1 given, a finite number that is not below 0 allowed"
     );
+    let kinds = [0, 0, 0, 0, 0, 0, 64 | 1, 0];
+    let (code, text) = ask(Question::Detect, &kinds, &NUMBERS);
+    assert!(code == "invalid" && text.starts_with("kinds: "), "{text}");
+    let (_, text) = ask(Question::Impacts, &[0, 0, 0, 0, 0, 0, 64 | 16, 0], &NUMBERS);
+    assert_eq!(text, "kinds: ef given, of a step: vf, ee, ev, vv allowed");
+    let (_, text) = ask(Question::Advance, &[0, 0, 0, 0, 0, 0, 0, 4], &NUMBERS);
+    assert!(text.starts_with("owned_by: "), "{text}");
+    assert_eq!(ask(Question::Detect, &[], &NUMBERS).0, "invalid");
     // The refused calls changed nothing.
-    assert!(world.detect(Asked::Within(a))?.0.is_empty());
-    assert_eq!(world.size(a)?, (1, 3));
+    assert!(rows(&mut asker, &world, [4, a, 0])?.is_empty());
+    assert_eq!(world.body(a)?.n_vertices(), 3);
+    let mut limited = Asker::new(Settings {
+        max_pairs: Some(0),
+        ..Backend::Cpu.into()
+    })?;
+    add(&mut world, &ACROSS)?;
+    let error = rows(&mut limited, &world, ALL).expect_err("one pair");
+    assert_eq!(error.code(), "too_many_pairs");
     Ok(())
 }
 
@@ -300,20 +397,19 @@ fn scenes_are_written_for_browsers_with_the_native_answer() -> Result<(), Box<dy
             scene.set_end_positions(id, &end)?;
         }
         let mut detector = Detector::new(Backend::Cpu)?;
-        let query = Query::everything().shared_vertex(rule);
+        let query = Query::all().shared_vertex(rule);
         let skip = query.clone().shared_vertex(SharedVertex::Skip);
         let skipped = detector.detect(&scene, &skip)?.len();
         let pairs = detector.detect(&scene, &query)?;
         assert!(!pairs.is_empty(), "{name} has no pair");
         let (n_pairs, hash) = (pairs.len(), pairs.hash());
         n_of_neighbours += n_pairs - skipped.min(n_pairs);
-        let step = Step::new(query);
-        let impacts = detector.impacts(&scene, &step)?;
+        let impacts = detector.impacts(&scene, &query)?;
         let first = impacts
             .iter()
             .find(|impact| !impact.at_start)
             .ok_or("nothing starts to touch")?;
-        let (kind, time) = (first.kind.name(), first.toi);
+        let (kind, toi) = (first.kind.name(), first.toi);
         let (n_impacts, impacts_hash) = (impacts.len(), impacts.hash());
         let rule = match rule {
             SharedVertex::Skip => "skip",
@@ -323,7 +419,7 @@ fn scenes_are_written_for_browsers_with_the_native_answer() -> Result<(), Box<dy
         written.push(format!(
             "{{\"name\":\"{name}\",\"sharedVertex\":\"{rule}\",\"pairs\":{n_pairs},\"hash\":\"{hash:016x}\",\
              \"impacts\":{n_impacts},\"impactsHash\":\"{impacts_hash:016x}\",\
-             \"first\":{{\"kind\":\"{kind}\",\"time\":{time}}},\"bodies\":[{bodies}]}}"
+             \"first\":{{\"kind\":\"{kind}\",\"toi\":{toi}}},\"bodies\":[{bodies}]}}"
         ));
     }
     assert!(n_of_neighbours > 0, "both rules have the same answers");

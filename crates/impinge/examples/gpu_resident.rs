@@ -5,7 +5,7 @@
 //! `cargo run --release --example gpu_resident --features gpu`
 
 use impinge::wgpu::{self, util::DeviceExt};
-use impinge::{Detector, Query, Scene, Settings, Step};
+use impinge::{Detector, Query, Scene, Settings};
 use impinge_scenes::surfaces;
 
 const FRAMES: u32 = 60;
@@ -101,6 +101,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let resting = ball.add_to(&mut scene)?;
     let query = Query::between(moving, resting);
     let mut detector = Detector::with_device(device.clone(), queue.clone(), Settings::default())?;
+    let mut gpu = detector.gpu().expect("it has one");
 
     let words: Vec<u8> = ball
         .positions
@@ -154,7 +155,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             &deform_group,
             ball.n_vertices().div_ceil(64),
         );
-        let found = detector.encode(&scene, &query, &[(moving, &positions)], &mut encoder)?;
+        let found = gpu.encode(&scene, &query, &[(moving, &positions)], &mut encoder)?;
         let words = [found.n_pairs_offset / 4, found.n_unsure_offset / 4, 0, 0];
         let words: Vec<u8> = words
             .iter()
@@ -172,9 +173,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         run(&mut encoder, &mark, &group(&device, &mark, &buffers), 64);
 
         // What may touch on the way from the last pose to this one.
-        let step = Step::new(query.clone());
         let (starts, ends) = ([(moving, &before)], [(moving, &positions)]);
-        let found = detector.encode_step(&scene, &step, &starts, &ends, &mut encoder)?;
+        let found = gpu.encode_step(&scene, &query, &starts, &ends, &mut encoder)?;
         let [n_pairs, touches_by] = [found.n_pairs_offset, found.touches_by_offset];
         let words = [
             n_pairs as u32 / 4,
@@ -193,7 +193,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 
     // The only read-back: did everything fit, how many primitives were hit in the last frame, and how many pairs may have touched
     // on the way to it?
-    let is_complete = detector.make_room()?;
+    let is_complete = gpu.grow()?;
     let staging = device.create_buffer(&wgpu::BufferDescriptor {
         label: Some("staging"),
         size: is_hit.size() + of_step.size(),

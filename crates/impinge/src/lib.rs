@@ -1,11 +1,11 @@
 //! Exact, real-time collision detection for deforming meshes.
 //!
 //! Bodies have fixed topology and positions that change every frame. A [`Detector`] finds
-//! which of their primitives intersect, between bodies and within one body.
+//! which of their elements intersect, between bodies and within one body.
 //!
 //! * **Closed sets.** Touching counts, coplanar overlap counts, a degenerate triangle is the
 //!   segment or the point that it is.
-//! * **Exact.** A pair is reported if and only if the two primitives share a point when the given
+//! * **Exact.** A pair is reported if and only if the two elements share a point when the given
 //!   coordinates are read as real numbers. There is no tolerance anywhere.
 //! * **The same bytes everywhere.** The answer is sorted and depends on the input alone: not on
 //!   method, backend, threads or memory.
@@ -13,43 +13,34 @@
 //!   positions to their [end positions](Scene::set_end_positions), and the first time of each pair, exact and rounded down.
 //!   For solvers, [`Detector::earliest`] finds the first contact of a step, [`Detector::is_free`] decides whether there is any,
 //!   and [`Detector::advance`] finds how far a step can be taken.
-//! * **Proximity.** [`Detector::within_distance`] finds which vertices, edges and faces are within a distance of each other,
+//! * **Proximity.** [`Detector::near`] finds which vertices, edges and faces are within a distance of each other,
 //!   exactly, and which of their features are nearest. [`Detector::distance`] finds the smallest distance of two bodies.
 //!
 //! ```toml
 //! [dependencies]
-//! impinge = "0.1"                                            # with the GPU backend
-//! # impinge = { version = "0.1", default-features = false }  # the CPU alone: without wgpu, a quarter of the packages
-//! impinge-io = "0.1"                                         # reads OBJ, PLY, STL, OFF, glTF, MSH, VTK and others
+//! impinge = "0.1"                                            # reads OBJ, PLY, STL, OFF, glTF, MSH, VTK and others
+//! # impinge = { version = "0.1", features = ["gpu"] }        # and the GPU backend
+//! # impinge = { version = "0.1", default-features = false }  # no files, and the fewest packages
 //! ```
 //!
 //! A whole program: which triangles of two meshes intersect.
 //!
 //! ```
-//! use impinge::{Backend, BodyId, Detector, Query, Scene};
-//! use impinge_io::{Elements, Positions, ReadOptions, read};
-//! use std::error::Error;
+//! # #[cfg(feature = "io")]
+//! use impinge::{Backend, Detector, Query, Scene, read};
 //!
-//! fn add(scene: &mut Scene, path: &str) -> Result<BodyId, Box<dyn Error>> {
-//!     let mesh = read(path.as_ref(), &ReadOptions::default())?;
-//!     Ok(match (&mesh.elements, &mesh.positions) {
-//!         (Elements::Triangles(faces), Positions::F32(at)) => scene.add_triangles(faces, at)?,
-//!         (Elements::Triangles(faces), Positions::F64(at)) => scene.add_triangles(faces, at)?,
-//!         (Elements::Tetrahedra(tets), Positions::F32(at)) => scene.add_tetrahedra(tets, at)?,
-//!         (Elements::Tetrahedra(tets), Positions::F64(at)) => scene.add_tetrahedra(tets, at)?,
-//!     })
-//! }
-//!
-//! fn main() -> Result<(), Box<dyn Error>> {
+//! # #[cfg(not(feature = "io"))] fn main() {}
+//! # #[cfg(feature = "io")]
+//! fn main() -> Result<(), impinge::Error> {
 //!     let mut scene = Scene::new();
-//!     let a = add(&mut scene, "examples/data/tetrahedron.obj")?;
-//!     let b = add(&mut scene, "examples/data/square.obj")?;
+//!     let a = scene.add(read("examples/data/tetrahedron.obj")?)?;
+//!     let b = scene.add(read("examples/data/square.obj")?)?;
 //!     let mut detector = Detector::new(Backend::Auto)?; // a GPU where there is one, else the CPU
 //!     let pairs = detector.detect(&scene, &Query::between(a, b))?;
-//!     for (i, j) in pairs.between(a, b) {
+//!     for [i, j] in pairs.between(a, b) {
 //!         println!("triangle {i} of a meets triangle {j} of b");
 //!     }
-//! #   assert_eq!(pairs.between(a, b).collect::<Vec<_>>(), [(1, 0), (1, 1), (2, 0), (2, 1), (3, 0), (3, 1)]);
+//! #   assert_eq!(pairs.between(a, b).collect::<Vec<_>>(), [[1, 0], [1, 1], [2, 0], [2, 1], [3, 0], [3, 1]]);
 //!     Ok(())
 //! }
 //! ```
@@ -60,7 +51,7 @@
 //! before on straight lines without contact, rounding included. So surfaces that do not intersect at first never do.
 //!
 //! ```
-//! use impinge::{Backend, Detector, Scene, Step};
+//! use impinge::{Backend, Detector, Query, Scene};
 //! # fn main() -> Result<(), impinge::Error> {
 //! let mut scene = Scene::new();
 //! scene.add_triangles(&[[0, 1, 2]], &[[-4.0, -4.0, 0.0], [4.0, -4.0, 0.0], [0.0, 4.0, 0.0f32]])?;
@@ -70,7 +61,7 @@
 //! for _ in 0..3 {
 //!     let wished = height - 0.75f32;
 //!     scene.set_end_positions(strand, &[[0.0, 0.0, wished], [0.5, 0.0, wished]])?;
-//!     let advance = detector.advance(&scene, &Step::default())?;
+//!     let advance = detector.advance(&scene, &Query::all())?;
 //!     advance.apply(&mut scene)?;
 //!     height = scene.body(strand)?.positions().point(0)[2] as f32;
 //! }
@@ -83,7 +74,7 @@
 //! repeated, touch for ever. [`Weld`] makes one vertex of those at the same position.
 //!
 //! ```
-//! use impinge::{Backend, Detector, Scene, Start, Step, Weld};
+//! use impinge::{Backend, Detector, Query, Scene, Start, Weld};
 //! # fn main() -> Result<(), impinge::Error> {
 //! // Two triangles of a renderer: the vertices of their common edge are there twice.
 //! let positions = [[0.0f32, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
@@ -93,7 +84,7 @@
 //! let cloth = scene.add_triangles(&weld.apply(&faces), &weld.positions(&positions)?)?;
 //! let wished = positions.map(|[x, y, z]| [x, y, z - 1.0]);
 //! scene.set_end_positions(cloth, &weld.positions(&wished)?)?; // every frame is welded alike
-//! let step = Step::default().start(Start::Verify);
+//! let step = Query::all().start(Start::Verify);
 //! let advance = Detector::new(Backend::Cpu)?.advance(&scene, &step)?;
 //! assert_eq!((advance.fraction, advance.start_intersects), (1.0, Some(false)));
 //! # Ok(()) }
@@ -129,20 +120,26 @@
 //!
 //! This crate is the stable interface of the engine in `impinge-core`.
 
-/// The GPU interface of [`Detector::with_device`], [`Detector::encode`] and [`Detector::encode_step`].
+#[cfg(feature = "io")]
+mod read;
+
+#[cfg(feature = "io")]
+pub use read::read;
+
+/// The GPU interface of [`Detector::with_device`] and [`Gpu`].
 #[cfg(feature = "gpu")]
 pub use impinge_core::wgpu;
 pub use impinge_core::{
-    Advance, Backend, Body, BodyId, CancelToken, CandidateQuery, Candidates, Clearance,
-    ClosestPoints, Control, Detector, ElementVertices, Elements, Error, Filter, Impact, Impacts,
-    InstructionSet, Kind, Method, NearIter, NearPair, NearPairs, NearQuery, PairFilter, PairKind,
-    PairKinds, Pairs, Part, Place, Placement, PositionRows, Positions, Primitive, Progress, Query,
-    Real, Recluster, Scene, Settings, SharedVertex, Stage, Start, Statistics, Step, Toi, Weld,
-    WrongNumber, hash_impact_rows, hash_rows,
+    Advance, Affinity, Backend, Body, BodyId, BodyKind, CancelToken, Candidates, Clearance,
+    ClosestPoints, Control, Detector, Element, ElementVertices, Elements, Error, Exclusion, Filter,
+    Impact, Impacts, InstructionSet, Mesh, Method, NearIter, NearPair, NearPairs, NewPositions,
+    PairFilter, PairKind, PairKinds, Pairs, Part, Place, Positions, Precision, Progress, Query,
+    Real, Recluster, Scene, Settings, SharedVertex, Stage, Start, Stats, Weld, WrongNumber,
+    hash_impact_rows, hash_rows,
 };
 #[cfg(feature = "gpu")]
 pub use impinge_core::{
-    DeviceInfo, ResidentPairs, ResidentPart, ResidentStep, devices, devices_async,
+    DeviceInfo, Gpu, ResidentPairs, ResidentPart, ResidentStep, devices, devices_async,
 };
 pub use impinge_core::{contact, exact, proximity};
 
@@ -154,7 +151,5 @@ const _: () = {
     threads_may_share::<Pairs>();
     threads_may_share::<Query>();
     threads_may_share::<Impacts>();
-    threads_may_share::<Step>();
     threads_may_share::<NearPairs>();
-    threads_may_share::<NearQuery>();
 };

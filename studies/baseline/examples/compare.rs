@@ -33,11 +33,11 @@ fn main() -> Result<(), Box<dyn Error>> {
         impinge_io::Elements::Tetrahedra(tets) => impinge_core::Elements::Tetrahedra(tets),
     };
     let mut scene = Scene::new();
-    let a = scene.add(elements.clone(), positions)?;
-    let b = scene.add(elements, moved)?;
+    let a = scene.add((elements.clone(), positions))?;
+    let b = scene.add((elements, moved))?;
     let n = scene.bodies().map(|(_, body)| body.n_primitives()).sum();
     for method in [Method::Clusters, Method::Cells] {
-        let mut detector = Detector::with_settings(impinge_core::Settings {
+        let mut detector = Detector::new(impinge_core::Settings {
             method,
             backend: Backend::Cpu,
             ..impinge_core::Settings::default()
@@ -95,7 +95,7 @@ fn on_gpu(scene: &Scene, a: BodyId, b: BodyId) -> Result<(), Box<dyn Error>> {
     };
     println!("on {device}");
     for method in [Method::Clusters, Method::Cells] {
-        let mut detector = Detector::with_settings(impinge_core::Settings {
+        let mut detector = Detector::new(impinge_core::Settings {
             method,
             backend: Backend::Gpu,
             ..impinge_core::Settings::default()

@@ -22,7 +22,7 @@
 //! let b = scene.add_triangles(&[[0, 1, 2]], &triangle.map(|[x, y, z]| [x, z + 0.25, y - 0.25]))?;
 //! let mut grid = UniformGrid::new(Settings::default())?;
 //! let outcome = grid.detect(&scene, a, b)?;
-//! assert_eq!(outcome.pairs.between(a, b).collect::<Vec<_>>(), [(0, 0)]);
+//! assert_eq!(outcome.pairs.between(a, b).collect::<Vec<_>>(), [[0, 0]]);
 //! # Ok(()) }
 //! ```
 

@@ -22,7 +22,7 @@ use impinge_core::cpu::world::World;
 use impinge_core::search::runner::Job;
 use impinge_core::search::sink::Answer;
 use impinge_core::simd::Isa;
-use impinge_core::{InstructionSet, Statistics};
+use impinge_core::{InstructionSet, Stats};
 
 use crate::pairing::{Lists, Run, Scratch};
 use crate::radix::Radix;
@@ -80,7 +80,7 @@ impl Method {
         job: Job<'_>,
         answer: &Arc<Answer>,
         settings: &Settings,
-        stats: &mut Statistics,
+        stats: &mut Stats,
     ) -> Result<(), Error> {
         let world = World::new(job.scene, job.plan);
         self.counts = Counts::default();
@@ -135,7 +135,7 @@ impl Method {
         region: &Bounds,
         n_near: usize,
         settings: &Settings,
-        stats: &mut Statistics,
+        stats: &mut Stats,
     ) -> Result<Grid, Error> {
         let kept = &mut self.reaching.kept;
         let n_tasks = kept.len().div_ceil(PRIMITIVES);
@@ -265,7 +265,7 @@ impl Method {
         world: World<'_>,
         grid: &Grid,
         settings: &Settings,
-        stats: &mut Statistics,
+        stats: &mut Stats,
     ) {
         let start = Instant::now();
         let lists = Lists {
@@ -289,7 +289,7 @@ impl Method {
         stats.add_ms("narrow", narrow_ms);
     }
 
-    fn book(&mut self, grid: &Grid, stats: &mut Statistics) {
+    fn book(&mut self, grid: &Grid, stats: &mut Stats) {
         let counts = &mut self.counts;
         counts.resolution = grid.resolution;
         counts.n_reaching = self.reaching.kept.len() as u64;

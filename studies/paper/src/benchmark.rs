@@ -90,12 +90,12 @@ fn find(
     method: Method,
     control: &Control<'_>,
 ) -> Result<Vec<[u32; 4]>, Error> {
-    let mut detector = Detector::with_settings(Settings {
+    let mut detector = Detector::new(Settings {
         method,
         backend: Backend::Cpu,
         ..Settings::default()
     })?;
-    let watched = impinge::Control::new().cancel(control.cancel);
-    let pairs = detector.detect_with(course.scene(), &course.query(), &watched)?;
+    detector.set_control(impinge::Control::new().cancel(control.cancel));
+    let pairs = detector.detect(course.scene(), &course.query())?;
     Ok(pairs.rows().collect())
 }

@@ -92,9 +92,9 @@ impl Setup {
             Method::Clusters => impinge::Method::Clusters,
             Method::Fwzs11 => return self.place.uniform_grid(self.lambda),
         };
-        Ok(Box::new(Detector::with_settings(Settings {
+        Ok(Box::new(Detector::new(Settings {
             method,
-            lambda: self.lambda,
+            density: self.lambda,
             ..self.place.settings()
         })?))
     }
@@ -160,10 +160,10 @@ impl Finder for Detector {
         rows: &mut Vec<[u32; 4]>,
     ) -> Result<Found, Error> {
         let query = Query::between(a, b);
-        let control = Control::new().cancel(cancel);
+        self.set_control(Control::new().cancel(cancel));
         let start = Instant::now();
-        let pairs = self.detect_with(scene, &query, &control)?;
-        Ok(Found::of(start, pairs, rows))
+        let pairs = self.detect(scene, &query)?;
+        Ok(Found::of(start, &pairs, rows))
     }
 }
 

@@ -1,4 +1,4 @@
-//! Statistics of a number per frame.
+//! Stats of a number per frame.
 
 use serde::Serialize;
 

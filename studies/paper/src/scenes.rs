@@ -95,7 +95,7 @@ impl Moving {
             .sqrt();
         let at = |share: f32| [share, ASIDE[0], ASIDE[1]].map(|share| share * width);
         let mut scene = Scene::new();
-        let mut add = || scene.add(model.elements.clone(), model.positions.clone());
+        let mut add = || scene.add((model.elements.clone(), model.positions.clone()));
         let bodies = [add()?, add()?];
         Ok(Moving {
             name,

@@ -52,18 +52,18 @@ impl Recorded {
         let place = Place::Cpu {
             n_threads: options.n_threads,
         };
-        let mut detector = Detector::with_settings(place.settings())?;
+        let mut detector = Detector::new(place.settings())?;
         let what = format!("{}, simulation", name.name());
         let n_frames = options.n_frames(name);
         let mut frames = Vec::with_capacity(n_frames);
         let mut times = Vec::with_capacity(n_frames);
-        let watched = impinge::Control::new().cancel(control.cancel);
+        detector.set_control(impinge::Control::new().cancel(control.cancel));
         for frame in 0..n_frames {
             control.go_on()?;
             let positions = |body| positions(simulation.scene(), body);
             frames.push([positions(lower)?, positions(upper)?]);
-            let pairs = simulation.detect(&mut detector, &watched)?;
-            times.push(simulation.advance(pairs)?.advance_ms);
+            let pairs = simulation.detect(&mut detector)?;
+            times.push(simulation.advance(&pairs)?.advance_ms);
             control.report(&what, frame + 1, n_frames);
         }
         Ok(Some(Recorded {

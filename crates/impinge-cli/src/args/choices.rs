@@ -65,20 +65,20 @@ impl From<SharedVertexArg> for impinge::SharedVertex {
     }
 }
 
-/// [`impinge::Toi`] as an option.
+/// [`impinge::Precision`] as an option.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum ToiArg {
+pub enum PrecisionArg {
     /// Single precision
     F32,
     /// Double precision
     F64,
 }
 
-impl From<ToiArg> for impinge::Toi {
-    fn from(toi: ToiArg) -> Self {
-        match toi {
-            ToiArg::F32 => impinge::Toi::F32,
-            ToiArg::F64 => impinge::Toi::F64,
+impl From<PrecisionArg> for impinge::Precision {
+    fn from(precision: PrecisionArg) -> Self {
+        match precision {
+            PrecisionArg::F32 => impinge::Precision::F32,
+            PrecisionArg::F64 => impinge::Precision::F64,
         }
     }
 }

@@ -3,7 +3,7 @@
 
 use clap::{Arg, ArgAction, Args as _, Command, CommandFactory, FromArgMatches};
 
-use super::{Cli, DetectorArgs, PictureArgs};
+use super::{Cli, DetectorArgs, PictureArgs, RowsArgs};
 
 /// Options that many commands share.
 struct Topic {
@@ -30,39 +30,39 @@ const TOPICS: [Topic; 3] = [
             PictureArgs::augment_args(command.arg(png.help("The picture (.png)")))
         },
         text: "\
-Pictures are drawn on a GPU if there is one, else on the CPU; they look alike. Colliding primitives of body 0 are red,
+Pictures are drawn on a GPU if there is one, else on the CPU; they look alike. Colliding elements of body 0 are red,
 those of body 1 blue, then green, orange, …; hidden ones show through faintly.",
     },
     Topic {
         name: "rows",
-        about: "Files of rows, one per pair: --pairs, --impacts, --candidates, --contacts",
-        options: |command| command,
+        about: "Files of rows, one per pair that is found: --rows, --candidates, --contacts",
+        options: RowsArgs::augment_args,
         text: "\
-The name of the file decides the format: .csv, .jsonl or .npy. \"-\" is standard output, as CSV unless
---pairs-format says otherwise; the summary then goes to standard error. Rows are sorted. Bodies are
-numbered from 0 as given, primitives, vertices and faces as in the file; edges are the unique pairs
-(low, high) of vertices in the order of (high, low).
+Without --rows-format the name of the file decides: .csv, .jsonl or .npy; standard output is CSV. If the rows go to
+standard output, the summary goes to standard error. Rows are sorted. Bodies are numbered from 0 as given,
+vertices and faces as in the file; edges are the unique pairs (low, high) of vertices in the order of (high, low).
+Columns of numbers alone are a plain array in .npy files, others a structured one.
 
---pairs of `pairs` and `self`: body_a, primitive_a, body_b, primitive_b (u32)
---pairs of `sequence`: the same, after the number of the frame
---pairs of `near`: kind, body_a, element_a, body_b, element_b, type, feature_a, feature_b, parallel,
-  distance, ax, ay, az, bx, by, bz. The kind names the elements: vf a vertex and a face, ee two edges, and so
-  on. The type says which features are nearest, with ipc-toolkit's names: P_T, P_E0, EA_EB, ... A feature
-  is v0, v1 or v2 (a vertex of the element), e0, e1 or e2 (edge k goes from vertex k to the next) or f.
-  Distance and points are rounded.
---impacts of `step`: kind, body_a, element_a, body_b, element_b, toi. Of kind vf, a is the vertex and b the
-  face. Mesh files hold faces, so kinds are vf and ee; ev and vv are of bodies of edges or points, which
-  the library and the Python module have.
---candidates of `step`: the same without toi, written run by run, so that memory need not hold all of them:
-  see --memory-budget. In a .npy file they are a structured array.
---contacts of `pairs` and `self` (.npy or .csv): one row per corner of the intersection of two triangles, which
-  is a point, the two ends of a segment, or the corners of a polygon if both lie in one plane. feature_a
-  and feature_b say where the corner lies in each triangle: on vertex 7 (v7), edge 7-9 (e7-9) or face 3 (f3).",
+`pairs`, `self`: body_a, element_a, body_b, element_b
+`near`: kind, body_a, element_a, body_b, element_b, type, feature_a, feature_b, parallel, distance, ax, ay, az, bx,
+  by, bz. The kind names the elements: vf a vertex and a face, ee two edges, and so on. The type says which
+  features are nearest, with ipc-toolkit's names: P_T, P_E0, EA_EB, ... A feature is v0, v1 or v2 (a vertex of
+  the element), e0, e1 or e2 (edge k goes from vertex k to the next) or f. Points are point_a and point_b
+  in .jsonl and .npy files. Distance and points are rounded.
+`step`: kind, body_a, element_a, body_b, element_b, toi. Of kind vf, a is the vertex and b the face. Mesh files
+  hold faces, so kinds are vf and ee; ev and vv are of bodies of edges or points, which the library and the
+  Python module have.
+`sequence`: the columns of `pairs`, with --ccd those of `step`, after the number of the frame
+--candidates of `step`: those of `step` without toi, written run by run, so that memory need not hold all of
+  them: see --memory-budget
+--contacts of `pairs` and `self`: one row per corner of the intersection of two triangles, which is a point, the
+  two ends of a segment, or the corners of a polygon if both lie in one plane. feature_a and feature_b say
+  where the corner lies in each triangle: on vertex 7 (v7), edge 7-9 (e7-9) or face 3 (f3).",
     },
 ];
 
 /// Options that write rows, whichever command has them.
-const ROWS: [&str; 5] = ["pairs", "pairs_format", "impacts", "candidates", "contacts"];
+const ROWS: [&str; 4] = ["rows", "rows_format", "candidates", "contacts"];
 
 /// Reads the command line. Prints help, or an error of usage, and ends the program if that is all there is to do.
 pub fn parse() -> Cli {

@@ -1,20 +1,22 @@
 //! The command line of `impinge near`.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use impinge::PairKind;
 
-use super::{DetectorArgs, ReadArgs};
-use crate::values::{RowsFile, RowsFormat, body_numbers, distance};
+use super::{AskArgs, DetectorArgs, RowsArgs};
+use crate::values::{body_length, distance, two_bodies};
 
 pub const NEAR_EXAMPLES: &str = "\
 Examples:
   impinge near a.obj b.obj --distance 0.01                which elements are within 0.01 of each other?
   impinge near cloth.ply --distance 0.002                 of one mesh: parts that do not share a vertex
-  impinge near a.ply b.ply --distance 0.01 --pairs -      the pairs themselves, as CSV
+  impinge near a.ply b.ply --distance 0.01 --rows -       the pairs themselves, as CSV
   impinge near a.stl b.stl --distance 0.5 --fail-on-hit   a check of clearance: exit code 3 if it is less
   impinge near a.ply b.ply --distance 1 --kinds ff        pairs of faces
+  impinge near cloth.ply b.ply --distance 0 --thickness 0,0.01
+                                                          the cloth is 0.01 thick
 
 Whether a distance is at most D is decided exactly; --distance is read as a double-precision number. An edge and a face (ef) are
 reported if they meet, whatever D: else their vertices and edges say that they are near. The program also asks whether anything
@@ -34,40 +36,18 @@ pub struct NearArgs {
     /// Which pairs: vertex-face, edge-edge, edge-vertex, vertex-vertex, edge-face, face-face [default: vf,ee,ef]
     #[arg(long, value_enum, value_name = "KIND", value_delimiter = ',')]
     pub kinds: Vec<KindArg>,
+    /// Find only the pairs of bodies A and B, numbered from 0 as given
+    #[arg(long, value_name = "A,B", value_parser = two_bodies, conflicts_with_all = ["within", "exclude"])]
+    pub between: Option<(usize, usize)>,
+    /// The thickness T of body N, a length that adds to the distance of its pairs (twice within it) [default: 0]
+    #[arg(long, value_name = "N,T", value_parser = body_length)]
+    pub thickness: Vec<(usize, f64)>,
     #[command(flatten)]
-    pub read: ReadArgs,
-    /// Ignore the pairs of bodies A and B, numbered from 0 as given (A,A: the pairs within A)
-    #[arg(long, value_name = "A,B", value_parser = body_numbers)]
-    pub ignore: Vec<(usize, usize)>,
-    /// End with exit code 3 if anything is found
-    #[arg(long)]
-    pub fail_on_hit: bool,
-    /// Print JSON and nothing else (see docs/cli.md)
-    #[arg(long)]
-    pub json: bool,
-    /// Write the pairs (.csv, .jsonl or .npy; "-" is standard output, as CSV unless --pairs-format says otherwise)
-    #[arg(long, value_name = "FILE")]
-    pub pairs: Option<RowsFile>,
-    /// The format of the pairs, whatever the name of the file
-    #[arg(long, value_enum, value_name = "FORMAT", requires = "pairs")]
-    pub pairs_format: Option<RowsFormat>,
+    pub ask: AskArgs,
+    #[command(flatten)]
+    pub rows: RowsArgs,
     #[command(flatten)]
     pub detector: DetectorArgs,
-}
-
-impl NearArgs {
-    /// The file of the pairs, with the requested format.
-    pub fn rows(&self) -> Option<RowsFile> {
-        let file = self.pairs.clone()?;
-        let format = self.pairs_format.unwrap_or(file.format);
-        Some(RowsFile { format, ..file })
-    }
-
-    /// The output file, with its option.
-    pub fn output(&self) -> Option<(&'static str, &Path)> {
-        let file = self.pairs.as_ref().filter(|file| !file.is_stdout())?;
-        Some(("--pairs", &file.path))
-    }
 }
 
 /// [`PairKind`] as an option.

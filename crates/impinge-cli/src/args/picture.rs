@@ -34,7 +34,7 @@ pub struct PictureArgs {
     /// The axis that points up; at azimuth 0 the viewer is on the side of +z or of -y
     #[arg(long, value_enum, value_name = "AXIS", default_value_t = UpArg::Y, requires = "png")]
     pub up: UpArg,
-    /// How visible hidden colliding primitives are, from 0 (not at all) to 1 (as if nothing hid them)
+    /// How visible hidden colliding elements are, from 0 (not at all) to 1 (as if nothing hid them)
     #[arg(long, value_name = "X", value_parser = part, default_value = "0.5", requires = "png")]
     pub see_through: f32,
     /// Draw without perspective

@@ -4,13 +4,17 @@ use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use impinge::Query;
 
 use super::DetectorArgs;
 use super::PictureArgs;
-use super::choices::{StartArg, ToiArg};
+use super::RowsArgs;
+use super::choices::{PrecisionArg, StartArg};
 use super::near::KindArg;
+use crate::asked::Question;
+use crate::detection::of_kinds;
 use crate::values::PngFile;
-use crate::values::{MeshFile, RowsFile, at_least_one, body_numbers, distance};
+use crate::values::{MeshFile, ReachedFile, at_least_one, body_numbers, distance, two_bodies};
 
 pub const STEP_EXAMPLES: &str = "\
 Examples:
@@ -20,8 +24,10 @@ Examples:
   impinge step cloth_0.ply cloth_1.ply --fail-on-hit  the same as a check: exit code 3 if anything touches
   impinge step cloth_0.ply cloth_1.ply --clearance 1e-4 --earliest
                                                       how far a solver can go that needs some distance
-  impinge step cloth_0.ply cloth_1.ply --impacts impacts.csv --out impacts.glb
-  impinge step cloth_0.ply cloth_1.ply --candidates boxes.npy --distance 0.001
+  impinge step a_0.obj a_1.obj b_0.obj b_1.obj --clearance 1e-4 --advance a.obj b.obj
+                                                      go as far as it is free: each body there
+  impinge step cloth_0.ply cloth_1.ply --rows impacts.csv --out impacts.glb
+  impinge step cloth_0.ply cloth_1.ply --candidates boxes.npy --inflation 0.001
 
 Every vertex moves on a straight line from time 0 to time 1. The two files of a body must have the same elements.
 Times are exact first times, rounded down: nothing touches earlier.";
@@ -32,12 +38,17 @@ pub struct StepArgs {
     #[arg(value_names = ["START", "END"], required = true, num_args = 2..)]
     pub meshes: Vec<PathBuf>,
     /// Find only the first contact
-    #[arg(long, conflicts_with_all = ["impacts", "out", "candidates"])]
-    #[arg(conflicts_with = "png")]
+    #[arg(long, conflicts_with_all = ["rows", "out", "candidates", "png"])]
     pub earliest: bool,
-    /// Ignore the pairs within each body
+    /// Find how far the step can be taken, and write each body there: one file per body, in their order (.ply or .obj)
+    #[arg(long, value_name = "OUT", num_args = 1.., conflicts_with_all = ["earliest", "rows", "out", "candidates", "png", "repeat"])]
+    pub advance: Vec<ReachedFile>,
+    /// Leave out the pairs within each body
     #[arg(long)]
     pub no_self: bool,
+    /// Find only the pairs of bodies A and B, numbered from 0 as given
+    #[arg(long, value_name = "A,B", value_parser = two_bodies, conflicts_with_all = ["no_self", "exclude"])]
+    pub between: Option<(usize, usize)>,
     #[command(flatten)]
     pub how: StepHow,
     /// Weld vertices that are at the same position both at the start and at the end, within each body; this is the default
@@ -46,34 +57,24 @@ pub struct StepArgs {
     /// Do not weld such vertices, except in STL files, where triangles share nothing else
     #[arg(long, overrides_with = "weld")]
     pub no_weld: bool,
-    /// Ignore the pairs of bodies A and B, numbered from 0 as given (A,A: the self-collision of A)
-    #[arg(long, value_name = "A,B", value_parser = body_numbers)]
-    pub ignore: Vec<(usize, usize)>,
+    /// Leave out the pairs of bodies A and B, numbered from 0 as given (A,A: the self-collision of A)
+    #[arg(long, value_name = "A,B", value_parser = body_numbers, alias = "ignore")]
+    pub exclude: Vec<(usize, usize)>,
     /// End with exit code 3 unless the step is free (4 if the start intersects, with or without this option)
     #[arg(long, conflicts_with = "candidates")]
     pub fail_on_hit: bool,
     /// Print JSON and nothing else (see docs/cli.md)
     #[arg(long)]
     pub json: bool,
-    /// Write all impacts (.csv, .jsonl or .npy; "-" is standard output, as CSV)
-    #[arg(long, value_name = "FILE")]
-    pub impacts: Option<RowsFile>,
+    #[command(flatten)]
+    pub rows: RowsArgs,
     /// Write the pairs whose boxes over the whole step overlap (.csv, .jsonl or .npy; "-" is standard output, as CSV), and
     /// find no impacts
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["impacts", "out", "repeat", "separation", "clearance", "png"])]
-    pub candidates: Option<RowsFile>,
-    /// How far the boxes of --candidates are inflated on all sides: 0 or more
-    #[arg(long, value_name = "D", default_value = "0", requires = "candidates", allow_negative_numbers = true, value_parser = distance)]
-    pub distance: f64,
-    /// Which --candidates: vertex-face, edge-edge, edge-vertex, vertex-vertex, edge-face, face-face [default: vf,ee]
-    #[arg(
-        long,
-        value_enum,
-        value_name = "KIND",
-        value_delimiter = ',',
-        requires = "candidates"
-    )]
-    pub kinds: Vec<KindArg>,
+    #[arg(long, value_name = "FILE", group = "rows_file", conflicts_with_all = ["out", "repeat", "separation", "clearance", "png"])]
+    pub candidates: Option<PathBuf>,
+    /// How far the boxes of --candidates are inflated on all sides, a length
+    #[arg(long, value_name = "R", default_value = "0", requires = "candidates", allow_negative_numbers = true, value_parser = distance)]
+    pub inflation: f64,
     /// Ask N times, rewriting positions at both ends before each, and show median times
     #[arg(long, value_name = "N", default_value = "1", value_parser = at_least_one)]
     pub repeat: NonZeroUsize,
@@ -89,28 +90,44 @@ pub struct StepArgs {
     pub detector: DetectorArgs,
 }
 
+impl StepHow {
+    /// The query with these options.
+    pub fn of(&self, query: Query) -> Query {
+        of_kinds(query, &self.kinds)
+            .start(self.start.into())
+            .precision(self.precision.into())
+            .separation(self.separation)
+            .clearance(self.clearance)
+    }
+
+    /// What is asked of a step.
+    pub fn question(&self) -> Question {
+        Question::Step {
+            start: self.start == StartArg::Verify,
+        }
+    }
+}
+
 impl StepArgs {
-    /// The output files, each with its option.
+    /// The output files without the rows, each with its option.
     pub fn outputs(&self) -> Vec<(&'static str, &Path)> {
-        let impacts = self.impacts.as_ref();
-        let impacts = impacts.map(|file| ("--impacts", file.path.as_path()));
         let out = self.out.as_ref().map(|file| ("--out", file.path.as_path()));
         let png = self.png.as_ref().map(|file| ("--png", file.0.as_path()));
-        let candidates = self.candidates.as_ref().filter(|file| !file.is_stdout());
-        let candidates = candidates.map(|file| ("--candidates", file.path.as_path()));
-        [impacts, out, png, candidates]
-            .into_iter()
-            .flatten()
-            .collect()
+        let reached = self.advance.iter();
+        let reached = reached.map(|file| ("--advance", file.path.as_path()));
+        [out, png].into_iter().flatten().chain(reached).collect()
     }
 }
 
 /// Options of reporting impacts.
-#[derive(Debug, Clone, Copy, Args)]
+#[derive(Debug, Clone, Args)]
 pub struct StepHow {
+    /// Which pairs: vertex-face, edge-edge, edge-vertex, vertex-vertex; of --candidates also edge-face, face-face [default: vf,ee]
+    #[arg(long, value_enum, value_name = "KIND", value_delimiter = ',')]
+    pub kinds: Vec<KindArg>,
     /// The precision to which times are rounded down
-    #[arg(long, value_enum, value_name = "PRECISION", default_value_t = ToiArg::F32)]
-    pub toi: ToiArg,
+    #[arg(long, value_enum, value_name = "P", default_value_t = PrecisionArg::F32, alias = "toi")]
+    pub precision: PrecisionArg,
     /// Pairs that touch at the start: reported with the time 0, or ignored; and whether the start is asked for intersections
     #[arg(long, value_enum, value_name = "RULE", default_value_t = StartArg::Verify)]
     pub start: StartArg,

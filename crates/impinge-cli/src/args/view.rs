@@ -36,7 +36,7 @@ pub struct ViewArgs {
     /// Begin with self-collision; implied for one mesh
     #[arg(long = "self")]
     pub within: bool,
-    /// Which neighbours are reported: pairs of primitives of one body that share a vertex
+    /// Which neighbours are reported: pairs of elements of one body that share a vertex
     #[arg(long, value_enum, value_name = "RULE", default_value_t = SharedVertexArg::Resolve)]
     pub shared_vertex: SharedVertexArg,
     /// Do not weld vertices at the same position, except in STL files

@@ -1,21 +1,21 @@
 //! `impinge pairs` and `impinge self`: one answer for one set of meshes.
 
-use std::io::{Write, stderr};
+use std::io::Write;
 use std::path::PathBuf;
 
 use impinge::{BodyId, CancelToken, Control, Detector};
-use impinge_io::printable;
+use impinge_io::{Cell, ELEMENTS, printable};
 use serde_json::Value;
 
 use crate::apart::Inputs;
 use crate::args::{AnswerArgs, AskArgs, DetectorArgs, PairsArgs, WithinArgs};
 use crate::asked::Asked;
-use crate::detection::{any, asked, count, hit, query, repeat, settings};
+use crate::detection::{asked, hit, query, repeat, settings};
 use crate::error::Error;
 use crate::load::{Bodies, Loading, Vertices};
 use crate::picture::Drawer;
 use crate::text::counted;
-use crate::values::{RowsFile, RowsFormat};
+use crate::values::RowsFile;
 use crate::watch::Watch;
 use crate::{contacts, headline, json, meshes, output, regions, rows};
 
@@ -23,7 +23,10 @@ use crate::{contacts, headline, json, meshes, output, regions, rows};
 pub fn pairs(args: &PairsArgs, cancel: &CancelToken) -> Result<(), Error> {
     answer(
         Bodies::read,
-        asked((true, args.within), &args.ask),
+        Asked {
+            only: args.between,
+            ..asked((true, args.within), &args.ask)
+        },
         &args.meshes,
         &args.ask,
         &args.answer,
@@ -59,16 +62,9 @@ fn answer(
     for (option, path) in answer.outputs() {
         inputs.check(option, path)?;
     }
-    let rows_file = answer.rows();
-    if let Some(file) = &answer.contacts
-        && (file.is_stdout() || file.format == RowsFormat::Jsonl)
-    {
-        let text = "--contacts: contacts are written to files, as .npy or .csv";
-        return Err(Error::Usage(text.to_owned()));
-    }
-    let is_stdout_taken = rows_file.as_ref().is_some_and(RowsFile::is_stdout);
-    if ask.json && is_stdout_taken {
-        let text = "--json and --pairs - both write to standard output: give one of them a file";
+    let rows_file = answer.rows.file(&inputs, ask.json)?;
+    if answer.contacts.as_ref().is_some_and(RowsFile::is_stdout) {
+        let text = "--contacts: contacts are written to files";
         return Err(Error::Usage(text.to_owned()));
     }
     let holds_no_pairs = answer.count || answer.any;
@@ -100,7 +96,7 @@ fn answer(
         );
         return Err(Error::Usage(text));
     }
-    let query = query(asked, ask, &ids)?;
+    let query = query(asked, &ask.exclude, &ids)?;
     // The detector comes last, because opening a GPU takes time and some drivers print messages.
     let mut settings = settings(how);
     if !is_one_frame {
@@ -108,21 +104,22 @@ fn answer(
         settings.method = settings.method.in_the_long_run();
     }
     let threads = settings.threads;
-    let mut detector = Detector::with_settings(settings)?;
+    let mut detector = Detector::new(settings)?;
 
     let watch = Watch::detection(!how.no_progress, "detecting");
+    detector.set_control(watch.control(cancel));
     let named = ids.iter().copied().zip(names.iter().map(String::as_str));
     let bodies: Vec<(BodyId, &str)> = named.collect();
     if holds_no_pairs {
         let (n_pairs, text, found) = if answer.count {
-            let n = count(&mut detector, &scene, &query, cancel, &watch)?;
+            let n = detector.count(&scene, &query)?;
             let text = match n {
                 0 => "no pairs".to_owned(),
                 n => counted(n, "pair"),
             };
             (n, text, ("pairs", Value::from(n)))
         } else {
-            let any = any(&mut detector, &scene, &query, cancel, &watch)?;
+            let any = detector.any(&scene, &query)?;
             let text = if any { "at least one pair" } else { "no pairs" };
             (u64::from(any), text.to_owned(), ("any", Value::from(any)))
         };
@@ -140,20 +137,25 @@ fn answer(
         return end(ask, n_pairs > 0, &unread, paths.len());
     }
     let n_frames = answer.repeat.get();
-    let (_, times) = repeat(&mut detector, &mut scene, &query, n_frames, cancel, &watch)?;
-    let pairs = &detector.take_pairs();
+    let (pairs, times) = repeat(&mut detector, &mut scene, &query, n_frames)?;
+    let pairs = &pairs;
     drop(watch);
+    detector.set_control(Control::new().cancel(cancel));
 
     // Files are written first: if one can't be written, no answer is printed that looks like success.
     if let Some(file) = &rows_file {
-        rows::write(file, pairs)?;
+        rows::write(
+            file,
+            ELEMENTS.into(),
+            pairs.len(),
+            pairs.rows().map(|row| row.map(Cell::Number)),
+        )?;
     }
     if let Some(file) = &answer.out {
         meshes::write(file, &scene, &bodies, pairs)?;
     }
     let met = if answer.contacts.is_some() || answer.curves.is_some() {
-        let control = Control::new().cancel(cancel);
-        let contacts = detector.contacts_with(&scene, pairs, &control)?;
+        let contacts = detector.contacts(&scene, pairs)?;
         let curves = contacts.curves()?;
         Some((contacts, curves))
     } else {
@@ -186,12 +188,7 @@ fn answer(
             output::print_details(&mut text, &scene, &bodies, pairs, &times)?;
         }
         writeln!(text, "{}", asked.line(&read, &nouns))?;
-        if is_stdout_taken {
-            // If standard error is closed, nobody reads the summary.
-            let _ = stderr().write_all(&text);
-        } else {
-            output::out().write_all(&text)?;
-        }
+        output::say(&text, rows_file.as_ref())?;
     }
     // The picture comes last, so that the answer is printed even without an adapter.
     if let Some(png) = &answer.png {

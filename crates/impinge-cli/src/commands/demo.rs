@@ -5,13 +5,13 @@ use std::io::Write;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use impinge::{BodyId, CancelToken, Detector, Method, Pairs, Query, Scene, Settings};
+use impinge::{BodyId, CancelToken, Control, Detector, Method, Pairs, Query, Scene, Settings};
 
 use impinge_io::printable;
 
 use crate::args::{DemoArgs, PictureArgs};
 use crate::commands::demo_scene::DemoScene;
-use crate::detection::{Times, detect, detector, settings};
+use crate::detection::{Times, detector, settings};
 use crate::error::Error;
 use crate::meshes;
 use crate::output::{body_table, out, stage_table, table};
@@ -26,7 +26,7 @@ const SAMPLE: usize = 16_000;
 pub fn demo(args: &DemoArgs, cancel: &CancelToken) -> Result<(), Error> {
     let mut detector = detector(&args.detector)?;
     let mut demo = DemoScene::new(args.triangles as usize)?;
-    let query = Query::everything();
+    let query = Query::all();
     writeln!(
         out(),
         "{} deforming bodies, {} triangles, {}: pairs between bodies and within each",
@@ -38,14 +38,14 @@ pub fn demo(args: &DemoArgs, cancel: &CancelToken) -> Result<(), Error> {
     let mut found = Found::new(demo.bodies().len());
     let mut moving = Duration::ZERO;
     let watch = Watch::frames(!args.detector.no_progress, args.frames as usize, false);
-    let still = Watch::detection(false, "");
+    detector.set_control(Control::new().cancel(cancel));
     for frame in 0..args.frames {
         go_on(cancel)?;
         let started = Instant::now();
         demo.pose(frame, args.frames)?;
         moving += started.elapsed();
-        let pairs = detect(&mut detector, demo.scene(), &query, cancel, &still)?;
-        found.add(&demo.bodies(), pairs);
+        let pairs = detector.detect(demo.scene(), &query)?;
+        found.add(&demo.bodies(), &pairs);
         watch.frame_done();
     }
     drop(watch);
@@ -54,13 +54,13 @@ pub fn demo(args: &DemoArgs, cancel: &CancelToken) -> Result<(), Error> {
     let fullest = found.fullest();
     demo.pose(fullest, args.frames)?;
     let bodies = demo.bodies();
-    let pairs = detect(&mut detector, demo.scene(), &query, cancel, &still)?;
+    let pairs = detector.detect(demo.scene(), &query)?;
     writeln!(
         out(),
         "\nframe {fullest} has the most pairs:\n{}\n",
-        body_table(demo.scene(), &bodies, pairs)?
+        body_table(demo.scene(), &bodies, &pairs)?
     )?;
-    check(args, &demo, fullest, pairs, cancel)?;
+    check(args, &demo, fullest, &pairs, cancel)?;
 
     let png = match &args.png {
         Some(file) => file.0.clone(),
@@ -72,11 +72,11 @@ pub fn demo(args: &DemoArgs, cancel: &CancelToken) -> Result<(), Error> {
     {
         make_folder(folder)?;
     }
-    meshes::write(&args.out, demo.scene(), &bodies, pairs)?;
+    meshes::write(&args.out, demo.scene(), &bodies, &pairs)?;
     let picture = PictureArgs::default();
     let threads = args.detector.threads.map_or(0, Into::into);
     let mut drawer = Drawer::new(&picture, args.detector.device.as_deref(), threads)?;
-    drawer.write(&png, demo.scene(), &bodies, pairs)?;
+    drawer.write(&png, demo.scene(), &bodies, &pairs)?;
     writeln!(
         out(),
         "wrote {}, a mesh, and {}, its picture: colliding triangles red (worm), blue (knot), green (ball)",
@@ -105,14 +105,15 @@ fn check(
         Method::Naive => Method::Clusters,
     };
     let sample = Sample::new(demo, pairs)?;
-    let mut detector = Detector::with_settings(Settings {
+    let mut detector = Detector::new(Settings {
         method: reference,
         memory_budget: None,
         ..told
     })?;
     let watch = Watch::detection(!args.detector.no_progress, "checking");
-    let query = Query::everything();
-    let expected = detect(&mut detector, &sample.scene, &query, cancel, &watch)?;
+    let query = Query::all();
+    detector.set_control(watch.control(cancel));
+    let expected = detector.detect(&sample.scene, &query)?;
     drop(watch);
     let rows: Vec<[u32; 4]> = expected.rows().collect();
     if rows != sample.rows {
@@ -184,7 +185,7 @@ impl Sample {
             });
             numbers.push(numbered.collect());
             n_triangles += faces.len();
-            scene.add(faces, body.positions().clone())?;
+            scene.add((faces, body.positions().clone()))?;
         }
         let in_sample = |body: u32, primitive: u32| numbers[body as usize][primitive as usize];
         let rows = pairs.rows().filter_map(|[body_a, a, body_b, b]| {
@@ -205,7 +206,7 @@ fn make_folder(folder: &Path) -> Result<(), Error> {
     })
 }
 
-/// Statistics over the frames.
+/// Stats over the frames.
 #[derive(Default)]
 struct Found {
     times: Times,
@@ -247,7 +248,7 @@ impl Found {
         for meeting in &mut self.meetings {
             let (a, b) = (bodies[meeting.a_ix].0, bodies[meeting.b_ix].0);
             let n = if a == b {
-                pairs.within(a).count()
+                pairs.self_of(a).count()
             } else {
                 pairs.between(a, b).count()
             };

@@ -78,7 +78,7 @@ impl DemoScene {
             elements,
         } = model;
         let rest = positions.clone();
-        let id = self.scene.add(elements, positions)?;
+        let id = self.scene.add((elements, positions))?;
         self.actors.push(Actor {
             id,
             name,

@@ -3,7 +3,6 @@
 use std::io::Write;
 use std::time::Instant;
 
-use impinge::proximity::Nearest;
 use impinge::{Backend, CancelToken, Control, Detector};
 use impinge_io::printable;
 use serde_json::json;
@@ -22,25 +21,18 @@ pub fn distance(args: &DistanceArgs, cancel: &CancelToken) -> Result<(), Error> 
     } = Bodies::read(&paths, loading)?;
     let start = Instant::now();
     let mut detector = Detector::new(Backend::Cpu)?;
-    let control = Control::new().cancel(cancel);
-    let nearest = detector.distance_with(&scene, ids[0], ids[1], &control)?;
+    detector.set_control(Control::new().cancel(cancel));
+    let nearest = detector.distance(&scene, ids[0], ids[1])?;
     let ms = start.elapsed().as_secs_f64() * 1e3;
-    let Some(Nearest {
-        distance,
-        primitives: [a, b],
-        points,
-        ..
-    }) = nearest
-    else {
-        return Err(Error::Usage(
-            "a mesh without primitives has no distance".to_owned(),
-        ));
-    };
+    let nearest = nearest
+        .ok_or_else(|| Error::Usage("a mesh without elements has no distance".to_owned()))?;
+    let (distance, points) = (nearest.distance, nearest.points);
+    let [a, b] = [nearest.a.element, nearest.b.element];
     let mut to = out();
     if args.json {
         let object = json!({
             "distance": distance,
-            "primitives": [a, b],
+            "elements": [a, b],
             "points": points,
             "ms": ms,
         });
@@ -48,10 +40,10 @@ pub fn distance(args: &DistanceArgs, cancel: &CancelToken) -> Result<(), Error> 
         return Ok(());
     }
     writeln!(to, "distance {distance}")?;
-    for (side, primitive) in [a, b].into_iter().enumerate() {
+    for (side, element) in [a, b].into_iter().enumerate() {
         let name = printable(&names[side]);
         let [x, y, z] = points[side];
-        writeln!(to, "primitive {primitive} of {name} at {x} {y} {z}")?;
+        writeln!(to, "element {element} of {name} at {x} {y} {z}")?;
     }
     Ok(())
 }

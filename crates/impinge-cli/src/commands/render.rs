@@ -32,13 +32,15 @@ pub fn render(args: &RenderArgs, cancel: &CancelToken) -> Result<(), Error> {
     } = Bodies::read(&args.meshes, Loading::new(&args.ask, is_self, cancel))?;
     // Of one body there is nothing else to ask.
     let asked = asked((true, args.within || ids.len() == 1), &args.ask);
-    let query = query(asked, &args.ask, &ids)?;
+    let query = query(asked, &args.ask.exclude, &ids)?;
     // The drawer comes before detection: without an adapter there is no picture.
     let threads = settings(how).threads;
     let mut drawer = Drawer::new(&args.picture, how.device.as_deref(), threads)?;
     let mut detector = detector(how)?;
     let watch = Watch::detection(!how.no_progress, "detecting");
-    let (pairs, times) = repeat(&mut detector, &mut scene, &query, 1, cancel, &watch)?;
+    detector.set_control(watch.control(cancel));
+    let (pairs, times) = repeat(&mut detector, &mut scene, &query, 1)?;
+    let pairs = &pairs;
     drop(watch);
 
     let bodies: Vec<(BodyId, &str)> = ids

@@ -3,31 +3,27 @@
 use std::io::{Write, stderr};
 use std::path::Path;
 
-use impinge::{BodyId, CancelToken, Control, Pairs, Scene, Step};
-use impinge_io::{Sequence, Weld, printable};
+use impinge::{BodyId, CancelToken, Control, Pairs, Scene};
+use impinge_io::{Cell, ELEMENTS, Sequence, Weld, impact_columns, printable};
 use serde_json::{Map, Value};
 
-use super::step::{self, Frames as _, steps_of_sequence};
+use super::step::{self, Frames as _, Shown, steps_of_sequence};
 use crate::apart::Inputs;
-use crate::args::{BodiesArg, SequenceArgs};
-use crate::detection::{Times, asked, detect, detector, hit, query, set_positions, settings};
+use crate::args::{BodiesArg, PrecisionArg, SequenceArgs};
+use crate::asked::Asked;
+use crate::detection::{Times, asked, detector, hit, query, set_positions, settings};
 use crate::error::Error;
 use crate::load::{Bodies, Loading, to_positions};
 use crate::output::out;
 use crate::picture::Drawer;
-use crate::rows::FrameRows;
+use crate::rows::{self, Rows};
 use crate::text::{counted, grouped, hash};
 use crate::values::RowsFile;
 use crate::watch::{Watch, go_on};
-use crate::{json, meshes, regions};
+use crate::{json, meshes, output, regions};
 
 /// `impinge sequence`.
 pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> {
-    let rows_on_stdout = args.pairs.as_ref().is_some_and(RowsFile::is_stdout);
-    if args.ask.json && rows_on_stdout {
-        let text = "--json and --pairs - both write to standard output: give one of them a file";
-        return Err(Error::Usage(text.to_owned()));
-    }
     if args
         .ask
         .read
@@ -57,7 +53,7 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
         nouns,
         ..
     } = bodies;
-    let query = query(asked, &args.ask, &ids)?;
+    let query = query(asked, &args.ask.exclude, &ids)?;
     let bodies: Vec<(BodyId, &str)> = ids
         .into_iter()
         .zip(names.iter().map(String::as_str))
@@ -71,30 +67,45 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
         ))
     })?;
     let mut detector = detector(&args.detector)?;
-    let mut outputs = Outputs::new(args, &frames)?;
-    let prints = !args.ask.json && !rows_on_stdout;
+    detector.set_control(Control::new().cancel(cancel));
+    let inputs = Inputs::new(
+        std::iter::once(&args.mesh)
+            .chain(&args.others)
+            .chain(frames.sequence.files()),
+    );
+    let file = args.rows.file(&inputs, args.ask.json)?;
+    let prints = !args.ask.json && !file.as_ref().is_some_and(RowsFile::is_stdout);
     let watch = Watch::frames(!args.detector.no_progress, range.len(), true);
     if args.ccd {
-        let step = Step::new(query)
-            .start(args.step.start.into())
-            .toi(args.step.toi.into())
-            .separation(args.step.separation)
-            .clearance(args.step.clearance);
+        let in_f64 = args.step.precision == PrecisionArg::F64;
+        let columns = rows::of_frames(&impact_columns(in_f64));
+        let create = |file| Rows::create(file, columns, None);
+        let shown = Shown {
+            json: args.ask.json,
+            text: prints,
+            rows: file.as_ref().map(create).transpose()?,
+        };
         let steps = steps_of_sequence(
             (&mut detector, &mut scene, moving),
-            &step,
+            &args.step.of(query),
             &frames,
             range,
-            args.ask.json,
-            &Control::new().cancel(cancel),
+            shown,
             || watch.frame_done(),
         )?;
+        drop(watch);
         if !args.ask.json {
-            writeln!(out(), "{}", asked.line(&vertices, &nouns))?;
+            let asked = Asked {
+                question: args.step.question(),
+                has_kinds: !args.step.kinds.is_empty(),
+                ..asked
+            };
+            let line = asked.line(&vertices, &nouns) + "\n";
+            output::say(line.as_bytes(), file.as_ref())?;
         }
         return steps.end(args.ask.fail_on_hit);
     }
-    let still = Watch::detection(false, "");
+    let mut outputs = Outputs::new(args, inputs, file.as_ref())?;
     let mut lines = Lines::default();
     if prints {
         Lines::begin()?;
@@ -105,7 +116,7 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
         let positions = frames.read(frame_ix)?;
         set_positions(&mut scene, moving, &positions)
             .map_err(|source| frames.refused(frame_ix, source))?;
-        let pairs = detect(&mut detector, &scene, &query, cancel, &still)?;
+        let pairs = &detector.detect(&scene, &query)?;
         n_pairs += pairs.len();
         outputs.frame(frame_ix, &scene, &bodies, pairs)?;
         if args.ask.json {
@@ -129,7 +140,10 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
     outputs.finish()?;
     if prints {
         lines.end()?;
-        writeln!(out(), "{}", asked.line(&vertices, &nouns))?;
+    }
+    if !args.ask.json {
+        let line = asked.line(&vertices, &nouns) + "\n";
+        output::say(line.as_bytes(), file.as_ref())?;
     }
     hit(args.ask.fail_on_hit, n_pairs > 0)
 }
@@ -138,21 +152,17 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
 struct Outputs<'a> {
     args: &'a SequenceArgs,
     inputs: Inputs,
-    rows: Option<FrameRows>,
+    rows: Option<Rows>,
     drawer: Option<Drawer<'a>>,
 }
 
 impl<'a> Outputs<'a> {
-    fn new(args: &'a SequenceArgs, frames: &Frames) -> Result<Self, Error> {
-        let meshes = std::iter::once(&args.mesh).chain(&args.others);
-        let inputs = Inputs::new(meshes.chain(frames.sequence.files()));
-        if let Some(file) = args.pairs.as_ref().filter(|file| !file.is_stdout()) {
-            inputs.check("--pairs", &file.path)?;
-        }
+    fn new(args: &'a SequenceArgs, inputs: Inputs, rows: Option<&RowsFile>) -> Result<Self, Error> {
+        let create = |file| Rows::create(file, rows::of_frames(&ELEMENTS), None);
         Ok(Outputs {
             args,
             inputs,
-            rows: args.pairs.as_ref().map(FrameRows::create).transpose()?,
+            rows: rows.map(create).transpose()?,
             drawer: match args.png {
                 Some(_) => {
                     let device = args.detector.device.as_deref();
@@ -172,7 +182,11 @@ impl<'a> Outputs<'a> {
         pairs: &Pairs,
     ) -> Result<(), Error> {
         if let Some(rows) = &mut self.rows {
-            rows.frame(frame_ix, pairs)?;
+            let frame = rows::frame(frame_ix);
+            rows.put(pairs.rows().map(|row| {
+                let [body_a, a, body_b, b] = row.map(Cell::Number);
+                [frame, body_a, a, body_b, b]
+            }))?;
         }
         if let Some(files) = &self.args.out {
             let file = files.frame(frame_ix).map_err(Error::Usage)?;
@@ -188,7 +202,7 @@ impl<'a> Outputs<'a> {
     }
 
     fn finish(self) -> Result<(), Error> {
-        self.rows.map_or(Ok(()), FrameRows::finish)
+        self.rows.map_or(Ok(()), Rows::finish)
     }
 }
 

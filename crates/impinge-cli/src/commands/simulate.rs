@@ -70,6 +70,7 @@ pub fn simulate(args: &SimulateArgs, cancel: &CancelToken) -> Result<(), Error> 
     );
     // A step is short, so a request to stop waits for it, and its state is saved.
     let _patience = Patience::new();
+    detector.set_control(Control::new().cancel(cancel));
     let mut summary = Summary::default();
     let result = run(
         &mut simulation,
@@ -138,8 +139,7 @@ fn run(
             return Err(impinge_fem::Error::from(impinge::Error::Cancelled).into());
         }
         let step = simulation.n_steps();
-        let control = Control::new().cancel(cancel);
-        let pairs = simulation.detect(detector, &control)?;
+        let pairs = &simulation.detect(detector)?;
         to.record.frame(simulation, to.bodies, pairs)?;
         to.summary.found(to.bodies, pairs);
         let found = Found::new(step, to.bodies, pairs);

@@ -5,25 +5,29 @@ mod candidates;
 mod colors;
 mod frames;
 mod load;
-mod rows;
+mod reached;
 
-use std::io::{Write, stderr};
+use std::io::Write;
 
-use impinge::{CancelToken, CandidateQuery, Control, Query, Step};
+use impinge::{CancelToken, SharedVertex};
+use impinge_io::impact_columns;
 use serde_json::Value;
 
 use crate::apart::Inputs;
-use crate::args::StepArgs;
-use crate::detection::{Times, detector, without};
+use crate::args::{PrecisionArg, StepArgs};
+use crate::asked::{Asked, Question};
+use crate::detection::{Times, detector, query};
 use crate::error::Error;
-use crate::output::out;
+use crate::load::Nouns;
+use crate::output::{out, say};
 use crate::picture::Drawer;
+use crate::rows;
 use crate::values::RowsFile;
 use crate::watch::Watch;
 
 use answer::Found;
 pub use answer::impact_row;
-pub use frames::{Frames, steps_of_sequence};
+pub use frames::{Frames, Shown, steps_of_sequence};
 use load::Moving;
 
 /// `impinge step`.
@@ -32,79 +36,72 @@ pub fn step(args: &StepArgs, cancel: &CancelToken) -> Result<(), Error> {
     for (option, path) in args.outputs() {
         inputs.check(option, path)?;
     }
-    let rows_on_stdout = args.impacts.as_ref().is_some_and(RowsFile::is_stdout);
-    if args.json && rows_on_stdout {
-        let text = "--json and --impacts - both write to standard output: give one of them a file";
-        return Err(Error::Usage(text.to_owned()));
-    }
-    if args.json && args.candidates.as_ref().is_some_and(RowsFile::is_stdout) {
-        let text =
-            "--json and --candidates - both write to standard output: give one of them a file";
-        return Err(Error::Usage(text.to_owned()));
-    }
+    let rows_file = args.rows.file(&inputs, args.json)?;
+    let candidates = args.candidates.as_ref();
+    let candidates = args
+        .rows
+        .checked("--candidates", candidates, &inputs, args.json)?;
     let mut detector = detector(&args.detector)?;
     let mut bodies = Moving::read(args, cancel)?;
-    let step = Step::new(query(args, &bodies)?)
-        .start(args.how.start.into())
-        .toi(args.how.toi.into())
-        .separation(args.how.separation)
-        .clearance(args.how.clearance);
+    let asked = asked(args, &bodies)?;
+    let step = args.how.of(query(asked, &args.exclude, &bodies.ids)?);
 
     let watch = Watch::detection(!args.detector.no_progress, "detecting");
-    let report = |progress| watch.report(progress);
-    let mut control = Control::new().cancel(cancel);
-    if watch.is_shown() {
-        control = control.progress(&report);
-    }
-    if let Some(file) = &args.candidates {
-        let query = candidate_query(args, &bodies)?;
-        let asked = (&mut detector, &bodies, &query);
-        let written = candidates::write(file, asked, &control)?;
+    detector.set_control(watch.control(cancel));
+    if let Some(file) = &candidates {
+        let of_boxes = (args.inflation, &step);
+        let written = candidates::write(file, (&mut detector, &bodies), of_boxes)?;
         drop(watch);
         if args.json {
-            writeln!(out(), "{}", written.json(&bodies, args.distance)?)?;
-        } else if file.is_stdout() {
-            // If standard error is closed, nobody reads the summary.
-            let _ = written.print(&mut stderr());
-        } else {
-            written.print(&mut out())?;
+            let object = written.json(&bodies, args.inflation, asked)?;
+            writeln!(out(), "{object}")?;
+            return Ok(());
         }
-        return Ok(());
+        let mut text = Vec::new();
+        written.print(&mut text)?;
+        writeln!(text, "{}", asked.line(&bodies.vertices, &Nouns::default()))?;
+        return say(&text, Some(file));
+    }
+    if !args.advance.is_empty() {
+        reached::check(&args.advance, &bodies)?;
+        let advance = detector.advance(&bodies.scene, &step)?;
+        drop(watch);
+        reached::write(&args.advance, &bodies, &advance)?;
+        let found = Found::advance(&advance, detector.stats());
+        print(args, asked, &bodies, &found, None)?;
+        return found.end(args.fail_on_hit);
     }
     let mut times = Times::default();
     for _ in 1..args.repeat.get() {
         if args.earliest {
-            detector.earliest_with(&bodies.scene, &step, &control)?;
+            detector.earliest(&bodies.scene, &step)?;
         } else {
-            detector.impacts_with(&bodies.scene, &step, &control)?;
+            detector.impacts(&bodies.scene, &step)?;
         }
-        times.add(detector.step_stats());
+        times.add(detector.stats());
         bodies.rewrite()?;
     }
     if args.earliest {
-        let earliest = detector.earliest_with(&bodies.scene, &step, &control)?;
+        let earliest = detector.earliest(&bodies.scene, &step)?;
         let start_intersects = detector.start_intersects();
         drop(watch);
-        let found = Found::first(earliest, start_intersects, detector.step_stats(), times);
-        print(args, &bodies, &found)?;
+        let found = Found::first(earliest, start_intersects, detector.stats(), times);
+        print(args, asked, &bodies, &found, None)?;
         return found.end(args.fail_on_hit);
     }
-    let impacts = detector.impacts_with(&bodies.scene, &step, &control)?;
+    let impacts = &detector.impacts(&bodies.scene, &step)?;
     drop(watch);
     // Files are written first: if one can't be written, no answer is printed that looks like success.
-    if let Some(file) = &args.impacts {
-        rows::write(file, args.how.toi, impacts)?;
+    if let Some(file) = &rows_file {
+        let columns = impact_columns(args.how.precision == PrecisionArg::F64);
+        let rows = impacts.iter().map(rows::impact);
+        rows::write(file, columns, impacts.len(), rows)?;
     }
     if let Some(file) = &args.out {
         colors::write(file, &bodies, impacts)?;
     }
     let found = Found::all(impacts, times);
-    if rows_on_stdout {
-        // If standard error is closed, nobody reads the summary.
-        let _ = found.print(&mut stderr(), &bodies, &args.how);
-    } else {
-        print(args, &bodies, &found)?;
-    }
+    print(args, asked, &bodies, &found, rows_file.as_ref())?;
     if let Some(png) = &args.png {
         let surfaces = colors::surfaces(&bodies, impacts)?;
         let device = args.detector.device.as_deref();
@@ -113,32 +110,42 @@ pub fn step(args: &StepArgs, cancel: &CancelToken) -> Result<(), Error> {
     found.end(args.fail_on_hit)
 }
 
-fn query(args: &StepArgs, bodies: &Moving) -> Result<Query, Error> {
+fn asked(args: &StepArgs, bodies: &Moving) -> Result<Asked, Error> {
     if args.no_self && bodies.ids.len() < 2 {
         return Err(Error::Usage(
             "--no-self leaves nothing to test if there is only one body".to_owned(),
         ));
     }
-    let asked = match args.no_self {
-        true => Query::all(),
-        false => Query::everything(),
-    };
-    without(asked, &args.ignore, &bodies.ids)
-}
-
-fn candidate_query(args: &StepArgs, bodies: &Moving) -> Result<CandidateQuery, Error> {
-    let asked = CandidateQuery::new(query(args, bodies)?).distance(args.distance);
-    Ok(match args.kinds.is_empty() {
-        true => asked,
-        false => asked.kinds(args.kinds.iter().map(|&kind| kind.into())),
+    Ok(Asked {
+        between: bodies.ids.len() > 1,
+        within: !args.no_self && args.between.is_none(),
+        only: args.between,
+        shared_vertex: SharedVertex::Resolve,
+        question: match args.candidates {
+            Some(_) => Question::Candidates,
+            None => args.how.question(),
+        },
+        has_self: false,
+        excludes: !args.exclude.is_empty(),
+        has_kinds: !args.how.kinds.is_empty(),
     })
 }
 
-fn print(args: &StepArgs, bodies: &Moving, found: &Found<'_>) -> Result<(), Error> {
+fn print(
+    args: &StepArgs,
+    asked: Asked,
+    bodies: &Moving,
+    found: &Found<'_>,
+    rows: Option<&RowsFile>,
+) -> Result<(), Error> {
     if args.json {
-        let object = Value::Object(found.json(bodies, &args.how)?);
-        writeln!(out(), "{object}")?;
+        let mut object = found.json(bodies, &args.how)?;
+        object.insert("asked".into(), asked.json());
+        writeln!(out(), "{}", Value::Object(object))?;
         return Ok(());
     }
-    Ok(found.print(&mut out(), bodies, &args.how)?)
+    let mut text = Vec::new();
+    found.print(&mut text, bodies, &args.how)?;
+    writeln!(text, "{}", asked.line(&bodies.vertices, &Nouns::default()))?;
+    say(&text, rows)
 }

@@ -13,6 +13,7 @@ use self::args::{MergeArgs, PlanArgs, RunArgs, ScatterArgs, TilesCommand};
 pub use self::args::{TILES_EXAMPLES, TilesArgs};
 use super::step::impact_row;
 use crate::error::Error;
+use crate::json;
 use crate::output::out;
 use crate::text::{counted, grouped};
 use crate::watch::Watch;
@@ -137,7 +138,7 @@ fn run(args: &RunArgs, cancel: &CancelToken) -> Result<(), Error> {
             within: !args.between,
             shared_vertex: args.shared_vertex.into(),
             start: args.start.into(),
-            toi: args.toi.into(),
+            precision: args.precision.into(),
         },
         settings: Settings {
             backend: Backend::Cpu,
@@ -152,7 +153,7 @@ fn run(args: &RunArgs, cancel: &CancelToken) -> Result<(), Error> {
     let control = Control::new().cancel(cancel);
     let mut results: Vec<TileResult> = Vec::new();
     let mut printed = Ok(());
-    plan.run(tiles, &options, &control, &mut |result| {
+    plan.run(tiles, &options, control, &mut |result| {
         watch.frame_done();
         if args.json && printed.is_ok() {
             printed = print(true, &row(result), "");
@@ -249,16 +250,13 @@ fn merge(args: &MergeArgs) -> Result<(), Error> {
 
 /// What `impinge step --json` says too, under the same keys.
 fn of_step(step: &MergedStep) -> Value {
-    let kinds = step
-        .kinds
-        .map(|(kind, n)| (kind.name().to_owned(), Value::from(n)));
     let earliest = step
         .earliest
         .map(|(kind, row, toi)| impact_row(kind, row, toi));
     json!({
         "free": earliest.is_none(),
         "earliest": earliest,
-        "kinds": Value::Object(kinds.into_iter().collect()),
+        "kinds": json::kinds(step.kinds),
         "touching_at_start": step.touching_at_start,
     })
 }

@@ -13,7 +13,7 @@ use super::sequence::{Frames, welded};
 use super::step::Frames as _;
 use crate::apart::Inputs;
 use crate::args::ViewArgs;
-use crate::asked::Asked;
+use crate::asked::{Asked, Question};
 use crate::commands::demo_scene::DemoScene;
 use crate::error::Error;
 use crate::files::{Files, FrameFiles};
@@ -72,8 +72,12 @@ fn save(
     let asked = Asked {
         between: true,
         within: args.within || bodies.len() == 1,
+        only: None,
         shared_vertex: args.shared_vertex.into(),
-        ignores: false,
+        question: Question::Pairs,
+        has_self: true,
+        excludes: false,
+        has_kinds: false,
     };
     writeln!(to, "{}", asked.line(&vertices, &nouns))?;
     Ok(())

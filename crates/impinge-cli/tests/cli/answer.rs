@@ -28,10 +28,10 @@ fn json_has_the_shape_that_is_promised() {
             "hash",
             "backend",
             "method",
-            "asked",
-            "bodies",
             "ms",
             "stats",
+            "asked",
+            "bodies",
             "n_regions",
             "regions"
         ]
@@ -51,9 +51,9 @@ fn json_has_the_shape_that_is_promised() {
         found.dedup();
         found.len()
     };
-    let described = |name: &str, primitives: usize, vertices: usize, colliding: usize| {
+    let described = |name: &str, elements: usize, vertices: usize, colliding: usize| {
         json!({
-            "name": name, "kind": "triangles", "primitives": primitives, "vertices": vertices, "colliding": colliding,
+            "name": name, "kind": "triangles", "elements": elements, "vertices": vertices, "colliding": colliding,
             "welded": 0, "coincident": 0,
         })
     };
@@ -93,20 +93,22 @@ fn written_rows_are_the_library_s() {
     }
     type Ask = fn(&[impinge::BodyId]) -> Query;
     let cases: [(&[&str], Ask); 7] = [
-        (&["pairs"], |_| Query::all()),
-        (&["pairs", "--self"], |_| Query::everything()),
-        (&["pairs", "--ignore", "0,1"], |ids| {
-            Query::all().ignore(ids[0], ids[1])
+        (&["pairs"], |_| Query::between_all()),
+        (&["pairs", "--self"], |_| Query::all()),
+        (&["pairs", "--exclude", "0,1"], |ids| {
+            Query::between_all().exclude((ids[0], ids[1]))
         }),
-        (&["pairs", "--ignore", "2,0", "--ignore", "1,2"], |ids| {
-            Query::all().ignore(ids[0], ids[2]).ignore(ids[1], ids[2])
+        (&["pairs", "--exclude", "2,0", "--exclude", "1,2"], |ids| {
+            Query::between_all()
+                .exclude((ids[0], ids[2]))
+                .exclude((ids[1], ids[2]))
         }),
-        (&["pairs", "--self", "--ignore", "1,1"], |ids| {
-            Query::everything().ignore(ids[1], ids[1])
+        (&["pairs", "--self", "--exclude", "1,1"], |ids| {
+            Query::all().exclude((ids[1], ids[1]))
         }),
-        (&["self"], |_| Query::all_within()),
-        (&["self", "--ignore", "0,0"], |ids| {
-            Query::all_within().ignore(ids[0], ids[0])
+        (&["self"], |_| Query::self_all()),
+        (&["self", "--exclude", "0,0"], |ids| {
+            Query::self_all().exclude((ids[0], ids[0]))
         }),
     ];
     let mut seen = Vec::new();
@@ -122,7 +124,7 @@ fn written_rows_are_the_library_s() {
                     "--no-weld",
                     "--shared-vertex",
                     rule,
-                    "--pairs",
+                    "--rows",
                     file,
                     "--json",
                 ];
@@ -149,7 +151,7 @@ fn no_option_of_the_search_changes_the_answer() {
     let (a, b) = (ball(500), solid_ball(200).translated([0.4, 0.0, 0.1]));
     folder.ply("a.ply", &a);
     folder.medit("b.mesh", &b);
-    let (rows, hash) = oracle(&[&a, &b], |_| Query::everything());
+    let (rows, hash) = oracle(&[&a, &b], |_| Query::all());
     for options in [
         &["--method", "naive"][..],
         &["--method", "clusters", "--threads", "1", "--backend", "cpu"],
@@ -188,7 +190,7 @@ fn no_option_of_the_search_changes_the_answer() {
             "b.mesh",
             "--self",
             "--json",
-            "--pairs",
+            "--rows",
             "rows.npy",
             "--shared-vertex",
             "skip",
@@ -214,7 +216,7 @@ fn text_for_people_holds_the_numbers() {
     let (a, b) = (ball(1_280), ball(1_280).translated([0.8, 0.0, 0.0]));
     folder.ply("a.ply", &a);
     folder.ply("b.ply", &b);
-    let (rows, hash) = oracle(&[&a, &b], |_| Query::all());
+    let (rows, hash) = oracle(&[&a, &b], |_| Query::between_all());
     let text = folder
         .run(["pairs", "a.ply", "b.ply", "--backend", "cpu", "-v"])
         .printed();
@@ -278,7 +280,7 @@ fn polygons_are_fanned_with_a_note() {
     let expected = "note: quad.obj: polygons split into triangles (primitive numbers count the triangles): 1\n";
     assert_eq!(run.stderr, expected);
     let object = folder.run(["self", "quad.obj", "--json"]).json();
-    assert_eq!(object["bodies"][0]["primitives"], json!(2));
+    assert_eq!(object["bodies"][0]["elements"], json!(2));
     assert_eq!(object["stats"]["grid"], Value::Null);
 }
 
@@ -336,7 +338,7 @@ fn pairs_are_limited_counted_and_asked_for() {
         let run = folder.run(["self", "pile.obj", option, "--fail-on-hit"]);
         assert_eq!((run.code, run.stderr.as_str()), (Some(3), ""));
         for others in [
-            &["--pairs", "p.csv"][..],
+            &["--rows", "p.csv"][..],
             &["--out", "p.ply"],
             &["--repeat", "2"],
         ] {

@@ -351,7 +351,7 @@ fn one_bad_file_of_many_does_not_keep_the_others_from_an_answer() {
     assert_eq!(run.stderr.lines().last(), Some(last));
 
     // Bodies keep their numbers.
-    let run = folder.run([&["self", "--json", "--pairs", "rows.csv"], &names[..]].concat());
+    let run = folder.run([&["self", "--json", "--rows", "rows.csv"], &names[..]].concat());
     assert_eq!(run.code, Some(1));
     let object: Value = serde_json::from_str(&run.stdout).unwrap();
     assert_eq!(wrong(&schema("answer"), &object, "$"), [""; 0]);

@@ -99,9 +99,9 @@ fn distances_are_told() {
         let printed = folder.run(["distance", a, b]).printed();
         assert_eq!(
             printed,
-            format!("distance 0\nprimitive 0 of {a} at 1 1 1\nprimitive 0 of {b} at 1 1 1\n")
+            format!("distance 0\nelement 0 of {a} at 1 1 1\nelement 0 of {b} at 1 1 1\n")
         );
     }
     let printed = folder.run(["distance", "a.ply", "b.ply"]).printed();
-    assert!(printed.starts_with("distance 2\nprimitive "), "{printed}");
+    assert!(printed.starts_with("distance 2\nelement "), "{printed}");
 }

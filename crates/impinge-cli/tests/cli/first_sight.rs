@@ -140,7 +140,7 @@ fn the_first_line_is_the_answer_and_the_next_ones_say_where() {
     let model = clashing();
     folder.ply("boxes.ply", &model);
     let (rows, hash) = oracle(&[&model], |_| {
-        Query::all_within().shared_vertex(SharedVertex::Resolve)
+        Query::self_all().shared_vertex(SharedVertex::Resolve)
     });
     let text = folder.run(["self", "boxes.ply"]).printed();
     let lines: Vec<&str> = text.lines().collect();
@@ -234,35 +234,28 @@ fn pairs_and_meshes_go_through_pipes() {
     let model = clashing();
     folder.ply("boxes.ply", &model);
     folder
-        .run(["self", "boxes.ply", "--pairs", "rows.csv"])
+        .run(["self", "boxes.ply", "--rows", "rows.csv"])
         .printed();
     let rows = csv_rows(&folder.path("rows.csv"));
-    let run = folder.run(["self", "boxes.ply", "--pairs", "-"]);
+    let run = folder.run(["self", "boxes.ply", "--rows", "-"]);
     assert!(run.stderr.starts_with("boxes.ply: "), "{}", run.stderr);
     assert_eq!(
         run.printed(),
         std::fs::read_to_string(folder.path("rows.csv")).unwrap()
     );
-    let args = [
-        "self",
-        "boxes.ply",
-        "--pairs",
-        "-",
-        "--pairs-format",
-        "jsonl",
-    ];
+    let args = ["self", "boxes.ply", "--rows", "-", "--rows-format", "jsonl"];
     let text = folder.run(args).printed();
     let read: Vec<[u32; 4]> = text
         .lines()
         .map(|line| {
             let row: serde_json::Value = serde_json::from_str(line).unwrap();
-            ["body_a", "primitive_a", "body_b", "primitive_b"]
+            ["body_a", "element_a", "body_b", "element_b"]
                 .map(|key| row[key].as_u64().unwrap() as u32)
         })
         .collect();
     assert_eq!(read, rows);
     folder
-        .run(["self", "boxes.ply", "--pairs", "-", "--json"])
+        .run(["self", "boxes.ply", "--rows", "-", "--json"])
         .misuse();
 
     let piped = |args: &[&str]| -> Run {
@@ -278,7 +271,7 @@ fn pairs_and_meshes_go_through_pipes() {
         let _ = child.stdin.take().unwrap().write_all(&bytes);
         child.wait_with_output().unwrap().into()
     };
-    let text = piped(&["self", "-", "--format", "ply", "--pairs", "in.csv"]).printed();
+    let text = piped(&["self", "-", "--format", "ply", "--rows", "in.csv"]).printed();
     assert!(text.starts_with("standard input: "), "{text}");
     assert_eq!(csv_rows(&folder.path("in.csv")), rows);
     assert!(piped(&["self", "-"]).misuse().contains("--format"));

@@ -155,7 +155,7 @@ pub fn oracle(
         .iter()
         .map(|model| model.add_to(&mut scene).unwrap())
         .collect();
-    let mut detector = Detector::with_settings(Settings {
+    let mut detector = Detector::new(Settings {
         method: Method::Naive,
         ..Settings::default()
     })
@@ -168,7 +168,7 @@ pub fn oracle(
 pub fn csv_rows(path: &Path) -> Vec<[u32; 4]> {
     let text = std::fs::read_to_string(path).unwrap();
     let mut lines = text.lines();
-    assert_eq!(lines.next(), Some("body_a,primitive_a,body_b,primitive_b"));
+    assert_eq!(lines.next(), Some("body_a,element_a,body_b,element_b"));
     lines
         .map(|line| {
             let row: Vec<u32> = line.split(',').map(|x| x.parse().unwrap()).collect();

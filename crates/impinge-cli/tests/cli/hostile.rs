@@ -34,7 +34,7 @@ fn a_full_disk_leaves_older_files_as_they_were() {
     for file in ["rows.csv", "rows.npy", "seen.ply", "seen.glb", "seen.vtu"] {
         folder.text(file, "precious");
         let option = if file.starts_with("rows") {
-            "--pairs"
+            "--rows"
         } else {
             "--out"
         };
@@ -76,7 +76,7 @@ fn an_output_keeps_who_may_read_it_and_the_link_to_it() {
     fs::set_permissions(&path, fs::Permissions::from_mode(0o600)).unwrap();
     symlink("secret.csv", folder.path("link.csv")).unwrap();
     folder
-        .run(["pairs", "a.ply", "b.ply", "--pairs", "link.csv"])
+        .run(["pairs", "a.ply", "b.ply", "--rows", "link.csv"])
         .printed();
     assert!(fs::read_to_string(&path).unwrap().starts_with("body_a,"));
     let mode = fs::metadata(&path).unwrap().permissions().mode();
@@ -104,7 +104,7 @@ fn no_output_replaces_an_input() {
         ("--out", "sub/link.ply"),
         ("--out", "hard.ply"),
         ("--out", &absolute),
-        ("--pairs", "rows.csv"),
+        ("--rows", "rows.csv"),
     ] {
         let said = folder
             .run(["pairs", "b.ply", "a.ply", option, file])

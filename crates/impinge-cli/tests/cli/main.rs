@@ -1,5 +1,6 @@
 //! The program from outside: the built binary, on files made for the test.
 
+mod advance;
 mod answer;
 mod check;
 mod contacts;
@@ -12,6 +13,7 @@ mod harness;
 mod hostile;
 mod near;
 mod render;
+mod rows;
 mod schema;
 mod sequence;
 mod shared_data;

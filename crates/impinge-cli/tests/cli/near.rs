@@ -1,6 +1,6 @@
 //! `impinge near`.
 
-use impinge::{Backend, Detector, NearPair, NearQuery, PairKind, Query, Scene};
+use impinge::{Backend, Detector, NearPair, PairKind, Query, Scene};
 use impinge_scenes::Model;
 use impinge_scenes::surfaces::{ball, cube};
 use serde_json::json;
@@ -28,12 +28,12 @@ fn expected(query: Query, kinds: &[PairKind]) -> (Vec<NearPair>, u64) {
     for model in models() {
         model.add_to(&mut scene).unwrap();
     }
-    let mut query = NearQuery::new(query).distance(DISTANCE).closest_points();
+    let mut query = query.closest_points();
     if !kinds.is_empty() {
         query = query.kinds(kinds.iter().copied());
     }
     let mut detector = Detector::new(Backend::Cpu).unwrap();
-    let near = detector.within_distance(&scene, &query).unwrap();
+    let near = detector.near(&scene, DISTANCE, &query).unwrap();
     (near.iter().collect(), near.hash())
 }
 
@@ -43,12 +43,12 @@ fn the_json_holds_what_the_library_says() {
     let schema = schema("near");
     let near = ["near", "a.ply", "b.ply", "--distance", "1.25", "--json"];
     for (more, query, kinds) in [
-        (&[][..], Query::all(), &[][..]),
-        (&["--self"], Query::everything(), &[]),
-        (&["--method", "naive"], Query::all(), &[]),
+        (&[][..], Query::between_all(), &[][..]),
+        (&["--self"], Query::all(), &[]),
+        (&["--method", "naive"], Query::between_all(), &[]),
         (
             &["--kinds", "vv,ef,ff"],
-            Query::all(),
+            Query::between_all(),
             &[
                 PairKind::VertexVertex,
                 PairKind::EdgeFace,
@@ -84,8 +84,8 @@ fn the_json_holds_what_the_library_says() {
 #[test]
 fn rows_read_back_to_the_same_bits() {
     let folder = folder();
-    let (pairs, _) = expected(Query::all(), &[]);
-    let near = ["near", "a.ply", "b.ply", "--distance", "1.25", "--pairs"];
+    let (pairs, _) = expected(Query::between_all(), &[]);
+    let near = ["near", "a.ply", "b.ply", "--distance", "1.25", "--rows"];
     let run = folder.run(near.iter().chain(&["-"]));
     assert!(
         run.stderr.contains("pairs of elements within 1.25"),
@@ -120,7 +120,7 @@ fn rows_read_back_to_the_same_bits() {
     for (line, pair) in text.lines().zip(&pairs) {
         let object: serde_json::Value = serde_json::from_str(line).unwrap();
         assert_eq!(object["type"], pair.name());
-        assert_eq!(object["element_b"], pair.b.primitive);
+        assert_eq!(object["element_b"], pair.b.element);
         assert_eq!(object["distance"], pair.closest.unwrap().distance);
     }
 
@@ -130,7 +130,7 @@ fn rows_read_back_to_the_same_bits() {
     let header = std::str::from_utf8(&bytes[10..start]).unwrap();
     let shape = format!("'shape': ({},)", pairs.len());
     assert!(header.contains(&shape), "{header}");
-    // Kind, four numbers, type, two features, a byte, distance and points.
+    // BodyKind, four numbers, type, two features, a byte, distance and points.
     let size = 8 + 16 + 28 + 16 + 1 + 8 + 48;
     let rows: Vec<&[u8]> = bytes[start..].chunks_exact(size).collect();
     assert_eq!(rows.len() * size, bytes.len() - start);
@@ -191,7 +191,7 @@ fn misuse_is_named() {
                 "--distance",
                 "1",
                 "--json",
-                "--pairs",
+                "--rows",
                 "-",
             ],
             "give one of them a file",
@@ -203,7 +203,7 @@ fn misuse_is_named() {
                 "b.ply",
                 "--distance",
                 "1",
-                "--ignore",
+                "--exclude",
                 "0,7",
             ],
             "names body 7, but 2 bodies",
@@ -223,7 +223,7 @@ fn misuse_is_named() {
             "b.ply",
             "--distance",
             "1",
-            "--pairs",
+            "--rows",
             "a.ply.csv/x.csv",
         ])
         .error();
@@ -247,7 +247,7 @@ fn what_intersects_is_never_clear() {
         (&answer["kinds"]["ef"], &answer["intersects"]),
         (&8.into(), &true.into())
     );
-    let rows = folder.run(near.iter().chain(&["--pairs", "-"])).printed();
+    let rows = folder.run(near.iter().chain(&["--rows", "-"])).printed();
     for row in rows.lines().skip(1) {
         let fields: Vec<&str> = row.split(',').collect();
         assert_eq!(

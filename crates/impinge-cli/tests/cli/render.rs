@@ -89,7 +89,7 @@ fn what_meets_is_red_and_blue() {
 fn answers_come_with_their_picture() {
     let folder = two_balls();
     let models = [ball(2_000), ball(2_000).translated([0.7, 0.2, 0.1])];
-    let (rows, hash) = oracle(&[&models[0], &models[1]], |_| Query::all());
+    let (rows, hash) = oracle(&[&models[0], &models[1]], |_| Query::between_all());
     for command in ["pairs", "render"] {
         let args = [command, "a.ply", "b.ply", "--png", "out.png", "--json"];
         let object = folder.run(args).json();

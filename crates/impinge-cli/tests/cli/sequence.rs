@@ -51,10 +51,10 @@ fn every_frame_is_the_oracle_s() {
     let ring = ring();
     type Case<'a> = (&'a [&'a str], Query);
     let cases: [Case; 4] = [
-        (&[], Query::all_within()),
-        (&["--self"], Query::all_within()),
-        (&["--other", "ring.ply"], Query::all()),
-        (&["--other", "ring.ply", "--self"], Query::everything()),
+        (&[], Query::self_all()),
+        (&["--self"], Query::self_all()),
+        (&["--other", "ring.ply"], Query::between_all()),
+        (&["--other", "ring.ply", "--self"], Query::all()),
     ];
     for (options, query) in cases {
         let expected: Vec<(Value, Value)> = frames
@@ -88,10 +88,10 @@ fn every_frame_is_the_oracle_s() {
                         "hash",
                         "backend",
                         "method",
-                        "asked",
-                        "bodies",
                         "ms",
                         "stats",
+                        "asked",
+                        "bodies",
                         "n_regions",
                         "regions"
                     ]
@@ -161,7 +161,7 @@ fn text_for_people() {
         ),
         (
             &["--ccd"],
-            "between 2 meshes, vertices as in the files, neighbours resolved; not asked: self-collision (--self)",
+            "between 2 meshes, vertices as in the files, neighbours resolved at the start, else left out; not asked: self-collision (--self)",
         ),
     ] {
         let run = folder.run(args.iter().chain(more));
@@ -202,7 +202,7 @@ fn frames_are_welded_as_the_mesh_is() {
         .printed();
     for (line, frame) in lines(&text).iter().zip(&frames) {
         let rule = SharedVertex::Resolve;
-        let (rows, hash) = oracle(&[frame], |_| Query::all_within().shared_vertex(rule));
+        let (rows, hash) = oracle(&[frame], |_| Query::self_all().shared_vertex(rule));
         assert_eq!(
             (&line["pairs"], &line["hash"]),
             (&json!(rows.len()), &json!(hash))
@@ -234,9 +234,9 @@ fn pairs_and_meshes_of_every_frame_are_written() {
     let folder = Folder::new();
     let frames = write(&folder, 4);
     let rule = SharedVertex::Resolve;
-    let mut expected = vec!["frame,body_a,primitive_a,body_b,primitive_b".to_owned()];
+    let mut expected = vec!["frame,body_a,element_a,body_b,element_b".to_owned()];
     for (frame_ix, frame) in frames.iter().enumerate() {
-        let (rows, _) = oracle(&[frame], |_| Query::all_within().shared_vertex(rule));
+        let (rows, _) = oracle(&[frame], |_| Query::self_all().shared_vertex(rule));
         expected.extend(
             rows.iter()
                 .map(|[body_a, a, body_b, b]| format!("{frame_ix},{body_a},{a},{body_b},{b}")),
@@ -245,7 +245,7 @@ fn pairs_and_meshes_of_every_frame_are_written() {
     assert!(expected.len() > 20);
     let base = ["sequence", "ball.ply", "run.pc2"];
     let run = |options: &[&str]| folder.run(base.iter().chain(options)).printed();
-    run(&["--pairs", "rows.csv", "--out", "seen_%02d.ply"]);
+    run(&["--rows", "rows.csv", "--out", "seen_%02d.ply"]);
     let text = std::fs::read_to_string(folder.path("rows.csv")).unwrap();
     assert_eq!(text.lines().collect::<Vec<_>>(), expected);
     for (frame_ix, frame) in frames.iter().enumerate() {
@@ -256,15 +256,15 @@ fn pairs_and_meshes_of_every_frame_are_written() {
             impinge_io::Positions::F32(frame.positions.clone())
         );
     }
-    let printed = run(&["--pairs", "-"]);
+    let printed = run(&["--rows", "-"]);
     assert_eq!(printed.lines().collect::<Vec<_>>(), expected);
-    run(&["--pairs", "rows.jsonl"]);
+    run(&["--rows", "rows.jsonl"]);
     let text = std::fs::read_to_string(folder.path("rows.jsonl")).unwrap();
     assert_eq!(text.lines().count(), expected.len() - 1);
     let first: Value = serde_json::from_str(text.lines().next().unwrap()).unwrap();
     assert_eq!(
         keys(&first),
-        ["frame", "body_a", "primitive_a", "body_b", "primitive_b"]
+        ["frame", "body_a", "element_a", "body_b", "element_b"]
     );
     // Input frames are not overwritten, and one file cannot hold all frames.
     for out in ["run_%03d.ply", "seen.ply"] {
@@ -302,7 +302,7 @@ fn a_mesh_that_comes_apart_where_it_was_welded_is_refused() {
     folder.text("a.obj", &face(0.0));
     folder.text("f_1.obj", &face(0.0));
     folder.text("f_2.obj", &face(1.0));
-    let args = ["sequence", "a.obj", "f_1.obj", "--pairs", "-"];
+    let args = ["sequence", "a.obj", "f_1.obj", "--rows", "-"];
     let run = folder.run(args);
     assert_eq!(run.code, Some(2));
     assert!(

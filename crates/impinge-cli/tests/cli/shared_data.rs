@@ -44,7 +44,7 @@ fn self_intersections_of_welded_meshes() {
                     "--shared-vertex",
                     rule,
                     "--json",
-                    "--pairs",
+                    "--rows",
                     "rows.npy",
                 ])
                 .json();
@@ -95,7 +95,7 @@ fn bunny_against_its_moved_copy() {
             path.to_str().unwrap(),
             "moved.ply",
             "--json",
-            "--pairs",
+            "--rows",
             "rows.npy",
         ])
         .json();

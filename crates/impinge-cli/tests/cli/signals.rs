@@ -147,7 +147,7 @@ fn reading_and_writing_are_stopped_too() {
     folder.ply("b.ply", &ball(2_000).translated([0.1, 0.0, 0.0]));
     let made = Command::new("mkfifo").arg(folder.path("rows.csv")).status();
     assert!(made.unwrap().success());
-    let args = ["pairs", "a.ply", "b.ply", "--pairs", "rows.csv"];
+    let args = ["pairs", "a.ply", "b.ply", "--rows", "rows.csv"];
     let wait = |_: &Child| std::thread::sleep(Duration::from_millis(500));
     let (code, took, said) = stopped(&folder, &args, wait, "-TERM");
     assert_eq!((code, said.as_str()), (Some(143), "impinge: cancelled\n"));

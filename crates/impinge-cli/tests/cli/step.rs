@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use impinge::{Backend, CandidateQuery, Detector, Impact, PairKind, Query, Scene, Step, Toi};
+use impinge::{Backend, Detector, Impact, PairKind, Precision, Query, Scene};
 use impinge_scenes::Model;
 use impinge_scenes::surfaces::{ball, cube};
 use serde_json::Value;
@@ -32,7 +32,7 @@ fn folder() -> Folder {
 }
 
 /// All impacts, by the library.
-fn expected(toi: Toi) -> (Vec<Impact>, u64) {
+fn expected(precision: Precision) -> (Vec<Impact>, u64) {
     let [a0, a1, b0, b1] = crash().map(|(_, model)| model);
     let mut scene = Scene::new();
     for (start, end) in [(a0, a1), (b0, b1)] {
@@ -40,8 +40,9 @@ fn expected(toi: Toi) -> (Vec<Impact>, u64) {
         scene.set_end_positions(id, &end.positions).unwrap();
     }
     let mut detector = Detector::new(Backend::Cpu).unwrap();
-    let impacts = detector.impacts(&scene, &Step::default().toi(toi)).unwrap();
-    (impacts.as_slice().to_vec(), impacts.hash())
+    let query = Query::all().precision(precision);
+    let impacts = detector.impacts(&scene, &query).unwrap();
+    (impacts.iter().copied().collect(), impacts.hash())
 }
 
 type Row = (String, [u32; 4], f64);
@@ -108,9 +109,10 @@ fn the_json_holds_what_the_library_says() {
         "stats",
         "separation",
         "clearance",
+        "asked",
     ];
     assert_eq!(keys(&answer), names);
-    let (impacts, hash) = expected(Toi::F32);
+    let (impacts, hash) = expected(Precision::F32);
     assert!(impacts.len() > 10);
     assert_eq!(answer["free"], false);
     assert_eq!(answer["impacts"], impacts.len());
@@ -171,19 +173,19 @@ fn the_json_holds_what_the_library_says() {
 #[test]
 fn impacts_read_back_to_the_same_bits() {
     let folder = folder();
-    for (name, toi) in [("f32", Toi::F32), ("f64", Toi::F64)] {
+    for (name, toi) in [("f32", Precision::F32), ("f64", Precision::F64)] {
         let rows: Vec<Row> = expected(toi).0.iter().map(row).collect();
         for file in ["impacts.csv", "impacts.npy"] {
-            let options = ["--toi", name, "--impacts", file];
+            let options = ["--precision", name, "--rows", file];
             let run = folder.run(["step"].iter().chain(&FILES).chain(&options));
             run.printed();
         }
         assert_eq!(csv(&folder.path("impacts.csv")), rows);
         let read = match toi {
-            Toi::F32 => npy(&folder.path("impacts.npy"), |bytes| {
+            Precision::F32 => npy(&folder.path("impacts.npy"), |bytes| {
                 f32::from_le_bytes(bytes).into()
             }),
-            Toi::F64 => npy(&folder.path("impacts.npy"), f64::from_le_bytes),
+            Precision::F64 => npy(&folder.path("impacts.npy"), f64::from_le_bytes),
         };
         assert_eq!(read, rows);
     }
@@ -193,7 +195,7 @@ fn impacts_read_back_to_the_same_bits() {
 #[test]
 fn rows_are_printed_alone() {
     let folder = folder();
-    let ask = |to| folder.run(["step"].iter().chain(&FILES).chain(&["--impacts", to]));
+    let ask = |to| folder.run(["step"].iter().chain(&FILES).chain(&["--rows", to]));
     let run = ask("-");
     assert!(run.stderr.starts_with("not free: "), "{}", run.stderr);
     assert!(run.stderr.contains(" impacts ("), "{}", run.stderr);
@@ -206,7 +208,7 @@ fn rows_are_printed_alone() {
 fn a_check_fails_where_a_step_is_not_free() {
     let folder = folder();
     let ask = |args: &[&str]| folder.run(["step"].iter().chain(args).chain(&["--fail-on-hit"]));
-    for more in [&[][..], &["--earliest"], &["--json"], &["--impacts", "-"]] {
+    for more in [&[][..], &["--earliest"], &["--json"], &["--rows", "-"]] {
         let run = ask(&[&FILES[..], more].concat());
         assert_eq!(run.code, Some(3), "{}", run.stderr);
         assert!(!run.stdout.is_empty());
@@ -223,11 +225,9 @@ fn expected_candidates(kinds: &[PairKind], distance: f64) -> (Vec<(String, [u32;
         let id = start.add_to(&mut scene).unwrap();
         scene.set_end_positions(id, &end.positions).unwrap();
     }
-    let query = CandidateQuery::new(Query::everything())
-        .kinds(kinds.iter().copied())
-        .distance(distance);
+    let query = Query::all().kinds(kinds.iter().copied());
     let mut detector = Detector::new(Backend::Cpu).unwrap();
-    let candidates = detector.candidates(&scene, &query).unwrap();
+    let candidates = detector.candidates(&scene, distance, &query).unwrap();
     let rows = kinds.iter().flat_map(|&kind| {
         candidates
             .rows(kind)
@@ -241,7 +241,7 @@ fn candidates_are_written_in_every_format() {
     let folder = folder();
     let defaults = [PairKind::VertexFace, PairKind::EdgeEdge];
     let all = PairKind::ALL.map(PairKind::name).join(",");
-    let wide = ["--kinds", &all, "--distance", "0.5", "--threads", "1"];
+    let wide = ["--kinds", &all, "--inflation", "0.5", "--threads", "1"];
     // The least budget that is enough, and holds only runs of the candidates.
     let budgets = (512..4096).step_by(64).map(|kib| format!("{kib}k"));
     let is_enough = |budget: &String| {
@@ -272,7 +272,7 @@ fn candidates_are_written_in_every_format() {
             let answer = folder.run(arguments.chain(more).chain(&["--json"])).json();
             assert_eq!(answer["candidates"], rows.len());
             assert_eq!(answer["hash"], format!("{hash:016x}"));
-            assert_eq!(answer["distance"], distance);
+            assert_eq!(answer["inflation"], distance);
             assert_eq!(
                 answer["runs"].as_u64() > Some(1),
                 more.len() == in_runs.len()
@@ -305,11 +305,11 @@ fn candidates_are_written_in_every_format() {
     assert!(misuse.contains("both write to standard output"), "{misuse}");
     let misuse = ask(&["--candidates", "a0.ply"]);
     assert!(misuse.contains("--candidates"), "{misuse}");
-    for with in [&["--impacts", "-"][..], &["--earliest"], &["--repeat", "2"]] {
+    for with in [&["--rows", "-"][..], &["--earliest"], &["--repeat", "2"]] {
         let misuse = ask(&[&["--candidates", "boxes.csv"], with].concat());
         assert!(misuse.contains("cannot be used with"), "{misuse}");
     }
-    assert!(ask(&["--distance", "1"]).contains("--candidates"));
+    assert!(ask(&["--inflation", "1"]).contains("--candidates"));
 }
 
 fn npy_candidates(bytes: &[u8]) -> Vec<(String, [u32; 4])> {
@@ -458,15 +458,20 @@ fn welding_keeps_what_parts() {
     // Whoever wonders about contact at the start is told of these vertices.
     let noted = |more: &[&str]| {
         let run = folder.run(["step", "start.obj", "start.obj"].iter().chain(more));
-        run.stderr
+        (run.stderr, run.stdout)
     };
     let earliest = ["step", "start.obj", "start.obj", "--no-weld", "--earliest"];
     let run = folder.run(earliest);
     let first = "not free: vertex 0 and face 1 of start.obj touch first, at the start\n";
     assert!(run.stdout.starts_with(first), "{}", run.stdout);
     let told = "note: start.obj: vertices at the position of another, not welded to it: 1\n";
-    assert_eq!(noted(&["--no-weld"]), told);
-    assert!(noted(&[]).ends_with("welded to others: 1\n"));
+    assert_eq!(noted(&["--no-weld"]).0, told);
+    let (noted, printed) = noted(&[]);
+    assert_eq!(noted, "");
+    assert!(
+        printed.contains("\nwithin 1 mesh, 1 vertex welded, "),
+        "{printed}"
+    );
 }
 
 /// The triangles of an STL file share nothing except positions.
@@ -483,12 +488,13 @@ fn neighbours_in_an_stl_file_do_not_touch() {
     folder.text("start.stl", &text);
     folder.text("end.stl", &text.replace(" 0\n", " 2\n"));
     let run = folder.run(["step", "start.stl", "end.stl"]);
+    assert_eq!(run.stderr, "");
+    let printed = run.printed();
+    assert!(printed.starts_with("free: "), "{printed}");
     assert!(
-        run.stderr.ends_with("welded to others: 2\n"),
-        "{}",
-        run.stderr
+        printed.contains("\nwithin 1 mesh, 2 vertices welded, "),
+        "{printed}"
     );
-    assert!(run.printed().starts_with("free: "));
 }
 
 #[test]
@@ -548,12 +554,12 @@ fn a_sequence_is_followed_step_by_step() {
     let one = folder.run(text.iter().chain(&["--frames", "0..2"]));
     assert!(one.printed().contains("\n1 step, 1 free of contact\n"));
     // What a question does not answer is refused.
-    for more in [["--pairs", "rows.csv"], ["--out", "seen_%d.ply"]] {
+    for more in [["--png", "seen_%d.png"], ["--out", "seen_%d.ply"]] {
         let misuse = folder.run(text.iter().chain(&more)).misuse();
         assert!(misuse.contains("cannot be used with"), "{misuse}");
     }
     for more in [
-        ["--toi", "f64"],
+        ["--precision", "f64"],
         ["--start", "skip"],
         ["--separation", "1"],
         ["--clearance", "1"],
@@ -567,7 +573,7 @@ fn a_sequence_is_followed_step_by_step() {
 #[test]
 fn a_clearance_is_kept() {
     let said = " come as near as a clearance of 0.0625 lets them first, ";
-    let [_, with] = keeps("clearance", Step::default().clearance(0.0625), said);
+    let [_, with] = keeps("clearance", Query::all().clearance(0.0625), said);
     assert!(with["earliest"]["toi"].as_f64() > Some(0.0));
     assert_eq!(with["touching_at_start"], 0);
 }
@@ -576,13 +582,13 @@ fn a_clearance_is_kept() {
 #[test]
 fn a_separation_is_kept() {
     let said = " come within 0.0625 first, ";
-    let [without, with] = keeps("separation", Step::default().separation(0.0625), said);
+    let [without, with] = keeps("separation", Query::all().separation(0.0625), said);
     assert!(with["impacts"].as_u64() > without["impacts"].as_u64());
 }
 
 /// Asks about a crash without and with an option that makes elements keep 0.0625, compares it with the library, and returns both
 /// answers.
-fn keeps(option: &str, asked: Step, said: &str) -> [Value; 2] {
+fn keeps(option: &str, asked: Query, said: &str) -> [Value; 2] {
     let folder = folder();
     let step = |more: &[&str]| folder.run(["step"].iter().chain(&FILES).chain(more));
     let flag = &format!("--{option}")[..];

@@ -24,7 +24,7 @@ fn whole(folder: &Folder) -> Value {
         "--json",
         "--backend",
         "cpu",
-        "--pairs",
+        "--rows",
         "whole.npy",
     ];
     folder.run(args).json()
@@ -105,7 +105,7 @@ fn a_step_gives_the_impacts_of_the_whole() {
             [
                 &["step", "--start", "report"],
                 &files[..],
-                &["--json", "--impacts", "whole.npy"],
+                &["--json", "--rows", "whole.npy"],
             ]
             .concat(),
         )
@@ -187,7 +187,7 @@ fn a_step_with_a_separation_and_welded_vertices_gives_the_impacts_of_the_whole()
         &["step"],
         &files[..],
         &asked,
-        &["--json", "--impacts", "whole.npy"],
+        &["--json", "--rows", "whole.npy"],
     ]
     .concat();
     let expected = folder.run(whole).json();

@@ -38,10 +38,10 @@ fn help_shows_every_command_with_examples() {
                 "--format",
                 "--lambda",
                 "--repeat",
-                "--pairs",
+                "--rows",
                 "--out",
                 "--json",
-                "--ignore",
+                "--exclude",
                 "--memory-budget",
                 "--group-size",
                 "impinge pairs a.obj b.obj",
@@ -188,9 +188,9 @@ fn bad_usage_is_code_2() {
         &["pairs", "a.ply", "a.ply", "--lambda", "0"],
         &["pairs", "a.ply", "a.ply", "--group-size", "65"],
         &["pairs", "a.ply", "a.ply", "--memory-budget", "lots"],
-        &["pairs", "a.ply", "a.ply", "--pairs", "rows.txt"],
+        &["pairs", "a.ply", "a.ply", "--rows", "rows.txt"],
         &["pairs", "a.ply", "a.ply", "--out", "seen.obj"],
-        &["pairs", "a.ply", "a.ply", "--ignore", "0"],
+        &["pairs", "a.ply", "a.ply", "--exclude", "0"],
         &["demo", "--frames", "0"],
         &["demo", "--out", "demo"],
     ] {
@@ -198,11 +198,11 @@ fn bad_usage_is_code_2() {
         assert!(!said.is_empty(), "{args:?}");
     }
     let said = folder
-        .run(["pairs", "a.ply", "a.ply", "--ignore", "0,2"])
+        .run(["pairs", "a.ply", "a.ply", "--exclude", "0,2"])
         .misuse();
     assert_eq!(
         said.trim_end(),
-        "impinge: --ignore names body 2, but 2 bodies are given, numbered from 0"
+        "impinge: --exclude names body 2, but 2 bodies are given, numbered from 0"
     );
 }
 
@@ -237,7 +237,7 @@ fn other_errors_are_code_1_and_one_line() {
 fn unwritable_files_are_named() {
     let folder = Folder::new();
     folder.ply("a.ply", &ball(20));
-    for (option, file) in [("--pairs", "no/rows.csv"), ("--out", "no/seen.ply")] {
+    for (option, file) in [("--rows", "no/rows.csv"), ("--out", "no/seen.ply")] {
         let line = folder
             .run(["pairs", "a.ply", "a.ply", option, file])
             .error();

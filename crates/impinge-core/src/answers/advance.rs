@@ -9,7 +9,7 @@ use crate::scene::positions::Positions;
 /// How far a step can be taken.
 #[derive(Clone, PartialEq)]
 pub struct Advance {
-    /// The part of the step that can be taken: 1 for all of it, 0 for none. With a [clearance](crate::Step::clearance) it holds for positions
+    /// The part of the step that can be taken: 1 for all of it, 0 for none. With a [clearance](crate::Query::clearance) it holds for positions
     /// that solvers compute, and for all smaller parts: see [`Detector::advance`](crate::Detector::advance).
     pub fraction: f64,
     /// The first contact of the whole step, its time rounded down to `f64`. `None` if nothing touches.

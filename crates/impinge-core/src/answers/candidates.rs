@@ -1,7 +1,8 @@
 //! The answer about candidates.
 
+use crate::answers::home::{Home, gives_back};
 use crate::answers::numbering::{Numbering, row};
-use crate::answers::pairs::{Primitive, hash_row, mix};
+use crate::answers::pairs::{Element, hash_row, mix};
 use crate::plan::Plan;
 use crate::query::pair_kind::PairKind;
 use crate::scene::error::Error;
@@ -9,15 +10,19 @@ use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
 use crate::search::found::KeysByKind;
 use crate::search::runner::{Job, Outcome};
-use crate::search::stats::Statistics;
+use crate::search::stats::Stats;
 
 /// Pairs of elements whose boxes overlap during a step, sorted by `(kind, body_a, element_a, body_b, element_b)`.
 #[derive(Clone, Default)]
 pub struct Candidates {
     numbering: Numbering,
     keys: KeysByKind,
-    stats: Statistics,
+    stats: Stats,
+    /// Where its buffers go when it is dropped.
+    pub(crate) home: Option<Home<Candidates>>,
 }
+
+gives_back!(Candidates);
 
 impl std::fmt::Debug for Candidates {
     /// Their number and the first of them, however many there are.
@@ -46,7 +51,7 @@ impl Candidates {
     }
 
     /// The candidates of one kind: `(a, b)`, where `a` is the element that the kind names first.
-    pub fn of(&self, kind: PairKind) -> impl ExactSizeIterator<Item = (Primitive, Primitive)> + '_ {
+    pub fn of(&self, kind: PairKind) -> impl ExactSizeIterator<Item = (Element, Element)> + '_ {
         let keys = self.keys[kind as usize].iter();
         keys.map(|&key| self.numbering.pair(key))
     }
@@ -57,22 +62,27 @@ impl Candidates {
     }
 
     /// All candidates.
-    pub fn iter(&self) -> impl Iterator<Item = (PairKind, Primitive, Primitive)> + '_ {
+    pub fn iter(&self) -> impl Iterator<Item = (PairKind, Element, Element)> + '_ {
         let kinds = PairKind::ALL.into_iter();
         kinds.flat_map(|kind| self.of(kind).map(move |(a, b)| (kind, a, b)))
     }
 
     /// A hash of the set that does not depend on its order.
     pub fn hash(&self) -> u64 {
-        PairKind::ALL.into_iter().fold(0, |sum, kind| {
-            self.rows(kind).fold(sum, |sum: u64, row| {
-                sum.wrapping_add(mix(hash_row(row) ^ kind as u64))
-            })
+        let kinds = PairKind::ALL.into_iter();
+        kinds.fold(0, |sum: u64, kind| sum.wrapping_add(self.hash_of(kind)))
+    }
+
+    /// The hash of the candidates of one kind; [`hash`](Candidates::hash) is the sum of these.
+    pub fn hash_of(&self, kind: PairKind) -> u64 {
+        let rows = self.rows(kind);
+        rows.fold(0, |sum: u64, row| {
+            sum.wrapping_add(mix(hash_row(row) ^ kind as u64))
         })
     }
 
     /// How the answer was found.
-    pub fn stats(&self) -> &Statistics {
+    pub fn stats(&self) -> &Stats {
         &self.stats
     }
 }
@@ -84,7 +94,7 @@ impl Outcome<u64, { PairKind::ALL.len() }> for Candidates {
         self.stats.clear();
     }
 
-    fn stats_mut(&mut self) -> &mut Statistics {
+    fn stats_mut(&mut self) -> &mut Stats {
         &mut self.stats
     }
 

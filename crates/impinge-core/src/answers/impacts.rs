@@ -1,16 +1,17 @@
 //! The answer about a step: impacts, with their times.
 
+use crate::answers::home::{Home, gives_back};
 use crate::answers::numbering::{Numbering, row};
-use crate::answers::pairs::{Primitive, hash_row, mix};
+use crate::answers::pairs::{Element, hash_row, mix};
 use crate::plan::Plan;
 use crate::query::pair_kind::PairKind;
-use crate::query::step::Toi;
+use crate::query::step::Precision;
 use crate::scene::error::Error;
 #[cfg(doc)]
 use crate::scene::ids::BodyId;
 use crate::search::found::{Found, FoundByKind};
 use crate::search::sink::reserve;
-use crate::search::stats::Statistics;
+use crate::search::stats::Stats;
 use impinge_exact::Contact;
 
 /// Two elements that touch during a step, and when first.
@@ -23,11 +24,11 @@ pub struct Impact {
     /// Vertices are numbered as positions are. Faces are numbered as they were given; those of tetrahedra by tetrahedron,
     /// then by the opposite corner. Edges are numbered as they were given; those of faces as unique pairs `(low, high)` in
     /// the order of `(high, low)`. [`Body::part`](crate::Body::part) lists them.
-    pub a: Primitive,
+    pub a: Element,
     /// The other element. If both are of the same kind, it belongs to the body with the higher id, or is the higher element
     /// of the same body.
-    pub b: Primitive,
-    /// The first time in [0, 1] at which they touch, rounded down to `f32` or `f64`, as [`Step::toi`](crate::Step::toi) says.
+    pub b: Element,
+    /// The first time in [0, 1] at which they touch, rounded down to `f32` or `f64`, as [`Query::precision`](crate::Query::precision) says.
     pub toi: f64,
     /// Whether they touch at the start, at time 0.
     pub at_start: bool,
@@ -54,13 +55,18 @@ impl Impact {
     }
 }
 
-fn name(numbering: &Numbering, kind: PairKind, toi: Toi, found: &Found<Contact>) -> Impact {
+fn name(
+    numbering: &Numbering,
+    kind: PairKind,
+    precision: Precision,
+    found: &Found<Contact>,
+) -> Impact {
     let (a, b) = numbering.pair(found.key);
     Impact {
         kind,
         a,
         b,
-        toi: toi.round(&found.value),
+        toi: precision.round(&found.value),
         at_start: found.value.at_start,
     }
 }
@@ -82,8 +88,12 @@ pub struct Impacts {
     numbering: Numbering,
     impacts: Vec<Impact>,
     start_intersects: Option<bool>,
-    stats: Statistics,
+    stats: Stats,
+    /// Where its buffers go when it is dropped.
+    pub(crate) home: Option<Home<Impacts>>,
 }
+
+gives_back!(Impacts);
 
 impl std::fmt::Debug for Impacts {
     /// Their number and the first of them, however many there are.
@@ -108,7 +118,7 @@ impl Impacts {
         self.start_intersects = start_intersects;
     }
 
-    pub(crate) fn stats_mut(&mut self) -> &mut Statistics {
+    pub(crate) fn stats_mut(&mut self) -> &mut Stats {
         &mut self.stats
     }
 
@@ -116,14 +126,18 @@ impl Impacts {
     ///
     /// # Errors
     /// There is no memory for them.
-    pub(crate) fn fill(&mut self, toi: Toi, found: &FoundByKind) -> Result<(), Error> {
+    pub(crate) fn fill(&mut self, precision: Precision, found: &FoundByKind) -> Result<(), Error> {
         let n: usize = found.iter().map(Vec::len).sum();
         let Impacts {
             numbering, impacts, ..
         } = self;
         reserve(impacts, n, "impacts")?;
         for (kind, found) in PairKind::ALL.into_iter().zip(found) {
-            impacts.extend(found.iter().map(|found| name(numbering, kind, toi, found)));
+            impacts.extend(
+                found
+                    .iter()
+                    .map(|found| name(numbering, kind, precision, found)),
+            );
         }
         Ok(())
     }
@@ -134,8 +148,13 @@ impl Impacts {
     }
 
     /// What was found, by its names.
-    pub(crate) fn impact(&self, kind: PairKind, toi: Toi, found: &Found<Contact>) -> Impact {
-        name(&self.numbering, kind, toi, found)
+    pub(crate) fn impact(
+        &self,
+        kind: PairKind,
+        precision: Precision,
+        found: &Found<Contact>,
+    ) -> Impact {
+        name(&self.numbering, kind, precision, found)
     }
 
     /// The number of pairs that touch.
@@ -155,11 +174,6 @@ impl Impacts {
     }
 
     /// All of them, sorted.
-    pub fn as_slice(&self) -> &[Impact] {
-        &self.impacts
-    }
-
-    /// All of them, sorted.
     pub fn iter(&self) -> std::slice::Iter<'_, Impact> {
         self.impacts.iter()
     }
@@ -176,12 +190,6 @@ impl Impacts {
         self.impacts.iter().copied().reduce(Impact::earlier)
     }
 
-    /// The number of pairs that touch at the start.
-    pub fn touching_at_start(&self) -> usize {
-        let at_start = self.impacts.iter().filter(|impact| impact.at_start);
-        at_start.count()
-    }
-
     /// A hash of the set of impacts, times included, that does not depend on their order: the wrapping sum of a mixed
     /// 64-bit word per impact.
     pub fn hash(&self) -> u64 {
@@ -193,7 +201,7 @@ impl Impacts {
     }
 
     /// How the answer was found.
-    pub fn stats(&self) -> &Statistics {
+    pub fn stats(&self) -> &Stats {
         &self.stats
     }
 }

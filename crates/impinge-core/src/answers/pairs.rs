@@ -2,21 +2,24 @@
 
 use std::ops::Range;
 
+use crate::answers::home::{Home, gives_back};
 use crate::plan::{Plan, owner_by_first};
-use crate::scene::elements::Kind;
+use crate::scene::Scene;
+use crate::scene::elements::BodyKind;
 use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
 use crate::scene::index::{ElementIx, Number, lower_number, pair_numbers};
 use crate::search::runner::{Job, Outcome};
-use crate::search::stats::Statistics;
+use crate::search::sink::reserve;
+use crate::search::stats::Stats;
 
 /// One primitive of one body.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct Primitive {
+pub struct Element {
     /// The body.
     pub body: BodyId,
     /// Index of the primitive within the body.
-    pub primitive: u32,
+    pub element: u32,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -24,7 +27,7 @@ struct PairBody {
     id: BodyId,
     /// The global number of its first primitive.
     first: Number,
-    kind: Kind,
+    kind: BodyKind,
 }
 
 /// The numbers of no primitives.
@@ -38,8 +41,12 @@ const NONE: Range<Number> = Number::new(0)..Number::new(0);
 pub struct Pairs {
     keys: Vec<u64>,
     bodies: Vec<PairBody>,
-    stats: Statistics,
+    stats: Stats,
+    /// Where its buffers go when it is dropped.
+    pub(crate) home: Option<Home<Pairs>>,
 }
+
+gives_back!(Pairs);
 
 impl Pairs {
     /// The number of pairs.
@@ -52,18 +59,61 @@ impl Pairs {
         self.keys.is_empty()
     }
 
+    /// Pairs from [rows](Pairs::rows), sorted and of this scene: for callers that keep rows alone.
+    ///
+    /// # Errors
+    /// A row names a body or an element that is not there; rows are not sorted.
+    #[doc(hidden)]
+    pub fn of_rows(scene: &Scene, rows: &[[u32; 4]]) -> Result<Self, Error> {
+        let mut pairs = Pairs::default();
+        let mut end: u32 = 0;
+        for (id, body) in scene.bodies() {
+            pairs.bodies.push(PairBody {
+                id,
+                first: Number::new(end),
+                kind: body.kind(),
+            });
+            end = end.saturating_add(body.elements().len() as u32);
+        }
+        let number = |body: u32, element: u32| {
+            let ix = pairs.bodies.partition_point(|held| held.id.slot() < body);
+            let held = pairs.bodies.get(ix).filter(|held| held.id.slot() == body)?;
+            let n = scene.body(held.id).ok()?.elements().len();
+            ((element as usize) < n).then(|| held.first.plus(ElementIx::new(element)))
+        };
+        let mut keys = Vec::new();
+        reserve(&mut keys, rows.len(), "pairs")?;
+        for &[body_a, a, body_b, b] in rows {
+            let key = number(body_a, a).zip(number(body_b, b));
+            let key = key.filter(|(low, high)| low < high);
+            let key = key.map(|(low, high)| low.key_with(high));
+            match key.filter(|key| keys.last().is_none_or(|last| last < key)) {
+                Some(key) => keys.push(key),
+                None => {
+                    return Err(Error::Setting {
+                        setting: "pairs",
+                        given: format!("row {}: {body_a}, {a}, {body_b}, {b}", keys.len()),
+                        allowed: "sorted rows of elements of the scene",
+                    });
+                }
+            }
+        }
+        pairs.keys = keys;
+        Ok(pairs)
+    }
+
     /// All pairs in order.
-    pub fn iter(&self) -> impl ExactSizeIterator<Item = (Primitive, Primitive)> + '_ {
+    pub fn iter(&self) -> impl ExactSizeIterator<Item = (Element, Element)> + '_ {
         self.keys.iter().map(|&key| self.pair(key))
     }
 
     /// One pair by its index in that order.
-    pub fn get(&self, ix: usize) -> Option<(Primitive, Primitive)> {
+    pub fn get(&self, ix: usize) -> Option<(Element, Element)> {
         self.keys.get(ix).map(|&key| self.pair(key))
     }
 
-    fn pair(&self, key: u64) -> (Primitive, Primitive) {
-        let [a, b] = pair_numbers(key).map(|number| self.primitive(number));
+    fn pair(&self, key: u64) -> (Element, Element) {
+        let [a, b] = pair_numbers(key).map(|number| self.element(number));
         (a, b)
     }
 
@@ -71,11 +121,11 @@ impl Pairs {
         &self.bodies[owner_by_first(&self.bodies, number, |body| body.first)]
     }
 
-    fn primitive(&self, number: Number) -> Primitive {
+    fn element(&self, number: Number) -> Element {
         let body = self.owner(number);
-        Primitive {
+        Element {
             body: body.id,
-            primitive: number.minus(body.first).raw(),
+            element: number.minus(body.first).raw(),
         }
     }
 
@@ -98,7 +148,7 @@ impl Pairs {
 
     /// Pairs `(i, j)` of primitive `i` of `a` and primitive `j` of `b`, in the order in which they
     /// are held. Empty when either did not take part.
-    pub fn between(&self, a: BodyId, b: BodyId) -> impl Iterator<Item = (u32, u32)> + '_ {
+    pub fn between(&self, a: BodyId, b: BodyId) -> impl Iterator<Item = [u32; 2]> + '_ {
         let swapped = b < a;
         let (low, high) = if swapped { (b, a) } else { (a, b) };
         let (low, high) = match (self.numbers(low), self.numbers(high)) {
@@ -109,18 +159,18 @@ impl Pairs {
             let [i, j] = pair_numbers(key);
             high.contains(&j).then(|| {
                 let (i, j) = (i.minus(low.start).raw(), j.minus(high.start).raw());
-                if swapped { (j, i) } else { (i, j) }
+                if swapped { [j, i] } else { [i, j] }
             })
         })
     }
 
     /// Pairs `(i, j)`, `i < j`, of primitives of one body.
-    pub fn within(&self, body: BodyId) -> impl Iterator<Item = (u32, u32)> + '_ {
+    pub fn self_of(&self, body: BodyId) -> impl Iterator<Item = [u32; 2]> + '_ {
         let numbers = self.numbers(body).unwrap_or(NONE);
         self.run(&numbers).iter().filter_map(move |&key| {
             let [i, j] = pair_numbers(key);
             let local = |number: Number| number.minus(numbers.start).raw();
-            numbers.contains(&j).then(|| (local(i), local(j)))
+            numbers.contains(&j).then(|| [local(i), local(j)])
         })
     }
 
@@ -139,9 +189,9 @@ impl Pairs {
         let (a, b) = self.pair(key);
         [
             a.body.index() as u32,
-            a.primitive,
+            a.element,
             b.body.index() as u32,
-            b.primitive,
+            b.element,
         ]
     }
 
@@ -188,12 +238,12 @@ impl Pairs {
     /// for _ in 0..3 {
     ///     scene.add_triangles(&[[0, 1, 2]], &triangle)?;
     /// }
-    /// let mut pairs = Detector::new(Backend::Cpu)?.detect(&scene, &Query::all())?.clone();
+    /// let mut pairs = Detector::new(Backend::Cpu)?.detect(&scene, &Query::between_all())?.clone();
     /// pairs.retain(|a, b| a.body.index() + b.body.index() != 1);
     /// assert_eq!(pairs.rows().collect::<Vec<_>>(), [[0, 0, 2, 0], [1, 0, 2, 0]]);
     /// # Ok(()) }
     /// ```
-    pub fn retain(&mut self, mut keep: impl FnMut(Primitive, Primitive) -> bool) {
+    pub fn retain(&mut self, mut keep: impl FnMut(Element, Element) -> bool) {
         let mut keys = std::mem::take(&mut self.keys);
         keys.retain(|&key| {
             let (a, b) = self.pair(key);
@@ -203,7 +253,7 @@ impl Pairs {
     }
 
     /// The bodies that took part, in order, and the kind of their primitives.
-    pub fn bodies(&self) -> impl ExactSizeIterator<Item = (BodyId, Kind)> + '_ {
+    pub fn bodies(&self) -> impl ExactSizeIterator<Item = (BodyId, BodyKind)> + '_ {
         self.bodies.iter().map(|body| (body.id, body.kind))
     }
 
@@ -214,13 +264,8 @@ impl Pairs {
     }
 
     /// How the answer was found: stages, counts, bytes.
-    pub fn stats(&self) -> &Statistics {
+    pub fn stats(&self) -> &Stats {
         &self.stats
-    }
-
-    /// Whether two answers have the same rows, whatever their scenes.
-    pub fn same_as(&self, other: &Pairs) -> bool {
-        self.keys.len() == other.keys.len() && self.rows().eq(other.rows())
     }
 }
 
@@ -236,7 +281,7 @@ impl Outcome<u64, 1> for Pairs {
         self.stats.clear();
     }
 
-    fn stats_mut(&mut self) -> &mut Statistics {
+    fn stats_mut(&mut self) -> &mut Stats {
         &mut self.stats
     }
 

@@ -58,7 +58,7 @@ impl Pairs {
             let mut last = None;
             for (own, other) in [(a, b), (b, a)] {
                 let body = scene.body(own.body)?;
-                for &vertex in body.elements().corners(own.primitive as usize) {
+                for &vertex in body.elements().corners(own.element as usize) {
                     let key = (own.body.index(), other.body.index(), vertex);
                     let node = match nodes.entry(key) {
                         Entry::Occupied(known) => *known.get(),
@@ -79,7 +79,7 @@ impl Pairs {
                 places.push(Place {
                     bodies: [a.body, b.body],
                     n_pairs: 0,
-                    first: [a.primitive, b.primitive],
+                    first: [a.element, b.element],
                     low: [f64::INFINITY; 3],
                     high: [f64::NEG_INFINITY; 3],
                 });
@@ -87,8 +87,8 @@ impl Pairs {
             });
             let place = &mut places[place];
             place.n_pairs += 1;
-            let a = extent(scene.body(a.body)?, a.primitive);
-            let b = extent(scene.body(b.body)?, b.primitive);
+            let a = extent(scene.body(a.body)?, a.element);
+            let b = extent(scene.body(b.body)?, b.element);
             for axis in 0..3 {
                 place.low[axis] = place.low[axis].min(a.min[axis].max(b.min[axis]));
                 place.high[axis] = place.high[axis].max(a.max[axis].min(b.max[axis]));

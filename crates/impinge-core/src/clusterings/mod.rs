@@ -36,7 +36,7 @@ use crate::scene::index::ElementIx;
 use crate::scene::{Body, Scene};
 #[cfg(feature = "gpu")]
 use crate::search::runner::Job;
-use crate::search::stats::Statistics;
+use crate::search::stats::Stats;
 use crate::workers::Workers;
 use crate::workers::clock::Instant;
 
@@ -174,7 +174,7 @@ impl Clusterings {
         body_part: BodyPart<'_>,
         own: Option<&Arc<Clustering>>,
         workers: &Workers,
-        stats: &mut Statistics,
+        stats: &mut Stats,
     ) -> Result<Arc<Clustering>, Error> {
         let mut known = self.lock();
         let clustering = match known.find(body_part, own) {
@@ -194,7 +194,7 @@ impl Clusterings {
         &self,
         job: Job<'_>,
         judges: impl Fn(BodyId) -> bool,
-        stats: &mut Statistics,
+        stats: &mut Stats,
     ) -> Result<Vec<Arc<Clustering>>, Error> {
         let Job {
             scene,
@@ -289,7 +289,7 @@ impl Entries {
         &mut self,
         body_part: BodyPart<'_>,
         workers: &Workers,
-        stats: &mut Statistics,
+        stats: &mut Stats,
     ) -> Result<&Arc<Clustering>, Error> {
         let n_elements = body_part.body.part(body_part.part).len();
         let clustering = workers.install(n_elements, || body_part.cluster())?;
@@ -326,7 +326,7 @@ impl Entries {
         body_part: BodyPart<'_>,
         (fit, spread): (&mut Fit, f64),
         workers: &Workers,
-        stats: &mut Statistics,
+        stats: &mut Stats,
     ) -> Result<Option<Arc<Clustering>>, Error> {
         if !self.is_stale(fit, spread) {
             return Ok(None);
@@ -346,7 +346,7 @@ impl Entries {
         &mut self,
         body_part: BodyPart<'_>,
         workers: &Workers,
-        stats: &mut Statistics,
+        stats: &mut Stats,
     ) -> Result<&Arc<Clustering>, Error> {
         stats.n_reclustered += 1;
         self.make(body_part, workers, stats)

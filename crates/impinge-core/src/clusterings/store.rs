@@ -9,7 +9,7 @@ use crate::scene::elements::Part;
 use crate::scene::error::Error;
 use crate::scene::{Body, Scene};
 use crate::search::runner::Job;
-use crate::search::stats::Statistics;
+use crate::search::stats::Stats;
 
 /// What a backend keeps of a body, or of a part of it: boxes, and whatever else belongs to a clustering.
 pub(crate) trait Clustered: Send {
@@ -101,7 +101,7 @@ impl<T: Clustered, const PARTS: usize> Store<T, PARTS> {
         &mut self,
         job: Job<'_>,
         (clusterings, local_faces): (&Clusterings, bool),
-        stats: &mut Statistics,
+        stats: &mut Stats,
         make: impl Fn(&Body, &Arc<Clustering>) -> T,
     ) -> Result<(), Error> {
         let Job {

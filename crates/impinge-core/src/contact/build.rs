@@ -10,7 +10,7 @@ use super::parts::ByBodies;
 use super::work::{Equal, Work};
 use super::{Contacts, Doubles, Feature, PointName, Shape, lowest};
 use crate::answers::pairs::Pairs;
-use crate::scene::elements::{Elements, Kind};
+use crate::scene::elements::{BodyKind, Elements};
 use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
 use crate::scene::index::VertexIx;
@@ -293,7 +293,7 @@ impl<'a> Bodies<'a> {
 }
 
 /// Refuses pairs that do not fit the body, and bad positions.
-fn check(id: BodyId, body: &Body, kind: Kind, colliding: &[u32]) -> Result<(), Error> {
+fn check(id: BodyId, body: &Body, kind: BodyKind, colliding: &[u32]) -> Result<(), Error> {
     let n_primitives = body.n_primitives();
     if let Some(&primitive) = colliding.last()
         && (primitive as usize >= n_primitives || body.kind() != kind)

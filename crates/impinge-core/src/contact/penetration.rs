@@ -24,7 +24,7 @@ use super::work::Work;
 use super::{Contacts, Feature, PointName, Shape};
 use crate::scene::error::Error;
 use crate::scene::index::VertexIx;
-use crate::scene::{Body, BodyId, Elements, Kind, Scene};
+use crate::scene::{Body, BodyId, BodyKind, Elements, Scene};
 use crate::search::sets::Sets;
 use crate::search::sink::grow;
 use impinge_exact::{Sign, orient3d};
@@ -138,7 +138,7 @@ impl Topologies {
             return Err(Error::WrongKind {
                 body: id,
                 kind: body.kind().name(),
-                expected: Kind::Triangles.name(),
+                expected: BodyKind::Triangles.name(),
             });
         };
         let edges = EdgesAround::new(id, faces, body.n_vertices(), work)?;

@@ -11,7 +11,7 @@ use crate::workers::Workers;
 #[derive(Clone, Copy)]
 pub(crate) struct Work<'a> {
     pub workers: &'a Workers,
-    pub control: &'a Control<'a>,
+    pub control: &'a Control,
 }
 
 /// What is kept of equal items.

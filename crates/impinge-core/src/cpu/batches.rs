@@ -12,7 +12,7 @@ use crate::scene::error::Error;
 use crate::scene::index::{ClusterIx, PartIx};
 use crate::search::runner::Job;
 use crate::search::sink::{Answer, Ending};
-use crate::search::stats::Statistics;
+use crate::search::stats::Stats;
 use crate::workers::clock::Instant;
 
 use super::lane_pairs::WorkItem;
@@ -80,7 +80,7 @@ pub(crate) trait BatchStages: Copy + Sync {
         _: Job<'_>,
         _: Self::Answer,
         _: &mut [Self::Worker],
-        _: &mut Statistics,
+        _: &mut Stats,
     ) -> Result<(), Error> {
         Ok(())
     }
@@ -133,7 +133,7 @@ impl<'a> BatchStages for World<'a> {
         job: Job<'_>,
         answer: Self::Answer,
         scratches: &mut [Worker],
-        stats: &mut Statistics,
+        stats: &mut Stats,
     ) -> Result<(), Error> {
         if job.plan.shared_vertex != SharedVertex::Resolve {
             return Ok(());
@@ -207,7 +207,7 @@ impl BatchScratch {
     pub fn run<W: BatchStages>(
         &mut self,
         task: Task<'_, W>,
-        stats: &mut Statistics,
+        stats: &mut Stats,
     ) -> Result<(), Error> {
         let Task {
             answer, settings, ..
@@ -253,7 +253,7 @@ struct Batches<'a, W: BatchStages> {
     items: &'a mut Vec<WorkItem>,
     most_items: usize,
     scratches: &'a mut [W::Worker],
-    stats: &'a mut Statistics,
+    stats: &'a mut Stats,
     /// Time spent on full batches.
     ms: f64,
 }

@@ -28,7 +28,7 @@ use crate::query::progress::Control;
 use crate::query::settings::Settings;
 use crate::scene::error::Error;
 use crate::scene::index::PartIx;
-use crate::search::stats::Statistics;
+use crate::search::stats::Stats;
 
 use super::cull_map::{Kept, KeptList};
 use super::narrow::{Candidate, Decider};
@@ -121,7 +121,7 @@ impl Cells {
         answer: &Arc<Answer>,
         settings: &Settings,
         rule: &R,
-        stats: &mut Statistics,
+        stats: &mut Stats,
     ) -> Result<(), Error> {
         match self.divide(job, answer, settings, stats)? {
             Some(grid) => self.decide(job, answer, settings, rule, grid, stats),
@@ -135,7 +135,7 @@ impl Cells {
         job: Job<'_>,
         answer: &Arc<Answer>,
         settings: &Settings,
-        stats: &mut Statistics,
+        stats: &mut Stats,
     ) -> Result<Option<Grid>, Error> {
         let Job {
             scene,
@@ -184,7 +184,7 @@ impl Cells {
         settings: &Settings,
         rule: &R,
         grid: Grid,
-        stats: &mut Statistics,
+        stats: &mut Stats,
     ) -> Result<(), Error> {
         let items = size_of::<CellItem>() * self.items.capacity();
         answer.share(self.bytes() - items as u64 + batch_bytes(settings));
@@ -222,11 +222,11 @@ impl Cells {
         region: &Bounds,
         n_near: u64,
         settings: &Settings,
-        control: &Control<'_>,
-        stats: &mut Statistics,
+        control: &Control,
+        stats: &mut Stats,
     ) -> Result<Grid, Error> {
         let n = self.reaching.kept.len() as u64;
-        let mut grid = Grid::new(region, n_near, settings.lambda);
+        let mut grid = Grid::new(region, n_near, settings.density);
         let mut most_entries = n.saturating_mul(MOST_ENTRIES_EACH).min(u64::from(u32::MAX));
         let mut most_cells = u64::MAX;
         if let Some(budget) = settings.memory_budget {
@@ -293,7 +293,7 @@ impl Cells {
         task: Task<'_, R>,
         grid: Grid,
         settings: &Settings,
-        stats: &mut Statistics,
+        stats: &mut Stats,
     ) -> Result<(), Error> {
         let start = Instant::now();
         let mut paired_ms = 0.0;

@@ -21,11 +21,11 @@ use crate::bvh::clusters::Clustering;
 use crate::clusterings::{Clusterings, Fit, spread};
 use crate::query::settings::{InstructionSet, Settings};
 use crate::query::tuning::Tuning;
-use crate::scene::elements::Kind;
+use crate::scene::elements::BodyKind;
 use crate::scene::error::Error;
 use crate::scene::positions::Positions;
 use crate::scene::{Body, Scene};
-use crate::search::stats::Statistics;
+use crate::search::stats::Stats;
 
 use super::batches::{self, BatchScratch};
 use super::bounds::TreeBounds;
@@ -66,7 +66,7 @@ impl Clusters {
         job: Job<'_>,
         answer: &Arc<Answer>,
         settings: &Settings,
-        stats: &mut Statistics,
+        stats: &mut Stats,
     ) -> Result<(), Error> {
         self.scratches.resize_with(job.workers.n(), Worker::default);
         stats.time("clustering", |stats| {
@@ -138,12 +138,7 @@ impl Clusters {
     }
 
     /// Clusters bodies that are new or were re-meshed; forgets removed bodies.
-    fn cluster(
-        &mut self,
-        job: Job<'_>,
-        tuning: &Tuning,
-        stats: &mut Statistics,
-    ) -> Result<(), Error> {
+    fn cluster(&mut self, job: Job<'_>, tuning: &Tuning, stats: &mut Stats) -> Result<(), Error> {
         let shared = (&self.clusterings, self.isa.looks_corners_up());
         self.caches.update(job, shared, stats, |body, clustering| {
             BodyCache::new(body, Arc::clone(clustering), tuning)
@@ -206,7 +201,7 @@ impl BodyCache {
 
     /// Finds the triangles that may meet a neighbour in the body's current pose.
     fn find_creases(&mut self, isa: Isa, body: &Body, workers: &Workers) -> Result<(), Error> {
-        if body.kind() != Kind::Triangles {
+        if body.kind() != BodyKind::Triangles {
             return Ok(());
         }
         let clustering = &self.clustering;

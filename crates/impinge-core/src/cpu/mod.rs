@@ -31,7 +31,7 @@ use crate::search::naive;
 use crate::search::narrow::Intersection;
 use crate::search::runner::{Finder, Job};
 use crate::search::sink::{Answer, BLOCK};
-use crate::search::stats::Statistics;
+use crate::search::stats::Stats;
 
 use auto::Acquaintances;
 use cells::Cells;
@@ -68,7 +68,7 @@ impl Cpu {
         &mut self,
         job: Job<'_>,
         answer: &Arc<Answer>,
-        stats: &mut Statistics,
+        stats: &mut Stats,
     ) -> Result<bool, Error> {
         let tuning = &self.settings.tuning;
         if self.settings.method != Method::Auto {
@@ -94,7 +94,7 @@ impl Cpu {
         &self,
         job: Job<'_>,
         answer: &Arc<Answer>,
-        stats: &mut Statistics,
+        stats: &mut Stats,
     ) -> Result<bool, Error> {
         job.plan.check(job.scene)?;
         let settings = &self.settings;
@@ -128,7 +128,7 @@ impl Finder for Cpu {
         &mut self,
         job: Job<'_>,
         answer: &Arc<Answer>,
-        stats: &mut Statistics,
+        stats: &mut Stats,
     ) -> Result<(), Error> {
         if self.find_as_new(job, answer, stats)? {
             return Ok(());
@@ -143,7 +143,7 @@ impl Finder for Cpu {
 }
 
 /// The oracle's pairs, handed over as those of the other methods are.
-fn run_naive(job: Job<'_>, answer: &Answer, stats: &mut Statistics) -> Result<(), Error> {
+fn run_naive(job: Job<'_>, answer: &Answer, stats: &mut Stats) -> Result<(), Error> {
     let Job {
         scene,
         plan,

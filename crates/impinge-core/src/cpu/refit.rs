@@ -18,7 +18,7 @@ use crate::query::tuning::Tuning;
 use crate::scene::error::Error;
 use crate::scene::index::PartIx;
 use crate::scene::positions::Positions;
-use crate::search::stats::Statistics;
+use crate::search::stats::Stats;
 use crate::workers::Workers;
 
 use super::bounds::{self, Summary};
@@ -81,7 +81,7 @@ impl Refit {
         settings: &Settings,
         (clusterings, caches): (&Clusterings, &mut Caches),
         scratches: &mut [Worker],
-        stats: &mut Statistics,
+        stats: &mut Stats,
     ) -> Result<(), Error> {
         let Job {
             scene,
@@ -248,7 +248,7 @@ impl Refit {
         job: Job<'_>,
         tuning: &Tuning,
         (clusterings, caches): (&Clusterings, &mut Caches),
-        stats: &mut Statistics,
+        stats: &mut Stats,
     ) -> Result<(), Error> {
         let Job {
             scene,

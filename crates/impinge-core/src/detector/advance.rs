@@ -5,17 +5,18 @@ use super::steps::StartAnswer;
 use crate::answers::advance::Advance;
 use crate::answers::impacts::Impact;
 use crate::plan::{Plan, TestId};
+use crate::query::Query;
 use crate::query::pair_kind::PairKind;
 use crate::query::progress::Control;
 use crate::query::settings::Method;
-use crate::query::step::{Start, Step};
+use crate::query::step::Start;
 use crate::scene::Scene;
 use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
 use crate::scene::index::pair_numbers;
 use crate::scene::positions::Positions;
 use crate::search::found::PairList;
-use crate::search::narrow::{Element, FirstContact};
+use crate::search::narrow::{FirstContact, PairElement};
 
 impl Detector {
     /// How far the step can be taken: a fraction of it, backed off from the first contact hardly more than the precision of positions
@@ -30,7 +31,7 @@ impl Detector {
     /// On the CPU all pairs are searched once, and rounded positions are tested on the pairs that rounding may bring together. On a GPU, with
     /// a separation or a memory budget, and where too many pairs are that close, all pairs are searched again for rounded positions.
     ///
-    /// With a [clearance](Step::clearance), every pair keeps what that says, and what floats can round besides. So the fraction holds for
+    /// With a [clearance](Query::clearance), every pair keeps what that says, and what floats can round besides. So the fraction holds for
     /// solvers too, which compute positions themselves: as `x0 + a * (x1 - x0)` or `x0 + a * dx` with `x1 = x0 + dx`, in the precision
     /// of the positions, for *every* `a` from 0 to the fraction, the straight way there is free and keeps the clearance. The fraction is
     /// rounded down to an `f32`, and a single search is enough. It is 0 if moving elements are nearer at the start than rounding
@@ -43,34 +44,22 @@ impl Detector {
     ///
     /// # Errors
     /// As [`impacts`](Detector::impacts), and [`Error::Seam`].
-    pub fn advance(&mut self, scene: &Scene, step: &Step) -> Result<Advance, Error> {
-        self.advance_with(scene, step, &Control::new())
-    }
-
-    /// [`advance`](Detector::advance) with a token to stop it and a callback to watch it.
-    ///
-    /// # Errors
-    /// As `advance`, and [`Error::Cancelled`].
-    pub fn advance_with(
-        &mut self,
-        scene: &Scene,
-        step: &Step,
-        control: &Control<'_>,
-    ) -> Result<Advance, Error> {
-        refuse_cell(step)?;
+    pub fn advance(&mut self, scene: &Scene, query: &Query) -> Result<Advance, Error> {
+        let control = &self.control.clone();
+        refuse_cell(query)?;
         let with_close = self.lists_close_pairs();
-        let plan = Plan::advance(scene, step, with_close, self.limits_of_steps())?;
-        let start = self.verify(scene, step, control)?;
+        let plan = Plan::advance(scene, query, with_close, self.limits_of_steps())?;
+        let start = self.verify(scene, query)?;
         let seen = self.find_contacts(scene, &plan, control, (start, false))?;
         self.refuse_seams(scene, &plan)?;
         let mut advance = Advance {
             fraction: 1.0,
-            first: self.steps.contacts.first(plan.toi),
+            first: self.steps.contacts.first(plan.precision),
             start_intersects: start.map(|StartAnswer { intersects, .. }| intersects),
             positions: Vec::new(),
             n_tried: 1,
         };
-        self.take_positions(scene, step, &plan, seen.close, control, &mut advance)?;
+        self.take_positions(scene, query, &plan, seen.close, control, &mut advance)?;
         Ok(advance)
     }
 
@@ -78,10 +67,10 @@ impl Detector {
     fn take_positions(
         &mut self,
         scene: &Scene,
-        step: &Step,
+        query: &Query,
         plan: &Plan,
         close: Option<PairList>,
-        control: &Control<'_>,
+        control: &Control,
         advance: &mut Advance,
     ) -> Result<(), Error> {
         let start_intersects = advance.start_intersects;
@@ -104,7 +93,7 @@ impl Detector {
             }
             Some(first) => {
                 let known = (self.pairs_at(plan, first), close);
-                self.back_off(scene, step, plan, known, control, advance)
+                self.back_off(scene, query, plan, known, control, advance)
             }
         }
     }
@@ -112,8 +101,9 @@ impl Detector {
     /// The pairs of a contact, which probably touch on the way to rounded positions, too.
     fn pairs_at(&self, plan: &Plan, first: Impact) -> PairList {
         let contacts = &self.steps.contacts;
-        let same =
-            |&(kind, found): &(_, &_)| contacts.impacts.impact(kind, plan.toi, found) == first;
+        let same = |&(kind, found): &(_, &_)| {
+            contacts.impacts.impact(kind, plan.precision, found) == first
+        };
         let found = contacts.found().filter(same);
         found.map(|(kind, found)| (kind, found.key)).collect()
     }
@@ -123,10 +113,10 @@ impl Detector {
     fn back_off(
         &mut self,
         scene: &Scene,
-        step: &Step,
+        query: &Query,
         plan: &Plan,
         (mut known, close): (PairList, Option<PairList>),
-        control: &Control<'_>,
+        control: &Control,
         advance: &mut Advance,
     ) -> Result<(), Error> {
         let Some(first) = advance.first else {
@@ -160,7 +150,7 @@ impl Detector {
                         Positions::F64(positions) => trial.set_end_positions(*id, positions)?,
                     }
                 }
-                let plan = Plan::trial(trial, step, fraction, self.limits_of_steps())?;
+                let plan = Plan::trial(trial, query, fraction, self.limits_of_steps())?;
                 self.find_contacts(trial, &plan, control, (None, false))?;
                 let found = self.steps.contacts.found();
                 known.extend(found.map(|(kind, found)| (kind, found.key)));
@@ -242,7 +232,7 @@ fn touch(scene: &Scene, plan: &Plan, (kind, key): (PairKind, u64), fraction: f64
         return false;
     }
     let located = pair_numbers(key).map(|number| plan.locate(number));
-    let [a, b] = located.each_ref().map(|(part, element)| Element {
+    let [a, b] = located.each_ref().map(|(part, element)| PairElement {
         scene,
         plan,
         part: *part,
@@ -254,8 +244,8 @@ fn touch(scene: &Scene, plan: &Plan, (kind, key): (PairKind, u64), fraction: f64
     contact.is_some_and(|contact| !(plan.start == Start::Skip && contact.at_start))
 }
 
-fn refuse_cell(step: &Step) -> Result<(), Error> {
-    match step.query.cell {
+fn refuse_cell(query: &Query) -> Result<(), Error> {
+    match query.cell {
         None => Ok(()),
         Some(_) => Err(Error::Setting {
             setting: "owned_by",

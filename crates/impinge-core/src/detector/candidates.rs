@@ -6,34 +6,37 @@
 
 use std::ops::ControlFlow;
 
+use super::Detector;
 use super::in_step::{InStep, Keys, Seen};
-use super::{Detector, Last};
 use crate::answers::candidates::Candidates;
+use crate::answers::home::Home;
 use crate::plan::Plan;
+use crate::query::Query;
 use crate::query::goal::Limits;
 use crate::query::pair_kind::PairKinds;
 use crate::query::progress::Control;
 #[cfg(doc)]
 use crate::query::settings::Settings;
-use crate::query::step::CandidateQuery;
 use crate::scene::Scene;
 use crate::scene::error::Error;
 use crate::search::found::KeysByKind;
 use crate::search::key_ranges::{KeyRanges, Run, Tally};
 use crate::search::runner::{Runner, ready};
 use crate::search::sink::{self, BLOCK};
-use crate::search::stats::Statistics;
+use crate::search::stats::Stats;
 
 /// A search for candidates, run by run.
 struct RunSearch<'a> {
     scene: &'a Scene,
     /// The whole question.
     plan: &'a Plan,
-    control: &'a Control<'a>,
+    control: &'a Control,
     runner: &'a Runner,
     finder: InStep<'a>,
     /// Of the last run: the runs have their own.
-    stats: &'a mut Statistics,
+    stats: &'a mut Stats,
+    /// Where the buffers of runs that are dropped go.
+    home: Option<Home<Candidates>>,
 }
 
 impl Detector {
@@ -46,25 +49,18 @@ impl Detector {
     pub fn candidates(
         &mut self,
         scene: &Scene,
-        query: &CandidateQuery,
-    ) -> Result<&Candidates, Error> {
-        self.candidates_with(scene, query, &Control::new())
-    }
-
-    /// [`candidates`](Detector::candidates) with a token to stop it and a callback to watch it.
-    ///
-    /// # Errors
-    /// As `candidates`, and [`Error::Cancelled`].
-    pub fn candidates_with(
-        &mut self,
-        scene: &Scene,
-        query: &CandidateQuery,
-        control: &Control<'_>,
-    ) -> Result<&Candidates, Error> {
-        let plan = Plan::candidates(scene, query, self.settings.limits())?;
-        let (mut search, candidates) = self.search(scene, &plan, control, Last::Candidates);
-        search.find(&plan, Keys::All, candidates)?;
-        Ok(&self.steps.candidates)
+        inflation: f64,
+        query: &Query,
+    ) -> Result<Candidates, Error> {
+        let control = &self.control.clone();
+        let plan = Plan::candidates(scene, inflation, query, self.settings.limits())?;
+        let home = self.home(&self.homes.candidates);
+        let mut candidates = self.homes.candidates.take();
+        let mut search = self.search(scene, &plan, control);
+        let found = search.find(&plan, Keys::All, &mut candidates);
+        self.stats.clone_from(candidates.stats());
+        candidates.home = home;
+        found.map(|_| candidates)
     }
 
     /// All [`candidates`](Detector::candidates) of a query in sorted runs of at most `most` candidates, one after the other, so that
@@ -83,16 +79,16 @@ impl Detector {
     ///
     /// ```
     /// use std::ops::ControlFlow;
-    /// use impinge::{Backend, CandidateQuery, Detector, PairKind, Query, Scene};
+    /// use impinge::{Backend, Detector, PairKind, Query, Scene};
     /// # fn main() -> Result<(), impinge::Error> {
     /// let mut scene = Scene::new();
     /// let points: Vec<[f32; 3]> = (0..10).map(|i| [i as f32, 0.0, 0.0]).collect();
     /// scene.add_points(&points)?;
     /// scene.add_points(&points)?;
-    /// let query = CandidateQuery::new(Query::all()).kinds([PairKind::VertexVertex]);
+    /// let query = Query::between_all().kinds([PairKind::VertexVertex]);
     /// let mut detector = Detector::new(Backend::Cpu)?;
     /// let mut lengths = Vec::new();
-    /// let all = detector.candidates_in_runs(&scene, &query, 4, |run| {
+    /// let all = detector.candidates_in_runs(&scene, 0.0, &query, 4, |run| {
     ///     lengths.push(run.len());
     ///     ControlFlow::<()>::Continue(())
     /// })?;
@@ -105,36 +101,24 @@ impl Detector {
     pub fn candidates_in_runs<B>(
         &mut self,
         scene: &Scene,
-        query: &CandidateQuery,
-        most: u64,
-        each: impl FnMut(Candidates) -> ControlFlow<B>,
-    ) -> Result<ControlFlow<B, u64>, Error> {
-        self.candidates_in_runs_with(scene, query, most, each, &Control::new())
-    }
-
-    /// [`candidates_in_runs`](Detector::candidates_in_runs) with a token to stop it and a callback to watch it.
-    ///
-    /// # Errors
-    /// As `candidates_in_runs`, and [`Error::Cancelled`].
-    pub fn candidates_in_runs_with<B>(
-        &mut self,
-        scene: &Scene,
-        query: &CandidateQuery,
+        inflation: f64,
+        query: &Query,
         most: u64,
         mut each: impl FnMut(Candidates) -> ControlFlow<B>,
-        control: &Control<'_>,
     ) -> Result<ControlFlow<B, u64>, Error> {
+        let control = &self.control.clone();
         check_most(most)?;
         let limits = self.settings.limits();
         let at_once = Limits {
             max_pairs: Some(most.min(limits.max_pairs.unwrap_or(most))),
             ..limits
         };
-        let plan = Plan::candidates(scene, query, at_once)?;
-        let (mut search, candidates) = self.search(scene, &plan, control, Last::Measured);
+        let plan = Plan::candidates(scene, inflation, query, at_once)?;
+        let candidates = &mut self.homes.candidates.take();
+        let mut search = self.search(scene, &plan, control);
         match search.find_at_once(candidates, limits, &mut each)? {
             Some(flow) => Ok(flow),
-            None => search.find_in_runs(candidates, query.kinds, (limits, most), &mut each),
+            None => search.find_in_runs(candidates, plan.kinds_asked(), (limits, most), &mut each),
         }
     }
 
@@ -142,16 +126,19 @@ impl Detector {
         &'a mut self,
         scene: &'a Scene,
         plan: &'a Plan,
-        control: &'a Control<'a>,
-        last: Last,
-    ) -> (RunSearch<'a>, &'a mut Candidates) {
-        self.last = last;
-        let search = RunSearch {
+        control: &'a Control,
+    ) -> RunSearch<'a> {
+        RunSearch {
             scene,
             plan,
             control,
             runner: &self.runner,
-            stats: &mut self.measured,
+            stats: &mut self.stats,
+            home: self
+                .settings
+                .memory_budget
+                .is_none()
+                .then(|| self.homes.candidates.clone()),
             finder: InStep {
                 clusters: &mut self.steps.clusters,
                 settings: &self.settings,
@@ -160,19 +147,7 @@ impl Detector {
                 keys: Keys::All,
                 seen: Seen::default(),
             },
-        };
-        (search, &mut self.steps.candidates)
-    }
-
-    /// Moves the candidates found last out of the detector, without a copy. It holds none until the next question.
-    pub fn take_candidates(&mut self) -> Candidates {
-        std::mem::take(&mut self.steps.candidates)
-    }
-
-    /// Takes back candidates that are no longer needed: the next answer uses their memory. New memory for millions of
-    /// candidates costs a tenth of the time to find them.
-    pub fn reuse_candidates(&mut self, candidates: Candidates) {
-        self.steps.candidates = candidates;
+        }
     }
 }
 
@@ -245,7 +220,9 @@ impl RunSearch<'_> {
         each: &mut impl FnMut(Candidates) -> ControlFlow<B>,
     ) -> ControlFlow<B> {
         self.stats.clone_from(candidates.stats());
-        each(std::mem::take(candidates))
+        let mut run = std::mem::take(candidates);
+        run.home.clone_from(&self.home);
+        each(run)
     }
 
     /// Counts the candidates in some ranges.
@@ -301,11 +278,16 @@ impl RunSearch<'_> {
     fn find_run(&mut self, candidates: &mut Candidates, run: &Run) -> Result<(), Error> {
         // They fit into the memory budget.
         let plan = self.plan.of_kinds(run.ranges.kinds());
-        let mut rooms = KeysByKind::default();
-        for (room, &n) in rooms.iter_mut().zip(&run.counts) {
-            *room = sink::with_capacity(n as usize, "candidates")?;
+        match &self.home {
+            Some(home) => *candidates = home.take(),
+            None => {
+                let mut buffers = KeysByKind::default();
+                for (buffer, &n) in buffers.iter_mut().zip(&run.counts) {
+                    *buffer = sink::with_capacity(n as usize, "candidates")?;
+                }
+                candidates.put_buffers(buffers);
+            }
         }
-        candidates.put_buffers(rooms);
         self.find(&plan, Keys::In(&run.ranges), candidates)?;
         Ok(())
     }

@@ -1,9 +1,8 @@
 //! A detector's answers about contact: where pairs meet, and how deep bodies are in each other.
 
-use super::{Detector, Last};
+use super::Detector;
 use crate::answers::pairs::Pairs;
 use crate::contact::{Contacts, Penetration, Work};
-use crate::query::progress::Control;
 use crate::scene::Scene;
 use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
@@ -21,7 +20,7 @@ impl Detector {
     /// scene.add_triangles(&[[0, 1, 2]], &floor)?;
     /// scene.add_triangles(&[[0, 1, 2]], &blade)?;
     /// let mut detector = Detector::new(Backend::Cpu)?;
-    /// let pairs = detector.detect(&scene, &Query::all())?.clone();
+    /// let pairs = detector.detect(&scene, &Query::between_all())?.clone();
     /// let contacts = detector.contacts(&scene, &pairs)?;
     /// assert_eq!(contacts.points(), [[1.0, 1.0, 0.0], [1.5, 1.0, 0.0]]);
     /// # Ok(()) }
@@ -31,23 +30,12 @@ impl Detector {
     /// A body of the pairs is no longer in the scene, is of another kind or has too few primitives; positions written in
     /// slot since then are refused.
     pub fn contacts(&mut self, scene: &Scene, pairs: &Pairs) -> Result<Contacts, Error> {
-        self.contacts_with(scene, pairs, &Control::new())
-    }
-
-    /// [`contacts`](Detector::contacts) with a token to stop it and a callback to watch it.
-    ///
-    /// # Errors
-    /// As `contacts`, and [`Error::Cancelled`].
-    pub fn contacts_with(
-        &mut self,
-        scene: &Scene,
-        pairs: &Pairs,
-        control: &Control<'_>,
-    ) -> Result<Contacts, Error> {
-        self.last = Last::Measured;
+        let control = &self.control.clone();
         let limits = self.settings.limits();
         let Detector {
-            runner, measured, ..
+            runner,
+            stats: measured,
+            ..
         } = self;
         runner.measure(measured, limits, |workers, stats| {
             let _shift = workers.shift(pairs.len() as u64);
@@ -91,26 +79,11 @@ impl Detector {
         a: BodyId,
         b: BodyId,
     ) -> Result<Penetration, Error> {
-        self.penetration_with(scene, contacts, a, b, &Control::new())
-    }
-
-    /// [`penetration`](Detector::penetration) with a token to stop it and a callback to watch it.
-    ///
-    /// # Errors
-    /// As `penetration`, and [`Error::Cancelled`].
-    pub fn penetration_with(
-        &mut self,
-        scene: &Scene,
-        contacts: &Contacts,
-        a: BodyId,
-        b: BodyId,
-        control: &Control<'_>,
-    ) -> Result<Penetration, Error> {
-        self.last = Last::Measured;
+        let control = &self.control.clone();
         let limits = self.settings.limits();
         let Detector {
             runner,
-            measured,
+            stats: measured,
             topologies,
             ..
         } = self;

@@ -5,7 +5,7 @@
 
 use std::sync::Arc;
 
-use super::{Detector, Last};
+use super::Detector;
 use crate::answers::pairs::Pairs;
 use crate::cpu::Cpu;
 use crate::cpu::clusters::Clusters;
@@ -21,12 +21,12 @@ use crate::scene::ids::BodyId;
 use crate::scene::index::pair_numbers;
 use crate::search::runner::{Finder, Job, Runner, ready};
 use crate::search::sink::Answer;
-use crate::search::stats::Statistics;
+use crate::search::stats::Stats;
 use crate::workers::Workers;
 
 impl Detector {
-    /// The two bodies that are nearest to each other of all that the query lets meet, and the pair of primitives that has their
-    /// [`distance`](Detector::distance); `None` if there are no two that have primitives. Of several pairs at the same computed
+    /// The two bodies that are nearest to each other of all that the query lets meet, and the pair of elements that has their
+    /// [`distance`](Detector::distance); `None` if there are no two that have elements. Of several pairs at the same computed
     /// distance the lowest. Pairs of bodies whose boxes are farther apart than the nearest two are never looked at.
     ///
     /// ```
@@ -36,8 +36,8 @@ impl Detector {
     /// let points = [0.0f32, 5.0, 7.0].map(|x| scene.add_points(&[[x, 0.0, 0.0]]));
     /// let [_, b, c] = points.map(|body| body.expect("finite"));
     /// let mut detector = Detector::new(Backend::Cpu)?;
-    /// let nearest = detector.nearest(&scene, &Query::all())?.expect("there are three");
-    /// assert_eq!((nearest.distance, nearest.bodies), (2.0, [b, c]));
+    /// let nearest = detector.nearest(&scene, &Query::between_all())?.expect("there are three");
+    /// assert_eq!((nearest.distance, nearest.a.body, nearest.b.body), (2.0, b, c));
     /// # Ok(()) }
     /// ```
     ///
@@ -45,19 +45,7 @@ impl Detector {
     /// A stale id, bad positions that were written in place, a query for self-collision or for the pairs of a cell, a memory
     /// budget too small for the trees of the bodies.
     pub fn nearest(&mut self, scene: &Scene, query: &Query) -> Result<Option<Nearest>, Error> {
-        self.nearest_with(scene, query, &Control::new())
-    }
-
-    /// [`nearest`](Detector::nearest) with a token to stop it and a callback to watch it.
-    ///
-    /// # Errors
-    /// As `nearest`, and [`Error::Cancelled`].
-    pub fn nearest_with(
-        &mut self,
-        scene: &Scene,
-        query: &Query,
-        control: &Control<'_>,
-    ) -> Result<Option<Nearest>, Error> {
+        let control = &self.control.clone();
         let plan = self.plan_of_nearest(scene, query)?;
         control.step(0, 1)?;
         self.measure_distance(scene, control, |distances, workers, touching| {
@@ -65,8 +53,8 @@ impl Detector {
         })
     }
 
-    /// The smallest distance of two bodies at the positions that they have, and the pair of primitives that has it; `None` if one
-    /// body has no primitives. The distance is 0 if and only if they share a point, which is decided exactly. Tetrahedra are
+    /// The smallest distance of two bodies at the positions that they have, and the pair of elements that has it; `None` if one
+    /// body has no elements. The distance is 0 if and only if they share a point, which is decided exactly. Tetrahedra are
     /// solid: a body inside one has distance 0.
     ///
     /// The detector keeps a tree per body and the nearest pair of each call. So repeated calls for bodies that move cost
@@ -80,8 +68,8 @@ impl Detector {
     /// let a = scene.add_triangles(&[[0, 1, 2]], &triangle)?;
     /// let b = scene.add_triangles(&[[0, 1, 2]], &triangle.map(|[x, y, z]| [x, y, z + 3.0]))?;
     /// let mut detector = Detector::new(Backend::Cpu)?;
-    /// let nearest = detector.distance(&scene, a, b)?.expect("both have primitives");
-    /// assert_eq!((nearest.distance, nearest.primitives), (3.0, [0, 0]));
+    /// let nearest = detector.distance(&scene, a, b)?.expect("both have elements");
+    /// assert_eq!((nearest.distance, nearest.a.element, nearest.b.element), (3.0, 0, 0));
     /// # Ok(()) }
     /// ```
     ///
@@ -94,20 +82,7 @@ impl Detector {
         a: BodyId,
         b: BodyId,
     ) -> Result<Option<Nearest>, Error> {
-        self.distance_with(scene, a, b, &Control::new())
-    }
-
-    /// [`distance`](Detector::distance) with a token to stop it and a callback to watch it.
-    ///
-    /// # Errors
-    /// As `distance`, and [`Error::Cancelled`].
-    pub fn distance_with(
-        &mut self,
-        scene: &Scene,
-        a: BodyId,
-        b: BodyId,
-        control: &Control<'_>,
-    ) -> Result<Option<Nearest>, Error> {
+        let control = &self.control.clone();
         self.measure_distance(scene, control, |distances, workers, touching| {
             distances.between(scene, [a, b], workers, control, || touching([a, b]))
         })
@@ -137,21 +112,20 @@ impl Detector {
     fn measure_distance(
         &mut self,
         scene: &Scene,
-        control: &Control<'_>,
+        control: &Control,
         find: impl FnOnce(
             &mut Distances,
             &Workers,
             &mut AskTouching<'_>,
         ) -> Result<Option<Nearest>, Error>,
     ) -> Result<Option<Nearest>, Error> {
-        self.last = Last::Measured;
         let Detector {
             touching,
             distances,
             runner,
             cpu,
             settings,
-            measured,
+            stats: measured,
             ..
         } = self;
         runner.measure(measured, settings.limits(), |workers, stats| {
@@ -182,7 +156,7 @@ impl Touching {
         &mut self,
         scene: &Scene,
         [a, b]: [BodyId; 2],
-        control: &Control<'_>,
+        control: &Control,
         (runner, cpu, settings): (&Runner, &mut Cpu, &Settings),
     ) -> Result<Option<[u32; 2]>, Error> {
         let limits = Limits {
@@ -229,7 +203,7 @@ impl Finder for Lowest<'_> {
         &mut self,
         job: Job<'_>,
         answer: &Arc<Answer>,
-        stats: &mut Statistics,
+        stats: &mut Stats,
     ) -> Result<(), Error> {
         self.clusters.run(job, answer, self.settings, stats)?;
         self.key = answer.lowest();

@@ -3,24 +3,20 @@
 use std::cell::Cell;
 use std::sync::Arc;
 
-use super::{Backend, Detector, Settings};
+use super::{Detector, Settings};
 use crate::clusterings::Clusterings;
 use crate::cpu::Cpu;
 use crate::cpu::steps::{ByDevice, StepClusters};
 use crate::gpu::recording::{Ran, Recording};
-use crate::gpu::{Capacities, Engine, Gpu, ResidentPairs, WantedAdapter};
-use crate::plan::Plan;
-use crate::query::Query;
+use crate::gpu::{Capacities, Engine, Gpu, WantedAdapter};
 use crate::query::goal::Goal;
-use crate::query::progress::Control;
+use crate::query::settings::Backend;
 use crate::query::settings::Method;
-use crate::scene::Scene;
 use crate::scene::error::Error;
-use crate::scene::ids::BodyId;
 use crate::search::found::StepAnswer;
 use crate::search::runner::{Finder, Job};
 use crate::search::sink::Answer;
-use crate::search::stats::Statistics;
+use crate::search::stats::Stats;
 use crate::workers::is_forked;
 
 /// Opens the GPU that the settings ask for, if they ask for one.
@@ -82,7 +78,7 @@ pub(super) fn find_in_step(
     clusters: &mut StepClusters,
     (job, settings): (Job<'_>, &Settings),
     answer: StepAnswer<'_>,
-    stats: &mut Statistics,
+    stats: &mut Stats,
 ) -> Result<ByDevice, Error> {
     if cfg!(target_family = "wasm") || job.plan.bound() > 0.0 || job.plan.has_filter() {
         return Ok(ByDevice::Not);
@@ -136,7 +132,7 @@ impl Finder for OnDevice<'_> {
         &mut self,
         job: Job<'_>,
         answer: &Arc<Answer>,
-        stats: &mut Statistics,
+        stats: &mut Stats,
     ) -> Result<(), Error> {
         if let Some(cpu) = &mut self.cpu
             && cpu.find_as_new(job, answer, stats)?
@@ -150,14 +146,14 @@ impl Finder for OnDevice<'_> {
 }
 
 impl Detector {
-    /// [`with_settings`](Detector::with_settings), with the initial room of GPU buffers. For
+    /// [`new`](Detector::new), with the initial room of GPU buffers. For
     /// tests: buffers grow by themselves.
     ///
     /// # Errors
-    /// As `with_settings`.
+    /// As `new`.
     #[doc(hidden)]
     pub fn with_capacities(settings: Settings, capacities: Capacities) -> Result<Self, Error> {
-        let mut detector = Detector::with_settings(settings)?;
+        let mut detector = Detector::new(settings)?;
         if let Some(gpu) = detector.gpu_in_use() {
             let clusterings = detector.clusterings.clone();
             let engine = Engine::new(gpu, &detector.settings, clusterings, capacities);
@@ -166,14 +162,14 @@ impl Detector {
         Ok(detector)
     }
 
-    /// [`with_settings`](Detector::with_settings), with the most bytes of topology or positions that a GPU may
+    /// [`new`](Detector::new), with the most bytes of topology or positions that a GPU may
     /// bind at once. For tests: devices report their own limit.
     ///
     /// # Errors
-    /// As `with_settings`.
+    /// As `new`.
     #[doc(hidden)]
     pub fn with_most_bound(settings: Settings, bytes: u64) -> Result<Self, Error> {
-        let mut detector = Detector::with_settings(settings)?;
+        let mut detector = Detector::new(settings)?;
         if let Some(engine) = &mut detector.gpu {
             engine.most_bound = bytes;
         }
@@ -212,9 +208,8 @@ impl Detector {
     /// A detector on the caller's device, which must allow 8 storage buffers per stage and
     /// workgroups of 256 (WebGPU's defaults do). `settings.backend` and `settings.device` are ignored.
     ///
-    /// Such a detector answers [`detect`](Detector::detect) like any other, and also
-    /// [`encode`](Detector::encode) and [`encode_step`](Detector::encode_step), where positions and pairs stay on the device. This constructor waits for nothing, so
-    /// it works in a browser too. Kernels are compiled when the first frame needs them.
+    /// Such a detector answers like any other, and also through [`gpu`](Detector::gpu), where positions and pairs stay on the
+    /// device. This constructor waits for nothing, so it works in a browser too. Kernels are compiled when the first frame needs them.
     ///
     /// # Errors
     /// A setting out of its range; a device that allows too little.
@@ -266,81 +261,5 @@ impl Detector {
 
     pub(super) fn gpu_in_use(&self) -> Option<Arc<Gpu>> {
         self.gpu.as_ref().map(|engine| Arc::clone(engine.gpu()))
-    }
-
-    /// Encodes a whole frame into the caller's encoder: positions come from buffers on the device and
-    /// pairs stay there. Nothing is read back.
-    ///
-    /// `positions` names bodies whose positions are taken from a buffer: `(v, 3)` f32 tightly packed,
-    /// with the usage `COPY_SRC`, copied when the encoder's commands run; other bodies' positions
-    /// come from the scene. For the named bodies, the scene's positions only serve to find clusters,
-    /// once. Positions on the device are not checked: if one is not finite, the pairs of
-    /// its primitives are unspecified.
-    ///
-    /// At most one frame of a detector may be encoded per submission. Pairs of which the filter on the device is
-    /// unsure come in a separate list. If there is not enough room, the lists are incomplete and
-    /// their counts say so, see [`ResidentPairs`]; [`make_room`](Detector::make_room) then grows them.
-    ///
-    /// # Errors
-    /// A stale id, a buffer that is too small or lacks its usage, a detector without a GPU. Device errors
-    /// go to the device's owner, and so do those of kernels, which the first frame compiles.
-    pub fn encode(
-        &mut self,
-        scene: &Scene,
-        query: &Query,
-        positions: &[(BodyId, &wgpu::Buffer)],
-        encoder: &mut wgpu::CommandEncoder,
-    ) -> Result<ResidentPairs, Error> {
-        if query.cell.is_some() {
-            return Err(Error::Setting {
-                setting: "owned_by",
-                given: "a cell in a plan that stays on a device".to_owned(),
-                allowed: "only detect, count and any",
-            });
-        }
-        let plan = Plan::intersections(scene, query, Goal::All, self.settings.limits())?;
-        let control = Control::new();
-        let job = self.runner.job(scene, &plan, &control)?;
-        let Some(engine) = &mut self.gpu else {
-            return Err(Error::NoAdapter {
-                found: "this detector works on the CPU".to_owned(),
-            });
-        };
-        engine.encode(job, positions, encoder)
-    }
-
-    /// The positions of a body in the buffer from which the last frame read them, `(v, 3)` f32 tightly packed, and the offset
-    /// of the first byte: to draw what was tested without another upload. The buffer has the usage `COPY_SRC`; the next
-    /// frame may write other positions into it, or replace it.
-    ///
-    /// `None` if they are not there: the last frame was answered on the CPU or in pieces, the body did not take part in it, has
-    /// f64 positions, or has moved since.
-    pub fn positions_on_device(&self, scene: &Scene, body: BodyId) -> Option<(&wgpu::Buffer, u64)> {
-        let engine = self.gpu.as_ref()?;
-        engine.positions_of(body, scene.body(body).ok()?)
-    }
-
-    /// Reads the counts of the last encoded frame, and of the last encoded step, whose commands must have been submitted, and
-    /// grows the lists that were too small. Returns whether both were complete; if not, encode them again. To be called
-    /// before the detector answers another question.
-    ///
-    /// # Errors
-    /// A lost device; lists larger than it can bind; a memory budget that does not allow them.
-    pub fn make_room(&mut self) -> Result<bool, Error> {
-        match self.gpu_in_use() {
-            Some(gpu) => gpu.block_on(self.make_room_async()),
-            None => Ok(true),
-        }
-    }
-
-    /// [`make_room`](Detector::make_room) without blocking.
-    ///
-    /// # Errors
-    /// As `make_room`.
-    pub async fn make_room_async(&mut self) -> Result<bool, Error> {
-        match &mut self.gpu {
-            Some(engine) => engine.make_room().await,
-            None => Ok(true),
-        }
     }
 }

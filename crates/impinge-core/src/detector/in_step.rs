@@ -17,7 +17,7 @@ use crate::search::naive;
 use crate::search::narrow::{BoxOverlap, FirstContact, Within};
 use crate::search::runner::{Finder, Job};
 use crate::search::sink::Ending;
-use crate::search::stats::Statistics;
+use crate::search::stats::Stats;
 use impinge_exact::Contact;
 
 /// Which keys to find.
@@ -55,7 +55,7 @@ impl InStep<'_> {
         &mut self,
         job: Job<'_>,
         answer: &ContactAnswer,
-        stats: &mut Statistics,
+        stats: &mut Stats,
     ) -> Result<(), Error> {
         if self.settings.method == Method::Naive {
             let skips = job.plan.start == Start::Skip;
@@ -86,8 +86,12 @@ impl InStep<'_> {
         &mut self,
         job: Job<'_>,
         answer: StepAnswer<'_>,
-        stats: &mut Statistics,
+        stats: &mut Stats,
     ) -> Result<ByDevice, Error> {
+        // The kernels know the kinds that are asked for where none are named.
+        if job.plan.names_kinds() {
+            return Ok(ByDevice::Not);
+        }
         super::gpu::find_in_step(self.gpu, self.clusters, (job, self.settings), answer, stats)
     }
 
@@ -101,7 +105,7 @@ impl InStep<'_> {
         &mut self,
         _: Job<'_>,
         _: StepAnswer<'_>,
-        _: &mut Statistics,
+        _: &mut Stats,
     ) -> Result<ByDevice, Error> {
         Ok(ByDevice::Not)
     }
@@ -110,7 +114,7 @@ impl InStep<'_> {
         &mut self,
         job: Job<'_>,
         answer: &KeyAnswer,
-        stats: &mut Statistics,
+        stats: &mut Stats,
     ) -> Result<(), Error> {
         let answer = match self.keys {
             Keys::All => StepAnswer::Keys(answer),
@@ -149,7 +153,7 @@ impl InStep<'_> {
 fn run_naive<T: crate::search::narrow::Test>(
     test: &T,
     job: Job<'_>,
-    stats: &mut Statistics,
+    stats: &mut Stats,
     mut emit: impl FnMut(PairKind, u64, T::Value) -> Result<(), Error>,
 ) -> Result<(), Error> {
     let Job {
@@ -182,7 +186,7 @@ impl Finder<Found<Contact>, { PairKind::ALL.len() }> for InStep<'_> {
         &mut self,
         job: Job<'_>,
         answer: &Arc<ContactAnswer>,
-        stats: &mut Statistics,
+        stats: &mut Stats,
     ) -> Result<(), Error> {
         self.find_contacts(job, answer, stats)
     }
@@ -197,7 +201,7 @@ impl Finder<u64, { PairKind::ALL.len() }> for InStep<'_> {
         &mut self,
         job: Job<'_>,
         answer: &Arc<KeyAnswer>,
-        stats: &mut Statistics,
+        stats: &mut Stats,
     ) -> Result<(), Error> {
         self.find_keys(job, answer, stats)
     }

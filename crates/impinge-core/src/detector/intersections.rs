@@ -1,6 +1,6 @@
 //! A detector's answers about intersections: which pairs, how many, whether any.
 
-use super::{Detector, Last};
+use super::Detector;
 use crate::answers::pairs::Pairs;
 use crate::plan::Plan;
 use crate::query::goal::Goal;
@@ -11,7 +11,7 @@ use crate::query::settings::{Method, Settings};
 use crate::query::{Query, Scope};
 use crate::scene::Scene;
 use crate::scene::error::Error;
-use crate::search::runner::{Outcome, ready};
+use crate::search::runner::ready;
 
 impl Detector {
     /// All pairs that the query asks for, in the current state of the scene.
@@ -19,23 +19,13 @@ impl Detector {
     /// # Errors
     /// A stale id, refused positions, more pairs than allowed, no memory for the answer, a memory budget too small for
     /// one batch and the answer, a GPU failure.
-    pub fn detect(&mut self, scene: &Scene, query: &Query) -> Result<&Pairs, Error> {
-        self.detect_with(scene, query, &Control::new())
-    }
-
-    /// [`detect`](Detector::detect) with a token to stop it and a callback to watch it.
-    ///
-    /// # Errors
-    /// As `detect`, and [`Error::Cancelled`].
-    pub fn detect_with(
-        &mut self,
-        scene: &Scene,
-        query: &Query,
-        control: &Control<'_>,
-    ) -> Result<&Pairs, Error> {
+    pub fn detect(&mut self, scene: &Scene, query: &Query) -> Result<Pairs, Error> {
+        let control = &self.control.clone();
         let plan = Plan::intersections(scene, query, Goal::All, self.settings.limits())?;
-        self.wait_for(scene, &plan, control)?;
-        Ok(&self.pairs)
+        let mut pairs = self.homes.pairs.take();
+        self.wait_for(scene, &plan, control, &mut pairs)?;
+        pairs.home = self.home(&self.homes.pairs);
+        Ok(pairs)
     }
 
     /// How many pairs [`detect`](Detector::detect) would find. None of them is held, so there may be more than memory
@@ -44,21 +34,12 @@ impl Detector {
     /// # Errors
     /// As `detect`.
     pub fn count(&mut self, scene: &Scene, query: &Query) -> Result<u64, Error> {
-        self.count_with(scene, query, &Control::new())
-    }
-
-    /// [`count`](Detector::count) with a token to stop it and a callback to watch it.
-    ///
-    /// # Errors
-    /// As `count`, and [`Error::Cancelled`].
-    pub fn count_with(
-        &mut self,
-        scene: &Scene,
-        query: &Query,
-        control: &Control<'_>,
-    ) -> Result<u64, Error> {
+        let control = &self.control.clone();
         let plan = Plan::intersections(scene, query, Goal::Count, self.settings.limits())?;
-        self.wait_for(scene, &plan, control)
+        let mut pairs = self.homes.pairs.take();
+        let n = self.wait_for(scene, &plan, control, &mut pairs);
+        self.homes.pairs.put(pairs);
+        n
     }
 
     /// Whether [`detect`](Detector::detect) would find any pair. The search ends with the first one that is certain.
@@ -69,24 +50,15 @@ impl Detector {
     /// # Errors
     /// As `detect`; but any number of pairs is allowed.
     pub fn any(&mut self, scene: &Scene, query: &Query) -> Result<bool, Error> {
-        self.any_with(scene, query, &Control::new())
-    }
-
-    /// [`any`](Detector::any) with a token to stop it and a callback to watch it.
-    ///
-    /// # Errors
-    /// As `any`, and [`Error::Cancelled`].
-    pub fn any_with(
-        &mut self,
-        scene: &Scene,
-        query: &Query,
-        control: &Control<'_>,
-    ) -> Result<bool, Error> {
+        let control = &self.control.clone();
         let plan = Plan::intersections(scene, query, Goal::Any, self.settings.limits())?;
         if let Some(any) = self.any_soon(scene, query, &plan, control)? {
             return Ok(any);
         }
-        Ok(self.wait_for(scene, &plan, control)? > 0)
+        let mut pairs = self.homes.pairs.take();
+        let n = self.wait_for(scene, &plan, control, &mut pairs);
+        self.homes.pairs.put(pairs);
+        Ok(n? > 0)
     }
 
     /// [`detect`](Detector::detect) without blocking. On a GPU the future waits for the device, which must be
@@ -94,10 +66,13 @@ impl Detector {
     ///
     /// # Errors
     /// As `detect`.
-    pub async fn detect_async(&mut self, scene: &Scene, query: &Query) -> Result<&Pairs, Error> {
+    pub async fn detect_async(&mut self, scene: &Scene, query: &Query) -> Result<Pairs, Error> {
         let plan = Plan::intersections(scene, query, Goal::All, self.settings.limits())?;
-        self.answer(scene, &plan, &Control::new()).await?;
-        Ok(&self.pairs)
+        let control = &self.control.clone();
+        let mut pairs = self.homes.pairs.take();
+        self.answer(scene, &plan, control, &mut pairs).await?;
+        pairs.home = self.home(&self.homes.pairs);
+        Ok(pairs)
     }
 
     /// Whether any of many bodies meet, on the CPU, if that is soon known.
@@ -106,7 +81,7 @@ impl Detector {
         scene: &Scene,
         query: &Query,
         plan: &Plan,
-        control: &Control<'_>,
+        control: &Control,
     ) -> Result<Option<bool>, Error> {
         if plan.parts.len() <= 2 || !self.may_know_soon(query) {
             return Ok(None);
@@ -116,10 +91,9 @@ impl Detector {
         let workers = self.runner.workers();
         let any = self.distances.any(scene, plan, workers, control)?;
         if any.is_some() {
-            self.last = Last::Intersections;
             // One thread has found it, without the loop.
-            self.pairs.begin(plan);
-            let stats = self.pairs.stats_mut();
+            let stats = &mut self.stats;
+            stats.clear();
             stats.method = Method::Clusters.name();
             stats.backend.push_str("cpu");
             stats.n_threads = 1;
@@ -136,7 +110,7 @@ impl Detector {
         } = self.settings;
         let is_about_many = matches!(
             query.scope,
-            Scope::Across
+            Scope::Across { .. }
                 | Scope::All {
                     between: true,
                     within: false
@@ -158,13 +132,14 @@ impl Detector {
         &mut self,
         scene: &Scene,
         plan: &Plan,
-        control: &Control<'_>,
+        control: &Control,
+        pairs: &mut Pairs,
     ) -> Result<u64, Error> {
         #[cfg(feature = "gpu")]
         if let Some(gpu) = self.gpu_in_use() {
-            return gpu.block_on(self.answer(scene, plan, control));
+            return gpu.block_on(self.answer(scene, plan, control, pairs));
         }
-        ready(self.answer(scene, plan, control))
+        ready(self.answer(scene, plan, control, pairs))
     }
 
     /// One frame. With `Backend::Auto`, the CPU takes over for good if the GPU fails or cannot hold the scene.
@@ -172,12 +147,22 @@ impl Detector {
         &mut self,
         scene: &Scene,
         plan: &Plan,
-        control: &Control<'_>,
+        control: &Control,
+        pairs: &mut Pairs,
     ) -> Result<u64, Error> {
-        self.last = Last::Intersections;
-        let Detector {
-            runner, pairs, cpu, ..
-        } = self;
+        let n = self.find_pairs(scene, plan, control, pairs).await;
+        self.stats.clone_from(pairs.stats());
+        n
+    }
+
+    async fn find_pairs(
+        &mut self,
+        scene: &Scene,
+        plan: &Plan,
+        control: &Control,
+        pairs: &mut Pairs,
+    ) -> Result<u64, Error> {
+        let Detector { runner, cpu, .. } = self;
         #[cfg(feature = "gpu")]
         if let Some(engine) = &mut self.gpu {
             let may_choose = self.settings.backend == Backend::Auto;

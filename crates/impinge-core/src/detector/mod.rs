@@ -15,15 +15,23 @@ mod near;
 mod resident;
 mod steps;
 
+#[cfg(feature = "gpu")]
+pub use resident::Gpu;
+
+use crate::answers::candidates::Candidates;
+use crate::answers::home::Home;
+use crate::answers::impacts::Impacts;
+use crate::answers::near::NearPairs;
 use crate::answers::pairs::Pairs;
 use crate::clusterings::Clusterings;
 use crate::contact::Topologies;
 use crate::cpu::Cpu;
 use crate::proximity::Distances;
-use crate::query::settings::{Backend, Settings};
+use crate::query::progress::Control;
+use crate::query::settings::Settings;
 use crate::scene::error::Error;
 use crate::search::runner::Runner;
-use crate::search::stats::Statistics;
+use crate::search::stats::Stats;
 
 /// Finds intersecting pairs, frame after frame. Owns the scratch memory and reuses it.
 ///
@@ -36,16 +44,16 @@ use crate::search::stats::Statistics;
 /// let b = scene.add_triangles(&[[0, 1, 2]], &triangle.map(|[x, y, z]| [x, z + 0.25, y - 0.25]))?;
 /// let mut detector = Detector::new(Backend::Cpu)?;
 /// let pairs = detector.detect(&scene, &Query::between(a, b))?;
-/// assert_eq!(pairs.between(a, b).collect::<Vec<_>>(), [(0, 0)]);
+/// assert_eq!(pairs.between(a, b).collect::<Vec<_>>(), [[0, 0]]);
 /// # Ok(()) }
 /// ```
 pub struct Detector {
     settings: Settings,
     runner: Runner,
-    pairs: Pairs,
-    /// Of distances, contacts and runs of candidates.
-    measured: Statistics,
-    last: Last,
+    homes: Homes,
+    control: Control,
+    /// Of the last question.
+    stats: Stats,
     /// Shared by all of the following.
     #[cfg(any(feature = "gpu", test))]
     pub(crate) clusterings: Clusterings,
@@ -58,34 +66,22 @@ pub struct Detector {
     gpu: Option<crate::gpu::Engine>,
 }
 
-/// The kind of question that was asked last: its statistics are the detector's.
-#[derive(Debug, Clone, Copy, Default)]
-enum Last {
-    #[default]
-    Intersections,
-    Contacts,
-    Candidates,
-    Near,
-    Measured,
+/// Where the buffers of dropped answers are.
+#[derive(Default)]
+struct Homes {
+    pairs: Home<Pairs>,
+    impacts: Home<Impacts>,
+    candidates: Home<Candidates>,
+    near: Home<NearPairs>,
 }
 
 impl Detector {
-    /// Creates a detector with the default method on the given backend.
-    ///
-    /// # Errors
-    /// As [`with_settings`](Detector::with_settings).
-    pub fn new(backend: Backend) -> Result<Self, Error> {
-        Detector::with_settings(Settings {
-            backend,
-            ..Settings::default()
-        })
-    }
-
     /// Creates a detector with explicit settings.
     ///
     /// # Errors
     /// A setting out of its range; no adapter for `Backend::Gpu`.
-    pub fn with_settings(settings: Settings) -> Result<Self, Error> {
+    pub fn new(settings: impl Into<Settings>) -> Result<Self, Error> {
+        let settings = settings.into();
         settings.check()?;
         let clusterings = Clusterings::new(&settings);
         #[cfg(feature = "gpu")]
@@ -98,11 +94,11 @@ impl Detector {
         ))
     }
 
-    /// [`with_settings`](Detector::with_settings) without blocking. In a browser this is the only way to open a GPU.
+    /// [`new`](Detector::new) without blocking. In a browser this is the only way to open a GPU.
     ///
     /// # Errors
-    /// As `with_settings`.
-    pub async fn with_settings_async(settings: Settings) -> Result<Self, Error> {
+    /// As `new`.
+    pub async fn open(settings: Settings) -> Result<Self, Error> {
         settings.check()?;
         let clusterings = Clusterings::new(&settings);
         #[cfg(feature = "gpu")]
@@ -124,9 +120,9 @@ impl Detector {
             #[cfg(feature = "gpu")]
             gpu,
             runner: Runner::new(&settings),
-            pairs: Pairs::default(),
-            measured: Statistics::default(),
-            last: Last::default(),
+            homes: Homes::default(),
+            control: Control::new(),
+            stats: Stats::default(),
             cpu: Cpu::new(&settings, &clusterings),
             steps: steps::StepMemory::new(&settings, clusterings.clone()),
             touching: distance::Touching::default(),
@@ -143,22 +139,21 @@ impl Detector {
         &self.settings
     }
 
-    /// The pairs that [`detect`](Detector::detect) found last, out of the detector without a copy. Until the next
-    /// frame it then holds none.
-    pub fn take_pairs(&mut self) -> Pairs {
-        std::mem::take(&mut self.pairs)
+    /// What all later questions heed: a token to stop them, a callback to watch them. Until it is called, there is none.
+    ///
+    /// A token that was cancelled stays so: set another control before the next question.
+    pub fn set_control(&mut self, control: Control) {
+        self.control = control;
     }
 
-    /// How the last question was answered, whatever it was: stages, counts, bytes. After [`detect`](Detector::detect) the same as
-    /// [`Pairs::stats`], and there after [`count`](Detector::count) and [`any`](Detector::any) too. An answer that was
-    /// moved out of the detector has its own.
-    pub fn stats(&self) -> &Statistics {
-        match self.last {
-            Last::Intersections => self.pairs.stats(),
-            Last::Contacts => self.steps.contacts.impacts.stats(),
-            Last::Candidates => self.steps.candidates.stats(),
-            Last::Near => self.steps.near.stats(),
-            Last::Measured => &self.measured,
-        }
+    /// Where the buffers of an answer go when it is dropped. With a memory budget they are freed instead: they would count twice.
+    fn home<T>(&self, home: &Home<T>) -> Option<Home<T>> {
+        self.settings.memory_budget.is_none().then(|| home.clone())
+    }
+
+    /// How the last question was answered, whatever it was, and if it failed how far: stages, counts, bytes. Answers have their
+    /// own, too: [`Pairs::stats`].
+    pub fn stats(&self) -> &Stats {
+        &self.stats
     }
 }

@@ -3,14 +3,13 @@
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use super::Detector;
 use super::in_step::{InStep, Keys, Seen};
-use super::{Detector, Last};
 use crate::answers::near::{ClosestPoints, Labels, NearPairs, Unnamed};
-use crate::answers::pairs::Primitive;
+use crate::answers::pairs::Element;
 use crate::plan::{Plan, TestId};
-use crate::query::near::NearQuery;
+use crate::query::Query;
 use crate::query::pair_kind::PairKind;
-use crate::query::progress::Control;
 use crate::scene::Scene;
 use crate::scene::elements::Part;
 use crate::scene::error::Error;
@@ -18,7 +17,7 @@ use crate::scene::index::ElementIx;
 use crate::search::found::KeysByKind;
 use crate::search::narrow::{Corners, exact_kind};
 use crate::search::runner::{Job, Outcome, ready};
-use crate::search::stats::Statistics;
+use crate::search::stats::Stats;
 use crate::workers::clock::Instant;
 use impinge_exact::internal::{NearestOfElements, closest_of_elements, nearest_of_elements};
 
@@ -26,21 +25,26 @@ use impinge_exact::internal::{NearestOfElements, closest_of_elements, nearest_of
 const TASK: usize = 1024;
 
 impl Detector {
-    /// All pairs of elements whose distance is at most that of the query, at the bodies' positions. End positions are ignored.
+    /// All pairs of elements whose distance is at most `distance` plus the [thickness](Scene::set_thickness) of both bodies, at the
+    /// bodies' positions, in the unit of the scene; of two elements of one body, plus twice its thickness. End positions are ignored.
     /// Each pair comes with its nearest features and, on request, with its distance and nearest points.
     ///
     /// The answer is exact: a pair is reported if and only if the distance of the two closed elements, as a real number,
-    /// is at most the distance asked for. A body of tetrahedra takes part with its surface.
+    /// is at most the distance asked for, which is a sum of real numbers: nothing is rounded. A body of tetrahedra takes part with its
+    /// surface. Pairs of one body that share a vertex are left out.
+    ///
+    /// An edge and a face ([`PairKind::EdgeFace`]) are reported if and only if they meet, whatever the distance: their distance is 0. If
+    /// they do not meet but are near, then so are the edge and an edge of the face, or an end of the edge and the face, and these pairs
+    /// say it: with each of them repeated, answers would have three times as many pairs.
     ///
     /// ```
-    /// use impinge::{Backend, Detector, NearQuery, PairKind, Query, Scene};
+    /// use impinge::{Backend, Detector, PairKind, Query, Scene};
     /// # fn main() -> Result<(), impinge::Error> {
     /// let mut scene = Scene::new();
     /// scene.add_triangles(&[[0, 1, 2]], &[[0.0f32, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]])?;
     /// scene.add_points(&[[1.0f32, 1.0, 0.5], [5.0, 0.0, 0.0]])?;
     /// let mut detector = Detector::new(Backend::Cpu)?;
-    /// let query = NearQuery::new(Query::all()).distance(0.5).closest_points();
-    /// let near = detector.within_distance(&scene, &query)?;
+    /// let near = detector.near(&scene, 0.5, &Query::between_all().closest_points())?;
     /// assert_eq!(near.len(), 1);
     /// let pair = near.iter().next().expect("one pair");
     /// assert_eq!((pair.kind, pair.name()), (PairKind::VertexFace, "P_T"));
@@ -52,26 +56,14 @@ impl Detector {
     /// # Errors
     /// A stale id, refused positions, a distance or thickness that is negative or not finite, a memory budget too small for
     /// even one batch.
-    pub fn within_distance(
+    pub fn near(
         &mut self,
         scene: &Scene,
-        query: &NearQuery,
-    ) -> Result<&NearPairs, Error> {
-        self.within_distance_with(scene, query, &Control::new())
-    }
-
-    /// [`within_distance`](Detector::within_distance) with a token to stop it and a callback to watch it.
-    ///
-    /// # Errors
-    /// As `within_distance`, and [`Error::Cancelled`].
-    pub fn within_distance_with(
-        &mut self,
-        scene: &Scene,
-        query: &NearQuery,
-        control: &Control<'_>,
-    ) -> Result<&NearPairs, Error> {
-        let plan = Plan::of_near(query, scene, self.settings.limits())?;
-        self.last = Last::Near;
+        distance: f64,
+        query: &Query,
+    ) -> Result<NearPairs, Error> {
+        let control = &self.control.clone();
+        let plan = Plan::nearness(scene, query, distance, self.settings.limits())?;
         let mut finder = InStep {
             clusters: &mut self.steps.clusters,
             settings: &self.settings,
@@ -80,25 +72,25 @@ impl Detector {
             keys: Keys::All,
             seen: Seen::default(),
         };
-        let near = &mut self.steps.near;
-        let mut outcome = WithFeatures { near, query };
-        ready(
+        let mut near = self.homes.near.take();
+        let mut outcome = WithFeatures {
+            near: &mut near,
+            query,
+        };
+        let found = ready(
             self.runner
                 .run(scene, &plan, control, &mut finder, &mut outcome),
-        )?;
-        Ok(&self.steps.near)
-    }
-
-    /// Moves the near pairs that were found last out of the detector, without a copy. It holds none until the next question.
-    pub fn take_near(&mut self) -> NearPairs {
-        std::mem::take(&mut self.steps.near)
+        );
+        self.stats.clone_from(near.stats());
+        near.home = self.home(&self.homes.near);
+        found.map(|_| near)
     }
 }
 
 /// Near pairs, whose features are found when the pairs are known.
 struct WithFeatures<'a> {
     near: &'a mut NearPairs,
-    query: &'a NearQuery,
+    query: &'a Query,
 }
 
 impl Outcome<u64, { PairKind::ALL.len() }> for WithFeatures<'_> {
@@ -106,7 +98,7 @@ impl Outcome<u64, { PairKind::ALL.len() }> for WithFeatures<'_> {
         self.near.begin(plan);
     }
 
-    fn stats_mut(&mut self) -> &mut Statistics {
+    fn stats_mut(&mut self) -> &mut Stats {
         self.near.stats_mut()
     }
 
@@ -160,13 +152,13 @@ impl Outcome<u64, { PairKind::ALL.len() }> for WithFeatures<'_> {
 fn find_features(
     scene: &Scene,
     kind: PairKind,
-    pair: [Primitive; 2],
+    pair: [Element; 2],
     closest: bool,
 ) -> (NearestOfElements, Option<ClosestPoints>) {
     let parts = kind.parts();
-    let corners = |Primitive { body, primitive }: Primitive, part: Part| {
+    let corners = |Element { body, element }: Element, part: Part| {
         let body = scene.body_in(body.slot());
-        let element = ElementIx::new(primitive);
+        let element = ElementIx::new(element);
         Corners::new(body.positions(), body.corners(part, &element))
     };
     let (a, b) = (corners(pair[0], parts[0]), corners(pair[1], parts[1]));

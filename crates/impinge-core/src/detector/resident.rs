@@ -1,19 +1,78 @@
-//! Steps that stay on the device of a detector.
+//! What stays on the device of a detector.
 
 use std::collections::BTreeMap;
 
 use super::Detector;
-use crate::gpu::ResidentStep;
+use crate::gpu::{ResidentPairs, ResidentStep};
 use crate::plan::Plan;
+use crate::query::Query;
 use crate::query::goal::Goal;
 use crate::query::progress::Control;
-use crate::query::step::Step;
 use crate::scene::Scene;
 use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
-use crate::search::stats::Statistics;
+use crate::search::stats::Stats;
+
+/// The device of a detector, for frames whose positions and pairs stay there: [`Detector::gpu`].
+pub struct Gpu<'a> {
+    detector: &'a mut Detector,
+}
+
+impl std::fmt::Debug for Gpu<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Gpu").finish_non_exhaustive()
+    }
+}
 
 impl Detector {
+    /// The device, if the detector works on one: for frames whose positions and pairs stay there.
+    pub fn gpu(&mut self) -> Option<Gpu<'_>> {
+        self.gpu.is_some().then_some(Gpu { detector: self })
+    }
+}
+
+impl Gpu<'_> {
+    /// Encodes a whole frame into the caller's encoder: positions come from buffers on the device and
+    /// pairs stay there. Nothing is read back.
+    ///
+    /// `positions` names bodies whose positions are taken from a buffer: `(v, 3)` f32 tightly packed,
+    /// with the usage `COPY_SRC`, copied when the encoder's commands run; other bodies' positions
+    /// come from the scene. For the named bodies, the scene's positions only serve to find clusters,
+    /// once. Positions on the device are not checked: if one is not finite, the pairs of
+    /// its primitives are unspecified.
+    ///
+    /// At most one frame of a detector may be encoded per submission. Pairs of which the filter on the device is
+    /// unsure come in a separate list. If there is not enough room, the lists are incomplete and
+    /// their counts say so, see [`ResidentPairs`]; [`grow`](Gpu::grow) then grows them.
+    ///
+    /// # Errors
+    /// A stale id, a buffer that is too small or lacks its usage, a detector without a GPU. Device errors
+    /// go to the device's owner, and so do those of kernels, which the first frame compiles.
+    pub fn encode(
+        &mut self,
+        scene: &Scene,
+        query: &Query,
+        positions: &[(BodyId, &wgpu::Buffer)],
+        encoder: &mut wgpu::CommandEncoder,
+    ) -> Result<ResidentPairs, Error> {
+        if query.cell.is_some() {
+            return Err(Error::Setting {
+                setting: "owned_by",
+                given: "a cell in a plan that stays on a device".to_owned(),
+                allowed: "only detect, count and any",
+            });
+        }
+        let plan = Plan::intersections(scene, query, Goal::All, self.detector.settings.limits())?;
+        let control = Control::new();
+        let job = self.detector.runner.job(scene, &plan, &control)?;
+        let Some(engine) = &mut self.detector.gpu else {
+            return Err(Error::NoAdapter {
+                found: "this detector works on the CPU".to_owned(),
+            });
+        };
+        engine.encode(job, positions, encoder)
+    }
+
     /// Encodes a whole step into the caller's encoder: positions at the start and at the end come from buffers on the device,
     /// and the pairs of elements that may touch stay there. Nothing is read back.
     ///
@@ -26,9 +85,9 @@ impl Detector {
     /// at the end, in a buffer or in the scene, does not move. For bodies named in `starts`, the scene's positions only serve to
     /// find clusters, once. Positions on the device are not checked: if one is not finite, the pairs of its elements are unspecified.
     ///
-    /// At most one step of a detector may be encoded per submission, besides one frame of [`encode`](Detector::encode). If there
+    /// At most one step of a detector may be encoded per submission, besides one frame of [`encode`](Gpu::encode). If there
     /// is not enough room, the list is incomplete and its count says so, see [`ResidentStep`];
-    /// [`make_room`](Detector::make_room) then grows it.
+    /// [`grow`](Gpu::grow) then grows it.
     ///
     /// # Errors
     /// A stale id, a buffer that is too small or lacks its usage, a step with a separation, a clearance or a filter, or for one cell, a step larger than the
@@ -37,52 +96,95 @@ impl Detector {
     pub fn encode_step(
         &mut self,
         scene: &Scene,
-        step: &Step,
+        query: &Query,
         starts: &[(BodyId, &wgpu::Buffer)],
         ends: &[(BodyId, &wgpu::Buffer)],
         encoder: &mut wgpu::CommandEncoder,
     ) -> Result<ResidentStep, Error> {
-        step.check()?;
-        if step.separation > 0.0 {
+        query.check_step()?;
+        if query.separation > 0.0 {
             return Err(Error::Setting {
                 setting: "separation",
-                given: step.separation.to_string(),
+                given: query.separation.to_string(),
                 allowed: "0 for a step that stays on a device",
             });
         }
-        if step.clearance.distance > 0.0 {
+        if query.clearance.distance > 0.0 {
             return Err(Error::Setting {
                 setting: "clearance",
-                given: step.clearance.distance.to_string(),
+                given: query.clearance.distance.to_string(),
                 allowed: "0 for a step that stays on a device",
             });
         }
-        if step.filter.is_some() {
+        if query.filter.is_some() {
             return Err(Error::Setting {
                 setting: "filter",
                 given: "a filter of pairs in a step that stays on a device".to_owned(),
                 allowed: "only steps that are read back",
             });
         }
-        if step.query.cell.is_some() {
+        if query.kinds.is_some() {
+            return Err(Error::Setting {
+                setting: "kinds",
+                given: "kinds of pairs in a step that stays on a device".to_owned(),
+                allowed: "only steps that are read back",
+            });
+        }
+        if query.cell.is_some() {
             return Err(Error::Setting {
                 setting: "owned_by",
                 given: "a cell in a step that stays on a device".to_owned(),
                 allowed: "only steps and candidates that are read back",
             });
         }
-        let Some(engine) = &mut self.gpu else {
+        let Some(engine) = &mut self.detector.gpu else {
             return Err(Error::NoAdapter {
                 found: "this detector works on the CPU".to_owned(),
             });
         };
-        let plan = Plan::contacts(scene, step, Goal::All, self.settings.limits())?;
+        let plan = Plan::contacts(scene, query, Goal::All, self.detector.settings.limits())?;
         let control = Control::new();
-        let job = self.runner.job(scene, &plan, &control)?;
+        let job = self.detector.runner.job(scene, &plan, &control)?;
         let resident: BTreeMap<BodyId, &wgpu::Buffer> = starts.iter().copied().collect();
         let judges = |body| !resident.contains_key(&body);
-        let stats = &mut Statistics::default();
-        let clusterings = self.clusterings.of_frame(job, judges, stats)?;
+        let stats = &mut Stats::default();
+        let clusterings = self.detector.clusterings.of_frame(job, judges, stats)?;
         engine.encode_step(job, &clusterings, [starts, ends], encoder)
+    }
+
+    /// The positions of a body in the buffer from which the last frame read them, `(v, 3)` f32 tightly packed, and the offset
+    /// of the first byte: to draw what was tested without another upload. The buffer has the usage `COPY_SRC`; the next
+    /// frame may write other positions into it, or replace it.
+    ///
+    /// `None` if they are not there: the last frame was answered on the CPU or in pieces, the body did not take part in it, has
+    /// f64 positions, or has moved since.
+    pub fn positions(&self, scene: &Scene, body: BodyId) -> Option<(wgpu::Buffer, u64)> {
+        let engine = self.detector.gpu.as_ref()?;
+        let (buffer, offset) = engine.positions_of(body, scene.body(body).ok()?)?;
+        Some((buffer.clone(), offset))
+    }
+
+    /// Reads the counts of the last encoded frame, and of the last encoded step, whose commands must have been submitted, and
+    /// grows the lists that were too small. Returns whether both were complete; if not, encode them again. To be called
+    /// before the detector answers another question.
+    ///
+    /// # Errors
+    /// A lost device; lists larger than it can bind; a memory budget that does not allow them.
+    pub fn grow(&mut self) -> Result<bool, Error> {
+        match self.detector.gpu_in_use() {
+            Some(gpu) => gpu.block_on(self.grow_async()),
+            None => Ok(true),
+        }
+    }
+
+    /// [`grow`](Gpu::grow) without blocking.
+    ///
+    /// # Errors
+    /// As `grow`.
+    pub async fn grow_async(&mut self) -> Result<bool, Error> {
+        match &mut self.detector.gpu {
+            Some(engine) => engine.make_room().await,
+            None => Ok(true),
+        }
     }
 }

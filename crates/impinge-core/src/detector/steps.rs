@@ -1,26 +1,24 @@
 //! A detector's answers about a step: which elements touch while bodies move from their positions to their end positions,
 //! and when first.
 
+use super::Detector;
 use super::in_step::{InStep, Keys, Seen};
-use super::{Detector, Last};
-use crate::answers::candidates::Candidates;
 use crate::answers::impacts::{Impact, Impacts};
-use crate::answers::near::NearPairs;
-use crate::answers::pairs::Primitive;
+use crate::answers::pairs::Element;
 use crate::clusterings::Clusterings;
 use crate::cpu::steps::StepClusters;
 use crate::plan::Plan;
-use crate::query::SharedVertex;
 use crate::query::goal::{Goal, Limits};
 use crate::query::pair_kind::PairKind;
 use crate::query::progress::Control;
 use crate::query::settings::Settings;
-use crate::query::step::{Start, Step, Toi};
+use crate::query::step::{Precision, Start};
+use crate::query::{Query, SharedVertex};
 use crate::scene::Scene;
 use crate::scene::error::Error;
 use crate::search::found::{Found, FoundByKind};
 use crate::search::runner::{Job, Outcome, ready};
-use crate::search::stats::Statistics;
+use crate::search::stats::Stats;
 use crate::workers::clock::Instant;
 use impinge_exact::Contact;
 
@@ -29,8 +27,6 @@ pub(super) struct StepMemory {
     pub contacts: Contacts,
     /// Whether the start of the last step intersects, if that was asked.
     start_intersects: Option<bool>,
-    pub candidates: Candidates,
-    pub near: NearPairs,
     pub clusters: StepClusters,
 }
 
@@ -39,8 +35,6 @@ impl StepMemory {
         StepMemory {
             contacts: Contacts::default(),
             start_intersects: None,
-            candidates: Candidates::default(),
-            near: NearPairs::default(),
             clusters: StepClusters::new(settings.instruction_set, clusterings),
         }
     }
@@ -71,10 +65,10 @@ impl Contacts {
     }
 
     /// The earliest of them.
-    pub fn first(&self, toi: Toi) -> Option<Impact> {
+    pub fn first(&self, precision: Precision) -> Option<Impact> {
         let named = self
             .found()
-            .map(|(kind, found)| self.impacts.impact(kind, toi, found));
+            .map(|(kind, found)| self.impacts.impact(kind, precision, found));
         named.reduce(Impact::earlier)
     }
 }
@@ -88,7 +82,7 @@ impl Outcome<Found<Contact>, { PairKind::ALL.len() }> for Contacts {
         }
     }
 
-    fn stats_mut(&mut self) -> &mut Statistics {
+    fn stats_mut(&mut self) -> &mut Stats {
         self.impacts.stats_mut()
     }
 
@@ -99,7 +93,7 @@ impl Outcome<Found<Contact>, { PairKind::ALL.len() }> for Contacts {
     fn fill(&mut self, job: Job<'_>, found: FoundByKind) -> Result<(), Error> {
         self.found = found;
         match self.names {
-            true => self.impacts.fill(job.plan.toi, &self.found),
+            true => self.impacts.fill(job.plan.precision, &self.found),
             false => Ok(()),
         }
     }
@@ -121,50 +115,41 @@ impl Detector {
     ///
     /// The answer is exact: a pair is reported if and only if the two closed elements share a point at some time, and its
     /// time is that of the first contact, rounded down: `toi <= first < toi.next_up()`. With a
-    /// [separation](Step::separation), the same holds of the first time at which their distance is at most that, and with a
-    /// [clearance](Step::clearance), of the first time at which a pair is as near as it may come.
+    /// [separation](Query::separation), the same holds of the first time at which their distance is at most that, and with a
+    /// [clearance](Query::clearance), of the first time at which a pair is as near as it may come.
     ///
     /// On a GPU the device finds the pairs that may touch, and the CPU finds their times, on all threads: the answer is the same to the
     /// last bit. The CPU answers alone if there is a separation, a clearance or a filter, or if the device or the memory budget cannot hold the step; in a
-    /// browser it always does. [`Statistics::backend`](crate::Statistics::backend) says who answered.
+    /// browser it always does. [`Stats::backend`](crate::Stats::backend) says who answered.
     ///
     /// ```
-    /// use impinge::{Backend, Detector, PairKind, Scene, Step};
+    /// use impinge::{Backend, Detector, PairKind, Query, Scene};
     /// # fn main() -> Result<(), impinge::Error> {
     /// let mut scene = Scene::new();
     /// scene.add_triangles(&[[0, 1, 2]], &[[0.0f32, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]])?;
     /// let point = scene.add_points(&[[1.0f32, 1.0, 1.0]])?;
     /// scene.set_end_positions(point, &[[1.0f32, 1.0, -3.0]])?;
     /// let mut detector = Detector::new(Backend::Cpu)?;
-    /// let impacts = detector.impacts(&scene, &Step::default())?;
+    /// let impacts = detector.impacts(&scene, &Query::all())?;
     /// assert_eq!(impacts.len(), 1);
-    /// let impact = impacts.as_slice()[0];
+    /// let impact = impacts.of(PairKind::VertexFace)[0];
     /// assert_eq!((impact.kind, impact.toi), (PairKind::VertexFace, 0.25));
-    /// assert!(!detector.is_free(&scene, &Step::default())?);
+    /// assert!(!detector.is_free(&scene, &Query::all())?);
     /// # Ok(()) }
     /// ```
     ///
     /// # Errors
     /// A stale id, refused positions, more pairs than allowed, no memory for the answer, a memory budget too small for
     /// one batch and the answer.
-    pub fn impacts(&mut self, scene: &Scene, step: &Step) -> Result<&Impacts, Error> {
-        self.impacts_with(scene, step, &Control::new())
-    }
-
-    /// [`impacts`](Detector::impacts) with a token to stop it and a callback to watch it.
-    ///
-    /// # Errors
-    /// As `impacts`, and [`Error::Cancelled`].
-    pub fn impacts_with(
-        &mut self,
-        scene: &Scene,
-        step: &Step,
-        control: &Control<'_>,
-    ) -> Result<&Impacts, Error> {
-        let plan = Plan::contacts(scene, step, Goal::All, self.limits_of_impacts())?;
-        let start = self.verify(scene, step, control)?;
-        self.find_contacts(scene, &plan, control, (start, true))?;
-        Ok(&self.steps.contacts.impacts)
+    pub fn impacts(&mut self, scene: &Scene, query: &Query) -> Result<Impacts, Error> {
+        let control = &self.control.clone();
+        let plan = Plan::contacts(scene, query, Goal::All, self.limits_of_impacts())?;
+        let start = self.verify(scene, query)?;
+        self.steps.contacts.impacts = self.homes.impacts.take();
+        let found = self.find_contacts(scene, &plan, control, (start, true));
+        let mut impacts = std::mem::take(&mut self.steps.contacts.impacts);
+        impacts.home = self.home(&self.homes.impacts);
+        found.map(|_| impacts)
     }
 
     /// The earliest impact; of several at the same time, the one whose row comes first. `None` if the step is free.
@@ -172,25 +157,13 @@ impl Detector {
     ///
     /// # Errors
     /// As [`impacts`](Detector::impacts).
-    pub fn earliest(&mut self, scene: &Scene, step: &Step) -> Result<Option<Impact>, Error> {
-        self.earliest_with(scene, step, &Control::new())
-    }
-
-    /// [`earliest`](Detector::earliest) with a token to stop it and a callback to watch it.
-    ///
-    /// # Errors
-    /// As `earliest`, and [`Error::Cancelled`].
-    pub fn earliest_with(
-        &mut self,
-        scene: &Scene,
-        step: &Step,
-        control: &Control<'_>,
-    ) -> Result<Option<Impact>, Error> {
-        let plan = Plan::contacts(scene, step, Goal::Earliest, self.limits_of_steps())?;
-        let start = self.verify(scene, step, control)?;
+    pub fn earliest(&mut self, scene: &Scene, query: &Query) -> Result<Option<Impact>, Error> {
+        let control = &self.control.clone();
+        let plan = Plan::contacts(scene, query, Goal::Earliest, self.limits_of_steps())?;
+        let start = self.verify(scene, query)?;
         self.find_contacts(scene, &plan, control, (start, false))?;
         // The first contact and all whose times may round to the same time have been found, and some later ones.
-        Ok(self.steps.contacts.first(plan.toi))
+        Ok(self.steps.contacts.first(plan.precision))
     }
 
     /// Whether elements intersect at the start of the step that was asked about last; `None` if that was not asked, which
@@ -206,22 +179,10 @@ impl Detector {
     ///
     /// # Errors
     /// As [`impacts`](Detector::impacts).
-    pub fn is_free(&mut self, scene: &Scene, step: &Step) -> Result<bool, Error> {
-        self.is_free_with(scene, step, &Control::new())
-    }
-
-    /// [`is_free`](Detector::is_free) with a token to stop it and a callback to watch it.
-    ///
-    /// # Errors
-    /// As `is_free`, and [`Error::Cancelled`].
-    pub fn is_free_with(
-        &mut self,
-        scene: &Scene,
-        step: &Step,
-        control: &Control<'_>,
-    ) -> Result<bool, Error> {
-        let plan = Plan::contacts(scene, step, Goal::Any, self.limits_of_steps())?;
-        let start = self.verify(scene, step, control)?;
+    pub fn is_free(&mut self, scene: &Scene, query: &Query) -> Result<bool, Error> {
+        let control = &self.control.clone();
+        let plan = Plan::contacts(scene, query, Goal::Any, self.limits_of_steps())?;
+        let start = self.verify(scene, query)?;
         if start.is_some_and(|start| start.intersects) {
             self.note_start(&plan, start);
             return Ok(false);
@@ -234,24 +195,26 @@ impl Detector {
     pub(super) fn verify(
         &mut self,
         scene: &Scene,
-        step: &Step,
-        control: &Control<'_>,
+        query: &Query,
     ) -> Result<Option<StartAnswer>, Error> {
         self.steps.start_intersects = None;
-        if step.start != Start::Verify {
+        if query.start != Start::Verify {
             return Ok(None);
         }
         let start = Instant::now();
-        let query = step.query.clone().shared_vertex(SharedVertex::Resolve);
-        let intersects = match &step.filter {
-            None => self.any_with(scene, &query, control)?,
+        let at_start = Query {
+            kinds: None,
+            ..query.clone().shared_vertex(SharedVertex::Resolve)
+        };
+        let intersects = match &query.filter {
+            None => self.any(scene, &at_start)?,
             Some(filter) => {
-                let corners = |of: Primitive| {
+                let corners = |of: Element| {
                     let body = scene.body(of.body)?;
-                    Ok::<_, Error>((of.body, body.elements().corners(of.primitive as usize)))
+                    Ok::<_, Error>((of.body, body.elements().corners(of.element as usize)))
                 };
-                let mut pairs = self.detect_with(scene, &query, control)?.iter();
-                pairs.try_fold(false, |any, (a, b)| {
+                let pairs = self.detect(scene, &at_start)?;
+                pairs.iter().try_fold(false, |any, (a, b)| {
                     Ok::<_, Error>(any || filter.passes([corners(a)?, corners(b)?]))
                 })?
             }
@@ -263,11 +226,11 @@ impl Detector {
 
     /// Takes note of a step that was not examined because of its start.
     fn note_start(&mut self, plan: &Plan, start: Option<StartAnswer>) {
-        self.last = Last::Contacts;
         let contacts = &mut self.steps.contacts;
         contacts.start = start;
         contacts.begin(plan);
         contacts.stats_mut().total_ms = plan.since.elapsed().as_secs_f64() * 1e3;
+        self.stats.clone_from(contacts.impacts.stats());
     }
 
     /// Finds the contacts that are sought, in any order unless all are. `names`: whether they are the impacts of an answer.
@@ -275,10 +238,9 @@ impl Detector {
         &mut self,
         scene: &Scene,
         plan: &Plan,
-        control: &Control<'_>,
+        control: &Control,
         (start, names): (Option<StartAnswer>, bool),
     ) -> Result<Seen, Error> {
-        self.last = Last::Contacts;
         let contacts = &mut self.steps.contacts;
         (contacts.start, contacts.names) = (start, names);
         let mut finder = InStep {
@@ -289,8 +251,9 @@ impl Detector {
             keys: Keys::All,
             seen: Seen::default(),
         };
-        ready(self.runner.run(scene, plan, control, &mut finder, contacts))?;
-        Ok(finder.seen)
+        let found = ready(self.runner.run(scene, plan, control, &mut finder, contacts));
+        self.stats.clone_from(contacts.impacts.stats());
+        found.map(|_| finder.seen)
     }
 
     /// What an answer of contacts may be that are not handed out.
@@ -307,16 +270,5 @@ impl Detector {
             besides: size_of::<Impact>() as u64,
             ..self.settings.limits()
         }
-    }
-
-    /// Moves the impacts found last out of the detector, without a copy. It holds none until the next question.
-    pub fn take_impacts(&mut self) -> Impacts {
-        std::mem::take(&mut self.steps.contacts.impacts)
-    }
-
-    /// Statistics of the last answer about a step: by [`impacts`](Detector::impacts),
-    /// [`earliest`](Detector::earliest), [`is_free`](Detector::is_free) or [`advance`](Detector::advance).
-    pub fn step_stats(&self) -> &Statistics {
-        self.steps.contacts.impacts.stats()
     }
 }

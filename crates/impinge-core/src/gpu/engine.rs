@@ -26,7 +26,7 @@ use crate::scene::ids::BodyId;
 use crate::scene::index::PartIx;
 use crate::search::runner::{Finder, Job};
 use crate::search::sink::Answer;
-use crate::search::stats::Statistics;
+use crate::search::stats::Stats;
 use crate::search::undecided::Undecided;
 
 /// The most cells, for any lambda.
@@ -200,7 +200,7 @@ impl Engine {
         &mut self,
         job: Job<'_>,
         answer: &Answer,
-        stats: &mut Statistics,
+        stats: &mut Stats,
     ) -> Result<(), Error> {
         let Job { plan, .. } = job;
         self.gpu.check_lost()?;
@@ -260,7 +260,7 @@ impl Engine {
         job: Job<'_>,
         clusterings: &[Arc<Clustering>],
         (sought, take): (Goal, &mut TakeUndecided<'_>),
-        stats: &mut Statistics,
+        stats: &mut Stats,
     ) -> Result<bool, Error> {
         let result = self
             .answer_step(job, clusterings, (sought, take), stats)
@@ -276,7 +276,7 @@ impl Engine {
         job: Job<'_>,
         clusterings: &[Arc<Clustering>],
         (sought, take): (Goal, &mut TakeUndecided<'_>),
-        stats: &mut Statistics,
+        stats: &mut Stats,
     ) -> Result<bool, Error> {
         self.gpu.check_lost()?;
         self.turn_to(Motion::Moving);
@@ -303,7 +303,7 @@ impl Engine {
         &mut self,
         job: Job<'_>,
         resident: &[BodyId],
-        stats: &mut Statistics,
+        stats: &mut Stats,
     ) -> Result<Vec<Arc<Clustering>>, Error> {
         // Not judged in `Cells`, where clusters only show which primitives are out of reach.
         let is_judged = self.lane.method == Method::Clusters;
@@ -316,7 +316,7 @@ impl Engine {
         &mut self,
         job: Job<'_>,
         clusterings: &[Arc<Clustering>],
-        stats: &mut Statistics,
+        stats: &mut Stats,
     ) -> Result<(), Error> {
         let none = ResidentEnds::default();
         let gpu = Arc::clone(&self.gpu);
@@ -342,7 +342,7 @@ impl Engine {
         job: Job<'_>,
         clusterings: &[Arc<Clustering>],
         resident: &ResidentEnds<'_>,
-        stats: &mut Statistics,
+        stats: &mut Stats,
     ) -> Result<(), Error> {
         self.has_pieces = false;
         let most = self.most();
@@ -362,7 +362,7 @@ impl Engine {
         job: Job<'_>,
         clusterings: &[Arc<Clustering>],
         answer: &Answer,
-        stats: &mut Statistics,
+        stats: &mut Stats,
     ) -> Result<(), Error> {
         let Job { scene, plan, .. } = job;
         if !self.has_pieces {
@@ -413,7 +413,7 @@ impl Engine {
         Ok(())
     }
 
-    fn finish(&self, stats: &mut Statistics) {
+    fn finish(&self, stats: &mut Stats) {
         if self.lane.method == Method::Clusters {
             stats.method = Method::Clusters.name();
         }
@@ -514,7 +514,7 @@ impl Engine {
             most.min(budget / SHARE_OF_CELLS / CellsWanted::CELL)
         });
         // Below 2^25, so the cast back is exact enough.
-        let asked = (plan.n_primitives() as f64 * self.settings.lambda).min(MOST_CELLS as f64);
+        let asked = (plan.n_primitives() as f64 * self.settings.density).min(MOST_CELLS as f64);
         Some(CellsWanted {
             n_cells: (asked.ceil() as u64).min(most).max(1),
             n_bodies: count(plan.parts.len()).max(self.world.n_parts()),
@@ -576,7 +576,7 @@ impl Finder for Engine {
         &mut self,
         job: Job<'_>,
         answer: &Arc<Answer>,
-        stats: &mut Statistics,
+        stats: &mut Stats,
     ) -> Result<(), Error> {
         let result = self.answer(job, answer, stats).await;
         if let Err(Error::Gpu { .. }) = result {

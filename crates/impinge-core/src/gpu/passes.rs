@@ -30,7 +30,7 @@ use crate::scene::index::Number;
 use crate::search::narrow::decide;
 use crate::search::runner::Job;
 use crate::search::sink::{Answer, BLOCK};
-use crate::search::stats::Statistics;
+use crate::search::stats::Stats;
 use crate::search::undecided::Undecided;
 
 /// The host descends before the first launch while there are at most this many seeds: each step saves two launches.
@@ -54,7 +54,7 @@ impl Engine {
         job: Job<'_>,
         mut sink: PassSink<'_, '_>,
         mut waiting: Vec<Work>,
-        stats: &mut Statistics,
+        stats: &mut Stats,
     ) -> Result<Outcome, Error> {
         let Job { plan, control, .. } = job;
         let cells = self.cells_wanted(plan);
@@ -228,7 +228,7 @@ impl Engine {
         work: &Work,
         capacities: Capacities,
         cells: Option<CellsWanted>,
-        stats: &mut Statistics,
+        stats: &mut Stats,
     ) -> Result<Collected, Error> {
         self.lane.is_encoded = false;
         let gpu = Arc::clone(&self.gpu);
@@ -313,7 +313,7 @@ impl Engine {
             pass_buffers: &self.lane.pass_buffers,
             recording,
         };
-        let (lambda, group_size) = (self.settings.lambda, self.settings.group_size);
+        let (lambda, group_size) = (self.settings.density, self.settings.group_size);
         let resolve = plan.shared_vertex == SharedVertex::Resolve;
         match (work, &mut self.guest) {
             (None, _) => {}
@@ -338,7 +338,7 @@ impl Engine {
 }
 
 /// Adds the counts of a complete pass to the statistics.
-fn book(collected: &Collected, method: Method, stats: &mut Statistics) {
+fn book(collected: &Collected, method: Method, stats: &mut Stats) {
     let needed = &collected.counts.needed;
     stats.n_batches += 1;
     stats.n_work_items += needed.items;

@@ -16,7 +16,7 @@ use crate::scene::ids::BodyId;
 use crate::scene::positions::Positions;
 use crate::scene::{Body, Scene};
 use crate::search::runner::Job;
-use crate::search::stats::Statistics;
+use crate::search::stats::Stats;
 
 /// The buffers that hold the pairs of an encoded frame once its commands have run.
 ///
@@ -26,7 +26,7 @@ use crate::search::stats::Statistics;
 /// pairs is not specified.
 ///
 /// A count may be larger than its list: the list then holds as many pairs as fit, and
-/// [`Detector::make_room`](crate::Detector::make_room) makes it larger.
+/// [`Gpu::grow`](crate::Gpu::grow) makes it larger.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct ResidentPairs {
@@ -72,7 +72,7 @@ pub struct ResidentPairs {
 /// whether an element uses them or not; edges and faces as [`Body::part`](crate::Body::part) lists them. The order of pairs is not specified.
 ///
 /// The count may be larger than the list: the list then holds as many pairs as fit, and
-/// [`Detector::make_room`](crate::Detector::make_room) makes it larger.
+/// [`Gpu::grow`](crate::Gpu::grow) makes it larger.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct ResidentStep {
@@ -131,7 +131,7 @@ impl Engine {
         }
         self.turn_to(Motion::Still);
         let ids: Vec<BodyId> = positions.iter().map(|&(body, _)| body).collect();
-        let clusterings = self.cluster(job, &ids, &mut Statistics::default())?;
+        let clusterings = self.cluster(job, &ids, &mut Stats::default())?;
         let starts = positions.iter().copied().collect();
         let resident = ResidentEnds([starts, BTreeMap::new()]);
         self.encode_whole(job, &clusterings, &resident, encoder)?;
@@ -207,7 +207,7 @@ impl Engine {
         resident: &ResidentEnds<'_>,
         encoder: &mut wgpu::CommandEncoder,
     ) -> Result<(), Error> {
-        self.update(job, clusterings, resident, &mut Statistics::default())?;
+        self.update(job, clusterings, resident, &mut Stats::default())?;
         self.world.copy_positions(resident, encoder);
         let cells = self.cells_wanted(job.plan);
         let capacities = self.first_capacities(cells)?;
@@ -230,7 +230,7 @@ impl Engine {
     /// Reads the counters of the encoded frame and step, and grows the buffers that were too small. Returns whether none was.
     ///
     /// # Errors
-    /// Those of [`Detector::make_room`](crate::Detector::make_room).
+    /// Those of [`Gpu::grow`](crate::Gpu::grow).
     pub async fn make_room(&mut self) -> Result<bool, Error> {
         self.gpu().check_lost()?;
         let mut is_complete = true;

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::layout::{Body, Cluster, ClusterVertex, Coordinate, Corners, Node, Order};
 use crate::bvh::clusters::Clustering;
-use crate::scene::elements::Kind;
+use crate::scene::elements::BodyKind;
 use crate::scene::index::{ClusterIx, Number};
 
 /// Clusters as kernels read them.
@@ -45,7 +45,7 @@ impl DeviceClusters {
             });
             self.cluster_vertices.extend(vertices);
         }
-        let is_solid = clustering.corners.kind() == Kind::Tetrahedra;
+        let is_solid = clustering.corners.kind() == BodyKind::Tetrahedra;
         self.has_solids |= is_solid && !slots.is_empty();
         // Edges and points become degenerate triangles.
         let corners = slots.clone().map(|ix| Corners {

@@ -38,7 +38,7 @@ use crate::scene::index::{Number, PartIx};
 use crate::scene::positions::Positions;
 use crate::scene::{Filter, Scene};
 use crate::search::runner::Job;
-use crate::search::stats::Statistics;
+use crate::search::stats::Stats;
 
 use super::buffers::{Storage, count};
 use super::layout::{
@@ -266,7 +266,7 @@ impl World {
         job: Job<'_>,
         (motion, clusterings): (Motion, &[Arc<Clustering>]),
         (resident, most): (&ResidentEnds<'_>, Most),
-        stats: &mut Statistics,
+        stats: &mut Stats,
     ) -> Result<(), Error> {
         let Job { scene, plan, .. } = job;
         if !self.is_seen(job, (motion, clusterings)) {
@@ -594,7 +594,7 @@ impl World {
         let mut ignored: Vec<NodePair> = match motion {
             Motion::Still => {
                 let part = |query_part: PartIx| view.parts[query_part.index()];
-                let pairs = plan.ignored_pairs().map(|(a, b)| [part(a), part(b)]);
+                let pairs = plan.excluded_pairs().map(|(a, b)| [part(a), part(b)]);
                 let pair = |[a, b]: [u32; 2]| NodePair {
                     a: a.min(b),
                     b: a.max(b),
@@ -602,7 +602,7 @@ impl World {
                 pairs.map(pair).collect()
             }
             Motion::Moving => {
-                let pairs = plan.ignored_bodies();
+                let pairs = plan.excluded_bodies();
                 let pair = |(a, b)| {
                     Some(NodePair {
                         a: number(a)?,

@@ -10,11 +10,7 @@
 use std::collections::BTreeMap;
 
 use crate::boxes::Sweep;
-use crate::query::goal::Limits;
-use crate::query::near::NearQuery;
-use crate::query::step::check_distance;
 use crate::scene::Scene;
-use crate::scene::error::Error;
 use crate::scene::index::PartIx;
 use impinge_exact::internal::{Keep, Reach};
 use impinge_exact::{Contact, ElementPair, Point};
@@ -22,28 +18,6 @@ use impinge_exact::{Contact, ElementPair, Point};
 use super::Plan;
 
 impl Plan {
-    /// What a query for near pairs asks of a scene.
-    pub(crate) fn of_near(query: &NearQuery, scene: &Scene, limits: Limits) -> Result<Plan, Error> {
-        let numbers = query
-            .thickness
-            .values()
-            .map(|&number| ("thickness", number));
-        for (setting, number) in numbers.chain([("distance", query.distance)]) {
-            check_distance(setting, number)?;
-        }
-        for &body in query.thickness.keys() {
-            scene.body(body)?;
-        }
-        let of_distance = size_of::<f64>() * usize::from(query.distances);
-        let of_points = size_of::<[[f64; 3]; 2]>() * usize::from(query.closest);
-        let limits = Limits {
-            besides: (1 + of_distance + of_points) as u64,
-            ..limits
-        };
-        let of_pairs = (&query.query, query.kinds);
-        Plan::nearness(scene, of_pairs, query.distance, &query.thickness, limits)
-    }
-
     /// Makes elements keep a separation, and a clearance if there is one.
     pub(super) fn keep(&mut self, scene: &Scene, keep: Keep) {
         self.keep = keep;

@@ -21,15 +21,15 @@ mod counted;
 mod distances;
 mod parts;
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::ops::Range;
 
 use crate::boxes::Sweep;
 use crate::query::goal::{Goal, Limits};
 use crate::query::pair_kind::{PairKind, PairKinds};
-use crate::query::step::{CandidateQuery, PairFilter, Start, Step, Toi};
+use crate::query::step::{PairFilter, Precision, Start, check_distance};
 use crate::query::{Cell, Query, Scope, SharedVertex};
-use crate::scene::elements::{Kind, Part};
+use crate::scene::elements::{BodyKind, Part};
 use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
 pub use crate::scene::index::pair_key;
@@ -50,7 +50,7 @@ pub struct QueryPart {
     /// How many numbers its elements take up. Vertices are numbered as positions are, whether they take part or not.
     pub n_primitives: u32,
     /// The kind of its elements.
-    pub kind: Kind,
+    pub kind: BodyKind,
     /// Whether its self-collision is queried.
     pub within: bool,
     /// Whether the body has no faces.
@@ -140,10 +140,12 @@ pub struct Plan {
     pub question: Question,
     /// The kinds of pairs, if the query names them.
     kinds: Option<PairKinds>,
+    /// Of those that are asked for, the ones to look for now.
+    only: PairKinds,
     /// The adjacency rule of self-collision.
     pub shared_vertex: SharedVertex,
     between: bool,
-    ignored: BTreeSet<(BodyId, BodyId)>,
+    excluded: BTreeSet<(BodyId, BodyId)>,
     cell: Option<Cell>,
     /// What of a step is examined. Boxes are inflated besides, see [`sweep`](Plan::sweep).
     sweep: Sweep,
@@ -157,7 +159,7 @@ pub struct Plan {
     /// What happens to pairs that touch at the start of a step.
     pub(crate) start: Start,
     /// The precision of times.
-    pub(crate) toi: Toi,
+    pub(crate) precision: Precision,
     /// What of the pairs is wanted.
     pub goal: Goal,
     /// What the answer may be.
@@ -185,17 +187,18 @@ impl Plan {
             },
             _ => limits,
         };
+        query.check_without_kinds()?;
         Plan::of(scene, query, Question::Intersection, goal, limits)
     }
 
     /// The question about the contacts of a step.
     pub(crate) fn contacts(
         scene: &Scene,
-        step: &Step,
+        query: &Query,
         goal: Goal,
         limits: Limits,
     ) -> Result<Self, Error> {
-        Plan::of_step(scene, step, step.keep(), goal, limits)
+        Plan::of_step(scene, query, query.keep(), goal, limits)
     }
 
     /// The question how far a step can be taken: about its earliest contact, at a time in `f64`, or in `f32` if elements keep a
@@ -203,20 +206,24 @@ impl Plan {
     /// at rounded positions, at any time of the step.
     pub(crate) fn advance(
         scene: &Scene,
-        step: &Step,
+        query: &Query,
         with_close: bool,
         limits: Limits,
     ) -> Result<Self, Error> {
         let keep = Keep {
             is_rounded: true,
-            ..step.keep()
+            ..query.keep()
         };
         let has_clearance = !keep.is_plain();
-        let keep = if has_clearance { keep } else { step.keep() };
-        let mut plan = Plan::of_step(scene, step, keep, Goal::Earliest, limits)?;
+        let keep = if has_clearance { keep } else { query.keep() };
+        let mut plan = Plan::of_step(scene, query, keep, Goal::Earliest, limits)?;
         // With a clearance, a time in single precision is as good, and decided by filters.
-        plan.toi = if has_clearance { Toi::F32 } else { Toi::F64 };
-        if !has_clearance && step.separation == 0.0 && with_close {
+        plan.precision = if has_clearance {
+            Precision::F32
+        } else {
+            Precision::F64
+        };
+        if !has_clearance && query.separation == 0.0 && with_close {
             plan.round(scene);
         }
         Ok(plan)
@@ -226,32 +233,32 @@ impl Plan {
     /// are not needed.
     pub(crate) fn trial(
         scene: &Scene,
-        step: &Step,
+        query: &Query,
         fraction: f64,
         limits: Limits,
     ) -> Result<Self, Error> {
-        let plan = Plan::of_step(scene, step, step.keep(), Goal::All, limits)?;
+        let plan = Plan::of_step(scene, query, query.keep(), Goal::All, limits)?;
         Ok(Plan {
             sweep: Sweep {
                 is_swept: fraction <= Sweep::NEARLY_STILL,
                 ..plan.sweep
             },
-            toi: Toi::F32,
+            precision: Precision::F32,
             ..plan
         })
     }
 
     fn of_step(
         scene: &Scene,
-        step: &Step,
+        query: &Query,
         keep: Keep,
         goal: Goal,
         limits: Limits,
     ) -> Result<Self, Error> {
-        step.check()?;
-        let mut plan = Plan::of(scene, &step.query, Question::Contact, goal, limits)?;
-        plan.filter.clone_from(&step.filter);
-        (plan.start, plan.toi) = (step.start, step.toi);
+        query.check_step()?;
+        let mut plan = Plan::of(scene, query, Question::Contact, goal, limits)?;
+        plan.filter.clone_from(&query.filter);
+        (plan.start, plan.precision) = (query.start, query.precision);
         plan.keep(scene, keep);
         Ok(plan)
     }
@@ -259,39 +266,61 @@ impl Plan {
     /// The question which elements are within a distance: the sum of `distance` and the thickness of both bodies.
     pub(crate) fn nearness(
         scene: &Scene,
-        (query, kinds): (&Query, Option<PairKinds>),
+        query: &Query,
         distance: f64,
-        thickness: &BTreeMap<BodyId, f64>,
         limits: Limits,
     ) -> Result<Self, Error> {
+        check_distance("distance", distance)?;
+        let of_distance = size_of::<f64>() * usize::from(query.distances);
+        let of_points = size_of::<[[f64; 3]; 2]>() * usize::from(query.closest);
+        let limits = Limits {
+            besides: (1 + of_distance + of_points) as u64,
+            ..limits
+        };
         let mut plan = Plan::of(scene, query, Question::Nearness, Goal::All, limits)?;
-        plan.kinds = kinds;
         (plan.distance, plan.bound) = (distance, distance);
         for part in &mut plan.parts {
-            part.thickness = thickness.get(&part.id).copied().unwrap_or(0.0);
+            part.thickness = scene.body(part.id)?.thickness();
         }
         Ok(plan)
     }
 
-    /// The question which boxes overlap. Each body is as thick as the query's distance.
+    /// The question which boxes overlap. Each body is as thick as the inflation.
     pub(crate) fn candidates(
         scene: &Scene,
-        query: &CandidateQuery,
+        inflation: f64,
+        query: &Query,
         limits: Limits,
     ) -> Result<Self, Error> {
-        query.check()?;
-        let mut plan = Plan::of(scene, &query.query, Question::Overlap, Goal::All, limits)?;
-        plan.kinds = Some(query.kinds);
+        check_distance("inflation", inflation)?;
+        let mut plan = Plan::of(scene, query, Question::Overlap, Goal::All, limits)?;
         for part in &mut plan.parts {
-            part.thickness = query.distance;
+            part.thickness = inflation;
         }
         Ok(plan)
+    }
+
+    /// Whether the query names the kinds of pairs.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn names_kinds(&self) -> bool {
+        self.kinds.is_some()
+    }
+
+    /// The kinds of pairs that are asked for, as far as some parts may have them.
+    pub(crate) fn kinds_asked(&self) -> PairKinds {
+        let is_asked = |kind: &PairKind| {
+            let mut tests = self
+                .part_ixs()
+                .flat_map(|a| self.part_ixs().map(move |b| (a, b)));
+            tests.any(|(a, b)| self.test(a, b) == Some(TestId::Elements(*kind)))
+        };
+        PairKind::ALL.into_iter().filter(is_asked).collect()
     }
 
     /// The same question about some kinds of pairs only, asked now, with an answer of any length.
     pub(crate) fn of_kinds(&self, kinds: PairKinds) -> Self {
         Plan {
-            kinds: Some(kinds),
+            only: kinds,
             limits: Limits::default(),
             since: Instant::now(),
             ..self.clone()
@@ -307,18 +336,21 @@ impl Plan {
     ) -> Result<Self, Error> {
         let mut plan = Plan {
             parts: Vec::with_capacity(match query.scope {
-                Scope::Between(..) | Scope::Within(_) => 2,
-                Scope::Across | Scope::All { .. } => scene.n_bodies() * question.parts().len(),
+                Scope::Between(..) | Scope::SelfOf(_) => 2,
+                Scope::Across { .. } | Scope::All { .. } => {
+                    scene.n_bodies() * question.parts().len()
+                }
             }),
             question,
-            kinds: None,
+            kinds: query.kinds,
+            only: PairKinds::ALL,
             // Vertices, edges and faces that share a vertex never count.
             shared_vertex: match question {
                 Question::Intersection => query.shared_vertex,
                 Question::Contact | Question::Nearness | Question::Overlap => SharedVertex::Skip,
             },
             between: false,
-            ignored: query.ignored.clone(),
+            excluded: query.excluded.clone(),
             cell: query.cell,
             sweep: question.sweep(),
             distance: 0.0,
@@ -326,7 +358,7 @@ impl Plan {
             keep: Keep::default(),
             filter: None,
             start: Start::default(),
-            toi: Toi::default(),
+            precision: Precision::default(),
             goal,
             limits,
             since: Instant::now(),
@@ -418,15 +450,15 @@ impl Plan {
                 PairKind::FaceFace => false,
             },
         };
-        is_asked.then_some(TestId::Elements(kind))
+        (is_asked && self.only.contains(kind)).then_some(TestId::Elements(kind))
     }
 
     #[inline]
     fn meet(&self, a: &QueryPart, b: &QueryPart) -> bool {
         self.between
             && a.filter.meets(b.filter)
-            && (self.ignored.is_empty()
-                || !self.ignored.contains(&(a.id.min(b.id), a.id.max(b.id))))
+            && (self.excluded.is_empty()
+                || !self.excluded.contains(&(a.id.min(b.id), a.id.max(b.id))))
     }
 
     /// The filter of a part.
@@ -443,18 +475,18 @@ impl Plan {
 
     /// Pairs of bodies, lower first and sorted, that do not meet whatever their filters say.
     #[cfg(feature = "gpu")]
-    pub(crate) fn ignored_bodies(&self) -> impl Iterator<Item = (BodyId, BodyId)> + '_ {
-        self.ignored.iter().copied().filter(|(a, b)| a != b)
+    pub(crate) fn excluded_bodies(&self) -> impl Iterator<Item = (BodyId, BodyId)> + '_ {
+        self.excluded.iter().copied().filter(|(a, b)| a != b)
     }
 
     /// Pairs of parts, lower first and sorted, that do not meet whatever their filters say.
     #[cfg(feature = "gpu")]
-    pub fn ignored_pairs(&self) -> impl Iterator<Item = (PartIx, PartIx)> + '_ {
+    pub fn excluded_pairs(&self) -> impl Iterator<Item = (PartIx, PartIx)> + '_ {
         let find = |id: BodyId| {
             let found = self.parts.binary_search_by_key(&id, |part| part.id);
             found.ok().map(PartIx::from_usize)
         };
-        self.ignored
+        self.excluded
             .iter()
             .filter(|(a, b)| a != b)
             .filter_map(move |&(a, b)| Some((find(a)?, find(b)?)))

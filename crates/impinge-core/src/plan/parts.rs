@@ -1,7 +1,7 @@
 //! Which parts of bodies take part, and whether their positions are fit for it.
 
 use crate::query::{Query, Scope};
-use crate::scene::elements::{Kind, Part};
+use crate::scene::elements::{BodyKind, Part};
 use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
 use crate::scene::index::{Number, PartIx};
@@ -24,19 +24,20 @@ impl Plan {
                     self.push(scene, id, part, false, Some(Filter::default()))?;
                 }
             }
-            Scope::Within(body) => {
+            Scope::SelfOf(body) => {
                 self.between = false;
                 self.push(scene, body, part, true, None)?;
             }
-            Scope::Across => {
+            Scope::Across { within } => {
                 self.between = true;
                 for (id, _) in scene.bodies() {
-                    let (category, mask) = match query.across.contains(&id) {
+                    let is_named = query.across.contains(&id);
+                    let (category, mask) = match is_named {
                         true => (1, 2),
                         false => (2, 1),
                     };
                     let filter = Filter { category, mask };
-                    self.push(scene, id, part, false, Some(filter))?;
+                    self.push(scene, id, part, within && is_named, Some(filter))?;
                 }
             }
             Scope::All { between, within } => {
@@ -100,9 +101,9 @@ impl Plan {
             first: Number::new(first as u32),
             n_primitives: n as u32,
             kind: elements.kind(),
-            is_bare: body.kind() < Kind::Triangles,
-            is_points: body.kind() == Kind::Points,
-            within: within && !self.ignored.contains(&(id, id)),
+            is_bare: body.kind() < BodyKind::Triangles,
+            is_points: body.kind() == BodyKind::Points,
+            within: within && !self.excluded.contains(&(id, id)),
             filter: filter.unwrap_or(body.filter()),
             thickness: 0.0,
             rounded: 0.0,

@@ -17,6 +17,7 @@ use super::axes::{Axes, View};
 use super::features::{Gap, gap};
 use super::scale::Scale;
 use super::shared::shared_point;
+use crate::answers::pairs::Element;
 use crate::boxes::Extent;
 
 use super::many::{Allowance, Bodies, are_apart, meet};
@@ -25,14 +26,14 @@ use crate::bvh::bounds::round_up;
 use crate::clusterings::{BodyPart, Clusterings};
 use crate::plan::Plan;
 use crate::query::progress::Control;
-use crate::scene::elements::{Kind, Part};
+use crate::scene::elements::{BodyKind, Part};
 use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
 use crate::scene::index::{ElementIx, PartIx};
 use crate::scene::positions::{Positions, check_positions};
 use crate::scene::{Body, Scene};
 use crate::search::narrow::intersect;
-use crate::search::stats::Statistics;
+use crate::search::stats::Stats;
 use crate::workers::Workers;
 use impinge_exact::Point;
 use impinge_exact::internal::filter::Directions64;
@@ -43,7 +44,7 @@ use impinge_exact::internal::filter::number::Portable32;
 pub(crate) struct Distances {
     clusterings: Clusterings,
     /// What was clustered.
-    stats: Statistics,
+    stats: Stats,
     /// By the number of the body.
     trees: HashMap<usize, Tree>,
     /// The pair found last, by the numbers of the bodies.
@@ -55,7 +56,7 @@ pub(crate) struct Distances {
     stack: Vec<[Node; 2]>,
 }
 
-/// The nearest pair of primitives of two bodies.
+/// The nearest pair of elements of two bodies.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct Nearest {
@@ -63,14 +64,41 @@ pub struct Nearest {
     /// Otherwise rounded: it is computed in `f64` from two points of the primitives, with an error of a few units
     /// in the last place of the largest coordinate.
     pub distance: f64,
-    /// The bodies: those that were asked for, in this order, or the nearest two of many, the lower one first.
-    pub bodies: [BodyId; 2],
-    /// The primitive of the first body, and of the second. Of several pairs at the same computed distance, the
-    /// lowest by the first body's primitive and then by the second's.
-    pub primitives: [u32; 2],
-    /// The point of each primitive that is nearest to the other, rounded. Where they touch, a point that they share, twice: see
+    /// The element of the first body: of the first that was asked for, or of the lower of the nearest two of many.
+    pub a: Element,
+    /// The element of the second body. Of several pairs at the same computed distance, the lowest by `a` and then by `b`.
+    pub b: Element,
+    /// The point of each element that is nearest to the other, rounded. Where they touch, a point that they share, twice: see
     /// [`contact`](crate::contact) for all of them.
     pub points: [[f64; 3]; 2],
+}
+
+impl Nearest {
+    fn new(
+        distance: f64,
+        bodies: [BodyId; 2],
+        elements: [ElementIx; 2],
+        points: [Point; 2],
+    ) -> Self {
+        let [a, b] = [0, 1].map(|side| Element {
+            body: bodies[side],
+            element: elements[side].raw(),
+        });
+        Nearest {
+            distance,
+            a,
+            b,
+            points,
+        }
+    }
+
+    fn bodies(&self) -> [BodyId; 2] {
+        [self.a.body, self.b.body]
+    }
+
+    fn elements(&self) -> [ElementIx; 2] {
+        [self.a, self.b].map(|at| ElementIx::new(at.element))
+    }
 }
 
 impl Distances {
@@ -78,7 +106,7 @@ impl Distances {
     pub fn new(clusterings: Clusterings) -> Self {
         Distances {
             clusterings,
-            stats: Statistics::default(),
+            stats: Stats::default(),
             trees: HashMap::new(),
             last: HashMap::new(),
             many: Bodies::default(),
@@ -106,7 +134,7 @@ impl Distances {
         scene: &Scene,
         [a, b]: [BodyId; 2],
         workers: &Workers,
-        control: &Control<'_>,
+        control: &Control,
         touching: impl FnOnce() -> Result<Option<[u32; 2]>, Error>,
     ) -> Result<Option<Nearest>, Error> {
         if a == b {
@@ -139,7 +167,7 @@ impl Distances {
         scene: &Scene,
         ids: [BodyId; 2],
         most: (Scale, f64),
-        control: &Control<'_>,
+        control: &Control,
         touching: impl FnOnce() -> Result<Option<[u32; 2]>, Error>,
     ) -> Result<Found, Error> {
         if let Some(found) = self.search(scene, ids, most, MOST_OVERLAPPING, control)? {
@@ -152,12 +180,8 @@ impl Distances {
         let bodies = [scene.body(ids[0])?, scene.body(ids[1])?];
         let elements = primitives.map(ElementIx::new);
         self.last.insert(ids.map(BodyId::index), elements);
-        let nearest = Nearest {
-            distance: 0.0,
-            bodies: ids,
-            primitives,
-            points: [where_they_touch(bodies, elements); 2],
-        };
+        let points = [where_they_touch(bodies, elements); 2];
+        let nearest = Nearest::new(0.0, ids, elements, points);
         Ok(Some((0.0, nearest)))
     }
 
@@ -169,7 +193,7 @@ impl Distances {
         ids: [BodyId; 2],
         (scale, most): (Scale, f64),
         most_overlapping: u64,
-        control: &Control<'_>,
+        control: &Control,
     ) -> Result<Option<Found>, Error> {
         let [a, b] = ids;
         let search = DistanceSearch {
@@ -183,7 +207,7 @@ impl Distances {
         let likely = self.last.get(&numbers).copied();
         let found = search.nearest(likely, most, most_overlapping)?;
         if let Some(Some((_, nearest))) = &found {
-            let pair = nearest.primitives.map(ElementIx::new);
+            let pair = nearest.elements();
             self.last.insert(numbers, pair);
         }
         Ok(found)
@@ -199,7 +223,7 @@ impl Distances {
         scene: &Scene,
         plan: &Plan,
         workers: &Workers,
-        control: &Control<'_>,
+        control: &Control,
         mut touching: impl FnMut([BodyId; 2]) -> Result<Option<[u32; 2]>, Error>,
     ) -> Result<Option<Nearest>, Error> {
         self.begin(scene);
@@ -227,7 +251,7 @@ impl Distances {
             let ids = [a, b].map(|part| plan.part(part).id);
             let most = best.map_or(f64::INFINITY, |(squared, _)| squared);
             // Nothing is nearer than 0, and no lower pair of bodies is asked later.
-            if most == 0.0 && best.is_some_and(|(_, best)| best.bodies <= ids) {
+            if most == 0.0 && best.is_some_and(|(_, best)| best.bodies() <= ids) {
                 return Ok(());
             }
             let pair = [a, b];
@@ -244,7 +268,7 @@ impl Distances {
             let found = self.search_or_ask(scene, ids, (scale, most), control, ask)?;
             if let Some(found) = found
                 && best.is_none_or(|(squared, best)| {
-                    found.0 < squared || (found.0 == squared && ids < best.bodies)
+                    found.0 < squared || (found.0 == squared && ids < best.bodies())
                 })
             {
                 *best = Some(found);
@@ -287,7 +311,7 @@ impl Distances {
         self.many = many;
         found?;
         let nearest = best.map(|(_, nearest)| nearest);
-        self.nearest = nearest.map(|nearest| nearest.bodies);
+        self.nearest = nearest.map(|nearest| nearest.bodies());
         Ok(nearest)
     }
 
@@ -300,7 +324,7 @@ impl Distances {
         scene: &Scene,
         plan: &Plan,
         workers: &Workers,
-        control: &Control<'_>,
+        control: &Control,
     ) -> Result<Option<bool>, Error> {
         self.begin(scene);
         let mut many = std::mem::take(&mut self.many);
@@ -327,7 +351,7 @@ impl Distances {
     }
 
     /// Says what the last question clustered, and the bytes of the trees.
-    pub fn report(&self, stats: &mut Statistics) {
+    pub fn report(&self, stats: &mut Stats) {
         (stats.n_clustered, stats.n_reclustered) =
             (self.stats.n_clustered, self.stats.n_reclustered);
         let beside: usize = self.trees.values().map(Tree::bytes).sum();
@@ -398,7 +422,7 @@ struct ComparedPrimitive {
 }
 
 struct DistanceSearch<'a> {
-    control: &'a Control<'a>,
+    control: &'a Control,
     ids: [BodyId; 2],
     bodies: [&'a Body; 2],
     trees: [&'a Tree; 2],
@@ -540,15 +564,12 @@ impl DistanceSearch<'_> {
         if best.primitives == [NONE; 2] {
             return Ok(Some(None));
         }
-        let nearest = Nearest {
-            distance: self.scale.length_back(best.squared.sqrt()),
-            bodies: self.ids,
-            primitives: best.primitives.map(ElementIx::raw),
-            points: match best.points {
-                Some(points) => points.map(|point| self.scale.point_back(point)),
-                None => [where_they_touch(self.bodies, best.primitives); 2],
-            },
+        let distance = self.scale.length_back(best.squared.sqrt());
+        let points = match best.points {
+            Some(points) => points.map(|point| self.scale.point_back(point)),
+            None => [where_they_touch(self.bodies, best.primitives); 2],
         };
+        let nearest = Nearest::new(distance, self.ids, best.primitives, points);
         Ok(Some(Some((best.squared, nearest))))
     }
 
@@ -687,7 +708,7 @@ impl DistanceSearch<'_> {
         let are_triangles = self
             .bodies
             .iter()
-            .all(|body| body.kind() == Kind::Triangles);
+            .all(|body| body.kind() == BodyKind::Triangles);
         if !are_triangles || lists[0].len() * lists[1].len() < DIRECTIONS_FROM {
             return false;
         }
@@ -759,7 +780,7 @@ impl DistanceSearch<'_> {
 /// The two nearest bodies, if they touch.
 fn touching_ones(best: Option<(f64, Nearest)>) -> Option<[BodyId; 2]> {
     let touches = best.filter(|(squared, _)| *squared == 0.0);
-    touches.map(|(_, nearest)| nearest.bodies)
+    touches.map(|(_, nearest)| nearest.bodies())
 }
 
 /// A point that two elements share.

@@ -3,12 +3,12 @@
 use impinge_exact::Point;
 use impinge_exact::internal::closest_of_elements;
 
-use crate::scene::elements::Kind;
+use crate::scene::elements::BodyKind;
 use crate::search::narrow::intersect;
 
 /// A point that two elements share which intersect, rounded: where their borders or surfaces meet; else, as one is inside
 /// the other, a corner of the inner one.
-pub(super) fn shared_point(kinds: [Kind; 2], corners: [&[Point; 4]; 2]) -> Point {
+pub(super) fn shared_point(kinds: [BodyKind; 2], corners: [&[Point; 4]; 2]) -> Point {
     let [of_a, of_b] = [0, 1].map(|side| surface(kinds[side], corners[side]));
     for (a, n_a) in &of_a {
         for (b, n_b) in &of_b {
@@ -20,16 +20,16 @@ pub(super) fn shared_point(kinds: [Kind; 2], corners: [&[Point; 4]; 2]) -> Point
     }
     let [a, b] = corners;
     let first_of_b = [b[0]; 4];
-    match intersect(kinds[0], a, Kind::Points, &first_of_b) {
+    match intersect(kinds[0], a, BodyKind::Points, &first_of_b) {
         true => b[0],
         false => a[0],
     }
 }
 
 /// The faces of a tetrahedron; any other element itself. Each with how many corners it has.
-fn surface(kind: Kind, &[p, q, r, s]: &[Point; 4]) -> Vec<([Point; 3], usize)> {
+fn surface(kind: BodyKind, &[p, q, r, s]: &[Point; 4]) -> Vec<([Point; 3], usize)> {
     match kind {
-        Kind::Tetrahedra => [[p, q, r], [p, q, s], [p, r, s], [q, r, s]]
+        BodyKind::Tetrahedra => [[p, q, r], [p, q, s], [p, r, s], [q, r, s]]
             .map(|face| (face, 3))
             .to_vec(),
         kind => vec![([p, q, r], kind.n_corners())],

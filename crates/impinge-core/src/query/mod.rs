@@ -1,7 +1,6 @@
 //! What is asked: queries, settings, cancellation and progress, and what can go wrong.
 
 pub mod goal;
-pub(crate) mod near;
 pub(crate) mod pair_kind;
 pub(crate) mod progress;
 mod scope;

@@ -1,6 +1,7 @@
 //! Kinds of pairs of elements.
 
 use crate::scene::elements::Part;
+use crate::scene::words::words;
 
 /// The kinds of a pair's elements. A pair's `a` is the element that the kind names first. So a vertex and a face are always
 /// in this order, whatever their bodies.
@@ -20,29 +21,11 @@ pub enum PairKind {
     FaceFace,
 }
 
+words!("kinds", "vf, ee, ev, vv, ef or ff", PairKind: [
+    VertexFace = "vf", EdgeEdge = "ee", EdgeVertex = "ev", VertexVertex = "vv", EdgeFace = "ef", FaceFace = "ff"; 6
+]);
+
 impl PairKind {
-    /// All kinds, in their order.
-    pub const ALL: [PairKind; 6] = [
-        PairKind::VertexFace,
-        PairKind::EdgeEdge,
-        PairKind::EdgeVertex,
-        PairKind::VertexVertex,
-        PairKind::EdgeFace,
-        PairKind::FaceFace,
-    ];
-
-    /// `"vf"`, `"ee"`, `"ev"`, `"vv"`, `"ef"` or `"ff"`.
-    pub fn name(self) -> &'static str {
-        match self {
-            PairKind::VertexFace => "vf",
-            PairKind::EdgeEdge => "ee",
-            PairKind::EdgeVertex => "ev",
-            PairKind::VertexVertex => "vv",
-            PairKind::EdgeFace => "ef",
-            PairKind::FaceFace => "ff",
-        }
-    }
-
     /// The parts of bodies that the elements belong to, in the order of the name.
     ///
     /// ```

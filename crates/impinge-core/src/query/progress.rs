@@ -35,34 +35,38 @@ pub struct Progress {
     pub total: u64,
 }
 
-/// Controls that a caller may attach to a detection: a token to stop it, a callback to watch it.
-#[derive(Clone, Copy, Default)]
-pub struct Control<'a> {
-    cancel: Option<&'a CancelToken>,
-    progress: Option<&'a (dyn Fn(Progress) + Sync)>,
+/// What a caller holds over a detector's questions: a token to stop them, a callback to watch them.
+/// See [`Detector::set_control`](crate::Detector::set_control).
+#[derive(Clone, Default)]
+#[must_use]
+pub struct Control {
+    cancel: Option<CancelToken>,
+    progress: Option<Arc<Callback>>,
 }
 
-impl<'a> Control<'a> {
-    /// No controls: the detection runs to its end without callbacks.
+type Callback = dyn Fn(Progress) + Send + Sync;
+
+impl Control {
+    /// No controls: questions run to their end without callbacks.
     pub fn new() -> Self {
         Control::default()
     }
 
     /// Stops with [`Error::Cancelled`] soon after the token is cancelled.
-    pub fn cancel(mut self, token: &'a CancelToken) -> Self {
-        self.cancel = Some(token);
+    pub fn cancel(mut self, token: &CancelToken) -> Self {
+        self.cancel = Some(token.clone());
         self
     }
 
-    /// Calls `callback` from time to time, from any of the threads used.
-    pub fn progress(mut self, callback: &'a (dyn Fn(Progress) + Sync)) -> Self {
-        self.progress = Some(callback);
+    /// Calls `each` from time to time, from any of the threads used.
+    pub fn progress(mut self, each: impl Fn(Progress) + Send + Sync + 'static) -> Self {
+        self.progress = Some(Arc::new(each));
         self
     }
 
     /// The token, if there is one.
     pub(crate) fn token(&self) -> Option<&CancelToken> {
-        self.cancel
+        self.cancel.as_ref()
     }
 
     /// Called by the stages between pieces of work.
@@ -71,12 +75,21 @@ impl<'a> Control<'a> {
     /// Cancellation.
     #[doc(hidden)]
     pub fn step(&self, done: u64, total: u64) -> Result<(), Error> {
-        if self.cancel.is_some_and(CancelToken::is_cancelled) {
+        if self.cancel.as_ref().is_some_and(CancelToken::is_cancelled) {
             return Err(Error::Cancelled);
         }
-        if let Some(callback) = self.progress {
+        if let Some(callback) = &self.progress {
             callback(Progress { done, total });
         }
         Ok(())
+    }
+}
+
+impl std::fmt::Debug for Control {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let mut short = f.debug_struct("Control");
+        short.field("cancel", &self.cancel);
+        short.field("progress", &self.progress.is_some());
+        short.finish()
     }
 }

@@ -1,8 +1,13 @@
-//! Queries: which bodies, and what a shared vertex means.
+//! The query: which pairs are asked for, and how.
 
 use std::collections::BTreeSet;
 
+use crate::query::pair_kind::{PairKind, PairKinds};
+use crate::query::step::{Clearance, PairFilter, Precision, Start, check_distance};
+use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
+use crate::scene::words::words;
+use impinge_exact::internal::Keep;
 
 /// How pairs of one body that share vertices are treated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -18,12 +23,16 @@ pub enum SharedVertex {
     Resolve,
 }
 
+words!("shared_vertex", "resolve or skip", SharedVertex: [Resolve = "resolve", Skip = "skip"; 2]);
+
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Scope {
     Between(BodyId, BodyId),
-    Within(BodyId),
-    /// Pairs of one of [`Query::across`] and another body.
-    Across,
+    SelfOf(BodyId),
+    /// Pairs of one of [`Query::across`] and another body; with `within`, self-collision of these too.
+    Across {
+        within: bool,
+    },
     /// All bodies: pairs of different bodies, pairs within one, or both.
     All {
         between: bool,
@@ -44,21 +53,57 @@ impl Cell {
     }
 }
 
-/// The question put to a scene.
+/// What is left out of a query: see [`Query::exclude`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Exclusion {
+    bodies: (BodyId, BodyId),
+}
+
+impl From<(BodyId, BodyId)> for Exclusion {
+    /// The pairs of two bodies; with the same body twice, its self-collision.
+    fn from((a, b): (BodyId, BodyId)) -> Self {
+        Exclusion {
+            bodies: (a.min(b), a.max(b)),
+        }
+    }
+}
+
+/// What is asked of a scene: which pairs, and how. One value for every question of a [`Detector`](crate::Detector).
+///
+/// Options that say *which* pairs ([`kinds`](Query::kinds), [`exclude`](Query::exclude), [`shared_vertex`](Query::shared_vertex),
+/// [`owned_by`](Query::owned_by), and the constructors) are refused by a question that cannot honour them. Options that say *how*
+/// are ignored by a question that has no use for them, so that a solver keeps one query for all.
 ///
 /// ```
-/// use impinge::{Query, SharedVertex};
-/// let query = Query::everything().shared_vertex(SharedVertex::Skip);
-/// assert_ne!(query, Query::everything());
+/// use impinge::{Precision, Query, SharedVertex, Start};
+/// let query = Query::all().start(Start::Skip).precision(Precision::F64);
+/// assert_ne!(query, Query::all());
+/// assert_eq!(Query::default(), Query::all());
 /// ```
 #[derive(Debug, Clone, PartialEq)]
+#[must_use]
 pub struct Query {
     pub(crate) scope: Scope,
     pub(crate) shared_vertex: SharedVertex,
-    pub(crate) ignored: BTreeSet<(BodyId, BodyId)>,
+    pub(crate) excluded: BTreeSet<(BodyId, BodyId)>,
     pub(crate) cell: Option<Cell>,
     /// Only of [`Scope::Across`].
     pub(crate) across: BTreeSet<BodyId>,
+    pub(crate) kinds: Option<PairKinds>,
+    pub(crate) start: Start,
+    pub(crate) precision: Precision,
+    pub(crate) separation: f64,
+    pub(crate) clearance: Clearance,
+    pub(crate) filter: Option<PairFilter>,
+    pub(crate) distances: bool,
+    pub(crate) closest: bool,
+}
+
+impl Default for Query {
+    /// [`Query::all`].
+    fn default() -> Self {
+        Query::all()
+    }
 }
 
 impl Query {
@@ -66,9 +111,17 @@ impl Query {
         Query {
             scope,
             shared_vertex: SharedVertex::default(),
-            ignored: BTreeSet::new(),
+            excluded: BTreeSet::new(),
             cell: None,
             across: BTreeSet::new(),
+            kinds: None,
+            start: Start::default(),
+            precision: Precision::default(),
+            separation: 0.0,
+            clearance: Clearance::new(0.0),
+            filter: None,
+            distances: false,
+            closest: false,
         }
     }
 
@@ -78,7 +131,7 @@ impl Query {
     }
 
     /// Pairs of different bodies, for all bodies whose [`Filter`](crate::Filter)s let them meet.
-    pub fn all() -> Self {
+    pub fn between_all() -> Self {
         Query::new(Scope::All {
             between: true,
             within: false,
@@ -86,12 +139,12 @@ impl Query {
     }
 
     /// Self-collision of one body.
-    pub fn within(body: BodyId) -> Self {
-        Query::new(Scope::Within(body))
+    pub fn self_of(body: BodyId) -> Self {
+        Query::new(Scope::SelfOf(body))
     }
 
     /// Self-collision of every body.
-    pub fn all_within() -> Self {
+    pub fn self_all() -> Self {
         Query::new(Scope::All {
             between: false,
             within: true,
@@ -99,11 +152,19 @@ impl Query {
     }
 
     /// Pairs of different bodies and of one body, all together.
-    pub fn everything() -> Self {
+    pub fn all() -> Self {
         Query::new(Scope::All {
             between: true,
             within: true,
         })
+    }
+
+    /// All pairs of one body: with every other body, and its self-collision. They meet whatever their filters say.
+    pub fn of(body: BodyId) -> Self {
+        Query {
+            across: [body].into(),
+            ..Query::new(Scope::Across { within: true })
+        }
     }
 
     /// Pairs of one of some bodies and one that is not among them. As those of [`between`](Query::between), they meet whatever
@@ -111,7 +172,7 @@ impl Query {
     pub fn across(bodies: impl IntoIterator<Item = BodyId>) -> Self {
         Query {
             across: bodies.into_iter().collect(),
-            ..Query::new(Scope::Across)
+            ..Query::new(Scope::Across { within: false })
         }
     }
 
@@ -122,9 +183,23 @@ impl Query {
         self
     }
 
-    /// Leaves out the pairs of these two bodies; with `a == b`, the self-collision of `a`.
-    pub fn ignore(mut self, a: BodyId, b: BodyId) -> Self {
-        self.ignored.insert((a.min(b), a.max(b)));
+    /// Leaves pairs out: `(a, b)`, those of two bodies; `(a, a)`, the self-collision of one.
+    pub fn exclude(mut self, what: impl Into<Exclusion>) -> Self {
+        self.excluded.insert(what.into().bodies);
+        self
+    }
+
+    /// Which kinds of pairs of vertices, edges and faces. If this is not said: vertices and faces, edges and edges; where bodies
+    /// are made of edges or points alone also edges and vertices, vertices and vertices;
+    /// of [`near`](crate::Detector::near) also edges that meet faces. Any two elements that are near have such a pair among their
+    /// parts, so bodies are at least the distance apart if there are none, and neighbours that fold onto each other have one
+    /// too. Only faces with the same three vertices, and a body inside tetrahedra, have none:
+    /// [`Detector::any`](crate::Detector::any) finds these.
+    ///
+    /// [`detect`](crate::Detector::detect), [`count`](crate::Detector::count) and [`any`](crate::Detector::any) are about the elements that
+    /// bodies were given as, and refuse kinds. Questions about a step refuse edges with faces, and faces with faces.
+    pub fn kinds(mut self, kinds: impl IntoIterator<Item = PairKind>) -> Self {
+        self.kinds = Some(kinds.into_iter().collect());
         self
     }
 
@@ -135,8 +210,8 @@ impl Query {
     ///
     /// For a step, boxes hold their elements from the start to the end. If pairs at a distance count as well, a process
     /// needs all elements whose boxes touch its cell when they are inflated, on all sides, by that distance: the
-    /// separation of a step, the distance of a [`NearQuery`](crate::NearQuery) with both bodies' thickness, twice the distance of a
-    /// [`CandidateQuery`](crate::CandidateQuery).
+    /// separation of a step, the distance of [`near`](crate::Detector::near) with both bodies' thickness, twice the inflation of
+    /// [`candidates`](crate::Detector::candidates).
     ///
     /// All intersections of the query are found and held first: [`Settings::max_pairs`](crate::Settings::max_pairs) and the memory
     /// budget count them, also those of [`Detector::count`](crate::Detector::count); [`Detector::any`](crate::Detector::any) does not
@@ -146,10 +221,118 @@ impl Query {
     ///
     /// ```
     /// use impinge::Query;
-    /// let left = Query::everything().owned_by([f64::NEG_INFINITY; 3], [0.0, f64::INFINITY, f64::INFINITY]);
+    /// let left = Query::all().owned_by([f64::NEG_INFINITY; 3], [0.0, f64::INFINITY, f64::INFINITY]);
     /// ```
     pub fn owned_by(mut self, low: [f64; 3], high: [f64; 3]) -> Self {
         self.cell = Some(Cell { low, high });
         self
+    }
+
+    /// Sets what happens to pairs that touch at the start.
+    pub fn start(mut self, start: Start) -> Self {
+        self.start = start;
+        self
+    }
+
+    /// Sets the precision to which times are rounded down.
+    pub fn precision(mut self, precision: Precision) -> Self {
+        self.precision = precision;
+        self
+    }
+
+    /// Sets the distance that elements must keep, in the unit of the scene: finite, 0 or more.
+    ///
+    /// A pair is then reported with the first time at which its distance is at most the separation, decided exactly and
+    /// rounded down, and pairs within the separation at the start count as touching at the start. With 0, which is the
+    /// default, elements must touch.
+    pub fn separation(mut self, separation: f64) -> Self {
+        self.separation = separation;
+        self
+    }
+
+    /// Sets what a step leaves between elements, in the unit of the scene: finite, 0 or more.
+    ///
+    /// A pair whose distance at the start is d keeps `separation + min(clearance, share (d - separation))`, with a
+    /// [share](Clearance::share) of 0.2 by default: it counts as in contact at the first time at which its distance is at most that.
+    /// Such contacts are not at the start; pairs within the separation at the start count as touching there, as they do without a
+    /// clearance. All of this is decided exactly; d - separation is rounded up to 24 bits first.
+    ///
+    /// So a chain of steps comes as near to contact as it likes, but never stops just short of it, where barriers are endless. With
+    /// a clearance of 1e-4 this is what ipc-toolkit's `conservative_rescaling = 0.8` does.
+    ///
+    /// ```
+    /// use impinge::{Clearance, Query};
+    /// let query = Query::all().clearance(1e-4);
+    /// assert_eq!(query, Query::all().clearance(Clearance::new(1e-4).share(0.2)));
+    /// ```
+    pub fn clearance(mut self, clearance: impl Into<Clearance>) -> Self {
+        self.clearance = clearance.into();
+        self
+    }
+
+    /// Leaves out the pairs that a filter refuses. It is asked about pairs that are in contact, or might be as far as floats can tell;
+    /// an [early](PairFilter::early) one sooner.
+    pub fn filter(mut self, filter: PairFilter) -> Self {
+        self.filter = Some(filter);
+        self
+    }
+
+    /// Asks for distances as `f64`, too: [`NearPair::distance`](crate::NearPair::distance), 8 bytes per pair.
+    pub fn distances(mut self) -> Self {
+        self.distances = true;
+        self
+    }
+
+    /// Asks for distances and nearest points as `f64`, too: [`NearPair::closest`](crate::NearPair::closest), 56 bytes per pair.
+    pub fn closest_points(mut self) -> Self {
+        (self.distances, self.closest) = (true, true);
+        self
+    }
+
+    /// What pairs keep.
+    pub(crate) fn keep(&self) -> Keep {
+        Keep {
+            separation: self.separation,
+            clearance: self.clearance.distance,
+            share: self.clearance.share,
+            is_rounded: false,
+        }
+    }
+
+    /// Checks the numbers, and that a question about a step is about kinds of pairs that have a first contact.
+    pub(crate) fn check_step(&self) -> Result<(), Error> {
+        let refused = [PairKind::EdgeFace, PairKind::FaceFace];
+        if let Some(kind) = self
+            .kinds
+            .and_then(|kinds| refused.into_iter().find(|&kind| kinds.contains(kind)))
+        {
+            return Err(Error::Setting {
+                setting: "kinds",
+                given: kind.name().to_owned(),
+                allowed: "of a step: vf, ee, ev, vv",
+            });
+        }
+        check_distance("separation", self.separation)?;
+        check_distance("clearance", self.clearance.distance)?;
+        match (0.0..1.0).contains(&self.clearance.share) {
+            true => Ok(()),
+            false => Err(Error::Setting {
+                setting: "clearance_share",
+                given: self.clearance.share.to_string(),
+                allowed: "a number from 0 to less than 1",
+            }),
+        }
+    }
+
+    /// Refuses kinds of pairs, for questions about the elements that bodies were given as.
+    pub(crate) fn check_without_kinds(&self) -> Result<(), Error> {
+        match self.kinds {
+            None => Ok(()),
+            Some(_) => Err(Error::Setting {
+                setting: "kinds",
+                given: "kinds of pairs of vertices, edges and faces".to_owned(),
+                allowed: "none: this question is about the elements that bodies were given as",
+            }),
+        }
     }
 }

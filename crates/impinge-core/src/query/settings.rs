@@ -3,15 +3,16 @@
 use crate::query::goal::Limits;
 use crate::query::tuning::Tuning;
 use crate::scene::error::Error;
+use crate::scene::words::words;
 
 /// How candidates are found. All methods give the same pairs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Method {
     /// `Cells` for a frame whose bodies are mostly new to the detector, if that is cheaper, and `Clusters` as soon as
-    /// they come back: their second frame makes the clusters. [`Statistics::method`](crate::Statistics::method) says which one answered. With a memory
+    /// they come back: their second frame makes the clusters. [`Stats::method`](crate::Stats::method) says which one answered. With a memory
     /// budget, and for steps and distances always `Clusters`.
     ///
-    /// With `Backend::Auto`, a detector on a GPU answers such a first frame on the CPU, and [`Statistics::backend`](crate::Statistics::backend) says so: all methods of a device
+    /// With `Backend::Auto`, a detector on a GPU answers such a first frame on the CPU, and [`Stats::backend`](crate::Stats::backend) says so: all methods of a device
     /// work on clusters, and making them takes the CPU longer than the whole frame in its grid.
     #[default]
     Auto,
@@ -25,19 +26,6 @@ pub enum Method {
 }
 
 impl Method {
-    /// Every method, the default first.
-    pub const ALL: [Method; 4] = [Method::Auto, Method::Clusters, Method::Cells, Method::Naive];
-
-    /// `"auto"`, `"clusters"`, `"cells"` or `"naive"`.
-    pub fn name(self) -> &'static str {
-        match self {
-            Method::Auto => "auto",
-            Method::Clusters => "clusters",
-            Method::Cells => "cells",
-            Method::Naive => "naive",
-        }
-    }
-
     /// The method that `Auto` uses for bodies that it has met before. Other methods are returned unchanged.
     pub fn in_the_long_run(self) -> Method {
         match self {
@@ -46,6 +34,8 @@ impl Method {
         }
     }
 }
+
+words!("method", "auto, clusters, cells or naive", Method: [Auto = "auto", Clusters = "clusters", Cells = "cells", Naive = "naive"; 4]);
 
 /// Where the work is done.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -60,6 +50,8 @@ pub enum Backend {
     Gpu,
 }
 
+words!("backend", "auto, cpu or gpu", Backend: [Auto = "auto", Cpu = "cpu", Gpu = "gpu"; 3]);
+
 /// Whether a body is clustered again after it has flowed far from the pose in which it was clustered.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Recluster {
@@ -70,6 +62,8 @@ pub enum Recluster {
     /// Never: no frame pays for clustering again, but boxes may grow and frames get slower.
     Never,
 }
+
+words!("recluster", "auto or never", Recluster: [Auto = "auto", Never = "never"; 2]);
 
 /// The widest vector instructions that the CPU backend may use, if the processor has them.
 /// The pairs do not depend on it.
@@ -85,23 +79,27 @@ pub enum InstructionSet {
     Avx512,
 }
 
+words!("instruction_set", "portable, avx2 or avx512", InstructionSet: [Portable = "portable", Avx2 = "avx2", Avx512 = "avx512"; 3]);
+
 /// Which cores the helper threads of the CPU backend may run on. The answer does not depend on it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-pub enum Placement {
+pub enum Affinity {
     /// On Linux, with up to 8 threads: every core that the helper was started with, except the one on which the calling
     /// thread is running. Otherwise as `Inherited`.
     ///
     /// The system often wakes a helper on the caller's core, where it runs only after the caller is done. A frame then takes
     /// as long as with fewer threads.
-    #[default]
     Auto,
     /// Those that the system chooses: no thread's affinity is ever set. A helper starts with the affinity of the
     /// thread that asked the first question.
     ///
     /// For programs that place threads themselves: ranks of MPI, real-time threads, containers whose cores are changed while
     /// they run, `taskset` on a running process. `Auto` would overwrite what they set for a helper.
+    #[default]
     Inherited,
 }
+
+words!("affinity", "auto or inherited", Affinity: [Auto = "auto", Inherited = "inherited"; 2]);
 
 /// The settings of a detector.
 #[derive(Debug, Clone)]
@@ -113,12 +111,13 @@ pub struct Settings {
     /// CPU threads; 0 means one per core.
     pub threads: usize,
     /// Which cores the helper threads may run on.
-    pub placement: Placement,
+    pub affinity: Affinity,
     /// The widest vector instructions that the CPU backend may use.
     pub instruction_set: InstructionSet,
     /// `Cells`: the density coefficient λ of the paper's equation (1), above 0.
-    pub lambda: f64,
-    /// `Cells`: the most primitives a group may hold, 1 to 64.
+    pub density: f64,
+    /// `Cells`: the most elements a group may hold, 1 to 64.
+    #[doc(hidden)]
     pub group_size: u32,
     /// Bytes the detector may hold, the answer included; `None` for as many as it takes. While an answer is found that
     /// is larger than the one before, it takes up to twice its size. On a GPU: bytes of buffers on the device, and as
@@ -142,9 +141,9 @@ impl Default for Settings {
             method: Method::default(),
             backend: Backend::default(),
             threads: 0,
-            placement: Placement::default(),
+            affinity: Affinity::default(),
             instruction_set: InstructionSet::default(),
-            lambda: 1.0,
+            density: 1.0,
             group_size: 64,
             memory_budget: None,
             max_pairs: None,
@@ -174,8 +173,8 @@ impl Settings {
                 allowed,
             })
         };
-        if !(self.lambda.is_finite() && self.lambda > 0.0) {
-            return refuse("lambda", self.lambda.to_string(), "a number above 0");
+        if !(self.density.is_finite() && self.density > 0.0) {
+            return refuse("density", self.density.to_string(), "a number above 0");
         }
         if !(1..=64).contains(&self.group_size) {
             return refuse("group size", self.group_size.to_string(), "1 to 64");
@@ -195,5 +194,15 @@ impl Settings {
             return refuse("threads", self.threads.to_string(), "0 to 1024");
         }
         Ok(())
+    }
+}
+
+impl From<Backend> for Settings {
+    /// A backend, and everything else by default.
+    fn from(backend: Backend) -> Self {
+        Settings {
+            backend,
+            ..Settings::default()
+        }
     }
 }

@@ -1,13 +1,14 @@
-//! Questions about a step, in which bodies move on straight lines from their positions to their end positions.
+//! What a question about a step needs besides: what counts at the start, how exact times are, what a step leaves, which pairs
+//! may collide.
 
 use std::fmt;
 use std::sync::Arc;
 
-use crate::query::Query;
-use crate::query::pair_kind::{PairKind, PairKinds};
+#[cfg(doc)]
+use crate::query::pair_kind::PairKind;
 use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
-use impinge_exact::internal::Keep;
+use crate::scene::words::words;
 
 /// What happens to pairs that touch at the start of a step, and whether the start is asked for intersections.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -26,9 +27,11 @@ pub enum Start {
     Verify,
 }
 
+words!("start", "report, skip or verify", Start: [Report = "report", Skip = "skip", Verify = "verify"; 3]);
+
 /// The precision to which times are rounded down.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-pub enum Toi {
+pub enum Precision {
     /// The largest `f32` that is not above the first time.
     #[default]
     F32,
@@ -36,118 +39,14 @@ pub enum Toi {
     F64,
 }
 
-impl Toi {
+words!("precision", "f32 or f64", Precision: [F32 = "f32", F64 = "f64"; 2]);
+
+impl Precision {
     /// The time of a contact in this precision, as an `f64`.
     pub(crate) fn round(self, contact: &impinge_exact::Contact) -> f64 {
         match self {
-            Toi::F32 => f64::from(contact.time_f32()),
-            Toi::F64 => contact.time,
-        }
-    }
-}
-
-/// The question about a step: which bodies, and what is reported.
-///
-/// Pairs of one body that share a vertex are never reported, whatever the query's adjacency rule.
-///
-/// ```
-/// use impinge::{Query, Start, Step, Toi};
-/// let step = Step::new(Query::everything()).start(Start::Skip).toi(Toi::F64);
-/// assert_eq!(Step::default(), Step::new(Query::everything()));
-/// # let _ = step;
-/// ```
-#[derive(Debug, Clone, PartialEq)]
-pub struct Step {
-    pub(crate) query: Query,
-    pub(crate) start: Start,
-    pub(crate) toi: Toi,
-    pub(crate) separation: f64,
-    pub(crate) clearance: Clearance,
-    pub(crate) filter: Option<PairFilter>,
-}
-
-impl Step {
-    /// A step of the bodies of a query.
-    pub fn new(query: Query) -> Self {
-        Step {
-            query,
-            start: Start::default(),
-            toi: Toi::default(),
-            separation: 0.0,
-            clearance: Clearance::new(0.0),
-            filter: None,
-        }
-    }
-
-    /// Sets what happens to pairs that touch at the start.
-    pub fn start(mut self, start: Start) -> Self {
-        self.start = start;
-        self
-    }
-
-    /// Sets the precision to which times are rounded down.
-    pub fn toi(mut self, toi: Toi) -> Self {
-        self.toi = toi;
-        self
-    }
-
-    /// Sets the distance that elements must keep, in the unit of the scene: finite, 0 or more.
-    ///
-    /// A pair is then reported with the first time at which its distance is at most the separation, decided exactly and
-    /// rounded down, and pairs within the separation at the start count as touching at the start. With 0, which is the
-    /// default, elements must touch.
-    pub fn separation(mut self, separation: f64) -> Self {
-        self.separation = separation;
-        self
-    }
-
-    /// Sets what a step leaves between elements, in the unit of the scene: finite, 0 or more.
-    ///
-    /// A pair whose distance at the start is d keeps `separation + min(clearance, share (d - separation))`, with a
-    /// [share](Clearance::share) of 0.2 by default: it counts as in contact at the first time at which its distance is at most that.
-    /// Such contacts are not at the start; pairs within the separation at the start count as touching there, as they do without a
-    /// clearance. All of this is decided exactly; d - separation is rounded up to 24 bits first.
-    ///
-    /// So a chain of steps comes as near to contact as it likes, but never stops just short of it, where barriers are endless. With
-    /// a clearance of 1e-4 this is what ipc-toolkit's `conservative_rescaling = 0.8` does.
-    ///
-    /// ```
-    /// use impinge::{Clearance, Step};
-    /// let step = Step::default().clearance(1e-4);
-    /// assert_eq!(step, Step::default().clearance(Clearance::new(1e-4).share(0.2)));
-    /// ```
-    pub fn clearance(mut self, clearance: impl Into<Clearance>) -> Self {
-        self.clearance = clearance.into();
-        self
-    }
-
-    /// Leaves out the pairs that a filter refuses. It is asked about pairs that are in contact, or might be as far as floats can tell;
-    /// an [early](PairFilter::early) one sooner.
-    pub fn filter(mut self, filter: PairFilter) -> Self {
-        self.filter = Some(filter);
-        self
-    }
-
-    /// What pairs keep.
-    pub(crate) fn keep(&self) -> Keep {
-        Keep {
-            separation: self.separation,
-            clearance: self.clearance.distance,
-            share: self.clearance.share,
-            is_rounded: false,
-        }
-    }
-
-    pub(crate) fn check(&self) -> Result<(), Error> {
-        check_distance("separation", self.separation)?;
-        check_distance("clearance", self.clearance.distance)?;
-        match (0.0..1.0).contains(&self.clearance.share) {
-            true => Ok(()),
-            false => Err(Error::Setting {
-                setting: "clearance_share",
-                given: self.clearance.share.to_string(),
-                allowed: "a number from 0 to less than 1",
-            }),
+            Precision::F32 => f64::from(contact.time_f32()),
+            Precision::F64 => contact.time,
         }
     }
 }
@@ -229,60 +128,6 @@ impl fmt::Debug for PairFilter {
 impl PartialEq for PairFilter {
     fn eq(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.passes, &other.passes)
-    }
-}
-
-impl Default for Step {
-    /// Pairs of different bodies and of one body, all together.
-    fn default() -> Self {
-        Step::new(Query::everything())
-    }
-}
-
-impl From<Query> for Step {
-    fn from(query: Query) -> Self {
-        Step::new(query)
-    }
-}
-
-/// The question which pairs of elements are candidates for a test of the caller's own.
-///
-/// Two elements are candidates when their boxes over the whole step, each inflated by `distance` on all sides, overlap
-/// (closed): no axis has a gap of more than twice the distance. This is decided exactly. Pairs of one body that share a
-/// vertex are never candidates.
-#[derive(Debug, Clone, PartialEq)]
-pub struct CandidateQuery {
-    pub(crate) query: Query,
-    pub(crate) kinds: PairKinds,
-    pub(crate) distance: f64,
-}
-
-impl CandidateQuery {
-    /// Candidates of the bodies of a query: vertices with faces and edges with edges, at distance 0.
-    pub fn new(query: Query) -> Self {
-        CandidateQuery {
-            query,
-            kinds: [PairKind::VertexFace, PairKind::EdgeEdge]
-                .into_iter()
-                .collect(),
-            distance: 0.0,
-        }
-    }
-
-    /// Sets the kinds of pairs.
-    pub fn kinds(mut self, kinds: impl IntoIterator<Item = PairKind>) -> Self {
-        self.kinds = kinds.into_iter().collect();
-        self
-    }
-
-    /// Sets by how much boxes are inflated on all sides: 0 or more.
-    pub fn distance(mut self, distance: f64) -> Self {
-        self.distance = distance;
-        self
-    }
-
-    pub(crate) fn check(&self) -> Result<(), Error> {
-        check_distance("distance", self.distance)
     }
 }
 

@@ -3,18 +3,19 @@
 use std::sync::Arc;
 
 use crate::scene::elements::with_corners;
-pub(crate) use crate::scene::elements::{Elements, Kind};
+pub(crate) use crate::scene::elements::{BodyKind, Elements};
 use crate::scene::elements::{Part, Topology};
 use crate::scene::error::Error;
 pub(crate) use crate::scene::ids::BodyId;
 use crate::scene::ids::new_stamp;
 use crate::scene::index::ElementIx;
+use crate::scene::mesh::Mesh;
 use crate::scene::position_rows::PositionRows;
-use crate::scene::positions::Real;
+use crate::scene::positions::{Given, NewPositions, Real};
 pub(crate) use crate::scene::positions::{Positions, check_positions};
 use crate::scene::transform::{Affine, RestPose};
 
-/// Which bodies meet in [`Query::all`](crate::Query::all): two bodies meet when the `category` of
+/// Which bodies meet in [`Query::between_all`](crate::Query::between_all): two bodies meet when the `category` of
 /// each shares a bit with the `mask` of the other. By default all bodies meet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Filter {
@@ -53,6 +54,7 @@ pub struct Body {
     /// How the body was moved by a transform, if it was.
     motion: Option<Box<RestPose>>,
     filter: Filter,
+    thickness: f64,
     topology_stamp: u64,
     positions_stamp: u64,
     step_stamp: u64,
@@ -70,6 +72,17 @@ impl Body {
     /// topology. Their numbers depend on the given elements alone.
     pub fn part(&self, part: Part) -> &Elements {
         self.topology.part(part)
+    }
+
+    /// The edges, `(n, 2)`: of tetrahedra those of their surface. They are found once per topology; their numbers, which pairs of
+    /// edges have, depend on the elements alone.
+    pub fn edges(&self) -> &Elements {
+        self.topology.part(Part::Edges)
+    }
+
+    /// The faces, `(n, 3)`: of tetrahedra those of their surface.
+    pub fn faces(&self) -> &Elements {
+        self.topology.part(Part::Faces)
     }
 
     /// One name for equal parts.
@@ -112,7 +125,7 @@ impl Body {
     }
 
     /// Points, edges, triangles or tetrahedra.
-    pub fn kind(&self) -> Kind {
+    pub fn kind(&self) -> BodyKind {
         self.elements().kind()
     }
 
@@ -129,6 +142,11 @@ impl Body {
     /// Which bodies it meets.
     pub fn filter(&self) -> Filter {
         self.filter
+    }
+
+    /// How thick the body is, in the unit of the scene: see [`Scene::set_thickness`].
+    pub fn thickness(&self) -> f64 {
+        self.thickness
     }
 
     /// Changes when the body is re-meshed; equal stamps mean equal topology.
@@ -159,6 +177,16 @@ impl Body {
                 given,
                 expected,
             }),
+        }
+    }
+
+    /// Refuses new positions of another number, and the first that is not finite.
+    fn check(&self, body: BodyId, positions: &NewPositions<'_>) -> Result<(), Error> {
+        self.check_number(body, positions.len())?;
+        match &positions.0 {
+            Given::F32(rows) => check_positions(body, rows),
+            Given::F64(rows) => check_positions(body, rows),
+            Given::Whole(positions) => positions.check(body),
         }
     }
 
@@ -217,7 +245,7 @@ impl Scene {
         faces: &[[u32; 3]],
         positions: &[[R; 3]],
     ) -> Result<BodyId, Error> {
-        self.add(Elements::Triangles(faces.to_vec()), R::store(positions))
+        self.add((faces.to_vec(), R::store(positions)))
     }
 
     /// Adds a body of tetrahedra: `tets` is `(n, 4)` vertex indices, `positions` `(v, 3)`.
@@ -230,7 +258,7 @@ impl Scene {
         tets: &[[u32; 4]],
         positions: &[[R; 3]],
     ) -> Result<BodyId, Error> {
-        self.add(Elements::Tetrahedra(tets.to_vec()), R::store(positions))
+        self.add((tets.to_vec(), R::store(positions)))
     }
 
     /// Adds a body of edges, such as strands of hair: `edges` is `(n, 2)` vertex indices, `positions` `(v, 3)`.
@@ -242,7 +270,7 @@ impl Scene {
         edges: &[[u32; 2]],
         positions: &[[R; 3]],
     ) -> Result<BodyId, Error> {
-        self.add(Elements::Edges(edges.to_vec()), R::store(positions))
+        self.add((edges.to_vec(), R::store(positions)))
     }
 
     /// Adds a body of points, one for each of `positions`, `(v, 3)`.
@@ -251,18 +279,14 @@ impl Scene {
     /// As [`add_triangles`](Scene::add_triangles).
     pub fn add_points<R: Real>(&mut self, positions: &[[R; 3]]) -> Result<BodyId, Error> {
         let points = (0u32..).zip(positions).map(|(vertex, _)| [vertex]);
-        self.add(Elements::Points(points.collect()), R::store(positions))
+        self.add((Elements::Points(points.collect()), R::store(positions)))
     }
 
-    /// Adds a body and takes over its arrays, without a copy.
+    /// Adds a body and takes over its arrays, without a copy: a [`Mesh`], such as one read from a file, or elements and positions.
     ///
     /// # Errors
     /// As [`add_triangles`](Scene::add_triangles).
-    pub fn add(
-        &mut self,
-        elements: impl Into<Elements>,
-        positions: impl Into<Positions>,
-    ) -> Result<BodyId, Error> {
+    pub fn add(&mut self, mesh: impl Into<Mesh>) -> Result<BodyId, Error> {
         let slot = match self.free.last() {
             Some(&slot) => slot,
             None => u32::try_from(self.slots.len()).map_err(|_| Error::TooMany {
@@ -272,7 +296,7 @@ impl Scene {
             })?,
         };
         let id = BodyId::new(slot);
-        let body = checked_body(id, elements.into(), positions.into(), Filter::default())?;
+        let body = checked_body(id, mesh.into(), Filter::default())?;
         let held = Slot(Some((id, body)));
         match self.free.pop() {
             Some(_) => self.slots[id.index()] = held,
@@ -322,7 +346,7 @@ impl Scene {
         for (part, vertices) in element_offsets.windows(2).zip(vertex_offsets.windows(2)) {
             let part: Elements =
                 with_corners!(elements, |all| all[part[0]..part[1]].to_vec().into());
-            let added = self.add(part, R::store(&positions[vertices[0]..vertices[1]]));
+            let added = self.add((part, R::store(&positions[vertices[0]..vertices[1]])));
             match added {
                 Ok(id) => ids.push(id),
                 Err(error) => {
@@ -353,101 +377,61 @@ impl Scene {
     ///
     /// # Errors
     /// As [`add`](Scene::add); the body is unchanged then.
-    pub fn remesh(
-        &mut self,
-        body: BodyId,
-        elements: impl Into<Elements>,
-        positions: impl Into<Positions>,
-    ) -> Result<(), Error> {
-        let filter = self.body(body)?.filter;
-        let remeshed = checked_body(body, elements.into(), positions.into(), filter)?;
-        *self.body_mut(body)? = remeshed;
+    pub fn remesh(&mut self, body: BodyId, mesh: impl Into<Mesh>) -> Result<(), Error> {
+        let old = self.body(body)?;
+        let (filter, thickness) = (old.filter, old.thickness);
+        let remeshed = checked_body(body, mesh.into(), filter)?;
+        *self.body_mut(body)? = Body {
+            thickness,
+            ..remeshed
+        };
         Ok(())
     }
 
-    /// Moves the vertices: `(v, 3)` positions, as many as the body has vertices. The precision
-    /// may differ from frame to frame; the array is copied and checked. A new step starts: the body stands still until
-    /// its end positions are [set](Scene::set_end_positions).
+    /// Moves the vertices: `(v, 3)` positions, as many as the body has vertices, and checked now. The precision may differ from
+    /// frame to frame. A new step starts: the body stands still until its end positions are [set](Scene::set_end_positions).
     ///
-    /// # Errors
-    /// A wrong number of positions, or one that is refused: the body keeps its old positions then.
-    pub fn set_positions<R: Real>(
-        &mut self,
-        body: BodyId,
-        positions: &[[R; 3]],
-    ) -> Result<(), Error> {
-        let target = self.body_mut(body)?;
-        target.check_number(body, positions.len())?;
-        check_positions(body, positions)?;
-        match R::stored(&mut target.positions) {
-            Some(stored) => stored.copy_from(positions),
-            None => target.positions = R::store(positions),
-        }
-        target.has_moved(true);
-        Ok(())
-    }
-
-    /// Moves the vertices without a copy: takes over an array, or shares one with its owner ([`PositionRows::shared`]). As
-    /// [`set_positions`](Scene::set_positions) otherwise: they are checked now. The body drops a shared array when it gets
-    /// other positions or is removed. Two such arrays serve a simulation: write the one that the scene
-    /// has dropped (`Arc::get_mut`), lend it, and go on with the other.
+    /// A slice, and a reference to a `Vec`, an array or [`Positions`], is copied. A `Vec` and `Positions` are taken over, and an
+    /// `Arc` of something that has rows is shared, without a copy: the body drops it when it gets other positions or is removed. Two
+    /// shared arrays serve a simulation: write the one that the scene has dropped, give it, and go on with the other.
     ///
     /// ```
     /// use std::sync::Arc;
-    /// use impinge_core::{PositionRows, Scene};
-    /// # fn main() -> Result<(), impinge_core::Error> {
+    /// use impinge::Scene;
+    /// # fn main() -> Result<(), impinge::Error> {
     /// let mut scene = Scene::new();
     /// let body = scene.add_triangles(&[[0, 1, 2]], &[[0.0f32, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])?;
     /// let mut frames = [vec![[0.0f32; 3]; 3], vec![[0.0f32; 3]; 3]].map(Arc::new);
     /// for step in 0..10u8 {
     ///     let next = Arc::get_mut(&mut frames[usize::from(step % 2)]).expect("dropped by the scene");
     ///     next[1] = [1.0, 0.0, step.into()];
-    ///     scene.lend_positions(body, PositionRows::shared(Arc::clone(&frames[usize::from(step % 2)])))?;
+    ///     scene.set_positions(body, Arc::clone(&frames[usize::from(step % 2)]))?;
     /// }
     /// assert_eq!(scene.body(body)?.positions().point(1), [1.0, 0.0, 9.0]);
     /// # Ok(()) }
     /// ```
     ///
-    /// Where a body must write its positions ([`positions_mut`](Scene::positions_mut), [`swap_positions`](Scene::swap_positions),
-    /// [`set_transform`](Scene::set_transform)), it copies a shared array first.
+    /// Where a body must write its positions ([`positions_mut`](Scene::positions_mut), [`set_transform`](Scene::set_transform)), it
+    /// copies a shared array first.
     ///
     /// # Errors
-    /// As [`set_positions`](Scene::set_positions).
-    pub fn lend_positions(
+    /// A wrong number of positions, or one that is refused: the body keeps its old positions then.
+    pub fn set_positions<'a>(
         &mut self,
         body: BodyId,
-        positions: impl Into<Positions>,
+        positions: impl Into<NewPositions<'a>>,
     ) -> Result<(), Error> {
         let positions = positions.into();
         let target = self.body_mut(body)?;
-        target.check_number(body, positions.len())?;
-        positions.check(body)?;
-        target.positions = positions;
+        target.check(body, &positions)?;
+        store(&mut target.positions, positions);
         target.has_moved(true);
         Ok(())
     }
 
-    /// Sets the positions at the end of a step without a copy, as [`lend_positions`](Scene::lend_positions) does for its start. If
-    /// start and end have different precisions, the single-precision one is copied to widen it.
-    ///
-    /// # Errors
-    /// As [`set_end_positions`](Scene::set_end_positions).
-    pub fn lend_end_positions(
-        &mut self,
-        body: BodyId,
-        positions: impl Into<Positions>,
-    ) -> Result<(), Error> {
-        let positions = positions.into();
-        let target = self.body_mut(body)?;
-        target.check_number(body, positions.len())?;
-        positions.check(body)?;
-        target.set_end(positions);
-        Ok(())
-    }
-
-    /// Sets the vertex positions at the end of a step, `(v, 3)`. Each vertex moves from [`positions`](Body::positions) to
-    /// its end position on a straight line at constant speed. They hold until the next [`set_positions`](Scene::set_positions),
-    /// [`positions_mut`](Scene::positions_mut), [`swap_positions`](Scene::swap_positions),
+    /// Sets the vertex positions at the end of a step, `(v, 3)`, copied or not as by [`set_positions`](Scene::set_positions).
+    /// Each vertex moves from [`positions`](Body::positions) to its end position on a straight line at constant speed. They hold
+    /// until the next [`set_positions`](Scene::set_positions), [`positions_mut`](Scene::positions_mut),
     /// [`set_transform`](Scene::set_transform), [`remesh`](Scene::remesh) or
     /// [`clear_end_positions`](Scene::clear_end_positions). A body that has none stands still.
     ///
@@ -455,19 +439,16 @@ impl Scene {
     ///
     /// # Errors
     /// A wrong number of positions, or one that is refused: the body keeps its old end positions then.
-    pub fn set_end_positions<R: Real>(
+    pub fn set_end_positions<'a>(
         &mut self,
         body: BodyId,
-        positions: &[[R; 3]],
+        positions: impl Into<NewPositions<'a>>,
     ) -> Result<(), Error> {
+        let positions = positions.into();
         let target = self.body_mut(body)?;
-        target.check_number(body, positions.len())?;
-        check_positions(body, positions)?;
-        let mut end = target.end.take().unwrap_or_else(|| R::store(&[]));
-        match R::stored(&mut end) {
-            Some(stored) if stored.len() == positions.len() => stored.copy_from(positions),
-            _ => end = R::store(positions),
-        }
+        target.check(body, &positions)?;
+        let mut end = target.end.take().unwrap_or_else(|| f32::store(&[]));
+        store(&mut end, positions);
         target.set_end(end);
         Ok(())
     }
@@ -493,37 +474,6 @@ impl Scene {
         let target = self.body_mut(body)?;
         target.has_moved(false);
         stored(body, &mut target.positions).map(|stored| stored.own().as_mut_slice())
-    }
-
-    /// Exchanges the positions of a body that stores `R` with an array of the caller's, without a copy: the caller gets the
-    /// body's former positions to write the next ones into. Two arrays in turn serve a whole simulation.
-    /// The next detection checks the new ones, and its error names a bad vertex. End positions are cleared, as by
-    /// [`set_positions`](Scene::set_positions).
-    ///
-    /// ```
-    /// use impinge_core::{Positions, Scene};
-    /// # fn main() -> Result<(), impinge_core::Error> {
-    /// let mut scene = Scene::new();
-    /// let body = scene.add_triangles(&[[0, 1, 2]], &[[0.0f32, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])?;
-    /// let mut next = vec![[0.0f32, 0.0, 0.5], [1.0, 0.0, 0.5], [0.0, 1.0, 0.5]];
-    /// scene.swap_positions(body, &mut next)?;
-    /// assert_eq!(scene.body(body)?.positions().point(1), [1.0, 0.0, 0.5]);
-    /// assert_eq!(next[1], [1.0, 0.0, 0.0]);
-    /// # Ok(()) }
-    /// ```
-    ///
-    /// # Errors
-    /// The id names no body, it stores the other precision, or has another number of vertices. Nothing is exchanged then.
-    pub fn swap_positions<R: Real>(
-        &mut self,
-        body: BodyId,
-        positions: &mut Vec<[R; 3]>,
-    ) -> Result<(), Error> {
-        let target = self.body_mut(body)?;
-        target.check_number(body, positions.len())?;
-        std::mem::swap(stored(body, &mut target.positions)?.own(), positions);
-        target.has_moved(false);
-        Ok(())
     }
 
     /// Moves a body by an affine matrix, such as a rigid motion, without passing its vertices again. It moves the rest
@@ -578,12 +528,29 @@ impl Scene {
         Ok(())
     }
 
-    /// Sets which bodies a body meets in [`Query::all`](crate::Query::all).
+    /// Sets which bodies a body meets in [`Query::between_all`](crate::Query::between_all).
     ///
     /// # Errors
     /// The id names no body.
     pub fn set_filter(&mut self, body: BodyId, filter: Filter) -> Result<(), Error> {
         self.body_mut(body)?.filter = filter;
+        Ok(())
+    }
+
+    /// Sets how thick a body is, in the unit of the scene: what its elements add to the distance of
+    /// [`near`](crate::Detector::near). 0 for a new body. Two elements of one body add it twice.
+    ///
+    /// # Errors
+    /// The id names no body; a thickness that is negative or not finite.
+    pub fn set_thickness(&mut self, body: BodyId, thickness: f64) -> Result<(), Error> {
+        if !(thickness >= 0.0 && thickness.is_finite()) {
+            return Err(Error::Setting {
+                setting: "thickness",
+                given: thickness.to_string(),
+                allowed: "a finite number that is not below 0",
+            });
+        }
+        self.body_mut(body)?.thickness = thickness;
         Ok(())
     }
 
@@ -694,12 +661,28 @@ fn check_offsets(setting: &'static str, offsets: &[usize], n: usize) -> Result<(
     }
 }
 
-fn checked_body(
-    id: BodyId,
-    elements: Elements,
-    positions: Positions,
-    filter: Filter,
-) -> Result<Body, Error> {
+/// Stores checked positions. Memory of the body's own is reused.
+fn store(stored: &mut Positions, new: NewPositions<'_>) {
+    match new.0 {
+        Given::F32(rows) => copy(stored, rows),
+        Given::F64(rows) => copy(stored, rows),
+        Given::Whole(positions) => *stored = positions,
+    }
+}
+
+fn copy<R: Real>(stored: &mut Positions, rows: &[[R; 3]]) {
+    match R::stored(stored) {
+        Some(own) if own.len() == rows.len() => own.copy_from(rows),
+        _ => *stored = R::store(rows),
+    }
+}
+
+fn checked_body(id: BodyId, mesh: Mesh, filter: Filter) -> Result<Body, Error> {
+    let Mesh {
+        elements,
+        positions,
+        ..
+    } = mesh;
     let limit = u64::from(u32::MAX);
     for (what, given) in [
         ("primitives of one body", elements.len() as u64),
@@ -728,6 +711,7 @@ fn checked_body(
         moves: false,
         motion: None,
         filter,
+        thickness: 0.0,
         topology_stamp: new_stamp(),
         positions_stamp: stamp,
         step_stamp: stamp,

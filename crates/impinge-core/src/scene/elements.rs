@@ -3,9 +3,11 @@
 use std::collections::HashMap;
 use std::sync::OnceLock;
 
+use crate::scene::words::words;
+
 /// The kind of elements of a body, or of one of its parts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Kind {
+pub enum BodyKind {
     /// Points, one vertex index each.
     Points,
     /// Edges, two vertex indices each.
@@ -16,20 +18,11 @@ pub enum Kind {
     Tetrahedra,
 }
 
-impl Kind {
-    /// All kinds, by the number of corners.
-    pub const ALL: [Kind; 4] = [Kind::Points, Kind::Edges, Kind::Triangles, Kind::Tetrahedra];
+words!("kind", "points, edges, triangles or tetrahedra", BodyKind: [
+    Points = "points", Edges = "edges", Triangles = "triangles", Tetrahedra = "tetrahedra"; 4
+]);
 
-    /// `"points"`, `"edges"`, `"triangles"` or `"tetrahedra"`.
-    pub fn name(self) -> &'static str {
-        match self {
-            Kind::Points => "points",
-            Kind::Edges => "edges",
-            Kind::Triangles => "triangles",
-            Kind::Tetrahedra => "tetrahedra",
-        }
-    }
-
+impl BodyKind {
     /// How many corners an element of this kind has: 1 to 4.
     pub fn n_corners(self) -> usize {
         self as usize + 1
@@ -75,12 +68,12 @@ impl Elements {
     }
 
     /// Points, edges, triangles or tetrahedra.
-    pub fn kind(&self) -> Kind {
+    pub fn kind(&self) -> BodyKind {
         match self {
-            Elements::Points(_) => Kind::Points,
-            Elements::Edges(_) => Kind::Edges,
-            Elements::Triangles(_) => Kind::Triangles,
-            Elements::Tetrahedra(_) => Kind::Tetrahedra,
+            Elements::Points(_) => BodyKind::Points,
+            Elements::Edges(_) => BodyKind::Edges,
+            Elements::Triangles(_) => BodyKind::Triangles,
+            Elements::Tetrahedra(_) => BodyKind::Tetrahedra,
         }
     }
 
@@ -191,7 +184,7 @@ impl Topology {
     /// One name for equal parts: the faces of a body given as triangles, or the edges of one given as edges, are `Given`.
     pub fn canonical(&self, part: Part) -> Part {
         match (part, self.given.kind()) {
-            (Part::Faces, Kind::Triangles) | (Part::Edges, Kind::Edges) => Part::Given,
+            (Part::Faces, BodyKind::Triangles) | (Part::Edges, BodyKind::Edges) => Part::Given,
             _ => part,
         }
     }
@@ -209,7 +202,7 @@ impl Topology {
     /// The boundary of tetrahedra, else the given elements.
     fn surface(&self) -> &Elements {
         match self.given.kind() {
-            Kind::Tetrahedra => self.part(Part::Faces),
+            BodyKind::Tetrahedra => self.part(Part::Faces),
             _ => &self.given,
         }
     }

@@ -191,4 +191,23 @@ pub enum Error {
     /// The threads of the pool could not be started.
     #[error("thread pool: {0}")]
     Threads(String),
+    /// A file could not be read: which, where in it, and why.
+    #[error("{0}")]
+    File(String),
+}
+
+impl Error {
+    /// What kind of error it is, by the name that it has in every language: `invalid`, `out_of_memory`, `budget`, `too_many_pairs`,
+    /// `cancelled`, `device` or `internal`. The detector stays usable after all but `internal`.
+    pub fn code(&self) -> &'static str {
+        match self {
+            Error::OutOfMemory { .. } => "out_of_memory",
+            Error::MemoryBudget { .. } => "budget",
+            Error::TooManyPairs { .. } => "too_many_pairs",
+            Error::Cancelled => "cancelled",
+            Error::NoAdapter { .. } | Error::Gpu { .. } => "device",
+            Error::Threads(_) => "internal",
+            _ => "invalid",
+        }
+    }
 }

@@ -5,8 +5,10 @@ pub(crate) mod elements;
 pub(crate) mod error;
 pub(crate) mod ids;
 pub mod index;
+pub(crate) mod mesh;
 pub(crate) mod position_rows;
 pub(crate) mod positions;
 pub(crate) mod transform;
+pub(crate) mod words;
 
 pub use bodies::*;

@@ -1,5 +1,7 @@
 //! Vertex positions: single or double precision, checked once.
 
+use std::sync::Arc;
+
 use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
 use crate::scene::position_rows::PositionRows;
@@ -15,6 +17,12 @@ pub enum Positions {
 }
 
 impl Positions {
+    /// Shares the rows of an owner, without a copy. The owner lives at least as long as these positions and their clones. It is
+    /// asked for its rows once.
+    pub fn shared<R: Real>(owner: Arc<impl AsRef<[[R; 3]]> + Send + Sync + 'static>) -> Self {
+        R::held(PositionRows::shared(owner))
+    }
+
     /// The number of vertices.
     pub fn len(&self) -> usize {
         match self {
@@ -172,6 +180,86 @@ impl<R: Real> From<PositionRows<R>> for Positions {
     }
 }
 
+/// Positions for [`Scene::set_positions`](crate::Scene::set_positions): a reference is copied; a `Vec`, an `Arc` and
+/// [`Positions`] are taken over without a copy.
+#[derive(Debug)]
+pub struct NewPositions<'a>(pub(crate) Given<'a>);
+
+#[derive(Debug)]
+pub(crate) enum Given<'a> {
+    F32(&'a [[f32; 3]]),
+    F64(&'a [[f64; 3]]),
+    Whole(Positions),
+}
+
+impl NewPositions<'_> {
+    pub(crate) fn len(&self) -> usize {
+        match &self.0 {
+            Given::F32(rows) => rows.len(),
+            Given::F64(rows) => rows.len(),
+            Given::Whole(positions) => positions.len(),
+        }
+    }
+}
+
+impl<'a, R: Real> From<&'a [[R; 3]]> for NewPositions<'a> {
+    fn from(rows: &'a [[R; 3]]) -> Self {
+        R::given(rows)
+    }
+}
+
+impl<'a, R: Real, const N: usize> From<&'a [[R; 3]; N]> for NewPositions<'a> {
+    fn from(rows: &'a [[R; 3]; N]) -> Self {
+        rows.as_slice().into()
+    }
+}
+
+impl<'a, R: Real> From<&'a Vec<[R; 3]>> for NewPositions<'a> {
+    fn from(rows: &'a Vec<[R; 3]>) -> Self {
+        rows.as_slice().into()
+    }
+}
+
+impl<'a, R: Real> From<&'a PositionRows<R>> for NewPositions<'a> {
+    fn from(rows: &'a PositionRows<R>) -> Self {
+        rows[..].into()
+    }
+}
+
+impl<'a> From<&'a Positions> for NewPositions<'a> {
+    fn from(positions: &'a Positions) -> Self {
+        match positions {
+            Positions::F32(rows) => rows[..].into(),
+            Positions::F64(rows) => rows[..].into(),
+        }
+    }
+}
+
+impl<R: Real> From<Vec<[R; 3]>> for NewPositions<'_> {
+    fn from(rows: Vec<[R; 3]>) -> Self {
+        Positions::from(rows).into()
+    }
+}
+
+impl From<Positions> for NewPositions<'_> {
+    fn from(positions: Positions) -> Self {
+        NewPositions(Given::Whole(positions))
+    }
+}
+
+impl<R: Real> From<PositionRows<R>> for NewPositions<'_> {
+    fn from(rows: PositionRows<R>) -> Self {
+        Positions::from(rows).into()
+    }
+}
+
+impl<R: Real> From<Arc<Vec<[R; 3]>>> for NewPositions<'_> {
+    /// Shares them with their owner: see [`Positions::shared`].
+    fn from(owner: Arc<Vec<[R; 3]>>) -> Self {
+        Positions::shared(owner).into()
+    }
+}
+
 mod sealed {
     pub trait Sealed {}
     impl Sealed for f32 {}
@@ -190,6 +278,8 @@ pub trait Real: sealed::Sealed + impinge_weld::Coordinate + Send + Sync + 'stati
     fn stored(positions: &mut Positions) -> Option<&mut PositionRows<Self>>;
     #[doc(hidden)]
     fn held(positions: PositionRows<Self>) -> Positions;
+    #[doc(hidden)]
+    fn given(positions: &[[Self; 3]]) -> NewPositions<'_>;
     #[doc(hidden)]
     fn store(positions: &[[Self; 3]]) -> Positions {
         positions.to_vec().into()
@@ -226,6 +316,9 @@ impl Real for f32 {
     fn held(positions: PositionRows<f32>) -> Positions {
         Positions::F32(positions)
     }
+    fn given(positions: &[[f32; 3]]) -> NewPositions<'_> {
+        NewPositions(Given::F32(positions))
+    }
 }
 
 impl Real for f64 {
@@ -255,6 +348,9 @@ impl Real for f64 {
     }
     fn held(positions: PositionRows<f64>) -> Positions {
         Positions::F64(positions)
+    }
+    fn given(positions: &[[f64; 3]]) -> NewPositions<'_> {
+        NewPositions(Given::F64(positions))
     }
 }
 

@@ -9,8 +9,8 @@ use crate::query::progress::Control;
 use crate::scene::Scene;
 use crate::scene::error::Error;
 use crate::scene::index::Number;
-use crate::search::narrow::{Element, Test};
-use crate::search::stats::Statistics;
+use crate::search::narrow::{PairElement, Test};
+use crate::search::stats::Stats;
 
 /// Calls `emit` with the test, the key and the value of every pair that the frame asks for and that passes its test, in the
 /// order of the keys. An error of `emit` ends the search.
@@ -18,8 +18,8 @@ pub(crate) fn run<T: Test>(
     test: &T,
     scene: &Scene,
     plan: &Plan,
-    control: &Control<'_>,
-    stats: &mut Statistics,
+    control: &Control,
+    stats: &mut Stats,
     mut emit: impl FnMut(TestId, u64, T::Value) -> Result<(), Error>,
 ) -> Result<(), Error> {
     let elements = elements(test, scene, plan);
@@ -46,11 +46,11 @@ fn elements<'a, T: Test>(
     test: &T,
     scene: &'a Scene,
     plan: &'a Plan,
-) -> Vec<(Number, Element<'a>, Extent)> {
+) -> Vec<(Number, PairElement<'a>, Extent)> {
     plan.part_ixs()
         .flat_map(|part| {
             plan.elements(scene, part).map(move |(number, corners)| {
-                let element = Element {
+                let element = PairElement {
                     scene,
                     plan,
                     part,

@@ -21,7 +21,7 @@ use crate::scene::Scene;
 use crate::scene::error::Error;
 use crate::search::sink::Answer;
 use crate::search::sort::{Keyed, Sorter};
-use crate::search::stats::Statistics;
+use crate::search::stats::Stats;
 use crate::workers::Workers;
 use crate::workers::clock::Instant;
 
@@ -35,7 +35,7 @@ pub struct Job<'a> {
     /// The threads.
     pub workers: &'a Workers,
     /// Stops and watches the frame.
-    pub control: &'a Control<'a>,
+    pub control: &'a Control,
 }
 
 /// Finds the pairs of a question: a backend of this crate, or a method of another one.
@@ -68,7 +68,7 @@ pub trait Finder<T = u64, const LISTS: usize = 1> {
         &mut self,
         job: Job<'_>,
         answer: &Arc<Answer<T, LISTS>>,
-        stats: &mut Statistics,
+        stats: &mut Stats,
     ) -> impl Future<Output = Result<(), Error>>;
 }
 
@@ -78,7 +78,7 @@ pub trait Outcome<T, const LISTS: usize> {
     fn begin(&mut self, plan: &Plan);
 
     /// How the answer is found.
-    fn stats_mut(&mut self) -> &mut Statistics;
+    fn stats_mut(&mut self) -> &mut Stats;
 
     /// Memory of the last answer, for the pairs of this one.
     fn take_buffers(&mut self) -> [Vec<T>; LISTS];
@@ -103,7 +103,7 @@ impl Runner {
     /// For detectors with these settings.
     pub fn new(settings: &Settings) -> Self {
         Runner {
-            workers: Workers::tuned(settings.threads, settings.placement, settings.tuning),
+            workers: Workers::tuned(settings.threads, settings.affinity, settings.tuning),
             sorter: Mutex::new(Sorter::new(settings)),
         }
     }
@@ -121,7 +121,7 @@ impl Runner {
         &'a self,
         scene: &'a Scene,
         plan: &'a Plan,
-        control: &'a Control<'a>,
+        control: &'a Control,
     ) -> Result<Job<'a>, Error> {
         plan.check(scene)?;
         Ok(Job {
@@ -139,9 +139,9 @@ impl Runner {
     /// Those of `find`, and more bytes held than the budget allows.
     pub(crate) fn measure<A>(
         &self,
-        stats: &mut Statistics,
+        stats: &mut Stats,
         limits: Limits,
-        find: impl FnOnce(&Workers, &mut Statistics) -> Result<A, Error>,
+        find: impl FnOnce(&Workers, &mut Stats) -> Result<A, Error>,
     ) -> Result<A, Error> {
         let start = Instant::now();
         stats.clear();
@@ -169,7 +169,7 @@ impl Runner {
         &self,
         scene: &Scene,
         plan: &Plan,
-        control: &Control<'_>,
+        control: &Control,
         finder: &mut impl Finder<T, LISTS>,
         outcome: &mut impl Outcome<T, LISTS>,
     ) -> Result<u64, Error> {

@@ -13,9 +13,9 @@ pub struct Stage {
 }
 
 /// Counts and times of one frame. The pairs never depend on any of this.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Default, PartialEq)]
 #[non_exhaustive]
-pub struct Statistics {
+pub struct Stats {
     /// `"cpu"` or the GPU's name.
     pub backend: String,
     /// `"clusters"`, `"cells"` or `"naive"`.
@@ -63,18 +63,29 @@ pub struct Statistics {
     pub ways: Ways,
 }
 
-impl Statistics {
+impl Clone for Stats {
+    fn clone(&self) -> Self {
+        let mut stats = Stats::default();
+        stats.clone_from(self);
+        stats
+    }
+
+    /// Keeps the allocated memory.
+    fn clone_from(&mut self, other: &Self) {
+        self.stages.clone_from(&other.stages);
+        self.backend.clone_from(&other.backend);
+        *self = Stats {
+            stages: std::mem::take(&mut self.stages),
+            backend: std::mem::take(&mut self.backend),
+            ..*other
+        };
+    }
+}
+
+impl Stats {
     /// Clears everything, but keeps the allocated memory.
     pub(crate) fn clear(&mut self) {
-        let mut stages = std::mem::take(&mut self.stages);
-        let mut backend = std::mem::take(&mut self.backend);
-        stages.clear();
-        backend.clear();
-        *self = Statistics {
-            stages,
-            backend,
-            ..Statistics::default()
-        };
+        self.clone_from(&Stats::default());
     }
 
     /// Adds time to a stage; appends the stage if it is new.

@@ -6,7 +6,7 @@
 //! second burst of frames began so, with 1.0 ms per frame instead of 0.55.) So helpers are kept off the caller's core: the
 //! core's number is read once per region, and if it has changed there is one system call per helper.
 //!
-//! Helpers run where the system puts them with [`Placement::Inherited`](crate::Placement::Inherited), if there is no such
+//! Helpers run where the system puts them with [`Affinity::Inherited`](crate::Affinity::Inherited), if there is no such
 //! call, if the call fails, or if there are many helpers, for whom a core is free then.
 
 #[cfg(target_os = "linux")]
@@ -19,7 +19,7 @@ mod linux {
     use std::sync::OnceLock;
     use std::sync::atomic::{AtomicUsize, Ordering};
 
-    use crate::query::settings::Placement;
+    use crate::query::settings::Affinity;
     use rustix::thread::{CpuSet, Pid, gettid, sched_getaffinity, sched_getcpu, sched_setaffinity};
 
     /// The caller's core, and the helpers' threads.
@@ -41,9 +41,9 @@ mod linux {
     const MANY: usize = 8;
 
     impl Places {
-        pub fn new(n_helpers: usize, placement: Placement) -> Self {
-            let n = match placement {
-                Placement::Auto if n_helpers < MANY => n_helpers,
+        pub fn new(n_helpers: usize, affinity: Affinity) -> Self {
+            let n = match affinity {
+                Affinity::Auto if n_helpers < MANY => n_helpers,
                 _ => 0,
             };
             Places {
@@ -116,7 +116,7 @@ mod linux {
         #[test]
         fn helpers_keep_off_the_callers_core() {
             let allowed = sched_getaffinity(None).expect("has a set of cores");
-            let places = Places::new(1, Placement::Auto);
+            let places = Places::new(1, Affinity::Auto);
             places.caller_is_here();
             let (started, is_started) = mpsc::channel();
             let (end, ended) = mpsc::channel::<()>();
@@ -147,13 +147,13 @@ mod linux {
 
 #[cfg(not(target_os = "linux"))]
 mod other {
-    use crate::query::settings::Placement;
+    use crate::query::settings::Affinity;
 
     /// Does nothing: cores are not known.
     pub(crate) struct Places;
 
     impl Places {
-        pub fn new(_: usize, _: Placement) -> Self {
+        pub fn new(_: usize, _: Affinity) -> Self {
             Places
         }
 

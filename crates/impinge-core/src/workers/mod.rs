@@ -23,7 +23,7 @@ use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
-use crate::query::settings::Placement;
+use crate::query::settings::Affinity;
 use crate::query::tuning::{Tuning, Ways};
 use crate::scene::error::Error;
 use crate::workers::alone::alone;
@@ -99,11 +99,11 @@ impl Drop for Workers {
 impl Workers {
     /// `threads` workers, the caller among them; 0 for one per core. Threads are started when first needed.
     pub fn new(threads: usize) -> Self {
-        Workers::tuned(threads, Placement::default(), Tuning::default())
+        Workers::tuned(threads, Affinity::default(), Tuning::default())
     }
 
-    /// As [`new`](Workers::new), with another placement of helpers and other thresholds.
-    pub(crate) fn tuned(threads: usize, placement: Placement, tuning: Tuning) -> Self {
+    /// As [`new`](Workers::new), with another affinity of helpers and other thresholds.
+    pub(crate) fn tuned(threads: usize, affinity: Affinity, tuning: Tuning) -> Self {
         let (pool, n) = match threads {
             // One thread, without what a pool needs.
             0 if cfg!(target_family = "wasm") => (OnceLock::new(), 1),
@@ -113,7 +113,7 @@ impl Workers {
         };
         Workers {
             n,
-            helpers: Arc::new(Helpers::new(n - 1, placement)),
+            helpers: Arc::new(Helpers::new(n - 1, affinity)),
             threads: OnceLock::new(),
             last: Mutex::new(None),
             wakes: AtomicBool::new(true),
@@ -313,11 +313,11 @@ struct Helpers {
 }
 
 impl Helpers {
-    fn new(n: usize, placement: Placement) -> Self {
+    fn new(n: usize, affinity: Affinity) -> Self {
         Helpers {
             crew: Crew::new(n),
             linger_ns: AtomicU64::new(0),
-            places: Places::new(n, placement),
+            places: Places::new(n, affinity),
         }
     }
 
@@ -461,16 +461,16 @@ mod tests {
     fn affinities_are_set_by_auto_alone() {
         use rustix::thread::{CpuSet, Pid, gettid, sched_getaffinity, sched_setaffinity};
 
-        let affinity = |thread: Option<Pid>| sched_getaffinity(thread).expect("has a set of cores");
+        let cores_of = |thread: Option<Pid>| sched_getaffinity(thread).expect("has a set of cores");
         let with_core = |core: usize| {
             let mut cores = CpuSet::new();
             cores.set(core);
             cores
         };
-        let moves = |placement: Placement| {
-            let all = affinity(None);
+        let moves = |affinity: Affinity| {
+            let all = cores_of(None);
             let mut cores = (0..CpuSet::MAX_CPU).filter(|&core| all.is_set(core));
-            let workers = Workers::tuned(3, placement, Tuning::default());
+            let workers = Workers::tuned(3, affinity, Tuning::default());
             let _shift = workers.shift(u64::MAX);
             let deadline = Instant::now() + Duration::from_secs(60);
             let mut threads = [None; 3];
@@ -490,24 +490,24 @@ mod tests {
                 sched_setaffinity(None, &with_core(core)).expect("its own core");
                 workers.for_each(&mut threads.clone(), 64, |_, _| ());
                 let mut expected = all;
-                if placement == Placement::Auto && all.count() > 1 {
+                if affinity == Affinity::Auto && all.count() > 1 {
                     expected.unset(core);
                 }
                 for &helper in helpers {
-                    assert!(affinity(helper) == expected, "{placement:?}, core {core}");
+                    assert!(cores_of(helper) == expected, "{affinity:?}, core {core}");
                 }
             }
-            if placement == Placement::Inherited {
+            if affinity == Affinity::Inherited {
                 sched_setaffinity(helpers[0], &with_core(first)).expect("the helper lives");
                 sched_setaffinity(None, &all).expect("its own cores");
                 workers.for_each(&mut threads.clone(), 64, |_, _| ());
-                assert!(affinity(helpers[0]) == with_core(first), "overwritten");
+                assert!(cores_of(helpers[0]) == with_core(first), "overwritten");
             }
         };
-        for placement in [Placement::Auto, Placement::Inherited] {
+        for affinity in [Affinity::Auto, Affinity::Inherited] {
             // The caller is a thread of its own, whose affinity ends with it.
             thread::scope(|scope| {
-                scope.spawn(|| moves(placement));
+                scope.spawn(|| moves(affinity));
             });
         }
     }

@@ -21,13 +21,13 @@ pub fn rows(pairs: &Pairs) -> Vec<[u32; 4]> {
 
 /// The oracle's answer.
 pub fn naive(case: &Case) -> Vec<[u32; 4]> {
-    let mut detector = Detector::with_settings(Settings {
+    let mut detector = Detector::new(Settings {
         method: Method::Naive,
         backend: Backend::Cpu,
         ..Settings::default()
     })
     .unwrap();
-    rows(detector.detect(&case.scene, &case.query).unwrap())
+    rows(&detector.detect(&case.scene, &case.query).unwrap())
 }
 
 /// Whether culled clusters are left out on this processor: without AVX2 this would gain nothing.
@@ -67,11 +67,11 @@ pub fn agree(expected: &[[u32; 4]], answer: &[[u32; 4]], hash: u64) -> Result<()
 
 /// Runs a case with these settings and compares.
 pub fn check(case: &Case, expected: &[[u32; 4]], settings: Settings) {
-    let mut detector = Detector::with_settings(settings.clone()).unwrap();
+    let mut detector = Detector::new(settings.clone()).unwrap();
     // Twice: the second frame uses the caches that the first filled.
     for frame in 0..2 {
         let pairs = detector.detect(&case.scene, &case.query).unwrap();
-        if let Err(error) = agree(expected, &rows(pairs), pairs.hash()) {
+        if let Err(error) = agree(expected, &rows(&pairs), pairs.hash()) {
             panic!("{} frame {frame} with {settings:?}: {error}", case.name);
         }
     }
@@ -82,11 +82,11 @@ fn two(name: &str, a: &Model, b: &Model, double: bool) -> Case {
     let add = |scene: &mut Scene, model: &Model| -> BodyId {
         if double {
             scene
-                .add(model.elements.clone(), model.positions_f64())
+                .add((model.elements.clone(), model.positions_f64()))
                 .unwrap()
         } else {
             scene
-                .add(model.elements.clone(), model.positions.clone())
+                .add((model.elements.clone(), model.positions.clone()))
                 .unwrap()
         }
     };
@@ -116,41 +116,41 @@ fn many(n: u64, scale: f32) -> Case {
             *position = position.map(|x| x * scale);
         }
         let added = if k % 4 == 1 {
-            scene.add(model.elements.clone(), model.positions_f64())
+            scene.add((model.elements.clone(), model.positions_f64()))
         } else {
-            scene.add(model.elements, model.positions)
+            scene.add((model.elements, model.positions))
         };
         added.unwrap();
     }
     Case {
         name: format!("{n} bodies, scale {scale:e}"),
         scene,
-        query: Query::all(),
+        query: Query::between_all(),
     }
 }
 
 fn one(name: &str, model: &Model, rule: SharedVertex) -> Case {
     let mut scene = Scene::new();
     let id = scene
-        .add(model.elements.clone(), model.positions.clone())
+        .add((model.elements.clone(), model.positions.clone()))
         .unwrap();
     Case {
         name: format!("{name}, {rule:?}"),
         scene,
-        query: Query::within(id).shared_vertex(rule),
+        query: Query::self_of(id).shared_vertex(rule),
     }
 }
 
 /// Two bodies, of which only the first may meet itself. It does so also where the second is not.
 fn one_meets_itself(rule: SharedVertex) -> Case {
     let mut scene = Scene::new();
-    let mut add = |model: Model| scene.add(model.elements, model.positions).unwrap();
+    let mut add = |model: Model| scene.add((model.elements, model.positions)).unwrap();
     add(soup::triangles(900, 0.15, 7));
     let ball = add(surfaces::ball(300).translated([1.5, 0.5, 0.5]));
     Case {
         name: format!("one of two meets itself, {rule:?}"),
         scene,
-        query: Query::everything().ignore(ball, ball).shared_vertex(rule),
+        query: Query::all().exclude((ball, ball)).shared_vertex(rule),
     }
 }
 
@@ -246,9 +246,9 @@ pub fn cases() -> Vec<Case> {
         let built = built.unwrap();
         for query in [
             built.query.clone(),
-            Query::everything(),
-            Query::all_within(),
-            Query::all_within().shared_vertex(SharedVertex::Skip),
+            Query::all(),
+            Query::self_all(),
+            Query::self_all().shared_vertex(SharedVertex::Skip),
         ] {
             cases.push(Case {
                 name: format!("{} {query:?}", built.name),
@@ -325,7 +325,7 @@ fn of_any_size() -> Vec<Case> {
         let mut scene = Scene::new();
         let mut add = |model: Model, seed: u64| {
             let points = size.points(&model.positions, seed);
-            scene.add(model.elements, points).unwrap()
+            scene.add((model.elements, points)).unwrap()
         };
         let ids = [
             add(soup::lattice_triangles(14, 3, 1), 1),
@@ -335,8 +335,8 @@ fn of_any_size() -> Vec<Case> {
         ];
         for query in [
             Query::between(ids[0], ids[1]),
-            Query::everything().shared_vertex(SharedVertex::Skip),
-            Query::all_within().shared_vertex(SharedVertex::Resolve),
+            Query::all().shared_vertex(SharedVertex::Skip),
+            Query::self_all().shared_vertex(SharedVertex::Resolve),
         ] {
             cases.push(Case {
                 name: format!("{size:?} {query:?}"),
@@ -348,11 +348,11 @@ fn of_any_size() -> Vec<Case> {
             let mut scene = Scene::new();
             let fan = fan(100);
             let points = size.points(&fan.positions, 5);
-            let id = scene.add(fan.elements, points).unwrap();
+            let id = scene.add((fan.elements, points)).unwrap();
             cases.push(Case {
                 name: format!("fan, {size:?}"),
                 scene,
-                query: Query::within(id).shared_vertex(SharedVertex::Resolve),
+                query: Query::self_of(id).shared_vertex(SharedVertex::Resolve),
             });
         }
     }

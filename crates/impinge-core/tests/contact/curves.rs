@@ -199,7 +199,7 @@ fn a_body_that_runs_into_itself() {
     let mut scene = Scene::new();
     let id = scene.add_triangles(&faces, &positions).unwrap();
     for rule in [SharedVertex::Skip, SharedVertex::Resolve] {
-        let pairs = detect(&scene, &Query::within(id).shared_vertex(rule));
+        let pairs = detect(&scene, &Query::self_of(id).shared_vertex(rule));
         let contacts = contacts_of(&scene, &pairs);
         let curves = contacts.curves().unwrap();
         assert!(!curves.is_empty());
@@ -216,7 +216,7 @@ fn threads_change_nothing() {
     let ids = [&a, &b].map(|model| model.add_to(&mut scene).unwrap());
     let pairs = detect(&scene, &Query::between(ids[0], ids[1]));
     let run = |n_threads: usize| {
-        let mut detector = Detector::with_settings(Settings {
+        let mut detector = Detector::new(Settings {
             backend: Backend::Cpu,
             threads: n_threads,
             ..Settings::default()
@@ -251,7 +251,7 @@ fn pairs_of_another_scene_are_refused_by_name() {
     let b = ball.translated([0.5, 0.0, 0.0]).add_to(&mut scene).unwrap();
     let pairs = detect(&scene, &Query::between(a, b));
     scene
-        .remesh(b, vec![[0u32, 1, 2]], vec![[0.0f32; 3]; 3])
+        .remesh(b, (vec![[0u32, 1, 2]], vec![[0.0f32; 3]; 3]))
         .unwrap();
     let mut detector = Detector::new(Backend::Cpu).unwrap();
     let error = detector.contacts(&scene, &pairs).unwrap_err().to_string();
@@ -263,8 +263,10 @@ fn pairs_of_another_scene_are_refused_by_name() {
     scene
         .remesh(
             b,
-            ball.elements.clone(),
-            vec![[50.0f32; 3]; ball.positions.len()],
+            (
+                ball.elements.clone(),
+                vec![[50.0f32; 3]; ball.positions.len()],
+            ),
         )
         .unwrap();
     let contacts = contacts_of(&scene, &pairs);

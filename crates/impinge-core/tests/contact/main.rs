@@ -120,10 +120,10 @@ fn two(a: &Model, b: &Model, double: bool) -> (Scene, Pairs) {
     let ids = [a, b].map(|model| {
         if double {
             let positions: Positions = model.positions_f64().into();
-            scene.add(model.elements.clone(), positions).unwrap()
+            scene.add((model.elements.clone(), positions)).unwrap()
         } else {
             scene
-                .add(model.elements.clone(), model.positions.clone())
+                .add((model.elements.clone(), model.positions.clone()))
                 .unwrap()
         }
     });
@@ -206,7 +206,7 @@ fn triangles_of_any_size_meet_as_the_oracle_says() {
                     })
                 })
                 .collect();
-            scene.add(model.elements, positions).unwrap()
+            scene.add((model.elements, positions)).unwrap()
         });
         let pairs = detect(&scene, &Query::between(ids[0], ids[1]));
         check(&scene, &pairs, 100, &mut seen);

@@ -312,7 +312,7 @@ fn pairs_of_bodies_among_many_are_as_if_alone() {
     let models = places.map(|place| ball.translated(place));
     let mut scene = Scene::new();
     let ids = models.each_ref().map(|m| m.add_to(&mut scene).unwrap());
-    let pairs = detect(&scene, &Query::everything());
+    let pairs = detect(&scene, &Query::all());
     let mut detector = Detector::new(Backend::Cpu).unwrap();
     let contacts = detector.contacts(&scene, &pairs).unwrap();
     for [a, b] in [[0, 1], [0, 2], [1, 2], [0, 3]] {

@@ -3,6 +3,7 @@
 mod atomic;
 mod glb;
 mod growing;
+mod obj;
 mod pc2;
 mod ply;
 mod polylines;
@@ -12,6 +13,7 @@ mod vtu;
 pub use atomic::{AtomicFile, remove_temporary_files};
 pub use glb::write_glb;
 pub use growing::GrowingPc2;
+pub use obj::write_obj;
 pub use pc2::Pc2Writer;
 pub use ply::write_ply;
 pub use polylines::{Polylines, write_polylines_obj, write_polylines_ply, write_polylines_vtu};

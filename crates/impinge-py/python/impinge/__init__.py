@@ -7,7 +7,7 @@ Two meshes, one line:
 >>> impinge.pairs(corners, [[0, 1, 2]], corners[:, [0, 2, 1]] + [0, 0.25, -0.25], [[0, 1, 2]])
 array([[0, 0]], dtype=uint32)
 
-A pair is reported if and only if the two primitives share a point when the given coordinates are
+A pair is reported if and only if the two elements share a point when the given coordinates are
 read as real numbers: touching counts, and there is no tolerance anywhere. The answer is sorted
 and depends on the input alone, not on method, backend, threads or memory.
 
@@ -18,40 +18,37 @@ those under the names of ipc-toolkit.
 """
 
 from . import ipc, ray, tiles
+from ._answers import Advance, Candidates, Impact, Impacts, Nearest, NearPairs, Pairs, Stats
 from ._check import check
+from ._detector import Detector
+from ._errors import (
+    Budget,
+    Cancelled,
+    DeviceError,
+    Error,
+    InternalError,
+    InvalidError,
+    OutOfMemory,
+    Seam,
+    TooManyPairs,
+)
+from ._functions import DeviceInfo, devices, hash_rows, pairs, self_pairs, weld
 from ._impinge import (
     FEATURES,
     KINDS,
     TYPES,
-    Advance,
     Body,
-    Cancelled,
     CancelToken,
-    Candidates,
     Contacts,
-    Detector,
-    Device,
-    Impact,
-    Impacts,
     Mesh,
-    Nearest,
-    NearPairs,
     Penetration,
-    Result,
-    Scene,
-    Seam,
-    Statistics,
-    TooManyPairs,
     __version__,
-    devices,
-    hash_rows,
-    pairs,
     read,
     read_bodies,
-    self_pairs,
-    weld,
 )
 from ._manager import CollisionManager
+from ._query import Query
+from ._scene import Scene
 
 __all__ = [
     "FEATURES",
@@ -59,23 +56,30 @@ __all__ = [
     "TYPES",
     "Advance",
     "Body",
+    "Budget",
     "CancelToken",
     "Cancelled",
     "Candidates",
     "CollisionManager",
     "Contacts",
     "Detector",
-    "Device",
+    "DeviceError",
+    "DeviceInfo",
+    "Error",
     "Impact",
     "Impacts",
+    "InternalError",
+    "InvalidError",
     "Mesh",
-    "Nearest",
     "NearPairs",
+    "Nearest",
+    "OutOfMemory",
+    "Pairs",
     "Penetration",
-    "Result",
+    "Query",
     "Scene",
     "Seam",
-    "Statistics",
+    "Stats",
     "TooManyPairs",
     "__version__",
     "check",
@@ -90,3 +94,9 @@ __all__ = [
     "tiles",
     "weld",
 ]
+
+for _name in __all__:
+    # Error messages, pickles and documentation name what users import.
+    if getattr(globals()[_name], "__module__", "").startswith("impinge._"):
+        globals()[_name].__module__ = "impinge"
+del _name

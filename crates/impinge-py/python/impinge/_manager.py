@@ -11,7 +11,10 @@ from weakref import ref
 import numpy as np
 import numpy.typing as npt
 
-from ._impinge import Body, Contacts, Detector, Result, Scene
+from ._answers import Pairs
+from ._detector import Detector
+from ._impinge import Body, Contacts
+from ._scene import Scene
 
 __all__ = ["CollisionManager", "ContactData", "DistanceData"]
 
@@ -417,12 +420,12 @@ class _Asked:
         return_names: bool,
         return_data: bool,
     ) -> Any:
-        bodies = None if across is None else [across]
+        asked = {"which": "between"} if across is None else {"_across": [across]}
         if not (return_names or return_data):
-            return self.detector._any(self.scene, bodies)
-        result = self.detector._detect(self.scene, bodies)
-        parts: list[Any] = [len(result) > 0]
-        touching = _Touching(self.detector, self.scene, result)
+            return self.detector._any(self.scene, asked)
+        pairs = Pairs(self.detector._detect(self.scene, asked))
+        parts: list[Any] = [len(pairs) > 0]
+        touching = _Touching(self.detector, self.scene, pairs)
         rows = touching.rows
         both, of_row, counts = np.unique(
             rows[:, [0, 2]], axis=0, return_inverse=True, return_counts=True
@@ -482,7 +485,7 @@ class _Asked:
         if nearest is None:
             parts: list[Any] = [float("inf"), None, None]
         else:
-            a, b = (int(body) for body in nearest.bodies)
+            a, b = int(nearest.body_a), int(nearest.body_b)
             distance = nearest.distance
             ends: Any = None
             if distance == 0:
@@ -490,7 +493,7 @@ class _Asked:
             if ends is None:
                 ends = tuple(nearest.points)
             first, second, swapped = self._sides(a, b, across)
-            i, j = nearest.primitives
+            i, j = nearest.element_a, nearest.element_b
             if swapped:
                 i, j = j, i
                 ends = (ends[1], ends[0])
@@ -579,18 +582,18 @@ class _Joint(_Asked):
 
 
 class _Touching:
-    """Where the pairs of a result meet. It is found when it is first asked for: convex bodies need none of it."""
+    """Where pairs meet. It is found when it is first asked for: convex bodies need none of it."""
 
-    def __init__(self, detector: Detector, scene: Scene, result: Result) -> None:
-        self._detector, self._scene, self._result = detector, scene, result
-        #: Those of the contacts, too. Each access to either makes a new array.
-        self.rows = result.rows
+    def __init__(self, detector: Detector, scene: Scene, pairs: Pairs) -> None:
+        self._detector, self._scene, self._pairs = detector, scene, pairs
+        #: Those of the contacts, too.
+        self.rows = pairs.rows
         #: Positions and elements, by the numbers of bodies: copies, too.
         self._meshes: dict[int, tuple[_Array, npt.NDArray[np.uint32]]] = {}
 
     @cached_property
     def contacts(self) -> Contacts:
-        return self._detector.contacts(self._scene, self._result)
+        return self._detector.contacts(self._scene, self._pairs)
 
     @cached_property
     def points(self) -> _Vector:

@@ -41,7 +41,9 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _impinge
-from ._impinge import Detector, Scene, Seam
+from ._detector import Detector
+from ._errors import Seam
+from ._scene import Scene
 
 __all__ = [
     "CollisionMesh",
@@ -226,7 +228,7 @@ class _Held:
 
     def __init__(self, mesh: CollisionMesh) -> None:
         self.process = os.getpid()
-        self.detector: Any = Detector(backend="cpu")
+        self.detector = Detector("cpu")
         self.scene = Scene()
         self._parts = mesh._parts
 
@@ -326,10 +328,10 @@ def is_step_collision_free(
     start, end, distance = _step(ours, vertices_t0, vertices_t1, min_distance)
     held = ours._held()
     scene = held.place(start, end)
-    free: bool = held.detector.is_free(
-        scene, start="verify", separation=distance, _filter=ours._filter(labels, _may(mesh, labels))
+    filtered = ours._filter(labels, _may(mesh, labels))
+    return held.detector._is_free(
+        scene, {"start": "verify", "separation": distance, "_filter": filtered}
     )
-    return free
 
 
 def compute_collision_free_stepsize(
@@ -389,21 +391,21 @@ def compute_collision_free_stepsize(
     held = ours._held()
     scene = held.place(start, end)
     try:
-        advance = held.detector.advance(
-            scene,
-            separation=distance,
-            clearance=_CLEARANCE,
+        options = {
+            "separation": distance,
+            "clearance": _CLEARANCE,
             # With all of its distance to lose, a pair still keeps what rounding moves.
-            clearance_share=max(1 - rescaling, 1e-9),
-            _filter=ours._filter(labels, _may(mesh, labels)),
-        )
+            "clearance_share": max(1 - rescaling, 1e-9),
+            "_filter": ours._filter(labels, _may(mesh, labels)),
+        }
+        advance = held.detector._advance(scene, options)
     except Seam:
         # Parts that have come to touch at a vertex are no seam: there is no step, as for all that
         # touches.
         if len(np.unique(ours._rest, axis=0)) < len(ours._rest):
             raise
         return 0.0
-    return float(advance.fraction)
+    return advance.fraction
 
 
 def has_intersections(
@@ -435,10 +437,7 @@ def has_intersections(
     scene = held.place(_positions(ours, vertices, "vertices"))
     may = _may(mesh, labels)
     if labels is None and may is None and not ours._is_mixed:
-        any_pair: bool = held.detector.any(
-            scene, between=True, within=True, shared_vertex="resolve"
-        )
-        return any_pair
+        return held.detector.any(scene)
     return _some_intersect(ours, held, labels, may)
 
 
@@ -454,13 +453,13 @@ def _some_intersect(
     may: Callable[[int, int], bool] | None,
 ) -> bool:
     """Whether any pairs intersect that may collide."""
-    pairs = held.detector.detect(held.scene, between=True, within=True, shared_vertex="resolve")
+    pairs = held.detector.detect(held.scene)
     label_of = mesh._labels(labels)
     of_body = []
     for body, (_, _, rows) in enumerate(mesh._parts):
         elements = held.scene.elements(body)
         of_body.append(elements if rows is None else rows[elements])
-    for body_a, a, body_b, b in pairs.rows.tolist():
+    for body_a, a, body_b, b in pairs:
         of_a, of_b = of_body[body_a][a].tolist(), of_body[body_b][b].tolist()
         if body_a != body_b and set(of_a) & set(of_b):
             continue

@@ -104,11 +104,10 @@ def check(
 def tiles(
     folder: _Path,
     *,
-    between: bool = True,
-    within: bool = True,
+    which: Literal["all", "between", "self"] = "all",
     shared_vertex: Literal["resolve", "skip"] = "resolve",
     start: Literal["report", "skip"] = "report",
-    toi: Literal["f32", "f64"] = "f32",
+    precision: Literal["f32", "f64"] = "f32",
     memory_budget: int | None = None,
     max_in_flight: int | None = None,
     max_retries: int = 3,
@@ -122,7 +121,7 @@ def tiles(
     ----------
     folder : path
         Seen by all machines under this path.
-    between, within, shared_vertex, start, toi, memory_budget
+    which, shared_vertex, start, precision, memory_budget
         As for `impinge.tiles.run`.
     max_in_flight, max_retries
         As for `check`.
@@ -156,11 +155,10 @@ def tiles(
         _tiles.run(
             path,
             [tile],
-            between=between,
-            within=within,
+            which=which,
             shared_vertex=shared_vertex,
             start=start,
-            toi=toi,
+            precision=precision,
             threads=1,
             memory_budget=memory_budget,
         )

@@ -123,11 +123,10 @@ def run(
     folder: _Path,
     tiles: Iterable[int] | None = None,
     *,
-    between: bool = True,
-    within: bool = True,
+    which: Literal["all", "between", "self"] = "all",
     shared_vertex: Literal["resolve", "skip"] = "resolve",
     start: Literal["report", "skip"] = "report",
-    toi: Literal["f32", "f64"] = "f32",
+    precision: Literal["f32", "f64"] = "f32",
     threads: int = 0,
     memory_budget: int | None = None,
     again: bool = False,
@@ -141,11 +140,11 @@ def run(
         With all parts.
     tiles : iterable of int, optional
         Which; by default all of them.
-    between, within : bool
-        Pairs of different files, pairs within each file. All tiles must be asked the same.
+    which : {"all", "between", "self"}
+        All pairs, those of different files, or those within each file. All tiles must be asked the same.
     shared_vertex : {"resolve", "skip"}
         As for `Detector.detect`. In a step neighbours never count.
-    start, toi
+    start, precision
         In a step, as for `Detector.impacts`.
     threads : int
         Threads; 0 for one per core.
@@ -166,8 +165,6 @@ def run(
     OSError, ValueError, RuntimeError
         No such tile; parts that are missing, stale or damaged; a detection that fails.
     """
-    if not (between or within):
-        raise ValueError("between and within: at least one of them must be asked")
     chosen = range(describe(folder)["tiles"]) if tiles is None else tiles
     numbers = list(chosen)
     n_done = 0
@@ -178,7 +175,7 @@ def run(
         if progress is not None:
             progress(n_done, len(numbers))
 
-    arguments = (between, within, shared_vertex, start, toi, threads, memory_budget, again, done)
+    arguments = (which, shared_vertex, start, precision, threads, memory_budget, again, done)
     return _impinge._tiles_run(os.fspath(folder), numbers, *arguments)
 
 
@@ -188,7 +185,7 @@ def merge(folder: _Path) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``pairs``, ``hash`` (as `Result.hash` in 16 hexadecimal digits), ``asked``, ``tiles``, ``records``, ``uncut_tiles``,
+        ``pairs``, ``hash`` (as `Pairs.hash` in 16 hexadecimal digits), ``asked``, ``tiles``, ``records``, ``uncut_tiles``,
         ``rows`` (the path of the rows). In a step also ``kinds`` (how many of each), ``touching_at_start`` and ``earliest``:
         ``(kind, (body_a, element_a, body_b, element_b), toi)`` or None.
 
@@ -206,7 +203,7 @@ def rows(folder: _Path) -> npt.NDArray[Any]:
     Returns
     -------
     numpy.ndarray of uint32, shape (n, 4)
-        As `Result.rows`, with bodies numbered by the order of files. In a step a structured array of shape (n,) with the fields
+        As `Pairs.rows`, with bodies numbered by the order of files. In a step a structured array of shape (n,) with the fields
         ``kind``, ``body_a``, ``element_a``, ``body_b``, ``element_b`` and ``toi``.
     """
     mapped: npt.NDArray[Any] = np.load(os.path.join(folder, "rows.npy"), mmap_mode="r")

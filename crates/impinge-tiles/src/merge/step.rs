@@ -3,8 +3,8 @@
 use std::fs;
 use std::path::Path;
 
-use impinge::{PairKind, Toi, hash_impact_rows};
-use impinge_io::write_impacts_npy;
+use impinge::{PairKind, Precision, hash_impact_rows};
+use impinge_io::{Cell, Table, TableFormat, impact_columns};
 
 use super::{MergedStep, STEP, each_sorted, open_all};
 use crate::disk;
@@ -44,11 +44,14 @@ impl Plan {
             .collect();
         rows.sort_unstable_by_key(|&(kind, row, _)| (kind, row));
         // All tiles have answered the same question.
-        let toi = results[0].step.map_or(Toi::F32, |step| step.toi);
-        let named = rows
-            .iter()
-            .map(|&(kind, row, time)| (kind.name(), row, time));
-        disk::replace(path, |to| write_impacts_npy(to, named, toi == Toi::F64))?;
+        let toi = results[0].step.map_or(Precision::F32, |step| step.toi);
+        let table = Table::new(TableFormat::Npy, impact_columns(toi == Precision::F64));
+        disk::replace(path, |to| {
+            to.write_all(&table.header(Some(rows.len() as u64)))?;
+            rows.iter().try_for_each(|&(kind, row, toi)| {
+                table.row(to, &Cell::impact(kind.name(), row, toi))
+            })
+        })?;
         let first = |a: Row, b: Row| if b.2 < a.2 { b } else { a };
         let of = |kind: PairKind| rows.iter().filter(|row| row.0 == kind).count() as u64;
         let step = MergedStep {

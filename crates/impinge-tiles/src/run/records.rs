@@ -170,7 +170,7 @@ impl Records {
                 3 => numbers.as_chunks::<3>().0.to_vec().into(),
                 _ => numbers.as_chunks::<4>().0.to_vec().into(),
             };
-            part.scene.add(elements, positions)?;
+            part.scene.add((elements, positions))?;
             part.bodies.push(runs);
         }
         Ok(part)

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use impinge::{Control, Detector, Step, hash_rows};
+use impinge::{Detector, hash_rows};
 
 use super::ranges::both;
 use super::records::Records;
@@ -19,7 +19,6 @@ impl Plan {
         records: &Records,
         ask: Ask,
         detector: &mut Detector,
-        control: &Control<'_>,
     ) -> Result<TileResult, Error> {
         let refused = refused(tile);
         let is_mine = |point| self.cells.owner(point) == tile;
@@ -29,13 +28,14 @@ impl Plan {
         let whole: Range<usize> = 0..n_faces;
         let whole = surfaces.scene(&[whole]).map_err(refused)?;
         let names = whole.to_number(is_mine).map_err(refused)?;
-        let step = Step::new(ask.query())
+        let step = ask
+            .query()
             .start(ask.start)
-            .toi(ask.toi)
+            .precision(ask.precision)
             .separation(self.separation);
         let (mut rows, mut n_elsewhere) = (Vec::new(), 0);
         let mut find = |part: &SurfaceScene<'_>| {
-            let impacts = detector.impacts_with(&part.scene, &step, control)?;
+            let impacts = detector.impacts(&part.scene, &step)?;
             for impact in impacts.iter() {
                 let (elements, point) = part.named(impact)?;
                 if is_mine(point) {
@@ -74,7 +74,7 @@ impl Plan {
             step: Some(OfStep {
                 n_names: names.len() as u64,
                 names_hash: hash_rows(names.iter().copied()),
-                toi: ask.toi,
+                toi: ask.precision,
             }),
             n_elsewhere,
             n_pieces: pieces.len() as u64,

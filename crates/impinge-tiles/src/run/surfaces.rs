@@ -69,7 +69,7 @@ impl Surface {
     ) -> Result<Self, impinge::Error> {
         let mut scene = Scene::new();
         let all: Vec<u32> = (0..self.vertices.len() as u32).collect();
-        let id = scene.add(tetrahedra.to_vec(), self.at(0, &all))?;
+        let id = scene.add((tetrahedra.to_vec(), self.at(0, &all)))?;
         let body = scene.body(id)?;
         let Elements::Triangles(faces) = body.part(Part::Faces) else {
             unreachable!("faces are triangles");
@@ -171,7 +171,7 @@ impl<'a> SurfaceScene<'a> {
             .map(|corners| corners.map(|v| place[v as usize]))
             .collect();
         let [start, end] = [0, 1].map(|pose| surface.at(pose, &vertices));
-        let id = self.scene.add(triangles, start)?;
+        let id = self.scene.add((triangles, start))?;
         match end {
             Positions::F32(end) => self.scene.set_end_positions(id, &end)?,
             Positions::F64(end) => self.scene.set_end_positions(id, &end)?,
@@ -187,9 +187,9 @@ impl<'a> SurfaceScene<'a> {
 
     /// The elements of an impact, and the point that decides to which tile it belongs.
     pub fn named(&self, impact: &Impact) -> Result<([Element; 2], Point), impinge::Error> {
-        let named = |part, element: impinge::Primitive| {
+        let named = |part, element: impinge::Element| {
             let body = &self.bodies[element.body.index()];
-            self.element(body, part, element.primitive as usize)
+            self.element(body, part, element.element as usize)
         };
         let [part_a, part_b] = impact.kind.parts();
         let (a, low_a) = named(part_a, impact.a)?;

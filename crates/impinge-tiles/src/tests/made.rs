@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use impinge::{CancelToken, Control, Detector, Impacts, Method, Query, Scene, Settings, Step};
+use impinge::{CancelToken, Control, Detector, Impacts, Method, Query, Scene, Settings};
 use impinge_io::{ColoredMesh, Elements, Mesh, Positions, Weld, write_ply};
 
 use crate::{Ask, Cells, Merged, Plan, PlanOptions, RunOptions, ScatterOptions};
@@ -143,12 +143,12 @@ fn add(scene: &mut Scene, mesh: &Mesh) -> impinge::BodyId {
         Positions::F32(positions) => positions.into(),
         Positions::F64(positions) => positions.into(),
     };
-    scene.add(elements, positions).unwrap()
+    scene.add((elements, positions)).unwrap()
 }
 
 /// Every box against every box.
 fn naive() -> Detector {
-    Detector::with_settings(Settings {
+    Detector::new(Settings {
         method: Method::Naive,
         threads: 1,
         ..Settings::default()
@@ -158,9 +158,9 @@ fn naive() -> Detector {
 
 fn query(ask: Ask) -> Query {
     match (ask.between, ask.within) {
-        (true, true) => Query::everything(),
-        (true, false) => Query::all(),
-        _ => Query::all_within(),
+        (true, true) => Query::all(),
+        (true, false) => Query::between_all(),
+        _ => Query::self_all(),
     }
 }
 
@@ -201,11 +201,11 @@ pub fn step_oracle(bodies: &[[Mesh; 2]], options: &PlanOptions, ask: Ask) -> Imp
             Positions::F64(end) => scene.set_end_positions(id, end).unwrap(),
         }
     }
-    let step = Step::new(query(ask))
+    let step = query(ask)
         .start(ask.start)
-        .toi(ask.toi)
+        .precision(ask.precision)
         .separation(options.separation);
-    naive().impacts(&scene, &step).unwrap().clone()
+    naive().impacts(&scene, &step).unwrap()
 }
 
 pub fn one_thread() -> Settings {
@@ -233,7 +233,7 @@ pub fn run(plan: &Plan, ask: Ask) -> Result<(), crate::Error> {
         settings: one_thread(),
         again: false,
     };
-    plan.run(0..plan.n_tiles(), &options, &Control::new(), &mut |_| {})
+    plan.run(0..plan.n_tiles(), &options, Control::new(), &mut |_| {})
 }
 
 /// All steps.

@@ -192,7 +192,7 @@ fn tiles_that_were_asked_differently_are_not_merged() {
         ask: skip,
         ..crate::RunOptions::default()
     };
-    plan.run([1], &options, &impinge::Control::new(), &mut |_| {})
+    plan.run([1], &options, impinge::Control::new(), &mut |_| {})
         .unwrap();
     assert!(matches!(
         plan.merge(),

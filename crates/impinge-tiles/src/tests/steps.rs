@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
-use impinge::{PairKind, Start, Toi};
-use impinge_io::{Elements, Mesh, Positions, Weld, write_impacts_npy};
+use impinge::{PairKind, Precision, Start};
+use impinge_io::{Cell, Elements, Mesh, Positions, Table, TableFormat, Weld, impact_columns};
 
 use super::made::{Random, answer, cells, lattice, moved, plan, run, scatter, step_oracle, write};
 use super::refusals::{npy, soup};
@@ -55,9 +55,15 @@ fn compare(
         .iter()
         .map(|impact| (impact.kind, impact.row(), impact.toi))
         .collect();
-    let named = rows.iter().map(|&(kind, row, toi)| (kind.name(), row, toi));
-    let mut expected = Vec::new();
-    write_impacts_npy(&mut expected, named, ask.toi == Toi::F64).unwrap();
+    let table = Table::new(
+        TableFormat::Npy,
+        impact_columns(ask.precision == Precision::F64),
+    );
+    let mut expected = table.header(Some(rows.len() as u64));
+    for &(kind, row, toi) in &rows {
+        let cells = Cell::impact(kind.name(), row, toi);
+        table.row(&mut expected, &cells).unwrap();
+    }
     assert_eq!(std::fs::read(&merged.rows).unwrap(), expected, "{what}");
     assert_eq!(
         (merged.n_pairs, merged.hash),
@@ -70,14 +76,15 @@ fn compare(
         step.kinds,
         kinds.map(|kind| (kind, impacts.of(kind).len() as u64))
     );
-    assert_eq!(step.touching_at_start, impacts.touching_at_start() as u64);
+    let n_at_start = impacts.iter().filter(|impact| impact.at_start).count();
+    assert_eq!(step.touching_at_start, n_at_start as u64);
     let earliest = impacts.earliest();
     let earliest = earliest.map(|impact| (impact.kind, impact.row(), impact.toi));
     assert_eq!(step.earliest, earliest, "{what}");
     [
         impacts.of(kinds[0]).len(),
         impacts.of(kinds[1]).len(),
-        impacts.touching_at_start(),
+        n_at_start,
     ]
 }
 
@@ -102,7 +109,7 @@ fn tiles_have_the_impacts_of_the_whole() {
             between,
             within,
             start: [Start::Report, Start::Skip][random.below(2) as usize],
-            toi: [Toi::F32, Toi::F64][random.below(2) as usize],
+            precision: [Precision::F32, Precision::F64][random.below(2) as usize],
             ..Ask::default()
         };
         let unit = if is_f64 { 1.0 / 3.0 } else { 0.25 };
@@ -301,13 +308,13 @@ fn what_is_no_step_is_refused_by_name() {
         ..PlanOptions::default()
     };
     let double = Ask {
-        toi: Toi::F64,
+        precision: Precision::F64,
         ..Ask::default()
     };
     assert!(
         refusal(&files, &still, double)
             .to_string()
-            .starts_with("toi: f64 given")
+            .starts_with("precision: f64 given")
     );
     // An end that changes after the plan is noticed, and so is a list of names that is missing.
     let mut other_end = bodies[0][1].clone();

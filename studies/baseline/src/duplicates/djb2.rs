@@ -17,7 +17,7 @@ use impinge_core::scene::index::{PartIx, Slot};
 use impinge_core::search::runner::Job;
 use impinge_core::search::sink::Answer;
 use impinge_core::simd::Isa;
-use impinge_core::{Error, Statistics};
+use impinge_core::{Error, Stats};
 
 use super::Possible;
 
@@ -72,7 +72,7 @@ impl Table {
         &mut self,
         job: Job<'_>,
         answer: &Arc<Answer>,
-        stats: &mut Statistics,
+        stats: &mut Stats,
     ) -> Result<(), Error> {
         let Table {
             isa,

@@ -22,9 +22,9 @@ impl Case {
         let add = |scene: &mut Scene, model: &Model| {
             let elements = model.elements.clone();
             if double {
-                scene.add(elements, model.positions_f64()).unwrap()
+                scene.add((elements, model.positions_f64())).unwrap()
             } else {
-                scene.add(elements, model.positions.clone()).unwrap()
+                scene.add((elements, model.positions.clone())).unwrap()
             }
         };
         let (a, b) = (add(&mut scene, a), add(&mut scene, b));
@@ -43,7 +43,7 @@ impl Case {
 
 /// The answer of the oracle.
 pub fn oracle(case: &Case) -> Vec<[u32; 4]> {
-    let mut detector = Detector::with_settings(Settings {
+    let mut detector = Detector::new(Settings {
         method: Method::Naive,
         backend: Backend::Cpu,
         ..Settings::default()

@@ -2,14 +2,15 @@
 
 use std::io::{self, Write};
 
-use impinge::{Error, Impact, Impacts, PairKind, Statistics};
+use impinge::{Advance, Error, Impact, Impacts, PairKind, Stats};
 use impinge_io::printable;
 use serde_json::{Map, Value, json};
 
 use crate::args::StepHow;
 use crate::detection::{Times, hit};
-use crate::json::{counters, rounded};
-use crate::text::{counted, grouped, hex};
+use crate::json::counters;
+use crate::text::{self, counted, grouped, hex};
+use crate::{json, output};
 
 use super::load::Moving;
 
@@ -27,7 +28,9 @@ pub struct Found<'a> {
     /// Whether elements intersect at the start, if that was asked.
     start_intersects: Option<bool>,
     all: Option<&'a Impacts>,
-    stats: &'a Statistics,
+    /// The part of the step that can be taken, if that was asked.
+    fraction: Option<f64>,
+    stats: &'a Stats,
     times: Times,
 }
 
@@ -38,6 +41,7 @@ impl<'a> Found<'a> {
             earliest: impacts.earliest(),
             start_intersects: impacts.start_intersects(),
             all: Some(impacts),
+            fraction: None,
             stats: impacts.stats(),
             times: earlier.and(impacts.stats()),
         }
@@ -46,15 +50,28 @@ impl<'a> Found<'a> {
     pub fn first(
         earliest: Option<Impact>,
         start_intersects: Option<bool>,
-        stats: &'a Statistics,
+        stats: &'a Stats,
         earlier: Times,
     ) -> Self {
         Found {
             earliest,
             start_intersects,
             all: None,
+            fraction: None,
             stats,
             times: earlier.and(stats),
+        }
+    }
+
+    pub fn advance(advance: &Advance, stats: &'a Stats) -> Self {
+        Found {
+            fraction: Some(advance.fraction),
+            ..Found::first(
+                advance.first,
+                advance.start_intersects,
+                stats,
+                Times::default(),
+            )
         }
     }
 
@@ -72,9 +89,12 @@ impl<'a> Found<'a> {
     }
 
     /// `free`, `earliest`, `impacts`, `kinds`, `touching_at_start`, `start_intersects`, `hash`, `backend`, `bodies`, `ms`, `stats`, `separation`,
-    /// `clearance`; counts and the hash are null with `--earliest`.
+    /// `clearance`, and `fraction` with `--advance`; counts and the hash are null with `--earliest` and `--advance`.
     pub fn json(&self, bodies: &Moving, how: &StepHow) -> Result<Map<String, Value>, Error> {
         let mut object = self.numbers();
+        if let Some(fraction) = self.fraction {
+            object.insert("fraction".into(), fraction.into());
+        }
         object.insert("bodies".into(), described(bodies)?);
         object.insert("ms".into(), self.ms());
         object.insert("stats".into(), counters(self.stats));
@@ -85,19 +105,13 @@ impl<'a> Found<'a> {
 
     /// The keys that the lines of a sequence also have.
     pub fn numbers(&self) -> Map<String, Value> {
-        let kinds = |impacts: &Impacts| {
-            let counted = KINDS.map(|kind| (kind.name().to_owned(), impacts.of(kind).len().into()));
-            Value::Object(counted.into_iter().collect())
-        };
+        let kinds = |all| json::kinds(counts(all));
         let mut object = Map::new();
         object.insert("free".into(), self.is_free().into());
         object.insert("earliest".into(), self.earliest.map_or(Value::Null, impact));
         object.insert("impacts".into(), json!(self.all.map(Impacts::len)));
         object.insert("kinds".into(), self.all.map_or(Value::Null, kinds));
-        object.insert(
-            "touching_at_start".into(),
-            json!(self.all.map(Impacts::touching_at_start)),
-        );
+        object.insert("touching_at_start".into(), json!(self.all.map(n_at_start)));
         object.insert("start_intersects".into(), json!(self.start_intersects));
         object.insert("hash".into(), json!(self.all.map(|all| hex(all.hash()))));
         object.insert("backend".into(), self.stats.backend.as_str().into());
@@ -105,14 +119,9 @@ impl<'a> Found<'a> {
         object
     }
 
-    /// Times of the stages, and the total time: medians, if the question was asked more than once.
+    /// Times of the stages, and the total time.
     pub fn ms(&self) -> Value {
-        let stages: Map<String, Value> = self
-            .times
-            .stages_ms()
-            .map(|(name, ms)| (name.to_owned(), rounded(ms).into()))
-            .collect();
-        json!({ "total": rounded(self.times.total_ms(50)), "stages": stages })
+        json::ms(&self.times)
     }
 
     /// Prints the answer in the first line, then counts.
@@ -149,12 +158,12 @@ impl<'a> Found<'a> {
             Some(first) => writeln!(
                 to,
                 "not free: {}{} and {} of {} {} first, {}",
-                element(first.kind, first.a.primitive, true),
+                element(first.kind, first.a.element, true),
                 match first.a.body == first.b.body {
                     true => String::new(),
                     false => format!(" of {}", name(first.a.body)),
                 },
-                element(first.kind, first.b.primitive, false),
+                element(first.kind, first.b.element, false),
                 name(first.b.body),
                 match (separation > 0.0, clearance > 0.0) {
                     (_, true) if !first.at_start => {
@@ -172,54 +181,38 @@ impl<'a> Found<'a> {
         if self.earliest.is_some() && self.start_intersects == Some(true) {
             writeln!(to, "elements intersect at the start")?;
         }
+        if let Some(fraction) = self.fraction {
+            writeln!(to, "{fraction:?} of the step can be taken")?;
+        }
         if let Some(all) = self.all.filter(|all| !all.is_empty()) {
-            let counts: Vec<String> = KINDS
-                .iter()
-                .map(|&kind| (kind, all.of(kind).len()))
-                .filter(|&(_, n)| n > 0)
-                .map(|(kind, n)| format!("{} {}", grouped(n as u64), kind.name()))
-                .collect();
             writeln!(
                 to,
                 "{} ({}), {} touching at the start, hash {}",
                 counted(all.len() as u64, "impact"),
-                counts.join(", "),
-                grouped(all.touching_at_start() as u64),
+                text::kinds(counts(all)),
+                grouped(n_at_start(all) as u64),
                 hex(all.hash())
             )?;
         }
-        writeln!(
-            to,
-            "{} on {}, {}; {}, {} unsure; {:.3} ms{}",
-            self.stats.method,
-            self.stats.backend,
-            counted(self.stats.n_threads as u64, "thread"),
-            counted(self.stats.n_candidates, "candidate"),
-            grouped(self.stats.n_unsure),
-            self.times.total_ms(50),
-            match self.times.n_frames() {
-                1 => String::new(),
-                n => format!(", median of {n}"),
-            }
-        )?;
-        Ok(())
+        writeln!(to, "{}", output::how(self.stats, &self.times))
     }
+}
+
+fn counts(impacts: &Impacts) -> [(PairKind, u64); KINDS.len()] {
+    KINDS.map(|kind| (kind, impacts.of(kind).len() as u64))
+}
+
+fn n_at_start(impacts: &Impacts) -> usize {
+    impacts.iter().filter(|impact| impact.at_start).count()
 }
 
 /// The bodies as JSON objects.
 pub fn described(bodies: &Moving) -> Result<Value, Error> {
     let all = bodies.ids.iter().zip(&bodies.names).zip(&bodies.vertices);
     all.map(|((&id, [start, end]), vertices)| {
-        let body = bodies.scene.body(id)?;
-        Ok(json!({
-            "name": start,
-            "end": end,
-            "kind": body.kind().name(),
-            "primitives": body.n_primitives(),
-            "vertices": body.n_vertices(),
-            "welded": vertices.n_welded,
-            "coincident": vertices.n_coincident,
-        }))
+        let mut object = json::body(&bodies.scene, id, start, vertices)?;
+        object["end"] = end.as_str().into();
+        Ok(object)
     })
     .collect()
 }

@@ -4,15 +4,16 @@ use std::io::{self, Write};
 use std::ops::ControlFlow;
 use std::time::Instant;
 
-use impinge::{CandidateQuery, Candidates, Control, Detector, PairKind, Statistics};
-use impinge_io::{npy_header, npy_header_in};
-use serde_json::{Map, Value, json};
+use impinge::{Candidates, Detector, PairKind, Query, Stats};
+use impinge_io::{Cell, ELEMENTS, KIND};
+use serde_json::{Value, json};
 
+use crate::asked::Asked;
 use crate::error::Error;
-use crate::json::{counters, rounded};
-use crate::target::Target;
-use crate::text::{counted, grouped, hex};
-use crate::values::{RowsFile, RowsFormat};
+use crate::json::{self, counters, rounded};
+use crate::rows::Rows;
+use crate::text::{self, counted, hex};
+use crate::values::RowsFile;
 
 use super::answer;
 use super::load::Moving;
@@ -28,32 +29,44 @@ pub struct Written {
     n_runs: u64,
     ms: f64,
     /// Of the last run.
-    stats: Statistics,
+    stats: Stats,
 }
 
 /// Finds candidates and writes rows `kind, body_a, element_a, body_b, element_b`, sorted.
 pub fn write(
     file: &RowsFile,
-    (detector, bodies, query): (&mut Detector, &Moving, &CandidateQuery),
-    control: &Control<'_>,
+    (detector, bodies): (&mut Detector, &Moving),
+    (inflation, query): (f64, &Query),
 ) -> Result<Written, Error> {
-    let mut rows = Rows::create(file)?;
+    let columns = [&[KIND][..], &ELEMENTS].concat();
+    let mut rows = Rows::create(file, columns, None)?;
     let mut written = Written::default();
     let start = Instant::now();
-    let mut each = |run: Candidates| match rows.put(&run) {
+    let mut each = |run: Candidates| match rows.put(cells(&run)) {
         Ok(()) => {
             written.add(&run);
             ControlFlow::Continue(())
         }
         Err(error) => ControlFlow::Break(error),
     };
-    let found = detector.candidates_in_runs_with(&bodies.scene, query, MOST, &mut each, control)?;
+    let found = detector.candidates_in_runs(&bodies.scene, inflation, query, MOST, &mut each)?;
     if let ControlFlow::Break(error) = found {
         return Err(error);
     }
     rows.finish()?;
     written.ms = start.elapsed().as_secs_f64() * 1e3;
     Ok(written)
+}
+
+fn cells(run: &Candidates) -> impl Iterator<Item = [Cell<'static>; 5]> + '_ {
+    let of = |kind: PairKind| {
+        let kind_cell = Cell::Text(kind.name());
+        run.rows(kind).map(move |row| {
+            let [body_a, a, body_b, b] = row.map(Cell::Number);
+            [kind_cell, body_a, a, body_b, b]
+        })
+    };
+    PairKind::ALL.into_iter().flat_map(of)
 }
 
 impl Written {
@@ -66,23 +79,29 @@ impl Written {
         self.stats = run.stats().clone();
     }
 
+    fn kinds(&self) -> [(PairKind, u64); PairKind::ALL.len()] {
+        PairKind::ALL.map(|kind| (kind, self.counts[kind as usize]))
+    }
+
     fn n(&self) -> u64 {
         self.counts.iter().sum()
     }
 
-    /// `candidates`, `kinds`, `hash`, `runs`, `distance`, `bodies`, `ms`, `stats`; `ms` holds the time of
+    /// `candidates`, `kinds`, `hash`, `runs`, `inflation`, `asked`, `bodies`, `ms`, `stats`; `ms` holds the time of
     /// finding and writing all runs, `stats` the counters of the last one.
-    pub fn json(&self, bodies: &Moving, distance: f64) -> Result<Value, impinge::Error> {
-        let kinds = PairKind::ALL.into_iter().zip(self.counts);
-        let kinds: Map<String, Value> = kinds
-            .map(|(kind, n)| (kind.name().to_owned(), n.into()))
-            .collect();
+    pub fn json(
+        &self,
+        bodies: &Moving,
+        inflation: f64,
+        asked: Asked,
+    ) -> Result<Value, impinge::Error> {
         Ok(json!({
             "candidates": self.n(),
-            "kinds": kinds,
+            "kinds": json::kinds(self.kinds()),
             "hash": hex(self.hash),
             "runs": self.n_runs,
-            "distance": distance,
+            "inflation": inflation,
+            "asked": asked.json(),
             "bodies": answer::described(bodies)?,
             "ms": { "total": rounded(self.ms) },
             "stats": counters(&self.stats),
@@ -91,20 +110,14 @@ impl Written {
 
     /// Prints counts in one line, and how they were found in another.
     pub fn print(&self, to: &mut impl Write) -> io::Result<()> {
-        let counts: Vec<String> = PairKind::ALL
-            .into_iter()
-            .zip(self.counts)
-            .filter(|&(_, n)| n > 0)
-            .map(|(kind, n)| format!("{} {}", grouped(n), kind.name()))
-            .collect();
-        if counts.is_empty() {
+        if self.n() == 0 {
             return writeln!(to, "no candidates");
         }
         writeln!(
             to,
             "{} ({}), hash {}",
             counted(self.n(), "candidate"),
-            counts.join(", "),
+            text::kinds(self.kinds()),
             hex(self.hash)
         )?;
         writeln!(
@@ -115,82 +128,5 @@ impl Written {
             counted(self.n_runs, "run"),
             self.ms
         )
-    }
-}
-
-/// A file of candidates.
-struct Rows {
-    format: RowsFormat,
-    to: Target,
-    n: u64,
-}
-
-impl Rows {
-    fn create(file: &RowsFile) -> Result<Self, Error> {
-        let mut to = Target::create(file)?;
-        match file.format {
-            RowsFormat::Npy => to.write(|to| to.write_all(&longest_header()))?,
-            RowsFormat::Csv => {
-                to.write(|to| writeln!(to, "kind,body_a,element_a,body_b,element_b"))?;
-            }
-            RowsFormat::Jsonl => {}
-        }
-        Ok(Rows {
-            format: file.format,
-            to,
-            n: 0,
-        })
-    }
-
-    fn put(&mut self, run: &Candidates) -> Result<(), Error> {
-        let format = self.format;
-        self.n += run.len() as u64;
-        self.to.write(|to| {
-            for kind in PairKind::ALL {
-                for row in run.rows(kind) {
-                    put(to, format, kind, row)?;
-                }
-            }
-            Ok(())
-        })
-    }
-
-    /// Writes the number of rows into the header, and gives the file its name.
-    fn finish(mut self) -> Result<(), Error> {
-        if self.format == RowsFormat::Npy {
-            self.to
-                .write_start(&header(longest_header().len(), self.n))?;
-        }
-        self.to.finish()
-    }
-}
-
-/// The fields of a packed structured array: `kind` is two characters of four bytes each, as in NumPy.
-const FIELDS: &str = "[('kind', '<U2'), ('body_a', '<u4'), ('element_a', '<u4'), ('body_b', '<u4'), ('element_b', '<u4')]";
-
-fn header(n_bytes: usize, n: u64) -> Vec<u8> {
-    npy_header_in(n_bytes, FIELDS, &format!("({n},)"))
-}
-
-/// A header with room for any number of rows.
-fn longest_header() -> Vec<u8> {
-    npy_header(FIELDS, &format!("({},)", u64::MAX))
-}
-
-fn put(to: &mut dyn Write, format: RowsFormat, kind: PairKind, row: [u32; 4]) -> io::Result<()> {
-    let [body_a, a, body_b, b] = row;
-    let name = kind.name();
-    match format {
-        RowsFormat::Npy => {
-            for letter in name.chars() {
-                to.write_all(&u32::from(letter).to_le_bytes())?;
-            }
-            to.write_all(row.map(u32::to_le_bytes).as_flattened())
-        }
-        RowsFormat::Csv => writeln!(to, "{name},{body_a},{a},{body_b},{b}"),
-        RowsFormat::Jsonl => writeln!(
-            to,
-            "{{\"kind\":\"{name}\",\"body_a\":{body_a},\"element_a\":{a},\"body_b\":{body_b},\"element_b\":{b}}}"
-        ),
     }
 }

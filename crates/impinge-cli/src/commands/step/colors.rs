@@ -35,15 +35,15 @@ impl Times {
                 match part {
                     Part::Edges => put(
                         &mut times.edges,
-                        sorted(edges.corners(element.primitive as usize)),
+                        sorted(edges.corners(element.element as usize)),
                         toi,
                     ),
                     Part::Faces => put(
                         &mut times.faces,
-                        sorted(faces.corners(element.primitive as usize)),
+                        sorted(faces.corners(element.element as usize)),
                         toi,
                     ),
-                    _ => put(&mut times.vertices, element.primitive, toi),
+                    _ => put(&mut times.vertices, element.element, toi),
                 }
             }
         }

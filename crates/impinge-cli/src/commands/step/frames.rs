@@ -3,12 +3,13 @@
 use std::io::Write;
 use std::ops::Range;
 
-use impinge::{BodyId, Control, Detector, Positions, Scene, Step};
+use impinge::{BodyId, Detector, Positions, Query, Scene};
 use serde_json::{Map, Value};
 
 use crate::detection::{Times, hit, set_positions};
 use crate::error::Error;
 use crate::output::out;
+use crate::rows::{self, Rows};
 use crate::text::{counted, grouped};
 
 use super::answer::Found;
@@ -34,6 +35,13 @@ impl Steps {
     }
 }
 
+/// Where the steps of a sequence are shown.
+pub struct Shown {
+    pub json: bool,
+    pub text: bool,
+    pub rows: Option<Rows>,
+}
+
 /// A source of frames.
 pub trait Frames {
     /// The positions of a frame.
@@ -45,14 +53,13 @@ pub trait Frames {
 /// Steps from each frame of a range to the next, the body `moving` in motion and all others at rest.
 pub fn steps_of_sequence(
     (detector, scene, moving): (&mut Detector, &mut Scene, BodyId),
-    step: &Step,
+    step: &Query,
     frames: &impl Frames,
     range: Range<usize>,
-    is_json: bool,
-    control: &Control<'_>,
+    mut shown: Shown,
     frame_done: impl Fn(),
 ) -> Result<Steps, Error> {
-    if !is_json {
+    if shown.text {
         writeln!(
             out(),
             "{:>13} {:>11} {:>23} {:>11}  hash",
@@ -72,20 +79,27 @@ pub fn steps_of_sequence(
         set_positions(scene, moving, &start).map_err(|source| frames.refused(frame_ix, source))?;
         set_end_positions(scene, moving, &end)
             .map_err(|source| frames.refused(frame_ix + 1, source))?;
-        let impacts = detector.impacts_with(scene, step, control)?;
-        let found = Found::all(impacts, Times::default());
+        let impacts = detector.impacts(scene, step)?;
+        let found = Found::all(&impacts, Times::default());
         steps.n += 1;
         steps.n_free += u64::from(found.is_free());
         let intersects = impacts.start_intersects() == Some(true);
         steps.n_asked += u64::from(impacts.start_intersects().is_some());
         steps.n_intersecting += u64::from(intersects);
-        if is_json {
+        if let Some(rows) = &mut shown.rows {
+            let frame = rows::frame(frame_ix);
+            rows.put(impacts.iter().map(|found| {
+                let [kind, body_a, a, body_b, b, toi] = rows::impact(found);
+                [frame, kind, body_a, a, body_b, b, toi]
+            }))?;
+        }
+        if shown.json {
             let mut line = Map::new();
             line.insert("frame".into(), frame_ix.into());
             line.extend(found.numbers());
             line.insert("ms".into(), found.ms());
             writeln!(out(), "{}", Value::Object(line))?;
-        } else {
+        } else if shown.text {
             let first = impacts.earliest();
             writeln!(
                 out(),
@@ -105,7 +119,10 @@ pub fn steps_of_sequence(
         frame_done();
         start = end;
     }
-    if !is_json {
+    if let Some(rows) = shown.rows {
+        rows.finish()?;
+    }
+    if shown.text {
         writeln!(
             out(),
             "{}, {} free of contact{}",

@@ -3,13 +3,21 @@
 use std::path::Path;
 
 use impinge::{BodyId, CancelToken, Positions, Scene};
-use impinge_io::{Format, Mesh, ReadOptions, Weld, printable, read_with_summary};
+use impinge_io::{Elements, Format, Mesh, ReadOptions, Weld, printable, read_with_summary};
 
 use crate::args::StepArgs;
 use crate::detection::set_positions;
 use crate::error::Error;
 use crate::load::{Vertices, note, to_elements, to_positions};
 use crate::watch::go_on;
+
+/// A body as its files have it, before vertices are welded.
+#[derive(Debug)]
+pub struct Given {
+    pub elements: Elements,
+    /// The vertex of the scene for each vertex of the files; `None` if they are the same.
+    pub map: Option<Vec<u32>>,
+}
 
 /// A scene whose bodies have end positions, and the files of the bodies.
 #[derive(Debug, Default)]
@@ -18,6 +26,8 @@ pub struct Moving {
     pub ids: Vec<BodyId>,
     /// The files of each body's start and end.
     pub names: Vec<[String; 2]>,
+    /// The bodies before welding, if they are to be written.
+    pub given: Vec<Given>,
     /// Vertices that share their position with another one at both ends.
     pub vertices: Vec<Vertices>,
 }
@@ -59,6 +69,13 @@ impl Moving {
         let (mut at_start, summary) = read_with_summary(start, &ReadOptions::as_they_are())?;
         let (mut at_end, _) = read_with_summary(end, &ReadOptions::as_they_are())?;
         same_elements(&names, &at_start, &at_end)?;
+        if !args.advance.is_empty() {
+            let elements = at_start.elements.clone();
+            self.given.push(Given {
+                elements,
+                map: None,
+            });
+        }
         let mut vertices = Vertices::default();
         // Triangles of an STL file share nothing except positions.
         let welds = args.weld
@@ -70,14 +87,25 @@ impl Moving {
             if welds {
                 weld.apply(&mut at_start);
                 weld.apply(&mut at_end);
-                vertices.n_welded = weld.n_welded();
-                vertices.n_coincident = Some(0);
+                if let Some(given) = self.given.last_mut() {
+                    given.map = (weld.n_welded() > 0).then(|| weld.map().to_vec());
+                }
+                vertices = Vertices {
+                    welds,
+                    n_welded: weld.n_welded(),
+                    n_coincident: Some(0),
+                };
             } else {
                 vertices.n_coincident = Some(weld.n_welded());
             }
         }
         if !args.json {
-            note(&names[0], &summary, vertices);
+            // The last line of the answer says how many were welded.
+            let told = Vertices {
+                n_welded: 0,
+                ..vertices
+            };
+            note(&names[0], &summary, told);
         }
         // No coordinate changes its value; this halves the memory if all coordinates fit in f32.
         at_start.positions.narrow_if_exact();
@@ -92,7 +120,7 @@ impl Moving {
         );
         let id = self
             .scene
-            .add(elements, positions)
+            .add((elements, positions))
             .map_err(refused(&names[0]))?;
         set_end_positions(&mut self.scene, id, &to_positions(at_end.positions))
             .map_err(refused(&names[1]))?;

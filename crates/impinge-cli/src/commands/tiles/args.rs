@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 
-use crate::args::{MethodArg, SharedVertexArg, StartArg, ToiArg};
+use crate::args::{MethodArg, PrecisionArg, SharedVertexArg, StartArg};
 use crate::values::{bytes, count, distance};
 
 /// Shown below the help.
@@ -129,8 +129,8 @@ pub struct RunArgs {
     #[arg(long, value_enum, value_name = "RULE", default_value_t = SharedVertexArg::Resolve)]
     pub shared_vertex: SharedVertexArg,
     /// Of a step: the precision to which times are rounded down
-    #[arg(long, value_enum, value_name = "PRECISION", default_value_t = ToiArg::F32)]
-    pub toi: ToiArg,
+    #[arg(long, value_enum, value_name = "P", default_value_t = PrecisionArg::F32, alias = "toi")]
+    pub precision: PrecisionArg,
     /// Of a step: pairs that touch at the start are reported with the time 0, or ignored
     #[arg(long, value_enum, value_name = "RULE", default_value_t = StartArg::Report)]
     pub start: StartArg,

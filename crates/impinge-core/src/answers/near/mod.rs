@@ -2,15 +2,16 @@
 
 mod labels;
 
+use crate::answers::home::{Home, gives_back};
 use crate::answers::numbering::{Numbering, row};
-use crate::answers::pairs::{Primitive, hash_row, mix};
+use crate::answers::pairs::{Element, hash_row, mix};
 use crate::plan::Plan;
-use crate::query::near::NearQuery;
+use crate::query::Query;
 use crate::query::pair_kind::PairKind;
 use crate::scene::error::Error;
 use crate::search::found::KeysByKind;
 use crate::search::sink::reserve;
-use crate::search::stats::Statistics;
+use crate::search::stats::Stats;
 use impinge_exact::internal::NearestOfElements;
 use impinge_exact::{ElementPair, Feature};
 
@@ -22,18 +23,18 @@ pub struct NearPair {
     /// What they are.
     pub kind: PairKind,
     /// The element that the kind names first, numbered as in [`Impact::a`](crate::Impact::a).
-    pub a: Primitive,
+    pub a: Element,
     /// The other element. Where both are of the same kind, it is of a body with a higher id, or the higher element.
-    pub b: Primitive,
+    pub b: Element,
     /// The features of `a` and of `b` that are nearest to each other, decided exactly: those with the nearest points
     /// in their inside. Of several at the same distance, the first of the smallest.
     pub features: [Feature; 2],
     /// Whether nearest points may not be the only ones: edges are parallel, or an element is degenerate, or faces are
     /// parallel.
     pub is_parallel: bool,
-    /// The distance, where [`NearQuery::distances`] or [`NearQuery::closest_points`] asks for it: that of the nearest points.
+    /// The distance, where [`Query::distances`](crate::Query::distances) or [`Query::closest_points`](crate::Query::closest_points) asks for it: that of the nearest points.
     pub distance: Option<f64>,
-    /// Distance and nearest points, where [`NearQuery::closest_points`] asks for them.
+    /// Distance and nearest points, where [`Query::closest_points`](crate::Query::closest_points) asks for them.
     pub closest: Option<ClosestPoints>,
 }
 
@@ -88,8 +89,12 @@ pub struct NearPairs {
     /// Of all pairs, kind after kind, if they were asked for.
     distances: Vec<f64>,
     points: Vec<[[f64; 3]; 2]>,
-    stats: Statistics,
+    stats: Stats,
+    /// Where its buffers go when it is dropped.
+    pub(crate) home: Option<Home<NearPairs>>,
 }
+
+gives_back!(NearPairs);
 
 /// Some pairs of one kind whose features are not all known.
 pub(crate) struct Unnamed<'a> {
@@ -117,7 +122,7 @@ impl NearPairs {
         std::mem::take(&mut self.keys)
     }
 
-    pub(crate) fn stats_mut(&mut self) -> &mut Statistics {
+    pub(crate) fn stats_mut(&mut self) -> &mut Stats {
         &mut self.stats
     }
 
@@ -129,7 +134,7 @@ impl NearPairs {
     pub(crate) fn fill(
         &mut self,
         keys: KeysByKind,
-        query: &NearQuery,
+        query: &Query,
         n_each: usize,
     ) -> Result<(Vec<Unnamed<'_>>, &Numbering), Error> {
         const WHAT: &str = "nearest features";
@@ -233,7 +238,7 @@ impl NearPairs {
     }
 
     /// How the answer was found.
-    pub fn stats(&self) -> &Statistics {
+    pub fn stats(&self) -> &Stats {
         &self.stats
     }
 }

@@ -35,7 +35,7 @@ use crate::query::settings::Settings;
 use crate::scene::Body;
 use crate::scene::index::PartIx;
 use crate::search::runner::Job;
-use crate::search::stats::Statistics;
+use crate::search::stats::Stats;
 
 use super::pairing::Worker;
 use super::world::{BodyCache, Caches, World};
@@ -93,12 +93,7 @@ pub(super) fn plan(cache: &mut BodyCache, body: &Body, is_allowed: bool) -> Need
 
 /// Proves that the groups of a body are beside all bodies that it could meet. Returns the boxes that it needs besides: of
 /// the clusters that are near now, if groups have come back; of all, if groups come back too often.
-pub(super) fn prove(
-    job: Job<'_>,
-    caches: &mut Caches,
-    part: PartIx,
-    stats: &mut Statistics,
-) -> Needed {
+pub(super) fn prove(job: Job<'_>, caches: &mut Caches, part: PartIx, stats: &mut Stats) -> Needed {
     let Job { scene, plan, .. } = job;
     let world = World {
         scene,

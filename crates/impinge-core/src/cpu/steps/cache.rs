@@ -13,7 +13,7 @@ use crate::scene::Body;
 use crate::scene::error::Error;
 use crate::scene::index::{ClusterIx, PartIx};
 use crate::search::runner::Job;
-use crate::search::stats::Statistics;
+use crate::search::stats::Stats;
 use crate::simd::{Isa, Simd, with_isa};
 
 /// Clusters per task.
@@ -115,7 +115,7 @@ pub(super) fn refit<S: Send>(
     sweep: Sweep,
     (clusterings, caches): (&Clusterings, &mut Caches),
     scratches: &mut [S],
-    stats: &mut Statistics,
+    stats: &mut Stats,
 ) -> Result<(), Error> {
     find_boxes(isa, job, settings, sweep, caches, scratches);
     let Job {

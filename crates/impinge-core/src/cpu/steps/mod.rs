@@ -31,7 +31,7 @@ use crate::query::settings::InstructionSet;
 use crate::scene::error::Error;
 use crate::scene::index::PartIx;
 use crate::search::found::StepAnswer;
-use crate::search::stats::Statistics;
+use crate::search::stats::Stats;
 #[cfg(feature = "gpu")]
 use crate::search::undecided::Undecided;
 
@@ -72,7 +72,7 @@ impl<'a> BatchStages for World<'a> {
         job: Job<'_>,
         _: StepAnswer<'a>,
         workers: &mut [Worker],
-        stats: &mut Statistics,
+        stats: &mut Stats,
     ) -> Result<(), Error> {
         // Stages are listed in the order of their first times.
         stats.add_ms("pairing", 0.0);
@@ -130,7 +130,7 @@ impl StepClusters {
         job: Job<'_>,
         settings: &Settings,
         answer: StepAnswer<'_>,
-        stats: &mut Statistics,
+        stats: &mut Stats,
     ) -> Result<(), Error> {
         self.scratches.resize_with(job.workers.n(), Worker::default);
         stats.n_clusters = 0;
@@ -182,11 +182,11 @@ impl StepClusters {
         job: Job<'_>,
         settings: &Settings,
         answer: StepAnswer<'_>,
-        stats: &mut Statistics,
+        stats: &mut Stats,
         find: impl FnOnce(
             &[Arc<Clustering>],
             &mut dyn FnMut(Undecided<'_>) -> Result<bool, Error>,
-            &mut Statistics,
+            &mut Stats,
         ) -> Result<bool, Error>,
     ) -> Result<ByDevice, Error> {
         stats.n_clusters = 0;
@@ -243,7 +243,7 @@ impl StepClusters {
     }
 
     /// Clusters parts that are new or were re-meshed; forgets parts of removed bodies.
-    fn cluster(&mut self, job: Job<'_>, stats: &mut Statistics) -> Result<(), Error> {
+    fn cluster(&mut self, job: Job<'_>, stats: &mut Stats) -> Result<(), Error> {
         let shared = (&self.clusterings, false);
         self.caches.update(job, shared, stats, |body, clustering| {
             PartCache::new(body, Arc::clone(clustering))
@@ -251,12 +251,7 @@ impl StepClusters {
     }
 
     /// Computes the boxes of parts that have moved.
-    fn refit(
-        &mut self,
-        job: Job<'_>,
-        settings: &Settings,
-        stats: &mut Statistics,
-    ) -> Result<(), Error> {
+    fn refit(&mut self, job: Job<'_>, settings: &Settings, stats: &mut Stats) -> Result<(), Error> {
         cache::refit(
             self.isa,
             job,

@@ -27,7 +27,7 @@ pub(crate) struct SharedBound {
 }
 
 impl SharedBound {
-    pub fn new(control: &Control<'_>) -> Self {
+    pub fn new(control: &Control) -> Self {
         SharedBound {
             earliest: AtomicU64::new(f64::INFINITY.to_bits()),
             is_over: AtomicBool::new(false),

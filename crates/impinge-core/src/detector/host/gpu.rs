@@ -15,7 +15,7 @@ use crate::scene::Scene;
 use crate::scene::error::Error;
 use crate::search::runner::{Finder, Job, Runner};
 use crate::search::sink::Answer;
-use crate::search::stats::Statistics;
+use crate::search::stats::Stats;
 
 /// The frame loop around a method of another crate.
 pub struct Host {
@@ -42,7 +42,7 @@ impl Host {
         let settings = Settings {
             method: Method::Cells,
             backend: Backend::Gpu,
-            lambda,
+            density: lambda,
             memory_budget,
             ..Settings::default()
         };
@@ -96,7 +96,7 @@ impl Finder for Guest<'_> {
         &mut self,
         job: Job<'_>,
         answer: &Arc<Answer>,
-        stats: &mut Statistics,
+        stats: &mut Stats,
     ) -> Result<(), Error> {
         self.engine.find(job, answer, stats).await
     }

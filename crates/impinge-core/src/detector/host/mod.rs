@@ -15,7 +15,7 @@ use crate::scene::Scene;
 use crate::scene::error::Error;
 use crate::search::runner::{Finder, Job, Runner, ready};
 use crate::search::sink::Answer;
-use crate::search::stats::Statistics;
+use crate::search::stats::Stats;
 
 /// The frame loop around a method of another crate, on the CPU.
 pub struct Host {
@@ -46,7 +46,7 @@ impl Host {
         scene: &Scene,
         query: &Query,
         name: &'static str,
-        method: impl FnMut(Job<'_>, &Arc<Answer>, &mut Statistics) -> Result<(), Error>,
+        method: impl FnMut(Job<'_>, &Arc<Answer>, &mut Stats) -> Result<(), Error>,
     ) -> Result<&Pairs, Error> {
         let plan = Plan::intersections(scene, query, Goal::All, Limits::default())?;
         let (mut guest, control) = (Guest { name, method }, Control::new());
@@ -63,7 +63,7 @@ struct Guest<F> {
 
 impl<F> Finder for Guest<F>
 where
-    F: FnMut(Job<'_>, &Arc<Answer>, &mut Statistics) -> Result<(), Error>,
+    F: FnMut(Job<'_>, &Arc<Answer>, &mut Stats) -> Result<(), Error>,
 {
     fn method(&self) -> &'static str {
         self.name
@@ -77,7 +77,7 @@ where
         &mut self,
         job: Job<'_>,
         answer: &Arc<Answer>,
-        stats: &mut Statistics,
+        stats: &mut Stats,
     ) -> Result<(), Error> {
         (self.method)(job, answer, stats)
     }

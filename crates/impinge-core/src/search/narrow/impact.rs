@@ -5,7 +5,7 @@ use crate::plan::TestId;
 use crate::query::pair_kind::PairKind;
 use impinge_exact::{Contact, ElementPair, Point};
 
-use super::{Element, Test};
+use super::{PairElement, Test};
 
 /// The test of [`Detector::impacts`](crate::Detector::impacts).
 pub(crate) struct FirstContact;
@@ -13,7 +13,7 @@ pub(crate) struct FirstContact;
 impl Test for FirstContact {
     type Value = Contact;
 
-    fn extent(&self, element: Element<'_>) -> Extent {
+    fn extent(&self, element: PairElement<'_>) -> Extent {
         let extent = Extent::of(element.ends().flatten());
         match element.plan.inflation(element.part) {
             0.0 => extent,
@@ -21,7 +21,7 @@ impl Test for FirstContact {
         }
     }
 
-    fn decide(&self, test: TestId, a: Element<'_>, b: Element<'_>) -> Option<Contact> {
+    fn decide(&self, test: TestId, a: PairElement<'_>, b: PairElement<'_>) -> Option<Contact> {
         Self::decide_part(test, a, b, 1.0)
     }
 }
@@ -31,8 +31,8 @@ impl FirstContact {
     /// they are stored.
     pub fn decide_part(
         test: TestId,
-        a: Element<'_>,
-        b: Element<'_>,
+        a: PairElement<'_>,
+        b: PairElement<'_>,
         fraction: f64,
     ) -> Option<Contact> {
         let pair = exact_kind(test)?;

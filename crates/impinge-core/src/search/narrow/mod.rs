@@ -20,7 +20,7 @@ use crate::scene::index::PartIx;
 
 /// One element of one part of a frame.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Element<'a> {
+pub(crate) struct PairElement<'a> {
     pub scene: &'a Scene,
     pub plan: &'a Plan,
     /// The part.
@@ -35,20 +35,20 @@ pub(crate) trait Test {
     type Value: Copy;
 
     /// A box around an element: pairs whose boxes have no point in common are not reported.
-    fn extent(&self, element: Element<'_>) -> Extent;
+    fn extent(&self, element: PairElement<'_>) -> Extent;
 
     /// Whether the adjacency rule lets a pair whose extents meet be a candidate.
-    fn admits(&self, _: TestId, _: Element<'_>, _: Element<'_>) -> bool {
+    fn admits(&self, _: TestId, _: PairElement<'_>, _: PairElement<'_>) -> bool {
         true
     }
 
     /// The value of a pair, decided exactly and by the adjacency rule; `None` if the pair is not reported.
-    fn decide(&self, test: TestId, a: Element<'_>, b: Element<'_>) -> Option<Self::Value>;
+    fn decide(&self, test: TestId, a: PairElement<'_>, b: PairElement<'_>) -> Option<Self::Value>;
 }
 
-impl Element<'_> {
+impl PairElement<'_> {
     /// Whether two elements are of one body and name a common vertex of it.
-    pub fn shares_vertex(&self, other: &Element<'_>) -> bool {
+    pub fn shares_vertex(&self, other: &PairElement<'_>) -> bool {
         let same_body = self.plan.part(self.part).id == self.plan.part(other.part).id;
         same_body && share_vertex(self.corners, other.corners)
     }

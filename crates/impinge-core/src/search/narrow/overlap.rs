@@ -4,7 +4,7 @@ use crate::boxes::Extent;
 use crate::plan::TestId;
 use impinge_exact::internal::two_sum;
 
-use super::{Element, Test};
+use super::{PairElement, Test};
 
 /// The test of [`Detector::candidates`](crate::Detector::candidates): whether the boxes over the whole step overlap once each
 /// is inflated by the distance that the plan says, so that no axis has a gap of more than twice that.
@@ -13,13 +13,13 @@ pub(crate) struct BoxOverlap;
 impl Test for BoxOverlap {
     type Value = ();
 
-    fn extent(&self, element: Element<'_>) -> Extent {
+    fn extent(&self, element: PairElement<'_>) -> Extent {
         let extent = Extent::of(element.ends().flatten());
         // Rounded outward: `decide` tests again without rounding.
         extent.inflated(element.plan.inflation(element.part))
     }
 
-    fn decide(&self, _: TestId, a: Element<'_>, b: Element<'_>) -> Option<()> {
+    fn decide(&self, _: TestId, a: PairElement<'_>, b: PairElement<'_>) -> Option<()> {
         if a.shares_vertex(&b) {
             return None;
         }

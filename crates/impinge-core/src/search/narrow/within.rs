@@ -7,20 +7,20 @@ use crate::scene::positions::Positions;
 use impinge_exact::Point;
 use impinge_exact::internal::{elements_are_within, elements_meet};
 
-use super::{Element, Test};
+use super::{PairElement, Test};
 
-/// The test of [`Detector::within_distance`](crate::Detector::within_distance).
+/// The test of [`Detector::near`](crate::Detector::near).
 pub(crate) struct Within;
 
 impl Test for Within {
     type Value = ();
 
-    fn extent(&self, element: Element<'_>) -> Extent {
+    fn extent(&self, element: PairElement<'_>) -> Extent {
         let extent = Extent::of(element.corners().points().iter().copied());
         extent.inflated(element.plan.inflation(element.part))
     }
 
-    fn decide(&self, test: TestId, a: Element<'_>, b: Element<'_>) -> Option<()> {
+    fn decide(&self, test: TestId, a: PairElement<'_>, b: PairElement<'_>) -> Option<()> {
         if a.shares_vertex(&b) {
             return None;
         }
@@ -35,7 +35,7 @@ impl Test for Within {
     }
 }
 
-impl Element<'_> {
+impl PairElement<'_> {
     fn corners(&self) -> Corners {
         let body = self.plan.body(self.scene, self.part);
         Corners::new(body.positions(), self.corners)

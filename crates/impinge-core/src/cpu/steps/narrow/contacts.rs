@@ -4,7 +4,7 @@ use crate::cpu::narrow::room_to_wait;
 use crate::plan::Plan;
 use crate::query::goal::Goal;
 use crate::query::pair_kind::PairKind;
-use crate::query::step::{Start, Toi};
+use crate::query::step::{Precision, Start};
 use crate::query::tuning::Tuning;
 use crate::search::found::{Found, FoundByKind, StepAnswer};
 use crate::search::sink::BLOCK;
@@ -33,7 +33,7 @@ pub(super) struct Open {
 pub(crate) struct FirstContacts {
     pub(super) goal: Goal,
     start: Start,
-    toi: Toi,
+    toi: Precision,
     /// Contacts found, handed over in blocks.
     found: FoundByKind,
     pub(super) counts: NarrowCounts,
@@ -62,7 +62,7 @@ pub(crate) struct FirstContacts {
 impl FirstContacts {
     /// Prepares for a step.
     pub fn begin(&mut self, n_clusters: u64, plan: &Plan, tuning: &Tuning) {
-        (self.goal, self.start, self.toi) = (plan.goal, plan.start, plan.toi);
+        (self.goal, self.start, self.toi) = (plan.goal, plan.start, plan.precision);
         self.most_close = MOST_CLOSE.max(2 * n_clusters as usize);
         self.full = tuning.decide_from;
         self.counts = NarrowCounts::default();
@@ -248,8 +248,8 @@ impl FirstContacts {
         world.known.found(self.goal, span[1]);
         let time = match (self.goal, self.toi) {
             (Goal::Any, _) => Some(span[0]),
-            (_, Toi::F32) => time_between(span).map(f64::from),
-            (_, Toi::F64) => None,
+            (_, Precision::F32) => time_between(span).map(f64::from),
+            (_, Precision::F64) => None,
         };
         let Some(time) = time else {
             return self.decide_exactly(world, between, pair, slots);

@@ -1,0 +1,75 @@
+//! `impinge step --advance`: how far a step can be taken, and the bodies there.
+
+use impinge::{Advance, Positions};
+use impinge_io::{ColoredMesh, Elements, write_obj, write_ply};
+
+use crate::error::Error;
+use crate::values::ReachedFile;
+
+use super::load::{Given, Moving};
+
+/// Fails unless there is a file per body, of a format that holds it.
+pub fn check(files: &[ReachedFile], bodies: &Moving) -> Result<(), Error> {
+    let n = bodies.ids.len();
+    if files.len() != n {
+        let text = format!(
+            "--advance writes a file per body: {} are named for {n} bodies",
+            files.len()
+        );
+        return Err(Error::Usage(text));
+    }
+    let misfits = |(file, given): &(&ReachedFile, &Given)| {
+        file.is_obj && matches!(given.elements, Elements::Tetrahedra(_))
+    };
+    match files.iter().zip(&bodies.given).find(misfits) {
+        None => Ok(()),
+        Some((file, _)) => Err(Error::Usage(format!(
+            "--advance {}: OBJ files hold triangles: write tetrahedra as .ply",
+            impinge_io::printable(&file.path)
+        ))),
+    }
+}
+
+/// Writes each body at the positions that were reached, with the vertices and elements of its files, so that the files can begin the
+/// next step.
+pub fn write(files: &[ReachedFile], bodies: &Moving, advance: &Advance) -> Result<(), Error> {
+    for (ix, (file, given)) in files.iter().zip(&bodies.given).enumerate() {
+        let id = bodies.ids[ix];
+        let reached = advance.positions.iter().find(|(body, _)| *body == id);
+        let positions = match reached {
+            Some((_, positions)) => positions,
+            None => bodies.scene.body(id)?.positions(),
+        };
+        let positions = as_given(positions, given.map.as_deref());
+        match &given.elements {
+            Elements::Triangles(faces) if file.is_obj => write_obj(&file.path, &positions, faces)?,
+            elements => {
+                let mesh = ColoredMesh {
+                    positions: &positions,
+                    elements,
+                    primitive_colors: None,
+                    colliding: None,
+                    name: &bodies.names[ix][0],
+                };
+                write_ply(&file.path, &[mesh])?;
+            }
+        }
+    }
+    Ok(())
+}
+
+fn as_given(positions: &Positions, map: Option<&[u32]>) -> impinge_io::Positions {
+    fn of<T: Copy>(positions: &[T], map: Option<&[u32]>) -> Vec<T> {
+        match map {
+            None => positions.to_vec(),
+            Some(map) => map
+                .iter()
+                .map(|&vertex| positions[vertex as usize])
+                .collect(),
+        }
+    }
+    match positions {
+        Positions::F32(positions) => impinge_io::Positions::F32(of(positions, map)),
+        Positions::F64(positions) => impinge_io::Positions::F64(of(positions, map)),
+    }
+}

@@ -1,0 +1,340 @@
+//! `--rows` of every answer, in every format, and the last line, which says what was asked.
+
+use impinge_scenes::surfaces::{ball, cube};
+use serde_json::Value;
+
+use crate::harness::Folder;
+
+fn folder() -> Folder {
+    let folder = Folder::new();
+    let (a, b) = (ball(80), cube([0.5, 0.125, 0.0], 1.0));
+    folder.ply("a.ply", &a);
+    folder.ply("b.ply", &b);
+    folder.ply("c.ply", &cube([9.0, 0.0, 0.0], 1.0));
+    // A ball that folds onto itself, and its way into the cube.
+    let mut folded = a.clone();
+    folded.positions[7] = folded.positions[7].map(|x| -1.5 * x);
+    folder.ply("f_000.ply", &folded);
+    folder.ply("f_001.ply", &a.translated([0.25, 0.0, 0.0]));
+    folder.ply("f_002.ply", &a.translated([1.5, 0.0, 0.0]));
+    folder
+}
+
+/// The questions, each with the columns of its rows.
+const ANSWERS: [(&[&str], &str); 6] = [
+    (
+        &["pairs", "a.ply", "b.ply"],
+        "body_a,element_a,body_b,element_b",
+    ),
+    (&["self", "f_000.ply"], "body_a,element_a,body_b,element_b"),
+    (
+        &["near", "a.ply", "b.ply", "--distance", "0.125"],
+        "kind,body_a,element_a,body_b,element_b,type,feature_a,feature_b,parallel,distance,ax,ay,az,bx,by,bz",
+    ),
+    (
+        &[
+            "step",
+            "a.ply",
+            "f_002.ply",
+            "b.ply",
+            "b.ply",
+            "--start",
+            "report",
+        ],
+        "kind,body_a,element_a,body_b,element_b,toi",
+    ),
+    (
+        &["sequence", "a.ply", "f_000.ply", "--other", "b.ply"],
+        "frame,body_a,element_a,body_b,element_b",
+    ),
+    (
+        &[
+            "sequence",
+            "a.ply",
+            "f_000.ply",
+            "--other",
+            "b.ply",
+            "--ccd",
+            "--start",
+            "report",
+        ],
+        "frame,kind,body_a,element_a,body_b,element_b,toi",
+    ),
+];
+
+/// The rows of a NumPy array, by its shape.
+fn n_of_npy(bytes: &[u8]) -> usize {
+    assert_eq!(&bytes[..8], b"\x93NUMPY\x01\x00");
+    let start = 10 + usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
+    let header = std::str::from_utf8(&bytes[10..start]).unwrap();
+    let shape = header.split("'shape': (").nth(1).unwrap();
+    let n = shape.split(',').next().unwrap().parse().unwrap();
+    assert!(
+        n == 0 || (bytes.len() - start).is_multiple_of(n),
+        "{header}"
+    );
+    n
+}
+
+#[test]
+fn every_answer_writes_rows_in_every_format() {
+    let folder = folder();
+    for (question, columns) in ANSWERS {
+        let run = |more: &[&str]| {
+            let run = folder.run(question.iter().chain(more));
+            assert_eq!(run.code, Some(0), "{question:?} {more:?}: {}", run.stderr);
+            run
+        };
+        let csv = run(&["--rows", "-"]).stdout;
+        let mut lines = csv.lines();
+        assert_eq!(lines.next(), Some(columns), "{question:?}");
+        let n = lines.clone().count();
+        assert!(n > 0, "{question:?}");
+
+        run(&["--rows", "rows.csv"]);
+        assert_eq!(
+            std::fs::read_to_string(folder.path("rows.csv")).unwrap(),
+            csv
+        );
+        run(&["--rows", "rows.npy"]);
+        assert_eq!(
+            n_of_npy(&std::fs::read(folder.path("rows.npy")).unwrap()),
+            n
+        );
+        run(&["--rows", "rows.dat", "--rows-format", "npy"]);
+        assert_eq!(
+            std::fs::read(folder.path("rows.dat")).unwrap(),
+            std::fs::read(folder.path("rows.npy")).unwrap()
+        );
+        let jsonl = run(&["--rows", "-", "--rows-format", "jsonl"]).stdout;
+        assert_eq!(jsonl.lines().count(), n);
+        for (line, row) in jsonl.lines().zip(lines) {
+            let object: Value = serde_json::from_str(line).unwrap();
+            for (column, field) in columns.split(',').zip(row.split(',')) {
+                match &object[column] {
+                    // Points have one name there.
+                    Value::Null => assert!(column.len() == 2, "{line}"),
+                    Value::String(text) => assert_eq!(text, field),
+                    Value::Bool(is_so) => assert_eq!(u8::from(*is_so).to_string(), field),
+                    number => assert_eq!(number.as_f64(), field.parse().ok(), "{line}"),
+                }
+            }
+        }
+        // The old names of one release.
+        for old in ["--pairs", "--impacts"] {
+            assert_eq!(run(&[old, "-"]).stdout, csv);
+            let help = folder.run([question[0], "--help"]).printed();
+            assert!(!help.contains(old), "{help}");
+        }
+        let both = folder.run(question.iter().chain(&["--rows", "-", "--json"]));
+        assert!(
+            both.misuse()
+                .contains("--rows - both write to standard output")
+        );
+        let unknown = folder.run(question.iter().chain(&["--rows", "rows.txt"]));
+        assert!(unknown.misuse().contains(".csv, .jsonl or .npy"));
+        let alone = folder.run(question.iter().chain(&["--rows-format", "csv"]));
+        assert_eq!(alone.code, Some(2));
+        let lost = ["--rows", question[1], "--rows-format", "csv"];
+        let lost = folder.run(question.iter().chain(&lost)).misuse();
+        assert!(lost.contains(&format!("--rows {} is the input", question[1])));
+    }
+    // The header of such a file comes first, and has the number of rows.
+    let stream = ["--rows", "-", "--rows-format", "npy"];
+    assert_eq!(
+        folder.run(ANSWERS[0].0.iter().chain(&stream[..2])).code,
+        Some(0)
+    );
+    let refused = folder.run(ANSWERS[4].0.iter().chain(&stream));
+    assert!(refused.misuse().contains("name a file"));
+}
+
+#[test]
+fn old_names_of_options_mean_the_same() {
+    let folder = folder();
+    for [new, old] in [["--exclude", "--ignore"], ["--precision", "--toi"]] {
+        let value = if new == "--exclude" { "1,1" } else { "f64" };
+        let ask = |option: &str| {
+            let args = [
+                "step",
+                "a.ply",
+                "f_002.ply",
+                "b.ply",
+                "b.ply",
+                "--start",
+                "report",
+                "--rows",
+                "-",
+                option,
+                value,
+            ];
+            folder.run(args).printed()
+        };
+        assert_eq!(ask(new), ask(old));
+        for command in ["step", "pairs", "sequence"] {
+            assert!(!folder.run([command, "--help"]).printed().contains(old));
+        }
+    }
+}
+
+#[test]
+fn two_bodies_of_many() {
+    let folder = folder();
+    let ask = |more: &[&str]| {
+        let args = ["pairs", "a.ply", "b.ply", "c.ply", "a.ply"];
+        folder.run(args.iter().chain(more))
+    };
+    let all = ask(&["--rows", "-"]).printed();
+    let two = ask(&["--rows", "-", "--between", "3,1"]).printed();
+    let expected: Vec<&str> = all
+        .lines()
+        .filter(|row| row.starts_with("body") || (row.starts_with("1,") && row.contains(",3,")))
+        .collect();
+    assert!(expected.len() > 5);
+    assert_eq!(two.lines().collect::<Vec<_>>(), expected);
+    let last = "between meshes 3 and 1 of 4, 0 vertices welded, neighbours resolved; not asked: self-collision (--self), pairs of other \
+                meshes\n";
+    let text = ask(&["--between", "3,1"]).printed();
+    assert!(text.ends_with(last), "{text}");
+    for (more, said) in [
+        (
+            &["--between", "0,4"][..],
+            "--between names body 4, but 4 bodies",
+        ),
+        (&["--between", "1,1"], "impinge self"),
+        (&["--between", "0,1", "--self"], "cannot be used with"),
+    ] {
+        let misuse = ask(more).misuse();
+        assert!(misuse.contains(said), "{misuse}");
+    }
+    let near = [
+        "near",
+        "a.ply",
+        "b.ply",
+        "c.ply",
+        "--distance",
+        "20",
+        "--between",
+        "0,2",
+        "--rows",
+        "-",
+    ];
+    let rows = folder.run(near).printed();
+    assert!(rows.lines().count() > 1);
+    assert!(rows.lines().skip(1).all(|row| {
+        let fields: Vec<&str> = row.split(',').collect();
+        let mut bodies = [fields[1], fields[3]];
+        bodies.sort_unstable();
+        bodies == ["0", "2"]
+    }));
+}
+
+/// A thick body is near from farther away: its thickness adds to the distance, exactly.
+#[test]
+fn thickness_adds_to_the_distance() {
+    let folder = Folder::new();
+    let (low, high) = (cube([0.0; 3], 1.0), cube([0.0, 0.0, 2.0], 1.0));
+    folder.ply("low.ply", &low);
+    folder.ply("high.ply", &high);
+    let n = |more: &[&str]| {
+        let args = ["near", "low.ply", "high.ply", "--json", "--distance"];
+        let answer = folder.run(args.iter().chain(more)).json();
+        (answer["pairs"].clone(), answer["hash"].clone())
+    };
+    let reached = n(&["1"]);
+    assert!(reached.0.as_u64() > Some(0));
+    assert_eq!(n(&["0.5"]).0, 0);
+    assert_eq!(n(&["0.5", "--thickness", "0,0.5"]), reached);
+    assert_eq!(
+        n(&["0", "--thickness", "0,0.75", "--thickness", "1,0.25"]),
+        reached
+    );
+    assert_eq!(n(&["0.5", "--thickness", "1,0.4999"]).0, 0);
+    let misuse = |value: &str| {
+        let args = [
+            "near",
+            "low.ply",
+            "high.ply",
+            "--distance",
+            "1",
+            "--thickness",
+            value,
+        ];
+        folder.run(args).misuse()
+    };
+    assert!(misuse("2,1").contains("--thickness names body 2"));
+    assert!(misuse("0,-1").contains("not below 0"));
+    assert!(misuse("1").contains("a body's number and a length"));
+}
+
+/// Kinds of a step: the impacts of the others are left out, and the last line says so.
+#[test]
+fn kinds_of_a_step() {
+    let folder = folder();
+    let ask = |more: &[&str]| {
+        let args = [
+            "step",
+            "a.ply",
+            "f_002.ply",
+            "b.ply",
+            "b.ply",
+            "--start",
+            "report",
+        ];
+        folder.run(args.iter().chain(more))
+    };
+    let all = ask(&["--rows", "-"]).printed();
+    let kept = ask(&["--rows", "-", "--kinds", "ee"]).printed();
+    let of_kind: Vec<&str> = all.lines().filter(|row| !row.starts_with("vf,")).collect();
+    assert!(of_kind.len() > 1 && of_kind.len() < all.lines().count());
+    assert_eq!(kept.lines().collect::<Vec<_>>(), of_kind);
+    let last = "between 2 meshes and within each, 0 vertices welded, neighbours left out; not asked: other kinds of pairs (--kinds), \
+                whether the start intersects (--start verify)\n";
+    let text = ask(&["--kinds", "ee"]).printed();
+    assert!(text.ends_with(last), "{text}");
+    assert!(ask(&["--kinds", "ef"]).misuse().contains("vf, ee, ev, vv"));
+}
+
+/// An answer that resolves neighbours in one line does not leave them out in another.
+#[test]
+fn the_last_line_says_what_was_asked() {
+    let folder = folder();
+    for (args, last) in [
+        (
+            &["near", "a.ply", "b.ply", "--distance", "1"][..],
+            "between 2 meshes, 0 vertices welded, neighbours resolved where they intersect, else never near; not asked: \
+             self-collision (--self)\n",
+        ),
+        (
+            &["step", "a.ply", "a.ply", "c.ply", "c.ply"],
+            "between 2 meshes and within each, 0 vertices welded, neighbours resolved at the start, else left out\n",
+        ),
+        (
+            &[
+                "step",
+                "a.ply",
+                "a.ply",
+                "c.ply",
+                "c.ply",
+                "--no-self",
+                "--earliest",
+            ],
+            "between 2 meshes, 0 vertices welded, neighbours resolved at the start, else left out; not asked: self-collision\n",
+        ),
+        (
+            &["step", "a.ply", "a.ply", "--candidates", "boxes.csv"],
+            "within 1 mesh, 0 vertices welded, neighbours left out\n",
+        ),
+    ] {
+        let text = folder.run(args).printed();
+        assert!(text.ends_with(last), "{args:?}: {text}");
+        assert_eq!(text.matches("neighbours").count(), 1, "{text}");
+    }
+    let answer = folder
+        .run(["near", "a.ply", "b.ply", "--distance", "1", "--json"])
+        .json();
+    assert_eq!(
+        answer["asked"],
+        serde_json::json!({ "between": true, "self": false, "shared_vertex": "resolve" })
+    );
+}

@@ -1,0 +1,608 @@
+"""Answers: sorted, the same bytes on every method, backend and thread count. They own their data."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn, SupportsIndex, overload
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _impinge
+
+if TYPE_CHECKING:
+    from ._impinge import Body
+    from ._query import _Array, _Body, _PairKind
+    from ._scene import Scene
+
+__all__ = [
+    "Advance",
+    "Candidates",
+    "Impact",
+    "Impacts",
+    "Nearest",
+    "NearPairs",
+    "Pairs",
+    "Stats",
+]
+
+
+@dataclass(frozen=True, repr=False)
+class Stats:
+    """What a question cost and what it went through. The answer never depends on any of this.
+
+    Attributes
+    ----------
+    backend : str
+        ``"cpu"`` or the name of the GPU.
+    method : str
+        ``"clusters"``, ``"cells"`` or ``"naive"``.
+    n_threads : int
+        Threads that worked.
+    stages : dict of str to float
+        Wall time in milliseconds by stage, in the order of their first run.
+    total_ms : float
+        Wall time of the whole question in milliseconds.
+    grid : tuple of three int, or None
+        ``"cells"``: cells of the first level along x, y and z.
+    n_subdivided : int
+        ``"cells"``: cells that went through the second level.
+    n_entries : int
+        ``"cells"``: entries of the cell lists, an element counted once a cell.
+    n_clusters : int
+        ``"clusters"``: clusters of all bodies that took part.
+    n_culled : int
+        ``"clusters"`` on the CPU: those proven to lie beside all other bodies, whose boxes were not needed.
+    n_work_items : int
+        Pairs of groups that were paired.
+    n_candidates : int
+        Pairs of elements whose boxes overlap and that the adjacency rule lets through.
+    n_unsure : int
+        Candidates that the floating-point filter left to exact arithmetic.
+    n_clustered : int
+        Bodies that were clustered in this frame, the first time included.
+    n_reclustered : int
+        Of those, bodies clustered again because they had flowed away from their rest pose.
+    n_batches : int
+        Runs over parts of the work; 1 when the memory budget allowed for all at once.
+    n_pieces : int
+        GPU: pieces that a scene was cut into because the device or the budget could not hold it whole; 0 if it was not.
+    n_reruns : int
+        Stages that were run again because a buffer had to grow.
+    bytes_held : int
+        Bytes that the detector holds, the answer not counted.
+    """
+
+    backend: str
+    method: str
+    n_threads: int
+    stages: dict[str, float]
+    total_ms: float
+    grid: tuple[int, int, int] | None
+    n_subdivided: int
+    n_entries: int
+    n_clusters: int
+    n_culled: int
+    n_work_items: int
+    n_candidates: int
+    n_unsure: int
+    n_clustered: int
+    n_reclustered: int
+    n_batches: int
+    n_pieces: int
+    n_reruns: int
+    bytes_held: int
+
+    @property
+    def unsure_share(self) -> float:
+        """float : ``n_unsure`` by ``n_candidates``; 0 without candidates."""
+        return self.n_unsure / self.n_candidates if self.n_candidates else 0.0
+
+    def as_dict(self) -> dict[str, Any]:
+        """All of it as a dictionary, ready for ``json.dump``.
+
+        Returns
+        -------
+        dict
+        """
+        return {**asdict(self), "unsure_share": self.unsure_share}
+
+    def __repr__(self) -> str:
+        stages = ", ".join(f"{name} {ms:.3f}" for name, ms in self.stages.items())
+        counts = f"{self.n_candidates} candidates, {self.n_unsure} unsure"
+        where = f"{self.method!r} on {self.backend!r}"
+        return f"Stats({self.total_ms:.3f} ms by {where}: {stages}; {counts})"
+
+
+class Impact(NamedTuple):
+    """Two elements that touch during a step, and when first.
+
+    `kind` is ``"vf"`` (a vertex and a face), ``"ee"`` (two edges), ``"ev"`` (an edge and a vertex) or ``"vv"`` (two
+    vertices); its first letter is the element of `body_a`. `toi` is the first time in [0, 1] at which they touch, rounded down;
+    `at_start` says whether that is the start.
+    """
+
+    kind: _PairKind
+    body_a: Body
+    element_a: int
+    body_b: Body
+    element_b: int
+    toi: float
+    at_start: bool
+
+
+class Nearest(NamedTuple):
+    """The pair of elements of two bodies that are nearest to each other.
+
+    `distance` is in the unit of the scene. It is 0 if and only if they share a point, which is decided exactly; else it is rounded, with
+    an error of a few units in the last place of the largest coordinate. `points` is an array of float64, shape (2, 3): the point of
+    each element that is nearest to the other, rounded; where they touch, a point that they share, twice. Of several pairs at the same
+    computed distance the lowest.
+    """
+
+    distance: float
+    body_a: Body
+    element_a: int
+    body_b: Body
+    element_b: int
+    points: npt.NDArray[np.float64]
+
+
+def _locked(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    array.flags.writeable = False
+    return array
+
+
+class Pairs:
+    """The pairs of elements that intersect: sorted.
+
+    ``len(pairs)`` is their number; no pairs are false. Pairs are a sequence of rows, each a tuple of four int: number of a body, its
+    element, number of the other body, its element. A slice is an array, and so is ``numpy.asarray(pairs)``, which has shape (n, 4).
+    """
+
+    __slots__ = ("_hash", "_inner", "_rows")
+
+    def __init__(self, inner: _impinge.Pairs) -> None:
+        self._inner = inner
+        self._rows: npt.NDArray[np.uint32] | None = None
+        self._hash: int | None = None
+
+    @property
+    def rows(self) -> npt.NDArray[np.uint32]:
+        """numpy.ndarray of uint32, shape (n, 4) : all pairs, sorted, one per row: number of a body, its element, number of the other
+        body, its element. Read-only, and made once.
+        """
+        if self._rows is None:
+            self._rows = _locked(self._inner.rows())
+        return self._rows
+
+    def between(self, a: _Body, b: _Body) -> npt.NDArray[np.uint32]:
+        """The pairs of two bodies.
+
+        Parameters
+        ----------
+        a, b : Body or int
+
+        Returns
+        -------
+        numpy.ndarray of uint32, shape (n, 2)
+            Element of `a`, element of `b`; sorted.
+
+        Raises
+        ------
+        ValueError
+            A body that took no part, or one named twice.
+        """
+        return self._inner.between(a, b)
+
+    def self_of(self, body: _Body) -> npt.NDArray[np.uint32]:
+        """The pairs of elements of one body.
+
+        Parameters
+        ----------
+        body : Body or int
+
+        Returns
+        -------
+        numpy.ndarray of uint32, shape (n, 2)
+            The lower element first; sorted.
+
+        Raises
+        ------
+        ValueError
+            A body that took no part.
+        """
+        return self._inner.self_of(body)
+
+    @overload
+    def colliding(self, body: None = None) -> dict[Body, npt.NDArray[np.uint32]]: ...
+    @overload
+    def colliding(self, body: _Body) -> npt.NDArray[np.uint32]: ...
+    def colliding(self, body: _Body | None = None) -> Any:
+        """The elements that take part in any pair, for colouring: of a body, or of all bodies in one pass.
+
+        Parameters
+        ----------
+        body : Body or int, optional
+
+        Returns
+        -------
+        numpy.ndarray of uint32, shape (n,)
+            Sorted, each once. Without a body, a dict with such an array for each Body that has any, in order; it is
+            indexed by the numbers of bodies, too.
+        """
+        return self._inner.all_colliding() if body is None else self._inner.colliding(body)
+
+    def retain(self, keep: _Array) -> Pairs:
+        """The pairs that a filter of your own keeps, by body, element, vertex or anything else.
+
+        Parameters
+        ----------
+        keep : array_like of bool, shape (n,)
+            One per row of `rows`.
+
+        Returns
+        -------
+        Pairs
+            New ones; these stay as they are.
+
+        Raises
+        ------
+        ValueError
+            A mask of another shape or dtype.
+
+        Examples
+        --------
+        >>> import impinge
+        >>> scene = impinge.Scene()
+        >>> for z in (0, 1):
+        ...     _ = scene.add([[0, 0, 0], [4, 0, 0], [0, 4, 0], [0, 0, z]], [[0, 1, 2], [0, 1, 3]])
+        >>> pairs = impinge.Detector("cpu").detect(scene, which="between")
+        >>> len(pairs), len(pairs.retain(pairs.rows[:, 1] == 0))
+        (4, 2)
+        """
+        return Pairs(self._inner.retain(keep))
+
+    @property
+    def bodies(self) -> list[Body]:
+        """list of Body : the bodies that took part, in order."""
+        return self._inner.bodies()
+
+    @property
+    def hash(self) -> int:
+        """int : a 64-bit hash of the set of pairs; equal sets have equal hashes everywhere."""
+        if self._hash is None:
+            self._hash = self._inner.hash()
+        return self._hash
+
+    @property
+    def stats(self) -> Stats:
+        """Stats : what the answer cost."""
+        return Stats(**self._inner.stats())
+
+    def __len__(self) -> int:
+        return len(self._inner)
+
+    @overload
+    def __getitem__(self, index: SupportsIndex, /) -> tuple[int, int, int, int]: ...
+    @overload
+    def __getitem__(self, index: slice, /) -> npt.NDArray[np.uint32]: ...
+    def __getitem__(self, index: Any, /) -> Any:
+        if isinstance(index, slice):
+            return self.rows[index]
+        if not hasattr(index, "__index__"):
+            given = type(index).__name__
+            raise TypeError(f"index: a whole number or a slice expected, {given} given")
+        if not -len(self) <= index < len(self):
+            raise IndexError(f"index {index} given, but there are {len(self)} pairs")
+        return tuple(self.rows[index].tolist())
+
+    def __iter__(self) -> Iterator[tuple[int, int, int, int]]:
+        for start in range(0, len(self), 4096):
+            yield from map(tuple, self.rows[start : start + 4096].tolist())
+
+    def __array__(
+        self, dtype: npt.DTypeLike | None = None, copy: bool | None = None
+    ) -> npt.NDArray[Any]:
+        rows = self.rows
+        if dtype is not None and rows.dtype != dtype:
+            if copy is False:
+                raise ValueError(f"copy=False: rows are uint32, {np.dtype(dtype)} asked for")
+            return rows.astype(dtype)
+        return rows.copy() if copy else rows
+
+    def __reduce__(self) -> NoReturn:
+        raise TypeError("Pairs name bodies of a live scene: pickle pairs.rows")
+
+    def __repr__(self) -> str:
+        n_bodies = len(self._inner.bodies())
+        return f"Pairs({len(self)} pairs of {n_bodies} bodies, hash {self.hash:#018x})"
+
+
+class _OfKinds:
+    """What answers about pairs of several kinds have in common."""
+
+    __slots__ = ("_inner", "_kinds", "_rows")
+
+    def __init__(self, inner: Any) -> None:
+        self._inner = inner
+        self._rows: npt.NDArray[np.uint32] | None = None
+        self._kinds: npt.NDArray[np.uint8] | None = None
+
+    @property
+    def rows(self) -> npt.NDArray[np.uint32]:
+        """numpy.ndarray of uint32, shape (n, 4) : number of a body, its element, number of the other body, its element. The element that
+        the kind names first comes first. Read-only, and made once.
+
+        A vertex is numbered as positions are, a face as it was given (of tetrahedra as in `Scene.faces`), an edge as in `Scene.edges`.
+        """
+        if self._rows is None:
+            self._rows = _locked(self._inner.rows())
+        return self._rows
+
+    @property
+    def kinds(self) -> npt.NDArray[np.uint8]:
+        """numpy.ndarray of uint8, shape (n,) : what the pairs are, as an index of `impinge.KINDS`: ``"vf"`` (a vertex and a face),
+        ``"ee"`` (two edges), ``"ev"`` (an edge and a vertex), ``"vv"`` (two vertices), ``"ef"`` (an edge and a face) or ``"ff"`` (two
+        faces). Read-only, and made once.
+        """
+        if self._kinds is None:
+            self._kinds = _locked(self._inner.kinds())
+        return self._kinds
+
+    @property
+    def hash(self) -> int:
+        """int : a 64-bit hash of the set, all that was decided of its pairs included; equal sets have equal hashes everywhere."""
+        value: int = self._inner.hash()
+        return value
+
+    @property
+    def stats(self) -> Stats:
+        """Stats : what the answer cost."""
+        return Stats(**self._inner.stats())
+
+    def __len__(self) -> int:
+        return len(self._inner)
+
+    def __reduce__(self) -> NoReturn:
+        name = type(self).__name__
+        raise TypeError(f"{name} name bodies of a live scene: pickle their arrays")
+
+    def __repr__(self) -> str:
+        counts = np.bincount(self.kinds, minlength=len(_impinge.KINDS)).tolist()
+        named = [f"{kind}: {n}" for kind, n in zip(_impinge.KINDS, counts) if n]
+        return f"{type(self).__name__}({', '.join(named)})"
+
+
+class Impacts(_OfKinds):
+    """The pairs of elements that touch during a step, sorted by kind, then by bodies and elements.
+
+    ``len(impacts)`` is their number; impacts of a free step are false. They are indexed and iterated as `Impact`, and taken as arrays
+    by the attributes, one row per impact.
+    """
+
+    __slots__ = ()
+    _inner: _impinge.Impacts
+
+    @property
+    def toi(self) -> npt.NDArray[np.floating[Any]]:
+        """numpy.ndarray of float32, or float64 after ``precision="f64"``, shape (n,) : first times in [0, 1], each rounded down."""
+        return self._inner.toi()
+
+    @property
+    def at_start(self) -> npt.NDArray[np.bool_]:
+        """numpy.ndarray of bool, shape (n,) : which touch at the start, at time 0."""
+        return self._inner.at_start()
+
+    @property
+    def start_intersects(self) -> bool | None:
+        """bool or None : whether elements intersect at the start of the step; ``None`` if nobody asked, which only
+        ``start="verify"`` does.
+        """
+        return self._inner.start_intersects()
+
+    def of(self, kind: _PairKind) -> Impacts:
+        """Those of one kind.
+
+        Parameters
+        ----------
+        kind : {"vf", "ee", "ev", "vv", "ef", "ff"}
+
+        Returns
+        -------
+        Impacts
+            A part of the same answer, which is not copied.
+        """
+        return Impacts(self._inner.of(kind))
+
+    def earliest(self) -> Impact | None:
+        """The impact with the least time; of several, the first row.
+
+        Returns
+        -------
+        Impact or None
+            ``None`` where nothing touches.
+        """
+        first = self._inner.earliest()
+        return None if first is None else Impact(*first)
+
+    def __getitem__(self, index: SupportsIndex, /) -> Impact:
+        return Impact(*self._inner[index])
+
+    def __iter__(self) -> Iterator[Impact]:
+        return (Impact(*self._inner[ix]) for ix in range(len(self)))
+
+    def __repr__(self) -> str:
+        first = self.earliest()
+        if first is not None:
+            return f"Impacts({len(self)}, the first at {first.toi!r})"
+        is_verified = self.start_intersects is True
+        return f"Impacts(0, {'the start intersects' if is_verified else 'nothing touches'})"
+
+
+class NearPairs(_OfKinds):
+    """The pairs of elements that are within a distance of each other, sorted by kind, then by bodies and elements.
+
+    ``len(near)`` is their number. The attributes are arrays with one row per pair.
+    """
+
+    __slots__ = ()
+    _inner: _impinge.Near
+
+    @property
+    def types(self) -> npt.NDArray[np.uint8]:
+        """numpy.ndarray of uint8, shape (n,) : which features are nearest, as an index of `impinge.TYPES`, which are
+        ipc-toolkit's names: ``"P_T"``, ``"P_E0"``, ``"P_T0"``, ``"EA_EB"``, ``"EA_EB0"``, ``"EA0_EB0"``, …; of an edge and
+        a face, and of two faces, without numbers. Decided exactly.
+        """
+        return self._inner.types()
+
+    @property
+    def features(self) -> npt.NDArray[np.uint8]:
+        """numpy.ndarray of uint8, shape (n, 2) : the nearest feature of either element, as an index of `impinge.FEATURES`: ``"v0"``
+        to ``"v2"``, ``"e0"`` to ``"e2"`` (edge k goes from vertex k to the next) or ``"f"``.
+        """
+        return self._inner.features()
+
+    @property
+    def parallel(self) -> npt.NDArray[np.bool_]:
+        """numpy.ndarray of bool, shape (n,) : where nearest points may not be the only ones."""
+        return self._inner.parallel()
+
+    @property
+    def distances(self) -> npt.NDArray[np.float64]:
+        """numpy.ndarray of float64, shape (n,) : distances, rounded; the same bits on every machine. Only after
+        ``distances=True`` or ``closest_points=True``.
+        """
+        return self._inner.distances()
+
+    @property
+    def points(self) -> npt.NDArray[np.float64]:
+        """numpy.ndarray of float64, shape (n, 2, 3) : a nearest point of either element, rounded. Only after
+        ``closest_points=True``.
+        """
+        return self._inner.points()
+
+    def of(self, kind: _PairKind) -> NearPairs:
+        """Those of one kind.
+
+        Parameters
+        ----------
+        kind : {"vf", "ee", "ev", "vv", "ef", "ff"}
+
+        Returns
+        -------
+        NearPairs
+            A part of the same answer, which is not copied.
+        """
+        return NearPairs(self._inner.of(kind))
+
+
+class Candidates(_OfKinds):
+    """Pairs of elements whose boxes overlap during a step, sorted by kind, then by bodies and elements.
+
+    ``len(candidates)`` is their number. The attributes are arrays with one row per pair.
+    """
+
+    __slots__ = ()
+    _inner: _impinge.Candidates
+
+    def of(self, kind: _PairKind) -> Candidates:
+        """Those of one kind.
+
+        Parameters
+        ----------
+        kind : {"vf", "ee", "ev", "vv", "ef", "ff"}
+
+        Returns
+        -------
+        Candidates
+            A part of the same answer, which is not copied.
+        """
+        return Candidates(self._inner.of(kind))
+
+
+class Advance:
+    """How far a step can be taken, and where vertices are then."""
+
+    __slots__ = ("_inner",)
+
+    def __init__(self, inner: _impinge.Advance) -> None:
+        self._inner = inner
+
+    @property
+    def fraction(self) -> float:
+        """float : the part of the step that can be taken: 1 for all of it, 0 for none. With a clearance it holds for all smaller
+        parts, and for positions that you compute (see `Detector.advance`).
+        """
+        return self._inner.fraction
+
+    @property
+    def first(self) -> Impact | None:
+        """Impact or None : the first contact of the whole step, its time rounded down to float64; ``None`` where
+        nothing touches.
+        """
+        first = self._inner.first()
+        return None if first is None else Impact(*first)
+
+    @property
+    def start_intersects(self) -> bool | None:
+        """bool or None : whether elements intersect at the start, so that no part of the step can be taken; ``None`` if nobody
+        asked, which only ``start="verify"`` does.
+        """
+        return self._inner.start_intersects
+
+    @property
+    def n_tried(self) -> int:
+        """int : how many fractions were tried."""
+        return self._inner.n_tried
+
+    @property
+    def bodies(self) -> list[Body]:
+        """list of Body : the bodies that move."""
+        return self._inner.bodies()
+
+    def positions(self, body: _Body) -> npt.NDArray[np.floating[Any]] | None:
+        """Where the vertices of a body are then, rounded to the precision in which they are held.
+
+        The straight way from the start to these rounded positions is free, if the start was free of intersections, and but for what
+        touches at the start.
+
+        Parameters
+        ----------
+        body : Body or int
+
+        Returns
+        -------
+        numpy.ndarray, shape (v, 3), float32 or float64, or None
+            A copy; ``None`` for a body that stands still.
+
+        Raises
+        ------
+        ValueError, TypeError
+            A body of another scene.
+        """
+        return self._inner.positions(body)
+
+    def apply(self, scene: Scene) -> None:
+        """Takes the step: these positions become those of the scene, and its bodies stand still until they are
+        given end positions again.
+
+        Parameters
+        ----------
+        scene : Scene
+            The scene that was asked about.
+
+        Raises
+        ------
+        ValueError
+            A body that is gone, or that has another number of vertices now.
+        """
+        self._inner.apply(scene)
+
+    def __reduce__(self) -> NoReturn:
+        raise TypeError("an Advance names bodies of a live scene: pickle its arrays")
+
+    def __repr__(self) -> str:
+        return f"Advance(fraction={self.fraction!r}, {len(self.bodies)} bodies)"

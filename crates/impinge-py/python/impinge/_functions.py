@@ -1,0 +1,229 @@
+"""The everyday cases in one line, and what needs no scene."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, SupportsFloat, SupportsIndex, TypedDict
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _impinge
+from ._detector import Detector
+from ._scene import Scene
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+    from ._query import _Array
+    from ._scene import _RowKind
+
+__all__ = ["DeviceInfo", "devices", "hash_rows", "pairs", "self_pairs", "weld"]
+
+
+class Settings(TypedDict, total=False):
+    """The settings of a detector."""
+
+    backend: Literal["auto", "cpu", "gpu"]
+    method: Literal["auto", "clusters", "cells", "naive"]
+    device: str | None
+    threads: SupportsIndex | None
+    memory_budget: SupportsIndex | None
+    max_pairs: SupportsIndex | None
+    recluster: Literal["auto", "never"]
+    instruction_set: Literal["portable", "avx2", "avx512"] | None
+    density: SupportsFloat
+    affinity: Literal["inherited", "auto"]
+
+
+def pairs(
+    vertices_a: _Array,
+    faces_a: _Array,
+    vertices_b: _Array,
+    faces_b: _Array,
+    *,
+    weld: bool = False,
+    kind_a: _RowKind | None = None,
+    kind_b: _RowKind | None = None,
+    **settings: Unpack[Settings],
+) -> npt.NDArray[np.uint32]:
+    """Which elements of two meshes intersect.
+
+    Parameters
+    ----------
+    vertices_a, vertices_b : array_like, shape (v, 3)
+        Positions, float32 or float64.
+    faces_a, faces_b : array_like of int, shape (n, 3) or (n, 4)
+        Triangles or tetrahedra as vertex indices.
+    weld : bool
+        Whether vertices of one mesh at the same position become one first. This does not change which elements of two
+        meshes intersect.
+    kind_a, kind_b : {"points", "edges", "triangles", "tetrahedra", "quads"}, optional
+        What the rows of `faces_a` and `faces_b` are, as for `Scene.add`.
+    **settings
+        As for `Detector`, but for ``backend``, which is ``"cpu"`` unless it is given: waking a GPU
+        does not pay for one question.
+
+    Returns
+    -------
+    numpy.ndarray of uint32, shape (n, 2)
+        Every pair (row of `faces_a`, row of `faces_b`) that shares a point, touching included;
+        sorted.
+
+    Raises
+    ------
+    ValueError, TypeError
+        As `Scene.add` and `Detector`.
+
+    Examples
+    --------
+    >>> import numpy as np, impinge
+    >>> corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)
+    >>> impinge.pairs(corners, [[0, 1, 2]], corners + [0, 0, 1], [[0, 1, 2]])
+    array([], shape=(0, 2), dtype=uint32)
+    """
+    scene = Scene()
+    scene._add_named(vertices_a, faces_a, kind_a, ("vertices_a", "faces_a"), weld)
+    scene._add_named(vertices_b, faces_b, kind_b, ("vertices_b", "faces_b"), weld)
+    settings.setdefault("backend", "cpu")
+    found = Detector(**settings)._detect(scene, {"between": (0, 1)})
+    return found.between(0, 1)
+
+
+def self_pairs(
+    vertices: _Array,
+    faces: _Array,
+    *,
+    shared_vertex: Literal["resolve", "skip"] = "resolve",
+    weld: bool = False,
+    kind: _RowKind | None = None,
+    **settings: Unpack[Settings],
+) -> npt.NDArray[np.uint32]:
+    """Which elements of one mesh intersect each other.
+
+    Parameters
+    ----------
+    vertices : array_like, shape (v, 3)
+        Positions, float32 or float64.
+    faces : array_like of int, shape (n, 3) or (n, 4)
+        Triangles or tetrahedra as vertex indices.
+    shared_vertex : {"resolve", "skip"}
+        Elements that share a vertex index are reported when they share more points than the vertices
+        they have in common, or never. Vertices at one position with different indices are not
+        shared, unless they are welded.
+    weld : bool
+        Whether vertices at the same position become one first, as `weld` does. Rows of the answer stay those of
+        `faces`; with it, the answer about the arrays of a file is that of the program ``impinge self``.
+    kind : {"points", "edges", "triangles", "tetrahedra", "quads"}, optional
+        What the rows of `faces` are, as for `Scene.add`.
+    **settings
+        As for `Detector`, but for ``backend``, which is ``"cpu"`` unless it is given: waking a GPU
+        does not pay for one question.
+
+    Returns
+    -------
+    numpy.ndarray of uint32, shape (n, 2)
+        Pairs of rows of `faces`, the lower one first; sorted.
+
+    Raises
+    ------
+    ValueError, TypeError
+        As `Scene.add` and `Detector`.
+    """
+    scene = Scene()
+    scene._add_named(vertices, faces, kind, ("vertices", "faces"), weld)
+    question = {"self_of": 0, "shared_vertex": shared_vertex}
+    settings.setdefault("backend", "cpu")
+    found = Detector(**settings)._detect(scene, question)
+    return found.self_of(0)
+
+
+def weld(
+    vertices: _Array, faces: _Array
+) -> tuple[npt.NDArray[Any], npt.NDArray[np.uint32], npt.NDArray[np.uint32]]:
+    """Makes one vertex of all vertices at the same position.
+
+    Files such as STL, and meshes of renderers, repeat a vertex along each seam. Faces on both sides of a seam
+    then touch, but are no neighbours, because vertices are shared when their indices are equal.
+
+    Parameters
+    ----------
+    vertices : array_like, shape (v, 3)
+        Positions, float32 or float64. They are compared as numbers, without a tolerance; of equal ones the
+        first stays. NaN equals nothing.
+    faces : array_like of int, shape (n, k), k from 1 to 4
+        Elements of any kind as vertex indices.
+
+    Returns
+    -------
+    vertices : numpy.ndarray, shape (w, 3)
+        The vertices that stay, in their order and precision.
+    faces : numpy.ndarray of uint32, shape (n, k)
+        The same elements in the same order, with the indices of the vertices that stay.
+    map : numpy.ndarray of uint32, shape (v,)
+        For each vertex its index among those that stay. The positions of a later frame are welded by
+        ``positions[numpy.unique(map, return_index=True)[1]]``.
+
+    Raises
+    ------
+    ValueError, TypeError
+        As `Scene.add`.
+
+    Examples
+    --------
+    >>> import impinge
+    >>> soup = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
+    >>> vertices, faces, index = impinge.weld(soup, [[0, 1, 2], [3, 4, 5]])
+    >>> faces
+    array([[0, 1, 2],
+           [1, 3, 2]], dtype=uint32)
+    >>> index
+    array([0, 1, 2, 1, 3, 2], dtype=uint32)
+    """
+    return _impinge._weld(vertices, faces)
+
+
+def hash_rows(rows: _Array) -> int:
+    """`Pairs.hash` of rows that come from elsewhere.
+
+    Parameters
+    ----------
+    rows : array_like of int, shape (n, 4)
+        As `Pairs.rows`. The order of rows does not matter; in each, the lower (body, element) comes first.
+
+    Returns
+    -------
+    int
+    """
+    return _impinge._hash_rows(rows)
+
+
+class DeviceInfo(NamedTuple):
+    """A GPU adapter: hardware, or a driver that does the work of a GPU on the CPU.
+
+    Any part of its `name` chooses it in ``Detector(device=...)``. `interface` is ``"vulkan"``, ``"metal"`` or ``"dx12"``; `driver` the
+    driver and its version. `is_software`: whether it is a program on the CPU, which ``backend="auto"`` passes over.
+    `max_binding`: bytes that one buffer binding may have.
+    """
+
+    name: str
+    interface: str
+    driver: str
+    is_software: bool
+    max_binding: int
+
+
+def devices() -> list[DeviceInfo]:
+    """The GPUs that ``backend="gpu"`` can use, hardware first.
+
+    Returns
+    -------
+    list of DeviceInfo
+        Empty where there is none.
+
+    Examples
+    --------
+    >>> import impinge
+    >>> all(device.name for device in impinge.devices())
+    True
+    """
+    return [DeviceInfo(*device) for device in _impinge._devices()]

@@ -1,0 +1,413 @@
+"""`impinge.Scene`: bodies, their topology and positions."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Literal, SupportsFloat, SupportsIndex
+
+import numpy as np
+import numpy.typing as npt
+
+from ._impinge import SceneBase
+
+if TYPE_CHECKING:
+    from typing_extensions import TypeAlias
+
+    from ._impinge import Body
+    from ._query import _Array, _Body
+
+    _RowKind: TypeAlias = Literal["points", "edges", "triangles", "tetrahedra", "quads"]
+    _Positions: TypeAlias = npt.NDArray[np.floating[Any]]
+
+__all__ = ["Scene"]
+
+
+class Scene(SceneBase):
+    """Bodies with fixed topology, and where their vertices are now.
+
+    ``len(scene)`` is the number of bodies, ``body in scene`` says whether a handle is one of it. Scenes pickle and copy, with all
+    bodies under their numbers.
+
+    Examples
+    --------
+    >>> import numpy as np, impinge
+    >>> corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)
+    >>> scene = impinge.Scene()
+    >>> a = scene.add(corners, [[0, 1, 2]])
+    >>> b = scene.add(corners[:, [0, 2, 1]] + [0, 0.25, -0.25], [[0, 1, 2]])
+    >>> impinge.Detector("cpu").detect(scene).between(a, b)
+    array([[0, 0]], dtype=uint32)
+    """
+
+    __slots__ = ("__weakref__",)
+
+    def add(self, vertices: _Array, faces: _Array | None = None, kind: _RowKind | None = None) -> Body:
+        """Adds a body of triangles or tetrahedra. The arrays are copied.
+
+        Parameters
+        ----------
+        vertices : array_like, shape (v, 3), or a mesh
+            Positions. float32 and float64 are taken as they are and answered exactly; other
+            dtypes are converted where that loses nothing. Or, without `faces`, an object with ``vertices`` and
+            ``faces`` (trimesh and many others) or ``triangles`` (Open3D), or with ``points`` and ``cells_dict``
+            (meshio).
+        faces : array_like of int, shape (n, 3) or (n, 4), optional
+            Vertex indices: three per triangle, four per tetrahedron. Orientation does not matter.
+        kind : {"points", "edges", "triangles", "tetrahedra", "quads"}, optional
+            What the rows of `faces` are. ``"quads"`` cuts row ``i`` into the triangles ``2 * i`` and ``2 * i + 1``,
+            along the diagonal from its first corner. By default three columns are triangles, and four are
+            tetrahedra if two rows share exactly three vertices, as neighbours in a mesh of tetrahedra do and quads do
+            not; else four columns are refused.
+
+        Returns
+        -------
+        Body
+            The handle by which the body is named from now on.
+
+        Raises
+        ------
+        ValueError
+            A wrong shape, an index out of range, a position that is not finite or outside the
+            range in which answers are exact, a number that a conversion would change, rows of four that may be quads,
+            a mesh with cells of several kinds.
+        TypeError
+            An array that holds no real numbers, an object that is no mesh.
+        """
+        return self._add(vertices, faces, kind)
+
+    def add_many(
+        self,
+        vertices: _Array,
+        faces: _Array,
+        vertex_offsets: _Array,
+        face_offsets: _Array,
+        kind: _RowKind | None = None,
+    ) -> list[Body]:
+        """Adds many bodies in one call: all of them, or none. The arrays are copied.
+
+        Parameters
+        ----------
+        vertices : array_like, shape (v, 3)
+            The positions of all bodies, one after the other.
+        faces : array_like of int, shape (n, 3) or (n, 4)
+            The elements of all bodies, one after the other. Each names the vertices of its own body, from 0.
+        vertex_offsets, face_offsets : array_like of int, shape (m + 1,)
+            Body ``i`` of ``m`` has the rows ``offsets[i]`` to ``offsets[i + 1]``: they begin with 0, never fall, and end
+            with the number of rows.
+        kind : str, optional
+            As for `add`, but for ``"quads"``, which is refused.
+
+        Returns
+        -------
+        list of Body
+
+        Raises
+        ------
+        ValueError, TypeError
+            As `add`; the scene is unchanged then. Bodies are named by the number that they would have had.
+
+        Examples
+        --------
+        >>> import numpy as np, impinge
+        >>> corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)
+        >>> scene = impinge.Scene()
+        >>> parts = scene.add_many(np.tile(corners, (1000, 1)), [[0, 1, 2]] * 1000,
+        ...                        np.arange(1001) * 3, np.arange(1001))
+        >>> len(parts), parts[999]
+        (1000, Body(999))
+        """
+        return self._add_many(vertices, faces, vertex_offsets, face_offsets, kind)
+
+    def add_edges(self, vertices: _Array, edges: _Array) -> Body:
+        """Adds a body of edges, such as strands of hair. The arrays are copied.
+
+        Parameters
+        ----------
+        vertices : array_like, shape (v, 3)
+            As for `add`.
+        edges : array_like of int, shape (n, 2)
+            Vertex indices.
+
+        Returns
+        -------
+        Body
+
+        Raises
+        ------
+        ValueError, TypeError
+            As `add`.
+        """
+        return self._add_edges(vertices, edges)
+
+    def add_points(self, vertices: _Array) -> Body:
+        """Adds a body of points, one per row. The array is copied.
+
+        Parameters
+        ----------
+        vertices : array_like, shape (v, 3)
+            As for `add`.
+
+        Returns
+        -------
+        Body
+
+        Raises
+        ------
+        ValueError, TypeError
+            As `add`.
+        """
+        return self._add_points(vertices)
+
+    def remove(self, body: _Body) -> None:
+        """Removes a body. Its handle is refused from now on; its number may be used again.
+
+        Parameters
+        ----------
+        body : Body or int
+        """
+        self._remove(body)
+
+    def remesh(
+        self, body: _Body, vertices: _Array, faces: _Array, kind: _RowKind | None = None
+    ) -> None:
+        """Gives a body new topology and positions under its old handle.
+
+        Parameters
+        ----------
+        body : Body or int
+        vertices, faces, kind
+            As in `add`.
+
+        Raises
+        ------
+        ValueError, TypeError
+            As `add`; the body is unchanged then.
+        """
+        self._remesh(body, vertices, faces, kind)
+
+    def set_positions(self, body: _Body, vertices: _Array, *, copy: bool = True) -> None:
+        """Moves the vertices of a body; the precision may change. A new step starts: the
+        body has no end positions until they are set.
+
+        Parameters
+        ----------
+        body : Body or int
+        vertices : array_like, shape (v, 3)
+            As many positions as the body has vertices. With ``copy=False``, a `numpy.ndarray` of float32 or float64 in C order,
+            with ``vertices.flags.writeable`` False, and so for the array that it is a view of.
+        copy : bool
+            Without a copy, the scene checks the array now and then reads it where it lies, until the body gets other positions or is
+            removed, or the scene is gone; it keeps the array alive. The array must not change before that. Arrays that can be written,
+            and views of such, are refused. That is all that can be checked: whoever writes to the memory in another way, through a view
+            made before or by making the array writeable again, gets answers about no one pose, and may read torn numbers.
+
+        Raises
+        ------
+        ValueError, TypeError
+            As `add`; without a copy an array that can be written or would have to be copied. The body keeps its old positions then.
+
+        Examples
+        --------
+        >>> import numpy as np, impinge
+        >>> scene = impinge.Scene()
+        >>> corners = np.eye(3, dtype=np.float32)
+        >>> body = scene.add(corners, [[0, 1, 2]])
+        >>> frame = corners + np.float32(1)
+        >>> frame.flags.writeable = False
+        >>> scene.set_positions(body, frame, copy=False)
+        >>> scene.positions(body)[0].tolist()
+        [2.0, 1.0, 1.0]
+        """
+        self._set_positions(body, vertices, copy)
+
+    def set_end_positions(
+        self, body: _Body, vertices: _Array | None, *, copy: bool = True
+    ) -> None:
+        """Says where the vertices of a body are at the end of a step: between its positions and these, each moves
+        on a straight line at constant speed. They hold until the next `set_positions`, `set_transform` or `remesh`. A body without
+        end positions stands still.
+
+        Where start and end come in different precisions, the single one is widened, which is exact.
+
+        Parameters
+        ----------
+        body : Body or int
+        vertices : array_like, shape (v, 3), or None
+            As many positions as the body has vertices. ``None``: the body stands still.
+        copy : bool
+            As for `set_positions`. Where start and end come in different precisions, the single one is copied.
+
+        Raises
+        ------
+        ValueError, TypeError
+            As `set_positions`; the body keeps its old end positions then.
+        """
+        self._set_end_positions(body, vertices, copy)
+
+    def set_transform(self, body: _Body, matrix: _Array) -> None:
+        """Moves a body by an affine matrix, such as a rigid motion, without its vertices being given again.
+
+        The body moves from its rest positions, which are those that were given last (`add`, `set_positions`, `remesh`);
+        a second transform replaces the first. Answers are exact as if the moved vertices had been given, and these are
+        rounded in one way: row ``a, b, c, d`` of the matrix takes ``(x, y, z)`` to ``((a*x + b*y) + c*z) + d``, each
+        product and each sum rounded to float64 in this order, the last sum rounded once more to the dtype of the
+        rest positions. End positions are forgotten.
+
+        Parameters
+        ----------
+        body : Body or int
+        matrix : array_like, shape (4, 4)
+            In float64. The last row is ``0, 0, 0, 1``.
+
+        Raises
+        ------
+        ValueError, TypeError
+            A matrix of another shape, not finite, or not affine; a moved position that is refused. The body is
+            unchanged then.
+
+        Examples
+        --------
+        >>> import numpy as np, impinge
+        >>> scene = impinge.Scene()
+        >>> body = scene.add(np.eye(3, dtype=np.float32), [[0, 1, 2]])
+        >>> up = np.eye(4)
+        >>> up[2, 3] = 0.5
+        >>> scene.set_transform(body, up)
+        >>> scene.positions(body)[2].tolist(), scene.rest_positions(body)[2].tolist()
+        ([0.0, 0.0, 1.5], [0.0, 0.0, 1.0])
+        """
+        self._set_transform(body, matrix)
+
+    def set_filter(
+        self,
+        body: _Body,
+        category: SupportsIndex | None = None,
+        mask: SupportsIndex | None = None,
+    ) -> None:
+        """Sets who a body meets when a question is about all bodies.
+
+        Two bodies meet when each one's `category` shares a bit with the other one's `mask`.
+
+        Parameters
+        ----------
+        body : Body or int
+        category : int, 64 bits
+            The groups to which the body belongs; 1 by default.
+        mask : int, 64 bits
+            The groups that it meets; all of them by default.
+
+        Raises
+        ------
+        ValueError, TypeError
+            A number that does not fit.
+        """
+        self._set_filter(body, category, mask)
+
+    def set_thickness(self, body: _Body, thickness: SupportsFloat) -> None:
+        """Sets how thick a body is: what its elements add to the distance of `Detector.near`, of two elements of one body
+        twice. The sum is not rounded. A new body is not thick.
+
+        Parameters
+        ----------
+        body : Body or int
+        thickness : float
+            In the unit of the scene, 0 or more.
+
+        Raises
+        ------
+        ValueError, TypeError
+            A thickness that is negative or not finite.
+        """
+        self._set_thickness(body, thickness)
+
+    def positions(self, body: _Body) -> _Positions:
+        """The current positions of a body.
+
+        Returns
+        -------
+        numpy.ndarray, shape (v, 3), float32 or float64
+            A copy, in the precision in which they were given.
+        """
+        return self._positions(body)
+
+    def end_positions(self, body: _Body) -> _Positions | None:
+        """The end positions of a body.
+
+        Returns
+        -------
+        numpy.ndarray, shape (v, 3), float32 or float64, or None
+            A copy; ``None`` for a body that stands still.
+        """
+        return self._end_positions(body)
+
+    def rest_positions(self, body: _Body) -> _Positions:
+        """The positions that were given last, before any transform.
+
+        Returns
+        -------
+        numpy.ndarray, shape (v, 3), float32 or float64
+            A copy.
+        """
+        return self._rest_positions(body)
+
+    def transform(self, body: _Body) -> npt.NDArray[np.float64] | None:
+        """How a body was moved by `set_transform`.
+
+        Returns
+        -------
+        numpy.ndarray of float64, shape (4, 4), or None
+            ``None`` for a body that was not, or whose positions were given since.
+        """
+        return self._transform(body)
+
+    def elements(self, body: _Body) -> npt.NDArray[np.uint32]:
+        """The elements that a body was given as, by vertex indices.
+
+        Returns
+        -------
+        numpy.ndarray of uint32, shape (n, 1), (n, 2), (n, 3) or (n, 4)
+            A copy. Points, edges, triangles or tetrahedra, as `kind` says.
+        """
+        return self._elements(body)
+
+    def edges(self, body: _Body) -> npt.NDArray[np.uint32]:
+        """The edges of a body, in the order in which answers number them.
+
+        Returns
+        -------
+        numpy.ndarray of uint32, shape (n, 2)
+            The unique pairs (low, high) of vertices in the order of (high, low), as ``igl.edges`` has them; of tetrahedra the surface
+            counts. A copy.
+        """
+        return self._edges(body)
+
+    def faces(self, body: _Body) -> npt.NDArray[np.uint32]:
+        """The faces of a body, in the order in which answers number them.
+
+        Returns
+        -------
+        numpy.ndarray of uint32, shape (n, 3)
+            Triangles as they were given; of tetrahedra the surface. A copy.
+        """
+        return self._faces(body)
+
+    def kind(self, body: _Body) -> Literal["points", "edges", "triangles", "tetrahedra"]:
+        """What a body is made of: ``"points"``, ``"edges"``, ``"triangles"`` or ``"tetrahedra"``."""
+        return self._kind(body)
+
+    def n_elements(self, body: _Body) -> int:
+        """How many elements a body has."""
+        return self._n_elements(body)
+
+    def n_vertices(self, body: _Body) -> int:
+        """How many vertices a body has."""
+        return self._n_vertices(body)
+
+    @property
+    def bodies(self) -> list[Body]:
+        """list of Body : the bodies in the order of their numbers."""
+        return self._bodies()
+
+    @property
+    def nbytes(self) -> int:
+        """int : bytes held for topology and positions."""
+        return self._nbytes()

@@ -1,0 +1,245 @@
+// The classes that both builds have, made of the functions of either module.
+
+import { Advance, Candidates, Contacts, Impacts, NearPairs, Pairs, Penetration, earliest, nearest, numberOf, statsOf } from "./answers.js";
+import { packed, plain } from "./query.js";
+import { body, call, isSingle, mustBeNone, number, refuse, wide, word } from "./shared.js";
+
+const BODY_KINDS = ["points", "edges", "triangles", "tetrahedra"];
+
+// How the arrays of a body are used.
+const [ADD, REMESH, POSITIONS, END_POSITIONS] = [0, 1, 2, 3];
+const NONE = new Uint32Array(0);
+
+const first = ([, , [found]]) => found;
+const yes = (lists) => first(lists) === 1;
+
+let lastContacts = 0;
+
+function instance(given, type, needed) {
+  if (!(given instanceof type)) refuse(`${needed} is needed`);
+  return given;
+}
+
+// How each question is asked: its arguments but the scene, as `{ question, words, numbers, watch, shape }`.
+export const QUESTIONS = {
+  detect: (query) => ({ question: 0, ...packed(query), shape: (lists, stats) => new Pairs(lists, stats) }),
+  count: (query) => ({ question: 1, ...packed(query), shape: first }),
+  any: (query) => ({ question: 2, ...packed(query), shape: yes }),
+  impacts: (query) => ({ question: 3, ...packed(query), shape: (lists, stats) => new Impacts(lists, stats) }),
+  earliest: (query) => ({ question: 4, ...packed(query), shape: earliest }),
+  isFree: (query) => ({ question: 5, ...packed(query), shape: yes }),
+  advance: (query) => ({ question: 6, ...packed(query), shape: (lists, stats) => new Advance(lists, stats) }),
+  candidates: (inflation, query) => ({
+    ...{ question: 7, ...packed(query, number("inflation", inflation)) },
+    shape: (lists, stats) => new Candidates(lists, stats),
+  }),
+  near(distance, query) {
+    const hasPoints = Boolean(query?.closestPoints);
+    const has = { hasPoints, hasDistances: hasPoints || Boolean(query?.distances) };
+    const shape = (lists, stats) => new NearPairs(lists, stats, has);
+    return { question: 8, ...packed(query, number("distance", distance)), shape };
+  },
+  distance: (a, b, control) => ({ question: 9, ...plain(Uint32Array.of(body(a), body(b)), control), shape: nearest }),
+  contacts(pairs, control) {
+    const { rows } = instance(pairs, Pairs, "pairs: what detect() returned");
+    lastContacts = (lastContacts + 1) >>> 0;
+    const number = lastContacts;
+    const shape = (lists, stats) => new Contacts(lists, stats, { pairs, number });
+    return { question: 10, ...plain(before([number], rows), control), shape };
+  },
+  penetration(contacts, a, b, control) {
+    const { rows } = instance(contacts, Contacts, "contacts: what contacts() returned");
+    const words = before([numberOf(contacts), body(a), body(b)], rows);
+    return { question: 11, ...plain(words, control), shape: (lists, stats) => new Penetration(lists, stats) };
+  },
+};
+
+// The settings of a detector, as the module takes them.
+export function settings(given) {
+  const { method = "auto", recluster = "auto", memoryBudget, maxPairs, ...others } = given ?? {};
+  mustBeNone("settings", others, ["method", "recluster", "memoryBudget", "maxPairs"]);
+  const words = [
+    word("method", method, ["auto", "clusters", "cells", "naive"]),
+    word("recluster", recluster, ["auto", "never"]),
+  ];
+  return [...words, limit("memoryBudget", memoryBudget), limit("maxPairs", maxPairs)];
+}
+
+// A limit, or -1 for none.
+function limit(name, given) {
+  if (given === undefined) return -1;
+  if (number(name, given) >= 0) return given;
+  return refuse(`${name}: ${given} given, a number that is not below 0 is needed`);
+}
+
+// Numbers, then rows.
+function before(numbers, rows) {
+  const words = new Uint32Array(numbers.length + rows.length);
+  words.set(numbers);
+  words.set(rows, numbers.length);
+  return words;
+}
+
+// The kind of a mesh's elements by the number of their corners, its index and its positions. A mesh that was read has a name and a map.
+function arrays({ positions, faces, tetrahedra, edges, name: _name, map: _map, ...others }) {
+  mustBeNone("mesh", others, ["positions", "faces", "tetrahedra", "edges"]);
+  const given = [[1, edges], [2, faces], [3, tetrahedra]].filter(([, index]) => index !== undefined);
+  if (given.length > 1) refuse("mesh: elements of several kinds given, one of faces, tetrahedra and edges allowed");
+  const [[kind, index] = [0, NONE]] = given;
+  return [kind, wide(index), positions];
+}
+
+export function makeScene({ SceneHandle }, mustBeReady) {
+  let handleOf;
+  class Scene {
+    #handle;
+
+    static {
+      handleOf = (scene) => instance(scene, Scene, "scene: a Scene of the same module").#held;
+    }
+
+    constructor() {
+      mustBeReady();
+      this.#handle = new SceneHandle();
+    }
+
+    get #held() {
+      return this.#handle ?? refuse("this scene has been disposed of");
+    }
+
+    #put(use, which, kind, index, positions) {
+      const handle = this.#held;
+      const put = isSingle(positions) ? "put_f32" : "put_f64";
+      return call(() => handle[put](use, which, kind, index, positions));
+    }
+
+    add(mesh) {
+      return this.#put(ADD, 0, ...arrays(mesh));
+    }
+
+    addTriangles(faces, positions) {
+      return this.#put(ADD, 0, 2, wide(faces), positions);
+    }
+
+    addTetrahedra(tetrahedra, positions) {
+      return this.#put(ADD, 0, 3, wide(tetrahedra), positions);
+    }
+
+    addEdges(edges, positions) {
+      return this.#put(ADD, 0, 1, wide(edges), positions);
+    }
+
+    addPoints(positions) {
+      return this.#put(ADD, 0, 0, NONE, positions);
+    }
+
+    remove(which) {
+      call(() => this.#held.remove(body(which)));
+    }
+
+    remesh(which, mesh) {
+      this.#put(REMESH, body(which), ...arrays(mesh));
+    }
+
+    setPositions(which, positions) {
+      this.#put(POSITIONS, body(which), 0, NONE, positions);
+    }
+
+    setEndPositions(which, positions) {
+      if (positions === null) call(() => this.#held.clear_end_positions(body(which)));
+      else this.#put(END_POSITIONS, body(which), 0, NONE, positions);
+    }
+
+    setTransform(which, matrix) {
+      const columns = Float64Array.from(matrix);
+      if (columns.length !== 16) refuse(`transform: ${columns.length} numbers given, 16 allowed, column by column`);
+      call(() => this.#held.set_transform(body(which), columns));
+    }
+
+    setFilter(which, category = 1, mask = 0xffff_ffff_ffff_ffffn) {
+      const bits = [category, mask].map((given) => BigInt.asUintN(64, BigInt(given)));
+      call(() => this.#held.set_filter(body(which), ...bits));
+    }
+
+    setThickness(which, thickness) {
+      call(() => this.#held.set_thickness(body(which), number("thickness", thickness)));
+    }
+
+    #size(which) {
+      return call(() => this.#held.size(body(which)));
+    }
+
+    kind(which) {
+      return BODY_KINDS[this.#size(which)[0] - 1];
+    }
+
+    nElements(which) {
+      return this.#size(which)[1];
+    }
+
+    nVertices(which) {
+      return this.#size(which)[2];
+    }
+
+    #index(which, part) {
+      return call(() => this.#held.index(body(which), part));
+    }
+
+    elements(which) {
+      return this.#index(which, 0);
+    }
+
+    edges(which) {
+      return this.#index(which, 1);
+    }
+
+    faces(which) {
+      return this.#index(which, 2);
+    }
+
+    #positions(which, when) {
+      return call(() => this.#held.positions(body(which), when)) ?? null;
+    }
+
+    positions(which) {
+      return this.#positions(which, 0);
+    }
+
+    endPositions(which) {
+      return this.#positions(which, 1);
+    }
+
+    restPositions(which) {
+      return this.#positions(which, 2);
+    }
+
+    get bodies() {
+      return Array.from(this.#held.bodies());
+    }
+
+    dispose() {
+      this.#handle?.free();
+      this.#handle = null;
+    }
+  }
+  disposable(Scene);
+  return { Scene, handleOf };
+}
+
+export function disposable(type) {
+  if (Symbol.dispose) type.prototype[Symbol.dispose] = type.prototype.dispose;
+}
+
+// Asks the module at once. `detector` and `scene` are the module's.
+export function ask(detector, scene, { question, words, numbers, watch, shape }) {
+  const lists = watch.during((id) => call(() => detector.ask(question, scene, id, words, numbers)));
+  return shape(lists, statsOf(detector.stats(false)));
+}
+
+// Gives a class a method per question. `answer(detector, question, scene, asked)` has the answer.
+export function answering(type, answer) {
+  for (const question of Object.keys(QUESTIONS)) {
+    const value = { [question](scene, ...rest) { return answer(this, question, scene, () => QUESTIONS[question](...rest)); } }[question];
+    Object.defineProperty(type.prototype, question, { value, writable: true, configurable: true });
+  }
+}

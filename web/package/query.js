@@ -1,0 +1,158 @@
+// Questions as the lists of numbers that the module takes, and what watches them.
+
+import { ImpingeError, body, mustBeNone, number, refuse, word } from "./shared.js";
+
+export const KINDS = ["vf", "ee", "ev", "vv", "ef", "ff"];
+
+const FIELDS = [
+  ...["which", "between", "selfOf", "of", "kinds", "sharedVertex", "exclude", "ownedBy", "start", "separation", "clearance"],
+  ...["clearanceShare", "precision", "distances", "closestPoints", "signal", "progress"],
+];
+
+// The words and numbers of a query, and what watches the question. `length` is the question's own: a distance, an inflation.
+export function packed(query, length = 0) {
+  const {
+    which,
+    between,
+    selfOf,
+    of,
+    kinds,
+    sharedVertex = "resolve",
+    exclude = [],
+    ownedBy,
+    start = "report",
+    separation = 0,
+    clearance = 0,
+    clearanceShare = 0.2,
+    precision = "f32",
+    distances = false,
+    closestPoints = false,
+    signal,
+    progress,
+    ...others
+  } = query ?? {};
+  mustBeNone("query", others, FIELDS);
+  const rules = [
+    word("sharedVertex", sharedVertex, ["resolve", "skip"]),
+    word("start", start, ["report", "skip", "verify"]),
+    word("precision", precision, ["f32", "f64"]),
+  ];
+  const flags = (distances ? 1 : 0) | (closestPoints ? 2 : 0) | (ownedBy === undefined ? 0 : 4);
+  const words = [...bodies({ which, between, selfOf, of }), ...rules, bits(kinds), flags];
+  for (const pair of exclude) words.push(...two("exclude", pair));
+  const lengths = Object.entries({ separation, clearance, clearanceShare }).map((entry) => number(...entry));
+  return {
+    words: Uint32Array.from(words),
+    numbers: Float64Array.from([...lengths, ...cell(ownedBy), length]),
+    watch: new Watch(signal, progress),
+  };
+}
+
+// A question without a query: words alone.
+export function plain(words, control) {
+  const { signal, progress, ...others } = control ?? {};
+  mustBeNone("control", others, ["signal", "progress"]);
+  return { words, numbers: new Float64Array(10), watch: new Watch(signal, progress) };
+}
+
+function bodies(given) {
+  const names = Object.keys(given).filter((name) => given[name] !== undefined);
+  if (names.length > 1) refuse(`query: "${names[0]}" and "${names[1]}" given, one of them allowed`);
+  const { which = "all", between, selfOf, of } = given;
+  if (between !== undefined) return [3, ...two("between", between)];
+  if (selfOf !== undefined) return [4, body(selfOf), 0];
+  if (of !== undefined) return [5, body(of), 0];
+  return [word("which", which, ["all", "between", "self"]), 0, 0];
+}
+
+function two(name, given) {
+  if (given?.length !== 2) refuse(`${name}: ${String(given)} given, two bodies are needed`);
+  return Array.from(given, body);
+}
+
+// Kinds as bits. That they were said is a bit of its own.
+function bits(kinds) {
+  if (kinds === undefined) return 0;
+  return Array.from(kinds, (kind) => 1 << word("kinds", kind, KINDS)).reduce((all, bit) => all | bit, 64);
+}
+
+function cell(given) {
+  if (given === undefined) return [0, 0, 0, 0, 0, 0];
+  const corners = Array.from(given, (corner) => Array.from(corner, (x) => number("ownedBy", x)));
+  if (corners.length === 2 && corners.every(({ length }) => length === 3)) return corners.flat();
+  return refuse("ownedBy: two corners of three numbers each are needed");
+}
+
+const watches = new Map();
+let lastWatch = 0;
+
+// The module calls this from time to time: whether a question is to end.
+export const watch = (id, done, total) => watches.get(id)?.look(done, total) ?? false;
+
+const INTERVAL_MS = 10;
+
+// Looks at the signal of a question and tells its progress.
+class Watch {
+  #signal;
+  #progress;
+  #looked = -Infinity;
+  #isStopped = false;
+  #failure = null;
+
+  constructor(signal, progress) {
+    if (signal !== undefined && !(signal instanceof AbortSignal)) refuse("signal: an AbortSignal is needed");
+    if (progress !== undefined && typeof progress !== "function") refuse("progress: a function is needed");
+    this.#signal = signal;
+    this.#progress = progress;
+  }
+
+  look(done, total) {
+    const now = performance.now();
+    if (this.#isStopped || (done < total && now - this.#looked < INTERVAL_MS)) return this.#isStopped;
+    this.#looked = now;
+    try {
+      this.#isStopped = this.#progress?.(done, total) === false || this.#signal?.aborted === true;
+    } catch (error) {
+      this.#failure = { error };
+      this.#isStopped = true;
+    }
+    return this.#isStopped;
+  }
+
+  // Watches a question, which gets a number for the module; 0 if nobody looks.
+  during(ask) {
+    const id = this.#begin();
+    try {
+      return ask(id);
+    } finally {
+      this.#end(id);
+    }
+  }
+
+  async duringAsync(ask) {
+    const id = this.#begin();
+    try {
+      return await ask(id);
+    } finally {
+      this.#end(id);
+    }
+  }
+
+  #begin() {
+    if (this.#signal?.aborted) this.#stop();
+    if (this.#signal === undefined && this.#progress === undefined) return 0;
+    lastWatch = (lastWatch % 0xffff_ffff) + 1;
+    watches.set(lastWatch, this);
+    return lastWatch;
+  }
+
+  #end(id) {
+    watches.delete(id);
+    if (this.#failure !== null) throw this.#failure.error;
+    if (this.#isStopped) this.#stop();
+  }
+
+  #stop() {
+    throw new ImpingeError("cancelled", "cancelled", { cause: this.#signal?.reason });
+  }
+}
