@@ -16,6 +16,7 @@ mod detector;
 pub mod gpu;
 #[allow(missing_docs)]
 pub mod plan;
+mod probe;
 pub mod proximity;
 pub mod query;
 pub mod scene;

@@ -51,6 +51,14 @@ impl<'py> PositionArray<'py> {
         }
     }
 
+    /// The rows themselves.
+    pub fn rows(&self) -> PyResult<Rows<'_>> {
+        Ok(match self {
+            PositionArray::F32(array) => Rows::F32(slice_rows(array)?),
+            PositionArray::F64(array) => Rows::F64(slice_rows(array)?),
+        })
+    }
+
     /// How many positions there are.
     pub fn len(&self) -> usize {
         match self {
@@ -58,6 +66,13 @@ impl<'py> PositionArray<'py> {
             PositionArray::F64(array) => array.shape()[0],
         }
     }
+}
+
+/// Rows of three coordinates where they lie.
+#[derive(Clone, Copy)]
+pub enum Rows<'a> {
+    F32(&'a [[f32; 3]]),
+    F64(&'a [[f64; 3]]),
 }
 
 /// What the rows of an index array are.

@@ -10,6 +10,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::answers::{Advance, Candidates, Impacts, Pairs, Row, impact};
+use crate::arrays::{PositionArray, Rows};
 use crate::bodies::Body;
 use crate::contact::{Contacts, Penetration};
 use crate::errors::{invalid, raise};
@@ -243,6 +244,30 @@ impl DetectorBase {
             detector.nearest(scene, query)
         })?;
         nearest(slf.py(), asked)
+    }
+
+    fn _contains<'py>(
+        slf: &Bound<'py, Self>,
+        scene: &Bound<'_, PyAny>,
+        body: &Bound<'_, PyAny>,
+        points: &Bound<'py, PyAny>,
+        keywords: Keywords<'_, '_>,
+    ) -> PyResult<Bound<'py, PyArray1<i8>>> {
+        let points = PositionArray::new(points, "points")?;
+        let points = points.rows()?;
+        let options = Options::control(keywords)?;
+        let body = |scene: &Scene, _: &Options<'_>| scene.id(body, "body");
+        let asked = ask_about(
+            slf,
+            scene,
+            options,
+            body,
+            |detector, scene, &body| match points {
+                Rows::F32(points) => detector.contains(scene, body, points),
+                Rows::F64(points) => detector.contains(scene, body, points),
+            },
+        )?;
+        Ok(PyArray1::from_vec(slf.py(), asked.answer))
     }
 
     fn _contacts(

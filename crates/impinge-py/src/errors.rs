@@ -38,6 +38,11 @@ pub fn raise(error: Error) -> PyErr {
         Error::Cancelled => Cancelled::new_err("the detection was cancelled"),
         Error::NoAdapter { .. } | Error::Gpu { .. } => DeviceError::new_err(message),
         Error::Threads(_) => InternalError::new_err(message),
+        Error::NonFinitePoint { what, row, value } => {
+            let axis = value.iter().position(|x| !x.is_finite()).unwrap_or(0);
+            let value = number(value[axis]);
+            InvalidError::new_err(format!("{what}[{row}, {axis}] = {value}: must be finite"))
+        }
         _ => InvalidError::new_err(message),
     }
 }

@@ -189,7 +189,7 @@ fn windings(mut seeds: Vec<(Point, u32)>, body: &Body, work: Work<'_>) -> Result
 }
 
 /// 1 if the shifted ray from a point leaves through a face, -1 if it enters through it, else 0.
-fn passes(point: &Point, corners: &[Point; 3]) -> i32 {
+pub(crate) fn passes(point: &Point, corners: &[Point; 3]) -> i32 {
     if corners.iter().all(|corner| corner[0] < point[0]) {
         return 0;
     }

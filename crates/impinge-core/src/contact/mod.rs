@@ -50,11 +50,12 @@ mod work;
 pub use convex::{ConvexOverlap, convex_overlap};
 pub use curves::Curves;
 pub use depths::solid_depths;
+pub(crate) use inside::passes;
 pub use penetration::Penetration;
 pub(crate) use penetration::Topologies;
 pub use regions::Region;
 pub use solids::SolidOverlap;
-pub(crate) use work::Work;
+pub(crate) use work::{Equal, Work};
 
 use std::sync::Arc;
 

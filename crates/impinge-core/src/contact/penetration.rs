@@ -127,7 +127,10 @@ impl Topologies {
     }
 
     /// Caches the topology of a body.
-    fn know(&mut self, scene: &Scene, id: BodyId, work: Work<'_>) -> Result<(), Error> {
+    ///
+    /// # Errors
+    /// A body not made of triangles, a surface that is not closed, cancellation.
+    pub fn know(&mut self, scene: &Scene, id: BodyId, work: Work<'_>) -> Result<(), Error> {
         let body = scene.body(id)?;
         let stamp = body.topology_stamp();
         let known = self.edges.get(&id.index());

@@ -11,6 +11,7 @@ pub mod host;
 mod in_step;
 mod intersections;
 mod near;
+mod probe;
 #[cfg(feature = "gpu")]
 mod resident;
 mod steps;
@@ -26,12 +27,14 @@ use crate::answers::pairs::Pairs;
 use crate::clusterings::Clusterings;
 use crate::contact::Topologies;
 use crate::cpu::Cpu;
+use crate::probe::Probes;
 use crate::proximity::Distances;
 use crate::query::progress::Control;
 use crate::query::settings::Settings;
 use crate::scene::error::Error;
 use crate::search::runner::Runner;
 use crate::search::stats::Stats;
+use crate::simd::Isa;
 
 /// Finds intersecting pairs, frame after frame. Owns the scratch memory and reuses it.
 ///
@@ -62,6 +65,7 @@ pub struct Detector {
     touching: distance::Touching,
     distances: Distances,
     topologies: Topologies,
+    probes: Probes,
     #[cfg(feature = "gpu")]
     gpu: Option<crate::gpu::Engine>,
 }
@@ -128,6 +132,7 @@ impl Detector {
             touching: distance::Touching::default(),
             distances: Distances::new(clusterings.clone()),
             topologies: Topologies::default(),
+            probes: Probes::new(Isa::detect(settings.instruction_set)),
             #[cfg(any(feature = "gpu", test))]
             clusterings,
             settings,

@@ -115,8 +115,8 @@ impl Distances {
         }
     }
 
-    /// Forgets removed bodies.
-    fn begin(&mut self, scene: &Scene) {
+    /// Forgets removed bodies: to be called first in each question.
+    pub fn begin(&mut self, scene: &Scene) {
         self.trees.retain(|&slot, _| scene.holds(slot));
         drop(self.clusterings.open(scene));
         self.stats.clear();
@@ -356,6 +356,15 @@ impl Distances {
             (self.stats.n_clustered, self.stats.n_reclustered);
         let beside: usize = self.trees.values().map(Tree::bytes).sum();
         stats.bytes_held = (self.clusterings.bytes() + beside) as u64;
+    }
+
+    /// The tree of a body in its current pose.
+    ///
+    /// # Errors
+    /// A stale id, bad positions that were written in place.
+    pub fn tree(&mut self, scene: &Scene, id: BodyId, workers: &Workers) -> Result<&Tree, Error> {
+        self.know(scene, id, workers)?;
+        Ok(&self.trees[&id.index()])
     }
 
     fn know(&mut self, scene: &Scene, id: BodyId, workers: &Workers) -> Result<(), Error> {

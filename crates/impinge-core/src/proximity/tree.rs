@@ -15,7 +15,7 @@ use impinge_exact::Point;
 
 /// A body's clusters and boxes.
 #[derive(Debug)]
-pub(super) struct Tree {
+pub(crate) struct Tree {
     pub clustering: Arc<Clustering>,
     topology_stamp: u64,
     positions_stamp: u64,
@@ -72,6 +72,11 @@ impl Tree {
         true
     }
 
+    /// The boxes of each level's nodes, from the clusters up.
+    pub fn levels(&self) -> &[Vec<Bounds>] {
+        &self.levels
+    }
+
     /// How well the clusters fit the pose of the boxes.
     pub fn spread(&self) -> f64 {
         let (Some(clusters), Some(root)) = (self.levels.first(), self.root()) else {
@@ -124,7 +129,7 @@ impl Tree {
 
 /// A node of a tree; level 0 holds the clusters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) struct Node {
+pub(crate) struct Node {
     pub level: u32,
     pub number: u32,
 }

@@ -16,6 +16,16 @@ pub enum Error {
         /// The position as given.
         value: [f64; 3],
     },
+    /// A point or direction that was asked about holds NaN or an infinity. Check where it comes from.
+    #[error("{what}: row {row} is not finite ({}, {}, {})", value[0], value[1], value[2])]
+    NonFinitePoint {
+        /// Which array: `"points"`, `"origins"` or `"directions"`.
+        what: &'static str,
+        /// The row of the array.
+        row: usize,
+        /// The row as given.
+        value: [f64; 3],
+    },
     /// A primitive names a vertex that does not exist. Check the index buffer's base.
     #[error(
         "body {body}: primitive {primitive} names vertex {index}, but there are {n_vertices} vertices"

@@ -32,7 +32,7 @@ from ._errors import (
     Seam,
     TooManyPairs,
 )
-from ._functions import DeviceInfo, devices, hash_rows, pairs, self_pairs, weld
+from ._functions import DeviceInfo, contains, devices, hash_rows, pairs, self_pairs, weld
 from ._impinge import (
     FEATURES,
     KINDS,
@@ -83,6 +83,7 @@ __all__ = [
     "TooManyPairs",
     "__version__",
     "check",
+    "contains",
     "devices",
     "hash_rows",
     "ipc",

@@ -5,13 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any, Literal, SupportsFloat, SupportsIndex
 
+import numpy as np
+import numpy.typing as npt
+
 from ._answers import Advance, Candidates, Impact, Impacts, Nearest, NearPairs, Pairs, Stats
 from ._impinge import Contacts, DetectorBase, Penetration
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
 
-    from ._query import Control, Options, _Body
+    from ._query import Control, Options, _Array, _Body
     from ._scene import Scene
 
 __all__ = ["Detector"]
@@ -469,6 +472,46 @@ class Detector(DetectorBase):
         if across is not None:
             asked["_across"] = across
         return _nearest(self._nearest(scene, asked))
+
+    def contains(
+        self, scene: Scene, body: _Body, points: _Array, **control: Unpack[Control]
+    ) -> npt.NDArray[np.int8]:
+        """Where points lie: inside a body, on its surface or outside. Decided exactly, also for points on faces, edges and vertices.
+
+        Triangles must be a closed surface. A point is inside where the surface winds around it, whichever way, so an inner shell
+        of the opposite orientation makes a hollow. Of tetrahedra the surface consists of the faces that belong to one alone.
+
+        Parameters
+        ----------
+        scene : Scene
+        body : Body or int
+            Triangles or tetrahedra.
+        points : array_like, shape (n, 3)
+            Float32 or float64, taken as they are.
+        **control
+            ``cancel`` and ``progress``, as for `Detector`.
+
+        Returns
+        -------
+        numpy.ndarray of int8, shape (n,)
+            1 inside, 0 on the surface, -1 outside.
+
+        Raises
+        ------
+        ValueError, TypeError
+            A surface that is not closed (the error names an edge): weld its vertices (`weld`), fill holes, orient faces. A body of
+            edges or points, a point that is not finite.
+
+        Examples
+        --------
+        >>> import impinge
+        >>> scene = impinge.Scene()
+        >>> corners = [[0, 0, 0], [4, 0, 0], [0, 4, 0], [0, 0, 4]]
+        >>> body = scene.add(corners, [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
+        >>> impinge.Detector("cpu").contains(scene, body, [[1, 1, 1], [0, 0, 2], [-1, 0, 0]])
+        array([ 1,  0, -1], dtype=int8)
+        """
+        return self._contains(scene, body, points, control)
 
     def contacts(self, scene: Scene, pairs: Pairs, **control: Unpack[Control]) -> Contacts:
         """Where the triangles of each pair meet: points, segments, polygons, and the curves in which surfaces cross.

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from ._query import _Array
     from ._scene import _RowKind
 
-__all__ = ["DeviceInfo", "devices", "hash_rows", "pairs", "self_pairs", "weld"]
+__all__ = ["DeviceInfo", "contains", "devices", "hash_rows", "pairs", "self_pairs", "weld"]
 
 
 class Settings(TypedDict, total=False):
@@ -135,6 +135,56 @@ def self_pairs(
     settings.setdefault("backend", "cpu")
     found = Detector(**settings)._detect(scene, question)
     return found.self_of(0)
+
+
+def contains(
+    vertices: _Array,
+    faces: _Array,
+    points: _Array,
+    *,
+    weld: bool = False,
+    kind: _RowKind | None = None,
+    **settings: Unpack[Settings],
+) -> npt.NDArray[np.int8]:
+    """Where points lie: inside a closed mesh, on its surface or outside. Decided exactly.
+
+    Parameters
+    ----------
+    vertices : array_like, shape (v, 3)
+        Positions, float32 or float64.
+    faces : array_like of int, shape (n, 3) or (n, 4)
+        Triangles or tetrahedra as vertex indices.
+    points : array_like, shape (n, 3)
+        Float32 or float64, taken as they are.
+    weld : bool
+        Whether vertices at the same position become one first, as `weld` does: meshes with seams are not closed without.
+    kind : {"triangles", "tetrahedra", "quads"}, optional
+        What the rows of `faces` are, as for `Scene.add`.
+    **settings
+        As for `Detector`, but for ``backend``, which is ``"cpu"`` unless it is given.
+
+    Returns
+    -------
+    numpy.ndarray of int8, shape (n,)
+        1 inside, 0 on the surface, -1 outside, as `Detector.contains`.
+
+    Raises
+    ------
+    ValueError, TypeError
+        As `Scene.add` and `Detector.contains`: above all a surface that is not closed.
+
+    Examples
+    --------
+    >>> import impinge
+    >>> corners = [[0, 0, 0], [4, 0, 0], [0, 4, 0], [0, 0, 4]]
+    >>> faces = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]
+    >>> impinge.contains(corners, faces, [[1, 1, 1], [0, 0, 2], [-1, 0, 0]])
+    array([ 1,  0, -1], dtype=int8)
+    """
+    scene = Scene()
+    scene._add_named(vertices, faces, kind, ("vertices", "faces"), weld)
+    settings.setdefault("backend", "cpu")
+    return Detector(**settings)._contains(scene, 0, points, {})
 
 
 def weld(

@@ -1,0 +1,344 @@
+//! `contains`: inside, on the surface, outside.
+
+use std::collections::HashMap;
+
+use crate::oracle::{self, Vector};
+use impinge_core::{
+    Backend, CancelToken, Control, Detector, Elements, Error, InstructionSet, Scene, Settings,
+};
+use impinge_scenes::{Model, Random, solids, soup, surfaces};
+
+/// Boundaries of tetrahedra with corners on a lattice, each turned outward or inward: closed surfaces that overlap, coincide, touch
+/// in faces, edges and vertices, with some that are flat.
+fn shells(n: usize, k: u32, seed: u64) -> (Vec<[u32; 3]>, Vec<[f64; 3]>) {
+    let mut random = Random::new(seed);
+    let mut faces: Vec<[u32; 3]> = Vec::new();
+    let mut positions = Vec::new();
+    for _ in 0..n {
+        let first = positions.len() as u32;
+        positions.extend([(); 4].map(|()| [(); 3].map(|()| f64::from(random.below(k + 1)))));
+        let of_one = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]];
+        faces.extend(of_one.map(|face| face.map(|corner: u32| first + corner)));
+    }
+    (faces, positions)
+}
+
+/// All points of a lattice of halves around a box, and of quarters in a small one.
+fn lattice(k: u32) -> Vec<[f64; 3]> {
+    let parts = if k < 3 { 4 } else { 2 };
+    let line = || (-1..=parts * k as i32 + 1).map(|x| f64::from(x) / f64::from(parts));
+    let mut points = Vec::new();
+    for x in line() {
+        for y in line() {
+            points.extend(line().map(|z| [x, y, z]));
+        }
+    }
+    points
+}
+
+fn expected(faces: &[[u32; 3]], positions: &[[f64; 3]], points: &[[f64; 3]]) -> Vec<i8> {
+    let mut random = Random::new(77);
+    let faces: Vec<[Vector; 3]> = faces
+        .iter()
+        .map(|face| face.map(|vertex| oracle::vector(positions[vertex as usize])))
+        .collect();
+    let place = |point: &[f64; 3]| {
+        let point = oracle::vector(*point);
+        if faces.iter().any(|face| oracle::is_on(&point, face)) {
+            return 0;
+        }
+        // A flat face is on both sides of a segment at once, or on none.
+        match oracle::winding(&point, &faces, &mut random) {
+            0 => -1,
+            _ => 1,
+        }
+    };
+    points.iter().map(place).collect()
+}
+
+fn found(
+    faces: &[[u32; 3]],
+    positions: &[[f64; 3]],
+    points: &[[f64; 3]],
+    settings: impl Into<Settings>,
+) -> Vec<i8> {
+    let mut scene = Scene::new();
+    let body = scene.add_triangles(faces, positions).unwrap();
+    let mut detector = Detector::new(settings).unwrap();
+    detector.contains(&scene, body, points).unwrap()
+}
+
+fn count(places: &[i8]) -> [usize; 3] {
+    [-1, 0, 1].map(|place| places.iter().filter(|&&x| x == place).count())
+}
+
+#[test]
+fn lattices_of_shells_are_decided_exactly() {
+    let mut all = [0; 3];
+    for (n, k, seed) in [
+        (1, 1, 1),
+        (1, 2, 2),
+        (3, 2, 3),
+        (8, 2, 4),
+        (12, 3, 5),
+        (40, 4, 6),
+        (30, 2, 7),
+    ] {
+        let (faces, positions) = shells(n, k, seed);
+        let points = lattice(k);
+        let expected = expected(&faces, &positions, &points);
+        let found = found(&faces, &positions, &points, Backend::Cpu);
+        let wrong = found.iter().zip(&expected).position(|(x, y)| x != y);
+        if let Some(ix) = wrong {
+            panic!(
+                "{n} shells, point {:?}: {} found, {} expected",
+                points[ix], found[ix], expected[ix]
+            );
+        }
+        all = [0, 1, 2].map(|k| all[k] + count(&expected)[k]);
+    }
+    assert!(all.iter().all(|&n| n > 100), "{all:?}");
+}
+
+/// Points on vertices and near the middles of edges and faces, whose coordinates are rounded: on either side by the last bit.
+#[test]
+fn points_at_the_surface_of_round_bodies() {
+    let model = surfaces::icosphere(1).mapped(|[x, y, z]| [x + 0.1 * y, y - 0.3 * z, z + 0.7]);
+    let Elements::Triangles(faces) = &model.elements else {
+        panic!("triangles")
+    };
+    let positions = model.positions_f64();
+    let mut points = positions.clone();
+    for face in faces {
+        let [a, b, c] = face.map(|vertex| positions[vertex as usize]);
+        points.push([0, 1, 2].map(|k| (a[k] + b[k]) / 2.0));
+        points.push([0, 1, 2].map(|k| 0.3 * a[k] + 0.7 * b[k]));
+        points.push([0, 1, 2].map(|k| (a[k] + b[k] + c[k]) / 3.0));
+        // Straight above a vertex along an axis, so that rays pass through it.
+        points.push([a[0] - 0.5, a[1], a[2]]);
+        points.push([a[0], a[1], a[2] + 0.25]);
+    }
+    let expected = expected(faces, &positions, &points);
+    assert!(
+        count(&expected).iter().all(|&n| n > 20),
+        "{:?}",
+        count(&expected)
+    );
+    assert_eq!(found(faces, &positions, &points, Backend::Cpu), expected);
+}
+
+/// A hollow is outside, whichever way both shells are turned; a shell alone may be turned either way.
+#[test]
+fn nested_and_inverted_shells() {
+    let cube = |size: f32, is_inverted: bool| {
+        let mut cube = surfaces::cube([0.0; 3], size);
+        if let Elements::Triangles(faces) = &mut cube.elements
+            && is_inverted
+        {
+            faces.iter_mut().for_each(|face| face.swap(0, 1));
+        }
+        cube
+    };
+    let points: Vec<[f64; 3]> = (-5..=5).map(|x| [f64::from(x), 0.0, 0.0]).collect();
+    for (turns, expected) in [
+        ([false, false], [-1, 0, 1, 0, 1, 1, 1, 0, 1, 0, -1]),
+        ([false, true], [-1, 0, 1, 0, -1, -1, -1, 0, 1, 0, -1]),
+        ([true, false], [-1, 0, 1, 0, -1, -1, -1, 0, 1, 0, -1]),
+        ([true, true], [-1, 0, 1, 0, 1, 1, 1, 0, 1, 0, -1]),
+    ] {
+        let models = [cube(8.0, turns[0]), cube(4.0, turns[1])];
+        let (faces, positions) = joined(&models);
+        assert_eq!(found(&faces, &positions, &points, Backend::Cpu), expected);
+    }
+}
+
+fn joined(models: &[Model]) -> (Vec<[u32; 3]>, Vec<[f64; 3]>) {
+    let (mut faces, mut positions) = (Vec::new(), Vec::new());
+    for model in models {
+        let first = positions.len() as u32;
+        if let Elements::Triangles(of_one) = &model.elements {
+            faces.extend(of_one.iter().map(|face| face.map(|vertex| first + vertex)));
+        }
+        positions.extend(model.positions_f64());
+    }
+    (faces, positions)
+}
+
+/// The same answer for every instruction set, number of threads and precision, and for bodies that move.
+#[test]
+fn every_way_gives_the_same_answer() {
+    let mut random = Random::new(9);
+    let model = surfaces::torus_knot(20_000, surfaces::Knot::default());
+    let (low, high) = model.bounds().unwrap();
+    let points: Vec<[f32; 3]> = (0..5000)
+        .map(|_| [0, 1, 2].map(|k| random.range(low[k], high[k])))
+        .collect();
+    let wide: Vec<[f64; 3]> = points.iter().map(|point| point.map(f64::from)).collect();
+    let mut scene = Scene::new();
+    let body = model.add_to(&mut scene).unwrap();
+    let moved: Vec<[f32; 3]> = model.positions.iter().map(|&[x, y, z]| [y, z, x]).collect();
+    let mut answers = Vec::new();
+    for instruction_set in InstructionSet::ALL {
+        for threads in [1, 4] {
+            let mut detector = Detector::new(Settings {
+                instruction_set,
+                threads,
+                backend: Backend::Cpu,
+                ..Settings::default()
+            })
+            .unwrap();
+            let mut moving = scene.clone();
+            let first = detector.contains(&moving, body, &points).unwrap();
+            assert_eq!(first, detector.contains(&moving, body, &wide).unwrap());
+            moving.set_positions(body, &moved).unwrap();
+            let turned: Vec<[f32; 3]> = points.iter().map(|&[x, y, z]| [y, z, x]).collect();
+            assert_eq!(first, detector.contains(&moving, body, &turned).unwrap());
+            assert_eq!(detector.stats().n_threads, threads);
+            answers.push(first);
+        }
+    }
+    assert!(answers.iter().all(|answer| *answer == answers[0]));
+    assert!(count(&answers[0])[2] > 100);
+}
+
+/// A block is a box, whatever its tetrahedra; and a body that is bent has the inside of its border.
+#[test]
+fn tetrahedra() {
+    let block = solids::block(3, 2, 2, 1.0);
+    let (low, high) = block.bounds().unwrap();
+    let mut scene = Scene::new();
+    let body = block.add_to(&mut scene).unwrap();
+    let mut detector = Detector::new(Backend::Cpu).unwrap();
+    let quarter = |k: usize| {
+        let n = ((high[k] - low[k]) * 4.0) as i32;
+        (-1..=n + 1).map(move |x| f64::from(low[k]) + f64::from(x) / 4.0)
+    };
+    let mut points = Vec::new();
+    for x in quarter(0) {
+        for y in quarter(1) {
+            points.extend(quarter(2).map(|z| [x, y, z]));
+        }
+    }
+    let of_box = |point: &[f64; 3]| {
+        let inner = (0..3).all(|k| f64::from(low[k]) < point[k] && point[k] < f64::from(high[k]));
+        let held = (0..3).all(|k| f64::from(low[k]) <= point[k] && point[k] <= f64::from(high[k]));
+        if inner { 1 } else { i8::from(held) - 1 }
+    };
+    let expected: Vec<i8> = points.iter().map(of_box).collect();
+    assert_eq!(detector.contains(&scene, body, &points).unwrap(), expected);
+
+    let bent = |[x, y, z]: [f32; 3]| [x + 0.3 * y * y, y + 0.2 * z, z - 0.1 * x];
+    let block = solids::block(4, 3, 3, 1.0).mapped(bent);
+    let body = block.add_to(&mut scene).unwrap();
+    let positions = block.positions_f64();
+    let Elements::Tetrahedra(tetrahedra) = &block.elements else {
+        panic!("tetrahedra")
+    };
+    let mut faces: HashMap<[u32; 3], Vec<[u32; 3]>> = HashMap::new();
+    let point = |vertex: u32| oracle::vector(positions[vertex as usize]);
+    for &[a, b, c, d] in tetrahedra {
+        let is_positive = oracle::volume(&point(a), &point(b), &point(c), &point(d)) > 0;
+        for mut face in [[a, c, b], [a, b, d], [b, c, d], [c, a, d]] {
+            if !is_positive {
+                face.swap(0, 1);
+            }
+            let mut name = face;
+            name.sort_unstable();
+            faces.entry(name).or_default().push(face);
+        }
+    }
+    let border: Vec<[u32; 3]> = faces
+        .into_values()
+        .filter(|same| same.len() == 1)
+        .flatten()
+        .collect();
+    let mut random = Random::new(3);
+    let (low, high) = block.bounds().unwrap();
+    let mut points = positions.clone();
+    points.extend((0..3000).map(|_| [0, 1, 2].map(|k| f64::from(random.range(low[k], high[k])))));
+    for tetrahedron in tetrahedra {
+        let [a, b, c, _] = tetrahedron.map(|vertex| positions[vertex as usize]);
+        points.push([0, 1, 2].map(|k| (a[k] + b[k]) / 2.0));
+        points.push([0, 1, 2].map(|k| (a[k] + b[k]) / 4.0 + c[k] / 2.0));
+    }
+    let expected = found(&border, &positions, &points, Backend::Cpu);
+    assert!(
+        count(&expected).iter().all(|&n| n > 50),
+        "{:?}",
+        count(&expected)
+    );
+    assert_eq!(detector.contains(&scene, body, &points).unwrap(), expected);
+}
+
+/// Coordinates beyond those of single precision, and points far out.
+#[test]
+fn numbers_of_any_size() {
+    let cube = surfaces::cube([0.0; 3], 2.0);
+    let Elements::Triangles(faces) = &cube.elements else {
+        panic!("triangles")
+    };
+    for size in [1e-300, 1e-30, 1.0, 1e30, 1e300] {
+        let positions: Vec<[f64; 3]> = cube
+            .positions_f64()
+            .iter()
+            .map(|point| point.map(|x| x * size))
+            .collect();
+        let points = [0.0, 0.5, 1.0, 1.0f64.next_up(), -1.0, -1.5, 1e7].map(|x| {
+            let scaled = [x, 0.25, 0.0].map(|x| x * size);
+            [scaled[0], scaled[1], scaled[2]]
+        });
+        let found = found(faces, &positions, &points, Backend::Cpu);
+        assert_eq!(found, [1, 1, 0, -1, 0, -1, -1], "{size:e}");
+    }
+}
+
+#[test]
+fn what_is_refused() {
+    let mut detector = Detector::new(Backend::Cpu).unwrap();
+    let mut scene = Scene::new();
+    let cloth = surfaces::cloth(3, 3, 1.0).add_to(&mut scene).unwrap();
+    let cube = surfaces::cube([0.0; 3], 1.0).add_to(&mut scene).unwrap();
+    let dots = scene.add_points(&[[0.0f32; 3]]).unwrap();
+    let none: Vec<[f32; 3]> = Vec::new();
+    assert_eq!(detector.contains(&scene, cube, &none).unwrap(), []);
+    let open = detector
+        .contains(&scene, cloth, &[[0.0f32; 3]])
+        .unwrap_err();
+    assert!(
+        matches!(open, Error::NotClosed { body, n_forward: 1, n_backward: 0, .. }
+        | Error::NotClosed { body, n_forward: 0, n_backward: 1, .. } if body == cloth)
+    );
+    let kind = detector.contains(&scene, dots, &[[0.0f32; 3]]).unwrap_err();
+    assert!(matches!(kind, Error::WrongKind { kind: "points", .. }));
+    let points = [[0.0, 0.0, 0.0], [0.0, f64::NAN, 1.0]];
+    let error = detector.contains(&scene, cube, &points).unwrap_err();
+    assert_eq!(error.to_string(), "points: row 1 is not finite (0, NaN, 1)");
+    assert_eq!(error.code(), "invalid");
+    let token = CancelToken::new();
+    token.cancel();
+    detector.set_control(Control::new().cancel(&token));
+    let stopped = detector.contains(&scene, cube, &[[0.0f32; 3]]);
+    assert!(matches!(stopped, Err(Error::Cancelled)));
+    detector.set_control(Control::new());
+    assert_eq!(
+        detector.contains(&scene, cube, &[[0.0f32; 3]]).unwrap(),
+        [1]
+    );
+    scene.remove(cube).unwrap();
+    let stale = detector.contains(&scene, cube, &[[0.0f32; 3]]);
+    assert!(matches!(stale, Err(Error::UnknownBody { .. })));
+}
+
+/// Soups of triangles are not closed, and a body without faces has no inside.
+#[test]
+fn soups_and_empty_bodies() {
+    let mut detector = Detector::new(Backend::Cpu).unwrap();
+    let mut scene = Scene::new();
+    let soup = soup::triangles(30, 0.3, 1).add_to(&mut scene).unwrap();
+    let empty = scene.add_triangles::<f32>(&[], &[]).unwrap();
+    assert!(detector.contains(&scene, soup, &[[0.0f32; 3]]).is_err());
+    assert_eq!(
+        detector.contains(&scene, empty, &[[0.0f32; 3]]).unwrap(),
+        [-1]
+    );
+}

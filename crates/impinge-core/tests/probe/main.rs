@@ -1,0 +1,4 @@
+//! Points and rays: every decision held against rational arithmetic.
+
+mod inside;
+mod oracle;

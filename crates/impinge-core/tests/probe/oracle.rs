@@ -1,0 +1,109 @@
+//! The oracle: whole numbers of a unit, brute force, and other algorithms than those of the crate.
+
+use dashu_int::IBig;
+use impinge_scenes::Random;
+
+/// A vector in multiples of the unit.
+pub type Vector = [IBig; 3];
+
+/// Coordinates are multiples of 2^-120.
+const UNIT: i32 = -120;
+
+/// A float in multiples of the unit.
+pub fn whole(x: f64) -> IBig {
+    let bits = x.to_bits();
+    let biased = (bits >> 52) as i32 & 0x7ff;
+    let fraction = (bits & ((1 << 52) - 1)) as i64;
+    if biased == 0 {
+        assert_eq!(fraction, 0, "{x:e} is no multiple of the unit");
+        return IBig::ZERO;
+    }
+    let shift = biased - 1075 - UNIT;
+    assert!(shift >= 0, "{x:e} is no multiple of the unit");
+    let magnitude = IBig::from(fraction | 1 << 52) << shift as usize;
+    if x < 0.0 { -magnitude } else { magnitude }
+}
+
+pub fn vector(point: [f64; 3]) -> Vector {
+    point.map(whole)
+}
+
+pub fn sub(p: &Vector, q: &Vector) -> Vector {
+    [0, 1, 2].map(|k| &p[k] - &q[k])
+}
+
+pub fn cross(p: &Vector, q: &Vector) -> Vector {
+    [(1, 2), (2, 0), (0, 1)].map(|(i, j)| &p[i] * &q[j] - &p[j] * &q[i])
+}
+
+pub fn dot(p: &Vector, q: &Vector) -> IBig {
+    (0..3).map(|k| &p[k] * &q[k]).fold(IBig::ZERO, |x, y| x + y)
+}
+
+pub fn sign(x: &IBig) -> i32 {
+    match x.cmp(&IBig::ZERO) {
+        std::cmp::Ordering::Less => -1,
+        std::cmp::Ordering::Equal => 0,
+        std::cmp::Ordering::Greater => 1,
+    }
+}
+
+/// The sign of the volume of a tetrahedron.
+pub fn volume(a: &Vector, b: &Vector, c: &Vector, d: &Vector) -> i32 {
+    sign(&dot(&cross(&sub(b, a), &sub(c, a)), &sub(d, a)))
+}
+
+/// Whether a segment contains a point.
+fn is_on_segment(p: &Vector, a: &Vector, b: &Vector) -> bool {
+    if a == b {
+        return p == a;
+    }
+    let (way, to) = (sub(b, a), sub(p, a));
+    let along = dot(&way, &to);
+    cross(&way, &to).iter().all(|x| *x == IBig::ZERO)
+        && along >= IBig::ZERO
+        && along <= dot(&way, &way)
+}
+
+/// Whether a triangle, which may be degenerate, contains a point.
+pub fn is_on(p: &Vector, [a, b, c]: &[Vector; 3]) -> bool {
+    let edges = [(a, b), (b, c), (c, a)];
+    if edges.iter().any(|(x, y)| is_on_segment(p, x, y)) {
+        return true;
+    }
+    let normal = cross(&sub(b, a), &sub(c, a));
+    dot(&normal, &sub(p, a)) == IBig::ZERO
+        && edges.iter().all(|(x, y)| {
+            let inner = cross(&normal, &sub(y, x));
+            dot(&inner, &sub(p, x)) > IBig::ZERO
+        })
+}
+
+/// How often a closed surface winds around a point that is not on it: the crossings of a segment to a random far point, and
+/// of another one if it meets any edge.
+pub fn winding(p: &Vector, faces: &[[Vector; 3]], random: &mut Random) -> i32 {
+    'ways: loop {
+        let far: Vector = [(); 3].map(|()| {
+            let x = IBig::from(random.bits() >> 1) << 70;
+            if random.below(2) == 0 { x } else { -x }
+        });
+        let mut sum = 0;
+        for [a, b, c] in faces {
+            let (near_side, far_side) = (volume(a, b, c, p), volume(a, b, c, &far));
+            if near_side == 0 {
+                // The segment leaves the plane of the face at once, beside it.
+                continue;
+            }
+            let around = [(a, b), (b, c), (c, a)].map(|(x, y)| volume(p, &far, x, y));
+            if around.contains(&0) || far_side == 0 {
+                continue 'ways;
+            }
+            let is_through = around[0] == around[1] && around[1] == around[2];
+            if is_through && near_side * far_side < 0 {
+                // The far end is on the side of the normal: the segment leaves.
+                sum += far_side;
+            }
+        }
+        return sum;
+    }
+}
