@@ -7,7 +7,7 @@ use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use impinge::{ElementVertices, PairFilter};
-use numpy::PyReadonlyArray1;
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1};
 use pyo3::prelude::*;
 
 /// Which pairs of elements collide, by their vertices in a mesh whose parts are several bodies.
@@ -19,10 +19,14 @@ use pyo3::prelude::*;
 pub struct VertexFilter {
     pub inner: PairFilter,
     raised: Raised,
+    collected: Collected,
 }
 
 /// The first exception of the callback.
 type Raised = Arc<Mutex<Option<PyErr>>>;
+
+/// The vertices of pairs that were asked about, by how many each element has, one pair after the other.
+type Collected = Arc<Mutex<HashMap<(usize, usize), Vec<u32>>>>;
 
 /// A callback, and what it has said.
 struct Callback {
@@ -34,12 +38,15 @@ struct Callback {
 #[pymethods]
 impl VertexFilter {
     /// `rows`: for each body the numbers of its vertices in the mesh, or ``None`` where they are the same. `labels`: one per
-    /// vertex of the mesh.
+    /// vertex of the mesh. With `collects`, pairs that pass are remembered and refused: a step is then asked about pairs in contact, or
+    /// which might be as far as floats can tell, and no time is found.
     #[new]
+    #[pyo3(signature = (rows, labels, may, collects=false))]
     fn new(
         rows: Vec<Option<PyReadonlyArray1<'_, u32>>>,
         labels: Option<PyReadonlyArray1<'_, i64>>,
         may: Option<Py<PyAny>>,
+        collects: bool,
     ) -> PyResult<Self> {
         let mut maps = Vec::new();
         for row in &rows {
@@ -52,7 +59,9 @@ impl VertexFilter {
             Some(labels) => Some(labels.as_slice()?.to_vec()),
             None => None,
         };
-        let is_early = may.is_none();
+        let is_early = may.is_none() && !collects;
+        let collected = Collected::default();
+        let collector = collects.then(|| Arc::clone(&collected));
         let raised = Raised::default();
         let callback = may.map(|may| Callback {
             may,
@@ -71,14 +80,40 @@ impl VertexFilter {
                     return false;
                 }
             }
-            callback
+            let passes = callback
                 .as_ref()
-                .is_none_or(|callback| callback.passes(&a, &b))
+                .is_none_or(|callback| callback.passes(&a, &b));
+            let Some(collector) = &collector else {
+                return passes;
+            };
+            if passes {
+                let mut collected = collector.lock().unwrap_or_else(PoisonError::into_inner);
+                let vertices = collected.entry((a.len(), b.len())).or_default();
+                vertices.extend(a.iter().chain(&b));
+            }
+            false
         });
         Ok(VertexFilter {
             inner: if is_early { inner.early() } else { inner },
             raised,
+            collected,
         })
+    }
+
+    /// Takes the pairs that were remembered, of elements with `n_a` and `n_b` vertices: a row of vertices of the mesh per pair.
+    fn collected<'py>(
+        &self,
+        py: Python<'py>,
+        n_a: usize,
+        n_b: usize,
+    ) -> PyResult<Bound<'py, PyArray2<u32>>> {
+        let mut collected = self
+            .collected
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner);
+        let vertices = collected.remove(&(n_a, n_b)).unwrap_or_default();
+        let n_pairs = vertices.len() / (n_a + n_b).max(1);
+        PyArray1::from_vec(py, vertices).reshape([n_pairs, n_a + n_b])
     }
 }
 

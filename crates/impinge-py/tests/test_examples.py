@@ -37,6 +37,20 @@ def test_the_same_program_in_every_language(root):
     assert out.stdout == (folder / "expected.txt").read_text(), out.stderr
 
 
+def test_an_implicit_cloth_with_ipc_toolkit(root):
+    """Frames until it lies on the ball. Every question also goes to ipctk alone, and the program ends where answers differ."""
+    pytest.importorskip("ipctk", reason="ipctk is not installed: no barrier")
+    pytest.importorskip("scipy", reason="SciPy is not installed: no solver")
+    script = root / "examples" / "ipc" / "cloth.py"
+    command = [sys.executable, str(script), "--size", "9", "--frames", "30", "--beside"]
+    out = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    assert out.returncode == 0, out.stdout + out.stderr
+    first, *_, last = out.stdout.splitlines()
+    most = int(first.partition("at most ")[2].split()[0])
+    assert "no intersection" in first and most > 20
+    assert last.endswith("sets of collisions are the same") and int(last.split()[0]) > 60
+
+
 def test_check_mesh(run, tmp_path):
     out = run("check_mesh.py", "--report", "pairs.csv")
     assert out.returncode == 1 and "pairs of faces intersect" in out.stdout, out.stderr

@@ -42,10 +42,13 @@ def test_everything_public_is_documented():
                     assert getattr(held, member).__doc__, f"{name}.{member}"
 
 
-def test_stubs_tell_the_truth():
+def test_stubs_tell_the_truth(tmp_path):
     pytest.importorskip("mypy.stubtest", reason="mypy is not installed")
+    # A subclass of one of ipctk, which has no stubs and may be absent.
+    (tmp_path / "allowed").write_text(r"impinge\._broad_phase(\.BroadPhase)?")
+    allowed = ["--allowlist", str(tmp_path / "allowed"), "--ignore-unused-allowlist"]
     out = subprocess.run(
-        [sys.executable, "-m", "mypy.stubtest", "impinge", "--concise", "--ignore-disjoint-bases"],
+        [sys.executable, "-m", "mypy.stubtest", "impinge", "--concise", "--ignore-disjoint-bases", *allowed],
         capture_output=True,
         text=True,
     )

@@ -68,7 +68,9 @@ class _VertexFilter:
         rows: list[npt.NDArray[np.uint32] | None],
         labels: npt.NDArray[np.int64] | None,
         may: Callable[[int, int], object] | None,
+        collects: bool = False,
     ) -> Self: ...
+    def collected(self, n_a: int, n_b: int) -> npt.NDArray[np.uint32]: ...
 
 @final
 class Body:

@@ -16,9 +16,13 @@ True
 False
 
 The names and the order of the arguments are those of ipctk 1.6. A solver keeps its
-``ipctk.CollisionMesh`` for its candidates, collisions and potentials, and asks these functions
+``ipctk.CollisionMesh`` for its collisions and potentials, and asks these functions
 about the same mesh. The mesh of this module is for programs without ipctk: ipctk's functions do not
 take it.
+
+``BroadPhase`` goes wherever ipctk takes a ``broad_phase``, so that a solver changes nothing else:
+``collisions.build(mesh, x, dhat, broad_phase=ipc.BroadPhase())``. It needs ipctk, the rest of this
+module does not.
 
 Like ipc-toolkit's, the step size leaves every pair a share of its distance: with
 ``conservative_rescaling`` of 0.8, a fifth, but at most 1e-4. It is decided exactly, so no tolerance
@@ -34,24 +38,41 @@ import math
 import os
 import threading
 from collections.abc import Callable
-from typing import Any, Optional
+from typing import TYPE_CHECKING, Any, Literal, Optional
 from weakref import WeakKeyDictionary
 
 import numpy as np
 import numpy.typing as npt
 
 from . import _impinge
+from ._candidates import Candidates, Question
 from ._detector import Detector
 from ._errors import Seam
 from ._scene import Scene
 
+if TYPE_CHECKING:
+    from ._broad_phase import BroadPhase
+
+# `BroadPhase` is public, too, but needs ipctk, which an import of all names must not.
 __all__ = [
+    "Candidates",
     "CollisionMesh",
+    "candidates",
     "compute_collision_free_stepsize",
     "edges",
     "has_intersections",
     "is_step_collision_free",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    # A subclass of one of ipctk, which the rest of this module does without.
+    if name == "BroadPhase":
+        from ._broad_phase import BroadPhase
+
+        return BroadPhase
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
 
 #: The largest distance that a step leaves, as in ipc-toolkit.
 _CLEARANCE = 1e-4
@@ -132,10 +153,12 @@ class CollisionMesh:
                 raise ValueError(f"{place} = {value}: there are {n_vertices} vertices")
         self.can_collide = None
         self._local = threading.local()
-        of_faces = {tuple(edge) for edge in _edges_of(self._faces).tolist()}
-        given = np.unique(np.sort(self._edges), axis=0).tolist()
-        self._loose = np.array([edge for edge in given if tuple(edge) not in of_faces], np.int64)
-        self._loose = self._loose.reshape(-1, 2)
+        self._edge_table: tuple[npt.NDArray[np.int64], ...] | None = None
+        self._body_edges: dict[int, npt.NDArray[np.int64]] = {}
+        self._face_table: tuple[npt.NDArray[np.int64], ...] | None = None
+        given = np.unique(_edge_keys(self._edges))
+        given = given[~np.isin(given, _edge_keys(_edges_of(self._faces)))]
+        self._loose = np.stack([given >> 32, given & 0xFFFFFFFF], axis=1)
         named = np.zeros(len(self._rest), bool)
         named[self._faces.ravel()] = True
         named[self._loose.ravel()] = True
@@ -200,6 +223,56 @@ class CollisionMesh:
             held = self._local.held = _Held(self)
         return held
 
+    def _edge_numbers(self, corners: npt.NDArray[Any]) -> npt.NDArray[np.int64]:
+        """The rows of `edges` that have these two vertices each; -1 where none has."""
+        if self._edge_table is None:
+            keys = _edge_keys(self._edges)
+            order = np.argsort(keys, kind="stable")
+            keys = keys[order]
+            twice = np.flatnonzero(keys[1:] == keys[:-1])
+            if len(twice):
+                first, second = (int(row) for row in order[twice[0] : twice[0] + 2])
+                pair = tuple(np.sort(self._edges[first]).tolist())
+                raise ValueError(f"edges[{first}] and edges[{second}]: both are the edge {pair}")
+            # No key is beyond the last one, so that every search ends at a row.
+            keys = np.append(keys, np.iinfo(np.int64).max)
+            self._edge_table = keys, np.append(order, -1)
+        keys, rows = self._edge_table
+        wanted = _edge_keys(corners)
+        at = np.searchsorted(keys, wanted)
+        return np.where(keys[at] == wanted, rows[at], -1)
+
+    def _edges_of_body(self, body: int) -> npt.NDArray[np.int64]:
+        """The rows of `edges` that the edges of a body are; -1 for those that it lacks."""
+        if body not in self._body_edges:
+            corners = self._held().scene.edges(body).astype(np.int64)
+            self._body_edges[body] = self._edge_numbers(corners)
+        return self._body_edges[body]
+
+    def _face_numbers(
+        self, corners: npt.NDArray[np.int64]
+    ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+        """All rows of `faces` that have these three vertices each: which of `corners`, and the row."""
+        if self._face_table is None:
+            low, middle, high = np.sort(self._faces, axis=1).T
+            sides = np.unique(low << 32 | middle)
+            keys = np.searchsorted(sides, low << 32 | middle) << 32 | high
+            order = np.argsort(keys, kind="stable")
+            self._face_table = sides, keys[order], order
+        sides, keys, rows = self._face_table
+        low, middle, high = np.sort(corners, axis=1).T
+        wanted = np.searchsorted(sides, low << 32 | middle) << 32 | high
+        first = np.searchsorted(keys, wanted)
+        n_rows = np.searchsorted(keys, wanted, side="right") - first
+        which = np.repeat(np.arange(len(wanted)), n_rows)
+        # Of several, one after the other.
+        before = np.cumsum(n_rows) - n_rows
+        return which, rows[(first - before)[which] + np.arange(len(which))]
+
+    def _collector(self) -> Any:
+        """A filter that remembers pairs."""
+        return _impinge._VertexFilter([rows for _, _, rows in self._parts], None, None, True)
+
     def _filter(self, labels: _Array | None, may: Callable[[int, int], bool] | None) -> Any:
         """Which pairs of elements collide; `None` if all do that share no vertex of a body."""
         if labels is None and may is None and not self._is_mixed:
@@ -246,6 +319,68 @@ class _Held:
             for body, (_, _, rows) in enumerate(self._parts):
                 scene.set_end_positions(body, end if rows is None else end[rows])
         return scene
+
+
+def candidates(
+    mesh: _Mesh,
+    vertices: _Array,
+    vertices_t1: _Array | None = None,
+    inflation_radius: float = 0.0,
+    *,
+    mode: Literal["exact", "boxes"] = "exact",
+    labels: _Array | None = None,
+) -> Candidates:
+    """The pairs of elements that ``ipctk.Candidates.build`` finds, or fewer: as arrays, and for ipctk.
+
+    Parameters
+    ----------
+    mesh, labels
+        As for `is_step_collision_free`.
+    vertices : array_like, shape (v, 3)
+        Positions, or those at the start of a step.
+    vertices_t1 : array_like, shape (v, 3), optional
+        Positions at the end of a step.
+    inflation_radius : float
+        By how much boxes are inflated, 0 or more. For a barrier half the distance at which it begins.
+    mode : {"exact", "boxes"}
+        As for `BroadPhase`: ``"exact"``, only pairs that come within twice the radius, and in a step those that ipctk's continuous
+        detection may stop for; or all pairs whose inflated boxes overlap.
+
+    Returns
+    -------
+    Candidates
+        ``to_ipctk()`` makes an ``ipctk.Candidates`` of it.
+
+    Raises
+    ------
+    ValueError, TypeError
+        As `is_step_collision_free`; an edge of a face that the mesh's `edges` lack, or one that they have twice.
+    """
+    ours = _served(mesh)
+    radius = float(inflation_radius)
+    if not (math.isfinite(radius) and radius >= 0):
+        raise ValueError(f"inflation_radius: {radius} given, a finite number of 0 or more allowed")
+    if mode not in ("exact", "boxes"):
+        raise ValueError(f"mode: {mode!r} given, 'exact' or 'boxes' allowed")
+    ends: tuple[npt.NDArray[Any], ...]
+    if vertices_t1 is None:
+        ends = (_positions(ours, vertices, "vertices"),)
+    else:
+        ends = _ends(ours, vertices, vertices_t1, "vertices")
+    sides = _edges_of(ours._faces)
+    absent = ours._edge_numbers(sides) < 0
+    if absent.any():
+        edge = tuple(sides[np.argmax(absent)].tolist())
+        raise ValueError(f"edges: a face has the edge {edge}, which is not among them")
+    question = Question(ours, ends, radius, mode)
+    return Candidates(question.all_found(ours._labels(labels), _may(mesh, labels)))
+
+
+def _edge_keys(rows: npt.NDArray[Any]) -> npt.NDArray[np.int64]:
+    """Each edge as one number, whatever its direction."""
+    low, high = np.sort(rows.astype(np.int64), axis=1).T
+    keys: npt.NDArray[np.int64] = low << 32 | high
+    return keys
 
 
 def _add_points(scene: Scene, vertices: npt.NDArray[Any], _: object) -> None:
@@ -476,11 +611,17 @@ def _step(
     distance = float(min_distance)
     if not (math.isfinite(distance) and distance >= 0):
         raise ValueError(f"min_distance: {distance} given, a finite number of 0 or more allowed")
-    start = _positions(mesh, vertices_t0, "vertices_t0")
+    return *_ends(mesh, vertices_t0, vertices_t1, "vertices_t0"), distance
+
+
+def _ends(
+    mesh: CollisionMesh, vertices_t0: _Array, vertices_t1: _Array, name: str
+) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
+    start = _positions(mesh, vertices_t0, name)
     end = _positions(mesh, vertices_t1, "vertices_t1")
     if start.dtype != end.dtype:
         start, end = start.astype(np.float64), end.astype(np.float64)
-    return start, end, distance
+    return start, end
 
 
 def _positions(mesh: CollisionMesh, vertices: _Array, name: str) -> npt.NDArray[Any]:
