@@ -211,3 +211,21 @@ fn across_two_sets_and_any() {
     assert!(!kept.any(&scene, &Query::between_all()).unwrap());
     assert_eq!(kept.detect(&scene, &Query::between_all()).unwrap().len(), 0);
 }
+
+#[test]
+fn all_pairs_of_one_body_are_its_own_too() {
+    let mut scene = Scene::new();
+    let tangled = soup::triangles(60, 0.5, 1).add_to(&mut scene).unwrap();
+    for x in [20.0, 40.0] {
+        let far = surfaces::bumpy_ball(200, 0.3).translated([x, 0.0, 0.0]);
+        far.add_to(&mut scene).unwrap();
+    }
+    let (crowd, bodies) = scatter(20, 12.0, 3);
+    for (scene, body) in [(&scene, tangled), (&crowd, bodies[2]), (&crowd, bodies[0])] {
+        let query = Query::of(body);
+        let mut detector = cpu(Method::Auto);
+        let n = detector.count(scene, &query).unwrap();
+        assert_eq!(detector.any(scene, &query).unwrap(), n > 0, "{n}");
+    }
+    assert!(cpu(Method::Auto).any(&scene, &Query::of(tangled)).unwrap());
+}

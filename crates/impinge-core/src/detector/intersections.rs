@@ -110,7 +110,7 @@ impl Detector {
         } = self.settings;
         let is_about_many = matches!(
             query.scope,
-            Scope::Across { .. }
+            Scope::Across { within: false }
                 | Scope::All {
                     between: true,
                     within: false
