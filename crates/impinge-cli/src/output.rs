@@ -32,14 +32,17 @@ pub fn how(stats: &Stats, times: &Times) -> String {
         1 => String::new(),
         n => format!(", median of {n}"),
     };
+    format!("{}; {:.3} ms{of}", method(stats), times.total_ms(50))
+}
+
+fn method(stats: &Stats) -> String {
     format!(
-        "{} on {}, {}; {}, {} unsure; {:.3} ms{of}",
+        "{} on {}, {}; {}, {} unsure",
         stats.method,
         stats.backend,
         counted(stats.n_threads as u64, "thread"),
         counted(stats.n_candidates, "candidate"),
         grouped(stats.n_unsure),
-        times.total_ms(50)
     )
 }
 
@@ -122,12 +125,8 @@ fn print_summary(to: &mut impl Write, pairs: &Pairs) -> io::Result<()> {
     )?;
     writeln!(
         to,
-        "{} on {}, {}; {}, {} unsure; {} held",
-        stats.method,
-        stats.backend,
-        counted(stats.n_threads as u64, "thread"),
-        counted(stats.n_candidates, "candidate"),
-        grouped(stats.n_unsure),
+        "{}; {} held",
+        method(stats),
         shown_bytes(stats.bytes_held)
     )
 }
