@@ -614,3 +614,33 @@ fn bad_separations_are_refused_by_name() {
         }
     }
 }
+
+#[test]
+fn questions_that_ask_no_filter_refuse_one() {
+    let scene = falling(-1.0);
+    let step = Query::all().filter(PairFilter::new(|_| false));
+    let mut detector = detector(Method::Auto);
+    let answers = [
+        detector.detect(&scene, &step).map(|_| ()),
+        detector.count(&scene, &step).map(|_| ()),
+        detector.any(&scene, &step).map(|_| ()),
+        detector.near(&scene, 0.1, &step).map(|_| ()),
+        detector.nearest(&scene, &step).map(|_| ()),
+        detector.candidates(&scene, 0.1, &step).map(|_| ()),
+    ];
+    for (ix, answer) in answers.into_iter().enumerate() {
+        let error = answer.expect_err("a filter is refused");
+        let is_named = matches!(
+            error,
+            Error::Setting {
+                setting: "filter",
+                ..
+            }
+        );
+        assert!(is_named, "{ix}: {error}");
+    }
+    // Those about contacts take it, and their look at the start does.
+    let step = step.start(Start::Verify);
+    assert!(detector.impacts(&scene, &step).expect("good").is_empty());
+    assert!(detector.is_free(&scene, &step).expect("good"));
+}

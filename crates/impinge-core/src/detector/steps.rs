@@ -204,6 +204,7 @@ impl Detector {
         let start = Instant::now();
         let at_start = Query {
             kinds: None,
+            filter: None,
             ..query.clone().shared_vertex(SharedVertex::Resolve)
         };
         let intersects = match &query.filter {

@@ -188,6 +188,7 @@ impl Plan {
             _ => limits,
         };
         query.check_without_kinds()?;
+        query.check_without_filter()?;
         Plan::of(scene, query, Question::Intersection, goal, limits)
     }
 
@@ -271,6 +272,7 @@ impl Plan {
         limits: Limits,
     ) -> Result<Self, Error> {
         check_distance("distance", distance)?;
+        query.check_without_filter()?;
         let of_distance = size_of::<f64>() * usize::from(query.distances);
         let of_points = size_of::<[[f64; 3]; 2]>() * usize::from(query.closest);
         let limits = Limits {
@@ -293,6 +295,7 @@ impl Plan {
         limits: Limits,
     ) -> Result<Self, Error> {
         check_distance("inflation", inflation)?;
+        query.check_without_filter()?;
         let mut plan = Plan::of(scene, query, Question::Overlap, Goal::All, limits)?;
         for part in &mut plan.parts {
             part.thickness = inflation;
@@ -308,11 +311,13 @@ impl Plan {
 
     /// The kinds of pairs that are asked for, as far as some parts may have them.
     pub(crate) fn kinds_asked(&self) -> PairKinds {
+        let are_bare = self.parts.iter().any(|part| part.is_bare);
+        let are_points = self.parts.iter().any(|part| part.is_points);
         let is_asked = |kind: &PairKind| {
-            let mut tests = self
-                .part_ixs()
-                .flat_map(|a| self.part_ixs().map(move |b| (a, b)));
-            tests.any(|(a, b)| self.test(a, b) == Some(TestId::Elements(*kind)))
+            let has = |part| self.parts.iter().any(|own| own.part == part);
+            self.only.contains(*kind)
+                && self.is_kind_asked(*kind, are_bare, are_points)
+                && kind.parts().into_iter().all(has)
         };
         PairKind::ALL.into_iter().filter(is_asked).collect()
     }
@@ -438,19 +443,25 @@ impl Plan {
             return Some(TestId::Intersection);
         }
         let kind = PairKind::of(a.part, b.part)?;
-        let is_asked = match self.kinds {
+        let is_asked = self.is_kind_asked(kind, a.is_bare && b.is_bare, a.is_points && b.is_points);
+        (is_asked && self.only.contains(kind)).then_some(TestId::Elements(kind))
+    }
+
+    /// Whether pairs of a kind are asked for, of two bodies that have no faces, or no edges either.
+    #[inline]
+    fn is_kind_asked(&self, kind: PairKind, are_bare: bool, are_points: bool) -> bool {
+        match self.kinds {
             Some(kinds) => kinds.contains(kind),
             // Vertices against faces and edges against edges cover every body with faces. Only bodies without faces need
             // edges against vertices, and only bodies of points need vertices against vertices.
             None => match kind {
                 PairKind::VertexFace | PairKind::EdgeEdge => true,
-                PairKind::EdgeVertex => a.is_bare && b.is_bare,
-                PairKind::VertexVertex => a.is_points && b.is_points,
+                PairKind::EdgeVertex => are_bare,
+                PairKind::VertexVertex => are_points,
                 PairKind::EdgeFace => self.question == Question::Nearness,
                 PairKind::FaceFace => false,
             },
-        };
-        (is_asked && self.only.contains(kind)).then_some(TestId::Elements(kind))
+        }
     }
 
     #[inline]

@@ -270,7 +270,7 @@ impl Query {
         self
     }
 
-    /// Leaves out the pairs that a filter refuses. It is asked about pairs that are in contact, or might be as far as floats can tell;
+    /// Leaves out the pairs that a filter refuses, in questions about the contacts of a step; all others refuse a filter. It is asked about pairs that are in contact, or might be as far as floats can tell;
     /// an [early](PairFilter::early) one sooner.
     pub fn filter(mut self, filter: PairFilter) -> Self {
         self.filter = Some(filter);
@@ -320,6 +320,18 @@ impl Query {
                 setting: "clearance_share",
                 given: self.clearance.share.to_string(),
                 allowed: "a number from 0 to less than 1",
+            }),
+        }
+    }
+
+    /// Refuses a filter, for questions that ask none.
+    pub(crate) fn check_without_filter(&self) -> Result<(), Error> {
+        match self.filter {
+            None => Ok(()),
+            Some(_) => Err(Error::Setting {
+                setting: "filter",
+                given: "a filter of pairs".to_owned(),
+                allowed: "none: only questions about the contacts of a step ask one",
             }),
         }
     }
