@@ -30,8 +30,10 @@ pub use answers::advance::Advance;
 pub use answers::candidates::Candidates;
 pub use answers::impacts::{Impact, Impacts, hash_impact_rows};
 pub use answers::near::{ClosestPoints, NearIter, NearPair, NearPairs};
+pub use answers::neighbours::{Csr, Neighbours};
 pub use answers::pairs::{Element, Pairs, hash_rows};
 pub use answers::places::Place;
+pub use answers::safe::{Bounds, SafeDistances};
 #[cfg(feature = "gpu")]
 pub use detector::Gpu;
 pub use detector::{Detector, host};

@@ -5,6 +5,8 @@ pub(crate) mod candidates;
 pub(crate) mod home;
 pub(crate) mod impacts;
 pub(crate) mod near;
+pub(crate) mod neighbours;
 pub(crate) mod numbering;
 pub(crate) mod pairs;
 pub(crate) mod places;
+pub(crate) mod safe;

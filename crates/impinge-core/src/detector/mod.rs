@@ -14,6 +14,7 @@ mod near;
 mod probe;
 #[cfg(feature = "gpu")]
 mod resident;
+mod solver;
 mod steps;
 
 #[cfg(feature = "gpu")]
@@ -23,7 +24,9 @@ use crate::answers::candidates::Candidates;
 use crate::answers::home::Home;
 use crate::answers::impacts::Impacts;
 use crate::answers::near::NearPairs;
+use crate::answers::neighbours::Neighbours;
 use crate::answers::pairs::Pairs;
+use crate::answers::safe::SafeDistances;
 use crate::clusterings::Clusterings;
 use crate::contact::Topologies;
 use crate::cpu::Cpu;
@@ -62,6 +65,7 @@ pub struct Detector {
     pub(crate) clusterings: Clusterings,
     cpu: Cpu,
     steps: steps::StepMemory,
+    solver: solver::SolverMemory,
     touching: distance::Touching,
     distances: Distances,
     topologies: Topologies,
@@ -77,6 +81,8 @@ struct Homes {
     impacts: Home<Impacts>,
     candidates: Home<Candidates>,
     near: Home<NearPairs>,
+    neighbours: Home<Neighbours>,
+    safe: Home<SafeDistances>,
 }
 
 impl Detector {
@@ -129,6 +135,7 @@ impl Detector {
             stats: Stats::default(),
             cpu: Cpu::new(&settings, &clusterings),
             steps: steps::StepMemory::new(&settings, clusterings.clone()),
+            solver: solver::SolverMemory::default(),
             touching: distance::Touching::default(),
             distances: Distances::new(clusterings.clone()),
             topologies: Topologies::default(),

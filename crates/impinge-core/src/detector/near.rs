@@ -107,45 +107,55 @@ impl Outcome<u64, { PairKind::ALL.len() }> for WithFeatures<'_> {
     }
 
     fn fill(&mut self, job: Job<'_>, keys: KeysByKind) -> Result<(), Error> {
-        let features = Instant::now();
-        let Job {
-            scene,
-            plan,
-            workers,
-            control,
-        } = job;
-        let labels = Labels::new(plan.n_primitives());
-        let query = self.query;
-        let (unnamed, numbering) = self.near.fill(keys, query, workers.task(TASK))?;
-        let tasks: Vec<Mutex<Unnamed<'_>>> = unnamed.into_iter().map(Mutex::new).collect();
-        let n_tasks = tasks.len();
-        let is_stopped = AtomicBool::new(false);
-        workers.for_each(&mut vec![(); workers.n()], n_tasks, |(), ix| {
-            if is_stopped.load(Ordering::Relaxed)
-                || control.step(ix as u64, n_tasks as u64).is_err()
-            {
-                is_stopped.store(true, Ordering::Relaxed);
-                return;
-            }
-            if let Ok(mut unnamed) = tasks[ix].lock() {
-                let kind = unnamed.kind;
-                let find = |key| {
-                    let (a, b) = numbering.pair(key);
-                    find_features(scene, kind, [a, b], query.distances)
-                };
-                unnamed.name(labels, exact_kind(TestId::Elements(kind)), find);
-            }
-        });
-        drop(tasks);
-        control.step(n_tasks as u64, n_tasks as u64)?;
-        let ms = features.elapsed().as_secs_f64() * 1e3;
-        self.near.stats_mut().add_ms("features", ms);
-        Ok(())
+        name_features(self.near, job, keys, self.query)
     }
 
     fn bytes(&self) -> u64 {
         self.near.bytes()
     }
+}
+
+/// Fills an answer with sorted keys, and finds their features.
+///
+/// # Errors
+/// There is no memory, cancellation.
+pub(super) fn name_features(
+    near: &mut NearPairs,
+    job: Job<'_>,
+    keys: KeysByKind,
+    query: &Query,
+) -> Result<(), Error> {
+    let features = Instant::now();
+    let Job {
+        scene,
+        plan,
+        workers,
+        control,
+    } = job;
+    let labels = Labels::new(plan.n_primitives());
+    let (unnamed, numbering) = near.fill(keys, query, workers.task(TASK))?;
+    let tasks: Vec<Mutex<Unnamed<'_>>> = unnamed.into_iter().map(Mutex::new).collect();
+    let n_tasks = tasks.len();
+    let is_stopped = AtomicBool::new(false);
+    workers.for_each(&mut vec![(); workers.n()], n_tasks, |(), ix| {
+        if is_stopped.load(Ordering::Relaxed) || control.step(ix as u64, n_tasks as u64).is_err() {
+            is_stopped.store(true, Ordering::Relaxed);
+            return;
+        }
+        if let Ok(mut unnamed) = tasks[ix].lock() {
+            let kind = unnamed.kind;
+            let find = |key| {
+                let (a, b) = numbering.pair(key);
+                find_features(scene, kind, [a, b], query.distances)
+            };
+            unnamed.name(labels, exact_kind(TestId::Elements(kind)), find);
+        }
+    });
+    drop(tasks);
+    control.step(n_tasks as u64, n_tasks as u64)?;
+    let ms = features.elapsed().as_secs_f64() * 1e3;
+    near.stats_mut().add_ms("features", ms);
+    Ok(())
 }
 
 /// The nearest features of a pair, and on request the nearest points.

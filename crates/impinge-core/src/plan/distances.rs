@@ -99,6 +99,16 @@ impl Plan {
         Reach::of_sum([self.distance, a, b])
     }
 
+    /// A number below the distance of two elements of two parts, minus the thickness of their bodies: 0 if that is not certainly
+    /// above 0.
+    pub(crate) fn without_thickness(&self, parts: [PartIx; 2], distance: f64) -> f64 {
+        let [a, b] = parts.map(|part| self.part(part).thickness);
+        if a == 0.0 && b == 0.0 {
+            return distance;
+        }
+        (distance - (a + b).next_up()).next_down().max(0.0)
+    }
+
     /// How far the boxes of a part must reach beyond its elements, so that those of near elements overlap: those of two
     /// parts reach at least as far together as their elements may be apart.
     pub(crate) fn inflation(&self, part: PartIx) -> f64 {

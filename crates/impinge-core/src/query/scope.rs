@@ -97,6 +97,7 @@ pub struct Query {
     pub(crate) filter: Option<PairFilter>,
     pub(crate) distances: bool,
     pub(crate) closest: bool,
+    pub(crate) fixed: BTreeSet<BodyId>,
 }
 
 impl Default for Query {
@@ -122,6 +123,7 @@ impl Query {
             filter: None,
             distances: false,
             closest: false,
+            fixed: BTreeSet::new(),
         }
     }
 
@@ -274,6 +276,13 @@ impl Query {
     /// an [early](PairFilter::early) one sooner.
     pub fn filter(mut self, filter: PairFilter) -> Self {
         self.filter = Some(filter);
+        self
+    }
+
+    /// Says which bodies do not move, for [`safe_distances`](crate::Detector::safe_distances): they leave the whole distance to what is
+    /// near them.
+    pub fn fixed(mut self, bodies: impl IntoIterator<Item = BodyId>) -> Self {
+        self.fixed = bodies.into_iter().collect();
         self
     }
 

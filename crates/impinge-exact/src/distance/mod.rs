@@ -29,7 +29,9 @@ use super::Point;
 use super::algebra::fixed::{Vector, cross, difference, dot};
 use super::element_pair::ElementPair;
 pub use elements::{NearestOfElements, are_within_certainly, elements_are_within};
-pub use elements::{closest_of_elements, elements_meet, nearest_of_elements, unsure_are_within};
+pub use elements::{
+    closest_of_elements, distance_below, elements_meet, nearest_of_elements, unsure_are_within,
+};
 pub use features::{Feature, NearestFeatures};
 pub use filter::{Approach, approach};
 pub use keep::Keep;

@@ -1,0 +1,442 @@
+//! How far vertices may move, and neighbours by element: against every pair by the exact tests.
+
+use impinge_core::exact::{ElementPair, Point, are_within, closest_points, edge_face_are_within};
+use impinge_core::{
+    Backend, BodyId, Bounds, Csr, Detector, Elements, Error, Method, PairKind, Part, Query,
+    SafeDistances, Scene, Settings,
+};
+use impinge_scenes::{Random, solids, soup, surfaces};
+
+fn detector(method: Method, threads: usize) -> Detector {
+    Detector::new(Settings {
+        method,
+        threads,
+        backend: Backend::Cpu,
+        ..Settings::default()
+    })
+    .expect("settings")
+}
+
+fn detectors() -> [Detector; 3] {
+    [
+        detector(Method::Clusters, 1),
+        detector(Method::Clusters, 4),
+        detector(Method::Naive, 2),
+    ]
+}
+
+/// An element of one body, by its corners.
+#[derive(Debug, Clone)]
+struct Held {
+    body: BodyId,
+    part: Part,
+    element: u32,
+    corners: Vec<u32>,
+}
+
+fn elements(scene: &Scene, part: Part) -> Vec<Held> {
+    let mut all = Vec::new();
+    for (body, held) in scene.bodies() {
+        let n = match part {
+            Part::Vertices => held.n_vertices(),
+            Part::Edges => held.edges().len(),
+            _ => held.faces().len(),
+        };
+        let given = held.elements();
+        let used: Vec<u32> = (0..given.len())
+            .flat_map(|ix| given.corners(ix).to_vec())
+            .collect();
+        for element in 0..n {
+            let corners = match part {
+                Part::Vertices => vec![element as u32],
+                Part::Edges => held.edges().corners(element).to_vec(),
+                _ => held.faces().corners(element).to_vec(),
+            };
+            // Vertices of no element do not take part.
+            if part != Part::Vertices || used.contains(&corners[0]) {
+                all.push(Held {
+                    body,
+                    part,
+                    element: element as u32,
+                    corners,
+                });
+            }
+        }
+    }
+    all
+}
+
+fn points(scene: &Scene, of: &Held) -> Vec<Point> {
+    let positions = scene.body(of.body).expect("held").positions();
+    let point = |&corner: &u32| positions.point(corner as usize);
+    of.corners.iter().map(point).collect()
+}
+
+/// All pairs of elements of the kinds that meet in a test, and their points as the exact tests take them.
+fn pairs(scene: &Scene) -> Vec<(PairKind, Held, Held, [Point; 4])> {
+    let [vertices, edges, faces] =
+        [Part::Vertices, Part::Edges, Part::Faces].map(|part| elements(scene, part));
+    let mut all = Vec::new();
+    let mut add = |kind, a: &Held, b: &Held| {
+        let shares = a.body == b.body && a.corners.iter().any(|corner| b.corners.contains(corner));
+        if !shares {
+            let mut four = [[0.0; 3]; 4];
+            let (a_points, b_points) = (points(scene, a), points(scene, b));
+            // The exact test of an edge and a vertex takes the vertex first.
+            let (first, second) = match kind {
+                PairKind::EdgeVertex => (b_points, a_points),
+                _ => (a_points, b_points),
+            };
+            for (to, from) in four.iter_mut().zip(first.iter().chain(&second)) {
+                *to = *from;
+            }
+            all.push((kind, a.clone(), b.clone(), four));
+        }
+    };
+    for v in &vertices {
+        for f in &faces {
+            add(PairKind::VertexFace, v, f);
+        }
+    }
+    for (ix, e) in edges.iter().enumerate() {
+        for f in &edges[ix + 1..] {
+            add(PairKind::EdgeEdge, e, f);
+        }
+        for v in &vertices {
+            add(PairKind::EdgeVertex, e, v);
+        }
+    }
+    for (ix, v) in vertices.iter().enumerate() {
+        for w in &vertices[ix + 1..] {
+            add(PairKind::VertexVertex, v, w);
+        }
+    }
+    all
+}
+
+fn test_of(kind: PairKind) -> ElementPair {
+    match kind {
+        PairKind::VertexFace => ElementPair::VertexFace,
+        PairKind::EdgeEdge => ElementPair::EdgeEdge,
+        PairKind::EdgeVertex => ElementPair::VertexEdge,
+        _ => ElementPair::VertexVertex,
+    }
+}
+
+/// At least the sum.
+fn sum_up(numbers: &[f64]) -> f64 {
+    numbers.iter().fold(0.0, |sum: f64, &x| match x {
+        0.0 => sum,
+        x => (sum + x).next_up(),
+    })
+}
+
+/// The largest bound of the corners of an element.
+fn largest(safe: &SafeDistances, of: &Held) -> f64 {
+    let bounds = safe.of(of.body).expect("held");
+    let own = of.corners.iter().map(|&corner| bounds.get(corner as usize));
+    own.fold(0.0, f64::max)
+}
+
+/// Holds the bounds against every pair: together, two elements move less than they are apart, and no bound is much smaller than it
+/// must be.
+fn check(scene: &Scene, safe: &SafeDistances, most: f64, fixed: &[BodyId]) -> [usize; 2] {
+    let thickness = |of: &Held| scene.body(of.body).expect("held").thickness();
+    let mut least = std::collections::BTreeMap::new();
+    let (mut n_touching, mut n_bounded) = (0, 0);
+    for (kind, a, b, four) in pairs(scene) {
+        let thick = [thickness(&a), thickness(&b)];
+        let moves = [largest(safe, &a), largest(safe, &b)];
+        let sum = sum_up(&[moves[0], moves[1], thick[0], thick[1]]);
+        let pair = test_of(kind);
+        if are_within(pair, &four, sum) {
+            assert_eq!(moves, [0.0; 2], "{kind:?} {a:?} {b:?}");
+            n_touching += 1;
+        }
+        let own = closest_points(pair, &four).distance - thick[0] - thick[1];
+        let are_fixed = [&a, &b].map(|of| fixed.contains(&of.body));
+        let share = match are_fixed {
+            [false, false] => own / 2.0,
+            _ => own,
+        };
+        for of in [&a, &b] {
+            for &corner in &of.corners {
+                let least = least.entry((of.body, corner)).or_insert(most);
+                if !fixed.contains(&of.body) {
+                    *least = share.min(*least).max(0.0);
+                } else {
+                    *least = 0.0;
+                }
+            }
+        }
+    }
+    // An edge that pierces a face.
+    for e in elements(scene, Part::Edges) {
+        for f in elements(scene, Part::Faces) {
+            let shares = e.body == f.body && e.corners.iter().any(|c| f.corners.contains(c));
+            let (ends, face) = (points(scene, &e), points(scene, &f));
+            let face = [face[0], face[1], face[2]];
+            if !shares && edge_face_are_within(&[ends[0], ends[1]], &face, 0.0) {
+                for of in [&e, &f] {
+                    assert_eq!(largest(safe, of), 0.0, "{e:?} {f:?}");
+                    for &corner in &of.corners {
+                        least.insert((of.body, corner), 0.0);
+                    }
+                }
+            }
+        }
+    }
+    for ((body, corner), least) in least {
+        let bound = safe.of(body).expect("held").get(corner as usize);
+        assert!(bound <= most);
+        assert!(
+            bound >= least * (1.0 - 1.0 / 1024.0) - 1e-300,
+            "{body:?} {corner}: {bound} {least}"
+        );
+        n_bounded += usize::from(bound > 0.0 && bound < most);
+    }
+    [n_touching, n_bounded]
+}
+
+/// A scene of small bodies of every kind: on a lattice, where many elements touch, are parallel, coplanar or degenerate; or at random.
+fn scene(seed: u64, is_lattice: bool, is_double: bool) -> (Scene, Vec<BodyId>) {
+    let mut random = Random::new(seed);
+    let mut scene = Scene::new();
+    let mut points = |n: usize| -> Vec<[f64; 3]> {
+        let lattice = |random: &mut Random| [0; 3].map(|_| f64::from(random.below(5) as u32));
+        (0..n)
+            .map(|_| match is_lattice {
+                true => lattice(&mut random),
+                false => random.point(-1.0, 1.0).map(f64::from),
+            })
+            .collect()
+    };
+    let faces: Vec<[u32; 3]> = vec![[0, 1, 2], [2, 1, 3], [4, 5, 6], [6, 5, 5]];
+    let (a, b) = (points(9), points(5));
+    let (c, d) = (points(4), points(3));
+    let mut bodies = Vec::new();
+    if is_double {
+        bodies.push(scene.add_triangles(&faces, &a).expect("good"));
+    } else {
+        let a: Vec<[f32; 3]> = a.iter().map(|p| p.map(|x| x as f32)).collect();
+        bodies.push(scene.add_triangles(&faces, &a).expect("good"));
+    }
+    bodies.push(scene.add_tetrahedra(&[[0, 1, 2, 3]], &b).expect("good"));
+    bodies.push(scene.add_edges(&[[0, 1], [1, 2]], &c).expect("good"));
+    bodies.push(scene.add_points(&d).expect("good"));
+    (scene, bodies)
+}
+
+#[test]
+fn together_two_elements_move_less_than_they_are_apart() {
+    let (mut n_touching, mut n_bounded) = (0, 0);
+    let mut detectors = detectors();
+    for seed in 0..40 {
+        for (is_lattice, is_double) in [(false, false), (false, true), (true, false), (true, true)]
+        {
+            let (mut scene, bodies) = scene(seed, is_lattice, is_double);
+            let fixed = match seed % 3 {
+                0 => vec![],
+                1 => vec![bodies[0]],
+                _ => vec![bodies[1], bodies[3]],
+            };
+            if seed % 4 == 3 {
+                scene.set_thickness(bodies[0], 0.1).expect("good");
+                scene.set_thickness(bodies[2], 0.03).expect("good");
+            }
+            let most = [0.05, 0.3, 2.0][seed as usize % 3];
+            let query = Query::all().fixed(fixed.iter().copied());
+            let safe: Vec<SafeDistances> = detectors
+                .iter_mut()
+                .map(|detector| detector.safe_distances(&scene, most, &query).expect("good"))
+                .collect();
+            for other in &safe[1..] {
+                for &body in &bodies {
+                    assert_eq!(safe[0].of(body), other.of(body), "{seed}");
+                }
+                let rows = |of: &SafeDistances| of.touching().iter().collect::<Vec<_>>();
+                assert_eq!(rows(&safe[0]), rows(other), "{seed}");
+            }
+            let [touching, bounded] = check(&scene, &safe[0], most, &fixed);
+            n_touching += touching;
+            n_bounded += bounded;
+            let has_own = safe[0].touching().iter().next().is_some();
+            assert!(has_own || touching == 0, "{seed}");
+        }
+    }
+    assert!(
+        n_touching > 1000 && n_bounded > 300,
+        "{n_touching} {n_bounded}"
+    );
+}
+
+#[test]
+fn bounds_hold_on_surfaces() {
+    let mut scene = Scene::new();
+    let mut bodies = Vec::new();
+    for x in [0.0, 2.05] {
+        let ball = surfaces::bumpy_ball(300, 0.3).translated([x, 0.0, 0.0]);
+        bodies.push(ball.add_to(&mut scene).expect("good"));
+    }
+    let block = solids::block(2, 2, 1, 0.5).translated([0.0, 1.2, 0.0]);
+    bodies.push(block.add_to(&mut scene).expect("good"));
+    let mut detector = detector(Method::Clusters, 2);
+    let safe = detector
+        .safe_distances(&scene, 0.1, &Query::all())
+        .expect("good");
+    let [_, n_bounded] = check(&scene, &safe, 0.1, &[]);
+    assert!(n_bounded > 100, "{n_bounded}");
+}
+
+/// Moves every vertex as far as it may, but for rounding, in random directions.
+fn moved(scene: &Scene, safe: &SafeDistances, body: BodyId, random: &mut Random) -> Vec<[f64; 3]> {
+    let held = scene.body(body).expect("held");
+    let bounds = safe.of(body).expect("held");
+    (0..held.n_vertices())
+        .map(|ix| {
+            let by = random.point(-1.0, 1.0).map(f64::from);
+            let length = by.iter().map(|x| x * x).sum::<f64>().sqrt().max(1e-9);
+            let scale = bounds.get(ix) * (1.0 - 1e-9) / length;
+            let at = held.positions().point(ix);
+            [0, 1, 2].map(|axis| at[axis] + by[axis] * scale)
+        })
+        .collect()
+}
+
+#[test]
+fn what_moves_within_its_bounds_never_touches() {
+    let mut random = Random::new(7);
+    let mut scene = Scene::new();
+    let model = soup::triangles(120, 0.25, 3);
+    let wide = model.positions_f64();
+    let body = scene
+        .add((model.elements.clone(), wide.clone()))
+        .expect("good");
+    let mut detector = detector(Method::Clusters, 2);
+    // Those that intersect already stand still, and are not asked about.
+    let query = Query::all();
+    let pairs = detector.detect(&scene, &query).expect("good");
+    let colliding = pairs.colliding(body);
+    let Elements::Triangles(faces) = model.elements else {
+        panic!("a soup of triangles");
+    };
+    let kept: Vec<[u32; 3]> = (0..faces.len())
+        .filter(|&ix| colliding.binary_search(&(ix as u32)).is_err())
+        .map(|ix| faces[ix])
+        .collect();
+    assert!(kept.len() > 30);
+    scene.remesh(body, (kept, wide)).expect("good");
+    for _ in 0..50 {
+        let safe = detector.safe_distances(&scene, 0.05, &query).expect("good");
+        assert!(safe.touching().is_empty());
+        let end = moved(&scene, &safe, body, &mut random);
+        scene.set_end_positions(body, end.clone()).expect("good");
+        assert!(detector.is_free(&scene, &query).expect("good"));
+        scene.clear_end_positions(body).expect("good");
+        scene.set_positions(body, end).expect("good");
+        assert!(!detector.any(&scene, &query).expect("good"));
+    }
+}
+
+/// A list as `(row, column)` pairs.
+fn entries(of: &Csr) -> Vec<(u32, u32)> {
+    let rows = 0..of.offsets.len().saturating_sub(1);
+    rows.flat_map(|row| of.of(row).map(move |(column, _)| (row as u32, column)))
+        .collect()
+}
+
+#[test]
+fn neighbours_are_the_near_pairs_by_element() {
+    let kinds = [
+        PairKind::VertexFace,
+        PairKind::EdgeEdge,
+        PairKind::EdgeVertex,
+        PairKind::VertexVertex,
+        PairKind::EdgeFace,
+    ];
+    for (seed, is_lattice) in [(1, false), (2, true), (3, true)] {
+        let (mut scene, bodies) = scene(seed, is_lattice, true);
+        // A body in between that is gone.
+        scene.remove(bodies[1]).expect("good");
+        let query = Query::all().kinds(kinds);
+        let of_all = detectors().map(|mut detector| {
+            let near = detector.near(&scene, 1.0, &query).expect("good");
+            let lists = detector.neighbours(&scene, 1.0, &query).expect("good");
+            (near, lists)
+        });
+        let (near, lists) = &of_all[0];
+        assert!(!near.is_empty());
+        assert_eq!(near.len(), lists.len());
+        for kind in kinds {
+            let [a, b] = kind.parts();
+            let number = |part, at: impinge_core::Element| {
+                lists.first(at.body, part).expect("held") + at.element
+            };
+            let mut pairs: Vec<(u32, u32)> = near
+                .of(kind)
+                .map(|pair| (number(a, pair.a), number(b, pair.b)))
+                .collect();
+            let mut turned: Vec<(u32, u32)> = pairs.iter().map(|&(a, b)| (b, a)).collect();
+            if a == b {
+                pairs.extend(turned.iter().copied());
+                turned = pairs.clone();
+            }
+            pairs.sort_unstable();
+            turned.sort_unstable();
+            assert_eq!(entries(lists.of(kind)), pairs, "{kind:?}");
+            assert_eq!(entries(lists.reversed(kind)), turned, "{kind:?}");
+        }
+        for (kind, a, b, four) in pairs(&scene) {
+            let row = lists.first(a.body, a.part).expect("held") + a.element;
+            let column = lists.first(b.body, b.part).expect("held") + b.element;
+            let found = lists
+                .of(kind)
+                .of(row as usize)
+                .find(|&(at, _)| at == column);
+            let pair = test_of(kind);
+            assert_eq!(found.is_some(), are_within(pair, &four, 1.0), "{kind:?}");
+            if let Some((_, distance)) = found {
+                let touches = are_within(pair, &four, 0.0);
+                assert_eq!(distance == 0.0, touches);
+                assert!(touches || !are_within(pair, &four, distance));
+                assert!(are_within(pair, &four, distance * (1.0 + 2f64.powi(-19))));
+            }
+        }
+        for (_, other) in &of_all[1..] {
+            for kind in kinds {
+                assert_eq!(lists.of(kind), other.of(kind));
+                assert_eq!(lists.reversed(kind), other.reversed(kind));
+            }
+        }
+    }
+}
+
+#[test]
+fn bad_lengths_and_bodies_are_refused_by_name() {
+    let (mut scene, bodies) = scene(1, false, false);
+    let mut detector = detector(Method::Auto, 1);
+    for most in [-1.0, f64::NAN, f64::INFINITY, f64::MAX] {
+        let error = detector.safe_distances(&scene, most, &Query::all());
+        let error = error.expect_err("refused");
+        let is_named = matches!(
+            &error,
+            Error::Setting {
+                setting: "most",
+                ..
+            }
+        );
+        assert!(is_named, "{most}: {error}");
+    }
+    scene.remove(bodies[3]).expect("good");
+    let query = Query::all().fixed([bodies[3]]);
+    let error = detector.safe_distances(&scene, 1.0, &query);
+    assert!(matches!(error, Err(Error::UnknownBody { .. })));
+    let safe = detector
+        .safe_distances(&scene, 1.0, &Query::all())
+        .expect("good");
+    assert_eq!(safe.of(bodies[3]), None);
+    assert!(matches!(safe.of(bodies[0]), Some(Bounds::F32(_))));
+    assert!(matches!(safe.of(bodies[1]), Some(Bounds::F64(_))));
+    // A vertex of no element may go as far as any.
+    assert_eq!(safe.of(bodies[0]).expect("held").get(8), 1.0);
+}
