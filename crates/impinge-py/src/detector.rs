@@ -18,6 +18,7 @@ use crate::near::Near;
 use crate::options::Options;
 use crate::scene::Scene;
 use crate::settings::{self, number, unexpected, unsigned};
+use crate::solver::{Neighbours, SafeDistances};
 use crate::statistics;
 use crate::watch::Watch;
 
@@ -205,14 +206,40 @@ impl DetectorBase {
     ) -> PyResult<Near> {
         let distance = number(distance, "distance")?;
         let options = Options::new(keywords)?;
-        let has = [
-            options.distances || options.closest_points,
-            options.closest_points,
-        ];
+        let has = options.has_measures();
         let asked = ask(slf, scene, options, |detector, scene, query| {
             detector.near(scene, distance, query)
         })?;
         Ok(Near::new(asked.answer, has))
+    }
+
+    fn _safe_distances(
+        slf: &Bound<'_, Self>,
+        scene: &Bound<'_, PyAny>,
+        most: &Bound<'_, PyAny>,
+        keywords: Keywords<'_, '_>,
+    ) -> PyResult<SafeDistances> {
+        let most = number(most, "most")?;
+        let options = Options::new(keywords)?;
+        let has = options.has_measures();
+        let asked = ask(slf, scene, options, |detector, scene, query| {
+            detector.safe_distances(scene, most, query)
+        })?;
+        Ok(SafeDistances::new(asked.answer, asked.scene, has))
+    }
+
+    fn _neighbours(
+        slf: &Bound<'_, Self>,
+        scene: &Bound<'_, PyAny>,
+        distance: &Bound<'_, PyAny>,
+        keywords: Keywords<'_, '_>,
+    ) -> PyResult<Neighbours> {
+        let distance = number(distance, "distance")?;
+        let options = Options::new(keywords)?;
+        let asked = ask(slf, scene, options, |detector, scene, query| {
+            detector.neighbours(scene, distance, query)
+        })?;
+        Ok(Neighbours::new(asked.answer, asked.scene))
     }
 
     fn _distance<'py>(

@@ -19,6 +19,7 @@ mod near;
 mod options;
 mod scene;
 mod settings;
+mod solver;
 mod statistics;
 mod vertex_filter;
 mod watch;
@@ -59,6 +60,8 @@ mod _impinge {
     use super::options::_check_options;
     #[pymodule_export]
     use super::scene::Scene;
+    #[pymodule_export]
+    use super::solver::{Neighbours, SafeDistances};
     #[pymodule_export]
     use super::vertex_filter::VertexFilter;
     #[pymodule_export]

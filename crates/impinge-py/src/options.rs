@@ -14,7 +14,7 @@ use crate::vertex_filter::VertexFilter;
 use crate::watch::CancelToken;
 
 /// The options that users may name, in the order of the documentation.
-const NAMES: [&str; 18] = [
+const NAMES: [&str; 19] = [
     "which",
     "between",
     "self_of",
@@ -30,6 +30,7 @@ const NAMES: [&str; 18] = [
     "precision",
     "distances",
     "closest_points",
+    "fixed",
     "query",
     "cancel",
     "progress",
@@ -53,6 +54,7 @@ pub struct Options<'py> {
     pub precision: Precision,
     pub distances: bool,
     pub closest_points: bool,
+    fixed: Vec<Bound<'py, PyAny>>,
     pub cancel: Option<impinge::CancelToken>,
     pub progress: Option<Py<PyAny>>,
     /// Of `impinge.ipc`.
@@ -136,6 +138,11 @@ impl<'py> Options<'py> {
             "precision" => self.precision = choose_one(&value, name, words!(Precision))?,
             "distances" => self.distances = flag(&value, name)?,
             "closest_points" => self.closest_points = flag(&value, name)?,
+            "fixed" => {
+                let bodies = items(&value);
+                self.fixed =
+                    bodies.ok_or_else(|| unexpected(&value, name, "a sequence of bodies"))?;
+            }
             "query" => {}
             "cancel" => {
                 let token = value.cast::<CancelToken>();
@@ -154,6 +161,11 @@ impl<'py> Options<'py> {
             _ => return Err(unknown(name, &NAMES)),
         }
         Ok(())
+    }
+
+    /// Whether distances are asked for, and nearest points.
+    pub fn has_measures(&self) -> [bool; 2] {
+        [self.distances || self.closest_points, self.closest_points]
     }
 
     /// The same, about pairs of different bodies unless something else was said.
@@ -198,6 +210,9 @@ impl<'py> Options<'py> {
             .separation(self.separation)
             .clearance(clearance)
             .precision(self.precision);
+        let fixed = self.fixed.iter().enumerate();
+        let fixed = fixed.map(|(ix, body)| scene.id(body, &format!("fixed[{ix}]")));
+        query = query.fixed(fixed.collect::<PyResult<Vec<BodyId>>>()?);
         if let Some(filter) = &self.filter {
             query = query.filter(filter.get().inner.clone());
         }

@@ -20,6 +20,8 @@ QUESTIONS = {
     "advance": (),
     "candidates": (0.1,),
     "near": (0.1,),
+    "safe_distances": (0.1,),
+    "neighbours": (0.1,),
     "nearest": (),
 }
 STATIC = ("detect", "count", "any")
@@ -52,6 +54,10 @@ def value(answer):
         return answer.fraction
     if isinstance(answer, impinge.Nearest):
         return answer[:5]
+    if isinstance(answer, impinge.SafeDistances):
+        return [answer.of(body).tolist() for body in range(3)]
+    if isinstance(answer, impinge.Neighbours):
+        return [column.tolist() for lists in (answer.vf, answer.fv, answer.ee) for column in lists]
     return getattr(answer, "hash", answer) if not isinstance(answer, tuple) else answer
 
 

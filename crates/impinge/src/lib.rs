@@ -130,12 +130,12 @@ pub use read::read;
 #[cfg(feature = "gpu")]
 pub use impinge_core::wgpu;
 pub use impinge_core::{
-    Advance, Affinity, Backend, Body, BodyId, BodyKind, CancelToken, Candidates, Clearance,
-    ClosestPoints, Control, Detector, Element, ElementVertices, Elements, Error, Exclusion, Filter,
-    Impact, Impacts, InstructionSet, Mesh, Method, NearIter, NearPair, NearPairs, NewPositions,
-    PairFilter, PairKind, PairKinds, Pairs, Part, Place, Positions, Precision, Progress, Query,
-    Real, Recluster, Scene, Settings, SharedVertex, Stage, Start, Stats, Weld, WrongNumber,
-    hash_impact_rows, hash_rows,
+    Advance, Affinity, Backend, Body, BodyId, BodyKind, Bounds, CancelToken, Candidates, Clearance,
+    ClosestPoints, Control, Csr, Detector, Element, ElementVertices, Elements, Error, Exclusion,
+    Filter, Impact, Impacts, InstructionSet, Mesh, Method, NearIter, NearPair, NearPairs,
+    Neighbours, NewPositions, PairFilter, PairKind, PairKinds, Pairs, Part, Place, Positions,
+    Precision, Progress, Query, Real, Recluster, SafeDistances, Scene, Settings, SharedVertex,
+    Stage, Start, Stats, Weld, WrongNumber, hash_impact_rows, hash_rows,
 };
 #[cfg(feature = "gpu")]
 pub use impinge_core::{
@@ -152,4 +152,6 @@ const _: () = {
     threads_may_share::<Query>();
     threads_may_share::<Impacts>();
     threads_may_share::<NearPairs>();
+    threads_may_share::<SafeDistances>();
+    threads_may_share::<Neighbours>();
 };

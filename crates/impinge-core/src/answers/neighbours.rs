@@ -188,6 +188,11 @@ impl Neighbours {
         Some(self.bodies[ix].1[place])
     }
 
+    /// All bodies of the scene, when it was asked about.
+    pub fn bodies(&self) -> impl Iterator<Item = BodyId> + '_ {
+        self.bodies.iter().map(|of| of.0)
+    }
+
     /// How many pairs are near: each is in two lists.
     pub fn len(&self) -> usize {
         self.n_pairs

@@ -119,6 +119,16 @@ impl SafeDistances {
         Ok(())
     }
 
+    /// All bodies of the scene, when it was asked about.
+    pub fn bodies(&self) -> impl Iterator<Item = BodyId> + '_ {
+        self.bodies.iter().map(|of| of.id)
+    }
+
+    /// How many vertices they have together.
+    pub fn n_vertices(&self) -> usize {
+        self.singles.len() + self.doubles.len()
+    }
+
     /// Bytes of the answer.
     pub(crate) fn bytes(&self) -> u64 {
         let bodies = size_of::<OfBody>() * self.bodies.capacity();
@@ -159,7 +169,7 @@ impl std::fmt::Debug for SafeDistances {
     /// How many vertices and touching pairs there are.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let mut short = f.debug_struct("SafeDistances");
-        short.field("n_vertices", &(self.singles.len() + self.doubles.len()));
+        short.field("n_vertices", &self.n_vertices());
         short.field("n_touching", &self.touching.len());
         short.finish_non_exhaustive()
     }

@@ -18,7 +18,19 @@ those under the names of ipc-toolkit.
 """
 
 from . import ipc, ray, tiles
-from ._answers import Advance, Candidates, Impact, Impacts, Nearest, NearPairs, Pairs, Stats
+from ._answers import (
+    Advance,
+    Candidates,
+    Csr,
+    Impact,
+    Impacts,
+    Nearest,
+    NearPairs,
+    Neighbours,
+    Pairs,
+    SafeDistances,
+    Stats,
+)
 from ._check import check
 from ._detector import Detector
 from ._errors import (
@@ -62,6 +74,7 @@ __all__ = [
     "Candidates",
     "CollisionManager",
     "Contacts",
+    "Csr",
     "Detector",
     "DeviceError",
     "DeviceInfo",
@@ -73,10 +86,12 @@ __all__ = [
     "Mesh",
     "NearPairs",
     "Nearest",
+    "Neighbours",
     "OutOfMemory",
     "Pairs",
     "Penetration",
     "Query",
+    "SafeDistances",
     "Scene",
     "Seam",
     "Stats",

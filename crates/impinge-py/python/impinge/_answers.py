@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn, SupportsIndex, overload
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, NoReturn, SupportsIndex, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -19,11 +19,14 @@ if TYPE_CHECKING:
 __all__ = [
     "Advance",
     "Candidates",
+    "Csr",
     "Impact",
     "Impacts",
     "Nearest",
     "NearPairs",
+    "Neighbours",
     "Pairs",
+    "SafeDistances",
     "Stats",
 ]
 
@@ -497,6 +500,141 @@ class NearPairs(_OfKinds):
             A part of the same answer, which is not copied.
         """
         return NearPairs(self._inner.of(kind))
+
+
+class SafeDistances:
+    """How far each vertex may move, on any path, so that nothing touches."""
+
+    __slots__ = ("_inner",)
+
+    def __init__(self, inner: _impinge.SafeDistances) -> None:
+        self._inner = inner
+
+    def of(self, body: _Body) -> npt.NDArray[np.floating[Any]]:
+        """The bounds of the vertices of a body, in the unit of the scene, rounded down.
+
+        Parameters
+        ----------
+        body : Body or int
+
+        Returns
+        -------
+        numpy.ndarray, shape (v,), float32 or float64 as the positions of the body
+
+        Raises
+        ------
+        ValueError, TypeError
+            A body that was not in the scene.
+        """
+        return self._inner.of(body)
+
+    @property
+    def touching(self) -> NearPairs:
+        """NearPairs : the pairs at distance 0, or nearer than their bodies are thick, whose vertices may not move at all."""
+        return NearPairs(self._inner.touching())
+
+    @property
+    def stats(self) -> Stats:
+        """Stats : what the answer cost."""
+        return Stats(**self._inner.stats())
+
+    def __reduce__(self) -> NoReturn:
+        raise TypeError("SafeDistances name bodies of a live scene: pickle their arrays")
+
+    def __repr__(self) -> str:
+        return f"SafeDistances({self._inner.n_vertices()} vertices, {self._inner.n_touching()} touching pairs)"
+
+
+class Csr(NamedTuple):
+    """Compressed sparse rows: the neighbours of element ``i`` are ``indices[offsets[i]:offsets[i + 1]]``, ascending.
+
+    `distances` are in the unit of the scene and rounded down: below the distance by at most 2**-20 of it, and 0 if and only if
+    the elements touch. With SciPy, ``csr_array((csr.distances, csr.indices, csr.offsets), shape=(n, m))`` is a matrix.
+    """
+
+    offsets: npt.NDArray[np.uint64]
+    indices: npt.NDArray[np.uint32]
+    distances: npt.NDArray[np.float64]
+
+
+class Neighbours:
+    """Which elements are near each element: the pairs of `Detector.near` as lists.
+
+    ``len(neighbours)`` is the number of pairs. The vertices of all bodies are numbered one after another in the order of the bodies,
+    and so are the edges and the faces: `first`.
+    """
+
+    __slots__ = ("_inner", "_lists")
+
+    def __init__(self, inner: _impinge.Neighbours) -> None:
+        self._inner = inner
+        self._lists: dict[tuple[str, bool], Csr] = {}
+
+    def of(self, kind: _PairKind, *, reverse: bool = False) -> Csr:
+        """The lists of a kind of pairs: of ``"vf"``, the faces near each vertex, or with `reverse` the vertices near each face.
+
+        Parameters
+        ----------
+        kind : {"vf", "ee", "ev", "vv", "ef", "ff"}
+        reverse : bool
+
+        Returns
+        -------
+        Csr
+            Arrays that are made once.
+        """
+        if (kind, reverse) not in self._lists:
+            arrays = self._inner.lists(kind, bool(reverse))
+            self._lists[kind, reverse] = Csr(*map(_locked, arrays))
+        return self._lists[kind, reverse]
+
+    @property
+    def vf(self) -> Csr:
+        """Csr : the faces near each vertex."""
+        return self.of("vf")
+
+    @property
+    def fv(self) -> Csr:
+        """Csr : the vertices near each face."""
+        return self.of("vf", reverse=True)
+
+    @property
+    def ee(self) -> Csr:
+        """Csr : the edges near each edge; a pair is in the lists of both."""
+        return self.of("ee")
+
+    def first(self, body: _Body, part: Literal["vertices", "edges", "faces"]) -> int:
+        """The number of the first vertex, edge or face of a body in the lists.
+
+        Parameters
+        ----------
+        body : Body or int
+        part : {"vertices", "edges", "faces"}
+
+        Returns
+        -------
+        int
+
+        Raises
+        ------
+        ValueError, TypeError
+            A body that was not in the scene.
+        """
+        return self._inner.first(body, part)
+
+    @property
+    def stats(self) -> Stats:
+        """Stats : what the answer cost."""
+        return Stats(**self._inner.stats())
+
+    def __len__(self) -> int:
+        return len(self._inner)
+
+    def __reduce__(self) -> NoReturn:
+        raise TypeError("Neighbours belong to a live scene: pickle their arrays")
+
+    def __repr__(self) -> str:
+        return f"Neighbours({len(self)} pairs)"
 
 
 class Candidates(_OfKinds):

@@ -8,7 +8,18 @@ from typing import TYPE_CHECKING, Any, Literal, SupportsFloat, SupportsIndex
 import numpy as np
 import numpy.typing as npt
 
-from ._answers import Advance, Candidates, Impact, Impacts, Nearest, NearPairs, Pairs, Stats
+from ._answers import (
+    Advance,
+    Candidates,
+    Impact,
+    Impacts,
+    Nearest,
+    NearPairs,
+    Neighbours,
+    Pairs,
+    SafeDistances,
+    Stats,
+)
 from ._impinge import Contacts, DetectorBase, Penetration
 
 if TYPE_CHECKING:
@@ -403,6 +414,76 @@ class Detector(DetectorBase):
         ('P_T', [0.5], [[[1.0, 1.0, 0.5], [1.0, 1.0, 0.0]]])
         """
         return NearPairs(self._near(scene, distance, options))
+
+    def safe_distances(
+        self, scene: Scene, most: SupportsFloat, **options: Unpack[Options]
+    ) -> SafeDistances:
+        """How far each vertex may move, on any path, so that nothing touches.
+
+        For each pair of elements that do not share a vertex, the largest number of the vertices of one and the largest of the other add
+        up to less than their distance, minus the thickness of both bodies (`Scene.set_thickness`). Both get half of it; what is
+        `fixed` gets 0 and leaves all of it to the other. Each number is rounded down: it is never above what the smallest distance
+        of its vertex allows, and below that by at most 2**-10 of it. Vertices of pairs that touch get 0.
+
+        So a solver may move every vertex by its number, in any direction and in any order, without a test in between. What counts is the
+        motion to the new position as it was rounded. End positions are ignored.
+
+        Parameters
+        ----------
+        scene : Scene
+        most : float
+            No number is above this length, in the unit of the scene. Pairs farther apart than twice of it play no part.
+        **options
+            As for `Query`, and ``query``, ``cancel`` and ``progress``, as for `Detector`.
+
+        Returns
+        -------
+        SafeDistances
+
+        Raises
+        ------
+        ValueError
+            A length that is negative or not finite.
+
+        Examples
+        --------
+        >>> import impinge
+        >>> scene = impinge.Scene()
+        >>> floor = scene.add([[0, 0, 0], [4, 0, 0], [0, 4, 0]], [[0, 1, 2]])
+        >>> points = scene.add_points([[1, 1, 0.5], [1, 1, 9]])
+        >>> safe = impinge.Detector("cpu").safe_distances(scene, most=1.0, fixed=[floor])
+        >>> safe.of(points).round(6).tolist(), safe.of(floor).tolist(), len(safe.touching)
+        ([0.5, 1.0], [0.0, 0.0, 0.0], 0)
+        """
+        return SafeDistances(self._safe_distances(scene, most, options))
+
+    def neighbours(
+        self, scene: Scene, distance: SupportsFloat, **options: Unpack[Options]
+    ) -> Neighbours:
+        """The pairs of `near` as lists by element, in both directions, with distances that are rounded down.
+
+        Parameters
+        ----------
+        scene, distance, **options
+            As for `near`.
+
+        Returns
+        -------
+        Neighbours
+
+        Examples
+        --------
+        >>> import impinge
+        >>> scene = impinge.Scene()
+        >>> floor = scene.add([[0, 0, 0], [4, 0, 0], [0, 4, 0]], [[0, 1, 2]])
+        >>> points = scene.add_points([[9, 9, 9], [1, 1, 0.5]])
+        >>> near = impinge.Detector("cpu").neighbours(scene, 1.0)
+        >>> near.vf.offsets.tolist(), near.vf.indices.tolist(), near.fv.indices.tolist()
+        ([0, 0, 0, 0, 0, 1], [0], [4])
+        >>> near.first(points, "vertices")
+        3
+        """
+        return Neighbours(self._neighbours(scene, distance, options))
 
     def distance(
         self, scene: Scene, a: _Body, b: _Body, **control: Unpack[Control]

@@ -40,6 +40,7 @@ class Fields(TypedDict, total=False):
     precision: Literal["f32", "f64"]
     distances: bool
     closest_points: bool
+    fixed: Iterable[_Body]
 
 
 class Control(TypedDict, total=False):
@@ -72,6 +73,7 @@ _DEFAULTS: dict[str, Any] = {
     "precision": "f32",
     "distances": False,
     "closest_points": False,
+    "fixed": (),
 }
 _SCOPE = ("which", "between", "self_of", "of")
 
@@ -130,6 +132,8 @@ class Query:
         `Detector.near`: whether to find distances, too.
     closest_points : bool
         `Detector.near`: whether to find distances and nearest points, too.
+    fixed : sequence of Body
+        `Detector.safe_distances`: bodies that do not move, and leave the whole distance to what is near them.
 
     Raises
     ------
@@ -165,6 +169,7 @@ class Query:
     precision: Literal["f32", "f64"]
     distances: bool
     closest_points: bool
+    fixed: tuple[_Body, ...]
 
     def __init__(self, **options: Unpack[Fields]) -> None:
         told: dict[str, Any] = {**options}
@@ -172,7 +177,7 @@ class Query:
         for name in ("query", "cancel", "progress"):
             if name in told:
                 raise TypeError(f"{name}: no part of a Query, but a keyword of the question")
-        for name in ("kinds", "exclude"):
+        for name in ("kinds", "exclude", "fixed"):
             # What can be read only once is read here.
             if hasattr(told.get(name), "__next__"):
                 told[name] = list(told[name])
@@ -251,6 +256,8 @@ def _canonical(name: str, value: Any) -> Any:
         return tuple(kind for kind in KINDS if kind in kinds)
     if name == "between":
         return tuple(value)
+    if name == "fixed":
+        return tuple(sorted(set(value)))
     if name == "exclude":
         pairs = list(value)
         if len(pairs) == 2 and all(hasattr(body, "__index__") for body in pairs):

@@ -1,0 +1,119 @@
+"""What penetration-free solvers ask: how far vertices may move, and neighbours by element."""
+
+import pickle
+
+import numpy as np
+import pytest
+
+import impinge
+from shapes import ball
+
+
+@pytest.fixture
+def scene():
+    """Two balls, one in single and one in double precision, with a gap of about 0.1."""
+    scene = impinge.Scene()
+    vertices, faces = ball(12, 16)
+    scene.add(vertices, faces)
+    scene.add(vertices.astype(np.float64) + [2.1, 0, 0], faces)
+    return scene
+
+
+@pytest.fixture
+def detector():
+    return impinge.Detector("cpu", threads=2)
+
+
+def test_moving_by_the_bounds_is_free(scene, detector):
+    rng = np.random.default_rng(3)
+    for _ in range(10):
+        safe = detector.safe_distances(scene, 0.2)
+        assert len(safe.touching) == 0 and repr(safe).endswith("0 touching pairs)")
+        for body in scene.bodies:
+            at = scene.positions(body)
+            bounds = safe.of(body)
+            assert bounds.dtype == at.dtype and bounds.shape == (len(at),)
+            assert (bounds > 0).all() and (bounds <= 0.2).all()
+            way = rng.normal(size=at.shape)
+            way *= (0.999 * bounds / np.linalg.norm(way, axis=1))[:, None]
+            scene.set_end_positions(body, (at + way).astype(at.dtype))
+        assert detector.is_free(scene)
+        detector.advance(scene).apply(scene)
+    assert not detector.any(scene)
+
+
+def test_fixed_bodies_leave_all_of_a_distance(scene, detector):
+    both = detector.safe_distances(scene, 0.2, which="between")
+    one = detector.safe_distances(scene, 0.2, which="between", fixed=[0])
+    query = impinge.Query(which="between", fixed=[scene.bodies[0], 0])
+    assert detector.safe_distances(scene, 0.2, query=query).of(1).tolist() == one.of(1).tolist()
+    assert query == pickle.loads(pickle.dumps(query))
+    assert not one.of(0).any()
+    near = both.of(1) < 0.2
+    assert near.any()
+    expected = np.minimum(2 * both.of(1)[near], 0.2)
+    assert np.allclose(one.of(1)[near], expected, rtol=1e-9)
+
+
+def test_touching_pairs_stand_still_and_are_named(detector):
+    scene = impinge.Scene()
+    scene.add([[0, 0, 0], [4, 0, 0], [0, 4, 0]], [[0, 1, 2]])
+    scene.add_points([[1, 1, 0], [1, 1, 0.5], [9, 9, 9]])
+    safe = detector.safe_distances(scene, 1.0, closest_points=True)
+    assert safe.touching.rows.tolist() == [[1, 0, 0, 0]] and safe.touching.points.shape == (1, 2, 3)
+    assert safe.of(0).tolist() == [0, 0, 0]
+    assert safe.of(1)[[0, 2]].tolist() == [0, 1] and 0.2499 < safe.of(1)[1] < 0.25
+    scene.set_thickness(0, 0.25)
+    safe = detector.safe_distances(scene, 1.0)
+    assert 0.1249 < safe.of(1)[1] < 0.125
+    scene.set_thickness(0, 0.5)
+    safe = detector.safe_distances(scene, 1.0)
+    assert safe.of(1).tolist() == [0, 0, 1] and len(safe.touching) == 2
+    with pytest.raises(TypeError, match="^SafeDistances name bodies of a live scene"):
+        pickle.dumps(safe)
+
+
+def test_neighbours_are_near_pairs(scene, detector):
+    near = detector.near(scene, 0.3, distances=True)
+    lists = detector.neighbours(scene, 0.3)
+    assert len(lists) == len(near) > 0 and repr(lists) == f"Neighbours({len(near)} pairs)"
+    assert [lists.first(1, part) for part in ("vertices", "edges", "faces")] == [
+        len(scene.positions(0)),
+        len(scene.edges(0)),
+        len(scene.faces(0)),
+    ]
+    for kind, parts, rows in [("vf", ("vertices", "faces"), lists.vf), ("ee", ("edges", "edges"), lists.ee)]:
+        of = near.of(kind)
+        first = np.array([[lists.first(body, part) for part in parts] for body in range(2)])
+        a = first[of.rows[:, 0], 0] + of.rows[:, 1]
+        b = first[of.rows[:, 2], 1] + of.rows[:, 3]
+        distances = of.distances
+        if kind == "ee":
+            a, b, distances = np.r_[a, b], np.r_[b, a], np.r_[distances, distances]
+        order = np.lexsort((b, a))
+        row = np.repeat(np.arange(len(rows.offsets) - 1), np.diff(rows.offsets.astype(np.int64)))
+        assert row.tolist() == a[order].tolist() and rows.indices.tolist() == b[order].tolist()
+        assert (rows.distances <= distances[order]).all()
+        assert np.allclose(rows.distances, distances[order], rtol=2**-20)
+    turned = lists.fv
+    assert turned is lists.of("vf", reverse=True) and not turned.indices.flags.writeable
+    assert len(turned.indices) == len(lists.vf.indices) and int(turned.offsets[-1]) == len(turned.indices)
+    assert np.isin(turned.indices, np.unique(np.flatnonzero(np.diff(lists.vf.offsets.astype(np.int64))))).all()
+
+
+@pytest.mark.parametrize("most", [-1, float("nan"), float("inf")])
+def test_bad_lengths_are_refused(scene, detector, most):
+    with pytest.raises(ValueError, match="^most: "):
+        detector.safe_distances(scene, most)
+
+
+def test_bad_bodies_are_refused(scene, detector):
+    with pytest.raises(ValueError, match="^fixed\\[1\\]: "):
+        detector.safe_distances(scene, 1, fixed=[0, 7])
+    with pytest.raises(TypeError, match="^fixed: a sequence of bodies expected, int given"):
+        detector.safe_distances(scene, 1, fixed=3)
+    safe = detector.safe_distances(scene, 1)
+    with pytest.raises(ValueError, match="^body: "):
+        safe.of(7)
+    with pytest.raises(ValueError, match='^part: "corners" given'):
+        detector.neighbours(scene, 1).first(0, "corners")
