@@ -584,8 +584,10 @@ class Neighbours:
             Arrays that are made once.
         """
         if (kind, reverse) not in self._lists:
-            arrays = self._inner.lists(kind, bool(reverse))
-            self._lists[kind, reverse] = Csr(*map(_locked, arrays))
+            offsets, indices, distances = self._inner.lists(kind, bool(reverse))
+            self._lists[kind, reverse] = Csr(
+                _locked(offsets), _locked(indices), _locked(distances)
+            )
         return self._lists[kind, reverse]
 
     @property
