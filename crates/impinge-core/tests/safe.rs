@@ -203,7 +203,7 @@ fn scene(seed: u64, is_lattice: bool, is_double: bool) -> (Scene, Vec<BodyId>) {
     let mut random = Random::new(seed);
     let mut scene = Scene::new();
     let mut points = |n: usize| -> Vec<[f64; 3]> {
-        let lattice = |random: &mut Random| [0; 3].map(|_| f64::from(random.below(5) as u32));
+        let lattice = |random: &mut Random| [0; 3].map(|_| f64::from(random.below(5)));
         (0..n)
             .map(|_| match is_lattice {
                 true => lattice(&mut random),
