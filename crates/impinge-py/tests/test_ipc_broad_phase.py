@@ -1,13 +1,14 @@
 """`impinge.ipc.BroadPhase` and `candidates` in the place of ipc-toolkit's own, beside its brute force."""
 
 import doctest
+import os
 import subprocess
 import sys
 
 import numpy as np
 import pytest
 
-from impinge import ipc
+from impinge import _filters, ipc
 from shapes import ball
 
 ipctk = pytest.importorskip("ipctk", reason="ipctk is not installed: no comparison with it")
@@ -162,6 +163,41 @@ def test_collisions_and_steps_are_the_same(seed):
             assert ipctk.has_intersections(mesh, at, ipc.BroadPhase()) == ipctk.has_intersections(mesh, at)
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_balls_that_approach(seed):
+    """Steps that are neither none nor whole, with a distance to keep, and what Offset Geometric Contact asks for."""
+    vertices, faces = ball(8, 12, np.float64)
+    faces = np.vstack([faces, faces + len(vertices)]).astype(np.int32)
+    random = np.random.default_rng(seed)
+    start = np.vstack([vertices, vertices + [0, 0, 2.05]])
+    start += 1e-3 * random.standard_normal(start.shape)
+    end = start + 0.05 * random.standard_normal(start.shape)
+    end[len(vertices) :, 2] -= 0.5
+    mesh = ipctk.CollisionMesh(start, ipctk.edges(faces), faces)
+    ours = ipc.BroadPhase()
+    step = ipctk.compute_collision_free_stepsize
+    for distance in [0.0, 1e-3, 1e-2]:
+        theirs = step(mesh, start, end, distance)
+        assert 0 < theirs < 0.2 and step(mesh, start, end, distance, ours) == theirs
+    # This one leaves each pair a share of its distance, however large.
+    additive = ipctk.AdditiveCCD()
+    longer = step(mesh, start, end, 0.0, ours, additive)
+    assert longer >= step(mesh, start, end, 0.0, None, additive)
+    assert ipc.is_step_collision_free(mesh, start, start + longer * (end - start))
+    regions = []
+    for broad_phase in [ours, ipctk.LBVH()]:
+        region = ipctk.ogc.TrustRegion(0.05)
+        collisions = ipctk.NormalCollisions()
+        x = np.asfortranarray(start)
+        predicted = np.asfortranarray(end)
+        region.warm_start_time_step(mesh, x, predicted, collisions, 0.05, 0.0, broad_phase)
+        regions.append((x, region.trust_region_radii, len(collisions)))
+    # But for the order of two edges, and with it the last bit of their distance.
+    np.testing.assert_allclose(regions[0][0], regions[1][0], rtol=1e-12, atol=1e-14)
+    np.testing.assert_allclose(regions[0][1], regions[1][1], rtol=1e-12)
+    assert regions[0][2] == regions[1][2] > 50
+
+
 def test_one_object_serves_many_meshes_in_turn():
     broad_phase = ipc.BroadPhase()
     for seed in [0, 1, 0, 2, 3, 4, 1]:
@@ -255,8 +291,15 @@ def one_thread():
     ipctk.set_num_threads(n_threads)
 
 
+@pytest.fixture(params=["filters looked into", "filters called"])
+def look(request, monkeypatch):
+    """Whether what filters of ipctk are is known."""
+    if request.param == "filters called":
+        monkeypatch.setattr(_filters, "_known", {})
+
+
 @pytest.mark.parametrize("seed", range(2))
-def test_filters_are_respected(seed, one_thread):
+def test_filters_are_respected(seed, one_thread, look):
     mesh, start, end = scene(seed)
     # The edges of no face are left out here: their vertices have no component.
     mesh = ipctk.CollisionMesh(start[:9], ipctk.edges(mesh.faces), mesh.faces)
@@ -286,6 +329,57 @@ def test_filters_are_respected(seed, one_thread):
     mesh.can_collide = ipctk.CollisionFilter(fails)
     with pytest.raises(KeyError, match="of the callback"):
         built(mesh, start, radius=0.1, by=ipc.BroadPhase())
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="filters are looked into on Linux")
+def test_filters_that_are_not_called():
+    n = 9
+    faces = np.array([[0, 1, 2], [1, 2, 3], [5, 6, 8]], np.int32)
+    patches = ipctk.make_vertex_patches_filter(np.array([4, 4, -1, 7, 7, 0, 0, 0, 1 << 30]))
+    known = {
+        "all": ipctk.CollisionFilter(),
+        "static": ipctk.make_static_obstacle_filter(4),
+        "no obstacle": ipctk.make_static_obstacle_filter(1 << 40),
+        "patches": patches,
+        "components": ipctk.make_connected_components_filter(faces),
+    }
+    for name, may in known.items():
+        labels, left = _filters.labels_of(may, n)
+        assert left is None, name
+        labels = np.arange(n) if labels is None else labels
+        for a in range(n):
+            # A filter may let a vertex collide with itself; elements that share one never do.
+            said = [may(a, b) for b in range(n) if b != a]
+            assert said == [labels[a] != labels[b] for b in range(n) if b != a], name
+    # Through a mesh, which has a copy, as through a broad phase.
+    mesh = ipctk.CollisionMesh(np.eye(3), ipctk.edges(faces[:1]), faces[:1])
+    assert _filters.labels_of(mesh.can_collide, 3) == (None, None)
+    mesh.can_collide = patches
+    assert _filters.labels_of(mesh.can_collide, 3)[0].tolist() == [4, 4, -1]
+    called = {
+        "sparse": ipctk.make_sparse_filter({(0, 1): False}, True),
+        "both": patches & known["static"],
+        "either": patches | known["static"],
+        "not": ~patches,
+        "of Python": ipctk.CollisionFilter(lambda a, b: True),
+        "a function": lambda a, b: True,
+        # ipctk itself would read beyond the end.
+        "too few labels": ipctk.make_vertex_patches_filter(np.zeros(n - 1, np.int32)),
+    }
+    for name, may in called.items():
+        assert _filters.labels_of(may, n) == (None, may), name
+
+
+@pytest.mark.parametrize("shift", [1, 8])
+def test_filters_are_called_where_memory_reads_otherwise(monkeypatch, shift):
+    may = ipctk.make_static_obstacle_filter(4)
+    read = _filters._read
+    # Another layout, and a system that shows no memory.
+    for wrong in [lambda at, n: read(at + shift, n), lambda at, n: os.pread(0, -1, 0)]:
+        monkeypatch.setattr(_filters, "_known", None)
+        monkeypatch.setattr(_filters, "_read", wrong)
+        assert _filters.labels_of(may, 9) == (None, may)
+        assert _filters._known == {}
 
 
 def test_candidates_as_arrays():
@@ -340,7 +434,7 @@ def test_ipctk_need_not_be_installed():
 import sys
 sys.modules["ipctk"] = None
 import numpy as np
-from impinge import ipc
+from impinge import _filters, ipc
 from impinge.ipc import *
 mesh = ipc.CollisionMesh(np.eye(3), [[0, 1], [1, 2], [0, 2]], [[0, 1, 2]])
 found = candidates(mesh, np.eye(3), inflation_radius=1.0)

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 import ipctk  # type: ignore[import-not-found, import-untyped, unused-ignore]
 import numpy as np
 
-from ._candidates import KINDS, Question, objects
+from ._candidates import Question, objects
+from ._filters import labels_of
 
 if TYPE_CHECKING:
     from ._candidates import _Mode
@@ -118,7 +119,8 @@ class BroadPhase(ipctk.BroadPhase):  # type: ignore[misc, unused-ignore]
                 "argument is the broad phase, ipctk takes its own build instead of this one.)"
             )
         rows = self._question.find(kind)
-        rows = self._question.passing(kind, rows, None, self.can_vertices_collide)
+        allowed = labels_of(self.can_vertices_collide, self._question.n_vertices)
+        rows = self._question.passing(kind, rows, *allowed)
         return objects(ipctk, kind, rows)
 
     def _mesh_of(self, vertices: Any, edges: Any, faces: Any) -> CollisionMesh:

@@ -128,6 +128,11 @@ class Question:
         self._loose = next(bodies) if len(mesh._loose) else None
         self._points = next(bodies) if len(mesh._points) else None
 
+    @property
+    def n_vertices(self) -> int:
+        """How many vertices the mesh has."""
+        return self._mesh.num_vertices
+
     def find(self, kind: str, bodies: tuple[Any, Any] | None = None) -> _Ids:
         """All pairs of a kind that share no vertex, by the mesh's numbers, as ipctk orders them.
 

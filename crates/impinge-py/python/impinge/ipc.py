@@ -48,6 +48,7 @@ from . import _impinge
 from ._candidates import Candidates, Question
 from ._detector import Detector
 from ._errors import Seam
+from ._filters import labels_of
 from ._scene import Scene
 
 if TYPE_CHECKING:
@@ -154,6 +155,7 @@ class CollisionMesh:
         self.can_collide = None
         self._local = threading.local()
         self._edge_table: tuple[npt.NDArray[np.int64], ...] | None = None
+        self._edges_are_checked = False
         self._body_edges: dict[int, npt.NDArray[np.int64]] = {}
         self._face_table: tuple[npt.NDArray[np.int64], ...] | None = None
         given = np.unique(_edge_keys(self._edges))
@@ -242,6 +244,17 @@ class CollisionMesh:
         at = np.searchsorted(keys, wanted)
         return np.where(keys[at] == wanted, rows[at], -1)
 
+    def _check_edges(self) -> None:
+        """Refuses a face whose edges are not among `edges`."""
+        if self._edges_are_checked:
+            return
+        sides = _edges_of(self._faces)
+        absent = self._edge_numbers(sides) < 0
+        if absent.any():
+            edge = tuple(sides[np.argmax(absent)].tolist())
+            raise ValueError(f"edges: a face has the edge {edge}, which is not among them")
+        self._edges_are_checked = True
+
     def _edges_of_body(self, body: int) -> npt.NDArray[np.int64]:
         """The rows of `edges` that the edges of a body are; -1 for those that it lacks."""
         if body not in self._body_edges:
@@ -273,17 +286,15 @@ class CollisionMesh:
         """A filter that remembers pairs."""
         return _impinge._VertexFilter([rows for _, _, rows in self._parts], None, None, True)
 
-    def _filter(self, labels: _Array | None, may: Callable[[int, int], bool] | None) -> Any:
+    def _filter(self, labels: npt.NDArray[np.int64] | None, may: Callable[[int, int], bool] | None) -> Any:
         """Which pairs of elements collide; `None` if all do that share no vertex of a body."""
         if labels is None and may is None and not self._is_mixed:
             return None
         rows = [rows for _, _, rows in self._parts]
-        return _impinge._VertexFilter(rows, self._labels(labels), may)
+        return _impinge._VertexFilter(rows, labels, may)
 
-    def _labels(self, labels: _Array | None) -> npt.NDArray[np.int64] | None:
+    def _labels(self, labels: _Array) -> npt.NDArray[np.int64]:
         """Labels of vertices, which are checked."""
-        if labels is None:
-            return None
         given = np.asarray(labels)
         if given.dtype.kind not in "iu" or given.shape != (self.num_vertices,):
             shape = f"({self.num_vertices},)"
@@ -367,13 +378,9 @@ def candidates(
         ends = (_positions(ours, vertices, "vertices"),)
     else:
         ends = _ends(ours, vertices, vertices_t1, "vertices")
-    sides = _edges_of(ours._faces)
-    absent = ours._edge_numbers(sides) < 0
-    if absent.any():
-        edge = tuple(sides[np.argmax(absent)].tolist())
-        raise ValueError(f"edges: a face has the edge {edge}, which is not among them")
+    ours._check_edges()
     question = Question(ours, ends, radius, mode)
-    return Candidates(question.all_found(ours._labels(labels), _may(mesh, labels)))
+    return Candidates(question.all_found(*_allowed(ours, mesh, labels)))
 
 
 def _edge_keys(rows: npt.NDArray[Any]) -> npt.NDArray[np.int64]:
@@ -463,7 +470,7 @@ def is_step_collision_free(
     start, end, distance = _step(ours, vertices_t0, vertices_t1, min_distance)
     held = ours._held()
     scene = held.place(start, end)
-    filtered = ours._filter(labels, _may(mesh, labels))
+    filtered = ours._filter(*_allowed(ours, mesh, labels))
     return held.detector._is_free(
         scene, {"start": "verify", "separation": distance, "_filter": filtered}
     )
@@ -531,7 +538,7 @@ def compute_collision_free_stepsize(
             "clearance": _CLEARANCE,
             # With all of its distance to lose, a pair still keeps what rounding moves.
             "clearance_share": max(1 - rescaling, 1e-9),
-            "_filter": ours._filter(labels, _may(mesh, labels)),
+            "_filter": ours._filter(*_allowed(ours, mesh, labels)),
         }
         advance = held.detector._advance(scene, options)
     except Seam:
@@ -570,26 +577,29 @@ def has_intersections(
     ours = _served(mesh)
     held = ours._held()
     scene = held.place(_positions(ours, vertices, "vertices"))
-    may = _may(mesh, labels)
-    if labels is None and may is None and not ours._is_mixed:
+    own_labels, may = _allowed(ours, mesh, labels)
+    if own_labels is None and may is None and not ours._is_mixed:
         return held.detector.any(scene)
-    return _some_intersect(ours, held, labels, may)
+    return _some_intersect(ours, held, own_labels, may)
 
 
-def _may(mesh: _Mesh, labels: _Array | None) -> Callable[[int, int], bool] | None:
-    """Whether vertices may collide, as the mesh says; labels take its place."""
-    return mesh.can_collide if labels is None else None
+def _allowed(
+    ours: CollisionMesh, mesh: _Mesh, labels: _Array | None
+) -> tuple[npt.NDArray[np.int64] | None, Callable[[int, int], bool] | None]:
+    """Which vertices may collide: by labels, which take the place of what the mesh says, and by a function."""
+    if labels is not None:
+        return ours._labels(labels), None
+    return labels_of(mesh.can_collide, ours.num_vertices)
 
 
 def _some_intersect(
     mesh: CollisionMesh,
     held: _Held,
-    labels: _Array | None,
+    label_of: npt.NDArray[np.int64] | None,
     may: Callable[[int, int], bool] | None,
 ) -> bool:
     """Whether any pairs intersect that may collide."""
     pairs = held.detector.detect(held.scene)
-    label_of = mesh._labels(labels)
     of_body = []
     for body, (_, _, rows) in enumerate(mesh._parts):
         elements = held.scene.elements(body)
