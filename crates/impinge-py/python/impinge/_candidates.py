@@ -273,7 +273,7 @@ class Question:
         if labels is not None:
             of_all = labels[np.concatenate([a, b], axis=1)]
             rows, a, b = _chosen((of_all != of_all[:, :1]).any(axis=1), rows, a, b)
-        return rows if may is None else rows[_any_may(a, b, may)]
+        return rows if may is None else rows[any_may(a, b, may)]
 
     def all_found(self, labels: npt.NDArray[np.int64] | None, may: _May) -> dict[str, _Ids]:
         """The pairs that ipctk tests in three dimensions."""
@@ -293,7 +293,7 @@ def _chosen(keep: npt.NDArray[np.bool_], *arrays: npt.NDArray[Any]) -> Any:
     return tuple(array[keep] for array in arrays)
 
 
-def _any_may(
+def any_may(
     a: npt.NDArray[np.int64], b: npt.NDArray[np.int64], may: Callable[[int, int], bool]
 ) -> npt.NDArray[np.bool_]:
     """For each row, whether any vertex of `a` may collide with any of `b`."""

@@ -45,7 +45,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _impinge
-from ._candidates import Candidates, Question
+from ._candidates import Candidates, Question, any_may
 from ._detector import Detector
 from ._errors import Seam
 from ._filters import labels_of
@@ -599,18 +599,22 @@ def _some_intersect(
     may: Callable[[int, int], bool] | None,
 ) -> bool:
     """Whether any pairs intersect that may collide."""
-    pairs = held.detector.detect(held.scene)
+    rows = held.detector.detect(held.scene).rows
     of_body = []
-    for body, (_, _, rows) in enumerate(mesh._parts):
-        elements = held.scene.elements(body)
-        of_body.append(elements if rows is None else rows[elements])
-    for body_a, a, body_b, b in pairs:
-        of_a, of_b = of_body[body_a][a].tolist(), of_body[body_b][b].tolist()
-        if body_a != body_b and set(of_a) & set(of_b):
-            continue
-        if label_of is not None and len(set(label_of[of_a + of_b].tolist())) == 1:
-            continue
-        if may is None or any(may(min(x, y), max(x, y)) for x in of_a for y in of_b):
+    for body, (_, _, own) in enumerate(mesh._parts):
+        elements = held.scene.elements(body).astype(np.int64)
+        of_body.append(elements if own is None else own[elements].astype(np.int64))
+    bodies = rows[:, [0, 2]]
+    for body_a, body_b in np.unique(bodies, axis=0):
+        of_both = rows[(bodies == [body_a, body_b]).all(axis=1)]
+        a, b = of_body[body_a][of_both[:, 1]], of_body[body_b][of_both[:, 3]]
+        keep = np.ones(len(a), bool)
+        if body_a != body_b:
+            keep &= ~(a[:, :, None] == b[:, None, :]).any(axis=(1, 2))
+        if label_of is not None:
+            labels = label_of[np.concatenate([a, b], axis=1)]
+            keep &= (labels != labels[:, :1]).any(axis=1)
+        if keep.any() and (may is None or any_may(a[keep], b[keep], may).any()):
             return True
     return False
 
