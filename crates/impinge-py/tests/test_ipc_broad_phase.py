@@ -382,6 +382,13 @@ def test_filters_are_called_where_memory_reads_otherwise(monkeypatch, shift):
         assert _filters._known == {}
 
 
+def test_filters_are_called_where_ipctk_makes_none(monkeypatch):
+    may = ipctk.make_static_obstacle_filter(4)
+    monkeypatch.setattr(_filters, "_known", None)
+    monkeypatch.delattr(ipctk, "make_vertex_patches_filter")
+    assert _filters.labels_of(may, 9) == (None, may)
+
+
 def test_candidates_as_arrays():
     mesh, start, end = scene(0)
     found = ipc.candidates(mesh, start, end, 0.05)

@@ -92,7 +92,8 @@ def _kinds() -> dict[tuple[int, int], str]:
         is_known = sys.platform == "linux" and platform.python_implementation() == "CPython"
         try:
             _known = _found_kinds() if is_known and struct.calcsize("P") == 8 else {}
-        except _UNREADABLE:
+        except (*_UNREADABLE, AttributeError):
+            # Before version 1.6, ipctk has no such filters.
             _known = {}
     return _known
 
