@@ -28,6 +28,7 @@ pub mod workers;
 
 pub use answers::advance::Advance;
 pub use answers::candidates::Candidates;
+pub use answers::closest::{Closest, ClosestElement};
 pub use answers::impacts::{Impact, Impacts, hash_impact_rows};
 pub use answers::near::{ClosestPoints, NearIter, NearPair, NearPairs};
 pub use answers::neighbours::{Csr, Neighbours};

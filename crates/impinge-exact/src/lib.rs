@@ -76,8 +76,9 @@ pub mod internal {
     pub use crate::algebra::{Integer, unit_of};
     pub use crate::distance::{
         Approach, Keep, NearestOfElements, Reach, approach, are_within_certainly,
-        closest_of_elements, distance_below, elements_are_within, elements_meet,
-        nearest_of_elements, unsure_are_within,
+        closest_of_elements, compare_point_distances, distance_below, elements_are_within,
+        elements_meet, nearest_of_elements, point_distance_below, point_distance_bounds,
+        unsure_are_within,
     };
     pub use crate::orientation::{Projection, collinear};
     pub use crate::rounding::two_sum;

@@ -131,11 +131,11 @@ pub use read::read;
 pub use impinge_core::wgpu;
 pub use impinge_core::{
     Advance, Affinity, Backend, Body, BodyId, BodyKind, Bounds, CancelToken, Candidates, Clearance,
-    ClosestPoints, Control, Csr, Detector, Element, ElementVertices, Elements, Error, Exclusion,
-    Filter, Impact, Impacts, InstructionSet, Mesh, Method, NearIter, NearPair, NearPairs,
-    Neighbours, NewPositions, PairFilter, PairKind, PairKinds, Pairs, Part, Place, Positions,
-    Precision, Progress, Query, Real, Recluster, SafeDistances, Scene, Settings, SharedVertex,
-    Stage, Start, Stats, Weld, WrongNumber, hash_impact_rows, hash_rows,
+    Closest, ClosestElement, ClosestPoints, Control, Csr, Detector, Element, ElementVertices,
+    Elements, Error, Exclusion, Filter, Impact, Impacts, InstructionSet, Mesh, Method, NearIter,
+    NearPair, NearPairs, Neighbours, NewPositions, PairFilter, PairKind, PairKinds, Pairs, Part,
+    Place, Positions, Precision, Progress, Query, Real, Recluster, SafeDistances, Scene, Settings,
+    SharedVertex, Stage, Start, Stats, Weld, WrongNumber, hash_impact_rows, hash_rows,
 };
 #[cfg(feature = "gpu")]
 pub use impinge_core::{

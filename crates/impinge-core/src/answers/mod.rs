@@ -2,6 +2,7 @@
 
 pub(crate) mod advance;
 pub(crate) mod candidates;
+pub(crate) mod closest;
 pub(crate) mod home;
 pub(crate) mod impacts;
 pub(crate) mod near;

@@ -21,6 +21,7 @@ mod steps;
 pub use resident::Gpu;
 
 use crate::answers::candidates::Candidates;
+use crate::answers::closest::Closest;
 use crate::answers::home::Home;
 use crate::answers::impacts::Impacts;
 use crate::answers::near::NearPairs;
@@ -83,6 +84,7 @@ struct Homes {
     near: Home<NearPairs>,
     neighbours: Home<Neighbours>,
     safe: Home<SafeDistances>,
+    closest: Home<Closest>,
 }
 
 impl Detector {

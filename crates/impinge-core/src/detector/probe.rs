@@ -1,8 +1,10 @@
-//! A detector's answers about points: where they lie.
+//! A detector's answers about points: where they lie, and what is nearest to them.
 
 use super::Detector;
+use crate::answers::closest::Closest;
 use crate::contact::Work;
 use crate::probe::Shared;
+use crate::query::Query;
 use crate::scene::Scene;
 use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
@@ -64,5 +66,70 @@ impl Detector {
             stats.bytes_held += probes.bytes() + topologies.bytes();
             Ok(places)
         })
+    }
+
+    /// The element that is nearest to each point, if it is at most `most` away, in the unit of the scene: with its distance, the
+    /// nearest point of it and the feature on which that lies. Elements are the faces of bodies of triangles and of tetrahedra (their
+    /// surface, so a point inside has a distance), and the edges and points of other bodies.
+    ///
+    /// Which element is nearest is decided exactly; of several at the same distance it is the lowest by body and then by
+    /// number. Distances are rounded down: never above the true one. Points are rounded to nearest.
+    ///
+    /// A query for all bodies, the default, or [`Query::of`] one or [`Query::across`] several, which then are those that are
+    /// looked at. Cost: per point a way down the tree of each body whose box may hold the nearest element.
+    ///
+    /// ```
+    /// use impinge::{Backend, Detector, Query, Scene, exact::Feature};
+    /// # fn main() -> Result<(), impinge::Error> {
+    /// let mut scene = Scene::new();
+    /// let floor = [[0.0f32, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]];
+    /// scene.add_triangles(&[[0, 1, 2]], &floor)?;
+    /// let mut detector = Detector::new(Backend::Cpu)?;
+    /// let points = [[1.0f32, 1.0, 2.0], [-3.0, 0.0, 4.0], [0.0, 0.0, 99.0]];
+    /// let closest = detector.closest(&scene, &points, 10.0, &Query::all())?;
+    /// let [first, second, third] = [0, 1, 2].map(|point| closest.get(point));
+    /// assert_eq!(first.map(|at| (at.distance, at.point)), Some((2.0, [1.0, 1.0, 0.0])));
+    /// assert_eq!(second.map(|at| (at.distance, at.feature)), Some((5.0, Feature::Vertex(0))));
+    /// assert_eq!(third, None);
+    /// # Ok(()) }
+    /// ```
+    ///
+    /// # Errors
+    /// A stale id, a query about pairs, a distance that is negative or NaN, positions or points that are not finite, a memory budget
+    /// too small for the trees of the bodies.
+    pub fn closest<R: Real>(
+        &mut self,
+        scene: &Scene,
+        points: &[[R; 3]],
+        most: f64,
+        query: &Query,
+    ) -> Result<Closest, Error> {
+        let control = &self.control.clone();
+        let limits = self.settings.limits();
+        let mut closest = self.homes.closest.take();
+        let Detector {
+            runner,
+            stats: measured,
+            distances,
+            topologies,
+            probes,
+            ..
+        } = self;
+        runner.measure(measured, limits, |workers, stats| {
+            let _shift = workers.shift(points.len() as u64);
+            let work = Work { workers, control };
+            let mut shared = Shared {
+                distances,
+                topologies,
+            };
+            let asked = (query, most);
+            probes.closest(scene, asked, points, &mut closest.found, &mut shared, work)?;
+            distances.report(stats);
+            stats.bytes_held += probes.bytes() + closest.bytes();
+            Ok(())
+        })?;
+        closest.stats.clone_from(&self.stats);
+        closest.home = self.home(&self.homes.closest);
+        Ok(closest)
     }
 }

@@ -71,6 +71,17 @@ impl Boxes {
         }
     }
 
+    /// How many levels of nodes there are, the clusters among them.
+    pub fn n_levels(&self) -> usize {
+        self.levels.len()
+    }
+
+    /// The box of a node.
+    #[inline(always)]
+    pub fn node(&self, level: usize, node: usize) -> Bounds {
+        self.levels[level].at(node)
+    }
+
     /// The boxes of a cluster's elements.
     #[inline(always)]
     pub fn elements(&self, body: &Body, cluster: ClusterIx) -> &LaneBounds {

@@ -1,6 +1,7 @@
 //! Probes: where points lie, and what is nearest to them.
 //!
-//! What it does: says of points whether they are inside a body, on its surface or outside.
+//! What it does: says of points whether they are inside a body, on its surface or outside, and which element of some bodies is nearest
+//! to each of them.
 //!
 //! How: a probe is a box of its own. It goes down the tree of the body's clusters, which all questions share, past the boxes
 //! of 64 elements at a time, to the elements that it may meet. These are decided one by one with exact signs.
@@ -12,14 +13,17 @@
 
 mod border;
 mod boxes;
+mod closest;
 mod inside;
 
 use std::collections::HashMap;
 use std::sync::Arc;
 
+use crate::answers::closest::ClosestElement;
 use crate::contact::{Topologies, Work};
 use crate::proximity::Distances;
-use crate::scene::elements::BodyKind;
+use crate::query::{Query, Scope, SharedVertex};
+use crate::scene::elements::{BodyKind, Part};
 use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
 use crate::scene::positions::Real;
@@ -33,8 +37,9 @@ use boxes::Boxes;
 #[derive(Debug)]
 pub(crate) struct Probes {
     isa: Isa,
+    /// By the number of the body and the part of it.
+    boxes: HashMap<(usize, Part), Boxes>,
     /// By the number of the body.
-    boxes: HashMap<usize, Boxes>,
     borders: HashMap<usize, Border>,
 }
 
@@ -97,10 +102,10 @@ impl Probes {
                 });
             }
         }
-        self.know(scene, &[id], shared, work)?;
+        self.know(scene, &[(id, Part::Given)], shared, work)?;
         let target = Target {
             body,
-            boxes: &self.boxes[&id.index()],
+            boxes: &self.boxes[&(id.index(), Part::Given)],
         };
         let border = self.borders.get(&id.index());
         let mut places = vec![0i8; points.len()];
@@ -112,25 +117,75 @@ impl Probes {
         Ok(places)
     }
 
-    /// Refits the boxes of some bodies, and forgets removed ones.
-    fn know(
+    /// The nearest element of some bodies to each point, if it is at most a distance away: a face, or of bodies without faces an
+    /// edge or a point.
+    ///
+    /// # Errors
+    /// A query that is not about whole bodies, a distance that is none, positions or points that are not finite, cancellation.
+    pub fn closest<R: Real>(
         &mut self,
         scene: &Scene,
-        ids: &[BodyId],
+        (query, most): (&Query, f64),
+        points: &[[R; 3]],
+        found: &mut Vec<Option<ClosestElement>>,
         shared: &mut Shared<'_>,
         work: Work<'_>,
     ) -> Result<(), Error> {
-        self.boxes.retain(|&slot, _| scene.holds(slot));
+        if most.is_nan() || most < 0.0 {
+            return Err(Error::Setting {
+                setting: "most",
+                given: most.to_string(),
+                allowed: "a length of at least 0, or infinity",
+            });
+        }
+        check_points("points", points)?;
+        let mut parts = Vec::new();
+        for id in targets(scene, query)? {
+            let body = scene.body(id)?;
+            let part = match body.kind() {
+                BodyKind::Tetrahedra => Part::Faces,
+                _ => Part::Given,
+            };
+            parts.push((id, part));
+        }
+        self.know(scene, &parts, shared, work)?;
+        let mut bodies = Vec::with_capacity(parts.len());
+        for &(id, part) in &parts {
+            let target = Target {
+                body: scene.body(id)?,
+                boxes: &self.boxes[&(id.index(), part)],
+            };
+            bodies.push((id, target));
+        }
+        found.clear();
+        found.resize(points.len(), None);
+        let size = work.workers.task(TASK);
+        let mut tasks: Vec<_> = points.chunks(size).zip(found.chunks_mut(size)).collect();
+        work.each(&mut tasks, |_, (points, found)| {
+            closest::closest(self.isa, &bodies, points, most, found, work)
+        })
+    }
+
+    /// Refits the boxes of some parts of bodies, and forgets removed bodies.
+    fn know(
+        &mut self,
+        scene: &Scene,
+        parts: &[(BodyId, Part)],
+        shared: &mut Shared<'_>,
+        work: Work<'_>,
+    ) -> Result<(), Error> {
+        self.boxes.retain(|&(slot, _), _| scene.holds(slot));
         self.borders.retain(|&slot, _| scene.holds(slot));
         shared.distances.begin(scene);
-        for &id in ids {
+        for &(id, part) in parts {
             work.step()?;
-            let tree = shared.distances.tree(scene, id, work.workers)?;
+            let tree = shared.distances.tree(scene, (id, part), work.workers)?;
             let stamp = scene.body(id)?.positions_stamp();
-            let known = self.boxes.get(&id.index());
+            let name = (id.index(), part);
+            let known = self.boxes.get(&name);
             if !known.is_some_and(|boxes| boxes.fits(&tree.clustering, stamp)) {
                 let boxes = Boxes::new(Arc::clone(&tree.clustering), stamp, tree.levels());
-                self.boxes.insert(id.index(), boxes);
+                self.boxes.insert(name, boxes);
             }
         }
         Ok(())
@@ -144,6 +199,34 @@ impl Probes {
             self.borders.insert(id.index(), border);
         }
         Ok(())
+    }
+}
+
+/// The bodies that a query is about: all, or those that it names with [`Query::of`] and [`Query::across`].
+fn targets(scene: &Scene, query: &Query) -> Result<Vec<BodyId>, Error> {
+    let refused = |setting, given: &str| {
+        Err(Error::Setting {
+            setting,
+            given: given.to_owned(),
+            allowed: "all bodies, or those that are named by `of` or `across`",
+        })
+    };
+    if query.cell.is_some() {
+        return refused("owned_by", "a cell");
+    }
+    if query.kinds.is_some() {
+        return refused("kinds", "kinds of pairs");
+    }
+    if !query.excluded.is_empty() {
+        return refused("exclude", "pairs of bodies");
+    }
+    if query.shared_vertex != SharedVertex::default() {
+        return refused("shared_vertex", query.shared_vertex.name());
+    }
+    match query.scope {
+        Scope::All { between: true, .. } => Ok(scene.bodies().map(|(id, _)| id).collect()),
+        Scope::Across { .. } => Ok(query.across.iter().copied().collect()),
+        _ => refused("query", "pairs of two bodies, or self-collision"),
     }
 }
 

@@ -45,8 +45,8 @@ pub(crate) struct Distances {
     clusterings: Clusterings,
     /// What was clustered.
     stats: Stats,
-    /// By the number of the body.
-    trees: HashMap<usize, Tree>,
+    /// By the number of the body and the part of it.
+    trees: HashMap<(usize, Part), Tree>,
     /// The pair found last, by the numbers of the bodies.
     last: HashMap<[usize; 2], [ElementIx; 2]>,
     /// A tree over the bodies of the last question about many.
@@ -117,7 +117,7 @@ impl Distances {
 
     /// Forgets removed bodies: to be called first in each question.
     pub fn begin(&mut self, scene: &Scene) {
-        self.trees.retain(|&slot, _| scene.holds(slot));
+        self.trees.retain(|&(slot, _), _| scene.holds(slot));
         drop(self.clusterings.open(scene));
         self.stats.clear();
     }
@@ -143,11 +143,11 @@ impl Distances {
         self.begin(scene);
         for id in [a, b] {
             control.step(0, 1)?;
-            self.know(scene, id, workers)?;
+            self.know(scene, id, Part::Given, workers)?;
         }
         let bodies = [scene.body(a)?, scene.body(b)?];
         let boxed = [a, b].into_iter().map(|id| {
-            let tree = &self.trees[&id.index()];
+            let tree = &self.trees[&(id.index(), Part::Given)];
             tree.root()
                 .map_or(0.0, |root| tree.bounds(root).magnitude())
         });
@@ -200,7 +200,7 @@ impl Distances {
             control,
             ids,
             bodies: [scene.body(a)?, scene.body(b)?],
-            trees: ids.map(|id| &self.trees[&id.index()]),
+            trees: ids.map(|id| &self.trees[&(id.index(), Part::Given)]),
             scale,
         };
         let numbers = ids.map(BodyId::index);
@@ -262,7 +262,7 @@ impl Distances {
             n_asked += 1;
             control.step(n_asked, n_asked + 1)?;
             for id in ids {
-                self.know(scene, id, workers)?;
+                self.know(scene, id, Part::Given, workers)?;
             }
             let ask = || touching(ids);
             let found = self.search_or_ask(scene, ids, (scale, most), control, ask)?;
@@ -339,10 +339,10 @@ impl Distances {
             control.step(0, 1)?;
             let ids = pair.map(|part| plan.part(part).id);
             for id in ids {
-                self.know(scene, id, workers)?;
+                self.know(scene, id, Part::Given, workers)?;
             }
             let bodies = pair.map(|part| plan.body(scene, part));
-            let trees = ids.map(|id| &self.trees[&id.index()]);
+            let trees = ids.map(|id| &self.trees[&(id.index(), Part::Given)]);
             any = meet(bodies, trees, &mut allowance, &mut self.stack);
             Ok(any != Some(false))
         });
@@ -358,16 +358,28 @@ impl Distances {
         stats.bytes_held = (self.clusterings.bytes() + beside) as u64;
     }
 
-    /// The tree of a body in its current pose.
+    /// The tree of a part of a body in its current pose.
     ///
     /// # Errors
     /// A stale id, bad positions that were written in place.
-    pub fn tree(&mut self, scene: &Scene, id: BodyId, workers: &Workers) -> Result<&Tree, Error> {
-        self.know(scene, id, workers)?;
-        Ok(&self.trees[&id.index()])
+    pub fn tree(
+        &mut self,
+        scene: &Scene,
+        (id, part): (BodyId, Part),
+        workers: &Workers,
+    ) -> Result<&Tree, Error> {
+        let part = scene.body(id)?.canonical(part);
+        self.know(scene, id, part, workers)?;
+        Ok(&self.trees[&(id.index(), part)])
     }
 
-    fn know(&mut self, scene: &Scene, id: BodyId, workers: &Workers) -> Result<(), Error> {
+    fn know(
+        &mut self,
+        scene: &Scene,
+        id: BodyId,
+        part: Part,
+        workers: &Workers,
+    ) -> Result<(), Error> {
         let body = scene.body(id)?;
         if !body.is_checked() {
             match body.positions() {
@@ -375,10 +387,13 @@ impl Distances {
                 Positions::F64(positions) => check_positions(id, positions)?,
             }
         }
-        let body_part = BodyPart::new(id, body, Part::Given);
+        let body_part = BodyPart::new(id, body, part);
         let (slot, stats) = (id.index(), &mut self.stats);
-        let known = self.trees.remove(&slot).filter(|tree| tree.fits(body));
-        if known.is_none() {
+        let known = self
+            .trees
+            .remove(&(slot, part))
+            .filter(|tree| tree.fits(body));
+        if known.is_none() && part == Part::Given {
             self.last.retain(|numbers, _| !numbers.contains(&slot));
         }
         let own = known.as_ref().map(|tree| &tree.clustering);
@@ -394,7 +409,7 @@ impl Distances {
                 tree.fit.note(tree.spread());
             }
         }
-        self.trees.insert(slot, tree);
+        self.trees.insert((slot, part), tree);
         Ok(())
     }
 }

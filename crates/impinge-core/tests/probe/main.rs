@@ -1,4 +1,5 @@
 //! Points and rays: every decision held against rational arithmetic.
 
+mod closest;
 mod inside;
 mod oracle;

@@ -107,3 +107,66 @@ pub fn winding(p: &Vector, faces: &[[Vector; 3]], random: &mut Random) -> i32 {
         return sum;
     }
 }
+
+/// A fraction of squares of units; the denominator is positive.
+#[derive(Debug, Clone)]
+pub struct Fraction(pub IBig, pub IBig);
+
+impl Fraction {
+    pub fn compare(&self, other: &Fraction) -> std::cmp::Ordering {
+        (&self.0 * &other.1).cmp(&(&other.0 * &self.1))
+    }
+
+    fn lesser(self, other: Fraction) -> Fraction {
+        if other.compare(&self).is_lt() {
+            other
+        } else {
+            self
+        }
+    }
+
+    /// How the square root, in multiples of the unit, compares with a float.
+    pub fn compare_root(&self, x: f64) -> std::cmp::Ordering {
+        let x = whole(x);
+        self.0.cmp(&(&(&x * &x) * &self.1))
+    }
+}
+
+fn to_segment(p: &Vector, a: &Vector, b: &Vector) -> Fraction {
+    let (way, to) = (sub(b, a), sub(p, a));
+    let (along, length) = (dot(&way, &to), dot(&way, &way));
+    if along <= IBig::ZERO {
+        return Fraction(dot(&to, &to), IBig::ONE);
+    }
+    if along >= length {
+        let to = sub(p, b);
+        return Fraction(dot(&to, &to), IBig::ONE);
+    }
+    let moment = cross(&way, &to);
+    Fraction(dot(&moment, &moment), length)
+}
+
+/// The square of the distance of a point from an element of one to three corners.
+pub fn squared_distance(p: &Vector, corners: &[Vector]) -> Fraction {
+    match corners {
+        [a] => to_segment(p, a, a),
+        [a, b] => to_segment(p, a, b),
+        [a, b, c] => {
+            let edges = [(a, b), (b, c), (c, a)];
+            let to_edges = edges.map(|(x, y)| to_segment(p, x, y));
+            let [first, second, third] = to_edges;
+            let least = first.lesser(second).lesser(third);
+            let normal = cross(&sub(b, a), &sub(c, a));
+            let square = dot(&normal, &normal);
+            let is_above = edges
+                .iter()
+                .all(|(x, y)| dot(&cross(&normal, &sub(y, x)), &sub(p, x)) > IBig::ZERO);
+            if square == IBig::ZERO || !is_above {
+                return least;
+            }
+            let height = dot(&normal, &sub(p, a));
+            Fraction(&height * &height, square)
+        }
+        _ => panic!("one to three corners"),
+    }
+}

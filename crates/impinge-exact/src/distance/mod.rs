@@ -20,6 +20,7 @@ mod filter;
 mod keep;
 mod moving;
 mod nearest;
+mod point;
 mod reach;
 mod rounded;
 #[cfg(test)]
@@ -37,6 +38,7 @@ pub use filter::{Approach, approach};
 pub use keep::Keep;
 pub use moving::first_within;
 pub use nearest::nearest_features;
+pub use point::{compare_point_distances, point_distance_below, point_distance_bounds};
 pub use reach::Reach;
 pub use rounded::{Closest, closest_points};
 

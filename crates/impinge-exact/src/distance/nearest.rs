@@ -134,9 +134,14 @@ impl<T: Coordinate> Polygon<T> {
 
     /// Whether the origin is at most as far away as the distance.
     pub(super) fn is_within(&self) -> bool {
+        self.compare() != Sign::Positive
+    }
+
+    /// The sign of how much farther away than the distance the origin is.
+    pub(super) fn compare(&self) -> Sign {
         let (over, under) = self.square_of_distance(self.nearest());
         let square = self.distance.product(&self.distance).widened();
-        over.minus(&square.product(&under)).sign() != Sign::Positive
+        over.minus(&square.product(&under)).sign()
     }
 
     fn after(&self, ix: usize) -> &Vector<T> {

@@ -1,0 +1,337 @@
+//! The element that is nearest to each point, by branch and bound.
+//!
+//! Nodes are opened nearest box first, and skipped if their boxes are farther away than an element certainly is. Of an
+//! element, floats that enclose its distance are found. What may be nearest by these is kept, mostly one element, or the few that share
+//! the nearest edge or vertex. Exact comparisons decide among these. So the answer does not depend on the order of the search.
+//!
+//! Neighbouring points come one after the other in most arrays. So the element found last is a first bound for the next point.
+//!
+//! Cost: per point some dozens of boxes per level of the tree, and in one or two clusters 64 boxes and a few elements.
+
+use std::cmp::Ordering;
+
+use super::Target;
+use crate::answers::closest::ClosestElement;
+use crate::answers::pairs::Element;
+use crate::bvh::bounds::Bounds;
+use crate::contact::Work;
+use crate::scene::elements::with_corners;
+use crate::scene::error::Error;
+use crate::scene::ids::BodyId;
+use crate::scene::index::{ClusterIx, ElementIx};
+use crate::scene::positions::Real;
+use crate::search::narrow::Corners;
+use crate::simd::{Isa, LaneBounds, Lanes, Simd, up_to, with_isa};
+use impinge_exact::Point;
+use impinge_exact::internal::{
+    Reach, closest_of_elements, compare_point_distances, elements_are_within, point_distance_below,
+    point_distance_bounds,
+};
+
+/// Nodes, or exact comparisons, between two looks at the control.
+const LOOK: u32 = 1 << 10;
+/// More than what rounding may do to squares of distances of boxes, which are of a few operations.
+const ROUNDING: f64 = 64.0 * f64::EPSILON;
+
+/// The nearest element to each point.
+///
+/// # Errors
+/// Cancellation.
+pub(super) fn closest<R: Real>(
+    isa: Isa,
+    bodies: &[(BodyId, Target<'_>)],
+    points: &[[R; 3]],
+    most: f64,
+    found: &mut [Option<ClosestElement>],
+    work: Work<'_>,
+) -> Result<(), Error> {
+    with_isa!(isa, all_closest, <R: Real>(
+        bodies: &[(BodyId, Target<'_>)] = bodies,
+        points: &[[R; 3]] = points,
+        most: f64 = most,
+        found: &mut [Option<ClosestElement>] = found,
+        work: Work<'_> = work,
+    ) -> Result<(), Error>)
+}
+
+#[inline(always)]
+fn all_closest<S: Simd, R: Real>(
+    _simd: S,
+    bodies: &[(BodyId, Target<'_>)],
+    points: &[[R; 3]],
+    most: f64,
+    found: &mut [Option<ClosestElement>],
+    work: Work<'_>,
+) -> Result<(), Error> {
+    let mut search = Search::new(work);
+    let mut order: Vec<(f64, usize)> = Vec::new();
+    let mut likely: Option<Candidate> = None;
+    for (point, found) in points.iter().zip(found) {
+        let point = point.map(R::widen);
+        search.begin(most);
+        if let Some(likely) = likely {
+            let [_, high] = likely.bounds(bodies, &point);
+            search.tighten(high);
+        }
+        order.clear();
+        for (number, (_, target)) in bodies.iter().enumerate() {
+            order.push((squared_distance(&target.boxes.root(), &point), number));
+        }
+        order.sort_unstable_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
+        for &(low, body) in &order {
+            if low > search.limit {
+                break;
+            }
+            search.visit(body, bodies[body].1, &point)?;
+        }
+        let nearest = search.nearest(bodies, &point)?;
+        likely = nearest.or(likely);
+        *found = nearest.and_then(|nearest| nearest.answer(bodies, &point, most));
+    }
+    Ok(())
+}
+
+/// An element that may be nearest.
+#[derive(Debug, Clone, Copy)]
+struct Candidate {
+    /// The distance is certainly not below this.
+    low: f64,
+    /// The place of the body among those that are looked at.
+    body: usize,
+    /// The place of the element in the order of the clusters.
+    slot: usize,
+}
+
+impl Candidate {
+    fn corners(&self, bodies: &[(BodyId, Target<'_>)]) -> Corners {
+        let (_, target) = &bodies[self.body];
+        corners(target, self.slot)
+    }
+
+    fn bounds(&self, bodies: &[(BodyId, Target<'_>)], point: &Point) -> [f64; 2] {
+        point_distance_bounds(point, self.corners(bodies).points())
+    }
+
+    /// The body and the element, by number.
+    fn name(&self, bodies: &[(BodyId, Target<'_>)]) -> (usize, ElementIx) {
+        let (_, target) = &bodies[self.body];
+        (self.body, target.boxes.clustering.order[self.slot])
+    }
+
+    /// What is said about it, if it is at most a distance away.
+    fn answer(
+        &self,
+        bodies: &[(BodyId, Target<'_>)],
+        point: &Point,
+        most: f64,
+    ) -> Option<ClosestElement> {
+        let corners = self.corners(bodies);
+        let corners = corners.points();
+        if most < f64::INFINITY && !elements_are_within(&[*point], corners, &Reach::from(most)) {
+            return None;
+        }
+        let (nearest, distance, points) = closest_of_elements(&[*point], corners);
+        let (body, element) = self.name(bodies);
+        Some(ClosestElement {
+            element: Element {
+                body: bodies[body].0,
+                element: element.raw(),
+            },
+            feature: nearest.features[1],
+            distance: point_distance_below(point, corners, distance),
+            point: points[1],
+        })
+    }
+}
+
+#[inline(always)]
+fn corners(target: &Target<'_>, slot: usize) -> Corners {
+    let elements = &target.boxes.clustering.corners;
+    with_corners!(elements, |all| Corners::new(
+        target.body.positions(),
+        &all[slot]
+    ))
+}
+
+/// The search for one point; the memory is kept for the next.
+struct Search<'a> {
+    work: Work<'a>,
+    n_seen: u32,
+    /// The nearest element is certainly not farther away.
+    high: f64,
+    /// Boxes whose squared distance is larger hold nothing as near.
+    limit: f64,
+    candidates: Vec<Candidate>,
+    /// Squared distances of boxes, levels and nodes that wait.
+    waiting: Vec<(f64, usize, usize)>,
+}
+
+impl<'a> Search<'a> {
+    fn new(work: Work<'a>) -> Self {
+        Search {
+            work,
+            n_seen: 0,
+            high: f64::INFINITY,
+            limit: f64::INFINITY,
+            candidates: Vec::new(),
+            waiting: Vec::new(),
+        }
+    }
+
+    fn begin(&mut self, most: f64) {
+        self.candidates.clear();
+        (self.high, self.limit) = (f64::INFINITY, f64::INFINITY);
+        self.tighten(most);
+    }
+
+    #[inline(always)]
+    fn tighten(&mut self, high: f64) {
+        if high < self.high {
+            self.high = high;
+            self.limit = high * high * (1.0 + ROUNDING) + f64::MIN_POSITIVE;
+        }
+    }
+
+    /// To be called now and then.
+    ///
+    /// # Errors
+    /// Cancellation.
+    #[inline(always)]
+    fn step(&mut self) -> Result<(), Error> {
+        self.n_seen += 1;
+        if self.n_seen == LOOK {
+            self.n_seen = 0;
+            self.work.step()?;
+        }
+        Ok(())
+    }
+
+    /// Adds the elements of a body that may be nearest.
+    #[inline(always)]
+    fn visit(&mut self, body: usize, target: Target<'_>, point: &Point) -> Result<(), Error> {
+        let boxes = target.boxes;
+        self.waiting.clear();
+        if let Some(top) = boxes.n_levels().checked_sub(1) {
+            self.waiting.push((0.0, top, 0));
+        }
+        while let Some((low, level, node)) = self.waiting.pop() {
+            if low > self.limit {
+                continue;
+            }
+            self.step()?;
+            if level == 0 {
+                self.compare(body, target, ClusterIx::new(node as u32), point);
+                continue;
+            }
+            let first = self.waiting.len();
+            for child in boxes.clustering.shape.children(level, node) {
+                let low = squared_distance(&boxes.node(level - 1, child), point);
+                if low > self.limit {
+                    continue;
+                }
+                // The nearest is popped first.
+                let mut place = self.waiting.len();
+                self.waiting.push((low, level - 1, child));
+                while place > first && self.waiting[place - 1].0 < low {
+                    self.waiting.swap(place - 1, place);
+                    place -= 1;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Adds the elements of a cluster that may be nearest.
+    #[inline(always)]
+    fn compare(&mut self, body: usize, target: Target<'_>, cluster: ClusterIx, point: &Point) {
+        let slots = target.boxes.clustering.slots(cluster);
+        let lows = squared_distances(target.boxes.elements(target.body, cluster), point);
+        // The nearest box first: then most others are too far away.
+        let mut nearest = 0;
+        let mut mask = 0u64;
+        for lane in 0..slots.len() {
+            mask |= u64::from(lows[lane] <= self.limit) << lane;
+            if lows[lane] < lows[nearest] {
+                nearest = lane;
+            }
+        }
+        if mask >> nearest & 1 == 0 {
+            return;
+        }
+        let rest = mask & up_to(slots.len() - 1) & !(1 << nearest);
+        for lane in std::iter::once(nearest).chain(Lanes(rest)) {
+            if lows[lane] > self.limit {
+                continue;
+            }
+            let slot = slots.start + lane;
+            let corners = corners(&target, slot);
+            let [low, high] = point_distance_bounds(point, corners.points());
+            if low > self.high {
+                continue;
+            }
+            if high < self.high {
+                self.tighten(high);
+                self.candidates.retain(|other| other.low <= high);
+            }
+            self.candidates.push(Candidate { low, body, slot });
+        }
+    }
+
+    /// The nearest of the candidates, of several the lowest.
+    ///
+    /// # Errors
+    /// Cancellation.
+    fn nearest(
+        &mut self,
+        bodies: &[(BodyId, Target<'_>)],
+        point: &Point,
+    ) -> Result<Option<Candidate>, Error> {
+        let mut candidates = std::mem::take(&mut self.candidates);
+        candidates.sort_unstable_by_key(|candidate| candidate.name(bodies));
+        let mut best: Option<Candidate> = None;
+        for &candidate in &candidates {
+            if let Some(best) = best {
+                self.step()?;
+                let [other, corners] = [candidate, best].map(|one| one.corners(bodies));
+                let order = compare_point_distances(point, other.points(), corners.points());
+                if order != Ordering::Less {
+                    continue;
+                }
+            }
+            best = Some(candidate);
+        }
+        self.candidates = candidates;
+        Ok(best)
+    }
+}
+
+/// The square of a point's distance from a box, rounded.
+#[inline(always)]
+fn squared_distance(bounds: &Bounds, point: &Point) -> f64 {
+    let mut sum = 0.0;
+    for axis in 0..3 {
+        sum += squared_gap(bounds.min[axis], bounds.max[axis], point[axis]);
+    }
+    sum
+}
+
+/// The squares of a point's distances from the boxes of a cluster, rounded.
+#[inline(always)]
+fn squared_distances(lanes: &LaneBounds, point: &Point) -> [f64; 64] {
+    let mut sums = [0.0; 64];
+    for axis in 0..3 {
+        let (min, max) = (&lanes.min[axis], &lanes.max[axis]);
+        for (lane, sum) in sums.iter_mut().enumerate() {
+            *sum += squared_gap(min[lane], max[lane], point[axis]);
+        }
+    }
+    sums
+}
+
+#[inline(always)]
+fn squared_gap(min: f32, max: f32, x: f64) -> f64 {
+    let (below, above) = (f64::from(min) - x, x - f64::from(max));
+    let gap = if below > above { below } else { above };
+    let gap = if gap > 0.0 { gap } else { 0.0 };
+    gap * gap
+}

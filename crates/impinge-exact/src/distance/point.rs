@@ -1,0 +1,107 @@
+//! Which of two elements is nearer to a point, and how near an element is at least.
+//!
+//! Between two elements exact fractions decide. For searches there are floats that certainly enclose a distance.
+
+use core::cmp::Ordering;
+
+use super::features::PolygonPart;
+use super::filter;
+use super::nearest::Polygon;
+use super::reach::Reach;
+use crate::algebra::Integer;
+use crate::element_pair::ElementPair;
+use crate::{Point, Sign};
+
+/// A point and an element of one to three corners as a pair of elements. A longer list counts as its first three corners.
+fn paired(point: &Point, corners: &[Point]) -> (ElementPair, [Point; 4]) {
+    let pair = match corners.len() {
+        0 | 1 => ElementPair::VertexVertex,
+        2 => ElementPair::VertexEdge,
+        _ => ElementPair::VertexFace,
+    };
+    let mut points = [*point; 4];
+    for (to, from) in points[1..].iter_mut().zip(corners) {
+        *to = *from;
+    }
+    (pair, points)
+}
+
+/// Two numbers between which the distance of a point from an element of one to three corners certainly is.
+#[inline]
+pub fn point_distance_bounds(point: &Point, corners: &[Point]) -> [f64; 2] {
+    let (pair, points) = paired(point, corners);
+    filter::bounds(pair, &points).unwrap_or([0.0, f64::INFINITY])
+}
+
+/// The largest float that is at most the distance of a point from an element of one to three corners, given that distance
+/// rounded in any way: an estimate that is far off takes long. The largest finite float if the distance is larger.
+///
+/// 0 where they touch, and for distances below the smallest float.
+pub fn point_distance_below(point: &Point, corners: &[Point], rounded: f64) -> f64 {
+    let (pair, points) = paired(point, corners);
+    let is_below = |distance: f64| {
+        let reach = Reach::from(distance);
+        let sign = match Polygon::short(pair, &points, &reach) {
+            Some(polygon) => polygon.compare(),
+            None => Polygon::of_any_size(pair, &points, &reach).compare(),
+        };
+        sign != Sign::Negative
+    };
+    let mut distance = rounded.clamp(0.0, f64::MAX);
+    if is_below(distance) {
+        let mut next = distance.next_up();
+        while next < f64::INFINITY && is_below(next) {
+            (distance, next) = (next, next.next_up());
+        }
+        return distance;
+    }
+    while distance > 0.0 {
+        distance = distance.next_down();
+        if is_below(distance) {
+            break;
+        }
+    }
+    distance
+}
+
+/// Which of two elements of one to three corners is nearer to a point: exact.
+pub fn compare_point_distances(point: &Point, a: &[Point], b: &[Point]) -> Ordering {
+    // Features in common are met often: neighbours share the edge or the vertex that is nearest.
+    if let (Some(of_a), Some(of_b)) = (shared_feature(point, a), shared_feature(point, b))
+        && of_a == of_b
+    {
+        return Ordering::Equal;
+    }
+    let square = |corners: &[Point]| {
+        let (pair, points) = paired(point, corners);
+        let polygon = Polygon::of_any_size(pair, &points, &Reach::from(0.0));
+        let (over, under) = polygon.square_of_distance(polygon.nearest());
+        (over, under, 2 * polygon.exponent)
+    };
+    let ((x, y, i), (z, w, j)) = (square(a), square(b));
+    let least = i.min(j);
+    let shifted =
+        |x: Integer, by: i64| x.shifted(u64::try_from(by - least).expect("not below the least"));
+    let left = shifted(&x * &w, i);
+    let right = shifted(&z * &y, j);
+    (&left - &right).sign().order()
+}
+
+/// The ends of the edge, or twice the vertex, that is nearest; none for the inside of a face, and where floats cannot tell.
+fn shared_feature(point: &Point, corners: &[Point]) -> Option<[Point; 2]> {
+    let (pair, points) = paired(point, corners);
+    let n = pair.corners().len();
+    match filter::nearest_part(pair, &points)? {
+        PolygonPart::Face => None,
+        PolygonPart::Corner(ix) => Some([points[1 + ix]; 2]),
+        PolygonPart::Edge(ix) => {
+            let ends = [points[1 + ix], points[1 + (ix + 1) % n]];
+            // One name for both directions.
+            Some(if ends[0] < ends[1] {
+                ends
+            } else {
+                [ends[1], ends[0]]
+            })
+        }
+    }
+}
