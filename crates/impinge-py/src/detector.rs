@@ -12,6 +12,7 @@ use pyo3::types::PyDict;
 use crate::answers::{Advance, Candidates, Impacts, Pairs, Row, impact};
 use crate::arrays::{PositionArray, Rows};
 use crate::bodies::Body;
+use crate::closest::Closest;
 use crate::contact::{Contacts, Penetration};
 use crate::errors::{invalid, raise};
 use crate::near::Near;
@@ -295,6 +296,26 @@ impl DetectorBase {
             },
         )?;
         Ok(PyArray1::from_vec(slf.py(), asked.answer))
+    }
+
+    fn _closest(
+        slf: &Bound<'_, Self>,
+        scene: &Bound<'_, PyAny>,
+        points: &Bound<'_, PyAny>,
+        most: &Bound<'_, PyAny>,
+        keywords: Keywords<'_, '_>,
+    ) -> PyResult<Closest> {
+        let points = PositionArray::new(points, "points")?;
+        let points = points.rows()?;
+        let most = number(most, "most")?;
+        let options = Options::new(keywords)?;
+        let asked = ask(slf, scene, options, |detector, scene, query| match points {
+            Rows::F32(points) => detector.closest(scene, points, most, query),
+            Rows::F64(points) => detector.closest(scene, points, most, query),
+        })?;
+        Ok(Closest {
+            inner: asked.answer,
+        })
     }
 
     fn _contacts(

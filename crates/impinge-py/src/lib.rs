@@ -6,6 +6,7 @@
 mod answers;
 mod arrays;
 mod bodies;
+mod closest;
 mod contact;
 mod datasets;
 mod detector;
@@ -39,6 +40,8 @@ mod _impinge {
     use super::answers::{Advance, Candidates, Impacts, Pairs};
     #[pymodule_export]
     use super::bodies::Body;
+    #[pymodule_export]
+    use super::closest::Closest;
     #[pymodule_export]
     use super::contact::{Contacts, Penetration};
     #[pymodule_export]

@@ -142,7 +142,7 @@ impl Near {
 }
 
 /// The number of a feature.
-fn number(feature: Feature) -> u8 {
+pub fn number(feature: Feature) -> u8 {
     match feature {
         Feature::Vertex(ix) => ix % 3,
         Feature::Edge(ix) => 3 + ix % 3,

@@ -76,3 +76,44 @@ def test_contains_is_stopped():
     with pytest.raises(impinge.Cancelled):
         detector.contains(scene, body, grid(), cancel=token)
     assert (detector.contains(scene, body, grid()) == expected(grid())).all()
+
+
+def test_closest():
+    points = grid()
+    closest = impinge.closest_points(CORNERS, CUBE, points)
+    assert len(closest) == len(points) and repr(closest) == "Closest(729 points)"
+    inner = np.clip(points, 0, 1)
+    outside = np.linalg.norm(points - inner, axis=1)
+    inside = np.minimum(inner, 1 - inner).min(1)
+    distances = np.where(expected(points) < 0, outside, inside)
+    assert np.allclose(closest.distances, distances, rtol=1e-15)
+    assert np.allclose(np.linalg.norm(closest.points - points, axis=1), distances)
+    assert closest.rows.dtype == np.uint32 and closest.rows.shape == (729, 2)
+    assert closest.rows is closest.rows and not closest.rows.flags.writeable
+    assert (closest.elements == closest.rows[:, 1]).all() and closest.elements.max() < 12
+    assert closest.features.dtype == np.uint8 and closest.features.max() < 7
+    assert isinstance(closest.hash, int) and closest.stats.n_threads >= 1
+    signed = impinge.signed_distance(CORNERS, CUBE, points)
+    assert (signed == closest.distances * expected(points)).all()
+    assert signed[expected(points) == 1].min() > 0 > signed[expected(points) == -1].max()
+
+
+def test_closest_of_some():
+    scene = impinge.Scene()
+    a = scene.add(CORNERS, CUBE)
+    b = scene.add_points(CORNERS.astype(np.float32) + 3)
+    detector = impinge.Detector("cpu")
+    points = [[0.5, 0.375, 0.75], [2.5, 3.0, 3.0], [9.0, 9.0, 9.0]]
+    closest = detector.closest(scene, points, 1.0)
+    assert closest.rows.tolist() == [[0, closest.elements[0]], [1, 0], [2**32 - 1] * 2]
+    assert closest.distances.tolist() == [0.25, 0.5, np.inf]
+    assert closest.features.tolist() == [6, 0, 255]
+    assert np.isnan(closest.points[2]).all() and closest.points[1].tolist() == [3, 3, 3]
+    assert (detector.closest(scene, points, of=b).rows[:, 0] == 1).all()
+    assert (detector.closest(scene, points, of=a).rows[:, 0] == 0).all()
+    with pytest.raises(ValueError, match="most: -1 given"):
+        detector.closest(scene, points, -1)
+    with pytest.raises(ValueError, match="named by `of`"):
+        detector.closest(scene, points, between=(a, b))
+    with pytest.raises(TypeError):
+        detector.closest(scene, points, nearest=1)

@@ -21,6 +21,7 @@ from . import ipc, ray, tiles
 from ._answers import (
     Advance,
     Candidates,
+    Closest,
     Csr,
     Impact,
     Impacts,
@@ -44,7 +45,17 @@ from ._errors import (
     Seam,
     TooManyPairs,
 )
-from ._functions import DeviceInfo, contains, devices, hash_rows, pairs, self_pairs, weld
+from ._functions import (
+    DeviceInfo,
+    closest_points,
+    contains,
+    devices,
+    hash_rows,
+    pairs,
+    self_pairs,
+    signed_distance,
+    weld,
+)
 from ._impinge import (
     FEATURES,
     KINDS,
@@ -72,6 +83,7 @@ __all__ = [
     "CancelToken",
     "Cancelled",
     "Candidates",
+    "Closest",
     "CollisionManager",
     "Contacts",
     "Csr",
@@ -98,6 +110,7 @@ __all__ = [
     "TooManyPairs",
     "__version__",
     "check",
+    "closest_points",
     "contains",
     "devices",
     "hash_rows",
@@ -107,6 +120,7 @@ __all__ = [
     "read",
     "read_bodies",
     "self_pairs",
+    "signed_distance",
     "tiles",
     "weld",
 ]

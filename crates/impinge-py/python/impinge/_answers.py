@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 __all__ = [
     "Advance",
     "Candidates",
+    "Closest",
     "Csr",
     "Impact",
     "Impacts",
@@ -661,6 +662,66 @@ class Candidates(_OfKinds):
             A part of the same answer, which is not copied.
         """
         return Candidates(self._inner.of(kind))
+
+
+class Closest:
+    """The element that is nearest to each point. ``len(closest)`` is the number of points; the attributes are arrays with one row per
+    point.
+    """
+
+    __slots__ = ("_inner", "_rows")
+
+    def __init__(self, inner: _impinge.Closest) -> None:
+        self._inner = inner
+        self._rows: npt.NDArray[np.uint32] | None = None
+
+    @property
+    def rows(self) -> npt.NDArray[np.uint32]:
+        """numpy.ndarray of uint32, shape (n, 2) : number of the body and its element: a face as it was given (of tetrahedra as in
+        `Scene.faces`), or an edge or a point of bodies that have no faces. Decided exactly; of several at the same distance the lowest.
+        4294967295 twice where nothing is as near as was asked for. Read-only, and made once.
+        """
+        if self._rows is None:
+            self._rows = _locked(self._inner.rows())
+        return self._rows
+
+    @property
+    def elements(self) -> npt.NDArray[np.uint32]:
+        """numpy.ndarray of uint32, shape (n,) : the second column of `rows`."""
+        return self.rows[:, 1]
+
+    @property
+    def distances(self) -> npt.NDArray[np.float64]:
+        """numpy.ndarray of float64, shape (n,) : distances, rounded down: never above the true one. Infinity where nothing is near."""
+        return self._inner.distances()
+
+    @property
+    def points(self) -> npt.NDArray[np.float64]:
+        """numpy.ndarray of float64, shape (n, 3) : the nearest point of the element, rounded. NaN where nothing is near."""
+        return self._inner.points()
+
+    @property
+    def features(self) -> npt.NDArray[np.uint8]:
+        """numpy.ndarray of uint8, shape (n,) : the feature of the element on which that point lies, as an index of
+        `impinge.FEATURES`. 255 where nothing is near.
+        """
+        return self._inner.features()
+
+    @property
+    def hash(self) -> int:
+        """int : a 64-bit hash of the rows in their order; equal answers have equal hashes everywhere."""
+        return self._inner.hash()
+
+    @property
+    def stats(self) -> Stats:
+        """Stats : what the answer cost."""
+        return Stats(**self._inner.stats())
+
+    def __len__(self) -> int:
+        return len(self._inner)
+
+    def __repr__(self) -> str:
+        return f"Closest({len(self)} points)"
 
 
 class Advance:

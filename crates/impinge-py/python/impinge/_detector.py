@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from math import inf
 from typing import TYPE_CHECKING, Any, Literal, SupportsFloat, SupportsIndex
 
 import numpy as np
@@ -11,6 +12,7 @@ import numpy.typing as npt
 from ._answers import (
     Advance,
     Candidates,
+    Closest,
     Impact,
     Impacts,
     Nearest,
@@ -553,6 +555,49 @@ class Detector(DetectorBase):
         if across is not None:
             asked["_across"] = across
         return _nearest(self._nearest(scene, asked))
+
+    def closest(
+        self,
+        scene: Scene,
+        points: _Array,
+        most: SupportsFloat = inf,
+        **options: Unpack[Options],
+    ) -> Closest:
+        """The element that is nearest to each point: its distance, the nearest point and the feature on which that lies. Elements are
+        the faces of bodies of triangles and of tetrahedra (their surface), and the edges and points of other bodies.
+
+        Parameters
+        ----------
+        scene : Scene
+        points : array_like, shape (n, 3)
+            Float32 or float64, taken as they are.
+        most : float
+            Elements farther away, in the unit of the scene, are not looked for.
+        **options
+            ``of=body`` looks at one body; else all are looked at. ``query``, ``cancel`` and ``progress`` as for `Detector`. Options
+            about pairs are refused.
+
+        Returns
+        -------
+        Closest
+
+        Raises
+        ------
+        ValueError
+            A distance that is negative or NaN, a point that is not finite.
+
+        Examples
+        --------
+        >>> import impinge
+        >>> scene = impinge.Scene()
+        >>> floor = scene.add([[0, 0, 0], [4, 0, 0], [0, 4, 0]], [[0, 1, 2]])
+        >>> closest = impinge.Detector("cpu").closest(scene, [[1, 1, 2], [-3, 0, 4]])
+        >>> closest.distances.tolist(), closest.points.tolist()
+        ([2.0, 5.0], [[1.0, 1.0, 0.0], [0.0, 0.0, 0.0]])
+        >>> [impinge.FEATURES[ix] for ix in closest.features]
+        ['f', 'v0']
+        """
+        return Closest(self._closest(scene, points, most, options))
 
     def contains(
         self, scene: Scene, body: _Body, points: _Array, **control: Unpack[Control]

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _impinge
+from ._answers import Closest
 from ._detector import Detector
 from ._scene import Scene
 
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
     from ._query import _Array
     from ._scene import _RowKind
 
-__all__ = ["DeviceInfo", "contains", "devices", "hash_rows", "pairs", "self_pairs", "weld"]
+__all__ = ["DeviceInfo", "closest_points", "contains", "devices", "hash_rows", "pairs", "self_pairs", "signed_distance", "weld"]
 
 
 class Settings(TypedDict, total=False):
@@ -135,6 +136,94 @@ def self_pairs(
     settings.setdefault("backend", "cpu")
     found = Detector(**settings)._detect(scene, question)
     return found.self_of(0)
+
+
+def closest_points(
+    vertices: _Array,
+    faces: _Array,
+    points: _Array,
+    *,
+    kind: _RowKind | None = None,
+    **settings: Unpack[Settings],
+) -> Closest:
+    """The face of a mesh that is nearest to each point, with the nearest point and its distance.
+
+    Parameters
+    ----------
+    vertices : array_like, shape (v, 3)
+        Positions, float32 or float64.
+    faces : array_like of int, shape (n, 3) or (n, 4)
+        Triangles, or tetrahedra, whose surface is looked at, as vertex indices.
+    points : array_like, shape (n, 3)
+        Float32 or float64, taken as they are.
+    kind : {"points", "edges", "triangles", "tetrahedra", "quads"}, optional
+        What the rows of `faces` are, as for `Scene.add`.
+    **settings
+        As for `Detector`, but for ``backend``, which is ``"cpu"`` unless it is given.
+
+    Returns
+    -------
+    Closest
+        Its `points`, `distances` and `elements` are what trimesh's ``closest_point`` returns.
+
+    Raises
+    ------
+    ValueError, TypeError
+        As `Scene.add` and `Detector.closest`.
+
+    Examples
+    --------
+    >>> import impinge
+    >>> closest = impinge.closest_points([[0, 0, 0], [4, 0, 0], [0, 4, 0]], [[0, 1, 2]], [[1, 1, 2]])
+    >>> closest.points.tolist(), closest.distances.tolist(), closest.elements.tolist()
+    ([[1.0, 1.0, 0.0]], [2.0], [0])
+    """
+    scene = Scene()
+    scene._add_named(vertices, faces, kind, ("vertices", "faces"), False)
+    settings.setdefault("backend", "cpu")
+    return Closest(Detector(**settings)._closest(scene, points, np.inf, {}))
+
+
+def signed_distance(
+    vertices: _Array,
+    faces: _Array,
+    points: _Array,
+    *,
+    weld: bool = False,
+    kind: _RowKind | None = None,
+    **settings: Unpack[Settings],
+) -> npt.NDArray[np.float64]:
+    """How far points are from the surface of a closed mesh: positive inside, negative outside, as trimesh has it.
+
+    Parameters
+    ----------
+    vertices, faces, points, weld, kind, **settings
+        As for `contains`.
+
+    Returns
+    -------
+    numpy.ndarray of float64, shape (n,)
+        0 on the surface. The sign is exact, and the magnitude is rounded down: never above the true distance.
+
+    Raises
+    ------
+    ValueError, TypeError
+        As `contains`.
+
+    Examples
+    --------
+    >>> import impinge
+    >>> corners = [[0, 0, 0], [4, 0, 0], [0, 4, 0], [0, 0, 4]]
+    >>> faces = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]
+    >>> impinge.signed_distance(corners, faces, [[1, 1, 0.5], [0, 0, 2], [-1, 0, 0]]).tolist()
+    [0.5, 0.0, -1.0]
+    """
+    scene = Scene()
+    scene._add_named(vertices, faces, kind, ("vertices", "faces"), weld)
+    settings.setdefault("backend", "cpu")
+    detector = Detector(**settings)
+    places = detector._contains(scene, 0, points, {})
+    return detector._closest(scene, points, np.inf, {}).distances() * places
 
 
 def contains(
