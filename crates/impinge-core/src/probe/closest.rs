@@ -32,6 +32,8 @@ use impinge_exact::internal::{
 const LOOK: u32 = 1 << 10;
 /// More than what rounding may do to squares of distances of boxes, which are of a few operations.
 const ROUNDING: f64 = 64.0 * f64::EPSILON;
+/// The square of the shortest way across which planes are taken.
+const SHORTEST: f64 = 1e-250;
 
 /// The nearest element to each point.
 ///
@@ -70,8 +72,8 @@ fn all_closest<S: Simd, R: Real>(
         let point = point.map(R::widen);
         search.begin(most);
         if let Some(likely) = likely {
-            let [_, high] = likely.bounds(bodies, &point);
-            search.tighten(high);
+            let ([_, high], way) = point_distance_bounds(&point, likely.corners(bodies).points());
+            search.tighten(high, way);
         }
         order.clear();
         for (number, (_, target)) in bodies.iter().enumerate() {
@@ -106,10 +108,6 @@ impl Candidate {
     fn corners(&self, bodies: &[(BodyId, Target<'_>)]) -> Corners {
         let (_, target) = &bodies[self.body];
         corners(target, self.slot)
-    }
-
-    fn bounds(&self, bodies: &[(BodyId, Target<'_>)], point: &Point) -> [f64; 2] {
-        point_distance_bounds(point, self.corners(bodies).points())
     }
 
     /// The body and the element, by number.
@@ -161,6 +159,9 @@ struct Search<'a> {
     high: f64,
     /// Boxes whose squared distance is larger hold nothing as near.
     limit: f64,
+    /// About the shortest way from that element to the point, and its length times `high`.
+    way: Point,
+    level: f64,
     candidates: Vec<Candidate>,
     /// Squared distances of boxes, levels and nodes that wait.
     waiting: Vec<(f64, usize, usize)>,
@@ -173,6 +174,8 @@ impl<'a> Search<'a> {
             n_seen: 0,
             high: f64::INFINITY,
             limit: f64::INFINITY,
+            way: [0.0; 3],
+            level: f64::INFINITY,
             candidates: Vec::new(),
             waiting: Vec::new(),
         }
@@ -181,15 +184,41 @@ impl<'a> Search<'a> {
     fn begin(&mut self, most: f64) {
         self.candidates.clear();
         (self.high, self.limit) = (f64::INFINITY, f64::INFINITY);
-        self.tighten(most);
+        (self.way, self.level) = ([0.0; 3], f64::INFINITY);
+        self.tighten(most, [0.0; 3]);
     }
 
     #[inline(always)]
-    fn tighten(&mut self, high: f64) {
+    fn tighten(&mut self, high: f64, way: Point) {
         if high < self.high {
             self.high = high;
             self.limit = high * high * (1.0 + ROUNDING) + f64::MIN_POSITIVE;
+            self.way = way;
+            let square = dot(&way, &way);
+            // The squares of shorter ways lose bits.
+            self.level = match square > SHORTEST {
+                true => high * square.sqrt() * (1.0 + ROUNDING),
+                false => f64::INFINITY,
+            };
         }
+    }
+
+    /// Whether all corners of an element are beyond a plane across the way, which is farther from the point than the nearest element.
+    /// Most elements whose boxes are near are seen to be farther so.
+    #[inline(always)]
+    fn is_beyond(&self, point: &Point, corners: &[Point]) -> bool {
+        let (mut lowest, mut size) = (f64::INFINITY, 0.0f64);
+        for corner in corners {
+            let to = [0, 1, 2].map(|k| point[k] - corner[k]);
+            lowest = lowest.min(dot(&self.way, &to));
+            size = size.max(to[0].abs() + to[1].abs() + to[2].abs());
+        }
+        let of_way = self.way[0]
+            .abs()
+            .max(self.way[1].abs())
+            .max(self.way[2].abs());
+        // Three differences, products and sums.
+        lowest - ROUNDING * of_way * size > self.level
     }
 
     /// To be called now and then.
@@ -265,12 +294,15 @@ impl<'a> Search<'a> {
             }
             let slot = slots.start + lane;
             let corners = corners(&target, slot);
-            let [low, high] = point_distance_bounds(point, corners.points());
+            if self.is_beyond(point, corners.points()) {
+                continue;
+            }
+            let ([low, high], way) = point_distance_bounds(point, corners.points());
             if low > self.high {
                 continue;
             }
             if high < self.high {
-                self.tighten(high);
+                self.tighten(high, way);
                 self.candidates.retain(|other| other.low <= high);
             }
             self.candidates.push(Candidate { low, body, slot });
@@ -303,6 +335,10 @@ impl<'a> Search<'a> {
         self.candidates = candidates;
         Ok(best)
     }
+}
+
+fn dot(p: &Point, q: &Point) -> f64 {
+    p[0] * q[0] + p[1] * q[1] + p[2] * q[2]
 }
 
 /// The square of a point's distance from a box, rounded.

@@ -20,6 +20,11 @@ pub(super) fn answer(pair: ElementPair, points: &[Point; 4], reach: &Reach) -> O
 
 /// Two numbers between which the distance of two elements certainly is; none where sizes are out of range.
 pub(super) fn bounds(pair: ElementPair, points: &[Point; 4]) -> Option<[f64; 2]> {
+    bounds_and_way(pair, points).map(|(bounds, _)| bounds)
+}
+
+/// [`bounds`], and about the shortest way from the second element to the first.
+pub(super) fn bounds_and_way(pair: ElementPair, points: &[Point; 4]) -> Option<([f64; 2], Point)> {
     let polygon = Polygon::of_pair(pair, points);
     let largest = polygon.size();
     if largest >= f64::LARGEST || largest.is_nan() {
@@ -31,7 +36,7 @@ pub(super) fn bounds(pair: ElementPair, points: &[Point; 4]) -> Option<[f64; 2]>
         .iter()
         .map(|normal| least_beyond(normal, &polygon, largest))
         .fold(0.0, f64::max);
-    Some([low, most(&near, largest)])
+    Some(([low, most(&near, largest)], near))
 }
 
 /// A distance from a plane through the origin that all corners certainly have, all on one side; 0 if that is not certain.

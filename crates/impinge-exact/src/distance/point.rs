@@ -26,11 +26,12 @@ fn paired(point: &Point, corners: &[Point]) -> (ElementPair, [Point; 4]) {
     (pair, points)
 }
 
-/// Two numbers between which the distance of a point from an element of one to three corners certainly is.
+/// Two numbers between which the distance of a point from an element of one to three corners certainly is, and about the shortest way
+/// from the element to the point.
 #[inline]
-pub fn point_distance_bounds(point: &Point, corners: &[Point]) -> [f64; 2] {
+pub fn point_distance_bounds(point: &Point, corners: &[Point]) -> ([f64; 2], Point) {
     let (pair, points) = paired(point, corners);
-    filter::bounds(pair, &points).unwrap_or([0.0, f64::INFINITY])
+    filter::bounds_and_way(pair, &points).unwrap_or(([0.0, f64::INFINITY], [0.0; 3]))
 }
 
 /// The largest float that is at most the distance of a point from an element of one to three corners, given that distance
