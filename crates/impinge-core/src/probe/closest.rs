@@ -345,8 +345,8 @@ fn dot(p: &Point, q: &Point) -> f64 {
 #[inline(always)]
 fn squared_distance(bounds: &Bounds, point: &Point) -> f64 {
     let mut sum = 0.0;
-    for axis in 0..3 {
-        sum += squared_gap(bounds.min[axis], bounds.max[axis], point[axis]);
+    for (axis, &x) in point.iter().enumerate() {
+        sum += squared_gap(bounds.min[axis], bounds.max[axis], x);
     }
     sum
 }
@@ -355,10 +355,10 @@ fn squared_distance(bounds: &Bounds, point: &Point) -> f64 {
 #[inline(always)]
 fn squared_distances(lanes: &LaneBounds, point: &Point) -> [f64; 64] {
     let mut sums = [0.0; 64];
-    for axis in 0..3 {
+    for (axis, &x) in point.iter().enumerate() {
         let (min, max) = (&lanes.min[axis], &lanes.max[axis]);
         for (lane, sum) in sums.iter_mut().enumerate() {
-            *sum += squared_gap(min[lane], max[lane], point[axis]);
+            *sum += squared_gap(min[lane], max[lane], x);
         }
     }
     sums
