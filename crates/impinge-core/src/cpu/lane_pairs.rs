@@ -116,6 +116,17 @@ impl LanePairs {
         n_kept + kept.count_ones() as usize
     }
 
+    /// Drops the candidates that a function refuses.
+    pub fn retain(&mut self, keep: impl Fn([u8; 2]) -> bool) {
+        let mut n_kept = 0;
+        for ix in 0..self.n {
+            let lanes = self.lanes(ix);
+            (self.lanes.a[n_kept], self.lanes.b[n_kept]) = (lanes[0], lanes[1]);
+            n_kept += usize::from(keep(lanes));
+        }
+        self.n = n_kept;
+    }
+
     /// Forgets all candidates but the first ones.
     #[inline(always)]
     pub fn truncate(&mut self, n: usize) {

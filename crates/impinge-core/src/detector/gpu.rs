@@ -80,7 +80,11 @@ pub(super) fn find_in_step(
     answer: StepAnswer<'_>,
     stats: &mut Stats,
 ) -> Result<ByDevice, Error> {
-    if cfg!(target_family = "wasm") || job.plan.bound() > 0.0 || job.plan.has_filter() {
+    if cfg!(target_family = "wasm")
+        || job.plan.bound() > 0.0
+        || job.plan.has_filter()
+        || job.plan.leaves_out()
+    {
         return Ok(ByDevice::Not);
     }
     let Some(on_device) = engine else {

@@ -83,7 +83,7 @@ impl Detector {
         plan: &Plan,
         control: &Control,
     ) -> Result<Option<bool>, Error> {
-        if plan.parts.len() <= 2 || !self.may_know_soon(query) {
+        if plan.parts.len() <= 2 || !self.may_know_soon(query, plan) {
             return Ok(None);
         }
         control.step(0, 1)?;
@@ -102,7 +102,7 @@ impl Detector {
         Ok(any)
     }
 
-    fn may_know_soon(&self, query: &Query) -> bool {
+    fn may_know_soon(&self, query: &Query, plan: &Plan) -> bool {
         let Settings {
             method,
             memory_budget,
@@ -122,7 +122,7 @@ impl Detector {
         #[cfg(not(feature = "gpu"))]
         let is_on_device = false;
         is_about_many
-            && query.cell.is_none()
+            && !plan.counts_late()
             && may_choose
             && memory_budget.is_none()
             && !is_on_device

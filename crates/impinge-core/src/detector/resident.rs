@@ -63,6 +63,7 @@ impl Gpu<'_> {
             });
         }
         let plan = Plan::intersections(scene, query, Goal::All, self.detector.settings.limits())?;
+        refuse_left_out(&plan)?;
         let control = Control::new();
         let job = self.detector.runner.job(scene, &plan, &control)?;
         let Some(engine) = &mut self.detector.gpu else {
@@ -143,6 +144,7 @@ impl Gpu<'_> {
             });
         };
         let plan = Plan::contacts(scene, query, Goal::All, self.detector.settings.limits())?;
+        refuse_left_out(&plan)?;
         let control = Control::new();
         let job = self.detector.runner.job(scene, &plan, &control)?;
         let resident: BTreeMap<BodyId, &wgpu::Buffer> = starts.iter().copied().collect();
@@ -186,5 +188,18 @@ impl Gpu<'_> {
             Some(engine) => engine.make_room().await,
             None => Ok(true),
         }
+    }
+}
+
+/// Frames that stay on a device leave out bodies only.
+fn refuse_left_out(plan: &Plan) -> Result<(), Error> {
+    match plan.leaves_out() {
+        false => Ok(()),
+        true => Err(Error::Setting {
+            setting: "exclude",
+            given: "rings, groups, pairs or pinned vertices in a plan that stays on a device"
+                .to_owned(),
+            allowed: "bodies",
+        }),
     }
 }

@@ -56,9 +56,9 @@ impl Plan {
         Extent::of(points).min
     }
 
-    /// Whether it is known in the end only which pairs belong to the cell. Finders of other questions look themselves.
-    pub(crate) fn is_owned_late(&self) -> bool {
-        self.question == Question::Intersection && self.cell.is_some()
+    /// Whether it is known in the end only which pairs count. Finders of other questions look themselves.
+    pub(crate) fn counts_late(&self) -> bool {
+        self.question == Question::Intersection && (self.cell.is_some() || self.leaves_out())
     }
 
     /// Whether some pairs do not count, because of their elements.
@@ -71,10 +71,12 @@ impl Plan {
         self.filter.as_ref().is_some_and(PairFilter::is_early)
     }
 
-    /// Whether a pair counts: it belongs to the cell, if there is one, and the filter lets it pass.
+    /// Whether a pair counts: it belongs to the cell, if there is one, the filter lets it pass, and it is not left out.
     #[inline(always)]
     pub fn counts(&self, scene: &Scene, key: u64) -> bool {
-        self.is_owned(scene, key) && (self.filter.is_none() || self.passes(scene, key))
+        self.is_owned(scene, key)
+            && (self.filter.is_none() || self.passes(scene, key))
+            && !(self.leaves_out() && self.is_key_left_out(scene, key))
     }
 
     #[inline(never)]

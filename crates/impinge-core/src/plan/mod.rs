@@ -19,10 +19,12 @@
 
 mod counted;
 mod distances;
+mod left_out;
 mod parts;
 
 use std::collections::BTreeSet;
 use std::ops::Range;
+use std::sync::Arc;
 
 use crate::boxes::Sweep;
 use crate::query::goal::{Goal, Limits};
@@ -156,6 +158,8 @@ pub struct Plan {
     keep: Keep,
     /// Which pairs of a step count.
     filter: Option<PairFilter>,
+    /// Which pairs are left out because of their elements.
+    left_out: Option<Arc<left_out::LeftOut>>,
     /// What happens to pairs that touch at the start of a step.
     pub(crate) start: Start,
     /// The precision of times.
@@ -188,6 +192,7 @@ impl Plan {
             _ => limits,
         };
         query.check_without_kinds()?;
+        query.check_without_pairs()?;
         query.check_without_filter()?;
         Plan::of(scene, query, Question::Intersection, goal, limits)
     }
@@ -362,6 +367,7 @@ impl Plan {
             bound: 0.0,
             keep: Keep::default(),
             filter: None,
+            left_out: None,
             start: Start::default(),
             precision: Precision::default(),
             goal,
@@ -382,6 +388,7 @@ impl Plan {
         for &part in question.parts() {
             plan.push_part(scene, query, part)?;
         }
+        plan.leave_out(scene, query)?;
         Ok(plan)
     }
 
@@ -389,7 +396,7 @@ impl Plan {
     /// one is the earliest.
     pub(crate) fn held(&self) -> Goal {
         match self.question {
-            Question::Intersection if self.cell.is_none() => self.goal,
+            Question::Intersection if !self.counts_late() => self.goal,
             _ => Goal::All,
         }
     }

@@ -2,6 +2,7 @@
 
 pub mod goal;
 pub(crate) mod pair_kind;
+pub(crate) mod pair_set;
 pub(crate) mod progress;
 mod scope;
 pub(crate) mod settings;

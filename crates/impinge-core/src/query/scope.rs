@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 
 use crate::query::pair_kind::{PairKind, PairKinds};
+use crate::query::pair_set::PairSet;
 use crate::query::step::{Clearance, PairFilter, Precision, Start, check_distance};
 use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
@@ -54,17 +55,44 @@ impl Cell {
 }
 
 /// What is left out of a query: see [`Query::exclude`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Exclusion {
-    bodies: (BodyId, BodyId),
+#[derive(Debug, Clone, PartialEq)]
+pub struct Exclusion(Excluded);
+
+#[derive(Debug, Clone, PartialEq)]
+enum Excluded {
+    Bodies(BodyId, BodyId),
+    Rings(u32),
+    Groups(u32, u32),
+    Pairs(PairSet),
+}
+
+impl Exclusion {
+    /// The most rings that can be left out.
+    pub const MOST_RINGS: u32 = 16;
+
+    /// Pairs of one body that are near each other in its surface: some vertex of one element is at most so many edges away from some
+    /// vertex of the other. 0 leaves out what shares a vertex, 1 also what an edge joins.
+    pub fn rings(n: u32) -> Self {
+        Exclusion(Excluded::Rings(n))
+    }
+
+    /// Pairs of elements of two [groups](crate::Scene::set_groups), or of one with itself: each vertex of one element and each vertex of
+    /// the other must be in such groups.
+    pub fn groups(g: u32, h: u32) -> Self {
+        Exclusion(Excluded::Groups(g.min(h), g.max(h)))
+    }
 }
 
 impl From<(BodyId, BodyId)> for Exclusion {
     /// The pairs of two bodies; with the same body twice, its self-collision.
     fn from((a, b): (BodyId, BodyId)) -> Self {
-        Exclusion {
-            bodies: (a.min(b), a.max(b)),
-        }
+        Exclusion(Excluded::Bodies(a.min(b), a.max(b)))
+    }
+}
+
+impl From<PairSet> for Exclusion {
+    fn from(pairs: PairSet) -> Self {
+        Exclusion(Excluded::Pairs(pairs))
     }
 }
 
@@ -86,6 +114,9 @@ pub struct Query {
     pub(crate) scope: Scope,
     pub(crate) shared_vertex: SharedVertex,
     pub(crate) excluded: BTreeSet<(BodyId, BodyId)>,
+    pub(crate) rings: u32,
+    pub(crate) groups: BTreeSet<(u32, u32)>,
+    pub(crate) pairs: Vec<PairSet>,
     pub(crate) cell: Option<Cell>,
     /// Only of [`Scope::Across`].
     pub(crate) across: BTreeSet<BodyId>,
@@ -113,6 +144,9 @@ impl Query {
             scope,
             shared_vertex: SharedVertex::default(),
             excluded: BTreeSet::new(),
+            rings: 0,
+            groups: BTreeSet::new(),
+            pairs: Vec::new(),
             cell: None,
             across: BTreeSet::new(),
             kinds: None,
@@ -185,9 +219,44 @@ impl Query {
         self
     }
 
-    /// Leaves pairs out: `(a, b)`, those of two bodies; `(a, a)`, the self-collision of one.
+    /// Leaves pairs out, before they are decided: `(a, b)`, those of two bodies; `(a, a)`, the self-collision of one;
+    /// [`Exclusion::rings`], what is near in the surface; [`Exclusion::groups`], groups of vertices that do not meet; the pairs of
+    /// [`near`](crate::Detector::near), those that were near at rest. Each call leaves out more.
+    ///
+    /// Besides, pairs of elements all of whose vertices are [pinned](crate::Scene::set_pinned) are left out of every query.
+    ///
+    /// [`detect`](crate::Detector::detect), [`count`](crate::Detector::count) and [`any`](crate::Detector::any) find all pairs first and
+    /// leave out rings, groups and pinned vertices then: limits count what is left out, too. They are about the elements that
+    /// bodies were given as, and refuse pairs of an answer. [`nearest`](crate::Detector::nearest) and frames that stay on a
+    /// device refuse all but bodies.
+    ///
+    /// ```
+    /// use impinge::{Backend, Detector, Exclusion, Query, Scene};
+    /// # fn main() -> Result<(), impinge::Error> {
+    /// let mut scene = Scene::new();
+    /// let strip: Vec<[f32; 3]> = (0..12).map(|i| [(i / 2) as f32, (i % 2) as f32, 0.0]).collect();
+    /// let faces: Vec<[u32; 3]> = (0..10).map(|i| [i, i + 1, i + 2]).collect();
+    /// let body = scene.add_triangles(&faces, &strip)?;
+    /// let mut detector = Detector::new(Backend::Cpu)?;
+    /// let at_rest = detector.near(&scene, 1.0, &Query::all())?;
+    /// assert!(at_rest.len() > 20);
+    /// let query = Query::all().exclude(Exclusion::rings(1));
+    /// assert!(detector.near(&scene, 1.0, &query)?.is_empty());
+    /// let query = Query::all().exclude(&at_rest);
+    /// assert!(detector.near(&scene, 1.0, &query)?.is_empty());
+    /// # Ok(()) }
+    /// ```
     pub fn exclude(mut self, what: impl Into<Exclusion>) -> Self {
-        self.excluded.insert(what.into().bodies);
+        match what.into().0 {
+            Excluded::Bodies(a, b) => {
+                self.excluded.insert((a, b));
+            }
+            Excluded::Rings(n) => self.rings = self.rings.max(n),
+            Excluded::Groups(g, h) => {
+                self.groups.insert((g, h));
+            }
+            Excluded::Pairs(pairs) => self.pairs.push(pairs),
+        }
         self
     }
 
@@ -341,6 +410,18 @@ impl Query {
                 setting: "filter",
                 given: "a filter of pairs".to_owned(),
                 allowed: "none: only questions about the contacts of a step ask one",
+            }),
+        }
+    }
+
+    /// Refuses pairs of an answer, for questions about the elements that bodies were given as.
+    pub(crate) fn check_without_pairs(&self) -> Result<(), Error> {
+        match self.pairs.is_empty() {
+            true => Ok(()),
+            false => Err(Error::Setting {
+                setting: "exclude",
+                given: "pairs of vertices, edges and faces".to_owned(),
+                allowed: "bodies, rings and groups: this question is about the elements that bodies were given as",
             }),
         }
     }

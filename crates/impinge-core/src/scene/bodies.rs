@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::scene::elements::with_corners;
 pub(crate) use crate::scene::elements::{BodyKind, Elements};
-use crate::scene::elements::{Part, Topology};
+use crate::scene::elements::{Part, Topology, VertexRings};
 use crate::scene::error::Error;
 pub(crate) use crate::scene::ids::BodyId;
 use crate::scene::ids::new_stamp;
@@ -55,6 +55,9 @@ pub struct Body {
     motion: Option<Box<RestPose>>,
     filter: Filter,
     thickness: f64,
+    /// Of each vertex, if it was set.
+    groups: Option<Arc<[u32]>>,
+    pinned: Option<Arc<[bool]>>,
     topology_stamp: u64,
     positions_stamp: u64,
     step_stamp: u64,
@@ -142,6 +145,21 @@ impl Body {
     /// Which bodies it meets.
     pub fn filter(&self) -> Filter {
         self.filter
+    }
+
+    /// The group of each vertex, if [groups](Scene::set_groups) were set.
+    pub(crate) fn groups(&self) -> Option<&Arc<[u32]>> {
+        self.groups.as_ref()
+    }
+
+    /// Whether each vertex is pinned, if [that](Scene::set_pinned) was set.
+    pub(crate) fn pinned(&self) -> Option<&Arc<[bool]>> {
+        self.pinned.as_ref()
+    }
+
+    /// The vertices at most some number of edges away from each vertex.
+    pub(crate) fn vertex_rings(&self, n_rings: u32) -> Arc<VertexRings> {
+        self.topology.rings(self.n_vertices(), n_rings)
     }
 
     /// How thick the body is, in the unit of the scene: see [`Scene::set_thickness`].
@@ -537,6 +555,30 @@ impl Scene {
         Ok(())
     }
 
+    /// Puts each vertex of a body into a group, for [`Exclusion::groups`](crate::Exclusion::groups): one number per vertex. A body whose
+    /// groups were never set is in no group. [`remesh`](Scene::remesh) forgets them.
+    ///
+    /// # Errors
+    /// The id names no body; more or fewer groups than vertices.
+    pub fn set_groups(&mut self, body: BodyId, groups: &[u32]) -> Result<(), Error> {
+        let held = self.body_mut(body)?;
+        check_per_vertex(body, "groups", groups.len(), held.n_vertices())?;
+        held.groups = Some(groups.into());
+        Ok(())
+    }
+
+    /// Says which vertices of a body are pinned, where they never move: one flag per vertex. Pairs of elements all of whose vertices are
+    /// pinned are left out of every query. [`remesh`](Scene::remesh) forgets it.
+    ///
+    /// # Errors
+    /// The id names no body; more or fewer flags than vertices.
+    pub fn set_pinned(&mut self, body: BodyId, pinned: &[bool]) -> Result<(), Error> {
+        let held = self.body_mut(body)?;
+        check_per_vertex(body, "pinned", pinned.len(), held.n_vertices())?;
+        held.pinned = pinned.contains(&true).then(|| pinned.into());
+        Ok(())
+    }
+
     /// Sets how thick a body is, in the unit of the scene: what its elements add to the distance of
     /// [`near`](crate::Detector::near). 0 for a new body. Two elements of one body add it twice.
     ///
@@ -677,6 +719,23 @@ fn copy<R: Real>(stored: &mut Positions, rows: &[[R; 3]]) {
     }
 }
 
+fn check_per_vertex(
+    body: BodyId,
+    what: &'static str,
+    given: usize,
+    n_vertices: usize,
+) -> Result<(), Error> {
+    match given == n_vertices {
+        true => Ok(()),
+        false => Err(Error::PerVertex {
+            body,
+            what,
+            given,
+            n_vertices,
+        }),
+    }
+}
+
 fn checked_body(id: BodyId, mesh: Mesh, filter: Filter) -> Result<Body, Error> {
     let Mesh {
         elements,
@@ -712,6 +771,8 @@ fn checked_body(id: BodyId, mesh: Mesh, filter: Filter) -> Result<Body, Error> {
         motion: None,
         filter,
         thickness: 0.0,
+        groups: None,
+        pinned: None,
         topology_stamp: new_stamp(),
         positions_stamp: stamp,
         step_stamp: stamp,

@@ -1,7 +1,7 @@
 //! The elements of bodies, given and derived: vertices, edges, boundary faces.
 
 use std::collections::HashMap;
-use std::sync::OnceLock;
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use crate::scene::words::words;
 
@@ -165,6 +165,68 @@ pub(crate) struct Topology {
     vertices: OnceLock<Elements>,
     edges: OnceLock<Elements>,
     boundary: OnceLock<Elements>,
+    /// The last ones that were asked for, with their number.
+    rings: Arc<Mutex<Option<(u32, Arc<VertexRings>)>>>,
+}
+
+/// The vertices at most some number of edges away from each vertex, itself included.
+#[derive(Debug)]
+pub(crate) struct VertexRings {
+    starts: Vec<usize>,
+    vertices: Vec<u32>,
+}
+
+impl VertexRings {
+    fn new(n_vertices: usize, n_rings: u32, elements: &Elements, edges: &Elements) -> Self {
+        // All edges, also those inside of tetrahedra.
+        let mut ends: Vec<[u32; 2]> = Vec::new();
+        let mut add = |corners: &[u32]| {
+            for (ix, &a) in corners.iter().enumerate() {
+                ends.extend(corners[ix + 1..].iter().flat_map(|&b| [[a, b], [b, a]]));
+            }
+        };
+        match elements {
+            Elements::Tetrahedra(tetrahedra) => tetrahedra.iter().for_each(|of| add(of)),
+            _ => (0..edges.len()).for_each(|ix| add(edges.corners(ix))),
+        }
+        ends.sort_unstable();
+        ends.dedup();
+        let next = |vertex: u32| {
+            let first = ends.partition_point(|&[from, _]| from < vertex);
+            let own = ends[first..]
+                .iter()
+                .take_while(move |&&[from, _]| from == vertex);
+            own.map(|&[_, to]| to)
+        };
+        let (mut starts, mut vertices) = (vec![0], Vec::new());
+        for vertex in 0..n_vertices as u32 {
+            let first = vertices.len();
+            vertices.push(vertex);
+            let mut ring = first;
+            for _ in 0..n_rings {
+                let end = vertices.len();
+                for ix in ring..end {
+                    for to in next(vertices[ix]) {
+                        if !vertices[first..].contains(&to) {
+                            vertices.push(to);
+                        }
+                    }
+                }
+                ring = end;
+            }
+            vertices[first..].sort_unstable();
+            starts.push(vertices.len());
+        }
+        VertexRings { starts, vertices }
+    }
+
+    /// Whether any of some vertices is in the rings of a vertex.
+    #[inline]
+    pub fn reaches_any(&self, from: u32, to: &[u32]) -> bool {
+        let [start, end] = [0, 1].map(|next| self.starts[from as usize + next]);
+        let rings = &self.vertices[start..end];
+        to.iter().any(|to| rings.binary_search(to).is_ok())
+    }
 }
 
 impl Topology {
@@ -174,6 +236,22 @@ impl Topology {
             vertices: OnceLock::new(),
             edges: OnceLock::new(),
             boundary: OnceLock::new(),
+            rings: Arc::default(),
+        }
+    }
+
+    /// The vertices at most `n_rings` edges away from each vertex. Those asked for last are kept.
+    pub fn rings(&self, n_vertices: usize, n_rings: u32) -> Arc<VertexRings> {
+        let mut held = self.rings.lock().unwrap_or_else(PoisonError::into_inner);
+        match &*held {
+            Some((n, rings)) if *n == n_rings => Arc::clone(rings),
+            _ => {
+                let rings =
+                    VertexRings::new(n_vertices, n_rings, &self.given, self.part(Part::Edges));
+                let rings = Arc::new(rings);
+                *held = Some((n_rings, Arc::clone(&rings)));
+                rings
+            }
         }
     }
 

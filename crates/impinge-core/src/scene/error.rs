@@ -60,6 +60,18 @@ pub enum Error {
         /// The requested precision.
         asked: &'static str,
     },
+    /// What is given per vertex has another length than the body has vertices.
+    #[error("body {body}: {given} {what} given, but there are {n_vertices} vertices")]
+    PerVertex {
+        /// The body.
+        body: BodyId,
+        /// What was given: `"groups"`, `"pinned"`.
+        what: &'static str,
+        /// How many were given.
+        given: usize,
+        /// How many vertices the body has.
+        n_vertices: usize,
+    },
     /// The id names no body of this scene: the body was removed, or belongs to another scene.
     #[error(
         "there is no such body {body} among the {n_bodies} of this scene: it was removed, or is another scene's"

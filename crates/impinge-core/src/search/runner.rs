@@ -199,8 +199,8 @@ impl Runner {
             found?;
         }
         let (mut lists, mut n) = joined?;
-        if let Some(n_owned) = keep_owned(job, &mut lists) {
-            n = n_owned;
+        if let Some(n_counted) = keep_counted(job, &mut lists) {
+            n = n_counted;
         }
         let mut sorter = self.sorter.lock().unwrap_or_else(PoisonError::into_inner);
         if plan.goal == Goal::All {
@@ -222,16 +222,16 @@ impl Runner {
     }
 }
 
-/// Drops pairs that do not belong to the cell, if there is one and finders have not looked. Returns how many are left then.
-fn keep_owned<T: Keyed, const LISTS: usize>(
+/// Drops pairs that do not count, if there may be any and finders have not looked. Returns how many are left then.
+fn keep_counted<T: Keyed, const LISTS: usize>(
     job: Job<'_>,
     lists: &mut [Vec<T>; LISTS],
 ) -> Option<u64> {
-    if !job.plan.is_owned_late() {
+    if !job.plan.counts_late() {
         return None;
     }
     for list in &mut *lists {
-        list.retain(|item| job.plan.is_owned(job.scene, item.key()));
+        list.retain(|item| job.plan.counts(job.scene, item.key()));
     }
     let n = lists.iter().map(Vec::len).sum::<usize>();
     if job.plan.goal != Goal::All {

@@ -6,8 +6,9 @@ use crate::answers::home::{Home, gives_back};
 use crate::answers::numbering::{Numbering, row};
 use crate::answers::pairs::{Element, hash_row, mix};
 use crate::plan::Plan;
-use crate::query::Query;
 use crate::query::pair_kind::PairKind;
+use crate::query::pair_set::PairSet;
+use crate::query::{Exclusion, Query};
 use crate::scene::error::Error;
 use crate::search::found::KeysByKind;
 use crate::search::sink::reserve;
@@ -240,6 +241,18 @@ impl NearPairs {
     /// How the answer was found.
     pub fn stats(&self) -> &Stats {
         &self.stats
+    }
+}
+
+/// The pairs of an answer, to be left out of others: those that are near in a pose at rest, for one.
+impl From<&NearPairs> for Exclusion {
+    fn from(near: &NearPairs) -> Self {
+        let named = |of: Element| (of.body, of.element);
+        PairSet::new(
+            near.iter()
+                .map(|pair| (pair.kind, [named(pair.a), named(pair.b)])),
+        )
+        .into()
     }
 }
 

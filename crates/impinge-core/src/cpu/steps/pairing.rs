@@ -25,7 +25,7 @@ use crate::simd::{Isa, LaneBounds, Lanes, Masks, Simd};
 use crate::workers::clock::Instant;
 
 use super::group::Group;
-use super::narrow::{Batch, Between, Decider, NarrowCounts};
+use super::narrow::{Batch, Between, Decider, NarrowCounts, key_in};
 use super::world::World;
 
 /// The narrow stage is timed for one work item in this many.
@@ -308,7 +308,24 @@ fn pair<S: Simd>(
         let corners = [&a.corners[..a.n_corners], &b.corners[..b.n_corners]];
         lane_pairs.drop_sharing(simd, corners);
     }
+    if world.plan.leaves_out() {
+        lane_pairs.retain(|lanes| !is_left_out(world, item, [a, b], lanes));
+    }
     (lane_pairs.len() > 0).then_some([slot_a, slot_b])
+}
+
+/// Whether the elements of two lanes are left out.
+fn is_left_out(world: World<'_>, item: &WorkItem, groups: [&Group; 2], lanes: [u8; 2]) -> bool {
+    let corners: [[u32; 3]; 2] = std::array::from_fn(|side| {
+        let lane = usize::from(lanes[side]);
+        groups[side]
+            .corners
+            .each_ref()
+            .map(|corners| corners.0[lane])
+    });
+    let of = |side: usize| &corners[side][..groups[side].n_corners];
+    let sides = [(item.a, of(0)), (item.b, of(1))];
+    world.plan.is_left_out(key_in(groups, lanes), sides)
 }
 
 /// The lanes of two clusters that may have a key whose lower number is in a range, ends included; `None` if no pair has.

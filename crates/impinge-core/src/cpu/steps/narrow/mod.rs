@@ -24,7 +24,7 @@ use crate::simd::Isa;
 
 use super::world::World;
 
-pub(super) use batch::{Batch, Between, Narrow, NarrowCounts};
+pub(super) use batch::{Batch, Between, Narrow, NarrowCounts, key_in};
 pub(super) use contacts::FirstContacts;
 use near::NearElements;
 use overlaps::Overlaps;

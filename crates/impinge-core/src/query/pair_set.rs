@@ -1,0 +1,76 @@
+//! Pairs of vertices, edges and faces that a query leaves out by name.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use crate::query::pair_kind::PairKind;
+use crate::scene::elements::Part;
+use crate::scene::ids::BodyId;
+use crate::scene::index::{Number, pair_key};
+
+/// Elements of bodies, by the body and the number of the element.
+type Named = [(BodyId, u32); 2];
+
+/// Sorted keys, by kind of pair.
+pub(crate) type SortedKeys = Arc<[Vec<u64>; PairKind::ALL.len()]>;
+
+/// A part of a body, and the number of its first element in a plan.
+pub(crate) type Numbered = (BodyId, Part, Number);
+
+/// Pairs by kind. Equal to itself and its clones only.
+#[derive(Debug, Clone)]
+pub(crate) struct PairSet(Arc<Held>);
+
+#[derive(Debug)]
+struct Held {
+    pairs: [Vec<Named>; PairKind::ALL.len()],
+    /// Their keys in the numbers of the last plan.
+    keys: Mutex<Option<(Vec<Numbered>, SortedKeys)>>,
+}
+
+impl PartialEq for PairSet {
+    fn eq(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.0, &other.0)
+    }
+}
+
+impl PairSet {
+    pub fn new(pairs: impl Iterator<Item = (PairKind, Named)>) -> Self {
+        let mut of_kinds: [Vec<Named>; PairKind::ALL.len()] = Default::default();
+        for (kind, pair) in pairs {
+            of_kinds[kind as usize].push(pair);
+        }
+        PairSet(Arc::new(Held {
+            pairs: of_kinds,
+            keys: Mutex::default(),
+        }))
+    }
+
+    /// The keys of the pairs in the numbers of a plan; those of bodies that do not take part have none. They are made again only when
+    /// numbers have changed.
+    pub fn keys(&self, parts: Vec<Numbered>) -> SortedKeys {
+        let mut held = self.0.keys.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((of, keys)) = &*held
+            && *of == parts
+        {
+            return Arc::clone(keys);
+        }
+        let keys = PairKind::ALL.map(|kind| {
+            let pairs = self.0.pairs[kind as usize].iter();
+            let number = |(body, element): (BodyId, u32), part: Part| {
+                let own = |&&(id, of, _): &&Numbered| id == body && of == part;
+                let (_, _, first) = parts.iter().find(own)?;
+                Some(Number::new(first.raw() + element))
+            };
+            let key = |&[a, b]: &Named| {
+                let [part_a, part_b] = kind.parts();
+                Some(pair_key(number(a, part_a)?, number(b, part_b)?))
+            };
+            let mut keys: Vec<u64> = pairs.filter_map(key).collect();
+            keys.sort_unstable();
+            keys
+        });
+        let keys = Arc::new(keys);
+        *held = Some((parts, Arc::clone(&keys)));
+        keys
+    }
+}

@@ -1,0 +1,368 @@
+//! Pairs that are left out because of their vertices, or by name: every question, against its answer without them.
+
+use std::collections::{BTreeSet, VecDeque};
+
+use impinge_core::{
+    Backend, BodyId, Detector, Element, Error, Exclusion, Method, PairKind, Part, Query, Scene,
+    Settings, Start,
+};
+use impinge_scenes::{Random, surfaces};
+
+fn detectors() -> [Detector; 3] {
+    [
+        (Method::Clusters, 1),
+        (Method::Clusters, 4),
+        (Method::Naive, 1),
+    ]
+    .map(|(method, threads)| {
+        Detector::new(Settings {
+            method,
+            threads,
+            backend: Backend::Cpu,
+            ..Settings::default()
+        })
+        .expect("settings")
+    })
+}
+
+/// Crumpled cloth, and a body that it falls on; random end positions.
+fn scene(seed: u64) -> (Scene, [BodyId; 2]) {
+    let mut random = Random::new(seed);
+    let mut scene = Scene::new();
+    let bodies = [
+        surfaces::cloth(9, 7, 0.2),
+        surfaces::bumpy_ball(120, 0.3).scaled(0.5),
+    ]
+    .map(|model| {
+        let mut crumple = || random.point(-0.15, 0.15);
+        let mut at = |by: [f32; 3]| -> Vec<[f32; 3]> {
+            let moved = |p: &[f32; 3]| {
+                let q = crumple();
+                [0, 1, 2].map(|axis| p[axis] + q[axis] + by[axis])
+            };
+            model.positions.iter().map(moved).collect()
+        };
+        let (start, end) = (at([0.0; 3]), at([0.1, 0.0, -0.1]));
+        let body = scene.add((model.elements.clone(), start)).expect("good");
+        scene.set_end_positions(body, end).expect("good");
+        body
+    });
+    (scene, bodies)
+}
+
+/// A pair of elements of some parts.
+type Named = ([Part; 2], [Element; 2]);
+
+fn corners(scene: &Scene, part: Part, of: Element) -> Vec<u32> {
+    let body = scene.body(of.body).expect("held");
+    match part {
+        Part::Vertices => vec![of.element],
+        Part::Edges => body.edges().corners(of.element as usize).to_vec(),
+        Part::Faces => body.faces().corners(of.element as usize).to_vec(),
+        Part::Given => body.elements().corners(of.element as usize).to_vec(),
+    }
+}
+
+/// The answers of all questions about a query, each as sorted pairs.
+fn answers(
+    detector: &mut Detector,
+    scene: &Scene,
+    query: &Query,
+    is_detected: bool,
+) -> Vec<Vec<Named>> {
+    let of_kind = |kind: PairKind, a, b| (kind.parts(), [a, b]);
+    let impacts = detector.impacts(scene, query).expect("good");
+    let separated = detector
+        .impacts(scene, &query.clone().separation(0.01))
+        .expect("good");
+    let near = detector.near(scene, 0.1, query).expect("good");
+    let candidates = detector.candidates(scene, 0.02, query).expect("good");
+    let mut all: Vec<Vec<Named>> = vec![
+        impacts.iter().map(|i| of_kind(i.kind, i.a, i.b)).collect(),
+        separated
+            .iter()
+            .map(|i| of_kind(i.kind, i.a, i.b))
+            .collect(),
+        near.iter().map(|n| of_kind(n.kind, n.a, n.b)).collect(),
+        candidates
+            .iter()
+            .map(|(kind, a, b)| of_kind(kind, a, b))
+            .collect(),
+    ];
+    let lists = detector.neighbours(scene, 0.1, query).expect("good");
+    assert_eq!(lists.len(), near.len());
+    assert_eq!(
+        detector.is_free(scene, query).expect("good"),
+        impacts.is_empty()
+    );
+    assert_eq!(
+        detector.earliest(scene, query).expect("good"),
+        impacts.earliest()
+    );
+    if is_detected {
+        let pairs = detector.detect(scene, query).expect("good");
+        assert_eq!(
+            detector.count(scene, query).expect("good"),
+            pairs.len() as u64
+        );
+        assert_eq!(detector.any(scene, query).expect("good"), !pairs.is_empty());
+        all.push(
+            pairs
+                .iter()
+                .map(|(a, b)| ([Part::Given; 2], [a, b]))
+                .collect(),
+        );
+    }
+    all
+}
+
+/// Asks everything, and expects what is asked without the exclusion, but for pairs that a function refuses.
+fn check(
+    scene: &Scene,
+    query: &Query,
+    full: &Scene,
+    without: &Query,
+    is_detected: bool,
+    keeps: impl Fn(&Named) -> bool,
+) {
+    let mut n_left_out = 0;
+    for mut detector in detectors() {
+        let all = answers(&mut detector, full, without, is_detected);
+        let found = answers(&mut detector, scene, query, is_detected);
+        for (question, (all, found)) in all.iter().zip(&found).enumerate() {
+            let expected: Vec<Named> = all.iter().filter(|pair| keeps(pair)).copied().collect();
+            assert_eq!(found, &expected, "question {question}");
+            assert!(!found.is_empty(), "question {question}");
+            n_left_out += all.len() - found.len();
+        }
+    }
+    assert!(n_left_out > 0);
+}
+
+/// The vertices at most some number of edges away.
+fn around(scene: &Scene, body: BodyId, from: u32, n: u32) -> BTreeSet<u32> {
+    let edges = scene.body(body).expect("held").edges();
+    let edges: Vec<Vec<u32>> = (0..edges.len())
+        .map(|ix| edges.corners(ix).to_vec())
+        .collect();
+    let mut seen = BTreeSet::from([from]);
+    let mut next = VecDeque::from([(from, 0)]);
+    while let Some((at, depth)) = next.pop_front() {
+        if depth == n {
+            continue;
+        }
+        for edge in &edges {
+            for (a, b) in [(edge[0], edge[1]), (edge[1], edge[0])] {
+                if a == at && seen.insert(b) {
+                    next.push_back((b, depth + 1));
+                }
+            }
+        }
+    }
+    seen
+}
+
+#[test]
+fn rings_are_left_out() {
+    for n in [1, 2, 3] {
+        let (scene, _) = scene(u64::from(n));
+        check(
+            &scene,
+            &Query::all().exclude(Exclusion::rings(n)),
+            &scene,
+            &Query::all(),
+            true,
+            |(parts, [a, b])| {
+                a.body != b.body || {
+                    let [from, to] = [(parts[0], *a), (parts[1], *b)]
+                        .map(|(part, of)| corners(&scene, part, of));
+                    from.iter().all(|&v| {
+                        let near = around(&scene, a.body, v, n);
+                        to.iter().all(|w| !near.contains(w))
+                    })
+                }
+            },
+        );
+    }
+}
+
+#[test]
+fn groups_that_do_not_meet_are_left_out() {
+    let (mut scene, bodies) = scene(5);
+    let n = scene.body(bodies[0]).expect("held").n_vertices() as u32;
+    let groups: Vec<u32> = (0..n).map(|ix| 3 + ix / (n / 3 + 1)).collect();
+    scene.set_groups(bodies[0], &groups).expect("good");
+    // The other body is in no group at first.
+    for has_both in [false, true] {
+        if has_both {
+            let n = scene.body(bodies[1]).expect("held").n_vertices();
+            scene.set_groups(bodies[1], &vec![9; n]).expect("good");
+        }
+        let query = Query::all()
+            .exclude(Exclusion::groups(4, 3))
+            .exclude(Exclusion::groups(5, 5))
+            .exclude(Exclusion::groups(9, 5));
+        let group = |body: BodyId, vertex: u32| match (body == bodies[0], has_both) {
+            (true, _) => Some(groups[vertex as usize]),
+            (false, true) => Some(9),
+            (false, false) => None,
+        };
+        check(
+            &scene,
+            &query,
+            &scene,
+            &Query::all(),
+            true,
+            |(parts, [a, b])| {
+                let [from, to] =
+                    [(parts[0], *a), (parts[1], *b)].map(|(part, of)| corners(&scene, part, of));
+                from.iter().any(|&v| {
+                    to.iter().any(|&w| {
+                        let (Some(g), Some(h)) = (group(a.body, v), group(b.body, w)) else {
+                            return true;
+                        };
+                        ![(3, 4), (5, 5), (5, 9)].contains(&(g.min(h), g.max(h)))
+                    })
+                })
+            },
+        );
+    }
+}
+
+#[test]
+fn what_is_pinned_does_not_meet_what_is_pinned() {
+    let (full, bodies) = scene(8);
+    let (mut scene, _) = self::scene(8);
+    // Bodies of different scenes have different ids; their order is the same.
+    let own: Vec<BodyId> = scene.bodies().map(|(id, _)| id).collect();
+    let is_pinned = |body: usize, vertex: u32| body == 1 || vertex % 5 < 3;
+    for (ix, &body) in own.iter().enumerate() {
+        let n = scene.body(body).expect("held").n_vertices() as u32;
+        let pinned: Vec<bool> = (0..n).map(|vertex| is_pinned(ix, vertex)).collect();
+        scene.set_pinned(body, &pinned).expect("good");
+    }
+    let of = |body: BodyId| bodies.iter().position(|&own| own == body).expect("held");
+    let rename = |named: &Named| (named.0, named.1.map(|e| (of_own(&own, e.body), e.element)));
+    let mut n_left_out = 0;
+    for mut detector in detectors() {
+        let all = answers(&mut detector, &full, &Query::all(), true);
+        let found = answers(&mut detector, &scene, &Query::all(), true);
+        for (all, found) in all.iter().zip(&found) {
+            let expected: Vec<_> = all
+                .iter()
+                .filter(|(parts, pair)| {
+                    (0..2).any(|side| {
+                        let corners = corners(&full, parts[side], pair[side]);
+                        corners.iter().any(|&v| !is_pinned(of(pair[side].body), v))
+                    })
+                })
+                .map(|(parts, pair)| (*parts, pair.map(|e| (of(e.body), e.element))))
+                .collect();
+            let found: Vec<_> = found.iter().map(rename).collect();
+            assert_eq!(found, expected);
+            n_left_out += all.len() - found.len();
+        }
+    }
+    assert!(n_left_out > 0);
+    // Nothing is pinned any more.
+    for &body in &own {
+        let n = scene.body(body).expect("held").n_vertices();
+        scene.set_pinned(body, &vec![false; n]).expect("good");
+    }
+    let mut detector = detectors().into_iter().next().expect("some");
+    let [mine, theirs] =
+        [&scene, &full].map(|of| detector.detect(of, &Query::all()).expect("good").len());
+    assert_eq!(mine, theirs);
+}
+
+fn of_own(own: &[BodyId], body: BodyId) -> usize {
+    own.iter().position(|&id| id == body).expect("held")
+}
+
+#[test]
+fn pairs_of_an_answer_are_left_out() {
+    let (mut scene, bodies) = scene(11);
+    let mut detector = detectors().into_iter().next().expect("some");
+    let at_rest = detector.near(&scene, 0.05, &Query::all()).expect("good");
+    assert!(at_rest.len() > 20);
+    let named: BTreeSet<(PairKind, [u32; 4])> =
+        at_rest.iter().map(|pair| (pair.kind, pair.row())).collect();
+    let keeps = |(parts, [a, b]): &Named| {
+        let kinds = PairKind::ALL.into_iter();
+        let kind = kinds
+            .filter(|kind| kind.parts() == *parts)
+            .next()
+            .expect("a kind");
+        let row = [
+            a.body.index() as u32,
+            a.element,
+            b.body.index() as u32,
+            b.element,
+        ];
+        !named.contains(&(kind, row))
+    };
+    let query = Query::all().exclude(&at_rest);
+    check(&scene, &query, &scene, &Query::all(), false, keeps);
+    // Other numbers: a query about one body, and a body before the others that is new.
+    let query = Query::self_of(bodies[0]).exclude(&at_rest);
+    check(
+        &scene,
+        &query,
+        &scene,
+        &Query::self_of(bodies[0]),
+        false,
+        keeps,
+    );
+    let points: Vec<[f32; 3]> = (0..7).map(|ix| [ix as f32, 20.0, 0.0]).collect();
+    scene.add_edges(&[[0, 1], [2, 3]], &points).expect("good");
+    let query = Query::all().exclude(&at_rest).exclude(Exclusion::rings(1));
+    let rings = Query::all().exclude(Exclusion::rings(1));
+    check(&scene, &query, &scene, &rings, false, keeps);
+    let error = detector.detect(&scene, &query).expect_err("refused");
+    assert!(matches!(
+        error,
+        Error::Setting {
+            setting: "exclude",
+            ..
+        }
+    ));
+    // The look at the start of a step leaves out what it can.
+    let query = query.start(Start::Verify);
+    detector.is_free(&scene, &query).expect("good");
+    assert_eq!(query, query.clone());
+    assert_ne!(query, rings);
+}
+
+#[test]
+fn bad_exclusions_are_refused_by_name() {
+    let (mut scene, bodies) = scene(1);
+    let mut detector = detectors().into_iter().next().expect("some");
+    let query = Query::all().exclude(Exclusion::rings(17));
+    let error = detector.near(&scene, 0.1, &query).expect_err("refused");
+    assert!(matches!(
+        error,
+        Error::Setting {
+            setting: "rings",
+            ..
+        }
+    ));
+    let error = scene.set_pinned(bodies[0], &[true]).expect_err("refused");
+    assert_eq!(
+        error.to_string(),
+        format!(
+            "body {}: 1 pinned given, but there are {} vertices",
+            bodies[0],
+            scene.body(bodies[0]).expect("held").n_vertices()
+        )
+    );
+    assert!(scene.set_groups(bodies[1], &[]).is_err());
+    let query = Query::between_all().exclude(Exclusion::rings(1));
+    let error = detector.nearest(&scene, &query).expect_err("refused");
+    assert!(matches!(
+        error,
+        Error::Setting {
+            setting: "exclude",
+            ..
+        }
+    ));
+}
