@@ -12,6 +12,7 @@ mod datasets;
 mod detector;
 mod devices;
 mod errors;
+mod exclusion;
 mod files;
 mod functions;
 mod lent;
@@ -53,6 +54,8 @@ mod _impinge {
     use super::detector::DetectorBase;
     #[pymodule_export]
     use super::devices::_devices;
+    #[pymodule_export]
+    use super::exclusion::{_groups, _rest_pairs, _rings, Exclusion};
     #[pymodule_export]
     use super::files::{Mesh, read, read_bodies};
     #[pymodule_export]

@@ -42,6 +42,11 @@ impl Near {
         }
     }
 
+    /// All pairs of the answer.
+    pub fn whole(&self) -> &impinge::NearPairs {
+        &self.inner
+    }
+
     fn iter(&self) -> NearIter<'_> {
         match self.kind {
             Some(kind) => self.inner.of(kind),

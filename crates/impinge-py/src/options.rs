@@ -8,6 +8,7 @@ use pyo3::types::{PyBool, PyDict, PyString};
 
 use crate::arrays;
 use crate::errors::invalid;
+use crate::exclusion::Exclusion;
 use crate::scene::Scene;
 use crate::settings::{WHICH, choose_one, number, unexpected, words};
 use crate::vertex_filter::VertexFilter;
@@ -43,7 +44,7 @@ const CONTROL: [&str; 2] = ["cancel", "progress"];
 #[derive(Default)]
 pub struct Options<'py> {
     scope: Option<Scope<'py>>,
-    exclude: Vec<[Bound<'py, PyAny>; 2]>,
+    exclude: Vec<Excluded<'py>>,
     kinds: Option<Vec<PairKind>>,
     shared_vertex: SharedVertex,
     cell: Option<[[f64; 3]; 2]>,
@@ -59,6 +60,12 @@ pub struct Options<'py> {
     pub progress: Option<Py<PyAny>>,
     /// Of `impinge.ipc`.
     pub filter: Option<Bound<'py, VertexFilter>>,
+}
+
+/// What is left out.
+enum Excluded<'py> {
+    Bodies([Bound<'py, PyAny>; 2]),
+    Ready(Bound<'py, Exclusion>),
 }
 
 /// Which pairs of bodies.
@@ -190,9 +197,14 @@ impl<'py> Options<'py> {
                 Query::across(ids.collect::<PyResult<Vec<BodyId>>>()?)
             }
         };
-        for (ix, [a, b]) in self.exclude.iter().enumerate() {
-            let name = format!("exclude[{ix}]");
-            query = query.exclude((scene.id(a, &name)?, scene.id(b, &name)?));
+        for (ix, excluded) in self.exclude.iter().enumerate() {
+            query = match excluded {
+                Excluded::Bodies([a, b]) => {
+                    let name = format!("exclude[{ix}]");
+                    query.exclude((scene.id(a, &name)?, scene.id(b, &name)?))
+                }
+                Excluded::Ready(exclusion) => query.exclude(exclusion.get().inner.clone()),
+            };
         }
         if let Some(kinds) = &self.kinds {
             query = query.kinds(kinds.iter().copied());
@@ -259,22 +271,28 @@ fn two_bodies<'py>(value: &Bound<'py, PyAny>, name: &str) -> PyResult<[Bound<'py
     })
 }
 
-/// One pair of bodies, or many.
-fn exclusions<'py>(value: &Bound<'py, PyAny>) -> PyResult<Vec<[Bound<'py, PyAny>; 2]>> {
-    let expected = "a pair of bodies, or a sequence of such pairs,";
+/// One pair of bodies, one `Exclusion`, or many of both.
+fn exclusions<'py>(value: &Bound<'py, PyAny>) -> PyResult<Vec<Excluded<'py>>> {
+    if let Ok(exclusion) = value.cast::<Exclusion>() {
+        return Ok(vec![Excluded::Ready(exclusion.clone())]);
+    }
+    let expected = "a pair of bodies, an Exclusion, or a sequence of these,";
     let items = items(value).ok_or_else(|| unexpected(value, "exclude", expected))?;
     let is_body = |item: &Bound<'py, PyAny>| item.hasattr("__index__").unwrap_or(false);
     match <[Bound<'py, PyAny>; 2]>::try_from(items) {
-        Ok(pair) if pair.iter().all(is_body) => Ok(vec![pair]),
-        Ok(two) => each_pair(&two),
-        Err(many) => each_pair(&many),
+        Ok(pair) if pair.iter().all(is_body) => Ok(vec![Excluded::Bodies(pair)]),
+        Ok(two) => each_exclusion(&two),
+        Err(many) => each_exclusion(&many),
     }
 }
 
-fn each_pair<'py>(pairs: &[Bound<'py, PyAny>]) -> PyResult<Vec<[Bound<'py, PyAny>; 2]>> {
-    let pairs = pairs.iter().enumerate();
-    pairs
-        .map(|(ix, pair)| two_bodies(pair, &format!("exclude[{ix}]")))
+fn each_exclusion<'py>(items: &[Bound<'py, PyAny>]) -> PyResult<Vec<Excluded<'py>>> {
+    let items = items.iter().enumerate();
+    items
+        .map(|(ix, item)| match item.cast::<Exclusion>() {
+            Ok(exclusion) => Ok(Excluded::Ready(exclusion.clone())),
+            Err(_) => two_bodies(item, &format!("exclude[{ix}]")).map(Excluded::Bodies),
+        })
         .collect()
 }
 

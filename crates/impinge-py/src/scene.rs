@@ -379,6 +379,42 @@ impl Scene {
         scene.inner.set_filter(id, filter).map_err(raise)
     }
 
+    fn _set_groups(
+        slf: &Bound<'_, Self>,
+        body: &Bound<'_, PyAny>,
+        groups: &Bound<'_, PyAny>,
+    ) -> PyResult<()> {
+        let groups = arrays::offsets(groups, "groups")?;
+        let group = |(ix, &group): (usize, &usize)| {
+            u32::try_from(group).map_err(|_| {
+                invalid(format!(
+                    "groups[{ix}]: {group} given, at most {} allowed",
+                    u32::MAX
+                ))
+            })
+        };
+        let groups = groups
+            .iter()
+            .enumerate()
+            .map(group)
+            .collect::<PyResult<Vec<u32>>>()?;
+        let mut scene = change(slf)?;
+        let id = scene.id(body, "body")?;
+        scene.inner.set_groups(id, &groups).map_err(raise)
+    }
+
+    fn _set_pinned(
+        slf: &Bound<'_, Self>,
+        body: &Bound<'_, PyAny>,
+        pinned: &Bound<'_, PyAny>,
+    ) -> PyResult<()> {
+        let mut scene = change(slf)?;
+        let id = scene.id(body, "body")?;
+        let n_vertices = scene.inner.body(id).map_err(raise)?.n_vertices();
+        let pinned = arrays::mask(pinned, "pinned", n_vertices)?;
+        scene.inner.set_pinned(id, &pinned).map_err(raise)
+    }
+
     fn _set_thickness(
         slf: &Bound<'_, Self>,
         body: &Bound<'_, PyAny>,

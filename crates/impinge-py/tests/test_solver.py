@@ -117,3 +117,45 @@ def test_bad_bodies_are_refused(scene, detector):
         safe.of(7)
     with pytest.raises(ValueError, match='^part: "corners" given'):
         detector.neighbours(scene, 1).first(0, "corners")
+
+
+def test_what_is_left_out(detector):
+    scene = impinge.Scene()
+    grid = np.stack(np.meshgrid(np.arange(8), np.arange(6), [0.0], indexing="ij"), -1).reshape(-1, 3)
+    faces = [[6 * i + j, 6 * i + j + 1, 6 * i + 6 + j] for i in range(7) for j in range(5)]
+    faces += [[6 * i + j + 1, 6 * i + j + 7, 6 * i + 6 + j] for i in range(7) for j in range(5)]
+    cloth = scene.add(grid, faces)
+    points = scene.add_points(grid + [0, 0, 0.25])
+    near = detector.near(scene, 1.0, of=cloth)
+    counts = [len(detector.near(scene, 1.0, of=cloth, exclude=impinge.rings(n))) for n in range(3)]
+    assert len(near) == counts[0] > counts[1] >= counts[2] == len(detector.near(scene, 1.0, between=(cloth, points)))
+    rest = scene.rest_pairs(1.0)
+    assert repr(rest) == f"Exclusion({len(detector.near(scene, 1.0))} pairs)" and rest == rest != impinge.rings(1)
+    for ask in (detector.near, detector.candidates, detector.neighbours):
+        assert len(ask(scene, 1.0)) > 0
+    assert len(detector.near(scene, 1.0, exclude=rest)) == 0 == len(detector.neighbours(scene, 1.0, exclude=[rest]))
+    free = detector.safe_distances(scene, 0.5, exclude=rest).of(cloth)
+    assert (free == 0.5).all() and (detector.safe_distances(scene, 0.5).of(cloth) < 0.13).all()
+    # Groups: the points meet the left half of the cloth only.
+    scene.set_groups(cloth, (grid[:, 0] >= 4).astype(int))
+    scene.set_groups(points, np.full(len(grid), 7))
+    kept = detector.near(scene, 0.3, between=(cloth, points), exclude=impinge.groups(1, 7))
+    assert 0 < len(kept) < len(detector.near(scene, 0.3, between=(cloth, points)))
+    assert (grid[np.asarray(scene.faces(cloth))[kept.of("vf").rows[:, 3]]][:, :, 0].min(axis=1) < 4).all()
+    scene.set_pinned(cloth, np.ones(len(grid), bool))
+    assert len(detector.near(scene, 0.3)) > 0
+    scene.set_pinned(points, np.ones(len(grid), bool))
+    assert len(detector.near(scene, 0.3)) == 0
+    query = impinge.Query(exclude=[impinge.rings(2), (1, 0), impinge.groups(7, 1)])
+    assert query == pickle.loads(pickle.dumps(query)) and len({query, query.replace()}) == 1
+    assert repr(query) == "Query(exclude=((0, 1), groups(1, 7), rings(2)))"
+    with pytest.raises(TypeError, match="^an Exclusion of pairs names bodies"):
+        pickle.dumps(rest)
+    with pytest.raises(ValueError, match="^exclude: "):
+        detector.detect(scene, exclude=rest)
+    with pytest.raises(ValueError, match="^n: 17 given"):
+        impinge.rings(17)
+    with pytest.raises(TypeError, match="^exclude: a pair of bodies, an Exclusion, or a sequence of these, expected"):
+        detector.detect(scene, exclude=3)
+    with pytest.raises(ValueError, match="3 groups given, but there are 48 vertices"):
+        scene.set_groups(cloth, [1, 2, 3])

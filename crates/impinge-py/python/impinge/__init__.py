@@ -63,6 +63,7 @@ from ._impinge import (
     Body,
     CancelToken,
     Contacts,
+    Exclusion,
     Mesh,
     Penetration,
     __version__,
@@ -70,7 +71,7 @@ from ._impinge import (
     read_bodies,
 )
 from ._manager import CollisionManager
-from ._query import Query
+from ._query import Query, groups, rings
 from ._scene import Scene
 
 __all__ = [
@@ -91,6 +92,7 @@ __all__ = [
     "DeviceError",
     "DeviceInfo",
     "Error",
+    "Exclusion",
     "Impact",
     "Impacts",
     "InternalError",
@@ -113,12 +115,14 @@ __all__ = [
     "closest_points",
     "contains",
     "devices",
+    "groups",
     "hash_rows",
     "ipc",
     "pairs",
     "ray",
     "read",
     "read_bodies",
+    "rings",
     "self_pairs",
     "signed_distance",
     "tiles",

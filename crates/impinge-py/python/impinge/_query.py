@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Literal, SupportsFloat, SupportsIndex, TypedDict
 
-from ._impinge import KINDS, Body, CancelToken, _check_options
+from ._impinge import KINDS, Body, CancelToken, Exclusion, _check_options, _groups, _rings
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -16,10 +16,10 @@ if TYPE_CHECKING:
     # A handle of a body, or its number.
     _Body: TypeAlias = Body | SupportsIndex
     _PairKind: TypeAlias = Literal["vf", "ee", "ev", "vv", "ef", "ff"]
-    _Exclusion: TypeAlias = tuple[_Body, _Body]
+    _Exclusion: TypeAlias = tuple[_Body, _Body] | Exclusion
     _Progress: TypeAlias = Callable[[int, int], object]
 
-__all__ = ["Query"]
+__all__ = ["Query", "groups", "rings"]
 
 
 class Fields(TypedDict, total=False):
@@ -104,8 +104,11 @@ class Query:
     shared_vertex : {"resolve", "skip"}
         `Detector.detect`, `count` and `any`: elements of one body that share a vertex are reported when they meet in more than what they
         share, or never. In all other questions pairs that share a vertex never count.
-    exclude : (Body, Body) or sequence of (Body, Body)
-        Bodies whose pairs are left out; a body named twice leaves out its self-collision.
+    exclude : (Body, Body), Exclusion, or sequence of these
+        What is left out before it is decided. Bodies: their pairs; a body named twice leaves out its self-collision. ``rings(n)``: pairs
+        that are near in the surface. ``groups(g, h)``: groups of vertices that do not meet. ``scene.rest_pairs(r)``: pairs that were
+        near at rest, which `Detector.detect`, `count` and `any` refuse, for they are about other elements; these three find all pairs
+        first, so that limits count what is left out, too. `Detector.nearest` takes bodies alone.
     owned_by : (low, high)
         Only the pairs that belong to the half-open box between these two corners, three numbers each: a pair belongs
         to the cell that holds the larger of the lower corners of its two bounding boxes, axis by axis; in a step, of boxes that hold
@@ -234,6 +237,43 @@ class Query:
         return _query, (_numbers(self._given),)
 
 
+def rings(n: SupportsIndex) -> Exclusion:
+    """Leaves out pairs of one body that are near each other in its surface: some vertex of one element is at most `n` edges away from
+    some vertex of the other. For ``exclude=``.
+
+    Parameters
+    ----------
+    n : int
+        0 to 16; 0 leaves out what shares a vertex, 1 also what an edge joins.
+
+    Returns
+    -------
+    Exclusion
+
+    Examples
+    --------
+    >>> import impinge
+    >>> impinge.Query(exclude=[(0, 1), impinge.rings(2)])
+    Query(exclude=((0, 1), rings(2)))
+    """
+    return _rings(n)
+
+
+def groups(g: SupportsIndex, h: SupportsIndex) -> Exclusion:
+    """Leaves out pairs of elements of two groups of vertices (`Scene.set_groups`), or of one with itself: where each vertex of one element
+    and each vertex of the other are in such groups. For ``exclude=``.
+
+    Parameters
+    ----------
+    g, h : int
+
+    Returns
+    -------
+    Exclusion
+    """
+    return _groups(g, h)
+
+
 def _query(given: dict[str, Any]) -> Query:
     return Query(**given)
 
@@ -259,10 +299,12 @@ def _canonical(name: str, value: Any) -> Any:
     if name == "fixed":
         return tuple(sorted(set(value)))
     if name == "exclude":
-        pairs = list(value)
+        pairs = [value] if isinstance(value, Exclusion) else list(value)
         if len(pairs) == 2 and all(hasattr(body, "__index__") for body in pairs):
             pairs = [pairs]
-        return tuple(sorted(tuple(sorted(pair)) for pair in pairs))
+        bodies = {tuple(sorted(pair)) for pair in pairs if not isinstance(pair, Exclusion)}
+        others = {pair for pair in pairs if isinstance(pair, Exclusion)}
+        return (*sorted(bodies), *sorted(others, key=repr))
     if name == "owned_by":
         low, high = value
         return tuple(map(float, low)), tuple(map(float, high))

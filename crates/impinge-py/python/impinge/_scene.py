@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING, Any, Literal, SupportsFloat, SupportsIndex
 import numpy as np
 import numpy.typing as npt
 
-from ._impinge import SceneBase
+from ._detector import Detector
+from ._impinge import SceneBase, _rest_pairs
 
 if TYPE_CHECKING:
     from typing_extensions import TypeAlias
 
-    from ._impinge import Body
+    from ._impinge import Body, Exclusion
     from ._query import _Array, _Body
 
     _RowKind: TypeAlias = Literal["points", "edges", "triangles", "tetrahedra", "quads"]
@@ -301,6 +302,63 @@ class Scene(SceneBase):
             A number that does not fit.
         """
         self._set_filter(body, category, mask)
+
+    def set_groups(self, body: _Body, groups: _Array) -> None:
+        """Puts each vertex of a body into a group, for ``exclude=groups(g, h)``. A body whose groups were never set is in no group.
+
+        Parameters
+        ----------
+        body : Body or int
+        groups : array_like of int, shape (v,)
+            One per vertex, 0 or more, 32 bits.
+
+        Raises
+        ------
+        ValueError, TypeError
+            More or fewer than there are vertices, a number that does not fit.
+        """
+        self._set_groups(body, groups)
+
+    def set_pinned(self, body: _Body, pinned: _Array) -> None:
+        """Says which vertices of a body never move. Pairs of elements all of whose vertices are pinned are left out of every
+        question, whatever it asks.
+
+        Parameters
+        ----------
+        body : Body or int
+        pinned : array_like of bool, shape (v,)
+
+        Raises
+        ------
+        ValueError, TypeError
+            More or fewer than there are vertices.
+        """
+        self._set_pinned(body, pinned)
+
+    def rest_pairs(self, distance: SupportsFloat) -> Exclusion:
+        """The pairs of elements that are within a distance of each other now, to be left out of later questions with ``exclude=``: in
+        a pose at rest, what is near is meant to be.
+
+        Parameters
+        ----------
+        distance : float
+            In the unit of the scene, 0 or more.
+
+        Returns
+        -------
+        Exclusion
+
+        Examples
+        --------
+        >>> import impinge
+        >>> scene = impinge.Scene()
+        >>> strip = [[i // 2, i % 2, 0] for i in range(12)]
+        >>> cloth = scene.add(strip, [[i, i + 1, i + 2] for i in range(10)])
+        >>> detector = impinge.Detector("cpu")
+        >>> len(detector.near(scene, 1.0)) > 0, len(detector.near(scene, 1.0, exclude=scene.rest_pairs(1.0)))
+        (True, 0)
+        """
+        return _rest_pairs(Detector("cpu").near(self, distance)._inner)
 
     def set_thickness(self, body: _Body, thickness: SupportsFloat) -> None:
         """Sets how thick a body is: what its elements add to the distance of `Detector.near`, of two elements of one body
