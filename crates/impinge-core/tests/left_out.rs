@@ -288,11 +288,8 @@ fn pairs_of_an_answer_are_left_out() {
     let named: BTreeSet<(PairKind, [u32; 4])> =
         at_rest.iter().map(|pair| (pair.kind, pair.row())).collect();
     let keeps = |(parts, [a, b]): &Named| {
-        let kinds = PairKind::ALL.into_iter();
-        let kind = kinds
-            .filter(|kind| kind.parts() == *parts)
-            .next()
-            .expect("a kind");
+        let mut kinds = PairKind::ALL.into_iter();
+        let kind = kinds.find(|kind| kind.parts() == *parts).expect("a kind");
         let row = [
             a.body.index() as u32,
             a.element,

@@ -90,7 +90,7 @@ impl Plan {
         let has_pinned = scene.bodies().any(|(_, body)| body.pinned().is_some());
         // What shares a vertex is left out of questions about vertices, edges and faces anyway, and by its own rule elsewhere.
         let rings = query.rings > 0;
-        if !(has_pinned || rings || !query.groups.is_empty() || !query.pairs.is_empty()) {
+        if !has_pinned && !rings && query.groups.is_empty() && query.pairs.is_empty() {
             return Ok(());
         }
         let of_part = |part: PartIx| {

@@ -166,8 +166,11 @@ pub(crate) struct Topology {
     edges: OnceLock<Elements>,
     boundary: OnceLock<Elements>,
     /// The last ones that were asked for, with their number.
-    rings: Arc<Mutex<Option<(u32, Arc<VertexRings>)>>>,
+    rings: Arc<Mutex<Option<NumberedRings>>>,
 }
+
+/// Rings, and how many.
+type NumberedRings = (u32, Arc<VertexRings>);
 
 /// The vertices at most some number of edges away from each vertex, itself included.
 #[derive(Debug)]
