@@ -8,7 +8,6 @@ use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 
-use crate::near::Near;
 use crate::settings::unsigned;
 
 /// Pairs of elements that a question leaves out: made by `rings`, `groups` and `Scene.rest_pairs`.
@@ -16,6 +15,16 @@ use crate::settings::unsigned;
 pub struct Exclusion {
     pub inner: Inner,
     name: Name,
+}
+
+impl Exclusion {
+    /// The pairs of an answer.
+    pub fn pairs(near: &impinge::NearPairs) -> Self {
+        Exclusion {
+            inner: Inner::from(near),
+            name: Name::Pairs(near.len()),
+        }
+    }
 }
 
 #[derive(Clone, Copy, PartialEq, Hash)]
@@ -78,13 +87,4 @@ pub fn _groups(g: &Bound<'_, PyAny>, h: &Bound<'_, PyAny>) -> PyResult<Exclusion
         inner: Inner::groups(g, h),
         name: Name::Groups([g.min(h), g.max(h)]),
     })
-}
-
-#[pyfunction]
-pub fn _rest_pairs(near: &Bound<'_, Near>) -> Exclusion {
-    let near = near.get().whole();
-    Exclusion {
-        inner: Inner::from(near),
-        name: Name::Pairs(near.len()),
-    }
 }

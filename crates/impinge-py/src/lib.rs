@@ -55,13 +55,13 @@ mod _impinge {
     #[pymodule_export]
     use super::devices::_devices;
     #[pymodule_export]
-    use super::exclusion::{_groups, _rest_pairs, _rings, Exclusion};
+    use super::exclusion::{_groups, _rings, Exclusion};
     #[pymodule_export]
     use super::files::{Mesh, read, read_bodies};
     #[pymodule_export]
     use super::functions::{_hash_rows, _weld};
     #[pymodule_export]
-    use super::near::Near;
+    use super::near::{_rest_pairs, Near};
     #[pymodule_export]
     use super::options::_check_options;
     #[pymodule_export]

@@ -10,6 +10,7 @@ use pyo3::types::PyDict;
 
 use crate::answers::{collect, kind_numbers, to_array};
 use crate::errors::invalid;
+use crate::exclusion::Exclusion;
 use crate::options::pair_kind;
 use crate::statistics;
 
@@ -40,11 +41,6 @@ impl Near {
             has_distances,
             has_points,
         }
-    }
-
-    /// All pairs of the answer.
-    pub fn whole(&self) -> &impinge::NearPairs {
-        &self.inner
     }
 
     fn iter(&self) -> NearIter<'_> {
@@ -153,4 +149,10 @@ pub fn number(feature: Feature) -> u8 {
         Feature::Edge(ix) => 3 + ix % 3,
         Feature::Face => 6,
     }
+}
+
+/// What leaves out all pairs of an answer.
+#[pyfunction]
+pub fn _rest_pairs(near: &Bound<'_, Near>) -> Exclusion {
+    Exclusion::pairs(&near.get().inner)
 }

@@ -161,7 +161,7 @@ pub(super) fn numbers_in([a, b]: [&Group; 2], [lane_a, lane_b]: [u8; 2]) -> [Num
 
 /// The key of a pair, by its lanes in two groups.
 #[inline(always)]
-pub(in crate::cpu::steps) fn key_in(groups: [&Group; 2], lanes: [u8; 2]) -> u64 {
+pub fn key_in(groups: [&Group; 2], lanes: [u8; 2]) -> u64 {
     let [a, b] = numbers_in(groups, lanes);
     pair_key(a, b)
 }
