@@ -4,7 +4,7 @@
 //! element, floats that enclose its distance are found. What may be nearest by these is kept, mostly one element, or the few that share
 //! the nearest edge or vertex. Exact comparisons decide among these. So the answer does not depend on the order of the search.
 //!
-//! Neighbouring points come one after the other in most arrays. So the element found last is a first bound for the next point.
+//! Points come in an order in which most are near to the one before. So the element found last is a first bound for the next point.
 //!
 //! Cost: per point some dozens of boxes per level of the tree, and in one or two clusters 64 boxes and a few elements.
 

@@ -1,0 +1,46 @@
+//! An order of points in which most are near to the one before: along a Morton curve in their box.
+//!
+//! Cost: `O(n log n)` comparisons of single numbers. No answer depends on this order.
+
+use crate::scene::positions::Real;
+
+/// Bits per axis.
+const BITS: u32 = 10;
+
+/// The numbers of the points in the order of the curve; of equal places, the lower number first.
+pub(super) fn along_curve<R: Real>(points: &[[R; 3]]) -> Vec<u32> {
+    let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+    for point in points {
+        for (axis, &x) in point.iter().enumerate() {
+            low[axis] = low[axis].min(x.widen());
+            high[axis] = high[axis].max(x.widen());
+        }
+    }
+    // Halves, for the difference may overflow.
+    let half = [0, 1, 2].map(|axis| 0.5 * high[axis] - 0.5 * low[axis]);
+    let most = f64::from((1u32 << BITS) - 1);
+    let place = |point: &[R; 3]| {
+        let mut code = 0;
+        for (axis, &x) in point.iter().enumerate() {
+            // Where all are equal this is not a number, which becomes 0.
+            let share = (0.5 * x.widen() - 0.5 * low[axis]) / half[axis];
+            code |= spread((share * most) as u32) << axis;
+        }
+        code
+    };
+    let numbered = (0u64..).zip(points);
+    let mut keys: Vec<u64> = numbered
+        .map(|(ix, point)| u64::from(place(point)) << 32 | ix)
+        .collect();
+    keys.sort_unstable();
+    keys.into_iter().map(|key| key as u32).collect()
+}
+
+/// Two zeros after each of the lowest ten bits.
+fn spread(x: u32) -> u32 {
+    let x = x.min((1 << BITS) - 1);
+    let x = (x | x << 16) & 0x0300_00ff;
+    let x = (x | x << 8) & 0x0300_f00f;
+    let x = (x | x << 4) & 0x030c_30c3;
+    (x | x << 2) & 0x0924_9249
+}
