@@ -17,7 +17,7 @@ For deforming meshes keep a `Scene` and a `Detector`, move the vertices with
 those under the names of ipc-toolkit.
 """
 
-from . import ipc, ray, tiles
+from . import ipc, ray, tiles, trimesh
 from ._answers import (
     Advance,
     Candidates,
@@ -126,6 +126,7 @@ __all__ = [
     "self_pairs",
     "signed_distance",
     "tiles",
+    "trimesh",
     "weld",
 ]
 
