@@ -70,14 +70,21 @@ pub enum Approach {
 }
 
 /// The most planes that are tried.
-const N_PLANES: usize = 24;
+const N_PLANES: usize = 64;
+
+/// The least time by which elements are looked at later: times are numbers from 0 to 1.
+const LEAST_WIDTH: f64 = 2.0 * f64::EPSILON;
+
+/// How often the elements are looked at where planes lead no farther, each time eight times as far beyond.
+const N_LOOKS: usize = 9;
 
 /// Follows two elements from t = 0 to when they are within a distance, at most to `until`.
 ///
 /// From a time at which they are certainly farther apart, time advances to where some corner of the difference polygon
 /// reaches a plane at the distance from the origin, across the nearest point. Up to then all corners are beyond that plane. As
 /// with Newton's method, the steps become shorter fast, until rounding ends them; then the elements are certainly near a little
-/// later, unless they only graze.
+/// later, unless they only graze. How much later depends on how fast the nearest points come, which may be slower than the corner that
+/// reaches the plane: so a few times are tried.
 pub fn approach(
     pair: ElementPair,
     start: &[Point; 4],
@@ -99,34 +106,58 @@ pub fn approach(
     if stay_beyond(&first, &goal, largest, distance) {
         return Approach::Apart;
     }
-    let (mut time, mut here) = (0.0, first);
-    for _ in 0..N_PLANES {
-        let near = here.nearest(&here.normal());
-        if are_beyond(&near, &[here, goal], largest, distance) {
-            return Approach::Apart;
-        }
+    let nearest_at = |time: f64| {
+        let there = first.at(&last, time);
+        there.nearest(&there.normal())
+    };
+    let is_near_at = |time: f64| distance > most(&nearest_at(time), largest);
+    // How far a plane leads from a polygon at some time, and how much later the elements may be near.
+    let leads = |here: &Polygon, time: f64, normal: &Point| {
         // Beyond the bound by more than rounding, so that the next polygon is certainly beyond it.
-        let [bound, error] = beyond(&near, largest, distance);
+        let [bound, error] = beyond(normal, largest, distance);
         let level = bound + 2.0 * error;
         let (mut next, mut speed) = (1.0, 0.0);
         for (from, to) in first.corners().iter().zip(last.corners()) {
-            let (from, to) = (dot(&near, from), dot(&near, to));
+            let (from, to) = (dot(normal, from), dot(normal, to));
             let reached = (from - level) / (from - to);
             if to < level && reached < next {
                 (next, speed) = (reached, from - to);
             }
         }
         let there = first.at(&last, next);
-        if !(time < next && next < 1.0 && are_beyond(&near, &[here, there], largest, distance)) {
-            return Approach::Unsure;
+        let is_later = time < next && next < 1.0;
+        (is_later && are_beyond(normal, &[*here, there], largest, distance))
+            .then(|| (next, there, f64::max(16.0 * error / speed, LEAST_WIDTH)))
+    };
+    let (mut time, mut here, mut width) = (0.0, first, LEAST_WIDTH);
+    let mut before: Option<[f64; 2]> = None;
+    for _ in 0..N_PLANES {
+        let near = here.nearest(&here.normal());
+        if are_beyond(&near, &[here, goal], largest, distance) {
+            return Approach::Apart;
         }
-        let later = f64::min(next + 16.0 * error / speed, 1.0);
-        let behind = first.at(&last, later);
-        let near = behind.nearest(&behind.normal());
-        if distance > most(&near, largest) {
-            return Approach::Between([next, later]);
+        // A plane as it is at the contact turns no more until then. By how the gap has become smaller, that is here:
+        let gap = root(dot(&near, &near)) - distance;
+        let guess = before.map(|[then, wide]| time + gap * (time - then) / (wide - gap));
+        let ahead = guess
+            .filter(|&guess| time < guess && guess < 1.0)
+            .and_then(|guess| leads(&here, time, &nearest_at(guess)));
+        let Some((next, there, later)) = ahead.or_else(|| leads(&here, time, &near)) else {
+            break;
+        };
+        width = later;
+        if is_near_at(f64::min(next + width, 1.0)) {
+            return Approach::Between([next, f64::min(next + width, 1.0)]);
         }
+        before = Some([time, gap]);
         (time, here) = (next, there);
+    }
+    for _ in 0..N_LOOKS {
+        let later = f64::min(time + width, 1.0);
+        if is_near_at(later) {
+            return Approach::Between([time, later]);
+        }
+        width *= 8.0;
     }
     Approach::Unsure
 }
