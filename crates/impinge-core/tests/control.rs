@@ -74,8 +74,17 @@ fn bits(points: &[[f64; 3]]) -> u64 {
     bits.fold(0, |sum, x| sum.rotate_left(5) ^ x)
 }
 
+/// The vertices of the first body.
+fn points(world: &World) -> Vec<[f64; 3]> {
+    let body = world.scene.body(world.bodies[0]).unwrap();
+    let positions = body.positions();
+    (0..body.n_vertices())
+        .map(|ix| positions.point(ix))
+        .collect()
+}
+
 /// By the names of the methods; where one is asked twice, with more after a space.
-const ALL: [(&str, Ask); 15] = [
+const ALL: [(&str, Ask); 19] = [
     ("detect", |d, w| {
         Ok(d.detect(&w.scene, &Query::all())?.hash())
     }),
@@ -114,6 +123,32 @@ const ALL: [(&str, Ask); 15] = [
     ("near", |d, w| {
         let query = Query::between_all();
         Ok(d.near(&w.scene, 0.0, &query)?.hash())
+    }),
+    ("safe_distances", |d, w| {
+        let safe = d.safe_distances(&w.scene, 0.05, &Query::between_all())?;
+        let bounds = safe.of(w.bodies[0]).expect("a body");
+        let sum = (0..bounds.len()).fold(0, |sum: u64, ix| {
+            sum.rotate_left(5) ^ bounds.get(ix).to_bits()
+        });
+        Ok(sum ^ safe.touching().hash())
+    }),
+    ("neighbours", |d, w| {
+        let lists = d.neighbours(&w.scene, 0.01, &Query::between_all())?;
+        let columns = lists.vf().indices.iter().chain(&lists.ee().indices);
+        Ok(columns.fold(lists.len() as u64, |sum, &ix| {
+            sum.rotate_left(5) ^ u64::from(ix)
+        }))
+    }),
+    ("closest", |d, w| {
+        let points = points(w);
+        let closest = d.closest(&w.scene, &points, f64::INFINITY, &Query::of(w.bodies[2]))?;
+        Ok(closest.hash())
+    }),
+    ("contains", |d, w| {
+        let places = d.contains(&w.scene, w.bodies[1], &points(w))?;
+        Ok(places
+            .iter()
+            .fold(0, |sum, &place| 3 * (sum % (1 << 60)) + (place + 1) as u64))
     }),
     ("nearest", |d, w| {
         let [a, ..] = w.bodies;
