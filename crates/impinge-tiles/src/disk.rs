@@ -9,7 +9,7 @@ use impinge_io::AtomicFile;
 use crate::error::Error;
 
 /// Writes a temporary file and renames it, so that readers see either the old file or the new one. A process that is
-/// killed leaves a `.part` file behind, which no step reads.
+/// killed leaves a `.part` file behind, which no step reads: [`remove_leftovers`].
 pub fn replace(
     path: &Path,
     write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
@@ -27,6 +27,30 @@ pub fn replace(
     synced.map_err(error)?;
     file.finish()?;
     step().map_err(error)
+}
+
+/// Removes the temporary files, left by processes that were killed, of those files of a folder that are whole by now.
+pub fn remove_leftovers(folder: &Path) -> Result<(), Error> {
+    let error = |source| Error::io(folder, "look into the folder", source);
+    for entry in fs::read_dir(folder).map_err(error)? {
+        let entry = entry.map_err(error)?;
+        let name = entry.file_name();
+        // `.NAME.PROCESS-SERIAL.part`, as `AtomicFile` calls them.
+        let target = name.to_str().and_then(|name| {
+            let (target, numbers) = name
+                .strip_prefix('.')?
+                .strip_suffix(".part")?
+                .rsplit_once('.')?;
+            let (process, serial) = numbers.split_once('-')?;
+            let are_numbers = [process, serial].iter().all(|x| x.parse::<u32>().is_ok());
+            are_numbers.then_some(target)
+        });
+        if target.is_some_and(|target| folder.join(target).exists()) {
+            // Another process may have removed it.
+            let _ = fs::remove_file(entry.path());
+        }
+    }
+    Ok(())
 }
 
 /// Creates a folder, unless it exists.

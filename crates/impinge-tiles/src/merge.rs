@@ -90,6 +90,10 @@ impl Plan {
         disk::replace(&self.folder().join("answer.json"), |to| {
             writeln!(to, "{object}")
         })?;
+        // All is whole now.
+        for sub in ["", "parts", "results"] {
+            disk::remove_leftovers(&self.folder().join(sub))?;
+        }
         Ok(merged)
     }
 

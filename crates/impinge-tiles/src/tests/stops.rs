@@ -56,6 +56,47 @@ fn a_step_stopped_at_each_write_and_run_again_has_the_same_bytes() {
     stop_everywhere(folder.path(), &meshes, options, hash, 30);
 }
 
+#[test]
+fn what_killed_processes_have_left_goes_with_the_merge() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut random = Random(8);
+    let meshes = [30, 20].map(|n| lattice(&mut random, n, false, false));
+    let files = [
+        write(folder.path(), "a", &meshes[0]),
+        write(folder.path(), "b", &meshes[1]),
+    ];
+    let whole = folder.path().join("whole");
+    let options = PlanOptions::default();
+    let merged = answer(&whole, &files, &options, Ask::default()).unwrap();
+    let named = |sub: &str| {
+        let mut entries = std::fs::read_dir(whole.join(sub)).unwrap();
+        let name = entries.find_map(|entry| {
+            let name = entry.unwrap().file_name().into_string().unwrap();
+            whole.join(sub).join(&name).is_file().then_some(name)
+        });
+        name.unwrap()
+    };
+    let leftovers = ["", "parts", "results"]
+        .map(|sub| whole.join(sub).join(format!(".{}.4711-3.part", named(sub))));
+    // Of a file that is not whole yet, and what is not ours.
+    let others = [
+        ".absent.4711-3.part",
+        ".rows.npy.old.part",
+        "answer.json.1-2.part",
+    ];
+    for path in leftovers
+        .iter()
+        .cloned()
+        .chain(others.map(|name| whole.join(name)))
+    {
+        std::fs::write(path, "half of it").unwrap();
+    }
+    let again = answer(&whole, &files, &options, Ask::default()).unwrap();
+    assert_eq!(again.hash, merged.hash);
+    assert_eq!(leftovers.map(|path| path.exists()), [false; 3]);
+    assert_eq!(others.map(|name| whole.join(name).exists()), [true; 3]);
+}
+
 /// Stops all steps at each of their writes, at least `n_least` of them.
 fn stop_everywhere(
     folder: &Path,
