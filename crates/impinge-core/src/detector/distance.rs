@@ -100,7 +100,7 @@ impl Detector {
         if query.cell.is_some() {
             return refused("owned_by", "a cell");
         }
-        if query.rings > 0 || !query.groups.is_empty() {
+        if query.rings.is_some() || !query.groups.is_empty() {
             return refused("exclude", "rings or groups");
         }
         let plan = Plan::intersections(scene, query, Goal::Any, self.settings.limits())?;

@@ -3,9 +3,9 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use crate::query::Query;
 use crate::query::pair_kind::PairKind;
 use crate::query::pair_set::{PairSet, SortedKeys};
+use crate::query::{Exclusion, Query};
 use crate::scene::Scene;
 use crate::scene::elements::VertexRings;
 use crate::scene::error::Error;
@@ -80,23 +80,24 @@ impl LeftOut {
 impl Plan {
     /// Resolves what the query and the scene leave out.
     pub(super) fn leave_out(&mut self, scene: &Scene, query: &Query) -> Result<(), Error> {
-        if query.rings > crate::query::Exclusion::MOST_RINGS {
+        if let Some(n) = query.rings
+            && n > Exclusion::MOST_RINGS
+        {
             return Err(Error::Setting {
                 setting: "rings",
-                given: query.rings.to_string(),
+                given: n.to_string(),
                 allowed: "at most 16",
             });
         }
         let has_pinned = scene.bodies().any(|(_, body)| body.pinned().is_some());
-        // What shares a vertex is left out of questions about vertices, edges and faces anyway, and by its own rule elsewhere.
-        let rings = query.rings > 0;
-        if !has_pinned && !rings && query.groups.is_empty() && query.pairs.is_empty() {
+        if !has_pinned && query.rings.is_none() && query.groups.is_empty() && query.pairs.is_empty()
+        {
             return Ok(());
         }
         let of_part = |part: PartIx| {
             let body = self.body(scene, part);
             OfPart {
-                rings: rings.then(|| body.vertex_rings(query.rings)),
+                rings: query.rings.map(|n| body.vertex_rings(n)),
                 groups: body.groups().cloned(),
                 pinned: body.pinned().cloned(),
             }

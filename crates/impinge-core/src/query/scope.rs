@@ -114,7 +114,7 @@ pub struct Query {
     pub(crate) scope: Scope,
     pub(crate) shared_vertex: SharedVertex,
     pub(crate) excluded: BTreeSet<(BodyId, BodyId)>,
-    pub(crate) rings: u32,
+    pub(crate) rings: Option<u32>,
     pub(crate) groups: BTreeSet<(u32, u32)>,
     pub(crate) pairs: Vec<PairSet>,
     pub(crate) cell: Option<Cell>,
@@ -144,7 +144,7 @@ impl Query {
             scope,
             shared_vertex: SharedVertex::default(),
             excluded: BTreeSet::new(),
-            rings: 0,
+            rings: None,
             groups: BTreeSet::new(),
             pairs: Vec::new(),
             cell: None,
@@ -251,7 +251,7 @@ impl Query {
             Excluded::Bodies(a, b) => {
                 self.excluded.insert((a, b));
             }
-            Excluded::Rings(n) => self.rings = self.rings.max(n),
+            Excluded::Rings(n) => self.rings = self.rings.max(Some(n)),
             Excluded::Groups(g, h) => {
                 self.groups.insert((g, h));
             }
