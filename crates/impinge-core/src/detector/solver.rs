@@ -63,10 +63,10 @@ impl Detector {
     /// let floor = scene.add_triangles(&[[0, 1, 2]], &[[0.0f32, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]])?;
     /// let points = scene.add_points(&[[1.0f32, 1.0, 0.5], [1.0, 1.0, 9.0]])?;
     /// let safe = Detector::new(Backend::Cpu)?.safe_distances(&scene, 1.0, &Query::all().fixed([floor]))?;
-    /// let bounds = safe.of(points)?;
+    /// let bounds = safe.of(points).expect("a body");
     /// assert!(bounds.get(0) < 0.5 && bounds.get(0) > 0.4999);
     /// assert_eq!(bounds.get(1), 1.0);
-    /// assert_eq!(safe.of(floor)?, Bounds::F32(&[0.0; 3]));
+    /// assert_eq!(safe.of(floor), Some(Bounds::F32(&[0.0; 3])));
     /// # Ok(()) }
     /// ```
     ///
