@@ -157,7 +157,7 @@ def test_frames_follow_the_positions():
         ({"exclude": [0]}, TypeError, r"^exclude\[0\]: a pair of bodies expected"),
         ({"shared_vertex": "all"}, ValueError, '^shared_vertex: "all" given, "resolve", "skip"'),
         ({"shared_vertex": 0}, TypeError, "^shared_vertex: a string expected, int given"),
-        ({"exclude": 0}, TypeError, "^exclude: a pair of bodies, or a sequence of such pairs, expected, int given"),
+        ({"exclude": 0}, TypeError, "^exclude: a pair of bodies, an Exclusion, or a sequence of these, expected, int given"),
         ({"query": {}}, TypeError, "^query: a Query expected, dict given"),
         ({"betwen": (0, 1)}, TypeError, "^betwen: no such option, which, between, self_of, of, kinds, .*, progress allowed"),
         ({"distances": 1}, TypeError, "^distances: True or False expected, int given"),
