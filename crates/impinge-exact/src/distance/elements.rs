@@ -420,16 +420,8 @@ impl<'a> Measured<'a> {
     }
 
     fn compare(&self, other: &Self) -> Ordering {
-        let (over, under) = self.polygon.square_of_distance(self.nearest);
-        let (over_other, under_other) = other.polygon.square_of_distance(other.nearest);
-        // Squares are over 4 to the exponent.
-        let exponents = [self, other].map(|measured| 2 * measured.polygon.exponent);
-        let least = exponents[0].min(exponents[1]);
-        let [shift, shift_other] =
-            exponents.map(|exponent| u64::try_from(exponent - least).expect("not below the least"));
-        let left = (&over * &under_other).shifted(shift);
-        let right = (&over_other * &under).shifted(shift_other);
-        (&left - &right).sign().order()
+        self.polygon
+            .compare_distances(self.nearest, (&other.polygon, other.nearest))
     }
 }
 

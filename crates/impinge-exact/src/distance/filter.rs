@@ -142,12 +142,13 @@ pub fn approach(
         let ahead = guess
             .filter(|&guess| time < guess && guess < 1.0)
             .and_then(|guess| leads(&here, time, &nearest_at(guess)));
-        let Some((next, there, later)) = ahead.or_else(|| leads(&here, time, &near)) else {
+        let Some((next, there, least_width)) = ahead.or_else(|| leads(&here, time, &near)) else {
             break;
         };
-        width = later;
-        if is_near_at(f64::min(next + width, 1.0)) {
-            return Approach::Between([next, f64::min(next + width, 1.0)]);
+        width = least_width;
+        let later = f64::min(next + width, 1.0);
+        if is_near_at(later) {
+            return Approach::Between([next, later]);
         }
         before = Some([time, gap]);
         (time, here) = (next, there);

@@ -1,5 +1,7 @@
 //! Which features of two elements are nearest, and whether they are within a distance; in integers.
 
+use core::cmp::Ordering;
+
 use super::features::{NearestFeatures, PolygonPart};
 use super::filter;
 use super::reach::Reach;
@@ -39,9 +41,14 @@ fn nearest_features_exactly(pair: ElementPair, points: &[Point; 4]) -> NearestFe
 
 /// [`are_within`](super::are_within) by integers alone.
 pub(super) fn are_within(pair: ElementPair, points: &[Point; 4], reach: &Reach) -> bool {
+    compare(pair, points, reach) != Sign::Positive
+}
+
+/// The sign of how much farther apart than a distance two elements are, by integers alone.
+pub(super) fn compare(pair: ElementPair, points: &[Point; 4], reach: &Reach) -> Sign {
     match Polygon::short(pair, points, reach) {
-        Some(polygon) => polygon.is_within(),
-        None => Polygon::of_any_size(pair, points, reach).is_within(),
+        Some(polygon) => polygon.compare(),
+        None => Polygon::of_any_size(pair, points, reach).compare(),
     }
 }
 
@@ -94,6 +101,24 @@ impl Polygon<Integer> {
         let distance = Reach::sum(&integers[12..]);
         Self::new(numbers.len(), corners, distance, exponent)
     }
+
+    /// Which of two polygons is nearer to the origin, given their nearest parts.
+    pub(super) fn compare_distances(
+        &self,
+        nearest: PolygonPart,
+        (other, of_other): (&Self, PolygonPart),
+    ) -> Ordering {
+        let (over, under) = self.square_of_distance(nearest);
+        let (over_other, under_other) = other.square_of_distance(of_other);
+        // Squares are over 4 to the exponent.
+        let exponents = [self, other].map(|polygon| 2 * polygon.exponent);
+        let least = exponents[0].min(exponents[1]);
+        let [shift, shift_other] =
+            exponents.map(|exponent| u64::try_from(exponent - least).expect("not below the least"));
+        let left = (&over * &under_other).shifted(shift);
+        let right = (&over_other * &under).shifted(shift_other);
+        (&left - &right).sign().order()
+    }
 }
 
 impl<T: Coordinate> Polygon<T> {
@@ -130,11 +155,6 @@ impl<T: Coordinate> Polygon<T> {
 
     fn nearest_features(&self, pair: ElementPair) -> NearestFeatures {
         self.nearest().named(pair, self.is_flat())
-    }
-
-    /// Whether the origin is at most as far away as the distance.
-    pub(super) fn is_within(&self) -> bool {
-        self.compare() != Sign::Positive
     }
 
     /// The sign of how much farther away than the distance the origin is.

@@ -6,9 +6,8 @@ use core::cmp::Ordering;
 
 use super::features::PolygonPart;
 use super::filter;
-use super::nearest::Polygon;
+use super::nearest::{self, Polygon};
 use super::reach::Reach;
-use crate::algebra::Integer;
 use crate::element_pair::ElementPair;
 use crate::{Point, Sign};
 
@@ -40,14 +39,8 @@ pub fn point_distance_bounds(point: &Point, corners: &[Point]) -> ([f64; 2], Poi
 /// 0 where they touch, and for distances below the smallest float.
 pub fn point_distance_below(point: &Point, corners: &[Point], rounded: f64) -> f64 {
     let (pair, points) = paired(point, corners);
-    let is_below = |distance: f64| {
-        let reach = Reach::from(distance);
-        let sign = match Polygon::short(pair, &points, &reach) {
-            Some(polygon) => polygon.compare(),
-            None => Polygon::of_any_size(pair, &points, &reach).compare(),
-        };
-        sign != Sign::Negative
-    };
+    let is_below =
+        |distance: f64| nearest::compare(pair, &points, &Reach::from(distance)) != Sign::Negative;
     let mut distance = rounded.clamp(0.0, f64::MAX);
     if is_below(distance) {
         let mut next = distance.next_up();
@@ -73,19 +66,13 @@ pub fn compare_point_distances(point: &Point, a: &[Point], b: &[Point]) -> Order
     {
         return Ordering::Equal;
     }
-    let square = |corners: &[Point]| {
+    let [(a, of_a), (b, of_b)] = [a, b].map(|corners| {
         let (pair, points) = paired(point, corners);
         let polygon = Polygon::of_any_size(pair, &points, &Reach::from(0.0));
-        let (over, under) = polygon.square_of_distance(polygon.nearest());
-        (over, under, 2 * polygon.exponent)
-    };
-    let ((x, y, i), (z, w, j)) = (square(a), square(b));
-    let least = i.min(j);
-    let shifted =
-        |x: Integer, by: i64| x.shifted(u64::try_from(by - least).expect("not below the least"));
-    let left = shifted(&x * &w, i);
-    let right = shifted(&z * &y, j);
-    (&left - &right).sign().order()
+        let nearest = polygon.nearest();
+        (polygon, nearest)
+    });
+    a.compare_distances(of_a, (&b, of_b))
 }
 
 /// The ends of the edge, or twice the vertex, that is nearest; none for the inside of a face, and where floats cannot tell.

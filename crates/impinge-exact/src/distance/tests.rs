@@ -313,7 +313,7 @@ fn integers_of_fixed_width_answer_as_those_of_any_size() {
         n_short += 1;
         assert_eq!(short.nearest(), long.nearest(), "{}", case());
         assert_eq!(short.is_flat(), long.is_flat(), "{}", case());
-        assert_eq!(short.is_within(), long.is_within(), "{}", case());
+        assert_eq!(short.compare(), long.compare(), "{}", case());
         let (a, b) = (
             closest_of(&short, pair, points),
             closest_of(&long, pair, points),
@@ -383,7 +383,7 @@ fn the_largest_short_numbers_fit() {
                     panic!("{pair:?} {points:?} {reach:?}");
                 };
                 assert_eq!(short.nearest(), long.nearest(), "{pair:?} {points:?}");
-                assert_eq!(short.is_within(), long.is_within(), "{pair:?} {points:?}");
+                assert_eq!(short.compare(), long.compare(), "{pair:?} {points:?}");
             }
             let half = Reach::from(0.5);
             let far = points.map(|point| point.map(|x| 2.0 * x));
