@@ -7,7 +7,6 @@
 use super::coordinates::{Definition, Precision};
 use super::meet::{Local, ends, meet};
 use super::parts::ByBodies;
-use super::work::{Equal, Work};
 use super::{Contacts, Doubles, Feature, PointName, Shape, lowest};
 use crate::answers::pairs::Pairs;
 use crate::scene::elements::{BodyKind, Elements};
@@ -17,6 +16,7 @@ use crate::scene::index::VertexIx;
 use crate::scene::positions::{Positions, check_positions};
 use crate::scene::{Body, Scene};
 use crate::search::sink::{self, grow, reserve};
+use crate::search::work::{Equal, Work};
 use impinge_exact::Point;
 
 /// Pairs per task.

@@ -45,7 +45,6 @@ mod penetration;
 mod regions;
 mod solids;
 mod topology;
-mod work;
 
 pub use convex::{ConvexOverlap, convex_overlap};
 pub use curves::Curves;
@@ -55,7 +54,6 @@ pub use penetration::Penetration;
 pub(crate) use penetration::Topologies;
 pub use regions::Region;
 pub use solids::SolidOverlap;
-pub(crate) use work::{Equal, Work};
 
 use std::sync::Arc;
 
@@ -64,6 +62,7 @@ use crate::scene::Scene;
 use crate::scene::error::Error;
 use crate::scene::index::VertexIx;
 use crate::search::sets::Sets;
+use crate::search::work::Work;
 
 /// The vertex, edge or face of a body in whose relative interior a point of contact lies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]

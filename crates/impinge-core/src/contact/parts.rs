@@ -5,10 +5,10 @@
 
 use std::ops::Range;
 
-use super::work::Work;
 use super::{Contacts, PointName};
 use crate::scene::error::Error;
 use crate::search::sink::{filled, with_capacity};
+use crate::search::work::Work;
 
 /// What memory is for.
 const WHAT: &str = "contacts by bodies";

@@ -20,13 +20,13 @@ use super::regions::{
     NO_REGION, Region, Vector, WHAT, add, cross, dot, join_contacts, regions, scaled, sub,
 };
 use super::topology::EdgesAround;
-use super::work::Work;
 use super::{Contacts, Feature, PointName, Shape};
 use crate::scene::error::Error;
 use crate::scene::index::VertexIx;
 use crate::scene::{Body, BodyId, BodyKind, Elements, Scene};
 use crate::search::sets::Sets;
 use crate::search::sink::grow;
+use crate::search::work::Work;
 use impinge_exact::{Sign, orient3d};
 
 /// The topologies of closed bodies, from call to call.

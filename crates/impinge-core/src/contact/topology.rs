@@ -5,10 +5,10 @@
 //!
 //! Cost: `O(n log n)` once per topology.
 
-use super::work::{Equal, Work};
 use crate::scene::BodyId;
 use crate::scene::error::Error;
 use crate::scene::index::VertexIx;
+use crate::search::work::{Equal, Work};
 
 /// Faces whose edges are sorted by one task.
 const FACES: usize = 8 * 1024;

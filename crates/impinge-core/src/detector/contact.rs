@@ -2,10 +2,11 @@
 
 use super::Detector;
 use crate::answers::pairs::Pairs;
-use crate::contact::{Contacts, Penetration, Work};
+use crate::contact::{Contacts, Penetration};
 use crate::scene::Scene;
 use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
+use crate::search::work::Work;
 
 impl Detector {
     /// Where the triangles of each pair meet: points, segments and polygons. The scene must not have changed since the pairs

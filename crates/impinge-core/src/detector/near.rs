@@ -1,11 +1,8 @@
 //! A detector's answers about elements within a distance of each other.
 
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicBool, Ordering};
-
 use super::Detector;
 use super::in_step::{InStep, Keys, Seen};
-use crate::answers::near::{ClosestPoints, Labels, NearPairs, Unnamed};
+use crate::answers::near::{ClosestPoints, Labels, NearPairs};
 use crate::answers::pairs::Element;
 use crate::plan::{Plan, TestId};
 use crate::query::Query;
@@ -18,6 +15,7 @@ use crate::search::found::KeysByKind;
 use crate::search::narrow::{Corners, exact_kind};
 use crate::search::runner::{Job, Outcome, ready};
 use crate::search::stats::Stats;
+use crate::search::work::Work;
 use crate::workers::clock::Instant;
 use impinge_exact::internal::{NearestOfElements, closest_of_elements, nearest_of_elements};
 
@@ -62,6 +60,25 @@ impl Detector {
         distance: f64,
         query: &Query,
     ) -> Result<NearPairs, Error> {
+        let mut near = self.homes.near.take();
+        let mut outcome = WithFeatures {
+            near: &mut near,
+            query,
+        };
+        let found = self.find_near(scene, distance, query, &mut outcome);
+        self.stats.clone_from(near.stats());
+        near.home = self.home(&self.homes.near);
+        found.map(|_| near)
+    }
+
+    /// Finds the pairs within a distance, for whatever becomes of them.
+    pub(super) fn find_near(
+        &mut self,
+        scene: &Scene,
+        distance: f64,
+        query: &Query,
+        outcome: &mut impl Outcome<u64, { PairKind::ALL.len() }>,
+    ) -> Result<u64, Error> {
         let control = &self.control.clone();
         let plan = Plan::nearness(scene, query, distance, self.settings.limits())?;
         let mut finder = InStep {
@@ -72,18 +89,7 @@ impl Detector {
             keys: Keys::All,
             seen: Seen::default(),
         };
-        let mut near = self.homes.near.take();
-        let mut outcome = WithFeatures {
-            near: &mut near,
-            query,
-        };
-        let found = ready(
-            self.runner
-                .run(scene, &plan, control, &mut finder, &mut outcome),
-        );
-        self.stats.clone_from(near.stats());
-        near.home = self.home(&self.homes.near);
-        found.map(|_| near)
+        ready(self.runner.run(scene, &plan, control, &mut finder, outcome))
     }
 }
 
@@ -133,26 +139,18 @@ pub(super) fn name_features(
         control,
     } = job;
     let labels = Labels::new(plan.n_primitives());
-    let (unnamed, numbering) = near.fill(keys, query, workers.task(TASK))?;
-    let tasks: Vec<Mutex<Unnamed<'_>>> = unnamed.into_iter().map(Mutex::new).collect();
-    let n_tasks = tasks.len();
-    let is_stopped = AtomicBool::new(false);
-    workers.for_each(&mut vec![(); workers.n()], n_tasks, |(), ix| {
-        if is_stopped.load(Ordering::Relaxed) || control.step(ix as u64, n_tasks as u64).is_err() {
-            is_stopped.store(true, Ordering::Relaxed);
-            return;
-        }
-        if let Ok(mut unnamed) = tasks[ix].lock() {
-            let kind = unnamed.kind;
-            let find = |key| {
-                let (a, b) = numbering.pair(key);
-                find_features(scene, kind, [a, b], query.distances)
-            };
-            unnamed.name(labels, exact_kind(TestId::Elements(kind)), find);
-        }
-    });
-    drop(tasks);
-    control.step(n_tasks as u64, n_tasks as u64)?;
+    let (mut unnamed, numbering) = near.fill(keys, query, workers.task(TASK))?;
+    let n_tasks = unnamed.len() as u64;
+    Work { workers, control }.each(&mut unnamed, |_, unnamed| {
+        let kind = unnamed.kind;
+        let find = |key| {
+            let (a, b) = numbering.pair(key);
+            find_features(scene, kind, [a, b], query.distances)
+        };
+        unnamed.name(labels, exact_kind(TestId::Elements(kind)), find);
+        Ok(())
+    })?;
+    control.step(n_tasks, n_tasks)?;
     let ms = features.elapsed().as_secs_f64() * 1e3;
     near.stats_mut().add_ms("features", ms);
     Ok(())

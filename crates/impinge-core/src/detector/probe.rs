@@ -2,13 +2,13 @@
 
 use super::Detector;
 use crate::answers::closest::Closest;
-use crate::contact::Work;
 use crate::probe::Shared;
 use crate::query::Query;
 use crate::scene::Scene;
 use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
 use crate::scene::positions::Real;
+use crate::search::work::Work;
 
 impl Detector {
     /// Where each point lies: inside a body (1), on its surface (0) or outside (-1). Decided exactly, also for points on faces,

@@ -6,11 +6,9 @@
 //! Neighbours                         the pairs by element
 //! ```
 
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::Detector;
-use super::in_step::{InStep, Keys, Seen};
 use super::near::name_features;
 use crate::answers::near::Labels;
 use crate::answers::neighbours::Neighbours;
@@ -24,9 +22,10 @@ use crate::scene::error::Error;
 use crate::scene::index::{PartIx, pair_numbers};
 use crate::search::found::KeysByKind;
 use crate::search::narrow::Corners;
-use crate::search::runner::{Job, Outcome, ready};
+use crate::search::runner::{Job, Outcome};
 use crate::search::sink::reserve;
 use crate::search::stats::Stats;
+use crate::search::work::Work;
 use crate::workers::clock::Instant;
 use impinge_exact::internal::distance_below;
 
@@ -91,7 +90,7 @@ impl Detector {
             query,
             most,
         };
-        let found = self.measure(scene, 2.0 * most, query, &mut outcome);
+        let found = self.find_near(scene, 2.0 * most, query, &mut outcome);
         self.solver = memory;
         self.stats.clone_from(safe.stats());
         safe.home = self.home(&self.homes.safe);
@@ -128,32 +127,11 @@ impl Detector {
             neighbours: &mut neighbours,
             memory: &mut memory,
         };
-        let found = self.measure(scene, distance, query, &mut outcome);
+        let found = self.find_near(scene, distance, query, &mut outcome);
         self.solver = memory;
         self.stats.clone_from(neighbours.stats());
         neighbours.home = self.home(&self.homes.neighbours);
         found.map(|_| neighbours)
-    }
-
-    /// Finds the pairs within a distance, for an outcome that measures them.
-    fn measure(
-        &mut self,
-        scene: &Scene,
-        distance: f64,
-        query: &Query,
-        outcome: &mut impl Outcome<u64, { PairKind::ALL.len() }>,
-    ) -> Result<u64, Error> {
-        let control = &self.control.clone();
-        let plan = Plan::nearness(scene, query, distance, self.settings.limits())?;
-        let mut finder = InStep {
-            clusters: &mut self.steps.clusters,
-            settings: &self.settings,
-            #[cfg(feature = "gpu")]
-            gpu: &mut self.gpu,
-            keys: Keys::All,
-            seen: Seen::default(),
-        };
-        ready(self.runner.run(scene, &plan, control, &mut finder, outcome))
     }
 }
 
@@ -194,21 +172,10 @@ impl SolverMemory {
             reserve(distances, keys.len(), "distances")?;
             distances.resize(keys.len(), 0.0);
             let parts = keys.chunks_mut(n_each).zip(distances.chunks_mut(n_each));
-            tasks.extend(parts.map(|(keys, distances)| Mutex::new((kind, keys, distances))));
+            tasks.extend(parts.map(|(keys, distances)| (kind, keys, distances)));
         }
-        let n_tasks = tasks.len();
-        let is_stopped = AtomicBool::new(false);
-        workers.for_each(&mut vec![(); workers.n()], n_tasks, |(), ix| {
-            if is_stopped.load(Ordering::Relaxed)
-                || control.step(ix as u64, n_tasks as u64).is_err()
-            {
-                is_stopped.store(true, Ordering::Relaxed);
-                return;
-            }
-            let Ok(mut task) = tasks[ix].lock() else {
-                return;
-            };
-            let (kind, keys, distances) = &mut *task;
+        let n_tasks = tasks.len() as u64;
+        Work { workers, control }.each(&mut tasks, |_, (kind, keys, distances)| {
             for (key, distance) in keys.iter_mut().zip(&mut **distances) {
                 (*key, _) = labels.split(*key);
                 let [a, b] = pair_numbers(*key).map(|number| plan.locate(number));
@@ -234,9 +201,9 @@ impl SolverMemory {
                     distance: *distance,
                 });
             }
-        });
-        drop(tasks);
-        control.step(n_tasks as u64, n_tasks as u64)?;
+            Ok(())
+        })?;
+        control.step(n_tasks, n_tasks)?;
         stats.add_ms("measure", start.elapsed().as_secs_f64() * 1e3);
         Ok(())
     }

@@ -2,9 +2,9 @@
 //!
 //! Cost: `O(n log n)` once per topology, one byte per tetrahedron.
 
-use crate::contact::{Equal, Work};
 use crate::scene::error::Error;
 use crate::scene::{Body, Elements};
+use crate::search::work::{Equal, Work};
 
 /// Tetrahedra whose faces are sorted by one task.
 const TETRAHEDRA: usize = 8 * 1024;

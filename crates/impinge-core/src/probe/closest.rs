@@ -14,13 +14,13 @@ use super::Target;
 use crate::answers::closest::ClosestElement;
 use crate::answers::pairs::Element;
 use crate::bvh::bounds::Bounds;
-use crate::contact::Work;
 use crate::scene::elements::with_corners;
 use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
 use crate::scene::index::{ClusterIx, ElementIx};
 use crate::scene::positions::Real;
 use crate::search::narrow::Corners;
+use crate::search::work::Work;
 use crate::simd::{Isa, LaneBounds, Lanes, Simd, up_to, with_isa};
 use impinge_exact::Point;
 use impinge_exact::internal::{

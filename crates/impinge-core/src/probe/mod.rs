@@ -21,7 +21,7 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use crate::answers::closest::ClosestElement;
-use crate::contact::{Topologies, Work};
+use crate::contact::Topologies;
 use crate::proximity::Distances;
 use crate::query::{Query, Scope, SharedVertex};
 use crate::scene::elements::{BodyKind, Part};
@@ -29,6 +29,7 @@ use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
 use crate::scene::positions::Real;
 use crate::scene::{Body, Scene};
+use crate::search::work::Work;
 use crate::simd::Isa;
 
 use border::Border;

@@ -13,3 +13,4 @@ pub(crate) mod sort;
 pub(crate) mod stats;
 #[cfg(feature = "gpu")]
 pub(crate) mod undecided;
+pub(crate) mod work;

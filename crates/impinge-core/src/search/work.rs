@@ -1,4 +1,4 @@
-//! Work on contacts: shared among the workers of a detector, and stopped soon after it is cancelled.
+//! Work in tasks: shared among the workers of a detector, and stopped soon after it is cancelled.
 
 use std::sync::{Mutex, PoisonError};
 
