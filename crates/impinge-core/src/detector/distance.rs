@@ -100,8 +100,8 @@ impl Detector {
         if query.cell.is_some() {
             return refused("owned_by", "a cell");
         }
-        if query.rings.is_some() || !query.groups.is_empty() {
-            return refused("exclude", "rings or groups");
+        if let Some(given) = query.leaves_out_elements() {
+            return refused("exclude", given);
         }
         let plan = Plan::intersections(scene, query, Goal::Any, self.settings.limits())?;
         plan.check(scene)?;

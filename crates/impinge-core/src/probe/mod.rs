@@ -237,6 +237,10 @@ fn targets(scene: &Scene, query: &Query) -> Result<Vec<BodyId>, Error> {
     if !query.excluded.is_empty() {
         return refused("exclude", "pairs of bodies");
     }
+    if let Some(given) = query.leaves_out_elements() {
+        return refused("exclude", given);
+    }
+    query.check_without_filter()?;
     if query.shared_vertex != SharedVertex::default() {
         return refused("shared_vertex", query.shared_vertex.name());
     }

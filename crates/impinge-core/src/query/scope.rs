@@ -414,6 +414,17 @@ impl Query {
         }
     }
 
+    /// What is left out besides pairs of bodies, for questions that are about whole bodies.
+    pub(crate) fn leaves_out_elements(&self) -> Option<&'static str> {
+        if self.rings.is_some() {
+            return Some("rings");
+        }
+        if !self.groups.is_empty() {
+            return Some("groups of vertices");
+        }
+        (!self.pairs.is_empty()).then_some("pairs of vertices, edges and faces")
+    }
+
     /// Refuses pairs of an answer, for questions about the elements that bodies were given as.
     pub(crate) fn check_without_pairs(&self) -> Result<(), Error> {
         match self.pairs.is_empty() {

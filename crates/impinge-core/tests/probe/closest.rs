@@ -3,8 +3,8 @@
 use crate::oracle::{self, Fraction, Vector};
 use impinge_core::exact::Feature;
 use impinge_core::{
-    Backend, BodyId, CancelToken, Closest, Control, Detector, Elements, Error, InstructionSet,
-    Query, Scene, Settings,
+    Backend, BodyId, CancelToken, Closest, Control, Detector, Elements, Error, Exclusion,
+    InstructionSet, PairFilter, Query, Scene, Settings,
 };
 use impinge_scenes::{Model, Random, solids, soup, surfaces};
 
@@ -284,10 +284,15 @@ fn what_is_refused() {
     let a = surfaces::cube([0.0; 3], 1.0).add_to(&mut scene).unwrap();
     let b = surfaces::cube([3.0; 3], 1.0).add_to(&mut scene).unwrap();
     let point = [[0.0f32; 3]];
+    let at_rest = detector.near(&scene, 1.5, &Query::all()).unwrap();
     for query in [
         Query::between(a, b),
         Query::self_all(),
         Query::all().exclude((a, b)),
+        Query::all().exclude(Exclusion::rings(1)),
+        Query::all().exclude(Exclusion::groups(1, 2)),
+        Query::all().exclude(&at_rest),
+        Query::all().filter(PairFilter::new(|_| false)),
         Query::all().owned_by([0.0; 3], [1.0; 3]),
         Query::all().kinds([impinge_core::PairKind::EdgeEdge]),
         Query::all().shared_vertex(impinge_core::SharedVertex::Skip),
