@@ -19,7 +19,7 @@ pub struct Candidates {
     keys: KeysByKind,
     stats: Stats,
     /// Where its buffers go when it is dropped.
-    pub(crate) home: Option<Home<Candidates>>,
+    home: Home<Candidates>,
 }
 
 gives_back!(Candidates);

@@ -25,7 +25,7 @@ pub struct Closest {
     pub(crate) found: Vec<Option<ClosestElement>>,
     pub(crate) stats: Stats,
     /// Where its buffers go when it is dropped.
-    pub(crate) home: Option<Home<Closest>>,
+    home: Home<Closest>,
 }
 
 gives_back!(Closest);

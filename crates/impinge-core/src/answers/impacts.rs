@@ -90,7 +90,7 @@ pub struct Impacts {
     start_intersects: Option<bool>,
     stats: Stats,
     /// Where its buffers go when it is dropped.
-    pub(crate) home: Option<Home<Impacts>>,
+    home: Home<Impacts>,
 }
 
 gives_back!(Impacts);

@@ -92,7 +92,7 @@ pub struct Neighbours {
     n_pairs: usize,
     stats: Stats,
     /// Where its buffers go when it is dropped.
-    pub(crate) home: Option<Home<Neighbours>>,
+    home: Home<Neighbours>,
 }
 
 gives_back!(Neighbours);

@@ -43,7 +43,7 @@ pub struct Pairs {
     bodies: Vec<PairBody>,
     stats: Stats,
     /// Where its buffers go when it is dropped.
-    pub(crate) home: Option<Home<Pairs>>,
+    home: Home<Pairs>,
 }
 
 gives_back!(Pairs);

@@ -58,7 +58,7 @@ pub struct SafeDistances {
     pub(crate) touching: NearPairs,
     stats: Stats,
     /// Where its buffers go when it is dropped.
-    pub(crate) home: Option<Home<SafeDistances>>,
+    home: Home<SafeDistances>,
 }
 
 gives_back!(SafeDistances);

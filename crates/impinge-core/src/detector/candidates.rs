@@ -36,7 +36,7 @@ struct RunSearch<'a> {
     /// Of the last run: the runs have their own.
     stats: &'a mut Stats,
     /// Where the buffers of runs that are dropped go.
-    home: Option<Home<Candidates>>,
+    home: &'a Home<Candidates>,
 }
 
 impl Detector {
@@ -54,12 +54,10 @@ impl Detector {
     ) -> Result<Candidates, Error> {
         let control = &self.control.clone();
         let plan = Plan::candidates(scene, inflation, query, self.settings.limits())?;
-        let home = self.home(&self.homes.candidates);
         let mut candidates = self.homes.candidates.take();
         let mut search = self.search(scene, &plan, control);
         let found = search.find(&plan, Keys::All, &mut candidates);
         self.stats.clone_from(candidates.stats());
-        candidates.home = home;
         found.map(|_| candidates)
     }
 
@@ -134,11 +132,7 @@ impl Detector {
             control,
             runner: &self.runner,
             stats: &mut self.stats,
-            home: self
-                .settings
-                .memory_budget
-                .is_none()
-                .then(|| self.homes.candidates.clone()),
+            home: &self.homes.candidates,
             finder: InStep {
                 clusters: &mut self.steps.clusters,
                 settings: &self.settings,
@@ -220,9 +214,7 @@ impl RunSearch<'_> {
         each: &mut impl FnMut(Candidates) -> ControlFlow<B>,
     ) -> ControlFlow<B> {
         self.stats.clone_from(candidates.stats());
-        let mut run = std::mem::take(candidates);
-        run.home.clone_from(&self.home);
-        each(run)
+        each(std::mem::take(candidates))
     }
 
     /// Counts the candidates in some ranges.
@@ -278,15 +270,13 @@ impl RunSearch<'_> {
     fn find_run(&mut self, candidates: &mut Candidates, run: &Run) -> Result<(), Error> {
         // They fit into the memory budget.
         let plan = self.plan.of_kinds(run.ranges.kinds());
-        match &self.home {
-            Some(home) => *candidates = home.take(),
-            None => {
-                let mut buffers = KeysByKind::default();
-                for (buffer, &n) in buffers.iter_mut().zip(&run.counts) {
-                    *buffer = sink::with_capacity(n as usize, "candidates")?;
-                }
-                candidates.put_buffers(buffers);
+        *candidates = self.home.take();
+        if !self.home.keeps() {
+            let mut buffers = KeysByKind::default();
+            for (buffer, &n) in buffers.iter_mut().zip(&run.counts) {
+                *buffer = sink::with_capacity(n as usize, "candidates")?;
             }
+            candidates.put_buffers(buffers);
         }
         self.find(&plan, Keys::In(&run.ranges), candidates)?;
         Ok(())

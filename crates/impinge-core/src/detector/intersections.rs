@@ -24,7 +24,6 @@ impl Detector {
         let plan = Plan::intersections(scene, query, Goal::All, self.settings.limits())?;
         let mut pairs = self.homes.pairs.take();
         self.wait_for(scene, &plan, control, &mut pairs)?;
-        pairs.home = self.home(&self.homes.pairs);
         Ok(pairs)
     }
 
@@ -37,9 +36,7 @@ impl Detector {
         let control = &self.control.clone();
         let plan = Plan::intersections(scene, query, Goal::Count, self.settings.limits())?;
         let mut pairs = self.homes.pairs.take();
-        let n = self.wait_for(scene, &plan, control, &mut pairs);
-        self.homes.pairs.put(pairs);
-        n
+        self.wait_for(scene, &plan, control, &mut pairs)
     }
 
     /// Whether [`detect`](Detector::detect) would find any pair. The search ends with the first one that is certain.
@@ -56,9 +53,7 @@ impl Detector {
             return Ok(any);
         }
         let mut pairs = self.homes.pairs.take();
-        let n = self.wait_for(scene, &plan, control, &mut pairs);
-        self.homes.pairs.put(pairs);
-        Ok(n? > 0)
+        Ok(self.wait_for(scene, &plan, control, &mut pairs)? > 0)
     }
 
     /// [`detect`](Detector::detect) without blocking. On a GPU the future waits for the device, which must be
@@ -71,7 +66,6 @@ impl Detector {
         let control = &self.control.clone();
         let mut pairs = self.homes.pairs.take();
         self.answer(scene, &plan, control, &mut pairs).await?;
-        pairs.home = self.home(&self.homes.pairs);
         Ok(pairs)
     }
 

@@ -75,8 +75,7 @@ pub struct Detector {
     gpu: Option<crate::gpu::Engine>,
 }
 
-/// Where the buffers of dropped answers are.
-#[derive(Default)]
+/// Where the buffers of dropped answers are. With a memory budget they are freed: they would count twice.
 struct Homes {
     pairs: Home<Pairs>,
     impacts: Home<Impacts>,
@@ -85,6 +84,21 @@ struct Homes {
     neighbours: Home<Neighbours>,
     safe: Home<SafeDistances>,
     closest: Home<Closest>,
+}
+
+impl Homes {
+    fn new(settings: &Settings) -> Self {
+        let keeps = settings.memory_budget.is_none();
+        Homes {
+            pairs: Home::new(keeps),
+            impacts: Home::new(keeps),
+            candidates: Home::new(keeps),
+            near: Home::new(keeps),
+            neighbours: Home::new(keeps),
+            safe: Home::new(keeps),
+            closest: Home::new(keeps),
+        }
+    }
 }
 
 impl Detector {
@@ -132,7 +146,7 @@ impl Detector {
             #[cfg(feature = "gpu")]
             gpu,
             runner: Runner::new(&settings),
-            homes: Homes::default(),
+            homes: Homes::new(&settings),
             control: Control::new(),
             stats: Stats::default(),
             cpu: Cpu::new(&settings, &clusterings),
@@ -158,11 +172,6 @@ impl Detector {
     /// A token that was cancelled stays so: set another control before the next question.
     pub fn set_control(&mut self, control: Control) {
         self.control = control;
-    }
-
-    /// Where the buffers of an answer go when it is dropped. With a memory budget they are freed instead: they would count twice.
-    fn home<T>(&self, home: &Home<T>) -> Option<Home<T>> {
-        self.settings.memory_budget.is_none().then(|| home.clone())
     }
 
     /// How the last question was answered, whatever it was, and if it failed how far: stages, counts, bytes. Answers have their

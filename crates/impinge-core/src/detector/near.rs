@@ -67,7 +67,6 @@ impl Detector {
         };
         let found = self.find_near(scene, distance, query, &mut outcome);
         self.stats.clone_from(near.stats());
-        near.home = self.home(&self.homes.near);
         found.map(|_| near)
     }
 

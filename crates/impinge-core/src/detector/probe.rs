@@ -129,7 +129,6 @@ impl Detector {
             Ok(())
         })?;
         closest.stats.clone_from(&self.stats);
-        closest.home = self.home(&self.homes.closest);
         Ok(closest)
     }
 }

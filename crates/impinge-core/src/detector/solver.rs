@@ -93,7 +93,6 @@ impl Detector {
         let found = self.find_near(scene, 2.0 * most, query, &mut outcome);
         self.solver = memory;
         self.stats.clone_from(safe.stats());
-        safe.home = self.home(&self.homes.safe);
         found.map(|_| safe)
     }
 
@@ -130,7 +129,6 @@ impl Detector {
         let found = self.find_near(scene, distance, query, &mut outcome);
         self.solver = memory;
         self.stats.clone_from(neighbours.stats());
-        neighbours.home = self.home(&self.homes.neighbours);
         found.map(|_| neighbours)
     }
 }

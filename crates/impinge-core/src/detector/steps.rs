@@ -147,8 +147,7 @@ impl Detector {
         let start = self.verify(scene, query)?;
         self.steps.contacts.impacts = self.homes.impacts.take();
         let found = self.find_contacts(scene, &plan, control, (start, true));
-        let mut impacts = std::mem::take(&mut self.steps.contacts.impacts);
-        impacts.home = self.home(&self.homes.impacts);
+        let impacts = std::mem::take(&mut self.steps.contacts.impacts);
         found.map(|_| impacts)
     }
 

@@ -92,7 +92,7 @@ pub struct NearPairs {
     points: Vec<[[f64; 3]; 2]>,
     stats: Stats,
     /// Where its buffers go when it is dropped.
-    pub(crate) home: Option<Home<NearPairs>>,
+    home: Home<NearPairs>,
 }
 
 gives_back!(NearPairs);
