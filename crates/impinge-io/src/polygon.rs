@@ -2,7 +2,8 @@
 
 mod inner;
 
-use std::collections::VecDeque;
+use std::cmp::Ordering;
+use std::collections::BinaryHeap;
 
 use inner::{InnerCorners, turn};
 
@@ -86,60 +87,56 @@ fn clip_ears(points: &[[f64; 2]], triangles: &mut Vec<[usize; 3]>) -> bool {
     turn(points[left[0]], points[left[1]], points[left[2]]) > 0.0
 }
 
-/// The same for many corners. Corners wait in a queue. A corner whose neighbour was clipped goes to its end, so a run of ears is
-/// halved again and again, and triangles stay small. A corner whose ear is not free waits for the corner that lies in it. Returns how many
-/// nodes and corners it looked at; `None` if some corner is left without an ear, or after far more looks than a polygon needs that does
-/// not cross itself.
+/// The same for many corners. The ear whose cut is shortest goes first, so triangles stay small: cuts along a run of corners halve it
+/// again and again, and cuts between two sides go from one to the other. A corner whose ear is not free waits for the corner that lies in
+/// it. Returns how many nodes and corners it looked at; `None` if some corner is left without an ear, or after far more looks than a
+/// polygon needs that does not cross itself.
 fn clip_many_ears(points: &[[f64; 2]], triangles: &mut Vec<[usize; 3]>) -> Option<u64> {
     let n = points.len();
     let mut ring = Ring::new(points);
     let inner = (0..n).filter(|&corner| !ring.is_convex(corner));
     let mut inner = InnerCorners::new(points, inner.map(|corner| corner as u32).collect());
     let mut waiting: Vec<Vec<usize>> = vec![Vec::new(); n];
-    let mut queue = Queue {
-        corners: VecDeque::new(),
-        tickets: vec![0; n],
-        last: 0,
-    };
-    (0..n).for_each(|corner| queue.push(corner));
+    let mut queue: BinaryHeap<_> = (0..n).map(|corner| ring.cut(corner)).collect();
     let most = LOOKS * n as u64 * u64::from(n.ilog2() + 1);
     let mut n_left = n;
+    let mut last = 0;
     while n_left > 3 {
         inner.n_looks += 1;
         if inner.n_looks > most {
             return None;
         }
-        let corner = queue.pop()?;
-        if !ring.is_convex(corner) {
+        let cut = queue.pop()?;
+        let ear = ring.around(cut.corner);
+        let is_old = !ring.is_left(cut.corner) || cut.ear != ear;
+        if is_old || !ring.is_convex(cut.corner) {
             continue;
         }
-        let ear = ring.around(corner);
         if let Some(blocking) = inner.find_in(points, ear) {
-            waiting[blocking].push(corner);
+            waiting[blocking].push(cut.corner);
             continue;
         }
         triangles.push(ear);
-        ring.remove(corner);
-        queue.withdraw(corner);
+        ring.remove(cut.corner);
         n_left -= 1;
         let [from, _, to] = ear;
-        for corner in [corner, from, to] {
+        for corner in [cut.corner, from, to] {
             let is_left = corner == from || corner == to;
             if is_left {
-                queue.push(corner);
+                queue.push(ring.cut(corner));
             }
             if !is_left || ring.is_convex(corner) {
                 inner.remove(corner);
                 for other in std::mem::take(&mut waiting[corner]) {
-                    if !queue.is_withdrawn(other) {
-                        queue.push(other);
+                    if ring.is_left(other) {
+                        queue.push(ring.cut(other));
                     }
                 }
             }
         }
-        queue.last = from;
+        last = from;
     }
-    let last = ring.around(queue.last);
+    let last = ring.around(last);
     triangles.push(last);
     (turn_of(points, last) > 0.0).then_some(inner.n_looks)
 }
@@ -175,47 +172,55 @@ impl<'a> Ring<'a> {
         turn_of(self.points, self.around(corner)) > 0.0
     }
 
+    /// The cut that would clip a corner.
+    fn cut(&self, corner: usize) -> Cut {
+        let ear = self.around(corner);
+        let [from, to] = [ear[0], ear[2]].map(|corner| self.points[corner]);
+        let length = (from[0] - to[0]).hypot(from[1] - to[1]);
+        Cut {
+            length,
+            corner,
+            ear,
+        }
+    }
+
+    fn is_left(&self, corner: usize) -> bool {
+        self.next[self.before[corner]] == corner
+    }
+
     fn remove(&mut self, corner: usize) {
         let [before, _, next] = self.around(corner);
         (self.next[before], self.before[next]) = (next, before);
     }
 }
 
-/// Corners that may have an ear.
-struct Queue {
-    /// With the number of times that each had been put there before: only the last time counts.
-    corners: VecDeque<(usize, u32)>,
-    tickets: Vec<u32>,
-    /// A corner that is left.
-    last: usize,
+/// An ear that may be clipped. The shortest is the greatest, then that of the lowest corner.
+struct Cut {
+    length: f64,
+    corner: usize,
+    ear: [usize; 3],
 }
 
-/// The ticket of a corner that was clipped.
-const WITHDRAWN: u32 = u32::MAX;
-
-impl Queue {
-    fn push(&mut self, corner: usize) {
-        self.tickets[corner] += 1;
-        self.corners.push_back((corner, self.tickets[corner]));
-    }
-
-    fn pop(&mut self) -> Option<usize> {
-        loop {
-            let (corner, ticket) = self.corners.pop_front()?;
-            if self.tickets[corner] == ticket {
-                return Some(corner);
-            }
-        }
-    }
-
-    fn withdraw(&mut self, corner: usize) {
-        self.tickets[corner] = WITHDRAWN;
-    }
-
-    fn is_withdrawn(&self, corner: usize) -> bool {
-        self.tickets[corner] == WITHDRAWN
+impl Ord for Cut {
+    fn cmp(&self, other: &Self) -> Ordering {
+        let length = other.length.total_cmp(&self.length);
+        length.then_with(|| other.ear.cmp(&self.ear))
     }
 }
+
+impl PartialOrd for Cut {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl PartialEq for Cut {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other).is_eq()
+    }
+}
+
+impl Eq for Cut {}
 
 /// So many looks per corner, and per halving of their number, are allowed.
 const LOOKS: u64 = 64;
@@ -316,7 +321,7 @@ mod tests {
     }
 
     /// A polygon with a name, and its area.
-    fn large(n: u32) -> [(&'static str, Vec<[f64; 2]>); 6] {
+    fn large(n: u32) -> [(&'static str, Vec<[f64; 2]>); 7] {
         let full = f64::from(n);
         let at = |radius: f64, share: f64| {
             let angle = share * std::f64::consts::TAU;
@@ -328,6 +333,11 @@ mod tests {
             0.0 => [0.0, -1.0],
             1.0 => [full, -1.0],
             _ => [full - ix, if ix % 2.0 == 0.0 { 0.0 } else { 1.0 }],
+        });
+        // Teeth on both sides of a band.
+        let ribbon = corners(&|ix| match ix < full / 2.0 {
+            true => [ix, if ix % 2.0 == 0.0 { -1.0 } else { -0.5 }],
+            false => [full - 1.0 - ix, if ix % 2.0 == 0.0 { 0.0 } else { 1.0 }],
         });
         // A band that winds outward 32 times: out along its outer side, back along the inner one.
         let half = full / 2.0;
@@ -355,6 +365,7 @@ mod tests {
             // Teeth that nearly meet in the middle.
             ("wheel", corners(&|ix| at(0.001 + ix % 2.0, ix / full))),
             ("zigzag", zigzag),
+            ("ribbon", ribbon),
             ("spiral", spiral),
             ("square", square),
         ]
@@ -392,21 +403,24 @@ mod tests {
         }
     }
 
-    /// A large convex polygon is cut into small triangles, so that their boxes overlap little: half of all edges are those of
-    /// the polygon, and each halving of the corners left makes edges twice as long.
+    /// Large polygons are cut into small triangles, so that their boxes overlap little. In a circle half of all edges are those of the
+    /// polygon, and each halving of the corners left makes edges twice as long. In a ribbon an edge goes to the next corners, or across.
     #[test]
-    fn a_large_circle_has_short_edges() {
-        let [(_, circle), ..] = large(1 << 14);
-        let length: f64 = (cut(&circle).iter())
-            .map(|triangle| {
-                let [a, b, c] = triangle.map(|corner| circle[corner as usize]);
-                [[a, b], [b, c], [c, a]]
-                    .map(|[p, q]| (p[0] - q[0]).hypot(p[1] - q[1]))
-                    .iter()
-                    .sum::<f64>()
-            })
-            .sum();
-        // A fan would have 16384 times 2 or so.
-        assert!(length < 250.0, "{length}");
+    fn large_circles_and_ribbons_have_short_edges() {
+        let polygons = large(1 << 14);
+        for (name, most) in [("circle", 250.0), ("ribbon", 3.0 * f64::from(3 << 14))] {
+            let (_, polygon) = polygons.iter().find(|(other, _)| *other == name).unwrap();
+            let length: f64 = (cut(polygon).iter())
+                .map(|triangle| {
+                    let [a, b, c] = triangle.map(|corner| polygon[corner as usize]);
+                    [[a, b], [b, c], [c, a]]
+                        .map(|[p, q]| (p[0] - q[0]).hypot(p[1] - q[1]))
+                        .iter()
+                        .sum::<f64>()
+                })
+                .sum();
+            // A fan of the circle would have 16384 times 2 or so.
+            assert!(length < most, "{name}: {length}");
+        }
     }
 }
