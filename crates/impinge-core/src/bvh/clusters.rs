@@ -15,7 +15,7 @@ use std::sync::OnceLock;
 use super::adjacency::Adjacency;
 use super::hubs::{self, Hubs};
 use super::rings::Rings;
-use super::tree::{Entry, TreeShape};
+use super::tree::{Entry, GoOn, TreeShape, order_while};
 use super::unique::{LocalCorners, Unique};
 use super::{GROUP, made_from};
 use crate::scene::elements::{Elements, with_corners};
@@ -52,26 +52,19 @@ pub(crate) struct ToOrder {
     pub sizes: Option<Vec<u8>>,
 }
 
-impl From<Vec<Entry>> for ToOrder {
-    fn from(centers: Vec<Entry>) -> Self {
-        ToOrder {
-            centers,
-            sizes: None,
-        }
-    }
-}
-
 /// The corners of a cluster's triangles as numbers of its vertices.
 pub(crate) type LocalFaces = LocalCorners<3>;
 
 impl Clustering {
     /// Clusters primitives by the centres of their boxes in the current pose, which are given in the order of the primitives. Those
     /// of one class of sizes follow each other. Their [local faces](Self::local_faces) are found at the same time if they are needed.
-    pub fn new(elements: &Elements, to_order: impl Into<ToOrder>, with_local_faces: bool) -> Self {
-        Self::make(elements, to_order.into(), with_local_faces)
-    }
-
-    fn make(elements: &Elements, to_order: ToOrder, with_local_faces: bool) -> Self {
+    /// `None` if `go_on` says no: it is asked between pieces of work that take a few milliseconds.
+    pub fn new(
+        elements: &Elements,
+        to_order: ToOrder,
+        with_local_faces: bool,
+        go_on: &GoOn<'_>,
+    ) -> Option<Self> {
         let ToOrder {
             centers: mut entries,
             sizes,
@@ -82,7 +75,10 @@ impl Clustering {
         let of_hubs = with_corners!(elements, |corners| hubs::classes(corners, &counts));
         let has_hubs = of_hubs.is_some();
         let classes = with_sizes(of_hubs, sizes);
-        super::tree::order(&shape, GROUP, classes.as_deref(), &mut entries);
+        order_while(go_on, &shape, GROUP, classes.as_deref(), &mut entries);
+        if !go_on() {
+            return None;
+        }
         let order = made_from(&entries, |_, entry| ElementIx::new(entry.number));
         let corners = with_corners!(elements, |corners| gather(corners, entries).into());
         let (vertices, vertex_starts, local_faces) = match &corners {
@@ -95,9 +91,12 @@ impl Clustering {
                 (unique.vertices, unique.starts, OnceLock::new())
             }),
         };
+        if !go_on() {
+            return None;
+        }
         let hubs = has_hubs
             .then(|| with_corners!(&corners, |corners| Hubs::new(corners, &counts, &shape)));
-        Clustering {
+        Some(Clustering {
             n_vertices_covered: counts
                 .iter()
                 .all(|&count| count > 0)
@@ -111,7 +110,7 @@ impl Clustering {
             adjacency: OnceLock::new(),
             local_faces,
             rings: OnceLock::new(),
-        }
+        })
     }
 
     pub fn n_clusters(&self) -> usize {

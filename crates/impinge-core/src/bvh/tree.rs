@@ -136,9 +136,21 @@ pub(crate) fn order(
     classes: Option<&[Option<u32>]>,
     entries: &mut [Entry],
 ) {
+    order_while(&|| true, shape, leaf_size, classes, entries);
+}
+
+/// The same, as long as `go_on` says so; it is asked before each large piece of work.
+pub(crate) fn order_while(
+    go_on: &GoOn<'_>,
+    shape: &TreeShape,
+    leaf_size: usize,
+    classes: Option<&[Option<u32>]>,
+    entries: &mut [Entry],
+) {
     debug_assert_eq!(shape.n_leaves, entries.len().div_ceil(leaf_size));
     if shape.n_levels() > 0 {
         let split = Split {
+            go_on,
             shape,
             leaf_size,
             classes,
@@ -147,7 +159,11 @@ pub(crate) fn order(
     }
 }
 
+/// Whether to go on: false once a question is cancelled.
+pub(crate) type GoOn<'a> = dyn Fn() -> bool + Sync + 'a;
+
 struct Split<'a> {
+    go_on: &'a GoOn<'a>,
     shape: &'a TreeShape,
     leaf_size: usize,
     classes: Option<&'a [Option<u32>]>,
@@ -163,12 +179,15 @@ impl Split<'_> {
             }
             return;
         }
+        let parallel = entries.len() >= PARALLEL_FROM;
+        if parallel && !(self.go_on)() {
+            return;
+        }
         let middle = nodes.start + nodes.len() / 2;
         let middle_leaf = self.first_leaf(level, middle);
         let cut = (middle_leaf - first_leaf) * self.leaf_size;
         split_at(entries, cut, self.classes);
         let (low, high) = entries.split_at_mut(cut);
-        let parallel = low.len() + high.len() >= PARALLEL_FROM;
         let mut low = || self.nodes(level, nodes.start..middle, first_leaf, low);
         let mut high = || self.nodes(level, middle..nodes.end, middle_leaf, high);
         if parallel {

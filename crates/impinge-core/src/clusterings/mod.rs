@@ -27,6 +27,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use crate::boxes;
 use crate::bvh::clusters::Clustering;
+use crate::query::progress::{CancelToken, Control};
 use crate::query::settings::{Recluster, Settings};
 use crate::query::tuning::Tuning;
 use crate::scene::elements::{Elements, Part};
@@ -37,6 +38,7 @@ use crate::scene::{Body, Scene};
 #[cfg(feature = "gpu")]
 use crate::search::runner::Job;
 use crate::search::stats::Stats;
+use crate::search::work::Work;
 use crate::workers::Workers;
 use crate::workers::clock::Instant;
 
@@ -117,15 +119,17 @@ impl<'a> BodyPart<'a> {
     }
 
     /// Clusters the part in the body's current pose. Nobody else does that.
-    fn cluster(&self) -> Clustering {
+    fn cluster(&self, control: &Control) -> Result<Clustering, Error> {
         let (elements, positions) = (self.body.part(self.part), self.body.positions());
         let centers = boxes::centers(elements, positions);
-        let mut clustering = Clustering::new(elements, centers, self.local_faces);
+        let go_on = || !control.token().is_some_and(CancelToken::is_cancelled);
+        let clustering = Clustering::new(elements, centers, self.local_faces, &go_on);
+        let mut clustering = clustering.ok_or(Error::Cancelled)?;
         if let (Part::Vertices, Elements::Points(vertices)) = (self.part, &clustering.corners) {
             // Vertices are numbered as positions are.
             clustering.order = vertices.iter().map(|&[ix]| ElementIx::new(ix)).collect();
         }
-        clustering
+        Ok(clustering)
     }
 
     /// Adds what is needed besides to a clustering that was made for somebody else.
@@ -168,18 +172,18 @@ impl Clusterings {
     /// The clusters of a part of a body. `own` are those of its present topology that the asker has, if any.
     ///
     /// # Errors
-    /// Threads that do not start.
+    /// Threads that do not start; cancellation.
     pub fn of(
         &self,
         body_part: BodyPart<'_>,
         own: Option<&Arc<Clustering>>,
-        workers: &Workers,
+        work: Work<'_>,
         stats: &mut Stats,
     ) -> Result<Arc<Clustering>, Error> {
         let mut known = self.lock();
         let clustering = match known.find(body_part, own) {
             Some(clustering) => clustering,
-            None => known.make(body_part, workers, stats)?,
+            None => known.make(body_part, work, stats)?,
         };
         Ok(Arc::clone(clustering))
     }
@@ -202,6 +206,7 @@ impl Clusterings {
             workers,
             control,
         } = job;
+        let work = Work { workers, control };
         let mut known = self.open(scene);
         let mut all = Vec::with_capacity(plan.parts.len());
         for (ix, part) in plan.numbered_parts() {
@@ -213,7 +218,7 @@ impl Clusterings {
                 Some(clustering) => clustering,
                 None => {
                     control.step(ix.raw().into(), plan.parts.len() as u64)?;
-                    Arc::clone(known.make(body_part, workers, stats)?)
+                    Arc::clone(known.make(body_part, work, stats)?)
                 }
             };
             let of_body = &known.slots[part.id.index()];
@@ -223,7 +228,7 @@ impl Clusterings {
                 sampled.stamp = stamp;
                 let spread = sampled_spread(&clustering, body.positions());
                 if known.is_stale(&mut sampled.fit, spread) {
-                    clustering = Arc::clone(known.renew(body_part, workers, stats)?);
+                    clustering = Arc::clone(known.renew(body_part, work, stats)?);
                     sampled.fit = Fit::UNKNOWN;
                     let spread = sampled_spread(&clustering, body.positions());
                     sampled.fit.note(spread);
@@ -284,15 +289,16 @@ impl Entries {
     /// Clusters a part of a body, and books it.
     ///
     /// # Errors
-    /// Threads that do not start.
+    /// Threads that do not start; cancellation.
     pub fn make(
         &mut self,
         body_part: BodyPart<'_>,
-        workers: &Workers,
+        work: Work<'_>,
         stats: &mut Stats,
     ) -> Result<&Arc<Clustering>, Error> {
         let n_elements = body_part.body.part(body_part.part).len();
-        let clustering = workers.install(n_elements, || body_part.cluster())?;
+        let Work { workers, control } = work;
+        let clustering = workers.install(n_elements, || body_part.cluster(control))??;
         stats.n_clustered += 1;
         Ok(self.put(body_part, Arc::new(clustering)))
     }
@@ -320,19 +326,19 @@ impl Entries {
     /// well they fit the pose at hand, `fit` how well they have fitted at best.
     ///
     /// # Errors
-    /// Threads that do not start.
+    /// Threads that do not start; cancellation.
     pub fn renew_if_stale(
         &mut self,
         body_part: BodyPart<'_>,
         (fit, spread): (&mut Fit, f64),
-        workers: &Workers,
+        work: Work<'_>,
         stats: &mut Stats,
     ) -> Result<Option<Arc<Clustering>>, Error> {
         if !self.is_stale(fit, spread) {
             return Ok(None);
         }
         let start = Instant::now();
-        let clustering = Arc::clone(self.renew(body_part, workers, stats)?);
+        let clustering = Arc::clone(self.renew(body_part, work, stats)?);
         stats.add_ms("clustering", start.elapsed().as_secs_f64() * 1e3);
         Ok(Some(clustering))
     }
@@ -345,10 +351,10 @@ impl Entries {
     fn renew(
         &mut self,
         body_part: BodyPart<'_>,
-        workers: &Workers,
+        work: Work<'_>,
         stats: &mut Stats,
     ) -> Result<&Arc<Clustering>, Error> {
         stats.n_reclustered += 1;
-        self.make(body_part, workers, stats)
+        self.make(body_part, work, stats)
     }
 }

@@ -10,6 +10,7 @@ use crate::scene::error::Error;
 use crate::scene::{Body, Scene};
 use crate::search::runner::Job;
 use crate::search::stats::Stats;
+use crate::search::work::Work;
 
 /// What a backend keeps of a body, or of a part of it: boxes, and whatever else belongs to a clustering.
 pub(crate) trait Clustered: Send {
@@ -135,7 +136,7 @@ impl<T: Clustered, const PARTS: usize> Store<T, PARTS> {
                 Some(clustering) => clustering,
                 None => {
                     control.step(ix.raw().into(), plan.parts.len() as u64)?;
-                    known.make(body_part, workers, stats)?
+                    known.make(body_part, Work { workers, control }, stats)?
                 }
             };
             if own.is_none_or(|own| !Arc::ptr_eq(own, clustering)) {

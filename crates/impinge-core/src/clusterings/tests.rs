@@ -1,9 +1,12 @@
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Weak};
 
 use super::{BodyPart, Clusterings, PARTS};
+use crate::boxes;
 use crate::bvh::clusters::Clustering;
 use crate::detector::Detector;
 use crate::query::Query;
+use crate::query::progress::Control;
 use crate::query::settings::{Backend, InstructionSet, Method, Settings};
 use crate::scene::Scene;
 use crate::scene::elements::{Elements, Part};
@@ -228,8 +231,11 @@ fn questions_of_two_scenes_take_turns() {
 fn local_faces_are_the_same_whether_found_at_once_or_later() {
     let (scene, [a, _]) = two_sheets();
     let body_part = BodyPart::new(a, scene.body(a).unwrap(), Part::Faces);
-    let at_once = body_part.with_local_faces(true).cluster();
-    let later = body_part.cluster();
+    let at_once = body_part
+        .with_local_faces(true)
+        .cluster(&Control::new())
+        .unwrap();
+    let later = body_part.cluster(&Control::new()).unwrap();
     assert!(at_once.knows_local_faces() && !later.knows_local_faces());
     later.find_local_faces();
     assert_eq!(at_once.bytes(), later.bytes());
@@ -271,5 +277,27 @@ fn clusters_that_distance_made_serve_intersections() {
                     .eq(alone.detect(&scene, &query).unwrap().rows())
             );
         }
+    }
+}
+
+/// A question that is cancelled while a large body is clustered does not wait for the rest.
+#[test]
+fn clustering_stops_wherever_it_is_told_to() {
+    let (elements, positions) = sheet(200, 0.0);
+    let positions = positions.into();
+    // What is made after `n` questions whether to go on, and how often it was asked.
+    let cluster = |n: usize| {
+        let n_asked = AtomicUsize::new(0);
+        let go_on = || n_asked.fetch_add(1, Ordering::Relaxed) < n;
+        let centers = boxes::centers(&elements, &positions);
+        let made = Clustering::new(&elements, centers, true, &go_on);
+        (made.is_some(), n_asked.into_inner())
+    };
+    let (is_made, n_asked) = cluster(usize::MAX);
+    assert!(is_made);
+    // 80,000 triangles: at least one question for every 8,000.
+    assert!(n_asked >= 10, "{n_asked}");
+    for n in 0..n_asked {
+        assert!(!cluster(n).0, "after {n} questions");
     }
 }

@@ -404,6 +404,7 @@ fn is_below(axis: usize, arm: &[f64; 3]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::bvh::clusters::ToOrder;
     use crate::bvh::tree::Entry;
     use crate::query::settings::InstructionSet;
     use crate::scene::index::Slot;
@@ -412,8 +413,11 @@ mod tests {
     fn folded(faces: &[[u32; 3]], positions: &[[f64; 3]]) -> Vec<u32> {
         let elements = Elements::from(faces.to_vec());
         let numbers = 0..faces.len() as u32;
-        let centers: Vec<Entry> = numbers.map(|number| Entry::new([0.0; 3], number)).collect();
-        let clustering = Clustering::new(&elements, centers, false);
+        let to_order = ToOrder {
+            centers: numbers.map(|number| Entry::new([0.0; 3], number)).collect(),
+            sizes: None,
+        };
+        let clustering = Clustering::new(&elements, to_order, false, &|| true).expect("it goes on");
         clustering.find_rings();
         let mut answers = Vec::new();
         let single = positions.iter().map(|p| p.map(|x| x as f32)).collect();

@@ -19,6 +19,7 @@ use crate::scene::error::Error;
 use crate::scene::index::PartIx;
 use crate::scene::positions::Positions;
 use crate::search::stats::Stats;
+use crate::search::work::Work;
 use crate::workers::Workers;
 
 use super::bounds::{self, Summary};
@@ -254,8 +255,9 @@ impl Refit {
             scene,
             plan,
             workers,
-            ..
+            control,
         } = job;
+        let work = Work { workers, control };
         let mut known = clusterings.lock();
         for (ix, part) in plan.numbered_parts() {
             let body = plan.body(scene, ix);
@@ -271,8 +273,7 @@ impl Refit {
             let body_part =
                 BodyPart::new(part.id, body, part.part).with_local_faces(isa.looks_corners_up());
             let spread = cache.spread();
-            let renewed =
-                known.renew_if_stale(body_part, (&mut cache.fit, spread), workers, stats)?;
+            let renewed = known.renew_if_stale(body_part, (&mut cache.fit, spread), work, stats)?;
             if let Some(clustering) = renewed {
                 *cache = BodyCache::new(body, clustering, tuning);
                 if part.within {

@@ -22,7 +22,7 @@ use crate::scene::index::pair_numbers;
 use crate::search::runner::{Finder, Job, Runner, ready};
 use crate::search::sink::Answer;
 use crate::search::stats::Stats;
-use crate::workers::Workers;
+use crate::search::work::Work;
 
 impl Detector {
     /// The two bodies that are nearest to each other of all that the query lets meet, and the pair of elements that has their
@@ -48,8 +48,8 @@ impl Detector {
         let control = &self.control.clone();
         let plan = self.plan_of_nearest(scene, query)?;
         control.step(0, 1)?;
-        self.measure_distance(scene, control, |distances, workers, touching| {
-            distances.nearest(scene, &plan, workers, control, touching)
+        self.measure_distance(scene, control, |distances, work, touching| {
+            distances.nearest(scene, &plan, work, touching)
         })
     }
 
@@ -83,8 +83,8 @@ impl Detector {
         b: BodyId,
     ) -> Result<Option<Nearest>, Error> {
         let control = &self.control.clone();
-        self.measure_distance(scene, control, |distances, workers, touching| {
-            distances.between(scene, [a, b], workers, control, || touching([a, b]))
+        self.measure_distance(scene, control, |distances, work, touching| {
+            distances.between(scene, [a, b], work, || touching([a, b]))
         })
     }
 
@@ -118,7 +118,7 @@ impl Detector {
         control: &Control,
         find: impl FnOnce(
             &mut Distances,
-            &Workers,
+            Work<'_>,
             &mut AskTouching<'_>,
         ) -> Result<Option<Nearest>, Error>,
     ) -> Result<Option<Nearest>, Error> {
@@ -132,7 +132,7 @@ impl Detector {
             ..
         } = self;
         runner.measure(measured, settings.limits(), |workers, stats| {
-            let nearest = find(distances, workers, &mut |ids| {
+            let nearest = find(distances, Work { workers, control }, &mut |ids| {
                 touching.lowest(scene, ids, control, (runner, cpu, settings))
             })?;
             distances.report(stats);

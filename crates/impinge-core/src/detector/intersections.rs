@@ -12,6 +12,7 @@ use crate::query::{Query, Scope};
 use crate::scene::Scene;
 use crate::scene::error::Error;
 use crate::search::runner::ready;
+use crate::search::work::Work;
 
 impl Detector {
     /// All pairs that the query asks for, in the current state of the scene.
@@ -83,7 +84,7 @@ impl Detector {
         control.step(0, 1)?;
         plan.check(scene)?;
         let workers = self.runner.workers();
-        let any = self.distances.any(scene, plan, workers, control)?;
+        let any = self.distances.any(scene, plan, Work { workers, control })?;
         if any.is_some() {
             // One thread has found it, without the loop.
             let stats = &mut self.stats;

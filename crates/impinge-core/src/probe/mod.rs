@@ -196,7 +196,7 @@ impl Probes {
         shared.distances.begin(scene);
         for &(id, part) in parts {
             work.step()?;
-            let tree = shared.distances.tree(scene, (id, part), work.workers)?;
+            let tree = shared.distances.tree(scene, (id, part), work)?;
             let stamp = scene.body(id)?.positions_stamp();
             let name = (id.index(), part);
             let known = self.boxes.get(&name);

@@ -34,7 +34,7 @@ use crate::scene::positions::{Positions, check_positions};
 use crate::scene::{Body, Scene};
 use crate::search::narrow::intersect;
 use crate::search::stats::Stats;
-use crate::workers::Workers;
+use crate::search::work::Work;
 use impinge_exact::Point;
 use impinge_exact::internal::filter::Directions64;
 use impinge_exact::internal::filter::number::Portable32;
@@ -133,8 +133,7 @@ impl Distances {
         &mut self,
         scene: &Scene,
         [a, b]: [BodyId; 2],
-        workers: &Workers,
-        control: &Control,
+        work: Work<'_>,
         touching: impl FnOnce() -> Result<Option<[u32; 2]>, Error>,
     ) -> Result<Option<Nearest>, Error> {
         if a == b {
@@ -142,8 +141,8 @@ impl Distances {
         }
         self.begin(scene);
         for id in [a, b] {
-            control.step(0, 1)?;
-            self.know(scene, id, Part::Given, workers)?;
+            work.step()?;
+            self.know(scene, id, Part::Given, work)?;
         }
         let bodies = [scene.body(a)?, scene.body(b)?];
         let boxed = [a, b].into_iter().map(|id| {
@@ -157,7 +156,7 @@ impl Distances {
         };
         let scale = Scale::of(boxed.fold(0.0, f64::max), exact);
         let most = (scale, f64::INFINITY);
-        let found = self.search_or_ask(scene, [a, b], most, control, touching)?;
+        let found = self.search_or_ask(scene, [a, b], most, work.control, touching)?;
         Ok(found.map(|(_, nearest)| nearest))
     }
 
@@ -222,8 +221,7 @@ impl Distances {
         &mut self,
         scene: &Scene,
         plan: &Plan,
-        workers: &Workers,
-        control: &Control,
+        work: Work<'_>,
         mut touching: impl FnMut([BodyId; 2]) -> Result<Option<[u32; 2]>, Error>,
     ) -> Result<Option<Nearest>, Error> {
         self.begin(scene);
@@ -260,12 +258,12 @@ impl Distances {
                 return Ok(());
             }
             n_asked += 1;
-            control.step(n_asked, n_asked + 1)?;
+            work.control.step(n_asked, n_asked + 1)?;
             for id in ids {
-                self.know(scene, id, Part::Given, workers)?;
+                self.know(scene, id, Part::Given, work)?;
             }
             let ask = || touching(ids);
-            let found = self.search_or_ask(scene, ids, (scale, most), control, ask)?;
+            let found = self.search_or_ask(scene, ids, (scale, most), work.control, ask)?;
             if let Some(found) = found
                 && best.is_none_or(|(squared, best)| {
                     found.0 < squared || (found.0 == squared && ids < best.bodies())
@@ -323,8 +321,7 @@ impl Distances {
         &mut self,
         scene: &Scene,
         plan: &Plan,
-        workers: &Workers,
-        control: &Control,
+        work: Work<'_>,
     ) -> Result<Option<bool>, Error> {
         self.begin(scene);
         let mut many = std::mem::take(&mut self.many);
@@ -336,10 +333,10 @@ impl Distances {
             if plan.test(a, b).is_none() {
                 return Ok(false);
             }
-            control.step(0, 1)?;
+            work.step()?;
             let ids = pair.map(|part| plan.part(part).id);
             for id in ids {
-                self.know(scene, id, Part::Given, workers)?;
+                self.know(scene, id, Part::Given, work)?;
             }
             let bodies = pair.map(|part| plan.body(scene, part));
             let trees = ids.map(|id| &self.trees[&(id.index(), Part::Given)]);
@@ -366,20 +363,14 @@ impl Distances {
         &mut self,
         scene: &Scene,
         (id, part): (BodyId, Part),
-        workers: &Workers,
+        work: Work<'_>,
     ) -> Result<&Tree, Error> {
         let part = scene.body(id)?.canonical(part);
-        self.know(scene, id, part, workers)?;
+        self.know(scene, id, part, work)?;
         Ok(&self.trees[&(id.index(), part)])
     }
 
-    fn know(
-        &mut self,
-        scene: &Scene,
-        id: BodyId,
-        part: Part,
-        workers: &Workers,
-    ) -> Result<(), Error> {
+    fn know(&mut self, scene: &Scene, id: BodyId, part: Part, work: Work<'_>) -> Result<(), Error> {
         let body = scene.body(id)?;
         if !body.is_checked() {
             match body.positions() {
@@ -397,12 +388,12 @@ impl Distances {
             self.last.retain(|numbers, _| !numbers.contains(&slot));
         }
         let own = known.as_ref().map(|tree| &tree.clustering);
-        let clustering = self.clusterings.of(body_part, own, workers, stats)?;
+        let clustering = self.clusterings.of(body_part, own, work, stats)?;
         let known = known.filter(|tree| Arc::ptr_eq(&tree.clustering, &clustering));
         let mut tree = known.unwrap_or_else(|| Tree::new(body, clustering));
         if tree.refit(body) {
             let (spread, mut all) = (tree.spread(), self.clusterings.lock());
-            let renewed = all.renew_if_stale(body_part, (&mut tree.fit, spread), workers, stats)?;
+            let renewed = all.renew_if_stale(body_part, (&mut tree.fit, spread), work, stats)?;
             if let Some(clustering) = renewed {
                 tree = Tree::new(body, clustering);
                 tree.refit(body);

@@ -14,6 +14,7 @@ use crate::scene::error::Error;
 use crate::scene::index::{ClusterIx, PartIx};
 use crate::search::runner::Job;
 use crate::search::stats::Stats;
+use crate::search::work::Work;
 use crate::simd::{Isa, Simd, with_isa};
 
 /// Clusters per task.
@@ -122,8 +123,9 @@ pub(super) fn refit<S: Send>(
         scene,
         plan,
         workers,
-        ..
+        control,
     } = job;
+    let work = Work { workers, control };
     let mut is_stale = false;
     for (ix, part) in plan.numbered_parts() {
         let body = plan.body(scene, ix);
@@ -137,7 +139,7 @@ pub(super) fn refit<S: Send>(
         let spread = cache.spread();
         let (body_part, fit) = (BodyPart::new(part.id, body, part.part), &mut cache.fit);
         let mut known = clusterings.lock();
-        if let Some(clustering) = known.renew_if_stale(body_part, (fit, spread), workers, stats)? {
+        if let Some(clustering) = known.renew_if_stale(body_part, (fit, spread), work, stats)? {
             *cache = PartCache::new(body, clustering);
             is_stale = true;
         }
