@@ -270,6 +270,37 @@ fn together_two_elements_move_less_than_they_are_apart() {
     );
 }
 
+/// Half of an odd multiple of the smallest number is none, and most distances are no multiple: all are rounded down.
+#[test]
+fn bounds_of_multiples_of_the_smallest_number() {
+    let unit = f64::from_bits(1);
+    let multiple = |x: f64| x.to_bits();
+    let mut detector = detector(Method::Clusters, 1);
+    let steps = || 0..5u64;
+    for [x, y, z] in
+        steps().flat_map(|x| steps().flat_map(move |y| steps().map(move |z| [x, y, z])))
+    {
+        let square = x * x + y * y + z * z;
+        let mut scene = Scene::new();
+        let bodies = [[0; 3], [x, y, z]].map(|at| {
+            let point = at.map(|k| k as f64 * unit);
+            scene.add_points(&[point]).expect("good")
+        });
+        let query = Query::all().kinds([PairKind::VertexVertex]);
+        let lists = detector.neighbours(&scene, 1.0, &query).expect("good");
+        let (_, distance) = lists.of(PairKind::VertexVertex).of(0).next().expect("near");
+        assert!(multiple(distance).pow(2) <= square, "{x} {y} {z}");
+        for fixed in [&bodies[..0], &bodies[..1]] {
+            let query = Query::all().fixed(fixed.iter().copied());
+            let safe = detector.safe_distances(&scene, 1.0, &query).expect("good");
+            let [a, b] = bodies.map(|body| multiple(safe.of(body).expect("held").get(0)));
+            assert!((a + b).pow(2) <= square, "{x} {y} {z}: {a} {b}");
+            // Less than what two roundings may take away.
+            assert!((a + b + 3).pow(2) > square, "{x} {y} {z}: {a} {b}");
+        }
+    }
+}
+
 #[test]
 fn bounds_hold_on_surfaces() {
     let mut scene = Scene::new();
@@ -406,6 +437,50 @@ fn neighbours_are_the_near_pairs_by_element() {
             for kind in kinds {
                 assert_eq!(lists.of(kind), other.of(kind));
                 assert_eq!(lists.reversed(kind), other.reversed(kind));
+            }
+        }
+    }
+}
+
+/// Where squares are no numbers any more, bounds in floats are of no use, and distances are still rounded down.
+#[test]
+fn distances_of_tiny_and_huge_scenes_are_rounded_down() {
+    let mut detector = detector(Method::Clusters, 1);
+    for exponent in [-700, -520, 520, 700] {
+        let size = 2f64.powi(exponent);
+        let mut random = Random::new(7);
+        let mut at = || random.point(-1.0, 1.0).map(|x| f64::from(x) * size);
+        let corners: Vec<Point> = (0..24).map(|_| at()).collect();
+        let mut scene = Scene::new();
+        scene.add_points(&corners[..6]).expect("good");
+        let pairs_of: Vec<[u32; 2]> = (0..3).map(|ix| [2 * ix, 2 * ix + 1]).collect();
+        scene.add_edges(&pairs_of, &corners[6..12]).expect("good");
+        let triangles: Vec<[u32; 3]> = (0..4).map(|ix| [0, 1, 2].map(|k| 3 * ix + k)).collect();
+        scene
+            .add_triangles(&triangles, &corners[12..])
+            .expect("good");
+        let kinds = [
+            PairKind::VertexFace,
+            PairKind::EdgeEdge,
+            PairKind::EdgeVertex,
+            PairKind::VertexVertex,
+        ];
+        let query = Query::all().kinds(kinds);
+        let lists = detector.neighbours(&scene, size, &query).expect("good");
+        assert!(lists.len() > 50, "{}", lists.len());
+        for (kind, a, b, four) in pairs(&scene) {
+            let [row, column] =
+                [&a, &b].map(|of| lists.first(of.body, of.part).expect("held") + of.element);
+            let mut near = lists.of(kind).of(row as usize);
+            if let Some((_, distance)) = near.find(|&(at, _)| at == column) {
+                let pair = test_of(kind);
+                let touches = are_within(pair, &four, 0.0);
+                assert!(
+                    touches || !are_within(pair, &four, distance),
+                    "{kind:?} {exponent}"
+                );
+                let above = distance * (1.0 + 2f64.powi(-19));
+                assert!(are_within(pair, &four, above), "{kind:?} {exponent}");
             }
         }
     }

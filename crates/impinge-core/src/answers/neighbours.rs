@@ -20,8 +20,8 @@ pub struct Csr {
     pub offsets: Vec<u64>,
     /// The neighbours.
     pub indices: Vec<u32>,
-    /// How far away each is, in the unit of the scene, rounded down: below the distance by at most 2^-20 of it, and 0 if and only if
-    /// they touch.
+    /// How far away each is, in the unit of the scene, rounded down: below the distance by at most 2^-20 of it, or a few times the smallest
+    /// `f64`; and 0 if and only if they touch or are as near as that.
     pub distances: Vec<f64>,
 }
 

@@ -9,12 +9,12 @@ use core::cmp::Ordering;
 use super::features::PolygonPart;
 use super::nearest::Polygon;
 use super::reach::Reach;
-use super::rounded::{self, between, quotient};
+use super::rounded::{self, Closest, between, quotient};
 use super::{Feature, NearestFeatures, filter, nearest};
 use crate::algebra::Integer;
 use crate::element_pair::ElementPair;
 use crate::triangle::{passes_inside, segment_meets_triangle};
-use crate::{Point, triangles_intersect};
+use crate::{Point, Sign, triangles_intersect};
 
 /// 2^-20
 const POWER_20: f64 = 1.0 / (1 << 20) as f64;
@@ -185,8 +185,8 @@ pub fn closest_of_elements(a: &[Point], b: &[Point]) -> (NearestOfElements, f64,
     }
 }
 
-/// A number below the distance of two elements of one to three corners by at most 2^-20 of it; 0 if and only if they touch, or are
-/// nearer than the smallest `f64`.
+/// A number that is at most the distance of two elements of one to three corners, and below it by at most 2^-20 of it, or by a few
+/// times the smallest `f64`; 0 if and only if they touch or are as near as that.
 ///
 /// A bound in `f64` does for most pairs, and the exact distance, rounded down, for the others: the same bits on every machine.
 pub fn distance_below(a: &[Point], b: &[Point]) -> f64 {
@@ -234,9 +234,21 @@ impl Simple {
     fn distance_below(&self) -> f64 {
         match filter::bounds(self.pair, &self.points) {
             Some([low, high]) if low > high * (1.0 - POWER_20) => low,
-            // Wrong by a few units in the last place, which this makes up for many times.
-            _ => super::closest_points(self.pair, &self.points).distance * (1.0 - 0.5 * POWER_20),
+            _ => {
+                let Closest { distance, .. } = super::closest_points(self.pair, &self.points);
+                // Wrong by a few units in the last place, which this makes up for many times.
+                let mut below = distance * (1.0 - 0.5 * POWER_20);
+                // But for the smallest numbers, which have few bits.
+                while below > 0.0 && below < f64::MIN_POSITIVE && self.is_nearer_than(below) {
+                    below = below.next_down();
+                }
+                below
+            }
         }
+    }
+
+    fn is_nearer_than(&self, distance: f64) -> bool {
+        nearest::compare(self.pair, &self.points, &Reach::from(distance)) == Sign::Negative
     }
 
     fn in_order<T>(&self, [first, second]: [T; 2]) -> [T; 2] {
