@@ -3,10 +3,10 @@
 use std::collections::{BTreeSet, VecDeque};
 
 use impinge_core::{
-    Backend, BodyId, Detector, Element, Error, Exclusion, Method, PairKind, Part, Query, Scene,
-    Settings, Start,
+    Backend, BodyId, Detector, Element, Elements, Error, Exclusion, Method, PairKind, Part, Query,
+    Scene, Settings, Start,
 };
-use impinge_scenes::{Random, surfaces};
+use impinge_scenes::{Random, solids, surfaces};
 
 fn detectors() -> [Detector; 3] {
     [
@@ -183,6 +183,47 @@ fn rings_are_left_out() {
                 }
             },
         );
+    }
+}
+
+/// Edges inside of tetrahedra count: the corners of each are one edge apart, though no edge of the surface joins them.
+#[test]
+fn rings_go_through_tetrahedra() {
+    let block = solids::block(2, 2, 2, 1.0);
+    let Elements::Tetrahedra(tetrahedra) = &block.elements else {
+        panic!("tetrahedra")
+    };
+    let mut scene = Scene::new();
+    let body = block.add_to(&mut scene).expect("good");
+    let edges = scene.body(body).expect("held").edges();
+    let on_surface: BTreeSet<[u32; 2]> = (0..edges.len())
+        .map(|ix| {
+            let mut ends = [edges.corners(ix)[0], edges.corners(ix)[1]];
+            ends.sort_unstable();
+            ends
+        })
+        .collect();
+    let query = Query::all()
+        .kinds([PairKind::VertexVertex])
+        .exclude(Exclusion::rings(1));
+    for mut detector in detectors() {
+        let near = detector.near(&scene, 100.0, &query).expect("good");
+        let found: BTreeSet<[u32; 2]> = near
+            .iter()
+            .map(|pair| [pair.a.element, pair.b.element])
+            .collect();
+        let vertices: BTreeSet<u32> = found.iter().flatten().copied().collect();
+        let mut n_inside = 0;
+        for &a in &vertices {
+            for &b in vertices.range(a + 1..) {
+                let are_joined = tetrahedra
+                    .iter()
+                    .any(|of| of.contains(&a) && of.contains(&b));
+                assert_eq!(found.contains(&[a, b]), !are_joined, "{a} {b}");
+                n_inside += usize::from(are_joined && !on_surface.contains(&[a, b]));
+            }
+        }
+        assert!(n_inside > 0);
     }
 }
 

@@ -138,6 +138,23 @@ fn lattices() {
     }
 }
 
+/// How far away an element may be is compared exactly: the diagonal of a square is longer than the float below it.
+#[test]
+fn the_largest_distance_is_exact() {
+    let mut scene = Scene::new();
+    scene.add_points(&[[0.0f64; 3]]).unwrap();
+    let below = 2f64.sqrt().next_down();
+    assert!(below * below < 2.0);
+    for (most, is_found) in [(below, false), (below.next_up(), true), (1.0, false)] {
+        let found = cpu().closest(&scene, &[[1.0, 1.0, 0.0]], most, &Query::all());
+        assert_eq!(
+            found.unwrap().iter().next().unwrap().is_some(),
+            is_found,
+            "{most}"
+        );
+    }
+}
+
 #[test]
 fn meshes_and_soups() {
     let mut random = Random::new(5);

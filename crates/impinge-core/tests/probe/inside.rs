@@ -270,6 +270,73 @@ fn tetrahedra() {
     assert_eq!(detector.contains(&scene, body, &points).unwrap(), expected);
 }
 
+/// The border of a flat tetrahedron that lies on a face of another one, and tetrahedra that overlap, in either order.
+#[test]
+fn flat_and_overlapping_tetrahedra() {
+    let mut detector = Detector::new(Backend::Cpu).unwrap();
+    let mut places = |tetrahedra: &[[u32; 4]], positions: &[[f64; 3]], points: &[[f64; 3]]| {
+        let mut scene = Scene::new();
+        let body = scene.add_tetrahedra(tetrahedra, positions).unwrap();
+        detector.contains(&scene, body, points).unwrap()
+    };
+    let positions = [
+        [0.0, 0.0, -3.0],
+        [0.0; 3],
+        [4.0, 0.0, 0.0],
+        [0.0, 4.0, 0.0],
+        [4.0, 4.0, 0.0],
+    ];
+    // Of the flat one, the face opposite its first corner is that of the other.
+    let points = [
+        [1.0, 1.0, 0.0],
+        [3.5, 3.5, 0.0],
+        [1.0, 1.0, -0.25],
+        [1.0, 1.0, 0.25],
+    ];
+    for flat in [[4, 1, 2, 3], [1, 4, 2, 3], [2, 3, 1, 4]] {
+        let found = places(&[[0, 1, 2, 3], flat], &positions, &points);
+        assert_eq!(found, [0, 0, 1, -1], "{flat:?}");
+    }
+    // The point is inside the first and on a face of the second.
+    let mut positions = vec![
+        [-8.0, -8.0, -8.0],
+        [8.0, -8.0, -8.0],
+        [0.0, 8.0, -8.0],
+        [0.0, 0.0, 8.0],
+    ];
+    positions.extend([[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
+    for tetrahedra in [[[0, 1, 2, 3], [4, 5, 6, 7]], [[4, 5, 6, 7], [0, 1, 2, 3]]] {
+        let points = [
+            [0.25, 0.25, 0.0],
+            [0.125; 3],
+            [-1.0, 0.0, 0.0],
+            [0.0, 0.0, 8.0],
+        ];
+        let found = places(&tetrahedra, &positions, &points);
+        assert_eq!(found, [1, 1, 1, 0], "{tetrahedra:?}");
+    }
+}
+
+/// The next body in the place of one that is gone has a border of its own.
+#[test]
+fn a_body_in_the_place_of_another() {
+    let mut scene = Scene::new();
+    let mut detector = Detector::new(Backend::Cpu).unwrap();
+    let mut positions = vec![[0.0; 3], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0], [0.0, 0.0, 4.0]];
+    positions.push([0.0, 0.0, -4.0]);
+    let far: Vec<[f64; 3]> = positions[..4].iter().map(|p| p.map(|x| x + 9.0)).collect();
+    positions.extend(far);
+    let [apart, joined] = [[5, 6, 7, 8], [0, 1, 2, 4]];
+    for (second, place) in [(apart, 0), (joined, 1), (apart, 0)] {
+        let tetrahedra = [[0, 1, 2, 3], second];
+        let body = scene.add_tetrahedra(&tetrahedra, &positions).unwrap();
+        let point = [[1.0, 1.0, 0.0]];
+        let found = detector.contains(&scene, body, &point).unwrap();
+        assert_eq!(found, [place], "{second:?}");
+        scene.remove(body).unwrap();
+    }
+}
+
 /// Coordinates beyond those of single precision, and points far out.
 #[test]
 fn numbers_of_any_size() {
