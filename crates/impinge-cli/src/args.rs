@@ -19,7 +19,7 @@ use crate::commands::{CHECK_EXAMPLES, CheckArgs, CheckWorkerArgs, TILES_EXAMPLES
 use crate::values::PngFile;
 use crate::values::{
     CurvesFile, FrameRange, FramesFile, MeshFile, RowsFile, at_least_one, body_numbers, bytes,
-    lambda, mesh_format, two_bodies,
+    lambda, mesh_format, threads, two_bodies,
 };
 
 pub use choices::{BackendArg, BodiesArg, MethodArg, PrecisionArg, SharedVertexArg, StartArg};
@@ -225,7 +225,7 @@ pub struct DetectorArgs {
     #[arg(long, value_name = "NAME")]
     pub device: Option<String>,
     /// CPU threads, 1 to 1024 [default: one per core]
-    #[arg(long, value_name = "N", value_parser = at_least_one)]
+    #[arg(long, value_name = "N", value_parser = threads)]
     pub threads: Option<NonZeroUsize>,
     /// Density coefficient of the grid of `--method cells`
     #[arg(long, value_name = "X", value_parser = lambda, default_value = "1")]

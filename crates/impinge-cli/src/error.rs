@@ -36,6 +36,17 @@ pub enum Error {
     /// The end of a step has other elements than its start.
     #[error("{0}")]
     Ends(String),
+    /// A mesh with seams, which were not to be welded.
+    #[error(
+        "{}: vertices {} and {} are at one position but not shared, so what they belong to touches at the start, and no step can be \
+         taken: leave out --no-weld ({n_coincident} vertices lie at positions of others), or ask with --start skip",
+        printable(.name), .vertices[0], .vertices[1]
+    )]
+    Seam {
+        name: String,
+        vertices: [u32; 2],
+        n_coincident: usize,
+    },
     /// The detection failed, or was cancelled.
     #[error(transparent)]
     Detection(#[from] impinge::Error),

@@ -222,6 +222,14 @@ pub fn at_least_one(text: &str) -> Result<NonZeroUsize, String> {
         .map_err(|_| "expected a whole number of at least 1".to_owned())
 }
 
+/// A number of threads.
+pub fn threads(text: &str) -> Result<NonZeroUsize, String> {
+    at_least_one(text)
+        .ok()
+        .filter(|threads| threads.get() <= 1024)
+        .ok_or_else(|| "expected a whole number of at least 1 and at most 1024".to_owned())
+}
+
 fn extension(path: &str) -> String {
     let extension = Path::new(path).extension().unwrap_or_default();
     extension.to_string_lossy().to_ascii_lowercase()

@@ -64,7 +64,9 @@ pub fn step(args: &StepArgs, cancel: &CancelToken) -> Result<(), Error> {
     }
     if !args.advance.is_empty() {
         reached::check(&args.advance, &bodies)?;
-        let advance = detector.advance(&bodies.scene, &step)?;
+        let advance = detector
+            .advance(&bodies.scene, &step)
+            .map_err(|error| bodies.named(error))?;
         drop(watch);
         reached::write(&args.advance, &bodies, &advance)?;
         let found = Found::advance(&advance, detector.stats());

@@ -80,3 +80,24 @@ fn a_step_is_taken_as_far_as_it_is_free() {
         assert!(misuse.contains(said), "{misuse}");
     }
 }
+
+#[test]
+fn a_mesh_with_seams_is_named_by_its_file() {
+    let folder = Folder::new();
+    let corners = "v 0 0 Z\nv 1 0 Z\nv 0 1 Z\nv 0 1 Z\nv 1 0 Z\nv 1 1 Z\nf 1 2 3\nf 4 5 6\n";
+    folder.text("start.obj", &corners.replace('Z', "0"));
+    folder.text("end.obj", &corners.replace('Z', "1"));
+    let step = ["step", "start.obj", "end.obj", "--advance", "out.obj"];
+    folder.run(step).printed();
+    let apart = [&step[..], &["--no-weld"]].concat();
+    let run = folder.run(&apart);
+    assert_eq!(run.code, Some(1));
+    let line = "\nimpinge: start.obj: vertices 1 and 4 are at one position but not shared";
+    let said = run.stderr;
+    assert!(
+        said.contains(line) && said.contains("leave out --no-weld"),
+        "{said}"
+    );
+    let run = folder.run(apart.iter().chain(&["--start", "skip"]));
+    assert_eq!(run.code, Some(0), "{}", run.stderr);
+}

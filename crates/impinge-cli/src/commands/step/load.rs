@@ -33,6 +33,26 @@ pub struct Moving {
 }
 
 impl Moving {
+    /// An error of the library, with the file of the body that it is about.
+    pub fn named(&self, error: impinge::Error) -> Error {
+        match error {
+            impinge::Error::Seam {
+                body,
+                vertices,
+                n_coincident,
+            } => {
+                let mut named = self.ids.iter().zip(&self.names);
+                let name = named.find(|(id, _)| **id == body);
+                Error::Seam {
+                    name: name.map_or_else(|| body.to_string(), |(_, [start, _])| start.clone()),
+                    vertices,
+                    n_coincident,
+                }
+            }
+            error => error.into(),
+        }
+    }
+
     /// Reads files in pairs.
     pub fn read(args: &StepArgs, cancel: &CancelToken) -> Result<Self, Error> {
         let (pairs, rest) = args.meshes.as_chunks::<2>();
