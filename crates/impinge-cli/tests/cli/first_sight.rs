@@ -303,8 +303,14 @@ fn words() {
             );
         }
     }
-    let said = folder.run(["self", "a.ply", "--threads=1025"]).misuse();
-    assert!(said.contains("at most 1024"), "{said}");
+    for command in [
+        &["self", "a.ply"][..],
+        &["tiles", "run", "tiles"],
+        &["tiles", "scatter", "tiles"],
+    ] {
+        let said = folder.run([command, &["--threads=1025"]].concat()).misuse();
+        assert!(said.contains("at most 1024"), "{said}");
+    }
     folder.run(["self", "a.ply", "--threads=1024"]).printed();
     folder.text("far.off", "OFF\n3 1 0\n0 0 0\n1e400 0 0\n0 1 0\n3 0 1 2\n");
     let line = folder.run(["self", "far.off"]).error();

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use clap::{Args, Subcommand};
 
 use crate::args::{MethodArg, PrecisionArg, SharedVertexArg, StartArg};
-use crate::values::{bytes, count, distance};
+use crate::values::{bytes, count, distance, threads};
 
 /// Shown below the help.
 pub const TILES_EXAMPLES: &str = "\
@@ -99,7 +99,7 @@ pub struct ScatterArgs {
     #[command(flatten)]
     pub share: ShareArgs,
     /// CPU threads, 1 to 1024 [default: one per core]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = threads)]
     pub threads: Option<NonZeroUsize>,
     /// Print JSON and nothing else
     #[arg(long)]
@@ -138,7 +138,7 @@ pub struct RunArgs {
     #[arg(long, value_enum, default_value_t = MethodArg::Auto)]
     pub method: MethodArg,
     /// CPU threads, 1 to 1024 [default: one per core]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = threads)]
     pub threads: Option<NonZeroUsize>,
     /// Memory for the detector without the answer, such as 512M [default: no limit]
     #[arg(long, value_name = "BYTES", value_parser = bytes)]
