@@ -92,6 +92,8 @@ GENERATED = {
     "ball": (ball, np.float32([0.7, 0.05, 0.02])),
     "bolt": (bolt, np.float32([0.4, -0.1, 0.05])),
 }
+#: In these, the boxes of so many pairs of triangles overlap in the first frame.
+BOXES = {"bolt": 95_828_482}
 
 
 class Scene:
@@ -184,7 +186,7 @@ def milliseconds(time):
     return f"{time:,.0f}" if time >= 100 else f"{time:.{1 if time >= 10 else 3}f}"
 
 
-def table(scene, reference, truth, rows):
+def table(scene, reference, truth, rows, left_out):
     """The results of one scene as Markdown."""
     n = len(scene.faces)
     lines = [
@@ -202,6 +204,12 @@ def table(scene, reference, truth, rows):
         wrong = f"+{row['extra']:,} −{row['missing']:,}" if row["extra"] + row["missing"] else "0"
         cells = [row["contender"], *map(milliseconds, times), f"{row['pairs']:,}", wrong]
         lines.append(f"| {' | '.join(cells)} | {row['frame_ms'] / ours:,.1f} |")
+    for contender in left_out:
+        lines += [
+            "",
+            f"{contender.name} is left out: it keeps all pairs whose boxes overlap, here {BOXES[scene.name]:,}, "
+            "which takes more than 8 GB.",
+        ]
     return "\n".join(lines)
 
 
@@ -221,7 +229,9 @@ def abilities(classes):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
-    parser.add_argument("scenes", nargs="*", help="ball, bolt, bunny, buddha, dragon; all by default")
+    parser.add_argument(
+        "scenes", nargs="*", help="ball, bolt, bunny, buddha, dragon; all by default"
+    )
     parser.add_argument("--frames", type=int, default=5)
     parser.add_argument("--seconds", type=float, default=2.0, help="for each contender, at least")
     parser.add_argument("--record", action="store_true", help="write to bench/record as well")
@@ -249,15 +259,18 @@ def main():
     for name in arguments.scenes or known:
         scene = Scene(name, data, arguments.frames)
         truth = scene.truth(reference)
-        rows = []
+        rows, left_out = [], []
         for contender in present:
+            if BOXES.get(name, 0) > contender.most_boxes:
+                left_out.append(contender)
+                continue
             row = run(contender, scene, truth, arguments.seconds)
             print(f"{name}: {row['contender']} {row['frame_ms']:.3g} ms per frame", file=sys.stderr)
             rows.append(row)
             if contender.exact and row["extra"] + row["missing"]:
                 print(f"{name}: {row['contender']} claims to be exact and is not", file=sys.stderr)
                 failed = True
-        parts.append(table(scene, reference.name, truth, rows))
+        parts.append(table(scene, reference.name, truth, rows, left_out))
         record[name] = {"n_triangles": len(scene.faces), "frames": len(truth), "rows": rows}
 
     today = datetime.date.today().isoformat()

@@ -31,6 +31,8 @@ class Contender:
     #: Two meshes, one mesh with itself, tetrahedra, answers, when vertices move.
     abilities = ()
     settings = "defaults"
+    #: The most pairs with boxes that overlap for which there is memory.
+    most_boxes = float("inf")
 
     @property
     def name(self):
@@ -259,6 +261,7 @@ class IpcToolkit(Contender):
 
     label, package = "ipc-toolkit, LBVH candidates", "ipctk"
     settings = "LBVH without edges, two patches, all threads"
+    most_boxes = 20_000_000
     abilities = (
         "boxes only",
         "boxes only (edge-face: yes or no)",

@@ -66,6 +66,43 @@ def test_a_wrong_answer_is_counted_and_fails(modules, monkeypatch, capsys):
     assert "+1 −2" in out and "claims to be exact and is not" in err
 
 
+def test_who_has_no_memory_for_all_boxes_is_left_out_by_name(modules, monkeypatch, capsys):
+    compare, contenders = modules
+
+    class KeepsBoxes(contenders.Impinge):
+        most_boxes = 10**6
+
+        def start(self, *arrays):
+            raise MemoryError
+
+    ours, peer = contenders.Impinge(""), KeepsBoxes(", which keeps boxes")
+    monkeypatch.setattr(contenders, "available", lambda: ([ours, peer], []))
+    monkeypatch.setattr(sys, "argv", ["compare", "bolt", "--frames", "1", "--seconds", "0"])
+    assert compare.main() == 0
+    out, _ = capsys.readouterr()
+    assert "which keeps boxes is left out: it keeps all pairs whose boxes overlap" in out
+    assert out.count("| **impinge**") == 1
+    # The number in the table of scenes.
+    scene = compare.Scene("bolt", None, 1)
+    (low, high), (other_low, other_high) = [
+        (frame[scene.faces].min(axis=1), frame[scene.faces].max(axis=1))
+        for frame in scene.frames[0]
+    ]
+    order = np.argsort(other_low[:, 0])
+    other_low, other_high = other_low[order], other_high[order]
+    n = 0
+    for at in range(0, len(low), 500):
+        some = slice(at, at + 500)
+        last = np.searchsorted(other_low[:, 0], high[some, 0].max(), side="right")
+        overlap = np.ones((len(low[some]), last), bool)
+        for axis in range(3):
+            overlap &= low[some, axis, None] <= other_high[None, :last, axis]
+            overlap &= other_low[None, :last, axis] <= high[some, axis, None]
+        n += np.count_nonzero(overlap)
+    # Sines differ in the last bit from one machine to another.
+    assert abs(n / compare.BOXES["bolt"] - 1) < 1e-3
+
+
 def test_bad_arguments_are_named(root):
     def run(*arguments):
         script = str(root / "bench" / "compare.py")
