@@ -205,7 +205,7 @@ def _cancel(ray: Any, flying: Iterable[Any]) -> None:
 
 def _ray() -> Any:
     try:
-        import ray
+        import ray  # type: ignore[import-not-found, unused-ignore]
     except ModuleNotFoundError as error:
         message = "impinge.ray needs Ray: pip install 'impinge[ray]' (Python 3.10 or later)"
         raise ModuleNotFoundError(message, name="ray") from error
