@@ -35,6 +35,7 @@ pub use answers::neighbours::{Csr, Neighbours};
 pub use answers::pairs::{Element, Pairs, hash_rows};
 pub use answers::places::Place;
 pub use answers::safe::{Bounds, SafeDistances};
+pub use answers::truncation::Truncation;
 #[cfg(feature = "gpu")]
 pub use detector::Gpu;
 pub use detector::{Detector, host};

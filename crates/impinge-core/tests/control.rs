@@ -84,7 +84,7 @@ fn points(world: &World) -> Vec<[f64; 3]> {
 }
 
 /// By the names of the methods; where one is asked twice, with more after a space.
-const ALL: [(&str, Ask); 19] = [
+const ALL: [(&str, Ask); 20] = [
     ("detect", |d, w| {
         Ok(d.detect(&w.scene, &Query::all())?.hash())
     }),
@@ -107,6 +107,13 @@ const ALL: [(&str, Ask); 19] = [
     ("advance", |d, w| {
         let step = Query::between(w.bodies[0], w.bodies[2]);
         Ok(d.advance(&w.scene, &step)?.fraction.to_bits())
+    }),
+    ("truncate", |d, w| {
+        let step = Query::between(w.bodies[0], w.bodies[2]);
+        let truncation = d.truncate(&w.scene, &step)?;
+        let at = truncation.positions(w.bodies[0]).expect("it moves");
+        let points: Vec<[f64; 3]> = (0..at.len()).map(|v| at.point(v)).collect();
+        Ok(bits(&points) ^ truncation.n_cut())
     }),
     ("candidates", |d, w| {
         let query = Query::between(w.bodies[0], w.bodies[1]);

@@ -25,6 +25,16 @@ impl ElementPair {
         }
     }
 
+    /// How many of the points are the first element's.
+    #[inline]
+    #[must_use]
+    pub fn n_first(self) -> usize {
+        match self {
+            Self::VertexVertex | Self::VertexEdge | Self::VertexFace => 1,
+            Self::EdgeEdge => 2,
+        }
+    }
+
     /// The corners of the difference polygon, in cyclic order: which point minus which.
     pub(crate) fn corners(self) -> &'static [[usize; 2]] {
         match self {

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use impinge::{BodyId, PairKind};
+use impinge::{BodyId, PairKind, Positions};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::exceptions::{PyMemoryError, PyRuntimeError};
 use pyo3::prelude::*;
@@ -306,6 +306,13 @@ impl Advance {
     pub fn new(inner: impinge::Advance, scene: u64) -> Self {
         Advance { inner, scene }
     }
+
+    fn moving(&self) -> impl Iterator<Item = (BodyId, &Positions)> {
+        self.inner
+            .positions
+            .iter()
+            .map(|(id, positions)| (*id, positions))
+    }
 }
 
 #[pymethods]
@@ -331,9 +338,7 @@ impl Advance {
     }
 
     fn bodies(&self) -> Vec<Body> {
-        let scene = self.scene;
-        let moving = self.inner.positions.iter();
-        moving.map(|&(id, _)| Body { id, scene }).collect()
+        bodies_of(self.moving(), self.scene)
     }
 
     fn positions<'py>(
@@ -341,30 +346,104 @@ impl Advance {
         py: Python<'py>,
         body: &Bound<'py, PyAny>,
     ) -> PyResult<Option<Bound<'py, PyAny>>> {
-        let mut moving = self.inner.positions.iter();
-        let found = match body.cast::<Body>() {
-            Ok(body) if body.get().scene != self.scene => {
-                return Err(invalid("body: of another scene"));
-            }
-            Ok(body) => moving.find(|(id, _)| *id == body.get().id),
-            Err(_) => {
-                let number = unsigned(body, "body", u64::from(u32::MAX))?;
-                moving.find(|(id, _)| id.index() as u64 == number)
-            }
-        };
-        let found = found.map(|(_, positions)| positions_array(py, positions));
-        found.transpose()
+        positions_of(py, self.moving(), self.scene, body)
     }
 
     fn apply(&self, scene: &Bound<'_, PyAny>) -> PyResult<()> {
-        let scene = scene
-            .cast::<Scene>()
-            .map_err(|_| unexpected(scene, "scene", "a Scene"))?;
-        let mut scene = scene.try_borrow_mut().map_err(|_| {
-            PyRuntimeError::new_err("the scene is being read by a detection: wait for it to end")
-        })?;
-        self.inner.apply(&mut scene.inner).map_err(raise)
+        changed(scene, |scene| self.inner.apply(scene))
     }
+}
+
+/// What `impinge.Truncation` is made of.
+#[pyclass(module = "impinge._impinge", frozen)]
+pub struct Truncation {
+    inner: impinge::Truncation,
+    scene: u64,
+}
+
+impl Truncation {
+    pub fn new(inner: impinge::Truncation, scene: u64) -> Self {
+        Truncation { inner, scene }
+    }
+}
+
+#[pymethods]
+impl Truncation {
+    #[getter]
+    fn n_cut(&self) -> u64 {
+        self.inner.n_cut()
+    }
+
+    #[getter]
+    fn n_touching(&self) -> u64 {
+        self.inner.n_touching()
+    }
+
+    #[getter]
+    fn rounds(&self) -> u32 {
+        self.inner.rounds()
+    }
+
+    #[getter]
+    fn start_intersects(&self) -> Option<bool> {
+        self.inner.start_intersects()
+    }
+
+    fn bodies(&self) -> Vec<Body> {
+        bodies_of(self.inner.iter(), self.scene)
+    }
+
+    fn positions<'py>(
+        &self,
+        py: Python<'py>,
+        body: &Bound<'py, PyAny>,
+    ) -> PyResult<Option<Bound<'py, PyAny>>> {
+        positions_of(py, self.inner.iter(), self.scene, body)
+    }
+
+    fn apply(&self, scene: &Bound<'_, PyAny>) -> PyResult<()> {
+        changed(scene, |scene| self.inner.apply(scene))
+    }
+}
+
+/// The bodies that an answer moves.
+fn bodies_of<'a>(moving: impl Iterator<Item = (BodyId, &'a Positions)>, scene: u64) -> Vec<Body> {
+    moving.map(|(id, _)| Body { id, scene }).collect()
+}
+
+/// Where an answer moves the vertices of a body; `None` for one that stands still.
+fn positions_of<'py, 'a>(
+    py: Python<'py>,
+    mut moving: impl Iterator<Item = (BodyId, &'a Positions)>,
+    scene: u64,
+    body: &Bound<'py, PyAny>,
+) -> PyResult<Option<Bound<'py, PyAny>>> {
+    let found = match body.cast::<Body>() {
+        Ok(body) if body.get().scene != scene => {
+            return Err(invalid("body: of another scene"));
+        }
+        Ok(body) => moving.find(|(id, _)| *id == body.get().id),
+        Err(_) => {
+            let number = unsigned(body, "body", u64::from(u32::MAX))?;
+            moving.find(|(id, _)| id.index() as u64 == number)
+        }
+    };
+    let found = found.map(|(_, positions)| positions_array(py, positions));
+    found.transpose()
+}
+
+/// Changes a scene that nobody reads.
+fn changed(
+    scene: &Bound<'_, PyAny>,
+    change: impl FnOnce(&mut impinge::Scene) -> Result<(), impinge::Error>,
+) -> PyResult<()> {
+    let scene = scene
+        .cast::<Scene>()
+        .map_err(|_| unexpected(scene, "scene", "a Scene"))?;
+    let mut scene = scene.try_borrow_mut().map_err(|_| {
+        PyRuntimeError::new_err("the scene is being read by a detection: wait for it to end")
+    })?;
+    change(&mut scene.inner).map_err(raise)
 }
 
 /// What `impinge.Candidates` is made of.

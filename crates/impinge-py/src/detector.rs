@@ -9,7 +9,7 @@ use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::answers::{Advance, Candidates, Impacts, Pairs, Row, impact};
+use crate::answers::{Advance, Candidates, Impacts, Pairs, Row, Truncation, impact};
 use crate::arrays::{PositionArray, Rows};
 use crate::bodies::Body;
 use crate::closest::Closest;
@@ -145,6 +145,20 @@ impl DetectorBase {
             |detector, scene, query| detector.advance(scene, query),
         )?;
         Ok(Advance::new(asked.answer, asked.scene))
+    }
+
+    fn _truncate(
+        slf: &Bound<'_, Self>,
+        scene: &Bound<'_, PyAny>,
+        keywords: Keywords<'_, '_>,
+    ) -> PyResult<Truncation> {
+        let asked = ask(
+            slf,
+            scene,
+            Options::new(keywords)?,
+            |detector, scene, query| detector.truncate(scene, query),
+        )?;
+        Ok(Truncation::new(asked.answer, asked.scene))
     }
 
     fn _candidates(

@@ -38,7 +38,7 @@ mod _impinge {
     use super::near::{FEATURES, TYPES};
 
     #[pymodule_export]
-    use super::answers::{Advance, Candidates, Impacts, Pairs};
+    use super::answers::{Advance, Candidates, Impacts, Pairs, Truncation};
     #[pymodule_export]
     use super::bodies::Body;
     #[pymodule_export]

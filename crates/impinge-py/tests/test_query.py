@@ -18,6 +18,7 @@ QUESTIONS = {
     "earliest": (),
     "is_free": (),
     "advance": (),
+    "truncate": (),
     "candidates": (0.1,),
     "near": (0.1,),
     "safe_distances": (0.1,),
@@ -25,7 +26,7 @@ QUESTIONS = {
     "nearest": (),
 }
 STATIC = ("detect", "count", "any")
-STEPS = ("impacts", "earliest", "is_free", "advance")
+STEPS = ("impacts", "earliest", "is_free", "advance", "truncate")
 INF = float("inf")
 CELL = ([-INF, -INF, -INF], [0.5, INF, INF])
 
@@ -52,6 +53,8 @@ def value(answer):
     """What can be compared of an answer."""
     if isinstance(answer, impinge.Advance):
         return answer.fraction
+    if isinstance(answer, impinge.Truncation):
+        return [answer.positions(body).tolist() for body in answer.bodies]
     if isinstance(answer, impinge.Nearest):
         return answer[:5]
     if isinstance(answer, impinge.SafeDistances):
@@ -132,7 +135,7 @@ WHICH = {
     "of": (1, {"nearest": "query: self-collision"}),
     "kinds": (("ee",), dict.fromkeys((*STATIC, "nearest"), "kinds: ")),
     "exclude": ([(0, 1), (2, 2)], {}),
-    "owned_by": (CELL, dict.fromkeys(("advance", "nearest"), "owned_by: ")),
+    "owned_by": (CELL, dict.fromkeys(("advance", "truncate", "nearest"), "owned_by: ")),
 }
 HOW = {
     "shared_vertex": "skip",

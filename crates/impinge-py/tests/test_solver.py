@@ -42,6 +42,27 @@ def test_moving_by_the_bounds_is_free(scene, detector):
     assert not detector.any(scene)
 
 
+def test_each_vertex_goes_as_far_as_it_can(scene, detector):
+    a, b = scene.bodies
+    starts = [scene.positions(body).copy() for body in (a, b)]
+    scene.set_end_positions(a, starts[0] + np.float32([0.3, 0, 0]))
+    truncation = detector.truncate(scene)
+    at = truncation.positions(a)
+    assert truncation.bodies == [a] and truncation.positions(b) is None
+    assert at.dtype == np.float32 and truncation.n_touching == 0 and truncation.start_intersects is None
+    moved = at[:, 0] - starts[0][:, 0]
+    assert 0 < truncation.n_cut < len(at) and truncation.rounds >= 1
+    assert (moved >= 0).all() and moved.max() > 0.2999 and moved.min() < 0.2
+    assert detector.advance(scene).fraction * 0.3 < moved.max()
+    assert f"n_cut={truncation.n_cut}" in repr(truncation)
+    with pytest.raises(TypeError, match="pickle its arrays"):
+        pickle.dumps(truncation)
+    scene.set_end_positions(a, at)
+    assert detector.is_free(scene, start="verify")
+    truncation.apply(scene)
+    assert np.array_equal(scene.positions(a), at)
+
+
 def test_fixed_bodies_leave_all_of_a_distance(scene, detector):
     both = detector.safe_distances(scene, 0.2, which="between")
     one = detector.safe_distances(scene, 0.2, which="between", fixed=[0])

@@ -135,7 +135,7 @@ pub use impinge_core::{
     Elements, Error, Exclusion, Filter, Impact, Impacts, InstructionSet, Mesh, Method, NearIter,
     NearPair, NearPairs, Neighbours, NewPositions, PairFilter, PairKind, PairKinds, Pairs, Part,
     Place, Positions, Precision, Progress, Query, Real, Recluster, SafeDistances, Scene, Settings,
-    SharedVertex, Stage, Start, Stats, Weld, WrongNumber, hash_impact_rows, hash_rows,
+    SharedVertex, Stage, Start, Stats, Truncation, Weld, WrongNumber, hash_impact_rows, hash_rows,
 };
 #[cfg(feature = "gpu")]
 pub use impinge_core::{
@@ -154,4 +154,5 @@ const _: () = {
     threads_may_share::<NearPairs>();
     threads_may_share::<SafeDistances>();
     threads_may_share::<Neighbours>();
+    threads_may_share::<Truncation>();
 };

@@ -45,11 +45,21 @@ impl Advance {
     /// # Errors
     /// A body that was removed, or that now has another number of vertices.
     pub fn apply(&self, scene: &mut Scene) -> Result<(), Error> {
-        self.positions
-            .iter()
-            .try_for_each(|(body, positions)| match positions {
-                Positions::F32(positions) => scene.set_positions(*body, positions),
-                Positions::F64(positions) => scene.set_positions(*body, positions),
-            })
+        set_positions(scene, &self.positions)
     }
+}
+
+/// Sets the positions of bodies in a scene.
+///
+/// # Errors
+/// A body that was removed, or that now has another number of vertices.
+pub(crate) fn set_positions(
+    scene: &mut Scene,
+    positions: &[(BodyId, Positions)],
+) -> Result<(), Error> {
+    let mut all = positions.iter();
+    all.try_for_each(|(body, positions)| match positions {
+        Positions::F32(positions) => scene.set_positions(*body, positions),
+        Positions::F64(positions) => scene.set_positions(*body, positions),
+    })
 }

@@ -11,3 +11,4 @@ pub(crate) mod numbering;
 pub(crate) mod pairs;
 pub(crate) mod places;
 pub(crate) mod safe;
+pub(crate) mod truncation;

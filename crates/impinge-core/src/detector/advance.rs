@@ -51,7 +51,13 @@ impl Detector {
         let plan = Plan::advance(scene, query, with_close, self.limits_of_steps())?;
         let start = self.verify(scene, query)?;
         let seen = self.find_contacts(scene, &plan, control, (start, false))?;
-        self.refuse_seams(scene, &plan)?;
+        let contacts = self.steps.contacts.found();
+        let touching = contacts.filter(|(_, found)| found.value.at_start);
+        refuse_seams(
+            scene,
+            &plan,
+            touching.map(|(kind, found)| (kind, found.key)),
+        )?;
         let mut advance = Advance {
             fraction: 1.0,
             first: self.steps.contacts.first(plan.precision),
@@ -167,39 +173,6 @@ impl Detector {
         }
     }
 
-    /// Refuses elements of one body, among the contacts found, that touch at the start at vertices with equal positions.
-    fn refuse_seams(&self, scene: &Scene, plan: &Plan) -> Result<(), Error> {
-        let at_start = self
-            .steps
-            .contacts
-            .found()
-            .filter(|(_, found)| found.value.at_start);
-        let seams = at_start.filter_map(|(kind, found)| {
-            let [a, b] = pair_numbers(found.key).map(|number| plan.locate(number));
-            let [of_a, of_b] = [a.0, b.0].map(|part| plan.part(part));
-            if of_a.id != of_b.id {
-                return None;
-            }
-            let body = plan.body(scene, a.0);
-            let at = body.positions();
-            let [a, b] = [(of_a.part, a.1), (of_b.part, b.1)]
-                .map(|(part, element)| body.corners(part, &element).to_vec());
-            let both = a.iter().flat_map(|&a| b.iter().map(move |&b| [a, b]));
-            let coincide = |&[a, b]: &[u32; 2]| at.point(a as usize) == at.point(b as usize);
-            let vertices = both.filter(coincide).min()?;
-            Some(((kind, found.key), of_a.id, vertices))
-        });
-        // Contacts come in any order.
-        let Some((_, body, vertices)) = seams.min_by_key(|(pair, ..)| *pair) else {
-            return Ok(());
-        };
-        Err(Error::Seam {
-            body,
-            vertices,
-            n_coincident: scene.body(body)?.positions().n_coincident(),
-        })
-    }
-
     /// Whether the search for the earliest contact also lists the pairs that rounding may bring together.
     fn lists_close_pairs(&self) -> bool {
         #[cfg(feature = "gpu")]
@@ -213,8 +186,40 @@ impl Detector {
     }
 }
 
+/// Refuses elements of one body, among pairs that touch at the start, that do so at vertices with equal positions.
+pub(super) fn refuse_seams(
+    scene: &Scene,
+    plan: &Plan,
+    touching: impl IntoIterator<Item = (PairKind, u64)>,
+) -> Result<(), Error> {
+    let seams = touching.into_iter().filter_map(|(kind, key)| {
+        let [a, b] = pair_numbers(key).map(|number| plan.locate(number));
+        let [of_a, of_b] = [a.0, b.0].map(|part| plan.part(part));
+        if of_a.id != of_b.id {
+            return None;
+        }
+        let body = plan.body(scene, a.0);
+        let at = body.positions();
+        let [a, b] = [(of_a.part, a.1), (of_b.part, b.1)]
+            .map(|(part, element)| body.corners(part, &element).to_vec());
+        let both = a.iter().flat_map(|&a| b.iter().map(move |&b| [a, b]));
+        let coincide = |&[a, b]: &[u32; 2]| at.point(a as usize) == at.point(b as usize);
+        let vertices = both.filter(coincide).min()?;
+        Some(((kind, key), of_a.id, vertices))
+    });
+    // Pairs come in any order.
+    let Some((_, body, vertices)) = seams.min_by_key(|(pair, ..)| *pair) else {
+        return Ok(());
+    };
+    Err(Error::Seam {
+        body,
+        vertices,
+        n_coincident: scene.body(body)?.positions().n_coincident(),
+    })
+}
+
 /// Bodies that move, with their positions at the start and at the end.
-fn moving(scene: &Scene) -> impl Iterator<Item = (BodyId, &Positions, &Positions)> {
+pub(super) fn moving(scene: &Scene) -> impl Iterator<Item = (BodyId, &Positions, &Positions)> {
     let bodies = scene.bodies();
     bodies.filter_map(|(id, body)| Some((id, body.positions(), body.end_positions()?)))
 }
@@ -244,7 +249,7 @@ fn touch(scene: &Scene, plan: &Plan, (kind, key): (PairKind, u64), fraction: f64
     contact.is_some_and(|contact| !(plan.start == Start::Skip && contact.at_start))
 }
 
-fn refuse_cell(query: &Query) -> Result<(), Error> {
+pub(super) fn refuse_cell(query: &Query) -> Result<(), Error> {
     match query.cell {
         None => Ok(()),
         Some(_) => Err(Error::Setting {

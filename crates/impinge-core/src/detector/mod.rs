@@ -16,6 +16,7 @@ mod probe;
 mod resident;
 mod solver;
 mod steps;
+mod truncate;
 
 #[cfg(feature = "gpu")]
 pub use resident::Gpu;

@@ -35,7 +35,7 @@ const TASK: usize = 1024;
 /// Memory of these questions.
 #[derive(Debug, Default)]
 pub(super) struct SolverMemory {
-    keys: KeysByKind,
+    pub keys: KeysByKind,
     distances: [Vec<f64>; PairKind::ALL.len()],
     /// Of each vertex of each body, the bits of the least share: floats of at least 0 are in the order of their bits.
     least: Vec<AtomicU64>,

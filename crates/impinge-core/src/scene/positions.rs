@@ -125,6 +125,14 @@ impl Positions {
         share * self.magnitude().max(end.magnitude()) + least
     }
 
+    /// About the share of a vertex's way by which rounding moves positions on it.
+    pub(crate) fn share_of_rounding(&self, end: &Positions, vertex: usize) -> f64 {
+        let [from, to] = [self, end].map(|positions| positions.point(vertex));
+        let size = |p: [f64; 3]| p.iter().fold(0.0, |size: f64, x| size.max(x.abs()));
+        let way = size(std::array::from_fn(|k| to[k] - from[k]));
+        self.unit_roundoff(end) * (size(from).max(size(to)) / way)
+    }
+
     /// The unit roundoff of positions on the way to others.
     pub(crate) fn unit_roundoff(&self, end: &Positions) -> f64 {
         match (self, end) {

@@ -23,7 +23,7 @@ pub(super) fn bounds(pair: ElementPair, points: &[Point; 4]) -> Option<[f64; 2]>
     bounds_and_way(pair, points).map(|(bounds, _)| bounds)
 }
 
-/// [`bounds`], and about the shortest way from the second element to the first.
+/// [`bounds`], and about the shortest way from the origin to the difference polygon.
 pub(super) fn bounds_and_way(pair: ElementPair, points: &[Point; 4]) -> Option<([f64; 2], Point)> {
     let polygon = Polygon::of_pair(pair, points);
     let largest = polygon.size();

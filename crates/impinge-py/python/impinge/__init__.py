@@ -13,7 +13,7 @@ and depends on the input alone, not on method, backend, threads or memory.
 
 For deforming meshes keep a `Scene` and a `Detector`, move the vertices with
 `Scene.set_positions`, and ask again with `Detector.detect`. Of a step, from positions to
-`Scene.set_end_positions`, ask `Detector.impacts`, `earliest`, `is_free` and `advance`; `impinge.ipc` has
+`Scene.set_end_positions`, ask `Detector.impacts`, `earliest`, `is_free`, `advance` and `truncate`; `impinge.ipc` has
 those under the names of ipc-toolkit.
 """
 
@@ -31,6 +31,7 @@ from ._answers import (
     Pairs,
     SafeDistances,
     Stats,
+    Truncation,
 )
 from ._check import check
 from ._detector import Detector
@@ -110,6 +111,7 @@ __all__ = [
     "Seam",
     "Stats",
     "TooManyPairs",
+    "Truncation",
     "__version__",
     "check",
     "closest_points",

@@ -29,6 +29,7 @@ __all__ = [
     "Pairs",
     "SafeDistances",
     "Stats",
+    "Truncation",
 ]
 
 
@@ -724,40 +725,19 @@ class Closest:
         return f"Closest({len(self)} points)"
 
 
-class Advance:
-    """How far a step can be taken, and where vertices are then."""
+class _Motion:
+    """Where vertices are after a step, as far as it can be taken."""
 
     __slots__ = ("_inner",)
 
-    def __init__(self, inner: _impinge.Advance) -> None:
-        self._inner = inner
-
-    @property
-    def fraction(self) -> float:
-        """float : the part of the step that can be taken: 1 for all of it, 0 for none. With a clearance it holds for all smaller
-        parts, and for positions that you compute (see `Detector.advance`).
-        """
-        return self._inner.fraction
-
-    @property
-    def first(self) -> Impact | None:
-        """Impact or None : the first contact of the whole step, its time rounded down to float64; ``None`` where
-        nothing touches.
-        """
-        first = self._inner.first()
-        return None if first is None else Impact(*first)
+    _inner: _impinge.Advance | _impinge.Truncation
 
     @property
     def start_intersects(self) -> bool | None:
-        """bool or None : whether elements intersect at the start, so that no part of the step can be taken; ``None`` if nobody
-        asked, which only ``start="verify"`` does.
+        """bool or None : whether elements intersect at the start, so that nothing can be moved; ``None`` if nobody asked, which only
+        ``start="verify"`` does.
         """
         return self._inner.start_intersects
-
-    @property
-    def n_tried(self) -> int:
-        """int : how many fractions were tried."""
-        return self._inner.n_tried
 
     @property
     def bodies(self) -> list[Body]:
@@ -803,7 +783,65 @@ class Advance:
         self._inner.apply(scene)
 
     def __reduce__(self) -> NoReturn:
-        raise TypeError("an Advance names bodies of a live scene: pickle its arrays")
+        raise TypeError(f"{type(self).__name__} names bodies of a live scene: pickle its arrays")
+
+
+class Advance(_Motion):
+    """How far a step can be taken, and where vertices are then."""
+
+    __slots__ = ()
+    _inner: _impinge.Advance
+
+    def __init__(self, inner: _impinge.Advance) -> None:
+        self._inner = inner
+
+    @property
+    def fraction(self) -> float:
+        """float : the part of the step that can be taken: 1 for all of it, 0 for none. With a clearance it holds for all smaller
+        parts, and for positions that you compute (see `Detector.advance`).
+        """
+        return self._inner.fraction
+
+    @property
+    def first(self) -> Impact | None:
+        """Impact or None : the first contact of the whole step, its time rounded down to float64; ``None`` where
+        nothing touches.
+        """
+        first = self._inner.first()
+        return None if first is None else Impact(*first)
+
+    @property
+    def n_tried(self) -> int:
+        """int : how many fractions were tried."""
+        return self._inner.n_tried
 
     def __repr__(self) -> str:
         return f"Advance(fraction={self.fraction!r}, {len(self.bodies)} bodies)"
+
+
+class Truncation(_Motion):
+    """How far each vertex can go in a step: `Detector.truncate`."""
+
+    __slots__ = ()
+    _inner: _impinge.Truncation
+
+    def __init__(self, inner: _impinge.Truncation) -> None:
+        self._inner = inner
+
+    @property
+    def n_cut(self) -> int:
+        """int : how many vertices were stopped before the end of their way."""
+        return self._inner.n_cut
+
+    @property
+    def n_touching(self) -> int:
+        """int : how many pairs already touch at the start, or are nearer than they are to keep: their vertices were not moved."""
+        return self._inner.n_touching
+
+    @property
+    def rounds(self) -> int:
+        """int : how often pairs were looked at again, because vertices had been stopped."""
+        return self._inner.rounds
+
+    def __repr__(self) -> str:
+        return f"Truncation(n_cut={self.n_cut}, {len(self.bodies)} bodies)"

@@ -21,6 +21,7 @@ from ._answers import (
     Pairs,
     SafeDistances,
     Stats,
+    Truncation,
 )
 from ._impinge import Contacts, DetectorBase, Penetration
 
@@ -304,6 +305,48 @@ class Detector(DetectorBase):
             Vertices of one body at one position that are not shared.
         """
         return Advance(self._advance(scene, options))
+
+    def truncate(self, scene: Scene, **options: Unpack[Options]) -> Truncation:
+        """How far each vertex can go on its way to its end position, so that nothing touches: each vertex stops for itself,
+        where `advance` stops all of them at one fraction of the step.
+
+        The straight way from the start to the *rounded* positions is free, if the start was, and but for pairs that touch at the
+        start: their vertices stay, or are not looked at with ``start="skip"``. Elements that are to keep a `separation` or a
+        `clearance` do so at every moment. Elements that stay apart as they go the same way are not stopped. Where two come too
+        near, the vertices that go towards the other element stop before planes between the two; so some stop that might have
+        passed, and the next step takes them farther.
+
+        Parameters
+        ----------
+        scene, **options
+            As for `impacts`. No `owned_by`.
+
+        Returns
+        -------
+        Truncation
+            ``truncation.apply(scene)`` takes the step.
+
+        Raises
+        ------
+        Seam
+            Vertices of one body at one position that are not shared.
+
+        Examples
+        --------
+        >>> import impinge
+        >>> scene = impinge.Scene()
+        >>> floor = scene.add([[0, 0, 0], [4, 0, 0], [0, 4, 0]], [[0, 1, 2]])
+        >>> points = scene.add_points([[1, 1, 1], [9, 9, 1]])
+        >>> scene.set_end_positions(points, [[1, 1, -1], [9, 9, -1]])
+        >>> truncation = impinge.Detector("cpu").truncate(scene)
+        >>> truncation.n_cut, truncation.positions(points)[:, 2].round(2).tolist()
+        (1, [0.0, -1.0])
+
+        Notes
+        -----
+        Divide and Truncate (Chen et al., SIGGRAPH 2026) has the planes that divide the room between two elements.
+        """
+        return Truncation(self._truncate(scene, options))
 
     def candidates(
         self, scene: Scene, inflation: SupportsFloat = 0.0, **options: Unpack[Options]

@@ -35,10 +35,22 @@ impl FirstContact {
         b: PairElement<'_>,
         fraction: f64,
     ) -> Option<Contact> {
-        let pair = exact_kind(test)?;
         if a.shares_vertex(&b) {
             return None;
         }
+        let (pair, [a, b], [start, end]) = Self::ends(test, [a, b], fraction)?;
+        let parts = [a.part, b.part];
+        a.plan.first(a.scene, parts, pair, [&start, &end])
+    }
+
+    /// The pair as the exact predicate names it, with its elements in that order, and their points at the start and at a fraction of the
+    /// step.
+    pub fn ends(
+        test: TestId,
+        [a, b]: [PairElement<'_>; 2],
+        fraction: f64,
+    ) -> Option<(ElementPair, [PairElement<'_>; 2], [[Point; 4]; 2])> {
+        let pair = exact_kind(test)?;
         // The pair is named "edge and vertex", but tested as vertex and edge.
         let (a, b) = match pair {
             ElementPair::VertexEdge => (b, a),
@@ -51,8 +63,7 @@ impl FirstContact {
                 points[ix] = end;
             }
         }
-        let ends = points.each_ref();
-        a.plan.first(a.scene, [a.part, b.part], pair, ends)
+        Some((pair, [a, b], points))
     }
 }
 

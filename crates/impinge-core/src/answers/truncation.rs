@@ -1,0 +1,76 @@
+//! How far each vertex may go in a step, and where it is afterwards.
+
+use crate::answers::advance::set_positions;
+use crate::scene::Scene;
+use crate::scene::error::Error;
+use crate::scene::ids::BodyId;
+use crate::scene::positions::Positions;
+
+/// Where the vertices are after each has gone as far as it may: see [`Detector::truncate`](crate::Detector::truncate).
+///
+/// The same input gives the same bytes on every method, backend, thread count and budget.
+#[derive(Clone, Default, PartialEq)]
+pub struct Truncation {
+    pub(crate) positions: Vec<(BodyId, Positions)>,
+    pub(crate) n_cut: u64,
+    pub(crate) n_touching: u64,
+    pub(crate) n_rounds: u32,
+    pub(crate) start_intersects: Option<bool>,
+}
+
+impl Truncation {
+    /// The positions of a body, in the precision of its positions; `None` for one that does not move or was not in the scene.
+    pub fn positions(&self, body: BodyId) -> Option<&Positions> {
+        let found = self.positions.binary_search_by_key(&body, |(id, _)| *id);
+        Some(&self.positions[found.ok()?].1)
+    }
+
+    /// The bodies that move, each with its positions.
+    pub fn iter(&self) -> impl ExactSizeIterator<Item = (BodyId, &Positions)> {
+        self.positions
+            .iter()
+            .map(|(id, positions)| (*id, positions))
+    }
+
+    /// How many vertices were stopped before the end of their way.
+    pub fn n_cut(&self) -> u64 {
+        self.n_cut
+    }
+
+    /// How many pairs already touch at the start, or are nearer than they are to keep: their vertices were not moved.
+    pub fn n_touching(&self) -> u64 {
+        self.n_touching
+    }
+
+    /// How often pairs were looked at again, because vertices had been stopped.
+    pub fn rounds(&self) -> u32 {
+        self.n_rounds
+    }
+
+    /// Whether elements intersect at the start; no vertex was moved then. `None` if nobody asked: only
+    /// [`Start::Verify`](crate::Start::Verify) does.
+    pub fn start_intersects(&self) -> Option<bool> {
+        self.start_intersects
+    }
+
+    /// Takes the step: sets these positions in the scene.
+    ///
+    /// # Errors
+    /// A body that was removed, or that now has another number of vertices.
+    pub fn apply(&self, scene: &mut Scene) -> Result<(), Error> {
+        set_positions(scene, &self.positions)
+    }
+}
+
+impl std::fmt::Debug for Truncation {
+    /// Without the positions: these may be millions.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let mut short = f.debug_struct("Truncation");
+        short.field("n_cut", &self.n_cut);
+        short.field("n_touching", &self.n_touching);
+        short.field("n_rounds", &self.n_rounds);
+        short.field("start_intersects", &self.start_intersects);
+        short.field("n_bodies", &self.positions.len());
+        short.finish_non_exhaustive()
+    }
+}

@@ -1,0 +1,303 @@
+//! How far each vertex may go in a step: by the exact test of the whole step.
+
+use impinge_core::{
+    Backend, BodyId, Detector, Error, Method, PairFilter, Positions, Query, Real, Scene, Settings,
+    Start, Truncation,
+};
+use impinge_scenes::{Random, soup, surfaces};
+
+fn detector(method: Method, threads: usize) -> Detector {
+    Detector::new(Settings {
+        method,
+        threads,
+        backend: Backend::Cpu,
+        ..Settings::default()
+    })
+    .expect("settings")
+}
+
+fn detectors() -> [Detector; 3] {
+    [
+        detector(Method::Clusters, 1),
+        detector(Method::Clusters, 4),
+        detector(Method::Naive, 2),
+    ]
+}
+
+/// The vertices of all bodies that move: at the start, at the end, and where they were stopped.
+fn ways(scene: &Scene, truncation: &Truncation) -> Vec<[[f64; 3]; 3]> {
+    let mut all = Vec::new();
+    for (id, body) in scene.bodies() {
+        let Some(end) = body.end_positions() else {
+            continue;
+        };
+        let at = truncation.positions(id).expect("it moves");
+        assert_eq!(at.len(), end.len());
+        all.extend((0..end.len()).map(|v| [body.positions().point(v), end.point(v), at.point(v)]));
+    }
+    all
+}
+
+/// The same scene with other ends.
+fn with_ends(scene: &Scene, truncation: &Truncation) -> Scene {
+    let mut scene = scene.clone();
+    for (id, at) in truncation.iter() {
+        match at {
+            Positions::F32(at) => scene.set_end_positions(id, at),
+            Positions::F64(at) => scene.set_end_positions(id, at),
+        }
+        .expect("as many");
+    }
+    scene
+}
+
+/// Asks all detectors, and tests the answer.
+fn checked(scene: &Scene, query: &Query) -> Truncation {
+    let [truncation, others @ ..] =
+        detectors().map(|mut detector| detector.truncate(scene, query).expect("an answer"));
+    for other in others {
+        assert_eq!(truncation, other);
+    }
+    let mut detector = detector(Method::Clusters, 2);
+    // What touches at the start is not free.
+    let query = match truncation.n_touching() {
+        0 => query.clone(),
+        _ => query.clone().start(Start::Skip),
+    };
+    let stopped = with_ends(scene, &truncation);
+    assert!(detector.is_free(&stopped, &query).expect("an answer"));
+    let ways = ways(scene, &truncation);
+    for [start, end, at] in &ways {
+        for k in 0..3 {
+            assert!(start[k].min(end[k]) <= at[k] && at[k] <= start[k].max(end[k]));
+        }
+    }
+    let n_before_end = ways.iter().filter(|[_, end, at]| end != at).count() as u64;
+    assert!(n_before_end <= truncation.n_cut());
+    truncation
+}
+
+/// Coordinates as they are held.
+fn held<R: Real>(points: &[[f64; 3]], round: impl Fn(f64) -> R) -> Vec<[R; 3]> {
+    points.iter().map(|p| p.map(&round)).collect()
+}
+
+/// Triangles that fly about, small enough to be apart at the start.
+fn flying<R: Real>(
+    random: &mut Random,
+    n: usize,
+    far: f64,
+    round: impl Fn(f64) -> R + Copy,
+) -> Scene {
+    let mut scene = Scene::new();
+    let mut number = |size: f64| (f64::from(random.unit()) - 0.5) * size;
+    for _ in 0..n {
+        let at = [(); 3].map(|()| number(4.0));
+        let way = [(); 3].map(|()| number(far));
+        let corners = [(); 3].map(|()| [0, 1, 2].map(|k: usize| at[k] + number(0.5)));
+        let ends = corners.map(|p| [0, 1, 2].map(|k: usize| p[k] + way[k] + number(0.3 * far)));
+        let body = scene
+            .add_triangles(&[[0, 1, 2]], &held(&corners, round))
+            .expect("a triangle");
+        scene
+            .set_end_positions(body, held(&ends, round))
+            .expect("as many");
+    }
+    scene
+}
+
+#[test]
+fn steps_to_where_vertices_are_stopped_are_free() {
+    let mut random = Random::new(31);
+    let (mut n_cut, mut n_all, mut n_rounds) = (0, 0, 0);
+    for round in 0..60 {
+        let far = [0.2, 1.0, 5.0][round % 3];
+        let n = 20 + round % 20;
+        let scene = match round % 4 {
+            0 | 1 => flying(&mut random, n, far, |x| x as f32),
+            2 => flying(&mut random, n, far, |x| x),
+            // Far from the origin, where rounding shows.
+            _ => flying(&mut random, n, far, |x| (x + 3000.0) as f32),
+        };
+        let query = match round % 5 {
+            3 => Query::all().separation(0.01),
+            4 => Query::all().clearance(0.02),
+            _ => Query::all(),
+        };
+        let truncation = checked(&scene, &query);
+        n_cut += truncation.n_cut();
+        n_rounds += u64::from(truncation.rounds());
+        n_all += 3 * n as u64;
+        // A free step of the same bodies needs no stop.
+        if truncation.n_cut() == 0 {
+            assert!(
+                detector(Method::Clusters, 1)
+                    .is_free(&scene, &query)
+                    .expect("an answer")
+            );
+        }
+    }
+    assert!(
+        n_cut > n_all / 20 && n_cut < n_all / 2,
+        "{n_cut} of {n_all}"
+    );
+    assert!(n_rounds > 0);
+}
+
+#[test]
+fn a_chain_of_such_steps_never_touches() {
+    let mut random = Random::new(5);
+    let mut scene = soup_in_motion(&mut random);
+    let mut detector = detector(Method::Clusters, 2);
+    let mut n_cut = 0;
+    for _ in 0..40 {
+        let truncation = detector.truncate(&scene, &Query::all()).expect("an answer");
+        assert_eq!(truncation.n_touching(), 0);
+        n_cut += truncation.n_cut();
+        truncation.apply(&mut scene).expect("the same bodies");
+        assert!(!detector.any(&scene, &Query::all()).expect("an answer"));
+        move_on(&mut scene, &mut random);
+    }
+    assert!(n_cut > 1000, "{n_cut}");
+}
+
+/// Triangles that are apart, on their ways.
+fn soup_in_motion(random: &mut Random) -> Scene {
+    let mut scene = Scene::new();
+    let mut at = Vec::new();
+    for ix in 0..125 {
+        let cell = [ix % 5, ix / 5 % 5, ix / 25].map(f64::from);
+        let corner = |random: &mut Random| cell.map(|x| x + 0.4 * f64::from(random.unit()));
+        at.extend([corner(random), corner(random), corner(random)]);
+    }
+    let faces: Vec<[u32; 3]> = (0..125)
+        .map(|ix| [3 * ix, 3 * ix + 1, 3 * ix + 2])
+        .collect();
+    scene
+        .add_triangles(&faces, &held(&at, |x| x as f32))
+        .expect("a soup");
+    move_on(&mut scene, random);
+    scene
+}
+
+/// Sends every vertex somewhere.
+fn move_on(scene: &mut Scene, random: &mut Random) {
+    let ids: Vec<BodyId> = scene.bodies().map(|(id, _)| id).collect();
+    for id in ids {
+        let positions = scene.body(id).expect("held").positions();
+        let ends: Vec<[f32; 3]> = (0..positions.len())
+            .map(|v| {
+                (positions.point(v))
+                    .map(|x| (0.98 * x + 0.8 * (f64::from(random.unit()) - 0.5)) as f32)
+            })
+            .collect();
+        scene.set_end_positions(id, &ends).expect("as many");
+    }
+}
+
+#[test]
+fn what_moves_together_is_not_stopped() {
+    // A sheet that flies within its own plane, by many edges: static planes between its vertices would stop all of them.
+    let sheet = surfaces::bumpy_ball(2000, 0.2);
+    let mut scene = Scene::new();
+    let body = sheet.add_to(&mut scene).expect("a ball");
+    let wall = scene
+        .add_triangles(
+            &[[0, 1, 2]],
+            &[
+                [2.0_f32, -50.0, -50.0],
+                [2.0, 50.0, -50.0],
+                [2.0, 0.0, 50.0],
+            ],
+        )
+        .expect("a wall");
+    let moved = |by: f32| sheet.translated([by, 0.0, 0.0]).positions;
+    scene.set_end_positions(body, moved(1.0)).expect("as many");
+    let truncation = checked(&scene, &Query::all());
+    assert_eq!((truncation.n_cut(), truncation.rounds()), (0, 0));
+    assert_eq!(truncation.positions(wall), None);
+    // Against the wall, some do stop, but those behind the ball's widest part do not have to.
+    scene.set_end_positions(body, moved(1.6)).expect("as many");
+    let truncation = checked(&scene, &Query::all());
+    let n = sheet.positions.len() as u64;
+    assert!(
+        truncation.n_cut() > 10 && truncation.n_cut() < n * 3 / 4,
+        "{truncation:?} {n}"
+    );
+}
+
+#[test]
+fn who_touches_at_the_start_stays_or_is_skipped() {
+    let mut scene = Scene::new();
+    let floor = [[0.0_f32, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]];
+    scene.add_triangles(&[[0, 1, 2]], &floor).expect("a floor");
+    let points = scene
+        .add_points(&[[1.0_f32, 1.0, 0.0], [1.0, 2.0, 1.0]])
+        .expect("points");
+    let ends = [[1.0_f32, 1.0, 1.0], [1.0, 2.0, 2.0]];
+    scene.set_end_positions(points, &ends).expect("as many");
+    let truncation = checked(&scene, &Query::all());
+    assert_eq!((truncation.n_touching(), truncation.n_cut()), (1, 1));
+    let at = truncation.positions(points).expect("it moves");
+    assert_eq!([at.point(0)[2], at.point(1)[2]], [0.0, 2.0]);
+    let skipping = Query::all().start(Start::Skip);
+    let truncation = checked(&scene, &skipping);
+    assert_eq!((truncation.n_touching(), truncation.n_cut()), (0, 0));
+    // Two triangles through each other: nothing moves, if anyone asks.
+    let mut scene = Scene::new();
+    let soup = soup::triangles(200, 0.6, 3);
+    let body = soup.add_to(&mut scene).expect("a soup");
+    let far = soup.translated([9.0, 0.0, 0.0]).positions;
+    scene.set_end_positions(body, &far).expect("as many");
+    let verified = Query::all().start(Start::Verify);
+    let truncation = detector(Method::Clusters, 1)
+        .truncate(&scene, &verified)
+        .expect("an answer");
+    assert_eq!(truncation.start_intersects(), Some(true));
+    let stays = |[start, _, at]: [[f64; 3]; 3]| start == at;
+    assert!(ways(&scene, &truncation).into_iter().all(stays));
+}
+
+#[test]
+fn seams_are_refused_by_name() {
+    let mut scene = Scene::new();
+    let at = [
+        [0.0_f32, 0.0, 0.0],
+        [1.0, 0.0, 0.0],
+        [0.0, 1.0, 0.0],
+        [1.0, 0.0, 0.0],
+        [0.0, 1.0, 0.0],
+        [1.0, 1.0, 0.0],
+    ];
+    let body = scene
+        .add_triangles(&[[0, 1, 2], [3, 5, 4]], &at)
+        .expect("two triangles");
+    let ends = at.map(|[x, y, z]| [x, y, z + 1.0]);
+    scene.set_end_positions(body, &ends).expect("as many");
+    let refused = detector(Method::Clusters, 1).truncate(&scene, &Query::all());
+    let Err(Error::Seam {
+        body: named,
+        n_coincident,
+        ..
+    }) = refused
+    else {
+        panic!("{refused:?}");
+    };
+    assert_eq!((named, n_coincident), (body, 2));
+}
+
+#[test]
+fn what_is_left_out_is_not_kept_apart() {
+    let mut scene = Scene::new();
+    let floor = [[0.0_f32, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]];
+    let floor = scene.add_triangles(&[[0, 1, 2]], &floor).expect("a floor");
+    let point = scene.add_points(&[[1.0_f32, 1.0, 1.0]]).expect("a point");
+    scene
+        .set_end_positions(point, &[[1.0_f32, 1.0, -1.0]])
+        .expect("as many");
+    let mut detector = detector(Method::Clusters, 1);
+    let mut n_cut = |query: &Query| detector.truncate(&scene, query).expect("an answer").n_cut();
+    assert_eq!(n_cut(&Query::all()), 1);
+    assert_eq!(n_cut(&Query::all().exclude((floor, point))), 0);
+    assert_eq!(n_cut(&Query::all().filter(PairFilter::new(|_| false))), 0);
+}

@@ -1,0 +1,268 @@
+//! Directions across which moving elements stay apart, and where their points must stop so that they do.
+//!
+//! What it does: two elements whose points lie on either side of a space between two parallel planes, at the start and at the end, do
+//! so on all of their straight ways: the planes go along. No times are needed.
+//!
+//! How: the planes lie across the shortest way between the elements, at the start or at the end. Heights over a plane are computed
+//! in `f64` with a bound of their error; what is not certain counts as not so. If the elements do not stay apart, the points that go
+//! towards the other element are stopped: where both come nearer, each gets a share of the room, by how far it wants to go.
+//!
+//! Source: A. Chen et al., "Divide and Truncate", SIGGRAPH 2026, for planes that divide the room between elements. There they
+//! rest.
+
+use super::filter::bounds_and_way;
+use crate::Point;
+use crate::element_pair::ElementPair;
+use crate::rounding::root;
+
+/// The share of the room that stays free, so that elements are certainly apart when their points have stopped.
+const LEAST_SHARE: f64 = 1.0 / 1024.0;
+
+/// A bound of the relative error of a height: 8 roundings, where 5 happen.
+const ERROR: f64 = 4.0 * f64::EPSILON;
+
+/// Whether two elements certainly stay farther apart than a distance, as their points go at the same time from their start to where
+/// they are now, on their ways to their end.
+#[must_use]
+pub fn stay_apart(pair: ElementPair, [start, now, end]: [&[Point; 4]; 3], distance: f64) -> bool {
+    ways(pair, [start, end, now])
+        .any(|across| across.are_apart(start, distance) && across.are_apart(now, distance))
+}
+
+/// How far each point of two elements may go from its start to its end, a share, so that the elements stay apart: about, and only as
+/// far as those that are now where they do not have to stop stay there. Points that do not have to stop earlier than now have 1.
+///
+/// `None` if the elements are not certainly farther apart at the start.
+#[must_use]
+pub fn shares_apart(
+    pair: ElementPair,
+    [start, now, end]: [&[Point; 4]; 3],
+    distance: f64,
+) -> Option<[f64; 4]> {
+    let possible = ways(pair, [start, end]).filter(|across| across.are_apart(start, distance));
+    let shares = possible.map(|across| across.shares([start, now, end], distance));
+    let least = |shares: &[f64; 4]| shares.iter().fold(1.0, |least: f64, &x| least.min(x));
+    shares.max_by(|a, b| least(a).total_cmp(&least(b)))
+}
+
+/// About the shortest ways between two elements, at some times.
+fn ways<'a>(
+    pair: ElementPair,
+    times: impl IntoIterator<Item = &'a [Point; 4]>,
+) -> impl Iterator<Item = Across> {
+    times.into_iter().filter_map(move |points| {
+        let (_, way) = bounds_and_way(pair, points)?;
+        // To the difference polygon: the face minus the vertex, or the first edge minus the second.
+        let way = match pair {
+            ElementPair::EdgeEdge => way,
+            _ => way.map(|x| -x),
+        };
+        let size = way.iter().fold(0.0, |size: f64, x| size.max(x.abs()));
+        (size > 0.0 && size < f64::INFINITY).then(|| Across {
+            normal: way.map(|x| x / size),
+            pair,
+        })
+    })
+}
+
+/// A direction from the second element to the first.
+struct Across {
+    /// Its largest coordinate is 1 or -1.
+    normal: Point,
+    pair: ElementPair,
+}
+
+impl Across {
+    /// The height of a point over another one, and a bound of its error.
+    fn height(&self, point: &Point, origin: &Point) -> [f64; 2] {
+        let (mut height, mut size) = (0.0, 0.0);
+        for (k, x) in point.iter().enumerate() {
+            let part = self.normal[k] * (x - origin[k]);
+            height += part;
+            size += part.abs();
+        }
+        // Products that underflow are off by less than the smallest normal number.
+        [height, ERROR * size + 4.0 * f64::MIN_POSITIVE]
+    }
+
+    /// The number of each point, and the side of its element.
+    fn sides(&self) -> impl Iterator<Item = (usize, usize)> + use<> {
+        let (n, n_first) = (self.pair.n_points(), self.pair.n_first());
+        (0..n).map(move |ix| (ix, usize::from(ix >= n_first)))
+    }
+
+    /// How far apart planes are, as heights: rounded up, by more than the roundings here.
+    fn thick(&self, distance: f64) -> f64 {
+        let square: f64 = self.normal.iter().map(|x| x * x).sum();
+        distance * root(square) * (1.0 + 4.0 * ERROR)
+    }
+
+    /// The lowest of the first element's heights, and the highest of the second's; `signs` of the error are added.
+    fn bounds(&self, points: &[Point; 4], origin: &Point, error: f64) -> [f64; 2] {
+        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+        for (ix, side) in self.sides() {
+            let [height, most] = self.height(&points[ix], origin);
+            if height.is_nan() {
+                return [f64::NAN; 2];
+            }
+            match side {
+                0 => low = low.min(height - error * most),
+                _ => high = high.max(height + error * most),
+            }
+        }
+        [low, high]
+    }
+
+    /// Whether the elements are certainly farther apart.
+    fn are_apart(&self, points: &[Point; 4], distance: f64) -> bool {
+        let [low, high] = self.bounds(points, &points[0], 1.0);
+        (low - high).next_down() > self.thick(distance)
+    }
+
+    /// See [`shares_apart`].
+    fn shares(&self, [start, now, end]: [&[Point; 4]; 3], distance: f64) -> [f64; 4] {
+        let origin = &start[0];
+        let thick = self.thick(distance);
+        let [low, high] = self.bounds(start, origin, 0.0);
+        let [low_now, high_now] = self.bounds(now, origin, 0.0);
+        let room = low - high - thick;
+        let spare = LEAST_SHARE * room;
+        // How far each has come towards the other.
+        let come = [low - low_now, high_now - high];
+        let levels = match come.map(|come| come > 0.0) {
+            [true, true] => {
+                let given = (room * (come[0] / (come[0] + come[1]))).clamp(spare, room - spare);
+                let level = low - given;
+                [level + 0.5 * spare, level - thick - 0.5 * spare]
+            }
+            // The first one stays where it is now, and the second one may follow it.
+            [false, _] => [low_now, low_now - thick - spare],
+            [_, false] => [high_now + thick + spare, high_now],
+        };
+        let mut shares = [1.0; 4];
+        for (ix, side) in self.sides() {
+            let [from, at, to] =
+                [start, now, end].map(|points| self.height(&points[ix], origin)[0]);
+            let is_beyond = match side {
+                0 => at < levels[0],
+                _ => at > levels[1],
+            };
+            if is_beyond {
+                let share = (levels[side] - from) / (to - from);
+                // Also if that is not a number.
+                shares[ix] = if share > 0.0 { share.min(1.0) } else { 0.0 };
+            }
+        }
+        shares
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::distance::{are_within, first_within};
+
+    /// Numbers that look random.
+    struct Numbers(u64);
+
+    impl Numbers {
+        fn next(&mut self, n: u64) -> f64 {
+            let next = self.0.wrapping_mul(6_364_136_223_846_793_005);
+            self.0 = next.wrapping_add(1);
+            ((self.0 >> 33) % n) as f64
+        }
+
+        fn point(&mut self, n: u64, scale: f64) -> Point {
+            [(); 3].map(|()| (self.next(2 * n + 1) - n as f64) * scale)
+        }
+    }
+
+    const PAIRS: [ElementPair; 4] = [
+        ElementPair::VertexVertex,
+        ElementPair::VertexEdge,
+        ElementPair::VertexFace,
+        ElementPair::EdgeEdge,
+    ];
+
+    #[test]
+    fn what_stays_apart_never_comes_within_the_distance() {
+        let mut numbers = Numbers(7);
+        let (mut n_apart, mut n_stopped) = (0, 0);
+        for round in 0..20_000 {
+            let pair = PAIRS[round % 4];
+            let scale = [1.0, 0.1, 1e-3][round / 4 % 3];
+            let [start, end] = [(); 2].map(|()| [(); 4].map(|()| numbers.point(4, scale)));
+            let distance = [0.0, 0.25, 0.7][round % 3] * scale;
+            let Some(shares) = shares_apart(pair, [&start, &end, &end], distance) else {
+                // They are near, but for rounding.
+                assert!(
+                    are_within(pair, &start, distance + 1e-12 * scale),
+                    "{start:?}"
+                );
+                continue;
+            };
+            assert!(!are_within(pair, &start, distance));
+            if stay_apart(pair, [&start, &end, &end], distance) {
+                n_apart += 1;
+                assert_eq!(first_within(pair, &start, &end, distance), None);
+                continue;
+            }
+            n_stopped += 1;
+            assert!(shares.iter().any(|&share| share < 1.0), "{shares:?}");
+            let at: [Point; 4] = core::array::from_fn(|ix| {
+                core::array::from_fn(|k| start[ix][k] + shares[ix] * (end[ix][k] - start[ix][k]))
+            });
+            assert!(
+                stay_apart(pair, [&start, &at, &end], distance),
+                "{pair:?} {shares:?}"
+            );
+            assert_eq!(first_within(pair, &start, &at, distance), None);
+        }
+        assert!(n_apart > 2000 && n_stopped > 2000, "{n_apart} {n_stopped}");
+    }
+
+    const ORIGIN: Point = [0.0; 3];
+
+    /// Two points over each other at first.
+    fn over(ends: [f64; 2]) -> [[Point; 4]; 2] {
+        let at = |z: [f64; 2]| [[0.0, 0.0, z[0]], [0.0, 0.0, z[1]], ORIGIN, ORIGIN];
+        [at([1.0, 0.0]), at(ends)]
+    }
+
+    #[test]
+    fn elements_that_go_the_same_way_stay_apart() {
+        let [start, end] = over([-8.0, -9.0]);
+        let ends = [&start, &end, &end];
+        assert!(stay_apart(ElementPair::VertexVertex, ends, 0.5));
+        assert!(!stay_apart(ElementPair::VertexVertex, ends, 1.0));
+    }
+
+    #[test]
+    fn who_stays_leaves_the_room_to_who_moves_and_who_goes_away_is_followed() {
+        let shares = |ends: [f64; 2]| {
+            let [start, end] = over(ends);
+            shares_apart(ElementPair::VertexVertex, [&start, &end, &end], 0.0)
+                .map(|[a, b, ..]| [a, b])
+                .expect("they are apart")
+        };
+        let [share, other] = shares([-1.0, 0.0]);
+        assert!(other == 1.0 && share > 0.499 && share < 0.5, "{share}");
+        let [share, other] = shares([-9.0, -5.0]);
+        assert!(other == 1.0 && share > 0.599 && share < 0.6, "{share}");
+        let [share, other] = shares([-1.0, 2.0]);
+        assert!(share > 0.249 && share < 0.25 && other > 0.249 && other < 0.25);
+    }
+
+    #[test]
+    fn what_touches_has_no_shares() {
+        let of = |start: &[Point; 4], distance| {
+            shares_apart(ElementPair::VertexVertex, [start, start, start], distance)
+        };
+        assert_eq!(of(&[ORIGIN; 4], 0.0), None);
+        let [start, _] = over([0.0; 2]);
+        assert_eq!(of(&start, 1.0), None);
+        assert!(of(&start, 0.999).is_some());
+        let huge = [[0.0, 0.0, 1e308], [0.0, 0.0, -1e308], ORIGIN, ORIGIN];
+        assert_eq!(of(&huge, 0.0), None);
+    }
+}
