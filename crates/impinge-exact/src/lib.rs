@@ -34,6 +34,7 @@ mod distance;
 mod element_pair;
 mod filter;
 mod orientation;
+mod ray;
 mod rounding;
 mod segment;
 mod shared;
@@ -81,6 +82,7 @@ pub mod internal {
         shares_apart, stay_apart, unsure_are_within,
     };
     pub use crate::orientation::{Projection, collinear};
+    pub use crate::ray::{Meeting, Parameter, Ray, meet};
     pub use crate::rounding::two_sum;
     pub use crate::segment::strictly_between;
 

@@ -1,0 +1,583 @@
+//! Where a ray meets an element of one to three corners: decided exactly.
+//!
+//! The points `origin + t direction`, for t from 0 to `most`, that lie in the element are an interval of t, for the element is
+//! convex. It is a single t unless the ray lies in the plane of the face or along the edge.
+//!
+//! With the corners a, b, c relative to the origin, the direction d and n = (b - a) x (c - a):
+//!
+//! - d . n not 0: t = (a . n) / (d . n), and the barycentrics are d . (b x c), d . (c x a) and d . (a x b), over d . n, their sum.
+//! - d . n = 0 = a . n: in the projection in which n is not 0, each barycentric is a linear function of t, and none may be below 0.
+//! - n = 0: the element is the union of its edges. The ray crosses an edge in a point, or lies along it.
+//!
+//! Cost: some 50 products of integers of any size: no filter, for what floats cannot decide.
+
+use core::cmp::Ordering;
+
+use crate::algebra::fixed::{Vector, cross, difference, dot};
+use crate::algebra::{Integer, common_integers, unit_of};
+use crate::distance::Feature;
+use crate::{Point, Sign};
+
+/// The points `origin + t direction` for t from 0 to `most`, read as real numbers. A direction of zero is the origin alone.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ray {
+    /// Where t is 0.
+    pub origin: Point,
+    /// From there to where t is 1.
+    pub direction: Point,
+    /// The largest t: at least 0, or infinity.
+    pub most: f64,
+}
+
+/// Where a ray meets an element.
+#[derive(Clone, Debug)]
+pub struct Meeting {
+    /// The smallest t.
+    pub entry: Parameter,
+    /// The largest t.
+    pub exit: Parameter,
+    /// The smallest feature of the element that contains the point of entry; of several the one with the lowest number.
+    pub feature: Feature,
+    /// The barycentrics of that point, each rounded to nearest; of an edge and a point too, which have weights of 0 besides.
+    pub barycentrics: [f64; 3],
+}
+
+/// A value of t: `over / under * 2^exponent`, where `under` is positive.
+#[derive(Clone, Debug)]
+pub struct Parameter {
+    over: Integer,
+    under: Integer,
+    exponent: i64,
+}
+
+impl Parameter {
+    fn of(x: f64) -> Self {
+        let exponent = unit_of(x).unwrap_or(0);
+        Self {
+            over: Integer::of_multiple(x, exponent),
+            under: Integer::from(1),
+            exponent,
+        }
+    }
+
+    /// The exact order of two values, of any two rays.
+    #[must_use]
+    pub fn compare(&self, other: &Self) -> Ordering {
+        let left = &self.over * &other.under;
+        let right = &other.over * &self.under;
+        let lowest = self.exponent.min(other.exponent);
+        let left = left.shifted((self.exponent - lowest).unsigned_abs());
+        let right = right.shifted((other.exponent - lowest).unsigned_abs());
+        (&left - &right).sign().order()
+    }
+
+    /// The largest float that is at most the value; the largest finite one if the value is larger.
+    #[must_use]
+    pub fn rounded_down(&self) -> f64 {
+        let nearest = self.over.quotient(&self.under, self.exponent, 53, -1074);
+        let is_above = nearest == f64::INFINITY || Self::of(nearest).compare(self).is_gt();
+        if is_above {
+            nearest.next_down()
+        } else {
+            nearest
+        }
+    }
+}
+
+/// A point of an element: t and weights of the corners, whose sum is `sum`.
+struct At {
+    entry: Parameter,
+    exit: Parameter,
+    weights: [Integer; 3],
+    sum: Integer,
+    feature: Feature,
+}
+
+/// Where a ray meets an element of one to three corners, if it does. Exact for finite numbers of any size.
+#[must_use]
+pub fn meet(ray: &Ray, corners: &[Point]) -> Option<Meeting> {
+    let last = corners.last()?;
+    let corner = |ix: usize| corners.get(ix).unwrap_or(last);
+    let points = [&ray.origin, corner(0), corner(1), corner(2)];
+    let numbers: [f64; 12] = core::array::from_fn(|ix| points[ix / 3][ix % 3]);
+    let (numbers, unit) = common_integers(numbers);
+    let (direction, unit_of_direction) = common_integers(ray.direction);
+    let exponent = unit - unit_of_direction;
+    let corners_from_origin: [Vector; 3] =
+        [3, 6, 9].map(|first| core::array::from_fn(|axis| &numbers[first + axis] - &numbers[axis]));
+    let cast = Cast {
+        direction,
+        corners: corners_from_origin,
+        n_corners: corners.len().min(3),
+        exponent,
+        most: (ray.most < f64::INFINITY).then(|| Parameter::of(ray.most)),
+    };
+    let [a, b, c] = &cast.corners;
+    let normal = cross(&difference(b, a), &difference(c, a));
+    let at = match axis_of(&normal) {
+        Some(axis) => cast.face(&normal, axis),
+        None => cast.edges(),
+    }?;
+    Some(Meeting {
+        entry: at.entry,
+        exit: at.exit,
+        feature: at.feature,
+        barycentrics: at.weights.map(|w| w.quotient(&at.sum, 0, 53, -1074)),
+    })
+}
+
+/// An axis along which a vector is not 0.
+fn axis_of(vector: &Vector) -> Option<usize> {
+    vector.iter().position(|x| !x.is_zero())
+}
+
+fn is_negative(x: &Integer) -> bool {
+    x.sign() == Sign::Negative
+}
+
+/// A ray and an element in integers, relative to the origin of the ray.
+struct Cast {
+    direction: Vector,
+    corners: [Vector; 3],
+    n_corners: usize,
+    /// Values of t are multiples of 2^exponent.
+    exponent: i64,
+    most: Option<Parameter>,
+}
+
+impl Cast {
+    fn parameter(&self, over: Integer, under: Integer) -> Parameter {
+        let (over, under) = positive(over, under);
+        Parameter {
+            over,
+            under,
+            exponent: self.exponent,
+        }
+    }
+
+    fn is_within(&self, t: &Parameter) -> bool {
+        !is_negative(&t.over)
+            && self
+                .most
+                .as_ref()
+                .is_none_or(|most| t.compare(most).is_le())
+    }
+
+    /// What the ray shares with an interval.
+    fn clipped(&self, low: Parameter, high: Option<Parameter>) -> Option<(Parameter, Parameter)> {
+        let entry = match is_negative(&low.over) {
+            true => self.parameter(Integer::zero(), Integer::from(1)),
+            false => low,
+        };
+        let exit = match (high, self.most.clone()) {
+            (Some(high), Some(most)) if high.compare(&most).is_gt() => most,
+            (Some(high), _) => high,
+            (None, Some(most)) => most,
+            (None, None) => entry.clone(),
+        };
+        entry.compare(&exit).is_le().then_some((entry, exit))
+    }
+
+    /// A face that is not degenerate; its normal is not 0 along an axis.
+    fn face(&self, normal: &Vector, axis: usize) -> Option<At> {
+        let [a, b, c] = &self.corners;
+        let height = dot(a, normal);
+        let slope = dot(&self.direction, normal);
+        if slope.is_zero() {
+            return height.is_zero().then(|| self.in_plane(normal, axis))?;
+        }
+        let is_reversed = is_negative(&slope);
+        let weights = [[b, c], [c, a], [a, b]].map(|[p, q]| {
+            let weight = dot(&self.direction, &cross(p, q));
+            if is_reversed { -&weight } else { weight }
+        });
+        if weights.iter().any(is_negative) {
+            return None;
+        }
+        let t = self.parameter(height, slope.clone());
+        self.is_within(&t).then(|| At {
+            entry: t.clone(),
+            exit: t,
+            feature: feature_of(&weights),
+            weights,
+            sum: slope.abs(),
+        })
+    }
+
+    /// A ray in the plane of the face.
+    fn in_plane(&self, normal: &Vector, axis: usize) -> Option<At> {
+        let [a, b, c] = &self.corners;
+        let is_reversed = is_negative(&normal[axis]);
+        let part = |p: &Vector, q: &Vector| {
+            let [x, y, z] = cross(p, q);
+            let part = [x, y, z][axis].clone();
+            if is_reversed { -&part } else { part }
+        };
+        // The weight of each corner, at t = 0 and per t.
+        let weights = [[b, c], [c, a], [a, b]]
+            .map(|[p, q]| (part(p, q), part(&difference(q, p), &self.direction)));
+        let mut low = self.parameter(Integer::zero(), Integer::from(1));
+        let mut high: Option<Parameter> = None;
+        for (at_origin, per_t) in &weights {
+            match per_t.sign() {
+                Sign::Zero if is_negative(at_origin) => return None,
+                Sign::Zero => {}
+                Sign::Positive => {
+                    let from = self.parameter(-at_origin, per_t.clone());
+                    if from.compare(&low).is_gt() {
+                        low = from;
+                    }
+                }
+                Sign::Negative => {
+                    let to = self.parameter(-at_origin, per_t.clone());
+                    if high.as_ref().is_none_or(|high| to.compare(high).is_lt()) {
+                        high = Some(to);
+                    }
+                }
+            }
+        }
+        let is_point = axis_of(&self.direction).is_none();
+        let high = if is_point { Some(low.clone()) } else { high };
+        let (entry, exit) = self.clipped(low, high)?;
+        let weights = weights
+            .map(|(at_origin, per_t)| &(&at_origin * &entry.under) + &(&per_t * &entry.over));
+        Some(At {
+            feature: feature_of(&weights),
+            sum: &normal[axis].clone().abs() * &entry.under,
+            weights,
+            entry,
+            exit,
+        })
+    }
+
+    /// An element that is the union of its edges.
+    fn edges(&self) -> Option<At> {
+        let n = self.n_corners;
+        let n_edges = [1, 1, 1, 3][n];
+        let mut all: Option<At> = None;
+        for edge in 0..n_edges {
+            let Some(at) = self.edge(edge, (edge + 1) % n) else {
+                continue;
+            };
+            let Some(known) = &mut all else {
+                all = Some(at);
+                continue;
+            };
+            let exit = match at.exit.compare(&known.exit).is_gt() {
+                true => at.exit.clone(),
+                false => known.exit.clone(),
+            };
+            let order = at.entry.compare(&known.entry);
+            if order.then(at.feature.cmp(&known.feature)).is_lt() {
+                *known = at;
+            }
+            known.exit = exit;
+        }
+        all
+    }
+
+    /// The edge from corner i to corner j, which may be a point.
+    fn edge(&self, i: usize, j: usize) -> Option<At> {
+        let (p, q, d) = (&self.corners[i], &self.corners[j], &self.direction);
+        let way = difference(q, p);
+        let across = cross(d, &way);
+        let one = || Integer::from(1);
+        let (entry, exit, (share, sum)) = if let Some(axis) = axis_of(&across) {
+            if !dot(p, &across).is_zero() {
+                return None;
+            }
+            let t = self.parameter(cross(p, &way)[axis].clone(), across[axis].clone());
+            if !self.is_within(&t) {
+                return None;
+            }
+            let share = positive(cross(p, d)[axis].clone(), across[axis].clone());
+            (t.clone(), t, share)
+        } else {
+            if axis_of(&cross(d, p)).is_some() || axis_of(&cross(&way, p)).is_some() {
+                return None;
+            }
+            let (entry, exit) = if let Some(axis) = axis_of(d) {
+                let [to_p, to_q] =
+                    [p, q].map(|end| self.parameter(end[axis].clone(), d[axis].clone()));
+                let (low, high) = match to_p.compare(&to_q).is_le() {
+                    true => (to_p, to_q),
+                    false => (to_q, to_p),
+                };
+                self.clipped(low, Some(high))?
+            } else {
+                let zero = self.parameter(Integer::zero(), one());
+                (zero.clone(), zero)
+            };
+            let share = match axis_of(&way) {
+                Some(axis) => {
+                    let from_p = &(&d[axis] * &entry.over) - &(&p[axis] * &entry.under);
+                    positive(from_p, &way[axis] * &entry.under)
+                }
+                None if axis_of(d).is_none() && axis_of(p).is_some() => return None,
+                None => (Integer::zero(), one()),
+            };
+            (entry, exit, share)
+        };
+        let rest = &sum - &share;
+        if is_negative(&share) || is_negative(&rest) {
+            return None;
+        }
+        let number = |ix: usize| u8::try_from(ix).unwrap_or(0);
+        let feature = match (share.is_zero(), rest.is_zero()) {
+            (true, _) => Feature::Vertex(number(i)),
+            (_, true) => Feature::Vertex(number(j)),
+            _ => Feature::Edge(number(i)),
+        };
+        let mut weights = [0; 3].map(|_| Integer::zero());
+        weights[j] = share;
+        weights[i] = &weights[i] + &rest;
+        Some(At {
+            entry,
+            exit,
+            weights,
+            sum,
+            feature,
+        })
+    }
+}
+
+/// A quotient whose denominator is positive.
+fn positive(over: Integer, under: Integer) -> (Integer, Integer) {
+    match is_negative(&under) {
+        true => (-&over, -&under),
+        false => (over, under),
+    }
+}
+
+/// The smallest feature of a face at some weights.
+fn feature_of(weights: &[Integer; 3]) -> Feature {
+    match weights.each_ref().map(Integer::is_zero) {
+        [false, false, false] => Feature::Face,
+        [false, true, true] => Feature::Vertex(0),
+        [true, false, true] => Feature::Vertex(1),
+        [true, true, false] => Feature::Vertex(2),
+        // Edge k is opposite the corner before its ends.
+        [true, ..] => Feature::Edge(1),
+        [_, true, _] => Feature::Edge(2),
+        [.., true] => Feature::Edge(0),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::triangle::segment_meets_triangle;
+
+    /// A generator of small numbers.
+    struct Numbers(u64);
+
+    impl Numbers {
+        fn below(&mut self, n: u64) -> u64 {
+            self.0 ^= self.0 << 13;
+            self.0 ^= self.0 >> 7;
+            self.0 ^= self.0 << 17;
+            (self.0 >> 11) % n
+        }
+
+        fn point(&mut self, low: i32, n: u64) -> Point {
+            [(); 3].map(|()| f64::from(low) + self.below(n) as f64)
+        }
+    }
+
+    fn at(origin: &Point, direction: &Point, t: f64, scale: f64) -> Point {
+        [0, 1, 2].map(|k| scale * origin[k] + t * direction[k])
+    }
+
+    /// A number that is small and whole.
+    fn small(x: &Integer) -> f64 {
+        x.quotient(&Integer::from(1), 0, 53, -1074)
+    }
+
+    /// Whether a feature has a point in its inside: it has the point, and without any of its corners it has not.
+    fn holds_inside(corners: &[Point; 3], feature: Feature, point: &Point) -> bool {
+        let vertices = match feature {
+            Feature::Vertex(k) => vec![usize::from(k)],
+            Feature::Edge(k) => vec![usize::from(k), (usize::from(k) + 1) % 3],
+            Feature::Face => vec![0, 1, 2],
+        };
+        let has = |vertices: &[usize]| {
+            let corner = |ix: usize| corners[vertices[ix.min(vertices.len() - 1)]];
+            segment_meets_triangle(point, point, &[corner(0), corner(1), corner(2)])
+        };
+        let is_smaller = |left_out: usize| {
+            let mut some = vertices.clone();
+            some.remove(left_out);
+            !some.is_empty() && has(&some)
+        };
+        let same = |ix: usize| corners[vertices[0]] == corners[ix];
+        has(&vertices)
+            && (0..vertices.len()).all(|ix| !is_smaller(ix))
+            // Of vertices at one place, the first.
+            && (vertices.len() > 1 || !(0..vertices[0]).any(same))
+    }
+
+    /// On a lattice: rays through vertices, along edges and in the planes of faces, faces that are segments and points, rays
+    /// that are points. Whether they meet, where they enter and where they leave is held against segments and triangles.
+    #[test]
+    fn on_a_lattice() {
+        const FINE: f64 = 1048576.0;
+        let mut numbers = Numbers(1);
+        // Misses, faces, edges, vertices, intervals.
+        let mut n = [0usize; 5];
+        for round in 0..200_000 {
+            let size = 2 + round % 3;
+            let corners = [(); 3].map(|()| numbers.point(0, size));
+            let origin = numbers.point(-1, size + 2);
+            let direction = numbers.point(-1, 3);
+            let most = [0.0, 1.0, 2.0, 9.0, f64::INFINITY][numbers.below(5) as usize];
+            let far = at(
+                &origin,
+                &direction,
+                if most < 9.0 { most } else { 9.0 },
+                1.0,
+            );
+            let ray = Ray {
+                origin,
+                direction,
+                most,
+            };
+            let case = format!("{ray:?} {corners:?}");
+            let Some(meeting) = meet(&ray, &corners) else {
+                assert!(!segment_meets_triangle(&origin, &far, &corners), "{case}");
+                n[0] += 1;
+                continue;
+            };
+            let times = [&meeting.entry, &meeting.exit].map(|time| {
+                assert!(time.exponent == 0 || time.over.is_zero() || time.exponent.abs() < 4);
+                let scale = f64::from(2.0f32.powi(time.exponent as i32));
+                (scale * small(&time.over), small(&time.under))
+            });
+            let [(over, under), (over_exit, under_exit)] = times;
+            // All of it larger, so that points of the ray are whole.
+            let larger = |by: f64| corners.map(|corner| corner.map(|x| by * x));
+            let point = at(&origin, &direction, over, under);
+            let faces = larger(under);
+            assert!(over >= 0.0 && over <= most * under, "{case}");
+            assert!(segment_meets_triangle(&point, &point, &faces), "{case}");
+            assert!(
+                holds_inside(&faces, meeting.feature, &point),
+                "{case} {meeting:?}"
+            );
+            if over > 0.0 {
+                let before = at(&origin, &direction, FINE * over - 1.0, FINE * under);
+                let start = origin.map(|x| FINE * under * x);
+                let fine = larger(FINE * under);
+                assert!(!segment_meets_triangle(&start, &before, &fine), "{case}");
+            }
+            let last = at(&origin, &direction, over_exit, under_exit);
+            let faces = larger(under_exit);
+            assert!(segment_meets_triangle(&last, &last, &faces), "{case}");
+            if over_exit < most * under_exit && direction != [0.0; 3] {
+                let after = at(
+                    &origin,
+                    &direction,
+                    FINE * over_exit + 1.0,
+                    FINE * under_exit,
+                );
+                let end = at(
+                    &origin,
+                    &direction,
+                    99.0 * FINE * under_exit,
+                    FINE * under_exit,
+                );
+                let fine = larger(FINE * under_exit);
+                let is_behind = most * under_exit * FINE >= FINE * over_exit + 1.0;
+                let meets = segment_meets_triangle(&after, &end, &fine);
+                assert!(!is_behind || !meets, "{case}");
+            }
+            // Rounded down, and the point that the barycentrics give.
+            let t = meeting.entry.rounded_down();
+            assert!(Parameter::of(t).compare(&meeting.entry).is_le());
+            assert!(Parameter::of(t.next_up()).compare(&meeting.entry).is_gt());
+            for axis in 0..3 {
+                let sum: f64 = (0..3)
+                    .map(|k| meeting.barycentrics[k] * corners[k][axis])
+                    .sum();
+                let exact = origin[axis] + over / under * direction[axis];
+                assert!((sum - exact).abs() < 1e-14, "{case} {meeting:?}");
+            }
+            n[match meeting.feature {
+                Feature::Face => 1,
+                Feature::Edge(_) => 2,
+                Feature::Vertex(_) => 3,
+            }] += 1;
+            n[4] += usize::from(meeting.entry.compare(&meeting.exit).is_lt());
+        }
+        assert!(n.iter().all(|&n| n > 400), "{n:?}");
+    }
+
+    /// Numbers of any size give what small ones give, and values of t are compared across rays.
+    #[test]
+    fn of_any_size() {
+        let corners = [[0.0, 0.0, 3.0], [3.0, 0.0, 3.0], [0.0, 3.0, 3.0]];
+        let ray = |size: f64, length: f64| Ray {
+            origin: [size, size, 0.0],
+            direction: [0.0, 0.0, 7.0 * length],
+            most: f64::INFINITY,
+        };
+        for size in [1e-320, 1e-300, 1e-20, 1.0, 1e20, 1e300] {
+            let scaled = corners.map(|corner| corner.map(|x| x * size));
+            let meeting = meet(&ray(size, size), &scaled).unwrap();
+            assert_eq!(meeting.feature, Feature::Face);
+            if size >= 1e-300 {
+                assert!((meeting.entry.rounded_down() - 3.0 / 7.0).abs() < 1e-15);
+                assert!(
+                    meeting
+                        .barycentrics
+                        .iter()
+                        .all(|w| (w - 1.0 / 3.0).abs() < 1e-15)
+                );
+            }
+        }
+        let tiny = meet(&ray(1.0, 1e-320), &corners).unwrap();
+        assert_eq!(tiny.entry.rounded_down(), f64::MAX);
+        let huge = meet(&ray(1.0, 1e307), &corners).unwrap();
+        assert!(huge.entry.rounded_down() < 1e-306);
+        let slow = meet(&ray(1.0, 1.0), &corners).unwrap();
+        assert!(huge.entry.compare(&slow.entry).is_lt());
+        assert!(slow.entry.compare(&tiny.entry).is_lt());
+        assert!(slow.entry.compare(&slow.entry).is_eq());
+        let behind = Ray {
+            direction: [0.0, 0.0, -1.0],
+            ..ray(1.0, 1.0)
+        };
+        assert!(meet(&behind, &corners).is_none());
+        assert!(meet(&behind, &[]).is_none());
+    }
+
+    /// Elements of one and of two corners.
+    #[test]
+    fn edges_and_points() {
+        let ray = Ray {
+            origin: [0.0; 3],
+            direction: [2.0, 0.0, 0.0],
+            most: 3.0,
+        };
+        let edge = |p: Point, q: Point| {
+            meet(&ray, &[p, q]).map(|at| {
+                let [entry, exit] = [at.entry, at.exit].map(|t| t.rounded_down());
+                (at.feature, entry, exit, at.barycentrics)
+            })
+        };
+        let crossed = edge([1.0, -1.0, 0.0], [1.0, 3.0, 0.0]);
+        assert_eq!(
+            crossed,
+            Some((Feature::Edge(0), 0.5, 0.5, [0.75, 0.25, 0.0]))
+        );
+        let along = edge([8.0, 0.0, 0.0], [4.0, 0.0, 0.0]);
+        assert_eq!(along, Some((Feature::Vertex(1), 2.0, 3.0, [0.0, 1.0, 0.0])));
+        let around = edge([-2.0, 0.0, 0.0], [2.0, 0.0, 0.0]);
+        assert_eq!(around, Some((Feature::Edge(0), 0.0, 1.0, [0.5, 0.5, 0.0])));
+        assert_eq!(edge([8.0, 0.0, 0.0], [7.0, 0.0, 0.0]), None);
+        assert_eq!(edge([1.0, 1.0, 0.0], [1.0, 3.0, 0.0]), None);
+        let point = meet(&ray, &[[4.0, 0.0, 0.0]]).unwrap();
+        assert_eq!(point.feature, Feature::Vertex(0));
+        assert_eq!(point.entry.rounded_down(), 2.0);
+        assert!(meet(&ray, &[[4.0, 1.0, 0.0]]).is_none());
+    }
+}
