@@ -84,7 +84,7 @@ fn points(world: &World) -> Vec<[f64; 3]> {
 }
 
 /// By the names of the methods; where one is asked twice, with more after a space.
-const ALL: [(&str, Ask); 20] = [
+const ALL: [(&str, Ask); 21] = [
     ("detect", |d, w| {
         Ok(d.detect(&w.scene, &Query::all())?.hash())
     }),
@@ -150,6 +150,17 @@ const ALL: [(&str, Ask); 20] = [
         let points = points(w);
         let closest = d.closest(&w.scene, &points, f64::INFINITY, &Query::of(w.bodies[2]))?;
         Ok(closest.hash())
+    }),
+    ("cast", |d, w| {
+        let points = points(w);
+        let hits = d.cast(
+            &w.scene,
+            &points,
+            &points,
+            f64::INFINITY,
+            &Query::of(w.bodies[2]),
+        )?;
+        Ok(hits.hash())
     }),
     ("contains", |d, w| {
         let places = d.contains(&w.scene, w.bodies[1], &points(w))?;

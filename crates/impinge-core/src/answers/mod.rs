@@ -3,6 +3,7 @@
 pub(crate) mod advance;
 pub(crate) mod candidates;
 pub(crate) mod closest;
+pub(crate) mod hits;
 pub(crate) mod home;
 pub(crate) mod impacts;
 pub(crate) mod near;

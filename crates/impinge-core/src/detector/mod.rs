@@ -23,6 +23,7 @@ pub use resident::Gpu;
 
 use crate::answers::candidates::Candidates;
 use crate::answers::closest::Closest;
+use crate::answers::hits::Hits;
 use crate::answers::home::Home;
 use crate::answers::impacts::Impacts;
 use crate::answers::near::NearPairs;
@@ -85,6 +86,7 @@ struct Homes {
     neighbours: Home<Neighbours>,
     safe: Home<SafeDistances>,
     closest: Home<Closest>,
+    hits: Home<Hits>,
 }
 
 impl Homes {
@@ -98,6 +100,7 @@ impl Homes {
             neighbours: Home::new(keeps),
             safe: Home::new(keeps),
             closest: Home::new(keeps),
+            hits: Home::new(keeps),
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use super::Detector;
 use crate::answers::closest::Closest;
+use crate::answers::hits::Hits;
 use crate::probe::Shared;
 use crate::query::Query;
 use crate::scene::Scene;
@@ -130,5 +131,66 @@ impl Detector {
         })?;
         closest.stats.clone_from(&self.stats);
         Ok(closest)
+    }
+
+    /// What each ray hits: the points `origin + t direction`, for t from 0 to `most` (1 for segments, infinity for rays). The
+    /// first hit, and with [`Query::hits`] whether there is any, or all. Elements are those of [`closest`](Detector::closest).
+    ///
+    /// Decided exactly: a ray that grazes an edge or a vertex hits all elements there, and one in the plane of a face hits it
+    /// from an entry to an exit. The first hit is the one with the smallest t; of several it is the lowest by body and then by
+    /// number. Values of t are rounded down. A direction of zero is the origin alone.
+    ///
+    /// ```
+    /// use impinge::{Backend, Detector, Query, Scene};
+    /// # fn main() -> Result<(), impinge::Error> {
+    /// let mut scene = Scene::new();
+    /// let floor = [[0.0f32, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]];
+    /// scene.add_triangles(&[[0, 1, 2]], &floor)?;
+    /// let mut detector = Detector::new(Backend::Cpu)?;
+    /// let origins = [[1.0f32, 1.0, 2.0], [9.0, 1.0, 2.0]];
+    /// let directions = [[0.0f32, 0.0, -1.0]; 2];
+    /// let hits = detector.cast(&scene, &origins, &directions, f64::INFINITY, &Query::all())?;
+    /// assert_eq!(hits.is_hit(), [true, false]);
+    /// assert_eq!(hits.of(0)[0].t, 2.0);
+    /// # Ok(()) }
+    /// ```
+    ///
+    /// # Errors
+    /// A stale id, a query about pairs, a `most` that is negative or NaN, another number of directions than of origins, positions or rays
+    /// that are not finite, a memory budget too small for the trees of the bodies.
+    pub fn cast<R: Real>(
+        &mut self,
+        scene: &Scene,
+        origins: &[[R; 3]],
+        directions: &[[R; 3]],
+        most: f64,
+        query: &Query,
+    ) -> Result<Hits, Error> {
+        let control = &self.control.clone();
+        let limits = self.settings.limits();
+        let mut hits = self.homes.hits.take();
+        let Detector {
+            runner,
+            stats: measured,
+            distances,
+            topologies,
+            probes,
+            ..
+        } = self;
+        runner.measure(measured, limits, |workers, stats| {
+            let _shift = workers.shift(origins.len() as u64);
+            let work = Work { workers, control };
+            let mut shared = Shared {
+                distances,
+                topologies,
+            };
+            let rays = [origins, directions];
+            probes.cast(scene, (query, most), rays, &mut hits, &mut shared, work)?;
+            distances.report(stats);
+            stats.bytes_held += probes.bytes() + hits.bytes();
+            Ok(())
+        })?;
+        hits.stats.clone_from(&self.stats);
+        Ok(hits)
     }
 }

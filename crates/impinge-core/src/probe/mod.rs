@@ -13,6 +13,7 @@
 
 mod border;
 mod boxes;
+mod cast;
 mod closest;
 mod inside;
 mod order;
@@ -21,6 +22,7 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use crate::answers::closest::ClosestElement;
+use crate::answers::hits::{Hits, RayHit};
 use crate::contact::Topologies;
 use crate::proximity::Distances;
 use crate::query::{Query, Scope, SharedVertex};
@@ -34,6 +36,7 @@ use crate::simd::Isa;
 
 use border::Border;
 use boxes::Boxes;
+use impinge_exact::internal::Ray;
 
 /// What is kept of the bodies that were probed, from call to call.
 #[derive(Debug)]
@@ -143,24 +146,9 @@ impl Probes {
             });
         }
         check_points("points", points)?;
-        let mut parts = Vec::new();
-        for id in targets(scene, query)? {
-            let body = scene.body(id)?;
-            let part = match body.kind() {
-                BodyKind::Tetrahedra => Part::Faces,
-                _ => Part::Given,
-            };
-            parts.push((id, part));
-        }
+        let parts = surfaces(scene, query)?;
         self.know(scene, &parts, shared, work)?;
-        let mut bodies = Vec::with_capacity(parts.len());
-        for &(id, part) in &parts {
-            let target = Target {
-                body: scene.body(id)?,
-                boxes: &self.boxes[&(id.index(), part)],
-            };
-            bodies.push((id, target));
-        }
+        let bodies = self.targets(scene, &parts)?;
         found.clear();
         found.resize(points.len(), None);
         for (points, found) in points.chunks(BLOCK).zip(found.chunks_mut(BLOCK)) {
@@ -181,6 +169,87 @@ impl Probes {
             }
         }
         Ok(())
+    }
+
+    /// What rays hit, of the elements of some bodies.
+    ///
+    /// # Errors
+    /// A query that is not about whole bodies, a largest parameter that is none, another number of directions than of origins, positions or
+    /// rays that are not finite, cancellation.
+    pub fn cast<R: Real>(
+        &mut self,
+        scene: &Scene,
+        (query, most): (&Query, f64),
+        [origins, directions]: [&[[R; 3]]; 2],
+        into: &mut Hits,
+        shared: &mut Shared<'_>,
+        work: Work<'_>,
+    ) -> Result<(), Error> {
+        if most.is_nan() || most < 0.0 {
+            return Err(Error::Setting {
+                setting: "most",
+                given: most.to_string(),
+                allowed: "a number of at least 0, or infinity",
+            });
+        }
+        if origins.len() != directions.len() {
+            return Err(Error::Setting {
+                setting: "directions",
+                given: format!("{} directions", directions.len()),
+                allowed: "as many directions as origins",
+            });
+        }
+        check_points("origins", origins)?;
+        check_points("directions", directions)?;
+        let parts = surfaces(scene, query)?;
+        self.know(scene, &parts, shared, work)?;
+        let bodies = self.targets(scene, &parts)?;
+        let size = work.workers.task(TASK);
+        type Task<'a, R> = ([&'a [[R; 3]]; 2], (Vec<RayHit>, Vec<(usize, bool)>));
+        let mut tasks: Vec<Task<'_, R>> = origins
+            .chunks(size)
+            .zip(directions.chunks(size))
+            .map(|(origins, directions)| ([origins, directions], Default::default()))
+            .collect();
+        work.each(&mut tasks, |_, ([origins, directions], found)| {
+            let rays = origins
+                .iter()
+                .zip(*directions)
+                .map(|(origin, direction)| Ray {
+                    origin: origin.map(R::widen),
+                    direction: direction.map(R::widen),
+                    most,
+                });
+            cast::cast(&bodies, rays, query.hits, found, work)
+        })?;
+        into.found.clear();
+        into.offsets.clear();
+        into.is_hit.clear();
+        into.offsets.push(0);
+        for (_, (found, ends)) in &tasks {
+            let before = into.found.len();
+            into.found.extend_from_slice(found);
+            into.offsets
+                .extend(ends.iter().map(|(end, _)| before + end));
+            into.is_hit.extend(ends.iter().map(|&(_, is_hit)| is_hit));
+        }
+        Ok(())
+    }
+
+    /// Some parts of bodies, whose boxes are known.
+    fn targets<'a>(
+        &'a self,
+        scene: &'a Scene,
+        parts: &[(BodyId, Part)],
+    ) -> Result<Vec<(BodyId, Target<'a>)>, Error> {
+        let target = |&(id, part): &(BodyId, Part)| {
+            let target = Target {
+                body: scene.body(id)?,
+                boxes: &self.boxes[&(id.index(), part)],
+            };
+            Ok((id, target))
+        };
+        parts.iter().map(target).collect()
     }
 
     /// Refits the boxes of some parts of bodies, and forgets removed bodies.
@@ -217,6 +286,17 @@ impl Probes {
         }
         Ok(())
     }
+}
+
+/// The elements that a query is about: the faces of bodies of triangles and tetrahedra, and all of other bodies.
+fn surfaces(scene: &Scene, query: &Query) -> Result<Vec<(BodyId, Part)>, Error> {
+    let part = |id: BodyId| {
+        Ok(match scene.body(id)?.kind() {
+            BodyKind::Tetrahedra => (id, Part::Faces),
+            _ => (id, Part::Given),
+        })
+    };
+    targets(scene, query)?.into_iter().map(part).collect()
 }
 
 /// The bodies that a query is about: all, or those that it names with [`Query::of`] and [`Query::across`].

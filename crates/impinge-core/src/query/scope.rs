@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use crate::query::pair_kind::{PairKind, PairKinds};
 use crate::query::pair_set::PairSet;
-use crate::query::step::{Clearance, PairFilter, Precision, Start, check_distance};
+use crate::query::step::{Clearance, Hit, PairFilter, Precision, Start, check_distance};
 use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
 use crate::scene::words::words;
@@ -129,6 +129,7 @@ pub struct Query {
     pub(crate) distances: bool,
     pub(crate) closest: bool,
     pub(crate) fixed: BTreeSet<BodyId>,
+    pub(crate) hits: Hit,
 }
 
 impl Default for Query {
@@ -158,6 +159,7 @@ impl Query {
             distances: false,
             closest: false,
             fixed: BTreeSet::new(),
+            hits: Hit::default(),
         }
     }
 
@@ -364,6 +366,12 @@ impl Query {
     /// Asks for distances and nearest points as `f64`, too: [`NearPair::closest`](crate::NearPair::closest), 56 bytes per pair.
     pub fn closest_points(mut self) -> Self {
         (self.distances, self.closest) = (true, true);
+        self
+    }
+
+    /// Sets what is asked of rays, for [`cast`](crate::Detector::cast): the first hit, whether there is any, or all.
+    pub fn hits(mut self, hits: Hit) -> Self {
+        self.hits = hits;
         self
     }
 

@@ -29,6 +29,20 @@ pub enum Start {
 
 words!("start", "report, skip or verify", Start: [Report = "report", Skip = "skip", Verify = "verify"; 3]);
 
+/// What is asked of rays.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Hit {
+    /// What each ray hits first: at the smallest parameter, of several the lowest by body and then by number.
+    #[default]
+    First,
+    /// Whether each ray hits anything.
+    Any,
+    /// All that each ray hits.
+    All,
+}
+
+words!("hits", "first, any or all", Hit: [First = "first", Any = "any", All = "all"; 3]);
+
 /// The precision to which times are rounded down.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Precision {
