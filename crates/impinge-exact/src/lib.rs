@@ -79,7 +79,7 @@ pub mod internal {
         Approach, Keep, NearestOfElements, Reach, approach, are_within_certainly,
         closest_of_elements, compare_point_distances, distance_below, elements_are_within,
         elements_meet, nearest_of_elements, point_distance_below, point_distance_bounds,
-        shares_apart, stay_apart, unsure_are_within,
+        shares_apart, spare_apart, unsure_are_within,
     };
     pub use crate::orientation::{Projection, collinear};
     pub use crate::ray::{Meeting, Parameter, Ray, meet};

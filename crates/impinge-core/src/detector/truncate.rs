@@ -32,7 +32,7 @@ use crate::search::sink::reserve;
 use crate::search::stats::Stats;
 use crate::search::work::Work;
 use crate::workers::clock::Instant;
-use impinge_exact::internal::{shares_apart, stay_apart};
+use impinge_exact::internal::{shares_apart, spare_apart};
 use impinge_exact::{ElementPair, Point};
 
 /// Pairs that a task looks at.
@@ -181,8 +181,8 @@ struct Vertex {
     at: Point,
     /// How often it was stopped.
     n_stops: u8,
-    /// Whether it was stopped in the last round.
-    is_new: bool,
+    /// How far it was taken back since the first round: at least that.
+    moved: f64,
 }
 
 /// A vertex that was stopped so often stays at its start: rounds end.
@@ -209,7 +209,7 @@ impl Vertices {
                 share: 1.0,
                 at: end.point(vertex),
                 n_stops: 0,
-                is_new: true,
+                moved: 0.0,
             }));
         }
         let first = |part: PartIx| of_slots[plan.part(part).id.index()];
@@ -232,8 +232,7 @@ impl Vertices {
             let own = all.by_ref().take(body.n_vertices());
             for (ix, (vertex, most)) in own.enumerate() {
                 let most = std::mem::replace(most.get_mut(), WHOLE);
-                vertex.is_new = most < WHOLE;
-                if vertex.is_new {
+                if most < WHOLE {
                     any = true;
                     let least = start.share_of_rounding(end, ix);
                     // Twice as much each time, and nothing in the end, whatever the numbers.
@@ -242,7 +241,10 @@ impl Vertices {
                     let is_last = vertex.n_stops >= MOST_STOPS;
                     vertex.share = if is_last { 0.0 } else { share.max(0.0) };
                     vertex.n_stops += 1;
-                    vertex.at = start.blend_point(end, ix, vertex.share);
+                    let at = start.blend_point(end, ix, vertex.share);
+                    let back: f64 = (0..3).map(|k| (at[k] - vertex.at[k]).abs()).sum();
+                    vertex.moved = (vertex.moved + back * (1.0 + 8.0 * f64::EPSILON)).next_up();
+                    vertex.at = at;
                 }
             }
         }
@@ -288,6 +290,8 @@ struct Pair {
     state: State,
     /// Its vertices among all; the first again, where there are fewer.
     vertices: [u32; 4],
+    /// It need not be looked at again before its vertices have been taken back so far together.
+    until: f64,
 }
 
 /// What is known of a pair.
@@ -347,20 +351,24 @@ impl Ways {
         }
     }
 
-    /// Stops the vertices that go towards the other element, if the two do not stay apart.
-    fn stop(&self, plan: &Plan, vertices: &Vertices) -> State {
+    /// Stops the vertices that go towards the other element, if the two do not stay apart. Returns also how far vertices may be taken
+    /// back before it has to be asked again.
+    fn stop(&self, plan: &Plan, vertices: &Vertices) -> (State, f64) {
         let [start, now, end] = &self.times;
         let points = 0..self.pair.n_points();
         let moving = points.filter(|&ix| now[ix] != start[ix]);
-        if moving.clone().next().is_none() || stay_apart(self.pair, [start, now, end], self.kept) {
-            return State::Apart;
+        if moving.clone().next().is_none() {
+            return (State::Apart, f64::INFINITY);
+        }
+        if let Some(spare) = spare_apart(self.pair, [start, now, end], self.kept) {
+            return (State::Apart, spare);
         }
         let Some(shares) = shares_apart(self.pair, [start, now, end], self.kept) else {
             if plan.start == Start::Skip && plan.at_start(self.pair, start).at_start {
-                return State::Skipped;
+                return (State::Skipped, 0.0);
             }
             moving.for_each(|ix| vertices.stop(self.vertices[ix] as usize, 0.0));
-            return State::Touches;
+            return (State::Touches, 0.0);
         };
         // Where no share is less, the planes are too close for that: each goes back a little.
         let is_any_less = shares.iter().any(|&share| share < 1.0);
@@ -371,7 +379,7 @@ impl Ways {
                 vertices.stop(self.vertices[ix] as usize, share);
             }
         }
-        State::Apart
+        (State::Apart, 0.0)
     }
 }
 
@@ -393,13 +401,14 @@ impl<'a> Pairs<'a> {
                 key,
                 state: State::New,
                 vertices: [0; 4],
+                until: 0.0,
             }));
         }
         Ok(Pairs { job, all })
     }
 
-    /// Stops the vertices of all pairs that do not stay apart as they are now. Pairs of which no vertex was stopped in the last round
-    /// need no look.
+    /// Stops the vertices of all pairs that do not stay apart as they are now. Most need no second look: their vertices are not taken back
+    /// far enough.
     ///
     /// # Errors
     /// Cancellation.
@@ -414,14 +423,25 @@ impl<'a> Pairs<'a> {
         let mut tasks: Vec<&mut [Pair]> = self.all.chunks_mut(workers.task(TASK)).collect();
         Work { workers, control }.each(&mut tasks, |_, pairs| {
             for pair in pairs.iter_mut() {
-                let is_new = |&vertex: &u32| vertices.all[vertex as usize].is_new;
+                let numbers = pair.vertices;
+                let moved = || -> f64 {
+                    let all = numbers.iter();
+                    // Rounded up as far as four numbers can be rounded down.
+                    let sum: f64 = all.map(|&vertex| vertices.all[vertex as usize].moved).sum();
+                    sum * (1.0 + 8.0 * f64::EPSILON)
+                };
                 match pair.state {
                     State::New if !plan.counts(scene, pair.key) => pair.state = State::Skipped,
-                    State::Apart if !pair.vertices.iter().any(is_new) => {}
+                    State::Apart if moved() < pair.until => {}
                     State::New | State::Apart => {
                         let ways = Ways::new(job, vertices, pair.kind, pair.key);
                         pair.vertices = ways.vertices;
-                        pair.state = ways.stop(plan, vertices);
+                        let spare;
+                        (pair.state, spare) = ways.stop(plan, vertices);
+                        let all = ways.vertices.iter();
+                        let moved: f64 =
+                            all.map(|&vertex| vertices.all[vertex as usize].moved).sum();
+                        pair.until = (moved * (1.0 - 8.0 * f64::EPSILON) + spare).next_down();
                     }
                     State::Touches | State::Skipped => {}
                 }

@@ -21,12 +21,29 @@ const LEAST_SHARE: f64 = 1.0 / 1024.0;
 /// A bound of the relative error of a height: 8 roundings, where 5 happen.
 const ERROR: f64 = 4.0 * f64::EPSILON;
 
-/// Whether two elements certainly stay farther apart than a distance, as their points go at the same time from their start to where
-/// they are now, on their ways to their end.
+/// How far each point of two elements may be from where it is now, so that the elements certainly stay farther apart than a distance, as
+/// their points go there from their start at the same time. `now` lies on the ways from the start to the end.
+///
+/// `None` if they do not certainly stay apart.
 #[must_use]
-pub fn stay_apart(pair: ElementPair, [start, now, end]: [&[Point; 4]; 3], distance: f64) -> bool {
-    ways(pair, [start, end, now])
-        .any(|across| across.are_apart(start, distance) && across.are_apart(now, distance))
+pub fn spare_apart(
+    pair: ElementPair,
+    [start, now, end]: [&[Point; 4]; 3],
+    distance: f64,
+) -> Option<f64> {
+    // Where elements are far apart, a way between any two points does.
+    let about = |k: usize| {
+        let between = |points: &[Point; 4]| points[0][k] - points[pair.n_first()][k];
+        between(start) + between(now)
+    };
+    let about = Across::new(core::array::from_fn(about), pair);
+    let mut all = about.into_iter().chain(ways(pair, [start, end, now]));
+    all.find_map(|across| {
+        let spare = |points| across.room(points, distance).filter(|&room| room > 0.0);
+        spare(start)?;
+        // The normal is no longer than the root of 3, and two points may move.
+        spare(now).map(|room| room * (0.99 / (2.0 * 1.733)))
+    })
 }
 
 /// How far each point of two elements may go from its start to its end, a share, so that the elements stay apart: about, and only as
@@ -39,7 +56,8 @@ pub fn shares_apart(
     [start, now, end]: [&[Point; 4]; 3],
     distance: f64,
 ) -> Option<[f64; 4]> {
-    let possible = ways(pair, [start, end]).filter(|across| across.are_apart(start, distance));
+    let is_possible = |across: &Across| across.room(start, distance).is_some_and(|room| room > 0.0);
+    let possible = ways(pair, [start, end]).filter(is_possible);
     let shares = possible.map(|across| across.shares([start, now, end], distance));
     let least = |shares: &[f64; 4]| shares.iter().fold(1.0, |least: f64, &x| least.min(x));
     shares.max_by(|a, b| least(a).total_cmp(&least(b)))
@@ -57,11 +75,7 @@ fn ways<'a>(
             ElementPair::EdgeEdge => way,
             _ => way.map(|x| -x),
         };
-        let size = way.iter().fold(0.0, |size: f64, x| size.max(x.abs()));
-        (size > 0.0 && size < f64::INFINITY).then(|| Across {
-            normal: way.map(|x| x / size),
-            pair,
-        })
+        Across::new(way, pair)
     })
 }
 
@@ -73,6 +87,15 @@ struct Across {
 }
 
 impl Across {
+    /// Along a way, if it has a length.
+    fn new(way: Point, pair: ElementPair) -> Option<Self> {
+        let size = way.iter().fold(0.0, |size: f64, x| size.max(x.abs()));
+        (size > 0.0 && size < f64::INFINITY).then(|| Across {
+            normal: way.map(|x| x / size),
+            pair,
+        })
+    }
+
     /// The height of a point over another one, and a bound of its error.
     fn height(&self, point: &Point, origin: &Point) -> [f64; 2] {
         let (mut height, mut size) = (0.0, 0.0);
@@ -113,10 +136,11 @@ impl Across {
         [low, high]
     }
 
-    /// Whether the elements are certainly farther apart.
-    fn are_apart(&self, points: &[Point; 4], distance: f64) -> bool {
+    /// By how much the elements are at least farther apart, as a height; `None` if that is not a number.
+    fn room(&self, points: &[Point; 4], distance: f64) -> Option<f64> {
         let [low, high] = self.bounds(points, &points[0], 1.0);
-        (low - high).next_down() > self.thick(distance)
+        let room = ((low - high).next_down() - self.thick(distance)).next_down();
+        (!room.is_nan()).then_some(room)
     }
 
     /// See [`shares_apart`].
@@ -202,8 +226,15 @@ mod tests {
                 continue;
             };
             assert!(!are_within(pair, &start, distance));
-            if stay_apart(pair, [&start, &end, &end], distance) {
+            if let Some(spare) = spare_apart(pair, [&start, &end, &end], distance) {
                 n_apart += 1;
+                // Each point may be so far off, in any direction.
+                let mut off = || [(); 3].map(|()| (numbers.next(2) - 0.5) * 2.0 * spare / 1.7321);
+                let near = end.map(|p| {
+                    let off = off();
+                    core::array::from_fn(|k| p[k] + off[k])
+                });
+                assert_eq!(first_within(pair, &start, &near, distance), None);
                 assert_eq!(first_within(pair, &start, &end, distance), None);
                 continue;
             }
@@ -212,10 +243,8 @@ mod tests {
             let at: [Point; 4] = core::array::from_fn(|ix| {
                 core::array::from_fn(|k| start[ix][k] + shares[ix] * (end[ix][k] - start[ix][k]))
             });
-            assert!(
-                stay_apart(pair, [&start, &at, &end], distance),
-                "{pair:?} {shares:?}"
-            );
+            let spare = spare_apart(pair, [&start, &at, &end], distance);
+            assert!(spare.is_some(), "{pair:?} {shares:?}");
             assert_eq!(first_within(pair, &start, &at, distance), None);
         }
         assert!(n_apart > 2000 && n_stopped > 2000, "{n_apart} {n_stopped}");
@@ -233,8 +262,9 @@ mod tests {
     fn elements_that_go_the_same_way_stay_apart() {
         let [start, end] = over([-8.0, -9.0]);
         let ends = [&start, &end, &end];
-        assert!(stay_apart(ElementPair::VertexVertex, ends, 0.5));
-        assert!(!stay_apart(ElementPair::VertexVertex, ends, 1.0));
+        let spare = |distance| spare_apart(ElementPair::VertexVertex, ends, distance);
+        assert!(spare(0.5).is_some_and(|spare| spare > 0.1 && spare < 0.25));
+        assert_eq!(spare(1.0), None);
     }
 
     #[test]
