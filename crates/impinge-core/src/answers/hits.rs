@@ -84,7 +84,7 @@ impl Hits {
     /// A hash of the rays, the elements that they hit and their order.
     pub fn hash(&self) -> u64 {
         let of_ray = |ray: usize| {
-            let [high, low] = [(ray >> 32) as u32, ray as u32];
+            let [high, low] = [(ray as u64 >> 32) as u32, ray as u32];
             let hits = (1u32..).zip(self.of(ray)).map(move |(ix, hit)| {
                 let Element { body, element } = hit.element;
                 hash_row([high, low, body.slot() ^ ix.rotate_left(16), element])
