@@ -2,7 +2,7 @@
 
 mod inner;
 
-use std::cmp::Ordering;
+use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 use inner::{InnerCorners, turn};
@@ -106,21 +106,20 @@ fn clip_many_ears(points: &[[f64; 2]], triangles: &mut Vec<[usize; 3]>) -> Optio
         if inner.n_looks > most {
             return None;
         }
-        let cut = queue.pop()?;
-        let ear = ring.around(cut.corner);
-        let is_old = !ring.is_left(cut.corner) || cut.ear != ear;
-        if is_old || !ring.is_convex(cut.corner) {
+        let Reverse((_, ear)) = queue.pop()?;
+        let [from, clipped, to] = ear;
+        let is_old = !ring.is_left(clipped) || ear != ring.around(clipped);
+        if is_old || !ring.is_convex(clipped) {
             continue;
         }
         if let Some(blocking) = inner.find_in(points, ear) {
-            waiting[blocking].push(cut.corner);
+            waiting[blocking].push(clipped);
             continue;
         }
         triangles.push(ear);
-        ring.remove(cut.corner);
+        ring.remove(clipped);
         n_left -= 1;
-        let [from, _, to] = ear;
-        for corner in [cut.corner, from, to] {
+        for corner in [clipped, from, to] {
             let is_left = corner == from || corner == to;
             if is_left {
                 queue.push(ring.cut(corner));
@@ -172,16 +171,13 @@ impl<'a> Ring<'a> {
         turn_of(self.points, self.around(corner)) > 0.0
     }
 
-    /// The cut that would clip a corner.
-    fn cut(&self, corner: usize) -> Cut {
+    /// The ear of a corner, by the length of the cut that clips it. The heap has the shortest first, then the lowest corner.
+    fn cut(&self, corner: usize) -> Reverse<(u64, [usize; 3])> {
         let ear = self.around(corner);
         let [from, to] = [ear[0], ear[2]].map(|corner| self.points[corner]);
         let length = (from[0] - to[0]).hypot(from[1] - to[1]);
-        Cut {
-            length,
-            corner,
-            ear,
-        }
+        // Floats of at least 0 are in the order of their bits.
+        Reverse((length.abs().to_bits(), ear))
     }
 
     fn is_left(&self, corner: usize) -> bool {
@@ -193,34 +189,6 @@ impl<'a> Ring<'a> {
         (self.next[before], self.before[next]) = (next, before);
     }
 }
-
-/// An ear that may be clipped. The shortest is the greatest, then that of the lowest corner.
-struct Cut {
-    length: f64,
-    corner: usize,
-    ear: [usize; 3],
-}
-
-impl Ord for Cut {
-    fn cmp(&self, other: &Self) -> Ordering {
-        let length = other.length.total_cmp(&self.length);
-        length.then_with(|| other.ear.cmp(&self.ear))
-    }
-}
-
-impl PartialOrd for Cut {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl PartialEq for Cut {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other).is_eq()
-    }
-}
-
-impl Eq for Cut {}
 
 /// So many looks per corner, and per halving of their number, are allowed.
 const LOOKS: u64 = 64;
