@@ -3,7 +3,7 @@
 use super::Detector;
 use crate::answers::closest::Closest;
 use crate::answers::hits::Hits;
-use crate::probe::Shared;
+use crate::probe::{Probes, Shared};
 use crate::query::Query;
 use crate::scene::Scene;
 use crate::scene::error::Error;
@@ -45,27 +45,9 @@ impl Detector {
         body: BodyId,
         points: &[[R; 3]],
     ) -> Result<Vec<i8>, Error> {
-        let control = &self.control.clone();
-        let limits = self.settings.limits();
-        let Detector {
-            runner,
-            stats: measured,
-            distances,
-            topologies,
-            probes,
-            ..
-        } = self;
-        runner.measure(measured, limits, |workers, stats| {
-            let _shift = workers.shift(points.len() as u64);
-            let work = Work { workers, control };
-            let mut shared = Shared {
-                distances,
-                topologies,
-            };
-            let places = probes.contains(scene, body, points, &mut shared, work)?;
-            distances.report(stats);
-            stats.bytes_held += probes.bytes() + topologies.bytes();
-            Ok(places)
+        self.probe(points.len(), |probes, shared, work| {
+            let places = probes.contains(scene, body, points, shared, work)?;
+            Ok((places, shared.topologies.bytes()))
         })
     }
 
@@ -105,29 +87,11 @@ impl Detector {
         most: f64,
         query: &Query,
     ) -> Result<Closest, Error> {
-        let control = &self.control.clone();
-        let limits = self.settings.limits();
         let mut closest = self.homes.closest.take();
-        let Detector {
-            runner,
-            stats: measured,
-            distances,
-            topologies,
-            probes,
-            ..
-        } = self;
-        runner.measure(measured, limits, |workers, stats| {
-            let _shift = workers.shift(points.len() as u64);
-            let work = Work { workers, control };
-            let mut shared = Shared {
-                distances,
-                topologies,
-            };
+        self.probe(points.len(), |probes, shared, work| {
             let asked = (query, most);
-            probes.closest(scene, asked, points, &mut closest.found, &mut shared, work)?;
-            distances.report(stats);
-            stats.bytes_held += probes.bytes() + closest.bytes();
-            Ok(())
+            probes.closest(scene, asked, points, &mut closest.found, shared, work)?;
+            Ok(((), closest.bytes()))
         })?;
         closest.stats.clone_from(&self.stats);
         Ok(closest)
@@ -166,9 +130,24 @@ impl Detector {
         most: f64,
         query: &Query,
     ) -> Result<Hits, Error> {
+        let mut hits = self.homes.hits.take();
+        self.probe(origins.len(), |probes, shared, work| {
+            let rays = [origins, directions];
+            probes.cast(scene, (query, most), rays, &mut hits, shared, work)?;
+            Ok(((), hits.bytes()))
+        })?;
+        hits.stats.clone_from(&self.stats);
+        Ok(hits)
+    }
+
+    /// Asks about some points or rays, and measures it. `ask` also says how many bytes it holds beside trees and probes.
+    fn probe<T>(
+        &mut self,
+        n: usize,
+        ask: impl FnOnce(&mut Probes, &mut Shared<'_>, Work<'_>) -> Result<(T, u64), Error>,
+    ) -> Result<T, Error> {
         let control = &self.control.clone();
         let limits = self.settings.limits();
-        let mut hits = self.homes.hits.take();
         let Detector {
             runner,
             stats: measured,
@@ -178,19 +157,16 @@ impl Detector {
             ..
         } = self;
         runner.measure(measured, limits, |workers, stats| {
-            let _shift = workers.shift(origins.len() as u64);
+            let _shift = workers.shift(n as u64);
             let work = Work { workers, control };
             let mut shared = Shared {
                 distances,
                 topologies,
             };
-            let rays = [origins, directions];
-            probes.cast(scene, (query, most), rays, &mut hits, &mut shared, work)?;
+            let (answer, bytes) = ask(probes, &mut shared, work)?;
             distances.report(stats);
-            stats.bytes_held += probes.bytes() + hits.bytes();
-            Ok(())
-        })?;
-        hits.stats.clone_from(&self.stats);
-        Ok(hits)
+            stats.bytes_held += probes.bytes() + bytes;
+            Ok(answer)
+        })
     }
 }

@@ -8,7 +8,7 @@
 
 use std::cmp::Ordering;
 
-use super::Target;
+use super::{Looks, Target};
 use crate::answers::hits::RayHit;
 use crate::answers::pairs::Element;
 use crate::bvh::bounds::Bounds;
@@ -22,8 +22,6 @@ use crate::search::work::Work;
 use impinge_exact::Point;
 use impinge_exact::internal::{Meeting, Ray, meet};
 
-/// Nodes, or exact decisions, between two looks at the control.
-const LOOK: u32 = 1 << 10;
 /// More than the relative error of a few operations.
 const ROUNDING: f64 = 64.0 * f64::EPSILON;
 /// More than the error of a determinant, relative to the product of its vectors' sizes.
@@ -45,8 +43,7 @@ pub(super) fn cast(
     work: Work<'_>,
 ) -> Result<(), Error> {
     let mut search = Search {
-        work,
-        n_seen: 0,
+        looks: Looks::new(work),
         hits,
         limit: f64::INFINITY,
         found: Vec::new(),
@@ -101,8 +98,7 @@ impl Found {
 
 /// The search of one ray; the memory is kept for the next.
 struct Search<'a> {
-    work: Work<'a>,
-    n_seen: u32,
+    looks: Looks<'a>,
     hits: Hit,
     /// What the ray meets later is not asked for.
     limit: f64,
@@ -115,17 +111,6 @@ impl Search<'_> {
     fn begin(&mut self, ray: &Ray) {
         self.found.clear();
         self.limit = ray.most;
-    }
-
-    /// # Errors
-    /// Cancellation.
-    fn step(&mut self) -> Result<(), Error> {
-        self.n_seen += 1;
-        if self.n_seen == LOOK {
-            self.n_seen = 0;
-            self.work.step()?;
-        }
-        Ok(())
     }
 
     /// When the ray comes to a box, about; `None` if it certainly does not before the limit.
@@ -162,7 +147,7 @@ impl Search<'_> {
             if near > self.limit * (1.0 + ROUNDING) {
                 continue;
             }
-            self.step()?;
+            self.looks.step()?;
             if level == 0 {
                 self.look(body, target, ClusterIx::new(node as u32), ray)?;
                 if self.hits == Hit::Any && !self.found.is_empty() {
@@ -204,7 +189,7 @@ impl Search<'_> {
             if self.certainly_misses(ray, corners) {
                 continue;
             }
-            self.step()?;
+            self.looks.step()?;
             let Some(meeting) = meet(ray, corners) else {
                 continue;
             };
@@ -263,7 +248,7 @@ impl Search<'_> {
     /// # Errors
     /// Cancellation.
     fn sort(&mut self) -> Result<(), Error> {
-        self.work.step()?;
+        self.looks.work.step()?;
         self.found.sort_unstable_by(Found::compare);
         Ok(())
     }

@@ -10,7 +10,7 @@
 
 use std::cmp::Ordering;
 
-use super::Target;
+use super::{Looks, Target};
 use crate::answers::closest::ClosestElement;
 use crate::answers::pairs::Element;
 use crate::bvh::bounds::Bounds;
@@ -28,8 +28,6 @@ use impinge_exact::internal::{
     point_distance_bounds,
 };
 
-/// Nodes, or exact comparisons, between two looks at the control.
-const LOOK: u32 = 1 << 10;
 /// More than what rounding may do to squares of distances of boxes, which are of a few operations.
 const ROUNDING: f64 = 64.0 * f64::EPSILON;
 /// The square of the shortest way across which planes are taken.
@@ -153,8 +151,7 @@ fn corners(target: &Target<'_>, slot: usize) -> Corners {
 
 /// The search for one point; the memory is kept for the next.
 struct Search<'a> {
-    work: Work<'a>,
-    n_seen: u32,
+    looks: Looks<'a>,
     /// The nearest element is certainly not farther away.
     high: f64,
     /// Boxes whose squared distance is larger hold nothing as near.
@@ -170,8 +167,7 @@ struct Search<'a> {
 impl<'a> Search<'a> {
     fn new(work: Work<'a>) -> Self {
         Search {
-            work,
-            n_seen: 0,
+            looks: Looks::new(work),
             high: f64::INFINITY,
             limit: f64::INFINITY,
             way: [0.0; 3],
@@ -221,20 +217,6 @@ impl<'a> Search<'a> {
         lowest - ROUNDING * of_way * size > self.level
     }
 
-    /// To be called now and then.
-    ///
-    /// # Errors
-    /// Cancellation.
-    #[inline(always)]
-    fn step(&mut self) -> Result<(), Error> {
-        self.n_seen += 1;
-        if self.n_seen == LOOK {
-            self.n_seen = 0;
-            self.work.step()?;
-        }
-        Ok(())
-    }
-
     /// Adds the elements of a body that may be nearest.
     #[inline(always)]
     fn visit(&mut self, body: usize, target: Target<'_>, point: &Point) -> Result<(), Error> {
@@ -247,7 +229,7 @@ impl<'a> Search<'a> {
             if low > self.limit {
                 continue;
             }
-            self.step()?;
+            self.looks.step()?;
             if level == 0 {
                 self.compare(body, target, ClusterIx::new(node as u32), point);
                 continue;
@@ -323,7 +305,7 @@ impl<'a> Search<'a> {
         let mut best: Option<Candidate> = None;
         for &candidate in &candidates {
             if let Some(best) = best {
-                self.step()?;
+                self.looks.step()?;
                 let [other, corners] = [candidate, best].map(|one| one.corners(bodies));
                 let order = compare_point_distances(point, other.points(), corners.points());
                 if order != Ordering::Less {

@@ -138,13 +138,7 @@ impl Probes {
         shared: &mut Shared<'_>,
         work: Work<'_>,
     ) -> Result<(), Error> {
-        if most.is_nan() || most < 0.0 {
-            return Err(Error::Setting {
-                setting: "most",
-                given: most.to_string(),
-                allowed: "a length of at least 0, or infinity",
-            });
-        }
+        check_most(most, "a length of at least 0, or infinity")?;
         check_points("points", points)?;
         let parts = surfaces(scene, query)?;
         self.know(scene, &parts, shared, work)?;
@@ -185,13 +179,7 @@ impl Probes {
         shared: &mut Shared<'_>,
         work: Work<'_>,
     ) -> Result<(), Error> {
-        if most.is_nan() || most < 0.0 {
-            return Err(Error::Setting {
-                setting: "most",
-                given: most.to_string(),
-                allowed: "a number of at least 0, or infinity",
-            });
-        }
+        check_most(most, "a number of at least 0, or infinity")?;
         if origins.len() != directions.len() {
             return Err(Error::Setting {
                 setting: "directions",
@@ -328,6 +316,46 @@ fn targets(scene: &Scene, query: &Query) -> Result<Vec<BodyId>, Error> {
         Scope::All { between: true, .. } => Ok(scene.bodies().map(|(id, _)| id).collect()),
         Scope::Across { .. } => Ok(query.across.iter().copied().collect()),
         _ => refused("query", "pairs of two bodies, or self-collision"),
+    }
+}
+
+fn check_most(most: f64, allowed: &'static str) -> Result<(), Error> {
+    if most >= 0.0 {
+        return Ok(());
+    }
+    Err(Error::Setting {
+        setting: "most",
+        given: most.to_string(),
+        allowed,
+    })
+}
+
+/// Nodes, or exact decisions, between two looks at the control.
+const LOOK: u32 = 1 << 10;
+
+/// Looks at the control from time to time.
+struct Looks<'a> {
+    work: Work<'a>,
+    n_seen: u32,
+}
+
+impl<'a> Looks<'a> {
+    fn new(work: Work<'a>) -> Self {
+        Looks { work, n_seen: 0 }
+    }
+
+    /// To be called for each.
+    ///
+    /// # Errors
+    /// Cancellation.
+    #[inline(always)]
+    fn step(&mut self) -> Result<(), Error> {
+        self.n_seen += 1;
+        if self.n_seen == LOOK {
+            self.n_seen = 0;
+            self.work.step()?;
+        }
+        Ok(())
     }
 }
 

@@ -1,29 +1,13 @@
 //! `cast`: what rays hit. Where one ray meets one element is held against other predicates in `impinge-exact`; here the search
 //! is held against all elements, one by one.
 
+use crate::elements;
 use impinge_core::exact::internal::{Meeting, Ray, meet};
 use impinge_core::{
     Backend, BodyId, CancelToken, Control, Detector, Error, Hit, Hits, InstructionSet, Query,
     RayHit, Scene, Settings,
 };
 use impinge_scenes::{Random, solids, soup, surfaces};
-
-/// The surface of each body, element by element.
-fn elements(scene: &Scene) -> Vec<(BodyId, u32, Vec<[f64; 3]>)> {
-    let mut all = Vec::new();
-    for (id, body) in scene.bodies() {
-        let elements = match body.faces().is_empty() {
-            false => body.faces(),
-            true => body.elements(),
-        };
-        for element in 0..elements.len() {
-            let corners = elements.corners(element).iter();
-            let points = corners.map(|&vertex| body.positions().point(vertex as usize));
-            all.push((id, element as u32, points.collect()));
-        }
-    }
-    all
-}
 
 fn ask(scene: &Scene, rays: &[[[f64; 3]; 2]], most: f64, hits: Hit) -> Hits {
     let [origins, directions] = [0, 1].map(|k| rays.iter().map(|ray| ray[k]).collect::<Vec<_>>());

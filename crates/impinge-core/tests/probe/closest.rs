@@ -1,29 +1,13 @@
 //! `closest`: which element is nearest, where, and how far.
 
+use crate::elements;
 use crate::oracle::{self, Fraction, Vector};
 use impinge_core::exact::Feature;
 use impinge_core::{
-    Backend, BodyId, CancelToken, Closest, Control, Detector, Elements, Error, Exclusion,
-    InstructionSet, PairFilter, Query, Scene, Settings,
+    Backend, CancelToken, Closest, Control, Detector, Elements, Error, Exclusion, InstructionSet,
+    PairFilter, Query, Scene, Settings,
 };
 use impinge_scenes::{Model, Random, solids, soup, surfaces};
-
-/// The surface of each body, element by element.
-fn elements(scene: &Scene) -> Vec<(BodyId, u32, Vec<[f64; 3]>)> {
-    let mut all = Vec::new();
-    for (id, body) in scene.bodies() {
-        let elements = match body.faces().is_empty() {
-            false => body.faces(),
-            true => body.elements(),
-        };
-        for element in 0..elements.len() {
-            let corners = elements.corners(element).iter();
-            let points = corners.map(|&vertex| body.positions().point(vertex as usize));
-            all.push((id, element as u32, points.collect()));
-        }
-    }
-    all
-}
 
 /// Holds an answer against exact distances from all elements.
 fn check(scene: &Scene, points: &[[f64; 3]], most: f64, closest: &Closest) {
