@@ -1,29 +1,13 @@
 //! How far vertices may move, and neighbours by element: against every pair by the exact tests.
 
+mod common;
+
+use common::{detector, detectors};
 use impinge_core::exact::{ElementPair, Point, are_within, closest_points, edge_face_are_within};
 use impinge_core::{
-    Backend, BodyId, Bounds, Csr, Detector, Elements, Error, Method, PairKind, Part, Query,
-    SafeDistances, Scene, Settings,
+    BodyId, Bounds, Csr, Elements, Error, Method, PairKind, Part, Query, SafeDistances, Scene,
 };
 use impinge_scenes::{Random, solids, soup, surfaces};
-
-fn detector(method: Method, threads: usize) -> Detector {
-    Detector::new(Settings {
-        method,
-        threads,
-        backend: Backend::Cpu,
-        ..Settings::default()
-    })
-    .expect("settings")
-}
-
-fn detectors() -> [Detector; 3] {
-    [
-        detector(Method::Clusters, 1),
-        detector(Method::Clusters, 4),
-        detector(Method::Naive, 2),
-    ]
-}
 
 /// An element of one body, by its corners.
 #[derive(Debug, Clone)]

@@ -1,28 +1,12 @@
 //! How far each vertex may go in a step: by the exact test of the whole step.
 
+mod common;
+
+use common::{detector, detectors};
 use impinge_core::{
-    Backend, BodyId, Detector, Error, Method, PairFilter, Positions, Query, Real, Scene, Settings,
-    Start, Truncation,
+    BodyId, Error, Method, PairFilter, Positions, Query, Real, Scene, Start, Truncation,
 };
 use impinge_scenes::{Random, soup, surfaces};
-
-fn detector(method: Method, threads: usize) -> Detector {
-    Detector::new(Settings {
-        method,
-        threads,
-        backend: Backend::Cpu,
-        ..Settings::default()
-    })
-    .expect("settings")
-}
-
-fn detectors() -> [Detector; 3] {
-    [
-        detector(Method::Clusters, 1),
-        detector(Method::Clusters, 4),
-        detector(Method::Naive, 2),
-    ]
-}
 
 /// The vertices of all bodies that move: at the start, at the end, and where they were stopped.
 fn ways(scene: &Scene, truncation: &Truncation) -> Vec<[[f64; 3]; 3]> {

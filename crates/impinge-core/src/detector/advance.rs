@@ -237,14 +237,7 @@ fn touch(scene: &Scene, plan: &Plan, (kind, key): (PairKind, u64), fraction: f64
         return false;
     }
     let located = pair_numbers(key).map(|number| plan.locate(number));
-    let [a, b] = located.each_ref().map(|(part, element)| PairElement {
-        scene,
-        plan,
-        part: *part,
-        corners: plan
-            .body(scene, *part)
-            .corners(plan.part(*part).part, element),
-    });
+    let [a, b] = (located.each_ref()).map(|located| PairElement::new(scene, plan, located));
     let contact = FirstContact::decide_part(TestId::Elements(kind), a, b, fraction);
     contact.is_some_and(|contact| !(plan.start == Start::Skip && contact.at_start))
 }

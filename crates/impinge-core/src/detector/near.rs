@@ -78,8 +78,18 @@ impl Detector {
         query: &Query,
         outcome: &mut impl Outcome<u64, { PairKind::ALL.len() }>,
     ) -> Result<u64, Error> {
-        let control = &self.control.clone();
         let plan = Plan::nearness(scene, query, distance, self.settings.limits())?;
+        self.find_keys(scene, &plan, outcome)
+    }
+
+    /// Finds pairs of vertices, edges and faces, for whatever becomes of them.
+    pub(super) fn find_keys(
+        &mut self,
+        scene: &Scene,
+        plan: &Plan,
+        outcome: &mut impl Outcome<u64, { PairKind::ALL.len() }>,
+    ) -> Result<u64, Error> {
+        let control = &self.control.clone();
         let mut finder = InStep {
             clusters: &mut self.steps.clusters,
             settings: &self.settings,
@@ -88,7 +98,7 @@ impl Detector {
             keys: Keys::All,
             seen: Seen::default(),
         };
-        ready(self.runner.run(scene, &plan, control, &mut finder, outcome))
+        ready(self.runner.run(scene, plan, control, &mut finder, outcome))
     }
 }
 

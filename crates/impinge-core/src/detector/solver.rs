@@ -238,15 +238,8 @@ impl Outcome<u64, { PairKind::ALL.len() }> for Safe<'_> {
         let Job { scene, plan, .. } = job;
         let is_fixed = |part: PartIx| self.query.fixed.contains(&plan.part(part).id);
         let are_fixed: Vec<bool> = plan.part_ixs().map(is_fixed).collect();
-        let mut n_vertices = 0;
-        let mut firsts = Vec::new();
-        for (id, body) in scene.bodies() {
-            firsts.resize(id.index() + 1, 0);
-            firsts[id.index()] = n_vertices;
-            n_vertices += body.n_vertices();
-        }
-        let first_of = |part: PartIx| firsts[plan.part(part).id.index()];
-        let firsts: Vec<usize> = plan.part_ixs().map(first_of).collect();
+        let n_vertices = scene.bodies().map(|(_, body)| body.n_vertices()).sum();
+        let firsts = plan.first_vertices(scene);
         let mut least = std::mem::take(&mut self.memory.least);
         least.clear();
         reserve(&mut least, n_vertices, "safe distances")?;

@@ -14,7 +14,6 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::Detector;
 use super::advance::{moving, refuse_cell, refuse_seams};
-use super::in_step::{InStep, Keys, Seen};
 use crate::answers::truncation::Truncation;
 use crate::plan::{Plan, TestId};
 use crate::query::Query;
@@ -23,11 +22,11 @@ use crate::query::step::Start;
 use crate::scene::Scene;
 use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
-use crate::scene::index::{PartIx, pair_numbers};
+use crate::scene::index::pair_numbers;
 use crate::scene::positions::Positions;
 use crate::search::found::KeysByKind;
 use crate::search::narrow::{FirstContact, PairElement};
-use crate::search::runner::{Job, Outcome, ready};
+use crate::search::runner::{Job, Outcome};
 use crate::search::sink::reserve;
 use crate::search::stats::Stats;
 use crate::search::work::Work;
@@ -79,7 +78,6 @@ impl Detector {
     /// Divide and Truncate (Chen et al., SIGGRAPH 2026) for planes that divide the room between elements. Their proof in floats, and
     /// for rounded positions, is ours.
     pub fn truncate(&mut self, scene: &Scene, query: &Query) -> Result<Truncation, Error> {
-        let control = &self.control.clone();
         refuse_cell(query)?;
         let plan = Plan::truncation(scene, query, self.settings.limits())?;
         let start = self.verify(scene, query)?.map(|start| start.intersects);
@@ -97,18 +95,7 @@ impl Detector {
             keys: std::mem::take(&mut self.solver.keys),
             stats: Stats::default(),
         };
-        let mut finder = InStep {
-            clusters: &mut self.steps.clusters,
-            settings: &self.settings,
-            #[cfg(feature = "gpu")]
-            gpu: &mut self.gpu,
-            keys: Keys::All,
-            seen: Seen::default(),
-        };
-        let found = ready(
-            self.runner
-                .run(scene, &plan, control, &mut finder, &mut outcome),
-        );
+        let found = self.find_keys(scene, &plan, &mut outcome);
         self.stats.clone_from(&outcome.stats);
         self.solver.keys = outcome.keys;
         found.map(|_| outcome.truncation)
@@ -142,15 +129,14 @@ impl Outcome<u64, { PairKind::ALL.len() }> for Truncated {
         let mut vertices = Vertices::new(job)?;
         let mut pairs = Pairs::new(job, &self.keys)?;
         let truncation = &mut self.truncation;
-        loop {
-            pairs.stop(&vertices)?;
-            if !vertices.go_back(scene) {
-                break;
-            }
-            truncation.n_rounds += 1;
-        }
-        truncation.n_touching = pairs.touching().count() as u64;
+        pairs.stop(&vertices)?;
+        // All that touch at the start are known now.
         refuse_seams(scene, plan, pairs.touching())?;
+        truncation.n_touching = pairs.touching().count() as u64;
+        while vertices.go_back(scene) {
+            truncation.n_rounds += 1;
+            pairs.stop(&vertices)?;
+        }
         truncation.n_cut = vertices.n_cut();
         truncation.positions = vertices.positions(scene);
         self.stats
@@ -200,10 +186,7 @@ impl Vertices {
         reserve(&mut all, n, "vertices")?;
         reserve(&mut most, n, "vertices")?;
         most.resize_with(n, || AtomicU64::new(WHOLE));
-        let mut of_slots = Vec::new();
-        for (id, body) in scene.bodies() {
-            of_slots.resize(id.index() + 1, 0);
-            of_slots[id.index()] = all.len();
+        for (_, body) in scene.bodies() {
             let end = body.end_positions().unwrap_or(body.positions());
             all.extend((0..body.n_vertices()).map(|vertex| Vertex {
                 share: 1.0,
@@ -212,9 +195,11 @@ impl Vertices {
                 moved: 0.0,
             }));
         }
-        let first = |part: PartIx| of_slots[plan.part(part).id.index()];
-        let firsts = plan.part_ixs().map(first).collect();
-        Ok(Vertices { all, most, firsts })
+        Ok(Vertices {
+            all,
+            most,
+            firsts: plan.first_vertices(scene),
+        })
     }
 
     /// Lets a vertex go at most a share of its way.
@@ -320,12 +305,7 @@ impl Ways {
     fn new(job: Job<'_>, vertices: &Vertices, kind: PairKind, key: u64) -> Self {
         let Job { scene, plan, .. } = job;
         let located = pair_numbers(key).map(|number| plan.locate(number));
-        let elements = located.each_ref().map(|(part, element)| PairElement {
-            scene,
-            plan,
-            part: *part,
-            corners: (plan.body(scene, *part)).corners(plan.part(*part).part, element),
-        });
+        let elements = (located.each_ref()).map(|located| PairElement::new(scene, plan, located));
         let (pair, elements, [start, end]) =
             FirstContact::ends(TestId::Elements(kind), elements, 1.0)
                 .expect("steps have vertices, edges and faces");

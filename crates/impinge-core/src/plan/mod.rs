@@ -564,6 +564,18 @@ impl Plan {
         scene.body_in(self.part(part).id.slot())
     }
 
+    /// For each part, how many vertices the bodies of the scene have before its body.
+    pub(crate) fn first_vertices(&self, scene: &Scene) -> Vec<usize> {
+        let mut of_slots = Vec::new();
+        let mut n = 0;
+        for (id, body) in scene.bodies() {
+            of_slots.resize(id.index() + 1, 0);
+            of_slots[id.index()] = n;
+            n += body.n_vertices();
+        }
+        (self.parts.iter().map(|part| of_slots[part.id.index()])).collect()
+    }
+
     /// The part and the element that a global number belongs to.
     #[inline]
     pub fn locate(&self, number: Number) -> (PartIx, ElementIx) {

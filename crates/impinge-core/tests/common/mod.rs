@@ -14,6 +14,26 @@ pub struct Case {
     pub query: Query,
 }
 
+/// A detector on the CPU.
+pub fn detector(method: Method, threads: usize) -> Detector {
+    Detector::new(Settings {
+        method,
+        threads,
+        backend: Backend::Cpu,
+        ..Settings::default()
+    })
+    .expect("settings")
+}
+
+/// Detectors that must give the same bytes.
+pub fn detectors() -> [Detector; 3] {
+    [
+        detector(Method::Clusters, 1),
+        detector(Method::Clusters, 4),
+        detector(Method::Naive, 2),
+    ]
+}
+
 /// The rows of an answer.
 pub fn rows(pairs: &Pairs) -> Vec<[u32; 4]> {
     pairs.rows().collect()

@@ -16,7 +16,7 @@ pub(crate) use within::{Corners, Within};
 use crate::boxes::Extent;
 use crate::plan::{Plan, TestId};
 use crate::scene::Scene;
-use crate::scene::index::PartIx;
+use crate::scene::index::{ElementIx, PartIx};
 
 /// One element of one part of a frame.
 #[derive(Debug, Clone, Copy)]
@@ -44,6 +44,19 @@ pub(crate) trait Test {
 
     /// The value of a pair, decided exactly and by the adjacency rule; `None` if the pair is not reported.
     fn decide(&self, test: TestId, a: PairElement<'_>, b: PairElement<'_>) -> Option<Self::Value>;
+}
+
+impl<'a> PairElement<'a> {
+    /// An element that was located by its number.
+    pub fn new(scene: &'a Scene, plan: &'a Plan, (part, element): &'a (PartIx, ElementIx)) -> Self {
+        let of = plan.part(*part).part;
+        PairElement {
+            scene,
+            plan,
+            part: *part,
+            corners: plan.body(scene, *part).corners(of, element),
+        }
+    }
 }
 
 impl PairElement<'_> {
