@@ -1,0 +1,73 @@
+"""Where the meshes of this frame intersect, and where they are near."""
+
+from __future__ import annotations
+
+import bpy
+
+from .. import meshes, state, text
+from ..job import Job
+from ..question import Asker, Question
+from .waiting import Waiting
+
+__all__ = ["CLASSES", "question"]
+
+
+def question(settings, distance=None):
+    """The question that the panel's options ask."""
+    return Question(
+        itself=settings.which != "BETWEEN",
+        between=settings.which != "ACTIVE",
+        distance=distance,
+        rings=settings.rings,
+        weld=settings.weld,
+    )
+
+
+def wanted(context):
+    """Names of the objects. Raises ValueError where there are too few."""
+    which = context.scene.impinge.which
+    names = meshes.chosen(context, which)
+    if which == "ACTIVE" and not names:
+        raise ValueError("there is no active object with faces")
+    if len(names) < (2 if which == "BETWEEN" else 1):
+        raise ValueError(f"{text.counted(len(names), 'object')} with faces selected, {'2' if which == 'BETWEEN' else '1'} or more needed")
+    return names
+
+
+class Asking(Waiting):
+    """Asks about this frame, and shows the answer in the panel."""
+
+    def steps(self, context):
+        settings = context.scene.impinge
+        names = wanted(context)
+        asked = question(settings, self.distance(settings))
+        frame = context.scene.frame_current
+        bodies = meshes.read(context, names, settings.selected_only)
+        answer = yield Job(lambda cancel, progress: Asker(asked).find(bodies, cancel, progress))
+        state.show(answer, asked, frame)
+        self.report({"INFO"}, text.of_answer(answer, asked))
+
+
+class IMPINGE_OT_check(Asking, bpy.types.Operator):
+    """Find the faces that intersect in this frame, modifiers included. Touching counts"""
+
+    bl_idname = "impinge.check"
+    bl_label = "Check"
+    label = "Check"
+
+    def distance(self, settings):
+        return None
+
+
+class IMPINGE_OT_clearance(Asking, bpy.types.Operator):
+    """Find what is nearer than the distance, in this frame, modifiers included"""
+
+    bl_idname = "impinge.clearance"
+    bl_label = "Find Clearance"
+    label = "Clearance"
+
+    def distance(self, settings):
+        return settings.distance
+
+
+CLASSES = (IMPINGE_OT_check, IMPINGE_OT_clearance)

@@ -1,0 +1,88 @@
+"""Which frames of an animation intersect."""
+
+from __future__ import annotations
+
+import bpy
+
+from .. import meshes, state, text
+from ..frames import Frames
+from ..job import Job
+from ..question import Asker
+from .check import question, wanted
+from .waiting import Waiting
+
+__all__ = ["CLASSES"]
+
+#: Markers that begin with this are ours, and the next scan replaces them.
+MARK = "impinge: "
+
+
+class IMPINGE_OT_scan(Waiting, bpy.types.Operator):
+    """Look for intersections in each frame, from the first to the last one of the scene, or of its preview range"""
+
+    bl_idname = "impinge.scan"
+    bl_label = "Scan Frames"
+    bl_options = {"REGISTER", "UNDO"}
+    label = "Scan"
+
+    def steps(self, context):
+        settings = context.scene.impinge
+        names = wanted(context)
+        asker = Asker(question(settings))
+        selected_only = settings.selected_only
+        scene_name, before = context.scene.name, context.scene.frame_current
+        seen = Frames(*span(context.scene), settings.step)
+        try:
+            for frame in seen.wanted:
+                bpy.data.scenes[scene_name].frame_set(frame)
+                bodies = meshes.read(context, names, selected_only)
+                seen.add(frame, (yield Job(lambda cancel, progress, bodies=bodies: asker.count(bodies, cancel, progress))))
+                state.running.frames = (len(seen.counts), len(seen.wanted))
+        finally:
+            scene = bpy.data.scenes.get(scene_name)
+            if scene is not None:
+                scene.frame_set(before)
+                # A scan that was stopped shows how far it has come.
+                show(scene, seen)
+        self.report({"INFO"}, text.of_frames(seen))
+
+
+def span(scene):
+    """First and last frame."""
+    if scene.use_preview_range:
+        return scene.frame_preview_start, scene.frame_preview_end
+    return scene.frame_start, scene.frame_end
+
+
+def show(scene, seen):
+    """Writes what was found into the scene: numbers, and markers."""
+    settings = scene.impinge
+    settings.n_frames, settings.n_hits = len(seen.counts), seen.n_hits
+    settings.is_hit = seen.first is not None
+    settings.first_frame = seen.first if seen.first is not None else 0
+    for marker in [marker for marker in scene.timeline_markers if marker.name.startswith(MARK)]:
+        scene.timeline_markers.remove(marker)
+    if settings.mark:
+        for run in seen.runs():
+            scene.timeline_markers.new(f"{MARK}{text.pairs(run.most)}", frame=run.first)
+            if run.free is not None:
+                scene.timeline_markers.new(f"{MARK}free", frame=run.free)
+
+
+class IMPINGE_OT_first_frame(bpy.types.Operator):
+    """Go to the first frame that intersects"""
+
+    bl_idname = "impinge.first_frame"
+    bl_label = "Go to First Frame"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context):
+        return context.scene.impinge.is_hit
+
+    def execute(self, context):
+        context.scene.frame_set(context.scene.impinge.first_frame)
+        return {"FINISHED"}
+
+
+CLASSES = (IMPINGE_OT_scan, IMPINGE_OT_first_frame)

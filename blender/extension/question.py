@@ -1,0 +1,152 @@
+"""What is asked about bodies, and the answer. Asks impinge, and knows nothing of Blender: all of this may run in another thread."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+
+import impinge
+import numpy as np
+
+from . import places
+from .bodies import World
+
+__all__ = ["MOST_PAIRS", "Answer", "Asker", "Question"]
+
+#: The most pairs that are held: 16 bytes each. More is an error that says so.
+MOST_PAIRS = 50_000_000
+#: The most pairs whose places are found. Their contacts take about 200 bytes each.
+MOST_PLACED = 2_000_000
+
+
+@dataclass(frozen=True)
+class Question:
+    """`itself`: pairs of one body; `between`: pairs of different ones. `distance`, in the world: pairs that are at most that near; None:
+    pairs that intersect. `rings`: what is as near in the surface of one body is not near. `weld`: equal positions are one vertex.
+    """
+
+    itself: bool
+    between: bool
+    distance: float | None = None
+    rings: int = 2
+    weld: bool = True
+
+
+@dataclass
+class Answer:
+    """`faces` has, by name of the object, faces of its own mesh. `n_made`: triangles without one, because a modifier made them.
+    `is_placed` is false where there were too many pairs for finding places. Of `n_places`, the first are described.
+    """
+
+    n_pairs: int = 0
+    places: list = field(default_factory=list)
+    faces: dict = field(default_factory=dict)
+    n_polygons: dict = field(default_factory=dict)
+    n_made: int = 0
+    n_triangles: int = 0
+    is_placed: bool = True
+    n_places: int = 0
+    seconds: float = 0.0
+
+
+class Asker:
+    """Asks one question about frame after frame."""
+
+    def __init__(self, question):
+        self.question = question
+        # The same answer as any other backend, and no driver of a GPU within Blender's process.
+        self._detector = impinge.Detector("cpu", max_pairs=MOST_PAIRS)
+        self._worlds = {}
+
+    def count(self, bodies, cancel=None, progress=None):
+        """How many pairs intersect."""
+        n_pairs = 0
+        for _, _, pairs, _ in self._pairs(bodies, cancel, progress):
+            n_pairs += len(pairs)
+        return n_pairs
+
+    def find(self, bodies, cancel=None, progress=None):
+        """The answer with places and faces.
+
+        Raises ValueError for positions that cannot be used, `impinge.Cancelled` and the other errors of impinge.
+        """
+        began = time.perf_counter()
+        answer = Answer(n_polygons={body.name: body.n_polygons for body in bodies})
+        answer.n_triangles = sum(len(body.triangles) for body in bodies)
+        if self.question.distance is not None:
+            self._near(answer, bodies, cancel, progress)
+        else:
+            for part, scene, pairs, is_local in self._pairs(bodies, cancel, progress):
+                answer.n_pairs += len(pairs)
+                self._faces(answer, part, pairs.rows)
+                if len(pairs) > MOST_PLACED:
+                    answer.is_placed = False
+                elif len(pairs):
+                    contacts = self._detector.contacts(scene, pairs, cancel=cancel, progress=progress)
+                    found, n_places = places.of_contacts(part, pairs, contacts, is_local)
+                    answer.places += found
+                    answer.n_places += n_places
+            answer.places.sort(key=lambda place: -place.n_pairs)
+        answer.seconds = time.perf_counter() - began
+        return answer
+
+    def _world(self, name, bodies, local):
+        world = self._worlds.setdefault(name, World())
+        return world.update(bodies, self.question.weld, local)
+
+    def _pairs(self, bodies, cancel, progress):
+        """Bodies, their scene, the pairs that count, and whether the scene is in the space of the object.
+
+        A body meets itself in its own space: a transform changes no intersection, but rounds. Different bodies meet in the world.
+        """
+        bodies = [body for body in bodies if len(body.triangles)]
+        asked = [([body], True) for body in bodies] if self.question.itself else []
+        if self.question.between and len(bodies) > 1:
+            asked.append((bodies, False))
+        for part, is_local in asked:
+            scene = self._world(part[0].name if is_local else None, part, is_local)
+            which = "self" if is_local else "between"
+            pairs = self._detector.detect(scene, which=which, cancel=cancel, progress=progress)
+            if any(body.selected is not None for body in part):
+                pairs = pairs.retain(_either_selected(part, pairs.rows))
+            yield part, scene, pairs, is_local
+
+    def _faces(self, answer, part, rows):
+        for ix, body in enumerate(part):
+            triangles = np.concatenate([rows[rows[:, side] == ix, side + 1] for side in (0, 2)])
+            polygons = body.polygons[np.unique(triangles)]
+            answer.n_made += int((polygons < 0).sum())
+            polygons = np.unique(polygons[polygons >= 0])
+            known = answer.faces.get(body.name)
+            answer.faces[body.name] = polygons if known is None else np.union1d(known, polygons)
+
+    def _near(self, answer, bodies, cancel, progress):
+        question = self.question
+        bodies = [body for body in bodies if len(body.triangles)]
+        if not bodies:
+            return
+        which = {(True, True): "all", (True, False): "self", (False, True): "between"}[question.itself, question.between]
+        scene = self._world(None, bodies, False)
+        exclude = [impinge.rings(question.rings)] if question.itself else []
+        options = {"which": which, "exclude": exclude, "closest_points": True, "cancel": cancel, "progress": progress}
+        near = self._detector.near(scene, question.distance, **options)
+        if not len(near):
+            return
+        found = places.Near(bodies, scene, near)
+        answer.n_pairs = found.n_pairs
+        if found.n_pairs:
+            answer.faces = found.faces()
+            answer.places, answer.n_places = found.places()
+
+
+def _is_selected(body, triangles):
+    return np.ones(len(triangles), bool) if body.selected is None else body.selected[triangles]
+
+
+def _either_selected(part, rows):
+    keep = np.zeros(len(rows), bool)
+    for ix, body in enumerate(part):
+        for side in (0, 2):
+            here = np.flatnonzero(rows[:, side] == ix)
+            keep[here] |= _is_selected(body, rows[here, side + 1])
+    return keep

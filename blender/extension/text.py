@@ -1,0 +1,38 @@
+"""Answers in words. Knows nothing of Blender."""
+
+from __future__ import annotations
+
+__all__ = ["of_answer", "of_frames", "of_place", "pairs"]
+
+
+def counted(n, noun):
+    return f"{n:,} {noun}" if n == 1 else f"{n:,} {noun}s"
+
+
+def pairs(n):
+    return counted(n, "pair")
+
+
+def of_answer(answer, question):
+    """`83 pairs of 5,804 triangles in 3 places`, as the program says it."""
+    near = "" if question.distance is None else " near"
+    if not answer.n_pairs:
+        return f"none of {counted(answer.n_triangles, 'triangle')}{' is near' if near else ' intersects'}"
+    where = f" in {counted(answer.n_places, 'place')}" if answer.is_placed else ", too many to find their places"
+    return f"{counted(answer.n_pairs, (near + ' pair').strip())} of {counted(answer.n_triangles, 'triangle')}{where}"
+
+
+def of_place(place, length):
+    """What a place is; `length` writes a distance in the units of the scene."""
+    a, b = place.names
+    of = a if a == b else f"{a} and {b}"
+    distance = "" if place.distance is None else f", {length(place.distance)} apart"
+    return f"{of}: {pairs(place.n_pairs)}{distance}"
+
+
+def of_frames(seen):
+    """What a scan has found."""
+    n = len(seen.counts)
+    if seen.first is None:
+        return f"none of {counted(n, 'frame')} intersects"
+    return f"{seen.n_hits:,} of {counted(n, 'frame')} intersect, the first is {seen.first}"

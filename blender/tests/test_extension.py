@@ -1,0 +1,706 @@
+"""The extension as it was packed and installed: known scenes, transforms, modifiers, modes, animations, and stopping."""
+
+import threading
+import time
+from types import SimpleNamespace
+
+import bmesh
+import bpy
+import impinge
+import numpy as np
+import pytest
+from bl_ext.user_default.impinge import bodies, job, meshes, places, question, state, text
+from bl_ext.user_default.impinge.operators import scan, waiting
+from conftest import CUBE, SIDES
+from mathutils import Matrix
+
+
+def check(which="ACTIVE", **options):
+    """Presses Check, and gives what was found."""
+    settings = bpy.context.scene.impinge
+    settings.which = which
+    for name, value in options.items():
+        setattr(settings, name, value)
+    assert bpy.ops.impinge.check() == {"FINISHED"}
+    assert state.running is None
+    return state.found.answer
+
+
+def scene_of(*objects):
+    """Pairs of triangles of two evaluated objects, by the module itself: what the extension must find."""
+    arrays = []
+    for object in objects:
+        mesh = object.evaluated_get(bpy.context.evaluated_depsgraph_get()).to_mesh()
+        vertices = np.array([object.matrix_world @ vertex.co for vertex in mesh.vertices], np.float64)
+        arrays += [vertices, np.array([triangle.vertices[:] for triangle in mesh.loop_triangles])]
+    return impinge.pairs(*arrays)
+
+
+def selected(object):
+    return [polygon.index for polygon in object.data.polygons if polygon.select]
+
+
+def test_the_wheel_comes_with_the_extension():
+    import os
+
+    assert os.path.realpath(impinge.__file__).startswith(os.path.realpath(os.environ["BLENDER_USER_RESOURCES"]))
+    assert hasattr(bpy.types, "IMPINGE_PT_check") and "impinge" in bpy.types.Scene.bl_rna.properties
+
+
+# A known scene.
+
+
+def test_two_cubes(cube):
+    a, b = cube("a"), cube("b", (1.5, 1.5, 1.5))
+    answer = check("BETWEEN")
+    assert answer.n_pairs == len(scene_of(a, b)) > 0
+    # Three faces of each meet at the corner.
+    assert answer.faces["a"].tolist() == [1, 3, 5] and answer.faces["b"].tolist() == [0, 2, 4]
+    [place] = answer.places
+    assert place.names == ("a", "b") and place.n_pairs == answer.n_pairs
+    assert np.all(np.abs(place.position - 0.75) < 0.3) and 0.4 < place.radius < 1.0
+    assert text.of_answer(answer, state.found.question) == f"{answer.n_pairs} pairs of 24 triangles in 1 place"
+
+
+def test_touching_counts_and_a_gap_does_not(cube):
+    cube("a")
+    b = cube("b", (2, 0, 0))
+    assert check("BETWEEN").n_pairs > 0
+    # The smallest gap that the numbers have.
+    b.location.x = float(np.nextafter(np.float32(2), np.float32(3)))
+    bpy.context.view_layer.update()
+    answer = check("BETWEEN")
+    assert answer.n_pairs == 0 and answer.places == [] and not any(map(len, answer.faces.values()))
+
+
+def test_which_pairs(cube, add):
+    # The second object cuts through itself, and not through the first.
+    cube("a")
+    crossed = [[0, 0, 0], [2, 0, 0], [0, 2, 0], [0.5, 0.5, -1], [0.6, 0.5, 1], [0.5, 0.6, 1]]
+    add("crossed", np.add(crossed, [5, 0, 0]), [(0, 1, 2), (3, 4, 5)])
+    assert check("ACTIVE").n_pairs == 1
+    assert check("BETWEEN").n_pairs == 0
+    answer = check("ALL")
+    assert answer.n_pairs == 1 and answer.faces["crossed"].tolist() == [0, 1] and len(answer.faces["a"]) == 0
+
+
+def test_welding(cube):
+    # The faces of a cube, each with corners of its own, as of an STL file.
+    made = cube("a")
+    mesh = bpy.data.meshes.new("apart")
+    mesh.from_pydata(np.concatenate([CUBE[list(side)] for side in SIDES]).tolist(), [], [range(4 * i, 4 * i + 4) for i in range(6)])
+    made.data = mesh
+    assert check(weld=True).n_pairs == 0
+    assert check(weld=False).n_pairs > 0
+
+
+# Transforms and units.
+
+
+def test_transforms(cube):
+    a = cube("a")
+    b = cube("b")
+    parent = bpy.data.objects.new("parent", None)
+    bpy.context.scene.collection.objects.link(parent)
+    b.parent = parent
+    parent.matrix_world = Matrix.Translation((10, 0, 0)) @ Matrix.Rotation(0.7, 4, "Z") @ Matrix.Diagonal((3, -1, 0.5, 1))
+    bpy.context.view_layer.update()
+    assert check("BETWEEN").n_pairs == 0
+    a.location = (8, 0, 0)
+    bpy.context.view_layer.update()
+    answer = check("BETWEEN")
+    assert answer.n_pairs == len(scene_of(a, b)) > 0
+    assert all(7 <= place.position[0] <= 13 for place in answer.places)
+
+
+def test_the_place_of_a_self_intersection_is_in_the_world(add):
+    vertices = [[0, 0, 0], [2, 0, 0], [0, 2, 0], [0.5, 0.5, -1], [0.6, 0.5, 1], [0.5, 0.6, 1]]
+    made = add("a", vertices, [(0, 1, 2), (3, 4, 5)], (100, 200, 300))
+    made.rotation_euler = (0, 0, np.pi / 2)
+    made.scale = (2, 2, 2)
+    bpy.context.view_layer.update()
+    [place] = check().places
+    # About (0.53, 0.53, 0), turned by a quarter, twice as large.
+    assert np.abs(place.position - [99, 201, 300]).max() < 0.2
+    # The segment from (0.55, 0.5) to (0.5, 0.55), twice as large.
+    assert place.radius == pytest.approx(0.0707, rel=0.01)
+
+
+def test_a_transform_cannot_change_a_self_intersection(grid):
+    # Faces that touch exactly, in a space that rounds.
+    made = grid("a", 4, lambda x, y: np.where(x == 0.5, 0.25, 0))
+    still = check().n_pairs
+    made.matrix_world = Matrix.Translation((0.1, 0.2, 1000.3)) @ Matrix.Rotation(0.3, 4, (1, 2, 3)) @ Matrix.Scale(0.7, 4)
+    bpy.context.view_layer.update()
+    assert check().n_pairs == still == 0
+
+
+def test_units(cube, scene):
+    cube("a")
+    cube("b", (2.01, 0, 0))
+    scene.unit_settings.system, scene.unit_settings.scale_length = "METRIC", 0.001
+    scene.impinge.which = "BETWEEN"
+    # The property is in Blender's units, whatever the scene shows.
+    scene.impinge.distance = 0.02
+    assert bpy.ops.impinge.clearance() == {"FINISHED"}
+    [place] = state.found.answer.places
+    assert place.distance == pytest.approx(0.01, rel=1e-4)
+    from bl_ext.user_default.impinge import panel
+
+    assert panel.length(bpy.context, 0.02) == "20 µm"
+    scene.unit_settings.system = "NONE"
+    assert panel.length(bpy.context, 0.02) == "0.02"
+
+
+# Clearance.
+
+
+def test_clearance(cube, scene):
+    cube("a")
+    cube("b", (2.5, 0, 0))
+    cube("c", (0, 20, 0))
+    scene.impinge.which, scene.impinge.distance = "BETWEEN", 0.49
+    bpy.ops.impinge.clearance()
+    assert state.found.answer.n_pairs == 0
+    assert text.of_answer(state.found.answer, state.found.question) == "none of 36 triangles is near"
+    scene.impinge.distance = 0.5
+    bpy.ops.impinge.clearance()
+    answer = state.found.answer
+    [place] = answer.places
+    assert place.names == ("a", "b") and place.distance == 0.5 and abs(place.position[0] - 1.25) < 1e-6
+    # All around the two sides has a near edge or vertex, but not the sides away.
+    assert 1 in answer.faces["a"] and 0 in answer.faces["b"] and 0 not in answer.faces["a"] and 1 not in answer.faces["b"]
+
+
+def test_clearance_within_one_object(grid, scene):
+    # A sheet folded over: the two halves are 0.05 apart.
+    made = grid("a", 20)
+    for vertex in made.data.vertices:
+        x = vertex.co.x
+        if x > 0.5:
+            vertex.co.x, vertex.co.z = 1 - x, 0.05
+    scene.impinge.which, scene.impinge.distance, scene.impinge.rings = "ACTIVE", 0.051, 3
+    bpy.ops.impinge.clearance()
+    answer = state.found.answer
+    assert answer.n_pairs > 100 and answer.places[0].distance == pytest.approx(0.05, rel=1e-5)
+    scene.impinge.distance = 0.049
+    bpy.ops.impinge.clearance()
+    assert state.found.answer.n_pairs == 0
+
+
+def test_components():
+    generator = np.random.default_rng(1)
+    for n, m in ((1, 0), (5, 3), (200, 150), (2000, 1900)):
+        a, b = generator.integers(0, n, (2, m))
+        label = list(range(n))
+        for _ in range(n):
+            before = list(label)
+            for i, j in zip(a, b):
+                label[i] = label[j] = min(label[i], label[j])
+            if label == before:
+                break
+        assert places.components(n, a, b).tolist() == label
+    chain = np.arange(9999)
+    assert not places.components(10000, chain, chain + 1).any()
+
+
+# Modifiers.
+
+
+def test_modifiers_count(grid, cube):
+    sheet = grid("sheet", 8)
+    cube("cube", (0.5, 0.5, 1.2), 0.2)
+    assert check("BETWEEN").n_pairs == 0
+    modifier = sheet.modifiers.new("up", "DISPLACE")
+    modifier.strength, modifier.direction = 1.1, "Z"
+    modifier.mid_level = 0
+    bpy.context.view_layer.update()
+    answer = check("BETWEEN")
+    assert answer.n_pairs > 0 and set(answer.faces["sheet"]) < set(range(64)) and len(answer.faces["sheet"])
+    modifier.show_viewport = False
+    bpy.context.view_layer.update()
+    assert check("BETWEEN").n_pairs == 0
+
+
+@pytest.mark.parametrize("mode", ["OBJECT", "EDIT"])
+def test_faces_that_modifiers_make_lead_back_to_their_own(grid, cube, mode):
+    cube("cube", (0.05, 0.05, 0), 0.02)
+    sheet = grid("sheet", 8)
+    sheet.modifiers.new("finer", "SUBSURF").levels = 2
+    array = sheet.modifiers.new("copies", "ARRAY")
+    array.relative_offset_displace = (3, 0, 0)
+    # The copy is hit in another face.
+    cube("other", (3.55, 0.55, 0), 0.02)
+    bpy.context.view_layer.objects.active = sheet
+    bpy.ops.object.mode_set(mode=mode)
+    answer = check("BETWEEN")
+    # Quads are 1/8 wide: (0.05, 0.05) is in the first one, (0.55, 0.55) in column 4, row 4.
+    assert answer.faces["sheet"].tolist() == [0, 4 * 8 + 4]
+    assert answer.n_made == 0
+    # Nothing is left in the user's mesh.
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert meshes.NUMBER not in sheet.data.attributes
+    assert not bmesh_layers(sheet)
+
+
+def bmesh_layers(object):
+    made = bmesh.new()
+    made.from_mesh(object.data)
+    names = [name for name in made.faces.layers.int.keys() if name == meshes.NUMBER]
+    made.free()
+    return names
+
+
+def test_faces_of_nothing_are_counted(cube):
+    a = cube("a")
+    cube("b", (1.5, 0, 0))
+    # Remeshing hands no numbers on.
+    modifier = a.modifiers.new("new", "REMESH")
+    modifier.mode, modifier.voxel_size = "VOXEL", 0.25
+    answer = check("BETWEEN")
+    assert answer.n_pairs > 0 and answer.n_made > 0 and len(answer.faces["a"]) == 0 and len(answer.faces["b"]) > 0
+
+
+def test_curves_take_part(cube):
+    cube("cube")
+    curve = bpy.data.curves.new("tube", "CURVE")
+    curve.dimensions, curve.bevel_depth = "3D", 0.1
+    line = curve.splines.new("POLY")
+    line.points.add(1)
+    line.points[0].co, line.points[1].co = (-3, 0.3, 0.2, 1), (3, 0.3, 0.2, 1)
+    tube = bpy.data.objects.new("tube", curve)
+    bpy.context.scene.collection.objects.link(tube)
+    tube.select_set(True)
+    answer = check("BETWEEN")
+    assert len(answer.places) == 2 and answer.faces["cube"].tolist() == [0, 1]
+
+
+# Edit Mode and selections.
+
+
+def test_edit_mode_counts_selected_faces(cube, scene):
+    cube("b", (1.5, 0, 0))
+    cube("c", (-1.5, 0, 0))
+    a = cube("a")
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.select_all(action="DESELECT")
+    everything = check("BETWEEN")
+    edited = bmesh.from_edit_mesh(a.data)
+    edited.faces.ensure_lookup_table()
+    edited.faces[1].select_set(True)
+    bmesh.update_edit_mesh(a.data)
+    some = check("BETWEEN")
+    assert 0 < some.n_pairs < everything.n_pairs
+    assert some.faces["a"].tolist() == [1] and len(some.faces["c"]) == 0 and len(some.faces["b"])
+    assert check("BETWEEN", selected_only=False).n_pairs == everything.n_pairs
+    # What was moved in Edit Mode is seen there.
+    scene.impinge.selected_only = True
+    for vertex in edited.verts:
+        vertex.co.z += 100
+    bmesh.update_edit_mesh(a.data)
+    assert check("BETWEEN").n_pairs == 0
+
+
+def test_edit_mode_counts_selected_faces_that_are_near(cube, scene):
+    cube("b", (2.1, 0, 0))
+    cube("c", (-2.1, 0, 0))
+    a = cube("a")
+    scene.impinge.which, scene.impinge.distance = "BETWEEN", 0.15
+    bpy.ops.impinge.clearance()
+    everything = state.found.answer
+    assert {frozenset(place.names) for place in everything.places} == {frozenset("ab"), frozenset("ac")}
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.select_all(action="DESELECT")
+    edited = bmesh.from_edit_mesh(a.data)
+    edited.faces.ensure_lookup_table()
+    edited.faces[1].select_set(True)
+    bmesh.update_edit_mesh(a.data)
+    bpy.ops.impinge.clearance()
+    [place] = state.found.answer.places
+    assert set(place.names) == {"a", "b"} and 0 < place.n_pairs == state.found.answer.n_pairs < everything.n_pairs / 2
+
+
+def test_select(cube):
+    a, b = cube("a"), cube("b", (1.5, 1.5, 1.5))
+    answer = check("BETWEEN")
+    bpy.ops.object.select_all(action="DESELECT")
+    assert bpy.ops.impinge.select() == {"FINISHED"}
+    assert bpy.context.mode == "EDIT_MESH" and {o.name for o in bpy.context.objects_in_mode} == {"a", "b"}
+    assert bpy.context.tool_settings.mesh_select_mode[:] == (False, False, True)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert selected(a) == answer.faces["a"].tolist() and selected(b) == answer.faces["b"].tolist()
+    # Another mesh than the one that was checked.
+    a.data = bpy.data.meshes.new("other")
+    with pytest.raises(RuntimeError, match="a has changed"):
+        bpy.ops.impinge.select()
+
+
+def test_select_one_place(cube):
+    a = cube("a")
+    cube("b", (1.5, 0, 0), 0.6)
+    cube("c", (-1.5, 0, 0), 0.6)
+    assert len(check("BETWEEN").places) == 2
+    with pytest.raises(RuntimeError, match="go to a place"):
+        bpy.ops.impinge.select(place_only=True)
+    seen = []
+    for _ in range(2):
+        bpy.ops.impinge.step(by=1)
+        bpy.ops.impinge.select(place_only=True)
+        bpy.ops.object.mode_set(mode="OBJECT")
+        seen += selected(a)
+    assert sorted(seen) == [0, 1]
+
+
+def test_step_takes_the_view_there(cube, scene):
+    cube("a", (10, 0, 0))
+    cube("b", (11.5, 0, 0), 0.6)
+    cube("c", (8.5, 0, 0), 0.6)
+    scene.frame_set(3)
+    check("BETWEEN")
+    scene.frame_set(1)
+    [view] = [area.spaces.active.region_3d for area in bpy.context.screen.areas if area.type == "VIEW_3D"]
+    view.view_perspective = "CAMERA"
+    at = []
+    for by in (1, 1, 1, -1, -1):
+        assert bpy.ops.impinge.step(by=by) == {"FINISHED"}
+        at.append(tuple(round(x, 3) for x in view.view_location))
+        place = state.found.answer.places[state.found.place]
+        assert np.allclose(view.view_location, place.position, atol=1e-5) and view.view_distance == pytest.approx(4 * place.radius)
+    assert at[0] == at[2] == at[4] != at[1] == at[3]
+    assert view.view_perspective == "PERSP" and scene.frame_current == 3
+
+
+class Layout:
+    """Takes what a panel draws; what Blender would refuse is refused."""
+
+    def __init__(self, texts):
+        self.texts = texts
+
+    def row(self, align=False):
+        return Layout(self.texts)
+
+    def prop(self, holder, name, expand=False):
+        assert name in holder.bl_rna.properties, name
+        self.texts.append(name)
+
+    def label(self, text):
+        self.texts.append(text)
+
+    def progress(self, factor, text):
+        assert 0 <= factor <= 1
+        self.texts.append(text)
+
+    def operator(self, name, text=None, icon="NONE"):
+        assert icon in bpy.types.UILayout.bl_rna.functions["operator"].parameters["icon"].enum_items
+        kind = getattr(bpy.types, name.replace(".", "_OT_").replace("impinge", "IMPINGE"))
+        self.texts.append(kind.bl_label if text is None else text)
+        return SimpleNamespace()
+
+
+def drawn(part):
+    texts = []
+    part.draw(SimpleNamespace(layout=Layout(texts)), bpy.context)
+    return texts
+
+
+def test_the_panel_says_what_was_found(cube, scene):
+    from bl_ext.user_default.impinge import panel
+
+    cube("a")
+    cube("b", (1.5, 1.5, 1.5))
+    assert drawn(panel.IMPINGE_PT_check) == ["which", "weld", "Check"]
+    n = check("BETWEEN").n_pairs
+    texts = drawn(panel.IMPINGE_PT_check)
+    assert f"{n} pairs of 24 triangles in 1 place" in texts and "Place 0 of 1" in texts
+    bpy.ops.impinge.step(by=1)
+    assert {f"a and b: {n} pairs", "Place 1 of 1", "Select Faces of This Place"} <= set(drawn(panel.IMPINGE_PT_check))
+    scene.frame_set(4)
+    assert "in frame 1" in drawn(panel.IMPINGE_PT_check)
+    assert drawn(panel.IMPINGE_PT_clearance) == ["distance", "Find Clearance"]
+    assert drawn(panel.IMPINGE_PT_scan) == ["step", "mark", "Scan Frames"]
+    bpy.ops.impinge.scan()
+    assert {"20 of 20 frames intersect", "first_frame"} <= set(drawn(panel.IMPINGE_PT_scan))
+    state.run(state.Running("Scan", SimpleNamespace(progress=(0, 0)), (3, 20)))
+    assert {"Scan 3 of 20", ""} <= set(drawn(panel.IMPINGE_PT_check))
+    bpy.ops.object.mode_set(mode="EDIT")
+    assert "selected_only" in drawn(panel.IMPINGE_PT_check)
+
+
+# Animations.
+
+
+def test_scan(cube, scene):
+    moving = cube("moving")
+    cube("still", (10, 0, 0))
+    # At frame f at x = f: it touches from 8 to 12.
+    for frame in (1, 20):
+        moving.location.x = frame
+        moving.keyframe_insert("location", frame=frame)
+    for curve in moving.animation_data.action.fcurves:
+        for point in curve.keyframe_points:
+            point.interpolation = "LINEAR"
+    scene.frame_set(5)
+    scene.timeline_markers.new("mine", frame=2)
+    scene.impinge.which = "BETWEEN"
+    assert bpy.ops.impinge.scan() == {"FINISHED"}
+    settings = scene.impinge
+    assert (settings.is_hit, settings.first_frame, settings.n_frames, settings.n_hits) == (True, 8, 20, 5)
+    assert scene.frame_current == 5
+    marks = {marker.frame: marker.name for marker in scene.timeline_markers}
+    assert list(sorted(marks)) == [2, 8, 13] and marks[13] == "impinge: free" and marks[8].endswith("pairs")
+    # Each frame as Check sees it.
+    for frame in (7, 8, 10, 12, 13):
+        scene.frame_set(frame)
+        assert (check("BETWEEN").n_pairs > 0) == (8 <= frame <= 12)
+    bpy.ops.impinge.first_frame()
+    assert scene.frame_current == 8
+    # The number can be keyed.
+    assert settings.keyframe_insert("first_frame", frame=1)
+
+    settings.step = 3
+    scene.frame_start = 9
+    bpy.ops.impinge.scan()
+    assert (settings.first_frame, settings.n_frames, settings.n_hits) == (9, 4, 2)
+    assert sorted(marker.frame for marker in scene.timeline_markers) == [2, 9, 15]
+    scene.use_preview_range, scene.frame_preview_start, scene.frame_preview_end = True, 14, 16
+    bpy.ops.impinge.scan()
+    assert not settings.is_hit and [marker.name for marker in scene.timeline_markers] == ["mine"]
+
+
+def test_scan_of_topology_that_changes(cube, grid, scene):
+    sheet = grid("sheet", 4)
+    cube("cube", (3.5, 0.5, 0), 0.4)
+    # One more copy per frame: the fourth one reaches the cube.
+    array = sheet.modifiers.new("copies", "ARRAY")
+    for frame in range(1, 7):
+        array.count = frame
+        array.keyframe_insert("count", frame=frame)
+    scene.frame_end = 6
+    scene.impinge.which = "BETWEEN"
+    bpy.ops.impinge.scan()
+    assert (scene.impinge.first_frame, scene.impinge.n_hits) == (4, 3)
+
+
+def test_runs():
+    from bl_ext.user_default.impinge.frames import Frames
+
+    seen = Frames(1, 8)
+    for frame, n_pairs in zip(seen.wanted, (0, 2, 5, 0, 0, 1, 3, 3)):
+        seen.add(frame, n_pairs)
+    assert seen.runs() == [(2, 3, 5, 4), (6, 8, 3, None)] and seen.first == 2 and seen.n_hits == 5
+
+
+# Stopping, errors, and an interface that does not freeze.
+
+
+def test_errors_name_the_object(cube):
+    a = cube("broken")
+    cube("b", (1.5, 0, 0))
+    a.data.vertices[3].co.y = float("nan")
+    bpy.context.scene.impinge.which = "BETWEEN"
+    with pytest.raises(RuntimeError, match=r"Check: broken: .*3.*(NaN|nan)"):
+        bpy.ops.impinge.check()
+    assert state.found is None and state.running is None
+    a.data.vertices[3].co.y = 1
+    assert check("BETWEEN").n_pairs > 0
+
+
+def test_nothing_to_ask(cube):
+    bpy.context.scene.impinge.which = "BETWEEN"
+    with pytest.raises(RuntimeError, match="0 objects"):
+        bpy.ops.impinge.check()
+    cube("a")
+    with pytest.raises(RuntimeError, match="1 object"):
+        bpy.ops.impinge.check()
+
+
+class Fake:
+    """What an operator that was invoked has of Blender: without a window there are no events."""
+
+    def __init__(self):
+        self.timers, self.handlers, self.reports, self.drawn = [], [], [], 0
+        area = SimpleNamespace(type="VIEW_3D", tag_redraw=self.draw)
+        window = SimpleNamespace(screen=SimpleNamespace(areas=[area]))
+        manager = SimpleNamespace(
+            windows=[window],
+            event_timer_add=lambda seconds, window: self.timers.append(seconds) or "timer",
+            event_timer_remove=lambda timer: self.timers.pop(),
+            modal_handler_add=self.handlers.append,
+        )
+        self.window_manager, self.window = manager, window
+
+    def draw(self):
+        self.drawn += 1
+
+    def __getattr__(self, name):
+        return getattr(bpy.context, name)
+
+
+def invoke(kind, context, monkeypatch):
+    """An operator that runs beside the interface; events go to its `modal`."""
+
+    class Run(kind):
+        def report(self, kinds, message):
+            context.reports.append((kinds, message))
+
+    operator = Run()
+    monkeypatch.setattr(waiting, "bpy", SimpleNamespace(app=SimpleNamespace(background=False)))
+    assert operator.invoke(context, None) == {"RUNNING_MODAL"} and context.handlers == [operator]
+    return operator
+
+
+def tick(operator, context, longest=None):
+    began = time.perf_counter()
+    result = operator.modal(context, SimpleNamespace(type="TIMER", value="NOTHING"))
+    if longest is not None:
+        longest.append(time.perf_counter() - began)
+    return result
+
+
+class Scan(waiting.Waiting):
+    """The scan without Blender's registration, whose instances only Blender can make."""
+
+    label = "Scan"
+    steps = scan.IMPINGE_OT_scan.steps
+
+
+def test_a_scan_can_be_stopped(cube, scene, monkeypatch):
+    moving = cube("moving")
+    cube("still", (5, 0, 0))
+    for frame in (1, 20):
+        moving.location.x = frame
+        moving.keyframe_insert("location", frame=frame)
+    scene.impinge.which = "BETWEEN"
+    context = Fake()
+    operator = invoke(Scan, context, monkeypatch)
+    # A second button says that the first is busy.
+    assert Scan.execute(SimpleNamespace(label="x", report=lambda *_: None, _is_busy=lambda: Scan._is_busy(operator)), context) == {"CANCELLED"}
+    while not (state.running.frames and state.running.frames[0] >= 7):
+        assert tick(operator, context) == {"PASS_THROUGH"}
+        time.sleep(0.002)
+    assert bpy.ops.impinge.cancel() == {"FINISHED"}
+    result = {"PASS_THROUGH"}
+    while result == {"PASS_THROUGH"}:
+        result = tick(operator, context)
+    assert result == {"CANCELLED"} and context.reports[-1] == ({"INFO"}, "Scan was cancelled")
+    assert state.running is None and context.timers == [] and context.drawn > 5
+    # What was seen by then is kept, and the frame is the one from before.
+    assert 7 <= scene.impinge.n_frames < 20 and scene.impinge.is_hit and scene.frame_current == 1
+
+
+class Check(waiting.Waiting):
+    label = "Check"
+    distance = lambda self, settings: None  # noqa: E731
+
+    def steps(self, context):
+        from bl_ext.user_default.impinge.operators.check import Asking
+
+        return Asking.steps(self, context)
+
+
+def big(add, n_triangles):
+    """A torus that winds so tightly that it cuts through itself, made of arrays: Python loops would take minutes."""
+    n = int((n_triangles / 2) ** 0.5)
+    u, v = np.meshgrid(np.arange(n) * 2 * np.pi / n, np.arange(n) * 2 * np.pi / n, indexing="ij")
+    at = np.stack([(1 + 1.2 * np.cos(v)) * np.cos(u), (1 + 1.2 * np.cos(v)) * np.sin(u), np.sin(v)], axis=-1)
+    index = np.arange(n * n).reshape(n, n)
+    quads = np.stack([index, np.roll(index, -1, 0), np.roll(index, (-1, -1), (0, 1)), np.roll(index, -1, 1)], axis=-1).reshape(-1, 4)
+    made = add("big", [], [])
+    mesh = made.data
+    mesh.vertices.add(n * n)
+    mesh.vertices.foreach_set("co", at.astype(np.float32).ravel())
+    mesh.loops.add(quads.size)
+    mesh.loops.foreach_set("vertex_index", quads.astype(np.int32).ravel())
+    mesh.polygons.add(len(quads))
+    mesh.polygons.foreach_set("loop_start", np.arange(0, quads.size, 4, dtype=np.int32))
+    mesh.update(calc_edges=True)
+    return made
+
+
+def test_a_million_triangles_do_not_freeze_the_interface(add, monkeypatch, capsys):
+    made = big(add, 1_000_000)
+    context, spans = Fake(), []
+    began = time.perf_counter()
+    operator = invoke(Check, context, monkeypatch)
+    result = {"PASS_THROUGH"}
+    while result == {"PASS_THROUGH"}:
+        result = tick(operator, context, spans)
+        time.sleep(0.005)
+    whole = time.perf_counter() - began
+    answer = state.found.answer
+    assert result == {"FINISHED"} and answer.n_triangles > 990_000 and answer.n_pairs > 1000 and len(answer.places) >= 1
+    with capsys.disabled():
+        print(f"\n1 M triangles: {whole:.2f} s, {len(spans)} looks, the longest {1000 * max(spans):.0f} ms, the next {1000 * sorted(spans)[-2]:.0f} ms")
+    # The first look reads the mesh, which only the main thread may do. None waits for the answer.
+    assert max(spans) < 1.5 and sorted(spans)[-2] < 0.25 and len(spans) > 5
+    # The selection of all of it.
+    assert bpy.ops.impinge.select() == {"FINISHED"}
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert len(selected(made)) == len(answer.faces["big"])
+
+
+def test_a_check_can_be_stopped(add, monkeypatch):
+    big(add, 1_000_000)
+    context = Fake()
+    operator = invoke(Check, context, monkeypatch)
+    tick(operator, context)
+    began = time.perf_counter()
+    assert operator.modal(context, SimpleNamespace(type="ESC", value="PRESS")) == {"RUNNING_MODAL"}
+    result = {"PASS_THROUGH"}
+    while result == {"PASS_THROUGH"}:
+        result = tick(operator, context)
+        time.sleep(0.005)
+    assert result == {"CANCELLED"} and state.found is None and state.running is None
+    assert time.perf_counter() - began < 2.0
+
+
+def test_jobs_fail_where_they_are_waited_for():
+    def steps(seen):
+        seen.append((yield job.Job(lambda cancel, progress: 1)))
+        try:
+            yield job.Job(lambda cancel, progress: 1 / 0)
+        except ZeroDivisionError as error:
+            seen.append(error)
+        yield job.Job(lambda cancel, progress: progress(3, 4))
+        return 5
+
+    seen = []
+    assert job.Driver(steps(seen)).run() == 5 and seen[0] == 1 and isinstance(seen[1], ZeroDivisionError)
+
+    gate = threading.Event()
+    driver = job.Driver(iter_of(job.Job(lambda cancel, progress: (progress(3, 4), gate.wait(10)))))
+    assert not driver.poll() and not driver.poll()
+    while driver.progress != (3, 4):
+        time.sleep(0.001)
+    driver.cancel()
+    # It is not over before the work is.
+    assert not driver.poll()
+    gate.set()
+    with pytest.raises(impinge.Cancelled):
+        driver.run()
+
+
+def iter_of(one):
+    yield one
+
+
+def test_equal_points_stay_equal_in_the_world():
+    generator = np.random.default_rng(2)
+    points = np.repeat(generator.random((97, 3)).astype(np.float32), 3, axis=0)
+    matrix = np.array(Matrix.Rotation(0.3, 4, (1, 2, 3)), np.float64)
+    assert len(np.unique(bodies.to_world(matrix, points), axis=0)) == 97
+
+
+def test_register_again():
+    import addon_utils
+
+    name = "bl_ext.user_default.impinge"
+    addon_utils.disable(name)
+    assert not hasattr(bpy.types, "IMPINGE_PT_check")
+    assert addon_utils.enable(name) is not None and hasattr(bpy.types, "IMPINGE_PT_check")
+
+
+def test_question_is_asked_with_the_panel_s_options(cube):
+    cube("a")
+    check("ACTIVE", weld=False)
+    assert state.found.question == question.Question(itself=True, between=False, rings=2, weld=False)
