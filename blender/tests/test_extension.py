@@ -436,9 +436,11 @@ def test_scan(cube, scene):
     for frame in (1, 20):
         moving.location.x = frame
         moving.keyframe_insert("location", frame=frame)
-    for curve in moving.animation_data.action.fcurves:
-        for point in curve.keyframe_points:
-            point.interpolation = "LINEAR"
+    action = moving.animation_data.action
+    # Blender 4.4 and later keep them in channels per slot.
+    curves = action.layers[0].strips[0].channelbags[0].fcurves if bpy.app.version >= (4, 4, 0) else action.fcurves
+    for point in (point for curve in curves for point in curve.keyframe_points):
+        point.interpolation = "LINEAR"
     scene.frame_set(5)
     scene.timeline_markers.new("mine", frame=2)
     scene.impinge.which = "BETWEEN"

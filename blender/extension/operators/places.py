@@ -116,8 +116,10 @@ def set_selection(mesh, polygons):
     selected = np.zeros(len(mesh.polygons), bool)
     selected[polygons] = True
     mesh.polygons.foreach_set("select", selected)
-    for rows in (mesh.vertices, mesh.edges):
-        rows.foreach_set("select", np.zeros(len(rows), bool))
+    for name in (".select_vert", ".select_edge"):
+        # Where there is no such attribute nothing is selected. `mesh.edges.foreach_set("select", ...)` crashes Blender 5.0.
+        if name in mesh.attributes:
+            mesh.attributes.remove(mesh.attributes[name])
     mesh.update_tag()
 
 
