@@ -225,9 +225,18 @@ impl Directions64 {
     ) -> V::Mask {
         let [x, y, z] = &self.edges;
         let own = [V::row(x, first), V::row(y, first), V::row(z, first)];
-        let edge = other.edges.each_ref().map(|row| splat::<V>(row[lane]));
-        let points = [0, 1, 2].map(|corner| self.points_at::<V>(corner, first));
-        let others = [0, 1, 2].map(|corner| other.point::<V>(corner, lane));
+        let [x, y, z] = &other.edges;
+        let edge = [splat(x[lane]), splat(y[lane]), splat(z[lane])];
+        let points = [
+            self.points_at::<V>(0, first),
+            self.points_at::<V>(1, first),
+            self.points_at::<V>(2, first),
+        ];
+        let others = [
+            other.point::<V>(0, lane),
+            other.point::<V>(1, lane),
+            other.point::<V>(2, lane),
+        ];
         are_apart_along(&cross(&edge, &own), &points, &others, reach)
     }
 
@@ -256,7 +265,8 @@ impl Directions64 {
                     .map(|row| row[firsts[side]]),
                 _ => continue,
             };
-            let spans = [0, 1].map(|k| groups[k].along::<V>(&axis));
+            // Not `map`: a closure that it does not inline would be compiled without the instruction set.
+            let spans = [self.along::<V>(&axis), other.along::<V>(&axis)];
             let whole = [0, 1].map(|k| spans[k].of(lanes[k]));
             for k in 0..2 {
                 lanes[k] &= spans[k].meeting::<V>(whole[1 - k], reach);
@@ -278,7 +288,7 @@ impl Directions64 {
     /// The spans of all elements along a direction of length 1 or 0.
     #[inline(always)]
     fn along<V: Lookup>(&self, axis: &[f32; 3]) -> Spans {
-        let axis = axis.map(|x| splat::<V>(x));
+        let axis = [splat::<V>(axis[0]), splat(axis[1]), splat(axis[2])];
         let mut spans = Spans([[0.0; TABLE]; 2]);
         for first in (0..TABLE).step_by(V::N) {
             let mut low = dot(&axis, &self.points_at::<V>(0, first));
