@@ -68,6 +68,16 @@ fn the_nearest_two_are_those_of_all_pairs() {
             let expected = one_by_one(&scene, &bodies, |_, _| true);
             let found = kept.nearest(&scene, &Query::between_all()).unwrap();
             assert_eq!(found, expected, "{seed} {round}");
+            // Asked again, and of single pairs: what is kept serves other questions.
+            assert_eq!(
+                kept.nearest(&scene, &Query::between_all()).unwrap(),
+                expected
+            );
+            for pair in bodies.windows(2) {
+                let of_two = kept.distance(&scene, pair[0], pair[1]).unwrap();
+                let fresh = cpu(Method::Auto).distance(&scene, pair[0], pair[1]);
+                assert_eq!(of_two, fresh.unwrap(), "{seed} {round} {pair:?}");
+            }
             match found.unwrap().distance {
                 0.0 => n_touching += 1,
                 _ => n_apart += 1,
@@ -87,6 +97,47 @@ fn the_nearest_two_are_those_of_all_pairs() {
         }
     }
     assert!(n_touching > 5 && n_apart > 5, "{n_touching} {n_apart}");
+}
+
+/// Only pairs of the lowest bodies are looked at, once a pair of these touches.
+#[test]
+fn in_a_crowd_the_lowest_pair_that_touches_is_found() {
+    let mut kept = cpu(Method::Auto);
+    let mut n_lower = 0;
+    for seed in 0..3 {
+        let (mut scene, bodies) = scatter(80, 6.0, seed);
+        for round in 0..4 {
+            let found = kept.nearest(&scene, &Query::between_all()).unwrap();
+            assert_eq!(
+                found,
+                one_by_one(&scene, &bodies, |_, _| true),
+                "{seed} {round}"
+            );
+            let found = found.unwrap();
+            assert_eq!(found.distance, 0.0);
+            assert!(kept.any(&scene, &Query::between_all()).unwrap());
+            let moved = |body: BodyId, by: [f64; 3]| -> Vec<[f64; 3]> {
+                let held = scene.body(body).unwrap();
+                let points = (0..held.n_vertices()).map(|ix| held.positions().point(ix));
+                points.map(|p| [0, 1, 2].map(|k| p[k] + by[k])).collect()
+            };
+            let first = |body: BodyId| scene.body(body).unwrap().positions().point(0);
+            let (a, b) = (found.a.body, found.b.body);
+            let between = bodies.iter().copied().find(|&body| a < body && body < b);
+            let (body, positions) = match between {
+                // A body between the two comes to the first: a lower pair, while both still touch.
+                Some(body) => {
+                    let (from, to) = (first(body), first(a));
+                    n_lower += 1;
+                    (body, moved(body, [0, 1, 2].map(|k| to[k] - from[k])))
+                }
+                // The first goes far away.
+                None => (a, moved(a, [100.0, 0.0, 0.0])),
+            };
+            scene.set_positions(body, positions).unwrap();
+        }
+    }
+    assert!(n_lower > 3, "{n_lower}");
 }
 
 /// Of pairs at one distance, the lowest.

@@ -88,12 +88,28 @@ impl TreeShape {
         starts[node] as usize..starts[node + 1] as usize
     }
 
+    /// The children of a node that is not a leaf.
+    pub fn children_of(&self, node: Node) -> impl Iterator<Item = Node> + use<> {
+        let children = self.children(node.level as usize, node.number as usize);
+        children.map(move |number| Node {
+            level: node.level - 1,
+            number: number as u32,
+        })
+    }
+
     pub fn bytes(&self) -> usize {
         self.child_starts
             .iter()
             .map(|starts| size_of_val(&starts[..]))
             .sum()
     }
+}
+
+/// A node of a tree; level 0 holds the leaves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Node {
+    pub level: u32,
+    pub number: u32,
 }
 
 /// An entry to be ordered: a centre, and the number of what it stands for.

@@ -38,14 +38,14 @@ const ROUNDING: f64 = 1e-12;
 /// The shortest way that takes the convex hulls of two sets of points apart; `None` if these are flat in sum, or empty.
 pub fn convex_overlap(a: &[[f64; 3]], b: &[[f64; 3]]) -> Option<ConvexOverlap> {
     let farthest = |points: &[Vector], way: Vector| {
-        let heights = points.iter().map(|&point| dot(point, way));
-        let mut best: Option<(usize, f64)> = None;
-        for (ix, height) in heights.enumerate() {
-            if best.is_none_or(|(_, most)| height > most) {
-                best = Some((ix, height));
+        let (mut best, mut most) = (None, f64::NEG_INFINITY);
+        for (ix, &point) in points.iter().enumerate() {
+            let height = dot(point, way);
+            if height > most {
+                (best, most) = (Some(ix), height);
             }
         }
-        best.map(|(ix, _)| ix)
+        best
     };
     let support = |way: Vector| -> Option<Vector> {
         let (i, j) = (farthest(a, way)?, farthest(b, scaled(way, -1.0))?);

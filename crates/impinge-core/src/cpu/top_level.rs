@@ -1,7 +1,7 @@
 //! Which bodies' boxes meet, for frames of more than two bodies.
 
 use crate::bvh::bounds::Bounds;
-use crate::bvh::tree::{Entry, TreeShape, order};
+use crate::bvh::tree::{Entry, Node, TreeShape, order};
 use crate::clusterings::Fit;
 use crate::query::tuning::Tuning;
 use crate::scene::index::PartIx;
@@ -41,6 +41,53 @@ impl TopLevel {
             }
             emit(a.min(b), a.max(b))
         })
+    }
+
+    /// Calls `emit` for each part whose box overlaps a box.
+    #[inline(always)]
+    pub fn meeting<S: Simd, E>(
+        &self,
+        simd: S,
+        query: &Bounds,
+        stack: &mut Vec<NodePair>,
+        mut emit: impl FnMut(PartIx) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let tree = Tree {
+            shape: &self.shape,
+            bounds: &self.bounds,
+        };
+        traversal::meeting(simd, tree, query, stack, |leaf| {
+            emit(self.order[leaf as usize])
+        })
+    }
+
+    /// The root, if there are any parts.
+    pub fn root_node(&self) -> Option<Node> {
+        let level = self.bounds.levels.len().checked_sub(1)?;
+        Some(Node {
+            level: level as u32,
+            number: 0,
+        })
+    }
+
+    /// The box of all parts.
+    pub fn root(&self) -> Bounds {
+        self.bounds.root()
+    }
+
+    /// The box of a node.
+    pub fn bounds(&self, node: Node) -> Bounds {
+        self.bounds.levels[node.level as usize].at(node.number as usize)
+    }
+
+    /// The children of a node that is not a leaf.
+    pub fn children(&self, node: Node) -> impl Iterator<Item = Node> + use<> {
+        self.shape.children_of(node)
+    }
+
+    /// The part of a leaf.
+    pub fn part(&self, leaf: Node) -> PartIx {
+        self.order[leaf.number as usize]
     }
 
     pub fn bytes(&self) -> usize {

@@ -108,6 +108,40 @@ pub(crate) fn between<S: Simd, E>(
     Ok(())
 }
 
+/// Calls `emit(leaf)` for every leaf of a tree whose box overlaps a box.
+#[inline(always)]
+pub(crate) fn meeting<S: Simd, E>(
+    simd: S,
+    tree: Tree<'_>,
+    query: &Bounds,
+    stack: &mut Vec<NodePair>,
+    mut emit: impl FnMut(u32) -> Result<(), E>,
+) -> Result<(), E> {
+    let Some(top) = tree.top() else {
+        return Ok(());
+    };
+    let alone = |level_a: u32, a: u32| NodePair {
+        level_a,
+        a,
+        level_b: 0,
+        b: 0,
+    };
+    stack.clear();
+    if tree.at(top, 0).overlaps(query) {
+        stack.push(alone(top, 0));
+    }
+    while let Some(NodePair { level_a, a, .. }) = stack.pop() {
+        if level_a == 0 {
+            emit(a)?;
+            continue;
+        }
+        for child in tree.children_meeting(simd, level_a, a, query) {
+            stack.push(alone(level_a - 1, child));
+        }
+    }
+    Ok(())
+}
+
 /// Calls `emit(leaf, other)`, `leaf <= other`, for every leaf with itself and every pair of different
 /// leaves of one tree whose boxes overlap, except below pairs of nodes whose primitives all name a common hub.
 #[inline(always)]

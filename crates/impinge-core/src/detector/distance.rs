@@ -104,7 +104,6 @@ impl Detector {
             return refused("exclude", given);
         }
         let plan = Plan::intersections(scene, query, Goal::Any, self.settings.limits())?;
-        plan.check(scene)?;
         match plan.parts.iter().any(|part| part.within) {
             true => refused("query", "self-collision"),
             false => Ok(plan),

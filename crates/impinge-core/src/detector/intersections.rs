@@ -82,7 +82,6 @@ impl Detector {
             return Ok(None);
         }
         control.step(0, 1)?;
-        plan.check(scene)?;
         let workers = self.runner.workers();
         let any = self.distances.any(scene, plan, Work { workers, control })?;
         if any.is_some() {

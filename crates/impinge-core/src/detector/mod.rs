@@ -157,7 +157,7 @@ impl Detector {
             steps: steps::StepMemory::new(&settings, clusterings.clone()),
             solver: solver::SolverMemory::default(),
             touching: distance::Touching::default(),
-            distances: Distances::new(clusterings.clone()),
+            distances: Distances::new(&settings, clusterings.clone()),
             topologies: Topologies::default(),
             probes: Probes::new(Isa::detect(settings.instruction_set)),
             #[cfg(any(feature = "gpu", test))]

@@ -511,14 +511,16 @@ impl Plan {
     /// Pairs of parts, lower first and sorted, that do not meet whatever their filters say.
     #[cfg(feature = "gpu")]
     pub fn excluded_pairs(&self) -> impl Iterator<Item = (PartIx, PartIx)> + '_ {
-        let find = |id: BodyId| {
-            let found = self.parts.binary_search_by_key(&id, |part| part.id);
-            found.ok().map(PartIx::from_usize)
-        };
         self.excluded
             .iter()
             .filter(|(a, b)| a != b)
-            .filter_map(move |&(a, b)| Some((find(a)?, find(b)?)))
+            .filter_map(move |&(a, b)| Some((self.part_of(a)?, self.part_of(b)?)))
+    }
+
+    /// The part of a body, where each body has at most one.
+    pub(crate) fn part_of(&self, body: BodyId) -> Option<PartIx> {
+        let found = self.parts.binary_search_by_key(&body, |part| part.id);
+        found.ok().map(PartIx::from_usize)
     }
 
     /// The elements of a part, and their numbers.

@@ -26,6 +26,7 @@ use crate::bvh::bounds::round_up;
 use crate::clusterings::{BodyPart, Clusterings};
 use crate::plan::Plan;
 use crate::query::progress::Control;
+use crate::query::settings::Settings;
 use crate::scene::elements::{BodyKind, Part};
 use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
@@ -39,21 +40,45 @@ use impinge_exact::Point;
 use impinge_exact::internal::filter::Directions64;
 use impinge_exact::internal::filter::number::Portable32;
 
-/// The trees of bodies and the pairs found last, from call to call.
-#[derive(Debug)]
+/// Answers about distances, and what is kept from call to call.
 pub(crate) struct Distances {
+    of_two: OfTwo,
+    /// A tree over the bodies of the last question about many.
+    many: Bodies,
+    /// The bodies that were nearest to each other in it.
+    nearest: Option<[BodyId; 2]>,
+    /// Two bodies that met when it was last asked whether any do.
+    met: Option<[BodyId; 2]>,
+    stack: Vec<[Node; 2]>,
+}
+
+/// The trees of bodies, and what was found about pairs of them.
+struct OfTwo {
     clusterings: Clusterings,
     /// What was clustered.
     stats: Stats,
     /// By the number of the body and the part of it.
     trees: HashMap<(usize, Part), Tree>,
-    /// The pair found last, by the numbers of the bodies.
-    last: HashMap<[usize; 2], [ElementIx; 2]>,
-    /// A tree over the bodies of the last question about many.
-    many: Bodies,
-    /// The bodies that were nearest to each other in it.
-    nearest: Option<[BodyId; 2]>,
-    stack: Vec<[Node; 2]>,
+    /// By the numbers of the bodies.
+    known: HashMap<[usize; 2], Known>,
+}
+
+/// What was found about two bodies when they were asked about last.
+#[derive(Clone, Copy)]
+struct Known {
+    /// The stamps of their positions.
+    stamps: [u64; 2],
+    answer: KnownDistance,
+    /// The elements that were nearest last.
+    likely: Option<[ElementIx; 2]>,
+}
+
+#[derive(Clone, Copy)]
+enum KnownDistance {
+    /// The square of the distance, and who has it.
+    Is(f64, Nearest),
+    /// The square of the distance is above this.
+    Above(f64),
 }
 
 /// The nearest pair of elements of two bodies.
@@ -103,23 +128,24 @@ impl Nearest {
 
 impl Distances {
     /// Nothing is known yet but the clusterings that other questions share.
-    pub fn new(clusterings: Clusterings) -> Self {
+    pub fn new(settings: &Settings, clusterings: Clusterings) -> Self {
         Distances {
-            clusterings,
-            stats: Stats::default(),
-            trees: HashMap::new(),
-            last: HashMap::new(),
-            many: Bodies::default(),
+            of_two: OfTwo {
+                clusterings,
+                stats: Stats::default(),
+                trees: HashMap::new(),
+                known: HashMap::new(),
+            },
+            many: Bodies::new(settings),
             nearest: None,
+            met: None,
             stack: Vec::new(),
         }
     }
 
-    /// Forgets removed bodies: to be called first in each question.
+    /// Forgets removed bodies: to be called first in each question about trees.
     pub fn begin(&mut self, scene: &Scene) {
-        self.trees.retain(|&(slot, _), _| scene.holds(slot));
-        drop(self.clusterings.open(scene));
-        self.stats.clear();
+        self.of_two.begin(scene);
     }
 
     /// The smallest distance of two bodies and the pair of primitives that has it; `None` if one body has
@@ -139,14 +165,15 @@ impl Distances {
         if a == b {
             return Err(Error::SameBody { body: a });
         }
-        self.begin(scene);
+        let of_two = &mut self.of_two;
+        of_two.begin(scene);
         for id in [a, b] {
             work.step()?;
-            self.know(scene, id, Part::Given, work)?;
+            of_two.know(scene, id, Part::Given, work)?;
         }
         let bodies = [scene.body(a)?, scene.body(b)?];
         let boxed = [a, b].into_iter().map(|id| {
-            let tree = &self.trees[&(id.index(), Part::Given)];
+            let tree = &of_two.trees[&(id.index(), Part::Given)];
             tree.root()
                 .map_or(0.0, |root| tree.bounds(root).magnitude())
         });
@@ -156,60 +183,8 @@ impl Distances {
         };
         let scale = Scale::of(boxed.fold(0.0, f64::max), exact);
         let most = (scale, f64::INFINITY);
-        let found = self.search_or_ask(scene, [a, b], most, work.control, touching)?;
+        let found = of_two.search_or_ask(scene, [a, b], most, work.control, touching)?;
         Ok(found.map(|(_, nearest)| nearest))
-    }
-
-    /// As `search`, but where very many boxes overlap `touching` is asked first for the lowest pair that touches.
-    fn search_or_ask(
-        &mut self,
-        scene: &Scene,
-        ids: [BodyId; 2],
-        most: (Scale, f64),
-        control: &Control,
-        touching: impl FnOnce() -> Result<Option<[u32; 2]>, Error>,
-    ) -> Result<Found, Error> {
-        if let Some(found) = self.search(scene, ids, most, MOST_OVERLAPPING, control)? {
-            return Ok(found);
-        }
-        let Some(primitives) = touching()? else {
-            let found = self.search(scene, ids, most, u64::MAX, control)?;
-            return Ok(found.flatten());
-        };
-        let bodies = [scene.body(ids[0])?, scene.body(ids[1])?];
-        let elements = primitives.map(ElementIx::new);
-        self.last.insert(ids.map(BodyId::index), elements);
-        let points = [where_they_touch(bodies, elements); 2];
-        let nearest = Nearest::new(0.0, ids, elements, points);
-        Ok(Some((0.0, nearest)))
-    }
-
-    /// The nearest elements of two bodies that are known, and the square of their distance in a scale, if that is at most `most`. `None` if
-    /// more pairs of clusters would have to be compared whose boxes overlap than `most_overlapping`.
-    fn search(
-        &mut self,
-        scene: &Scene,
-        ids: [BodyId; 2],
-        (scale, most): (Scale, f64),
-        most_overlapping: u64,
-        control: &Control,
-    ) -> Result<Option<Found>, Error> {
-        let [a, b] = ids;
-        let search = DistanceSearch {
-            control,
-            ids,
-            bodies: [scene.body(a)?, scene.body(b)?],
-            trees: ids.map(|id| &self.trees[&(id.index(), Part::Given)]),
-            scale,
-        };
-        let numbers = ids.map(BodyId::index);
-        let likely = self.last.get(&numbers).copied();
-        let found = search.nearest(likely, most, most_overlapping)?;
-        if let Some(Some((_, nearest))) = &found {
-            let pair = nearest.elements();
-            self.last.insert(numbers, pair);
-        }
-        Ok(found)
     }
 
     /// The two nearest of the bodies of a frame that may meet, and their nearest elements. Of several pairs at the same computed
@@ -224,13 +199,11 @@ impl Distances {
         work: Work<'_>,
         mut touching: impl FnMut([BodyId; 2]) -> Result<Option<[u32; 2]>, Error>,
     ) -> Result<Option<Nearest>, Error> {
-        self.begin(scene);
-        let mut many = std::mem::take(&mut self.many);
-        many.update(scene, plan);
+        let Distances { of_two, many, .. } = self;
+        of_two.begin(scene);
+        many.update(scene, plan)?;
         // The bodies that were nearest last are a good bound.
-        let likely = self
-            .nearest
-            .map(|ids| ids.map(|id| plan.parts.binary_search_by_key(&id, |part| part.id)));
+        let likely = self.nearest.map(|ids| ids.map(|id| plan.part_of(id)));
         let scale = Scale::of(many.magnitude(), || {
             let bodies = plan
                 .parts
@@ -260,10 +233,10 @@ impl Distances {
             n_asked += 1;
             work.control.step(n_asked, n_asked + 1)?;
             for id in ids {
-                self.know(scene, id, Part::Given, work)?;
+                of_two.know(scene, id, Part::Given, work)?;
             }
             let ask = || touching(ids);
-            let found = self.search_or_ask(scene, ids, (scale, most), work.control, ask)?;
+            let found = of_two.search_or_ask(scene, ids, (scale, most), work.control, ask)?;
             if let Some(found) = found
                 && best.is_none_or(|(squared, best)| {
                     found.0 < squared || (found.0 == squared && ids < best.bodies())
@@ -274,22 +247,23 @@ impl Distances {
             Ok::<(), Error>(())
         };
         let found: Result<(), Error> = (|| {
-            if let Some([Ok(a), Ok(b)]) = likely {
-                ask(&mut best, &many, [a, b].map(PartIx::from_usize))?;
+            if let Some([Some(a), Some(b)]) = likely {
+                ask(&mut best, many, [a, b])?;
             }
             let mut overlapping = Vec::new();
             // If two touch, only lower ones that touch are left to be found.
             let least = touching_ones(best);
-            many.overlapping(|pair| {
+            let last = least.and_then(|[a, _]| plan.part_of(a));
+            many.overlapping(last, &mut |pair| {
                 let is_lower = |least: [BodyId; 2]| pair.map(|part| plan.part(part).id) < least;
                 if least.is_none_or(is_lower) {
                     overlapping.push(pair);
                 }
-                Ok::<bool, Error>(false)
+                Ok(false)
             })?;
             overlapping.sort_unstable();
             for pair in overlapping {
-                ask(&mut best, &many, pair)?;
+                ask(&mut best, many, pair)?;
             }
             // Bodies whose boxes are apart do not touch.
             if touching_ones(best).is_some() {
@@ -302,11 +276,10 @@ impl Distances {
                 Some((squared, _)) => limit(scale.length_back(squared.sqrt()).powi(2), error),
             };
             while let Some(pair) = apart.next(most(best)) {
-                ask(&mut best, &many, pair)?;
+                ask(&mut best, many, pair)?;
             }
             Ok(())
         })();
-        self.many = many;
         found?;
         let nearest = best.map(|(_, nearest)| nearest);
         self.nearest = nearest.map(|nearest| nearest.bodies());
@@ -323,12 +296,20 @@ impl Distances {
         plan: &Plan,
         work: Work<'_>,
     ) -> Result<Option<bool>, Error> {
-        self.begin(scene);
-        let mut many = std::mem::take(&mut self.many);
-        many.update(scene, plan);
+        let Distances {
+            of_two,
+            many,
+            met,
+            stack,
+            ..
+        } = self;
+        of_two.begin(scene);
+        many.update(scene, plan)?;
         let mut allowance = Allowance(ALLOWANCE);
         let mut any = Some(false);
-        let found = many.overlapping(|pair| {
+        // Bodies that met last may still do so.
+        let likely = met.map(|ids| ids.map(|id| plan.part_of(id)));
+        let mut ask = |pair: [PartIx; 2]| {
             let [a, b] = pair;
             if plan.test(a, b).is_none() {
                 return Ok(false);
@@ -336,23 +317,33 @@ impl Distances {
             work.step()?;
             let ids = pair.map(|part| plan.part(part).id);
             for id in ids {
-                self.know(scene, id, Part::Given, work)?;
+                of_two.know(scene, id, Part::Given, work)?;
             }
             let bodies = pair.map(|part| plan.body(scene, part));
-            let trees = ids.map(|id| &self.trees[&(id.index(), Part::Given)]);
-            any = meet(bodies, trees, &mut allowance, &mut self.stack);
+            let trees = ids.map(|id| &of_two.trees[&(id.index(), Part::Given)]);
+            any = meet(bodies, trees, &mut allowance, stack);
+            if any == Some(true) {
+                *met = Some(ids);
+            }
             Ok(any != Some(false))
-        });
-        self.many = many;
-        found.map(|()| any)
+        };
+        let is_over = match likely {
+            Some([Some(a), Some(b)]) => ask([a, b])?,
+            _ => false,
+        };
+        if !is_over {
+            many.overlapping(None, &mut ask)?;
+        }
+        Ok(any)
     }
 
     /// Says what the last question clustered, and the bytes of the trees.
     pub fn report(&self, stats: &mut Stats) {
+        let of_two = &self.of_two;
         (stats.n_clustered, stats.n_reclustered) =
-            (self.stats.n_clustered, self.stats.n_reclustered);
-        let beside: usize = self.trees.values().map(Tree::bytes).sum();
-        stats.bytes_held = (self.clusterings.bytes() + beside) as u64;
+            (of_two.stats.n_clustered, of_two.stats.n_reclustered);
+        let beside: usize = of_two.trees.values().map(Tree::bytes).sum();
+        stats.bytes_held = (of_two.clusterings.bytes() + beside) as u64;
     }
 
     /// The tree of a part of a body in its current pose.
@@ -366,8 +357,89 @@ impl Distances {
         work: Work<'_>,
     ) -> Result<&Tree, Error> {
         let part = scene.body(id)?.canonical(part);
-        self.know(scene, id, part, work)?;
-        Ok(&self.trees[&(id.index(), part)])
+        let of_two = &mut self.of_two;
+        of_two.know(scene, id, part, work)?;
+        Ok(&of_two.trees[&(id.index(), part)])
+    }
+}
+
+impl OfTwo {
+    /// Forgets removed bodies: to be called first in each question.
+    fn begin(&mut self, scene: &Scene) {
+        if self.trees.len() > scene.n_bodies() {
+            self.trees.retain(|&(slot, _), _| scene.holds(slot));
+        }
+        if self.known.len() > MOST_KNOWN * scene.n_bodies().max(MOST_KNOWN) {
+            self.known.clear();
+        }
+        drop(self.clusterings.open(scene));
+        self.stats.clear();
+    }
+
+    /// As `search`, but where very many boxes overlap `touching` is asked first for the lowest pair that touches.
+    fn search_or_ask(
+        &mut self,
+        scene: &Scene,
+        ids: [BodyId; 2],
+        most: (Scale, f64),
+        control: &Control,
+        touching: impl FnOnce() -> Result<Option<[u32; 2]>, Error>,
+    ) -> Result<Found, Error> {
+        if let Some(found) = self.search(scene, ids, most, MOST_OVERLAPPING, control)? {
+            return Ok(found);
+        }
+        let Some(primitives) = touching()? else {
+            let found = self.search(scene, ids, most, u64::MAX, control)?;
+            return Ok(found.flatten());
+        };
+        let bodies = [scene.body(ids[0])?, scene.body(ids[1])?];
+        let elements = primitives.map(ElementIx::new);
+        let points = [where_they_touch(bodies, elements); 2];
+        let found = Some((0.0, Nearest::new(0.0, ids, elements, points)));
+        note(&mut self.known, bodies, f64::INFINITY, (ids, found));
+        Ok(found)
+    }
+
+    /// The nearest elements of two bodies that are known, and the square of their distance in a scale, if that is at most `most`. `None` if
+    /// more pairs of clusters would have to be compared whose boxes overlap than `most_overlapping`.
+    fn search(
+        &mut self,
+        scene: &Scene,
+        ids: [BodyId; 2],
+        (scale, most): (Scale, f64),
+        most_overlapping: u64,
+        control: &Control,
+    ) -> Result<Option<Found>, Error> {
+        let [a, b] = ids;
+        let search = DistanceSearch {
+            control,
+            ids,
+            bodies: [scene.body(a)?, scene.body(b)?],
+            trees: ids.map(|id| &self.trees[&(id.index(), Part::Given)]),
+            scale,
+        };
+        let known = self.known.get(&ids.map(BodyId::index));
+        if let Some(known) = known
+            && scale.is_one()
+            && known.stamps == search.bodies.map(Body::positions_stamp)
+        {
+            match known.answer {
+                KnownDistance::Is(squared, nearest) => {
+                    return Ok(Some((squared <= most).then_some((squared, nearest))));
+                }
+                KnownDistance::Above(squared) if most <= squared => return Ok(Some(None)),
+                KnownDistance::Above(_) => {}
+            }
+        }
+        let likely = known.and_then(|known| known.likely);
+        let bodies = search.bodies;
+        let found = search.nearest(likely, most, most_overlapping)?;
+        if let Some(found) = found
+            && scale.is_one()
+        {
+            note(&mut self.known, bodies, most, (ids, found));
+        }
+        Ok(found)
     }
 
     fn know(&mut self, scene: &Scene, id: BodyId, part: Part, work: Work<'_>) -> Result<(), Error> {
@@ -385,7 +457,7 @@ impl Distances {
             .remove(&(slot, part))
             .filter(|tree| tree.fits(body));
         if known.is_none() && part == Part::Given {
-            self.last.retain(|numbers, _| !numbers.contains(&slot));
+            self.known.retain(|numbers, _| !numbers.contains(&slot));
         }
         let own = known.as_ref().map(|tree| &tree.clustering);
         let clustering = self.clusterings.of(body_part, own, work, stats)?;
@@ -403,6 +475,28 @@ impl Distances {
         self.trees.insert((slot, part), tree);
         Ok(())
     }
+}
+
+/// Keeps what was found about two bodies, of all that is at most `most`.
+fn note(
+    known: &mut HashMap<[usize; 2], Known>,
+    bodies: [&Body; 2],
+    most: f64,
+    (ids, found): ([BodyId; 2], Found),
+) {
+    let known = known.entry(ids.map(BodyId::index)).or_insert(Known {
+        stamps: [0; 2],
+        answer: KnownDistance::Above(0.0),
+        likely: None,
+    });
+    known.stamps = bodies.map(Body::positions_stamp);
+    known.answer = match found {
+        Some((squared, nearest)) => {
+            known.likely = Some(nearest.elements());
+            KnownDistance::Is(squared, nearest)
+        }
+        None => KnownDistance::Above(most),
+    };
 }
 
 /// Two nodes in the queue: nearest first, equally near ones by number.
@@ -468,6 +562,8 @@ struct FoundDistance {
 /// The square of the smallest distance, and who has it; `None` if nothing is as near as was asked for.
 type Found = Option<(f64, Nearest)>;
 
+/// Of how many pairs of bodies the answers are kept, for each body.
+const MOST_KNOWN: usize = 64;
 /// With more pairs of clusters whose boxes overlap, it pays to ask first whether the bodies touch.
 const MOST_OVERLAPPING: u64 = 8;
 /// From this many pairs of triangles of two clusters on, their normals are tested first.

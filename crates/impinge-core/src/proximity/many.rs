@@ -13,48 +13,64 @@ use std::collections::BinaryHeap;
 
 use crate::boxes::{self, Extent};
 use crate::bvh::bounds::Bounds;
-use crate::bvh::tree::{Entry, TreeShape, order};
+use crate::cpu::top_level::TopLevel;
+use crate::cpu::traversal::NodePair;
 use crate::plan::Plan;
+use crate::query::settings::Settings;
+use crate::query::tuning::Tuning;
+use crate::scene::error::Error;
 use crate::scene::index::PartIx;
 use crate::scene::{Body, Scene};
 use crate::search::narrow::intersect;
+use crate::simd::{Isa, Simd, with_isa};
 
 use super::axes::Axes;
 use super::features::dot;
 use super::tree::{Node, Tree, box_of, corners};
 
 /// A tree over the boxes of the bodies of a frame.
-#[derive(Debug, Default)]
 pub(super) struct Bodies {
+    isa: Isa,
+    tuning: Tuning,
     /// The stamp of the scene.
     scene: u64,
     /// The slot and the stamp of the positions of each part's body.
     stamps: Vec<(u32, u64)>,
     boxes: Vec<Bounds>,
-    shape: TreeShape,
-    /// The part at each leaf.
-    order: Vec<PartIx>,
-    /// The boxes of each level's nodes, from the leaves up.
-    levels: Vec<Vec<Bounds>>,
-    /// The summed surface of the nodes above the leaves when the order was made.
-    surface: f64,
-    stack: Vec<[Node; 2]>,
+    tree: TopLevel,
+    stack: Vec<NodePair>,
 }
 
-/// An order whose nodes have grown by this factor is made again.
-const STALE: f64 = 1.5;
+/// If pairs of fewer than one part in so many are wanted, the tree is asked about each of these.
+const FEW: usize = 16;
+
+/// Takes a pair of parts, the lower one first; whether no more are wanted.
+type Each<'a> = dyn FnMut([PartIx; 2]) -> Result<bool, Error> + 'a;
 
 impl Bodies {
+    pub fn new(settings: &Settings) -> Self {
+        Bodies {
+            isa: Isa::detect(settings.instruction_set),
+            tuning: settings.tuning,
+            scene: 0,
+            stamps: Vec::new(),
+            boxes: Vec::new(),
+            tree: TopLevel::default(),
+            stack: Vec::new(),
+        }
+    }
+
     /// Brings boxes and tree up to the scene; the boxes of bodies that have not moved are kept.
-    pub fn update(&mut self, scene: &Scene, plan: &Plan) {
+    ///
+    /// # Errors
+    /// Bad positions that were written in place.
+    pub fn update(&mut self, scene: &Scene, plan: &Plan) -> Result<(), Error> {
         let n = plan.parts.len();
         let slots = plan.parts.iter().map(|part| part.id.slot());
         if self.scene == scene.stamp() && slots.eq(self.stamps.iter().map(|&(slot, _)| slot)) {
-            return;
+            return Ok(());
         }
-        self.scene = scene.stamp();
-        let mut is_new = self.stamps.len() != n;
-        let mut has_moved = is_new;
+        self.scene = 0;
         self.stamps.resize(n, (u32::MAX, 0));
         self.boxes.resize(n, Bounds::EMPTY);
         for (ix, part) in plan.numbered_parts() {
@@ -62,85 +78,15 @@ impl Bodies {
             let stamp = (part.id.slot(), body.positions_stamp());
             let known = &mut self.stamps[ix.index()];
             if *known != stamp {
-                is_new |= known.0 != stamp.0;
-                has_moved = true;
+                plan.check_one(scene, ix)?;
                 *known = stamp;
                 self.boxes[ix.index()] = boxes::of_run(body.positions(), 0..body.n_vertices());
             }
         }
-        if is_new {
-            self.shape = TreeShape::new(n);
-            self.order.clear();
-            self.order.extend(PartIx::up_to(n));
-            let n_levels = self.shape.n_levels();
-            self.levels.resize_with(n_levels, Vec::new);
-            for (level, boxes) in self.levels.iter_mut().enumerate() {
-                boxes.resize(self.shape.n_nodes(level), Bounds::EMPTY);
-            }
-        }
-        if has_moved {
-            self.refit();
-        }
-        if is_new || self.surface_now() > STALE * self.surface {
-            let entry = |part: PartIx| Entry::new(self.boxes[part.index()].center(), part.raw());
-            let mut entries: Vec<Entry> = PartIx::up_to(n).map(entry).collect();
-            order(&self.shape, 1, None, &mut entries);
-            for (part, entry) in self.order.iter_mut().zip(&entries) {
-                *part = PartIx::new(entry.number);
-            }
-            self.refit();
-            self.surface = self.surface_now();
-        }
-    }
-
-    fn refit(&mut self) {
-        let Some(leaves) = self.levels.first_mut() else {
-            return;
-        };
-        for (leaf, part) in leaves.iter_mut().zip(&self.order) {
-            *leaf = self.boxes[part.index()];
-        }
-        for level in 1..self.levels.len() {
-            let (below, above) = self.levels.split_at_mut(level);
-            for (node, bounds) in above[0].iter_mut().enumerate() {
-                *bounds = Bounds::EMPTY;
-                for child in &below[level - 1][self.shape.children(level, node)] {
-                    bounds.join(child);
-                }
-            }
-        }
-    }
-
-    fn surface_now(&self) -> f64 {
-        let above = self.levels.iter().skip(1).flatten();
-        above.map(Bounds::half_area).filter(|x| x.is_finite()).sum()
-    }
-
-    fn root(&self) -> Option<Node> {
-        let level = self.levels.len().checked_sub(1)?;
-        Some(Node {
-            level: level as u32,
-            number: 0,
-        })
-    }
-
-    fn bounds(&self, node: Node) -> &Bounds {
-        &self.levels[node.level as usize][node.number as usize]
-    }
-
-    fn children(&self, node: Node) -> impl Iterator<Item = Node> + use<> {
-        let level = node.level as usize;
-        let children = self.shape.children(level, node.number as usize);
-        children.map(move |number| Node {
-            level: level as u32 - 1,
-            number: number as u32,
-        })
-    }
-
-    /// The parts of two leaves, the lower one first.
-    fn parts(&self, [a, b]: [Node; 2]) -> [PartIx; 2] {
-        let [a, b] = [a, b].map(|leaf| self.order[leaf.number as usize]);
-        [a.min(b), a.max(b)]
+        let boxes = &self.boxes;
+        self.tree.refit(n, &self.tuning, |part| boxes[part.index()]);
+        self.scene = scene.stamp();
+        Ok(())
     }
 
     /// The boxes of two parts' bodies.
@@ -150,79 +96,73 @@ impl Bodies {
 
     /// The largest magnitude of a coordinate.
     pub fn magnitude(&self) -> f64 {
-        let root = self.root().map(|root| Extent::from(self.bounds(root)));
-        root.map_or(0.0, |root| root.magnitude())
+        match self.boxes.is_empty() {
+            true => 0.0,
+            false => Extent::from(&self.tree.root()).magnitude(),
+        }
     }
 
-    /// Calls `each` for the pairs of parts whose boxes have a point in common, until it returns true.
-    pub fn overlapping<E>(
-        &mut self,
-        mut each: impl FnMut([PartIx; 2]) -> Result<bool, E>,
-    ) -> Result<(), E> {
-        let mut stack = std::mem::take(&mut self.stack);
-        stack.clear();
-        stack.extend(self.root().map(|root| [root; 2]));
-        let mut found = Ok(false);
-        while let Some([x, y]) = stack.pop() {
-            if x.level == 0 {
-                if x != y {
-                    found = each(self.parts([x, y]));
-                    if !matches!(found, Ok(false)) {
-                        break;
-                    }
-                }
-                continue;
-            }
-            self.open([x, y], |pair| {
-                let [x, y] = pair.map(|node| self.bounds(node));
-                if x.overlaps(y) {
-                    stack.push(pair);
-                }
-            });
-        }
-        self.stack = stack;
-        found.map(|_| ())
-    }
-
-    /// The pairs of children of two nodes of one level, each pair once.
-    fn open(&self, [x, y]: [Node; 2], mut each: impl FnMut([Node; 2])) {
-        for i in self.children(x) {
-            for j in self.children(y) {
-                if x != y || i <= j {
-                    each([i, j]);
-                }
-            }
-        }
+    /// Calls `each` for the pairs of parts whose boxes have a point in common, until it returns true. Pairs without any part up to
+    /// `last` may be missing.
+    ///
+    /// # Errors
+    /// Those of `each`.
+    pub fn overlapping(&mut self, last: Option<PartIx>, each: &mut Each<'_>) -> Result<(), Error> {
+        let few = last.filter(|last| last.index() < self.boxes.len() / FEW);
+        let found = with_isa!(self.isa, overlapping, (
+            tree: &TopLevel = &self.tree,
+            few: Option<&[Bounds]> = few.map(|last| &self.boxes[..=last.index()]),
+            stack: &mut Vec<NodePair> = &mut self.stack,
+            each: &mut Each<'_> = each,
+        ) -> Result<(), Option<Error>>);
+        found.or_else(|stopped| stopped.map_or(Ok(()), Err))
     }
 
     /// Pairs of parts whose boxes are apart, nearest boxes first.
     pub fn apart(&self) -> Apart<'_> {
-        let mut apart = Apart {
-            bodies: self,
-            waiting: BinaryHeap::new(),
-        };
-        if let Some(root) = self.root() {
-            apart.push([root; 2]);
+        Apart {
+            tree: &self.tree,
+            waiting: BinaryHeap::from_iter(
+                self.tree.root_node().map(|root| Reverse((0, [root; 2]))),
+            ),
         }
-        apart
     }
+}
+
+/// The pairs of all parts, or of the first few with all others.
+#[inline(always)]
+fn overlapping<S: Simd>(
+    simd: S,
+    tree: &TopLevel,
+    few: Option<&[Bounds]>,
+    stack: &mut Vec<NodePair>,
+    each: &mut Each<'_>,
+) -> Result<(), Option<Error>> {
+    let mut each = |pair| match each(pair) {
+        Ok(false) => Ok(()),
+        Ok(true) => Err(None),
+        Err(error) => Err(Some(error)),
+    };
+    let Some(few) = few else {
+        return tree.pairs(simd, stack, |a, b| each([a, b]));
+    };
+    for (a, bounds) in PartIx::up_to(few.len()).zip(few) {
+        tree.meeting(simd, bounds, stack, |b| match a < b {
+            true => each([a, b]),
+            false => Ok(()),
+        })?;
+    }
+    Ok(())
 }
 
 /// Pairs of nodes that wait, by the squared distances of their boxes.
 pub(super) struct Apart<'a> {
-    bodies: &'a Bodies,
+    tree: &'a TopLevel,
     waiting: BinaryHeap<Reverse<(u64, [Node; 2])>>,
 }
 
 impl Apart<'_> {
-    fn push(&mut self, nodes: [Node; 2]) {
-        let [x, y] = nodes.map(|node| Extent::from(self.bodies.bounds(node)));
-        // Bits of numbers that are not negative have their order.
-        let squared = x.squared_distance(&y).to_bits();
-        self.waiting.push(Reverse((squared, nodes)));
-    }
-
-    /// The next pair, if the squared distance of its boxes is at most `most`.
+    /// The next pair, if the squared distance of its boxes is at most `most`, which never grows.
     pub fn next(&mut self, most: f64) -> Option<[PartIx; 2]> {
         while let Some(Reverse((squared, nodes))) = self.waiting.pop() {
             let squared = f64::from_bits(squared);
@@ -230,16 +170,37 @@ impl Apart<'_> {
                 return None;
             }
             if nodes[0].level > 0 {
-                let bodies = self.bodies;
-                bodies.open(nodes, |pair| self.push(pair));
-            } else if nodes[0] != nodes[1] {
-                let [x, y] = nodes.map(|node| self.bodies.bounds(node));
-                if !x.overlaps(y) {
-                    return Some(self.bodies.parts(nodes));
-                }
+                self.open(nodes, most);
+                continue;
+            }
+            let [x, y] = nodes.map(|node| self.tree.bounds(node));
+            if nodes[0] != nodes[1] && !x.overlaps(&y) {
+                let [a, b] = nodes.map(|node| self.tree.part(node));
+                return Some([a.min(b), a.max(b)]);
             }
         }
         None
+    }
+
+    /// Puts the pairs of children of two nodes of one level into the queue, each pair once.
+    fn open(&mut self, [x, y]: [Node; 2], most: f64) {
+        let tree = self.tree;
+        let within = |node: Node, other: Node| {
+            let other = Extent::from(&tree.bounds(other));
+            let children = tree
+                .children(node)
+                .map(|child| (child, Extent::from(&tree.bounds(child))));
+            children.filter(move |(_, bounds)| bounds.squared_distance(&other) <= most)
+        };
+        for (i, x_bounds) in within(x, y) {
+            for (j, y_bounds) in within(y, x) {
+                let squared = x_bounds.squared_distance(&y_bounds);
+                if (x != y || i <= j) && squared <= most {
+                    // Bits of numbers that are not negative have their order.
+                    self.waiting.push(Reverse((squared.to_bits(), [i, j])));
+                }
+            }
+        }
     }
 }
 

@@ -8,6 +8,7 @@ use std::sync::Arc;
 use crate::boxes::{self, Extent};
 use crate::bvh::bounds::Bounds;
 use crate::bvh::clusters::Clustering;
+pub(crate) use crate::bvh::tree::Node;
 use crate::clusterings::{Fit, spread};
 use crate::scene::Body;
 use crate::scene::index::{ClusterIx, ElementIx};
@@ -111,27 +112,13 @@ impl Tree {
 
     /// The children of a node that is not a cluster.
     pub fn children(&self, node: Node) -> impl Iterator<Item = Node> + use<> {
-        let children = self
-            .clustering
-            .shape
-            .children(node.level as usize, node.number as usize);
-        children.map(move |number| Node {
-            level: node.level - 1,
-            number: number as u32,
-        })
+        self.clustering.shape.children_of(node)
     }
 
     /// The primitives of a cluster.
     pub fn primitives(&self, node: Node) -> &[ElementIx] {
         self.clustering.primitives(ClusterIx::new(node.number))
     }
-}
-
-/// A node of a tree; level 0 holds the clusters.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) struct Node {
-    pub level: u32,
-    pub number: u32,
 }
 
 /// The box of a primitive, in `f64`.
