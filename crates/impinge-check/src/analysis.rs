@@ -19,6 +19,10 @@ pub struct Options {
     /// Whether vertices at exactly the same position are welded first. On by default: many formats repeat vertices
     /// per face, and without welding every edge would be a border.
     pub weld: bool,
+    /// Whether edges, vertices and copies are counted as the mesh has them, and only self-intersections are sought with vertices at one
+    /// position welded. [`fix_mesh`](crate::fix_mesh) parts edges and vertices without moving them: welding everything would
+    /// join them again, and welding nothing would report that they touch. [`weld`](Self::weld) is then ignored.
+    pub keep_seams: bool,
     /// CPU threads of the self-intersection search; 0 means one per core. No count depends on it.
     pub threads: usize,
 }
@@ -27,6 +31,7 @@ impl Default for Options {
     fn default() -> Self {
         Options {
             weld: true,
+            keep_seams: false,
             threads: 0,
         }
     }
@@ -48,9 +53,32 @@ pub struct Checked {
 /// # Errors
 /// Positions or indices that [`Scene::add`] refuses (NaN, infinities), and more
 /// corners than 32 bits can number.
-pub fn check_mesh(mut mesh: Mesh, options: &Options) -> Result<Checked, Error> {
+pub fn check_mesh(mesh: Mesh, options: &Options) -> Result<Checked, Error> {
+    Ok(check(mesh, options)?.0)
+}
+
+/// The counts of a mesh, and the pairs that [`Counts::self_intersections`] counts; none if they are more than the search lists.
+pub fn check_listed(mesh: Mesh, options: &Options) -> Result<(Counts, Vec<[u32; 2]>), Error> {
+    let (checked, pairs) = check(mesh, options)?;
+    let counts = checked.counts;
+    let is_whole = pairs.len() as u64 == counts.self_intersections;
+    Ok((counts, if is_whole { pairs } else { Vec::new() }))
+}
+
+/// Whether each primitive intersects another one, vertices at one position welded.
+pub fn intersecting_with_seams(mesh: &Mesh, options: &Options) -> Result<Vec<bool>, Error> {
+    let mut welded = mesh.clone();
+    weld(&mut welded);
+    let mut marks = vec![Marks::default(); mesh.n_primitives()];
+    intersections(&welded, options, &mut Counts::default(), &mut marks)?;
+    let is_marked = |marks: &Marks| marks.has(Problem::SelfIntersection);
+    Ok(marks.iter().map(is_marked).collect())
+}
+
+fn check(mut mesh: Mesh, options: &Options) -> Result<(Checked, Vec<[u32; 2]>), Error> {
     let n_vertices = mesh.n_vertices();
-    let n_welded = if options.weld { weld(&mut mesh) } else { 0 };
+    let welds = options.weld && !options.keep_seams;
+    let n_welded = if welds { weld(&mut mesh) } else { 0 };
     mesh.positions.narrow_if_exact();
     let mut counts = Counts {
         n_vertices: n_vertices as u64,
@@ -60,7 +88,14 @@ pub fn check_mesh(mut mesh: Mesh, options: &Options) -> Result<Checked, Error> {
     let mut marks = vec![Marks::default(); mesh.n_primitives()];
     // This comes first because it refuses indices out of range and coordinates that are not finite, on which the steps below
     // rely.
-    intersections(&mesh, options, &mut counts, &mut marks)?;
+    let pairs = if options.keep_seams {
+        let mut welded = mesh.clone();
+        weld(&mut welded);
+        intersections(&welded, options, &mut counts, &mut marks)?
+    } else {
+        intersections(&mesh, options, &mut counts, &mut marks)?
+    };
+    duplicates(&mesh, &mut counts, &mut marks);
     match &mesh.elements {
         Elements::Triangles(triangles) => {
             counts.n_triangles = triangles.len() as u64;
@@ -85,21 +120,38 @@ pub fn check_mesh(mut mesh: Mesh, options: &Options) -> Result<Checked, Error> {
             );
         }
     }
-    Ok(Checked {
+    let checked = Checked {
         counts,
         marks,
         mesh,
-    })
+    };
+    Ok((checked, pairs))
 }
 
-/// Counts and marks pairs that share more points than their common vertices, edge or face, and primitives with the vertices of an
-/// earlier one.
+/// The primitives with the same vertices. Indices must be in range.
+fn copies(mesh: &Mesh) -> Copies {
+    match &mesh.elements {
+        Elements::Triangles(triangles) => Copies::new(triangles, mesh.n_vertices()),
+        Elements::Tetrahedra(tets) => Copies::new(tets, mesh.n_vertices()),
+    }
+}
+
+/// Counts and marks primitives with the vertices of an earlier one.
+fn duplicates(mesh: &Mesh, counts: &mut Counts, marks: &mut [Marks]) {
+    for &element in copies(mesh).sets().flat_map(|set| &set[1..]) {
+        counts.duplicates += 1;
+        marks[element as usize].add(Problem::Duplicate);
+    }
+}
+
+/// Counts and marks pairs that share more points than their common vertices, edge or face. Returns the pairs that were found,
+/// sorted.
 fn intersections(
     mesh: &Mesh,
     options: &Options,
     counts: &mut Counts,
     marks: &mut [Marks],
-) -> Result<(), Error> {
+) -> Result<Vec<[u32; 2]>, Error> {
     let mut scene = Scene::new();
     let elements: impinge::Elements = match &mesh.elements {
         Elements::Triangles(triangles) => triangles.clone().into(),
@@ -111,14 +163,7 @@ fn intersections(
     };
     let body = scene.add((elements, positions))?;
     // The scene has refused indices out of range.
-    let copies = match &mesh.elements {
-        Elements::Triangles(triangles) => Copies::new(triangles, mesh.n_vertices()),
-        Elements::Tetrahedra(tets) => Copies::new(tets, mesh.n_vertices()),
-    };
-    for &element in copies.sets().flat_map(|set| &set[1..]) {
-        counts.duplicates += 1;
-        marks[element as usize].add(Problem::Duplicate);
-    }
+    let copies = copies(mesh);
     let few = copies.few(mesh.n_primitives());
     if let Some(few) = &few {
         let at = |kept: &u32| *kept as usize;
@@ -141,16 +186,16 @@ fn intersections(
         ..Settings::default()
     })?;
     let pairs = detector.detect(&scene, &Query::self_of(body))?;
+    let mut found: Vec<[u32; 2]> = pairs.self_of(body).collect();
     match &few {
         None => {
             counts.self_intersections = pairs.len() as u64;
             counts.hash = Some(pairs.hash());
-            for primitive in pairs.self_of(body).flatten() {
+            for &primitive in found.as_flattened() {
                 marks[primitive as usize].add(Problem::SelfIntersection);
             }
         }
         Some(few) => {
-            let found: Vec<[u32; 2]> = pairs.self_of(body).collect();
             (counts.self_intersections, counts.hash) = few.count(found.iter().copied());
             for side in found.iter().flat_map(|&pair| few.pairs(pair).sides()) {
                 // Either all of a side are marked or none.
@@ -161,11 +206,14 @@ fn intersections(
                     }
                 }
             }
+            for place in found.as_flattened_mut() {
+                *place = few.kept[*place as usize];
+            }
         }
     }
     let is_marked = |marks: &&Marks| marks.has(Problem::SelfIntersection);
     counts.n_intersecting = marks.iter().filter(is_marked).count() as u64;
-    Ok(())
+    Ok(found)
 }
 
 /// Counts and marks everything that depends on vertex indices alone.
@@ -300,7 +348,7 @@ fn degenerate<const K: usize>(
 }
 
 /// A triangle has zero area if and only if all its projections onto the three coordinate planes have zero area.
-fn is_flat_triangle([a, b, c]: &[Point; 3]) -> bool {
+pub fn is_flat_triangle([a, b, c]: &[Point; 3]) -> bool {
     [[0, 1], [1, 2], [2, 0]].iter().all(|&[u, v]| {
         let drop = |p: &Point| [p[u], p[v]];
         orient2d(drop(a), drop(b), drop(c)).is_zero()

@@ -3,7 +3,8 @@
 //!
 //! [`check_mesh`] checks one mesh in memory, [`check_file`] one file. For a dataset of many files use
 //! [`Pool`]: each mesh is checked in a child process that may be killed, so that one bad file costs one row and
-//! not the run. [`RowStore`] keeps rows on disk, so that an interrupted run can continue where it stopped.
+//! not the run. [`RowStore`] keeps rows on disk, so that an interrupted run can continue where it stopped. [`fix_mesh`] mends what
+//! can be mended without moving a vertex.
 //!
 //! ```
 //! use impinge_check::{Options, check_mesh};
@@ -27,16 +28,19 @@ mod analysis;
 mod copies;
 mod facets;
 mod file;
+mod fix;
 mod limits;
 mod marks;
 mod pool;
 mod row;
 mod store;
 mod union_find;
+mod volume;
 mod worker;
 
 pub use analysis::{Checked, Options, check_mesh};
 pub use file::{check_file, check_file_marked};
+pub use fix::{FixError, FixOptions, Fixed, MOST_HOLE_EDGES, Repair, Repairs, fix_mesh};
 pub use limits::{Limits, apply_limits};
 pub use marks::{Marks, Problem};
 pub use pool::{Pool, PoolError};

@@ -15,7 +15,9 @@ use std::path::{Path, PathBuf};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use impinge_fem::scenes::SceneName;
 
-use crate::commands::{CHECK_EXAMPLES, CheckArgs, CheckWorkerArgs, TILES_EXAMPLES, TilesArgs};
+use crate::commands::{
+    CHECK_EXAMPLES, CheckArgs, CheckWorkerArgs, FIX_EXAMPLES, FixArgs, TILES_EXAMPLES, TilesArgs,
+};
 use crate::values::PngFile;
 use crate::values::{
     CurvesFile, FrameRange, FramesFile, MeshFile, RowsFile, at_least_one, body_numbers, bytes,
@@ -48,6 +50,7 @@ Examples:
   impinge pairs a.obj b.obj --rows -            the pairs themselves, as CSV
   impinge near a.obj b.obj --distance 0.01      which elements are nearer than that
   impinge check parts/*.stl                     what is wrong with each mesh
+  impinge fix part.stl --out mended.ply         mend what can be mended without moving a vertex
   impinge sequence body.ply run.pc2 --self      the pairs of every frame of an animation
   impinge step cloth_0.ply cloth_1.ply          does anything touch on the way, and when first
   impinge simulate blocks --out out/blocks      bodies that fall, deform and collide
@@ -97,6 +100,9 @@ pub enum Command {
     /// Check meshes for self-intersections, degenerate faces, borders, …
     #[command(after_help = CHECK_EXAMPLES)]
     Check(CheckArgs),
+    /// Mend a mesh without moving a vertex: weld, orient, split, close holes, …
+    #[command(after_help = FIX_EXAMPLES)]
+    Fix(FixArgs),
     /// Find the pairs of a scene that is larger than memory, tile by tile
     #[command(after_help = TILES_EXAMPLES)]
     Tiles(TilesArgs),

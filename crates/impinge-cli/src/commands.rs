@@ -7,6 +7,7 @@ mod demo_scene;
 #[cfg(feature = "gpu")]
 mod devices;
 mod distance;
+mod fix;
 mod near;
 mod record;
 mod render;
@@ -23,6 +24,7 @@ pub use demo::demo;
 #[cfg(feature = "gpu")]
 pub use devices::devices;
 pub use distance::distance;
+pub use fix::{FIX_EXAMPLES, FixArgs, fix};
 pub use near::near;
 pub use render::render;
 pub use sequence::sequence;

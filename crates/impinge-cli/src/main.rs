@@ -43,6 +43,7 @@ fn main() -> ExitCode {
         Command::Step(args) => commands::step(&args, &cancel),
         Command::Simulate(args) => commands::simulate(&args, &cancel),
         Command::Check(args) => commands::check(&args, &cancel),
+        Command::Fix(args) => commands::fix(&args),
         Command::CheckWorker(args) => commands::check_worker(&args),
         Command::Tiles(args) => commands::tiles(&args, &cancel),
         Command::Render(args) => commands::render(&args, &cancel),

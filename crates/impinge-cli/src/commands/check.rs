@@ -13,7 +13,8 @@ use std::time::Duration;
 use impinge::CancelToken;
 use impinge_check::{Options, Pool, PoolError, Row, RowStore, apply_limits, serve};
 
-pub use self::args::{CHECK_EXAMPLES, CheckArgs, CheckWorkerArgs};
+pub use self::args::{CHECK_EXAMPLES, CheckArgs, CheckWorkerArgs, FailOn};
+pub use self::table::fail;
 use crate::error::Error;
 use crate::output;
 use crate::stop::Patience;
@@ -22,6 +23,11 @@ use crate::watch::Watch;
 /// `impinge check`.
 pub fn check(args: &CheckArgs, cancel: &CancelToken) -> Result<(), Error> {
     let paths = paths(args)?;
+    if args.keep_seams && matches!(args.out, Some(args::Out::Folder(_))) {
+        // Rows do not say by which of the two rules an unwelded mesh was checked.
+        let text = "--keep-seams: its rows are printed, not kept in a folder: use --json";
+        return Err(Error::Usage(text.to_owned()));
+    }
     let mine: Vec<usize> = share(args, paths.len()).collect();
     let watch = Watch::things(!args.no_progress, mine.len(), "meshes", args.json);
     let rows = match &args.out {
@@ -58,7 +64,8 @@ pub fn check_worker(args: &CheckWorkerArgs) -> Result<(), Error> {
     };
     apply_limits(&limits)?;
     let options = Options {
-        weld: !args.no_weld,
+        weld: !args.no_weld && !args.keep_seams,
+        keep_seams: args.keep_seams,
         threads: args.threads,
     };
     Ok(serve(stdin().lock(), stdout().lock(), &options)?)
@@ -127,6 +134,9 @@ fn run(
         if args.no_weld {
             command.arg("--no-weld");
         }
+        if args.keep_seams {
+            command.arg("--keep-seams");
+        }
         if let Some(memory) = args.memory {
             command.arg("--memory").arg(memory.to_string());
         }
@@ -136,7 +146,7 @@ fn run(
         command: &command,
         jobs,
         timeout: args.timeout.map(Duration::from_secs_f64),
-        weld: !args.no_weld,
+        weld: !args.no_weld && !args.keep_seams,
     };
     let chosen: Vec<PathBuf> = wanted.iter().map(|&ix| paths[ix].clone()).collect();
     // A row that can't be printed or stored stops the run.

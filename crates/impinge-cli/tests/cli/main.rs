@@ -9,6 +9,7 @@ mod demo;
 mod devices;
 mod doors;
 mod first_sight;
+mod fix;
 mod harness;
 mod hostile;
 mod near;

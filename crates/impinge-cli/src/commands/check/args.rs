@@ -49,6 +49,9 @@ pub struct CheckArgs {
     /// Do not weld vertices at the same position
     #[arg(long)]
     pub no_weld: bool,
+    /// Count edges and vertices as the file has them, and weld only to find self-intersections: for meshes that `impinge fix` has split
+    #[arg(long, conflicts_with = "no_weld")]
+    pub keep_seams: bool,
     /// Show no progress bar
     #[arg(long)]
     pub no_progress: bool,
@@ -103,6 +106,9 @@ pub struct CheckWorkerArgs {
     /// Do not weld vertices at the same position
     #[arg(long)]
     pub no_weld: bool,
+    /// Weld only to find self-intersections
+    #[arg(long)]
+    pub keep_seams: bool,
     /// Address space
     #[arg(long, value_name = "BYTES")]
     pub memory: Option<u64>,

@@ -19,7 +19,8 @@ const FINE: [u8; 3] = [200, 200, 200];
 /// All meshes that could be checked, with the marks of their primitives.
 fn marked(rows: &[Row], args: &CheckArgs) -> Result<Vec<(String, Checked)>, Error> {
     let options = Options {
-        weld: !args.no_weld,
+        weld: !args.no_weld && !args.keep_seams,
+        keep_seams: args.keep_seams,
         threads: 0,
     };
     let sound = rows.iter().filter(|row| row.result.is_ok());

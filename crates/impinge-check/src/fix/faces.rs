@@ -1,0 +1,197 @@
+//! Faces that go: duplicates, faces of zero area, and vertices that no face is left to use.
+
+use std::collections::{HashMap, VecDeque};
+
+use impinge::exact::Point;
+use impinge_io::Positions;
+
+use super::Surface;
+use crate::analysis::is_flat_triangle;
+use crate::copies::Copies;
+use crate::facets::is_simplex;
+
+/// Of faces with the same vertices the first stays. Returns how many go.
+pub fn remove_duplicates(surface: &mut Surface) -> u64 {
+    let copies = Copies::new(&surface.faces, surface.n_vertices());
+    let mut is_copy = vec![false; surface.faces.len()];
+    for &face in copies.sets().flat_map(|set| &set[1..]) {
+        is_copy[face as usize] = true;
+    }
+    remove(surface, &is_copy)
+}
+
+/// Removes faces of zero area. Returns how many were removed, and how many have divided a neighbour instead.
+///
+/// A face of zero area whose vertices are three different points is a segment. If it just went, its long side and its two short
+/// ones would be borders, although the surface has no gap there. So the neighbour at the long side is divided at the middle
+/// vertex, which lies exactly on it: the two halves take the places of the face and of its neighbour.
+pub fn remove_degenerate(surface: &mut Surface) -> (u64, u64) {
+    let collapsed: Vec<bool> = surface.faces.iter().map(|face| !is_simplex(face)).collect();
+    let n_collapsed = remove(surface, &collapsed);
+    let is_flat = |surface: &Surface, face: [u32; 3]| is_flat_triangle(&surface.corners(face));
+    let mut flat: Vec<bool> = surface
+        .faces
+        .iter()
+        .map(|&face| is_flat(surface, face))
+        .collect();
+    if !flat.contains(&true) {
+        return (n_collapsed, 0);
+    }
+    let mut edges = Edges::new(&surface.faces);
+    let mut queue: VecDeque<u32> = (0u32..)
+        .zip(&flat)
+        .filter(|(_, is_flat)| **is_flat)
+        .map(|(face, _)| face)
+        .collect();
+    let n_flat = queue.len() as u64;
+    // Each division leaves fewer flat faces, or as many with shorter long sides: it ends.
+    while let Some(face) = queue.pop_front() {
+        if !flat[face as usize] {
+            continue;
+        }
+        let Some(divided) = divide(surface, &edges, &flat, face) else {
+            continue;
+        };
+        let pair = [face, divided.neighbour];
+        for face in pair {
+            edges.remove(face, surface.faces[face as usize]);
+        }
+        for (face, corners) in pair.into_iter().zip(divided.halves) {
+            surface.faces[face as usize] = corners;
+            flat[face as usize] = is_flat(surface, corners);
+            edges.add(face, corners);
+        }
+        // What could not be divided before may be now.
+        for corners in divided.halves {
+            for edge in sides(corners) {
+                let around = edges.of(edge).iter();
+                queue.extend(around.filter(|&&face| flat[face as usize]));
+            }
+        }
+    }
+    let n_removed = remove(surface, &flat);
+    (n_collapsed + n_removed, n_flat - n_removed)
+}
+
+/// A neighbour of a flat face, and the two halves that take the places of the flat face and of the neighbour.
+struct Divided {
+    neighbour: u32,
+    halves: [[u32; 3]; 2],
+}
+
+/// How the neighbour at the long side of a flat face is divided; `None` if there is no single one, or if the halves would make an
+/// edge that exists already.
+fn divide(surface: &Surface, edges: &Edges, flat: &[bool], face: u32) -> Option<Divided> {
+    let corners = surface.faces[face as usize];
+    let points = surface.corners(corners);
+    let middle =
+        (0..3).find(|&ix| is_between(&points[ix], &points[(ix + 1) % 3], &points[(ix + 2) % 3]))?;
+    let [b, c, a] = [0, 1, 2].map(|step| corners[(middle + step) % 3]);
+    let [first, second] = edges.of([a, c]) else {
+        return None;
+    };
+    let neighbour = if *first == face { *second } else { *first };
+    let held = surface.faces[neighbour as usize];
+    let d = held
+        .into_iter()
+        .find(|&vertex| vertex != a && vertex != c)?;
+    if d == b || !edges.of([b, d]).is_empty() {
+        return None;
+    }
+    // A flat neighbour is only divided if its own long side is the same; else it is its neighbour's turn first.
+    let [at_a, at_c, at_d] = surface.corners([a, c, d]);
+    if flat[neighbour as usize] && !is_between(&at_d, &at_a, &at_c) {
+        return None;
+    }
+    let replaced = |old: u32| held.map(|vertex| if vertex == old { b } else { vertex });
+    Some(Divided {
+        neighbour,
+        halves: [replaced(c), replaced(a)],
+    })
+}
+
+/// Whether a point of the line through a and c lies strictly between them.
+fn is_between(b: &Point, a: &Point, c: &Point) -> bool {
+    (0..3).any(|axis| {
+        let (low, high) = (a[axis].min(c[axis]), a[axis].max(c[axis]));
+        low < b[axis] && b[axis] < high
+    })
+}
+
+fn sides([a, b, c]: [u32; 3]) -> [[u32; 2]; 3] {
+    [[a, b], [b, c], [c, a]]
+}
+
+/// The faces at each edge, while faces change.
+struct Edges(HashMap<[u32; 2], Vec<u32>>);
+
+impl Edges {
+    fn new(faces: &[[u32; 3]]) -> Self {
+        let mut edges = Edges(HashMap::with_capacity(faces.len() * 3 / 2));
+        for (face, &corners) in (0u32..).zip(faces) {
+            edges.add(face, corners);
+        }
+        edges
+    }
+
+    fn key([a, b]: [u32; 2]) -> [u32; 2] {
+        [a.min(b), a.max(b)]
+    }
+
+    fn of(&self, edge: [u32; 2]) -> &[u32] {
+        self.0.get(&Self::key(edge)).map_or(&[], Vec::as_slice)
+    }
+
+    fn add(&mut self, face: u32, corners: [u32; 3]) {
+        for edge in sides(corners) {
+            self.0.entry(Self::key(edge)).or_default().push(face);
+        }
+    }
+
+    fn remove(&mut self, face: u32, corners: [u32; 3]) {
+        for edge in sides(corners) {
+            if let Some(faces) = self.0.get_mut(&Self::key(edge)) {
+                faces.retain(|&held| held != face);
+            }
+        }
+    }
+}
+
+/// Removes marked faces and returns how many there were.
+pub fn remove(surface: &mut Surface, marked: &[bool]) -> u64 {
+    let n = surface.faces.len();
+    let mut marks = marked.iter();
+    surface
+        .faces
+        .retain(|_| !marks.next().copied().unwrap_or(false));
+    (n - surface.faces.len()) as u64
+}
+
+/// Removes vertices of no face and returns how many there were. The order of the others stays.
+pub fn remove_unused(surface: &mut Surface) -> u64 {
+    let n = surface.n_vertices();
+    let mut places = vec![u32::MAX; n];
+    for &vertex in surface.faces.as_flattened() {
+        places[vertex as usize] = 0;
+    }
+    let mut next = 0u32;
+    for place in places.iter_mut().filter(|place| **place == 0) {
+        *place = next;
+        next += 1;
+    }
+    if next as usize == n {
+        return 0;
+    }
+    fn kept<P>(held: &mut Vec<P>, places: &[u32]) {
+        let mut places = places.iter();
+        held.retain(|_| places.next().is_some_and(|&place| place != u32::MAX));
+    }
+    match &mut surface.positions {
+        Positions::F32(held) => kept(held, &places),
+        Positions::F64(held) => kept(held, &places),
+    }
+    for vertex in surface.faces.as_flattened_mut() {
+        *vertex = places[*vertex as usize];
+    }
+    n as u64 - u64::from(next)
+}

@@ -1,0 +1,309 @@
+//! Mends meshes of triangles without moving a vertex.
+//!
+//! In: a mesh with indices in range. Out: the mended mesh, what each repair did, and the counts of a check before and after.
+//! Repairs run in the order of [`Repair::ALL`]; each leaves alone what an earlier one has mended. Every decision about geometry is
+//! the sign of a determinant or a comparison of coordinates, so it is exact. Only the choice among several triangulations of a hole
+//! is by rounded areas, and every triangle that is chosen passes exact tests.
+//!
+//! Positions are never computed: a vertex of the result has the bits of a vertex of the input.
+
+mod faces;
+mod holes;
+mod orient;
+mod shells;
+mod split;
+
+use impinge::exact::Point;
+use impinge_io::{Elements, Mesh, Positions, weld};
+
+use crate::analysis::{self, Options, check_mesh};
+use crate::row::Counts;
+
+pub use holes::MOST_HOLE_EDGES;
+
+/// One kind of repair.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Repair {
+    /// Vertices at exactly the same position become one.
+    Weld,
+    /// Of faces with the same vertices, in any order, the first one stays.
+    Duplicates,
+    /// Faces of zero area go. Where one lies along an edge of a neighbour, the neighbour is divided there, so that no gap opens.
+    Degenerate,
+    /// Neighbours get the same orientation. In each piece the fewest faces are turned.
+    Orient,
+    /// Edges of more than two faces come apart: faces that bound the same matter stay together.
+    SplitEdges,
+    /// Vertices of several fans come apart: each fan gets a vertex of its own at the same position.
+    SplitVertices,
+    /// Holes of few edges are filled with triangles between their vertices.
+    CloseHoles,
+    /// Closed shells are turned so that matter is inside: outer ones outward, cavities inward.
+    Outward,
+    /// Vertices of no face go.
+    Unused,
+}
+
+impl Repair {
+    /// All repairs, in the order in which they run.
+    pub const ALL: [Repair; 9] = [
+        Repair::Weld,
+        Repair::Duplicates,
+        Repair::Degenerate,
+        Repair::Orient,
+        Repair::SplitEdges,
+        Repair::SplitVertices,
+        Repair::CloseHoles,
+        Repair::Outward,
+        Repair::Unused,
+    ];
+
+    /// The name in options and answers, such as `split-edges`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Repair::Weld => "weld",
+            Repair::Duplicates => "duplicates",
+            Repair::Degenerate => "degenerate",
+            Repair::Orient => "orient",
+            Repair::SplitEdges => "split-edges",
+            Repair::SplitVertices => "split-vertices",
+            Repair::CloseHoles => "close-holes",
+            Repair::Outward => "outward",
+            Repair::Unused => "unused",
+        }
+    }
+}
+
+/// What is mended.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct FixOptions {
+    /// The repairs, in any order. All of them by default.
+    pub repairs: Vec<Repair>,
+    /// The most edges of a hole that is closed; 0, the default, closes none. At most [`MOST_HOLE_EDGES`].
+    pub close_holes: usize,
+    /// CPU threads; 0 means one per core. The result does not depend on it.
+    pub threads: usize,
+}
+
+impl Default for FixOptions {
+    fn default() -> Self {
+        FixOptions {
+            repairs: Repair::ALL.to_vec(),
+            close_holes: 0,
+            threads: 0,
+        }
+    }
+}
+
+/// What each repair did.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Repairs {
+    /// Vertices that welding removed.
+    pub welded_vertices: u64,
+    /// Faces removed because an earlier one has their vertices.
+    pub duplicate_faces: u64,
+    /// Faces of zero area that were removed.
+    pub degenerate_faces: u64,
+    /// Faces of zero area that were used to divide a neighbour; the number of faces stays.
+    pub divided_faces: u64,
+    /// Faces turned to agree with their neighbours.
+    pub turned_faces: u64,
+    /// Pieces that have no consistent orientation, such as Möbius strips. They stay as they are.
+    pub non_orientable: u64,
+    /// Edges of more than two faces that were split.
+    pub split_edges: u64,
+    /// Vertices added by splitting edges.
+    pub split_edges_added: u64,
+    /// Vertices of several fans that were split, those on split edges left out.
+    pub split_vertices: u64,
+    /// Vertices added by splitting vertices.
+    pub split_vertices_added: u64,
+    /// Holes that were closed.
+    pub closed_holes: u64,
+    /// Faces that close them.
+    pub added_faces: u64,
+    /// Holes of few enough edges that stay open, because every filling would be degenerate, not manifold or intersect something.
+    pub refused_holes: u64,
+    /// Closed shells: pieces without a border, of one orientation.
+    pub shells: u64,
+    /// Shells inside an odd number of others: their normals point into the hollow.
+    pub cavities: u64,
+    /// Shells that were inside out.
+    pub turned_shells: u64,
+    /// Shells of exactly zero volume, which have no inside and stay as they are.
+    pub flat_shells: u64,
+    /// Vertices of no face that were removed.
+    pub unused_vertices: u64,
+}
+
+/// A mended mesh.
+#[derive(Debug, Clone)]
+pub struct Fixed {
+    /// The mesh.
+    pub mesh: Mesh,
+    /// What each repair did.
+    pub repairs: Repairs,
+    /// The check of the mesh as it was; welded, if the repairs weld.
+    pub before: Counts,
+    /// The check of the mended mesh, with [`keep_seams`](Options::keep_seams).
+    pub after: Counts,
+    /// The pairs of faces of the mended mesh that intersect, sorted. They are not mended. Empty if
+    /// [`after`](Self::after) counts more than the pairs that [`check_mesh`] lists.
+    pub self_intersections: Vec<[u32; 2]>,
+}
+
+impl Fixed {
+    /// Whether vertices at one position are different ones, so that a check has to keep seams to see what this repair has done.
+    pub fn has_seams(&self) -> bool {
+        self.repairs.split_edges_added + self.repairs.split_vertices_added > 0
+    }
+}
+
+/// Why a mesh is not mended.
+#[derive(Debug, thiserror::Error)]
+pub enum FixError {
+    /// Only meshes of triangles are mended.
+    #[error("{0} tetrahedra: only meshes of triangles are mended")]
+    Tetrahedra(usize),
+    /// A limit that is too large.
+    #[error("holes of up to {0} edges: at most {MOST_HOLE_EDGES} can be asked for")]
+    Holes(usize),
+    /// Content that the library refuses.
+    #[error(transparent)]
+    Refused(#[from] impinge::Error),
+}
+
+/// A surface that is being mended.
+struct Surface {
+    positions: Positions,
+    faces: Vec<[u32; 3]>,
+}
+
+impl Surface {
+    fn n_vertices(&self) -> usize {
+        self.positions.len()
+    }
+
+    fn at(&self, vertex: u32) -> Point {
+        match &self.positions {
+            Positions::F32(held) => held[vertex as usize].map(f64::from),
+            Positions::F64(held) => held[vertex as usize],
+        }
+    }
+
+    fn corners(&self, face: [u32; 3]) -> [Point; 3] {
+        face.map(|vertex| self.at(vertex))
+    }
+
+    /// Adds a vertex with the bits of another one.
+    fn copy_vertex(&mut self, vertex: u32) -> u32 {
+        let fresh = self.positions.len() as u32;
+        match &mut self.positions {
+            Positions::F32(held) => held.push(held[vertex as usize]),
+            Positions::F64(held) => held.push(held[vertex as usize]),
+        }
+        fresh
+    }
+
+    fn mesh(&self) -> Mesh {
+        Mesh {
+            positions: self.positions.clone(),
+            elements: Elements::Triangles(self.faces.clone()),
+        }
+    }
+}
+
+/// Mends a mesh of triangles. Its indices must be in range. No vertex is moved.
+///
+/// ```
+/// use impinge_check::{FixOptions, fix_mesh};
+/// use impinge_io::{Elements, Mesh, Positions};
+/// # fn main() -> Result<(), impinge_check::FixError> {
+/// // A tetrahedron, one of whose faces is turned, and another one twice.
+/// let mesh = Mesh {
+///     positions: Positions::F32(vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]),
+///     elements: Elements::Triangles(vec![[0, 2, 1], [0, 1, 3], [1, 3, 2], [2, 0, 3], [0, 1, 3]]),
+/// };
+/// let fixed = fix_mesh(mesh, &FixOptions::default())?;
+/// assert_eq!((fixed.repairs.turned_faces, fixed.repairs.duplicate_faces), (1, 1));
+/// assert_eq!(fixed.after.inconsistent_facets + fixed.after.duplicates, 0);
+/// # Ok(()) }
+/// ```
+///
+/// # Errors
+/// [`FixError`].
+pub fn fix_mesh(mesh: Mesh, options: &FixOptions) -> Result<Fixed, FixError> {
+    let does = |repair: Repair| options.repairs.contains(&repair);
+    if let Elements::Tetrahedra(tets) = &mesh.elements {
+        return Err(FixError::Tetrahedra(tets.len()));
+    }
+    if options.close_holes > MOST_HOLE_EDGES {
+        return Err(FixError::Holes(options.close_holes));
+    }
+    // This refuses indices out of range and coordinates that are not finite, on which everything below relies.
+    let checked_as_it_was = Options {
+        weld: does(Repair::Weld),
+        keep_seams: !does(Repair::Weld),
+        threads: options.threads,
+    };
+    let before = check_mesh(mesh.clone(), &checked_as_it_was)?.counts;
+    let mut repairs = Repairs::default();
+    let mut mesh = mesh;
+    if does(Repair::Weld) {
+        repairs.welded_vertices = weld(&mut mesh) as u64;
+    }
+    let Elements::Triangles(faces) = mesh.elements else {
+        return Err(FixError::Tetrahedra(0));
+    };
+    let mut surface = Surface {
+        positions: mesh.positions,
+        faces,
+    };
+    if does(Repair::Duplicates) {
+        repairs.duplicate_faces = faces::remove_duplicates(&mut surface);
+    }
+    if does(Repair::Degenerate) {
+        (repairs.degenerate_faces, repairs.divided_faces) = faces::remove_degenerate(&mut surface);
+    }
+    if does(Repair::Orient) {
+        (repairs.turned_faces, repairs.non_orientable) = orient::orient(&mut surface);
+    }
+    split::split(
+        &mut surface,
+        (does(Repair::SplitEdges), does(Repair::SplitVertices)),
+        &mut repairs,
+    );
+    if does(Repair::CloseHoles) && options.close_holes > 0 {
+        holes::close(&mut surface, options, &mut repairs)?;
+    }
+    if does(Repair::Outward) {
+        shells::turn(&mut surface, options.threads, &mut repairs)?;
+    }
+    if does(Repair::Unused) {
+        repairs.unused_vertices = faces::remove_unused(&mut surface);
+    }
+    let mesh = surface.mesh();
+    let (after, self_intersections) = if surface.faces.is_empty() {
+        let n_vertices = surface.n_vertices() as u64;
+        let nothing = Counts {
+            n_vertices,
+            unused_vertices: n_vertices,
+            ..Counts::default()
+        };
+        (nothing, Vec::new())
+    } else {
+        let options = Options {
+            weld: false,
+            keep_seams: true,
+            threads: options.threads,
+        };
+        analysis::check_listed(mesh.clone(), &options)?
+    };
+    Ok(Fixed {
+        mesh,
+        repairs,
+        before,
+        after,
+        self_intersections,
+    })
+}

@@ -1,0 +1,512 @@
+//! What `fix_mesh` writes, a check confirms: every defect by itself, all of them together, and vertices that keep their bits.
+
+use std::collections::HashSet;
+
+use impinge_check::{Checked, FixOptions, Fixed, Options, Repair, check_mesh, fix_mesh};
+use impinge_io::{Elements, Mesh, Positions};
+use impinge_scenes::Random;
+use impinge_scenes::surfaces::ball;
+
+fn mesh(points: Vec<[f64; 3]>, faces: Vec<[u32; 3]>) -> Mesh {
+    Mesh {
+        positions: Positions::F64(points),
+        elements: Elements::Triangles(faces),
+    }
+}
+
+fn faces(mesh: &Mesh) -> &[[u32; 3]] {
+    let Elements::Triangles(faces) = &mesh.elements else {
+        panic!("triangles")
+    };
+    faces
+}
+
+/// A box, outward.
+fn cube(low: [f64; 3], size: f64) -> Mesh {
+    let points = (0..8)
+        .map(|ix| [2, 1, 0].map(|bit| f64::from(ix >> bit & 1) * size))
+        .map(|at| [0, 1, 2].map(|axis| low[axis] + at[axis]));
+    let faces = [
+        [0, 1, 3],
+        [0, 3, 2],
+        [4, 6, 7],
+        [4, 7, 5],
+        [0, 4, 5],
+        [0, 5, 1],
+        [2, 3, 7],
+        [2, 7, 6],
+        [0, 2, 6],
+        [0, 6, 4],
+        [1, 5, 7],
+        [1, 7, 3],
+    ];
+    mesh(points.collect(), faces.to_vec())
+}
+
+/// Several meshes as one.
+fn together(parts: &[Mesh]) -> Mesh {
+    let (mut points, mut all) = (Vec::new(), Vec::new());
+    for part in parts {
+        let first = points.len() as u32;
+        all.extend(faces(part).iter().map(|face| face.map(|v| v + first)));
+        points.extend(part.positions.to_f64());
+    }
+    mesh(points, all)
+}
+
+fn round(n: usize) -> Mesh {
+    let model = ball(n);
+    let impinge::Elements::Triangles(faces) = &model.elements else {
+        panic!("triangles")
+    };
+    Mesh {
+        positions: Positions::F32(model.positions.clone()),
+        elements: Elements::Triangles(faces.clone()),
+    }
+}
+
+fn turned(mesh: &Mesh, which: impl Fn(usize) -> bool) -> Mesh {
+    let mut mesh = mesh.clone();
+    let Elements::Triangles(faces) = &mut mesh.elements else {
+        panic!("triangles")
+    };
+    for (ix, face) in faces.iter_mut().enumerate() {
+        if which(ix) {
+            face.swap(1, 2);
+        }
+    }
+    mesh
+}
+
+fn volume(mesh: &Mesh) -> f64 {
+    let points = mesh.positions.to_f64();
+    let faces = faces(mesh).iter();
+    faces
+        .map(|face| {
+            let [a, b, c] = face.map(|v| points[v as usize]);
+            (a[0] * (b[1] * c[2] - b[2] * c[1])
+                + a[1] * (b[2] * c[0] - b[0] * c[2])
+                + a[2] * (b[0] * c[1] - b[1] * c[0]))
+                / 6.0
+        })
+        .sum()
+}
+
+fn bits(mesh: &Mesh) -> Vec<[u64; 3]> {
+    match &mesh.positions {
+        Positions::F32(held) => held.iter().map(|p| p.map(|x| x.to_bits().into())).collect(),
+        Positions::F64(held) => held.iter().map(|p| p.map(f64::to_bits)).collect(),
+    }
+}
+
+fn kept(mesh: Mesh) -> Checked {
+    let options = Options {
+        weld: false,
+        keep_seams: true,
+        threads: 1,
+    };
+    check_mesh(mesh, &options).unwrap()
+}
+
+/// Mends with all repairs, and holds the result against what is promised of any result.
+fn fix(mesh: &Mesh, close_holes: usize) -> Fixed {
+    let options = FixOptions {
+        close_holes,
+        threads: 1,
+        ..FixOptions::default()
+    };
+    let fixed = fix_mesh(mesh.clone(), &options).unwrap();
+    let old: HashSet<[u64; 3]> = bits(mesh).into_iter().collect();
+    assert!(bits(&fixed.mesh).iter().all(|at| old.contains(at)), "moved");
+    if faces(&fixed.mesh).is_empty() {
+        return fixed;
+    }
+    let counts = kept(fixed.mesh.clone()).counts;
+    assert_eq!(counts, fixed.after);
+    assert_eq!(counts.degenerate, 0);
+    assert_eq!(counts.duplicates, 0);
+    assert_eq!(counts.non_manifold_facets, 0);
+    assert_eq!(counts.non_manifold_vertices, 0);
+    assert_eq!(counts.unused_vertices, 0);
+    if fixed.repairs.non_orientable == 0 {
+        assert_eq!(counts.inconsistent_facets, 0);
+    }
+    assert_eq!(
+        fixed.self_intersections.len() as u64,
+        counts.self_intersections
+    );
+    fixed
+}
+
+#[test]
+fn a_sound_mesh_stays_as_it_is() {
+    let whole = round(1000);
+    let fixed = fix(&whole, 64);
+    assert_eq!(fixed.mesh, whole);
+    assert_eq!(fixed.before, fixed.after);
+    assert_eq!((fixed.repairs.shells, fixed.repairs.turned_shells), (1, 0));
+}
+
+#[test]
+fn a_soup_is_welded() {
+    let whole = round(500);
+    let points = whole.positions.to_f64();
+    let soup = faces(&whole).iter().flatten();
+    let soup: Vec<[f64; 3]> = soup.map(|&v| points[v as usize]).collect();
+    let n = soup.len() as u32;
+    let loose = mesh(
+        soup,
+        (0..n / 3).map(|f| [3 * f, 3 * f + 1, 3 * f + 2]).collect(),
+    );
+    let fixed = fix(&loose, 0);
+    let n_welded = n as usize - whole.n_vertices();
+    assert_eq!(fixed.repairs.welded_vertices, n_welded as u64);
+    assert_eq!(
+        (fixed.after.boundary_facets, fixed.after.components),
+        (0, 1)
+    );
+}
+
+#[test]
+fn copies_go_and_the_first_stays() {
+    let whole = round(300);
+    let mut twice = whole.clone();
+    let Elements::Triangles(more) = &mut twice.elements else {
+        panic!("triangles")
+    };
+    let again: Vec<[u32; 3]> = more[10..20].iter().map(|&[a, b, c]| [c, b, a]).collect();
+    more.extend(again);
+    let fixed = fix(&twice, 0);
+    assert_eq!(fixed.repairs.duplicate_faces, 10);
+    assert_eq!(fixed.mesh, whole);
+}
+
+/// A tetrahedron with further vertices on one edge: one face is a fan of flat ones and a face of the whole edge, the other face
+/// has the vertices.
+fn with_flat_faces(on_edge: &[f64], order: bool) -> Mesh {
+    let mut points = vec![
+        [0.0, 0.0, 0.0],
+        [8.0, 0.0, 0.0],
+        [0.0, 8.0, 0.0],
+        [0.0, 0.0, 8.0],
+    ];
+    points.extend(on_edge.iter().map(|&x| [x, 0.0, 0.0]));
+    let chain: Vec<u32> = [0]
+        .into_iter()
+        .chain(4..4 + on_edge.len() as u32)
+        .chain([1])
+        .collect();
+    let mut faces = vec![[0, 2, 1], [1, 2, 3], [2, 0, 3]];
+    // The face 0 1 3 in parts.
+    faces.extend(chain.windows(2).map(|part| [part[0], part[1], 3]));
+    // Between the edge 0 1 of the face 0 2 1 and its parts: flat faces.
+    let flat = chain.windows(2).skip(1).map(|part| [0, part[1], part[0]]);
+    let mut flat: Vec<[u32; 3]> = flat.collect();
+    if order {
+        flat.reverse();
+    }
+    faces.extend(flat);
+    mesh(points, faces)
+}
+
+#[test]
+fn flat_faces_divide_their_neighbours_and_leave_no_gap() {
+    for (on_edge, order) in [
+        (&[3.0][..], false),
+        (&[1.0, 2.5, 7.0], false),
+        (&[1.0, 2.5, 7.0], true),
+        (&[1e-300, 0.1, 0.3, 7.9], true),
+    ] {
+        let flat = with_flat_faces(on_edge, order);
+        let before = kept(flat.clone()).counts;
+        assert_eq!(before.degenerate, on_edge.len() as u64);
+        assert_eq!((before.boundary_facets, before.inconsistent_facets), (0, 0));
+        let fixed = fix(&flat, 0);
+        assert_eq!(fixed.repairs.divided_faces, on_edge.len() as u64);
+        assert_eq!(fixed.repairs.degenerate_faces, 0);
+        assert_eq!(
+            (fixed.after.boundary_facets, fixed.after.self_intersections),
+            (0, 0)
+        );
+        assert!((volume(&fixed.mesh) - 512.0 / 6.0).abs() < 1e-9);
+    }
+    // Faces that name a vertex twice have no place at all.
+    let mut collapsed = round(100);
+    let Elements::Triangles(faces) = &mut collapsed.elements else {
+        panic!("triangles")
+    };
+    faces.insert(7, [3, 3, 9]);
+    let fixed = fix(&collapsed, 0);
+    assert_eq!(
+        (fixed.repairs.degenerate_faces, fixed.repairs.divided_faces),
+        (1, 0)
+    );
+    assert_eq!(fixed.mesh, round(100));
+}
+
+#[test]
+fn the_fewest_faces_are_turned() {
+    let whole = round(800);
+    let fixed = fix(&turned(&whole, |ix| ix % 7 == 3), 0);
+    let n = faces(&whole).len().saturating_sub(4).div_ceil(7) as u64;
+    assert_eq!(fixed.repairs.turned_faces, n);
+    assert_eq!(fixed.mesh, whole);
+}
+
+#[test]
+fn shells_are_turned_by_what_is_inside_what() {
+    let parts = [
+        cube([-8.0; 3], 16.0),
+        cube([-4.0; 3], 8.0),
+        cube([-2.0; 3], 4.0),
+        cube([100.0; 3], 1.0),
+    ];
+    let expected = 4096.0 - 512.0 + 64.0 + 1.0;
+    for mask in 0..16 {
+        let shells: Vec<Mesh> = (0..4)
+            .map(|ix| turned(&parts[ix], |_| mask >> ix & 1 == 1))
+            .collect();
+        let fixed = fix(&together(&shells), 0);
+        assert!((volume(&fixed.mesh) - expected).abs() < 1e-6, "{mask}");
+        assert_eq!((fixed.repairs.shells, fixed.repairs.cavities), (4, 1));
+        // Given are: outward, inward, outward, outward.
+        let n_wrong = u64::from((mask ^ 2u32).count_ones());
+        assert_eq!(fixed.repairs.turned_shells, n_wrong, "{mask}");
+    }
+    // Boxes that pass through each other contain nothing of each other, and touching a wall from inside is inside.
+    let crossing = together(&[cube([0.0; 3], 2.0), turned(&cube([1.0; 3], 2.0), |_| true)]);
+    let fixed = fix(&crossing, 0);
+    assert_eq!(
+        (fixed.repairs.turned_shells, fixed.repairs.cavities),
+        (1, 0)
+    );
+    assert!(fixed.after.self_intersections > 0);
+    let mut touching = together(&[cube([0.0; 3], 4.0), cube([1.0, 1.0, 0.0], 1.0)]);
+    touching.positions.narrow_if_exact();
+    let fixed = fix(&touching, 0);
+    assert_eq!(
+        (fixed.repairs.turned_shells, fixed.repairs.cavities),
+        (1, 1)
+    );
+}
+
+#[test]
+fn boxes_that_share_an_edge_or_a_vertex_come_apart() {
+    // Around an edge, two to four boxes touch; of three or four, neighbours share walls, which then are there twice.
+    let sharing = |lows: &[[f64; 3]]| {
+        let parts: Vec<Mesh> = lows.iter().map(|&low| cube(low, 1.0)).collect();
+        together(&parts)
+    };
+    let edge = sharing(&[[0.0; 3], [1.0, 1.0, 0.0]]);
+    let before = check_mesh(edge.clone(), &Options::default())
+        .unwrap()
+        .counts;
+    assert_eq!(before.non_manifold_facets, 1);
+    for flipped in [false, true] {
+        let fixed = fix(&turned(&edge, |ix| flipped && ix >= 12), 0);
+        assert_eq!(
+            (fixed.repairs.split_edges, fixed.repairs.split_edges_added),
+            (1, 2)
+        );
+        assert_eq!(
+            (fixed.after.components, fixed.after.boundary_facets),
+            (2, 0)
+        );
+        assert_eq!(
+            fixed.after.self_intersections, 0,
+            "touching is no intersection"
+        );
+        assert_eq!(fixed.repairs.shells, 2);
+        assert!((volume(&fixed.mesh) - 2.0).abs() < 1e-12);
+        assert!(fixed.has_seams());
+    }
+    let vertex = sharing(&[[0.0; 3], [1.0; 3]]);
+    let fixed = fix(&vertex, 0);
+    assert_eq!(
+        (
+            fixed.repairs.split_vertices,
+            fixed.repairs.split_vertices_added
+        ),
+        (1, 1)
+    );
+    assert_eq!(
+        (fixed.after.components, fixed.after.boundary_facets),
+        (2, 0)
+    );
+    // Two boxes with a common wall: kept twice, it parts into two boxes.
+    let wall = sharing(&[[0.0; 3], [1.0, 0.0, 0.0]]);
+    let options = FixOptions {
+        repairs: Repair::ALL
+            .into_iter()
+            .filter(|&it| it != Repair::Duplicates)
+            .collect(),
+        ..FixOptions::default()
+    };
+    let fixed = fix_mesh(wall, &options).unwrap();
+    assert_eq!(fixed.after.components, 2);
+    assert_eq!(
+        (fixed.after.boundary_facets, fixed.after.non_manifold_facets),
+        (0, 0)
+    );
+}
+
+#[test]
+fn holes_are_closed_up_to_a_number_of_edges() {
+    let whole = cube([0.0; 3], 1.0);
+    let without = |gone: &[usize]| {
+        let left = faces(&whole).iter().enumerate();
+        let left = left
+            .filter(|(ix, _)| !gone.contains(ix))
+            .map(|(_, &face)| face);
+        mesh(whole.positions.to_f64(), left.collect())
+    };
+    let triangle = without(&[3]);
+    assert_eq!(fix(&triangle, 0).after.boundary_facets, 3);
+    let fixed = fix(&triangle, 3);
+    assert_eq!(
+        (fixed.repairs.closed_holes, fixed.repairs.added_faces),
+        (1, 1)
+    );
+    assert_eq!(
+        (fixed.after.boundary_facets, fixed.after.self_intersections),
+        (0, 0)
+    );
+    assert!((volume(&fixed.mesh) - 1.0).abs() < 1e-12);
+    let side = without(&[2, 3]);
+    assert_eq!(fix(&side, 3).repairs.closed_holes, 0);
+    let fixed = fix(&side, 4);
+    assert_eq!(
+        (fixed.repairs.closed_holes, fixed.after.boundary_facets),
+        (1, 0)
+    );
+    assert!((volume(&fixed.mesh) - 1.0).abs() < 1e-12);
+    // A needle through the hole keeps it open: the filling would be pierced.
+    let needle = mesh(
+        vec![[0.5, 0.25, 0.25], [1.5, 0.25, 0.25], [1.5, 0.375, 0.25]],
+        vec![[0, 1, 2]],
+    );
+    let pierced = together(&[side.clone(), needle]);
+    let fixed = fix(&pierced, 4);
+    assert_eq!(
+        (fixed.repairs.closed_holes, fixed.repairs.refused_holes),
+        (0, 2)
+    );
+    assert_eq!(fixed.after.self_intersections, 0);
+    assert_eq!(faces(&fixed.mesh).len(), faces(&pierced).len());
+}
+
+#[test]
+fn a_moebius_strip_is_said_and_left() {
+    let n = 12u32;
+    let at = |ix: u32, side: f64| {
+        let turn = f64::from(ix) / f64::from(n) * std::f64::consts::TAU;
+        let out = 4.0 + side * (turn / 2.0).cos();
+        [
+            out * turn.cos(),
+            out * turn.sin(),
+            side * (turn / 2.0).sin(),
+        ]
+    };
+    let points = (0..n).flat_map(|ix| [at(ix, -1.0), at(ix, 1.0)]).collect();
+    let mut all = Vec::new();
+    for ix in 0..n {
+        let (a, b) = (2 * ix, 2 * ix + 1);
+        let (c, d) = if ix + 1 == n { (1, 0) } else { (a + 2, b + 2) };
+        all.extend([[a, b, c], [c, b, d]]);
+    }
+    let strip = mesh(points, all);
+    let fixed = fix(&strip, 0);
+    assert_eq!(
+        (fixed.repairs.non_orientable, fixed.repairs.turned_faces),
+        (1, 0)
+    );
+    assert_eq!(fixed.mesh, strip);
+    assert!(fixed.after.inconsistent_facets > 0);
+}
+
+#[test]
+fn only_what_is_asked_is_done() {
+    let mut bad = turned(&with_flat_faces(&[3.0], false), |ix| ix == 1);
+    let Elements::Triangles(more) = &mut bad.elements else {
+        panic!("triangles")
+    };
+    more.push(more[0]);
+    let options = |repairs: &[Repair]| FixOptions {
+        repairs: repairs.to_vec(),
+        ..FixOptions::default()
+    };
+    assert_eq!(fix_mesh(bad.clone(), &options(&[])).unwrap().mesh, bad);
+    let fixed = fix_mesh(bad.clone(), &options(&[Repair::Duplicates])).unwrap();
+    assert_eq!((fixed.after.duplicates, fixed.after.degenerate), (0, 1));
+    let fixed = fix_mesh(bad, &options(&[Repair::Degenerate, Repair::Orient])).unwrap();
+    assert_eq!((fixed.after.duplicates, fixed.after.degenerate), (1, 0));
+}
+
+#[test]
+fn refusals_name_numbers() {
+    let tets = Mesh {
+        positions: Positions::F32(vec![[0.0; 3]; 4]),
+        elements: Elements::Tetrahedra(vec![[0, 1, 2, 3]]),
+    };
+    let error = fix_mesh(tets, &FixOptions::default()).unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        "1 tetrahedra: only meshes of triangles are mended"
+    );
+    let options = FixOptions {
+        close_holes: 257,
+        ..FixOptions::default()
+    };
+    let error = fix_mesh(cube([0.0; 3], 1.0), &options).unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        "holes of up to 257 edges: at most 256 can be asked for"
+    );
+    let far = mesh(vec![[0.0; 3]], vec![[0, 0, 9]]);
+    assert!(
+        fix_mesh(far, &FixOptions::default())
+            .unwrap_err()
+            .to_string()
+            .contains('9')
+    );
+}
+
+/// Faces at random on few places: every defect at once, surfaces that come back to an edge, Möbius strips, needles, copies.
+#[test]
+fn random_soups_come_out_as_promised_and_stay_so() {
+    let mut generator = Random::new(7);
+    let mut random = |n: u32| generator.below(n);
+    let (mut n_split, mut n_divided, mut n_closed, mut n_shells) = (0, 0, 0, 0);
+    for round in 0..3000 {
+        let n_points = 4 + random(9);
+        let size = 2 + random(3);
+        let points = (0..n_points).map(|_| [0; 3].map(|_| f64::from(random(size))));
+        let points: Vec<[f64; 3]> = points.collect();
+        let n_faces = 1 + random(28);
+        let soup = (0..n_faces)
+            .map(|_| [0; 3].map(|_| random(n_points)))
+            .collect();
+        let soup = mesh(points, soup);
+        let holes = if round % 3 == 0 { 6 } else { 0 };
+        let fixed = fix(&soup, holes);
+        n_split += fixed.repairs.split_edges;
+        n_divided += fixed.repairs.divided_faces;
+        n_closed += fixed.repairs.closed_holes;
+        n_shells += fixed.repairs.shells;
+        if holes > 0 {
+            assert!(fixed.after.self_intersections <= fix(&soup, 0).after.self_intersections);
+        }
+        if !faces(&fixed.mesh).is_empty() {
+            let again = fix(&fixed.mesh, 0).after;
+            assert_eq!(
+                (again.n_triangles, again.self_intersections),
+                (fixed.after.n_triangles, fixed.after.self_intersections)
+            );
+        }
+    }
+    // The soups are as bad as they are meant to be.
+    assert!(
+        n_split > 1000 && n_divided > 5 && n_closed > 20 && n_shells > 20,
+        "{n_split} {n_divided} {n_closed} {n_shells}"
+    );
+}

@@ -1,0 +1,360 @@
+//! `impinge fix`: mends a mesh without moving a vertex.
+
+mod args;
+
+use std::io::{Read, Write, stdin};
+use std::path::Path;
+
+use impinge_check::{Counts, FixError, FixOptions, Fixed, Repair, Row, fix_mesh};
+use impinge_io::{
+    Cell, ColoredMesh, ELEMENTS, Elements, Mesh, ReadOptions, printable, read, read_bytes,
+    write_obj, write_ply,
+};
+use serde_json::{Map, Value, json};
+
+pub use self::args::{FIX_EXAMPLES, FixArgs};
+use crate::apart::Inputs;
+use crate::commands::check::fail;
+use crate::error::Error;
+use crate::output;
+use crate::rows;
+use crate::text::counted;
+
+/// `impinge fix`.
+pub fn fix(args: &FixArgs) -> Result<(), Error> {
+    let inputs = Inputs::new([&args.mesh]);
+    inputs.check("--out", &args.out.path)?;
+    let rows_file = args.rows.file(&inputs, args.json)?;
+    let repairs = args.repairs();
+    if args
+        .only
+        .iter()
+        .any(|&it| Repair::from(it) == Repair::CloseHoles)
+        && args.close_holes.is_none()
+    {
+        let text = "--only close-holes: --close-holes N says of how many edges";
+        return Err(Error::Usage(text.to_owned()));
+    }
+    if !args.force && args.out.path.exists() {
+        return Err(Error::Usage(format!(
+            "--out {}: the file exists; --force replaces it",
+            printable(&args.out.path)
+        )));
+    }
+    let options = FixOptions {
+        repairs,
+        close_holes: args.close_holes.unwrap_or(0),
+        threads: args.threads.map_or(0, usize::from),
+    };
+    let fixed = fix_mesh(read_mesh(args)?, &options).map_err(|error| match error {
+        FixError::Refused(source) => Error::Refused {
+            what: args.mesh.display().to_string(),
+            source,
+        },
+        other => Error::Usage(format!("{}: {other}", printable(&args.mesh))),
+    })?;
+    // Files are written first: if one can't be written, no answer is printed that looks like success.
+    write(args, &fixed.mesh)?;
+    if let Some(file) = &rows_file {
+        let pairs = &fixed.self_intersections;
+        if (pairs.len() as u64) < fixed.after.self_intersections {
+            return Err(Error::Usage(format!(
+                "--rows: {} pairs, many of them of faces with the same vertices, are only counted",
+                fixed.after.self_intersections
+            )));
+        }
+        let cells = |&[a, b]: &[u32; 2]| [0, a, 0, b].map(Cell::Number);
+        rows::write(file, ELEMENTS.into(), pairs.len(), pairs.iter().map(cells))?;
+    }
+    if args.json {
+        writeln!(output::out(), "{}", object(args, &options, &fixed))?;
+    } else {
+        output::say(text(args, &options, &fixed).as_bytes(), rows_file.as_ref())?;
+    }
+    fail(&[row(&args.out.path, false, fixed.after)], &args.fail_on)
+}
+
+fn read_mesh(args: &FixArgs) -> Result<Mesh, Error> {
+    let options = ReadOptions::as_they_are();
+    if args.mesh != Path::new("-") {
+        return Ok(read(&args.mesh, &options)?);
+    }
+    let Some(format) = args.format else {
+        let text = "a mesh on standard input needs its format, such as --format off";
+        return Err(Error::Usage(text.to_owned()));
+    };
+    let mut bytes = Vec::new();
+    let mut input = stdin()
+        .lock()
+        .take(options.max_file_bytes.saturating_add(1));
+    let read = |source| Error::Read {
+        path: args.mesh.clone(),
+        source,
+    };
+    input.read_to_end(&mut bytes).map_err(read)?;
+    Ok(read_bytes(&bytes, format, "standard input", &options)?)
+}
+
+fn write(args: &FixArgs, mesh: &Mesh) -> Result<(), Error> {
+    let path = &args.out.path;
+    match &mesh.elements {
+        Elements::Triangles(faces) if args.out.is_obj => write_obj(path, &mesh.positions, faces)?,
+        elements => {
+            let body = ColoredMesh {
+                positions: &mesh.positions,
+                elements,
+                primitive_colors: None,
+                colliding: None,
+                name: "mended",
+            };
+            write_ply(path, &[body])?;
+        }
+    }
+    Ok(())
+}
+
+fn row(path: &Path, is_welded: bool, counts: Counts) -> Row {
+    Row {
+        path: path.display().to_string(),
+        is_welded,
+        result: Ok(counts),
+    }
+}
+
+/// The numbers of a repair, by their names in JSON.
+fn numbers(repair: Repair, fixed: &Fixed) -> Vec<(&'static str, u64)> {
+    let done = &fixed.repairs;
+    match repair {
+        Repair::Weld => vec![("vertices_removed", done.welded_vertices)],
+        Repair::Duplicates => vec![("faces_removed", done.duplicate_faces)],
+        Repair::Degenerate => vec![
+            ("faces_removed", done.degenerate_faces),
+            ("faces_divided", done.divided_faces),
+        ],
+        Repair::Orient => vec![
+            ("faces_turned", done.turned_faces),
+            ("pieces_not_orientable", done.non_orientable),
+        ],
+        Repair::SplitEdges => vec![
+            ("edges_split", done.split_edges),
+            ("vertices_added", done.split_edges_added),
+        ],
+        Repair::SplitVertices => vec![
+            ("vertices_split", done.split_vertices),
+            ("vertices_added", done.split_vertices_added),
+        ],
+        Repair::CloseHoles => vec![
+            ("holes_closed", done.closed_holes),
+            ("faces_added", done.added_faces),
+            ("holes_refused", done.refused_holes),
+        ],
+        Repair::Outward => vec![
+            ("shells", done.shells),
+            ("cavities", done.cavities),
+            ("shells_turned", done.turned_shells),
+            ("shells_flat", done.flat_shells),
+        ],
+        Repair::Unused => vec![("vertices_removed", done.unused_vertices)],
+    }
+}
+
+/// The object that `docs/fix.schema.json` describes.
+fn object(args: &FixArgs, options: &FixOptions, fixed: &Fixed) -> Value {
+    let mut repairs = Map::new();
+    for repair in Repair::ALL {
+        let mut of = Map::new();
+        of.insert("asked".into(), options.repairs.contains(&repair).into());
+        for (name, n) in numbers(repair, fixed) {
+            of.insert(name.into(), n.into());
+        }
+        repairs.insert(repair.name().into(), of.into());
+    }
+    let welds = options.repairs.contains(&Repair::Weld);
+    let mut before = row(&args.mesh, welds, fixed.before);
+    if args.mesh == Path::new("-") {
+        before.path = "-".to_owned();
+    }
+    json!({
+        "path": before.path,
+        "out": args.out.path.display().to_string(),
+        "repairs": repairs,
+        "close_holes": options.close_holes,
+        "seams": fixed.has_seams(),
+        "before": before.to_json(),
+        "after": row(&args.out.path, false, fixed.after).to_json(),
+    })
+}
+
+/// What was done, what is left, and what to do next.
+fn text(args: &FixArgs, options: &FixOptions, fixed: &Fixed) -> String {
+    let done = &fixed.repairs;
+    let size = |counts: &Counts| {
+        let faces = counted(counts.n_triangles, "face");
+        format!("{faces}, {}", vertices(counts.n_vertices))
+    };
+    let mut text = format!("{}: {}\n", printable(&args.mesh), size(&fixed.before));
+    let mut is_changed = false;
+    for &repair in &options.repairs {
+        let said = said(repair, fixed);
+        if said.is_empty() {
+            continue;
+        }
+        is_changed = true;
+        text += &format!("  {:<15} {}\n", repair.name(), said.join(", "));
+    }
+    if !is_changed {
+        text += "  nothing to mend\n";
+    }
+    text += &format!("{}: {}\n", printable(&args.out.path), size(&fixed.after));
+    let after = &fixed.after;
+    let left: Vec<String> = [
+        (
+            after.self_intersections,
+            "pair of faces that intersect",
+            "pairs of faces that intersect",
+        ),
+        (after.degenerate, "degenerate face", "degenerate faces"),
+        (after.duplicates, "duplicate face", "duplicate faces"),
+        (
+            after.non_manifold_facets,
+            "non-manifold edge",
+            "non-manifold edges",
+        ),
+        (
+            after.non_manifold_vertices,
+            "non-manifold vertex",
+            "non-manifold vertices",
+        ),
+        (
+            after.inconsistent_facets,
+            "edge of inconsistent orientation",
+            "edges of inconsistent orientation",
+        ),
+        (after.boundary_facets, "border edge", "border edges"),
+        (
+            done.non_orientable,
+            "piece without an orientation",
+            "pieces without an orientation",
+        ),
+        (
+            done.flat_shells,
+            "shell without volume",
+            "shells without volume",
+        ),
+        (
+            after.unused_vertices,
+            "vertex of no face",
+            "vertices of no face",
+        ),
+    ]
+    .into_iter()
+    .filter(|&(n, ..)| n > 0)
+    .map(|(n, one, many)| several(n, one, many))
+    .collect();
+    let left = match left.is_empty() {
+        true => "nothing".to_owned(),
+        false => left.join(", "),
+    };
+    text += &format!("left: {left}\n");
+    let seams = if fixed.has_seams() {
+        " --keep-seams"
+    } else {
+        ""
+    };
+    text += &format!("next: impinge check {}{seams}\n", printable(&args.out.path));
+    text
+}
+
+/// What a repair did, in words; nothing if it did nothing.
+fn said(repair: Repair, fixed: &Fixed) -> Vec<String> {
+    let done = &fixed.repairs;
+    let faces = |n: u64| counted(n, "face");
+    let of = |n: u64, text: String| (n > 0).then_some(text);
+    let said = match repair {
+        Repair::Weld => vec![of(
+            done.welded_vertices,
+            vertices(done.welded_vertices) + " removed",
+        )],
+        Repair::Duplicates => vec![of(
+            done.duplicate_faces,
+            faces(done.duplicate_faces) + " removed",
+        )],
+        Repair::Degenerate => vec![
+            of(
+                done.degenerate_faces,
+                faces(done.degenerate_faces) + " removed",
+            ),
+            of(
+                done.divided_faces,
+                faces(done.divided_faces) + " used to divide a neighbour",
+            ),
+        ],
+        Repair::Orient => vec![
+            of(done.turned_faces, faces(done.turned_faces) + " turned"),
+            of(
+                done.non_orientable,
+                counted(done.non_orientable, "piece") + " not orientable",
+            ),
+        ],
+        Repair::SplitEdges => vec![
+            of(
+                done.split_edges,
+                counted(done.split_edges, "edge") + " split",
+            ),
+            of(
+                done.split_edges_added,
+                vertices(done.split_edges_added) + " added",
+            ),
+        ],
+        Repair::SplitVertices => vec![
+            of(
+                done.split_vertices,
+                vertices(done.split_vertices) + " split",
+            ),
+            of(
+                done.split_vertices_added,
+                vertices(done.split_vertices_added) + " added",
+            ),
+        ],
+        Repair::CloseHoles => vec![
+            of(
+                done.closed_holes,
+                format!(
+                    "{} closed with {}",
+                    counted(done.closed_holes, "hole"),
+                    faces(done.added_faces)
+                ),
+            ),
+            of(
+                done.refused_holes,
+                counted(done.refused_holes, "hole") + " without a filling that is sound",
+            ),
+        ],
+        Repair::Outward if done.turned_shells == 0 => Vec::new(),
+        Repair::Outward => vec![
+            of(
+                done.turned_shells,
+                format!(
+                    "{} of {} turned",
+                    done.turned_shells,
+                    counted(done.shells, "shell")
+                ),
+            ),
+            of(done.cavities, several(done.cavities, "cavity", "cavities")),
+        ],
+        Repair::Unused => vec![of(
+            done.unused_vertices,
+            vertices(done.unused_vertices) + " removed",
+        )],
+    };
+    said.into_iter().flatten().collect()
+}
+
+fn vertices(n: u64) -> String {
+    several(n, "vertex", "vertices")
+}
+
+fn several(n: u64, one: &str, many: &str) -> String {
+    let word = if n == 1 { one } else { many };
+    format!("{} {word}", crate::text::grouped(n))
+}

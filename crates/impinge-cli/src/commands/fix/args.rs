@@ -1,0 +1,127 @@
+//! The command line of `impinge fix`.
+
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use impinge_check::{MOST_HOLE_EDGES, Repair};
+
+use crate::args::RowsArgs;
+use crate::commands::check::FailOn;
+use crate::values::{ReachedFile, mesh_format, threads};
+
+/// Shown below the help.
+pub const FIX_EXAMPLES: &str = "\
+Examples:
+  impinge fix part.stl --out mended.ply
+  impinge fix part.obj --out mended.obj --close-holes 8
+  impinge fix part.obj --out mended.obj --only weld,orient,outward
+  impinge fix part.ply --out mended.ply --skip duplicates --json
+  impinge fix part.ply --out mended.ply --rows left.csv --fail-on any
+
+No vertex is moved: each vertex of the result has the bits of a vertex of the file. What cannot be mended this way, above all
+self-intersections, is counted and stays; --rows lists their pairs, by the faces of the result. Edges and vertices that were split
+are at one position: `impinge check --keep-seams` sees them apart, other readers that weld join them again.";
+
+#[derive(Debug, Args)]
+pub struct FixArgs {
+    /// A mesh file with triangles
+    #[arg(value_name = "MESH")]
+    pub mesh: PathBuf,
+    /// The mended mesh (.ply or .obj)
+    #[arg(long, value_name = "FILE")]
+    pub out: ReachedFile,
+    /// Replace the file if it exists
+    #[arg(long)]
+    pub force: bool,
+    /// Mend only this (comma-separated) [default: everything]
+    #[arg(long, value_name = "WHAT", value_enum, value_delimiter = ',')]
+    pub only: Vec<RepairArg>,
+    /// Mend everything but this (comma-separated)
+    #[arg(
+        long,
+        value_name = "WHAT",
+        value_enum,
+        value_delimiter = ',',
+        conflicts_with = "only"
+    )]
+    pub skip: Vec<RepairArg>,
+    /// Close holes of up to N edges, 3 to 256 [default: none]
+    #[arg(long, value_name = "N", value_parser = hole_edges)]
+    pub close_holes: Option<usize>,
+    /// The format of a mesh on standard input, which is named "-": ply, off, stl, …
+    #[arg(long, value_name = "EXT", value_parser = mesh_format)]
+    pub format: Option<impinge_io::Format>,
+    /// Exit with code 3 if the result still has one of these problems (comma-separated)
+    #[arg(long, value_name = "WHAT", value_enum, value_delimiter = ',')]
+    pub fail_on: Vec<FailOn>,
+    /// CPU threads, 1 to 1024 [default: one per core]
+    #[arg(long, value_name = "N", value_parser = threads)]
+    pub threads: Option<NonZeroUsize>,
+    /// Print JSON and nothing else
+    #[arg(long)]
+    pub json: bool,
+    #[command(flatten)]
+    pub rows: RowsArgs,
+}
+
+impl FixArgs {
+    /// The repairs that are asked for, in the order in which they run.
+    pub fn repairs(&self) -> Vec<Repair> {
+        let named = |list: &[RepairArg], repair| list.iter().any(|&it| Repair::from(it) == repair);
+        let asks = |repair: &Repair| {
+            let chosen = self.only.is_empty() || named(&self.only, *repair);
+            let has_limit = *repair != Repair::CloseHoles || self.close_holes.is_some();
+            chosen && has_limit && !named(&self.skip, *repair)
+        };
+        Repair::ALL.into_iter().filter(asks).collect()
+    }
+}
+
+/// [`Repair`] as an option.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum RepairArg {
+    /// Vertices at exactly the same position become one
+    Weld,
+    /// Of faces with the same vertices the first stays
+    Duplicates,
+    /// Faces of zero area go; one along an edge divides its neighbour there, so that no gap opens
+    Degenerate,
+    /// Neighbours get the same orientation, by turning the fewest faces of each piece
+    Orient,
+    /// Edges of more than two faces come apart
+    SplitEdges,
+    /// Vertices of several fans come apart
+    SplitVertices,
+    /// Holes of up to --close-holes edges are closed
+    CloseHoles,
+    /// Closed shells are turned outward, cavities inward
+    Outward,
+    /// Vertices of no face go
+    Unused,
+}
+
+impl From<RepairArg> for Repair {
+    fn from(arg: RepairArg) -> Repair {
+        match arg {
+            RepairArg::Weld => Repair::Weld,
+            RepairArg::Duplicates => Repair::Duplicates,
+            RepairArg::Degenerate => Repair::Degenerate,
+            RepairArg::Orient => Repair::Orient,
+            RepairArg::SplitEdges => Repair::SplitEdges,
+            RepairArg::SplitVertices => Repair::SplitVertices,
+            RepairArg::CloseHoles => Repair::CloseHoles,
+            RepairArg::Outward => Repair::Outward,
+            RepairArg::Unused => Repair::Unused,
+        }
+    }
+}
+
+fn hole_edges(text: &str) -> Result<usize, String> {
+    match text.parse() {
+        Ok(n) if (3..=MOST_HOLE_EDGES).contains(&n) => Ok(n),
+        _ => Err(format!(
+            "expected a number of edges from 3 to {MOST_HOLE_EDGES}"
+        )),
+    }
+}
