@@ -113,7 +113,11 @@ pub fn _serve_check(
     threads: usize,
     memory: Option<u64>,
 ) -> PyResult<()> {
-    let options = Options { weld, threads };
+    let options = Options {
+        weld,
+        keep_seams: false,
+        threads,
+    };
     py.detach(|| {
         apply_limits(&Limits { memory })?;
         serve(std::io::stdin().lock(), std::io::stdout().lock(), &options)
