@@ -142,3 +142,17 @@ def test_a_wheel_in_an_empty_environment(python, tmp_path):
     assert out.stdout == f"{impinge.__version__} [[0, 0]]\n", out.stderr
     files = set((home / "lib").rglob("impinge/*")) | set((home / "Lib").rglob("impinge/*"))
     assert {"py.typed", "_impinge.pyi", "__init__.py"} <= {file.name for file in files}
+
+
+def test_without_the_c_library_that_is_said(tmp_path):
+    # scripts/test-c tries wheels that have it.
+    holder = pathlib.Path(impinge.__file__).parent
+    if (holder / "_c").exists():
+        pytest.skip("this build has the C library")
+    out = subprocess.run([sys.executable, "-m", "impinge.cmake"], capture_output=True, text=True, cwd=tmp_path)
+    assert out.returncode == 1 and out.stdout == "" and f"{holder / '_c'}: this build of the module has no C library" in out.stderr
+
+    from impinge import cmake
+
+    with pytest.raises(FileNotFoundError):
+        cmake.prefix()
