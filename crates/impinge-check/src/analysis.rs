@@ -10,8 +10,10 @@ use impinge_io::{Elements, Mesh, Positions, weld};
 use crate::copies::Copies;
 use crate::facets::{Facet, facets, groups, is_simplex};
 use crate::marks::{Marks, Problem};
+use crate::places::{Place, places};
 use crate::row::Counts;
 use crate::union_find::UnionFind;
+use crate::volume;
 
 /// How a mesh is checked.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -23,6 +25,10 @@ pub struct Options {
     /// position welded. [`fix_mesh`](crate::fix_mesh) parts edges and vertices without moving them: welding everything would
     /// join them again, and welding nothing would report that they touch. [`weld`](Self::weld) is then ignored.
     pub keep_seams: bool,
+    /// The most [places](crate::Place) of each problem that are said, largest first; 3 by default. No count depends on it.
+    pub places: usize,
+    /// Whether places name all their elements, not only the first few.
+    pub faces: bool,
     /// CPU threads of the self-intersection search; 0 means one per core. No count depends on it.
     pub threads: usize,
 }
@@ -32,6 +38,8 @@ impl Default for Options {
         Options {
             weld: true,
             keep_seams: false,
+            places: 3,
+            faces: false,
             threads: 0,
         }
     }
@@ -44,6 +52,8 @@ pub struct Checked {
     pub counts: Counts,
     /// The problems of each primitive, in the order of the mesh.
     pub marks: Vec<Marks>,
+    /// Where the problems are.
+    pub places: Vec<Place>,
     /// The checked mesh: welded, if the options say so.
     pub mesh: Mesh,
 }
@@ -57,12 +67,11 @@ pub fn check_mesh(mesh: Mesh, options: &Options) -> Result<Checked, Error> {
     Ok(check(mesh, options)?.0)
 }
 
-/// The counts of a mesh, and the pairs that [`Counts::self_intersections`] counts; none if they are more than the search lists.
-pub fn check_listed(mesh: Mesh, options: &Options) -> Result<(Counts, Vec<[u32; 2]>), Error> {
+/// The check of a mesh, and the pairs that [`Counts::self_intersections`] counts; none if they are more than the search lists.
+pub fn check_listed(mesh: Mesh, options: &Options) -> Result<(Checked, Vec<[u32; 2]>), Error> {
     let (checked, pairs) = check(mesh, options)?;
-    let counts = checked.counts;
-    let is_whole = pairs.len() as u64 == counts.self_intersections;
-    Ok((counts, if is_whole { pairs } else { Vec::new() }))
+    let is_whole = pairs.len() as u64 == checked.counts.self_intersections;
+    Ok((checked, if is_whole { pairs } else { Vec::new() }))
 }
 
 /// Whether each primitive intersects another one, vertices at one position welded.
@@ -96,10 +105,16 @@ fn check(mut mesh: Mesh, options: &Options) -> Result<(Checked, Vec<[u32; 2]>), 
         intersections(&mesh, options, &mut counts, &mut marks)?
     };
     duplicates(&mesh, &mut counts, &mut marks);
+    let fans;
     match &mesh.elements {
         Elements::Triangles(triangles) => {
             counts.n_triangles = triangles.len() as u64;
-            topology(triangles, mesh.n_vertices(), &mut counts, &mut marks)?;
+            fans = topology(triangles, mesh.n_vertices(), &mut counts, &mut marks)?;
+            if counts.is_watertight == Some(true) && counts.inconsistent_facets == 0 {
+                let points = |corners: &[u32; 3]| corners.map(|vertex| at(&mesh.positions, vertex));
+                let volume = volume::rounded(triangles.iter().map(points));
+                counts.volume = Some(volume).filter(|volume| volume.is_finite());
+            }
             degenerate(
                 &mesh.positions,
                 triangles,
@@ -110,7 +125,7 @@ fn check(mut mesh: Mesh, options: &Options) -> Result<(Checked, Vec<[u32; 2]>), 
         }
         Elements::Tetrahedra(tets) => {
             counts.n_tetrahedra = tets.len() as u64;
-            topology(tets, mesh.n_vertices(), &mut counts, &mut marks)?;
+            fans = topology(tets, mesh.n_vertices(), &mut counts, &mut marks)?;
             degenerate(
                 &mesh.positions,
                 tets,
@@ -122,6 +137,7 @@ fn check(mut mesh: Mesh, options: &Options) -> Result<(Checked, Vec<[u32; 2]>), 
     }
     let checked = Checked {
         counts,
+        places: places(&mesh, &marks, &fans, options.places, options.faces),
         marks,
         mesh,
     };
@@ -216,13 +232,13 @@ fn intersections(
     Ok(found)
 }
 
-/// Counts and marks everything that depends on vertex indices alone.
+/// Counts and marks everything that depends on vertex indices alone. Returns the vertices of several fans, ascending.
 fn topology<const K: usize>(
     elements: &[[u32; K]],
     n_vertices: usize,
     counts: &mut Counts,
     marks: &mut [Marks],
-) -> Result<(), Error> {
+) -> Result<Vec<u32>, Error> {
     let n_corners = u32::try_from(elements.len() * K).map_err(|_| Error::TooMany {
         what: "corners of primitives",
         given: (elements.len() * K) as u64,
@@ -233,7 +249,9 @@ fn topology<const K: usize>(
     let mut borders = UnionFind::new(n_vertices as u32);
     let mut on_border = vec![false; n_vertices];
     let sorted = facets(elements, n_vertices);
+    let mut n_facets = 0i64;
     for group in groups(&sorted) {
+        n_facets += 1;
         let problem = match group {
             [alone] => {
                 counts.boundary_facets += 1;
@@ -265,8 +283,14 @@ fn topology<const K: usize>(
     counts.components = n_roots(&mut pieces, |element| {
         is_simplex(&elements[element as usize])
     });
-    count_vertices(elements, n_vertices, &mut corners, counts);
-    Ok(())
+    let (n_used, fans) = count_vertices(elements, n_vertices, &mut corners, counts);
+    if K == 3 {
+        let n_faces = elements.iter().filter(|held| is_simplex(held)).count() as i64;
+        counts.euler = Some(n_used - n_facets + n_faces);
+        let has_pairs = counts.boundary_facets + counts.non_manifold_facets == 0;
+        counts.is_watertight = Some(has_pairs && n_faces > 0);
+    }
+    Ok(fans)
 }
 
 /// Two primitives with a common facet belong to one piece, and to one fan around each vertex of the facet.
@@ -295,13 +319,14 @@ fn n_roots(sets: &mut UnionFind, counts: impl Fn(u32) -> bool) -> u64 {
     (0..n).filter(|&x| counts(x) && sets.root(x) == x).count() as u64
 }
 
-/// Counts vertices of no primitive, and vertices around which primitives form several fans.
+/// Counts vertices of no primitive, and vertices around which primitives form several fans. Returns how many vertices belong to
+/// primitives that name no vertex twice, and those of several fans.
 fn count_vertices<const K: usize>(
     elements: &[[u32; K]],
     n_vertices: usize,
     corners: &mut UnionFind,
     counts: &mut Counts,
-) {
+) -> (i64, Vec<u32>) {
     const UNUSED: u8 = 0;
     const USED: u8 = 1;
     const ONE_FAN: u8 = 2;
@@ -325,7 +350,20 @@ fn count_vertices<const K: usize>(
     }
     let count = |sought: u8| states.iter().filter(|&&state| state == sought).count() as u64;
     counts.unused_vertices = count(UNUSED);
-    counts.non_manifold_vertices = count(SEVERAL_FANS);
+    let fans: Vec<u32> = (0u32..)
+        .zip(&states)
+        .filter(|(_, state)| **state == SEVERAL_FANS)
+        .map(|(vertex, _)| vertex)
+        .collect();
+    counts.non_manifold_vertices = fans.len() as u64;
+    ((count(ONE_FAN) + count(SEVERAL_FANS)) as i64, fans)
+}
+
+fn at(positions: &Positions, vertex: u32) -> Point {
+    match positions {
+        Positions::F32(held) => held[vertex as usize].map(f64::from),
+        Positions::F64(held) => held[vertex as usize],
+    }
 }
 
 fn degenerate<const K: usize>(
@@ -336,10 +374,7 @@ fn degenerate<const K: usize>(
     marks: &mut [Marks],
 ) {
     for (corners, marks) in elements.iter().zip(marks) {
-        let points = corners.map(|vertex| match positions {
-            Positions::F32(held) => held[vertex as usize].map(f64::from),
-            Positions::F64(held) => held[vertex as usize],
-        });
+        let points = corners.map(|vertex| at(positions, vertex));
         if is_flat(&points) {
             counts.degenerate += 1;
             marks.add(Problem::Degenerate);

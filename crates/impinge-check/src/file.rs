@@ -14,14 +14,15 @@ pub fn check_file(path: &Path, options: &Options) -> Row {
 
 /// Like [`check_file`], and also returns the mesh with the marks of its primitives if it could be checked.
 pub fn check_file_marked(path: &Path, options: &Options) -> (Row, Option<Checked>) {
-    let (result, checked) = match checked(path, options) {
-        Ok(checked) => (Ok(checked.counts), Some(checked)),
-        Err(failure) => (Err(failure), None),
+    let (result, places, checked) = match checked(path, options) {
+        Ok(checked) => (Ok(checked.counts), checked.places.clone(), Some(checked)),
+        Err(failure) => (Err(failure), Vec::new(), None),
     };
     let row = Row {
         path: path.display().to_string(),
         is_welded: options.weld,
         result,
+        places,
     };
     (row, checked)
 }

@@ -56,6 +56,18 @@ impl Problem {
         }
     }
 
+    /// The problem's name in rows, and in the program's `--fail-on`.
+    pub fn key(self) -> &'static str {
+        match self {
+            Problem::SelfIntersection => "self-intersections",
+            Problem::Duplicate => "duplicates",
+            Problem::NonManifold => "non-manifold",
+            Problem::Inconsistent => "orientation",
+            Problem::Degenerate => "degenerate",
+            Problem::Boundary => "boundary",
+        }
+    }
+
     /// The problem's name in a legend.
     pub fn name(self) -> &'static str {
         match self {

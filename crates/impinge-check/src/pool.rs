@@ -135,7 +135,7 @@ impl Pool<'_> {
                     if !is_short {
                         *held = Some(child);
                     }
-                    return Ok(row);
+                    return Ok(*row);
                 }
                 Answer::Cancelled => return Err(PoolError::Cancelled),
                 Answer::TooLate => {

@@ -2,8 +2,10 @@
 
 use serde_json::{Map, Value, json};
 
+use crate::places::Place;
+
 /// The counts of one mesh. Facets are edges of triangles and faces of tetrahedra.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Counts {
     /// Vertices, as in the file.
     pub n_vertices: u64,
@@ -39,6 +41,13 @@ pub struct Counts {
     pub components: u64,
     /// Vertices of no primitive, counted after welding.
     pub unused_vertices: u64,
+    /// Whether every edge belongs to exactly two triangles; `None` for tetrahedra.
+    pub is_watertight: Option<bool>,
+    /// The volume that the triangles enclose, rounded once, negative if they are inside out. `None` unless they are watertight and of one
+    /// orientation, and if it is larger than any `f64`. Of a surface that intersects itself, each part of space counts as often as the surface winds around it.
+    pub volume: Option<f64>,
+    /// Euler's characteristic V - E + F of the triangles, without vertices of no triangle and triangles that name a vertex twice; `None` for tetrahedra.
+    pub euler: Option<i64>,
 }
 
 /// Why a mesh has no counts.
@@ -99,7 +108,7 @@ pub struct Failure {
 }
 
 /// The result for one mesh.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Row {
     /// The file, as it was named.
     pub path: String,
@@ -107,6 +116,8 @@ pub struct Row {
     pub is_welded: bool,
     /// The counts, or why there are none.
     pub result: Result<Counts, Failure>,
+    /// Where the problems are: see [`Options::places`](crate::Options::places).
+    pub places: Vec<Place>,
 }
 
 impl Row {
@@ -123,6 +134,7 @@ impl Row {
                 kind,
                 message: lines.collect::<Vec<_>>().join("; "),
             }),
+            places: Vec::new(),
         }
     }
 
@@ -173,6 +185,9 @@ impl Row {
         );
         put("components", json!(number(|c| c.components)));
         put("unused_vertices", json!(number(|c| c.unused_vertices)));
+        put("watertight", json!(counts.and_then(|c| c.is_watertight)));
+        put("volume", json!(counts.and_then(|c| c.volume)));
+        put("euler", json!(counts.and_then(|c| c.euler)));
         if is_solid {
             put(
                 "duplicate_tetrahedra",
@@ -191,6 +206,11 @@ impl Row {
                 json!(of_kind(true, |c| c.inconsistent_facets)),
             );
         }
+        let places = || self.places.iter().map(Place::to_json).collect();
+        put(
+            "places",
+            counts.map_or(Value::Null, |_| Value::Array(places())),
+        );
         let failure = self.result.as_ref().err();
         put("error", json!(failure.map(|failure| &failure.message)));
         put(
@@ -217,6 +237,13 @@ impl Row {
             path: value.get("path")?.as_str()?.to_owned(),
             is_welded: value.get("welded")?.as_bool()?,
             result,
+            // Rows of earlier versions have none.
+            places: match value.get("places") {
+                Some(Value::Array(places)) => {
+                    places.iter().map(Place::from_json).collect::<Option<_>>()?
+                }
+                _ => Vec::new(),
+            },
         })
     }
 }
@@ -244,12 +271,16 @@ fn counts(value: &Value) -> Option<Counts> {
         inconsistent_facets: either("inconsistent_edges", "inconsistent_faces")?,
         components: number("components")?,
         unused_vertices: number("unused_vertices")?,
+        is_watertight: value.get("watertight").and_then(Value::as_bool),
+        volume: value.get("volume").and_then(Value::as_f64),
+        euler: value.get("euler").and_then(Value::as_i64),
     })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::marks::Problem;
 
     fn counted(n_triangles: u64, n_tetrahedra: u64) -> Row {
         Row {
@@ -272,7 +303,18 @@ mod tests {
                 inconsistent_facets: 14,
                 components: 15,
                 unused_vertices: 16,
+                is_watertight: (n_tetrahedra == 0).then_some(true),
+                volume: (n_triangles > 3).then_some(0.1),
+                euler: (n_tetrahedra == 0).then_some(-2),
             }),
+            places: vec![Place {
+                problem: Problem::Boundary,
+                vertex: (n_triangles > 3).then_some(7),
+                point: [0.1, -2.0, 1e-30],
+                size: 0.3,
+                n_elements: 4,
+                elements: vec![1, 5],
+            }],
         }
     }
 

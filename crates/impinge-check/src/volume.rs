@@ -1,7 +1,7 @@
-//! The sign of the volume of a closed surface, exactly.
+//! The signed volume of a closed surface: its sign, exactly, and its value, rounded once.
 //!
 //! Six times the volume is the sum of the determinants of all faces. A sum of floats with a bound of its error gives the
-//! sign of most meshes; where it cannot tell, coordinates are integers over one power of two, and so is the sum.
+//! sign of most meshes; where it cannot tell, and for the value, coordinates are integers over one power of two, and so is the sum.
 
 use impinge::exact::internal::{Integer, unit_of};
 use impinge::exact::{Point, Sign};
@@ -41,11 +41,17 @@ pub fn sign(faces: impl Iterator<Item = [Point; 3]> + Clone) -> Sign {
             return Sign::Negative;
         }
     }
-    sixfold(faces).sign()
+    sixfold(faces).0.sign()
 }
 
-/// Six times the volume, in the cube of a unit that all coordinates are multiples of.
-fn sixfold(faces: impl Iterator<Item = [Point; 3]> + Clone) -> Integer {
+/// The volume that faces enclose, rounded to the nearest `f64`; infinite if it is larger than any.
+pub fn rounded(faces: impl Iterator<Item = [Point; 3]> + Clone) -> f64 {
+    let (sixfold, unit) = sixfold(faces);
+    sixfold.quotient(&Integer::from(6), 3 * unit, 53, -1074)
+}
+
+/// Six times the volume: an integer, and the exponent of the unit whose cube it counts.
+fn sixfold(faces: impl Iterator<Item = [Point; 3]> + Clone) -> (Integer, i64) {
     let coordinates = faces.clone().flatten().flatten();
     let unit = coordinates.filter_map(unit_of).min().unwrap_or(0);
     let mut sum = Integer::zero();
@@ -60,7 +66,7 @@ fn sixfold(faces: impl Iterator<Item = [Point; 3]> + Clone) -> Integer {
             sum = &sum + &(x * minor);
         }
     }
-    sum
+    (sum, unit)
 }
 
 #[cfg(test)]
@@ -76,6 +82,17 @@ mod tests {
         };
         let [o, x, y, z] = [[shift; 3], corner(0), corner(1), corner(2)];
         vec![[o, y, x], [o, x, z], [x, y, z], [y, o, z]]
+    }
+
+    #[test]
+    fn values_are_rounded_once() {
+        let volume = |faces: &[[Point; 3]]| rounded(faces.iter().copied());
+        assert_eq!(volume(&tetrahedron(1.0, 0.0)), 1.0 / 6.0);
+        assert_eq!(volume(&tetrahedron(3.0, 1e9)), 4.5);
+        // 1e15 + 0.125 is a float; its cube is lost in any sum of floats.
+        assert_eq!(volume(&tetrahedron(0.125, 1e15)), 0.125f64.powi(3) / 6.0);
+        assert_eq!(volume(&tetrahedron(1e150, 0.0)), f64::INFINITY);
+        assert_eq!(volume(&[]), 0.0);
     }
 
     #[test]

@@ -39,6 +39,9 @@ fn a_closed_surface_has_nothing() {
         n_triangles: 4,
         hash: Some(0),
         components: 1,
+        is_watertight: Some(true),
+        volume: Some(1.0 / 6.0),
+        euler: Some(2),
         ..Counts::default()
     };
     assert_eq!(counts, expected);
@@ -445,4 +448,105 @@ fn a_million_equal_faces_are_counted() {
     assert_eq!(counts.self_intersections, n * (n - 1) / 2 + n);
     assert_eq!((counts.hash, counts.duplicates), (None, n - 1));
     assert_eq!(counts.n_intersecting, n + 1);
+}
+
+#[test]
+fn volume_euler_and_watertightness_of_known_surfaces() {
+    let of = |faces: &[usize]| {
+        let (positions, all) = tetrahedron(1e9);
+        let faces = faces.iter().map(|&ix| all[ix]).collect();
+        counts(triangles(positions, faces))
+    };
+    let whole = of(&[0, 1, 2, 3]);
+    let said = |c: &Counts| (c.is_watertight, c.volume, c.euler);
+    assert_eq!(said(&whole), (Some(true), Some(1.0 / 6.0), Some(2)));
+    assert_eq!(said(&of(&[0, 1, 2])), (Some(false), None, Some(1)));
+    let (positions, mut faces) = tetrahedron(0.0);
+    for face in &mut faces {
+        face.swap(0, 1);
+    }
+    let inside_out = counts(triangles(positions.clone(), faces.clone()));
+    assert_eq!(said(&inside_out), (Some(true), Some(-1.0 / 6.0), Some(2)));
+    faces[0].swap(0, 1);
+    let mixed = counts(triangles(positions, faces));
+    assert_eq!(said(&mixed), (Some(true), None, Some(2)));
+    // A torus has a hole; its volume is that of its triangles.
+    let model = impinge_scenes::surfaces::torus(24, 12, 2.0, 0.5);
+    let impinge::Elements::Triangles(faces) = &model.elements else {
+        panic!("triangles")
+    };
+    let points: Vec<[f64; 3]> = model.positions.iter().map(|p| p.map(f64::from)).collect();
+    let torus = counts(triangles(points, faces.clone()));
+    assert_eq!((torus.is_watertight, torus.euler), (Some(true), Some(0)));
+    let round = 2.0 * std::f64::consts::PI.powi(2) * 2.0 * 0.25;
+    let volume = torus.volume.unwrap().abs();
+    assert!(volume < round && volume > 0.9 * round, "{volume} {round}");
+}
+
+#[test]
+fn places_are_where_the_problems_are() {
+    // Two tetrahedra far apart; a needle through a face of each, a hole in the second, and both touch a third one's vertex.
+    let (mut positions, mut faces) = tetrahedron(0.0);
+    let (far, more) = tetrahedron(100.0);
+    positions.extend(far);
+    faces.extend(more[..3].iter().map(|face| face.map(|v| v + 4)));
+    for at in [0.0, 100.0] {
+        let first = positions.len() as u32;
+        positions.extend(
+            [[0.2, 0.2, -0.1], [0.21, 0.2, -0.1], [0.2, 0.2, 0.1]]
+                .map(|p: [f64; 3]| p.map(|x| x + at)),
+        );
+        faces.push([first, first + 1, first + 2]);
+    }
+    let check = |most: usize, faces_too: bool| {
+        let options = Options {
+            places: most,
+            faces: faces_too,
+            ..Options::default()
+        };
+        let mesh = triangles(positions.clone(), faces.clone());
+        check_mesh(mesh, &options).unwrap().places
+    };
+    let places = check(9, false);
+    let crossing: Vec<_> = places
+        .iter()
+        .filter(|p| p.problem == Problem::SelfIntersection)
+        .collect();
+    assert_eq!(crossing.len(), 4);
+    // The needles and the faces that they pass through share no vertex: four places of one element.
+    for place in &crossing {
+        assert_eq!((place.n_elements, place.elements.len()), (1, 1));
+        let corners = faces[place.elements[0] as usize].map(|v| positions[v as usize]);
+        let middle = [0, 1, 2].map(|axis| corners.iter().map(|p| p[axis]).sum::<f64>() / 3.0);
+        for (found, expected) in place.point.iter().zip(middle) {
+            assert!((found - expected).abs() < 1e-9);
+        }
+    }
+    let borders: Vec<u64> = places
+        .iter()
+        .filter(|p| p.problem == Problem::Boundary)
+        .map(|p| p.n_elements)
+        .collect();
+    assert_eq!(borders, [3, 1, 1]);
+    assert_eq!(check(1, false).len(), 2);
+    assert_eq!(check(0, false), []);
+    // A strip of many faces names eight of them, or all.
+    let strip: Vec<[u32; 3]> = (0..30).map(|ix| [ix, ix + 1, ix + 2]).collect();
+    let points: Vec<[f64; 3]> = (0..32)
+        .map(|ix| [f64::from(ix), f64::from(ix % 2), 0.0])
+        .collect();
+    for (all, n) in [(false, 8), (true, 30)] {
+        let options = Options {
+            faces: all,
+            ..Options::default()
+        };
+        let places = check_mesh(triangles(points.clone(), strip.clone()), &options)
+            .unwrap()
+            .places;
+        let border = places
+            .iter()
+            .find(|p| p.problem == Problem::Boundary)
+            .unwrap();
+        assert_eq!((border.n_elements, border.elements.len()), (30, n));
+    }
 }

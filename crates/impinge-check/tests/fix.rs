@@ -104,6 +104,7 @@ fn kept(mesh: Mesh) -> Checked {
         weld: false,
         keep_seams: true,
         threads: 1,
+        ..Options::default()
     };
     check_mesh(mesh, &options).unwrap()
 }

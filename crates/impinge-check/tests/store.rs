@@ -13,6 +13,7 @@ fn row(path: &Path) -> Row {
         path: path.display().to_string(),
         is_welded: true,
         result: Ok(Counts::default()),
+        places: Vec::new(),
     }
 }
 

@@ -284,6 +284,21 @@ impl FromStr for PngFile {
     }
 }
 
+/// A file for a page.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct HtmlFile(pub PathBuf);
+
+impl FromStr for HtmlFile {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match extension(text).as_str() {
+            "html" | "htm" => Ok(HtmlFile(text.into())),
+            _ => Err("reports are written as .html".to_owned()),
+        }
+    }
+}
+
 /// Width and height in pixels with an `x` between them.
 pub fn size(text: &str) -> Result<[u32; 2], String> {
     text.split_once('x')

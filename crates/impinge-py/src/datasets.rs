@@ -115,8 +115,8 @@ pub fn _serve_check(
 ) -> PyResult<()> {
     let options = Options {
         weld,
-        keep_seams: false,
         threads,
+        ..Options::default()
     };
     py.detach(|| {
         apply_limits(&Limits { memory })?;

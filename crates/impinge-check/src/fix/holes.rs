@@ -71,6 +71,8 @@ pub fn close(
         let checked = Options {
             weld: false,
             keep_seams: true,
+            places: 0,
+            faces: false,
             threads: options.threads,
         };
         let intersects = intersecting_with_seams(&surface.mesh(), &checked)?;

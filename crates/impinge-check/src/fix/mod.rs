@@ -17,6 +17,7 @@ use impinge::exact::Point;
 use impinge_io::{Elements, Mesh, Positions, weld};
 
 use crate::analysis::{self, Options, check_mesh};
+use crate::places::Place;
 use crate::row::Counts;
 
 pub use holes::MOST_HOLE_EDGES;
@@ -147,6 +148,10 @@ pub struct Fixed {
     pub before: Counts,
     /// The check of the mended mesh, with [`keep_seams`](Options::keep_seams).
     pub after: Counts,
+    /// Where the problems of the mesh were.
+    pub places_before: Vec<Place>,
+    /// Where those of the mended mesh are.
+    pub places_after: Vec<Place>,
     /// The pairs of faces of the mended mesh that intersect, sorted. They are not mended. Empty if
     /// [`after`](Self::after) counts more than the pairs that [`check_mesh`] lists.
     pub self_intersections: Vec<[u32; 2]>,
@@ -245,8 +250,9 @@ pub fn fix_mesh(mesh: Mesh, options: &FixOptions) -> Result<Fixed, FixError> {
         weld: does(Repair::Weld),
         keep_seams: !does(Repair::Weld),
         threads: options.threads,
+        ..Options::default()
     };
-    let before = check_mesh(mesh.clone(), &checked_as_it_was)?.counts;
+    let was = check_mesh(mesh.clone(), &checked_as_it_was)?;
     let mut repairs = Repairs::default();
     let mut mesh = mesh;
     if does(Repair::Weld) {
@@ -283,27 +289,31 @@ pub fn fix_mesh(mesh: Mesh, options: &FixOptions) -> Result<Fixed, FixError> {
         repairs.unused_vertices = faces::remove_unused(&mut surface);
     }
     let mesh = surface.mesh();
-    let (after, self_intersections) = if surface.faces.is_empty() {
+    let (after, places_after, self_intersections) = if surface.faces.is_empty() {
         let n_vertices = surface.n_vertices() as u64;
         let nothing = Counts {
             n_vertices,
             unused_vertices: n_vertices,
             ..Counts::default()
         };
-        (nothing, Vec::new())
+        (nothing, Vec::new(), Vec::new())
     } else {
         let options = Options {
             weld: false,
             keep_seams: true,
             threads: options.threads,
+            ..Options::default()
         };
-        analysis::check_listed(mesh.clone(), &options)?
+        let (checked, pairs) = analysis::check_listed(mesh.clone(), &options)?;
+        (checked.counts, checked.places, pairs)
     };
     Ok(Fixed {
         mesh,
         repairs,
-        before,
+        before: was.counts,
         after,
+        places_before: was.places,
+        places_after,
         self_intersections,
     })
 }

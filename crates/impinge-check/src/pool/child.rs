@@ -30,7 +30,7 @@ pub struct Child {
 /// The result of asking a child.
 pub enum Answer {
     /// The row of the mesh.
-    Row(Row),
+    Row(Box<Row>),
     /// No answer within the time limit.
     TooLate,
     /// The caller cancelled the run.
@@ -91,7 +91,7 @@ impl Child {
                 Ok(line) => {
                     let value = serde_json::from_str(&line).ok();
                     return match value.as_ref().and_then(Row::from_json) {
-                        Some(row) if row.path == path => Answer::Row(row),
+                        Some(row) if row.path == path => Answer::Row(Box::new(row)),
                         _ => Answer::Ended {
                             kind: ErrorKind::Crash,
                             message: format!(

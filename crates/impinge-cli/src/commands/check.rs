@@ -1,6 +1,8 @@
 //! `impinge check`: checks one mesh, or a million.
 
 mod args;
+mod html;
+mod report;
 mod shown;
 mod table;
 
@@ -29,7 +31,12 @@ pub fn check(args: &CheckArgs, cancel: &CancelToken) -> Result<(), Error> {
         return Err(Error::Usage(text.to_owned()));
     }
     let mine: Vec<usize> = share(args, paths.len()).collect();
-    let watch = Watch::things(!args.no_progress, mine.len(), "meshes", args.json);
+    let watch = Watch::things(
+        !args.no_progress,
+        mine.len(),
+        "meshes",
+        args.json || args.format != args::Format::Text,
+    );
     let rows = match &args.out {
         Some(args::Out::Folder(folder)) => kept(args, folder, &paths, &watch, cancel)?,
         _ => {
@@ -44,11 +51,17 @@ pub fn check(args: &CheckArgs, cancel: &CancelToken) -> Result<(), Error> {
     if let Some(args::Out::Mesh(file)) = &args.out {
         shown::write_mesh(file, &rows, args)?;
     }
-    if !args.json {
+    if args.format != args::Format::Text {
+        report::print(&rows, args)?;
+    } else if !args.json {
         table::print(&rows)?;
         if matches!(args.out, Some(args::Out::Mesh(_))) {
             shown::print_legend()?;
         }
+        table::print_next(&rows, args)?;
+    }
+    if let Some(file) = &args.html {
+        html::write(&file.0, &rows, args)?;
     }
     // The picture comes last, so that the answer is printed even without an adapter.
     if let Some(png) = &args.png {
@@ -66,6 +79,8 @@ pub fn check_worker(args: &CheckWorkerArgs) -> Result<(), Error> {
     let options = Options {
         weld: !args.no_weld && !args.keep_seams,
         keep_seams: args.keep_seams,
+        places: args.places,
+        faces: args.faces,
         threads: args.threads,
     };
     Ok(serve(stdin().lock(), stdout().lock(), &options)?)
@@ -136,6 +151,10 @@ fn run(
         }
         if args.keep_seams {
             command.arg("--keep-seams");
+        }
+        command.arg("--places").arg(args.places.to_string());
+        if args.faces {
+            command.arg("--faces");
         }
         if let Some(memory) = args.memory {
             command.arg("--memory").arg(memory.to_string());

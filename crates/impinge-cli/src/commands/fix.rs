@@ -5,7 +5,7 @@ mod args;
 use std::io::{Read, Write, stdin};
 use std::path::Path;
 
-use impinge_check::{Counts, FixError, FixOptions, Fixed, Repair, Row, fix_mesh};
+use impinge_check::{Counts, FixError, FixOptions, Fixed, Place, Repair, Row, fix_mesh};
 use impinge_io::{
     Cell, ColoredMesh, ELEMENTS, Elements, Mesh, ReadOptions, printable, read, read_bytes,
     write_obj, write_ply,
@@ -71,7 +71,10 @@ pub fn fix(args: &FixArgs) -> Result<(), Error> {
     } else {
         output::say(text(args, &options, &fixed).as_bytes(), rows_file.as_ref())?;
     }
-    fail(&[row(&args.out.path, false, fixed.after)], &args.fail_on)
+    fail(
+        &[row(&args.out.path, false, fixed.after, &fixed.places_after)],
+        &args.fail_on,
+    )
 }
 
 fn read_mesh(args: &FixArgs) -> Result<Mesh, Error> {
@@ -113,11 +116,12 @@ fn write(args: &FixArgs, mesh: &Mesh) -> Result<(), Error> {
     Ok(())
 }
 
-fn row(path: &Path, is_welded: bool, counts: Counts) -> Row {
+fn row(path: &Path, is_welded: bool, counts: Counts, places: &[Place]) -> Row {
     Row {
         path: path.display().to_string(),
         is_welded,
         result: Ok(counts),
+        places: places.to_vec(),
     }
 }
 
@@ -170,7 +174,7 @@ fn object(args: &FixArgs, options: &FixOptions, fixed: &Fixed) -> Value {
         repairs.insert(repair.name().into(), of.into());
     }
     let welds = options.repairs.contains(&Repair::Weld);
-    let mut before = row(&args.mesh, welds, fixed.before);
+    let mut before = row(&args.mesh, welds, fixed.before, &fixed.places_before);
     if args.mesh == Path::new("-") {
         before.path = "-".to_owned();
     }
@@ -181,7 +185,7 @@ fn object(args: &FixArgs, options: &FixOptions, fixed: &Fixed) -> Value {
         "close_holes": options.close_holes,
         "seams": fixed.has_seams(),
         "before": before.to_json(),
-        "after": row(&args.out.path, false, fixed.after).to_json(),
+        "after": row(&args.out.path, false, fixed.after, &fixed.places_after).to_json(),
     })
 }
 

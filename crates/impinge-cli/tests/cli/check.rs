@@ -101,7 +101,7 @@ fn a_table_and_what_it_sums_up_to() {
         text.contains("pierced.obj") && text.contains("self-int."),
         "{text}"
     );
-    let last = text.lines().last().unwrap();
+    let last = text.lines().rev().nth(1).unwrap();
     assert_eq!(
         last,
         "3 meshes: 1 without any finding, 1 with self-intersections, 1 with an open border, \
@@ -381,4 +381,212 @@ fn one_bad_file_of_many_does_not_keep_the_others_from_an_answer() {
             .error()
             .contains("missing.ply")
     );
+}
+
+/// The files of a report with a mesh of each sort, under names that have to be escaped.
+fn reported(args: &[&str]) -> Run {
+    let folder = meshes();
+    let crossing = std::fs::read_to_string(folder.path("pierced.obj")).unwrap();
+    folder.text("a b,<&>%:1.obj", &crossing);
+    let names = ["closed.obj", "a b,<&>%:1.obj", "nan.obj", "missing.ply"];
+    folder.run([&["check"], args, &names[..]].concat())
+}
+
+#[test]
+fn sarif_has_what_the_standard_requires() {
+    let run = reported(&["--format", "sarif", "--fail-on", "self-intersections"]);
+    assert_eq!(run.code, Some(3));
+    let log: Value = serde_json::from_str(&run.stdout).unwrap();
+    assert_eq!(log["version"], "2.1.0");
+    assert!(log["$schema"].as_str().unwrap().contains("sarif-2.1.0"));
+    let [one] = &log["runs"].as_array().unwrap()[..] else {
+        panic!("one run")
+    };
+    let driver = &one["tool"]["driver"];
+    assert_eq!(driver["name"], "impinge check");
+    let rules = driver["rules"].as_array().unwrap();
+    let results = one["results"].as_array().unwrap();
+    let mut found = Vec::new();
+    for result in results {
+        // Section 3.27 of the standard: a message, a level of four, a rule that is there, a location with a URI.
+        assert!(!result["message"]["text"].as_str().unwrap().is_empty());
+        let rule = &rules[result["ruleIndex"].as_u64().unwrap() as usize];
+        assert_eq!(rule["id"], result["ruleId"]);
+        assert!(rule["shortDescription"]["text"].is_string());
+        let at = &result["locations"][0]["physicalLocation"]["artifactLocation"]["uri"];
+        let uri = at.as_str().unwrap();
+
+        let level = result["level"].as_str().unwrap();
+        assert!(["none", "note", "warning", "error"].contains(&level));
+        found.push((uri, result["ruleId"].as_str().unwrap(), level));
+    }
+    let name = "a%20b%2C%3C%26%3E%25%3A1.obj";
+    let expected = [
+        (name, "self-intersections", "error"),
+        (name, "boundary", "warning"),
+        ("nan.obj", "nan", "error"),
+        ("missing.ply", "error", "error"),
+    ];
+    assert_eq!(found, expected);
+    let place = &results[0]["properties"]["places"][0];
+    assert_eq!(place["problem"], "self-intersections");
+}
+
+#[test]
+fn junit_is_xml_with_the_numbers_that_it_announces() {
+    use quick_xml::events::Event;
+    for (fail_on, n_cases, n_failures) in [(&[][..], 14, 2), (&["--fail-on", "boundary"], 4, 1)] {
+        let run = reported(&[&["--format", "junit"], fail_on].concat());
+        let mut reader = quick_xml::Reader::from_str(&run.stdout);
+        let mut counts = std::collections::BTreeMap::<String, u64>::new();
+        let mut announced = Vec::new();
+        let mut names = std::collections::BTreeSet::new();
+        loop {
+            match reader.read_event().unwrap() {
+                Event::Eof => break,
+                Event::Start(tag) | Event::Empty(tag) => {
+                    let name = tag.name().as_ref().to_owned();
+                    for attribute in tag.attributes() {
+                        let attribute = attribute.unwrap();
+                        let value = attribute.value.to_string();
+                        if name == "testsuite" && attribute.key.as_ref() != "name" {
+                            announced.push(value.parse::<u64>().unwrap());
+                        } else if attribute.key.as_ref() == "classname" {
+                            names.insert(value);
+                        }
+                    }
+                    *counts.entry(name).or_default() += 1;
+                }
+                _ => {}
+            }
+        }
+        assert_eq!(announced, [n_cases, n_failures, 2]);
+        let counted = ["testcase", "failure", "error"].map(|name| counts[name]);
+        assert_eq!(counted, [n_cases, n_failures, 2]);
+        assert!(names.contains("a b,&lt;&amp;&gt;%:1.obj"), "{names:?}");
+    }
+}
+
+#[test]
+fn github_gets_one_annotation_per_finding() {
+    let run = reported(&["--format", "github", "--fail-on", "boundary"]);
+    let lines: Vec<&str> = run.stdout.lines().collect();
+    assert_eq!(lines.len(), 4, "{}", run.stdout);
+    let start = "::warning file=a b%2C<&>%25%3A1.obj,title=self-intersections::2 pairs of elements intersect, near (";
+    assert!(lines[0].starts_with(start), "{}", lines[0]);
+    assert!(lines[1].starts_with("::error file=a b%2C"), "{}", lines[1]);
+    assert!(lines[3].starts_with("::error file=missing.ply,title=an error::missing.ply: "));
+    reported(&["--format", "github", "--json"]).misuse();
+}
+
+#[test]
+fn the_last_line_names_the_command_that_helps() {
+    let folder = meshes();
+    folder.text(
+        "crossing only.obj",
+        &std::fs::read_to_string(folder.path("pierced.obj")).unwrap(),
+    );
+    folder.text("twice.obj", &format!("{CLOSED}f 1 2 4\n"));
+    folder.text(
+        "inward.obj",
+        "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 4 2\nf 2 4 3\nf 1 3 4\n",
+    );
+    let last = |name: &str| -> String {
+        let text = folder.run(["check", name]).printed();
+        text.lines().last().unwrap().to_owned()
+    };
+    assert_eq!(last("closed.obj"), "1 mesh: clean");
+    assert_eq!(
+        last("crossing only.obj"),
+        "next: impinge render 'crossing only.obj' --png where.png"
+    );
+    assert_eq!(
+        last("twice.obj"),
+        "next: impinge fix twice.obj --out twice-mended.ply"
+    );
+    assert_eq!(
+        last("inward.obj"),
+        "next: impinge fix inward.obj --out inward-mended.ply"
+    );
+    // It does help.
+    for name in ["twice", "inward"] {
+        let (from, to) = (format!("{name}.obj"), format!("{name}-mended.ply"));
+        folder.run(["fix", &from, "--out", &to]).printed();
+        assert_eq!(last(&to), "1 mesh: clean");
+    }
+    let run = folder
+        .run(["check", "open.obj", "--json", "--faces", "--places", "1"])
+        .json();
+    assert_eq!(run["places"][0]["elements"], serde_json::json!([0, 1, 2]));
+    assert_eq!(
+        (&run["watertight"], &run["euler"]),
+        (&serde_json::json!(false), &serde_json::json!(1))
+    );
+}
+
+#[test]
+fn the_page_stands_alone_and_its_pictures_are_pictures() {
+    let folder = meshes();
+    let crossing = std::fs::read_to_string(folder.path("pierced.obj")).unwrap();
+    folder.text("a <b> & 'c'.obj", &crossing);
+    let args = [
+        "check",
+        "closed.obj",
+        "a <b> & 'c'.obj",
+        "nan.obj",
+        "--html",
+        "report.html",
+    ];
+    failed(folder.run(args), 1, 3);
+    let page = std::fs::read_to_string(folder.path("report.html")).unwrap();
+    assert!(page.starts_with("<!DOCTYPE html>") && page.ends_with("</html>\n"));
+    // Nothing is loaded from elsewhere.
+    for outside in ["http://", "https://", "src=\"/", "href="] {
+        assert!(!page.contains(outside), "{outside}");
+    }
+    assert!(page.contains("a &lt;b&gt; &amp; &#39;c&#39;.obj") && !page.contains("a <b>"));
+    let body = &page[page.find("<tbody>").unwrap()..];
+    let rows: Vec<&str> = body.split("<tr>").skip(1).collect();
+    let n_pictures: Vec<usize> = rows
+        .iter()
+        .map(|row| row.matches("<img ").count())
+        .collect();
+    // The crossing triangles are in two places, and the needle has a border.
+    assert_eq!(n_pictures, [1, 4, 0]);
+    assert!(rows[2].contains("class=\"error\">") && rows[2].contains("nan.obj"));
+    let cells: Vec<usize> = rows.iter().map(|row| row.matches("<td").count()).collect();
+    assert_eq!(cells, [11; 3]);
+    assert!(rows[1].contains("data-label=\"self-int.\" data-v=\"2\" class=\"bad\">2</td>"));
+    // Every picture is a PNG of the announced size; that of the sound mesh has no red in it, that of the pierced one has.
+    let mut reds = Vec::new();
+    for part in page.split("data:image/png;base64,").skip(1) {
+        let text = &part[..part.find('"').unwrap()];
+        let png = decoded(text);
+        let mut reader = png::Decoder::new(std::io::Cursor::new(png))
+            .read_info()
+            .unwrap();
+        let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
+        let info = reader.next_frame(&mut pixels).unwrap();
+        assert_eq!((info.width, info.height), (240, 180));
+        let is_red = |p: &[u8]| i32::from(p[0]) > i32::from(p[1]) + 60;
+        reds.push(pixels.chunks(3).filter(|p| is_red(p)).count() > 50);
+    }
+    assert_eq!(reds[..2], [false, true]);
+    folder
+        .run(["check", "closed.obj", "--html", "report.txt"])
+        .misuse();
+}
+
+/// The bytes of a base64 text.
+fn decoded(text: &str) -> Vec<u8> {
+    const DIGITS: &str = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    let digits: Vec<u32> = text
+        .chars()
+        .filter_map(|c| DIGITS.find(c).map(|ix| ix as u32))
+        .collect();
+    let bytes = digits.chunks(4).flat_map(|four| {
+        let bits = four.iter().fold(0, |bits, digit| bits << 6 | digit) << (6 * (4 - four.len()));
+        (0..four.len() - 1).map(move |ix| (bits >> (16 - 8 * ix)) as u8)
+    });
+    bytes.collect()
 }

@@ -7,8 +7,7 @@ use std::str::FromStr;
 use clap::{Args, ValueEnum};
 
 use crate::args::PictureArgs;
-use crate::values::PngFile;
-use crate::values::{MeshFile, bytes};
+use crate::values::{HtmlFile, MeshFile, PngFile, bytes};
 
 /// Shown below the help.
 pub const CHECK_EXAMPLES: &str = "\
@@ -16,6 +15,8 @@ Examples:
   impinge check part.stl
   impinge check *.obj --json | jq 'select(.self_intersections > 0) | .path'
   impinge check part.ply --fail-on self-intersections,boundary       exit code 3 in CI
+  impinge check parts/*.stl --format sarif > meshes.sarif            for code scanning; also junit, github
+  impinge check parts/*.stl --html report.html                       a page with pictures of what is wrong
   impinge check part.ply --out wrong.glb                             what is wrong, in colours
   impinge check --list meshes.txt --out rows --timeout 60 --memory 4G
   impinge check --list meshes.txt --out rows --rank $SLURM_ARRAY_TASK_ID --world-size 64
@@ -40,6 +41,9 @@ pub struct CheckArgs {
     /// Print one line of JSON per mesh and nothing else
     #[arg(long)]
     pub json: bool,
+    /// What is printed
+    #[arg(long, value_enum, value_name = "FORMAT", conflicts_with = "json", default_value_t = Format::Text)]
+    pub format: Format,
     /// A folder for rows, in which an interrupted run can continue; or a mesh file that shows the problems (.glb, .ply, .vtu)
     #[arg(long, value_name = "DIR|MESH")]
     pub out: Option<Out>,
@@ -52,6 +56,12 @@ pub struct CheckArgs {
     /// Count edges and vertices as the file has them, and weld only to find self-intersections: for meshes that `impinge fix` has split
     #[arg(long, conflicts_with = "no_weld")]
     pub keep_seams: bool,
+    /// The most places of each problem that rows name, largest first
+    #[arg(long, value_name = "N", default_value = "3")]
+    pub places: usize,
+    /// Name all faces of each place, not only the first few
+    #[arg(long)]
+    pub faces: bool,
     /// Show no progress bar
     #[arg(long)]
     pub no_progress: bool,
@@ -91,6 +101,9 @@ pub struct CheckArgs {
     /// Check meshes again that ended by a limit or a crash in an earlier run in --out
     #[arg(long, help_heading = "Many meshes")]
     pub retry: bool,
+    /// Write a page with a table, a picture of each mesh and one of each place (.html)
+    #[arg(long, value_name = "FILE")]
+    pub html: Option<HtmlFile>,
     /// Draw the problems as a picture (.png)
     #[arg(long, value_name = "FILE")]
     pub png: Option<PngFile>,
@@ -109,6 +122,12 @@ pub struct CheckWorkerArgs {
     /// Weld only to find self-intersections
     #[arg(long)]
     pub keep_seams: bool,
+    /// Places of each problem
+    #[arg(long, value_name = "N", default_value = "3")]
+    pub places: usize,
+    /// All faces of each place
+    #[arg(long)]
+    pub faces: bool,
     /// Address space
     #[arg(long, value_name = "BYTES")]
     pub memory: Option<u64>,
@@ -136,6 +155,19 @@ impl FromStr for Out {
         }
         Ok(Out::Folder(path))
     }
+}
+
+/// What `impinge check` prints.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Format {
+    /// A table
+    Text,
+    /// A SARIF 2.1.0 log, for code scanning
+    Sarif,
+    /// A JUnit report, for CI servers
+    Junit,
+    /// Commands that annotate a GitHub workflow
+    Github,
 }
 
 /// A problem that makes a run fail.

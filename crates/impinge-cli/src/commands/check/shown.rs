@@ -6,7 +6,9 @@ use std::io::Write;
 use std::path::Path;
 
 use impinge_check::{Checked, Options, Problem, Row, check_file_marked};
-use impinge_io::{ColoredMesh, write_glb, write_ply, write_vtu};
+use impinge_io::{ColoredMesh, Elements, write_glb, write_ply, write_vtu};
+
+use impinge_render::{Face, Normals, Surface};
 
 use super::args::CheckArgs;
 use crate::error::Error;
@@ -16,13 +18,20 @@ use crate::values::{MeshFile, MeshFormat};
 /// The colour of primitives without a finding.
 const FINE: [u8; 3] = [200, 200, 200];
 
-/// All meshes that could be checked, with the marks of their primitives.
-fn marked(rows: &[Row], args: &CheckArgs) -> Result<Vec<(String, Checked)>, Error> {
-    let options = Options {
+/// How meshes are checked once more.
+pub fn options(args: &CheckArgs) -> Options {
+    Options {
         weld: !args.no_weld && !args.keep_seams,
         keep_seams: args.keep_seams,
+        places: args.places,
+        faces: args.faces,
         threads: 0,
-    };
+    }
+}
+
+/// All meshes that could be checked, with the marks of their primitives.
+fn marked(rows: &[Row], args: &CheckArgs) -> Result<Vec<(String, Checked)>, Error> {
+    let options = options(args);
     let sound = rows.iter().filter(|row| row.result.is_ok());
     let checked: Vec<(String, Checked)> = sound
         .filter_map(|row| {
@@ -95,35 +104,37 @@ pub fn print_legend() -> Result<(), Error> {
 
 /// Draws the meshes in the same colours. Primitives with a problem show through faces that hide them.
 pub fn draw(path: &Path, rows: &[Row], args: &CheckArgs) -> Result<(), Error> {
-    use impinge_io::Elements;
-    use impinge_render::{Face, Normals, Surface};
-    const SIDES: [[usize; 3]; 4] = [[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]];
-    let surfaces = marked(rows, args)?.into_iter().map(|(_, checked)| {
-        let face = |corners: [u32; 3], primitive: usize| Face {
-            corners,
-            color: color(&checked, primitive),
-            shows_through: checked.marks[primitive].first().is_some(),
-        };
-        let (faces, normals) = match &checked.mesh.elements {
-            Elements::Triangles(triangles) => {
-                let faces = triangles
-                    .iter()
-                    .enumerate()
-                    .map(|(ix, &corners)| face(corners, ix));
-                (faces.collect(), Normals::Smooth)
-            }
-            Elements::Tetrahedra(tets) => {
-                let sides = tets.iter().enumerate().flat_map(|(ix, corners)| {
-                    SIDES.map(|side| face(side.map(|corner| corners[corner]), ix))
-                });
-                (sides.collect(), Normals::Flat)
-            }
-        };
-        Surface {
-            positions: checked.mesh.positions.to_f64(),
-            faces,
-            normals,
-        }
-    });
+    let meshes = marked(rows, args)?;
+    let surfaces = meshes.iter().map(|(_, checked)| surface(checked));
     crate::picture::Drawer::new(&args.picture, None, 1)?.draw(path, surfaces.collect())
+}
+
+/// A mesh in these colours.
+pub fn surface(checked: &Checked) -> Surface {
+    const SIDES: [[usize; 3]; 4] = [[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]];
+    let face = |corners: [u32; 3], primitive: usize| Face {
+        corners,
+        color: color(checked, primitive),
+        shows_through: checked.marks[primitive].first().is_some(),
+    };
+    let (faces, normals) = match &checked.mesh.elements {
+        Elements::Triangles(triangles) => {
+            let faces = triangles
+                .iter()
+                .enumerate()
+                .map(|(ix, &corners)| face(corners, ix));
+            (faces.collect(), Normals::Smooth)
+        }
+        Elements::Tetrahedra(tets) => {
+            let sides = tets.iter().enumerate().flat_map(|(ix, corners)| {
+                SIDES.map(|side| face(side.map(|corner| corners[corner]), ix))
+            });
+            (sides.collect(), Normals::Flat)
+        }
+    };
+    Surface {
+        positions: checked.mesh.positions.to_f64(),
+        faces,
+        normals,
+    }
 }

@@ -1,11 +1,12 @@
 //! The table of `impinge check`, and its failures.
 
 use std::io::Write;
+use std::path::Path;
 
 use impinge_check::{Counts, ErrorKind, Row};
 use impinge_io::printable;
 
-use super::args::FailOn;
+use super::args::{CheckArgs, FailOn};
 use crate::error::Error;
 use crate::output::{out, table};
 use crate::text::grouped;
@@ -15,7 +16,7 @@ const LISTED: usize = 50;
 
 impl FailOn {
     /// All problems except `any`, in the order of the summary.
-    const EACH: [FailOn; 8] = [
+    pub const EACH: [FailOn; 8] = [
         FailOn::SelfIntersections,
         FailOn::Degenerate,
         FailOn::Duplicates,
@@ -27,7 +28,7 @@ impl FailOn {
     ];
 
     /// The words for it in a sentence: "3 with …".
-    fn words(self) -> &'static str {
+    pub fn words(self) -> &'static str {
         match self {
             FailOn::SelfIntersections => "self-intersections",
             FailOn::Degenerate => "degenerate primitives",
@@ -42,7 +43,7 @@ impl FailOn {
     }
 
     /// Whether a mesh has the problem.
-    fn is_in(self, row: &Row) -> bool {
+    pub fn is_in(self, row: &Row) -> bool {
         let counted =
             |get: fn(&Counts) -> u64| row.result.as_ref().is_ok_and(|counts| get(counts) > 0);
         match self {
@@ -76,10 +77,11 @@ pub fn print(rows: &[Row]) -> Result<(), Error> {
         .iter()
         .filter(|row| few || FailOn::Any.is_in(row))
         .collect();
-    let lines = listed
-        .iter()
-        .take(LISTED)
-        .filter_map(|row| Some(line(row, row.result.as_ref().ok()?)));
+    let lines = listed.iter().take(LISTED).filter_map(|row| {
+        let numbers = line(row.result.as_ref().ok()?);
+        let name = [printable(&row.path)].into_iter();
+        Some(name.chain(numbers.map(grouped)).collect())
+    });
     let lines: Vec<_> = lines.collect();
     if !lines.is_empty() {
         let header = [
@@ -110,11 +112,16 @@ pub fn print(rows: &[Row]) -> Result<(), Error> {
         let n = (listed.len() - LISTED) as u64;
         writeln!(to, "… and {} more: see --json or --out DIR", meshes(n))?;
     }
+    writeln!(to, "{}", summary(rows))?;
+    Ok(())
+}
+
+/// How many meshes have what, in one line.
+pub fn summary(rows: &[Row]) -> String {
     let n_clean = rows.iter().filter(|row| !FailOn::Any.is_in(row)).count();
     if n_clean == rows.len() && n_clean > 0 {
         let all = if n_clean == 1 { "clean" } else { "all clean" };
-        writeln!(to, "{}: {all}", meshes(n_clean as u64))?;
-        return Ok(());
+        return format!("{}: {all}", meshes(n_clean as u64));
     }
     let mut parts = vec![format!("{} without any finding", grouped(n_clean as u64))];
     for what in FailOn::EACH {
@@ -123,16 +130,16 @@ pub fn print(rows: &[Row]) -> Result<(), Error> {
             parts.push(format!("{} with {}", grouped(n as u64), what.words()));
         }
     }
-    writeln!(to, "{}: {}", meshes(rows.len() as u64), parts.join(", "))?;
-    Ok(())
+    format!("{}: {}", meshes(rows.len() as u64), parts.join(", "))
 }
 
 fn meshes(n: u64) -> String {
     format!("{} mesh{}", grouped(n), if n == 1 { "" } else { "es" })
 }
 
-fn line(row: &Row, counts: &Counts) -> Vec<String> {
-    let numbers = [
+/// The numbers of a mesh, in the order of the columns.
+pub fn line(counts: &Counts) -> [u64; 8] {
+    [
         counts.n_triangles + counts.n_tetrahedra,
         counts.self_intersections,
         counts.degenerate,
@@ -141,10 +148,49 @@ fn line(row: &Row, counts: &Counts) -> Vec<String> {
         counts.inconsistent_facets,
         counts.boundary_facets,
         counts.components,
-    ];
-    let mut line = vec![printable(&row.path)];
-    line.extend(numbers.map(grouped));
-    line
+    ]
+}
+
+/// Prints the command that helps most: one that mends, or, where nothing can be mended, one that shows.
+pub fn print_next(rows: &[Row], args: &CheckArgs) -> Result<(), Error> {
+    let is_mendable = |row: &&Row| {
+        row.result.as_ref().is_ok_and(|counts| {
+            let found = counts.degenerate
+                + counts.duplicates
+                + counts.non_manifold_facets
+                + counts.non_manifold_vertices
+                + counts.inconsistent_facets;
+            let is_inside_out =
+                counts.volume.is_some_and(|volume| volume < 0.0) && counts.components == 1;
+            counts.n_tetrahedra == 0 && (found > 0 || is_inside_out)
+        })
+    };
+    let crosses = |row: &&Row| FailOn::SelfIntersections.is_in(row);
+    // What fix has split stays as it is.
+    let mendable = rows.iter().find(is_mendable).filter(|_| !args.keep_seams);
+    let command = match (mendable, rows.iter().find(crosses)) {
+        (Some(row), _) => {
+            let stem = Path::new(&row.path).file_stem().unwrap_or_default();
+            let out = format!("{}-mended.ply", stem.to_string_lossy());
+            format!("impinge fix {} --out {}", quoted(&row.path), quoted(&out))
+        }
+        (None, Some(row)) if args.png.is_none() => {
+            format!("impinge render {} --png where.png", quoted(&row.path))
+        }
+        _ => return Ok(()),
+    };
+    writeln!(out(), "next: {command}")?;
+    Ok(())
+}
+
+/// A word of a command line, in quotes if a shell would take it apart.
+fn quoted(word: &str) -> String {
+    let word = printable(word);
+    let is_plain = |c: char| c.is_alphanumeric() || "/._-+=:,@%".contains(c);
+    match word.chars().all(is_plain) {
+        true => word,
+        false => format!("'{}'", word.replace('\'', "'\\''")),
+    }
 }
 
 /// Fails if any mesh has one of the named problems, or could not be checked.
