@@ -79,9 +79,13 @@ def test_words_and_exit_codes_of_the_program(folder, arguments):
     mine = run(*arguments)
     assert mine.returncode == known.returncode
     if "--json" in arguments:
-        assert [*map(json.loads, mine.stdout.splitlines())] == [*map(json.loads, known.stdout.splitlines())]
+        # How many places are named is an option of the program.
+        rows = [[{**json.loads(line), "places": None} for line in out.stdout.splitlines()] for out in (mine, known)]
+        assert rows[0] == rows[1]
     else:
-        assert mine.stdout == known.stdout.replace("see --json or --out DIR", "see --json")
+        # The program alone can mend and draw, and says so in its last line.
+        told = re.sub(r"^next: .*\n", "", known.stdout, flags=re.M)
+        assert mine.stdout == told.replace("see --json or --out DIR", "see --json")
     assert mine.stderr == known.stderr.replace("impinge: ", "impinge-check: ", 1)
 
 
