@@ -4,6 +4,7 @@
 //! An argument is taken, in this order, as a NumPy array, through DLPack, or through
 //! `numpy.asarray` (buffer protocol, `__array__`, nested sequences).
 
+use std::borrow::Cow;
 use std::collections::HashMap;
 
 use impinge::{BodyKind, Elements, Positions};
@@ -73,6 +74,16 @@ impl<'py> PositionArray<'py> {
 pub enum Rows<'a> {
     F32(&'a [[f32; 3]]),
     F64(&'a [[f64; 3]]),
+}
+
+impl<'a> Rows<'a> {
+    /// The same as doubles, which loses nothing.
+    pub fn widened(self) -> Cow<'a, [[f64; 3]]> {
+        match self {
+            Rows::F32(rows) => rows.iter().map(|row| row.map(f64::from)).collect(),
+            Rows::F64(rows) => Cow::Borrowed(rows),
+        }
+    }
 }
 
 /// What the rows of an index array are.

@@ -15,6 +15,7 @@ use crate::bodies::Body;
 use crate::closest::Closest;
 use crate::contact::{Contacts, Penetration};
 use crate::errors::{invalid, raise};
+use crate::hits::Hits;
 use crate::near::Near;
 use crate::options::Options;
 use crate::scene::Scene;
@@ -329,6 +330,35 @@ impl DetectorBase {
         })?;
         Ok(Closest {
             inner: asked.answer,
+        })
+    }
+
+    fn _cast(
+        slf: &Bound<'_, Self>,
+        scene: &Bound<'_, PyAny>,
+        origins: &Bound<'_, PyAny>,
+        directions: &Bound<'_, PyAny>,
+        most: &Bound<'_, PyAny>,
+        keywords: Keywords<'_, '_>,
+    ) -> PyResult<Hits> {
+        let origins = PositionArray::new(origins, "origins")?;
+        let directions = PositionArray::new(directions, "directions")?;
+        let rays = [origins.rows()?, directions.rows()?];
+        let most = number(most, "most")?;
+        let options = Options::new(keywords)?;
+        let hits = options.hits;
+        let asked = ask(slf, scene, options, |detector, scene, query| match rays {
+            [Rows::F32(origins), Rows::F32(directions)] => {
+                detector.cast(scene, origins, directions, most, query)
+            }
+            mixed => {
+                let [origins, directions] = mixed.map(Rows::widened);
+                detector.cast(scene, &origins, &directions, most, query)
+            }
+        })?;
+        Ok(Hits {
+            inner: asked.answer,
+            hits,
         })
     }
 

@@ -15,6 +15,7 @@ mod errors;
 mod exclusion;
 mod files;
 mod functions;
+mod hits;
 mod lent;
 mod meshes;
 mod near;
@@ -60,6 +61,8 @@ mod _impinge {
     use super::files::{Mesh, read, read_bodies};
     #[pymodule_export]
     use super::functions::{_hash_rows, _weld};
+    #[pymodule_export]
+    use super::hits::Hits;
     #[pymodule_export]
     use super::near::{_rest_pairs, Near};
     #[pymodule_export]

@@ -1,6 +1,6 @@
 //! The options of a question, from Python's keywords or a `Query`.
 
-use impinge::{BodyId, Clearance, PairKind, Precision, Query, SharedVertex, Start};
+use impinge::{BodyId, Clearance, Hit, PairKind, Precision, Query, SharedVertex, Start};
 use pyo3::exceptions::PyTypeError;
 use pyo3::intern;
 use pyo3::prelude::*;
@@ -15,7 +15,7 @@ use crate::vertex_filter::VertexFilter;
 use crate::watch::CancelToken;
 
 /// The options that users may name, in the order of the documentation.
-const NAMES: [&str; 19] = [
+const NAMES: [&str; 20] = [
     "which",
     "between",
     "self_of",
@@ -31,6 +31,7 @@ const NAMES: [&str; 19] = [
     "precision",
     "distances",
     "closest_points",
+    "hits",
     "fixed",
     "query",
     "cancel",
@@ -55,6 +56,7 @@ pub struct Options<'py> {
     pub precision: Precision,
     pub distances: bool,
     pub closest_points: bool,
+    pub hits: Hit,
     fixed: Vec<Bound<'py, PyAny>>,
     pub cancel: Option<impinge::CancelToken>,
     pub progress: Option<Py<PyAny>>,
@@ -145,6 +147,7 @@ impl<'py> Options<'py> {
             "precision" => self.precision = choose_one(&value, name, words!(Precision))?,
             "distances" => self.distances = flag(&value, name)?,
             "closest_points" => self.closest_points = flag(&value, name)?,
+            "hits" => self.hits = choose_one(&value, name, words!(Hit))?,
             "fixed" => {
                 let bodies = items(&value);
                 self.fixed =
@@ -221,7 +224,8 @@ impl<'py> Options<'py> {
             .start(self.start)
             .separation(self.separation)
             .clearance(clearance)
-            .precision(self.precision);
+            .precision(self.precision)
+            .hits(self.hits);
         let fixed = self.fixed.iter().enumerate();
         let fixed = fixed.map(|(ix, body)| scene.id(body, &format!("fixed[{ix}]")));
         query = query.fixed(fixed.collect::<PyResult<Vec<BodyId>>>()?);

@@ -117,3 +117,91 @@ def test_closest_of_some():
         detector.closest(scene, points, between=(a, b))
     with pytest.raises(TypeError):
         detector.closest(scene, points, nearest=1)
+
+
+def axis_rays(dtype=np.float64):
+    """Rays down onto the cube, and where they first meet it."""
+    line = np.linspace(-0.5, 1.5, 9)
+    places = np.stack(np.meshgrid(line, line), -1).reshape(-1, 2)
+    origins = np.column_stack([places, np.full(len(places), 3.0)]).astype(dtype)
+    directions = np.tile(np.array([0, 0, -0.5], dtype), (len(places), 1))
+    return origins, directions, ((places >= 0) & (places <= 1)).all(1)
+
+
+@pytest.mark.parametrize("dtypes", [(np.float32,) * 2, (np.float64,) * 2, (np.float32, np.float64)])
+def test_cast(dtypes):
+    origins, directions, hit = axis_rays()
+    origins, directions = origins.astype(dtypes[0]), directions.astype(dtypes[1])
+    hits = impinge.cast(CORNERS, CUBE, origins, directions)
+    assert len(hits) == len(hit) and repr(hits) == "Hits(81 rays)"
+    assert (hits.hit == hit).all() and hits.hit.dtype == np.bool_
+    inner = ((origins[:, :2] > 0) & (origins[:, :2] < 1)).all(1)
+    assert (hits.t == np.where(hit, 4.0, np.inf)).all() and (hits.t_end[inner] == 4.0).all()
+    assert hits.rows.shape == (81, 2) and hits.rows.dtype == np.uint32
+    assert hits.rows is hits.rows and not hits.rows.flags.writeable
+    assert (hits.rows[~hit] == 2**32 - 1).all() and (hits.rows[hit, 0] == 0).all()
+    assert (hits.elements == hits.rows[:, 1]).all()
+    assert (np.diff(hits.offsets.astype(int)) == hit).all()
+    corners = CORNERS[CUBE[hits.elements[hit]]]
+    points = np.einsum("nk,nkj->nj", hits.barycentrics[hit], corners)
+    assert np.abs(points - (origins[hit] + hits.t[hit, None] * directions[hit])).max() < 1e-15
+    assert np.isnan(hits.barycentrics[~hit]).all() and (hits.features[~hit] == 255).all()
+    corner = hits.features < 3
+    assert corner.sum() == 4 and np.isin(origins[corner][:, :2], (0, 1)).all()
+    assert isinstance(hits.hash, int) and hits.stats.n_threads >= 1
+
+
+def test_cast_all_and_any():
+    origins, directions, hit = axis_rays()
+    scene = impinge.Scene()
+    body = scene.add(CORNERS, CUBE)
+    dots = scene.add_points(CORNERS.astype(np.float32) + [0, 0, 1])
+    detector = impinge.Detector("cpu", threads=2)
+    every = detector.cast(scene, origins, directions, hits="all")
+    ray = np.repeat(np.arange(len(every)), np.diff(every.offsets.astype(int)))
+    assert len(every.t) == len(every.rows) == len(every.features) == len(ray) > 2 * hit.sum()
+    assert (every.hit == hit).all() and every.barycentrics.shape == (len(ray), 3)
+    grows = np.diff(every.t) >= 0
+    assert grows[ray[1:] == ray[:-1]].all()
+    # A ray down a wall of the cube lies in the planes of two faces.
+    assert (every.t_end - every.t == 2).any() and (every.t_end > every.t).sum() > 20
+    of_dots = detector.cast(scene, origins, directions, of=dots)
+    assert of_dots.hit.sum() == 4 and (of_dots.t[of_dots.hit] == 2).all()
+    assert (every.rows[:, 0] == 1).sum() == 8
+    inner = detector.cast(scene, origins, directions, of=body, hits="all")
+    assert (inner.rows == every.rows[every.rows[:, 0] == 0]).all()
+    query = impinge.Query(hits="any")
+    yes = detector.cast(scene, origins, directions, query=query)
+    assert (yes.hit == hit).all() and not yes.offsets.any()
+    with pytest.raises(ValueError, match='hits: "any" given'):
+        print(yes.t)
+    segments = detector.cast(scene, origins, directions, 3.999, of=body)
+    assert not segments.hit.any() and (segments.t == np.inf).all()
+    assert (detector.cast(scene, origins, directions, 4, of=body).hit == hit).all()
+    scene.set_positions(body, CORNERS - [0, 0, 1])
+    assert (detector.cast(scene, origins, directions, of=body).t[hit] == 6).all()
+    assert len(detector.cast(scene, np.empty((0, 3)), np.empty((0, 3)))) == 0
+
+
+def test_cast_refuses():
+    scene = impinge.Scene()
+    scene.add(CORNERS, CUBE)
+    detector = impinge.Detector("cpu")
+    row = [[0.0, 0.0, 1.0]]
+    with pytest.raises(ValueError, match="directions: 2 directions given, as many directions as"):
+        detector.cast(scene, row, row * 2)
+    with pytest.raises(ValueError, match="most: -1 given"):
+        detector.cast(scene, row, row, -1)
+    with pytest.raises(ValueError, match=r"directions\[0, 1\] = nan: must be finite"):
+        detector.cast(scene, row, [[0.0, np.nan, 0.0]])
+    with pytest.raises(ValueError, match=r"origins: shape \(n, 3\) expected"):
+        detector.cast(scene, [0, 0, 0], row)
+    with pytest.raises(ValueError, match="hits: 'last' given, first, any or all|hits: "):
+        detector.cast(scene, row, row, hits="last")
+    with pytest.raises(ValueError, match="which|query"):
+        detector.cast(scene, row, row, which="self")
+    token = impinge.CancelToken()
+    token.cancel()
+    with pytest.raises(impinge.Cancelled):
+        detector.cast(scene, row, row, cancel=token)
+    assert detector.cast(scene, row, row).hit.tolist() == [True]

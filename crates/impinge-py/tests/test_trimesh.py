@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from impinge.trimesh import ProximityQuery, closest_point, contains, signed_distance
+from impinge.trimesh import ProximityQuery, RayMeshIntersector, closest_point, contains, signed_distance
 
 trimesh = pytest.importorskip("trimesh")
 
@@ -64,3 +64,57 @@ def test_a_mesh_that_changes_is_read_again():
         query.contains([[3, 0, 0]])
     # Nearest points do not need a closed surface.
     assert query.on_surface([[9, 0, 0]])[1][0] > 4.9
+
+
+@pytest.mark.parametrize("mesh", list(meshes()))
+def test_rays_beside_trimesh(mesh):
+    rng = np.random.default_rng(8)
+    low, high = mesh.bounds
+    origins, directions = rng.uniform(low - 0.5, high + 0.5, (300, 3)), rng.normal(size=(300, 3))
+    rays = RayMeshIntersector(mesh, threads=2)
+    face, ray, places = rays.intersects_id(origins, directions, return_locations=True)
+    assert face.dtype == ray.dtype == np.int64 and places.shape == (len(ray), 3)
+    # Ordinary rays hit what floats find when every face is tried.
+    a, b, c = (mesh.triangles[:, k] for k in range(3))
+    weights = [
+        np.einsum("fk,nfk->nf", np.cross(p, q), np.broadcast_to(directions[:, None], (300, len(a), 3)))
+        + np.einsum("fk,nk->nf", q - p, np.cross(origins, directions))
+        for p, q in [(b, c), (c, a), (a, b)]
+    ]
+    same = np.logical_and.reduce([w > 0 for w in weights]) | np.logical_and.reduce([w < 0 for w in weights])
+    normals = np.cross(b - a, c - a)
+    with np.errstate(divide="ignore"):
+        t = np.einsum("nfk,fk->nf", a[None] - origins[:, None], normals) / (directions @ normals.T)
+    found = np.zeros((300, len(a)), bool)
+    found[ray, face] = True
+    assert (found == (same & (t >= 0))).all() and found.sum() == len(ray) > 100
+    expected = origins[ray] + t[ray, face][:, None] * directions[ray]
+    assert np.abs(places - expected).max() < 1e-9
+    first = np.where(same & (t >= 0), t, np.inf)
+    any_hit = np.isfinite(first).any(axis=1)
+    assert (rays.intersects_any(origins, directions) == any_hit).all()
+    assert (rays.intersects_first(origins, directions) == np.where(any_hit, first.argmin(axis=1), -1)).all()
+    one, its_ray = rays.intersects_id(origins, directions, multiple_hits=False)
+    assert (its_ray == np.flatnonzero(any_hit)).all() and (one == first.argmin(axis=1)[any_hit]).all()
+    where, ray_of, face_of = rays.intersects_location(origins, directions)
+    assert (where == places).all() and (ray_of == ray).all() and (face_of == face).all()
+    some = rays.intersects_id(origins, directions, max_hits=1)
+    assert (some[0] == one).all() and (some[1] == its_ray).all()
+    assert (rays.contains_points(origins) == contains(mesh, origins)).all()
+
+
+def test_rays_through_edges_and_vertices():
+    box = trimesh.creation.box((2, 2, 2))
+    rays = RayMeshIntersector(box)
+    # The diagonal of a face, a corner, an edge of the box, and beside it.
+    origins = [[0.5, 0.5, 3], [1, 1, 3], [1, 0.25, 3], [1 + 2**-40, 0.25, 3]]
+    down = [[0, 0, -1]] * 4
+    places, ray, _ = rays.intersects_location(origins, down)
+    assert np.bincount(ray).tolist()[0] == 2 and (np.abs(places).max(axis=1) == 1).all()
+    assert rays.intersects_any(origins, down).tolist() == [True, True, True, False]
+    face, ray = rays.intersects_id(origins, down)
+    assert np.bincount(ray)[0] in (2, 3, 4) and np.bincount(ray)[1] >= 4
+    face, ray = rays.intersects_id(origins, down, max_hits=2)
+    assert np.bincount(ray).tolist() == [2, 2, 2]
+    nothing = rays.intersects_id(np.empty((0, 3)), np.empty((0, 3)), return_locations=True)
+    assert [column.shape for column in nothing] == [(0,), (0,), (0, 3)]

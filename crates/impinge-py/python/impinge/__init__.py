@@ -23,6 +23,7 @@ from ._answers import (
     Candidates,
     Closest,
     Csr,
+    Hits,
     Impact,
     Impacts,
     Nearest,
@@ -48,6 +49,7 @@ from ._errors import (
 )
 from ._functions import (
     DeviceInfo,
+    cast,
     closest_points,
     contains,
     devices,
@@ -94,6 +96,7 @@ __all__ = [
     "DeviceInfo",
     "Error",
     "Exclusion",
+    "Hits",
     "Impact",
     "Impacts",
     "InternalError",
@@ -113,6 +116,7 @@ __all__ = [
     "TooManyPairs",
     "Truncation",
     "__version__",
+    "cast",
     "check",
     "closest_points",
     "contains",

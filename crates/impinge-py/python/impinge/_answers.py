@@ -21,6 +21,7 @@ __all__ = [
     "Candidates",
     "Closest",
     "Csr",
+    "Hits",
     "Impact",
     "Impacts",
     "Nearest",
@@ -723,6 +724,89 @@ class Closest:
 
     def __repr__(self) -> str:
         return f"Closest({len(self)} points)"
+
+
+class Hits:
+    """What rays hit. ``len(hits)`` is the number of rays.
+
+    Asked with ``hits="first"``, the columns have one row per ray. With ``"all"`` they have one per hit, the rays one after the other:
+    those of ray i are the rows ``offsets[i]`` to ``offsets[i + 1]``, by `t`, then by body and number. With ``"any"`` there is only
+    `hit`.
+    """
+
+    __slots__ = ("_inner", "_rows")
+
+    def __init__(self, inner: _impinge.Hits) -> None:
+        self._inner = inner
+        self._rows: npt.NDArray[np.uint32] | None = None
+
+    @property
+    def hit(self) -> npt.NDArray[np.bool_]:
+        """numpy.ndarray of bool, shape (rays,) : whether each ray hits anything. Exact."""
+        return self._inner.hit()
+
+    @property
+    def offsets(self) -> npt.NDArray[np.uint64]:
+        """numpy.ndarray of uint64, shape (rays + 1,) : where the hits of each ray start among all hits, and the end of the last.
+        ``numpy.repeat(numpy.arange(len(hits)), numpy.diff(hits.offsets))`` is the ray of each hit.
+        """
+        return self._inner.offsets()
+
+    @property
+    def rows(self) -> npt.NDArray[np.uint32]:
+        """numpy.ndarray of uint32, shape (n, 2) : number of the body and its element, as in `Closest.rows`. Exact. 4294967295 twice
+        where a ray hits nothing. Read-only, and made once.
+        """
+        if self._rows is None:
+            self._rows = _locked(self._inner.rows())
+        return self._rows
+
+    @property
+    def elements(self) -> npt.NDArray[np.uint32]:
+        """numpy.ndarray of uint32, shape (n,) : the second column of `rows`."""
+        return self.rows[:, 1]
+
+    @property
+    def t(self) -> npt.NDArray[np.float64]:
+        """numpy.ndarray of float64, shape (n,) : where the ray comes to the element, in units of its direction, rounded down: never
+        above the true one. Infinity where a ray hits nothing.
+        """
+        return self._inner.t()
+
+    @property
+    def t_end(self) -> npt.NDArray[np.float64]:
+        """numpy.ndarray of float64, shape (n,) : where it leaves the element, rounded down: `t`, unless it lies in the face's plane."""
+        return self._inner.t_end()
+
+    @property
+    def barycentrics(self) -> npt.NDArray[np.float64]:
+        """numpy.ndarray of float64, shape (n, 3) : the point of entry as weights of the element's corners, each rounded to nearest.
+        NaN where a ray hits nothing.
+        """
+        return self._inner.barycentrics()
+
+    @property
+    def features(self) -> npt.NDArray[np.uint8]:
+        """numpy.ndarray of uint8, shape (n,) : the feature of the element on which that point lies, as an index of `impinge.FEATURES`.
+        Exact. 255 where a ray hits nothing.
+        """
+        return self._inner.features()
+
+    @property
+    def hash(self) -> int:
+        """int : a 64-bit hash of the rays, what they hit and in which order; equal answers have equal hashes everywhere."""
+        return self._inner.hash()
+
+    @property
+    def stats(self) -> Stats:
+        """Stats : what the answer cost."""
+        return Stats(**self._inner.stats())
+
+    def __len__(self) -> int:
+        return len(self._inner)
+
+    def __repr__(self) -> str:
+        return f"Hits({len(self)} rays)"
 
 
 class _Motion:

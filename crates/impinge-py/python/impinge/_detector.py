@@ -13,6 +13,7 @@ from ._answers import (
     Advance,
     Candidates,
     Closest,
+    Hits,
     Impact,
     Impacts,
     Nearest,
@@ -641,6 +642,51 @@ class Detector(DetectorBase):
         ['f', 'v0']
         """
         return Closest(self._closest(scene, points, most, options))
+
+    def cast(
+        self,
+        scene: Scene,
+        origins: _Array,
+        directions: _Array,
+        most: SupportsFloat = inf,
+        **options: Unpack[Options],
+    ) -> Hits:
+        """What each ray hits: the points ``origin + t * direction``, for t from 0 to `most`. Elements are those of `closest`.
+
+        Decided exactly: a ray that grazes an edge or a vertex hits all elements there, and one in the plane of a face hits it from an
+        entry to an exit. The first hit is the one with the smallest t; of several it is the lowest by body and then by number. A
+        direction of zero is the origin alone.
+
+        Parameters
+        ----------
+        scene : Scene
+        origins, directions : array_like, shape (n, 3)
+            Float32 or float64, taken as they are. Directions need not have unit length.
+        most : float
+            The largest t: infinity for rays, 1 for segments from `origins` to ``origins + directions``.
+        **options
+            ``hits="first"``, ``"any"`` or ``"all"``. ``of=body`` looks at one body; else all are looked at. ``query``, ``cancel`` and
+            ``progress`` as for `Detector`. Options about pairs are refused.
+
+        Returns
+        -------
+        Hits
+
+        Raises
+        ------
+        ValueError
+            Another number of directions than of origins, a `most` that is negative or NaN, a ray that is not finite.
+
+        Examples
+        --------
+        >>> import impinge
+        >>> scene = impinge.Scene()
+        >>> floor = scene.add([[0, 0, 0], [4, 0, 0], [0, 4, 0]], [[0, 1, 2]])
+        >>> hits = impinge.Detector("cpu").cast(scene, [[1, 1, 2], [9, 1, 2]], [[0, 0, -1], [0, 0, -1]])
+        >>> hits.hit.tolist(), hits.t.tolist(), hits.elements[hits.hit].tolist()
+        ([True, False], [2.0, inf], [0])
+        """
+        return Hits(self._cast(scene, origins, directions, most, options))
 
     def contains(
         self, scene: Scene, body: _Body, points: _Array, **control: Unpack[Control]

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _impinge
-from ._answers import Closest
+from ._answers import Closest, Hits
 from ._detector import Detector
 from ._scene import Scene
 
@@ -18,7 +18,18 @@ if TYPE_CHECKING:
     from ._query import _Array
     from ._scene import _RowKind
 
-__all__ = ["DeviceInfo", "closest_points", "contains", "devices", "hash_rows", "pairs", "self_pairs", "signed_distance", "weld"]
+__all__ = [
+    "DeviceInfo",
+    "cast",
+    "closest_points",
+    "contains",
+    "devices",
+    "hash_rows",
+    "pairs",
+    "self_pairs",
+    "signed_distance",
+    "weld",
+]
 
 
 class Settings(TypedDict, total=False):
@@ -130,12 +141,8 @@ def self_pairs(
     ValueError, TypeError
         As `Scene.add` and `Detector`.
     """
-    scene = Scene()
-    scene._add_named(vertices, faces, kind, ("vertices", "faces"), weld)
-    question = {"self_of": 0, "shared_vertex": shared_vertex}
-    settings.setdefault("backend", "cpu")
-    found = Detector(**settings)._detect(scene, question)
-    return found.self_of(0)
+    scene, detector = _one_mesh(vertices, faces, kind, weld, settings)
+    return detector._detect(scene, {"self_of": 0, "shared_vertex": shared_vertex}).self_of(0)
 
 
 def closest_points(
@@ -178,10 +185,58 @@ def closest_points(
     >>> closest.points.tolist(), closest.distances.tolist(), closest.elements.tolist()
     ([[1.0, 1.0, 0.0]], [2.0], [0])
     """
-    scene = Scene()
-    scene._add_named(vertices, faces, kind, ("vertices", "faces"), False)
-    settings.setdefault("backend", "cpu")
-    return Closest(Detector(**settings)._closest(scene, points, np.inf, {}))
+    scene, detector = _one_mesh(vertices, faces, kind, False, settings)
+    return Closest(detector._closest(scene, points, np.inf, {}))
+
+
+def cast(
+    vertices: _Array,
+    faces: _Array,
+    origins: _Array,
+    directions: _Array,
+    most: SupportsFloat = np.inf,
+    *,
+    hits: Literal["first", "any", "all"] = "first",
+    kind: _RowKind | None = None,
+    **settings: Unpack[Settings],
+) -> Hits:
+    """What rays hit of a mesh: the points ``origin + t * direction``, for t from 0 to `most`. Decided exactly.
+
+    Parameters
+    ----------
+    vertices : array_like, shape (v, 3)
+        Positions, float32 or float64.
+    faces : array_like of int, shape (n, 3) or (n, 4)
+        Triangles, or tetrahedra, whose surface is looked at, as vertex indices.
+    origins, directions : array_like, shape (n, 3)
+        Float32 or float64, taken as they are. Directions need not have unit length.
+    most : float
+        The largest t: infinity for rays, 1 for segments.
+    hits : {"first", "any", "all"}
+        What each ray hits first, whether it hits anything, or all that it hits.
+    kind : {"points", "edges", "triangles", "tetrahedra", "quads"}, optional
+        What the rows of `faces` are, as for `Scene.add`.
+    **settings
+        As for `Detector`, but for ``backend``, which is ``"cpu"`` unless it is given.
+
+    Returns
+    -------
+    Hits
+
+    Raises
+    ------
+    ValueError, TypeError
+        As `Scene.add` and `Detector.cast`.
+
+    Examples
+    --------
+    >>> import impinge
+    >>> hits = impinge.cast([[0, 0, 0], [4, 0, 0], [0, 4, 0]], [[0, 1, 2]], [[1, 1, 2]], [[0, 0, -1]])
+    >>> hits.t.tolist(), hits.elements.tolist(), hits.barycentrics.tolist()
+    ([2.0], [0], [[0.5, 0.25, 0.25]])
+    """
+    scene, detector = _one_mesh(vertices, faces, kind, False, settings)
+    return Hits(detector._cast(scene, origins, directions, most, {"hits": hits}))
 
 
 def signed_distance(
@@ -218,10 +273,7 @@ def signed_distance(
     >>> impinge.signed_distance(corners, faces, [[1, 1, 0.5], [0, 0, 2], [-1, 0, 0]]).tolist()
     [0.5, 0.0, -1.0]
     """
-    scene = Scene()
-    scene._add_named(vertices, faces, kind, ("vertices", "faces"), weld)
-    settings.setdefault("backend", "cpu")
-    detector = Detector(**settings)
+    scene, detector = _one_mesh(vertices, faces, kind, weld, settings)
     places = detector._contains(scene, 0, points, {})
     return detector._closest(scene, points, np.inf, {}).distances() * places
 
@@ -270,10 +322,18 @@ def contains(
     >>> impinge.contains(corners, faces, [[1, 1, 1], [0, 0, 2], [-1, 0, 0]])
     array([ 1,  0, -1], dtype=int8)
     """
+    scene, detector = _one_mesh(vertices, faces, kind, weld, settings)
+    return detector._contains(scene, 0, points, {})
+
+
+def _one_mesh(
+    vertices: _Array, faces: _Array, kind: _RowKind | None, weld: bool, settings: Settings
+) -> tuple[Scene, Detector]:
+    """A scene of one mesh, and a detector, on the CPU unless the settings say otherwise."""
     scene = Scene()
     scene._add_named(vertices, faces, kind, ("vertices", "faces"), weld)
     settings.setdefault("backend", "cpu")
-    return Detector(**settings)._contains(scene, 0, points, {})
+    return scene, Detector(**settings)
 
 
 def weld(

@@ -40,6 +40,7 @@ class Fields(TypedDict, total=False):
     precision: Literal["f32", "f64"]
     distances: bool
     closest_points: bool
+    hits: Literal["first", "any", "all"]
     fixed: Iterable[_Body]
 
 
@@ -73,6 +74,7 @@ _DEFAULTS: dict[str, Any] = {
     "precision": "f32",
     "distances": False,
     "closest_points": False,
+    "hits": "first",
     "fixed": (),
 }
 _SCOPE = ("which", "between", "self_of", "of")
@@ -135,6 +137,8 @@ class Query:
         `Detector.near`: whether to find distances, too.
     closest_points : bool
         `Detector.near`: whether to find distances and nearest points, too.
+    hits : {"first", "any", "all"}
+        `Detector.cast`: what each ray hits first, whether it hits anything, or all that it hits.
     fixed : sequence of Body
         `Detector.safe_distances`: bodies that do not move, and leave the whole distance to what is near them.
 
@@ -172,6 +176,7 @@ class Query:
     precision: Literal["f32", "f64"]
     distances: bool
     closest_points: bool
+    hits: Literal["first", "any", "all"]
     fixed: tuple[_Body, ...]
 
     def __init__(self, **options: Unpack[Fields]) -> None:

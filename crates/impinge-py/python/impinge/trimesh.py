@@ -1,4 +1,4 @@
-"""Questions about points under the names of trimesh: change the import, and the answers are exact.
+"""Questions about points and rays under the names of trimesh: change the import, and the answers are exact.
 
 >>> import numpy as np
 >>> from impinge.trimesh import ProximityQuery, contains
@@ -9,16 +9,20 @@
 array([ True, False, False])
 >>> ProximityQuery(Tip).signed_distance([[1, 1, 0.5], [-1, 0, 0]])
 array([ 0.5, -1. ])
+>>> from impinge.trimesh import RayMeshIntersector
+>>> RayMeshIntersector(Tip).intersects_first([[1, 1, -2], [9, 9, -2]], [[0, 0, 1], [0, 0, 1]])
+array([ 0, -1])
 
 A mesh is anything with `vertices` and `faces`. It is read again when it has changed. Where trimesh takes a nearest face by floats and casts a
 ray to tell inside from outside, these decide: the nearest face is the nearest, of several the lowest, and a point is inside if the
 surface winds around it. So the mesh must be closed for `contains` and `signed_distance`, which refuse one that is not, naming an edge; seams, where
-vertices are there twice, count as closed. Distances are rounded down. Rays are not here yet.
+vertices are there twice, count as closed. Distances are rounded down. A ray hits whatever it
+shares a point with: edges, vertices and faces in whose plane it lies, which trimesh leaves out or counts as rounding has it.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, SupportsIndex
+from typing import TYPE_CHECKING, Any, Literal, SupportsIndex
 
 import numpy as np
 import numpy.typing as npt
@@ -29,13 +33,39 @@ from ._scene import Scene
 if TYPE_CHECKING:
     from ._query import _Array
 
-__all__ = ["ProximityQuery", "closest_point", "contains", "signed_distance"]
+__all__ = ["ProximityQuery", "RayMeshIntersector", "closest_point", "contains", "signed_distance"]
 
 _Floats = npt.NDArray[np.float64]
 _Numbers = npt.NDArray[np.int64]
 
 
-class ProximityQuery:
+class _OfMesh:
+    """Asks about one mesh, which is read again when it has changed."""
+
+    def __init__(self, mesh: Any, *, threads: SupportsIndex | None = None) -> None:
+        self._mesh = mesh
+        self._detector = Detector("cpu", threads=threads)
+        self._read: tuple[npt.NDArray[Any], npt.NDArray[Any]] | None = None
+        self._scene = Scene()
+        #: The vertices as a body of points, and the surface whose they are.
+        self._vertices: tuple[Scene, Scene] | None = None
+
+    def _surface(self) -> Scene:
+        """A scene of the mesh as it is now."""
+        vertices, faces = np.asarray(self._mesh.vertices), np.asarray(self._mesh.faces)
+        if self._read is not None:
+            if np.array_equal(vertices, self._read[0]) and np.array_equal(faces, self._read[1]):
+                return self._scene
+        self._scene = Scene()
+        self._scene._add_named(vertices, faces, "triangles", ("vertices", "faces"), True)
+        self._read = vertices.copy(), faces.copy()
+        return self._scene
+
+    def _contains(self, points: _Array) -> npt.NDArray[np.bool_]:
+        return self._detector.contains(self._surface(), 0, points) > 0
+
+
+class ProximityQuery(_OfMesh):
     """Nearest points, distances and sides of one mesh, as ``trimesh.proximity.ProximityQuery``.
 
     Parameters
@@ -44,12 +74,6 @@ class ProximityQuery:
     threads : int, optional
         CPU threads; by default one per core.
     """
-
-    def __init__(self, mesh: Any, *, threads: SupportsIndex | None = None) -> None:
-        self._mesh = mesh
-        self._detector = Detector("cpu", threads=threads)
-        self._read: tuple[npt.NDArray[Any], npt.NDArray[Any]] | None = None
-        self._surface = self._vertices = Scene()
 
     def on_surface(self, points: _Array) -> tuple[_Floats, _Floats, _Numbers]:
         """The nearest points of the surface.
@@ -67,8 +91,7 @@ class ProximityQuery:
         triangle_id : numpy.ndarray of int64, shape (n,)
             The face with that point; of several the lowest.
         """
-        self._refresh()
-        closest = self._detector.closest(self._surface, points)
+        closest = self._detector.closest(self._surface(), points)
         return closest.points, closest.distances, closest.elements.astype(np.int64)
 
     def vertex(self, points: _Array) -> tuple[_Floats, _Numbers]:
@@ -85,8 +108,11 @@ class ProximityQuery:
         vertex_id : numpy.ndarray of int64, shape (n,)
             Of several the lowest.
         """
-        self._refresh()
-        closest = self._detector.closest(self._vertices, points)
+        surface = self._surface()
+        if self._vertices is None or self._vertices[0] is not surface:
+            self._vertices = surface, Scene()
+            self._vertices[1].add_points(np.asarray(self._mesh.vertices))
+        closest = self._detector.closest(self._vertices[1], points)
         return closest.distances, closest.elements.astype(np.int64)
 
     def signed_distance(self, points: _Array) -> _Floats:
@@ -106,9 +132,9 @@ class ProximityQuery:
         ValueError
             A surface that is not closed.
         """
-        self._refresh()
-        places = self._detector.contains(self._surface, 0, points)
-        return self._detector.closest(self._surface, points).distances * places
+        surface = self._surface()
+        places = self._detector.contains(surface, 0, points)
+        return self._detector.closest(surface, points).distances * places
 
     def contains(self, points: _Array) -> npt.NDArray[np.bool_]:
         """Whether points are inside; what is on the surface is not. `impinge.contains` tells all three apart.
@@ -126,19 +152,143 @@ class ProximityQuery:
         ValueError
             A surface that is not closed.
         """
-        self._refresh()
-        return self._detector.contains(self._surface, 0, points) > 0
+        return self._contains(points)
 
-    def _refresh(self) -> None:
-        """Reads the mesh, if it has changed."""
-        vertices, faces = np.asarray(self._mesh.vertices), np.asarray(self._mesh.faces)
-        if self._read is not None:
-            if np.array_equal(vertices, self._read[0]) and np.array_equal(faces, self._read[1]):
-                return
-        self._surface, self._vertices = Scene(), Scene()
-        self._surface._add_named(vertices, faces, "triangles", ("vertices", "faces"), True)
-        self._vertices.add_points(vertices)
-        self._read = vertices.copy(), faces.copy()
+
+class RayMeshIntersector(_OfMesh):
+    """What rays hit of one mesh, as ``trimesh.ray.ray_triangle.RayMeshIntersector`` and ``trimesh.ray.ray_pyembree``.
+
+    Directions need not have unit length. Decided exactly: a ray hits all faces with which it shares a point.
+
+    Parameters
+    ----------
+    mesh : trimesh.Trimesh, or anything with `vertices` and `faces`
+    scale_to_box : bool
+        Without meaning here: nothing is scaled.
+    threads : int, optional
+        CPU threads; by default one per core.
+    """
+
+    def __init__(
+        self, mesh: Any, scale_to_box: bool = True, *, threads: SupportsIndex | None = None
+    ) -> None:
+        del scale_to_box
+        super().__init__(mesh, threads=threads)
+
+    def intersects_id(
+        self,
+        ray_origins: _Array,
+        ray_directions: _Array,
+        multiple_hits: bool = True,
+        max_hits: SupportsIndex | None = None,
+        return_locations: bool = False,
+    ) -> tuple[_Numbers, _Numbers] | tuple[_Numbers, _Numbers, _Floats]:
+        """The faces that rays hit.
+
+        Parameters
+        ----------
+        ray_origins, ray_directions : array_like, shape (n, 3)
+        multiple_hits : bool
+            All faces that a ray hits, or the first; of several at one place the lowest.
+        max_hits : int, optional
+            The most hits of a ray, the first ones; by default all.
+        return_locations : bool
+            Whether to return where, too. Then of several faces that a ray hits at one place, as on an edge, only the lowest is
+            named, so that hits can be counted.
+
+        Returns
+        -------
+        index_tri, index_ray : numpy.ndarray of int64, shape (m,)
+            By ray, then by distance.
+        locations : numpy.ndarray of float64, shape (m, 3)
+            If they were asked for. Rounded.
+        """
+        kind: Literal["first", "all"] = "all" if multiple_hits else "first"
+        hits = self._detector.cast(self._surface(), ray_origins, ray_directions, hits=kind)
+        starts = hits.offsets.astype(np.int64)
+        ray: _Numbers = np.repeat(np.arange(len(hits)), starts[1:] - starts[:-1])
+        # Asked for the first hits, there is a row for each ray.
+        held = np.ones(len(ray), bool) if multiple_hits else hits.hit
+        face, t = hits.elements[held].astype(np.int64), hits.t[held]
+        kept = np.ones(len(ray), bool)
+        if return_locations:
+            kept[1:] = (ray[1:] != ray[:-1]) | (t[1:] != t[:-1])
+        if max_hits is not None:
+            # The number of each hit among those of its ray that are kept.
+            before = np.cumsum(kept) - kept
+            kept &= before - before[starts[ray]] < int(max_hits)
+        if not return_locations:
+            return face[kept], ray[kept]
+        corners = np.asarray(self._mesh.vertices, np.float64)[np.asarray(self._mesh.faces)[face[kept]]]
+        locations = np.einsum("nk,nkj->nj", hits.barycentrics[held][kept], corners)
+        return face[kept], ray[kept], locations
+
+    def intersects_location(
+        self, ray_origins: _Array, ray_directions: _Array, multiple_hits: bool = True
+    ) -> tuple[_Floats, _Numbers, _Numbers]:
+        """Where rays hit the mesh, each place once.
+
+        Parameters
+        ----------
+        ray_origins, ray_directions : array_like, shape (n, 3)
+        multiple_hits : bool
+            All places, or the first of each ray.
+
+        Returns
+        -------
+        locations : numpy.ndarray of float64, shape (m, 3)
+        index_ray, index_tri : numpy.ndarray of int64, shape (m,)
+        """
+        face, ray, locations = self.intersects_id(  # type: ignore[misc]
+            ray_origins, ray_directions, multiple_hits, return_locations=True
+        )
+        return locations, ray, face
+
+    def intersects_first(self, ray_origins: _Array, ray_directions: _Array) -> _Numbers:
+        """The first face that each ray hits.
+
+        Parameters
+        ----------
+        ray_origins, ray_directions : array_like, shape (n, 3)
+
+        Returns
+        -------
+        numpy.ndarray of int64, shape (n,)
+            -1 where it hits nothing.
+        """
+        hits = self._detector.cast(self._surface(), ray_origins, ray_directions)
+        return np.where(hits.hit, hits.elements.astype(np.int64), -1)
+
+    def intersects_any(self, ray_origins: _Array, ray_directions: _Array) -> npt.NDArray[np.bool_]:
+        """Whether each ray hits the mesh.
+
+        Parameters
+        ----------
+        ray_origins, ray_directions : array_like, shape (n, 3)
+
+        Returns
+        -------
+        numpy.ndarray of bool, shape (n,)
+        """
+        return self._detector.cast(self._surface(), ray_origins, ray_directions, hits="any").hit
+
+    def contains_points(self, points: _Array) -> npt.NDArray[np.bool_]:
+        """As `ProximityQuery.contains`: no ray decides.
+
+        Parameters
+        ----------
+        points : array_like, shape (n, 3)
+
+        Returns
+        -------
+        numpy.ndarray of bool, shape (n,)
+
+        Raises
+        ------
+        ValueError
+            A surface that is not closed.
+        """
+        return self._contains(points)
 
 
 def closest_point(mesh: Any, points: _Array) -> tuple[_Floats, _Floats, _Numbers]:
