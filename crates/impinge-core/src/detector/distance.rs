@@ -48,9 +48,11 @@ impl Detector {
         let control = &self.control.clone();
         let plan = self.plan_of_nearest(scene, query)?;
         control.step(0, 1)?;
-        self.measure_distance(scene, control, |distances, work, touching| {
+        let nearest = self.measure_distance(scene, control, |distances, work, touching| {
             distances.nearest(scene, &plan, work, touching)
-        })
+        })?;
+        self.keep(scene, query, plan);
+        Ok(nearest)
     }
 
     /// The smallest distance of two bodies at the positions that they have, and the pair of elements that has it; `None` if one
@@ -89,7 +91,7 @@ impl Detector {
     }
 
     /// What is asked about the nearest bodies.
-    fn plan_of_nearest(&self, scene: &Scene, query: &Query) -> Result<Plan, Error> {
+    fn plan_of_nearest(&mut self, scene: &Scene, query: &Query) -> Result<Plan, Error> {
         let refused = |setting, given: &str| {
             Err(Error::Setting {
                 setting,
@@ -103,7 +105,7 @@ impl Detector {
         if let Some(given) = query.leaves_out_elements() {
             return refused("exclude", given);
         }
-        let plan = Plan::intersections(scene, query, Goal::Any, self.settings.limits())?;
+        let plan = self.plan_of_any(scene, query)?;
         match plan.parts.iter().any(|part| part.within) {
             true => refused("query", "self-collision"),
             false => Ok(plan),

@@ -14,6 +14,14 @@ use crate::scene::error::Error;
 use crate::search::runner::ready;
 use crate::search::work::Work;
 
+/// The plan of a question, and what it depends on.
+#[derive(Debug)]
+pub(super) struct KeptPlan {
+    arrangement: u64,
+    query: Query,
+    plan: Plan,
+}
+
 impl Detector {
     /// All pairs that the query asks for, in the current state of the scene.
     ///
@@ -49,12 +57,36 @@ impl Detector {
     /// As `detect`; but any number of pairs is allowed.
     pub fn any(&mut self, scene: &Scene, query: &Query) -> Result<bool, Error> {
         let control = &self.control.clone();
-        let plan = Plan::intersections(scene, query, Goal::Any, self.settings.limits())?;
-        if let Some(any) = self.any_soon(scene, query, &plan, control)? {
-            return Ok(any);
+        let plan = self.plan_of_any(scene, query)?;
+        let any = match self.any_soon(scene, query, &plan, control)? {
+            Some(any) => any,
+            None => {
+                let mut pairs = self.homes.pairs.take();
+                self.wait_for(scene, &plan, control, &mut pairs)? > 0
+            }
+        };
+        self.keep(scene, query, plan);
+        Ok(any)
+    }
+
+    /// The question whether any elements meet, which is also that for the nearest bodies. Of many bodies it takes longer to list them than to
+    /// answer: it is kept until bodies are added or changed other than in their positions.
+    pub(super) fn plan_of_any(&mut self, scene: &Scene, query: &Query) -> Result<Plan, Error> {
+        match self.any.take() {
+            Some(kept) if kept.arrangement == scene.arrangement() && kept.query == *query => {
+                Ok(kept.plan.asked_now())
+            }
+            _ => Plan::intersections(scene, query, Goal::Any, self.settings.limits()),
         }
-        let mut pairs = self.homes.pairs.take();
-        Ok(self.wait_for(scene, &plan, control, &mut pairs)? > 0)
+    }
+
+    /// Keeps a plan for the same question.
+    pub(super) fn keep(&mut self, scene: &Scene, query: &Query, plan: Plan) {
+        self.any = Some(KeptPlan {
+            arrangement: scene.arrangement(),
+            query: query.clone(),
+            plan,
+        });
     }
 
     /// [`detect`](Detector::detect) without blocking. On a GPU the future waits for the device, which must be

@@ -70,6 +70,8 @@ pub struct Detector {
     steps: steps::StepMemory,
     solver: solver::SolverMemory,
     touching: distance::Touching,
+    /// The last question whether any elements meet.
+    any: Option<intersections::KeptPlan>,
     distances: Distances,
     topologies: Topologies,
     probes: Probes,
@@ -156,6 +158,7 @@ impl Detector {
             cpu: Cpu::new(&settings, &clusterings),
             steps: steps::StepMemory::new(&settings, clusterings.clone()),
             solver: solver::SolverMemory::default(),
+            any: None,
             touching: distance::Touching::default(),
             distances: Distances::new(&settings, clusterings.clone()),
             topologies: Topologies::default(),

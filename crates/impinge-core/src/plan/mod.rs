@@ -348,6 +348,14 @@ impl Plan {
         }
     }
 
+    /// The same question, asked now.
+    pub(crate) fn asked_now(self) -> Self {
+        Plan {
+            since: Instant::now(),
+            ..self
+        }
+    }
+
     fn of(
         scene: &Scene,
         query: &Query,

@@ -246,6 +246,8 @@ pub struct Scene {
     free: Vec<u32>,
     /// Changes whenever anything may have changed; equal stamps mean equal scenes.
     stamp: u64,
+    /// Changes whenever anything but positions may have changed.
+    arrangement: u64,
 }
 
 impl Scene {
@@ -320,7 +322,7 @@ impl Scene {
             Some(_) => self.slots[id.index()] = held,
             None => self.slots.push(held),
         }
-        self.stamp = new_stamp();
+        self.rearranged();
         Ok(id)
     }
 
@@ -387,7 +389,7 @@ impl Scene {
         self.body(body)?;
         self.slots[body.index()] = Slot(None);
         self.free.push(body.slot());
-        self.stamp = new_stamp();
+        self.rearranged();
         Ok(())
     }
 
@@ -440,7 +442,7 @@ impl Scene {
         positions: impl Into<NewPositions<'a>>,
     ) -> Result<(), Error> {
         let positions = positions.into();
-        let target = self.body_mut(body)?;
+        let target = self.moved_body(body)?;
         target.check(body, &positions)?;
         store(&mut target.positions, positions);
         target.has_moved(true);
@@ -463,7 +465,7 @@ impl Scene {
         positions: impl Into<NewPositions<'a>>,
     ) -> Result<(), Error> {
         let positions = positions.into();
-        let target = self.body_mut(body)?;
+        let target = self.moved_body(body)?;
         target.check(body, &positions)?;
         let mut end = target.end.take().unwrap_or_else(|| f32::store(&[]));
         store(&mut end, positions);
@@ -476,7 +478,7 @@ impl Scene {
     /// # Errors
     /// The id names no body.
     pub fn clear_end_positions(&mut self, body: BodyId) -> Result<(), Error> {
-        let target = self.body_mut(body)?;
+        let target = self.moved_body(body)?;
         target.moves = false;
         target.step_stamp = new_stamp();
         Ok(())
@@ -489,7 +491,7 @@ impl Scene {
     /// # Errors
     /// The id names no body, or it stores the other precision.
     pub fn positions_mut<R: Real>(&mut self, body: BodyId) -> Result<&mut [[R; 3]], Error> {
-        let target = self.body_mut(body)?;
+        let target = self.moved_body(body)?;
         target.has_moved(false);
         stored(body, &mut target.positions).map(|stored| stored.own().as_mut_slice())
     }
@@ -522,7 +524,7 @@ impl Scene {
     /// were written in place and are refused; a moved position that is refused. The body is unchanged then.
     pub fn set_transform(&mut self, body: BodyId, matrix: &[[f64; 4]; 4]) -> Result<(), Error> {
         let matrix = Affine::new(matrix)?;
-        let target = self.body_mut(body)?;
+        let target = self.moved_body(body)?;
         if !target.checked {
             target.positions.check(body)?;
         }
@@ -612,7 +614,23 @@ impl Scene {
         self.stamp
     }
 
+    /// Changes whenever anything but positions may have changed; equal stamps mean the same bodies.
+    pub(crate) fn arrangement(&self) -> u64 {
+        self.arrangement
+    }
+
+    fn rearranged(&mut self) {
+        self.stamp = new_stamp();
+        self.arrangement = self.stamp;
+    }
+
     fn body_mut(&mut self, body: BodyId) -> Result<&mut Body, Error> {
+        self.rearranged();
+        self.moved_body(body)
+    }
+
+    /// A body of which only positions are changed.
+    fn moved_body(&mut self, body: BodyId) -> Result<&mut Body, Error> {
         let unknown = self.unknown(body);
         self.stamp = new_stamp();
         match self.slots.get_mut(body.index()) {
