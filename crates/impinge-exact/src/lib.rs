@@ -82,7 +82,7 @@ pub mod internal {
         shares_apart, spare_apart, unsure_are_within,
     };
     pub use crate::orientation::{Projection, collinear};
-    pub use crate::ray::{Meeting, Parameter, Ray, meet};
+    pub use crate::ray::{Meeting, Parameter, Ray, meet, meet_inside};
     pub use crate::rounding::two_sum;
     pub use crate::segment::strictly_between;
 

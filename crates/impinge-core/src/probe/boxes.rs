@@ -76,6 +76,12 @@ impl Boxes {
         self.levels.len()
     }
 
+    /// The boxes of a level's nodes.
+    #[inline(always)]
+    pub fn level(&self, level: usize) -> &BoundsArray {
+        &self.levels[level]
+    }
+
     /// The box of a node.
     #[inline(always)]
     pub fn node(&self, level: usize, node: usize) -> Bounds {

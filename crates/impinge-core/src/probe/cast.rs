@@ -1,17 +1,18 @@
 //! What rays hit: the way down the trees past boxes, nearest first, then floats, then exact arithmetic.
 //!
 //! A node is skipped if the ray certainly misses its box, or comes to it later than to the first hit. Of an element, floats say
-//! that the ray certainly misses it, or meets it too late. All others are decided exactly. So the answer does not depend on the
-//! order of the search.
+//! that the ray certainly misses it, or meets it too late, or certainly passes through its inside, between two parameters. What is in
+//! doubt is decided exactly at once. Of the hits that may be first, mostly one, the numbers are found last: rounded from twice the
+//! precision of floats where that suffices. So the answer does not depend on the order of the search.
 //!
-//! Cost: per ray some dozens of boxes per level, in a few clusters 64 boxes, and per hit some microseconds of exact arithmetic.
+//! Cost: per ray some dozens of boxes per level, eight at a time, in a few clusters 64 boxes at a time, and some faces.
 
 use std::cmp::Ordering;
 
 use super::{Looks, Target};
 use crate::answers::hits::RayHit;
 use crate::answers::pairs::Element;
-use crate::bvh::bounds::Bounds;
+use crate::bvh::bounds::{Bounds, BoundsArray, round_down, round_up};
 use crate::query::step::Hit;
 use crate::scene::elements::with_corners;
 use crate::scene::error::Error;
@@ -19,27 +20,52 @@ use crate::scene::ids::BodyId;
 use crate::scene::index::{ClusterIx, ElementIx};
 use crate::search::narrow::Corners;
 use crate::search::work::Work;
-use impinge_exact::Point;
-use impinge_exact::internal::{Meeting, Ray, meet};
+use crate::simd::{Isa, LaneBounds, Lanes, Simd, up_to, with_isa};
+use impinge_exact::internal::{Ray, meet, meet_inside};
+use impinge_exact::{Feature, Point};
 
 /// More than the relative error of a few operations.
 const ROUNDING: f64 = 64.0 * f64::EPSILON;
-/// More than the error of a determinant, relative to the product of its vectors' sizes.
-const ERROR: f64 = 128.0 * f64::EPSILON;
-/// Sizes of products that are not wrong by underflow, and do not overflow.
-const SAFE: std::ops::Range<f64> = 1e-200..1e200;
-/// Sizes of numbers of rays that are held against boxes.
-const MODERATE: std::ops::Range<f64> = 1e-100..1e100;
+/// More than the error of a determinant, relative to the cube of its largest number.
+const ERROR: f64 = 512.0 * f64::EPSILON;
+/// Sizes of numbers of which no product of three is wrong by underflow, or overflows.
+const MODERATE: std::ops::Range<f64> = 1e-60..1e60;
+/// 1 and more than the relative error of a few operations in `f32`.
+const GROWN: f32 = 1.0 + 16.0 * f32::EPSILON;
+/// The largest coordinates of rays and boxes that are held against each other: 2^60.
+const FAR: f32 = (1u64 << 60) as f32;
 
-/// What rays hit, one list after the other, and where the lists end.
+/// What rays hit: one list after the other, and where the lists end.
+pub(super) type Lists = (Vec<RayHit>, Vec<(usize, bool)>);
+
+/// What rays hit.
 ///
 /// # Errors
 /// Cancellation.
 pub(super) fn cast(
+    isa: Isa,
     bodies: &[(BodyId, Target<'_>)],
-    rays: impl Iterator<Item = Ray>,
+    rays: &[Ray],
     hits: Hit,
-    into: &mut (Vec<RayHit>, Vec<(usize, bool)>),
+    into: &mut Lists,
+    work: Work<'_>,
+) -> Result<(), Error> {
+    with_isa!(isa, cast_all, (
+        bodies: &[(BodyId, Target<'_>)] = bodies,
+        rays: &[Ray] = rays,
+        hits: Hit = hits,
+        into: &mut Lists = into,
+        work: Work<'_> = work,
+    ) -> Result<(), Error>)
+}
+
+#[inline(always)]
+fn cast_all<S: Simd>(
+    _simd: S,
+    bodies: &[(BodyId, Target<'_>)],
+    rays: &[Ray],
+    hits: Hit,
+    into: &mut Lists,
     work: Work<'_>,
 ) -> Result<(), Error> {
     let mut search = Search {
@@ -50,35 +76,93 @@ pub(super) fn cast(
         waiting: Vec::new(),
     };
     for ray in rays {
-        search.begin(&ray);
+        search.begin(ray);
         for (number, &(_, target)) in bodies.iter().enumerate() {
-            search.visit(number, target, &ray)?;
+            search.visit(number, target, ray)?;
         }
         let is_hit = !search.found.is_empty();
-        search.sort()?;
-        if hits != Hit::Any {
-            into.0
-                .extend(search.found.iter().map(|found| found.answer(bodies)));
-        }
+        search.answer(bodies, ray, &mut into.0)?;
         into.1.push((into.0.len(), is_hit));
     }
     Ok(())
 }
 
-struct Found {
-    meeting: Meeting,
-    t: f64,
+/// An element that a ray certainly meets.
+struct Candidate {
+    /// The ray does not come to it before this.
+    low: f64,
     /// The place of the body among those that are looked at.
     body: usize,
+    /// The place of the element in the order of the clusters.
+    slot: usize,
+    met: Option<Met>,
+}
+
+/// The numbers of a hit.
+struct Met {
+    t: f64,
+    t_end: f64,
+    feature: Feature,
+    barycentrics: [f64; 3],
+}
+
+impl Met {
+    fn exactly(ray: &Ray, corners: &[Point]) -> Option<Self> {
+        let meeting = meet(ray, corners)?;
+        Some(Met {
+            t: meeting.entry.rounded_down(),
+            t_end: meeting.exit.rounded_down(),
+            feature: meeting.feature,
+            barycentrics: meeting.barycentrics,
+        })
+    }
+}
+
+/// A hit among others of its ray.
+struct Found {
+    met: Met,
+    body: usize,
     element: ElementIx,
+    corners: Corners,
 }
 
 impl Found {
-    /// The exact order of hits.
-    fn compare(&self, other: &Found) -> Ordering {
-        let by_float = self.t.total_cmp(&other.t);
-        by_float
-            .then_with(|| self.meeting.entry.compare(&other.meeting.entry))
+    fn new(candidate: Candidate, bodies: &[(BodyId, Target<'_>)], ray: &Ray) -> Option<Self> {
+        let Candidate { body, slot, .. } = candidate;
+        let target = bodies[body].1;
+        let corners = corners(target, slot);
+        let inside = || {
+            let &[a, b, c] = corners.points() else {
+                return None;
+            };
+            let (t, barycentrics) = meet_inside(ray, &[a, b, c])?;
+            Some(Met {
+                t,
+                t_end: t,
+                feature: Feature::Face,
+                barycentrics,
+            })
+        };
+        let met = candidate.met.or_else(inside);
+        Some(Found {
+            met: met.or_else(|| Met::exactly(ray, corners.points()))?,
+            body,
+            element: target.boxes.clustering.order[slot],
+            corners,
+        })
+    }
+
+    /// The exact order of the hits of a ray.
+    fn compare(&self, other: &Found, ray: &Ray) -> Ordering {
+        let exactly = || {
+            let [one, two] = [self, other].map(|found| meet(ray, found.corners.points()));
+            one.zip(two)
+                .map_or(Ordering::Equal, |(one, two)| one.entry.compare(&two.entry))
+        };
+        self.met
+            .t
+            .total_cmp(&other.met.t)
+            .then_with(exactly)
             .then((self.body, self.element).cmp(&(other.body, other.element)))
     }
 
@@ -88,11 +172,80 @@ impl Found {
                 body: bodies[self.body].0,
                 element: self.element.raw(),
             },
-            feature: self.meeting.feature,
-            t: self.t,
-            t_end: self.meeting.exit.rounded_down(),
-            barycentrics: self.meeting.barycentrics,
+            feature: self.met.feature,
+            t: self.met.t,
+            t_end: self.met.t_end,
+            barycentrics: self.met.barycentrics,
         }
+    }
+}
+
+#[inline(always)]
+fn corners(target: Target<'_>, slot: usize) -> Corners {
+    with_corners!(&target.boxes.clustering.corners, |all| Corners::new(
+        target.body.positions(),
+        &all[slot]
+    ))
+}
+
+/// A ray as boxes are held against it, in single precision: rounded so that it meets all that the ray meets.
+struct Slabs {
+    /// The origin, rounded down and up.
+    origin: [[f32; 3]; 2],
+    /// Of the direction: infinite for 0, and no number along axes that are not looked at.
+    inverse: [f32; 3],
+    is_down: [bool; 3],
+}
+
+impl Slabs {
+    fn new(ray: &Ray, whole: &Bounds) -> Self {
+        let is_near = |x: f32| x.abs() <= FAR;
+        let origin = [ray.origin.map(round_down), ray.origin.map(round_up)];
+        let inverse = [0, 1, 2].map(|k| {
+            let inverse = 1.0 / ray.direction[k].abs();
+            let is_moderate = inverse == f64::INFINITY && ray.direction[k] == 0.0
+                || (1.0 / f64::from(FAR)..f64::from(FAR)).contains(&inverse);
+            let all = [origin[0][k], origin[1][k], whole.min[k], whole.max[k]];
+            let is_moderate = is_moderate && all.into_iter().all(is_near);
+            let is_down = ray.direction[k] < 0.0;
+            match is_moderate {
+                true if is_down => -(inverse as f32),
+                true => inverse as f32,
+                false => f32::NAN,
+            }
+        });
+        Slabs {
+            origin,
+            inverse,
+            is_down: ray.direction.map(|x| x < 0.0),
+        }
+    }
+
+    /// When the ray comes to some boxes, about and never too late, and those that it may reach before a limit.
+    #[inline(always)]
+    fn reach<const N: usize>(&self, boxes: [[&[f32; N]; 3]; 2], limit: f32) -> ([f32; N], u64) {
+        let (mut near, mut far) = ([0.0f32; N], [limit; N]);
+        let [low, high] = boxes;
+        for (axis, (low, high)) in low.into_iter().zip(high).enumerate() {
+            let [below, above] = [self.origin[0][axis], self.origin[1][axis]];
+            let ((enter, at_enter), (leave, at_leave)) = match self.is_down[axis] {
+                true => ((high, below), (low, above)),
+                false => ((low, above), (high, below)),
+            };
+            let inverse = self.inverse[axis];
+            for (lane, (near, far)) in near.iter_mut().zip(&mut far).enumerate() {
+                // Comparisons with what is no number are false.
+                let t = (enter[lane] - at_enter) * inverse;
+                *near = if t > *near { t } else { *near };
+                let t = (leave[lane] - at_leave) * inverse;
+                *far = if t < *far { t } else { *far };
+            }
+        }
+        let mut mask = 0;
+        for (lane, (near, far)) in near.iter().zip(far).enumerate() {
+            mask |= u64::from(*near <= far * GROWN + f32::MIN_POSITIVE) << lane;
+        }
+        (near, mask)
     }
 }
 
@@ -102,9 +255,9 @@ struct Search<'a> {
     hits: Hit,
     /// What the ray meets later is not asked for.
     limit: f64,
-    found: Vec<Found>,
-    /// The parameters at which the ray comes to boxes, levels and nodes that wait.
-    waiting: Vec<(f64, usize, usize)>,
+    found: Vec<Candidate>,
+    /// When the ray comes to boxes, levels and nodes that wait.
+    waiting: Vec<(f32, u32, u32)>,
 }
 
 impl Search<'_> {
@@ -113,166 +266,209 @@ impl Search<'_> {
         self.limit = ray.most;
     }
 
-    /// When the ray comes to a box, about; `None` if it certainly does not before the limit.
-    fn reaches(&self, bounds: &Bounds, ray: &Ray) -> Option<f64> {
-        let (mut near, mut far) = (0.0f64, self.limit);
-        for axis in 0..3 {
-            let (from, way) = (ray.origin[axis], ray.direction[axis]);
-            let ends = [bounds.min[axis], bounds.max[axis]].map(f64::from);
-            if way == 0.0 {
-                if from < ends[0] || ends[1] < from {
-                    return None;
-                }
-                continue;
-            }
-            let is_moderate = |x: f64| x == 0.0 || MODERATE.contains(&x.abs());
-            if !is_moderate(from) || !is_moderate(way) {
-                continue;
-            }
-            let [x, y] = ends.map(|end| (end - from) / way);
-            near = near.max(x.min(y));
-            far = far.min(x.max(y));
-        }
-        (near <= far * (1.0 + ROUNDING)).then_some(near)
+    /// The limit for boxes.
+    #[inline(always)]
+    fn limit_of_boxes(&self) -> f32 {
+        round_up(self.limit)
     }
 
     /// Adds what the ray hits of a body.
+    #[inline(always)]
     fn visit(&mut self, body: usize, target: Target<'_>, ray: &Ray) -> Result<(), Error> {
         let boxes = target.boxes;
+        let slabs = Slabs::new(ray, &boxes.root());
         self.waiting.clear();
         if let Some(top) = boxes.n_levels().checked_sub(1) {
-            self.waiting.push((0.0, top, 0));
+            self.waiting.push((0.0, top as u32, 0));
         }
         while let Some((near, level, node)) = self.waiting.pop() {
-            if near > self.limit * (1.0 + ROUNDING) {
+            let limit = self.limit_of_boxes();
+            if near > limit * GROWN + f32::MIN_POSITIVE {
                 continue;
             }
             self.looks.step()?;
             if level == 0 {
-                self.look(body, target, ClusterIx::new(node as u32), ray)?;
+                self.look(body, target, ClusterIx::new(node), ray, &slabs)?;
                 if self.hits == Hit::Any && !self.found.is_empty() {
                     return Ok(());
                 }
                 continue;
             }
-            let first = self.waiting.len();
-            for child in boxes.clustering.shape.children(level, node) {
-                if let Some(near) = self.reaches(&boxes.node(level - 1, child), ray) {
-                    self.waiting.push((near, level - 1, child));
+            let (level, first) = (level - 1, self.waiting.len());
+            let children = boxes
+                .clustering
+                .shape
+                .children(level as usize + 1, node as usize);
+            let eight = eight(boxes.level(level as usize), children.start);
+            let (nears, mask) = slabs.reach(eight, limit);
+            for lane in Lanes(mask & up_to(children.len() - 1)) {
+                let near = nears[lane];
+                // The nearest is popped first.
+                let mut place = self.waiting.len();
+                self.waiting
+                    .push((near, level, (children.start + lane) as u32));
+                while place > first && self.waiting[place - 1].0 < near {
+                    self.waiting.swap(place - 1, place);
+                    place -= 1;
                 }
             }
-            // The nearest is popped first.
-            self.waiting[first..].sort_unstable_by(|x, y| y.0.total_cmp(&x.0));
         }
         Ok(())
     }
 
     /// Adds what the ray hits of a cluster.
+    #[inline(always)]
     fn look(
         &mut self,
         body: usize,
         target: Target<'_>,
         cluster: ClusterIx,
         ray: &Ray,
+        slabs: &Slabs,
     ) -> Result<(), Error> {
-        let clustering = &target.boxes.clustering;
-        let lanes = target.boxes.elements(target.body, cluster);
-        for (lane, slot) in clustering.slots(cluster).enumerate() {
-            if self.reaches(&lanes.at(lane), ray).is_none() {
+        let slots = target.boxes.clustering.slots(cluster);
+        let lanes: &LaneBounds = target.boxes.elements(target.body, cluster);
+        let rows = [lanes.min.each_ref(), lanes.max.each_ref()];
+        let (nears, mask) = slabs.reach(rows, self.limit_of_boxes());
+        for lane in Lanes(mask & up_to(slots.len() - 1)) {
+            if nears[lane] > self.limit_of_boxes() * GROWN + f32::MIN_POSITIVE {
                 continue;
             }
-            let corners = with_corners!(&clustering.corners, |all| Corners::new(
-                target.body.positions(),
-                &all[slot]
-            ));
-            let corners = corners.points();
-            if self.certainly_misses(ray, corners) {
-                continue;
-            }
-            self.looks.step()?;
-            let Some(meeting) = meet(ray, corners) else {
-                continue;
+            let slot = slots.start + lane;
+            let corners = corners(target, slot);
+            let (low, high, met) = match self.passes(ray, corners.points()) {
+                Passes::Not => continue,
+                Passes::Inside(low, high) => (low, high, None),
+                Passes::InDoubt => {
+                    self.looks.step()?;
+                    let Some(met) = Met::exactly(ray, corners.points()) else {
+                        continue;
+                    };
+                    // The exact parameter is below the next float.
+                    (met.t, met.t.next_up(), Some(met))
+                }
             };
-            let found = Found {
-                t: meeting.entry.rounded_down(),
-                meeting,
+            if self.hits != Hit::All && high < self.limit {
+                self.limit = high;
+                self.found.retain(|other| other.low <= high);
+            }
+            self.found.push(Candidate {
+                low,
                 body,
-                element: clustering.order[slot],
-            };
-            if self.hits == Hit::All {
-                self.found.push(found);
-                continue;
-            }
-            // The exact parameter is below the next float.
-            self.limit = self.limit.min(found.t.next_up());
-            match self.found.first_mut() {
-                Some(known) if found.compare(known).is_lt() => *known = found,
-                Some(_) => {}
-                None => self.found.push(found),
-            }
+                slot,
+                met,
+            });
         }
         Ok(())
     }
 
-    /// Whether floats tell that a ray misses a face, or meets it after the limit. If they cannot: no.
-    fn certainly_misses(&self, ray: &Ray, corners: &[Point]) -> bool {
+    /// Whether floats tell that a ray misses a face, or meets it after the limit, or passes through its inside.
+    #[inline(always)]
+    fn passes(&self, ray: &Ray, corners: &[Point]) -> Passes {
         let &[a, b, c] = corners else {
-            return false;
+            return Passes::InDoubt;
         };
         let d = &ray.direction;
         let [a, b, c] = [a, b, c].map(|corner| difference(&corner, &ray.origin));
-        // The barycentrics times a common factor: 1, -1, or 0 if floats cannot tell.
-        let signs = [[&b, &c], [&c, &a], [&a, &b]].map(|[p, q]| {
-            let (value, error) = determinant(p, q, d);
-            f64::from(value > error) - f64::from(-value > error)
-        });
-        if signs.contains(&1.0) && signs.contains(&-1.0) {
-            return true;
+        let largest = size(&a).max(size(&b)).max(size(&c));
+        let of_way = size(d);
+        if !MODERATE.contains(&largest) || !MODERATE.contains(&of_way) {
+            return Passes::InDoubt;
         }
-        let ways = [&b, &c].map(|corner| difference(corner, &a));
-        let (height, of_height) = determinant(&ways[0], &ways[1], &a);
-        let (slope, of_slope) = determinant(&ways[0], &ways[1], d);
-        if slope.abs() <= of_slope {
-            return false;
+        // The barycentrics times a common factor, whose sum that is.
+        let error = ERROR * (largest * largest * of_way);
+        let across = cross(&a, d);
+        let (of_b, of_c) = (dot(&c, &across), -dot(&b, &across));
+        let are_apart = |x: f64, y: f64| x > error && y < -error || x < -error && y > error;
+        if are_apart(of_b, of_c) {
+            return Passes::Not;
         }
-        let height = if slope < 0.0 { -height } else { height };
-        if height < -of_height {
-            return true;
+        let normal = cross(&difference(&b, &a), &difference(&c, &a));
+        let slope = dot(d, &normal);
+        let of_a = slope - of_b - of_c;
+        if are_apart(of_a, of_b) || are_apart(of_a, of_c) {
+            return Passes::Not;
         }
-        let lowest = (height - of_height) / (slope.abs() + of_slope);
-        lowest * (1.0 - ROUNDING) > self.limit
+        if slope.abs() <= error {
+            return Passes::InDoubt;
+        }
+        let height = dot(&a, &normal);
+        let of_height = ERROR * (largest * largest * largest);
+        let sign = if slope < 0.0 { -1.0 } else { 1.0 };
+        let (height, slope) = (sign * height, sign * slope);
+        let low = (height - of_height) / (slope + error) * (1.0 - ROUNDING);
+        if height < -of_height || low > self.limit {
+            return Passes::Not;
+        }
+        let high = (height + of_height) / (slope - error) * (1.0 + ROUNDING);
+        let is_inside = sign * of_a > error && sign * of_b > error && sign * of_c > error;
+        match is_inside && height > of_height && high <= ray.most {
+            true => Passes::Inside(low, high),
+            false => Passes::InDoubt,
+        }
     }
 
-    /// Puts the hits of a ray in order.
+    /// What is said of a ray: nothing, the first hit, or all in order.
     ///
     /// # Errors
     /// Cancellation.
-    fn sort(&mut self) -> Result<(), Error> {
-        self.looks.work.step()?;
-        self.found.sort_unstable_by(Found::compare);
+    fn answer(
+        &mut self,
+        bodies: &[(BodyId, Target<'_>)],
+        ray: &Ray,
+        into: &mut Vec<RayHit>,
+    ) -> Result<(), Error> {
+        if self.hits == Hit::Any {
+            return Ok(());
+        }
+        let found = self.found.drain(..);
+        let mut found = found.filter_map(|candidate| Found::new(candidate, bodies, ray));
+        if self.hits == Hit::First {
+            let first = found.min_by(|one, other| one.compare(other, ray));
+            into.extend(first.map(|first| first.answer(bodies)));
+            return Ok(());
+        }
+        let mut all: Vec<Found> = Vec::new();
+        for one in found.by_ref() {
+            self.looks.step()?;
+            all.push(one);
+        }
+        all.sort_unstable_by(|one, other| one.compare(other, ray));
+        into.extend(all.iter().map(|found| found.answer(bodies)));
         Ok(())
     }
+}
+
+/// What floats tell of a ray and a face.
+enum Passes {
+    Not,
+    /// Through its inside, between these parameters.
+    Inside(f64, f64),
+    InDoubt,
+}
+
+/// Eight consecutive boxes; arrays are padded by as many.
+#[inline(always)]
+fn eight(boxes: &BoundsArray, first: usize) -> [[&[f32; 8]; 3]; 2] {
+    const NONE: &[f32; 8] = &[0.0; 8];
+    [&boxes.min, &boxes.max].map(|rows| {
+        rows.each_ref()
+            .map(|row| row[first..].first_chunk().unwrap_or(NONE))
+    })
+}
+
+fn size(v: &Point) -> f64 {
+    v[0].abs().max(v[1].abs()).max(v[2].abs())
 }
 
 fn difference(p: &Point, q: &Point) -> Point {
     [0, 1, 2].map(|k| p[k] - q[k])
 }
 
-/// (p x q) . r, and more than its error; infinity where products may underflow or overflow.
-fn determinant(p: &Point, q: &Point, r: &Point) -> (f64, f64) {
-    let size = |v: &Point| v[0].abs().max(v[1].abs()).max(v[2].abs());
-    let value = (p[1] * q[2] - p[2] * q[1]) * r[0]
-        + (p[2] * q[0] - p[0] * q[2]) * r[1]
-        + (p[0] * q[1] - p[1] * q[0]) * r[2];
-    let sizes = [p, q, r].map(size);
-    let product = sizes[0] * sizes[1] * sizes[2];
-    let is_safe = SAFE.contains(&product) && sizes.iter().all(|x| MODERATE.contains(x));
-    (
-        value,
-        if is_safe {
-            ERROR * product
-        } else {
-            f64::INFINITY
-        },
-    )
+fn cross(p: &Point, q: &Point) -> Point {
+    [[1, 2], [2, 0], [0, 1]].map(|[i, j]| p[i] * q[j] - p[j] * q[i])
+}
+
+fn dot(p: &Point, q: &Point) -> f64 {
+    p[0] * q[0] + p[1] * q[1] + p[2] * q[2]
 }

@@ -192,34 +192,41 @@ impl Probes {
         let parts = surfaces(scene, query)?;
         self.know(scene, &parts, shared, work)?;
         let bodies = self.targets(scene, &parts)?;
-        let size = work.workers.task(TASK);
-        type Task<'a, R> = ([&'a [[R; 3]]; 2], (Vec<RayHit>, Vec<(usize, bool)>));
-        let mut tasks: Vec<Task<'_, R>> = origins
-            .chunks(size)
-            .zip(directions.chunks(size))
-            .map(|(origins, directions)| ([origins, directions], Default::default()))
-            .collect();
-        work.each(&mut tasks, |_, ([origins, directions], found)| {
-            let rays = origins
-                .iter()
-                .zip(*directions)
-                .map(|(origin, direction)| Ray {
-                    origin: origin.map(R::widen),
-                    direction: direction.map(R::widen),
-                    most,
-                });
-            cast::cast(&bodies, rays, query.hits, found, work)
-        })?;
         into.found.clear();
         into.offsets.clear();
         into.is_hit.clear();
         into.offsets.push(0);
-        for (_, (found, ends)) in &tasks {
-            let before = into.found.len();
-            into.found.extend_from_slice(found);
-            into.offsets
-                .extend(ends.iter().map(|(end, _)| before + end));
-            into.is_hit.extend(ends.iter().map(|&(_, is_hit)| is_hit));
+        for (origins, directions) in origins.chunks(BLOCK).zip(directions.chunks(BLOCK)) {
+            // Rays that start near each other, one after the other, find memory in the caches.
+            let order = order::along_curve(origins);
+            let size = work.workers.task(TASK);
+            let mut tasks: Vec<(&[u32], cast::Lists)> = order
+                .chunks(size)
+                .map(|some| (some, Default::default()))
+                .collect();
+            work.each(&mut tasks, |_, (some, found)| {
+                let ray = |&ix: &u32| Ray {
+                    origin: origins[ix as usize].map(R::widen),
+                    direction: directions[ix as usize].map(R::widen),
+                    most,
+                };
+                let rays: Vec<Ray> = some.iter().map(ray).collect();
+                cast::cast(self.isa, &bodies, &rays, query.hits, found, work)
+            })?;
+            // The list of each ray, and whether it hits anything.
+            let mut lists: Vec<(&[RayHit], bool)> = vec![(&[], false); origins.len()];
+            for (some, (found, ends)) in &tasks {
+                let mut from = 0;
+                for (&ix, &(to, is_hit)) in some.iter().zip(ends) {
+                    lists[ix as usize] = (&found[from..to], is_hit);
+                    from = to;
+                }
+            }
+            for (list, is_hit) in lists {
+                into.found.extend_from_slice(list);
+                into.offsets.push(into.found.len());
+                into.is_hit.push(is_hit);
+            }
         }
         Ok(())
     }

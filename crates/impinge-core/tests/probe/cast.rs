@@ -126,6 +126,41 @@ fn meshes_of_all_kinds() {
     }
 }
 
+/// Faces so near each other that rounded parameters are the same, and origins as near to faces.
+#[test]
+fn nearly_at_once() {
+    let mut scene = Scene::new();
+    let (mut faces, mut corners) = (Vec::new(), Vec::new());
+    // In no order, and a few last bits, or a little more, apart.
+    for ix in 0..64u32 {
+        let z = 1.9 + f64::from(ix * 29 % 64 / 2) * if ix % 2 == 0 { f64::EPSILON } else { 1e-5 };
+        corners.extend([[-1.0, -1.0, z], [4.0, -1.0, z], [-1.0, 4.0, z]]);
+        faces.push([3 * ix, 3 * ix + 1, 3 * ix + 2]);
+    }
+    scene.add_triangles(&faces, &corners).unwrap();
+    let mut random = Random::new(3);
+    let mut number = || f64::from(random.point(0.0, 1.0)[0]);
+    let mut rays: Vec<_> = (0..200)
+        .map(|_| [[number(), number(), 0.0], [0.0, 0.0, 1.7 + 0.3 * number()]])
+        .collect();
+    for height in [1e-5, 1e-12, 1e-15, 0.0] {
+        for way in [1.0, -1.0] {
+            let z = 1.9 - way * height;
+            rays.push([[number(), number(), z], [0.0, 0.0, way]]);
+            rays.push([
+                [number(), number(), z],
+                [1e-3 * number(), 1e-3, way * number()],
+            ]);
+        }
+    }
+    let [n, ..] = check(&scene, &rays, f64::INFINITY);
+    assert!(n > 12_000, "{n}");
+    let all = ask(&scene, &rays, f64::INFINITY, Hit::All);
+    let same = (0..200).flat_map(|ray| all.of(ray).windows(2));
+    let same = same.filter(|two| two[0].t == two[1].t && two[0].element > two[1].element);
+    assert!(same.count() > 500);
+}
+
 /// The same bytes for every instruction set, number of threads and precision, and for bodies that move.
 #[test]
 fn every_way_gives_the_same_answer() {
