@@ -102,6 +102,7 @@ impl<'a> Loading<'a> {
     fn parts(&self, format: Format, n: usize) -> Option<[&'static str; 2]> {
         let (kind, nouns) = match format {
             Format::Gltf => (BodiesArg::Nodes, ["node", "nodes"]),
+            Format::ThreeMf => (BodiesArg::Nodes, ["item", "items"]),
             Format::Obj => (BodiesArg::Groups, ["group", "groups"]),
             _ => return None,
         };

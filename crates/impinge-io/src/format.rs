@@ -26,13 +26,15 @@ pub enum Format {
     Vtu,
     /// Medit, ascii (`.mesh`).
     Medit,
+    /// 3MF, core and production extension (`.3mf`).
+    ThreeMf,
     /// TetGen, two files: `.node` and `.ele` (or `.face`).
     Tetgen,
 }
 
 /// The extensions of [`Format::from_extension`], for messages.
 pub(crate) const KNOWN: &str =
-    "obj, ply, stl, off, coff, noff, gltf, glb, msh, vtk, vtu, mesh, node, ele, face";
+    "obj, ply, stl, off, coff, noff, gltf, glb, msh, vtk, vtu, mesh, 3mf, node, ele, face";
 
 impl Format {
     /// The format of files with this extension (without the dot; case does not matter).
@@ -53,6 +55,7 @@ impl Format {
             "vtk" => Format::Vtk,
             "vtu" => Format::Vtu,
             "mesh" => Format::Medit,
+            "3mf" => Format::ThreeMf,
             "node" | "ele" | "face" => Format::Tetgen,
             _ => return None,
         })

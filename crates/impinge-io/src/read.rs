@@ -8,7 +8,7 @@ use crate::encoding::check_encoding;
 use crate::error::{Error, Name, Place};
 use crate::files::{Source, folder_of};
 use crate::format::Format;
-use crate::formats::{gltf, medit, msh, obj, off, ply, stl, tetgen, vtk, vtu};
+use crate::formats::{gltf, medit, msh, obj, off, ply, stl, tetgen, threemf, vtk, vtu};
 use crate::mesh::Mesh;
 use crate::options::{ReadOptions, Summary};
 
@@ -32,7 +32,7 @@ pub fn read_with_summary(path: &Path, options: &ReadOptions) -> Result<(Mesh, Su
     collect_file(path, options, |parts| parts.finish(options))
 }
 
-/// Reads the bodies of the file at `path`, each as a mesh of its own: the nodes of a glTF file that have a mesh; the objects
+/// Reads the bodies of the file at `path`, each as a mesh of its own: the nodes of a glTF file that have a mesh; the items of a 3MF file; the objects
 /// (`o`) of an OBJ file, or its groups (`g`) if it has no objects. Other files, files with tetrahedra and files with only one
 /// such part are one body.
 ///
@@ -169,6 +169,7 @@ fn collect_bytes<'a>(
         Format::Msh => msh::read(bytes, name),
         Format::Vtk => vtk::read(bytes, name),
         Format::Vtu => vtu::read(bytes, name, options),
+        Format::ThreeMf => threemf::read(bytes, name, options),
         Format::Medit => medit::read(bytes, name),
         Format::Tetgen => Err(name.unsupported(
             Place::File,

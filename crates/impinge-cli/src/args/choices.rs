@@ -107,7 +107,7 @@ impl From<StartArg> for impinge::Start {
 /// What becomes a body of its own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum BodiesArg {
-    /// Each node of a glTF file that has a mesh; other files are one body each
+    /// Each node of a glTF file that has a mesh, each item of a 3MF file; other files are one body each
     Nodes,
     /// Each object (o) of an OBJ file, or each group (g) of one without objects; other files are one body each
     Groups,
@@ -119,7 +119,7 @@ impl BodiesArg {
     /// The error where no file has such parts.
     pub fn misfit(self) -> String {
         match self {
-            BodiesArg::Nodes => "--bodies nodes: only glTF files have nodes",
+            BodiesArg::Nodes => "--bodies nodes: only glTF and 3MF files have nodes",
             BodiesArg::Groups => "--bodies groups: only OBJ files have groups",
             BodiesArg::File => "--bodies file: every file is a body",
         }

@@ -247,7 +247,7 @@ fn parts_of_files_are_bodies_where_they_are_asked_for() {
         ),
         (
             &["self", "groups.obj", "--bodies", "nodes"],
-            "only glTF files have nodes",
+            "only glTF and 3MF files have nodes",
         ),
         (
             &["self", "nodes.gltf", "--bodies", "groups"],

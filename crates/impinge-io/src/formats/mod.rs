@@ -15,6 +15,7 @@ pub(crate) mod off;
 pub(crate) mod ply;
 pub(crate) mod stl;
 pub(crate) mod tetgen;
+pub(crate) mod threemf;
 pub(crate) mod vtk;
 pub(crate) mod vtu;
 

@@ -225,6 +225,11 @@ pub fn samples() -> Vec<Sample> {
     add("gltf", Format::Gltf, gltf().into_bytes(), surface(false));
     add("glb", Format::Gltf, glb(), surface(false));
 
+    for (kind, deflates) in [("3mf stored", false), ("3mf deflated", true)] {
+        let archive = zip(&[(MODEL, threemf().as_bytes())], deflates);
+        add(kind, Format::ThreeMf, archive, surface(true));
+    }
+
     let msh = format!(
         "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Comments\n$ any\n$EndComments\n$Nodes\n5\n{}$EndNodes\n$Elements\n4\n1 15 2 0 0 1\n2 2 2 0 0 1 2 3\n{}$EndElements\n",
         vertex_lines(|ix| format!("{} ", ix + 1), ""),
@@ -534,4 +539,83 @@ pub fn assert_valid(mesh: &Mesh) {
         "a coordinate that is not finite"
     );
     assert!(!mesh.elements.is_empty(), "no primitives");
+}
+
+/// The part of a 3MF file that holds its model.
+pub const MODEL: &str = "3D/3dmodel.model";
+
+/// The vertices and the triangles as the `mesh` of a 3MF model.
+pub fn threemf_mesh() -> String {
+    let vertices = VERTICES.map(|[x, y, z]| format!("<vertex x=\"{x}\" y=\"{y}\" z=\"{z}\"/>\n"));
+    let triangles =
+        TRIANGLES.map(|[a, b, c]| format!("<triangle v1=\"{a}\" v2=\"{b}\" v3=\"{c}\"/>\n"));
+    format!(
+        "<mesh><vertices>\n{}</vertices><triangles>\n{}</triangles></mesh>",
+        vertices.concat(),
+        triangles.concat()
+    )
+}
+
+/// A 3MF model of these objects and items.
+pub fn threemf_model(objects: &str, items: &str) -> String {
+    format!(
+        "<?xml version=\"1.0\"?>\n<model xmlns=\"http://schemas.microsoft.com/3dmanufacturing/core/2015/02\" xmlns:p=\"p\">\n\
+         <resources>{objects}</resources>\n<build>{items}</build></model>\n"
+    )
+}
+
+fn threemf() -> String {
+    let object = format!(
+        "<object id=\"1\" name=\"a &amp; b\">{}</object>",
+        threemf_mesh()
+    );
+    threemf_model(&object, "<item objectid=\"1\"/>")
+}
+
+/// A ZIP archive of these parts.
+pub fn zip(parts: &[(&str, &[u8])], deflates: bool) -> Vec<u8> {
+    let (mut bytes, mut directory) = (Vec::new(), Vec::new());
+    for (name, content) in parts {
+        let crc = !content.iter().fold(u32::MAX, |crc, &byte| {
+            (0..8).fold(crc ^ u32::from(byte), |crc, _| {
+                if crc & 1 == 0 {
+                    crc >> 1
+                } else {
+                    crc >> 1 ^ 0xEDB8_8320
+                }
+            })
+        });
+        let packed = match deflates {
+            true => miniz_oxide::deflate::compress_to_vec(content, 6),
+            false => content.to_vec(),
+        };
+        let offset = bytes.len() as u32;
+        let mut fields: Vec<u8> = [20u16, 0, if deflates { 8 } else { 0 }, 0, 0]
+            .iter()
+            .flat_map(|x| x.to_le_bytes())
+            .collect();
+        for number in [crc, packed.len() as u32, content.len() as u32] {
+            fields.extend(number.to_le_bytes());
+        }
+        fields.extend((name.len() as u16).to_le_bytes());
+        fields.extend([0; 2]);
+        bytes.extend(b"PK\x03\x04");
+        bytes.extend(&fields);
+        bytes.extend(name.as_bytes());
+        bytes.extend(&packed);
+        directory.extend(b"PK\x01\x02\x14\0");
+        directory.extend(&fields);
+        directory.extend([0; 10]);
+        directory.extend(offset.to_le_bytes());
+        directory.extend(name.as_bytes());
+    }
+    let start = bytes.len() as u32;
+    let n = parts.len() as u16;
+    bytes.extend(&directory);
+    bytes.extend(b"PK\x05\x06\0\0\0\0");
+    bytes.extend([n, n].iter().flat_map(|n| n.to_le_bytes()));
+    bytes.extend((directory.len() as u32).to_le_bytes());
+    bytes.extend(start.to_le_bytes());
+    bytes.extend([0; 2]);
+    bytes
 }
