@@ -16,7 +16,7 @@
 //!
 //! Reason for each discard: sectors that do not overlap. `docs/exactness.md`, "Creases", has the proof and the bound.
 
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU16, AtomicU64, Ordering};
 
 use crate::bvh::GROUP;
 use crate::bvh::clusters::Clustering;
@@ -41,14 +41,14 @@ pub(crate) struct Creases {
     vertices: Vec<AtomicU64>,
     /// One bit per triangle.
     lanes: Vec<AtomicU64>,
-    /// Four words of triangles each, by slot; empty if positions are not in single precision.
-    turns: Vec<AtomicU64>,
+    /// One word per triangle, by slot; empty if positions are not in single precision.
+    turns: Vec<AtomicU16>,
 }
 
 impl Creases {
     pub fn bytes(&self) -> usize {
-        let words = self.vertices.capacity() + self.lanes.capacity() + self.turns.capacity();
-        size_of::<AtomicU64>() * words
+        let words = self.vertices.capacity() + self.lanes.capacity();
+        size_of::<AtomicU64>() * words + size_of::<AtomicU16>() * self.turns.capacity()
     }
 
     /// The triangles of a cluster that have a crease.
@@ -78,23 +78,23 @@ impl Creases {
         self.lanes
             .resize_with(clustering.n_clusters(), AtomicU64::default);
         let n_turns = match positions {
-            Positions::F32(_) => clustering.n_clusters() * WORDS,
+            Positions::F32(_) => clustering.n_clusters() * GROUP,
             Positions::F64(_) => 0,
         };
-        self.turns.resize_with(n_turns, AtomicU64::default);
+        self.turns.resize_with(n_turns, AtomicU16::default);
         let (vertices, lanes, turns) = (&self.vertices, &self.lanes, &self.turns);
         let no_scratch = &mut vec![(); workers.n()][..];
         let n_each = workers.task(TASK);
         if let Positions::F32(positions) = positions {
-            let n_words = n_each * WORDS;
+            let n_words = n_each * GROUP;
             workers.for_each(no_scratch, turns.len().div_ceil(n_words), |(), task| {
                 let clusters = task * n_each;
-                let words = &turns[clusters * WORDS..turns.len().min((clusters + n_each) * WORDS)];
+                let words = &turns[clusters * GROUP..turns.len().min((clusters + n_each) * GROUP)];
                 with_isa!(isa, put_turns, (
                     clustering: &Clustering = clustering,
                     positions: &[[f32; 3]] = positions,
                     first: usize = clusters,
-                    words: &[AtomicU64] = words,
+                    words: &[AtomicU16] = words,
                 ));
             });
         }
@@ -150,11 +150,6 @@ fn chunk(
     (first..).zip(&words[first..words.len().min(first + n_each)])
 }
 
-/// Words of triangles in one number.
-const PER_NUMBER: usize = 4;
-/// Numbers of words per cluster.
-const WORDS: usize = GROUP / PER_NUMBER;
-
 /// Writes the words of the triangles of some clusters.
 #[inline(always)]
 fn put_turns<S: Simd>(
@@ -162,14 +157,14 @@ fn put_turns<S: Simd>(
     clustering: &Clustering,
     positions: &[[f32; 3]],
     first: usize,
-    words: &[AtomicU64],
+    words: &[AtomicU16],
 ) {
     let Elements::Triangles(faces) = &clustering.corners else {
         return;
     };
     let mut corners = [[[0.0; GROUP]; 3]; 3];
     let mut turns = [0; GROUP];
-    for (cluster, numbers) in (first..).zip(words.chunks_exact(WORDS)) {
+    for (cluster, words) in (first..).zip(words.chunks_exact(GROUP)) {
         let cluster = ClusterIx::from_usize(cluster);
         let of_cluster = ClusterFaces {
             faces: &faces[clustering.slots(cluster)],
@@ -178,31 +173,28 @@ fn put_turns<S: Simd>(
         };
         simd.put_corners(positions, &of_cluster, &mut corners);
         filter::turns::<S::F32>(&corners, &mut turns);
-        let (fours, _) = turns.as_chunks::<PER_NUMBER>();
-        for (number, [a, b, c, d]) in numbers.iter().zip(fours) {
-            let [a, b, c, d] = [*a, *b, *c, *d].map(u64::from);
-            number.store(a | b << 16 | c << 32 | d << 48, Ordering::Relaxed);
+        for (word, &turns) in words.iter().zip(&turns) {
+            word.store(turns as u16, Ordering::Relaxed);
         }
     }
 }
 
 /// Whether the triangles around a vertex with a closed ring certainly do not overlap, seen along an axis.
 #[inline(always)]
-fn are_side_by_side(turns: &[AtomicU64], corners: impl Iterator<Item = CornerAt>) -> bool {
+fn are_side_by_side(turns: &[AtomicU16], corners: impl Iterator<Item = CornerAt>) -> bool {
     let (mut all, mut n_crossings) = (filter::TURNS, 0);
     for CornerAt { slot, corner } in corners {
-        let number = turns[slot / PER_NUMBER].load(Ordering::Relaxed);
-        let word = (number >> (16 * (slot % PER_NUMBER))) as u32 & 0xffff;
+        let word = u32::from(turns[slot].load(Ordering::Relaxed));
         all &= word;
         // One byte per axis: a ring has at most 96 triangles.
         let crosses = filter::crossings(word, corner);
-        n_crossings += (crosses | crosses << 7 | crosses << 14) & 0x01_01_01;
+        n_crossings += crosses * 0x40_81 & 0x01_01_01;
     }
     (0..3).any(|axis| all >> (2 * axis) & 0b11 != 0 && n_crossings >> (8 * axis) & 0xff == 2)
 }
 
 /// Bit `k`: vertex `64 word + k` is a crease.
-fn creases(rings: &Rings, word: usize, turns: &[AtomicU64], at: impl Fn(usize) -> [f64; 3]) -> u64 {
+fn creases(rings: &Rings, word: usize, turns: &[AtomicU16], at: impl Fn(usize) -> [f64; 3]) -> u64 {
     let first = 64 * word;
     let end = rings.n_vertices().min(first + 64);
     (first..end).fold(0, |creases, vertex| {
