@@ -4,6 +4,7 @@ mod choices;
 mod help;
 mod near;
 mod picture;
+mod probe;
 mod rows;
 mod step;
 #[cfg(feature = "view")]
@@ -28,6 +29,7 @@ pub use choices::{BackendArg, BodiesArg, MethodArg, PrecisionArg, SharedVertexAr
 pub use help::parse;
 pub use near::{KindArg, NearArgs};
 pub use picture::PictureArgs;
+pub use probe::{CastArgs, HitsArg, OneMeshArgs, ProbeArgs};
 pub use rows::RowsArgs;
 pub use step::{StepArgs, StepHow};
 #[cfg(feature = "view")]
@@ -49,6 +51,8 @@ Examples:
   impinge self part.stl --fail-on-hit           the same as a check: exit code 3 if it does
   impinge pairs a.obj b.obj --rows -            the pairs themselves, as CSV
   impinge near a.obj b.obj --distance 0.01      which elements are nearer than that
+  impinge probe a.obj --points p.csv --signed   how far are points, and are they inside
+  impinge cast a.obj --rays rays.csv            what rays hit
   impinge check parts/*.stl                     what is wrong with each mesh
   impinge fix part.stl --out mended.ply         mend what can be mended without moving a vertex
   impinge sequence body.ply run.pc2 --self      the pairs of every frame of an animation
@@ -78,6 +82,18 @@ pub enum Command {
     /// Find the elements that are within a distance of each other, and which of their features are nearest
     #[command(after_help = near::NEAR_EXAMPLES)]
     Near(NearArgs),
+    /// Find the element of a mesh that is nearest to each of many points, and which of them are inside
+    #[command(
+        after_help = probe::PROBE_EXAMPLES,
+        mut_arg("rows", |rows| rows.help("Write a row per point that is near enough (.csv, .jsonl or .npy; \"-\" is standard output)"))
+    )]
+    Probe(ProbeArgs),
+    /// Find what rays hit of a mesh
+    #[command(
+        after_help = probe::CAST_EXAMPLES,
+        mut_arg("rows", |rows| rows.help("Write a row per hit (.csv, .jsonl or .npy; \"-\" is standard output)"))
+    )]
+    Cast(CastArgs),
     /// Find the pairs in every frame of a deforming mesh
     #[command(
         after_help = SEQUENCE_EXAMPLES,
@@ -390,6 +406,9 @@ pub struct DistanceArgs {
     /// Another mesh file
     #[arg(value_name = "B")]
     pub b: PathBuf,
+    /// CPU threads, 1 to 1024 [default: one per core]
+    #[arg(long, value_name = "N", value_parser = threads)]
+    pub threads: Option<NonZeroUsize>,
     /// Print JSON and nothing else
     #[arg(long)]
     pub json: bool,

@@ -137,7 +137,7 @@ pub fn body(option: &str, bodies: &[BodyId], number: usize) -> Result<BodyId, Er
 }
 
 /// How many vertices were welded, and how many were not though they coincide with another one.
-fn welded(vertices: &[Vertices]) -> String {
+pub fn welded(vertices: &[Vertices]) -> String {
     let n_welded: usize = vertices.iter().map(|of| of.n_welded).sum();
     let n_apart: usize = vertices.iter().filter_map(|of| of.n_coincident).sum();
     let welded = counted(n_welded as u64, "vertex").replace("vertexs", "vertices") + " welded";

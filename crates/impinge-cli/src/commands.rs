@@ -1,6 +1,7 @@
 //! One file per command.
 
 mod answer;
+mod cast;
 mod check;
 mod demo;
 mod demo_scene;
@@ -9,6 +10,7 @@ mod devices;
 mod distance;
 mod fix;
 mod near;
+mod probe;
 mod record;
 mod render;
 mod sequence;
@@ -19,6 +21,7 @@ mod tiles;
 mod view;
 
 pub use answer::{pairs, within};
+pub use cast::cast;
 pub use check::{CHECK_EXAMPLES, CheckArgs, CheckWorkerArgs, check, check_worker};
 pub use demo::demo;
 #[cfg(feature = "gpu")]
@@ -26,6 +29,7 @@ pub use devices::devices;
 pub use distance::distance;
 pub use fix::{FIX_EXAMPLES, FixArgs, fix};
 pub use near::near;
+pub use probe::probe;
 pub use render::render;
 pub use sequence::sequence;
 pub use simulate::simulate;

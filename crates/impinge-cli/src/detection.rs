@@ -1,5 +1,7 @@
 //! Runs a detector with the options of the command line, and collects its times over many frames.
 
+use std::num::NonZeroUsize;
+
 use impinge::{
     Affinity, Backend, BodyId, Detector, PairKind, Pairs, Positions, Query, Scene, Settings, Stats,
 };
@@ -24,6 +26,17 @@ pub fn settings(args: &DetectorArgs) -> Settings {
         memory_budget: args.memory_budget,
         max_pairs: args.max_pairs,
         device: args.device.clone(),
+        // All threads of this process are its own.
+        affinity: Affinity::Auto,
+        ..Settings::default()
+    }
+}
+
+/// The settings of a question that only the CPU answers.
+pub fn on_cpu(threads: Option<NonZeroUsize>) -> Settings {
+    Settings {
+        backend: Backend::Cpu,
+        threads: threads.map_or(0, Into::into),
         // All threads of this process are its own.
         affinity: Affinity::Auto,
         ..Settings::default()
@@ -164,6 +177,11 @@ impl Times {
     pub fn and(mut self, stats: &Stats) -> Self {
         self.add(stats);
         self
+    }
+
+    /// The total time of all frames together.
+    pub fn sum_ms(&self) -> f64 {
+        self.total.iter().sum()
     }
 
     /// How many frames there were.

@@ -13,6 +13,7 @@ mod headline;
 mod json;
 mod load;
 mod meshes;
+mod one_mesh;
 mod output;
 mod palette;
 mod picture;
@@ -37,6 +38,8 @@ fn main() -> ExitCode {
         Command::Demo(args) => commands::demo(&args, &cancel),
         Command::Distance(args) => commands::distance(&args, &cancel),
         Command::Near(args) => commands::near(&args, &cancel),
+        Command::Probe(args) => commands::probe(&args, &cancel),
+        Command::Cast(args) => commands::cast(&args, &cancel),
         Command::Pairs(args) => commands::pairs(&args, &cancel),
         Command::Within(args) => commands::within(&args, &cancel),
         Command::Sequence(args) => commands::sequence(&args, &cancel),

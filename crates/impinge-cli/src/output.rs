@@ -35,6 +35,12 @@ pub fn how(stats: &Stats, times: &Times) -> String {
     format!("{}; {:.3} ms{of}", method(stats), times.total_ms(50))
 }
 
+/// The same of a question that counts no candidates: `on cpu, 2 threads; 0.365 ms`.
+pub fn how_alone(stats: &Stats, ms: f64) -> String {
+    let threads = counted(stats.n_threads as u64, "thread");
+    format!("on {}, {threads}; {ms:.3} ms", stats.backend)
+}
+
 fn method(stats: &Stats) -> String {
     format!(
         "{} on {}, {}; {}, {} unsure",

@@ -107,7 +107,12 @@ pub fn of_frames(columns: &[Column]) -> Vec<Column> {
 
 /// The number of a frame.
 pub fn frame(frame_ix: usize) -> Cell<'static> {
-    Cell::Number(u32::try_from(frame_ix).unwrap_or(u32::MAX))
+    number(frame_ix)
+}
+
+/// The number of a point or a ray.
+pub fn number(ix: usize) -> Cell<'static> {
+    Cell::Number(u32::try_from(ix).unwrap_or(u32::MAX))
 }
 
 /// The row of an impact.
@@ -138,7 +143,9 @@ pub fn write_near(file: &RowsFile, near: &NearPairs) -> Result<(), Error> {
 
 fn of_near(pair: &NearPair) -> [Cell<'static>; 12] {
     let [body_a, a, body_b, b] = pair.row().map(Cell::Number);
-    let [feature_a, feature_b] = pair.features.map(|feature| Cell::Text(name(feature)));
+    let [feature_a, feature_b] = pair
+        .features
+        .map(|feature| Cell::Text(feature_name(feature)));
     let (distance, [point_a, point_b]) = pair
         .closest
         .map_or((f64::NAN, [[f64::NAN; 3]; 2]), |closest| {
@@ -160,7 +167,8 @@ fn of_near(pair: &NearPair) -> [Cell<'static>; 12] {
     ]
 }
 
-fn name(feature: Feature) -> &'static str {
+/// The name of a feature of an element.
+pub fn feature_name(feature: Feature) -> &'static str {
     match feature {
         Feature::Vertex(ix) => ["v0", "v1", "v2"][usize::from(ix)],
         Feature::Edge(ix) => ["e0", "e1", "e2"][usize::from(ix)],

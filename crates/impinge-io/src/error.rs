@@ -20,6 +20,9 @@ pub fn printable(name: impl AsRef<Path>) -> String {
     text
 }
 
+/// The extensions of files of rows of numbers, for messages.
+pub(crate) const KNOWN_ROWS: &str = "csv, txt, xyz, npy";
+
 /// A place in a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Place {
@@ -86,6 +89,16 @@ pub enum Error {
     /// The format is chosen by the file's extension, and this extension is not known. Check the name.
     #[error("{}: no mesh format has the extension '{extension}' (known: {known})", crate::printable(.path))]
     UnknownFormat {
+        /// The file.
+        path: PathBuf,
+        /// Its extension, empty if it has none.
+        extension: String,
+        /// The known extensions.
+        known: &'static str,
+    },
+    /// Rows of numbers are read by the file's extension, and this one is not known. Check the name.
+    #[error("{}: no rows of numbers have the extension '{extension}' (known: {known})", crate::printable(.path))]
+    UnknownRows {
         /// The file.
         path: PathBuf,
         /// Its extension, empty if it has none.

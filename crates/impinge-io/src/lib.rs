@@ -49,6 +49,7 @@ mod format;
 mod formats;
 mod mesh;
 mod npy;
+mod numbers;
 mod options;
 mod polygon;
 mod read;
@@ -61,7 +62,8 @@ pub use bodies::NamedMesh;
 pub use error::{Error, Location, Place, printable};
 pub use format::Format;
 pub use mesh::{Elements, Mesh, Positions, Weld, weld};
-pub use npy::npy_header;
+pub use npy::{NpyHeader, npy_header};
+pub use numbers::{read_points, read_rows};
 pub use options::{Prefer, ReadOptions, Summary};
 pub use read::{
     read, read_bodies, read_bodies_bytes, read_bytes, read_bytes_with_summary, read_tetgen_bytes,

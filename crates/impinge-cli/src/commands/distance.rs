@@ -3,11 +3,12 @@
 use std::io::Write;
 use std::time::Instant;
 
-use impinge::{Backend, CancelToken, Control, Detector};
+use impinge::{CancelToken, Control, Detector};
 use impinge_io::printable;
 use serde_json::json;
 
 use crate::args::DistanceArgs;
+use crate::detection::on_cpu;
 use crate::error::Error;
 use crate::load::{Bodies, Loading};
 use crate::output::out;
@@ -20,7 +21,7 @@ pub fn distance(args: &DistanceArgs, cancel: &CancelToken) -> Result<(), Error> 
         scene, ids, names, ..
     } = Bodies::read(&paths, loading)?;
     let start = Instant::now();
-    let mut detector = Detector::new(Backend::Cpu)?;
+    let mut detector = Detector::new(on_cpu(args.threads))?;
     detector.set_control(Control::new().cancel(cancel));
     let nearest = detector.distance(&scene, ids[0], ids[1])?;
     let ms = start.elapsed().as_secs_f64() * 1e3;

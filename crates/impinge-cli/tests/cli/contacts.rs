@@ -76,6 +76,11 @@ fn distances_are_told() {
     folder.ply("c.ply", &cube([1.0, 0.25, 0.0], 1.0));
     let object = folder.run(["distance", "a.ply", "b.ply", "--json"]).json();
     assert_eq!(object["distance"], json!(2.0));
+    let mut alone = folder
+        .run(["distance", "a.ply", "b.ply", "--json", "--threads", "1"])
+        .json();
+    alone["ms"] = object["ms"].clone();
+    assert_eq!(alone, object);
     assert_eq!(object["points"][0][0], json!(0.5));
     assert_eq!(object["points"][1][0], json!(2.5));
     // They touch: exactly 0, and where.

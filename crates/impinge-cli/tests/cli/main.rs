@@ -13,6 +13,7 @@ mod fix;
 mod harness;
 mod hostile;
 mod near;
+mod probe;
 mod render;
 mod rows;
 mod schema;

@@ -190,6 +190,7 @@ fn every_command_that_prints_json_has_a_schema() {
         "soup.obj",
         "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 0\nf 1 2 3\nf 4 3 2\n",
     );
+    folder.text("rays.csv", "0,0,9,0,0,-1\n9,9,9,1,0,0\n");
     folder.text("broken.obj", "v 0 0 0\nf 1 2 3\n");
     let mut cache = Pc2Writer::create(&folder.path("run.pc2"), a.n_vertices(), 0.0, 1.0).unwrap();
     cache.append(&a.positions).unwrap();
@@ -222,6 +223,11 @@ fn every_command_that_prints_json_has_a_schema() {
         ("near", "near a.ply b.ply --distance 0.01"),
         ("near", "near a.ply far.ply --distance 0"),
         ("near", "near soup.obj --distance 0.1 --no-weld"),
+        ("probe", "probe a.ply --points b.ply --signed"),
+        ("probe", "probe a.ply --points far.ply --most 0.1"),
+        ("cast", "cast a.ply --rays rays.csv"),
+        ("cast", "cast a.ply --rays rays.csv --hits any --most 1"),
+        ("cast", "cast a.ply --rays rays.csv --hits all"),
         ("step", "step a.ply a1.ply b.ply b.ply"),
         ("step", "step a.ply a1.ply far.ply far.ply --no-self"),
         ("step", "step a.ply a1.ply b.ply b.ply --earliest"),

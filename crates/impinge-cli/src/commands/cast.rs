@@ -1,0 +1,162 @@
+//! `impinge cast`: what rays hit of a mesh.
+
+use std::io::Write;
+
+use impinge::{CancelToken, Hits, Query, RayHit};
+use impinge_io::{Cell, Column, Holds, ReadOptions, printable, read_rows};
+use serde_json::{Map, Value, json};
+
+use crate::apart::Inputs;
+use crate::args::{CastArgs, HitsArg};
+use crate::detection::hit;
+use crate::error::Error;
+use crate::one_mesh::OneMesh;
+use crate::output::{how_alone, out, say};
+use crate::text::{counted, grouped, hex};
+use crate::values::RowsFile;
+use crate::watch::go_on;
+use crate::{json, rows};
+
+/// `impinge cast`.
+pub fn cast(args: &CastArgs, cancel: &CancelToken) -> Result<(), Error> {
+    let inputs = Inputs::new([&args.mesh, &args.rays]);
+    let rows_file = args.rows.file(&inputs, args.how.json)?;
+    let mesh = OneMesh::read(&args.mesh, &args.how, cancel)?;
+    go_on(cancel)?;
+    let rays: Vec<[f64; 6]> = read_rows(&args.rays, &ReadOptions::as_they_are())?;
+    let (origins, directions): (Vec<_>, Vec<_>) = rays
+        .iter()
+        .map(|&[x, y, z, dx, dy, dz]| ([x, y, z], [dx, dy, dz]))
+        .unzip();
+    drop(rays);
+    let mut detector = mesh.detector(&args.how, cancel)?;
+    let query = Query::all().hits(args.hits.into());
+    let most = args.most.unwrap_or(f64::INFINITY);
+    let hits = detector.cast(mesh.scene(), &origins, &directions, most, &query)?;
+    let answer = Answer {
+        args,
+        mesh: &mesh,
+        hits: &hits,
+    };
+    // Files are written first: if one can't be written, no answer is printed that looks like success.
+    if let Some(file) = &rows_file {
+        answer.write_rows(file)?;
+    }
+    if args.how.json {
+        let object = Value::Object(answer.object()?);
+        writeln!(out(), "{object}")?;
+    } else {
+        let mut text = Vec::new();
+        answer.print(&mut text)?;
+        say(&text, rows_file.as_ref())?;
+    }
+    hit(args.fail_on_hit, answer.n_hit() > 0)
+}
+
+struct Answer<'a> {
+    args: &'a CastArgs,
+    mesh: &'a OneMesh,
+    hits: &'a Hits,
+}
+
+impl Answer<'_> {
+    /// How many rays hit anything.
+    fn n_hit(&self) -> u64 {
+        self.hits.is_hit().iter().filter(|&&is_hit| is_hit).count() as u64
+    }
+
+    /// The hits with the numbers of their rays.
+    fn found(&self) -> impl Iterator<Item = (usize, &RayHit)> {
+        (0..self.hits.len()).flat_map(|ray| self.hits.of(ray).iter().map(move |hit| (ray, hit)))
+    }
+
+    /// The first of the hits with the smallest t.
+    fn nearest(&self) -> Option<(usize, &RayHit)> {
+        self.found()
+            .reduce(|best, next| if next.1.t < best.1.t { next } else { best })
+    }
+
+    fn write_rows(&self, file: &RowsFile) -> Result<(), Error> {
+        let ray = Column::new("ray", Holds::U32);
+        if self.args.hits == HitsArg::Any {
+            let columns = vec![ray, Column::new("hit", Holds::Bool)];
+            let of_rays = self.hits.is_hit().iter().enumerate();
+            let of_rays = of_rays.map(|(ray, &is_hit)| [rows::number(ray), Cell::Bool(is_hit)]);
+            return rows::write(file, columns, self.hits.len(), of_rays);
+        }
+        let columns = vec![
+            ray,
+            Column::new("element", Holds::U32),
+            Column::new("feature", Holds::Text(2)),
+            Column::new("t", Holds::F64),
+            Column::new("t_end", Holds::F64),
+            Column::new("barycentrics", Holds::Point(["b0", "b1", "b2"])),
+        ];
+        let found = self.found().map(|(ray, hit)| {
+            [
+                rows::number(ray),
+                Cell::Number(hit.element.element),
+                Cell::Text(rows::feature_name(hit.feature)),
+                Cell::Float(hit.t),
+                Cell::Float(hit.t_end),
+                Cell::Point(hit.barycentrics),
+            ]
+        });
+        rows::write(file, columns, self.hits.iter().len(), found)
+    }
+
+    /// The object that `docs/cast.schema.json` describes.
+    fn object(&self) -> Result<Map<String, Value>, Error> {
+        let n_hits = (self.args.hits != HitsArg::Any).then(|| self.hits.iter().len());
+        let nearest = self
+            .nearest()
+            .map(|(ray, hit)| json!({ "ray": ray, "element": hit.element.element, "t": hit.t }));
+        let asked = json!({ "hits": self.which(), "most": self.args.most });
+        let mut object = Map::new();
+        object.insert("asked".into(), asked);
+        object.insert("rays".into(), self.hits.len().into());
+        object.insert("hit".into(), self.n_hit().into());
+        object.insert("hits".into(), n_hits.into());
+        object.insert("nearest".into(), nearest.into());
+        object.insert("hash".into(), hex(self.hits.hash()).into());
+        object.insert("bodies".into(), json!([self.mesh.json()?]));
+        let stats = self.hits.stats();
+        let ms = json!({ "total": json::rounded(stats.total_ms) });
+        json::add_how(&mut object, stats, ms);
+        Ok(object)
+    }
+
+    fn which(&self) -> &'static str {
+        match self.args.hits {
+            HitsArg::First => "first",
+            HitsArg::Any => "any",
+            HitsArg::All => "all",
+        }
+    }
+
+    /// The answer in the first line, then the nearest hit.
+    fn print(&self, to: &mut impl Write) -> Result<(), Error> {
+        let subject = printable(&self.mesh.name);
+        let rays = counted(self.hits.len() as u64, "ray");
+        let all = match self.args.hits {
+            HitsArg::All => format!(" ({})", counted(self.hits.iter().len() as u64, "hit")),
+            _ => String::new(),
+        };
+        let (n_hit, hash) = (grouped(self.n_hit()), hex(self.hits.hash()));
+        writeln!(to, "{subject}: {n_hit} of {rays} hit it{all}, hash {hash}")?;
+        if let Some((ray, hit)) = self.nearest() {
+            let (element, t) = (hit.element.element, hit.t);
+            writeln!(to, "nearest: ray {ray} hits element {element} at t {t}")?;
+        }
+        let stats = self.hits.stats();
+        writeln!(to, "{}", how_alone(stats, stats.total_ms))?;
+        let not_asked = match self.args.hits {
+            HitsArg::First => "; not asked: what rays hit after that (--hits all)",
+            HitsArg::Any => "; not asked: what they hit (--hits first)",
+            HitsArg::All => "",
+        };
+        let (file, welded) = (printable(&self.args.rays), self.mesh.welded());
+        writeln!(to, "{rays} of {file} and 1 mesh, {welded}{not_asked}")?;
+        Ok(())
+    }
+}

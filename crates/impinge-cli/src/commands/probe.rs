@@ -1,0 +1,217 @@
+//! `impinge probe`: which element of a mesh is nearest to each of many points, and which of them are inside.
+
+use std::io::Write;
+
+use impinge::{CancelToken, Closest, ClosestElement, Query};
+use impinge_io::{Cell, Column, Holds, ReadOptions, printable, read_points};
+use serde_json::{Map, Value, json};
+
+use crate::apart::Inputs;
+use crate::args::ProbeArgs;
+use crate::detection::Times;
+use crate::error::Error;
+use crate::one_mesh::OneMesh;
+use crate::output::{how_alone, out, say};
+use crate::text::{counted, grouped, hex};
+use crate::values::RowsFile;
+use crate::watch::go_on;
+use crate::{json, rows};
+
+/// `impinge probe`.
+pub fn probe(args: &ProbeArgs, cancel: &CancelToken) -> Result<(), Error> {
+    let inputs = Inputs::new([&args.mesh, &args.points]);
+    let rows_file = args.rows.file(&inputs, args.how.json)?;
+    let mesh = OneMesh::read(&args.mesh, &args.how, cancel)?;
+    go_on(cancel)?;
+    let points = read_points(&args.points, &ReadOptions::as_they_are())?;
+    let mut detector = mesh.detector(&args.how, cancel)?;
+    let scene = mesh.scene();
+    // First what may be refused.
+    let places = match args.signed {
+        true => {
+            let places = detector.contains(scene, mesh.id, &points);
+            Some(places.map_err(|error| mesh.refused(error))?)
+        }
+        false => None,
+    };
+    let mut times = Times::default();
+    if args.signed {
+        times.add(detector.stats());
+    }
+    let most = args.most.unwrap_or(f64::INFINITY);
+    let closest = detector.closest(scene, &points, most, &Query::all())?;
+    times.add(closest.stats());
+    let answer = Answer {
+        args,
+        mesh: &mesh,
+        closest: &closest,
+        places: places.as_deref(),
+        ms: times.sum_ms(),
+    };
+    // Files are written first: if one can't be written, no answer is printed that looks like success.
+    if let Some(file) = &rows_file {
+        answer.write_rows(file)?;
+    }
+    if args.how.json {
+        let object = Value::Object(answer.object()?);
+        writeln!(out(), "{object}")?;
+        return Ok(());
+    }
+    let mut text = Vec::new();
+    answer.print(&mut text)?;
+    say(&text, rows_file.as_ref())
+}
+
+/// Where a point lies, as a word.
+fn word(place: i8) -> &'static str {
+    match place {
+        1 => "inside",
+        0 => "on",
+        _ => "outside",
+    }
+}
+
+struct Answer<'a> {
+    args: &'a ProbeArgs,
+    mesh: &'a OneMesh,
+    closest: &'a Closest,
+    /// 1 inside, 0 on the surface, -1 outside.
+    places: Option<&'a [i8]>,
+    ms: f64,
+}
+
+impl Answer<'_> {
+    /// The points that are near enough, by their numbers, with what is nearest to them.
+    fn found(&self) -> impl Iterator<Item = (usize, ClosestElement)> + '_ {
+        let found = self.closest.iter().enumerate();
+        found.filter_map(|(point, found)| Some((point, found?)))
+    }
+
+    /// How many points are inside, on the surface and outside.
+    fn counts(&self) -> Option<[u64; 3]> {
+        let count = |places: &[i8], which| places.iter().filter(|&&at| at == which).count() as u64;
+        self.places
+            .map(|places| [1, 0, -1].map(|which| count(places, which)))
+    }
+
+    /// The first of the nearest points and the first of the farthest.
+    fn extremes(&self) -> Option<[(usize, ClosestElement); 2]> {
+        let first = self.found().next()?;
+        Some(self.found().fold([first; 2], |[near, far], next| {
+            let is_nearer = next.1.distance < near.1.distance;
+            let is_farther = next.1.distance > far.1.distance;
+            [
+                if is_nearer { next } else { near },
+                if is_farther { next } else { far },
+            ]
+        }))
+    }
+
+    fn write_rows(&self, file: &RowsFile) -> Result<(), Error> {
+        let columns = [
+            Column::new("point", Holds::U32),
+            Column::new("element", Holds::U32),
+            Column::new("feature", Holds::Text(2)),
+            Column::new("distance", Holds::F64),
+            Column::new("nearest", Holds::Point(["x", "y", "z"])),
+        ];
+        let n = self.found().count();
+        let row = |(point, found): (usize, ClosestElement)| {
+            let is_outside = self.places.is_some_and(|places| places[point] < 0);
+            let distance = match is_outside {
+                true => -found.distance,
+                false => found.distance,
+            };
+            [
+                rows::number(point),
+                Cell::Number(found.element.element),
+                Cell::Text(rows::feature_name(found.feature)),
+                Cell::Float(distance),
+                Cell::Point(found.point),
+            ]
+        };
+        let Some(places) = self.places else {
+            return rows::write(file, columns.to_vec(), n, self.found().map(row));
+        };
+        let columns = [&columns[..], &[Column::new("place", Holds::Text(7))]].concat();
+        let signed = self.found().map(|(point, found)| {
+            let [point_cell, element, feature, distance, nearest] = row((point, found));
+            let place = Cell::Text(word(places[point]));
+            [point_cell, element, feature, distance, nearest, place]
+        });
+        rows::write(file, columns, n, signed)
+    }
+
+    /// The object that `docs/probe.schema.json` describes.
+    fn object(&self) -> Result<Map<String, Value>, Error> {
+        let at = |(point, found): (usize, ClosestElement)| {
+            json!({
+                "point": point,
+                "element": found.element.element,
+                "distance": found.distance,
+                "nearest": found.point,
+            })
+        };
+        let [nearest, farthest] = match self.extremes() {
+            Some(both) => both.map(at),
+            None => [Value::Null, Value::Null],
+        };
+        let places = self
+            .counts()
+            .map(|[inside, on, outside]| json!({ "inside": inside, "on": on, "outside": outside }));
+        let mut object = Map::new();
+        let asked = json!({ "signed": self.args.signed, "most": self.args.most });
+        object.insert("asked".into(), asked);
+        object.insert("points".into(), self.closest.len().into());
+        object.insert("near".into(), self.found().count().into());
+        object.insert("places".into(), places.into());
+        object.insert("nearest".into(), nearest);
+        object.insert("farthest".into(), farthest);
+        object.insert("hash".into(), hex(self.closest.hash()).into());
+        object.insert("bodies".into(), json!([self.mesh.json()?]));
+        let ms = json!({ "total": json::rounded(self.ms) });
+        json::add_how(&mut object, self.closest.stats(), ms);
+        Ok(object)
+    }
+
+    /// The answer in the first line, then where points lie.
+    fn print(&self, to: &mut impl Write) -> Result<(), Error> {
+        let subject = printable(&self.mesh.name);
+        let points = counted(self.closest.len() as u64, "point");
+        let within = match self.args.most {
+            None => points.clone(),
+            Some(most) => {
+                let near = self.found().count() as u64;
+                format!("{} of {points} within {most}", grouped(near))
+            }
+        };
+        let hash = hex(self.closest.hash());
+        writeln!(to, "{subject}: {within}, hash {hash}")?;
+        if let Some(both) = self.extremes() {
+            for (name, (point, found)) in ["nearest", "farthest"].into_iter().zip(both) {
+                let ([x, y, z], distance) = (found.point, found.distance);
+                let element = found.element.element;
+                writeln!(
+                    to,
+                    "{name}: point {point}, distance {distance}, to element {element} at {x} {y} {z}"
+                )?;
+            }
+        }
+        if let Some(counts) = self.counts() {
+            let [inside, on, outside] = counts.map(grouped);
+            writeln!(
+                to,
+                "{inside} inside, {on} on the surface, {outside} outside"
+            )?;
+        }
+        writeln!(to, "{}", how_alone(self.closest.stats(), self.ms))?;
+        let not_asked = match self.args.signed {
+            true => "",
+            false => "; not asked: inside or outside (--signed)",
+        };
+        let file = printable(&self.args.points);
+        let welded = self.mesh.welded();
+        writeln!(to, "{points} of {file} and 1 mesh, {welded}{not_asked}")?;
+        Ok(())
+    }
+}

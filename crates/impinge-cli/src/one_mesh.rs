@@ -1,0 +1,82 @@
+//! A mesh about which points or rays ask.
+
+use std::path::Path;
+
+use impinge::{BodyId, CancelToken, Control, Detector, Scene};
+use impinge_io::Weld;
+use serde_json::Value;
+
+use crate::args::OneMeshArgs;
+use crate::asked;
+use crate::detection::on_cpu;
+use crate::error::Error;
+use crate::json;
+use crate::load::{Bodies, Loading};
+
+/// A scene of one mesh.
+pub struct OneMesh {
+    bodies: Bodies,
+    pub id: BodyId,
+    /// The file as given.
+    pub name: String,
+    weld: Option<Weld>,
+}
+
+impl OneMesh {
+    pub fn read(path: &Path, args: &OneMeshArgs, cancel: &CancelToken) -> Result<Self, Error> {
+        let weld = args.no_weld.then_some(false);
+        // Whether a surface is closed depends on which vertices are welded, as self-collision does.
+        let loading = Loading::as_they_are(!args.json, cancel).asked(weld, true, args.format);
+        let mut bodies = Bodies::default();
+        let (id, weld) = bodies.add(path, loading)?;
+        let name = bodies.names[0].clone();
+        Ok(OneMesh {
+            bodies,
+            id,
+            name,
+            weld,
+        })
+    }
+
+    pub fn scene(&self) -> &Scene {
+        &self.bodies.scene
+    }
+
+    /// A detector for it.
+    pub fn detector(&self, args: &OneMeshArgs, cancel: &CancelToken) -> Result<Detector, Error> {
+        let mut detector = Detector::new(on_cpu(args.threads))?;
+        detector.set_control(Control::new().cancel(cancel));
+        Ok(detector)
+    }
+
+    /// The error with the name of the file, and vertices as the file numbers them.
+    pub fn refused(&self, mut error: impinge::Error) -> Error {
+        let impinge::Error::NotClosed { edge, .. } = &mut error else {
+            return error.into();
+        };
+        if let Some(weld) = &self.weld {
+            // Of welded vertices the first one stays.
+            let first = |welded| weld.map().iter().position(|&index| index == welded);
+            *edge = edge.map(|welded| first(welded).map_or(welded, |ix| ix as u32));
+        }
+        Error::Refused {
+            what: self.name.clone(),
+            source: error,
+        }
+    }
+
+    /// How many vertices were welded, in words.
+    pub fn welded(&self) -> String {
+        asked::welded(&self.bodies.vertices)
+    }
+
+    /// What every answer says of a body.
+    pub fn json(&self) -> Result<Value, Error> {
+        Ok(json::body(
+            self.scene(),
+            self.id,
+            &self.name,
+            &self.bodies.vertices[0],
+        )?)
+    }
+}
