@@ -188,7 +188,7 @@ fn are_side_by_side(turns: &[AtomicU16], corners: impl Iterator<Item = CornerAt>
         all &= word;
         // One byte per axis: a ring has at most 96 triangles.
         let crosses = filter::crossings(word, corner);
-        n_crossings += crosses * 0x40_81 & 0x01_01_01;
+        n_crossings += (crosses * 0x40_81) & 0x01_01_01;
     }
     (0..3).any(|axis| all >> (2 * axis) & 0b11 != 0 && n_crossings >> (8 * axis) & 0xff == 2)
 }
