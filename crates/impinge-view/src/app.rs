@@ -146,19 +146,27 @@ impl Viewer {
         if self.options.opener.is_none() {
             return;
         }
-        let Some(text) = &mut self.opening else {
+        let is_new = self.opening.is_none();
+        if is_new {
             let button = ui.button("Open files");
-            if button
+            if !button
                 .on_hover_text("Or drop them onto the window")
                 .clicked()
             {
-                self.opening = Some(String::new());
+                return;
             }
-            return;
-        };
+        }
+        let text = self.opening.get_or_insert_default();
         let label = ui.label("Files to open, one per line");
-        ui.add(egui::TextEdit::multiline(text).desired_rows(2))
-            .labelled_by(label.id);
+        // The name keeps the focus when the button, which is counted before it, is gone.
+        let field = egui::TextEdit::multiline(text)
+            .id_salt("files to open")
+            .desired_rows(2);
+        let field = ui.add(field).labelled_by(label.id);
+        // Otherwise what is typed would be taken for the window's keys.
+        if is_new {
+            field.request_focus();
+        }
         let mut chosen = None;
         let mut is_over = false;
         ui.horizontal(|ui| {

@@ -194,29 +194,49 @@ fn questions(ui: &mut Ui, session: &mut Session) {
     ui.checkbox(&mut question.within, "Self-collision")
         .on_hover_text("Also pairs within one body");
     ui.horizontal(|ui| {
-        ui.label("Neighbours").on_hover_text(
-            "Triangles of one body that share vertices. Resolve: a pair if they also meet elsewhere. Skip: never a pair.",
-        );
-        ui.radio_value(
-            &mut question.shared_vertex,
-            SharedVertex::Resolve,
-            "resolve",
-        );
-        ui.radio_value(&mut question.shared_vertex, SharedVertex::Skip, "skip");
+        ui.label("Neighbours")
+            .on_hover_text("Triangles of one body that share vertices");
+        for (rule, name, text) in [
+            (
+                SharedVertex::Resolve,
+                "resolve",
+                "Neighbours are a pair if they also meet elsewhere",
+            ),
+            (SharedVertex::Skip, "skip", "Neighbours are never a pair"),
+        ] {
+            ui.radio_value(&mut question.shared_vertex, rule, name)
+                .on_hover_text(text);
+        }
     });
     ui.horizontal(|ui| {
         ui.label("Method")
             .on_hover_text("How pairs are found. All methods find the same ones.");
-        ui.radio_value(&mut question.method, Method::Clusters, "clusters");
-        ui.radio_value(&mut question.method, Method::Cells, "cells");
-        ui.radio_value(&mut question.method, Method::Naive, "naive");
+        for (method, name, text) in [
+            (
+                Method::Clusters,
+                "clusters",
+                "Groups fixed by topology: the fastest for meshes that move",
+            ),
+            (Method::Cells, "cells", "A grid, made anew for each frame"),
+            (
+                Method::Naive,
+                "naive",
+                "Every box against every box: slow, to check the others",
+            ),
+        ] {
+            ui.radio_value(&mut question.method, method, name)
+                .on_hover_text(text);
+        }
     });
     ui.horizontal(|ui| {
-        ui.label("On the")
-            .on_hover_text("Where pairs are found. They are the same ones.");
-        ui.radio_value(&mut question.backend, Backend::Cpu, "CPU");
+        let text = "Where pairs are found. They are the same ones.";
+        ui.label("On the").on_hover_text(text);
+        ui.radio_value(&mut question.backend, Backend::Cpu, "CPU")
+            .on_hover_text(text);
         ui.add_enabled_ui(question.method != Method::Naive, |ui| {
-            ui.radio_value(&mut question.backend, Backend::Gpu, "GPU");
+            ui.radio_value(&mut question.backend, Backend::Gpu, "GPU")
+                .on_hover_text(text)
+                .on_disabled_hover_text("The method naive runs on the CPU");
         });
     });
     session.asked(before);
@@ -225,13 +245,26 @@ fn questions(ui: &mut Ui, session: &mut Session) {
 /// Switches that change what is seen.
 fn shown(ui: &mut Ui, session: &mut Session) {
     let before = session.shows;
-    ui.radio_value(&mut session.shows, Shows::Everything, "Everything");
-    ui.radio_value(&mut session.shows, Shows::Colliding, "Only what collides");
-    ui.radio_value(&mut session.shows, Shows::Curves, "Only curves")
-        .on_hover_text("The lines in which surfaces cross");
+    for (shows, name, text) in [
+        (Shows::Everything, "Everything", "All bodies (C)"),
+        (
+            Shows::Colliding,
+            "Only what collides",
+            "Only faces that are in a pair (C)",
+        ),
+        (
+            Shows::Curves,
+            "Only curves",
+            "The lines in which surfaces cross (C)",
+        ),
+    ] {
+        ui.radio_value(&mut session.shows, shows, name)
+            .on_hover_text(text);
+    }
     let mut changed = before != session.shows;
     changed |= ui
         .checkbox(&mut session.shows_curves, "Intersection curves")
+        .on_hover_text("Also the lines in which surfaces cross (I)")
         .changed();
     if session.n_frames() > 1 {
         changed |= ui
@@ -240,11 +273,11 @@ fn shown(ui: &mut Ui, session: &mut Session) {
             .changed();
     }
     ui.horizontal(|ui| {
+        let text =
+            "Colours the faces that are at most so far from others, in the unit of the files";
         let label = ui
             .checkbox(&mut session.shows_near, "Within")
-            .on_hover_text(
-                "Colours the faces that are at most so far from others, in the unit of the files",
-            );
+            .on_hover_text(text);
         changed |= label.changed();
         let speed = 0.02 * session.distance.max(1e-9);
         let range = 0.0..=f64::MAX;
@@ -252,7 +285,8 @@ fn shown(ui: &mut Ui, session: &mut Session) {
             .speed(speed)
             .range(range)
             .max_decimals(6);
-        changed |= ui.add(value).labelled_by(label.id).changed() && session.shows_near;
+        let value = ui.add(value).labelled_by(label.id).on_hover_text(text);
+        changed |= value.changed() && session.shows_near;
     });
     if let Some(note) = &session.note {
         ui.label(note);
@@ -412,10 +446,18 @@ pub(crate) fn bottom(ui: &mut Ui, session: &mut Session) {
                     session.n_frames()
                 ));
                 ui.label(format!("{} per second", session.player.speed));
-                if ui.button("First collision").clicked() {
+                let first = ui.button("First collision");
+                if first
+                    .on_hover_text("Show the first frame with a collision (B)")
+                    .clicked()
+                {
                     session.jump(session.timeline.first_collision());
                 }
-                if ui.button("Next collision").clicked() {
+                let next = ui.button("Next collision");
+                if next
+                    .on_hover_text("Show the next frame with a collision (N)")
+                    .clicked()
+                {
                     session.jump(session.timeline.next_collision(session.stage.frame_ix()));
                 }
                 let mut with_earliest = session.with_earliest;

@@ -66,6 +66,8 @@ pub(crate) struct Session {
     /// What could not be loaded: shown until the user dismisses it.
     missing: Option<String>,
     pub saved: Option<Saved>,
+    /// Why the last picture was not saved.
+    save_error: Option<String>,
     /// The path of the picture that is about to be saved, as the user edits it.
     pub saving: Option<String>,
     pub drag: Option<Drag>,
@@ -154,6 +156,7 @@ impl Session {
             message,
             missing,
             saved: None,
+            save_error: None,
             saving: None,
             drag: None,
             stage,
@@ -686,8 +689,17 @@ impl Session {
         };
         let (answer, device) = (self.answer.as_ref(), self.screen.device());
         match picture::save(&self.stage, answer, &options, &self.question, device, path) {
-            Ok(saved) => self.saved = Some(saved),
-            Err(text) => self.message = Some(text),
+            Ok(saved) => {
+                self.saved = Some(saved);
+                let error = self.save_error.take();
+                if self.message == error {
+                    self.message = None;
+                }
+            }
+            Err(text) => {
+                self.save_error = Some(text.clone());
+                self.message = Some(text);
+            }
         }
     }
 }

@@ -1159,12 +1159,10 @@ fn files_can_be_opened_and_dropped() {
     harness.get_by_label("bad.obj: not a mesh");
     // From there others can be opened.
     click(&mut harness, "Open files");
+    // What is typed goes into the field, without a click on it: no key of the window is meant.
     let field = harness.get_by_label("Files to open, one per line");
-    field.focus();
-    harness.step();
-    harness
-        .get_by_label("Files to open, one per line")
-        .type_text("typed.obj");
+    assert!(field.is_focused());
+    field.type_text("typed.obj");
     harness.run_steps(2);
     click(&mut harness, "Open");
     wait(&mut harness, |viewer| {
@@ -1206,6 +1204,78 @@ fn a_picture_is_saved_where_the_user_says() {
         Some(path.as_path())
     );
     assert!(path.exists());
+}
+
+#[test]
+fn a_picture_that_is_saved_at_last_leaves_no_message_that_it_is_not() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let missing = folder.path().join("missing");
+    let options = Options {
+        folder: missing.clone(),
+        size: [64, 48],
+        ..paused()
+    };
+    let mut harness = open(|| Ok(passing()), options);
+    wait(&mut harness, is_counted);
+    press(&mut harness, Key::S);
+    click(&mut harness, "Save");
+    let message = harness.state().message().expect("a message");
+    assert!(message.contains("cannot write"), "{message}");
+    std::fs::create_dir(&missing).expect("a folder");
+    press(&mut harness, Key::S);
+    click(&mut harness, "Save");
+    assert!(harness.state().saved().is_some());
+    assert_eq!(harness.state().message(), None);
+    // A message about something else stays.
+    press(&mut harness, Key::End);
+    press(&mut harness, Key::N);
+    let other = harness.state().message().map(str::to_owned);
+    assert!(other.is_some());
+    press(&mut harness, Key::S);
+    click(&mut harness, "Save");
+    assert_eq!(harness.state().message().map(str::to_owned), other);
+}
+
+/// Each control says what it does to a pointer that rests on it.
+#[test]
+fn controls_have_tooltips() {
+    let mut harness = open_content(passing());
+    harness
+        .ctx
+        .all_styles_mut(|style| style.interaction.tooltip_delay = 0.0);
+    for (control, text) in [
+        ("Play", "Space"),
+        ("First collision", "first frame with a collision (B)"),
+        ("Next collision", "next frame with a collision (N)"),
+        ("Earliest impacts", "first contact"),
+        ("Next place", "(J)"),
+        ("See all", "(F)"),
+        ("Save picture", "(S)"),
+        ("Everything", "(C)"),
+        ("Only what collides", "(C)"),
+        ("Only curves", "(C)"),
+        ("Intersection curves", "(I)"),
+        ("Impacts by time", "next frame"),
+        ("Within", "in the unit of the files"),
+        ("Self-collision", "within one body"),
+        ("resolve", "also meet elsewhere"),
+        ("skip", "never a pair"),
+        ("clusters", "fixed"),
+        ("cells", "grid"),
+        ("naive", "slow"),
+        ("CPU", "the same"),
+        ("GPU", "the same"),
+    ] {
+        harness.hover_at(Pos2::new(300.0, 300.0));
+        harness.run_steps(4);
+        let at = harness.get_by_label(control).rect().center();
+        harness.hover_at(at);
+        harness.run_steps(6);
+        assert!(
+            harness.query_all_by_label_contains(text).count() > 0,
+            "{control}: no tooltip with \"{text}\""
+        );
+    }
 }
 
 /// Every frame collides: the timeline is one area, whatever the width of a frame.
