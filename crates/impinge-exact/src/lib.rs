@@ -83,7 +83,7 @@ pub mod internal {
     };
     pub use crate::orientation::{Projection, collinear};
     pub use crate::ray::{Meeting, Parameter, Ray, meet, meet_inside};
-    pub use crate::rounding::two_sum;
+    pub use crate::rounding::{two_product, two_sum};
     pub use crate::segment::strictly_between;
 
     /// The tests of many pairs at a time, in the registers of an instruction set: certain answers, or none.

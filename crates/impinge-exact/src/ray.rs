@@ -17,7 +17,7 @@ use core::cmp::Ordering;
 use crate::algebra::fixed::{Vector, cross, difference, dot};
 use crate::algebra::{Integer, common_integers, unit_of};
 use crate::distance::Feature;
-use crate::rounding::two_sum;
+use crate::rounding::{two_product, two_sum};
 use crate::{Point, Sign};
 
 /// The points `origin + t direction` for t from 0 to `most`, read as real numbers. A direction of zero is the origin alone.
@@ -242,20 +242,6 @@ impl Twice {
             + 16.0 * f64::EPSILON * f64::EPSILON * quotient;
         (quotient, rest, doubt)
     }
-}
-
-/// The product of two floats, rounded, and its error (Dekker). The numbers must be moderate.
-#[inline]
-fn two_product(a: f64, b: f64) -> [f64; 2] {
-    let halves = |x: f64| {
-        let large = x * 134_217_729.0;
-        let high = large - (large - x);
-        [high, x - high]
-    };
-    let product = a * b;
-    let [[a_high, a_low], [b_high, b_low]] = [halves(a), halves(b)];
-    let rest = ((a_high * b_high - product) + a_high * b_low + a_low * b_high) + a_low * b_low;
-    [product, rest]
 }
 
 /// An axis along which a vector is not 0.

@@ -8,6 +8,23 @@ pub fn two_sum(a: f64, b: f64) -> [f64; 2] {
     [sum, (a - (sum - part)) + (b - part)]
 }
 
+/// The product of two floats, rounded, and its error, which is a float too unless it underflows (Dekker). No fused multiply-add, so the bits
+/// are the same on every machine. NaN beyond 2^996.
+#[inline]
+pub fn two_product(a: f64, b: f64) -> [f64; 2] {
+    // Two halves of 26 bits each (Veltkamp).
+    let halves = |x: f64| {
+        const SPLITTER: f64 = ((1u64 << 27) + 1) as f64;
+        let scaled = SPLITTER * x;
+        let high = scaled - (scaled - x);
+        [high, x - high]
+    };
+    let product = a * b;
+    let [[a_high, a_low], [b_high, b_low]] = [halves(a), halves(b)];
+    let rest = ((a_high * b_high - product) + a_high * b_low + a_low * b_high) + a_low * b_low;
+    [product, rest]
+}
+
 /// 2^`exponent`: infinity above the largest `f64`, 0 below the smallest.
 #[inline]
 pub(crate) const fn power_of_two(exponent: i32) -> f64 {

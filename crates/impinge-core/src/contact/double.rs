@@ -5,7 +5,7 @@
 //! a product below 7 · 2^-106, a quotient below 16 · 2^-106. No fused multiply-add, so the bits are the same
 //! on every machine.
 
-use impinge_exact::internal::two_sum;
+use impinge_exact::internal::{two_product, two_sum};
 
 /// `high + low`, where `high` is the sum rounded to nearest.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -32,21 +32,10 @@ fn quick_sum(a: f64, b: f64) -> Double {
     }
 }
 
-fn two_product(a: f64, b: f64) -> Double {
-    let high = a * b;
-    let ((a1, a0), (b1, b0)) = (split(a), split(b));
-    Double {
-        high,
-        low: ((a1 * b1 - high) + a1 * b0 + a0 * b1) + a0 * b0,
-    }
-}
-
-/// Two halves of 26 bits each (Veltkamp). Overflows beyond 2^996.
-fn split(a: f64) -> (f64, f64) {
-    const SPLITTER: f64 = ((1u64 << 27) + 1) as f64;
-    let scaled = SPLITTER * a;
-    let high = scaled - (scaled - a);
-    (high, a - high)
+/// `a * b`, without error.
+fn product(a: f64, b: f64) -> Double {
+    let [high, low] = two_product(a, b);
+    Double { high, low }
 }
 
 impl Double {
@@ -100,7 +89,7 @@ impl std::ops::Mul for Double {
     type Output = Self;
 
     fn mul(self, other: Self) -> Self {
-        let product = two_product(self.high, other.high);
+        let product = product(self.high, other.high);
         let cross = self.high * other.low + self.low * other.high;
         quick_sum(product.high, product.low + cross)
     }

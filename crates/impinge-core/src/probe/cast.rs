@@ -21,6 +21,7 @@ use crate::scene::index::{ClusterIx, ElementIx};
 use crate::search::narrow::Corners;
 use crate::search::work::Work;
 use crate::simd::{Isa, LaneBounds, Lanes, Simd, up_to, with_isa};
+use impinge_exact::internal::filter::{cross, difference, dot, size};
 use impinge_exact::internal::{Ray, meet, meet_inside};
 use impinge_exact::{Feature, Point};
 
@@ -455,20 +456,4 @@ fn eight(boxes: &BoundsArray, first: usize) -> [[&[f32; 8]; 3]; 2] {
         rows.each_ref()
             .map(|row| row[first..].first_chunk().unwrap_or(NONE))
     })
-}
-
-fn size(v: &Point) -> f64 {
-    v[0].abs().max(v[1].abs()).max(v[2].abs())
-}
-
-fn difference(p: &Point, q: &Point) -> Point {
-    [0, 1, 2].map(|k| p[k] - q[k])
-}
-
-fn cross(p: &Point, q: &Point) -> Point {
-    [[1, 2], [2, 0], [0, 1]].map(|[i, j]| p[i] * q[j] - p[j] * q[i])
-}
-
-fn dot(p: &Point, q: &Point) -> f64 {
-    p[0] * q[0] + p[1] * q[1] + p[2] * q[2]
 }

@@ -38,6 +38,7 @@ mod turns;
 use super::Point;
 
 pub use directions::Directions64;
+pub use motion::{cross, difference, dot, size};
 pub use moving::{
     Enclosed8, Look8, Moving64, Next, Search, Spans8, Steps8, are_across_in_tables, are_apart,
     are_aside_in_tables, are_far_in_tables, enclose, look, time_between,

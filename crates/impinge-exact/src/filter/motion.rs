@@ -642,8 +642,9 @@ fn cross_over<T: Number>(d: &[Vector<T>; 2], e: &[Vector<T>; 2]) -> [Vector<T>; 
     ]
 }
 
+/// The cross product, each difference of products rounded as it stands.
 #[inline(always)]
-pub(crate) fn cross<T: Number>(d: &Vector<T>, e: &Vector<T>) -> Vector<T> {
+pub fn cross<T: Number>(d: &Vector<T>, e: &Vector<T>) -> Vector<T> {
     [
         d[1] * e[2] - d[2] * e[1],
         d[2] * e[0] - d[0] * e[2],
@@ -651,18 +652,20 @@ pub(crate) fn cross<T: Number>(d: &Vector<T>, e: &Vector<T>) -> Vector<T> {
     ]
 }
 
+/// The scalar product, summed from the left.
 #[inline(always)]
-pub(crate) fn dot<T: Number>(d: &Vector<T>, e: &Vector<T>) -> T {
+pub fn dot<T: Number>(d: &Vector<T>, e: &Vector<T>) -> T {
     d[0] * e[0] + d[1] * e[1] + d[2] * e[2]
 }
 
+/// The first less the second.
 #[inline(always)]
-pub(crate) fn difference<T: Number>(p: &Vector<T>, q: &Vector<T>) -> Vector<T> {
+pub fn difference<T: Number>(p: &Vector<T>, q: &Vector<T>) -> Vector<T> {
     [p[0] - q[0], p[1] - q[1], p[2] - q[2]]
 }
 
 /// The largest magnitude of the three coordinates.
 #[inline(always)]
-pub(crate) fn size<T: Number>(d: &Vector<T>) -> T {
+pub fn size<T: Number>(d: &Vector<T>) -> T {
     d[0].abs().larger(d[1].abs()).larger(d[2].abs())
 }
