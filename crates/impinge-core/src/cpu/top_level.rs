@@ -30,11 +30,7 @@ impl TopLevel {
         stack: &mut Vec<NodePair>,
         mut emit: impl FnMut(PartIx, PartIx) -> Result<(), E>,
     ) -> Result<(), E> {
-        let tree = Tree {
-            shape: &self.shape,
-            bounds: &self.bounds,
-        };
-        traversal::within(simd, tree, None, stack, |i, j| {
+        traversal::within(simd, self.tree(), None, stack, |i, j| {
             let (a, b) = (self.order[i as usize], self.order[j as usize]);
             if a == b {
                 return Ok(());
@@ -52,13 +48,17 @@ impl TopLevel {
         stack: &mut Vec<NodePair>,
         mut emit: impl FnMut(PartIx) -> Result<(), E>,
     ) -> Result<(), E> {
-        let tree = Tree {
-            shape: &self.shape,
-            bounds: &self.bounds,
-        };
-        traversal::meeting(simd, tree, query, stack, |leaf| {
+        traversal::meeting(simd, self.tree(), query, stack, |leaf| {
             emit(self.order[leaf as usize])
         })
+    }
+
+    #[inline(always)]
+    fn tree(&self) -> Tree<'_> {
+        Tree {
+            shape: &self.shape,
+            bounds: &self.bounds,
+        }
     }
 
     /// The root, if there are any parts.

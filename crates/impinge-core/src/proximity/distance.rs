@@ -246,29 +246,26 @@ impl Distances {
             }
             Ok::<(), Error>(())
         };
-        let found: Result<(), Error> = (|| {
-            if let Some([Some(a), Some(b)]) = likely {
-                ask(&mut best, many, [a, b])?;
+        if let Some([Some(a), Some(b)]) = likely {
+            ask(&mut best, many, [a, b])?;
+        }
+        let mut overlapping = Vec::new();
+        // If two touch, only lower ones that touch are left to be found.
+        let least = touching_ones(best);
+        let last = least.and_then(|[a, _]| plan.part_of(a));
+        many.overlapping(last, &mut |pair| {
+            let is_lower = |least: [BodyId; 2]| pair.map(|part| plan.part(part).id) < least;
+            if least.is_none_or(is_lower) {
+                overlapping.push(pair);
             }
-            let mut overlapping = Vec::new();
-            // If two touch, only lower ones that touch are left to be found.
-            let least = touching_ones(best);
-            let last = least.and_then(|[a, _]| plan.part_of(a));
-            many.overlapping(last, &mut |pair| {
-                let is_lower = |least: [BodyId; 2]| pair.map(|part| plan.part(part).id) < least;
-                if least.is_none_or(is_lower) {
-                    overlapping.push(pair);
-                }
-                Ok(false)
-            })?;
-            overlapping.sort_unstable();
-            for pair in overlapping {
-                ask(&mut best, many, pair)?;
-            }
-            // Bodies whose boxes are apart do not touch.
-            if touching_ones(best).is_some() {
-                return Ok(());
-            }
+            Ok(false)
+        })?;
+        overlapping.sort_unstable();
+        for pair in overlapping {
+            ask(&mut best, many, pair)?;
+        }
+        // Bodies whose boxes are apart do not touch.
+        if touching_ones(best).is_none() {
             let mut apart = many.apart();
             let most = |best: Option<(f64, Nearest)>| match best {
                 None => f64::INFINITY,
@@ -278,9 +275,7 @@ impl Distances {
             while let Some(pair) = apart.next(most(best)) {
                 ask(&mut best, many, pair)?;
             }
-            Ok(())
-        })();
-        found?;
+        }
         let nearest = best.map(|(_, nearest)| nearest);
         self.nearest = nearest.map(|nearest| nearest.bodies());
         Ok(nearest)
