@@ -76,10 +76,8 @@ pub fn check_listed(mesh: Mesh, options: &Options) -> Result<(Checked, Vec<[u32;
 
 /// Whether each primitive intersects another one, vertices at one position welded.
 pub fn intersecting_with_seams(mesh: &Mesh, options: &Options) -> Result<Vec<bool>, Error> {
-    let mut welded = mesh.clone();
-    weld(&mut welded);
     let mut marks = vec![Marks::default(); mesh.n_primitives()];
-    intersections(&welded, options, &mut Counts::default(), &mut marks)?;
+    intersections(&welded(mesh), options, &mut Counts::default(), &mut marks)?;
     let is_marked = |marks: &Marks| marks.has(Problem::SelfIntersection);
     Ok(marks.iter().map(is_marked).collect())
 }
@@ -97,14 +95,13 @@ fn check(mut mesh: Mesh, options: &Options) -> Result<(Checked, Vec<[u32; 2]>), 
     let mut marks = vec![Marks::default(); mesh.n_primitives()];
     // This comes first because it refuses indices out of range and coordinates that are not finite, on which the steps below
     // rely.
-    let pairs = if options.keep_seams {
-        let mut welded = mesh.clone();
-        weld(&mut welded);
-        intersections(&welded, options, &mut counts, &mut marks)?
+    let (pairs, copies) = if options.keep_seams {
+        let (pairs, _) = intersections(&welded(&mesh), options, &mut counts, &mut marks)?;
+        (pairs, copies(&mesh))
     } else {
         intersections(&mesh, options, &mut counts, &mut marks)?
     };
-    duplicates(&mesh, &mut counts, &mut marks);
+    duplicates(&copies, &mut counts, &mut marks);
     let fans;
     match &mesh.elements {
         Elements::Triangles(triangles) => {
@@ -144,6 +141,13 @@ fn check(mut mesh: Mesh, options: &Options) -> Result<(Checked, Vec<[u32; 2]>), 
     Ok((checked, pairs))
 }
 
+/// The mesh with vertices at one position as one. Its primitives keep their numbers.
+fn welded(mesh: &Mesh) -> Mesh {
+    let mut welded = mesh.clone();
+    weld(&mut welded);
+    welded
+}
+
 /// The primitives with the same vertices. Indices must be in range.
 fn copies(mesh: &Mesh) -> Copies {
     match &mesh.elements {
@@ -153,21 +157,21 @@ fn copies(mesh: &Mesh) -> Copies {
 }
 
 /// Counts and marks primitives with the vertices of an earlier one.
-fn duplicates(mesh: &Mesh, counts: &mut Counts, marks: &mut [Marks]) {
-    for &element in copies(mesh).sets().flat_map(|set| &set[1..]) {
+fn duplicates(copies: &Copies, counts: &mut Counts, marks: &mut [Marks]) {
+    for &element in copies.sets().flat_map(|set| &set[1..]) {
         counts.duplicates += 1;
         marks[element as usize].add(Problem::Duplicate);
     }
 }
 
 /// Counts and marks pairs that share more points than their common vertices, edge or face. Returns the pairs that were found,
-/// sorted.
+/// sorted, and the primitives with the same vertices.
 fn intersections(
     mesh: &Mesh,
     options: &Options,
     counts: &mut Counts,
     marks: &mut [Marks],
-) -> Result<Vec<[u32; 2]>, Error> {
+) -> Result<(Vec<[u32; 2]>, Copies), Error> {
     let mut scene = Scene::new();
     let elements: impinge::Elements = match &mesh.elements {
         Elements::Triangles(triangles) => triangles.clone().into(),
@@ -229,7 +233,7 @@ fn intersections(
     }
     let is_marked = |marks: &&Marks| marks.has(Problem::SelfIntersection);
     counts.n_intersecting = marks.iter().filter(is_marked).count() as u64;
-    Ok(found)
+    Ok((found, copies))
 }
 
 /// Counts and marks everything that depends on vertex indices alone. Returns the vertices of several fans, ascending.
@@ -359,11 +363,10 @@ fn count_vertices<const K: usize>(
     ((count(ONE_FAN) + count(SEVERAL_FANS)) as i64, fans)
 }
 
-fn at(positions: &Positions, vertex: u32) -> Point {
-    match positions {
-        Positions::F32(held) => held[vertex as usize].map(f64::from),
-        Positions::F64(held) => held[vertex as usize],
-    }
+/// The position of a vertex whose index is in range.
+pub fn at(positions: &Positions, vertex: u32) -> Point {
+    let position = positions.get(vertex as usize);
+    position.expect("the scene has refused indices out of range")
 }
 
 fn degenerate<const K: usize>(

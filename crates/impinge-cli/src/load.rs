@@ -15,7 +15,7 @@ use crate::text::grouped;
 use crate::watch::go_on;
 
 /// The path that stands for standard input.
-const STDIN: &str = "-";
+pub const STDIN: &str = "-";
 
 /// A scene and the names of its bodies.
 #[derive(Debug, Default)]
@@ -318,10 +318,7 @@ impl Bodies {
         if path != Path::new(STDIN) {
             return Ok(Format::from_path(path)?);
         }
-        loading.format.ok_or_else(|| {
-            let text = "a mesh from standard input needs its format, such as --format ply";
-            Error::Usage(text.to_owned())
-        })
+        format_of_stdin(loading.format)
     }
 
     /// Reads a file, or standard input, without changes: in one piece, or in its parts.
@@ -342,30 +339,48 @@ impl Bodies {
             };
             return Ok((path.display().to_string(), read));
         }
-        let name = "standard input";
+        let name = NAME_OF_STDIN;
         if self.names.iter().any(|other| other == name) {
             let text = "only one mesh can come from standard input";
             return Err(Error::Usage(text.to_owned()));
         }
-        let mut bytes = Vec::new();
-        let most = options.max_file_bytes;
-        stdin()
-            .lock()
-            .take(most.saturating_add(1))
-            .read_to_end(&mut bytes)
-            .map_err(|source| Error::Read {
-                path: name.into(),
-                source,
-            })?;
-        if bytes.len() as u64 > most {
-            return Err(Error::Usage(format!("{name}: more than {most} bytes")));
-        }
+        let bytes = stdin_bytes(&options)?;
         let read = match in_parts {
             true => read_bodies_bytes(&bytes, format, name, &options)?,
             false => whole(read_bytes_with_summary(&bytes, format, name, &options)?),
         };
         Ok((name.to_owned(), read))
     }
+}
+
+/// What standard input is called in messages.
+pub const NAME_OF_STDIN: &str = "standard input";
+
+/// The format of standard input, which has no ending.
+pub fn format_of_stdin(format: Option<Format>) -> Result<Format, Error> {
+    format.ok_or_else(|| {
+        let text = "a mesh from standard input needs its format, such as --format ply";
+        Error::Usage(text.to_owned())
+    })
+}
+
+/// All of standard input.
+pub fn stdin_bytes(options: &ReadOptions) -> Result<Vec<u8>, Error> {
+    let name = NAME_OF_STDIN;
+    let mut bytes = Vec::new();
+    let most = options.max_file_bytes;
+    stdin()
+        .lock()
+        .take(most.saturating_add(1))
+        .read_to_end(&mut bytes)
+        .map_err(|source| Error::Read {
+            path: name.into(),
+            source,
+        })?;
+    if bytes.len() as u64 > most {
+        return Err(Error::Usage(format!("{name}: more than {most} bytes")));
+    }
+    Ok(bytes)
 }
 
 /// Notes on a file for users who look at primitive numbers, or wonder about pairs.

@@ -190,10 +190,7 @@ impl Surface {
     }
 
     fn at(&self, vertex: u32) -> Point {
-        match &self.positions {
-            Positions::F32(held) => held[vertex as usize].map(f64::from),
-            Positions::F64(held) => held[vertex as usize],
-        }
+        analysis::at(&self.positions, vertex)
     }
 
     fn corners(&self, face: [u32; 3]) -> [Point; 3] {

@@ -2,7 +2,7 @@
 
 mod args;
 
-use std::io::{Read, Write, stdin};
+use std::io::Write;
 use std::path::Path;
 
 use impinge_check::{Counts, FixError, FixOptions, Fixed, Place, Repair, Row, fix_mesh};
@@ -16,6 +16,7 @@ pub use self::args::{FIX_EXAMPLES, FixArgs};
 use crate::apart::Inputs;
 use crate::commands::check::fail;
 use crate::error::Error;
+use crate::load::{NAME_OF_STDIN, STDIN, format_of_stdin, stdin_bytes};
 use crate::output;
 use crate::rows;
 use crate::text::counted;
@@ -79,23 +80,12 @@ pub fn fix(args: &FixArgs) -> Result<(), Error> {
 
 fn read_mesh(args: &FixArgs) -> Result<Mesh, Error> {
     let options = ReadOptions::as_they_are();
-    if args.mesh != Path::new("-") {
+    if args.mesh != Path::new(STDIN) {
         return Ok(read(&args.mesh, &options)?);
     }
-    let Some(format) = args.format else {
-        let text = "a mesh on standard input needs its format, such as --format off";
-        return Err(Error::Usage(text.to_owned()));
-    };
-    let mut bytes = Vec::new();
-    let mut input = stdin()
-        .lock()
-        .take(options.max_file_bytes.saturating_add(1));
-    let read = |source| Error::Read {
-        path: args.mesh.clone(),
-        source,
-    };
-    input.read_to_end(&mut bytes).map_err(read)?;
-    Ok(read_bytes(&bytes, format, "standard input", &options)?)
+    let format = format_of_stdin(args.format)?;
+    let bytes = stdin_bytes(&options)?;
+    Ok(read_bytes(&bytes, format, NAME_OF_STDIN, &options)?)
 }
 
 fn write(args: &FixArgs, mesh: &Mesh) -> Result<(), Error> {
@@ -174,10 +164,7 @@ fn object(args: &FixArgs, options: &FixOptions, fixed: &Fixed) -> Value {
         repairs.insert(repair.name().into(), of.into());
     }
     let welds = options.repairs.contains(&Repair::Weld);
-    let mut before = row(&args.mesh, welds, fixed.before, &fixed.places_before);
-    if args.mesh == Path::new("-") {
-        before.path = "-".to_owned();
-    }
+    let before = row(&args.mesh, welds, fixed.before, &fixed.places_before);
     json!({
         "path": before.path,
         "out": args.out.path.display().to_string(),
