@@ -9,7 +9,7 @@ import numpy as np
 
 from .bodies import to_world
 
-__all__ = ["MOST", "Near", "Place", "components", "of_contacts"]
+__all__ = ["MOST", "Near", "Place", "add_faces", "components", "of_contacts"]
 
 #: The most places that are described, of the most pairs or the smallest distance. Others are only counted.
 MOST = 5_000
@@ -29,7 +29,8 @@ class Place:
     distance: float | None = None
 
 
-def _add_faces(faces, body, triangles):
+def add_faces(faces, body, triangles):
+    """Adds to the lists by name the faces of an object's own mesh in which triangles of a body lie."""
     polygons = np.unique(body.polygons[triangles])
     polygons = polygons[polygons >= 0]
     if len(polygons):
@@ -52,8 +53,8 @@ def of_contacts(bodies, pairs, contacts, local):
             corners = np.array(np.meshgrid(*zip(low, high))).reshape(3, 8).T
             points = to_world(a.matrix, np.vstack([points[:1], corners]))
         place = Place((a.name, b.name), len(here), points[0], float(np.linalg.norm(np.ptp(points[1:], axis=0)) / 2))
-        _add_faces(place.faces, a, here[:, 1])
-        _add_faces(place.faces, b, here[:, 3])
+        add_faces(place.faces, a, here[:, 1])
+        add_faces(place.faces, b, here[:, 3])
         places.append(place)
     return places, len(regions)
 
@@ -133,9 +134,9 @@ class Near:
             for ix in np.unique(numbers):
                 here = pairs[numbers == ix]
                 is_face = self._letters[here, side] == "f"
-                _add_faces(faces, self._bodies[ix], self._rows[here[is_face], 2 * side + 1])
+                add_faces(faces, self._bodies[ix], self._rows[here[is_face], 2 * side + 1])
                 ends = self._corners[here[~is_face], side, :2] - self._first[ix]
-                _add_faces(faces, self._bodies[ix], self._triangles_at(ix, ends))
+                add_faces(faces, self._bodies[ix], self._triangles_at(ix, ends))
         return faces
 
     def _triangles_at(self, ix, ends):

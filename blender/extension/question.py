@@ -113,12 +113,11 @@ class Asker:
 
     def _faces(self, answer, part, rows):
         for ix, body in enumerate(part):
-            triangles = np.concatenate([rows[rows[:, side] == ix, side + 1] for side in (0, 2)])
-            polygons = body.polygons[np.unique(triangles)]
-            answer.n_made += int((polygons < 0).sum())
-            polygons = np.unique(polygons[polygons >= 0])
-            known = answer.faces.get(body.name)
-            answer.faces[body.name] = polygons if known is None else np.union1d(known, polygons)
+            triangles = np.unique(np.concatenate([rows[rows[:, side] == ix, side + 1] for side in (0, 2)]))
+            answer.n_made += int((body.polygons[triangles] < 0).sum())
+            # Each body that was asked about has a list, if an empty one.
+            answer.faces.setdefault(body.name, body.polygons[:0])
+            places.add_faces(answer.faces, body, triangles)
 
     def _near(self, answer, bodies, cancel, progress):
         question = self.question
