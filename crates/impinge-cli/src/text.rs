@@ -20,6 +20,11 @@ pub fn counted(n: u64, one: &str) -> String {
     format!("{} {one}{}", grouped(n), if n == 1 { "" } else { "s" })
 }
 
+/// `n` with a noun that has a plural of its own, or with more words.
+pub fn several(n: u64, one: &str, many: &str) -> String {
+    format!("{} {}", grouped(n), if n == 1 { one } else { many })
+}
+
 /// How many pairs of each kind there are, without those of which there are none: `2 vf, 6 ee`.
 pub fn kinds(kinds: impl IntoIterator<Item = (PairKind, u64)>) -> String {
     let found = kinds.into_iter().filter(|&(_, n)| n > 0);

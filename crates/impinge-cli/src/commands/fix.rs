@@ -19,7 +19,7 @@ use crate::error::Error;
 use crate::load::{NAME_OF_STDIN, STDIN, format_of_stdin, stdin_bytes};
 use crate::output;
 use crate::rows;
-use crate::text::counted;
+use crate::text::{counted, several};
 
 /// `impinge fix`.
 pub fn fix(args: &FixArgs) -> Result<(), Error> {
@@ -343,9 +343,4 @@ fn said(repair: Repair, fixed: &Fixed) -> Vec<String> {
 
 fn vertices(n: u64) -> String {
     several(n, "vertex", "vertices")
-}
-
-fn several(n: u64, one: &str, many: &str) -> String {
-    let word = if n == 1 { one } else { many };
-    format!("{} {word}", crate::text::grouped(n))
 }

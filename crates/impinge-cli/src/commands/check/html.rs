@@ -55,6 +55,7 @@ pub fn write(path: &Path, rows: &[Row], args: &CheckArgs) -> Result<(), Error> {
 }
 
 fn head(rows: &[Row]) -> String {
+    let summary = escaped(&summary(rows));
     let legend: String = Problem::ALL
         .iter()
         .map(|problem| {
@@ -86,12 +87,10 @@ fn head(rows: &[Row]) -> String {
     format!(
         "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
          <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'\">\
-         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"><title>impinge check: {}</title>\n\
-         <style>\n{STYLE}</style></head>\n<body><h1>impinge check</h1>\n<p>{}</p>\n<p class=\"legend\">{legend}</p>\n\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"><title>impinge check: {summary}</title>\n\
+         <style>\n{STYLE}</style></head>\n<body><h1>impinge check</h1>\n<p>{summary}</p>\n<p class=\"legend\">{legend}</p>\n\
          <label class=\"sort\">Sort by <select>{choices}</select></label>\n\
-         <table><thead><tr><th class=\"pic\" scope=\"col\"></th>{heads}</tr></thead>\n<tbody>\n",
-        escaped(&summary(rows)),
-        escaped(&summary(rows)),
+         <table><thead><tr><th class=\"pic\" scope=\"col\"></th>{heads}</tr></thead>\n<tbody>\n"
     )
 }
 

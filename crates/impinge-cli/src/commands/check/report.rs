@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 use super::args::{CheckArgs, FailOn, Format};
 use crate::error::Error;
 use crate::output::out;
-use crate::text::grouped;
+use crate::text::several;
 
 /// One problem of one mesh.
 struct Finding<'a> {
@@ -99,10 +99,6 @@ fn message(row: &Row, kind: FailOn) -> String {
 }
 
 fn said(kind: FailOn, counts: &Counts) -> String {
-    let several = |n: u64, one: &str, many: &str| match n {
-        1 => format!("1 {one}"),
-        _ => format!("{} {many}", grouped(n)),
-    };
     let facets = if counts.n_tetrahedra > 0 {
         ["face", "faces"]
     } else {
