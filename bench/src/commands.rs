@@ -72,7 +72,8 @@ impl Peers {
 }
 
 /// The library's contestants; the others are compared with the first one. `variants` adds positions
-/// copied on the clock, and a single thread. Other affinities of helper threads follow the first contestant.
+/// copied on the clock, and a single thread. Other affinities of helper threads follow the first
+/// contestant.
 fn ours(
     problem: &Problem,
     options: &Options,

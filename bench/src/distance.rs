@@ -1,9 +1,10 @@
-//! The smallest distance of two bodies, beside parry's `query::distance` of two `TriMesh`es. (`bench/near.py` has the peers with Python
-//! modules.)
+//! The smallest distance of two bodies, beside parry's `query::distance` of two `TriMesh`es.
+//! (`bench/near.py` has the peers with Python modules.)
 //!
-//! Two scans, with their boxes three gaps apart. *Moved*: positions alternate between a pose and its mirror image, whose distance is the
-//! same, and are handed over on the clock; parry builds its meshes anew, for it cannot change the vertices of one. *Still*: the same
-//! question again. All distances must agree to single precision.
+//! Two scans, with their boxes three gaps apart. *Moved*: positions alternate between a pose and
+//! its mirror image, whose distance is the same, and are handed over on the clock; parry builds its
+//! meshes anew, for it cannot change the vertices of one. *Still*: the same question again. All
+//! distances must agree to single precision.
 
 use std::time::Instant;
 

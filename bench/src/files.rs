@@ -15,7 +15,8 @@ const BALL_OFFSET: [f32; 3] = [0.9, 0.01, 0.02];
 const N_PAIRS_BALL_15K: u64 = 277;
 const N_PAIRS_BALL: u64 = 390;
 
-/// Reads a mesh file in single precision. Coordinates that need more precision are rounded, because a bench measures time.
+/// Reads a mesh file in single precision. Coordinates that need more precision are rounded, because
+/// a bench measures time.
 fn load(path: &Path, weld: bool) -> Result<Model, Failure> {
     let options = ReadOptions {
         weld,
@@ -48,8 +49,8 @@ fn mesh(file: &str, stand_in: impl FnOnce() -> Model) -> Result<(Model, String),
 
 const MIRRORED: &str = "frames alternate with the mirror image, whose pairs are the same because changing signs is exact";
 
-/// Two copies of a body, their number of pairs, and a description. Scenes: `ball15k`, `ball` (30,000), `bunny`, `buddha`,
-/// `dragon`.
+/// Two copies of a body, their number of pairs, and a description. Scenes: `ball15k`, `ball`
+/// (30,000), `bunny`, `buddha`, `dragon`.
 fn twice(scene: &str) -> Result<(Vec<Model>, Option<u64>, String), Failure> {
     let (model, offset, expected, about) = match scene {
         "ball15k" => (
@@ -121,7 +122,8 @@ pub fn two_body(scene: &str) -> Result<Problem, Failure> {
 /// The number of steps of a passing body from one end of its path to the other.
 const N_STEPS: usize = 15;
 
-/// Two copies of a body, one of which passes by: `step` is the share of its width that it moves per frame.
+/// Two copies of a body, one of which passes by: `step` is the share of its width that it moves per
+/// frame.
 pub fn passing(scene: &str, step: f32) -> Result<Problem, Failure> {
     let (models, ..) = twice(scene)?;
     let width = models[0].bounds().map_or(0.0, |(min, max)| max[0] - min[0]);

@@ -1,7 +1,8 @@
 //! Measures a GPU: the time of each stage on the device, beside a lower bound.
 //!
-//! The lower bound (floor) is bytes over bandwidth plus launches. Both rates are measured on the same device: the
-//! bandwidth by copying a large buffer, the cost of a launch by a sequence of dependent launches.
+//! The lower bound (floor) is bytes over bandwidth plus launches. Both rates are measured on the
+//! same device: the bandwidth by copying a large buffer, the cost of a launch by a sequence of
+//! dependent launches.
 
 use std::time::Instant;
 
@@ -194,7 +195,8 @@ impl Rates {
         })
     }
 
-    /// The time of the bytes that must move, at full bandwidth, plus the launches of one pass, as counted in docs/lab/gpu.md.
+    /// The time of the bytes that must move, at full bandwidth, plus the launches of one pass, as
+    /// counted in docs/lab/gpu.md.
     fn floor_ms(&self, problem: &Problem, stats: &Stats) -> f64 {
         const CLUSTER: u64 = 45 * (4 + 12);
         const BOX: u64 = 2 * 24;

@@ -1,8 +1,8 @@
 //! Runs frames of all contestants in turns, so that all meet the same conditions.
 //!
-//! A turn is a few frames of one contestant. With one frame per turn, each contestant starts with cold
-//! caches and sleeping threads. With ten, nine frames run under the conditions of a program that uses only this
-//! contestant.
+//! A turn is a few frames of one contestant. With one frame per turn, each contestant starts with
+//! cold caches and sleeping threads. With ten, nine frames run under the conditions of a program
+//! that uses only this contestant.
 
 use std::time::Duration;
 
@@ -12,7 +12,8 @@ use crate::Failure;
 use crate::problem::Problem;
 use crate::runner::{Answer, Runner};
 
-/// Untimed frames before the timed ones; more if there are more poses, because answers are verified in these frames.
+/// Untimed frames before the timed ones; more if there are more poses, because answers are verified
+/// in these frames.
 const N_WARM: usize = 4;
 
 /// The pause between two turns.
@@ -93,8 +94,9 @@ impl Table {
 /// Runs `n_frames` timed frames of every contestant, `turn` of them in a row.
 ///
 /// # Errors
-/// A contestant fails; an exact contestant does not find the expected number of pairs, finds another number in another
-/// frame of the same pose, or finds other pairs than another exact contestant.
+/// A contestant fails; an exact contestant does not find the expected number of pairs, finds
+/// another number in another frame of the same pose, or finds other pairs than another exact
+/// contestant.
 pub fn run(
     problem: &Problem,
     mut runners: Vec<Box<dyn Runner>>,
@@ -188,8 +190,8 @@ impl Record {
     }
 }
 
-/// Checks an answer against what is known about its pose: the number of pairs that the contestant has found before, and the
-/// agreed hash with the contestant that gave it first.
+/// Checks an answer against what is known about its pose: the number of pairs that the contestant
+/// has found before, and the agreed hash with the contestant that gave it first.
 fn check(
     problem: &Problem,
     name: &str,

@@ -1,10 +1,11 @@
 //! Elements within a distance of each other, of one mesh with itself.
 //!
-//! Positions alternate between a pose and its mirror image, and are written before each frame. Every answer of the library is held
-//! against the known number of pairs and their hash, names of nearest features included.
+//! Positions alternate between a pose and its mirror image, and are written before each frame.
+//! Every answer of the library is held against the known number of pairs and their hash, names of
+//! nearest features included.
 //!
-//! Peers answer a part of the question in floating point. Their rows are compared with those of the library, off the clock, and
-//! the numbers of rows that only one of them has are printed.
+//! Peers answer a part of the question in floating point. Their rows are compared with those of the
+//! library, off the clock, and the numbers of rows that only one of them has are printed.
 
 #[cfg(feature = "embree")]
 mod embree;

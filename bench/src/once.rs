@@ -1,4 +1,5 @@
-//! One question, once: how long the first frame of a new detector takes, by each method. Detectors are made off the clock.
+//! One question, once: how long the first frame of a new detector takes, by each method. Detectors
+//! are made off the clock.
 
 use std::time::Instant;
 

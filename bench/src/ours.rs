@@ -13,8 +13,8 @@ use crate::runner::{Answer, Runner};
 /// How the library gets its positions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Feed {
-    /// Written in place through `positions_mut` before the clock starts, as for the peers. Detection
-    /// checks them, and this is timed.
+    /// Written in place through `positions_mut` before the clock starts, as for the peers.
+    /// Detection checks them, and this is timed.
     InPlace,
     /// Copied and checked by `set_positions` while the clock runs.
     Copied,

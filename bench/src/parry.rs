@@ -1,6 +1,6 @@
 //! parry3d as a peer: its `Bvh` over primitives, refitted each frame, its traversals, and the plain
-//! pair test. parry has no self-collision and no triangle-pair query for meshes, but it offers these
-//! parts; [`tuned`] tries several ways to combine them.
+//! pair test. parry has no self-collision and no triangle-pair query for meshes, but it offers
+//! these parts; [`tuned`] tries several ways to combine them.
 
 use std::fmt;
 use std::time::Instant;
@@ -24,8 +24,8 @@ pub struct Setting {
     refit: Refit,
     /// Whether candidates are collected and tested in parallel, or tested one by one as they come.
     parallel_test: bool,
-    /// For many bodies: whether to use a tree over bodies, with all box pairs of two bodies that meet, or a tree over
-    /// primitives.
+    /// For many bodies: whether to use a tree over bodies, with all box pairs of two bodies that
+    /// meet, or a tree over primitives.
     over_bodies: bool,
 }
 

@@ -1,5 +1,6 @@
-//! The pair tests of the peers: plain double precision, without error bounds, written to be
-//! fast. They may be wrong for primitives that touch or nearly touch, which shows as a difference in counts.
+//! The pair tests of the peers: plain double precision, without error bounds, written to be fast.
+//! They may be wrong for primitives that touch or nearly touch, which shows as a difference in
+//! counts.
 
 /// A point in double precision.
 pub type Point = [f64; 3];
@@ -95,7 +96,8 @@ fn apex(d: [f64; 3]) -> Option<(usize, bool)> {
     } else if in_plane == 7 {
         None
     } else {
-        // One corner in the plane, the others together on one side: it counts as being on the other side.
+        // One corner in the plane, the others together on one side: it counts as being on the other
+        // side.
         Some((corner(in_plane), below != 0))
     }
 }
@@ -215,8 +217,8 @@ fn faces(a: &[Point; 4], b: &[Point; 4]) -> Faces {
     Faces::Unknown
 }
 
-/// The square of the distance of a point and a triangle, by the regions of the triangle's nearest point: C. Ericson, Real-Time
-/// Collision Detection, 2005, section 5.1.5.
+/// The square of the distance of a point and a triangle, by the regions of the triangle's nearest
+/// point: C. Ericson, Real-Time Collision Detection, 2005, section 5.1.5.
 #[cfg_attr(not(feature = "embree"), allow(dead_code, reason = "for peers"))]
 #[inline]
 pub fn square_of_point_and_triangle(p: Point, [a, b, c]: [Point; 3]) -> f64 {

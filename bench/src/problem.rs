@@ -56,8 +56,9 @@ impl Problem {
         })
     }
 
-    /// A problem whose last body moves to and fro along x: `n_steps` steps of length `step` each way, around its place. The other
-    /// bodies stay, but their positions are rewritten too. The pairs of the poses differ.
+    /// A problem whose last body moves to and fro along x: `n_steps` steps of length `step` each
+    /// way, around its place. The other bodies stay, but their positions are rewritten too. The
+    /// pairs of the poses differ.
     pub fn passing(name: &str, models: Vec<Model>, ask: Ask, step: f32, n_steps: usize) -> Problem {
         let last = models.len().saturating_sub(1);
         let middle = n_steps as f32 / 2.0;
@@ -125,7 +126,8 @@ impl Problem {
         self
     }
 
-    /// Counts the pairs by the oracle, if their number is not known and the problem is small enough.
+    /// Counts the pairs by the oracle, if their number is not known and the problem is small
+    /// enough.
     pub fn by_oracle(self) -> Result<Problem, Failure> {
         const MAX_PRIMITIVES: usize = 60_000;
         if self.expected.is_some() || self.n_primitives() > MAX_PRIMITIVES {

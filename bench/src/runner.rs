@@ -25,8 +25,8 @@ pub trait Runner {
     /// Rewrites all positions. Not timed.
     fn load(&mut self, problem: &Problem, pose: usize) -> Result<(), Failure>;
 
-    /// Answers for the current positions and measures the time. With `verify`, it may compute a hash of the answer
-    /// after the clock has stopped.
+    /// Answers for the current positions and measures the time. With `verify`, it may compute a
+    /// hash of the answer after the clock has stopped.
     fn frame(&mut self, verify: bool) -> Result<Answer, Failure>;
 
     /// Counts, bytes and stages of the last frame, for the record.

@@ -1,8 +1,10 @@
-//! Steps of cloth of 10^3 to 10^6 faces: the cost of each question against the size, and the memory that a detector holds.
+//! Steps of cloth of 10^3 to 10^6 faces: the cost of each question against the size, and the memory
+//! that a detector holds.
 //!
-//! Two layers of waving cloth, most of an edge length apart. Waves run through them in opposite directions, about an edge length
-//! in a step, so that impacts, like faces, grow with the square of the resolution. Answers are held against each other: the
-//! earliest impact is the first of all impacts, a step with impacts is not free, and all impacts are among the candidates.
+//! Two layers of waving cloth, most of an edge length apart. Waves run through them in opposite
+//! directions, about an edge length in a step, so that impacts, like faces, grow with the square of
+//! the resolution. Answers are held against each other: the earliest impact is the first of all
+//! impacts, a step with impacts is not free, and all impacts are among the candidates.
 
 use std::time::Instant;
 

@@ -1,8 +1,9 @@
-//! Steps: bodies that move from a start to an end. All contacts, the earliest one, whether there is any, how far the step can
-//! be taken, and pairs of boxes, each stage by stage.
+//! Steps: bodies that move from a start to an end. All contacts, the earliest one, whether there is
+//! any, how far the step can be taken, and pairs of boxes, each stage by stage.
 //!
-//! Positions at both ends are rewritten before each frame. Every answer is held against what is known of the scene: how many
-//! pairs touch, the hash of all of them with their times, the earliest time.
+//! Positions at both ends are rewritten before each frame. Every answer is held against what is
+//! known of the scene: how many pairs touch, the hash of all of them with their times, the earliest
+//! time.
 
 use std::time::Instant;
 
@@ -103,7 +104,8 @@ impl Moving {
 #[derive(Clone)]
 struct Frame {
     ms: f64,
-    /// Time on the processor, where the system says and one thread worked: other programs do not disturb it.
+    /// Time on the processor, where the system says and one thread worked: other programs do not
+    /// disturb it.
     cpu_ms: Option<f64>,
     stats: Stats,
     said: String,

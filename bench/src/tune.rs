@@ -1,4 +1,5 @@
-//! Finds the best setting of a peer: tries every setting on the problem itself and keeps the fastest.
+//! Finds the best setting of a peer: tries every setting on the problem itself and keeps the
+//! fastest.
 
 use crate::Failure;
 use crate::problem::Problem;
@@ -8,10 +9,10 @@ use crate::runner::Runner;
 const N_WARM: usize = 3;
 const N_TIMED: usize = 8;
 
-/// Builds a contestant for each setting, runs a few frames, and returns the contestant with the fastest
-/// frame: on a shared machine, the fastest of several frames says most about a setting. A
-/// setting whose first frames take twice as long as the best so far is abandoned. With a
-/// single setting nothing is measured.
+/// Builds a contestant for each setting, runs a few frames, and returns the contestant with the
+/// fastest frame: on a shared machine, the fastest of several frames says most about a setting. A
+/// setting whose first frames take twice as long as the best so far is abandoned. With a single
+/// setting nothing is measured.
 pub fn fastest<S: Copy>(
     problem: &Problem,
     settings: &[S],

@@ -1,4 +1,5 @@
-//! Names the shared library by the version of its binary interface, so that programs find the one they were linked with.
+//! Names the shared library by the version of its binary interface, so that programs find the one
+//! they were linked with.
 
 fn main() {
     println!("cargo:rerun-if-changed=build.rs");

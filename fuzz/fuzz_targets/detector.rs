@@ -1,4 +1,5 @@
-//! The pairs of scenes made from bytes: every method must agree with the oracle, and nothing may panic.
+//! The pairs of scenes made from bytes: every method must agree with the oracle, and nothing may
+//! panic.
 
 #![no_main]
 

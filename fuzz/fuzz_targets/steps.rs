@@ -1,4 +1,5 @@
-//! Steps of scenes made from bytes: all answers must agree with the oracle and with each other, and nothing may panic.
+//! Steps of scenes made from bytes: all answers must agree with the oracle and with each other, and
+//! nothing may panic.
 
 #![no_main]
 

@@ -1,5 +1,6 @@
-//! The assertions of the fuzz targets: here those of file formats, in [`scene`] those of the detector. libFuzzer checks for
-//! panics, endless loops and memory; the functions here check that returned meshes and errors are valid.
+//! The assertions of the fuzz targets: here those of file formats, in [`scene`] those of the
+//! detector. libFuzzer checks for panics, endless loops and memory; the functions here check that
+//! returned meshes and errors are valid.
 
 pub mod scene;
 
@@ -57,7 +58,8 @@ pub fn mesh(bytes: &[u8], format: Format) {
     ));
 }
 
-/// Reads a TetGen mesh. A zero byte separates its two files; the first byte chooses the kind of cells of the second file.
+/// Reads a TetGen mesh. A zero byte separates its two files; the first byte chooses the kind of
+/// cells of the second file.
 pub fn tetgen(bytes: &[u8]) {
     let Some((kind, bytes)) = bytes.split_first() else {
         return;

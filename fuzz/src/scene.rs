@@ -1,8 +1,8 @@
 //! Scenes made from bytes, and what must hold of the answers about them.
 //!
-//! The first byte chooses how coordinates are read: as small integers, where everything is degenerate, or
-//! as raw bits of f32 or f64, including NaN. Then bodies follow: a byte for kind and size, vertices, corners; for a step,
-//! also end positions.
+//! The first byte chooses how coordinates are read: as small integers, where everything is
+//! degenerate, or as raw bits of f32 or f64, including NaN. Then bodies follow: a byte for kind and
+//! size, vertices, corners; for a step, also end positions.
 
 use impinge::{
     Backend, BodyId, Detector, Elements, Error, Method, Query, Scene, Settings, SharedVertex, Start,
@@ -147,8 +147,8 @@ pub fn pairs(data: &[u8]) -> usize {
     expected.len()
 }
 
-/// The impacts, the earliest one, whether there is any, and the candidates of a step are the oracle's. Returns how many
-/// impacts there are.
+/// The impacts, the earliest one, whether there is any, and the candidates of a step are the
+/// oracle's. Returns how many impacts there are.
 pub fn steps(data: &[u8]) -> usize {
     const CHECKED: &str = "a checked scene is answered";
     let Some((scene, mode)) = build(data, true) else {
@@ -183,7 +183,8 @@ pub fn steps(data: &[u8]) -> usize {
 mod tests {
     use super::*;
 
-    /// Random bytes are what a fuzzer begins with. Together the scenes must have pairs and impacts, or the test checks nothing.
+    /// Random bytes are what a fuzzer begins with. Together the scenes must have pairs and impacts,
+    /// or the test checks nothing.
     #[test]
     fn noise() {
         let mut state = 1u64;

@@ -1,10 +1,10 @@
-//! Embree 3 as a peer: a bounding volume hierarchy over user-defined primitives, refitted or rebuilt
-//! each frame, `rtcCollide`, and the plain pair test in its callback.
+//! Embree 3 as a peer: a bounding volume hierarchy over user-defined primitives, refitted or
+//! rebuilt each frame, `rtcCollide`, and the plain pair test in its callback.
 //!
-//! `rtcCollide` takes only user geometries and calls back with candidate pairs from several threads. The
-//! callback is fast: no lock, no allocation, one atomic addition per batch of hits.
-//! The setting (build quality, scene flags, threads, whether candidates' boxes are compared first) is
-//! not fixed: [`tuned`] measures all sensible settings on the problem and keeps the fastest.
+//! `rtcCollide` takes only user geometries and calls back with candidate pairs from several
+//! threads. The callback is fast: no lock, no allocation, one atomic addition per batch of hits.
+//! The setting (build quality, scene flags, threads, whether candidates' boxes are compared first)
+//! is not fixed: [`tuned`] measures all sensible settings on the problem and keeps the fastest.
 
 pub mod ffi;
 
@@ -308,7 +308,8 @@ impl Handles {
 
 impl Drop for Handles {
     fn drop(&mut self) {
-        // SAFETY: each handle was created once, by whoever filled these lists, and is released once, here.
+        // SAFETY: each handle was created once, by whoever filled these lists, and is released
+        // once, here.
         unsafe {
             for &geometry in &self.geometries {
                 ffi::rtcReleaseGeometry(geometry);
@@ -419,7 +420,8 @@ impl<P: Corners> Embree<P> {
 
         let (first, last) = (handles.scenes[0], handles.scenes[handles.scenes.len() - 1]);
         let user = std::ptr::from_ref(&*self.shared).cast_mut().cast();
-        // SAFETY: both scenes are committed; the callback reads `shared` and writes its atomics only.
+        // SAFETY: both scenes are committed; the callback reads `shared` and writes its atomics
+        // only.
         unsafe { ffi::rtcCollide(first, last, self.callback, user) };
         self.shared.n_hits.load(Relaxed)
     }

@@ -1,4 +1,5 @@
-//! Embree 3 as a peer: `rtcPointQuery` with each vertex, and in its callback the plain distance of a point and a triangle.
+//! Embree 3 as a peer: `rtcPointQuery` with each vertex, and in its callback the plain distance of
+//! a point and a triangle.
 //!
 //! Embree compares boxes with a sphere, so it gives a few faces more than are near.
 
@@ -40,8 +41,8 @@ impl Points {
             .collect();
         let faces = mesh.faces.to_vec();
         let mut handles = Handles::new(n_threads)?;
-        // SAFETY: plain calls of the C interface with live handles. Both buffers keep their place and length as long as the
-        // geometry lives: they are released after it.
+        // SAFETY: plain calls of the C interface with live handles. Both buffers keep their place
+        // and length as long as the geometry lives: they are released after it.
         unsafe {
             let scene = ffi::rtcNewScene(handles.device);
             handles.scenes.push(scene);
@@ -92,7 +93,8 @@ fn point([x, y, z, _]: [f32; 4]) -> Point {
 }
 
 unsafe extern "C" fn meets(arguments: *mut ffi::PointQueryArguments) -> bool {
-    // SAFETY: Embree passes valid arguments, and as `user` the `Query` that `find` passes and uses nowhere else meanwhile.
+    // SAFETY: Embree passes valid arguments, and as `user` the `Query` that `find` passes and uses
+    // nowhere else meanwhile.
     let (query, face) = unsafe {
         let arguments = &*arguments;
         (
@@ -135,7 +137,8 @@ impl Shared {
             n_instances: 0,
         };
         let user = std::ptr::from_mut(query).cast();
-        // SAFETY: the scene is committed; the query and the context are valid and not used meanwhile.
+        // SAFETY: the scene is committed; the query and the context are valid and not used
+        // meanwhile.
         unsafe { ffi::rtcPointQuery(self.0, &mut at, &mut context, Some(meets), user) };
     }
 }

@@ -1,5 +1,6 @@
-//! parry3d as a peer, in single precision: its `Bvh`, refitted in each frame, and its distances of a point and a triangle, and of
-//! two segments. It has no query for pairs within a distance, but has the parts for one.
+//! parry3d as a peer, in single precision: its `Bvh`, refitted in each frame, and its distances of
+//! a point and a triangle, and of two segments. It has no query for pairs within a distance, but
+//! has the parts for one.
 
 use parry3d::bounding_volume::Aabb;
 use parry3d::math::{Pose, Vector};
@@ -14,8 +15,9 @@ use crate::Failure;
 
 /// Vertices, or pairs of edges, per task.
 const TASK: usize = 1024;
-/// parry takes edges for parallel whose cross product has a square below 1.2e-7, whatever their lengths. A tenth of the pairs of edges of a
-/// mesh of unit size is lost by that. So it gets larger coordinates; powers of two round nothing.
+/// parry takes edges for parallel whose cross product has a square below 1.2e-7, whatever their
+/// lengths. A tenth of the pairs of edges of a mesh of unit size is lost by that. So it gets larger
+/// coordinates; powers of two round nothing.
 const SCALE: f32 = 1024.0;
 
 /// The elements of a mesh in a tree.

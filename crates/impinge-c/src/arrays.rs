@@ -1,4 +1,5 @@
-//! Arrays of callers, as rows of Rust: checked, and copied only where rows are not packed. And views of our own arrays.
+//! Arrays of callers, as rows of Rust: checked, and copied only where rows are not packed. And
+//! views of our own arrays.
 
 use std::borrow::Cow;
 use std::ffi::c_void;

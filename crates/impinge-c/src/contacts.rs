@@ -1,4 +1,5 @@
-//! Where triangles meet, and how deep bodies overlap: `impinge_find_contacts`, `impinge_find_penetration`.
+//! Where triangles meet, and how deep bodies overlap: `impinge_find_contacts`,
+//! `impinge_find_penetration`.
 
 use std::sync::OnceLock;
 

@@ -37,7 +37,8 @@ struct Callbacks {
     user: *mut c_void,
 }
 
-// SAFETY: `impinge.h` says that the callbacks are called by the thread that asks, which may be another one each time.
+// SAFETY: `impinge.h` says that the callbacks are called by the thread that asks, which may be
+// another one each time.
 unsafe impl Send for Callbacks {}
 // SAFETY: other threads of a question see them, and call none (`Watch`).
 unsafe impl Sync for Callbacks {}
@@ -45,7 +46,8 @@ unsafe impl Sync for Callbacks {}
 impl Callbacks {
     fn log(&self, level: u32, message: &str) {
         if let (Some(log), Ok(text)) = (self.log, CString::new(message)) {
-            // SAFETY: the caller's function, with the caller's argument and a text that lives as long as the call.
+            // SAFETY: the caller's function, with the caller's argument and a text that lives as
+            // long as the call.
             unsafe { log(self.user, level, text.as_ptr()) };
         }
     }
@@ -177,7 +179,8 @@ unsafe fn settings(given: &impinge_settings) -> Result<Settings, Failure> {
 
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn impinge_settings_default(settings: *mut impinge_settings) {
-    // SAFETY: `impinge.h` says what pointers are, here and in all functions below. Without room for it there is nothing to fill.
+    // SAFETY: `impinge.h` says what pointers are, here and in all functions below. Without room for
+    // it there is nothing to fill.
     let _ = unsafe { put(settings, "settings", impinge_settings::default()) };
 }
 

@@ -12,7 +12,8 @@ use crate::status::Failure;
 pub struct EdgeNumbers {
     /// The rows of the caller.
     pub rows: Vec<[u32; 2]>,
-    /// By the library's number: the caller's, and whether the caller's row names the vertices the other way round.
+    /// By the library's number: the caller's, and whether the caller's row names the vertices the
+    /// other way round.
     to_own: Vec<(u32, bool)>,
 }
 

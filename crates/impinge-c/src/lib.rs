@@ -1,7 +1,8 @@
-//! The C interface of impinge. `include/impinge.h` is its documentation: what pointers are, who owns what, which errors there are.
+//! The C interface of impinge. `include/impinge.h` is its documentation: what pointers are, who
+//! owns what, which errors there are.
 //!
-//! The crate has no Rust interface. Each entry runs within a guard (`status`), reads what the caller gives (`arrays`, `query`), and asks the
-//! crate `impinge`.
+//! The crate has no Rust interface. Each entry runs within a guard (`status`), reads what the
+//! caller gives (`arrays`, `query`), and asks the crate `impinge`.
 
 #![allow(non_camel_case_types)]
 #![allow(

@@ -1,4 +1,5 @@
-//! What an `impinge_query` asks, in the words of the crate `impinge`. The only place that knows them.
+//! What an `impinge_query` asks, in the words of the crate `impinge`. The only place that knows
+//! them.
 
 use std::ffi::c_void;
 
@@ -202,7 +203,8 @@ fn pair_filter(passes: PassesCallback, user: *mut c_void) -> PairFilter {
             n_vertices: vertices.len() as u32,
             body: body.index() as u32,
         });
-        // SAFETY: the caller's function, with the caller's argument and elements that live as long as the call.
+        // SAFETY: the caller's function, with the caller's argument and elements that live as long
+        // as the call.
         unsafe { passes(user.get(), &a, &b) != 0 }
     })
 }

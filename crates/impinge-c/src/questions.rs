@@ -84,7 +84,8 @@ unsafe fn value(
 
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn impinge_query_default(query: *mut impinge_query) {
-    // SAFETY: `impinge.h` says what pointers are, here and in all functions below. Without room for it there is nothing to fill.
+    // SAFETY: `impinge.h` says what pointers are, here and in all functions below. Without room for
+    // it there is nothing to fill.
     let _ = unsafe { put(query, "query", impinge_query::default()) };
 }
 

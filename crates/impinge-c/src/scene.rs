@@ -533,7 +533,8 @@ pub unsafe extern "C" fn impinge_weld(
         if map.is_null() && positions.rows > 0 {
             return Err(Failure::null("map"));
         }
-        // SAFETY: the caller has room for as many numbers as there are positions, and there are no more vertices after welding.
+        // SAFETY: the caller has room for as many numbers as there are positions, and there are no
+        // more vertices after welding.
         unsafe {
             put(n_vertices, "n_vertices", weld.firsts().len())?;
             if positions.rows > 0 {

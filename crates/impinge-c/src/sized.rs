@@ -6,7 +6,8 @@ use crate::types::*;
 /// A structure that callers pass with its size, and that grows at its end only.
 ///
 /// # Safety
-/// `#[repr(C)]`, the first field is `size: u32`, and all bytes that a caller may give are a valid value.
+/// `#[repr(C)]`, the first field is `size: u32`, and all bytes that a caller may give are a valid
+/// value.
 pub unsafe trait Sized32: Copy + Default {
     const NAME: &'static str;
 }
@@ -21,7 +22,8 @@ unsafe impl Sized32 for impinge_settings {
     const NAME: &'static str = "impinge_settings";
 }
 
-/// The structure of a caller, whose header may be older: the defaults stand for what it lacks. NULL is all defaults.
+/// The structure of a caller, whose header may be older: the defaults stand for what it lacks. NULL
+/// is all defaults.
 ///
 /// # Safety
 /// `given` is NULL or points to a structure of as many bytes as its first field says.

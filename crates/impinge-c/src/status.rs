@@ -1,4 +1,5 @@
-//! What a call answers: its status, the message of the thread's last failure, and the guard that no panic passes.
+//! What a call answers: its status, the message of the thread's last failure, and the guard that no
+//! panic passes.
 
 use std::any::Any;
 use std::cell::{Cell, RefCell};
@@ -89,8 +90,8 @@ fn watch_panics() {
     });
 }
 
-/// Runs an entry of the library. A failure, or a panic, becomes a status and the thread's message. No panic leaves it, because callers
-/// in C cannot unwind.
+/// Runs an entry of the library. A failure, or a panic, becomes a status and the thread's message.
+/// No panic leaves it, because callers in C cannot unwind.
 pub fn guard(entry: impl FnOnce() -> Result<(), Failure>) -> Status {
     watch_panics();
     GUARDS.with(|n| n.set(n.get() + 1));
@@ -134,7 +135,8 @@ pub fn broken(name: &str) -> Failure {
     }
 }
 
-/// Runs an entry that changes a handle. The handle is given to `entry`, and refuses further use after a panic.
+/// Runs an entry that changes a handle. The handle is given to `entry`, and refuses further use
+/// after a panic.
 ///
 /// # Safety
 /// `handle` is NULL or a handle of this library that nobody else uses at the same time.

@@ -1,5 +1,5 @@
-//! Tests of the interface from within: layouts, hashes beside those of Rust, the caller's numbers of edges. `tests/` has those in C and C++,
-//! which `scripts/test-c` runs.
+//! Tests of the interface from within: layouts, hashes beside those of Rust, the caller's numbers
+//! of edges. `tests/` has those in C and C++, which `scripts/test-c` runs.
 
 use std::collections::BTreeMap;
 use std::mem::offset_of;
@@ -365,7 +365,8 @@ fn answers_have_the_hashes_of_rust() {
     }
 }
 
-/// Edges in reverse order, every second one the other way round, and some that are none of the body's.
+/// Edges in reverse order, every second one the other way round, and some that are none of the
+/// body's.
 fn own_edges(scene: &Scene, body: usize) -> Vec<[u32; 2]> {
     let (_, held) = scene.bodies().nth(body).expect("it is there");
     let Elements::Edges(edges) = held.part(Part::Edges) else {
@@ -428,7 +429,8 @@ fn edges_have_the_numbers_of_the_caller() {
     }
 }
 
-/// What a near pair is, without numbers of edges: its kind, the vertices of both elements and of both features, its points.
+/// What a near pair is, without numbers of edges: its kind, the vertices of both elements and of
+/// both features, its points.
 type Described = (u8, Vec<(Vec<u32>, Vec<u32>, [u64; 3])>);
 
 /// # Safety

@@ -1,4 +1,5 @@
-//! The structures and constants of `impinge.h`, with the same layout. `tests/layout.c` holds both against each other.
+//! The structures and constants of `impinge.h`, with the same layout. `tests/layout.c` holds both
+//! against each other.
 
 #![allow(non_camel_case_types)]
 

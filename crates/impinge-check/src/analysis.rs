@@ -1,7 +1,8 @@
 //! The check of one mesh in memory.
 //!
-//! In: a mesh with indices in range. Out: [`Counts`], and the [`Marks`] of each primitive.
-//! The steps are welding, self-intersections, facets, union of neighbours and zero areas; each is exact.
+//! In: a mesh with indices in range. Out: [`Counts`], and the [`Marks`] of each primitive. The
+//! steps are welding, self-intersections, facets, union of neighbours and zero areas; each is
+//! exact.
 
 use impinge::exact::{Point, orient2d, orient3d};
 use impinge::{Backend, Detector, Error, Query, Scene, Settings};
@@ -18,14 +19,17 @@ use crate::volume;
 /// How a mesh is checked.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Options {
-    /// Whether vertices at exactly the same position are welded first. On by default: many formats repeat vertices
-    /// per face, and without welding every edge would be a border.
+    /// Whether vertices at exactly the same position are welded first. On by default: many formats
+    /// repeat vertices per face, and without welding every edge would be a border.
     pub weld: bool,
-    /// Whether edges, vertices and copies are counted as the mesh has them, and only self-intersections are sought with vertices at one
-    /// position welded. [`fix_mesh`](crate::fix_mesh) parts edges and vertices without moving them: welding everything would
-    /// join them again, and welding nothing would report that they touch. [`weld`](Self::weld) is then ignored.
+    /// Whether edges, vertices and copies are counted as the mesh has them, and only
+    /// self-intersections are sought with vertices at one position welded.
+    /// [`fix_mesh`](crate::fix_mesh) parts edges and vertices without moving them: welding
+    /// everything would join them again, and welding nothing would report that they touch.
+    /// [`weld`](Self::weld) is then ignored.
     pub keep_seams: bool,
-    /// The most [places](crate::Place) of each problem that are said, largest first; 3 by default. No count depends on it.
+    /// The most [places](crate::Place) of each problem that are said, largest first; 3 by default.
+    /// No count depends on it.
     pub places: usize,
     /// Whether places name all their elements, not only the first few.
     pub faces: bool,
@@ -67,7 +71,8 @@ pub fn check_mesh(mesh: Mesh, options: &Options) -> Result<Checked, Error> {
     Ok(check(mesh, options)?.0)
 }
 
-/// The check of a mesh, and the pairs that [`Counts::self_intersections`] counts; none if they are more than the search lists.
+/// The check of a mesh, and the pairs that [`Counts::self_intersections`] counts; none if they are
+/// more than the search lists.
 pub fn check_listed(mesh: Mesh, options: &Options) -> Result<(Checked, Vec<[u32; 2]>), Error> {
     let (checked, pairs) = check(mesh, options)?;
     let is_whole = pairs.len() as u64 == checked.counts.self_intersections;
@@ -93,8 +98,8 @@ fn check(mut mesh: Mesh, options: &Options) -> Result<(Checked, Vec<[u32; 2]>), 
         ..Counts::default()
     };
     let mut marks = vec![Marks::default(); mesh.n_primitives()];
-    // This comes first because it refuses indices out of range and coordinates that are not finite, on which the steps below
-    // rely.
+    // This comes first because it refuses indices out of range and coordinates that are not finite,
+    // on which the steps below rely.
     let (pairs, copies) = if options.keep_seams {
         let (pairs, _) = intersections(&welded(&mesh), options, &mut counts, &mut marks)?;
         (pairs, copies(&mesh))
@@ -164,8 +169,8 @@ fn duplicates(copies: &Copies, counts: &mut Counts, marks: &mut [Marks]) {
     }
 }
 
-/// Counts and marks pairs that share more points than their common vertices, edge or face. Returns the pairs that were found,
-/// sorted, and the primitives with the same vertices.
+/// Counts and marks pairs that share more points than their common vertices, edge or face. Returns
+/// the pairs that were found, sorted, and the primitives with the same vertices.
 fn intersections(
     mesh: &Mesh,
     options: &Options,
@@ -236,7 +241,8 @@ fn intersections(
     Ok((found, copies))
 }
 
-/// Counts and marks everything that depends on vertex indices alone. Returns the vertices of several fans, ascending.
+/// Counts and marks everything that depends on vertex indices alone. Returns the vertices of
+/// several fans, ascending.
 fn topology<const K: usize>(
     elements: &[[u32; K]],
     n_vertices: usize,
@@ -297,7 +303,8 @@ fn topology<const K: usize>(
     Ok(fans)
 }
 
-/// Two primitives with a common facet belong to one piece, and to one fan around each vertex of the facet.
+/// Two primitives with a common facet belong to one piece, and to one fan around each vertex of the
+/// facet.
 fn join_neighbours<const K: usize>(
     elements: &[[u32; K]],
     a: &Facet,
@@ -323,8 +330,8 @@ fn n_roots(sets: &mut UnionFind, counts: impl Fn(u32) -> bool) -> u64 {
     (0..n).filter(|&x| counts(x) && sets.root(x) == x).count() as u64
 }
 
-/// Counts vertices of no primitive, and vertices around which primitives form several fans. Returns how many vertices belong to
-/// primitives that name no vertex twice, and those of several fans.
+/// Counts vertices of no primitive, and vertices around which primitives form several fans. Returns
+/// how many vertices belong to primitives that name no vertex twice, and those of several fans.
 fn count_vertices<const K: usize>(
     elements: &[[u32; K]],
     n_vertices: usize,
@@ -385,7 +392,8 @@ fn degenerate<const K: usize>(
     }
 }
 
-/// A triangle has zero area if and only if all its projections onto the three coordinate planes have zero area.
+/// A triangle has zero area if and only if all its projections onto the three coordinate planes
+/// have zero area.
 pub fn is_flat_triangle([a, b, c]: &[Point; 3]) -> bool {
     [[0, 1], [1, 2], [2, 0]].iter().all(|&[u, v]| {
         let drop = |p: &Point| [p[u], p[v]];

@@ -1,8 +1,9 @@
 //! Primitives with the same vertices, and what pairs of a few of them say about all of them.
 //!
-//! Whether a pair of primitives counts depends on their vertices alone, not on the order in which they name them. So of
-//! primitives with the same vertices only two are tested: their pair speaks for every pair of them, and the first one's pairs with
-//! other primitives for those of all. A million equal triangles are 5 · 10^11 pairs, which no memory holds.
+//! Whether a pair of primitives counts depends on their vertices alone, not on the order in which
+//! they name them. So of primitives with the same vertices only two are tested: their pair speaks
+//! for every pair of them, and the first one's pairs with other primitives for those of all. A
+//! million equal triangles are 5 · 10^11 pairs, which no memory holds.
 
 use std::ops::Range;
 

@@ -1,8 +1,9 @@
 //! Facets: the edges of triangles, the faces of tetrahedra, and which primitives meet at each.
 //!
-//! All facets of all primitives are listed with their vertices in ascending order, and sorted, so that equal facets
-//! are neighbours. One counting pass sorts by the smallest vertex; only short runs remain to be sorted.
-//! Cost: linear in primitives for meshes whose vertices have few neighbours. Scratch: 20 bytes per facet, twice.
+//! All facets of all primitives are listed with their vertices in ascending order, and sorted, so
+//! that equal facets are neighbours. One counting pass sorts by the smallest vertex; only short
+//! runs remain to be sorted. Cost: linear in primitives for meshes whose vertices have few
+//! neighbours. Scratch: 20 bytes per facet, twice.
 
 /// One facet of one primitive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

@@ -12,7 +12,8 @@ pub fn check_file(path: &Path, options: &Options) -> Row {
     check_file_marked(path, options).0
 }
 
-/// Like [`check_file`], and also returns the mesh with the marks of its primitives if it could be checked.
+/// Like [`check_file`], and also returns the mesh with the marks of its primitives if it could be
+/// checked.
 pub fn check_file_marked(path: &Path, options: &Options) -> (Row, Option<Checked>) {
     let (result, places, checked) = match checked(path, options) {
         Ok(checked) => (Ok(checked.counts), checked.places.clone(), Some(checked)),

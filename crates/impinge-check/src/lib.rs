@@ -1,10 +1,12 @@
-//! Checks meshes for self-intersections, degenerate and duplicate primitives, non-manifold places, open
-//! borders and inconsistent orientation, and counts their pieces. Every count is exact: there is no tolerance anywhere.
+//! Checks meshes for self-intersections, degenerate and duplicate primitives, non-manifold places,
+//! open borders and inconsistent orientation, and counts their pieces. Every count is exact: there
+//! is no tolerance anywhere.
 //!
-//! [`check_mesh`] checks one mesh in memory, [`check_file`] one file. For a dataset of many files use
+//! [`check_mesh`] checks one mesh in memory, [`check_file`] one file. For a dataset of many files
+//! use
 //! [`Pool`]: each mesh is checked in a child process that may be killed, so that one bad file costs one row and
-//! not the run. [`RowStore`] keeps rows on disk, so that an interrupted run can continue where it stopped. [`fix_mesh`] mends what
-//! can be mended without moving a vertex.
+//! not the run. [`RowStore`] keeps rows on disk, so that an interrupted run can continue where it
+//! stopped. [`fix_mesh`] mends what can be mended without moving a vertex.
 //!
 //! ```
 //! use impinge_check::{Options, check_mesh};

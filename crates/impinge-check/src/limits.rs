@@ -3,13 +3,14 @@
 /// Limits of the process that checks a mesh.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Limits {
-    /// The most bytes of address space (`RLIMIT_AS`); `None` for no limit. If the limit is reached, the
-    /// process ends and its mesh gets a row of kind `memory`. Unix only; macOS accepts the limit and does not enforce it.
+    /// The most bytes of address space (`RLIMIT_AS`); `None` for no limit. If the limit is reached,
+    /// the process ends and its mesh gets a row of kind `memory`. Unix only; macOS accepts the
+    /// limit and does not enforce it.
     pub memory: Option<u64>,
 }
 
-/// Limits this process; a child calls it at its start. On Linux the process then also ends with its parent, so that a mesh that
-/// takes forever does not outlive the run.
+/// Limits this process; a child calls it at its start. On Linux the process then also ends with its
+/// parent, so that a mesh that takes forever does not outlive the run.
 ///
 /// # Errors
 /// The system refuses the limit, or does not support it.

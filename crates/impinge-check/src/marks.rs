@@ -1,6 +1,7 @@
 //! The problems of each primitive, for pictures.
 
-/// One kind of problem of a primitive, in the order in which pictures show them: the first that applies gives the colour.
+/// One kind of problem of a primitive, in the order in which pictures show them: the first that
+/// applies gives the colour.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Problem {
     /// Shares more points with another primitive than their common vertices, edge or face.

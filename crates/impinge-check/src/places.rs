@@ -10,20 +10,24 @@ use crate::union_find::UnionFind;
 /// Elements that a place names unless all are asked for.
 const NAMED: usize = 8;
 
-/// One place with a problem: elements that have it and hang together by common vertices, or a vertex of several fans.
+/// One place with a problem: elements that have it and hang together by common vertices, or a
+/// vertex of several fans.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Place {
     /// The problem.
     pub problem: Problem,
-    /// The vertex of several fans, numbered as in the checked mesh; then the elements are those around it.
+    /// The vertex of several fans, numbered as in the checked mesh; then the elements are those
+    /// around it.
     pub vertex: Option<u32>,
-    /// The middle of the element that is nearest to the middle of the place, or the vertex; rounded.
+    /// The middle of the element that is nearest to the middle of the place, or the vertex;
+    /// rounded.
     pub point: [f64; 3],
     /// The diagonal of the box around the elements, rounded.
     pub size: f64,
     /// How many elements there are.
     pub n_elements: u64,
-    /// Their numbers, ascending: the first few, or all if [`Options::faces`](crate::Options::faces) asks for them.
+    /// Their numbers, ascending: the first few, or all if [`Options::faces`](crate::Options::faces)
+    /// asks for them.
     pub elements: Vec<u32>,
 }
 
@@ -64,7 +68,8 @@ impl Place {
     }
 }
 
-/// The largest places of each problem, at most `most` of each. `fans`: the vertices of several fans.
+/// The largest places of each problem, at most `most` of each. `fans`: the vertices of several
+/// fans.
 pub fn places(
     mesh: &Mesh,
     marks: &[Marks],

@@ -1,8 +1,9 @@
 //! Many meshes, each checked in a child process.
 //!
-//! A child answers one mesh after the other ([`serve`](crate::serve)). A child that takes too long is killed. If a child
-//! ends by itself, its current mesh is tried once more in a child of its own, so that the row does not depend on
-//! the meshes that the first child checked before. A mesh that fails gets a row of kind `timeout`, `memory` or `crash`.
+//! A child answers one mesh after the other ([`serve`](crate::serve)). A child that takes too long
+//! is killed. If a child ends by itself, its current mesh is tried once more in a child of its own,
+//! so that the row does not depend on the meshes that the first child checked before. A mesh that
+//! fails gets a row of kind `timeout`, `memory` or `crash`.
 
 mod child;
 
@@ -20,7 +21,8 @@ use crate::row::{ErrorKind, Row};
 
 /// Checks meshes in child processes, several at a time.
 pub struct Pool<'a> {
-    /// The command of a child, which must call [`apply_limits`](crate::apply_limits) and [`serve`](crate::serve).
+    /// The command of a child, which must call [`apply_limits`](crate::apply_limits) and
+    /// [`serve`](crate::serve).
     pub command: &'a (dyn Fn() -> Command + Sync),
     /// How many children run at a time; at least 1.
     pub jobs: usize,
@@ -43,7 +45,8 @@ pub enum PoolError {
 }
 
 impl Pool<'_> {
-    /// Checks `paths` and passes each row, with the number of its path, to `done`, in the order in which they are finished.
+    /// Checks `paths` and passes each row, with the number of its path, to `done`, in the order in
+    /// which they are finished.
     ///
     /// # Errors
     /// A child that can't be started; cancellation. Rows passed before that are valid.

@@ -20,8 +20,9 @@ pub struct Counts {
     pub self_intersections: u64,
     /// Primitives in any such pair.
     pub n_intersecting: u64,
-    /// [`Pairs::hash`](impinge::Pairs::hash) of these pairs. `None` if they are more than 2^32, and many of them of primitives with
-    /// the same vertices: such pairs are counted without being listed.
+    /// [`Pairs::hash`](impinge::Pairs::hash) of these pairs. `None` if they are more than 2^32, and
+    /// many of them of primitives with the same vertices: such pairs are counted without being
+    /// listed.
     pub hash: Option<u64>,
     /// Primitives of exactly zero area, or volume.
     pub degenerate: u64,
@@ -43,10 +44,13 @@ pub struct Counts {
     pub unused_vertices: u64,
     /// Whether every edge belongs to exactly two triangles; `None` for tetrahedra.
     pub is_watertight: Option<bool>,
-    /// The volume that the triangles enclose, rounded once, negative if they are inside out. `None` unless they are watertight and of one
-    /// orientation, and if it is larger than any `f64`. Of a surface that intersects itself, each part of space counts as often as the surface winds around it.
+    /// The volume that the triangles enclose, rounded once, negative if they are inside out. `None`
+    /// unless they are watertight and of one orientation, and if it is larger than any `f64`. Of a
+    /// surface that intersects itself, each part of space counts as often as the surface winds
+    /// around it.
     pub volume: Option<f64>,
-    /// Euler's characteristic V - E + F of the triangles, without vertices of no triangle and triangles that name a vertex twice; `None` for tetrahedra.
+    /// Euler's characteristic V - E + F of the triangles, without vertices of no triangle and
+    /// triangles that name a vertex twice; `None` for tetrahedra.
     pub euler: Option<i64>,
 }
 
@@ -138,8 +142,9 @@ impl Row {
         }
     }
 
-    /// The row as an object. The keys are the same for every mesh. Counts that do not apply are `null`: all counts of a
-    /// mesh with an `error`, and the counts of edges of a mesh of tetrahedra, which has counts of faces instead.
+    /// The row as an object. The keys are the same for every mesh. Counts that do not apply are
+    /// `null`: all counts of a mesh with an `error`, and the counts of edges of a mesh of
+    /// tetrahedra, which has counts of faces instead.
     pub fn to_json(&self) -> Value {
         let counts = self.result.as_ref().ok();
         let number = |get: fn(&Counts) -> u64| counts.map(get);

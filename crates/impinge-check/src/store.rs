@@ -1,9 +1,10 @@
 //! Rows on disk, so that an interrupted run can continue where it stopped.
 //!
-//! The list of meshes is cut into batches of equal length. The rows of batch 12 are in `rows-00000012.jsonl`, one line per
-//! mesh, in the order of the list. A file is replaced as a whole by a rename, at most once per second while
-//! its batch is in progress, so it always holds complete lines only. Batch b belongs to the process whose rank is
-//! b modulo the number of processes, so no two processes write one file. `cat rows-*.jsonl` gives all rows.
+//! The list of meshes is cut into batches of equal length. The rows of batch 12 are in
+//! `rows-00000012.jsonl`, one line per mesh, in the order of the list. A file is replaced as a
+//! whole by a rename, at most once per second while its batch is in progress, so it always holds
+//! complete lines only. Batch b belongs to the process whose rank is b modulo the number of
+//! processes, so no two processes write one file. `cat rows-*.jsonl` gives all rows.
 
 use std::fs;
 use std::io::{self, Write};
@@ -75,11 +76,13 @@ struct Batch {
 }
 
 impl RowStore {
-    /// Opens or creates a folder for the rows of `paths`, the whole list of meshes. Takes the batches of process `rank` of
-    /// `world_size` and reads their existing rows. With `retry`, rows of kind `timeout`, `memory` and `crash` count as missing.
+    /// Opens or creates a folder for the rows of `paths`, the whole list of meshes. Takes the
+    /// batches of process `rank` of `world_size` and reads their existing rows. With `retry`, rows
+    /// of kind `timeout`, `memory` and `crash` count as missing.
     ///
     /// # Errors
-    /// A folder that can't be created or read; a file with a line that is not a row, or belongs to another run.
+    /// A folder that can't be created or read; a file with a line that is not a row, or belongs to
+    /// another run.
     pub fn open(
         folder: &Path,
         paths: &[PathBuf],
@@ -246,7 +249,8 @@ fn write_batch(folder: &Path, batch: &mut Batch) -> Result<(), StoreError> {
     Ok(())
 }
 
-/// Removes temporary files that a killed process left in this process's batches. No other process writes these batches.
+/// Removes temporary files that a killed process left in this process's batches. No other process
+/// writes these batches.
 fn remove_leftovers(folder: &Path, is_mine: impl Fn(usize) -> bool) -> io::Result<()> {
     for entry in fs::read_dir(folder)? {
         let entry = entry?;

@@ -31,7 +31,8 @@ impl UnionFind {
         }
     }
 
-    /// Joins two sets. The smaller root stays, so the result does not depend on the order of unions.
+    /// Joins two sets. The smaller root stays, so the result does not depend on the order of
+    /// unions.
     pub fn join(&mut self, a: u32, b: u32) {
         let (a, b) = (self.root(a), self.root(b));
         self.parents[a.max(b) as usize] = a.min(b);

@@ -1,7 +1,8 @@
 //! The signed volume of a closed surface: its sign, exactly, and its value, rounded once.
 //!
-//! Six times the volume is the sum of the determinants of all faces. A sum of floats with a bound of its error gives the
-//! sign of most meshes; where it cannot tell, and for the value, coordinates are integers over one power of two, and so is the sum.
+//! Six times the volume is the sum of the determinants of all faces. A sum of floats with a bound
+//! of its error gives the sign of most meshes; where it cannot tell, and for the value, coordinates
+//! are integers over one power of two, and so is the sum.
 
 use impinge::exact::internal::{Integer, unit_of};
 use impinge::exact::{Point, Sign};
@@ -11,7 +12,8 @@ const HALF_ULP: f64 = f64::EPSILON / 2.0;
 
 /// The exact sign of the volume that faces enclose: positive if their normals point outward.
 ///
-/// Of a surface that intersects itself, each part of space counts as often as the surface winds around it.
+/// Of a surface that intersects itself, each part of space counts as often as the surface winds
+/// around it.
 pub fn sign(faces: impl Iterator<Item = [Point; 3]> + Clone) -> Sign {
     let (mut sum, mut permanent, mut n) = (0.0f64, 0.0f64, 0.0f64);
     let mut largest = 0.0f64;
@@ -30,8 +32,9 @@ pub fn sign(faces: impl Iterator<Item = [Point; 3]> + Clone) -> Sign {
         }
         n += 3.0;
     }
-    // Each term has three roundings and takes part in at most n additions; the sums themselves round too. Products of coordinates
-    // in this range neither overflow nor lose more to underflow than the last term.
+    // Each term has three roundings and takes part in at most n additions; the sums themselves
+    // round too. Products of coordinates in this range neither overflow nor lose more to underflow
+    // than the last term.
     if largest < 1e100 && permanent < 1e300 {
         let bound = 2.0 * (n + 8.0) * HALF_ULP * permanent + n * 1e-200;
         if sum > bound {

@@ -8,7 +8,8 @@ use serde_json::Value;
 use crate::analysis::Options;
 use crate::file::check_file;
 
-/// Answers each line of `input`, a path as a JSON string, with the row of its mesh on a line of `output`, until the input ends.
+/// Answers each line of `input`, a path as a JSON string, with the row of its mesh on a line of
+/// `output`, until the input ends.
 ///
 /// # Errors
 /// A line that is not a JSON string; an error of input or output.

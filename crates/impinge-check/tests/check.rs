@@ -192,7 +192,8 @@ fn plainly(n_vertices: u32, faces: &[[u32; 3]]) -> [u64; 8] {
                 .push((ix, a < b));
         }
     }
-    /// Whether to count an edge, given the faces that use it, each with its direction along the edge.
+    /// Whether to count an edge, given the faces that use it, each with its direction along the
+    /// edge.
     type Pick = fn(&[(usize, bool)]) -> bool;
     let n = |pick: Pick| edges.values().filter(|users| pick(users)).count() as u64;
     let boundary = n(|users| users.len() == 1);
@@ -351,7 +352,8 @@ fn files_that_cannot_be_read_are_rows() {
     assert_eq!(missing.result.unwrap_err().kind, ErrorKind::File);
 }
 
-/// Corners on a lattice of so few points that most primitives have copies, with corners in another order.
+/// Corners on a lattice of so few points that most primitives have copies, with corners in another
+/// order.
 fn crowd<const K: usize>(seed: &mut u64, n: usize, n_vertices: u32) -> Vec<[u32; K]> {
     let mut below = |n: u32| {
         *seed = seed
@@ -485,7 +487,8 @@ fn volume_euler_and_watertightness_of_known_surfaces() {
 
 #[test]
 fn places_are_where_the_problems_are() {
-    // Two tetrahedra far apart; a needle through a face of each, a hole in the second, and both touch a third one's vertex.
+    // Two tetrahedra far apart; a needle through a face of each, a hole in the second, and both
+    // touch a third one's vertex.
     let (mut positions, mut faces) = tetrahedron(0.0);
     let (far, more) = tetrahedron(100.0);
     positions.extend(far);

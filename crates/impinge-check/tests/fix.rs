@@ -1,4 +1,5 @@
-//! What `fix_mesh` writes, a check confirms: every defect by itself, all of them together, and vertices that keep their bits.
+//! What `fix_mesh` writes, a check confirms: every defect by itself, all of them together, and
+//! vertices that keep their bits.
 
 use std::collections::HashSet;
 
@@ -182,8 +183,8 @@ fn copies_go_and_the_first_stays() {
     assert_eq!(fixed.mesh, whole);
 }
 
-/// A tetrahedron with further vertices on one edge: one face is a fan of flat ones and a face of the whole edge, the other face
-/// has the vertices.
+/// A tetrahedron with further vertices on one edge: one face is a fan of flat ones and a face of
+/// the whole edge, the other face has the vertices.
 fn with_flat_faces(on_edge: &[f64], order: bool) -> Mesh {
     let mut points = vec![
         [0.0, 0.0, 0.0],
@@ -274,7 +275,8 @@ fn shells_are_turned_by_what_is_inside_what() {
         let n_wrong = u64::from((mask ^ 2u32).count_ones());
         assert_eq!(fixed.repairs.turned_shells, n_wrong, "{mask}");
     }
-    // Boxes that pass through each other contain nothing of each other, and touching a wall from inside is inside.
+    // Boxes that pass through each other contain nothing of each other, and touching a wall from
+    // inside is inside.
     let crossing = together(&[cube([0.0; 3], 2.0), turned(&cube([1.0; 3], 2.0), |_| true)]);
     let fixed = fix(&crossing, 0);
     assert_eq!(
@@ -293,7 +295,8 @@ fn shells_are_turned_by_what_is_inside_what() {
 
 #[test]
 fn boxes_that_share_an_edge_or_a_vertex_come_apart() {
-    // Around an edge, two to four boxes touch; of three or four, neighbours share walls, which then are there twice.
+    // Around an edge, two to four boxes touch; of three or four, neighbours share walls, which then
+    // are there twice.
     let sharing = |lows: &[[f64; 3]]| {
         let parts: Vec<Mesh> = lows.iter().map(|&low| cube(low, 1.0)).collect();
         together(&parts)
@@ -472,7 +475,8 @@ fn refusals_name_numbers() {
     );
 }
 
-/// Faces at random on few places: every defect at once, surfaces that come back to an edge, Möbius strips, needles, copies.
+/// Faces at random on few places: every defect at once, surfaces that come back to an edge, Möbius
+/// strips, needles, copies.
 #[test]
 fn random_soups_come_out_as_promised_and_stay_so() {
     let mut generator = Random::new(7);

@@ -1,4 +1,5 @@
-//! Children that hang, die, run out of memory or print nonsense: each affects only the row of its mesh.
+//! Children that hang, die, run out of memory or print nonsense: each affects only the row of its
+//! mesh.
 //!
 //! The children here are shell scripts that use the protocol of `serve`.
 #![cfg(unix)]

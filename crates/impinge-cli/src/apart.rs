@@ -15,8 +15,8 @@ impl Inputs {
         Inputs(paths.into_iter().filter_map(known).collect())
     }
 
-    /// Fails if an output is one of the inputs, under any name or link. Outputs contain less than a mesh file may contain
-    /// (normals, colours, attributes, groups), and the input would be lost.
+    /// Fails if an output is one of the inputs, under any name or link. Outputs contain less than a
+    /// mesh file may contain (normals, colours, attributes, groups), and the input would be lost.
     pub fn check(&self, option: &str, output: &Path) -> Result<(), Error> {
         let Some(output_id) = Id::of(output) else {
             return Ok(());

@@ -79,10 +79,12 @@ pub enum Command {
     /// Find the smallest distance between two meshes, and where it is
     #[command(after_help = DISTANCE_EXAMPLES)]
     Distance(DistanceArgs),
-    /// Find the elements that are within a distance of each other, and which of their features are nearest
+    /// Find the elements that are within a distance of each other, and which of their features are
+    /// nearest
     #[command(after_help = near::NEAR_EXAMPLES)]
     Near(NearArgs),
-    /// Find the element of a mesh that is nearest to each of many points, and which of them are inside
+    /// Find the element of a mesh that is nearest to each of many points, and which of them are
+    /// inside
     #[command(
         after_help = probe::PROBE_EXAMPLES,
         mut_arg("rows", |rows| rows.help("Write a row per point that is near enough (.csv, .jsonl or .npy; \"-\" is standard output)"))
@@ -272,7 +274,8 @@ pub struct ReadArgs {
     /// Weld vertices at the same position, within each file; this is the default
     #[arg(long, overrides_with = "no_weld")]
     weld: bool,
-    /// Do not weld vertices at the same position, except in STL files, where triangles share nothing else
+    /// Do not weld vertices at the same position, except in STL files, where triangles share
+    /// nothing else
     #[arg(long, overrides_with = "weld")]
     no_weld: bool,
     /// The format of a mesh on standard input, which is named "-": ply, off, stl, …
@@ -302,7 +305,8 @@ pub struct AskArgs {
     pub shared_vertex: SharedVertexArg,
     #[command(flatten)]
     pub read: ReadArgs,
-    /// Leave out the pairs of bodies A and B, numbered from 0 as given (A,A: the self-collision of A)
+    /// Leave out the pairs of bodies A and B, numbered from 0 as given (A,A: the self-collision of
+    /// A)
     #[arg(long, value_name = "A,B", value_parser = body_numbers, alias = "ignore")]
     pub exclude: Vec<(usize, usize)>,
     /// End with exit code 3 if anything is found
@@ -325,7 +329,8 @@ pub struct AnswerArgs {
     /// Only say whether there is any pair, and stop at the first one
     #[arg(long)]
     pub any: bool,
-    /// Run N frames, rewriting positions before each, and show median times; with N above 1, the method auto is clusters
+    /// Run N frames, rewriting positions before each, and show median times; with N above 1, the
+    /// method auto is clusters
     #[arg(long, value_name = "N", default_value = "1", value_parser = at_least_one)]
     pub repeat: NonZeroUsize,
     #[command(flatten)]
@@ -446,13 +451,15 @@ pub struct SequenceArgs {
     pub frames: FrameRange,
     #[command(flatten)]
     pub rows: RowsArgs,
-    /// Write the meshes of each frame with colliding elements coloured (seen_%04d.ply, .glb or .vtu)
+    /// Write the meshes of each frame with colliding elements coloured (seen_%04d.ply, .glb or
+    /// .vtu)
     #[arg(long, value_name = "FILE")]
     pub out: Option<FramesFile<MeshFile>>,
     /// Draw each frame (seen_%04d.png)
     #[arg(long, value_name = "FILE")]
     pub png: Option<FramesFile<PngFile>>,
-    /// Find what touches on the way from each frame to the next, and when first; vertices move on straight lines
+    /// Find what touches on the way from each frame to the next, and when first; vertices move on
+    /// straight lines
     #[arg(long, conflicts_with_all = ["out", "png"])]
     pub ccd: bool,
     #[command(flatten)]

@@ -53,9 +53,9 @@ fn backend(args: &DetectorArgs) -> Backend {
     }
 }
 
-/// Whether this machine may have a hardware GPU. Searching for one loads every driver, and some software drivers then write to
-/// standard error. On Linux a GPU has a file in `/dev`, made by the kernel's graphics drivers, by NVIDIA's driver, by WSL
-/// or by a phone's driver.
+/// Whether this machine may have a hardware GPU. Searching for one loads every driver, and some
+/// software drivers then write to standard error. On Linux a GPU has a file in `/dev`, made by the
+/// kernel's graphics drivers, by NVIDIA's driver, by WSL or by a phone's driver.
 pub fn may_have_gpu() -> bool {
     if !cfg!(target_os = "linux") {
         return true;
@@ -112,8 +112,8 @@ pub fn hit(fail_on_hit: bool, is_found: bool) -> Result<(), Error> {
     }
 }
 
-/// Runs the same frame `n_frames` times. All positions are rewritten before each run, so that no result
-/// of the frame before can be reused.
+/// Runs the same frame `n_frames` times. All positions are rewritten before each run, so that no
+/// result of the frame before can be reused.
 pub fn repeat(
     detector: &mut Detector,
     scene: &mut Scene,

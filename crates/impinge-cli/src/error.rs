@@ -131,9 +131,9 @@ impl Error {
         )
     }
 
-    /// 128 plus the signal's number if a signal ended the program, 2 for bad usage, 3 for `--fail-on-hit` and `--fail-on`, 4 if the start of a step
-    /// already intersects, 0 if the reader of
-    /// standard output has closed it (it has what it wanted), else 1.
+    /// 128 plus the signal's number if a signal ended the program, 2 for bad usage, 3 for
+    /// `--fail-on-hit` and `--fail-on`, 4 if the start of a step already intersects, 0 if the
+    /// reader of standard output has closed it (it has what it wanted), else 1.
     pub fn exit_code(&self) -> u8 {
         match self {
             error if error.is_cancelled() => stop::exit_code().unwrap_or(1),
@@ -152,7 +152,8 @@ impl Error {
         matches!(self, Error::Hit | Error::StartIntersects) || self.exit_code() == 0
     }
 
-    /// The message on one line. Names of files are escaped in it; what a driver says may have several lines.
+    /// The message on one line. Names of files are escaped in it; what a driver says may have
+    /// several lines.
     pub fn line(&self) -> String {
         let text = self.to_string();
         let lines: Vec<&str> = text

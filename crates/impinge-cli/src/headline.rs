@@ -13,8 +13,8 @@ use crate::text::{counted, grouped};
 /// The most lines of places, and of bodies; the rest is only counted.
 const MOST_LINES: usize = 8;
 
-/// Writes the answer: `cow.off: 83 pairs of 5,804 triangles in 3 places, near (0.1, 0.2, 0.3)`. For several bodies, the
-/// first line is the total, and one line per two bodies that meet follows.
+/// Writes the answer: `cow.off: 83 pairs of 5,804 triangles in 3 places, near (0.1, 0.2, 0.3)`. For
+/// several bodies, the first line is the total, and one line per two bodies that meet follows.
 pub fn write(
     to: &mut impl Write,
     (scene, nouns): (&Scene, &Nouns),

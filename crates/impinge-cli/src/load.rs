@@ -25,7 +25,8 @@ pub struct Bodies {
     pub names: Vec<String>,
     pub vertices: Vec<Vertices>,
     pub nouns: Nouns,
-    /// Files that could not be read: the number of the body, and why. Such a body has no primitives.
+    /// Files that could not be read: the number of the body, and why. Such a body has no
+    /// primitives.
     pub unread: Vec<(usize, String)>,
 }
 
@@ -55,7 +56,8 @@ pub struct Vertices {
     pub welds: bool,
     /// How many were welded to another one.
     pub n_welded: usize,
-    /// How many are at the position of another one, but not welded to it; `None` if this was not counted.
+    /// How many are at the position of another one, but not welded to it; `None` if this was not
+    /// counted.
     pub n_coincident: Option<usize>,
 }
 
@@ -98,7 +100,8 @@ impl<'a> Loading<'a> {
         }
     }
 
-    /// What the parts of a file of this format are called, if they are to be bodies. There are `n` files.
+    /// What the parts of a file of this format are called, if they are to be bodies. There are `n`
+    /// files.
     fn parts(&self, format: Format, n: usize) -> Option<[&'static str; 2]> {
         let (kind, nouns) = match format {
             Format::Gltf => (BodiesArg::Nodes, ["node", "nodes"]),
@@ -126,8 +129,8 @@ impl<'a> Loading<'a> {
         }
     }
 
-    /// Files of which it may be asked where a body meets itself, with what the user tells of vertices at one position and
-    /// of standard input.
+    /// Files of which it may be asked where a body meets itself, with what the user tells of
+    /// vertices at one position and of standard input.
     pub fn asked(self, weld: Option<bool>, is_self: bool, format: Option<Format>) -> Self {
         Loading {
             weld,
@@ -152,8 +155,8 @@ impl Bodies {
         Bodies::read_all(paths, loading, false)
     }
 
-    /// Like [`read`](Self::read), but a file that can't be read becomes a body without primitives, so that all others
-    /// keep their numbers. Fails if no file can be read.
+    /// Like [`read`](Self::read), but a file that can't be read becomes a body without primitives,
+    /// so that all others keep their numbers. Fails if no file can be read.
     pub fn read_readable(paths: &[PathBuf], loading: Loading<'_>) -> Result<Self, Error> {
         Bodies::read_all(paths, loading, paths.len() > 1)
     }
@@ -238,8 +241,8 @@ impl Bodies {
         added.ok_or_else(|| Error::Usage(format!("{name}: no mesh")))
     }
 
-    /// Reads a file as one more body per part; returns the name of the file. The names of bodies begin with it if there are
-    /// `several` files.
+    /// Reads a file as one more body per part; returns the name of the file. The names of bodies
+    /// begin with it if there are `several` files.
     fn add_parts(
         &mut self,
         path: &Path,

@@ -71,8 +71,9 @@ fn main() -> ExitCode {
     }
 }
 
-/// Without a desktop session, a Vulkan layer of Mesa complains on standard error that it finds no display
-/// by which to choose a GPU. The program chooses the GPU itself, so the layer is switched off.
+/// Without a desktop session, a Vulkan layer of Mesa complains on standard error that it finds no
+/// display by which to choose a GPU. The program chooses the GPU itself, so the layer is switched
+/// off.
 #[cfg(all(feature = "gpu", target_os = "linux"))]
 fn keep_mesa_quiet() {
     if std::env::var_os("XDG_RUNTIME_DIR").is_none() {

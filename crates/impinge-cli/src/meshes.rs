@@ -49,8 +49,8 @@ pub fn from_positions(positions: &Positions) -> impinge_io::Positions {
     }
 }
 
-/// Converts elements of the library to those of mesh files. Mesh files hold only triangles and tetrahedra, so an edge or a point
-/// becomes a degenerate triangle.
+/// Converts elements of the library to those of mesh files. Mesh files hold only triangles and
+/// tetrahedra, so an edge or a point becomes a degenerate triangle.
 pub fn from_elements(elements: &Elements) -> impinge_io::Elements {
     match elements {
         Elements::Triangles(faces) => impinge_io::Elements::Triangles(faces.clone()),

@@ -26,7 +26,8 @@ pub fn say(text: &[u8], rows: Option<&RowsFile>) -> Result<(), Error> {
     Ok(out().write_all(text)?)
 }
 
-/// How an answer was found, in one line: `clusters on cpu, 2 threads; 10 candidates, 0 unsure; 0.365 ms`.
+/// How an answer was found, in one line:
+/// `clusters on cpu, 2 threads; 10 candidates, 0 unsure; 0.365 ms`.
 pub fn how(stats: &Stats, times: &Times) -> String {
     let of = match times.n_frames() {
         1 => String::new(),

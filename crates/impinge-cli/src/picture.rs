@@ -25,9 +25,9 @@ pub struct Drawer<'a> {
 }
 
 impl<'a> Drawer<'a> {
-    /// Opens the adapter whose name contains `device`; without a name, a GPU if there may be one. Pictures are drawn on the CPU
-    /// rather than by a software driver: that is faster, and needs no driver. Contacts are found on so many threads; 0 for one
-    /// per core.
+    /// Opens the adapter whose name contains `device`; without a name, a GPU if there may be one.
+    /// Pictures are drawn on the CPU rather than by a software driver: that is faster, and needs no
+    /// driver. Contacts are found on so many threads; 0 for one per core.
     pub fn new(args: &'a PictureArgs, device: Option<&str>, threads: usize) -> Result<Self, Error> {
         #[cfg(not(feature = "gpu"))]
         if device.is_some() {

@@ -53,8 +53,8 @@ mod tests {
 
     use super::*;
 
-    /// A horizontal sheet of two triangles without shared vertices. Two upright triangles pierce it far apart; so does
-    /// a third triangle of another body.
+    /// A horizontal sheet of two triangles without shared vertices. Two upright triangles pierce it
+    /// far apart; so does a third triangle of another body.
     #[test]
     fn pairs_that_hang_together_are_one_region() {
         let sheet = [[0u32, 1, 2], [3, 4, 5]];

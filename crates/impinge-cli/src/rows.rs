@@ -1,4 +1,5 @@
-//! Files of rows: one writer for all answers. A file exists whole or not at all; "-" is standard output.
+//! Files of rows: one writer for all answers. A file exists whole or not at all; "-" is standard
+//! output.
 
 use std::io::{BufWriter, Write};
 use std::path::PathBuf;

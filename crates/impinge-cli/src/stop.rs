@@ -1,8 +1,8 @@
 //! Ctrl-C and requests to terminate.
 //!
-//! The first request cancels a token that every detection watches. Some long operations can't watch it (reading a file, a
-//! driver's compiler, a pipe that nobody reads). So if the program has not ended within [`GRACE`], a thread ends it.
-//! A second request ends it at once.
+//! The first request cancels a token that every detection watches. Some long operations can't watch
+//! it (reading a file, a driver's compiler, a pipe that nobody reads). So if the program has not
+//! ended within [`GRACE`], a thread ends it. A second request ends it at once.
 
 use std::io::{Write, stderr};
 use std::sync::atomic::{AtomicBool, AtomicU8, AtomicUsize, Ordering};
@@ -14,7 +14,8 @@ use impinge::CancelToken;
 /// How long the program may take to end by itself.
 const GRACE: Duration = Duration::from_millis(600);
 
-/// The exit code for the first request: 128 plus the number of the signal, as in shells; 0 while there is no request.
+/// The exit code for the first request: 128 plus the number of the signal, as in shells; 0 while
+/// there is no request.
 static CODE: AtomicU8 = AtomicU8::new(0);
 
 /// The number of running parts that must finish before the program may be ended.
@@ -32,7 +33,8 @@ pub fn exit_code() -> Option<u8> {
     Some(CODE.load(Ordering::Acquire)).filter(|&code| code > 0)
 }
 
-/// While this is held, the first request waits, so that results can be saved. The second request does not wait.
+/// While this is held, the first request waits, so that results can be saved. The second request
+/// does not wait.
 pub struct Patience;
 
 impl Patience {
@@ -80,7 +82,8 @@ fn listen(token: CancelToken) -> std::io::Result<()> {
 #[cfg(unix)]
 fn is_ignored(signal: i32) -> bool {
     let mut action = std::mem::MaybeUninit::<libc::sigaction>::zeroed();
-    // SAFETY: no action is set, and the present one is written to memory of its size; all zeros are a valid value of it.
+    // SAFETY: no action is set, and the present one is written to memory of its size; all zeros are
+    // a valid value of it.
     let action = unsafe {
         libc::sigaction(signal, std::ptr::null(), action.as_mut_ptr());
         action.assume_init()
@@ -120,7 +123,8 @@ fn asked(token: &CancelToken, code: u8) {
 fn end(code: u8) -> ! {
     impinge_io::remove_temporary_files();
     say("cancelled");
-    // Exit handlers of drivers or libraries might wait for threads that are still working, so they are not run.
+    // Exit handlers of drivers or libraries might wait for threads that are still working, so they
+    // are not run.
     #[cfg(unix)]
     // SAFETY: ends the process at once; no more of its code runs.
     unsafe {

@@ -164,7 +164,8 @@ impl FromStr for ReachedFile {
     }
 }
 
-/// Files for the frames of a sequence: a name in which `%d` or `%04d` stands for the number of the frame.
+/// Files for the frames of a sequence: a name in which `%d` or `%04d` stands for the number of the
+/// frame.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FramesFile<T> {
     before: String,

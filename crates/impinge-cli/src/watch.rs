@@ -31,8 +31,8 @@ impl Watch {
         Watch::new(wanted, 0, "{msg} {wide_bar} {percent:>3} % {eta:>4}", what)
     }
 
-    /// Watches `n_frames` frames through [`frame_done`](Watch::frame_done). No bar is shown if the frames
-    /// themselves are printed on the terminal (`prints_frames`).
+    /// Watches `n_frames` frames through [`frame_done`](Watch::frame_done). No bar is shown if the
+    /// frames themselves are printed on the terminal (`prints_frames`).
     pub fn frames(wanted: bool, n_frames: usize, prints_frames: bool) -> Self {
         let wanted = wanted && !(prints_frames && stdout().is_terminal());
         Watch::new(
@@ -43,8 +43,8 @@ impl Watch {
         )
     }
 
-    /// Watches `n` items through [`frame_done`](Watch::frame_done). No bar is shown if rows are printed on
-    /// the terminal (`prints_rows`).
+    /// Watches `n` items through [`frame_done`](Watch::frame_done). No bar is shown if rows are
+    /// printed on the terminal (`prints_rows`).
     pub fn things(wanted: bool, n: usize, what: &'static str, prints_rows: bool) -> Self {
         let wanted = wanted && !(prints_rows && stdout().is_terminal());
         let template = "{msg} {wide_bar} {pos}/{len} {eta:>4}";

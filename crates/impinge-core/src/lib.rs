@@ -1,8 +1,9 @@
 //! The engine of `impinge`: all its internals, public but without a promise of stability.
 //!
 //! Users of the library depend on the crate `impinge`, which re-exports the stable part. Methods in
-//! other crates, such as the baselines that impinge is compared with, are built on this crate. They share its
-//! frame, boxes, grid, threads, exact test and GPU engine, so that only the method differs.
+//! other crates, such as the baselines that impinge is compared with, are built on this crate. They
+//! share its frame, boxes, grid, threads, exact test and GPU engine, so that only the method
+//! differs.
 
 mod answers;
 mod boxes;

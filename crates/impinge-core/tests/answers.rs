@@ -1,6 +1,7 @@
 //! What grows with the answer: limits, counts, and memory that is not there.
 //!
-//! All tests of this file share one allocator, which counts and may refuse; so they run one at a time.
+//! All tests of this file share one allocator, which counts and may refuse; so they run one at a
+//! time.
 
 mod common;
 
@@ -20,7 +21,8 @@ struct Limited;
 static HELD: AtomicUsize = AtomicUsize::new(0);
 static PEAK: AtomicUsize = AtomicUsize::new(0);
 static LIMIT: AtomicUsize = AtomicUsize::new(usize::MAX);
-/// Smaller requests are always granted, as they mostly are where a process has used up its address space.
+/// Smaller requests are always granted, as they mostly are where a process has used up its address
+/// space.
 const SMALL: usize = 1 << 14;
 
 fn add(size: usize) -> bool {
@@ -105,8 +107,8 @@ fn detector_on_one_thread() -> Detector {
 
 const METHODS: [Method; 3] = [Method::Clusters, Method::Cells, Method::Naive];
 
-/// A body of `n` triangles, turned around one axis that passes through all of them: they share no vertex, and each meets
-/// each.
+/// A body of `n` triangles, turned around one axis that passes through all of them: they share no
+/// vertex, and each meets each.
 fn pile(n: u32) -> (Scene, BodyId) {
     let faces: Vec<[u32; 3]> = (0..n).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]).collect();
     let positions: Vec<[f32; 3]> = (0..n)
@@ -128,7 +130,8 @@ fn n_pairs_of_pile(n: u32) -> u64 {
     u64::from(n) * u64::from(n - 1) / 2
 }
 
-/// Two bodies of points on one spot, one of which moves away: `n` times `n` impacts of two vertices.
+/// Two bodies of points on one spot, one of which moves away: `n` times `n` impacts of two
+/// vertices.
 fn swarm(n: usize) -> Scene {
     let mut scene = Scene::new();
     scene.add_points(&vec![[0.0f32; 3]; n]).unwrap();

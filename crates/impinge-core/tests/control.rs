@@ -1,5 +1,6 @@
-//! Every question of the detector: on one thread, in a forked process, stopped by a token, with too little memory; and its
-//! statistics. A public method of the detector that is neither asked here nor named as no question fails the test.
+//! Every question of the detector: on one thread, in a forked process, stopped by a token, with too
+//! little memory; and its statistics. A public method of the detector that is neither asked here
+//! nor named as no question fails the test.
 //!
 //! The threads of this process are counted, so this file holds one test alone.
 
@@ -370,8 +371,9 @@ fn in_fork(mut work: impl FnMut() -> bool) {
         });
     };
     let mut command = Command::new("/bin/false");
-    // SAFETY: not much: a fork of a process with threads may only call what is safe in a signal handler, and this allocates
-    // and starts threads. That is what Python's multiprocessing does, and what is tested.
+    // SAFETY: not much: a fork of a process with threads may only call what is safe in a signal
+    // handler, and this allocates and starts threads. That is what Python's multiprocessing does,
+    // and what is tested.
     unsafe { command.pre_exec(erase(code)) };
     let status = command.spawn().and_then(|mut child| child.wait());
     assert_eq!(
@@ -381,7 +383,8 @@ fn in_fork(mut work: impl FnMut() -> bool) {
     );
 }
 
-/// Lets a closure live as long as the command wishes. It is dropped before what it borrows: `in_fork` ends after the child.
+/// Lets a closure live as long as the command wishes. It is dropped before what it borrows:
+/// `in_fork` ends after the child.
 fn erase<'a>(
     code: impl FnMut() -> std::io::Result<()> + 'a,
 ) -> impl FnMut() -> std::io::Result<()> + Send + Sync + 'static {

@@ -1,4 +1,5 @@
-//! Triangles around a vertex, under `SharedVertex::Resolve`: where the vertex says that none of them meet, none do.
+//! Triangles around a vertex, under `SharedVertex::Resolve`: where the vertex says that none of
+//! them meet, none do.
 
 mod common;
 

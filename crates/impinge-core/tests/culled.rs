@@ -1,4 +1,5 @@
-//! Clusters that are proven culled are left out of a frame. Whatever moves and whatever the query, no pair may be lost.
+//! Clusters that are proven culled are left out of a frame. Whatever moves and whatever the query,
+//! no pair may be lost.
 
 mod common;
 
@@ -341,7 +342,8 @@ fn bodies_that_come_to_touch_meet() {
     let a = sheet.add_to(&mut scene).unwrap();
     let b = sheet.add_to(&mut scene).unwrap();
     let (low, high) = sheet.bounds().unwrap();
-    // Along each axis in which the sheet has an extent, from either side: first beside it, then edge to edge.
+    // Along each axis in which the sheet has an extent, from either side: first beside it, then
+    // edge to edge.
     for axis in [0, 1, 2].into_iter().filter(|&axis| low[axis] < high[axis]) {
         for width in [low[axis] - high[axis], high[axis] - low[axis]] {
             let mut contest = Contest::new();
@@ -362,7 +364,8 @@ fn bodies_that_come_to_touch_meet() {
     }
 }
 
-/// A model whose vertices are numbered along x, so that each run of vertices covers only part of its extent.
+/// A model whose vertices are numbered along x, so that each run of vertices covers only part of
+/// its extent.
 fn from_low_to_high(model: Model) -> Model {
     let mut order: Vec<u32> = (0..model.positions.len() as u32).collect();
     let x = |vertex: u32| model.positions[vertex as usize][0];
@@ -444,7 +447,8 @@ fn detectors_with_a_past_answer_as_new_ones() {
         }
         assert!(contest.has_left_out());
     };
-    // A clone of the scene whose positions have changed since, while the saved clone kept its stamps.
+    // A clone of the scene whose positions have changed since, while the saved clone kept its
+    // stamps.
     let mut one = scene.clone();
     decide(&mut contest, &mut one);
     let saved = one.clone();

@@ -39,8 +39,8 @@ fn alone(model: &Model, primitive: usize) -> Model {
     }
 }
 
-/// The search finds the same as comparing all pairs one by one: the same distance to the last bit, and the
-/// lowest pair that has it.
+/// The search finds the same as comparing all pairs one by one: the same distance to the last bit,
+/// and the lowest pair that has it.
 #[test]
 fn the_search_loses_nothing() {
     let far = [2.0, 0.3, 0.1];
@@ -78,7 +78,8 @@ fn the_search_loses_nothing() {
     }
 }
 
-/// Bodies of any size: the distance scales with them, and is never 0 between bodies that do not meet.
+/// Bodies of any size: the distance scales with them, and is never 0 between bodies that do not
+/// meet.
 #[test]
 fn distances_of_numbers_of_any_size() {
     let of = |a: &Model, b: &Model, exponents: [i32; 3]| {
@@ -147,12 +148,13 @@ fn boxes(model: &Model) -> Vec<[[f32; 3]; 2]> {
         .collect()
 }
 
-/// The same of bodies of many clusters that face each other askew, so that most are discarded along the shortest way. All pairs
-/// are compared whose boxes are not farther apart than the answer.
+/// The same of bodies of many clusters that face each other askew, so that most are discarded along
+/// the shortest way. All pairs are compared whose boxes are not farther apart than the answer.
 #[test]
 fn the_search_through_many_clusters_loses_nothing() {
     let wall = surfaces::cloth(12, 12, 0.125);
-    // The same wall farther away, askew: equal numbers in all rows, so many pairs are at the same distance.
+    // The same wall farther away, askew: equal numbers in all rows, so many pairs are at the same
+    // distance.
     let askew = |model: &Model, by: f32| Model {
         positions: model
             .positions
@@ -253,7 +255,8 @@ fn is_on(point: [f64; 3], scene: &Scene, elements: [(BodyId, u32); 2]) -> bool {
     })
 }
 
-/// The distance is zero if and only if the detector finds a pair; the pair is then one of the detector's.
+/// The distance is zero if and only if the detector finds a pair; the pair is then one of the
+/// detector's.
 #[test]
 fn zero_means_that_they_touch() {
     let a = surfaces::bumpy_ball(1_500, 0.2);
@@ -314,7 +317,8 @@ fn bodies_without_primitives_and_wrong_questions() {
     assert!(distances.distance(&scene, ball, empty).is_err());
 }
 
-/// A detector that has answered before says the same as one that has not, whatever has happened to the scene meanwhile.
+/// A detector that has answered before says the same as one that has not, whatever has happened to
+/// the scene meanwhile.
 #[test]
 fn earlier_calls_change_nothing() {
     let ball = surfaces::bumpy_ball(3_000, 0.2);
@@ -374,8 +378,8 @@ fn far_from_the_origin_in_double_precision() {
     );
 }
 
-/// Bodies that touch have the lowest pair that does, by the first body's primitives and then by the second's, whichever body was added
-/// first and however many threads search.
+/// Bodies that touch have the lowest pair that does, by the first body's primitives and then by the
+/// second's, whichever body was added first and however many threads search.
 #[test]
 fn touching_bodies_have_their_lowest_pair() {
     let parts = adversarial::machine_parts(6_000).unwrap();

@@ -1,5 +1,5 @@
-//! Pinned answers: the same hash for every method and for 1 to 16 threads, on every machine. The scene's coordinates
-//! come from integers and sums alone, so they have the same bits everywhere.
+//! Pinned answers: the same hash for every method and for 1 to 16 threads, on every machine. The
+//! scene's coordinates come from integers and sums alone, so they have the same bits everywhere.
 
 use impinge_core::{Backend, Detector, Method, Query, Scene, Settings, SharedVertex};
 use impinge_scenes::soup;
@@ -56,7 +56,8 @@ fn is_the_same_for_1_to_16_threads(name: &str) {
                 ..Settings::default()
             })
             .unwrap();
-            // The second frame finds caches filled and helpers awake; positions are written again before it.
+            // The second frame finds caches filled and helpers awake; positions are written again
+            // before it.
             for frame in 0..2 {
                 let pairs = detector.detect(&scene, &query).unwrap();
                 assert_eq!(

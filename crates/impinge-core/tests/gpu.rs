@@ -68,8 +68,8 @@ fn cells_agree_with_the_oracle() {
     }
 }
 
-/// The buffers of one scene are reused for the next, which may need larger or smaller ones, and other
-/// kernels.
+/// The buffers of one scene are reused for the next, which may need larger or smaller ones, and
+/// other kernels.
 #[test]
 fn one_detector_answers_scene_after_scene() {
     let cases = cases();
@@ -173,8 +173,8 @@ fn a_crowded_cell_keeps_to_the_budget_or_is_left_to_clusters() {
     }
 }
 
-/// Whether the device holds no more than the budget, beside an answer on the host that takes at most twice the bytes of
-/// its pairs.
+/// Whether the device holds no more than the budget, beside an answer on the host that takes at
+/// most twice the bytes of its pairs.
 fn is_kept(budget: Option<u64>, stats: &Stats, n_pairs: usize) -> bool {
     let answer = 2 * size_of::<u64>() as u64 * n_pairs as u64;
     budget.is_none_or(|budget| stats.bytes_held <= budget + answer)
@@ -238,7 +238,8 @@ fn buffers_that_overflow_grow_and_nothing_is_lost() {
                 let pairs = detector.detect(&case.scene, &case.query).unwrap();
                 pairs.stats().n_reruns
             };
-            // A grown buffer stays grown. The first frame had to grow it, if the method has this stage.
+            // A grown buffer stays grown. The first frame had to grow it, if the method has this
+            // stage.
             assert_eq!(reruns(&mut detector), 0, "{method:?} {stage}");
             let mut again = Detector::with_capacities(settings.clone(), capacities).unwrap();
             let is_there = match stage {
@@ -399,7 +400,8 @@ fn pieces_keep_to_filters_ignored_pairs_and_frames() {
         scene.set_positions(a, &moved.positions).unwrap();
     }
     assert!(sizes.len() > 6, "{sizes:?}");
-    // A scene that fits is again answered in one piece, and one that does not is again answered in several.
+    // A scene that fits is again answered in one piece, and one that does not is again answered in
+    // several.
     let small = cases().swap_remove(4);
     let expected = naive(&small);
     for detector in &mut detectors {
@@ -444,7 +446,8 @@ fn few_pairs_are_left_to_exact_arithmetic() {
     assert!(!stats.backend.is_empty() && stats.backend != "cpu");
 }
 
-/// Triangles over a few vertices: nearly all share one vertex with many others, and some share two or three.
+/// Triangles over a few vertices: nearly all share one vertex with many others, and some share two
+/// or three.
 fn web(n: u32, n_vertices: u32, seed: u64) -> impinge_scenes::Model {
     let mut state = seed;
     let mut next = |below: u32| {
@@ -582,7 +585,8 @@ fn frames_follow_positions_bodies_and_precision() {
         .set_positions(b, &ball.translated([0.7, 0.1, 0.0]).positions)
         .unwrap();
     assert_ne!(compare(&scene, Query::between_all()), first);
-    // Positions that only f64 can hold: touching, and apart or overlapping by less than f32 resolves.
+    // Positions that only f64 can hold: touching, and apart or overlapping by less than f32
+    // resolves.
     let apart = |gap: f64| {
         let (_, max) = ball.bounds().unwrap();
         let shift = 2.0 * f64::from(max[0]) + gap;
@@ -609,7 +613,8 @@ fn topology_that_changes_within_its_room_is_bound_anew() {
         let mut scene = Scene::new();
         let a = surfaces::ball(100).add_to(&mut scene).unwrap();
         let b = surfaces::ball(100).add_to(&mut scene).unwrap();
-        // Larger; much larger; slightly larger, within the spare quarter of the buffers; smaller and solid.
+        // Larger; much larger; slightly larger, within the spare quarter of the buffers; smaller
+        // and solid.
         let solids = soup::tetrahedra(500, 0.3, 1);
         for model in [
             surfaces::ball(1000),
@@ -899,7 +904,8 @@ fn sizes_to_a_hundred_thousand_and_a_thousand_bodies() {
     }
 }
 
-/// All choices left to the detector, on the device that tests use: by itself, `Auto` takes only hardware.
+/// All choices left to the detector, on the device that tests use: by itself, `Auto` takes only
+/// hardware.
 fn on_any_device() -> Settings {
     Settings {
         backend: Backend::Auto,

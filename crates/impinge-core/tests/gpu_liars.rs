@@ -1,4 +1,5 @@
-//! Proof that the comparison with the oracle can fail: the GPU's answers are falsified, and its kernels damaged.
+//! Proof that the comparison with the oracle can fail: the GPU's answers are falsified, and its
+//! kernels damaged.
 #![cfg(feature = "gpu")]
 
 mod common;

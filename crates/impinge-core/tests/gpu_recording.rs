@@ -193,7 +193,8 @@ fn parts_and_positions_are_on_the_device_once() {
     }
 }
 
-/// Tetrahedra, triangles in f64, and boxes: so many bodies that there is a tree over them, some of which move.
+/// Tetrahedra, triangles in f64, and boxes: so many bodies that there is a tree over them, some of
+/// which move.
 fn mixed() -> (Scene, Vec<BodyId>) {
     let mut scene = Scene::new();
     let mut random = Random::new(5);

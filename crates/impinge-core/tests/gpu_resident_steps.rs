@@ -75,7 +75,8 @@ impl Caller {
         words.map(|word| u32::from_le_bytes(*word)).collect()
     }
 
-    /// Encodes a step until there is room for its pairs, and reads them. Also returns how often the step was encoded.
+    /// Encodes a step until there is room for its pairs, and reads them. Also returns how often the
+    /// step was encoded.
     fn pairs(
         &self,
         detector: &mut Detector,
@@ -151,7 +152,8 @@ const KINDS: [PairKind; 4] = [
     PairKind::VertexVertex,
 ];
 
-/// Asserts that the list has all impacts of a scene and only candidates of it. Returns the number of impacts.
+/// Asserts that the list has all impacts of a scene and only candidates of it. Returns the number
+/// of impacts.
 fn assert_between(
     name: &str,
     found: &ResidentStep,
@@ -201,7 +203,8 @@ fn assert_between(
 /// A body, and where it is at both ends.
 type Moving = (BodyId, [Vec<[f32; 3]>; 2]);
 
-/// Two balls that run into each other: the truth, and the same scene as the host knows it, where nothing moves.
+/// Two balls that run into each other: the truth, and the same scene as the host knows it, where
+/// nothing moves.
 fn balls(n: usize) -> (Scene, Scene, Vec<Moving>) {
     let ball = surfaces::ball(n / 2);
     let (low, high) = ball.bounds().expect("not empty");

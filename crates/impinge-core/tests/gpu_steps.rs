@@ -31,7 +31,8 @@ fn on_cpu() -> Detector {
     Detector::new(Backend::Cpu).expect("settings")
 }
 
-/// Asserts that both answer a step alike, the first one on its device. Returns the number of impacts.
+/// Asserts that both answer a step alike, the first one on its device. Returns the number of
+/// impacts.
 fn assert_alike(name: &str, device: &mut Detector, scene: &Scene, step: &Query) -> usize {
     let mut cpu = on_cpu();
     let expected = cpu.impacts(scene, step).expect(name).clone();
@@ -483,8 +484,9 @@ fn certain_contacts_are_the_only_ones() {
     }
 }
 
-/// A large triangle and points that move, half of them down and half of them up. `way` gives the height of each above the triangle, and how
-/// far the point is inside of an edge, at the start and at the end.
+/// A large triangle and points that move, half of them down and half of them up. `way` gives the
+/// height of each above the triangle, and how far the point is inside of an edge, at the start and
+/// at the end.
 fn triangle_and_points(n: usize, way: impl Fn(f32) -> [[f32; 2]; 2]) -> Scene {
     let mut scene = Scene::new();
     let triangle = [[0.0f32, 0.0, 0.0], [64.0, 0.0, 0.0], [0.0, 64.0, 0.0]];
@@ -507,7 +509,8 @@ fn leaving_points(n: usize) -> Scene {
     triangle_and_points(n, |_| [[0.0, 4.0], [8.0, 4.0]])
 }
 
-/// Points that come from above a triangle and pass its plane at many times, always a little outside of an edge.
+/// Points that come from above a triangle and pass its plane at many times, always a little outside
+/// of an edge.
 fn passing_points(n: usize) -> Scene {
     triangle_and_points(n, |part| {
         let time = 0.25 + 0.7 * part;
@@ -515,8 +518,8 @@ fn passing_points(n: usize) -> Scene {
     })
 }
 
-/// A point that passes the plane of a triangle while it is outside of an edge that turns: at a quarter of the step. At the start and in the
-/// middle of the step it is inside of all edges.
+/// A point that passes the plane of a triangle while it is outside of an edge that turns: at a
+/// quarter of the step. At the start and in the middle of the step it is inside of all edges.
 fn turning_edge() -> Scene {
     let mut scene = Scene::new();
     let start = [[-1.0f32, -1.0, 0.0], [10.0, 5.0, 0.0], [0.0, 1000.0, 0.0]];
@@ -529,7 +532,8 @@ fn turning_edge() -> Scene {
     scene
 }
 
-/// A triangle that passes over a point three times in the first half of the step. Found by trying random ones.
+/// A triangle that passes over a point three times in the first half of the step. Found by trying
+/// random ones.
 fn three_contacts() -> Scene {
     let mut scene = Scene::new();
     let start = [[14.0f32, 3.0, -6.0], [-10.0, 10.0, -2.0], [-9.0, -6.0, 6.0]];
@@ -555,7 +559,8 @@ fn pairs_that_touch_at_the_start_bound_no_time() {
     assert_eq!(assert_alike("late", &mut device, &scene, &skip), 1);
 }
 
-/// A device does not know which cell owns a pair, so a pair that certainly touches says nothing about another cell.
+/// A device does not know which cell owns a pair, so a pair that certainly touches says nothing
+/// about another cell.
 #[test]
 fn cells_are_answered_alike() {
     let scene = balls(800);
@@ -903,7 +908,8 @@ fn damaged_kernels_are_noticed() {
             "first_slot = reserve(counter, atomicLoad(&n_entries));",
             "first_slot = reserve(counter, atomicLoad(&n_entries) / 2u);",
         ),
-        // What is certain of contact: the sign of f changes, and all edges are passed on the inner side.
+        // What is certain of contact: the sign of f changes, and all edges are passed on the inner
+        // side.
         (
             "narrow_search",
             "var touches = falls || rises;",

@@ -1,4 +1,5 @@
-//! Hubs, vertices that very many primitives name: the oracle's answers, with work bounded by input plus output.
+//! Hubs, vertices that very many primitives name: the oracle's answers, with work bounded by input
+//! plus output.
 
 mod common;
 
@@ -193,7 +194,8 @@ fn faces_with_the_same_vertices_are_answered_as_by_the_oracle() {
     }
 }
 
-/// A million faces with the same vertices are half of 10^12 pairs, which no machine holds: that is foreseen.
+/// A million faces with the same vertices are half of 10^12 pairs, which no machine holds: that is
+/// foreseen.
 #[test]
 fn a_million_faces_with_the_same_vertices_cost_nothing() {
     let n_pairs = 499_999_500_000;

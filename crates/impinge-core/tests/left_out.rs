@@ -1,4 +1,5 @@
-//! Pairs that are left out because of their vertices, or by name: every question, against its answer without them.
+//! Pairs that are left out because of their vertices, or by name: every question, against its
+//! answer without them.
 
 use std::collections::{BTreeSet, VecDeque};
 
@@ -116,7 +117,8 @@ fn answers(
     all
 }
 
-/// Asks everything, and expects what is asked without the exclusion, but for pairs that a function refuses.
+/// Asks everything, and expects what is asked without the exclusion, but for pairs that a function
+/// refuses.
 fn check(
     scene: &Scene,
     query: &Query,
@@ -186,7 +188,8 @@ fn rings_are_left_out() {
     }
 }
 
-/// Edges inside of tetrahedra count: the corners of each are one edge apart, though no edge of the surface joins them.
+/// Edges inside of tetrahedra count: the corners of each are one edge apart, though no edge of the
+/// surface joins them.
 #[test]
 fn rings_go_through_tetrahedra() {
     let block = solids::block(2, 2, 2, 1.0);

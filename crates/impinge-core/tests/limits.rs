@@ -169,7 +169,8 @@ fn the_largest_and_smallest_coordinates_are_answered() {
         scene.add_triangles(&[[0, 1, 2]], &a).unwrap();
         scene.add_triangles(&[[0, 1, 2]], &b).unwrap();
     }
-    // Sums of such numbers overflow: the check of positions written in place must not mistake that for infinity.
+    // Sums of such numbers overflow: the check of positions written in place must not mistake that
+    // for infinity.
     let first = scene.bodies().next().unwrap().0;
     scene.positions_mut::<f32>(first).unwrap();
     let case = common::Case {
@@ -223,7 +224,8 @@ fn budgets_are_kept_by_batches() {
         let mut free = Detector::new(cpu(method)).unwrap();
         let pairs = free.detect(&built.scene, &query).unwrap();
         let expected = rows(&pairs);
-        // While it is found, the answer takes twice its size, and a part of a chunk more. The grid may take half of a budget.
+        // While it is found, the answer takes twice its size, and a part of a chunk more. The grid
+        // may take half of a budget.
         let of_answer = 2 * (2 * 8 * pairs.len() as u64 + (1 << 20));
         // Counting holds no answer: what is left is all of the method.
         assert_eq!(
@@ -231,7 +233,8 @@ fn budgets_are_kept_by_batches() {
             expected.len() as u64
         );
         let held = free.stats().bytes_held;
-        // Bisect between a budget that is refused and one that is enough, to the least sufficient budget.
+        // Bisect between a budget that is refused and one that is enough, to the least sufficient
+        // budget.
         let (mut refused, mut enough) = (1_000, held);
         let mut most_batches = 0;
         while enough - refused > held / 200 {

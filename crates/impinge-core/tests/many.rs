@@ -208,7 +208,8 @@ fn filters_and_queries_say_which_bodies_are_asked() {
     );
 }
 
-/// Pairs of two sets, with every method; and `any` says whether there are some, in crowds and where nothing meets.
+/// Pairs of two sets, with every method; and `any` says whether there are some, in crowds and where
+/// nothing meets.
 #[test]
 fn across_two_sets_and_any() {
     let (mut n_none, mut n_some) = (0, 0);

@@ -54,9 +54,10 @@ fn methods_agree_with_the_oracle() {
     }
 }
 
-/// A candidate is a pair that the adjacency rule admits and whose boxes overlap. The boxes of bodies in f64 are
-/// rounded to f32 outward, so there are a few more of them. Around a hub, a vertex of very many primitives, `Clusters`
-/// tells pairs apart by their directions, so there are fewer.
+/// A candidate is a pair that the adjacency rule admits and whose boxes overlap. The boxes of
+/// bodies in f64 are rounded to f32 outward, so there are a few more of them. Around a hub, a
+/// vertex of very many primitives, `Clusters` tells pairs apart by their directions, so there are
+/// fewer.
 #[test]
 fn methods_count_the_same_candidates() {
     for case in cases() {
@@ -276,7 +277,8 @@ fn a_frame_that_failed_leaves_nothing_behind() {
             scene.set_positions(b, &place).unwrap();
             assert!(!detector.detect(&scene, &query).unwrap().is_empty());
         }
-        // Restoring the clone brings back the old positions and their old stamps, so a stale cache would look valid.
+        // Restoring the clone brings back the old positions and their old stamps, so a stale cache
+        // would look valid.
         let saved = scene.clone();
         for bad in [a, b] {
             for body in [a, b] {
@@ -390,7 +392,8 @@ fn auto_finds_the_same_in_the_grid_as_clusters_do() {
         .unwrap();
     // And one that meets no other.
     ball.translated([3.0, 0.0, 0.0]).add_to(&mut scene).unwrap();
-    // Under `Resolve`, clusters decide neighbours per vertex, and the grid does not: then the first frame takes clusters.
+    // Under `Resolve`, clusters decide neighbours per vertex, and the grid does not: then the first
+    // frame takes clusters.
     for query in [
         Query::between_all(),
         Query::all().shared_vertex(SharedVertex::Skip),
@@ -442,8 +445,8 @@ fn auto_frees_the_grid_and_what_bodies_that_are_gone_had() {
         large_balls(&mut scene);
     }
     let left = held(&scene, "cells");
-    // At least the order and the corners of 24,000 triangles. Clusters have a few bytes more, how many depends on the
-    // instruction set; the rest is of all bodies together.
+    // At least the order and the corners of 24,000 triangles. Clusters have a few bytes more, how
+    // many depends on the instruction set; the rest is of all bodies together.
     assert!(left + 16 * 24_000 < with_old, "{left} of {with_old}");
 }
 

@@ -1,4 +1,5 @@
-//! Elements within a distance: against every pair by the exact test, on every method, thread count and budget.
+//! Elements within a distance: against every pair by the exact test, on every method, thread count
+//! and budget.
 
 use impinge_core::exact::{
     ElementPair, Feature, are_within, closest_points, edge_face_are_within, faces_are_within,
@@ -229,7 +230,8 @@ fn a_distance_that_occurs_counts_and_one_below_does_not() {
             PairKind::ALL.map(|kind| near.of(kind).len())
         };
         assert_eq!(count(3.0_f64.next_down()), [0; 6]);
-        // Each vertex is over the other face; each edge is over itself and both neighbours. No edge meets a face.
+        // Each vertex is over the other face; each edge is over itself and both neighbours. No edge
+        // meets a face.
         assert_eq!(count(3.0), [6, 9, 12, 3, 0, 1]);
     }
 }
@@ -246,7 +248,8 @@ fn what_is_reported_by_default_depends_on_what_bodies_are() {
     for mut detector in detectors() {
         let near = detector.near(&scene, 2.0, &query).expect("good");
         let kinds = PairKind::ALL.map(|kind| near.of(kind).len());
-        // Four vertices over the face; the bare edge and all three edges of the face; the bare edge and both points; those.
+        // Four vertices over the face; the bare edge and all three edges of the face; the bare edge
+        // and both points; those.
         assert_eq!(kinds, [4, 3, 2, 1, 0, 0], "{near:?}");
     }
 }
@@ -291,7 +294,8 @@ fn thickness_is_added_as_real_numbers() {
     }
 }
 
-/// Faces and edges near faces: the distance is that of the nearest parts, points have it, and features hold the points.
+/// Faces and edges near faces: the distance is that of the nearest parts, points have it, and
+/// features hold the points.
 #[test]
 fn edges_and_faces_are_as_far_as_their_nearest_parts() {
     let mut n_by_name = std::collections::BTreeMap::new();
@@ -387,8 +391,8 @@ fn edges_and_faces_are_as_far_as_their_nearest_parts() {
     assert_eq!(names, ["E_E", "E_T", "P_E", "P_P", "P_T"], "{n_by_name:?}");
 }
 
-/// A ball inside a slightly larger one, and a lattice: the same bytes for every thread count, instruction set and budget,
-/// as the oracle says.
+/// A ball inside a slightly larger one, and a lattice: the same bytes for every thread count,
+/// instruction set and budget, as the oracle says.
 #[test]
 fn the_answer_depends_on_the_input_alone() {
     let ball = surfaces::icosphere(3);
@@ -575,7 +579,8 @@ fn solids_and_numbers_of_any_size() {
     }
 }
 
-/// Long elements of machine parts, in both precisions, at distances below and above what single precision tells.
+/// Long elements of machine parts, in both precisions, at distances below and above what single
+/// precision tells.
 #[test]
 fn long_elements_are_near_as_the_oracle_says() {
     let built = adversarial::machine_parts(1_200).unwrap();

@@ -56,7 +56,8 @@ fn points(scene: &Scene, of: &Held) -> Vec<Point> {
     of.corners.iter().map(point).collect()
 }
 
-/// All pairs of elements of the kinds that meet in a test, and their points as the exact tests take them.
+/// All pairs of elements of the kinds that meet in a test, and their points as the exact tests take
+/// them.
 fn pairs(scene: &Scene) -> Vec<(PairKind, Held, Held, [Point; 4])> {
     let [vertices, edges, faces] =
         [Part::Vertices, Part::Edges, Part::Faces].map(|part| elements(scene, part));
@@ -122,8 +123,8 @@ fn largest(safe: &SafeDistances, of: &Held) -> f64 {
     own.fold(0.0, f64::max)
 }
 
-/// Holds the bounds against every pair: together, two elements move less than they are apart, and no bound is much smaller than it
-/// must be.
+/// Holds the bounds against every pair: together, two elements move less than they are apart, and
+/// no bound is much smaller than it must be.
 fn check(scene: &Scene, safe: &SafeDistances, most: f64, fixed: &[BodyId]) -> [usize; 2] {
     let thickness = |of: &Held| scene.body(of.body).expect("held").thickness();
     let mut least = std::collections::BTreeMap::new();
@@ -182,7 +183,8 @@ fn check(scene: &Scene, safe: &SafeDistances, most: f64, fixed: &[BodyId]) -> [u
     [n_touching, n_bounded]
 }
 
-/// A scene of small bodies of every kind: on a lattice, where many elements touch, are parallel, coplanar or degenerate; or at random.
+/// A scene of small bodies of every kind: on a lattice, where many elements touch, are parallel,
+/// coplanar or degenerate; or at random.
 fn scene(seed: u64, is_lattice: bool, is_double: bool) -> (Scene, Vec<BodyId>) {
     let mut random = Random::new(seed);
     let mut scene = Scene::new();
@@ -254,7 +256,8 @@ fn together_two_elements_move_less_than_they_are_apart() {
     );
 }
 
-/// Half of an odd multiple of the smallest number is none, and most distances are no multiple: all are rounded down.
+/// Half of an odd multiple of the smallest number is none, and most distances are no multiple: all
+/// are rounded down.
 #[test]
 fn bounds_of_multiples_of_the_smallest_number() {
     let unit = f64::from_bits(1);
@@ -426,7 +429,8 @@ fn neighbours_are_the_near_pairs_by_element() {
     }
 }
 
-/// Where squares are no numbers any more, bounds in floats are of no use, and distances are still rounded down.
+/// Where squares are no numbers any more, bounds in floats are of no use, and distances are still
+/// rounded down.
 #[test]
 fn distances_of_tiny_and_huge_scenes_are_rounded_down() {
     let mut detector = detector(Method::Clusters, 1);

@@ -1,5 +1,5 @@
-//! Steps in which elements must keep a distance, or a clearance: against every pair by the exact test, and what must hold of any
-//! answer.
+//! Steps in which elements must keep a distance, or a clearance: against every pair by the exact
+//! test, and what must hold of any answer.
 
 use std::collections::BTreeMap;
 
@@ -68,7 +68,8 @@ fn expected(scene: &Scene, separation: f64) -> Vec<Row> {
     })
 }
 
-/// When a pair is first as near as a clearance lets it come. For separations that a float with few bits holds.
+/// When a pair is first as near as a clearance lets it come. For separations that a float with few
+/// bits holds.
 fn first_kept(
     pair: ElementPair,
     [start, end]: [&[Point; 4]; 2],
@@ -78,7 +79,8 @@ fn first_kept(
     if are_within(pair, start, separation) {
         return first_within(pair, start, end, separation);
     }
-    // The least number of 24 bits that is not less than what the pair is apart. A computed distance is wrong by less than 1e-12.
+    // The least number of 24 bits that is not less than what the pair is apart. A computed distance
+    // is wrong by less than 1e-12.
     let apart = closest_points(pair, start).distance - separation;
     let step = 2f64.powi(apart.log2().floor() as i32 - 23);
     let short = (0..3)
@@ -205,7 +207,8 @@ fn lattices_are_answered_as_pair_by_pair() {
     }
 }
 
-/// A separation of 0 changes nothing; a larger one finds all pairs of a smaller one, none of them later.
+/// A separation of 0 changes nothing; a larger one finds all pairs of a smaller one, none of them
+/// later.
 #[test]
 fn more_separation_is_never_later() {
     for seed in 10..14 {
@@ -323,8 +326,9 @@ fn start_faces(mesh: &impinge_scenes::Model) -> Vec<[u32; 3]> {
     }
 }
 
-/// Every position that a solver computes on the way, by either formula and for any smaller part, is reached on a straight line
-/// on which all pairs keep the clearance. A chain of steps goes on, however near elements are.
+/// Every position that a solver computes on the way, by either formula and for any smaller part, is
+/// reached on a straight line on which all pairs keep the clearance. A chain of steps goes on,
+/// however near elements are.
 #[test]
 fn every_part_of_an_advanced_step_keeps_the_clearance() {
     for is_double in [false, true] {
@@ -407,7 +411,8 @@ fn added(x: f32, y: f32) -> f32 {
         .unwrap_or(difference)
 }
 
-/// Elements that are nearer than rounding can move them allow no step, however short, but only if they move.
+/// Elements that are nearer than rounding can move them allow no step, however short, but only if
+/// they move.
 #[test]
 fn elements_nearer_than_rounding_allow_no_step() {
     for (gap, is_free) in [(2f64.powi(-22), false), (2f64.powi(-8), true)] {
@@ -509,7 +514,8 @@ fn a_triangle_that_comes_near_is_told_when() {
     }
 }
 
-/// The rounded positions keep the distance on the whole way, and the step is nearly as long as it can be.
+/// The rounded positions keep the distance on the whole way, and the step is nearly as long as it
+/// can be.
 #[test]
 fn a_step_that_is_advanced_keeps_the_distance() {
     for mut detector in detectors() {

@@ -1,4 +1,5 @@
-//! What a step knows of its start: intersections that touch nothing, and seams of meshes that were not welded.
+//! What a step knows of its start: intersections that touch nothing, and seams of meshes that were
+//! not welded.
 
 use impinge::{
     Backend, BodyId, Detector, Error, Method, PairFilter, PairKind, Query, Scene, Settings, Start,
@@ -18,8 +19,8 @@ fn detectors() -> Vec<Detector> {
         .into()
 }
 
-/// A thin rod through a plate: edges of the rod pass through the insides of two faces, and no vertex is near any face of the
-/// other body.
+/// A thin rod through a plate: edges of the rod pass through the insides of two faces, and no
+/// vertex is near any face of the other body.
 fn rod_through_plate() -> (Scene, [BodyId; 2]) {
     let mut scene = Scene::new();
     let plate = scene
@@ -145,7 +146,8 @@ fn a_start_that_intersects_is_not_free_if_asked() {
     }
 }
 
-/// Two triangles that share one vertex, one through the inside of the other: no vertex touches a face, and no edge an edge.
+/// Two triangles that share one vertex, one through the inside of the other: no vertex touches a
+/// face, and no edge an edge.
 #[test]
 fn a_face_through_its_neighbour_is_near_it_and_an_intersection_of_the_start() {
     let faces = [[0, 1, 2], [0, 3, 4]];
@@ -245,7 +247,8 @@ fn seams_are_refused_by_name_and_welding_mends_them() {
     }
 }
 
-/// Two bodies that touch at the start are no seam, and neither are parts of one body that touch away from vertices.
+/// Two bodies that touch at the start are no seam, and neither are parts of one body that touch
+/// away from vertices.
 #[test]
 fn touching_starts_that_are_no_seams_are_answered() {
     for mut detector in detectors() {

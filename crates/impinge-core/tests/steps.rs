@@ -157,7 +157,8 @@ fn a_step_that_is_advanced_is_free_to_its_rounded_end() {
     }
 }
 
-/// Triangles that land on a slope nearly at once: rounding makes others touch than the first. The naive method searches all pairs for every fraction.
+/// Triangles that land on a slope nearly at once: rounding makes others touch than the first. The
+/// naive method searches all pairs for every fraction.
 #[test]
 fn a_step_is_advanced_as_far_as_by_testing_all_pairs() {
     let mut n_backed_off = 0;
@@ -193,7 +194,8 @@ fn a_step_is_advanced_as_far_as_by_testing_all_pairs() {
     assert!(n_backed_off > 20, "{n_backed_off}");
 }
 
-/// Thousands of triangles that land within a last bit: too many pairs are close for the list of one thread.
+/// Thousands of triangles that land within a last bit: too many pairs are close for the list of one
+/// thread.
 #[test]
 fn a_step_is_advanced_freely_where_very_many_pairs_are_close() {
     let mut n_backed_off = 0;
@@ -228,7 +230,8 @@ fn a_step_is_advanced_freely_where_very_many_pairs_are_close() {
     assert!(n_backed_off > 1, "{n_backed_off}");
 }
 
-/// Elements that are nearer to a tie than single precision can tell: about half of them touch, or are within a distance, or have boxes that do.
+/// Elements that are nearer to a tie than single precision can tell: about half of them touch, or
+/// are within a distance, or have boxes that do.
 #[test]
 fn elements_in_double_precision_are_answered_as_pair_by_pair() {
     let mut n_found = [0; 3];
@@ -283,7 +286,8 @@ fn elements_in_double_precision_are_answered_as_pair_by_pair() {
     );
 }
 
-/// A vertex meets a face between corners on both sides of it; at the start, one corner is farther away than single precision can tell.
+/// A vertex meets a face between corners on both sides of it; at the start, one corner is farther
+/// away than single precision can tell.
 #[test]
 fn differences_that_overflow_hide_no_contact() {
     let vertex = [[-3e38f32, 1.0, 1.0], [0.0, 1.0, 1.0]];
@@ -382,7 +386,8 @@ fn numbers_of_any_size_are_answered_as_pair_by_pair() {
     assert!(n_found.iter().all(|&n| n > 100), "{n_found:?}");
 }
 
-/// A damped motion: every coordinate of one body shrinks in each frame, to the smallest numbers that there are.
+/// A damped motion: every coordinate of one body shrinks in each frame, to the smallest numbers
+/// that there are.
 #[test]
 fn a_motion_that_dies_away_goes_on() {
     let mut random = impinge_scenes::Random::new(5);
@@ -472,7 +477,8 @@ fn candidates_are_boxes_that_overlap_within_twice_the_distance() {
     }
 }
 
-/// A surface, edges and points that move at random: all six kinds of pairs, between bodies and within them.
+/// A surface, edges and points that move at random: all six kinds of pairs, between bodies and
+/// within them.
 fn crowd(is_double: bool) -> Scene {
     let mut random = impinge_scenes::Random::new(5);
     let mut points = |n: u32, size: f32| -> Vec<[f32; 3]> {
@@ -658,7 +664,8 @@ fn parts(kind: PairKind) -> [Part; 2] {
     }
 }
 
-/// Each pair belongs to one cell, and a process that has what touches the cell has both of its elements.
+/// Each pair belongs to one cell, and a process that has what touches the cell has both of its
+/// elements.
 #[test]
 fn pairs_of_all_cells_are_the_pairs_of_the_whole() {
     // Coordinates are multiples of 2^-10 or less: boxes end at the cut.
@@ -919,7 +926,8 @@ fn lattices_are_answered_as_pair_by_pair() {
     }
 }
 
-/// Two bodies of random triangles on a lattice of even numbers, at the start and at the end of a step.
+/// Two bodies of random triangles on a lattice of even numbers, at the start and at the end of a
+/// step.
 struct Twins {
     faces: [Vec<[u32; 3]>; 2],
     start: [Vec<[f32; 3]>; 2],
@@ -946,7 +954,8 @@ impl Twins {
         }
     }
 
-    /// Sorted rows of impacts. An element is named by whether it belongs to the second body, and its number.
+    /// Sorted rows of impacts. An element is named by whether it belongs to the second body, and
+    /// its number.
     fn rows(&self, swapped: bool, detector: &mut Detector) -> Vec<Row> {
         let mut scene = Scene::new();
         let order = if swapped { [1, 0] } else { [0, 1] };

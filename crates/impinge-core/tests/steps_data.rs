@@ -1,5 +1,6 @@
-//! Steps of real scenes against answers from elsewhere: every pair that touches, and every time to the last bit. Fails
-//! if the data folder (`../shared/data` or `$IMPINGE_DATA`) is absent, unless `IMPINGE_NO_DATA=1` is set.
+//! Steps of real scenes against answers from elsewhere: every pair that touches, and every time to
+//! the last bit. Fails if the data folder (`../shared/data` or `$IMPINGE_DATA`) is absent, unless
+//! `IMPINGE_NO_DATA=1` is set.
 
 use std::ops::ControlFlow;
 
@@ -131,7 +132,8 @@ fn every_pair_and_every_time_is_that_of_the_exact_prototype() {
     }
 }
 
-/// Fails where no adapter is found. A software driver is enough, but takes seconds for the larger step, so there is enough room at once.
+/// Fails where no adapter is found. A software driver is enough, but takes seconds for the larger
+/// step, so there is enough room at once.
 #[cfg(feature = "gpu")]
 #[test]
 fn a_device_leaves_every_pair_that_touches() {

@@ -181,7 +181,8 @@ fn move_on(scene: &mut Scene, random: &mut Random) {
 
 #[test]
 fn what_moves_together_is_not_stopped() {
-    // A sheet that flies within its own plane, by many edges: static planes between its vertices would stop all of them.
+    // A sheet that flies within its own plane, by many edges: static planes between its vertices
+    // would stop all of them.
     let sheet = surfaces::bumpy_ball(2000, 0.2);
     let mut scene = Scene::new();
     let body = sheet.add_to(&mut scene).expect("a ball");

@@ -1,4 +1,5 @@
-//! Every threshold of the CPU backend at 0 and at infinity: the same answers, and the code behind each one is really entered.
+//! Every threshold of the CPU backend at 0 and at infinity: the same answers, and the code behind
+//! each one is really entered.
 
 mod common;
 
@@ -258,7 +259,8 @@ fn films() -> Vec<Film> {
     films
 }
 
-/// The boxes of positions in double precision are rounded outward to `f32`, so more of them overlap.
+/// The boxes of positions in double precision are rounded outward to `f32`, so more of them
+/// overlap.
 fn is_single(scene: &Scene) -> bool {
     let mut bodies = scene.bodies();
     bodies.all(|(_, body)| matches!(body.positions(), Positions::F32(_)))
@@ -275,8 +277,8 @@ fn no_threshold_changes_the_answer_to_a_frame() {
             expected.push((rows(&pairs), pairs.stats().n_candidates));
         });
         assert!(expected.iter().any(|(rows, _)| !rows.is_empty()));
-        // Every threshold in each second film, in turn. There are seven films in either precision, so in one of the two
-        // precisions it meets each of them.
+        // Every threshold in each second film, in turn. There are seven films in either precision,
+        // so in one of the two precisions it meets each of them.
         let chosen = tunings.iter().skip(film_ix % 2).step_by(2);
         for tuned in chosen.chain(&extremes) {
             for &method in tuned.methods {
@@ -367,7 +369,8 @@ fn no_threshold_changes_the_answer_to_a_step() {
     }
 }
 
-/// What a threshold governs, seen in the statistics of a few frames: one number with the threshold at 0, and one at infinity.
+/// What a threshold governs, seen in the statistics of a few frames: one number with the threshold
+/// at 0, and one at infinity.
 struct Watched {
     method: Method,
     /// Thresholds that must be at 0 for this one to matter; all others are at infinity.
@@ -537,7 +540,8 @@ fn the_code_behind_thresholds_of_steps_is_entered() {
     assert!(shortened(ZERO) == 0 && shortened(INFINITY) > 0);
 }
 
-/// Bodies that are apart at first. Every thread begins with the whole step and goes on with less of it, task by task.
+/// Bodies that are apart at first. Every thread begins with the whole step and goes on with less of
+/// it, task by task.
 #[test]
 fn the_earliest_contact_is_found_however_early_boxes_end() {
     let zero = Tuning::ENDS[ZERO];
@@ -590,7 +594,8 @@ fn the_earliest_contact_is_found_however_early_boxes_end() {
     }
 }
 
-/// Triangles that land nearly at once, where rounding makes others touch than the first: all close pairs are found however early boxes end.
+/// Triangles that land nearly at once, where rounding makes others touch than the first: all close
+/// pairs are found however early boxes end.
 #[test]
 fn a_step_is_advanced_freely_however_early_boxes_end() {
     let zero = Tuning::ENDS[ZERO];

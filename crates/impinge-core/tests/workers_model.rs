@@ -1,5 +1,6 @@
-//! The protocol of caller and helpers under loom, which tries the interleavings of threads and the values that the memory
-//! model lets them read: no helper sees work that has ended, no task is done twice or left out, nobody sleeps for ever.
+//! The protocol of caller and helpers under loom, which tries the interleavings of threads and the
+//! values that the memory model lets them read: no helper sees work that has ended, no task is done
+//! twice or left out, nobody sleeps for ever.
 
 mod sync {
     pub(crate) use loom::cell::UnsafeCell;
@@ -61,7 +62,8 @@ fn end(crew: &Crew, helpers: Vec<JoinHandle<()>>) {
     }
 }
 
-/// Memory of a region that is gone when the region is: loom notices whoever looks at it later, and two who write.
+/// Memory of a region that is gone when the region is: loom notices whoever looks at it later, and
+/// two who write.
 struct Task {
     done: UnsafeCell<u32>,
 }

@@ -1,26 +1,28 @@
-//! One exact test and nothing else: do two elements touch, how far apart are they, and when do they first meet?
+//! One exact test and nothing else: do two elements touch, how far apart are they, and when do they
+//! first meet?
 //!
 //! What it does: decides, without any tolerance, whether two triangles, two tetrahedra or a
 //! triangle and a tetrahedron share at least one point when their coordinates are read as real
-//! numbers ([`triangles_intersect`]); whether vertices, edges and faces are within a distance ([`are_within`]); and when
-//! two of them first touch while their points move ([`first_contact`]). Primitives are *closed*: touching counts, coplanar
-//! overlap counts, and a degenerate primitive is the segment, the point or the flat polygon that it is.
+//! numbers ([`triangles_intersect`]); whether vertices, edges and faces are within a distance
+//! ([`are_within`]); and when two of them first touch while their points move ([`first_contact`]).
+//! Primitives are *closed*: touching counts, coplanar overlap counts, and a degenerate primitive is
+//! the segment, the point or the flat polygon that it is.
 //!
-//! How: answers about primitives at rest are combinations of signs of two determinants, [`orient2d`] and
-//! [`orient3d`], and of comparisons of single coordinates. The signs are exact (adaptive
-//! arithmetic after Shewchuk, *Adaptive Precision Floating-Point Arithmetic and Fast Robust
-//! Geometric Predicates*, 1997), so the answers are. Answers about motion and distances are signs of polynomials, in
-//! integers of any size where floats with an error bound cannot tell.
+//! How: answers about primitives at rest are combinations of signs of two determinants,
+//! [`orient2d`] and [`orient3d`], and of comparisons of single coordinates. The signs are exact
+//! (adaptive arithmetic after Shewchuk, *Adaptive Precision Floating-Point Arithmetic and Fast
+//! Robust Geometric Predicates*, 1997), so the answers are. Answers about motion and distances are
+//! signs of polynomials, in integers of any size where floats with an error bound cannot tell.
 //!
-//! Invariant: answers are exact for all finite coordinates, of whatever size: where doubles would overflow or lose a
-//! bit to underflow, integers decide. Others never cause a panic, but the answer is then unspecified; callers check their
-//! input once.
+//! Invariant: answers are exact for all finite coordinates, of whatever size: where doubles would
+//! overflow or lose a bit to underflow, integers decide. Others never cause a panic, but the answer
+//! is then unspecified; callers check their input once.
 //!
 //! `docs/exactness.md` of the repository derives every bound and draws every case.
 //!
-//! It has no scene and no threads: for whole meshes use the crate `impinge`, which is built on this one. It needs an allocator,
-//! for integers above 512 bits and polynomials. With default features it uses the standard library for square roots alone;
-//! without, the feature `libm` has them.
+//! It has no scene and no threads: for whole meshes use the crate `impinge`, which is built on this
+//! one. It needs an allocator, for integers above 512 bits and polynomials. With default features
+//! it uses the standard library for square roots alone; without, the feature `libm` has them.
 
 #![cfg_attr(not(any(feature = "std", test)), no_std)]
 
@@ -69,10 +71,11 @@ struct Readme;
 /// A position: x, y, z in the unit of the scene. `f32` coordinates are widened, which is exact.
 pub type Point = [f64; 3];
 
-/// What the engine of impinge needs beyond single tests. **No promise of stability: do not rely on it.**
+/// What the engine of impinge needs beyond single tests. **No promise of stability: do not rely on
+/// it.**
 ///
-/// The registers of an instruction set in [`filter::number`] may only be used where the processor has
-/// been asked for that set, in functions compiled for it. Nothing checks that.
+/// The registers of an instruction set in [`filter::number`] may only be used where the processor
+/// has been asked for that set, in functions compiled for it. Nothing checks that.
 pub mod internal {
     pub use crate::algebra::{Integer, unit_of};
     pub use crate::distance::{
@@ -86,7 +89,8 @@ pub mod internal {
     pub use crate::rounding::{two_product, two_sum};
     pub use crate::segment::strictly_between;
 
-    /// The tests of many pairs at a time, in the registers of an instruction set: certain answers, or none.
+    /// The tests of many pairs at a time, in the registers of an instruction set: certain answers,
+    /// or none.
     pub mod filter {
         pub use crate::filter::*;
     }

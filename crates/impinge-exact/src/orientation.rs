@@ -67,8 +67,9 @@ fn orient2d_in_integers(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> Sign {
     (&left - &right).sign()
 }
 
-/// Whether all coordinates are zero or between 2^-250 and 2^250 in magnitude. Then no product, error term or bound of the
-/// adaptive stages underflows or overflows (`docs/exactness.md`, "Range"). False for NaN.
+/// Whether all coordinates are zero or between 2^-250 and 2^250 in magnitude. Then no product,
+/// error term or bound of the adaptive stages underflows or overflows (`docs/exactness.md`,
+/// "Range"). False for NaN.
 #[inline]
 fn are_moderate(coordinates: &[f64]) -> bool {
     const SMALLEST: f64 = f64::from_bits((1023 - 250) << 52);
@@ -117,7 +118,8 @@ pub fn orient3d(a: &Point, b: &Point, c: &Point, d: &Point) -> Sign {
     let permanent = az.abs() * (bc.abs() + cb.abs())
         + bz.abs() * (ca.abs() + ac.abs())
         + cz.abs() * (ab.abs() + ba.abs());
-    // A product of two differences that underflows is wrong by less than 2^-1074, and that times the third.
+    // A product of two differences that underflows is wrong by less than 2^-1074, and that times
+    // the third.
     let bound = ORIENT3D_BOUND * permanent + UNDERFLOW * (az.abs() + bz.abs() + cz.abs() + 1.0);
     if det > bound {
         return Sign::Positive;
@@ -199,8 +201,8 @@ impl Projection {
         orient2d(self.apply(a), self.apply(b), self.apply(c))
     }
 
-    /// A projection in which a, b, c do not lie on one line, so that it is one-to-one on their plane;
-    /// `None` if the three lie on one line.
+    /// A projection in which a, b, c do not lie on one line, so that it is one-to-one on their
+    /// plane; `None` if the three lie on one line.
     #[inline]
     pub fn injective(a: &Point, b: &Point, c: &Point) -> Option<Self> {
         Self::ALL

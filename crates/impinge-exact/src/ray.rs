@@ -1,16 +1,21 @@
 //! Where a ray meets an element of one to three corners: decided exactly.
 //!
-//! The points `origin + t direction`, for t from 0 to `most`, that lie in the element are an interval of t, for the element is
-//! convex. It is a single t unless the ray lies in the plane of the face or along the edge.
+//! The points `origin + t direction`, for t from 0 to `most`, that lie in the element are an
+//! interval of t, for the element is convex. It is a single t unless the ray lies in the plane of
+//! the face or along the edge.
 //!
 //! With the corners a, b, c relative to the origin, the direction d and n = (b - a) x (c - a):
 //!
-//! - d . n not 0: t = (a . n) / (d . n), and the barycentrics are d . (b x c), d . (c x a) and d . (a x b), over d . n, their sum.
-//! - d . n = 0 = a . n: in the projection in which n is not 0, each barycentric is a linear function of t, and none may be below 0.
-//! - n = 0: the element is the union of its edges. The ray crosses an edge in a point, or lies along it.
+//! - d . n not 0: t = (a . n) / (d . n), and the barycentrics are d . (b x c), d . (c x a) and d .
+//!   (a x b), over d . n, their sum.
+//! - d . n = 0 = a . n: in the projection in which n is not 0, each barycentric is a linear
+//!   function of t, and none may be below 0.
+//! - n = 0: the element is the union of its edges. The ray crosses an edge in a point, or lies
+//!   along it.
 //!
-//! Cost: some 50 products of integers of any size: no filter, for what floats cannot decide. [`meet_inside`] gives the same numbers for a
-//! thirtieth of that, where twice the precision of floats suffices, as it mostly does for rays through the inside of a face.
+//! Cost: some 50 products of integers of any size: no filter, for what floats cannot decide.
+//! [`meet_inside`] gives the same numbers for a thirtieth of that, where twice the precision of
+//! floats suffices, as it mostly does for rays through the inside of a face.
 
 use core::cmp::Ordering;
 
@@ -20,7 +25,8 @@ use crate::distance::Feature;
 use crate::rounding::{two_product, two_sum};
 use crate::{Point, Sign};
 
-/// The points `origin + t direction` for t from 0 to `most`, read as real numbers. A direction of zero is the origin alone.
+/// The points `origin + t direction` for t from 0 to `most`, read as real numbers. A direction of
+/// zero is the origin alone.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ray {
     /// Where t is 0.
@@ -38,9 +44,11 @@ pub struct Meeting {
     pub entry: Parameter,
     /// The largest t.
     pub exit: Parameter,
-    /// The smallest feature of the element that contains the point of entry; of several the one with the lowest number.
+    /// The smallest feature of the element that contains the point of entry; of several the one
+    /// with the lowest number.
     pub feature: Feature,
-    /// The barycentrics of that point, each rounded to nearest; of an edge and a point too, which have weights of 0 besides.
+    /// The barycentrics of that point, each rounded to nearest; of an edge and a point too, which
+    /// have weights of 0 besides.
     pub barycentrics: [f64; 3],
 }
 
@@ -95,7 +103,8 @@ struct At {
     feature: Feature,
 }
 
-/// Where a ray meets an element of one to three corners, if it does. Exact for finite numbers of any size.
+/// Where a ray meets an element of one to three corners, if it does. Exact for finite numbers of
+/// any size.
 #[must_use]
 pub fn meet(ray: &Ray, corners: &[Point]) -> Option<Meeting> {
     let last = corners.last()?;
@@ -128,8 +137,9 @@ pub fn meet(ray: &Ray, corners: &[Point]) -> Option<Meeting> {
     })
 }
 
-/// Where a ray meets the inside of a face: the entry rounded down, and the barycentrics, as [`meet`] gives them. `None` if that is in
-/// doubt or not so, as near an edge, where the origin lies in the face, or where a number lies halfway between floats.
+/// Where a ray meets the inside of a face: the entry rounded down, and the barycentrics, as
+/// [`meet`] gives them. `None` if that is in doubt or not so, as near an edge, where the origin
+/// lies in the face, or where a number lies halfway between floats.
 #[must_use]
 pub fn meet_inside(ray: &Ray, corners: &[Point; 3]) -> Option<(f64, [f64; 3])> {
     let [a, b, c] = corners.map(|corner| Twice::difference(&corner, &ray.origin));
@@ -182,7 +192,8 @@ pub fn meet_inside(ray: &Ray, corners: &[Point; 3]) -> Option<(f64, [f64; 3])> {
 
 /// Sizes of numbers of which no product and no quotient overflows or loses bits to underflow.
 const MODERATE: core::ops::Range<f64> = 1e-30..1e30;
-/// More than the error of a determinant in twice the precision, relative to the cube of its largest number.
+/// More than the error of a determinant in twice the precision, relative to the cube of its largest
+/// number.
 const ERROR: f64 = f64::EPSILON * f64::EPSILON * 4096.0;
 
 /// The sum of two floats, of which the second is at most half a last bit of the first.
@@ -229,8 +240,8 @@ impl Twice {
         [[1, 2], [2, 0], [0, 1]].map(|[i, j]| p[i].times(q[j]).minus(p[j].times(q[i])))
     }
 
-    /// The quotient of two positive numbers with errors: the nearest float or one beside it, what is left, at most half a last bit, and
-    /// more than the error of both together.
+    /// The quotient of two positive numbers with errors: the nearest float or one beside it, what
+    /// is left, at most half a last bit, and more than the error of both together.
     #[inline]
     fn over(self, divisor: Self, error: f64, of_divisor: f64) -> (f64, f64, f64) {
         let quotient = self.0[0] / divisor.0[0];
@@ -511,7 +522,8 @@ mod tests {
         x.quotient(&Integer::from(1), 0, 53, -1074)
     }
 
-    /// Whether a feature has a point in its inside: it has the point, and without any of its corners it has not.
+    /// Whether a feature has a point in its inside: it has the point, and without any of its
+    /// corners it has not.
     fn holds_inside(corners: &[Point; 3], feature: Feature, point: &Point) -> bool {
         let vertices = match feature {
             Feature::Vertex(k) => vec![usize::from(k)],
@@ -534,8 +546,9 @@ mod tests {
             && (vertices.len() > 1 || !(0..vertices[0]).any(same))
     }
 
-    /// On a lattice: rays through vertices, along edges and in the planes of faces, faces that are segments and points, rays
-    /// that are points. Whether they meet, where they enter and where they leave is held against segments and triangles.
+    /// On a lattice: rays through vertices, along edges and in the planes of faces, faces that are
+    /// segments and points, rays that are points. Whether they meet, where they enter and where
+    /// they leave is held against segments and triangles.
     #[test]
     fn on_a_lattice() {
         const FINE: f64 = 1048576.0;
@@ -674,7 +687,8 @@ mod tests {
         let mut numbers = Numbers(77);
         let mut n = [0; 4];
         for round in 0..60_000 {
-            // Sizes that differ, numbers of few and of many bits, and rays that nearly lie in the face or miss it.
+            // Sizes that differ, numbers of few and of many bits, and rays that nearly lie in the
+            // face or miss it.
             let size = [1.0, 1e-9, 1e12, 3e-31][round % 4];
             let bits = [4, 1 << 20, 1 << 40][round % 3];
             let far = [0.0, 0.0, 1000.0][round / 12 % 3];

@@ -1,6 +1,7 @@
 //! Exact numbers rounded to floats, and what rounding leaves out.
 
-/// The sum of two floats, rounded, and its error, which is a float too (Knuth). NaN where it overflows.
+/// The sum of two floats, rounded, and its error, which is a float too (Knuth). NaN where it
+/// overflows.
 #[inline]
 pub fn two_sum(a: f64, b: f64) -> [f64; 2] {
     let sum = a + b;
@@ -8,8 +9,8 @@ pub fn two_sum(a: f64, b: f64) -> [f64; 2] {
     [sum, (a - (sum - part)) + (b - part)]
 }
 
-/// The product of two floats, rounded, and its error, which is a float too unless it underflows (Dekker). No fused multiply-add, so the bits
-/// are the same on every machine. NaN beyond 2^996.
+/// The product of two floats, rounded, and its error, which is a float too unless it underflows
+/// (Dekker). No fused multiply-add, so the bits are the same on every machine. NaN beyond 2^996.
 #[inline]
 pub fn two_product(a: f64, b: f64) -> [f64; 2] {
     // Two halves of 26 bits each (Veltkamp).

@@ -48,8 +48,8 @@ pub fn triangles_intersect_beyond_shared(
         .unwrap_or_else(|| SplitCorners::new(a, ids_a, b, ids_b).meet_beyond_shared())
 }
 
-/// The filter's answer for triangles with three different ids each that share one or two; `None` when
-/// unsure.
+/// The filter's answer for triangles with three different ids each that share one or two; `None`
+/// when unsure.
 #[inline]
 fn neighbours_answer(
     a: &[Point; 3],
@@ -255,8 +255,9 @@ fn padded<const N: usize>(points: &[Point]) -> [Point; N] {
 /// Whether conv(v, a) and conv(v, b) share a point other than v.
 ///
 /// Follow the ray from v through a common point until it leaves one of the two primitives. If v is
-/// in neither conv(a) nor conv(b), the ray leaves each primitive through its face opposite v. So one
-/// of these faces must meet the other primitive. As v is in neither face, that is also sufficient.
+/// in neither conv(a) nor conv(b), the ray leaves each primitive through its face opposite v. So
+/// one of these faces must meet the other primitive. As v is in neither face, that is also
+/// sufficient.
 fn beyond_vertex(v: &Point, a: Points, b: Points) -> bool {
     if let ([a0, a1], [b0, b1]) = (a.as_slice(), b.as_slice())
         && let Some(answer) = beyond_vertex_in_plane(v, [a0, a1], [b0, b1])
@@ -314,8 +315,8 @@ fn parted_by_face(v: &Point, a: &[Point], b: &[Point]) -> bool {
         })
 }
 
-/// If v lies in conv(a), then conv(a) is the union of conv(v, f) over the faces f of a. Returns these
-/// faces; no face if `a` is one point.
+/// If v lies in conv(a), then conv(a) is the union of conv(v, f) over the faces f of a. Returns
+/// these faces; no face if `a` is one point.
 fn parts_around(a: Points) -> impl Iterator<Item = Points> {
     let n_parts = if a.n > 1 { a.n } else { 0 };
     (0..n_parts).map(move |left_out_ix| a.without(left_out_ix))

@@ -133,8 +133,8 @@ fn classify_in_tables(pairs: &InTables) -> Verdict16 {
     )
 }
 
-/// Compares the answers of the filter in f32 with the truth, for many batches. Returns how many pairs it settled, and
-/// how many of these intersect.
+/// Compares the answers of the filter in f32 with the truth, for many batches. Returns how many
+/// pairs it settled, and how many of these intersect.
 fn check_in_tables(
     random: &mut Random,
     n_batches: u32,
@@ -497,8 +497,8 @@ fn filter_is_right_on_triangles_that_share_a_vertex_or_an_edge() {
     }
 }
 
-/// Whether two triangles meet beyond their shared vertex 0, without any filter: each is given as a flat
-/// tetrahedron that repeats the triangle's last point.
+/// Whether two triangles meet beyond their shared vertex 0, without any filter: each is given as a
+/// flat tetrahedron that repeats the triangle's last point.
 fn beyond_vertex_by_signs(a: &[Point; 3], b: &[Point; 3]) -> bool {
     let flat = |t: &[Point; 3]| [t[0], t[1], t[2], t[2]];
     tetrahedra_intersect_beyond_shared(&flat(a), [0, 1, 2, 3], &flat(b), [0, 4, 5, 6])

@@ -49,8 +49,8 @@ pub(super) fn tetrahedra_intersect_by_signs(a: &[Point; 4], b: &[Point; 4]) -> b
     if separated_by_face(a, a_sign, b) || separated_by_face(b, b_sign, a) {
         return false;
     }
-    // Either one lies inside the other, and then so does each of its vertices, or their surfaces meet.
-    // A flat tetrahedron is the union of its faces, so it needs no rule of its own.
+    // Either one lies inside the other, and then so does each of its vertices, or their surfaces
+    // meet. A flat tetrahedron is the union of its faces, so it needs no rule of its own.
     contains(a, a_sign, &b[0])
         || contains(b, b_sign, &a[0])
         || (0..4).any(|i| {

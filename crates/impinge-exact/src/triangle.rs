@@ -31,8 +31,8 @@ pub fn triangles_intersect(a: &[Point; 3], b: &[Point; 3]) -> bool {
     })
 }
 
-/// Whether both primitives have a vertex with the same coordinates: then they touch. Most pairs that
-/// no filter can settle are such neighbours in a mesh that repeats its vertices.
+/// Whether both primitives have a vertex with the same coordinates: then they touch. Most pairs
+/// that no filter can settle are such neighbours in a mesh that repeats its vertices.
 pub(super) fn have_common_point(a: &[Point], b: &[Point]) -> bool {
     a.iter().any(|point| b.contains(point))
 }
@@ -61,9 +61,9 @@ pub(super) fn triangles_intersect_by_signs(a: &[Point; 3], b: &[Point; 3]) -> bo
 
 /// Whether two coplanar triangles share a point; `None` when one is degenerate.
 ///
-/// Two convex polygons in a plane are apart if and only if the line of an edge of one has the
-/// other strictly on its outer side. Proof: their difference is a convex polygon with edges parallel
-/// to theirs. If they are apart, the origin lies strictly beyond one of its edges.
+/// Two convex polygons in a plane are apart if and only if the line of an edge of one has the other
+/// strictly on its outer side. Proof: their difference is a convex polygon with edges parallel to
+/// theirs. If they are apart, the origin lies strictly beyond one of its edges.
 fn intersect_in_plane(a: &[Point; 3], b: &[Point; 3]) -> Option<bool> {
     let projection = Projection::injective(&a[0], &a[1], &a[2])?;
     let (a, b) = (projection.apply_all(a), projection.apply_all(b));
@@ -103,7 +103,8 @@ pub(super) fn segment_meets_triangle(p: &Point, q: &Point, triangle: &[Point; 3]
     segment_meets_triangle_with_sides(p, q, p_side, q_side, triangle)
 }
 
-/// Whether the open segment pq passes through the inside of the triangle, so that no border of one touches the other.
+/// Whether the open segment pq passes through the inside of the triangle, so that no border of one
+/// touches the other.
 pub(super) fn passes_inside(p: &Point, q: &Point, triangle: &[Point; 3]) -> bool {
     let [a, b, c] = triangle;
     if !orient3d(a, b, c, p).strictly_opposite(orient3d(a, b, c, q)) {

@@ -1,4 +1,5 @@
-//! Runs a scene and prints one line per step: `cargo run --release -p impinge-fem --example drop -- bunny-7k 240`.
+//! Runs a scene and prints one line per step:
+//! `cargo run --release -p impinge-fem --example drop -- bunny-7k 240`.
 
 use impinge::{Backend, Detector};
 use impinge_fem::scenes::{SceneName, drop_scene};

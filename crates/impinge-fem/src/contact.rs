@@ -1,25 +1,26 @@
 //! Contact: a penalty on the volume of the intersection of two tetrahedra.
 //!
-//! For each pair that the detector finds, the intersection, a polyhedron, is computed exactly (up to
-//! rounding). With volume V, centroid c and a unit direction n, tetrahedron a is pushed by `k V n`
-//! at c and tetrahedron b by the opposite force, distributed to corners by the barycentric coordinates
-//! of c. Both forces act at one point, so linear and angular momentum are conserved. Where bodies overlap by
-//! a depth d over an area A, the forces of all pairs sum to `k A d`: a pressure `k d`, independent of the
-//! meshes.
+//! For each pair that the detector finds, the intersection, a polyhedron, is computed exactly (up
+//! to rounding). With volume V, centroid c and a unit direction n, tetrahedron a is pushed by
+//! `k V n` at c and tetrahedron b by the opposite force, distributed to corners by the barycentric
+//! coordinates of c. Both forces act at one point, so linear and angular momentum are conserved.
+//! Where bodies overlap by a depth d over an area A, the forces of all pairs sum to `k A d`: a
+//! pressure `k d`, independent of the meshes.
 //!
-//! **Direction.** Each vertex has an outward direction. On the surface it is the area-weighted normal of
-//! its faces; inside, it is the direction in which the depth at rest decreases. It is interpolated in the
-//! deformed mesh (Hirota et al. 2001, Fisher & Lin 2001). n is b's direction at c minus a's, normalised: it
-//! is smooth in c, also defined between edges, and does not depend on which body comes first. If both
-//! directions cancel, a is pushed away from the centroid of b.
+//! **Direction.** Each vertex has an outward direction. On the surface it is the area-weighted
+//! normal of its faces; inside, it is the direction in which the depth at rest decreases. It is
+//! interpolated in the deformed mesh (Hirota et al. 2001, Fisher & Lin 2001). n is b's direction at
+//! c minus a's, normalised: it is smooth in c, also defined between edges, and does not depend on
+//! which body comes first. If both directions cancel, a is pushed away from the centroid of b.
 //!
-//! **Stiffness.** As the bodies approach, V grows in proportion to the cross-section. The cross-section is V
-//! divided by the larger of two lengths: the polyhedron's extent along n, and the sum d of the two
-//! interpolated depths at c. With d, a stack of pairs through the overlap shares one cross-section.
-//! The stiffness enters the implicit step, so that stiff contacts stay stable.
+//! **Stiffness.** As the bodies approach, V grows in proportion to the cross-section. The
+//! cross-section is V divided by the larger of two lengths: the polyhedron's extent along n, and
+//! the sum d of the two interpolated depths at c. With d, a stack of pairs through the overlap
+//! shares one cross-section. The stiffness enters the implicit step, so that stiff contacts stay
+//! stable.
 //!
-//! **Friction** is Coulomb's, with the normal force at the beginning of the step; at very small speeds it
-//! grows linearly. It is implicit too.
+//! **Friction** is Coulomb's, with the normal force at the beginning of the step; at very small
+//! speeds it grows linearly. It is implicit too.
 
 use impinge::Pairs;
 use impinge::contact::SolidOverlap;
@@ -76,7 +77,8 @@ pub(crate) fn outward_directions(mesh: &Mesh, positions: &[Vec3], outward: &mut 
         let [a, b, c, d] = element.corners.map(|corner| mesh.depths[corner as usize]);
         let [p, q, r] = &element.gradients;
         let at_rest = p * (b - a) + q * (c - a) + r * (d - a);
-        // The gradient in the deformed element, times its volume: finite even if the element is flat.
+        // The gradient in the deformed element, times its volume: finite even if the element is
+        // flat.
         let f = element.deformation(positions);
         let cofactors = cofactors(&f);
         let det = f.column(0).dot(&cofactors.column(0));
@@ -171,8 +173,8 @@ impl Now<'_> {
         })
     }
 
-    /// Pressure per depth between two elements in Pa/m (the harmonic mean of the materials' moduli over the mean
-    /// edge), and the mean length of their edges.
+    /// Pressure per depth between two elements in Pa/m (the harmonic mean of the materials' moduli
+    /// over the mean edge), and the mean length of their edges.
     fn hardness(&self, pair: [u32; 2]) -> (f64, f64) {
         let [a, b] = pair.map(|tet| {
             let parts = &self.mesh.parts;
@@ -183,8 +185,8 @@ impl Now<'_> {
         (self.settings.contact_stiffness * young / edge, edge)
     }
 
-    /// Calls `add` with the ground's force on each surface vertex below the ground's surface, and its term of the implicit
-    /// step.
+    /// Calls `add` with the ground's force on each surface vertex below the ground's surface, and
+    /// its term of the implicit step.
     pub fn ground(&self, mut add: impl FnMut(usize, Vec3, Mat3)) {
         let Some(ground) = self.settings.ground else {
             return;
@@ -213,7 +215,8 @@ impl Now<'_> {
 fn barycentric(tet: &[Vec3; 4], at: &Vec3) -> Option<[f64; 4]> {
     let [a, b, c, d] = tet.map(|corner| corner - at);
     let volume = |p: &Vec3, q: &Vec3, r: &Vec3| p.cross(q).dot(r);
-    // The weight of a corner is the volume of the tetrahedron in which the point replaces that corner.
+    // The weight of a corner is the volume of the tetrahedron in which the point replaces that
+    // corner.
     let weights = [
         volume(&b, &c, &d),
         -volume(&a, &c, &d),
@@ -258,8 +261,8 @@ pub(crate) fn numbered(mesh: &Mesh, pairs: &Pairs, out: &mut Vec<[u32; 2]>) -> R
     Ok(())
 }
 
-/// The contacts as a part of the system matrix: blocks between any two of a contact's eight vertices,
-/// applied without storing them.
+/// The contacts as a part of the system matrix: blocks between any two of a contact's eight
+/// vertices, applied without storing them.
 #[derive(Debug, Default)]
 pub(crate) struct Couplings {
     pub contacts: Vec<Contact>,

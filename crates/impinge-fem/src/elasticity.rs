@@ -2,8 +2,8 @@
 //!
 //! Müller & Gross 2004 ("Interactive virtual materials"): strain is measured in a frame that turns
 //! with the element, ε = RᵀF − 1 (symmetric, as R is the polar factor), and stress is linear in it:
-//! σ = λ tr(ε) 1 + 2μ ε. A corner with rest gradient g is pulled by −V R σ g, and the stiffness is the
-//! linear one turned by R; the derivative of R is ignored, which keeps the matrix positive
+//! σ = λ tr(ε) 1 + 2μ ε. A corner with rest gradient g is pulled by −V R σ g, and the stiffness is
+//! the linear one turned by R; the derivative of R is ignored, which keeps the matrix positive
 //! semidefinite. [`rotation`] returns a useful R even if the element is inverted.
 
 use nalgebra::Matrix3;
@@ -13,7 +13,8 @@ use crate::element::{Element, Mat3, Vec3};
 use crate::mesh::Mesh;
 use crate::rotation::rotation;
 
-/// The least number of vertices or elements per task of a thread, and the size of the pieces of sums.
+/// The least number of vertices or elements per task of a thread, and the size of the pieces of
+/// sums.
 pub(crate) const GRAIN: usize = 512;
 
 /// The current state of an element.
@@ -51,7 +52,8 @@ impl Turned {
         }
     }
 
-    /// The stiffness between two corners: minus the derivative of the force on `a` with respect to the position of `b`.
+    /// The stiffness between two corners: minus the derivative of the force on `a` with respect to
+    /// the position of `b`.
     #[inline]
     pub fn stiffness(&self, a: usize, b: usize) -> Mat3 {
         let (p, q) = (self.gradient(a), self.gradient(b));
@@ -71,8 +73,8 @@ pub(crate) fn turn(mesh: &Mesh, positions: &[Vec3], turned: &mut Vec<Turned>) {
         .collect_into_vec(turned);
 }
 
-/// The elastic force on each vertex, summed over its tetrahedra in their order, so it does not depend on the
-/// number of threads.
+/// The elastic force on each vertex, summed over its tetrahedra in their order, so it does not
+/// depend on the number of threads.
 pub(crate) fn forces(mesh: &Mesh, turned: &[Turned], forces: &mut Vec<Vec3>) {
     (0..mesh.n_vertices())
         .into_par_iter()

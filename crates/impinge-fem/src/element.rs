@@ -12,7 +12,8 @@ pub(crate) struct Element {
     pub corners: [u32; 4],
     /// Volume, above 0.
     pub volume: f64,
-    /// Gradients of the linear shape functions of corners 1, 2, 3; that of corner 0 is minus their sum.
+    /// Gradients of the linear shape functions of corners 1, 2, 3; that of corner 0 is minus their
+    /// sum.
     pub gradients: [Vec3; 3],
     /// Lamé's λ and μ.
     pub lame: (f64, f64),

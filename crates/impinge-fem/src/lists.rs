@@ -36,8 +36,8 @@ impl Lists {
         }
         self.entries.clear();
         self.entries.resize(n_entries, 0);
-        // At first starts[v + 1] is the beginning of list v. Filling the list advances it to the end of the
-        // list, which is the beginning of list v + 1, as it should be.
+        // At first starts[v + 1] is the beginning of list v. Filling the list advances it to the
+        // end of the list, which is the beginning of list v + 1, as it should be.
         let mut entry = 0;
         for tuple in tuples {
             for vertex in tuple {

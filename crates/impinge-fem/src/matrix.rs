@@ -1,4 +1,5 @@
-//! The system matrix: 3×3 blocks for every two vertices that share a tetrahedron, in compressed rows.
+//! The system matrix: 3×3 blocks for every two vertices that share a tetrahedron, in compressed
+//! rows.
 
 use rayon::prelude::*;
 
@@ -7,7 +8,8 @@ use crate::element::{Mat3, Vec3};
 use crate::lists::Lists;
 use crate::mesh::Mesh;
 
-/// The matrix is symmetric, but all blocks are stored, so that one thread sums each row in a fixed order.
+/// The matrix is symmetric, but all blocks are stored, so that one thread sums each row in a fixed
+/// order.
 #[derive(Debug)]
 pub(crate) struct BlockMatrix {
     /// Columns of each row, ascending.
@@ -16,8 +18,8 @@ pub(crate) struct BlockMatrix {
     blocks: Vec<Mat3>,
     /// The index of the diagonal block of each row.
     diagonal: Vec<u32>,
-    /// For each block, the pairs of corners that contribute to it: 16 · element + 4 · row's corner + column's corner,
-    /// ascending.
+    /// For each block, the pairs of corners that contribute to it: 16 · element + 4 · row's corner
+    /// + column's corner, ascending.
     contributions: Lists,
 }
 

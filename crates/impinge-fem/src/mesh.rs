@@ -11,8 +11,8 @@ use crate::error::Error;
 use crate::lists::Lists;
 use crate::solid::Solid;
 
-/// A tetrahedron with a volume below this share of its longest edge cubed counts as flat: its strains would
-/// be rounding errors.
+/// A tetrahedron with a volume below this share of its longest edge cubed counts as flat: its
+/// strains would be rounding errors.
 const FLAT: f64 = 1e-9;
 
 /// The ranges of a solid's vertices and tetrahedra in the arrays over all solids.

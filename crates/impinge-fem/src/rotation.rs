@@ -2,20 +2,21 @@
 //!
 //! Müller & Gross 2004 use the rotation R of F = R S. If an element is inverted (det F < 0), the
 //! polar decomposition gives a reflection. Irving, Teran & Fedkiw 2004 (section 4) use the singular
-//! value decomposition F = U Σ Vᵀ with proper rotations U, V and let the *smallest* singular value be
-//! negative, so that the element is pushed back along the direction in which it is least inverted. R = U Vᵀ.
+//! value decomposition F = U Σ Vᵀ with proper rotations U, V and let the *smallest* singular value
+//! be negative, so that the element is pushed back along the direction in which it is least
+//! inverted. R = U Vᵀ.
 //!
 //! For det F well above 0 both agree, and Newton's iteration for the polar factor, scaled
 //! (Higham 1986, section 3), is several times faster than an SVD; otherwise the SVD is used.
 
 use nalgebra::{Matrix3, Vector3};
 
-/// Below this share of the determinant of a conformal map of the same size, Newton's iteration would
-/// need many steps or converge to a reflection, so the SVD is used.
+/// Below this share of the determinant of a conformal map of the same size, Newton's iteration
+/// would need many steps or converge to a reflection, so the SVD is used.
 const WELL_CONDITIONED: f64 = 1e-2;
 
-/// The rotation nearest to `f` (in the Frobenius norm): orthogonal, determinant 1. It does not depend
-/// on the scale of `f`; for a zero or non-finite `f` it is the identity.
+/// The rotation nearest to `f` (in the Frobenius norm): orthogonal, determinant 1. It does not
+/// depend on the scale of `f`; for a zero or non-finite `f` it is the identity.
 pub fn rotation(f: &Matrix3<f64>) -> Matrix3<f64> {
     let size = f.norm() / 3f64.sqrt();
     if !(size.is_finite() && size > 0.0) {
@@ -61,7 +62,8 @@ fn signed_svd(f: &Matrix3<f64>) -> Matrix3<f64> {
         return Matrix3::identity();
     };
     if u.determinant() * v_t.determinant() < 0.0 {
-        // U or V is a reflection; reversing the axis of the smallest singular value makes it a rotation.
+        // U or V is a reflection; reversing the axis of the smallest singular value makes it a
+        // rotation.
         let smallest = svd.singular_values.imin();
         u.column_mut(smallest).neg_mut();
     }
@@ -75,8 +77,8 @@ fn signed_svd(f: &Matrix3<f64>) -> Matrix3<f64> {
     }
 }
 
-/// For matrices of (nearly) rank 1: a rotation that maps the direction in which `f` is largest as `f` does.
-/// All such rotations are equally near to `f`, so any will do.
+/// For matrices of (nearly) rank 1: a rotation that maps the direction in which `f` is largest as
+/// `f` does. All such rotations are equally near to `f`, so any will do.
 fn from_dominant_axes(f: &Matrix3<f64>) -> Matrix3<f64> {
     let eigen = (f.transpose() * f).symmetric_eigen();
     let from: Vector3<f64> = eigen

@@ -1,8 +1,9 @@
 //! Scenes with large deformation: one body dropped on another one like it.
 //!
-//! The bodies are those of the paper's table 2, with other meshes of about the same size. The files are
-//! not part of the repository (`tets/*.msh` in the folder of shared data, see [`impinge_scenes::data`]).
-//! If a file is absent, a ball of about the same number of tetrahedra stands in, and the scene's label says so.
+//! The bodies are those of the paper's table 2, with other meshes of about the same size. The files
+//! are not part of the repository (`tets/*.msh` in the folder of shared data, see
+//! [`impinge_scenes::data`]). If a file is absent, a ball of about the same number of tetrahedra
+//! stands in, and the scene's label says so.
 
 use std::path::Path;
 
@@ -84,8 +85,8 @@ pub const SOFT: Material = Material {
     density: 1e3,
 };
 
-/// Builds a scene: two bodies with the longest side of their box 1 m, the upper one turned a little and thrown down
-/// on the lower one.
+/// Builds a scene: two bodies with the longest side of their box 1 m, the upper one turned a little
+/// and thrown down on the lower one.
 ///
 /// # Errors
 /// A mesh file that exists but can't be read, or holds no tetrahedra.
@@ -170,8 +171,8 @@ pub fn load(path: &Path, material: Material) -> Result<Solid, Error> {
     }
 }
 
-/// A block of `n_x` by `n_y` by `n_z` cubes of six tetrahedra with edge `spacing` in metres; one corner is at
-/// the origin.
+/// A block of `n_x` by `n_y` by `n_z` cubes of six tetrahedra with edge `spacing` in metres; one
+/// corner is at the origin.
 pub fn block(n_x: usize, n_y: usize, n_z: usize, spacing: f64, material: Material) -> Solid {
     let model = solids::block(n_x, n_y, n_z, 1.0);
     let rest = model.positions_f64();

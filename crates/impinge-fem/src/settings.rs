@@ -11,8 +11,8 @@ pub struct Ground {
     pub height: f64,
 }
 
-/// Rayleigh damping: the damping matrix is `mass` · M + `stiffness` · K. Backward Euler also damps by
-/// itself, and more for longer steps.
+/// Rayleigh damping: the damping matrix is `mass` · M + `stiffness` · K. Backward Euler also damps
+/// by itself, and more for longer steps.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Damping {
     /// Share of the mass matrix, in 1/s, 0 or more.

@@ -17,12 +17,13 @@ use crate::state::{State, fingerprint};
 
 /// Elastic solids in contact, moved by backward Euler.
 ///
-/// A step solves `(M + h D + h² K) v' = M v + h f` for the new velocities, with the stiffness K and all
-/// forces f at the beginning of the step: one round of Newton's method, as in Müller & Gross 2004. D is
-/// Rayleigh damping. Then `x' = x + h v'`. Contacts add to K as described in [`contact`](crate#contact).
+/// A step solves `(M + h D + h² K) v' = M v + h f` for the new velocities, with the stiffness K and
+/// all forces f at the beginning of the step: one round of Newton's method, as in Müller & Gross
+/// 2004. D is Rayleigh damping. Then `x' = x + h v'`. Contacts add to K as described in
+/// [`contact`](crate#contact).
 ///
-/// Positions are f64 inside. The [`scene`](Simulation::scene), which detection uses and files contain, holds
-/// them rounded to f32.
+/// Positions are f64 inside. The [`scene`](Simulation::scene), which detection uses and files
+/// contain, holds them rounded to f32.
 ///
 /// ```
 /// use impinge::{Backend, Detector};
@@ -95,8 +96,8 @@ pub struct StepReport {
     pub advance_ms: f64,
     /// Iterations of the solver.
     pub n_iterations: usize,
-    /// The residual that the solver reached, relative to the right side. It is above the tolerance if the
-    /// solver ran out of iterations.
+    /// The residual that the solver reached, relative to the right side. It is above the tolerance
+    /// if the solver ran out of iterations.
     pub residual: f64,
     /// Counts and times of the detection.
     pub detection: Stats,
@@ -186,7 +187,8 @@ impl Simulation {
         &self.bodies
     }
 
-    /// The query for the detector: pairs of different solids, and with self-contact also pairs within one solid.
+    /// The query for the detector: pairs of different solids, and with self-contact also pairs
+    /// within one solid.
     pub fn query(&self) -> &Query {
         &self.query
     }
@@ -216,7 +218,8 @@ impl Simulation {
         found.into_iter().map(Into::into).collect()
     }
 
-    /// Forces of the contacts of these pairs on all vertices, in newton, without the forces of the ground.
+    /// Forces of the contacts of these pairs on all vertices, in newton, without the forces of the
+    /// ground.
     ///
     /// # Errors
     /// [`Error::ForeignPair`] for pairs of another scene.
@@ -270,8 +273,8 @@ impl Simulation {
         self.advance(&pairs)
     }
 
-    /// Finds the pairs of tetrahedra that intersect now: the first half of a step. Use it to see the
-    /// pairs together with the positions at which they were found.
+    /// Finds the pairs of tetrahedra that intersect now: the first half of a step. Use it to see
+    /// the pairs together with the positions at which they were found.
     ///
     /// # Errors
     /// As [`Detector::detect`].
@@ -283,7 +286,8 @@ impl Simulation {
     /// [`detect`](Simulation::detect): the second half of a step.
     ///
     /// # Errors
-    /// [`Error::ForeignPair`]; [`Error::NotFinite`] if the motion diverges. The simulation is then unchanged.
+    /// [`Error::ForeignPair`]; [`Error::NotFinite`] if the motion diverges. The simulation is then
+    /// unchanged.
     pub fn advance(&mut self, pairs: &Pairs) -> Result<StepReport, Error> {
         let start = Instant::now();
         let mut scratch = std::mem::take(&mut self.scratch);
@@ -365,8 +369,9 @@ impl Simulation {
         }
     }
 
-    /// Continues from a state of a simulation of the same solids with the same settings; the number of
-    /// threads may differ. The following steps give the same bits as they would have given there.
+    /// Continues from a state of a simulation of the same solids with the same settings; the number
+    /// of threads may differ. The following steps give the same bits as they would have given
+    /// there.
     ///
     /// # Errors
     /// [`Error::State`] for a state of another simulation; [`Error::NotFinite`].

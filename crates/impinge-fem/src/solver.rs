@@ -1,8 +1,9 @@
 //! Conjugate gradients with a block-Jacobi preconditioner.
 //!
 //! Hestenes & Stiefel 1952; fixed vertices are filtered as by Baraff & Witkin 1998 (section 5.3):
-//! their unknowns do not change and their residuals count as 0. Sums run over fixed pieces of
-//! the vertices, each in order, and then over the pieces in order, so they do not depend on the number of threads.
+//! their unknowns do not change and their residuals count as 0. Sums run over fixed pieces of the
+//! vertices, each in order, and then over the pieces in order, so they do not depend on the number
+//! of threads.
 
 use rayon::prelude::*;
 
@@ -11,7 +12,8 @@ use crate::elasticity::GRAIN;
 use crate::element::{Mat3, Vec3};
 use crate::matrix::BlockMatrix;
 
-/// The symmetric positive definite operator: the sparse matrix, and the couplings of bodies in contact.
+/// The symmetric positive definite operator: the sparse matrix, and the couplings of bodies in
+/// contact.
 pub(crate) struct System<'a> {
     pub matrix: &'a BlockMatrix,
     pub couplings: &'a Couplings,
@@ -132,8 +134,8 @@ impl System<'_> {
                 break;
             }
             let step = norm / curvature;
-            // One pass over all vectors updates the solution, the residual, the preconditioned residual and
-            // the product of these two.
+            // One pass over all vectors updates the solution, the residual, the preconditioned
+            // residual and the product of these two.
             x.par_chunks_mut(GRAIN)
                 .zip(residual.par_chunks_mut(GRAIN))
                 .zip(preconditioned.par_chunks_mut(GRAIN))

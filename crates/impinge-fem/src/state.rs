@@ -3,8 +3,9 @@
 //! ```text
 //! "impinge state 1\n" | fingerprint u64 | step u64 | n vertices u64 | positions 3n f64 | velocities 3n f64 | checksum u64
 //! ```
-//! All numbers are little-endian. The fingerprint identifies the solids and the settings that affect the
-//! result; the checksum covers all bytes before it. Both are 64-bit FNV-1a (Fowler, Noll, Vo).
+//! All numbers are little-endian. The fingerprint identifies the solids and the settings that
+//! affect the result; the checksum covers all bytes before it. Both are 64-bit FNV-1a (Fowler,
+//! Noll, Vo).
 
 use crate::error::Error;
 use crate::settings::Settings;

@@ -1,8 +1,10 @@
-//! Cloth that never intersects: every stored state comes from `advance`, and no state has two triangles that intersect.
+//! Cloth that never intersects: every stored state comes from `advance`, and no state has two
+//! triangles that intersect.
 //!
-//! The scene is awkward on purpose, in single precision: a sheet falls flat onto a box whose edges are exactly below its own, is
-//! pierced at by a box that stands on its corner, rests on the first box's top, coplanar with it, and hangs down at the sides; a
-//! second sheet falls on it, folded double.
+//! The scene is awkward on purpose, in single precision: a sheet falls flat onto a box whose edges
+//! are exactly below its own, is pierced at by a box that stands on its corner, rests on the first
+//! box's top, coplanar with it, and hangs down at the sides; a second sheet falls on it, folded
+//! double.
 
 use impinge::{
     Backend, BodyId, Detector, Elements, Impact, PairKind, Part, Positions, Precision, Query,
@@ -133,8 +135,8 @@ impl World {
         }
     }
 
-    /// One step. Every second one is taken as far as it goes, so that elements come as close as their precision allows; in
-    /// the others, vertices that would touch move together.
+    /// One step. Every second one is taken as far as it goes, so that elements come as close as
+    /// their precision allows; in the others, vertices that would touch move together.
     fn advance(&mut self) {
         let before: Vec<_> = self.sheets.iter().map(|of| self.positions(of.id)).collect();
         let mut wished: Vec<_> = self
@@ -201,7 +203,8 @@ impl World {
         self.n_steps += 1;
     }
 
-    /// What a solver does that knows the exact time of the first contact, but not what rounding does: goes there.
+    /// What a solver does that knows the exact time of the first contact, but not what rounding
+    /// does: goes there.
     fn take_rounded(&mut self, before: &[Vec<Point>], wished: &[Vec<Point>]) {
         let step = self.step.clone().precision(Precision::F64);
         let first = self.detector.earliest(&self.scene, &step).expect("good");

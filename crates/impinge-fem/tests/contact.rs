@@ -1,4 +1,5 @@
-//! Contact: forces balance, bodies do not pass through each other, the ground holds, every run gives the same bits.
+//! Contact: forces balance, bodies do not pass through each other, the ground holds, every run
+//! gives the same bits.
 
 mod common;
 
@@ -43,8 +44,8 @@ fn contact_forces_are_opposite_and_twist_nothing() {
     let positions = simulation.positions();
     let n = forces.len() / 2;
     let (below, above) = (sum(forces[..n].to_vec()), sum(forces[n..].to_vec()));
-    // The overlap is 0.07 m deep over the common area of two squares, turned and moved. It pushes straight up except
-    // at the rim, where normals lean outwards.
+    // The overlap is 0.07 m deep over the common area of two squares, turned and moved. It pushes
+    // straight up except at the rim, where normals lean outwards.
     let pressure = settings.contact_stiffness * 1e5 * 0.07 / mean_edge();
     let area = above[1] / pressure;
     assert!((0.7..0.95).contains(&area), "{area}");
@@ -206,7 +207,8 @@ fn friction_holds_on_a_slope_and_without_it_slides() {
         let n = simulation.masses().len() as f64;
         simulation.positions().iter().map(|p| p[0]).sum::<f64>() / n
     };
-    // The path in one second of free sliding: g sin 0.2 / 2; with friction of 0.1, g (sin 0.2 - 0.1 cos 0.2) / 2.
+    // The path in one second of free sliding: g sin 0.2 / 2; with friction of 0.1, g (sin 0.2 - 0.1
+    // cos 0.2) / 2.
     assert!((slide(0.0) - 0.974).abs() < 0.08, "{}", slide(0.0));
     assert!((slide(0.1) - 0.494).abs() < 0.08, "{}", slide(0.1));
     assert!(slide(0.5) < 0.1, "{}", slide(0.5));

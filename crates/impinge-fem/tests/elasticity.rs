@@ -12,7 +12,8 @@ const MATERIAL: Material = Material {
     density: 1e3,
 };
 
-/// A block of 4 by 3 by 3 cubes of 0.25 m with randomly moved inner vertices, so that no two elements are alike.
+/// A block of 4 by 3 by 3 cubes of 0.25 m with randomly moved inner vertices, so that no two
+/// elements are alike.
 fn shaken_block() -> Solid {
     let mut solid = scenes::block(4, 3, 3, 0.25, MATERIAL);
     let mut random = Random::new(5);
@@ -57,8 +58,8 @@ fn patch_test_a_uniform_stretch_leaves_inner_vertices_without_force() {
         }
     }
     assert_eq!(n_inside, 3 * 2 * 2);
-    // The face x = 1 is pulled back by stress times area. Its border vertices also carry parts of the sides'
-    // tractions, which cancel between opposite sides, because these have the same mesh.
+    // The face x = 1 is pulled back by stress times area. Its border vertices also carry parts of
+    // the sides' tractions, which cancel between opposite sides, because these have the same mesh.
     let (lambda, mu) = MATERIAL.lame();
     let [xx, yy, zz, xy, xz] = [0.02, -0.03, 0.01, 0.01, -0.005];
     let normal_stress = lambda * (xx + yy + zz) + 2.0 * mu * xx;
@@ -270,7 +271,8 @@ fn inverted_elements_recover() {
         }
         let end = simulation.energy().elastic;
         if what == "point" {
-            // The direction in which a point unfolds is not defined, but it must not stay a point, nor fly apart.
+            // The direction in which a point unfolds is not defined, but it must not stay a point,
+            // nor fly apart.
             assert!(end < 0.5 * start, "{what}: {start} -> {end}");
             continue;
         }

@@ -1,5 +1,5 @@
-//! Base64 as found in mesh files: with white space, and with padding in the middle if a writer encoded header and data
-//! separately.
+//! Base64 as found in mesh files: with white space, and with padding in the middle if a writer
+//! encoded header and data separately.
 
 /// The offset of the first byte that is not valid base64.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

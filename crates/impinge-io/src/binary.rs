@@ -47,8 +47,8 @@ impl Scalar {
         )
     }
 
-    /// The number at the start of `bytes`, which hold at least [`size`](Self::size), as an integer. A u64 beyond i64
-    /// becomes `i64::MAX`, which no index or count reaches; floats are truncated.
+    /// The number at the start of `bytes`, which hold at least [`size`](Self::size), as an integer.
+    /// A u64 beyond i64 becomes `i64::MAX`, which no index or count reaches; floats are truncated.
     pub(crate) fn integer(self, bytes: &[u8], endian: Endian) -> i64 {
         match self {
             Scalar::I8 => i64::from(i8::from_ne_bytes([bytes[0]])),
@@ -65,7 +65,8 @@ impl Scalar {
         }
     }
 
-    /// The number at the start of `bytes`, which hold at least [`size`](Self::size), in f64; a 64-bit integer is rounded.
+    /// The number at the start of `bytes`, which hold at least [`size`](Self::size), in f64; a
+    /// 64-bit integer is rounded.
     pub(crate) fn float(self, bytes: &[u8], endian: Endian) -> f64 {
         match self {
             Scalar::F32 => f64::from(f32::from_le_bytes(array(bytes, endian))),
@@ -74,7 +75,8 @@ impl Scalar {
         }
     }
 
-    /// The number at the start of `bytes` in f32. Callers make sure that [`fits_f32`](Self::fits_f32) holds, so it is exact.
+    /// The number at the start of `bytes` in f32. Callers make sure that
+    /// [`fits_f32`](Self::fits_f32) holds, so it is exact.
     pub(crate) fn narrow(self, bytes: &[u8], endian: Endian) -> f32 {
         match self {
             Scalar::F32 => f32::from_le_bytes(array(bytes, endian)),

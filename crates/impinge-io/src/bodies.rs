@@ -24,7 +24,8 @@ pub(crate) struct Parts {
 }
 
 impl Parts {
-    /// From triangle `first` on, triangles belong to the part of this name: to a new one, or to the one that has it already.
+    /// From triangle `first` on, triangles belong to the part of this name: to a new one, or to the
+    /// one that has it already.
     pub(crate) fn begin(&mut self, name: &str, is_new: bool, first: usize) {
         let part = match self.known.get(name) {
             Some(&part) if !is_new => part,
@@ -41,7 +42,8 @@ impl Parts {
         self.runs.push((first, part));
     }
 
-    /// One mesh per part that has triangles, in the order of their first ones; the mesh itself if there are not several.
+    /// One mesh per part that has triangles, in the order of their first ones; the mesh itself if
+    /// there are not several.
     pub(crate) fn split(self, mesh: Mesh) -> Vec<NamedMesh> {
         let faces = match &mesh.elements {
             Elements::Triangles(faces) if self.runs.len() > 1 => faces,
@@ -88,7 +90,8 @@ impl Parts {
     }
 }
 
-/// The mesh of these faces and the vertices that they name, in their order. `numbers` has room for a number per vertex.
+/// The mesh of these faces and the vertices that they name, in their order. `numbers` has room for
+/// a number per vertex.
 fn part_of(positions: &Positions, mut faces: Vec<[u32; 3]>, numbers: &mut [u32]) -> Mesh {
     let mut named: Vec<u32> = faces.as_flattened().to_vec();
     named.sort_unstable();

@@ -2,7 +2,8 @@
 
 use crate::error::{Error, Name, Place};
 
-/// Reserves room for `n` more elements. Returns an error if there is not enough memory, instead of ending the process.
+/// Reserves room for `n` more elements. Returns an error if there is not enough memory, instead of
+/// ending the process.
 pub(crate) fn reserve<T>(name: Name, place: Place, to: &mut Vec<T>, n: u64) -> Result<(), Error> {
     usize::try_from(n)
         .ok()
@@ -13,8 +14,9 @@ pub(crate) fn reserve<T>(name: Name, place: Place, to: &mut Vec<T>, n: u64) -> R
         })
 }
 
-/// The most bytes that the compressed data of a file of `length` bytes may expand to. Meshes rarely compress to less than a
-/// tenth of their size. Constant arrays compress by a factor of a thousand, but they are a small part of a mesh.
+/// The most bytes that the compressed data of a file of `length` bytes may expand to. Meshes rarely
+/// compress to less than a tenth of their size. Constant arrays compress by a factor of a thousand,
+/// but they are a small part of a mesh.
 pub(crate) fn most_expanded(length: u64, limit: u64) -> u64 {
     const FACTOR: u64 = 200;
     const FLOOR: u64 = 64 << 20;

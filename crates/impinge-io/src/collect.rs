@@ -1,4 +1,5 @@
-//! The output of every reader: positions, triangles, tetrahedra, and the counts of fanned polygons and skipped cells.
+//! The output of every reader: positions, triangles, tetrahedra, and the counts of fanned polygons
+//! and skipped cells.
 
 use std::ops::Range;
 
@@ -15,8 +16,8 @@ pub(crate) struct Collector<'a> {
     pub positions: Positions,
     pub triangles: Vec<[u32; 3]>,
     pub tetrahedra: Vec<[u32; 4]>,
-    /// The triangles of polygons of more than three corners. If the fan is no good, they are replaced in the end: some
-    /// formats name vertices before their positions.
+    /// The triangles of polygons of more than three corners. If the fan is no good, they are
+    /// replaced in the end: some formats name vertices before their positions.
     fans: Vec<Range<usize>>,
     pub n_lines: u64,
     pub n_points: u64,
@@ -41,8 +42,8 @@ impl<'a> Collector<'a> {
         }
     }
 
-    /// The triangles that are added from now on belong to the part of this name, until another one begins. With `is_new`, a
-    /// part of the same name that began before is another one.
+    /// The triangles that are added from now on belong to the part of this name, until another one
+    /// begins. With `is_new`, a part of the same name that began before is another one.
     pub(crate) fn begin_part(&mut self, name: &str, is_new: bool) {
         self.parts.begin(name, is_new, self.triangles.len());
     }
@@ -56,7 +57,8 @@ impl<'a> Collector<'a> {
         vertex_ix(self.name, index, first, self.n_vertices(), place)
     }
 
-    /// Adds the face in [`corners`](Self::corners): a polygon, unless it has the one corner of a point or the two of a line.
+    /// Adds the face in [`corners`](Self::corners): a polygon, unless it has the one corner of a
+    /// point or the two of a line.
     pub(crate) fn face(&mut self, place: Place) -> Result<(), Error> {
         match self.corners.len() {
             1 => self.n_points += 1,
@@ -91,8 +93,8 @@ impl<'a> Collector<'a> {
         Ok(())
     }
 
-    /// Adds the strip in [`corners`](Self::corners): each corner forms a triangle with the two before it; every other
-    /// triangle is flipped.
+    /// Adds the strip in [`corners`](Self::corners): each corner forms a triangle with the two
+    /// before it; every other triangle is flipped.
     pub(crate) fn strip(&mut self) {
         self.triangles
             .extend(self.corners.windows(3).enumerate().map(|(ix, t)| {
@@ -128,7 +130,8 @@ impl<'a> Collector<'a> {
         Ok((bodies, summary))
     }
 
-    /// Chooses the primitives that the options ask for, checks that there are some, and welds if the options say so.
+    /// Chooses the primitives that the options ask for, checks that there are some, and welds if
+    /// the options say so.
     pub(crate) fn finish(mut self, options: &ReadOptions) -> Result<(Mesh, Summary), Error> {
         let n_polygons_fanned = self.fans.len() as u64;
         for fan in std::mem::take(&mut self.fans) {

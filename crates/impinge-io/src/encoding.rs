@@ -6,8 +6,8 @@ use crate::formats::stl;
 
 /// Refuses text in UTF-16, which some editors and shells write, with an error that says so.
 ///
-/// Without a byte order mark, UTF-16 is recognised by a zero in every other byte. Only binary STL can start like that, because
-/// its title may be anything; binary STL is recognised by its length.
+/// Without a byte order mark, UTF-16 is recognised by a zero in every other byte. Only binary STL
+/// can start like that, because its title may be anything; binary STL is recognised by its length.
 pub(crate) fn check_encoding(bytes: &[u8], format: Format, name: Name) -> Result<(), Error> {
     let is_utf16 = match bytes {
         [0xff, 0xfe, ..] | [0xfe, 0xff, ..] => true,

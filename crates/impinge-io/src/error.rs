@@ -3,8 +3,8 @@
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-/// The name of a file as text for a terminal or a log: control characters, such as line breaks and the start of escape
-/// sequences, are escaped.
+/// The name of a file as text for a terminal or a log: control characters, such as line breaks and
+/// the start of escape sequences, are escaped.
 ///
 /// ```
 /// assert_eq!(impinge_io::printable("a\n\u{1b}[2J.ply"), r"a\n\u{1b}[2J.ply");
@@ -58,8 +58,8 @@ impl fmt::Display for Location {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// The operating system reported an error. Check that the file exists, that it may be read or written, and that the disk has
-    /// room.
+    /// The operating system reported an error. Check that the file exists, that it may be read or
+    /// written, and that the disk has room.
     #[error("{}: cannot {action}: {source}", crate::printable(.path))]
     Io {
         /// The file or folder.
@@ -69,7 +69,8 @@ pub enum Error {
         /// The system's error.
         source: std::io::Error,
     },
-    /// The path is not a regular file but a pipe, a device, a socket or a folder. Check the name, or copy its content to a file.
+    /// The path is not a regular file but a pipe, a device, a socket or a folder. Check the name,
+    /// or copy its content to a file.
     #[error("{}: is {what}, not a regular file", crate::printable(.path))]
     NotAFile {
         /// The path.
@@ -77,8 +78,8 @@ pub enum Error {
         /// What the path is instead.
         what: &'static str,
     },
-    /// A mesh file or a pattern names a file in another folder, perhaps through a link. Check that you trust the mesh, or put
-    /// the file beside it.
+    /// A mesh file or a pattern names a file in another folder, perhaps through a link. Check that
+    /// you trust the mesh, or put the file beside it.
     #[error("{}: is not in {}; only files in the folder of the mesh or below it are read", crate::printable(.path), crate::printable(.folder))]
     Outside {
         /// The file that was named.
@@ -86,7 +87,8 @@ pub enum Error {
         /// The folder in which the file should be.
         folder: PathBuf,
     },
-    /// The format is chosen by the file's extension, and this extension is not known. Check the name.
+    /// The format is chosen by the file's extension, and this extension is not known. Check the
+    /// name.
     #[error("{}: no mesh format has the extension '{extension}' (known: {known})", crate::printable(.path))]
     UnknownFormat {
         /// The file.
@@ -140,7 +142,8 @@ pub enum Error {
         /// How many there are.
         found: u64,
     },
-    /// A primitive names a vertex that does not exist. Check the index; the message says how the format counts.
+    /// A primitive names a vertex that does not exist. Check the index; the message says how the
+    /// format counts.
     #[error(
         "{at}: vertex index {index} is out of range; vertices: {n_vertices}, numbered from {first}"
     )]
@@ -154,7 +157,8 @@ pub enum Error {
         /// How many vertices there are.
         n_vertices: u64,
     },
-    /// A coordinate is NaN or infinite (a text number beyond the range of f64 counts as infinite). Check the vertex.
+    /// A coordinate is NaN or infinite (a text number beyond the range of f64 counts as infinite).
+    /// Check the vertex.
     #[error("{at}: vertex {vertex} has the coordinate {value}, which is not a finite number")]
     NotFinite {
         /// Where.
@@ -164,7 +168,8 @@ pub enum Error {
         /// The coordinate.
         value: f64,
     },
-    /// The file is valid, but uses a feature that is not supported. Convert it with another program.
+    /// The file is valid, but uses a feature that is not supported. Convert it with another
+    /// program.
     #[error("{at}: {what} is not supported")]
     Unsupported {
         /// Where.
@@ -172,7 +177,8 @@ pub enum Error {
         /// What is not supported, and the supported alternatives.
         what: String,
     },
-    /// The file has no primitive of the wanted kind. Check that it is a surface or a volume, not points or curves.
+    /// The file has no primitive of the wanted kind. Check that it is a surface or a volume, not
+    /// points or curves.
     #[error(
         "{}: no {wanted} in this file (vertices: {n_vertices}, triangles: {n_triangles}, tetrahedra: {n_tetrahedra}, lines: {n_lines}, points: {n_points})",
         crate::printable(.file)
@@ -193,8 +199,8 @@ pub enum Error {
         /// Point cells in the file.
         n_points: u64,
     },
-    /// A number is too large for an index, or for a byte limit of [`ReadOptions`](crate::ReadOptions). Split the file, or raise
-    /// the limit.
+    /// A number is too large for an index, or for a byte limit of
+    /// [`ReadOptions`](crate::ReadOptions). Split the file, or raise the limit.
     #[error("{at}: {what}: {found} is more than the limit of {limit}")]
     TooLarge {
         /// Where.
@@ -206,7 +212,8 @@ pub enum Error {
         /// How much there is.
         found: u64,
     },
-    /// There is not enough memory for the content of the file. Check that the file is valid, or give the process more memory.
+    /// There is not enough memory for the content of the file. Check that the file is valid, or
+    /// give the process more memory.
     #[error("{at}: {needed} bytes of memory are needed, but there is not enough")]
     NoMemory {
         /// The place in the file.

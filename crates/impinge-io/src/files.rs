@@ -1,8 +1,9 @@
-//! Opening files safely: only regular files, only up to a size limit, and files named by a mesh only in the mesh's folder.
+//! Opening files safely: only regular files, only up to a size limit, and files named by a mesh
+//! only in the mesh's folder.
 //!
-//! Reading a pipe may never end, and a device may give bytes forever; neither is a mesh. A path inside a mesh file
-//! may have been written by somebody who wants to see other files. So such a path is resolved, including links, and
-//! must lie in the folder of the mesh file or below.
+//! Reading a pipe may never end, and a device may give bytes forever; neither is a mesh. A path
+//! inside a mesh file may have been written by somebody who wants to see other files. So such a
+//! path is resolved, including links, and must lie in the folder of the mesh file or below.
 
 use std::fs::{self, File, Metadata, OpenOptions};
 use std::io::Read;
@@ -76,8 +77,8 @@ fn open(shown: &Path, path: &Path) -> Result<(File, u64), Error> {
             what: kind(metadata),
         }),
     };
-    // Opening a device can already have effects, so the path is checked first. The open file is checked again, because the path
-    // may lead to another file by now.
+    // Opening a device can already have effects, so the path is checked first. The open file is
+    // checked again, because the path may lead to another file by now.
     check(&fs::metadata(path).map_err(failed)?)?;
     let file = patient(OpenOptions::new().read(true))
         .open(path)
@@ -125,7 +126,8 @@ fn kind(metadata: &Metadata) -> &'static str {
 /// `path` with all links resolved; an error unless it lies in `folder` or below.
 fn resolved(path: &Path, folder: &Path) -> Result<PathBuf, Error> {
     let outside = || outside(path, folder);
-    // Names that lead out are refused before any lookup, so that an error does not reveal whether such a file exists.
+    // Names that lead out are refused before any lookup, so that an error does not reveal whether
+    // such a file exists.
     if path.strip_prefix(folder).is_ok_and(leads_out) {
         return Err(outside());
     }

@@ -4,7 +4,8 @@ use std::path::Path;
 
 use crate::error::Error;
 
-/// A format of meshes that [`read`](crate::read) knows. Text and binary flavours are told apart by content.
+/// A format of meshes that [`read`](crate::read) knows. Text and binary flavours are told apart by
+/// content.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Format {

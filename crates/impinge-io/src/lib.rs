@@ -1,5 +1,5 @@
-//! Mesh files for impinge: reads surfaces, tetrahedra and sequences of positions, writes coloured meshes. Both sides are plain
-//! arrays; this crate knows nothing about collision detection.
+//! Mesh files for impinge: reads surfaces, tetrahedra and sequences of positions, writes coloured
+//! meshes. Both sides are plain arrays; this crate knows nothing about collision detection.
 //!
 //! ```no_run
 //! use impinge_io::{ColoredMesh, ReadOptions, read, write_ply};
@@ -18,24 +18,29 @@
 //! ```
 //!
 //! # What readers preserve
-//! - **Values.** Binary `float` coordinates stay f32. Coordinates in text are read as f64, correctly rounded, whatever
-//!   type a header declares; [`Positions::narrow_if_exact`] converts them to f32 if nothing is lost.
-//! - **Order.** Vertices and primitives keep the order of the file. A polygon of n corners becomes n - 2 triangles
-//!   in its place: the fan around its first corner, which covers a convex polygon exactly. If the polygon is concave and its fan
-//!   overlaps itself, as seen along its normal, or if it has more than 256 corners, its ears are clipped instead, in `O(n log n)`. A strip
+//! - **Values.** Binary `float` coordinates stay f32. Coordinates in text are read as f64,
+//!   correctly rounded, whatever type a header declares; [`Positions::narrow_if_exact`] converts
+//!   them to f32 if nothing is lost.
+//! - **Order.** Vertices and primitives keep the order of the file. A polygon of n corners becomes
+//!   n - 2 triangles in its place: the fan around its first corner, which covers a convex polygon
+//!   exactly. If the polygon is concave and its fan overlaps itself, as seen along its normal, or
+//!   if it has more than 256 corners, its ears are clipped instead, in `O(n log n)`. A strip
 //!   becomes its triangles.
-//! - **Everything that can collide.** Points and lines are counted and skipped. If a file has tetrahedra, its triangles are
-//!   skipped too, unless [`ReadOptions::prefer`] says otherwise; see [`Summary`]. Hexahedra, prisms, pyramids and
-//!   curved (higher-order) cells are refused with an error: skipping them would lose collisions silently.
+//! - **Everything that can collide.** Points and lines are counted and skipped. If a file has
+//!   tetrahedra, its triangles are skipped too, unless [`ReadOptions::prefer`] says otherwise; see
+//!   [`Summary`]. Hexahedra, prisms, pyramids and curved (higher-order) cells are refused with an
+//!   error: skipping them would lose collisions silently.
 //!
 //! # What readers refuse
-//! Indices out of range, coordinates that are not finite, files that end early, and headers that announce more than the
-//! file holds: each is an [`Error`] that names the file, the line or byte offset, and both numbers. Memory is reserved by the
-//! content of a file, not by what its header says.
+//! Indices out of range, coordinates that are not finite, files that end early, and headers that
+//! announce more than the file holds: each is an [`Error`] that names the file, the line or byte
+//! offset, and both numbers. Memory is reserved by the content of a file, not by what its header
+//! says.
 //!
 //! # Why the parsers are our own
-//! Crates exist for most of these formats, but they cover only one version of a format, read coordinates as f32, merge vertices,
-//! or report errors without a line. For XML, JSON, zlib and LZ4 we use crates.
+//! Crates exist for most of these formats, but they cover only one version of a format, read
+//! coordinates as f32, merge vertices, or report errors without a line. For XML, JSON, zlib and LZ4
+//! we use crates.
 
 mod base64;
 mod binary;

@@ -1,7 +1,7 @@
 //! A mesh as plain arrays, and the welding of its vertices.
 
-/// Vertex positions in the precision of their file: binary `float` stays f32; text is read as f64, so that no coordinate is
-/// silently rounded to f32.
+/// Vertex positions in the precision of their file: binary `float` stays f32; text is read as f64,
+/// so that no coordinate is silently rounded to f32.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Positions {
     /// One `[x, y, z]` per vertex, in the file's unit of length.
@@ -24,7 +24,8 @@ impl Positions {
         self.len() == 0
     }
 
-    /// The position of vertex `ix` in f64, which holds every f32 exactly; `None` if there is no such vertex.
+    /// The position of vertex `ix` in f64, which holds every f32 exactly; `None` if there is no
+    /// such vertex.
     pub fn get(&self, ix: usize) -> Option<[f64; 3]> {
         match self {
             Positions::F32(p) => p.get(ix).map(|v| v.map(f64::from)),
@@ -40,8 +41,8 @@ impl Positions {
         }
     }
 
-    /// All positions in f32, each coordinate rounded to the nearest. Lossless for `F32`, and for `F64` if and only if
-    /// [`narrow_if_exact`](Self::narrow_if_exact) would narrow.
+    /// All positions in f32, each coordinate rounded to the nearest. Lossless for `F32`, and for
+    /// `F64` if and only if [`narrow_if_exact`](Self::narrow_if_exact) would narrow.
     pub fn to_f32_rounded(&self) -> Vec<[f32; 3]> {
         match self {
             Positions::F32(p) => p.clone(),
@@ -49,9 +50,11 @@ impl Positions {
         }
     }
 
-    /// Converts `F64` to `F32` if every coordinate is exactly representable in f32. Returns whether the positions are f32 now.
+    /// Converts `F64` to `F32` if every coordinate is exactly representable in f32. Returns whether
+    /// the positions are f32 now.
     ///
-    /// No coordinate changes its value, so no answer about the mesh changes; this halves the memory.
+    /// No coordinate changes its value, so no answer about the mesh changes; this halves the
+    /// memory.
     pub fn narrow_if_exact(&mut self) -> bool {
         let Positions::F64(wide) = self else {
             return true;
@@ -109,7 +112,8 @@ impl Elements {
     }
 }
 
-/// One body: vertices and primitives. Readers guarantee that every index is in range and every coordinate is finite.
+/// One body: vertices and primitives. Readers guarantee that every index is in range and every
+/// coordinate is finite.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mesh {
     /// The positions of the vertices.
@@ -132,8 +136,8 @@ impl Mesh {
 
 /// A map from vertices to welded vertices: vertices at the same position become one.
 ///
-/// Keep it for reading a sequence: the frames have the vertices of the file, and [`Weld::positions`] converts them to those of
-/// the welded mesh.
+/// Keep it for reading a sequence: the frames have the vertices of the file, and
+/// [`Weld::positions`] converts them to those of the welded mesh.
 ///
 /// ```
 /// use impinge_io::{Positions, Weld};
@@ -146,8 +150,9 @@ impl Mesh {
 pub struct Weld(impinge_weld::Weld);
 
 impl Weld {
-    /// Welds vertices whose coordinates are all equal as numbers (-0.0 equals 0.0). Of equal vertices the first one stays, and
-    /// the order of vertices is kept. NaN equals nothing, so a vertex with NaN is never welded.
+    /// Welds vertices whose coordinates are all equal as numbers (-0.0 equals 0.0). Of equal
+    /// vertices the first one stays, and the order of vertices is kept. NaN equals nothing, so a
+    /// vertex with NaN is never welded.
     pub fn by_position(positions: &Positions) -> Self {
         Weld(match positions {
             Positions::F32(p) => impinge_weld::Weld::by_position(p),
@@ -155,7 +160,8 @@ impl Weld {
         })
     }
 
-    /// Welds only vertices that both weldings weld: given two poses of the same vertices, those that coincide in both.
+    /// Welds only vertices that both weldings weld: given two poses of the same vertices, those
+    /// that coincide in both.
     ///
     /// # Panics
     /// If the two weldings have different numbers of vertices.
@@ -173,7 +179,8 @@ impl Weld {
         self.0.map()
     }
 
-    /// Welds the mesh that this welding was computed from: its vertices, and the indices of its primitives.
+    /// Welds the mesh that this welding was computed from: its vertices, and the indices of its
+    /// primitives.
     pub fn apply(&self, mesh: &mut Mesh) {
         if self.n_welded() == 0 {
             return;
@@ -196,7 +203,8 @@ impl Weld {
         }
     }
 
-    /// The positions of the welded vertices, taken from those of all vertices (of any frame); `None` if their number differs.
+    /// The positions of the welded vertices, taken from those of all vertices (of any frame);
+    /// `None` if their number differs.
     pub fn positions(&self, positions: &Positions) -> Option<Positions> {
         Some(match positions {
             Positions::F32(p) => Positions::F32(self.0.positions(p).ok()?),
@@ -205,10 +213,12 @@ impl Weld {
     }
 }
 
-/// Welds the vertices of `mesh` that are at the same position (compared as numbers, exactly) and returns how many it removed.
+/// Welds the vertices of `mesh` that are at the same position (compared as numbers, exactly) and
+/// returns how many it removed.
 ///
-/// Primitives keep their number and order, so their ids do not change; primitives whose corners are welded become
-/// degenerate and stay. To weld the frames of a sequence in the same way, see [`Weld`].
+/// Primitives keep their number and order, so their ids do not change; primitives whose corners are
+/// welded become degenerate and stay. To weld the frames of a sequence in the same way, see
+/// [`Weld`].
 pub fn weld(mesh: &mut Mesh) -> usize {
     let weld = Weld::by_position(&mesh.positions);
     weld.apply(mesh);

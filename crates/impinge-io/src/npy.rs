@@ -1,13 +1,14 @@
 //! NumPy's array format.
 
-/// The header of NumPy's array format, version 1.0 (NEP 1): magic, version, length of the description, description
-/// padded with spaces so that the data starts at a multiple of 64. The data is little-endian, in C order.
+/// The header of NumPy's array format, version 1.0 (NEP 1): magic, version, length of the
+/// description, description padded with spaces so that the data starts at a multiple of 64. The
+/// data is little-endian, in C order.
 pub fn npy_header(kind: &str, shape: &str) -> Vec<u8> {
     npy_header_in(0, kind, shape)
 }
 
-/// The same in `n_bytes` bytes, a multiple of 64, or in more where it needs more: for a header that is written over one of
-/// that length, once the number of rows is known.
+/// The same in `n_bytes` bytes, a multiple of 64, or in more where it needs more: for a header that
+/// is written over one of that length, once the number of rows is known.
 pub(crate) fn npy_header_in(n_bytes: usize, kind: &str, shape: &str) -> Vec<u8> {
     const PREAMBLE: usize = 10;
     let mut text = format!("{{'descr': {kind}, 'fortran_order': False, 'shape': {shape}, }}");
@@ -36,7 +37,8 @@ pub struct NpyHeader {
 }
 
 impl NpyHeader {
-    /// Reads the header at the beginning of a file; `None` if it is not valid, or if the array holds something else than plain numbers.
+    /// Reads the header at the beginning of a file; `None` if it is not valid, or if the array
+    /// holds something else than plain numbers.
     pub fn parse(head: &[u8]) -> Option<Self> {
         let rest = head.strip_prefix(b"\x93NUMPY")?;
         let (length, preamble) = match *rest {

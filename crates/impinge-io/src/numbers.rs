@@ -12,9 +12,10 @@ use crate::options::ReadOptions;
 use crate::read::collect_file;
 use crate::text::{Text, number};
 
-/// Reads rows of `N` finite numbers: a NumPy array of shape `(n, N)` of `float32` or `float64` (`.npy`), or text (`.csv`, `.txt`, `.xyz`)
-/// with a row per line. Numbers in text are separated by commas or blanks; what follows `#` is a comment, and a first line without any
-/// number holds names of columns.
+/// Reads rows of `N` finite numbers: a NumPy array of shape `(n, N)` of `float32` or `float64`
+/// (`.npy`), or text (`.csv`, `.txt`, `.xyz`) with a row per line. Numbers in text are separated by
+/// commas or blanks; what follows `#` is a comment, and a first line without any number holds names
+/// of columns.
 ///
 /// ```no_run
 /// use impinge_io::{ReadOptions, read_rows};
@@ -25,8 +26,9 @@ use crate::text::{Text, number};
 /// ```
 ///
 /// # Errors
-/// [`Error::UnknownRows`] for another extension; [`Error::Syntax`], which names the line or the byte, for a row of another
-/// length and for what is no finite number; [`Error::Truncated`] for an array that ends early.
+/// [`Error::UnknownRows`] for another extension; [`Error::Syntax`], which names the line or the
+/// byte, for a row of another length and for what is no finite number; [`Error::Truncated`] for an
+/// array that ends early.
 pub fn read_rows<const N: usize>(
     path: &Path,
     options: &ReadOptions,
@@ -44,8 +46,8 @@ pub fn read_rows<const N: usize>(
     }
 }
 
-/// Reads points: rows of three numbers, as [`read_rows`], or the vertices of a mesh file, which needs no faces. Vertices keep their
-/// order and are never welded.
+/// Reads points: rows of three numbers, as [`read_rows`], or the vertices of a mesh file, which
+/// needs no faces. Vertices keep their order and are never welded.
 ///
 /// # Errors
 /// As [`read_rows`] and [`read`](crate::read).

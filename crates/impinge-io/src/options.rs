@@ -3,7 +3,8 @@
 /// Which primitives to take from a file that has triangles and tetrahedra.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Prefer {
-    /// The tetrahedra if there are any, else the triangles: files of volumes often repeat the surface.
+    /// The tetrahedra if there are any, else the triangles: files of volumes often repeat the
+    /// surface.
     #[default]
     Volume,
     /// The triangles; a file without triangles is an error.
@@ -15,16 +16,18 @@ pub enum Prefer {
 /// How to read a mesh.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ReadOptions {
-    /// Whether vertices at the same position become one; see [`weld`](crate::weld). On by default, here and in all that reads files:
-    /// files repeat vertices along seams, whose faces would touch for ever. Arrays are taken as they are.
+    /// Whether vertices at the same position become one; see [`weld`](crate::weld). On by default,
+    /// here and in all that reads files: files repeat vertices along seams, whose faces would touch
+    /// for ever. Arrays are taken as they are.
     pub weld: bool,
     /// Which primitives to take if the file has both kinds.
     pub prefer: Prefer,
-    /// The most bytes in memory for data that is smaller in the file: compressed arrays, and glTF meshes placed many times.
-    /// 4 GiB by default. In addition, compressed arrays may take at most 200 times the bytes of their file, or 64 MiB if that
-    /// is more.
+    /// The most bytes in memory for data that is smaller in the file: compressed arrays, and glTF
+    /// meshes placed many times. 4 GiB by default. In addition, compressed arrays may take at most
+    /// 200 times the bytes of their file, or 64 MiB if that is more.
     pub max_expanded_bytes: u64,
-    /// The most bytes that a file may have; a longer one is refused before it is read. 16 GiB by default.
+    /// The most bytes that a file may have; a longer one is refused before it is read. 16 GiB by
+    /// default.
     pub max_file_bytes: u64,
 }
 
@@ -53,7 +56,8 @@ impl ReadOptions {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[non_exhaustive]
 pub struct Summary {
-    /// Polygons of four corners or more, each of which became several triangles. If it is 0, primitive ids are those of the file.
+    /// Polygons of four corners or more, each of which became several triangles. If it is 0,
+    /// primitive ids are those of the file.
     pub n_polygons_fanned: u64,
     /// Lines skipped.
     pub n_lines_skipped: u64,

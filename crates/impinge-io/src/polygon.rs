@@ -7,16 +7,17 @@ use std::collections::BinaryHeap;
 
 use inner::{InnerCorners, turn};
 
-/// Polygons with more corners than this are cut by [`clip_many_ears`], and smaller ones as they always were.
+/// Polygons with more corners than this are cut by [`clip_many_ears`], and smaller ones as they
+/// always were.
 const FEW: usize = 256;
 
-/// Replaces the fan of a polygon around its first corner by other triangles of the same corners, as many, as seen along the
-/// polygon's normal (Newell's). Ears are clipped one after the other (Meisters 1975). A polygon that runs out of ears,
-/// because it crosses itself, stays a fan.
+/// Replaces the fan of a polygon around its first corner by other triangles of the same corners, as
+/// many, as seen along the polygon's normal (Newell's). Ears are clipped one after the other
+/// (Meisters 1975). A polygon that runs out of ears, because it crosses itself, stays a fan.
 ///
-/// A small polygon is cut only if a triangle of the fan is turned over. That happens only where the polygon is concave, and the fan then
-/// overlaps itself. A large one is always cut: the triangles of its fan would be long and all meet at one corner, so their boxes
-/// overlap.
+/// A small polygon is cut only if a triangle of the fan is turned over. That happens only where the
+/// polygon is concave, and the fan then overlaps itself. A large one is always cut: the triangles
+/// of its fan would be long and all meet at one corner, so their boxes overlap.
 pub(crate) fn mend(fan: &mut [[u32; 3]], position: impl Fn(u32) -> [f64; 3]) {
     if fan.len() < 2 {
         return;
@@ -38,7 +39,8 @@ pub(crate) fn mend(fan: &mut [[u32; 3]], position: impl Fn(u32) -> [f64; 3]) {
     }
 }
 
-/// The corners as seen along the polygon's normal: anticlockwise, without the coordinate that the normal has most of.
+/// The corners as seen along the polygon's normal: anticlockwise, without the coordinate that the
+/// normal has most of.
 fn flatten(corners: &[u32], position: impl Fn(u32) -> [f64; 3]) -> Vec<[f64; 2]> {
     let points: Vec<[f64; 3]> = corners.iter().map(|&corner| position(corner)).collect();
     let next = points.iter().cycle().skip(1);
@@ -63,8 +65,8 @@ fn flatten(corners: &[u32], position: impl Fn(u32) -> [f64; 3]) -> Vec<[f64; 2]>
     points.iter().map(|p| [p[u], p[v]]).collect()
 }
 
-/// Clips the first ear again and again: as many looks as the square of the number of corners. Returns false if some corner is left
-/// without an ear.
+/// Clips the first ear again and again: as many looks as the square of the number of corners.
+/// Returns false if some corner is left without an ear.
 fn clip_ears(points: &[[f64; 2]], triangles: &mut Vec<[usize; 3]>) -> bool {
     let mut left: Vec<usize> = (0..points.len()).collect();
     while left.len() > 3 {
@@ -87,10 +89,11 @@ fn clip_ears(points: &[[f64; 2]], triangles: &mut Vec<[usize; 3]>) -> bool {
     turn(points[left[0]], points[left[1]], points[left[2]]) > 0.0
 }
 
-/// The same for many corners. The ear whose cut is shortest goes first, so triangles stay small: cuts along a run of corners halve it
-/// again and again, and cuts between two sides go from one to the other. A corner whose ear is not free waits for the corner that lies in
-/// it. Returns how many nodes and corners it looked at; `None` if some corner is left without an ear, or after far more looks than a
-/// polygon needs that does not cross itself.
+/// The same for many corners. The ear whose cut is shortest goes first, so triangles stay small:
+/// cuts along a run of corners halve it again and again, and cuts between two sides go from one to
+/// the other. A corner whose ear is not free waits for the corner that lies in it. Returns how many
+/// nodes and corners it looked at; `None` if some corner is left without an ear, or after far more
+/// looks than a polygon needs that does not cross itself.
 fn clip_many_ears(points: &[[f64; 2]], triangles: &mut Vec<[usize; 3]>) -> Option<u64> {
     let n = points.len();
     let mut ring = Ring::new(points);
@@ -171,7 +174,8 @@ impl<'a> Ring<'a> {
         turn_of(self.points, self.around(corner)) > 0.0
     }
 
-    /// The ear of a corner, by the length of the cut that clips it. The heap has the shortest first, then the lowest corner.
+    /// The ear of a corner, by the length of the cut that clips it. The heap has the shortest
+    /// first, then the lowest corner.
     fn cut(&self, corner: usize) -> Reverse<(u64, [usize; 3])> {
         let ear = self.around(corner);
         let [from, to] = [ear[0], ear[2]].map(|corner| self.points[corner]);
@@ -371,8 +375,9 @@ mod tests {
         }
     }
 
-    /// Large polygons are cut into small triangles, so that their boxes overlap little. In a circle half of all edges are those of the
-    /// polygon, and each halving of the corners left makes edges twice as long. In a ribbon an edge goes to the next corners, or across.
+    /// Large polygons are cut into small triangles, so that their boxes overlap little. In a circle
+    /// half of all edges are those of the polygon, and each halving of the corners left makes edges
+    /// twice as long. In a ribbon an edge goes to the next corners, or across.
     #[test]
     fn large_circles_and_ribbons_have_short_edges() {
         let polygons = large(1 << 14);

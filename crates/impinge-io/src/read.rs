@@ -14,9 +14,9 @@ use crate::options::{ReadOptions, Summary};
 
 /// Reads the mesh at `path`; the extension decides the format ([`Format::from_path`]).
 ///
-/// All bodies, groups and nodes of a file become one mesh; [`read_bodies`] tells them apart. `path` may be either of TetGen's two files; the other must lie
-/// beside it. Only regular files are read. Files that belong to the mesh file must lie in its folder or below, after
-/// resolving links.
+/// All bodies, groups and nodes of a file become one mesh; [`read_bodies`] tells them apart. `path`
+/// may be either of TetGen's two files; the other must lie beside it. Only regular files are read.
+/// Files that belong to the mesh file must lie in its folder or below, after resolving links.
 ///
 /// # Errors
 /// Any [`Error`] except [`Error::Mismatch`].
@@ -32,11 +32,13 @@ pub fn read_with_summary(path: &Path, options: &ReadOptions) -> Result<(Mesh, Su
     collect_file(path, options, |parts| parts.finish(options))
 }
 
-/// Reads the bodies of the file at `path`, each as a mesh of its own: the nodes of a glTF file that have a mesh; the items of a 3MF file; the objects
-/// (`o`) of an OBJ file, or its groups (`g`) if it has no objects. Other files, files with tetrahedra and files with only one
-/// such part are one body.
+/// Reads the bodies of the file at `path`, each as a mesh of its own: the nodes of a glTF file that
+/// have a mesh; the items of a 3MF file; the objects (`o`) of an OBJ file, or its groups (`g`) if
+/// it has no objects. Other files, files with tetrahedra and files with only one such part are one
+/// body.
 ///
-/// The primitives of a body are numbered from 0, in the order of the file. Vertices that bodies share are in each of them.
+/// The primitives of a body are numbered from 0, in the order of the file. Vertices that bodies
+/// share are in each of them.
 ///
 /// # Errors
 /// As [`read`].
@@ -60,8 +62,8 @@ pub fn read_bodies_bytes(
 /// Reads a mesh from the bytes of a file. Errors use `name` for the file.
 ///
 /// # Errors
-/// As [`read`]. A mesh in several files can't be read this way ([`Error::Unsupported`]): TetGen (see
-/// [`read_tetgen_bytes`]) and glTF with buffers in other files.
+/// As [`read`]. A mesh in several files can't be read this way ([`Error::Unsupported`]): TetGen
+/// (see [`read_tetgen_bytes`]) and glTF with buffers in other files.
 pub fn read_bytes(
     bytes: &[u8],
     format: Format,
@@ -84,8 +86,8 @@ pub fn read_bytes_with_summary(
     collect_bytes(bytes, format, Name(name), None, options)?.finish(options)
 }
 
-/// Reads a TetGen mesh from the bytes of its `.node` file and of its `.ele` or `.face` file; the extension of `cells_name`
-/// says which of these it is. Errors use the given names for the files.
+/// Reads a TetGen mesh from the bytes of its `.node` file and of its `.ele` or `.face` file; the
+/// extension of `cells_name` says which of these it is. Errors use the given names for the files.
 ///
 /// # Errors
 /// As [`read`].
@@ -103,7 +105,8 @@ pub fn read_tetgen_bytes(
     )
 }
 
-/// Gives all parts of the file at `path` to `then`, before any of them is chosen. A file without primitives is not an error here.
+/// Gives all parts of the file at `path` to `then`, before any of them is chosen. A file without
+/// primitives is not an error here.
 pub(crate) fn collect_file<T>(
     path: &Path,
     options: &ReadOptions,
@@ -151,7 +154,8 @@ pub(crate) fn collect<T>(
     )?)
 }
 
-/// The parts of a file's bytes. `folder` is the folder of the files that it refers to; `None` if these may not be read.
+/// The parts of a file's bytes. `folder` is the folder of the files that it refers to; `None` if
+/// these may not be read.
 fn collect_bytes<'a>(
     bytes: &[u8],
     format: Format,

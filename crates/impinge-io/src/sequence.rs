@@ -34,8 +34,8 @@ impl SequenceFormat {
     }
 }
 
-/// The frames of a deforming mesh: positions only, all with the same number of vertices. Opening reads the header (or the first
-/// of numbered files). Each frame is read on request, in any order.
+/// The frames of a deforming mesh: positions only, all with the same number of vertices. Opening
+/// reads the header (or the first of numbered files). Each frame is read on request, in any order.
 #[derive(Debug)]
 pub struct Sequence {
     name: String,
@@ -73,13 +73,15 @@ struct Header {
 impl Sequence {
     /// Opens a sequence:
     /// - `run.pc2`, `run.mdd`: a point cache;
-    /// - `run_0010.ply`: that file and all files with a greater number in this place (the last number in the name), in the
-    ///   order of their numbers, gaps allowed;
+    /// - `run_0010.ply`: that file and all files with a greater number in this place (the last
+    ///   number in the name), in the order of their numbers, gaps allowed;
     /// - `run_%04d.ply`, `run_%d.ply`: all files of that pattern, in the order of their numbers;
-    /// - `run_*.ply`, `run_??.ply`: all files whose name matches, ordered by name with runs of digits compared as numbers.
+    /// - `run_*.ply`, `run_??.ply`: all files whose name matches, ordered by name with runs of
+    ///   digits compared as numbers.
     ///
-    /// Patterns may occur in the file's name, but not in the name of a folder. Numbered files may have any mesh format; only
-    /// their positions are read, and they are never welded (see [`Weld`](crate::Weld)).
+    /// Patterns may occur in the file's name, but not in the name of a folder. Numbered files may
+    /// have any mesh format; only their positions are read, and they are never welded (see
+    /// [`Weld`](crate::Weld)).
     ///
     /// # Errors
     /// As [`read`](crate::read); [`Error::Truncated`] if a cache is shorter than its header says.
@@ -105,7 +107,8 @@ impl Sequence {
         self.n_frames
     }
 
-    /// The files that hold the frames: one per frame, or one for all of them; none if the frames are in memory.
+    /// The files that hold the frames: one per frame, or one for all of them; none if the frames
+    /// are in memory.
     pub fn files(&self) -> &[PathBuf] {
         match &self.frames {
             Frames::Files { files, .. } => files,
@@ -117,8 +120,9 @@ impl Sequence {
         }
     }
 
-    /// Gaps in the numbers of numbered files: the files before and after each gap. A gap is a step that is larger than the
-    /// smallest step between two files, so a sequence of every tenth number has no gap.
+    /// Gaps in the numbers of numbered files: the files before and after each gap. A gap is a step
+    /// that is larger than the smallest step between two files, so a sequence of every tenth number
+    /// has no gap.
     pub fn gaps(&self) -> Vec<[&Path; 2]> {
         let Frames::Files { files, .. } = &self.frames else {
             return Vec::new();
@@ -149,11 +153,12 @@ impl Sequence {
         self.n_points
     }
 
-    /// The positions of frame `frame_ix`, counted from 0: f32 from a point cache, else in the precision of the file.
+    /// The positions of frame `frame_ix`, counted from 0: f32 from a point cache, else in the
+    /// precision of the file.
     ///
     /// # Errors
-    /// [`Error::Mismatch`] if there is no such frame, or a numbered file has another number of vertices;
-    /// [`Error::NotFinite`]; as [`read`](crate::read) for numbered files.
+    /// [`Error::Mismatch`] if there is no such frame, or a numbered file has another number of
+    /// vertices; [`Error::NotFinite`]; as [`read`](crate::read) for numbered files.
     pub fn frame(&self, frame_ix: usize) -> Result<Positions, Error> {
         let mismatch = |file: &str, what: &str, expected: usize, found: usize| Error::Mismatch {
             file: file.to_owned(),
@@ -279,7 +284,8 @@ impl Sequence {
 }
 
 impl Header {
-    /// Reads the header at the start of a file of `length` bytes, and checks that all frames are there.
+    /// Reads the header at the start of a file of `length` bytes, and checks that all frames are
+    /// there.
     fn read(start: &[u8], length: u64, format: SequenceFormat, name: Name) -> Result<Self, Error> {
         let endian = match format {
             SequenceFormat::Pc2 => Endian::Little,
@@ -343,7 +349,8 @@ fn input<'p>(path: &'p Path, named: &'p Path) -> Input<'p> {
     }
 }
 
-/// The files that `path` stands for, in order, at least one. `path` is the first file, a printf pattern, or a glob pattern.
+/// The files that `path` stands for, in order, at least one. `path` is the first file, a printf
+/// pattern, or a glob pattern.
 fn numbered_files(path: &Path) -> Result<Vec<PathBuf>, Error> {
     let shown_path = path.display().to_string();
     let name = Name(&shown_path);
@@ -484,7 +491,8 @@ fn matches_glob(pattern: &str, name: &str) -> bool {
     pattern[p..].iter().all(|&c| c == '*')
 }
 
-/// Splits a name into texts and numbers, so that 9 comes before 10; each entry is a number and the text after it.
+/// Splits a name into texts and numbers, so that 9 comes before 10; each entry is a number and the
+/// text after it.
 fn natural_key(name: &str) -> Vec<(u128, String)> {
     let mut key = vec![(0, String::new())];
     let mut digits = String::new();

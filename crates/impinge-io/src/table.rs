@@ -1,4 +1,5 @@
-//! Tables of rows: CSV, lines of JSON, NumPy arrays. One description of the columns serves all three.
+//! Tables of rows: CSV, lines of JSON, NumPy arrays. One description of the columns serves all
+//! three.
 
 use std::io::{self, Write};
 
@@ -11,7 +12,8 @@ pub enum TableFormat {
     Csv,
     /// A JSON object per row, each on its own line.
     Jsonl,
-    /// NumPy's array format: an `(n, k)` array of `u32` if all columns hold these, else a packed structured array.
+    /// NumPy's array format: an `(n, k)` array of `u32` if all columns hold these, else a packed
+    /// structured array.
     Npy,
 }
 
@@ -43,7 +45,8 @@ pub enum Holds {
     Word,
     /// Three `f64`, in CSV under three names.
     Point([&'static str; 3]),
-    /// A vertex `v7`, an edge `e7-9` or a face `f3`; in arrays 0, 1 or 2 under this name, and two numbers.
+    /// A vertex `v7`, an edge `e7-9` or a face `f3`; in arrays 0, 1 or 2 under this name, and two
+    /// numbers.
     Feature(&'static str),
 }
 
@@ -77,7 +80,8 @@ pub const ELEMENTS: [Column; 4] = [
 /// The column `kind`, with the names of kinds of pairs: two letters.
 pub const KIND: Column = Column::new("kind", Holds::Text(2));
 
-/// The columns of impacts: `kind`, `body_a`, `element_a`, `body_b`, `element_b`, `toi`. Times are all `f32`, unless `in_f64`.
+/// The columns of impacts: `kind`, `body_a`, `element_a`, `body_b`, `element_b`, `toi`. Times are
+/// all `f32`, unless `in_f64`.
 pub fn impact_columns(in_f64: bool) -> Vec<Column> {
     let toi = match in_f64 {
         true => Holds::F64,
@@ -87,7 +91,8 @@ pub fn impact_columns(in_f64: bool) -> Vec<Column> {
 }
 
 impl<'a> Cell<'a> {
-    /// The row of an impact, for [`impact_columns`]: its kind, `[body_a, element_a, body_b, element_b]` and its time.
+    /// The row of an impact, for [`impact_columns`]: its kind,
+    /// `[body_a, element_a, body_b, element_b]` and its time.
     pub fn impact(kind: &'a str, elements: [u32; 4], toi: f64) -> [Self; 6] {
         let [body_a, a, body_b, b] = elements.map(Cell::Number);
         [Cell::Text(kind), body_a, a, body_b, b, Cell::Float(toi)]
@@ -117,7 +122,8 @@ impl Table {
         }
     }
 
-    /// The bytes before the first row. Without the number of rows they are only as long as these bytes are with it.
+    /// The bytes before the first row. Without the number of rows they are only as long as these
+    /// bytes are with it.
     pub fn header(&self, n_rows: Option<u64>) -> Vec<u8> {
         match self.format {
             TableFormat::Jsonl => Vec::new(),
@@ -132,7 +138,8 @@ impl Table {
         }
     }
 
-    /// The bytes that replace those of a [`header`](Table::header) that was made without the number of rows; `None` if those hold.
+    /// The bytes that replace those of a [`header`](Table::header) that was made without the number
+    /// of rows; `None` if those hold.
     pub fn late_header(&self, n_rows: u64) -> Option<Vec<u8>> {
         let is_counted = self.format == TableFormat::Npy;
         is_counted.then(|| self.npy(self.header(None).len(), n_rows))

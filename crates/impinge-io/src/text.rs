@@ -7,7 +7,8 @@ fn is_space(byte: u8) -> bool {
     matches!(byte, b' ' | b'\t' | b'\r' | b'\n' | 0x0b | 0x0c)
 }
 
-/// Parses `word` as a number. Floats are rounded to nearest, as by the standard library's correctly rounding parser.
+/// Parses `word` as a number. Floats are rounded to nearest, as by the standard library's correctly
+/// rounding parser.
 pub(crate) fn number<T: std::str::FromStr>(
     name: Name,
     place: Place,
@@ -68,12 +69,14 @@ pub(crate) struct Text<'a> {
     line: u64,
     /// What starts a comment that [`Text::word`] skips, if anything.
     comment: Option<u8>,
-    /// If binary data is mixed with text, line numbers mean nothing: places are then offsets in bytes, added to this base.
+    /// If binary data is mixed with text, line numbers mean nothing: places are then offsets in
+    /// bytes, added to this base.
     base: Option<usize>,
 }
 
 impl<'a> Text<'a> {
-    /// A cursor at the start of `bytes`, after the byte order mark that some editors put before UTF-8.
+    /// A cursor at the start of `bytes`, after the byte order mark that some editors put before
+    /// UTF-8.
     pub(crate) fn new(name: Name<'a>, bytes: &'a [u8]) -> Self {
         let offset = if bytes.starts_with(b"\xef\xbb\xbf") {
             3
@@ -117,7 +120,8 @@ impl<'a> Text<'a> {
         &self.bytes[self.offset..]
     }
 
-    /// How many items of at least `bytes` each can still follow: the limit for what a header may reserve.
+    /// How many items of at least `bytes` each can still follow: the limit for what a header may
+    /// reserve.
     pub(crate) fn room(&self, bytes: usize) -> u64 {
         (self.rest().len() / bytes + 1) as u64
     }
@@ -138,7 +142,8 @@ impl<'a> Text<'a> {
         }
     }
 
-    /// The next line, ended by `\n`, `\r\n`, `\r` or the end of the file; `None` at the end of the file.
+    /// The next line, ended by `\n`, `\r\n`, `\r` or the end of the file; `None` at the end of the
+    /// file.
     pub(crate) fn line(&mut self) -> Option<Line<'a>> {
         let rest = self.rest();
         if rest.is_empty() {
@@ -169,7 +174,8 @@ impl<'a> Text<'a> {
         }
     }
 
-    /// Like [`Text::content_line`], but the end of the file is an error that says what was `expected`.
+    /// Like [`Text::content_line`], but the end of the file is an error that says what was
+    /// `expected`.
     pub(crate) fn need_content_line(
         &mut self,
         comment: u8,
@@ -196,7 +202,8 @@ impl<'a> Text<'a> {
         }
     }
 
-    /// The next word, on whatever line; `None` at the end of the file. Afterwards [`Text::place`] is the place of the word.
+    /// The next word, on whatever line; `None` at the end of the file. Afterwards [`Text::place`]
+    /// is the place of the word.
     pub(crate) fn word(&mut self) -> Option<&'a [u8]> {
         self.skip_space();
         let start = self.offset;

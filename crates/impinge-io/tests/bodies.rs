@@ -38,7 +38,8 @@ fn groups_of_an_obj_are_bodies() {
         names(&bodies),
         [Some("left wing"), Some("tail"), Some("default")]
     );
-    // The quad is cut into two; a group that begins again goes on. Vertices of no face of the body are left out.
+    // The quad is cut into two; a group that begins again goes on. Vertices of no face of the body
+    // are left out.
     let n: Vec<_> = bodies
         .iter()
         .map(|body| (body.mesh.n_primitives(), body.mesh.n_vertices()))

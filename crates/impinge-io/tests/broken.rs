@@ -1,5 +1,6 @@
-//! Broken files: cut off at every byte, changed at every byte, and with wrong headers. Nothing panics, every returned mesh is
-//! valid, and memory is bounded by the length of a file, whatever its header says.
+//! Broken files: cut off at every byte, changed at every byte, and with wrong headers. Nothing
+//! panics, every returned mesh is valid, and memory is bounded by the length of a file, whatever
+//! its header says.
 
 mod common;
 
@@ -15,7 +16,8 @@ struct Counting;
 static HELD: AtomicUsize = AtomicUsize::new(0);
 static MOST_HELD: AtomicUsize = AtomicUsize::new(0);
 
-// SAFETY: every call is handed on to the system's allocator unchanged; counting touches no memory of the caller.
+// SAFETY: every call is handed on to the system's allocator unchanged; counting touches no memory
+// of the caller.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         let held = HELD.fetch_add(layout.size(), Ordering::Relaxed) + layout.size();
@@ -42,7 +44,8 @@ fn measured(sample: &Sample, bytes: &[u8]) -> (Result<impinge_io::Mesh, impinge_
     (result, MOST_HELD.load(Ordering::Relaxed) - before)
 }
 
-/// The most bytes that reading a few hundred bytes may allocate. (A hash table and an inflater alone take tens of thousands.)
+/// The most bytes that reading a few hundred bytes may allocate. (A hash table and an inflater
+/// alone take tens of thousands.)
 const MOST_BYTES: usize = 1 << 19;
 
 /// Reads a broken file: no panic, no invalid mesh, a message of one line, little memory.
@@ -86,8 +89,8 @@ fn cut_off_at_every_byte() {
                 &sample.bytes[..length],
                 &format!("cut off at {length}"),
             );
-            // OBJ announces no counts, and many Medit files have no end mark, so their beginnings are valid files. Other formats
-            // may lose an end mark or a line's end.
+            // OBJ announces no counts, and many Medit files have no end mark, so their beginnings
+            // are valid files. Other formats may lose an end mark or a line's end.
             if !matches!(sample.format, Format::Obj | Format::Medit) {
                 let Some(mesh) = read else { continue };
                 assert_eq!(mesh, sample.mesh, "{} cut off at {length}", sample.name);

@@ -1,5 +1,5 @@
-//! Hostile files: meshes that name files elsewhere, inputs that never end, archives that expand without limit, text in
-//! other encodings.
+//! Hostile files: meshes that name files elsewhere, inputs that never end, archives that expand
+//! without limit, text in other encodings.
 
 mod common;
 

@@ -1,4 +1,5 @@
-//! Every mesh of the shared data is read with the numbers of vertices and primitives that its README states.
+//! Every mesh of the shared data is read with the numbers of vertices and primitives that its
+//! README states.
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;

@@ -115,7 +115,8 @@ fn surface_of_tetrahedra_is_drawn_from_outside() {
         };
         faces.iter().map(signed).sum()
     };
-    // Each tetrahedron's faces enclose a positive volume: 1 * 1.5 * 2.25 / 6 for the first, |det| / 6 for the second.
+    // Each tetrahedron's faces enclose a positive volume: 1 * 1.5 * 2.25 / 6 for the first, |det| /
+    // 6 for the second.
     assert!((volume_below(faces) - (0.5625 + volume_of_second())).abs() < 1e-12);
 }
 

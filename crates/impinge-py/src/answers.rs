@@ -1,4 +1,5 @@
-//! What the answers of `impinge` are made of: their columns as arrays. An array for which there is no memory is a `MemoryError`.
+//! What the answers of `impinge` are made of: their columns as arrays. An array for which there is
+//! no memory is a `MemoryError`.
 
 use std::sync::Arc;
 

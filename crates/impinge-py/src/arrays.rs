@@ -94,7 +94,8 @@ pub enum RowKind {
     Quads,
 }
 
-/// Vertex indices: three or four per row, or as many as an element of the kind has corners. Quads become triangles.
+/// Vertex indices: three or four per row, or as many as an element of the kind has corners. Quads
+/// become triangles.
 pub fn elements(
     argument: &Bound<'_, PyAny>,
     name: &str,
@@ -130,8 +131,9 @@ fn cut_quads(quads: &[[u32; 4]]) -> Vec<[u32; 3]> {
     quads.iter().flat_map(cut).collect()
 }
 
-/// Whether rows of four are tetrahedra beyond doubt: neighbours in a mesh of tetrahedra share three vertices and differ in
-/// the fourth, which no two quads of a surface do. In meshes one of the first rows tells. No row at all may be either.
+/// Whether rows of four are tetrahedra beyond doubt: neighbours in a mesh of tetrahedra share three
+/// vertices and differ in the fourth, which no two quads of a surface do. In meshes one of the
+/// first rows tells. No row at all may be either.
 fn are_tetrahedra(rows: &[[u32; 4]]) -> bool {
     let mut fourth = HashMap::new();
     rows.is_empty()
@@ -231,7 +233,8 @@ pub fn rows(argument: &Bound<'_, PyAny>, name: &str, n_columns: usize) -> PyResu
     indices(&array, numbers, name)
 }
 
-/// Rows `(n, k)` of vertex indices below `n_vertices`, row after row, and `k`, which is one of those allowed.
+/// Rows `(n, k)` of vertex indices below `n_vertices`, row after row, and `k`, which is one of
+/// those allowed.
 pub fn index_rows(
     argument: &Bound<'_, PyAny>,
     name: &str,

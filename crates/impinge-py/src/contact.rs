@@ -10,11 +10,12 @@ use pyo3::types::PyDict;
 use crate::answers::to_array;
 use crate::errors::raise;
 
-/// Where the triangles of each pair of `Pairs` meet: points, segments, and polygons where both lie in one
-/// plane; and the curves in which surfaces cross. `Detector.contacts` finds them.
+/// Where the triangles of each pair of `Pairs` meet: points, segments, and polygons where both lie
+/// in one plane; and the curves in which surfaces cross. `Detector.contacts` finds them.
 ///
-/// Which features meet where, and which points are one, is exact. Coordinates are the exact numbers rounded: to
-/// float32 where both bodies hold float32, else to float64. Each access makes new arrays.
+/// Which features meet where, and which points are one, is exact. Coordinates are the exact numbers
+/// rounded: to float32 where both bodies hold float32, else to float64. Each access makes new
+/// arrays.
 #[pyclass(module = "impinge", frozen)]
 pub struct Contacts {
     pub inner: Inner,
@@ -44,15 +45,16 @@ impl Contacts {
 
 #[pymethods]
 impl Contacts {
-    /// numpy.ndarray of uint32, shape (n, 4) : the pairs: number of a body, its triangle, number of the other
-    /// body, its triangle.
+    /// numpy.ndarray of uint32, shape (n, 4) : the pairs: number of a body, its triangle, number of
+    /// the other body, its triangle.
     #[getter]
     fn rows<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u32>>> {
         to_array(py, self.inner.rows().to_vec())
     }
 
     /// numpy.ndarray of str, shape (n,) : what each pair has in common: ``"point"``, ``"segment"``,
-    /// ``"polygon"``, ``"solid"`` (a pair that is not of triangles) or ``"apart"`` (the scene has moved since).
+    /// ``"polygon"``, ``"solid"`` (a pair that is not of triangles) or ``"apart"`` (the scene has
+    /// moved since).
     #[getter]
     fn shapes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let names = self.inner.shapes().iter().map(|shape| match shape {
@@ -72,15 +74,15 @@ impl Contacts {
         PyArray1::from_vec(py, flat).reshape([self.inner.points().len(), 3])
     }
 
-    /// numpy.ndarray of uint32, shape (c,) : the corners of all contacts as rows of `points`, one contact after the
-    /// other: one for a point, two for a segment, three to six for a polygon.
+    /// numpy.ndarray of uint32, shape (c,) : the corners of all contacts as rows of `points`, one
+    /// contact after the other: one for a point, two for a segment, three to six for a polygon.
     #[getter]
     fn corners<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<u32>> {
         PyArray1::from_slice(py, self.inner.all_corners())
     }
 
-    /// numpy.ndarray of uint64, shape (n + 1,) : where each contact's corners start in `corners`, and one past the
-    /// last.
+    /// numpy.ndarray of uint64, shape (n + 1,) : where each contact's corners start in `corners`,
+    /// and one past the last.
     #[getter]
     fn starts<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<u64>> {
         let starts = self.inner.starts().iter().map(|&start| start as u64);
@@ -94,8 +96,8 @@ impl Contacts {
         to_array(py, names.map(|name| name.bodies).collect())
     }
 
-    /// numpy.ndarray of str, shape (p, 2) : what each point lies on, of either body: ``"v"`` (a vertex), ``"e"``
-    /// (an edge) or ``"f"`` (a face).
+    /// numpy.ndarray of str, shape (p, 2) : what each point lies on, of either body: ``"v"`` (a
+    /// vertex), ``"e"`` (an edge) or ``"f"`` (a face).
     #[getter]
     fn feature_kinds<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let features = self.inner.names().iter().flat_map(|name| name.features);
@@ -107,8 +109,8 @@ impl Contacts {
         strings::<1>(py, kinds)?.call_method1("reshape", ((-1, 2),))
     }
 
-    /// numpy.ndarray of uint32, shape (p, 2, 2) : the numbers of these features: the two vertices of an edge, the
-    /// lower first; of a vertex and of a face their number twice.
+    /// numpy.ndarray of uint32, shape (p, 2, 2) : the numbers of these features: the two vertices
+    /// of an edge, the lower first; of a vertex and of a face their number twice.
     #[getter]
     fn features<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let features = self.inner.names().iter().flat_map(|name| name.features);
@@ -178,8 +180,8 @@ pub struct Penetration {
 
 #[pymethods]
 impl Penetration {
-    /// tuple of two numpy.ndarray of uint32 : the vertices of the body with the lower number that are strictly inside the
-    /// other one, and those of the other one inside the first; sorted.
+    /// tuple of two numpy.ndarray of uint32 : the vertices of the body with the lower number that
+    /// are strictly inside the other one, and those of the other one inside the first; sorted.
     #[getter]
     fn inside<'py>(
         &self,
@@ -189,8 +191,8 @@ impl Penetration {
         (PyArray1::from_slice(py, a), PyArray1::from_slice(py, b))
     }
 
-    /// float or None : the volume that both bodies have in common, in cubic units; ``None`` where it is unknown because they
-    /// meet other than by edges that cross faces.
+    /// float or None : the volume that both bodies have in common, in cubic units; ``None`` where
+    /// it is unknown because they meet other than by edges that cross faces.
     #[getter]
     fn volume(&self) -> Option<f64> {
         self.inner.volume()

@@ -1,4 +1,5 @@
-//! Checks of many meshes, and tiles: what the modules `impinge._check` and `impinge.tiles` are made of.
+//! Checks of many meshes, and tiles: what the modules `impinge._check` and `impinge.tiles` are made
+//! of.
 
 use std::ffi::OsString;
 use std::path::PathBuf;
@@ -19,8 +20,8 @@ use crate::settings::{WHICH, choose_one, words};
 /// How often Python gets a look while work goes on in another thread.
 const INTERVAL: Duration = Duration::from_millis(50);
 
-/// Runs `work` in a thread of its own, with the interpreter released, and hands what it sends to `each` here. Ctrl-C and
-/// exceptions of `each` cancel the work, which is waited for.
+/// Runs `work` in a thread of its own, with the interpreter released, and hands what it sends to
+/// `each` here. Ctrl-C and exceptions of `each` cancel the work, which is waited for.
 fn watched<M: Send, T: Send>(
     py: Python<'_>,
     mut each: impl FnMut(Python<'_>, M) -> PyResult<()> + Send,

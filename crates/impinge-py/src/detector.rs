@@ -466,8 +466,8 @@ fn ask<T: Send>(
     ask_about(detector, scene, options, query, answer)
 }
 
-/// Asks about a scene and answers with the interpreter released, watched for Ctrl-C, progress and cancellation. `question` is made
-/// when the scene is known.
+/// Asks about a scene and answers with the interpreter released, watched for Ctrl-C, progress and
+/// cancellation. `question` is made when the scene is known.
 fn ask_about<'py, Q: Sync + Send, T: Send>(
     detector: &Bound<'py, DetectorBase>,
     scene: &Bound<'py, PyAny>,

@@ -30,13 +30,15 @@ impl Mesh {
 
 #[pymethods]
 impl Mesh {
-    /// numpy.ndarray, shape (v, 3) : positions, in the precision of the file; numbers in text are float64.
+    /// numpy.ndarray, shape (v, 3) : positions, in the precision of the file; numbers in text are
+    /// float64.
     #[getter]
     fn vertices(&self, py: Python<'_>) -> Py<PyAny> {
         self.vertices.clone_ref(py)
     }
 
-    /// numpy.ndarray of uint32, shape (n, 3) or (n, 4) : triangles or tetrahedra as vertex indices, in the order of the file.
+    /// numpy.ndarray of uint32, shape (n, 3) or (n, 4) : triangles or tetrahedra as vertex indices,
+    /// in the order of the file.
     #[getter]
     fn faces(&self, py: Python<'_>) -> Py<PyArray2<u32>> {
         self.faces.clone_ref(py)
@@ -106,8 +108,9 @@ pub fn read(py: Python<'_>, path: PathBuf, weld: bool) -> PyResult<Mesh> {
 
 /// Reads the bodies of a file, each as a mesh of its own.
 ///
-/// The bodies of a glTF file are its nodes that have a mesh; those of an OBJ file its objects (``o``), or its groups
-/// (``g``) if it has no objects. A file of another format, or with one body, is a list of one mesh.
+/// The bodies of a glTF file are its nodes that have a mesh; those of an OBJ file its objects
+/// (``o``), or its groups (``g``) if it has no objects. A file of another format, or with one body,
+/// is a list of one mesh.
 ///
 /// Parameters
 /// ----------

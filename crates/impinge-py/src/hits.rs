@@ -18,7 +18,8 @@ pub struct Hits {
 }
 
 impl Hits {
-    /// A value per ray if the first hits were asked for, `none` where there is none; else a value per hit.
+    /// A value per ray if the first hits were asked for, `none` where there is none; else a value
+    /// per hit.
     fn column<T: Copy>(&self, none: T, value: impl Fn(&RayHit) -> T) -> PyResult<Vec<T>> {
         match self.hits {
             Hit::First => {

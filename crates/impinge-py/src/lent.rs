@@ -18,16 +18,17 @@ struct Lent<R> {
     n: usize,
 }
 
-// SAFETY: the rows are only read, from any thread, and numbers are `Sync`. Python objects may be dropped by any thread.
+// SAFETY: the rows are only read, from any thread, and numbers are `Sync`. Python objects may be
+// dropped by any thread.
 unsafe impl<R: Real> Send for Lent<R> {}
 // SAFETY: as above.
 unsafe impl<R: Real> Sync for Lent<R> {}
 
 impl<R: Real> AsRef<[[R; 3]]> for Lent<R> {
     fn as_ref(&self) -> &[[R; 3]] {
-        // SAFETY: `first` and `n` are those of a slice of the array, which is alive. NumPy moves no data of an array that others
-        // refer to. `positions` has checked that no array over this data can be written; that none is made to be is
-        // the caller's part of the contract.
+        // SAFETY: `first` and `n` are those of a slice of the array, which is alive. NumPy moves no
+        // data of an array that others refer to. `positions` has checked that no array over this
+        // data can be written; that none is made to be is the caller's part of the contract.
         unsafe { std::slice::from_raw_parts(self.first, self.n) }
     }
 }

@@ -1,7 +1,8 @@
 //! The Python module `impinge`: the library's scenes, detectors and answers on NumPy arrays.
 //!
-//! What Python users read is written in Python, in the package's own modules, and in `docs/python.md`. This crate converts
-//! arguments, names what it refuses, and lets go of the interpreter while it works.
+//! What Python users read is written in Python, in the package's own modules, and in
+//! `docs/python.md`. This crate converts arguments, names what it refuses, and lets go of the
+//! interpreter while it works.
 
 mod answers;
 mod arrays;

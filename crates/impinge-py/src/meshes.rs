@@ -17,8 +17,8 @@ pub struct Parts<'py> {
     pub names: Names<'static>,
 }
 
-/// Takes a mesh apart: one with `vertices` and `faces` (trimesh) or `triangles` (Open3D), or with `points` and
-/// `cells_dict` (meshio).
+/// Takes a mesh apart: one with `vertices` and `faces` (trimesh) or `triangles` (Open3D), or with
+/// `points` and `cells_dict` (meshio).
 pub fn parts<'py>(mesh: &Bound<'py, PyAny>, kind: Option<RowKind>) -> PyResult<Parts<'py>> {
     // Of a mesh that was read it is known what its rows are.
     let known = mesh.cast::<Mesh>().ok().map(|mesh| mesh.get().kind());

@@ -170,7 +170,8 @@ impl Scene {
         Ok(slf.try_borrow()?.handle(id))
     }
 
-    /// For functions whose arguments have other names; with `weld`, vertices at the same position become one.
+    /// For functions whose arguments have other names; with `weld`, vertices at the same position
+    /// become one.
     fn _add_named(
         slf: &Bound<'_, Self>,
         vertices: &Bound<'_, PyAny>,

@@ -1,7 +1,8 @@
 //! `impinge._impinge._VertexFilter`: which pairs of elements `impinge.ipc` lets collide.
 //!
-//! What a callback says of two vertices is kept for the question, whichever elements have them: neighbouring pairs of elements share most
-//! of theirs, and a call of Python costs more than all the rest of a pair.
+//! What a callback says of two vertices is kept for the question, whichever elements have them:
+//! neighbouring pairs of elements share most of theirs, and a call of Python costs more than all
+//! the rest of a pair.
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -12,9 +13,10 @@ use pyo3::prelude::*;
 
 /// Which pairs of elements collide, by their vertices in a mesh whose parts are several bodies.
 ///
-/// Two elements that name a common vertex of the mesh do not. Nor do elements whose vertices all have one label. Of the
-/// others, those do for which `may` is true of any vertex of one with any vertex of the other. It is called last, and with the lower
-/// vertex first, so that threads do not decide the order.
+/// Two elements that name a common vertex of the mesh do not. Nor do elements whose vertices all
+/// have one label. Of the others, those do for which `may` is true of any vertex of one with any
+/// vertex of the other. It is called last, and with the lower vertex first, so that threads do not
+/// decide the order.
 #[pyclass(module = "impinge", name = "_VertexFilter", frozen)]
 pub struct VertexFilter {
     pub inner: PairFilter,
@@ -25,7 +27,8 @@ pub struct VertexFilter {
 /// The first exception of the callback.
 type Raised = Arc<Mutex<Option<PyErr>>>;
 
-/// The vertices of pairs that were asked about, by how many each element has, one pair after the other.
+/// The vertices of pairs that were asked about, by how many each element has, one pair after the
+/// other.
 type Collected = Arc<Mutex<HashMap<(usize, usize), Vec<u32>>>>;
 
 /// A callback, and what it has said.
@@ -37,9 +40,10 @@ struct Callback {
 
 #[pymethods]
 impl VertexFilter {
-    /// `rows`: for each body the numbers of its vertices in the mesh, or ``None`` where they are the same. `labels`: one per
-    /// vertex of the mesh. With `collects`, pairs that pass are remembered and refused: a step is then asked about pairs in contact, or
-    /// which might be as far as floats can tell, and no time is found.
+    /// `rows`: for each body the numbers of its vertices in the mesh, or ``None`` where they are
+    /// the same. `labels`: one per vertex of the mesh. With `collects`, pairs that pass are
+    /// remembered and refused: a step is then asked about pairs in contact, or which might be as
+    /// far as floats can tell, and no time is found.
     #[new]
     #[pyo3(signature = (rows, labels, may, collects=false))]
     fn new(
@@ -100,7 +104,8 @@ impl VertexFilter {
         })
     }
 
-    /// Takes the pairs that were remembered, of elements with `n_a` and `n_b` vertices: a row of vertices of the mesh per pair.
+    /// Takes the pairs that were remembered, of elements with `n_a` and `n_b` vertices: a row of
+    /// vertices of the mesh per pair.
     fn collected<'py>(
         &self,
         py: Python<'py>,
@@ -134,7 +139,8 @@ fn in_mesh(maps: &[Option<Vec<u32>>], (body, corners): ElementVertices<'_>) -> V
 }
 
 impl Callback {
-    /// Whether any vertices of two elements may collide. After an exception, nothing is asked any more.
+    /// Whether any vertices of two elements may collide. After an exception, nothing is asked any
+    /// more.
     fn passes(&self, a: &[u32], b: &[u32]) -> bool {
         let pairs = a
             .iter()

@@ -17,8 +17,8 @@ pub struct Colors {
 impl Surface {
     /// A body in its current pose; its `colliding` primitives are coloured and show through.
     ///
-    /// Triangles are drawn with smooth normals. Tetrahedra are drawn with flat faces: the faces of only one
-    /// tetrahedron, and all faces of colliding tetrahedra.
+    /// Triangles are drawn with smooth normals. Tetrahedra are drawn with flat faces: the faces of
+    /// only one tetrahedron, and all faces of colliding tetrahedra.
     ///
     /// # Errors
     /// A number in `colliding` that the body does not have.

@@ -24,11 +24,12 @@ pub enum Projection {
     Orthographic,
 }
 
-/// The viewpoint of a picture. Unless the picture has a [`Focus`], the distance is chosen so that it contains everything.
+/// The viewpoint of a picture. Unless the picture has a [`Focus`], the distance is chosen so that
+/// it contains everything.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Camera {
-    /// Degrees counter-clockwise around the up axis, seen from above. At 0 the viewer is on the side of
-    /// +z if y is up, and of -y if z is up; in both cases +x is to the right.
+    /// Degrees counter-clockwise around the up axis, seen from above. At 0 the viewer is on the
+    /// side of +z if y is up, and of -y if z is up; in both cases +x is to the right.
     pub azimuth: f64,
     /// Degrees above the ground, -90 to 90.
     pub elevation: f64,
@@ -43,8 +44,8 @@ pub struct Camera {
 pub struct Focus {
     /// The point in the middle of the picture, in the unit of the scene.
     pub target: [f64; 3],
-    /// The distance of the viewer from it, above 0, in the same unit. Without perspective, a quarter of it is half the height
-    /// of what is seen.
+    /// The distance of the viewer from it, above 0, in the same unit. Without perspective, a
+    /// quarter of it is half the height of what is seen.
     pub distance: f64,
 }
 

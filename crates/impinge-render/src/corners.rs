@@ -93,8 +93,8 @@ pub(crate) fn chunks(
     }
 }
 
-/// The numbers, from 1, ascending, of wanted faces that a later one with the same corners hides. Very many coincident faces, each of
-/// which covers many pixels, would otherwise take forever.
+/// The numbers, from 1, ascending, of wanted faces that a later one with the same corners hides.
+/// Very many coincident faces, each of which covers many pixels, would otherwise take forever.
 fn hidden_faces(picture: &Picture, frame: &Frame, wanted: &impl Fn(&Face) -> bool) -> Vec<u32> {
     let faces = || {
         let surfaces = picture.surfaces.iter();
@@ -130,7 +130,8 @@ fn hash(key: &[[u32; 3]; 3]) -> u64 {
     })
 }
 
-/// Unit normals of vertices: the mean normal of the faces around a vertex, weighted by their angles there.
+/// Unit normals of vertices: the mean normal of the faces around a vertex, weighted by their angles
+/// there.
 fn vertex_normals(surface: &Surface, frame: &Frame) -> Vec<[f64; 3]> {
     let mut sums = vec![[0.0; 3]; surface.positions.len()];
     for face in &surface.faces {
@@ -185,7 +186,8 @@ fn snorm(x: f64) -> i16 {
 mod tests {
     use super::*;
 
-    /// Work, not time: of many coincident faces only the last is drawn, whatever order its corners have.
+    /// Work, not time: of many coincident faces only the last is drawn, whatever order its corners
+    /// have.
     #[test]
     fn of_coincident_faces_the_last_is_drawn() {
         const N: u32 = 300_000;

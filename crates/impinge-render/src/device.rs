@@ -73,7 +73,8 @@ impl Gpu {
         ]
         .map(|filter| self.device.push_error_scope(filter));
         let done = work();
-        // Innermost scope first. Memory errors come first in the list, because they cause other errors.
+        // Innermost scope first. Memory errors come first in the list, because they cause other
+        // errors.
         let (memory, validation, internal) = (memory.pop(), validation.pop(), internal.pop());
         let errors = [memory, validation, internal].map(pollster::block_on);
         match errors.into_iter().flatten().next() {

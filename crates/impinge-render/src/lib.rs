@@ -1,7 +1,10 @@
-//! Pictures of meshes and their colliding primitives, drawn off screen: on the CPU, or with `wgpu` on any GPU.
+//! Pictures of meshes and their colliding primitives, drawn off screen: on the CPU, or with `wgpu`
+//! on any GPU.
 //!
-//! A [`Picture`] is plain data: [`Surface`]s with one colour per face, a [`Camera`] and a size. [`Picture::draw`] turns it into
-//! an [`Image`] on the CPU; with the feature `gpu` a `Renderer` does so on a GPU, with the same light. Unless the picture has a [`Focus`], the camera distance is chosen so that everything is visible.
+//! A [`Picture`] is plain data: [`Surface`]s with one colour per face, a [`Camera`] and a size.
+//! [`Picture::draw`] turns it into an [`Image`] on the CPU; with the feature `gpu` a `Renderer`
+//! does so on a GPU, with the same light. Unless the picture has a [`Focus`], the camera distance
+//! is chosen so that everything is visible.
 //!
 //! ```no_run
 //! use impinge::{Backend, Detector, Query, Scene};
@@ -25,19 +28,20 @@
 //! ```
 //!
 //! # What is drawn
-//! Both sides of every face, with soft light and darkened hollows, four samples per pixel. Faces that
-//! [show through](Face::shows_through) are faintly visible where other faces hide them, so that a band of
-//! contact can be followed around a body. For tetrahedra, the boundary is drawn, and all faces of colliding
-//! tetrahedra.
+//! Both sides of every face, with soft light and darkened hollows, four samples per pixel. Faces
+//! that [show through](Face::shows_through) are faintly visible where other faces hide them, so
+//! that a band of contact can be followed around a body. For tetrahedra, the boundary is drawn, and
+//! all faces of colliding tetrahedra.
 //!
 //! # Live
-//! `Live` (feature `gpu`) draws bodies that move into a texture of the caller's, such as a window's, many times per second. It is simpler
-//! (flat faces, no darkened hollows) and never waits for the device.
+//! `Live` (feature `gpu`) draws bodies that move into a texture of the caller's, such as a
+//! window's, many times per second. It is simpler (flat faces, no darkened hollows) and never waits
+//! for the device.
 //!
 //! # What it costs
-//! A picture is drawn in tiles, and faces are uploaded in chunks. So memory beyond the faces themselves
-//! (72 bytes each) is bounded, whatever the size of the picture. The same picture on the same device gives the
-//! same bytes; different devices may differ in the last bits.
+//! A picture is drawn in tiles, and faces are uploaded in chunks. So memory beyond the faces
+//! themselves (72 bytes each) is bounded, whatever the size of the picture. The same picture on the
+//! same device gives the same bytes; different devices may differ in the last bits.
 
 mod body;
 mod camera;

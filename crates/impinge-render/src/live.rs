@@ -25,7 +25,8 @@ pub struct Look {
     pub faces: bool,
     /// Whether only marked faces are drawn.
     pub only_marked: bool,
-    /// How visible marked faces and lines are where other faces hide them, from 0 (not at all) to 1.
+    /// How visible marked faces and lines are where other faces hide them, from 0 (not at all) to
+    /// 1.
     pub see_through: f32,
     /// The width of lines in pixels.
     pub line_width: f32,
@@ -50,9 +51,10 @@ impl Default for Look {
 
 /// Draws bodies into a texture of the caller's, on the caller's device.
 ///
-/// It is for windows: faces go to the device once, and per frame only positions (12 bytes per vertex) and one bit per face.
-/// Faces are flat. No call waits for the device, so it works in a browser too. Errors of the device go to the caller's error
-/// scopes, or to the handler of the device.
+/// It is for windows: faces go to the device once, and per frame only positions (12 bytes per
+/// vertex) and one bit per face. Faces are flat. No call waits for the device, so it works in a
+/// browser too. Errors of the device go to the caller's error scopes, or to the handler of the
+/// device.
 ///
 /// ```no_run
 /// use impinge::{BodyId, Pairs, Scene};
@@ -125,11 +127,13 @@ struct Targets {
 }
 
 impl Live {
-    /// A renderer without bodies, for textures of one format. Colours are written as sRGB numbers, so the format must not
-    /// convert them (`Rgba8Unorm`, not `Rgba8UnormSrgb`). `samples` per pixel are 1 or 4.
+    /// A renderer without bodies, for textures of one format. Colours are written as sRGB numbers,
+    /// so the format must not convert them (`Rgba8Unorm`, not `Rgba8UnormSrgb`). `samples` per
+    /// pixel are 1 or 4.
     ///
     /// # Errors
-    /// Another number of samples; a format that converts; a device whose vertex shaders may read fewer than four buffers.
+    /// Another number of samples; a format that converts; a device whose vertex shaders may read
+    /// fewer than four buffers.
     pub fn new(
         device: wgpu::Device,
         queue: wgpu::Queue,
@@ -180,9 +184,9 @@ impl Live {
         })
     }
 
-    /// Sets the box (lowest and highest coordinates) in which the bodies are, roughly. Positions are sent relative to it, so
-    /// that a scene far from the origin, or of any size, keeps its shape in single precision. To be called before
-    /// positions and lines are set.
+    /// Sets the box (lowest and highest coordinates) in which the bodies are, roughly. Positions
+    /// are sent relative to it, so that a scene far from the origin, or of any size, keeps its
+    /// shape in single precision. To be called before positions and lines are set.
     pub fn set_bounds(&mut self, [low, high]: [[f64; 3]; 2]) {
         let half = (0..3)
             .map(|k| 0.5 * high[k] - 0.5 * low[k])
@@ -207,7 +211,8 @@ impl Live {
         std::array::from_fn(|k| ((point[k] - self.middle[k]) / self.half) as f32)
     }
 
-    /// Adds a body; returns its number, counted from 0. Its vertices are at 0 until positions are set.
+    /// Adds a body; returns its number, counted from 0. Its vertices are at 0 until positions are
+    /// set.
     ///
     /// # Errors
     /// A body that is too large for the device's buffers.
@@ -332,13 +337,14 @@ impl Live {
         Ok(())
     }
 
-    /// Takes the positions of a body's vertices, `(v, 3)` f32 tightly packed, from a buffer of the same device with the usage
-    /// `COPY_SRC`, from this byte on: such as that of
-    /// the `positions` of a detector's `Gpu`. They are copied when the encoder's commands run.
+    /// Takes the positions of a body's vertices, `(v, 3)` f32 tightly packed, from a buffer of the
+    /// same device with the usage `COPY_SRC`, from this byte on: such as that of the `positions` of
+    /// a detector's `Gpu`. They are copied when the encoder's commands run.
     ///
     /// # Errors
-    /// No such body; a buffer that ends before the last vertex or lacks its usage; an offset that is no multiple of 4; bounds so
-    /// small or so far away that single precision does not have them: then use [`set_positions`](Live::set_positions).
+    /// No such body; a buffer that ends before the last vertex or lacks its usage; an offset that
+    /// is no multiple of 4; bounds so small or so far away that single precision does not have
+    /// them: then use [`set_positions`](Live::set_positions).
     pub fn copy_positions(
         &mut self,
         encoder: &mut wgpu::CommandEncoder,
@@ -372,7 +378,8 @@ impl Live {
         Ok(())
     }
 
-    /// Marks the faces of these primitives and of no others: they get the colliding colour, and show through.
+    /// Marks the faces of these primitives and of no others: they get the colliding colour, and
+    /// show through.
     ///
     /// # Errors
     /// No such body; a primitive that it does not have.
@@ -394,7 +401,8 @@ impl Live {
         Ok(())
     }
 
-    /// Gives the faces of these primitives colours of their own (sRGB), and takes those of all others away.
+    /// Gives the faces of these primitives colours of their own (sRGB), and takes those of all
+    /// others away.
     ///
     /// # Errors
     /// No such body; a primitive that it does not have.
@@ -454,8 +462,8 @@ impl Live {
         Ok(())
     }
 
-    /// Adds the commands that draw everything over the whole target, a view of a texture of the renderer's format and of
-    /// `size` pixels. The caller submits them before the next call.
+    /// Adds the commands that draw everything over the whole target, a view of a texture of the
+    /// renderer's format and of `size` pixels. The caller submits them before the next call.
     ///
     /// # Errors
     /// A size of 0 or beyond the device's textures; a camera with a setting out of its range.

@@ -2,11 +2,12 @@
 
 use crate::camera::{Camera, Focus, Projection};
 
-/// Half the height of what an orthographic camera sees, at a distance of 1: about that of the default perspective.
+/// Half the height of what an orthographic camera sees, at a distance of 1: about that of the
+/// default perspective.
 const ORTHOGRAPHIC: f64 = 0.25;
 
-/// A viewpoint at a distance from a point of the scene. Unlike the camera of a [`Picture`](crate::Picture), it does not
-/// depend on the scene's content.
+/// A viewpoint at a distance from a point of the scene. Unlike the camera of a
+/// [`Picture`](crate::Picture), it does not depend on the scene's content.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Orbit {
     /// The direction from which the scene is seen, the axis that points up, and how depth is shown.
@@ -27,7 +28,8 @@ impl Orbit {
         }
     }
 
-    /// Sees a box (its lowest and highest coordinates) completely, whatever the direction. `aspect` is width through height.
+    /// Sees a box (its lowest and highest coordinates) completely, whatever the direction. `aspect`
+    /// is width through height.
     pub fn around(camera: Camera, [low, high]: [[f64; 3]; 2], aspect: f64) -> Self {
         // Halve before adding: the sum of two coordinates may overflow.
         let target = std::array::from_fn(|k| 0.5 * low[k] + 0.5 * high[k]);
@@ -52,7 +54,8 @@ impl Orbit {
         };
         let [wide, high] = orbit.half_size(aspect);
         let narrow = wide.min(high);
-        // The sphere around the box touches the narrower edge of the view: at the sine of its angle.
+        // The sphere around the box touches the narrower edge of the view: at the sine of its
+        // angle.
         let factor = match camera.projection {
             Projection::Perspective { .. } => narrow / (1.0 + narrow * narrow).sqrt(),
             Projection::Orthographic => narrow,
@@ -69,8 +72,8 @@ impl Orbit {
         [axes.right, axes.up, axes.back]
     }
 
-    /// Half the width and half the height of the view, per unit of distance from the eye. (In an orthographic view they
-    /// are scaled by the same distance.)
+    /// Half the width and half the height of the view, per unit of distance from the eye. (In an
+    /// orthographic view they are scaled by the same distance.)
     fn half_size(&self, aspect: f64) -> [f64; 2] {
         let high = match self.camera.projection {
             Projection::Perspective { degrees } => (0.5 * degrees.to_radians()).tan(),
@@ -79,14 +82,14 @@ impl Orbit {
         [high * aspect, high]
     }
 
-    /// Half the width and half the height of the part of the plane through the target that is visible, in the unit of the
-    /// scene.
+    /// Half the width and half the height of the part of the plane through the target that is
+    /// visible, in the unit of the scene.
     pub fn visible(&self, aspect: f64) -> [f64; 2] {
         self.half_size(aspect).map(|x| x * self.distance)
     }
 
-    /// The ray through a point of the view, whose left lower corner is (-1, -1) and whose right upper corner is (1, 1): where
-    /// it starts, and its direction (not of length 1).
+    /// The ray through a point of the view, whose left lower corner is (-1, -1) and whose right
+    /// upper corner is (1, 1): where it starts, and its direction (not of length 1).
     pub fn ray(&self, aspect: f64, at: [f64; 2]) -> [[f64; 3]; 2] {
         let [right, up, back] = self.axes();
         let half = self.visible(aspect);
@@ -102,8 +105,8 @@ impl Orbit {
         [start, std::array::from_fn(|k| on_plane[k] - start[k])]
     }
 
-    /// Where a point of the scene is in the view, as in [`ray`](Orbit::ray), and how far it is from the viewer along the
-    /// axis of view. `None` behind the viewer.
+    /// Where a point of the scene is in the view, as in [`ray`](Orbit::ray), and how far it is from
+    /// the viewer along the axis of view. `None` behind the viewer.
     pub fn project(&self, aspect: f64, point: [f64; 3]) -> Option<([f64; 2], f64)> {
         let from_target: [f64; 3] = std::array::from_fn(|k| point[k] - self.target[k]);
         let [x, y, z] = self.axes().map(|axis| dot(axis, from_target));

@@ -20,7 +20,8 @@ pub enum Normals {
     /// Every face is flat.
     #[default]
     Flat,
-    /// Faces that share vertices look like one curved surface, except at edges sharper than 50 degrees.
+    /// Faces that share vertices look like one curved surface, except at edges sharper than 50
+    /// degrees.
     Smooth,
 }
 
@@ -46,8 +47,8 @@ pub struct Picture {
     pub focus: Option<Focus>,
     /// Width and height in pixels.
     pub size: [u32; 2],
-    /// How visible hidden faces that [show through](Face::shows_through) are, from 0 (not at all) to 1
-    /// (as if nothing hid them).
+    /// How visible hidden faces that [show through](Face::shows_through) are, from 0 (not at all)
+    /// to 1 (as if nothing hid them).
     pub see_through: f32,
     /// How dark hollows are, from 0 (as bright as the rest) to 1.
     pub occlusion: f32,

@@ -19,7 +19,8 @@ pub(crate) struct FrameUniform {
     pub background_bottom: [f32; 4],
     /// Width and height of the picture; first column and row of the tile.
     pub picture: [f32; 4],
-    /// Occlusion's radius in the scene; its largest radius in pixels; its strength; the visibility of hidden faces.
+    /// Occlusion's radius in the scene; its largest radius in pixels; its strength; the visibility
+    /// of hidden faces.
     pub amounts: [f32; 4],
 }
 
@@ -48,7 +49,8 @@ pub(crate) const SHADERS: [(&str, &str); 3] = [
     ),
 ];
 
-/// The name and the text of every shader that this crate compiles, for compilers other than naga to check.
+/// The name and the text of every shader that this crate compiles, for compilers other than naga to
+/// check.
 pub fn shaders() -> impl Iterator<Item = (&'static str, String)> {
     let all = SHADERS.into_iter().chain(crate::live::SHADERS);
     all.map(|(name, text)| (name, text.to_owned()))
@@ -66,7 +68,8 @@ pub(crate) const PIXELS: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8UnormSr
 pub(crate) struct Pipelines {
     /// All faces.
     pub surface: wgpu::RenderPipeline,
-    /// Faces that show through. They are drawn slightly nearer, so that they win against faces in the same place.
+    /// Faces that show through. They are drawn slightly nearer, so that they win against faces in
+    /// the same place.
     pub raised: wgpu::RenderPipeline,
     pub occlusion: wgpu::RenderPipeline,
     pub composite: wgpu::RenderPipeline,
@@ -136,7 +139,8 @@ fn layout(device: &wgpu::Device, textures: &[wgpu::BindingType]) -> wgpu::BindGr
     })
 }
 
-/// With a bias, a pipeline that draws faces with depth and multisampling; without, one triangle over all pixels.
+/// With a bias, a pipeline that draws faces with depth and multisampling; without, one triangle
+/// over all pixels.
 fn pipeline(
     device: &wgpu::Device,
     module: &wgpu::ShaderModule,

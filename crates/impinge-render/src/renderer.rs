@@ -60,7 +60,8 @@ impl Renderer {
         Ok(Renderer {
             pipelines,
             targets: None,
-            // Both are far from 0 for every device with at least the downlevel limits, which allow textures of 2,048 pixels.
+            // Both are far from 0 for every device with at least the downlevel limits, which allow
+            // textures of 2,048 pixels.
             tile: limits
                 .max_texture_dimension_2d
                 .saturating_sub(2 * (REACH_PIXELS + BLUR))
@@ -123,7 +124,8 @@ impl Renderer {
                     mapped_at_creation: false,
                 });
                 queue.write_buffer(&buffer, 0, bytes);
-                // Submit now; otherwise all chunks would be held twice until the first tile is drawn.
+                // Submit now; otherwise all chunks would be held twice until the first tile is
+                // drawn.
                 queue.submit([]);
                 buffers.push(buffer);
             });
@@ -137,8 +139,8 @@ impl Renderer {
         })
     }
 
-    /// Draws the tile that begins at column and row `begin` into the image. A margin around the tile is drawn too, as wide as
-    /// the reach of occlusion.
+    /// Draws the tile that begins at column and row `begin` into the image. A margin around the
+    /// tile is drawn too, as wide as the reach of occlusion.
     fn tile(
         &mut self,
         picture: &Picture,

@@ -1,8 +1,9 @@
-//! Draws a picture on the CPU, without a GPU or a driver: the passes and the light of the shaders, written once more.
+//! Draws a picture on the CPU, without a GPU or a driver: the passes and the light of the shaders,
+//! written once more.
 //!
-//! Like the renderer on a device it works in tiles with a margin as wide as the reach of occlusion, so that memory beyond the
-//! faces is bounded. Threads share the rows of a tile. Every pixel is computed by one thread, in the order of the faces, so
-//! their number changes no byte.
+//! Like the renderer on a device it works in tiles with a margin as wide as the reach of occlusion,
+//! so that memory beyond the faces is bounded. Threads share the rows of a tile. Every pixel is
+//! computed by one thread, in the order of the faces, so their number changes no byte.
 
 use std::thread;
 
@@ -16,8 +17,8 @@ use crate::view::{Frame, View};
 const TILE: u32 = 1536;
 /// The largest width and height of a picture: that of most GPUs.
 const MOST: u32 = 16_384;
-/// The largest distance between a hollow and a face that darkens it, as for the renderer on a device: as a share of the
-/// scene's longest half extent, and in pixels.
+/// The largest distance between a hollow and a face that darkens it, as for the renderer on a
+/// device: as a share of the scene's longest half extent, and in pixels.
 pub(crate) const REACH: f32 = 0.16;
 pub(crate) const REACH_PIXELS: u32 = 254;
 /// The radius of the blur of occlusion, in pixels.
@@ -35,11 +36,12 @@ const RAISED: f32 = 8.0;
 const N_PLACES: i32 = 20;
 
 impl Picture {
-    /// Draws the picture on the CPU. It looks like that of a `Renderer`, up to the rounding of colours, and
-    /// is the same on every machine with the same mathematical functions.
+    /// Draws the picture on the CPU. It looks like that of a `Renderer`, up to the rounding of
+    /// colours, and is the same on every machine with the same mathematical functions.
     ///
     /// # Errors
-    /// A position that is not finite or an index out of range; a size of 0 or above 16,384; a setting out of its range.
+    /// A position that is not finite or an index out of range; a size of 0 or above 16,384; a
+    /// setting out of its range.
     pub fn draw(&self) -> Result<Image, Error> {
         self.draw_in_tiles(TILE)
     }
@@ -132,7 +134,8 @@ impl Lens {
         }
     }
 
-    /// The depth of a point before it is divided by its distance: 0 or more beyond the nearest visible distance.
+    /// The depth of a point before it is divided by its distance: 0 or more beyond the nearest
+    /// visible distance.
     fn clip_depth(&self, vertex: &Vertex) -> f64 {
         self.view.projection[2] * vertex.seen[2] + self.view.projection[3]
     }
@@ -346,7 +349,8 @@ impl Tile<'_> {
             corner.at[1] -= f64::from(self.begin[1]) + f64::from(first);
         }
         let [a, b, c] = corners.map(|corner| corner.at);
-        // Rows go down, so a face that is counter-clockwise for the viewer has a negative area here.
+        // Rows go down, so a face that is counter-clockwise for the viewer has a negative area
+        // here.
         let area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
         if area == 0.0 || !area.is_finite() {
             return;
@@ -413,8 +417,8 @@ impl Tile<'_> {
         })
     }
 
-    /// How much light nearby faces leave, and 1 plus the distance of the face; the latter is 0 if there is no face. See
-    /// `occlusion.wgsl`.
+    /// How much light nearby faces leave, and 1 plus the distance of the face; the latter is 0 if
+    /// there is no face. See `occlusion.wgsl`.
     fn occlusion(&self, depths: &[f32], x: u32, y: u32) -> [f32; 2] {
         let (x, y) = (i64::from(x), i64::from(y));
         let seen_at = |right: i64, down: i64| self.seen_at(depths, x + right, y + down);
@@ -456,7 +460,8 @@ impl Tile<'_> {
         [1.0 - lost, 1.0 + here[2].abs()]
     }
 
-    /// The mean occlusion over those pixels of a block that have about the same depth: see `composite.wgsl`.
+    /// The mean occlusion over those pixels of a block that have about the same depth: see
+    /// `composite.wgsl`.
     fn brightness(&self, occlusion: &[[f32; 2]], x: u32, y: u32) -> f32 {
         let here = occlusion[self.index(x, y)][1];
         if here == 0.0 {
@@ -477,7 +482,8 @@ impl Tile<'_> {
         sum / weights
     }
 
-    /// The visible faces, faintly over them the faces that show through, behind them the background.
+    /// The visible faces, faintly over them the faces that show through, behind them the
+    /// background.
     fn composed(&self, seen: [f32; 4], hidden: [f32; 4], brightness: f32, y: u32) -> [u8; 4] {
         let part = self.picture.see_through;
         let left = 1.0 - part * hidden[3];

@@ -1,5 +1,5 @@
-//! The textures of a tile, and the passes that draw it: all faces; occlusion from their depths; only the faces that show
-//! through; the composition of these.
+//! The textures of a tile, and the passes that draw it: all faces; occlusion from their depths;
+//! only the faces that show through; the composition of these.
 
 use impinge::wgpu;
 
@@ -200,7 +200,8 @@ impl Targets {
             }),
             ..Default::default()
         });
-        // The viewport is the whole picture, of which the tile is a part, so that tiles fit together.
+        // The viewport is the whole picture, of which the tile is a part, so that tiles fit
+        // together.
         let [width, height, x, y] = frame.picture;
         pass.set_viewport(-x, -y, width, height, 0.0, 1.0);
         pass.set_bind_group(0, &self.frame_group, &[]);

@@ -6,8 +6,8 @@ use crate::picture::{Face, Normals, Surface};
 const N_SIDES: u32 = 6;
 
 impl Surface {
-    /// Tubes around segments, such as the curves in which surfaces cross; they show through. Segments without length have
-    /// none. `radius` is in the unit of the scene.
+    /// Tubes around segments, such as the curves in which surfaces cross; they show through.
+    /// Segments without length have none. `radius` is in the unit of the scene.
     pub fn of_segments(segments: &[[[f64; 3]; 2]], radius: f64, color: [u8; 3]) -> Surface {
         let mut tubes = Surface {
             normals: Normals::Smooth,

@@ -8,8 +8,8 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// The coordinate system for drawing: the middle of the scene is at 0 and its longest half extent is 1. Converted in
-/// f64, so that a scene far from the origin keeps its shape in f32.
+/// The coordinate system for drawing: the middle of the scene is at 0 and its longest half extent
+/// is 1. Converted in f64, so that a scene far from the origin keeps its shape in f32.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Frame {
     middle: [f64; 3],
@@ -60,7 +60,8 @@ pub(crate) struct View {
     pub axes: [[f64; 4]; 3],
     /// The scene's up axis as seen by the viewer.
     pub sky: [f64; 3],
-    /// Factors of x and y, and `a`, `b` of depth `a z + b` (before division by `-z` in perspective).
+    /// Factors of x and y, and `a`, `b` of depth `a z + b` (before division by `-z` in
+    /// perspective).
     pub projection: [f64; 4],
     pub is_perspective: bool,
 }
@@ -119,7 +120,8 @@ impl View {
         }
     }
 
-    /// Fits a camera to the picture's faces, so that the outermost points touch the filled part on each side.
+    /// Fits a camera to the picture's faces, so that the outermost points touch the filled part on
+    /// each side.
     fn fit(picture: &Picture, frame: &Frame) -> View {
         let camera = &picture.camera;
         let axes = camera.axes();
@@ -136,9 +138,9 @@ impl View {
             Projection::Perspective { .. } => [FILLED * wide, FILLED * high],
             Projection::Orthographic => [f64::INFINITY; 2],
         };
-        // In perspective, x stays within the right edge if x / slope + z is at most the eye's distance
-        // (for an eye at x = 0). So the outermost point of each edge is the point with the largest sum; in
-        // orthographic projection, the point with the largest x.
+        // In perspective, x stays within the right edge if x / slope + z is at most the eye's
+        // distance (for an eye at x = 0). So the outermost point of each edge is the point with the
+        // largest sum; in orthographic projection, the point with the largest x.
         let mut outermost = [[f64::NEG_INFINITY; 2]; 2];
         let (mut near, mut far) = (f64::NEG_INFINITY, f64::INFINITY);
         for surface in &picture.surfaces {
@@ -182,8 +184,9 @@ impl View {
         }
     }
 
-    /// `eye` is given in the coordinates of `axes`. The view reaches so far to each side (half the width, half the height), in
-    /// perspective at the distance 1, and from one distance from the eye to another.
+    /// `eye` is given in the coordinates of `axes`. The view reaches so far to each side (half the
+    /// width, half the height), in perspective at the distance 1, and from one distance from the
+    /// eye to another.
     fn new(
         axes: &Axes,
         eye: [f64; 3],

@@ -1,5 +1,5 @@
-//! Pictures on the first adapter, and on the CPU, which must look alike. The tests fail if there is no adapter; a software driver
-//! suffices.
+//! Pictures on the first adapter, and on the CPU, which must look alike. The tests fail if there is
+//! no adapter; a software driver suffices.
 
 use impinge::{Backend, Detector, Query, Scene};
 use impinge_render::{
@@ -182,7 +182,8 @@ fn a_hidden_face_that_shows_through_is_seen_as_far_as_asked() {
 
 #[test]
 fn the_viewer_stands_where_the_angles_say() {
-    // A small square at the end of each axis; the one that faces the viewer is in the middle of the picture.
+    // A small square at the end of each axis; the one that faces the viewer is in the middle of the
+    // picture.
     let axes: [([f64; 3], [u8; 3]); 3] = [
         ([1.0, 0.0, 0.0], RED),
         ([0.0, 1.0, 0.0], [40, 160, 40]),
@@ -367,7 +368,8 @@ fn runs_and_chunks_change_no_byte_and_tiles_no_picture() {
             .with_room(tile, n_faces)
             .render(&picture)
             .unwrap();
-        // Pixels beside a seam may be rounded differently: drivers place faces relative to the tile.
+        // Pixels beside a seam may be rounded differently: drivers place faces relative to the
+        // tile.
         let is_one_tile = tile >= picture.size[0];
         let allowed = if is_one_tile { 0 } else { 1 };
         assert!(

@@ -1,9 +1,9 @@
 //! Scenes that break methods which are only fast on average.
 //!
-//! Work should be bounded by input plus output. Each scene here violates one hidden assumption of
-//! a method: that primitives have about the same size, that they are spread out, that the scene has a
-//! volume, that there are few bodies. [`SCENES`] lists them all, to be compared with [`plain`] of the
-//! same size.
+//! Work should be bounded by input plus output. Each scene here violates one hidden assumption of a
+//! method: that primitives have about the same size, that they are spread out, that the scene has a
+//! volume, that there are few bodies. [`SCENES`] lists them all, to be compared with [`plain`] of
+//! the same size.
 
 use impinge::Error;
 
@@ -158,9 +158,9 @@ fn cloth_about_origin(n_along: usize, spacing: f32) -> Model {
     cloth(n_along, n_along, spacing).translated([-half, -half, 0.0])
 }
 
-/// Two bodies whose triangles lie flat in one stack, alternately from each body, 2^-24 apart, plus one
-/// triangle of each body 2^20 away. A uniform grid over the region puts the whole stack in one cell. No
-/// two boxes touch, so there are no pairs. Probes that work in one cell is not quadratic.
+/// Two bodies whose triangles lie flat in one stack, alternately from each body, 2^-24 apart, plus
+/// one triangle of each body 2^20 away. A uniform grid over the region puts the whole stack in one
+/// cell. No two boxes touch, so there are no pairs. Probes that work in one cell is not quadratic.
 ///
 /// # Errors
 /// As [`plain`].
@@ -180,8 +180,8 @@ pub fn one_cell(n: usize) -> Result<BuiltScene, Error> {
 }
 
 /// Two bodies of `n / 2` triangles, all hinged on one segment like the pages of a book: every
-/// triangle of one body meets every triangle of the other, `(n / 2)^2` pairs. Probes that memory and
-/// time are proportional to the answer.
+/// triangle of one body meets every triangle of the other, `(n / 2)^2` pairs. Probes that memory
+/// and time are proportional to the answer.
 ///
 /// # Errors
 /// As [`plain`].
@@ -223,8 +223,8 @@ pub fn needle_row(n: usize) -> Result<BuiltScene, Error> {
     BuiltScene::between("needle-row", row.model(), needles.model())
 }
 
-/// A body of `n / 2` triangles and itself, in the same place: every triangle meets its copy and
-/// the copies of its neighbours, all of it touching and coplanar. Probes the exact test at its slowest.
+/// A body of `n / 2` triangles and itself, in the same place: every triangle meets its copy and the
+/// copies of its neighbours, all of it touching and coplanar. Probes the exact test at its slowest.
 ///
 /// # Errors
 /// As [`plain`].
@@ -232,8 +232,8 @@ pub fn coincident(n: usize) -> Result<BuiltScene, Error> {
     BuiltScene::two_body("coincident", &stand_in(n / 2), [0.0; 3])
 }
 
-/// The [`plain`] scene with eight more triangles per body, a million units away towards all corners.
-/// Probes that the resolution does not depend only on the region in which bodies overlap.
+/// The [`plain`] scene with eight more triangles per body, a million units away towards all
+/// corners. Probes that the resolution does not depend only on the region in which bodies overlap.
 ///
 /// # Errors
 /// As [`plain`].
@@ -307,9 +307,9 @@ fn tumbled_cube(random: &mut Random, centre: [f32; 3], size: f32) -> Model {
     })
 }
 
-/// `n_bodies` cubes of 12 triangles each, placed and turned at random, with edges of 0.4 to 0.8 in a
-/// space of one unit volume per body: each cube meets about one other. The query asks for pairs of all
-/// bodies. Probes that no step visits all pairs of bodies.
+/// `n_bodies` cubes of 12 triangles each, placed and turned at random, with edges of 0.4 to 0.8 in
+/// a space of one unit volume per body: each cube meets about one other. The query asks for pairs
+/// of all bodies. Probes that no step visits all pairs of bodies.
 ///
 /// # Errors
 /// As [`plain`].
@@ -325,9 +325,9 @@ pub fn boxes(n_bodies: usize, seed: u64) -> Result<BuiltScene, Error> {
     BuiltScene::all("boxes", cubes)
 }
 
-/// Two bodies of `n / 4` triangles and `n / 24` cubes of 12 triangles around and inside them, with edges
-/// from 1/2 down to 1/1024, each size half as likely as the next smaller one. Probes that the unit of
-/// work is neither a body nor the largest primitive.
+/// Two bodies of `n / 4` triangles and `n / 24` cubes of 12 triangles around and inside them, with
+/// edges from 1/2 down to 1/1024, each size half as likely as the next smaller one. Probes that the
+/// unit of work is neither a body nor the largest primitive.
 ///
 /// # Errors
 /// As [`plain`].
@@ -350,10 +350,10 @@ pub fn mixed_sizes(n: usize) -> Result<BuiltScene, Error> {
     BuiltScene::all("mixed-sizes", [large, neighbour].into_iter().chain(cubes))
 }
 
-/// Long, thin triangles along diagonals, `n / 2` per body: those of one body along `(1, 1, 1)`, those of
-/// the other along `(1, 1, -1)`, crossing the first ones at their middles. Their boxes are
-/// nearly empty and four in ten pairs of boxes overlap, so boxes tell little about them.
-/// Probes that memory stays bounded and that the pair test is fast.
+/// Long, thin triangles along diagonals, `n / 2` per body: those of one body along `(1, 1, 1)`,
+/// those of the other along `(1, 1, -1)`, crossing the first ones at their middles. Their boxes are
+/// nearly empty and four in ten pairs of boxes overlap, so boxes tell little about them. Probes
+/// that memory stays bounded and that the pair test is fast.
 ///
 /// # Errors
 /// As [`plain`].
@@ -379,10 +379,11 @@ const AROUND: usize = 24;
 /// Rings of a fillet at either end of a tube.
 const RINGS: usize = 8;
 
-/// Two parts of a machine as programs for CAD export them: tubes of 860 triangles, whose walls are slivers 200 times as long
-/// as wide, whose ends are fans across, and whose fillets are cut finely. The tubes of one part run along one direction, those of
-/// the other along another one, and none along an axis of coordinates; each tube crosses about two of the other part. One triangle
-/// in ten is long. Probes that the cost of long elements is not that of their boxes.
+/// Two parts of a machine as programs for CAD export them: tubes of 860 triangles, whose walls are
+/// slivers 200 times as long as wide, whose ends are fans across, and whose fillets are cut finely.
+/// The tubes of one part run along one direction, those of the other along another one, and none
+/// along an axis of coordinates; each tube crosses about two of the other part. One triangle in ten
+/// is long. Probes that the cost of long elements is not that of their boxes.
 ///
 /// # Errors
 /// As [`plain`].
@@ -406,8 +407,8 @@ pub fn machine_parts(n: usize) -> Result<BuiltScene, Error> {
     BuiltScene::between("machine-parts", a, b)
 }
 
-/// A tube of length 4 and radius 0.08 along z, or across it, turned in space: its wall, its ends, and fillets around these. A point
-/// of its middle is given by two coordinates.
+/// A tube of length 4 and radius 0.08 along z, or across it, turned in space: its wall, its ends,
+/// and fillets around these. A point of its middle is given by two coordinates.
 fn tube([x, y]: [f32; 2], is_across: bool) -> Mesh {
     let mut mesh = Mesh::default();
     let radius = |ring: usize| 0.08 * (1.0 - 0.04 * real(ring) * real(ring) / real(RINGS));
@@ -473,9 +474,9 @@ fn unit_cube([x, y, z]: [usize; 3]) -> Model {
     crate::surfaces::cuboid(min, add(min, [1.0; 3]))
 }
 
-/// Unit cubes on integer coordinates, stacked without gaps, each a body of 12 triangles; the query asks
-/// for pairs of all bodies. Faces, edges and corners touch and boxes end exactly on cell borders:
-/// probes that each touching pair is found, and found once.
+/// Unit cubes on integer coordinates, stacked without gaps, each a body of 12 triangles; the query
+/// asks for pairs of all bodies. Faces, edges and corners touch and boxes end exactly on cell
+/// borders: probes that each touching pair is found, and found once.
 ///
 /// # Errors
 /// As [`plain`].

@@ -49,7 +49,8 @@ impl BuiltScene {
         Ok(built)
     }
 
-    /// A model and its copy moved by `offset` (added in f32), with a query for the pairs between them.
+    /// A model and its copy moved by `offset` (added in f32), with a query for the pairs between
+    /// them.
     ///
     /// # Errors
     /// As [`Scene::add`].

@@ -12,10 +12,12 @@ pub fn data_dir() -> Option<PathBuf> {
     folder.is_dir().then_some(folder)
 }
 
-/// A file of [`data_dir`] for a test. `None` only if the file is absent and `IMPINGE_NO_DATA=1` is set.
+/// A file of [`data_dir`] for a test. `None` only if the file is absent and `IMPINGE_NO_DATA=1` is
+/// set.
 ///
 /// # Panics
-/// If the file is absent and `IMPINGE_NO_DATA=1` is not set: a test of real meshes must not pass by skipping them.
+/// If the file is absent and `IMPINGE_NO_DATA=1` is not set: a test of real meshes must not pass by
+/// skipping them.
 pub fn test_file(path: &str) -> Option<PathBuf> {
     let found = data_dir()
         .map(|folder| folder.join(path))

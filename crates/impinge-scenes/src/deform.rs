@@ -20,8 +20,8 @@ pub trait Deform {
     /// The position at time `t` of the vertex with rest position `p`.
     fn at(&self, p: [f32; 3], t: f32) -> [f32; 3];
 
-    /// Overwrites `now` with the positions at time `t`, without allocating. If the arrays have different
-    /// lengths, it writes the common part.
+    /// Overwrites `now` with the positions at time `t`, without allocating. If the arrays have
+    /// different lengths, it writes the common part.
     fn apply(&self, rest: &[[f32; 3]], t: f32, now: &mut [[f32; 3]]) {
         for (now, &rest) in now.iter_mut().zip(rest) {
             *now = self.at(rest, t);

@@ -42,7 +42,8 @@ impl Model {
         self.mapped(|p| add(p, offset))
     }
 
-    /// The same mesh, scaled about the origin: one f32 product per coordinate, exact for powers of two.
+    /// The same mesh, scaled about the origin: one f32 product per coordinate, exact for powers of
+    /// two.
     pub fn scaled(&self, factor: f32) -> Model {
         self.mapped(|p| p.map(|x| x * factor))
     }
@@ -95,9 +96,9 @@ impl Mesh {
         );
     }
 
-    /// Splits evenly spread faces, each at a new vertex, until there are `n_faces` faces (or one less:
-    /// a split adds two faces, and a closed surface stays closed). The new vertex is the face's
-    /// centroid, mapped by `place`.
+    /// Splits evenly spread faces, each at a new vertex, until there are `n_faces` faces (or one
+    /// less: a split adds two faces, and a closed surface stays closed). The new vertex is the
+    /// face's centroid, mapped by `place`.
     pub fn split_to(&mut self, n_faces: usize, place: impl Fn([f32; 3]) -> [f32; 3]) {
         while self.faces.len() + 2 <= n_faces {
             let n_old = self.faces.len();

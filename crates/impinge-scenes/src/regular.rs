@@ -1,8 +1,9 @@
-//! Flat and regular surfaces, like sheets at rest and machine parts: neighbours in one plane, edges in one line.
+//! Flat and regular surfaces, like sheets at rest and machine parts: neighbours in one plane, edges
+//! in one line.
 //!
-//! None of them meets itself except at shared vertices. They are hard for filters, because the plane of a
-//! triangle contains its neighbours' vertices exactly, or nearly. [`rough`] is an easy surface of the same
-//! size, for comparison.
+//! None of them meets itself except at shared vertices. They are hard for filters, because the
+//! plane of a triangle contains its neighbours' vertices exactly, or nearly. [`rough`] is an easy
+//! surface of the same size, for comparison.
 
 use std::f64::consts::TAU;
 
@@ -157,7 +158,8 @@ pub fn grid_box(n_triangles: usize) -> Model {
     mesh.model()
 }
 
-/// Bolts: rows of prisms of 32 sides, standing apart. Their walls are long and thin, their caps fans.
+/// Bolts: rows of prisms of 32 sides, standing apart. Their walls are long and thin, their caps
+/// fans.
 pub fn bolts(n_triangles: usize) -> Model {
     const SIDES: usize = 32;
     let n_along = (n_triangles / (4 * SIDES)).isqrt().max(1);

@@ -4,8 +4,9 @@ use impinge::Elements;
 
 use crate::model::{Model, count, index, real, to_f32};
 
-/// A block of `n_x * n_y * n_z` cubes with edge `spacing` and one corner at the origin. Each cube is cut
-/// into six tetrahedra along its main diagonal (Kuhn 1960), so that faces of neighbouring cubes match.
+/// A block of `n_x * n_y * n_z` cubes with edge `spacing` and one corner at the origin. Each cube
+/// is cut into six tetrahedra along its main diagonal (Kuhn 1960), so that faces of neighbouring
+/// cubes match.
 pub fn block(n_x: usize, n_y: usize, n_z: usize, spacing: f32) -> Model {
     let [n_x, n_y, n_z] = [n_x, n_y, n_z].map(|n| n.clamp(1, 512));
     let vertex = |x: usize, y: usize, z: usize| index((z * (n_y + 1) + y) * (n_x + 1) + x);
@@ -18,8 +19,8 @@ pub fn block(n_x: usize, n_y: usize, n_z: usize, spacing: f32) -> Model {
             );
         }
     }
-    // The order of axes in a path of unit steps from corner 0 to corner 7. Odd permutations swap two
-    // corners to keep the volume positive.
+    // The order of axes in a path of unit steps from corner 0 to corner 7. Odd permutations swap
+    // two corners to keep the volume positive.
     const PATHS: [([usize; 3], bool); 6] = [
         ([0, 1, 2], false),
         ([1, 2, 0], false),

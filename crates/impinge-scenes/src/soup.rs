@@ -56,8 +56,8 @@ pub fn tetrahedra(n: usize, size: f32, seed: u64) -> Model {
     }
 }
 
-/// `n` triangles whose corners are random points of the lattice 0, 1, …, `k` (at most 65,535) cubed:
-/// with a small `k` many are segments or points, and nearly all pairs only touch.
+/// `n` triangles whose corners are random points of the lattice 0, 1, …, `k` (at most 65,535)
+/// cubed: with a small `k` many are segments or points, and nearly all pairs only touch.
 pub fn lattice_triangles(n: usize, k: u32, seed: u64) -> Model {
     let mut random = Random::new(seed);
     let (positions, faces) = separate(n, || on_lattice(&mut random, k.min(65_535)));
@@ -93,9 +93,9 @@ fn web<const K: usize>(n: usize, n_vertices: usize, seed: u64) -> Vec<[u32; K]> 
         .collect()
 }
 
-/// `n` triangles over shared vertices, the points of the lattice 0, 1, …, `k` (at most 255) cubed: a
-/// hard case for adjacency rules. Triangles share one, two or three vertices, and a triangle may name
-/// the same vertex twice.
+/// `n` triangles over shared vertices, the points of the lattice 0, 1, …, `k` (at most 255) cubed:
+/// a hard case for adjacency rules. Triangles share one, two or three vertices, and a triangle may
+/// name the same vertex twice.
 pub fn lattice_web(n: usize, k: u32, seed: u64) -> Model {
     let positions = lattice_points(k);
     Model {

@@ -47,8 +47,8 @@ pub fn uv_sphere(n_segments: usize, n_rings: usize) -> Model {
 }
 
 /// A sphere of radius 0.5 about the origin with `n_triangles` triangles of about the same size:
-/// exactly this many for an even number from 20 on, one less for an odd number (a closed surface has
-/// an even number of triangles).
+/// exactly this many for an even number from 20 on, one less for an odd number (a closed surface
+/// has an even number of triangles).
 pub fn ball(n_triangles: usize) -> Model {
     ball_mesh(n_triangles).model()
 }
@@ -233,8 +233,8 @@ impl Default for Knot {
     }
 }
 
-/// A tube along a torus knot, scaled to a box diagonal of 1 about the origin, with
-/// `n_triangles` triangles: exactly this many for an even number from 96 on, one less for an odd number.
+/// A tube along a torus knot, scaled to a box diagonal of 1 about the origin, with `n_triangles`
+/// triangles: exactly this many for an even number from 96 on, one less for an odd number.
 pub fn torus_knot(n_triangles: usize, knot: Knot) -> Model {
     let n_triangles = n_triangles.clamp(96, MAX_PRIMITIVES);
     let (p, q) = (f64::from(knot.p), f64::from(knot.q));

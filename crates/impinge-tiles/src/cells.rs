@@ -1,27 +1,33 @@
 //! Half-open cells that fill space, and which box goes to which cell.
 //!
-//! A cut at `c` along an axis divides a cell into a low side, `x < c`, and a high side, `x >= c`. A box goes to the low
-//! side if `lo < c` and to the high side if `hi >= c`. Its corners are given numbers, so these comparisons are exact.
+//! A cut at `c` along an axis divides a cell into a low side, `x < c`, and a high side, `x >= c`. A
+//! box goes to the low side if `lo < c` and to the high side if `hi >= c`. Its corners are given
+//! numbers, so these comparisons are exact.
 //!
-//! Why every pair is found exactly once: let two boxes meet, and let p be the larger of their lower corners, axis by axis.
-//! Then p lies in both boxes. Consider each cut on the way to the cell that holds p. If `p < c`, the lower corner of each box
-//! is at most p, so it is below c and the box goes low. If `p >= c`, the upper corner of each box is at least p, so the box
-//! goes high. So that cell gets both boxes. Cells are disjoint and fill space, so exactly one cell holds p.
+//! Why every pair is found exactly once: let two boxes meet, and let p be the larger of their lower
+//! corners, axis by axis. Then p lies in both boxes. Consider each cut on the way to the cell that
+//! holds p. If `p < c`, the lower corner of each box is at most p, so it is below c and the box
+//! goes low. If `p >= c`, the upper corner of each box is at least p, so the box goes high. So that
+//! cell gets both boxes. Cells are disjoint and fill space, so exactly one cell holds p.
 //!
-//! Where pairs within a distance d count, the box goes to the high side if `hi + d >= c`. Along an axis, boxes within d have a gap
-//! of at most d. There p is the lower corner of one of them, so p is at most the upper corner of either box plus d, as
-//! real numbers. Rounding to nearest keeps order and p is a floating-point number, so p is also at most the rounded sum. If `p >= c`,
-//! that sum is at least c, and the box goes high. The low side is unchanged: p is at least the lower corner of each box.
+//! Where pairs within a distance d count, the box goes to the high side if `hi + d >= c`. Along an
+//! axis, boxes within d have a gap of at most d. There p is the lower corner of one of them, so p
+//! is at most the upper corner of either box plus d, as real numbers. Rounding to nearest keeps
+//! order and p is a floating-point number, so p is also at most the rounded sum. If `p >= c`, that
+//! sum is at least c, and the box goes high. The low side is unchanged: p is at least the lower
+//! corner of each box.
 
 use serde_json::{Value, json};
 
-/// The comparisons as a type, so that tests can replace them by wrong ones and check that this is noticed.
+/// The comparisons as a type, so that tests can replace them by wrong ones and check that this is
+/// noticed.
 pub(crate) trait Rule {
     /// Whether a box with this lower coordinate goes to the low side.
     fn goes_low(lo: f64, cut: f64) -> bool;
     /// Whether a box with this upper coordinate goes to the high side.
     fn goes_high(hi: f64, cut: f64) -> bool;
-    /// The largest coordinate of an owner point of a box with this upper coordinate and a box within the separation.
+    /// The largest coordinate of an owner point of a box with this upper coordinate and a box
+    /// within the separation.
     fn reach(hi: f64, separation: f64) -> f64 {
         hi + separation
     }
@@ -90,7 +96,8 @@ impl Cells {
         self.n_tiles
     }
 
-    /// Cuts a tile at a coordinate: its low side keeps its number, the high side gets the returned one.
+    /// Cuts a tile at a coordinate: its low side keeps its number, the high side gets the returned
+    /// one.
     ///
     /// # Panics
     /// No such tile or axis, or a coordinate that is not finite.
@@ -145,8 +152,8 @@ impl Cells {
         }
     }
 
-    /// Calls `found` for each tile that may own a pair of this box and another one within the separation. With 0 these are the
-    /// tiles that the box touches.
+    /// Calls `found` for each tile that may own a pair of this box and another one within the
+    /// separation. With 0 these are the tiles that the box touches.
     pub(crate) fn route<R: Rule>(
         &self,
         bounds: &Bounds,
@@ -176,7 +183,8 @@ impl Cells {
         }
     }
 
-    /// Nodes as JSON. A cut is also written as the 64 bits of its number, so that it is not rounded.
+    /// Nodes as JSON. A cut is also written as the 64 bits of its number, so that it is not
+    /// rounded.
     pub(crate) fn to_json(&self) -> Value {
         let node = |node: &Node| match node {
             Node::Tile(tile) => json!({ "tile": tile }),
@@ -229,7 +237,8 @@ impl Cells {
     }
 }
 
-/// The point that decides to which tile a pair belongs: the larger of the two lower corners, axis by axis.
+/// The point that decides to which tile a pair belongs: the larger of the two lower corners, axis
+/// by axis.
 pub(crate) fn owner_point(a: &[f64; 3], b: &[f64; 3]) -> [f64; 3] {
     std::array::from_fn(|axis| a[axis].max(b[axis]))
 }

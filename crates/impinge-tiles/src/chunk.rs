@@ -35,7 +35,8 @@ pub struct Chunk {
     pub first: u64,
     /// Vertex numbers, `corners` per primitive.
     pub vertices: Vec<u32>,
-    /// Positions of these vertices: `corners` per primitive; in a step, `corners` at the start and then as many at the end.
+    /// Positions of these vertices: `corners` per primitive; in a step, `corners` at the start and
+    /// then as many at the end.
     pub positions: Vec<[f64; 3]>,
 }
 
@@ -45,7 +46,8 @@ impl Chunk {
         self.positions.chunks_exact(shape.points()).map(bounds)
     }
 
-    /// Refuses coordinates that are not finite, which no tile holds. `paths` are the files of the start and of the end.
+    /// Refuses coordinates that are not finite, which no tile holds. `paths` are the files of the
+    /// start and of the end.
     pub fn check(&self, paths: [&Path; 2], shape: Shape) -> Result<(), Error> {
         let bad = |x: &f64| !x.is_finite();
         match self.positions.iter().position(|p| p.iter().any(bad)) {

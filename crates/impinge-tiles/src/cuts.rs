@@ -2,7 +2,8 @@
 
 use crate::cells::{Bounds, Cells};
 
-/// A cell is not cut if the two sides together would hold more than this multiple of its primitives.
+/// A cell is not cut if the two sides together would hold more than this multiple of its
+/// primitives.
 const MAX_GROWTH: f64 = 1.5;
 
 /// A cell is not cut if the larger side would keep more than this share of its primitives.
@@ -11,8 +12,8 @@ const MAX_KEPT: f64 = 0.9;
 /// The most cuts on the way to a cell.
 const MAX_DEPTH: usize = 64;
 
-/// Cells of about `cap` primitives each, from a sample in which each box stands for `weight` primitives. The result depends
-/// on the sample alone.
+/// Cells of about `cap` primitives each, from a sample in which each box stands for `weight`
+/// primitives. The result depends on the sample alone.
 pub fn cells(sample: &[Bounds], weight: f64, cap: u64) -> Cells {
     let mut cells = Cells::whole();
     let all: Vec<u32> = (0..sample.len() as u32).collect();
@@ -43,7 +44,8 @@ pub fn cells(sample: &[Bounds], weight: f64, cap: u64) -> Cells {
     cells
 }
 
-/// The median cut that copies the fewest boxes; `None` if no cut is worth its copies, as for boxes on one spot.
+/// The median cut that copies the fewest boxes; `None` if no cut is worth its copies, as for boxes
+/// on one spot.
 fn best_cut(sample: &[Bounds], members: &[u32]) -> Option<(usize, f64)> {
     let n = members.len() as f64;
     let mut best: Option<(usize, usize, f64)> = None;

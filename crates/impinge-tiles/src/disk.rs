@@ -8,8 +8,9 @@ use impinge_io::AtomicFile;
 
 use crate::error::Error;
 
-/// Writes a temporary file and renames it, so that readers see either the old file or the new one. A process that is
-/// killed leaves a `.part` file behind, which no step reads: [`remove_leftovers`].
+/// Writes a temporary file and renames it, so that readers see either the old file or the new one.
+/// A process that is killed leaves a `.part` file behind, which no step reads:
+/// [`remove_leftovers`].
 pub fn replace(
     path: &Path,
     write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
@@ -29,7 +30,8 @@ pub fn replace(
     step().map_err(error)
 }
 
-/// Removes the temporary files, left by processes that were killed, of those files of a folder that are whole by now.
+/// Removes the temporary files, left by processes that were killed, of those files of a folder that
+/// are whole by now.
 pub fn remove_leftovers(folder: &Path) -> Result<(), Error> {
     let error = |source| Error::io(folder, "look into the folder", source);
     for entry in fs::read_dir(folder).map_err(error)? {
@@ -64,7 +66,8 @@ struct Stepped<'a>(&'a mut AtomicFile);
 impl Write for Stepped<'_> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         if step().is_err() {
-            // Like a process that is killed in the middle of a write: half of the bytes are on the disk.
+            // Like a process that is killed in the middle of a write: half of the bytes are on the
+            // disk.
             self.0.write_all(&bytes[..bytes.len() / 2])?;
             return Err(io::Error::other("stopped by a test"));
         }

@@ -1,5 +1,5 @@
-//! A checksum that detects damage and identifies plans: two rounds of a folded 128-bit product per 8 bytes. It is not
-//! cryptographic.
+//! A checksum that detects damage and identifies plans: two rounds of a folded 128-bit product per
+//! 8 bytes. It is not cryptographic.
 
 /// The checksum of bytes.
 pub fn checksum(bytes: &[u8]) -> u64 {

@@ -24,8 +24,9 @@ const STEP: &str = "tiles run";
 pub struct Merged {
     /// All pairs.
     pub n_pairs: u64,
-    /// The hash of all pairs: equal to [`Pairs::hash`](impinge::Pairs::hash) of the whole scene in one process, with bodies in
-    /// the order of files; in a step, to [`Impacts::hash`](impinge::Impacts::hash).
+    /// The hash of all pairs: equal to [`Pairs::hash`](impinge::Pairs::hash) of the whole scene in
+    /// one process, with bodies in the order of files; in a step, to
+    /// [`Impacts::hash`](impinge::Impacts::hash).
     pub hash: u64,
     /// Records of all tiles together: primitives, counted once per tile that they touch.
     pub n_records: u64,
@@ -33,8 +34,9 @@ pub struct Merged {
     pub n_uncut: u64,
     /// The query that all tiles answered, in words.
     pub asked: String,
-    /// The rows `file_a, primitive_a, file_b, primitive_b` (u32, sorted); in a step, a structured array of `kind`, `body_a`,
-    /// `element_a`, `body_b`, `element_b` and `toi`, as `impinge step --rows` writes it.
+    /// The rows `file_a, primitive_a, file_b, primitive_b` (u32, sorted); in a step, a structured
+    /// array of `kind`, `body_a`, `element_a`, `body_b`, `element_b` and `toi`, as
+    /// `impinge step --rows` writes it.
     pub rows: PathBuf,
     /// What else is known of a step.
     pub step: Option<MergedStep>,
@@ -47,14 +49,14 @@ pub struct MergedStep {
     pub kinds: [(PairKind, u64); 2],
     /// How many touch at the start.
     pub touching_at_start: u64,
-    /// The first contact: kind, `[file_a, element_a, file_b, element_b]`, time. Of several at the same time, the one whose row
-    /// comes first.
+    /// The first contact: kind, `[file_a, element_a, file_b, element_b]`, time. Of several at the
+    /// same time, the one whose row comes first.
     pub earliest: Option<(PairKind, [u32; 4], f64)>,
 }
 
 impl Plan {
-    /// Merges the results of all tiles into `rows.npy` and `answer.json`. All contacts of a step are in memory then, about 150
-    /// bytes each.
+    /// Merges the results of all tiles into `rows.npy` and `answer.json`. All contacts of a step
+    /// are in memory then, about 150 bytes each.
     ///
     /// # Errors
     /// A tile whose result is missing, stale, damaged, or for another query than that of tile 0.
@@ -149,8 +151,8 @@ impl Plan {
     }
 }
 
-/// The rows of one tile, block by block. The file is closed in between, because there may be more tiles than a process may have
-/// open files.
+/// The rows of one tile, block by block. The file is closed in between, because there may be more
+/// tiles than a process may have open files.
 struct Rows {
     path: PathBuf,
     start: u64,
@@ -235,7 +237,8 @@ impl Rows {
     }
 }
 
-/// Hands over the rows of all tiles, ascending. A repeated row, or one out of order, means a damaged file.
+/// Hands over the rows of all tiles, ascending. A repeated row, or one out of order, means a
+/// damaged file.
 fn each_sorted(
     tiles: &mut [Rows],
     mut each: impl FnMut(&Rows, [u32; 4]) -> Result<(), Error>,

@@ -4,7 +4,8 @@ use std::io::{self, Write};
 
 use impinge_io::{NpyHeader, npy_header};
 
-/// Reads the header at the beginning of a file; `None` if it is not valid, or if the data is in Fortran order.
+/// Reads the header at the beginning of a file; `None` if it is not valid, or if the data is in
+/// Fortran order.
 pub fn parse(head: &[u8]) -> Option<NpyHeader> {
     NpyHeader::parse(head).filter(|header| !header.fortran_order)
 }

@@ -10,8 +10,9 @@
 //!     records: u32 primitive, u32 vertex per corner, 3 coordinates per corner, in a step 3 more per corner at the end
 //! ```
 //!
-//! All numbers are little-endian. A checksum covers the tile's number, the place and number of its records, and the records.
-//! A tile reads one entry of the table and its records; it does not touch the rest of the file.
+//! All numbers are little-endian. A checksum covers the tile's number, the place and number of its
+//! records, and the records. A tile reads one entry of the table and its records; it does not touch
+//! the rest of the file.
 
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};

@@ -1,4 +1,5 @@
-//! The plan: files, cells and units of work. Every other file in the folder names the plan that it belongs to.
+//! The plan: files, cells and units of work. Every other file in the folder names the plan that it
+//! belongs to.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -29,16 +30,18 @@ type Fingerprint = (u64, u64);
 /// How a plan is made.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlanOptions {
-    /// About how many primitives a tile may hold; one tile is in memory at a time. 2 million by default: about 600 MB.
+    /// About how many primitives a tile may hold; one tile is in memory at a time. 2 million by
+    /// default: about 600 MB.
     pub cap: u64,
-    /// Primitives per unit of scattering; a thread reads, sorts and writes one unit at a time. 500,000 by default.
+    /// Primitives per unit of scattering; a thread reads, sorts and writes one unit at a time.
+    /// 500,000 by default.
     pub chunk: u64,
-    /// Whether vertices of one file at exactly the same position are welded, as the program does. On by default. In a
-    /// step, vertices must be at one position both at the start and at the end. Scattering such a body holds all its vertices, up to
-    /// 90 bytes each in f32 and 140 in f64.
+    /// Whether vertices of one file at exactly the same position are welded, as the program does.
+    /// On by default. In a step, vertices must be at one position both at the start and at the end.
+    /// Scattering such a body holds all its vertices, up to 90 bytes each in f32 and 140 in f64.
     pub weld: bool,
-    /// Whether the scene moves: a body is then two files with the same elements, its start and its end, and tiles find the
-    /// first contacts between them.
+    /// Whether the scene moves: a body is then two files with the same elements, its start and its
+    /// end, and tiles find the first contacts between them.
     pub step: bool,
     /// In a step: the distance that elements must keep, as [`impinge::Query::separation`].
     pub separation: f64,
@@ -100,9 +103,10 @@ pub(crate) struct Unit {
 }
 
 impl Plan {
-    /// Reads every primitive of `files` once (coordinates must be finite), takes a sample, cuts space and writes `plan.json`. With
-    /// [`step`](PlanOptions::step), files are start, end, start, end and so on.
-    /// A folder with exactly the same plan is left as it is. `progress` gets the number of primitives done and the total.
+    /// Reads every primitive of `files` once (coordinates must be finite), takes a sample, cuts
+    /// space and writes `plan.json`. With [`step`](PlanOptions::step), files are start, end, start,
+    /// end and so on. A folder with exactly the same plan is left as it is. `progress` gets the
+    /// number of primitives done and the total.
     ///
     /// # Errors
     /// Files that can't be read, refused coordinates, another plan in the folder, cancellation.
@@ -218,7 +222,8 @@ impl Plan {
             .map_err(|error| Error::io(&path, "write", error.into()))?;
         disk::replace(&path, |to| writeln!(to, "{text}"))?;
         if replace {
-            // Files of another plan would be found stale one by one; removing them frees disk space.
+            // Files of another plan would be found stale one by one; removing them frees disk
+            // space.
             for name in ["parts", "results"] {
                 let old = self.folder.join(name);
                 if old.exists() {
@@ -234,7 +239,8 @@ impl Plan {
         &self.folder
     }
 
-    /// The number that identifies this plan in all its files: a checksum of files, cells and options.
+    /// The number that identifies this plan in all its files: a checksum of files, cells and
+    /// options.
     pub fn id(&self) -> u64 {
         self.id
     }
@@ -390,7 +396,8 @@ impl File {
         self.n_primitives.div_ceil(chunk) as usize
     }
 
-    /// Opens the file, if it has not changed since the plan was made. `weld` welds the vertices of a body of a step.
+    /// Opens the file, if it has not changed since the plan was made. `weld` welds the vertices of
+    /// a body of a step.
     pub(crate) fn open(&self, weld: bool) -> Result<Box<dyn Source>, Error> {
         let changed = |path: &Path| Error::Changed {
             path: path.to_owned(),
@@ -490,8 +497,8 @@ fn file(body: &Paths<'_>, source: &dyn Source) -> Result<File, Error> {
     })
 }
 
-/// Checks all primitives of a file and samples every `step`th of them. If the file turns out to hold polygons other than
-/// triangles, its source is replaced by one that reads the whole file.
+/// Checks all primitives of a file and samples every `step`th of them. If the file turns out to
+/// hold polygons other than triangles, its source is replaced by one that reads the whole file.
 fn look_at(
     body: &Paths<'_>,
     source: &mut Box<dyn Source>,

@@ -1,4 +1,5 @@
-//! Runs one tile: reads its primitives from all parts, finds the pairs among them, and keeps those that the tile owns.
+//! Runs one tile: reads its primitives from all parts, finds the pairs among them, and keeps those
+//! that the tile owns.
 
 mod ranges;
 mod records;
@@ -99,14 +100,15 @@ pub struct TileResult {
     pub n_primitives: u64,
     /// Pairs that belong to it; in a step, first contacts.
     pub n_pairs: u64,
-    /// The sum of the hashes of these pairs; see [`hash_rows`]. In a step, a checksum of the rows as the tile stores them: their
-    /// edges have numbers, and the answer its hash, only after merging.
+    /// The sum of the hashes of these pairs; see [`hash_rows`]. In a step, a checksum of the rows
+    /// as the tile stores them: their edges have numbers, and the answer its hash, only after
+    /// merging.
     pub hash: u64,
     pub(crate) step: Option<OfStep>,
     /// Pairs that were found here but belong to another tile.
     pub n_elsewhere: u64,
-    /// The number of pieces into which the tile was split, every piece tested against every other. It is above 1 if its
-    /// primitives overlap so much that no cut of space separates them.
+    /// The number of pieces into which the tile was split, every piece tested against every other.
+    /// It is above 1 if its primitives overlap so much that no cut of space separates them.
     pub n_pieces: u64,
     /// Whether the result already existed.
     pub was_kept: bool,
@@ -142,11 +144,13 @@ impl Plan {
             .join(format!("tile-{tile:08}.json"))
     }
 
-    /// Finds the pairs of each of `tiles`, in a step the first contacts, and writes them, with one tile in memory at a time. Existing results for the same query
-    /// are kept. `done` gets the result of each tile.
+    /// Finds the pairs of each of `tiles`, in a step the first contacts, and writes them, with one
+    /// tile in memory at a time. Existing results for the same query are kept. `done` gets the
+    /// result of each tile.
     ///
     /// # Errors
-    /// No such tile; parts that are missing, stale or damaged; errors of [`Detector::detect`]; cancellation.
+    /// No such tile; parts that are missing, stale or damaged; errors of [`Detector::detect`];
+    /// cancellation.
     pub fn run(
         &self,
         tiles: impl IntoIterator<Item = u32>,
@@ -253,7 +257,8 @@ impl Plan {
                 for row in pairs.rows() {
                     let (first, second) =
                         (part.record(row[0], row[1]), part.record(row[2], row[3]));
-                    // For two pieces, only pairs between them count: each piece was tested by itself before.
+                    // For two pieces, only pairs between them count: each piece was tested by
+                    // itself before.
                     if a != b && a.contains(&first) == a.contains(&second) {
                         continue;
                     }
@@ -285,8 +290,8 @@ impl Plan {
         Ok(result)
     }
 
-    /// Cuts the numbers of a tile's primitives into pieces. The plan aims at `cap` primitives per tile; a tile has more than
-    /// twice that only if no cut was worth its copies.
+    /// Cuts the numbers of a tile's primitives into pieces. The plan aims at `cap` primitives per
+    /// tile; a tile has more than twice that only if no cut was worth its copies.
     fn pieces(&self, n: usize) -> Vec<Range<usize>> {
         let piece = if n as u64 > 2 * self.cap {
             self.cap as usize
@@ -299,7 +304,8 @@ impl Plan {
             .collect()
     }
 
-    /// Removes an older result, so that none names rows of another run. Rows are written next, then the result that names them.
+    /// Removes an older result, so that none names rows of another run. Rows are written next, then
+    /// the result that names them.
     fn remove_result(&self, tile: u32) -> Result<(), Error> {
         let path = self.result_path(tile);
         if path.exists() {

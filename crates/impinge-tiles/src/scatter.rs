@@ -45,7 +45,8 @@ pub struct Scattered {
 }
 
 impl Plan {
-    /// Writes the missing parts of this process's units. `progress` gets the number of units done and the total.
+    /// Writes the missing parts of this process's units. `progress` gets the number of units done
+    /// and the total.
     ///
     /// # Errors
     /// Files that have changed or can't be read, refused coordinates, a full disk, cancellation.
@@ -156,7 +157,8 @@ impl Plan {
         let chunk = chunk.ok_or_else(|| Error::Changed {
             path: paths[0].to_owned(),
         })?;
-        // The plan has checked the coordinates, but the file may have changed: a box with NaN would lie in no tile.
+        // The plan has checked the coordinates, but the file may have changed: a box with NaN would
+        // lie in no tile.
         chunk.check(paths, source.shape())?;
         self.write_part(unit_ix, unit.file, &chunk)
     }

@@ -1,7 +1,8 @@
 //! Mesh files as chunks of primitives.
 //!
-//! Binary PLY of triangles, binary STL and `.npy` arrays have primitives of equal length on disk, so any run of them can be read
-//! separately. All other formats of `impinge-io` are held in memory as a whole.
+//! Binary PLY of triangles, binary STL and `.npy` arrays have primitives of equal length on disk,
+//! so any run of them can be read separately. All other formats of `impinge-io` are held in memory
+//! as a whole.
 
 mod moving;
 mod npy;
@@ -22,7 +23,8 @@ use crate::hash::checksum;
 
 /// A mesh file that several threads can read at a time, in runs of primitives.
 pub trait Source: Send + Sync {
-    /// `ply`, `stl`, `npy` or `whole`; of a step, those of its start and its end with a comma between them.
+    /// `ply`, `stl`, `npy` or `whole`; of a step, those of its start and its end with a comma
+    /// between them.
     fn reader(&self) -> String;
     /// The kind of its primitives.
     fn shape(&self) -> Shape;
@@ -30,10 +32,11 @@ pub trait Source: Send + Sync {
     fn n_primitives(&self) -> u64;
     /// How many vertices there are.
     fn n_vertices(&self) -> u64;
-    /// Primitives `first..first + n`, which must be in range; `None` if they are not triangles, so that the file must be read
-    /// whole.
+    /// Primitives `first..first + n`, which must be in range; `None` if they are not triangles, so
+    /// that the file must be read whole.
     fn read(&self, first: u64, n: usize) -> Result<Option<Chunk>, Error>;
-    /// Which vertices have the position of an earlier one. Unless overridden, vertices are the corners of primitives in order.
+    /// Which vertices have the position of an earlier one. Unless overridden, vertices are the
+    /// corners of primitives in order.
     fn weld(&self) -> Result<Weld, Error> {
         const BLOCK: u64 = 1 << 18;
         let (mut narrow, mut wide) = (Vec::new(), Vec::new());
@@ -107,7 +110,8 @@ pub fn open_as(path: &Path, reader: &str) -> Result<Box<dyn Source>, Error> {
     Ok(source)
 }
 
-/// The length of a file, and a checksum of up to 16 blocks spread evenly over it: enough to recognise another file.
+/// The length of a file, and a checksum of up to 16 blocks spread evenly over it: enough to
+/// recognise another file.
 pub fn fingerprint(path: &Path) -> Result<(u64, u64), Error> {
     const BLOCK: u64 = 4096;
     const N: u64 = 16;

@@ -1,4 +1,5 @@
-//! What tiles of a step write: first contacts whose elements have names instead of numbers, and the names to number.
+//! What tiles of a step write: first contacts whose elements have names instead of numbers, and the
+//! names to number.
 //!
 //! ```text
 //! results/tile-*.npy        per contact: kind, body, name, body, name, time, whether at the start: ten u32
@@ -9,7 +10,8 @@ use impinge::PairKind;
 
 use crate::hash;
 
-/// A name of an element that every tile with this element knows, and whose order is that of the numbers in the whole body:
+/// A name of an element that every tile with this element knows, and whose order is that of the
+/// numbers in the whole body:
 ///
 /// | element | name |
 /// |---|---|

@@ -66,7 +66,8 @@ const LOADING: Duration = Duration::from_millis(20);
 const WARM_UP: u32 = 10;
 
 impl Viewer {
-    /// An app for a window, or for a test, that draws with the device of `render`. `load` runs on a thread of its own.
+    /// An app for a window, or for a test, that draws with the device of `render`. `load` runs on a
+    /// thread of its own.
     pub fn new(
         render: Option<RenderState>,
         load: impl FnOnce() -> Result<Content, String> + Send + 'static,
@@ -101,7 +102,8 @@ impl Viewer {
         }
     }
 
-    /// The places of collision in the frame that is shown: the numbers of their bodies, and of their pairs.
+    /// The places of collision in the frame that is shown: the numbers of their bodies, and of
+    /// their pairs.
     pub fn places(&mut self) -> Vec<([usize; 2], usize)> {
         let State::Shown(session) = &mut self.state else {
             return Vec::new();
@@ -220,8 +222,8 @@ impl Viewer {
             .map_or(&[], |session| &session.timeline.counts)
     }
 
-    /// For the step from each frame to the next: `None` if not known, `Some(None)` if nothing touches, else the time of the
-    /// earliest impact.
+    /// For the step from each frame to the next: `None` if not known, `Some(None)` if nothing
+    /// touches, else the time of the earliest impact.
     pub fn earliest(&self) -> &[Option<Option<f64>>] {
         self.session()
             .map_or(&[], |session| &session.timeline.earliest)
@@ -271,7 +273,8 @@ impl Viewer {
         };
     }
 
-    /// Counts frames; after the last one prints how many there were per second, and closes the window.
+    /// Counts frames; after the last one prints how many there were per second, and closes the
+    /// window.
     fn measure(&mut self, ctx: &egui::Context) {
         let Some(wanted) = self.options.measure else {
             return;

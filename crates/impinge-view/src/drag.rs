@@ -11,7 +11,8 @@ pub(crate) enum Drag {
     Turn,
     /// The view moves in its plane.
     Shift,
-    /// A body moves in the plane of the view, at this distance from the viewer divided by that of the target.
+    /// A body moves in the plane of the view, at this distance from the viewer divided by that of
+    /// the target.
     Move { body: usize, depth: f64 },
     /// A body turns around a point.
     Spin { body: usize, center: [f64; 3] },
@@ -29,7 +30,8 @@ pub(crate) fn turn(orbit: &mut Orbit, [x, y]: [f64; 2]) {
     camera.elevation = (camera.elevation + TURN * y).clamp(-90.0, 90.0);
 }
 
-/// The motion of a point of the scene that follows the mouse, in the plane through the target, for a view of `height` points.
+/// The motion of a point of the scene that follows the mouse, in the plane through the target, for
+/// a view of `height` points.
 pub(crate) fn along_view(orbit: &Orbit, height: f64, [x, y]: [f64; 2]) -> [f64; 3] {
     let [right, up, _] = orbit.axes();
     // The visible height through the height in points.

@@ -11,7 +11,8 @@ use crate::stage::Stage;
 /// More pairs than this are an error, not an answer: no window can show them.
 const MAX_PAIRS: u64 = 20_000_000;
 
-/// The oracle compares every box with every box: beyond this number of primitives it would stop the window.
+/// The oracle compares every box with every box: beyond this number of primitives it would stop the
+/// window.
 pub(crate) const MAX_NAIVE: usize = 40_000;
 
 /// The answer for one frame.
@@ -137,8 +138,8 @@ pub(crate) fn curves(scene: &Scene, pairs: &Pairs) -> Result<Vec<[[f64; 3]; 2]>,
         .collect())
 }
 
-/// The faces of each body that are within a distance of another one's, as primitives of triangle bodies; pairs of faces that
-/// intersect are among them. Also the number of pairs.
+/// The faces of each body that are within a distance of another one's, as primitives of triangle
+/// bodies; pairs of faces that intersect are among them. Also the number of pairs.
 pub(crate) fn near(
     stage: &Stage,
     question: &Question,

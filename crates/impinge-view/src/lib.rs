@@ -16,8 +16,9 @@
 //! # }
 //! ```
 //!
-//! The window opens at once; `load` runs on a thread of its own, and its error is shown as a message. Detection runs on the
-//! window's thread in each frame that is drawn. The pairs of all frames are counted on another thread, for the timeline.
+//! The window opens at once; `load` runs on a thread of its own, and its error is shown as a
+//! message. Detection runs on the window's thread in each frame that is drawn. The pairs of all
+//! frames are counted on another thread, for the timeline.
 
 mod app;
 mod content;

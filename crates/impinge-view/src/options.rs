@@ -52,7 +52,8 @@ pub struct Options {
     pub method: Method,
     /// Where detection runs; the pairs are the same.
     pub backend: Backend,
-    /// The first frame to show. `None`: the first one with a collision, as soon as it is known; without any, the first.
+    /// The first frame to show. `None`: the first one with a collision, as soon as it is known;
+    /// without any, the first.
     pub frame: Option<usize>,
     /// Whether frames play from the beginning, unless a frame with a collision is shown.
     pub plays: bool,
@@ -74,7 +75,8 @@ pub struct Options {
     pub command: Command,
     /// Reads the files that the user opens or drops. `None`: that is not possible.
     pub opener: Option<Opener>,
-    /// Shows so many frames as fast as it can, prints how many there were per second, and closes the window.
+    /// Shows so many frames as fast as it can, prints how many there were per second, and closes
+    /// the window.
     pub measure: Option<u32>,
 }
 

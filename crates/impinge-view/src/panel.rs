@@ -504,7 +504,8 @@ pub(crate) fn bottom(ui: &mut Ui, session: &mut Session) {
         });
 }
 
-/// One bar per frame, or per column of pixels where there are more frames: the most pairs of its frames.
+/// One bar per frame, or per column of pixels where there are more frames: the most pairs of its
+/// frames.
 fn curve(ui: &Ui, room: Rect, session: &Session) {
     let painter = ui.painter_at(room);
     painter.rect_filled(room, 2.0, Color32::from_gray(235));
@@ -520,7 +521,8 @@ fn curve(ui: &Ui, room: Rect, session: &Session) {
     let most = counts.iter().map(pairs).max().unwrap_or(0).max(1);
     let n_columns = n_frames.min(room.width() as usize).max(1);
     let width = room.width() / n_columns as f32;
-    // Bars begin and end between pixels, each where the one before ends: rounded apart, they would have stripes between them.
+    // Bars begin and end between pixels, each where the one before ends: rounded apart, they would
+    // have stripes between them.
     let scale = ui.ctx().pixels_per_point();
     let edge = |column: usize| {
         let x = room.min.x + column as f32 * width;

@@ -56,7 +56,8 @@ pub(crate) fn pick<'a>(
     nearest
 }
 
-/// Where a ray meets a triangle (Möller and Trumbore 1997). Rounded: it is for a pointer, not for an answer.
+/// Where a ray meets a triangle (Möller and Trumbore 1997). Rounded: it is for a pointer, not for
+/// an answer.
 fn meets(start: [f64; 3], along: [f64; 3], [a, b, c]: [[f64; 3]; 3]) -> Option<f64> {
     let (u, v) = (sub(b, a), sub(c, a));
     let p = cross(along, v);

@@ -21,7 +21,8 @@ pub(crate) struct Saved {
 /// The colour of intersection curves.
 pub(crate) const CURVE: [u8; 3] = [20, 20, 20];
 
-/// The path that is suggested for a picture: `impinge-N.png` in the folder of the options, with the first number that no file has.
+/// The path that is suggested for a picture: `impinge-N.png` in the folder of the options, with the
+/// first number that no file has.
 pub(crate) fn suggested(options: &Options) -> PathBuf {
     let path = |number: u32| options.folder.join(format!("impinge-{number}.png"));
     let mut paths = (1..10_000).map(path);
@@ -89,8 +90,8 @@ fn draw(
     image.write_png(path).map_err(|error| error.to_string())
 }
 
-/// Half the width of lines: they are two pixels wide at the distance of what the picture looks at, or about so wide in a
-/// picture of everything.
+/// Half the width of lines: they are two pixels wide at the distance of what the picture looks at,
+/// or about so wide in a picture of everything.
 fn line_radius(stage: &Stage, options: &Options) -> f64 {
     let [width, height] = options.size.map(f64::from);
     if let Some(focus) = options.focus {
@@ -157,12 +158,12 @@ fn command_options(
     words
 }
 
-/// Draws a content as a PNG file, as a window that begins with these options saves it, but without a window. Returns the pairs that
-/// the picture shows.
+/// Draws a content as a PNG file, as a window that begins with these options saves it, but without
+/// a window. Returns the pairs that the picture shows.
 ///
 /// # Errors
-/// A message for the user: a frame that cannot be read, a refused position, no device to draw with, a file that cannot be
-/// written.
+/// A message for the user: a frame that cannot be read, a refused position, no device to draw with,
+/// a file that cannot be written.
 pub fn write_png(content: Content, options: &Options, path: &Path) -> Result<Pairs, String> {
     let renderer = Renderer::new().map_err(|error| error.to_string())?;
     draw_png(content, options, renderer, path)

@@ -1,4 +1,5 @@
-//! The part of the window that shows the bodies: a texture that is drawn when something has changed.
+//! The part of the window that shows the bodies: a texture that is drawn when something has
+//! changed.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -60,7 +61,8 @@ impl Screen {
 
     /// The first error of the device since the last call.
     pub fn take_error(&self) -> Option<String> {
-        // Without this, a loss would be told only when the next work is done, and there may be none.
+        // Without this, a loss would be told only when the next work is done, and there may be
+        // none.
         let _ = self.state.device.poll(wgpu::PollType::Poll);
         let mut held = self.errors.lock().unwrap_or_else(PoisonError::into_inner);
         held.take()
@@ -84,7 +86,8 @@ impl Screen {
         self.send_positions(stage, None)
     }
 
-    /// Sends the positions of all bodies, except those that a detector already has on the device: these are copied there.
+    /// Sends the positions of all bodies, except those that a detector already has on the device:
+    /// these are copied there.
     pub fn send_positions(
         &mut self,
         stage: &Stage,

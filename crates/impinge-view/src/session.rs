@@ -1,4 +1,5 @@
-//! Everything that is known while a content is shown: where its bodies are, what collides, what is seen and how.
+//! Everything that is known while a content is shown: where its bodies are, what collides, what is
+//! seen and how.
 
 use std::path::PathBuf;
 
@@ -365,8 +366,9 @@ impl Session {
         answer.pairs.iter().filter_map(other).collect()
     }
 
-    /// The places of collision, as the program numbers them. None where there are too many pairs, or where they cannot be told:
-    /// then there is a message. They are found when they are first asked for after the answer has changed.
+    /// The places of collision, as the program numbers them. None where there are too many pairs,
+    /// or where they cannot be told: then there is a message. They are found when they are first
+    /// asked for after the answer has changed.
     pub fn places(&mut self) -> &[Place] {
         let answer = match &self.answer {
             Some(answer) if answer.pairs.len() <= MOST_PAIRS => answer,
@@ -463,7 +465,8 @@ impl Session {
         self.flight = None;
     }
 
-    /// Lets time pass: frames play, the camera flies. Returns whether the window must be drawn again soon.
+    /// Lets time pass: frames play, the camera flies. Returns whether the window must be drawn
+    /// again soon.
     pub fn advance(&mut self, seconds: f64) -> bool {
         self.timeline.update();
         self.timeline
@@ -490,7 +493,8 @@ impl Session {
         self.player.plays || self.flight.is_some()
     }
 
-    /// Shows the first frame with a collision as soon as it is known. If there is none, frames play.
+    /// Shows the first frame with a collision as soon as it is known. If there is none, frames
+    /// play.
     fn seek(&mut self) {
         if !self.seeks || self.drag.is_some() {
             return;

@@ -61,7 +61,8 @@ impl Stage {
         Ok(())
     }
 
-    /// Moves a body by a matrix, from where the frame has it. If it is refused, the body stays where it was.
+    /// Moves a body by a matrix, from where the frame has it. If it is refused, the body stays
+    /// where it was.
     pub fn place(&mut self, body: usize, matrix: Matrix) -> Result<(), String> {
         let Some(id) = self.id(body) else {
             let n_bodies = self.content.bodies.len();
@@ -77,7 +78,8 @@ impl Stage {
         Ok(())
     }
 
-    /// Sets the positions of the next frame as the end of a step. Returns false if there is no next frame.
+    /// Sets the positions of the next frame as the end of a step. Returns false if there is no next
+    /// frame.
     pub fn set_ends(&mut self, scratch: &mut Stage) -> Result<bool, String> {
         let next = self.frame_ix + 1;
         if next >= self.content.n_frames() {
@@ -107,7 +109,8 @@ impl Stage {
         Ok(true)
     }
 
-    /// The lowest and highest coordinates of the corners of a primitive; `None` without such a body.
+    /// The lowest and highest coordinates of the corners of a primitive; `None` without such a
+    /// body.
     pub fn primitive_bounds(&self, body: usize, primitive: u32) -> Option<[[f64; 3]; 2]> {
         let body = self.scene().body(self.id(body)?).ok()?;
         let mut bounds = NOTHING;
@@ -117,7 +120,8 @@ impl Stage {
         Some(bounds)
     }
 
-    /// The lowest and highest coordinates of the vertices of a body, or of all of them; `None` without any.
+    /// The lowest and highest coordinates of the vertices of a body, or of all of them; `None`
+    /// without any.
     pub fn bounds(&self, only: Option<usize>) -> Option<[[f64; 3]; 2]> {
         let mut bounds = NOTHING;
         for (ix, shown) in self.content.bodies.iter().enumerate() {

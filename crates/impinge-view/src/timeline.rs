@@ -1,5 +1,5 @@
-//! The number of pairs of every frame, and the earliest impact on the way to the next: found on a thread of its own while
-//! the window is used.
+//! The number of pairs of every frame, and the earliest impact on the way to the next: found on a
+//! thread of its own while the window is used.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -35,7 +35,8 @@ enum News {
 /// What is known of all frames. Dropping it ends the thread.
 pub(crate) struct Timeline {
     pub counts: Vec<Count>,
-    /// For the step from each frame to the next: `None` while unknown, `Some(None)` if nothing touches.
+    /// For the step from each frame to the next: `None` while unknown, `Some(None)` if nothing
+    /// touches.
     pub earliest: Vec<Option<Option<f64>>>,
     news: Receiver<News>,
     cancel: CancelToken,
@@ -81,8 +82,9 @@ impl Timeline {
         }
     }
 
-    /// Tells whether the window is drawn all the time, as while frames play. Then the thread rests between frames, for as
-    /// long as the last one took, so that it takes no more than half of a core.
+    /// Tells whether the window is drawn all the time, as while frames play. Then the thread rests
+    /// between frames, for as long as the last one took, so that it takes no more than half of a
+    /// core.
     pub fn set_busy(&self, is_busy: bool) {
         self.is_busy.store(is_busy, Ordering::Relaxed);
     }

@@ -4,7 +4,8 @@ use std::collections::HashMap;
 
 use impinge::{Body, BodyId, Impacts, Part};
 
-/// The first time of contact of each primitive that touches anything, by itself or by an edge, a vertex or a face of it.
+/// The first time of contact of each primitive that touches anything, by itself or by an edge, a
+/// vertex or a face of it.
 pub(crate) fn first_times(body: &Body, id: BodyId, impacts: &Impacts) -> Vec<(u32, f64)> {
     let (edges, faces) = (body.part(Part::Edges), body.part(Part::Faces));
     // Sorted corners, filled up with the last one.
@@ -57,7 +58,8 @@ fn key(corners: &[u32]) -> [u32; 3] {
     for (held, &corner) in key.iter_mut().zip(corners) {
         *held = corner;
     }
-    // One, two and three different corners cannot be confused: an edge (a, b) is filled up with its larger number.
+    // One, two and three different corners cannot be confused: an edge (a, b) is filled up with its
+    // larger number.
     let n = corners.len().min(3);
     key[..n].sort_unstable();
     let largest = key[n.saturating_sub(1)];

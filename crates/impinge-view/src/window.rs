@@ -16,7 +16,8 @@ pub struct Error {
     what: String,
 }
 
-/// Opens a window and returns when it is closed. `load` runs on a thread of its own; its error is shown in the window.
+/// Opens a window and returns when it is closed. `load` runs on a thread of its own; its error is
+/// shown in the window.
 ///
 /// # Errors
 /// There is no display, or no device that can draw on it.
@@ -55,7 +56,8 @@ pub fn show(
     })
 }
 
-/// A message of the window's libraries without the lines of their sources, ` at some/file.rs:12: `, which tell a user nothing.
+/// A message of the window's libraries without the lines of their sources, ` at some/file.rs:12: `,
+/// which tell a user nothing.
 fn without_source(text: &str) -> String {
     let mut kept = String::new();
     let mut rest = text;

@@ -52,7 +52,8 @@ fn balls(n_triangles: usize, offset: f32) -> (Scene, [BodyId; 2]) {
     (scene, [a, b.expect("a ball")])
 }
 
-/// The second ball comes from the right and goes away again; nothing collides in the first and the last frames.
+/// The second ball comes from the right and goes away again; nothing collides in the first and the
+/// last frames.
 struct Passing {
     body: BodyId,
     rest: Vec<[f32; 3]>,
@@ -1169,7 +1170,8 @@ fn files_can_be_opened_and_dropped() {
         !viewer.is_loading() && viewer.names().len() == 2
     });
     assert_eq!(harness.state().names()[0], "typed.obj");
-    // The command that makes a picture again is that of these files, with what else the opener says.
+    // The command that makes a picture again is that of these files, with what else the opener
+    // says.
     press(&mut harness, Key::S);
     click(&mut harness, "Save");
     let (_, command) = harness.state().saved().expect("a picture");

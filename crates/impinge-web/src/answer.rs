@@ -8,7 +8,8 @@ use crate::ask::{Asker, Question, query};
 use crate::error::Error;
 use crate::world::World;
 
-/// The lists of an answer. What they hold depends on the question; those with sections have the length of each before it.
+/// The lists of an answer. What they hold depends on the question; those with sections have the
+/// length of each before it.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Answer {
     /// The hash of the answer, if it has one.
@@ -62,7 +63,8 @@ impl Answer {
         answer
     }
 
-    /// Kinds, two features per pair, whether parallel; distances and points, if they were asked for.
+    /// Kinds, two features per pair, whether parallel; distances and points, if they were asked
+    /// for.
     fn of_near(near: &NearPairs, world: &World) -> Self {
         let mut answer = Answer {
             hash: near.hash(),
@@ -80,8 +82,9 @@ impl Answer {
         answer
     }
 
-    /// Shapes, whether directed, whether curves are closed and directed; points, lengths, regions; where corners start, corners, where
-    /// points of curves start, points of curves, and the contacts of each region.
+    /// Shapes, whether directed, whether curves are closed and directed; points, lengths, regions;
+    /// where corners start, corners, where points of curves start, points of curves, and the
+    /// contacts of each region.
     fn of_contacts(contacts: &Contacts, world: &World) -> Result<Self, Error> {
         let mut answer = Answer::default();
         let (n, curves) = (contacts.len(), contacts.curves()?);
@@ -162,7 +165,8 @@ pub(crate) fn of_pairs(pairs: &Pairs, world: &World) -> Answer {
 }
 
 impl Asker {
-    /// Asks. For questions with a query, `words` and `numbers` are those of [`query`]. [`Question::Distance`]: two bodies.
+    /// Asks. For questions with a query, `words` and `numbers` are those of [`query`].
+    /// [`Question::Distance`]: two bodies.
     /// [`Question::Contacts`]: a number of the caller's for the answer, then rows of pairs; [`Question::Penetration`]: that number, two
     /// bodies, and the rows again; its rows are the two bodies, in the order of what is inside.
     ///
@@ -233,7 +237,8 @@ impl Asker {
         })
     }
 
-    /// The nearest pair of two bodies: a row, the distance and two points; nothing, if one of them is empty.
+    /// The nearest pair of two bodies: a row, the distance and two points; nothing, if one of them
+    /// is empty.
     fn distance(&mut self, world: &World, words: &[u32]) -> Result<Answer, Error> {
         let &[a, b] = words else {
             return Err(Error::Foreign);

@@ -1,4 +1,5 @@
-//! Questions as lists of numbers, which the package writes, and answers as flat lists, which it gives their shapes.
+//! Questions as lists of numbers, which the package writes, and answers as flat lists, which it
+//! gives their shapes.
 
 use impinge::contact::Contacts;
 use impinge::{
@@ -57,10 +58,12 @@ impl Question {
 
 /// A query as the package writes it.
 ///
-/// `words`: which pairs (0 all, 1 of different bodies, 2 of one body, 3 between `a` and `b`, 4 of `a` with itself, 5 all of `a`), `a`, `b`,
-/// the rule of shared vertices, the rule of the start, the precision (0 is the default of each), kinds as bits with 64 if they were
-/// said, flags (1 distances, 2 nearest points, 4 a cell), and two bodies for each exclusion. `numbers`: separation, clearance, its
-/// share, the low and the high corner of the cell, and the question's own length.
+/// `words`: which pairs (0 all, 1 of different bodies, 2 of one body, 3 between `a` and `b`, 4 of
+/// `a` with itself, 5 all of `a`), `a`, `b`, the rule of shared vertices, the rule of the start,
+/// the precision (0 is the default of each), kinds as bits with 64 if they were said, flags (1
+/// distances, 2 nearest points, 4 a cell), and two bodies for each exclusion. `numbers`:
+/// separation, clearance, its share, the low and the high corner of the cell, and the question's
+/// own length.
 ///
 /// # Errors
 /// No such body; lists that are not as described.
@@ -116,7 +119,8 @@ pub fn query(world: &World, words: &[u32], numbers: &[f64; 10]) -> Result<Query,
 /// A detector that is asked in lists of numbers.
 pub struct Asker {
     pub(crate) detector: Detector,
-    /// The contacts that were found last, with their number: how deep bodies are in each other is asked about these.
+    /// The contacts that were found last, with their number: how deep bodies are in each other is
+    /// asked about these.
     pub(crate) known: Option<(u32, Contacts)>,
 }
 

@@ -1,4 +1,5 @@
-//! The functions that JavaScript calls. `web/package` wraps them; their names are private to the package.
+//! The functions that JavaScript calls. `web/package` wraps them; their names are private to the
+//! package.
 //!
 //! An error is thrown as a string: its code, a line break, its text.
 
@@ -157,7 +158,8 @@ impl SceneHandle {
         self.0.index(body, part).map_err(thrown)
     }
 
-    /// The positions of a body: 0 now, 1 at the end of the step (`undefined` if it stands still), 2 at rest.
+    /// The positions of a body: 0 now, 1 at the end of the step (`undefined` if it stands still), 2
+    /// at rest.
     pub fn positions(&self, body: u32, which: u32) -> Thrown<JsValue> {
         let body = self.0.body(body).map_err(thrown)?;
         Ok(match which {
@@ -194,7 +196,8 @@ pub struct DetectorHandle {
     device: Option<impinge::Detector>,
 }
 
-/// The method and the rule of new clusterings by their number; the memory budget and the most pairs, -1 for none.
+/// The method and the rule of new clusterings by their number; the memory budget and the most
+/// pairs, -1 for none.
 fn settings(backend: Backend, [method, recluster]: [u32; 2], limits: [f64; 2]) -> Thrown<Settings> {
     let [memory_budget, max_pairs] = limits.map(|limit| (limit >= 0.0).then_some(limit as u64));
     Ok(Settings {
@@ -346,7 +349,8 @@ pub fn weld_f64(positions: &[f64]) -> Thrown<Vec<u32>> {
     welded(positions).map_err(thrown)
 }
 
-/// The mesh of a file, or with `in_bodies` each body in it: `[name, corners, index, positions, map]`.
+/// The mesh of a file, or with `in_bodies` each body in it:
+/// `[name, corners, index, positions, map]`.
 #[cfg(feature = "io")]
 #[wasm_bindgen]
 pub fn read(name: &str, bytes: &[u8], weld: bool, in_bodies: bool) -> Thrown<Array> {

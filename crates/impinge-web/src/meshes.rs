@@ -25,8 +25,8 @@ pub struct FileMesh {
     pub map: Vec<u32>,
 }
 
-/// Reads the bytes of a mesh file. The extension of its name is that of its format. With `weld`, vertices at the same
-/// position become one.
+/// Reads the bytes of a mesh file. The extension of its name is that of its format. With `weld`,
+/// vertices at the same position become one.
 ///
 /// # Errors
 /// An unknown extension; files that the reader refuses.
@@ -36,8 +36,8 @@ pub fn read(name: &str, bytes: &[u8], weld: bool) -> Result<FileMesh, Error> {
     Ok(FileMesh::new(name, mesh, weld))
 }
 
-/// Reads the bodies of a file, each as a mesh: the nodes of a glTF file, the objects or groups of an OBJ file. Their maps are of
-/// the vertices that their own primitives name.
+/// Reads the bodies of a file, each as a mesh: the nodes of a glTF file, the objects or groups of
+/// an OBJ file. Their maps are of the vertices that their own primitives name.
 ///
 /// # Errors
 /// As [`read`].

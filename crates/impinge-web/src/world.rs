@@ -1,4 +1,5 @@
-//! A scene whose bodies are numbered 0, 1, 2 … in the order in which they were added. Numbers are not used again.
+//! A scene whose bodies are numbered 0, 1, 2 … in the order in which they were added. Numbers are
+//! not used again.
 
 use impinge::{Body, BodyId, BodyKind, Elements, Filter, Part, Positions, Real, Scene, Weld};
 
@@ -36,11 +37,12 @@ impl World {
         World::default()
     }
 
-    /// Gives arrays to a body, whose number is returned. `index` holds `kind.n_corners()` vertex numbers per element (none for points:
-    /// each vertex is one), `positions` x, y, z per vertex.
+    /// Gives arrays to a body, whose number is returned. `index` holds `kind.n_corners()` vertex
+    /// numbers per element (none for points: each vertex is one), `positions` x, y, z per vertex.
     ///
     /// # Errors
-    /// No such body; arrays that are not whole rows; those of [`Scene::add`] and [`Scene::set_positions`].
+    /// No such body; arrays that are not whole rows; those of [`Scene::add`] and
+    /// [`Scene::set_positions`].
     pub fn put<R: Real>(
         &mut self,
         what: Put,
@@ -194,7 +196,8 @@ impl World {
         })
     }
 
-    /// Maps the library's indices of bodies to numbers. They differ once a body was added after a removal.
+    /// Maps the library's indices of bodies to numbers. They differ once a body was added after a
+    /// removal.
     pub(crate) fn numbers(&self) -> impl Fn(u32) -> u32 + use<> {
         let mut numbers = Vec::new();
         for (number, id) in (0u32..).zip(&self.ids) {
@@ -207,7 +210,8 @@ impl World {
     }
 }
 
-/// Welds vertices at the same position: for each vertex of `positions` (x, y, z per vertex), its number after the welding.
+/// Welds vertices at the same position: for each vertex of `positions` (x, y, z per vertex), its
+/// number after the welding.
 ///
 /// # Errors
 /// An array that is not whole rows.

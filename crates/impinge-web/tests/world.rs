@@ -1,4 +1,5 @@
-//! The logic behind the JavaScript classes, natively; and scenes with native answers for browsers and Node to reproduce.
+//! The logic behind the JavaScript classes, natively; and scenes with native answers for browsers
+//! and Node to reproduce.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -184,7 +185,8 @@ fn answers_about_steps() -> Result<(), Error> {
     );
     put(&mut world, Put::EndPositions, b, &sunk)?;
     let impacts = asker.ask(Question::Impacts, &world, &all, &NUMBERS)?;
-    // The vertices of b meet the face of a. The library calls b body 0, so a pair has b first wherever kinds are alike.
+    // The vertices of b meet the face of a. The library calls b body 0, so a pair has b first
+    // wherever kinds are alike.
     assert_eq!(impacts.rows[..4], [b, 0, a, 0]);
     let n = impacts.rows.len() / 4;
     assert_eq!(impacts.numbers, vec![0.25; n]);
@@ -358,7 +360,8 @@ fn numbers<T: std::fmt::Display>(numbers: impl IntoIterator<Item = T>) -> String
     text + "]"
 }
 
-/// Where bodies are at the end of the step. Not an affine motion, so that bodies meet themselves too.
+/// Where bodies are at the end of the step. Not an affine motion, so that bodies meet themselves
+/// too.
 fn end_of(ix: usize, position: [f32; 3]) -> [f32; 3] {
     let sign = if ix.is_multiple_of(2) { 0.25 } else { -0.25 };
     let [x, y, z] = position;

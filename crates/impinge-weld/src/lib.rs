@@ -1,18 +1,20 @@
 //! Welding: vertices at the same position become one.
 //!
-//! The crates `impinge` and `impinge-io` re-export [`Weld`]; it stands in a crate of its own so that neither needs the other.
+//! The crates `impinge` and `impinge-io` re-export [`Weld`]; it stands in a crate of its own so
+//! that neither needs the other.
 
 use std::collections::HashMap;
 use std::hash::{BuildHasher, Hash, Hasher, RandomState};
 
 /// A map from vertices to welded vertices: vertices at the same position become one.
 ///
-/// Many files, and the meshes of renderers, repeat a vertex along each seam. Such vertices are different ones, so the faces on
-/// both sides of a seam touch but are no neighbours. Welding makes neighbours of them. Elements keep their number and
-/// order, so their ids do not change; elements whose corners are welded become degenerate and stay.
+/// Many files, and the meshes of renderers, repeat a vertex along each seam. Such vertices are
+/// different ones, so the faces on both sides of a seam touch but are no neighbours. Welding makes
+/// neighbours of them. Elements keep their number and order, so their ids do not change; elements
+/// whose corners are welded become degenerate and stay.
 ///
-/// Keep the map for later frames: [`positions`](Weld::positions) converts the positions of any frame to those of the welded
-/// mesh.
+/// Keep the map for later frames: [`positions`](Weld::positions) converts the positions of any
+/// frame to those of the welded mesh.
 ///
 /// ```
 /// use impinge::Weld;
@@ -44,8 +46,9 @@ pub struct WrongNumber {
 }
 
 impl Weld {
-    /// Welds vertices whose coordinates are all equal as numbers (-0.0 equals 0.0), without a tolerance. Of equal vertices the
-    /// first one stays, and the order of vertices is kept. NaN equals nothing, so a vertex with NaN is never welded.
+    /// Welds vertices whose coordinates are all equal as numbers (-0.0 equals 0.0), without a
+    /// tolerance. Of equal vertices the first one stays, and the order of vertices is kept. NaN
+    /// equals nothing, so a vertex with NaN is never welded.
     pub fn by_position<R: Coordinate>(positions: &[[R; 3]]) -> Self {
         Self::by_key(positions.iter().map(|position| position.map(R::key)))
     }
@@ -70,7 +73,8 @@ impl Weld {
         Weld { map, firsts }
     }
 
-    /// Welds only vertices that both weldings weld: given two poses of the same vertices, those that coincide in both.
+    /// Welds only vertices that both weldings weld: given two poses of the same vertices, those
+    /// that coincide in both.
     ///
     /// # Panics
     /// If the two weldings have different numbers of vertices.
@@ -90,18 +94,21 @@ impl Weld {
         &self.map
     }
 
-    /// For each vertex after the welding, the first vertex before it that is at its position; ascending.
+    /// For each vertex after the welding, the first vertex before it that is at its position;
+    /// ascending.
     pub fn firsts(&self) -> &[u32] {
         &self.firsts
     }
 
-    /// The welded vertex of a vertex. An index that is out of range stays so, because welding only removes vertices.
+    /// The welded vertex of a vertex. An index that is out of range stays so, because welding only
+    /// removes vertices.
     #[inline]
     pub fn index(&self, vertex: u32) -> u32 {
         self.map.get(vertex as usize).copied().unwrap_or(vertex)
     }
 
-    /// Elements (edges, faces, tetrahedra) with the indices of the welded vertices, in the same order.
+    /// Elements (edges, faces, tetrahedra) with the indices of the welded vertices, in the same
+    /// order.
     pub fn apply<const N: usize>(&self, elements: &[[u32; N]]) -> Vec<[u32; N]> {
         let welded = |corners: &[u32; N]| corners.map(|vertex| self.index(vertex));
         elements.iter().map(welded).collect()
@@ -171,8 +178,8 @@ impl Coordinate for f64 {
     }
 }
 
-/// The seed of a [`Mix`], random for each weld, so that nobody can prepare a file whose vertices collide in the hash table. The
-/// result does not depend on it.
+/// The seed of a [`Mix`], random for each weld, so that nobody can prepare a file whose vertices
+/// collide in the hash table. The result does not depend on it.
 struct Seed(u64);
 
 impl Seed {
@@ -189,7 +196,8 @@ impl BuildHasher for Seed {
     }
 }
 
-/// A short multiplicative hash of the bits of coordinates. The standard library's hash took most of the time of a weld.
+/// A short multiplicative hash of the bits of coordinates. The standard library's hash took most of
+/// the time of a weld.
 struct Mix(u64);
 
 impl Hasher for Mix {
@@ -206,7 +214,8 @@ impl Hasher for Mix {
     }
 
     fn write_u64(&mut self, word: u64) {
-        // A folded 128-bit product: every bit of the input affects the high and the low bits, which the hash table uses.
+        // A folded 128-bit product: every bit of the input affects the high and the low bits, which
+        // the hash table uses.
         let product = u128::from(self.0 ^ word ^ 0x9E37_79B9_7F4A_7C15)
             * u128::from(0xD6E8_FEB8_6659_FD93_u64);
         self.0 = (product as u64) ^ ((product >> 64) as u64);

@@ -1,5 +1,6 @@
-//! A cloth falls on a ball that breathes: in each frame which elements intersect and how near the two are, then the step to the next
-//! frame as far as it is free. `examples/cloth-on-ball` has the same program in other languages, and what all of them print.
+//! A cloth falls on a ball that breathes: in each frame which elements intersect and how near the
+//! two are, then the step to the next frame as far as it is free. `examples/cloth-on-ball` has the
+//! same program in other languages, and what all of them print.
 
 use impinge::{Backend, Body, Detector, Positions, Query, Scene, read};
 

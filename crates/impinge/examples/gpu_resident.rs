@@ -1,6 +1,6 @@
-//! A simulation that never leaves the GPU: a compute shader deforms a mesh, the detector finds the pairs that intersect now
-//! and those that may touch on the way to the next pose, other shaders use them. The host only submits; it reads back once, after
-//! the last frame.
+//! A simulation that never leaves the GPU: a compute shader deforms a mesh, the detector finds the
+//! pairs that intersect now and those that may touch on the way to the next pose, other shaders use
+//! them. The host only submits; it reads back once, after the last frame.
 //!
 //! `cargo run --release --example gpu_resident --features gpu`
 
@@ -58,9 +58,9 @@ fn main(
 }
 ";
 
-/// Counts the pairs of a step that may touch, by kind: vertices with faces, and edges with edges. The third number becomes the time
-/// until which nothing touches, as bits; those of numbers from 0 to 1 are ordered as the numbers are. The fourth becomes the time
-/// by which something touches.
+/// Counts the pairs of a step that may touch, by kind: vertices with faces, and edges with edges.
+/// The third number becomes the time until which nothing touches, as bits; those of numbers from 0
+/// to 1 are ordered as the numbers are. The fourth becomes the time by which something touches.
 const COUNT: &str = "
 struct Pair { low: u32, high: u32 }
 @group(0) @binding(0) var<storage, read> pairs: array<Pair>;
@@ -191,8 +191,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         queue.submit([encoder.finish()]);
     }
 
-    // The only read-back: did everything fit, how many primitives were hit in the last frame, and how many pairs may have touched
-    // on the way to it?
+    // The only read-back: did everything fit, how many primitives were hit in the last frame, and
+    // how many pairs may have touched on the way to it?
     let is_complete = gpu.grow()?;
     let staging = device.create_buffer(&wgpu::BufferDescriptor {
         label: Some("staging"),

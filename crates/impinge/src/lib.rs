@@ -9,12 +9,14 @@
 //!   coordinates are read as real numbers. There is no tolerance anywhere.
 //! * **The same bytes everywhere.** The answer is sorted and depends on the input alone: not on
 //!   method, backend, threads or memory.
-//! * **Continuous detection.** [`Detector::impacts`] finds which vertices, edges and faces touch while bodies move from their
-//!   positions to their [end positions](Scene::set_end_positions), and the first time of each pair, exact and rounded down.
-//!   For solvers, [`Detector::earliest`] finds the first contact of a step, [`Detector::is_free`] decides whether there is any,
-//!   and [`Detector::advance`] finds how far a step can be taken.
-//! * **Proximity.** [`Detector::near`] finds which vertices, edges and faces are within a distance of each other,
-//!   exactly, and which of their features are nearest. [`Detector::distance`] finds the smallest distance of two bodies.
+//! * **Continuous detection.** [`Detector::impacts`] finds which vertices, edges and faces touch
+//!   while bodies move from their positions to their [end positions](Scene::set_end_positions), and
+//!   the first time of each pair, exact and rounded down. For solvers, [`Detector::earliest`] finds
+//!   the first contact of a step, [`Detector::is_free`] decides whether there is any, and
+//!   [`Detector::advance`] finds how far a step can be taken.
+//! * **Proximity.** [`Detector::near`] finds which vertices, edges and faces are within a distance
+//!   of each other, exactly, and which of their features are nearest. [`Detector::distance`] finds
+//!   the smallest distance of two bodies.
 //!
 //! ```toml
 //! [dependencies]
@@ -47,8 +49,9 @@
 //!
 //! # Steps of a solver
 //!
-//! A solver wishes for positions, and takes the step as far as nothing touches. Each stored state is then reached from the one
-//! before on straight lines without contact, rounding included. So surfaces that do not intersect at first never do.
+//! A solver wishes for positions, and takes the step as far as nothing touches. Each stored state
+//! is then reached from the one before on straight lines without contact, rounding included. So
+//! surfaces that do not intersect at first never do.
 //!
 //! ```
 //! use impinge::{Backend, Detector, Query, Scene};
@@ -69,9 +72,10 @@
 //! # Ok(()) }
 //! ```
 //!
-//! This holds if the start is free of intersections: bodies that already pass through each other need not touch on the way.
-//! [`Start::Verify`] asks that, too. And neighbours must share their vertices: the two sides of a seam, along which vertices are
-//! repeated, touch for ever. [`Weld`] makes one vertex of those at the same position.
+//! This holds if the start is free of intersections: bodies that already pass through each other
+//! need not touch on the way. [`Start::Verify`] asks that, too. And neighbours must share their
+//! vertices: the two sides of a seam, along which vertices are repeated, touch for ever. [`Weld`]
+//! makes one vertex of those at the same position.
 //!
 //! ```
 //! use impinge::{Backend, Detector, Query, Scene, Start, Weld};
@@ -90,13 +94,14 @@
 //! # Ok(()) }
 //! ```
 //!
-//! [`Detector::impacts`] has all pairs that touch, for solvers that resolve contacts; [`Detector::candidates`] the pairs whose boxes
-//! overlap, for a test of one's own.
+//! [`Detector::impacts`] has all pairs that touch, for solvers that resolve contacts;
+//! [`Detector::candidates`] the pairs whose boxes overlap, for a test of one's own.
 //!
 //! # Positions of other libraries
 //!
-//! Positions are `&[[f32; 3]]` or `&[[f64; 3]]`. The vectors of glam and nalgebra have this layout, and with their feature
-//! `bytemuck` a slice of them is cast without a copy; one vector at a time goes by `to_array` and `into`.
+//! Positions are `&[[f32; 3]]` or `&[[f64; 3]]`. The vectors of glam and nalgebra have this layout,
+//! and with their feature `bytemuck` a slice of them is cast without a copy; one vector at a time
+//! goes by `to_array` and `into`.
 //!
 //! ```
 //! # #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
@@ -114,9 +119,11 @@
 //! # Ok(()) }
 //! ```
 //!
-//! `glam::Vec3A` is padded to 16 bytes: `vertices.iter().map(|v| v.to_array()).collect::<Vec<_>>()`. A rigid body needs no new
-//! vertices at all: [`Scene::set_transform`] takes rows of `f64`, which are `matrix.transpose().to_cols_array_2d()` of a
-//! `glam::DMat4`, and `matrix.transpose().into()` of a `nalgebra::Matrix4<f64>`.
+//! `glam::Vec3A` is padded to 16 bytes:
+//! `vertices.iter().map(|v| v.to_array()).collect::<Vec<_>>()`. A rigid body needs no new vertices
+//! at all: [`Scene::set_transform`] takes rows of `f64`, which are
+//! `matrix.transpose().to_cols_array_2d()` of a `glam::DMat4`, and `matrix.transpose().into()` of a
+//! `nalgebra::Matrix4<f64>`.
 //!
 //! This crate is the stable interface of the engine in `impinge-core`.
 

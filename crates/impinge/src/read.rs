@@ -5,11 +5,12 @@ use std::path::Path;
 use impinge_core::{Error, Mesh};
 use impinge_io::{Elements, Positions, ReadOptions};
 
-/// Reads a mesh from a file; its extension decides the format: OBJ, PLY, STL, OFF, glTF, MSH, MEDIT, VTK, VTU or TetGen.
+/// Reads a mesh from a file; its extension decides the format: OBJ, PLY, STL, OFF, glTF, MSH,
+/// MEDIT, VTK, VTU or TetGen.
 ///
-/// Vertices at the same position become one, as in all that reads files: [`Mesh::n_welded`] says how many there were. A file with
-/// tetrahedra is a mesh of these, else of its triangles. The crate `impinge-io` reads bodies apart, sequences of frames and bytes, and
-/// has other options.
+/// Vertices at the same position become one, as in all that reads files: [`Mesh::n_welded`] says
+/// how many there were. A file with tetrahedra is a mesh of these, else of its triangles. The crate
+/// `impinge-io` reads bodies apart, sequences of frames and bytes, and has other options.
 ///
 /// ```no_run
 /// use impinge::{Backend, Detector, Query, Scene, read};

@@ -1,10 +1,10 @@
 //! The paper's two levels without impinge's owner rule.
 //!
-//! Two primitives often share several cells, and the pair is then found in each of them. The paper counts how
-//! often (section 4.2, table 3: 62 to 83 % of the pairs are checked more than once, 2.11 to 3.72 times on
-//! average). It tries a hash table to avoid this, which loses 2.7 to 4.3 % of the colliding primitives.
-//! In impinge only one cell tests each pair, the cell that holds the lower corner of the pair's
-//! common range: nothing is lost, and no table is needed.
+//! Two primitives often share several cells, and the pair is then found in each of them. The paper
+//! counts how often (section 4.2, table 3: 62 to 83 % of the pairs are checked more than once, 2.11
+//! to 3.72 times on average). It tries a hash table to avoid this, which loses 2.7 to 4.3 % of the
+//! colliding primitives. In impinge only one cell tests each pair, the cell that holds the lower
+//! corner of the pair's common range: nothing is lost, and no table is needed.
 //!
 //! ```
 //! use impinge_core::{Method, Query};
@@ -137,7 +137,8 @@ impl Missing {
     }
 }
 
-/// The paper's two levels between two bodies, without the owner rule. Memory lives here and is reused.
+/// The paper's two levels between two bodies, without the owner rule. Memory lives here and is
+/// reused.
 pub struct TwoLevels {
     settings: Settings,
     host: Host,
@@ -173,8 +174,8 @@ impl TwoLevels {
         &self.settings
     }
 
-    /// Tests every pair in every cell where it is found (table 3, "without hash"). Nothing is missing;
-    /// `n_candidates` of the statistics counts the tests, including repetitions.
+    /// Tests every pair in every cell where it is found (table 3, "without hash"). Nothing is
+    /// missing; `n_candidates` of the statistics counts the tests, including repetitions.
     ///
     /// # Errors
     /// A stale id, one body named twice, refused positions.
@@ -191,10 +192,10 @@ impl TwoLevels {
         )
     }
 
-    /// Like [`detect`](TwoLevels::detect), but pairs go through a table of `table_size` slots before the tests (table 3,
-    /// "with hash"; the paper has as many slots as there are primitives). DJB2 maps each pair to a slot. Of all
-    /// pairs in a slot only the lowest is tested, so that the answer does not depend on threads; the others are
-    /// lost.
+    /// Like [`detect`](TwoLevels::detect), but pairs go through a table of `table_size` slots
+    /// before the tests (table 3, "with hash"; the paper has as many slots as there are
+    /// primitives). DJB2 maps each pair to a slot. Of all pairs in a slot only the lowest is
+    /// tested, so that the answer does not depend on threads; the others are lost.
     ///
     /// # Errors
     /// As `detect`; a table without slots or with more than 2^32.

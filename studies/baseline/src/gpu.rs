@@ -1,7 +1,7 @@
 //! The uniform grid on a GPU: the same stages in WGSL, on any adapter.
 //!
-//! Pairs that the filter on the device leaves unsure are decided exactly on the CPU, as in impinge. So the pairs
-//! are those of [`crate::UniformGrid`] on every device.
+//! Pairs that the filter on the device leaves unsure are decided exactly on the CPU, as in impinge.
+//! So the pairs are those of [`crate::UniformGrid`] on every device.
 //!
 //! ```no_run
 //! use impinge_baseline::gpu::{Settings, UniformGrid};
@@ -31,8 +31,8 @@ use plan::Buffers;
 /// Settings of a [`UniformGrid`] on a GPU.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
-    /// The density coefficient λ of the paper's equation (1), above 0. The paper found 5 to be best for
-    /// this method.
+    /// The density coefficient λ of the paper's equation (1), above 0. The paper found 5 to be best
+    /// for this method.
     pub lambda: f64,
     /// Whether a pair is tested in only one of its common cells, as in impinge.
     pub owner_rule: bool,
@@ -57,7 +57,8 @@ pub struct UniformGrid {
 }
 
 impl UniformGrid {
-    /// Opens the adapter, or shares the device that impinge has open on it. The first frame compiles the kernels.
+    /// Opens the adapter, or shares the device that impinge has open on it. The first frame
+    /// compiles the kernels.
     ///
     /// # Errors
     /// A setting out of its range; no adapter matches; the driver returns an error.
@@ -65,8 +66,8 @@ impl UniformGrid {
         UniformGrid::with_room(settings, None, None)
     }
 
-    /// Like [`new`](UniformGrid::new), with the initial and the largest capacities of impinge's buffers. For tests:
-    /// normally buffers grow by themselves, up to the limits of the device.
+    /// Like [`new`](UniformGrid::new), with the initial and the largest capacities of impinge's
+    /// buffers. For tests: normally buffers grow by themselves, up to the limits of the device.
     ///
     /// # Errors
     /// As `new`.
@@ -102,9 +103,11 @@ impl UniformGrid {
         &self.settings
     }
 
-    /// Finds all intersecting pairs of primitives of two different bodies, in the current state of the scene.
+    /// Finds all intersecting pairs of primitives of two different bodies, in the current state of
+    /// the scene.
     ///
-    /// The device times its stages if it has a clock; `upload`, `decide` and `collect` are stages of the host.
+    /// The device times its stages if it has a clock; `upload`, `decide` and `collect` are stages
+    /// of the host.
     ///
     /// # Errors
     /// A stale id, one body named twice, refused positions; more than the device can hold.

@@ -1,13 +1,15 @@
 //! The methods that impinge is compared with, written to be as fast as possible.
 //!
-//! * [`UniformGrid`]: the parallel spatial hashing of `FWZS11`, as section 2 and section 4.1 of the paper
-//!   ("Real-time Collision Detection with Two-level Spatial Hashing on GPU") describe it: one uniform
-//!   grid with λ = 5, cell-primitive pairs sorted by a radix sort, compaction, all pairs of a cell tested.
-//! * [`duplicates`]: the paper's two levels without impinge's owner rule: pairs are tested in every cell
-//!   where they meet (table 3), or go through a table hashed by DJB2 that loses some of them (table 3,
-//!   figure 7).
+//! * [`UniformGrid`]: the parallel spatial hashing of `FWZS11`, as section 2 and section 4.1 of the
+//!   paper ("Real-time Collision Detection with Two-level Spatial Hashing on GPU") describe it: one
+//!   uniform grid with λ = 5, cell-primitive pairs sorted by a radix sort, compaction, all pairs of
+//!   a cell tested.
+//! * [`duplicates`]: the paper's two levels without impinge's owner rule: pairs are tested in every
+//!   cell where they meet (table 3), or go through a table hashed by DJB2 that loses some of them
+//!   (table 3, figure 7).
 //!
-//! Both use impinge's boxes, grid, threads and exact test, so that a comparison compares only methods.
+//! Both use impinge's boxes, grid, threads and exact test, so that a comparison compares only
+//! methods.
 //!
 //! The paper cites `FWZS11`. The code here follows the paper's description of it, not the
 //! original text.

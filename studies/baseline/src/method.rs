@@ -141,7 +141,8 @@ impl Method {
         let n_tasks = kept.len().div_ceil(PRIMITIVES);
         self.firsts
             .resize_with(n_tasks.max(self.firsts.len()), Mutex::default);
-        // As in `Cells`, the number of entries is bounded: a huge primitive would touch every cell of a fine grid.
+        // As in `Cells`, the number of entries is bounded: a huge primitive would touch every cell
+        // of a fine grid.
         let most = (kept.len() as u64)
             .saturating_mul(MOST_ENTRIES_EACH)
             .min(u64::from(u32::MAX));

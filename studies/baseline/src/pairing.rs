@@ -1,10 +1,10 @@
 //! All pairs of a cell: every primitive of one body against every primitive of the other.
 //!
 //! In: runs of the sorted entries. Out: candidates, which the exact test decides in runs of about a
-//! thousand, while they are in the cache.
-//! A small cell is two loops of box tests. In a larger one the boxes of 64 primitives of `b` are laid out in
-//! lanes, and a primitive of `a` is tested against 8 or 16 of them at a time.
-//! Cost: `n_a n_b` box tests per cell. The method culls nothing before them.
+//! thousand, while they are in the cache. A small cell is two loops of box tests. In a larger one
+//! the boxes of 64 primitives of `b` are laid out in lanes, and a primitive of `a` is tested
+//! against 8 or 16 of them at a time. Cost: `n_a n_b` box tests per cell. The method culls nothing
+//! before them.
 
 use std::sync::Arc;
 

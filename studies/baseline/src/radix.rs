@@ -1,7 +1,8 @@
 //! A radix sort of cell-primitive pairs: least significant digit first, stable, on all threads.
 //!
-//! In: entries `cell << 32 | primitive`. Out: the same entries, sorted by cell, and within a cell in the original
-//! order. The sort uses only as many bits as cells have, in as few digits as possible:
+//! In: entries `cell << 32 | primitive`. Out: the same entries, sorted by cell, and within a cell
+//! in the original order. The sort uses only as many bits as cells have, in as few digits as
+//! possible:
 //!
 //! ```text
 //!  63        48 47    41 40    32 31                0
@@ -10,9 +11,10 @@
 //! +------------+--------+--------+-------------------+
 //! ```
 //!
-//! A round counts the digits of each task's run of entries, sums up the counts (digit by digit, and within
-//! a digit task by task), and scatters. After the sums every task knows where its entries go, and no two
-//! tasks write to the same slot. Cost: per round each entry is read twice and written once.
+//! A round counts the digits of each task's run of entries, sums up the counts (digit by digit, and
+//! within a digit task by task), and scatters. After the sums every task knows where its entries
+//! go, and no two tasks write to the same slot. Cost: per round each entry is read twice and
+//! written once.
 
 use std::sync::Mutex;
 
@@ -44,7 +46,8 @@ unsafe impl Sync for Slots {}
 
 impl Slots {
     /// # Safety
-    /// `at` must lie within the memory pointed to, and no other task may write to it in the same round.
+    /// `at` must lie within the memory pointed to, and no other task may write to it in the same
+    /// round.
     #[inline(always)]
     unsafe fn put(self, at: usize, entry: u64) {
         // SAFETY: the caller guarantees it.
@@ -53,7 +56,8 @@ impl Slots {
 }
 
 impl Radix {
-    /// Sorts by cells, of which there are `n_cells`. `scratches` has one element per worker; only its length is used.
+    /// Sorts by cells, of which there are `n_cells`. `scratches` has one element per worker; only
+    /// its length is used.
     pub fn sort<S: Send>(
         &mut self,
         entries: &mut Vec<u64>,
@@ -123,8 +127,8 @@ impl Radix {
             for &entry in run(ix) {
                 let slot = &mut slots[digit(entry)];
                 debug_assert!((*slot as usize) < n);
-                // SAFETY: the counts of all tasks and digits add up to `n`, and each task takes as many
-                // slots of a digit as it has counted, starting where the task before it ends.
+                // SAFETY: the counts of all tasks and digits add up to `n`, and each task takes as
+                // many slots of a digit as it has counted, starting where the task before it ends.
                 unsafe { sorted.put(*slot as usize, entry) };
                 *slot += 1;
             }

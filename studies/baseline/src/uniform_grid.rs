@@ -9,8 +9,8 @@ use crate::{Error, check_lambda, check_threads};
 /// Settings of a [`UniformGrid`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
-    /// The density coefficient λ of the paper's equation (1), above 0. The paper found 5 to be best for
-    /// this method.
+    /// The density coefficient λ of the paper's equation (1), above 0. The paper found 5 to be best
+    /// for this method.
     pub lambda: f64,
     /// Whether a pair is tested in only one of its common cells, as in impinge. The method as
     /// described has no such rule: a pair is tested in every common cell.
@@ -103,7 +103,8 @@ impl UniformGrid {
         &self.settings
     }
 
-    /// Finds all intersecting pairs of primitives of two different bodies, in the current state of the scene.
+    /// Finds all intersecting pairs of primitives of two different bodies, in the current state of
+    /// the scene.
     ///
     /// # Errors
     /// A stale id, one body named twice, refused positions; 2^32 cell-primitive pairs or more.

@@ -1,4 +1,5 @@
-//! The GPU baseline compared with the oracle and with its CPU version. Without an adapter these tests fail.
+//! The GPU baseline compared with the oracle and with its CPU version. Without an adapter these
+//! tests fail.
 
 mod common;
 

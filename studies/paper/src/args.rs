@@ -19,20 +19,23 @@ Scans are read from ../shared/data beside the repository, or from $IMPINGE_DATA.
 a generated mesh of the same size stands in, and the report says so.
 The full run takes about a quarter of an hour on two cores.";
 
-/// Repeat the measurements of the paper on two-level spatial hashing; the report has its numbers beside ours.
+/// Repeat the measurements of the paper on two-level spatial hashing; the report has its numbers
+/// beside ours.
 #[derive(Debug, Parser)]
 #[command(name = "impinge-paper", after_help = EXAMPLES)]
 pub struct Args {
     /// The folder for the report: report.md, report.html, report.json and figures
     #[arg(long, value_name = "FOLDER", default_value = "out/paper")]
     pub out: PathBuf,
-    /// A benchmark to run: ball, bunny, buddha, dragon (surfaces), bunny-7k, bunny-19k, dragon-8k, dragon-15k (solids) [default: all]
+    /// A benchmark to run: ball, bunny, buddha, dragon (surfaces), bunny-7k, bunny-19k, dragon-8k,
+    /// dragon-15k (solids) [default: all]
     #[arg(long = "scene", value_name = "NAME", value_parser = benchmark)]
     scenes: Vec<SceneName>,
     /// A mesh for a benchmark, instead of the scan; with one --scene the name may be omitted
     #[arg(long = "mesh", value_name = "[NAME=]FILE")]
     meshes: Vec<BenchmarkMesh>,
-    /// A few frames of everything in less than two minutes: checks that all agree; times are not meaningful
+    /// A few frames of everything in less than two minutes: checks that all agree; times are not
+    /// meaningful
     #[arg(long)]
     quick: bool,
     /// Frames of each surface benchmark and steps of each solid one [default: 100 and 240]

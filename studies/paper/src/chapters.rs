@@ -1,5 +1,5 @@
-//! The text of the report, chapter by chapter: turns data into headings, tables and sentences. All numbers come from the
-//! data, and the data chooses the sentences that draw a conclusion.
+//! The text of the report, chapter by chapter: turns data into headings, tables and sentences. All
+//! numbers come from the data, and the data chooses the sentences that draw a conclusion.
 
 mod absolute;
 mod checks;

@@ -1,4 +1,5 @@
-//! Runs frames of all contestants in turns, so that all meet the same conditions, and compares their pairs.
+//! Runs frames of all contestants in turns, so that all meet the same conditions, and compares
+//! their pairs.
 
 use std::time::Duration;
 
@@ -38,7 +39,8 @@ pub(crate) struct Contest {
 }
 
 impl Contest {
-    /// A contest of `n_frames` frames. The flag of each setup says whether its λ was the fastest or was given.
+    /// A contest of `n_frames` frames. The flag of each setup says whether its λ was the fastest or
+    /// was given.
     pub fn new(setups: Vec<(Setup, bool)>, n_frames: usize, is_quick: bool) -> Result<Self, Error> {
         let n_in_software = match is_quick {
             true => FRAMES_IN_SOFTWARE_QUICK,
@@ -65,8 +67,8 @@ impl Contest {
         })
     }
 
-    /// Runs one frame with all contestants that run this frame, starting with a different one each time. Returns the
-    /// pairs of the first contestant, if it runs this frame.
+    /// Runs one frame with all contestants that run this frame, starting with a different one each
+    /// time. Returns the pairs of the first contestant, if it runs this frame.
     pub fn frame(
         &mut self,
         frame: usize,
@@ -138,7 +140,8 @@ impl Contestant {
             lambda,
         } = &self.setup;
         let counts = |count: fn(&Found) -> u64| Samples::of_counts(self.found.iter().map(count));
-        // Stages are in the order of the frame with the most stages: a frame without contact skips some.
+        // Stages are in the order of the frame with the most stages: a frame without contact skips
+        // some.
         let mut by_length: Vec<&Found> = self.found.iter().collect();
         by_length.sort_by_key(|found| std::cmp::Reverse(found.stages.len()));
         let mut names: Vec<&str> = Vec::new();
@@ -230,8 +233,8 @@ mod tests {
         }
     }
 
-    /// Compares an honest contestant with one that changes rows: the number of frames that differ, and whether the hashes are
-    /// equal.
+    /// Compares an honest contestant with one that changes rows: the number of frames that differ,
+    /// and whether the hashes are equal.
     fn against(lie: fn(&mut Vec<[u32; 4]>)) -> (usize, bool) {
         let balls = BuiltScene::two_body("balls", &surfaces::ball(500), [0.9, 0.0, 0.0]).unwrap();
         let setup = Setup {
@@ -271,7 +274,8 @@ mod tests {
         for lie in lies {
             assert_eq!(against(lie), (3, false));
         }
-        // In another order the hash is the same, but the answer is wrong, because it must be sorted.
+        // In another order the hash is the same, but the answer is wrong, because it must be
+        // sorted.
         assert_eq!(against(|rows| rows.swap(0, 1)), (3, true));
     }
 

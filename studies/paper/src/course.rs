@@ -25,8 +25,8 @@ pub(crate) trait Course {
     /// Moves the bodies to their positions in a frame. Frames may be requested in any order.
     fn pose(&mut self, frame: usize) -> Result<(), Error>;
 
-    /// The frame for the picture, given the counts of each frame: the frame with the most pairs, unless a course
-    /// overrides this.
+    /// The frame for the picture, given the counts of each frame: the frame with the most pairs,
+    /// unless a course overrides this.
     fn picture_frame(&self, moments: &[Moment]) -> usize {
         let fullest = moments.iter().max_by_key(|moment| moment.n_pairs);
         fullest.map_or(0, |moment| moment.frame)
@@ -45,8 +45,8 @@ pub(crate) trait Course {
     }
 }
 
-/// `n` frames spread over a course of `n_frames`, or all frames if there are fewer. The ends are avoided: contact
-/// grows during a course, and frames in its middle are typical.
+/// `n` frames spread over a course of `n_frames`, or all frames if there are fewer. The ends are
+/// avoided: contact grows during a course, and frames in its middle are typical.
 pub(crate) fn spread(n: usize, n_frames: usize) -> impl Iterator<Item = usize> {
     let n = n.min(n_frames);
     (0..n).map(move |k| (2 * k + 1) * n_frames / (2 * n))

@@ -1,7 +1,8 @@
 //! Table 3 and figure 7: pairs that meet in several cells.
 //!
-//! Compares three ways on the same frames: every cell tests the pairs that it finds; pairs go through a table hashed by
-//! DJB2 before the tests, as in the paper; and our owner rule, by which only one cell tests a pair.
+//! Compares three ways on the same frames: every cell tests the pairs that it finds; pairs go
+//! through a table hashed by DJB2 before the tests, as in the paper; and our owner rule, by which
+//! only one cell tests a pair.
 
 use std::borrow::Borrow;
 use std::time::{Duration, Instant};
@@ -70,7 +71,8 @@ pub(crate) fn table(
                 two_levels.detect_djb2(scene, a, b, n_primitives)?;
                 owner.detect(scene, &query)?;
             }
-            // Another way starts each time, because the first one finds the least data in the caches.
+            // Another way starts each time, because the first one finds the least data in the
+            // caches.
             let mut answers: [Pairs; 3] = std::array::from_fn(|_| Pairs::default());
             for turn in 0..3 {
                 let way = (ix + turn) % 3;
@@ -196,7 +198,8 @@ fn owner(options: &Options) -> Result<Detector, Error> {
     })?)
 }
 
-/// Times a detection after a pause, in which idle workers fall asleep, and copies its pairs after the clock has stopped.
+/// Times a detection after a pause, in which idle workers fall asleep, and copies its pairs after
+/// the clock has stopped.
 fn timed<P: Borrow<Pairs>>(
     to: &mut Pairs,
     detect: impl FnOnce() -> Result<P, impinge::Error>,

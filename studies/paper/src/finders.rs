@@ -65,8 +65,8 @@ pub(crate) struct Found {
 
 /// Finds all pairs of a frame.
 pub(crate) trait Finder {
-    /// Finds the pairs between two bodies in the current state of the scene. After the clock has stopped, it writes them to
-    /// `rows`, sorted.
+    /// Finds the pairs between two bodies in the current state of the scene. After the clock has
+    /// stopped, it writes them to `rows`, sorted.
     fn find(
         &mut self,
         scene: &Scene,
@@ -112,7 +112,8 @@ impl Place {
             Place::Cpu { n_threads } => {
                 Ok(Box::new(UniformGrid::new(impinge_baseline::Settings {
                     lambda,
-                    // With the paper's λ as described there; with its best λ, with everything that helps `Cells`.
+                    // With the paper's λ as described there; with its best λ, with everything that
+                    // helps `Cells`.
                     coarse_map: lambda != LAMBDA_FWZS11,
                     threads: *n_threads,
                     ..impinge_baseline::Settings::default()

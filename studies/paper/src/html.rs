@@ -122,7 +122,8 @@ fn escaped(text: &str) -> String {
         .replace('"', "&quot;")
 }
 
-/// Escapes text and converts code and strong words to tags. A mark without its other half stays as it is.
+/// Escapes text and converts code and strong words to tags. A mark without its other half stays as
+/// it is.
 fn marked(text: &str) -> String {
     let mut text = escaped(text);
     for (mark, tag) in [("`", "code"), ("**", "strong")] {

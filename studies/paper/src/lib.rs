@@ -1,8 +1,8 @@
-//! Repeats the measurements of the paper "Real-time Collision Detection with Two-level Spatial Hashing on GPU":
-//! its tables and figures, with the paper's own numbers beside ours.
+//! Repeats the measurements of the paper "Real-time Collision Detection with Two-level Spatial
+//! Hashing on GPU": its tables and figures, with the paper's own numbers beside ours.
 //!
-//! [`run`] measures and returns an [`Outcome`]: a [`Report`] of plain data, and figures. [`Outcome::write`]
-//! writes both as Markdown, HTML and JSON.
+//! [`run`] measures and returns an [`Outcome`]: a [`Report`] of plain data, and figures.
+//! [`Outcome::write`] writes both as Markdown, HTML and JSON.
 
 mod benchmark;
 mod chapters;

@@ -26,8 +26,9 @@ fn main() -> ExitCode {
     }
 }
 
-/// As in the program `impinge`: without a desktop session, a Vulkan layer of Mesa complains on standard error each time
-/// that a GPU is searched for. The program chooses the GPU itself, so the layer is switched off.
+/// As in the program `impinge`: without a desktop session, a Vulkan layer of Mesa complains on
+/// standard error each time that a GPU is searched for. The program chooses the GPU itself, so the
+/// layer is switched off.
 #[cfg(all(feature = "gpu", target_os = "linux"))]
 fn keep_mesa_quiet() {
     if std::env::var_os("XDG_RUNTIME_DIR").is_none() {

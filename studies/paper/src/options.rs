@@ -93,7 +93,8 @@ pub enum Backends {
     Both,
 }
 
-/// How surfaces wave: a travelling sine displacement. Lengths are shares of the box diagonal of a body.
+/// How surfaces wave: a travelling sine displacement. Lengths are shares of the box diagonal of a
+/// body.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Waving {
     /// How far a vertex moves to either side.

@@ -53,13 +53,15 @@ impl Painter {
         false
     }
 
-    /// Draws the bodies in their current pose, with the primitives of these pairs coloured. Returns the file's name.
+    /// Draws the bodies in their current pose, with the primitives of these pairs coloured. Returns
+    /// the file's name.
     #[cfg(not(feature = "gpu"))]
     pub fn paint(&mut self, _: &dyn Course, _: &[[u32; 4]]) -> Result<Option<String>, Error> {
         Ok(None)
     }
 
-    /// Draws the bodies in their current pose, with the primitives of these pairs coloured. Returns the file's name.
+    /// Draws the bodies in their current pose, with the primitives of these pairs coloured. Returns
+    /// the file's name.
     #[cfg(feature = "gpu")]
     pub fn paint(
         &mut self,

@@ -22,10 +22,12 @@ const SIZE: (u32, u32) = (760, 420);
 /// PNG pixels per SVG pixel, along each side.
 const SCALE: u32 = 2;
 
-/// The font family that is registered for measuring and for the PNG. SVG viewers use their own font.
+/// The font family that is registered for measuring and for the PNG. SVG viewers use their own
+/// font.
 const FONT: &str = "sans-serif";
 
-/// Colours that also differ in lightness, so that they are readable in grey and by the colour-blind (Okabe & Ito 2008).
+/// Colours that also differ in lightness, so that they are readable in grey and by the colour-blind
+/// (Okabe & Ito 2008).
 pub(crate) const COLORS: [RGBColor; 6] = [
     RGBColor(0x8a, 0x8a, 0x8a),
     RGBColor(0x00, 0x72, 0xb2),

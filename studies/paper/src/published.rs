@@ -1,7 +1,7 @@
 //! The paper's own numbers, each with its table.
 //!
-//! Source: "Real-time Collision Detection with Two-level Spatial Hashing on GPU", section 4. Figures 5 and 7
-//! contain no numbers; one point of figure 7 is known from table 3.
+//! Source: "Real-time Collision Detection with Two-level Spatial Hashing on GPU", section 4.
+//! Figures 5 and 7 contain no numbers; one point of figure 7 is known from table 3.
 
 use serde::Serialize;
 

@@ -126,7 +126,8 @@ pub struct Run {
     pub n_unsure: Samples,
     /// Bytes held without the answer, the maximum over frames.
     pub bytes_held: u64,
-    /// The sum of the frames' hashes, 16 hexadecimal digits; equal to the scene's if all frames were run.
+    /// The sum of the frames' hashes, 16 hexadecimal digits; equal to the scene's if all frames
+    /// were run.
     pub hash: String,
     /// Frames whose pairs differ from the first contestant's: a defect.
     pub n_frames_differing: usize,
@@ -157,8 +158,8 @@ pub struct Sweep {
 pub struct Duplicates {
     /// The scene.
     pub scene: String,
-    /// Which pairs of a cell are tested: all that touch a common sub-cell, as in the paper (false), or only those of them
-    /// whose boxes overlap (true).
+    /// Which pairs of a cell are tested: all that touch a common sub-cell, as in the paper (false),
+    /// or only those of them whose boxes overlap (true).
     pub has_box_test: bool,
     /// The number of measured frames.
     pub n_frames: usize,
@@ -219,8 +220,8 @@ pub struct TableSize {
 }
 
 impl Report {
-    /// The number of answers that differ: frames in which a contestant found other pairs than the first one, and failed checks of
-    /// table 3.
+    /// The number of answers that differ: frames in which a contestant found other pairs than the
+    /// first one, and failed checks of table 3.
     pub fn n_disagreements(&self) -> usize {
         let differing =
             |scene: &Scene| -> usize { scene.runs.iter().map(|run| run.n_frames_differing).sum() };
@@ -234,7 +235,8 @@ impl Report {
 }
 
 impl Scene {
-    /// The run of a method on the CPU or a GPU; of two runs with different λ, the one with the paper's.
+    /// The run of a method on the CPU or a GPU; of two runs with different λ, the one with the
+    /// paper's.
     pub fn run(&self, method: Method, is_gpu: bool) -> Option<&Run> {
         let mut runs = self.runs_of(method, is_gpu);
         let first = runs.next()?;
@@ -244,7 +246,8 @@ impl Scene {
         })
     }
 
-    /// The fastest run of a method, if it also ran with a chosen λ; `None` if only the paper's λ was run.
+    /// The fastest run of a method, if it also ran with a chosen λ; `None` if only the paper's λ
+    /// was run.
     pub fn best(&self, method: Method, is_gpu: bool) -> Option<&Run> {
         self.runs_of(method, is_gpu)
             .find(|run| run.is_chosen_lambda)?;

@@ -25,9 +25,9 @@ pub struct Outcome {
 /// Runs the benchmarks of the options. It writes no files.
 ///
 /// # Errors
-/// Options that do not fit together; a mesh that cannot be read; no GPU although one is requested; a detection
-/// that fails or is cancelled. Different answers are not an error here: the report counts them, see
-/// [`Report::n_disagreements`].
+/// Options that do not fit together; a mesh that cannot be read; no GPU although one is requested;
+/// a detection that fails or is cancelled. Different answers are not an error here: the report
+/// counts them, see [`Report::n_disagreements`].
 pub fn run(options: &Options, control: &Control<'_>) -> Result<Outcome, Error> {
     options.check()?;
     let (places, adapter, mut remarks) = places(options)?;
@@ -108,7 +108,8 @@ fn places(options: &Options) -> Result<Places, Error> {
     Ok((places, adapter, remarks))
 }
 
-/// The GPU of this name, or the first one, hardware before software; or the reason why there is none.
+/// The GPU of this name, or the first one, hardware before software; or the reason why there is
+/// none.
 #[cfg(feature = "gpu")]
 fn adapter(device: Option<&str>) -> Result<Adapter, String> {
     let wanted = device.unwrap_or_default().to_lowercase();

@@ -11,16 +11,17 @@ use crate::course::Course;
 use crate::error::Error;
 use crate::options::{Options, SceneName, Waving};
 
-/// The drift of the second body, in widths of the first one's box: it starts at `from` along x and ends at
-/// `to`. Chosen so that the average number of colliding triangles is close to the paper's, because the paper does
-/// not say how its bodies meet.
+/// The drift of the second body, in widths of the first one's box: it starts at `from` along x and
+/// ends at `to`. Chosen so that the average number of colliding triangles is close to the paper's,
+/// because the paper does not say how its bodies meet.
 #[derive(Debug, Clone, Copy)]
 struct Approach {
     from: f32,
     to: f32,
 }
 
-/// A small offset along y and z, as a share of the width, so that the two copies are not exactly aligned.
+/// A small offset along y and z, as a share of the width, so that the two copies are not exactly
+/// aligned.
 const ASIDE: [f32; 2] = [0.011, 0.007];
 
 /// The fixed data of a benchmark.

@@ -21,8 +21,8 @@ const FWZS11: [f64; 10] = [0.03125, 0.0625, 0.125, 0.25, 0.5, 1.0, 2.0, 5.0, 10.
 const N_FRAMES: usize = 3;
 const N_REPEATS: usize = 3;
 
-/// Times against λ for every method with a λ, at every hardware place: the average over frames of the fastest of a few
-/// repetitions.
+/// Times against λ for every method with a λ, at every hardware place: the average over frames of
+/// the fastest of a few repetitions.
 pub(crate) fn sweep(
     course: &mut dyn Course,
     places: &[Place],
@@ -70,8 +70,8 @@ pub(crate) fn sweep(
     Ok(sweeps)
 }
 
-/// The contestants: at each place the library's methods and the peer, each grid with the paper's λ and with
-/// the λ that was given or was the fastest. The flag marks this second λ.
+/// The contestants: at each place the library's methods and the peer, each grid with the paper's λ
+/// and with the λ that was given or was the fastest. The flag marks this second λ.
 pub(crate) fn contestants(
     places: &[Place],
     sweeps: &[Sweep],

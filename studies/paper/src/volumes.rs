@@ -1,7 +1,8 @@
-//! The volume benchmarks of table 2 and figure 6: solids of finite elements, one dropped on the other.
+//! The volume benchmarks of table 2 and figure 6: solids of finite elements, one dropped on the
+//! other.
 //!
-//! The simulation runs first, and its positions are recorded for every step. Then all contestants find the
-//! pairs of the same steps.
+//! The simulation runs first, and its positions are recorded for every step. Then all contestants
+//! find the pairs of the same steps.
 
 use impinge::{BodyId, Detector, Scene};
 use impinge_fem::Simulation;
@@ -126,7 +127,8 @@ impl Course for Recorded {
         self.frames.len()
     }
 
-    /// The first step with a third of the largest number of pairs: at the maximum, bodies are crushed beyond recognition.
+    /// The first step with a third of the largest number of pairs: at the maximum, bodies are
+    /// crushed beyond recognition.
     fn picture_frame(&self, moments: &[Moment]) -> usize {
         let most = moments.iter().map(|moment| moment.n_pairs).max();
         let enough = |moment: &Moment| 3 * moment.n_pairs >= most.unwrap_or(0);

@@ -7,8 +7,8 @@ use crate::run::Outcome;
 use crate::{chapters, html, markdown};
 
 impl Outcome {
-    /// Writes `report.md`, `report.html`, `report.json` and all figures to a folder, which is created if it does
-    /// not exist. Files of the same names are replaced.
+    /// Writes `report.md`, `report.html`, `report.json` and all figures to a folder, which is
+    /// created if it does not exist. Files of the same names are replaced.
     ///
     /// # Errors
     /// The folder cannot be created, or a file cannot be written.

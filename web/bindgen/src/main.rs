@@ -1,7 +1,8 @@
-//! Writes the JavaScript and the types beside a WebAssembly module: `impinge-bindgen MODULE.wasm FOLDER`.
+//! Writes the JavaScript and the types beside a WebAssembly module:
+//! `impinge-bindgen MODULE.wasm FOLDER`.
 //!
-//! The program `wasm-bindgen` does the same, but takes four times as long to build, for a test runner that
-//! nothing here needs.
+//! The program `wasm-bindgen` does the same, but takes four times as long to build, for a test
+//! runner that nothing here needs.
 
 use std::error::Error;
 use std::ffi::OsString;

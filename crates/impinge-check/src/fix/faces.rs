@@ -20,11 +20,13 @@ pub fn remove_duplicates(surface: &mut Surface) -> u64 {
     remove(surface, &is_copy)
 }
 
-/// Removes faces of zero area. Returns how many were removed, and how many have divided a neighbour instead.
+/// Removes faces of zero area. Returns how many were removed, and how many have divided a neighbour
+/// instead.
 ///
-/// A face of zero area whose vertices are three different points is a segment. If it just went, its long side and its two short
-/// ones would be borders, although the surface has no gap there. So the neighbour at the long side is divided at the middle
-/// vertex, which lies exactly on it: the two halves take the places of the face and of its neighbour.
+/// A face of zero area whose vertices are three different points is a segment. If it just went, its
+/// long side and its two short ones would be borders, although the surface has no gap there. So the
+/// neighbour at the long side is divided at the middle vertex, which lies exactly on it: the two
+/// halves take the places of the face and of its neighbour.
 pub fn remove_degenerate(surface: &mut Surface) -> (u64, u64) {
     let collapsed: Vec<bool> = surface.faces.iter().map(|face| !is_simplex(face)).collect();
     let n_collapsed = remove(surface, &collapsed);
@@ -73,14 +75,15 @@ pub fn remove_degenerate(surface: &mut Surface) -> (u64, u64) {
     (n_collapsed + n_removed, n_flat - n_removed)
 }
 
-/// A neighbour of a flat face, and the two halves that take the places of the flat face and of the neighbour.
+/// A neighbour of a flat face, and the two halves that take the places of the flat face and of the
+/// neighbour.
 struct Divided {
     neighbour: u32,
     halves: [[u32; 3]; 2],
 }
 
-/// How the neighbour at the long side of a flat face is divided; `None` if there is no single one, or if the halves would make an
-/// edge that exists already.
+/// How the neighbour at the long side of a flat face is divided; `None` if there is no single one,
+/// or if the halves would make an edge that exists already.
 fn divide(surface: &Surface, edges: &Edges, flat: &[bool], face: u32) -> Option<Divided> {
     let corners = surface.faces[face as usize];
     let points = surface.corners(corners);
@@ -98,7 +101,8 @@ fn divide(surface: &Surface, edges: &Edges, flat: &[bool], face: u32) -> Option<
     if d == b || !edges.of([b, d]).is_empty() {
         return None;
     }
-    // A flat neighbour is only divided if its own long side is the same; else it is its neighbour's turn first.
+    // A flat neighbour is only divided if its own long side is the same; else it is its neighbour's
+    // turn first.
     let [at_a, at_c, at_d] = surface.corners([a, c, d]);
     if flat[neighbour as usize] && !is_between(&at_d, &at_a, &at_c) {
         return None;

@@ -1,9 +1,10 @@
 //! Closes holes of few edges with triangles between their vertices.
 //!
-//! A hole is a simple loop of border edges. Of all its triangulations the one of the least area is chosen (dynamic programming, as Barequet
-//! and Sharir 1995), among those without a triangle of zero area and without a diagonal that is an edge of the mesh already. A hole
-//! whose filling intersects anything is opened again, so closing holes adds no self-intersection.
-//! Cost: the cube of the hole's edges, and one search for self-intersections.
+//! A hole is a simple loop of border edges. Of all its triangulations the one of the least area is
+//! chosen (dynamic programming, as Barequet and Sharir 1995), among those without a triangle of
+//! zero area and without a diagonal that is an edge of the mesh already. A hole whose filling
+//! intersects anything is opened again, so closing holes adds no self-intersection. Cost: the cube
+//! of the hole's edges, and one search for self-intersections.
 
 use std::collections::{HashMap, HashSet};
 
@@ -90,7 +91,8 @@ pub fn close(
     Ok(())
 }
 
-/// Closed loops of border edges with at most `most` edges, in which each vertex has one edge in and one out.
+/// Closed loops of border edges with at most `most` edges, in which each vertex has one edge in and
+/// one out.
 fn loops(borders: &[[u32; 2]], most: usize) -> Vec<Vec<u32>> {
     const SEVERAL: u32 = u32::MAX;
     let (mut next, mut entries) = (HashMap::new(), HashMap::new());

@@ -1,9 +1,10 @@
 //! Mends meshes of triangles without moving a vertex.
 //!
-//! In: a mesh with indices in range. Out: the mended mesh, what each repair did, and the counts of a check before and after.
-//! Repairs run in the order of [`Repair::ALL`]; each leaves alone what an earlier one has mended. Every decision about geometry is
-//! the sign of a determinant or a comparison of coordinates, so it is exact. Only the choice among several triangulations of a hole
-//! is by rounded areas, and every triangle that is chosen passes exact tests.
+//! In: a mesh with indices in range. Out: the mended mesh, what each repair did, and the counts of
+//! a check before and after. Repairs run in the order of [`Repair::ALL`]; each leaves alone what an
+//! earlier one has mended. Every decision about geometry is the sign of a determinant or a
+//! comparison of coordinates, so it is exact. Only the choice among several triangulations of a
+//! hole is by rounded areas, and every triangle that is chosen passes exact tests.
 //!
 //! Positions are never computed: a vertex of the result has the bits of a vertex of the input.
 
@@ -29,7 +30,8 @@ pub enum Repair {
     Weld,
     /// Of faces with the same vertices, in any order, the first one stays.
     Duplicates,
-    /// Faces of zero area go. Where one lies along an edge of a neighbour, the neighbour is divided there, so that no gap opens.
+    /// Faces of zero area go. Where one lies along an edge of a neighbour, the neighbour is divided
+    /// there, so that no gap opens.
     Degenerate,
     /// Neighbours get the same orientation. In each piece the fewest faces are turned.
     Orient,
@@ -80,7 +82,8 @@ impl Repair {
 pub struct FixOptions {
     /// The repairs, in any order. All of them by default.
     pub repairs: Vec<Repair>,
-    /// The most edges of a hole that is closed; 0, the default, closes none. At most [`MOST_HOLE_EDGES`].
+    /// The most edges of a hole that is closed; 0, the default, closes none. At most
+    /// [`MOST_HOLE_EDGES`].
     pub close_holes: usize,
     /// CPU threads; 0 means one per core. The result does not depend on it.
     pub threads: usize,
@@ -123,7 +126,8 @@ pub struct Repairs {
     pub closed_holes: u64,
     /// Faces that close them.
     pub added_faces: u64,
-    /// Holes of few enough edges that stay open, because every filling would be degenerate, not manifold or intersect something.
+    /// Holes of few enough edges that stay open, because every filling would be degenerate, not
+    /// manifold or intersect something.
     pub refused_holes: u64,
     /// Closed shells: pieces without a border, of one orientation.
     pub shells: u64,
@@ -158,7 +162,8 @@ pub struct Fixed {
 }
 
 impl Fixed {
-    /// Whether vertices at one position are different ones, so that a check has to keep seams to see what this repair has done.
+    /// Whether vertices at one position are different ones, so that a check has to keep seams to
+    /// see what this repair has done.
     pub fn has_seams(&self) -> bool {
         self.repairs.split_edges_added + self.repairs.split_vertices_added > 0
     }
@@ -242,7 +247,8 @@ pub fn fix_mesh(mesh: Mesh, options: &FixOptions) -> Result<Fixed, FixError> {
     if options.close_holes > MOST_HOLE_EDGES {
         return Err(FixError::Holes(options.close_holes));
     }
-    // This refuses indices out of range and coordinates that are not finite, on which everything below relies.
+    // This refuses indices out of range and coordinates that are not finite, on which everything
+    // below relies.
     let checked_as_it_was = Options {
         weld: does(Repair::Weld),
         keep_seams: !does(Repair::Weld),

@@ -1,15 +1,16 @@
 //! Gives neighbours the same orientation.
 //!
-//! Faces are neighbours across edges of exactly two faces. Edges of more faces are no way from face to face, because there
-//! neighbours in one sense are none in another; splitting pairs them afterwards by the orientations found here.
+//! Faces are neighbours across edges of exactly two faces. Edges of more faces are no way from face
+//! to face, because there neighbours in one sense are none in another; splitting pairs them
+//! afterwards by the orientations found here.
 
 use super::Surface;
 use crate::facets::{facets, groups};
 
 const NONE: u32 = u32::MAX;
 
-/// Turns the fewest faces of each piece so that its neighbours agree. Returns how many faces were turned, and how many pieces
-/// have no consistent orientation; these stay as they are.
+/// Turns the fewest faces of each piece so that its neighbours agree. Returns how many faces were
+/// turned, and how many pieces have no consistent orientation; these stay as they are.
 pub fn orient(surface: &mut Surface) -> (u64, u64) {
     let n = surface.faces.len();
     let mut neighbours = vec![[(NONE, false); 3]; n];

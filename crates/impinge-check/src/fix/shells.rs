@@ -1,13 +1,15 @@
 //! Turns closed shells so that matter is inside.
 //!
-//! A shell is a piece without a border and of one orientation. It is inside out if the sign of its signed volume, which is decided
-//! exactly, is not the one that its place asks for: positive for a shell inside an even number of others, negative for a cavity, which is
-//! inside an odd number. Which shell is inside which is decided exactly too, by `Detector::contains`: a shell is
-//! inside another one if its vertices are, those on the other surface left out. Shells that pass through each other contain each other as
-//! little as shells that are apart.
+//! A shell is a piece without a border and of one orientation. It is inside out if the sign of its
+//! signed volume, which is decided exactly, is not the one that its place asks for: positive for a
+//! shell inside an even number of others, negative for a cavity, which is inside an odd number.
+//! Which shell is inside which is decided exactly too, by `Detector::contains`: a shell is inside
+//! another one if its vertices are, those on the other surface left out. Shells that pass through
+//! each other contain each other as little as shells that are apart.
 //!
-//! The sign of the volume is used, not the normal at an extreme vertex: both agree for shells that do not intersect themselves,
-//! and for others the volume says which orientation has more matter inside.
+//! The sign of the volume is used, not the normal at an extreme vertex: both agree for shells that
+//! do not intersect themselves, and for others the volume says which orientation has more matter
+//! inside.
 
 use impinge::exact::{Point, Sign};
 use impinge::{Backend, Detector, Error, Scene, Settings};

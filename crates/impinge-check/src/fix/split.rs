@@ -1,9 +1,11 @@
 //! Splits edges of more than two faces, and vertices of several fans.
 //!
-//! Corners of faces are joined across edges; the corners at a vertex that hang together are a fan, and each fan after the first
-//! gets a vertex of its own at the same position. At an edge of more than two faces, only faces that are paired are joined: going
-//! around the edge, one after whose front matter begins with the one where it ends. So two boxes that share an edge become two boxes. The order
-//! around the edge is decided by signs of `orient3d`. Faces without a partner get a border there.
+//! Corners of faces are joined across edges; the corners at a vertex that hang together are a fan,
+//! and each fan after the first gets a vertex of its own at the same position. At an edge of more
+//! than two faces, only faces that are paired are joined: going around the edge, one after whose
+//! front matter begins with the one where it ends. So two boxes that share an edge become two
+//! boxes. The order around the edge is decided by signs of `orient3d`. Faces without a partner get
+//! a border there.
 
 use std::cmp::Ordering;
 use std::collections::HashMap;
@@ -23,7 +25,8 @@ const MOST_ROUNDS: u32 = 8;
 enum Pairing {
     /// Faces with matter between them.
     AroundMatter,
-    /// Faces with nothing between them: where the other pairing leaves the edge as it is, because the surface comes back to it.
+    /// Faces with nothing between them: where the other pairing leaves the edge as it is, because
+    /// the surface comes back to it.
     AroundHollow,
     /// None: each face has a border there.
     Cut,
@@ -185,7 +188,8 @@ fn pairs(surface: &Surface, group: &[Facet], pairing: Pairing) -> Vec<[usize; 2]
             },
             _ => Ordering::Equal,
         };
-        // Of coincident faces, one that closes comes first, so that two walls in one place bound what is on either side.
+        // Of coincident faces, one that closes comes first, so that two walls in one place bound
+        // what is on either side.
         halves[0]
             .cmp(&halves[1])
             .then_with(within)
@@ -220,15 +224,16 @@ struct Side {
     opens: bool,
 }
 
-/// Where a point lies in the turn around an edge that begins at a reference: with it (0), in the first half (1), opposite (2), in
-/// the second half (3). Looking from the end of the edge to its start, the turn is clockwise: behind a face that
-/// passes the edge forward, matter begins.
+/// Where a point lies in the turn around an edge that begins at a reference: with it (0), in the
+/// first half (1), opposite (2), in the second half (3). Looking from the end of the edge to its
+/// start, the turn is clockwise: behind a face that passes the edge forward, matter begins.
 fn half([u, v]: &[Point; 2], reference: &Point, point: &Point) -> u8 {
     match orient3d(u, v, reference, point) {
         Sign::Positive => 1,
         Sign::Negative => 3,
         Sign::Zero => {
-            // All four lie in one plane; a projection in which the edge and the reference do not fall together tells the sides apart.
+            // All four lie in one plane; a projection in which the edge and the reference do not
+            // fall together tells the sides apart.
             let opposite = [[0, 1], [1, 2], [2, 0]].iter().any(|&[x, y]| {
                 let side = |p: &Point| orient2d([u[x], u[y]], [v[x], v[y]], [p[x], p[y]]);
                 side(reference).strictly_opposite(side(point))

@@ -5,7 +5,8 @@ use clap::ValueEnum;
 /// [`impinge::Method`] as an option.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum MethodArg {
-    /// The grid for large meshes that are asked about for the first time, clusters as soon as they come back
+    /// The grid for large meshes that are asked about for the first time, clusters as soon as they
+    /// come back
     Auto,
     /// Groups fixed by topology; the fastest method for meshes that move
     Clusters,
@@ -107,9 +108,11 @@ impl From<StartArg> for impinge::Start {
 /// What becomes a body of its own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum BodiesArg {
-    /// Each node of a glTF file that has a mesh, each item of a 3MF file; other files are one body each
+    /// Each node of a glTF file that has a mesh, each item of a 3MF file; other files are one body
+    /// each
     Nodes,
-    /// Each object (o) of an OBJ file, or each group (g) of one without objects; other files are one body each
+    /// Each object (o) of an OBJ file, or each group (g) of one without objects; other files are
+    /// one body each
     Groups,
     /// Each file
     File,

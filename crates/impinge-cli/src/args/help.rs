@@ -1,5 +1,5 @@
-//! The help. Options that many commands share are shown once, by `impinge help detection`, `help rows` and `help picture`;
-//! the help of a command names them in one line per topic.
+//! The help. Options that many commands share are shown once, by `impinge help detection`,
+//! `help rows` and `help picture`; the help of a command names them in one line per topic.
 
 use clap::{Arg, ArgAction, Args as _, Command, CommandFactory, FromArgMatches};
 
@@ -67,7 +67,8 @@ Columns of numbers alone are a plain array in .npy files, others a structured on
 /// Options that write rows, whichever command has them.
 const ROWS: [&str; 4] = ["rows", "rows_format", "candidates", "contacts"];
 
-/// Reads the command line. Prints help, or an error of usage, and ends the program if that is all there is to do.
+/// Reads the command line. Prints help, or an error of usage, and ends the program if that is all
+/// there is to do.
 pub fn parse() -> Cli {
     let matches = command().get_matches();
     if let Some(topic) = matches
@@ -120,7 +121,8 @@ impl Topic {
     }
 }
 
-/// The command without the options of the topics in its help, which names them in one line per topic.
+/// The command without the options of the topics in its help, which names them in one line per
+/// topic.
 fn shortened(command: Command, options: &[Vec<Arg>; TOPICS.len()]) -> Command {
     let mut more = String::new();
     for (topic, own) in TOPICS.iter().zip(options) {
@@ -156,7 +158,8 @@ fn shortened(command: Command, options: &[Vec<Arg>; TOPICS.len()]) -> Command {
     })
 }
 
-/// `--help` prints one line per option; `impinge help COMMAND` also says what each of its values means.
+/// `--help` prints one line per option; `impinge help COMMAND` also says what each of its values
+/// means.
 fn with_help(command: Command) -> Command {
     if command.is_disable_help_flag_set() {
         return command;

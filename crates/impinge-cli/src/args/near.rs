@@ -33,13 +33,15 @@ pub struct NearArgs {
     /// Also find the pairs within each body
     #[arg(long = "self")]
     pub within: bool,
-    /// Which pairs: vertex-face, edge-edge, edge-vertex, vertex-vertex, edge-face, face-face [default: vf,ee,ef]
+    /// Which pairs: vertex-face, edge-edge, edge-vertex, vertex-vertex, edge-face, face-face
+    /// [default: vf,ee,ef]
     #[arg(long, value_enum, value_name = "KIND", value_delimiter = ',')]
     pub kinds: Vec<KindArg>,
     /// Find only the pairs of bodies A and B, numbered from 0 as given
     #[arg(long, value_name = "A,B", value_parser = two_bodies, conflicts_with_all = ["within", "exclude"])]
     pub between: Option<(usize, usize)>,
-    /// The thickness T of body N, a length that adds to the distance of its pairs (twice within it) [default: 0]
+    /// The thickness T of body N, a length that adds to the distance of its pairs (twice within it)
+    /// [default: 0]
     #[arg(long, value_name = "N,T", value_parser = body_length)]
     pub thickness: Vec<(usize, f64)>,
     #[command(flatten)]

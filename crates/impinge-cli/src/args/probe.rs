@@ -37,7 +37,8 @@ pub struct ProbeArgs {
     /// The points: rows of three numbers (.csv, .txt, .xyz or .npy), or the vertices of a mesh file
     #[arg(long, value_name = "FILE", required = true)]
     pub points: PathBuf,
-    /// Also decide whether each point is inside, on the surface or outside; distances are then negative outside
+    /// Also decide whether each point is inside, on the surface or outside; distances are then
+    /// negative outside
     #[arg(long)]
     pub signed: bool,
     /// Leave out points that are farther than this from the mesh [default: none]
@@ -75,7 +76,8 @@ pub struct CastArgs {
 /// How a mesh is read and asked about by points or rays.
 #[derive(Debug, Args)]
 pub struct OneMeshArgs {
-    /// Do not weld vertices at the same position, except in STL files, where triangles share nothing else
+    /// Do not weld vertices at the same position, except in STL files, where triangles share
+    /// nothing else
     #[arg(long)]
     pub no_weld: bool,
     /// The format of a mesh on standard input, which is named "-": ply, off, stl, …

@@ -40,7 +40,8 @@ pub struct StepArgs {
     /// Find only the first contact
     #[arg(long, conflicts_with_all = ["rows", "out", "candidates", "png"])]
     pub earliest: bool,
-    /// Find how far the step can be taken, and write each body there: one file per body, in their order (.ply or .obj)
+    /// Find how far the step can be taken, and write each body there: one file per body, in their
+    /// order (.ply or .obj)
     #[arg(long, value_name = "OUT", num_args = 1.., conflicts_with_all = ["earliest", "rows", "out", "candidates", "png", "repeat"])]
     pub advance: Vec<ReachedFile>,
     /// Leave out the pairs within each body
@@ -51,16 +52,19 @@ pub struct StepArgs {
     pub between: Option<(usize, usize)>,
     #[command(flatten)]
     pub how: StepHow,
-    /// Weld vertices that are at the same position both at the start and at the end, within each body; this is the default
+    /// Weld vertices that are at the same position both at the start and at the end, within each
+    /// body; this is the default
     #[arg(long, overrides_with = "no_weld")]
     pub weld: bool,
     /// Do not weld such vertices, except in STL files, where triangles share nothing else
     #[arg(long, overrides_with = "weld")]
     pub no_weld: bool,
-    /// Leave out the pairs of bodies A and B, numbered from 0 as given (A,A: the self-collision of A)
+    /// Leave out the pairs of bodies A and B, numbered from 0 as given (A,A: the self-collision of
+    /// A)
     #[arg(long, value_name = "A,B", value_parser = body_numbers, alias = "ignore")]
     pub exclude: Vec<(usize, usize)>,
-    /// End with exit code 3 unless the step is free (4 if the start intersects, with or without this option)
+    /// End with exit code 3 unless the step is free (4 if the start intersects, with or without
+    /// this option)
     #[arg(long, conflicts_with = "candidates")]
     pub fail_on_hit: bool,
     /// Print JSON and nothing else (see docs/cli.md)
@@ -68,8 +72,8 @@ pub struct StepArgs {
     pub json: bool,
     #[command(flatten)]
     pub rows: RowsArgs,
-    /// Write the pairs whose boxes over the whole step overlap (.csv, .jsonl or .npy; "-" is standard output, as CSV), and
-    /// find no impacts
+    /// Write the pairs whose boxes over the whole step overlap (.csv, .jsonl or .npy; "-" is
+    /// standard output, as CSV), and find no impacts
     #[arg(long, value_name = "FILE", group = "rows_file", conflicts_with_all = ["out", "repeat", "separation", "clearance", "png"])]
     pub candidates: Option<PathBuf>,
     /// How far the boxes of --candidates are inflated on all sides, a length
@@ -78,7 +82,8 @@ pub struct StepArgs {
     /// Ask N times, rewriting positions at both ends before each, and show median times
     #[arg(long, value_name = "N", default_value = "1", value_parser = at_least_one)]
     pub repeat: NonZeroUsize,
-    /// Write the meshes at the start of the step, coloured by the time of contact (.ply, .glb or .vtu)
+    /// Write the meshes at the start of the step, coloured by the time of contact (.ply, .glb or
+    /// .vtu)
     #[arg(long, value_name = "FILE")]
     pub out: Option<MeshFile>,
     /// Draw the meshes at the start of the step, coloured by the time of contact (.png)
@@ -122,20 +127,23 @@ impl StepArgs {
 /// Options of reporting impacts.
 #[derive(Debug, Clone, Args)]
 pub struct StepHow {
-    /// Which pairs: vertex-face, edge-edge, edge-vertex, vertex-vertex; of --candidates also edge-face, face-face [default: vf,ee]
+    /// Which pairs: vertex-face, edge-edge, edge-vertex, vertex-vertex; of --candidates also
+    /// edge-face, face-face [default: vf,ee]
     #[arg(long, value_enum, value_name = "KIND", value_delimiter = ',')]
     pub kinds: Vec<KindArg>,
     /// The precision to which times are rounded down
     #[arg(long, value_enum, value_name = "P", default_value_t = PrecisionArg::F32, alias = "toi")]
     pub precision: PrecisionArg,
-    /// Pairs that touch at the start: reported with the time 0, or ignored; and whether the start is asked for intersections
+    /// Pairs that touch at the start: reported with the time 0, or ignored; and whether the start
+    /// is asked for intersections
     #[arg(long, value_enum, value_name = "RULE", default_value_t = StartArg::Verify)]
     pub start: StartArg,
-    /// The distance that elements must keep: report the first time at which they are as near as that
+    /// The distance that elements must keep: report the first time at which they are as near as
+    /// that
     #[arg(long, value_name = "D", default_value = "0", allow_negative_numbers = true, value_parser = distance)]
     pub separation: f64,
-    /// What the step leaves: every pair keeps C, but of pairs that are near at the start a fifth of their distance; report the first
-    /// time at which one is as near as that
+    /// What the step leaves: every pair keeps C, but of pairs that are near at the start a fifth of
+    /// their distance; report the first time at which one is as near as that
     #[arg(long, value_name = "C", default_value = "0", allow_negative_numbers = true, value_parser = distance)]
     pub clearance: f64,
 }

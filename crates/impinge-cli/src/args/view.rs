@@ -24,7 +24,8 @@ Shift to turn it; drag beside the bodies to turn the view. The panel at the side
 
 #[derive(Debug, Clone, Args)]
 pub struct ViewArgs {
-    /// Mesh files, one per body; or a mesh and its frames (a .pc2 or .mdd file, a pattern, or numbered files)
+    /// Mesh files, one per body; or a mesh and its frames (a .pc2 or .mdd file, a pattern, or
+    /// numbered files)
     #[arg(value_name = "MESH")]
     pub meshes: Vec<PathBuf>,
     /// Read the files after the first one as its frames, whatever their names
@@ -51,7 +52,8 @@ pub struct ViewArgs {
     /// The number of triangles of the built-in scene
     #[arg(long, value_name = "N", default_value = "60000", value_parser = clap::value_parser!(u32).range(1_000..=100_000_000))]
     pub triangles: u32,
-    /// The frame to begin with, counted from 0 [default: the first one with a collision; for --png 0]
+    /// The frame to begin with, counted from 0 [default: the first one with a collision; for --png
+    /// 0]
     #[arg(long, value_name = "N")]
     pub frame: Option<usize>,
     /// Do not play at the beginning
@@ -90,7 +92,8 @@ pub struct ViewArgs {
     /// Save this picture and open no window
     #[arg(long, value_name = "FILE")]
     pub png: Option<PngFile>,
-    /// Show N frames as fast as possible, print how many there were per second, and close the window
+    /// Show N frames as fast as possible, print how many there were per second, and close the
+    /// window
     #[arg(long, value_name = "N", hide = true)]
     pub measure: Option<NonZeroU32>,
 }

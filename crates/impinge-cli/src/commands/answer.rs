@@ -142,7 +142,8 @@ fn answer(
     drop(watch);
     detector.set_control(Control::new().cancel(cancel));
 
-    // Files are written first: if one can't be written, no answer is printed that looks like success.
+    // Files are written first: if one can't be written, no answer is printed that looks like
+    // success.
     if let Some(file) = &rows_file {
         rows::write(
             file,

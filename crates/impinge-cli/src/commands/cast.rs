@@ -38,7 +38,8 @@ pub fn cast(args: &CastArgs, cancel: &CancelToken) -> Result<(), Error> {
         mesh: &mesh,
         hits: &hits,
     };
-    // Files are written first: if one can't be written, no answer is printed that looks like success.
+    // Files are written first: if one can't be written, no answer is printed that looks like
+    // success.
     if let Some(file) = &rows_file {
         answer.write_rows(file)?;
     }

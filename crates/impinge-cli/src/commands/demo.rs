@@ -19,7 +19,8 @@ use crate::picture::Drawer;
 use crate::text::{counted, grouped};
 use crate::watch::{Watch, go_on};
 
-/// The approximate number of triangles for the oracle, which is quadratic in them: it takes a second at most.
+/// The approximate number of triangles for the oracle, which is quadratic in them: it takes a
+/// second at most.
 const SAMPLE: usize = 16_000;
 
 /// `impinge demo`.
@@ -165,7 +166,8 @@ impl Sample {
             let n = body.n_primitives();
             let mut is_in = vec![n_all <= SAMPLE; n];
             if n_all > SAMPLE {
-                // Half of this body's share are colliding triangles, half are any triangles, both spread evenly.
+                // Half of this body's share are colliding triangles, half are any triangles, both
+                // spread evenly.
                 let most = (SAMPLE as u128 * n as u128 / n_all as u128) as usize / 2;
                 let colliding = pairs.colliding(id);
                 for (most, candidates) in [(most, colliding), (most, (0..).take(n).collect())] {

@@ -54,7 +54,8 @@ pub fn fix(args: &FixArgs) -> Result<(), Error> {
         },
         other => Error::Usage(format!("{}: {other}", printable(&args.mesh))),
     })?;
-    // Files are written first: if one can't be written, no answer is printed that looks like success.
+    // Files are written first: if one can't be written, no answer is printed that looks like
+    // success.
     write(args, &fixed.mesh)?;
     if let Some(file) = &rows_file {
         let pairs = &fixed.self_intersections;

@@ -42,11 +42,13 @@ pub fn near(args: &NearArgs, cancel: &CancelToken) -> Result<(), Error> {
     let watch = Watch::detection(!args.detector.no_progress, "detecting");
     detector.set_control(watch.control(cancel));
     let near = &detector.near(&bodies.scene, args.distance, &query)?;
-    // Faces with the same three vertices have no near pair, and neither has a body inside tetrahedra.
+    // Faces with the same three vertices have no near pair, and neither has a body inside
+    // tetrahedra.
     let meets = near.of(PairKind::EdgeFace).len() > 0;
     let intersects = meets || { detector.any(&bodies.scene, &intersect)? };
     drop(watch);
-    // Files are written first: if one can't be written, no answer is printed that looks like success.
+    // Files are written first: if one can't be written, no answer is printed that looks like
+    // success.
     if let Some(file) = &rows_file {
         rows::write_near(file, near)?;
     }

@@ -1,4 +1,5 @@
-//! `impinge probe`: which element of a mesh is nearest to each of many points, and which of them are inside.
+//! `impinge probe`: which element of a mesh is nearest to each of many points, and which of them
+//! are inside.
 
 use std::io::Write;
 
@@ -48,7 +49,8 @@ pub fn probe(args: &ProbeArgs, cancel: &CancelToken) -> Result<(), Error> {
         places: places.as_deref(),
         ms: times.sum_ms(),
     };
-    // Files are written first: if one can't be written, no answer is printed that looks like success.
+    // Files are written first: if one can't be written, no answer is printed that looks like
+    // success.
     if let Some(file) = &rows_file {
         answer.write_rows(file)?;
     }

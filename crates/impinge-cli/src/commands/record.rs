@@ -7,8 +7,8 @@
 //! FOLDER/steps.csv                     one row per step: counts, hash, times
 //! FOLDER/state.bin                     the last saved state
 //! ```
-//! The state after n steps is saved only after the first n frames and rows are on the disk. A run that continues from it
-//! cuts off later frames and rows and writes them again.
+//! The state after n steps is saved only after the first n frames and rows are on the disk. A run
+//! that continues from it cuts off later frames and rows and writes them again.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, ErrorKind, Write};

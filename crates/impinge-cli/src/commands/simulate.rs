@@ -126,7 +126,8 @@ struct Running<'a> {
     watch: &'a Watch,
 }
 
-/// Runs the simulation. Frame k shows the state after k steps and its pairs; it is written before step k is made.
+/// Runs the simulation. Frame k shows the state after k steps and its pairs; it is written before
+/// step k is made.
 fn run(
     simulation: &mut Simulation,
     detector: &mut Detector,

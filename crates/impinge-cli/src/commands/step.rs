@@ -93,7 +93,8 @@ pub fn step(args: &StepArgs, cancel: &CancelToken) -> Result<(), Error> {
     }
     let impacts = &detector.impacts(&bodies.scene, &step)?;
     drop(watch);
-    // Files are written first: if one can't be written, no answer is printed that looks like success.
+    // Files are written first: if one can't be written, no answer is printed that looks like
+    // success.
     if let Some(file) = &rows_file {
         let columns = impact_columns(args.how.precision == PrecisionArg::F64);
         let rows = impacts.iter().map(rows::impact);

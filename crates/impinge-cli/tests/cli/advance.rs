@@ -3,11 +3,13 @@
 use crate::harness::Folder;
 use crate::schema::{schema, wrong};
 
-/// The bodies are written as far as the step is free, with the vertices of their files: the next step begins with these files.
+/// The bodies are written as far as the step is free, with the vertices of their files: the next
+/// step begins with these files.
 #[test]
 fn a_step_is_taken_as_far_as_it_is_free() {
     let folder = Folder::new();
-    // Two triangles that share an edge, whose vertices are there twice; coordinates that no f32 has.
+    // Two triangles that share an edge, whose vertices are there twice; coordinates that no f32
+    // has.
     let sheet = |z: &str| {
         let corners = [
             "0.1 0.1", "1.1 0.1", "0.1 1.1", "1.1 0.1", "1.1 1.1", "0.1 1.1",

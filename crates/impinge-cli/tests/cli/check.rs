@@ -408,7 +408,8 @@ fn sarif_has_what_the_standard_requires() {
     let results = one["results"].as_array().unwrap();
     let mut found = Vec::new();
     for result in results {
-        // Section 3.27 of the standard: a message, a level of four, a rule that is there, a location with a URI.
+        // Section 3.27 of the standard: a message, a level of four, a rule that is there, a
+        // location with a URI.
         assert!(!result["message"]["text"].as_str().unwrap().is_empty());
         let rule = &rules[result["ruleIndex"].as_u64().unwrap() as usize];
         assert_eq!(rule["id"], result["ruleId"]);
@@ -557,7 +558,8 @@ fn the_page_stands_alone_and_its_pictures_are_pictures() {
     let cells: Vec<usize> = rows.iter().map(|row| row.matches("<td").count()).collect();
     assert_eq!(cells, [11; 3]);
     assert!(rows[1].contains("data-label=\"self-int.\" data-v=\"2\" class=\"bad\">2</td>"));
-    // Every picture is a PNG of the announced size; that of the sound mesh has no red in it, that of the pierced one has.
+    // Every picture is a PNG of the announced size; that of the sound mesh has no red in it, that
+    // of the pierced one has.
     let mut reds = Vec::new();
     for part in page.split("data:image/png;base64,").skip(1) {
         let text = &part[..part.find('"').unwrap()];

@@ -1,6 +1,7 @@
-//! One question has one answer at every door. The files of `tests/doors` repeat vertices along seams, share none, fold back
-//! onto themselves, have groups or nodes, or are made of tetrahedra; `answers.json` there has the answers, which the doors of
-//! Python (`test_doors.py`) and JavaScript are compared with too.
+//! One question has one answer at every door. The files of `tests/doors` repeat vertices along
+//! seams, share none, fold back onto themselves, have groups or nodes, or are made of tetrahedra;
+//! `answers.json` there has the answers, which the doors of Python (`test_doors.py`) and JavaScript
+//! are compared with too.
 
 use std::path::{Path, PathBuf};
 

@@ -99,7 +99,8 @@ fn what_is_not_welded_is_counted() {
         text.starts_with("one.obj: no pairs of 1 triangle\n"),
         "{text}"
     );
-    // Between bodies it does not change the answer, so nothing is counted unless vertices are welded.
+    // Between bodies it does not change the answer, so nothing is counted unless vertices are
+    // welded.
     let pairs = ["pairs", "split.obj", "split.obj", "--json"];
     for (more, counts) in [(&[][..], json!([2, 0])), (&["--no-weld"], json!([0, null]))] {
         let object = folder.run(pairs.iter().chain(more)).json();

@@ -207,7 +207,8 @@ pub fn keys(value: &Value) -> Vec<&str> {
         .collect()
 }
 
-/// A plate of two triangles, a thin rod through the inside of one of them, and the rod after a step along itself.
+/// A plate of two triangles, a thin rod through the inside of one of them, and the rod after a step
+/// along itself.
 pub fn rod_and_plate() -> Folder {
     let folder = Folder::new();
     folder.text(

@@ -1,5 +1,5 @@
-//! Nothing is lost and nothing hangs with full disks, outputs that are also inputs, inputs that never end, and meshes that
-//! name files elsewhere.
+//! Nothing is lost and nothing hangs with full disks, outputs that are also inputs, inputs that
+//! never end, and meshes that name files elsewhere.
 #![cfg(unix)]
 
 use std::fs;
@@ -182,7 +182,8 @@ fn a_mesh_of_the_current_folder_names_files_beside_it() {
     }
 }
 
-/// What a terminal would obey is printed as text: file names may hold line breaks and escape sequences.
+/// What a terminal would obey is printed as text: file names may hold line breaks and escape
+/// sequences.
 #[test]
 fn names_of_files_are_escaped() {
     let folder = Folder::new();

@@ -14,7 +14,8 @@ pub fn schema(name: &str) -> Value {
     serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
 }
 
-/// The errors in `value`, by the part of JSON Schema that the file uses; an unknown keyword is an error too.
+/// The errors in `value`, by the part of JSON Schema that the file uses; an unknown keyword is an
+/// error too.
 pub fn wrong(schema: &Value, value: &Value, at: &str) -> Vec<String> {
     let mut found = Vec::new();
     let mut say = |is_right: bool, what: String| {

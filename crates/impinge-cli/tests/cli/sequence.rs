@@ -148,7 +148,8 @@ fn text_for_people() {
         lines[7],
         "within 1 mesh, 0 vertices welded, neighbours resolved"
     );
-    // Beside another mesh, self-collision is no longer asked for unless it is said, and the answer says so.
+    // Beside another mesh, self-collision is no longer asked for unless it is said, and the answer
+    // says so.
     let args = ["sequence", "ball.ply", "run.pc2", "--other", "ring.ply"];
     for (more, last) in [
         (

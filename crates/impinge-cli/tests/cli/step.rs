@@ -424,7 +424,8 @@ fn ends_of_another_body_are_refused() {
     assert!(misuse.contains("nothing to test"), "{misuse}");
 }
 
-/// Two triangles, each with a vertex at the same position at the start; at the end these vertices have separated.
+/// Two triangles, each with a vertex at the same position at the start; at the end these vertices
+/// have separated.
 #[test]
 fn welding_keeps_what_parts() {
     let folder = Folder::new();
@@ -586,8 +587,8 @@ fn a_separation_is_kept() {
     assert!(with["impacts"].as_u64() > without["impacts"].as_u64());
 }
 
-/// Asks about a crash without and with an option that makes elements keep 0.0625, compares it with the library, and returns both
-/// answers.
+/// Asks about a crash without and with an option that makes elements keep 0.0625, compares it with
+/// the library, and returns both answers.
 fn keeps(option: &str, asked: Query, said: &str) -> [Value; 2] {
     let folder = folder();
     let step = |more: &[&str]| folder.run(["step"].iter().chain(&FILES).chain(more));

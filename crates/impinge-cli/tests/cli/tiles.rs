@@ -147,7 +147,8 @@ fn a_step_gives_the_impacts_of_the_whole() {
     assert!(kinds.iter().all(|(kind, n)| expected["kinds"][kind] == *n));
     let read = |name: &str| std::fs::read(folder.path(name)).unwrap();
     assert_eq!(read("big/rows.npy"), read("whole.npy"));
-    // Options that a plan without a step does not have are refused, and so is a body without an end.
+    // Options that a plan without a step does not have are refused, and so is a body without an
+    // end.
     let alone = folder.run(["tiles", "plan", "odd", "--step", files[0]]);
     assert!(alone.misuse().contains("body0-0.ply without an end"));
     // Neighbours never count in a step: either rule is the same question.
@@ -264,7 +265,8 @@ fn what_is_missing_is_said() {
     folder.run(again.into_iter().chain(["--replace"])).printed();
 }
 
-/// The kernel ends a process that exceeds its file size limit, in the middle of whatever file it writes.
+/// The kernel ends a process that exceeds its file size limit, in the middle of whatever file it
+/// writes.
 #[cfg(target_os = "linux")]
 #[test]
 fn killed_while_writing_and_run_again_the_answer_is_the_same() {

@@ -91,7 +91,8 @@ fn help_shows_every_command_with_examples() {
     assert_eq!(version, format!("impinge {}\n", env!("CARGO_PKG_VERSION")));
 }
 
-/// A command's help is short: its own options first, one line per topic for those that many commands share.
+/// A command's help is short: its own options first, one line per topic for those that many
+/// commands share.
 #[test]
 fn shared_options_are_explained_once() {
     let folder = Folder::new();

@@ -9,18 +9,20 @@ use crate::scene::positions::Positions;
 /// How far a step can be taken.
 #[derive(Clone, PartialEq)]
 pub struct Advance {
-    /// The part of the step that can be taken: 1 for all of it, 0 for none. With a [clearance](crate::Query::clearance) it holds for positions
-    /// that solvers compute, and for all smaller parts: see [`Detector::advance`](crate::Detector::advance).
+    /// The part of the step that can be taken: 1 for all of it, 0 for none. With a
+    /// [clearance](crate::Query::clearance) it holds for positions that solvers compute, and for
+    /// all smaller parts: see [`Detector::advance`](crate::Detector::advance).
     pub fraction: f64,
-    /// The first contact of the whole step, its time rounded down to `f64`. `None` if nothing touches.
-    /// With a clearance: the first time at which a pair is as near as it may come, rounding included, as an `f32`.
+    /// The first contact of the whole step, its time rounded down to `f64`. `None` if nothing
+    /// touches. With a clearance: the first time at which a pair is as near as it may come,
+    /// rounding included, as an `f32`.
     pub first: Option<Impact>,
-    /// Whether elements intersect at the start; the fraction is then 0, whether or not there is a first contact. `None` if nobody
-    /// asked: only [`Start::Verify`](crate::Start::Verify) does.
+    /// Whether elements intersect at the start; the fraction is then 0, whether or not there is a
+    /// first contact. `None` if nobody asked: only [`Start::Verify`](crate::Start::Verify) does.
     pub start_intersects: Option<bool>,
-    /// The vertex positions of all moving bodies at that fraction, rounded to the precision in which they are stored. The
-    /// straight path from the start to these rounded positions is free, if the start was free of intersections, and except for
-    /// pairs that touch at the start.
+    /// The vertex positions of all moving bodies at that fraction, rounded to the precision in
+    /// which they are stored. The straight path from the start to these rounded positions is free,
+    /// if the start was free of intersections, and except for pairs that touch at the start.
     pub positions: Vec<(BodyId, Positions)>,
     /// How many fractions were tried.
     pub n_tried: u32,

@@ -12,7 +12,8 @@ use crate::search::found::KeysByKind;
 use crate::search::runner::{Job, Outcome};
 use crate::search::stats::Stats;
 
-/// Pairs of elements whose boxes overlap during a step, sorted by `(kind, body_a, element_a, body_b, element_b)`.
+/// Pairs of elements whose boxes overlap during a step, sorted by
+/// `(kind, body_a, element_a, body_b, element_b)`.
 #[derive(Clone, Default)]
 pub struct Candidates {
     numbering: Numbering,
@@ -56,7 +57,8 @@ impl Candidates {
         keys.map(|&key| self.numbering.pair(key))
     }
 
-    /// Rows `[body_a, element_a, body_b, element_b]` of one kind, with bodies by their [`index`](BodyId::index).
+    /// Rows `[body_a, element_a, body_b, element_b]` of one kind, with bodies by their
+    /// [`index`](BodyId::index).
     pub fn rows(&self, kind: PairKind) -> impl ExactSizeIterator<Item = [u32; 4]> + '_ {
         self.of(kind).map(|(a, b)| row(a, b))
     }

@@ -9,7 +9,8 @@ use impinge_exact::Feature;
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct ClosestElement {
-    /// The element. Decided exactly; of several at the same distance, the lowest by body and then by number.
+    /// The element. Decided exactly; of several at the same distance, the lowest by body and then
+    /// by number.
     pub element: Element,
     /// The feature of the element that has the nearest point in its inside. Exact.
     pub feature: Feature,
@@ -19,7 +20,8 @@ pub struct ClosestElement {
     pub point: [f64; 3],
 }
 
-/// The elements nearest to points, one entry per point: [`Detector::closest`](crate::Detector::closest).
+/// The elements nearest to points, one entry per point:
+/// [`Detector::closest`](crate::Detector::closest).
 #[derive(Clone, Default)]
 pub struct Closest {
     pub(crate) found: Vec<Option<ClosestElement>>,
@@ -51,7 +53,8 @@ impl Closest {
         self.found.is_empty()
     }
 
-    /// What is nearest to a point; `None` if nothing is as near as was asked for, or there is no such point.
+    /// What is nearest to a point; `None` if nothing is as near as was asked for, or there is no
+    /// such point.
     pub fn get(&self, point: usize) -> Option<ClosestElement> {
         self.found.get(point).copied().flatten()
     }
@@ -61,8 +64,8 @@ impl Closest {
         self.found.iter().copied()
     }
 
-    /// Rows `[body, element]`, with bodies by their [`index`](crate::BodyId::index); `[u32::MAX, u32::MAX]` for points to which
-    /// nothing is near.
+    /// Rows `[body, element]`, with bodies by their [`index`](crate::BodyId::index);
+    /// `[u32::MAX, u32::MAX]` for points to which nothing is near.
     pub fn rows(&self) -> impl ExactSizeIterator<Item = [u32; 2]> + '_ {
         self.iter().map(|found| match found {
             Some(found) => [found.element.body.slot(), found.element.element],

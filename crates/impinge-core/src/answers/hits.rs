@@ -15,7 +15,8 @@ pub struct RayHit {
     pub feature: Feature,
     /// The largest float that is at most the parameter of entry, in units of the direction.
     pub t: f64,
-    /// The same of the parameter at which the ray leaves the element: more than at the entry where it lies in its plane.
+    /// The same of the parameter at which the ray leaves the element: more than at the entry where
+    /// it lies in its plane.
     pub t_end: f64,
     /// The barycentrics of the point of entry, each rounded to nearest.
     pub barycentrics: [f64; 3],
@@ -62,8 +63,8 @@ impl Hits {
         &self.is_hit
     }
 
-    /// What a ray hits, by t, then by body and number: all, or the first. Nothing if only yes or no was asked for, or there is no
-    /// such ray.
+    /// What a ray hits, by t, then by body and number: all, or the first. Nothing if only yes or no
+    /// was asked for, or there is no such ray.
     pub fn of(&self, ray: usize) -> &[RayHit] {
         match self.offsets.get(ray..).and_then(<[usize]>::first_chunk) {
             Some(&[from, to]) => &self.found[from..to],

@@ -1,4 +1,5 @@
-//! Where the buffers of a dropped answer go: back to the detector that made it, so that a loop allocates nothing.
+//! Where the buffers of a dropped answer go: back to the detector that made it, so that a loop
+//! allocates nothing.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -34,7 +35,8 @@ impl<T: GivesBack> Home<T> {
         self.0.is_some()
     }
 
-    /// An answer with the buffers of one that was dropped, or an empty one. Its buffers come back here.
+    /// An answer with the buffers of one that was dropped, or an empty one. Its buffers come back
+    /// here.
     pub fn take(&self) -> T {
         let held = self.0.as_ref().and_then(|place| {
             let mut held = place.lock().unwrap_or_else(PoisonError::into_inner);

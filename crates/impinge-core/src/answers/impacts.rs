@@ -19,23 +19,27 @@ use impinge_exact::Contact;
 pub struct Impact {
     /// The kinds of the two elements.
     pub kind: PairKind,
-    /// The element that the kind names first: the vertex of a vertex and a face, the edge of an edge and a vertex.
+    /// The element that the kind names first: the vertex of a vertex and a face, the edge of an
+    /// edge and a vertex.
     ///
-    /// Vertices are numbered as positions are. Faces are numbered as they were given; those of tetrahedra by tetrahedron,
-    /// then by the opposite corner. Edges are numbered as they were given; those of faces as unique pairs `(low, high)` in
-    /// the order of `(high, low)`. [`Body::part`](crate::Body::part) lists them.
+    /// Vertices are numbered as positions are. Faces are numbered as they were given; those of
+    /// tetrahedra by tetrahedron, then by the opposite corner. Edges are numbered as they were
+    /// given; those of faces as unique pairs `(low, high)` in the order of `(high, low)`.
+    /// [`Body::part`](crate::Body::part) lists them.
     pub a: Element,
-    /// The other element. If both are of the same kind, it belongs to the body with the higher id, or is the higher element
-    /// of the same body.
+    /// The other element. If both are of the same kind, it belongs to the body with the higher id,
+    /// or is the higher element of the same body.
     pub b: Element,
-    /// The first time in [0, 1] at which they touch, rounded down to `f32` or `f64`, as [`Query::precision`](crate::Query::precision) says.
+    /// The first time in [0, 1] at which they touch, rounded down to `f32` or `f64`, as
+    /// [`Query::precision`](crate::Query::precision) says.
     pub toi: f64,
     /// Whether they touch at the start, at time 0.
     pub at_start: bool,
 }
 
 impl Impact {
-    /// The row `[body_a, element_a, body_b, element_b]`, with bodies by their [`index`](BodyId::index).
+    /// The row `[body_a, element_a, body_b, element_b]`, with bodies by their
+    /// [`index`](BodyId::index).
     pub fn row(&self) -> [u32; 4] {
         row(self.a, self.b)
     }
@@ -71,8 +75,8 @@ fn name(
     }
 }
 
-/// [`Impacts::hash`] of impacts given as kind, `[body_a, element_a, body_b, element_b]` and time. The hash of several sets
-/// with no impact in common is the wrapping sum of their hashes.
+/// [`Impacts::hash`] of impacts given as kind, `[body_a, element_a, body_b, element_b]` and time.
+/// The hash of several sets with no impact in common is the wrapping sum of their hashes.
 pub fn hash_impact_rows(rows: impl IntoIterator<Item = (PairKind, [u32; 4], f64)>) -> u64 {
     rows.into_iter().fold(0, |sum, (kind, row, toi)| {
         let time = mix(toi.to_bits() ^ kind as u64);
@@ -80,7 +84,8 @@ pub fn hash_impact_rows(rows: impl IntoIterator<Item = (PairKind, [u32; 4], f64)
     })
 }
 
-/// All pairs of elements that touch during a step, sorted by `(kind, body_a, element_a, body_b, element_b)`.
+/// All pairs of elements that touch during a step, sorted by
+/// `(kind, body_a, element_a, body_b, element_b)`.
 ///
 /// The same input gives the same bytes on every method, backend, thread count and budget.
 #[derive(Clone, Default)]
@@ -190,8 +195,8 @@ impl Impacts {
         self.impacts.iter().copied().reduce(Impact::earlier)
     }
 
-    /// A hash of the set of impacts, times included, that does not depend on their order: the wrapping sum of a mixed
-    /// 64-bit word per impact.
+    /// A hash of the set of impacts, times included, that does not depend on their order: the
+    /// wrapping sum of a mixed 64-bit word per impact.
     pub fn hash(&self) -> u64 {
         hash_impact_rows(
             self.impacts

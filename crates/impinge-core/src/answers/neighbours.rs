@@ -12,16 +12,19 @@ use crate::search::found::KeysByKind;
 use crate::search::sink::reserve;
 use crate::search::stats::Stats;
 
-/// Compressed sparse rows: the neighbours of element `i` are `indices[offsets[i]..offsets[i + 1]]`, ascending.
+/// Compressed sparse rows: the neighbours of element `i` are `indices[offsets[i]..offsets[i + 1]]`,
+/// ascending.
 #[derive(Debug, Clone, Default, PartialEq)]
 #[non_exhaustive]
 pub struct Csr {
-    /// Where the list of each element starts, and the end of the last one: one more than there are elements.
+    /// Where the list of each element starts, and the end of the last one: one more than there are
+    /// elements.
     pub offsets: Vec<u64>,
     /// The neighbours.
     pub indices: Vec<u32>,
-    /// How far away each is, in the unit of the scene, rounded down: below the distance by at most 2^-20 of it, or a few times the smallest
-    /// `f64`; and 0 if and only if they touch or are as near as that.
+    /// How far away each is, in the unit of the scene, rounded down: below the distance by at most
+    /// 2^-20 of it, or a few times the smallest `f64`; and 0 if and only if they touch or are as
+    /// near as that.
     pub distances: Vec<f64>,
 }
 
@@ -42,7 +45,8 @@ impl Csr {
         self.distances.clear();
     }
 
-    /// Makes rows of entries `(row, column, distance)`, which are gone through twice and keep their order within a row.
+    /// Makes rows of entries `(row, column, distance)`, which are gone through twice and keep their
+    /// order within a row.
     fn fill(
         &mut self,
         n_rows: usize,
@@ -81,8 +85,9 @@ impl Csr {
 
 /// Which elements are near each element: see [`Detector::neighbours`](crate::Detector::neighbours).
 ///
-/// The vertices of all bodies are numbered one after another in the order of the bodies, whether the query is about a body or not, and
-/// so are the edges and the faces: [`first`](Neighbours::first).
+/// The vertices of all bodies are numbered one after another in the order of the bodies, whether
+/// the query is about a body or not, and so are the edges and the faces:
+/// [`first`](Neighbours::first).
 #[derive(Clone, Default)]
 pub struct Neighbours {
     /// The first vertex, edge and face of each body.
@@ -180,8 +185,8 @@ impl Neighbours {
         (bodies + lists) as u64
     }
 
-    /// The number of the first vertex, edge or face of a body in the lists; `None` if the body was not in the scene, or for
-    /// [`Part::Given`].
+    /// The number of the first vertex, edge or face of a body in the lists; `None` if the body was
+    /// not in the scene, or for [`Part::Given`].
     pub fn first(&self, body: BodyId, part: Part) -> Option<u32> {
         let ix = self.bodies.binary_search_by_key(&body, |of| of.0).ok()?;
         let place = PARTS.iter().position(|&of| of == part)?;
@@ -203,13 +208,15 @@ impl Neighbours {
         self.n_pairs == 0
     }
 
-    /// The lists of the elements that a kind names first: of [`PairKind::VertexFace`], the faces near each vertex. Where both are of
-    /// the same kind, each pair is in the lists of both elements.
+    /// The lists of the elements that a kind names first: of [`PairKind::VertexFace`], the faces
+    /// near each vertex. Where both are of the same kind, each pair is in the lists of both
+    /// elements.
     pub fn of(&self, kind: PairKind) -> &Csr {
         &self.lists[kind as usize][0]
     }
 
-    /// The lists of the elements that a kind names second: of [`PairKind::VertexFace`], the vertices near each face.
+    /// The lists of the elements that a kind names second: of [`PairKind::VertexFace`], the
+    /// vertices near each face.
     pub fn reversed(&self, kind: PairKind) -> &Csr {
         let [a, b] = kind.parts();
         &self.lists[kind as usize][usize::from(a != b)]

@@ -207,8 +207,8 @@ impl Pairs {
         bits.into_numbers()
     }
 
-    /// The primitives of each body that take part in any pair, found in one pass: sorted, each once. Bodies come in order;
-    /// bodies without such a primitive are left out.
+    /// The primitives of each body that take part in any pair, found in one pass: sorted, each
+    /// once. Bodies come in order; bodies without such a primitive are left out.
     pub fn all_colliding(&self) -> Vec<(BodyId, Vec<u32>)> {
         let mut bits = Bits::default();
         for number in self.keys.iter().flat_map(|&key| pair_numbers(key)) {
@@ -225,10 +225,10 @@ impl Pairs {
             .collect()
     }
 
-    /// Keeps only the pairs for which `keep` returns true: a filter of the caller's own, by body, by face or by vertex.
-    /// `keep` is called once per pair, in order, after all pairs were found. So the answer is
-    /// the same for every method, backend and thread count, provided that `keep` depends on the pair alone. The statistics
-    /// do not change.
+    /// Keeps only the pairs for which `keep` returns true: a filter of the caller's own, by body,
+    /// by face or by vertex. `keep` is called once per pair, in order, after all pairs were found.
+    /// So the answer is the same for every method, backend and thread count, provided that `keep`
+    /// depends on the pair alone. The statistics do not change.
     ///
     /// ```
     /// use impinge_core::{Backend, Detector, Query, Scene};
@@ -336,8 +336,9 @@ impl Bits {
     }
 }
 
-/// [`Pairs::hash`] of rows `[body_a, primitive_a, body_b, primitive_b]` that come from elsewhere. The order of rows
-/// does not matter. In each row the lower `(body, primitive)` comes first: the other way round gives another hash.
+/// [`Pairs::hash`] of rows `[body_a, primitive_a, body_b, primitive_b]` that come from elsewhere.
+/// The order of rows does not matter. In each row the lower `(body, primitive)` comes first: the
+/// other way round gives another hash.
 pub fn hash_rows(rows: impl IntoIterator<Item = [u32; 4]>) -> u64 {
     let hashes = rows.into_iter().map(hash_row);
     hashes.fold(0, u64::wrapping_add)

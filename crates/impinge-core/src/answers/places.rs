@@ -11,7 +11,8 @@ use crate::scene::ids::BodyId;
 use crate::scene::{Body, Scene};
 use crate::search::sets::Sets;
 
-/// Pairs of two bodies, or of one body with itself, that are connected by shared primitives or vertices.
+/// Pairs of two bodies, or of one body with itself, that are connected by shared primitives or
+/// vertices.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Place {
@@ -42,15 +43,17 @@ impl Place {
 }
 
 impl Pairs {
-    /// The places where the bodies of an answer meet: those with the most pairs first, equally large ones in the order of their first pair.
-    /// The program and the window number places like this.
+    /// The places where the bodies of an answer meet: those with the most pairs first, equally
+    /// large ones in the order of their first pair. The program and the window number places like
+    /// this.
     ///
     /// Cost: a few hash look-ups per pair.
     ///
     /// # Errors
     /// A body is no longer in the scene.
     pub fn places(&self, scene: &Scene) -> Result<Vec<Place>, Error> {
-        // One node per vertex of a colliding primitive, separately for each pair of bodies: (body, other body, vertex).
+        // One node per vertex of a colliding primitive, separately for each pair of bodies: (body,
+        // other body, vertex).
         let mut sets = Sets::default();
         let mut nodes: HashMap<(usize, usize, u32), u32> = HashMap::new();
         let mut of_pairs = Vec::with_capacity(self.len());

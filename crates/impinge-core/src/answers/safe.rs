@@ -46,7 +46,8 @@ impl Bounds<'_> {
     }
 }
 
-/// How far each vertex may move so that nothing touches: see [`Detector::safe_distances`](crate::Detector::safe_distances).
+/// How far each vertex may move so that nothing touches: see
+/// [`Detector::safe_distances`](crate::Detector::safe_distances).
 ///
 /// The same input gives the same bytes on every method, backend, thread count and budget.
 #[derive(Clone, Default)]
@@ -84,7 +85,8 @@ impl SafeDistances {
         &mut self.stats
     }
 
-    /// Takes the bounds of all vertices of all bodies, and rounds them down to the precision of the bodies.
+    /// Takes the bounds of all vertices of all bodies, and rounds them down to the precision of the
+    /// bodies.
     ///
     /// # Errors
     /// There is no memory for them.
@@ -136,8 +138,9 @@ impl SafeDistances {
         (bodies + bounds) as u64 + self.touching.bytes()
     }
 
-    /// How far each vertex of a body may move, in the unit of the scene, by the number of the vertex; `None` if the body was not in the
-    /// scene. A vertex that belongs to no element has `most`, as has each vertex of a body that the query is not about.
+    /// How far each vertex of a body may move, in the unit of the scene, by the number of the
+    /// vertex; `None` if the body was not in the scene. A vertex that belongs to no element has
+    /// `most`, as has each vertex of a body that the query is not about.
     pub fn of(&self, body: BodyId) -> Option<Bounds<'_>> {
         let found = self.bodies.binary_search_by_key(&body, |of| of.id);
         let OfBody {
@@ -153,8 +156,8 @@ impl SafeDistances {
         })
     }
 
-    /// The pairs at distance 0, or nearer than their bodies are thick, whose vertices may not move at all. Unless the query names kinds,
-    /// an edge that pierces a face is among them.
+    /// The pairs at distance 0, or nearer than their bodies are thick, whose vertices may not move
+    /// at all. Unless the query names kinds, an edge that pierces a face is among them.
     pub fn touching(&self) -> &NearPairs {
         &self.touching
     }

@@ -6,7 +6,8 @@ use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
 use crate::scene::positions::Positions;
 
-/// Where the vertices are after each has gone as far as it may: see [`Detector::truncate`](crate::Detector::truncate).
+/// Where the vertices are after each has gone as far as it may: see
+/// [`Detector::truncate`](crate::Detector::truncate).
 ///
 /// The same input gives the same bytes on every method, backend, thread count and budget.
 #[derive(Clone, Default, PartialEq)]
@@ -19,7 +20,8 @@ pub struct Truncation {
 }
 
 impl Truncation {
-    /// The positions of a body, in the precision of its positions; `None` for one that does not move or was not in the scene.
+    /// The positions of a body, in the precision of its positions; `None` for one that does not
+    /// move or was not in the scene.
     pub fn positions(&self, body: BodyId) -> Option<&Positions> {
         let found = self.positions.binary_search_by_key(&body, |(id, _)| *id);
         Some(&self.positions[found.ok()?].1)
@@ -37,7 +39,8 @@ impl Truncation {
         self.n_cut
     }
 
-    /// How many pairs already touch at the start, or are nearer than they are to keep: their vertices were not moved.
+    /// How many pairs already touch at the start, or are nearer than they are to keep: their
+    /// vertices were not moved.
     pub fn n_touching(&self) -> u64 {
         self.n_touching
     }
@@ -47,8 +50,8 @@ impl Truncation {
         self.n_rounds
     }
 
-    /// Whether elements intersect at the start; no vertex was moved then. `None` if nobody asked: only
-    /// [`Start::Verify`](crate::Start::Verify) does.
+    /// Whether elements intersect at the start; no vertex was moved then. `None` if nobody asked:
+    /// only [`Start::Verify`](crate::Start::Verify) does.
     pub fn start_intersects(&self) -> Option<bool> {
         self.start_intersects
     }

@@ -1,13 +1,14 @@
-//! Where vertices become boxes, for both backends on the host. (On a device that is the text of `kernels/still.wgsl` and
-//! `kernels/moving.wgsl`.)
+//! Where vertices become boxes, for both backends on the host. (On a device that is the text of
+//! `kernels/still.wgsl` and `kernels/moving.wgsl`.)
 //!
 //! ```text
 //! vertices of a pose  ->  box of some vertices   of_vertices, of_run, of_cluster; BoxSource::of_cluster: at both ends of a step
 //! corners in tables   ->  boxes of a group       LaneBounds::hold, fill; Sweep: what of a step they must hold
 //! ```
 //!
-//! Boxes of positions in f32 are exact, those of positions in f64 rounded outward. Boxes of points in tables hold these as they are rounded:
-//! rounding keeps the order of coordinates, so boxes that are apart prove the elements apart.
+//! Boxes of positions in f32 are exact, those of positions in f64 rounded outward. Boxes of points
+//! in tables hold these as they are rounded: rounding keeps the order of coordinates, so boxes that
+//! are apart prove the elements apart.
 
 mod extent;
 mod sweep;
@@ -30,7 +31,8 @@ use crate::scene::positions::Positions;
 
 /// An instruction set, as far as it reads vertices.
 pub(crate) trait ReadVertices: Copy {
-    /// The box of some vertices, and whether all are certainly finite: the results of [`of_vertices_f32`].
+    /// The box of some vertices, and whether all are certainly finite: the results of
+    /// [`of_vertices_f32`].
     ///
     /// # Panics
     /// If there is no such vertex.
@@ -55,8 +57,8 @@ pub(crate) fn of_vertices(positions: &Positions, vertices: &[u32]) -> Bounds {
     }
 }
 
-/// What the order of a body's clusters follows: the centres of the boxes of all elements, on the threads of the pool at hand, and the
-/// elements' sizes if these differ much.
+/// What the order of a body's clusters follows: the centres of the boxes of all elements, on the
+/// threads of the pool at hand, and the elements' sizes if these differ much.
 pub(crate) fn centers(elements: &Elements, positions: &Positions) -> ToOrder {
     let centers = with_corners!(elements, |corners| match positions {
         Positions::F32(positions) => numbered(corners, |corners| center_f32(positions, corners)),
@@ -75,11 +77,11 @@ const LONG: f32 = 8.0;
 /// The share of long elements from which they are set apart: one in so many.
 const ONE_IN: usize = 32;
 
-/// The class of each element by the length of its box: 0, or how many fourfold lengths it is longer than the middle one's [`LONG`], and 1.
-/// `None` where hardly any element is long.
+/// The class of each element by the length of its box: 0, or how many fourfold lengths it is longer
+/// than the middle one's [`LONG`], and 1. `None` where hardly any element is long.
 ///
-/// A long element makes the box of its cluster as long as itself. In clusters of their own, they leave those of short elements as
-/// small as these.
+/// A long element makes the box of its cluster as long as itself. In clusters of their own, they
+/// leave those of short elements as small as these.
 fn sizes(elements: &Elements, positions: &Positions) -> Option<Vec<u8>> {
     let length = |element: usize| {
         let bounds = of_vertices(positions, elements.corners(element));
@@ -115,7 +117,8 @@ fn numbered<const N: usize>(
     })
 }
 
-/// The box of a cluster, and whether the positions that were read are certainly finite. (f64 positions are checked before.)
+/// The box of a cluster, and whether the positions that were read are certainly finite. (f64
+/// positions are checked before.)
 #[inline(always)]
 pub(crate) fn of_cluster<S: ReadVertices>(
     simd: S,
@@ -209,7 +212,8 @@ impl<'a> BoxSource<'a> {
         [self.start, self.end.unwrap_or(self.start)]
     }
 
-    /// Puts the boxes of a cluster's elements into lanes, by the corners of its elements; to be [closed](Self::close).
+    /// Puts the boxes of a cluster's elements into lanes, by the corners of its elements; to be
+    /// [closed](Self::close).
     pub fn fill(&self, clustering: &Clustering, cluster: ClusterIx, boxes: [&mut LaneBounds; 2]) {
         let [start, end] = boxes;
         fill(self.start, clustering, cluster, start);
@@ -238,7 +242,8 @@ impl<'a> BoxSource<'a> {
         both
     }
 
-    /// Makes the boxes to be tested from those of a group's elements at both ends: [`Sweep::close_all`].
+    /// Makes the boxes to be tested from those of a group's elements at both ends:
+    /// [`Sweep::close_all`].
     #[inline(always)]
     pub fn close(&self, boxes: [&mut LaneBounds; 2], size: usize) {
         self.sweep.close_all(boxes, size);
@@ -315,7 +320,8 @@ fn of_elements<const N: usize>(
 }
 
 impl LaneBounds {
-    /// The boxes of elements whose corners are in tables, one element per lane; lanes past `size` become empty.
+    /// The boxes of elements whose corners are in tables, one element per lane; lanes past `size`
+    /// become empty.
     #[inline(always)]
     pub fn hold<const N: usize>(&mut self, corners: [&[[f32; GROUP]; 3]; N], size: usize) {
         for axis in 0..3 {

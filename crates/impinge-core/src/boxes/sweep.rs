@@ -29,8 +29,8 @@ impl Sweep {
         is_swept: false,
     };
 
-    /// In this part of a step, elements hardly leave their boxes at the start: boxes that hold the whole path are as good as
-    /// boxes at both ends, and cost half as much.
+    /// In this part of a step, elements hardly leave their boxes at the start: boxes that hold the
+    /// whole path are as good as boxes at both ends, and cost half as much.
     pub const NEARLY_STILL: f64 = 1.0 / 64.0;
 
     /// The step up to a time.
@@ -64,8 +64,8 @@ impl Sweep {
 
     /// The boxes to be tested, from those at the start and at the end of the step.
     ///
-    /// The box at a time between lies within the interpolation of the boxes at both ends: each coordinate is at least the
-    /// interpolated minimum. Everything is rounded outward.
+    /// The box at a time between lies within the interpolation of the boxes at both ends: each
+    /// coordinate is at least the interpolated minimum. Everything is rounded outward.
     #[inline(always)]
     pub fn close(self, [start, end]: [Bounds; 2]) -> [Bounds; 2] {
         if self.is_plain() {
@@ -120,8 +120,9 @@ impl Sweep {
         }
     }
 
-    /// [`close`](Self::close) for the boxes of a group of `size` elements: in `f32`, rounded farther outward. If the sweep
-    /// [has single boxes](Self::is_single), `start` is that box, and `end` means nothing afterwards.
+    /// [`close`](Self::close) for the boxes of a group of `size` elements: in `f32`, rounded
+    /// farther outward. If the sweep [has single boxes](Self::is_single), `start` is that box, and
+    /// `end` means nothing afterwards.
     #[inline(always)]
     pub fn close_all(self, [start, end]: [&mut LaneBounds; 2], size: usize) {
         if self.is_plain() {
@@ -164,8 +165,8 @@ impl Sweep {
         for lane in 0..GROUP {
             let (x, y) = (start[lane], end[lane]);
             let between = x + until * (y - x);
-            // Four roundings of numbers up to the sum of both sizes. Not farther out than both ends, which also count
-            // if the interpolation overflows.
+            // Four roundings of numbers up to the sum of both sizes. Not farther out than both
+            // ends, which also count if the interpolation overflows.
             let slack = SLACK * (x.abs() + y.abs()) + f32::MIN_POSITIVE;
             end[lane] = if ARE_LOW {
                 greater(between - slack, lesser(x, y))
@@ -189,8 +190,8 @@ impl Sweep {
     }
 }
 
-/// By how much boxes of elements are rounded outward, relative to their coordinates: 2^-20, sixteen unit roundoffs. One of them is
-/// for coordinates in `f64` that were rounded.
+/// By how much boxes of elements are rounded outward, relative to their coordinates: 2^-20, sixteen
+/// unit roundoffs. One of them is for coordinates in `f64` that were rounded.
 const SLACK: f32 = 1.0 / 1_048_576.0;
 
 #[allow(

@@ -1,4 +1,5 @@
-//! Vertices as four lanes: the box of some vertices on every processor, whatever instruction set is chosen.
+//! Vertices as four lanes: the box of some vertices on every processor, whatever instruction set is
+//! chosen.
 
 use crate::bvh::bounds::Bounds;
 #[cfg(not(target_arch = "x86_64"))]
@@ -131,8 +132,9 @@ impl Vec4 {
     }
 }
 
-/// The box of some vertices, and whether all are certainly finite. The latter costs one addition per vertex:
-/// a sum is finite only if all its terms are. (If a sum of finite terms overflows, they are checked one by one.)
+/// The box of some vertices, and whether all are certainly finite. The latter costs one addition
+/// per vertex: a sum is finite only if all its terms are. (If a sum of finite terms overflows, they
+/// are checked one by one.)
 #[inline]
 pub(crate) fn of_vertices_f32(positions: &[[f32; 3]], vertices: &[u32]) -> (Bounds, bool) {
     const CHAINS: usize = 4;

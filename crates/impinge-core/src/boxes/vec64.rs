@@ -8,14 +8,16 @@ pub(super) struct Vec64 {
     z: std::arch::x86_64::__m128d,
 }
 
-// Minima and maxima are written out, because the compiler makes several instructions of a comparison of each coordinate.
+// Minima and maxima are written out, because the compiler makes several instructions of a
+// comparison of each coordinate.
 #[cfg(target_arch = "x86_64")]
 impl Vec64 {
     #[inline(always)]
     pub fn load(positions: &[[f64; 3]], vertex: u32) -> Self {
         use std::arch::x86_64::*;
         let point = &positions[vertex as usize];
-        // SAFETY: every x86-64 processor has SSE2 (here and below); a point holds two numbers, and a third.
+        // SAFETY: every x86-64 processor has SSE2 (here and below); a point holds two numbers, and
+        // a third.
         unsafe {
             Vec64 {
                 xy: _mm_loadu_pd(point.as_ptr()),

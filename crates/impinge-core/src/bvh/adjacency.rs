@@ -1,9 +1,9 @@
 //! Which primitives share vertices, as 64-bit masks fixed by topology.
 //!
 //! In self-collision nearly all box overlaps are between neighbours on one surface, which the
-//! adjacency rule excludes. Since a clustering never changes, the rule is one mask per primitive, made
-//! once: bit `j` of the mask of primitive `i` says that `i` and lane `j` of the other cluster name a common
-//! vertex. A frame then clears neighbours from its candidate masks with one `and`.
+//! adjacency rule excludes. Since a clustering never changes, the rule is one mask per primitive,
+//! made once: bit `j` of the mask of primitive `i` says that `i` and lane `j` of the other cluster
+//! name a common vertex. A frame then clears neighbours from its candidate masks with one `and`.
 //!
 //! ```text
 //! cluster A, lane 5                 own cluster      0b…0101_0000   lanes that share a vertex
@@ -13,8 +13,8 @@
 //! A vertex with very many primitives (the hub of a fan) would make these masks quadratic. Hubs are
 //! left out: [`hubs`](super::hubs) has separate masks for them.
 //!
-//! Cost: `O(n · valence)` once per topology; about 8 bytes per primitive for the own masks and about as much
-//! for those of neighbours, at most `HUB` entries per corner.
+//! Cost: `O(n · valence)` once per topology; about 8 bytes per primitive for the own masks and
+//! about as much for those of neighbours, at most `HUB` entries per corner.
 
 use crate::scene::index::{ClusterIx, Slot};
 
@@ -24,7 +24,8 @@ use super::{GROUP, parallel};
 /// The masks of one body's clusters.
 #[derive(Debug)]
 pub(crate) struct Adjacency {
-    /// One mask per slot of the order: lanes of the same cluster that share a vertex, itself included.
+    /// One mask per slot of the order: lanes of the same cluster that share a vertex, itself
+    /// included.
     own: Vec<u64>,
     /// Neighbour clusters of each cluster, higher numbers only.
     neighbors: Vec<Neighbor>,
@@ -95,7 +96,8 @@ impl Adjacency {
         &self.own[cluster.slots(self.own.len())]
     }
 
-    /// Lanes of cluster `a` that share vertices with lanes of cluster `b > a`, and those lanes' masks.
+    /// Lanes of cluster `a` that share vertices with lanes of cluster `b > a`, and those lanes'
+    /// masks.
     #[inline]
     pub fn between(&self, a: ClusterIx, b: ClusterIx) -> impl Iterator<Item = (usize, u64)> + '_ {
         let (starts, a) = (&self.neighbor_starts, a.index());

@@ -1,4 +1,5 @@
-//! Axis-aligned boxes in single precision, rounded outward: one, the boxes of a group, arrays of many.
+//! Axis-aligned boxes in single precision, rounded outward: one, the boxes of a group, arrays of
+//! many.
 //!
 //! Rounding may only grow a box, never shrink it. So boxes that do not overlap prove that their
 //! contents do not meet. Boxes of f32 positions are not rounded at all.
@@ -57,8 +58,8 @@ impl Bounds {
         std::array::from_fn(|axis| 0.5 * self.min[axis] + 0.5 * self.max[axis])
     }
 
-    /// Half the surface: a measure of how often other boxes meet this one. In double precision, where
-    /// the squares of f32 extents cannot overflow.
+    /// Half the surface: a measure of how often other boxes meet this one. In double precision,
+    /// where the squares of f32 extents cannot overflow.
     #[inline]
     pub fn half_area(&self) -> f64 {
         let [x, y, z]: [f64; 3] =
@@ -79,7 +80,8 @@ pub(crate) fn greater(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 
-/// The largest f32 that is at most `x`. Without a branch: half of all roundings would mispredict it.
+/// The largest f32 that is at most `x`. Without a branch: half of all roundings would mispredict
+/// it.
 #[inline]
 pub(crate) fn round_down(x: f64) -> f32 {
     let nearest = x as f32;
@@ -93,8 +95,8 @@ pub(crate) fn round_up(x: f64) -> f32 {
     stepped(nearest, i32::from(f64::from(nearest) < x))
 }
 
-/// The number itself, or its neighbour above (1) or below (-1). Never steps from a zero across it: a number that rounds to
-/// zero leaves it its sign.
+/// The number itself, or its neighbour above (1) or below (-1). Never steps from a zero across it:
+/// a number that rounds to zero leaves it its sign.
 #[inline]
 fn stepped(x: f32, by: i32) -> f32 {
     let bits = x.to_bits().cast_signed();
@@ -223,7 +225,8 @@ unsafe impl Sync for RawBoundsArray {}
 
 impl RawBoundsArray {
     /// # Safety
-    /// `ix` must lie within the array, which must still live; no other thread may use that box at the same time.
+    /// `ix` must lie within the array, which must still live; no other thread may use that box at
+    /// the same time.
     #[inline(always)]
     pub unsafe fn put(self, ix: usize, bounds: &Bounds) {
         for axis in 0..3 {

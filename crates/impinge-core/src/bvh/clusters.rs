@@ -1,13 +1,13 @@
 //! Clusters: groups fixed by topology, found once in the current pose.
 //!
 //! In: the primitives' corners and one pose. Out: an order of the primitives in which cluster `c`
-//! is the run `64 c .. 64 c + 64` (the last one may be shorter), the tree over clusters, the corners in
-//! that order, and each cluster's unique vertices. A frame computes a cluster's box from these, each
-//! read once (64 triangles of a closed mesh have about 45 unique vertices, not 192).
+//! is the run `64 c .. 64 c + 64` (the last one may be shorter), the tree over clusters, the
+//! corners in that order, and each cluster's unique vertices. A frame computes a cluster's box from
+//! these, each read once (64 triangles of a closed mesh have about 45 unique vertices, not 192).
 //!
-//! Cost: `O(n log n)` time once per topology; 8 to 12 bytes per primitive for order and vertices, and a
-//! copy of the corners. Inside a cluster, the order of the primitives does not matter: frames were not faster when runs
-//! of eight lay close together, and half of this work went into that.
+//! Cost: `O(n log n)` time once per topology; 8 to 12 bytes per primitive for order and vertices,
+//! and a copy of the corners. Inside a cluster, the order of the primitives does not matter: frames
+//! were not faster when runs of eight lay close together, and half of this work went into that.
 
 use std::ops::Range;
 use std::sync::OnceLock;
@@ -28,12 +28,13 @@ pub(crate) struct Clustering {
     pub order: Vec<ElementIx>,
     /// The corners at each slot of the order.
     pub corners: Elements,
-    /// Unique vertices of all clusters, cluster after cluster. Each run ascends and repeats its last vertex up
-    /// to a multiple of [`CHUNK`](super::CHUNK).
+    /// Unique vertices of all clusters, cluster after cluster. Each run ascends and repeats its
+    /// last vertex up to a multiple of [`CHUNK`](super::CHUNK).
     pub vertices: Vec<u32>,
     /// Where each cluster's run starts, and one past the last.
     pub vertex_starts: Vec<u32>,
-    /// The number of vertices, if every vertex up to the highest index belongs to some primitive; else `None`.
+    /// The number of vertices, if every vertex up to the highest index belongs to some primitive;
+    /// else `None`.
     pub n_vertices_covered: Option<usize>,
     /// The tree over the clusters.
     pub shape: TreeShape,
@@ -56,9 +57,10 @@ pub(crate) struct ToOrder {
 pub(crate) type LocalFaces = LocalCorners<3>;
 
 impl Clustering {
-    /// Clusters primitives by the centres of their boxes in the current pose, which are given in the order of the primitives. Those
-    /// of one class of sizes follow each other. Their [local faces](Self::local_faces) are found at the same time if they are needed.
-    /// `None` if `go_on` says no: it is asked between pieces of work that take a few milliseconds.
+    /// Clusters primitives by the centres of their boxes in the current pose, which are given in
+    /// the order of the primitives. Those of one class of sizes follow each other. Their [local
+    /// faces](Self::local_faces) are found at the same time if they are needed. `None` if `go_on`
+    /// says no: it is asked between pieces of work that take a few milliseconds.
     pub fn new(
         elements: &Elements,
         to_order: ToOrder,
@@ -153,7 +155,8 @@ impl Clustering {
         self.order[slot.index()]
     }
 
-    /// The unique vertices of a cluster, ascending, the last one repeated up to a multiple of [`CHUNK`](super::CHUNK).
+    /// The unique vertices of a cluster, ascending, the last one repeated up to a multiple of
+    /// [`CHUNK`](super::CHUNK).
     #[inline(always)]
     pub fn vertices(&self, cluster: ClusterIx) -> &[u32] {
         let (starts, ix) = (&self.vertex_starts, cluster.index());
@@ -172,8 +175,8 @@ impl Clustering {
             .get_or_init(|| with_corners!(&self.corners, |corners| Adjacency::new(corners)))
     }
 
-    /// Finds the local faces of all clusters, if the primitives are triangles: for kernels that look corners up in a table of a
-    /// cluster's vertices.
+    /// Finds the local faces of all clusters, if the primitives are triangles: for kernels that
+    /// look corners up in a table of a cluster's vertices.
     pub fn find_local_faces(&self) {
         if let Elements::Triangles(faces) = &self.corners {
             let n_vertices = self
@@ -231,7 +234,8 @@ impl Clustering {
     }
 }
 
-/// The classes of primitives: by their hubs, if they have any, and else by their sizes. Vertices have lower numbers than sizes.
+/// The classes of primitives: by their hubs, if they have any, and else by their sizes. Vertices
+/// have lower numbers than sizes.
 fn with_sizes(
     of_hubs: Option<Vec<Option<u32>>>,
     sizes: Option<Vec<u8>>,
@@ -247,8 +251,8 @@ fn with_sizes(
     Some(classes)
 }
 
-/// The corners in the order of the entries, in their memory: the first use of new memory would take four times as long as
-/// this loop does.
+/// The corners in the order of the entries, in their memory: the first use of new memory would take
+/// four times as long as this loop does.
 fn gather<const N: usize>(elements: &[[u32; N]], entries: Vec<Entry>) -> Vec<[u32; N]> {
     let corners = entries
         .into_iter()

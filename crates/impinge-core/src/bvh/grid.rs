@@ -2,9 +2,10 @@
 //!
 //! Source: "Real-time Collision Detection with Two-level Spatial Hashing on GPU", section 3.1.
 //!
-//! A box is stored once as a range of *fine* cells: a coarse cell has four along each axis, so coarse is
-//! fine shifted right by two. `floor((x - origin) * scale)` is monotone under any rounding, and so is
-//! clamping to the grid: boxes that overlap have ranges that overlap, on any device.
+//! A box is stored once as a range of *fine* cells: a coarse cell has four along each axis, so
+//! coarse is fine shifted right by two. `floor((x - origin) * scale)` is monotone under any
+//! rounding, and so is clamping to the grid: boxes that overlap have ranges that overlap, on any
+//! device.
 //!
 //! ```text
 //! fine    | 0 | 1 | 2 | 3 | 4 | 5 | 6 | 7 | 8 | …      one axis
@@ -44,9 +45,10 @@ pub struct FineRange {
 impl Grid {
     /// Equation (1): `R_i = d_i (lambda N / V)^(1/3)`, at least one cell per axis.
     ///
-    /// If the region is so thin along an axis that the equation gives less than one cell, the axis gets
-    /// one cell and the other axes share the cells (with the square root, or no root, in place of the cube
-    /// root). So a flat cloth, with V = 0, gets a grid of squares, and a needle gets a row of cells.
+    /// If the region is so thin along an axis that the equation gives less than one cell, the axis
+    /// gets one cell and the other axes share the cells (with the square root, or no root, in place
+    /// of the cube root). So a flat cloth, with V = 0, gets a grid of squares, and a needle gets a
+    /// row of cells.
     pub fn new(region: &Bounds, n_primitives: u64, lambda: f64) -> Self {
         let extent: [f64; 3] = std::array::from_fn(|axis| {
             (f64::from(region.max[axis]) - f64::from(region.min[axis])).clamp(0.0, 2f64.powi(129))
@@ -192,9 +194,9 @@ fn spread(bits: u64, stride: u32) -> u64 {
     (0..4).fold(0, |spread, k| spread | (bits >> k & 1) << (k * stride))
 }
 
-/// The owner rule: of all cells that two boxes share, the pair belongs to the one that holds the lower
-/// corner of their common range, `max(lo_a, lo_b)`. It is exact and needs no memory. The paper has a table
-/// hashed by DJB2 instead, which lost 2.7 to 4.3 % of the collisions (table 3).
+/// The owner rule: of all cells that two boxes share, the pair belongs to the one that holds the
+/// lower corner of their common range, `max(lo_a, lo_b)`. It is exact and needs no memory. The
+/// paper has a table hashed by DJB2 instead, which lost 2.7 to 4.3 % of the collisions (table 3).
 #[inline(always)]
 pub fn owns(cell: [u32; 3], a: &FineRange, b: &FineRange) -> bool {
     (0..3).all(|axis| u32::from(a.lo[axis].max(b.lo[axis]) >> 2) == cell[axis])

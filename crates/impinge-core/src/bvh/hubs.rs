@@ -1,15 +1,15 @@
 //! Hubs: vertices that very many primitives name, such as the middle of a fan.
 //!
-//! All primitives around a hub have boxes that overlap there, so pairs that share a hub would be quadratic in
-//! number. They are never examined one by one:
+//! All primitives around a hub have boxes that overlap there, so pairs that share a hub would be
+//! quadratic in number. They are never examined one by one:
 //!
 //! - Primitives of one hub follow each other in the order of the clusters (`classes`).
-//! - A node of the tree records the hubs that *all* of its primitives name. `traversal` skips a pair of nodes with
-//!   a common hub: each pair of their primitives shares a vertex.
+//! - A node of the tree records the hubs that *all* of its primitives name. `traversal` skips a
+//!   pair of nodes with a common hub: each pair of their primitives shares a vertex.
 //! - In clusters of which only some primitives name a hub, lane masks exclude such pairs.
 //!
-//! Under `SharedVertex::Skip` that is all. Under `SharedVertex::Resolve`, `cpu::hubs` decides the pairs of each
-//! hub by the directions of the primitives as seen from it.
+//! Under `SharedVertex::Skip` that is all. Under `SharedVertex::Resolve`, `cpu::hubs` decides the
+//! pairs of each hub by the directions of the primitives as seen from it.
 //!
 //! Two hubs that very many primitives name together are an *axis*, such as the spine of a book.
 //!
@@ -26,7 +26,8 @@ const NONE: u32 = u32::MAX;
 /// The most hubs of one primitive: a tetrahedron has four vertices.
 const MOST: usize = 4;
 
-/// The hubs of one primitive, or those common to all primitives of a node: ascending, then [`NONE`].
+/// The hubs of one primitive, or those common to all primitives of a node: ascending, then
+/// [`NONE`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct HubSet([u32; MOST]);
 
@@ -100,8 +101,8 @@ pub(super) fn counts<const N: usize>(corners: &[[u32; N]]) -> Vec<u32> {
     counts
 }
 
-/// For each primitive, the one of its hubs that is named most often, if it has any; `None` if the body has no hub.
-/// `counts` says how often each vertex is named.
+/// For each primitive, the one of its hubs that is named most often, if it has any; `None` if the
+/// body has no hub. `counts` says how often each vertex is named.
 pub(super) fn classes<const N: usize>(
     corners: &[[u32; N]],
     counts: &[u32],
@@ -121,7 +122,8 @@ pub(super) fn classes<const N: usize>(
 }
 
 impl Hubs {
-    /// Finds the hubs from the corners in the order of the clusters. `counts` says how often each vertex is named.
+    /// Finds the hubs from the corners in the order of the clusters. `counts` says how often each
+    /// vertex is named.
     pub fn new<const N: usize>(corners: &[[u32; N]], counts: &[u32], shape: &TreeShape) -> Self {
         let sets: Vec<HubSet> = corners
             .iter()
@@ -167,7 +169,8 @@ impl Hubs {
         a.meets(&self.common[level_b as usize][b as usize])
     }
 
-    /// For each hub that two clusters (or one with itself) both name: `(lanes of a, lanes of b)` that name it.
+    /// For each hub that two clusters (or one with itself) both name: `(lanes of a, lanes of b)`
+    /// that name it.
     pub fn between(&self, a: ClusterIx, b: ClusterIx) -> impl Iterator<Item = (u64, u64)> + '_ {
         let of = |cluster: ClusterIx| {
             let (starts, ix) = (&self.lane_starts, cluster.index());
@@ -212,8 +215,8 @@ impl Hubs {
         partners
     }
 
-    /// Whether two primitives are decided at `shared`, a hub or an axis. Each pair is decided once: at the first axis
-    /// that both name, or if there is none at the first hub.
+    /// Whether two primitives are decided at `shared`, a hub or an axis. Each pair is decided once:
+    /// at the first axis that both name, or if there is none at the first hub.
     pub fn owns(&self, shared: &[u32], a: &[u32], b: &[u32]) -> bool {
         let mut common = HubSet::EMPTY;
         for &vertex in a {
@@ -251,7 +254,8 @@ impl Hubs {
     }
 }
 
-/// Inverts a list: `things` gives each slot's hubs or axes; returns the slots of each, sorted by hub or axis.
+/// Inverts a list: `things` gives each slot's hubs or axes; returns the slots of each, sorted by
+/// hub or axis.
 fn runs(
     things: impl Iterator<Item = impl Iterator<Item = [u32; 2]>>,
 ) -> Vec<([u32; 2], Vec<Slot>)> {

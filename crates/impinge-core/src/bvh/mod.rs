@@ -19,6 +19,6 @@ pub(crate) use parallel::made_from;
 
 pub use crate::scene::index::GROUP;
 
-/// A cluster's vertices are padded to whole chunks of this many: a loop over them needs no remainder, and its end
-/// is easy to predict.
+/// A cluster's vertices are padded to whole chunks of this many: a loop over them needs no
+/// remainder, and its end is easy to predict.
 pub(crate) const CHUNK: usize = 8;

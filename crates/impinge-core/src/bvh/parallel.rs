@@ -1,5 +1,6 @@
-//! Loops on the threads of the rayon pool at hand; plain loops where the thread is [alone](crate::workers::alone). On wasm, which has one
-//! thread, that is known to the compiler: what a pool needs would be a tenth of the module.
+//! Loops on the threads of the rayon pool at hand; plain loops where the thread is
+//! [alone](crate::workers::alone). On wasm, which has one thread, that is known to the compiler:
+//! what a pool needs would be a tenth of the module.
 
 use std::mem::MaybeUninit;
 
@@ -29,7 +30,8 @@ pub(super) fn join(a: impl FnOnce() + Send, b: impl FnOnce() + Send) {
     }
 }
 
-/// What is made of each number below `n`, in order. Each thread has a scratch of its own, and takes at least `at_least` numbers.
+/// What is made of each number below `n`, in order. Each thread has a scratch of its own, and takes
+/// at least `at_least` numbers.
 pub(super) fn made<S: Send, T: Send>(
     n: usize,
     at_least: usize,
@@ -53,8 +55,8 @@ pub(crate) fn for_each<T: Send>(items: Vec<T>, work: impl Fn(T) + Sync + Send) {
     }
 }
 
-/// A list made from another one, entry by entry, from its number too. Collecting from a parallel iterator takes four times as
-/// long: it counts entries one by one.
+/// A list made from another one, entry by entry, from its number too. Collecting from a parallel
+/// iterator takes four times as long: it counts entries one by one.
 pub(crate) fn made_from<A: Sync, B: Copy + Send>(
     from: &[A],
     make: impl Fn(usize, &A) -> B + Sync,

@@ -1,4 +1,5 @@
-//! The ring of each vertex of a surface: the other vertices of its triangles, in the order in which they go around it.
+//! The ring of each vertex of a surface: the other vertices of its triangles, in the order in which
+//! they go around it.
 //!
 //! ```text
 //!        p1 ---- p0          closed: p0 p1 p2 p3 p4 p0
@@ -9,8 +10,9 @@
 //!          p3
 //! ```
 //!
-//! Vertices whose triangles form neither one closed ring nor one open ring are *irregular*. Hubs are irregular too:
-//! `hubs` decides their pairs. A vertex of a single triangle has no ring, for no pair shares it.
+//! Vertices whose triangles form neither one closed ring nor one open ring are *irregular*. Hubs
+//! are irregular too: `hubs` decides their pairs. A vertex of a single triangle has no ring, for no
+//! pair shares it.
 //!
 //! Cost: `O(n)` once per topology; 32 bytes per triangle.
 
@@ -27,8 +29,8 @@ pub(crate) struct Rings {
     starts: Vec<u32>,
     /// Ring after ring; a closed one ends with its first vertex.
     vertices: Vec<u32>,
-    /// The corners at each vertex with a closed ring of triangles of one sense, one less than its ring has vertices; else
-    /// [`IRREGULAR`].
+    /// The corners at each vertex with a closed ring of triangles of one sense, one less than its
+    /// ring has vertices; else [`IRREGULAR`].
     corners: Vec<u32>,
 }
 
@@ -134,8 +136,8 @@ impl Rings {
         }
     }
 
-    /// The corners at a vertex, in any order, if its ring is closed and all triangles turn around it in the sense in which they name
-    /// their corners, or all in the other one.
+    /// The corners at a vertex, in any order, if its ring is closed and all triangles turn around
+    /// it in the sense in which they name their corners, or all in the other one.
     #[inline(always)]
     pub fn corners(&self, vertex: usize) -> Option<impl Iterator<Item = CornerAt> + '_> {
         let of = self.starts[vertex] as usize..self.starts[vertex + 1] as usize;
@@ -171,7 +173,8 @@ impl Rings {
     }
 }
 
-/// Whether all triangles of a closed ring name its vertices in the same sense: then each vertex of the ring follows the middle once.
+/// Whether all triangles of a closed ring name its vertices in the same sense: then each vertex of
+/// the ring follows the middle once.
 fn are_alike(faces: &[[u32; 3]], corners: &[u32]) -> bool {
     let next = |packed: u32| {
         if packed == IRREGULAR {
@@ -194,8 +197,9 @@ fn packed(slot: usize, corner: usize) -> u32 {
     }
 }
 
-/// Writes the vertices of the sides around one vertex in an order in which consecutive ones are a side. `false` if there
-/// is none: some vertex belongs to three sides, or the sides form several rings. The sides end up in another order.
+/// Writes the vertices of the sides around one vertex in an order in which consecutive ones are a
+/// side. `false` if there is none: some vertex belongs to three sides, or the sides form several
+/// rings. The sides end up in another order.
 fn put_in_order(sides: &mut [[u32; 2]], ring: &mut [u32]) -> bool {
     let n_at = |sides: &[[u32; 2]], vertex: u32| {
         sides
@@ -240,7 +244,8 @@ fn put_in_order(sides: &mut [[u32; 2]], ring: &mut [u32]) -> bool {
         last = if p == last { q } else { p };
         ring[n + 1] = last;
     }
-    // A closed ring comes back to its first vertex, and not before its end: no vertex belongs to three sides.
+    // A closed ring comes back to its first vertex, and not before its end: no vertex belongs to
+    // three sides.
     n_ends == 2 || last == first
 }
 

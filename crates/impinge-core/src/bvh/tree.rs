@@ -1,8 +1,8 @@
 //! The shape of a wide tree over leaves in some order, and that order.
 //!
-//! Level 0 holds the leaves. A node of level `l` has up to eight children, which are consecutive in level
-//! `l - 1`. The top level holds the root. All leaves are equally deep and children share the leaves
-//! evenly, so the shape follows from the number of leaves alone:
+//! Level 0 holds the leaves. A node of level `l` has up to eight children, which are consecutive in
+//! level `l - 1`. The top level holds the root. All leaves are equally deep and children share the
+//! leaves evenly, so the shape follows from the number of leaves alone:
 //!
 //! ```text
 //! level 2                 [ root ]
@@ -10,9 +10,10 @@
 //! level 0   0  1  2  3  4       5  6  7  8  9
 //! ```
 //!
-//! The order comes from splitting at medians of the box centres along the axis on which they vary most, at
-//! the boundaries that the shape prescribes (a balanced k-d order; median splits made 5 times fewer
-//! cluster pairs than blocks along a Morton curve on the dragon, see `docs/lab/intersections.md`).
+//! The order comes from splitting at medians of the box centres along the axis on which they vary
+//! most, at the boundaries that the shape prescribes (a balanced k-d order; median splits made 5
+//! times fewer cluster pairs than blocks along a Morton curve on the dragon, see
+//! `docs/lab/intersections.md`).
 //!
 //! Cost: `O(n log n)` once per topology. Invariant: an order is a permutation, whatever the input.
 
@@ -27,7 +28,8 @@ pub(crate) const FANOUT: usize = 8;
 #[derive(Debug, Clone, Default)]
 pub(crate) struct TreeShape {
     n_leaves: usize,
-    /// `child_starts[l]` has one entry per node of level `l + 1`, and one more for the end of the last.
+    /// `child_starts[l]` has one entry per node of level `l + 1`, and one more for the end of the
+    /// last.
     child_starts: Vec<Vec<u32>>,
 }
 
@@ -144,8 +146,9 @@ const PARALLEL_FROM: usize = 8 * 1024;
 /// The most entries of a node that are looked at to choose the axis.
 const SAMPLE: usize = 32;
 
-/// Puts entries in the order of the shape. Its leaves hold `leaf_size` entries each, the last leaf the
-/// rest. If entries have classes, by number, those of one class follow each other, whatever their centers.
+/// Puts entries in the order of the shape. Its leaves hold `leaf_size` entries each, the last leaf
+/// the rest. If entries have classes, by number, those of one class follow each other, whatever
+/// their centers.
 pub(crate) fn order(
     shape: &TreeShape,
     leaf_size: usize,
@@ -221,8 +224,8 @@ impl Split<'_> {
     }
 }
 
-/// Moves the `cut` entries that are lowest along the widest axis to the front; lower classes come before
-/// higher ones. The two sets depend only on the input.
+/// Moves the `cut` entries that are lowest along the widest axis to the front; lower classes come
+/// before higher ones. The two sets depend only on the input.
 fn split_at(entries: &mut [Entry], cut: usize, classes: Option<&[Option<u32>]>) {
     if cut == 0 || cut >= entries.len() {
         return;
@@ -248,8 +251,9 @@ fn split_along<const AXIS: usize>(
     };
 }
 
-/// The axis on which a sample of the entries has the largest variance. The extent of all entries gives 3 % more
-/// pairs of clusters on scans, for a few outliers decide it, and takes four times as long.
+/// The axis on which a sample of the entries has the largest variance. The extent of all entries
+/// gives 3 % more pairs of clusters on scans, for a few outliers decide it, and takes four times as
+/// long.
 fn widest_axis(entries: &[Entry]) -> usize {
     let from = entries[0].center();
     let (mut sum, mut squares) = ([0.0; 3], [0.0; 3]);

@@ -1,10 +1,12 @@
 //! The vertices of each cluster, each once, and the corners of its primitives as numbers of those.
 //!
-//! A sparse set finds what is new: of 192 corners of 64 triangles about 45 are. These are put in ascending order by
-//! counting for each how many are lower, which needs no branch and is a few comparisons of whole registers.
-//! On the dragon this takes half the time of sorting, and of finding the corners by binary search.
+//! A sparse set finds what is new: of 192 corners of 64 triangles about 45 are. These are put in
+//! ascending order by counting for each how many are lower, which needs no branch and is a few
+//! comparisons of whole registers. On the dragon this takes half the time of sorting, and of
+//! finding the corners by binary search.
 //!
-//! Cost: `O(n)` once per topology; while it runs, one byte per vertex of the body and job of the pool.
+//! Cost: `O(n)` once per topology; while it runs, one byte per vertex of the body and job of the
+//! pool.
 
 use std::hint::select_unpredictable;
 
@@ -13,7 +15,8 @@ use super::{CHUNK, GROUP, parallel};
 /// Clusters that one of several threads takes at a time.
 const BLOCK: usize = 64;
 
-/// The corners of a cluster's primitives as numbers of its vertices: `[corner][slot]`. Slots past its size hold 0.
+/// The corners of a cluster's primitives as numbers of its vertices: `[corner][slot]`. Slots past
+/// its size hold 0.
 pub(crate) type LocalCorners<const N: usize> = [[u8; GROUP]; N];
 
 /// With four corners per primitive, the numbers fit a byte.
@@ -22,7 +25,8 @@ const _: () = assert!(4 * GROUP <= 256);
 /// The vertices of clusters.
 #[derive(Debug)]
 pub(crate) struct Unique<const N: usize> {
-    /// Cluster after cluster. Each run ascends and repeats its last vertex up to a multiple of [`CHUNK`].
+    /// Cluster after cluster. Each run ascends and repeats its last vertex up to a multiple of
+    /// [`CHUNK`].
     pub vertices: Vec<u32>,
     /// Where each cluster's run starts, and one past the last.
     pub starts: Vec<u32>,
@@ -31,8 +35,8 @@ pub(crate) struct Unique<const N: usize> {
 }
 
 impl<const N: usize> Unique<N> {
-    /// From the corners in the order of the clusters, which are all below `n_vertices`; `with_corners`, if these are to be
-    /// numbered too.
+    /// From the corners in the order of the clusters, which are all below `n_vertices`;
+    /// `with_corners`, if these are to be numbered too.
     pub fn new(corners: &[[u32; N]], n_vertices: usize, with_corners: bool) -> Self {
         // One block needs no copy.
         let block = match parallel::n_threads() {
@@ -104,13 +108,14 @@ fn of_block<const N: usize>(
     unique
 }
 
-/// The vertices of a cluster seen so far, numbered as they come: a sparse set (Briggs, Torczon, An efficient
-/// representation for sparse sets, 1993). It never has to be cleared: a vertex is in the set if the number in its slot leads
-/// back to it.
+/// The vertices of a cluster seen so far, numbered as they come: a sparse set (Briggs, Torczon, An
+/// efficient representation for sparse sets, 1993). It never has to be cleared: a vertex is in the
+/// set if the number in its slot leads back to it.
 struct VertexSet {
     /// For each vertex of the body its number, or what an earlier cluster left.
     numbers: Vec<u8>,
-    /// The vertices by number, else [`NONE`](VertexSet::NONE). The highest bit is inverted: registers compare signed numbers.
+    /// The vertices by number, else [`NONE`](VertexSet::NONE). The highest bit is inverted:
+    /// registers compare signed numbers.
     found: [i32; 4 * GROUP],
     n: usize,
 }
@@ -129,8 +134,8 @@ impl VertexSet {
 
     /// Numbers the vertices of a cluster as they come, and writes the number of each corner.
     ///
-    /// Whether a vertex is new cannot be predicted, so nothing branches on it. The counter stays in a register: in
-    /// memory, each corner would wait for the one before it.
+    /// Whether a vertex is new cannot be predicted, so nothing branches on it. The counter stays in
+    /// a register: in memory, each corner would wait for the one before it.
     #[inline(always)]
     fn number<const N: usize>(&mut self, group: &[[u32; N]], local: &mut LocalCorners<N>) {
         self.found.fill(VertexSet::NONE);
@@ -150,7 +155,8 @@ impl VertexSet {
         self.n = n;
     }
 
-    /// Appends the vertices in ascending order, padded to whole chunks. Returns the slot of each number.
+    /// Appends the vertices in ascending order, padded to whole chunks. Returns the slot of each
+    /// number.
     fn sort_into(&mut self, vertices: &mut Vec<u32>) -> [u8; 4 * GROUP] {
         let n = self.n;
         let padded = n.next_multiple_of(CHUNK);
@@ -210,7 +216,8 @@ mod tests {
         }
     }
 
-    /// All different, all equal, and clusters and blocks that are not full; with one thread and with two.
+    /// All different, all equal, and clusters and blocks that are not full; with one thread and
+    /// with two.
     #[test]
     fn vertices_ascend_once_each_and_corners_name_them() {
         let highest = vec![[1 << 20, 0, (1 << 20) - 1], [1, 1 << 19, 7]];

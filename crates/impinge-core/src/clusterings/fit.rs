@@ -34,7 +34,8 @@ impl Fit {
         self.best_spread = self.best_spread.min(spread);
     }
 
-    /// Takes note of the spread in the pose at hand; whether the body has flowed away from its clusters.
+    /// Takes note of the spread in the pose at hand; whether the body has flowed away from its
+    /// clusters.
     pub fn is_stale(&mut self, spread: f64, tuning: &Tuning) -> bool {
         let is_stale = spread > tuning.stale_from * self.best_spread;
         self.note(spread);
@@ -62,7 +63,8 @@ pub(crate) fn sampled_spread(clustering: &Clustering, positions: &Positions) -> 
     spread(sum, &whole)
 }
 
-/// The clusters' summed surface over that of the whole: how well they fit the pose at hand. Both are halves.
+/// The clusters' summed surface over that of the whole: how well they fit the pose at hand. Both
+/// are halves.
 pub(crate) fn spread(surface: f64, whole: &Bounds) -> f64 {
     let whole = whole.half_area();
     if whole > 0.0 && whole.is_finite() && surface.is_finite() {

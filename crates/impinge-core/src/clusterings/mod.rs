@@ -7,16 +7,19 @@
 //!   boxes, culled clusters   boxes at both ends     boxes         buffers
 //! ```
 //!
-//! Each of these holds its clusterings by `Arc`, and beside them what else it needs. When it begins a question it asks for the
-//! clusterings that are shared now: they are made for a body that is new or was re-meshed, and dropped with their body. What more a
-//! question needs of a clustering (which elements share vertices, the rings of vertices, local faces) is found when it is first
-//! needed, within the clustering.
+//! Each of these holds its clusterings by `Arc`, and beside them what else it needs. When it begins
+//! a question it asks for the clusterings that are shared now: they are made for a body that is new
+//! or was re-meshed, and dropped with their body. What more a question needs of a clustering (which
+//! elements share vertices, the rings of vertices, local faces) is found when it is first needed,
+//! within the clustering.
 //!
-//! A body that has flowed away from its clusters is clustered again, for all: [`renew_if_stale`](Clusterings::renew_if_stale)
-//! decides that. Whoever has boxes judges by them, after finding all of a frame; for a device, which computes boxes itself, a
-//! sample of the clusters is judged before.
+//! A body that has flowed away from its clusters is clustered again, for all:
+//! [`renew_if_stale`](Clusterings::renew_if_stale) decides that. Whoever has boxes judges by them,
+//! after finding all of a frame; for a device, which computes boxes itself, a sample of the
+//! clusters is judged before.
 //!
-//! No answer depends on the pose in which a body was clustered. So questions of several scenes may take turns.
+//! No answer depends on the pose in which a body was clustered. So questions of several scenes may
+//! take turns.
 
 mod fit;
 mod store;
@@ -80,7 +83,8 @@ struct OfBody {
     samples: [Sampled; PARTS],
 }
 
-/// How well a sample of the clusters has fitted, and the stamp of the positions that were judged last.
+/// How well a sample of the clusters has fitted, and the stamp of the positions that were judged
+/// last.
 #[cfg(feature = "gpu")]
 #[derive(Debug, Default, Clone, Copy)]
 struct Sampled {
@@ -160,7 +164,8 @@ impl Clusterings {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The same, for a question about a scene: if that has fewer bodies than were known, what is outdated is dropped.
+    /// The same, for a question about a scene: if that has fewer bodies than were known, what is
+    /// outdated is dropped.
     pub fn open(&self, scene: &Scene) -> MutexGuard<'_, Entries> {
         let mut known = self.lock();
         if known.slots.len() > scene.n_bodies() {
@@ -169,7 +174,8 @@ impl Clusterings {
         known
     }
 
-    /// The clusters of a part of a body. `own` are those of its present topology that the asker has, if any.
+    /// The clusters of a part of a body. `own` are those of its present topology that the asker
+    /// has, if any.
     ///
     /// # Errors
     /// Threads that do not start; cancellation.
@@ -188,8 +194,9 @@ impl Clusterings {
         Ok(Arc::clone(clustering))
     }
 
-    /// The clusters of all parts of a frame, for a device, which computes boxes itself. Whether a body has flowed away from its
-    /// clusters is judged by a sample of them, if `judges` says so: the host does not know the pose of all bodies.
+    /// The clusters of all parts of a frame, for a device, which computes boxes itself. Whether a
+    /// body has flowed away from its clusters is judged by a sample of them, if `judges` says so:
+    /// the host does not know the pose of all bodies.
     ///
     /// # Errors
     /// Threads that do not start; cancellation.
@@ -266,8 +273,8 @@ impl Entries {
         }
     }
 
-    /// The clusters of a part of a body. Those that only the asker has are shared from now on: questions of several scenes may
-    /// have taken turns.
+    /// The clusters of a part of a body. Those that only the asker has are shared from now on:
+    /// questions of several scenes may have taken turns.
     pub fn find(
         &mut self,
         body_part: BodyPart<'_>,
@@ -322,8 +329,9 @@ impl Entries {
         of_body.parts[body_part.ix()].insert(clustering)
     }
 
-    /// Clusters a part anew, for all who share it, if it has flowed away from its clusters, and books that. `spread` says how
-    /// well they fit the pose at hand, `fit` how well they have fitted at best.
+    /// Clusters a part anew, for all who share it, if it has flowed away from its clusters, and
+    /// books that. `spread` says how well they fit the pose at hand, `fit` how well they have
+    /// fitted at best.
     ///
     /// # Errors
     /// Threads that do not start; cancellation.

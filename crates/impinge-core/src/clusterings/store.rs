@@ -12,7 +12,8 @@ use crate::search::runner::Job;
 use crate::search::stats::Stats;
 use crate::search::work::Work;
 
-/// What a backend keeps of a body, or of a part of it: boxes, and whatever else belongs to a clustering.
+/// What a backend keeps of a body, or of a part of it: boxes, and whatever else belongs to a
+/// clustering.
 pub(crate) trait Clustered: Send {
     /// The stamp of the topology that was clustered.
     fn topology_stamp(&self) -> u64;
@@ -93,8 +94,9 @@ impl<T: Clustered, const PARTS: usize> Store<T, PARTS> {
         }
     }
 
-    /// Brings the store up to a frame: drops what belongs to bodies that are gone, and makes what is missing, or belongs to
-    /// another clustering than the one that is shared now. `local_faces`: whether clusterings are to have them.
+    /// Brings the store up to a frame: drops what belongs to bodies that are gone, and makes what
+    /// is missing, or belongs to another clustering than the one that is shared now. `local_faces`:
+    /// whether clusterings are to have them.
     ///
     /// # Errors
     /// Cancellation; threads that do not start.

@@ -1,8 +1,8 @@
 //! Contacts from pairs: first the names of all corners, then the coordinates of each point, once.
 //!
-//! In: a scene and the pairs found in it. Out: [`Contacts`]. Cost: a few hundred nanoseconds per pair for
-//! signs and coordinates, `O(n log n)` for the names; both in parallel, in chunks whose results are
-//! concatenated in order.
+//! In: a scene and the pairs found in it. Out: [`Contacts`]. Cost: a few hundred nanoseconds per
+//! pair for signs and coordinates, `O(n log n)` for the names; both in parallel, in chunks whose
+//! results are concatenated in order.
 
 use super::coordinates::{Definition, Precision};
 use super::meet::{Local, ends, meet};
@@ -314,9 +314,11 @@ fn check(id: BodyId, body: &Body, kind: BodyKind, colliding: &[u32]) -> Result<(
     }
 }
 
-/// The vertices of some triangles that are not the lowest one at their position, each with the lowest.
+/// The vertices of some triangles that are not the lowest one at their position, each with the
+/// lowest.
 ///
-/// Meshes that repeat their vertices for each face would fall apart into single triangles otherwise.
+/// Meshes that repeat their vertices for each face would fall apart into single triangles
+/// otherwise.
 fn doubles(body: &Body, colliding: &[u32], work: Work<'_>) -> Result<Doubles, Error> {
     let Elements::Triangles(faces) = body.elements() else {
         return Ok(Vec::new());

@@ -1,10 +1,11 @@
 //! How deep two convex bodies are in each other: the shortest way that takes them apart.
 //!
-//! The differences of a point of the first body and a point of the second form a convex body too, which holds the origin if
-//! the two have a point in common (Minkowski). The shortest way out of it is the shortest way apart. A polyhedron inside it
-//! grows towards the nearest face until that face cannot move (van den Bergen, *Proximity queries and penetration depth
-//! computation on 3D game objects*, 2001). Faces that do not have the origin beneath them count as nearer than all others, so the
-//! polyhedron need not hold the origin at first.
+//! The differences of a point of the first body and a point of the second form a convex body too,
+//! which holds the origin if the two have a point in common (Minkowski). The shortest way out of it
+//! is the shortest way apart. A polyhedron inside it grows towards the nearest face until that face
+//! cannot move (van den Bergen, *Proximity queries and penetration depth computation on 3D game
+//! objects*, 2001). Faces that do not have the origin beneath them count as nearer than all others,
+//! so the polyhedron need not hold the origin at first.
 //!
 //! Everything is rounded, in one fixed order. Cost: `O(n)` per vertex that the polyhedron takes.
 
@@ -30,12 +31,14 @@ struct Face {
     height: f64,
 }
 
-/// Polyhedra with more vertices are not grown further: the way found so far is at most a little too short.
+/// Polyhedra with more vertices are not grown further: the way found so far is at most a little too
+/// short.
 const MOST: usize = 400;
 /// Differences of heights below this part of the size are rounding.
 const ROUNDING: f64 = 1e-12;
 
-/// The shortest way that takes the convex hulls of two sets of points apart; `None` if these are flat in sum, or empty.
+/// The shortest way that takes the convex hulls of two sets of points apart; `None` if these are
+/// flat in sum, or empty.
 pub fn convex_overlap(a: &[[f64; 3]], b: &[[f64; 3]]) -> Option<ConvexOverlap> {
     let farthest = |points: &[Vector], way: Vector| {
         let (mut best, mut most) = (None, f64::NEG_INFINITY);
@@ -217,7 +220,8 @@ mod tests {
         assert_eq!(convex_overlap(&[], &a), None);
     }
 
-    /// Moved apart along the normal by the depth, they do not overlap; along no other way is it shorter.
+    /// Moved apart along the normal by the depth, they do not overlap; along no other way is it
+    /// shorter.
     #[test]
     fn it_is_the_shortest_way() {
         let mut random = Random::new(5);

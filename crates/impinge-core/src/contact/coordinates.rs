@@ -1,19 +1,19 @@
 //! The coordinates of a corner, each the exact number rounded to nearest.
 //!
-//! A corner is a vertex, or the point where a segment pq crosses a plane or another segment's line. That point
-//! is `(|Q| p + |P| q) / (|P| + |Q|)`. P and Q are determinants of different signs that measure how far
-//! p and q are from the plane or line: `orient3d` for a plane, `orient2d` in a projection for a line. Nothing
-//! cancels in the sum, so the weight of q is as precise as P and Q.
+//! A corner is a vertex, or the point where a segment pq crosses a plane or another segment's line.
+//! That point is `(|Q| p + |P| q) / (|P| + |Q|)`. P and Q are determinants of different signs that
+//! measure how far p and q are from the plane or line: `orient3d` for a plane, `orient2d` in a
+//! projection for a line. Nothing cancels in the sum, so the weight of q is as precise as P and Q.
 //!
-//! Three stages, each with a bound on its own error. A stage's result counts when all numbers within its bound
-//! round to the same one:
+//! Three stages, each with a bound on its own error. A stage's result counts when all numbers
+//! within its bound round to the same one:
 //!
 //! 1. `f64`, for bodies in single precision;
 //! 2. sums of two `f64` ([`Double`]), for either;
 //! 3. integers, which have no error.
 //!
-//! So the coordinates depend on the exact point alone. They are the same on every machine, and whichever pair of
-//! triangles leads to the point.
+//! So the coordinates depend on the exact point alone. They are the same on every machine, and
+//! whichever pair of triangles leads to the point.
 
 use super::double::{self, Double};
 use impinge_exact::Point;
@@ -39,7 +39,8 @@ pub(super) enum Definition {
 }
 
 impl Definition {
-    /// The coordinates, rounded to nearest, ties to even. A vertex has the coordinates that it was given.
+    /// The coordinates, rounded to nearest, ties to even. A vertex has the coordinates that it was
+    /// given.
     pub fn rounded(&self, precision: Precision) -> Point {
         let rounded = match self {
             Definition::Vertex(point) => *point,
@@ -54,7 +55,8 @@ impl Definition {
     }
 }
 
-/// How far two points are from the line through two others, which crosses the line of the two points.
+/// How far two points are from the line through two others, which crosses the line of the two
+/// points.
 fn from_line([p, q]: &[Point; 2], line: &[Point; 2]) -> [Offset; 2] {
     // No end of one lies on the line of the other.
     let projection = Projection::injective(p, q, &line[0]).unwrap_or(Projection::ALL[0]);
@@ -170,21 +172,23 @@ fn crossing(ends: &[Point; 2], offsets: [Offset; 2], precision: Precision) -> Po
         .unwrap_or_else(|| in_integers(ends, offsets, precision))
 }
 
-/// Beyond these sizes of the larger permanent a product's rounding error may underflow, or a sum overflow: with coordinates up to
-/// `LARGEST`, what underflows is below 2^-1073 times that. Positions in single precision are all within.
+/// Beyond these sizes of the larger permanent a product's rounding error may underflow, or a sum
+/// overflow: with coordinates up to `LARGEST`, what underflows is below 2^-1073 times that.
+/// Positions in single precision are all within.
 const SAFE: std::ops::Range<f64> = 1e-200..1e200;
 /// The same for positions in double precision.
 const SAFE_DOUBLE: std::ops::Range<f64> = 1e-120..1e200;
 /// The largest coordinate.
 const LARGEST: f64 = 1e80;
 
-/// More than the relative error of any one operation in `f64`, and more than Shewchuk's 7 + 56 u for the
-/// determinant.
+/// More than the relative error of any one operation in `f64`, and more than Shewchuk's 7 + 56 u
+/// for the determinant.
 const ERROR_F64: f64 = 8.0 * f64::EPSILON / 2.0;
 
 /// Stage 1: the weight of q and then the point in `f64`.
 ///
-/// With P and Q known to ε each, the weight P / (P + Q) is known to ε / (P + Q), since both have one sign.
+/// With P and Q known to ε each, the weight P / (P + Q) is known to ε / (P + Q), since both have
+/// one sign.
 fn in_single(ends: &[Point; 2], offsets: [Offset; 2], precision: Precision) -> Option<Point> {
     if precision != Precision::Single {
         return None;
@@ -246,8 +250,8 @@ fn greatest(offsets: [Offset; 2], precision: Precision) -> Option<f64> {
     is_safe.then_some(greatest)
 }
 
-/// The single-precision number to which all numbers from `below` to `above` round; `None` if there are several.
-/// Both ends may have been rounded to `f64`.
+/// The single-precision number to which all numbers from `below` to `above` round; `None` if there
+/// are several. Both ends may have been rounded to `f64`.
 fn single_between(below: f64, above: f64) -> Option<f64> {
     let [below, above] = [below.next_down(), above.next_up()].map(|x| f64::from(x as f32));
     (below == above).then_some(below)

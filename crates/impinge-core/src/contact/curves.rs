@@ -1,11 +1,13 @@
 //! Curves: segments chained at the points that they share.
 //!
-//! In: contacts. Out: chains of points. A segment that several pairs have in common counts once: an edge that
-//! lies in a face is found from both of its triangles. At most points no more than two segments meet, and a
-//! chain continues there. Where three or more meet (surfaces that touch in an edge, three sheets at one point),
-//! all chains end: a junction. Two closed surfaces in general position have closed chains only.
+//! In: contacts. Out: chains of points. A segment that several pairs have in common counts once: an
+//! edge that lies in a face is found from both of its triangles. At most points no more than two
+//! segments meet, and a chain continues there. Where three or more meet (surfaces that touch in an
+//! edge, three sheets at one point), all chains end: a junction. Two closed surfaces in general
+//! position have closed chains only.
 //!
-//! Only the names of points are compared, so no tolerance decides what is connected. Cost: `O(n log n)`.
+//! Only the names of points are compared, so no tolerance decides what is connected. Cost:
+//! `O(n log n)`.
 
 use super::{Contacts, Shape};
 use crate::scene::error::Error;
@@ -37,8 +39,8 @@ impl std::fmt::Debug for Curves {
     }
 }
 
-/// A segment between two different points, and its direction: 1 from the lower point to the higher, -1 the
-/// other way, 0 if it has none or pairs disagree.
+/// A segment between two different points, and its direction: 1 from the lower point to the higher,
+/// -1 the other way, 0 if it has none or pairs disagree.
 #[derive(Clone, Copy)]
 struct Link {
     ends: [u32; 2],
@@ -120,14 +122,14 @@ impl Curves {
         self.closed.is_empty()
     }
 
-    /// The points of a curve in order, as numbers of [`Contacts::points`]. A closed one does not repeat
-    /// its first point.
+    /// The points of a curve in order, as numbers of [`Contacts::points`]. A closed one does not
+    /// repeat its first point.
     pub fn points(&self, curve: usize) -> &[u32] {
         &self.points[self.starts[curve]..self.starts[curve + 1]]
     }
 
-    /// The two points of each segment of a curve in order, as numbers of [`Contacts::points`]. A closed curve's last segment
-    /// ends at its first point.
+    /// The two points of each segment of a curve in order, as numbers of [`Contacts::points`]. A
+    /// closed curve's last segment ends at its first point.
     pub fn segments(&self, curve: usize) -> impl Iterator<Item = [u32; 2]> + '_ {
         let points = self.points(curve);
         let n_segments = points.len() - usize::from(!self.is_closed(curve));
@@ -139,7 +141,8 @@ impl Curves {
         &self.points
     }
 
-    /// Where each curve's points start in [`all_points`](Curves::all_points), and one past the last.
+    /// Where each curve's points start in [`all_points`](Curves::all_points), and one past the
+    /// last.
     pub fn starts(&self) -> &[usize] {
         &self.starts
     }
@@ -149,15 +152,16 @@ impl Curves {
         self.closed[curve]
     }
 
-    /// Whether all segments of a curve point the same way along it, which is then its direction: seen from
-    /// outside the first body, the part of it that is beneath the second body's surface lies to the left. True
-    /// between bodies whose faces are oriented. Within one body the order of a pair means nothing, so this means
-    /// nothing either.
+    /// Whether all segments of a curve point the same way along it, which is then its direction:
+    /// seen from outside the first body, the part of it that is beneath the second body's surface
+    /// lies to the left. True between bodies whose faces are oriented. Within one body the order of
+    /// a pair means nothing, so this means nothing either.
     pub fn is_directed(&self, curve: usize) -> bool {
         self.directed[curve]
     }
 
-    /// The length of a curve in the unit of the scene: the sum of the distances of its rounded points in `f64`.
+    /// The length of a curve in the unit of the scene: the sum of the distances of its rounded
+    /// points in `f64`.
     pub fn length(&self, curve: usize) -> f64 {
         self.lengths[curve]
     }
@@ -172,8 +176,8 @@ impl Curves {
         self.lengths.iter().sum()
     }
 
-    /// Points of contact that are not a corner of any segment or polygon: two bodies touch there and nowhere
-    /// nearby. Sorted.
+    /// Points of contact that are not a corner of any segment or polygon: two bodies touch there
+    /// and nowhere nearby. Sorted.
     pub fn isolated(&self) -> &[u32] {
         &self.isolated
     }

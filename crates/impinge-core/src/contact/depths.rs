@@ -1,8 +1,8 @@
 //! The depth of each vertex of a solid below its surface: the shortest path along edges.
 //!
-//! Interpolated in the tetrahedra, wherever they move, this is a deformed distance field (Fisher and Lin 2001). The path along
-//! edges (Dijkstra 1959) is at least the distance, cheap on any mesh, and accurate enough for directions and a
-//! stiffness.
+//! Interpolated in the tetrahedra, wherever they move, this is a deformed distance field (Fisher
+//! and Lin 2001). The path along edges (Dijkstra 1959) is at least the distance, cheap on any mesh,
+//! and accurate enough for directions and a stiffness.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
@@ -34,8 +34,9 @@ impl PartialOrd for WaitingVertex {
     }
 }
 
-/// The depth of each vertex of a mesh of tetrahedra below its surface, in the unit of the positions: the length of the shortest
-/// path along edges to a vertex of a surface triangle. Finite; 0 for vertices on the surface and for those without a path to it.
+/// The depth of each vertex of a mesh of tetrahedra below its surface, in the unit of the
+/// positions: the length of the shortest path along edges to a vertex of a surface triangle.
+/// Finite; 0 for vertices on the surface and for those without a path to it.
 ///
 /// # Panics
 /// If a tetrahedron or a triangle names a vertex that has no position.

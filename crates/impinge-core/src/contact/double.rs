@@ -1,9 +1,9 @@
 //! Numbers of about 106 bits: the unevaluated sum of two `f64`.
 //!
 //! Algorithms and bounds: Joldes, Muller & Popescu, *Tight and rigorous error bounds for basic
-//! building blocks of double-word arithmetic*, 2017: a sum has a relative error below 3 · 2^-106 + …,
-//! a product below 7 · 2^-106, a quotient below 16 · 2^-106. No fused multiply-add, so the bits are the same
-//! on every machine.
+//! building blocks of double-word arithmetic*, 2017: a sum has a relative error below 3 · 2^-106 +
+//! …, a product below 7 · 2^-106, a quotient below 16 · 2^-106. No fused multiply-add, so the bits
+//! are the same on every machine.
 
 use impinge_exact::internal::{two_product, two_sum};
 

@@ -1,14 +1,16 @@
 //! Which vertices of a surface lie inside a closed one: exact winding numbers.
 //!
-//! Along an edge that does not meet the other surface, the winding number is constant. So vertices joined by
-//! such edges form one *part* with one winding number. A part that reaches beyond the other body's box is
-//! outside; each other part costs one ray.
+//! Along an edge that does not meet the other surface, the winding number is constant. So vertices
+//! joined by such edges form one *part* with one winding number. A part that reaches beyond the
+//! other body's box is outside; each other part costs one ray.
 //!
-//! A ray goes from a vertex along +x and counts the faces that it meets, with their orientation. It is
-//! shifted by an infinitely small step along y and a smaller one along z, so that it meets no edge. The shift
-//! decides alike for both faces at an edge, so no crossing is counted twice or missed. Signs are exact.
+//! A ray goes from a vertex along +x and counts the faces that it meets, with their orientation. It
+//! is shifted by an infinitely small step along y and a smaller one along z, so that it meets no
+//! edge. The shift decides alike for both faces at an edge, so no crossing is counted twice or
+//! missed. Signs are exact.
 //!
-//! Cost: the vertices within the other's box, and per part with a ray the faces that its y value meets.
+//! Cost: the vertices within the other's box, and per part with a ray the faces that its y value
+//! meets.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -195,8 +197,8 @@ pub(crate) fn passes(point: &Point, corners: &[Point; 3]) -> i32 {
     }
     let flat = |p: &Point| [p[1], p[2]];
     let at = flat(point);
-    // The edges above the shifted point in the plane of y and z: those that lead to higher y minus those that
-    // lead to lower y.
+    // The edges above the shifted point in the plane of y and z: those that lead to higher y minus
+    // those that lead to lower y.
     let mut around = 0;
     for k in 0..3 {
         let (p, q) = (flat(&corners[k]), flat(&corners[(k + 1) % 3]));
@@ -205,8 +207,8 @@ pub(crate) fn passes(point: &Point, corners: &[Point; 3]) -> i32 {
             around += way;
         }
     }
-    // An edge that leads to lower y lies above the inside of a triangle that turns counter-clockwise, whose
-    // normal points along +x.
+    // An edge that leads to lower y lies above the inside of a triangle that turns
+    // counter-clockwise, whose normal points along +x.
     let normal = -around;
     let [a, b, c] = corners;
     let height = -(orient3d(a, b, c, point) as i32);

@@ -1,7 +1,7 @@
 //! Where two triangles meet: exact combinatorics, no coordinates.
 //!
-//! Two closed triangles are convex, so their intersection is empty, a point, a segment or a
-//! convex polygon: the hull of its corners. A corner lies in the relative interior of exactly one feature
+//! Two closed triangles are convex, so their intersection is empty, a point, a segment or a convex
+//! polygon: the hull of its corners. A corner lies in the relative interior of exactly one feature
 //! (vertex, edge, face) of each triangle, and the two features have only that point in common. So a
 //! corner *is* a pair of features, and finding the intersection means finding these pairs:
 //!
@@ -11,8 +11,8 @@
 //! edge, edge                               they cross, and are not on one line
 //! ```
 //!
-//! All of these are decided by signs of `orient2d` and `orient3d`, which are exact. Degenerate triangles are
-//! segments or points with fewer features, and need no other rules.
+//! All of these are decided by signs of `orient2d` and `orient3d`, which are exact. Degenerate
+//! triangles are segments or points with fewer features, and need no other rules.
 //!
 //! Cost: 6 to 18 signs for triangles in general position.
 
@@ -27,7 +27,8 @@ pub(super) enum Local {
     Face,
 }
 
-/// A point of both triangles, named by the feature of each triangle in whose relative interior it lies.
+/// A point of both triangles, named by the feature of each triangle in whose relative interior it
+/// lies.
 pub(super) type Corner = [Local; 2];
 
 /// The intersection of two triangles.
@@ -49,8 +50,8 @@ impl Meeting {
         directed: false,
     };
 
-    /// The corners: none, a point, a segment's ends, or a polygon in order, counter-clockwise as seen
-    /// from the side from which the first triangle is.
+    /// The corners: none, a point, a segment's ends, or a polygon in order, counter-clockwise as
+    /// seen from the side from which the first triangle is.
     pub fn corners(&self) -> &[Corner] {
         &self.corners[..self.n_corners]
     }
@@ -151,7 +152,8 @@ impl<'a> ConvexTriangle<'a> {
         matches!(self.shape, Degeneracy::Triangle { .. })
     }
 
-    /// On which side of the plane a point lies: positive where the triangle turns counter-clockwise.
+    /// On which side of the plane a point lies: positive where the triangle turns
+    /// counter-clockwise.
     fn height(&self, point: &Point) -> Sign {
         let [a, b, c] = self.points;
         -orient3d(a, b, c, point)
@@ -191,8 +193,8 @@ fn first_at(points: &[Point; 3], k: usize) -> usize {
         .unwrap_or(k)
 }
 
-/// The feature of a triangle that contains a point in the triangle's plane. `sides`: on which side of each edge
-/// the point lies; `inside`: the inner side. `None` outside.
+/// The feature of a triangle that contains a point in the triangle's plane. `sides`: on which side
+/// of each edge the point lies; `inside`: the inner side. `None` outside.
 fn feature_by_sides(sides: [Sign; 3], inside: Sign) -> Option<Local> {
     if sides.iter().any(|side| side.strictly_opposite(inside)) {
         return None;
@@ -299,8 +301,8 @@ impl One<'_> {
         }
     }
 
-    /// The feature of the other triangle that an edge crosses. The ends of the edge are strictly on different
-    /// sides of that triangle's plane.
+    /// The feature of the other triangle that an edge crosses. The ends of the edge are strictly on
+    /// different sides of that triangle's plane.
     fn crossed(&self, edge: usize) -> Option<Local> {
         let [p, q] = self.hull.edge(edge);
         let sides = [0, 1, 2].map(|edge| {
@@ -312,7 +314,8 @@ impl One<'_> {
     }
 }
 
-/// Whether two segments cross in a point that is strictly inside of both, and lie on different lines.
+/// Whether two segments cross in a point that is strictly inside of both, and lie on different
+/// lines.
 fn edges_cross([p, q]: [&Point; 2], [r, s]: [&Point; 2]) -> bool {
     if !orient3d(p, q, r, s).is_zero() {
         return false;
@@ -325,8 +328,8 @@ fn edges_cross([p, q]: [&Point; 2], [r, s]: [&Point; 2]) -> bool {
     turn(p, q, r).strictly_opposite(turn(p, q, s)) && turn(r, s, p).strictly_opposite(turn(r, s, q))
 }
 
-/// Names a corner at the middle corner of a flat triangle by that vertex, not by the edge: the triangle's
-/// neighbours name it by the vertex too.
+/// Names a corner at the middle corner of a flat triangle by that vertex, not by the edge: the
+/// triangle's neighbours name it by the vertex too.
 fn name_middles(hulls: &[ConvexTriangle<'_>; 2], heights: [[Sign; 3]; 2], meeting: &mut Meeting) {
     for side in 0..2 {
         let Degeneracy::Segment {
@@ -340,7 +343,8 @@ fn name_middles(hulls: &[ConvexTriangle<'_>; 2], heights: [[Sign; 3]; 2], meetin
         let found = std::mem::replace(meeting, Meeting::EMPTY);
         for &corner in found.corners() {
             let mut corner = corner;
-            // The edge and the other feature have only this corner in common, and the middle is in both.
+            // The edge and the other feature have only this corner in common, and the middle is in
+            // both.
             if matches!(corner[side], Local::Edge(_)) && there == Some(corner[1 - side]) {
                 corner[side] = Local::Vertex(middle);
             }
@@ -351,9 +355,9 @@ fn name_middles(hulls: &[ConvexTriangle<'_>; 2], heights: [[Sign; 3]; 2], meetin
 
 /// Turns a segment in the direction of the product of the normals, if both triangles have one.
 ///
-/// The line of both planes enters triangle a where a's boundary goes up through b's plane, and leaves a where
-/// the boundary goes down; for b it is the other way round. (With d = n_a × n_b and an edge e of a, n_a × e
-/// leads into a, and d · (n_a × e) = |n_a|² (n_b · e).)
+/// The line of both planes enters triangle a where a's boundary goes up through b's plane, and
+/// leaves a where the boundary goes down; for b it is the other way round. (With d = n_a × n_b and
+/// an edge e of a, n_a × e leads into a, and d · (n_a × e) = |n_a|² (n_b · e).)
 fn direct(hulls: &[ConvexTriangle<'_>; 2], heights: [[Sign; 3]; 2], meeting: &mut Meeting) {
     if !hulls.iter().all(ConvexTriangle::is_triangle) {
         return;
@@ -383,8 +387,9 @@ fn direct(hulls: &[ConvexTriangle<'_>; 2], heights: [[Sign; 3]; 2], meeting: &mu
 
 /// Puts the corners of a polygon in order: counter-clockwise as seen from above the first triangle.
 ///
-/// Every side of the polygon lies on an edge of one of the triangles. The line of an edge holds two corners if
-/// a side lies on it, and fewer otherwise. So two corners are neighbours if and only if some edge has both.
+/// Every side of the polygon lies on an edge of one of the triangles. The line of an edge holds two
+/// corners if a side lies on it, and fewer otherwise. So two corners are neighbours if and only if
+/// some edge has both.
 fn order(hulls: &[ConvexTriangle<'_>; 2], meeting: &mut Meeting) {
     let found = *meeting;
     let n = found.n_corners;
@@ -430,7 +435,8 @@ fn first_side(hulls: &[ConvexTriangle<'_>; 2], found: &Meeting) -> Option<(usize
                 .filter(|&k| is_on(found.corners[k][side], edge))
                 .collect();
             if let [i, j] = on[..] {
-                // In the direction of the edge, or against it if its triangle turns the other way than the first.
+                // In the direction of the edge, or against it if its triangle turns the other way
+                // than the first.
                 let forward = comes_first(hulls, side, edge, found.corners[i], found.corners[j]);
                 return Some(if forward == (side == 0 || agree) {
                     (i, j)
@@ -459,8 +465,8 @@ fn comes_first(
             _ => {}
         }
     }
-    // Both lie strictly inside the edge, so each is at a vertex of the other triangle or crosses one of its
-    // edges. The corner where the edge enters that triangle is the first.
+    // Both lie strictly inside the edge, so each is at a vertex of the other triangle or crosses
+    // one of its edges. The corner where the edge enters that triangle is the first.
     let (here, there) = (&hulls[side], &hulls[1 - side]);
     let Degeneracy::Triangle { projection, turn } = there.shape else {
         return true;

@@ -1,17 +1,18 @@
 //! Contact geometry: where triangles meet, the curves in which surfaces cross, how deep.
 //!
-//! [`Contacts`], which [`Detector::contacts`](crate::Detector::contacts) finds for the pairs of a detection, are points, segments
-//! and polygons; [`Curves`] chains these into loops; [`Penetration`], which
-//! [`Detector::penetration`](crate::Detector::penetration) finds, has the parts of two closed bodies that lie inside the other, and a
-//! normal, a depth and a volume per connected region of contact. For solids of tetrahedra, [`SolidOverlap`] is what two of them have in
-//! common, and [`solid_depths`] how deep vertices lie below the surface.
+//! [`Contacts`], which [`Detector::contacts`](crate::Detector::contacts) finds for the pairs of a
+//! detection, are points, segments and polygons; [`Curves`] chains these into loops;
+//! [`Penetration`], which [`Detector::penetration`](crate::Detector::penetration) finds, has the
+//! parts of two closed bodies that lie inside the other, and a normal, a depth and a volume per
+//! connected region of contact. For solids of tetrahedra, [`SolidOverlap`] is what two of them have
+//! in common, and [`solid_depths`] how deep vertices lie below the surface.
 //!
-//! **Exact combinatorics.** Which edge crosses which face, in which order, which points are one point,
-//! which segments follow each other: decided by the signs of [`impinge_exact`], without
-//! tolerance. **Rounded coordinates.** Each coordinate is the exact number rounded to nearest: to `f32` if both
-//! bodies hold `f32`, else to `f64`. It depends on the point alone, so the bytes are the same on
-//! every machine and for every number of threads. Lengths, areas,
-//! normals, depths and volumes are computed from rounded coordinates in `f64`, in a fixed order.
+//! **Exact combinatorics.** Which edge crosses which face, in which order, which points are one
+//! point, which segments follow each other: decided by the signs of [`impinge_exact`], without
+//! tolerance. **Rounded coordinates.** Each coordinate is the exact number rounded to nearest: to
+//! `f32` if both bodies hold `f32`, else to `f64`. It depends on the point alone, so the bytes are
+//! the same on every machine and for every number of threads. Lengths, areas, normals, depths and
+//! volumes are computed from rounded coordinates in `f64`, in a fixed order.
 //!
 //! ```
 //! use impinge_core::contact::Shape;
@@ -79,7 +80,8 @@ pub enum Feature {
 /// The intersection of a pair of triangles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Shape {
-    /// Not a pair of triangles. The intersection with a tetrahedron is a solid, which no curve describes.
+    /// Not a pair of triangles. The intersection with a tetrahedron is a solid, which no curve
+    /// describes.
     Solid,
     /// Nothing: the scene has moved since the pairs were found.
     Apart,
@@ -92,8 +94,8 @@ pub enum Shape {
     Polygon,
 }
 
-/// The name of a point of contact: the numbers of both bodies, and the feature of each in which the point lies.
-/// Within one body the lower feature comes first.
+/// The name of a point of contact: the numbers of both bodies, and the feature of each in which the
+/// point lies. Within one body the lower feature comes first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct PointName {
     /// The bodies by their [`index`](crate::BodyId::index); the same number twice within one body.
@@ -104,10 +106,10 @@ pub struct PointName {
 
 /// Where the triangles of each pair meet.
 ///
-/// Contact `i` belongs to row `i` of the pairs. Its corners are numbers of points; a point that belongs to
-/// several contacts is held once. A segment of two triangles with different planes points along
-/// `n_a × n_b`, the product of their normals (counter-clockwise rule): seen from outside body `a`, the part of `a`
-/// beneath `b`'s surface lies to its left.
+/// Contact `i` belongs to row `i` of the pairs. Its corners are numbers of points; a point that
+/// belongs to several contacts is held once. A segment of two triangles with different planes
+/// points along `n_a × n_b`, the product of their normals (counter-clockwise rule): seen from
+/// outside body `a`, the part of `a` beneath `b`'s surface lies to its left.
 ///
 /// Degenerate triangles are the segments or points that they are.
 #[derive(Clone, Default)]
@@ -121,7 +123,8 @@ pub struct Contacts {
     corners: Vec<u32>,
     names: Vec<PointName>,
     points: Vec<[f64; 3]>,
-    /// For each body that has any: vertices that are not the lowest one at their position, each with the lowest.
+    /// For each body that has any: vertices that are not the lowest one at their position, each
+    /// with the lowest.
     doubles: Arc<[(u32, Doubles)]>,
     by_bodies: parts::ByBodies,
 }
@@ -194,13 +197,14 @@ impl Contacts {
         &self.corners
     }
 
-    /// Where each contact's corners start in [`all_corners`](Contacts::all_corners), and one past the last.
+    /// Where each contact's corners start in [`all_corners`](Contacts::all_corners), and one past
+    /// the last.
     pub fn starts(&self) -> &[usize] {
         &self.starts
     }
 
-    /// `(n, 3)` coordinates of the points, each the exact number rounded to nearest: to an `f32` (widened to `f64`)
-    /// if both bodies hold `f32`, else to an `f64`.
+    /// `(n, 3)` coordinates of the points, each the exact number rounded to nearest: to an `f32`
+    /// (widened to `f64`) if both bodies hold `f32`, else to an `f64`.
     pub fn points(&self) -> &[[f64; 3]] {
         &self.points
     }
@@ -218,8 +222,8 @@ impl Contacts {
         Curves::new(self)
     }
 
-    /// The contacts in connected regions, each with its position, its size and a normal. [`Penetration`] finds what
-    /// lies inside, and how deep.
+    /// The contacts in connected regions, each with its position, its size and a normal.
+    /// [`Penetration`] finds what lies inside, and how deep.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`].

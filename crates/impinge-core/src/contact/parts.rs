@@ -1,7 +1,8 @@
 //! The contacts of two bodies out of those of all bodies.
 //!
-//! Contacts are sorted by the first body and its primitive, so those of one pair of bodies are scattered. Their numbers are
-//! grouped by pairs of bodies once. Cost: `O(n log n)` for all pairs together, and then `O(n)` in the contacts of one pair.
+//! Contacts are sorted by the first body and its primitive, so those of one pair of bodies are
+//! scattered. Their numbers are grouped by pairs of bodies once. Cost: `O(n log n)` for all pairs
+//! together, and then `O(n)` in the contacts of one pair.
 
 use std::ops::Range;
 
@@ -53,7 +54,8 @@ impl ByBodies {
 }
 
 impl Contacts {
-    /// The contacts of two bodies alone, the lower number first, and their numbers among all contacts.
+    /// The contacts of two bodies alone, the lower number first, and their numbers among all
+    /// contacts.
     pub(super) fn part(&self, bodies: [u32; 2]) -> Result<(Contacts, &[u32]), Error> {
         let numbers = self.by_bodies.of(bodies);
         let at = |name: &PointName| name.bodies;

@@ -1,16 +1,18 @@
-//! Which parts of two closed bodies lie inside the other, region by region: normals, depths, volumes.
+//! Which parts of two closed bodies lie inside the other, region by region: normals, depths,
+//! volumes.
 //!
 //! 1. Vertices inside: exact winding numbers (see `inside`).
-//! 2. Each edge that crosses the other surface is cut at its crossings. The signs of the crossed faces say
-//!    which pieces are inside. The two ends of a piece inside belong to one region, whether they are
-//!    crossings or vertices.
-//! 3. The border of the overlap consists of the parts of faces that lie inside. Each part is a polygon
-//!    whose sides are segments of contact and pieces of edges. So the volume is a sum over these sides,
-//!    and no polygon is ever assembled (divergence theorem, then Stokes' theorem on each face).
+//! 2. Each edge that crosses the other surface is cut at its crossings. The signs of the crossed
+//!    faces say which pieces are inside. The two ends of a piece inside belong to one region,
+//!    whether they are crossings or vertices.
+//! 3. The border of the overlap consists of the parts of faces that lie inside. Each part is a
+//!    polygon whose sides are segments of contact and pieces of edges. So the volume is a sum over
+//!    these sides, and no polygon is ever assembled (divergence theorem, then Stokes' theorem on
+//!    each face).
 //!
-//! All decisions are exact except one: crossings along an edge are ordered by their rounded coordinates.
-//! Crossings that round to one place may be swapped; the piece between them is then no longer than the
-//! rounding error.
+//! All decisions are exact except one: crossings along an edge are ordered by their rounded
+//! coordinates. Crossings that round to one place may be swapped; the piece between them is then no
+//! longer than the rounding error.
 
 use std::collections::HashMap;
 
@@ -36,15 +38,16 @@ pub(crate) struct Topologies {
     edges: HashMap<usize, (u64, EdgesAround)>,
 }
 
-/// How deep two closed bodies are in each other: [`Detector::penetration`](crate::Detector::penetration).
+/// How deep two closed bodies are in each other:
+/// [`Detector::penetration`](crate::Detector::penetration).
 #[derive(Clone, Default, PartialEq)]
 #[non_exhaustive]
 pub struct Penetration {
-    /// Vertices of the first body strictly inside the second, and of the second strictly inside the first: sorted.
-    /// The body with the lower number comes first.
+    /// Vertices of the first body strictly inside the second, and of the second strictly inside the
+    /// first: sorted. The body with the lower number comes first.
     pub inside: [Vec<u32>; 2],
-    /// Connected regions: first those with contacts, in the order of the contacts, then shells wholly inside the other
-    /// body.
+    /// Connected regions: first those with contacts, in the order of the contacts, then shells
+    /// wholly inside the other body.
     pub regions: Vec<Region>,
 }
 
@@ -242,8 +245,8 @@ impl<'a> Crossings<'a> {
     }
 }
 
-/// A piece of an edge that is inside the other body, from the end nearer to the lower vertex, and a member of its
-/// region's set.
+/// A piece of an edge that is inside the other body, from the end nearer to the lower vertex, and a
+/// member of its region's set.
 struct Piece {
     edge: Edge,
     from: Vector,
@@ -318,7 +321,8 @@ impl OverlapWork<'_> {
         self.bodies[side].positions().point(vertex.index())
     }
 
-    /// The pieces of crossed edges that are inside, sorted by edge. Joins the sets of each piece's two ends.
+    /// The pieces of crossed edges that are inside, sorted by edge. Joins the sets of each piece's
+    /// two ends.
     fn pieces(&self, side: usize, sets: &mut Sets) -> Result<Vec<Piece>, Error> {
         let mut pieces = Vec::new();
         for crossed in self.crossings[side].on_edges.chunk_by(|x, y| x.0 == y.0) {
@@ -364,8 +368,8 @@ impl OverlapWork<'_> {
         points.sort_by(|&p, &q| height(p).total_cmp(&height(q)).then(p.cmp(&q)));
     }
 
-    /// The pieces of one edge that are inside, each with the two set members that it joins; `None` if the edge does
-    /// not just cross faces.
+    /// The pieces of one edge that are inside, each with the two set members that it joins; `None`
+    /// if the edge does not just cross faces.
     fn cut(&self, side: usize, edge: Edge, points: &[u32]) -> Option<Vec<(Piece, [u32; 2])>> {
         let [low, high] = edge;
         let crossings = &self.crossings[side];
@@ -403,7 +407,8 @@ impl OverlapWork<'_> {
         (winding == self.parts[side].winding(high)).then_some(pieces)
     }
 
-    /// By how much the winding number grows where an edge, coming from vertex `from`, crosses a face of the other body.
+    /// By how much the winding number grows where an edge, coming from vertex `from`, crosses a
+    /// face of the other body.
     fn step(&self, side: usize, from: VertexIx, face: u32) -> i32 {
         let corners = self.bodies[1 - side].elements().corners(face as usize);
         let [a, b, c] = [0, 1, 2].map(|k| self.position(1 - side, VertexIx::new(corners[k])));
@@ -450,8 +455,9 @@ impl OverlapWork<'_> {
         (high - low).max(0.0)
     }
 
-    /// The volume of each region: a sixth of the sum of `(x - o) · ((p - o) × (q - o))` over the sides pq of
-    /// the parts of faces that lie inside, where x is any point of the face and o is one point for all.
+    /// The volume of each region: a sixth of the sum of `(x - o) · ((p - o) × (q - o))` over the
+    /// sides pq of the parts of faces that lie inside, where x is any point of the face and o is
+    /// one point for all.
     fn volumes(
         &self,
         regions: &[Region],
@@ -482,7 +488,8 @@ impl OverlapWork<'_> {
                     let corners = self.bodies[side].elements().corners(face as usize);
                     self.position(side, VertexIx::new(corners[0]))
                 };
-                // The part inside lies to the left as seen from outside a, to the right as seen from outside b.
+                // The part inside lies to the left as seen from outside a, to the right as seen
+                // from outside b.
                 add_side(number, on(0, a), from, to);
                 add_side(number, on(1, b), to, from);
             }

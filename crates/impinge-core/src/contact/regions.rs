@@ -1,13 +1,14 @@
 //! Regions: connected contacts, each region with a position, a size, a normal and a depth.
 //!
-//! Two contacts are connected when they have a point in common. In closed bodies, edges and vertices inside
-//! connect contacts too ([`Penetration`](super::Penetration)).
+//! Two contacts are connected when they have a point in common. In closed bodies, edges and
+//! vertices inside connect contacts too ([`Penetration`](super::Penetration)).
 //!
-//! **Normal.** Let L be the directed curves of a region, and `a = ½ ∮ x × dx` the area that they span. By
-//! Stokes' theorem `a` is the integral of the first body's normals over its part inside the second body.
-//! When the first body moves by u, the volume that they have in common grows by `a · u`. So that volume shrinks
-//! fastest when the first body moves along `-a` (Allard et al., *Volume contact constraints at arbitrary
-//! resolution*, 2010): push the first body that way. Where bodies touch only in a patch, `a` is the area of the patch.
+//! **Normal.** Let L be the directed curves of a region, and `a = ½ ∮ x × dx` the area that they
+//! span. By Stokes' theorem `a` is the integral of the first body's normals over its part inside
+//! the second body. When the first body moves by u, the volume that they have in common grows by
+//! `a · u`. So that volume shrinks fastest when the first body moves along `-a` (Allard et al.,
+//! *Volume contact constraints at arbitrary resolution*, 2010): push the first body that way. Where
+//! bodies touch only in a patch, `a` is the area of the patch.
 
 use super::curves::{Curves, distance};
 use super::{Contacts, Shape};
@@ -26,8 +27,8 @@ pub struct Region {
     pub bodies: [u32; 2],
     /// Numbers of contacts: rows of the pairs, sorted.
     pub contacts: Vec<u32>,
-    /// The middle of the region: the mean of its curves weighted by length, else of its patches weighted by area, else
-    /// of its points.
+    /// The middle of the region: the mean of its curves weighted by length, else of its patches
+    /// weighted by area, else of its points.
     pub position: [f64; 3],
     /// The lowest and the highest coordinates of its points, and of the vertices inside.
     pub bounds: [[f64; 3]; 2],
@@ -35,22 +36,24 @@ pub struct Region {
     pub length: f64,
     /// The area of its patches, where faces of both bodies lie in one plane; in square units.
     pub patch_area: f64,
-    /// The area that its curves span, as a vector: the projected area of the first body's surface inside the
-    /// second body. In square units.
+    /// The area that its curves span, as a vector: the projected area of the first body's surface
+    /// inside the second body. In square units.
     pub area: [f64; 3],
-    /// The unit direction in which to push the first body so that the overlap shrinks fastest; push the second
-    /// body the other way. `None` if the curves span no area in total (a rod through a wall), or if faces are not
-    /// oriented consistently.
+    /// The unit direction in which to push the first body so that the overlap shrinks fastest; push
+    /// the second body the other way. `None` if the curves span no area in total (a rod through a
+    /// wall), or if faces are not oriented consistently.
     pub normal: Option<[f64; 3]>,
-    /// Vertices of the first body inside the second, and of the second inside the first; sorted. Empty unless
-    /// [`Penetration`](super::Penetration) found the region.
+    /// Vertices of the first body inside the second, and of the second inside the first; sorted.
+    /// Empty unless [`Penetration`](super::Penetration) found the region.
     pub inside: [Vec<u32>; 2],
-    /// How far the region extends along the normal: pushed that far, the bodies no longer overlap in this
-    /// region. `None` without a normal, or unless [`Penetration`](super::Penetration) found the region.
+    /// How far the region extends along the normal: pushed that far, the bodies no longer overlap
+    /// in this region. `None` without a normal, or unless [`Penetration`](super::Penetration) found
+    /// the region.
     pub depth: Option<f64>,
-    /// The volume that the bodies have in common, in cubic units. A cavity that no edge joins to its surroundings
-    /// is a region of negative volume. `None` unless [`Penetration`](super::Penetration) found the region. Also `None` if
-    /// the bodies meet other than by edges that cross faces (vertices on faces, edges on edges, common planes).
+    /// The volume that the bodies have in common, in cubic units. A cavity that no edge joins to
+    /// its surroundings is a region of negative volume. `None` unless
+    /// [`Penetration`](super::Penetration) found the region. Also `None` if the bodies meet other
+    /// than by edges that cross faces (vertices on faces, edges on edges, common planes).
     pub volume: Option<f64>,
 }
 
@@ -103,8 +106,8 @@ pub(super) fn dot(p: Vector, q: Vector) -> f64 {
     p[0] * q[0] + p[1] * q[1] + p[2] * q[2]
 }
 
-/// The regions of sets of points, in the order of their first contacts, and the region of each point that
-/// stands for its set ([`NO_REGION`] for other points).
+/// The regions of sets of points, in the order of their first contacts, and the region of each
+/// point that stands for its set ([`NO_REGION`] for other points).
 pub(super) fn regions(
     contacts: &Contacts,
     curves: &Curves,

@@ -1,7 +1,7 @@
 //! The common part of two tetrahedra: a convex polyhedron, cut out piece by piece.
 //!
-//! Cost: about a microsecond per pair; no memory is allocated after the first pairs. Coordinates are rounded in `f64`, in one
-//! fixed order.
+//! Cost: about a microsecond per pair; no memory is allocated after the first pairs. Coordinates
+//! are rounded in `f64`, in one fixed order.
 
 use impinge_exact::Point;
 
@@ -15,8 +15,8 @@ const FACES: [([usize; 3], usize); 4] = [
 
 /// Cuts one tetrahedron by another; reuses its memory. For penalty forces between solids.
 ///
-/// Each cut by a face leaves a piece as it is, drops it or splits it into at most three tetrahedra, so there are
-/// never more than 81 pieces, and mostly about ten.
+/// Each cut by a face leaves a piece as it is, drops it or splits it into at most three tetrahedra,
+/// so there are never more than 81 pieces, and mostly about ten.
 ///
 /// ```
 /// use impinge_core::contact::SolidOverlap;
@@ -40,7 +40,8 @@ impl SolidOverlap {
         SolidOverlap::default()
     }
 
-    /// Cuts `a` by `b`, of any orientation, four corners each. The remaining pieces fill the common part.
+    /// Cuts `a` by `b`, of any orientation, four corners each. The remaining pieces fill the common
+    /// part.
     pub fn cut(&mut self, a: &[Point; 4], b: &[Point; 4]) {
         self.pieces.clear();
         self.pieces.push(*a);
@@ -86,7 +87,8 @@ impl SolidOverlap {
     }
 }
 
-/// Adds to `out` the part of a piece with height 0 or more, given the heights of its corners over a plane.
+/// Adds to `out` the part of a piece with height 0 or more, given the heights of its corners over a
+/// plane.
 fn cut(piece: &[Point; 4], heights: [f64; 4], out: &mut Vec<[Point; 4]>) {
     // Corners above first.
     let mut order = [0, 1, 2, 3];

@@ -1,7 +1,8 @@
 //! The topology of a closed surface: which vertices are joined by edges.
 //!
-//! A surface is closed when every edge has as many faces along it as against it. Winding numbers are then
-//! integers and change only at faces. Several shells, and edges of more than two faces, are fine.
+//! A surface is closed when every edge has as many faces along it as against it. Winding numbers
+//! are then integers and change only at faces. Several shells, and edges of more than two faces,
+//! are fine.
 //!
 //! Cost: `O(n log n)` once per topology.
 
@@ -36,7 +37,8 @@ impl EdgesAround {
         n_vertices: usize,
         work: Work<'_>,
     ) -> Result<Self, Error> {
-        // Low vertex, high vertex, direction: packed so that sorting puts an edge's faces next to each other.
+        // Low vertex, high vertex, direction: packed so that sorting puts an edge's faces next to
+        // each other.
         let side = |face: &[u32; 3], k: usize| {
             let (from, to) = (face[k], face[(k + 1) % 3]);
             let (low, high) = (from.min(to), from.max(to));

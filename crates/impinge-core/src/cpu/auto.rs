@@ -1,10 +1,12 @@
 //! The method `Auto`: which of the others answers a frame.
 //!
-//! Clusters are made once for each body, and that costs several times as much as the frame itself does in the grid of
-//! `Cells`. It pays as soon as the body comes back. So a frame whose primitives are mostly of new bodies goes through
-//! the grid, except: bodies that another question has clustered already; so few primitives that neither takes long; small bodies, which are few clusters each; cells that turn out
-//! crowded (the grid is uniform, so small details in a large scene can all be in one cell); neighbours that must be
-//! resolved, which `Clusters` decides per vertex; and memory budgets, which the grid would need more of.
+//! Clusters are made once for each body, and that costs several times as much as the frame itself
+//! does in the grid of `Cells`. It pays as soon as the body comes back. So a frame whose primitives
+//! are mostly of new bodies goes through the grid, except: bodies that another question has
+//! clustered already; so few primitives that neither takes long; small bodies, which are few
+//! clusters each; cells that turn out crowded (the grid is uniform, so small details in a large
+//! scene can all be in one cell); neighbours that must be resolved, which `Clusters` decides per
+//! vertex; and memory budgets, which the grid would need more of.
 
 use crate::clusterings::Clusterings;
 use crate::plan::Plan;
@@ -19,7 +21,8 @@ pub(super) struct Acquaintances {
 }
 
 impl Acquaintances {
-    /// Whether the grid may be the faster way to answer this frame. Its bodies are known from now on.
+    /// Whether the grid may be the faster way to answer this frame. Its bodies are known from now
+    /// on.
     pub fn prefer_grid(
         &mut self,
         scene: &Scene,

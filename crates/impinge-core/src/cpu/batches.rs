@@ -1,5 +1,5 @@
-//! The stages of `Clusters` from `traversal` on: work items come in batches, and a full batch is paired and
-//! decided before traversal goes on.
+//! The stages of `Clusters` from `traversal` on: work items come in batches, and a full batch is
+//! paired and decided before traversal goes on.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -26,14 +26,15 @@ use crate::simd::{Isa, Simd, with_isa};
 const MOST_ITEMS: usize = 1 << 20;
 /// The fewest work items with which a batch makes sense.
 const FEWEST_ITEMS: usize = 256;
-/// The fewest and the most work items per task. Neighbours in the batch are neighbours in space, and a
-/// worker caches the boxes of the clusters it has just seen: long tasks find more of them cached.
+/// The fewest and the most work items per task. Neighbours in the batch are neighbours in space,
+/// and a worker caches the boxes of the clusters it has just seen: long tasks find more of them
+/// cached.
 const TASK: std::ops::RangeInclusive<usize> = 16..=512;
 /// Tasks per worker, so that no worker waits long for the last task.
 const TASKS_EACH: usize = 12;
 
-/// How many work items a batch may hold within the budget, if `held` bytes are held besides. An eighth of the remaining
-/// bytes is for work items, the rest for the answer.
+/// How many work items a batch may hold within the budget, if `held` bytes are held besides. An
+/// eighth of the remaining bytes is for work items, the rest for the answer.
 fn most_items(settings: &Settings, held: u64) -> Result<usize, Error> {
     let most = settings.tuning.most_batch_items.clamp(1, MOST_ITEMS);
     let Some(budget) = settings.memory_budget else {

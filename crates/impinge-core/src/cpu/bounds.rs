@@ -1,8 +1,8 @@
 //! Stage `bounds`: the box of each cluster, and of the tree above it.
 //!
-//! In: positions and the unique vertices of each cluster. Out: one box per cluster and per tree node, as
-//! structures of arrays. A vertex is one 4-lane load and two instructions.
-//! Cost: every vertex of a body once per cluster that has it (1.35 times on average in a closed mesh).
+//! In: positions and the unique vertices of each cluster. Out: one box per cluster and per tree
+//! node, as structures of arrays. A vertex is one 4-lane load and two instructions. Cost: every
+//! vertex of a body once per cluster that has it (1.35 times on average in a closed mesh).
 //! Invariant: a box holds all its vertices; f64 positions are rounded outward.
 
 use crate::boxes::{self, ReadVertices};
@@ -19,7 +19,8 @@ pub(crate) struct Summary {
     pub bounds: Bounds,
     /// Half their summed surface; infinite if squares of extents overflow.
     pub surface: f32,
-    /// Whether all positions that were read are certainly finite. (f64 positions are checked before.)
+    /// Whether all positions that were read are certainly finite. (f64 positions are checked
+    /// before.)
     pub all_finite: bool,
 }
 
@@ -43,7 +44,8 @@ impl Summary {
 /// The boxes of some clusters.
 ///
 /// # Safety
-/// `into` must be as long as the clustering, and no other thread may access these clusters' boxes at the same time.
+/// `into` must be as long as the clustering, and no other thread may access these clusters' boxes
+/// at the same time.
 #[inline(always)]
 pub(crate) unsafe fn of_clusters<S: ReadVertices>(
     simd: S,

@@ -10,11 +10,12 @@
 //! narrow      filters, then exact arithmetic
 //! ```
 //!
-//! Source: "Real-time Collision Detection with Two-level Spatial Hashing on GPU", section 3.
-//! Where we deviate: the owner rule replaces the hash table (nothing is lost or tested twice), and
-//! cell lists are bounded by the number of primitives: a huge primitive would touch every cell, so the grid is made
-//! coarser until the lists hold at most [`MOST_ENTRIES_EACH`] entries per primitive. That keeps memory
-//! bounded; the price is more pairs per cell, which `n_reruns` and `grid` in the statistics show.
+//! Source: "Real-time Collision Detection with Two-level Spatial Hashing on GPU", section 3. Where
+//! we deviate: the owner rule replaces the hash table (nothing is lost or tested twice), and cell
+//! lists are bounded by the number of primitives: a huge primitive would touch every cell, so the
+//! grid is made coarser until the lists hold at most [`MOST_ENTRIES_EACH`] entries per primitive.
+//! That keeps memory bounded; the price is more pairs per cell, which `n_reruns` and `grid` in the
+//! statistics show.
 
 use std::sync::Arc;
 
@@ -51,7 +52,8 @@ pub trait Rule: Sync {
     /// The pairs that the rule is asked about.
     fn query(&self) -> SubcellQuery;
 
-    /// Whether such a pair is a candidate here. Keys that the rule appends to `keys` become part of the answer.
+    /// Whether such a pair is a candidate here. Keys that the rule appends to `keys` become part of
+    /// the answer.
     fn admits(&self, a: &Kept, b: &Kept, keys: &mut Vec<u64>) -> bool;
 }
 
@@ -91,7 +93,8 @@ pub struct Cells {
     reaching: KeptList,
     /// Where each cell's list starts, and one past the last.
     starts: Vec<u32>,
-    /// The cell lists: indices in `kept`, ascending within a cell, so that those of one body are together.
+    /// The cell lists: indices in `kept`, ascending within a cell, so that those of one body are
+    /// together.
     entries: Vec<u32>,
     items: Vec<CellItem>,
     scratches: Vec<Decider>,
@@ -129,7 +132,8 @@ impl Cells {
         }
     }
 
-    /// Sorts the primitives into the cells of a grid; `None` if no body reaches another, and the answer is complete.
+    /// Sorts the primitives into the cells of a grid; `None` if no body reaches another, and the
+    /// answer is complete.
     pub(super) fn divide(
         &mut self,
         job: Job<'_>,
@@ -230,7 +234,8 @@ impl Cells {
         let mut most_entries = n.saturating_mul(MOST_ENTRIES_EACH).min(u64::from(u32::MAX));
         let mut most_cells = u64::MAX;
         if let Some(budget) = settings.memory_budget {
-            // Bytes held by now, mainly the boxes of primitives, without the lists that are sized below.
+            // Bytes held by now, mainly the boxes of primitives, without the lists that are sized
+            // below.
             let sized_later = size_of::<u32>() * (self.starts.capacity() + self.entries.capacity())
                 + size_of::<CellItem>() * self.items.capacity();
             let fixed = self.bytes() - sized_later as u64 + batch_bytes(settings) + 8;
@@ -261,7 +266,8 @@ impl Cells {
             grid = coarser;
             stats.n_reruns += 1;
         }
-        // Counts go two entries past the cell's own: the prefix sum moves them back by one, and so does the scatter.
+        // Counts go two entries past the cell's own: the prefix sum moves them back by one, and so
+        // does the scatter.
         let n_starts = grid.n_cells() as usize + 2;
         self.starts.clear();
         self.starts.reserve_exact(n_starts);

@@ -10,8 +10,8 @@
 //!
 //! This file keeps the caches; `batches` runs the stages from `traversal` on.
 //!
-//! Memory: a cache per body, and a batch of work items. A full batch is paired and decided, then traversal
-//! goes on.
+//! Memory: a cache per body, and a batch of work items. A full batch is paired and decided, then
+//! traversal goes on.
 
 use std::sync::Arc;
 
@@ -186,8 +186,8 @@ impl BodyCache {
         }
     }
 
-    /// Finds which primitives share vertices, before workers need it. Going to the pool costs 0.1 ms, so it is avoided
-    /// when the adjacency is known.
+    /// Finds which primitives share vertices, before workers need it. Going to the pool costs 0.1
+    /// ms, so it is avoided when the adjacency is known.
     pub(super) fn find_adjacency(&self, workers: &Workers) -> Result<(), Error> {
         if !self.clustering.knows_adjacency() {
             let n_primitives = self.clustering.order.len();
@@ -234,8 +234,8 @@ impl BodyCache {
         self.culled.as_deref().filter(|culled| culled.is_sorted())
     }
 
-    /// Whether the positions can be read in memory order: they are in single precision, and the primitives name every
-    /// vertex.
+    /// Whether the positions can be read in memory order: they are in single precision, and the
+    /// primitives name every vertex.
     pub(super) fn can_be_read(&self, body: &Body) -> bool {
         let is_single = matches!(body.positions(), Positions::F32(_));
         is_single && self.clustering.n_vertices_covered == Some(body.n_vertices())
@@ -246,7 +246,8 @@ impl BodyCache {
         self.positions_stamp = 0;
     }
 
-    /// The clusters' summed surface divided by the body's: how well the clusters fit the current pose.
+    /// The clusters' summed surface divided by the body's: how well the clusters fit the current
+    /// pose.
     pub(super) fn spread(&self) -> f64 {
         spread(self.surface, &self.bounds.root())
     }

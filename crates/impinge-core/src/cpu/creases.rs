@@ -1,20 +1,24 @@
-//! Neighbours that cannot meet, under `SharedVertex::Resolve`: found per vertex instead of per pair.
+//! Neighbours that cannot meet, under `SharedVertex::Resolve`: found per vertex instead of per
+//! pair.
 //!
-//! In: the rings of a surface, and its positions. Out: for each cluster, the lanes of triangles with a *crease*: a vertex
-//! whose triangles are not certainly side by side. Two triangles that share a vertex are tested only if both have a
-//! crease.
+//! In: the rings of a surface, and its positions. Out: for each cluster, the lanes of triangles
+//! with a *crease*: a vertex whose triangles are not certainly side by side. Two triangles that
+//! share a vertex are tested only if both have a crease.
 //!
-//! Seen along an axis, the triangles around a vertex are sectors of a plane. If they all turn the same way and together
-//! go around the vertex no more than once, no two sectors overlap, so no two triangles meet anywhere but in the simplex
-//! that they share. On a smooth surface nearly every vertex passes, also where neighbours lie in one plane.
+//! Seen along an axis, the triangles around a vertex are sectors of a plane. If they all turn the
+//! same way and together go around the vertex no more than once, no two sectors overlap, so no two
+//! triangles meet anywhere but in the simplex that they share. On a smooth surface nearly every
+//! vertex passes, also where neighbours lie in one plane.
 //!
-//! 1. Of each triangle in single precision: which way it turns, and which lines through its corners its far sides cross
-//!    (`impinge_exact::filter::turns`), a register of triangles at a time.
-//! 2. Of each vertex: whether all of its triangles turn the same way, and how many lines they cross. Where that leaves it open, its
-//!    ring is gone along in `f64`, along the axes and then along the sum of its normals.
+//! 1. Of each triangle in single precision: which way it turns, and which lines through its corners
+//!    its far sides cross (`impinge_exact::filter::turns`), a register of triangles at a time.
+//! 2. Of each vertex: whether all of its triangles turn the same way, and how many lines they
+//!    cross. Where that leaves it open, its ring is gone along in `f64`, along the axes and then
+//!    along the sum of its normals.
 //! 3. Of each cluster: which triangles have a vertex with a crease.
 //!
-//! Reason for each discard: sectors that do not overlap. `docs/exactness.md`, "Creases", has the proof and the bound.
+//! Reason for each discard: sectors that do not overlap. `docs/exactness.md`, "Creases", has the
+//! proof and the bound.
 
 use std::sync::atomic::{AtomicU16, AtomicU64, Ordering};
 
@@ -179,7 +183,8 @@ fn put_turns<S: Simd>(
     }
 }
 
-/// Whether the triangles around a vertex with a closed ring certainly do not overlap, seen along an axis.
+/// Whether the triangles around a vertex with a closed ring certainly do not overlap, seen along an
+/// axis.
 #[inline(always)]
 fn are_side_by_side(turns: &[AtomicU16], corners: impl Iterator<Item = CornerAt>) -> bool {
     let (mut all, mut n_crossings) = (filter::TURNS, 0);
@@ -259,8 +264,8 @@ impl<'a, P: Fn(usize) -> [f64; 3]> Arms<'a, P> {
         })
     }
 
-    /// Whether seen along the sum of their normals the triangles certainly do not overlap: at the edges of boxes and at
-    /// the rims of cylinders they do along every axis.
+    /// Whether seen along the sum of their normals the triangles certainly do not overlap: at the
+    /// edges of boxes and at the rims of cylinders they do along every axis.
     #[inline(never)]
     fn are_side_by_side_along_their_normal(&self) -> bool {
         let mut normal = [0.0; 3];
@@ -319,8 +324,8 @@ impl TurnsSeen {
         self.n_crossings += u32::from(crosses);
     }
 
-    /// Whether the triangles turn the same way and do not overlap. An open ring also has the turn from its last vertex to
-    /// its first.
+    /// Whether the triangles turn the same way and do not overlap. An open ring also has the turn
+    /// from its last vertex to its first.
     #[inline(always)]
     fn is_once_at_most(&self, closing: Option<[bool; 2]>) -> bool {
         let [left, right] = self.all;
@@ -352,7 +357,8 @@ fn cross(from: &[f64; 3], to: &[f64; 3]) -> [(f64, f64); 3] {
     })
 }
 
-/// Seen along an axis, whether the turn from one arm to another is certainly to the left, and certainly to the right.
+/// Seen along an axis, whether the turn from one arm to another is certainly to the left, and
+/// certainly to the right.
 #[inline(always)]
 fn turn(axis: usize, from: &[f64; 3], to: &[f64; 3]) -> [bool; 2] {
     let (i, j) = ((axis + 1) % 3, (axis + 2) % 3);
@@ -374,8 +380,8 @@ fn turn_along(direction: &[f64; 3], from: &[f64; 3], to: &[f64; 3]) -> [bool; 2]
     [turn > bound, turn < -bound]
 }
 
-/// Seen along a direction, on which side of a line an arm certainly lies. Any line would do; on the image of a vector that
-/// is like no other, meshes rarely have vertices.
+/// Seen along a direction, on which side of a line an arm certainly lies. Any line would do; on the
+/// image of a vector that is like no other, meshes rarely have vertices.
 #[inline(always)]
 fn is_below_along(direction: &[f64; 3], arm: &[f64; 3]) -> Option<bool> {
     const LINE: [f64; 3] = [0.331, 0.577, 0.747];
@@ -385,8 +391,8 @@ fn is_below_along(direction: &[f64; 3], arm: &[f64; 3]) -> Option<bool> {
     }
 }
 
-/// Seen along an axis, which of two half-planes an arm points to: the one of angles from 0 up to but without 180 degrees,
-/// or the other.
+/// Seen along an axis, which of two half-planes an arm points to: the one of angles from 0 up to
+/// but without 180 degrees, or the other.
 #[inline(always)]
 fn is_below(axis: usize, arm: &[f64; 3]) -> bool {
     let (i, j) = ((axis + 1) % 3, (axis + 2) % 3);

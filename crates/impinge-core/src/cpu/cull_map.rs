@@ -1,7 +1,7 @@
 //! Stage `bounds` of methods that work in a grid: the primitives that reach another body.
 //!
-//! In: positions. Out: where bodies may meet, and the primitives that reach there with their boxes, ordered by
-//! body and primitive. Cost: every vertex once for the boxes of bodies, every
+//! In: positions. Out: where bodies may meet, and the primitives that reach there with their boxes,
+//! ordered by body and primitive. Cost: every vertex once for the boxes of bodies, every
 //! primitive's corners once. Invariant: no pair that intersects has a primitive that is not kept.
 
 use std::sync::Mutex;
@@ -145,8 +145,8 @@ impl KeptList {
         }
     }
 
-    /// Finds the boxes of bodies, where bodies reach each other, and the primitives that reach there. `scratches` has
-    /// one entry per worker; only their number matters.
+    /// Finds the boxes of bodies, where bodies reach each other, and the primitives that reach
+    /// there. `scratches` has one entry per worker; only their number matters.
     pub fn find<S: Send>(&mut self, world: World<'_>, workers: &Workers, scratches: &mut [S]) {
         let scratches = self.few(world, scratches);
         self.begin(world, workers, scratches);
@@ -173,8 +173,8 @@ impl KeptList {
         scratches: &mut [S],
     ) -> usize {
         let scratches = self.few(world, scratches);
-        // Bodies queried for self-collision keep every primitive, and with many bodies the map rejects almost
-        // nothing; skip it in both cases.
+        // Bodies queried for self-collision keep every primitive, and with many bodies the map
+        // rejects almost nothing; skip it in both cases.
         let parts = &world.plan.parts;
         if !world.plan.between()
             || parts.len() > self.tuning.most_maps.min(Cull::MOST_MAPS)
@@ -276,8 +276,9 @@ impl KeptList {
         }
     }
 
-    /// Finds the box in which each part may meet others. Reason for the discard that follows: the boxes of a
-    /// pair share a point. It lies in both bodies' boxes, so each primitive meets the intersection of the two.
+    /// Finds the box in which each part may meet others. Reason for the discard that follows: the
+    /// boxes of a pair share a point. It lies in both bodies' boxes, so each primitive meets the
+    /// intersection of the two.
     fn find_reach(&mut self, world: World<'_>) {
         let plan = world.plan;
         let KeptList {

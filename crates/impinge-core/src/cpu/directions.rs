@@ -1,11 +1,13 @@
-//! Between `pairing` and `narrow`: where very many boxes of two clusters overlap, a direction of each element tells most pairs apart.
+//! Between `pairing` and `narrow`: where very many boxes of two clusters overlap, a direction of
+//! each element tells most pairs apart.
 //!
-//! In: the masks of a work item. Out: the same masks without pairs that are certainly apart (`impinge_exact::filter::directions`).
-//! Boxes say little about long elements that lie aslant: on two parts of a machine whose triangles are mostly slivers, those of
-//! a fifth of all pairs overlap, of which planes leave one in 150.
+//! In: the masks of a work item. Out: the same masks without pairs that are certainly apart
+//! (`impinge_exact::filter::directions`). Boxes say little about long elements that lie aslant: on
+//! two parts of a machine whose triangles are mostly slivers, those of a fifth of all pairs
+//! overlap, of which planes leave one in 150.
 //!
-//! Cost: nothing where few boxes overlap, as between clusters of short elements. Else 1 ns per pair, and 2 µs per cluster when it is first
-//! needed, with 3.8 KB.
+//! Cost: nothing where few boxes overlap, as between clusters of short elements. Else 1 ns per
+//! pair, and 2 µs per cluster when it is first needed, with 3.8 KB.
 
 use crate::bvh::GROUP;
 use crate::bvh::clusters::Clustering;

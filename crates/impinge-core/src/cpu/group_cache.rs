@@ -1,8 +1,10 @@
-//! A worker's own copy of the clusters it saw last, for `pairing` and `narrow`: one primitive per lane.
+//! A worker's own copy of the clusters it saw last, for `pairing` and `narrow`: one primitive per
+//! lane.
 //!
-//! In: positions and corners of a cluster. Out: the boxes of its primitives and, for triangles in f32, their
-//! corners as tables, so that the filter reads them from the first-level cache and not from all over the
-//! body. Cost: each corner of a cluster once, when it is first needed; 3.8 KB per cluster.
+//! In: positions and corners of a cluster. Out: the boxes of its primitives and, for triangles in
+//! f32, their corners as tables, so that the filter reads them from the first-level cache and not
+//! from all over the body. Cost: each corner of a cluster once, when it is first needed; 3.8 KB per
+//! cluster.
 
 use crate::boxes;
 use crate::bvh::GROUP;
@@ -74,7 +76,8 @@ pub(super) trait PerCluster<W>: Clone {
 
 /// The clusters that a worker has seen last.
 ///
-/// A cluster has two possible slots, `h` and `h ^ 1`; a new one replaces the cluster that is not in use.
+/// A cluster has two possible slots, `h` and `h ^ 1`; a new one replaces the cluster that is not in
+/// use.
 #[derive(Debug)]
 pub(super) struct GroupCache<G> {
     /// Part and cluster of each slot.
@@ -96,7 +99,8 @@ impl<G> Default for GroupCache<G> {
 
 /// The key of an empty slot: there are fewer than 2^32 parts.
 const NOBODY: u64 = u64::MAX;
-/// Clusters kept under a memory budget, 31 KB: hardly slower, for neighbouring clusters come in a row.
+/// Clusters kept under a memory budget, 31 KB: hardly slower, for neighbouring clusters come in a
+/// row.
 const MOST_IN_BUDGET: u64 = 8;
 
 impl<G> GroupCache<G> {
@@ -160,8 +164,8 @@ impl<G> GroupCache<G> {
         self.keys[first] == key || self.keys[first ^ 1] == key
     }
 
-    /// The slot of a cluster of a part; computes its data if it is not cached. The cluster at the slot `pinned`
-    /// stays.
+    /// The slot of a cluster of a part; computes its data if it is not cached. The cluster at the
+    /// slot `pinned` stays.
     #[inline(always)]
     pub fn slot<S: Simd, W>(
         &mut self,

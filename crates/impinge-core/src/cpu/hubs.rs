@@ -1,11 +1,12 @@
-//! Pairs that share a hub, under `SharedVertex::Resolve`: found by the directions of their primitives.
+//! Pairs that share a hub, under `SharedVertex::Resolve`: found by the directions of their
+//! primitives.
 //!
 //! In: the hubs and axes of a body, and its positions. Out: pairs for the exact test.
 //!
-//! The boxes of all primitives around a hub v overlap there, so boxes in space separate nothing. Seen from v, each
-//! primitive is a cone of directions, and two primitives that meet in a point other than v share the direction
-//! of that point. So each cone gets a box on the surface of the cube of all directions, and a tree over these
-//! boxes finds those that overlap:
+//! The boxes of all primitives around a hub v overlap there, so boxes in space separate nothing.
+//! Seen from v, each primitive is a cone of directions, and two primitives that meet in a point
+//! other than v share the direction of that point. So each cone gets a box on the surface of the
+//! cube of all directions, and a tree over these boxes finds those that overlap:
 //!
 //! ```text
 //!    +-------*--*---+      * directions of a triangle's two other vertices:
@@ -16,13 +17,15 @@
 //!    +--------------+
 //! ```
 //!
-//! Primitives that share an axis uv also share the direction of its other vertex. They are found by half-planes
-//! around the axis: the half-plane of a point p is given by the direction of (v - u) x (p - u).
+//! Primitives that share an axis uv also share the direction of its other vertex. They are found by
+//! half-planes around the axis: the half-plane of a point p is given by the direction of (v - u) x
+//! (p - u).
 //!
 //! Primitives with the same vertices have the same answers, so one test speaks for all of them.
 //!
-//! Cost: `O(n log n)` per hub for n primitives, and one exact test per pair whose cones' boxes overlap.
-//! Reason for each discard: cones without a common direction. `docs/exactness.md`, "Hubs", has the proof and the bound.
+//! Cost: `O(n log n)` per hub for n primitives, and one exact test per pair whose cones' boxes
+//! overlap. Reason for each discard: cones without a common direction. `docs/exactness.md`, "Hubs",
+//! has the proof and the bound.
 
 use crate::bvh::bounds::{Bounds, round_down, round_up};
 use crate::bvh::hubs::{HubSet, Hubs};
@@ -37,7 +40,8 @@ use super::world::BodyRef;
 const LEAF: usize = 4;
 /// The rounding error of a direction's coordinate: 2^-24.
 const ERROR: f64 = f64::from_bits((1023 - 24) << 52);
-/// A normal shorter than this share of the product of its factors' sizes has no certain direction: 2^-23.
+/// A normal shorter than this share of the product of its factors' sizes has no certain direction:
+/// 2^-23.
 const SHORTEST: f64 = f64::from_bits((1023 - 23) << 52);
 
 /// All directions.
@@ -163,7 +167,8 @@ impl HubScratch {
         self.slots = slots;
     }
 
-    /// Calls `emit` for all pairs of entries whose cones' boxes overlap and that have no common partner.
+    /// Calls `emit` for all pairs of entries whose cones' boxes overlap and that have no common
+    /// partner.
     fn meet(&mut self, emit: &mut impl FnMut(Alike, Alike)) {
         let n = self.entries.len();
         if n < 2 {
@@ -356,8 +361,9 @@ impl Cone {
         }
         let min = self.min.map(|x| x - ERROR);
         let max = self.max.map(|x| x + ERROR);
-        // A point between directions on the cube lies within their box, so its largest coordinate is at least `least`.
-        // Projected outward onto the cube, it grows at most by the factor `most`.
+        // A point between directions on the cube lies within their box, so its largest coordinate
+        // is at least `least`. Projected outward onto the cube, it grows at most by the factor
+        // `most`.
         let least = (0..3).fold(0.0, |least: f64, k| least.max(min[k]).max(-max[k]));
         let most = 1.0 / least;
         let out = |x: f64| {

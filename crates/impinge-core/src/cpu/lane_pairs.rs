@@ -1,4 +1,5 @@
-//! The data passed from stage to stage: two clusters that may meet, and the lanes of their elements whose boxes do.
+//! The data passed from stage to stage: two clusters that may meet, and the lanes of their elements
+//! whose boxes do.
 
 use crate::bvh::GROUP;
 use crate::scene::index::{ClusterIx, PartIx};
@@ -91,8 +92,9 @@ impl LanePairs {
         self.n = n_kept;
     }
 
-    /// Moves some candidates of the batch from `first` on to the slot after the `n_kept` that were kept before. Returns how
-    /// many are kept now; [`truncate`](Self::truncate) ends a round of this.
+    /// Moves some candidates of the batch from `first` on to the slot after the `n_kept` that were
+    /// kept before. Returns how many are kept now; [`truncate`](Self::truncate) ends a round of
+    /// this.
     #[inline(always)]
     pub fn keep_batch<S: Simd>(
         &mut self,

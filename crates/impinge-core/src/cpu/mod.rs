@@ -62,8 +62,8 @@ impl Cpu {
         &mut self.clusters
     }
 
-    /// Of `Auto`: answers the frame in the grid if most bodies are new and it is not crowded; otherwise returns false, and
-    /// clusters are to answer it.
+    /// Of `Auto`: answers the frame in the grid if most bodies are new and it is not crowded;
+    /// otherwise returns false, and clusters are to answer it.
     pub fn find_as_new(
         &mut self,
         job: Job<'_>,
@@ -89,7 +89,8 @@ impl Cpu {
         Ok(false)
     }
 
-    /// Answers through a grid whose memory is freed after the frame; false if the grid is too crowded.
+    /// Answers through a grid whose memory is freed after the frame; false if the grid is too
+    /// crowded.
     fn find_in_grid(
         &self,
         job: Job<'_>,

@@ -1,10 +1,11 @@
 //! Stage `narrow`: the exact test of candidates.
 //!
 //! In: candidates. Out: keys of pairs that intersect. Triangle pairs go through two floating-point
-//! filters, eight pairs at a time (`impinge_exact::filter`, bounds derived in `docs/exactness.md`): most are
-//! rejected because one triangle lies on one side of the other's plane; the rest is classified.
-//! Tetrahedron pairs are classified by their faces, then the open ones by faces and edges. Pairs of which the filters
-//! are unsure go to exact arithmetic, and so do pairs of a triangle and a tetrahedron; that code filters too.
+//! filters, eight pairs at a time (`impinge_exact::filter`, bounds derived in `docs/exactness.md`):
+//! most are rejected because one triangle lies on one side of the other's plane; the rest is
+//! classified. Tetrahedron pairs are classified by their faces, then the open ones by faces and
+//! edges. Pairs of which the filters are unsure go to exact arithmetic, and so do pairs of a
+//! triangle and a tetrahedron; that code filters too.
 
 use crate::workers::clock::Instant;
 use std::sync::Arc;
@@ -40,7 +41,8 @@ pub struct Candidate {
     pub slot_b: Slot,
 }
 
-/// Room for the candidates that wait: the last work item may add a full group product to those that are not enough yet.
+/// Room for the candidates that wait: the last work item may add a full group product to those that
+/// are not enough yet.
 pub(super) fn room_to_wait(tuning: &Tuning) -> usize {
     // A test may ask for more than memory holds.
     tuning.decide_from.min(1 << 16) + GROUP * GROUP
@@ -123,7 +125,8 @@ impl Decider {
         self.answer.as_ref().is_some_and(|answer| answer.is_over())
     }
 
-    /// Where only the lowest pair is wanted: of which side's elements only those up to a number still matter.
+    /// Where only the lowest pair is wanted: of which side's elements only those up to a number
+    /// still matter.
     #[inline(always)]
     pub(super) fn up_to(&self) -> Option<(Side, Number)> {
         let side = match self.seeks_lowest? {
@@ -146,8 +149,8 @@ impl Decider {
         self.candidates.push(candidate);
     }
 
-    /// Takes the candidates of a work item. The filter in f32 decides triangles in f32, except for a few of which it is
-    /// unsure; these and all other candidates are [pushed](Self::push).
+    /// Takes the candidates of a work item. The filter in f32 decides triangles in f32, except for
+    /// a few of which it is unsure; these and all other candidates are [pushed](Self::push).
     #[inline(always)]
     pub(super) fn decide_item<S: Simd>(
         &mut self,
@@ -207,15 +210,17 @@ impl Decider {
         self.decide_shared_by_all(body, &[slot_a], &[slot_b]);
     }
 
-    /// Decides all pairs of a primitive of the one list with one of the other, under `SharedVertex::Resolve`. Primitives
-    /// of one list have the same vertices, and a vertex is in both.
+    /// Decides all pairs of a primitive of the one list with one of the other, under
+    /// `SharedVertex::Resolve`. Primitives of one list have the same vertices, and a vertex is in
+    /// both.
     pub fn decide_shared_by_all(&mut self, body: &BodyRef<'_>, a: &[Slot], b: &[Slot]) {
         let n_pairs = a.len() as u64 * b.len() as u64;
         let pairs = a.iter().flat_map(|&a| b.iter().map(move |&b| (a, b)));
         self.decide_as_one(body, [a[0], b[0]], n_pairs, pairs);
     }
 
-    /// Decides all pairs of a list, under `SharedVertex::Resolve`. Its primitives have the same vertices.
+    /// Decides all pairs of a list, under `SharedVertex::Resolve`. Its primitives have the same
+    /// vertices.
     pub fn decide_alike(&mut self, body: &BodyRef<'_>, list: &[Slot]) {
         let &[first, second, ..] = list else {
             return;
@@ -275,8 +280,8 @@ impl Decider {
         self.busy += start.elapsed();
     }
 
-    /// Passes on triangle pairs that planes do not separate, and tetrahedron pairs that are open after the test of
-    /// faces. Decides batches of mixed kinds right away.
+    /// Passes on triangle pairs that planes do not separate, and tetrahedron pairs that are open
+    /// after the test of faces. Decides batches of mixed kinds right away.
     #[inline(always)]
     fn reject<S: Simd>(&mut self, simd: S, world: World<'_>) {
         let mut lookup = BodyLookup::new(world);
@@ -384,7 +389,8 @@ fn keep(list: &mut Vec<Candidate>, chunk: &[Candidate], mask: u8) {
     }
 }
 
-// Kernels of their own: without optimisation, one for all of them would need more stack than a thread has.
+// Kernels of their own: without optimisation, one for all of them would need more stack than a
+// thread has.
 
 #[inline(always)]
 fn reject<S: Simd>(simd: S, decider: &mut Decider, world: World<'_>) {

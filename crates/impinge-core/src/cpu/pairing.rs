@@ -1,20 +1,22 @@
 //! Stage `pairing`: which primitives of two clusters have boxes that meet.
 //!
-//! In: work items (two clusters). Out: candidates, which `narrow` decides item by item, while both groups are in
-//! the cache.
+//! In: work items (two clusters). Out: candidates, which `narrow` decides item by item, while both
+//! groups are in the cache.
 //!
-//! 0. The boxes of a cluster's primitives, and their corners, are computed when first needed; a worker caches
-//!    those of the clusters it saw last. Work items come in the order of the tree, so most clusters are cached.
+//! 0. The boxes of a cluster's primitives, and their corners, are computed when first needed; a
+//!    worker caches those of the clusters it saw last. Work items come in the order of the tree, so
+//!    most clusters are cached.
 //! 1. The two clusters' boxes intersect in a box; primitives of either side that do not meet it
 //!    drop out, for a partner's box lies in its cluster's box.
 //! 2. Each survivor of the smaller side is tested against the survivors of the other, 16 (or 8)
 //!    lanes at a time: one 64-bit mask per primitive.
 //!    Where these are very many, `directions` clears most of them.
-//! 3. Within one body the adjacency masks clear the lanes that share a vertex, or set apart those that `creases` leaves
-//!    open. Pairs that share a hub are cleared under any rule: `hubs` decides them.
+//! 3. Within one body the adjacency masks clear the lanes that share a vertex, or set apart those
+//!    that `creases` leaves open. Pairs that share a hub are cleared under any rule: `hubs` decides
+//!    them.
 //!
-//! Invariant: a pair of primitives lies in one work item only, so no candidate comes twice.
-//! On a CPU these box tests beat the 4x4x4 sub-cell masks of the paper, see `docs/lab/intersections.md`.
+//! Invariant: a pair of primitives lies in one work item only, so no candidate comes twice. On a
+//! CPU these box tests beat the 4x4x4 sub-cell masks of the paper, see `docs/lab/intersections.md`.
 
 use crate::workers::clock::Instant;
 use std::sync::Arc;
@@ -34,10 +36,12 @@ use super::narrow::Decider;
 use super::world::{BodyCache, BodyRef, World};
 use crate::simd::{Isa, Lanes, Masks, Simd};
 
-/// The narrow stage is timed for one work item in this many: reading the clock takes longer than some items.
+/// The narrow stage is timed for one work item in this many: reading the clock takes longer than
+/// some items.
 const SAMPLED: u32 = 16;
 
-/// The state of one worker. Two of them share no cache line, nor a pair of lines that is fetched together.
+/// The state of one worker. Two of them share no cache line, nor a pair of lines that is fetched
+/// together.
 #[derive(Debug, Default)]
 #[repr(align(128))]
 pub(crate) struct Worker {
@@ -167,7 +171,8 @@ pub(crate) fn run<S: Simd>(
     decider.decide(isa, world);
 }
 
-/// The slots of a work item's groups, and the lanes of each that meet the intersection of the two clusters' boxes.
+/// The slots of a work item's groups, and the lanes of each that meet the intersection of the two
+/// clusters' boxes.
 struct Culled {
     slots: [usize; 2],
     lanes: [u64; 2],
@@ -183,7 +188,8 @@ fn lanes_up_to(world: World<'_>, part: PartIx, cluster: ClusterIx, to: Number) -
     })
 }
 
-/// Only the lanes in `wanted` matter. `None` if one side has no lane that meets the intersection of the two clusters' boxes.
+/// Only the lanes in `wanted` matter. `None` if one side has no lane that meets the intersection of
+/// the two clusters' boxes.
 #[inline(always)]
 fn cull<S: Simd>(
     simd: S,
@@ -221,7 +227,8 @@ fn cull<S: Simd>(
     Some(Culled { slots, lanes })
 }
 
-/// Finds the pairs of lanes whose boxes overlap: one mask per row, which is a lane of the side that is returned.
+/// Finds the pairs of lanes whose boxes overlap: one mask per row, which is a lane of the side that
+/// is returned.
 #[inline(always)]
 fn overlap<S: Simd>(
     simd: S,
@@ -283,7 +290,8 @@ fn within_body<S: Simd>(
     }
 }
 
-/// Clears the pairs of one body that share a hub, and lists for each row the lanes that share another vertex with it.
+/// Clears the pairs of one body that share a hub, and lists for each row the lanes that share
+/// another vertex with it.
 #[inline(always)]
 fn put_shared(
     cache: &BodyCache,

@@ -1,4 +1,5 @@
-//! Stage `bounds` of `Clusters`: boxes of the clusters of bodies that moved, and of the trees above them.
+//! Stage `bounds` of `Clusters`: boxes of the clusters of bodies that moved, and of the trees above
+//! them.
 //!
 //! ```text
 //! read    all boxes of a body whose clusters are not sorted; else its positions in memory order, and the boxes of
@@ -49,7 +50,8 @@ pub(super) struct Refit {
 enum What {
     /// Reads runs of vertices.
     Read,
-    /// Computes the boxes of nodes of level 1 and of all their clusters; only the cluster's box if there is just one.
+    /// Computes the boxes of nodes of level 1 and of all their clusters; only the cluster's box if
+    /// there is just one.
     All,
     /// The same for the clusters that are near, node by node.
     Near,
@@ -146,8 +148,8 @@ impl Refit {
                 self.push(workers, part, cache, What::All, n_nodes);
             }
             Needed::Near { n_nodes, n_runs } => {
-                // Order tasks so that one thread tends to read a body and compute its boxes: `work` reverses this list,
-                // so the caller starts at its end and helpers at its front.
+                // Order tasks so that one thread tends to read a body and compute its boxes: `work`
+                // reverses this list, so the caller starts at its end and helpers at its front.
                 let mut parts = [(What::Read, n_runs), (What::Near, n_nodes)];
                 if 2 * part.index() >= n_bodies {
                     parts.reverse();
@@ -242,7 +244,8 @@ impl Refit {
         all_finite
     }
 
-    /// Computes the boxes of nodes above level 1; clusters bodies again that have flowed away from their clusters.
+    /// Computes the boxes of nodes above level 1; clusters bodies again that have flowed away from
+    /// their clusters.
     fn above(
         &mut self,
         isa: Isa,
@@ -327,8 +330,8 @@ fn work<S: Simd>(simd: S, world: World<'_>, task: Task) -> FoundBoxes {
             Some(_) => Children::new(clustering.shape.children(1, node), only),
             None => Children::new(node..node + 1, only),
         };
-        // SAFETY: no two tasks name the same node of the same body, and no thread reads boxes before all
-        // tasks are done.
+        // SAFETY: no two tasks name the same node of the same body, and no thread reads boxes
+        // before all tasks are done.
         unsafe {
             let of_node = bounds::of_clusters(simd, positions, clustering, clusters, task.leaves);
             if let Some(parents) = task.parents {

@@ -1,8 +1,8 @@
 //! The second level: which primitives of two groups of one cell touch a common sub-cell.
 //!
-//! A box touches a product of ranges of the 4 x 4 x 4 sub-cells. Two products share a sub-cell if and only
-//! if their ranges overlap along x, along y and along z. So the 64 x 64 occupancy bits of the
-//! paper, with their transposition, reduce to 8 masks of lanes per axis:
+//! A box touches a product of ranges of the 4 x 4 x 4 sub-cells. Two products share a sub-cell if
+//! and only if their ranges overlap along x, along y and along z. So the 64 x 64 occupancy bits of
+//! the paper, with their transposition, reduce to 8 masks of lanes per axis:
 //!
 //! ```text
 //! begins[s]    lanes j whose range begins at sub-cell s or before      s = 0 … 3
@@ -10,8 +10,8 @@
 //! partners     of i: for all axes, begins[last of i] and ends[first of i]
 //! ```
 //!
-//! The owner rule is a mask, too: of all cells that two boxes share, the pair belongs to the one in which
-//! one of the two boxes begins along each axis.
+//! The owner rule is a mask, too: of all cells that two boxes share, the pair belongs to the one in
+//! which one of the two boxes begins along each axis.
 
 use crate::bvh::GROUP;
 
@@ -76,8 +76,8 @@ impl Lanes64 {
     }
 }
 
-/// The first and the last sub-cell along an axis, from 1 to 4. The first is 0 if the range begins in an
-/// earlier cell.
+/// The first and the last sub-cell along an axis, from 1 to 4. The first is 0 if the range begins
+/// in an earlier cell.
 #[inline(always)]
 fn along(kept: &Kept, cell: [u32; 3], axis: usize) -> (usize, usize) {
     let before = 4 * cell[axis];

@@ -1,9 +1,10 @@
-//! Stage `traversal`: pairs of clusters whose boxes meet, tree against tree or a tree against itself.
+//! Stage `traversal`: pairs of clusters whose boxes meet, tree against tree or a tree against
+//! itself.
 //!
 //! In: two trees of boxes. Out: pairs of leaves, each once. Eight boxes are tested at a time; the
-//! stack holds pairs of nodes whose boxes are known to overlap.
-//! Cost: proportional to the node pairs that overlap. Reason for each discard: boxes that do not overlap
-//! hold primitives that cannot meet.
+//! stack holds pairs of nodes whose boxes are known to overlap. Cost: proportional to the node
+//! pairs that overlap. Reason for each discard: boxes that do not overlap hold primitives that
+//! cannot meet.
 
 use crate::bvh::bounds::Bounds;
 use crate::bvh::hubs::Hubs;
@@ -142,8 +143,9 @@ pub(crate) fn meeting<S: Simd, E>(
     Ok(())
 }
 
-/// Calls `emit(leaf, other)`, `leaf <= other`, for every leaf with itself and every pair of different
-/// leaves of one tree whose boxes overlap, except below pairs of nodes whose primitives all name a common hub.
+/// Calls `emit(leaf, other)`, `leaf <= other`, for every leaf with itself and every pair of
+/// different leaves of one tree whose boxes overlap, except below pairs of nodes whose primitives
+/// all name a common hub.
 #[inline(always)]
 pub(crate) fn within<S: Simd, E>(
     simd: S,
@@ -203,8 +205,8 @@ pub(crate) fn within<S: Simd, E>(
     Ok(())
 }
 
-/// Replaces a pair of different nodes by the pairs of their children that overlap: the children of the
-/// higher node, or of both.
+/// Replaces a pair of different nodes by the pairs of their children that overlap: the children of
+/// the higher node, or of both.
 #[inline(always)]
 fn descend<S: Simd, E>(
     simd: S,

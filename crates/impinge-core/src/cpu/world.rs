@@ -28,7 +28,8 @@ pub(crate) struct BodyCache {
     pub bounds: TreeBounds,
     /// The box of all primitives.
     pub whole: Bounds,
-    /// The clusters that lie beside all bodies that this one could meet; only for bodies that are large enough.
+    /// The clusters that lie beside all bodies that this one could meet; only for bodies that are
+    /// large enough.
     pub culled: Option<Box<Culled>>,
     /// The triangles that may meet a neighbour; found under `SharedVertex::Resolve` only.
     pub creases: Option<Box<Creases>>,

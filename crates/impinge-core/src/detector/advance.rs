@@ -19,28 +19,35 @@ use crate::search::found::PairList;
 use crate::search::narrow::{FirstContact, PairElement};
 
 impl Detector {
-    /// How far the step can be taken: a fraction of it, backed off from the first contact hardly more than the precision of positions
-    /// asks for, for which the straight way from the start to the *rounded* positions is free.
+    /// How far the step can be taken: a fraction of it, backed off from the first contact hardly
+    /// more than the precision of positions asks for, for which the straight way from the start to
+    /// the *rounded* positions is free.
     ///
-    /// Positions that are stored are rounded, and rounding alone may make elements touch that did not. So each fraction is
-    /// tried: positions are rounded first, and the way to those must be free in the sense of [`is_free`](Detector::is_free). A chain of such
-    /// steps is free from the first to the last, whatever the rounding, if its start was free of intersections; [`Start::Verify`] asks
-    /// that, and allows no step if it was not. The first fraction tried is that of the first
-    /// contact; then the back-off doubles, from the last bit on, so it is less than twice what is needed.
+    /// Positions that are stored are rounded, and rounding alone may make elements touch that did
+    /// not. So each fraction is tried: positions are rounded first, and the way to those must be
+    /// free in the sense of [`is_free`](Detector::is_free). A chain of such steps is free from the
+    /// first to the last, whatever the rounding, if its start was free of intersections;
+    /// [`Start::Verify`] asks that, and allows no step if it was not. The first fraction tried is
+    /// that of the first contact; then the back-off doubles, from the last bit on, so it is less
+    /// than twice what is needed.
     ///
-    /// On the CPU all pairs are searched once, and rounded positions are tested on the pairs that rounding may bring together. On a GPU, with
-    /// a separation or a memory budget, and where too many pairs are that close, all pairs are searched again for rounded positions.
+    /// On the CPU all pairs are searched once, and rounded positions are tested on the pairs that
+    /// rounding may bring together. On a GPU, with a separation or a memory budget, and where too
+    /// many pairs are that close, all pairs are searched again for rounded positions.
     ///
-    /// With a [clearance](Query::clearance), every pair keeps what that says, and what floats can round besides. So the fraction holds for
-    /// solvers too, which compute positions themselves: as `x0 + a * (x1 - x0)` or `x0 + a * dx` with `x1 = x0 + dx`, in the precision
-    /// of the positions, for *every* `a` from 0 to the fraction, the straight way there is free and keeps the clearance. The fraction is
-    /// rounded down to an `f32`, and a single search is enough. It is 0 if moving elements are nearer at the start than rounding
-    /// can move them: about 25 unit roundoffs of their largest coordinate. Without a clearance, only the positions of the answer
+    /// With a [clearance](Query::clearance), every pair keeps what that says, and what floats can
+    /// round besides. So the fraction holds for solvers too, which compute positions themselves: as
+    /// `x0 + a * (x1 - x0)` or `x0 + a * dx` with `x1 = x0 + dx`, in the precision of the
+    /// positions, for *every* `a` from 0 to the fraction, the straight way there is free and keeps
+    /// the clearance. The fraction is rounded down to an `f32`, and a single search is enough. It
+    /// is 0 if moving elements are nearer at the start than rounding can move them: about 25 unit
+    /// roundoffs of their largest coordinate. Without a clearance, only the positions of the answer
     /// are proven.
     ///
-    /// Pairs that touch at the start allow no step at all under [`Start::Report`], and are ignored under
-    /// [`Start::Skip`]. The seams of a mesh that was not welded are such pairs: they are refused by name, because no step would ever be
-    /// possible. Weld the mesh ([`Weld`](crate::Weld)), or skip what touches at the start.
+    /// Pairs that touch at the start allow no step at all under [`Start::Report`], and are ignored
+    /// under [`Start::Skip`]. The seams of a mesh that was not welded are such pairs: they are
+    /// refused by name, because no step would ever be possible. Weld the mesh
+    /// ([`Weld`](crate::Weld)), or skip what touches at the start.
     ///
     /// # Errors
     /// As [`impacts`](Detector::impacts), and [`Error::Seam`].
@@ -114,8 +121,8 @@ impl Detector {
         found.map(|(kind, found)| (kind, found.key)).collect()
     }
 
-    /// Backs off from the first contact until the way to rounded positions is free. `known`: pairs that may touch on such ways, and all
-    /// others, if they were listed.
+    /// Backs off from the first contact until the way to rounded positions is free. `known`: pairs
+    /// that may touch on such ways, and all others, if they were listed.
     fn back_off(
         &mut self,
         scene: &Scene,
@@ -173,7 +180,8 @@ impl Detector {
         }
     }
 
-    /// Whether the search for the earliest contact also lists the pairs that rounding may bring together.
+    /// Whether the search for the earliest contact also lists the pairs that rounding may bring
+    /// together.
     fn lists_close_pairs(&self) -> bool {
         #[cfg(feature = "gpu")]
         let is_on_device = self.gpu.is_some();
@@ -186,7 +194,8 @@ impl Detector {
     }
 }
 
-/// Refuses elements of one body, among pairs that touch at the start, that do so at vertices with equal positions.
+/// Refuses elements of one body, among pairs that touch at the start, that do so at vertices with
+/// equal positions.
 pub(super) fn refuse_seams(
     scene: &Scene,
     plan: &Plan,
@@ -230,8 +239,8 @@ fn blended(scene: &Scene, fraction: f64) -> Vec<(BodyId, Positions)> {
     blended.collect()
 }
 
-/// Whether two elements touch on the way to the rounded positions at a fraction of the step; with [`Start::Skip`], not at
-/// its start.
+/// Whether two elements touch on the way to the rounded positions at a fraction of the step; with
+/// [`Start::Skip`], not at its start.
 fn touch(scene: &Scene, plan: &Plan, (kind, key): (PairKind, u64), fraction: f64) -> bool {
     if !plan.counts(scene, key) {
         return false;

@@ -1,8 +1,8 @@
 //! Candidates, all at once or in runs.
 //!
-//! In runs: candidates are counted first, part by part (`key_ranges`). Then each run is searched for alone, in the order of the
-//! answer, and only pairs of elements that may belong to it are tested. So an answer of `k` runs takes `k + 1` searches, and
-//! memory for one run.
+//! In runs: candidates are counted first, part by part (`key_ranges`). Then each run is searched
+//! for alone, in the order of the answer, and only pairs of elements that may belong to it are
+//! tested. So an answer of `k` runs takes `k + 1` searches, and memory for one run.
 
 use std::ops::ControlFlow;
 
@@ -40,9 +40,10 @@ struct RunSearch<'a> {
 }
 
 impl Detector {
-    /// Pairs of elements whose boxes overlap during a step, each box inflated by a distance: for callers with their own test.
-    /// Sorted and complete. Always found on the CPU. [`candidates_in_runs`](Detector::candidates_in_runs) gives them piece by
-    /// piece, for answers larger than memory.
+    /// Pairs of elements whose boxes overlap during a step, each box inflated by a distance: for
+    /// callers with their own test. Sorted and complete. Always found on the CPU.
+    /// [`candidates_in_runs`](Detector::candidates_in_runs) gives them piece by piece, for answers
+    /// larger than memory.
     ///
     /// # Errors
     /// As [`impacts`](Detector::impacts), and a distance that is negative or not finite.
@@ -61,17 +62,18 @@ impl Detector {
         found.map(|_| candidates)
     }
 
-    /// All [`candidates`](Detector::candidates) of a query in sorted runs of at most `most` candidates, one after the other, so that
-    /// never more than one run is held. Returns how many candidates there are.
+    /// All [`candidates`](Detector::candidates) of a query in sorted runs of at most `most`
+    /// candidates, one after the other, so that never more than one run is held. Returns how many
+    /// candidates there are.
     ///
-    /// Run after run, the candidates are exactly those of `candidates`, each once and in the same order, whatever `most`, the
-    /// memory budget and the number of threads. A run may hold several kinds of pairs and ends anywhere between two candidates.
-    /// No run is empty.
+    /// Run after run, the candidates are exactly those of `candidates`, each once and in the same
+    /// order, whatever `most`, the memory budget and the number of threads. A run may hold several
+    /// kinds of pairs and ends anywhere between two candidates. No run is empty.
     ///
     /// A run takes 8 bytes per candidate, and 4 bytes more where there is no memory budget. A
-    /// [memory budget](Settings::memory_budget) makes runs as short as it needs; `most` can then be `u64::MAX`. Each run is
-    /// searched for alone, and all candidates are counted before, so short runs cost time. An answer of at most `most` candidates
-    /// is found at once, as by `candidates`.
+    /// [memory budget](Settings::memory_budget) makes runs as short as it needs; `most` can then be
+    /// `u64::MAX`. Each run is searched for alone, and all candidates are counted before, so short
+    /// runs cost time. An answer of at most `most` candidates is found at once, as by `candidates`.
     ///
     /// `each` gets the runs and may keep them; [`ControlFlow::Break`] ends the search.
     ///
@@ -95,7 +97,8 @@ impl Detector {
     /// ```
     ///
     /// # Errors
-    /// As [`candidates`](Detector::candidates), except that a memory budget need not hold the whole answer; a `most` of 0.
+    /// As [`candidates`](Detector::candidates), except that a memory budget need not hold the whole
+    /// answer; a `most` of 0.
     pub fn candidates_in_runs<B>(
         &mut self,
         scene: &Scene,
@@ -243,7 +246,8 @@ impl RunSearch<'_> {
         Ok(most.min((budget - held) / each))
     }
 
-    /// Finds the candidates that were counted, run by run. Returns whether `each` has not ended the search.
+    /// Finds the candidates that were counted, run by run. Returns whether `each` has not ended the
+    /// search.
     fn hand_over<B>(
         &mut self,
         candidates: &mut Candidates,

@@ -9,8 +9,8 @@ use crate::scene::ids::BodyId;
 use crate::search::work::Work;
 
 impl Detector {
-    /// Where the triangles of each pair meet: points, segments and polygons. The scene must not have changed since the pairs
-    /// were found.
+    /// Where the triangles of each pair meet: points, segments and polygons. The scene must not
+    /// have changed since the pairs were found.
     ///
     /// ```
     /// use impinge::{Backend, Detector, Query, Scene};
@@ -28,8 +28,8 @@ impl Detector {
     /// ```
     ///
     /// # Errors
-    /// A body of the pairs is no longer in the scene, is of another kind or has too few primitives; positions written in
-    /// slot since then are refused.
+    /// A body of the pairs is no longer in the scene, is of another kind or has too few primitives;
+    /// positions written in slot since then are refused.
     pub fn contacts(&mut self, scene: &Scene, pairs: &Pairs) -> Result<Contacts, Error> {
         let control = &self.control.clone();
         let limits = self.settings.limits();
@@ -46,11 +46,12 @@ impl Detector {
         })
     }
 
-    /// How deep two closed bodies of triangles are in each other, from contacts among which are all of these two. The
-    /// bodies' topologies are kept, so that later calls cost less.
+    /// How deep two closed bodies of triangles are in each other, from contacts among which are all
+    /// of these two. The bodies' topologies are kept, so that later calls cost less.
     ///
-    /// A vertex is inside where the other surface's winding number around it is not 0; a vertex on the surface
-    /// is not inside. The body with the lower number is the first, whichever argument it is.
+    /// A vertex is inside where the other surface's winding number around it is not 0; a vertex on
+    /// the surface is not inside. The body with the lower number is the first, whichever argument
+    /// it is.
     ///
     /// ```
     /// use impinge::{Backend, Detector, Query, Scene};
@@ -72,7 +73,8 @@ impl Detector {
     /// ```
     ///
     /// # Errors
-    /// A body that is not in the scene, the same body twice, a body not made of triangles, a surface that is not closed.
+    /// A body that is not in the scene, the same body twice, a body not made of triangles, a
+    /// surface that is not closed.
     pub fn penetration(
         &mut self,
         scene: &Scene,

@@ -1,7 +1,9 @@
-//! A detector's answers about distances of bodies, and whether two bodies touch whose distance is asked for.
+//! A detector's answers about distances of bodies, and whether two bodies touch whose distance is
+//! asked for.
 //!
-//! Where boxes of clusters overlap, whether the bodies touch is asked first, with the clusters, filters and threads of intersections. Boxes of
-//! very many long triangles overlap: a search by distances would compare most of these one by one.
+//! Where boxes of clusters overlap, whether the bodies touch is asked first, with the clusters,
+//! filters and threads of intersections. Boxes of very many long triangles overlap: a search by
+//! distances would compare most of these one by one.
 
 use std::sync::Arc;
 
@@ -25,9 +27,10 @@ use crate::search::stats::Stats;
 use crate::search::work::Work;
 
 impl Detector {
-    /// The two bodies that are nearest to each other of all that the query lets meet, and the pair of elements that has their
-    /// [`distance`](Detector::distance); `None` if there are no two that have elements. Of several pairs at the same computed
-    /// distance the lowest. Pairs of bodies whose boxes are farther apart than the nearest two are never looked at.
+    /// The two bodies that are nearest to each other of all that the query lets meet, and the pair
+    /// of elements that has their [`distance`](Detector::distance); `None` if there are no two that
+    /// have elements. Of several pairs at the same computed distance the lowest. Pairs of bodies
+    /// whose boxes are farther apart than the nearest two are never looked at.
     ///
     /// ```
     /// use impinge::{Backend, Detector, Query, Scene};
@@ -42,8 +45,8 @@ impl Detector {
     /// ```
     ///
     /// # Errors
-    /// A stale id, bad positions that were written in place, a query for self-collision or for the pairs of a cell, a memory
-    /// budget too small for the trees of the bodies.
+    /// A stale id, bad positions that were written in place, a query for self-collision or for the
+    /// pairs of a cell, a memory budget too small for the trees of the bodies.
     pub fn nearest(&mut self, scene: &Scene, query: &Query) -> Result<Option<Nearest>, Error> {
         let control = &self.control.clone();
         let plan = self.plan_of_nearest(scene, query)?;
@@ -55,12 +58,14 @@ impl Detector {
         Ok(nearest)
     }
 
-    /// The smallest distance of two bodies at the positions that they have, and the pair of elements that has it; `None` if one
-    /// body has no elements. The distance is 0 if and only if they share a point, which is decided exactly. Tetrahedra are
-    /// solid: a body inside one has distance 0.
+    /// The smallest distance of two bodies at the positions that they have, and the pair of
+    /// elements that has it; `None` if one body has no elements. The distance is 0 if and only if
+    /// they share a point, which is decided exactly. Tetrahedra are solid: a body inside one has
+    /// distance 0.
     ///
-    /// The detector keeps a tree per body and the nearest pair of each call. So repeated calls for bodies that move cost
-    /// little more than to read their positions. The answer does not depend on earlier calls.
+    /// The detector keeps a tree per body and the nearest pair of each call. So repeated calls for
+    /// bodies that move cost little more than to read their positions. The answer does not depend
+    /// on earlier calls.
     ///
     /// ```
     /// use impinge::{Backend, Detector, Scene};
@@ -76,8 +81,8 @@ impl Detector {
     /// ```
     ///
     /// # Errors
-    /// A stale id, the same body twice, bad positions that were written in place, a memory budget too small for the trees of
-    /// both bodies.
+    /// A stale id, the same body twice, bad positions that were written in place, a memory budget
+    /// too small for the trees of both bodies.
     pub fn distance(
         &mut self,
         scene: &Scene,

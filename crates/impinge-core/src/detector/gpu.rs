@@ -70,9 +70,10 @@ fn engine_of(
     }
 }
 
-/// Has the device find the pairs of a step that may touch, and decides them on the CPU. Returns [`ByDevice::Not`] if there is no device,
-/// or if the CPU has to answer: steps with a separation, a clearance or a filter, steps that the device cannot hold, any step in a browser, which
-/// cannot wait for a device here. With `Backend::Auto` the CPU takes over for good if the device fails.
+/// Has the device find the pairs of a step that may touch, and decides them on the CPU. Returns
+/// [`ByDevice::Not`] if there is no device, or if the CPU has to answer: steps with a separation, a
+/// clearance or a filter, steps that the device cannot hold, any step in a browser, which cannot
+/// wait for a device here. With `Backend::Auto` the CPU takes over for good if the device fails.
 pub(super) fn find_in_step(
     engine: &mut Option<Engine>,
     clusters: &mut StepClusters,
@@ -90,7 +91,8 @@ pub(super) fn find_in_step(
     let Some(on_device) = engine else {
         return Ok(ByDevice::Not);
     };
-    // Which pairs a cell owns is not known on a device, so a pair that certainly touches may be another cell's.
+    // Which pairs a cell owns is not known on a device, so a pair that certainly touches may be
+    // another cell's.
     let sought = match job.plan.has_cell() {
         false => job.plan.goal,
         true => Goal::All,
@@ -116,8 +118,9 @@ pub(super) fn find_in_step(
 
 /// A device, and with `Backend::Auto` the CPU for frames of new bodies.
 ///
-/// Every method of the device works on clusters, which the host makes. That takes the host about twice as long as the whole
-/// frame takes in its own grid. So `Method::Auto` answers such a frame there, by the rule of the CPU backend.
+/// Every method of the device works on clusters, which the host makes. That takes the host about
+/// twice as long as the whole frame takes in its own grid. So `Method::Auto` answers such a frame
+/// there, by the rule of the CPU backend.
 pub(super) struct OnDevice<'a> {
     pub engine: &'a mut Engine,
     pub cpu: Option<&'a mut Cpu>,
@@ -180,8 +183,8 @@ impl Detector {
         Ok(detector)
     }
 
-    /// Whether each question is also answered launch by launch, with what each kernel has written read back: slow. For finding
-    /// the launch that goes wrong: see [`ran`](Detector::ran).
+    /// Whether each question is also answered launch by launch, with what each kernel has written
+    /// read back: slow. For finding the launch that goes wrong: see [`ran`](Detector::ran).
     #[doc(hidden)]
     pub fn trace(&mut self, is_traced: bool) {
         if let Some(engine) = &mut self.gpu {
@@ -189,7 +192,8 @@ impl Detector {
         }
     }
 
-    /// The last pass of the last question that a device has answered: its launches as data, to be printed.
+    /// The last pass of the last question that a device has answered: its launches as data, to be
+    /// printed.
     #[doc(hidden)]
     pub fn recording(&self) -> Option<&Recording> {
         let engine = self.gpu.as_ref()?;
@@ -203,17 +207,20 @@ impl Detector {
         engine.map_or(&[], |engine| &engine.lane.ran)
     }
 
-    /// Bytes of topology and positions on the device. For tests: statistics add the buffers for results.
+    /// Bytes of topology and positions on the device. For tests: statistics add the buffers for
+    /// results.
     #[doc(hidden)]
     pub fn bytes_on_device(&self) -> u64 {
         self.gpu.as_ref().map_or(0, Engine::bytes_of_world)
     }
 
     /// A detector on the caller's device, which must allow 8 storage buffers per stage and
-    /// workgroups of 256 (WebGPU's defaults do). `settings.backend` and `settings.device` are ignored.
+    /// workgroups of 256 (WebGPU's defaults do). `settings.backend` and `settings.device` are
+    /// ignored.
     ///
-    /// Such a detector answers like any other, and also through [`gpu`](Detector::gpu), where positions and pairs stay on the
-    /// device. This constructor waits for nothing, so it works in a browser too. Kernels are compiled when the first frame needs them.
+    /// Such a detector answers like any other, and also through [`gpu`](Detector::gpu), where
+    /// positions and pairs stay on the device. This constructor waits for nothing, so it works in a
+    /// browser too. Kernels are compiled when the first frame needs them.
     ///
     /// # Errors
     /// A setting out of its range; a device that allows too little.
@@ -225,8 +232,8 @@ impl Detector {
         Detector::on(Gpu::of_caller(device, queue)?, settings)
     }
 
-    /// [`with_device`](Detector::with_device), with one line of one kernel replaced. For tests: answers
-    /// may be wrong.
+    /// [`with_device`](Detector::with_device), with one line of one kernel replaced. For tests:
+    /// answers may be wrong.
     ///
     /// # Errors
     /// As `with_device`; a kernel without this line.

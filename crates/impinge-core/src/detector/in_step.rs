@@ -46,7 +46,8 @@ pub(super) struct InStep<'a> {
 pub(super) struct Seen {
     /// Whether a device has found that something touches; then the list of contacts may be empty.
     pub touches: bool,
-    /// The pairs that rounded positions may make touch, up to the earliest contact, by kind and key, if known.
+    /// The pairs that rounded positions may make touch, up to the earliest contact, by kind and
+    /// key, if known.
     pub close: Option<PairList>,
 }
 

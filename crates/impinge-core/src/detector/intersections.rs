@@ -26,8 +26,8 @@ impl Detector {
     /// All pairs that the query asks for, in the current state of the scene.
     ///
     /// # Errors
-    /// A stale id, refused positions, more pairs than allowed, no memory for the answer, a memory budget too small for
-    /// one batch and the answer, a GPU failure.
+    /// A stale id, refused positions, more pairs than allowed, no memory for the answer, a memory
+    /// budget too small for one batch and the answer, a GPU failure.
     pub fn detect(&mut self, scene: &Scene, query: &Query) -> Result<Pairs, Error> {
         let control = &self.control.clone();
         let plan = Plan::intersections(scene, query, Goal::All, self.settings.limits())?;
@@ -36,8 +36,8 @@ impl Detector {
         Ok(pairs)
     }
 
-    /// How many pairs [`detect`](Detector::detect) would find. None of them is held, so there may be more than memory
-    /// has room for.
+    /// How many pairs [`detect`](Detector::detect) would find. None of them is held, so there may
+    /// be more than memory has room for.
     ///
     /// # Errors
     /// As `detect`.
@@ -48,10 +48,11 @@ impl Detector {
         self.wait_for(scene, &plan, control, &mut pairs)
     }
 
-    /// Whether [`detect`](Detector::detect) would find any pair. The search ends with the first one that is certain.
+    /// Whether [`detect`](Detector::detect) would find any pair. The search ends with the first one
+    /// that is certain.
     ///
-    /// That pair is not given: which one comes first depends on the threads. For one that is the same on every run take
-    /// the first of all pairs.
+    /// That pair is not given: which one comes first depends on the threads. For one that is the
+    /// same on every run take the first of all pairs.
     ///
     /// # Errors
     /// As `detect`; but any number of pairs is allowed.
@@ -69,8 +70,9 @@ impl Detector {
         Ok(any)
     }
 
-    /// The question whether any elements meet, which is also that for the nearest bodies. Of many bodies it takes longer to list them than to
-    /// answer: it is kept until bodies are added or changed other than in their positions.
+    /// The question whether any elements meet, which is also that for the nearest bodies. Of many
+    /// bodies it takes longer to list them than to answer: it is kept until bodies are added or
+    /// changed other than in their positions.
     pub(super) fn plan_of_any(&mut self, scene: &Scene, query: &Query) -> Result<Plan, Error> {
         match self.any.take() {
             Some(kept) if kept.arrangement == scene.arrangement() && kept.query == *query => {
@@ -89,8 +91,9 @@ impl Detector {
         });
     }
 
-    /// [`detect`](Detector::detect) without blocking. On a GPU the future waits for the device, which must be
-    /// polled meanwhile (a browser does that; natively call `wgpu::Device::poll`). On the CPU it is ready at once.
+    /// [`detect`](Detector::detect) without blocking. On a GPU the future waits for the device,
+    /// which must be polled meanwhile (a browser does that; natively call `wgpu::Device::poll`). On
+    /// the CPU it is ready at once.
     ///
     /// # Errors
     /// As `detect`.
@@ -168,7 +171,8 @@ impl Detector {
         ready(self.answer(scene, plan, control, pairs))
     }
 
-    /// One frame. With `Backend::Auto`, the CPU takes over for good if the GPU fails or cannot hold the scene.
+    /// One frame. With `Backend::Auto`, the CPU takes over for good if the GPU fails or cannot hold
+    /// the scene.
     async fn answer(
         &mut self,
         scene: &Scene,

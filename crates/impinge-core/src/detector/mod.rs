@@ -1,5 +1,5 @@
-//! The detector that users hold: one file per kind of question. Each makes a plan, picks what finds its pairs, and has the
-//! loop (`run`) do the rest.
+//! The detector that users hold: one file per kind of question. Each makes a plan, picks what finds
+//! its pairs, and has the loop (`run`) do the rest.
 
 mod advance;
 mod candidates;
@@ -79,7 +79,8 @@ pub struct Detector {
     gpu: Option<crate::gpu::Engine>,
 }
 
-/// Where the buffers of dropped answers are. With a memory budget they are freed: they would count twice.
+/// Where the buffers of dropped answers are. With a memory budget they are freed: they would count
+/// twice.
 struct Homes {
     pairs: Home<Pairs>,
     impacts: Home<Impacts>,
@@ -174,15 +175,16 @@ impl Detector {
         &self.settings
     }
 
-    /// What all later questions heed: a token to stop them, a callback to watch them. Until it is called, there is none.
+    /// What all later questions heed: a token to stop them, a callback to watch them. Until it is
+    /// called, there is none.
     ///
     /// A token that was cancelled stays so: set another control before the next question.
     pub fn set_control(&mut self, control: Control) {
         self.control = control;
     }
 
-    /// How the last question was answered, whatever it was, and if it failed how far: stages, counts, bytes. Answers have their
-    /// own, too: [`Pairs::stats`].
+    /// How the last question was answered, whatever it was, and if it failed how far: stages,
+    /// counts, bytes. Answers have their own, too: [`Pairs::stats`].
     pub fn stats(&self) -> &Stats {
         &self.stats
     }

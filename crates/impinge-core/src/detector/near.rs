@@ -23,17 +23,21 @@ use impinge_exact::internal::{NearestOfElements, closest_of_elements, nearest_of
 const TASK: usize = 1024;
 
 impl Detector {
-    /// All pairs of elements whose distance is at most `distance` plus the [thickness](Scene::set_thickness) of both bodies, at the
-    /// bodies' positions, in the unit of the scene; of two elements of one body, plus twice its thickness. End positions are ignored.
-    /// Each pair comes with its nearest features and, on request, with its distance and nearest points.
+    /// All pairs of elements whose distance is at most `distance` plus the
+    /// [thickness](Scene::set_thickness) of both bodies, at the bodies' positions, in the unit of
+    /// the scene; of two elements of one body, plus twice its thickness. End positions are ignored.
+    /// Each pair comes with its nearest features and, on request, with its distance and nearest
+    /// points.
     ///
-    /// The answer is exact: a pair is reported if and only if the distance of the two closed elements, as a real number,
-    /// is at most the distance asked for, which is a sum of real numbers: nothing is rounded. A body of tetrahedra takes part with its
-    /// surface. Pairs of one body that share a vertex are left out.
+    /// The answer is exact: a pair is reported if and only if the distance of the two closed
+    /// elements, as a real number, is at most the distance asked for, which is a sum of real
+    /// numbers: nothing is rounded. A body of tetrahedra takes part with its surface. Pairs of one
+    /// body that share a vertex are left out.
     ///
-    /// An edge and a face ([`PairKind::EdgeFace`]) are reported if and only if they meet, whatever the distance: their distance is 0. If
-    /// they do not meet but are near, then so are the edge and an edge of the face, or an end of the edge and the face, and these pairs
-    /// say it: with each of them repeated, answers would have three times as many pairs.
+    /// An edge and a face ([`PairKind::EdgeFace`]) are reported if and only if they meet, whatever
+    /// the distance: their distance is 0. If they do not meet but are near, then so are the edge
+    /// and an edge of the face, or an end of the edge and the face, and these pairs say it: with
+    /// each of them repeated, answers would have three times as many pairs.
     ///
     /// ```
     /// use impinge::{Backend, Detector, PairKind, Query, Scene};
@@ -52,8 +56,8 @@ impl Detector {
     /// ```
     ///
     /// # Errors
-    /// A stale id, refused positions, a distance or thickness that is negative or not finite, a memory budget too small for
-    /// even one batch.
+    /// A stale id, refused positions, a distance or thickness that is negative or not finite, a
+    /// memory budget too small for even one batch.
     pub fn near(
         &mut self,
         scene: &Scene,

@@ -12,16 +12,18 @@ use crate::scene::positions::Real;
 use crate::search::work::Work;
 
 impl Detector {
-    /// Where each point lies: inside a body (1), on its surface (0) or outside (-1). Decided exactly, also for points on faces,
-    /// edges and vertices and in their planes.
+    /// Where each point lies: inside a body (1), on its surface (0) or outside (-1). Decided
+    /// exactly, also for points on faces, edges and vertices and in their planes.
     ///
-    /// Triangles must be a closed surface: every edge has as many faces along it as against it. A point is inside where the
-    /// surface winds around it a number of times that is not 0, whichever way. So an outer shell and an inner one of the opposite
-    /// orientation have a hollow between them, and where two shells of one orientation overlap is inside. A point on any face is on
+    /// Triangles must be a closed surface: every edge has as many faces along it as against it. A
+    /// point is inside where the surface winds around it a number of times that is not 0, whichever
+    /// way. So an outer shell and an inner one of the opposite orientation have a hollow between
+    /// them, and where two shells of one orientation overlap is inside. A point on any face is on
     /// the surface.
     ///
-    /// Of tetrahedra, a point is inside if it is strictly inside one of them, or on faces of theirs that are not the border of
-    /// the body: faces that belong to one tetrahedron alone are the border, and the surface.
+    /// Of tetrahedra, a point is inside if it is strictly inside one of them, or on faces of theirs
+    /// that are not the border of the body: faces that belong to one tetrahedron alone are the
+    /// border, and the surface.
     ///
     /// ```
     /// use impinge::{Backend, Detector, Scene};
@@ -37,8 +39,9 @@ impl Detector {
     /// ```
     ///
     /// # Errors
-    /// A stale id, a body of points or edges, a surface that is not closed (the error names an edge), positions or points that
-    /// are not finite, a memory budget too small for the trees of the body.
+    /// A stale id, a body of points or edges, a surface that is not closed (the error names an
+    /// edge), positions or points that are not finite, a memory budget too small for the trees of
+    /// the body.
     pub fn contains<R: Real>(
         &mut self,
         scene: &Scene,
@@ -51,15 +54,18 @@ impl Detector {
         })
     }
 
-    /// The element that is nearest to each point, if it is at most `most` away, in the unit of the scene: with its distance, the
-    /// nearest point of it and the feature on which that lies. Elements are the faces of bodies of triangles and of tetrahedra (their
-    /// surface, so a point inside has a distance), and the edges and points of other bodies.
+    /// The element that is nearest to each point, if it is at most `most` away, in the unit of the
+    /// scene: with its distance, the nearest point of it and the feature on which that lies.
+    /// Elements are the faces of bodies of triangles and of tetrahedra (their surface, so a point
+    /// inside has a distance), and the edges and points of other bodies.
     ///
-    /// Which element is nearest is decided exactly; of several at the same distance it is the lowest by body and then by
-    /// number. Distances are rounded down: never above the true one. Points are rounded to nearest.
+    /// Which element is nearest is decided exactly; of several at the same distance it is the
+    /// lowest by body and then by number. Distances are rounded down: never above the true one.
+    /// Points are rounded to nearest.
     ///
-    /// A query for all bodies, the default, or [`Query::of`] one or [`Query::across`] several, which then are those that are
-    /// looked at. Cost: per point a way down the tree of each body whose box may hold the nearest element.
+    /// A query for all bodies, the default, or [`Query::of`] one or [`Query::across`] several,
+    /// which then are those that are looked at. Cost: per point a way down the tree of each body
+    /// whose box may hold the nearest element.
     ///
     /// ```
     /// use impinge::{Backend, Detector, Query, Scene, exact::Feature};
@@ -78,8 +84,8 @@ impl Detector {
     /// ```
     ///
     /// # Errors
-    /// A stale id, a query about pairs, a distance that is negative or NaN, positions or points that are not finite, a memory budget
-    /// too small for the trees of the bodies.
+    /// A stale id, a query about pairs, a distance that is negative or NaN, positions or points
+    /// that are not finite, a memory budget too small for the trees of the bodies.
     pub fn closest<R: Real>(
         &mut self,
         scene: &Scene,
@@ -97,12 +103,14 @@ impl Detector {
         Ok(closest)
     }
 
-    /// What each ray hits: the points `origin + t direction`, for t from 0 to `most` (1 for segments, infinity for rays). The
-    /// first hit, and with [`Query::hits`] whether there is any, or all. Elements are those of [`closest`](Detector::closest).
+    /// What each ray hits: the points `origin + t direction`, for t from 0 to `most` (1 for
+    /// segments, infinity for rays). The first hit, and with [`Query::hits`] whether there is any,
+    /// or all. Elements are those of [`closest`](Detector::closest).
     ///
-    /// Decided exactly: a ray that grazes an edge or a vertex hits all elements there, and one in the plane of a face hits it
-    /// from an entry to an exit. The first hit is the one with the smallest t; of several it is the lowest by body and then by
-    /// number. Values of t are rounded down. A direction of zero is the origin alone.
+    /// Decided exactly: a ray that grazes an edge or a vertex hits all elements there, and one in
+    /// the plane of a face hits it from an entry to an exit. The first hit is the one with the
+    /// smallest t; of several it is the lowest by body and then by number. Values of t are rounded
+    /// down. A direction of zero is the origin alone.
     ///
     /// ```
     /// use impinge::{Backend, Detector, Query, Scene};
@@ -120,8 +128,9 @@ impl Detector {
     /// ```
     ///
     /// # Errors
-    /// A stale id, a query about pairs, a `most` that is negative or NaN, another number of directions than of origins, positions or rays
-    /// that are not finite, a memory budget too small for the trees of the bodies.
+    /// A stale id, a query about pairs, a `most` that is negative or NaN, another number of
+    /// directions than of origins, positions or rays that are not finite, a memory budget too small
+    /// for the trees of the bodies.
     pub fn cast<R: Real>(
         &mut self,
         scene: &Scene,
@@ -140,7 +149,8 @@ impl Detector {
         Ok(hits)
     }
 
-    /// Asks about some points or rays, and measures it. `ask` also says how many bytes it holds beside trees and probes.
+    /// Asks about some points or rays, and measures it. `ask` also says how many bytes it holds
+    /// beside trees and probes.
     fn probe<T>(
         &mut self,
         n: usize,

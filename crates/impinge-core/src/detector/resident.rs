@@ -32,22 +32,23 @@ impl Detector {
 }
 
 impl Gpu<'_> {
-    /// Encodes a whole frame into the caller's encoder: positions come from buffers on the device and
-    /// pairs stay there. Nothing is read back.
+    /// Encodes a whole frame into the caller's encoder: positions come from buffers on the device
+    /// and pairs stay there. Nothing is read back.
     ///
-    /// `positions` names bodies whose positions are taken from a buffer: `(v, 3)` f32 tightly packed,
-    /// with the usage `COPY_SRC`, copied when the encoder's commands run; other bodies' positions
-    /// come from the scene. For the named bodies, the scene's positions only serve to find clusters,
-    /// once. Positions on the device are not checked: if one is not finite, the pairs of
-    /// its primitives are unspecified.
+    /// `positions` names bodies whose positions are taken from a buffer: `(v, 3)` f32 tightly
+    /// packed, with the usage `COPY_SRC`, copied when the encoder's commands run; other bodies'
+    /// positions come from the scene. For the named bodies, the scene's positions only serve to
+    /// find clusters, once. Positions on the device are not checked: if one is not finite, the
+    /// pairs of its primitives are unspecified.
     ///
-    /// At most one frame of a detector may be encoded per submission. Pairs of which the filter on the device is
-    /// unsure come in a separate list. If there is not enough room, the lists are incomplete and
-    /// their counts say so, see [`ResidentPairs`]; [`grow`](Gpu::grow) then grows them.
+    /// At most one frame of a detector may be encoded per submission. Pairs of which the filter on
+    /// the device is unsure come in a separate list. If there is not enough room, the lists are
+    /// incomplete and their counts say so, see [`ResidentPairs`]; [`grow`](Gpu::grow) then grows
+    /// them.
     ///
     /// # Errors
-    /// A stale id, a buffer that is too small or lacks its usage, a detector without a GPU. Device errors
-    /// go to the device's owner, and so do those of kernels, which the first frame compiles.
+    /// A stale id, a buffer that is too small or lacks its usage, a detector without a GPU. Device
+    /// errors go to the device's owner, and so do those of kernels, which the first frame compiles.
     pub fn encode(
         &mut self,
         scene: &Scene,
@@ -74,26 +75,31 @@ impl Gpu<'_> {
         engine.encode(job, positions, encoder)
     }
 
-    /// Encodes a whole step into the caller's encoder: positions at the start and at the end come from buffers on the device,
-    /// and the pairs of elements that may touch stay there. Nothing is read back.
+    /// Encodes a whole step into the caller's encoder: positions at the start and at the end come
+    /// from buffers on the device, and the pairs of elements that may touch stay there. Nothing is
+    /// read back.
     ///
-    /// The pairs are those of [`impacts`](Detector::impacts), and others that the filter on the device does not prove free: a
-    /// superset of the impacts, for a solver that treats every pair of the list as one that may touch. Whether pairs touch at the start
-    /// makes no difference, nor does the precision of times that is asked for.
+    /// The pairs are those of [`impacts`](Detector::impacts), and others that the filter on the
+    /// device does not prove free: a superset of the impacts, for a solver that treats every pair
+    /// of the list as one that may touch. Whether pairs touch at the start makes no difference, nor
+    /// does the precision of times that is asked for.
     ///
-    /// `starts` and `ends` name bodies whose positions at that end are taken from a buffer: `(v, 3)` f32 tightly packed, with the
-    /// usage `COPY_SRC`, copied when the encoder's commands run. All other positions come from the scene. A body that has no positions
-    /// at the end, in a buffer or in the scene, does not move. For bodies named in `starts`, the scene's positions only serve to
-    /// find clusters, once. Positions on the device are not checked: if one is not finite, the pairs of its elements are unspecified.
+    /// `starts` and `ends` name bodies whose positions at that end are taken from a buffer:
+    /// `(v, 3)` f32 tightly packed, with the usage `COPY_SRC`, copied when the encoder's commands
+    /// run. All other positions come from the scene. A body that has no positions at the end, in a
+    /// buffer or in the scene, does not move. For bodies named in `starts`, the scene's positions
+    /// only serve to find clusters, once. Positions on the device are not checked: if one is not
+    /// finite, the pairs of its elements are unspecified.
     ///
-    /// At most one step of a detector may be encoded per submission, besides one frame of [`encode`](Gpu::encode). If there
-    /// is not enough room, the list is incomplete and its count says so, see [`ResidentStep`];
-    /// [`grow`](Gpu::grow) then grows it.
+    /// At most one step of a detector may be encoded per submission, besides one frame of
+    /// [`encode`](Gpu::encode). If there is not enough room, the list is incomplete and its count
+    /// says so, see [`ResidentStep`]; [`grow`](Gpu::grow) then grows it.
     ///
     /// # Errors
-    /// A stale id, a buffer that is too small or lacks its usage, a step with a separation, a clearance or a filter, or for one cell, a step larger than the
-    /// device or the memory budget can hold, a detector without a GPU. Device errors go to the device's owner, and so do those of
-    /// kernels, which the first step compiles.
+    /// A stale id, a buffer that is too small or lacks its usage, a step with a separation, a
+    /// clearance or a filter, or for one cell, a step larger than the device or the memory budget
+    /// can hold, a detector without a GPU. Device errors go to the device's owner, and so do those
+    /// of kernels, which the first step compiles.
     pub fn encode_step(
         &mut self,
         scene: &Scene,
@@ -154,21 +160,23 @@ impl Gpu<'_> {
         engine.encode_step(job, &clusterings, [starts, ends], encoder)
     }
 
-    /// The positions of a body in the buffer from which the last frame read them, `(v, 3)` f32 tightly packed, and the offset
-    /// of the first byte: to draw what was tested without another upload. The buffer has the usage `COPY_SRC`; the next
-    /// frame may write other positions into it, or replace it.
+    /// The positions of a body in the buffer from which the last frame read them, `(v, 3)` f32
+    /// tightly packed, and the offset of the first byte: to draw what was tested without another
+    /// upload. The buffer has the usage `COPY_SRC`; the next frame may write other positions into
+    /// it, or replace it.
     ///
-    /// `None` if they are not there: the last frame was answered on the CPU or in pieces, the body did not take part in it, has
-    /// f64 positions, or has moved since.
+    /// `None` if they are not there: the last frame was answered on the CPU or in pieces, the body
+    /// did not take part in it, has f64 positions, or has moved since.
     pub fn positions(&self, scene: &Scene, body: BodyId) -> Option<(wgpu::Buffer, u64)> {
         let engine = self.detector.gpu.as_ref()?;
         let (buffer, offset) = engine.positions_of(body, scene.body(body).ok()?)?;
         Some((buffer.clone(), offset))
     }
 
-    /// Reads the counts of the last encoded frame, and of the last encoded step, whose commands must have been submitted, and
-    /// grows the lists that were too small. Returns whether both were complete; if not, encode them again. To be called
-    /// before the detector answers another question.
+    /// Reads the counts of the last encoded frame, and of the last encoded step, whose commands
+    /// must have been submitted, and grows the lists that were too small. Returns whether both were
+    /// complete; if not, encode them again. To be called before the detector answers another
+    /// question.
     ///
     /// # Errors
     /// A lost device; lists larger than it can bind; a memory budget that does not allow them.

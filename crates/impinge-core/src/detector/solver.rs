@@ -1,4 +1,5 @@
-//! What penetration-free solvers ask in every iteration: how far each vertex may move, and which elements are near each element.
+//! What penetration-free solvers ask in every iteration: how far each vertex may move, and which
+//! elements are near each element.
 //!
 //! ```text
 //! near pairs (keys)  ->  Measured    a number below the distance of each pair, in parallel
@@ -37,23 +38,28 @@ const TASK: usize = 1024;
 pub(super) struct SolverMemory {
     pub keys: KeysByKind,
     distances: [Vec<f64>; PairKind::ALL.len()],
-    /// Of each vertex of each body, the bits of the least share: floats of at least 0 are in the order of their bits.
+    /// Of each vertex of each body, the bits of the least share: floats of at least 0 are in the
+    /// order of their bits.
     least: Vec<AtomicU64>,
 }
 
 impl Detector {
-    /// How far each vertex may move, on any path, so that nothing touches: for each pair of elements that do not share a vertex, the
-    /// largest number of the vertices of one and the largest of the other add up to less than their distance, minus the
-    /// [thickness](Scene::set_thickness) of both bodies. No number is above `most`, which is a length in the unit of the scene.
+    /// How far each vertex may move, on any path, so that nothing touches: for each pair of
+    /// elements that do not share a vertex, the largest number of the vertices of one and the
+    /// largest of the other add up to less than their distance, minus the
+    /// [thickness](Scene::set_thickness) of both bodies. No number is above `most`, which is a
+    /// length in the unit of the scene.
     ///
-    /// Both elements get half of the distance; what is [fixed](Query::fixed) gets 0 and leaves all of it to the other. Each number is
-    /// rounded down: it is below what the smallest distance of its vertex allows by at most 2^-10 of it, and never above.
-    /// Pairs that touch get 0, and are [named](SafeDistances::touching). If there are any, what they have in common is no
-    /// longer ruled out: it is for the caller to part them.
+    /// Both elements get half of the distance; what is [fixed](Query::fixed) gets 0 and leaves all
+    /// of it to the other. Each number is rounded down: it is below what the smallest distance of
+    /// its vertex allows by at most 2^-10 of it, and never above. Pairs that touch get 0, and are
+    /// [named](SafeDistances::touching). If there are any, what they have in common is no longer
+    /// ruled out: it is for the caller to part them.
     ///
-    /// So a solver may move every vertex by its number, in any direction and in any order, and needs no test in between. The motion
-    /// of a vertex is what it really does: rounding of its new position counts. The bodies' end positions are ignored, and so are
-    /// pairs of elements of one body that share a vertex, which no numbers above 0 could keep apart.
+    /// So a solver may move every vertex by its number, in any direction and in any order, and
+    /// needs no test in between. The motion of a vertex is what it really does: rounding of its new
+    /// position counts. The bodies' end positions are ignored, and so are pairs of elements of one
+    /// body that share a vertex, which no numbers above 0 could keep apart.
     ///
     /// ```
     /// use impinge::{Backend, Bounds, Detector, Query, Scene};
@@ -70,7 +76,8 @@ impl Detector {
     /// ```
     ///
     /// # Errors
-    /// As [`near`](Detector::near), with a `most` that is negative or not finite, and for fixed bodies that are not in the scene.
+    /// As [`near`](Detector::near), with a `most` that is negative or not finite, and for fixed
+    /// bodies that are not in the scene.
     pub fn safe_distances(
         &mut self,
         scene: &Scene,
@@ -96,8 +103,9 @@ impl Detector {
         found.map(|_| safe)
     }
 
-    /// The pairs of [`near`](Detector::near) as lists: of each vertex the faces near it, of each face the vertices, of each edge the
-    /// edges, and so on for the kinds that the query asks for. Each neighbour comes with its distance, rounded down.
+    /// The pairs of [`near`](Detector::near) as lists: of each vertex the faces near it, of each
+    /// face the vertices, of each edge the edges, and so on for the kinds that the query asks for.
+    /// Each neighbour comes with its distance, rounded down.
     ///
     /// ```
     /// use impinge::{Backend, Detector, Query, Scene};
@@ -137,12 +145,14 @@ impl Detector {
 struct Measured<'a> {
     parts: [PartIx; 2],
     corners: [&'a [u32]; 2],
-    /// A number below its distance minus the thickness of both bodies; 0 if and only if that is not above 0.
+    /// A number below its distance minus the thickness of both bodies; 0 if and only if that is not
+    /// above 0.
     distance: f64,
 }
 
 impl SolverMemory {
-    /// Takes keys with labels off, and measures the distance of each pair, in parallel. `each` is told of each pair.
+    /// Takes keys with labels off, and measures the distance of each pair, in parallel. `each` is
+    /// told of each pair.
     ///
     /// # Errors
     /// There is no memory, cancellation.
@@ -289,8 +299,8 @@ impl Outcome<u64, { PairKind::ALL.len() }> for Safe<'_> {
     }
 }
 
-/// How far the vertices of either element of a pair may move, so that both together move less than a number. Neither has to share with
-/// what is fixed.
+/// How far the vertices of either element of a pair may move, so that both together move less than
+/// a number. Neither has to share with what is fixed.
 fn shares(distance: f64, are_fixed: [bool; 2]) -> [f64; 2] {
     match are_fixed {
         [true, true] => [0.0; 2],

@@ -1,5 +1,5 @@
-//! A detector's answers about a step: which elements touch while bodies move from their positions to their end positions,
-//! and when first.
+//! A detector's answers about a step: which elements touch while bodies move from their positions
+//! to their end positions, and when first.
 
 use super::Detector;
 use super::in_step::{InStep, Keys, Seen};
@@ -108,19 +108,23 @@ impl Detector {
     /// All pairs of elements that touch during a step, each with the first time at which they do.
     ///
     /// In: a scene whose bodies have positions, and end positions if they move
-    /// ([`Scene::set_end_positions`]). Every vertex moves on a straight line at constant speed, from time 0 to time 1. Pairs
-    /// are a vertex and a face, or two edges. Between bodies of edges or points alone, they are also an edge and a vertex, and
-    /// between bodies of points two vertices. Tetrahedra take part with their surface. Pairs of one body that share a vertex
-    /// are not reported.
+    /// ([`Scene::set_end_positions`]). Every vertex moves on a straight line at constant speed,
+    /// from time 0 to time 1. Pairs are a vertex and a face, or two edges. Between bodies of edges
+    /// or points alone, they are also an edge and a vertex, and between bodies of points two
+    /// vertices. Tetrahedra take part with their surface. Pairs of one body that share a vertex are
+    /// not reported.
     ///
-    /// The answer is exact: a pair is reported if and only if the two closed elements share a point at some time, and its
-    /// time is that of the first contact, rounded down: `toi <= first < toi.next_up()`. With a
-    /// [separation](Query::separation), the same holds of the first time at which their distance is at most that, and with a
+    /// The answer is exact: a pair is reported if and only if the two closed elements share a point
+    /// at some time, and its time is that of the first contact, rounded down:
+    /// `toi <= first < toi.next_up()`. With a [separation](Query::separation), the same holds of
+    /// the first time at which their distance is at most that, and with a
     /// [clearance](Query::clearance), of the first time at which a pair is as near as it may come.
     ///
-    /// On a GPU the device finds the pairs that may touch, and the CPU finds their times, on all threads: the answer is the same to the
-    /// last bit. The CPU answers alone if there is a separation, a clearance or a filter, or if the device or the memory budget cannot hold the step; in a
-    /// browser it always does. [`Stats::backend`](crate::Stats::backend) says who answered.
+    /// On a GPU the device finds the pairs that may touch, and the CPU finds their times, on all
+    /// threads: the answer is the same to the last bit. The CPU answers alone if there is a
+    /// separation, a clearance or a filter, or if the device or the memory budget cannot hold the
+    /// step; in a browser it always does. [`Stats::backend`](crate::Stats::backend) says who
+    /// answered.
     ///
     /// ```
     /// use impinge::{Backend, Detector, PairKind, Query, Scene};
@@ -139,8 +143,8 @@ impl Detector {
     /// ```
     ///
     /// # Errors
-    /// A stale id, refused positions, more pairs than allowed, no memory for the answer, a memory budget too small for
-    /// one batch and the answer.
+    /// A stale id, refused positions, more pairs than allowed, no memory for the answer, a memory
+    /// budget too small for one batch and the answer.
     pub fn impacts(&mut self, scene: &Scene, query: &Query) -> Result<Impacts, Error> {
         let control = &self.control.clone();
         let plan = Plan::contacts(scene, query, Goal::All, self.limits_of_impacts())?;
@@ -151,8 +155,8 @@ impl Detector {
         found.map(|_| impacts)
     }
 
-    /// The earliest impact; of several at the same time, the one whose row comes first. `None` if the step is free.
-    /// The same as [`Impacts::earliest`] of all impacts, but found faster.
+    /// The earliest impact; of several at the same time, the one whose row comes first. `None` if
+    /// the step is free. The same as [`Impacts::earliest`] of all impacts, but found faster.
     ///
     /// # Errors
     /// As [`impacts`](Detector::impacts).
@@ -161,20 +165,23 @@ impl Detector {
         let plan = Plan::contacts(scene, query, Goal::Earliest, self.limits_of_steps())?;
         let start = self.verify(scene, query)?;
         self.find_contacts(scene, &plan, control, (start, false))?;
-        // The first contact and all whose times may round to the same time have been found, and some later ones.
+        // The first contact and all whose times may round to the same time have been found, and
+        // some later ones.
         Ok(self.steps.contacts.first(plan.precision))
     }
 
-    /// Whether elements intersect at the start of the step that was asked about last; `None` if that was not asked, which
-    /// only [`Start::Verify`] does.
+    /// Whether elements intersect at the start of the step that was asked about last; `None` if
+    /// that was not asked, which only [`Start::Verify`] does.
     pub fn start_intersects(&self) -> Option<bool> {
         self.steps.start_intersects
     }
 
-    /// Whether nothing touches during the step. With [`Start::Skip`], pairs that touch at its start do not count.
+    /// Whether nothing touches during the step. With [`Start::Skip`], pairs that touch at its start
+    /// do not count.
     ///
-    /// If the start was free of intersections, so is each moment of a free step. Of bodies that already pass through each other it
-    /// says nothing, unless [`Start::Verify`] asks: then a step whose start intersects is not free.
+    /// If the start was free of intersections, so is each moment of a free step. Of bodies that
+    /// already pass through each other it says nothing, unless [`Start::Verify`] asks: then a step
+    /// whose start intersects is not free.
     ///
     /// # Errors
     /// As [`impacts`](Detector::impacts).
@@ -234,7 +241,8 @@ impl Detector {
         self.stats.clone_from(contacts.impacts.stats());
     }
 
-    /// Finds the contacts that are sought, in any order unless all are. `names`: whether they are the impacts of an answer.
+    /// Finds the contacts that are sought, in any order unless all are. `names`: whether they are
+    /// the impacts of an answer.
     pub(super) fn find_contacts(
         &mut self,
         scene: &Scene,

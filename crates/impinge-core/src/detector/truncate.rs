@@ -7,8 +7,9 @@
 //! again               for pairs of which a vertex was stopped since, until there are none
 //! ```
 //!
-//! Where the vertices are now is always rounded as it is stored, so what is asked last is the proof. In each round all pairs see the same
-//! positions, and of several shares of a way the least counts: the order does not matter.
+//! Where the vertices are now is always rounded as it is stored, so what is asked last is the
+//! proof. In each round all pairs see the same positions, and of several shares of a way the least
+//! counts: the order does not matter.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -38,21 +39,25 @@ use impinge_exact::{ElementPair, Point};
 const TASK: usize = 1024;
 
 impl Detector {
-    /// How far each vertex may go on its way to its end position, so that nothing touches: each vertex stops for itself, where
-    /// [`advance`](Detector::advance) stops all of them at one fraction of the step.
+    /// How far each vertex may go on its way to its end position, so that nothing touches: each
+    /// vertex stops for itself, where [`advance`](Detector::advance) stops all of them at one
+    /// fraction of the step.
     ///
-    /// The straight way from the start to the *rounded* positions is free in the sense of [`is_free`](Detector::is_free), if the start was
-    /// free of intersections, and except for pairs that touch at the start. Elements that are to keep a
-    /// [separation](Query::separation) or a [clearance](Query::clearance) do so at every moment.
+    /// The straight way from the start to the *rounded* positions is free in the sense of
+    /// [`is_free`](Detector::is_free), if the start was free of intersections, and except for pairs
+    /// that touch at the start. Elements that are to keep a [separation](Query::separation) or a
+    /// [clearance](Query::clearance) do so at every moment.
     ///
-    /// Elements that stay apart as they go the same way are not stopped. Where two come too near, the vertices that go towards the
-    /// other element stop before planes across their shortest way at the start, or at the end: if only one of them comes nearer, it gets all
-    /// of the room but a thousandth, and if both do, each gets a share of it, by how far it wants to go. So some vertices stop that
-    /// might have passed; the next step takes them farther.
+    /// Elements that stay apart as they go the same way are not stopped. Where two come too near,
+    /// the vertices that go towards the other element stop before planes across their shortest way
+    /// at the start, or at the end: if only one of them comes nearer, it gets all of the room but a
+    /// thousandth, and if both do, each gets a share of it, by how far it wants to go. So some
+    /// vertices stop that might have passed; the next step takes them farther.
     ///
-    /// The vertices of pairs that touch at the start, or are nearer than they are to keep, stay where they are, and
-    /// [are counted](Truncation::n_touching); under [`Start::Skip`] they go as far as other pairs let them. The seams of a mesh that was not
-    /// welded are refused by name. Found on the CPU.
+    /// The vertices of pairs that touch at the start, or are nearer than they are to keep, stay
+    /// where they are, and [are counted](Truncation::n_touching); under [`Start::Skip`] they go as
+    /// far as other pairs let them. The seams of a mesh that was not welded are refused by name.
+    /// Found on the CPU.
     ///
     /// ```
     /// use impinge::{Backend, Detector, Positions, Query, Scene};
@@ -75,8 +80,8 @@ impl Detector {
     /// As [`advance`](Detector::advance).
     ///
     /// # Sources
-    /// Divide and Truncate (Chen et al., SIGGRAPH 2026) for planes that divide the room between elements. Their proof in floats, and
-    /// for rounded positions, is ours.
+    /// Divide and Truncate (Chen et al., SIGGRAPH 2026) for planes that divide the room between
+    /// elements. Their proof in floats, and for rounded positions, is ours.
     pub fn truncate(&mut self, scene: &Scene, query: &Query) -> Result<Truncation, Error> {
         refuse_cell(query)?;
         let plan = Plan::truncation(scene, query, self.settings.limits())?;
@@ -153,7 +158,8 @@ impl Outcome<u64, { PairKind::ALL.len() }> for Truncated {
 /// How far each vertex of each body goes.
 struct Vertices {
     all: Vec<Vertex>,
-    /// The bits of the share of its way that each is to go at most: floats of at least 0 are in the order of their bits.
+    /// The bits of the share of its way that each is to go at most: floats of at least 0 are in the
+    /// order of their bits.
     most: Vec<AtomicU64>,
     /// The first vertex of the body of each part.
     firsts: Vec<usize>,
@@ -331,8 +337,8 @@ impl Ways {
         }
     }
 
-    /// Stops the vertices that go towards the other element, if the two do not stay apart. Returns also how far vertices may be taken
-    /// back before it has to be asked again.
+    /// Stops the vertices that go towards the other element, if the two do not stay apart. Returns
+    /// also how far vertices may be taken back before it has to be asked again.
     fn stop(&self, plan: &Plan, vertices: &Vertices) -> (State, f64) {
         let [start, now, end] = &self.times;
         let points = 0..self.pair.n_points();
@@ -387,8 +393,8 @@ impl<'a> Pairs<'a> {
         Ok(Pairs { job, all })
     }
 
-    /// Stops the vertices of all pairs that do not stay apart as they are now. Most need no second look: their vertices are not taken back
-    /// far enough.
+    /// Stops the vertices of all pairs that do not stay apart as they are now. Most need no second
+    /// look: their vertices are not taken back far enough.
     ///
     /// # Errors
     /// Cancellation.

@@ -1,8 +1,8 @@
 //! Typed buffers that grow.
 //!
 //! A [`Storage<T>`] is bound to kernels as [`Read<T>`] or [`Write<T>`], and kernels name the `T` of
-//! each binding: two swapped buffers do not compile. A buffer never exceeds the device's binding limit;
-//! the engine splits work that does not fit.
+//! each binding: two swapped buffers do not compile. A buffer never exceeds the device's binding
+//! limit; the engine splits work that does not fit.
 
 use std::future::Future;
 use std::marker::PhantomData;
@@ -87,8 +87,8 @@ impl<T: Pod> Storage<T> {
         (gpu.max_binding() / Self::SIZE).min(u64::from(u32::MAX))
     }
 
-    /// Binds exactly `len` elements; if it must grow, by a quarter more than needed. Growing loses the
-    /// contents.
+    /// Binds exactly `len` elements; if it must grow, by a quarter more than needed. Growing loses
+    /// the contents.
     ///
     /// # Errors
     /// More elements than one binding may hold.

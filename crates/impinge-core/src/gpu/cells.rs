@@ -29,8 +29,9 @@ const KEPT: u32 = 0;
 /// Slot of the arguments for launches over cells, 64 per workgroup.
 const CELLS: u32 = 1;
 
-/// The work of a pass in cells. To split a single cell over several passes takes tiles: every pass that fills lists does so in
-/// the order in which threads happen to come, so tiles would not hold the same primitives from pass to pass.
+/// The work of a pass in cells. To split a single cell over several passes takes tiles: every pass
+/// that fills lists does so in the order in which threads happen to come, so tiles would not hold
+/// the same primitives from pass to pass.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum CellWork {
     /// All of some cells.
@@ -63,7 +64,8 @@ impl CellWork {
         }
     }
 
-    /// Smaller parts; `None` if splitting does not help. `kept`: for how many kept primitives there was room.
+    /// Smaller parts; `None` if splitting does not help. `kept`: for how many kept primitives there
+    /// was room.
     pub fn split(self, collected: &Collected, kept: u64) -> Option<Vec<CellWork>> {
         match self {
             // The kept primitives do not depend on the cells.
@@ -77,7 +79,8 @@ impl CellWork {
         }
     }
 
-    /// The work that follows it. No other pass changes the list of a cell before the last of its tiles is done.
+    /// The work that follows it. No other pass changes the list of a cell before the last of its
+    /// tiles is done.
     pub fn next(self, collected: &Collected, group_size: u32) -> Option<CellWork> {
         let n_entries = collected.counts.needed.entries as u32;
         match self {
@@ -127,7 +130,8 @@ pub struct CellRange {
 }
 
 impl CellRange {
-    /// Two halves of the cells; `None` for a single cell. `n_cells`: the number of cells of the grid.
+    /// Two halves of the cells; `None` for a single cell. `n_cells`: the number of cells of the
+    /// grid.
     pub fn split(self, n_cells: u32) -> Option<[CellRange; 2]> {
         let count = self.count.min(n_cells.saturating_sub(self.first));
         let low = CellRange {
@@ -174,7 +178,8 @@ impl Tile {
         }
     }
 
-    /// Its quarters, except those with nothing on or above the diagonal; `None` for a single pair of groups.
+    /// Its quarters, except those with nothing on or above the diagonal; `None` for a single pair
+    /// of groups.
     pub fn split(self) -> Option<Vec<Tile>> {
         if self.side < 2 {
             return None;
@@ -222,8 +227,8 @@ impl fmt::Debug for Guest {
 }
 
 impl Guest {
-    /// A guest whose recorder is made by `make`: with no buffers at first, and anew after a device error. It records a pass for some cells,
-    /// with the density of cells.
+    /// A guest whose recorder is made by `make`: with no buffers at first, and anew after a device
+    /// error. It records a pass for some cells, with the density of cells.
     pub fn new(make: impl Fn() -> Box<Record> + Send + Sync + 'static) -> Self {
         let record = make();
         let make = Box::new(make);
@@ -348,7 +353,8 @@ impl Recorder<'_> {
         self.indirect(KEPT)
     }
 
-    /// Stage `bounds` of methods that work in a grid: the boxes of bodies, their reach, and the primitives within reach.
+    /// Stage `bounds` of methods that work in a grid: the boxes of bodies, their reach, and the
+    /// primitives within reach.
     pub fn bounds_within_reach(&mut self) {
         let (gpu, world, view, pass_buffers) = (self.gpu, self.world, self.view, self.pass_buffers);
         self.recording.clear(pass_buffers.tallies.all());
@@ -385,7 +391,8 @@ impl Recorder<'_> {
             .launch(&gpu.kernels.bounds_keep, &keep, groups);
     }
 
-    /// Stage `grid`, up to the ranges of kept primitives and their shift, with cells as dense as `lambda`.
+    /// Stage `grid`, up to the ranges of kept primitives and their shift, with cells as dense as
+    /// `lambda`.
     pub fn grid(&mut self, lambda: f64) {
         self.recording.stage("grid");
         let (gpu, pass_buffers) = (self.gpu, self.pass_buffers);

@@ -1,4 +1,5 @@
-//! The method `Clusters` as a recording. Steps have the same launches, with kernels for boxes at both ends and with a search.
+//! The method `Clusters` as a recording. Steps have the same launches, with kernels for boxes at
+//! both ends and with a search.
 //!
 //! ```text
 //! bounds     clusters · wide levels, one launch each · all narrow levels in one
@@ -19,7 +20,8 @@ use super::recording::{Recorder, Workgroups};
 use super::world::Motion;
 use crate::query::goal::Goal;
 
-/// Levels of up to this many nodes are refitted by one workgroup, in one launch with the levels above them.
+/// Levels of up to this many nodes are refitted by one workgroup, in one launch with the levels
+/// above them.
 const NARROW_LEVEL: u32 = 2048;
 /// Candidates per workgroup.
 const GROUP: u32 = 64;
@@ -238,7 +240,8 @@ impl Recorder<'_> {
     pub fn narrow(&mut self) {
         let (gpu, world, view, pass_buffers) = (self.gpu, self.world, self.view, self.pass_buffers);
         let groups = self.counted_candidates();
-        // Scenes without tetrahedra use a kernel without the code for solids, and the registers it needs.
+        // Scenes without tetrahedra use a kernel without the code for solids, and the registers it
+        // needs.
         let kernel = match world.has_solids {
             true => &gpu.kernels.narrow_solids,
             false => &gpu.kernels.narrow,
@@ -256,8 +259,9 @@ impl Recorder<'_> {
         self.recording.launch(kernel, &bindings, groups);
     }
 
-    /// Stage `narrow` of a step: the filter over all candidates, and a search of the pairs that it leaves. `sought`: which contacts the
-    /// host seeks; none if the results stay on the device, where pairs are named by global numbers.
+    /// Stage `narrow` of a step: the filter over all candidates, and a search of the pairs that it
+    /// leaves. `sought`: which contacts the host seeks; none if the results stay on the device,
+    /// where pairs are named by global numbers.
     fn narrow_step(&mut self, sought: Option<Goal>) {
         let (gpu, world, view, pass_buffers) = (self.gpu, self.world, self.view, self.pass_buffers);
         let groups = self.counted_candidates();

@@ -111,7 +111,8 @@ impl Collector {
         }
     }
 
-    /// Records what is read back: counters, the grid, and about as many keys as last time. `sought`: which contacts of a step are.
+    /// Records what is read back: counters, the grid, and about as many keys as last time.
+    /// `sought`: which contacts of a step are.
     pub fn record(
         &self,
         pass_buffers: &PassBuffers,

@@ -11,8 +11,8 @@ use crate::scene::error::Error;
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct DeviceInfo {
-    /// The name that the driver gives, or the interface's name if that is empty. Any part of it selects this device in
-    /// [`Settings::device`](crate::Settings::device).
+    /// The name that the driver gives, or the interface's name if that is empty. Any part of it
+    /// selects this device in [`Settings::device`](crate::Settings::device).
     pub name: String,
     /// The programming interface: `"vulkan"`, `"metal"`, `"dx12"`, or `"webgpu"` in a browser.
     pub interface: String,
@@ -143,7 +143,8 @@ impl Scopes {
         ])
     }
 
-    /// Closes immediately. The future returns the first error; out-of-memory comes before the errors that follow from it.
+    /// Closes immediately. The future returns the first error; out-of-memory comes before the
+    /// errors that follow from it.
     pub fn close(self) -> impl Future<Output = Result<(), Error>> {
         let [internal, validation, memory] = self.0;
         // Innermost first.

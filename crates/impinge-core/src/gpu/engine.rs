@@ -52,14 +52,16 @@ pub struct Engine {
     pub(super) world: World,
     /// The method of another crate that is run instead of `Cells`.
     pub(super) guest: Option<Guest>,
-    /// What the question at hand writes, and what the other kind of question has written: the caller may still read that.
+    /// What the question at hand writes, and what the other kind of question has written: the
+    /// caller may still read that.
     pub lane: Lane,
     pub(super) other: Lane,
     /// The counts of each complete pass of the last question.
     pub complete: Vec<PassCounts>,
     /// Keys that each worker has decided, until they are appended to the answer.
     pub(super) decided: Vec<Vec<u64>>,
-    /// Which contacts of a step the host seeks, and the least time by which some pair certainly touches, as far as passes have said.
+    /// Which contacts of a step the host seeks, and the least time by which some pair certainly
+    /// touches, as far as passes have said.
     pub(super) sought: Goal,
     pub(super) touches_by: Option<f32>,
     /// Whether passes are run launch by launch too.
@@ -127,7 +129,8 @@ pub(super) enum Outcome {
 }
 
 impl Engine {
-    /// Creates an engine that shares clusterings. Of `Auto` it answers what `Clusters` are to answer.
+    /// Creates an engine that shares clusterings. Of `Auto` it answers what `Clusters` are to
+    /// answer.
     pub(crate) fn new(
         gpu: Arc<Gpu>,
         settings: &Settings,
@@ -250,8 +253,9 @@ impl Engine {
         Ok(())
     }
 
-    /// Hands over all pairs of a step that the device has not dropped, as far as they matter for what is sought. So times of contact
-    /// come from the CPU alone. Returns false if the device, or the memory budget, cannot hold the step; then nothing has been handed over.
+    /// Hands over all pairs of a step that the device has not dropped, as far as they matter for
+    /// what is sought. So times of contact come from the CPU alone. Returns false if the device, or
+    /// the memory budget, cannot hold the step; then nothing has been handed over.
     ///
     /// # Errors
     /// Device errors, a budget too small for the smallest pass, cancellation, those of `take`.
@@ -298,7 +302,8 @@ impl Engine {
         }
     }
 
-    /// The clusters of all bodies of a frame. The host does not know the pose of `resident` bodies, so it does not judge their clusters.
+    /// The clusters of all bodies of a frame. The host does not know the pose of `resident` bodies,
+    /// so it does not judge their clusters.
     pub(super) fn cluster(
         &mut self,
         job: Job<'_>,
@@ -326,7 +331,8 @@ impl Engine {
         updated?;
         closed.await?;
         if self.first_capacities(self.cells_wanted(job.plan)).is_err() {
-            // What is held for the other kind of question, or the buffers' spare room, exceeds the budget.
+            // What is held for the other kind of question, or the buffers' spare room, exceeds the
+            // budget.
             self.world.forget();
             if !self.other.is_encoded {
                 self.other.pass_buffers = PassBuffers::new();
@@ -455,7 +461,8 @@ impl Engine {
     /// Whether a frame that does not fit may be answered in pieces.
     ///
     /// # Errors
-    /// The device binds less than the frame needs, and with `Backend::Auto` the CPU is to answer it.
+    /// The device binds less than the frame needs, and with `Backend::Auto` the CPU is to answer
+    /// it.
     fn may_cut(&self, job: Job<'_>, clusterings: &[Arc<Clustering>]) -> Result<(), Error> {
         let weight = weigh(job, self.lane.motion, clusterings);
         let (needed, most) = (

@@ -234,7 +234,8 @@ bindings! {
     }
 }
 
-/// Declares the set: for each kernel its source, constants and bindings. A second kernel of one file has a name of its own.
+/// Declares the set: for each kernel its source, constants and bindings. A second kernel of one
+/// file has a name of its own.
 macro_rules! kernels {
     ($($name:ident: $bindings:ident = $source:ident [$($constant:expr),*]
         from $file:literal $(as $label:literal)? ($($shared:literal),*);)*) => {
@@ -309,7 +310,8 @@ kernels! {
         from "pairing_cells" ("boxes", "filters", "meets", "ids", "reserve", "groups");
 }
 
-/// The name and the text of every shader that this crate compiles, for compilers other than naga to check.
+/// The name and the text of every shader that this crate compiles, for compilers other than naga to
+/// check.
 pub fn shaders() -> impl Iterator<Item = (&'static str, String)> {
     ALL.iter().map(|(source, _)| (source.name, source.text()))
 }

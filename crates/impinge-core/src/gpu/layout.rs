@@ -44,11 +44,14 @@ words! {
     WorkItem { a: u32, b: u32 }
     /// Two slots, with flags.
     Candidate { a: u32, b: u32 }
-    /// Two global primitive numbers that certainly intersect; in a step, two slots of a pair that is searched, with flags.
+    /// Two global primitive numbers that certainly intersect; in a step, two slots of a pair that
+    /// is searched, with flags.
     PairKey { low: u32, high: u32 }
-    /// Two global primitive numbers left to exact arithmetic; in a step that the host decides, two slots.
+    /// Two global primitive numbers left to exact arithmetic; in a step that the host decides, two
+    /// slots.
     UnsureKey { low: u32, high: u32 }
-    /// Until when a pair of a step certainly does not touch, and by when it certainly does: the bits of two f32.
+    /// Until when a pair of a step certainly does not touch, and by when it certainly does: the
+    /// bits of two f32.
     PairTimes { free_until: u32, touches_by: u32 }
     /// Parameters of one dispatch.
     Params {

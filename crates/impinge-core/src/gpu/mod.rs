@@ -1,12 +1,12 @@
 //! The GPU backend: the whole pipeline in WGSL, the same bytes as the CPU.
 //!
-//! Stages have the same names as on the CPU; each kernel file begins with a card. If all buffers are large enough, a
-//! frame is one submission: positions go up, counters and results come back, see `clusters` and `cells`. Pairs of
-//! which the filter on the device is unsure are decided exactly on the CPU, from the numbers as given. Only
-//! `waiting` blocks.
+//! Stages have the same names as on the CPU; each kernel file begins with a card. If all buffers
+//! are large enough, a frame is one submission: positions go up, counters and results come back,
+//! see `clusters` and `cells`. Pairs of which the filter on the device is unsure are decided
+//! exactly on the CPU, from the numbers as given. Only `waiting` blocks.
 //!
-//! A step runs through the same stages, with two boxes per node, up to a filter. The device drops pairs that certainly do not touch, and
-//! the host finds the first contacts of all others.
+//! A step runs through the same stages, with two boxes per node, up to a filter. The device drops
+//! pairs that certainly do not touch, and the host finds the first contacts of all others.
 
 mod collect;
 mod device;
@@ -47,7 +47,8 @@ pub(crate) use engine::Engine;
 pub use kernels::shaders;
 pub use open::{Gpu, WantedAdapter, devices, devices_async};
 
-/// The texts from which kernels are assembled. `LAYOUT`, with the structs of all kernels, comes first.
+/// The texts from which kernels are assembled. `LAYOUT`, with the structs of all kernels, comes
+/// first.
 pub mod shared {
     macro_rules! shared {
         ($($name:ident = $file:literal;)*) => {

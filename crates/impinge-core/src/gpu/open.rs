@@ -10,8 +10,8 @@ use super::pipeline::Source;
 use super::waiting::wait;
 use crate::scene::error::Error;
 
-/// The adapters on this machine that can run the kernels, hardware first. Empty in a browser, where a program cannot
-/// wait for the answer: use [`devices_async`].
+/// The adapters on this machine that can run the kernels, hardware first. Empty in a browser, where
+/// a program cannot wait for the answer: use [`devices_async`].
 pub fn devices() -> Vec<DeviceInfo> {
     wait(async { Ok(devices_async().await) }).unwrap_or_default()
 }
@@ -30,7 +30,8 @@ async fn adapters() -> Vec<(wgpu::Adapter, DeviceInfo)> {
     let instance = INSTANCE.get_or_init(|| {
         wgpu::Instance::new(wgpu::InstanceDescriptor {
             backends: wgpu::Backends::PRIMARY,
-            // Indirect arguments need no validation: they come from our own kernel, which keeps to the limits.
+            // Indirect arguments need no validation: they come from our own kernel, which keeps to
+            // the limits.
             flags: wgpu::InstanceFlags::empty(),
             ..wgpu::InstanceDescriptor::new_without_display_handle()
         })
@@ -48,13 +49,14 @@ async fn adapters() -> Vec<(wgpu::Adapter, DeviceInfo)> {
     adapters
 }
 
-/// Whether the system may have a GPU. On Linux every GPU driver makes a device file. If there is none, no driver is
-/// loaded at all, because software drivers write to standard error when loaded.
+/// Whether the system may have a GPU. On Linux every GPU driver makes a device file. If there is
+/// none, no driver is loaded at all, because software drivers write to standard error when loaded.
 fn may_have_hardware() -> bool {
     if !cfg!(target_os = "linux") {
         return true;
     }
-    // Direct rendering (most drivers), NVIDIA, AMD compute, Windows' subsystem for Linux, Mali, Adreno, PowerVR.
+    // Direct rendering (most drivers), NVIDIA, AMD compute, Windows' subsystem for Linux, Mali,
+    // Adreno, PowerVR.
     let of_drivers = [
         "dri",
         "nvidiactl",
@@ -143,7 +145,8 @@ impl Gpu {
         if let Some(gpu) = Gpu::shared(info) {
             return Ok(gpu);
         }
-        // The lock is not held while the device is awaited, so another detector may have opened it first.
+        // The lock is not held while the device is awaited, so another detector may have opened it
+        // first.
         let gpu = Arc::new(Gpu::request(adapter, info.clone()).await?);
         if let Some(gpu) = Gpu::shared(info) {
             return Ok(gpu);

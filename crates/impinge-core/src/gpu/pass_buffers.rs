@@ -1,7 +1,7 @@
 //! Buffers for the results of a pass: queues, work items, candidates, pairs, unsure pairs.
 //!
-//! Their sizes are not known in advance. Kernels count what they need, even if it does not fit. Buffers that
-//! were too small grow, and the pass runs again. If the device or the memory budget
+//! Their sizes are not known in advance. Kernels count what they need, even if it does not fit.
+//! Buffers that were too small grow, and the pass runs again. If the device or the memory budget
 //! allows no more, the engine splits the pass instead.
 
 use super::buffers::{Slice, Storage, count};
@@ -240,8 +240,9 @@ impl PassBuffers {
         self.grid.resize_exactly(gpu, 1);
     }
 
-    /// The copies that start a pass: the seeds, which must fit the queue, and counters at zero except the number of seeds and
-    /// the time by which some pair certainly touches, if there is one.
+    /// The copies that start a pass: the seeds, which must fit the queue, and counters at zero
+    /// except the number of seeds and the time by which some pair certainly touches, if there is
+    /// one.
     ///
     /// # Errors
     /// As [`Storage::resize`].
@@ -287,7 +288,8 @@ impl PassBuffers {
 /// The counts of a pass.
 #[derive(Debug, Clone, Copy)]
 pub struct PassCounts {
-    /// The capacities that would have been enough; a lower bound for stages after one that overflowed.
+    /// The capacities that would have been enough; a lower bound for stages after one that
+    /// overflowed.
     pub needed: Capacities,
     /// Cells that went through the second level.
     pub n_subdivided: u64,
@@ -329,12 +331,14 @@ impl PassCounts {
         }
     }
 
-    /// Whether a pass ends a step, however much room it had: any contact is sought, and there is one.
+    /// Whether a pass ends a step, however much room it had: any contact is sought, and there is
+    /// one.
     pub(super) fn answer(&self, sought: Goal) -> bool {
         sought == Goal::Any && self.touches_by.is_some()
     }
 
-    /// Compares the counts with the room that the pass had. `bytes`: the most that these buffers may take together.
+    /// Compares the counts with the room that the pass had. `bytes`: the most that these buffers
+    /// may take together.
     pub fn judge(&self, gpu: &Gpu, pass_buffers: Capacities, bytes: Option<u64>) -> NextPass {
         if self.too_much {
             return NextPass::Split;

@@ -1,11 +1,13 @@
 //! The frame on the device: passes, growing, splitting.
 //!
-//! A pass takes its share of the work through all stages in one submission. If a buffer was too small,
-//! the counters say how large it must be: it grows and the pass runs again. If the device's limit or the
-//! memory budget forbids that, the work is split and each part becomes a pass:
+//! A pass takes its share of the work through all stages in one submission. If a buffer was too
+//! small, the counters say how large it must be: it grows and the pass runs again. If the device's
+//! limit or the memory budget forbids that, the work is split and each part becomes a pass:
 //!
-//! * `Clusters`: the seeds of the traversal, which are pairs of tree nodes, down to one pair of clusters;
-//! * `Cells`: ranges of cells, then the product of one cell's groups, in tiles, over a list that does not change.
+//! * `Clusters`: the seeds of the traversal, which are pairs of tree nodes, down to one pair of
+//!   clusters;
+//! * `Cells`: ranges of cells, then the product of one cell's groups, in tiles, over a list that
+//!   does not change.
 //!
 //! The smallest pass has one work item, for which [`Capacities::LEAST`] is enough.
 
@@ -33,7 +35,8 @@ use crate::search::sink::{Answer, BLOCK};
 use crate::search::stats::Stats;
 use crate::search::undecided::Undecided;
 
-/// The host descends before the first launch while there are at most this many seeds: each step saves two launches.
+/// The host descends before the first launch while there are at most this many seeds: each step
+/// saves two launches.
 const SEEDS: usize = 512;
 /// From this many unsure pairs on, several threads decide them.
 const PARALLEL_FROM: usize = 512;

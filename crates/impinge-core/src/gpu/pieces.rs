@@ -1,8 +1,8 @@
 //! Frames that are too large for the device, answered piece by piece.
 //!
-//! The clusters of all parts, body after body, are cut into chunks of which two fit on the device. The pieces
-//! are every chunk by itself, and every two chunks whose boxes meet. Each piece is a separate query, for which its
-//! topology and positions are sent.
+//! The clusters of all parts, body after body, are cut into chunks of which two fit on the device.
+//! The pieces are every chunk by itself, and every two chunks whose boxes meet. Each piece is a
+//! separate query, for which its topology and positions are sent.
 //!
 //! ```text
 //! clusters  | body 0 . . . . . | body 1 . | body 2 . . . . . . . . |      chunks    0  1  2
@@ -12,8 +12,8 @@
 //! ```
 //!
 //! Two runs of one body count as one body on the device, with one numbering of their vertices: so
-//! primitives share a vertex there if and only if they do in the whole body. The host decides which runs
-//! meet, so the device has no tree over bodies.
+//! primitives share a vertex there if and only if they do in the whole body. The host decides which
+//! runs meet, so the device has no tree over bodies.
 //!
 //! Cost: quadratic in the number of chunks, but chunks are compact and most of their boxes do
 //! not meet. Invariant: every two clusters lie in one pair of runs of one piece.
@@ -49,7 +49,8 @@ pub struct Chunk {
     bounds: Bounds,
 }
 
-/// Cuts the clusters of a frame into chunks that weigh at most `most`, but have at least one cluster.
+/// Cuts the clusters of a frame into chunks that weigh at most `most`, but have at least one
+/// cluster.
 ///
 /// # Errors
 /// Threads that do not start.
@@ -108,8 +109,8 @@ pub fn cut<'a>(
     Ok(chunks)
 }
 
-/// The pairs of runs of a piece that may hold pairs of primitives, lower number first: runs of the first
-/// chunk come before those of the second. For a single chunk, the pairs within it.
+/// The pairs of runs of a piece that may hold pairs of primitives, lower number first: runs of the
+/// first chunk come before those of the second. For a single chunk, the pairs within it.
 ///
 /// Two primitives can only meet if the boxes of their runs do. Cost: a sweep along x.
 pub fn meeting(plan: &Plan, chunks: &[&Chunk]) -> Vec<[u32; 2]> {

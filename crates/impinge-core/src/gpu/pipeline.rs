@@ -204,8 +204,8 @@ impl Program {
         self.entries
     }
 
-    /// The bind group of the first bytes of some buffers. The first call on this device, by any detector, compiles the kernel;
-    /// errors go to the open error scopes.
+    /// The bind group of the first bytes of some buffers. The first call on this device, by any
+    /// detector, compiles the kernel; errors go to the open error scopes.
     pub(super) fn bind(&self, gpu: &Device, buffers: &[(wgpu::Buffer, u64)]) -> wgpu::BindGroup {
         let compiled = self.compiled.get_or_init(|| {
             let text = self.damaged.clone();

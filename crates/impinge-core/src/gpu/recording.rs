@@ -1,8 +1,9 @@
 //! A pass as data: the launches of kernels, in order, each with its buffers and parameters.
 //!
-//! Pure functions make a [`Recording`]: `clusters` those of the method `Clusters` and of steps, `cells` those of `Cells`. It can be
-//! printed, one line per launch. A [`Launcher`] encodes it; or it runs launch by launch and reads back what each one has
-//! written, so that a wrong launch is found by comparing with another device, or with kernels known to be good.
+//! Pure functions make a [`Recording`]: `clusters` those of the method `Clusters` and of steps,
+//! `cells` those of `Cells`. It can be printed, one line per launch. A [`Launcher`] encodes it; or
+//! it runs launch by launch and reads back what each one has written, so that a wrong launch is
+//! found by comparing with another device, or with kernels known to be good.
 
 use std::fmt;
 use std::sync::Arc;
@@ -257,7 +258,8 @@ impl Default for Launcher {
     }
 }
 
-/// A launch that is ready: its bind group among those of the launcher, and the offset of its parameters.
+/// A launch that is ready: its bind group among those of the launcher, and the offset of its
+/// parameters.
 struct Ready {
     group: usize,
     offset: Option<u32>,
@@ -363,7 +365,8 @@ impl Launcher {
         Ok(ready.collect())
     }
 
-    /// The number of the bind group of a launch: one of this recording, one of the recording before, or a new one.
+    /// The number of the bind group of a launch: one of this recording, one of the recording
+    /// before, or a new one.
     fn group(&mut self, gpu: &Gpu, before: &mut Vec<Group>, launch: &Launch) -> usize {
         let buffer = |bound: &Bound| match bound {
             Bound::Buffer(slice) => (slice.buffer.clone(), slice.bytes),

@@ -1,4 +1,5 @@
-//! Frames and steps that stay on the device: positions come from the caller's buffers, pairs go to ours.
+//! Frames and steps that stay on the device: positions come from the caller's buffers, pairs go to
+//! ours.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -20,10 +21,10 @@ use crate::search::stats::Stats;
 
 /// The buffers that hold the pairs of an encoded frame once its commands have run.
 ///
-/// Both lists hold two `u32` per pair: the numbers of its primitives, the lower one first. Primitives are
-/// numbered consecutively, body after body in the order of their ids: primitive `i` of a body has the number
-/// `first + i`, where `first` is the number of primitives of all parts before it. The order of
-/// pairs is not specified.
+/// Both lists hold two `u32` per pair: the numbers of its primitives, the lower one first.
+/// Primitives are numbered consecutively, body after body in the order of their ids: primitive `i`
+/// of a body has the number `first + i`, where `first` is the number of primitives of all parts
+/// before it. The order of pairs is not specified.
 ///
 /// A count may be larger than its list: the list then holds as many pairs as fit, and
 /// [`Gpu::grow`](crate::Gpu::grow) makes it larger.
@@ -32,8 +33,8 @@ use crate::search::stats::Stats;
 pub struct ResidentPairs {
     /// Pairs that certainly intersect.
     pub pairs: wgpu::Buffer,
-    /// Pairs that may or may not intersect, within the rounding error of the device. To be conservative, count them
-    /// as pairs.
+    /// Pairs that may or may not intersect, within the rounding error of the device. To be
+    /// conservative, count them as pairs.
     pub unsure: wgpu::Buffer,
     /// Holds the two counts as `u32`.
     pub counts: wgpu::Buffer,
@@ -49,8 +50,9 @@ pub struct ResidentPairs {
 
 /// The buffers that hold the pairs of an encoded step which may touch, once its commands have run.
 ///
-/// The list has two `u32` per pair: the numbers of its elements, the lower one first. Elements are numbered consecutively:
-/// first the edges of all bodies, then their vertices, then their faces, each in the order of the bodies' ids.
+/// The list has two `u32` per pair: the numbers of its elements, the lower one first. Elements are
+/// numbered consecutively: first the edges of all bodies, then their vertices, then their faces,
+/// each in the order of the bodies' ids.
 ///
 /// ```text
 /// 0            first_vertex            first_face
@@ -68,8 +70,9 @@ pub struct ResidentPairs {
 /// | two vertices | a vertex | below `first_face` |
 /// | a vertex and a face | a vertex | from `first_face` on |
 ///
-/// Element `i` of a part of a body has the number `first + i` of its [part](ResidentPart). Vertices are numbered as positions are,
-/// whether an element uses them or not; edges and faces as [`Body::part`](crate::Body::part) lists them. The order of pairs is not specified.
+/// Element `i` of a part of a body has the number `first + i` of its [part](ResidentPart). Vertices
+/// are numbered as positions are, whether an element uses them or not; edges and faces as
+/// [`Body::part`](crate::Body::part) lists them. The order of pairs is not specified.
 ///
 /// The count may be larger than the list: the list then holds as many pairs as fit, and
 /// [`Gpu::grow`](crate::Gpu::grow) makes it larger.
@@ -78,16 +81,17 @@ pub struct ResidentPairs {
 pub struct ResidentStep {
     /// Pairs that may touch. All others certainly do not.
     pub pairs: wgpu::Buffer,
-    /// Holds two `f32` per pair of the list, in the same order, times of the step from 0 to 1. Until the first one the pair certainly does not
-    /// touch: so up to the least of them nothing does. By the second one it certainly touches, after the start; 2 if that is
-    /// not certain.
+    /// Holds two `f32` per pair of the list, in the same order, times of the step from 0 to 1.
+    /// Until the first one the pair certainly does not touch: so up to the least of them nothing
+    /// does. By the second one it certainly touches, after the start; 2 if that is not certain.
     pub times: wgpu::Buffer,
     /// Holds the count as a `u32`, and a time as an `f32`.
     pub counts: wgpu::Buffer,
     /// Byte offset of the number of pairs in `counts`.
     pub n_pairs_offset: u64,
-    /// Byte offset in `counts` of the least time by which some pair certainly touches; 2 if that is certain of none. The first contact
-    /// of the step is earlier than this, even if the list is too small.
+    /// Byte offset in `counts` of the least time by which some pair certainly touches; 2 if that is
+    /// certain of none. The first contact of the step is earlier than this, even if the list is too
+    /// small.
     pub touches_by_offset: u64,
     /// The number of pairs that the list has room for.
     pub pairs_capacity: u64,
@@ -148,7 +152,8 @@ impl Engine {
         })
     }
 
-    /// Encodes all work of a step as one pass. `ends`: the buffers of bodies' positions at the start, and at the end.
+    /// Encodes all work of a step as one pass. `ends`: the buffers of bodies' positions at the
+    /// start, and at the end.
     ///
     /// # Errors
     /// Those of [`Detector::encode_step`](crate::Detector::encode_step).
@@ -227,7 +232,8 @@ impl Engine {
         }
     }
 
-    /// Reads the counters of the encoded frame and step, and grows the buffers that were too small. Returns whether none was.
+    /// Reads the counters of the encoded frame and step, and grows the buffers that were too small.
+    /// Returns whether none was.
     ///
     /// # Errors
     /// Those of [`Gpu::grow`](crate::Gpu::grow).

@@ -202,7 +202,8 @@ impl Top {
         true
     }
 
-    /// The summed surface of the boxes around runs of neighbouring entries: how well the order fits.
+    /// The summed surface of the boxes around runs of neighbouring entries: how well the order
+    /// fits.
     fn spread(&self) -> f64 {
         let boxes = self.entries.chunks(FANOUT);
         boxes

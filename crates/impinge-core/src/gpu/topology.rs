@@ -19,8 +19,8 @@ pub struct DeviceClusters {
 }
 
 impl DeviceClusters {
-    /// Appends a run of clusters of a body whose first primitive has the global number `first`. `body`: its
-    /// number on the device; `on_device`: where each of its vertices is there.
+    /// Appends a run of clusters of a body whose first primitive has the global number `first`.
+    /// `body`: its number on the device; `on_device`: where each of its vertices is there.
     pub fn push(
         &mut self,
         clustering: &Clustering,
@@ -75,7 +75,8 @@ const fn bytes<T>(n: u64) -> u64 {
 }
 
 impl Weight {
-    /// Adds a cluster of a piece, with nodes and a body of its own, as if no other cluster shared them.
+    /// Adds a cluster of a piece, with nodes and a body of its own, as if no other cluster shared
+    /// them.
     pub fn add_cluster(&mut self, n_primitives: u64, n_vertices: u64) {
         self.n_primitives += n_primitives;
         self.n_vertices += n_vertices;
@@ -108,7 +109,8 @@ impl Weight {
             + bytes::<Body>(self.n_bodies)
     }
 
-    /// Whether no buffer has more than `most.binding` bytes and all together have at most `most.bytes`.
+    /// Whether no buffer has more than `most.binding` bytes and all together have at most
+    /// `most.bytes`.
     pub fn fits(&self, most: Most) -> bool {
         self.binding() <= most.binding && self.bytes() <= most.bytes
     }

@@ -1,7 +1,7 @@
 //! The only module of the GPU backend that blocks a thread.
 //!
-//! A thread in a browser must never wait: promises are fulfilled only between its turns. So on wasm these functions
-//! return an error that names the alternative.
+//! A thread in a browser must never wait: promises are fulfilled only between its turns. So on wasm
+//! these functions return an error that names the alternative.
 
 use std::future::Future;
 
@@ -31,11 +31,12 @@ pub fn wait<T>(_: impl Future<Output = Result<T, Error>>) -> Result<T, Error> {
     cannot_wait()
 }
 
-/// Runs a future to completion, waiting for the device when necessary; after each wait, `check` may give up.
+/// Runs a future to completion, waiting for the device when necessary; after each wait, `check` may
+/// give up.
 ///
 /// # Errors
-/// The errors of the future and of `check`; a device that cannot be waited for. Always an error in a browser, before
-/// the future is polled.
+/// The errors of the future and of `check`; a device that cannot be waited for. Always an error in
+/// a browser, before the future is polled.
 #[cfg(not(target_family = "wasm"))]
 pub fn drive<T>(
     device: &wgpu::Device,

@@ -1,4 +1,5 @@
-//! The parts of bodies on the device: a trees of clusters, and positions. One world for frames and for steps.
+//! The parts of bodies on the device: a trees of clusters, and positions. One world for frames and
+//! for steps.
 //!
 //! ```text
 //! parts       edges of all bodies | vertices | faces | elements as given that are none of these
@@ -6,13 +7,14 @@
 //! nodes       boxes at the start      | boxes at the end
 //! ```
 //!
-//! A frame and a step see the same world, each by its own [`View`]: which parts take part, their records, the tree over them.
-//! The parts of both are sent together if the bodies are the same, so detection and steps of a body have its faces and its
-//! positions once. Parts of one body share its positions, so equal vertex numbers mean the same vertex.
+//! A frame and a step see the same world, each by its own [`View`]: which parts take part, their
+//! records, the tree over them. The parts of both are sent together if the bodies are the same, so
+//! detection and steps of a body have its faces and its positions once. Parts of one body share its
+//! positions, so equal vertex numbers mean the same vertex.
 //!
-//! All trees lie in one array of nodes, ordered by height over all parts, so that one launch refits one
-//! height of every tree. Above three or more parts of a view there is a tree over them, whose leaves are
-//! gates, the entrances to the parts:
+//! All trees lie in one array of nodes, ordered by height over all parts, so that one launch refits
+//! one height of every tree. Above three or more parts of a view there is a tree over them, whose
+//! leaves are gates, the entrances to the parts:
 //!
 //! ```text
 //! height h+2                    top
@@ -148,7 +150,8 @@ pub struct World {
     pub positions: Storage<Coordinate>,
 }
 
-/// The size of the query_parts of a frame on the device; `None` if 32 bits do not number its vertices, primitives or bodies.
+/// The size of the query_parts of a frame on the device; `None` if 32 bits do not number its
+/// vertices, primitives or bodies.
 pub(crate) fn weigh(
     job: Job<'_>,
     motion: Motion,
@@ -255,8 +258,9 @@ impl World {
         count(self.parts.len())
     }
 
-    /// Sends what has changed since the last frame, or step, which must have a [weight](weigh); positions of `resident`
-    /// bodies are on the device already. What was held for the other kind of question stays if `most` allows.
+    /// Sends what has changed since the last frame, or step, which must have a [weight](weigh);
+    /// positions of `resident` bodies are on the device already. What was held for the other kind
+    /// of question stays if `most` allows.
     ///
     /// # Errors
     /// More than the device can bind at once.
@@ -317,7 +321,8 @@ impl World {
         })
     }
 
-    /// Sends parts for a kind of question, and with them those for the other kind if they are of the same bodies and fit.
+    /// Sends parts for a kind of question, and with them those for the other kind if they are of
+    /// the same bodies and fit.
     fn send_parts(
         &mut self,
         gpu: &Gpu,
@@ -446,7 +451,8 @@ impl World {
         self.bodies.binary_search_by_key(&id, |body| body.id).ok()
     }
 
-    /// Sends the positions of bodies that have moved, at one end or at both; runs of consecutive bodies in one write.
+    /// Sends the positions of bodies that have moved, at one end or at both; runs of consecutive
+    /// bodies in one write.
     fn send_positions(
         &mut self,
         gpu: &Gpu,
@@ -524,7 +530,8 @@ impl World {
         }
     }
 
-    /// Sends the records of all parts and the list of ignored pairs, if they differ from those on the device.
+    /// Sends the records of all parts and the list of ignored pairs, if they differ from those on
+    /// the device.
     fn send_records(
         &mut self,
         gpu: &Gpu,
@@ -626,8 +633,8 @@ impl World {
         view.send(gpu, records, ignored)
     }
 
-    /// Where the positions of a body are on the device, if they are those of the pose with this stamp: the buffer and the
-    /// first byte.
+    /// Where the positions of a body are on the device, if they are those of the pose with this
+    /// stamp: the buffer and the first byte.
     pub fn positions_of(&self, body: BodyId, stamp: u64) -> Option<(&wgpu::Buffer, u64)> {
         let held = &self.bodies[self.number(body)?];
         let is_there = held.sent[0] == stamp;
@@ -681,8 +688,8 @@ impl World {
         pairs.iter().map(seed).collect()
     }
 
-    /// Appends the pairs of children of two nodes, whether their boxes overlap or not. Returns false, and appends
-    /// nothing, for two clusters. The same steps as `traversal.wgsl`.
+    /// Appends the pairs of children of two nodes, whether their boxes overlap or not. Returns
+    /// false, and appends nothing, for two clusters. The same steps as `traversal.wgsl`.
     pub fn expand(
         &self,
         plan: &Plan,
@@ -838,7 +845,8 @@ fn put_words(positions: &Positions, words: &mut Vec<u32>) {
     }
 }
 
-/// A point of a body: the first corner of its first primitive. The tree over parts is built from these points.
+/// A point of a body: the first corner of its first primitive. The tree over parts is built from
+/// these points.
 fn sample(scene: &Scene, id: BodyId) -> [f32; 3] {
     let body = scene.body_in(id.slot());
     let vertex = body.elements().corners(0)[0];

@@ -45,7 +45,8 @@ impl Plan {
         cell.holds(std::array::from_fn(|axis| a[axis].max(b[axis])))
     }
 
-    /// The lower corner of the box of an element: over the whole step, if the question is about one.
+    /// The lower corner of the box of an element: over the whole step, if the question is about
+    /// one.
     fn lower_corner(&self, scene: &Scene, number: Number) -> [f64; 3] {
         let (part, element) = self.locate(number);
         let body = self.body(scene, part);
@@ -56,7 +57,8 @@ impl Plan {
         Extent::of(points).min
     }
 
-    /// Whether it is known in the end only which pairs count. Finders of other questions look themselves.
+    /// Whether it is known in the end only which pairs count. Finders of other questions look
+    /// themselves.
     pub(crate) fn counts_late(&self) -> bool {
         self.question == Question::Intersection && (self.cell.is_some() || self.leaves_out())
     }
@@ -71,7 +73,8 @@ impl Plan {
         self.filter.as_ref().is_some_and(PairFilter::is_early)
     }
 
-    /// Whether a pair counts: it belongs to the cell, if there is one, the filter lets it pass, and it is not left out.
+    /// Whether a pair counts: it belongs to the cell, if there is one, the filter lets it pass, and
+    /// it is not left out.
     #[inline(always)]
     pub fn counts(&self, scene: &Scene, key: u64) -> bool {
         self.is_owned(scene, key)

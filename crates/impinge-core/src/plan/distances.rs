@@ -99,8 +99,8 @@ impl Plan {
         Reach::of_sum([self.distance, a, b])
     }
 
-    /// A number below the distance of two elements of two parts, minus the thickness of their bodies: 0 if that is not certainly
-    /// above 0.
+    /// A number below the distance of two elements of two parts, minus the thickness of their
+    /// bodies: 0 if that is not certainly above 0.
     pub(crate) fn without_thickness(&self, parts: [PartIx; 2], distance: f64) -> f64 {
         let [a, b] = parts.map(|part| self.part(part).thickness);
         if a == 0.0 && b == 0.0 {
@@ -109,8 +109,8 @@ impl Plan {
         (distance - (a + b).next_up()).next_down().max(0.0)
     }
 
-    /// How far the boxes of a part must reach beyond its elements, so that those of near elements overlap: those of two
-    /// parts reach at least as far together as their elements may be apart.
+    /// How far the boxes of a part must reach beyond its elements, so that those of near elements
+    /// overlap: those of two parts reach at least as far together as their elements may be apart.
     pub(crate) fn inflation(&self, part: PartIx) -> f64 {
         let thickness = self.part(part).thickness;
         match (self.bound, thickness) {
@@ -133,7 +133,8 @@ impl Plan {
         }
     }
 
-    /// How far vertices of two parts may be from their ways, because positions on these are rounded.
+    /// How far vertices of two parts may be from their ways, because positions on these are
+    /// rounded.
     pub(crate) fn rounded(&self, a: PartIx, b: PartIx) -> f64 {
         f64::max(self.part(a).rounded, self.part(b).rounded)
     }
@@ -143,7 +144,8 @@ impl Plan {
         self.parts.iter().any(|part| part.rounded > 0.0)
     }
 
-    /// The sweep of a part: its boxes also reach by its [`inflation`](Plan::inflation), and as far as positions are rounded.
+    /// The sweep of a part: its boxes also reach by its [`inflation`](Plan::inflation), and as far
+    /// as positions are rounded.
     #[inline(always)]
     pub(crate) fn sweep_of(&self, sweep: Sweep, part: PartIx) -> Sweep {
         sweep.inflated_by(self.inflation(part) + self.part(part).rounded)

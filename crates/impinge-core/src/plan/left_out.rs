@@ -1,4 +1,5 @@
-//! Pairs that are left out because of their vertices, or by name: rings, groups, pinned vertices, pairs of an answer.
+//! Pairs that are left out because of their vertices, or by name: rings, groups, pinned vertices,
+//! pairs of an answer.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;

@@ -1,14 +1,17 @@
-//! What a question asks, resolved for one scene: which parts take part, in what order, which of them meet and under which
-//! test, how elements move, what of the pairs is wanted, and within which limits.
+//! What a question asks, resolved for one scene: which parts take part, in what order, which of
+//! them meet and under which test, how elements move, what of the pairs is wanted, and within which
+//! limits.
 //!
 //! A plan is made from a scene and a query, by one function per question, and never changes.
 //!
-//! A *part* is a part of a body whose elements are of one kind. For intersections each body has one part: the
-//! elements that it was given as. For steps it has up to three: its edges, its vertices and its faces.
+//! A *part* is a part of a body whose elements are of one kind. For intersections each body has one
+//! part: the elements that it was given as. For steps it has up to three: its edges, its vertices
+//! and its faces.
 //!
-//! The elements of all parts are numbered consecutively, part after part and body after body in slot order: element `i` of
-//! part `l` has the global number `first(l) + i`. A pair is then one 64-bit key, `lower << 32 | higher`, and sorting
-//! the keys of one test sorts rows `(body_a, element_a, body_b, element_b)`.
+//! The elements of all parts are numbered consecutively, part after part and body after body in
+//! slot order: element `i` of part `l` has the global number `first(l) + i`. A pair is then one
+//! 64-bit key, `lower << 32 | higher`, and sorting the keys of one test sorts rows
+//! `(body_a, element_a, body_b, element_b)`.
 //!
 //! ```text
 //!  63            32 31             0
@@ -49,7 +52,8 @@ pub struct QueryPart {
     pub part: Part,
     /// Global number of its first element.
     pub first: Number,
-    /// How many numbers its elements take up. Vertices are numbered as positions are, whether they take part or not.
+    /// How many numbers its elements take up. Vertices are numbered as positions are, whether they
+    /// take part or not.
     pub n_primitives: u32,
     /// The kind of its elements.
     pub kind: BodyKind,
@@ -91,7 +95,8 @@ pub enum Question {
     /// Whether elements that bodies were given as share a point.
     #[default]
     Intersection,
-    /// Whether and when vertices, edges and faces first touch during a step, or come as near as they may.
+    /// Whether and when vertices, edges and faces first touch during a step, or come as near as
+    /// they may.
     Contact,
     /// Which vertices, edges and faces are within a distance, at the positions that bodies have.
     Nearness,
@@ -100,8 +105,9 @@ pub enum Question {
 }
 
 impl Question {
-    /// The parts of bodies that take part, in the order of their parts. In this order, the lower number of a pair belongs to
-    /// the element that its kind names first: edges come before vertices, and vertices before faces.
+    /// The parts of bodies that take part, in the order of their parts. In this order, the lower
+    /// number of a pair belongs to the element that its kind names first: edges come before
+    /// vertices, and vertices before faces.
     fn parts(self) -> &'static [Part] {
         match self {
             Question::Intersection => &[Part::Given],
@@ -173,7 +179,8 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// The question which elements intersect. Positions that were written in place are not checked yet.
+    /// The question which elements intersect. Positions that were written in place are not checked
+    /// yet.
     ///
     /// # Errors
     /// A stale id, one body twice, a cell without room, too many elements.
@@ -207,9 +214,10 @@ impl Plan {
         Plan::of_step(scene, query, query.keep(), goal, limits)
     }
 
-    /// The question how far a step can be taken: about its earliest contact, at a time in `f64`, or in `f32` if elements keep a
-    /// clearance. With one, rounding is part of what they keep. Without, `with_close` makes it a question about all ways that end
-    /// at rounded positions, at any time of the step.
+    /// The question how far a step can be taken: about its earliest contact, at a time in `f64`, or
+    /// in `f32` if elements keep a clearance. With one, rounding is part of what they keep.
+    /// Without, `with_close` makes it a question about all ways that end at rounded positions, at
+    /// any time of the step.
     pub(crate) fn advance(
         scene: &Scene,
         query: &Query,
@@ -235,8 +243,8 @@ impl Plan {
         Ok(plan)
     }
 
-    /// The question which elements touch on the way to the end positions of a scene, which are those at a fraction of a step. Times
-    /// are not needed.
+    /// The question which elements touch on the way to the end positions of a scene, which are
+    /// those at a fraction of a step. Times are not needed.
     pub(crate) fn trial(
         scene: &Scene,
         query: &Query,
@@ -269,7 +277,8 @@ impl Plan {
         Ok(plan)
     }
 
-    /// The question which elements are within a distance: the sum of `distance` and the thickness of both bodies.
+    /// The question which elements are within a distance: the sum of `distance` and the thickness
+    /// of both bodies.
     pub(crate) fn nearness(
         scene: &Scene,
         query: &Query,
@@ -308,8 +317,8 @@ impl Plan {
         Ok(plan)
     }
 
-    /// The question which pairs could be too near at some time of a step, however far each vertex goes on its way: their boxes overlap,
-    /// each inflated by half of what pairs keep.
+    /// The question which pairs could be too near at some time of a step, however far each vertex
+    /// goes on its way: their boxes overlap, each inflated by half of what pairs keep.
     pub(crate) fn truncation(scene: &Scene, query: &Query, limits: Limits) -> Result<Self, Error> {
         query.check_step()?;
         let mut plan = Plan::of(scene, query, Question::Overlap, Goal::All, limits)?;
@@ -411,8 +420,8 @@ impl Plan {
         Ok(plan)
     }
 
-    /// What is to become of the pairs that are found: all are held where it is known in the end only which of them count, or which
-    /// one is the earliest.
+    /// What is to become of the pairs that are found: all are held where it is known in the end
+    /// only which of them count, or which one is the earliest.
     pub(crate) fn held(&self) -> Goal {
         match self.question {
             Question::Intersection if !self.counts_late() => self.goal,
@@ -437,8 +446,9 @@ impl Plan {
             .map_or(0, |last| u64::from(last.numbers().end.raw()))
     }
 
-    /// The numbers that the lower number of a pair of some kind, or of an intersection, may be: those of the elements that the kind names first. Parts follow
-    /// each other, so there are few others between them.
+    /// The numbers that the lower number of a pair of some kind, or of an intersection, may be:
+    /// those of the elements that the kind names first. Parts follow each other, so there are few
+    /// others between them.
     pub(crate) fn lower_numbers(&self, kind: Option<PairKind>) -> Range<Number> {
         let of_part = |part: &&QueryPart| kind.is_none_or(|kind| part.part == kind.parts()[0]);
         let parts = self.parts.iter().filter(of_part);
@@ -453,7 +463,8 @@ impl Plan {
         self.parts.len() > 1 && (self.between || self.question != Question::Intersection)
     }
 
-    /// The test for pairs of elements of two parts, or of one with itself; `None` if no pair of them is wanted.
+    /// The test for pairs of elements of two parts, or of one with itself; `None` if no pair of
+    /// them is wanted.
     #[inline]
     pub fn test(&self, a: PartIx, b: PartIx) -> Option<TestId> {
         let (a, b) = (self.part(a), self.part(b));
@@ -478,8 +489,9 @@ impl Plan {
     fn is_kind_asked(&self, kind: PairKind, are_bare: bool, are_points: bool) -> bool {
         match self.kinds {
             Some(kinds) => kinds.contains(kind),
-            // Vertices against faces and edges against edges cover every body with faces. Only bodies without faces need
-            // edges against vertices, and only bodies of points need vertices against vertices.
+            // Vertices against faces and edges against edges cover every body with faces. Only
+            // bodies without faces need edges against vertices, and only bodies of points need
+            // vertices against vertices.
             None => match kind {
                 PairKind::VertexFace | PairKind::EdgeEdge => true,
                 PairKind::EdgeVertex => are_bare,

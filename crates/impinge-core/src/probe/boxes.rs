@@ -7,7 +7,8 @@
 //! elements    [ 64 boxes ]     …      found when a probe first comes to the cluster
 //! ```
 //!
-//! Cost: a copy of the boxes of clusters and nodes per pose, and the boxes of elements where they are needed.
+//! Cost: a copy of the boxes of clusters and nodes per pose, and the boxes of elements where they
+//! are needed.
 
 use std::sync::{Arc, OnceLock};
 

@@ -1,11 +1,15 @@
-//! What rays hit: the way down the trees past boxes, nearest first, then floats, then exact arithmetic.
+//! What rays hit: the way down the trees past boxes, nearest first, then floats, then exact
+//! arithmetic.
 //!
-//! A node is skipped if the ray certainly misses its box, or comes to it later than to the first hit. Of an element, floats say
-//! that the ray certainly misses it, or meets it too late, or certainly passes through its inside, between two parameters. What is in
-//! doubt is decided exactly at once. Of the hits that may be first, mostly one, the numbers are found last: rounded from twice the
-//! precision of floats where that suffices. So the answer does not depend on the order of the search.
+//! A node is skipped if the ray certainly misses its box, or comes to it later than to the first
+//! hit. Of an element, floats say that the ray certainly misses it, or meets it too late, or
+//! certainly passes through its inside, between two parameters. What is in doubt is decided exactly
+//! at once. Of the hits that may be first, mostly one, the numbers are found last: rounded from
+//! twice the precision of floats where that suffices. So the answer does not depend on the order of
+//! the search.
 //!
-//! Cost: per ray some dozens of boxes per level, eight at a time, in a few clusters 64 boxes at a time, and some faces.
+//! Cost: per ray some dozens of boxes per level, eight at a time, in a few clusters 64 boxes at a
+//! time, and some faces.
 
 use std::cmp::Ordering;
 
@@ -189,7 +193,8 @@ fn corners(target: Target<'_>, slot: usize) -> Corners {
     ))
 }
 
-/// A ray as boxes are held against it, in single precision: rounded so that it meets all that the ray meets.
+/// A ray as boxes are held against it, in single precision: rounded so that it meets all that the
+/// ray meets.
 struct Slabs {
     /// The origin, rounded down and up.
     origin: [[f32; 3]; 2],
@@ -222,7 +227,8 @@ impl Slabs {
         }
     }
 
-    /// When the ray comes to some boxes, about and never too late, and those that it may reach before a limit.
+    /// When the ray comes to some boxes, about and never too late, and those that it may reach
+    /// before a limit.
     #[inline(always)]
     fn reach<const N: usize>(&self, boxes: [[&[f32; N]; 3]; 2], limit: f32) -> ([f32; N], u64) {
         let (mut near, mut far) = ([0.0f32; N], [limit; N]);
@@ -363,7 +369,8 @@ impl Search<'_> {
         Ok(())
     }
 
-    /// Whether floats tell that a ray misses a face, or meets it after the limit, or passes through its inside.
+    /// Whether floats tell that a ray misses a face, or meets it after the limit, or passes through
+    /// its inside.
     #[inline(always)]
     fn passes(&self, ray: &Ray, corners: &[Point]) -> Passes {
         let &[a, b, c] = corners else {

@@ -1,12 +1,15 @@
 //! The element that is nearest to each point, by branch and bound.
 //!
-//! Nodes are opened nearest box first, and skipped if their boxes are farther away than an element certainly is. Of an
-//! element, floats that enclose its distance are found. What may be nearest by these is kept, mostly one element, or the few that share
-//! the nearest edge or vertex. Exact comparisons decide among these. So the answer does not depend on the order of the search.
+//! Nodes are opened nearest box first, and skipped if their boxes are farther away than an element
+//! certainly is. Of an element, floats that enclose its distance are found. What may be nearest by
+//! these is kept, mostly one element, or the few that share the nearest edge or vertex. Exact
+//! comparisons decide among these. So the answer does not depend on the order of the search.
 //!
-//! Points come in an order in which most are near to the one before. So the element found last is a first bound for the next point.
+//! Points come in an order in which most are near to the one before. So the element found last is a
+//! first bound for the next point.
 //!
-//! Cost: per point some dozens of boxes per level of the tree, and in one or two clusters 64 boxes and a few elements.
+//! Cost: per point some dozens of boxes per level of the tree, and in one or two clusters 64 boxes
+//! and a few elements.
 
 use std::cmp::Ordering;
 
@@ -199,8 +202,9 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Whether all corners of an element are beyond a plane across the way, which is farther from the point than the nearest element.
-    /// Most elements whose boxes are near are seen to be farther so.
+    /// Whether all corners of an element are beyond a plane across the way, which is farther from
+    /// the point than the nearest element. Most elements whose boxes are near are seen to be
+    /// farther so.
     #[inline(always)]
     fn is_beyond(&self, point: &Point, corners: &[Point]) -> bool {
         let (mut lowest, mut size) = (f64::INFINITY, 0.0f64);

@@ -1,13 +1,16 @@
 //! Whether points are inside a body: exact winding numbers around each point.
 //!
-//! A closed surface: a ray goes from the point along a coordinate axis to the nearest wall of the body's box, and counts the faces
-//! that it meets, with their orientation. As in [`contact`](crate::contact), the ray is shifted by an infinitely small step, so that
-//! it meets no edge and no vertex, and the signs are exact. The number is the same along every axis, for the surface is closed. So
-//! there is no ray that has to be tried again. A face that contains the point says that it is on the surface.
+//! A closed surface: a ray goes from the point along a coordinate axis to the nearest wall of the
+//! body's box, and counts the faces that it meets, with their orientation. As in
+//! [`contact`](crate::contact), the ray is shifted by an infinitely small step, so that it meets no
+//! edge and no vertex, and the signs are exact. The number is the same along every axis, for the
+//! surface is closed. So there is no ray that has to be tried again. A face that contains the point
+//! says that it is on the surface.
 //!
 //! Tetrahedra: those that contain the point, and the border of the body. No ray is needed.
 //!
-//! Cost: per point the clusters that a ray of half the body's size meets, and per cluster one test of 64 boxes.
+//! Cost: per point the clusters that a ray of half the body's size meets, and per cluster one test
+//! of 64 boxes.
 
 use super::Target;
 use super::border::{Border, FACES};

@@ -1,15 +1,18 @@
 //! Probes: where points lie, and what is nearest to them.
 //!
-//! What it does: says of points whether they are inside a body, on its surface or outside, and which element of some bodies is nearest
-//! to each of them.
+//! What it does: says of points whether they are inside a body, on its surface or outside, and
+//! which element of some bodies is nearest to each of them.
 //!
-//! How: a probe is a box of its own. It goes down the tree of the body's clusters, which all questions share, past the boxes
-//! of 64 elements at a time, to the elements that it may meet. These are decided one by one with exact signs.
+//! How: a probe is a box of its own. It goes down the tree of the body's clusters, which all
+//! questions share, past the boxes of 64 elements at a time, to the elements that it may meet.
+//! These are decided one by one with exact signs.
 //!
-//! In: bodies, whose clusters are refitted when they have moved, and points in either precision. Out: one answer per point.
+//! In: bodies, whose clusters are refitted when they have moved, and points in either precision.
+//! Out: one answer per point.
 //!
-//! Cost: the trees as for distances of bodies; 24 bytes per element of the clusters that probes come to; then per point a way down
-//! the tree. Points are shared among the workers; each point's answer depends on nothing but the point and the bodies.
+//! Cost: the trees as for distances of bodies; 24 bytes per element of the clusters that probes
+//! come to; then per point a way down the tree. Points are shared among the workers; each point's
+//! answer depends on nothing but the point and the bodies.
 
 mod border;
 mod boxes;
@@ -86,8 +89,8 @@ impl Probes {
     /// Whether each point is inside a body (1), on its surface (0) or outside (-1).
     ///
     /// # Errors
-    /// A stale id, a body of another kind than triangles and tetrahedra, a surface that is not closed, positions or points that are
-    /// not finite, cancellation.
+    /// A stale id, a body of another kind than triangles and tetrahedra, a surface that is not
+    /// closed, positions or points that are not finite, cancellation.
     pub fn contains<R: Real>(
         &mut self,
         scene: &Scene,
@@ -124,11 +127,12 @@ impl Probes {
         Ok(places)
     }
 
-    /// The nearest element of some bodies to each point, if it is at most a distance away: a face, or of bodies without faces an
-    /// edge or a point.
+    /// The nearest element of some bodies to each point, if it is at most a distance away: a face,
+    /// or of bodies without faces an edge or a point.
     ///
     /// # Errors
-    /// A query that is not about whole bodies, a distance that is none, positions or points that are not finite, cancellation.
+    /// A query that is not about whole bodies, a distance that is none, positions or points that
+    /// are not finite, cancellation.
     pub fn closest<R: Real>(
         &mut self,
         scene: &Scene,
@@ -146,7 +150,8 @@ impl Probes {
         found.clear();
         found.resize(points.len(), None);
         for (points, found) in points.chunks(BLOCK).zip(found.chunks_mut(BLOCK)) {
-            // Neighbours one after the other: the element found last is a good first bound, and memory is in the caches.
+            // Neighbours one after the other: the element found last is a good first bound, and
+            // memory is in the caches.
             let order = order::along_curve(points);
             let size = work.workers.task(TASK);
             let mut tasks: Vec<(&[u32], Vec<_>)> =
@@ -168,8 +173,8 @@ impl Probes {
     /// What rays hit, of the elements of some bodies.
     ///
     /// # Errors
-    /// A query that is not about whole bodies, a largest parameter that is none, another number of directions than of origins, positions or
-    /// rays that are not finite, cancellation.
+    /// A query that is not about whole bodies, a largest parameter that is none, another number of
+    /// directions than of origins, positions or rays that are not finite, cancellation.
     pub fn cast<R: Real>(
         &mut self,
         scene: &Scene,
@@ -283,7 +288,8 @@ impl Probes {
     }
 }
 
-/// The elements that a query is about: the faces of bodies of triangles and tetrahedra, and all of other bodies.
+/// The elements that a query is about: the faces of bodies of triangles and tetrahedra, and all of
+/// other bodies.
 fn surfaces(scene: &Scene, query: &Query) -> Result<Vec<(BodyId, Part)>, Error> {
     let part = |id: BodyId| {
         Ok(match scene.body(id)?.kind() {
@@ -294,7 +300,8 @@ fn surfaces(scene: &Scene, query: &Query) -> Result<Vec<(BodyId, Part)>, Error> 
     targets(scene, query)?.into_iter().map(part).collect()
 }
 
-/// The bodies that a query is about: all, or those that it names with [`Query::of`] and [`Query::across`].
+/// The bodies that a query is about: all, or those that it names with [`Query::of`] and
+/// [`Query::across`].
 fn targets(scene: &Scene, query: &Query) -> Result<Vec<BodyId>, Error> {
     let refused = |setting, given: &str| {
         Err(Error::Setting {

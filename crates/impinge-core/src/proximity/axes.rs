@@ -1,13 +1,15 @@
 //! Two bodies seen along the shortest way between them that has been found so far.
 //!
-//! Where round bodies face each other, boxes along the coordinate axes of many clusters are nearer than the bodies. Along the
-//! shortest way they are not: what does not reach as far as its ends is farther away. So boxes are taken along three directions
-//! at right angles of which the first is that way.
+//! Where round bodies face each other, boxes along the coordinate axes of many clusters are nearer
+//! than the bodies. Along the shortest way they are not: what does not reach as far as its ends is
+//! farther away. So boxes are taken along three directions at right angles of which the first is
+//! that way.
 //!
-//! Cost: nine products for each vertex of a cluster that is asked for, once; clusters that are never near are never turned.
+//! Cost: nine products for each vertex of a cluster that is asked for, once; clusters that are
+//! never near are never turned.
 //!
-//! Invariant: a distance of such boxes is never larger than that of what they hold by more than rounding
-//! (`docs/exactness.md`, "The smallest distance of two bodies").
+//! Invariant: a distance of such boxes is never larger than that of what they hold by more than
+//! rounding (`docs/exactness.md`, "The smallest distance of two bodies").
 
 use super::features::dot;
 use crate::boxes::Extent;
@@ -76,7 +78,8 @@ fn unit(p: Point) -> Option<Point> {
 #[derive(Debug)]
 pub(super) struct View {
     pub axes: Axes,
-    /// Which of the boxes is that of each cluster, for either body; [`UNKNOWN`] before it is asked for.
+    /// Which of the boxes is that of each cluster, for either body; [`UNKNOWN`] before it is asked
+    /// for.
     box_ixs: [Vec<u32>; 2],
     boxes: Vec<Extent>,
 }
@@ -99,7 +102,8 @@ impl View {
         self.boxes.clear();
     }
 
-    /// The box of a node of the first or the second body: of a cluster from its vertices, of others from their boxes.
+    /// The box of a node of the first or the second body: of a cluster from its vertices, of others
+    /// from their boxes.
     pub fn bounds(
         &mut self,
         side: usize,

@@ -1,13 +1,14 @@
 //! The smallest distance of two bodies, by branch and bound over their clusters' trees.
 //!
-//! A queue holds pairs of nodes, nearest boxes first. The nearest pair is taken: if both are clusters, their
-//! primitives are compared, else one node is replaced by its children. When the next pair is farther than the
-//! best distance found so far, that distance is the answer.
+//! A queue holds pairs of nodes, nearest boxes first. The nearest pair is taken: if both are
+//! clusters, their primitives are compared, else one node is replaced by its children. When the
+//! next pair is farther than the best distance found so far, that distance is the answer.
 //!
-//! A pair of nodes is skipped only if its boxes are farther apart than the best distance by more than
-//! the rounding error: those along the coordinate axes, or those along the best pair's shortest way and across it. So no pair of primitives is lost whose computed distance is as small or smaller, and the
-//! answer does not depend on the order of the search. The pair that was nearest in the last call is compared first: bodies that
-//! move little have a good bound from the start.
+//! A pair of nodes is skipped only if its boxes are farther apart than the best distance by more
+//! than the rounding error: those along the coordinate axes, or those along the best pair's
+//! shortest way and across it. So no pair of primitives is lost whose computed distance is as small
+//! or smaller, and the answer does not depend on the order of the search. The pair that was nearest
+//! in the last call is compared first: bodies that move little have a good bound from the start.
 
 use std::cmp::{Ordering, Reverse};
 use std::collections::{BinaryHeap, HashMap};
@@ -85,16 +86,18 @@ enum KnownDistance {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct Nearest {
-    /// Their distance in the unit of the scene. 0 if and only if they share a point, which is decided exactly.
-    /// Otherwise rounded: it is computed in `f64` from two points of the primitives, with an error of a few units
-    /// in the last place of the largest coordinate.
+    /// Their distance in the unit of the scene. 0 if and only if they share a point, which is
+    /// decided exactly. Otherwise rounded: it is computed in `f64` from two points of the
+    /// primitives, with an error of a few units in the last place of the largest coordinate.
     pub distance: f64,
-    /// The element of the first body: of the first that was asked for, or of the lower of the nearest two of many.
+    /// The element of the first body: of the first that was asked for, or of the lower of the
+    /// nearest two of many.
     pub a: Element,
-    /// The element of the second body. Of several pairs at the same computed distance, the lowest by `a` and then by `b`.
+    /// The element of the second body. Of several pairs at the same computed distance, the lowest
+    /// by `a` and then by `b`.
     pub b: Element,
-    /// The point of each element that is nearest to the other, rounded. Where they touch, a point that they share, twice: see
-    /// [`contact`](crate::contact) for all of them.
+    /// The point of each element that is nearest to the other, rounded. Where they touch, a point
+    /// that they share, twice: see [`contact`](crate::contact) for all of them.
     pub points: [[f64; 3]; 2],
 }
 
@@ -148,13 +151,14 @@ impl Distances {
         self.of_two.begin(scene);
     }
 
-    /// The smallest distance of two bodies and the pair of primitives that has it; `None` if one body has
-    /// no primitives.
+    /// The smallest distance of two bodies and the pair of primitives that has it; `None` if one
+    /// body has no primitives.
     ///
     /// # Errors
-    /// A body that is not in the scene, the same body twice, bad positions that were written in place; cancellation; errors of
-    /// `touching`, which is asked for the lowest pair that touches where boxes of many clusters overlap: it may decide by pairs of clusters
-    /// what this search would decide one by one.
+    /// A body that is not in the scene, the same body twice, bad positions that were written in
+    /// place; cancellation; errors of `touching`, which is asked for the lowest pair that touches
+    /// where boxes of many clusters overlap: it may decide by pairs of clusters what this search
+    /// would decide one by one.
     pub fn between(
         &mut self,
         scene: &Scene,
@@ -187,8 +191,8 @@ impl Distances {
         Ok(found.map(|(_, nearest)| nearest))
     }
 
-    /// The two nearest of the bodies of a frame that may meet, and their nearest elements. Of several pairs at the same computed
-    /// distance the lowest.
+    /// The two nearest of the bodies of a frame that may meet, and their nearest elements. Of
+    /// several pairs at the same computed distance the lowest.
     ///
     /// # Errors
     /// Cancellation; errors of `touching`, which is asked as in [`between`](Distances::between).
@@ -281,7 +285,8 @@ impl Distances {
         Ok(nearest)
     }
 
-    /// Whether any elements of bodies of a frame meet, if that is soon known. The frame must be about pairs of different bodies.
+    /// Whether any elements of bodies of a frame meet, if that is soon known. The frame must be
+    /// about pairs of different bodies.
     ///
     /// # Errors
     /// Cancellation.
@@ -371,7 +376,8 @@ impl OfTwo {
         self.stats.clear();
     }
 
-    /// As `search`, but where very many boxes overlap `touching` is asked first for the lowest pair that touches.
+    /// As `search`, but where very many boxes overlap `touching` is asked first for the lowest pair
+    /// that touches.
     fn search_or_ask(
         &mut self,
         scene: &Scene,
@@ -395,8 +401,9 @@ impl OfTwo {
         Ok(found)
     }
 
-    /// The nearest elements of two bodies that are known, and the square of their distance in a scale, if that is at most `most`. `None` if
-    /// more pairs of clusters would have to be compared whose boxes overlap than `most_overlapping`.
+    /// The nearest elements of two bodies that are known, and the square of their distance in a
+    /// scale, if that is at most `most`. `None` if more pairs of clusters would have to be compared
+    /// whose boxes overlap than `most_overlapping`.
     fn search(
         &mut self,
         scene: &Scene,
@@ -554,7 +561,8 @@ struct FoundDistance {
     directions: Box<[Directions64; 2]>,
 }
 
-/// The square of the smallest distance, and who has it; `None` if nothing is as near as was asked for.
+/// The square of the smallest distance, and who has it; `None` if nothing is as near as was asked
+/// for.
 type Found = Option<(f64, Nearest)>;
 
 /// Of how many pairs of bodies the answers are kept, for each body.
@@ -566,19 +574,21 @@ const DIRECTIONS_FROM: usize = 256;
 
 /// Stands for no element.
 const NONE: ElementIx = ElementIx::new(u32::MAX);
-/// How much work [`Distances::any`] does before it leaves a scene to the whole machinery: some 50 microseconds.
+/// How much work [`Distances::any`] does before it leaves a scene to the whole machinery: some 50
+/// microseconds.
 const ALLOWANCE: u32 = 20_000;
-/// Pairs of nodes between two looks at the control: a few milliseconds, if all are clusters whose primitives are compared.
+/// Pairs of nodes between two looks at the control: a few milliseconds, if all are clusters whose
+/// primitives are compared.
 const LOOK: u64 = 8;
-/// By how much, relative to the largest coordinate, rounding may make a computed distance smaller than the
-/// distance of the boxes.
+/// By how much, relative to the largest coordinate, rounding may make a computed distance smaller
+/// than the distance of the boxes.
 const ROUNDING: f64 = 32.0 * f64::EPSILON;
 /// The same of boxes along other axes, which are rounded themselves.
 pub(super) const ROUNDING_TURNED: f64 = 256.0 * f64::EPSILON;
 
 impl FoundDistance {
-    /// Squared distances of boxes that may hold a pair as near as the best are at most these: along coordinate axes, and along
-    /// others.
+    /// Squared distances of boxes that may hold a pair as near as the best are at most these: along
+    /// coordinate axes, and along others.
     fn limits(&self) -> [f64; 2] {
         self.errors.map(|error| limit(self.best.squared, error))
     }
@@ -590,8 +600,9 @@ impl FoundDistance {
 }
 
 impl DistanceSearch<'_> {
-    /// The nearest pair and the square of its distance, if that is at most `most`; `likely` is one to compare first. `None` if more pairs
-    /// of clusters would have to be compared whose boxes overlap than `most_overlapping`.
+    /// The nearest pair and the square of its distance, if that is at most `most`; `likely` is one
+    /// to compare first. `None` if more pairs of clusters would have to be compared whose boxes
+    /// overlap than `most_overlapping`.
     ///
     /// # Errors
     /// Cancellation.
@@ -804,8 +815,8 @@ impl DistanceSearch<'_> {
         found.lists = lists;
     }
 
-    /// Puts the triangles of two clusters that are left side by side, to be told apart along their normals, if they are many: boxes
-    /// of long ones overlap although they are far from each other.
+    /// Puts the triangles of two clusters that are left side by side, to be told apart along their
+    /// normals, if they are many: boxes of long ones overlap although they are far from each other.
     fn put_directions(
         &self,
         lists: &[Vec<ComparedPrimitive>; 2],
@@ -828,7 +839,8 @@ impl DistanceSearch<'_> {
         directions[0].can_part(&directions[1])
     }
 
-    /// Takes a first pair of two clusters that is likely to be near: what is nearest to a box, to that, and to that again.
+    /// Takes a first pair of two clusters that is likely to be near: what is nearest to a box, to
+    /// that, and to that again.
     fn guess(&self, nodes: [Node; 2], found: &mut FoundDistance) {
         let mut boxes = [0, 1].map(|side| self.bounds(side, nodes[side]));
         let mut pair = [ElementIx::new(0); 2];
@@ -865,7 +877,8 @@ impl DistanceSearch<'_> {
     fn gap(&self, a: ElementIx, b: ElementIx, apart: f64) -> Gap {
         let [body_a, body_b] = self.bodies;
         let (a, b) = (corners(body_a, a), corners(body_b, b));
-        // Primitives in boxes that are apart do not meet. But the distance of such boxes may underflow to 0.
+        // Primitives in boxes that are apart do not meet. But the distance of such boxes may
+        // underflow to 0.
         if apart == 0.0 && intersect(body_a.kind(), &a, body_b.kind(), &b) {
             return Gap {
                 squared: 0.0,

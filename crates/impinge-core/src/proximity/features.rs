@@ -1,10 +1,11 @@
 //! The distance of two primitives that do not meet, in `f64`.
 //!
-//! It is the least distance of a corner of one to a face of the other, and of an edge of one to an edge of the
-//! other (Ericson, *Real-Time Collision Detection*, 2005, 5.1.5 and 5.1.9). Each case finds one point on each
-//! primitive, and the distance is that of the two points. So it is never less than the true distance by more than
-//! the rounding of these points, however inaccurate the parameters that led to them. One fixed order of
-//! operations, no fused multiply-add: the same bits everywhere.
+//! It is the least distance of a corner of one to a face of the other, and of an edge of one to an
+//! edge of the other (Ericson, *Real-Time Collision Detection*, 2005, 5.1.5 and 5.1.9). Each case
+//! finds one point on each primitive, and the distance is that of the two points. So it is never
+//! less than the true distance by more than the rounding of these points, however inaccurate the
+//! parameters that led to them. One fixed order of operations, no fused multiply-add: the same bits
+//! everywhere.
 
 /// A point, or a difference of points.
 type Vector = [f64; 3];
@@ -69,8 +70,8 @@ fn on_segment(p: Vector, a: Vector, b: Vector) -> Vector {
 
 /// The nearest points of a point and a triangle.
 ///
-/// The edges are always examined too. So a point of the triangle is found even if rounding misplaces the foot of
-/// the perpendicular.
+/// The edges are always examined too. So a point of the triangle is found even if rounding
+/// misplaces the foot of the perpendicular.
 fn point_triangle(p: Vector, [a, b, c]: [Vector; 3]) -> Gap {
     let (ab, ac, ap) = (sub(b, a), sub(c, a), sub(p, a));
     let (uu, uv, vv) = (dot(ab, ab), dot(ab, ac), dot(ac, ac));
@@ -159,7 +160,8 @@ mod tests {
     use super::*;
     use impinge_scenes::Random;
 
-    /// The least distance of two triangles by numerical minimisation: never less than the true distance.
+    /// The least distance of two triangles by numerical minimisation: never less than the true
+    /// distance.
     fn sampled(a: [Vector; 3], b: [Vector; 3]) -> f64 {
         let blend = |t: &[Vector; 3], u: f64, v: f64| {
             [0, 1, 2].map(|k| t[0][k] + u * (t[1][k] - t[0][k]) + v * (t[2][k] - t[0][k]))

@@ -1,12 +1,15 @@
 //! Many bodies: which two are nearest, and whether any two meet.
 //!
-//! A tree over the bodies' boxes says which pairs of bodies are worth a look. Trees of single bodies are made when they are first
-//! needed, so bodies that are far from all others cost their box alone.
+//! A tree over the bodies' boxes says which pairs of bodies are worth a look. Trees of single
+//! bodies are made when they are first needed, so bodies that are far from all others cost their
+//! box alone.
 //!
-//! * **Nearest**: pairs of tree nodes wait in a queue, nearest boxes first. When the next pair is farther than the best
-//!   distance so far, no other pair of bodies can be nearer: the rest is never asked.
-//! * **Any**: pairs of bodies whose boxes meet are compared one by one, up to the first two elements that meet. A scene in which
-//!   that takes long is left to the whole machinery, which is faster per pair and slower to start.
+//! * **Nearest**: pairs of tree nodes wait in a queue, nearest boxes first. When the next pair is
+//!   farther than the best distance so far, no other pair of bodies can be nearer: the rest is
+//!   never asked.
+//! * **Any**: pairs of bodies whose boxes meet are compared one by one, up to the first two
+//!   elements that meet. A scene in which that takes long is left to the whole machinery, which is
+//!   faster per pair and slower to start.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -102,8 +105,8 @@ impl Bodies {
         }
     }
 
-    /// Calls `each` for the pairs of parts whose boxes have a point in common, until it returns true. Pairs without any part up to
-    /// `last` may be missing.
+    /// Calls `each` for the pairs of parts whose boxes have a point in common, until it returns
+    /// true. Pairs without any part up to `last` may be missing.
     ///
     /// # Errors
     /// Those of `each`.
@@ -207,8 +210,9 @@ impl Apart<'_> {
 /// Bodies with more vertices are not looked at as a whole.
 const MOST_VERTICES: usize = 1024;
 
-/// Whether two bodies are farther apart than a distance, seen along the way between the middles of their boxes: all vertices
-/// of one are beyond all of the other's by more. Of many round bodies, most whose boxes are near are told apart so.
+/// Whether two bodies are farther apart than a distance, seen along the way between the middles of
+/// their boxes: all vertices of one are beyond all of the other's by more. Of many round bodies,
+/// most whose boxes are near are told apart so.
 ///
 /// `error` is what rounding may do to heights along that way, and to a distance that is computed.
 pub(super) fn are_apart(

@@ -1,8 +1,9 @@
 //! The power of two in which a search for the smallest distance reads coordinates.
 //!
-//! Squares of very small or very large lengths underflow or overflow. There all coordinates are multiplied by one power of two, with which
-//! the largest is between 2^-80 and 2^30. That is exact but for coordinates that are very much smaller than the largest; what those
-//! lose is far below the error that the search allows for. Anywhere else the factor is 1.
+//! Squares of very small or very large lengths underflow or overflow. There all coordinates are
+//! multiplied by one power of two, with which the largest is between 2^-80 and 2^30. That is exact
+//! but for coordinates that are very much smaller than the largest; what those lose is far below
+//! the error that the search allows for. Anywhere else the factor is 1.
 
 use crate::boxes::Extent;
 use impinge_exact::Point;
@@ -11,14 +12,15 @@ use impinge_exact::Point;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Scale(f64);
 
-/// Where coordinates are read as they are. Every square of a difference that matters is then a normal number.
+/// Where coordinates are read as they are. Every square of a difference that matters is then a
+/// normal number.
 const USUAL: std::ops::Range<f64> = power(-200)..power(200);
 /// The exponents of factors, so that the factor and its inverse are normal numbers.
 const MOST: i64 = 1000;
 
 impl Scale {
-    /// For bodies of which boxes in `f32` have coordinates up to `boxed`. `exact` is the largest coordinate itself, which is asked for only
-    /// where `f32` has no exponents for it.
+    /// For bodies of which boxes in `f32` have coordinates up to `boxed`. `exact` is the largest
+    /// coordinate itself, which is asked for only where `f32` has no exponents for it.
     pub fn of(boxed: f64, exact: impl FnOnce() -> f64) -> Self {
         let is_held = boxed >= f64::from(f32::MIN_POSITIVE) && boxed < f64::from(f32::MAX);
         let largest = if is_held { boxed } else { exact() };

@@ -6,8 +6,8 @@ use impinge_exact::internal::closest_of_elements;
 use crate::scene::elements::BodyKind;
 use crate::search::narrow::intersect;
 
-/// A point that two elements share which intersect, rounded: where their borders or surfaces meet; else, as one is inside
-/// the other, a corner of the inner one.
+/// A point that two elements share which intersect, rounded: where their borders or surfaces meet;
+/// else, as one is inside the other, a corner of the inner one.
 pub(super) fn shared_point(kinds: [BodyKind; 2], corners: [&[Point; 4]; 2]) -> Point {
     let [of_a, of_b] = [0, 1].map(|side| surface(kinds[side], corners[side]));
     for (a, n_a) in &of_a {

@@ -1,7 +1,7 @@
 //! The boxes of a body's clusters, and of the tree nodes above them.
 //!
-//! The clusters are those that all questions share. Their boxes are found once per pose, from each cluster's vertices; boxes
-//! of primitives only when a cluster is compared. Cost: `O(n)`.
+//! The clusters are those that all questions share. Their boxes are found once per pose, from each
+//! cluster's vertices; boxes of primitives only when a cluster is compared. Cost: `O(n)`.
 
 use std::sync::Arc;
 

@@ -3,8 +3,8 @@
 use crate::scene::elements::Part;
 use crate::scene::words::words;
 
-/// The kinds of a pair's elements. A pair's `a` is the element that the kind names first. So a vertex and a face are always
-/// in this order, whatever their bodies.
+/// The kinds of a pair's elements. A pair's `a` is the element that the kind names first. So a
+/// vertex and a face are always in this order, whatever their bodies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum PairKind {
     /// A vertex and a face.

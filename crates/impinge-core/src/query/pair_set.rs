@@ -45,8 +45,8 @@ impl PairSet {
         }))
     }
 
-    /// The keys of the pairs in the numbers of a plan; those of bodies that do not take part have none. They are made again only when
-    /// numbers have changed.
+    /// The keys of the pairs in the numbers of a plan; those of bodies that do not take part have
+    /// none. They are made again only when numbers have changed.
     pub fn keys(&self, parts: Vec<Numbered>) -> SortedKeys {
         let mut held = self.0.keys.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some((of, keys)) = &*held

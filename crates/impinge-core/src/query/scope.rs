@@ -15,11 +15,11 @@ use impinge_exact::internal::Keep;
 pub enum SharedVertex {
     /// Pairs that share a vertex index are not reported.
     Skip,
-    /// The default: they are reported when they meet in more than the parts that they share. Triangles: sharing one
-    /// vertex, when the edge opposite it in one meets the other triangle; sharing an edge, when
-    /// they are coplanar and fold to the same side; sharing all three, always. Tetrahedra: when
-    /// the intersection is larger than the common vertex, edge or face. Edges and points of one body
-    /// that share a vertex are not reported under either rule.
+    /// The default: they are reported when they meet in more than the parts that they share.
+    /// Triangles: sharing one vertex, when the edge opposite it in one meets the other triangle;
+    /// sharing an edge, when they are coplanar and fold to the same side; sharing all three,
+    /// always. Tetrahedra: when the intersection is larger than the common vertex, edge or face.
+    /// Edges and points of one body that share a vertex are not reported under either rule.
     #[default]
     Resolve,
 }
@@ -30,7 +30,8 @@ words!("shared_vertex", "resolve or skip", SharedVertex: [Resolve = "resolve", S
 pub(crate) enum Scope {
     Between(BodyId, BodyId),
     SelfOf(BodyId),
-    /// Pairs of one of [`Query::across`] and another body; with `within`, self-collision of these too.
+    /// Pairs of one of [`Query::across`] and another body; with `within`, self-collision of these
+    /// too.
     Across {
         within: bool,
     },
@@ -70,14 +71,15 @@ impl Exclusion {
     /// The most rings that can be left out.
     pub const MOST_RINGS: u32 = 16;
 
-    /// Pairs of one body that are near each other in its surface: some vertex of one element is at most so many edges away from some
-    /// vertex of the other. 0 leaves out what shares a vertex, 1 also what an edge joins.
+    /// Pairs of one body that are near each other in its surface: some vertex of one element is at
+    /// most so many edges away from some vertex of the other. 0 leaves out what shares a vertex, 1
+    /// also what an edge joins.
     pub fn rings(n: u32) -> Self {
         Exclusion(Excluded::Rings(n))
     }
 
-    /// Pairs of elements of two [groups](crate::Scene::set_groups), or of one with itself: each vertex of one element and each vertex of
-    /// the other must be in such groups.
+    /// Pairs of elements of two [groups](crate::Scene::set_groups), or of one with itself: each
+    /// vertex of one element and each vertex of the other must be in such groups.
     pub fn groups(g: u32, h: u32) -> Self {
         Exclusion(Excluded::Groups(g.min(h), g.max(h)))
     }
@@ -96,11 +98,13 @@ impl From<PairSet> for Exclusion {
     }
 }
 
-/// What is asked of a scene: which pairs, and how. One value for every question of a [`Detector`](crate::Detector).
+/// What is asked of a scene: which pairs, and how. One value for every question of a
+/// [`Detector`](crate::Detector).
 ///
-/// Options that say *which* pairs ([`kinds`](Query::kinds), [`exclude`](Query::exclude), [`shared_vertex`](Query::shared_vertex),
-/// [`owned_by`](Query::owned_by), and the constructors) are refused by a question that cannot honour them. Options that say *how*
-/// are ignored by a question that has no use for them, so that a solver keeps one query for all.
+/// Options that say *which* pairs ([`kinds`](Query::kinds), [`exclude`](Query::exclude),
+/// [`shared_vertex`](Query::shared_vertex), [`owned_by`](Query::owned_by), and the constructors)
+/// are refused by a question that cannot honour them. Options that say *how* are ignored by a
+/// question that has no use for them, so that a solver keeps one query for all.
 ///
 /// ```
 /// use impinge::{Precision, Query, SharedVertex, Start};
@@ -197,7 +201,8 @@ impl Query {
         })
     }
 
-    /// All pairs of one body: with every other body, and its self-collision. They meet whatever their filters say.
+    /// All pairs of one body: with every other body, and its self-collision. They meet whatever
+    /// their filters say.
     pub fn of(body: BodyId) -> Self {
         Query {
             across: [body].into(),
@@ -205,8 +210,8 @@ impl Query {
         }
     }
 
-    /// Pairs of one of some bodies and one that is not among them. As those of [`between`](Query::between), they meet whatever
-    /// their filters say.
+    /// Pairs of one of some bodies and one that is not among them. As those of
+    /// [`between`](Query::between), they meet whatever their filters say.
     pub fn across(bodies: impl IntoIterator<Item = BodyId>) -> Self {
         Query {
             across: bodies.into_iter().collect(),
@@ -214,23 +219,26 @@ impl Query {
         }
     }
 
-    /// The adjacency rule of self-collision: [`SharedVertex::Resolve`], unless it is said. Vertices are shared when their
-    /// indices are equal: positions that coincide count once they are welded.
+    /// The adjacency rule of self-collision: [`SharedVertex::Resolve`], unless it is said. Vertices
+    /// are shared when their indices are equal: positions that coincide count once they are welded.
     pub fn shared_vertex(mut self, rule: SharedVertex) -> Self {
         self.shared_vertex = rule;
         self
     }
 
-    /// Leaves pairs out, before they are decided: `(a, b)`, those of two bodies; `(a, a)`, the self-collision of one;
-    /// [`Exclusion::rings`], what is near in the surface; [`Exclusion::groups`], groups of vertices that do not meet; the pairs of
+    /// Leaves pairs out, before they are decided: `(a, b)`, those of two bodies; `(a, a)`, the
+    /// self-collision of one; [`Exclusion::rings`], what is near in the surface;
+    /// [`Exclusion::groups`], groups of vertices that do not meet; the pairs of
     /// [`near`](crate::Detector::near), those that were near at rest. Each call leaves out more.
     ///
-    /// Besides, pairs of elements all of whose vertices are [pinned](crate::Scene::set_pinned) are left out of every query.
+    /// Besides, pairs of elements all of whose vertices are [pinned](crate::Scene::set_pinned) are
+    /// left out of every query.
     ///
-    /// [`detect`](crate::Detector::detect), [`count`](crate::Detector::count) and [`any`](crate::Detector::any) find all pairs first and
-    /// leave out rings, groups and pinned vertices then: limits count what is left out, too. They are about the elements that
-    /// bodies were given as, and refuse pairs of an answer. [`nearest`](crate::Detector::nearest) and frames that stay on a
-    /// device refuse all but bodies.
+    /// [`detect`](crate::Detector::detect), [`count`](crate::Detector::count) and
+    /// [`any`](crate::Detector::any) find all pairs first and leave out rings, groups and pinned
+    /// vertices then: limits count what is left out, too. They are about the elements that bodies
+    /// were given as, and refuse pairs of an answer. [`nearest`](crate::Detector::nearest) and
+    /// frames that stay on a device refuse all but bodies.
     ///
     /// ```
     /// use impinge::{Backend, Detector, Exclusion, Query, Scene};
@@ -262,35 +270,41 @@ impl Query {
         self
     }
 
-    /// Which kinds of pairs of vertices, edges and faces. If this is not said: vertices and faces, edges and edges; where bodies
-    /// are made of edges or points alone also edges and vertices, vertices and vertices;
-    /// of [`near`](crate::Detector::near) also edges that meet faces. Any two elements that are near have such a pair among their
-    /// parts, so bodies are at least the distance apart if there are none, and neighbours that fold onto each other have one
-    /// too. Only faces with the same three vertices, and a body inside tetrahedra, have none:
+    /// Which kinds of pairs of vertices, edges and faces. If this is not said: vertices and faces,
+    /// edges and edges; where bodies are made of edges or points alone also edges and vertices,
+    /// vertices and vertices; of [`near`](crate::Detector::near) also edges that meet faces. Any
+    /// two elements that are near have such a pair among their parts, so bodies are at least the
+    /// distance apart if there are none, and neighbours that fold onto each other have one too.
+    /// Only faces with the same three vertices, and a body inside tetrahedra, have none:
     /// [`Detector::any`](crate::Detector::any) finds these.
     ///
-    /// [`detect`](crate::Detector::detect), [`count`](crate::Detector::count) and [`any`](crate::Detector::any) are about the elements that
-    /// bodies were given as, and refuse kinds. Questions about a step refuse edges with faces, and faces with faces.
+    /// [`detect`](crate::Detector::detect), [`count`](crate::Detector::count) and
+    /// [`any`](crate::Detector::any) are about the elements that bodies were given as, and refuse
+    /// kinds. Questions about a step refuse edges with faces, and faces with faces.
     pub fn kinds(mut self, kinds: impl IntoIterator<Item = PairKind>) -> Self {
         self.kinds = Some(kinds.into_iter().collect());
         self
     }
 
-    /// Only the pairs that belong to the half-open box `[low, high)`: for programs that cut space into cells themselves, such
-    /// as MPI codes. A pair belongs to the cell that holds the larger of the lower corners of its two bounding boxes,
-    /// axis by axis. So if each process has all primitives whose boxes touch its cell, and the cells cover space without
-    /// overlap, each pair of the whole is found by exactly one process. Bounds may be infinite.
+    /// Only the pairs that belong to the half-open box `[low, high)`: for programs that cut space
+    /// into cells themselves, such as MPI codes. A pair belongs to the cell that holds the larger
+    /// of the lower corners of its two bounding boxes, axis by axis. So if each process has all
+    /// primitives whose boxes touch its cell, and the cells cover space without overlap, each pair
+    /// of the whole is found by exactly one process. Bounds may be infinite.
     ///
-    /// For a step, boxes hold their elements from the start to the end. If pairs at a distance count as well, a process
-    /// needs all elements whose boxes touch its cell when they are inflated, on all sides, by that distance: the
-    /// separation of a step, the distance of [`near`](crate::Detector::near) with both bodies' thickness, twice the inflation of
+    /// For a step, boxes hold their elements from the start to the end. If pairs at a distance
+    /// count as well, a process needs all elements whose boxes touch its cell when they are
+    /// inflated, on all sides, by that distance: the separation of a step, the distance of
+    /// [`near`](crate::Detector::near) with both bodies' thickness, twice the inflation of
     /// [`candidates`](crate::Detector::candidates).
     ///
-    /// All intersections of the query are found and held first: [`Settings::max_pairs`](crate::Settings::max_pairs) and the memory
-    /// budget count them, also those of [`Detector::count`](crate::Detector::count); [`Detector::any`](crate::Detector::any) does not
-    /// stop early, and has no limit of pairs. Steps and distances hold only the pairs of the cell.
-    /// [`Detector::advance`](crate::Detector::advance) and frames that stay on a device refuse a cell, and so does every question if a
-    /// lower bound is above the upper one.
+    /// All intersections of the query are found and held first:
+    /// [`Settings::max_pairs`](crate::Settings::max_pairs) and the memory budget count them, also
+    /// those of [`Detector::count`](crate::Detector::count);
+    /// [`Detector::any`](crate::Detector::any) does not stop early, and has no limit of pairs.
+    /// Steps and distances hold only the pairs of the cell.
+    /// [`Detector::advance`](crate::Detector::advance) and frames that stay on a device refuse a
+    /// cell, and so does every question if a lower bound is above the upper one.
     ///
     /// ```
     /// use impinge::Query;
@@ -315,9 +329,9 @@ impl Query {
 
     /// Sets the distance that elements must keep, in the unit of the scene: finite, 0 or more.
     ///
-    /// A pair is then reported with the first time at which its distance is at most the separation, decided exactly and
-    /// rounded down, and pairs within the separation at the start count as touching at the start. With 0, which is the
-    /// default, elements must touch.
+    /// A pair is then reported with the first time at which its distance is at most the separation,
+    /// decided exactly and rounded down, and pairs within the separation at the start count as
+    /// touching at the start. With 0, which is the default, elements must touch.
     pub fn separation(mut self, separation: f64) -> Self {
         self.separation = separation;
         self
@@ -325,13 +339,16 @@ impl Query {
 
     /// Sets what a step leaves between elements, in the unit of the scene: finite, 0 or more.
     ///
-    /// A pair whose distance at the start is d keeps `separation + min(clearance, share (d - separation))`, with a
-    /// [share](Clearance::share) of 0.2 by default: it counts as in contact at the first time at which its distance is at most that.
-    /// Such contacts are not at the start; pairs within the separation at the start count as touching there, as they do without a
-    /// clearance. All of this is decided exactly; d - separation is rounded up to 24 bits first.
+    /// A pair whose distance at the start is d keeps
+    /// `separation + min(clearance, share (d - separation))`, with a [share](Clearance::share) of
+    /// 0.2 by default: it counts as in contact at the first time at which its distance is at most
+    /// that. Such contacts are not at the start; pairs within the separation at the start count as
+    /// touching there, as they do without a clearance. All of this is decided exactly; d -
+    /// separation is rounded up to 24 bits first.
     ///
-    /// So a chain of steps comes as near to contact as it likes, but never stops just short of it, where barriers are endless. With
-    /// a clearance of 1e-4 this is what ipc-toolkit's `conservative_rescaling = 0.8` does.
+    /// So a chain of steps comes as near to contact as it likes, but never stops just short of it,
+    /// where barriers are endless. With a clearance of 1e-4 this is what ipc-toolkit's
+    /// `conservative_rescaling = 0.8` does.
     ///
     /// ```
     /// use impinge::{Clearance, Query};
@@ -343,33 +360,37 @@ impl Query {
         self
     }
 
-    /// Leaves out the pairs that a filter refuses, in questions about the contacts of a step; all others refuse a filter. It is asked about pairs that are in contact, or might be as far as floats can tell;
-    /// an [early](PairFilter::early) one sooner.
+    /// Leaves out the pairs that a filter refuses, in questions about the contacts of a step; all
+    /// others refuse a filter. It is asked about pairs that are in contact, or might be as far as
+    /// floats can tell; an [early](PairFilter::early) one sooner.
     pub fn filter(mut self, filter: PairFilter) -> Self {
         self.filter = Some(filter);
         self
     }
 
-    /// Says which bodies do not move, for [`safe_distances`](crate::Detector::safe_distances): they leave the whole distance to what is
-    /// near them.
+    /// Says which bodies do not move, for [`safe_distances`](crate::Detector::safe_distances): they
+    /// leave the whole distance to what is near them.
     pub fn fixed(mut self, bodies: impl IntoIterator<Item = BodyId>) -> Self {
         self.fixed = bodies.into_iter().collect();
         self
     }
 
-    /// Asks for distances as `f64`, too: [`NearPair::distance`](crate::NearPair::distance), 8 bytes per pair.
+    /// Asks for distances as `f64`, too: [`NearPair::distance`](crate::NearPair::distance), 8 bytes
+    /// per pair.
     pub fn distances(mut self) -> Self {
         self.distances = true;
         self
     }
 
-    /// Asks for distances and nearest points as `f64`, too: [`NearPair::closest`](crate::NearPair::closest), 56 bytes per pair.
+    /// Asks for distances and nearest points as `f64`, too:
+    /// [`NearPair::closest`](crate::NearPair::closest), 56 bytes per pair.
     pub fn closest_points(mut self) -> Self {
         (self.distances, self.closest) = (true, true);
         self
     }
 
-    /// Sets what is asked of rays, for [`cast`](crate::Detector::cast): the first hit, whether there is any, or all.
+    /// Sets what is asked of rays, for [`cast`](crate::Detector::cast): the first hit, whether
+    /// there is any, or all.
     pub fn hits(mut self, hits: Hit) -> Self {
         self.hits = hits;
         self
@@ -385,7 +406,8 @@ impl Query {
         }
     }
 
-    /// Checks the numbers, and that a question about a step is about kinds of pairs that have a first contact.
+    /// Checks the numbers, and that a question about a step is about kinds of pairs that have a
+    /// first contact.
     pub(crate) fn check_step(&self) -> Result<(), Error> {
         let refused = [PairKind::EdgeFace, PairKind::FaceFace];
         if let Some(kind) = self

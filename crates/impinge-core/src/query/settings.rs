@@ -8,16 +8,18 @@ use crate::scene::words::words;
 /// How candidates are found. All methods give the same pairs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Method {
-    /// `Cells` for a frame whose bodies are mostly new to the detector, if that is cheaper, and `Clusters` as soon as
-    /// they come back: their second frame makes the clusters. [`Stats::method`](crate::Stats::method) says which one answered. With a memory
-    /// budget, and for steps and distances always `Clusters`.
+    /// `Cells` for a frame whose bodies are mostly new to the detector, if that is cheaper, and
+    /// `Clusters` as soon as they come back: their second frame makes the clusters.
+    /// [`Stats::method`](crate::Stats::method) says which one answered. With a memory budget, and
+    /// for steps and distances always `Clusters`.
     ///
-    /// With `Backend::Auto`, a detector on a GPU answers such a first frame on the CPU, and [`Stats::backend`](crate::Stats::backend) says so: all methods of a device
-    /// work on clusters, and making them takes the CPU longer than the whole frame in its grid.
+    /// With `Backend::Auto`, a detector on a GPU answers such a first frame on the CPU, and
+    /// [`Stats::backend`](crate::Stats::backend) says so: all methods of a device work on clusters,
+    /// and making them takes the CPU longer than the whole frame in its grid.
     #[default]
     Auto,
-    /// Groups are fixed by topology; in each frame only their boxes move. The fastest method for bodies that are asked
-    /// about more than once: the first frame pays for the groups.
+    /// Groups are fixed by topology; in each frame only their boxes move. The fastest method for
+    /// bodies that are asked about more than once: the first frame pays for the groups.
     Clusters,
     /// The two-level grid of the paper: the primitives of a cell form groups, made anew each frame.
     Cells,
@@ -26,7 +28,8 @@ pub enum Method {
 }
 
 impl Method {
-    /// The method that `Auto` uses for bodies that it has met before. Other methods are returned unchanged.
+    /// The method that `Auto` uses for bodies that it has met before. Other methods are returned
+    /// unchanged.
     pub fn in_the_long_run(self) -> Method {
         match self {
             Method::Auto => Method::Clusters,
@@ -40,8 +43,8 @@ words!("method", "auto, clusters, cells or naive", Method: [Auto = "auto", Clust
 /// Where the work is done.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Backend {
-    /// A hardware GPU if there is one, else the CPU. The CPU also takes over if the GPU fails or cannot
-    /// hold the scene.
+    /// A hardware GPU if there is one, else the CPU. The CPU also takes over if the GPU fails or
+    /// cannot hold the scene.
     #[default]
     Auto,
     /// The CPU, with one thread per core or as many as [`Settings::threads`] says.
@@ -52,11 +55,13 @@ pub enum Backend {
 
 words!("backend", "auto, cpu or gpu", Backend: [Auto = "auto", Cpu = "cpu", Gpu = "gpu"; 3]);
 
-/// Whether a body is clustered again after it has flowed far from the pose in which it was clustered.
+/// Whether a body is clustered again after it has flowed far from the pose in which it was
+/// clustered.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Recluster {
-    /// Yes, when the summed surface of its cluster boxes has grown so much that it pays. A GPU judges by a sample of
-    /// the boxes, and only bodies whose positions are in the scene, not in a buffer of the caller's.
+    /// Yes, when the summed surface of its cluster boxes has grown so much that it pays. A GPU
+    /// judges by a sample of the boxes, and only bodies whose positions are in the scene, not in a
+    /// buffer of the caller's.
     #[default]
     Auto,
     /// Never: no frame pays for clustering again, but boxes may grow and frames get slower.
@@ -73,8 +78,8 @@ pub enum InstructionSet {
     Portable,
     /// 256 bits on x86-64.
     Avx2,
-    /// 512 bits on x86-64, where the processor has AVX-512 with its extensions VL, DQ, BW and VBMI2 (Ice Lake, Zen 4
-    /// and later); else 256.
+    /// 512 bits on x86-64, where the processor has AVX-512 with its extensions VL, DQ, BW and VBMI2
+    /// (Ice Lake, Zen 4 and later); else 256.
     #[default]
     Avx512,
 }
@@ -84,17 +89,18 @@ words!("instruction_set", "portable, avx2 or avx512", InstructionSet: [Portable 
 /// Which cores the helper threads of the CPU backend may run on. The answer does not depend on it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Affinity {
-    /// On Linux, with up to 8 threads: every core that the helper was started with, except the one on which the calling
-    /// thread is running. Otherwise as `Inherited`.
+    /// On Linux, with up to 8 threads: every core that the helper was started with, except the one
+    /// on which the calling thread is running. Otherwise as `Inherited`.
     ///
-    /// The system often wakes a helper on the caller's core, where it runs only after the caller is done. A frame then takes
-    /// as long as with fewer threads.
+    /// The system often wakes a helper on the caller's core, where it runs only after the caller is
+    /// done. A frame then takes as long as with fewer threads.
     Auto,
-    /// Those that the system chooses: no thread's affinity is ever set. A helper starts with the affinity of the
-    /// thread that asked the first question.
+    /// Those that the system chooses: no thread's affinity is ever set. A helper starts with the
+    /// affinity of the thread that asked the first question.
     ///
-    /// For programs that place threads themselves: ranks of MPI, real-time threads, containers whose cores are changed while
-    /// they run, `taskset` on a running process. `Auto` would overwrite what they set for a helper.
+    /// For programs that place threads themselves: ranks of MPI, real-time threads, containers
+    /// whose cores are changed while they run, `taskset` on a running process. `Auto` would
+    /// overwrite what they set for a helper.
     #[default]
     Inherited,
 }
@@ -119,12 +125,13 @@ pub struct Settings {
     /// `Cells`: the most elements a group may hold, 1 to 64.
     #[doc(hidden)]
     pub group_size: u32,
-    /// Bytes the detector may hold, the answer included; `None` for as many as it takes. While an answer is found that
-    /// is larger than the one before, it takes up to twice its size. On a GPU: bytes of buffers on the device, and as
-    /// many again for the answer on the host.
+    /// Bytes the detector may hold, the answer included; `None` for as many as it takes. While an
+    /// answer is found that is larger than the one before, it takes up to twice its size. On a GPU:
+    /// bytes of buffers on the device, and as many again for the answer on the host.
     pub memory_budget: Option<u64>,
     /// The most pairs that an answer may have: with more, detection ends with
-    /// [`Error::TooManyPairs`](crate::Error::TooManyPairs) as soon as that is certain. `None` for any number.
+    /// [`Error::TooManyPairs`](crate::Error::TooManyPairs) as soon as that is certain. `None` for
+    /// any number.
     pub max_pairs: Option<u64>,
     /// `Clusters`: whether bodies are clustered again.
     pub recluster: Recluster,

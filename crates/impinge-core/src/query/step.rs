@@ -1,5 +1,5 @@
-//! What a question about a step needs besides: what counts at the start, how exact times are, what a step leaves, which pairs
-//! may collide.
+//! What a question about a step needs besides: what counts at the start, how exact times are, what
+//! a step leaves, which pairs may collide.
 
 use std::fmt;
 use std::sync::Arc;
@@ -10,20 +10,25 @@ use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
 use crate::scene::words::words;
 
-/// What happens to pairs that touch at the start of a step, and whether the start is asked for intersections.
+/// What happens to pairs that touch at the start of a step, and whether the start is asked for
+/// intersections.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Start {
-    /// They are reported with the time 0. Surfaces that already pass through each other need not touch at all: an edge inside
-    /// a face, or a body inside another, has no contact until it comes to a border.
+    /// They are reported with the time 0. Surfaces that already pass through each other need not
+    /// touch at all: an edge inside a face, or a body inside another, has no contact until it comes
+    /// to a border.
     #[default]
     Report,
     /// They are not reported, whatever they do later in the step.
     Skip,
-    /// As `Report`, and the start is asked for intersections: [`Detector::any`](crate::Detector::any) of the same bodies, with
-    /// [`SharedVertex::Resolve`](crate::SharedVertex::Resolve). If there are any, [`is_free`](crate::Detector::is_free) is false
-    /// and [`advance`](crate::Detector::advance) allows no step; [`Impacts::start_intersects`](crate::Impacts::start_intersects)
-    /// and [`Advance::start_intersects`](crate::Advance::start_intersects) say so, and after any of these questions and
-    /// [`earliest`](crate::Detector::earliest), [`Detector::start_intersects`](crate::Detector::start_intersects).
+    /// As `Report`, and the start is asked for intersections:
+    /// [`Detector::any`](crate::Detector::any) of the same bodies, with
+    /// [`SharedVertex::Resolve`](crate::SharedVertex::Resolve). If there are any,
+    /// [`is_free`](crate::Detector::is_free) is false and [`advance`](crate::Detector::advance)
+    /// allows no step; [`Impacts::start_intersects`](crate::Impacts::start_intersects) and
+    /// [`Advance::start_intersects`](crate::Advance::start_intersects) say so, and after any of
+    /// these questions and [`earliest`](crate::Detector::earliest),
+    /// [`Detector::start_intersects`](crate::Detector::start_intersects).
     Verify,
 }
 
@@ -32,7 +37,8 @@ words!("start", "report, skip or verify", Start: [Report = "report", Skip = "ski
 /// What is asked of rays.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Hit {
-    /// What each ray hits first: at the smallest parameter, of several the lowest by body and then by number.
+    /// What each ray hits first: at the smallest parameter, of several the lowest by body and then
+    /// by number.
     #[default]
     First,
     /// Whether each ray hits anything.
@@ -65,7 +71,8 @@ impl Precision {
     }
 }
 
-/// What a step leaves between elements: a distance, but of pairs that are near at the start only a share of theirs.
+/// What a step leaves between elements: a distance, but of pairs that are near at the start only a
+/// share of theirs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Clearance {
     pub(crate) distance: f64,
@@ -81,7 +88,8 @@ impl Clearance {
         }
     }
 
-    /// Sets the share of its distance at the start that a pair keeps at most: from 0, which keeps nothing, to less than 1.
+    /// Sets the share of its distance at the start that a pair keeps at most: from 0, which keeps
+    /// nothing, to less than 1.
     pub fn share(mut self, share: f64) -> Self {
         self.share = share;
         self
@@ -97,7 +105,8 @@ impl From<f64> for Clearance {
 /// The vertices of an element, and their body.
 pub type ElementVertices<'a> = (BodyId, &'a [u32]);
 
-/// Which pairs of elements may collide, as a function of their vertices. Threads call it at the same time.
+/// Which pairs of elements may collide, as a function of their vertices. Threads call it at the
+/// same time.
 #[derive(Clone)]
 pub struct PairFilter {
     passes: Arc<Passes>,
@@ -107,8 +116,9 @@ pub struct PairFilter {
 type Passes = dyn Fn([ElementVertices<'_>; 2]) -> bool + Send + Sync;
 
 impl PairFilter {
-    /// A filter that lets the pairs pass for which a function is true. For one pair it must always say the same. The first element is
-    /// the one that the [kind](PairKind) of the pair names first.
+    /// A filter that lets the pairs pass for which a function is true. For one pair it must always
+    /// say the same. The first element is the one that the [kind](PairKind) of the pair names
+    /// first.
     pub fn new(passes: impl Fn([ElementVertices<'_>; 2]) -> bool + Send + Sync + 'static) -> Self {
         PairFilter {
             passes: Arc::new(passes),
@@ -116,8 +126,8 @@ impl PairFilter {
         }
     }
 
-    /// Says that the function costs little: it is then asked before distances and times, about all pairs that boxes and the first
-    /// filters leave.
+    /// Says that the function costs little: it is then asked before distances and times, about all
+    /// pairs that boxes and the first filters leave.
     pub fn early(mut self) -> Self {
         self.is_early = true;
         self

@@ -1,7 +1,7 @@
 //! From which size on another way of doing the same work pays; and which ways a frame went.
 //!
-//! No answer depends on these numbers. They are in one place so that tests can enter every way with small scenes: with each
-//! number at 0 and at infinity.
+//! No answer depends on these numbers. They are in one place so that tests can enter every way with
+//! small scenes: with each number at 0 and at infinity.
 
 /// One end of the range of a threshold.
 trait Ends: Copy {
@@ -27,7 +27,8 @@ impl Ends for f64 {
 /// The type with all thresholds, from one list of them, so that tests forget none.
 macro_rules! thresholds {
     ($($(#[$doc:meta])* $name:ident: $type:ty = $default:expr,)*) => {
-        /// The thresholds of the CPU backend. Not for users: a better value belongs into the default.
+        /// The thresholds of the CPU backend. Not for users: a better value belongs into the
+        /// default.
         #[derive(Debug, Clone, Copy, PartialEq)]
         pub struct Tuning {
             $($(#[$doc])* pub $name: $type,)*
@@ -65,30 +66,35 @@ macro_rules! thresholds {
 }
 
 thresholds! {
-    /// From this many primitives of all bodies on, helpers are woken at the beginning of a frame of `Clusters`.
+    /// From this many primitives of all bodies on, helpers are woken at the beginning of a frame of
+    /// `Clusters`.
     call_from: u64 = 30_000,
-    /// From this many primitives on, a frame is expected to take so long that sleeping helpers are woken, whatever the last
-    /// frame took.
+    /// From this many primitives on, a frame is expected to take so long that sleeping helpers are
+    /// woken, whatever the last frame took.
     wake_from: u64 = 300_000,
     /// From this many primitives on, a body is clustered on several threads.
     pool_from: usize = 4096,
-    /// The most units of work per task, whatever a stage's units are: the stages' own limits are lower. At least one.
+    /// The most units of work per task, whatever a stage's units are: the stages' own limits are
+    /// lower. At least one.
     most_per_task: usize = usize::MAX,
-    /// Stage `bounds` of `Clusters`: with fewer primitives of all bodies, one thread computes the boxes. Positions have just
-    /// been written, mostly by one thread. If they fit in its cache, this thread reads them faster than another could fetch
-    /// them.
+    /// Stage `bounds` of `Clusters`: with fewer primitives of all bodies, one thread computes the
+    /// boxes. Positions have just been written, mostly by one thread. If they fit in its cache,
+    /// this thread reads them faster than another could fetch them.
     bounds_parallel_from: u64 = 120_000,
     /// The same for steps, in elements of all parts.
     step_bounds_parallel_from: u64 = 60_000,
-    /// How much the clusters' surface may grow against the body's before the body is clustered again.
+    /// How much the clusters' surface may grow against the body's before the body is clustered
+    /// again.
     stale_from: f64 = 1.5,
-    /// The clusters of a body are sorted (see `cpu::culled`) if it has at least this many primitives.
+    /// The clusters of a body are sorted (see `cpu::culled`) if it has at least this many
+    /// primitives.
     culled_from: usize = 2_048,
     /// Clusters stay sorted if at least one in this many lies beside the other bodies.
     culled_one_in: usize = 4,
     /// Sorting groups of clusters again costs as much as they save in this many frames.
     culled_cost: u32 = 6,
-    /// Frames after which all boxes are found again, to see which clusters are culled by now and how well clusters fit.
+    /// Frames after which all boxes are found again, to see which clusters are culled by now and
+    /// how well clusters fit.
     culled_lasts: u32 = 64,
     /// Stage `bounds` of `Cells`: with fewer primitives, waking a thread costs more than it saves.
     cull_parallel_from: u64 = 100_000,
@@ -96,31 +102,34 @@ thresholds! {
     most_maps: usize = 8,
     /// Primitives of all bodies per cell of the map. At least one.
     map_cell: u64 = 8,
-    /// The most rows of the map that one primitive marks; a larger primitive counts as being everywhere.
+    /// The most rows of the map that one primitive marks; a larger primitive counts as being
+    /// everywhere.
     most_marked: u32 = 256,
     /// The most work items per batch: the methods' own limits are lower. At least one.
     most_batch_items: usize = usize::MAX,
     /// With fewer work items in a batch of `Clusters`, one worker takes them all.
     pairing_parallel_from: usize = 64,
-    /// The most clusters whose boxes and corners a worker keeps: 500 KB of them fit in a second-level cache. At least two.
+    /// The most clusters whose boxes and corners a worker keeps: 500 KB of them fit in a
+    /// second-level cache. At least two.
     most_cached: u64 = 128,
     /// A worker decides its candidates once there are this many.
     decide_from: usize = 1024,
-    /// With fewer pairs of boxes of two clusters that overlap, directions of their elements are not tested: `narrow` takes
-    /// the pairs as fast.
+    /// With fewer pairs of boxes of two clusters that overlap, directions of their elements are not
+    /// tested: `narrow` takes the pairs as fast.
     directions_from: usize = 512,
-    /// The search for the earliest contact computes the boxes of elements again once contacts are sought only in this part of
-    /// the time that the boxes hold.
+    /// The search for the earliest contact computes the boxes of elements again once contacts are
+    /// sought only in this part of the time that the boxes hold.
     step_shorter_from: f64 = 0.5,
-    /// With fewer keys, or with fewer keys than half the numbers of elements, one thread sorts them in place as fast.
+    /// With fewer keys, or with fewer keys than half the numbers of elements, one thread sorts them
+    /// in place as fast.
     sort_from: usize = 1 << 15,
-    /// `Auto`: from this many primitives of new bodies on, the grid is worth a try. With fewer, clusters are made in about a
-    /// millisecond.
+    /// `Auto`: from this many primitives of new bodies on, the grid is worth a try. With fewer,
+    /// clusters are made in about a millisecond.
     auto_from: u64 = 10_000,
     /// `Auto`: bodies with fewer primitives than this do not count as new.
     auto_body_from: u32 = 1_000,
-    /// `Auto`: with more primitives in a cell than this (see `Cells::crowding`), making clusters costs less than pairing all
-    /// of a cell.
+    /// `Auto`: with more primitives in a cell than this (see `Cells::crowding`), making clusters
+    /// costs less than pairing all of a cell.
     auto_most_crowded: u64 = 64,
 }
 

@@ -15,8 +15,8 @@ use crate::scene::positions::{Given, NewPositions, Real};
 pub(crate) use crate::scene::positions::{Positions, check_positions};
 use crate::scene::transform::{Affine, RestPose};
 
-/// Which bodies meet in [`Query::between_all`](crate::Query::between_all): two bodies meet when the `category` of
-/// each shares a bit with the `mask` of the other. By default all bodies meet.
+/// Which bodies meet in [`Query::between_all`](crate::Query::between_all): two bodies meet when the
+/// `category` of each shares a bit with the `mask` of the other. By default all bodies meet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Filter {
     /// The categories to which the body belongs.
@@ -71,14 +71,14 @@ impl Body {
         self.topology.given()
     }
 
-    /// The elements of one part: those that the body was given as, or its vertices, edges or faces, which are found once per
-    /// topology. Their numbers depend on the given elements alone.
+    /// The elements of one part: those that the body was given as, or its vertices, edges or faces,
+    /// which are found once per topology. Their numbers depend on the given elements alone.
     pub fn part(&self, part: Part) -> &Elements {
         self.topology.part(part)
     }
 
-    /// The edges, `(n, 2)`: of tetrahedra those of their surface. They are found once per topology; their numbers, which pairs of
-    /// edges have, depend on the elements alone.
+    /// The edges, `(n, 2)`: of tetrahedra those of their surface. They are found once per topology;
+    /// their numbers, which pairs of edges have, depend on the elements alone.
     pub fn edges(&self) -> &Elements {
         self.topology.part(Part::Edges)
     }
@@ -107,14 +107,14 @@ impl Body {
         &self.positions
     }
 
-    /// The positions at the end of a step, in the precision of [`positions`](Body::positions). `None` for a body that
-    /// stands still.
+    /// The positions at the end of a step, in the precision of [`positions`](Body::positions).
+    /// `None` for a body that stands still.
     pub fn end_positions(&self) -> Option<&Positions> {
         self.end.as_ref().filter(|_| self.moves)
     }
 
-    /// The matrix that moved the vertices from the [rest positions](Body::rest_positions); `None` without one
-    /// ([`Scene::set_transform`]).
+    /// The matrix that moved the vertices from the [rest positions](Body::rest_positions); `None`
+    /// without one ([`Scene::set_transform`]).
     pub fn transform(&self) -> Option<[[f64; 4]; 4]> {
         self.motion.as_ref().map(|motion| motion.matrix.matrix())
     }
@@ -281,7 +281,8 @@ impl Scene {
         self.add((tets.to_vec(), R::store(positions)))
     }
 
-    /// Adds a body of edges, such as strands of hair: `edges` is `(n, 2)` vertex indices, `positions` `(v, 3)`.
+    /// Adds a body of edges, such as strands of hair: `edges` is `(n, 2)` vertex indices,
+    /// `positions` `(v, 3)`.
     ///
     /// # Errors
     /// As [`add_triangles`](Scene::add_triangles).
@@ -302,7 +303,8 @@ impl Scene {
         self.add((Elements::Points(points.collect()), R::store(positions)))
     }
 
-    /// Adds a body and takes over its arrays, without a copy: a [`Mesh`], such as one read from a file, or elements and positions.
+    /// Adds a body and takes over its arrays, without a copy: a [`Mesh`], such as one read from a
+    /// file, or elements and positions.
     ///
     /// # Errors
     /// As [`add_triangles`](Scene::add_triangles).
@@ -329,8 +331,9 @@ impl Scene {
     /// Adds many bodies in one call: all of them, or none.
     ///
     /// Body `i` has the elements `element_offsets[i]..element_offsets[i + 1]` and the positions
-    /// `vertex_offsets[i]..vertex_offsets[i + 1]`; its elements name its own vertices, from 0. Both offsets have one number
-    /// more than there are bodies: they begin with 0, never fall, and end with the number of elements and of positions.
+    /// `vertex_offsets[i]..vertex_offsets[i + 1]`; its elements name its own vertices, from 0. Both
+    /// offsets have one number more than there are bodies: they begin with 0, never fall, and end
+    /// with the number of elements and of positions.
     ///
     /// ```
     /// use impinge_core::{Elements, Scene};
@@ -408,12 +411,14 @@ impl Scene {
         Ok(())
     }
 
-    /// Moves the vertices: `(v, 3)` positions, as many as the body has vertices, and checked now. The precision may differ from
-    /// frame to frame. A new step starts: the body stands still until its end positions are [set](Scene::set_end_positions).
+    /// Moves the vertices: `(v, 3)` positions, as many as the body has vertices, and checked now.
+    /// The precision may differ from frame to frame. A new step starts: the body stands still until
+    /// its end positions are [set](Scene::set_end_positions).
     ///
-    /// A slice, and a reference to a `Vec`, an array or [`Positions`], is copied. A `Vec` and `Positions` are taken over, and an
-    /// `Arc` of something that has rows is shared, without a copy: the body drops it when it gets other positions or is removed. Two
-    /// shared arrays serve a simulation: write the one that the scene has dropped, give it, and go on with the other.
+    /// A slice, and a reference to a `Vec`, an array or [`Positions`], is copied. A `Vec` and
+    /// `Positions` are taken over, and an `Arc` of something that has rows is shared, without a
+    /// copy: the body drops it when it gets other positions or is removed. Two shared arrays serve
+    /// a simulation: write the one that the scene has dropped, give it, and go on with the other.
     ///
     /// ```
     /// use std::sync::Arc;
@@ -431,8 +436,8 @@ impl Scene {
     /// # Ok(()) }
     /// ```
     ///
-    /// Where a body must write its positions ([`positions_mut`](Scene::positions_mut), [`set_transform`](Scene::set_transform)), it
-    /// copies a shared array first.
+    /// Where a body must write its positions ([`positions_mut`](Scene::positions_mut),
+    /// [`set_transform`](Scene::set_transform)), it copies a shared array first.
     ///
     /// # Errors
     /// A wrong number of positions, or one that is refused: the body keeps its old positions then.
@@ -449,16 +454,20 @@ impl Scene {
         Ok(())
     }
 
-    /// Sets the vertex positions at the end of a step, `(v, 3)`, copied or not as by [`set_positions`](Scene::set_positions).
-    /// Each vertex moves from [`positions`](Body::positions) to its end position on a straight line at constant speed. They hold
-    /// until the next [`set_positions`](Scene::set_positions), [`positions_mut`](Scene::positions_mut),
-    /// [`set_transform`](Scene::set_transform), [`remesh`](Scene::remesh) or
-    /// [`clear_end_positions`](Scene::clear_end_positions). A body that has none stands still.
+    /// Sets the vertex positions at the end of a step, `(v, 3)`, copied or not as by
+    /// [`set_positions`](Scene::set_positions). Each vertex moves from
+    /// [`positions`](Body::positions) to its end position on a straight line at constant speed.
+    /// They hold until the next [`set_positions`](Scene::set_positions),
+    /// [`positions_mut`](Scene::positions_mut), [`set_transform`](Scene::set_transform),
+    /// [`remesh`](Scene::remesh) or [`clear_end_positions`](Scene::clear_end_positions). A body
+    /// that has none stands still.
     ///
-    /// If start and end have different precisions, the single-precision one is widened, which is exact.
+    /// If start and end have different precisions, the single-precision one is widened, which is
+    /// exact.
     ///
     /// # Errors
-    /// A wrong number of positions, or one that is refused: the body keeps its old end positions then.
+    /// A wrong number of positions, or one that is refused: the body keeps its old end positions
+    /// then.
     pub fn set_end_positions<'a>(
         &mut self,
         body: BodyId,
@@ -484,8 +493,8 @@ impl Scene {
         Ok(())
     }
 
-    /// The positions of a body that stores `R`, to be written in place without a copy.
-    /// The next detection checks them, and its error names a bad vertex. End positions are cleared, as by
+    /// The positions of a body that stores `R`, to be written in place without a copy. The next
+    /// detection checks them, and its error names a bad vertex. End positions are cleared, as by
     /// [`set_positions`](Scene::set_positions).
     ///
     /// # Errors
@@ -496,14 +505,16 @@ impl Scene {
         stored(body, &mut target.positions).map(|stored| stored.own().as_mut_slice())
     }
 
-    /// Moves a body by an affine matrix, such as a rigid motion, without passing its vertices again. It moves the rest
-    /// positions, which are those given last ([`add`](Scene::add), [`set_positions`](Scene::set_positions),
-    /// [`remesh`](Scene::remesh)). A second transform replaces the first; they do not accumulate.
+    /// Moves a body by an affine matrix, such as a rigid motion, without passing its vertices
+    /// again. It moves the rest positions, which are those given last ([`add`](Scene::add),
+    /// [`set_positions`](Scene::set_positions), [`remesh`](Scene::remesh)). A second transform
+    /// replaces the first; they do not accumulate.
     ///
     /// Answers are exact for the moved vertices. These are rounded in a fixed way, so they have the
-    /// same bits on every backend: row `[a, b, c, d]` of the matrix takes `(x, y, z)` to `((a x + b y) + c z) + d`. Each
-    /// product and each sum is rounded to `f64` in this order, none is fused with another, and the last sum is rounded
-    /// once more to the precision of the rest positions. So a rotation deforms a body by the rounding error.
+    /// same bits on every backend: row `[a, b, c, d]` of the matrix takes `(x, y, z)` to
+    /// `((a x + b y) + c z) + d`. Each product and each sum is rounded to `f64` in this order, none
+    /// is fused with another, and the last sum is rounded once more to the precision of the rest
+    /// positions. So a rotation deforms a body by the rounding error.
     ///
     /// End positions are cleared, as by [`set_positions`](Scene::set_positions).
     ///
@@ -520,8 +531,9 @@ impl Scene {
     /// ```
     ///
     /// # Errors
-    /// The id names no body; a matrix that is not finite, or whose last row is not `[0, 0, 0, 1]`; rest positions that
-    /// were written in place and are refused; a moved position that is refused. The body is unchanged then.
+    /// The id names no body; a matrix that is not finite, or whose last row is not `[0, 0, 0, 1]`;
+    /// rest positions that were written in place and are refused; a moved position that is refused.
+    /// The body is unchanged then.
     pub fn set_transform(&mut self, body: BodyId, matrix: &[[f64; 4]; 4]) -> Result<(), Error> {
         let matrix = Affine::new(matrix)?;
         let target = self.moved_body(body)?;
@@ -557,8 +569,9 @@ impl Scene {
         Ok(())
     }
 
-    /// Puts each vertex of a body into a group, for [`Exclusion::groups`](crate::Exclusion::groups): one number per vertex. A body whose
-    /// groups were never set is in no group. [`remesh`](Scene::remesh) forgets them.
+    /// Puts each vertex of a body into a group, for
+    /// [`Exclusion::groups`](crate::Exclusion::groups): one number per vertex. A body whose groups
+    /// were never set is in no group. [`remesh`](Scene::remesh) forgets them.
     ///
     /// # Errors
     /// The id names no body; more or fewer groups than vertices.
@@ -569,8 +582,9 @@ impl Scene {
         Ok(())
     }
 
-    /// Says which vertices of a body are pinned, where they never move: one flag per vertex. Pairs of elements all of whose vertices are
-    /// pinned are left out of every query. [`remesh`](Scene::remesh) forgets it.
+    /// Says which vertices of a body are pinned, where they never move: one flag per vertex. Pairs
+    /// of elements all of whose vertices are pinned are left out of every query.
+    /// [`remesh`](Scene::remesh) forgets it.
     ///
     /// # Errors
     /// The id names no body; more or fewer flags than vertices.

@@ -149,8 +149,8 @@ impl From<Vec<[u32; 4]>> for Elements {
 pub enum Part {
     /// The elements that the body was given as.
     Given,
-    /// The vertices that some element names; for tetrahedra, those that a boundary face names. Answers number them as
-    /// positions are numbered.
+    /// The vertices that some element names; for tetrahedra, those that a boundary face names.
+    /// Answers number them as positions are numbered.
     Vertices,
     /// The edges of the surface, or those that the body was given as.
     Edges,
@@ -158,7 +158,8 @@ pub enum Part {
     Faces,
 }
 
-/// The elements that a body was given as, and the elements derived from them, each kind found when first needed.
+/// The elements that a body was given as, and the elements derived from them, each kind found when
+/// first needed.
 #[derive(Debug, Clone)]
 pub(crate) struct Topology {
     given: Elements,
@@ -262,7 +263,8 @@ impl Topology {
         &self.given
     }
 
-    /// One name for equal parts: the faces of a body given as triangles, or the edges of one given as edges, are `Given`.
+    /// One name for equal parts: the faces of a body given as triangles, or the edges of one given
+    /// as edges, are `Given`.
     pub fn canonical(&self, part: Part) -> Part {
         match (part, self.given.kind()) {
             (Part::Faces, BodyKind::Triangles) | (Part::Edges, BodyKind::Edges) => Part::Given,
@@ -299,8 +301,8 @@ impl Topology {
         Elements::Points(vertices.map(|(vertex, _)| [vertex]).collect())
     }
 
-    /// Unique pairs `[low, high]` in the order of `(high, low)`, as `igl::edges` numbers them. The same vertex twice is not
-    /// an edge.
+    /// Unique pairs `[low, high]` in the order of `(high, low)`, as `igl::edges` numbers them. The
+    /// same vertex twice is not an edge.
     fn find_edges(&self) -> Elements {
         let mut keys: Vec<u64> = match self.surface() {
             Elements::Triangles(faces) => faces
@@ -320,10 +322,11 @@ impl Topology {
         )
     }
 
-    /// All faces except those between two different tetrahedra, each once, in the order of the first tetrahedron that has it
-    /// and of the opposite corner. A face points outward if that tetrahedron is oriented positively. A face that more than
-    /// two tetrahedra share counts as surface, and so does one shared by two tetrahedra with the same vertices: nothing may
-    /// pass through it unseen.
+    /// All faces except those between two different tetrahedra, each once, in the order of the
+    /// first tetrahedron that has it and of the opposite corner. A face points outward if that
+    /// tetrahedron is oriented positively. A face that more than two tetrahedra share counts as
+    /// surface, and so does one shared by two tetrahedra with the same vertices: nothing may pass
+    /// through it unseen.
     fn find_boundary(&self) -> Elements {
         let Elements::Tetrahedra(tets) = &self.given else {
             return Elements::Triangles(Vec::new());
@@ -389,7 +392,8 @@ mod tests {
 
     #[test]
     fn what_lies_inside_tetrahedra_takes_no_part() {
-        // One vertex inside a tetrahedron, joined to its four sides; another vertex that no element names.
+        // One vertex inside a tetrahedron, joined to its four sides; another vertex that no element
+        // names.
         let tets = vec![[5, 1, 2, 3], [0, 5, 2, 3], [0, 1, 5, 3], [0, 1, 2, 5]];
         let topology = Topology::new(Elements::from(tets));
         let vertices = vec![[0], [1], [2], [3]];

@@ -16,7 +16,8 @@ pub enum Error {
         /// The position as given.
         value: [f64; 3],
     },
-    /// A point or direction that was asked about holds NaN or an infinity. Check where it comes from.
+    /// A point or direction that was asked about holds NaN or an infinity. Check where it comes
+    /// from.
     #[error("{what}: row {row} is not finite ({}, {}, {})", value[0], value[1], value[2])]
     NonFinitePoint {
         /// Which array: `"points"`, `"origins"` or `"directions"`.
@@ -40,7 +41,8 @@ pub enum Error {
         /// How many vertices the body has.
         n_vertices: usize,
     },
-    /// The number of new positions is not the body's number of vertices. Only re-meshing changes topology.
+    /// The number of new positions is not the body's number of vertices. Only re-meshing changes
+    /// topology.
     #[error("body {body}: {given} positions given, but it has {expected} vertices")]
     WrongNumberOfPositions {
         /// The body.
@@ -102,7 +104,8 @@ pub enum Error {
         /// The kind of the body's primitives, such as `"triangles"`.
         kind: &'static str,
     },
-    /// A surface with a border, or with faces whose orientations disagree. Weld vertices, fill holes, orient faces.
+    /// A surface with a border, or with faces whose orientations disagree. Weld vertices, fill
+    /// holes, orient faces.
     #[error(
         "body {body}: the surface is not closed: the edge of vertices {} and {} has {n_forward} faces along it and {n_backward} against it",
         edge[0], edge[1]
@@ -117,9 +120,10 @@ pub enum Error {
         /// How many faces run the other way.
         n_backward: usize,
     },
-    /// Elements of one body touch at the start of a step at vertices that are at one position but not shared, as along the
-    /// seams of a mesh that was not welded. No part of such a step could ever be taken. Weld the mesh
-    /// ([`Weld`](crate::Weld)), or skip what touches at the start ([`Start::Skip`](crate::Start::Skip)).
+    /// Elements of one body touch at the start of a step at vertices that are at one position but
+    /// not shared, as along the seams of a mesh that was not welded. No part of such a step could
+    /// ever be taken. Weld the mesh ([`Weld`](crate::Weld)), or skip what touches at the start
+    /// ([`Start::Skip`](crate::Start::Skip)).
     #[error(
         "body {body}: vertices {} and {} are at one position but not shared, so what they belong to touches at the start, and no \
          step can be taken: weld the mesh ({n_coincident} of its vertices lie at positions of others), or skip pairs that touch at \
@@ -131,7 +135,8 @@ pub enum Error {
         body: BodyId,
         /// Two vertices at one position, of elements that touch.
         vertices: [u32; 2],
-        /// How many vertices of the body lie at positions of others: as many as welding would remove.
+        /// How many vertices of the body lie at positions of others: as many as welding would
+        /// remove.
         n_coincident: usize,
     },
     /// A body of the other kind is needed here.
@@ -182,7 +187,8 @@ pub enum Error {
         /// The most that are allowed.
         limit: u64,
     },
-    /// There is no memory for the answer. Ask for parts of the scene, limit the pairs or count them.
+    /// There is no memory for the answer. Ask for parts of the scene, limit the pairs or count
+    /// them.
     #[error("out of memory: {needed} bytes more are needed with {n} {what} found")]
     OutOfMemory {
         /// What the memory was for.
@@ -219,8 +225,9 @@ pub enum Error {
 }
 
 impl Error {
-    /// What kind of error it is, by the name that it has in every language: `invalid`, `out_of_memory`, `budget`, `too_many_pairs`,
-    /// `cancelled`, `device` or `internal`. The detector stays usable after all but `internal`.
+    /// What kind of error it is, by the name that it has in every language: `invalid`,
+    /// `out_of_memory`, `budget`, `too_many_pairs`, `cancelled`, `device` or `internal`. The
+    /// detector stays usable after all but `internal`.
     pub fn code(&self) -> &'static str {
         match self {
             Error::OutOfMemory { .. } => "out_of_memory",

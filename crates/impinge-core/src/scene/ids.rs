@@ -4,9 +4,9 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Names a body of a [`Scene`](crate::Scene): a slot, and a number that is unique in this process.
 ///
-/// Ids are ordered by slot. After a body was removed its slot is reused, but the new body has another
-/// number: an old id, or one of another scene, never names a body by mistake. The ids of a scene also name
-/// the bodies of its clones.
+/// Ids are ordered by slot. After a body was removed its slot is reused, but the new body has
+/// another number: an old id, or one of another scene, never names a body by mistake. The ids of a
+/// scene also name the bodies of its clones.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct BodyId {
     slot: u32,
@@ -20,7 +20,8 @@ impl BodyId {
         BodyId { slot, number }
     }
 
-    /// The body's slot in the scene: 0 for the first body added, and so on. Slots of removed bodies are reused.
+    /// The body's slot in the scene: 0 for the first body added, and so on. Slots of removed bodies
+    /// are reused.
     pub fn index(self) -> usize {
         self.slot as usize
     }
@@ -36,8 +37,9 @@ impl std::fmt::Display for BodyId {
     }
 }
 
-/// A number that was not used before. Stamps of topology and positions tell a detector what has changed since the last
-/// frame. They come from one counter per process, so no two states of any bodies have the same stamp.
+/// A number that was not used before. Stamps of topology and positions tell a detector what has
+/// changed since the last frame. They come from one counter per process, so no two states of any
+/// bodies have the same stamp.
 pub(crate) fn new_stamp() -> u64 {
     static LAST: AtomicU64 = AtomicU64::new(0);
     LAST.fetch_add(1, Ordering::Relaxed) + 1

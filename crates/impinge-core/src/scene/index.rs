@@ -12,9 +12,9 @@
 //!    Slot   ----------->  ElementIx  <----->  Number      two of them make the key of a pair
 //! ```
 //!
-//! Bodies are named by [`BodyId`](crate::BodyId). The corners of elements, as users give them and as kernels read them, are
-//! arrays of `u32`: vertices as the positions of their body are numbered. Inside a kernel, indices are `u32` too; they get
-//! their type where they leave it.
+//! Bodies are named by [`BodyId`](crate::BodyId). The corners of elements, as users give them and
+//! as kernels read them, are arrays of `u32`: vertices as the positions of their body are numbered.
+//! Inside a kernel, indices are `u32` too; they get their type where they leave it.
 
 use std::ops::Range;
 
@@ -76,8 +76,8 @@ index_types! {
     /// A cluster of a clustering.
     ClusterIx
 
-    /// Where an element is in the order of a clustering: cluster after cluster, [`GROUP`] elements each. Methods without
-    /// clusters leave elements in the order in which users number them.
+    /// Where an element is in the order of a clustering: cluster after cluster, [`GROUP`] elements
+    /// each. Methods without clusters leave elements in the order in which users number them.
     ///
     /// ```text
     ///  31            6 5       0

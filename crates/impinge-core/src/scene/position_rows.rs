@@ -4,7 +4,8 @@ use std::any::Any;
 use std::ops::Deref;
 use std::sync::Arc;
 
-/// `(n, 3)` positions: an array of the body's own, or one that is shared with its owner and therefore only read.
+/// `(n, 3)` positions: an array of the body's own, or one that is shared with its owner and
+/// therefore only read.
 ///
 /// ```
 /// use std::sync::Arc;
@@ -28,14 +29,15 @@ struct Shared<R> {
     owner: Arc<dyn Any + Send + Sync>,
 }
 
-// SAFETY: a `Shared` is used like a reference to its rows, which may be sent if `R` is `Sync`. The owner is `Send` and `Sync`.
+// SAFETY: a `Shared` is used like a reference to its rows, which may be sent if `R` is `Sync`. The
+// owner is `Send` and `Sync`.
 unsafe impl<R: Sync> Send for Shared<R> {}
 // SAFETY: as above.
 unsafe impl<R: Sync> Sync for Shared<R> {}
 
 impl<R: Copy> PositionRows<R> {
-    /// Shares the rows of an owner, without a copy. The owner lives at least as long as these rows and their clones.
-    /// It is asked for its rows once.
+    /// Shares the rows of an owner, without a copy. The owner lives at least as long as these rows
+    /// and their clones. It is asked for its rows once.
     pub fn shared<O: AsRef<[[R; 3]]> + Send + Sync + 'static>(owner: Arc<O>) -> Self {
         let rows: *const [[R; 3]] = (*owner).as_ref();
         PositionRows(Held::Shared(Shared { rows, owner }))
@@ -76,8 +78,9 @@ impl<R> Deref for PositionRows<R> {
     fn deref(&self) -> &[[R; 3]] {
         match &self.0 {
             Held::Own(rows) => rows,
-            // SAFETY: `shared` got these rows from a reference to the owner. The `Arc` keeps the owner alive and in its place, and
-            // while it exists nobody gets a `&mut` to the owner. So the rows are borrowed as long as `self` is.
+            // SAFETY: `shared` got these rows from a reference to the owner. The `Arc` keeps the
+            // owner alive and in its place, and while it exists nobody gets a `&mut` to the owner.
+            // So the rows are borrowed as long as `self` is.
             Held::Shared(shared) => unsafe { &*shared.rows },
         }
     }

@@ -17,8 +17,8 @@ pub enum Positions {
 }
 
 impl Positions {
-    /// Shares the rows of an owner, without a copy. The owner lives at least as long as these positions and their clones. It is
-    /// asked for its rows once.
+    /// Shares the rows of an owner, without a copy. The owner lives at least as long as these
+    /// positions and their clones. It is asked for its rows once.
     pub fn shared<R: Real>(owner: Arc<impl AsRef<[[R; 3]]> + Send + Sync + 'static>) -> Self {
         R::held(PositionRows::shared(owner))
     }
@@ -64,8 +64,9 @@ impl Positions {
         }
     }
 
-    /// The positions at a fraction of the way to others, as many of the same precision: `start + fraction (end - start)`, each
-    /// coordinate computed in double precision and rounded to that of the positions.
+    /// The positions at a fraction of the way to others, as many of the same precision:
+    /// `start + fraction (end - start)`, each coordinate computed in double precision and rounded
+    /// to that of the positions.
     pub(crate) fn blend(&self, end: &Positions, fraction: f64) -> Positions {
         match (self, end) {
             (Positions::F32(start), Positions::F32(end)) => {
@@ -100,7 +101,8 @@ impl Positions {
 
     /// The largest magnitude of a coordinate.
     pub(crate) fn magnitude(&self) -> f64 {
-        // Magnitudes are ordered as their bits are, and compilers find the largest of many integers at once.
+        // Magnitudes are ordered as their bits are, and compilers find the largest of many integers
+        // at once.
         match self {
             Positions::F32(positions) => {
                 let bits = positions.as_flattened().iter().map(|x| x.abs().to_bits());
@@ -113,9 +115,11 @@ impl Positions {
         }
     }
 
-    /// How far rounding may move a coordinate of [`blend`](Positions::blend) from the way to the end.
+    /// How far rounding may move a coordinate of [`blend`](Positions::blend) from the way to the
+    /// end.
     pub(crate) fn most_rounded(&self, end: &Positions) -> f64 {
-        // Half a unit in the last place of an `f32`, after four roundings in `f64` of numbers up to twice as large.
+        // Half a unit in the last place of an `f32`, after four roundings in `f64` of numbers up to
+        // twice as large.
         let (share, least) = match (self, end) {
             (Positions::F32(_), Positions::F32(_)) => {
                 (2f64.powi(-24) + 2f64.powi(-49), 2f64.powi(-149))
@@ -188,8 +192,8 @@ impl<R: Real> From<PositionRows<R>> for Positions {
     }
 }
 
-/// Positions for [`Scene::set_positions`](crate::Scene::set_positions): a reference is copied; a `Vec`, an `Arc` and
-/// [`Positions`] are taken over without a copy.
+/// Positions for [`Scene::set_positions`](crate::Scene::set_positions): a reference is copied; a
+/// `Vec`, an `Arc` and [`Positions`] are taken over without a copy.
 #[derive(Debug)]
 pub struct NewPositions<'a>(pub(crate) Given<'a>);
 
@@ -295,8 +299,8 @@ pub trait Real: sealed::Sealed + impinge_weld::Coordinate + Send + Sync + 'stati
 }
 
 impl Real for f32 {
-    /// Adding one to an exponent of all ones carries into the sign bit, so any infinity or NaN sets that bit. The
-    /// compiler vectorises this, but not `is_finite`.
+    /// Adding one to an exponent of all ones carries into the sign bit, so any infinity or NaN sets
+    /// that bit. The compiler vectorises this, but not `is_finite`.
     #[inline]
     fn all_finite(numbers: &[f32]) -> bool {
         const EXPONENT: u32 = 0x7f80_0000;

@@ -44,8 +44,9 @@ impl Affine {
         [x, y, z, [0.0, 0.0, 0.0, 1.0]]
     }
 
-    /// Row `[a, b, c, d]` takes `(x, y, z)` to `((a x + b y) + c z) + d`: each product and each sum is rounded to `f64` in
-    /// this order, none is fused, and the last sum is rounded to the precision of the positions.
+    /// Row `[a, b, c, d]` takes `(x, y, z)` to `((a x + b y) + c z) + d`: each product and each sum
+    /// is rounded to `f64` in this order, none is fused, and the last sum is rounded to the
+    /// precision of the positions.
     fn apply<R: Real>(&self, point: &[R; 3]) -> [R; 3] {
         let [x, y, z] = point.map(R::widen);
         self.0

@@ -1,7 +1,7 @@
 //! The words for the choices that users have: the same in every language.
 
-/// Gives an enum its words: `ALL`, `name`, `Display` and `FromStr`. An unknown word is an [`Error`](crate::Error) that names the
-/// setting and the words allowed.
+/// Gives an enum its words: `ALL`, `name`, `Display` and `FromStr`. An unknown word is an
+/// [`Error`](crate::Error) that names the setting and the words allowed.
 macro_rules! words {
     ($setting:literal, $allowed:literal, $type:ident: [$($variant:ident = $word:literal),+; $n:literal]) => {
         impl $type {

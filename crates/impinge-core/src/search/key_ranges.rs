@@ -1,8 +1,10 @@
-//! Ranges of keys, and how many candidates are in each part of them: how a long answer is divided into runs.
+//! Ranges of keys, and how many candidates are in each part of them: how a long answer is divided
+//! into runs.
 //!
-//! Candidates are ordered by kind, then by key. Ranges name some of them, one range per kind. To divide them, each range is
-//! cut into parts of equally many possible keys, and the candidates of each part are counted. Consecutive parts that hold few
-//! enough candidates together make a run; a part that alone holds too many is divided again.
+//! Candidates are ordered by kind, then by key. Ranges name some of them, one range per kind. To
+//! divide them, each range is cut into parts of equally many possible keys, and the candidates of
+//! each part are counted. Consecutive parts that hold few enough candidates together make a run; a
+//! part that alone holds too many is divided again.
 //!
 //! ```text
 //! ranges   |     vertices and faces    |        edges and edges        |
@@ -52,7 +54,8 @@ impl KeyRanges {
         self.of(kind).contains(&key)
     }
 
-    /// The lowest and the highest lower number that a key of a kind may have; `None` if the kind has no keys.
+    /// The lowest and the highest lower number that a key of a kind may have; `None` if the kind
+    /// has no keys.
     #[inline]
     pub fn lower_numbers(&self, kind: PairKind) -> Option<[Number; 2]> {
         let Range { start, end } = *self.of(kind);
@@ -85,7 +88,8 @@ pub(crate) struct Tally {
 impl Tally {
     /// Bytes that a tally takes at most.
     pub const MOST_BYTES: u64 = (MOST_PARTS * size_of::<AtomicU64>()) as u64;
-    /// How often ranges can be divided until parts have one key: 64 bits, at least 9 the first time and 12 each time after that.
+    /// How often ranges can be divided until parts have one key: 64 bits, at least 9 the first time
+    /// and 12 each time after that.
     pub const MOST_DEPTH: u64 = 6;
 
     /// # Errors
@@ -118,7 +122,8 @@ impl Tally {
         })
     }
 
-    /// Counts those of some keys that are in the ranges. Neighbours in the list are often in the same part.
+    /// Counts those of some keys that are in the ranges. Neighbours in the list are often in the
+    /// same part.
     pub fn count(&self, kind: PairKind, keys: &[u64]) {
         let (range, parts) = (self.ranges.of(kind), &self.parts[kind as usize]);
         let add = |part: usize, n: u64| {
@@ -148,8 +153,8 @@ impl Tally {
         self.counts.iter().map(read).sum()
     }
 
-    /// Divides the ranges, in order, into runs of at most so many candidates, and into parts that alone hold more. Ranges without
-    /// candidates are left out.
+    /// Divides the ranges, in order, into runs of at most so many candidates, and into parts that
+    /// alone hold more. Ranges without candidates are left out.
     pub fn divide(&self, most: u64) -> impl Iterator<Item = Run> + '_ {
         let mut next = 0;
         std::iter::from_fn(move || {

@@ -12,8 +12,8 @@ use crate::scene::index::Number;
 use crate::search::narrow::{PairElement, Test};
 use crate::search::stats::Stats;
 
-/// Calls `emit` with the test, the key and the value of every pair that the frame asks for and that passes its test, in the
-/// order of the keys. An error of `emit` ends the search.
+/// Calls `emit` with the test, the key and the value of every pair that the frame asks for and that
+/// passes its test, in the order of the keys. An error of `emit` ends the search.
 pub(crate) fn run<T: Test>(
     test: &T,
     scene: &Scene,

@@ -1,4 +1,5 @@
-//! The loop that answers every question: has a [`Finder`] find the pairs of a [`Plan`], and sorts them.
+//! The loop that answers every question: has a [`Finder`] find the pairs of a [`Plan`], and sorts
+//! them.
 //!
 //! ```text
 //! scene + query  ->  Plan      what is asked: one constructor per question
@@ -6,8 +7,9 @@
 //! Answer         ->  Outcome   pairs, impacts, candidates, near pairs: sorted, with statistics
 //! ```
 //!
-//! There is one loop for all questions and backends, and for methods of other crates. It is async because a GPU must be waited
-//! for. A finder that works on the CPU never waits: its frame is complete at the first poll, see [`ready`].
+//! There is one loop for all questions and backends, and for methods of other crates. It is async
+//! because a GPU must be waited for. A finder that works on the CPU never waits: its frame is
+//! complete at the first poll, see [`ready`].
 
 use std::pin::pin;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -48,8 +50,8 @@ pub trait Finder<T = u64, const LISTS: usize = 1> {
         "cpu"
     }
 
-    /// Whether [`find`](Finder::find) itself refuses positions that were written in place and are not finite. If not,
-    /// the loop checks them before.
+    /// Whether [`find`](Finder::find) itself refuses positions that were written in place and are
+    /// not finite. If not, the loop checks them before.
     fn checks_positions(&self) -> bool {
         false
     }
@@ -59,11 +61,12 @@ pub trait Finder<T = u64, const LISTS: usize = 1> {
         false
     }
 
-    /// Hands over all pairs that the plan asks for, in any order, and tells the answer how many bytes the
-    /// finder holds itself.
+    /// Hands over all pairs that the plan asks for, in any order, and tells the answer how many
+    /// bytes the finder holds itself.
     ///
     /// # Errors
-    /// Refused positions, cancellation, a memory budget that is too small, a GPU failure, those of the answer.
+    /// Refused positions, cancellation, a memory budget that is too small, a GPU failure, those of
+    /// the answer.
     fn find(
         &mut self,
         job: Job<'_>,
@@ -93,7 +96,8 @@ pub trait Outcome<T, const LISTS: usize> {
     fn bytes(&self) -> u64;
 }
 
-/// Takes questions from their plans to their answers. Holds what they all need: threads, and memory to sort in.
+/// Takes questions from their plans to their answers. Holds what they all need: threads, and memory
+/// to sort in.
 pub struct Runner {
     workers: Workers,
     sorter: Mutex<Sorter>,
@@ -113,7 +117,8 @@ impl Runner {
         &self.workers
     }
 
-    /// A frame as a finder sees it, with positions that were checked: for answers that stay on a device.
+    /// A frame as a finder sees it, with positions that were checked: for answers that stay on a
+    /// device.
     ///
     /// # Errors
     /// Refused positions.
@@ -132,8 +137,8 @@ impl Runner {
         })
     }
 
-    /// Answers a question whose answer is no list of pairs, with statistics and a memory budget as in [`run`](Runner::run).
-    /// `find` says how many bytes the detector holds for it.
+    /// Answers a question whose answer is no list of pairs, with statistics and a memory budget as
+    /// in [`run`](Runner::run). `find` says how many bytes the detector holds for it.
     ///
     /// # Errors
     /// Those of `find`, and more bytes held than the budget allows.
@@ -161,7 +166,8 @@ impl Runner {
         }
     }
 
-    /// Answers a question. Returns how many pairs there are: of [`Goal::Any`], at least one if there is any.
+    /// Answers a question. Returns how many pairs there are: of [`Goal::Any`], at least one if
+    /// there is any.
     ///
     /// # Errors
     /// Refused positions, errors of the finder, those of the answer.
@@ -222,7 +228,8 @@ impl Runner {
     }
 }
 
-/// Drops pairs that do not count, if there may be any and finders have not looked. Returns how many are left then.
+/// Drops pairs that do not count, if there may be any and finders have not looked. Returns how many
+/// are left then.
 fn keep_counted<T: Keyed, const LISTS: usize>(
     job: Job<'_>,
     lists: &mut [Vec<T>; LISTS],

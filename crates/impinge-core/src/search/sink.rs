@@ -7,8 +7,8 @@
 //! overflow  | chunk | chunk | …       pairs that do not fit there; joined to `held` in the end
 //! ```
 //!
-//! Memory: the answer, and once more the answer while chunks are joined. Every allocation here may fail. Then all pairs
-//! are dropped, and the error names what did not fit.
+//! Memory: the answer, and once more the answer while chunks are joined. Every allocation here may
+//! fail. Then all pairs are dropped, and the error names what did not fit.
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -24,7 +24,8 @@ pub const BLOCK: usize = 1024;
 const FIRST_CHUNK: usize = 1 << 15;
 const LARGEST_CHUNK: usize = 1 << 20;
 
-/// Reserves space for `n_more` more items. The error names `what` and how many items the list holds.
+/// Reserves space for `n_more` more items. The error names `what` and how many items the list
+/// holds.
 ///
 /// # Errors
 /// There is no memory for them.
@@ -77,7 +78,8 @@ fn out_of_memory<T>(n: usize, n_more: usize, what: &'static str) -> Error {
     }
 }
 
-/// Takes the pairs that a finder finds: keys, unless they come with a value. Each goes to one of several lists.
+/// Takes the pairs that a finder finds: keys, unless they come with a value. Each goes to one of
+/// several lists.
 #[derive(Debug)]
 pub struct Answer<T = u64, const LISTS: usize = 1> {
     is_over: AtomicBool,
@@ -121,11 +123,12 @@ impl<T: Copy, const LISTS: usize> Default for Answer<T, LISTS> {
 }
 
 impl<T: Copy, const LISTS: usize> Answer<T, LISTS> {
-    /// Starts an answer. `rooms` is memory that it may use: the lists of an earlier [`finish`](Answer::finish).
+    /// Starts an answer. `rooms` is memory that it may use: the lists of an earlier
+    /// [`finish`](Answer::finish).
     pub fn new(limits: Limits, goal: Goal, rooms: [Vec<T>; LISTS]) -> Self {
         let mut state = State::new(limits, goal);
-        // With a memory budget, the last answer's memory is not used again: its capacity would count
-        // beside that of this answer.
+        // With a memory budget, the last answer's memory is not used again: its capacity would
+        // count beside that of this answer.
         if limits.memory_budget.is_none() {
             state.lists = rooms.map(List::in_buffer);
         }
@@ -144,8 +147,8 @@ impl<T: Copy, const LISTS: usize> Answer<T, LISTS> {
         }
     }
 
-    /// How many work items are gathered before they are paired, at most `room`. They are few where the first pair ends
-    /// or narrows the search.
+    /// How many work items are gathered before they are paired, at most `room`. They are few where
+    /// the first pair ends or narrows the search.
     pub fn most_items(&self, room: usize) -> usize {
         match self.state().goal {
             Goal::Any | Goal::Lowest { .. } => room.min(BLOCK),
@@ -181,8 +184,8 @@ impl<T: Copy, const LISTS: usize> Answer<T, LISTS> {
     /// What ends the frame early, if anything does.
     ///
     /// # Errors
-    /// More pairs than allowed, no memory, a memory budget that is too small; a cancellation where the answer
-    /// [is enough](Answer::is_enough).
+    /// More pairs than allowed, no memory, a memory budget that is too small; a cancellation where
+    /// the answer [is enough](Answer::is_enough).
     pub fn check(&self) -> Result<(), Error> {
         match self.is_over() {
             true => Err(self.state().error.clone().unwrap_or(Error::Cancelled)),
@@ -203,8 +206,9 @@ impl<T: Copy, const LISTS: usize> Answer<T, LISTS> {
         self.check()
     }
 
-    /// Call this before delivering `n_more` certain pairs. Ends the search at once if they exceed the limit or the
-    /// available memory. Returns whether the pairs should be delivered: not if the search is over or only counts.
+    /// Call this before delivering `n_more` certain pairs. Ends the search at once if they exceed
+    /// the limit or the available memory. Returns whether the pairs should be delivered: not if the
+    /// search is over or only counts.
     pub fn announce(&self, n_more: u64) -> bool {
         if self.is_over() {
             return false;
@@ -259,7 +263,8 @@ impl<T: Copy, const LISTS: usize> Answer<T, LISTS> {
 
     fn note(&self, result: Result<(), Error>, state: &mut State<T, LISTS>) {
         if let Err(error) = result {
-            // Free the pairs first, so that the error can be reported without running out of memory again.
+            // Free the pairs first, so that the error can be reported without running out of memory
+            // again.
             state.drop_pairs();
             state.error = Some(error);
             self.is_over.store(true, Ordering::Relaxed);
@@ -324,8 +329,8 @@ impl Answer {
         }
     }
 
-    /// The number in the upper half of the lowest key found; the highest number before a key is found. No pair with a
-    /// higher number can be the lowest.
+    /// The number in the upper half of the lowest key found; the highest number before a key is
+    /// found. No pair with a higher number can be the lowest.
     pub fn up_to(&self) -> Number {
         Number::new((self.lowest.load(Ordering::Relaxed) >> 32) as u32)
     }
@@ -372,7 +377,8 @@ impl<T: Copy, const LISTS: usize> State<T, LISTS> {
         }
     }
 
-    /// As [`count`](State::count) for pairs that will be counted when they are handed over, unless one is enough.
+    /// As [`count`](State::count) for pairs that will be counted when they are handed over, unless
+    /// one is enough.
     fn foresee(&mut self, n_more: u64) -> Result<(), Error> {
         let n = self.n;
         let result = self.count(n_more);
@@ -453,7 +459,8 @@ impl<T: Copy, const LISTS: usize> State<T, LISTS> {
         Ok(())
     }
 
-    /// Fails if the answer and the finder exceed the budget. Chunks count twice: joining them copies them.
+    /// Fails if the answer and the finder exceed the budget. Chunks count twice: joining them
+    /// copies them.
     fn keep_budget(&self) -> Result<(), Error> {
         let Some(budget) = self.limits.memory_budget else {
             return Ok(());

@@ -1,7 +1,8 @@
 //! Sorts the keys of a large answer on all threads.
 //!
-//! A key is a pair of numbers, lower number first, and few numbers have many partners. So keys are counted by their lower
-//! number, the partners of each number are put together, and these short runs are sorted:
+//! A key is a pair of numbers, lower number first, and few numbers have many partners. So keys are
+//! counted by their lower number, the partners of each number are put together, and these short
+//! runs are sorted:
 //!
 //! ```text
 //! keys       | 5 9 | 2 7 | 5 6 | 2 3 |   as they were found; each thread counts and places a part of them
@@ -117,7 +118,8 @@ impl Sorter {
         }
     }
 
-    /// Sorts each list of pairs: those of a question about intersections, or of each kind. Returns how many lists were counted.
+    /// Sorts each list of pairs: those of a question about intersections, or of each kind. Returns
+    /// how many lists were counted.
     pub fn sort<T: Keyed>(&mut self, lists: &mut [Vec<T>], plan: &Plan, workers: &Workers) -> u64 {
         let kinds = PairKind::ALL.into_iter().map(Some);
         let counted = lists.iter_mut().zip(kinds).map(|(list, kind)| {
@@ -127,8 +129,8 @@ impl Sorter {
         counted.sum()
     }
 
-    /// Sorts keys whose lower numbers are in a range. Returns whether they were counted: few keys, and keys without memory for
-    /// that, are sorted in place.
+    /// Sorts keys whose lower numbers are in a range. Returns whether they were counted: few keys,
+    /// and keys without memory for that, are sorted in place.
     fn sort_keys(&mut self, keys: &mut [u64], numbers: Range<Number>, workers: &Workers) -> bool {
         let first = numbers.start.index();
         let n_numbers = numbers.end.index() - first;
@@ -335,8 +337,9 @@ impl Batch {
     }
 }
 
-/// Sorts each lane by Batcher's merge exchange: Knuth, The Art of Computer Programming, volume 3, section 5.2.2,
-/// algorithm M. Which rows are compared depends on how many there are, and on nothing else.
+/// Sorts each lane by Batcher's merge exchange: Knuth, The Art of Computer Programming, volume 3,
+/// section 5.2.2, algorithm M. Which rows are compared depends on how many there are, and on
+/// nothing else.
 #[inline(always)]
 fn sort_lanes(rows: &mut [Row]) {
     let half = rows.len().next_power_of_two() / 2;

@@ -30,29 +30,31 @@ pub struct Stats {
     pub grid: Option<[u32; 3]>,
     /// `Cells`: cells that went through the second level.
     pub n_subdivided: u64,
-    /// `Cells`: entries of the cell lists, where a primitive counts once per cell. Primitives that no other body
-    /// comes near may have none.
+    /// `Cells`: entries of the cell lists, where a primitive counts once per cell. Primitives that
+    /// no other body comes near may have none.
     pub n_entries: u64,
     /// `Clusters`: clusters of all bodies that take part.
     pub n_clusters: u64,
-    /// `Clusters` on the CPU: clusters that were proven to lie beside all other bodies, so that their boxes were not
-    /// needed.
+    /// `Clusters` on the CPU: clusters that were proven to lie beside all other bodies, so that
+    /// their boxes were not needed.
     pub n_culled: u64,
     /// Work items: pairs of groups whose primitives were paired.
     pub n_work_items: u64,
     /// Pairs whose boxes overlap and that the adjacency rule admits.
     pub n_candidates: u64,
-    /// Candidates that the floating-point filter left to exact arithmetic. On a GPU: that the filter on the device left to
-    /// the CPU, which decides them with a filter in `f64` and then exactly.
+    /// Candidates that the floating-point filter left to exact arithmetic. On a GPU: that the
+    /// filter on the device left to the CPU, which decides them with a filter in `f64` and then
+    /// exactly.
     pub n_unsure: u64,
     /// Bodies that were clustered in this frame, for the first time or again.
     pub n_clustered: u64,
-    /// Of those, bodies clustered again because they had flowed away from the pose in which they were clustered.
+    /// Of those, bodies clustered again because they had flowed away from the pose in which they
+    /// were clustered.
     pub n_reclustered: u64,
     /// Parts in which the work was done; 1 if the memory budget allowed all of it at once.
     pub n_batches: u64,
-    /// GPU: pieces in which the scene was answered because the device or the memory budget cannot hold all of
-    /// it; 0 if it can.
+    /// GPU: pieces in which the scene was answered because the device or the memory budget cannot
+    /// hold all of it; 0 if it can.
     pub n_pieces: u64,
     /// Stages that were run again because a buffer had to grow.
     pub n_reruns: u64,

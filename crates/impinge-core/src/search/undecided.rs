@@ -14,9 +14,11 @@ pub(crate) struct UndecidedPair {
 /// What a device says about a step, or about a part of it.
 #[derive(Debug)]
 pub(crate) struct Undecided<'a> {
-    /// Pairs that may touch, in any order. Where the earliest contact is sought, those that touch later than `touches_by` may be missing;
-    /// where any is sought, all may be missing if one certainly touches.
+    /// Pairs that may touch, in any order. Where the earliest contact is sought, those that touch
+    /// later than `touches_by` may be missing; where any is sought, all may be missing if one
+    /// certainly touches.
     pub pairs: &'a mut [UndecidedPair],
-    /// The least time by which some pair certainly touches, after the start; none where all are sought.
+    /// The least time by which some pair certainly touches, after the start; none where all are
+    /// sought.
     pub touches_by: Option<f32>,
 }

@@ -59,7 +59,8 @@ impl Work<'_> {
         failed.map_or(Ok(()), Err)
     }
 
-    /// One sorted list of all items of some sorted lists: neighbours are merged, two and two, until one list is left.
+    /// One sorted list of all items of some sorted lists: neighbours are merged, two and two, until
+    /// one list is left.
     ///
     /// # Errors
     /// Cancellation; no memory.

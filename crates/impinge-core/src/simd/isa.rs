@@ -71,7 +71,8 @@ impl Isa {
 /// Calls a kernel `fn kernel(simd: impl Simd, …)`, marked `inline(always)`, compiled for `$isa`.
 macro_rules! with_isa {
     ($isa:expr, $kernel:path, $(<$generic:ident: $bound:ident>)? ($($name:ident: $type:ty = $value:expr),* $(,)?) $(-> $result:ty)?) => {{
-        // A separate function, like the others: without optimisation, a kernel's stack frame is half a megabyte.
+        // A separate function, like the others: without optimisation, a kernel's stack frame is
+        // half a megabyte.
         fn portable$(<$generic: $bound>)?($($name: $type),*) $(-> $result)? {
             $kernel($crate::simd::Portable, $($name),*)
         }
@@ -100,8 +101,8 @@ macro_rules! with_isa {
 }
 pub(crate) use with_isa;
 
-/// For each query, which of the lanes of `among` it overlaps: `overlaps_64` for callers that are not
-/// themselves compiled once per instruction set. Answers as many queries as there are masks.
+/// For each query, which of the lanes of `among` it overlaps: `overlaps_64` for callers that are
+/// not themselves compiled once per instruction set. Answers as many queries as there are masks.
 pub fn masks(isa: Isa, boxes: &LaneBounds, among: u64, queries: &[Bounds], masks: &mut [u64]) {
     with_isa!(isa, all_masks, (
         boxes: &LaneBounds = boxes,

@@ -1,10 +1,11 @@
-//! Box tests, many at a time: AVX-512, AVX2, WebAssembly's vectors, or plain loops that any compiler vectorises (NEON).
+//! Box tests, many at a time: AVX-512, AVX2, WebAssembly's vectors, or plain loops that any
+//! compiler vectorises (NEON).
 //!
-//! A binary built for plain x86-64 detects at run time which instruction sets the processor has. Kernels are
-//! generic over `Simd` and wrapped once per instruction set by `traversal!`; everything between wrapper
-//! and intrinsic is `inline(always)`, so a whole kernel is compiled for its set. Kernels pass no closures
-//! to library functions: those would be compiled separately, without the set.
-//! The answers are bit masks of exact comparisons, so they are the same for every set.
+//! A binary built for plain x86-64 detects at run time which instruction sets the processor has.
+//! Kernels are generic over `Simd` and wrapped once per instruction set by `traversal!`; everything
+//! between wrapper and intrinsic is `inline(always)`, so a whole kernel is compiled for its set.
+//! Kernels pass no closures to library functions: those would be compiled separately, without the
+//! set. The answers are bit masks of exact comparisons, so they are the same for every set.
 
 #[cfg(target_arch = "x86_64")]
 use crate::bvh::CHUNK;
@@ -41,8 +42,8 @@ impl Iterator for Lanes {
     }
 }
 
-/// The triangles of a cluster in two forms: for kernels that load each corner, and for kernels that load each vertex
-/// once.
+/// The triangles of a cluster in two forms: for kernels that load each corner, and for kernels that
+/// load each vertex once.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ClusterFaces<'a> {
     /// At most 64.
@@ -91,8 +92,9 @@ pub(crate) trait Simd: ReadVertices {
     /// Bit `k`: lane `k` overlaps `query`; only lanes of `among` are tested.
     fn overlaps_64(self, boxes: &LaneBounds, query: &Bounds, among: u64) -> u64;
 
-    /// Bit `k`: lane `k`, whose box moves from `start` to `end`, is not beside `query` on the same side of one axis at both
-    /// ends; only lanes of `among` are tested. A box that is beside it at both ends is so all the time.
+    /// Bit `k`: lane `k`, whose box moves from `start` to `end`, is not beside `query` on the same
+    /// side of one axis at both ends; only lanes of `among` are tested. A box that is beside it at
+    /// both ends is so all the time.
     #[inline(always)]
     fn meets_64(
         self,
@@ -123,8 +125,8 @@ pub(crate) trait Simd: ReadVertices {
         mask & among
     }
 
-    /// For each lane of `rows`, the mask of the lanes of `boxes` that its box in `queries` overlaps; only
-    /// lanes of `among` are tested. Masks of other rows are zero.
+    /// For each lane of `rows`, the mask of the lanes of `boxes` that its box in `queries`
+    /// overlaps; only lanes of `among` are tested. Masks of other rows are zero.
     #[inline(always)]
     fn overlaps_rows(
         self,
@@ -140,8 +142,8 @@ pub(crate) trait Simd: ReadVertices {
         }
     }
 
-    /// For each lane of `among`, the mask of the higher lanes of `among` that it overlaps. Other masks are
-    /// zero.
+    /// For each lane of `among`, the mask of the higher lanes of `among` that it overlaps. Other
+    /// masks are zero.
     #[inline(always)]
     fn overlaps_within(self, boxes: &LaneBounds, among: u64, masks: &mut Masks) {
         masks.0 = [0; GROUP];
@@ -150,7 +152,8 @@ pub(crate) trait Simd: ReadVertices {
         }
     }
 
-    /// As [`overlaps_rows`](Simd::overlaps_rows), where boxes move: the lanes that each row [meets](Simd::meets_64).
+    /// As [`overlaps_rows`](Simd::overlaps_rows), where boxes move: the lanes that each row
+    /// [meets](Simd::meets_64).
     #[inline(always)]
     fn meets_rows(
         self,
@@ -189,7 +192,8 @@ pub(crate) trait Simd: ReadVertices {
         rows
     }
 
-    /// Writes the lanes of a mask, lowest first; the rest of the list is arbitrary. Returns the number of lanes.
+    /// Writes the lanes of a mask, lowest first; the rest of the list is arbitrary. Returns the
+    /// number of lanes.
     #[inline(always)]
     fn list_lanes(self, mask: u64, list: &mut [u8; GROUP]) -> usize {
         let mut n = 0;
@@ -203,7 +207,8 @@ pub(crate) trait Simd: ReadVertices {
     /// Bit `k`: lane `k` equals `query`; only lanes of `among` are tested.
     fn equals_64(self, lanes: &Lanes32, query: u32, among: u64) -> u64;
 
-    /// Writes `map[k]` for each lane k of a mask, lowest first; the rest of the list is arbitrary. Returns the number of lanes.
+    /// Writes `map[k]` for each lane k of a mask, lowest first; the rest of the list is arbitrary.
+    /// Returns the number of lanes.
     #[inline(always)]
     fn list_mapped(self, mask: u64, map: &[u8; GROUP], list: &mut [u8; GROUP]) -> usize {
         let mut n = 0;
@@ -233,8 +238,8 @@ pub(crate) trait Simd: ReadVertices {
         }
     }
 
-    /// Bit `k`: some corner of the element `slots_a[k]` is a corner of `slots_b[k]`. Slots are below [`GROUP`], except
-    /// those whose bits are ignored.
+    /// Bit `k`: some corner of the element `slots_a[k]` is a corner of `slots_b[k]`. Slots are
+    /// below [`GROUP`], except those whose bits are ignored.
     #[inline(always)]
     fn share_16(self, [a, b]: [&[Lanes32]; 2], [slots_a, slots_b]: [&[u8; BATCH]; 2]) -> u16 {
         let mut mask = 0;
@@ -269,7 +274,8 @@ pub(crate) trait Simd: ReadVertices {
         into: &mut Triangles64,
     );
 
-    /// The first `n` of some vertices as rows of x, y and z, rounded to nearest; the rest of the rows is arbitrary.
+    /// The first `n` of some vertices as rows of x, y and z, rounded to nearest; the rest of the
+    /// rows is arbitrary.
     ///
     /// # Panics
     /// If there is no such vertex.

@@ -1,4 +1,5 @@
-//! Runs of sixteen vertices as they lie in memory: 48 coordinates, interleaved x, y, z, and which of them belong to a group.
+//! Runs of sixteen vertices as they lie in memory: 48 coordinates, interleaved x, y, z, and which
+//! of them belong to a group.
 //!
 //! `extents` turns the results into boxes and intervals; each instruction set has its own kernel.
 
@@ -11,9 +12,9 @@ pub(crate) const COORDINATES: usize = 3 * RUN;
 /// Coordinates in a row of members: the bits of a u16.
 pub(crate) const ROW: usize = u16::BITS as usize;
 
-/// Which coordinates of a run belong to a group: the x of vertices in groups that lie beside others along x, and likewise
-/// for y and z. One bit per coordinate, in rows: first those of the groups below, then above. A vertex of several clusters
-/// may be in several groups.
+/// Which coordinates of a run belong to a group: the x of vertices in groups that lie beside others
+/// along x, and likewise for y and z. One bit per coordinate, in rows: first those of the groups
+/// below, then above. A vertex of several clusters may be in several groups.
 pub(crate) type Members = [[u16; COORDINATES / ROW]; 2];
 
 /// The results of a kernel, one per coordinate of a run.

@@ -1,7 +1,8 @@
 //! The box tests of [`Portable`](super::Portable) with WebAssembly's registers of four numbers.
 //!
-//! Compilers unroll the plain loops into hundreds of single comparisons, in every kernel that uses them. These functions are
-//! smaller and faster. They are not inlined: a module for browsers is loaded over the network.
+//! Compilers unroll the plain loops into hundreds of single comparisons, in every kernel that uses
+//! them. These functions are smaller and faster. They are not inlined: a module for browsers is
+//! loaded over the network.
 
 use std::arch::wasm32::{f32x4_le, f32x4_splat, i32x4_bitmask, v128, v128_and, v128_load, v128_or};
 

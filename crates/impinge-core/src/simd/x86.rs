@@ -18,8 +18,8 @@ use crate::simd::runs::COORDINATES;
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Avx2(());
 
-/// 512-bit registers and mask registers. Only created if `avx512f` and its extensions `vl`, `dq`, `bw` and
-/// `vbmi2` were detected.
+/// 512-bit registers and mask registers. Only created if `avx512f` and its extensions `vl`, `dq`,
+/// `bw` and `vbmi2` were detected.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Avx512(());
 
@@ -64,8 +64,9 @@ impl Load4 for f64 {
     }
 }
 
-/// Eight vertices as rows of x, y and z: two columns of four, transposed side by side. `None` if one
-/// of them is the last vertex or past it: a vertex is read as four numbers, one of which belongs to its successor.
+/// Eight vertices as rows of x, y and z: two columns of four, transposed side by side. `None` if
+/// one of them is the last vertex or past it: a vertex is read as four numbers, one of which
+/// belongs to its successor.
 ///
 /// # Safety
 /// The caller must be compiled for AVX2.
@@ -226,8 +227,8 @@ unsafe fn put_corners_by_vertices(
 #[repr(C, align(64))]
 struct CornerTable([[f32; TABLE]; 3]);
 
-/// Expands eight membership bits into lane masks. Non-members become all ones, an f32 NaN, for which `minps` and `maxps`
-/// return their second operand.
+/// Expands eight membership bits into lane masks. Non-members become all ones, an f32 NaN, for
+/// which `minps` and `maxps` return their second operand.
 static NO_MEMBERS: [[u32; 8]; 256] = {
     let mut table = [[0; 8]; 256];
     let mut k = 0;
@@ -247,10 +248,12 @@ fn no_members(members: &Members, end: usize, eight: usize) -> &'static [u32; 8] 
     &NO_MEMBERS[usize::from(byte)]
 }
 
-/// Runs that are read repeatedly, eight coordinates of each at a time, while they are in the first-level cache.
+/// Runs that are read repeatedly, eight coordinates of each at a time, while they are in the
+/// first-level cache.
 const BLOCK: usize = 32;
 
-/// As `Simd::add_runs`, for eight of the runs' coordinates: so few that all their results stay in registers.
+/// As `Simd::add_runs`, for eight of the runs' coordinates: so few that all their results stay in
+/// registers.
 ///
 /// # Safety
 /// The caller must be compiled for AVX2.
@@ -297,8 +300,8 @@ unsafe fn add_eight(
 /// Coordinates in 4 KiB: the processor's own prefetching ends with the page.
 const PAGE: usize = 1024;
 
-/// As `ReadVertices::of_ascending`: two vertices per register and four chains, which hide the latency of minimum
-/// and maximum.
+/// As `ReadVertices::of_ascending`: two vertices per register and four chains, which hide the
+/// latency of minimum and maximum.
 ///
 /// # Safety
 /// The caller must be compiled for AVX2, and `vertices` must not descend.
@@ -310,8 +313,8 @@ unsafe fn of_ascending(positions: &[[f32; 3]], vertices: &[u32]) -> (Bounds, boo
         return of_vertices_f32(positions, vertices);
     }
     let first = positions.as_ptr();
-    // SAFETY: no vertex is higher than the last one, which has a successor. So the 16 bytes that start with a
-    // vertex's 12 lie within the slice.
+    // SAFETY: no vertex is higher than the last one, which has a successor. So the 16 bytes that
+    // start with a vertex's 12 lie within the slice.
     unsafe {
         let mut min = [_mm256_set1_ps(f32::INFINITY); CHUNK / 2];
         let mut max = [_mm256_set1_ps(f32::NEG_INFINITY); CHUNK / 2];
@@ -357,8 +360,8 @@ unsafe fn splat_512(point: &[f32; 3]) -> [__m512; 3] {
 #[inline(always)]
 unsafe fn look_up_512(lanes: &Lanes32, slots: __m512i) -> __m512i {
     let first = lanes.0.as_ptr();
-    // SAFETY: the caller's; four loads of sixteen from 64. A permutation looks at the five lowest bits of a slot, the
-    // choice at the sixth.
+    // SAFETY: the caller's; four loads of sixteen from 64. A permutation looks at the five lowest
+    // bits of a slot, the choice at the sixth.
     unsafe {
         let load = |chunk: usize| _mm512_load_si512(first.add(16 * chunk).cast());
         let low = _mm512_permutex2var_epi32(load(0), slots, load(1));
@@ -579,8 +582,8 @@ unsafe fn chunk_overlaps(
     }
 }
 
-/// As [`chunk_overlaps`], where boxes move: the bits of lanes that are not beside a row on the same side of an axis at both
-/// ends.
+/// As [`chunk_overlaps`], where boxes move: the bits of lanes that are not beside a row on the same
+/// side of an axis at both ends.
 ///
 /// # Safety
 /// The caller must be compiled for AVX-512.
@@ -644,7 +647,8 @@ static LANE: Numbers = {
 impl ReadVertices for Avx512 {
     #[inline(always)]
     unsafe fn of_ascending(self, positions: &[[f32; 3]], vertices: &[u32]) -> (Bounds, bool) {
-        // SAFETY: `Avx512` exists only where the processor has AVX2 too; the caller guarantees the order.
+        // SAFETY: `Avx512` exists only where the processor has AVX2 too; the caller guarantees the
+        // order.
         unsafe { of_ascending(positions, vertices) }
     }
 }
@@ -742,7 +746,8 @@ impl Simd for Avx512 {
 
     #[inline(always)]
     fn list_mapped(self, mask: u64, map: &[u8; GROUP], list: &mut [u8; GROUP]) -> usize {
-        // SAFETY: `Avx512` exists only where the processor has it; one load and one store of 64 bytes.
+        // SAFETY: `Avx512` exists only where the processor has it; one load and one store of 64
+        // bytes.
         unsafe {
             let lanes = _mm512_maskz_compress_epi8(mask, _mm512_loadu_si512(map.as_ptr().cast()));
             _mm512_storeu_si512(list.as_mut_ptr().cast(), lanes);
@@ -752,7 +757,8 @@ impl Simd for Avx512 {
 
     #[inline(always)]
     fn keep_16(self, mask: u16, lanes: &[u8; BATCH], list: &mut [u8; BATCH]) {
-        // SAFETY: `Avx512` exists only where the processor has it; one load and one store of 16 bytes.
+        // SAFETY: `Avx512` exists only where the processor has it; one load and one store of 16
+        // bytes.
         unsafe {
             let lanes = _mm_maskz_compress_epi8(mask, _mm_loadu_si128(lanes.as_ptr().cast()));
             _mm_storeu_si128(list.as_mut_ptr().cast(), lanes);
@@ -770,8 +776,8 @@ impl Simd for Avx512 {
                 let mut n = 0;
                 for chunk in 0..4 {
                     let mask = (mask >> (16 * chunk)) as __mmask16;
-                    // SAFETY: `Avx512` exists only where the processor has it. At most 16 numbers of each chunk before
-                    // were put, so sixteen more lie within the row.
+                    // SAFETY: `Avx512` exists only where the processor has it. At most 16 numbers
+                    // of each chunk before were put, so sixteen more lie within the row.
                     unsafe {
                         let lanes = _mm512_load_ps(row.as_ptr().add(16 * chunk));
                         let lanes = _mm512_maskz_compress_ps(mask, lanes);
@@ -785,7 +791,8 @@ impl Simd for Avx512 {
 
     #[inline(always)]
     fn share_16(self, [a, b]: [&[Lanes32]; 2], [slots_a, slots_b]: [&[u8; BATCH]; 2]) -> u16 {
-        // SAFETY: `Avx512` exists only where the processor has it; loads of sixteen bytes, and of sixteen numbers of 64.
+        // SAFETY: `Avx512` exists only where the processor has it; loads of sixteen bytes, and of
+        // sixteen numbers of 64.
         unsafe {
             let slots =
                 |slots: &[u8; BATCH]| _mm512_cvtepu8_epi32(_mm_loadu_si128(slots.as_ptr().cast()));
@@ -907,8 +914,9 @@ impl Simd for Avx512 {
 
     #[inline(always)]
     fn add_runs(self, runs: &[[[f32; 3]; RUN]], members: &[Members], into: &mut RunExtents) {
-        // SAFETY: `Avx512` exists only where the processor has it; a run is three registers of coordinates,
-        // as is each row of `into`. A prefetch may go past the end: it is a hint and never faults.
+        // SAFETY: `Avx512` exists only where the processor has it; a run is three registers of
+        // coordinates, as is each row of `into`. A prefetch may go past the end: it is a hint and
+        // never faults.
         unsafe {
             let load = |row: &[f32; 3 * RUN]| {
                 let first = row.as_ptr();

@@ -1,13 +1,17 @@
-//! Where helpers run: not on the caller's core, if there is another, unless users place threads themselves.
+//! Where helpers run: not on the caller's core, if there is another, unless users place threads
+//! themselves.
 //!
-//! A helper that wakes on the core of the busy caller runs only when the caller is done, which is too late, and the
-//! system does not soon move one of two busy threads to another core. (Linux wakes threads on the caller's core when it
-//! thinks that the other cores are busy, and one busy core of two is enough for that: on the machine of the records every
-//! second burst of frames began so, with 1.0 ms per frame instead of 0.55.) So helpers are kept off the caller's core: the
-//! core's number is read once per region, and if it has changed there is one system call per helper.
+//! A helper that wakes on the core of the busy caller runs only when the caller is done, which is
+//! too late, and the system does not soon move one of two busy threads to another core. (Linux
+//! wakes threads on the caller's core when it thinks that the other cores are busy, and one busy
+//! core of two is enough for that: on the machine of the records every second burst of frames began
+//! so, with 1.0 ms per frame instead of 0.55.) So helpers are kept off the caller's core: the
+//! core's number is read once per region, and if it has changed there is one system call per
+//! helper.
 //!
-//! Helpers run where the system puts them with [`Affinity::Inherited`](crate::Affinity::Inherited), if there is no such
-//! call, if the call fails, or if there are many helpers, for whom a core is free then.
+//! Helpers run where the system puts them with [`Affinity::Inherited`](crate::Affinity::Inherited),
+//! if there is no such call, if the call fails, or if there are many helpers, for whom a core is
+//! free then.
 
 #[cfg(target_os = "linux")]
 pub(super) use linux::Places;
@@ -81,7 +85,8 @@ mod linux {
                 thread: gettid(),
                 cores,
             });
-            // From here on the caller sees the helper. Apply the caller's core until it has not changed meanwhile.
+            // From here on the caller sees the helper. Apply the caller's core until it has not
+            // changed meanwhile.
             let mut core = UNKNOWN;
             loop {
                 let now = self.caller.load(Ordering::SeqCst);

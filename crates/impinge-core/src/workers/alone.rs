@@ -1,7 +1,7 @@
 //! Whether work that rayon could share is done by the thread at hand.
 //!
-//! A detector with one worker, and one in a forked process that has none of the parent's threads, must not go to a pool of
-//! rayon. So loops that may ask [`is_alone`] first.
+//! A detector with one worker, and one in a forked process that has none of the parent's threads,
+//! must not go to a pool of rayon. So loops that may ask [`is_alone`] first.
 
 use std::cell::Cell;
 

@@ -1,4 +1,4 @@
-//! The only module that reads the time. [`Instant`] is the standard library's. In a browser, where that one panics, it
-//! is the page's clock.
+//! The only module that reads the time. [`Instant`] is the standard library's. In a browser, where
+//! that one panics, it is the page's clock.
 
 pub use web_time::Instant;

@@ -1,7 +1,9 @@
-//! The protocol between a caller and its helpers: regions of work that helpers enter and leave, sleep, and waking.
+//! The protocol between a caller and its helpers: regions of work that helpers enter and leave,
+//! sleep, and waking.
 //!
-//! All memory that threads share unsafely is here, and nothing else: `tests/workers_model.rs` runs this file under a model
-//! checker that tries the interleavings and memory orders which the language allows.
+//! All memory that threads share unsafely is here, and nothing else: `tests/workers_model.rs` runs
+//! this file under a model checker that tries the interleavings and memory orders which the
+//! language allows.
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
@@ -14,9 +16,9 @@ pub(crate) type Work<'a> = dyn Fn(usize) + Sync + 'a;
 
 /// The state that caller and helpers share.
 ///
-/// The gate holds whether a region is open (bit 0), how many helpers are in it (bits 1 to 31), and the region's
-/// number (above). A helper enters only through an open gate. The caller closes it and waits until all helpers are
-/// out, so the region's work outlives every helper in it.
+/// The gate holds whether a region is open (bit 0), how many helpers are in it (bits 1 to 31), and
+/// the region's number (above). A helper enters only through an open gate. The caller closes it and
+/// waits until all helpers are out, so the region's work outlives every helper in it.
 pub(crate) struct Crew {
     gate: AtomicU64,
     /// Valid while the gate is open or a helper is inside.
@@ -35,8 +37,8 @@ const INSIDE: u64 = 2;
 const INSIDE_MASK: u64 = (1 << 32) - INSIDE;
 const REGION: u64 = 1 << 32;
 
-// SAFETY: only the one caller that has set `busy` writes `work`, while the gate is closed and no helper is inside; only
-// helpers that entered an open gate read it.
+// SAFETY: only the one caller that has set `busy` writes `work`, while the gate is closed and no
+// helper is inside; only helpers that entered an open gate read it.
 unsafe impl Send for Crew {}
 // SAFETY: as above.
 unsafe impl Sync for Crew {}
@@ -87,7 +89,8 @@ impl Crew {
         }
         // Drop a panic that was left over when the caller's own part panicked.
         self.take_panic();
-        // SAFETY: only the lifetime changes; `Closing` makes sure that all helpers are out before it ends.
+        // SAFETY: only the lifetime changes; `Closing` makes sure that all helpers are out before
+        // it ends.
         let work_ptr =
             unsafe { std::mem::transmute::<*const Work<'_>, *const Work<'static>>(work) };
         // SAFETY: the gate is closed and no helper is inside; `busy` excludes other callers.
@@ -113,7 +116,8 @@ impl Crew {
         Seen(self.gate.load(Ordering::Acquire))
     }
 
-    /// Does a helper's part of the region that it has seen to be open. False if that has changed, or for no reason.
+    /// Does a helper's part of the region that it has seen to be open. False if that has changed,
+    /// or for no reason.
     pub fn help(&self, seat: usize, Seen(gate): Seen) -> bool {
         let entered = self.gate.compare_exchange_weak(
             gate,
@@ -137,8 +141,8 @@ impl Crew {
         true
     }
 
-    /// Sleeps until woken, unless something has happened since the helper looked at the gate. A call that comes
-    /// too early for it to be seen is lost: the region goes on without this helper.
+    /// Sleeps until woken, unless something has happened since the helper looked at the gate. A
+    /// call that comes too early for it to be seen is lost: the region goes on without this helper.
     pub fn sleep(&self, seat: usize, Seen(gate): Seen) {
         self.asleep[seat - 1].store(true, Ordering::Relaxed);
         fence(Ordering::SeqCst);
@@ -148,14 +152,16 @@ impl Crew {
         self.asleep[seat - 1].store(false, Ordering::Relaxed);
     }
 
-    /// Whether a helper sleeps, or is about to, and nobody else has been told so: the one who is told must unpark it.
+    /// Whether a helper sleeps, or is about to, and nobody else has been told so: the one who is
+    /// told must unpark it.
     pub fn wakes(&self, seat: usize) -> bool {
         let asleep = &self.asleep[seat - 1];
         asleep.load(Ordering::Relaxed) && asleep.swap(false, Ordering::AcqRel)
     }
 }
 
-/// Closes the gate and waits until all helpers are out, even if the caller's part of the work panics.
+/// Closes the gate and waits until all helpers are out, even if the caller's part of the work
+/// panics.
 struct Closing<'a>(&'a Crew);
 
 impl Drop for Closing<'_> {

@@ -1,15 +1,17 @@
 //! Threads: the caller, which works too, and its helpers.
 //!
-//! Waking a sleeping thread takes as long as a small frame (on the machine of the records, 15 µs of the caller's time
-//! and 45 µs until the thread runs; through a rayon pool 35 µs of the caller's). So helpers are called once per frame, the
-//! caller never waits for a helper that has not come yet, and helpers do not go to sleep at once:
+//! Waking a sleeping thread takes as long as a small frame (on the machine of the records, 15 µs of
+//! the caller's time and 45 µs until the thread runs; through a rayon pool 35 µs of the caller's).
+//! So helpers are called once per frame, the caller never waits for a helper that has not come yet,
+//! and helpers do not go to sleep at once:
 //!
 //! ```text
 //! caller    | call | region 1 ......... | alone | region 2 .... | end of the shift
 //! helper    : (waking) ..........|      | spins | ............. | lingers, as long as the shift took | sleeps
 //! ```
 //!
-//! A helper that lingers yields to every other thread. Clustering, which rayon parallelises, runs in a rayon pool.
+//! A helper that lingers yields to every other thread. Clustering, which rayon parallelises, runs
+//! in a rayon pool.
 
 mod affinity;
 pub(crate) mod alone;
@@ -35,7 +37,8 @@ use crew::{Claims, Crew};
 const SPIN: Duration = Duration::from_micros(50);
 /// How long a helper lingers within a shift, and at most after a shift.
 const LINGER: Duration = Duration::from_millis(1);
-/// How long a frame must take to be worth waking a helper that will sleep again before the next frame.
+/// How long a frame must take to be worth waking a helper that will sleep again before the next
+/// frame.
 const WORTH: Duration = Duration::from_micros(800);
 /// How often a helper checks the gate between two looks at the clock.
 const LOOKS: u32 = 64;
@@ -97,7 +100,8 @@ impl Drop for Workers {
 }
 
 impl Workers {
-    /// `threads` workers, the caller among them; 0 for one per core. Threads are started when first needed.
+    /// `threads` workers, the caller among them; 0 for one per core. Threads are started when first
+    /// needed.
     pub fn new(threads: usize) -> Self {
         Workers::tuned(threads, Affinity::default(), Tuning::default())
     }
@@ -131,9 +135,9 @@ impl Workers {
 
     /// Keeps helpers awake between regions until the returned shift is dropped.
     ///
-    /// Sleeping helpers are woken unless the frame will probably be over before they come. They are woken if it has very
-    /// many primitives; if the last frame took long, for so will this one; and if it follows the last one closely, for
-    /// then they stay awake for the next one.
+    /// Sleeping helpers are woken unless the frame will probably be over before they come. They are
+    /// woken if it has very many primitives; if the last frame took long, for so will this one; and
+    /// if it follows the last one closely, for then they stay awake for the next one.
     pub fn shift(&self, n_primitives: u64) -> Shift<'_> {
         let start = Instant::now();
         let wakes = n_primitives >= self.tuning.wake_from
@@ -185,12 +189,14 @@ impl Workers {
         self.last.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Runs work that rayon parallelises, on as many threads as there are workers. With one worker, or few primitives, it runs on
-    /// this thread, for going to a pool takes 70 µs. Such work must ask `alone::is_alone` before it shares.
+    /// Runs work that rayon parallelises, on as many threads as there are workers. With one worker,
+    /// or few primitives, it runs on this thread, for going to a pool takes 70 µs. Such work must
+    /// ask `alone::is_alone` before it shares.
     ///
-    /// Why a second pool beside the helpers: clustering splits a body recursively, which takes a work-stealing scheduler,
-    /// while helpers only take equal tasks from a list. The pool works when a body is new or has flowed away from its
-    /// clusters; in all other frames its threads sleep.
+    /// Why a second pool beside the helpers: clustering splits a body recursively, which takes a
+    /// work-stealing scheduler, while helpers only take equal tasks from a list. The pool works
+    /// when a body is new or has flowed away from its clusters; in all other frames its threads
+    /// sleep.
     ///
     /// # Errors
     /// The pool's threads do not start.
@@ -199,7 +205,8 @@ impl Workers {
         n_primitives: usize,
         work: impl FnOnce() -> T + Send,
     ) -> Result<T, Error> {
-        // One worker is this thread; in a fork, the pools of the process that created the workers have no threads.
+        // One worker is this thread; in a fork, the pools of the process that created the workers
+        // have no threads.
         if self.n == 1 || n_primitives < self.tuning.pool_from || self.process != process() {
             return Ok(alone(work));
         }
@@ -219,9 +226,9 @@ impl Workers {
         })
     }
 
-    /// Calls `task(scratch, ix)` once for each `ix` below `n_tasks`, each worker with its own scratch. The
-    /// caller takes tasks from the first on, helpers from the last: neighbouring tasks tend to use the same
-    /// memory. With a single task or worker, no helper is woken.
+    /// Calls `task(scratch, ix)` once for each `ix` below `n_tasks`, each worker with its own
+    /// scratch. The caller takes tasks from the first on, helpers from the last: neighbouring tasks
+    /// tend to use the same memory. With a single task or worker, no helper is woken.
     pub fn for_each<S: Send>(
         &self,
         scratches: &mut [S],
@@ -246,7 +253,8 @@ impl Workers {
             if worker >= n_workers {
                 return;
             }
-            // SAFETY: there are at least `n_workers` scratches, and every worker has a different number.
+            // SAFETY: there are at least `n_workers` scratches, and every worker has a different
+            // number.
             let scratch = unsafe { &mut *scratches.at(worker) };
             while let Some(ix) = claims.next(n_tasks, worker == 0) {
                 task(scratch, ix);
@@ -304,7 +312,8 @@ impl<S> Scratches<S> {
     }
 }
 
-/// The helpers of a detector: the protocol that they share with the caller, and how long they stay awake.
+/// The helpers of a detector: the protocol that they share with the caller, and how long they stay
+/// awake.
 struct Helpers {
     crew: Crew,
     /// How long helpers that have nothing to do stay awake.

@@ -1,4 +1,5 @@
-//! What the crew needs of the standard library. The model checker of `tests/workers_model.rs` puts its own in its place.
+//! What the crew needs of the standard library. The model checker of `tests/workers_model.rs` puts
+//! its own in its place.
 
 pub(super) use std::sync::Mutex;
 pub(super) use std::sync::atomic::{AtomicBool, AtomicU64, Ordering, fence};

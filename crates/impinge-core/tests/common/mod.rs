@@ -174,8 +174,8 @@ fn one_meets_itself(rule: SharedVertex) -> Case {
     }
 }
 
-/// Cases of up to a few thousand primitives: every kind, every query, lattice troublemakers, and the
-/// adversarial scenes in small.
+/// Cases of up to a few thousand primitives: every kind, every query, lattice troublemakers, and
+/// the adversarial scenes in small.
 pub fn cases() -> Vec<Case> {
     let mut cases = Vec::new();
     let rules = [SharedVertex::Skip, SharedVertex::Resolve];
@@ -287,8 +287,8 @@ pub fn times_power(x: f64, exponent: i32) -> f64 {
     x * 2.0_f64.powi(half) * 2.0_f64.powi(exponent - half)
 }
 
-/// A way to leave the range in which products of three coordinates are doubles, for points of small numbers. The answer stays the same
-/// for the first ones, which are linear maps.
+/// A way to leave the range in which products of three coordinates are doubles, for points of small
+/// numbers. The answer stays the same for the first ones, which are linear maps.
 #[derive(Debug, Clone, Copy)]
 pub enum Size {
     /// Each axis times a power of two.
@@ -397,8 +397,9 @@ fn fan(n: u32) -> Model {
     }
 }
 
-/// Triangles at the start and at the end of a step in which `n` of them land on a slope, nearly at once, each on a way of its own. The slope
-/// is a triangle too, the first. They land where x and y are at most `half_width` from `far`.
+/// Triangles at the start and at the end of a step in which `n` of them land on a slope, nearly at
+/// once, each on a way of its own. The slope is a triangle too, the first. They land where x and y
+/// are at most `half_width` from `far`.
 pub fn landing(
     random: &mut Random,
     n: u32,

@@ -40,8 +40,8 @@ struct Seen {
     polygons: [usize; 7],
 }
 
-/// Compares every contact with the oracle: the same corners, each coordinate the nearest number, in the
-/// promised order and direction.
+/// Compares every contact with the oracle: the same corners, each coordinate the nearest number, in
+/// the promised order and direction.
 fn check(scene: &Scene, pairs: &Pairs, most: usize, seen: &mut Seen) {
     let bodies: Vec<BodyId> = scene.bodies().map(|(id, _)| id).collect();
     let contacts = contacts_of(scene, pairs);
@@ -214,8 +214,8 @@ fn triangles_of_any_size_meet_as_the_oracle_says() {
     assert!(seen.directed > 100, "{seen:?}");
 }
 
-/// Coordinates of very different sizes: results that cancel almost to zero, often beyond both rounding
-/// stages.
+/// Coordinates of very different sizes: results that cancel almost to zero, often beyond both
+/// rounding stages.
 #[test]
 fn coordinates_that_cancel_are_the_nearest_too() {
     let mut random = Random::new(11);

@@ -1,9 +1,10 @@
 //! The oracle: the intersection of two triangles, in integers and by another algorithm.
 //!
-//! A point of both is a blend of either's corners with weights λ, μ ≥ 0 of sum 1. The solutions form a
-//! polytope whose vertices are *basic*: their nonzero weights belong to independent columns. Trying all sets
-//! of columns finds them all. If neither triangle is degenerate, points and weights determine each other, so these
-//! are the corners. Else all lie on one line, and the corners are the first and the last in lexicographic order.
+//! A point of both is a blend of either's corners with weights λ, μ ≥ 0 of sum 1. The solutions
+//! form a polytope whose vertices are *basic*: their nonzero weights belong to independent columns.
+//! Trying all sets of columns finds them all. If neither triangle is degenerate, points and weights
+//! determine each other, so these are the corners. Else all lie on one line, and the corners are
+//! the first and the last in lexicographic order.
 
 use dashu_int::IBig;
 
@@ -120,8 +121,8 @@ pub fn equal(p: &Rational, q: &Rational) -> bool {
     between(p, q).iter().all(|x| *x == IBig::ZERO)
 }
 
-/// The point of the basic solution of a set of columns; `None` if they are linearly dependent or a weight
-/// is not positive.
+/// The point of the basic solution of a set of columns; `None` if they are linearly dependent or a
+/// weight is not positive.
 fn basic(a: &[[IBig; 3]; 3], b: &[[IBig; 3]; 3], set: u32) -> Option<Rational> {
     let columns: Vec<usize> = (0..6).filter(|k| set >> k & 1 == 1).collect();
     if columns.len() > 5 || columns[0] > 2 || columns[columns.len() - 1] < 3 {
@@ -187,8 +188,8 @@ fn basic(a: &[[IBig; 3]; 3], b: &[[IBig; 3]; 3], set: u32) -> Option<Rational> {
     })
 }
 
-/// Whether `x` is the number nearest to `numerator / denominator`, ties to even; in single precision, the nearest
-/// `f32`.
+/// Whether `x` is the number nearest to `numerator / denominator`, ties to even; in single
+/// precision, the nearest `f32`.
 pub fn is_nearest(
     scale: Scale,
     x: f64,

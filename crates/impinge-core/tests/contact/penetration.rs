@@ -257,7 +257,8 @@ fn touching_bodies_have_a_normal_and_no_depth() {
     assert!(found.inside.iter().all(Vec::is_empty));
 }
 
-/// Coincident bodies and bodies that share a plane: everything is degenerate, and there is still an answer.
+/// Coincident bodies and bodies that share a plane: everything is degenerate, and there is still an
+/// answer.
 #[test]
 fn degenerate_overlaps_do_not_panic() {
     let cube = surfaces::cube([0.0; 3], 1.0);
@@ -304,7 +305,8 @@ fn open_surfaces_are_refused_by_name() {
     );
 }
 
-/// Each pair of many bodies is as if it were alone in the scene, but for the numbers of its contacts.
+/// Each pair of many bodies is as if it were alone in the scene, but for the numbers of its
+/// contacts.
 #[test]
 fn pairs_of_bodies_among_many_are_as_if_alone() {
     let ball = surfaces::bumpy_ball(300, 0.2);

@@ -193,7 +193,8 @@ impl Device<'_> {
         }
     }
 
-    /// The sign of the turn from a - o to b - o in the plane of x and y if it is sure, and the computed value.
+    /// The sign of the turn from a - o to b - o in the plane of x and y if it is sure, and the
+    /// computed value.
     fn turn(&mut self, [a, b, o]: [&[f32; 3]; 3], narrowing: f32) -> (Option<Sign>, f32) {
         let (d, e) = (self.difference(a, o), self.difference(b, o));
         let value = self.planar(&d, &e);

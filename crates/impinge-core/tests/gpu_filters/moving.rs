@@ -1,6 +1,7 @@
-//! The filter of the GPU for moving elements, as `docs/exactness.md` specifies it, in the model of WGSL's arithmetic of
-//! `bound`. Signs that it calls certain must be right, for the whole step and for intervals of it. Elements that it drops must not
-//! touch, all others not before the one time that it says, and certainly before the other one.
+//! The filter of the GPU for moving elements, as `docs/exactness.md` specifies it, in the model of
+//! WGSL's arithmetic of `bound`. Signs that it calls certain must be right, for the whole step and
+//! for intervals of it. Elements that it drops must not touch, all others not before the one time
+//! that it says, and certainly before the other one.
 
 use crate::bound::{Device, LARGEST, NARROWING, SMALLEST};
 use crate::generators::{Kind, Random};
@@ -84,7 +85,8 @@ impl<T: Copy> Polygon<T> {
 }
 
 impl<T: Copy> Polygon<T> {
-    /// The polygon at the ends of an interval. `at`: a number that moves, at the first or at the second of them.
+    /// The polygon at the ends of an interval. `at`: a number that moves, at the first or at the
+    /// second of them.
     fn over(&self, mut at: impl FnMut([T; 2], usize) -> T) -> Self {
         let mut over = |[start, end]: &Moving<T>| -> Moving<T> {
             [0, 1].map(|ix| std::array::from_fn(|axis| at([start[axis], end[axis]], ix)))
@@ -129,7 +131,8 @@ impl Sum for Device<'_> {
             .iter()
             .map(|factors| self.product(factors))
             .collect();
-        // Mostly in the order in which they are written, in which terms cancel late; else in any order.
+        // Mostly in the order in which they are written, in which terms cancel late; else in any
+        // order.
         let shuffled = self.below(2) == 0;
         while terms.len() > 1 {
             let n = terms.len() as u64;
@@ -301,7 +304,8 @@ fn load(
     })
 }
 
-/// The bounds that the kernels compute, and the values under the model: for the whole step, or for an interval of it.
+/// The bounds that the kernels compute, and the values under the model: for the whole step, or for
+/// an interval of it.
 fn values(device: &mut Device<'_>, loaded: &Pair, interval: Option<[f32; 2]>) -> Values {
     let &Pair {
         pair, wide, slack, ..
@@ -356,7 +360,8 @@ fn are_all(values: impl Iterator<Item = (f32, f32)> + Clone) -> bool {
         || values.clone().all(|(value, bound)| value < -bound)
 }
 
-/// The kernel's decision: nothing is certain, or that elements do not touch, or that they do between the ends.
+/// The kernel's decision: nothing is certain, or that elements do not touch, or that they do
+/// between the ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Decided {
     Unclear,
@@ -469,7 +474,8 @@ fn coefficients_are_right_where_they_are_sure() {
                 let scaled = narrow.map(|p| p.map(|x| x * 2f32.powi(power)));
                 let whole = [0, 4].map(|k| std::array::from_fn(|i| whole[k + i]));
                 let pair = random.pick(&PAIRS);
-                // The whole step, or from one multiple of 1/32 to another: larger integers would be too long.
+                // The whole step, or from one multiple of 1/32 to another: larger integers would be
+                // too long.
                 let low = random.below(32);
                 let times = [low, low + 1 + random.below(32 - low)];
                 let interval = (random.below(2) == 0).then_some(times.map(|t| t as f32 / 32.0));

@@ -1,5 +1,5 @@
-//! `cast`: what rays hit. Where one ray meets one element is held against other predicates in `impinge-exact`; here the search
-//! is held against all elements, one by one.
+//! `cast`: what rays hit. Where one ray meets one element is held against other predicates in
+//! `impinge-exact`; here the search is held against all elements, one by one.
 
 use crate::elements;
 use impinge_core::exact::internal::{Meeting, Ray, meet};
@@ -18,7 +18,8 @@ fn ask(scene: &Scene, rays: &[[[f64; 3]; 2]], most: f64, hits: Hit) -> Hits {
         .unwrap()
 }
 
-/// Holds all three answers against all elements; returns the numbers of hits, ties for the first, and intervals.
+/// Holds all three answers against all elements; returns the numbers of hits, ties for the first,
+/// and intervals.
 fn check(scene: &Scene, rays: &[[[f64; 3]; 2]], most: f64) -> [usize; 3] {
     let elements = elements(scene);
     let [first, any, all] =
@@ -161,7 +162,8 @@ fn nearly_at_once() {
     assert!(same.count() > 500);
 }
 
-/// The same bytes for every instruction set, number of threads and precision, and for bodies that move.
+/// The same bytes for every instruction set, number of threads and precision, and for bodies that
+/// move.
 #[test]
 fn every_way_gives_the_same_answer() {
     let mut random = Random::new(9);

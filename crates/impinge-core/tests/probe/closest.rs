@@ -103,7 +103,8 @@ fn cpu() -> Detector {
     Detector::new(Backend::Cpu).unwrap()
 }
 
-/// On a lattice most points have several nearest elements, and many elements are segments or points.
+/// On a lattice most points have several nearest elements, and many elements are segments or
+/// points.
 #[test]
 fn lattices() {
     for seed in 0..4 {
@@ -122,7 +123,8 @@ fn lattices() {
     }
 }
 
-/// How far away an element may be is compared exactly: the diagonal of a square is longer than the float below it.
+/// How far away an element may be is compared exactly: the diagonal of a square is longer than the
+/// float below it.
 #[test]
 fn the_largest_distance_is_exact() {
     let mut scene = Scene::new();
@@ -204,7 +206,8 @@ fn other_kinds() {
     }
 }
 
-/// The same bytes for every instruction set, number of threads, precision and order of the points, and for bodies that move.
+/// The same bytes for every instruction set, number of threads, precision and order of the points,
+/// and for bodies that move.
 #[test]
 fn every_way_gives_the_same_answer() {
     let mut random = Random::new(9);

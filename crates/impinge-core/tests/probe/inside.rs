@@ -8,8 +8,8 @@ use impinge_core::{
 };
 use impinge_scenes::{Model, Random, solids, soup, surfaces};
 
-/// Boundaries of tetrahedra with corners on a lattice, each turned outward or inward: closed surfaces that overlap, coincide, touch
-/// in faces, edges and vertices, with some that are flat.
+/// Boundaries of tetrahedra with corners on a lattice, each turned outward or inward: closed
+/// surfaces that overlap, coincide, touch in faces, edges and vertices, with some that are flat.
 fn shells(n: usize, k: u32, seed: u64) -> (Vec<[u32; 3]>, Vec<[f64; 3]>) {
     let mut random = Random::new(seed);
     let mut faces: Vec<[u32; 3]> = Vec::new();
@@ -100,7 +100,8 @@ fn lattices_of_shells_are_decided_exactly() {
     assert!(all.iter().all(|&n| n > 100), "{all:?}");
 }
 
-/// Points on vertices and near the middles of edges and faces, whose coordinates are rounded: on either side by the last bit.
+/// Points on vertices and near the middles of edges and faces, whose coordinates are rounded: on
+/// either side by the last bit.
 #[test]
 fn points_at_the_surface_of_round_bodies() {
     let model = surfaces::icosphere(1).mapped(|[x, y, z]| [x + 0.1 * y, y - 0.3 * z, z + 0.7]);
@@ -127,7 +128,8 @@ fn points_at_the_surface_of_round_bodies() {
     assert_eq!(found(faces, &positions, &points, Backend::Cpu), expected);
 }
 
-/// A hollow is outside, whichever way both shells are turned; a shell alone may be turned either way.
+/// A hollow is outside, whichever way both shells are turned; a shell alone may be turned either
+/// way.
 #[test]
 fn nested_and_inverted_shells() {
     let cube = |size: f32, is_inverted: bool| {
@@ -164,7 +166,8 @@ fn joined(models: &[Model]) -> (Vec<[u32; 3]>, Vec<[f64; 3]>) {
     (faces, positions)
 }
 
-/// The same answer for every instruction set, number of threads and precision, and for bodies that move.
+/// The same answer for every instruction set, number of threads and precision, and for bodies that
+/// move.
 #[test]
 fn every_way_gives_the_same_answer() {
     let mut random = Random::new(9);
@@ -270,7 +273,8 @@ fn tetrahedra() {
     assert_eq!(detector.contains(&scene, body, &points).unwrap(), expected);
 }
 
-/// The border of a flat tetrahedron that lies on a face of another one, and tetrahedra that overlap, in either order.
+/// The border of a flat tetrahedron that lies on a face of another one, and tetrahedra that
+/// overlap, in either order.
 #[test]
 fn flat_and_overlapping_tetrahedra() {
     let mut detector = Detector::new(Backend::Cpu).unwrap();

@@ -79,8 +79,8 @@ pub fn is_on(p: &Vector, [a, b, c]: &[Vector; 3]) -> bool {
         })
 }
 
-/// How often a closed surface winds around a point that is not on it: the crossings of a segment to a random far point, and
-/// of another one if it meets any edge.
+/// How often a closed surface winds around a point that is not on it: the crossings of a segment to
+/// a random far point, and of another one if it meets any edge.
 pub fn winding(p: &Vector, faces: &[[Vector; 3]], random: &mut Random) -> i32 {
     'ways: loop {
         let far: Vector = [(); 3].map(|()| {

@@ -1,16 +1,18 @@
 //! Integers of fixed width, and what they have in common with those of any size.
 //!
-//! What it does: lets one algorithm run on integers of fixed width where numbers are short, and on [`Integer`] where they
-//! are not. The product of two numbers has a type of its own, with twice the bits:
+//! What it does: lets one algorithm run on integers of fixed width where numbers are short, and on
+//! [`Integer`] where they are not. The product of two numbers has a type of its own, with twice the
+//! bits:
 //!
 //! ```text
 //! i64  x  i64  ->  i128  x  i128  ->  Wide<4> (256 bits)  x  Wide<4>  ->  Wide<8> (512 bits)
 //! ```
 //!
-//! Cost: a product of two `i64` is one instruction, one of two `i128` four, one of two `Wide<4>` sixteen. Nothing is
-//! allocated.
+//! Cost: a product of two `i64` is one instruction, one of two `i128` four, one of two `Wide<4>`
+//! sixteen. Nothing is allocated.
 //!
-//! Invariant: products are exact. Sums are exact as long as their value fits the type: callers bound their numbers.
+//! Invariant: products are exact. Sums are exact as long as their value fits the type: callers
+//! bound their numbers.
 
 use super::integer::{Integer, approximate, halves};
 use crate::Sign;

@@ -213,7 +213,8 @@ impl Integer {
     }
 }
 
-/// `x * 2^exponent` with 1 <= |x| < 2, rounded towards zero to 53 bits; (0, 0) for zero. Limbs are lowest first.
+/// `x * 2^exponent` with 1 <= |x| < 2, rounded towards zero to 53 bits; (0, 0) for zero. Limbs are
+/// lowest first.
 #[allow(
     clippy::cast_precision_loss,
     clippy::cast_possible_wrap,

@@ -1,13 +1,16 @@
-//! Exact arithmetic behind everything that moves: integers of any size, polynomials in Bernstein form, real roots. Contact
-//! geometry takes its coordinates from the same integers.
+//! Exact arithmetic behind everything that moves: integers of any size, polynomials in Bernstein
+//! form, real roots. Contact geometry takes its coordinates from the same integers.
 //!
-//! What it does: holds the polynomials in time that decide first contacts, isolates their roots in (0, 1], tells the
-//! sign of another polynomial at a root, and rounds a root down to a float. All of it exactly.
+//! What it does: holds the polynomials in time that decide first contacts, isolates their roots in
+//! (0, 1], tells the sign of another polynomial at a root, and rounds a root down to a float. All
+//! of it exactly.
 //!
-//! Cost: a decision needs a few hundred multiplications of numbers below 400 bits, which fit without allocation.
-//! Larger numbers (coordinates of very different size) go to the heap and take longer; nothing can overflow.
+//! Cost: a decision needs a few hundred multiplications of numbers below 400 bits, which fit
+//! without allocation. Larger numbers (coordinates of very different size) go to the heap and take
+//! longer; nothing can overflow.
 //!
-//! Invariant: no rounding and no tolerance. Floating-point numbers appear only as guesses that are checked.
+//! Invariant: no rounding and no tolerance. Floating-point numbers appear only as guesses that are
+//! checked.
 
 pub(super) mod fixed;
 mod integer;

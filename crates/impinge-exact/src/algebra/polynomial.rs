@@ -1,12 +1,13 @@
 //! Polynomials in time with integer coefficients, in Bernstein form.
 //!
-//! A [`Polynomial`] of degree n holds c_0 .. c_n and stands for the sum of c_i (1-t)^(n-i) t^i: Bernstein form with the
-//! binomials inside the coefficients. A point that moves from p to q is (p, q), a product is a convolution, and
-//! nothing is divided. With x = t / (1-t) it is (1-t)^n times the ordinary polynomial with coefficients c_i in x, and
-//! x runs over (0, infinity) as t runs over (0, 1): degrees, remainders and Descartes' rule are those in x.
+//! A [`Polynomial`] of degree n holds c_0 .. c_n and stands for the sum of c_i (1-t)^(n-i) t^i:
+//! Bernstein form with the binomials inside the coefficients. A point that moves from p to q is (p,
+//! q), a product is a convolution, and nothing is divided. With x = t / (1-t) it is (1-t)^n times
+//! the ordinary polynomial with coefficients c_i in x, and x runs over (0, infinity) as t runs over
+//! (0, 1): degrees, remainders and Descartes' rule are those in x.
 //!
-//! [`Controls`] are the Bernstein coefficients proper, of a polynomial over a dyadic interval, all times one positive
-//! number, for halving.
+//! [`Controls`] are the Bernstein coefficients proper, of a polynomial over a dyadic interval, all
+//! times one positive number, for halving.
 
 use alloc::{vec, vec::Vec};
 use core::ops::{Add, Sub};
@@ -36,8 +37,8 @@ impl Polynomial {
         self.0[self.0.len() - 1].sign()
     }
 
-    /// How often the coefficients change sign, ignoring zeros. Descartes: the number of roots in the open interval
-    /// (0, 1), counted with multiplicity, is this or smaller by an even number.
+    /// How often the coefficients change sign, ignoring zeros. Descartes: the number of roots in
+    /// the open interval (0, 1), counted with multiplicity, is this or smaller by an even number.
     pub(crate) fn variations(&self) -> usize {
         variations(&self.0)
     }
@@ -139,7 +140,8 @@ impl Polynomial {
         )
     }
 
-    /// A greatest common divisor as polynomials in x, up to a constant. Its roots in (0, 1) are the common ones.
+    /// A greatest common divisor as polynomials in x, up to a constant. Its roots in (0, 1) are the
+    /// common ones.
     pub(super) fn common_divisor(&self, other: &Self) -> Self {
         let (mut a, mut b) = (self.trimmed(), other.trimmed());
         while !b.0.is_empty() {
@@ -160,8 +162,8 @@ impl Polynomial {
         self.trimmed().0.len() <= 1
     }
 
-    /// Without leading zeros, and divided by the largest power of two that divides all coefficients. Zero becomes a
-    /// polynomial without coefficients.
+    /// Without leading zeros, and divided by the largest power of two that divides all
+    /// coefficients. Zero becomes a polynomial without coefficients.
     fn trimmed(&self) -> Self {
         let n = self
             .0
@@ -219,7 +221,8 @@ impl Sub for &Polynomial {
     }
 }
 
-/// 1 as a polynomial of degree 2, ((1-t) + t)^2: multiplying by it raises the degree by 2 and changes no value.
+/// 1 as a polynomial of degree 2, ((1-t) + t)^2: multiplying by it raises the degree by 2 and
+/// changes no value.
 pub(crate) fn square_of_sum() -> Polynomial {
     Polynomial([1, 2, 1].map(Integer::from).to_vec())
 }

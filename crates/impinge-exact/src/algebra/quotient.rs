@@ -28,8 +28,8 @@ impl Integer {
     }
 
     /// `self / divisor · 2^unit` for a positive divisor, rounded to the nearest number with
-    /// `precision` bits that is a multiple of `2^lowest`, ties to even. `precision` is at most 53 and
-    /// `lowest` at least -1074, so that an `f64` holds the result.
+    /// `precision` bits that is a multiple of `2^lowest`, ties to even. `precision` is at most 53
+    /// and `lowest` at least -1074, so that an `f64` holds the result.
     pub fn quotient(&self, divisor: &Self, unit: i64, precision: u32, lowest: i64) -> f64 {
         debug_assert!(divisor.sign() == Sign::Positive);
         if self.is_zero() {
@@ -59,8 +59,9 @@ impl Integer {
         }
     }
 
-    /// Quotient and remainder of `|self|` divided by `divisor · 2^exponent`, and the divisor that belongs to the
-    /// remainder: both are scaled so that they are integers. The quotient must fit 64 bits.
+    /// Quotient and remainder of `|self|` divided by `divisor · 2^exponent`, and the divisor that
+    /// belongs to the remainder: both are scaled so that they are integers. The quotient must fit
+    /// 64 bits.
     fn divided(&self, divisor: &Self, exponent: i64) -> (u64, Integer, Integer) {
         let by = |n: i64| n.max(0).unsigned_abs();
         let mut rest = self.clone().abs().shifted(by(-exponent));

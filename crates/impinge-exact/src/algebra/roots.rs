@@ -1,9 +1,10 @@
 //! Real roots in (0, 1]: isolation, the sign of another polynomial at a root, rounding down.
 //!
-//! Isolation is by Descartes' rule of signs on dyadic intervals (Collins and Akritas, *Polynomial real root isolation
-//! using Descartes' rule of signs*, 1976; in Bernstein form, Lane and Riesenfeld 1981): no variation, no root; one
-//! variation, one simple root; else the interval is halved. Halving ends if no root is multiple, so a
-//! polynomial that keeps two variations for long is divided by the common divisor with its derivative.
+//! Isolation is by Descartes' rule of signs on dyadic intervals (Collins and Akritas, *Polynomial
+//! real root isolation using Descartes' rule of signs*, 1976; in Bernstein form, Lane and
+//! Riesenfeld 1981): no variation, no root; one variation, one simple root; else the interval is
+//! halved. Halving ends if no root is multiple, so a polynomial that keeps two variations for long
+//! is divided by the common divisor with its derivative.
 
 use alloc::vec::Vec;
 use core::cmp::Ordering;
@@ -30,7 +31,8 @@ pub(crate) struct Root {
 
 #[derive(Debug)]
 enum RootPlace {
-    /// The only root of `polynomial` inside the interval, and simple. `controls` are over the interval.
+    /// The only root of `polynomial` inside the interval, and simple. `controls` are over the
+    /// interval.
     Inside {
         polynomial: Polynomial,
         controls: Controls,
@@ -187,8 +189,9 @@ impl Root {
             }
             match &self.place {
                 RootPlace::At { numerator, depth } => return other.sign_at(numerator, *depth),
-                // A root of the divisor is a root of the polynomial, which has only this one inside, and it is simple.
-                // So the divisor has at most one root inside, and its variations are odd if and only if it has one.
+                // A root of the divisor is a root of the polynomial, which has only this one
+                // inside, and it is simple. So the divisor has at most one root inside, and its
+                // variations are odd if and only if it has one.
                 RootPlace::Inside { polynomial, .. } if round == PATIENCE => {
                     let divisor = polynomial.common_divisor(other);
                     if divisor.controls_over(&self.path).variations() % 2 == 1 {
@@ -205,8 +208,8 @@ impl Root {
         unreachable!("halving ends where the sign is not zero")
     }
 
-    /// Halves the interval. Returns whether the right half has the root; `None` where the root is the middle, and from
-    /// then on.
+    /// Halves the interval. Returns whether the right half has the root; `None` where the root is
+    /// the middle, and from then on.
     fn halve(&mut self) -> Option<bool> {
         let RootPlace::Inside { controls, .. } = &mut self.place else {
             return None;
@@ -221,7 +224,8 @@ impl Root {
             };
             return None;
         }
-        // The sign changes once inside, so the root is on the left where the middle has the later sign.
+        // The sign changes once inside, so the root is on the left where the middle has the later
+        // sign.
         let is_right = middle == controls.first_sign();
         *controls = if is_right { right } else { left };
         self.path.push(is_right);
@@ -279,7 +283,8 @@ impl Root {
     }
 }
 
-/// The only root of a polynomial between two floats in [0, 1] that are not roots themselves, rounded down.
+/// The only root of a polynomial between two floats in [0, 1] that are not roots themselves,
+/// rounded down.
 pub(crate) fn floor_between(polynomial: &Polynomial, low: f64, high: f64) -> Time {
     let value_at = |x: f64| {
         let (numerator, depth) = dyadic(x);
@@ -375,8 +380,8 @@ fn scaled((x, exponent): (f64, i64), depth: u64) -> f64 {
     }
 }
 
-/// The only root of Bernstein coefficients with one variation, as a share of the interval: Newton's method, with
-/// bisection where it would leave the bounds found so far.
+/// The only root of Bernstein coefficients with one variation, as a share of the interval: Newton's
+/// method, with bisection where it would leave the bounds found so far.
 fn guess_inside(controls: &Controls) -> f64 {
     let parts: Vec<(f64, i64)> = controls
         .coefficients()

@@ -18,11 +18,11 @@ pub(crate) struct Unit {
 }
 
 impl Unit {
-    /// Differences of points and the unit that they are counted in, with which `other` is below 2^61 too. `None` if one is not a
-    /// whole number of units.
+    /// Differences of points and the unit that they are counted in, with which `other` is below
+    /// 2^61 too. `None` if one is not a whole number of units.
     ///
-    /// Each coordinate is the sum of a rounded difference and its error. With the unit that keeps all of them below 2^61, they
-    /// only have to be whole.
+    /// Each coordinate is the sum of a rounded difference and its error. With the unit that keeps
+    /// all of them below 2^61, they only have to be whole.
     pub(crate) fn differences<const N: usize>(
         pairs: [[&Point; 2]; N],
         other: f64,

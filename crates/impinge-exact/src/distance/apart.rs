@@ -1,28 +1,34 @@
-//! Directions across which moving elements stay apart, and where their points must stop so that they do.
+//! Directions across which moving elements stay apart, and where their points must stop so that
+//! they do.
 //!
-//! What it does: two elements whose points lie on either side of a space between two parallel planes, at the start and at the end, do
-//! so on all of their straight ways: the planes go along. No times are needed.
+//! What it does: two elements whose points lie on either side of a space between two parallel
+//! planes, at the start and at the end, do so on all of their straight ways: the planes go along.
+//! No times are needed.
 //!
-//! How: the planes lie across the shortest way between the elements, at the start or at the end. Heights over a plane are computed
-//! in `f64` with a bound of their error; what is not certain counts as not so. If the elements do not stay apart, the points that go
-//! towards the other element are stopped: where both come nearer, each gets a share of the room, by how far it wants to go.
+//! How: the planes lie across the shortest way between the elements, at the start or at the end.
+//! Heights over a plane are computed in `f64` with a bound of their error; what is not certain
+//! counts as not so. If the elements do not stay apart, the points that go towards the other
+//! element are stopped: where both come nearer, each gets a share of the room, by how far it wants
+//! to go.
 //!
-//! Source: A. Chen et al., "Divide and Truncate", SIGGRAPH 2026, for planes that divide the room between elements. There they
-//! rest.
+//! Source: A. Chen et al., "Divide and Truncate", SIGGRAPH 2026, for planes that divide the room
+//! between elements. There they rest.
 
 use super::filter::bounds_and_way;
 use crate::Point;
 use crate::element_pair::ElementPair;
 use crate::rounding::root;
 
-/// The share of the room that stays free, so that elements are certainly apart when their points have stopped.
+/// The share of the room that stays free, so that elements are certainly apart when their points
+/// have stopped.
 const LEAST_SHARE: f64 = 1.0 / 1024.0;
 
 /// A bound of the relative error of a height: 8 roundings, where 5 happen.
 const ERROR: f64 = 4.0 * f64::EPSILON;
 
-/// How far each point of two elements may be from where it is now, so that the elements certainly stay farther apart than a distance, as
-/// their points go there from their start at the same time. `now` lies on the ways from the start to the end.
+/// How far each point of two elements may be from where it is now, so that the elements certainly
+/// stay farther apart than a distance, as their points go there from their start at the same time.
+/// `now` lies on the ways from the start to the end.
 ///
 /// `None` if they do not certainly stay apart.
 #[must_use]
@@ -46,8 +52,9 @@ pub fn spare_apart(
     })
 }
 
-/// How far each point of two elements may go from its start to its end, a share, so that the elements stay apart: about, and only as
-/// far as those that are now where they do not have to stop stay there. Points that do not have to stop earlier than now have 1.
+/// How far each point of two elements may go from its start to its end, a share, so that the
+/// elements stay apart: about, and only as far as those that are now where they do not have to stop
+/// stay there. Points that do not have to stop earlier than now have 1.
 ///
 /// `None` if the elements are not certainly farther apart at the start.
 #[must_use]
@@ -120,7 +127,8 @@ impl Across {
         distance * root(square) * (1.0 + 4.0 * ERROR)
     }
 
-    /// The lowest of the first element's heights, and the highest of the second's; `signs` of the error are added.
+    /// The lowest of the first element's heights, and the highest of the second's; `signs` of the
+    /// error are added.
     fn bounds(&self, points: &[Point; 4], origin: &Point, error: f64) -> [f64; 2] {
         let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
         for (ix, side) in self.sides() {
@@ -136,7 +144,8 @@ impl Across {
         [low, high]
     }
 
-    /// By how much the elements are at least farther apart, as a height; `None` if that is not a number.
+    /// By how much the elements are at least farther apart, as a height; `None` if that is not a
+    /// number.
     fn room(&self, points: &[Point; 4], distance: f64) -> Option<f64> {
         let [low, high] = self.bounds(points, &points[0], 1.0);
         let room = ((low - high).next_down() - self.thick(distance)).next_down();

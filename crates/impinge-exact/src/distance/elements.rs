@@ -1,7 +1,8 @@
-//! Distances of elements by their corners: one vertex, two ends of an edge, three corners of a face.
+//! Distances of elements by their corners: one vertex, two ends of an edge, three corners of a
+//! face.
 //!
-//! An edge and a face, and two faces, that share no point are as near as some vertex and face of theirs, or some two
-//! edges: `docs/exactness.md`, "Distances".
+//! An edge and a face, and two faces, that share no point are as near as some vertex and face of
+//! theirs, or some two edges: `docs/exactness.md`, "Distances".
 
 use alloc::vec::Vec;
 use core::cmp::Ordering;
@@ -32,7 +33,8 @@ pub struct NearestOfElements {
 }
 
 impl NearestOfElements {
-    /// What a filter's number of a part stands for (`crate::filter::Near16`): none if the part is not known.
+    /// What a filter's number of a part stands for (`crate::filter::Near16`): none if the part is
+    /// not known.
     #[inline]
     pub fn of_part(pair: ElementPair, number: u8) -> Option<Self> {
         let nearest = PolygonPart::numbered(number)?.named(pair, false);
@@ -72,8 +74,9 @@ impl NearestOfElements {
         }
     }
 
-    /// ipc-toolkit's name of the distance type, given which pair it is, and whether the second element comes first in that. An
-    /// edge and a face, or two faces, have the names of the kinds of the features, without numbers.
+    /// ipc-toolkit's name of the distance type, given which pair it is, and whether the second
+    /// element comes first in that. An edge and a face, or two faces, have the names of the kinds
+    /// of the features, without numbers.
     pub fn name(&self, pair: Option<(ElementPair, bool)>) -> &'static str {
         let [a, b] = self.features;
         if let Some((pair, is_swapped)) = pair {
@@ -94,7 +97,8 @@ impl NearestOfElements {
     }
 }
 
-/// Whether the distance of two elements of one to three corners is at most a reach, if plain floats can decide it.
+/// Whether the distance of two elements of one to three corners is at most a reach, if plain floats
+/// can decide it.
 #[inline]
 pub fn are_within_certainly(a: &[Point], b: &[Point], reach: &Reach) -> Option<bool> {
     if let Some(simple) = Simple::new(a, b) {
@@ -154,7 +158,8 @@ const EDGE_THROUGH_FACE: NearestOfElements = NearestOfElements {
     is_parallel: false,
 };
 
-/// Whether the elements are an edge and a face, and the open edge passes through the inside of the face.
+/// Whether the elements are an edge and a face, and the open edge passes through the inside of the
+/// face.
 fn edge_passes_inside(a: &[Point], b: &[Point]) -> bool {
     match (a, b) {
         ([p, q], [r, s, t]) => passes_inside(p, q, &[*r, *s, *t]),
@@ -185,10 +190,12 @@ pub fn closest_of_elements(a: &[Point], b: &[Point]) -> (NearestOfElements, f64,
     }
 }
 
-/// A number that is at most the distance of two elements of one to three corners, and below it by at most 2^-20 of it, or by a few
-/// times the smallest `f64`; 0 if and only if they touch or are as near as that.
+/// A number that is at most the distance of two elements of one to three corners, and below it by
+/// at most 2^-20 of it, or by a few times the smallest `f64`; 0 if and only if they touch or are as
+/// near as that.
 ///
-/// A bound in `f64` does for most pairs, and the exact distance, rounded down, for the others: the same bits on every machine.
+/// A bound in `f64` does for most pairs, and the exact distance, rounded down, for the others: the
+/// same bits on every machine.
 pub fn distance_below(a: &[Point], b: &[Point]) -> f64 {
     match Simple::new(a, b) {
         Some(simple) => simple.distance_below(),
@@ -446,8 +453,8 @@ pub fn elements_meet(a: &[Point], b: &[Point]) -> bool {
     }
 }
 
-/// An edge of one element that passes through the inside of a face of the other, and the rounded point where it does. The
-/// borders of the elements must touch neither each other nor a face.
+/// An edge of one element that passes through the inside of a face of the other, and the rounded
+/// point where it does. The borders of the elements must touch neither each other nor a face.
 fn crossing(a: &[Point], b: &[Point]) -> Option<([Feature; 2], Point)> {
     if !elements_meet(a, b) {
         return None;

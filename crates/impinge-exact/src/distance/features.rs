@@ -15,22 +15,23 @@ pub enum Feature {
 
 /// The nearest features of two elements: those whose relative interiors contain the nearest points.
 ///
-/// A nearest point on the border of a feature belongs to the smaller feature. Where there are several nearest points (of
-/// parallel edges or flat elements), the first of the smallest features counts, in the order of ipc-toolkit's names.
+/// A nearest point on the border of a feature belongs to the smaller feature. Where there are
+/// several nearest points (of parallel edges or flat elements), the first of the smallest features
+/// counts, in the order of ipc-toolkit's names.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct NearestFeatures {
     /// The feature of the first element.
     pub a: Feature,
     /// The feature of the second element.
     pub b: Feature,
-    /// Whether the edges are parallel (or one is a point), or the face is degenerate. There may then be other nearest
-    /// points.
+    /// Whether the edges are parallel (or one is a point), or the face is degenerate. There may
+    /// then be other nearest points.
     pub is_parallel: bool,
 }
 
 impl NearestFeatures {
-    /// ipc-toolkit's name of the distance type: `P_T`, `P_E0`, `P_T0`; `EA_EB`, `EA_EB0`, `EA0_EB1`; for a vertex and an
-    /// edge `P_E`, `P_E0`, `P_E1`; for two vertices `P_P`.
+    /// ipc-toolkit's name of the distance type: `P_T`, `P_E0`, `P_T0`; `EA_EB`, `EA_EB0`,
+    /// `EA0_EB1`; for a vertex and an edge `P_E`, `P_E0`, `P_E1`; for two vertices `P_P`.
     #[must_use]
     pub fn name(&self, pair: ElementPair) -> &'static str {
         use Feature::{Edge, Vertex};

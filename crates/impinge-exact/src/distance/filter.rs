@@ -11,14 +11,15 @@ use crate::rounding::root;
 
 /// Whether two elements are within a distance; `None` when unsure.
 ///
-/// No, if the whole difference polygon lies beyond a plane that is farther from the origin than the reach. Yes, if
-/// some point of the polygon is nearer than the reach.
+/// No, if the whole difference polygon lies beyond a plane that is farther from the origin than the
+/// reach. Yes, if some point of the polygon is nearer than the reach.
 pub(super) fn answer(pair: ElementPair, points: &[Point; 4], reach: &Reach) -> Option<bool> {
     let (yes, no) = Polygon::of_pair(pair, points).verdict(reach.low, reach.high);
     if yes { Some(true) } else { no.then_some(false) }
 }
 
-/// Two numbers between which the distance of two elements certainly is; none where sizes are out of range.
+/// Two numbers between which the distance of two elements certainly is; none where sizes are out of
+/// range.
 pub(super) fn bounds(pair: ElementPair, points: &[Point; 4]) -> Option<[f64; 2]> {
     bounds_and_way(pair, points).map(|(bounds, _)| bounds)
 }
@@ -39,7 +40,8 @@ pub(super) fn bounds_and_way(pair: ElementPair, points: &[Point; 4]) -> Option<(
     Some(([low, most(&near, largest)], near))
 }
 
-/// A distance from a plane through the origin that all corners certainly have, all on one side; 0 if that is not certain.
+/// A distance from a plane through the origin that all corners certainly have, all on one side; 0
+/// if that is not certain.
 fn least_beyond(normal: &Point, polygon: &Polygon, largest: f64) -> f64 {
     if size(normal) <= f64::SHORTEST {
         return 0.0;
@@ -75,16 +77,18 @@ const N_PLANES: usize = 64;
 /// The least time by which elements are looked at later: times are numbers from 0 to 1.
 const LEAST_WIDTH: f64 = 2.0 * f64::EPSILON;
 
-/// How often the elements are looked at where planes lead no farther, each time eight times as far beyond.
+/// How often the elements are looked at where planes lead no farther, each time eight times as far
+/// beyond.
 const N_LOOKS: usize = 9;
 
 /// Follows two elements from t = 0 to when they are within a distance, at most to `until`.
 ///
-/// From a time at which they are certainly farther apart, time advances to where some corner of the difference polygon
-/// reaches a plane at the distance from the origin, across the nearest point. Up to then all corners are beyond that plane. As
-/// with Newton's method, the steps become shorter fast, until rounding ends them; then the elements are certainly near a little
-/// later, unless they only graze. How much later depends on how fast the nearest points come, which may be slower than the corner that
-/// reaches the plane: so a few times are tried.
+/// From a time at which they are certainly farther apart, time advances to where some corner of the
+/// difference polygon reaches a plane at the distance from the origin, across the nearest point. Up
+/// to then all corners are beyond that plane. As with Newton's method, the steps become shorter
+/// fast, until rounding ends them; then the elements are certainly near a little later, unless they
+/// only graze. How much later depends on how fast the nearest points come, which may be slower than
+/// the corner that reaches the plane: so a few times are tried.
 pub fn approach(
     pair: ElementPair,
     start: &[Point; 4],
@@ -111,7 +115,8 @@ pub fn approach(
         there.nearest(&there.normal())
     };
     let is_near_at = |time: f64| distance > most(&nearest_at(time), largest);
-    // How far a plane leads from a polygon at some time, and how much later the elements may be near.
+    // How far a plane leads from a polygon at some time, and how much later the elements may be
+    // near.
     let leads = |here: &Polygon, time: f64, normal: &Point| {
         // Beyond the bound by more than rounding, so that the next polygon is certainly beyond it.
         let [bound, error] = beyond(normal, largest, distance);
@@ -136,7 +141,8 @@ pub fn approach(
         if are_beyond(&near, &[here, goal], largest, distance) {
             return Approach::Apart;
         }
-        // A plane as it is at the contact turns no more until then. By how the gap has become smaller, that is here:
+        // A plane as it is at the contact turns no more until then. By how the gap has become
+        // smaller, that is here:
         let gap = root(dot(&near, &near)) - distance;
         let guess = before.map(|[then, wide]| time + gap * (time - then) / (wide - gap));
         let ahead = guess
@@ -163,7 +169,8 @@ pub fn approach(
     Approach::Unsure
 }
 
-/// The part of the polygon with the nearest point in its inside, if signs of rounded values can decide it.
+/// The part of the polygon with the nearest point in its inside, if signs of rounded values can
+/// decide it.
 ///
 /// As the exact decision goes by signs (`Polygon::nearest`), with none of them zero.
 pub(super) fn nearest_part(pair: ElementPair, points: &[Point; 4]) -> Option<PolygonPart> {

@@ -1,12 +1,15 @@
 //! How near two moving elements may come, by how far apart they are at the start.
 //!
-//! What it does: two elements keep a separation s, and beyond it the lesser of a clearance c and a share p of what they are
-//! apart at the start: s + min(c, p (d - s)), with d their distance at the start.
+//! What it does: two elements keep a separation s, and beyond it the lesser of a clearance c and a
+//! share p of what they are apart at the start: s + min(c, p (d - s)), with d their distance at the
+//! start.
 //!
-//! How: the excess d - s is rounded up to 24 bits. An enclosure of d in `f64` nearly always decides which number that is, and
-//! exact comparisons do so elsewhere. So the number depends on the pair alone, and costs about as much as a filter.
+//! How: the excess d - s is rounded up to 24 bits. An enclosure of d in `f64` nearly always decides
+//! which number that is, and exact comparisons do so elsewhere. So the number depends on the pair
+//! alone, and costs about as much as a filter.
 //!
-//! Invariant: for elements that are farther apart than s at the start, the number is at least s and below d.
+//! Invariant: for elements that are farther apart than s at the start, the number is at least s and
+//! below d.
 
 use crate::element_pair::ElementPair;
 use crate::rounding::{power_of_two, two_sum};
@@ -25,7 +28,8 @@ pub struct Keep {
     pub clearance: f64,
     /// From 0 to less than 1.
     pub share: f64,
-    /// Whether the distance is kept by positions on the way that are computed in floats, not only by the way itself.
+    /// Whether the distance is kept by positions on the way that are computed in floats, not only
+    /// by the way itself.
     pub is_rounded: bool,
 }
 
@@ -39,8 +43,8 @@ impl Keep {
         self.clearance == 0.0 || self.share == 0.0
     }
 
-    /// A distance that is at least what any pair keeps, for coordinates up to a magnitude, stored in a precision with this unit
-    /// roundoff.
+    /// A distance that is at least what any pair keeps, for coordinates up to a magnitude, stored
+    /// in a precision with this unit roundoff.
     pub fn most(&self, magnitude: f64, unit: f64) -> f64 {
         if self.is_plain() {
             return self.separation;
@@ -53,7 +57,8 @@ impl Keep {
         sum_above((self.separation + self.clearance).next_up(), rounded)
     }
 
-    /// What a pair keeps, positions as they are computed included. `unit` is the unit roundoff of the positions' precision.
+    /// What a pair keeps, positions as they are computed included. `unit` is the unit roundoff of
+    /// the positions' precision.
     pub fn distance(&self, pair: ElementPair, [start, end]: [&[Point; 4]; 2], unit: f64) -> f64 {
         if self.is_plain() {
             return self.separation;
@@ -66,8 +71,8 @@ impl Keep {
         sum_above(self.beyond(pair, start), rounded)
     }
 
-    /// The first time at which two elements are as near as they may come. Only elements within the separation are in contact
-    /// at the start.
+    /// The first time at which two elements are as near as they may come. Only elements within the
+    /// separation are in contact at the start.
     pub fn first(&self, pair: ElementPair, ends: [&[Point; 4]; 2], unit: f64) -> Option<Contact> {
         let distance = self.distance(pair, ends, unit);
         let contact = first_within(pair, ends[0], ends[1], distance)?;
@@ -102,7 +107,8 @@ impl Keep {
         sum_below(self.separation, share.min(self.clearance))
     }
 
-    /// d - s rounded up to 24 bits, or the largest such number if it is larger; `None` if it is not above 0.
+    /// d - s rounded up to 24 bits, or the largest such number if it is larger; `None` if it is not
+    /// above 0.
     fn excess(
         &self,
         pair: ElementPair,
@@ -124,8 +130,8 @@ impl Keep {
         if reaches(Short::ZERO) {
             return None;
         }
-        // Between the last number that is known not to reach and the first that does: away from a guess in growing strides, then
-        // by halves.
+        // Between the last number that is known not to reach and the first that does: away from a
+        // guess in growing strides, then by halves.
         let (mut below, mut above) = (Short::ZERO, Short::not_below(high.max(0.0)));
         let mut stride = 1;
         while !reaches(above) {
@@ -198,8 +204,9 @@ fn sum_above(kept: f64, rounded: f64) -> f64 {
     }
 }
 
-/// A distance by which rounding moves two elements towards each other certainly less, where vertices stand at
-/// `x0 + a * (x1 - x0)` or `x0 + a * dx` as floats give them (`docs/exactness.md`, "Clearance").
+/// A distance by which rounding moves two elements towards each other certainly less, where
+/// vertices stand at `x0 + a * (x1 - x0)` or `x0 + a * dx` as floats give them
+/// (`docs/exactness.md`, "Clearance").
 fn moved_by_rounding(magnitude: f64, unit: f64) -> f64 {
     // What is below the normal numbers is wrong by less than this, too.
     let least = if unit < power_of_two(-30) {
@@ -284,7 +291,8 @@ mod tests {
         ] {
             assert_eq!(of(keep(separation, clearance, share), z), expected, "{z}");
         }
-        // Not above what is there, however little that is, and by the same bits as exact comparisons alone.
+        // Not above what is there, however little that is, and by the same bits as exact
+        // comparisons alone.
         for z in [1e-9_f64, 1e-12, 3e-17, 0.1, 1.0 / 3.0, 5e-5, 1e-30] {
             for separation in [0.0, 1e-3, 0.1 - 1e-17, z, z.next_down(), z / 2.0] {
                 for share in [0.2, 0.5, 1.0f64.next_down()] {
@@ -322,7 +330,8 @@ mod tests {
         }
     }
 
-    /// Enclosures of distances and exact comparisons give the same number for elements in any position.
+    /// Enclosures of distances and exact comparisons give the same number for elements in any
+    /// position.
     #[test]
     fn the_excess_does_not_depend_on_the_enclosure() {
         let mut state = 1u64;

@@ -1,16 +1,19 @@
-//! Exact distances: are two elements within a distance, which of their features are nearest, and when first?
+//! Exact distances: are two elements within a distance, which of their features are nearest, and
+//! when first?
 //!
-//! What it does: decides whether the Euclidean distance of two elements is at most d, without any tolerance: d is read
-//! exactly and its square never rounded. Names the features (vertex, edge, face) that are nearest. Finds the first time
-//! at which two moving elements are within d, rounded down as in [`first_contact`](super::first_contact).
+//! What it does: decides whether the Euclidean distance of two elements is at most d, without any
+//! tolerance: d is read exactly and its square never rounded. Names the features (vertex, edge,
+//! face) that are nearest. Finds the first time at which two moving elements are within d, rounded
+//! down as in [`first_contact`](super::first_contact).
 //!
-//! How: the distance of two elements is the distance of the origin from their difference polygon (see `crate::sweep`).
-//! Signs of polynomials of degree four say whether the nearest point of this convex polygon is inside, on an edge or at
-//! a corner. Then one comparison of degree six decides. Most pairs are settled before that by a nearest point in `f64`
-//! and the plane through it.
+//! How: the distance of two elements is the distance of the origin from their difference polygon
+//! (see `crate::sweep`). Signs of polynomials of degree four say whether the nearest point of this
+//! convex polygon is inside, on an edge or at a corner. Then one comparison of degree six decides.
+//! Most pairs are settled before that by a nearest point in `f64` and the plane through it.
 //!
-//! In: positions and d. Out: booleans, [`NearestFeatures`], [`Contact`](super::Contact). Distances and points as `f64` are
-//! rounded, but computed in one fixed order of operations, so they are the same everywhere.
+//! In: positions and d. Out: booleans, [`NearestFeatures`], [`Contact`](super::Contact). Distances
+//! and points as `f64` are rounded, but computed in one fixed order of operations, so they are the
+//! same everywhere.
 //!
 //! `docs/exactness.md`, "Distances", has the proofs.
 
@@ -46,9 +49,9 @@ pub use rounded::{Closest, closest_points};
 
 /// Whether the distance of two elements is at most `distance`.
 ///
-/// The points and their order are those of the [`ElementPair`]. Closed: a distance of exactly `distance` counts, and with 0 the
-/// elements must touch. Exact for finite coordinates. False for a distance below zero or NaN, true for
-/// infinity.
+/// The points and their order are those of the [`ElementPair`]. Closed: a distance of exactly
+/// `distance` counts, and with 0 the elements must touch. Exact for finite coordinates. False for a
+/// distance below zero or NaN, true for infinity.
 ///
 /// ```
 /// use impinge_exact::{ElementPair, are_within};

@@ -12,11 +12,12 @@ use crate::{Point, Sign, first_contact};
 use super::are_within;
 use super::filter::{self, Approach};
 
-/// The first time at which the distance of two elements is at most `distance`, while their points move from `start` to
-/// `end` on straight lines.
+/// The first time at which the distance of two elements is at most `distance`, while their points
+/// move from `start` to `end` on straight lines.
 ///
-/// The time is rounded as in [`first_contact`], which answers for a distance of 0. `at_start` is set if the elements are
-/// within the distance at t = 0. `None` if they never are, or if the distance is NaN or below zero.
+/// The time is rounded as in [`first_contact`], which answers for a distance of 0. `at_start` is
+/// set if the elements are within the distance at t = 0. `None` if they never are, or if the
+/// distance is NaN or below zero.
 ///
 /// ```
 /// use impinge_exact::{ElementPair, first_within};
@@ -48,8 +49,8 @@ pub fn first_within(
     }
 }
 
-/// [`first_within`] by exact arithmetic alone, for a finite distance above zero and elements that are farther apart at the
-/// start.
+/// [`first_within`] by exact arithmetic alone, for a finite distance above zero and elements that
+/// are farther apart at the start.
 pub(super) fn first_within_by_roots(
     pair: ElementPair,
     start: &[Point; 4],

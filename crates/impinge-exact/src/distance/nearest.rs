@@ -66,7 +66,8 @@ pub(super) struct Polygon<T: Coordinate> {
 }
 
 impl Polygon<i64> {
-    /// The polygon in integers of fixed width, if its coordinates and the distance are short enough.
+    /// The polygon in integers of fixed width, if its coordinates and the distance are short
+    /// enough.
     pub(super) fn short(pair: ElementPair, points: &[Point; 4], reach: &Reach) -> Option<Self> {
         let numbers = pair.corners();
         let n_corners = numbers.len();
@@ -182,9 +183,9 @@ impl<T: Coordinate> Polygon<T> {
         }
     }
 
-    /// The nearest part of a polygon with a normal. If the origin's projection is in the polygon, that is the face. If the
-    /// projection is beyond an edge and between its ends, it is that edge. Else it is the corner from which both edges lead
-    /// away from the origin.
+    /// The nearest part of a polygon with a normal. If the origin's projection is in the polygon,
+    /// that is the face. If the projection is beyond an edge and between its ends, it is that edge.
+    /// Else it is the corner from which both edges lead away from the origin.
     fn nearest_of_polygon(&self, normal: &Vector<Two<T>>) -> PolygonPart {
         let n = self.n_corners;
         let mut is_inner = [Sign::Positive; 4];
@@ -206,9 +207,11 @@ impl<T: Coordinate> Polygon<T> {
         PolygonPart::Corner((0..n).find(is_nearest).unwrap_or(0))
     }
 
-    /// The nearest part of a segment or a point: the nearest of its corners and of the edges that the origin is beside.
+    /// The nearest part of a segment or a point: the nearest of its corners and of the edges that
+    /// the origin is beside.
     fn nearest_of_segment(&self) -> PolygonPart {
-        // The order of ipc-toolkit's names: EA0_EB0, EA0_EB1, EA1_EB0, EA1_EB1, EA_EB0, EA_EB1, EA0_EB, EA1_EB.
+        // The order of ipc-toolkit's names: EA0_EB0, EA0_EB1, EA1_EB0, EA1_EB1, EA_EB0, EA_EB1,
+        // EA0_EB, EA1_EB.
         let (corner_order, edge_order): (&[usize], &[usize]) = match self.n_corners {
             1 => (&[0], &[]),
             2 => (&[0, 1], &[0]),

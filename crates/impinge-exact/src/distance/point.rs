@@ -1,6 +1,7 @@
 //! Which of two elements is nearer to a point, and how near an element is at least.
 //!
-//! Between two elements exact fractions decide. For searches there are floats that certainly enclose a distance.
+//! Between two elements exact fractions decide. For searches there are floats that certainly
+//! enclose a distance.
 
 use core::cmp::Ordering;
 
@@ -11,7 +12,8 @@ use super::reach::Reach;
 use crate::element_pair::ElementPair;
 use crate::{Point, Sign};
 
-/// A point and an element of one to three corners as a pair of elements. A longer list counts as its first three corners.
+/// A point and an element of one to three corners as a pair of elements. A longer list counts as
+/// its first three corners.
 fn paired(point: &Point, corners: &[Point]) -> (ElementPair, [Point; 4]) {
     let pair = match corners.len() {
         0 | 1 => ElementPair::VertexVertex,
@@ -25,16 +27,17 @@ fn paired(point: &Point, corners: &[Point]) -> (ElementPair, [Point; 4]) {
     (pair, points)
 }
 
-/// Two numbers between which the distance of a point from an element of one to three corners certainly is, and about the shortest way
-/// from the element to the point.
+/// Two numbers between which the distance of a point from an element of one to three corners
+/// certainly is, and about the shortest way from the element to the point.
 #[inline]
 pub fn point_distance_bounds(point: &Point, corners: &[Point]) -> ([f64; 2], Point) {
     let (pair, points) = paired(point, corners);
     filter::bounds_and_way(pair, &points).unwrap_or(([0.0, f64::INFINITY], [0.0; 3]))
 }
 
-/// The largest float that is at most the distance of a point from an element of one to three corners, given that distance
-/// rounded in any way: an estimate that is far off takes long. The largest finite float if the distance is larger.
+/// The largest float that is at most the distance of a point from an element of one to three
+/// corners, given that distance rounded in any way: an estimate that is far off takes long. The
+/// largest finite float if the distance is larger.
 ///
 /// 0 where they touch, and for distances below the smallest float.
 pub fn point_distance_below(point: &Point, corners: &[Point], rounded: f64) -> f64 {
@@ -75,7 +78,8 @@ pub fn compare_point_distances(point: &Point, a: &[Point], b: &[Point]) -> Order
     a.compare_distances(of_a, (&b, of_b))
 }
 
-/// The ends of the edge, or twice the vertex, that is nearest; none for the inside of a face, and where floats cannot tell.
+/// The ends of the edge, or twice the vertex, that is nearest; none for the inside of a face, and
+/// where floats cannot tell.
 fn shared_feature(point: &Point, corners: &[Point]) -> Option<[Point; 2]> {
     let (pair, points) = paired(point, corners);
     let n = pair.corners().len();

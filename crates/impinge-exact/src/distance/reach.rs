@@ -30,7 +30,8 @@ impl Reach {
                 high: sum,
             };
         }
-        // Two roundings of sums without cancellation: the sum is wrong by less than two units in the last place.
+        // Two roundings of sums without cancellation: the sum is wrong by less than two units in
+        // the last place.
         Self {
             parts,
             low: sum.next_down().next_down().max(0.0),

@@ -17,15 +17,16 @@ pub struct Closest {
     /// Their distance, wrong by a few units in the last place at most. For decisions use
     /// [`are_within`](super::are_within).
     pub distance: f64,
-    /// The points of the first and of the second element. Their places on the elements are wrong by a few parts in
-    /// 2^52, also where edges are nearly parallel; their coordinates are rounded.
+    /// The points of the first and of the second element. Their places on the elements are wrong by
+    /// a few parts in 2^52, also where edges are nearly parallel; their coordinates are rounded.
     pub points: [Point; 2],
 }
 
 /// Nearest points of two elements and their distance.
 ///
-/// The features are exact. Distance and points are computed in `f64` from exact quotients, in one order of operations: the
-/// same on every machine, but rounded. The points and their order are those of the [`ElementPair`].
+/// The features are exact. Distance and points are computed in `f64` from exact quotients, in one
+/// order of operations: the same on every machine, but rounded. The points and their order are
+/// those of the [`ElementPair`].
 ///
 /// ```
 /// use impinge_exact::{ElementPair, closest_points};
@@ -100,8 +101,8 @@ fn edge_share<T: Coordinate>(polygon: &Polygon<T>, ix: usize) -> f64 {
     -quotient(&dot(&polygon.corners()[ix], edge), &dot(edge, edge))
 }
 
-/// How far along the first edge and the second the foot of the perpendicular is: with V_0 + s E_0 + t E_1 = c N,
-/// s = -N . (V_0 x E_1) / |N|^2 and t = N . (V_0 x E_0) / |N|^2.
+/// How far along the first edge and the second the foot of the perpendicular is: with V_0 + s E_0 +
+/// t E_1 = c N, s = -N . (V_0 x E_1) / |N|^2 and t = N . (V_0 x E_0) / |N|^2.
 fn face_shares<T: Coordinate>(polygon: &Polygon<T>) -> [f64; 2] {
     let corner = &polygon.corners()[0];
     let [first, second] = [&polygon.edges()[0], &polygon.edges()[1]];

@@ -1,5 +1,5 @@
-//! The filters for distances compared with integers and exact roots, on troublesome input and every instruction set. Those are
-//! compared with an independent oracle in `tests/sweep`.
+//! The filters for distances compared with integers and exact roots, on troublesome input and every
+//! instruction set. Those are compared with an independent oracle in `tests/sweep`.
 
 use super::features::PolygonPart;
 use super::filter::{self, Approach};
@@ -100,7 +100,8 @@ fn answer_avx512(asked: &Asked) -> (Near16, u16) {
     asked.answer::<number::Avx512F32>()
 }
 
-/// A distance that some of the elements have at the start or at the end, or one next to it, or another one.
+/// A distance that some of the elements have at the start or at the end, or one next to it, or
+/// another one.
 fn distance(pair: ElementPair, steps: &[Step], kind: Kind, random: &mut Random) -> f64 {
     let step = &steps[random.below(BATCH as u64) as usize];
     let found = closest_points(pair, &step[random.below(2) as usize]).distance;
@@ -187,7 +188,8 @@ fn filters_never_contradict_integers_and_roots() {
                     // One pair in sixteen is at the distance asked for, or next to it, at an end.
                     assert!(n_open * 10 < n_sure, "{counts}");
                     assert!(n_rounded > 0 && n_near > 10 && n_kept > 5, "{counts}");
-                    // What goes to exact arithmetic: no interval, or one with ends that round apart.
+                    // What goes to exact arithmetic: no interval, or one with ends that round
+                    // apart.
                     let n_exact = n_unsure + n_between - n_rounded;
                     assert!(n_exact * 10 < n_sure + n_open, "{counts}");
                 }
@@ -206,8 +208,8 @@ fn exact_part(pair: ElementPair, points: &[Point; 4]) -> Option<PolygonPart> {
     (!polygon.is_flat()).then(|| polygon.nearest())
 }
 
-/// The points moved so that the first corner of the polygon is straight beside its first edge, but for rounding to `f32`: the origin is
-/// between the regions of both.
+/// The points moved so that the first corner of the polygon is straight beside its first edge, but
+/// for rounding to `f32`: the origin is between the regions of both.
 fn beside_the_end(pair: ElementPair, mut points: [Point; 4]) -> [Point; 4] {
     let [from, to, moved] = match pair {
         ElementPair::EdgeEdge => [0, 1, 2],

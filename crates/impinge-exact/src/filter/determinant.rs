@@ -56,9 +56,10 @@ impl<T: Number> Determinant<T> {
 
 /// A vector d x e, with [`BOUND`](Number::BOUND) |d| |e|.
 ///
-/// In `f64` coordinates may have any size, so products may underflow or overflow. An underflow in d x e grows with f: it is
-/// part of the bound that is multiplied by |f|. Where (d x e) . f might overflow, 8 |d| |e| |f| does, and with it the bound: so it
-/// is computed with a factor of [`HEADROOM`](Number::HEADROOM), which the last step takes away.
+/// In `f64` coordinates may have any size, so products may underflow or overflow. An underflow in d
+/// x e grows with f: it is part of the bound that is multiplied by |f|. Where (d x e) . f might
+/// overflow, 8 |d| |e| |f| does, and with it the bound: so it is computed with a factor of
+/// [`HEADROOM`](Number::HEADROOM), which the last step takes away.
 #[derive(Clone, Copy)]
 pub(super) struct Normal<T: Number = f64> {
     vector: [T; 3],

@@ -1,20 +1,25 @@
 //! One element against a whole group: apart along a direction of either, 64 pairs at a time.
 //!
-//! What it does: a long triangle or edge that lies aslant has a box that holds far more than the element. Where the boxes of many
-//! pairs of two groups overlap, the plane of a triangle, and the directions across two edges, tell most of these pairs apart.
+//! What it does: a long triangle or edge that lies aslant has a box that holds far more than the
+//! element. Where the boxes of many pairs of two groups overlap, the plane of a triangle, and the
+//! directions across two edges, tell most of these pairs apart.
 //!
-//! In: for each element of a group its points in `f32`, the unit normal of a triangle or the unit direction of an edge, and the
-//! span of a triangle along its normal, computed in `f64` ([`Directions64`]). Out: bit masks. Cost: 70 operations for a register
-//! of pairs, without a table look-up: two fifths of what a pair costs in [`classify_in_tables`](super::classify_in_tables).
+//! In: for each element of a group its points in `f32`, the unit normal of a triangle or the unit
+//! direction of an edge, and the span of a triangle along its normal, computed in `f64`
+//! ([`Directions64`]). Out: bit masks. Cost: 70 operations for a register of pairs, without a table
+//! look-up: two fifths of what a pair costs in [`classify_in_tables`](super::classify_in_tables).
 //!
-//! Method: any direction separates two elements whose spans along it are apart, so directions need not be accurate.
-//! Two triangles are tested along the normal of either, and along the cross product of their longest edges; two edges along the
-//! cross product of their directions, and along the way from the line of the one to an end of the other. Before that, whole groups
-//! are tested along the directions of one element of each ([`Directions64::near`]): clusters of long elements are long themselves.
+//! Method: any direction separates two elements whose spans along it are apart, so directions need
+//! not be accurate. Two triangles are tested along the normal of either, and along the cross
+//! product of their longest edges; two edges along the cross product of their directions, and along
+//! the way from the line of the one to an end of the other. Before that, whole groups are tested
+//! along the directions of one element of each ([`Directions64::near`]): clusters of long elements
+//! are long themselves.
 //!
-//! Invariant: with L the largest coordinate of both groups and n a direction, a computed n . p is wrong by less than
-//! 2^-20 L |n| + 2^-121, the rounding of p included. So spans that are farther apart than a distance d along n, by more than
-//! 2^-19 L |n| + 2^-119, belong to elements that are farther apart than d (`docs/exactness.md`, "Directions").
+//! Invariant: with L the largest coordinate of both groups and n a direction, a computed n . p is
+//! wrong by less than 2^-20 L |n| + 2^-121, the rounding of p included. So spans that are farther
+//! apart than a distance d along n, by more than 2^-19 L |n| + 2^-119, belong to elements that are
+//! farther apart than d (`docs/exactness.md`, "Directions").
 
 use super::TABLE;
 use super::motion::{cross, difference, dot, size};
@@ -112,7 +117,8 @@ impl Directions64 {
         }
     }
 
-    /// Whether the elements of two groups can be told apart: one group has triangles, or both have edges.
+    /// Whether the elements of two groups can be told apart: one group has triangles, or both have
+    /// edges.
     #[inline(always)]
     #[must_use]
     pub fn can_part(&self, other: &Self) -> bool {
@@ -121,8 +127,8 @@ impl Directions64 {
         have_directions && self.largest <= LARGEST && other.largest <= LARGEST
     }
 
-    /// Which lanes of `among` are certainly farther than a distance from the element in lane `row` of another group. The two
-    /// [can be told apart](Self::can_part).
+    /// Which lanes of `among` are certainly farther than a distance from the element in lane `row`
+    /// of another group. The two [can be told apart](Self::can_part).
     #[inline(always)]
     #[must_use]
     pub fn beyond<V: Lookup>(&self, among: u64, row: (&Self, usize), distance: f32) -> u64 {
@@ -214,7 +220,8 @@ impl Directions64 {
             | are_apart_along(&across, &ends, &others, reach)
     }
 
-    /// Which triangles are apart from a triangle of another group, across the longest edges of both.
+    /// Which triangles are apart from a triangle of another group, across the longest edges of
+    /// both.
     #[inline(always)]
     fn slivers_beyond<V: Lookup>(
         &self,
@@ -240,8 +247,9 @@ impl Directions64 {
         are_apart_along(&cross(&edge, &own), &points, &others, reach)
     }
 
-    /// Of the lanes of two groups that [can be told apart](Self::can_part), those that may be near the other group: all others are certainly
-    /// farther than a distance from each of `lanes` there. Cost: 60 operations on registers for each of three directions.
+    /// Of the lanes of two groups that [can be told apart](Self::can_part), those that may be near
+    /// the other group: all others are certainly farther than a distance from each of `lanes`
+    /// there. Cost: 60 operations on registers for each of three directions.
     #[inline(always)]
     #[must_use]
     pub fn near<V: Lookup>(&self, other: &Self, lanes: [u64; 2], distance: f32) -> [u64; 2] {
@@ -265,7 +273,8 @@ impl Directions64 {
                     .map(|row| row[firsts[side]]),
                 _ => continue,
             };
-            // Not `map`: a closure that it does not inline would be compiled without the instruction set.
+            // Not `map`: a closure that it does not inline would be compiled without the
+            // instruction set.
             let spans = [self.along::<V>(&axis), other.along::<V>(&axis)];
             let whole = [0, 1].map(|k| spans[k].of(lanes[k]));
             for k in 0..2 {
@@ -476,7 +485,8 @@ mod tests {
         group
     }
 
-    /// Compares each verdict with an exact one. Returns how many of all pairs were told apart, and how many are.
+    /// Compares each verdict with an exact one. Returns how many of all pairs were told apart, and
+    /// how many are.
     fn compare<const N: usize, const M: usize>(
         seed: u64,
         (size, far): (f64, f64),
@@ -506,7 +516,8 @@ mod tests {
 
     #[test]
     fn pairs_beyond_a_distance_are_farther_apart() {
-        // Of coordinates that are small, as large as the distances between elements, and much larger.
+        // Of coordinates that are small, as large as the distances between elements, and much
+        // larger.
         for (seed, place) in [(1.0, 0.0), (1e-30, 0.0), (1e3, 2e4), (1.0, 1e6)]
             .into_iter()
             .enumerate()
@@ -582,7 +593,8 @@ mod tests {
 
     #[test]
     fn directions_whose_squares_underflow_tell_nothing_apart() {
-        // The computed length of the normal would be 0.7 of the true one, and a unit normal 1.4 long.
+        // The computed length of the normal would be 0.7 of the true one, and a unit normal 1.4
+        // long.
         let (y, z) = (1.5716e-162, 2.72e-162);
         let triangle = filled(&[[[0.0; 3], [1.0, 0.0, 0.0], [0.5, y, z]]]);
         let length = f64::hypot(y / z, 1.0);

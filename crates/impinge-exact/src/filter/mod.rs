@@ -1,26 +1,28 @@
-//! The fast path: most pairs settled in plain `f64` or `f32`, many at a time, with a proven error bound.
+//! The fast path: most pairs settled in plain `f64` or `f32`, many at a time, with a proven error
+//! bound.
 //!
 //! What it does: answers *yes*, *no* or *unsure* for a pair of triangles. Yes and no are certain;
 //! unsure pairs go to [`triangles_intersect`](super::triangles_intersect). Pairs of random
-//! triangles are settled in more than 99 of 100 cases. Coplanar pairs that are apart are mostly settled by
-//! [`projections`]; pairs that touch, or overlap in one plane, are always unsure.
+//! triangles are settled in more than 99 of 100 cases. Coplanar pairs that are apart are mostly
+//! settled by [`projections`]; pairs that touch, or overlap in one plane, are always unsure.
 //!
-//! In: [`TrianglePairs8`], eight pairs with one array per coordinate ("structure of arrays"), in `f64`; or, in
-//! `f32`, the corners of two groups as tables ([`Triangles64`]) and the slots of sixteen pairs in them.
-//! Out: bit masks, bit k for pair k. Cost: [`reject_by_planes`] about 120 and [`classify`] about
-//! 330 operations, without a branch, for all eight lanes at once. Both are generic over the vector
-//! registers that they use ([`number`]) and `#[inline(always)]`, so that a caller compiles them for an
-//! instruction set by calling them from a function that enables it.
+//! In: [`TrianglePairs8`], eight pairs with one array per coordinate ("structure of arrays"), in
+//! `f64`; or, in `f32`, the corners of two groups as tables ([`Triangles64`]) and the slots of
+//! sixteen pairs in them. Out: bit masks, bit k for pair k. Cost: [`reject_by_planes`] about 120
+//! and [`classify`] about 330 operations, without a branch, for all eight lanes at once. Both are
+//! generic over the vector registers that they use ([`number`]) and `#[inline(always)]`, so that a
+//! caller compiles them for an instruction set by calling them from a function that enables it.
 //!
 //! Method: planes first, then the two edge-edge determinants of Guigue and Devillers, *Fast and
 //! Robust Triangle-Triangle Overlap Test Using Orientation Predicates*, 2003. They permute the
 //! vertices by branches, we use selects; they test for zero, we answer unsure near it.
 //!
 //! Invariant: every determinant here is a sum of the six products of three vectors d, e, f, each a
-//! difference of two input points. Its computed value is wrong by less than
-//! 2^-47 |d| |e| |f| + 2^-950 |f| + 2^-1000 in `f64`, 2^-18 |d| |e| |f| + 2^-69 in `f32`, with |.| the largest coordinate, whatever the
-//! order of operations and whether or not products and sums are fused (`docs/exactness.md`, "The batch
-//! filter"). NaN and overflow make comparisons fail, and so end as unsure. In `f64` that holds for all finite coordinates.
+//! difference of two input points. Its computed value is wrong by less than 2^-47 |d| |e| |f| +
+//! 2^-950 |f| + 2^-1000 in `f64`, 2^-18 |d| |e| |f| + 2^-69 in `f32`, with |.| the largest
+//! coordinate, whatever the order of operations and whether or not products and sums are fused
+//! (`docs/exactness.md`, "The batch filter"). NaN and overflow make comparisons fail, and so end as
+//! unsure. In `f64` that holds for all finite coordinates.
 
 mod determinant;
 mod directions;
@@ -65,8 +67,8 @@ pub const BATCH: usize = 16;
 /// How many triangles a table holds.
 pub const TABLE: usize = 64;
 
-/// The largest coordinate magnitude that the filter in `f32` accepts, 2^24: the error that underflow may add to a
-/// determinant grows with the square of the coordinates.
+/// The largest coordinate magnitude that the filter in `f32` accepts, 2^24: the error that
+/// underflow may add to a determinant grows with the square of the coordinates.
 pub const LARGEST_F32: f32 = f32::from_bits((127 + 24) << 23);
 
 /// The triangles of a group: `[vertex][axis][slot]`.
@@ -100,7 +102,8 @@ pub struct TetrahedronPairs8 {
     pub b: Tetrahedra8,
 }
 
-/// A filter's answers: bit k stands for lane k. A lane with neither bit is unsure; no lane has both.
+/// A filter's answers: bit k stands for lane k. A lane with neither bit is unsure; no lane has
+/// both.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Verdict {
     /// The pairs that certainly intersect.

@@ -1,30 +1,33 @@
 //! Moving elements: certainly apart, certainly in contact within known times, or unsure.
 //!
-//! What it does: tests the difference polygon of two moving elements (see `crate::sweep`) over an interval of time, in
-//! plain `f64` or `f32`. One pair per lane. The search of [0, 1] for the first contact is a sequence of two tests
-//! of an interval, [`Motion::look`] and [`Motion::enclose`], which have no branches. The caller stores
-//! the intervals ([`Search`]), and so can keep all lanes busy.
+//! What it does: tests the difference polygon of two moving elements (see `crate::sweep`) over an
+//! interval of time, in plain `f64` or `f32`. One pair per lane. The search of [0, 1] for the first
+//! contact is a sequence of two tests of an interval, [`Motion::look`] and [`Motion::enclose`],
+//! which have no branches. The caller stores the intervals ([`Search`]), and so can keep all lanes
+//! busy.
 //!
-//! In: the points at the start and at the end ([`Motion`]). Out: masks and times. Cost in operations for all lanes:
-//! [`Motion::are_far`] about 200, [`Motion::are_across`] 300, [`Motion::are_aside`] 400, [`Motion::look`] 500,
-//! [`Motion::enclose`] 900.
+//! In: the points at the start and at the end ([`Motion`]). Out: masks and times. Cost in
+//! operations for all lanes: [`Motion::are_far`] about 200, [`Motion::are_across`] 300,
+//! [`Motion::are_aside`] 400, [`Motion::look`] 500, [`Motion::enclose`] 900.
 //!
-//! Method: over [a, b] the corners V and edges E of the polygon are computed at a and at b, and from them the Bernstein
-//! coefficients over [a, b] of the cubic f = N . V_0 and of the quartics w = N . (V x E), one per edge. If all
-//! coefficients of f have one sign, or all of some w are negative, there is no contact. If f has one root, and all
-//! coefficients of all w are positive around it, there is contact. Else the interval is halved.
+//! Method: over [a, b] the corners V and edges E of the polygon are computed at a and at b, and
+//! from them the Bernstein coefficients over [a, b] of the cubic f = N . V_0 and of the quartics w
+//! = N . (V x E), one per edge. If all coefficients of f have one sign, or all of some w are
+//! negative, there is no contact. If f has one root, and all coefficients of all w are positive
+//! around it, there is contact. Else the interval is halved.
 //!
-//! Invariant: with |.| the largest coordinate at either end of the step and u the unit roundoff, computed
-//! coefficients are wrong by less than 128 u |E_0| |E_1| |V_0| (f; three times that for the inner ones, which are kept
-//! three times as large) and 384 u |E_0| |E_1| |V| |E| (w; times 4, 6, 4 for the inner ones), at any time in any
-//! interval (`docs/exactness.md`, "The filter for moving elements"). NaN and overflow end as unsure.
+//! Invariant: with |.| the largest coordinate at either end of the step and u the unit roundoff,
+//! computed coefficients are wrong by less than 128 u |E_0| |E_1| |V_0| (f; three times that for
+//! the inner ones, which are kept three times as large) and 384 u |E_0| |E_1| |V| |E| (w; times 4,
+//! 6, 4 for the inner ones), at any time in any interval (`docs/exactness.md`, "The filter for
+//! moving elements"). NaN and overflow end as unsure.
 
 use super::number::Number;
 
 /// The difference polygon of pairs of moving elements: a triangle or a parallelogram.
 ///
-/// The number of corners is a value, not a type parameter: the functions below are long, and this compiles them only once
-/// per instruction set.
+/// The number of corners is a value, not a type parameter: the functions below are long, and this
+/// compiles them only once per instruction set.
 #[derive(Clone, Copy)]
 pub struct Motion<T: Number> {
     /// 3 or 4.
@@ -67,7 +70,8 @@ pub struct Enclosed<T: Number> {
     pub is_short: T::Mask,
 }
 
-/// Which Bernstein coefficients of f over an interval are certainly positive, and which certainly negative.
+/// Which Bernstein coefficients of f over an interval are certainly positive, and which certainly
+/// negative.
 struct Cubic<T: Number> {
     positive: [T::Mask; 4],
     negative: [T::Mask; 4],
@@ -99,8 +103,8 @@ impl<T: Number> Cubic<T> {
         (a & b & c & d) | (e & f & g & h)
     }
 
-    /// Whether the signs certainly change once: the outer coefficients have opposite signs, and some inner one does not have
-    /// the sign of the outer one farther away.
+    /// Whether the signs certainly change once: the outer coefficients have opposite signs, and
+    /// some inner one does not have the sign of the outer one farther away.
     #[inline(always)]
     fn has_one_root(&self) -> T::Mask {
         let ([a, b, c, d], [e, f, g, h]) = (self.positive, self.negative);
@@ -121,7 +125,8 @@ type Vector<T> = [T; 3];
 // own, without the instruction set, and every operation would become a call.
 
 impl<T: Number> Motion<T> {
-    /// A vertex, point 0, and a face, points 1 to 3; or two edges, points 0 and 1, and points 2 and 3.
+    /// A vertex, point 0, and a face, points 1 to 3; or two edges, points 0 and 1, and points 2 and
+    /// 3.
     #[inline(always)]
     pub fn new(are_edges: bool, start: &[Vector<T>; 4], end: &[Vector<T>; 4]) -> Self {
         if are_edges {
@@ -200,8 +205,8 @@ impl<T: Number> Motion<T> {
         motion
     }
 
-    /// The same elements, where at any time each coordinate of a corner and of an edge may differ from the given one by up to
-    /// `margin`: what is certainly apart is so for all of these.
+    /// The same elements, where at any time each coordinate of a corner and of an edge may differ
+    /// from the given one by up to `margin`: what is certainly apart is so for all of these.
     #[inline(always)]
     #[must_use]
     pub fn with_margin(mut self, margin: f64) -> Self {
@@ -230,8 +235,9 @@ impl<T: Number> Motion<T> {
         if self.n_corners == 3 { 3 } else { 2 }
     }
 
-    /// The lanes whose elements are certainly apart from t = 0 to `until`: the cheap first step, [`are_far`](Self::are_far)
-    /// and [`are_across`](Self::are_across), and for edges [`are_beside`](Self::are_beside).
+    /// The lanes whose elements are certainly apart from t = 0 to `until`: the cheap first step,
+    /// [`are_far`](Self::are_far) and [`are_across`](Self::are_across), and for edges
+    /// [`are_beside`](Self::are_beside).
     #[inline(always)]
     #[must_use]
     pub fn are_apart(&self, until: f64) -> T::Mask {
@@ -242,8 +248,8 @@ impl<T: Number> Motion<T> {
         apart | self.are_beside(until)
     }
 
-    /// The lanes whose elements are certainly apart from t = 0 to `until`: they are apart on an axis or along the sum of all
-    /// corners, at both ends of that time.
+    /// The lanes whose elements are certainly apart from t = 0 to `until`: they are apart on an
+    /// axis or along the sum of all corners, at both ends of that time.
     #[inline(always)]
     #[must_use]
     pub fn are_far(&self, until: f64) -> T::Mask {
@@ -260,7 +266,8 @@ impl<T: Number> Motion<T> {
             }
         }
         let (start, end) = (&start[..self.n_corners], &end[..self.n_corners]);
-        // At t = 1 only differences are rounded, and their signs are right; but infinite ones make others NaN, which minima lose.
+        // At t = 1 only differences are rounded, and their signs are right; but infinite ones make
+        // others NaN, which minima lose.
         let bound = if until == 1.0 && !self.has_margin {
             T::splat(0.0) * size
         } else {
@@ -270,8 +277,8 @@ impl<T: Number> Motion<T> {
             | are_apart_on_an_axis(start, end, bound)
     }
 
-    /// The lanes whose elements are certainly apart from t = 0 to `until`: they are apart along a normal at both ends of that
-    /// time, or f has one sign.
+    /// The lanes whose elements are certainly apart from t = 0 to `until`: they are apart along a
+    /// normal at both ends of that time, or f has one sign.
     #[inline(always)]
     #[must_use]
     pub fn are_across(&self, until: f64) -> T::Mask {
@@ -293,8 +300,9 @@ impl<T: Number> Motion<T> {
         (along | cubic.has_no_root()) & self.is_small
     }
 
-    /// The lanes whose edges are certainly apart from t = 0 to `until`: they are apart along the way from the line of the first
-    /// edge to the origin, at both ends of that time. Parallel edges have no normal, and all their w are zero.
+    /// The lanes whose edges are certainly apart from t = 0 to `until`: they are apart along the
+    /// way from the line of the first edge to the origin, at both ends of that time. Parallel edges
+    /// have no normal, and all their w are zero.
     #[inline(always)]
     #[must_use]
     pub fn are_beside(&self, until: f64) -> T::Mask {
@@ -321,8 +329,8 @@ impl<T: Number> Motion<T> {
         are_before(&way, start, end, size) & self.is_small
     }
 
-    /// The lanes whose elements are certainly apart from t = 0 to `until`: some w is negative, or edges
-    /// [are beside](Self::are_beside) each other.
+    /// The lanes whose elements are certainly apart from t = 0 to `until`: some w is negative, or
+    /// edges [are beside](Self::are_beside) each other.
     #[inline(always)]
     #[must_use]
     pub fn are_aside(&self, until: f64) -> T::Mask {
@@ -375,7 +383,8 @@ impl<T: Number> Motion<T> {
         }
     }
 
-    /// If f has one root in [low, high]: a short interval that has it, and whether there is contact.
+    /// If f has one root in [low, high]: a short interval that has it, and whether there is
+    /// contact.
     #[inline(always)]
     #[must_use]
     pub fn enclose(&self, low: T, high: T) -> Enclosed<T> {
@@ -433,7 +442,8 @@ impl<T: Number> Motion<T> {
         cubic(&normal, &self.corner_over(0, a, b))
     }
 
-    /// Whether all coefficients of w over an interval are certainly positive, and whether all are certainly negative.
+    /// Whether all coefficients of w over an interval are certainly positive, and whether all are
+    /// certainly negative.
     #[inline(always)]
     fn sides(
         &self,
@@ -476,13 +486,15 @@ impl<T: Number> Motion<T> {
         }
     }
 
-    /// If [low, high] has one root of f: an interval inside it, as short as rounding allows, that certainly has the root.
+    /// If [low, high] has one root of f: an interval inside it, as short as rounding allows, that
+    /// certainly has the root.
     #[inline(always)]
     fn narrowed(&self, low: T, high: T) -> [T; 2] {
         let (zero, one, two, three) = (T::splat(0.0), T::splat(1.0), T::splat(2.0), T::splat(3.0));
         let f = self.f_over(low, high);
         let is_rising = f[3].gt(f[0]);
-        // f in powers of s, a share of the interval. Newton's method starts at the root of the chord and is kept inside.
+        // f in powers of s, a share of the interval. Newton's method starts at the root of the
+        // chord and is kept inside.
         let powers = [
             f[0],
             f[1] - three * f[0],
@@ -505,7 +517,8 @@ impl<T: Number> Motion<T> {
         let length = high - low;
         let root = low + s * length;
         let bound = self.f_at(root).1;
-        // At this distance from the root f is certain, if its slope stays the same; else sixteen times as far.
+        // At this distance from the root f is certain, if its slope stays the same; else sixteen
+        // times as far.
         let reach = bound * T::splat(1.5) * length / slope.abs() + root * T::splat(T::BOUND / 16.0);
         let (mut first, mut last) = (low, high);
         for widening in WIDENINGS {
@@ -551,10 +564,12 @@ impl<T: Number> Motion<T> {
     }
 }
 
-/// Steps of Newton's method: nearly always enough from the root of a chord to the last bits of an `f64`.
+/// Steps of Newton's method: nearly always enough from the root of a chord to the last bits of an
+/// `f64`.
 const N_NEWTON: usize = 8;
 
-/// The widths that are tried for the interval around a root, relative to the likely width; the narrowest certain one counts.
+/// The widths that are tried for the interval around a root, relative to the likely width; the
+/// narrowest certain one counts.
 const WIDENINGS: [f64; 2] = [16.0, 1.0];
 
 /// f = N . V over an interval: f_0, 3 f_1, 3 f_2, f_3.
@@ -568,7 +583,8 @@ fn cubic<T: Number>(normal: &[Vector<T>; 3], corner: &[Vector<T>; 2]) -> [T; 4] 
     ]
 }
 
-/// Whether on some axis all corners at both ends are farther from the origin than a bound, on the same side.
+/// Whether on some axis all corners at both ends are farther from the origin than a bound, on the
+/// same side.
 #[inline(always)]
 fn are_apart_on_an_axis<T: Number>(start: &[Vector<T>], end: &[Vector<T>], bound: T) -> T::Mask {
     let (mut least, mut most) = (start[0], start[0]);
@@ -584,8 +600,8 @@ fn are_apart_on_an_axis<T: Number>(start: &[Vector<T>], end: &[Vector<T>], bound
         | (least[0].gt(bound) | least[1].gt(bound) | least[2].gt(bound))
 }
 
-/// Whether all corners at both ends are certainly on one side of the plane through the origin with this normal,
-/// which is taken as exact. `corner_size` is the largest one.
+/// Whether all corners at both ends are certainly on one side of the plane through the origin with
+/// this normal, which is taken as exact. `corner_size` is the largest one.
 #[inline(always)]
 fn are_before<T: Number>(
     normal: &Vector<T>,
@@ -631,7 +647,8 @@ pub(crate) fn between<T: Number>(p: &Vector<T>, q: &Vector<T>, t: T) -> Vector<T
     ]
 }
 
-/// Bernstein coefficients of the cross product of two moving vectors: the first, twice the middle one, the last.
+/// Bernstein coefficients of the cross product of two moving vectors: the first, twice the middle
+/// one, the last.
 #[inline(always)]
 fn cross_over<T: Number>(d: &[Vector<T>; 2], e: &[Vector<T>; 2]) -> [Vector<T>; 3] {
     let (one, two) = (cross(&d[0], &e[1]), cross(&d[1], &e[0]));

@@ -6,8 +6,8 @@ use super::{BATCH, LANES, TABLE};
 use crate::rounding::round_down;
 use crate::{ElementPair, Point};
 
-/// The points of eight pairs of moving elements, one pair per lane: `[start or end][point][axis][lane]`, points in the
-/// order of the [`ElementPair`].
+/// The points of eight pairs of moving elements, one pair per lane:
+/// `[start or end][point][axis][lane]`, points in the order of the [`ElementPair`].
 #[derive(Clone, Debug, Default, PartialEq)]
 #[repr(align(64))]
 pub struct Steps8(pub [[[[f64; LANES]; 3]; 4]; 2]);
@@ -112,8 +112,8 @@ impl Search {
         [self.low, self.high]
     }
 
-    /// Goes on after a look at the interval, with one lane of the result. `until` may be less than before: later contacts
-    /// are no longer of interest.
+    /// Goes on after a look at the interval, with one lane of the result. `until` may be less than
+    /// before: later contacts are no longer of interest.
     #[inline]
     pub fn after_look(&mut self, seen: &Look8, lane: usize, until: f64) -> Next {
         let is = |mask: u8| mask >> lane & 1 == 1;
@@ -172,7 +172,8 @@ impl Search {
     }
 }
 
-/// A time that is certainly in an interval, rounded down to `f32`; `None` if the interval leaves it open.
+/// A time that is certainly in an interval, rounded down to `f32`; `None` if the interval leaves it
+/// open.
 #[inline]
 #[must_use]
 pub fn time_between([low, high]: [f64; 2]) -> Option<f32> {
@@ -180,9 +181,9 @@ pub fn time_between([low, high]: [f64; 2]) -> Option<f32> {
     (low == high).then_some(low)
 }
 
-/// Which of eight pairs are certainly apart from t = 0 to `until`: the cheap first step. For pairs of a vertex and a
-/// face, or of two edges. With a margin, they are apart even if at any time coordinates of the difference polygon's corners and edges
-/// differ by up to that much.
+/// Which of eight pairs are certainly apart from t = 0 to `until`: the cheap first step. For pairs
+/// of a vertex and a face, or of two edges. With a margin, they are apart even if at any time
+/// coordinates of the difference polygon's corners and edges differ by up to that much.
 #[inline(always)]
 #[must_use]
 pub fn are_apart<V: Vector>(pair: ElementPair, steps: &Steps8, until: f64, margin: f64) -> u8 {
@@ -256,8 +257,9 @@ pub(super) fn are_edges(pair: ElementPair) -> bool {
     matches!(pair, ElementPair::EdgeEdge)
 }
 
-/// Which of sixteen pairs are certainly apart from t = 0 to `until`, by the cheapest test. The elements are those of two
-/// groups, named by their slots, with a margin as in [`are_apart`]. In `f32`: for coordinates of any size, but differences above 2^16 are never certain.
+/// Which of sixteen pairs are certainly apart from t = 0 to `until`, by the cheapest test. The
+/// elements are those of two groups, named by their slots, with a margin as in [`are_apart`]. In
+/// `f32`: for coordinates of any size, but differences above 2^16 are never certain.
 #[cfg_attr(target_family = "wasm", inline(never))]
 #[cfg_attr(not(target_family = "wasm"), inline(always))]
 #[must_use]
@@ -363,7 +365,8 @@ pub(super) fn look_up<V: Lookup>([x, y, z]: &[[f32; TABLE]; 3], slots: V::Slots)
     ]
 }
 
-/// Searches the whole step of one pair. Also returns the interval of the first contact, if there certainly is one.
+/// Searches the whole step of one pair. Also returns the interval of the first contact, if there
+/// certainly is one.
 #[inline]
 pub(crate) fn search_contact(
     pair: ElementPair,

@@ -1,21 +1,23 @@
 //! Elements near each other: certainly within a distance, certainly not, or unsure.
 //!
-//! What it does: tests the difference polygon of two elements (see `crate::distance`) in plain `f64` or `f32`, one pair per
-//! lane, for elements that rest ([`Polygon::verdict`]) and for elements that move ([`stay_beyond`]).
+//! What it does: tests the difference polygon of two elements (see `crate::distance`) in plain
+//! `f64` or `f32`, one pair per lane, for elements that rest ([`Polygon::verdict`]) and for
+//! elements that move ([`stay_beyond`]).
 //!
-//! In: the elements' points, and floats that enclose the distance. Out: masks. Cost of a verdict: about 250 operations for
-//! all lanes.
+//! In: the elements' points, and floats that enclose the distance. Out: masks. Cost of a verdict:
+//! about 250 operations for all lanes.
 //!
-//! Method: compute a point of the polygon that is nearest to the origin, but for rounding. If it is nearer than the distance,
-//! so is the polygon. If the whole polygon lies beyond the plane through that point, or beyond a plane along the polygon, farther
-//! away than the distance, it is not. Neither answer depends on how good the nearest point is.
+//! Method: compute a point of the polygon that is nearest to the origin, but for rounding. If it is
+//! nearer than the distance, so is the polygon. If the whole polygon lies beyond the plane through
+//! that point, or beyond a plane along the polygon, farther away than the distance, it is not.
+//! Neither answer depends on how good the nearest point is.
 //!
-//! Which part of the polygon is nearest follows from signs of V . E and w, if those of one region are certain
-//! ([`Polygon::nearest_part`]).
+//! Which part of the polygon is nearest follows from signs of V . E and w, if those of one region
+//! are certain ([`Polygon::nearest_part`]).
 //!
-//! Invariant: with |.| the largest coordinate and u the unit roundoff, n . V is wrong by less than 22 u |n| |V| for any known
-//! n and a corner V at any time of a step, and a blend of corners by less than 24 u |V| (`docs/exactness.md`, "Distances").
-//! NaN and overflow end as unsure.
+//! Invariant: with |.| the largest coordinate and u the unit roundoff, n . V is wrong by less than
+//! 22 u |n| |V| for any known n and a corner V at any time of a step, and a blend of corners by
+//! less than 24 u |V| (`docs/exactness.md`, "Distances"). NaN and overflow end as unsure.
 
 use super::motion::{between, cross, difference, dot, size};
 use super::moving::{are_edges, two_edges, vertex_and_face};
@@ -25,8 +27,8 @@ use crate::{ElementPair, Point};
 
 type Vector<T> = [T; 3];
 
-/// The number of a part of a polygon, bit after bit from the lowest: corner i is i, edge i is 4 + i, the face is 8. All bits are
-/// set where signs are not certain to tell.
+/// The number of a part of a polygon, bit after bit from the lowest: corner i is i, edge i is 4 +
+/// i, the face is 8. All bits are set where signs are not certain to tell.
 pub(crate) type PartBits<M> = [M; 4];
 
 /// The difference polygon of pairs of elements: a point, a segment, a triangle or a parallelogram.
@@ -58,8 +60,8 @@ impl Polygon {
     }
 }
 
-// Here and below no closures are passed to library functions: those would be compiled on their own, without the
-// instruction set.
+// Here and below no closures are passed to library functions: those would be compiled on their own,
+// without the instruction set.
 
 impl<T: Number> Polygon<T> {
     /// Of a vertex, point 0, and a face; or of two edges, points 0 and 1, and points 2 and 3.
@@ -94,7 +96,8 @@ impl<T: Number> Polygon<T> {
         largest
     }
 
-    /// The sum of the magnitudes of all coordinates: not below the largest one, and NaN where any coordinate is.
+    /// The sum of the magnitudes of all coordinates: not below the largest one, and NaN where any
+    /// coordinate is.
     #[inline(always)]
     fn total(&self) -> T {
         let mut total = T::splat(0.0);
@@ -154,7 +157,8 @@ impl<T: Number> Polygon<T> {
         best
     }
 
-    /// The foot of the perpendicular from the origin, as a blend of the corners, and where it lies in the polygon.
+    /// The foot of the perpendicular from the origin, as a blend of the corners, and where it lies
+    /// in the polygon.
     #[inline(always)]
     fn foot(&self, normal: &Vector<T>) -> (T::Mask, Vector<T>) {
         let (zero, one) = (T::splat(0.0), T::splat(1.0));
@@ -166,7 +170,8 @@ impl<T: Number> Polygon<T> {
         let weights = if self.n_corners == 3 {
             [of_a, dot(normal, &cross(c, a)) / square, of_c, zero]
         } else {
-            // Shares along a -> b and b -> c. Inside the parallelogram, their products are nonnegative weights.
+            // Shares along a -> b and b -> c. Inside the parallelogram, their products are
+            // nonnegative weights.
             let (s, t) = (one - of_a, of_c);
             let (before, below) = (one - s, one - t);
             [before * below, s * below, s * t, before * t]
@@ -190,10 +195,11 @@ impl<T: Number> Polygon<T> {
         (is_one & !is_negative, foot)
     }
 
-    /// The part with the nearest point in its inside, as the bits of its number ([`PartBits`]). Each edge is a difference of two input
-    /// points, rounded once.
+    /// The part with the nearest point in its inside, as the bits of its number ([`PartBits`]).
+    /// Each edge is a difference of two input points, rounded once.
     ///
-    /// The regions of a polygon with a normal have no point in common, so the signs of one region are enough:
+    /// The regions of a polygon with a normal have no point in common, so the signs of one region
+    /// are enough:
     ///
     /// ```text
     /// face      every w_i > 0                                  the origin is above or below the inside
@@ -201,8 +207,8 @@ impl<T: Number> Polygon<T> {
     /// corner i  V_i . E_i > 0 > V_i . E_{i-1}, N != 0          both edges lead away from the origin
     /// ```
     ///
-    /// V . E is wrong by less than 16 u |V| |E|, a coordinate of N by less than 9 u |E_0| |E_1|, and w by less than
-    /// 133 u |E_0| |E_1| |V| |E| (`docs/exactness.md`, "Distances").
+    /// V . E is wrong by less than 16 u |V| |E|, a coordinate of N by less than 9 u |E_0| |E_1|,
+    /// and w by less than 133 u |E_0| |E_1| |V| |E| (`docs/exactness.md`, "Distances").
     #[inline(always)]
     pub(crate) fn nearest_part(&self, edges: &[Vector<T>; 4]) -> PartBits<T::Mask> {
         let (zero, n) = (T::splat(0.0), self.n_corners);
@@ -215,7 +221,8 @@ impl<T: Number> Polygon<T> {
             self::size(&edges[3]),
         ];
         let is_small = T::splat(T::LARGEST).gt(self.total());
-        // Of each edge: the signs of V . E at its start and at its end. First whether it is positive, then negative.
+        // Of each edge: the signs of V . E at its start and at its end. First whether it is
+        // positive, then negative.
         let (mut starts, mut ends) = ([[never; 2]; 4], [[never; 2]; 4]);
         for ix in 0..if n > 2 { n } else { n - 1 } {
             let next = if ix + 1 == n { 0 } else { ix + 1 };
@@ -260,8 +267,8 @@ impl<T: Number> Polygon<T> {
         ]
     }
 
-    /// Which polygons are certainly within a distance of the origin, and which certainly are not. The distance is between two
-    /// numbers.
+    /// Which polygons are certainly within a distance of the origin, and which certainly are not.
+    /// The distance is between two numbers.
     #[inline(always)]
     pub(crate) fn verdict(&self, low: T, high: T) -> (T::Mask, T::Mask) {
         let size = self.size();
@@ -275,8 +282,8 @@ impl<T: Number> Polygon<T> {
     }
 }
 
-/// The edges of the polygon of a vertex and a face or of two edges, each a difference of two input points. A triangle has no
-/// fourth edge.
+/// The edges of the polygon of a vertex and a face or of two edges, each a difference of two input
+/// points. A triangle has no fourth edge.
 #[inline(always)]
 fn edges_of<T: Number>(are_edges: bool, [p, q, r, s]: &[Vector<T>; 4]) -> [Vector<T>; 4] {
     if are_edges {
@@ -292,15 +299,16 @@ fn edges_of<T: Number>(are_edges: bool, [p, q, r, s]: &[Vector<T>; 4]) -> [Vecto
     }
 }
 
-/// A number that the length of a computed point of a polygon of some size certainly does not exceed.
+/// A number that the length of a computed point of a polygon of some size certainly does not
+/// exceed.
 #[inline(always)]
 pub(crate) fn most<T: Number>(point: &Vector<T>, size: T) -> T {
     dot(point, point).sqrt() * T::splat(1.0 + T::BOUND)
         + (T::splat(T::BOUND) * size + T::splat(T::SHORTEST))
 }
 
-/// The least n . V that is certainly farther away than a distance along n: the distance times the length of n, and the
-/// error. The second number is the part of it that is for errors.
+/// The least n . V that is certainly farther away than a distance along n: the distance times the
+/// length of n, and the error. The second number is the part of it that is for errors.
 #[inline(always)]
 pub(crate) fn beyond<T: Number>(normal: &Vector<T>, largest: T, distance: T) -> [T; 2] {
     let error = T::splat(T::BOUND) * (size(normal) * largest) + T::splat(T::TINY[0]);
@@ -308,8 +316,8 @@ pub(crate) fn beyond<T: Number>(normal: &Vector<T>, largest: T, distance: T) -> 
     [distance * length * T::splat(1.0 + T::BOUND) + error, error]
 }
 
-/// Whether n . V > d |n| for all corners V of some polygons, or n . V < -d |n| for all. The normal n is taken as exact;
-/// `largest` is the largest coordinate of a corner.
+/// Whether n . V > d |n| for all corners V of some polygons, or n . V < -d |n| for all. The normal
+/// n is taken as exact; `largest` is the largest coordinate of a corner.
 #[inline(always)]
 pub(crate) fn are_beyond<T: Number>(
     normal: &Vector<T>,
@@ -333,8 +341,8 @@ pub(crate) fn are_beyond<T: Number>(
     above | below
 }
 
-/// Which polygons certainly stay farther away from the origin than a distance, on the way from one to the other. `largest`
-/// is the largest coordinate of a corner at either end of the step.
+/// Which polygons certainly stay farther away from the origin than a distance, on the way from one
+/// to the other. `largest` is the largest coordinate of a corner at either end of the step.
 #[inline(always)]
 pub(crate) fn stay_beyond<T: Number>(
     first: &Polygon<T>,
@@ -360,7 +368,8 @@ pub(crate) fn stay_beyond<T: Number>(
     stay & T::splat(T::LARGEST).gt(largest)
 }
 
-/// Whether values that are wrong by less than a bound are certainly positive, and whether certainly negative.
+/// Whether values that are wrong by less than a bound are certainly positive, and whether certainly
+/// negative.
 #[inline(always)]
 fn signs<T: Number>(value: T, bound: T) -> [T::Mask; 2] {
     [value.gt(bound), (T::splat(0.0) - bound).gt(value)]
@@ -375,8 +384,8 @@ fn select<T: Number>(mask: T::Mask, yes: &Vector<T>, no: &Vector<T>) -> Vector<T
     ]
 }
 
-/// Which of sixteen pairs are within a distance at the start. The elements are those of two groups, named by their slots;
-/// the distance is between two numbers.
+/// Which of sixteen pairs are within a distance at the start. The elements are those of two groups,
+/// named by their slots; the distance is between two numbers.
 #[cfg_attr(target_family = "wasm", inline(never))]
 #[cfg_attr(not(target_family = "wasm"), inline(always))]
 #[must_use]
@@ -397,13 +406,15 @@ pub fn are_within_in_tables<V: Lookup>(
     verdict
 }
 
-/// Which of sixteen pairs are within a distance, and which parts of their difference polygons are then nearest.
+/// Which of sixteen pairs are within a distance, and which parts of their difference polygons are
+/// then nearest.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Near16 {
     /// Which are within the distance.
     pub verdict: Verdict16,
-    /// Bit after bit, from the lowest, of the number of a part: corner i is i, edge i is 4 + i, the face is 8. All bits are
-    /// set where signs are not certain to tell, or no pair of the register is certainly near.
+    /// Bit after bit, from the lowest, of the number of a part: corner i is i, edge i is 4 + i, the
+    /// face is 8. All bits are set where signs are not certain to tell, or no pair of the register
+    /// is certainly near.
     pub parts: [u16; 4],
 }
 
@@ -417,7 +428,8 @@ impl Near16 {
     }
 }
 
-/// The number of a part of the difference polygon of two edges, by its number where the edges change slots.
+/// The number of a part of the difference polygon of two edges, by its number where the edges
+/// change slots.
 ///
 /// ```text
 ///  corner 3 (a0, b1) --- edge 2 (a, b1) --- corner 2 (a1, b1)
@@ -460,8 +472,9 @@ pub fn nearest_in_tables<V: Lookup>(
     near
 }
 
-/// Which of sixteen pairs certainly stay farther apart than a distance from t = 0 to `until`. The elements are those of two
-/// groups, named by their slots; the distance is at most the number given.
+/// Which of sixteen pairs certainly stay farther apart than a distance from t = 0 to `until`. The
+/// elements are those of two groups, named by their slots; the distance is at most the number
+/// given.
 #[cfg_attr(target_family = "wasm", inline(never))]
 #[cfg_attr(not(target_family = "wasm"), inline(always))]
 #[must_use]

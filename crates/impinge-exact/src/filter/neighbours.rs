@@ -5,12 +5,12 @@ use super::determinant::{Determinant, Normal, difference};
 
 /// Whether the triangles v, a and v, b certainly meet, and certainly miss, beyond v.
 ///
-/// If one plane has the other triangle's two vertices strictly on one side, they miss. If each plane
-/// has the other's vertices on different sides, each triangle contains the start of one ray from v
-/// along the line where the planes meet. Let n_a, n_b be the normals of (v, vertex 0, vertex 1). The
-/// ray of a has the direction n_a x n_b if vertex 0 of a is above b, else the opposite one; the ray
-/// of b has it if vertex 0 of b is *below* a. So they meet if and only if exactly one of the two is
-/// above.
+/// If one plane has the other triangle's two vertices strictly on one side, they miss. If each
+/// plane has the other's vertices on different sides, each triangle contains the start of one ray
+/// from v along the line where the planes meet. Let n_a, n_b be the normals of (v, vertex 0, vertex
+/// 1). The ray of a has the direction n_a x n_b if vertex 0 of a is above b, else the opposite one;
+/// the ray of b has it if vertex 0 of b is *below* a. So they meet if and only if exactly one of
+/// the two is above.
 #[inline(always)]
 pub(crate) fn shared_vertex(v: &Point, a: [&Point; 2], b: [&Point; 2]) -> (bool, bool) {
     let (a, b) = (a.map(|p| difference(p, v)), b.map(|p| difference(p, v)));

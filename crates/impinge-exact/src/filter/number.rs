@@ -25,24 +25,26 @@ pub trait Number:
         + BitXor<Output = Self::Mask>
         + Not<Output = Self::Mask>;
 
-    /// 64 unit roundoffs: the error of a determinant, relative to the product of its vectors' sizes. The derivation
-    /// needs a little more than 60.
+    /// 64 unit roundoffs: the error of a determinant, relative to the product of its vectors'
+    /// sizes. The derivation needs a little more than 60.
     const BOUND: f64;
-    /// The error that underflow may add: 2^-1000 for `f64`, 2^-69 for `f32` with coordinates up to 2^24, there even where the
-    /// processor flushes subnormal numbers to zero.
+    /// The error that underflow may add: 2^-1000 for `f64`, 2^-69 for `f32` with coordinates up to
+    /// 2^24, there even where the processor flushes subnormal numbers to zero.
     const UNDERFLOW: f64;
-    /// For `f64`, whose coordinates have any size: what underflow may add to a vector's product, per size of the other vector.
-    /// 0 for `f32`.
+    /// For `f64`, whose coordinates have any size: what underflow may add to a vector's product,
+    /// per size of the other vector. 0 for `f32`.
     const UNDERFLOW_PER_SIZE: f64;
-    /// For `f64`: a bound is computed so many times larger, so that it overflows before a determinant does. 1 for `f32`.
+    /// For `f64`: a bound is computed so many times larger, so that it overflows before a
+    /// determinant does. 1 for `f32`.
     const HEADROOM: f64;
 
     /// The largest coordinate difference that the filter for moving elements accepts; see `motion`.
     const LARGEST: f64;
-    /// The error that underflow may add, with such differences, to the product of a vector with a known one, to a
-    /// determinant of three, and to a product of four.
+    /// The error that underflow may add, with such differences, to the product of a vector with a
+    /// known one, to a determinant of three, and to a product of four.
     const TINY: [f64; 3];
-    /// Squares of lengths above this are not wrong by underflow, but for a fraction of a unit roundoff; see `nearness`.
+    /// Squares of lengths above this are not wrong by underflow, but for a fraction of a unit
+    /// roundoff; see `nearness`.
     const SHORTEST: f64;
 
     /// A bound plus the error that underflow may add.
@@ -200,8 +202,9 @@ macro_rules! operator {
     };
 }
 
-/// Numbers as a plain array, for processors without a known vector instruction set; the compiler may vectorise it.
-/// Every operation names its lanes: loops over them, thousands in one function, took the compiler minutes.
+/// Numbers as a plain array, for processors without a known vector instruction set; the compiler
+/// may vectorise it. Every operation names its lanes: loops over them, thousands in one function,
+/// took the compiler minutes.
 macro_rules! portable {
     (
         $type:ident, $mask:ident, $number:ty, $bits:ty, $n:expr, [$($k:literal),*], $bound:expr, $underflow:expr, $any_size:expr,
@@ -385,8 +388,8 @@ pub use wasm::{Wasm, WasmF32};
 #[cfg(target_arch = "x86_64")]
 pub use x86::{Avx2, Avx2F32, Avx512, Avx512F32};
 
-/// The methods are sound only inside a function that enables the instruction set. Values of these types
-/// start with `load`, `splat` or `look_up`, and only such functions call those.
+/// The methods are sound only inside a function that enables the instruction set. Values of these
+/// types start with `load`, `splat` or `look_up`, and only such functions call those.
 #[cfg(target_arch = "x86_64")]
 mod x86 {
     use super::*;
@@ -541,7 +544,8 @@ mod x86 {
     }
 
     register! {
-        /// Eight numbers in a 512-bit register. To be used where `avx512f` and `avx512dq` were detected.
+        /// Eight numbers in a 512-bit register. To be used where `avx512f` and `avx512dq` were
+        /// detected.
         Avx512(__m512d), Avx512Mask(__mmask8), BOUND_F64, UNDERFLOW_F64, ANY_SIZE_F64, LARGEST_DIFFERENCE_F64, TINY_F64, SHORTEST_F64,
         add _mm512_add_pd, sub _mm512_sub_pd, mul _mm512_mul_pd, div _mm512_div_pd, max _mm512_max_pd,
         splat |x| _mm512_set1_pd(x),
@@ -553,7 +557,8 @@ mod x86 {
     }
 
     register! {
-        /// Sixteen `f32` in a 512-bit register. To be used where `avx512f` and `avx512dq` were detected.
+        /// Sixteen `f32` in a 512-bit register. To be used where `avx512f` and `avx512dq` were
+        /// detected.
         Avx512F32(__m512), Avx512F32Mask(__mmask16), BOUND_F32, UNDERFLOW_F32, ANY_SIZE_F32, LARGEST_DIFFERENCE_F32, TINY_F32, SHORTEST_F32,
         add _mm512_add_ps, sub _mm512_sub_ps, mul _mm512_mul_ps, div _mm512_div_ps, max _mm512_max_ps,
         splat |x| _mm512_set1_ps(x as f32),
@@ -657,8 +662,8 @@ mod x86 {
                 assert!(TABLE == 64, "two permutations of 32 and a choice");
             }
             let first = table.as_ptr();
-            // SAFETY: see above; four loads of sixteen from a table of 64. A permutation reads the five
-            // lowest bits of a slot, the blend reads the sixth.
+            // SAFETY: see above; four loads of sixteen from a table of 64. A permutation reads the
+            // five lowest bits of a slot, the blend reads the sixth.
             unsafe {
                 let low = _mm512_permutex2var_ps(
                     _mm512_loadu_ps(first),

@@ -1,14 +1,17 @@
 //! Edges and faces: those that certainly meet, and those that certainly do not.
 //!
-//! In: the tables of two groups, and the slots of sixteen pairs in them. Out: masks. Cost: about 130 operations for all lanes, 60 where
-//! every edge is on one side of its face.
+//! In: the tables of two groups, and the slots of sixteen pairs in them. Out: masks. Cost: about
+//! 130 operations for all lanes, 60 where every edge is on one side of its face.
 //!
-//! Method: an edge with both ends strictly on one side of a face's plane misses it. Else the line pq of the edge passes each
-//! edge of the face on one side or the other. If two of them are passed on different sides, the line has no point of the closed
-//! face: seen along the line, a point of a triangle is to the left of all its edges or to the right of all, but for those that it is on. If
-//! all three are passed on the same side and the ends are on different sides of the plane, they meet.
+//! Method: an edge with both ends strictly on one side of a face's plane misses it. Else the line
+//! pq of the edge passes each edge of the face on one side or the other. If two of them are passed
+//! on different sides, the line has no point of the closed face: seen along the line, a point of a
+//! triangle is to the left of all its edges or to the right of all, but for those that it is on. If
+//! all three are passed on the same side and the ends are on different sides of the plane, they
+//! meet.
 //!
-//! Invariant: that of [`Determinant`](super::determinant::Determinant). Ties, degenerate elements and NaN end as unsure.
+//! Invariant: that of [`Determinant`](super::determinant::Determinant). Ties, degenerate elements
+//! and NaN end as unsure.
 
 use super::determinant::{Normal, difference};
 use super::moving::look_up;
@@ -18,8 +21,8 @@ use super::{BATCH, TABLE, Verdict16};
 /// Edges or faces of a group: `[corner][axis][slot]`.
 type Table = [[[f32; TABLE]; 3]; 3];
 
-/// Which of sixteen edges and faces certainly share a point. The elements are those of two groups, named by their slots.
-/// Coordinate magnitudes must not exceed [`LARGEST_F32`](super::LARGEST_F32).
+/// Which of sixteen edges and faces certainly share a point. The elements are those of two groups,
+/// named by their slots. Coordinate magnitudes must not exceed [`LARGEST_F32`](super::LARGEST_F32).
 #[cfg_attr(target_family = "wasm", inline(never))]
 #[cfg_attr(not(target_family = "wasm"), inline(always))]
 #[must_use]

@@ -1,7 +1,9 @@
-//! Pairs separated in a coordinate plane: for triangles of flat and regular meshes, whose own planes separate nothing.
+//! Pairs separated in a coordinate plane: for triangles of flat and regular meshes, whose own
+//! planes separate nothing.
 //!
-//! Neighbours in a flat mesh lie in one plane, and every determinant of the other filters is zero. But projected
-//! along a coordinate axis, they are separated like triangles in a plane: by the line of an edge.
+//! Neighbours in a flat mesh lie in one plane, and every determinant of the other filters is zero.
+//! But projected along a coordinate axis, they are separated like triangles in a plane: by the line
+//! of an edge.
 //!
 //! ```text
 //!    a2            b2       Triangles that are apart in the projection are apart in space. Of the three
@@ -10,8 +12,9 @@
 //!    a0--a1|   b0--b1       all of b beyond the line of edge a1a2: apart
 //! ```
 //!
-//! Every value here is a determinant of two differences of input points, wrong by less than 8.1 u S^2 with S the
-//! largest difference (`docs/exactness.md`, "Projections"). NaN and overflow make comparisons fail: unsure.
+//! Every value here is a determinant of two differences of input points, wrong by less than 8.1 u
+//! S^2 with S the largest difference (`docs/exactness.md`, "Projections"). NaN and overflow make
+//! comparisons fail: unsure.
 
 use super::Point;
 use super::determinant::difference;
@@ -37,8 +40,8 @@ fn in_plane<T: Number>(triangle: &[[T; 3]; 3], [i, j]: [usize; 2]) -> [[T; 2]; 3
     [[p[i], p[j]], [q[i], q[j]], [r[i], r[j]]]
 }
 
-/// The error of two determinants together, for triangles whose coordinates differ by at most S along each axis:
-/// 32 u S^2.
+/// The error of two determinants together, for triangles whose coordinates differ by at most S
+/// along each axis: 32 u S^2.
 #[inline(always)]
 pub(super) fn bound<T: Number>(a: &[[T; 3]; 3], b: &[[T; 3]; 3]) -> T {
     let (mut largest, mut sum) = (T::splat(0.0), T::splat(0.0));
@@ -52,14 +55,15 @@ pub(super) fn bound<T: Number>(a: &[[T; 3]; 3], b: &[[T; 3]; 3]) -> T {
         }
         largest = largest.larger(high - low);
     }
-    // Minimum and maximum may drop a NaN. The sum of all coordinates keeps it: times zero, the sum is NaN if a
-    // coordinate is NaN or infinite, else it adds 0.
+    // Minimum and maximum may drop a NaN. The sum of all coordinates keeps it: times zero, the sum
+    // is NaN if a coordinate is NaN or infinite, else it adds 0.
     let bound = T::splat(0.5 * T::BOUND) * (largest * largest);
     bound.with_underflow() + sum * T::splat(0.0)
 }
 
-/// Whether the triangles are certainly apart in coordinate plane number `plane` of three: one lies strictly beyond the
-/// line of an edge of the other. `bound` is the result of [`bound`] for the same triangles.
+/// Whether the triangles are certainly apart in coordinate plane number `plane` of three: one lies
+/// strictly beyond the line of an edge of the other. `bound` is the result of [`bound`] for the
+/// same triangles.
 #[inline(always)]
 pub(super) fn are_parted<T: Number>(
     a: &[[T; 3]; 3],
@@ -79,7 +83,8 @@ fn parts<T: Number>(a: &[[T; 2]; 3], b: &[[T; 2]; 3], bound: T) -> T::Mask {
         minus(&a[2], &a[1]),
         minus(&a[0], &a[2]),
     ];
-    // How far the vertex opposite an edge is from the edge's line: for all three edges, twice the area.
+    // How far the vertex opposite an edge is from the edge's line: for all three edges, twice the
+    // area.
     let own = cross(&edges[2], &edges[0]);
     let zero = T::splat(0.0);
     let (above, below) = (own.larger(zero) + bound, own.smaller(zero) - bound);
@@ -88,8 +93,8 @@ fn parts<T: Number>(a: &[[T; 2]; 3], b: &[[T; 2]; 3], bound: T) -> T::Mask {
         | is_beyond(&a[2], &edges[2], b, above, below)
 }
 
-/// Whether all of `b` is more than `above` over the line of an edge, or less than `below`. No closure: it would be
-/// compiled without the instruction set.
+/// Whether all of `b` is more than `above` over the line of an edge, or less than `below`. No
+/// closure: it would be compiled without the instruction set.
 #[inline(always)]
 fn is_beyond<T: Number>(
     from: &[T; 2],
@@ -112,8 +117,8 @@ pub(crate) fn apart_in_a_plane(a: &[Point; 3], b: &[Point; 3]) -> bool {
     (0..3).any(|plane| are_parted(a, b, plane, bound))
 }
 
-/// Whether the triangles v, a and v, b certainly meet in v alone, because seen along a coordinate axis no ray
-/// from v lies in both: none of their edges at v lies in the angle of the other.
+/// Whether the triangles v, a and v, b certainly meet in v alone, because seen along a coordinate
+/// axis no ray from v lies in both: none of their edges at v lies in the angle of the other.
 #[inline]
 pub(crate) fn angles_apart(v: &Point, a: [&Point; 2], b: [&Point; 2]) -> bool {
     let (a, b) = (a.map(|p| difference(p, v)), b.map(|p| difference(p, v)));
@@ -135,7 +140,8 @@ pub(crate) fn angles_apart(v: &Point, a: [&Point; 2], b: [&Point; 2]) -> bool {
         };
         turn_a.abs() > bound
             && turn_b.abs() > bound
-            // a x b for the first and second edge of each: b0, b1 outside of a; a0, a1 outside of b.
+            // a x b for the first and second edge of each: b0, b1 outside of a; a0, a1 outside of
+            // b.
             && (s < -bound || u > bound)
             && (t < -bound || w > bound)
             && (s > bound || t < -bound)
@@ -143,8 +149,8 @@ pub(crate) fn angles_apart(v: &Point, a: [&Point; 2], b: [&Point; 2]) -> bool {
     })
 }
 
-/// Whether the triangles u, v, p and u, v, q certainly share the edge uv and nothing else, because seen along a
-/// coordinate axis p and q lie on different sides of it.
+/// Whether the triangles u, v, p and u, v, q certainly share the edge uv and nothing else, because
+/// seen along a coordinate axis p and q lie on different sides of it.
 #[inline]
 pub(crate) fn sides_apart(u: &Point, v: &Point, p: &Point, q: &Point) -> bool {
     let [e, p, q] = [v, p, q].map(|point| difference(point, u));

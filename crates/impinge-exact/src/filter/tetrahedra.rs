@@ -4,8 +4,8 @@ use super::determinant::{Determinant, Normal, difference};
 use super::number::{Number, Vector, load_vertex};
 use super::{LANES, Point, Tetrahedra8, TetrahedronPairs8, Verdict};
 
-/// Which lanes are certainly apart because a face of one separates them, and which certainly intersect
-/// because one has a vertex inside the other.
+/// Which lanes are certainly apart because a face of one separates them, and which certainly
+/// intersect because one has a vertex inside the other.
 ///
 /// The cheap first step. Unsure lanes, including those that only cross at edges, go to
 /// [`classify_tetrahedra`]. About 900 operations for all eight lanes, without a branch.
@@ -24,8 +24,9 @@ pub fn classify_by_faces<V: Vector>(pairs: &TetrahedronPairs8) -> Verdict {
 
 /// Which lanes certainly intersect and which certainly do not, by faces and by edges.
 ///
-/// The reasons are those of `tetrahedra_answer`. Each of the 36 determinants of two edges is used twice:
-/// for the edge of a against faces of b, and for the edge of b against faces of a. About 3,000 operations.
+/// The reasons are those of `tetrahedra_answer`. Each of the 36 determinants of two edges is used
+/// twice: for the edge of a against faces of b, and for the edge of b against faces of a. About
+/// 3,000 operations.
 #[inline(always)]
 #[must_use]
 pub fn classify_tetrahedra<V: Vector>(pairs: &TetrahedronPairs8) -> Verdict {
@@ -83,7 +84,8 @@ impl<T: Number> Passes<T> {
         passes
     }
 
-    /// The table as seen from the other tetrahedron: exchanging two edges keeps the sign of their determinant.
+    /// The table as seen from the other tetrahedron: exchanging two edges keeps the sign of their
+    /// determinant.
     #[inline(always)]
     fn turned(&self) -> Self {
         let mut turned = Passes {
@@ -99,8 +101,8 @@ impl<T: Number> Passes<T> {
         turned
     }
 
-    /// Whether an edge certainly crosses a face of the other tetrahedron, and whether one may. `sides`: where
-    /// the edges' ends lie relative to these faces.
+    /// Whether an edge certainly crosses a face of the other tetrahedron, and whether one may.
+    /// `sides`: where the edges' ends lie relative to these faces.
     #[inline(always)]
     fn crossings(&self, sides: &Sides<T>) -> (T::Mask, T::Mask) {
         let none = T::splat(0.0).gt(T::splat(0.0));
@@ -310,7 +312,8 @@ enum Crossing {
     Unsure,
 }
 
-/// The edges of `points` against the faces of `k`. `sides`: where `points` lie relative to these faces.
+/// The edges of `points` against the faces of `k`. `sides`: where `points` lie relative to these
+/// faces.
 fn edges_cross(points: &[Point; 4], sides: &Sides, k: &[Point; 4]) -> Crossing {
     let mut crossing = Crossing::None;
     for [from, to] in EDGES {

@@ -48,8 +48,9 @@ pub fn classify<V: Vector>(pairs: &TrianglePairs8) -> Verdict {
     verdict
 }
 
-/// [`classify`] in `f32`, for triangles of two groups that are named by their slots in the groups' tables. Only the
-/// lanes of `among` are needed. Coordinate magnitudes must not exceed [`LARGEST_F32`](super::LARGEST_F32).
+/// [`classify`] in `f32`, for triangles of two groups that are named by their slots in the groups'
+/// tables. Only the lanes of `among` are needed. Coordinate magnitudes must not exceed
+/// [`LARGEST_F32`](super::LARGEST_F32).
 #[inline(always)]
 #[must_use]
 pub fn classify_in_tables<V: Lookup>(

@@ -1,7 +1,8 @@
-//! How the triangles of a group are seen along the axes: which way each turns, and at which corners its far side crosses a line.
+//! How the triangles of a group are seen along the axes: which way each turns, and at which corners
+//! its far side crosses a line.
 //!
-//! What it does: half of what says whether the triangles around a vertex overlap (`cpu::folds`), once per triangle instead of once
-//! per corner, a register of triangles at a time.
+//! What it does: half of what says whether the triangles around a vertex overlap (`cpu::folds`),
+//! once per triangle instead of once per corner, a register of triangles at a time.
 //!
 //! In: the corners of a group, as tables. Out: one word per triangle.
 //!
@@ -11,9 +12,10 @@
 //!      at 2       at 1      at 0                       crosses: along x (lowest bit), y, z
 //! ```
 //!
-//! Seen from a corner along an axis, each of the other two corners is below the line through that corner or not. The far side crosses
-//! the line if the answers differ. They are comparisons of coordinates, so they are exact. Turns are twice the areas of the images,
-//! with a bound: `docs/exactness.md`, "Folds".
+//! Seen from a corner along an axis, each of the other two corners is below the line through that
+//! corner or not. The far side crosses the line if the answers differ. They are comparisons of
+//! coordinates, so they are exact. Turns are twice the areas of the images, with a bound:
+//! `docs/exactness.md`, "Folds".
 
 use super::motion::{cross, difference};
 use super::number::{Lookup, Number};
@@ -72,7 +74,8 @@ fn word<V: Number>([a, b, c]: [[V; 3]; 3]) -> V {
         let bound = V::splat(RELATIVE) * size + V::splat(ABSOLUTE);
         word = word + bit(is_small & turn.gt(bound), 2 * axis);
         word = word + bit(is_small & (zero - bound).gt(turn), 2 * axis + 1);
-        // Unless two corners have one image, and then nothing is certain, p is below q or q is below p.
+        // Unless two corners have one image, and then nothing is certain, p is below q or q is
+        // below p.
         let below = [
             is_below(&b, &a, i, j),
             is_below(&c, &b, i, j),

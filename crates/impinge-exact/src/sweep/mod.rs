@@ -1,19 +1,22 @@
 //! Exact continuous collision: do two elements touch while their points move, and when first?
 //!
-//! What it does: takes two elements (vertex, edge or face) whose points move on straight lines at constant speed over
-//! t in [0, 1], and decides whether there is a time at which they share a point, without any tolerance. The first
-//! such time is an algebraic number; it is returned rounded down to a float.
+//! What it does: takes two elements (vertex, edge or face) whose points move on straight lines at
+//! constant speed over t in [0, 1], and decides whether there is a time at which they share a
+//! point, without any tolerance. The first such time is an algebraic number; it is returned rounded
+//! down to a float.
 //!
-//! How: at each time two elements share a point if and only if the origin lies in their *difference polygon*: a
-//! point, a segment, a triangle or a parallelogram, whose corners move linearly. When its plane passes through the
-//! origin, a cubic f in t is zero. The signs of three or four quartics then say whether the origin is inside. If f is
-//! zero at all times, the first contact is on an edge of the polygon, at a root of a quadratic.
+//! How: at each time two elements share a point if and only if the origin lies in their *difference
+//! polygon*: a point, a segment, a triangle or a parallelogram, whose corners move linearly. When
+//! its plane passes through the origin, a cubic f in t is zero. The signs of three or four quartics
+//! then say whether the origin is inside. If f is zero at all times, the first contact is on an
+//! edge of the polygon, at a root of a quadratic.
 //!
-//! In: the positions of the points at the start and at the end. Out: `None`, or a [`Contact`]. Cost: nearly always a
-//! few microseconds, and much less for most pairs that do not touch.
+//! In: the positions of the points at the start and at the end. Out: `None`, or a [`Contact`].
+//! Cost: nearly always a few microseconds, and much less for most pairs that do not touch.
 //!
-//! Invariant: `contact.time <= t < contact.time.next_up()` for the exact first time t. Degenerate elements are the
-//! segments and points that they are; touching counts, at t = 1 as well, and so does contact over a whole interval.
+//! Invariant: `contact.time <= t < contact.time.next_up()` for the exact first time t. Degenerate
+//! elements are the segments and points that they are; touching counts, at t = 1 as well, and so
+//! does contact over a whole interval.
 //!
 //! `docs/exactness.md`, "Continuous collision", has the proofs.
 
@@ -36,7 +39,8 @@ pub(super) use polygon::Polygon;
 pub struct Contact {
     /// The first time, in [0, 1], rounded down: the largest `f64` that is not above it.
     ///
-    /// 0 if the elements touch at the start, or if the first time is below the smallest positive `f64`.
+    /// 0 if the elements touch at the start, or if the first time is below the smallest positive
+    /// `f64`.
     pub time: f64,
     /// Whether `time` is the first time exactly, not rounded.
     pub is_exact: bool,
@@ -75,10 +79,11 @@ impl Contact {
     }
 }
 
-/// The first time at which two elements share a point while their points move from `start` to `end` on straight lines.
+/// The first time at which two elements share a point while their points move from `start` to `end`
+/// on straight lines.
 ///
-/// `None` if they share no point at any time in [0, 1]. The points and their order are those of the [`ElementPair`]. Exact
-/// for finite coordinates; unspecified for others, but never a panic.
+/// `None` if they share no point at any time in [0, 1]. The points and their order are those of the
+/// [`ElementPair`]. Exact for finite coordinates; unspecified for others, but never a panic.
 ///
 /// ```
 /// use impinge_exact::{ElementPair, first_contact};
@@ -119,7 +124,8 @@ fn first_contact_by_roots(
         .map(Contact::later)
 }
 
-/// Whether two elements share a point at some time in [0, 1]: [`first_contact`] without the time, and faster.
+/// Whether two elements share a point at some time in [0, 1]: [`first_contact`] without the time,
+/// and faster.
 #[must_use]
 pub fn touch_during(pair: ElementPair, start: &[Point; 4], end: &[Point; 4]) -> bool {
     if is_apart_on_an_axis(pair, start, end) || !are_finite(pair, start, end) {
@@ -143,8 +149,8 @@ pub fn touch(pair: ElementPair, points: &[Point; 4]) -> bool {
     }
 }
 
-/// Whether on some axis one element is strictly before the other at the start and at the end. Then it is so at all
-/// times between. Uses only comparisons, so it is exact for all numbers.
+/// Whether on some axis one element is strictly before the other at the start and at the end. Then
+/// it is so at all times between. Uses only comparisons, so it is exact for all numbers.
 fn is_apart_on_an_axis(pair: ElementPair, start: &[Point; 4], end: &[Point; 4]) -> bool {
     let corners = pair.corners();
     (0..3).any(|axis| {

@@ -50,7 +50,8 @@ impl Polygon {
         (Self { corners }, distance)
     }
 
-    /// The only root of f between two times that are not roots, rounded down. For triangles and parallelograms.
+    /// The only root of f between two times that are not roots, rounded down. For triangles and
+    /// parallelograms.
     pub(super) fn time_between(&self, low: f64, high: f64) -> Time {
         floor_between(&plane_and_height(&self.corners).1, low, high)
     }
@@ -59,7 +60,8 @@ impl Polygon {
         &self.corners
     }
 
-    /// The first time in (0, 1] at which the origin is in the polygon, provided that it is not in it at the start.
+    /// The first time in (0, 1] at which the origin is in the polygon, provided that it is not in
+    /// it at the start.
     pub(super) fn first_time(&self) -> Option<Time> {
         match &self.corners[..] {
             [corner] => first_at_corner(corner),
@@ -71,8 +73,9 @@ impl Polygon {
 
 /// [`Polygon::first_time`] of a triangle or a parallelogram.
 ///
-/// Let f = N . V_0 and w_i = N . (V_i x V_(i+1)). The origin is inside at t if and only if f(t) = 0 and all
-/// w_i(t) > 0, or it is on an edge. If all w_i(t) are at least 0 and one is greater, f(t) = 0 is sufficient.
+/// Let f = N . V_0 and w_i = N . (V_i x V_(i+1)). The origin is inside at t if and only if f(t) = 0
+/// and all w_i(t) > 0, or it is on an edge. If all w_i(t) are at least 0 and one is greater, f(t) =
+/// 0 is sufficient.
 fn first_in_face(corners: &[Vector]) -> Option<Time> {
     let (normal, f) = plane_and_height(corners);
     if f.is_zero() {
@@ -116,7 +119,8 @@ fn edges(corners: &[Vector]) -> impl Iterator<Item = Edge> {
     (0..corners.len()).map(|ix| Edge::new(&corners[ix], &corners[(ix + 1) % corners.len()]))
 }
 
-/// An edge AB of the polygon. The origin is on it at t if and only if A x B = 0 and A . B <= 0 there.
+/// An edge AB of the polygon. The origin is on it at t if and only if A x B = 0 and A . B <= 0
+/// there.
 struct Edge {
     cross: Vector,
     dot: Polynomial,
@@ -136,15 +140,16 @@ impl Edge {
             && root.sign_of(&self.dot) != Sign::Positive
     }
 
-    /// The first time in (0, 1] at which the origin is on the edge, provided that it is not on it at the start.
+    /// The first time in (0, 1] at which the origin is on the edge, provided that it is not on it
+    /// at the start.
     fn first_time(&self) -> Option<Time> {
         let moving: Vec<&Polynomial> = self.cross.iter().filter(|x| !x.is_zero()).collect();
         if moving.iter().any(|x| x.has_no_root()) {
             return None;
         }
         let Some(&first) = moving.first() else {
-            // The edge's line passes through the origin at all times. A . B is positive at the start, and the origin
-            // comes onto the edge when A . B becomes zero.
+            // The edge's line passes through the origin at all times. A . B is positive at the
+            // start, and the origin comes onto the edge when A . B becomes zero.
             return (!self.dot.is_zero())
                 .then(|| Roots::of(self.dot.clone()).next())
                 .flatten()
@@ -155,7 +160,8 @@ impl Edge {
     }
 }
 
-/// The first time in (0, 1] at which a corner is at the origin, provided that it is not there at the start.
+/// The first time in (0, 1] at which a corner is at the origin, provided that it is not there at
+/// the start.
 fn first_at_corner(corner: &Vector) -> Option<Time> {
     let first = corner.iter().find(|x| !x.is_zero())?;
     Roots::of(first.clone()).find_map(|mut root| {

@@ -1,10 +1,12 @@
-//! Elements of which one moves against the other as a whole, without turning: the first contact in integers of fixed width.
+//! Elements of which one moves against the other as a whole, without turning: the first contact in
+//! integers of fixed width.
 //!
-//! What it does: where all corners of the difference polygon move by one vector, its edges E and its normal N do not move, so f,
-//! w and V x E are linear in t. Each has one root, a fraction, and the sign of another at it is that of a sum of two products.
+//! What it does: where all corners of the difference polygon move by one vector, its edges E and
+//! its normal N do not move, so f, w and V x E are linear in t. Each has one root, a fraction, and
+//! the sign of another at it is that of a sum of two products.
 //!
-//! Cost: about 100 multiplications, nothing allocated. Layers of cloth that move against each other consist of such pairs, and
-//! floats decide few of them.
+//! Cost: about 100 multiplications, nothing allocated. Layers of cloth that move against each other
+//! consist of such pairs, and floats decide few of them.
 //!
 //! `docs/exactness.md`, "Continuous collision", has the proof and the bounds.
 
@@ -12,8 +14,8 @@ use crate::algebra::fixed::{Factor, Vector, Whole, Wide, cross, difference, dot}
 use crate::algebra::{Time, Unit, floor_of_share};
 use crate::{Point, Sign};
 
-/// The first time in (0, 1] at which two elements share a point, provided that they do not at the start. Corners are differences of
-/// points, each given by two numbers of points.
+/// The first time in (0, 1] at which two elements share a point, provided that they do not at the
+/// start. Corners are differences of points, each given by two numbers of points.
 ///
 /// The outer `None`: not decided here.
 #[allow(

@@ -1,5 +1,5 @@
-//! The answers of the filter for moving elements compared with those of exact roots. The roots themselves are compared
-//! with an independent oracle in `tests/sweep`.
+//! The answers of the filter for moving elements compared with those of exact roots. The roots
+//! themselves are compared with an independent oracle in `tests/sweep`.
 
 use super::{Contact, ElementPair, first_contact, first_contact_by_roots};
 use crate::Point;
@@ -105,7 +105,8 @@ impl Steps8 {
     }
 }
 
-/// How the search of one lane ended, and with which interval: that of the contact, or what was not searched any more.
+/// How the search of one lane ended, and with which interval: that of the contact, or what was not
+/// searched any more.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Outcome {
     next: Next,
@@ -325,14 +326,15 @@ fn filter_never_contradicts_exact_roots() {
     }
 }
 
-/// What is apart with a margin is apart for all elements whose vertices are off their ways by half of it; without the margin, some
-/// of those touch.
+/// What is apart with a margin is apart for all elements whose vertices are off their ways by half
+/// of it; without the margin, some of those touch.
 #[test]
 fn a_margin_covers_elements_that_are_off_their_ways() {
     let mut random = Random(8);
     for kind in [Kind::Plain, Kind::Close, Kind::Lattice, Kind::NearlyTied] {
         for pair in PAIRS {
-            // Pairs that touch when they are off their ways: apart without the margin, in tables and not, and by looking.
+            // Pairs that touch when they are off their ways: apart without the margin, in tables
+            // and not, and by looking.
             let mut n_missed = [0; 3];
             let mut n_apart = [0; 3];
             for round in 0..480 {
@@ -393,8 +395,8 @@ fn a_margin_covers_elements_that_are_off_their_ways() {
     }
 }
 
-/// Elements that meet at the border of a face or at an end of an edge: the area to one side is exactly zero at all times,
-/// and only its rounding error has a sign.
+/// Elements that meet at the border of a face or at an end of an edge: the area to one side is
+/// exactly zero at all times, and only its rounding error has a sign.
 #[test]
 fn filter_does_not_trust_the_rounding_error_of_an_area() {
     let mut random = Random(5);
@@ -419,8 +421,9 @@ fn filter_does_not_trust_the_rounding_error_of_an_area() {
     }
 }
 
-/// The first point, and of two edges the second with it, moves through the middle of the edge between two others, at time
-/// 1/2, in the plane of that edge and the normal. Coordinates are whole numbers below 2^53, and areas are not.
+/// The first point, and of two edges the second with it, moves through the middle of the edge
+/// between two others, at time 1/2, in the plane of that edge and the normal. Coordinates are whole
+/// numbers below 2^53, and areas are not.
 fn meeting_at_a_border(pair: ElementPair, random: &mut Random) -> [[Point; 4]; 2] {
     let mut corner = || [(); 3].map(|()| 2.0 * random.below(1 << 13) as f64);
     let (start, end, third) = (corner(), corner(), corner());

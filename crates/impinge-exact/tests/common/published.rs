@@ -1,5 +1,6 @@
-//! Published triangle pairs, from the shared data. `None` if the data is absent and `IMPINGE_NO_DATA=1` allows that. A test that
-//! includes this file says where a file of the data is: `crate::file`.
+//! Published triangle pairs, from the shared data. `None` if the data is absent and
+//! `IMPINGE_NO_DATA=1` allows that. A test that includes this file says where a file of the data
+//! is: `crate::file`.
 
 /// A triangle as three corners.
 pub type Triangle = [[f64; 3]; 3];

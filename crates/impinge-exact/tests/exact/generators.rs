@@ -57,7 +57,8 @@ pub enum Kind {
     Lattice(u64),
     /// Lattice points under one linear map with 24-bit entries: degenerate in no axis.
     Skewed(u64),
-    /// Lattice points {0..n}^2 of one plane in general position: all coplanar, often collinear or coincident.
+    /// Lattice points {0..n}^2 of one plane in general position: all coplanar, often collinear or
+    /// coincident.
     Planar(u64),
     /// `f32` numbers of similar size.
     Plain,
@@ -73,7 +74,8 @@ pub enum Kind {
     WideF64,
     /// A few `f64` from both ends of the range and from between.
     Ends,
-    /// Lattice points, each axis times a power of two of its own, from one end of the range to the other.
+    /// Lattice points, each axis times a power of two of its own, from one end of the range to the
+    /// other.
     Stretched(u64),
     /// As `NearlyTouching64`, times a power of two near one end of the range.
     NearlyTouchingAtEnds,
@@ -96,7 +98,8 @@ impl Kind {
         Self::NearlyTouchingAtEnds,
     ];
 
-    /// Whether coordinates leave the range in which doubles decide: big integers make the tests slow.
+    /// Whether coordinates leave the range in which doubles decide: big integers make the tests
+    /// slow.
     pub fn is_wide(self) -> bool {
         matches!(
             self,

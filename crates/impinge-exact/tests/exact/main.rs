@@ -265,8 +265,8 @@ fn neighbouring_tetrahedra_agree_with_the_oracle() {
     }
 }
 
-/// Two flat tetrahedra in different planes, or on one line, that share the edge where they meet. The
-/// answer depends on how far each extends along the line of the edge.
+/// Two flat tetrahedra in different planes, or on one line, that share the edge where they meet.
+/// The answer depends on how far each extends along the line of the edge.
 #[test]
 fn flat_tetrahedra_that_share_an_edge_agree_with_the_oracle() {
     let mut random = Random::new(11);

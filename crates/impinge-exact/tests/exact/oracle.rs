@@ -103,7 +103,8 @@ pub fn intersect_beyond_shared(
         )
 }
 
-/// Makes all coordinates integers over one power of two, and calls `small` if they are small, else `big`.
+/// Makes all coordinates integers over one power of two, and calls `small` if they are small, else
+/// `big`.
 fn with_integers(
     a: &[[f64; 3]],
     b: &[[f64; 3]],

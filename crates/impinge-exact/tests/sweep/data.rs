@@ -1,5 +1,6 @@
-//! Pairs with published answers, and steps whose contacts and times are known to the last bit. The data is
-//! not part of the repository: without it the tests fail, unless `IMPINGE_NO_DATA=1` is set.
+//! Pairs with published answers, and steps whose contacts and times are known to the last bit. The
+//! data is not part of the repository: without it the tests fail, unless `IMPINGE_NO_DATA=1` is
+//! set.
 
 use std::path::PathBuf;
 
@@ -178,7 +179,8 @@ impl Recorded {
         }
     }
 
-    /// The pairs with published answers: those that touch are among the contacts, the others are not.
+    /// The pairs with published answers: those that touch are among the contacts, the others are
+    /// not.
     fn check_published(&self, kind: &str, pair: ElementPair, number: &str) {
         let json = |what: &str| -> Option<serde_json::Value> {
             let path = file(&format!("ccd/{}/{what}.json", self.name))?;

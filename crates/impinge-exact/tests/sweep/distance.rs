@@ -1,6 +1,7 @@
-//! Distances against an oracle in fractions. For every subset of the polygon's corners, the oracle finds the point of their
-//! plane, line or point that is nearest to the origin, and keeps it if its weights are positive. The nearest of these is the
-//! nearest point of the polygon. No normals, no regions of edges or corners.
+//! Distances against an oracle in fractions. For every subset of the polygon's corners, the oracle
+//! finds the point of their plane, line or point that is nearest to the origin, and keeps it if its
+//! weights are positive. The nearest of these is the nearest point of the polygon. No normals, no
+//! regions of edges or corners.
 
 use dashu_int::IBig;
 use impinge_exact::{
@@ -52,8 +53,8 @@ fn shortest(polygon: &[Vector]) -> Shortest {
     best.expect("a corner at least")
 }
 
-/// The shortest blend of corners with weights of sum 1, if the corners are independent and the weights positive. The dot
-/// product of the shortest blend with every corner is the same.
+/// The shortest blend of corners with weights of sum 1, if the corners are independent and the
+/// weights positive. The dot product of the shortest blend with every corner is the same.
 fn foot(polygon: &[Vector], support: Vec<usize>) -> Option<Shortest> {
     let n = support.len();
     // Rows: G weights - m = 0 for each corner, and sum of weights = 1; unknowns: weights, then m.
@@ -109,7 +110,8 @@ fn polygon(pair: ElementPair, points: &[Vector]) -> Vec<Vector> {
         .collect()
 }
 
-/// The features that a blend of the oracle's corners belongs to; `None` where several features are possible.
+/// The features that a blend of the oracle's corners belongs to; `None` where several features are
+/// possible.
 fn features(pair: ElementPair, support: &[usize]) -> Option<(Feature, Feature)> {
     use Feature::{Edge, Face, Vertex};
     let numbers = corners(pair);
@@ -141,7 +143,8 @@ fn features(pair: ElementPair, support: &[usize]) -> Option<(Feature, Feature)> 
     }
 }
 
-/// Of the corners and edges of a flat polygon that are nearest, the first in the order of ipc-toolkit's names.
+/// Of the corners and edges of a flat polygon that are nearest, the first in the order of
+/// ipc-toolkit's names.
 fn first_of_nearest(pair: ElementPair, polygon: &[Vector]) -> Vec<usize> {
     let edges: &[[usize; 2]] = match pair {
         ElementPair::EdgeEdge => &[[0, 2], [1, 3], [0, 1], [2, 3]],
@@ -179,7 +182,8 @@ fn check(pair: ElementPair, points: &[Point; 4], distance: f64) -> bool {
     assert!(!nearest.name(pair).is_empty());
     let closest = closest_points(pair, points);
     assert_eq!(closest.nearest, nearest);
-    // The rounded distance agrees to the last digits, the rounded points as precisely as coordinates are rounded.
+    // The rounded distance agrees to the last digits, the rounded points as precisely as
+    // coordinates are rounded.
     let size = points
         .iter()
         .flatten()
@@ -294,8 +298,8 @@ fn grids_agree_with_the_oracle() {
     }
 }
 
-/// A face and an edge, or two faces: the nearest point of the hull of all differences of corners, which needs up to three
-/// corners where it is not the origin.
+/// A face and an edge, or two faces: the nearest point of the hull of all differences of corners,
+/// which needs up to three corners where it is not the origin.
 #[test]
 fn faces_are_as_near_as_the_hull_of_differences() {
     let mut random = Random::new(32);
@@ -347,7 +351,8 @@ fn faces_are_as_near_as_the_hull_of_differences() {
     assert!(n_near > 50 && n_far > 50, "{n_near} {n_far}");
 }
 
-/// Moving elements: not within the distance before the time, and within it from then on for a moment.
+/// Moving elements: not within the distance before the time, and within it from then on for a
+/// moment.
 #[test]
 fn first_times_within_a_distance_are_right() {
     let mut random = Random::new(33);

@@ -5,8 +5,8 @@ use impinge_exact::ElementPair;
 use crate::generators::Random;
 use crate::moving::Point;
 
-/// Structured grids, as cloth is laid out: one over another, aligned or shifted by half a step. Features tie, edges are
-/// parallel, and faces coplanar.
+/// Structured grids, as cloth is laid out: one over another, aligned or shifted by half a step.
+/// Features tie, edges are parallel, and faces coplanar.
 #[derive(Clone, Copy, Debug)]
 pub enum Grid {
     /// A step of 1/64.

@@ -1,4 +1,5 @@
-//! Exact continuous collision and distances: against an independent oracle, against published answers, and asked in other ways.
+//! Exact continuous collision and distances: against an independent oracle, against published
+//! answers, and asked in other ways.
 
 mod data;
 mod distance;

@@ -191,8 +191,8 @@ fn lattices_agree_with_the_oracle() {
 
 const N_CASES: u64 = 150;
 
-/// Layers of cloth of which one moves against the other as a whole: down, aside, both, or within its plane. Edges are parallel, faces
-/// coplanar, and vertices meet edges and vertices.
+/// Layers of cloth of which one moves against the other as a whole: down, aside, both, or within
+/// its plane. Edges are parallel, faces coplanar, and vertices meet edges and vertices.
 #[test]
 fn layers_that_move_as_a_whole_agree_with_the_oracle() {
     let mut random = Random::new(35);
@@ -202,7 +202,8 @@ fn layers_that_move_as_a_whole_agree_with_the_oracle() {
             for round in 0..120 {
                 let points = grid.points(pair, &mut random);
                 let n_moving = if pair == ElementPair::EdgeEdge { 2 } else { 1 };
-                // Onto a point of the other element, or past it, or not so far; every third time a bit aside.
+                // Onto a point of the other element, or past it, or not so far; every third time a
+                // bit aside.
                 let n_targets = corners(pair).len() / n_moving;
                 let target = points[n_moving + random.below(n_targets as u64) as usize];
                 let far = [1.0, 2.0, 1.25, 0.5][random.below(4) as usize];
@@ -213,7 +214,8 @@ fn layers_that_move_as_a_whole_agree_with_the_oracle() {
                     } else {
                         0.0
                     };
-                    // Exact sums for grids of `f32`, so the element does not turn. Those of `f64` round some.
+                    // Exact sums for grids of `f32`, so the element does not turn. Those of `f64`
+                    // round some.
                     f64::from((far * (target[axis] - points[0][axis]) + aside * size) as f32)
                 });
                 let mut end = points;
@@ -279,7 +281,8 @@ fn twins_agree() {
                     same("both turned", [1, 0, 3, 2]);
                 }
             }
-            // Moving or scaling everything changes nothing, even with another shift at the end than at the start.
+            // Moving or scaling everything changes nothing, even with another shift at the end than
+            // at the start.
             let moved = |by: f64, scale: f64, points: &[Point; 4]| {
                 points.map(|point| point.map(|x| (x + by) * scale))
             };
@@ -293,7 +296,8 @@ fn twins_agree() {
                 found.is_some(),
                 "{pair:?} {start:?} {end:?}"
             );
-            // In two halves: the first half has the contact if the contact is no later than the middle.
+            // In two halves: the first half has the contact if the contact is no later than the
+            // middle.
             let middle: [Point; 4] = std::array::from_fn(|ix| {
                 std::array::from_fn(|axis| (start[ix][axis] + end[ix][axis]) / 2.0)
             });
@@ -336,7 +340,8 @@ fn times_are_rounded_down() {
     let half = vertex_face(1.0, -1.0);
     assert!(half.is_exact && half.time == 0.5 && half.is_within(0.5));
     assert!(vertex_face(1.0, 0.0).is_exact && vertex_face(1.0, 0.0).time == 1.0);
-    // A time below the smallest `f32` rounds down to zero, though the two do not touch at the start.
+    // A time below the smallest `f32` rounds down to zero, though the two do not touch at the
+    // start.
     let tiny = f64::from(f32::from_bits(1));
     let early = vertex_face(tiny, -f64::from(f32::MAX));
     assert!(early.time > 0.0 && early.time_f32() == 0.0 && !early.at_start);

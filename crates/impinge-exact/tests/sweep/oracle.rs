@@ -1,11 +1,12 @@
 //! The oracle: the first contact of two moving elements by another algorithm.
 //!
-//! At one moment two elements share a point if and only if weights λ ≥ 0 with sum 1 exist that blend the differences
-//! of their points to zero. If such weights exist, some exist with at most three of them positive whose
-//! columns (difference, 1) are linearly independent (Carathéodory; the differences lie in a plane). The signs of the
-//! minors of these columns decide whether they exist. So the answer can change only at a root of a minor. All
-//! roots in [0, 1] of all minors are found (Sturm), and at each root elimination looks for weights. Its entries
-//! are polynomials, whose signs at a root are found by counting (Tarski).
+//! At one moment two elements share a point if and only if weights λ ≥ 0 with sum 1 exist that
+//! blend the differences of their points to zero. If such weights exist, some exist with at most
+//! three of them positive whose columns (difference, 1) are linearly independent (Carathéodory; the
+//! differences lie in a plane). The signs of the minors of these columns decide whether they exist.
+//! So the answer can change only at a root of a minor. All roots in [0, 1] of all minors are found
+//! (Sturm), and at each root elimination looks for weights. Its entries are polynomials, whose
+//! signs at a root are found by counting (Tarski).
 //!
 //! No normal, no area, no case distinction, no Bernstein form, no floating-point operation.
 
@@ -66,7 +67,8 @@ impl Moments {
             .any(|moment| moment.compare(&Dyadic(IBig::ZERO, 0)) == Ordering::Equal)
     }
 
-    /// Whether the first of the moments is at `x` or later, and before `next`; and whether it is at `x`.
+    /// Whether the first of the moments is at `x` or later, and before `next`; and whether it is at
+    /// `x`.
     pub fn first_is_between(&self, x: f64, next: f64) -> (bool, bool) {
         let (x, next) = (dyadic(x), dyadic(next));
         let none_before = self.0.iter().all(|m| m.compare(&x) != Ordering::Less);
@@ -86,7 +88,8 @@ fn dyadic(x: f64) -> Dyadic {
     }
 }
 
-/// All minors of one to three columns that are not zero everywhere, each once up to constant factors.
+/// All minors of one to three columns that are not zero everywhere, each once up to constant
+/// factors.
 fn minors(columns: &[[Polynomial; 4]]) -> HashSet<Polynomial> {
     let subsets = |n: usize| {
         (1_u32..1 << n)
@@ -136,7 +139,8 @@ fn touches(columns: &[[Polynomial; 4]], moment: &Moment) -> bool {
         })
 }
 
-/// Whether the columns are linearly independent at the moment and positive weights with sum 1 blend them to zero.
+/// Whether the columns are linearly independent at the moment and positive weights with sum 1 blend
+/// them to zero.
 fn has_positive_weights(support: &[&[Polynomial; 4]], moment: &Moment) -> bool {
     let n = support.len();
     let mut rows: Vec<Vec<Polynomial>> = (0..4)

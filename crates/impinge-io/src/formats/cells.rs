@@ -5,7 +5,8 @@
 use crate::collect::Collector;
 use crate::error::{Error, Place};
 
-/// Adds the cell of type `kind` with these point indices to `parts`; polygons and strips are cut into triangles.
+/// Adds the cell of type `kind` with these point indices to `parts`; polygons and strips are cut
+/// into triangles.
 pub(crate) fn put(
     parts: &mut Collector,
     kind: i64,

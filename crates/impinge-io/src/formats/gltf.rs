@@ -1,9 +1,11 @@
-//! glTF 2.0 and GLB: all triangles of the default scene, placed by their nodes, as one body or as a body per node.
+//! glTF 2.0 and GLB: all triangles of the default scene, placed by their nodes, as one body or as a
+//! body per node.
 //!
-//! Source: Khronos, "glTF 2.0 Specification". Triangles, strips and fans are read; points and lines are counted. Within a
-//! node, primitives that use the same positions share their vertices. Positions stay f32 if no node moves them; otherwise
-//! they are computed in f64 (each sum and product rounded to nearest) and stay f64. Skins and morph targets are not applied: the
-//! mesh is in its rest pose.
+//! Source: Khronos, "glTF 2.0 Specification". Triangles, strips and fans are read; points and lines
+//! are counted. Within a node, primitives that use the same positions share their vertices.
+//! Positions stay f32 if no node moves them; otherwise they are computed in f64 (each sum and
+//! product rounded to nearest) and stay f64. Skins and morph targets are not applied: the mesh is
+//! in its rest pose.
 
 mod accessor;
 mod json;
@@ -242,7 +244,8 @@ impl<'a> Scene<'a, '_> {
         Ok(self.parts)
     }
 
-    /// Adds a primitive; `bases` are the first vertices of the accessors that this node has used already.
+    /// Adds a primitive; `bases` are the first vertices of the accessors that this node has used
+    /// already.
     fn add(
         &mut self,
         primitive: &Primitive,

@@ -1,8 +1,8 @@
 //! Medit `.mesh`, ascii: vertices, triangles, quadrilaterals (cut into triangles), tetrahedra.
 //!
-//! Source: P. Frey, "MEDIT: An interactive mesh visualization software", INRIA RT-0253, 2001, section 7.2. Edges and corners
-//! are counted; hexahedra, prisms and pyramids are refused; other sections (normals, tangents, required vertices, …) are
-//! skipped up to the next keyword.
+//! Source: P. Frey, "MEDIT: An interactive mesh visualization software", INRIA RT-0253, 2001,
+//! section 7.2. Edges and corners are counted; hexahedra, prisms and pyramids are refused; other
+//! sections (normals, tangents, required vertices, …) are skipped up to the next keyword.
 
 use crate::collect::{Collector, check_n_vertices, finite};
 use crate::error::{Error, Name, shown};

@@ -19,7 +19,8 @@ pub(crate) mod threemf;
 pub(crate) mod vtk;
 pub(crate) mod vtu;
 
-/// Positions from an array of numbers: f32 where the type fits, else f64. `place` gives the place of a vertex in the file.
+/// Positions from an array of numbers: f32 where the type fits, else f64. `place` gives the place
+/// of a vertex in the file.
 fn positions(
     name: Name,
     bytes: &[u8],

@@ -1,8 +1,9 @@
 //! Gmsh MSH 2.x and 4.1, ascii and binary: `$Nodes` and `$Elements`; other sections are skipped.
 //!
-//! Source: Gmsh reference manual, "MSH file format" (4.1) and "Legacy formats" (2.2). Nodes have tags, perhaps with gaps:
-//! vertices are numbered in the order of the file. Linear triangles, quadrangles (cut into triangles) and tetrahedra are read, lines
-//! and points are counted, all other element types are refused.
+//! Source: Gmsh reference manual, "MSH file format" (4.1) and "Legacy formats" (2.2). Nodes have
+//! tags, perhaps with gaps: vertices are numbered in the order of the file. Linear triangles,
+//! quadrangles (cut into triangles) and tetrahedra are read, lines and points are counted, all
+//! other element types are refused.
 
 mod v2;
 mod v4;
@@ -364,7 +365,8 @@ fn text_tags<'t>(
     Ok(&tags[..n])
 }
 
-/// Reads a count line of version 2: only the number, then the end of the line. Binary data starts after it.
+/// Reads a count line of version 2: only the number, then the end of the line. Binary data starts
+/// after it.
 fn count_line(file: &mut File, what: &str) -> Result<u64, Error> {
     let n = file.text.number(what)?;
     if file.binary.is_some() {

@@ -1,9 +1,11 @@
-//! Wavefront OBJ: `v` and `f`, and the names of objects and groups; materials, normals and texture coordinates are skipped.
+//! Wavefront OBJ: `v` and `f`, and the names of objects and groups; materials, normals and texture
+//! coordinates are skipped.
 //!
-//! Source: Wavefront, "Advanced Visualizer" manual, appendix B1. A file is read as one body, its groups in their order, or as a
-//! body per object; per group if there are no objects, which often have groups of one material each. A
-//! face may name vertices that come later (positive indices); negative ones count back from the last vertex so far. Faces of one
-//! or two corners, which some programs write for points and segments, are counted and skipped.
+//! Source: Wavefront, "Advanced Visualizer" manual, appendix B1. A file is read as one body, its
+//! groups in their order, or as a body per object; per group if there are no objects, which often
+//! have groups of one material each. A face may name vertices that come later (positive indices);
+//! negative ones count back from the last vertex so far. Faces of one or two corners, which some
+//! programs write for points and segments, are counted and skipped.
 
 use std::borrow::Cow;
 
@@ -16,7 +18,8 @@ pub(crate) fn read<'a>(bytes: &[u8], name: Name<'a>) -> Result<Collector<'a>, Er
     let read = statements(bytes, name);
     let has_vertices = read.as_ref().is_ok_and(|parts| !parts.positions.is_empty());
     match !has_vertices && bytes.iter().take(HEAD).any(|&byte| byte == 0) {
-        // Some lines of other data begin as statements do, and what is wrong with them is of no use.
+        // Some lines of other data begin as statements do, and what is wrong with them is of no
+        // use.
         true => Err(name.syntax(Place::File, "the text of an OBJ file", "other data")),
         false => read,
     }
@@ -66,8 +69,8 @@ fn statements<'a>(bytes: &[u8], name: Name<'a>) -> Result<Collector<'a>, Error> 
                             } else {
                                 greatest
                             };
-                            // An index that does not fit exceeds the greatest possible number of vertices, so the check at the
-                            // end refuses it.
+                            // An index that does not fit exceeds the greatest possible number of
+                            // vertices, so the check at the end refuses it.
                             u32::try_from(index - 1).unwrap_or(u32::MAX)
                         }
                         ..0 => vertex_ix(name, index, -(positions.len() as i64), n_so_far, place)?,

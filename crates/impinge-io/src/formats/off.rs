@@ -1,8 +1,9 @@
-//! Geomview OFF, text and binary: `OFF`, `COFF`, `NOFF`, `STOFF` and mixtures; normals, colours and texture coordinates are
-//! skipped. Numbers of a binary file have 32 bits, the most significant byte first.
+//! Geomview OFF, text and binary: `OFF`, `COFF`, `NOFF`, `STOFF` and mixtures; normals, colours and
+//! texture coordinates are skipped. Numbers of a binary file have 32 bits, the most significant
+//! byte first.
 //!
-//! Source: Geomview manual, "OFF Files". The keyword and the number of edges may be missing. Faces of one or two corners,
-//! which OFF uses for points and segments, are counted and skipped.
+//! Source: Geomview manual, "OFF Files". The keyword and the number of edges may be missing. Faces
+//! of one or two corners, which OFF uses for points and segments, are counted and skipped.
 
 use crate::binary::{Cursor, Endian, Scalar};
 use crate::collect::{Collector, check_n_vertices, finite};
@@ -109,7 +110,8 @@ fn read_binary<'a>(
     from.count(Scalar::I32, "the number of edges")?;
     check_n_vertices(name, place, n_vertices)?;
 
-    // A vertex is its position, then a normal, a colour and texture coordinates where the keyword says so.
+    // A vertex is its position, then a normal, a colour and texture coordinates where the keyword
+    // says so.
     let has = |letter| keyword.contains(&letter);
     let n_floats =
         3 + 3 * usize::from(has(b'N')) + 4 * usize::from(has(b'C')) + 2 * usize::from(has(b'S'));

@@ -1,8 +1,10 @@
-//! PLY: ascii and binary of either byte order; faces (polygons cut into triangles), triangle strips, tetrahedra.
+//! PLY: ascii and binary of either byte order; faces (polygons cut into triangles), triangle
+//! strips, tetrahedra.
 //!
-//! Source: G. Turk, "The PLY Polygon File Format", 1994. The reader takes the elements
-//! `vertex` (x, y, z), `face` and `tristrips` (a list `vertex_indices` or `vertex_index`; -1 starts a new strip), and `tetra`,
-//! `tetrahedra`, `tet` or `tets` (such a list of four). `edge` is counted; other elements and properties are skipped.
+//! Source: G. Turk, "The PLY Polygon File Format", 1994. The reader takes the elements `vertex` (x,
+//! y, z), `face` and `tristrips` (a list `vertex_indices` or `vertex_index`; -1 starts a new
+//! strip), and `tetra`, `tetrahedra`, `tet` or `tets` (such a list of four). `edge` is counted;
+//! other elements and properties are skipped.
 
 mod header;
 

@@ -1,7 +1,8 @@
-//! STL, ascii and binary; each triangle has three vertices of its own; normals and attributes are skipped.
+//! STL, ascii and binary; each triangle has three vertices of its own; normals and attributes are
+//! skipped.
 //!
-//! Source: 3D Systems, "StereoLithography Interface Specification", 1989. Several solids of an ascii file become one body.
-//! Neighbours share no vertices here: weld to get a connected surface.
+//! Source: 3D Systems, "StereoLithography Interface Specification", 1989. Several solids of an
+//! ascii file become one body. Neighbours share no vertices here: weld to get a connected surface.
 
 use crate::binary::{Cursor, Endian, Scalar};
 use crate::collect::{Collector, check_n_vertices, finite};
@@ -33,8 +34,8 @@ pub(crate) fn read<'a>(bytes: &[u8], name: Name<'a>) -> Result<Collector<'a>, Er
     read_binary(bytes, name)
 }
 
-/// Whether this is a whole binary file. Titles may start with 'solid' too; only binary files have exactly the length that
-/// they announce.
+/// Whether this is a whole binary file. Titles may start with 'solid' too; only binary files have
+/// exactly the length that they announce.
 pub(crate) fn is_binary(bytes: &[u8]) -> bool {
     announced(bytes).is_some_and(|length| length == bytes.len() as u64)
 }

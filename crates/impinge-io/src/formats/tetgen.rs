@@ -1,7 +1,8 @@
 //! TetGen: vertices in `.node`, tetrahedra in `.ele`, triangles in `.face`.
 //!
-//! Source: H. Si, "TetGen, A Quality Tetrahedral Mesh Generator", manual, section "File formats". Vertices are numbered from 0 or 1; the
-//! first line of the `.node` file decides. Attributes and markers are skipped; tetrahedra with mid-edge nodes are refused.
+//! Source: H. Si, "TetGen, A Quality Tetrahedral Mesh Generator", manual, section "File formats".
+//! Vertices are numbered from 0 or 1; the first line of the `.node` file decides. Attributes and
+//! markers are skipped; tetrahedra with mid-edge nodes are refused.
 
 use std::path::{Path, PathBuf};
 
@@ -12,8 +13,8 @@ use crate::format::Format;
 use crate::mesh::Positions;
 use crate::text::{Line, Text, number};
 
-/// The `.node` file and the file of cells that belong to `path`, which is one of them. The cells are in `.ele` if it exists, else
-/// in `.face`.
+/// The `.node` file and the file of cells that belong to `path`, which is one of them. The cells
+/// are in `.ele` if it exists, else in `.face`.
 pub(crate) fn paths(path: &Path) -> (PathBuf, PathBuf) {
     let is_face = path
         .extension()

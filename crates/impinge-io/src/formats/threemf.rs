@@ -1,9 +1,10 @@
 //! 3MF: the objects that the build places, as one body or as a body per item.
 //!
-//! Source: 3MF Consortium, "3MF Core Specification" 1.3 and "Production Extension" 1.1 (objects in parts of their own). Coordinates are read as f64, correctly
-//! rounded, in the unit of the file. Those of items and components with a transform are computed in f64, each sum and product
-//! rounded to nearest; a transform that mirrors turns the triangles, so that matter stays inside. Colours, materials and other
-//! extensions are ignored.
+//! Source: 3MF Consortium, "3MF Core Specification" 1.3 and "Production Extension" 1.1 (objects in
+//! parts of their own). Coordinates are read as f64, correctly rounded, in the unit of the file.
+//! Those of items and components with a transform are computed in f64, each sum and product rounded
+//! to nearest; a transform that mirrors turns the triangles, so that matter stays inside. Colours,
+//! materials and other extensions are ignored.
 
 mod zip;
 
@@ -160,7 +161,8 @@ impl Package<'_> {
             );
             return Err(name.syntax(Place::File, what, "none"));
         };
-        // Objects without triangles are charged too: a few of them can be placed in more ways than time allows.
+        // Objects without triangles are charged too: a few of them can be placed in more ways than
+        // time allows.
         let n = object.points.len() as u64 * 24 + object.triangles.len() as u64 * 12 + 64;
         self.placed.charge(name, Place::File, n, 1)?;
         let first = points.len() as u64;

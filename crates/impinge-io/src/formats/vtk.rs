@@ -1,7 +1,9 @@
-//! Legacy VTK, ascii and binary (big endian): unstructured grids and polygonal data, versions 1 to 5.1.
+//! Legacy VTK, ascii and binary (big endian): unstructured grids and polygonal data, versions 1 to
+//! 5.1.
 //!
-//! Source: VTK File Formats (Kitware), "Simple legacy formats"; for the split cell arrays of version 5.1, the VTK 9 release notes.
-//! Reading stops at point or cell data; fields and metadata before them are skipped.
+//! Source: VTK File Formats (Kitware), "Simple legacy formats"; for the split cell arrays of
+//! version 5.1, the VTK 9 release notes. Reading stops at point or cell data; fields and metadata
+//! before them are skipped.
 
 use super::cells;
 use crate::binary::{Cursor, Endian, Scalar};

@@ -1,7 +1,8 @@
-//! VTU, the unstructured grid of VTK XML files: ascii, inline base64, and appended data raw or in base64; compressed by
-//! zlib or LZ4 or not at all. All pieces become one body.
+//! VTU, the unstructured grid of VTK XML files: ascii, inline base64, and appended data raw or in
+//! base64; compressed by zlib or LZ4 or not at all. All pieces become one body.
 //!
-//! Source: VTK File Formats (Kitware), "XML file formats"; vtkXMLDataReader.cxx for the block header of compressed data.
+//! Source: VTK File Formats (Kitware), "XML file formats"; vtkXMLDataReader.cxx for the block
+//! header of compressed data.
 
 mod array;
 mod xml;
@@ -264,7 +265,8 @@ fn read_piece(arrays: &mut Arrays, piece: Node, parts: &mut Collector) -> Result
             return Err(name.count(at, what, n_cells, values.len() as u64));
         }
     }
-    // Indices of one byte become corners of four bytes, and a polygon of n corners becomes n - 2 triangles.
+    // Indices of one byte become corners of four bytes, and a polygon of n corners becomes n - 2
+    // triangles.
     arrays.budget.charge(
         name,
         connectivity_at,

@@ -1,7 +1,7 @@
 //! Corners where a polygon bends inward, in a tree: whether one of them lies in a triangle.
 //!
-//! Only such corners can lie in an ear of a polygon that does not cross itself. Cost: `O(n log n)` to build, `O(log n)` to remove one, and
-//! usually `O(log n)` to ask.
+//! Only such corners can lie in an ear of a polygon that does not cross itself. Cost: `O(n log n)`
+//! to build, `O(log n)` to remove one, and usually `O(log n)` to ask.
 
 type Point = [f64; 2];
 
@@ -105,7 +105,8 @@ impl InnerCorners {
         }
     }
 
-    /// A corner other than those of the triangle that lies in it or on its border. The triangle is anticlockwise.
+    /// A corner other than those of the triangle that lies in it or on its border. The triangle is
+    /// anticlockwise.
     pub fn find_in(&mut self, points: &[Point], triangle: [usize; 3]) -> Option<usize> {
         let [a, b, c] = triangle.map(|corner| points[corner]);
         let low: Point = std::array::from_fn(|k| a[k].min(b[k]).min(c[k]));

@@ -10,9 +10,10 @@ use crate::error::Error;
 
 /// A file that gets its name only when it is complete.
 ///
-/// Bytes go to a temporary file beside the target, and [`finish`](Self::finish) renames it. Dropping it without `finish`
-/// removes the temporary file, and an older file of that name stays as it was. A link stays a link: its target is replaced.
-/// A target that exists and is not a regular file (a device, a pipe) is written directly.
+/// Bytes go to a temporary file beside the target, and [`finish`](Self::finish) renames it.
+/// Dropping it without `finish` removes the temporary file, and an older file of that name stays as
+/// it was. A link stays a link: its target is replaced. A target that exists and is not a regular
+/// file (a device, a pipe) is written directly.
 ///
 /// ```
 /// use impinge_io::AtomicFile;
@@ -32,7 +33,8 @@ use crate::error::Error;
 pub struct AtomicFile {
     /// The path as the caller gave it, for messages.
     path: PathBuf,
-    /// The file being written, and its final path; both are the same if the target is not a regular file.
+    /// The file being written, and its final path; both are the same if the target is not a regular
+    /// file.
     written: PathBuf,
     target: PathBuf,
     /// `None` once it is closed.
@@ -47,8 +49,8 @@ fn parts() -> MutexGuard<'static, Vec<PathBuf>> {
     PARTS.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Removes the temporary files of all outputs being written. For a program that must end at once, for example after a
-/// second Ctrl-C. Any thread may call it.
+/// Removes the temporary files of all outputs being written. For a program that must end at once,
+/// for example after a second Ctrl-C. Any thread may call it.
 pub fn remove_temporary_files() {
     for part in parts().drain(..) {
         // A failure can't be reported any more; the name of the file shows that it is temporary.
@@ -77,7 +79,8 @@ impl AtomicFile {
                 };
                 let (written, file) = create_beside(&target).map_err(error)?;
                 if let Ok(replaced) = found {
-                    // Keeps the permissions of the replaced file. If they can't be set, the default ones are acceptable.
+                    // Keeps the permissions of the replaced file. If they can't be set, the default
+                    // ones are acceptable.
                     let _ = file.set_permissions(replaced.permissions());
                 }
                 (written, target, file)
@@ -159,7 +162,8 @@ impl Drop for AtomicFile {
             drop(file.into_parts());
         }
         if !self.is_finished && self.written != self.target {
-            // A failure can't be reported any more; the name of the file shows that it is temporary.
+            // A failure can't be reported any more; the name of the file shows that it is
+            // temporary.
             let _ = fs::remove_file(&self.written);
             parts().retain(|part| *part != self.written);
         }

@@ -17,15 +17,18 @@ const UNSIGNED_BYTE: u32 = 5121;
 const ARRAY_BUFFER: u32 = 34962;
 const ELEMENT_ARRAY_BUFFER: u32 = 34963;
 
-/// Writes bodies into one GLB file (glTF 2.0), one node per body, with colours that every viewer shows.
+/// Writes bodies into one GLB file (glTF 2.0), one node per body, with colours that every viewer
+/// shows.
 ///
-/// glTF colours vertices only, so a vertex between faces of different colours is written once per colour, in the order in which
-/// the triangles use them; vertices that no triangle uses are omitted. Positions are f32 in this format: f64 is rounded to
-/// nearest. For tetrahedra, their surface is written. Bodies without triangles are omitted.
+/// glTF colours vertices only, so a vertex between faces of different colours is written once per
+/// colour, in the order in which the triangles use them; vertices that no triangle uses are
+/// omitted. Positions are f32 in this format: f64 is rounded to nearest. For tetrahedra, their
+/// surface is written. Bodies without triangles are omitted.
 ///
 /// # Errors
-/// [`Error::Io`]; [`Error::Mismatch`] or [`Error::Index`] if the parts of a body do not fit together; [`Error::NotFinite`] if a
-/// coordinate is not finite in f32, which JSON can't express; [`Error::TooLarge`] beyond 4 GiB, the limit of the format.
+/// [`Error::Io`]; [`Error::Mismatch`] or [`Error::Index`] if the parts of a body do not fit
+/// together; [`Error::NotFinite`] if a coordinate is not finite in f32, which JSON can't express;
+/// [`Error::TooLarge`] beyond 4 GiB, the limit of the format.
 pub fn write_glb(path: &Path, meshes: &[ColoredMesh]) -> Result<(), Error> {
     check(path, meshes)?;
     let name = path.display().to_string();
@@ -89,7 +92,8 @@ impl Glb {
             for corner in face {
                 let ix = *written.entry((corner, color)).or_insert_with(|| {
                     vertices.push((corner, color));
-                    // There may be more than 2^32 corners, but not within the 4 GiB checked at the end.
+                    // There may be more than 2^32 corners, but not within the 4 GiB checked at the
+                    // end.
                     (vertices.len() - 1) as u32
                 });
                 indices.extend_from_slice(&ix.to_le_bytes());
@@ -133,7 +137,8 @@ impl Glb {
         Ok(())
     }
 
-    /// Adds `bytes`, whose length is a multiple of 4, as a view with an accessor for all of it; returns the accessor's index.
+    /// Adds `bytes`, whose length is a multiple of 4, as a view with an accessor for all of it;
+    /// returns the accessor's index.
     fn accessor(&mut self, bytes: &[u8], target: u32, mut accessor: Value) -> usize {
         self.views.push(json!({"buffer": 0, "byteOffset": self.binary.len(), "byteLength": bytes.len(), "target": target}));
         self.binary.extend_from_slice(bytes);

@@ -13,9 +13,9 @@ const N_FRAMES_AT: usize = 28;
 /// The bytes before the first frame.
 const HEADER: usize = 32;
 
-/// A PC2 point cache written in place, for long runs. It is complete and readable after each [`save`](Self::save). After an
-/// interruption, [`resume`](Self::resume) cuts off later bytes and continues. For an all-or-nothing file, use
-/// [`Pc2Writer`](crate::Pc2Writer).
+/// A PC2 point cache written in place, for long runs. It is complete and readable after each
+/// [`save`](Self::save). After an interruption, [`resume`](Self::resume) cuts off later bytes and
+/// continues. For an all-or-nothing file, use [`Pc2Writer`](crate::Pc2Writer).
 #[derive(Debug)]
 pub struct GrowingPc2 {
     path: PathBuf,
@@ -25,8 +25,9 @@ pub struct GrowingPc2 {
 }
 
 impl GrowingPc2 {
-    /// Starts a cache of frames of `n_points` vertices, replacing any existing file. `start` is the time of the first frame and
-    /// `rate` the time between two frames, both in frames of the program that plays the cache (usually 0 and 1).
+    /// Starts a cache of frames of `n_points` vertices, replacing any existing file. `start` is the
+    /// time of the first frame and `rate` the time between two frames, both in frames of the
+    /// program that plays the cache (usually 0 and 1).
     ///
     /// # Errors
     /// [`Error::Io`]; [`Error::TooLarge`] beyond 2^31 - 1 points.
@@ -46,11 +47,12 @@ impl GrowingPc2 {
         Self::resume(path, n_points, 0)
     }
 
-    /// Continues after the first `n_frames` frames of a cache that [`create`](Self::create) started; later frames are cut off.
+    /// Continues after the first `n_frames` frames of a cache that [`create`](Self::create)
+    /// started; later frames are cut off.
     ///
     /// # Errors
-    /// [`Error::Io`]; [`Error::Mismatch`] if the file is not a PC2 cache of `n_points` vertices; [`Error::Truncated`] if it holds
-    /// fewer frames. On an error the file is unchanged.
+    /// [`Error::Io`]; [`Error::Mismatch`] if the file is not a PC2 cache of `n_points` vertices;
+    /// [`Error::Truncated`] if it holds fewer frames. On an error the file is unchanged.
     pub fn resume(path: &Path, n_points: usize, n_frames: usize) -> Result<Self, Error> {
         let open = OpenOptions::new().read(true).write(true).open(path);
         let mut file = open.map_err(|source| Error::io(path, "open", source))?;
@@ -138,7 +140,8 @@ impl GrowingPc2 {
         Ok(())
     }
 
-    /// Makes the file complete: writes buffered bytes to the disk, and the number of frames to the header.
+    /// Makes the file complete: writes buffered bytes to the disk, and the number of frames to the
+    /// header.
     ///
     /// # Errors
     /// [`Error::Io`].

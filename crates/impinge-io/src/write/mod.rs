@@ -1,4 +1,5 @@
-//! Writing coloured meshes and point caches. Except for [`GrowingPc2`], a file gets its name only when it is complete.
+//! Writing coloured meshes and point caches. Except for [`GrowingPc2`], a file gets its name only
+//! when it is complete.
 
 mod atomic;
 mod glb;
@@ -90,7 +91,8 @@ fn check(path: &Path, meshes: &[ColoredMesh]) -> Result<(), Error> {
     meshes.iter().try_for_each(|mesh| mesh.check(Name(&name)))
 }
 
-/// Whether any body has f64 positions. A file has only one type of number, so then all positions are written as f64.
+/// Whether any body has f64 positions. A file has only one type of number, so then all positions
+/// are written as f64.
 fn any_f64(meshes: &[ColoredMesh]) -> bool {
     meshes
         .iter()

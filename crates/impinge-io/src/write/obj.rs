@@ -6,8 +6,9 @@ use super::atomic::AtomicFile;
 use crate::error::Error;
 use crate::mesh::Positions;
 
-/// Writes triangles as a Wavefront OBJ file: a `v` per vertex and an `f` per triangle, in their order, without colours. Coordinates
-/// have as many digits as needed to read the same `f64` back, so those of an `f32` are exact too.
+/// Writes triangles as a Wavefront OBJ file: a `v` per vertex and an `f` per triangle, in their
+/// order, without colours. Coordinates have as many digits as needed to read the same `f64` back,
+/// so those of an `f32` are exact too.
 ///
 /// # Errors
 /// [`Error::Io`].

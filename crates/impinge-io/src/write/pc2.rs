@@ -5,8 +5,8 @@ use std::path::Path;
 use super::atomic::AtomicFile;
 use crate::error::{Error, Name, Place};
 
-/// Writes a PC2 point cache frame by frame. [`finish`](Self::finish) gives the file its name; dropping the writer without
-/// `finish` leaves no file.
+/// Writes a PC2 point cache frame by frame. [`finish`](Self::finish) gives the file its name;
+/// dropping the writer without `finish` leaves no file.
 #[derive(Debug)]
 pub struct Pc2Writer {
     file: AtomicFile,
@@ -18,8 +18,9 @@ pub struct Pc2Writer {
 const N_FRAMES_AT: u64 = 28;
 
 impl Pc2Writer {
-    /// Starts a cache of frames of `n_points` vertices. `start` is the time of the first frame and `rate` the time between two
-    /// frames, both in frames of the program that plays the cache (usually 0 and 1).
+    /// Starts a cache of frames of `n_points` vertices. `start` is the time of the first frame and
+    /// `rate` the time between two frames, both in frames of the program that plays the cache
+    /// (usually 0 and 1).
     ///
     /// # Errors
     /// [`Error::Io`]; [`Error::TooLarge`] beyond 2^31 - 1 points.

@@ -11,15 +11,16 @@ use crate::mesh::{Elements, Positions};
 
 /// Writes bodies into one binary PLY file, with one colour per face.
 ///
-/// Vertices are those given, in their order, body by body, so a mesh that is read back has the same vertices and ids.
-/// The viewer must support face colours (MeshLab, CloudCompare and ParaView do; for others write GLB). Each face also has the
-/// property `body`, the number of its body. The surface of tetrahedra goes to the element `face`, and all tetrahedra go to an
-/// element `tetra` (lists of four indices, colour, body), which viewers ignore and [`read`](crate::read) reads.
+/// Vertices are those given, in their order, body by body, so a mesh that is read back has the same
+/// vertices and ids. The viewer must support face colours (MeshLab, CloudCompare and ParaView do;
+/// for others write GLB). Each face also has the property `body`, the number of its body. The
+/// surface of tetrahedra goes to the element `face`, and all tetrahedra go to an element `tetra`
+/// (lists of four indices, colour, body), which viewers ignore and [`read`](crate::read) reads.
 /// Positions are f32 if all bodies have f32, else f64: nothing is rounded.
 ///
 /// # Errors
-/// [`Error::Io`]; [`Error::Mismatch`] or [`Error::Index`] if the parts of a body do not fit together; [`Error::TooLarge`] beyond
-/// 2^31 - 1 vertices.
+/// [`Error::Io`]; [`Error::Mismatch`] or [`Error::Index`] if the parts of a body do not fit
+/// together; [`Error::TooLarge`] beyond 2^31 - 1 vertices.
 pub fn write_ply(path: &Path, meshes: &[ColoredMesh]) -> Result<(), Error> {
     check(path, meshes)?;
     let name = path.display().to_string();

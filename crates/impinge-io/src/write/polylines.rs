@@ -12,7 +12,8 @@ use crate::error::{Error, Name, Place};
 pub struct Polylines<'a> {
     /// The positions of the points.
     pub points: &'a [[f64; 3]],
-    /// Each curve as point indices in order, and whether it is closed (leads back from its last point to its first).
+    /// Each curve as point indices in order, and whether it is closed (leads back from its last
+    /// point to its first).
     pub curves: &'a [(&'a [u32], bool)],
 }
 
@@ -47,8 +48,8 @@ impl Polylines<'_> {
     }
 }
 
-/// Writes curves as a Wavefront OBJ file: `v` for each point, `l` for each curve (a closed one ends with its
-/// first point). Coordinates have as many digits as needed to read the same `f64` back.
+/// Writes curves as a Wavefront OBJ file: `v` for each point, `l` for each curve (a closed one ends
+/// with its first point). Coordinates have as many digits as needed to read the same `f64` back.
 ///
 /// # Errors
 /// [`Error::Io`]; [`Error::Index`] if a curve names a point that does not exist.
@@ -70,8 +71,8 @@ pub fn write_polylines_obj(path: &Path, lines: &Polylines) -> Result<(), Error> 
     file.finish()
 }
 
-/// Writes curves as a binary PLY file: elements `vertex` (x, y, z as double) and `edge` (vertex1, vertex2 as int, and
-/// `curve`, the number of its curve).
+/// Writes curves as a binary PLY file: elements `vertex` (x, y, z as double) and `edge` (vertex1,
+/// vertex2 as int, and `curve`, the number of its curve).
 ///
 /// # Errors
 /// As [`write_polylines_obj`].
@@ -105,8 +106,8 @@ pub fn write_polylines_ply(path: &Path, lines: &Polylines) -> Result<(), Error> 
     file.finish()
 }
 
-/// Writes curves as a VTU file: one polyline cell per curve, with cell data `curve` (i32, its number)
-/// and `closed` (u8, 0 or 1).
+/// Writes curves as a VTU file: one polyline cell per curve, with cell data `curve` (i32, its
+/// number) and `closed` (u8, 0 or 1).
 ///
 /// # Errors
 /// As [`write_polylines_obj`].

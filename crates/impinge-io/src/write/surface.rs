@@ -2,8 +2,8 @@
 
 use crate::mesh::{Elements, Positions};
 
-/// Triangles to draw, each with its primitive: the triangles themselves, or the outward-oriented faces of tetrahedra that
-/// no other tetrahedron shares.
+/// Triangles to draw, each with its primitive: the triangles themselves, or the outward-oriented
+/// faces of tetrahedra that no other tetrahedron shares.
 pub(super) fn surface(positions: &Positions, elements: &Elements) -> Vec<([u32; 3], usize)> {
     match elements {
         Elements::Triangles(triangles) => triangles.iter().copied().zip(0..).collect(),
@@ -31,8 +31,8 @@ pub(super) fn surface(positions: &Positions, elements: &Elements) -> Vec<([u32; 
     }
 }
 
-/// Whether the volume is negative. Rounding may give the wrong sign for flat tetrahedra; only the orientation of drawn faces
-/// depends on it.
+/// Whether the volume is negative. Rounding may give the wrong sign for flat tetrahedra; only the
+/// orientation of drawn faces depends on it.
 fn is_turned(positions: &Positions, [a, b, c, d]: [u32; 4]) -> bool {
     let at = |ix: u32| positions.get(ix as usize).unwrap_or_default();
     let origin = at(a);

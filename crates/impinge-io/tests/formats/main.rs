@@ -40,7 +40,8 @@ fn all_samples() {
     }
 }
 
-/// If `$IMPINGE_SEEDS` names a folder (`fuzz/corpus`), the samples are written there, into one folder per fuzz target.
+/// If `$IMPINGE_SEEDS` names a folder (`fuzz/corpus`), the samples are written there, into one
+/// folder per fuzz target.
 #[test]
 fn samples_are_seeds_for_fuzzing() {
     let Some(folder) = std::env::var_os("IMPINGE_SEEDS").map(std::path::PathBuf::from) else {

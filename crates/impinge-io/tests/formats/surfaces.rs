@@ -331,7 +331,8 @@ fn ply_strips_tetrahedra_and_other_elements() {
 
 #[test]
 fn ply_binary_with_properties_of_all_kinds_around() {
-    // A list before the vertices, integer coordinates, and a property on either side of a face's vertices.
+    // A list before the vertices, integer coordinates, and a property on either side of a face's
+    // vertices.
     let mut ply = b"ply\nformat binary_big_endian 1.0\nelement list 2\nproperty list ushort short v\nelement face 2\nproperty uchar a\n\
         property list uint8 uint16 vertex_index\nproperty list uchar uchar b\nelement vertex 4\nproperty int16 x\nproperty uint8 y\nproperty int8 z\nend_header\n"
         .to_vec();

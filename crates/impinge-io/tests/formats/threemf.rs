@@ -25,7 +25,8 @@ fn object(id: &str) -> String {
 
 #[test]
 fn items_and_components_are_placed() {
-    // The object as it is; moved by (10, 20, 30); and inside another one, mirrored and then moved by (0, 0, 5).
+    // The object as it is; moved by (10, 20, 30); and inside another one, mirrored and then moved
+    // by (0, 0, 5).
     let nested = "<object id=\"2\"><components><component objectid=\"1\" transform=\"-1 0 0 0 1 0 0 0 1 0 0 0\"/></components></object>";
     let items = "<item objectid=\"1\"/><item objectid=\"1\" transform=\"1 0 0 0 1 0 0 0 1 10 20 30\"/>\
                  <item objectid=\"2\" transform=\"1 0 0 0 1 0 0 0 1 0 0 5\"/>";

@@ -226,7 +226,8 @@ fn vtu_pieces_and_errors() {
 #[test]
 fn vtu_compressed_data_is_held_to_what_it_says() {
     let vtu = String::from_utf8(common::vtu(common::VtuStorage::InlineZlib)).unwrap();
-    // The header of the points: 2 blocks of 31 bytes, 29 in the last one. Let it say 2^31 - 1 of 31.
+    // The header of the points: 2 blocks of 31 bytes, 29 in the last one. Let it say 2^31 - 1 of
+    // 31.
     let header = |block: u32| {
         let words = [2, block, 29].map(u32::to_le_bytes);
         common::base64(&words.concat())

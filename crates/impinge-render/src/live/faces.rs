@@ -7,10 +7,11 @@ use impinge::{Body, Elements};
 /// No face has this number.
 const NONE: u32 = u32::MAX;
 
-/// The faces that stand for a body's primitives: its triangles, or the faces of its tetrahedra, each once. Edges and points
-/// have none.
+/// The faces that stand for a body's primitives: its triangles, or the faces of its tetrahedra,
+/// each once. Edges and points have none.
 ///
-/// A face between two tetrahedra is inside the body, so it is drawn only where one of the two is marked.
+/// A face between two tetrahedra is inside the body, so it is drawn only where one of the two is
+/// marked.
 #[derive(Debug, Clone, Default)]
 pub struct Faces {
     /// Three vertices, and 1 for a face inside the body.
@@ -86,7 +87,8 @@ impl Faces {
             .is_some_and(|corners| corners[3] == 1)
     }
 
-    /// The primitive to which a face belongs; of two tetrahedra the first. `None` beyond the last face.
+    /// The primitive to which a face belongs; of two tetrahedra the first. `None` beyond the last
+    /// face.
     pub fn primitive(&self, face: usize) -> Option<u32> {
         self.owners.get(face).copied()
     }

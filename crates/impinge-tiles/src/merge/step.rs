@@ -97,8 +97,8 @@ impl Plan {
         Some([body, part, name[0], name[1]])
     }
 
-    /// The elements of the contacts that need numbers, ascending, with their numbers: their places among the elements of the
-    /// same part of the same body that all tiles list.
+    /// The elements of the contacts that need numbers, ascending, with their numbers: their places
+    /// among the elements of the same part of the same body that all tiles list.
     fn numbers(
         &self,
         results: &[TileResult],

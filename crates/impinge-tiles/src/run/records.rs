@@ -128,7 +128,8 @@ impl Records {
         Ok(Surfaces(surfaces.collect::<Result<_, _>>()?))
     }
 
-    /// A scene of the records in `ranges` (ascending), with one body per file that has any. Vertices are numbered densely.
+    /// A scene of the records in `ranges` (ascending), with one body per file that has any.
+    /// Vertices are numbered densely.
     pub fn scene(&self, ranges: &[Range<usize>], weld: bool) -> Result<Part, impinge::Error> {
         let mut part = Part {
             scene: Scene::new(),
@@ -177,7 +178,8 @@ impl Records {
     }
 }
 
-/// Gives equal keys equal numbers, from 0 on. Returns the number of each key, and the first place of each number.
+/// Gives equal keys equal numbers, from 0 on. Returns the number of each key, and the first place
+/// of each number.
 fn dense<K: Ord>(keys: impl Iterator<Item = K>) -> (Vec<u32>, Vec<u32>) {
     let mut sorted: Vec<(K, u32)> = keys.zip(0u32..).collect();
     sorted.sort_unstable();

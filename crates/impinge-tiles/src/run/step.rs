@@ -1,4 +1,5 @@
-//! Runs one tile of a step: finds the first contacts among its surfaces, and keeps those that the tile owns.
+//! Runs one tile of a step: finds the first contacts among its surfaces, and keeps those that the
+//! tile owns.
 
 use std::ops::Range;
 
@@ -62,7 +63,8 @@ impl Plan {
                     find(&part).map_err(refused)?;
                 }
             }
-            // Two pieces have the pairs within each of them again, and pieces share edges and vertices.
+            // Two pieces have the pairs within each of them again, and pieces share edges and
+            // vertices.
             rows.sort_unstable();
             rows.dedup();
         }

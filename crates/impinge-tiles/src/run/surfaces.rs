@@ -1,9 +1,11 @@
-//! The surfaces of a tile of a step, scenes of some of their faces, and names for the elements of such a scene.
+//! The surfaces of a tile of a step, scenes of some of their faces, and names for the elements of
+//! such a scene.
 //!
-//! A tile has only some of a body's primitives, so its surface may have faces, edges and vertices that the body's surface has
-//! not: the inner faces of tetrahedra whose other side is elsewhere. Their boxes, inflated by the separation as in `cells.rs`, do
-//! not touch the tile's cell, because a primitive that has such an element would touch it too and be here. So no pair that the
-//! tile owns has one of them.
+//! A tile has only some of a body's primitives, so its surface may have faces, edges and vertices
+//! that the body's surface has not: the inner faces of tetrahedra whose other side is elsewhere.
+//! Their boxes, inflated by the separation as in `cells.rs`, do not touch the tile's cell, because
+//! a primitive that has such an element would touch it too and be here. So no pair that the tile
+//! owns has one of them.
 
 use std::ops::Range;
 
@@ -74,7 +76,8 @@ impl Surface {
         let Elements::Triangles(faces) = body.part(Part::Faces) else {
             unreachable!("faces are triangles");
         };
-        // Faces are in the order of the first tetrahedron that has them, then of the opposite corner.
+        // Faces are in the order of the first tetrahedron that has them, then of the opposite
+        // corner.
         let sides = tetrahedra.iter().zip(numbers).flat_map(|(&tet, number)| {
             let [a, b, c, d] = tet;
             let sides = [[b, c, d], [a, d, c], [a, b, d], [a, c, b]];
@@ -151,7 +154,8 @@ pub struct SurfaceScene<'a> {
 struct OfSurface<'a> {
     id: BodyId,
     surface: &'a Surface,
-    /// The body's vertices as numbers within the surface, ascending, so that edges are in the same order.
+    /// The body's vertices as numbers within the surface, ascending, so that edges are in the same
+    /// order.
     vertices: Vec<u32>,
     /// Its faces as numbers within the surface.
     faces: Vec<u32>,
@@ -197,7 +201,8 @@ impl<'a> SurfaceScene<'a> {
         Ok(([a, b], owner_point(&low_a, &low_b)))
     }
 
-    /// The elements whose lower corner `is_mine` accepts, of those that merging must number: body, part, name; ascending.
+    /// The elements whose lower corner `is_mine` accepts, of those that merging must number: body,
+    /// part, name; ascending.
     pub fn to_number(
         &self,
         is_mine: impl Fn(Point) -> bool,

@@ -1,5 +1,5 @@
-//! NumPy arrays of corners: `(n, 3, 3)` triangles or `(n, 4, 3)` tetrahedra, `<f4` or `<f8`; each primitive has vertices of its
-//! own.
+//! NumPy arrays of corners: `(n, 3, 3)` triangles or `(n, 4, 3)` tetrahedra, `<f4` or `<f8`; each
+//! primitive has vertices of its own.
 
 use std::path::{Path, PathBuf};
 

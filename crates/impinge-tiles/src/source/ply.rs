@@ -53,7 +53,8 @@ impl Ply {
         let vertex_bytes = layout.n_vertices * layout.vertex_stride as u64;
         let faces_start = layout.start + vertex_bytes;
         if length(path)? != faces_start + layout.n_faces * layout.face.stride as u64 {
-            // Faces of other lengths, or a file that is too short: the reader of whole files decides.
+            // Faces of other lengths, or a file that is too short: the reader of whole files
+            // decides.
             return Ok(None);
         }
         Ok(Some(Ply {
@@ -167,7 +168,8 @@ fn size(name: &str) -> Option<usize> {
     })
 }
 
-/// Reads a header: vertices with x, y, z, then faces with one list of 4-byte vertex numbers, and nothing else.
+/// Reads a header: vertices with x, y, z, then faces with one list of 4-byte vertex numbers, and
+/// nothing else.
 fn layout(head: &[u8]) -> Option<Layout> {
     let end_mark = b"end_header\n";
     let end = head

@@ -1,4 +1,5 @@
-//! Binary STL: 80 bytes of title, a count, 50 bytes per triangle (a normal, three corners, two bytes).
+//! Binary STL: 80 bytes of title, a count, 50 bytes per triangle (a normal, three corners, two
+//! bytes).
 
 use std::path::{Path, PathBuf};
 

@@ -1,7 +1,8 @@
-//! A body of a step with its vertices welded: those at one position at the start and at one position at the end become one.
+//! A body of a step with its vertices welded: those at one position at the start and at one
+//! position at the end become one.
 //!
-//! Vertices are numbered in the answer, and the number of a welded vertex depends on all vertices before it. So a body is
-//! welded as a whole before it is scattered, not tile by tile.
+//! Vertices are numbered in the answer, and the number of a welded vertex depends on all vertices
+//! before it. So a body is welded as a whole before it is scattered, not tile by tile.
 
 use super::Source;
 use crate::chunk::{Chunk, Shape};

@@ -1,5 +1,6 @@
-//! Tiles compared with the oracle on lattices, where everything touches: any cuts, both precisions, both adjacency rules,
-//! triangles and tetrahedra. One test shows that wrong comparisons would be noticed.
+//! Tiles compared with the oracle on lattices, where everything touches: any cuts, both precisions,
+//! both adjacency rules, triangles and tetrahedra. One test shows that wrong comparisons would be
+//! noticed.
 
 use std::collections::BTreeMap;
 
@@ -128,8 +129,8 @@ fn a_pile_that_no_cut_parts_falls_apart_into_pieces() {
     assert_eq!((rows(&merged), merged.hash), (expected, hash));
 }
 
-/// For boxes on a lattice: how many pairs with gaps of at most the separation the tiles of a rule miss, and how many pairs they
-/// find more than once.
+/// For boxes on a lattice: how many pairs with gaps of at most the separation the tiles of a rule
+/// miss, and how many pairs they find more than once.
 fn found<R: Rule>(seed: u64, separation: f64) -> (usize, usize) {
     let mut random = Random(seed);
     let (mut n_lost, mut n_twice) = (0, 0);
@@ -236,7 +237,8 @@ impl Rule for NotInflated {
     }
 }
 
-/// As if both boxes were inflated by half the separation: then the owner point of the boxes as they are can lie outside.
+/// As if both boxes were inflated by half the separation: then the owner point of the boxes as they
+/// are can lie outside.
 struct HalfInflated;
 
 impl Rule for HalfInflated {
@@ -256,7 +258,8 @@ impl Rule for HalfInflated {
 
 #[test]
 fn a_sum_that_rounds_down_still_reaches_the_owner_point() {
-    // The boxes of two vertices whose distance is exactly the separation, or as near to it as numbers allow.
+    // The boxes of two vertices whose distance is exactly the separation, or as near to it as
+    // numbers allow.
     let mut random = Random(8);
     let mut n_rounded = 0;
     for _ in 0..100_000 {
@@ -278,8 +281,8 @@ fn a_sum_that_rounds_down_still_reaches_the_owner_point() {
     assert!(n_rounded > 1_000, "{n_rounded}");
 }
 
-/// Whether `a - b` exceeds `c` as real numbers, all three positive and `a` the largest: `a - b` is split into a rounded
-/// difference and its error.
+/// Whether `a - b` exceeds `c` as real numbers, all three positive and `a` the largest: `a - b` is
+/// split into a rounded difference and its error.
 fn difference_exceeds(a: f64, b: f64, c: f64) -> bool {
     let difference = a - b;
     let back = a - difference;

@@ -24,7 +24,8 @@ impl Random {
     }
 }
 
-/// Primitives over few vertices of a lattice: many touch, lie on cuts, or are degenerate. One in eight is very large.
+/// Primitives over few vertices of a lattice: many touch, lie on cuts, or are degenerate. One in
+/// eight is very large.
 pub fn lattice(random: &mut Random, n: usize, is_solid: bool, is_f64: bool) -> Mesh {
     let width = 4 + random.below(8);
     let n_vertices = 4 + n as u32 / 2;
@@ -185,7 +186,8 @@ pub fn oracle_as_given(meshes: &[Mesh], ask: Ask) -> (Vec<[u32; 4]>, u64) {
     (pairs.rows().collect(), pairs.hash())
 }
 
-/// What the oracle finds while bodies move from their first mesh to their second, welded and kept apart as a plan says.
+/// What the oracle finds while bodies move from their first mesh to their second, welded and kept
+/// apart as a plan says.
 pub fn step_oracle(bodies: &[[Mesh; 2]], options: &PlanOptions, ask: Ask) -> Impacts {
     let mut scene = Scene::new();
     for [start, end] in bodies {

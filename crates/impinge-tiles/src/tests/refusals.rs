@@ -1,4 +1,5 @@
-//! Errors name files that are missing, stale, damaged or changed, and coordinates that are not finite.
+//! Errors name files that are missing, stale, damaged or changed, and coordinates that are not
+//! finite.
 
 use std::path::{Path, PathBuf};
 
@@ -358,7 +359,8 @@ fn soups_are_welded_tile_by_tile_as_the_whole_would_be() {
 
 #[test]
 fn faces_of_many_corners_are_read_whole() {
-    // These faces have as many bytes as triangles with one more byte; only the count of corners distinguishes them.
+    // These faces have as many bytes as triangles with one more byte; only the count of corners
+    // distinguishes them.
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("quads.ply");
     let mut bytes = b"ply\nformat binary_little_endian 1.0\nelement vertex 4\nproperty float x\nproperty float y\n\

@@ -1,4 +1,5 @@
-//! Steps tile by tile compared with the oracle on the whole: rows, times and hash, on lattices where everything touches.
+//! Steps tile by tile compared with the oracle on the whole: rows, times and hash, on lattices
+//! where everything touches.
 
 use std::path::PathBuf;
 
@@ -121,7 +122,8 @@ fn tiles_have_the_impacts_of_the_whole() {
             cells: random.chance(8).then(Cells::whole).or(Some(cuts)),
             step: true,
             weld: random.chance(2),
-            // None; exactly the distance of neighbours on the lattice; less than that; more than a cell.
+            // None; exactly the distance of neighbours on the lattice; less than that; more than a
+            // cell.
             separation: [0.0, unit, 0.1, 3.0 * unit][random.below(4) as usize],
             ..PlanOptions::default()
         };

@@ -1,9 +1,10 @@
 //! A table of pairs that loses some of them.
 //!
-//! Section 4.2 of the paper says that possible pairs are handled "by a hashing function", that DJB2 was
-//! tested, and that pairs are lost to its conflicts, but nothing more. Here a slot holds one pair. While cells are
-//! paired, every possible pair goes to its slot. A repetition of the same pair changes nothing; of
-//! different pairs only the lowest stays. Afterwards the pair in each occupied slot is tested once.
+//! Section 4.2 of the paper says that possible pairs are handled "by a hashing function", that DJB2
+//! was tested, and that pairs are lost to its conflicts, but nothing more. Here a slot holds one
+//! pair. While cells are paired, every possible pair goes to its slot. A repetition of the same
+//! pair changes nothing; of different pairs only the lowest stays. Afterwards the pair in each
+//! occupied slot is tested once.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -137,7 +138,8 @@ impl Rule for Insert<'_> {
     }
 }
 
-/// Bernstein's hash of the bytes of two numbers, low bytes first: `hash = 33 hash + byte`, from 5381, in 32 bits.
+/// Bernstein's hash of the bytes of two numbers, low bytes first: `hash = 33 hash + byte`, from
+/// 5381, in 32 bits.
 #[inline(always)]
 fn djb2(a: u32, b: u32) -> u32 {
     let bytes = [a.to_le_bytes(), b.to_le_bytes()];

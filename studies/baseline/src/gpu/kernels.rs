@@ -30,7 +30,8 @@ macro_rules! words {
 words! {
     /// Entries of the primitives before this one in its workgroup.
     First
-    /// The number of entries of each workgroup of primitives; after the scan, of all workgroups before it.
+    /// The number of entries of each workgroup of primitives; after the scan, of all workgroups
+    /// before it.
     Sum
     /// How often a digit occurs in each block; after the scan, in all blocks before it.
     DigitCount
@@ -187,7 +188,8 @@ kernels! {
     pairing: Pairing from "pairing" (BOXES, COARSE, GROUPS, RESERVE);
 }
 
-/// The name and the text of every shader that this crate compiles, for compilers other than naga to check.
+/// The name and the text of every shader that this crate compiles, for compilers other than naga to
+/// check.
 pub fn shaders() -> impl Iterator<Item = (&'static str, String)> {
     let sources = all().into_iter();
     sources.map(|(source, _)| (source.name, source.text()))

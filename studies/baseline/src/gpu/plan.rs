@@ -10,8 +10,8 @@
 //! narrow     the filter                                                    impinge's own
 //! ```
 //!
-//! A pass processes a given range of cells. It counts the items that do not fit; then the engine grows its buffers and
-//! runs the pass again, as for impinge's own methods.
+//! A pass processes a given range of cells. It counts the items that do not fit; then the engine
+//! grows its buffers and runs the pass again, as for impinge's own methods.
 
 use impinge_core::Error;
 use impinge_core::gpu::Gpu;
@@ -27,7 +27,8 @@ use super::kernels::{
     Pairing, SortCount, SortScan, SortScatter, Sum,
 };
 
-/// Slots of indirect arguments: blocks of a sort, workgroups over entries. The slots of pairing and narrow are impinge's.
+/// Slots of indirect arguments: blocks of a sort, workgroups over entries. The slots of pairing and
+/// narrow are impinge's.
 const BLOCKS: u32 = 2;
 const ENTRIES: u32 = 3;
 

@@ -112,8 +112,8 @@ pub fn cases() -> Vec<Case> {
     cases
 }
 
-/// How often each pair of f32 bodies is tested, by brute force: for each pair, the number of coarse cells
-/// (by the paper's equations 1 to 3) that hold a common sub-cell.
+/// How often each pair of f32 bodies is tested, by brute force: for each pair, the number of coarse
+/// cells (by the paper's equations 1 to 3) that hold a common sub-cell.
 pub fn brute_checks(case: &Case, lambda: f64, boxes: bool) -> Checks {
     type Box = [[f32; 3]; 2];
     let primitives = |id: BodyId| -> Vec<Box> {

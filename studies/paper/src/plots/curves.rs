@@ -46,7 +46,8 @@ pub(crate) struct Curves {
 }
 
 impl Axis {
-    /// A linear axis from 0 to at least `most`, in about six steps of 1, 2 or 5 times a power of ten.
+    /// A linear axis from 0 to at least `most`, in about six steps of 1, 2 or 5 times a power of
+    /// ten.
     pub fn linear(name: &str, most: f64) -> Self {
         let most = if most > 0.0 { most } else { 1.0 };
         let power = 10f64.powf((most / 6.0).log10().floor());
@@ -68,7 +69,8 @@ impl Axis {
         }
     }
 
-    /// A logarithmic axis that contains all values above 0, with labels at 1, 2 and 5 times powers of ten.
+    /// A logarithmic axis that contains all values above 0, with labels at 1, 2 and 5 times powers
+    /// of ten.
     pub fn log(name: &str, values: impl IntoIterator<Item = f64>) -> Self {
         let (low, high) = values
             .into_iter()

@@ -35,7 +35,8 @@ pub struct CheckArgs {
     /// Mesh files
     #[arg(value_name = "MESH", required_unless_present = "list")]
     pub meshes: Vec<PathBuf>,
-    /// A file with one path per line (- for standard input); empty lines and lines that start with # are ignored
+    /// A file with one path per line (- for standard input); empty lines and lines that start with
+    /// # are ignored
     #[arg(long, value_name = "FILE")]
     pub list: Option<PathBuf>,
     /// Print one line of JSON per mesh and nothing else
@@ -44,16 +45,19 @@ pub struct CheckArgs {
     /// What is printed
     #[arg(long, value_enum, value_name = "FORMAT", conflicts_with = "json", default_value_t = Format::Text)]
     pub format: Format,
-    /// A folder for rows, in which an interrupted run can continue; or a mesh file that shows the problems (.glb, .ply, .vtu)
+    /// A folder for rows, in which an interrupted run can continue; or a mesh file that shows the
+    /// problems (.glb, .ply, .vtu)
     #[arg(long, value_name = "DIR|MESH")]
     pub out: Option<Out>,
-    /// Exit with code 3 if any mesh has one of these problems (comma-separated); a mesh that could not be checked always fails
+    /// Exit with code 3 if any mesh has one of these problems (comma-separated); a mesh that could
+    /// not be checked always fails
     #[arg(long, value_name = "WHAT", value_enum, value_delimiter = ',')]
     pub fail_on: Vec<FailOn>,
     /// Do not weld vertices at the same position
     #[arg(long)]
     pub no_weld: bool,
-    /// Count edges and vertices as the file has them, and weld only to find self-intersections: for meshes that `impinge fix` has split
+    /// Count edges and vertices as the file has them, and weld only to find self-intersections: for
+    /// meshes that `impinge fix` has split
     #[arg(long, conflicts_with = "no_weld")]
     pub keep_seams: bool,
     /// The most places of each problem that rows name, largest first

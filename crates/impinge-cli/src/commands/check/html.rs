@@ -1,7 +1,9 @@
-//! `impinge check --html`: one self-contained page with a sortable table, a picture per mesh and one per place.
+//! `impinge check --html`: one self-contained page with a sortable table, a picture per mesh and
+//! one per place.
 //!
-//! Pictures are PNG in base64, drawn on the CPU. Browsers decode them when they come into view, and those of places when
-//! their list is opened. Meshes are checked and drawn one after another, so memory holds one of them.
+//! Pictures are PNG in base64, drawn on the CPU. Browsers decode them when they come into view, and
+//! those of places when their list is opened. Meshes are checked and drawn one after another, so
+//! memory holds one of them.
 
 use std::io::Write;
 use std::path::Path;

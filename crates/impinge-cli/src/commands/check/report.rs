@@ -57,7 +57,8 @@ impl FailOn {
     }
 }
 
-/// The problems of a mesh, in the order of the summary. A mesh that could not be checked has one alone.
+/// The problems of a mesh, in the order of the summary. A mesh that could not be checked has one
+/// alone.
 fn findings<'a>(row: &'a Row, args: &CheckArgs) -> Vec<Finding<'a>> {
     let of = |kind: FailOn| {
         let is_named = args.fail_on.contains(&kind) || args.fail_on.contains(&FailOn::Any);
@@ -241,7 +242,8 @@ fn junit(rows: &[Row], args: &CheckArgs) -> String {
     )
 }
 
-/// Text in an attribute of XML or HTML. Control characters, which XML cannot hold, are escaped as in all messages.
+/// Text in an attribute of XML or HTML. Control characters, which XML cannot hold, are escaped as
+/// in all messages.
 pub fn escaped(text: &str) -> String {
     let mut safe = String::new();
     for c in printable(text).chars() {

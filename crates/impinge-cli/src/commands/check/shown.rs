@@ -1,6 +1,7 @@
 //! The problems of meshes in colours: mesh files and pictures.
 //!
-//! Child processes do not send marks of primitives, so meshes are checked once more in this process.
+//! Child processes do not send marks of primitives, so meshes are checked once more in this
+//! process.
 
 use std::io::Write;
 use std::path::Path;
@@ -53,7 +54,8 @@ fn color(checked: &Checked, primitive: usize) -> [u8; 3] {
         .map_or(FINE, Problem::color)
 }
 
-/// Writes the meshes, welded as in the check; each primitive has the colour of its most serious problem.
+/// Writes the meshes, welded as in the check; each primitive has the colour of its most serious
+/// problem.
 pub fn write_mesh(file: &MeshFile, rows: &[Row], args: &CheckArgs) -> Result<(), Error> {
     let checked = marked(rows, args)?;
     let colors: Vec<Vec<[u8; 3]>> = checked
@@ -102,7 +104,8 @@ pub fn print_legend() -> Result<(), Error> {
     Ok(())
 }
 
-/// Draws the meshes in the same colours. Primitives with a problem show through faces that hide them.
+/// Draws the meshes in the same colours. Primitives with a problem show through faces that hide
+/// them.
 pub fn draw(path: &Path, rows: &[Row], args: &CheckArgs) -> Result<(), Error> {
     let meshes = marked(rows, args)?;
     let surfaces = meshes.iter().map(|(_, checked)| surface(checked));

@@ -151,7 +151,8 @@ pub fn line(counts: &Counts) -> [u64; 8] {
     ]
 }
 
-/// Prints the command that helps most: one that mends, or, where nothing can be mended, one that shows.
+/// Prints the command that helps most: one that mends, or, where nothing can be mended, one that
+/// shows.
 pub fn print_next(rows: &[Row], args: &CheckArgs) -> Result<(), Error> {
     let is_mendable = |row: &&Row| {
         row.result.as_ref().is_ok_and(|counts| {

@@ -88,8 +88,9 @@ impl<'a> Found<'a> {
         }
     }
 
-    /// `free`, `earliest`, `impacts`, `kinds`, `touching_at_start`, `start_intersects`, `hash`, `backend`, `bodies`, `ms`, `stats`, `separation`,
-    /// `clearance`, and `fraction` with `--advance`; counts and the hash are null with `--earliest` and `--advance`.
+    /// `free`, `earliest`, `impacts`, `kinds`, `touching_at_start`, `start_intersects`, `hash`,
+    /// `backend`, `bodies`, `ms`, `stats`, `separation`, `clearance`, and `fraction` with
+    /// `--advance`; counts and the hash are null with `--earliest` and `--advance`.
     pub fn json(&self, bodies: &Moving, how: &StepHow) -> Result<Map<String, Value>, Error> {
         let mut object = self.numbers();
         if let Some(fraction) = self.fraction {

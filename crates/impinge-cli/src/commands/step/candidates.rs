@@ -1,4 +1,5 @@
-//! `impinge step --candidates`: pairs of elements whose boxes overlap, written run by run, so that memory holds only one run.
+//! `impinge step --candidates`: pairs of elements whose boxes overlap, written run by run, so that
+//! memory holds only one run.
 
 use std::io::{self, Write};
 use std::ops::ControlFlow;
@@ -87,8 +88,8 @@ impl Written {
         self.counts.iter().sum()
     }
 
-    /// `candidates`, `kinds`, `hash`, `runs`, `inflation`, `asked`, `bodies`, `ms`, `stats`; `ms` holds the time of
-    /// finding and writing all runs, `stats` the counters of the last one.
+    /// `candidates`, `kinds`, `hash`, `runs`, `inflation`, `asked`, `bodies`, `ms`, `stats`; `ms`
+    /// holds the time of finding and writing all runs, `stats` the counters of the last one.
     pub fn json(
         &self,
         bodies: &Moving,

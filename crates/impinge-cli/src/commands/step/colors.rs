@@ -1,4 +1,5 @@
-//! Colliding primitives, coloured by their time of contact: red at the start of the step, yellow at its end.
+//! Colliding primitives, coloured by their time of contact: red at the start of the step, yellow at
+//! its end.
 
 use std::collections::HashMap;
 

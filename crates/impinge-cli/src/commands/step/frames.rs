@@ -50,7 +50,8 @@ pub trait Frames {
     fn refused(&self, frame_ix: usize, source: impinge::Error) -> Error;
 }
 
-/// Steps from each frame of a range to the next, the body `moving` in motion and all others at rest.
+/// Steps from each frame of a range to the next, the body `moving` in motion and all others at
+/// rest.
 pub fn steps_of_sequence(
     (detector, scene, moving): (&mut Detector, &mut Scene, BodyId),
     step: &Query,

@@ -71,7 +71,8 @@ impl Moving {
         Ok(bodies)
     }
 
-    /// Writes the positions at both ends again, so that a detector can't reuse anything made from them.
+    /// Writes the positions at both ends again, so that a detector can't reuse anything made from
+    /// them.
     pub fn rewrite(&mut self) -> Result<(), Error> {
         for &id in &self.ids {
             let body = self.scene.body(id)?;

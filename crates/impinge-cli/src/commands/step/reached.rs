@@ -30,8 +30,8 @@ pub fn check(files: &[ReachedFile], bodies: &Moving) -> Result<(), Error> {
     }
 }
 
-/// Writes each body at the positions that were reached, with the vertices and elements of its files, so that the files can begin the
-/// next step.
+/// Writes each body at the positions that were reached, with the vertices and elements of its
+/// files, so that the files can begin the next step.
 pub fn write(files: &[ReachedFile], bodies: &Moving, advance: &Advance) -> Result<(), Error> {
     for (ix, (file, given)) in files.iter().zip(&bodies.given).enumerate() {
         let id = bodies.ids[ix];

@@ -62,10 +62,12 @@ pub struct PlanArgs {
     /// Mesh files, one per body; with --step two per body, its start and its end
     #[arg(value_name = "MESH", required = true)]
     pub meshes: Vec<PathBuf>,
-    /// Plan a step: tiles then find what touches while bodies move from start to end, and when first
+    /// Plan a step: tiles then find what touches while bodies move from start to end, and when
+    /// first
     #[arg(long)]
     pub step: bool,
-    /// Of a step: the distance that elements must keep; tiles find the first time at which they are as near as that
+    /// Of a step: the distance that elements must keep; tiles find the first time at which they are
+    /// as near as that
     #[arg(long, value_name = "D", default_value = "0", requires = "step", allow_negative_numbers = true, value_parser = distance)]
     pub separation: f64,
     /// About how many primitives a tile may hold, such as 500k or 2M: about 300 bytes each
@@ -74,7 +76,8 @@ pub struct PlanArgs {
     /// The number of primitives that a thread scatters at a time: about 200 bytes each
     #[arg(long, value_name = "N", value_parser = count, default_value = "500k")]
     pub chunk: u64,
-    /// Weld vertices at the same position, within each file; with --step, both at the start and at the end. This is the default
+    /// Weld vertices at the same position, within each file; with --step, both at the start and at
+    /// the end. This is the default
     #[arg(long, overrides_with = "no_weld")]
     pub weld: bool,
     /// Do not weld vertices at the same position

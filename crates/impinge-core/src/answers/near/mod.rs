@@ -25,24 +25,30 @@ pub struct NearPair {
     pub kind: PairKind,
     /// The element that the kind names first, numbered as in [`Impact::a`](crate::Impact::a).
     pub a: Element,
-    /// The other element. Where both are of the same kind, it is of a body with a higher id, or the higher element.
+    /// The other element. Where both are of the same kind, it is of a body with a higher id, or the
+    /// higher element.
     pub b: Element,
-    /// The features of `a` and of `b` that are nearest to each other, decided exactly: those with the nearest points
-    /// in their inside. Of several at the same distance, the first of the smallest.
+    /// The features of `a` and of `b` that are nearest to each other, decided exactly: those with
+    /// the nearest points in their inside. Of several at the same distance, the first of the
+    /// smallest.
     pub features: [Feature; 2],
-    /// Whether nearest points may not be the only ones: edges are parallel, or an element is degenerate, or faces are
-    /// parallel.
+    /// Whether nearest points may not be the only ones: edges are parallel, or an element is
+    /// degenerate, or faces are parallel.
     pub is_parallel: bool,
-    /// The distance, where [`Query::distances`](crate::Query::distances) or [`Query::closest_points`](crate::Query::closest_points) asks for it: that of the nearest points.
+    /// The distance, where [`Query::distances`](crate::Query::distances) or
+    /// [`Query::closest_points`](crate::Query::closest_points) asks for it: that of the nearest
+    /// points.
     pub distance: Option<f64>,
-    /// Distance and nearest points, where [`Query::closest_points`](crate::Query::closest_points) asks for them.
+    /// Distance and nearest points, where [`Query::closest_points`](crate::Query::closest_points)
+    /// asks for them.
     pub closest: Option<ClosestPoints>,
 }
 
 /// Nearest points of two elements and their distance, rounded.
 ///
-/// They are computed from exact quotients in one order of operations, so they have the same bits on every machine. Whether
-/// a pair is near is decided exactly, not by these numbers: a distance may be rounded to a number above the one asked for.
+/// They are computed from exact quotients in one order of operations, so they have the same bits on
+/// every machine. Whether a pair is near is decided exactly, not by these numbers: a distance may
+/// be rounded to a number above the one asked for.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ClosestPoints {
     /// The distance, wrong by a few units in the last place at most. 0 for elements that touch.
@@ -52,14 +58,16 @@ pub struct ClosestPoints {
 }
 
 impl NearPair {
-    /// The row `[body_a, element_a, body_b, element_b]`, with bodies by their [`index`](crate::BodyId::index).
+    /// The row `[body_a, element_a, body_b, element_b]`, with bodies by their
+    /// [`index`](crate::BodyId::index).
     pub fn row(&self) -> [u32; 4] {
         row(self.a, self.b)
     }
 
-    /// ipc-toolkit's name of the distance type: `P_T`, `P_E0`, `P_T0` of a vertex and a face; `EA_EB`, `EA_EB0`, `EA0_EB1`
-    /// of edges; `P_E`, `P_E0`, `P_E1` of an edge and a vertex; `P_P` of vertices. Of an edge and a face, or of faces, the
-    /// kinds of the features: `P_P`, `P_E`, `P_T`, `E_E`, and `E_T` where an edge passes through a face.
+    /// ipc-toolkit's name of the distance type: `P_T`, `P_E0`, `P_T0` of a vertex and a face;
+    /// `EA_EB`, `EA_EB0`, `EA0_EB1` of edges; `P_E`, `P_E0`, `P_E1` of an edge and a vertex; `P_P`
+    /// of vertices. Of an edge and a face, or of faces, the kinds of the features: `P_P`, `P_E`,
+    /// `P_T`, `E_E`, and `E_T` where an edge passes through a face.
     pub fn name(&self) -> &'static str {
         let pair = match self.kind {
             PairKind::VertexFace => Some((ElementPair::VertexFace, false)),
@@ -79,8 +87,8 @@ impl NearPair {
 
 /// All pairs of elements that are near, sorted by `(kind, body_a, element_a, body_b, element_b)`.
 ///
-/// The same input gives the same bytes on every method, backend, thread count and budget. A pair takes nine bytes, 8 more
-/// with its distance, and 56 more with its nearest points.
+/// The same input gives the same bytes on every method, backend, thread count and budget. A pair
+/// takes nine bytes, 8 more with its distance, and 56 more with its nearest points.
 #[derive(Clone, Default)]
 pub struct NearPairs {
     numbering: Numbering,
@@ -127,8 +135,8 @@ impl NearPairs {
         &mut self.stats
     }
 
-    /// Takes what was found: sorted keys with their [`Labels`]. Parts of about `n_each` pairs are to be
-    /// [named](Unnamed::name) next.
+    /// Takes what was found: sorted keys with their [`Labels`]. Parts of about `n_each` pairs are
+    /// to be [named](Unnamed::name) next.
     ///
     /// # Errors
     /// There is no memory for the features and nearest points.
@@ -232,8 +240,8 @@ impl NearPairs {
         })
     }
 
-    /// A hash of the set of pairs and their features that does not depend on their order: the wrapping sum of a mixed
-    /// 64-bit word per pair. Distances and points are not part of it.
+    /// A hash of the set of pairs and their features that does not depend on their order: the
+    /// wrapping sum of a mixed 64-bit word per pair. Distances and points are not part of it.
     pub fn hash(&self) -> u64 {
         self.iter().hash()
     }
@@ -244,7 +252,8 @@ impl NearPairs {
     }
 }
 
-/// The pairs of an answer, to be left out of others: those that are near in a pose at rest, for one.
+/// The pairs of an answer, to be left out of others: those that are near in a pose at rest, for
+/// one.
 impl From<&NearPairs> for Exclusion {
     fn from(near: &NearPairs) -> Self {
         let named = |of: Element| (of.body, of.element);
@@ -332,8 +341,8 @@ fn first<'a, T>(list: &mut &'a mut [T], n: usize) -> &'a mut [T] {
 }
 
 impl Unnamed<'_> {
-    /// Names the features of all pairs. Features that keys do not carry come from `find`, with nearest points where they were asked
-    /// for.
+    /// Names the features of all pairs. Features that keys do not carry come from `find`, with
+    /// nearest points where they were asked for.
     pub fn name(
         &mut self,
         labels: Labels,

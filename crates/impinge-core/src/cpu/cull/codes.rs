@@ -47,7 +47,8 @@ impl Codes {
     /// Writes the cells of vertices `range` of a body whose codes start at `first`.
     ///
     /// # Safety
-    /// The codes must still live and include the body's; no other thread may use those of `range` at the same time.
+    /// The codes must still live and include the body's; no other thread may use those of `range`
+    /// at the same time.
     pub unsafe fn put(
         self,
         isa: Isa,

@@ -8,9 +8,10 @@
 //! look up    each primitive again: whether its range has such a cell
 //! ```
 //!
-//! In: positions and where each body may meet others. Out: whether a primitive may have a partner. Cost: four
-//! bytes per vertex, twelve per primitive near other bodies. Invariant: the function from coordinates to
-//! cells is monotone under any rounding, so a point of two primitives lies in a cell that both mark.
+//! In: positions and where each body may meet others. Out: whether a primitive may have a partner.
+//! Cost: four bytes per vertex, twelve per primitive near other bodies. Invariant: the function
+//! from coordinates to cells is monotone under any rounding, so a point of two primitives lies in a
+//! cell that both mark.
 
 mod codes;
 
@@ -26,13 +27,14 @@ use crate::scene::index::{ElementIx, PartIx};
 use super::world::World;
 use codes::{Codes, Function, greater_bytes, lesser_bytes};
 
-/// The most cells along each axis. Two more hold vertices outside the region. A row along x then has 64 cells;
-/// along y and z a byte numbers the cells.
+/// The most cells along each axis. Two more hold vertices outside the region. A row along x then
+/// has 64 cells; along y and z a byte numbers the cells.
 const MOST_ALONG: [u32; 3] = [62, 253, 253];
 /// Primitives that are examined together; then those among them that are near are marked.
 const TOGETHER: usize = 512;
 
-/// A primitive within its body's reach, and the first and last cell of its vertices along x, y, z, one byte per axis.
+/// A primitive within its body's reach, and the first and last cell of its vertices along x, y, z,
+/// one byte per axis.
 #[derive(Debug, Clone, Copy)]
 struct WithinReach {
     primitive: ElementIx,
@@ -78,7 +80,8 @@ pub(crate) struct Cull {
     function: Function,
     /// The number of cells along each axis, including those outside the region.
     along: [u32; 3],
-    /// The most rows of the map that one primitive marks; a larger primitive counts as being everywhere.
+    /// The most rows of the map that one primitive marks; a larger primitive counts as being
+    /// everywhere.
     most_marked: u32,
     /// The cell of each vertex, one byte per axis, body after body.
     codes: Vec<u32>,
@@ -99,8 +102,8 @@ impl Cull {
     /// The most maps, and so the most parts: there are sets of them.
     pub const MOST_MAPS: usize = u32::BITS as usize;
 
-    /// Prepares for a frame of at most [`MOST_MAPS`](Self::MOST_MAPS) parts, which meet within the region; their
-    /// primitives come in `n_runs` runs.
+    /// Prepares for a frame of at most [`MOST_MAPS`](Self::MOST_MAPS) parts, which meet within the
+    /// region; their primitives come in `n_runs` runs.
     pub fn begin(&mut self, world: World<'_>, region: &Bounds, n_runs: usize, tuning: &Tuning) {
         self.most_marked = tuning.most_marked;
         let plan = world.plan;
@@ -111,7 +114,8 @@ impl Cull {
         self.function = Function {
             origin: region.min,
             scale: std::array::from_fn(|axis| {
-                // Slightly less than all cells, so that the region's end still lies in the last cell.
+                // Slightly less than all cells, so that the region's end still lies in the last
+                // cell.
                 let extent = region.max[axis] - region.min[axis];
                 let scale = (along[axis] as f32 - 0.01) / extent;
                 if scale.is_finite() && scale > 0.0 {
@@ -263,7 +267,8 @@ impl Cull {
         }
     }
 
-    /// Calls back for the primitives of a run that may have partners, in order. Returns how many were near.
+    /// Calls back for the primitives of a run that may have partners, in order. Returns how many
+    /// were near.
     pub fn for_live(&self, run_ix: usize, mut call: impl FnMut(ElementIx)) -> usize {
         let near = self.near[run_ix].lock().expect("no task panics");
         for near in &*near {

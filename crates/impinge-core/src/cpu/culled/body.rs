@@ -1,4 +1,5 @@
-//! The clusters of a body, sorted into those that are near and six groups that lie beside the other bodies.
+//! The clusters of a body, sorted into those that are near and six groups that lie beside the other
+//! bodies.
 
 use std::ops::Range;
 
@@ -24,7 +25,8 @@ pub(crate) struct SomeClusters {
 #[derive(Debug)]
 pub(crate) struct Culled {
     is_sorted: bool,
-    /// The group of each cluster; `None` for clusters that are near. Clusters in a group have empty boxes.
+    /// The group of each cluster; `None` for clusters that are near. Clusters in a group have empty
+    /// boxes.
     sides: Vec<Option<FreeSide>>,
     /// The clusters that are near.
     near: Vec<SomeClusters>,
@@ -63,7 +65,8 @@ impl Culled {
         self.is_sorted
     }
 
-    /// Whether clusters are to be sorted at the frame's end, once the boxes of all near clusters are known.
+    /// Whether clusters are to be sorted at the frame's end, once the boxes of all near clusters
+    /// are known.
     pub(super) fn is_due(&self) -> bool {
         !self.unsorted.is_empty() || (!self.is_sorted && !self.outlook.waits())
     }
@@ -112,16 +115,16 @@ impl Culled {
         std::mem::take(&mut self.is_sorted)
     }
 
-    /// A frame needs all boxes: the caller ends the sorting. It does not begin again at once, for the next frames may need
-    /// all boxes too.
+    /// A frame needs all boxes: the caller ends the sorting. It does not begin again at once, for
+    /// the next frames may need all boxes too.
     pub(super) fn interrupt(&mut self) {
         if self.is_sorted {
             self.outlook.pause();
         }
     }
 
-    /// Some groups have come back: their clusters are near from now on. False if groups have come back too often lately:
-    /// then the caller ends the sorting.
+    /// Some groups have come back: their clusters are near from now on. False if groups have come
+    /// back too often lately: then the caller ends the sorting.
     pub(super) fn come_back(&mut self, groups: Sides, clustering: &Clustering) -> bool {
         if !self.outlook.affords(groups) {
             return false;
@@ -143,8 +146,9 @@ impl Culled {
         extents::of(simd, &positions[vertices], &self.members[runs])
     }
 
-    /// Sorts near clusters by their boxes against the joint box of `others`, and empties the boxes of clusters that lie beside
-    /// it. False if there are too few of these: then the caller ends the sorting.
+    /// Sorts near clusters by their boxes against the joint box of `others`, and empties the boxes
+    /// of clusters that lie beside it. False if there are too few of these: then the caller ends
+    /// the sorting.
     #[must_use]
     pub(super) fn sort(
         &mut self,
@@ -227,8 +231,8 @@ impl Culled {
     }
 }
 
-/// The side on which a box is farthest beside others, measured in units of that side's slack; `None` if no gap is larger
-/// than its slack.
+/// The side on which a box is farthest beside others, measured in units of that side's slack;
+/// `None` if no gap is larger than its slack.
 fn side(cluster: &Bounds, others: &Bounds, slack: &[f32; 6]) -> Option<FreeSide> {
     let mut best = None;
     let mut farthest = 1.0;

@@ -1,9 +1,9 @@
 //! The extent of a body's vertices, and of groups of them, read in memory order.
 //!
-//! In: positions and, for each coordinate, whether it belongs to a group. Out: the box of the whole body, and an interval
-//! along one axis for each of six groups (see `culled`). Sixteen vertices fill three 512-bit registers of interleaved x, y,
-//! z. Axes are separated once, after the last run.
-//! Cost: 12 bytes of positions and 0.75 bytes of membership per vertex, read once.
+//! In: positions and, for each coordinate, whether it belongs to a group. Out: the box of the whole
+//! body, and an interval along one axis for each of six groups (see `culled`). Sixteen vertices
+//! fill three 512-bit registers of interleaved x, y, z. Axes are separated once, after the last
+//! run. Cost: 12 bytes of positions and 0.75 bytes of membership per vertex, read once.
 
 use crate::bvh::bounds::{Bounds, greater, lesser};
 
@@ -66,8 +66,8 @@ impl Extents {
     }
 }
 
-/// The intervals that the groups span: those below along x, y and z, then those above. Each axis stands for itself, so
-/// these are not boxes. Sides without members have empty intervals.
+/// The intervals that the groups span: those below along x, y and z, then those above. Each axis
+/// stands for itself, so these are not boxes. Sides without members have empty intervals.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Intervals([Bounds; 2]);
 
@@ -116,7 +116,8 @@ impl Intervals {
     }
 }
 
-/// The extents of consecutive runs, the last of which may be shorter. Positions and members begin at the same vertex.
+/// The extents of consecutive runs, the last of which may be shorter. Positions and members begin
+/// at the same vertex.
 #[inline(always)]
 pub(super) fn of<S: Simd>(simd: S, positions: &[[f32; 3]], members: &[Members]) -> Extents {
     let mut found = RunExtents::EMPTY;
@@ -140,14 +141,16 @@ pub(super) fn of<S: Simd>(simd: S, positions: &[[f32; 3]], members: &[Members]) 
             groups.min[axis] = lesser(groups.min[axis], found.group_min[end][k]);
             groups.max[axis] = greater(groups.max[axis], found.group_max[end][k]);
         }
-        // Finite only if all terms are. If it overflows on finite terms, the positions are checked one by one.
+        // Finite only if all terms are. If it overflows on finite terms, the positions are checked
+        // one by one.
         sum += found.sum[k];
     }
     extents.all_finite = sum.is_finite();
     extents
 }
 
-/// The side on which a cluster lies beside others, which is its group: below (0 to 2) or above (3 to 5) along an axis.
+/// The side on which a cluster lies beside others, which is its group: below (0 to 2) or above (3
+/// to 5) along an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct FreeSide(u8);
 

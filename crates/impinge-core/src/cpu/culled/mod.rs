@@ -1,9 +1,10 @@
 //! Culled clusters: proven, without their boxes, to be beside all other bodies.
 //!
-//! Computing a cluster's box reads vertices from all over memory; reading vertices in memory order costs a fraction of
-//! that. Bodies that meet mostly do so with only a part of them, and clusters that lie beside the
-//! other body mostly stay there for many frames. So clusters are *sorted*: those that lie beside all
-//! bodies that their body could meet go into one of six groups, below or above them along x, y or z.
+//! Computing a cluster's box reads vertices from all over memory; reading vertices in memory order
+//! costs a fraction of that. Bodies that meet mostly do so with only a part of them, and clusters
+//! that lie beside the other body mostly stay there for many frames. So clusters are *sorted*:
+//! those that lie beside all bodies that their body could meet go into one of six groups, below or
+//! above them along x, y or z.
 //!
 //! ```text
 //!            below, x |  near   | above, x
@@ -11,17 +12,18 @@
 //!   others            [.........]
 //! ```
 //!
-//! Each frame reads all positions in order and finds the interval that each group spans along its axis, and the box of
-//! the whole body. A group whose interval touches no other body's box is proven *culled*, however bodies have
-//! moved: none of its primitives can be in a pair, and its clusters keep empty boxes. A group that touches another box
-//! has come back: its clusters are near in this frame and are sorted again at its end, with more slack between them and
-//! the others if the group came back soon.
+//! Each frame reads all positions in order and finds the interval that each group spans along its
+//! axis, and the box of the whole body. A group whose interval touches no other body's box is
+//! proven *culled*, however bodies have moved: none of its primitives can be in a pair, and its
+//! clusters keep empty boxes. A group that touches another box has come back: its clusters are near
+//! in this frame and are sorted again at its end, with more slack between them and the others if
+//! the group came back soon.
 //!
 //! In: boxes of clusters, then positions frame by frame. Out: which clusters' boxes a frame needs.
 //!
-//! The stage `bounds` asks three questions per frame: [`plan`], before it reads positions, which boxes a body needs;
-//! [`prove`], once positions are read, which it needs besides; [`learn`], once all boxes are known, sorts clusters for
-//! the next frame.
+//! The stage `bounds` asks three questions per frame: [`plan`], before it reads positions, which
+//! boxes a body needs; [`prove`], once positions are read, which it needs besides; [`learn`], once
+//! all boxes are known, sorts clusters for the next frame.
 
 pub(super) mod body;
 pub(super) mod extents;
@@ -50,7 +52,8 @@ const MOST_BODIES: usize = 8;
 pub(super) enum Needed {
     /// No more than are known.
     None,
-    /// Boxes of near clusters only, in `n_nodes` nodes of the tree. All positions are still read once, in `n_runs` runs.
+    /// Boxes of near clusters only, in `n_nodes` nodes of the tree. All positions are still read
+    /// once, in `n_runs` runs.
     Near { n_nodes: usize, n_runs: usize },
     /// Those of all clusters.
     All,
@@ -64,8 +67,8 @@ pub(super) fn is_allowed(isa: Isa, plan: &Plan, settings: &Settings) -> bool {
         && settings.memory_budget.is_none()
 }
 
-/// The boxes that a body needs in its new pose. Known boxes become outdated if they are those of near clusters only and the
-/// frame needs more.
+/// The boxes that a body needs in its new pose. Known boxes become outdated if they are those of
+/// near clusters only and the frame needs more.
 pub(super) fn plan(cache: &mut BodyCache, body: &Body, is_allowed: bool) -> Needed {
     if !is_allowed {
         // The next frames may need all boxes too.
@@ -91,8 +94,9 @@ pub(super) fn plan(cache: &mut BodyCache, body: &Body, is_allowed: bool) -> Need
     })
 }
 
-/// Proves that the groups of a body are beside all bodies that it could meet. Returns the boxes that it needs besides: of
-/// the clusters that are near now, if groups have come back; of all, if groups come back too often.
+/// Proves that the groups of a body are beside all bodies that it could meet. Returns the boxes
+/// that it needs besides: of the clusters that are near now, if groups have come back; of all, if
+/// groups come back too often.
 pub(super) fn prove(job: Job<'_>, caches: &mut Caches, part: PartIx, stats: &mut Stats) -> Needed {
     let Job { scene, plan, .. } = job;
     let world = World {
@@ -178,7 +182,8 @@ fn lane_pairs(plan: &Plan, part: PartIx) -> impl Iterator<Item = PartIx> {
     others.filter(move |&other| plan.test(part, other).is_some())
 }
 
-/// The groups of a part that are not beside all bodies that it could meet; `None` if its clusters are not sorted.
+/// The groups of a part that are not beside all bodies that it could meet; `None` if its clusters
+/// are not sorted.
 fn back(world: World<'_>, part: PartIx) -> Option<Sides> {
     let sorted = world.cache(part).sorted()?;
     let groups =

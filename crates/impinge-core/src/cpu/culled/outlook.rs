@@ -1,4 +1,5 @@
-//! When the clusters of a body should be sorted, and how cautiously: what earlier frames suggest. No answer depends on it.
+//! When the clusters of a body should be sorted, and how cautiously: what earlier frames suggest.
+//! No answer depends on it.
 
 use std::ops::RangeInclusive;
 
@@ -20,7 +21,8 @@ pub(super) struct Outlook {
     ages: [u32; 6],
     /// Grows by one per frame; sorting groups again costs `cost`.
     credit: u32,
-    /// How far beside the other bodies a cluster must be to be in a group, as a share of the body's longest side.
+    /// How far beside the other bodies a cluster must be to be in a group, as a share of the body's
+    /// longest side.
     slack: [f32; 6],
     /// Sorting groups again costs as much as they save in this many frames.
     cost: u32,
@@ -112,7 +114,8 @@ impl Outlook {
     }
 }
 
-/// The slack with which a group would have lasted [`LASTS`] frames, given that it lasted `age` frames with this one.
+/// The slack with which a group would have lasted [`LASTS`] frames, given that it lasted `age`
+/// frames with this one.
 fn slack_for(slack: f32, age: u32) -> f32 {
     (slack * LASTS as f32 / (age as f32 + 1.0)).clamp(*SLACK.start(), *SLACK.end())
 }

@@ -78,7 +78,8 @@ impl PartCache {
         size_of::<PartCache>() + self.bounds.bytes() + ends
     }
 
-    /// How well the clusters fit the current pose: the clusters' summed surface divided by the part's.
+    /// How well the clusters fit the current pose: the clusters' summed surface divided by the
+    /// part's.
     fn spread(&self) -> f64 {
         let clusters = 0..self.clustering.n_clusters();
         let surface: f64 = clusters.map(|ix| self.ends[0].at(ix).half_area()).sum();
@@ -107,8 +108,8 @@ struct Task {
     ends: [RawBoundsArray; 2],
 }
 
-/// Computes the boxes of all parts that have moved, or whose boxes were made for another [`Sweep`]; parts that have flowed
-/// away from their clusters are clustered again.
+/// Computes the boxes of all parts that have moved, or whose boxes were made for another [`Sweep`];
+/// parts that have flowed away from their clusters are clustered again.
 pub(super) fn refit<S: Send>(
     isa: Isa,
     job: Job<'_>,
@@ -221,7 +222,8 @@ fn find<S: Simd>(simd: S, clustering: &Clustering, source: BoxSource<'_>, task: 
         let ends = source.of_cluster(simd, clustering, ClusterIx::from_usize(cluster));
         let mut both = ends[0];
         both.join(&ends[1]);
-        // SAFETY: no two tasks have the same cluster, and no thread reads boxes before all tasks are done.
+        // SAFETY: no two tasks have the same cluster, and no thread reads boxes before all tasks
+        // are done.
         unsafe {
             task.leaves.put(cluster, &both);
             task.ends[0].put(cluster, &ends[0]);

@@ -18,7 +18,8 @@ use super::world::World;
 #[derive(Debug, Clone)]
 #[repr(C, align(64))]
 pub(super) struct Group {
-    /// The elements' boxes at the start and at the end; where boxes hold the whole path, only the first.
+    /// The elements' boxes at the start and at the end; where boxes hold the whole path, only the
+    /// first.
     pub start: LaneBounds,
     pub end: LaneBounds,
     /// The cluster's own boxes.
@@ -33,8 +34,8 @@ pub(super) struct Group {
     pub points: Moving64,
     /// The largest coordinate, or more.
     pub largest: f64,
-    /// By how much coordinates of `points` are rounded at most: 0 if positions are `f32`. Infinite if `points` mean nothing, for coordinates
-    /// that are too large.
+    /// By how much coordinates of `points` are rounded at most: 0 if positions are `f32`. Infinite
+    /// if `points` mean nothing, for coordinates that are too large.
     pub rounded: f64,
 }
 
@@ -94,7 +95,8 @@ impl<'a> PerCluster<World<'a>> for Group {
             f64::INFINITY
         };
         if self.rounded.is_finite() {
-            // Rounding keeps the order of coordinates: boxes that are apart then are so of the points as they are.
+            // Rounding keeps the order of coordinates: boxes that are apart then are so of the
+            // points as they are.
             self.put_points(simd, ends);
         } else {
             source.fill(clustering, cluster, [&mut self.start, &mut self.end]);

@@ -1,4 +1,5 @@
-//! `Clusters` for steps: vertices, edges and faces that move from a start to an end, and pairs of them.
+//! `Clusters` for steps: vertices, edges and faces that move from a start to an end, and pairs of
+//! them.
 //!
 //! ```text
 //! clustering  the vertices, edges and faces of each body, once per topology
@@ -8,8 +9,9 @@
 //! narrow      filters, then exact arithmetic
 //! ```
 //!
-//! Reason for each discard: an element that moves linearly is, at any time, in the interpolation of its boxes at both ends.
-//! If one element is beside the other on the same side of an axis at both ends, they never touch.
+//! Reason for each discard: an element that moves linearly is, at any time, in the interpolation of
+//! its boxes at both ends. If one element is beside the other on the same side of an axis at both
+//! ends, they never touch.
 
 mod cache;
 mod group;
@@ -164,8 +166,10 @@ impl StepClusters {
         Ok(())
     }
 
-    /// The pairs that rounded positions may make touch, up to the earliest contact, of the last [`run`](Self::run), which looked for that
-    /// under a plan [with rounding](crate::plan::Plan::is_rounded): by kind and key, in any order. `None` if there are too many.
+    /// The pairs that rounded positions may make touch, up to the earliest contact, of the last
+    /// [`run`](Self::run), which looked for that under a plan [with
+    /// rounding](crate::plan::Plan::is_rounded): by kind and key, in any order. `None` if there are
+    /// too many.
     pub fn close(&mut self) -> Option<Vec<(PairKind, u64)>> {
         let mut close = Vec::new();
         for worker in &mut self.scratches {
@@ -174,8 +178,8 @@ impl StepClusters {
         Some(close)
     }
 
-    /// As [`run`](Self::run), where a device finds the candidates: `find` gets the clusters of all parts and hands over the
-    /// slots of pairs that may touch.
+    /// As [`run`](Self::run), where a device finds the candidates: `find` gets the clusters of all
+    /// parts and hands over the slots of pairs that may touch.
     #[cfg(feature = "gpu")]
     pub fn run_on_device(
         &mut self,

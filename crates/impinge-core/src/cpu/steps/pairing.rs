@@ -1,11 +1,12 @@
-//! Stages `pairing` and `narrow` of steps: finds the elements of two clusters that are not beside each other at both ends,
-//! and decides them.
+//! Stages `pairing` and `narrow` of steps: finds the elements of two clusters that are not beside
+//! each other at both ends, and decides them.
 //!
 //! 1. Elements of either cluster that do not meet the other cluster's box drop out.
-//! 2. The boxes of the larger side's survivors are put side by side, and each survivor of the smaller side is
-//!    tested against them, 16 (or 8) lanes at a time; where boxes are single, 16 lanes against all of them.
-//! 3. Within one body, candidates that share a vertex are dropped, again 16 at a time: the vertices of their corners
-//!    are looked up in the tables of both groups.
+//! 2. The boxes of the larger side's survivors are put side by side, and each survivor of the
+//!    smaller side is tested against them, 16 (or 8) lanes at a time; where boxes are single, 16
+//!    lanes against all of them.
+//! 3. Within one body, candidates that share a vertex are dropped, again 16 at a time: the vertices
+//!    of their corners are looked up in the tables of both groups.
 
 use std::time::Duration;
 
@@ -31,7 +32,8 @@ use super::world::World;
 /// The narrow stage is timed for one work item in this many.
 const SAMPLED: u32 = 16;
 
-/// The state of one worker. Two of them share no cache line, nor a pair of lines that is fetched together.
+/// The state of one worker. Two of them share no cache line, nor a pair of lines that is fetched
+/// together.
 #[derive(Debug)]
 #[repr(align(128))]
 pub(crate) struct Worker {
@@ -192,8 +194,8 @@ pub(super) fn run<S: Simd>(
     worker.busy += start.elapsed();
 }
 
-/// Lists the candidates of a work item. Returns the slots of its groups; `None` if there are no candidates. Where only
-/// keys with some lower numbers are wanted, most others are left out.
+/// Lists the candidates of a work item. Returns the slots of its groups; `None` if there are no
+/// candidates. Where only keys with some lower numbers are wanted, most others are left out.
 #[inline(always)]
 fn pair<S: Simd>(
     simd: S,
@@ -328,7 +330,8 @@ fn is_left_out(world: World<'_>, item: &WorkItem, groups: [&Group; 2], lanes: [u
     world.plan.is_left_out(key_in(groups, lanes), sides)
 }
 
-/// The lanes of two clusters that may have a key whose lower number is in a range, ends included; `None` if no pair has.
+/// The lanes of two clusters that may have a key whose lower number is in a range, ends included;
+/// `None` if no pair has.
 #[inline(always)]
 fn lanes_with_lower(
     world: World<'_>,

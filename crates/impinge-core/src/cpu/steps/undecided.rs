@@ -1,11 +1,12 @@
 //! Stage `decide`: finds the first contacts of pairs that the device could not rule out.
 //!
-//! In: pairs of elements by their places in cluster order, in any order. Each pair has a time before which it has no
-//! contact. Besides, an upper bound on the earliest contact of all pairs.
-//! Out: contacts, as from stage `narrow`, whose lists and filters do the work. A task is a run of pairs. It is sorted
-//! first, so that pairs of the same two parts come together. Where the earliest contact is sought, pairs are taken in
-//! the order of their times, a few at first, up to the earliest contact found. Where any contact is sought, a pair that
-//! certainly touches ends the search.
+//! In: pairs of elements by their places in cluster order, in any order. Each pair has a time
+//! before which it has no contact. Besides, an upper bound on the earliest contact of all pairs.
+//! Out: contacts, as from stage `narrow`, whose lists and filters do the work. A task is a run of
+//! pairs. It is sorted first, so that pairs of the same two parts come together. Where the earliest
+//! contact is sought, pairs are taken in the order of their times, a few at first, up to the
+//! earliest contact found. Where any contact is sought, a pair that certainly touches ends the
+//! search.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -24,8 +25,8 @@ use super::world::World;
 
 /// Pairs per task.
 const TASK: usize = 2048;
-/// Where the earliest contact is sought: pairs decided first. The times of the other pairs are then compared with the
-/// earliest contact found.
+/// Where the earliest contact is sought: pairs decided first. The times of the other pairs are then
+/// compared with the earliest contact found.
 const SOONEST: usize = 256;
 
 /// Decides pairs as they come.
@@ -121,8 +122,8 @@ impl Deciding<'_, '_> {
     }
 }
 
-/// Decides the pairs of one task, sorted by their two parts. Pairs of the same two parts stay in the order of the
-/// device, which lists pairs of two clusters next to each other.
+/// Decides the pairs of one task, sorted by their two parts. Pairs of the same two parts stay in
+/// the order of the device, which lists pairs of two clusters next to each other.
 fn decide(
     world: World<'_>,
     first_slots: &[u32],

@@ -1,4 +1,5 @@
-//! Read-only view shared by all stages of a step: the parts, and what is known of the answer so far.
+//! Read-only view shared by all stages of a step: the parts, and what is known of the answer so
+//! far.
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
@@ -35,7 +36,8 @@ impl SharedBound {
         }
     }
 
-    /// Whether the search was cancelled. The candidates of a work item may take long, and a task has many items.
+    /// Whether the search was cancelled. The candidates of a work item may take long, and a task
+    /// has many items.
     pub fn is_cancelled(&self) -> bool {
         self.cancel.as_ref().is_some_and(CancelToken::is_cancelled)
     }
@@ -68,7 +70,8 @@ pub(crate) struct World<'a> {
     pub isa: Isa,
     pub scene: &'a Scene,
     pub plan: &'a Plan,
-    /// The part of the step that is examined. Never longer than the part that the clusters' boxes cover.
+    /// The part of the step that is examined. Never longer than the part that the clusters' boxes
+    /// cover.
     pub sweep: Sweep,
     /// The part of the step that the clusters' boxes cover.
     pub(super) boxes: Sweep,

@@ -25,9 +25,9 @@ pub struct Host {
 }
 
 impl Host {
-    /// Opens the adapter whose name contains `device`, or the best one. `lambda` is the density of cells, and
-    /// `first` the initial room. The engine's own buffers take at most `memory_budget` bytes; if that is not
-    /// enough, the work is done in parts.
+    /// Opens the adapter whose name contains `device`, or the best one. `lambda` is the density of
+    /// cells, and `first` the initial room. The engine's own buffers take at most `memory_budget`
+    /// bytes; if that is not enough, the work is done in parts.
     ///
     /// # Errors
     /// No adapter fits; the driver refuses.

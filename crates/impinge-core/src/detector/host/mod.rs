@@ -36,8 +36,8 @@ impl Host {
         }
     }
 
-    /// One frame: resolves and checks the query, has `method` hand over the keys of all pairs, in any
-    /// order, sorts them and drops repetitions.
+    /// One frame: resolves and checks the query, has `method` hand over the keys of all pairs, in
+    /// any order, sorts them and drops repetitions.
     ///
     /// # Errors
     /// A stale id, refused positions, errors of the method.

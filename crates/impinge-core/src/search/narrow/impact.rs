@@ -27,8 +27,8 @@ impl Test for FirstContact {
 }
 
 impl FirstContact {
-    /// The first contact on the straight way from the start to the positions at a fraction of the step, which are rounded as
-    /// they are stored.
+    /// The first contact on the straight way from the start to the positions at a fraction of the
+    /// step, which are rounded as they are stored.
     pub fn decide_part(
         test: TestId,
         a: PairElement<'_>,
@@ -43,8 +43,8 @@ impl FirstContact {
         a.plan.first(a.scene, parts, pair, [&start, &end])
     }
 
-    /// The pair as the exact predicate names it, with its elements in that order, and their points at the start and at a fraction of the
-    /// step.
+    /// The pair as the exact predicate names it, with its elements in that order, and their points
+    /// at the start and at a fraction of the step.
     pub fn ends(
         test: TestId,
         [a, b]: [PairElement<'_>; 2],

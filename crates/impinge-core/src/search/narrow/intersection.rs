@@ -91,7 +91,8 @@ pub(crate) fn intersect(
     }
 }
 
-/// Whether a pair of one body that shares a vertex index is reported under the rule. Pairs of points and of edges never are.
+/// Whether a pair of one body that shares a vertex index is reported under the rule. Pairs of
+/// points and of edges never are.
 pub(crate) fn intersect_shared(
     rule: SharedVertex,
     kind: BodyKind,

@@ -42,7 +42,8 @@ pub(crate) trait Test {
         true
     }
 
-    /// The value of a pair, decided exactly and by the adjacency rule; `None` if the pair is not reported.
+    /// The value of a pair, decided exactly and by the adjacency rule; `None` if the pair is not
+    /// reported.
     fn decide(&self, test: TestId, a: PairElement<'_>, b: PairElement<'_>) -> Option<Self::Value>;
 }
 
@@ -71,7 +72,8 @@ impl PairElement<'_> {
         self.ends_at(1.0)
     }
 
-    /// The corners at the start of a step and at a fraction of it, rounded to the precision of the positions.
+    /// The corners at the start of a step and at a fraction of it, rounded to the precision of the
+    /// positions.
     fn ends_at(&self, fraction: f64) -> impl Iterator<Item = [[f64; 3]; 2]> {
         let body = self.plan.body(self.scene, self.part);
         let start = body.positions();

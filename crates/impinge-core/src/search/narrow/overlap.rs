@@ -6,8 +6,9 @@ use impinge_exact::internal::two_sum;
 
 use super::{PairElement, Test};
 
-/// The test of [`Detector::candidates`](crate::Detector::candidates): whether the boxes over the whole step overlap once each
-/// is inflated by the distance that the plan says, so that no axis has a gap of more than twice that.
+/// The test of [`Detector::candidates`](crate::Detector::candidates): whether the boxes over the
+/// whole step overlap once each is inflated by the distance that the plan says, so that no axis has
+/// a gap of more than twice that.
 pub(crate) struct BoxOverlap;
 
 impl Test for BoxOverlap {

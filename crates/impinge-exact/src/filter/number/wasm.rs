@@ -1,7 +1,8 @@
 //! WebAssembly's registers of 128 bits, for modules that are compiled for them.
 //!
-//! Compilers turn many of [`Portable`](super::Portable)'s operations into single ones, number by number: the filters then
-//! take three times as much code, and a module for browsers is loaded over the network.
+//! Compilers turn many of [`Portable`](super::Portable)'s operations into single ones, number by
+//! number: the filters then take three times as much code, and a module for browsers is loaded over
+//! the network.
 
 use core::arch::wasm32::*;
 

@@ -1,4 +1,5 @@
-//! Version 2: one line per node, one line per element with its own tags; binary elements come in blocks of one type.
+//! Version 2: one line per node, one line per element with its own tags; binary elements come in
+//! blocks of one type.
 
 use super::{File, MOST_NODES, Nodes, RawNodes, count_line, put, shape, text_tags};
 use crate::binary::Scalar;

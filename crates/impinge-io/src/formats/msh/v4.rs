@@ -45,8 +45,8 @@ impl<'a> Numbers<'a> {
         }
     }
 
-    /// Reads the header of a section: returns the number of blocks and the total number of nodes or elements, and skips the least
-    /// and the greatest tag.
+    /// Reads the header of a section: returns the number of blocks and the total number of nodes or
+    /// elements, and skips the least and the greatest tag.
     fn header(&mut self, file: &mut File) -> Result<(u64, u64), Error> {
         let n_blocks = self.size(file, "the number of blocks")?;
         let n = self.size(file, "the number in all")?;

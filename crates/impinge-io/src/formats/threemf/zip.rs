@@ -1,7 +1,8 @@
 //! The parts of a ZIP archive: stored or deflated, without encryption and without ZIP64.
 //!
-//! Source: PKWARE, "APPNOTE.TXT". Only the central directory says which parts there are. A part is expanded when it is asked for, after its
-//! announced size has been charged to a budget, and its length and checksum have to be those announced.
+//! Source: PKWARE, "APPNOTE.TXT". Only the central directory says which parts there are. A part is
+//! expanded when it is asked for, after its announced size has been charged to a budget, and its
+//! length and checksum have to be those announced.
 
 use miniz_oxide::inflate::{TINFLStatus, core};
 
@@ -72,7 +73,8 @@ impl<'b> Archive<'b> {
         Ok(Archive { bytes, entries })
     }
 
-    /// The bytes of a part; `None` if there is no part of this name. Case does not matter, as in packages of OPC.
+    /// The bytes of a part; `None` if there is no part of this name. Case does not matter, as in
+    /// packages of OPC.
     pub fn part(
         &self,
         part: &str,

@@ -254,8 +254,8 @@ impl<'b> Arrays<'b> {
         })
     }
 
-    /// Reads compressed data that follows its header: the number of blocks, the size of a block, the size of the last block (0 if
-    /// it is full), then the compressed size of each block.
+    /// Reads compressed data that follows its header: the number of blocks, the size of a block,
+    /// the size of the last block (0 if it is full), then the compressed size of each block.
     fn compressed(
         &mut self,
         encoded: &Encoded<'b>,
@@ -290,7 +290,8 @@ impl<'b> Arrays<'b> {
         };
         let mut total = 0u64;
         for (ix, &compressed) in (1..).zip(&sizes) {
-            // Neither method expands data more than this. A header that claims more is wrong, and no memory is reserved for it.
+            // Neither method expands data more than this. A header that claims more is wrong, and
+            // no memory is reserved for it.
             let most = compressed.saturating_mul(1100).saturating_add(64);
             if expanded(ix) > most {
                 return Err(name.too_large(

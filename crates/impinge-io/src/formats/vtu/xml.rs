@@ -1,5 +1,6 @@
-//! The elements of an XML text as a tree, with their places. Time and memory are linear in the length of the text, whatever its
-//! content (many attributes or namespaces make other validating parsers quadratic).
+//! The elements of an XML text as a tree, with their places. Time and memory are linear in the
+//! length of the text, whatever its content (many attributes or namespaces make other validating
+//! parsers quadratic).
 
 use std::borrow::Cow;
 use std::ops::Range;

@@ -1,4 +1,5 @@
-//! What the tests of stage `narrow` share: the candidates of a work item, keys, and the points of a pair.
+//! What the tests of stage `narrow` share: the candidates of a work item, keys, and the points of a
+//! pair.
 
 use crate::bvh::bounds::{round_down, round_up};
 use crate::cpu::lane_pairs::{LanePairs, WorkItem};
@@ -60,14 +61,16 @@ impl Batch<'_> {
         [cluster_a.slot(lane_a), cluster_b.slot(lane_b)]
     }
 
-    /// By how much coordinates in the tables of either group are rounded at most; infinite if one has no tables.
+    /// By how much coordinates in the tables of either group are rounded at most; infinite if one
+    /// has no tables.
     #[inline(always)]
     pub fn rounded(&self) -> f64 {
         f64::max(self.groups[0].rounded, self.groups[1].rounded)
     }
 
-    /// The kind of the pairs, and two numbers between which a distance is, if a filter decides from tables whether such pairs are
-    /// within the distance. Where tables are rounded, the numbers allow for that.
+    /// The kind of the pairs, and two numbers between which a distance is, if a filter decides from
+    /// tables whether such pairs are within the distance. Where tables are rounded, the numbers
+    /// allow for that.
     #[inline(always)]
     pub fn near_in_tables(&self, reach: &Reach) -> Option<(ElementPair, [f32; 2])> {
         let pair = match self.between.kind {
@@ -80,10 +83,12 @@ impl Batch<'_> {
         if rounded == 0.0 {
             return Some((pair, [low, high]));
         }
-        // Two points are each off by that along three axes: their distance by at most 2 sqrt(3) times as much.
+        // Two points are each off by that along three axes: their distance by at most 2 sqrt(3)
+        // times as much.
         let off = 4.0 * rounded;
         let [low, high] = [f64::from(low) - off, f64::from(high) + off];
-        // Where rounding is larger than the distance, the tables only tell that elements are farther apart.
+        // Where rounding is larger than the distance, the tables only tell that elements are
+        // farther apart.
         rounded
             .is_finite()
             .then(|| (pair, [round_down(low.max(0.0)), round_up(high)]))
@@ -166,7 +171,8 @@ pub fn key_in(groups: [&Group; 2], lanes: [u8; 2]) -> u64 {
     pair_key(a, b)
 }
 
-/// Whether a pair counts: it belongs to the cell whose pairs are wanted, if only those of one are, and the filter lets it pass.
+/// Whether a pair counts: it belongs to the cell whose pairs are wanted, if only those of one are,
+/// and the filter lets it pass.
 #[inline(always)]
 pub(super) fn counts(world: World<'_>, between: Between, slots: Slots) -> bool {
     let plan = world.plan;

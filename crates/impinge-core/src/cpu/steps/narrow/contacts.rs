@@ -17,8 +17,8 @@ use super::batch::{Between, Narrow, NarrowCounts, Slots, counts, key, points};
 
 /// The most pairs of one worker that are decided last.
 const MOST_UNSURE: usize = 4096;
-/// The most close pairs that one worker remembers: this many, or two per cluster if that is more. With more of them, a search of all
-/// pairs is as fast.
+/// The most close pairs that one worker remembers: this many, or two per cluster if that is more.
+/// With more of them, a search of all pairs is as fast.
 const MOST_CLOSE: usize = 4096;
 
 /// A pair whose first contact is sought.
@@ -39,7 +39,8 @@ pub(crate) struct FirstContacts {
     pub(super) counts: NarrowCounts,
     /// Number of open pairs that triggers a search.
     pub(super) full: usize,
-    /// Pairs of the current two parts that wait for root isolation; if `is_first`, for the separation tests before it.
+    /// Pairs of the current two parts that wait for root isolation; if `is_first`, for the
+    /// separation tests before it.
     pub(super) open: Vec<Open>,
     /// Pairs that wait for the next round of root isolation.
     pub(super) later: Vec<Open>,
@@ -52,8 +53,8 @@ pub(crate) struct FirstContacts {
     is_last: bool,
     /// Most pairs in `close`.
     most_close: usize,
-    /// Pairs that are not certainly farther apart than [the margin](Self::margin), by kind and key; one more than allowed if some are
-    /// missing.
+    /// Pairs that are not certainly farther apart than [the margin](Self::margin), by kind and key;
+    /// one more than allowed if some are missing.
     close: Vec<(PairKind, u64)>,
     /// Whether the filter's first step is still to be taken, in `f64`.
     pub(super) is_first: bool,
@@ -109,7 +110,8 @@ impl FirstContacts {
     #[inline(always)]
     pub fn until(&self, world: World<'_>) -> f64 {
         match self.goal {
-            // Contacts that are later by less than rounding are wanted, for their keys may be lower.
+            // Contacts that are later by less than rounding are wanted, for their keys may be
+            // lower.
             Goal::Earliest => {
                 let time = world.known.earliest();
                 let later = (time * (1.0 + 2f64.powi(-22))).max(f64::from(f32::MIN_POSITIVE));
@@ -119,7 +121,8 @@ impl FirstContacts {
         }
     }
 
-    /// By how much rounding may move two vertices relative to each other; 0 if close pairs are not wanted.
+    /// By how much rounding may move two vertices relative to each other; 0 if close pairs are not
+    /// wanted.
     #[inline(always)]
     pub(super) fn margin(&self, world: World<'_>, between: Between) -> f64 {
         // Pairs that are decided last are remembered already.

@@ -1,4 +1,5 @@
-//! Whether elements come nearer than they may during a step, by a separation or a clearance, and when first.
+//! Whether elements come nearer than they may during a step, by a separation or a clearance, and
+//! when first.
 //!
 //! ```text
 //! tables    sixteen pairs at a time in f32: certainly near at the start, or apart until the end

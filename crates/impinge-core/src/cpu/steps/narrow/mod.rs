@@ -1,6 +1,8 @@
-//! Stage `narrow` of steps: answers what is asked about the candidates of work items, many at a time.
+//! Stage `narrow` of steps: answers what is asked about the candidates of work items, many at a
+//! time.
 //!
-//! One file per test. Each gives the answers of a [`Test`](crate::search::narrow::Test), with which the oracle decides pairs one by one:
+//! One file per test. Each gives the answers of a [`Test`](crate::search::narrow::Test), with which
+//! the oracle decides pairs one by one:
 //!
 //! ```text
 //! touching   FirstContact: whether two elements touch during the step, and when first (search: the times)

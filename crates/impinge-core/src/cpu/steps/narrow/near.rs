@@ -1,8 +1,10 @@
 //! Whether elements are within a distance at the start of a step.
 //!
-//! In: candidates, whose boxes overlap when each reaches half as far. Sixteen pairs at a time are decided in `f32` from the tables
-//! (`impinge_exact::filter::nearness`), with the nearest features of most; other pairs in `f64` with bounds (`impinge_exact::distance`), the rest in
-//! exact arithmetic. Features that are not known here are named when the pairs are sorted. Edges and faces are tested for a common point alone.
+//! In: candidates, whose boxes overlap when each reaches half as far. Sixteen pairs at a time are
+//! decided in `f32` from the tables (`impinge_exact::filter::nearness`), with the nearest features
+//! of most; other pairs in `f64` with bounds (`impinge_exact::distance`), the rest in exact
+//! arithmetic. Features that are not known here are named when the pairs are sorted. Edges and
+//! faces are tested for a common point alone.
 
 use crate::answers::near::Labels;
 use crate::query::pair_kind::PairKind;

@@ -1,6 +1,7 @@
 //! Whether the boxes of elements over the whole step, inflated, overlap.
 //!
-//! Stage `pairing` has tested boxes of points rounded to `f32`. Pairs whose boxes overlap by less than rounding are tested again in `f64`.
+//! Stage `pairing` has tested boxes of points rounded to `f32`. Pairs whose boxes overlap by less
+//! than rounding are tested again in `f64`.
 
 use crate::boxes::{BoxSource, Extent};
 use crate::bvh::bounds::round_up;
@@ -91,10 +92,12 @@ fn take<S: Simd>(_: S, overlaps: &mut Overlaps, world: World<'_>, batch: Batch<'
     overlaps.keys.hand_over(world, between.kind);
 }
 
-/// By how much two boxes of groups together reach at most beyond the inflated boxes of elements, on one axis.
+/// By how much two boxes of groups together reach at most beyond the inflated boxes of elements, on
+/// one axis.
 ///
-/// An end is off by the rounding of points, at most 2^-24 of the largest coordinate, and moved outward by the distance, 2^-20 of all, and
-/// 2^-126 (`boxes::Sweep`): less than 2^-19 of the largest coordinate and of the distance, and 2^-125.
+/// An end is off by the rounding of points, at most 2^-24 of the largest coordinate, and moved
+/// outward by the distance, 2^-20 of all, and 2^-126 (`boxes::Sweep`): less than 2^-19 of the
+/// largest coordinate and of the distance, and 2^-125.
 fn farther_out([a, b]: [&Group; 2], distance: f64) -> f32 {
     let largest = f64::max(a.largest, b.largest) + distance;
     if largest * (1.0 + 2f64.powi(-18)) > f64::from(f32::MAX) {
@@ -104,7 +107,8 @@ fn farther_out([a, b]: [&Group; 2], distance: f64) -> f32 {
     round_up(largest * 2f64.powi(-18) + 2f64.powi(-120))
 }
 
-/// Which of sixteen pairs of boxes of two groups overlap by so much that the inflated boxes of the elements certainly do.
+/// Which of sixteen pairs of boxes of two groups overlap by so much that the inflated boxes of the
+/// elements certainly do.
 #[inline(always)]
 fn overlap_by<V: Lookup>(
     [a, b]: [&LaneBounds; 2],

@@ -5,8 +5,8 @@
 //! enclose  eight candidates: contact or none, and when, nearly always to all bits of an f32
 //! ```
 //!
-//! The two alternate on lists of a thousand pairs, so that no lane waits for another pair's search. If close pairs are wanted too,
-//! pairs that stay beyond the margin are dropped first.
+//! The two alternate on lists of a thousand pairs, so that no lane waits for another pair's search.
+//! If close pairs are wanted too, pairs that stay beyond the margin are dropped first.
 
 use crate::scene::positions::Positions;
 use crate::simd::{Lanes, Simd};
@@ -85,7 +85,8 @@ pub(super) fn search<S: Simd>(simd: S, contacts: &mut FirstContacts, world: Worl
 }
 
 impl FirstContacts {
-    /// Drops pairs that are farther apart than the margin at all times, and remembers all others, which are searched without it.
+    /// Drops pairs that are farther apart than the margin at all times, and remembers all others,
+    /// which are searched without it.
     #[inline(always)]
     fn keep_close(
         &mut self,

@@ -1,6 +1,7 @@
 //! Which elements touch during a step, and when first.
 //!
-//! In: candidates. Out: keys and times. Vertices with faces and edges with edges go through filters (`impinge_exact::filter`):
+//! In: candidates. Out: keys and times. Vertices with faces and edges with edges go through filters
+//! (`impinge_exact::filter`):
 //!
 //! ```text
 //! far     sixteen pairs at a time in f32, from the tables of the two groups: apart along a few directions
@@ -10,7 +11,8 @@
 //! search  those that are left, a thousand at a time
 //! ```
 //!
-//! Unsure pairs go to exact arithmetic, and so do pairs of bare edges and points, and all times in double precision.
+//! Unsure pairs go to exact arithmetic, and so do pairs of bare edges and points, and all times in
+//! double precision.
 
 use crate::bvh::bounds::round_up;
 use crate::cpu::lane_pairs::LanePairs;
@@ -62,12 +64,13 @@ impl Narrow for FirstContacts {
         if self.open.is_empty() {
             self.is_first = false;
         }
-        // Where rounding is large beside the elements, the tables leave what the first step in `f64` drops.
+        // Where rounding is large beside the elements, the tables leave what the first step in
+        // `f64` drops.
         self.is_first |= rounded > 0.0;
         if rounded.is_finite() {
             let tables = batch.groups.map(|group| &group.points);
-            // With a clearance, an element that is moved by what a pair keeps may be in contact: then coordinates of the
-            // polygon's corners, not of its edges, differ by up to that.
+            // With a clearance, an element that is moved by what a pair keeps may be in contact:
+            // then coordinates of the polygon's corners, not of its edges, differ by up to that.
             let kept = if has_clearance {
                 world.plan.bound()
             } else {
@@ -140,8 +143,9 @@ impl FirstContacts {
         }
     }
 
-    /// Takes pairs of two parts that a device has not dropped, by their places. Each comes with a time until which it certainly does not
-    /// touch, and a later one by which it certainly does, at one time only, if there is one.
+    /// Takes pairs of two parts that a device has not dropped, by their places. Each comes with a
+    /// time until which it certainly does not touch, and a later one by which it certainly does, at
+    /// one time only, if there is one.
     #[cfg(feature = "gpu")]
     pub fn take_left(
         &mut self,
@@ -161,7 +165,8 @@ impl FirstContacts {
             let body = world.plan.body(world.scene, part);
             matches!(body.positions(), Positions::F32(_))
         });
-        // Over the whole step, the device has taken the filter's first step for positions in single precision.
+        // Over the whole step, the device has taken the filter's first step for positions in single
+        // precision.
         self.is_first = !are_single || matches!(self.goal, Goal::Earliest);
         for (slots, free_until, touches_by) in pairs {
             let until = self.until(world);
@@ -185,7 +190,8 @@ impl FirstContacts {
     }
 }
 
-// Kernels of their own: without optimisation, one for all of them would need more stack than a thread has.
+// Kernels of their own: without optimisation, one for all of them would need more stack than a
+// thread has.
 
 #[inline(always)]
 fn kept<S: Simd>(simd: S, contacts: &mut FirstContacts, world: World<'_>, batch: Batch<'_>) {
@@ -212,7 +218,8 @@ fn drop_edges<S: Simd>(
     drop_apart(simd, ElementPair::EdgeEdge, tables, limits, lane_pairs);
 }
 
-/// Drops the candidates that are certainly apart from t = 0 to a time, by more than a margin: the two limits.
+/// Drops the candidates that are certainly apart from t = 0 to a time, by more than a margin: the
+/// two limits.
 #[inline(always)]
 fn drop_apart<S: Simd>(
     simd: S,
