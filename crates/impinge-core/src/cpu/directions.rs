@@ -7,7 +7,10 @@
 //! overlap, of which planes leave one in 150.
 //!
 //! Cost: nothing where few boxes overlap, as between clusters of short elements. Else 1 ns per
-//! pair, and 2 µs per cluster when it is first needed, with 3.8 KB.
+//! pair, and 2 µs per cluster when it is first needed, with 3.8 KB. Short elements that are nearer
+//! than the distance that is asked for overlap in many pairs too, and no direction tells those
+//! apart: after a work item in which it told few, a worker passes by one, then three, up to 31,
+//! until it told many again. Answers do not depend on it.
 
 use crate::bvh::GROUP;
 use crate::bvh::clusters::Clustering;
@@ -21,6 +24,46 @@ use super::group_cache::{GroupCache, PerCluster};
 use super::lane_pairs::{Side, WorkItem};
 use super::world::World;
 use crate::simd::{Lanes, Masks, Simd};
+
+/// Which work items are asked about: all, as long as directions tell many of their pairs apart.
+#[derive(Debug, Default)]
+struct Pause {
+    /// How many pass by after one of which they told few.
+    length: u32,
+    /// How many of these are still to come.
+    left: u32,
+}
+
+impl Pause {
+    /// Directions pay if they tell one pair in so many apart.
+    const PAYS: usize = 4;
+    /// Each work item of which they told few doubles the pause, up to this.
+    const LONGEST: u32 = 31;
+
+    /// Whether the next work item passes by.
+    #[inline(always)]
+    fn pass(&mut self) -> bool {
+        let passes = self.left > 0;
+        self.left = self.left.saturating_sub(1);
+        passes
+    }
+
+    /// Of a work item's pairs directions told so many apart.
+    #[inline(always)]
+    fn told(&mut self, n_parted: usize, n_pairs: usize) {
+        self.length = match n_parted * Self::PAYS >= n_pairs {
+            true => 0,
+            false => (2 * self.length + 1).min(Self::LONGEST),
+        };
+        self.left = self.length;
+    }
+
+    /// A work item turned out to have too few pairs: the next one is as likely to be in vain.
+    #[inline(always)]
+    fn again(&mut self) {
+        self.left = self.length;
+    }
+}
 
 /// Where the elements of a part are.
 pub(super) trait Placed: Copy {
@@ -43,6 +86,7 @@ pub(super) struct Directions {
     n: usize,
     /// From this many pairs on, they are worth it.
     from: usize,
+    pause: Pause,
     /// Pairs that they told apart.
     pub n_parted: u64,
 }
@@ -75,6 +119,7 @@ impl Directions {
     pub fn begin<W: Placed>(&mut self, n_clusters: u64, settings: &Settings) {
         self.n = GroupCache::<Directions64>::capacity(n_clusters, settings);
         self.from = settings.tuning.directions_from;
+        self.pause = Pause::default();
         self.n_parted = 0;
         self.groups.clear();
         // A budget must know now what may be needed.
@@ -87,11 +132,11 @@ impl Directions {
         self.groups.bytes()
     }
 
-    /// Whether so many boxes may overlap that counting them pays.
+    /// Whether so many boxes may overlap that counting them pays, of the next work item.
     #[inline(always)]
-    pub fn may_pay(&self, lanes: [u64; 2]) -> bool {
+    pub fn may_pay(&mut self, lanes: [u64; 2]) -> bool {
         let [a, b] = lanes.map(|lanes| lanes.count_ones() as usize);
-        a * b >= self.from
+        a * b >= self.from && !self.pause.pass()
     }
 
     /// Clears pairs that are certainly farther apart than a distance, if there are many pairs, and
@@ -115,6 +160,7 @@ impl Directions {
             lanes |= mask;
         }
         if n_pairs < self.from {
+            self.pause.again();
             return 0;
         }
         if self.groups.is_empty() {
@@ -151,6 +197,34 @@ impl Directions {
             n_parted += u64::from(beyond.count_ones());
         }
         self.n_parted += n_parted;
+        self.pause.told(n_parted as usize, n_pairs);
         n_parted
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Pause;
+
+    fn n_asked(pause: &mut Pause, n_items: usize, n_parted: usize) -> usize {
+        (0..n_items)
+            .filter(|_| {
+                let is_asked = !pause.pass();
+                if is_asked {
+                    pause.told(n_parted, 100);
+                }
+                is_asked
+            })
+            .count()
+    }
+
+    #[test]
+    fn items_pass_by_while_directions_tell_few_apart() {
+        let mut pause = Pause::default();
+        assert_eq!(n_asked(&mut pause, 1000, 25), 1000);
+        assert_eq!(n_asked(&mut pause, 62, 24), 5); // and pauses of 1, 3, 7, 15, 31
+        assert_eq!(n_asked(&mut pause, 3201, 0), 101); // one in 32
+        // They pay again: seen when the pause is over, and then everywhere.
+        assert_eq!(n_asked(&mut pause, 132, 90), 101);
     }
 }
