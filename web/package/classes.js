@@ -73,6 +73,12 @@ function limit(name, given) {
 }
 
 // Numbers, then rows.
+function columns(matrix) {
+  const numbers = Float64Array.from(matrix);
+  if (numbers.length !== 16) refuse(`transform: ${numbers.length} numbers given, 16 allowed, column by column`);
+  return numbers;
+}
+
 function before(numbers, rows) {
   const words = new Uint32Array(numbers.length + rows.length);
   words.set(numbers);
@@ -151,9 +157,11 @@ export function makeScene({ SceneHandle }, mustBeReady) {
     }
 
     setTransform(which, matrix) {
-      const columns = Float64Array.from(matrix);
-      if (columns.length !== 16) refuse(`transform: ${columns.length} numbers given, 16 allowed, column by column`);
-      call(() => this.#held.set_transform(body(which), columns));
+      call(() => this.#held.set_transform(body(which), columns(matrix)));
+    }
+
+    setEndTransform(which, matrix) {
+      call(() => this.#held.set_end_transform(body(which), columns(matrix)));
     }
 
     setFilter(which, category = 1, mask = 0xffff_ffff_ffff_ffffn) {

@@ -153,6 +153,11 @@ export declare class Scene {
   setEndPositions(body: Body, positions: Positions | null): void;
   /** Moves a body from the positions that were given last: 16 numbers, column by column, as `elements` of a `Matrix4`; affine. */
   setTransform(body: Body, matrix: ArrayLike<number>): void;
+  /**
+   * Sets the end of a step by a matrix, from the positions that were given last. Each vertex goes straight to its rounded end position, not along an arc: a point at
+   * distance r from the axis of a turn by w radians is at most r * w * w / 8 away from where it would be.
+   */
+  setEndTransform(body: Body, matrix: ArrayLike<number>): void;
   /** Bodies meet if the category of each shares a bit with the mask of the other; 64 bits. Category 1 and all bits by default. */
   setFilter(body: Body, category?: number | bigint, mask?: number | bigint): void;
   /** A length that `near` adds to the distance for each element of this body. */

@@ -320,6 +320,9 @@ export async function others(module) {
   scene.setTransform(cloud, [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, -3, 1]);
   const onFlat = [...(await detector.detect(scene)).rows];
   const [now, rest] = [scene.positions(cloud)[5], scene.restPositions(cloud)[5]];
+  scene.setEndTransform(cloud, [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 3, 1]);
+  const turned = [scene.endPositions(cloud)[5], await refusal(() => scene.setEndTransform(cloud, [1]))];
+  scene.setEndPositions(cloud, null);
   scene.setFilter(cloud, 2, 2n);
   const filtered = await detector.any(scene, { which: "between" });
   scene.setFilter(cloud);
@@ -361,6 +364,7 @@ export async function others(module) {
     nearest,
     onFlat,
     moved: [now, rest],
+    turned,
     filtered,
     excluded,
     described,
@@ -386,6 +390,7 @@ export const OTHERS = {
   nearest: { distance: 1, bodyA: 1, elementA: 0, bodyB: 0, elementB: 0, points: [[0.25, 0.25, 1], [0.25, 0.25, 0]] },
   onFlat: [0, 0, 2, 1],
   moved: [0, 3],
+  turned: [6, "invalid: transform: 1 numbers given, 16 allowed, column by column"],
   filtered: false,
   excluded: 0,
   described: ["edges", 1, 2, [0, 1], [0, 1, 0, 2, 1, 2]],

@@ -15,6 +15,7 @@ scene.setPositions(a, new Float32Array(9));
 scene.setEndPositions(b, new Float64Array(12));
 scene.setEndPositions(b, null);
 scene.setTransform(strand, [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]);
+scene.setEndTransform(strand, new Float32Array(16));
 scene.setFilter(cloud, 2, 0xffn);
 scene.setThickness(cloud, 0.5);
 scene.remesh(cloud, { positions: new Float32Array(3) });

@@ -208,6 +208,199 @@ fn positions_that_are_given_end_a_transform() {
     assert_eq!(points(&scene, body)[1], [1.0, 3.0, 6.0]);
 }
 
+/// Two clouds of triangles of which the first turns: by matrices, and by positions that are given.
+#[test]
+fn an_end_transform_is_the_end_positions_that_it_gives() {
+    let double = cloud(300);
+    let single: Vec<[f32; 3]> = double.iter().map(|p| p.map(|x| x as f32)).collect();
+    let faces: Vec<[u32; 3]> = (0..100)
+        .map(|ix| [3 * ix, 3 * ix + 1, 3 * ix + 2])
+        .collect();
+    let mut detector = Detector::new(Backend::Cpu).expect("good");
+    let mut hashes = Vec::new();
+    for wide in [false, true] {
+        let rest: Positions = match wide {
+            true => double.clone().into(),
+            false => single.clone().into(),
+        };
+        let scene = || {
+            let mut scene = Scene::new();
+            let ids = [0.0, 0.3].map(|shift| {
+                let body = scene.add((faces.clone(), rest.clone())).expect("good");
+                scene
+                    .set_transform(body, &lifted(3.0 * shift))
+                    .expect("good");
+                body
+            });
+            (scene, ids[0])
+        };
+        let ((mut turned, body), (mut given, same)) = (scene(), scene());
+        for frame in 0..4 {
+            let [start, end] = [0, 1].map(|ix| turn(0.3 * f64::from(frame + ix)));
+            turned.set_transform(body, &start).expect("good");
+            turned.set_end_transform(body, &end).expect("good");
+            // Twice, and after another one: they do not accumulate.
+            turned.set_end_transform(body, &lifted(9.0)).expect("good");
+            turned.set_end_transform(body, &end).expect("good");
+            let by_hand: Vec<[f64; 3]> = (0..rest.len())
+                .map(|ix| by_hand(&end, rest.point(ix)))
+                .collect();
+            given.set_transform(same, &start).expect("good");
+            match wide {
+                true => given.set_end_positions(same, &by_hand).expect("good"),
+                false => {
+                    let rounded: Vec<[f32; 3]> =
+                        by_hand.iter().map(|p| p.map(|x| x as f32)).collect();
+                    given.set_end_positions(same, &rounded).expect("good");
+                }
+            }
+            let [ours, theirs] = [(&turned, body), (&given, same)]
+                .map(|(scene, body)| scene.body(body).expect("known"));
+            assert_eq!(ours.end_positions(), theirs.end_positions());
+            assert_eq!(ours.positions(), theirs.positions());
+            assert_eq!(ours.transform(), Some(start), "it is that of the start");
+            assert_eq!(*ours.rest_positions(), rest);
+            let [ours, theirs] = [&turned, &given].map(|scene| {
+                let impacts = detector.impacts(scene, &Query::all()).expect("good");
+                impacts.hash()
+            });
+            assert_eq!(ours, theirs);
+            hashes.push(ours);
+            // The next step starts where this one ended, bit by bit.
+            let end_of_step = turned.body(body).expect("known").end_positions().cloned();
+            turned.set_transform(body, &end).expect("good");
+            let start = turned.body(body).expect("known").positions();
+            assert_eq!(end_of_step.as_ref(), Some(start));
+        }
+    }
+    hashes.dedup();
+    assert_eq!(hashes.len(), 8, "the body did move");
+}
+
+#[test]
+fn an_end_transform_moves_the_positions_given_last() {
+    let mut scene = Scene::new();
+    let body = scene.add_triangles(&FACE, &TRIANGLE).expect("good");
+    let end = |scene: &Scene| {
+        let end = scene.body(body).expect("known").end_positions();
+        end.map(|end| end.point(1))
+    };
+    // Without a transform, from where the body is.
+    scene.set_end_transform(body, &lifted(2.0)).expect("good");
+    assert_eq!(end(&scene), Some([1.0, 0.0, 2.0]));
+    scene.set_transform(body, &lifted(5.0)).expect("good");
+    assert_eq!(end(&scene), None, "a new start has no end yet");
+    scene.set_end_transform(body, &lifted(2.0)).expect("good");
+    assert_eq!(end(&scene), Some([1.0, 0.0, 2.0]), "from rest");
+    scene.clear_end_positions(body).expect("known");
+    assert_eq!(end(&scene), None);
+    // Written in place: these are the rest positions, and bad ones are refused.
+    scene.positions_mut::<f32>(body).expect("f32")[1][1] = f32::NAN;
+    let error = scene.set_end_transform(body, &IDENTITY).expect_err("NaN");
+    assert!(
+        matches!(error, Error::NonFinitePosition { vertex: 1, .. }),
+        "{error}"
+    );
+    scene.positions_mut::<f32>(body).expect("f32")[1][1] = 3.0;
+    scene.set_end_transform(body, &lifted(1.0)).expect("good");
+    assert_eq!(end(&scene), Some([1.0, 3.0, 6.0]));
+    // Start and end in two precisions: the narrower one is widened.
+    let wide = TRIANGLE.map(|p| p.map(f64::from));
+    scene.set_end_positions(body, &wide).expect("good");
+    scene.set_end_transform(body, &lifted(1.0)).expect("good");
+    let held = scene.body(body).expect("known");
+    assert!(matches!(held.positions(), Positions::F64(_)));
+    assert!(matches!(held.end_positions(), Some(Positions::F64(_))));
+}
+
+#[test]
+fn a_refused_end_transform_keeps_the_end_positions() {
+    let mut scene = Scene::new();
+    let body = scene.add_triangles(&FACE, &TRIANGLE).expect("good");
+    let mut projective = IDENTITY;
+    projective[3] = [0.0, 0.0, 0.5, 1.0];
+    let mut infinite = IDENTITY;
+    infinite[2][0] = f64::INFINITY;
+    let mut far = IDENTITY;
+    far[0][0] = 1e39;
+    for before in [None, Some(lifted(2.0))] {
+        if let Some(matrix) = &before {
+            scene.set_end_transform(body, matrix).expect("good");
+        }
+        let held = scene.body(body).expect("known").end_positions().cloned();
+        assert_eq!(held.is_some(), before.is_some());
+        for (matrix, message) in [
+            (
+                &projective,
+                "transform: a last row of [0.0, 0.0, 0.5, 1.0] given, [0, 0, 0, 1] allowed",
+            ),
+            (
+                &infinite,
+                "transform: inf in row 2, column 0 given, finite numbers allowed",
+            ),
+            (
+                &far,
+                "body 0: vertex 1 has a non-finite position (inf, 0, 0)",
+            ),
+        ] {
+            let error = scene.set_end_transform(body, matrix).expect_err("bad");
+            assert_eq!(error.to_string(), message);
+            assert_eq!(
+                scene.body(body).expect("known").end_positions(),
+                held.as_ref()
+            );
+        }
+    }
+    scene.remove(body).expect("known");
+    assert!(matches!(
+        scene.set_end_transform(body, &IDENTITY),
+        Err(Error::UnknownBody { .. })
+    ));
+}
+
+/// How far the documents say that a step may leave the arc, and that the least number of pieces
+/// which keeps to a deviation does.
+#[test]
+fn a_step_leaves_the_arc_of_a_turn_by_no_more_than_is_said() {
+    let mut scene = Scene::new();
+    let rest = cloud(60);
+    let body = scene.add_points(&rest).expect("good");
+    let axis = [2.0 / 7.0, 3.0 / 7.0, 6.0 / 7.0];
+    let radius = |p: &[f64; 3]| {
+        let along: f64 = p.iter().zip(axis).map(|(x, y)| x * y).sum();
+        let off: [f64; 3] = std::array::from_fn(|k| p[k] - along * axis[k]);
+        off.iter().map(|x| x * x).sum::<f64>().sqrt()
+    };
+    let farthest = rest.iter().map(radius).fold(0.0, f64::max);
+    for (angle, deviation) in [(3.0, 0.1), (0.9, 0.01), (6.2, 0.002)] {
+        let n = (angle * f64::sqrt(farthest / (8.0 * deviation))).ceil();
+        let step = angle / n;
+        scene.set_transform(body, &turn(0.4)).expect("good");
+        scene
+            .set_end_transform(body, &turn(0.4 + step))
+            .expect("good");
+        let held = scene.body(body).expect("known");
+        let end = held.end_positions().expect("set");
+        let mut most = 0.0f64;
+        for moment in 0..=100 {
+            let t = f64::from(moment) / 100.0;
+            let arc = turn(0.4 + t * step);
+            for (ix, &p) in rest.iter().enumerate() {
+                let (x, y) = (held.positions().point(ix), end.point(ix));
+                let there = by_hand(&arc, p);
+                let off = (0..3).map(|k| (x[k] + t * (y[k] - x[k]) - there[k]).powi(2));
+                let off = off.sum::<f64>().sqrt();
+                assert!(off <= radius(&p) * step * step / 8.0 + 1e-14);
+                most = most.max(off);
+            }
+        }
+        assert!(most <= deviation + 1e-14);
+        // One piece less would leave it by more: the rule wastes none, for small turns.
+        let coarse = farthest * (1.0 - (angle / (n - 1.0) / 2.0).cos());
+        assert!(step > 0.5 || coarse > deviation, "{coarse} of {deviation}");
+    }
+}
+
 /// `n` triangles as parts with vertices of their own.
 fn parts(n: usize) -> (Elements, Vec<usize>, Vec<[f32; 3]>, Vec<usize>) {
     let positions = (0..n).flat_map(|ix| {

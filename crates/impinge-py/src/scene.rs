@@ -146,6 +146,24 @@ fn change<'py>(scene: &Bound<'py, Scene>) -> PyResult<PyRefMut<'py, Scene>> {
     })
 }
 
+/// Moves a body, or the end of its step, by a matrix.
+fn move_by(
+    scene: &Bound<'_, Scene>,
+    body: &Bound<'_, PyAny>,
+    matrix: &Bound<'_, PyAny>,
+    set: impl Fn(&mut impinge::Scene, BodyId, &[[f64; 4]; 4]) -> Result<(), impinge::Error>,
+) -> PyResult<()> {
+    let mut scene = change(scene)?;
+    let id = scene.id(body, "body")?;
+    let matrix = arrays::matrix(matrix, "matrix")?;
+    set(&mut scene.inner, id, &matrix).map_err(|error| match error {
+        impinge::Error::Setting { given, allowed, .. } => {
+            invalid(format!("matrix: {given} given, {allowed} allowed"))
+        }
+        error => raise(error),
+    })
+}
+
 #[pymethods]
 impl Scene {
     #[new]
@@ -323,18 +341,15 @@ impl Scene {
         body: &Bound<'_, PyAny>,
         matrix: &Bound<'_, PyAny>,
     ) -> PyResult<()> {
-        let mut scene = change(slf)?;
-        let id = scene.id(body, "body")?;
-        let matrix = arrays::matrix(matrix, "matrix")?;
-        scene
-            .inner
-            .set_transform(id, &matrix)
-            .map_err(|error| match error {
-                impinge::Error::Setting { given, allowed, .. } => {
-                    invalid(format!("matrix: {given} given, {allowed} allowed"))
-                }
-                error => raise(error),
-            })
+        move_by(slf, body, matrix, impinge::Scene::set_transform)
+    }
+
+    fn _set_end_transform(
+        slf: &Bound<'_, Self>,
+        body: &Bound<'_, PyAny>,
+        matrix: &Bound<'_, PyAny>,
+    ) -> PyResult<()> {
+        move_by(slf, body, matrix, impinge::Scene::set_end_transform)
     }
 
     fn _transform<'py>(

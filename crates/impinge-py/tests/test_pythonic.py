@@ -227,6 +227,39 @@ def test_transforms():
     assert np.array_equal(scene.positions(body), rest)
 
 
+def test_end_transforms():
+    scene, given = impinge.Scene(), impinge.Scene()
+    body, same = scene.add(*ball(8, 12)), given.add(*ball(8, 12))
+    rest = scene.positions(body)
+    start, end = np.eye(4), np.eye(4)
+    end[:2, :2] = [[0.6, -0.8], [0.8, 0.6]]
+    end[:3, 3] = [0.5, -1, 2]
+    start[0, 3] = 3.0
+    scene.set_transform(body, start)
+    scene.set_end_transform(body, end)
+    x, y, z = rest.T.astype(np.float64)
+    by_hand = np.stack([((a * x + b * y) + c * z) + d for a, b, c, d in end[:3]], 1).astype(np.float32)
+    assert np.array_equal(scene.end_positions(body), by_hand) and scene.end_positions(body).dtype == np.float32
+    assert np.array_equal(scene.transform(body), start) and np.array_equal(scene.rest_positions(body), rest)
+    given.set_transform(same, start)
+    given.set_end_positions(same, by_hand)
+    wall = np.array([[1.5, -9, -9], [1.5, 9, -9], [1.5, 0, 9]], np.float32)
+    for each in scene, given:
+        each.add(wall, FACE)
+    ours, theirs = (impinge.Detector("cpu").impacts(each) for each in (scene, given))
+    assert len(ours) > 0 and ours.hash == theirs.hash
+    for words, bad in [
+        (r"^matrix: shape \(4, 4\) expected, \(3, 4\) given", end[:3]),
+        (r"^matrix: a last row of .* given, \[0, 0, 0, 1\] allowed", np.ones((4, 4))),
+        ("vertex 0 has", np.diag([1e300, 1, 1, 1])),
+    ]:
+        with pytest.raises(ValueError, match=words):
+            scene.set_end_transform(body, bad)
+        assert np.array_equal(scene.end_positions(body), by_hand)
+    scene.set_transform(body, end)
+    assert scene.end_positions(body) is None and np.array_equal(scene.positions(body), by_hand)
+
+
 def test_rows_of_four():
     scene = impinge.Scene()
     assert scene.kind(scene.add(CORNERS, TETS)) == "tetrahedra"

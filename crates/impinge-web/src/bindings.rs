@@ -128,6 +128,12 @@ impl SceneHandle {
         self.0.set_transform(body, columns).map_err(thrown)
     }
 
+    /// See [`World::set_end_transform`].
+    pub fn set_end_transform(&mut self, body: u32, columns: &[f64]) -> Thrown<()> {
+        let columns = columns.try_into().map_err(|_| thrown(Error::Foreign))?;
+        self.0.set_end_transform(body, columns).map_err(thrown)
+    }
+
     /// See [`World::set_filter`].
     pub fn set_filter(&mut self, body: u32, category: u64, mask: u64) -> Thrown<()> {
         self.0.set_filter(body, category, mask).map_err(thrown)

@@ -109,9 +109,16 @@ impl World {
     /// # Errors
     /// No such body; those of [`Scene::set_transform`].
     pub fn set_transform(&mut self, body: u32, columns: &[f64; 16]) -> Result<(), Error> {
-        let row = |row: usize| [0, 4, 8, 12].map(|column| columns[row + column]);
-        let matrix = [0, 1, 2, 3].map(row);
-        let set = self.scene.set_transform(self.id(body)?, &matrix);
+        let set = self.scene.set_transform(self.id(body)?, &by_rows(columns));
+        self.renumbered(body, set).map(|_| ())
+    }
+
+    /// Moves the rest positions of a body by a matrix, column by column, to the end of a step.
+    ///
+    /// # Errors
+    /// No such body; those of [`Scene::set_end_transform`].
+    pub fn set_end_transform(&mut self, body: u32, columns: &[f64; 16]) -> Result<(), Error> {
+        let set = (self.scene).set_end_transform(self.id(body)?, &by_rows(columns));
         self.renumbered(body, set).map(|_| ())
     }
 
@@ -218,6 +225,11 @@ impl World {
 pub fn welded<R: Real>(positions: &[R]) -> Result<Vec<u32>, Error> {
     let weld = Weld::by_position(rows(positions, "positions")?);
     Ok(weld.map().to_vec())
+}
+
+fn by_rows(columns: &[f64; 16]) -> [[f64; 4]; 4] {
+    let row = |row: usize| [0, 4, 8, 12].map(|column| columns[row + column]);
+    [0, 1, 2, 3].map(row)
 }
 
 fn elements(kind: BodyKind, index: &[u32], n_vertices: usize) -> Result<Elements, Error> {

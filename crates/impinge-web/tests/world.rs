@@ -158,6 +158,10 @@ fn bodies_are_of_every_kind_and_get_new_elements() -> Result<(), Error> {
     let body = world.body(points)?;
     assert_eq!(body.positions().point(1), [9.0, 0.0, 0.0]);
     assert_eq!(body.rest_positions().point(1), [1.0, 0.0, 0.0]);
+    turn[12] = 2.0;
+    world.set_end_transform(points, &turn)?;
+    let end = world.body(points)?.end_positions().expect("set");
+    assert_eq!(end.point(1), [3.0, 0.0, 0.0], "from rest");
     put(&mut world, Put::EndPositions, points, &TRIANGLE)?;
     assert!(world.body(points)?.end_positions().is_some());
     world.clear_end_positions(points)?;

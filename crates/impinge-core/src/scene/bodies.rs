@@ -460,7 +460,8 @@ impl Scene {
     /// They hold until the next [`set_positions`](Scene::set_positions),
     /// [`positions_mut`](Scene::positions_mut), [`set_transform`](Scene::set_transform),
     /// [`remesh`](Scene::remesh) or [`clear_end_positions`](Scene::clear_end_positions). A body
-    /// that has none stands still.
+    /// that has none stands still. For a rigid body, see
+    /// [`set_end_transform`](Scene::set_end_transform).
     ///
     /// If start and end have different precisions, the single-precision one is widened, which is
     /// exact.
@@ -557,6 +558,68 @@ impl Scene {
         }
         target.has_moved(true);
         target.motion = Some(Box::new(RestPose { rest, matrix }));
+        Ok(())
+    }
+
+    /// Sets where a step takes a body, by an affine matrix: its end positions are the
+    /// [rest positions](Body::rest_positions) moved by the matrix, rounded as by
+    /// [`set_transform`](Scene::set_transform), and hold as long as any
+    /// [end positions](Scene::set_end_positions). The two matrices of a step are those of its two
+    /// ends; both start from rest, neither from the other.
+    ///
+    /// **Each vertex goes straight, at constant speed, from its rounded position to its rounded
+    /// end position**, not along the arc of a turn, and each point of an element goes straight
+    /// with its vertices. What is proven of a step is proven of this motion. Halfway through a
+    /// turn the body is smaller, by a factor of the cosine of half the angle; half a turn takes
+    /// it through its axis.
+    ///
+    /// At each moment, a point at distance r from the axis of a screw motion by the angle w
+    /// (radians) is at most r w² / 8 away from where that motion would have it, plus the rounding
+    /// of the two ends. So a large turn is cut into n equal steps with
+    /// `n = ceil(w * sqrt(r / (8.0 * d)))`, where r is that of the farthest vertex and `d` the
+    /// deviation that is allowed. With 2 d (d of each of two bodies) as
+    /// [`separation`](crate::Query::separation), a step that is free is free for the screw motion
+    /// as well, up to that rounding.
+    ///
+    /// After a step, call `set_transform` with the matrix of its end: the positions are then the
+    /// end positions, bit by bit. A step taken by [`apply`](crate::Advance::apply) gives the body
+    /// the positions reached, which are then its rest positions.
+    ///
+    /// ```
+    /// use impinge_core::Scene;
+    /// # fn main() -> Result<(), impinge_core::Error> {
+    /// let mut scene = Scene::new();
+    /// let blade = scene.add_triangles(&[[0, 1, 2]], &[[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 0.0, 0.1]])?;
+    /// let turned = |angle: f64| {
+    ///     let (sin, cos) = angle.sin_cos();
+    ///     [[cos, -sin, 0.0, 0.0], [sin, cos, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]]
+    /// };
+    /// // A half turn, of which no step may leave the arc by more than 0.01.
+    /// let (angle, radius, deviation) = (std::f64::consts::PI, 2.0, 0.01);
+    /// let n = (angle * f64::sqrt(radius / (8.0 * deviation))).ceil();
+    /// assert_eq!(n, 16.0);
+    /// for step in 0..16 {
+    ///     scene.set_transform(blade, &turned(angle * f64::from(step) / n))?;
+    ///     scene.set_end_transform(blade, &turned(angle * f64::from(step + 1) / n))?;
+    ///     // ... ask about the step
+    /// }
+    /// # Ok(()) }
+    /// ```
+    ///
+    /// # Errors
+    /// As [`set_transform`](Scene::set_transform); the body keeps its old end positions then.
+    pub fn set_end_transform(&mut self, body: BodyId, matrix: &[[f64; 4]; 4]) -> Result<(), Error> {
+        let matrix = Affine::new(matrix)?;
+        let target = self.moved_body(body)?;
+        if !target.checked {
+            target.positions.check(body)?;
+        }
+        // The memory of end positions that no longer count is used again.
+        let unused = target.end.take_if(|_| !target.moves);
+        let mut end = unused.unwrap_or_else(|| f32::store(&[]));
+        matrix.write(target.rest_positions(), &mut end);
+        end.check(body)?;
+        target.set_end(end);
         Ok(())
     }
 
