@@ -53,7 +53,7 @@ uint32_t impinge_abi_version(void);
 
 /* ---- Arrays ---- */
 
-/* Types of numbers. U8 is that of some columns of answers, and never of input. */
+/* Types of numbers. U8 is that of some columns of answers, and of input only in impinge_scene_set_pinned. */
 #define IMPINGE_F32 1
 #define IMPINGE_F64 2
 #define IMPINGE_U32 3
@@ -167,6 +167,16 @@ impinge_status impinge_scene_set_filter(impinge_scene *scene, uint32_t body, uin
  * INVALID: no such body, another number. */
 impinge_status impinge_scene_set_thickness(impinge_scene *scene, uint32_t body, double thickness);
 
+/* Sets the group of each vertex of a body, for IMPINGE_EXCLUDE_GROUPS: as many rows as it has vertices, 1 column of any integer type. A
+ * body whose groups were not set has none that could be left out. New elements (impinge_scene_remesh) have no groups.
+ * INVALID: no such body, another number of rows, a number below 0 or above 2^32 - 1. */
+impinge_status impinge_scene_set_groups(impinge_scene *scene, uint32_t body, impinge_array groups);
+
+/* Says which vertices of a body are pinned, where they never move: as many rows as it has vertices, 1 column of U8 or any integer type,
+ * 1 or 0. Pairs of elements all of whose vertices are pinned are left out of every query.
+ * INVALID: no such body, another number of rows, another number than 0 or 1. */
+impinge_status impinge_scene_set_pinned(impinge_scene *scene, uint32_t body, impinge_array pinned);
+
 /* The number of bodies; 0 for NULL. */
 size_t impinge_scene_n_bodies(const impinge_scene *scene);
 
@@ -208,19 +218,25 @@ impinge_status impinge_weld(impinge_array positions, uint32_t *map, uint32_t *fi
 #define IMPINGE_START_VERIFY 2
 
 /* Flags of a query. DISTANCES and CLOSEST_POINTS: near pairs come with them. CELL: only pairs of the cell. SIGNED: not known to this
- * version. */
+ * version; impinge_signed_distance has signs. */
 #define IMPINGE_DISTANCES 1
 #define IMPINGE_CLOSEST_POINTS 2
 #define IMPINGE_SIGNED 4
 #define IMPINGE_CELL 8
 
-/* Which hits of a ray are sought. Not known to this version, but for the default. */
+/* Which hits of a ray are sought: the first, whether there is any, or all. */
 #define IMPINGE_HITS_FIRST 0
 #define IMPINGE_HITS_ANY 1
 #define IMPINGE_HITS_ALL 2
 
-/* Pairs to leave out. This version knows EXCLUDE_BODIES: the pairs of bodies `a` and `b`, or with a == b the self-collision of `a`.
- * Other fields are 0. */
+/* Pairs to leave out, before they are decided. Fields that are not named are 0.
+ *   EXCLUDE_BODIES      the pairs of bodies `a` and `b`, or with a == b the self-collision of `a`
+ *   EXCLUDE_RINGS       pairs of one body that are near each other in its surface: some vertex of one element is at most `n` edges, 0 to
+ *                       16, away from some vertex of the other
+ *   EXCLUDE_GROUPS      pairs of elements of the groups `a` and `b` of vertices, which impinge_scene_set_groups sets, or of one with
+ *                       itself: each vertex of one element and each of the other must be in such groups
+ *   EXCLUDE_VERTICES    not known to this version
+ * Pairs that are near at rest are left out by the field rest_pairs of impinge_query. */
 #define IMPINGE_EXCLUDE_BODIES 0
 #define IMPINGE_EXCLUDE_RINGS 1
 #define IMPINGE_EXCLUDE_GROUPS 2
@@ -229,6 +245,9 @@ typedef struct impinge_exclusion {
   uint32_t kind, a, b, n;
   impinge_array offsets, vertices;
 } impinge_exclusion;
+
+/* Sorted pairs of elements that are near each other. */
+typedef struct impinge_near impinge_near;
 
 /* The vertices of an element, in the order in which it names them, and its body. */
 typedef struct impinge_element {
@@ -251,6 +270,9 @@ typedef struct impinge_element {
  * infinite.
  *   exclusions, n_exclusions
  *                       Pairs to leave out. They are read during the call.
+ *   rest_pairs, n_rest_pairs
+ *                       Answers of impinge_find_near whose pairs are left out: of the same scene, mostly at rest, with the kinds of
+ *                       pairs that are to be left out. Refused by questions about the elements that bodies were given as.
  *   passes, passes_user Which pairs of elements may collide, of steps: 0 for those to leave out. It is asked about pairs that are in
  *                       contact, or might be, by several threads at the same time, and must always say the same of one pair. The first
  *                       element is the one that the kind of the pair names first. NULL, the default: all.
@@ -263,8 +285,9 @@ typedef struct impinge_element {
  *   clearance_share     From 0 to less than 1. Default: 0.2.
  *   flags IMPINGE_DISTANCES, IMPINGE_CLOSEST_POINTS
  *                       Columns that near pairs come with.
- *   hits, n_nearest, fixed, n_fixed
- *                       Not known to this version: anything but the default is refused. */
+ *   hits                IMPINGE_HITS_FIRST (default), IMPINGE_HITS_ANY or IMPINGE_HITS_ALL, of rays.
+ *   fixed, n_fixed      Bodies that do not move, of safe distances: they leave the whole distance to what is near them.
+ *   n_nearest           Not known to this version: anything but 0 is refused. */
 typedef struct impinge_query {
   uint32_t size; /* sizeof(impinge_query) of the caller */
   uint32_t between, self, shared_vertex;
@@ -278,6 +301,8 @@ typedef struct impinge_query {
   size_t n_fixed;
   int (*passes)(void *user, const impinge_element *a, const impinge_element *b);
   void *passes_user;
+  const impinge_near *const *rest_pairs;
+  size_t n_rest_pairs;
 } impinge_query;
 
 /* A query of a step: the same structure. */
@@ -340,6 +365,26 @@ impinge_status impinge_detector_create(const impinge_settings *settings, impinge
 /* Ends a detector and its threads. */
 void impinge_detector_destroy(impinge_detector *detector);
 
+/* A GPU that can run the kernels of the library. Strings live as long as the list. */
+typedef struct impinge_device {
+  const char *name;           /* any part of it selects this device in impinge_settings */
+  const char *interface_name; /* "vulkan", "metal" or "dx12" */
+  const char *driver;         /* and its version */
+  uint64_t max_binding;       /* the most bytes of one buffer binding */
+  uint32_t is_software;       /* 1 if it runs on the CPU: IMPINGE_BACKEND_AUTO ignores such devices */
+  uint32_t reserved;          /* 0 */
+} impinge_device;
+
+/* GPUs, hardware first. */
+typedef struct impinge_devices impinge_devices;
+
+/* The GPUs of this machine that can run the kernels of the library: none if it was built without the GPU backend. */
+impinge_status impinge_find_devices(impinge_devices **devices);
+/* How many there are, 0 for NULL; NULL if there are none. */
+size_t impinge_devices_count(const impinge_devices *devices);
+const impinge_device *impinge_devices_data(const impinge_devices *devices);
+void impinge_devices_destroy(impinge_devices *devices);
+
 /* ---- What answers are made of ---- */
 
 /* Two elements: numbers of bodies, and of elements in their bodies. */
@@ -360,6 +405,31 @@ typedef struct impinge_nearest {
   double distance, points[2][3];
   uint32_t body_a, element_a, body_b, element_b;
 } impinge_nearest;
+
+/* A feature of an element: 0 to 2 a vertex, 8 to 10 an edge (from that vertex to the next), 16 the face, and NO_FEATURE where there is no
+ * element. */
+#define IMPINGE_NO_FEATURE 255
+
+/* The element that is nearest to a point. Which it is, is decided exactly; of several at the same distance it is the lowest by body and
+ * then by number. Without any that is near enough `found` is 0, `body` IMPINGE_ANY_BODY, `distance` infinity and `point` NaN. */
+typedef struct impinge_closest_element {
+  double distance; /* rounded down: never above the true one, and 0 if they touch */
+  double point[3]; /* the nearest point of the element, rounded to nearest */
+  uint32_t body, element;
+  uint32_t feature; /* which feature of the element has that point in its inside */
+  uint32_t found;   /* 1, or 0 if nothing is near enough */
+} impinge_closest_element;
+
+/* Where a ray meets an element. */
+typedef struct impinge_ray_hit {
+  double t;               /* of the entry, in units of the direction, rounded down */
+  double t_end;           /* where the ray leaves the element: more than t where it lies in the plane of the element */
+  double barycentrics[3]; /* of the point of entry, each rounded to nearest */
+  uint64_t ray;           /* its row */
+  uint32_t body, element;
+  uint32_t feature;       /* which feature of the element has the point of entry in its inside */
+  uint32_t reserved;      /* 0 */
+} impinge_ray_hit;
 
 /* A connected region in which two bodies overlap: see impinge_find_penetration. */
 typedef struct impinge_region {
@@ -411,7 +481,13 @@ typedef struct impinge_stats {
  *   CURVE_POINTS k x 1 U32     numbers of points, along each curve                      contacts
  *   CURVE_CLOSED c x 1 U8      1 if it is a loop, which does not repeat its first point  contacts
  *   CURVE_LENGTH c x 1 F64     its length                                               contacts
- *   INSIDE_A, INSIDE_B  U32    vertices of one body inside the other, sorted            penetrations */
+ *   INSIDE_A, INSIDE_B  U32    vertices of one body inside the other, sorted            penetrations
+ * Of the elements nearest to points, and of hits of rays, ROWS is n x 2 U32 (body, element), FEATURES n x 1 U32, and:
+ *   DISTANCE, POINTS    n x 1, n x 3 F64                                                closest
+ *   IS_HIT      r x 1 U8       of each ray: 1 if it hits anything                       hits
+ *   STARTS      r + 1 x 1 U64  where the hits of each ray start, but for IMPINGE_HITS_ANY  hits
+ *   T, T_END    n x 1 F64                                                               hits
+ *   BARYCENTRICS n x 3 F64                                                              hits */
 #define IMPINGE_COLUMN_KIND 1
 #define IMPINGE_COLUMN_ROWS 2
 #define IMPINGE_COLUMN_DISTANCE 3
@@ -430,6 +506,10 @@ typedef struct impinge_stats {
 #define IMPINGE_COLUMN_CURVE_LENGTH 16
 #define IMPINGE_COLUMN_INSIDE_A 17
 #define IMPINGE_COLUMN_INSIDE_B 18
+#define IMPINGE_COLUMN_IS_HIT 19
+#define IMPINGE_COLUMN_T 20
+#define IMPINGE_COLUMN_T_END 21
+#define IMPINGE_COLUMN_BARYCENTRICS 22
 
 /* The shape of a contact: a pair that is no pair of triangles; nothing, because bodies have moved since; a point; a segment; a polygon
  * of two triangles in one plane. */
@@ -485,6 +565,12 @@ typedef struct impinge_motion impinge_motion;
 impinge_status impinge_advance(impinge_detector *detector, const impinge_scene *scene, const impinge_step *step, double *fraction,
     impinge_motion **motion);
 
+/* How far each vertex can go on its way to its end position: each stops for itself, where impinge_advance stops all at one fraction. The
+ * straight way to the rounded positions is free in the sense of impinge_is_free, if the start was, but for pairs that touch at the start:
+ * their vertices stay where they are, unless IMPINGE_START_SKIP leaves the pairs out, and are counted. Separation and clearance are kept at
+ * every moment. INVALID: as impinge_advance. Found on the CPU. */
+impinge_status impinge_truncate(impinge_detector *detector, const impinge_scene *scene, const impinge_step *step, impinge_motion **motion);
+
 /* Sorted pairs whose boxes overlap. */
 typedef struct impinge_candidates impinge_candidates;
 
@@ -501,18 +587,71 @@ impinge_status impinge_find_candidates_in_runs(impinge_detector *detector, const
                                                int (*each)(void *user, uint32_t kind, const impinge_pair *rows, size_t n), void *user,
     uint64_t *n);
 
-/* Sorted pairs of elements that are near each other. */
-typedef struct impinge_near impinge_near;
-
 /* Pairs of elements at most `distance` apart, a length of 0 or more, plus the thickness of both bodies; decided exactly, at the positions
  * of the scene. */
 impinge_status impinge_find_near(impinge_detector *detector, const impinge_scene *scene, double distance, const impinge_query *query,
     impinge_near **near_pairs);
 
+/* How far each vertex may move. */
+typedef struct impinge_safe_distances impinge_safe_distances;
+
+/* How far each vertex may move, on any path, so that nothing touches: for each pair of elements that do not share a vertex, the largest
+ * number of the vertices of one and the largest of the other add up to less than their distance, minus the thickness of both bodies. No
+ * number is above `most`, a length of 0 or more. Pairs that touch get 0. Each number is rounded down, and the rounding of a new position
+ * counts as motion. End positions are ignored. INVALID: also a body of `fixed` that is none of the scene. */
+impinge_status impinge_find_safe_distances(impinge_detector *detector, const impinge_scene *scene, double most, const impinge_query *query,
+    impinge_safe_distances **safe_distances);
+
+/* Lists of what is near each element. */
+typedef struct impinge_neighbours impinge_neighbours;
+
+/* The pairs of impinge_find_near as lists: of each vertex the faces near it, of each face the vertices, of each edge the edges, and so on
+ * for the kinds that the query asks for. */
+impinge_status impinge_find_neighbours(impinge_detector *detector, const impinge_scene *scene, double distance, const impinge_query *query,
+    impinge_neighbours **neighbours);
+
 /* The smallest distance of two bodies: `found` gets 1 and `nearest` the pair that has it, or 0 if one body has no elements. Tetrahedra
  * are solid. */
 impinge_status impinge_find_distance(impinge_detector *detector, const impinge_scene *scene, uint32_t a, uint32_t b,
     impinge_nearest *nearest, int32_t *found);
+
+/* The two bodies that are nearest to each other of all that the query lets meet: `found` gets 1 and `nearest` the pair of elements that
+ * has their distance, or 0 if there are no two that have elements. INVALID: also a query for self-collision, as the default one is (set
+ * its field `self` to 0), or for the pairs of a cell. */
+impinge_status impinge_find_nearest(impinge_detector *detector, const impinge_scene *scene, const impinge_query *query,
+    impinge_nearest *nearest, int32_t *found);
+
+/* Where points lie (3 columns of F32 or F64): `places` gets one number per row, 1 inside a body, 0 on its surface, -1 outside, decided
+ * exactly. Triangles must be a closed surface, around which points are inside if it winds around them any number of times but 0; the
+ * surface of tetrahedra are the faces of one tetrahedron alone.
+ * INVALID: also a body of points or edges, a surface that is not closed (the message names an edge), a point that is not finite. */
+impinge_status impinge_contains(impinge_detector *detector, const impinge_scene *scene, uint32_t body, impinge_array points,
+    int8_t *places);
+
+/* How far points are from the surface of a body: `distances` gets one number per row, above 0 inside and below 0 outside. The sign is
+ * exact, and the magnitude rounded down. INVALID: as impinge_contains. */
+impinge_status impinge_signed_distance(impinge_detector *detector, const impinge_scene *scene, uint32_t body, impinge_array points,
+    double *distances);
+
+/* The elements nearest to points, one row per point. */
+typedef struct impinge_closest impinge_closest;
+
+/* The element that is nearest to each point (3 columns of F32 or F64), if it is at most `most` away, a length of 0 or more, or infinity.
+ * Elements are faces, those of the surface of tetrahedra, and the edges and points of other bodies. The query is about all bodies, or about
+ * the body `a` alone. INVALID: also a query about pairs, a point that is not finite. */
+impinge_status impinge_find_closest(impinge_detector *detector, const impinge_scene *scene, impinge_array points, double most,
+    const impinge_query *query, impinge_closest **closest);
+
+/* What rays hit, one ray after the other. */
+typedef struct impinge_hits impinge_hits;
+
+/* What each ray hits: the points origin + t direction for t from 0 to `most`, which is 1 for segments and infinity for rays. Origins and
+ * directions have 3 columns of F32 or F64 and as many rows. Elements and the query are as for impinge_find_closest; its field `hits` asks
+ * for the first hit, for any, or for all. A ray that grazes an edge or a vertex hits all elements there, and one in the plane of a face
+ * hits it from an entry to an exit, decided exactly. The first hit is the one with the smallest t, of several the lowest by body and
+ * number. INVALID: also another number of directions than of origins, a number that is not finite. */
+impinge_status impinge_cast(impinge_detector *detector, const impinge_scene *scene, impinge_array origins, impinge_array directions,
+    double most, const impinge_query *query, impinge_hits **hits);
 
 /* Where the triangles of each pair meet. */
 typedef struct impinge_contacts impinge_contacts;
@@ -574,6 +713,47 @@ impinge_status impinge_near_column(const impinge_near *near_pairs, uint32_t colu
 impinge_status impinge_near_stats(const impinge_near *near_pairs, impinge_stats *stats);
 void impinge_near_destroy(impinge_near *near_pairs);
 
+/* How far each vertex of a body may move: a view, n x 1 F32 or F64 as its positions, valid as long as the answer. A vertex that belongs to
+ * no element has `most`, as has each vertex of a body that the query is not about. INVALID: no such body when it was asked. */
+impinge_status impinge_safe_distances_of(const impinge_safe_distances *safe_distances, uint32_t body, impinge_array *view);
+/* The pairs at distance 0, or nearer than their bodies are thick. They belong to the answer: do not destroy them. NULL for NULL. */
+const impinge_near *impinge_safe_distances_touching(const impinge_safe_distances *safe_distances);
+impinge_status impinge_safe_distances_stats(const impinge_safe_distances *safe_distances, impinge_stats *stats);
+void impinge_safe_distances_destroy(impinge_safe_distances *safe_distances);
+
+/* How many pairs are near; each is in two lists. 0 for NULL. */
+size_t impinge_neighbours_count(const impinge_neighbours *neighbours);
+/* The lists number the vertices of all bodies one after another in the order of the bodies, and so the edges and the faces: `first` gets
+ * the numbers of the first vertex, the first edge and the first face of a body. Edges have the caller's numbers, where these were set.
+ * INVALID: no such body when it was asked. */
+impinge_status impinge_neighbours_first(const impinge_neighbours *neighbours, uint32_t body, uint32_t (*first)[3]);
+/* The lists of the elements that a kind (IMPINGE_VF ...) names first, or, if `reversed` is 1, of those that it names second: of IMPINGE_VF
+ * the faces near each vertex, or the vertices near each face. The neighbours of element i are those from offsets[i] (U64) to
+ * offsets[i + 1] of `indices` (U32), ascending; `distances` (F64) has how far each is, rounded down: by at most 2^-20 of it, and 0 if they
+ * touch. Views, valid as long as the answer; each may be NULL. A kind that was not asked for has no offsets, or lists without entries. */
+impinge_status impinge_neighbours_lists(const impinge_neighbours *neighbours, uint32_t kind, uint32_t reversed, impinge_array *offsets,
+    impinge_array *indices, impinge_array *distances);
+impinge_status impinge_neighbours_stats(const impinge_neighbours *neighbours, impinge_stats *stats);
+void impinge_neighbours_destroy(impinge_neighbours *neighbours);
+
+/* One row per point, in their order. The hash is of rows and their order. */
+size_t impinge_closest_count(const impinge_closest *closest);
+const impinge_closest_element *impinge_closest_data(const impinge_closest *closest);
+uint64_t impinge_closest_hash(const impinge_closest *closest);
+impinge_status impinge_closest_column(const impinge_closest *closest, uint32_t column, impinge_array *view);
+impinge_status impinge_closest_stats(const impinge_closest *closest, impinge_stats *stats);
+void impinge_closest_destroy(impinge_closest *closest);
+
+/* One row per hit, by ray, by t, then by body and number; none if only yes or no was asked for. */
+size_t impinge_hits_count(const impinge_hits *hits);
+const impinge_ray_hit *impinge_hits_data(const impinge_hits *hits);
+/* How many rays there are; 0 for NULL. */
+size_t impinge_hits_n_rays(const impinge_hits *hits);
+uint64_t impinge_hits_hash(const impinge_hits *hits);
+impinge_status impinge_hits_column(const impinge_hits *hits, uint32_t column, impinge_array *view);
+impinge_status impinge_hits_stats(const impinge_hits *hits, impinge_stats *stats);
+void impinge_hits_destroy(impinge_hits *hits);
+
 /* One contact per row of the pairs. */
 size_t impinge_contacts_count(const impinge_contacts *contacts);
 const impinge_pair *impinge_contacts_data(const impinge_contacts *contacts);
@@ -592,13 +772,19 @@ impinge_status impinge_penetration_stats(const impinge_penetration *penetration,
 double impinge_penetration_volume(const impinge_penetration *penetration);
 void impinge_penetration_destroy(impinge_penetration *penetration);
 
-/* The part of the step that can be taken: 1 for all of it, 0 for none, and for NULL. */
+/* The part of the step that can be taken: 1 for all of it, 0 for none, and for NULL. NaN of impinge_truncate, where each vertex has its
+ * own. */
 double impinge_motion_fraction(const impinge_motion *motion);
-/* The first contact of the whole step: `found` gets 1 and `impact` the impact, or 0 if nothing touches. */
+/* The first contact of the whole step: `found` gets 1 and `impact` the impact, or 0 if nothing touches. INVALID: of impinge_truncate. */
 impinge_status impinge_motion_first(const impinge_motion *motion, impinge_impact *impact, int32_t *found);
 /* Whether elements intersect at the start: 1 or 0, or -1 if nobody asked. */
 int32_t impinge_motion_start_intersects(const impinge_motion *motion);
-/* Where the vertices of a body are at that fraction: a view, valid as long as the motion. No rows for a body that stands still. */
+/* Of impinge_truncate: how many vertices were stopped before the end of their way; how many pairs touch at the start, or are nearer than
+ * they are to keep; how often pairs were looked at again. 0 of impinge_advance, and for NULL. */
+uint64_t impinge_motion_n_cut(const impinge_motion *motion);
+uint64_t impinge_motion_n_touching(const impinge_motion *motion);
+uint32_t impinge_motion_rounds(const impinge_motion *motion);
+/* Where the vertices of a body are then: a view, valid as long as the motion. No rows for a body that stands still. */
 impinge_status impinge_motion_positions(const impinge_motion *motion, uint32_t body, impinge_array *view);
 /* Takes the step: these positions become those of the scene, and its bodies stand still until they get end positions again.
  * INVALID: a body that was removed, or that has another number of vertices now. */

@@ -1,10 +1,12 @@
 //! The answers that callers own: rows and columns, ready to be read.
 
 use std::mem::offset_of;
+use std::sync::OnceLock;
 
 use impinge::exact::Feature;
 use impinge::{
-    Candidates, Impact, Impacts, NearPairs, PairKind, Pairs, Stats, hash_impact_rows, hash_rows,
+    Candidates, Exclusion, Impact, Impacts, NearPairs, PairKind, Pairs, Stats, hash_impact_rows,
+    hash_rows,
 };
 
 use crate::arrays::{self, collect, reserve};
@@ -135,6 +137,8 @@ pub struct impinge_near {
     near: NearPairs,
     rows: Vec<impinge_pair>,
     columns: NearColumns,
+    /// The same pairs, to be left out of queries: made once, because it keeps their keys.
+    exclusion: OnceLock<Exclusion>,
     texts: Texts,
 }
 
@@ -148,7 +152,7 @@ struct NearColumns {
 }
 
 /// A feature as one number: a vertex of the element, its edges from 8 on, its face.
-fn code(feature: Feature, is_reversed: bool) -> u8 {
+pub fn code(feature: Feature, is_reversed: bool) -> u8 {
     match feature {
         Feature::Vertex(ix) if is_reversed => 1 - ix,
         Feature::Vertex(ix) => ix,
@@ -196,12 +200,18 @@ impl impinge_near {
             near,
             rows,
             columns: of,
+            exclusion: OnceLock::new(),
             texts: Texts::default(),
         };
         if scene.renames_edges() {
             answer.sort()?;
         }
         Ok(answer)
+    }
+
+    /// The pairs, for queries that leave them out.
+    pub fn exclusion(&self) -> Exclusion {
+        self.exclusion.get_or_init(|| (&self.near).into()).clone()
     }
 
     /// Puts rows and columns into the order of the rows.
@@ -240,7 +250,7 @@ pub trait Answer {
 }
 
 /// A column that an answer has only if it was asked for.
-fn asked_for<T>(
+pub fn asked_for<T>(
     list: &[T],
     n: usize,
     view: impl FnOnce() -> impinge_array,

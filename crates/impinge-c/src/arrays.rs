@@ -159,6 +159,13 @@ impl<const N: usize> Floats<'_, N> {
     }
 }
 
+impl<const N: usize> Floats<'_, N> {
+    /// All rows in double precision.
+    pub fn widened(&self, what: &str) -> Result<Vec<[f64; N]>, Failure> {
+        collect((0..self.len()).map(|row| self.wide(row)), what)
+    }
+}
+
 impl Floats<'_, 3> {
     /// A copy that a scene may keep.
     pub fn into_owned(self) -> Result<Positions, Failure> {
@@ -229,7 +236,8 @@ pub unsafe fn indices<const N: usize>(
             for (corner, wide) in corners.iter_mut().zip(unsafe { view.row(row) }) {
                 *corner = wide.try_into().map_err(|_| {
                     Failure::invalid(format!(
-                        "{what}: row {row} has {wide}, which is no vertex index"
+                        "{what}: row {row} has {wide}, where 0 to {} is allowed",
+                        u32::MAX
                     ))
                 })?;
             }
@@ -256,6 +264,38 @@ pub unsafe fn indices<const N: usize>(
             ))),
         }
     }
+}
+
+/// Flags of a caller, copied: 0 and 1 of any integer type, or bytes.
+///
+/// # Safety
+/// The array is as described.
+pub unsafe fn flags(array: &impinge_array, what: &str) -> Result<Vec<bool>, Failure> {
+    let refuse = |row: usize, given: u32| {
+        Failure::invalid(format!(
+            "{what}: row {row} has {given}, where 0 or 1 is allowed"
+        ))
+    };
+    let flag = |(row, given): (usize, u32)| match given {
+        0 => Ok(false),
+        1 => Ok(true),
+        _ => Err(refuse(row, given)),
+    };
+    if array.r#type != U8 {
+        // SAFETY: the caller's promise.
+        let rows = unsafe { indices::<1>(array, what) }?;
+        return rows
+            .as_flattened()
+            .iter()
+            .copied()
+            .enumerate()
+            .map(flag)
+            .collect();
+    }
+    let view = Strided::<u8, 1>::new(array, what)?;
+    // SAFETY: the caller's promise.
+    let rows = (0..view.rows).map(|row| (row, unsafe { view.row(row) }[0].into()));
+    rows.map(flag).collect()
 }
 
 /// Elements of a kind, copied.

@@ -57,6 +57,11 @@ impl EdgeNumbers {
         }
         Ok(EdgeNumbers { rows, to_own })
     }
+
+    /// The caller's number of an edge.
+    pub fn own(&self, edge: u32) -> u32 {
+        self.to_own[edge as usize].0
+    }
 }
 
 fn sorted([a, b]: [u32; 2]) -> [u32; 2] {

@@ -1,6 +1,6 @@
-//! How far a step can be taken: `impinge_motion_*`.
+//! How far a step can be taken, as a whole or by each vertex: `impinge_motion_*`.
 
-use impinge::{Advance, Positions, Stats};
+use impinge::{Advance, Positions, Scene, Stats, Truncation};
 
 use crate::answers::impact_row;
 use crate::arrays;
@@ -12,33 +12,82 @@ use crate::types::*;
 
 /// Positions to which a step can be taken.
 pub struct impinge_motion {
-    advance: Advance,
-    first: Option<impinge_impact>,
+    of: Motion,
     stats: Stats,
     texts: Texts,
 }
 
+enum Motion {
+    Whole {
+        advance: Advance,
+        first: Option<impinge_impact>,
+    },
+    ByVertex(Truncation),
+}
+
+impl Motion {
+    fn positions(&self, body: u32) -> Option<&Positions> {
+        let is_of = |index: usize| index == body as usize;
+        match self {
+            Motion::Whole { advance, .. } => {
+                let mut all = advance.positions.iter();
+                Some(&all.find(|(id, _)| is_of(id.index()))?.1)
+            }
+            Motion::ByVertex(truncation) => {
+                Some(truncation.iter().find(|(id, _)| is_of(id.index()))?.1)
+            }
+        }
+    }
+
+    fn truncation(&self) -> Option<&Truncation> {
+        match self {
+            Motion::Whole { .. } => None,
+            Motion::ByVertex(truncation) => Some(truncation),
+        }
+    }
+
+    fn start_intersects(&self) -> Option<bool> {
+        match self {
+            Motion::Whole { advance, .. } => advance.start_intersects,
+            Motion::ByVertex(truncation) => truncation.start_intersects(),
+        }
+    }
+
+    fn apply(&self, scene: &mut Scene) -> Result<(), impinge::Error> {
+        match self {
+            Motion::Whole { advance, .. } => advance.apply(scene),
+            Motion::ByVertex(truncation) => truncation.apply(scene),
+        }
+    }
+}
+
 impl impinge_motion {
     pub fn new(advance: Advance, stats: Stats, scene: &impinge_scene) -> Self {
+        let first = advance.first.map(|impact| impact_row(&impact, scene));
         impinge_motion {
-            first: advance.first.map(|impact| impact_row(&impact, scene)),
-            advance,
+            of: Motion::Whole { advance, first },
             stats,
             texts: Texts::default(),
         }
     }
 
-    fn positions(&self, body: u32) -> Option<&Positions> {
-        let mut all = self.advance.positions.iter();
-        let found = all.find(|(id, _)| id.index() == body as usize);
-        found.map(|(_, positions)| positions)
+    pub fn by_vertex(truncation: Truncation, stats: Stats) -> Self {
+        impinge_motion {
+            of: Motion::ByVertex(truncation),
+            stats,
+            texts: Texts::default(),
+        }
     }
 }
 
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn impinge_motion_fraction(motion: *const impinge_motion) -> f64 {
     // SAFETY: `impinge.h` says what pointers are.
-    unsafe { motion.as_ref() }.map_or(0.0, |motion| motion.advance.fraction)
+    match unsafe { motion.as_ref() }.map(|motion| &motion.of) {
+        None => 0.0,
+        Some(Motion::Whole { advance, .. }) => advance.fraction,
+        Some(Motion::ByVertex(_)) => f64::NAN,
+    }
 }
 
 #[unsafe(no_mangle)]
@@ -49,9 +98,13 @@ pub unsafe extern "C" fn impinge_motion_first(
 ) -> Status {
     guard(|| {
         // SAFETY: `impinge.h` says what pointers are.
-        let motion = unsafe { held(motion, "motion") }?;
+        let Motion::Whole { first, .. } = unsafe { held(motion, "motion") }?.of else {
+            return Err(Failure::invalid(
+                "motion: it is of impinge_truncate, which finds no first contact",
+            ));
+        };
         // SAFETY: `impinge.h` says what pointers are.
-        unsafe { put_found(motion.first, (impact, "impact"), found) }
+        unsafe { put_found(first, (impact, "impact"), found) }
     })
 }
 
@@ -79,7 +132,7 @@ pub unsafe fn put_found<T>(
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn impinge_motion_start_intersects(motion: *const impinge_motion) -> i32 {
     // SAFETY: `impinge.h` says what pointers are.
-    asked(unsafe { motion.as_ref() }.and_then(|motion| motion.advance.start_intersects))
+    asked(unsafe { motion.as_ref() }.and_then(|motion| motion.of.start_intersects()))
 }
 
 #[unsafe(no_mangle)]
@@ -91,7 +144,7 @@ pub unsafe extern "C" fn impinge_motion_positions(
     guard(|| {
         // SAFETY: `impinge.h` says what pointers are.
         let motion = unsafe { held(motion, "motion") }?;
-        let shown = motion.positions(body).map(arrays::positions_view);
+        let shown = motion.of.positions(body).map(arrays::positions_view);
         // SAFETY: `impinge.h` says what pointers are.
         unsafe { put(view, "view", shown.unwrap_or(arrays::no_rows(F64))) }
     })
@@ -105,9 +158,38 @@ pub unsafe extern "C" fn impinge_motion_apply(
     // SAFETY: `impinge.h` says what pointers are.
     unsafe {
         change(scene, |scene| {
-            Ok(held(motion, "motion")?.advance.apply(&mut scene.scene)?)
+            Ok(held(motion, "motion")?.of.apply(&mut scene.scene)?)
         })
     }
+}
+
+/// A count of a truncation; 0 of an advance, and for NULL.
+///
+/// # Safety
+/// As `impinge.h` says.
+unsafe fn counted<T: Default>(motion: *const impinge_motion, of: fn(&Truncation) -> T) -> T {
+    // SAFETY: the caller's promise.
+    let motion = unsafe { motion.as_ref() };
+    let truncation = motion.and_then(|motion| motion.of.truncation());
+    truncation.map_or_else(T::default, of)
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn impinge_motion_n_cut(motion: *const impinge_motion) -> u64 {
+    // SAFETY: `impinge.h` says what pointers are.
+    unsafe { counted(motion, Truncation::n_cut) }
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn impinge_motion_n_touching(motion: *const impinge_motion) -> u64 {
+    // SAFETY: `impinge.h` says what pointers are.
+    unsafe { counted(motion, Truncation::n_touching) }
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn impinge_motion_rounds(motion: *const impinge_motion) -> u32 {
+    // SAFETY: `impinge.h` says what pointers are.
+    unsafe { counted(motion, Truncation::rounds) }
 }
 
 #[unsafe(no_mangle)]

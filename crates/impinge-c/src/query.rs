@@ -3,11 +3,14 @@
 
 use std::ffi::c_void;
 
-use impinge::{Clearance, PairFilter, PairKind, Precision, Query, SharedVertex, Start};
+use impinge::{
+    BodyId, Clearance, Exclusion, Hit, PairFilter, PairKind, Precision, Query, SharedVertex, Start,
+};
 
+use crate::answers::impinge_near;
 use crate::scene::impinge_scene;
 use crate::sized::read_sized;
-use crate::status::Failure;
+use crate::status::{Failure, held};
 use crate::types::*;
 
 /// A query of a caller, checked: its size, its flags and what this version does not know.
@@ -44,16 +47,20 @@ impl<'a> Asked<'a> {
                 return refuse(field, given, "0 or 1 allowed");
             }
         }
-        for (field, given, default) in [
-            ("hits", given.hits, HITS_FIRST),
-            ("n_nearest", given.n_nearest, 0),
-            ("n_fixed", u32::from(given.n_fixed > 0), 0),
-        ] {
-            if given != default {
-                return refuse(field, given, "this version knows the default alone");
-            }
+        if given.n_nearest != 0 {
+            return refuse("n_nearest", given.n_nearest, "0 allowed in this version");
         }
         Ok(Asked { given, scene })
+    }
+
+    /// What is asked of rays.
+    pub fn hits(&self) -> Result<Hit, Failure> {
+        match self.given.hits {
+            HITS_FIRST => Ok(Hit::First),
+            HITS_ANY => Ok(Hit::Any),
+            HITS_ALL => Ok(Hit::All),
+            other => refuse("hits", other, "IMPINGE_HITS_FIRST, _ANY or _ALL allowed"),
+        }
     }
 
     /// The query of a question about a step.
@@ -100,34 +107,39 @@ impl<'a> Asked<'a> {
                 );
             }
         };
-        self.exclusions()?
-            .iter()
-            .enumerate()
-            .try_fold(query, |query, (ix, exclusion)| {
-                if exclusion.kind != EXCLUDE_BODIES {
-                    return refuse(
-                        &format!("exclusions[{ix}].kind"),
-                        exclusion.kind,
-                        "IMPINGE_EXCLUDE_BODIES allowed in this version",
-                    );
-                }
-                let [a, b] = [exclusion.a, exclusion.b].map(|body| self.scene.id(body));
-                Ok(query.exclude((a?, b?)))
-            })
+        let mut query = query;
+        let exclusions = list("exclusions", self.given.exclusions, self.given.n_exclusions)?;
+        for (ix, exclusion) in exclusions.iter().enumerate() {
+            query = query.exclude(self.exclusion(ix, exclusion)?);
+        }
+        let rest_pairs = list("rest_pairs", self.given.rest_pairs, self.given.n_rest_pairs)?;
+        for (ix, &near) in rest_pairs.iter().enumerate() {
+            // SAFETY: the caller's handles, which live during the call.
+            let near = unsafe { held(near.cast::<impinge_near>(), &format!("rest_pairs[{ix}]")) }?;
+            query = query.exclude(near.exclusion());
+        }
+        Ok(query)
     }
 
-    fn exclusions(&self) -> Result<&[impinge_exclusion], Failure> {
-        match (self.given.exclusions, self.given.n_exclusions) {
-            (_, 0) => Ok(&[]),
-            (list, n) if list.is_null() => refuse("exclusions", "NULL", &format!("{n} needed")),
-            (list, _) if !list.is_aligned() => refuse(
-                "exclusions",
-                "a pointer that is not aligned",
-                "an array needed",
+    fn exclusion(&self, ix: usize, given: &impinge_exclusion) -> Result<Exclusion, Failure> {
+        match given.kind {
+            EXCLUDE_BODIES => {
+                let [a, b] = [given.a, given.b].map(|body| self.scene.id(body));
+                Ok((a?, b?).into())
+            }
+            EXCLUDE_RINGS => Ok(Exclusion::rings(given.n)),
+            EXCLUDE_GROUPS => Ok(Exclusion::groups(given.a, given.b)),
+            other => refuse(
+                &format!("exclusions[{ix}].kind"),
+                other,
+                "IMPINGE_EXCLUDE_BODIES, _RINGS and _GROUPS allowed in this version",
             ),
-            // SAFETY: the caller says how many there are, and that they are there during the call.
-            (list, n) => Ok(unsafe { std::slice::from_raw_parts(list, n) }),
         }
+    }
+
+    fn fixed(&self) -> Result<Vec<BodyId>, Failure> {
+        let fixed = list("fixed", self.given.fixed, self.given.n_fixed)?;
+        fixed.iter().map(|&body| self.scene.id(body)).collect()
     }
 
     fn scope(&self) -> Result<Query, Failure> {
@@ -162,6 +174,8 @@ impl<'a> Asked<'a> {
             _ => query.closest_points(),
         };
         Ok(query
+            .fixed(self.fixed()?)
+            .hits(self.hits()?)
             .start(match self.given.start {
                 START_REPORT => Start::Report,
                 START_SKIP => Start::Skip,
@@ -181,6 +195,19 @@ impl<'a> Asked<'a> {
             })
             .separation(separation)
             .clearance(Clearance::new(clearance).share(clearance_share)))
+    }
+}
+
+/// A list of a caller.
+fn list<'a, T>(field: &str, items: *const T, n: usize) -> Result<&'a [T], Failure> {
+    match n {
+        0 => Ok(&[]),
+        _ if items.is_null() => refuse(field, "NULL", &format!("{n} needed")),
+        _ if !items.is_aligned() => {
+            refuse(field, "a pointer that is not aligned", "an array needed")
+        }
+        // SAFETY: the caller says how many there are, and that they are there during the call.
+        _ => Ok(unsafe { std::slice::from_raw_parts(items, n) }),
     }
 }
 

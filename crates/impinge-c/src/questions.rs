@@ -5,6 +5,7 @@ use std::ops::ControlFlow;
 
 use impinge::exact::ElementPair;
 use impinge::exact::internal::Keep;
+use impinge::proximity::Nearest;
 use impinge::{Detector, PairKind};
 
 use crate::answers::{
@@ -61,7 +62,7 @@ pub unsafe fn question<A>(
 ///
 /// # Safety
 /// As [`question`].
-unsafe fn value(
+pub unsafe fn value(
     (detector, scene, query): (
         *mut impinge_detector,
         *const impinge_scene,
@@ -231,6 +232,24 @@ pub unsafe extern "C" fn impinge_advance(
 }
 
 #[unsafe(no_mangle)]
+pub unsafe extern "C" fn impinge_truncate(
+    detector: *mut impinge_detector,
+    scene: *const impinge_scene,
+    step: *const impinge_query,
+    motion: *mut *mut impinge_motion,
+) -> Status {
+    // SAFETY: see `impinge_query_default`.
+    unsafe {
+        question((detector, scene, step), (motion, "motion"), |of| {
+            let step = of.asked.step()?;
+            let found = of.detector.truncate(&of.scene.scene, &step)?;
+            let stats = of.detector.stats().clone();
+            Ok(impinge_motion::by_vertex(found, stats))
+        })
+    }
+}
+
+#[unsafe(no_mangle)]
 pub unsafe extern "C" fn impinge_find_candidates(
     detector: *mut impinge_detector,
     scene: *const impinge_scene,
@@ -330,16 +349,37 @@ pub unsafe extern "C" fn impinge_find_distance(
         value((detector, scene, std::ptr::null()), |of| {
             let [of_a, of_b] = [of.scene.id(a)?, of.scene.id(b)?];
             let closest = of.detector.distance(&of.scene.scene, of_a, of_b)?;
-            let row = closest.map(|of| impinge_nearest {
-                distance: of.distance,
-                points: of.points,
-                body_a: a,
-                element_a: of.a.element,
-                body_b: b,
-                element_b: of.b.element,
-            });
-            put_found(row, (nearest, "nearest"), found)
+            put_found(closest.map(nearest_row), (nearest, "nearest"), found)
         })
+    }
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn impinge_find_nearest(
+    detector: *mut impinge_detector,
+    scene: *const impinge_scene,
+    query: *const impinge_query,
+    nearest: *mut impinge_nearest,
+    found: *mut i32,
+) -> Status {
+    // SAFETY: see `impinge_query_default`.
+    unsafe {
+        value((detector, scene, query), |of| {
+            let query = of.asked.query()?;
+            let closest = of.detector.nearest(&of.scene.scene, &query)?;
+            put_found(closest.map(nearest_row), (nearest, "nearest"), found)
+        })
+    }
+}
+
+fn nearest_row(of: Nearest) -> impinge_nearest {
+    impinge_nearest {
+        distance: of.distance,
+        points: of.points,
+        body_a: of.a.body.index() as u32,
+        element_a: of.a.element,
+        body_b: of.b.body.index() as u32,
+        element_b: of.b.element,
     }
 }
 

@@ -71,6 +71,11 @@ impl impinge_scene {
         Ok(self.scene.body(self.id(body)?)?)
     }
 
+    /// How many edges a body has.
+    pub fn n_edges(&self, body: u32) -> Result<usize, Failure> {
+        Ok(self.body(body)?.edges().len())
+    }
+
     /// The caller's numbers of the edges of a body.
     pub fn edge_numbers(&self, body: u32) -> Option<&EdgeNumbers> {
         self.bodies.get(body as usize)?.as_ref()?.edges.as_ref()
@@ -423,6 +428,38 @@ pub unsafe extern "C" fn impinge_scene_set_thickness(
         change(scene, |scene| {
             let id = scene.id(body)?;
             Ok(scene.scene.set_thickness(id, thickness)?)
+        })
+    }
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn impinge_scene_set_groups(
+    scene: *mut impinge_scene,
+    body: u32,
+    groups: impinge_array,
+) -> Status {
+    // SAFETY: see `impinge_scene_create`.
+    unsafe {
+        change(scene, |scene| {
+            let id = scene.id(body)?;
+            let groups = arrays::indices::<1>(&groups, "groups")?;
+            Ok(scene.scene.set_groups(id, groups.as_flattened())?)
+        })
+    }
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn impinge_scene_set_pinned(
+    scene: *mut impinge_scene,
+    body: u32,
+    pinned: impinge_array,
+) -> Status {
+    // SAFETY: see `impinge_scene_create`.
+    unsafe {
+        change(scene, |scene| {
+            let id = scene.id(body)?;
+            let pinned = arrays::flags(&pinned, "pinned")?;
+            Ok(scene.scene.set_pinned(id, &pinned)?)
         })
     }
 }

@@ -1,6 +1,8 @@
 //! Tests of the interface from within: layouts, hashes beside those of Rust, the caller's numbers
 //! of edges. `tests/` has those in C and C++, which `scripts/test-c` runs.
 
+mod probe;
+
 use std::collections::BTreeMap;
 use std::mem::offset_of;
 use std::path::Path;
@@ -40,12 +42,15 @@ fn layout_in_rust() -> BTreeMap<String, usize> {
     layout.insert("impinge_status".to_owned(), size_of::<Status>());
     structure!(impinge_array: data, rows, row_stride, column_stride, r#type);
     structure!(impinge_exclusion: kind, a, b, n, offsets, vertices);
-    structure!(impinge_query: size, between, own, shared_vertex, a, b, kinds, start, precision, hits, n_nearest, flags, separation, clearance, clearance_share, cell_low, cell_high, exclusions, n_exclusions, fixed, n_fixed, passes, passes_user);
+    structure!(impinge_query: size, between, own, shared_vertex, a, b, kinds, start, precision, hits, n_nearest, flags, separation, clearance, clearance_share, cell_low, cell_high, exclusions, n_exclusions, fixed, n_fixed, passes, passes_user, rest_pairs, n_rest_pairs);
     structure!(impinge_element: vertices, n_vertices, body);
     structure!(impinge_settings: size, backend, method, threads, memory_budget, max_pairs, cancelled, user, progress, log, device);
     structure!(impinge_pair: body_a, element_a, body_b, element_b);
     structure!(impinge_impact: toi, kind, body_a, element_a, body_b, element_b, at_start);
     structure!(impinge_nearest: distance, points, body_a, element_a, body_b, element_b);
+    structure!(impinge_device: name, interface_name, driver, max_binding, is_software, reserved);
+    structure!(impinge_closest_element: distance, point, body, element, feature, found);
+    structure!(impinge_ray_hit: t, t_end, barycentrics, ray, body, element, feature, reserved);
     structure!(impinge_region: position, bounds, length, patch_area, area, normal, depth, volume, body_a, body_b, n_contacts, n_inside);
     structure!(impinge_stats: size, n_threads, total_ms, n_candidates, n_unsure, n_work_items, n_clusters, n_culled, n_clustered, n_batches, n_reruns, bytes_held, backend, method);
     constants!(
@@ -79,7 +84,12 @@ fn layout_in_rust() -> BTreeMap<String, usize> {
         CLOSEST_POINTS,
         CELL,
         HITS_FIRST,
+        HITS_ANY,
+        HITS_ALL,
         EXCLUDE_BODIES,
+        EXCLUDE_RINGS,
+        EXCLUDE_GROUPS,
+        NO_FEATURE,
         LOG_ERROR,
         LOG_INFO,
         COLUMN_KIND,
@@ -99,7 +109,11 @@ fn layout_in_rust() -> BTreeMap<String, usize> {
         COLUMN_CURVE_CLOSED,
         COLUMN_CURVE_LENGTH,
         COLUMN_INSIDE_A,
-        COLUMN_INSIDE_B
+        COLUMN_INSIDE_B,
+        COLUMN_IS_HIT,
+        COLUMN_T,
+        COLUMN_T_END,
+        COLUMN_BARYCENTRICS
     );
     for kind in PairKind::ALL {
         layout.insert(kind.name().to_uppercase(), bit(kind) as usize);

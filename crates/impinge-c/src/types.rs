@@ -47,8 +47,12 @@ pub const CLOSEST_POINTS: u32 = 2;
 pub const CELL: u32 = 8;
 
 pub const HITS_FIRST: u32 = 0;
+pub const HITS_ANY: u32 = 1;
+pub const HITS_ALL: u32 = 2;
 
 pub const EXCLUDE_BODIES: u32 = 0;
+pub const EXCLUDE_RINGS: u32 = 1;
+pub const EXCLUDE_GROUPS: u32 = 2;
 
 pub const LOG_ERROR: u32 = 1;
 pub const LOG_INFO: u32 = 2;
@@ -71,6 +75,12 @@ pub const COLUMN_CURVE_CLOSED: u32 = 15;
 pub const COLUMN_CURVE_LENGTH: u32 = 16;
 pub const COLUMN_INSIDE_A: u32 = 17;
 pub const COLUMN_INSIDE_B: u32 = 18;
+pub const COLUMN_IS_HIT: u32 = 19;
+pub const COLUMN_T: u32 = 20;
+pub const COLUMN_T_END: u32 = 21;
+pub const COLUMN_BARYCENTRICS: u32 = 22;
+
+pub const NO_FEATURE: u32 = 255;
 
 /// The bit of a kind of pairs, `IMPINGE_VF` and so on.
 pub fn bit(kind: PairKind) -> u32 {
@@ -132,6 +142,9 @@ pub struct impinge_query {
     pub n_fixed: usize,
     pub passes: Option<PassesCallback>,
     pub passes_user: *mut c_void,
+    /// Of `impinge_near`, which is made of what is here.
+    pub rest_pairs: *const *const c_void,
+    pub n_rest_pairs: usize,
 }
 
 impl Default for impinge_query {
@@ -160,6 +173,8 @@ impl Default for impinge_query {
             n_fixed: 0,
             passes: None,
             passes_user: std::ptr::null_mut(),
+            rest_pairs: std::ptr::null(),
+            n_rest_pairs: 0,
         }
     }
 }
@@ -261,6 +276,43 @@ pub struct impinge_nearest {
     pub element_a: u32,
     pub body_b: u32,
     pub element_b: u32,
+}
+
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct impinge_closest_element {
+    pub distance: f64,
+    pub point: [f64; 3],
+    pub body: u32,
+    pub element: u32,
+    pub feature: u32,
+    pub found: u32,
+}
+
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct impinge_ray_hit {
+    pub t: f64,
+    pub t_end: f64,
+    pub barycentrics: [f64; 3],
+    pub ray: u64,
+    pub body: u32,
+    pub element: u32,
+    pub feature: u32,
+    /// So that rows have no gaps.
+    pub reserved: u32,
+}
+
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct impinge_device {
+    pub name: *const c_char,
+    pub interface_name: *const c_char,
+    pub driver: *const c_char,
+    pub max_binding: u64,
+    pub is_software: u32,
+    /// So that rows have no gaps.
+    pub reserved: u32,
 }
 
 #[repr(C)]

@@ -14,7 +14,15 @@ int main(void) {
   impinge_impact impact;
   double number = 0;
   int64_t wide[3] = {0, 1, -2};
-  uint32_t fixed = 0, beyond[3] = {0, 1, VERTICES};
+  impinge_safe_distances *safe = (impinge_safe_distances *)detector;
+  impinge_near *near_pairs = NULL, *other_near = NULL;
+  impinge_neighbours *lists = NULL;
+  impinge_closest *closest = (impinge_closest *)detector;
+  impinge_hits *hits = (impinge_hits *)detector;
+  impinge_motion *motion = (impinge_motion *)detector;
+  impinge_nearest nearest;
+  int8_t places[VERTICES];
+  uint32_t fixed = 3, beyond[3] = {0, 1, VERTICES};
   int32_t found = -1;
   uint64_t n = 7;
   size_t size = 0;
@@ -105,6 +113,52 @@ int main(void) {
   REFUSED(impinge_find_candidates(detector, scene, -1, NULL, (impinge_candidates **)&pairs), "inflation: -1");
   CHECK(found == -1);
 
+  /* Points, rays, bounds. */
+  REFUSED(impinge_contains(NULL, scene, 0, at, places), "detector is NULL");
+  REFUSED(impinge_contains(detector, NULL, 0, at, places), "scene is NULL");
+  REFUSED(impinge_contains(detector, scene, 0, at, NULL), "places is NULL");
+  REFUSED(impinge_contains(detector, scene, 4, at, places), "no body 4");
+  REFUSED(impinge_contains(detector, scene, 0, faces, places), "points: its type is IMPINGE_U32");
+  REFUSED(impinge_signed_distance(detector, scene, 0, at, NULL), "distances is NULL");
+  {
+    uint32_t open = 9;
+    GOOD(impinge_scene_add_triangles(scene, packed(one.faces, FACES - 1, IMPINGE_U32), at, &open));
+    REFUSED(impinge_contains(detector, scene, open, at, places), "edge");
+    CHECK(strstr(impinge_error_message(), "body 1") != NULL);
+    GOOD(impinge_scene_remove(scene, open));
+  }
+  one.positions[7][1] = NAN;
+  REFUSED(impinge_find_closest(detector, scene, at, 1, NULL, &closest), "7");
+  CHECK(closest == NULL);
+  REFUSED(impinge_cast(detector, scene, at, packed(one.faces, 2, IMPINGE_F32), 1, NULL, &hits), "2 directions given");
+  CHECK(hits == NULL);
+  one.positions[7][1] = number;
+  REFUSED(impinge_find_closest(detector, scene, at, -1, NULL, &closest), "most: -1");
+  REFUSED(impinge_find_closest(detector, scene, at, 1, NULL, NULL), "closest is NULL");
+  REFUSED(impinge_cast(detector, scene, at, at, NAN, NULL, &hits), "most: NaN");
+  REFUSED(impinge_find_safe_distances(detector, scene, -1, NULL, &safe), "most: -1");
+  REFUSED(impinge_find_safe_distances(detector, scene, HUGE_VAL, NULL, &safe), "most: inf");
+  REFUSED(impinge_find_neighbours(detector, scene, NAN, NULL, &lists), "distance: NaN");
+  REFUSED(impinge_find_nearest(detector, scene, NULL, &nearest, &found), "self-collision");
+  REFUSED(impinge_truncate(detector, scene, NULL, NULL), "motion is NULL");
+  REFUSED(impinge_truncate(NULL, scene, NULL, &motion), "detector is NULL");
+  CHECK(motion == NULL);
+  REFUSED(impinge_find_devices(NULL), "devices is NULL");
+  REFUSED(impinge_scene_set_groups(scene, 0, packed(beyond, 3, IMPINGE_U32)), "body 0");
+  REFUSED(impinge_scene_set_groups(scene, 0, packed(wide, 3, IMPINGE_I64)), "groups: row 2 has 4294967296");
+  REFUSED(impinge_scene_set_pinned(scene, 0, packed(beyond, 3, IMPINGE_U32)), "pinned: row 2 has 1154, where 0 or 1");
+  REFUSED(impinge_scene_set_pinned(scene, 0, at), "IMPINGE_F64");
+  REFUSED(impinge_neighbours_first(NULL, 0, NULL), "neighbours is NULL");
+  REFUSED(impinge_safe_distances_of(NULL, 0, &bad), "safe_distances is NULL");
+  CHECK(impinge_safe_distances_touching(NULL) == NULL && impinge_neighbours_count(NULL) == 0 && impinge_closest_count(NULL) == 0);
+  CHECK(impinge_hits_n_rays(NULL) == 0 && impinge_hits_hash(NULL) == 0 && impinge_closest_hash(NULL) == 0 && impinge_devices_count(NULL) == 0);
+  CHECK(impinge_motion_n_cut(NULL) == 0 && impinge_motion_n_touching(NULL) == 0 && impinge_motion_rounds(NULL) == 0);
+  impinge_safe_distances_destroy(NULL);
+  impinge_neighbours_destroy(NULL);
+  impinge_closest_destroy(NULL);
+  impinge_hits_destroy(NULL);
+  impinge_devices_destroy(NULL);
+
   /* Queries. */
 #define QUERY(field, value, text)                                                                                       \
   impinge_query_default(&query);                                                                                        \
@@ -117,21 +171,38 @@ int main(void) {
   QUERY(a, 3, "no body 3");
   QUERY(b, 0, "b: 0");
   QUERY(kinds, IMPINGE_VF, "kinds: ");
-  QUERY(hits, IMPINGE_HITS_ALL, "hits: 2");
+  QUERY(hits, 3, "hits: 3");
   QUERY(n_nearest, 3, "n_nearest: 3");
   QUERY(flags, IMPINGE_SIGNED, "flags: 4");
   QUERY(flags, 1u << 20, "flags");
   impinge_query_default(&query);
-  query.fixed = &fixed;
   query.n_fixed = 1;
-  REFUSED(impinge_detect(detector, scene, &query, &pairs), "n_fixed");
+  REFUSED(impinge_find_safe_distances(detector, scene, 1, &query, &safe), "fixed: NULL");
+  query.fixed = &fixed;
+  REFUSED(impinge_find_safe_distances(detector, scene, 1, &query, &safe), "no body 3");
+  CHECK(safe == NULL);
   impinge_query_default(&query);
   query.n_exclusions = 1;
   REFUSED(impinge_detect(detector, scene, &query, &pairs), "exclusions: NULL");
   memset(&exclusion, 0, sizeof exclusion);
-  exclusion.kind = IMPINGE_EXCLUDE_RINGS;
+  exclusion.kind = IMPINGE_EXCLUDE_VERTICES;
   query.exclusions = &exclusion;
-  REFUSED(impinge_detect(detector, scene, &query, &pairs), "exclusions[0].kind: 1");
+  REFUSED(impinge_detect(detector, scene, &query, &pairs), "exclusions[0].kind: 3");
+  exclusion.kind = IMPINGE_EXCLUDE_RINGS;
+  exclusion.n = 17;
+  REFUSED(impinge_detect(detector, scene, &query, &pairs), "rings: 17");
+  exclusion.n = 1;
+  REFUSED(impinge_find_nearest(detector, scene, &query, &nearest, &found), "rings");
+  impinge_query_default(&query);
+  query.n_rest_pairs = 1;
+  REFUSED(impinge_find_near(detector, scene, 0, &query, &near_pairs), "rest_pairs: NULL");
+  query.rest_pairs = (const impinge_near *const *)&near_pairs;
+  REFUSED(impinge_find_near(detector, scene, 0, &query, &other_near), "rest_pairs[0] is NULL");
+  impinge_query_default(&query);
+  query.size = offsetof(impinge_query, rest_pairs);
+  query.n_rest_pairs = 1;
+  GOOD(impinge_find_near(detector, scene, 0, &query, &near_pairs));
+  impinge_near_destroy(near_pairs);
   impinge_query_default(&query);
   query.between = query.self = 0;
   REFUSED(impinge_count(detector, scene, &query, &n), "between and self");

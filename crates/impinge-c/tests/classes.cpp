@@ -104,6 +104,57 @@ void steps() {
   throws(IMPINGE_ERROR_INVALID, "row_stride", [&] { scene.set_positions(a, std::vector<std::array<float, 4>>(VERTICES)); });
 }
 
+void probes() {
+  impinge::scene scene;
+  const auto a = scene.add_triangles(faces(balls[0]), numbers(balls[0]));
+  auto beside = numbers(balls[0]);
+  for (std::size_t ix = 0; ix < beside.size(); ix += 3) beside[ix] += 2.1;
+  const auto b = scene.add_triangles(faces(balls[0]), beside);
+  impinge::detector detector(impinge::backend::cpu);
+  const std::vector<std::array<float, 3>> points = {{0, 0, 0}, {0, 0, 1}, {0, 0, -3}};
+  CHECK(detector.contains(scene, a, points) == (std::vector<std::int8_t>{1, 0, -1}));
+  const auto signed_ = detector.signed_distance(scene, a, points);
+  CHECK(signed_[0] > 0.99 && signed_[1] == 0 && signed_[2] == -2);
+  const auto closest = detector.closest(scene, points, 1.5, query::of(a));
+  CHECK(closest.size() == 3 && closest[0].found == 1 && closest[2].found == 0 && closest[1].distance == 0 && closest.hash() != 0);
+  CHECK(detector.closest(scene, points)[2].found == 1);
+  const std::vector<double> origins = {0, 0, 5, 0, 3, 5}, down = {0, 0, -1, 0, 0, -1};
+  const auto hits = detector.cast(scene, origins, down);
+  CHECK(hits.n_rays() == 2 && hits.size() == 1 && hits[0].t == 4 && hits.of(0).size() == 1 && hits.of(1).empty() && hits.of(2).empty());
+  CHECK(hits.is_hit()[0] == 1 && hits.is_hit()[1] == 0);
+  const auto all = detector.cast(scene, origins, down, 9, query::all().hits(impinge::hits_of_ray::all));
+  CHECK(all.size() == 2 * SEGMENTS && all.starts().size() == 3 && all.of(0).size() == all.size() && all.hash() != hits.hash());
+  CHECK(detector.cast(scene, origins, down, 1, query::all().hits(impinge::hits_of_ray::any)).starts().empty());
+  const auto nearest = detector.nearest(scene);
+  CHECK(nearest && nearest->body_a == a && nearest->body_b == b && nearest->distance < 0.11);
+
+  const auto safe = detector.safe_distances(scene, 1, query::between_all().fixed({a}));
+  CHECK(static_cast<const double *>(safe.of(a).data)[0] == 0 && safe.of(b).rows == VERTICES && safe.touching().empty());
+  CHECK(safe.stats().n_candidates > 0);
+  const auto lists = detector.neighbours(scene, 0.2, query::between_all());
+  CHECK(lists.size() > 10 && lists.vf().offsets.size() == 2 * VERTICES + 1 && lists.fv().indices.size() == lists.vf().indices.size());
+  CHECK(lists.first(b)[0] == VERTICES && lists.ee().distances.size() == lists.ee().indices.size() && !lists.empty());
+  const auto rest = detector.near(scene, 0.2, query::between_all());
+  CHECK(detector.near(scene, 0.2, query::between_all().exclude(rest)).empty() && !rest.empty());
+  CHECK(detector.near(scene, 0.02, query::self_all().exclude_rings(3)).empty() && !detector.near(scene, 0.02, query::self_all()).empty());
+  scene.set_groups(a, std::vector<std::int64_t>(VERTICES, 4));
+  scene.set_groups(b, std::vector<std::uint32_t>(VERTICES, 5));
+  CHECK(detector.near(scene, 0.2, query::between_all().exclude_groups(5, 4)).empty());
+  scene.set_pinned(a, std::vector<std::uint8_t>(VERTICES, 1));
+  scene.set_pinned(b, std::vector<std::int32_t>(VERTICES, 1));
+  CHECK(detector.near(scene, 0.2, query::between_all()).empty());
+  scene.set_pinned(b, std::vector<std::uint8_t>(VERTICES, 0));
+
+  scene.set_end_positions(b, numbers(balls[1]));
+  const auto truncation = detector.truncate(scene);
+  CHECK(truncation.n_cut() > 10 && truncation.n_touching() == 0 && truncation.rounds() > 0 && !truncation.start_intersects());
+  CHECK(truncation.positions(b).rows == VERTICES && truncation.positions(a).rows == 0);
+  truncation.apply(scene);
+  CHECK(!detector.any(scene) && impinge::devices().empty());
+  throws(IMPINGE_ERROR_INVALID, "most: -1", [&] { detector.safe_distances(scene, -1); });
+  throws(IMPINGE_ERROR_INVALID, "no body 9", [&] { detector.contains(scene, 9, points); });
+}
+
 void callbacks() {
   impinge::scene scene;
   scene.add_triangles(faces(balls[0]), numbers(balls[0]));
@@ -146,12 +197,18 @@ int main() {
   impinge::detector detector(impinge::backend::cpu);
   const auto pairs = detector.detect(scene);
   CHECK(pairs && pairs->size() > 100);
+  const std::vector<double> origin(3);
+  const auto places = detector.contains(scene, *a, origin);
+  CHECK(places && places->size() == 1 && (*places)[0] == 1);
+  const auto refused = detector.safe_distances(scene, -1);
+  CHECK(!refused && refused.status() == IMPINGE_ERROR_INVALID);
   const auto gpu = impinge::detector(impinge::backend::gpu).any(scene);
   CHECK(!gpu && gpu.status() == IMPINGE_ERROR_INVALID);
   return finish("classes without exceptions");
 #else
   answers();
   steps();
+  probes();
   callbacks();
   return finish("classes");
 #endif

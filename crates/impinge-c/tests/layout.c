@@ -21,7 +21,7 @@ int main(void) {
   FIELD(impinge_query, separation); FIELD(impinge_query, clearance); FIELD(impinge_query, clearance_share);
   FIELD(impinge_query, cell_low); FIELD(impinge_query, cell_high); FIELD(impinge_query, exclusions);
   FIELD(impinge_query, n_exclusions); FIELD(impinge_query, fixed); FIELD(impinge_query, n_fixed); FIELD(impinge_query, passes);
-  FIELD(impinge_query, passes_user);
+  FIELD(impinge_query, passes_user); FIELD(impinge_query, rest_pairs); FIELD(impinge_query, n_rest_pairs);
   SIZE(impinge_element);
   FIELD(impinge_element, vertices); FIELD(impinge_element, n_vertices); FIELD(impinge_element, body);
   SIZE(impinge_settings);
@@ -36,6 +36,15 @@ int main(void) {
   SIZE(impinge_nearest);
   FIELD(impinge_nearest, distance); FIELD(impinge_nearest, points); FIELD(impinge_nearest, body_a); FIELD(impinge_nearest, element_a);
   FIELD(impinge_nearest, body_b); FIELD(impinge_nearest, element_b);
+  SIZE(impinge_device);
+  FIELD(impinge_device, name); FIELD(impinge_device, interface_name); FIELD(impinge_device, driver); FIELD(impinge_device, max_binding);
+  FIELD(impinge_device, is_software); FIELD(impinge_device, reserved);
+  SIZE(impinge_closest_element);
+  FIELD(impinge_closest_element, distance); FIELD(impinge_closest_element, point); FIELD(impinge_closest_element, body);
+  FIELD(impinge_closest_element, element); FIELD(impinge_closest_element, feature); FIELD(impinge_closest_element, found);
+  SIZE(impinge_ray_hit);
+  FIELD(impinge_ray_hit, t); FIELD(impinge_ray_hit, t_end); FIELD(impinge_ray_hit, barycentrics); FIELD(impinge_ray_hit, ray);
+  FIELD(impinge_ray_hit, body); FIELD(impinge_ray_hit, element); FIELD(impinge_ray_hit, feature); FIELD(impinge_ray_hit, reserved);
   SIZE(impinge_region);
   FIELD(impinge_region, position); FIELD(impinge_region, bounds); FIELD(impinge_region, length); FIELD(impinge_region, patch_area);
   FIELD(impinge_region, area); FIELD(impinge_region, normal); FIELD(impinge_region, depth); FIELD(impinge_region, volume);
@@ -50,11 +59,12 @@ int main(void) {
   VALUE(F32); VALUE(F64); VALUE(U32); VALUE(I32); VALUE(U64); VALUE(I64); VALUE(U8);
   VALUE(POINTS); VALUE(EDGES); VALUE(TRIANGLES); VALUE(TETRAHEDRA); VALUE(ANY_BODY); VALUE(SKIP); VALUE(RESOLVE);
   VALUE(START_REPORT); VALUE(START_SKIP); VALUE(START_VERIFY); VALUE(DISTANCES); VALUE(CLOSEST_POINTS); VALUE(CELL);
-  VALUE(HITS_FIRST); VALUE(EXCLUDE_BODIES); VALUE(LOG_ERROR); VALUE(LOG_INFO);
+  VALUE(HITS_FIRST); VALUE(HITS_ANY); VALUE(HITS_ALL); VALUE(EXCLUDE_BODIES); VALUE(EXCLUDE_RINGS); VALUE(EXCLUDE_GROUPS); VALUE(NO_FEATURE); VALUE(LOG_ERROR); VALUE(LOG_INFO);
   VALUE(VF); VALUE(EE); VALUE(EV); VALUE(VV); VALUE(EF); VALUE(FF);
   VALUE(COLUMN_KIND); VALUE(COLUMN_ROWS); VALUE(COLUMN_DISTANCE); VALUE(COLUMN_POINTS); VALUE(COLUMN_FEATURES);
   VALUE(COLUMN_PARALLEL); VALUE(COLUMN_TOI); VALUE(COLUMN_AT_START); VALUE(COLUMN_SHAPE); VALUE(COLUMN_STARTS);
   VALUE(COLUMN_CORNERS); VALUE(COLUMN_CONTACT_POINTS); VALUE(COLUMN_CURVE_STARTS); VALUE(COLUMN_CURVE_POINTS);
   VALUE(COLUMN_CURVE_CLOSED); VALUE(COLUMN_CURVE_LENGTH); VALUE(COLUMN_INSIDE_A); VALUE(COLUMN_INSIDE_B);
+  VALUE(COLUMN_IS_HIT); VALUE(COLUMN_T); VALUE(COLUMN_T_END); VALUE(COLUMN_BARYCENTRICS);
   return 0;
 }

@@ -66,6 +66,18 @@ int main() {
   } catch (const impinge::error &error) {
     CHECK(error.status() == IMPINGE_ERROR_INVALID);
   }
+  // Points of any layout, and what is nearest to them, without a copy.
+  const Eigen::MatrixXf probes = Eigen::MatrixXf::Random(20, 5);
+  const auto closest = detector.closest(scene, probes.middleCols(1, 3));
+  const auto nearest_points = impinge::points_of(closest);
+  CHECK(nearest_points.rows() == 20);
+  for (Eigen::Index ix = 0; ix < 20; ++ix) {
+    const double length = (nearest_points.row(ix) - probes.row(ix).segment(1, 3).cast<double>()).norm();
+    CHECK(std::abs(length - closest[static_cast<std::size_t>(ix)].distance) < 1e-12);
+  }
+  const auto lists = detector.neighbours(scene, 0.01);
+  const auto offsets = impinge::as_vector(lists.vf().offsets);
+  CHECK(offsets.size() == 2 * VERTICES + 1 && offsets(2 * VERTICES) == lists.vf().indices.size());
   // As libigl asks.
   Eigen::MatrixXi found;
   CHECK(impinge::igl::intersect_other(first, faces, columns, by_column, found));

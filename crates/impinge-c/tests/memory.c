@@ -97,6 +97,22 @@ int main(void) {
   CHECK(impinge_detect(detector, scene, NULL, &pairs) == IMPINGE_ERROR_OUT_OF_MEMORY && pairs == NULL);
   most = SIZE_MAX;
   CHECK(hash_of(detector, scene, NULL) == hash);
+  {
+    /* The answers about points and bounds: what was asked once has its working memory, the rows of the answer are new each time. */
+    static double origins[VERTICES][3];
+    impinge_closest *closest = NULL;
+    impinge_hits *hits = NULL;
+    impinge_array from = packed(origins, VERTICES, IMPINGE_F64), to = positions_of(&one);
+    GOOD(impinge_find_closest(detector, scene, to, HUGE_VAL, NULL, &closest));
+    impinge_closest_destroy(closest);
+    GOOD(impinge_cast(detector, scene, from, to, 9, NULL, &hits));
+    CHECK(impinge_hits_count(hits) == VERTICES);
+    impinge_hits_destroy(hits);
+    most = 50000; /* The rows of an answer have more bytes, and what the engine works with has less. */
+    CHECK(impinge_find_closest(detector, scene, to, HUGE_VAL, NULL, &closest) == IMPINGE_ERROR_OUT_OF_MEMORY && closest == NULL);
+    CHECK(impinge_cast(detector, scene, from, to, 9, NULL, &hits) == IMPINGE_ERROR_OUT_OF_MEMORY && hits == NULL);
+    most = SIZE_MAX;
+  }
   impinge_scene_destroy(scene);
   impinge_detector_destroy(detector);
   return finish("memory");

@@ -379,6 +379,235 @@ static void other_bodies(impinge_detector *detector) {
   CHECK(n == 3 && map[0] == 0 && map[1] == 1 && map[2] == 0 && map[3] == 2 && firsts[2] == 3);
 }
 
+/* Each vertex stops for itself; bounds and lists about the same pair of balls, 0.1 apart at first. */
+static void solvers(impinge_detector *detector) {
+  static ball far_away;
+  impinge_scene *scene = two_balls();
+  impinge_query query;
+  impinge_safe_distances *safe = NULL, *moving = NULL;
+  impinge_neighbours *lists = NULL;
+  impinge_near *near_pairs = NULL, *again = NULL;
+  impinge_motion *motion = NULL;
+  impinge_nearest nearest;
+  impinge_impact impact;
+  impinge_array view, indices, distances;
+  impinge_stats stats;
+  impinge_exclusion exclusion;
+  static uint32_t halves[VERTICES];
+  static uint8_t pinned[VERTICES];
+  const impinge_near *rest[1];
+  uint32_t fixed = 0, first[3] = {9, 9, 9};
+  size_t i;
+  int32_t found = -1, is_free = -1;
+  double least = 9, least_moving = 9;
+  make_ball(&far_away, 2.1);
+  GOOD(impinge_scene_set_positions(scene, 1, positions_of(&far_away)));
+  REFUSED(impinge_find_nearest(detector, scene, NULL, &nearest, &found), "self-collision");
+  impinge_query_default(&query);
+  query.self = 0;
+  GOOD(impinge_find_nearest(detector, scene, &query, &nearest, &found));
+  CHECK(found == 1 && fabs(nearest.distance - 0.1) < 0.01 && nearest.body_a == 0 && nearest.body_b == 1);
+  /* Half of the distance each; all of it where the other ball does not move. */
+  GOOD(impinge_find_safe_distances(detector, scene, 0.5, &query, &safe));
+  query.fixed = &fixed;
+  query.n_fixed = 1;
+  GOOD(impinge_find_safe_distances(detector, scene, 0.5, &query, &moving));
+  GOOD(impinge_safe_distances_of(safe, 0, &view));
+  CHECK(view.rows == VERTICES && view.type == IMPINGE_F64);
+  for (i = 0; i < view.rows; ++i) least = fmin(least, ((const double *)view.data)[i]);
+  GOOD(impinge_safe_distances_of(moving, 0, &view));
+  for (i = 0; i < view.rows; ++i) CHECK(((const double *)view.data)[i] == 0);
+  GOOD(impinge_safe_distances_of(moving, 1, &view));
+  for (i = 0; i < view.rows; ++i) least_moving = fmin(least_moving, ((const double *)view.data)[i]);
+  CHECK(2 * least < nearest.distance && 2 * least > 0.999 * nearest.distance);
+  CHECK(least_moving < nearest.distance && least_moving > 0.999 * nearest.distance);
+  CHECK(impinge_near_count(impinge_safe_distances_touching(safe)) == 0);
+  stats.size = sizeof stats;
+  GOOD(impinge_safe_distances_stats(safe, &stats));
+  CHECK(stats.n_candidates > 0);
+  REFUSED(impinge_safe_distances_of(safe, 2, &view), "no body 2 among the 2");
+  impinge_safe_distances_destroy(moving);
+  impinge_safe_distances_destroy(safe);
+  /* Lists have the near pairs. */
+  query.kinds = IMPINGE_VF;
+  query.flags = IMPINGE_DISTANCES;
+  GOOD(impinge_find_near(detector, scene, 0.2, &query, &near_pairs));
+  GOOD(impinge_find_neighbours(detector, scene, 0.2, &query, &lists));
+  CHECK(impinge_neighbours_count(lists) == impinge_near_count(near_pairs) && impinge_near_count(near_pairs) > 10);
+  GOOD(impinge_neighbours_first(lists, 1, &first));
+  CHECK(first[0] == VERTICES && first[1] == FACES * 3 / 2 && first[2] == FACES);
+  GOOD(impinge_neighbours_lists(lists, IMPINGE_VF, 0, &view, &indices, &distances));
+  CHECK(view.rows == 2 * VERTICES + 1 && indices.rows == impinge_near_count(near_pairs) && distances.rows == indices.rows);
+  {
+    const impinge_pair *row = impinge_near_data(near_pairs);
+    const uint64_t *offsets = view.data;
+    uint32_t vertex = row->body_a * VERTICES + row->element_a, face = row->body_b * FACES + row->element_b;
+    CHECK(offsets[vertex] == 0 && offsets[vertex + 1] > 0 && ((const uint32_t *)indices.data)[0] == face);
+  }
+  GOOD(impinge_neighbours_lists(lists, IMPINGE_VF, 1, &view, NULL, NULL));
+  CHECK(view.rows == 2 * FACES + 1);
+  REFUSED(impinge_neighbours_lists(lists, 3, 0, &view, NULL, NULL), "kind: 3");
+  REFUSED(impinge_neighbours_lists(lists, IMPINGE_VF, 2, &view, NULL, NULL), "reversed: 2");
+  REFUSED(impinge_neighbours_first(lists, 7, &first), "no body 7");
+  GOOD(impinge_neighbours_stats(lists, &stats));
+  impinge_neighbours_destroy(lists);
+  /* Those that are near at rest are left out; so are groups, and what is pinned on both sides. */
+  rest[0] = near_pairs;
+  query.rest_pairs = rest;
+  query.n_rest_pairs = 1;
+  GOOD(impinge_find_near(detector, scene, 0.2, &query, &again));
+  CHECK(impinge_near_count(again) == 0);
+  impinge_near_destroy(again);
+  query.n_rest_pairs = 0;
+  memset(&exclusion, 0, sizeof exclusion);
+  exclusion.kind = IMPINGE_EXCLUDE_GROUPS;
+  exclusion.b = 1;
+  query.exclusions = &exclusion;
+  query.n_exclusions = 1;
+  for (i = 0; i < VERTICES; ++i) halves[i] = 0;
+  GOOD(impinge_scene_set_groups(scene, 0, packed(halves, VERTICES, IMPINGE_U32)));
+  for (i = 0; i < VERTICES; ++i) halves[i] = far_away.positions[i][2] > 0;
+  GOOD(impinge_scene_set_groups(scene, 1, packed(halves, VERTICES, IMPINGE_U32)));
+  GOOD(impinge_find_near(detector, scene, 0.2, &query, &again));
+  CHECK(impinge_near_count(again) > 0 && impinge_near_count(again) < impinge_near_count(near_pairs));
+  impinge_near_destroy(again);
+  query.n_exclusions = 0;
+  memset(pinned, 1, sizeof pinned);
+  GOOD(impinge_scene_set_pinned(scene, 0, packed(pinned, VERTICES, IMPINGE_U8)));
+  GOOD(impinge_find_near(detector, scene, 0.2, &query, &again));
+  CHECK(impinge_near_hash(again) == impinge_near_hash(near_pairs));
+  impinge_near_destroy(again);
+  GOOD(impinge_scene_set_pinned(scene, 1, packed(pinned, VERTICES, IMPINGE_U8)));
+  GOOD(impinge_find_near(detector, scene, 0.2, &query, &again));
+  CHECK(impinge_near_count(again) == 0);
+  impinge_near_destroy(again);
+  memset(pinned, 0, sizeof pinned);
+  GOOD(impinge_scene_set_pinned(scene, 0, packed(pinned, VERTICES, IMPINGE_U8)));
+  GOOD(impinge_scene_set_pinned(scene, 1, packed(pinned, VERTICES, IMPINGE_U8)));
+  /* In the surface of one ball all that is near is near. */
+  exclusion.kind = IMPINGE_EXCLUDE_RINGS;
+  exclusion.b = 0;
+  exclusion.n = 3;
+  query.n_exclusions = 1;
+  query.self = 1;
+  query.between = 0;
+  GOOD(impinge_find_near(detector, scene, 0.02, &query, &again));
+  CHECK(impinge_near_count(again) == 0);
+  impinge_near_destroy(again);
+  query.n_exclusions = 0;
+  GOOD(impinge_find_near(detector, scene, 0.02, &query, &again));
+  CHECK(impinge_near_count(again) > 0);
+  impinge_near_destroy(again);
+  impinge_near_destroy(near_pairs);
+  /* The second ball wants into the first: its far side comes all the way. */
+  GOOD(impinge_scene_set_end_positions(scene, 1, positions_of(&balls[1])));
+  GOOD(impinge_truncate(detector, scene, NULL, &motion));
+  CHECK(impinge_motion_n_cut(motion) > 10 && impinge_motion_n_touching(motion) == 0 && impinge_motion_rounds(motion) > 0);
+  CHECK(isnan(impinge_motion_fraction(motion)) && impinge_motion_start_intersects(motion) == -1);
+  REFUSED(impinge_motion_first(motion, &impact, &found), "impinge_truncate");
+  GOOD(impinge_motion_positions(motion, 1, &view));
+  {
+    const double(*at)[3] = view.data;
+    size_t n_there = 0;
+    for (i = 0; i < VERTICES; ++i) n_there += memcmp(at[i], balls[1].positions[i], sizeof at[i]) == 0;
+    CHECK(n_there == VERTICES - impinge_motion_n_cut(motion) && n_there > 10);
+    GOOD(impinge_scene_set_end_positions(scene, 1, view));
+  }
+  GOOD(impinge_is_free(detector, scene, NULL, &is_free));
+  CHECK(is_free == 1);
+  GOOD(impinge_motion_apply(motion, scene));
+  CHECK(hash_of(detector, scene, NULL) == 0);
+  impinge_motion_destroy(motion);
+  impinge_scene_destroy(scene);
+}
+
+/* Points and rays at a ball of radius 1. */
+static void probes(impinge_detector *detector) {
+  static const float points[4][3] = {{0, 0, 0}, {0, 0, 1}, {3, 0, 0}, {0, 0, -1.5f}};
+  static const double origins[2][3] = {{0, 0, 5}, {0, 3, 5}};
+  static const float down[2][3] = {{0, 0, -2}, {0, 0, -2}};
+  impinge_scene *scene = NULL;
+  impinge_closest *closest = NULL;
+  impinge_hits *hits = NULL;
+  impinge_query query;
+  impinge_array at = packed(points, 4, IMPINGE_F32), from = packed(origins, 2, IMPINGE_F64), to = packed(down, 2, IMPINGE_F32), view;
+  impinge_stats stats;
+  const impinge_closest_element *near_to;
+  const impinge_ray_hit *hit;
+  int8_t places[4] = {9, 9, 9, 9};
+  double signed_[4] = {9, 9, 9, 9};
+  uint64_t hash;
+  GOOD(impinge_scene_create(&scene));
+  GOOD(impinge_scene_add_triangles(scene, faces_of(&balls[0]), positions_of(&balls[0]), NULL));
+  GOOD(impinge_contains(detector, scene, 0, at, places));
+  CHECK(places[0] == 1 && places[1] == 0 && places[2] == -1 && places[3] == -1);
+  GOOD(impinge_signed_distance(detector, scene, 0, at, signed_));
+  CHECK(fabs(signed_[0] - 1) < 0.01 && signed_[1] == 0 && fabs(signed_[2] + 2) < 0.01 && signed_[3] == -0.5);
+  GOOD(impinge_contains(detector, scene, 0, packed(NULL, 0, IMPINGE_F32), NULL));
+  GOOD(impinge_find_closest(detector, scene, at, 1.75, NULL, &closest));
+  CHECK(impinge_closest_count(closest) == 4 && impinge_closest_hash(closest) != 0);
+  near_to = impinge_closest_data(closest);
+  CHECK(near_to[0].found == 1 && near_to[0].distance == fabs(signed_[0]) && near_to[0].body == 0);
+  CHECK(near_to[2].found == 0 && near_to[2].body == IMPINGE_ANY_BODY && near_to[2].feature == IMPINGE_NO_FEATURE);
+  CHECK(isinf(near_to[2].distance) && isnan(near_to[2].point[0]));
+  /* The pole is a vertex of its faces. */
+  CHECK(near_to[3].distance == 0.5 && near_to[3].point[2] == -1 && near_to[3].feature < 3);
+  CHECK(balls[0].faces[near_to[3].element][near_to[3].feature] == RINGS * SEGMENTS + 1);
+  GOOD(impinge_closest_column(closest, IMPINGE_COLUMN_DISTANCE, &view));
+  CHECK(view.rows == 4 && view.data == &near_to[0].distance && view.row_stride == (ptrdiff_t)sizeof *near_to);
+  GOOD(impinge_closest_column(closest, IMPINGE_COLUMN_POINTS, &view));
+  CHECK(view.data == near_to[0].point);
+  GOOD(impinge_closest_column(closest, IMPINGE_COLUMN_ROWS, &view));
+  CHECK(view.data == &near_to[0].body);
+  GOOD(impinge_closest_column(closest, IMPINGE_COLUMN_FEATURES, &view));
+  REFUSED(impinge_closest_column(closest, IMPINGE_COLUMN_T, &view), "no column");
+  stats.size = sizeof stats;
+  GOOD(impinge_closest_stats(closest, &stats));
+  impinge_closest_destroy(closest);
+  /* One ray down the axis, one beside the ball: origins in double precision, directions in single. */
+  GOOD(impinge_cast(detector, scene, from, to, HUGE_VAL, NULL, &hits));
+  CHECK(impinge_hits_n_rays(hits) == 2 && impinge_hits_count(hits) == 1);
+  hit = impinge_hits_data(hits);
+  CHECK(hit->t == 2 && hit->ray == 0 && hit->feature < 3 && hit->barycentrics[hit->feature] == 1);
+  GOOD(impinge_hits_column(hits, IMPINGE_COLUMN_IS_HIT, &view));
+  CHECK(view.rows == 2 && ((const uint8_t *)view.data)[0] == 1 && ((const uint8_t *)view.data)[1] == 0);
+  GOOD(impinge_hits_column(hits, IMPINGE_COLUMN_T, &view));
+  CHECK(*(const double *)view.data == 2);
+  hash = impinge_hits_hash(hits);
+  impinge_hits_destroy(hits);
+  impinge_query_default(&query);
+  query.hits = IMPINGE_HITS_ALL;
+  GOOD(impinge_cast(detector, scene, from, to, HUGE_VAL, &query, &hits));
+  /* All faces at both poles. */
+  CHECK(impinge_hits_count(hits) == 2 * SEGMENTS && impinge_hits_hash(hits) != hash);
+  CHECK(impinge_hits_data(hits)[2 * SEGMENTS - 1].t == 3);
+  GOOD(impinge_hits_column(hits, IMPINGE_COLUMN_STARTS, &view));
+  CHECK(view.rows == 3 && ((const uint64_t *)view.data)[1] == 2 * SEGMENTS && ((const uint64_t *)view.data)[2] == 2 * SEGMENTS);
+  impinge_hits_destroy(hits);
+  query.hits = IMPINGE_HITS_ANY;
+  GOOD(impinge_cast(detector, scene, from, to, 1, &query, &hits));
+  GOOD(impinge_hits_column(hits, IMPINGE_COLUMN_IS_HIT, &view));
+  CHECK(impinge_hits_count(hits) == 0 && ((const uint8_t *)view.data)[0] == 0);
+  REFUSED(impinge_hits_column(hits, IMPINGE_COLUMN_STARTS, &view), "did not ask");
+  GOOD(impinge_hits_stats(hits, &stats));
+  impinge_hits_destroy(hits);
+  impinge_scene_destroy(scene);
+}
+
+static void gpus(void) {
+  impinge_devices *devices = NULL;
+  size_t i;
+  GOOD(impinge_find_devices(&devices));
+#ifndef WITH_GPU
+  CHECK(impinge_devices_count(devices) == 0 && impinge_devices_data(devices) == NULL);
+#endif
+  for (i = 0; i < impinge_devices_count(devices); ++i) {
+    const impinge_device *of = &impinge_devices_data(devices)[i];
+    CHECK(strlen(of->name) > 0 && strlen(of->interface_name) > 0 && of->driver != NULL && of->max_binding > 0 && of->is_software < 2);
+  }
+  impinge_devices_destroy(devices);
+}
+
 static int n_progress = 0, n_logged = 0;
 static int cancel(void *user) { return *(int *)user; }
 static void progress(void *user, uint64_t done, uint64_t total) {
@@ -448,6 +677,9 @@ int main(void) {
   steps(detector);
   near_and_candidates(detector);
   contacts(detector);
+  solvers(detector);
+  probes(detector);
+  gpus();
   other_bodies(detector);
   callbacks();
 #ifdef TEST_PANIC

@@ -6,8 +6,18 @@
 
 namespace impinge {
 
+namespace detail {
+/// What an answer cost; nothing of none.
+template <class Call, class Handle> impinge_stats stats_of(Call call, const Handle *of) {
+  impinge_stats stats{};
+  stats.size = sizeof stats;
+  if (call(of, &stats) != IMPINGE_OK) stats = {};
+  return stats;
+}
+} // namespace detail
+
 /// What an answer has: rows, a hash, columns, and what it cost.
-template <class Handle, class Row, auto count_of, auto data_of, auto column_of, auto stats_of, auto destroy> class answer {
+template <class Handle, class Row, auto count_of, auto data_of, auto column_of, auto of_stats, auto destroy> class answer {
 public:
   using value_type = Row;
   answer() = default;
@@ -25,12 +35,7 @@ public:
     return detail::give(column_of(raw(), column, &view), std::move(view));
   }
   /// Its strings live as long as this answer.
-  impinge_stats stats() const {
-    impinge_stats stats{};
-    stats.size = sizeof stats;
-    if (stats_of(raw(), &stats) != IMPINGE_OK) stats = {};
-    return stats;
-  }
+  impinge_stats stats() const { return detail::stats_of(of_stats, raw()); }
   Handle *raw() noexcept { return handle_.get(); }
   const Handle *raw() const noexcept { return handle_.get(); }
 
@@ -57,6 +62,10 @@ using contacts_answer = answer<impinge_contacts, pair, impinge_contacts_count, i
                                impinge_contacts_destroy>;
 using penetration_answer = answer<impinge_penetration, region, impinge_penetration_count, impinge_penetration_data, impinge_penetration_column,
                                   impinge_penetration_stats, impinge_penetration_destroy>;
+
+using closest_answer = answer<impinge_closest, closest_element, impinge_closest_count, impinge_closest_data, impinge_closest_column, impinge_closest_stats,
+                              impinge_closest_destroy>;
+using hits_answer = answer<impinge_hits, ray_hit, impinge_hits_count, impinge_hits_data, impinge_hits_column, impinge_hits_stats, impinge_hits_destroy>;
 
 /// The rows of one kind, of rows that are sorted by kind.
 template <class Row> view<Row> of_kind(view<Row> rows, view<std::uint8_t> kinds, pair_kind kind) {
@@ -160,11 +169,119 @@ public:
   view<std::uint32_t> inside_b() const { return packed<std::uint32_t>(IMPINGE_COLUMN_INSIDE_B); }
 };
 
-/// How far a step can be taken.
-class advance {
+/// The elements nearest to points, one row per point: `found` of a row is 0 where nothing is near enough.
+class closest : public detail::closest_answer {
 public:
-  advance() = default;
-  explicit advance(impinge_motion *handle) : handle_(handle) {}
+  using answer::answer;
+  std::uint64_t hash() const noexcept { return impinge_closest_hash(raw()); }
+};
+
+/// What rays hit, one ray after the other.
+class hits : public detail::hits_answer {
+public:
+  using answer::answer;
+  std::uint64_t hash() const noexcept { return impinge_hits_hash(raw()); }
+  std::size_t n_rays() const noexcept { return impinge_hits_n_rays(raw()); }
+  /// Of each ray: 1 if it hits anything.
+  view<std::uint8_t> is_hit() const { return packed<std::uint8_t>(IMPINGE_COLUMN_IS_HIT); }
+  /// The hits of ray i are those from `starts()[i]` to `starts()[i + 1]`; nothing if only yes or no was asked for.
+  view<std::uint64_t> starts() const { return packed<std::uint64_t>(IMPINGE_COLUMN_STARTS); }
+  /// What a ray hits: the first, or all.
+  view<ray_hit> of(std::size_t ray) const {
+    const auto at = starts();
+    if (ray + 1 >= at.size()) return {};
+    return {data() + at[ray], static_cast<std::size_t>(at[ray + 1] - at[ray])};
+  }
+};
+
+/// How far each vertex may move, on any path, so that nothing touches.
+class safe_distances {
+public:
+  safe_distances() = default;
+  explicit safe_distances(impinge_safe_distances *handle) : handle_(handle) {}
+  /// Those of a body, in the precision of its positions.
+  result<array> of(body of) const {
+    array view{};
+    return detail::give(impinge_safe_distances_of(raw(), of, &view), std::move(view));
+  }
+  /// The pairs at distance 0, whose vertices may not move at all.
+  view<pair> touching() const noexcept {
+    const auto *touching = impinge_safe_distances_touching(raw());
+    return {impinge_near_data(touching), impinge_near_count(touching)};
+  }
+  impinge_stats stats() const { return detail::stats_of(impinge_safe_distances_stats, raw()); }
+  const impinge_safe_distances *raw() const noexcept { return handle_.get(); }
+
+private:
+  detail::handle<impinge_safe_distances, impinge_safe_distances_destroy> handle_;
+};
+
+/// Lists: the neighbours of element i are those from `offsets[i]` to `offsets[i + 1]`, ascending, each with its distance rounded down.
+struct csr {
+  view<std::uint64_t> offsets;
+  view<std::uint32_t> indices;
+  view<double> distances;
+};
+
+/// Which elements are near each element.
+class neighbours {
+public:
+  neighbours() = default;
+  explicit neighbours(impinge_neighbours *handle) : handle_(handle) {}
+  /// How many pairs are near; each is in two lists.
+  std::size_t size() const noexcept { return impinge_neighbours_count(raw()); }
+  bool empty() const noexcept { return size() == 0; }
+  /// The numbers of the first vertex, the first edge and the first face of a body in the lists, which number those of all bodies.
+  result<std::array<std::uint32_t, 3>> first(body of) const {
+    std::uint32_t first[3] = {0, 0, 0};
+    const auto status = impinge_neighbours_first(raw(), of, &first);
+    return detail::give(status, std::array<std::uint32_t, 3>{first[0], first[1], first[2]});
+  }
+  /// The lists of the elements that a kind names first, and of those that it names second.
+  csr of(pair_kind kind) const { return lists(kind, 0); }
+  csr reversed(pair_kind kind) const { return lists(kind, 1); }
+  /// The faces near each vertex, the vertices near each face, the edges near each edge.
+  csr vf() const { return of(pair_kind::vf); }
+  csr fv() const { return reversed(pair_kind::vf); }
+  csr ee() const { return of(pair_kind::ee); }
+  impinge_stats stats() const { return detail::stats_of(impinge_neighbours_stats, raw()); }
+  const impinge_neighbours *raw() const noexcept { return handle_.get(); }
+
+private:
+  csr lists(pair_kind kind, std::uint32_t reversed) const {
+    array offsets{}, indices{}, distances{};
+    if (impinge_neighbours_lists(raw(), static_cast<std::uint32_t>(kind), reversed, &offsets, &indices, &distances) != IMPINGE_OK) return {};
+    return {{static_cast<const std::uint64_t *>(offsets.data), offsets.rows},
+            {static_cast<const std::uint32_t *>(indices.data), indices.rows},
+            {static_cast<const double *>(distances.data), distances.rows}};
+  }
+  detail::handle<impinge_neighbours, impinge_neighbours_destroy> handle_;
+};
+
+/// Positions that a step can be taken to.
+class motion {
+public:
+  motion() = default;
+  explicit motion(impinge_motion *handle) : handle_(handle) {}
+  std::optional<bool> start_intersects() const { return detail::asked(impinge_motion_start_intersects(raw())); }
+  /// Where the vertices of a body are then; no rows for one that stands still.
+  result<array> positions(body of) const {
+    array view{};
+    return detail::give(impinge_motion_positions(raw(), of, &view), std::move(view));
+  }
+  /// Takes the step.
+  result<void> apply(scene &to) const { return detail::give(impinge_motion_apply(raw(), to.raw())); }
+  impinge_stats stats() const { return detail::stats_of(impinge_motion_stats, raw()); }
+  const impinge_motion *raw() const noexcept { return handle_.get(); }
+
+private:
+  detail::handle<impinge_motion, impinge_motion_destroy> handle_;
+};
+
+/// How far a step can be taken.
+class advance : public motion {
+public:
+  using motion::motion;
   /// 1 for the whole step, 0 for none.
   double fraction() const noexcept { return impinge_motion_fraction(raw()); }
   /// The first contact of the whole step.
@@ -174,24 +291,18 @@ public:
     if (impinge_motion_first(raw(), &impact, &found) != IMPINGE_OK || found == 0) return std::nullopt;
     return impact;
   }
-  std::optional<bool> start_intersects() const { return detail::asked(impinge_motion_start_intersects(raw())); }
-  /// Where the vertices of a body are then; no rows for one that stands still.
-  result<array> positions(body of) const {
-    array view{};
-    return detail::give(impinge_motion_positions(raw(), of, &view), std::move(view));
-  }
-  /// Takes the step.
-  result<void> apply(scene &to) const { return detail::give(impinge_motion_apply(raw(), to.raw())); }
-  impinge_stats stats() const {
-    impinge_stats stats{};
-    stats.size = sizeof stats;
-    if (impinge_motion_stats(raw(), &stats) != IMPINGE_OK) stats = {};
-    return stats;
-  }
-  const impinge_motion *raw() const noexcept { return handle_.get(); }
+};
 
-private:
-  detail::handle<impinge_motion, impinge_motion_destroy> handle_;
+/// How far each vertex can go in a step.
+class truncation : public motion {
+public:
+  using motion::motion;
+  /// How many vertices were stopped before the end of their way.
+  std::uint64_t n_cut() const noexcept { return impinge_motion_n_cut(raw()); }
+  /// How many pairs touch at the start, or are nearer than they are to keep: their vertices were not moved.
+  std::uint64_t n_touching() const noexcept { return impinge_motion_n_touching(raw()); }
+  /// How often pairs were looked at again, because vertices had been stopped.
+  std::uint32_t rounds() const noexcept { return impinge_motion_rounds(raw()); }
 };
 
 } // namespace impinge

@@ -30,6 +30,18 @@ inline Eigen::Map<const Eigen::Matrix<std::uint32_t, Eigen::Dynamic, 4, Eigen::R
   return {reinterpret_cast<const std::uint32_t *>(rows.data()), static_cast<Eigen::Index>(rows.size()), 4};
 }
 
+/// The points that are nearest to those asked about, as a matrix of n x 3 numbers; NaN where nothing is near enough. A view.
+inline Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>, Eigen::Unaligned, Eigen::OuterStride<>> points_of(const closest &of) {
+  constexpr auto stride = sizeof(closest_element) / sizeof(double);
+  static_assert(sizeof(closest_element) % sizeof(double) == 0, "rows are a number of doubles apart");
+  return {of.empty() ? nullptr : of.data()->point, static_cast<Eigen::Index>(of.size()), 3, Eigen::OuterStride<>(stride)};
+}
+
+/// Numbers that belong to an answer, such as lists and columns, as a vector. A view.
+template <class T> Eigen::Map<const Eigen::Matrix<T, Eigen::Dynamic, 1>> as_vector(view<T> numbers) {
+  return {numbers.data(), static_cast<Eigen::Index>(numbers.size())};
+}
+
 /// Positions or points as a matrix of n x 3 numbers in double precision. A copy.
 inline Eigen::MatrixXd to_matrix(const array &positions) {
   using strides = Eigen::Stride<Eigen::Dynamic, Eigen::Dynamic>;

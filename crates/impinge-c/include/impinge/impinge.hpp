@@ -90,6 +90,8 @@ public:
     const auto status = impinge_advance(this->raw(), in.raw(), &raw, nullptr, made.out());
     return give(status, impinge::advance(made.take()));
   }
+  /// How far each vertex can go: each stops for itself.
+  result<truncation> truncate(const scene &in, const query &of = {}) { return ask<truncation, impinge_motion>(impinge_truncate, in, of); }
   /// Only the fraction: no positions are kept.
   result<double> advance_fraction(const scene &in, const query &of = {}) {
     const impinge_query raw = of.raw();
@@ -140,12 +142,65 @@ public:
     const auto status = impinge_find_near(this->raw(), in.raw(), distance, &raw, made.out());
     return give(status, near_pairs(made.take()));
   }
+  /// How far each vertex may move, at most `most`, so that nothing touches.
+  result<impinge::safe_distances> safe_distances(const scene &in, double most, const query &of = {}) {
+    const impinge_query raw = of.raw();
+    detail::made<impinge_safe_distances> made;
+    const auto status = impinge_find_safe_distances(this->raw(), in.raw(), most, &raw, made.out());
+    return give(status, impinge::safe_distances(made.take()));
+  }
+  result<impinge::neighbours> neighbours(const scene &in, double distance, const query &of = {}) {
+    const impinge_query raw = of.raw();
+    detail::made<impinge_neighbours> made;
+    const auto status = impinge_find_neighbours(this->raw(), in.raw(), distance, &raw, made.out());
+    return give(status, impinge::neighbours(made.take()));
+  }
+  /// Where each point lies: inside a body 1, on its surface 0, outside -1.
+  template <class P> result<std::vector<std::int8_t>> contains(const scene &in, body of, const P &points) {
+    const array at = detail::rows_of(points, 3);
+    std::vector<std::int8_t> places(at.rows);
+    const auto status = impinge_contains(raw(), in.raw(), of, at, places.data());
+    return give(status, std::move(places));
+  }
+  /// How far each point is from the surface of a body: above 0 inside, below 0 outside.
+  template <class P> result<std::vector<double>> signed_distance(const scene &in, body of, const P &points) {
+    const array at = detail::rows_of(points, 3);
+    std::vector<double> distances(at.rows);
+    const auto status = impinge_signed_distance(raw(), in.raw(), of, at, distances.data());
+    return give(status, std::move(distances));
+  }
+  /// The element nearest to each point, if it is at most `most` away.
+  template <class P>
+  result<impinge::closest> closest(const scene &in, const P &points, double most = std::numeric_limits<double>::infinity(), const query &of = {}) {
+    const impinge_query raw = of.raw();
+    detail::made<impinge_closest> made;
+    const auto status = impinge_find_closest(this->raw(), in.raw(), detail::rows_of(points, 3), most, &raw, made.out());
+    return give(status, impinge::closest(made.take()));
+  }
+  /// What each ray hits, origin + t direction for t from 0 to `most`: 1 for segments.
+  template <class O, class D>
+  result<impinge::hits> cast(const scene &in, const O &origins, const D &directions, double most = std::numeric_limits<double>::infinity(),
+                             const query &of = {}) {
+    const impinge_query raw = of.raw();
+    detail::made<impinge_hits> made;
+    const auto status =
+        impinge_cast(this->raw(), in.raw(), detail::rows_of(origins, 3), detail::rows_of(directions, 3), most, &raw, made.out());
+    return give(status, impinge::hits(made.take()));
+  }
+  /// The nearest two bodies of all that the query lets meet; nothing if there are none.
+  result<std::optional<impinge::nearest>> nearest(const scene &in, const query &of = query::between_all()) {
+    const impinge_query raw = of.raw();
+    impinge::nearest least{};
+    std::int32_t found = 0;
+    const auto status = impinge_find_nearest(this->raw(), in.raw(), &raw, &least, &found);
+    return give(status, found != 0 ? std::optional<impinge::nearest>(least) : std::nullopt);
+  }
   /// The smallest distance of two bodies; nothing if one has no elements.
-  result<std::optional<nearest>> distance(const scene &in, body a, body b) {
-    nearest least{};
+  result<std::optional<impinge::nearest>> distance(const scene &in, body a, body b) {
+    impinge::nearest least{};
     std::int32_t found = 0;
     const auto status = impinge_find_distance(raw(), in.raw(), a, b, &least, &found);
-    return give(status, found != 0 ? std::optional<nearest>(least) : std::nullopt);
+    return give(status, found != 0 ? std::optional<impinge::nearest>(least) : std::nullopt);
   }
   result<impinge::contacts> contacts(const scene &in, const pairs &of) {
     detail::made<impinge_contacts> made;
@@ -240,6 +295,27 @@ private:
   std::unique_ptr<watch> watch_;
   detail::handle<impinge_detector, impinge_detector_destroy> handle_;
 };
+
+/// A GPU that the library can run on.
+struct device_info {
+  std::string name, interface_name, driver;
+  std::uint64_t max_binding;
+  bool is_software;
+};
+
+/// The GPUs of this machine, hardware first; none if the library was built without the GPU backend.
+inline result<std::vector<device_info>> devices() {
+  detail::made<impinge_devices> made;
+  const auto status = impinge_find_devices(made.out());
+  const detail::handle<impinge_devices, impinge_devices_destroy> held(made.take());
+  std::vector<device_info> all;
+  const auto *rows = impinge_devices_data(held.get());
+  for (std::size_t ix = 0; ix < impinge_devices_count(held.get()); ++ix) {
+    const auto &of = rows[ix];
+    all.push_back({of.name, of.interface_name, of.driver, of.max_binding, of.is_software != 0});
+  }
+  return detail::give(status, std::move(all));
+}
 
 /// Vertices at equal positions as one.
 struct weld_map {

@@ -37,6 +37,10 @@ using pair = impinge_pair;
 using impact = impinge_impact;
 /// The nearest elements of two bodies.
 using nearest = impinge_nearest;
+/// The element that is nearest to a point.
+using closest_element = impinge_closest_element;
+/// Where a ray meets an element.
+using ray_hit = impinge_ray_hit;
 /// A region in which two bodies overlap.
 using region = impinge_region;
 /// Rows of numbers anywhere in memory.
@@ -139,7 +143,8 @@ template <class T> result<std::decay_t<T>> give(impinge_status status, T &&value
 /// The type code of a number.
 template <class T> constexpr std::uint32_t type_of() {
   static_assert(std::is_arithmetic_v<T>, "numbers are float, double, or integers of 32 or 64 bits");
-  if constexpr (std::is_same_v<T, float>) return IMPINGE_F32;
+  if constexpr (sizeof(T) == 1) return IMPINGE_U8;
+  else if constexpr (std::is_same_v<T, float>) return IMPINGE_F32;
   else if constexpr (std::is_same_v<T, double>) return IMPINGE_F64;
   else if constexpr (sizeof(T) == 4) return std::is_signed_v<T> ? IMPINGE_I32 : IMPINGE_U32;
   else {
@@ -232,6 +237,8 @@ enum class precision : std::uint32_t { f32 = IMPINGE_F32, f64 = IMPINGE_F64 };
 enum class pair_kind : std::uint32_t { vf = IMPINGE_VF, ee = IMPINGE_EE, ev = IMPINGE_EV, vv = IMPINGE_VV, ef = IMPINGE_EF, ff = IMPINGE_FF };
 /// Where the work is done.
 enum class backend : std::uint32_t { automatic = IMPINGE_BACKEND_AUTO, cpu = IMPINGE_BACKEND_CPU, gpu = IMPINGE_BACKEND_GPU };
+/// Which hits of a ray are sought.
+enum class hits_of_ray : std::uint32_t { first = IMPINGE_HITS_FIRST, any = IMPINGE_HITS_ANY, all = IMPINGE_HITS_ALL };
 /// How candidates are found.
 enum class method : std::uint32_t { automatic = IMPINGE_METHOD_AUTO, clusters = IMPINGE_METHOD_CLUSTERS, cells = IMPINGE_METHOD_CELLS, naive = IMPINGE_METHOD_NAIVE };
 
@@ -259,14 +266,23 @@ public:
   }
   query &shared_vertex(impinge::shared_vertex rule) { return set(raw_.shared_vertex, static_cast<std::uint32_t>(rule)); }
   /// Leaves out the pairs of two bodies, or the self-collision of one.
-  query &exclude(body a, body b) {
-    impinge_exclusion exclusion{};
-    exclusion.kind = IMPINGE_EXCLUDE_BODIES;
-    exclusion.a = a;
-    exclusion.b = b;
-    exclusions_.push_back(exclusion);
+  query &exclude(body a, body b) { return leave_out(IMPINGE_EXCLUDE_BODIES, a, b, 0); }
+  /// Leaves out pairs of one body that are at most `n` edges apart in its surface.
+  query &exclude_rings(std::uint32_t n) { return leave_out(IMPINGE_EXCLUDE_RINGS, 0, 0, n); }
+  /// Leaves out pairs of elements of two groups of vertices: see `scene::set_groups`.
+  query &exclude_groups(std::uint32_t g, std::uint32_t h) { return leave_out(IMPINGE_EXCLUDE_GROUPS, g, h, 0); }
+  /// Leaves out the pairs of an answer of `detector::near`, such as those that are near at rest. It must live as long as the query is asked.
+  template <class Near> query &exclude(const Near &rest_pairs) {
+    rest_pairs_.push_back(rest_pairs.raw());
     return *this;
   }
+  /// Bodies that do not move, of `detector::safe_distances`.
+  query &fixed(std::vector<body> bodies) {
+    fixed_ = std::move(bodies);
+    return *this;
+  }
+  /// Of `detector::cast`.
+  query &hits(hits_of_ray which) { return set(raw_.hits, static_cast<std::uint32_t>(which)); }
   /// Only the pairs of a half-open box of space.
   query &owned_by(const std::array<double, 3> &low, const std::array<double, 3> &high) {
     raw_.flags |= IMPINGE_CELL;
@@ -300,6 +316,10 @@ public:
     impinge_query raw = raw_;
     raw.exclusions = exclusions_.data();
     raw.n_exclusions = exclusions_.size();
+    raw.fixed = fixed_.data();
+    raw.n_fixed = fixed_.size();
+    raw.rest_pairs = rest_pairs_.data();
+    raw.n_rest_pairs = rest_pairs_.size();
     return raw;
   }
 
@@ -312,12 +332,23 @@ private:
     of.raw_.b = b;
     return of;
   }
+  query &leave_out(std::uint32_t kind, std::uint32_t a, std::uint32_t b, std::uint32_t n) {
+    impinge_exclusion exclusion{};
+    exclusion.kind = kind;
+    exclusion.a = a;
+    exclusion.b = b;
+    exclusion.n = n;
+    exclusions_.push_back(exclusion);
+    return *this;
+  }
   template <class T> query &set(T &field, T value) {
     field = value;
     return *this;
   }
   impinge_query raw_;
   std::vector<impinge_exclusion> exclusions_;
+  std::vector<body> fixed_;
+  std::vector<const impinge_near *> rest_pairs_;
 };
 
 /// Bodies: topology once, positions every frame. Elements and positions are anything that `as_array` reads: vectors of numbers or of
@@ -372,6 +403,10 @@ public:
   /// Four rows of four numbers.
   template <class M> result<void> set_transform(body of, const M &matrix) { return detail::give(impinge_scene_set_transform(raw(), of, detail::rows_of(matrix, 4))); }
   result<void> set_filter(body of, std::uint64_t category, std::uint64_t mask) { return detail::give(impinge_scene_set_filter(raw(), of, category, mask)); }
+  /// The group of each vertex, for `query::exclude_groups`.
+  template <class G> result<void> set_groups(body of, const G &groups) { return detail::give(impinge_scene_set_groups(raw(), of, detail::rows_of(groups, 1))); }
+  /// Which vertices never move: 1 or 0 for each, as bytes or integers.
+  template <class G> result<void> set_pinned(body of, const G &pinned) { return detail::give(impinge_scene_set_pinned(raw(), of, detail::rows_of(pinned, 1))); }
   result<void> set_thickness(body of, double thickness) { return detail::give(impinge_scene_set_thickness(raw(), of, thickness)); }
 
   std::size_t n_bodies() const noexcept { return impinge_scene_n_bodies(raw()); }

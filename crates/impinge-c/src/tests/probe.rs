@@ -1,0 +1,436 @@
+//! Questions about points and rays, and of penetration-free solvers: the answers through C are
+//! those of Rust.
+
+use std::ptr::{null, null_mut};
+
+use impinge::{Backend, Bounds, Csr, Detector, Exclusion, Hit, PairKind, Part, Query, Scene};
+use impinge_scenes::{Random, surfaces};
+
+use super::{Built, catalogue, of_models, own_edges, through_c};
+use crate::arrays::{no_rows, positions_view, view, view_of};
+use crate::motion::*;
+use crate::neighbours::*;
+use crate::probe::*;
+use crate::questions::*;
+use crate::safe::*;
+use crate::scene::*;
+use crate::types::*;
+
+fn points(n: usize, seed: u64) -> Vec<[f64; 3]> {
+    let mut random = Random::new(seed);
+    (0..n)
+        .map(|_| [0; 3].map(|_: i32| f64::from(random.range(-1.5, 1.5))))
+        .collect()
+}
+
+/// The numbers of a packed column of one number each.
+///
+/// # Safety
+/// The view is one of ours, of numbers of this type.
+unsafe fn numbers<T>(of: &impinge_array) -> &[T] {
+    match of.rows {
+        0 => &[],
+        // SAFETY: the caller's promise.
+        n => unsafe { std::slice::from_raw_parts(of.data.cast(), n) },
+    }
+}
+
+#[test]
+fn points_and_rays_are_those_of_rust() {
+    let (at, directions) = (points(300, 1), points(300, 2));
+    let narrow: Vec<[f32; 3]> = at.iter().map(|x| x.map(|x| x as f32)).collect();
+    for (name, scene) in catalogue() {
+        let built = through_c(&scene);
+        let (on, of) = (built.detector, built.scene.cast_const());
+        let mut detector = Detector::new(Backend::Cpu).expect("the CPU");
+        // SAFETY: as in `through_c`.
+        unsafe {
+            for most in [0.1, f64::INFINITY] {
+                let expected = detector.closest(&scene, &narrow, most, &Query::all());
+                let expected = expected.expect("nearest elements");
+                let mut closest = null_mut();
+                let status =
+                    impinge_find_closest(on, of, view(&narrow), most, null(), &mut closest);
+                assert_eq!(status, OK);
+                assert_eq!(impinge_closest_hash(closest), expected.hash(), "{name}");
+                let n = impinge_closest_count(closest);
+                let rows = std::slice::from_raw_parts(impinge_closest_data(closest), n);
+                for (row, found) in rows.iter().zip(expected.iter()) {
+                    assert_eq!(row.found, u32::from(found.is_some()));
+                    let Some(found) = found else { continue };
+                    assert_eq!((row.distance, row.point), (found.distance, found.point));
+                    assert_eq!(row.element, found.element.element);
+                }
+                impinge_closest_destroy(closest);
+            }
+            for (hits, bits) in [
+                (Hit::First, HITS_FIRST),
+                (Hit::Any, HITS_ANY),
+                (Hit::All, HITS_ALL),
+            ] {
+                let query = Query::all().hits(hits);
+                let expected = detector.cast(&scene, &at, &directions, 2.0, &query);
+                let expected = expected.expect("hits");
+                let query = impinge_query {
+                    hits: bits,
+                    ..impinge_query::default()
+                };
+                let mut found = null_mut();
+                let rays = [view(&at), view(&directions)];
+                let status = impinge_cast(on, of, rays[0], rays[1], 2.0, &query, &mut found);
+                assert_eq!(status, OK);
+                assert_eq!(impinge_hits_hash(found), expected.hash(), "{name}");
+                assert_eq!(impinge_hits_n_rays(found), at.len());
+                assert_eq!(impinge_hits_count(found), expected.iter().len());
+                let rows = impinge_hits_data(found);
+                for (ix, hit) in expected.iter().enumerate() {
+                    let row = &*rows.add(ix);
+                    assert_eq!((row.t, row.t_end), (hit.t, hit.t_end));
+                    assert_eq!(row.barycentrics, hit.barycentrics);
+                }
+                let mut starts = no_rows(U8);
+                let status = impinge_hits_column(found, COLUMN_STARTS, &mut starts);
+                assert_eq!(status, if hits == Hit::Any { INVALID } else { OK });
+                if status == OK {
+                    let starts = numbers::<u64>(&starts).iter().map(|&ix| ix as usize);
+                    assert!(starts.eq(expected.offsets().iter().copied()));
+                }
+                impinge_hits_destroy(found);
+            }
+            for (id, _) in scene.bodies() {
+                let body = id.index() as u32;
+                let (mut places, mut signed) = (vec![9; at.len()], vec![f64::NAN; at.len()]);
+                let status = impinge_contains(on, of, body, view(&at), places.as_mut_ptr());
+                match detector.contains(&scene, id, &at) {
+                    Ok(expected) => assert_eq!((status, &places), (OK, &expected), "{name}"),
+                    Err(_) => {
+                        assert_eq!(status, INVALID);
+                        assert!(places.iter().all(|&place| place == 9));
+                        continue;
+                    }
+                }
+                let distances = detector.closest(&scene, &at, f64::INFINITY, &Query::of(id));
+                let distances = distances.expect("nearest elements");
+                let status = impinge_signed_distance(on, of, body, view(&at), signed.as_mut_ptr());
+                assert_eq!(status, OK);
+                for (ix, signed) in signed.into_iter().enumerate() {
+                    let distance = distances.get(ix).expect("the body has elements").distance;
+                    assert_eq!(signed.abs(), distance);
+                    assert!(signed * f64::from(places[ix]) >= 0.0);
+                }
+            }
+            let (mut nearest, mut found) = (std::mem::zeroed::<impinge_nearest>(), -1);
+            let query = impinge_query {
+                own: 0,
+                ..impinge_query::default()
+            };
+            assert_eq!(
+                impinge_find_nearest(on, of, &query, &mut nearest, &mut found),
+                OK
+            );
+            let expected = detector.nearest(&scene, &Query::between_all());
+            let expected = expected.expect("an answer").map(|of| {
+                let body = |of: impinge::Element| (of.body.index() as u32, of.element);
+                (of.distance, body(of.a), body(of.b))
+            });
+            let row = (
+                nearest.distance,
+                (nearest.body_a, nearest.element_a),
+                (nearest.body_b, nearest.element_b),
+            );
+            assert_eq!((found == 1).then_some(row), expected, "{name}");
+        }
+    }
+}
+
+/// Compares the lists of one kind, seen from one side.
+///
+/// # Safety
+/// As in `through_c`.
+unsafe fn check_lists(of: *mut impinge_neighbours, kind: PairKind, reversed: u32, expected: &Csr) {
+    let [mut offsets, mut indices, mut distances] = [no_rows(U8); 3];
+    // SAFETY: the caller's promise.
+    unsafe {
+        let status = impinge_neighbours_lists(
+            of,
+            bit(kind),
+            reversed,
+            &mut offsets,
+            &mut indices,
+            &mut distances,
+        );
+        assert_eq!(status, OK);
+        assert_eq!(numbers::<u64>(&offsets), expected.offsets);
+        assert_eq!(numbers::<u32>(&indices), expected.indices);
+        assert_eq!(numbers::<f64>(&distances), expected.distances);
+    }
+}
+
+#[test]
+fn bounds_lists_and_truncations_are_those_of_rust() {
+    for (name, scene) in catalogue() {
+        let built = through_c(&scene);
+        let (on, of) = (built.detector, built.scene.cast_const());
+        let mut detector = Detector::new(Backend::Cpu).expect("the CPU");
+        let (fixed, _) = scene.bodies().next().expect("a body");
+        let number = fixed.index() as u32;
+        let query = impinge_query {
+            fixed: &raw const number,
+            n_fixed: 1,
+            ..impinge_query::default()
+        };
+        // SAFETY: as in `through_c`.
+        unsafe {
+            let mut safe = null_mut();
+            assert_eq!(
+                impinge_find_safe_distances(on, of, 0.02, &query, &mut safe),
+                OK
+            );
+            let expected = detector.safe_distances(&scene, 0.02, &Query::all().fixed([fixed]));
+            let expected = expected.expect("bounds");
+            for (id, _) in scene.bodies() {
+                let mut view = no_rows(U8);
+                let status = impinge_safe_distances_of(safe, id.index() as u32, &mut view);
+                assert_eq!(status, OK);
+                match expected.of(id).expect("a body") {
+                    Bounds::F32(bounds) => assert_eq!(numbers::<f32>(&view), bounds, "{name}"),
+                    Bounds::F64(bounds) => assert_eq!(numbers::<f64>(&view), bounds, "{name}"),
+                }
+            }
+            let touching = impinge_safe_distances_touching(safe);
+            let hash = crate::answers::impinge_near_hash(touching);
+            assert_eq!(hash, expected.touching().hash(), "{name}");
+            impinge_safe_distances_destroy(safe);
+
+            let mut near = null_mut();
+            assert_eq!(impinge_find_neighbours(on, of, 0.02, null(), &mut near), OK);
+            let expected = detector.neighbours(&scene, 0.02, &Query::all());
+            let expected = expected.expect("lists");
+            assert_eq!(impinge_neighbours_count(near), expected.len());
+            for kind in PairKind::ALL {
+                check_lists(near, kind, 0, expected.of(kind));
+                check_lists(near, kind, 1, expected.reversed(kind));
+            }
+            for (id, _) in scene.bodies() {
+                let mut first = [0; 3];
+                let status = impinge_neighbours_first(near, id.index() as u32, &mut first);
+                let parts = [Part::Vertices, Part::Edges, Part::Faces];
+                let own = parts.map(|part| expected.first(id, part).expect("a body"));
+                assert_eq!((status, first), (OK, own));
+            }
+            impinge_neighbours_destroy(near);
+
+            let mut motion = null_mut();
+            let status = impinge_truncate(on, of, null(), &mut motion);
+            match detector.truncate(&scene, &Query::all()) {
+                Err(_) => assert_eq!(status, INVALID, "{name}"),
+                Ok(expected) => {
+                    assert_eq!(status, OK, "{name}");
+                    let counts = (
+                        impinge_motion_n_cut(motion),
+                        impinge_motion_n_touching(motion),
+                        impinge_motion_rounds(motion),
+                    );
+                    let own = (expected.n_cut(), expected.n_touching(), expected.rounds());
+                    assert_eq!(counts, own, "{name}");
+                    assert!(impinge_motion_fraction(motion).is_nan());
+                    let (mut impact, mut found) = (std::mem::zeroed(), -1);
+                    let status = impinge_motion_first(motion, &mut impact, &mut found);
+                    assert_eq!((status, found), (INVALID, -1));
+                    for (id, _) in scene.bodies() {
+                        let mut view = no_rows(U8);
+                        let body = id.index() as u32;
+                        assert_eq!(impinge_motion_positions(motion, body, &mut view), OK);
+                        let own = expected.positions(id).map(positions_view);
+                        assert_eq!(view.rows, own.map_or(0, |own| own.rows));
+                        let Some(own) = own else { continue };
+                        let size = if own.r#type == F32 { 12 } else { 24 };
+                        let bytes = |of: &impinge_array| {
+                            std::slice::from_raw_parts(of.data.cast::<u8>(), of.rows * size)
+                        };
+                        assert_eq!(bytes(&view), bytes(&own), "{name}");
+                    }
+                    assert_eq!(impinge_motion_apply(motion, built.scene), OK);
+                }
+            }
+            impinge_motion_destroy(motion);
+        }
+    }
+}
+
+/// The hash of the near pairs that a query leaves.
+///
+/// # Safety
+/// As in `through_c`.
+unsafe fn near_hash(built: &Built, query: &impinge_query) -> u64 {
+    let mut near = null_mut();
+    // SAFETY: the caller's promise.
+    unsafe {
+        let status = impinge_find_near(built.detector, built.scene, 0.1, query, &mut near);
+        assert_eq!(status, OK);
+        let hash = crate::answers::impinge_near_hash(near);
+        crate::answers::impinge_near_destroy(near);
+        hash
+    }
+}
+
+#[test]
+fn what_is_left_out_is_what_rust_leaves_out() {
+    let ball = surfaces::ball(500);
+    let mut scene = of_models(&[ball.clone(), ball.translated([0.9, 0.0, 0.0])]);
+    let built = through_c(&scene);
+    let mut detector = Detector::new(Backend::Cpu).expect("the CPU");
+    let ids: Vec<_> = scene.bodies().map(|(id, _)| id).collect();
+    let groups: Vec<u32> = (0..ball.positions.len() as u32).map(|ix| ix % 2).collect();
+    let pinned: Vec<bool> = groups.iter().map(|&group| group == 1).collect();
+    let bytes: Vec<u8> = pinned.iter().map(|&flag| flag.into()).collect();
+    let mut check = |scene: &Scene, query: &impinge_query, own: &Query| {
+        let expected = detector.near(scene, 0.1, own).expect("near pairs").hash();
+        // SAFETY: as in `through_c`.
+        assert_eq!(unsafe { near_hash(&built, query) }, expected);
+        expected
+    };
+    let all = check(&scene, &impinge_query::default(), &Query::all());
+    let of_kind = |kind, a, b, n| impinge_exclusion {
+        kind,
+        a,
+        b,
+        n,
+        offsets: no_rows(U32),
+        vertices: no_rows(U32),
+    };
+    let with = |list: &[impinge_exclusion]| impinge_query {
+        exclusions: list.as_ptr(),
+        n_exclusions: list.len(),
+        ..impinge_query::default()
+    };
+    let rings = [of_kind(EXCLUDE_RINGS, 0, 0, 2)];
+    let own = Query::all().exclude(Exclusion::rings(2));
+    assert_ne!(check(&scene, &with(&rings), &own), all);
+    // SAFETY: as in `through_c`.
+    unsafe {
+        for (body, &id) in (0..).zip(&ids) {
+            assert_eq!(
+                impinge_scene_set_groups(built.scene, body, view_of(&groups)),
+                OK
+            );
+            scene.set_groups(id, &groups).expect("as many as vertices");
+        }
+    }
+    let exclusions = [
+        of_kind(EXCLUDE_GROUPS, 1, 0, 0),
+        of_kind(EXCLUDE_BODIES, 0, 0, 0),
+    ];
+    let own = Query::all().exclude(Exclusion::groups(0, 1));
+    let own = own.exclude((ids[0], ids[0]));
+    check(&scene, &with(&exclusions), &own);
+    // SAFETY: as in `through_c`.
+    unsafe {
+        assert_eq!(
+            impinge_scene_set_pinned(built.scene, 0, view_of(&bytes)),
+            OK
+        );
+        assert_eq!(
+            impinge_scene_set_pinned(built.scene, 1, view_of(&groups)),
+            OK
+        );
+    }
+    for &id in &ids {
+        scene.set_pinned(id, &pinned).expect("as many as vertices");
+    }
+    let left = check(&scene, &impinge_query::default(), &Query::all());
+    assert_ne!(left, all);
+    let mut rest = null_mut();
+    // SAFETY: as in `through_c`.
+    unsafe {
+        let status = impinge_find_near(built.detector, built.scene, 0.05, null(), &mut rest);
+        assert_eq!(status, OK);
+        let list = [rest.cast_const().cast()];
+        let query = impinge_query {
+            rest_pairs: list.as_ptr(),
+            n_rest_pairs: 1,
+            ..impinge_query::default()
+        };
+        let mut detector = Detector::new(Backend::Cpu).expect("the CPU");
+        let at_rest = detector.near(&scene, 0.05, &Query::all());
+        let at_rest = at_rest.expect("near pairs");
+        let own = Query::all().exclude(&at_rest);
+        let hash = check(&scene, &query, &own);
+        assert!(hash != left && hash != 0 && !at_rest.is_empty());
+        crate::answers::impinge_near_destroy(rest);
+    }
+}
+
+/// Pairs of edges by the vertices of both, with their distance.
+type ByVertices = Vec<([[u32; 2]; 2], u64)>;
+
+/// # Safety
+/// As in `through_c`.
+unsafe fn edge_lists(built: &Built, edges: &[Vec<[u32; 2]>; 2]) -> ByVertices {
+    let mut near = null_mut();
+    let [mut offsets, mut indices, mut distances] = [no_rows(U8); 3];
+    // SAFETY: the caller's promise.
+    unsafe {
+        let status = impinge_find_neighbours(built.detector, built.scene, 0.02, null(), &mut near);
+        assert_eq!(status, OK);
+        let status = impinge_neighbours_lists(
+            near,
+            bit(PairKind::EdgeEdge),
+            0,
+            &mut offsets,
+            &mut indices,
+            &mut distances,
+        );
+        assert_eq!(status, OK);
+        let mut first = [0; 3];
+        assert_eq!(impinge_neighbours_first(near, 1, &mut first), OK);
+        assert_eq!(first[1] as usize, edges[0].len());
+        let offsets = numbers::<u64>(&offsets);
+        assert_eq!(offsets.len(), edges[0].len() + edges[1].len() + 1);
+        // Vertices of the second body are told from those of the first.
+        let vertices = |edge: usize| {
+            let mut of = match edge.checked_sub(edges[0].len()) {
+                None => edges[0][edge],
+                Some(edge) => edges[1][edge].map(|vertex| vertex + 100_000),
+            };
+            of.sort_unstable();
+            of
+        };
+        let mut all = Vec::new();
+        for (edge, range) in offsets.array_windows().enumerate() {
+            let [from, to] = range.map(|ix| ix as usize);
+            let list = &numbers::<u32>(&indices)[from..to];
+            assert!(list.is_sorted());
+            for (&other, x) in list.iter().zip(&numbers::<f64>(&distances)[from..to]) {
+                all.push(([vertices(edge), vertices(other as usize)], x.to_bits()));
+            }
+        }
+        impinge_neighbours_destroy(near);
+        all.sort_unstable();
+        all
+    }
+}
+
+#[test]
+fn lists_have_the_callers_numbers_of_edges() {
+    let ball = surfaces::ball(500);
+    let scene = of_models(&[ball.clone(), ball.translated([0.9, 0.0, 0.0])]);
+    let (with, without) = (through_c(&scene), through_c(&scene));
+    let rows = [own_edges(&scene, 0), own_edges(&scene, 1)];
+    let given = [0, 1].map(|body| {
+        let (_, held) = scene.bodies().nth(body).expect("it is there");
+        let impinge::Elements::Edges(edges) = held.edges() else {
+            panic!("edges are edges");
+        };
+        edges.clone()
+    });
+    // SAFETY: as in `through_c`.
+    unsafe {
+        for (body, rows) in (0..).zip(&rows) {
+            assert_eq!(impinge_scene_set_edges(with.scene, body, view(rows)), OK);
+        }
+        let own = edge_lists(&with, &rows);
+        assert!(own.len() > 100);
+        assert_eq!(own, edge_lists(&without, &given));
+    }
+}
