@@ -159,6 +159,10 @@ impinge_status impinge_scene_lend_end_positions(impinge_scene *scene, uint32_t b
  * INVALID: no such body, a matrix that is not as described, a moved position that is not finite. */
 impinge_status impinge_scene_set_transform(impinge_scene *scene, uint32_t body, impinge_array matrix);
 
+/* Sets where the vertices are at the end of the step by an affine matrix, which moves the positions given last, those that
+ * impinge_scene_set_transform moves too, and is rounded as there. Each vertex moves on a straight line to its end. INVALID: as there. */
+impinge_status impinge_scene_set_end_transform(impinge_scene *scene, uint32_t body, impinge_array matrix);
+
 /* Sets whom a body meets in queries that name no two bodies: two bodies meet if the category of each shares a bit with the mask of the
  * other. By default category is 1 and mask has all bits. INVALID: no such body. */
 impinge_status impinge_scene_set_filter(impinge_scene *scene, uint32_t body, uint64_t category, uint64_t mask);

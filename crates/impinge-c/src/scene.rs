@@ -387,18 +387,41 @@ pub unsafe extern "C" fn impinge_scene_set_transform(
     // SAFETY: see `impinge_scene_create`.
     unsafe {
         change(scene, |scene| {
-            let id = scene.id(body)?;
-            let rows = arrays::floats::<4>(&matrix, "matrix")?;
-            if rows.len() != 4 {
-                let given = rows.len();
-                return Err(Failure::invalid(format!(
-                    "matrix: {given} rows of 4 given, 4 needed"
-                )));
-            }
-            let rows = std::array::from_fn(|row| rows.wide(row));
+            let (id, rows) = (scene.id(body)?, affine(&matrix)?);
             Ok(scene.scene.set_transform(id, &rows)?)
         })
     }
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn impinge_scene_set_end_transform(
+    scene: *mut impinge_scene,
+    body: u32,
+    matrix: impinge_array,
+) -> Status {
+    // SAFETY: see `impinge_scene_create`.
+    unsafe {
+        change(scene, |scene| {
+            let (id, rows) = (scene.id(body)?, affine(&matrix)?);
+            Ok(scene.scene.set_end_transform(id, &rows)?)
+        })
+    }
+}
+
+/// A matrix of a caller.
+///
+/// # Safety
+/// The array is as described.
+unsafe fn affine(matrix: &impinge_array) -> Result<[[f64; 4]; 4], Failure> {
+    // SAFETY: the caller's promise.
+    let rows = unsafe { arrays::floats::<4>(matrix, "matrix") }?;
+    if rows.len() != 4 {
+        let given = rows.len();
+        return Err(Failure::invalid(format!(
+            "matrix: {given} rows of 4 given, 4 needed"
+        )));
+    }
+    Ok(std::array::from_fn(|row| rows.wide(row)))
 }
 
 #[unsafe(no_mangle)]

@@ -145,6 +145,18 @@ static void pairs_of_bodies(impinge_detector *detector) {
     matrix.column_stride = 4 * sizeof(double);
     GOOD(impinge_scene_set_transform(scene, 1, matrix));
     CHECK(hash_of(detector, scene, NULL) == all);
+    /* The same motion as the end of a step. */
+    {
+      impinge_array end;
+      impinge_impact first;
+      int32_t found = -1;
+      GOOD(impinge_scene_set_end_transform(scene, 1, packed(away, 4, IMPINGE_F64)));
+      GOOD(impinge_scene_end_positions(scene, 1, &end));
+      CHECK(end.rows == VERTICES && ((const double(*)[3])end.data)[5][0] == balls[1].positions[5][0] + 9);
+      GOOD(impinge_find_earliest(detector, scene, NULL, &first, &found));
+      CHECK(found == 1 && first.toi == 0 && first.at_start == 1);
+      REFUSED(impinge_scene_set_end_transform(scene, 1, packed(away, 3, IMPINGE_F64)), "3 rows");
+    }
   }
   GOOD(impinge_scene_remove(scene, 0));
   CHECK(impinge_scene_n_bodies(scene) == 1 && hash_of(detector, scene, NULL) == 0);

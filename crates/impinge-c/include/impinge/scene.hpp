@@ -402,6 +402,10 @@ public:
   template <class P> result<void> lend_end_positions(body of, std::shared_ptr<P> owner) { return lend(impinge_scene_lend_end_positions, of, std::move(owner)); }
   /// Four rows of four numbers.
   template <class M> result<void> set_transform(body of, const M &matrix) { return detail::give(impinge_scene_set_transform(raw(), of, detail::rows_of(matrix, 4))); }
+  /// The end of the step, in the same way.
+  template <class M> result<void> set_end_transform(body of, const M &matrix) {
+    return detail::give(impinge_scene_set_end_transform(raw(), of, detail::rows_of(matrix, 4)));
+  }
   result<void> set_filter(body of, std::uint64_t category, std::uint64_t mask) { return detail::give(impinge_scene_set_filter(raw(), of, category, mask)); }
   /// The group of each vertex, for `query::exclude_groups`.
   template <class G> result<void> set_groups(body of, const G &groups) { return detail::give(impinge_scene_set_groups(raw(), of, detail::rows_of(groups, 1))); }
