@@ -15,9 +15,10 @@ use crate::places::{Place, places};
 use crate::row::Counts;
 use crate::union_find::UnionFind;
 use crate::volume;
+use crate::walls;
 
 /// How a mesh is checked.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Options {
     /// Whether vertices at exactly the same position are welded first. On by default: many formats
     /// repeat vertices per face, and without welding every edge would be a border.
@@ -33,6 +34,10 @@ pub struct Options {
     pub places: usize,
     /// Whether places name all their elements, not only the first few.
     pub faces: bool,
+    /// If a length is given, faces at walls that are at most as thick are counted and marked: near
+    /// faces that turn their backs to each other, with matter between them. None by default. Meshes
+    /// of tetrahedra have none.
+    pub min_thickness: Option<f64>,
     /// CPU threads of the self-intersection search; 0 means one per core. No count depends on it.
     pub threads: usize,
 }
@@ -44,6 +49,7 @@ impl Default for Options {
             keep_seams: false,
             places: 3,
             faces: false,
+            min_thickness: None,
             threads: 0,
         }
     }
@@ -87,6 +93,15 @@ pub fn intersecting_with_seams(mesh: &Mesh, options: &Options) -> Result<Vec<boo
     Ok(marks.iter().map(is_marked).collect())
 }
 
+/// The settings of a detector that checks.
+fn settings(options: &Options) -> Settings {
+    Settings {
+        backend: Backend::Cpu,
+        threads: options.threads,
+        ..Settings::default()
+    }
+}
+
 fn check(mut mesh: Mesh, options: &Options) -> Result<(Checked, Vec<[u32; 2]>), Error> {
     let n_vertices = mesh.n_vertices();
     let welds = options.weld && !options.keep_seams;
@@ -124,6 +139,19 @@ fn check(mut mesh: Mesh, options: &Options) -> Result<(Checked, Vec<[u32; 2]>), 
                 &mut counts,
                 &mut marks,
             );
+            counts.min_thickness = options.min_thickness;
+            if let Some(most) = options.min_thickness {
+                let settings = settings(options);
+                let positions = &mesh.positions;
+                walls::find(
+                    positions,
+                    triangles,
+                    most,
+                    &settings,
+                    &mut counts,
+                    &mut marks,
+                )?;
+            }
         }
         Elements::Tetrahedra(tets) => {
             counts.n_tetrahedra = tets.len() as u64;
@@ -205,11 +233,7 @@ fn intersections(
         let positions = scene.body(body)?.positions().clone();
         scene.remesh(body, (elements, positions))?;
     }
-    let mut detector = Detector::new(Settings {
-        backend: Backend::Cpu,
-        threads: options.threads,
-        ..Settings::default()
-    })?;
+    let mut detector = Detector::new(settings(options))?;
     let pairs = detector.detect(&scene, &Query::self_of(body))?;
     let mut found: Vec<[u32; 2]> = pairs.self_of(body).collect();
     match &few {

@@ -27,6 +27,7 @@
 //! ```
 
 mod analysis;
+mod assembly;
 mod copies;
 mod facets;
 mod file;
@@ -37,11 +38,17 @@ mod places;
 mod pool;
 mod row;
 mod store;
+mod surface;
 mod union_find;
 mod volume;
+mod walls;
 mod worker;
 
 pub use analysis::{Checked, Options, check_mesh};
+pub use assembly::{
+    Assembly, AssemblyError, AssemblyOptions, PartKind, PartPair, Relation, check_assembly,
+    check_assembly_with,
+};
 pub use file::{check_file, check_file_marked};
 pub use fix::{FixError, FixOptions, Fixed, MOST_HOLE_EDGES, Repair, Repairs, fix_mesh};
 pub use limits::{Limits, apply_limits};

@@ -16,17 +16,20 @@ pub enum Problem {
     Degenerate,
     /// Has an edge of no other triangle. Not used for tetrahedra, which always have a border.
     Boundary,
+    /// Is a side of a wall that is thinner than [was asked](crate::Options::min_thickness).
+    Thin,
 }
 
 impl Problem {
     /// All problems, the most serious first.
-    pub const ALL: [Problem; 6] = [
+    pub const ALL: [Problem; 7] = [
         Problem::SelfIntersection,
         Problem::Duplicate,
         Problem::NonManifold,
         Problem::Inconsistent,
         Problem::Degenerate,
         Problem::Boundary,
+        Problem::Thin,
     ];
 
     fn bit(self) -> u8 {
@@ -42,6 +45,7 @@ impl Problem {
             Problem::Inconsistent => [188, 189, 34],
             Problem::Degenerate => [227, 119, 194],
             Problem::Boundary => [27, 95, 217],
+            Problem::Thin => [23, 190, 207],
         }
     }
 
@@ -54,6 +58,7 @@ impl Problem {
             Problem::Inconsistent => "olive",
             Problem::Degenerate => "pink",
             Problem::Boundary => "blue",
+            Problem::Thin => "cyan",
         }
     }
 
@@ -66,6 +71,7 @@ impl Problem {
             Problem::Inconsistent => "orientation",
             Problem::Degenerate => "degenerate",
             Problem::Boundary => "boundary",
+            Problem::Thin => "thin",
         }
     }
 
@@ -78,6 +84,7 @@ impl Problem {
             Problem::Inconsistent => "inconsistent orientation",
             Problem::Degenerate => "degenerate",
             Problem::Boundary => "open border",
+            Problem::Thin => "thin wall",
         }
     }
 }

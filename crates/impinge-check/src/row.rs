@@ -52,6 +52,13 @@ pub struct Counts {
     /// Euler's characteristic V - E + F of the triangles, without vertices of no triangle and
     /// triangles that name a vertex twice; `None` for tetrahedra.
     pub euler: Option<i64>,
+    /// Faces at walls that are at most as thick as [was asked](crate::Options::min_thickness).
+    /// `None` if nothing was asked, or if the mesh has no closed piece of one orientation.
+    pub thin_faces: Option<u64>,
+    /// The thickness of the thinnest of these walls, rounded down; `None` if there is none.
+    pub thinnest: Option<f64>,
+    /// The thickness that was asked for.
+    pub min_thickness: Option<f64>,
 }
 
 /// Why a mesh has no counts.
@@ -211,6 +218,11 @@ impl Row {
                 json!(of_kind(true, |c| c.inconsistent_facets)),
             );
         }
+        if let Some(asked) = counts.and_then(|c| c.min_thickness) {
+            put("min_thickness", json!(asked));
+            put("thin_faces", json!(counts.and_then(|c| c.thin_faces)));
+            put("thinnest", json!(counts.and_then(|c| c.thinnest)));
+        }
         let places = || self.places.iter().map(Place::to_json).collect();
         put(
             "places",
@@ -279,6 +291,9 @@ fn counts(value: &Value) -> Option<Counts> {
         is_watertight: value.get("watertight").and_then(Value::as_bool),
         volume: value.get("volume").and_then(Value::as_f64),
         euler: value.get("euler").and_then(Value::as_i64),
+        thin_faces: value.get("thin_faces").and_then(Value::as_u64),
+        thinnest: value.get("thinnest").and_then(Value::as_f64),
+        min_thickness: value.get("min_thickness").and_then(Value::as_f64),
     })
 }
 
@@ -311,6 +326,9 @@ mod tests {
                 is_watertight: (n_tetrahedra == 0).then_some(true),
                 volume: (n_triangles > 3).then_some(0.1),
                 euler: (n_tetrahedra == 0).then_some(-2),
+                thin_faces: (n_triangles > 3).then_some(17),
+                thinnest: (n_triangles > 3).then_some(0.2),
+                min_thickness: (n_triangles > 3).then_some(0.3),
             }),
             places: vec![Place {
                 problem: Problem::Boundary,

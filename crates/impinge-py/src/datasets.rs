@@ -113,10 +113,12 @@ pub fn _serve_check(
     weld: bool,
     threads: usize,
     memory: Option<u64>,
+    min_thickness: Option<f64>,
 ) -> PyResult<()> {
     let options = Options {
         weld,
         threads,
+        min_thickness,
         ..Options::default()
     };
     py.detach(|| {

@@ -73,8 +73,8 @@ pub fn close(
             weld: false,
             keep_seams: true,
             places: 0,
-            faces: false,
             threads: options.threads,
+            ..Options::default()
         };
         let intersects = intersecting_with_seams(&surface.mesh(), &checked)?;
         for (&hole, &intersects) in hole_of.iter().zip(&intersects[n_before..]) {

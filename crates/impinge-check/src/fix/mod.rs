@@ -14,13 +14,14 @@ mod orient;
 mod shells;
 mod split;
 
-use impinge::exact::Point;
-use impinge_io::{Elements, Mesh, Positions, weld};
+use impinge_io::{Elements, Mesh, weld};
 
 use crate::analysis::{self, Options, check_mesh};
 use crate::places::Place;
 use crate::row::Counts;
+use crate::surface::Surface;
 
+pub(crate) use faces::remove_degenerate;
 pub use holes::MOST_HOLE_EDGES;
 
 /// One kind of repair.
@@ -183,43 +184,6 @@ pub enum FixError {
     Refused(#[from] impinge::Error),
 }
 
-/// A surface that is being mended.
-struct Surface {
-    positions: Positions,
-    faces: Vec<[u32; 3]>,
-}
-
-impl Surface {
-    fn n_vertices(&self) -> usize {
-        self.positions.len()
-    }
-
-    fn at(&self, vertex: u32) -> Point {
-        analysis::at(&self.positions, vertex)
-    }
-
-    fn corners(&self, face: [u32; 3]) -> [Point; 3] {
-        face.map(|vertex| self.at(vertex))
-    }
-
-    /// Adds a vertex with the bits of another one.
-    fn copy_vertex(&mut self, vertex: u32) -> u32 {
-        let fresh = self.positions.len() as u32;
-        match &mut self.positions {
-            Positions::F32(held) => held.push(held[vertex as usize]),
-            Positions::F64(held) => held.push(held[vertex as usize]),
-        }
-        fresh
-    }
-
-    fn mesh(&self) -> Mesh {
-        Mesh {
-            positions: self.positions.clone(),
-            elements: Elements::Triangles(self.faces.clone()),
-        }
-    }
-}
-
 /// Mends a mesh of triangles. Its indices must be in range. No vertex is moved.
 ///
 /// ```
@@ -264,10 +228,7 @@ pub fn fix_mesh(mesh: Mesh, options: &FixOptions) -> Result<Fixed, FixError> {
     let Elements::Triangles(faces) = mesh.elements else {
         return Err(FixError::Tetrahedra(0));
     };
-    let mut surface = Surface {
-        positions: mesh.positions,
-        faces,
-    };
+    let mut surface = Surface::new(mesh.positions, faces);
     if does(Repair::Duplicates) {
         repairs.duplicate_faces = faces::remove_duplicates(&mut surface);
     }

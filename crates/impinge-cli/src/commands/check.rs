@@ -1,6 +1,7 @@
 //! `impinge check`: checks one mesh, or a million.
 
 mod args;
+mod assembly;
 mod html;
 mod report;
 mod shown;
@@ -24,10 +25,23 @@ use crate::watch::Watch;
 
 /// `impinge check`.
 pub fn check(args: &CheckArgs, cancel: &CancelToken) -> Result<(), Error> {
+    if args.assembly || args.clearance.is_some() {
+        return assembly::check(args, cancel);
+    }
+    assembly::refuse_alone(args)?;
     let paths = paths(args)?;
     if args.keep_seams && matches!(args.out, Some(args::Out::Folder(_))) {
         // Rows do not say by which of the two rules an unwelded mesh was checked.
         let text = "--keep-seams: its rows are printed, not kept in a folder: use --json";
+        return Err(Error::Usage(text.to_owned()));
+    }
+    if args.min_thickness.is_some() && matches!(args.out, Some(args::Out::Folder(_))) {
+        // A run that goes on in the folder could ask for another thickness.
+        let text = "--min-thickness: its rows are printed, not kept in a folder: use --json";
+        return Err(Error::Usage(text.to_owned()));
+    }
+    if args.fail_on.contains(&FailOn::Thin) && args.min_thickness.is_none() {
+        let text = "--fail-on thin: --min-thickness T says how thin";
         return Err(Error::Usage(text.to_owned()));
     }
     let mine: Vec<usize> = share(args, paths.len()).collect();
@@ -81,6 +95,7 @@ pub fn check_worker(args: &CheckWorkerArgs) -> Result<(), Error> {
         keep_seams: args.keep_seams,
         places: args.places,
         faces: args.faces,
+        min_thickness: args.min_thickness,
         threads: args.threads,
     };
     Ok(serve(stdin().lock(), stdout().lock(), &options)?)
@@ -155,6 +170,9 @@ fn run(
         command.arg("--places").arg(args.places.to_string());
         if args.faces {
             command.arg("--faces");
+        }
+        if let Some(thickness) = args.min_thickness {
+            command.arg("--min-thickness").arg(format!("{thickness:?}"));
         }
         if let Some(memory) = args.memory {
             command.arg("--memory").arg(memory.to_string());

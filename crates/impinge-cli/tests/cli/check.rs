@@ -592,3 +592,169 @@ fn decoded(text: &str) -> Vec<u8> {
     });
     bytes.collect()
 }
+
+#[test]
+fn thin_walls_are_found_where_asked() {
+    let folder = meshes();
+    let mut plate = String::new();
+    for ix in 0..8 {
+        let at = [4, 2, 1].map(|bit| u8::from(ix & bit != 0));
+        plate += &format!("v {} {} {}\n", at[0], at[1], 0.125 * f64::from(at[2]));
+    }
+    for [a, b, c] in [
+        [1, 2, 4],
+        [1, 4, 3],
+        [5, 7, 8],
+        [5, 8, 6],
+        [1, 5, 6],
+        [1, 6, 2],
+        [3, 4, 8],
+        [3, 8, 7],
+        [1, 3, 7],
+        [1, 7, 5],
+        [2, 6, 8],
+        [2, 8, 4],
+    ] {
+        plate += &format!("f {a} {b} {c}\n");
+    }
+    folder.text("plate.obj", &plate);
+    let schema = schema("check");
+    for (most, thin, thinnest) in [("0.2", 4, Some(0.125)), ("0.1", 0, None)] {
+        let args = ["check", "plate.obj", "--json", "--min-thickness", most];
+        let row = &rows(folder.run(args))[0];
+        assert_eq!(wrong(&schema, row, "row"), Vec::<String>::new());
+        assert_eq!(row["thin_faces"], thin);
+        assert_eq!(row["thinnest"].as_f64(), thinnest);
+    }
+    let args = [
+        "check",
+        "plate.obj",
+        "--min-thickness",
+        "0.2",
+        "--fail-on",
+        "thin",
+    ];
+    let run = folder.run(args);
+    assert_eq!(run.code, Some(3));
+    assert_eq!(
+        run.stderr,
+        "impinge: 1 of 1 meshes failed: 1 with thin walls\n"
+    );
+    assert!(
+        run.stdout
+            .contains("plate.obj: the thinnest wall is 0.125\n")
+    );
+    let run = folder.run(["check", "open.obj", "--min-thickness", "0.2"]);
+    assert!(
+        run.stdout.lines().nth(1).unwrap().ends_with('-'),
+        "{}",
+        run.stdout
+    );
+    assert_eq!(
+        folder.run(["check", "plate.obj", "--fail-on", "thin"]).code,
+        Some(2)
+    );
+    assert_eq!(
+        folder
+            .run(["check", "plate.obj", "--min-thickness", "-1"])
+            .code,
+        Some(2)
+    );
+}
+
+/// A cube of a size, as a group.
+fn cube(name: &str, low: [f64; 3], size: f64, first: usize) -> String {
+    let mut text = format!("g {name}\n");
+    for ix in 0..8 {
+        let at = [4, 2, 1].map(|bit| if ix & bit == 0 { 0.0 } else { size });
+        text += &format!(
+            "v {} {} {}\n",
+            low[0] + at[0],
+            low[1] + at[1],
+            low[2] + at[2]
+        );
+    }
+    for [a, b, c] in [
+        [1, 2, 4],
+        [1, 4, 3],
+        [5, 8, 6],
+        [5, 7, 8],
+        [1, 5, 6],
+        [1, 6, 2],
+        [3, 4, 8],
+        [3, 8, 7],
+        [1, 3, 7],
+        [1, 7, 5],
+        [2, 6, 8],
+        [2, 8, 4],
+    ] {
+        text += &format!("f {} {} {}\n", a + first, b + first, c + first);
+    }
+    text
+}
+
+#[test]
+fn parts_of_an_assembly_are_compared() {
+    let folder = meshes();
+    let parts = [
+        cube("block", [0.0; 3], 4.0, 0),
+        cube("beside", [4.0, 0.0, 0.0], 4.0, 8),
+        cube("within", [1.0; 3], 2.0, 16),
+        cube("through", [7.0, 1.0, 1.0], 2.0, 24),
+        cube("near", [9.25, 1.0, 1.0], 2.0, 32),
+    ];
+    folder.text("machine.obj", &parts.concat());
+    let schema = schema("assembly");
+    let ask = |more: &[&str]| {
+        let run = folder.run([&["check", "--assembly", "--json", "machine.obj"], more].concat());
+        let answer: Value = serde_json::from_str(&run.printed()).unwrap();
+        assert_eq!(wrong(&schema, &answer, "answer"), Vec::<String>::new());
+        answer
+    };
+    let answer = ask(&[]);
+    assert_eq!(
+        answer["matrix"],
+        serde_json::json!(["-tO..", "t-.X.", "I.-..", ".X.-.", "....-"])
+    );
+    assert_eq!(answer["parts"][2]["name"], "within");
+    let answer = ask(&["--clearance", "0.25", "--touching", "ignore"]);
+    assert_eq!(
+        answer["matrix"],
+        serde_json::json!(["-.O..", ".-.X.", "I.-..", ".X.-n", "...n-"])
+    );
+    assert_eq!(answer["pairs"][2]["distance"], 0.25);
+    assert_eq!(ask(&["--clearance", "0.24"])["matrix"][4], "....-");
+    let text = folder
+        .run([
+            "check",
+            "--assembly",
+            "machine.obj",
+            "--html",
+            "report.html",
+        ])
+        .printed();
+    let last = "5 parts: 2 pairs share space, 1 only touches";
+    assert_eq!(text.lines().last(), Some(last), "{text}");
+    assert!(
+        text.contains("within is inside block, 1 from the surface"),
+        "{text}"
+    );
+    let page = read(&folder, "report.html");
+    assert!(page.contains("through") && page.contains(last), "{page}");
+    // Several files are parts, too; --clearance alone says so.
+    folder.text("left.obj", &cube("one", [0.0; 3], 1.0, 0));
+    folder.text("right.obj", &cube("one", [1.0, 0.0, 0.0], 1.0, 0));
+    let both = ["check", "left.obj", "right.obj", "--clearance", "0.5"];
+    let run = folder.run(both);
+    assert!(run.printed().contains("left.obj and right.obj touch: "));
+    let code = |args: &[&str]| folder.run([&both, args].concat()).code;
+    assert_eq!(code(&["--fail-on", "interpenetrating,near"]), Some(0));
+    assert_eq!(code(&["--fail-on", "any"]), Some(3));
+    assert_eq!(code(&["--touching", "ignore", "--fail-on", "any"]), Some(0));
+    assert_eq!(code(&["--fail-on", "boundary"]), Some(2));
+    let code = |args: &[&str]| folder.run([&["check"], args].concat()).code;
+    assert_eq!(code(&["left.obj", "--touching", "ignore"]), Some(2));
+    assert_eq!(code(&["left.obj", "--fail-on", "near"]), Some(2));
+    assert_eq!(code(&["left.obj", "--assembly"]), Some(2));
+    assert_eq!(code(&["left.obj", "missing.ply", "--assembly"]), Some(1));
+}

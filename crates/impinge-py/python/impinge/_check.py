@@ -19,6 +19,7 @@ def check(
     paths: Iterable[_Path] | _Path,
     *,
     weld: bool = True,
+    min_thickness: float | None = None,
     jobs: int | None = None,
     timeout: float | None = None,
     memory: int | None = None,
@@ -37,6 +38,9 @@ def check(
     weld : bool
         Whether vertices at one position become one first. Self-intersections are counted among faces as they are
         then, neighbours included where they meet in more than what they share.
+    min_thickness : float, optional
+        Also counts the faces at walls that are at most this thick, in the unit of the files, as ``thin_faces``, and
+        names the thickness of the thinnest as ``thinnest``. By default walls are not looked at.
     jobs : int, optional
         How many child processes there are at a time; by default one per core.
     timeout : float, optional
@@ -76,12 +80,14 @@ def check(
         raise ValueError(f"jobs: {jobs} given, 1 or more allowed")
     if timeout is not None and not timeout > 0:
         raise ValueError(f"timeout: {timeout} given, more than 0 allowed")
+    if min_thickness is not None and not 0 < min_thickness < float("inf"):
+        raise ValueError(f"min_thickness: {min_thickness} given, a length above 0 allowed")
     if memory is not None and memory < 1:
         raise ValueError(f"memory: {memory} given, 1 or more allowed")
     if not sys.executable:
         raise RuntimeError("sys.executable names no Python that could run child processes")
     jobs = min(jobs, max(len(names), 1))
-    options = [str(int(weld)), str(max(n_cores // jobs, 1)), str(memory or 0)]
+    options = [str(int(weld)), str(max(n_cores // jobs, 1)), str(memory or 0), repr(float(min_thickness or 0))]
     command = [sys.executable, "-m", "impinge._check_worker", *options]
     rows: list[Any] = [None] * len(names)
     n_done = 0

@@ -11,7 +11,8 @@ def main() -> None:
     # Ctrl-C goes to all processes of a terminal: the parent decides.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     weld, threads, memory = (int(argument) for argument in sys.argv[1:4])
-    _impinge._serve_check(bool(weld), threads, memory or None)
+    min_thickness = float(sys.argv[4])
+    _impinge._serve_check(bool(weld), threads, memory or None, min_thickness or None)
 
 
 if __name__ == "__main__":

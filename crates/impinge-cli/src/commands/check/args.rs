@@ -17,6 +17,9 @@ Examples:
   impinge check part.ply --fail-on self-intersections,boundary       exit code 3 in CI
   impinge check parts/*.stl --format sarif > meshes.sarif            for code scanning; also junit, github
   impinge check parts/*.stl --html report.html                       a page with pictures of what is wrong
+  impinge check part.stl --min-thickness 0.8 --fail-on thin           walls at most 0.8 thick
+  impinge check --assembly robot.glb --touching ignore               which parts share space
+  impinge check a.stl b.stl --clearance 0.2 --fail-on any            … or are nearer than that
   impinge check part.ply --out wrong.glb                             what is wrong, in colours
   impinge check --list meshes.txt --out rows --timeout 60 --memory 4G
   impinge check --list meshes.txt --out rows --rank $SLURM_ARRAY_TASK_ID --world-size 64
@@ -66,6 +69,22 @@ pub struct CheckArgs {
     /// Name all faces of each place, not only the first few
     #[arg(long)]
     pub faces: bool,
+    /// Find walls that are at most this thick, in the unit of the file: near faces of a closed piece
+    /// that turn their backs to each other, with matter between them
+    #[arg(long, value_name = "T", value_parser = length)]
+    pub min_thickness: Option<f64>,
+    /// Compare the parts of an assembly instead: the nodes of a glTF or 3MF file, the groups of an OBJ
+    /// file, or whole files. Which share space, and which only touch, is decided exactly
+    #[arg(long, conflicts_with_all = ["list", "format", "out", "no_weld", "keep_seams", "min_thickness", "png"])]
+    pub assembly: bool,
+    /// With --assembly, which this implies: also find parts that are at most this far from each
+    /// other
+    #[arg(long, value_name = "D", value_parser = crate::values::distance,
+        conflicts_with_all = ["list", "format", "out", "no_weld", "keep_seams", "min_thickness", "png"])]
+    pub clearance: Option<f64>,
+    /// With --assembly: what becomes of parts that only touch
+    #[arg(long, value_enum, value_name = "RULE", default_value_t = Touching::Report)]
+    pub touching: Touching,
     /// Show no progress bar
     #[arg(long)]
     pub no_progress: bool,
@@ -132,6 +151,9 @@ pub struct CheckWorkerArgs {
     /// All faces of each place
     #[arg(long)]
     pub faces: bool,
+    /// The thickness of walls to be found
+    #[arg(long, value_name = "T")]
+    pub min_thickness: Option<f64>,
     /// Address space
     #[arg(long, value_name = "BYTES")]
     pub memory: Option<u64>,
@@ -174,6 +196,15 @@ pub enum Format {
     Github,
 }
 
+/// What becomes of parts that only touch.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Touching {
+    /// They are reported
+    Report,
+    /// They are left out, also where --clearance asks how near parts are
+    Ignore,
+}
+
 /// A problem that makes a run fail.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum FailOn {
@@ -189,12 +220,27 @@ pub enum FailOn {
     Boundary,
     /// Neighbours with opposite orientations
     Orientation,
+    /// Walls that --min-thickness finds
+    Thin,
     /// Coordinates that are NaN or infinite
     Nan,
+    /// Parts of an assembly that share space
+    Interpenetrating,
+    /// Parts of an assembly that touch
+    Touching,
+    /// Parts of an assembly within --clearance
+    Near,
     /// Meshes that could not be checked, whatever the reason
     Error,
     /// Any of these
     Any,
+}
+
+fn length(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value > 0.0 && value.is_finite() => Ok(value),
+        _ => Err("expected a length above 0".to_owned()),
+    }
 }
 
 fn seconds(text: &str) -> Result<f64, String> {

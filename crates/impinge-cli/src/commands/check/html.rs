@@ -19,7 +19,7 @@ use super::table::{line, summary};
 use crate::error::Error;
 use crate::text::grouped;
 
-const STYLE: &str = include_str!("report.css");
+pub const STYLE: &str = include_str!("report.css");
 const SCRIPT: &str = include_str!("report.js");
 
 /// Width and height of a picture.
@@ -38,6 +38,17 @@ const COLUMNS: [(&str, Option<FailOn>); 8] = [
     ("border", Some(FailOn::Boundary)),
     ("pieces", None),
 ];
+
+/// A page of its own that loads nothing.
+pub fn page(title: &str, summary: &str, style: &str, body: &str) -> String {
+    format!(
+        "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
+         <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'\">\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"><title>{title}: {}</title>\n\
+         <style>\n{style}</style></head>\n<body><h1>{title}</h1>\n{body}</body></html>\n",
+        escaped(summary)
+    )
+}
 
 /// Writes the report.
 pub fn write(path: &Path, rows: &[Row], args: &CheckArgs) -> Result<(), Error> {

@@ -36,7 +36,7 @@ pub fn print(rows: &[Row], args: &CheckArgs) -> Result<(), Error> {
 
 impl FailOn {
     /// The name of the option's value.
-    fn key(self) -> &'static str {
+    pub fn key(self) -> &'static str {
         match self {
             FailOn::SelfIntersections => "self-intersections",
             FailOn::Degenerate => "degenerate",
@@ -44,6 +44,10 @@ impl FailOn {
             FailOn::NonManifold => "non-manifold",
             FailOn::Boundary => "boundary",
             FailOn::Orientation => "orientation",
+            FailOn::Thin => "thin",
+            FailOn::Interpenetrating => "interpenetrating",
+            FailOn::Touching => "touching",
+            FailOn::Near => "near",
             FailOn::Nan => "nan",
             FailOn::Error => "error",
             FailOn::Any => "any",
@@ -131,7 +135,16 @@ fn said(kind: FailOn, counts: &Counts) -> String {
             "inconsistent orientation at {}",
             several(counts.inconsistent_facets, facet, facets)
         ),
-        FailOn::Nan | FailOn::Error | FailOn::Any => kind.words().to_owned(),
+        FailOn::Thin => {
+            let n = counts.thin_faces.unwrap_or(0);
+            several(n, "face at a thin wall", "faces at thin walls")
+        }
+        FailOn::Interpenetrating
+        | FailOn::Touching
+        | FailOn::Near
+        | FailOn::Nan
+        | FailOn::Error
+        | FailOn::Any => kind.words().to_owned(),
     }
 }
 
@@ -203,6 +216,7 @@ fn junit(rows: &[Row], args: &CheckArgs) -> String {
     let kinds: Vec<FailOn> = FailOn::EACH
         .into_iter()
         .filter(|&kind| kind.problem().is_some() && asks(kind))
+        .filter(|&kind| kind != FailOn::Thin || args.min_thickness.is_some())
         .collect();
     let (mut cases, mut n_cases, mut n_failures, mut n_errors) = (String::new(), 0, 0, 0);
     for row in rows {

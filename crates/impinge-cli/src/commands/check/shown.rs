@@ -26,6 +26,7 @@ pub fn options(args: &CheckArgs) -> Options {
         keep_seams: args.keep_seams,
         places: args.places,
         faces: args.faces,
+        min_thickness: args.min_thickness,
         threads: 0,
     }
 }

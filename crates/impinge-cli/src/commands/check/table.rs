@@ -16,13 +16,14 @@ const LISTED: usize = 50;
 
 impl FailOn {
     /// All problems except `any`, in the order of the summary.
-    pub const EACH: [FailOn; 8] = [
+    pub const EACH: [FailOn; 9] = [
         FailOn::SelfIntersections,
         FailOn::Degenerate,
         FailOn::Duplicates,
         FailOn::NonManifold,
         FailOn::Orientation,
         FailOn::Boundary,
+        FailOn::Thin,
         FailOn::Nan,
         FailOn::Error,
     ];
@@ -36,6 +37,10 @@ impl FailOn {
             FailOn::NonManifold => "non-manifold edges or vertices",
             FailOn::Boundary => "an open border",
             FailOn::Orientation => "inconsistent orientation",
+            FailOn::Thin => "thin walls",
+            FailOn::Interpenetrating => "parts that share space",
+            FailOn::Touching => "parts that touch",
+            FailOn::Near => "parts that are near",
             FailOn::Nan => "coordinates that are not finite",
             FailOn::Error => "an error",
             FailOn::Any => "any of these",
@@ -60,6 +65,9 @@ impl FailOn {
                 }
             }),
             FailOn::Orientation => counted(|c| c.inconsistent_facets),
+            FailOn::Thin => counted(|c| c.thin_faces.unwrap_or(0)),
+            // Of assemblies, which have no rows.
+            FailOn::Interpenetrating | FailOn::Touching | FailOn::Near => false,
             FailOn::Nan => {
                 matches!(&row.result, Err(failure) if failure.kind == ErrorKind::NotFinite)
             }
@@ -77,14 +85,21 @@ pub fn print(rows: &[Row]) -> Result<(), Error> {
         .iter()
         .filter(|row| few || FailOn::Any.is_in(row))
         .collect();
+    let asks = |row: &Row| matches!(&row.result, Ok(counts) if counts.min_thickness.is_some());
+    let asks_walls = rows.iter().any(asks);
     let lines = listed.iter().take(LISTED).filter_map(|row| {
-        let numbers = line(row.result.as_ref().ok()?);
+        let counts = row.result.as_ref().ok()?;
         let name = [printable(&row.path)].into_iter();
-        Some(name.chain(numbers.map(grouped)).collect())
+        let numbers = name.chain(line(counts).map(grouped));
+        let thin = asks_walls.then(|| match counts.thin_faces {
+            Some(n) => grouped(n),
+            None => "-".to_owned(),
+        });
+        Some(numbers.chain(thin).collect())
     });
     let lines: Vec<_> = lines.collect();
     if !lines.is_empty() {
-        let header = [
+        let mut header = vec![
             "mesh",
             "primitives",
             "self-int.",
@@ -95,6 +110,7 @@ pub fn print(rows: &[Row]) -> Result<(), Error> {
             "border",
             "pieces",
         ];
+        header.extend(asks_walls.then_some("thin"));
         writeln!(to, "{}\n", table(&header, &[0], lines))?;
     }
     for row in listed.iter().take(LISTED) {
@@ -111,6 +127,14 @@ pub fn print(rows: &[Row]) -> Result<(), Error> {
     if listed.len() > LISTED {
         let n = (listed.len() - LISTED) as u64;
         writeln!(to, "… and {} more: see --json or --out DIR", meshes(n))?;
+    }
+    for (name, counts) in rows
+        .iter()
+        .filter_map(|row| Some((&row.path, row.result.as_ref().ok()?)))
+    {
+        if let Some(thinnest) = counts.thinnest.filter(|_| few) {
+            writeln!(to, "{}: the thinnest wall is {thinnest}", printable(name))?;
+        }
     }
     writeln!(to, "{}", summary(rows))?;
     Ok(())

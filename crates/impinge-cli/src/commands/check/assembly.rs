@@ -1,0 +1,324 @@
+//! `impinge check --assembly`: which parts share space, touch or are near.
+
+use std::io::Write;
+use std::path::Path;
+
+use impinge::CancelToken;
+use impinge_check::{
+    Assembly, AssemblyError, AssemblyOptions, PartPair, Relation, check_assembly_with,
+};
+use impinge_io::{AtomicFile, Format, Mesh, ReadOptions, printable, read, read_bodies};
+use serde_json::{Value, json};
+
+use super::args::{CheckArgs, FailOn, Touching};
+use super::html::{STYLE, page};
+use super::report::escaped;
+use crate::error::Error;
+use crate::output::out;
+use crate::text::{counted, several};
+use crate::watch::{Watch, go_on};
+
+/// The most parts of which a matrix is printed, and the most pairs that are listed.
+const MOST_IN_MATRIX: usize = 24;
+const MOST_LISTED: usize = 50;
+
+/// The problems of assemblies.
+const OF_ASSEMBLIES: [FailOn; 3] = [FailOn::Interpenetrating, FailOn::Touching, FailOn::Near];
+
+/// Refuses options of an assembly where none is checked.
+pub fn refuse_alone(args: &CheckArgs) -> Result<(), Error> {
+    let named = args
+        .fail_on
+        .iter()
+        .find(|what| OF_ASSEMBLIES.contains(what));
+    let text = match (named, args.touching) {
+        (Some(what), _) => format!("--fail-on {}: only with --assembly", what.key()),
+        (None, Touching::Ignore) => "--touching: only with --assembly".to_owned(),
+        (None, Touching::Report) => return Ok(()),
+    };
+    Err(Error::Usage(text))
+}
+
+/// `impinge check --assembly`.
+pub fn check(args: &CheckArgs, cancel: &CancelToken) -> Result<(), Error> {
+    let of_meshes = |what: &&FailOn| !OF_ASSEMBLIES.contains(what) && **what != FailOn::Any;
+    if let Some(what) = args.fail_on.iter().find(of_meshes) {
+        let text = format!("--fail-on {}: not with --assembly", what.key());
+        return Err(Error::Usage(text));
+    }
+    if args.fail_on.contains(&FailOn::Near) && args.clearance.is_none() {
+        let text = "--fail-on near: --clearance D says how near";
+        return Err(Error::Usage(text.to_owned()));
+    }
+    let (mut names, mut meshes) = (Vec::new(), Vec::new());
+    for path in &args.meshes {
+        go_on(cancel)?;
+        for (name, mesh) in parts(path, args.meshes.len() > 1)? {
+            names.push(name);
+            meshes.push(mesh);
+        }
+    }
+    if meshes.len() < 2 {
+        let text = format!("--assembly: {}, where two are needed", counted(1, "part"));
+        return Err(Error::Usage(text));
+    }
+    let options = AssemblyOptions {
+        clearance: args.clearance,
+        ignores_touching: args.touching == Touching::Ignore,
+        threads: 0,
+    };
+    let watch = Watch::detection(!args.no_progress, "comparing");
+    let answer =
+        check_assembly_with(meshes, &options, watch.control(cancel)).map_err(
+            |error| match error {
+                AssemblyError::Part(number, source) => Error::Refused {
+                    what: names[number].clone(),
+                    source,
+                },
+                AssemblyError::Tetrahedra(number, n) => Error::Usage(format!(
+                    "{}: {}: parts are meshes of triangles",
+                    printable(&names[number]),
+                    several(n as u64, "tetrahedron", "tetrahedra")
+                )),
+                AssemblyError::Refused(source) => source.into(),
+                other => Error::Usage(other.to_string()),
+            },
+        )?;
+    drop(watch);
+    if let Some(file) = &args.html {
+        write_page(&file.0, args, &names, &answer)?;
+    }
+    if args.json {
+        writeln!(out(), "{}", object(args, &names, &answer))?;
+    } else {
+        write!(out(), "{}", text(args, &names, &answer))?;
+    }
+    fail(args, &answer)
+}
+
+/// The parts of a file, with their names.
+fn parts(path: &Path, are_several: bool) -> Result<Vec<(String, Mesh)>, Error> {
+    let options = ReadOptions::as_they_are();
+    let file = path.display().to_string();
+    let has_parts = matches!(
+        Format::from_path(path)?,
+        Format::Gltf | Format::ThreeMf | Format::Obj
+    );
+    if !has_parts {
+        return Ok(vec![(file, read(path, &options)?)]);
+    }
+    let (bodies, _) = read_bodies(path, &options)?;
+    let named = bodies.into_iter().map(|body| {
+        let name = match body.name {
+            None => file.clone(),
+            Some(part) if are_several => format!("{file}#{part}"),
+            Some(part) => part,
+        };
+        (name, body.mesh)
+    });
+    Ok(named.collect())
+}
+
+/// What a pair is, seen from one of its parts, as a letter of the matrix.
+fn letter(relation: Relation) -> char {
+    match relation {
+        Relation::Interpenetrating => 'X',
+        Relation::Inside => 'I',
+        Relation::Around => 'O',
+        Relation::Touching => 't',
+        Relation::Near => 'n',
+    }
+}
+
+/// A row of letters per part: `.` for parts that are apart, `-` for the part itself.
+fn matrix(answer: &Assembly) -> Vec<Vec<char>> {
+    let n = answer.parts.len();
+    let mut rows = vec![vec!['.'; n]; n];
+    for (ix, row) in rows.iter_mut().enumerate() {
+        row[ix] = '-';
+    }
+    for PartPair {
+        parts, relation, ..
+    } in &answer.pairs
+    {
+        let [a, b] = *parts;
+        rows[a][b] = letter(*relation);
+        rows[b][a] = letter(match relation {
+            Relation::Inside => Relation::Around,
+            Relation::Around => Relation::Inside,
+            same => *same,
+        });
+    }
+    rows
+}
+
+/// The object that `docs/assembly.schema.json` describes.
+fn object(args: &CheckArgs, names: &[String], answer: &Assembly) -> Value {
+    let parts = names
+        .iter()
+        .zip(&answer.parts)
+        .map(|(name, part)| json!({ "name": name, "faces": part.n_faces, "solid": part.is_solid }));
+    let pairs = answer.pairs.iter().map(|pair| {
+        json!({
+            "parts": pair.parts,
+            "relation": pair.relation.name(),
+            "pairs": pair.n_pairs,
+            "distance": pair.distance,
+            "point": pair.point,
+        })
+    });
+    let rows = matrix(answer).into_iter().map(String::from_iter);
+    json!({
+        "clearance": args.clearance,
+        "touching": if args.touching == Touching::Ignore { "ignore" } else { "report" },
+        "parts": parts.collect::<Vec<_>>(),
+        "pairs": pairs.collect::<Vec<_>>(),
+        "matrix": rows.collect::<Vec<_>>(),
+    })
+}
+
+/// What a pair is, in words.
+fn said(names: &[String], pair: &PartPair) -> String {
+    let [a, b] = pair.parts.map(|part| printable(&names[part]));
+    let [x, y, z] = pair.point;
+    let faces = several(pair.n_pairs, "pair of faces", "pairs of faces");
+    let at = format!("near ({x}, {y}, {z})");
+    let apart = pair.distance;
+    match pair.relation {
+        Relation::Interpenetrating => format!("{a} and {b} interpenetrate: {faces}, {at}"),
+        Relation::Inside => format!("{a} is inside {b}, {apart} from the surface, {at}"),
+        Relation::Around => format!("{b} is inside {a}, {apart} from the surface, {at}"),
+        Relation::Touching => format!("{a} and {b} touch: {faces}, {at}"),
+        Relation::Near => format!("{a} and {b} are {apart} apart, {at}"),
+    }
+}
+
+fn summary(args: &CheckArgs, answer: &Assembly) -> String {
+    let n = |is: fn(Relation) -> bool| {
+        let found = answer.pairs.iter().filter(|pair| is(pair.relation));
+        found.count() as u64
+    };
+    let mut said = vec![several(
+        n(Relation::shares_space),
+        "pair shares space",
+        "pairs share space",
+    )];
+    if args.touching == Touching::Report {
+        let n = n(|relation| relation == Relation::Touching);
+        said.push(several(n, "only touches", "only touch"));
+    }
+    if let Some(clearance) = args.clearance {
+        let n = n(|relation| relation == Relation::Near);
+        let words = several(n, "is at most", "are at most");
+        said.push(format!("{words} {clearance} apart"));
+    }
+    let n_parts = answer.parts.len() as u64;
+    let n_sheets = answer.parts.iter().filter(|part| !part.is_solid).count() as u64;
+    let sheets = match n_sheets {
+        0 => String::new(),
+        n => format!(", {} not closed", several(n, "is", "are")),
+    };
+    format!("{}{sheets}: {}", counted(n_parts, "part"), said.join(", "))
+}
+
+fn text(args: &CheckArgs, names: &[String], answer: &Assembly) -> String {
+    let mut text = String::new();
+    if names.len() <= MOST_IN_MATRIX {
+        let width = names
+            .iter()
+            .map(|name| printable(name).chars().count())
+            .max();
+        let width = width.unwrap_or(0);
+        text += &" ".repeat(width + 4);
+        for number in 0..names.len() {
+            text += &format!(" {number:>2}");
+        }
+        text += "\n";
+        for (number, (name, row)) in names.iter().zip(matrix(answer)).enumerate() {
+            let name = printable(name);
+            text += &format!("{number:>2}  {name:<width$}");
+            for letter in row {
+                text += &format!("  {letter}");
+            }
+            text += "\n";
+        }
+        text += "X share space, I inside, O around, t touch, n near\n\n";
+    }
+    for pair in answer.pairs.iter().take(MOST_LISTED) {
+        text += &format!("{}\n", said(names, pair));
+    }
+    if answer.pairs.len() > MOST_LISTED {
+        let n = (answer.pairs.len() - MOST_LISTED) as u64;
+        text += &format!("… and {} more: see --json\n", counted(n, "pair"));
+    }
+    text + &summary(args, answer) + "\n"
+}
+
+/// A page with the matrix and the list.
+fn write_page(
+    path: &Path,
+    args: &CheckArgs,
+    names: &[String],
+    answer: &Assembly,
+) -> Result<(), Error> {
+    let failed = |source| Error::Write {
+        path: path.to_owned(),
+        source,
+    };
+    let summary = summary(args, answer);
+    let mut body = format!("<p>{}</p>\n", escaped(&summary));
+    body += "<p class=\"legend\"><span>X share space</span> <span>I inside</span> <span>O around</span> <span>t touch</span> <span>n near</span></p>\n";
+    body += "<div class=\"scroll\"><table class=\"matrix\"><thead><tr><th scope=\"col\"></th>";
+    for (number, name) in names.iter().enumerate() {
+        body += &format!(
+            "<th scope=\"col\" title=\"{}\">{number}</th>",
+            escaped(name)
+        );
+    }
+    body += "</tr></thead>\n<tbody>\n";
+    for (number, (name, row)) in names.iter().zip(matrix(answer)).enumerate() {
+        body += &format!("<tr><th scope=\"row\">{number} {}</th>", escaped(name));
+        for letter in row {
+            let class = match letter {
+                'X' | 'I' | 'O' => " class=\"bad\"",
+                'n' => " class=\"near\"",
+                _ => "",
+            };
+            let letter = if letter == '.' { ' ' } else { letter };
+            body += &format!("<td{class}>{letter}</td>");
+        }
+        body += "</tr>\n";
+    }
+    body += "</tbody></table></div>\n<ul>\n";
+    for pair in &answer.pairs {
+        body += &format!("<li>{}</li>\n", escaped(&said(names, pair)));
+    }
+    body += "</ul>\n";
+    let mut to = AtomicFile::create(path)?;
+    let text = page("impinge check --assembly", &summary, STYLE, &body);
+    to.write_all(text.as_bytes()).map_err(failed)?;
+    Ok(to.finish()?)
+}
+
+/// Fails if there is a pair that `--fail-on` names.
+fn fail(args: &CheckArgs, answer: &Assembly) -> Result<(), Error> {
+    let kind = |relation: Relation| match relation {
+        Relation::Touching => FailOn::Touching,
+        Relation::Near => FailOn::Near,
+        _ => FailOn::Interpenetrating,
+    };
+    let asks = |kind: FailOn| args.fail_on.contains(&kind) || args.fail_on.contains(&FailOn::Any);
+    let found: Vec<String> = OF_ASSEMBLIES
+        .into_iter()
+        .filter(|&what| asks(what))
+        .filter_map(|what| {
+            let pairs = answer.pairs.iter();
+            let n = pairs.filter(|pair| kind(pair.relation) == what).count() as u64;
+            (n > 0).then(|| format!("{} of {}", counted(n, "pair"), what.words()))
+        })
+        .collect();
+    match found.is_empty() {
+        true => Ok(()),
+        false => Err(Error::CheckFailed(found.join(", "))),
+    }
+}
