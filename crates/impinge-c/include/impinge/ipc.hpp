@@ -23,13 +23,21 @@
 namespace impinge::ipc {
 
 /// What a `BroadPhase` finds. `boxes`: pairs whose inflated boxes overlap, as ipc-toolkit's own do. `exact`: only pairs that come within
-/// twice the inflation radius at some time of the step, at least within 1e-4; nothing that needs them asks for others.
+/// twice the inflation radius; in a step all that Tight Inclusion may stop for, which compares axis by axis: pairs that come within the
+/// square root of 3 times the sum of twice the radius and 1.1e-4. So step sizes of either narrow phase are those that `boxes` gives.
 enum class mode { boxes, exact };
 
 /// `conservative_rescaling` of ipc-toolkit's continuous detection.
 constexpr double default_rescaling = 0.8;
 /// The largest distance that a step leaves, as in ipc-toolkit.
 constexpr double default_clearance = 1e-4;
+
+/// Tight Inclusion keeps up to this beyond the distance that is asked for, give or take its tolerance.
+constexpr double kept_in_steps = 1.1e-4;
+/// It compares axis by axis, so it stops for pairs that are farther apart by the square root of 3, rounded up.
+constexpr double by_axes = 1.7320508075688774;
+/// By how much more than twice the radius pairs are looked for: whoever tests them rounds.
+constexpr double slack = 1 + 1e-9;
 
 namespace detail {
 
@@ -373,12 +381,11 @@ private:
     auto &on = bodies_->detector();
     // Edges and faces, and faces and faces, are near where others are: their boxes are all that is asked for.
     if (mode_ == mode::boxes || are_boxes_ || !is_of_step) return all(on.candidates(bodies_->scene(), inflation_, query::all().kinds({kind})));
-    const double reach = 2 * inflation_;
     if (is_still_) {
-      if (!near_) near_ = on.near(bodies_->scene(), reach, query::all().kinds({pair_kind::vf, pair_kind::ee, pair_kind::ev, pair_kind::vv}));
+      if (!near_) near_ = on.near(bodies_->scene(), 2 * inflation_ * slack, query::all().kinds({pair_kind::vf, pair_kind::ee, pair_kind::ev, pair_kind::vv}));
       return all(near_->of(kind));
     }
-    if (!impacts_) impacts_ = on.impacts(bodies_->scene(), query::all().separation(std::max(reach, default_clearance)));
+    if (!impacts_) impacts_ = on.impacts(bodies_->scene(), query::all().separation(by_axes * (2 * inflation_ + kept_in_steps)));
     all(impacts_->of(kind));
   }
 
