@@ -100,6 +100,21 @@ impl<'a> Loading<'a> {
         }
     }
 
+    /// With what becomes a body of its own, if the user says so.
+    pub fn with_bodies(self, bodies: Option<BodiesArg>) -> Self {
+        Loading { bodies, ..self }
+    }
+
+    /// Fails if parts of files were to be bodies, and no file has such parts.
+    pub fn check(&self, has_parts: bool) -> Result<(), Error> {
+        match self.bodies {
+            Some(wanted) if wanted != BodiesArg::File && !has_parts => {
+                Err(Error::Usage(wanted.misfit()))
+            }
+            _ => Ok(()),
+        }
+    }
+
     /// What the parts of a file of this format are called, if they are to be bodies. There are `n`
     /// files.
     fn parts(&self, format: Format, n: usize) -> Option<[&'static str; 2]> {
@@ -177,16 +192,12 @@ impl Bodies {
             let text = format!("none of {} meshes could be read", paths.len());
             return Err(Error::Unread(text));
         }
-        match loading.bodies {
-            Some(wanted) if wanted != BodiesArg::File && !has_parts => {
-                Err(Error::Usage(wanted.misfit()))
-            }
-            _ => Ok(bodies),
-        }
+        loading.check(has_parts)?;
+        Ok(bodies)
     }
 
     /// Adds one of `n_files` files; returns whether its parts are the bodies.
-    fn add_file(
+    pub fn add_file(
         &mut self,
         path: &Path,
         loading: Loading<'_>,

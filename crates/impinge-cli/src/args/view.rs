@@ -6,13 +6,14 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 
 use super::picture::UpArg;
-use super::{MethodArg, SharedVertexArg};
+use super::{BodiesArg, MethodArg, SharedVertexArg};
 use crate::values::{PngFile, azimuth, body_matrix, elevation, lambda, point, size};
 
 pub const VIEW_EXAMPLES: &str = "\
 Examples:
   impinge view                                  the built-in scene
   impinge view a.obj b.ply                      two meshes: drag one of them
+  impinge view scene.glb --bodies nodes         each node of a file is a body
   impinge view cloth.ply run.pc2                a sequence
   impinge view cloth.ply run.pc2 body.ply       with a mesh that does not move
   impinge view run/cloth_*.obj                  three or more numbered meshes: a sequence
@@ -31,9 +32,10 @@ pub struct ViewArgs {
     /// Read the files after the first one as its frames, whatever their names
     #[arg(long, conflicts_with = "bodies")]
     pub sequence: bool,
-    /// Read each file as a body, whatever their names
-    #[arg(long)]
-    pub bodies: bool,
+    /// What becomes a body of its own, whatever the names of files [default: file, of numbered
+    /// files the frames of one]
+    #[arg(long, value_enum, value_name = "WHAT")]
+    pub bodies: Option<BodiesArg>,
     /// Begin with self-collision; implied for one mesh
     #[arg(long = "self")]
     pub within: bool,

@@ -4,6 +4,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
+use clap::ValueEnum;
 use impinge::{BodyId, CancelToken, Pairs, Positions};
 use impinge_io::{ReadOptions, Weld, printable};
 use impinge_render::{Camera, Colors, Focus, Projection};
@@ -38,7 +39,8 @@ pub fn view(args: &ViewArgs, cancel: &CancelToken) -> Result<(), Error> {
         let args = ViewArgs {
             meshes: paths.to_vec(),
             sequence: false,
-            bodies: false,
+            // What the files are is told by their names.
+            bodies: None,
             ..again.clone()
         };
         let (content, _) = content(&args, &token).map_err(|error| error.line())?;
@@ -126,14 +128,13 @@ fn options(args: &ViewArgs) -> Options {
 fn command(args: &ViewArgs) -> Command {
     let mut words = vec!["impinge".to_owned(), "view".to_owned()];
     words.extend(args.meshes.iter().map(|path| path.display().to_string()));
-    for (is_given, option) in [
-        (args.sequence, "--sequence"),
-        (args.bodies, "--bodies"),
-        (args.no_weld, "--no-weld"),
-    ] {
+    for (is_given, option) in [(args.sequence, "--sequence"), (args.no_weld, "--no-weld")] {
         if is_given {
             words.push(option.to_owned());
         }
+    }
+    if let Some(bodies) = args.bodies.and_then(|bodies| bodies.to_possible_value()) {
+        words.extend(["--bodies".to_owned(), bodies.get_name().to_owned()]);
     }
     if args.meshes.is_empty() {
         words.extend(["--triangles".to_owned(), args.triangles.to_string()]);
@@ -148,38 +149,41 @@ fn content(args: &ViewArgs, cancel: &CancelToken) -> Result<(Content, Vec<Vertic
         let vertices = vec![Vertices::default(); content.bodies.len()];
         return Ok((content, vertices));
     }
-    let files = Files::of(&args.meshes, args.sequence, args.bodies)?;
+    let files = Files::of(&args.meshes, args.sequence, args.bodies.is_some())?;
     // Self-collision may be asked for in the window.
-    let loading =
-        Loading::as_they_are(true, cancel).asked(args.no_weld.then_some(false), true, None);
+    let loading = Loading::as_they_are(true, cancel)
+        .asked(args.no_weld.then_some(false), true, None)
+        .with_bodies(args.bodies);
     let mut bodies = Bodies::default();
     // One bad file does not hide the others.
     let mut missing = Vec::new();
     let mut frames: Option<Arc<dyn impinge_view::Frames>> = None;
-    let mesh = bodies.add(files.mesh, loading);
-    match (files.frames, mesh) {
-        (FrameFiles::None, Ok(_)) => {}
-        (FrameFiles::None, Err(error)) => missing.push(error.line()),
-        (FrameFiles::Sequence(path), mesh) => {
-            let (body, weld) = mesh?;
+    let mut still = files.others.to_vec();
+    match files.frames {
+        FrameFiles::None => still.insert(0, files.mesh.to_owned()),
+        FrameFiles::Sequence(path) => {
+            let (body, weld) = bodies.add(files.mesh, loading)?;
             let source = Source::Sequence(Frames::open(path, weld)?);
             frames = Some(Arc::new(Moving { body, source }));
         }
-        (FrameFiles::Each(paths), mesh) => {
-            let (body, weld) = mesh?;
+        FrameFiles::Each(paths) => {
+            let (body, weld) = bodies.add(files.mesh, loading)?;
             let source = Source::Files(paths.to_vec(), weld);
             frames = Some(Arc::new(Moving { body, source }));
         }
     }
-    for other in files.others {
-        if let Err(error) = bodies.add(other, loading) {
-            missing.push(error.line());
+    let mut has_parts = false;
+    for file in &still {
+        match bodies.add_file(file, loading, args.meshes.len()) {
+            Ok(is_cut) => has_parts |= is_cut,
+            Err(error) => missing.push(error.line()),
         }
     }
     go_on(cancel)?;
     if bodies.ids.is_empty() {
         return Err(Error::View(missing.join("\n")));
     }
+    loading.check(has_parts)?;
     let shown = bodies
         .ids
         .iter()
@@ -300,6 +304,33 @@ mod tests {
         let n_welded = vertices.iter().map(|of| of.n_welded).sum();
         let hash = format!("{:016x}", pairs.hash());
         (json!({ "pairs": pairs.len(), "hash": hash }), n_welded)
+    }
+
+    #[test]
+    fn parts_of_a_file_are_bodies_if_asked_for() {
+        let doors = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doors");
+        let content_of = |words: &[&str]| {
+            let args = Line::try_parse_from(["view"].iter().chain(words))
+                .unwrap()
+                .args;
+            let content = content(&args, &CancelToken::new());
+            content.map(|(content, _)| (content, command(&args).0.join(" ")))
+        };
+        let file = format!("{doors}/nodes.gltf");
+        let (content, command) = content_of(&[&file, "--bodies", "nodes"]).unwrap();
+        let names: Vec<_> = content
+            .bodies
+            .iter()
+            .map(|body| body.name.as_str())
+            .collect();
+        assert_eq!(names, ["crate", "lid", "far"]);
+        assert!(command.ends_with("nodes.gltf --bodies nodes"), "{command}");
+        assert_eq!(content_of(&[&file]).unwrap().0.bodies.len(), 1);
+        let refused = content_of(&[&file, "--bodies", "groups"])
+            .err()
+            .unwrap()
+            .line();
+        assert_eq!(refused, "--bodies groups: only OBJ files have groups");
     }
 
     /// As every other door: `tests/cli/doors.rs`.
