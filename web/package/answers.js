@@ -19,7 +19,7 @@ export function statsOf([[backend, method, ...names], [totalMs, ...numbers]]) {
   return stats;
 }
 
-const hex = (hash) => hash.toString(16).padStart(16, "0");
+export const hex = (hash) => hash.toString(16).padStart(16, "0");
 
 function element(rows, ix) {
   const at = 4 * ix;
@@ -234,7 +234,7 @@ export class Advance {
 }
 
 // The sections of a list, each after its length.
-function* sections(words) {
+export function* sections(words) {
   for (let at = 0; at < words.length; ) {
     const end = at + 1 + words[at];
     yield words.subarray(at + 1, end);

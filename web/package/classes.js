@@ -1,7 +1,8 @@
 // The classes that both builds have, made of the functions of either module.
 
 import { Advance, Candidates, Contacts, Impacts, NearPairs, Pairs, Penetration, earliest, nearest, numberOf, statsOf } from "./answers.js";
-import { packed, plain } from "./query.js";
+import { Closest, Hits, Neighbours, SafeDistances, Truncation, places } from "./probe.js";
+import { packed, plain, withPoints } from "./query.js";
 import { body, call, isSingle, mustBeNone, number, refuse, wide, word } from "./shared.js";
 
 const BODY_KINDS = ["points", "edges", "triangles", "tetrahedra"];
@@ -52,7 +53,41 @@ export const QUESTIONS = {
     const words = before([numberOf(contacts), body(a), body(b)], rows);
     return { question: 11, ...plain(words, control), shape: (lists, stats) => new Penetration(lists, stats) };
   },
+  contains: (which, points, control) => ({
+    ...{ question: 12, ...withPoints(plain(Uint32Array.of(body(which)), control), [rowsOf("points", points)]) },
+    shape: places,
+  }),
+  closest: (points, query) => ({
+    ...{ question: 13, ...withPoints(packed(query, query?.most ?? Infinity), [rowsOf("points", points)]) },
+    shape: (lists, stats) => new Closest(lists, stats),
+  }),
+  cast(origins, directions, query) {
+    const rays = [rowsOf("origins", origins), rowsOf("directions", directions)];
+    if (origins.length !== directions.length) {
+      refuse(`directions: ${directions.length / 3} directions given, as many as the ${origins.length / 3} origins allowed`);
+    }
+    const shape = (lists, stats) => new Hits(lists, stats);
+    return { question: 14, ...withPoints(packed(query, query?.most ?? Infinity), rays), shape };
+  },
+  safeDistances(most, query) {
+    const hasPoints = Boolean(query?.closestPoints);
+    const has = { hasPoints, hasDistances: hasPoints || Boolean(query?.distances) };
+    return { question: 15, ...packed(query, number("most", most)), shape: (lists, stats) => new SafeDistances(lists, stats, has) };
+  },
+  truncate: (query) => ({ question: 16, ...packed(query), shape: (lists, stats) => new Truncation(lists, stats) }),
+  neighbours: (distance, query) => ({
+    ...{ question: 17, ...packed(query, number("distance", distance)) },
+    shape: (lists, stats) => new Neighbours(lists, stats),
+  }),
+  nearest: (query) => ({ question: 18, ...packed({ which: "between", ...query }), shape: nearest }),
 };
+
+// x, y, z of points.
+function rowsOf(name, given) {
+  isSingle(given);
+  if (given.length % 3 === 0) return given;
+  return refuse(`${name}: ${given.length} numbers given, not a multiple of 3`);
+}
 
 // The settings of a detector, as the module takes them.
 export function settings(given) {

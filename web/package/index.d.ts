@@ -98,8 +98,11 @@ export interface Query extends Control {
    * all (`"skip"`). Vertices, edges and faces of `near`, `candidates` and steps that share a vertex never count.
    */
   sharedVertex?: "resolve" | "skip";
-  /** Bodies whose pairs are left out; with the same body twice, its self-collision. */
-  exclude?: readonly (readonly [Body, Body])[];
+  /**
+   * Pairs that are left out: those of two bodies; with the same body twice, its self-collision; or with `{ rings: n }` the pairs of one
+   * body that are near in its surface: some vertex of one element is at most n edges, 0 to 16, away from some vertex of the other.
+   */
+  exclude?: readonly Exclusion[];
   /** Only pairs of the half-open box from a low to a high corner: that of the larger of the lower corners of both elements' boxes. */
   ownedBy?: readonly [Vec3, Vec3];
   /**
@@ -123,7 +126,16 @@ export interface Query extends Control {
   distances?: boolean;
   /** `near`: with distances and nearest points. */
   closestPoints?: boolean;
+  /** `safeDistances`: bodies that do not move, and leave the whole distance to what is near them. */
+  fixed?: readonly Body[];
+  /** `cast`: the first hit of each ray (the default), whether there is any, or all. */
+  hits?: "first" | "any" | "all";
+  /** `closest`: a length, nothing farther away is found. `cast`: the largest t, 1 for segments. Infinity by default. */
+  most?: number;
 }
+
+/** What a query leaves out. */
+export type Exclusion = readonly [Body, Body] | { readonly rings: number };
 
 /**
  * Bodies, and where their vertices are. Topology is given once, positions each frame. Arrays are copied.
@@ -354,6 +366,118 @@ export interface Nearest {
   points: [[number, number, number], [number, number, number]];
 }
 
+/** The element that is nearest to a point. */
+export interface ClosestElement {
+  body: Body;
+  /** Decided exactly; of several at the same distance the lowest by body and number. */
+  element: number;
+  /** The feature that has the nearest point: 0 to 3 for a vertex of the element, 8 to 10 for an edge, 16 for the face. */
+  feature: number;
+  /** A length, rounded down: never above the true one, and 0 if they touch. */
+  distance: number;
+  /** Rounded to nearest. */
+  point: [number, number, number];
+}
+
+/** What is nearest to each point: an entry per point, `null` where nothing is near enough. */
+export interface Closest extends Answer, Iterable<ClosestElement | null> {
+  readonly length: number;
+  /** `[body, element]` per point, 2^32 - 1 for none. */
+  readonly rows: Uint32Array;
+  /** 255 for none. */
+  readonly features: Uint8Array;
+  /** Infinity for none. */
+  readonly distances: Float64Array;
+  /** x, y, z per point, NaN for none. */
+  readonly points: Float64Array;
+  /** One entry; counted from the end if `ix` is negative. */
+  at(ix: number): ClosestElement | null;
+}
+
+/** Where a ray meets an element. */
+export interface RayHit {
+  body: Body;
+  element: number;
+  /** As in `ClosestElement`: the feature that has the point of entry. */
+  feature: number;
+  /** Of the entry, in units of the direction, rounded down. */
+  t: number;
+  /** Where the ray leaves the element: more than `t` where it lies in its plane. */
+  tEnd: number;
+  /** Of the point of entry, rounded. */
+  barycentrics: [number, number, number];
+}
+
+/** What rays hit, one ray after the other. */
+export interface Hits extends Answer {
+  /** The number of rays. */
+  readonly length: number;
+  /** 1 per ray that hits anything, else 0. */
+  readonly hit: Uint8Array;
+  /** Where the hits of each ray start in the columns below, and one past the last. */
+  readonly offsets: Uint32Array;
+  /** `[body, element]` per hit. */
+  readonly rows: Uint32Array;
+  readonly features: Uint8Array;
+  readonly t: Float64Array;
+  readonly tEnd: Float64Array;
+  /** Three per hit. */
+  readonly barycentrics: Float64Array;
+  /** What a ray hits, by t: the first, or all; nothing with `hits: "any"`. */
+  of(ray: number): RayHit[];
+}
+
+/** How far each vertex may move, on any path, so that nothing touches. */
+export interface SafeDistances {
+  /** A length per vertex, rounded down, in the precision of the body's positions. */
+  of(body: Body): Float32Array | Float64Array;
+  /** The pairs at distance 0, whose vertices may not move at all. */
+  readonly touching: NearPairs;
+  readonly stats: Stats;
+}
+
+/** How far each vertex can go in a step. */
+export interface Truncation {
+  /** How many vertices were stopped before the end of their way. */
+  readonly nCut: number;
+  /** How many pairs touch at the start, or are nearer than they are to keep: their vertices stay. */
+  readonly nTouching: number;
+  /** How often pairs were looked at again. */
+  readonly rounds: number;
+  /** As in `Impacts`. */
+  readonly startIntersects: boolean | null;
+  readonly stats: Stats;
+  /** The positions of a body afterwards; `null` for one that does not move. */
+  positions(body: Body): Positions | null;
+  /** Moves the bodies of the scene to these positions. */
+  apply(scene: Scene): void;
+}
+
+/** Lists: the neighbours of element i are those from `offsets[i]` to `offsets[i + 1]` of `indices`, ascending. */
+export interface Csr {
+  readonly offsets: Uint32Array;
+  readonly indices: Uint32Array;
+  /** How far away each is, rounded down. */
+  readonly distances: Float64Array;
+}
+
+/** Which elements are near each element. The vertices of all bodies are numbered one after another, and so are edges and faces. */
+export interface Neighbours {
+  /** How many pairs are near; each is in two lists. */
+  readonly length: number;
+  readonly stats: Stats;
+  /** The number of the first vertex, edge and face of a body in the lists. */
+  first(body: Body): { vertex: number; edge: number; face: number };
+  /** The lists of the elements that a kind names first: of `"vf"` the faces near each vertex. */
+  of(kind: PairKind): Csr;
+  /** Of those that it names second. */
+  reversed(kind: PairKind): Csr;
+  /** The faces near each vertex, the vertices near each face, the edges near each edge. */
+  readonly vf: Csr;
+  readonly fv: Csr;
+  readonly ee: Csr;
+}
+
 /** How two triangles meet. */
 export interface Contact {
   bodyA: Body;
@@ -454,6 +578,23 @@ export declare class Detector {
   candidates(scene: Scene, inflation: number, query?: Query): Candidates;
   /** Pairs of elements at most a length apart, thickness besides; decided exactly. */
   near(scene: Scene, distance: number, query?: Query): NearPairs;
+  /**
+   * Where points lie: 1 inside a body, 0 on its surface, -1 outside, decided exactly. Triangles must be a closed surface, so weld the
+   * seams of a geometry first; the error names an edge of one that is not.
+   */
+  contains(scene: Scene, body: Body, points: Positions, control?: Control): Int8Array;
+  /** The element nearest to each point: of all bodies, or of one with `of`. */
+  closest(scene: Scene, points: Positions, query?: Query): Closest;
+  /** What rays hit: the points origin + t direction, for t from 0 to `most`. Grazing an edge or a vertex is a hit. */
+  cast(scene: Scene, origins: Positions, directions: Positions, query?: Query): Hits;
+  /** How far each vertex may move, at most `most`, so that nothing touches. */
+  safeDistances(scene: Scene, most: number, query?: Query): SafeDistances;
+  /** How far each vertex can go in a step: each stops for itself, where `advance` stops all of them at one fraction. */
+  truncate(scene: Scene, query?: Query): Truncation;
+  /** The pairs of `near` as lists per element. */
+  neighbours(scene: Scene, distance: number, query?: Query): Neighbours;
+  /** The two bodies that are nearest to each other, and their nearest pair; `null` if there are no two. */
+  nearest(scene: Scene, query?: Query): Nearest | null;
   /** The smallest distance of two bodies; `null` if one of them has no elements. Tetrahedra are solid. */
   distance(scene: Scene, a: Body, b: Body, control?: Control): Nearest | null;
   /** Where the triangles of pairs meet. The scene must not have changed since they were found. */

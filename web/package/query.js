@@ -6,7 +6,7 @@ export const KINDS = ["vf", "ee", "ev", "vv", "ef", "ff"];
 
 const FIELDS = [
   ...["which", "between", "selfOf", "of", "kinds", "sharedVertex", "exclude", "ownedBy", "start", "separation", "clearance"],
-  ...["clearanceShare", "precision", "distances", "closestPoints", "signal", "progress"],
+  ...["clearanceShare", "precision", "distances", "closestPoints", "fixed", "hits", "most", "signal", "progress"],
 ];
 
 // The words and numbers of a query, and what watches the question. `length` is the question's own: a distance, an inflation.
@@ -27,6 +27,9 @@ export function packed(query, length = 0) {
     precision = "f32",
     distances = false,
     closestPoints = false,
+    fixed = [],
+    hits = "first",
+    most = Infinity,
     signal,
     progress,
     ...others
@@ -37,15 +40,37 @@ export function packed(query, length = 0) {
     word("start", start, ["report", "skip", "verify"]),
     word("precision", precision, ["f32", "f64"]),
   ];
-  const flags = (distances ? 1 : 0) | (closestPoints ? 2 : 0) | (ownedBy === undefined ? 0 : 4);
-  const words = [...bodies({ which, between, selfOf, of }), ...rules, bits(kinds), flags];
-  for (const pair of exclude) words.push(...two("exclude", pair));
+  const rings = Array.from(exclude).filter((of) => of?.rings !== undefined).map(ringsOf);
+  const places = [word("hits", hits, ["first", "any", "all"]) << 3, rings.length === 0 ? 0 : (Math.max(...rings) + 1) << 5, fixed.length << 10];
+  const flags = (distances ? 1 : 0) | (closestPoints ? 2 : 0) | (ownedBy === undefined ? 0 : 4) | places.reduce((all, of) => all | of);
+  const words = [...bodies({ which, between, selfOf, of }), ...rules, bits(kinds), flags, ...Array.from(fixed, body)];
+  for (const of of exclude) if (of?.rings === undefined) words.push(...two("exclude", of));
+  number("most", most);
   const lengths = Object.entries({ separation, clearance, clearanceShare }).map((entry) => number(...entry));
   return {
     words: Uint32Array.from(words),
     numbers: Float64Array.from([...lengths, ...cell(ownedBy), length]),
     watch: new Watch(signal, progress),
   };
+}
+
+// How many rings around each element are left out.
+function ringsOf({ rings, ...others }) {
+  mustBeNone("exclude", others, ["rings"]);
+  if (Number.isInteger(rings) && rings >= 0 && rings <= 16) return rings;
+  return refuse(`rings: ${String(rings)} given, 0 to 16 allowed`);
+}
+
+// The numbers of a question, followed by those of points.
+export function withPoints({ numbers, ...asked }, points) {
+  const all = new Float64Array(numbers.length + points.reduce((n, { length }) => n + length, 0));
+  all.set(numbers);
+  let at = numbers.length;
+  for (const of of points) {
+    all.set(of, at);
+    at += of.length;
+  }
+  return { ...asked, numbers: all };
 }
 
 // A question without a query: words alone.

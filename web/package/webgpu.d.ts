@@ -1,4 +1,4 @@
-import type { Advance, Body, Candidates, Contacts, Control, Impact, Impacts, Mesh, Module, NearPairs, Nearest, Pairs, Penetration, Positions, Query, Scene, Settings, Stats } from "./index.js";
+import type { Advance, Body, Candidates, Closest, Contacts, Control, Hits, Impact, Impacts, Mesh, Module, NearPairs, Nearest, Neighbours, Pairs, Penetration, Positions, Query, SafeDistances, Scene, Settings, Stats, Truncation } from "./index.js";
 
 /** Loads the WebAssembly module, which is another one than that of `impinge`. Later calls wait for the first. */
 export default function init(module?: Module | Promise<Module>): Promise<void>;
@@ -26,6 +26,13 @@ export declare class Detector {
   advance(scene: Scene, query?: Query): Promise<Advance>;
   candidates(scene: Scene, inflation: number, query?: Query): Promise<Candidates>;
   near(scene: Scene, distance: number, query?: Query): Promise<NearPairs>;
+  contains(scene: Scene, body: Body, points: Positions, control?: Control): Promise<Int8Array>;
+  closest(scene: Scene, points: Positions, query?: Query): Promise<Closest>;
+  cast(scene: Scene, origins: Positions, directions: Positions, query?: Query): Promise<Hits>;
+  safeDistances(scene: Scene, most: number, query?: Query): Promise<SafeDistances>;
+  truncate(scene: Scene, query?: Query): Promise<Truncation>;
+  neighbours(scene: Scene, distance: number, query?: Query): Promise<Neighbours>;
+  nearest(scene: Scene, query?: Query): Promise<Nearest | null>;
   distance(scene: Scene, a: Body, b: Body, control?: Control): Promise<Nearest | null>;
   contacts(scene: Scene, pairs: Pairs, control?: Control): Promise<Contacts>;
   penetration(scene: Scene, contacts: Contacts, a: Body, b: Body, control?: Control): Promise<Penetration>;

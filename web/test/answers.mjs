@@ -197,7 +197,7 @@ export const REFUSALS = {
   start: 'invalid: start: "never" given, "report", "skip" or "verify" allowed',
   field:
     'invalid: query: "seperation" given, which, between, selfOf, of, kinds, sharedVertex, exclude, ownedBy, start, separation, clearance, ' +
-    "clearanceShare, precision, distances, closestPoints, signal or progress allowed",
+    "clearanceShare, precision, distances, closestPoints, fixed, hits, most, signal or progress allowed",
   which: 'invalid: which: "none" given, "all", "between" or "self" allowed',
   both: 'invalid: query: "which" and "of" given, one of them allowed',
   separation: "invalid: separation: NaN given, a finite number that is not below 0 allowed",
@@ -345,6 +345,54 @@ export async function others(module) {
   const penetration = await detector.penetration(scene, contacts, tip, low);
   const [deep] = penetration.regions;
   const none = await detector.contacts(scene, await detector.detect(scene, { which: "self" }));
+  // Points and rays; the scene is that of the two solids.
+  const points = new Float32Array([0.125, 0.125, 0.125, 0, 0, 0.5, 3, 0, 0, 0.25, 0.25, 1]);
+  const places = [...(await detector.contains(scene, low, points))];
+  const closest = await detector.closest(scene, points, { of: low, most: 1 });
+  const far = await detector.closest(scene, Float64Array.from(points));
+  const origins = new Float64Array([0.125, 0.25, 4, 5, 5, 5]);
+  const down = new Float64Array([0, 0, -1, 0, 0, -1]);
+  const hits = await detector.cast(scene, origins, down, { of: low });
+  const all = await detector.cast(scene, origins, down, { hits: "all" });
+  const any = await detector.cast(scene, origins, down, { hits: "any", most: 1 });
+  const probes = {
+    places,
+    closest: [closest.length, closest.at(1), closest.at(2), [...closest.features], far.at(-2).body, far.length],
+    hits: [hits.length, [...hits.hit], hits.of(0), hits.of(1), hits.hash.length],
+    all: [all.of(0).map(({ body, t }) => [body, t > 3]), [...all.offsets], all.t.length, [...any.hit], any.of(0)],
+    ragged: await refusal(() => detector.closest(scene, points.subarray(1))),
+    list: await refusal(() => detector.contains(scene, low, [0, 0, 0])),
+    rays: await refusal(() => detector.cast(scene, origins, down.subarray(3))),
+    hit: await refusal(() => detector.cast(scene, origins, down, { hits: "last" })),
+    most: await refusal(() => detector.closest(scene, points, { most: -1 })),
+    open: await refusal(() => detector.contains(scene, 7, points)),
+  };
+  // Two triangles, 1 apart, of which the upper one wants to go through the lower one.
+  const step = new Scene();
+  const [lower, upper] = [0, 1].map((z) => step.addTriangles(index, new (z ? Float64Array : Float32Array)(TRIANGLE.map((x, ix) => (ix % 3 === 2 ? z : x)))));
+  const near2 = await detector.nearest(step);
+  const safe = await detector.safeDistances(step, 9, { which: "between" });
+  const held = await detector.safeDistances(step, 9, { which: "between", fixed: [lower] });
+  const lists = await detector.neighbours(step, 1.5, { which: "between" });
+  const ringed = await detector.near(scene, 9, { selfOf: low, exclude: [{ rings: 1 }] });
+  step.setEndPositions(upper, new Float64Array(TRIANGLE.map((x, ix) => (ix % 3 === 2 ? -1 : x))));
+  const truncation = await detector.truncate(step, { start: "verify" });
+  const reached = truncation.positions(upper)[2];
+  truncation.apply(step);
+  const solver = {
+    nearest: [near2.distance, near2.bodyA, near2.bodyB],
+    safe: [safe.of(lower).constructor.name, safe.of(upper).constructor.name, safe.of(lower)[0] < 0.5 && safe.of(lower)[0] > 0.4995, safe.touching.length],
+    held: [[...held.of(lower)], held.of(upper)[0] < 1 && held.of(upper)[0] > 0.999],
+    lists: [lists.length, lists.first(upper), [...lists.vf.offsets], [...lists.vf.indices], [...lists.fv.indices], lists.ee.distances.every((x) => x > 0.999)],
+    same: lists.ee === lists.reversed("ee"),
+    ringed: ringed.length,
+    truncation: [truncation.nCut, truncation.nTouching, truncation.rounds > 0, truncation.startIntersects, truncation.positions(lower)],
+    reached: [reached > 0 && reached < 0.01, step.positions(upper)[2] === reached, await detector.any(step)],
+    rings: await refusal(() => detector.near(scene, 1, { exclude: [{ rings: 17 }] })),
+    unknown: await refusal(() => detector.safeDistances(step, 1, { fixed: [5] })),
+    body: await refusal(() => safe.of(7)),
+  };
+  step.dispose();
   let n = 0;
   let stopped = null;
   try {
@@ -375,6 +423,8 @@ export async function others(module) {
     penetration: [penetration.bodies, penetration.inside.map((inside) => [...inside]), penetration.volume > 0, penetration.regions.length],
     deep: [deep.depth > 0 && deep.depth <= 0.125, deep.volume === penetration.volume, deep.inside.map((inside) => [...inside])],
     none: [none.length, none.hash, none.points.length, none.curves().length, none.regions()],
+    probes,
+    solver,
     stopped: [n > 0, stopped],
     aborted,
     thrown,
@@ -401,6 +451,37 @@ export const OTHERS = {
   penetration: [[0, 1], [[], [3]], true, 1],
   deep: [true, true, [[], [3]]],
   none: [0, "0000000000000000", 0, 0, []],
+  probes: {
+    places: [1, 0, -1, -1],
+    closest: [4, { body: 0, element: 1, feature: 10, distance: 0, point: [0, 0, 0.5] }, null, [16, 10, 255, 16], 0, 4],
+    hits: [
+      2,
+      [1, 0],
+      [{ body: 0, element: 3, feature: 16, t: 3.375, tEnd: 3.375, barycentrics: [0.125, 0.25, 0.625] }],
+      [],
+      16,
+    ],
+    all: [[[0, true], [0, true], [1, true], [1, true]], [0, 4, 4], 4, [0, 0], []],
+    ragged: "invalid: points: 11 numbers given, not a multiple of 3",
+    list: "invalid: positions: a Float32Array or a Float64Array is needed",
+    rays: "invalid: directions: 1 directions given, as many as the 2 origins allowed",
+    hit: 'invalid: hits: "last" given, "first", "any" or "all" allowed',
+    most: "invalid: most: -1 given, a length of at least 0, or infinity allowed",
+    open: "invalid: there is no body 7: 2 have been added, and 0 of them removed",
+  },
+  solver: {
+    nearest: [1, 0, 1],
+    safe: ["Float32Array", "Float64Array", true, 0],
+    held: [[0, 0, 0], true],
+    lists: [15, { vertex: 3, edge: 3, face: 1 }, [0, 1, 2, 3, 4, 5, 6], [1, 1, 1, 0, 0, 0], [3, 4, 5, 0, 1, 2], true],
+    same: true,
+    ringed: 0,
+    truncation: [3, 0, true, false, null],
+    reached: [true, true, false],
+    rings: "invalid: rings: 17 given, 0 to 16 allowed",
+    unknown: "invalid: there is no body 5: 2 have been added, and 0 of them removed",
+    body: "invalid: body: 7 given, which was not in the scene",
+  },
   stopped: [true, "cancelled"],
   aborted: "cancelled: cancelled",
   thrown: "Error: mine",

@@ -722,11 +722,33 @@ async function example(browser) {
   console.log("the example for three.js: pairs found, and they change");
 }
 
+// The ray under the mouse and the nearest point, on a mesh that deforms.
+async function cursor(browser) {
+  const page = await browser.newPage({ viewport: { width: 800, height: 600 } });
+  const problems = [];
+  page.on("pageerror", (error) => problems.push(String(error)));
+  await page.goto(`${server.url}examples/cursor.html`);
+  const says = (pattern) => page.waitForFunction((of) => new RegExp(of).test(document.getElementById("hit").textContent), pattern);
+  await page.mouse.move(2, 2);
+  await says("^nothing under the cursor; the probe is \\d\\.\\d+ away$");
+  // Somewhere on the way down the middle the ray meets the knot.
+  let found = false;
+  for (let y = 100; y < 500 && !found; y += 20) {
+    await page.mouse.move(400, y);
+    const text = await page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done(document.getElementById("hit").textContent)))));
+    found = /^triangle \d+, \d\.\d{3} away under the cursor/.test(text);
+  }
+  assert.ok(found, "a triangle is under the cursor");
+  await page.screenshot({ path: join(shots, "cursor.png") });
+  assert.deepEqual(problems, []);
+  console.log("the example with a cursor: rays hit the mesh, and the probe has a nearest point");
+}
+
 try {
   links();
   await latest();
   await writeFiles();
-  const visits = [dropped, frames, real, large, keyboard, phone, example];
+  const visits = [dropped, frames, real, large, keyboard, phone, example, cursor];
   for (const [options, all] of [[{ gpu: true }, visits], [{ gpu: false }, [withoutGpu]]]) {
     const those = all.filter(({ name }) => only.length === 0 || only.includes(name));
     const browser = await launch(options);

@@ -1,7 +1,7 @@
 // Uses all of the package's types; tsc checks it.
 
 import init, { Detector, ImpingeError, KINDS, SHAPES, Scene, weld } from "impinge";
-import type { Advance, Body, Contacts, Impact, Nearest, NearPairs, PairKind, Pairs, Penetration, Query, Region, Stats } from "impinge";
+import type { Advance, Body, ClosestElement, Contacts, Impact, Nearest, NearPairs, Neighbours, PairKind, Pairs, Penetration, Query, RayHit, Region, Stats, Truncation } from "impinge";
 import initGpu, { Detector as GpuDetector, Scene as GpuScene, read, readBodies, readFrames, type FileMesh } from "impinge/webgpu";
 
 await init();
@@ -33,6 +33,16 @@ const known: (boolean | null)[] = [detector.impacts(scene, query).startIntersect
 const near: NearPairs = detector.near(scene, 0.5, { closestPoints: true });
 const lengths: (number | undefined)[] = [near.distances?.[0], near.at(-1)?.points?.[1][2]];
 const nearest: Nearest | null = detector.distance(scene, a, b, { progress: () => undefined });
+const points = new Float32Array(6);
+const places: Int8Array = detector.contains(scene, a, points, { progress: () => true });
+const closest: ClosestElement | null = detector.closest(scene, points, { of: a, most: 2 }).at(-1);
+const hits: RayHit[] = detector.cast(scene, points, new Float64Array(6), { hits: "all", most: 1 }).of(0);
+const bounds: Float32Array | Float64Array = detector.safeDistances(scene, 0.5, { fixed: [b], exclude: [[a, b], { rings: 2 }] }).of(a);
+const truncation: Truncation = detector.truncate(scene, { clearance: 1e-3 });
+truncation.apply(scene);
+const lists: Neighbours = detector.neighbours(scene, 0.5);
+const listed: Uint32Array[] = [lists.vf.offsets, lists.fv.indices, lists.ee.offsets, lists.of("ev").indices];
+const nearestTwo: Nearest | null = detector.nearest(scene);
 const contacts: Contacts = detector.contacts(scene, pairs);
 const regions: Region[] = contacts.regions();
 const penetration: Penetration = detector.penetration(scene, contacts, a, b);
@@ -72,6 +82,7 @@ const any: Promise<boolean> = gpu.any(theirs);
 const parts: FileMesh[] = readBodies("a.glb", new Uint8Array());
 const frames: Float32Array[] = readFrames("a.pc2", new Uint8Array());
 const map: Uint32Array = mesh.map;
+console.log(places, closest, hits, bounds, listed, nearestTwo);
 console.log(rows, numbers, first, times, kind, free, known, lengths, nearest, regions, penetration, loops, next, single, told, sizes, bodies, held);
 console.log(answer.hash, any, parts[0]?.name, frames, map, (await gpu.impacts(theirs)).length, gpu.stats?.backend);
 await gpu.dispose();

@@ -2,7 +2,8 @@
 
 use impinge::contact::{Contacts, Curves, Penetration, Region, Shape};
 use impinge::exact::Feature;
-use impinge::{Impact, NearPairs, PairKind, Pairs, Positions};
+use impinge::proximity::Nearest;
+use impinge::{BodyId, Impact, NearPairs, PairKind, Pairs, Positions};
 
 use crate::ask::{Asker, Question, query};
 use crate::error::Error;
@@ -27,7 +28,7 @@ pub struct Answer {
 }
 
 impl Answer {
-    fn of(number: f64) -> Self {
+    pub(crate) fn of(number: f64) -> Self {
         Answer {
             numbers: vec![number],
             ..Answer::default()
@@ -40,7 +41,7 @@ impl Answer {
         self.rows.extend(rows.flat_map(row));
     }
 
-    fn section(&mut self, words: impl IntoIterator<Item = u32>) {
+    pub(crate) fn section(&mut self, words: impl IntoIterator<Item = u32>) {
         let at = self.words.len();
         self.words.push(0);
         self.words.extend(words);
@@ -65,7 +66,7 @@ impl Answer {
 
     /// Kinds, two features per pair, whether parallel; distances and points, if they were asked
     /// for.
-    fn of_near(near: &NearPairs, world: &World) -> Self {
+    pub(crate) fn of_near(near: &NearPairs, world: &World) -> Self {
         let mut answer = Answer {
             hash: near.hash(),
             ..Answer::default()
@@ -111,6 +112,24 @@ impl Answer {
         Ok(answer)
     }
 
+    /// A row, the distance and two points, if there is any pair.
+    pub(crate) fn of_nearest(nearest: Option<Nearest>, number: impl Fn(BodyId) -> u32) -> Self {
+        let mut answer = Answer::default();
+        if let Some(Nearest {
+            distance,
+            a,
+            b,
+            points,
+            ..
+        }) = nearest
+        {
+            answer.rows = vec![number(a.body), a.element, number(b.body), b.element];
+            answer.numbers.push(distance);
+            answer.numbers.extend(points.as_flattened());
+        }
+        answer
+    }
+
     fn add_curves(&mut self, curves: &Curves) {
         self.section(curves.starts().iter().map(|&start| start as u32));
         self.section(curves.all_points().iter().copied());
@@ -146,7 +165,7 @@ impl Answer {
 }
 
 /// A feature as one number: a vertex of the element, its edges from 8 on, its face.
-fn code(feature: Feature) -> u8 {
+pub(crate) fn code(feature: Feature) -> u8 {
     match feature {
         Feature::Vertex(ix) => ix,
         Feature::Edge(ix) => 8 + ix,
@@ -166,7 +185,8 @@ pub(crate) fn of_pairs(pairs: &Pairs, world: &World) -> Answer {
 
 impl Asker {
     /// Asks. For questions with a query, `words` and `numbers` are those of [`query`].
-    /// [`Question::Distance`]: two bodies.
+    /// [`Question::Distance`]: two bodies; [`Question::Contains`]: one. Points, or origins and then
+    /// directions, come after these numbers.
     /// [`Question::Contacts`]: a number of the caller's for the answer, then rows of pairs; [`Question::Penetration`]: that number, two
     /// bodies, and the rows again; its rows are the two bodies, in the order of what is inside.
     ///
@@ -177,9 +197,11 @@ impl Asker {
         question: Question,
         world: &World,
         words: &[u32],
-        numbers: &[f64; 10],
+        numbers: &[f64],
     ) -> Result<Answer, Error> {
+        let (numbers, given) = numbers.split_first_chunk().ok_or(Error::Foreign)?;
         match question {
+            Question::Contains => return self.contains(world, words, given),
             Question::Distance => return self.distance(world, words),
             Question::Contacts | Question::Penetration => {
                 return self.about_contacts(question, world, words);
@@ -232,6 +254,12 @@ impl Asker {
                 }
                 answer
             }
+            Question::Closest
+            | Question::Cast
+            | Question::SafeDistances
+            | Question::Truncate
+            | Question::Neighbours
+            | Question::Nearest => return self.probe(question, world, (query, length), given),
             Question::Near => Answer::of_near(&detector.near(scene, length, query)?, world),
             _ => of_pairs(&detector.detect(scene, query)?, world),
         })
@@ -246,14 +274,10 @@ impl Asker {
         let nearest = self
             .detector
             .distance(&world.scene, world.id(a)?, world.id(b)?)?;
-        let mut answer = Answer::default();
-        if let Some(nearest) = nearest {
-            let row = [a, nearest.a.element, b, nearest.b.element];
-            answer.rows.extend(row);
-            answer.numbers.push(nearest.distance);
-            answer.numbers.extend(nearest.points.as_flattened());
-        }
-        Ok(answer)
+        let first = world.id(a)?;
+        Ok(Answer::of_nearest(nearest, |body| {
+            if body == first { a } else { b }
+        }))
     }
 
     fn about_contacts(

@@ -3,7 +3,8 @@
 
 use impinge::contact::Contacts;
 use impinge::{
-    Clearance, Control, Detector, PairKind, Precision, Query, Settings, SharedVertex, Start, Stats,
+    Clearance, Control, Detector, Exclusion, Hit, PairKind, Precision, Query, Settings,
+    SharedVertex, Start, Stats,
 };
 
 use crate::error::Error;
@@ -36,11 +37,25 @@ pub enum Question {
     Contacts,
     /// [`Detector::penetration`].
     Penetration,
+    /// [`Detector::contains`].
+    Contains,
+    /// [`Detector::closest`].
+    Closest,
+    /// [`Detector::cast`].
+    Cast,
+    /// [`Detector::safe_distances`].
+    SafeDistances,
+    /// [`Detector::truncate`].
+    Truncate,
+    /// [`Detector::neighbours`].
+    Neighbours,
+    /// [`Detector::nearest`].
+    Nearest,
 }
 
 impl Question {
     /// All of them, by their number in the package.
-    pub const ALL: [Question; 12] = [
+    pub const ALL: [Question; 19] = [
         Question::Detect,
         Question::Count,
         Question::Any,
@@ -53,6 +68,13 @@ impl Question {
         Question::Distance,
         Question::Contacts,
         Question::Penetration,
+        Question::Contains,
+        Question::Closest,
+        Question::Cast,
+        Question::SafeDistances,
+        Question::Truncate,
+        Question::Neighbours,
+        Question::Nearest,
     ];
 }
 
@@ -61,14 +83,15 @@ impl Question {
 /// `words`: which pairs (0 all, 1 of different bodies, 2 of one body, 3 between `a` and `b`, 4 of
 /// `a` with itself, 5 all of `a`), `a`, `b`, the rule of shared vertices, the rule of the start,
 /// the precision (0 is the default of each), kinds as bits with 64 if they were said, flags (1
-/// distances, 2 nearest points, 4 a cell), and two bodies for each exclusion. `numbers`:
-/// separation, clearance, its share, the low and the high corner of the cell, and the question's
-/// own length.
+/// distances, 2 nearest points, 4 a cell; from 8 on which hits of rays; from 32 on how many rings
+/// are left out and one, 0 for none; from 1024 on how many bodies are fixed), the fixed bodies, and
+/// two bodies for each exclusion. `numbers`: separation, clearance, its share, the low and the high
+/// corner of the cell, and the question's own length.
 ///
 /// # Errors
 /// No such body; lists that are not as described.
 pub fn query(world: &World, words: &[u32], numbers: &[f64; 10]) -> Result<Query, Error> {
-    let Some((&[which, a, b, shared_vertex, start, precision, kinds, flags], excluded)) =
+    let Some((&[which, a, b, shared_vertex, start, precision, kinds, flags], rest)) =
         words.split_first_chunk()
     else {
         return Err(Error::Foreign);
@@ -99,6 +122,19 @@ pub fn query(world: &World, words: &[u32], numbers: &[f64; 10]) -> Result<Query,
     if flags & 4 != 0 {
         query = query.owned_by([x, y, z], [to_x, to_y, to_z]);
     }
+    query = query.hits(match flags >> 3 & 3 {
+        0 => Hit::First,
+        1 => Hit::Any,
+        _ => Hit::All,
+    });
+    if let Some(n) = (flags >> 5 & 31).checked_sub(1) {
+        query = query.exclude(Exclusion::rings(n));
+    }
+    let (fixed, excluded) = rest
+        .split_at_checked((flags >> 10) as usize)
+        .ok_or(Error::Foreign)?;
+    let fixed: Result<Vec<_>, Error> = fixed.iter().map(|&body| id(body)).collect();
+    query = query.fixed(fixed?);
     for &[a, b] in excluded.as_chunks().0 {
         query = query.exclude((id(a)?, id(b)?));
     }

@@ -266,7 +266,6 @@ impl DetectorHandle {
         numbers: &[f64],
     ) -> Thrown<Array> {
         let question = entry(Question::ALL, question)?;
-        let numbers = numbers.try_into().map_err(|_| thrown(Error::Foreign))?;
         self.asker.set_control(control(watcher));
         let answer = self.asker.ask(question, &scene.0, words, numbers);
         answer.map(|answer| lists(&answer)).map_err(thrown)

@@ -11,6 +11,7 @@ mod bindings;
 mod error;
 #[cfg(feature = "io")]
 mod meshes;
+mod probe;
 mod world;
 
 pub use answer::Answer;

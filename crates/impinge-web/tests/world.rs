@@ -434,3 +434,130 @@ fn scenes_are_written_for_browsers_with_the_native_answer() -> Result<(), Box<dy
     fs::write(file, format!("[{}]", written.join(",\n")))?;
     Ok(())
 }
+
+#[test]
+fn points_rays_and_bounds_are_those_of_the_library() -> Result<(), Error> {
+    let (mut world, mut asker) = (World::new(), asker()?);
+    // The second body gets the first slot, and so other numbers than the library's.
+    let gone = add(&mut world, &TRIANGLE)?;
+    let ball = surfaces::ball(500);
+    let at: Vec<f32> = ball.positions.as_flattened().to_vec();
+    let index: Vec<u32> = match &ball.elements {
+        Elements::Triangles(faces) => faces.as_flattened().to_vec(),
+        _ => panic!("a ball has faces"),
+    };
+    let kind = BodyKind::Triangles;
+    let a = world.put(Put::Add, 0, kind, &index, &at)?;
+    world.remove(gone)?;
+    let beside: Vec<f32> = at
+        .iter()
+        .enumerate()
+        .map(|(ix, x)| x + [2.1, 0.0, 0.0][ix % 3])
+        .collect();
+    let b = world.put(Put::Add, 0, kind, &index, &beside)?;
+    let mut scene = Scene::new();
+    let own_b = scene.add_triangles(index.as_chunks().0, beside.as_chunks().0)?;
+    let own_a = scene.add_triangles(index.as_chunks().0, at.as_chunks().0)?;
+    let mut detector = Detector::new(Backend::Cpu)?;
+    let all = Query::all();
+    let points = [[0.25, 0.5, 0.125], [2.0, 0.25, 0.5], [9.0, 9.0, 9.0]];
+    let with = |length: f64, points: &[[f64; 3]]| {
+        let mut numbers = NUMBERS;
+        numbers[9] = length;
+        [&numbers[..], points.as_flattened()].concat()
+    };
+
+    let answer = asker.ask(Question::Contains, &world, &[a], &with(0.0, &points))?;
+    let places = detector.contains(&scene, own_a, &points)?;
+    assert_eq!(
+        answer.bytes,
+        places.iter().map(|&x| x as u8).collect::<Vec<_>>()
+    );
+
+    let answer = asker.ask(Question::Closest, &world, &words(ALL), &with(5.0, &points))?;
+    let closest = detector.closest(&scene, &points, 5.0, &all)?;
+    let number = |body| if body == own_a { a } else { b };
+    for (ix, found) in closest.iter().enumerate() {
+        let row = found.map(|of| [number(of.element.body), of.element.element]);
+        assert_eq!(
+            answer.rows[2 * ix..2 * ix + 2],
+            row.unwrap_or([u32::MAX; 2])
+        );
+        assert_eq!(
+            answer.numbers[ix],
+            found.map_or(f64::INFINITY, |of| of.distance)
+        );
+    }
+    assert_eq!(answer.bytes[2], u8::MAX);
+    assert_eq!(answer.hash, closest.hash());
+
+    let rays = [
+        [0.1, 0.2, 5.0],
+        [2.0, 0.25, 5.0],
+        [0.0, 0.0, -1.0],
+        [0.0, 0.0, -1.0],
+    ];
+    let mut every = words(ALL);
+    every[7] = 2 << 3;
+    let answer = asker.ask(Question::Cast, &world, &every, &with(f64::INFINITY, &rays))?;
+    let query = Query::all().hits(impinge::Hit::All);
+    let hits = detector.cast(&scene, &rays[..2], &rays[2..], f64::INFINITY, &query)?;
+    assert!(
+        hits.is_hit()
+            .iter()
+            .map(|&is| u8::from(is))
+            .eq(answer.bytes[..2].iter().copied())
+    );
+    assert!(hits.is_hit()[0]);
+    assert_eq!(answer.rows.len(), 2 * hits.iter().len());
+    assert!(
+        hits.iter()
+            .map(|hit| hit.t)
+            .eq(answer.numbers[..hits.iter().len()].iter().copied())
+    );
+    let offsets: Vec<u32> = hits.offsets().iter().map(|&ix| ix as u32).collect();
+    assert_eq!(answer.words, [&[3], &offsets[..]].concat());
+
+    let mut fixed = [&words([1, 0, 0])[..], &[a]].concat();
+    fixed[7] = 1 << 10;
+    let answer = asker.ask(Question::SafeDistances, &world, &fixed, &with(1.0, &[]))?;
+    let query = Query::between_all().fixed([own_a]);
+    let safe = detector.safe_distances(&scene, 1.0, &query)?;
+    let n = ball.positions.len() as u32;
+    assert_eq!(answer.words, [b, n, 0, a, n, 0]);
+    let bounds = safe.of(own_b).expect("a body");
+    assert!((0..n as usize).all(|ix| answer.numbers[ix] == bounds.get(ix)));
+    assert!(
+        answer.numbers[n as usize..]
+            .iter()
+            .all(|&bound| bound == 0.0)
+    );
+
+    let mut ringed = words(ALL);
+    ringed[7] = 3 << 5;
+    let answer = asker.ask(Question::Neighbours, &world, &ringed, &with(1.3, &[]))?;
+    let query = Query::all().exclude(impinge::Exclusion::rings(2));
+    let near = detector.neighbours(&scene, 1.3, &query)?;
+    assert!(!near.is_empty() && answer.numbers[0] == near.len() as f64);
+    assert_eq!(answer.words[..5], [8, b, 0, 0, 0]);
+    let vf = &near.vf().distances;
+    assert_eq!(&answer.numbers[1..=vf.len()], vf);
+
+    let answer = asker.ask(Question::Nearest, &world, &words([1, 0, 0]), &NUMBERS)?;
+    let nearest = detector
+        .nearest(&scene, &Query::between_all())?
+        .expect("two");
+    assert_eq!(answer.rows, [b, nearest.a.element, a, nearest.b.element]);
+    assert_eq!(answer.numbers[0], nearest.distance);
+
+    let end = beside;
+    put(&mut world, Put::EndPositions, a, &end)?;
+    scene.set_end_positions(own_a, end.as_chunks::<3>().0.to_vec())?;
+    let answer = asker.ask(Question::Truncate, &world, &words(ALL), &NUMBERS)?;
+    let truncation = detector.truncate(&scene, &all)?;
+    assert!(truncation.n_cut() > 0);
+    assert_eq!(answer.numbers[0], truncation.n_cut() as f64);
+    assert_eq!((&answer.words[..], &answer.bytes[..]), (&[a][..], &[2][..]));
+    assert_eq!(Some(&answer.positions[0]), truncation.positions(own_a));
+    Ok(())
+}
