@@ -315,6 +315,13 @@ class World:
         z = self.scene.positions(self.body)[:, 2].astype(np.float64)
         return f"{self.name} {self.n_steps}: {self.n_near} near, {self.n_cut} cut so far, from {z.min():.6f} to {z.max():.6f} high"
 
+    def times(self):
+        """Milliseconds per step so far."""
+        spent = self.seconds
+        ms = ", ".join(f"{part} {1e3 * seconds / self.n_steps:.1f}" for part, seconds in spent.items())
+        share = (spent["near"] + spent["truncate"]) / (spent["near"] + spent["truncate"] + spent["solve"])
+        return f"{self.name} {self.n_steps}: ms per step: {ms}; near and truncate are {100 * share:.0f} % without any"
+
 
 class Frames:
     """A mesh and its frames, as `impinge view` and `impinge sequence` read them; and what does not move."""
@@ -350,10 +357,7 @@ def run(name, n_vertices, n_frames, out):
             frames.add(world)
         if step * 4 % n_frames < 4:
             print(world.line(), flush=True)
-    spent = world.seconds
-    ms = ", ".join(f"{part} {1e3 * seconds / n_frames:.1f}" for part, seconds in spent.items())
-    share = (spent["near"] + spent["truncate"]) / (spent["near"] + spent["truncate"] + spent["solve"])
-    print(f"{name}: ms per step: {ms}; near and truncate are {100 * share:.0f} % without any", file=sys.stderr)
+            print(world.times(), file=sys.stderr)
 
 
 def main():

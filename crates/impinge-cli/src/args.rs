@@ -6,6 +6,7 @@ mod near;
 mod picture;
 mod probe;
 mod rows;
+mod safe;
 mod step;
 #[cfg(feature = "view")]
 mod view;
@@ -31,6 +32,7 @@ pub use near::{KindArg, NearArgs};
 pub use picture::PictureArgs;
 pub use probe::{CastArgs, HitsArg, OneMeshArgs, ProbeArgs};
 pub use rows::RowsArgs;
+pub use safe::SafeArgs;
 pub use step::{StepArgs, StepHow};
 #[cfg(feature = "view")]
 pub use view::ViewArgs;
@@ -51,6 +53,7 @@ Examples:
   impinge self part.stl --fail-on-hit           the same as a check: exit code 3 if it does
   impinge pairs a.obj b.obj --rows -            the pairs themselves, as CSV
   impinge near a.obj b.obj --distance 0.01      which elements are nearer than that
+  impinge safe a.obj b.obj --most 0.01          how far each vertex may move
   impinge probe a.obj --points p.csv --signed   how far are points, and are they inside
   impinge cast a.obj --rays rays.csv            what rays hit
   impinge check parts/*.stl                     what is wrong with each mesh
@@ -83,6 +86,12 @@ pub enum Command {
     /// nearest
     #[command(after_help = near::NEAR_EXAMPLES)]
     Near(NearArgs),
+    /// Find how far each vertex may move, on any path, so that nothing touches
+    #[command(
+        after_help = safe::SAFE_EXAMPLES,
+        mut_arg("rows", |rows| rows.help("Write a row per vertex (.csv, .jsonl or .npy; \"-\" is standard output)"))
+    )]
+    Safe(SafeArgs),
     /// Find the element of a mesh that is nearest to each of many points, and which of them are
     /// inside
     #[command(

@@ -38,6 +38,7 @@ fn main() -> ExitCode {
         Command::Demo(args) => commands::demo(&args, &cancel),
         Command::Distance(args) => commands::distance(&args, &cancel),
         Command::Near(args) => commands::near(&args, &cancel),
+        Command::Safe(args) => commands::safe(&args, &cancel),
         Command::Probe(args) => commands::probe(&args, &cancel),
         Command::Cast(args) => commands::cast(&args, &cancel),
         Command::Pairs(args) => commands::pairs(&args, &cancel),

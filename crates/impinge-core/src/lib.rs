@@ -29,6 +29,7 @@ pub mod workers;
 
 pub use answers::advance::Advance;
 pub use answers::candidates::Candidates;
+pub use answers::changes::Changes;
 pub use answers::closest::{Closest, ClosestElement};
 pub use answers::hits::{Hits, RayHit};
 pub use answers::impacts::{Impact, Impacts, hash_impact_rows};

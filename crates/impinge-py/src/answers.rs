@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use impinge::{BodyId, PairKind, Positions};
+use impinge::{BodyId, Changes, PairKind, Positions};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::exceptions::{PyMemoryError, PyRuntimeError};
 use pyo3::prelude::*;
@@ -35,6 +35,28 @@ pub fn to_array<const N: usize>(
 ) -> PyResult<Bound<'_, PyArray2<u32>>> {
     let shape = [rows.len(), N];
     PyArray1::from_vec(py, rows.into_flattened()).reshape(shape)
+}
+
+/// Indices as NumPy takes them.
+type Indices<'py, D> = Bound<'py, numpy::PyArray<i64, D>>;
+
+/// The fields of `impinge.Changes`.
+pub type ChangeArrays<'py> = (
+    Indices<'py, numpy::Ix2>,
+    Indices<'py, numpy::Ix1>,
+    Indices<'py, numpy::Ix1>,
+);
+
+/// What has changed, as arrays.
+pub fn changes<'py>(py: Python<'py>, changes: &Changes) -> PyResult<ChangeArrays<'py>> {
+    let index = |&ix: &usize| i64::try_from(ix).unwrap_or(i64::MAX);
+    let list = |of: &[usize]| collect(of.len(), of.iter().map(index));
+    let kept = list(changes.kept.as_flattened())?;
+    Ok((
+        PyArray1::from_vec(py, kept).reshape([changes.kept.len(), 2])?,
+        PyArray1::from_vec(py, list(&changes.new)?),
+        PyArray1::from_vec(py, list(&changes.gone)?),
+    ))
 }
 
 /// Kinds, as indices of `impinge.KINDS`.
@@ -137,6 +159,15 @@ impl Pairs {
             all.set_item(Body { id, scene }, PyArray1::from_vec(py, colliding))?;
         }
         Ok(all)
+    }
+
+    fn changes<'py>(
+        &self,
+        py: Python<'py>,
+        old: &Bound<'py, Pairs>,
+    ) -> PyResult<ChangeArrays<'py>> {
+        let old = old.get();
+        changes(py, &py.detach(|| self.inner.changes(&old.inner)))
     }
 
     fn retain(&self, py: Python<'_>, keep: &Bound<'_, PyAny>) -> PyResult<Pairs> {
@@ -253,6 +284,18 @@ impl Impacts {
 
     fn start_intersects(&self) -> Option<bool> {
         self.inner.start_intersects()
+    }
+
+    fn changes<'py>(
+        &self,
+        py: Python<'py>,
+        old: &Bound<'py, Impacts>,
+    ) -> PyResult<ChangeArrays<'py>> {
+        let [old, new] = [old.get(), self].map(|impacts| {
+            let all = impacts.slice().iter();
+            all.map(|impact| (impact.kind, impact.a, impact.b))
+        });
+        changes(py, &py.detach(|| Changes::between(old, new)))
     }
 
     fn of(&self, kind: &Bound<'_, PyAny>) -> PyResult<Impacts> {

@@ -3,12 +3,12 @@
 use std::sync::Arc;
 
 use impinge::exact::Feature;
-use impinge::{NearIter, PairKind};
+use impinge::{Changes, NearIter, PairKind};
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::answers::{collect, kind_numbers, to_array};
+use crate::answers::{ChangeArrays, changes, collect, kind_numbers, to_array};
 use crate::errors::invalid;
 use crate::exclusion::Exclusion;
 use crate::options::pair_kind;
@@ -113,6 +113,18 @@ impl Near {
         let points = collect(self.__len__(), closest.map(|closest| closest.points))?;
         let flat = points.into_flattened().into_flattened();
         PyArray1::from_vec(py, flat).reshape([self.__len__(), 2, 3])
+    }
+
+    fn changes<'py>(&self, py: Python<'py>, old: &Bound<'py, Near>) -> PyResult<ChangeArrays<'py>> {
+        let old = old.get();
+        let found = py.detach(|| {
+            let [old, new] = [old, self].map(|near| {
+                let all = near.iter();
+                all.map(|pair| (pair.kind, pair.a, pair.b))
+            });
+            Changes::between(old, new)
+        });
+        changes(py, &found)
     }
 
     fn of(&self, kind: &Bound<'_, PyAny>) -> PyResult<Near> {

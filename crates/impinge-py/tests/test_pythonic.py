@@ -400,3 +400,39 @@ def test_a_detector_of_the_parent_is_refused_in_a_fork():
     assert out.returncode == 0, out.stderr
     first, last = out.stdout.splitlines()
     assert first.startswith("this detector was made before this process was forked") and last == "0"
+
+
+def test_changes_between_frames():
+    random = np.random.default_rng(5)
+    center = np.repeat(random.uniform(-1, 1, (300, 3)), 3, 0)
+    at = (center + random.uniform(-0.2, 0.2, center.shape)).astype(np.float32)
+    scene = impinge.Scene()
+    body = scene.add(at, np.arange(900).reshape(-1, 3))
+    detector = impinge.Detector("cpu")
+
+    def ask():
+        scene.set_end_positions(body, at + random.uniform(-0.05, 0.05, at.shape).astype(np.float32))
+        return detector.detect(scene), detector.impacts(scene), detector.near(scene, 0.1)
+
+    def keys(answer):
+        kinds = getattr(answer, "kinds", np.zeros(len(answer), np.uint8))
+        return [(kind, *row) for kind, row in zip(kinds.tolist(), answer.rows.tolist())]
+
+    before = ask()
+    for _ in range(3):
+        at = at + random.uniform(-0.05, 0.05, at.shape).astype(np.float32)
+        scene.set_positions(body, at)
+        after = ask()
+        parts = [(now.of("ee"), then.of("ee")) for now, then in zip(after[1:], before[1:])]
+        for now, then in [*zip(after, before), *parts]:
+            changes = now.changes(then)
+            old, new = keys(then), keys(now)
+            assert [(old[i], new[j]) for i, j in changes.kept] == [(key, key) for key in new if key in set(old)]
+            assert [new[i] for i in changes.new] == [key for key in new if key not in set(old)]
+            assert [old[i] for i in changes.gone] == [key for key in old if key not in set(new)]
+            assert min(map(len, changes)) > 0 and all(of.dtype == np.int64 for of in changes) and changes.kept.shape[1] == 2
+        before = after
+    with pytest.raises(TypeError):
+        before[0].changes(before[1])
+    with pytest.raises(TypeError):
+        before[1].changes(None)

@@ -510,6 +510,28 @@ impl World {
             "{name} {n_steps}: {n_near} near, {n_cut} cut so far, from {lowest:.6} to {highest:.6} high"
         ))
     }
+
+    /// Milliseconds per step so far.
+    fn times(&self) -> String {
+        let Seconds {
+            near,
+            solve,
+            truncate,
+            any,
+        } = self.seconds;
+        let ms = [near, solve, truncate, any].map(|seconds| 1e3 * seconds / float(self.n_steps));
+        let share = (near + truncate) / (near + truncate + solve);
+        format!(
+            "{} {}: ms per step: near {:.1}, solve {:.1}, truncate {:.1}, any {:.1}; near and truncate are {:.0} % without any",
+            self.name,
+            self.n_steps,
+            ms[0],
+            ms[1],
+            ms[2],
+            ms[3],
+            100.0 * share
+        )
+    }
 }
 
 /// Moves the vertices to where springs and contacts want them.
@@ -653,24 +675,9 @@ fn run(
         }
         if step * 4 % n_frames < 4 {
             println!("{}", world.line()?);
+            eprintln!("{}", world.times());
         }
     }
-    let Seconds {
-        near,
-        solve,
-        truncate,
-        any,
-    } = world.seconds;
-    let ms = [near, solve, truncate, any].map(|seconds| 1e3 * seconds / float(n_frames));
-    let share = (near + truncate) / (near + truncate + solve);
-    eprintln!(
-        "{name}: ms per step: near {:.1}, solve {:.1}, truncate {:.1}, any {:.1}; near and truncate are {:.0} % without any",
-        ms[0],
-        ms[1],
-        ms[2],
-        ms[3],
-        100.0 * share
-    );
     Ok(())
 }
 

@@ -137,13 +137,13 @@ pub use read::read;
 #[cfg(feature = "gpu")]
 pub use impinge_core::wgpu;
 pub use impinge_core::{
-    Advance, Affinity, Backend, Body, BodyId, BodyKind, Bounds, CancelToken, Candidates, Clearance,
-    Closest, ClosestElement, ClosestPoints, Control, Csr, Detector, Element, ElementVertices,
-    Elements, Error, Exclusion, Filter, Hit, Hits, Impact, Impacts, InstructionSet, Mesh, Method,
-    NearIter, NearPair, NearPairs, Neighbours, NewPositions, PairFilter, PairKind, PairKinds,
-    Pairs, Part, Place, Positions, Precision, Progress, Query, RayHit, Real, Recluster,
-    SafeDistances, Scene, Settings, SharedVertex, Stage, Start, Stats, Truncation, Weld,
-    WrongNumber, hash_impact_rows, hash_rows,
+    Advance, Affinity, Backend, Body, BodyId, BodyKind, Bounds, CancelToken, Candidates, Changes,
+    Clearance, Closest, ClosestElement, ClosestPoints, Control, Csr, Detector, Element,
+    ElementVertices, Elements, Error, Exclusion, Filter, Hit, Hits, Impact, Impacts,
+    InstructionSet, Mesh, Method, NearIter, NearPair, NearPairs, Neighbours, NewPositions,
+    PairFilter, PairKind, PairKinds, Pairs, Part, Place, Positions, Precision, Progress, Query,
+    RayHit, Real, Recluster, SafeDistances, Scene, Settings, SharedVertex, Stage, Start, Stats,
+    Truncation, Weld, WrongNumber, hash_impact_rows, hash_rows,
 };
 #[cfg(feature = "gpu")]
 pub use impinge_core::{

@@ -51,6 +51,7 @@ Columns of numbers alone are a plain array in .npy files, others a structured on
   in .jsonl and .npy files. Distance and points are rounded.
 `probe`: point, element, feature, distance, x, y, z, with --signed then place: inside, on or outside, and the distance is
   negative outside. Distances are rounded down. The nearest point is one column, nearest, in .jsonl and .npy files.
+`safe`: body, vertex, safe: how far it may move, rounded down
 `cast`: ray, element, feature, t, t_end, b0, b1, b2 (barycentrics in .jsonl and .npy files); with --hits any: ray, hit
 `step`: kind, body_a, element_a, body_b, element_b, toi. Of kind vf, a is the vertex and b the face. Mesh files
   hold faces, so kinds are vf and ee; ev and vv are of bodies of edges or points, which the library and the

@@ -26,6 +26,8 @@ Examples:
                                                       how far a solver can go that needs some distance
   impinge step a_0.obj a_1.obj b_0.obj b_1.obj --clearance 1e-4 --advance a.obj b.obj
                                                       go as far as it is free: each body there
+  impinge step cloth_0.ply cloth_1.ply --truncate cloth.ply
+                                                      go on where it is free: each vertex stops for itself
   impinge step cloth_0.ply cloth_1.ply --rows impacts.csv --out impacts.glb
   impinge step cloth_0.ply cloth_1.ply --candidates boxes.npy --inflation 0.001
 
@@ -44,6 +46,10 @@ pub struct StepArgs {
     /// order (.ply or .obj)
     #[arg(long, value_name = "OUT", num_args = 1.., conflicts_with_all = ["earliest", "rows", "out", "candidates", "png", "repeat"])]
     pub advance: Vec<ReachedFile>,
+    /// Find how far each vertex can go for itself, and write each body there: one file per body, in
+    /// their order (.ply or .obj)
+    #[arg(long, value_name = "OUT", num_args = 1.., conflicts_with_all = ["advance", "earliest", "rows", "out", "candidates", "png", "repeat"])]
+    pub truncate: Vec<ReachedFile>,
     /// Leave out the pairs within each body
     #[arg(long)]
     pub no_self: bool,
@@ -118,9 +124,17 @@ impl StepArgs {
     pub fn outputs(&self) -> Vec<(&'static str, &Path)> {
         let out = self.out.as_ref().map(|file| ("--out", file.path.as_path()));
         let png = self.png.as_ref().map(|file| ("--png", file.0.as_path()));
-        let reached = self.advance.iter();
-        let reached = reached.map(|file| ("--advance", file.path.as_path()));
+        let (option, reached) = self.reached();
+        let reached = reached.iter().map(|file| (option, file.path.as_path()));
         [out, png].into_iter().flatten().chain(reached).collect()
+    }
+
+    /// The files for the bodies where the step ends, and the option that names them.
+    pub fn reached(&self) -> (&'static str, &[ReachedFile]) {
+        match self.advance.is_empty() {
+            true => ("--truncate", &self.truncate),
+            false => ("--advance", &self.advance),
+        }
     }
 }
 

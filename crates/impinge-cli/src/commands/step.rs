@@ -62,13 +62,31 @@ pub fn step(args: &StepArgs, cancel: &CancelToken) -> Result<(), Error> {
         writeln!(text, "{}", asked.line(&bodies.vertices, &Nouns::default()))?;
         return say(&text, Some(file));
     }
+    if !args.reached().1.is_empty() {
+        reached::check(args.reached(), &bodies)?;
+    }
+    if !args.truncate.is_empty() {
+        // What touches first, and how far each vertex can go: two questions.
+        let earliest = detector.earliest(&bodies.scene, &step)?;
+        let truncation = detector
+            .truncate(&bodies.scene, &step)
+            .map_err(|error| bodies.named(error))?;
+        drop(watch);
+        reached::write(&args.truncate, &bodies, |id| truncation.positions(id))?;
+        let found = Found::truncation(earliest, &truncation, detector.stats());
+        print(args, asked, &bodies, &found, None)?;
+        return found.end(args.fail_on_hit);
+    }
     if !args.advance.is_empty() {
-        reached::check(&args.advance, &bodies)?;
         let advance = detector
             .advance(&bodies.scene, &step)
             .map_err(|error| bodies.named(error))?;
         drop(watch);
-        reached::write(&args.advance, &bodies, &advance)?;
+        let reached = |id| {
+            let mut moved = advance.positions.iter();
+            Some(&moved.find(|(body, _)| *body == id)?.1)
+        };
+        reached::write(&args.advance, &bodies, reached)?;
         let found = Found::advance(&advance, detector.stats());
         print(args, asked, &bodies, &found, None)?;
         return found.end(args.fail_on_hit);

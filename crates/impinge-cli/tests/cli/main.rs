@@ -16,6 +16,7 @@ mod near;
 mod probe;
 mod render;
 mod rows;
+mod safe;
 mod schema;
 mod sequence;
 mod shared_data;

@@ -224,6 +224,8 @@ fn every_command_that_prints_json_has_a_schema() {
         ("near", "near a.ply b.ply --distance 0.01"),
         ("near", "near a.ply far.ply --distance 0"),
         ("near", "near soup.obj --distance 0.1 --no-weld"),
+        ("safe", "safe a.ply b.ply --most 0.01"),
+        ("safe", "safe a.ply far.ply --most 9 --fixed 1 --no-self"),
         ("probe", "probe a.ply --points b.ply --signed"),
         ("probe", "probe a.ply --points far.ply --most 0.1"),
         ("cast", "cast a.ply --rays rays.csv"),
@@ -233,6 +235,11 @@ fn every_command_that_prints_json_has_a_schema() {
         ("step", "step a.ply a1.ply far.ply far.ply --no-self"),
         ("step", "step a.ply a1.ply b.ply b.ply --earliest"),
         ("step", "step soup.obj soup.obj --weld"),
+        ("step", "step a.ply a1.ply --truncate a2.ply"),
+        (
+            "step",
+            "step a.ply a1.ply b.ply b.ply --truncate a2.ply b2.ply",
+        ),
         (
             "candidates",
             "step a.ply a1.ply b.ply b.ply --candidates boxes.csv",

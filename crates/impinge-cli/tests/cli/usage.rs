@@ -107,7 +107,8 @@ fn shared_options_are_explained_once() {
         assert!(folder.run([topic]).printed().contains(text), "{topic}");
     }
     for command in [
-        "pairs", "self", "near", "probe", "cast", "sequence", "step", "check", "render", "simulate",
+        "pairs", "self", "near", "safe", "probe", "cast", "sequence", "step", "check", "render",
+        "simulate",
     ] {
         for help in [folder.run([command, "--help"]), folder.run([command, "-h"])] {
             let help = help.printed();

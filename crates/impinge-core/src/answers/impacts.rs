@@ -1,5 +1,6 @@
 //! The answer about a step: impacts, with their times.
 
+use crate::answers::changes::Changes;
 use crate::answers::home::{Home, gives_back};
 use crate::answers::numbering::{Numbering, row};
 use crate::answers::pairs::{Element, hash_row, mix};
@@ -42,6 +43,11 @@ impl Impact {
     /// [`index`](BodyId::index).
     pub fn row(&self) -> [u32; 4] {
         row(self.a, self.b)
+    }
+
+    /// What makes it the same pair in another answer, in the order of answers.
+    fn key(&self) -> (PairKind, Element, Element) {
+        (self.kind, self.a, self.b)
     }
 
     /// The order of rows.
@@ -193,6 +199,14 @@ impl Impacts {
     /// The earliest impact; of several at the same time, the one whose row comes first.
     pub fn earliest(&self) -> Option<Impact> {
         self.impacts.iter().copied().reduce(Impact::earlier)
+    }
+
+    /// Which pairs an older answer also has, which are new, and which are gone: two pairs are the
+    /// same if their kinds, bodies and elements are, whatever
+    /// their times. Pairs of a body that was removed and of one in
+    /// its slot differ; those of a body that was re-meshed are named by their numbers alone.
+    pub fn changes(&self, old: &Impacts) -> Changes {
+        Changes::between(old.iter().map(Impact::key), self.iter().map(Impact::key))
     }
 
     /// A hash of the set of impacts, times included, that does not depend on their order: the

@@ -2,6 +2,7 @@
 
 pub(crate) mod advance;
 pub(crate) mod candidates;
+pub(crate) mod changes;
 pub(crate) mod closest;
 pub(crate) mod hits;
 pub(crate) mod home;

@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use crate::answers::changes::Changes;
 use crate::answers::home::{Home, gives_back};
 use crate::plan::{Plan, owner_by_first};
 use crate::scene::Scene;
@@ -255,6 +256,13 @@ impl Pairs {
     /// The bodies that took part, in order, and the kind of their primitives.
     pub fn bodies(&self) -> impl ExactSizeIterator<Item = (BodyId, BodyKind)> + '_ {
         self.bodies.iter().map(|body| (body.id, body.kind))
+    }
+
+    /// Which pairs an older answer also has, which are new, and which are gone: two pairs are the
+    /// same if their bodies and elements are. Pairs of a body that was removed and of one in
+    /// its slot differ; those of a body that was re-meshed are named by their numbers alone.
+    pub fn changes(&self, old: &Pairs) -> Changes {
+        Changes::between(old.iter(), self.iter())
     }
 
     /// A hash of the set of pairs that does not depend on their order: the wrapping sum of a

@@ -21,6 +21,7 @@ from . import ipc, ray, tiles, trimesh
 from ._answers import (
     Advance,
     Candidates,
+    Changes,
     Closest,
     Csr,
     Hits,
@@ -87,6 +88,7 @@ __all__ = [
     "CancelToken",
     "Cancelled",
     "Candidates",
+    "Changes",
     "Closest",
     "CollisionManager",
     "Contacts",

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 __all__ = [
     "Advance",
     "Candidates",
+    "Changes",
     "Closest",
     "Csr",
     "Hits",
@@ -160,6 +161,25 @@ def _locked(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
     return array
 
 
+class Changes(NamedTuple):
+    """The pairs of an answer beside those of an older one. All indices ascend, and fit NumPy: what a solver keeps per pair
+    (multipliers, anchors of friction, a warm start) moves by ``moved[kept[:, 1]] = values[kept[:, 0]]``.
+
+    Attributes
+    ----------
+    kept : numpy.ndarray of int64, shape (n, 2)
+        Of each pair that is in both answers its index in the old one and in the new one.
+    new : numpy.ndarray of int64, shape (n,)
+        Indices in the new answer.
+    gone : numpy.ndarray of int64, shape (n,)
+        Indices in the old answer.
+    """
+
+    kept: npt.NDArray[np.int64]
+    new: npt.NDArray[np.int64]
+    gone: npt.NDArray[np.int64]
+
+
 class Pairs:
     """The pairs of elements that intersect: sorted.
 
@@ -182,6 +202,42 @@ class Pairs:
         if self._rows is None:
             self._rows = _locked(self._inner.rows())
         return self._rows
+
+    def changes(self, old: Pairs) -> Changes:
+        """Which pairs an older answer also has, which are new, and which are gone.
+
+        Two pairs are the same if their bodies and elements are. Pairs of a body that was removed and of one that has its number now
+        differ; those of a body that was re-meshed are named by their numbers alone.
+
+        Parameters
+        ----------
+        old : Pairs
+            Of the same scene.
+
+        Returns
+        -------
+        Changes
+
+        Raises
+        ------
+        TypeError
+            An answer to another question.
+
+        Examples
+        --------
+        >>> import impinge
+        >>> scene = impinge.Scene()
+        >>> floor = scene.add([[0, 0, 0], [4, 0, 0], [0, 4, 0]], [[0, 1, 2]])
+        >>> rods = scene.add_edges([[1, 1, -1], [1, 1, 1], [2, 1, 3], [2, 1, 5]], [[0, 1], [2, 3]])
+        >>> detector = impinge.Detector("cpu")
+        >>> before = detector.detect(scene)
+        >>> scene.set_positions(rods, [[1, 1, -1], [1, 1, 1], [2, 1, -1], [2, 1, 1]])
+        >>> after = detector.detect(scene)
+        >>> kept, new, gone = after.changes(before)
+        >>> kept.tolist(), new.tolist(), gone.tolist()
+        ([[0, 0]], [1], [])
+        """
+        return Changes(*self._inner.changes(old._inner if isinstance(old, Pairs) else old))
 
     def between(self, a: _Body, b: _Body) -> npt.NDArray[np.uint32]:
         """The pairs of two bodies.
@@ -408,6 +464,22 @@ class Impacts(_OfKinds):
         """
         return self._inner.start_intersects()
 
+    def changes(self, old: Impacts) -> Changes:
+        """Which pairs an older answer also has, which are new, and which are gone, as `Pairs.changes`.
+
+        Two pairs are the same if their kinds, bodies and elements are, whatever their times.
+
+        Parameters
+        ----------
+        old : Impacts
+            Of the same scene; of a part (`of`), the same part.
+
+        Returns
+        -------
+        Changes
+        """
+        return Changes(*self._inner.changes(old._inner if isinstance(old, Impacts) else old))
+
     def of(self, kind: _PairKind) -> Impacts:
         """Those of one kind.
 
@@ -489,6 +561,22 @@ class NearPairs(_OfKinds):
         ``closest_points=True``.
         """
         return self._inner.points()
+
+    def changes(self, old: NearPairs) -> Changes:
+        """Which pairs an older answer also has, which are new, and which are gone, as `Pairs.changes`.
+
+        Two pairs are the same if their kinds, bodies and elements are, whatever their features and distances.
+
+        Parameters
+        ----------
+        old : NearPairs
+            Of the same scene; of a part (`of`), the same part.
+
+        Returns
+        -------
+        Changes
+        """
+        return Changes(*self._inner.changes(old._inner if isinstance(old, NearPairs) else old))
 
     def of(self, kind: _PairKind) -> NearPairs:
         """Those of one kind.

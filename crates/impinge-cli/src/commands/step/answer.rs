@@ -2,7 +2,7 @@
 
 use std::io::{self, Write};
 
-use impinge::{Advance, Error, Impact, Impacts, PairKind, Stats};
+use impinge::{Advance, Error, Impact, Impacts, PairKind, Stats, Truncation};
 use impinge_io::printable;
 use serde_json::{Map, Value, json};
 
@@ -30,6 +30,9 @@ pub struct Found<'a> {
     all: Option<&'a Impacts>,
     /// The part of the step that can be taken, if that was asked.
     fraction: Option<f64>,
+    /// How many vertices were stopped, how many pairs touch at the start, and in how many rounds
+    /// that was found, if it was asked.
+    truncated: Option<(u64, u64, u32)>,
     stats: &'a Stats,
     times: Times,
 }
@@ -42,6 +45,7 @@ impl<'a> Found<'a> {
             start_intersects: impacts.start_intersects(),
             all: Some(impacts),
             fraction: None,
+            truncated: None,
             stats: impacts.stats(),
             times: earlier.and(impacts.stats()),
         }
@@ -58,6 +62,7 @@ impl<'a> Found<'a> {
             start_intersects,
             all: None,
             fraction: None,
+            truncated: None,
             stats,
             times: earlier.and(stats),
         }
@@ -75,6 +80,15 @@ impl<'a> Found<'a> {
         }
     }
 
+    pub fn truncation(earliest: Option<Impact>, truncation: &Truncation, stats: &'a Stats) -> Self {
+        let (n_cut, n_touching) = (truncation.n_cut(), truncation.n_touching());
+        let start = truncation.start_intersects();
+        Found {
+            truncated: Some((n_cut, n_touching, truncation.rounds())),
+            ..Found::first(earliest, start, stats, Times::default())
+        }
+    }
+
     /// Whether nothing touches on the way, and nothing was found to intersect at the start.
     pub fn is_free(&self) -> bool {
         self.earliest.is_none() && self.start_intersects != Some(true)
@@ -89,12 +103,18 @@ impl<'a> Found<'a> {
     }
 
     /// `free`, `earliest`, `impacts`, `kinds`, `touching_at_start`, `start_intersects`, `hash`,
-    /// `backend`, `bodies`, `ms`, `stats`, `separation`, `clearance`, and `fraction` with
-    /// `--advance`; counts and the hash are null with `--earliest` and `--advance`.
+    /// `backend`, `bodies`, `ms`, `stats`, `separation`, `clearance`, with `--advance` `fraction`,
+    /// with `--truncate` `cut`, `touching` and `rounds`; counts and the hash are null with these
+    /// and with `--earliest`.
     pub fn json(&self, bodies: &Moving, how: &StepHow) -> Result<Map<String, Value>, Error> {
         let mut object = self.numbers();
         if let Some(fraction) = self.fraction {
             object.insert("fraction".into(), fraction.into());
+        }
+        if let Some((n_cut, n_touching, rounds)) = self.truncated {
+            object.insert("cut".into(), n_cut.into());
+            object.insert("touching".into(), n_touching.into());
+            object.insert("rounds".into(), rounds.into());
         }
         object.insert("bodies".into(), described(bodies)?);
         object.insert("ms".into(), self.ms());
@@ -184,6 +204,22 @@ impl<'a> Found<'a> {
         }
         if let Some(fraction) = self.fraction {
             writeln!(to, "{fraction:?} of the step can be taken")?;
+        }
+        if let Some((n_cut, n_touching, _)) = self.truncated {
+            let n: usize = bodies.vertices_that_move();
+            match self.start_intersects {
+                Some(true) => writeln!(to, "no vertex was moved")?,
+                _ => writeln!(
+                    to,
+                    "{} of {} vertices stop before their ends{}",
+                    grouped(n_cut),
+                    grouped(n as u64),
+                    match n_touching {
+                        0 => String::new(),
+                        n => format!("; {} touch at the start", counted(n, "pair")),
+                    }
+                )?,
+            }
         }
         if let Some(all) = self.all.filter(|all| !all.is_empty()) {
             writeln!(

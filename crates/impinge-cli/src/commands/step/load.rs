@@ -53,6 +53,12 @@ impl Moving {
         }
     }
 
+    /// How many vertices have an end position.
+    pub fn vertices_that_move(&self) -> usize {
+        let bodies = self.scene.bodies();
+        bodies.map(|(_, body)| body.n_vertices()).sum()
+    }
+
     /// Reads files in pairs.
     pub fn read(args: &StepArgs, cancel: &CancelToken) -> Result<Self, Error> {
         let (pairs, rest) = args.meshes.as_chunks::<2>();
@@ -90,7 +96,7 @@ impl Moving {
         let (mut at_start, summary) = read_with_summary(start, &ReadOptions::as_they_are())?;
         let (mut at_end, _) = read_with_summary(end, &ReadOptions::as_they_are())?;
         same_elements(&names, &at_start, &at_end)?;
-        if !args.advance.is_empty() {
+        if !args.reached().1.is_empty() {
             let elements = at_start.elements.clone();
             self.given.push(Given {
                 elements,

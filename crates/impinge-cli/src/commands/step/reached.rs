@@ -1,6 +1,6 @@
-//! `impinge step --advance`: how far a step can be taken, and the bodies there.
+//! `impinge step --advance` and `--truncate`: how far a step can be taken, and the bodies there.
 
-use impinge::{Advance, Positions};
+use impinge::{BodyId, Positions};
 use impinge_io::{ColoredMesh, Elements, write_obj, write_ply};
 
 use crate::error::Error;
@@ -9,11 +9,11 @@ use crate::values::ReachedFile;
 use super::load::{Given, Moving};
 
 /// Fails unless there is a file per body, of a format that holds it.
-pub fn check(files: &[ReachedFile], bodies: &Moving) -> Result<(), Error> {
+pub fn check((option, files): (&str, &[ReachedFile]), bodies: &Moving) -> Result<(), Error> {
     let n = bodies.ids.len();
     if files.len() != n {
         let text = format!(
-            "--advance writes a file per body: {} are named for {n} bodies",
+            "{option} writes a file per body: {} are named for {n} bodies",
             files.len()
         );
         return Err(Error::Usage(text));
@@ -24,7 +24,7 @@ pub fn check(files: &[ReachedFile], bodies: &Moving) -> Result<(), Error> {
     match files.iter().zip(&bodies.given).find(misfits) {
         None => Ok(()),
         Some((file, _)) => Err(Error::Usage(format!(
-            "--advance {}: OBJ files hold triangles: write tetrahedra as .ply",
+            "{option} {}: OBJ files hold triangles: write tetrahedra as .ply",
             impinge_io::printable(&file.path)
         ))),
     }
@@ -32,12 +32,15 @@ pub fn check(files: &[ReachedFile], bodies: &Moving) -> Result<(), Error> {
 
 /// Writes each body at the positions that were reached, with the vertices and elements of its
 /// files, so that the files can begin the next step.
-pub fn write(files: &[ReachedFile], bodies: &Moving, advance: &Advance) -> Result<(), Error> {
+pub fn write<'a>(
+    files: &[ReachedFile],
+    bodies: &'a Moving,
+    reached: impl Fn(BodyId) -> Option<&'a Positions>,
+) -> Result<(), Error> {
     for (ix, (file, given)) in files.iter().zip(&bodies.given).enumerate() {
         let id = bodies.ids[ix];
-        let reached = advance.positions.iter().find(|(body, _)| *body == id);
-        let positions = match reached {
-            Some((_, positions)) => positions,
+        let positions = match reached(id) {
+            Some(positions) => positions,
             None => bodies.scene.body(id)?.positions(),
         };
         let positions = as_given(positions, given.map.as_deref());

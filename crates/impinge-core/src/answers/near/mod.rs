@@ -2,6 +2,7 @@
 
 mod labels;
 
+use crate::answers::changes::Changes;
 use crate::answers::home::{Home, gives_back};
 use crate::answers::numbering::{Numbering, row};
 use crate::answers::pairs::{Element, hash_row, mix};
@@ -238,6 +239,15 @@ impl NearPairs {
                 .zip(points)
                 .map(|(distance, points)| ClosestPoints { distance, points }),
         })
+    }
+
+    /// Which pairs an older answer also has, which are new, and which are gone: two pairs are the
+    /// same if their kinds, bodies and elements are, whatever
+    /// their features and distances. Pairs of a body that was removed and of one in
+    /// its slot differ; those of a body that was re-meshed are named by their numbers alone.
+    pub fn changes(&self, old: &NearPairs) -> Changes {
+        let key = |pair: NearPair| (pair.kind, pair.a, pair.b);
+        Changes::between(old.iter().map(key), self.iter().map(key))
     }
 
     /// A hash of the set of pairs and their features that does not depend on their order: the

@@ -1,0 +1,307 @@
+//! `impinge safe`: how far each vertex may move on any path, so that nothing touches.
+
+use std::io::Write;
+
+use impinge::{Body, BodyId, Bounds, CancelToken, Elements, Part, SafeDistances};
+use impinge_io::{Cell, ColoredMesh, Column, Holds, printable};
+use impinge_render::{Face, Normals, Surface};
+use serde_json::{Map, Value, json};
+
+use crate::apart::Inputs;
+use crate::args::SafeArgs;
+use crate::asked::{Asked, Question, body};
+use crate::detection::{Times, asked, detector, hit, query};
+use crate::error::Error;
+use crate::load::{Bodies, Loading};
+use crate::output::{out, say, stage_table};
+use crate::picture::Drawer;
+use crate::text::{counted, grouped};
+use crate::values::MeshFile;
+use crate::watch::Watch;
+use crate::{headline, json, meshes, output, palette, rows};
+
+/// `impinge safe`.
+pub fn safe(args: &SafeArgs, cancel: &CancelToken) -> Result<(), Error> {
+    let ask = &args.ask;
+    let inputs = Inputs::new(&args.meshes);
+    for (option, path) in args.outputs() {
+        inputs.check(option, path)?;
+    }
+    let rows_file = args.rows.file(&inputs, ask.json)?;
+    let mut bodies = Bodies::read(&args.meshes, Loading::new(ask, !args.no_self, cancel))?;
+    for &(number, thickness) in &args.thickness {
+        let id = body("--thickness", &bodies.ids, number)?;
+        bodies.scene.set_thickness(id, thickness)?;
+    }
+    let fixed = args.fixed.iter();
+    let fixed = fixed.map(|&number| body("--fixed", &bodies.ids, number));
+    let fixed: Vec<BodyId> = fixed.collect::<Result<_, _>>()?;
+    let mut detector = detector(&args.detector)?;
+    if args.no_self && bodies.ids.len() < 2 {
+        return Err(Error::Usage(
+            "--no-self leaves nothing to test if there is only one body".to_owned(),
+        ));
+    }
+    let asked = Asked {
+        question: Question::Near,
+        has_self: false,
+        ..asked((bodies.ids.len() > 1, !args.no_self), ask)
+    };
+    let intersect = query(asked, &ask.exclude, &bodies.ids)?;
+
+    let watch = Watch::detection(!args.detector.no_progress, "detecting");
+    detector.set_control(watch.control(cancel));
+    let safe =
+        detector.safe_distances(&bodies.scene, args.most, &intersect.clone().fixed(fixed))?;
+    // Edges that pass through faces may be far from what else there is of them.
+    let intersects = !safe.touching().is_empty() || detector.any(&bodies.scene, &intersect)?;
+    drop(watch);
+    let answer = Answer {
+        args,
+        asked,
+        bodies: &bodies,
+        safe: &safe,
+        intersects,
+    };
+    // Files are written first: if one can't be written, no answer is printed that looks like
+    // success.
+    if let Some(file) = &rows_file {
+        let columns = [
+            ("body", Holds::U32),
+            ("vertex", Holds::U32),
+            ("safe", Holds::F64),
+        ];
+        let columns = columns.map(|(name, holds)| Column::new(name, holds));
+        let each = answer.bounds();
+        let row =
+            |(body, vertex, bound)| [rows::number(body), rows::number(vertex), Cell::Float(bound)];
+        rows::write(file, columns.to_vec(), safe.n_vertices(), each.map(row))?;
+    }
+    if let Some(file) = &args.out {
+        answer.write_colored(file)?;
+    }
+    if let Some(png) = &args.png {
+        let device = args.detector.device.as_deref();
+        Drawer::new(&args.picture, device, 1)?.draw(&png.0, answer.surfaces()?)?;
+    }
+    if ask.json {
+        writeln!(out(), "{}", Value::Object(answer.object()?))?;
+    } else {
+        let mut text = Vec::new();
+        answer.print(&mut text)?;
+        writeln!(text, "{}", asked.line(&bodies.vertices, &bodies.nouns))?;
+        say(&text, rows_file.as_ref())?;
+    }
+    hit(ask.fail_on_hit, intersects)
+}
+
+struct Answer<'a> {
+    args: &'a SafeArgs,
+    asked: Asked,
+    bodies: &'a Bodies,
+    safe: &'a SafeDistances,
+    intersects: bool,
+}
+
+impl Answer<'_> {
+    fn of(&self, id: BodyId) -> Bounds<'_> {
+        self.safe.of(id).unwrap_or(Bounds::F32(&[]))
+    }
+
+    /// The largest bound of a body: what was asked for, in the precision of its positions.
+    fn most(&self, body: usize) -> f64 {
+        let most = self.args.most;
+        match self.of(self.bodies.ids[body]) {
+            Bounds::F64(_) => most,
+            Bounds::F32(_) => {
+                let single = most as f32;
+                let is_above = f64::from(single) > most;
+                f64::from(f32::from_bits(single.to_bits() - u32::from(is_above)))
+            }
+        }
+    }
+
+    /// The number of the body, the vertex and its bound.
+    fn bounds(&self) -> impl Iterator<Item = (usize, usize, f64)> {
+        let bodies = self.bodies.ids.iter().enumerate();
+        bodies.flat_map(|(number, &id)| {
+            let bounds = self.of(id);
+            (0..bounds.len()).map(move |vertex| (number, vertex, bounds.get(vertex)))
+        })
+    }
+
+    /// Vertices that move, with their bounds: those of fixed bodies have none of their own.
+    fn moving(&self) -> impl Iterator<Item = (usize, usize, f64)> {
+        self.bounds()
+            .filter(|(body, ..)| !self.args.fixed.contains(body))
+    }
+
+    /// The first vertex with the least bound of all that move.
+    fn smallest(&self) -> Option<(usize, usize, f64)> {
+        self.moving()
+            .reduce(|least, next| if next.2 < least.2 { next } else { least })
+    }
+
+    fn n_bounded(&self) -> usize {
+        self.moving()
+            .filter(|(body, _, bound)| *bound < self.most(*body))
+            .count()
+    }
+
+    /// The object that `docs/safe.schema.json` describes.
+    fn object(&self) -> Result<Map<String, Value>, Error> {
+        let Bodies {
+            scene,
+            ids,
+            names,
+            vertices,
+            ..
+        } = self.bodies;
+        let described = |ix: usize| {
+            let mut object = json::body(scene, ids[ix], &names[ix], &vertices[ix])?;
+            object["fixed"] = self.args.fixed.contains(&ix).into();
+            Ok(object)
+        };
+        let described: Vec<Value> = (0..ids.len())
+            .map(described)
+            .collect::<Result<_, Error>>()?;
+        let smallest = self.smallest();
+        let smallest = smallest
+            .map(|(body, vertex, safe)| json!({ "body": body, "vertex": vertex, "safe": safe }));
+        let stats = self.safe.stats();
+        let times = Times::default().and(stats);
+        let mut object = Map::new();
+        object.insert("most".into(), self.args.most.into());
+        object.insert("asked".into(), self.asked.json());
+        object.insert("vertices".into(), self.moving().count().into());
+        object.insert("bounded".into(), self.n_bounded().into());
+        object.insert("smallest".into(), json!(smallest));
+        object.insert("touching".into(), self.safe.touching().len().into());
+        object.insert("intersects".into(), self.intersects.into());
+        object.insert("bodies".into(), described.into());
+        json::add_how(&mut object, stats, json::ms(&times));
+        Ok(object)
+    }
+
+    /// The answer in the first line, then what touches.
+    fn print(&self, to: &mut impl Write) -> Result<(), Error> {
+        let Bodies { nouns, names, .. } = self.bodies;
+        let subject = headline::subject(nouns, names);
+        let most = self.args.most;
+        let n = grouped(self.moving().count() as u64);
+        let (n_bounded, smallest) = (self.n_bounded(), self.smallest());
+        match smallest.filter(|_| n_bounded > 0) {
+            None => writeln!(to, "{subject}: all {n} vertices may move by {most}")?,
+            Some((body, vertex, bound)) => {
+                let of = match names.len() {
+                    1 => String::new(),
+                    _ => format!(" of {}", printable(&names[body])),
+                };
+                writeln!(
+                    to,
+                    "{subject}: {} of {n} vertices may move by less than {most}, vertex {vertex}{of} by {bound:?} at most",
+                    grouped(n_bounded as u64)
+                )?;
+            }
+        }
+        let touching = self.safe.touching().len() as u64;
+        match (touching, self.intersects) {
+            (0, false) => writeln!(to, "nothing touches")?,
+            (0, true) => writeln!(to, "elements intersect: the bounds keep others apart")?,
+            (n, _) => writeln!(
+                to,
+                "{} of elements touch and may not move",
+                counted(n, "pair")
+            )?,
+        }
+        let stats = self.safe.stats();
+        let times = Times::default().and(stats);
+        if self.args.ask.verbose {
+            writeln!(to, "\n{}\n", stage_table(&times))?;
+        }
+        writeln!(to, "{}", output::how(stats, &times))?;
+        Ok(())
+    }
+
+    /// The colour of an element: from red where nothing may move to yellow, and grey where all may
+    /// move as far as was asked.
+    fn color(&self, body: usize, corners: &[u32]) -> ([u8; 3], bool) {
+        let bounds = self.of(self.bodies.ids[body]);
+        let least = corners
+            .iter()
+            .map(|&corner| bounds.get(corner as usize))
+            .fold(f64::INFINITY, f64::min);
+        match least < self.most(body) && !self.args.fixed.contains(&body) {
+            true => (palette::time(least / self.args.most), true),
+            false => (palette::body(body).other, false),
+        }
+    }
+
+    fn write_colored(&self, file: &MeshFile) -> Result<(), Error> {
+        struct Shown {
+            positions: impinge_io::Positions,
+            elements: impinge_io::Elements,
+            colors: Vec<[u8; 3]>,
+            bounded: Vec<bool>,
+        }
+        let Bodies {
+            scene, ids, names, ..
+        } = self.bodies;
+        let shown = |(ix, &id): (usize, &BodyId)| {
+            let body = scene.body(id)?;
+            let elements = body.elements();
+            let each = 0..elements.len();
+            let (colors, bounded) = each.map(|at| self.color(ix, elements.corners(at))).unzip();
+            Ok(Shown {
+                positions: meshes::from_positions(body.positions()),
+                elements: meshes::from_elements(elements),
+                colors,
+                bounded,
+            })
+        };
+        let shown = ids.iter().enumerate().map(shown);
+        let shown: Vec<Shown> = shown.collect::<Result<_, Error>>()?;
+        let meshes: Vec<ColoredMesh> = shown
+            .iter()
+            .zip(names)
+            .map(|(shown, name)| ColoredMesh {
+                positions: &shown.positions,
+                elements: &shown.elements,
+                primitive_colors: Some(&shown.colors),
+                colliding: Some(&shown.bounded),
+                name,
+            })
+            .collect();
+        meshes::write_colored(file, &meshes)
+    }
+
+    fn surfaces(&self) -> Result<Vec<Surface>, Error> {
+        let Bodies { scene, ids, .. } = self.bodies;
+        let surface = |(ix, &id): (usize, &BodyId)| Ok(self.surface(ix, scene.body(id)?));
+        ids.iter().enumerate().map(surface).collect()
+    }
+
+    fn surface(&self, ix: usize, body: &Body) -> Surface {
+        let faces = match body.part(Part::Faces) {
+            Elements::Triangles(faces) => faces.as_slice(),
+            _ => &[],
+        };
+        let positions = body.positions();
+        let face = |&corners: &[u32; 3]| Face {
+            corners,
+            color: self.color(ix, &corners).0,
+            // All that is near something else would show through.
+            shows_through: false,
+        };
+        Surface {
+            positions: (0..body.n_vertices())
+                .map(|at| positions.point(at))
+                .collect(),
+            faces: faces.iter().map(face).collect(),
+            normals: match body.elements() {
+                Elements::Tetrahedra(_) => Normals::Flat,
+                _ => Normals::Smooth,
+            },
+        }
+    }
+}

@@ -1,0 +1,89 @@
+//! What has changed from one answer to the next: which pairs are kept, new and gone.
+
+use std::cmp::Ordering;
+
+/// The pairs of an answer beside those of an older one: [`Pairs::changes`](crate::Pairs::changes),
+/// [`Impacts::changes`](crate::Impacts::changes), [`NearPairs::changes`](crate::NearPairs::changes).
+///
+/// What a solver keeps per pair (multipliers, anchors of friction, a warm start) moves with it:
+///
+/// ```
+/// use impinge::{Backend, Detector, Query, Scene};
+/// # fn main() -> Result<(), impinge::Error> {
+/// let mut scene = Scene::new();
+/// scene.add_triangles(&[[0, 1, 2]], &[[0.0f32, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]])?;
+/// let points = scene.add_points(&[[1.0f32, 1.0, 0.5], [2.0, 1.0, 0.5], [1.0, 2.0, 9.0]])?;
+/// let mut detector = Detector::new(Backend::Cpu)?;
+/// let mut near = detector.near(&scene, 1.0, &Query::all())?;
+/// let mut multipliers = vec![0.25, 0.5];
+///
+/// scene.set_positions(points, &[[1.0f32, 1.0, 9.0], [2.0, 1.0, 0.5], [1.0, 2.0, 0.5]])?;
+/// let next = detector.near(&scene, 1.0, &Query::all())?;
+/// let changes = next.changes(&near);
+/// let mut moved = vec![0.0; next.len()];
+/// for &[old, new] in &changes.kept {
+///     moved[new] = multipliers[old];
+/// }
+/// (near, multipliers) = (next, moved);
+/// assert_eq!((changes.new, changes.gone), (vec![1], vec![0]));
+/// assert_eq!(multipliers, [0.5, 0.0]);
+/// # assert_eq!(near.len(), 2);
+/// # Ok(()) }
+/// ```
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Changes {
+    /// Of each pair that is in both answers its index in the old one and in the new one; both
+    /// ascend.
+    pub kept: Vec<[usize; 2]>,
+    /// The indices, in the new answer, of pairs that the old one does not have; ascending.
+    pub new: Vec<usize>,
+    /// The indices, in the old answer, of pairs that the new one does not have; ascending.
+    pub gone: Vec<usize>,
+}
+
+impl Changes {
+    /// Whether both answers have the same pairs.
+    pub fn is_empty(&self) -> bool {
+        self.new.is_empty() && self.gone.is_empty()
+    }
+
+    /// Compares parts of answers, or anything else that ascends strictly: what makes a pair the
+    /// same, of all old ones and of all new ones. Takes time in their number.
+    ///
+    /// ```
+    /// use impinge::Changes;
+    /// let changes = Changes::between([2, 3, 5, 8], [1, 3, 5]);
+    /// assert_eq!(changes.kept, [[1, 1], [2, 2]]);
+    /// assert_eq!((changes.new, changes.gone), (vec![0], vec![0, 3]));
+    /// ```
+    pub fn between<K: Ord>(
+        old: impl IntoIterator<Item = K>,
+        new: impl IntoIterator<Item = K>,
+    ) -> Self {
+        let (mut old, mut new) = (old.into_iter().enumerate(), new.into_iter().enumerate());
+        let mut changes = Changes::default();
+        let (mut before, mut after) = (old.next(), new.next());
+        loop {
+            let order = match (&before, &after) {
+                (None, None) => return changes,
+                (Some(_), None) => Ordering::Less,
+                (None, Some(_)) => Ordering::Greater,
+                (Some((_, before)), Some((_, after))) => before.cmp(after),
+            };
+            // At most one of them is absent.
+            let indices = [&before, &after].map(|at| at.as_ref().map_or(0, |(ix, _)| *ix));
+            match order {
+                Ordering::Less => changes.gone.push(indices[0]),
+                Ordering::Greater => changes.new.push(indices[1]),
+                Ordering::Equal => changes.kept.push(indices),
+            }
+            if order.is_le() {
+                before = old.next();
+            }
+            if order.is_ge() {
+                after = new.next();
+            }
+        }
+    }
+}
