@@ -252,6 +252,7 @@ fn every_command_that_prints_json_has_a_schema() {
             "check",
             "check a.ply c.mesh broken.obj missing.ply soup.obj",
         ),
+        ("assembly", "check a.ply b.ply --assembly"),
         ("fix", "fix soup.obj --out mended.ply --close-holes 3"),
         ("tiles-plan", "tiles plan still a.ply b.ply --cap 200"),
         ("tiles-scatter", "tiles scatter still"),
