@@ -288,6 +288,47 @@ fn bounds_of_multiples_of_the_smallest_number() {
     }
 }
 
+/// Pairs that give no vertex less are dropped before they are measured: with many of nearly the same
+/// distance, and some that touch, the answer is that of the method which drops none.
+#[test]
+fn pairs_that_are_dropped_would_not_count() {
+    let mut random = Random::new(11);
+    let sheet = surfaces::cloth(7, 7, 1.0);
+    for (round, is_double) in [(0, false), (1, false), (2, true), (3, true)] {
+        let mut scene = Scene::new();
+        let lower = sheet.add_to(&mut scene).expect("good");
+        // A millionth is less than the filter can tell in single precision.
+        let mut height = |[x, y, z]: [f32; 3]| match (x + y) as u32 % 5 {
+            0 if round % 2 == 1 => [x, y, z],
+            _ => [x, y, z + 0.75 + 1e-6 * random.unit()],
+        };
+        let at: Vec<[f32; 3]> = sheet.positions.iter().map(|&p| height(p)).collect();
+        let upper = if is_double {
+            let at: Vec<Point> = at.iter().map(|p| p.map(f64::from)).collect();
+            scene.add((sheet.elements.clone(), at)).expect("good")
+        } else {
+            scene.add((sheet.elements.clone(), at)).expect("good")
+        };
+        for thickness in [0.0, 0.3] {
+            scene.set_thickness(upper, thickness).expect("good");
+            for fixed in [&[][..], &[lower]] {
+                let query = Query::all().fixed(fixed.iter().copied());
+                let [naive, others @ ..] = detectors().map(|mut detector| {
+                    detector.safe_distances(&scene, 0.9, &query).expect("good")
+                });
+                let rows = |of: &SafeDistances| of.touching().iter().collect::<Vec<_>>();
+                assert_eq!(rows(&naive).is_empty(), round % 2 == 0);
+                for other in others {
+                    for body in [lower, upper] {
+                        assert_eq!(naive.of(body), other.of(body), "{round} {thickness}");
+                    }
+                    assert_eq!(rows(&naive), rows(&other), "{round} {thickness}");
+                }
+            }
+        }
+    }
+}
+
 #[test]
 fn bounds_hold_on_surfaces() {
     let mut scene = Scene::new();

@@ -16,6 +16,7 @@ use crate::search::key_ranges::{KeyRanges, Tally};
 use crate::search::naive;
 use crate::search::narrow::{BoxOverlap, FirstContact, Within};
 use crate::search::runner::{Finder, Job};
+use crate::search::shares::Shares;
 use crate::search::sink::Ending;
 use crate::search::stats::Stats;
 use impinge_exact::Contact;
@@ -25,6 +26,8 @@ use impinge_exact::Contact;
 pub(super) enum Keys<'a> {
     #[default]
     All,
+    /// Those of pairs that may lower some vertex's share, and perhaps others.
+    Lowering(&'a Shares),
     /// Those in some ranges.
     In(&'a KeyRanges),
     /// They are counted and forgotten.
@@ -119,6 +122,7 @@ impl InStep<'_> {
     ) -> Result<(), Error> {
         let answer = match self.keys {
             Keys::All => StepAnswer::Keys(answer),
+            Keys::Lowering(shares) => StepAnswer::Lowering(answer, shares),
             Keys::In(ranges) => StepAnswer::KeysIn(answer, ranges),
             Keys::Counted(tally) => StepAnswer::Counts(tally),
         };

@@ -83,7 +83,7 @@ impl Detector {
         outcome: &mut impl Outcome<u64, { PairKind::ALL.len() }>,
     ) -> Result<u64, Error> {
         let plan = Plan::nearness(scene, query, distance, self.settings.limits())?;
-        self.find_keys(scene, &plan, outcome)
+        self.find_keys(scene, &plan, Keys::All, outcome)
     }
 
     /// Finds pairs of vertices, edges and faces, for whatever becomes of them.
@@ -91,6 +91,7 @@ impl Detector {
         &mut self,
         scene: &Scene,
         plan: &Plan,
+        keys: Keys<'_>,
         outcome: &mut impl Outcome<u64, { PairKind::ALL.len() }>,
     ) -> Result<u64, Error> {
         let control = &self.control.clone();
@@ -99,7 +100,7 @@ impl Detector {
             settings: &self.settings,
             #[cfg(feature = "gpu")]
             gpu: &mut self.gpu,
-            keys: Keys::All,
+            keys,
             seen: Seen::default(),
         };
         ready(self.runner.run(scene, plan, control, &mut finder, outcome))

@@ -2,19 +2,21 @@
 //! elements are near each element.
 //!
 //! ```text
-//! near pairs (keys)  ->  Measured    a number below the distance of each pair, in parallel
+//! near pairs (keys)  ->  Measured    a number below the distance of each pair, eight pairs at a time, in parallel
 //! SafeDistances                      of each vertex, the least share of these
 //! Neighbours                         the pairs by element
 //! ```
-
-use std::sync::atomic::{AtomicU64, Ordering};
+//!
+//! For safe distances, pairs whose bounds show that they give no vertex less are dropped where they
+//! are found.
 
 use super::Detector;
+use super::in_step::Keys;
 use super::near::name_features;
 use crate::answers::near::Labels;
 use crate::answers::neighbours::Neighbours;
 use crate::answers::safe::SafeDistances;
-use crate::plan::Plan;
+use crate::plan::{Plan, TestId};
 use crate::query::Query;
 use crate::query::pair_kind::PairKind;
 use crate::query::step::check_distance;
@@ -22,13 +24,17 @@ use crate::scene::Scene;
 use crate::scene::error::Error;
 use crate::scene::index::{PartIx, pair_numbers};
 use crate::search::found::KeysByKind;
-use crate::search::narrow::Corners;
+use crate::search::narrow::{Corners, exact_kind};
 use crate::search::runner::{Job, Outcome};
+use crate::search::shares::{Shares, without};
 use crate::search::sink::reserve;
 use crate::search::stats::Stats;
 use crate::search::work::Work;
+use crate::simd::{Isa, Simd, with_isa};
 use crate::workers::clock::Instant;
-use impinge_exact::internal::distance_below;
+use impinge_exact::ElementPair;
+use impinge_exact::internal::filter::{LANES, Points8, Spans8, distance_bounds};
+use impinge_exact::internal::{below_by_bounds, distance_below};
 
 /// Pairs that a task measures.
 const TASK: usize = 1024;
@@ -38,9 +44,7 @@ const TASK: usize = 1024;
 pub(super) struct SolverMemory {
     pub keys: KeysByKind,
     distances: [Vec<f64>; PairKind::ALL.len()],
-    /// Of each vertex of each body, the bits of the least share: floats of at least 0 are in the
-    /// order of their bits.
-    least: Vec<AtomicU64>,
+    shares: Shares,
 }
 
 impl Detector {
@@ -89,15 +93,20 @@ impl Detector {
         for &body in &query.fixed {
             scene.body(body)?;
         }
-        let mut safe = self.homes.safe.take();
+        let plan = Plan::nearness(scene, query, 2.0 * most, self.settings.limits())?;
         let mut memory = std::mem::take(&mut self.solver);
+        let mut shares = std::mem::take(&mut memory.shares);
+        shares.begin(scene, &plan, query, most)?;
+        let mut safe = self.homes.safe.take();
         let mut outcome = Safe {
             safe: &mut safe,
             memory: &mut memory,
+            shares: &shares,
+            isa: Isa::detect(self.settings.instruction_set),
             query,
-            most,
         };
-        let found = self.find_near(scene, 2.0 * most, query, &mut outcome);
+        let found = self.find_keys(scene, &plan, Keys::Lowering(&shares), &mut outcome);
+        memory.shares = shares;
         self.solver = memory;
         self.stats.clone_from(safe.stats());
         found.map(|_| safe)
@@ -133,6 +142,7 @@ impl Detector {
         let mut outcome = Listed {
             neighbours: &mut neighbours,
             memory: &mut memory,
+            isa: Isa::detect(self.settings.instruction_set),
         };
         let found = self.find_near(scene, distance, query, &mut outcome);
         self.solver = memory;
@@ -145,8 +155,7 @@ impl Detector {
 struct Measured<'a> {
     parts: [PartIx; 2],
     corners: [&'a [u32]; 2],
-    /// A number below its distance minus the thickness of both bodies; 0 if and only if that is not
-    /// above 0.
+    /// A number below its distance; 0 if and only if that is not above 0.
     distance: f64,
 }
 
@@ -159,6 +168,7 @@ impl SolverMemory {
     fn measure(
         &mut self,
         job: Job<'_>,
+        isa: Isa,
         keys: KeysByKind,
         stats: &mut Stats,
         each: impl Fn(Measured<'_>) + Sync,
@@ -184,30 +194,44 @@ impl SolverMemory {
         }
         let n_tasks = tasks.len() as u64;
         Work { workers, control }.each(&mut tasks, |_, (kind, keys, distances)| {
-            for (key, distance) in keys.iter_mut().zip(&mut **distances) {
-                (*key, _) = labels.split(*key);
-                let [a, b] = pair_numbers(*key).map(|number| plan.locate(number));
-                let parts = [a.0, b.0];
-                let corners = [&a, &b].map(|(part, element)| {
-                    let body = plan.body(scene, *part);
-                    body.corners(plan.part(*part).part, element)
-                });
-                *distance = match kind {
-                    // They meet.
-                    PairKind::EdgeFace => 0.0,
-                    _ => {
-                        let [a, b] = [0, 1].map(|side| {
-                            let body = plan.body(scene, parts[side]);
-                            Corners::new(body.positions(), corners[side])
-                        });
-                        plan.without_thickness(parts, distance_below(a.points(), b.points()))
+            let pair = exact_kind(TestId::Elements(*kind));
+            let mut points = Points8::default();
+            for (keys, distances) in keys.chunks_mut(LANES).zip(distances.chunks_mut(LANES)) {
+                for key in &mut *keys {
+                    (*key, _) = labels.split(*key);
+                }
+                let bounds = pair.map(|pair| {
+                    for (lane, key) in keys.iter().enumerate() {
+                        put_points((scene, plan), pair, *key, lane, &mut points);
                     }
-                };
-                each(Measured {
-                    parts,
-                    corners,
-                    distance: *distance,
+                    bounds_by_lane(isa, pair, &points)
                 });
+                for (lane, (key, to)) in keys.iter().zip(distances).enumerate() {
+                    let located = pair_numbers(*key).map(|number| plan.locate(number));
+                    let parts = [located[0].0, located[1].0];
+                    let [a, b] = located.each_ref().map(|(part, element)| {
+                        let body = plan.body(scene, *part);
+                        (body, body.corners(plan.part(*part).part, element))
+                    });
+                    let known = bounds
+                        .as_ref()
+                        .and_then(|bounds| below_by_bounds([bounds.low[lane], bounds.high[lane]]));
+                    let distance = known.unwrap_or_else(|| match kind {
+                        // They meet.
+                        PairKind::EdgeFace => 0.0,
+                        _ => {
+                            let [a, b] = [a, b]
+                                .map(|(body, corners)| Corners::new(body.positions(), corners));
+                            distance_below(a.points(), b.points())
+                        }
+                    });
+                    *to = without(plan.thickness(parts), distance);
+                    each(Measured {
+                        parts,
+                        corners: [a.1, b.1],
+                        distance,
+                    });
+                }
             }
             Ok(())
         })?;
@@ -219,16 +243,58 @@ impl SolverMemory {
     fn bytes(&self) -> u64 {
         let distances: usize = self.distances.iter().map(Vec::capacity).sum();
         let keys: usize = self.keys.iter().map(Vec::capacity).sum();
-        (size_of::<f64>() * (distances + keys + self.least.capacity())) as u64
+        (size_of::<f64>() * (distances + keys) + self.shares.bytes()) as u64
     }
+}
+
+/// Writes the points of a pair into a lane, in the order of the exact test.
+fn put_points(
+    (scene, plan): (&Scene, &Plan),
+    pair: ElementPair,
+    key: u64,
+    lane: usize,
+    Points8(points): &mut Points8,
+) {
+    let mut numbers = pair_numbers(key);
+    if pair == ElementPair::VertexEdge {
+        // Such pairs are named edge first, but tested vertex first.
+        numbers.reverse();
+    }
+    let mut rows = points.iter_mut();
+    for number in numbers {
+        let (part, element) = plan.locate(number);
+        let body = plan.body(scene, part);
+        let positions = body.positions();
+        let corners = body.corners(plan.part(part).part, &element);
+        for (&corner, row) in corners.iter().zip(&mut rows) {
+            for (to, x) in row.iter_mut().zip(positions.point(corner as usize)) {
+                to[lane] = x;
+            }
+        }
+    }
+}
+
+/// Bounds of the distances of eight pairs.
+fn bounds_by_lane(isa: Isa, pair: ElementPair, points: &Points8) -> Spans8 {
+    with_isa!(isa, bounds_in_registers, (
+        pair: ElementPair = pair,
+        points: &Points8 = points,
+    ) -> Spans8)
+}
+
+#[inline(always)]
+fn bounds_in_registers<S: Simd>(_: S, pair: ElementPair, points: &Points8) -> Spans8 {
+    distance_bounds::<S::F64>(pair, points)
 }
 
 /// Near pairs that become a bound per vertex.
 struct Safe<'a> {
     safe: &'a mut SafeDistances,
     memory: &'a mut SolverMemory,
+    /// As far as the pairs lower them that were not dropped.
+    shares: &'a Shares,
+    isa: Isa,
     query: &'a Query,
-    most: f64,
 }
 
 impl Outcome<u64, { PairKind::ALL.len() }> for Safe<'_> {
@@ -246,42 +312,14 @@ impl Outcome<u64, { PairKind::ALL.len() }> for Safe<'_> {
 
     fn fill(&mut self, job: Job<'_>, keys: KeysByKind) -> Result<(), Error> {
         let Job { scene, plan, .. } = job;
-        let is_fixed = |part: PartIx| self.query.fixed.contains(&plan.part(part).id);
-        let are_fixed: Vec<bool> = plan.part_ixs().map(is_fixed).collect();
-        let n_vertices = scene.bodies().map(|(_, body)| body.n_vertices()).sum();
-        let firsts = plan.first_vertices(scene);
-        let mut least = std::mem::take(&mut self.memory.least);
-        least.clear();
-        reserve(&mut least, n_vertices, "safe distances")?;
-        for (id, body) in scene.bodies() {
-            // What is fixed does not move.
-            let most = if self.query.fixed.contains(&id) {
-                0.0
-            } else {
-                self.most
-            };
-            let own = std::iter::repeat_n(most.to_bits(), body.n_vertices());
-            least.extend(own.map(AtomicU64::new));
-        }
+        let shares = self.shares;
         let stats = self.safe.stats_mut();
-        self.memory.measure(job, keys, stats, |pair| {
-            let shares = shares(
-                pair.distance,
-                pair.parts.map(|part| are_fixed[part.index()]),
-            );
-            for side in 0..2 {
-                let first = firsts[pair.parts[side].index()];
-                for &corner in pair.corners[side] {
-                    let bits = shares[side].to_bits();
-                    least[first + corner as usize].fetch_min(bits, Ordering::Relaxed);
-                }
-            }
+        (self.memory).measure(job, self.isa, keys, stats, |pair| {
+            shares
+                .between(plan, pair.parts)
+                .take(pair.corners, pair.distance);
         })?;
-        let bounds = least
-            .iter()
-            .map(|bits| f64::from_bits(bits.load(Ordering::Relaxed)));
-        self.safe.fill(scene, bounds)?;
-        self.memory.least = least;
+        self.safe.fill(scene, shares.iter())?;
         // The keys of the pairs that touch, which have no labels now.
         let labels = Labels::new(plan.n_primitives());
         let lists = self.memory.keys.iter().zip(&self.memory.distances);
@@ -295,27 +333,7 @@ impl Outcome<u64, { PairKind::ALL.len() }> for Safe<'_> {
     }
 
     fn bytes(&self) -> u64 {
-        self.safe.bytes() + self.memory.bytes()
-    }
-}
-
-/// How far the vertices of either element of a pair may move, so that both together move less than
-/// a number. Neither has to share with what is fixed.
-fn shares(distance: f64, are_fixed: [bool; 2]) -> [f64; 2] {
-    match are_fixed {
-        [true, true] => [0.0; 2],
-        [true, false] => [0.0, distance],
-        [false, true] => [distance, 0.0],
-        [false, false] => {
-            let half = distance / 2.0;
-            // Half of an odd multiple of the smallest number may be rounded up.
-            let half = if half + half > distance {
-                half.next_down()
-            } else {
-                half
-            };
-            [half; 2]
-        }
+        self.safe.bytes() + self.memory.bytes() + self.shares.bytes() as u64
     }
 }
 
@@ -323,6 +341,7 @@ fn shares(distance: f64, are_fixed: [bool; 2]) -> [f64; 2] {
 struct Listed<'a> {
     neighbours: &'a mut Neighbours,
     memory: &'a mut SolverMemory,
+    isa: Isa,
 }
 
 impl Outcome<u64, { PairKind::ALL.len() }> for Listed<'_> {
@@ -340,7 +359,7 @@ impl Outcome<u64, { PairKind::ALL.len() }> for Listed<'_> {
 
     fn fill(&mut self, job: Job<'_>, keys: KeysByKind) -> Result<(), Error> {
         let stats = self.neighbours.stats_mut();
-        self.memory.measure(job, keys, stats, |_| ())?;
+        (self.memory).measure(job, self.isa, keys, stats, |_| ())?;
         let start = Instant::now();
         let SolverMemory {
             keys, distances, ..

@@ -15,6 +15,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::Detector;
 use super::advance::{moving, refuse_cell, refuse_seams};
+use super::in_step::Keys;
 use crate::answers::truncation::Truncation;
 use crate::plan::{Plan, TestId};
 use crate::query::Query;
@@ -100,7 +101,7 @@ impl Detector {
             keys: std::mem::take(&mut self.solver.keys),
             stats: Stats::default(),
         };
-        let found = self.find_keys(scene, &plan, &mut outcome);
+        let found = self.find_keys(scene, &plan, Keys::All, &mut outcome);
         self.stats.clone_from(&outcome.stats);
         self.solver.keys = outcome.keys;
         found.map(|_| outcome.truncation)

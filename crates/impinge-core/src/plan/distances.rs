@@ -99,14 +99,13 @@ impl Plan {
         Reach::of_sum([self.distance, a, b])
     }
 
-    /// A number below the distance of two elements of two parts, minus the thickness of their
-    /// bodies: 0 if that is not certainly above 0.
-    pub(crate) fn without_thickness(&self, parts: [PartIx; 2], distance: f64) -> f64 {
+    /// How thick the bodies of two parts are together, rounded up.
+    pub(crate) fn thickness(&self, parts: [PartIx; 2]) -> f64 {
         let [a, b] = parts.map(|part| self.part(part).thickness);
-        if a == 0.0 && b == 0.0 {
-            return distance;
+        match a + b {
+            0.0 => 0.0,
+            sum => sum.next_up(),
         }
-        (distance - (a + b).next_up()).next_down().max(0.0)
     }
 
     /// How far the boxes of a part must reach beyond its elements, so that those of near elements

@@ -3,6 +3,7 @@
 use crate::query::pair_kind::PairKind;
 use crate::scene::error::Error;
 use crate::search::key_ranges::{KeyRanges, Tally};
+use crate::search::shares::Shares;
 use crate::search::sink::{Answer, Ending};
 use impinge_exact::Contact;
 
@@ -32,6 +33,8 @@ pub(crate) type KeyAnswer = Answer<u64, { PairKind::ALL.len() }>;
 pub(crate) enum StepAnswer<'a> {
     Contacts(&'a ContactAnswer),
     Keys(&'a KeyAnswer),
+    /// Only keys of pairs that may lower some vertex's share.
+    Lowering(&'a KeyAnswer, &'a Shares),
     /// Only keys in some ranges.
     KeysIn(&'a KeyAnswer, &'a KeyRanges),
     /// Keys are counted and forgotten.
@@ -49,7 +52,9 @@ impl<'a> StepAnswer<'a> {
     /// The same for pairs without a time.
     pub fn take_keys(&self, kind: PairKind, block: &mut Vec<u64>) {
         match self {
-            StepAnswer::Keys(answer) => answer.extend(kind as usize, block.drain(..)),
+            StepAnswer::Keys(answer) | StepAnswer::Lowering(answer, _) => {
+                answer.extend(kind as usize, block.drain(..));
+            }
             StepAnswer::KeysIn(answer, ranges) => {
                 block.retain(|&key| ranges.hold(kind, key));
                 answer.extend(kind as usize, block.drain(..));
@@ -67,7 +72,7 @@ impl<'a> StepAnswer<'a> {
         match self {
             StepAnswer::KeysIn(_, ranges) => Some(ranges),
             StepAnswer::Counts(tally) => Some(tally.ranges()),
-            StepAnswer::Contacts(_) | StepAnswer::Keys(_) => None,
+            StepAnswer::Contacts(_) | StepAnswer::Keys(_) | StepAnswer::Lowering(..) => None,
         }
     }
 }
@@ -76,7 +81,9 @@ impl Ending for StepAnswer<'_> {
     fn is_over(&self) -> bool {
         match self {
             StepAnswer::Contacts(answer) => answer.is_over(),
-            StepAnswer::Keys(answer) | StepAnswer::KeysIn(answer, _) => answer.is_over(),
+            StepAnswer::Keys(answer)
+            | StepAnswer::Lowering(answer, _)
+            | StepAnswer::KeysIn(answer, _) => answer.is_over(),
             StepAnswer::Counts(_) => false,
         }
     }
@@ -84,7 +91,9 @@ impl Ending for StepAnswer<'_> {
     fn check(&self) -> Result<(), Error> {
         match self {
             StepAnswer::Contacts(answer) => answer.check(),
-            StepAnswer::Keys(answer) | StepAnswer::KeysIn(answer, _) => answer.check(),
+            StepAnswer::Keys(answer)
+            | StepAnswer::Lowering(answer, _)
+            | StepAnswer::KeysIn(answer, _) => answer.check(),
             StepAnswer::Counts(_) => Ok(()),
         }
     }
@@ -92,9 +101,9 @@ impl Ending for StepAnswer<'_> {
     fn share(&self, held_by_finder: u64) {
         match self {
             StepAnswer::Contacts(answer) => answer.share(held_by_finder),
-            StepAnswer::Keys(answer) | StepAnswer::KeysIn(answer, _) => {
-                answer.share(held_by_finder)
-            }
+            StepAnswer::Keys(answer)
+            | StepAnswer::Lowering(answer, _)
+            | StepAnswer::KeysIn(answer, _) => answer.share(held_by_finder),
             StepAnswer::Counts(_) => {}
         }
     }

@@ -7,6 +7,7 @@ pub(crate) mod narrow;
 #[allow(missing_docs)]
 pub mod runner;
 pub(crate) mod sets;
+pub(crate) mod shares;
 #[allow(missing_docs)]
 pub mod sink;
 pub(crate) mod sort;

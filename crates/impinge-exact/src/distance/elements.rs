@@ -206,6 +206,13 @@ pub fn distance_below(a: &[Point], b: &[Point]) -> f64 {
     }
 }
 
+/// [`distance_below`] by bounds of the distance in `f64`
+/// ([`distance_bounds`](crate::filter::distance_bounds)), where these do.
+#[inline]
+pub fn below_by_bounds([low, high]: [f64; 2]) -> Option<f64> {
+    (low > high * (1.0 - POWER_20)).then_some(low)
+}
+
 /// Two elements that one [`ElementPair`] stands for.
 #[derive(Clone, Copy)]
 struct Simple {
@@ -239,19 +246,17 @@ impl Simple {
     }
 
     fn distance_below(&self) -> f64 {
-        match filter::bounds(self.pair, &self.points) {
-            Some([low, high]) if low > high * (1.0 - POWER_20) => low,
-            _ => {
-                let Closest { distance, .. } = super::closest_points(self.pair, &self.points);
-                // Wrong by a few units in the last place, which this makes up for many times.
-                let mut below = distance * (1.0 - 0.5 * POWER_20);
-                // But for the smallest numbers, which have few bits.
-                while below > 0.0 && below < f64::MIN_POSITIVE && self.is_nearer_than(below) {
-                    below = below.next_down();
-                }
-                below
+        let bounds = filter::bounds(self.pair, &self.points);
+        bounds.and_then(below_by_bounds).unwrap_or_else(|| {
+            let Closest { distance, .. } = super::closest_points(self.pair, &self.points);
+            // Wrong by a few units in the last place, which this makes up for many times.
+            let mut below = distance * (1.0 - 0.5 * POWER_20);
+            // But for the smallest numbers, which have few bits.
+            while below > 0.0 && below < f64::MIN_POSITIVE && self.is_nearer_than(below) {
+                below = below.next_down();
             }
-        }
+            below
+        })
     }
 
     fn is_nearer_than(&self, distance: f64) -> bool {

@@ -4,7 +4,7 @@ use super::features::PolygonPart;
 use super::reach::Reach;
 use crate::Point;
 use crate::element_pair::ElementPair;
-use crate::filter::motion::{difference, dot, size};
+use crate::filter::motion::{difference, dot};
 use crate::filter::nearness::{Polygon, are_beyond, beyond, most, stay_beyond};
 use crate::filter::number::Number;
 use crate::rounding::root;
@@ -26,36 +26,8 @@ pub(super) fn bounds(pair: ElementPair, points: &[Point; 4]) -> Option<[f64; 2]>
 
 /// [`bounds`], and about the shortest way from the origin to the difference polygon.
 pub(super) fn bounds_and_way(pair: ElementPair, points: &[Point; 4]) -> Option<([f64; 2], Point)> {
-    let polygon = Polygon::of_pair(pair, points);
-    let largest = polygon.size();
-    if largest >= f64::LARGEST || largest.is_nan() {
-        return None;
-    }
-    let normal = polygon.normal();
-    let near = polygon.nearest(&normal);
-    let low = [near, normal]
-        .iter()
-        .map(|normal| least_beyond(normal, &polygon, largest))
-        .fold(0.0, f64::max);
-    Some(([low, most(&near, largest)], near))
-}
-
-/// A distance from a plane through the origin that all corners certainly have, all on one side; 0
-/// if that is not certain.
-fn least_beyond(normal: &Point, polygon: &Polygon, largest: f64) -> f64 {
-    if size(normal) <= f64::SHORTEST {
-        return 0.0;
-    }
-    let [_, error] = beyond(normal, largest, 0.0);
-    let (mut lowest, mut highest) = (f64::INFINITY, f64::NEG_INFINITY);
-    for corner in polygon.corners() {
-        let height = dot(normal, corner);
-        lowest = lowest.min(height);
-        highest = highest.max(height);
-    }
-    let length = root(dot(normal, normal));
-    // The quotient has a few more roundings; the bound covers them many times.
-    ((lowest.max(-highest) - error) / length * (1.0 - f64::BOUND)).max(0.0)
+    let (is_small, bounds, way) = Polygon::of_pair(pair, points).bounds();
+    is_small.then_some((bounds, way))
 }
 
 /// When two moving elements are first within a distance, as far as plain floats can decide it.

@@ -36,7 +36,8 @@ use super::element_pair::ElementPair;
 pub use apart::{shares_apart, spare_apart};
 pub use elements::{NearestOfElements, are_within_certainly, elements_are_within};
 pub use elements::{
-    closest_of_elements, distance_below, elements_meet, nearest_of_elements, unsure_are_within,
+    below_by_bounds, closest_of_elements, distance_below, elements_meet, nearest_of_elements,
+    unsure_are_within,
 };
 pub use features::{Feature, NearestFeatures};
 pub use filter::{Approach, approach};

@@ -6,8 +6,8 @@ use super::filter::{self, Approach};
 use super::moving::first_within_by_roots;
 use super::{Reach, closest_points, nearest};
 use crate::filter::{
-    BATCH, Moving64, Near16, SWAPPED_PARTS, TABLE, are_within_in_tables, nearest_in_tables, number,
-    stay_beyond_in_tables, time_between,
+    BATCH, Bounded16, Moving64, Near16, SWAPPED_PARTS, TABLE, are_within_in_tables,
+    bounded_in_tables, nearest_in_tables, number, stay_beyond_in_tables, time_between,
 };
 use crate::sweep::tests::{KINDS, Kind, PAIRS, Random, step};
 use crate::{Contact, ElementPair, Point};
@@ -55,7 +55,7 @@ impl Asked {
     }
 
     #[inline(always)]
-    fn answer<V: number::Lookup>(&self) -> (Near16, u16) {
+    fn answer<V: number::Lookup>(&self) -> (Near16, u16, Bounded16) {
         let [a, b] = &self.tables;
         let (groups, slots) = ([&**a, &**b], [&self.slots; 2]);
         let within = are_within_in_tables::<V>(self.pair, groups, slots, self.reach);
@@ -67,11 +67,18 @@ impl Asked {
         for bits in &mut near.parts {
             *bits &= within.yes;
         }
-        (near, stay)
+        let mut bounded = bounded_in_tables::<V>(self.pair, groups, slots, self.reach);
+        assert_eq!(bounded.verdict, within);
+        for lane in 0..BATCH {
+            if within.yes >> lane & 1 == 0 {
+                (bounded.low[lane], bounded.high[lane]) = (0.0, f32::INFINITY);
+            }
+        }
+        (near, stay, bounded)
     }
 
     /// The answer of all instruction sets of this processor, which must be the same.
-    fn answer_of_all(&self) -> (Near16, u16) {
+    fn answer_of_all(&self) -> (Near16, u16, Bounded16) {
         let answer = self.answer::<number::Portable32>();
         #[cfg(target_arch = "x86_64")]
         {
@@ -90,13 +97,13 @@ impl Asked {
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
-fn answer_avx2(asked: &Asked) -> (Near16, u16) {
+fn answer_avx2(asked: &Asked) -> (Near16, u16, Bounded16) {
     asked.answer::<number::Avx2F32>()
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512dq")]
-fn answer_avx512(asked: &Asked) -> (Near16, u16) {
+fn answer_avx512(asked: &Asked) -> (Near16, u16, Bounded16) {
     asked.answer::<number::Avx512F32>()
 }
 
@@ -133,12 +140,17 @@ fn filters_never_contradict_integers_and_roots() {
                 let d = distance(pair, &steps, kind, &mut random);
                 let reach = Reach::from(d);
                 let asked = Asked::new(pair, &steps, until as f32, reach.enclosing_f32());
-                let (near, stay) = asked.answer_of_all();
+                let (near, stay, bounded) = asked.answer_of_all();
                 let within = near.verdict;
                 assert_eq!(within.yes & within.no, 0);
                 for (lane, [start, end]) in steps.iter().enumerate() {
                     let case = || format!("{kind:?} {pair:?} {until} {d:?} {:?}", steps[lane]);
                     let is = |mask: u16| mask >> lane & 1 == 1;
+                    let [low, high] = [bounded.low[lane], bounded.high[lane]].map(f64::from);
+                    assert!(closest_points(pair, start).distance >= low * (1.0 - 1e-15));
+                    assert!(
+                        high.is_infinite() || nearest::are_within(pair, start, &Reach::from(high))
+                    );
                     let is_near = nearest::are_within(pair, start, &reach);
                     assert!(!is(within.yes) || is_near, "{}", case());
                     assert!(!is(within.no) || !is_near, "{}", case());
@@ -246,7 +258,7 @@ fn nearest_parts_by_certain_signs_are_those_of_integers() {
                 }
                 // All pairs in range are near.
                 let asked = Asked::new(pair, &steps, 1.0, [1e4; 2]);
-                let (near, _) = asked.answer_of_all();
+                let (near, _, _) = asked.answer_of_all();
                 for (lane, [start, _]) in steps.iter().enumerate() {
                     let case = || format!("{kind:?} {pair:?} {start:?}");
                     let expected = exact_part(pair, start);
@@ -408,7 +420,7 @@ fn numbers_that_are_none_are_unsure() {
         });
         for pair in PAIRS {
             let asked = Asked::new(pair, &steps, 1.0, [0.1, 0.1]);
-            let (near, stay) = asked.answer_of_all();
+            let (near, stay, _) = asked.answer_of_all();
             let within = near.verdict;
             assert_eq!(stay, 0, "{x} {pair:?}");
             // The elements of odd lanes are finite at the start.

@@ -48,7 +48,10 @@ pub use moving::{
 pub(super) use moving::{contact_answer, search_contact};
 #[cfg(test)]
 pub use nearness::Near16;
-pub use nearness::{SWAPPED_PARTS, are_within_in_tables, nearest_in_tables, stay_beyond_in_tables};
+pub use nearness::{
+    Bounded16, SWAPPED_PARTS, are_within_in_tables, bounded_in_tables, distance_bounds,
+    nearest_in_tables, stay_beyond_in_tables,
+};
 pub(super) use neighbours::{shared_edge, shared_vertex};
 pub use passing::meet_in_tables;
 pub(super) use projections::{angles_apart, apart_in_a_plane, sides_apart};
@@ -101,6 +104,12 @@ pub struct TetrahedronPairs8 {
     /// The second tetrahedron of each pair, `[vertex][axis][lane]`.
     pub b: Tetrahedra8,
 }
+
+/// The points of eight pairs, one pair per lane: `[point][axis][lane]`, points in the order of the
+/// [`ElementPair`].
+#[derive(Clone, Debug, Default, PartialEq)]
+#[repr(align(64))]
+pub struct Points8(pub [[[f64; LANES]; 3]; 4]);
 
 /// A filter's answers: bit k stands for lane k. A lane with neither bit is unsure; no lane has
 /// both.

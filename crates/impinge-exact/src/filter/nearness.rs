@@ -21,9 +21,9 @@
 
 use super::motion::{between, cross, difference, dot, size};
 use super::moving::{are_edges, two_edges, vertex_and_face};
-use super::number::{Lookup, Number};
-use super::{BATCH, Moving64, Verdict16};
-use crate::{ElementPair, Point};
+use super::number::{self, Lookup, Number, load_points};
+use super::{BATCH, LANES, Moving64, Points8, Spans8, Verdict16};
+use crate::ElementPair;
 
 type Vector<T> = [T; 3];
 
@@ -39,11 +39,14 @@ pub(crate) struct Polygon<T: Number = f64> {
     corners: [Vector<T>; 4],
 }
 
-impl Polygon {
-    /// The polygon of one pair, in `f64`.
-    #[inline]
-    pub(crate) fn of_pair(pair: ElementPair, points: &[Point; 4]) -> Self {
-        let mut corners = [[0.0; 3]; 4];
+// Here and below no closures are passed to library functions: those would be compiled on their own,
+// without the instruction set.
+
+impl<T: Number> Polygon<T> {
+    /// The polygon of a pair.
+    #[inline(always)]
+    pub(crate) fn of_pair(pair: ElementPair, points: &[Vector<T>; 4]) -> Self {
+        let mut corners = [[T::splat(0.0); 3]; 4];
         let numbers = pair.corners();
         for (corner, &[i, j]) in corners.iter_mut().zip(numbers) {
             *corner = difference(&points[i], &points[j]);
@@ -55,15 +58,11 @@ impl Polygon {
     }
 
     /// Its corners.
-    pub(crate) fn corners(&self) -> &[Point] {
+    #[inline(always)]
+    pub(crate) fn corners(&self) -> &[Vector<T>] {
         &self.corners[..self.n_corners]
     }
-}
 
-// Here and below no closures are passed to library functions: those would be compiled on their own,
-// without the instruction set.
-
-impl<T: Number> Polygon<T> {
     /// Of a vertex, point 0, and a face; or of two edges, points 0 and 1, and points 2 and 3.
     #[inline(always)]
     fn new(are_edges: bool, [p, q, r, s]: &[Vector<T>; 4]) -> Self {
@@ -267,6 +266,42 @@ impl<T: Number> Polygon<T> {
         ]
     }
 
+    /// Two numbers between which the distance from the origin certainly is, and about the shortest
+    /// way from there, where the mask is set.
+    #[inline(always)]
+    pub(crate) fn bounds(&self) -> (T::Mask, [T; 2], Vector<T>) {
+        let size = self.size();
+        let normal = self.normal();
+        let near = self.nearest(&normal);
+        let [of_near, of_normal] = [
+            self.least_beyond(&near, size),
+            self.least_beyond(&normal, size),
+        ];
+        let is_small = T::splat(T::LARGEST).gt(size);
+        let low = of_near.larger(of_normal);
+        (is_small, [low, most(&near, size)], near)
+    }
+
+    /// A distance from a plane through the origin that all corners certainly have, all on one side;
+    /// 0 if that is not certain.
+    #[inline(always)]
+    fn least_beyond(&self, normal: &Vector<T>, largest: T) -> T {
+        let zero = T::splat(0.0);
+        let [_, error] = beyond(normal, largest, zero);
+        let mut lowest = dot(normal, &self.corners[0]);
+        let mut highest = lowest;
+        for corner in &self.corners[1..self.n_corners] {
+            let height = dot(normal, corner);
+            lowest = lowest.smaller(height);
+            highest = highest.larger(height);
+        }
+        let length = dot(normal, normal).sqrt();
+        // The quotient has a few more roundings; the bound covers them many times.
+        let least = (lowest.larger(zero - highest) - error) / length * T::splat(1.0 - T::BOUND);
+        let is_certain = size(normal).gt(T::splat(T::SHORTEST)) & least.gt(zero);
+        T::select(is_certain, least, zero)
+    }
+
     /// Which polygons are certainly within a distance of the origin, and which certainly are not.
     /// The distance is between two numbers.
     #[inline(always)]
@@ -439,6 +474,66 @@ impl Near16 {
 ///  corner 0 (a0, b0) --- edge 0 (a, b0) --- corner 1 (a1, b0)
 /// ```
 pub const SWAPPED_PARTS: [u8; 16] = [0, 3, 2, 1, 7, 6, 5, 4, 8, 9, 10, 11, 12, 13, 14, 15];
+
+/// Which of sixteen pairs are within a distance, and two numbers between which the distance of each
+/// certainly is.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Bounded16 {
+    /// Which are within the distance.
+    pub verdict: Verdict16,
+    /// At most the distances; 0 where no pair of the register is certainly near.
+    pub low: [f32; BATCH],
+    /// At least the distances; infinite where no pair of the register is certainly near.
+    pub high: [f32; BATCH],
+}
+
+/// As [`are_within_in_tables`], with bounds of the distances of pairs that are certainly near.
+#[cfg_attr(target_family = "wasm", inline(never))]
+#[cfg_attr(not(target_family = "wasm"), inline(always))]
+#[must_use]
+pub fn bounded_in_tables<V: Lookup>(
+    pair: ElementPair,
+    groups: [&Moving64; 2],
+    slots: [&[u8; BATCH]; 2],
+    reach: [f32; 2],
+) -> Bounded16 {
+    let [least, most] = [V::splat(f64::from(reach[0])), V::splat(f64::from(reach[1]))];
+    let mut bounded = Bounded16 {
+        verdict: Verdict16::default(),
+        low: [0.0; BATCH],
+        high: [f32::INFINITY; BATCH],
+    };
+    for first in (0..BATCH).step_by(V::N) {
+        let (are_edges, points) = look_up::<V>(pair, groups, slots, first, 0);
+        let polygon = Polygon::new(are_edges, &points);
+        let (yes, no) = polygon.verdict(least, most);
+        let yes = V::bits(yes);
+        bounded.verdict.yes |= yes << first;
+        bounded.verdict.no |= V::bits(no) << first;
+        if yes != 0 {
+            let (_, [low, high], _) = polygon.bounds();
+            low.put(&mut bounded.low, first);
+            high.put(&mut bounded.high, first);
+        }
+    }
+    bounded
+}
+
+/// Two numbers between which the distance of each of eight pairs certainly is: 0 and infinity where
+/// sizes are out of range. The same bits as those of one pair after the other.
+#[inline(always)]
+#[must_use]
+pub fn distance_bounds<V: number::Vector>(pair: ElementPair, points: &Points8) -> Spans8 {
+    let mut bounds = Spans8::default();
+    for first in (0..LANES).step_by(V::N) {
+        let polygon = Polygon::of_pair(pair, &load_points::<V>(points, first));
+        let (is_small, [low, high], _) = polygon.bounds();
+        let unknown = V::splat(f64::INFINITY);
+        V::select(is_small, low, V::splat(0.0)).store(&mut bounds.low, first);
+        V::select(is_small, high, unknown).store(&mut bounds.high, first);
+    }
+    bounds
+}
 
 /// As [`are_within_in_tables`], with the nearest parts of pairs that are certainly near.
 #[cfg_attr(target_family = "wasm", inline(never))]

@@ -6,7 +6,7 @@
 
 use core::ops::{Add, BitAnd, BitOr, BitXor, Div, Mul, Not, Sub};
 
-use super::{BATCH, LANES, TABLE};
+use super::{BATCH, LANES, Points8, TABLE};
 use crate::rounding::{root, root_f32};
 
 /// One number or several, side by side.
@@ -96,8 +96,8 @@ pub trait Lookup: Number {
     fn look_up(table: &[f32; TABLE], slots: Self::Slots) -> Self;
     /// `N` numbers of a table, from slot `first` on.
     fn row(table: &[f32; TABLE], first: usize) -> Self;
-    /// Writes the numbers into a table, from slot `first` on.
-    fn put(self, table: &mut [f32; TABLE], first: usize);
+    /// Writes the numbers to memory, from place `first` on.
+    fn put(self, row: &mut [f32], first: usize);
     /// Bit k for number k.
     fn bits(mask: Self::Mask) -> u16;
 }
@@ -106,6 +106,17 @@ pub trait Lookup: Number {
 #[inline(always)]
 pub(super) fn load_vertex<V: Vector>([x, y, z]: &[[f64; LANES]; 3], first: usize) -> [V; 3] {
     [V::load(x, first), V::load(y, first), V::load(z, first)]
+}
+
+/// Four points of each pair, from lane `first` on.
+#[inline(always)]
+pub(crate) fn load_points<V: Vector>(Points8(points): &Points8, first: usize) -> [[V; 3]; 4] {
+    [
+        load_vertex(&points[0], first),
+        load_vertex(&points[1], first),
+        load_vertex(&points[2], first),
+        load_vertex(&points[3], first),
+    ]
 }
 
 mod sealed {
@@ -370,8 +381,8 @@ impl Lookup for Portable32 {
         Portable32(*four)
     }
     #[inline(always)]
-    fn put(self, table: &mut [f32; TABLE], first: usize) {
-        table[first..][..PORTABLE_F32].copy_from_slice(&self.0);
+    fn put(self, row: &mut [f32], first: usize) {
+        row[first..][..PORTABLE_F32].copy_from_slice(&self.0);
     }
     #[inline(always)]
     fn bits(mask: Portable32Mask) -> u16 {
@@ -635,8 +646,8 @@ mod x86 {
             Avx2F32(unsafe { _mm256_loadu_ps(eight.as_ptr()) })
         }
         #[inline(always)]
-        fn put(self, table: &mut [f32; TABLE], first: usize) {
-            let eight: &mut [f32; 8] = table[first..].first_chunk_mut().expect("eight slots");
+        fn put(self, row: &mut [f32], first: usize) {
+            let eight: &mut [f32; 8] = row[first..].first_chunk_mut().expect("eight slots");
             // SAFETY: see above; one store of eight.
             unsafe { _mm256_storeu_ps(eight.as_mut_ptr(), self.0) }
         }
@@ -686,9 +697,8 @@ mod x86 {
             Avx512F32(unsafe { _mm512_loadu_ps(sixteen.as_ptr()) })
         }
         #[inline(always)]
-        fn put(self, table: &mut [f32; TABLE], first: usize) {
-            let sixteen: &mut [f32; BATCH] =
-                table[first..].first_chunk_mut().expect("sixteen slots");
+        fn put(self, row: &mut [f32], first: usize) {
+            let sixteen: &mut [f32; BATCH] = row[first..].first_chunk_mut().expect("sixteen slots");
             // SAFETY: see above; one store of sixteen.
             unsafe { _mm512_storeu_ps(sixteen.as_mut_ptr(), self.0) }
         }

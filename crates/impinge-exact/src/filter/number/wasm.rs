@@ -135,8 +135,8 @@ impl Lookup for WasmF32 {
         WasmF32(unsafe { v128_load(four.as_ptr().cast()) })
     }
     #[inline(always)]
-    fn put(self, table: &mut [f32; TABLE], first: usize) {
-        let four: &mut [f32; 4] = table[first..].first_chunk_mut().expect("four slots");
+    fn put(self, row: &mut [f32], first: usize) {
+        let four: &mut [f32; 4] = row[first..].first_chunk_mut().expect("four slots");
         // SAFETY: the four numbers are 16 writable bytes; stores need no alignment.
         unsafe { v128_store(four.as_mut_ptr().cast(), self.0) }
     }

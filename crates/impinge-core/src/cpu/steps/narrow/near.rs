@@ -13,6 +13,7 @@ use crate::scene::index::pair_key;
 use crate::scene::positions::Positions;
 use crate::search::found::StepAnswer;
 use crate::search::narrow::Corners;
+use crate::search::shares::SharesBetween;
 use crate::simd::{Isa, Lanes, Simd, with_isa};
 use impinge_exact::internal::filter::{self, BATCH, LARGEST_F32};
 use impinge_exact::internal::{Reach, are_within_certainly, elements_meet, unsure_are_within};
@@ -70,12 +71,29 @@ fn take<S: Simd>(_: S, near: &mut NearElements, world: World<'_>, batch: Batch<'
     let pairs = PartPair::new(world, between);
     let in_tables = batch.near_in_tables(&pairs.reach);
     let is_exact = batch.rounded() == 0.0;
+    let shares = match world.answer {
+        // It is known later only whether a pair belongs to a cell.
+        StepAnswer::Lowering(_, shares) if !world.plan.has_cell() => {
+            Some(shares.between(world.plan, [between.a, between.b]))
+        }
+        _ => None,
+    };
     let tables = batch.groups.map(|group| &group.points);
     for first in (0..batch.lane_pairs.len()).step_by(BATCH) {
         let lanes = batch.lane_pairs.batch(first);
         let n = (batch.lane_pairs.len() - first).min(BATCH);
         let mut open = u16::MAX >> (BATCH - n);
-        if let Some((pair, reach)) = in_tables {
+        if let (Some((pair, reach)), Some(shares)) = (in_tables, &shares) {
+            let found = filter::bounded_in_tables::<S::F32>(pair, tables, lanes, reach);
+            let yes = found.verdict.yes & open;
+            open &= !(found.verdict.yes | found.verdict.no);
+            for lane in Lanes(u64::from(yes)) {
+                let bounds = [found.low[lane], found.high[lane]];
+                if may_lower(shares, &batch, first + lane, bounds) {
+                    near.put(world, &batch, first + lane, Labels::UNKNOWN);
+                }
+            }
+        } else if let Some((pair, reach)) = in_tables {
             let found = filter::nearest_in_tables::<S::F32>(pair, tables, lanes, reach);
             let yes = found.verdict.yes & open;
             open &= !(found.verdict.yes | found.verdict.no);
@@ -95,6 +113,26 @@ fn take<S: Simd>(_: S, near: &mut NearElements, world: World<'_>, batch: Batch<'
         }
     }
     near.keys.hand_over(world, between.kind);
+}
+
+/// Whether a pair that is near may lower the shares of its vertices, by bounds of the distance in
+/// the tables.
+#[inline(always)]
+fn may_lower(
+    shares: &SharesBetween<'_>,
+    batch: &Batch<'_>,
+    ix: usize,
+    [low, high]: [f32; 2],
+) -> bool {
+    let [slot_a, slot_b] = batch.lane_pairs.lanes(ix);
+    let [a, b] = batch.groups;
+    let corners = [
+        (&a.corners[..a.n_corners], slot_a),
+        (&b.corners[..b.n_corners], slot_b),
+    ];
+    // As in `near_in_tables`.
+    let off = 4.0 * batch.rounded();
+    shares.lower_by(corners, [f64::from(low) - off, f64::from(high) + off])
 }
 
 /// An edge and a face are in the answer if they meet, whatever the distance.
