@@ -346,6 +346,17 @@ fn boxes_that_share_an_edge_or_a_vertex_come_apart() {
             .collect(),
         ..FixOptions::default()
     };
+    // With all repairs, the wall goes: one solid is left.
+    let whole = fix(&wall, 0);
+    assert_eq!(
+        (whole.repairs.duplicate_faces, whole.repairs.opposite_faces),
+        (4, 4)
+    );
+    assert_eq!(
+        (whole.after.components, whole.after.boundary_facets),
+        (1, 0)
+    );
+    assert_eq!(whole.after.volume, Some(2.0));
     let fixed = fix_mesh(wall, &options).unwrap();
     assert_eq!(fixed.after.components, 2);
     assert_eq!(
@@ -514,4 +525,58 @@ fn random_soups_come_out_as_promised_and_stay_so() {
         n_split > 1000 && n_divided > 5 && n_closed > 20 && n_shells > 20,
         "{n_split} {n_divided} {n_closed} {n_shells}"
     );
+}
+
+#[test]
+fn opposite_faces_go_where_they_hang_on_others_and_else_one_stays() {
+    // A fin of no thickness on an edge of a box.
+    let solid = cube([0.0; 3], 1.0);
+    let mut finned = solid.clone();
+    if let Positions::F64(points) = &mut finned.positions {
+        points.push([-1.0, -1.0, 0.5]);
+    }
+    if let Elements::Triangles(held) = &mut finned.elements {
+        held.extend([[0, 1, 8], [1, 0, 8]]);
+    }
+    let fixed = fix(&finned, 0);
+    assert_eq!(
+        (fixed.repairs.duplicate_faces, fixed.repairs.opposite_faces),
+        (2, 2)
+    );
+    assert_eq!(fixed.mesh, solid);
+    // A sheet with two sides stays a sheet; so does one with the same side twice.
+    let sheet = mesh(
+        vec![[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]],
+        vec![[0, 1, 2], [0, 2, 3], [0, 2, 1], [0, 3, 2]],
+    );
+    let fixed = fix(&sheet, 0);
+    assert_eq!(
+        (fixed.after.n_triangles, fixed.repairs.opposite_faces),
+        (2, 0)
+    );
+}
+
+/// What `fix` writes, `check` confirms: every real mesh that there is, closed if it was.
+#[test]
+fn real_meshes_come_out_as_promised_and_no_border_opens() {
+    for name in [
+        "buddha.ply",
+        "bunny.ply",
+        "camelhead.off",
+        "cow.off",
+        "dragon.ply",
+    ] {
+        let Some(path) = impinge_scenes::data::test_file(&format!("meshes/{name}")) else {
+            continue;
+        };
+        let whole = impinge_io::read(&path, &impinge_io::ReadOptions::as_they_are()).unwrap();
+        let fixed = fix(&whole, 0);
+        assert!(
+            fixed.after.self_intersections <= fixed.before.self_intersections,
+            "{name}"
+        );
+        if fixed.before.boundary_facets == 0 {
+            assert_eq!(fixed.after.boundary_facets, 0, "{name}");
+        }
+    }
 }

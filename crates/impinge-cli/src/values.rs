@@ -164,6 +164,36 @@ impl FromStr for ReachedFile {
     }
 }
 
+/// A file for a mended mesh.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct MendedFile {
+    pub path: PathBuf,
+    pub format: MendedFormat,
+}
+
+/// Formats of mended meshes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum MendedFormat {
+    Ply,
+    Obj,
+    Stl,
+}
+
+impl FromStr for MendedFile {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let format = match extension(text).as_str() {
+            "ply" => MendedFormat::Ply,
+            "obj" => MendedFormat::Obj,
+            "stl" => MendedFormat::Stl,
+            _ => return Err("mended meshes are written as .ply, .obj or .stl".to_owned()),
+        };
+        let path = text.into();
+        Ok(MendedFile { path, format })
+    }
+}
+
 /// Files for the frames of a sequence: a name in which `%d` or `%04d` stands for the number of the
 /// frame.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -5,19 +5,82 @@ use std::collections::{HashMap, VecDeque};
 use impinge::exact::Point;
 use impinge_io::Positions;
 
-use super::Surface;
 use crate::analysis::is_flat_triangle;
 use crate::copies::Copies;
 use crate::facets::is_simplex;
+use crate::surface::Surface;
+use crate::union_find::UnionFind;
 
-/// Of faces with the same vertices the first stays. Returns how many go.
-pub fn remove_duplicates(surface: &mut Surface) -> u64 {
+/// Of faces with the same vertices the first stays, or none: see [`hanging`]. Returns how many go,
+/// and how many of them are of sets of which none stays.
+pub fn remove_duplicates(surface: &mut Surface) -> (u64, u64) {
     let copies = Copies::new(&surface.faces, surface.n_vertices());
-    let mut is_copy = vec![false; surface.faces.len()];
+    let mut goes = vec![false; surface.faces.len()];
     for &face in copies.sets().flat_map(|set| &set[1..]) {
-        is_copy[face as usize] = true;
+        goes[face as usize] = true;
     }
-    remove(surface, &is_copy)
+    let mut n_opposite = 0;
+    for set in hanging(surface, &copies, &goes) {
+        goes[set[0] as usize] = true;
+        n_opposite += set.len() as u64;
+    }
+    (remove(surface, &goes), n_opposite)
+}
+
+/// The sets of which no face stays.
+///
+/// Faces with the same vertices, as many of one orientation as of the other, enclose nothing: an
+/// inner wall of two solids, or a fin of no thickness that hangs on one. With one of them left, the
+/// surface would have a border that it did not have. So of faces like these that hang together, none
+/// stays where the other faces meet in even numbers at each edge of theirs, and some there are: then
+/// what is left is closed there. A sheet with two sides, which no other faces meet, keeps one.
+fn hanging<'a>(surface: &Surface, copies: &'a Copies, is_copy: &[bool]) -> Vec<&'a [u32]> {
+    let is_even = |face: &u32| {
+        let [a, b, c] = surface.faces[*face as usize];
+        [a > b, b > c, a > c].iter().filter(|it| **it).count() % 2 == 0
+    };
+    let cancel = |set: &&[u32]| {
+        let n_even = set.iter().filter(|face| is_even(face)).count();
+        2 * n_even == set.len() && is_simplex(&surface.faces[set[0] as usize])
+    };
+    let sets: Vec<&[u32]> = copies.sets().filter(cancel).collect();
+    let mut of_face = HashMap::new();
+    // The sets at each edge, and how many other faces there are.
+    let mut edges: HashMap<[u32; 2], (Vec<u32>, u32)> = HashMap::new();
+    for (ix, set) in (0u32..).zip(&sets) {
+        of_face.insert(set[0], ix);
+        for edge in sides(surface.faces[set[0] as usize]) {
+            edges.entry(Edges::key(edge)).or_default().0.push(ix);
+        }
+    }
+    for (face, &corners) in (0u32..).zip(&surface.faces) {
+        if is_copy[face as usize] || of_face.contains_key(&face) || !is_simplex(&corners) {
+            continue;
+        }
+        for edge in sides(corners) {
+            if let Some((_, n_others)) = edges.get_mut(&Edges::key(edge)) {
+                *n_others += 1;
+            }
+        }
+    }
+    let mut patches = UnionFind::new(sets.len() as u32);
+    for (at_edge, _) in edges.values() {
+        for &set in &at_edge[1..] {
+            patches.join(at_edge[0], set);
+        }
+    }
+    let (mut is_closed, mut hangs) = (vec![true; sets.len()], vec![false; sets.len()]);
+    for (at_edge, n_others) in edges.values() {
+        let patch = patches.root(at_edge[0]) as usize;
+        is_closed[patch] &= n_others % 2 == 0;
+        hangs[patch] |= *n_others > 0;
+    }
+    let mut goes = |ix: &u32| {
+        let patch = patches.root(*ix) as usize;
+        is_closed[patch] && hangs[patch]
+    };
+    let going: Vec<u32> = (0..sets.len() as u32).filter(|ix| goes(ix)).collect();
+    going.into_iter().map(|ix| sets[ix as usize]).collect()
 }
 
 /// Removes faces of zero area. Returns how many were removed, and how many have divided a neighbour

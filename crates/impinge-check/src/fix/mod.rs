@@ -29,7 +29,8 @@ pub use holes::MOST_HOLE_EDGES;
 pub enum Repair {
     /// Vertices at exactly the same position become one.
     Weld,
-    /// Of faces with the same vertices, in any order, the first one stays.
+    /// Of faces with the same vertices, in any order, the first one stays; none where two of
+    /// opposite orientations hang on a closed surface, as an inner wall or a fin.
     Duplicates,
     /// Faces of zero area go. Where one lies along an edge of a neighbour, the neighbour is divided
     /// there, so that no gap opens.
@@ -105,8 +106,11 @@ impl Default for FixOptions {
 pub struct Repairs {
     /// Vertices that welding removed.
     pub welded_vertices: u64,
-    /// Faces removed because an earlier one has their vertices.
+    /// Faces removed because an earlier one has their vertices, the next ones included.
     pub duplicate_faces: u64,
+    /// Faces of sets with the same vertices and both orientations, of which none stays: they
+    /// enclosed nothing, and one of them would leave a border.
+    pub opposite_faces: u64,
     /// Faces of zero area that were removed.
     pub degenerate_faces: u64,
     /// Faces of zero area that were used to divide a neighbour; the number of faces stays.
@@ -167,6 +171,46 @@ impl Fixed {
     /// see what this repair has done.
     pub fn has_seams(&self) -> bool {
         self.repairs.split_edges_added + self.repairs.split_vertices_added > 0
+    }
+
+    /// What a repair did, by the names in answers.
+    pub fn numbers(&self, repair: Repair) -> Vec<(&'static str, u64)> {
+        let done = &self.repairs;
+        match repair {
+            Repair::Weld => vec![("vertices_removed", done.welded_vertices)],
+            Repair::Duplicates => vec![
+                ("faces_removed", done.duplicate_faces),
+                ("opposite_faces", done.opposite_faces),
+            ],
+            Repair::Degenerate => vec![
+                ("faces_removed", done.degenerate_faces),
+                ("faces_divided", done.divided_faces),
+            ],
+            Repair::Orient => vec![
+                ("faces_turned", done.turned_faces),
+                ("pieces_not_orientable", done.non_orientable),
+            ],
+            Repair::SplitEdges => vec![
+                ("edges_split", done.split_edges),
+                ("vertices_added", done.split_edges_added),
+            ],
+            Repair::SplitVertices => vec![
+                ("vertices_split", done.split_vertices),
+                ("vertices_added", done.split_vertices_added),
+            ],
+            Repair::CloseHoles => vec![
+                ("holes_closed", done.closed_holes),
+                ("faces_added", done.added_faces),
+                ("holes_refused", done.refused_holes),
+            ],
+            Repair::Outward => vec![
+                ("shells", done.shells),
+                ("cavities", done.cavities),
+                ("shells_turned", done.turned_shells),
+                ("shells_flat", done.flat_shells),
+            ],
+            Repair::Unused => vec![("vertices_removed", done.unused_vertices)],
+        }
     }
 }
 
@@ -230,7 +274,7 @@ pub fn fix_mesh(mesh: Mesh, options: &FixOptions) -> Result<Fixed, FixError> {
     };
     let mut surface = Surface::new(mesh.positions, faces);
     if does(Repair::Duplicates) {
-        repairs.duplicate_faces = faces::remove_duplicates(&mut surface);
+        (repairs.duplicate_faces, repairs.opposite_faces) = faces::remove_duplicates(&mut surface);
     }
     if does(Repair::Degenerate) {
         (repairs.degenerate_faces, repairs.divided_faces) = faces::remove_degenerate(&mut surface);

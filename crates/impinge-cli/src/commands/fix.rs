@@ -8,7 +8,7 @@ use std::path::Path;
 use impinge_check::{Counts, FixError, FixOptions, Fixed, Place, Repair, Row, fix_mesh};
 use impinge_io::{
     Cell, ColoredMesh, ELEMENTS, Elements, Mesh, ReadOptions, printable, read, read_bytes,
-    write_obj, write_ply,
+    write_obj, write_ply, write_stl,
 };
 use serde_json::{Map, Value, json};
 
@@ -20,6 +20,7 @@ use crate::load::{NAME_OF_STDIN, STDIN, format_of_stdin, stdin_bytes};
 use crate::output;
 use crate::rows;
 use crate::text::{counted, several};
+use crate::values::MendedFormat;
 
 /// `impinge fix`.
 pub fn fix(args: &FixArgs) -> Result<(), Error> {
@@ -92,7 +93,12 @@ fn read_mesh(args: &FixArgs) -> Result<Mesh, Error> {
 fn write(args: &FixArgs, mesh: &Mesh) -> Result<(), Error> {
     let path = &args.out.path;
     match &mesh.elements {
-        Elements::Triangles(faces) if args.out.is_obj => write_obj(path, &mesh.positions, faces)?,
+        Elements::Triangles(faces) if args.out.format == MendedFormat::Obj => {
+            write_obj(path, &mesh.positions, faces)?;
+        }
+        Elements::Triangles(faces) if args.out.format == MendedFormat::Stl => {
+            write_stl(path, &mesh.positions, faces)?;
+        }
         elements => {
             let body = ColoredMesh {
                 positions: &mesh.positions,
@@ -116,50 +122,13 @@ fn row(path: &Path, is_welded: bool, counts: Counts, places: &[Place]) -> Row {
     }
 }
 
-/// The numbers of a repair, by their names in JSON.
-fn numbers(repair: Repair, fixed: &Fixed) -> Vec<(&'static str, u64)> {
-    let done = &fixed.repairs;
-    match repair {
-        Repair::Weld => vec![("vertices_removed", done.welded_vertices)],
-        Repair::Duplicates => vec![("faces_removed", done.duplicate_faces)],
-        Repair::Degenerate => vec![
-            ("faces_removed", done.degenerate_faces),
-            ("faces_divided", done.divided_faces),
-        ],
-        Repair::Orient => vec![
-            ("faces_turned", done.turned_faces),
-            ("pieces_not_orientable", done.non_orientable),
-        ],
-        Repair::SplitEdges => vec![
-            ("edges_split", done.split_edges),
-            ("vertices_added", done.split_edges_added),
-        ],
-        Repair::SplitVertices => vec![
-            ("vertices_split", done.split_vertices),
-            ("vertices_added", done.split_vertices_added),
-        ],
-        Repair::CloseHoles => vec![
-            ("holes_closed", done.closed_holes),
-            ("faces_added", done.added_faces),
-            ("holes_refused", done.refused_holes),
-        ],
-        Repair::Outward => vec![
-            ("shells", done.shells),
-            ("cavities", done.cavities),
-            ("shells_turned", done.turned_shells),
-            ("shells_flat", done.flat_shells),
-        ],
-        Repair::Unused => vec![("vertices_removed", done.unused_vertices)],
-    }
-}
-
 /// The object that `docs/fix.schema.json` describes.
 fn object(args: &FixArgs, options: &FixOptions, fixed: &Fixed) -> Value {
     let mut repairs = Map::new();
     for repair in Repair::ALL {
         let mut of = Map::new();
         of.insert("asked".into(), options.repairs.contains(&repair).into());
-        for (name, n) in numbers(repair, fixed) {
+        for (name, n) in fixed.numbers(repair) {
             of.insert(name.into(), n.into());
         }
         repairs.insert(repair.name().into(), of.into());
@@ -248,7 +217,11 @@ fn text(args: &FixArgs, options: &FixOptions, fixed: &Fixed) -> String {
         false => left.join(", "),
     };
     text += &format!("left: {left}\n");
-    let seams = if fixed.has_seams() {
+    let is_stl = args.out.format == MendedFormat::Stl;
+    if is_stl && fixed.has_seams() {
+        text += "note: STL has positions alone, so readers join again what was split; PLY and OBJ keep it apart\n";
+    }
+    let seams = if fixed.has_seams() && !is_stl {
         " --keep-seams"
     } else {
         ""
@@ -267,10 +240,19 @@ fn said(repair: Repair, fixed: &Fixed) -> Vec<String> {
             done.welded_vertices,
             vertices(done.welded_vertices) + " removed",
         )],
-        Repair::Duplicates => vec![of(
-            done.duplicate_faces,
-            faces(done.duplicate_faces) + " removed",
-        )],
+        Repair::Duplicates => vec![
+            of(
+                done.duplicate_faces,
+                faces(done.duplicate_faces) + " removed",
+            ),
+            of(
+                done.opposite_faces,
+                format!(
+                    "{} of them of opposite pairs, of which none stays",
+                    done.opposite_faces
+                ),
+            ),
+        ],
         Repair::Degenerate => vec![
             of(
                 done.degenerate_faces,

@@ -167,7 +167,7 @@ fn files_are_safe_and_repairs_are_chosen_by_name() {
     folder
         .run(["fix", "bad.obj", "--out", "x.ply", "--only", "close-holes"])
         .misuse();
-    folder.run(["fix", "bad.obj", "--out", "x.stl"]).misuse();
+    folder.run(["fix", "bad.obj", "--out", "x.off"]).misuse();
     assert!(
         folder
             .run(["fix", "none.obj", "--out", "x.ply"])
@@ -220,4 +220,44 @@ fn seams_stay_only_where_check_is_told_to_keep_them() {
     folder
         .run(["check", "m.ply", "--keep-seams", "--out", "rows"])
         .misuse();
+}
+
+#[test]
+fn stl_keeps_the_bits_and_says_that_it_joins_what_was_split() {
+    let folder = Folder::new();
+    // Two tetrahedra with a common edge, a corner of which is no f32.
+    let far = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nv 0.1 -1 0\nv 0.1 0 -1\n";
+    let faces = "f 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\nf 1 2 5\nf 1 6 2\nf 2 6 5\nf 1 5 6\n";
+    folder.text("far.obj", &format!("{far}{faces}"));
+    let text = folder.run(["fix", "far.obj", "--out", "far.stl"]).printed();
+    assert!(
+        text.contains("edges split") || text.contains("edge split"),
+        "{text}"
+    );
+    assert!(text.contains("note: STL has positions alone"), "{text}");
+    assert!(text.ends_with("next: impinge check far.stl\n"), "{text}");
+    let written = std::fs::read_to_string(folder.path("far.stl")).unwrap();
+    assert!(
+        written.starts_with("solid") && written.contains("vertex 0.1 -1 0\n"),
+        "{written}"
+    );
+    folder.text("near.obj", &format!("{far}{faces}").replace("0.1", "0.125"));
+    folder
+        .run(["fix", "near.obj", "--out", "near.stl"])
+        .printed();
+    assert_eq!(
+        std::fs::read(folder.path("near.stl")).unwrap().len(),
+        84 + 8 * 50
+    );
+    for name in ["far", "near"] {
+        let count = |name: &str| {
+            let row = folder.run(["check", "--json", name]).json();
+            (
+                row["triangles"].clone(),
+                row["self_intersections"].clone(),
+                row["volume"].clone(),
+            )
+        };
+        assert_eq!(count(&format!("{name}.stl")), count(&format!("{name}.obj")));
+    }
 }

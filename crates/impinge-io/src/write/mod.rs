@@ -8,6 +8,7 @@ mod obj;
 mod pc2;
 mod ply;
 mod polylines;
+mod stl;
 mod surface;
 mod vtu;
 
@@ -18,6 +19,7 @@ pub use obj::write_obj;
 pub use pc2::Pc2Writer;
 pub use ply::write_ply;
 pub use polylines::{Polylines, write_polylines_obj, write_polylines_ply, write_polylines_vtu};
+pub use stl::write_stl;
 pub use vtu::write_vtu;
 
 use std::path::Path;

@@ -8,7 +8,7 @@ use impinge_check::{MOST_HOLE_EDGES, Repair};
 
 use crate::args::RowsArgs;
 use crate::commands::check::FailOn;
-use crate::values::{ReachedFile, mesh_format, threads};
+use crate::values::{MendedFile, mesh_format, threads};
 
 /// Shown below the help.
 pub const FIX_EXAMPLES: &str = "\
@@ -28,9 +28,9 @@ pub struct FixArgs {
     /// A mesh file with triangles
     #[arg(value_name = "MESH")]
     pub mesh: PathBuf,
-    /// The mended mesh (.ply or .obj)
+    /// The mended mesh (.ply, .obj or .stl)
     #[arg(long, value_name = "FILE")]
-    pub out: ReachedFile,
+    pub out: MendedFile,
     /// Replace the file if it exists
     #[arg(long)]
     pub force: bool,
@@ -83,7 +83,8 @@ impl FixArgs {
 pub enum RepairArg {
     /// Vertices at exactly the same position become one
     Weld,
-    /// Of faces with the same vertices the first stays
+    /// Of faces with the same vertices the first stays; none where two of opposite orientations are
+    /// an inner wall or a fin of a closed surface
     Duplicates,
     /// Faces of zero area go; one along an edge divides its neighbour there, so that no gap opens
     Degenerate,
