@@ -11,7 +11,7 @@ use std::cmp::Ordering;
 /// use impinge::{Backend, Detector, Query, Scene};
 /// # fn main() -> Result<(), impinge::Error> {
 /// let mut scene = Scene::new();
-/// scene.add_triangles(&[[0, 1, 2]], &[[0.0f32, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]])?;
+/// scene.add_triangles(&[[0, 1, 2]], &[[0.0f32, 0.0, 0.0], [8.0, 0.0, 0.0], [0.0, 8.0, 0.0]])?;
 /// let points = scene.add_points(&[[1.0f32, 1.0, 0.5], [2.0, 1.0, 0.5], [1.0, 2.0, 9.0]])?;
 /// let mut detector = Detector::new(Backend::Cpu)?;
 /// let mut near = detector.near(&scene, 1.0, &Query::all())?;
