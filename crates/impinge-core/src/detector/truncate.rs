@@ -2,7 +2,8 @@
 //!
 //! ```text
 //! candidates (keys)   pairs whose boxes over the step meet; no others can meet, however short each vertex stops
-//! are they apart?     a pair stays apart if its vertices lie on either side of two planes, at the start and where they are now
+//! are they apart?     a pair stays apart if its vertices lie on either side of two planes, at the start and where they are now:
+//!                     eight pairs at a time, across one direction after the other
 //! else they stop      the vertices that go towards the other element, before planes between the two
 //! again               for pairs of which a vertex was stopped since, until there are none
 //! ```
@@ -27,13 +28,15 @@ use crate::scene::ids::BodyId;
 use crate::scene::index::pair_numbers;
 use crate::scene::positions::Positions;
 use crate::search::found::KeysByKind;
-use crate::search::narrow::{FirstContact, PairElement};
+use crate::search::narrow::exact_kind;
 use crate::search::runner::{Job, Outcome};
-use crate::search::sink::reserve;
+use crate::search::sink::{filled, reserve};
 use crate::search::stats::Stats;
 use crate::search::work::Work;
+use crate::simd::{Isa, Simd, with_isa};
 use crate::workers::clock::Instant;
-use impinge_exact::internal::{shares_apart, spare_apart};
+use impinge_exact::internal::filter::{LANES, Points8};
+use impinge_exact::internal::{Apart8, apart_by_lane, shares_apart};
 use impinge_exact::{ElementPair, Point};
 
 /// Pairs that a task looks at.
@@ -99,6 +102,7 @@ impl Detector {
         let mut outcome = Truncated {
             truncation,
             keys: std::mem::take(&mut self.solver.keys),
+            isa: Isa::detect(self.settings.instruction_set),
             stats: Stats::default(),
         };
         let found = self.find_keys(scene, &plan, Keys::All, &mut outcome);
@@ -112,6 +116,7 @@ impl Detector {
 struct Truncated {
     truncation: Truncation,
     keys: KeysByKind,
+    isa: Isa,
     stats: Stats,
 }
 
@@ -133,7 +138,7 @@ impl Outcome<u64, { PairKind::ALL.len() }> for Truncated {
         let start = Instant::now();
         let Job { scene, plan, .. } = job;
         let mut vertices = Vertices::new(job)?;
-        let mut pairs = Pairs::new(job, &self.keys)?;
+        let mut pairs = Pairs::new(job, self.isa, &self.keys);
         let truncation = &mut self.truncation;
         pairs.stop(&vertices)?;
         // All that touch at the start are known now.
@@ -158,6 +163,10 @@ impl Outcome<u64, { PairKind::ALL.len() }> for Truncated {
 
 /// How far each vertex of each body goes.
 struct Vertices {
+    /// Of each: the start, where it is now, rounded as it is stored, and the end.
+    ways: Vec<[Point; 3]>,
+    /// How far each was taken back since the first round: at least that.
+    moved: Vec<f64>,
     all: Vec<Vertex>,
     /// The bits of the share of its way that each is to go at most: floats of at least 0 are in the
     /// order of their bits.
@@ -170,12 +179,8 @@ struct Vertices {
 struct Vertex {
     /// The share of its way.
     share: f64,
-    /// Where that is, rounded as it is stored.
-    at: Point,
     /// How often it was stopped.
     n_stops: u8,
-    /// How far it was taken back since the first round: at least that.
-    moved: f64,
 }
 
 /// A vertex that was stopped so often stays at its start: rounds end.
@@ -189,20 +194,28 @@ impl Vertices {
     fn new(job: Job<'_>) -> Result<Self, Error> {
         let Job { scene, plan, .. } = job;
         let n = scene.bodies().map(|(_, body)| body.n_vertices()).sum();
-        let (mut all, mut most) = (Vec::new(), Vec::new());
-        reserve(&mut all, n, "vertices")?;
-        reserve(&mut most, n, "vertices")?;
+        const WHAT: &str = "vertices";
+        let moved = filled(0.0, n, WHAT)?;
+        let (mut ways, mut all, mut most) = (Vec::new(), Vec::new(), Vec::new());
+        reserve(&mut ways, n, WHAT)?;
+        reserve(&mut all, n, WHAT)?;
+        reserve(&mut most, n, WHAT)?;
         most.resize_with(n, || AtomicU64::new(WHOLE));
+        all.resize_with(n, || Vertex {
+            share: 1.0,
+            n_stops: 0,
+        });
         for (_, body) in scene.bodies() {
-            let end = body.end_positions().unwrap_or(body.positions());
-            all.extend((0..body.n_vertices()).map(|vertex| Vertex {
-                share: 1.0,
-                at: end.point(vertex),
-                n_stops: 0,
-                moved: 0.0,
+            let start = body.positions();
+            let end = body.end_positions().unwrap_or(start);
+            ways.extend((0..body.n_vertices()).map(|vertex| {
+                let [start, end] = [start.point(vertex), end.point(vertex)];
+                [start, end, end]
             }));
         }
         Ok(Vertices {
+            ways,
+            moved,
             all,
             most,
             firsts: plan.first_vertices(scene),
@@ -217,12 +230,13 @@ impl Vertices {
     /// Takes the vertices back that were stopped. Returns whether there were any.
     fn go_back(&mut self, scene: &Scene) -> bool {
         let mut any = false;
-        let mut all = self.all.iter_mut().zip(&mut self.most);
+        let now = self.ways.iter_mut().zip(&mut self.moved);
+        let mut all = self.all.iter_mut().zip(&mut self.most).zip(now);
         for (_, body) in scene.bodies() {
             let start = body.positions();
             let end = body.end_positions().unwrap_or(start);
             let own = all.by_ref().take(body.n_vertices());
-            for (ix, (vertex, most)) in own.enumerate() {
+            for (ix, ((vertex, most), ([_, now, _], moved))) in own.enumerate() {
                 let most = std::mem::replace(most.get_mut(), WHOLE);
                 if most < WHOLE {
                     any = true;
@@ -234,9 +248,9 @@ impl Vertices {
                     vertex.share = if is_last { 0.0 } else { share.max(0.0) };
                     vertex.n_stops += 1;
                     let at = start.blend_point(end, ix, vertex.share);
-                    let back: f64 = (0..3).map(|k| (at[k] - vertex.at[k]).abs()).sum();
-                    vertex.moved = (vertex.moved + back * (1.0 + 8.0 * f64::EPSILON)).next_up();
-                    vertex.at = at;
+                    let back: f64 = (0..3).map(|k| (at[k] - now[k]).abs()).sum();
+                    *moved = (*moved + back * (1.0 + 8.0 * f64::EPSILON)).next_up();
+                    *now = at;
                 }
             }
         }
@@ -249,7 +263,7 @@ impl Vertices {
 
     /// The positions of all bodies that move.
     fn positions(&self, scene: &Scene) -> Vec<(BodyId, Positions)> {
-        let mut rest = self.all.iter().map(|vertex| vertex.at);
+        let mut rest = self.ways.iter().map(|&[_, now, _]| now);
         let mut positions = Vec::new();
         for (id, body) in scene.bodies() {
             let own = rest.by_ref().take(body.n_vertices());
@@ -275,171 +289,296 @@ impl Vertices {
 /// The bits of 1: all of a way.
 const WHOLE: u64 = 1.0_f64.to_bits();
 
+impl Vertices {
+    /// The points of a pair at one of the times of [`ways`](Vertices::ways).
+    fn points(&self, pair: &Pair, time: usize) -> [Point; 4] {
+        pair.vertices.map(|vertex| self.ways[vertex as usize][time])
+    }
+
+    /// How far the vertices of a pair were taken back together, but for rounding.
+    fn moved(&self, pair: &Pair) -> f64 {
+        let [a, b, c, d] = pair.vertices.map(|vertex| self.moved[vertex as usize]);
+        a + b + c + d
+    }
+
+    /// Whether any vertex of a pair is not at its start.
+    fn any_moves(&self, pair: &Pair) -> bool {
+        let mut all = pair.vertices.iter();
+        all.any(|&vertex| {
+            let [start, now, _] = &self.ways[vertex as usize];
+            start != now
+        })
+    }
+}
+
 /// A pair that could meet.
 struct Pair {
-    kind: PairKind,
     key: u64,
-    state: State,
-    /// Its vertices among all; the first again, where there are fewer.
+    /// Its vertices among all, in the order of the exact test; the first again, where there are
+    /// fewer.
     vertices: [u32; 4],
+    /// How near its elements may come.
+    kept: f64,
     /// It need not be looked at again before its vertices have been taken back so far together.
     until: f64,
 }
 
-/// What is known of a pair.
-#[derive(Clone, Copy, PartialEq)]
-enum State {
-    /// Nothing.
-    New,
-    /// It counts, and was apart at the start, or none of its vertices moves.
-    Apart,
-    /// None of its vertices may move: it touches at the start.
-    Touches,
-    /// It does not count.
-    Skipped,
-}
+/// It need not be looked at again at all.
+const DONE: f64 = f64::INFINITY;
 
-/// The points of a pair at the start, now, and at the end.
-struct Ways {
+/// Some pairs of one kind that could meet.
+struct PairsOfKind<'a> {
+    kind: PairKind,
     pair: ElementPair,
-    times: [[Point; 4]; 3],
-    /// How near they may come.
-    kept: f64,
-    vertices: [u32; 4],
-}
-
-impl Ways {
-    fn new(job: Job<'_>, vertices: &Vertices, kind: PairKind, key: u64) -> Self {
-        let Job { scene, plan, .. } = job;
-        let located = pair_numbers(key).map(|number| plan.locate(number));
-        let elements = (located.each_ref()).map(|located| PairElement::new(scene, plan, located));
-        let (pair, elements, [start, end]) =
-            FirstContact::ends(TestId::Elements(kind), elements, 1.0)
-                .expect("steps have vertices, edges and faces");
-        let all = elements.iter().flat_map(|element| {
-            let first = vertices.firsts[element.part.index()];
-            let corners = element.corners.iter();
-            corners.map(move |&corner| first + corner as usize)
-        });
-        let (mut now, mut numbers) = (end, [0; 4]);
-        for (ix, vertex) in all.enumerate() {
-            now[ix] = vertices.all[vertex].at;
-            // All numbers of parts are below 2^32, and vertices are a part.
-            numbers[ix] = vertex as u32;
-        }
-        let first = numbers[0];
-        numbers[pair.n_points()..].fill(first);
-        let parts = elements.map(|element| element.part);
-        Ways {
-            pair,
-            times: [start, now, end],
-            kept: plan.kept(scene, parts, pair, [&start, &end]),
-            vertices: numbers,
-        }
-    }
-
-    /// Stops the vertices that go towards the other element, if the two do not stay apart. Returns
-    /// also how far vertices may be taken back before it has to be asked again.
-    fn stop(&self, plan: &Plan, vertices: &Vertices) -> (State, f64) {
-        let [start, now, end] = &self.times;
-        let points = 0..self.pair.n_points();
-        let moving = points.filter(|&ix| now[ix] != start[ix]);
-        if moving.clone().next().is_none() {
-            return (State::Apart, f64::INFINITY);
-        }
-        if let Some(spare) = spare_apart(self.pair, [start, now, end], self.kept) {
-            return (State::Apart, spare);
-        }
-        let Some(shares) = shares_apart(self.pair, [start, now, end], self.kept) else {
-            if plan.start == Start::Skip && plan.at_start(self.pair, start).at_start {
-                return (State::Skipped, 0.0);
-            }
-            moving.for_each(|ix| vertices.stop(self.vertices[ix] as usize, 0.0));
-            return (State::Touches, 0.0);
-        };
-        // Where no share is less, the planes are too close for that: each goes back a little.
-        let is_any_less = shares.iter().any(|&share| share < 1.0);
-        for ix in moving {
-            let share = shares[ix];
-            if share < 1.0 || !is_any_less {
-                let share = share.min(1.0 - f64::EPSILON);
-                vertices.stop(self.vertices[ix] as usize, share);
-            }
-        }
-        (State::Apart, 0.0)
-    }
+    /// Those that were not looked at yet.
+    keys: &'a [u64],
+    /// Those that may have to be looked at again.
+    pairs: Vec<Pair>,
+    /// Those of which no vertex may move: they touch at the start.
+    touching: Vec<u64>,
 }
 
 /// The pairs that could meet.
 struct Pairs<'a> {
     job: Job<'a>,
-    all: Vec<Pair>,
+    isa: Isa,
+    /// By how much coordinates on the ways are rounded at most.
+    rounded: f64,
+    tasks: Vec<PairsOfKind<'a>>,
 }
 
 impl<'a> Pairs<'a> {
-    /// # Errors
-    /// There is no memory for them.
-    fn new(job: Job<'a>, keys: &KeysByKind) -> Result<Self, Error> {
-        let mut all = Vec::new();
-        reserve(&mut all, keys.iter().map(Vec::len).sum(), "pairs")?;
+    fn new(job: Job<'a>, isa: Isa, keys: &'a KeysByKind) -> Self {
+        let n_each = job.workers.task(TASK);
+        let mut tasks = Vec::new();
         for (kind, keys) in PairKind::ALL.into_iter().zip(keys) {
-            all.extend(keys.iter().map(|&key| Pair {
+            // Steps have vertices, edges and faces.
+            let Some(pair) = exact_kind(TestId::Elements(kind)) else {
+                continue;
+            };
+            tasks.extend(keys.chunks(n_each).map(|keys| PairsOfKind {
                 kind,
-                key,
-                state: State::New,
-                vertices: [0; 4],
-                until: 0.0,
+                pair,
+                keys,
+                pairs: Vec::new(),
+                touching: Vec::new(),
             }));
         }
-        Ok(Pairs { job, all })
+        let rounded = job.scene.bodies().map(|(_, body)| {
+            let end = body.end_positions();
+            end.map_or(0.0, |end| body.positions().most_rounded(end))
+        });
+        Pairs {
+            job,
+            isa,
+            rounded: rounded.fold(0.0, f64::max),
+            tasks,
+        }
     }
 
     /// Stops the vertices of all pairs that do not stay apart as they are now. Most need no second
-    /// look: their vertices are not taken back far enough.
+    /// look: their vertices are not taken back far enough, or they stay apart however far.
     ///
     /// # Errors
-    /// Cancellation.
+    /// Cancellation; there is no memory.
     fn stop(&mut self, vertices: &Vertices) -> Result<(), Error> {
-        let job = self.job;
+        let (job, isa, rounded) = (self.job, self.isa, self.rounded);
         let Job {
-            scene,
-            plan,
-            workers,
-            control,
+            workers, control, ..
         } = job;
-        let mut tasks: Vec<&mut [Pair]> = self.all.chunks_mut(workers.task(TASK)).collect();
-        Work { workers, control }.each(&mut tasks, |_, pairs| {
-            for pair in pairs.iter_mut() {
-                let numbers = pair.vertices;
-                let moved = || -> f64 {
-                    let all = numbers.iter();
-                    // Rounded up as far as four numbers can be rounded down.
-                    let sum: f64 = all.map(|&vertex| vertices.all[vertex as usize].moved).sum();
-                    sum * (1.0 + 8.0 * f64::EPSILON)
-                };
-                match pair.state {
-                    State::New if !plan.counts(scene, pair.key) => pair.state = State::Skipped,
-                    State::Apart if moved() < pair.until => {}
-                    State::New | State::Apart => {
-                        let ways = Ways::new(job, vertices, pair.kind, pair.key);
-                        pair.vertices = ways.vertices;
-                        let spare;
-                        (pair.state, spare) = ways.stop(plan, vertices);
-                        let all = ways.vertices.iter();
-                        let moved: f64 =
-                            all.map(|&vertex| vertices.all[vertex as usize].moved).sum();
-                        pair.until = (moved * (1.0 - 8.0 * f64::EPSILON) + spare).next_down();
-                    }
-                    State::Touches | State::Skipped => {}
-                }
-            }
+        Work { workers, control }.each(&mut self.tasks, |_, task| {
+            task.take_new(job, vertices)?;
+            task.look((isa, rounded), vertices);
+            task.stop(job.plan, vertices);
+            task.pairs.retain(|pair| pair.until < DONE);
             Ok(())
         })
     }
 
     /// The pairs of which no vertex moves.
     fn touching(&self) -> impl Iterator<Item = (PairKind, u64)> {
-        let touching = self.all.iter().filter(|pair| pair.state == State::Touches);
-        touching.map(|pair| (pair.kind, pair.key))
+        let tasks = self.tasks.iter();
+        tasks.flat_map(|task| task.touching.iter().map(|&key| (task.kind, key)))
     }
+}
+
+impl PairsOfKind<'_> {
+    /// The pairs that count and of which some vertex moves.
+    ///
+    /// # Errors
+    /// There is no memory for them.
+    fn take_new(&mut self, job: Job<'_>, vertices: &Vertices) -> Result<(), Error> {
+        let Job { scene, plan, .. } = job;
+        let keys = std::mem::take(&mut self.keys);
+        reserve(&mut self.pairs, keys.len(), "pairs")?;
+        for &key in keys {
+            if !plan.counts(scene, key) {
+                continue;
+            }
+            let [a, b] = pair_numbers(key);
+            let mut located = [plan.locate(a), plan.locate(b)];
+            if self.pair == ElementPair::VertexEdge {
+                // Such pairs are named edge first, but tested vertex first.
+                located.reverse();
+            }
+            let mut numbers = [0; 4];
+            let mut n = 0;
+            for (part, element) in &located {
+                let corners = plan
+                    .body(scene, *part)
+                    .corners(plan.part(*part).part, element);
+                for &corner in corners {
+                    // All numbers of parts are below 2^32, and vertices are a part.
+                    numbers[n] = (vertices.firsts[part.index()] + corner as usize) as u32;
+                    n += 1;
+                }
+            }
+            let first = numbers[0];
+            numbers[n..].fill(first);
+            let mut pair = Pair {
+                key,
+                vertices: numbers,
+                kept: plan.bound(),
+                until: 0.0,
+            };
+            if !vertices.any_moves(&pair) {
+                continue;
+            }
+            if plan.has_clearance() {
+                let [start, end] = [0, 2].map(|time| vertices.points(&pair, time));
+                let parts = [located[0].0, located[1].0];
+                pair.kept = plan.kept(scene, parts, self.pair, [&start, &end]);
+            }
+            self.pairs.push(pair);
+        }
+        Ok(())
+    }
+
+    /// Says of each pair that stays apart until when it does so. What is left has an `until` below
+    /// 0.
+    fn look(&mut self, (isa, rounded): (Isa, f64), vertices: &Vertices) {
+        const UNKNOWN: f64 = -1.0;
+        let mut open: Vec<u32> = Vec::new();
+        for (ix, pair) in self.pairs.iter_mut().enumerate() {
+            // Rounded up as far as four numbers can be rounded down.
+            if vertices.moved(pair) * (1.0 + 8.0 * f64::EPSILON) < pair.until {
+                continue;
+            }
+            if vertices.any_moves(pair) {
+                pair.until = UNKNOWN;
+                open.push(ix as u32);
+            } else {
+                pair.until = DONE;
+            }
+        }
+        let mut later = Vec::new();
+        let mut times: [Points8; 3] = Default::default();
+        // Where elements are far apart, a way between any two points does.
+        for at in [None, Some(0), Some(2), Some(1)] {
+            for eight in open.chunks(LANES) {
+                let mut kept = [0.0; LANES];
+                for (lane, &ix) in eight.iter().enumerate() {
+                    let pair = &self.pairs[ix as usize];
+                    kept[lane] = pair.kept;
+                    put_points(vertices, pair, lane, &mut times, at == Some(2));
+                }
+                let apart = apart_across(isa, self.pair, &times, at, &kept, rounded);
+                for (lane, &ix) in eight.iter().enumerate() {
+                    let pair = &mut self.pairs[ix as usize];
+                    let spare = apart.spare[lane];
+                    if apart.always >> lane & 1 == 1 {
+                        pair.until = DONE;
+                    } else if spare > 0.0 {
+                        let moved = vertices.moved(pair) * (1.0 - 8.0 * f64::EPSILON);
+                        pair.until = (moved + spare).next_down();
+                    } else {
+                        later.push(ix);
+                    }
+                }
+            }
+            std::mem::swap(&mut open, &mut later);
+            later.clear();
+        }
+    }
+
+    /// Stops the vertices that go towards the other element, of pairs that do not stay apart.
+    fn stop(&mut self, plan: &Plan, vertices: &Vertices) {
+        for pair in &mut self.pairs {
+            if pair.until >= 0.0 {
+                continue;
+            }
+            let [start, now, end] = [0, 1, 2].map(|time| vertices.points(pair, time));
+            let moving = (0..self.pair.n_points()).filter(|&ix| now[ix] != start[ix]);
+            let Some(shares) = shares_apart(self.pair, [&start, &now, &end], pair.kept) else {
+                pair.until = DONE;
+                if plan.start == Start::Skip && plan.at_start(self.pair, &start).at_start {
+                    continue;
+                }
+                moving.for_each(|ix| vertices.stop(pair.vertices[ix] as usize, 0.0));
+                self.touching.push(pair.key);
+                continue;
+            };
+            // Where no share is less, the planes are too close for that: each goes back a little.
+            let is_any_less = shares.iter().any(|&share| share < 1.0);
+            for ix in moving {
+                let share = shares[ix];
+                if share < 1.0 || !is_any_less {
+                    let share = share.min(1.0 - f64::EPSILON);
+                    vertices.stop(pair.vertices[ix] as usize, share);
+                }
+            }
+            // It is looked at in the next round.
+            pair.until = 0.0;
+        }
+    }
+}
+
+/// Writes the points of a pair into a lane: at the start and now, and on request at the end.
+fn put_points(
+    vertices: &Vertices,
+    pair: &Pair,
+    lane: usize,
+    times: &mut [Points8; 3],
+    with_end: bool,
+) {
+    let n_times = if with_end { 3 } else { 2 };
+    for (k, &vertex) in pair.vertices.iter().enumerate() {
+        let way = &vertices.ways[vertex as usize];
+        for (Points8(points), point) in times.iter_mut().zip(way).take(n_times) {
+            for (row, x) in points[k].iter_mut().zip(point) {
+                row[lane] = *x;
+            }
+        }
+    }
+}
+
+/// Whether eight pairs stay apart, across ways at one of some times.
+fn apart_across(
+    isa: Isa,
+    pair: ElementPair,
+    times: &[Points8; 3],
+    at: Option<usize>,
+    kept: &[f64; LANES],
+    rounded: f64,
+) -> Apart8 {
+    let at = at.map(|time| &times[time]);
+    with_isa!(isa, apart_in_registers, (
+        pair: ElementPair = pair,
+        times: &[Points8; 3] = times,
+        at: Option<&Points8> = at,
+        kept: &[f64; LANES] = kept,
+        rounded: f64 = rounded,
+    ) -> Apart8)
+}
+
+#[inline(always)]
+fn apart_in_registers<S: Simd>(
+    _: S,
+    pair: ElementPair,
+    [start, now, _]: &[Points8; 3],
+    at: Option<&Points8>,
+    kept: &[f64; LANES],
+    rounded: f64,
+) -> Apart8 {
+    apart_by_lane::<S::F64>(pair, [start, now], at, kept, rounded)
 }

@@ -14,9 +14,12 @@
 //! Source: A. Chen et al., "Divide and Truncate", SIGGRAPH 2026, for planes that divide the room
 //! between elements. There they rest.
 
-use super::filter::bounds_and_way;
 use crate::Point;
 use crate::element_pair::ElementPair;
+use crate::filter::motion::{dot, size};
+use crate::filter::nearness::Polygon;
+use crate::filter::number::{Number, Vector, load_points};
+use crate::filter::{LANES, Points8};
 use crate::rounding::root;
 
 /// The share of the room that stays free, so that elements are certainly apart when their points
@@ -26,30 +29,118 @@ const LEAST_SHARE: f64 = 1.0 / 1024.0;
 /// A bound of the relative error of a height: 8 roundings, where 5 happen.
 const ERROR: f64 = 4.0 * f64::EPSILON;
 
-/// How far each point of two elements may be from where it is now, so that the elements certainly
-/// stay farther apart than a distance, as their points go there from their start at the same time.
-/// `now` lies on the ways from the start to the end.
-///
-/// `None` if they do not certainly stay apart.
+/// What is known of eight pairs across one direction each.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Apart8 {
+    /// How far each point of a pair may be from where it is now, so that its elements certainly
+    /// stay farther apart than a distance, as their points go there from their start at the same
+    /// time. Not above 0 where they do not certainly stay apart.
+    pub spare: [f64; LANES],
+    /// Bit k: the elements of pair k certainly stay so far apart wherever each point stops on its
+    /// way from the start to where it is now, if no coordinate is rounded by more than a number.
+    pub always: u8,
+}
+
+/// Across a direction, whether the elements of eight pairs stay apart. The direction is about the
+/// shortest way between the elements where their points are `at`; if that is nowhere, a way
+/// between two of their points, which does where elements are far apart.
+#[inline(always)]
 #[must_use]
-pub fn spare_apart(
+pub fn apart_by_lane<V: Vector>(
     pair: ElementPair,
-    [start, now, end]: [&[Point; 4]; 3],
-    distance: f64,
-) -> Option<f64> {
-    // Where elements are far apart, a way between any two points does.
-    let about = |k: usize| {
-        let between = |points: &[Point; 4]| points[0][k] - points[pair.n_first()][k];
-        between(start) + between(now)
-    };
-    let about = Across::new(core::array::from_fn(about), pair);
-    let mut all = about.into_iter().chain(ways(pair, [start, end, now]));
-    all.find_map(|across| {
-        let spare = |points| across.room(points, distance).filter(|&room| room > 0.0);
-        spare(start)?;
-        // The normal is no longer than the root of 3, and two points may move.
-        spare(now).map(|room| room * (0.99 / (2.0 * 1.733)))
-    })
+    [start, now]: [&Points8; 2],
+    at: Option<&Points8>,
+    distances: &[f64; LANES],
+    rounded: f64,
+) -> Apart8 {
+    let mut apart = Apart8::default();
+    for first in (0..LANES).step_by(V::N) {
+        let ends = [load_points::<V>(start, first), load_points(now, first)];
+        let way = match at {
+            Some(at) => shortest_way(pair, &load_points(at, first)),
+            None => some_way(pair, [&ends[0], &ends[1]]),
+        };
+        let distance = V::load(distances, first);
+        let (spare, always) = apart_across(pair, &ends, &way, distance, V::splat(rounded));
+        spare.store(&mut apart.spare, first);
+        apart.always |= V::bits(always) << first;
+    }
+    apart
+}
+
+/// From the second element to the first, between two of their points.
+#[inline(always)]
+fn some_way<T: Number>(pair: ElementPair, [start, now]: [&[[T; 3]; 4]; 2]) -> [T; 3] {
+    let mut way = [T::splat(0.0); 3];
+    for axis in 0..3 {
+        let [first, second] = [0, pair.n_first()];
+        way[axis] =
+            (start[first][axis] - start[second][axis]) + (now[first][axis] - now[second][axis]);
+    }
+    way
+}
+
+/// About the shortest way from the second element to the first; without a length where sizes are
+/// out of range.
+#[inline(always)]
+fn shortest_way<T: Number>(pair: ElementPair, points: &[[T; 3]; 4]) -> [T; 3] {
+    let (is_small, mut way) = Polygon::of_pair(pair, points).way();
+    let zero = T::splat(0.0);
+    for x in &mut way {
+        // The polygon is the face minus the vertex, or the first edge minus the second.
+        let turned = if pair == ElementPair::EdgeEdge {
+            *x
+        } else {
+            zero - *x
+        };
+        *x = T::select(is_small, turned, zero);
+    }
+    way
+}
+
+/// See [`Apart8`].
+#[inline(always)]
+fn apart_across<T: Number>(
+    pair: ElementPair,
+    ends: &[[[T; 3]; 4]; 2],
+    way: &[T; 3],
+    distance: T,
+    rounded: T,
+) -> (T, T::Mask) {
+    let (zero, largest) = (T::splat(0.0), T::splat(f64::MAX));
+    let length = size(way);
+    let normal = [way[0] / length, way[1] / length, way[2] / length];
+    // All heights over the same point. They are NaN or infinite where this sum is.
+    let origin = &ends[0][0];
+    let mut sum = zero;
+    let (mut low, mut high) = ([largest; 2], [zero - largest; 2]);
+    for (time, points) in ends.iter().enumerate() {
+        for (ix, point) in points.iter().enumerate().take(pair.n_points()) {
+            let x = normal[0] * (point[0] - origin[0]);
+            let y = normal[1] * (point[1] - origin[1]);
+            let z = normal[2] * (point[2] - origin[2]);
+            let height = x + y + z;
+            let magnitude = x.abs() + y.abs() + z.abs();
+            let error = T::splat(ERROR) * magnitude + T::splat(4.0 * f64::MIN_POSITIVE);
+            sum = sum + magnitude;
+            if ix < pair.n_first() {
+                low[time] = low[time].smaller(height - error);
+            } else {
+                high[time] = high[time].larger(height + error);
+            }
+        }
+    }
+    // Rounded up by more than the roundings here. Errors of heights allow for the differences.
+    let thick = distance * dot(&normal, &normal).sqrt() * T::splat(1.0 + 4.0 * ERROR);
+    let rooms = [low[0] - high[0] - thick, low[1] - high[1] - thick];
+    let is_apart = length.gt(zero) & largest.gt(length) & largest.gt(sum) & rooms[0].gt(zero);
+    // The normal is no longer than the root of 3, and two points may move.
+    let spare = rooms[1] * T::splat(0.99 / (2.0 * 1.733));
+    // A plane that rests. Each height is off by at most three coordinates, each of which is
+    // rounded there and then.
+    let room = low[0].smaller(low[1]) - high[0].larger(high[1]) - thick;
+    let always = is_apart & room.gt(T::splat(16.0) * rounded);
+    (T::select(is_apart, spare, zero), always)
 }
 
 /// How far each point of two elements may go from its start to its end, a share, so that the
@@ -75,15 +166,10 @@ fn ways<'a>(
     pair: ElementPair,
     times: impl IntoIterator<Item = &'a [Point; 4]>,
 ) -> impl Iterator<Item = Across> {
-    times.into_iter().filter_map(move |points| {
-        let (_, way) = bounds_and_way(pair, points)?;
-        // To the difference polygon: the face minus the vertex, or the first edge minus the second.
-        let way = match pair {
-            ElementPair::EdgeEdge => way,
-            _ => way.map(|x| -x),
-        };
-        Across::new(way, pair)
-    })
+    let ways = times
+        .into_iter()
+        .map(move |points| shortest_way(pair, points));
+    ways.filter_map(move |way| Across::new(way, pair))
 }
 
 /// A direction from the second element to the first.
@@ -208,6 +294,21 @@ mod tests {
         fn point(&mut self, n: u64, scale: f64) -> Point {
             [(); 3].map(|()| (self.next(2 * n + 1) - n as f64) * scale)
         }
+    }
+
+    /// As all directions in turn say it.
+    fn spare_apart(
+        pair: ElementPair,
+        [start, now, end]: [&[Point; 4]; 3],
+        distance: f64,
+    ) -> Option<f64> {
+        let ends = [*start, *now];
+        let about = some_way(pair, [start, now]);
+        let ways = [start, end, now].map(|points| shortest_way(pair, points));
+        core::iter::once(about).chain(ways).find_map(|way| {
+            let (spare, _) = apart_across(pair, &ends, &way, distance, 0.0);
+            (spare > 0.0).then_some(spare)
+        })
     }
 
     const PAIRS: [ElementPair; 4] = [

@@ -282,6 +282,13 @@ impl<T: Number> Polygon<T> {
         (is_small, [low, most(&near, size)], near)
     }
 
+    /// About the shortest way from the origin, where the mask is set.
+    #[inline(always)]
+    pub(crate) fn way(&self) -> (T::Mask, Vector<T>) {
+        let is_small = T::splat(T::LARGEST).gt(self.size());
+        (is_small, self.nearest(&self.normal()))
+    }
+
     /// A distance from a plane through the origin that all corners certainly have, all on one side;
     /// 0 if that is not certain.
     #[inline(always)]
