@@ -8,12 +8,18 @@ use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
 
 use impinge::{Backend, CancelToken, Control, Precision, Settings, SharedVertex, Start};
-use impinge_check::{Limits, Options, Pool, PoolError, apply_limits, serve};
+use impinge_check::{
+    FixError, FixOptions, Limits, Options, Pool, PoolError, Repair, Row, apply_limits, fix_mesh,
+    serve,
+};
+use impinge_io::{Elements, Mesh, Positions};
 use impinge_tiles::{Ask, Error, Plan, PlanOptions, RunOptions, ScatterOptions};
+use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::exceptions::{PyOSError, PyRuntimeError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
+use crate::arrays::{PositionArray, Rows, index_rows, positions_array};
 use crate::errors::{Cancelled, invalid, raise};
 use crate::settings::{WHICH, choose_one, words};
 
@@ -104,6 +110,80 @@ pub fn _check(
         PoolError::Cancelled => Cancelled::new_err("the check was cancelled"),
         error => PyRuntimeError::new_err(error.to_string()),
     })
+}
+
+/// Vertices, faces, and what was done as a line of JSON.
+type FixedArrays<'py> = (Bound<'py, PyAny>, Bound<'py, PyArray2<u32>>, String);
+
+/// Mends a mesh; `only` names the repairs.
+#[pyfunction]
+pub fn _fix<'py>(
+    py: Python<'py>,
+    vertices: &Bound<'py, PyAny>,
+    faces: &Bound<'py, PyAny>,
+    only: Vec<String>,
+    close_holes: usize,
+    threads: usize,
+) -> PyResult<FixedArrays<'py>> {
+    let positions = PositionArray::new(vertices, "vertices")?;
+    let (indices, _) = index_rows(faces, "faces", &[3], positions.len())?;
+    let mesh = Mesh {
+        positions: match positions.rows()? {
+            Rows::F32(rows) => Positions::F32(rows.to_vec()),
+            Rows::F64(rows) => Positions::F64(rows.to_vec()),
+        },
+        elements: Elements::Triangles(indices.as_chunks().0.to_vec()),
+    };
+    let named = |repair: &Repair| only.iter().any(|name| name == repair.name());
+    let options = FixOptions {
+        repairs: Repair::ALL.into_iter().filter(named).collect(),
+        close_holes,
+        threads,
+    };
+    let fixed = py
+        .detach(|| fix_mesh(mesh, &options))
+        .map_err(|error| match error {
+            FixError::Refused(source) => raise(source),
+            other => invalid(other.to_string()),
+        })?;
+    let row = |counts, places: &[_], is_welded| {
+        let row = Row {
+            path: String::new(),
+            is_welded,
+            result: Ok(counts),
+            places: places.to_vec(),
+        };
+        let mut row = row.to_json();
+        row.as_object_mut().map(|row| row.remove("path"));
+        row
+    };
+    let numbers = |repair: Repair| {
+        let numbers = fixed.numbers(repair).into_iter();
+        let numbers = numbers.map(|(name, n)| (name.to_owned(), n.into()));
+        (
+            repair.name().to_owned(),
+            serde_json::Value::Object(numbers.collect()),
+        )
+    };
+    let welds = options.repairs.contains(&Repair::Weld);
+    let done = serde_json::json!({
+        "repairs": options.repairs.iter().copied().map(numbers).collect::<serde_json::Map<_, _>>(),
+        "seams": fixed.has_seams(),
+        "before": row(fixed.before, &fixed.places_before, welds),
+        "after": row(fixed.after, &fixed.places_after, false),
+    });
+    let held = match fixed.mesh.positions {
+        Positions::F32(positions) => positions.into(),
+        Positions::F64(positions) => positions.into(),
+    };
+    let faces = match fixed.mesh.elements {
+        Elements::Triangles(faces) => faces,
+        // Meshes of triangles stay what they are.
+        Elements::Tetrahedra(_) => Vec::new(),
+    };
+    let n = faces.len();
+    let faces = PyArray1::from_vec(py, faces.into_flattened()).reshape([n, 3])?;
+    Ok((positions_array(py, &held)?, faces, done.to_string()))
 }
 
 /// The child's side of `_check`: answers paths on standard input by rows on standard output.

@@ -49,7 +49,7 @@ mod _impinge {
     use super::contact::{Contacts, Penetration};
     #[pymodule_export]
     use super::datasets::{
-        _check, _serve_check, _tiles_describe, _tiles_merge, _tiles_plan, _tiles_run,
+        _check, _fix, _serve_check, _tiles_describe, _tiles_merge, _tiles_plan, _tiles_run,
         _tiles_scatter,
     };
     #[pymodule_export]

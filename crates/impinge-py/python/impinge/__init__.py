@@ -48,6 +48,7 @@ from ._errors import (
     Seam,
     TooManyPairs,
 )
+from ._fix import Fixed, fix
 from ._functions import (
     DeviceInfo,
     cast,
@@ -98,6 +99,7 @@ __all__ = [
     "DeviceInfo",
     "Error",
     "Exclusion",
+    "Fixed",
     "Hits",
     "Impact",
     "Impacts",
@@ -123,6 +125,7 @@ __all__ = [
     "closest_points",
     "contains",
     "devices",
+    "fix",
     "groups",
     "hash_rows",
     "ipc",

@@ -36,6 +36,7 @@ __all__ = [
     "_check_options",
     "_devices",
     "_groups",
+    "_fix",
     "_hash_rows",
     "_rest_pairs",
     "_rings",
@@ -379,6 +380,9 @@ def _check(
     timeout: float | None,
     row: Callable[[int, str], object],
 ) -> None: ...
+def _fix(
+    vertices: _Array, faces: _Array, only: list[str], close_holes: int, threads: int
+) -> tuple[npt.NDArray[Any], npt.NDArray[np.uint32], str]: ...
 def _serve_check(weld: bool, threads: int, memory: int | None, min_thickness: float | None) -> None: ...
 def _tiles_plan(
     folder: str,
