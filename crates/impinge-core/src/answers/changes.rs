@@ -12,12 +12,12 @@ use std::cmp::Ordering;
 /// # fn main() -> Result<(), impinge::Error> {
 /// let mut scene = Scene::new();
 /// scene.add_triangles(&[[0, 1, 2]], &[[0.0f32, 0.0, 0.0], [8.0, 0.0, 0.0], [0.0, 8.0, 0.0]])?;
-/// let points = scene.add_points(&[[1.0f32, 1.0, 0.5], [2.0, 1.0, 0.5], [1.0, 2.0, 9.0]])?;
+/// let points = scene.add_points(&[[1.0f32, 1.0, 0.5], [3.0, 1.0, 0.5], [1.0, 2.0, 9.0]])?;
 /// let mut detector = Detector::new(Backend::Cpu)?;
 /// let mut near = detector.near(&scene, 1.0, &Query::all())?;
 /// let mut multipliers = vec![0.25, 0.5];
 ///
-/// scene.set_positions(points, &[[1.0f32, 1.0, 9.0], [2.0, 1.0, 0.5], [1.0, 2.0, 0.5]])?;
+/// scene.set_positions(points, &[[1.0f32, 1.0, 9.0], [3.0, 1.0, 0.5], [1.0, 2.0, 0.5]])?;
 /// let next = detector.near(&scene, 1.0, &Query::all())?;
 /// let changes = next.changes(&near);
 /// let mut moved = vec![0.0; next.len()];
