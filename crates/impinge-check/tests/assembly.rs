@@ -1,5 +1,8 @@
 //! Parts that pass into each other, touch or are near, against separating axes of convex solids.
 
+mod common;
+
+use common::{BOX, corners};
 use impinge_check::{AssemblyError, AssemblyOptions, PartPair, Relation, check_assembly};
 use impinge_io::{Elements, Mesh, Positions};
 use impinge_scenes::Random;
@@ -31,30 +34,7 @@ fn relation(a: &Mesh, b: &Mesh) -> Option<Relation> {
 
 /// A box, outward.
 fn cuboid(low: Point, high: Point) -> (Vec<Point>, Faces) {
-    let points = (0..8usize).map(|ix| {
-        [0, 1, 2].map(|axis| {
-            if ix >> (2 - axis) & 1 == 1 {
-                high[axis]
-            } else {
-                low[axis]
-            }
-        })
-    });
-    let faces = vec![
-        [0, 1, 3],
-        [0, 3, 2],
-        [4, 6, 7],
-        [4, 7, 5],
-        [0, 4, 5],
-        [0, 5, 1],
-        [2, 3, 7],
-        [2, 7, 6],
-        [0, 2, 6],
-        [0, 6, 4],
-        [1, 5, 7],
-        [1, 7, 3],
-    ];
-    (points.collect(), faces)
+    (corners(low, high), BOX.to_vec())
 }
 
 fn sub(a: Point, b: Point) -> Point {

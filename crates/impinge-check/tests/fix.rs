@@ -1,8 +1,11 @@
 //! What `fix_mesh` writes, a check confirms: every defect by itself, all of them together, and
 //! vertices that keep their bits.
 
+mod common;
+
 use std::collections::HashSet;
 
+use common::{BOX, corners};
 use impinge_check::{Checked, FixOptions, Fixed, Options, Repair, check_mesh, fix_mesh};
 use impinge_io::{Elements, Mesh, Positions};
 use impinge_scenes::Random;
@@ -24,24 +27,8 @@ fn faces(mesh: &Mesh) -> &[[u32; 3]] {
 
 /// A box, outward.
 fn cube(low: [f64; 3], size: f64) -> Mesh {
-    let points = (0..8)
-        .map(|ix| [2, 1, 0].map(|bit| f64::from(ix >> bit & 1) * size))
-        .map(|at| [0, 1, 2].map(|axis| low[axis] + at[axis]));
-    let faces = [
-        [0, 1, 3],
-        [0, 3, 2],
-        [4, 6, 7],
-        [4, 7, 5],
-        [0, 4, 5],
-        [0, 5, 1],
-        [2, 3, 7],
-        [2, 7, 6],
-        [0, 2, 6],
-        [0, 6, 4],
-        [1, 5, 7],
-        [1, 7, 3],
-    ];
-    mesh(points.collect(), faces.to_vec())
+    let high = low.map(|x| x + size);
+    mesh(corners(low, high), BOX.to_vec())
 }
 
 /// Several meshes as one.

@@ -1,5 +1,8 @@
 //! Walls that are too thin: plates, hollow balls, wedges, gaps, and solids inside out.
 
+mod common;
+
+use common::{BOX, corners};
 use impinge_check::{Checked, Options, Problem, check_mesh};
 use impinge_io::{Elements, Mesh, Positions};
 
@@ -7,30 +10,7 @@ type Faces = Vec<[u32; 3]>;
 
 /// A box, outward.
 fn cuboid(low: [f64; 3], high: [f64; 3]) -> (Vec<[f64; 3]>, Faces) {
-    let points = (0..8usize).map(|ix| {
-        [0, 1, 2].map(|axis| {
-            if ix >> (2 - axis) & 1 == 1 {
-                high[axis]
-            } else {
-                low[axis]
-            }
-        })
-    });
-    let faces = vec![
-        [0, 1, 3],
-        [0, 3, 2],
-        [4, 6, 7],
-        [4, 7, 5],
-        [0, 4, 5],
-        [0, 5, 1],
-        [2, 3, 7],
-        [2, 7, 6],
-        [0, 2, 6],
-        [0, 6, 4],
-        [1, 5, 7],
-        [1, 7, 3],
-    ];
-    (points.collect(), faces)
+    (corners(low, high), BOX.to_vec())
 }
 
 fn turned((points, faces): (Vec<[f64; 3]>, Faces)) -> (Vec<[f64; 3]>, Faces) {

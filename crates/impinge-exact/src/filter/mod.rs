@@ -106,7 +106,7 @@ pub struct TetrahedronPairs8 {
 }
 
 /// The points of eight pairs, one pair per lane: `[point][axis][lane]`, points in the order of the
-/// [`ElementPair`].
+/// [`ElementPair`](crate::ElementPair).
 #[derive(Clone, Debug, Default, PartialEq)]
 #[repr(align(64))]
 pub struct Points8(pub [[[f64; LANES]; 3]; 4]);
