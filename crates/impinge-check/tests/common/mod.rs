@@ -18,7 +18,7 @@ pub const BOX: [[u32; 3]; 12] = [
 
 /// The corners of a box.
 pub fn corners<T: Copy>(low: [T; 3], high: [T; 3]) -> Vec<[T; 3]> {
-    let end = |ix: usize, axis| [low, high][ix >> (2 - axis) & 1][axis];
+    let end = |ix: usize, axis: usize| [low, high][ix >> (2 - axis) & 1][axis];
     (0..8)
         .map(|ix| [0, 1, 2].map(|axis| end(ix, axis)))
         .collect()
