@@ -3,7 +3,8 @@
 use std::cmp::Ordering;
 
 /// The pairs of an answer beside those of an older one: [`Pairs::changes`](crate::Pairs::changes),
-/// [`Impacts::changes`](crate::Impacts::changes), [`NearPairs::changes`](crate::NearPairs::changes).
+/// [`Impacts::changes`](crate::Impacts::changes),
+/// [`NearPairs::changes`](crate::NearPairs::changes).
 ///
 /// What a solver keeps per pair (multipliers, anchors of friction, a warm start) moves with it:
 ///

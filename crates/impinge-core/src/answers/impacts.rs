@@ -202,9 +202,9 @@ impl Impacts {
     }
 
     /// Which pairs an older answer also has, which are new, and which are gone: two pairs are the
-    /// same if their kinds, bodies and elements are, whatever
-    /// their times. Pairs of a body that was removed and of one in
-    /// its slot differ; those of a body that was re-meshed are named by their numbers alone.
+    /// same if their kinds, bodies and elements are, whatever their times. Pairs of a body that was
+    /// removed and of one in its slot differ; those of a body that was re-meshed are named by their
+    /// numbers alone.
     pub fn changes(&self, old: &Impacts) -> Changes {
         Changes::between(old.iter().map(Impact::key), self.iter().map(Impact::key))
     }

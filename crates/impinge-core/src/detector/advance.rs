@@ -13,7 +13,6 @@ use crate::query::step::Start;
 use crate::scene::Scene;
 use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
-use crate::scene::index::pair_numbers;
 use crate::scene::positions::Positions;
 use crate::search::found::PairList;
 use crate::search::narrow::{FirstContact, PairElement};
@@ -202,7 +201,7 @@ pub(super) fn refuse_seams(
     touching: impl IntoIterator<Item = (PairKind, u64)>,
 ) -> Result<(), Error> {
     let seams = touching.into_iter().filter_map(|(kind, key)| {
-        let [a, b] = pair_numbers(key).map(|number| plan.locate(number));
+        let [a, b] = plan.located(key);
         let [of_a, of_b] = [a.0, b.0].map(|part| plan.part(part));
         if of_a.id != of_b.id {
             return None;
@@ -245,7 +244,7 @@ fn touch(scene: &Scene, plan: &Plan, (kind, key): (PairKind, u64), fraction: f64
     if !plan.counts(scene, key) {
         return false;
     }
-    let located = pair_numbers(key).map(|number| plan.locate(number));
+    let located = plan.located(key);
     let [a, b] = (located.each_ref()).map(|located| PairElement::new(scene, plan, located));
     let contact = FirstContact::decide_part(TestId::Elements(kind), a, b, fraction);
     contact.is_some_and(|contact| !(plan.start == Start::Skip && contact.at_start))

@@ -20,7 +20,6 @@ use crate::query::settings::{Method, Settings};
 use crate::scene::Scene;
 use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
-use crate::scene::index::pair_numbers;
 use crate::search::runner::{Finder, Job, Runner, ready};
 use crate::search::sink::Answer;
 use crate::search::stats::Stats;
@@ -183,7 +182,7 @@ impl Touching {
         };
         ready(runner.run(scene, &plan, control, &mut finder, &mut self.pairs))?;
         Ok(finder.key.map(|key| {
-            let mut elements = pair_numbers(key).map(|number| plan.locate(number).1.raw());
+            let mut elements = plan.located(key).map(|(_, element)| element.raw());
             if by_second {
                 elements.reverse();
             }

@@ -22,7 +22,7 @@ use crate::query::pair_kind::PairKind;
 use crate::query::step::check_distance;
 use crate::scene::Scene;
 use crate::scene::error::Error;
-use crate::scene::index::{PartIx, pair_numbers};
+use crate::scene::index::{ElementIx, PartIx};
 use crate::search::found::KeysByKind;
 use crate::search::narrow::{Corners, exact_kind};
 use crate::search::runner::{Job, Outcome};
@@ -94,9 +94,9 @@ impl Detector {
             scene.body(body)?;
         }
         let plan = Plan::nearness(scene, query, 2.0 * most, self.settings.limits())?;
+        self.solver.shares.begin(scene, &plan, query, most)?;
         let mut memory = std::mem::take(&mut self.solver);
-        let mut shares = std::mem::take(&mut memory.shares);
-        shares.begin(scene, &plan, query, most)?;
+        let shares = std::mem::take(&mut memory.shares);
         let mut safe = self.homes.safe.take();
         let mut outcome = Safe {
             safe: &mut safe,
@@ -155,7 +155,8 @@ impl Detector {
 struct Measured<'a> {
     parts: [PartIx; 2],
     corners: [&'a [u32]; 2],
-    /// A number below its distance; 0 if and only if that is not above 0.
+    /// A number below its distance minus the thickness of both bodies; 0 if and only if that is not
+    /// above 0.
     distance: f64,
 }
 
@@ -200,14 +201,16 @@ impl SolverMemory {
                 for key in &mut *keys {
                     (*key, _) = labels.split(*key);
                 }
+                let located: [_; LANES] =
+                    std::array::from_fn(|lane| keys.get(lane).map(|&key| plan.located(key)));
+                let located = || located.iter().flatten().enumerate();
                 let bounds = pair.map(|pair| {
-                    for (lane, key) in keys.iter().enumerate() {
-                        put_points((scene, plan), pair, *key, lane, &mut points);
+                    for (lane, located) in located() {
+                        put_points((scene, plan), pair, located, lane, &mut points);
                     }
                     bounds_by_lane(isa, pair, &points)
                 });
-                for (lane, (key, to)) in keys.iter().zip(distances).enumerate() {
-                    let located = pair_numbers(*key).map(|number| plan.locate(number));
+                for ((lane, located), to) in located().zip(distances) {
                     let parts = [located[0].0, located[1].0];
                     let [a, b] = located.each_ref().map(|(part, element)| {
                         let body = plan.body(scene, *part);
@@ -229,7 +232,7 @@ impl SolverMemory {
                     each(Measured {
                         parts,
                         corners: [a.1, b.1],
-                        distance,
+                        distance: *to,
                     });
                 }
             }
@@ -243,7 +246,7 @@ impl SolverMemory {
     fn bytes(&self) -> u64 {
         let distances: usize = self.distances.iter().map(Vec::capacity).sum();
         let keys: usize = self.keys.iter().map(Vec::capacity).sum();
-        (size_of::<f64>() * (distances + keys) + self.shares.bytes()) as u64
+        (size_of::<f64>() * (distances + keys)) as u64
     }
 }
 
@@ -251,21 +254,20 @@ impl SolverMemory {
 fn put_points(
     (scene, plan): (&Scene, &Plan),
     pair: ElementPair,
-    key: u64,
+    located: &[(PartIx, ElementIx); 2],
     lane: usize,
     Points8(points): &mut Points8,
 ) {
-    let mut numbers = pair_numbers(key);
+    let mut located = located.each_ref();
     if pair == ElementPair::VertexEdge {
         // Such pairs are named edge first, but tested vertex first.
-        numbers.reverse();
+        located.reverse();
     }
     let mut rows = points.iter_mut();
-    for number in numbers {
-        let (part, element) = plan.locate(number);
-        let body = plan.body(scene, part);
+    for (part, element) in located {
+        let body = plan.body(scene, *part);
         let positions = body.positions();
-        let corners = body.corners(plan.part(part).part, &element);
+        let corners = body.corners(plan.part(*part).part, element);
         for (&corner, row) in corners.iter().zip(&mut rows) {
             for (to, x) in row.iter_mut().zip(positions.point(corner as usize)) {
                 to[lane] = x;

@@ -25,7 +25,6 @@ use crate::query::step::Start;
 use crate::scene::Scene;
 use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
-use crate::scene::index::pair_numbers;
 use crate::scene::positions::Positions;
 use crate::search::found::KeysByKind;
 use crate::search::narrow::exact_kind;
@@ -415,8 +414,7 @@ impl PairsOfKind<'_> {
             if !plan.counts(scene, key) {
                 continue;
             }
-            let [a, b] = pair_numbers(key);
-            let mut located = [plan.locate(a), plan.locate(b)];
+            let mut located = plan.located(key);
             if self.pair == ElementPair::VertexEdge {
                 // Such pairs are named edge first, but tested vertex first.
                 located.reverse();

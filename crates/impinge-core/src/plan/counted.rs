@@ -87,7 +87,7 @@ impl Plan {
         let Some(filter) = &self.filter else {
             return true;
         };
-        let [a, b] = pair_numbers(key).map(|number| self.locate(number));
+        let [a, b] = self.located(key);
         let [a, b] = [&a, &b].map(|(part, element)| {
             let corners = self
                 .body(scene, *part)

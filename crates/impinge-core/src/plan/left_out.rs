@@ -10,7 +10,7 @@ use crate::query::{Exclusion, Query};
 use crate::scene::Scene;
 use crate::scene::elements::VertexRings;
 use crate::scene::error::Error;
-use crate::scene::index::{PartIx, pair_numbers};
+use crate::scene::index::PartIx;
 
 use super::{Plan, Question};
 
@@ -139,7 +139,7 @@ impl Plan {
     /// Whether a pair is left out, by its key alone.
     #[inline(never)]
     pub(super) fn is_key_left_out(&self, scene: &Scene, key: u64) -> bool {
-        let [a, b] = pair_numbers(key).map(|number| self.locate(number));
+        let [a, b] = self.located(key);
         let [a, b] = [&a, &b].map(|(part, element)| {
             let corners = self
                 .body(scene, *part)

@@ -38,7 +38,7 @@ use crate::scene::elements::{BodyKind, Part};
 use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
 pub use crate::scene::index::pair_key;
-use crate::scene::index::{ElementIx, Number, PartIx};
+use crate::scene::index::{ElementIx, Number, PartIx, pair_numbers};
 use crate::scene::{Body, Filter, Scene};
 use crate::workers::clock::Instant;
 use impinge_exact::internal::Keep;
@@ -603,6 +603,11 @@ impl Plan {
     pub fn locate(&self, number: Number) -> (PartIx, ElementIx) {
         let ix = owner_by_first(&self.parts, number, |part| part.first);
         (PartIx::from_usize(ix), self.parts[ix].element(number))
+    }
+
+    /// The elements of a pair, in the order of its key.
+    pub fn located(&self, key: u64) -> [(PartIx, ElementIx); 2] {
+        pair_numbers(key).map(|number| self.locate(number))
     }
 }
 

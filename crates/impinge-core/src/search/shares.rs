@@ -87,9 +87,10 @@ pub(crate) struct SharesBetween<'a> {
 }
 
 impl SharesBetween<'_> {
-    /// Takes a pair, by a number below its distance, and both elements' corners.
+    /// Takes a pair, by a number below its distance [`without`] the thickness, and both
+    /// elements' corners.
     pub fn take(&self, corners: [&[u32]; 2], distance: f64) {
-        let shares = self.divided(without(self.thickness, distance));
+        let shares = self.divided(distance);
         for side in 0..2 {
             for &corner in corners[side] {
                 lower(&self.all[side][corner as usize], shares[side]);
