@@ -13,6 +13,7 @@ use crate::facets::{Facet, facets, groups, is_simplex};
 use crate::marks::{Marks, Problem};
 use crate::places::{Place, places};
 use crate::row::Counts;
+use crate::surface::{at, held};
 use crate::union_find::UnionFind;
 use crate::volume;
 use crate::walls;
@@ -210,11 +211,7 @@ fn intersections(
         Elements::Triangles(triangles) => triangles.clone().into(),
         Elements::Tetrahedra(tets) => tets.clone().into(),
     };
-    let positions: impinge::Positions = match &mesh.positions {
-        Positions::F32(positions) => positions.clone().into(),
-        Positions::F64(positions) => positions.clone().into(),
-    };
-    let body = scene.add((elements, positions))?;
+    let body = scene.add((elements, held(&mesh.positions)))?;
     // The scene has refused indices out of range.
     let copies = copies(mesh);
     let few = copies.few(mesh.n_primitives());
@@ -392,12 +389,6 @@ fn count_vertices<const K: usize>(
         .collect();
     counts.non_manifold_vertices = fans.len() as u64;
     ((count(ONE_FAN) + count(SEVERAL_FANS)) as i64, fans)
-}
-
-/// The position of a vertex whose index is in range.
-pub fn at(positions: &Positions, vertex: u32) -> Point {
-    let position = positions.get(vertex as usize);
-    position.expect("the scene has refused indices out of range")
 }
 
 fn degenerate<const K: usize>(

@@ -7,6 +7,8 @@
 
 use std::ops::Range;
 
+use crate::by_vertex::ByVertex;
+
 /// More pairs than this are counted without their hash, which takes a nanosecond or two per pair.
 const MOST_HASHED: u64 = 1 << 32;
 
@@ -26,25 +28,15 @@ impl Copies {
             key.sort_unstable();
             key
         };
-        let mut starts = vec![0usize; n_vertices + 1];
-        for corners in elements {
-            starts[sorted(corners)[0] as usize + 1] += 1;
-        }
-        for ix in 1..starts.len() {
-            starts[ix] += starts[ix - 1];
-        }
-        let mut next = starts.clone();
-        let mut by_first = vec![0u32; elements.len()];
-        for (element, corners) in (0u32..).zip(elements) {
-            let place = &mut next[sorted(corners)[0] as usize];
-            by_first[*place] = element;
-            *place += 1;
-        }
+        let named = (0u32..).zip(elements);
+        let by_first = ByVertex::new(
+            n_vertices,
+            named.map(|(element, corners)| (sorted(corners)[0], element)),
+        );
         let mut copies = Copies::default();
         let mut run = Vec::new();
-        for bounds in starts.windows(2) {
+        for members in by_first.iter() {
             run.clear();
-            let members = &by_first[bounds[0]..bounds[1]];
             run.extend(members.iter().map(|&e| (sorted(&elements[e as usize]), e)));
             run.sort_unstable();
             for same in run

@@ -28,6 +28,7 @@
 
 mod analysis;
 mod assembly;
+mod by_vertex;
 mod copies;
 mod facets;
 mod file;

@@ -23,8 +23,7 @@ impl Surface {
     }
 
     pub fn at(&self, vertex: u32) -> Point {
-        let position = self.positions.get(vertex as usize);
-        position.expect("the scene has refused indices out of range")
+        at(&self.positions, vertex)
     }
 
     pub fn corners(&self, face: [u32; 3]) -> [Point; 3] {
@@ -47,6 +46,20 @@ impl Surface {
             elements: Elements::Triangles(self.faces.clone()),
         }
     }
+}
+
+/// Positions as a scene takes them.
+pub fn held(positions: &Positions) -> impinge::Positions {
+    match positions {
+        Positions::F32(positions) => positions.clone().into(),
+        Positions::F64(positions) => positions.clone().into(),
+    }
+}
+
+/// The position of a vertex whose index is in range.
+pub fn at(positions: &Positions, vertex: u32) -> Point {
+    let position = positions.get(vertex as usize);
+    position.expect("the scene has refused indices out of range")
 }
 
 /// A closed piece of one orientation.

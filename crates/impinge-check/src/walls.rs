@@ -9,16 +9,18 @@
 //! of the segment between the nearest points, so that the sharp edge of a wedge is none. Matter is
 //! between them: the segment, moved a little towards the middle of the first face and without a
 //! hundredth at either end, meets no face and starts inside. It is moved because nearest points are
-//! often at the rim, where the segment lies in the surface. Both faces belong to one shell, or one of them to a cavity: where two solids overlap is
-//! no wall.
+//! often at the rim, where the segment lies in the surface. Both faces belong to one shell, or one
+//! of them to a cavity: where two solids overlap is no wall.
 
 use impinge::exact::internal::closest_of_elements;
+use impinge::exact::internal::filter::{cross, difference, dot};
 use impinge::{BodyId, Detector, Error, Hit, NearPair, PairKind, Query, Scene, Settings};
 use impinge_io::Positions;
 
+use crate::by_vertex::ByVertex;
 use crate::marks::{Marks, Problem};
 use crate::row::Counts;
-use crate::surface::{Surface, shells};
+use crate::surface::{Surface, held, shells};
 
 /// The cosine of 45°.
 const ALONG: f64 = std::f64::consts::FRAC_1_SQRT_2;
@@ -40,9 +42,8 @@ struct Faces {
     shells: Vec<(u32, bool)>,
     /// The face's number in the mesh.
     numbers: Vec<u32>,
-    /// The faces of vertex v are `around[starts[v]..starts[v + 1]]`.
-    starts: Vec<usize>,
-    around: Vec<u32>,
+    /// The faces of each vertex.
+    around: ByVertex,
 }
 
 /// Counts and marks the faces at walls that are at most `most` thick.
@@ -65,11 +66,7 @@ pub fn find(
     }
     let mut scene = Scene::new();
     let elements: impinge::Elements = faces.corners.clone().into();
-    let held: impinge::Positions = match &surface.positions {
-        Positions::F32(positions) => positions.clone().into(),
-        Positions::F64(positions) => positions.clone().into(),
-    };
-    let body = scene.add((elements, held))?;
+    let body = scene.add((elements, held(positions)))?;
     let mut detector = Detector::new(settings.clone())?;
     let query = Query::self_of(body).kinds([PairKind::VertexFace, PairKind::EdgeEdge]);
     let near = detector.near(&scene, most, &query)?;
@@ -142,18 +139,18 @@ fn add_walls(
     }
     let held = held.map(|vertex| surface.at(vertex));
     let (_, thickness, [p, q]) = closest_of_elements(&held[..n], &held[n..]);
-    let way = [0, 1, 2].map(|k| q[k] - p[k]);
+    let way = difference(&q, &p);
     let Some(direction) = unit(way) else {
         return;
     };
-    let length = dot(way, way).sqrt();
-    let along = |face: u32| dot(faces.normals[face as usize], direction).abs() >= ALONG;
+    let length = dot(&way, &way).sqrt();
+    let along = |face: u32| dot(&faces.normals[face as usize], &direction).abs() >= ALONG;
     for (a, b) in both {
         if along(a) && along(b) {
             let corners = surface.corners(faces.corners[a as usize]);
             let middle = [0, 1, 2].map(|k| corners.iter().map(|at| at[k] / 3.0).sum::<f64>());
-            let inward = [0, 1, 2].map(|k| middle[k] - p[k]);
-            let far = dot(inward, inward).sqrt();
+            let inward = difference(&middle, &p);
+            let far = dot(&inward, &inward).sqrt();
             let part = if far > 0.0 {
                 (ASIDE * length / far).min(0.5)
             } else {
@@ -178,13 +175,8 @@ fn are_matter(
 ) -> Result<Vec<bool>, Error> {
     let starts: Vec<Vector> = walls.iter().map(|wall| wall.start).collect();
     let along: Vec<Vector> = walls.iter().map(|wall| wall.along).collect();
-    let mut inside = Vec::with_capacity(walls.len());
-    inside.extend(
-        detector
-            .contains(scene, body, &starts)?
-            .into_iter()
-            .map(|place| place == 1),
-    );
+    let places = detector.contains(scene, body, &starts)?;
+    let mut inside: Vec<bool> = places.into_iter().map(|place| place == 1).collect();
     let query = Query::of(body).hits(Hit::Any);
     let hits = detector.cast(scene, &starts, &along, 1.0, &query)?;
     for (inside, is_hit) in inside.iter_mut().zip(hits.is_hit()) {
@@ -195,14 +187,8 @@ fn are_matter(
 
 impl Faces {
     fn new(surface: &Surface) -> Self {
-        let mut faces = Faces {
-            corners: Vec::new(),
-            normals: Vec::new(),
-            shells: Vec::new(),
-            numbers: Vec::new(),
-            starts: vec![0; surface.n_vertices() + 1],
-            around: Vec::new(),
-        };
+        let (mut all, mut normals) = (Vec::new(), Vec::new());
+        let (mut of_shells, mut numbers) = (Vec::new(), Vec::new());
         for (shell, held) in (0u32..).zip(shells(surface)) {
             // A shell of zero volume has no inside.
             if held.sign.is_zero() {
@@ -211,39 +197,26 @@ impl Faces {
             for &number in &held.faces {
                 let corners = surface.faces[number as usize];
                 let [a, b, c] = surface.corners(corners);
-                let (u, v) = (
-                    [0, 1, 2].map(|k| b[k] - a[k]),
-                    [0, 1, 2].map(|k| c[k] - a[k]),
-                );
-                faces.corners.push(corners);
-                faces.normals.push(normal(u, v));
+                all.push(corners);
+                normals.push(normal(difference(&b, &a), difference(&c, &a)));
                 let is_outward = held.sign == impinge::exact::Sign::Positive;
-                faces.shells.push((shell, is_outward));
-                faces.numbers.push(number);
+                of_shells.push((shell, is_outward));
+                numbers.push(number);
             }
         }
-        for &vertex in faces.corners.as_flattened() {
-            faces.starts[vertex as usize + 1] += 1;
+        Faces {
+            around: ByVertex::of_faces(surface.n_vertices(), &all),
+            corners: all,
+            normals,
+            shells: of_shells,
+            numbers,
         }
-        for ix in 1..faces.starts.len() {
-            faces.starts[ix] += faces.starts[ix - 1];
-        }
-        let mut next = faces.starts.clone();
-        faces.around = vec![0; 3 * faces.corners.len()];
-        for (face, corners) in (0u32..).zip(&faces.corners) {
-            for &vertex in corners {
-                faces.around[next[vertex as usize]] = face;
-                next[vertex as usize] += 1;
-            }
-        }
-        faces
     }
 
     /// The faces that have all these vertices.
     fn of<'a>(&'a self, vertices: &'a [u32]) -> impl Iterator<Item = u32> + 'a {
-        let first = vertices[0] as usize;
-        let around = &self.around[self.starts[first]..self.starts[first + 1]];
-        around.iter().copied().filter(|&face| {
+        let around = self.around.of(vertices[0]).iter();
+        around.copied().filter(|&face| {
             let corners = &self.corners[face as usize];
             vertices[1..].iter().all(|vertex| corners.contains(vertex))
         })
@@ -254,12 +227,8 @@ impl Faces {
     fn are_opposite(&self, a: u32, b: u32) -> bool {
         let [of_a, of_b] = [a, b].map(|face| self.shells[face as usize]);
         let [normal_a, normal_b] = [a, b].map(|face| self.normals[face as usize]);
-        (of_a.0 == of_b.0 || of_a.1 != of_b.1) && dot(normal_a, normal_b) <= -ALONG
+        (of_a.0 == of_b.0 || of_a.1 != of_b.1) && dot(&normal_a, &normal_b) <= -ALONG
     }
-}
-
-fn dot(a: Vector, b: Vector) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 /// The unit vector of a direction; `None` for zero, and for one without any.
@@ -270,7 +239,7 @@ fn unit(v: Vector) -> Option<Vector> {
         return None;
     }
     let v = v.map(|x| x / largest);
-    let length = dot(v, v).sqrt();
+    let length = dot(&v, &v).sqrt();
     Some(v.map(|x| x / length))
 }
 
@@ -278,10 +247,5 @@ fn normal(u: Vector, v: Vector) -> Vector {
     let (Some(u), Some(v)) = (unit(u), unit(v)) else {
         return [0.0; 3];
     };
-    unit([
-        u[1] * v[2] - u[2] * v[1],
-        u[2] * v[0] - u[0] * v[2],
-        u[0] * v[1] - u[1] * v[0],
-    ])
-    .unwrap_or([0.0; 3])
+    unit(cross(&u, &v)).unwrap_or([0.0; 3])
 }

@@ -25,6 +25,7 @@ use impinge::contact::{Contacts, Feature, Shape};
 use impinge::exact::internal::{Integer, unit_of};
 use impinge::exact::{Point, Sign};
 
+use crate::by_vertex::ByVertex;
 use crate::facets::{facets, groups};
 use crate::surface::Surface;
 use crate::volume;
@@ -39,9 +40,8 @@ pub struct Part {
     pub high: Point,
     /// The sign of the volume of a solid; zero for a sheet.
     sign: Sign,
-    /// The faces of vertex v are `around[starts[v]..starts[v + 1]]`.
-    starts: Vec<usize>,
-    around: Vec<u32>,
+    /// The faces of each vertex.
+    around: ByVertex,
     /// Of all coordinates.
     unit: i64,
 }
@@ -60,30 +60,17 @@ impl Part {
                 true => volume::sign(surface.faces.iter().map(|&face| surface.corners(face))),
                 false => Sign::Zero,
             },
+            around: ByVertex::of_faces(n, &surface.faces),
             surface,
             low: [f64::INFINITY; 3],
             high: [f64::NEG_INFINITY; 3],
-            starts: vec![0; n + 1],
-            around: Vec::new(),
             unit: i64::MAX,
         };
         for &vertex in part.surface.faces.as_flattened() {
-            part.starts[vertex as usize + 1] += 1;
             for (k, x) in part.surface.at(vertex).into_iter().enumerate() {
                 part.low[k] = part.low[k].min(x);
                 part.high[k] = part.high[k].max(x);
                 part.unit = part.unit.min(unit_of(x).unwrap_or(i64::MAX));
-            }
-        }
-        for ix in 1..part.starts.len() {
-            part.starts[ix] += part.starts[ix - 1];
-        }
-        let mut next = part.starts.clone();
-        part.around = vec![0; 3 * part.surface.faces.len()];
-        for (face, corners) in (0u32..).zip(&part.surface.faces) {
-            for &vertex in corners {
-                part.around[next[vertex as usize]] = face;
-                next[vertex as usize] += 1;
             }
         }
         part
@@ -96,19 +83,15 @@ impl Part {
 
     /// The positions of the vertices of faces.
     pub fn vertices(&self) -> impl Iterator<Item = Point> + '_ {
-        let used = |vertex: &usize| self.starts[*vertex] < self.starts[*vertex + 1];
-        let all = (0..self.surface.n_vertices()).filter(used);
-        all.map(|vertex| self.surface.at(vertex as u32))
-    }
-
-    fn around(&self, vertex: u32) -> &[u32] {
-        &self.around[self.starts[vertex as usize]..self.starts[vertex as usize + 1]]
+        let all = (0u32..).zip(self.around.iter());
+        let used = all.filter(|(_, faces)| !faces.is_empty());
+        used.map(|(vertex, _)| self.surface.at(vertex))
     }
 
     /// The faces at an edge.
     fn at_edge(&self, [u, v]: [u32; 2]) -> impl Iterator<Item = u32> + '_ {
         let has = move |face: &u32| self.surface.faces[*face as usize].contains(&v);
-        self.around(u).iter().copied().filter(has)
+        self.around.of(u).iter().copied().filter(has)
     }
 }
 
@@ -230,8 +213,8 @@ impl Local<'_> {
         overlap(&axis, rays, self.parts.map(Part::is_solid))
     }
 
-    /// Adds the rays of a part around an axis through `start`, which is along an edge of the part or
-    /// within a face.
+    /// Adds the rays of a part around an axis through `start`, which is along an edge of the part
+    /// or within a face.
     fn add_rays(
         &self,
         owner: usize,
@@ -294,7 +277,7 @@ impl Local<'_> {
     fn starts(&self, side: usize, feature: Feature) -> Vec<Vector> {
         match feature {
             Feature::Vertex(vertex) => {
-                let around = self.parts[side].around(vertex).iter();
+                let around = self.parts[side].around.of(vertex).iter();
                 let corners =
                     around.flat_map(|&face| self.parts[side].surface.faces[face as usize]);
                 let mut ends: Vec<u32> = corners.filter(|&end| end != vertex).collect();
@@ -343,7 +326,8 @@ impl Local<'_> {
         let part = self.parts[side];
         let tip = self.at(side, vertex);
         let sectors: Vec<[Vector; 3]> = part
-            .around(vertex)
+            .around
+            .of(vertex)
             .iter()
             .filter_map(|&face| {
                 let corners = part.surface.faces[face as usize];

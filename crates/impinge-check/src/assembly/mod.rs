@@ -16,12 +16,12 @@ mod local;
 use std::collections::BTreeMap;
 
 use impinge::exact::Point;
-use impinge::{Backend, BodyId, Control, Detector, Error, Query, Scene, Settings};
+use impinge::{Backend, BodyId, Control, Detector, Error, Pairs, Query, Scene, Settings};
 use impinge_io::{Elements, Mesh, weld};
 
 use self::local::{Part, interpenetrate};
 use crate::fix::remove_degenerate;
-use crate::surface::Surface;
+use crate::surface::{Surface, held};
 
 /// What is asked about an assembly.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -181,8 +181,8 @@ pub fn check_assembly_with(
     let meeting = asker.meeting()?;
     let mut pairs = Vec::new();
     for [a, b] in close(&asker.parts, clearance.unwrap_or(0.0)) {
-        let n_pairs = meeting.get(&[a, b]).copied().unwrap_or(0);
-        if let Some(pair) = asker.relation([a, b], n_pairs, clearance)?
+        let rows = meeting.get(&[a, b]).map_or(&[][..], Vec::as_slice);
+        if let Some(pair) = asker.relation([a, b], rows, clearance)?
             && !(options.ignores_touching && pair.relation == Relation::Touching)
         {
             pairs.push(pair);
@@ -203,12 +203,6 @@ pub fn check_assembly_with(
 fn add(scene: &mut Scene, number: usize, mut mesh: Mesh) -> Result<(BodyId, Part), AssemblyError> {
     // The scene refuses indices out of range and coordinates that are not finite.
     let refused = |source| AssemblyError::Part(number, source);
-    let held = |positions: &impinge_io::Positions| -> impinge::Positions {
-        match positions {
-            impinge_io::Positions::F32(positions) => positions.clone().into(),
-            impinge_io::Positions::F64(positions) => positions.clone().into(),
-        }
-    };
     let faces = match &mesh.elements {
         Elements::Triangles(faces) => faces.clone(),
         Elements::Tetrahedra(tets) => return Err(AssemblyError::Tetrahedra(number, tets.len())),
@@ -264,8 +258,8 @@ struct Asker {
 }
 
 impl Asker {
-    /// How many pairs of faces meet, of each two parts of which any do.
-    fn meeting(&mut self) -> Result<BTreeMap<[usize; 2], u64>, Error> {
+    /// The pairs of faces that meet, of each two parts of which any do: their rows.
+    fn meeting(&mut self) -> Result<BTreeMap<[usize; 2], Vec<[u32; 4]>>, Error> {
         let numbers: BTreeMap<BodyId, usize> = self
             .ids
             .iter()
@@ -273,19 +267,20 @@ impl Asker {
             .map(|(n, &id)| (id, n))
             .collect();
         let pairs = self.detector.detect(&self.scene, &Query::between_all())?;
-        let mut found = BTreeMap::new();
-        for (a, b) in pairs.iter() {
+        let mut found: BTreeMap<_, Vec<_>> = BTreeMap::new();
+        for ((a, b), row) in pairs.iter().zip(pairs.rows()) {
             let [a, b] = [a.body, b.body].map(|body| numbers[&body]);
-            *found.entry([a.min(b), a.max(b)]).or_default() += 1;
+            found.entry([a.min(b), a.max(b)]).or_default().push(row);
         }
         Ok(found)
     }
 
-    /// How two parts lie to each other; `None` if they are apart.
+    /// How two parts lie to each other, by the rows of their faces that meet; `None` if they are
+    /// apart.
     fn relation(
         &mut self,
         parts: [usize; 2],
-        n_pairs: u64,
+        rows: &[[u32; 4]],
         clearance: Option<f64>,
     ) -> Result<Option<PartPair>, Error> {
         let is_inside = [
@@ -297,22 +292,17 @@ impl Asker {
             Some(PartPair {
                 parts,
                 relation,
-                n_pairs,
+                n_pairs: rows.len() as u64,
                 distance,
                 point,
             })
         };
-        if n_pairs > 0 {
-            let pairs = self.detector.detect(&self.scene, &Query::between(a, b))?;
+        if !rows.is_empty() {
             // Where nearly all of two parts meets, one place is enough.
             let is_certain = is_inside[0] || is_inside[1];
-            let contacts = if is_certain {
-                let first: Vec<[u32; 4]> = pairs.rows().take(1).collect();
-                let first = impinge::Pairs::of_rows(&self.scene, &first)?;
-                self.detector.contacts(&self.scene, &first)?
-            } else {
-                self.detector.contacts(&self.scene, &pairs)?
-            };
+            let rows = if is_certain { &rows[..1] } else { rows };
+            let pairs = Pairs::of_rows(&self.scene, rows)?;
+            let contacts = self.detector.contacts(&self.scene, &pairs)?;
             let both = parts.map(|part| &self.parts[part]);
             let relation = match is_certain || interpenetrate(both, &contacts) {
                 true => Relation::Interpenetrating,

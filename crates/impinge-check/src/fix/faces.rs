@@ -31,9 +31,10 @@ pub fn remove_duplicates(surface: &mut Surface) -> (u64, u64) {
 ///
 /// Faces with the same vertices, as many of one orientation as of the other, enclose nothing: an
 /// inner wall of two solids, or a fin of no thickness that hangs on one. With one of them left, the
-/// surface would have a border that it did not have. So of faces like these that hang together, none
-/// stays where the other faces meet in even numbers at each edge of theirs, and some there are: then
-/// what is left is closed there. A sheet with two sides, which no other faces meet, keeps one.
+/// surface would have a border that it did not have. So of faces like these that hang together,
+/// none stays where the other faces meet in even numbers at each edge of theirs, and some there
+/// are: then what is left is closed there. A sheet with two sides, which no other faces meet, keeps
+/// one.
 fn hanging<'a>(surface: &Surface, copies: &'a Copies, is_copy: &[bool]) -> Vec<&'a [u32]> {
     let is_even = |face: &u32| {
         let [a, b, c] = surface.faces[*face as usize];

@@ -1,6 +1,7 @@
 //! What several tests build on.
 
-/// The faces of a box, outward. Corner 4 x + 2 y + z is at the high end of the axes whose digit is 1.
+/// The faces of a box, outward. Corner 4 x + 2 y + z is at the high end of the axes whose digit is
+/// 1.
 pub const BOX: [[u32; 3]; 12] = [
     [0, 1, 3],
     [0, 3, 2],
