@@ -264,11 +264,7 @@ impl Bodies {
         let format = self.format(path, loading)?;
         let (file, (meshes, mut summary)) = self.read_one(path, format, true, loading)?;
         for NamedMesh { name, mesh } in meshes {
-            let name = match name {
-                None => file.clone(),
-                Some(part) if several => format!("{file}#{part}"),
-                Some(part) => part,
-            };
+            let name = part_name(&file, name, several);
             self.add_mesh(name, format, mesh, &summary, loading)?;
             // Notes on the file are printed once.
             summary = Summary::default();
@@ -365,6 +361,15 @@ impl Bodies {
             false => whole(read_bytes_with_summary(&bytes, format, name, &options)?),
         };
         Ok((name.to_owned(), read))
+    }
+}
+
+/// The name of a part of a file; it begins with that of the file if there are `several` files.
+pub fn part_name(file: &str, part: Option<String>, several: bool) -> String {
+    match part {
+        None => file.to_owned(),
+        Some(part) if several => format!("{file}#{part}"),
+        Some(part) => part,
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use impinge::{BodyId, Elements, Pairs, Positions, Scene};
+use impinge::{Body, BodyId, Elements, Pairs, Positions, Scene};
 use impinge_io::{ColoredMesh, write_glb, write_ply, write_vtu};
 
 use crate::error::Error;
@@ -16,12 +16,26 @@ pub fn write(
     bodies: &[(BodyId, &str)],
     pairs: &Pairs,
 ) -> Result<(), Error> {
-    let parts: Vec<Part> = bodies
-        .iter()
-        .enumerate()
-        .map(|(ix, &(id, name))| Part::new(scene, id, name, palette::body(ix), pairs))
-        .collect::<Result<_, _>>()?;
-    let meshes: Vec<ColoredMesh> = parts.iter().map(Part::mesh).collect();
+    let mut colored = Vec::new();
+    for (ix, &(id, name)) in bodies.iter().enumerate() {
+        let body = scene.body(id)?;
+        let BodyColors { colliding, other } = palette::body(ix);
+        let mut collides = vec![false; body.n_primitives()];
+        for primitive in pairs.colliding(id) {
+            collides[primitive as usize] = true;
+        }
+        let color = |primitive: usize, _: &[u32]| match collides[primitive] {
+            true => (colliding, true),
+            false => (other, false),
+        };
+        colored.push(Colored::new(body, name, color));
+    }
+    write_all(file, &colored)
+}
+
+/// Writes bodies with a colour per primitive.
+pub fn write_all(file: &MeshFile, bodies: &[Colored<'_>]) -> Result<(), Error> {
+    let meshes: Vec<ColoredMesh> = bodies.iter().map(Colored::mesh).collect();
     write_colored(file, &meshes)
 }
 
@@ -64,7 +78,8 @@ pub fn from_elements(elements: &Elements) -> impinge_io::Elements {
     }
 }
 
-struct Part<'a> {
+/// A body with a colour per primitive.
+pub struct Colored<'a> {
     positions: impinge_io::Positions,
     elements: impinge_io::Elements,
     colors: Vec<[u8; 3]>,
@@ -72,29 +87,25 @@ struct Part<'a> {
     name: &'a str,
 }
 
-impl<'a> Part<'a> {
-    fn new(
-        scene: &Scene,
-        id: BodyId,
+impl<'a> Colored<'a> {
+    /// A body in its current pose. `color`: of a primitive, by its number and corners, and whether
+    /// it counts as colliding.
+    pub fn new(
+        body: &Body,
         name: &'a str,
-        colors: BodyColors,
-        pairs: &Pairs,
-    ) -> Result<Self, Error> {
-        let body = scene.body(id)?;
-        let mut primitive_colors = vec![colors.other; body.n_primitives()];
-        let mut colliding = vec![false; body.n_primitives()];
-        for primitive in pairs.colliding(id) {
-            primitive_colors[primitive as usize] = colors.colliding;
-            colliding[primitive as usize] = true;
-        }
-        Ok(Part {
+        color: impl Fn(usize, &[u32]) -> ([u8; 3], bool),
+    ) -> Self {
+        let elements = body.elements();
+        let each = 0..elements.len();
+        let (colors, colliding) = each.map(|ix| color(ix, elements.corners(ix))).unzip();
+        Colored {
             positions: from_positions(body.positions()),
-            elements: from_elements(body.elements()),
-            colors: primitive_colors,
+            elements: from_elements(elements),
+            colors,
             colliding,
             // The written mesh should not reveal folders of this machine.
             name: file_name(name),
-        })
+        }
     }
 
     fn mesh(&self) -> ColoredMesh<'_> {

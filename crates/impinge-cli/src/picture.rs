@@ -4,11 +4,11 @@ use std::io::Write;
 use std::path::Path;
 
 use impinge::contact::{Contacts, Curves};
-use impinge::{Backend, BodyId, Detector, Pairs, Scene, Settings};
+use impinge::{Backend, Body, BodyId, Detector, Elements, Pairs, Part, Scene, Settings};
 use impinge_io::AtomicFile;
 #[cfg(feature = "gpu")]
 use impinge_render::Renderer;
-use impinge_render::{Camera, Colors, Image, Picture, Projection, Surface};
+use impinge_render::{Camera, Colors, Face, Image, Normals, Picture, Projection, Surface};
 
 use crate::args::PictureArgs;
 use crate::error::Error;
@@ -135,6 +135,33 @@ fn tubes(contacts: &Contacts, curves: &Curves, diagonal: f64) -> Surface {
         .map(|ends| ends.map(|point| contacts.points()[point as usize]))
         .collect();
     Surface::of_segments(&segments, diagonal / 1000.0, CURVE)
+}
+
+/// The surface of a body. `color`: of a face, by its corners, and whether it shows through.
+pub fn surface(body: &Body, color: impl Fn(&[u32; 3]) -> ([u8; 3], bool)) -> Surface {
+    let faces = match body.part(Part::Faces) {
+        Elements::Triangles(faces) => faces.as_slice(),
+        _ => &[],
+    };
+    let face = |&corners: &[u32; 3]| {
+        let (color, shows_through) = color(&corners);
+        Face {
+            corners,
+            color,
+            shows_through,
+        }
+    };
+    let positions = body.positions();
+    Surface {
+        positions: (0..body.n_vertices())
+            .map(|vertex| positions.point(vertex))
+            .collect(),
+        faces: faces.iter().map(face).collect(),
+        normals: match body.elements() {
+            Elements::Tetrahedra(_) => Normals::Flat,
+            _ => Normals::Smooth,
+        },
+    }
 }
 
 /// One surface per body, in the colours of the palette.

@@ -2,9 +2,9 @@
 
 use std::io::Write;
 
-use impinge::{Body, BodyId, Bounds, CancelToken, Elements, Part, SafeDistances};
-use impinge_io::{Cell, ColoredMesh, Column, Holds, printable};
-use impinge_render::{Face, Normals, Surface};
+use impinge::{BodyId, Bounds, CancelToken, SafeDistances};
+use impinge_io::{Cell, Column, Holds, printable};
+use impinge_render::Surface;
 use serde_json::{Map, Value, json};
 
 use crate::apart::Inputs;
@@ -13,12 +13,13 @@ use crate::asked::{Asked, Question, body};
 use crate::detection::{Times, asked, detector, hit, query};
 use crate::error::Error;
 use crate::load::{Bodies, Loading};
+use crate::meshes::{self, Colored};
 use crate::output::{out, say, stage_table};
-use crate::picture::Drawer;
+use crate::picture::{self, Drawer};
 use crate::text::{counted, grouped};
 use crate::values::MeshFile;
 use crate::watch::Watch;
-use crate::{headline, json, meshes, output, palette, rows};
+use crate::{headline, json, output, palette, rows};
 
 /// `impinge safe`.
 pub fn safe(args: &SafeArgs, cancel: &CancelToken) -> Result<(), Error> {
@@ -115,8 +116,10 @@ impl Answer<'_> {
             Bounds::F64(_) => most,
             Bounds::F32(_) => {
                 let single = most as f32;
-                let is_above = f64::from(single) > most;
-                f64::from(f32::from_bits(single.to_bits() - u32::from(is_above)))
+                match f64::from(single) > most {
+                    true => single.next_down().into(),
+                    false => single.into(),
+                }
             }
         }
     }
@@ -238,70 +241,24 @@ impl Answer<'_> {
     }
 
     fn write_colored(&self, file: &MeshFile) -> Result<(), Error> {
-        struct Shown {
-            positions: impinge_io::Positions,
-            elements: impinge_io::Elements,
-            colors: Vec<[u8; 3]>,
-            bounded: Vec<bool>,
-        }
         let Bodies {
             scene, ids, names, ..
         } = self.bodies;
-        let shown = |(ix, &id): (usize, &BodyId)| {
-            let body = scene.body(id)?;
-            let elements = body.elements();
-            let each = 0..elements.len();
-            let (colors, bounded) = each.map(|at| self.color(ix, elements.corners(at))).unzip();
-            Ok(Shown {
-                positions: meshes::from_positions(body.positions()),
-                elements: meshes::from_elements(elements),
-                colors,
-                bounded,
-            })
-        };
-        let shown = ids.iter().enumerate().map(shown);
-        let shown: Vec<Shown> = shown.collect::<Result<_, Error>>()?;
-        let meshes: Vec<ColoredMesh> = shown
-            .iter()
-            .zip(names)
-            .map(|(shown, name)| ColoredMesh {
-                positions: &shown.positions,
-                elements: &shown.elements,
-                primitive_colors: Some(&shown.colors),
-                colliding: Some(&shown.bounded),
-                name,
-            })
-            .collect();
-        meshes::write_colored(file, &meshes)
+        let mut colored = Vec::new();
+        for (ix, (&id, name)) in ids.iter().zip(names).enumerate() {
+            let color = |_, corners: &[u32]| self.color(ix, corners);
+            colored.push(Colored::new(scene.body(id)?, name, color));
+        }
+        meshes::write_all(file, &colored)
     }
 
     fn surfaces(&self) -> Result<Vec<Surface>, Error> {
         let Bodies { scene, ids, .. } = self.bodies;
-        let surface = |(ix, &id): (usize, &BodyId)| Ok(self.surface(ix, scene.body(id)?));
-        ids.iter().enumerate().map(surface).collect()
-    }
-
-    fn surface(&self, ix: usize, body: &Body) -> Surface {
-        let faces = match body.part(Part::Faces) {
-            Elements::Triangles(faces) => faces.as_slice(),
-            _ => &[],
-        };
-        let positions = body.positions();
-        let face = |&corners: &[u32; 3]| Face {
-            corners,
-            color: self.color(ix, &corners).0,
+        let surface = |(ix, &id): (usize, &BodyId)| {
             // All that is near something else would show through.
-            shows_through: false,
+            let color = |corners: &[u32; 3]| (self.color(ix, corners).0, false);
+            Ok(picture::surface(scene.body(id)?, color))
         };
-        Surface {
-            positions: (0..body.n_vertices())
-                .map(|at| positions.point(at))
-                .collect(),
-            faces: faces.iter().map(face).collect(),
-            normals: match body.elements() {
-                Elements::Tetrahedra(_) => Normals::Flat,
-                _ => Normals::Smooth,
-            },
-        }
+        ids.iter().enumerate().map(surface).collect()
     }
 }

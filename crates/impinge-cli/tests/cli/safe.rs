@@ -125,7 +125,8 @@ fn what_touches_or_intersects_is_told_and_colours_show_the_bounds() {
     }
 }
 
-/// Each vertex stops for itself: the way to what is written is free, and the next step begins there.
+/// Each vertex stops for itself: the way to what is written is free, and the next step begins
+/// there.
 #[test]
 fn a_step_is_truncated_vertex_by_vertex() {
     let folder = Folder::new();

@@ -69,12 +69,12 @@ pub struct CheckArgs {
     /// Name all faces of each place, not only the first few
     #[arg(long)]
     pub faces: bool,
-    /// Find walls that are at most this thick, in the unit of the file: near faces of a closed piece
-    /// that turn their backs to each other, with matter between them
+    /// Find walls that are at most this thick, in the unit of the file: near faces of a closed
+    /// piece that turn their backs to each other, with matter between them
     #[arg(long, value_name = "T", value_parser = length)]
     pub min_thickness: Option<f64>,
-    /// Compare the parts of an assembly instead: the nodes of a glTF or 3MF file, the groups of an OBJ
-    /// file, or whole files. Which share space, and which only touch, is decided exactly
+    /// Compare the parts of an assembly instead: the nodes of a glTF or 3MF file, the groups of an
+    /// OBJ file, or whole files. Which share space, and which only touch, is decided exactly
     #[arg(long, conflicts_with_all = ["list", "format", "out", "no_weld", "keep_seams", "min_thickness", "png"])]
     pub assembly: bool,
     /// With --assembly, which this implies: also find parts that are at most this far from each

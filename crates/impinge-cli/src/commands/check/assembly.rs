@@ -11,9 +11,10 @@ use impinge_io::{AtomicFile, Format, Mesh, ReadOptions, printable, read, read_bo
 use serde_json::{Value, json};
 
 use super::args::{CheckArgs, FailOn, Touching};
-use super::html::{STYLE, page};
+use super::html::{END, start};
 use super::report::escaped;
 use crate::error::Error;
+use crate::load::part_name;
 use crate::output::out;
 use crate::text::{counted, several};
 use crate::watch::{Watch, go_on};
@@ -108,14 +109,9 @@ fn parts(path: &Path, are_several: bool) -> Result<Vec<(String, Mesh)>, Error> {
         return Ok(vec![(file, read(path, &options)?)]);
     }
     let (bodies, _) = read_bodies(path, &options)?;
-    let named = bodies.into_iter().map(|body| {
-        let name = match body.name {
-            None => file.clone(),
-            Some(part) if are_several => format!("{file}#{part}"),
-            Some(part) => part,
-        };
-        (name, body.mesh)
-    });
+    let named = bodies
+        .into_iter()
+        .map(|body| (part_name(&file, body.name, are_several), body.mesh));
     Ok(named.collect())
 }
 
@@ -265,8 +261,7 @@ fn write_page(
         path: path.to_owned(),
         source,
     };
-    let summary = summary(args, answer);
-    let mut body = format!("<p>{}</p>\n", escaped(&summary));
+    let mut body = start("impinge check --assembly", &summary(args, answer));
     body += "<p class=\"legend\"><span>X share space</span> <span>I inside</span> <span>O around</span> <span>t touch</span> <span>n near</span></p>\n";
     body += "<div class=\"scroll\"><table class=\"matrix\"><thead><tr><th scope=\"col\"></th>";
     for (number, name) in names.iter().enumerate() {
@@ -294,9 +289,9 @@ fn write_page(
         body += &format!("<li>{}</li>\n", escaped(&said(names, pair)));
     }
     body += "</ul>\n";
+    body += END;
     let mut to = AtomicFile::create(path)?;
-    let text = page("impinge check --assembly", &summary, STYLE, &body);
-    to.write_all(text.as_bytes()).map_err(failed)?;
+    to.write_all(body.as_bytes()).map_err(failed)?;
     Ok(to.finish()?)
 }
 

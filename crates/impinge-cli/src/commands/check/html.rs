@@ -19,7 +19,7 @@ use super::table::{line, summary};
 use crate::error::Error;
 use crate::text::grouped;
 
-pub const STYLE: &str = include_str!("report.css");
+const STYLE: &str = include_str!("report.css");
 const SCRIPT: &str = include_str!("report.js");
 
 /// Width and height of a picture.
@@ -39,16 +39,19 @@ const COLUMNS: [(&str, Option<FailOn>); 8] = [
     ("pieces", None),
 ];
 
-/// A page of its own that loads nothing.
-pub fn page(title: &str, summary: &str, style: &str, body: &str) -> String {
+/// The beginning of a page of its own that loads nothing.
+pub fn start(title: &str, summary: &str) -> String {
+    let summary = escaped(summary);
     format!(
         "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
          <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'\">\
-         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"><title>{title}: {}</title>\n\
-         <style>\n{style}</style></head>\n<body><h1>{title}</h1>\n{body}</body></html>\n",
-        escaped(summary)
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"><title>{title}: {summary}</title>\n\
+         <style>\n{STYLE}</style></head>\n<body><h1>{title}</h1>\n<p>{summary}</p>\n"
     )
 }
+
+/// Its end.
+pub const END: &str = "</body></html>\n";
 
 /// Writes the report.
 pub fn write(path: &Path, rows: &[Row], args: &CheckArgs) -> Result<(), Error> {
@@ -62,13 +65,13 @@ pub fn write(path: &Path, rows: &[Row], args: &CheckArgs) -> Result<(), Error> {
         to.write_all(of_row(row, args)?.as_bytes())
             .map_err(failed)?;
     }
-    let tail = format!("</tbody></table>\n<script>\n{SCRIPT}</script>\n</body></html>\n");
+    let tail = format!("</tbody></table>\n<script>\n{SCRIPT}</script>\n{END}");
     to.write_all(tail.as_bytes()).map_err(failed)?;
     Ok(to.finish()?)
 }
 
 fn head(rows: &[Row]) -> String {
-    let summary = escaped(&summary(rows));
+    let start = start("impinge check", &summary(rows));
     let legend: String = Problem::ALL
         .iter()
         .map(|problem| {
@@ -98,10 +101,7 @@ fn head(rows: &[Row]) -> String {
         .map(|(ix, name)| format!("<option value=\"{}\">{name}</option>", ix + 1))
         .collect();
     format!(
-        "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
-         <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'\">\
-         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"><title>impinge check: {summary}</title>\n\
-         <style>\n{STYLE}</style></head>\n<body><h1>impinge check</h1>\n<p>{summary}</p>\n<p class=\"legend\">{legend}</p>\n\
+        "{start}<p class=\"legend\">{legend}</p>\n\
          <label class=\"sort\">Sort by <select>{choices}</select></label>\n\
          <table><thead><tr><th class=\"pic\" scope=\"col\"></th>{heads}</tr></thead>\n<tbody>\n"
     )

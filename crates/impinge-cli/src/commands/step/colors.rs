@@ -3,15 +3,13 @@
 
 use std::collections::HashMap;
 
-use impinge::Elements;
 use impinge::{Body, BodyId, Impacts, Part};
-use impinge_io::ColoredMesh;
-use impinge_render::{Face, Normals, Surface};
+use impinge_render::Surface;
 
 use crate::error::Error;
-use crate::meshes;
-use crate::palette;
+use crate::meshes::{self, Colored};
 use crate::values::MeshFile;
+use crate::{palette, picture};
 
 use super::load::Moving;
 
@@ -80,76 +78,36 @@ fn put<K: Eq + std::hash::Hash>(times: &mut HashMap<K, f64>, key: K, toi: f64) {
 
 /// Writes the bodies at the start of the step.
 pub fn write(file: &MeshFile, bodies: &Moving, impacts: &Impacts) -> Result<(), Error> {
-    struct Shown {
-        positions: impinge_io::Positions,
-        elements: impinge_io::Elements,
-        colors: Vec<[u8; 3]>,
-        colliding: Vec<bool>,
-    }
-    let mut shown = Vec::new();
-    for (ix, &id) in bodies.ids.iter().enumerate() {
+    let mut colored = Vec::new();
+    for (ix, (&id, [name, _])) in bodies.ids.iter().zip(&bodies.names).enumerate() {
         let body = bodies.scene.body(id)?;
-        let times = Times::of(body, id, impacts);
-        let elements = body.elements();
-        let first: Vec<Option<f64>> = (0..elements.len())
-            .map(|primitive| times.first(elements.corners(primitive)))
-            .collect();
-        let other = palette::body(ix).other;
-        shown.push(Shown {
-            positions: meshes::from_positions(body.positions()),
-            elements: meshes::from_elements(elements),
-            colors: first
-                .iter()
-                .map(|first| first.map_or(other, palette::time))
-                .collect(),
-            colliding: first.iter().map(Option::is_some).collect(),
-        });
+        let color = color(ix, body, id, impacts);
+        colored.push(Colored::new(body, name, |_, corners| color(corners)));
     }
-    let colored: Vec<ColoredMesh> = shown
-        .iter()
-        .zip(&bodies.names)
-        .map(|(shown, [name, _])| ColoredMesh {
-            positions: &shown.positions,
-            elements: &shown.elements,
-            primitive_colors: Some(&shown.colors),
-            colliding: Some(&shown.colliding),
-            name,
-        })
-        .collect();
-    meshes::write_colored(file, &colored)
+    meshes::write_all(file, &colored)
 }
 
 /// The bodies' surfaces at the start of the step.
 pub fn surfaces(bodies: &Moving, impacts: &Impacts) -> Result<Vec<Surface>, Error> {
     let surface = |(ix, &id): (usize, &BodyId)| {
         let body = bodies.scene.body(id)?;
-        let times = Times::of(body, id, impacts);
-        let other = palette::body(ix).other;
-        let faces = match body.part(Part::Faces) {
-            Elements::Triangles(faces) => faces.as_slice(),
-            _ => &[],
-        };
-        let positions = body.positions();
-        Ok(Surface {
-            positions: (0..body.n_vertices())
-                .map(|vertex| positions.point(vertex))
-                .collect(),
-            faces: faces
-                .iter()
-                .map(|&corners| {
-                    let first = times.first(&corners);
-                    Face {
-                        corners,
-                        color: first.map_or(other, palette::time),
-                        shows_through: first.is_some(),
-                    }
-                })
-                .collect(),
-            normals: match body.elements() {
-                Elements::Tetrahedra(_) => Normals::Flat,
-                _ => Normals::Smooth,
-            },
-        })
+        let color = color(ix, body, id, impacts);
+        Ok(picture::surface(body, |corners| color(corners)))
     };
     bodies.ids.iter().enumerate().map(surface).collect()
+}
+
+/// The colour of an element, by its corners: of when it is first touched, if it is.
+fn color(
+    ix: usize,
+    body: &Body,
+    id: BodyId,
+    impacts: &Impacts,
+) -> impl Fn(&[u32]) -> ([u8; 3], bool) {
+    let times = Times::of(body, id, impacts);
+    let other = palette::body(ix).other;
+    move |corners| match times.first(corners) {
+        Some(first) => (palette::time(first), true),
+        None => (other, false),
+    }
 }
