@@ -107,13 +107,14 @@ function limit(name, given) {
   return refuse(`${name}: ${given} given, a number that is not below 0 is needed`);
 }
 
-// Numbers, then rows.
+// A matrix, column by column.
 function columns(matrix) {
   const numbers = Float64Array.from(matrix);
   if (numbers.length !== 16) refuse(`transform: ${numbers.length} numbers given, 16 allowed, column by column`);
   return numbers;
 }
 
+// Numbers, then rows.
 function before(numbers, rows) {
   const words = new Uint32Array(numbers.length + rows.length);
   words.set(numbers);

@@ -288,8 +288,8 @@ fn bounds_of_multiples_of_the_smallest_number() {
     }
 }
 
-/// Pairs that give no vertex less are dropped before they are measured: with many of nearly the same
-/// distance, and some that touch, the answer is that of the method which drops none.
+/// Pairs that give no vertex less are dropped before they are measured: with many of nearly the
+/// same distance, and some that touch, the answer is that of the method which drops none.
 #[test]
 fn pairs_that_are_dropped_would_not_count() {
     let mut random = Random::new(11);

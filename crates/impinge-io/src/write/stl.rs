@@ -6,9 +6,9 @@ use super::AtomicFile;
 use crate::error::{Error, Name, Place};
 use crate::mesh::Positions;
 
-/// Writes triangles as an STL file: binary if all positions are `f32` numbers, else as text, with as many
-/// digits as needed to read the same `f64` back. Vertices are repeated per triangle, in the order of
-/// the faces; normals are zero, which readers take as "to be computed from the vertices".
+/// Writes triangles as an STL file: binary if all positions are `f32` numbers, else as text, with
+/// as many digits as needed to read the same `f64` back. Vertices are repeated per triangle, in the
+/// order of the faces; normals are zero, which readers take as "to be computed from the vertices".
 ///
 /// # Errors
 /// [`Error::Io`]; more triangles than the format can count.
