@@ -10,21 +10,17 @@ mod boxes;
 pub mod bvh;
 mod clusterings;
 pub mod contact;
-#[allow(missing_docs)]
 pub mod cpu;
 mod detector;
 #[cfg(feature = "gpu")]
 pub mod gpu;
-#[allow(missing_docs)]
 pub mod plan;
 mod probe;
 pub mod proximity;
 pub mod query;
 pub mod scene;
 pub mod search;
-#[allow(missing_docs)]
 pub mod simd;
-#[allow(missing_docs)]
 pub mod workers;
 
 pub use answers::advance::Advance;

@@ -2,10 +2,8 @@
 //! clusters, trees, adjacency masks, the grid. Imports only `elements` and `index`.
 
 mod adjacency;
-#[allow(missing_docs)]
 pub mod bounds;
 pub(crate) mod clusters;
-#[allow(missing_docs)]
 pub mod grid;
 pub(crate) mod hubs;
 mod parallel;

@@ -34,14 +34,18 @@ pub struct Storage<T> {
 pub struct Slice {
     /// The name of the buffer.
     pub label: &'static str,
+    /// The buffer itself, which may be longer.
     pub buffer: wgpu::Buffer,
+    /// How many bytes from the first on.
     pub bytes: u64,
 }
 
 /// What a launch binds.
 #[derive(Debug, Clone)]
 pub enum Bound {
+    /// A storage buffer, or the first part of one.
     Buffer(Slice),
+    /// A uniform: the parameters of the launch.
     Params(Params),
 }
 
@@ -63,6 +67,7 @@ pub fn count(n: usize) -> u64 {
 }
 
 impl<T: Pod> Storage<T> {
+    /// An empty buffer for these uses, and copies to and from it.
     pub fn new(label: &'static str, usage: wgpu::BufferUsages) -> Self {
         Storage {
             label,
@@ -158,19 +163,23 @@ impl<T: Pod> Storage<T> {
         self.buffer.as_ref().expect("resized before it is used")
     }
 
+    /// The number of elements that are bound.
     #[expect(clippy::len_without_is_empty, reason = "there is always one element")]
     pub fn len(&self) -> u64 {
         self.len
     }
 
+    /// Bytes on the device, spare room included.
     pub fn bytes(&self) -> u64 {
         self.capacity * Self::SIZE
     }
 
+    /// Binds all elements for reading.
     pub fn read(&self) -> Read<T> {
         Read(self.first(self.len), PhantomData)
     }
 
+    /// Binds all elements for reading and writing.
     pub fn write_to(&self) -> Write<T> {
         Write(self.first(self.len), PhantomData)
     }
@@ -207,6 +216,7 @@ pub trait Binding {
     const ACCESS: Access;
     /// Bytes of one element.
     const STRIDE: u64;
+    /// What is bound: a part of a buffer, or the parameters.
     fn bound(&self) -> Bound;
 }
 

@@ -45,6 +45,7 @@ pub(super) struct ClusterPass {
 /// The workgroups over elements that a counter counts, for a later launch.
 #[derive(Debug, Clone, Copy)]
 pub struct Counted {
+    /// Which counter, as numbered in `layout`.
     pub counter: u32,
     /// Elements per workgroup.
     pub per_group: u32,

@@ -13,7 +13,10 @@ macro_rules! words {
             #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Pod, Zeroable)]
             #[repr(C)]
             pub struct $name {
-                $(pub $field: $type,)*
+                $(
+                    #[doc = concat!("`", stringify!($field), "` of `", stringify!($name), "` in `kernels/shared/layout.wgsl`.")]
+                    pub $field: $type,
+                )*
             }
 
             impl $name {
@@ -95,9 +98,11 @@ words! {
     Counter { n: u32 }
 }
 
-/// Which contacts of a step are sought, in `Params::sought`.
+/// All contacts of a step, in `Params::sought`.
 pub const SEEK_ALL: u32 = 0;
+/// Only the first contact, in `Params::sought`.
 pub const SEEK_EARLIEST: u32 = 1;
+/// Whether there is any contact, in `Params::sought`.
 pub const SEEK_ANY: u32 = 2;
 /// Children of a node, in `Node::shape`.
 pub const CHILDREN: u32 = 15;
@@ -129,9 +134,11 @@ pub const N_BOX_TESTS: u32 = 40;
 pub const N_BOX_TESTS_HIGH: u32 = 41;
 /// The number of words for the region and the entries per shift.
 pub const N_TALLIES: u32 = 37;
-/// Parts of bodies, in `Body::part`.
+/// The edges of a body, in `Body::part`.
 pub const EDGES: u32 = 0;
+/// The vertices of a body, in `Body::part`.
 pub const VERTICES: u32 = 1;
+/// The faces of a body, or its elements as given, in `Body::part`.
 pub const FACES: u32 = 2;
 /// Marks parts of bodies without faces, in `Body::part`.
 pub const BARE: u32 = 4;
@@ -169,14 +176,17 @@ impl Node {
         }
     }
 
+    /// The number of its children: 0 for a cluster, 1 for a gate.
     pub fn n_children(&self) -> u32 {
         self.shape & CHILDREN
     }
 
+    /// Its height: 0 for a cluster.
     pub fn height(&self) -> u32 {
         self.shape >> HEIGHT_SHIFT & 0xff
     }
 
+    /// Whether it is the entrance to a body.
     pub fn is_gate(&self) -> bool {
         self.shape & GATE != 0
     }
@@ -199,6 +209,7 @@ impl fmt::Display for Params {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Step {
+    /// The parameters.
     pub params: Params,
     padding: [u32; 45],
 }

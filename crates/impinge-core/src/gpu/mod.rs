@@ -8,35 +8,24 @@
 //! A step runs through the same stages, with two boxes per node, up to a filter. The device drops
 //! pairs that certainly do not touch, and the host finds the first contacts of all others.
 
+pub mod buffers;
+pub mod cells;
+pub mod clusters;
 mod collect;
 mod device;
-mod open;
-mod passes;
-mod pieces;
-mod resident;
-mod top_level;
-
-// Types are documented; internal fields and small methods are self-explanatory.
-#[allow(missing_docs)]
-pub mod buffers;
-#[allow(missing_docs)]
-pub mod cells;
-#[allow(missing_docs)]
-pub mod clusters;
-#[allow(missing_docs)]
 pub(crate) mod engine;
 mod kernels;
-#[allow(missing_docs)]
 pub mod layout;
-#[allow(missing_docs)]
+mod open;
 pub mod pass_buffers;
-#[allow(missing_docs)]
+mod passes;
+mod pieces;
 pub mod pipeline;
-#[allow(missing_docs)]
 pub mod recording;
+mod resident;
+mod top_level;
 mod topology;
 mod waiting;
-#[allow(missing_docs)]
 pub mod world;
 
 pub use device::{Device, DeviceInfo};

@@ -65,6 +65,7 @@ impl Capacities {
         unsure: ONE_ITEM,
     };
 
+    /// No room at all: there are no buffers yet.
     pub const NONE: Capacities = Capacities {
         queue: 0,
         items: 0,
@@ -111,6 +112,7 @@ impl Capacities {
         }
     }
 
+    /// The larger of both, each buffer for itself.
     pub fn max(self, other: Self) -> Self {
         self.zip(other, u64::max)
     }
@@ -141,21 +143,37 @@ impl Capacities {
 /// The buffers. Those that only the other method needs have one element each.
 #[derive(Debug)]
 pub struct PassBuffers {
+    /// Pairs of nodes of this round and of the next, in turns.
     pub queues: [Storage<NodePair>; 2],
+    /// Pairs of clusters; only `Clusters`.
     pub items: Storage<WorkItem>,
+    /// Pairs of primitives whose boxes overlap.
     pub candidates: Storage<Candidate>,
+    /// Pairs that certainly intersect.
     pub pairs: Storage<PairKey>,
+    /// Pairs left to exact arithmetic.
     pub unsure: Storage<UnsureKey>,
+    /// In a step: between which times each unsure pair first touches.
     pub times: Storage<PairTimes>,
+    /// What stages counted, at the indices of `layout`.
     pub counters: Storage<Counter>,
+    /// Workgroups of indirect launches: of each round, then of the stages after them.
     pub arguments: Storage<Arguments>,
+    /// Pairs of groups of one cell; only `Cells`, as all below.
     pub cell_items: Storage<CellItem>,
+    /// Primitives within reach of another body.
     pub kept: Storage<Kept>,
+    /// The lists of all cells, one after the other.
     pub entries: Storage<ListEntry>,
+    /// One record per cell.
     pub cells: Storage<Cell>,
+    /// Where the list of each cell starts in the entries.
     pub starts: Storage<Start>,
+    /// The box of each body in which it may meet others.
     pub reaches: Storage<Reach>,
+    /// The bounds of the region of the grid, then the number of entries per shift.
     pub tallies: Storage<Tally>,
+    /// The grid: one element.
     pub grid: Storage<Grid>,
     /// The initial counters and queue of a pass, copied by its encoder.
     start_counters: Storage<Counter>,
@@ -167,7 +185,9 @@ pub struct PassBuffers {
 /// Room that `Cells` needs besides the buffers that grow; zero for `Clusters`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct CellsWanted {
+    /// The number of cells of the grid, at most.
     pub n_cells: u64,
+    /// The number of parts of bodies on the device.
     pub n_bodies: u64,
 }
 
@@ -175,6 +195,7 @@ impl CellsWanted {
     /// Bytes per cell, the start of its list included.
     pub const CELL: u64 = (size_of::<Cell>() + size_of::<Start>()) as u64;
 
+    /// Bytes on the device.
     pub fn bytes(&self) -> u64 {
         self.n_cells * Self::CELL + self.n_bodies * size_of::<Reach>() as u64
     }
@@ -274,6 +295,7 @@ impl PassBuffers {
         self.sizes.map_or(0, |(_, cells)| cells.bytes())
     }
 
+    /// The room that there is.
     pub fn capacities(&self) -> Capacities {
         self.sizes.map_or(Capacities::NONE, |(wanted, _)| wanted)
     }
@@ -312,6 +334,7 @@ pub enum NextPass {
 }
 
 impl PassCounts {
+    /// Reads the counters of a pass.
     pub fn new(counters: &[Counter]) -> Self {
         let at = |ix: u32| u64::from(counters[ix as usize].n);
         PassCounts {

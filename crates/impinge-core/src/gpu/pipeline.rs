@@ -12,6 +12,7 @@ use super::device::Device;
 pub struct Entry {
     /// Its name in the kernel; tests compare the two.
     pub name: &'static str,
+    /// How the kernel uses it.
     pub access: Access,
     /// Bytes of one element.
     pub stride: u64,
@@ -19,7 +20,9 @@ pub struct Entry {
 
 /// All bindings of a kernel, in the order of their numbers.
 pub trait Bindings {
+    /// The bindings as the kernel declares them.
     const ENTRIES: &'static [Entry];
+    /// What is bound, in the same order.
     fn bound(&self) -> Vec<Bound>;
 }
 
@@ -55,11 +58,14 @@ pub use crate::bindings;
 
 /// A kernel's text: the shared files that it uses, then its own file.
 pub struct Source {
+    /// The name of the file, without `.wgsl`.
     pub name: &'static str,
+    /// The shared files, `layout` first, and the file itself.
     pub parts: &'static [&'static str],
 }
 
 impl Source {
+    /// All of it, for the compiler.
     pub fn text(&self) -> String {
         self.parts.join("\n")
     }

@@ -120,8 +120,11 @@ pub struct View {
     pub is_moved: bool,
     bodies_sent: Vec<Body>,
     ignored_sent: Vec<NodePair>,
+    /// The records of all parts: those that take part, and marks for the others.
     pub bodies: Storage<Body>,
+    /// The sorted list of pairs that are left out.
     pub ignored: Storage<NodePair>,
+    /// The levels as kernels read them.
     pub table: Storage<Level>,
 }
 
@@ -141,12 +144,19 @@ pub struct World {
     trees: Trees,
     words: Vec<u32>,
     views: [Option<View>; 2],
+    /// Whether some part has tetrahedra.
     pub has_solids: bool,
+    /// The nodes of all trees, boxes included.
     pub nodes: Storage<Node>,
+    /// The clusters of all parts.
     pub clusters: Storage<Cluster>,
+    /// The vertices of each cluster, each once.
     pub cluster_vertices: Storage<ClusterVertex>,
+    /// The corners of the primitive at each slot.
     pub corners: Storage<Corners>,
+    /// The number of the primitive at each slot.
     pub order: Storage<Order>,
+    /// The coordinates of all bodies, of each end in turn.
     pub positions: Storage<Coordinate>,
 }
 

@@ -4,11 +4,9 @@ pub(crate) mod found;
 pub(crate) mod key_ranges;
 pub(crate) mod naive;
 pub(crate) mod narrow;
-#[allow(missing_docs)]
 pub mod runner;
 pub(crate) mod sets;
 pub(crate) mod shares;
-#[allow(missing_docs)]
 pub mod sink;
 pub(crate) mod sort;
 pub(crate) mod stats;
