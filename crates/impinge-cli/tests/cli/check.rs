@@ -574,6 +574,24 @@ fn the_page_stands_alone_and_its_pictures_are_pictures() {
         reds.push(pixels.chunks(3).filter(|p| is_red(p)).count() > 50);
     }
     assert_eq!(reds[..2], [false, true]);
+    // The view has every face of both meshes; faces with a finding come last.
+    let meshes: Vec<&str> = page
+        .split("<script type=\"application/octet-stream\" ")
+        .skip(1)
+        .collect();
+    let number = |text: &str, name: &str| -> usize {
+        let from = text.find(&format!("{name}=\"")).unwrap() + name.len() + 2;
+        text[from..].split('"').next().unwrap().parse().unwrap()
+    };
+    let counts = meshes.iter().map(|text| {
+        let [points, fine, found, all] =
+            ["data-points", "data-fine", "data-found", "data-all"].map(|name| number(text, name));
+        let (from, to) = (text.find('>').unwrap() + 1, text.find('<').unwrap());
+        assert_eq!(decoded(&text[from..to]).len(), 12 * points + 13 * all);
+        assert_eq!(fine + found, all);
+        [points, fine, found]
+    });
+    assert_eq!(counts.collect::<Vec<_>>(), [[4, 4, 0], [7, 2, 3]]);
     folder
         .run(["check", "closed.obj", "--html", "report.txt"])
         .misuse();

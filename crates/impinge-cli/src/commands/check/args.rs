@@ -124,7 +124,7 @@ pub struct CheckArgs {
     /// Check meshes again that ended by a limit or a crash in an earlier run in --out
     #[arg(long, help_heading = "Many meshes")]
     pub retry: bool,
-    /// Write a page with a table, a picture of each mesh and one of each place (.html)
+    /// Write a page with a table, and each mesh and place as a picture and to be turned (.html)
     #[arg(long, value_name = "FILE")]
     pub html: Option<HtmlFile>,
     /// Draw the problems as a picture (.png)

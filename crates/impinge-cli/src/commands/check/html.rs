@@ -1,9 +1,11 @@
 //! `impinge check --html`: one self-contained page with a sortable table, a picture per mesh and
-//! one per place.
+//! one per place, and a view of each mesh that can be turned.
 //!
 //! Pictures are PNG in base64, drawn on the CPU. Browsers decode them when they come into view, and
 //! those of places when their list is opened. Meshes are checked and drawn one after another, so
 //! memory holds one of them.
+
+mod view;
 
 use std::io::Write;
 use std::path::Path;
@@ -20,7 +22,14 @@ use crate::error::Error;
 use crate::text::grouped;
 
 const STYLE: &str = include_str!("report.css");
-const SCRIPT: &str = include_str!("report.js");
+const SCRIPT: &str = concat!(include_str!("report.js"), include_str!("html/view.js"));
+
+/// The window that `view.js` draws in.
+const VIEW: &str = "<dialog><canvas tabindex=\"0\" aria-label=\"The mesh. Drag or use the arrow keys to turn it.\"></canvas>\
+    <div class=\"panel\"><div class=\"bar\"><b></b><button data-do=\"previous\">Previous</button><button data-do=\"next\">Next</button>\
+    <button data-do=\"whole\">Whole mesh</button><button data-do=\"close\">Close</button></div><p class=\"at\"></p>\
+    <p class=\"hint\">Drag: turn. Wheel or two fingers: nearer. <span>Shift or right button: move. N, P: next and previous place.</span></p>\
+    </div></dialog>\n";
 
 /// Width and height of a picture.
 const SIZE: [u32; 2] = [240, 180];
@@ -61,11 +70,14 @@ pub fn write(path: &Path, rows: &[Row], args: &CheckArgs) -> Result<(), Error> {
     };
     let mut to = AtomicFile::create(path)?;
     to.write_all(head(rows).as_bytes()).map_err(failed)?;
+    let most = view::share(rows.iter().filter(|row| row.result.is_ok()).count());
     for row in rows {
-        to.write_all(of_row(row, args)?.as_bytes())
+        to.write_all(of_row(row, most, args)?.as_bytes())
             .map_err(failed)?;
     }
-    let tail = format!("</tbody></table>\n<script>\n{SCRIPT}</script>\n{END}");
+    let up = format!("{:?}", args.picture.up).to_lowercase();
+    let tail =
+        format!("</tbody></table>\n{VIEW}<script data-up=\"{up}\">\n{SCRIPT}</script>\n{END}");
     to.write_all(tail.as_bytes()).map_err(failed)?;
     Ok(to.finish()?)
 }
@@ -107,7 +119,7 @@ fn head(rows: &[Row]) -> String {
     )
 }
 
-fn of_row(row: &Row, args: &CheckArgs) -> Result<String, Error> {
+fn of_row(row: &Row, most: usize, args: &CheckArgs) -> Result<String, Error> {
     let name = escaped(&row.path);
     let counts = match &row.result {
         Ok(counts) => counts,
@@ -135,28 +147,31 @@ fn of_row(row: &Row, args: &CheckArgs) -> Result<String, Error> {
             ..Picture::default()
         };
         thumbnail = image(&picture, &row.path)?;
-        if !row.places.is_empty() {
-            let what = if row.places.len() == 1 {
-                "place"
-            } else {
-                "places"
-            };
-            details += &format!(
-                "<details><summary>{} {what}</summary><div class=\"places\">",
-                row.places.len()
+        let mesh = view::element(&picture.surfaces[0], &checked, most);
+        if let Some(mesh) = &mesh {
+            thumbnail = format!(
+                "<button class=\"see\" title=\"Look at it from all sides\">{thumbnail}</button>{mesh}"
             );
+        }
+        if !row.places.is_empty() {
+            let what = crate::text::counted(row.places.len() as u64, "place");
+            details += &format!("<details><summary>{what}</summary><div class=\"places\">");
             let length = diagonal(&picture.surfaces[0]);
             for (ix, place) in row.places.iter().enumerate() {
+                look_at(&mut picture, place, &checked, length, args);
                 let shown = if ix < MOST_PICTURES {
-                    look_at(&mut picture, place, &checked, length, args);
                     image(&picture, place.problem.name())?
                 } else {
                     String::new()
                 };
-                details += &format!(
-                    "<figure>{shown}<figcaption>{}</figcaption></figure>",
-                    caption(place)
-                );
+                let caption = caption(place);
+                details += &match (picture.focus, &mesh) {
+                    (Some(focus), Some(_)) => format!(
+                        "<button class=\"see place\" {}>{shown}<span>{caption}</span></button>",
+                        view::attributes(&picture.camera, &focus)
+                    ),
+                    _ => format!("<div class=\"place\">{shown}<span>{caption}</span></div>"),
+                };
             }
             details += "</div></details>";
         }
