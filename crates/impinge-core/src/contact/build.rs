@@ -52,54 +52,9 @@ pub(super) fn contacts(scene: &Scene, pairs: &Pairs, work: Work<'_>) -> Result<C
     })?;
     drop(chunks);
 
-    let n_corners = met.iter().map(|met| met.names.len()).sum();
-    let mut runs: Vec<Vec<PointName>> = with_capacity(n_chunks.div_ceil(CHUNKS_PER_RUN))?;
-    runs.resize_with(n_chunks.div_ceil(CHUNKS_PER_RUN), Vec::new);
-    work.each(&mut runs, |ix, run| {
-        let first = ix * CHUNKS_PER_RUN;
-        let of_run = &met[first..n_chunks.min(first + CHUNKS_PER_RUN)];
-        reserve(run, of_run.iter().map(|met| met.names.len()).sum(), WHAT)?;
-        run.extend(of_run.iter().flat_map(|met| &met.names));
-        run.sort_unstable();
-        run.dedup();
-        Ok(())
-    })?;
-    let names = work.merged(runs, Equal::Once, WHAT)?;
-    if u32::try_from(names.len()).is_err() {
-        return Err(Error::TooMany {
-            what: "points of contact",
-            given: names.len() as u64,
-            limit: u64::from(u32::MAX),
-        });
-    }
-    let number = |name: &PointName| names.partition_point(|held| held < name) as u32;
-    let mut corners: Vec<u32> = sink::filled(0, n_corners, WHAT)?;
-    let mut rest = &mut corners[..];
-    let mut of_chunks: Vec<(&ChunkContacts, &mut [u32])> = with_capacity(n_chunks)?;
-    for met in &met {
-        let (of_chunk, others) = rest.split_at_mut(met.names.len());
-        of_chunks.push((met, of_chunk));
-        rest = others;
-    }
-    work.each(&mut of_chunks, |_, (met, corners)| {
-        for (corner, name) in corners.iter_mut().zip(&met.names) {
-            *corner = number(name);
-        }
-        Ok(())
-    })?;
-    let mut points: Vec<[f64; 3]> = sink::filled([0.0; 3], names.len(), WHAT)?;
-    let mut of_chunks: Vec<(&[PointName], &mut [[f64; 3]])> =
-        with_capacity(names.len().div_ceil(CHUNK))?;
-    of_chunks.extend(names.chunks(CHUNK).zip(points.chunks_mut(CHUNK)));
-    work.each(&mut of_chunks, |_, (names, points)| {
-        for (point, name) in points.iter_mut().zip(*names) {
-            let precision = bodies.precision(name.bodies);
-            *point = bodies.definition(name).rounded(precision);
-        }
-        Ok(())
-    })?;
-    drop(of_chunks);
-
+    let names = names(&met, work)?;
+    let corners = numbers(&met, &names, work)?;
+    let points = points(&bodies, &names, work)?;
     let mut contacts = Contacts {
         rows,
         shapes: with_capacity(n)?,
@@ -124,6 +79,72 @@ pub(super) fn contacts(scene: &Scene, pairs: &Pairs, work: Work<'_>) -> Result<C
     }
     contacts.by_bodies = ByBodies::new(&contacts.rows, work)?;
     Ok(contacts)
+}
+
+/// The names of all corners, sorted, each once.
+fn names(met: &[ChunkContacts], work: Work<'_>) -> Result<Vec<PointName>, Error> {
+    let n_chunks = met.len();
+    let mut runs: Vec<Vec<PointName>> = with_capacity(n_chunks.div_ceil(CHUNKS_PER_RUN))?;
+    runs.resize_with(n_chunks.div_ceil(CHUNKS_PER_RUN), Vec::new);
+    work.each(&mut runs, |ix, run| {
+        let first = ix * CHUNKS_PER_RUN;
+        let of_run = &met[first..n_chunks.min(first + CHUNKS_PER_RUN)];
+        reserve(run, of_run.iter().map(|met| met.names.len()).sum(), WHAT)?;
+        run.extend(of_run.iter().flat_map(|met| &met.names));
+        run.sort_unstable();
+        run.dedup();
+        Ok(())
+    })?;
+    let names = work.merged(runs, Equal::Once, WHAT)?;
+    match u32::try_from(names.len()) {
+        Ok(_) => Ok(names),
+        Err(_) => Err(Error::TooMany {
+            what: "points of contact",
+            given: names.len() as u64,
+            limit: u64::from(u32::MAX),
+        }),
+    }
+}
+
+/// The number of each corner's name.
+fn numbers(met: &[ChunkContacts], names: &[PointName], work: Work<'_>) -> Result<Vec<u32>, Error> {
+    let number = |name: &PointName| names.partition_point(|held| held < name) as u32;
+    let n_corners = met.iter().map(|met| met.names.len()).sum();
+    let mut corners: Vec<u32> = sink::filled(0, n_corners, WHAT)?;
+    let mut rest = &mut corners[..];
+    let mut of_chunks: Vec<(&ChunkContacts, &mut [u32])> = with_capacity(met.len())?;
+    for met in met {
+        let (of_chunk, others) = rest.split_at_mut(met.names.len());
+        of_chunks.push((met, of_chunk));
+        rest = others;
+    }
+    work.each(&mut of_chunks, |_, (met, corners)| {
+        for (corner, name) in corners.iter_mut().zip(&met.names) {
+            *corner = number(name);
+        }
+        Ok(())
+    })?;
+    Ok(corners)
+}
+
+/// The point of each name.
+fn points(
+    bodies: &Bodies<'_>,
+    names: &[PointName],
+    work: Work<'_>,
+) -> Result<Vec<[f64; 3]>, Error> {
+    let mut points: Vec<[f64; 3]> = sink::filled([0.0; 3], names.len(), WHAT)?;
+    let mut of_chunks: Vec<(&[PointName], &mut [[f64; 3]])> =
+        with_capacity(names.len().div_ceil(CHUNK))?;
+    of_chunks.extend(names.chunks(CHUNK).zip(points.chunks_mut(CHUNK)));
+    work.each(&mut of_chunks, |_, (names, points)| {
+        for (point, name) in points.iter_mut().zip(*names) {
+            let precision = bodies.precision(name.bodies);
+            *point = bodies.definition(name).rounded(precision);
+        }
+        Ok(())
+    })?;
+    Ok(points)
 }
 
 /// The contacts of a chunk of pairs.

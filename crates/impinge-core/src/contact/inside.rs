@@ -15,9 +15,10 @@
 use std::sync::{Mutex, PoisonError};
 
 use super::topology::EdgesAround;
+use crate::scene::Body;
+use crate::scene::elements::Elements;
 use crate::scene::error::Error;
 use crate::scene::index::VertexIx;
-use crate::scene::{Body, Elements};
 use crate::search::work::Work;
 use impinge_exact::{Point, Sign, orient2d, orient3d};
 

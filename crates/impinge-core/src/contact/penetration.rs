@@ -23,9 +23,11 @@ use super::regions::{
 };
 use super::topology::EdgesAround;
 use super::{Contacts, Feature, PointName, Shape};
+use crate::scene::elements::{BodyKind, Elements};
 use crate::scene::error::Error;
+use crate::scene::ids::BodyId;
 use crate::scene::index::VertexIx;
-use crate::scene::{Body, BodyId, BodyKind, Elements, Scene};
+use crate::scene::{Body, Scene};
 use crate::search::sets::Sets;
 use crate::search::sink::grow;
 use crate::search::work::Work;

@@ -6,8 +6,8 @@
 //!
 //! Cost: `O(n log n)` once per topology.
 
-use crate::scene::BodyId;
 use crate::scene::error::Error;
+use crate::scene::ids::BodyId;
 use crate::scene::index::VertexIx;
 use crate::search::work::{Equal, Work};
 

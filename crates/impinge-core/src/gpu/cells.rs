@@ -254,9 +254,6 @@ impl Guest {
 impl Recorder<'_> {
     /// All stages.
     pub(super) fn cells(&mut self, of_pass: CellPass) {
-        let (gpu, world, view, pass_buffers) = (self.gpu, self.world, self.view, self.pass_buffers);
-        let kernels = &gpu.kernels;
-        let counters = || pass_buffers.counters.write_to();
         let cells = of_pass.work.cells();
         let params = Params {
             first: cells.first,
@@ -264,68 +261,21 @@ impl Recorder<'_> {
             group_size: of_pass.group_size,
             ..Params::default()
         };
-        if let CellWork::Tile(_, tile) = of_pass.work {
-            // Boxes, grid and the list exist already: their stages are empty.
-            for stage in ["bounds", "grid", "traversal"] {
-                self.recording.stage(stage);
+        match of_pass.work {
+            CellWork::Tile(_, tile) => self.tile(tile, params),
+            CellWork::All(_) | CellWork::List(_) => {
+                self.recording.clear(self.pass_buffers.cells.all());
+                self.bounds_within_reach();
+                self.grid(of_pass.lambda);
+                let lists_only = u32::from(matches!(of_pass.work, CellWork::List(_)));
+                self.lists(Params {
+                    lists_only,
+                    ..params
+                });
             }
-            let bindings = TraversalTile {
-                grid: pass_buffers.grid.read(),
-                items: pass_buffers.cell_items.write_to(),
-                counters: counters(),
-                params: Uniform(Params {
-                    n_entries: tile.n_entries,
-                    tile_row: tile.row,
-                    tile_column: tile.column,
-                    tile_side: tile.side,
-                    ..params
-                }),
-            };
-            let groups = (u64::from(tile.side) * u64::from(tile.side)).div_ceil(64);
-            let groups = Workgroups::Known(groups);
-            self.recording
-                .launch(&kernels.traversal_tile, &bindings, groups);
-        } else {
-            self.recording.clear(pass_buffers.cells.all());
-            self.bounds_within_reach();
-            self.grid(of_pass.lambda);
-            let count = GridCount {
-                grid: pass_buffers.grid.read(),
-                kept: pass_buffers.kept.write_to(),
-                counters: counters(),
-                cells: pass_buffers.cells.write_to(),
-            };
-            let kept = self.over_kept();
-            self.recording.launch(&kernels.grid_count, &count, kept);
-            self.recording.stage("traversal");
-            let traversal = TraversalCells {
-                grid: pass_buffers.grid.read(),
-                bodies: view.bodies.read(),
-                cells: pass_buffers.cells.write_to(),
-                starts: pass_buffers.starts.write_to(),
-                items: pass_buffers.cell_items.write_to(),
-                counters: counters(),
-                params: Uniform(Params {
-                    lists_only: u32::from(matches!(of_pass.work, CellWork::List(_))),
-                    ..params
-                }),
-            };
-            let groups = self.indirect(CELLS);
-            self.recording
-                .launch(&kernels.traversal_cells, &traversal, groups);
-            let scatter = TraversalScatter {
-                grid: pass_buffers.grid.read(),
-                kept: pass_buffers.kept.read(),
-                starts: pass_buffers.starts.read(),
-                cells: pass_buffers.cells.write_to(),
-                entries: pass_buffers.entries.write_to(),
-                counters: counters(),
-            };
-            let kept = self.over_kept();
-            self.recording
-                .launch(&kernels.traversal_scatter, &scatter, kept);
         }
         self.recording.stage("pairing");
+        let (world, view, pass_buffers) = (self.world, self.view, self.pass_buffers);
         let groups = self.counted_items();
         let pairing = PairingCells {
             bodies: view.bodies.read(),
@@ -335,7 +285,7 @@ impl Recorder<'_> {
             entries: pass_buffers.entries.read(),
             items: pass_buffers.cell_items.read(),
             candidates: pass_buffers.candidates.write_to(),
-            counters: counters(),
+            counters: pass_buffers.counters.write_to(),
             params: Uniform(Params {
                 n_ignored: view.n_ignored(),
                 resolve: u32::from(of_pass.resolve),
@@ -343,9 +293,72 @@ impl Recorder<'_> {
             }),
         };
         self.recording
-            .launch(&kernels.pairing_cells, &pairing, groups);
+            .launch(&self.gpu.kernels.pairing_cells, &pairing, groups);
         self.recording.stage("narrow");
         self.narrow();
+    }
+
+    /// The work items of one tile. Boxes, grid and the list exist already: their stages are empty.
+    fn tile(&mut self, tile: Tile, params: Params) {
+        for stage in ["bounds", "grid", "traversal"] {
+            self.recording.stage(stage);
+        }
+        let pass_buffers = self.pass_buffers;
+        let bindings = TraversalTile {
+            grid: pass_buffers.grid.read(),
+            items: pass_buffers.cell_items.write_to(),
+            counters: pass_buffers.counters.write_to(),
+            params: Uniform(Params {
+                n_entries: tile.n_entries,
+                tile_row: tile.row,
+                tile_column: tile.column,
+                tile_side: tile.side,
+                ..params
+            }),
+        };
+        let groups = (u64::from(tile.side) * u64::from(tile.side)).div_ceil(64);
+        let groups = Workgroups::Known(groups);
+        self.recording
+            .launch(&self.gpu.kernels.traversal_tile, &bindings, groups);
+    }
+
+    /// The lists of cells, and their work items: the end of stage `grid`, and `traversal`.
+    fn lists(&mut self, params: Params) {
+        let (view, pass_buffers) = (self.view, self.pass_buffers);
+        let kernels = &self.gpu.kernels;
+        let counters = || pass_buffers.counters.write_to();
+        let count = GridCount {
+            grid: pass_buffers.grid.read(),
+            kept: pass_buffers.kept.write_to(),
+            counters: counters(),
+            cells: pass_buffers.cells.write_to(),
+        };
+        let kept = self.over_kept();
+        self.recording.launch(&kernels.grid_count, &count, kept);
+        self.recording.stage("traversal");
+        let traversal = TraversalCells {
+            grid: pass_buffers.grid.read(),
+            bodies: view.bodies.read(),
+            cells: pass_buffers.cells.write_to(),
+            starts: pass_buffers.starts.write_to(),
+            items: pass_buffers.cell_items.write_to(),
+            counters: counters(),
+            params: Uniform(params),
+        };
+        let groups = self.indirect(CELLS);
+        self.recording
+            .launch(&kernels.traversal_cells, &traversal, groups);
+        let scatter = TraversalScatter {
+            grid: pass_buffers.grid.read(),
+            kept: pass_buffers.kept.read(),
+            starts: pass_buffers.starts.read(),
+            cells: pass_buffers.cells.write_to(),
+            entries: pass_buffers.entries.write_to(),
+            counters: counters(),
+        };
+        let kept = self.over_kept();
+        self.recording
+            .launch(&kernels.traversal_scatter, &scatter, kept);
     }
 
     /// The workgroups of launches over kept primitives.

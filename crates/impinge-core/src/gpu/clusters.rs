@@ -17,7 +17,7 @@ use super::layout::{
     N_CANDIDATES, N_ITEMS, N_PAIRS, Params, ROUNDS, SEEK_ALL, SEEK_ANY, SEEK_EARLIEST,
 };
 use super::recording::{Recorder, Workgroups};
-use super::world::Motion;
+use super::view::Motion;
 use crate::query::goal::Goal;
 
 /// Levels of up to this many nodes are refitted by one workgroup, in one launch with the levels

@@ -58,6 +58,10 @@ impl Guess {
     fn bytes(&self) -> u64 {
         HEADER + KEY * (self.pairs + self.unsure) + TIMES_OF_PAIR * self.times
     }
+
+    fn has_times(&self) -> bool {
+        matches!(self.sought, Some(Goal::All | Goal::Earliest))
+    }
 }
 
 /// The results of a pass.
@@ -169,102 +173,166 @@ impl Collector {
     ) -> Result<Collected, Error> {
         // Given back when all went well: a buffer that stays mapped is of no more use.
         let staging = self.staging.take().expect("encoded before");
-        let has_times = matches!(guess.sought, Some(Goal::All | Goal::Earliest));
-        let (mut pairs, mut unsure) = (Vec::new(), Vec::<UnsureKey>::new());
-        let mut until = Vec::<PairTimes>::new();
-        let (counts, grid, ticks, n_pairs, n_unsure) = {
+        let mut keys = ReadKeys::default();
+        let first = {
             let view = map(&staging, guess.bytes() + TIMES).await?;
-            let at = |from: u64, size: u64| &view[from as usize..(from + size) as usize];
-            let counters: Vec<Counter> = bytemuck::pod_collect_to_vec(at(0, COUNTERS));
-            let grid: Grid = bytemuck::pod_read_unaligned(at(COUNTERS, GRID));
-            let ticks: Vec<u64> = bytemuck::pod_collect_to_vec(at(guess.bytes(), TIMES));
-            let counts = PassCounts::new(&counters);
-            let capacities = pass_buffers.capacities();
-            let n_pairs = match guess.sought {
-                Some(_) => 0,
-                None => counts.needed.pairs.min(capacities.pairs),
-            };
-            let is_answered = guess.sought.is_some_and(|sought| counts.answer(sought));
-            let n_unsure = match is_answered {
-                true => 0,
-                false => counts.needed.unsure.min(capacities.unsure),
-            };
-            let first = HEADER;
-            reserve_all(&mut pairs, n_pairs)?;
-            reserve_all(&mut unsure, n_unsure)?;
-            append(&mut pairs, at(first, KEY * n_pairs.min(guess.pairs)));
-            let first = first + KEY * guess.pairs;
-            append(&mut unsure, at(first, KEY * n_unsure.min(guess.unsure)));
-            if has_times {
-                reserve_all(&mut until, n_unsure)?;
-                let first = first + KEY * guess.unsure;
-                append(
-                    &mut until,
-                    at(first, TIMES_OF_PAIR * n_unsure.min(guess.times)),
-                );
-            }
-            (counts, grid, ticks, n_pairs, n_unsure)
+            FirstCopy::new(&view, pass_buffers, guess, &mut keys)?
         };
         staging.unmap();
         self.staging = Some(staging);
-        (self.n_pairs, self.n_unsure) = (n_pairs, n_unsure);
-        let more_pairs = n_pairs.saturating_sub(guess.pairs);
-        let more_unsure = n_unsure.saturating_sub(guess.unsure);
-        let more_times = if has_times { more_unsure } else { 0 };
-        if more_pairs + more_unsure > 0 {
-            let keys = KEY * (more_pairs + more_unsure);
-            let bytes = keys + TIMES_OF_PAIR * more_times;
-            let staging = self.reserve(gpu, bytes);
-            let mut encoder = gpu
-                .device
-                .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-            let mut copy = |from: &wgpu::Buffer, first: u64, to: u64, size: u64| {
-                encoder.copy_buffer_to_buffer(from, first, &staging, to, size);
-            };
-            let of_pairs = KEY * more_pairs;
-            copy(pass_buffers.pairs.buffer(), KEY * guess.pairs, 0, of_pairs);
-            let (first, size) = (KEY * guess.unsure, KEY * more_unsure);
-            copy(pass_buffers.unsure.buffer(), first, of_pairs, size);
-            let (first, size) = (TIMES_OF_PAIR * guess.times, TIMES_OF_PAIR * more_times);
-            copy(pass_buffers.times.buffer(), first, keys, size);
-            gpu.queue.submit([encoder.finish()]);
-            {
-                let view = map(&staging, bytes).await?;
-                let (of_keys, of_times) = view[..bytes as usize].split_at(keys as usize);
-                let (of_pairs, of_unsure) = of_keys.split_at(of_pairs as usize);
-                append(&mut pairs, of_pairs);
-                append(&mut unsure, of_unsure);
-                append(&mut until, of_times);
-            }
-            staging.unmap();
-        }
+        (self.n_pairs, self.n_unsure) = (first.n_pairs, first.n_unsure);
+        self.take_more(gpu, pass_buffers, guess, &mut keys).await?;
         let stage_ms = self.times.is_some().then(|| {
             let ms = f64::from(gpu.queue.get_timestamp_period()) * 1e-6;
+            let ticks = &first.ticks;
             let span = |stage: usize| ticks[2 * stage + 1].saturating_sub(ticks[2 * stage]);
             (0..n_stages).map(|stage| span(stage) as f64 * ms).collect()
         });
-        let mut undecided = Vec::new();
-        if guess.sought.is_some() {
-            reserve_all(&mut undecided, n_unsure)?;
-            let nothing = PairTimes {
-                free_until: 0,
-                touches_by: NEVER.to_bits(),
-            };
-            let times = until.iter().chain(std::iter::repeat(&nothing));
-            undecided.extend(unsure.iter().zip(times).map(|(pair, times)| UndecidedPair {
-                slots: [pair.low, pair.high],
-                free_until: f32::from_bits(times.free_until),
-                touches_by: time_by(times.touches_by),
-            }));
-        }
         Ok(Collected {
-            undecided,
-            counts,
-            grid,
+            undecided: match guess.sought {
+                Some(_) => keys.undecided()?,
+                None => Vec::new(),
+            },
+            counts: first.counts,
+            grid: first.grid,
             stage_ms,
-            pairs,
-            unsure,
+            pairs: keys.pairs,
+            unsure: keys.unsure,
         })
+    }
+
+    /// Copies and reads the keys that the first copy had no room for.
+    ///
+    /// # Errors
+    /// Device errors.
+    async fn take_more(
+        &mut self,
+        gpu: &Gpu,
+        pass_buffers: &PassBuffers,
+        guess: Guess,
+        keys: &mut ReadKeys,
+    ) -> Result<(), Error> {
+        let more_pairs = self.n_pairs.saturating_sub(guess.pairs);
+        let more_unsure = self.n_unsure.saturating_sub(guess.unsure);
+        let more_times = if guess.has_times() { more_unsure } else { 0 };
+        if more_pairs + more_unsure == 0 {
+            return Ok(());
+        }
+        let size_of_keys = KEY * (more_pairs + more_unsure);
+        let bytes = size_of_keys + TIMES_OF_PAIR * more_times;
+        let staging = self.reserve(gpu, bytes);
+        let mut encoder = gpu
+            .device
+            .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        let mut copy = |from: &wgpu::Buffer, first: u64, to: u64, size: u64| {
+            encoder.copy_buffer_to_buffer(from, first, &staging, to, size);
+        };
+        let of_pairs = KEY * more_pairs;
+        copy(pass_buffers.pairs.buffer(), KEY * guess.pairs, 0, of_pairs);
+        let (first, size) = (KEY * guess.unsure, KEY * more_unsure);
+        copy(pass_buffers.unsure.buffer(), first, of_pairs, size);
+        let (first, size) = (TIMES_OF_PAIR * guess.times, TIMES_OF_PAIR * more_times);
+        copy(pass_buffers.times.buffer(), first, size_of_keys, size);
+        gpu.queue.submit([encoder.finish()]);
+        {
+            let view = map(&staging, bytes).await?;
+            let (of_keys, of_times) = view[..bytes as usize].split_at(size_of_keys as usize);
+            let (of_pairs, of_unsure) = of_keys.split_at(of_pairs as usize);
+            append(&mut keys.pairs, of_pairs);
+            append(&mut keys.unsure, of_unsure);
+            append(&mut keys.times, of_times);
+        }
+        staging.unmap();
+        Ok(())
+    }
+}
+
+/// What the first copy has besides keys.
+struct FirstCopy {
+    counts: PassCounts,
+    grid: Grid,
+    ticks: Vec<u64>,
+    /// The number of keys on the device that are read.
+    n_pairs: u64,
+    n_unsure: u64,
+}
+
+impl FirstCopy {
+    /// Reads the first copy, and makes room for all keys.
+    ///
+    /// # Errors
+    /// There is no memory for the keys.
+    fn new(
+        bytes: &[u8],
+        pass_buffers: &PassBuffers,
+        guess: Guess,
+        keys: &mut ReadKeys,
+    ) -> Result<Self, Error> {
+        let at = |from: u64, size: u64| &bytes[from as usize..(from + size) as usize];
+        let counters: Vec<Counter> = bytemuck::pod_collect_to_vec(at(0, COUNTERS));
+        let counts = PassCounts::new(&counters);
+        let capacities = pass_buffers.capacities();
+        let n_pairs = match guess.sought {
+            Some(_) => 0,
+            None => counts.needed.pairs.min(capacities.pairs),
+        };
+        let is_answered = guess.sought.is_some_and(|sought| counts.answer(sought));
+        let n_unsure = match is_answered {
+            true => 0,
+            false => counts.needed.unsure.min(capacities.unsure),
+        };
+        let first = HEADER;
+        reserve_all(&mut keys.pairs, n_pairs)?;
+        reserve_all(&mut keys.unsure, n_unsure)?;
+        append(&mut keys.pairs, at(first, KEY * n_pairs.min(guess.pairs)));
+        let first = first + KEY * guess.pairs;
+        let size = KEY * n_unsure.min(guess.unsure);
+        append(&mut keys.unsure, at(first, size));
+        if guess.has_times() {
+            reserve_all(&mut keys.times, n_unsure)?;
+            let first = first + KEY * guess.unsure;
+            let size = TIMES_OF_PAIR * n_unsure.min(guess.times);
+            append(&mut keys.times, at(first, size));
+        }
+        Ok(FirstCopy {
+            counts,
+            grid: bytemuck::pod_read_unaligned(at(COUNTERS, GRID)),
+            ticks: bytemuck::pod_collect_to_vec(at(guess.bytes(), TIMES)),
+            n_pairs,
+            n_unsure,
+        })
+    }
+}
+
+/// The keys of a pass that were read.
+#[derive(Default)]
+struct ReadKeys {
+    pairs: Vec<PairKey>,
+    unsure: Vec<UnsureKey>,
+    /// Of unsure pairs in a step, unless any contact will do.
+    times: Vec<PairTimes>,
+}
+
+impl ReadKeys {
+    /// The unsure pairs of a step with their times.
+    ///
+    /// # Errors
+    /// There is no memory for them.
+    fn undecided(&self) -> Result<Vec<UndecidedPair>, Error> {
+        let mut undecided = Vec::new();
+        reserve_all(&mut undecided, self.unsure.len() as u64)?;
+        let nothing = PairTimes {
+            free_until: 0,
+            touches_by: NEVER.to_bits(),
+        };
+        let times = self.times.iter().chain(std::iter::repeat(&nothing));
+        let pairs = self.unsure.iter().zip(times);
+        undecided.extend(pairs.map(|(pair, times)| UndecidedPair {
+            slots: [pair.low, pair.high],
+            free_until: f32::from_bits(times.free_until),
+            touches_by: time_by(times.touches_by),
+        }));
+        Ok(undecided)
     }
 }
 

@@ -22,9 +22,12 @@ mod passes;
 mod pieces;
 pub mod pipeline;
 pub mod recording;
+mod records;
 mod resident;
+mod seeds;
 mod top_level;
 mod topology;
+pub mod view;
 mod waiting;
 pub mod world;
 

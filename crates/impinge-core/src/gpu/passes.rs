@@ -22,7 +22,7 @@ use super::engine::{Engine, Outcome, PassSink};
 use super::layout::NodePair;
 use super::pass_buffers::{Capacities, CellsWanted, NextPass};
 use super::recording::{Recorder, Recording};
-use super::world::Motion;
+use super::view::Motion;
 use crate::plan::{Plan, pair_key};
 use crate::query::SharedVertex;
 use crate::query::goal::Goal;

@@ -13,7 +13,8 @@ use super::layout::{Arguments, Params, Step};
 use super::open::Gpu;
 use super::pass_buffers::PassBuffers;
 use super::pipeline::{Bindings, Entry, Kernel, Program};
-use super::world::{Motion, View, World};
+use super::view::{Motion, View};
+use super::world::World;
 use crate::scene::error::Error;
 
 /// The widest row of workgroups; `shared/arguments.wgsl` has the same.

@@ -33,59 +33,28 @@ use std::sync::Arc;
 use crate::bvh::clusters::Clustering;
 use crate::bvh::tree::TreeShape;
 use crate::plan::{Plan, QueryPart};
-use crate::scene::elements::Part;
+use crate::scene::Scene;
 use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
 use crate::scene::index::{Number, PartIx};
 use crate::scene::positions::Positions;
-use crate::scene::{Filter, Scene};
 use crate::search::runner::Job;
 use crate::search::stats::Stats;
 
 use super::buffers::{Storage, count};
 use super::layout::{
-    BARE, BODY_SHIFT, Body, Cluster, ClusterVertex, Coordinate, Corners, EDGES, FACES, Level,
-    NO_ROOT, Node, NodePair, OWN_PARTS, Order, POINTS, VERTICES,
+    BODY_SHIFT, Body, Cluster, ClusterVertex, Coordinate, Corners, NO_ROOT, Node, Order,
 };
 use super::open::Gpu;
 use super::pieces::{Chunk, Loaded};
-use super::top_level::{Top, Trees};
+use super::top_level::Trees;
 use super::topology::{DeviceClusters, Most, Weight, narrowed};
+use super::view::{Motion, SLACK, View};
 
 /// Bit 31 of a slot is a flag.
 pub const MOST_PRIMITIVES: u64 = 1 << 31;
-/// By how many keys the boxes of rounded positions are widened: see `boxes.wgsl`.
-const SLACK: u32 = 2;
-/// Marks a part that does not take part.
-const NO_PART: u32 = u32::MAX;
 /// Bytes of a vertex.
 const VERTEX: u64 = 3 * size_of::<Coordinate>() as u64;
-
-/// What is asked of the device.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Motion {
-    /// A frame, in which nothing moves.
-    Still,
-    /// A step, with boxes and positions at both ends.
-    Moving,
-}
-
-impl Motion {
-    /// How many boxes each node has, and how many positions each vertex.
-    pub fn n_ends(self) -> u64 {
-        match self {
-            Motion::Still => 1,
-            Motion::Moving => 2,
-        }
-    }
-
-    fn other(self) -> Motion {
-        match self {
-            Motion::Still => Motion::Moving,
-            Motion::Moving => Motion::Still,
-        }
-    }
-}
 
 /// A body whose positions are on the device.
 #[derive(Debug)]
@@ -101,31 +70,9 @@ struct Resident {
 
 /// A part of a body on the device.
 #[derive(Debug, Clone)]
-struct Held {
-    id: BodyId,
-    clustering: Arc<Clustering>,
-}
-
-/// What a frame, or a step, sees of the world.
-#[derive(Debug)]
-pub struct View {
-    /// By query_part: its part.
-    parts: Vec<u32>,
-    /// By part: its query_part.
-    query_parts: Vec<u32>,
-    top: Option<Top>,
-    /// The nodes of each height, first those of the trees, then those of the tree over them.
-    pub levels: Vec<Level>,
-    /// Whether boxes have to be refitted.
-    pub is_moved: bool,
-    bodies_sent: Vec<Body>,
-    ignored_sent: Vec<NodePair>,
-    /// The records of all parts: those that take part, and marks for the others.
-    pub bodies: Storage<Body>,
-    /// The sorted list of pairs that are left out.
-    pub ignored: Storage<NodePair>,
-    /// The levels as kernels read them.
-    pub table: Storage<Level>,
+pub(super) struct Held {
+    pub id: BodyId,
+    pub clustering: Arc<Clustering>,
 }
 
 /// Positions that are on the device already, by body: at the start, and at the end.
@@ -136,14 +83,14 @@ pub struct ResidentEnds<'a>(pub [BTreeMap<BodyId, &'a wgpu::Buffer>; 2]);
 #[derive(Debug)]
 pub struct World {
     bodies: Vec<Resident>,
-    parts: Vec<Held>,
+    pub(super) parts: Vec<Held>,
     /// The vertices of all bodies.
     n_vertices: u64,
     n_ends: u64,
     /// The nodes on the device, without their boxes.
-    trees: Trees,
+    pub(super) trees: Trees,
     words: Vec<u32>,
-    views: [Option<View>; 2],
+    pub(super) views: [Option<View>; 2],
     /// Whether some part has tetrahedra.
     pub has_solids: bool,
     /// The nodes of all trees, boxes included.
@@ -457,7 +404,8 @@ impl World {
         Ok(())
     }
 
-    fn number(&self, id: BodyId) -> Option<usize> {
+    /// The number of a body whose positions are on the device.
+    pub(super) fn number(&self, id: BodyId) -> Option<usize> {
         self.bodies.binary_search_by_key(&id, |body| body.id).ok()
     }
 
@@ -540,280 +488,12 @@ impl World {
         }
     }
 
-    /// Sends the records of all parts and the list of ignored pairs, if they differ from those on
-    /// the device.
-    fn send_records(
-        &mut self,
-        gpu: &Gpu,
-        job: Job<'_>,
-        motion: Motion,
-        resident: &ResidentEnds<'_>,
-    ) -> Result<(), Error> {
-        let Job { scene, plan, .. } = job;
-        let is_rounded = |id: BodyId| {
-            let body = scene.body_in(id.slot());
-            let of_ends = [Some(body.positions()), body.end_positions()];
-            let mut ends = of_ends
-                .into_iter()
-                .zip(&resident.0)
-                .take(motion.n_ends() as usize);
-            ends.any(|(end, held)| {
-                matches!(end, Some(Positions::F64(_))) && !held.contains_key(&id)
-            })
-        };
-        let mut first_slot = 0;
-        let mut records = Vec::with_capacity(self.parts.len());
-        for part in &self.parts {
-            records.push(Body {
-                root: NO_ROOT,
-                // The boxes of parts that do not take part may be refitted too.
-                slack: if is_rounded(part.id) { SLACK } else { 0 },
-                first_slot,
-                ..Body::default()
-            });
-            // Slots fit 31 bits.
-            first_slot += part.clustering.order.len() as u32;
-        }
-        let meets_bodies = match motion {
-            Motion::Still => plan.between(),
-            Motion::Moving => plan.meets_bodies(),
-        };
-        let view = self.views[motion as usize].as_ref().expect("just sent");
-        let number = |id: BodyId| self.number(id).map(|number| number as u32);
-        for ((ix, query_part), &part) in plan.numbered_parts().zip(&view.parts) {
-            // Bodies without a category meet no other body.
-            let filter = match meets_bodies {
-                true => plan.filter(ix),
-                false => Filter {
-                    category: 0,
-                    mask: 0,
-                },
-            };
-            let record = &mut records[part as usize];
-            *record = Body {
-                root: self.trees.roots[part as usize],
-                within: u32::from(match motion {
-                    Motion::Still => query_part.within,
-                    Motion::Moving => plan.test(ix, ix).is_some(),
-                }),
-                part: match motion {
-                    Motion::Still => 0,
-                    Motion::Moving => {
-                        flags(query_part) | number(query_part.id).unwrap_or(0) << BODY_SHIFT
-                    }
-                },
-                category: words(filter.category),
-                mask: words(filter.mask),
-                first_number: query_part.first.raw(),
-                ..*record
-            };
-        }
-        let mut ignored: Vec<NodePair> = match motion {
-            Motion::Still => {
-                let part = |query_part: PartIx| view.parts[query_part.index()];
-                let pairs = plan.excluded_pairs().map(|(a, b)| [part(a), part(b)]);
-                let pair = |[a, b]: [u32; 2]| NodePair {
-                    a: a.min(b),
-                    b: a.max(b),
-                };
-                pairs.map(pair).collect()
-            }
-            Motion::Moving => {
-                let pairs = plan.excluded_bodies();
-                let pair = |(a, b)| {
-                    Some(NodePair {
-                        a: number(a)?,
-                        b: number(b)?,
-                    })
-                };
-                pairs.filter_map(pair).collect()
-            }
-        };
-        ignored.sort_unstable_by_key(|pair| (pair.a, pair.b));
-        let parts = &self.parts;
-        let sample = |part: u32| sample(scene, parts[part as usize].id);
-        let view = self.views[motion as usize].as_mut().expect("just sent");
-        if let Some(top) = &mut view.top
-            && top.reorder(&mut self.trees.nodes, sample)
-        {
-            let gates = top.gates(&self.trees.nodes);
-            self.nodes.write(gpu, u64::from(top.first_gate), gates);
-            view.is_moved = true;
-        }
-        view.send(gpu, records, ignored)
-    }
-
     /// Where the positions of a body are on the device, if they are those of the pose with this
     /// stamp: the buffer and the first byte.
     pub fn positions_of(&self, body: BodyId, stamp: u64) -> Option<(&wgpu::Buffer, u64)> {
         let held = &self.bodies[self.number(body)?];
         let is_there = held.sent[0] == stamp;
         is_there.then(|| (self.positions.buffer(), held.first_vertex * VERTEX))
-    }
-
-    fn root(&self, part: u32) -> u32 {
-        self.trees.roots[part as usize]
-    }
-
-    /// The seeds of a traversal: pairs of nodes, whose boxes need not overlap.
-    pub fn seeds(&self, plan: &Plan, motion: Motion) -> Vec<NodePair> {
-        let view = self.view(motion);
-        let root = |query_part: PartIx| self.root(view.parts[query_part.index()]);
-        let is_filled = |query_part: &PartIx| root(*query_part) != NO_ROOT;
-        let mut seeds = Vec::new();
-        if let Some(top) = view.top()
-            && plan.between()
-        {
-            return vec![NodePair { a: top, b: top }];
-        }
-        if plan.between() {
-            let filled: Vec<PartIx> = plan.part_ixs().filter(is_filled).collect();
-            if let [a, b] = filled[..]
-                && plan.test(a, b).is_some()
-            {
-                seeds.push(NodePair {
-                    a: root(a),
-                    b: root(b),
-                });
-            }
-        }
-        for (ix, query_part) in plan.numbered_parts() {
-            let is_asked = query_part.within && plan.test(ix, ix).is_some();
-            if is_asked && is_filled(&ix) {
-                seeds.push(NodePair {
-                    a: root(ix),
-                    b: root(ix),
-                });
-            }
-        }
-        seeds
-    }
-
-    /// The seeds of a piece, from pairs of its runs by their numbers.
-    pub fn seeds_of_runs(&self, pairs: &[[u32; 2]]) -> Vec<NodePair> {
-        let seed = |&[a, b]: &[u32; 2]| NodePair {
-            a: self.root(a),
-            b: self.root(b),
-        };
-        pairs.iter().map(seed).collect()
-    }
-
-    /// Appends the pairs of children of two nodes, whether their boxes overlap or not. Returns
-    /// false, and appends nothing, for two clusters. The same steps as `traversal.wgsl`.
-    pub fn expand(
-        &self,
-        plan: &Plan,
-        motion: Motion,
-        pair: NodePair,
-        into: &mut Vec<NodePair>,
-    ) -> bool {
-        let nodes = &self.trees.nodes;
-        let (a, b) = (&nodes[pair.a as usize], &nodes[pair.b as usize]);
-        if a.height() == 0 && b.height() == 0 {
-            return false;
-        }
-        if a.is_gate() && b.is_gate() {
-            let parts = [a, b].map(|gate| gate.first_child);
-            let query_parts = parts.map(|part| self.view(motion).query_parts[part as usize]);
-            let [part_a, part_b] = query_parts.map(PartIx::new);
-            if plan.test(part_a, part_b).is_some() {
-                let [a, b] = parts.map(|part| self.root(part));
-                into.push(NodePair { a, b });
-            }
-            return true;
-        }
-        let children = |node: &Node| node.first_child..node.first_child + node.n_children();
-        if pair.a == pair.b {
-            for i in children(a) {
-                into.extend((i..children(a).end).map(|j| NodePair { a: i, b: j }));
-            }
-        } else if a.height() > b.height() {
-            into.extend(children(a).map(|i| NodePair { a: i, b: pair.b }));
-        } else if b.height() > a.height() {
-            into.extend(children(b).map(|j| NodePair { a: pair.a, b: j }));
-        } else {
-            for i in children(a) {
-                into.extend(children(b).map(|j| NodePair { a: i, b: j }));
-            }
-        }
-        true
-    }
-
-    /// The number of rounds that a traversal from these pairs takes.
-    pub fn rounds(&self, seeds: &[NodePair]) -> u32 {
-        self.trees.rounds(seeds)
-    }
-}
-
-impl Default for View {
-    fn default() -> Self {
-        View {
-            parts: Vec::new(),
-            query_parts: Vec::new(),
-            top: None,
-            levels: Vec::new(),
-            is_moved: true,
-            bodies_sent: Vec::new(),
-            ignored_sent: Vec::new(),
-            bodies: Storage::plain("bodies"),
-            ignored: Storage::plain("ignored"),
-            table: Storage::plain("levels"),
-        }
-    }
-}
-
-impl View {
-    /// A view of some of `n_parts` parts, with a tree over them if there are more than a few.
-    fn new(
-        gpu: &Gpu,
-        trees: &mut Trees,
-        parts: Vec<u32>,
-        n_parts: usize,
-        sample: impl Fn(u32) -> [f32; 3],
-    ) -> Result<Self, Error> {
-        let mut query_parts = vec![NO_PART; n_parts];
-        for (query_part, &part) in (0..).zip(&parts) {
-            query_parts[part as usize] = query_part;
-        }
-        let top = trees.push_top(&parts, sample);
-        let mut levels = trees.levels(Some(&parts));
-        levels.extend(top.iter().flat_map(|top| &top.levels));
-        let mut view = View {
-            parts,
-            query_parts,
-            top,
-            levels,
-            ..View::default()
-        };
-        view.table.upload(gpu, &view.levels)?;
-        Ok(view)
-    }
-
-    fn bytes(&self) -> u64 {
-        self.bodies.bytes() + self.ignored.bytes() + self.table.bytes()
-    }
-
-    /// The root of the tree over parts.
-    pub fn top(&self) -> Option<u32> {
-        self.top.as_ref().map(|top| top.root)
-    }
-
-    /// The length of the list of ignored pairs.
-    pub fn n_ignored(&self) -> u32 {
-        self.ignored_sent.len() as u32
-    }
-
-    /// Sends records and ignored pairs that differ from those on the device.
-    fn send(&mut self, gpu: &Gpu, bodies: Vec<Body>, ignored: Vec<NodePair>) -> Result<(), Error> {
-        if bodies != self.bodies_sent || self.bodies.bytes() == 0 {
-            self.bodies.upload(gpu, &bodies)?;
-            self.bodies_sent = bodies;
-        }
-        if ignored != self.ignored_sent || self.ignored.bytes() == 0 {
-            self.ignored.upload(gpu, &ignored)?;
-            self.ignored_sent = ignored;
-        }
-        Ok(())
     }
 }
 
@@ -842,11 +522,6 @@ fn key(part: &Held) -> (BodyId, *const Clustering) {
     (part.id, Arc::as_ptr(&part.clustering))
 }
 
-/// The low and the high word.
-fn words(bits: u64) -> [u32; 2] {
-    [bits as u32, (bits >> 32) as u32]
-}
-
 /// Appends the coordinates as the device has them.
 fn put_words(positions: &Positions, words: &mut Vec<u32>) {
     match positions {
@@ -857,21 +532,8 @@ fn put_words(positions: &Positions, words: &mut Vec<u32>) {
 
 /// A point of a body: the first corner of its first primitive. The tree over parts is built from
 /// these points.
-fn sample(scene: &Scene, id: BodyId) -> [f32; 3] {
+pub(super) fn sample(scene: &Scene, id: BodyId) -> [f32; 3] {
     let body = scene.body_in(id.slot());
     let vertex = body.elements().corners(0)[0];
     body.positions().point(vertex as usize).map(|x| x as f32)
-}
-
-/// What `meets_parts.wgsl` needs to know of a query_part besides its body.
-fn flags(query_part: &QueryPart) -> u32 {
-    let part = match query_part.part {
-        Part::Edges => EDGES,
-        Part::Vertices => VERTICES,
-        Part::Faces | Part::Given => FACES,
-    };
-    let flag = |is_set: bool, flag: u32| if is_set { flag } else { 0 };
-    part | flag(query_part.is_bare, BARE)
-        | flag(query_part.is_points, POINTS)
-        | flag(query_part.within, OWN_PARTS)
 }

@@ -2,8 +2,9 @@
 //!
 //! Cost: `O(n log n)` once per topology, one byte per tetrahedron.
 
+use crate::scene::Body;
+use crate::scene::elements::Elements;
 use crate::scene::error::Error;
-use crate::scene::{Body, Elements};
 use crate::search::work::{Equal, Work};
 
 /// Tetrahedra whose faces are sorted by one task.

@@ -17,7 +17,7 @@ use super::border::{Border, FACES};
 use super::boxes::Descent;
 use crate::bvh::bounds::{Bounds, round_down, round_up};
 use crate::contact::passes;
-use crate::scene::Elements;
+use crate::scene::elements::Elements;
 use crate::scene::error::Error;
 use crate::scene::positions::Real;
 use crate::search::work::Work;

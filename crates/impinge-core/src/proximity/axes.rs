@@ -146,7 +146,7 @@ mod tests {
             let (p, q) = (point(), point());
             let (turned, expected) = (squared(axes.turn(p), axes.turn(q)), squared(p, q));
             // The largest coordinate is 1, so rounding is below the bound that the search takes.
-            let error = super::super::distance::ROUNDING_TURNED;
+            let error = super::super::best_first::ROUNDING_TURNED;
             assert!((turned.sqrt() - expected.sqrt()).abs() < error);
             // Along the way, all of its length is the first coordinate.
             let [first, ..] = axes.turn(way);

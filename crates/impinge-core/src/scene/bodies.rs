@@ -1,230 +1,11 @@
-//! Bodies: topology once, positions every frame.
+//! The bodies of a scene: added, removed, found, and told whom they meet.
 
-use std::sync::Arc;
-
-use crate::scene::elements::with_corners;
-pub(crate) use crate::scene::elements::{BodyKind, Elements};
-use crate::scene::elements::{Part, Topology, VertexRings};
+use crate::scene::body::{Body, Filter};
+use crate::scene::elements::{Elements, with_corners};
 use crate::scene::error::Error;
-pub(crate) use crate::scene::ids::BodyId;
-use crate::scene::ids::new_stamp;
-use crate::scene::index::ElementIx;
+use crate::scene::ids::{BodyId, new_stamp};
 use crate::scene::mesh::Mesh;
-use crate::scene::position_rows::PositionRows;
-use crate::scene::positions::{Given, NewPositions, Real};
-pub(crate) use crate::scene::positions::{Positions, check_positions};
-use crate::scene::transform::{Affine, RestPose};
-
-/// Which bodies meet in [`Query::between_all`](crate::Query::between_all): two bodies meet when the
-/// `category` of each shares a bit with the `mask` of the other. By default all bodies meet.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct Filter {
-    /// The categories to which the body belongs.
-    pub category: u64,
-    /// The categories that it meets.
-    pub mask: u64,
-}
-
-impl Default for Filter {
-    fn default() -> Self {
-        Filter {
-            category: 1,
-            mask: u64::MAX,
-        }
-    }
-}
-
-impl Filter {
-    /// Whether bodies with these two filters meet.
-    #[inline]
-    pub fn meets(self, other: Filter) -> bool {
-        self.category & other.mask != 0 && other.category & self.mask != 0
-    }
-}
-
-/// One body: elements, positions, filter.
-#[derive(Debug, Clone)]
-pub struct Body {
-    topology: Arc<Topology>,
-    positions: Positions,
-    /// Where the vertices are at the end of a step; as many as `positions`, or `None` so far.
-    end: Option<Positions>,
-    /// Whether `end` counts. If not, only its memory is kept.
-    moves: bool,
-    /// How the body was moved by a transform, if it was.
-    motion: Option<Box<RestPose>>,
-    filter: Filter,
-    thickness: f64,
-    /// Of each vertex, if it was set.
-    groups: Option<Arc<[u32]>>,
-    pinned: Option<Arc<[bool]>>,
-    topology_stamp: u64,
-    positions_stamp: u64,
-    step_stamp: u64,
-    /// False while positions written in place have not been checked.
-    checked: bool,
-}
-
-impl Body {
-    /// The elements that the body was given as.
-    pub fn elements(&self) -> &Elements {
-        self.topology.given()
-    }
-
-    /// The elements of one part: those that the body was given as, or its vertices, edges or faces,
-    /// which are found once per topology. Their numbers depend on the given elements alone.
-    pub fn part(&self, part: Part) -> &Elements {
-        self.topology.part(part)
-    }
-
-    /// The edges, `(n, 2)`: of tetrahedra those of their surface. They are found once per topology;
-    /// their numbers, which pairs of edges have, depend on the elements alone.
-    pub fn edges(&self) -> &Elements {
-        self.topology.part(Part::Edges)
-    }
-
-    /// The faces, `(n, 3)`: of tetrahedra those of their surface.
-    pub fn faces(&self) -> &Elements {
-        self.topology.part(Part::Faces)
-    }
-
-    /// One name for equal parts.
-    pub(crate) fn canonical(&self, part: Part) -> Part {
-        self.topology.canonical(part)
-    }
-
-    /// The corners of an element of a part.
-    pub(crate) fn corners<'a>(&'a self, part: Part, element: &'a ElementIx) -> &'a [u32] {
-        match part {
-            // Vertices are numbered as positions are.
-            Part::Vertices => element.as_corners(),
-            _ => self.part(part).corners(element.index()),
-        }
-    }
-
-    /// The current positions: where a step starts.
-    pub fn positions(&self) -> &Positions {
-        &self.positions
-    }
-
-    /// The positions at the end of a step, in the precision of [`positions`](Body::positions).
-    /// `None` for a body that stands still.
-    pub fn end_positions(&self) -> Option<&Positions> {
-        self.end.as_ref().filter(|_| self.moves)
-    }
-
-    /// The matrix that moved the vertices from the [rest positions](Body::rest_positions); `None`
-    /// without one ([`Scene::set_transform`]).
-    pub fn transform(&self) -> Option<[[f64; 4]; 4]> {
-        self.motion.as_ref().map(|motion| motion.matrix.matrix())
-    }
-
-    /// The positions that were given last, before any [transform](Scene::set_transform).
-    pub fn rest_positions(&self) -> &Positions {
-        match &self.motion {
-            Some(motion) => &motion.rest,
-            None => &self.positions,
-        }
-    }
-
-    /// Points, edges, triangles or tetrahedra.
-    pub fn kind(&self) -> BodyKind {
-        self.elements().kind()
-    }
-
-    /// The number of primitives.
-    pub fn n_primitives(&self) -> usize {
-        self.elements().len()
-    }
-
-    /// The number of vertices.
-    pub fn n_vertices(&self) -> usize {
-        self.positions.len()
-    }
-
-    /// Which bodies it meets.
-    pub fn filter(&self) -> Filter {
-        self.filter
-    }
-
-    /// The group of each vertex, if [groups](Scene::set_groups) were set.
-    pub(crate) fn groups(&self) -> Option<&Arc<[u32]>> {
-        self.groups.as_ref()
-    }
-
-    /// Whether each vertex is pinned, if [that](Scene::set_pinned) was set.
-    pub(crate) fn pinned(&self) -> Option<&Arc<[bool]>> {
-        self.pinned.as_ref()
-    }
-
-    /// The vertices at most some number of edges away from each vertex.
-    pub(crate) fn vertex_rings(&self, n_rings: u32) -> Arc<VertexRings> {
-        self.topology.rings(self.n_vertices(), n_rings)
-    }
-
-    /// How thick the body is, in the unit of the scene: see [`Scene::set_thickness`].
-    pub fn thickness(&self) -> f64 {
-        self.thickness
-    }
-
-    /// Changes when the body is re-meshed; equal stamps mean equal topology.
-    pub(crate) fn topology_stamp(&self) -> u64 {
-        self.topology_stamp
-    }
-
-    /// Changes whenever positions may have changed.
-    pub(crate) fn positions_stamp(&self) -> u64 {
-        self.positions_stamp
-    }
-
-    /// Changes whenever positions at the start or the end of a step may have changed.
-    pub(crate) fn step_stamp(&self) -> u64 {
-        self.step_stamp
-    }
-
-    pub(crate) fn is_checked(&self) -> bool {
-        self.checked
-    }
-
-    /// Refuses a number of positions other than that of the vertices.
-    fn check_number(&self, body: BodyId, given: usize) -> Result<(), Error> {
-        match self.n_vertices() {
-            expected if expected == given => Ok(()),
-            expected => Err(Error::WrongNumberOfPositions {
-                body,
-                given,
-                expected,
-            }),
-        }
-    }
-
-    /// Refuses new positions of another number, and the first that is not finite.
-    fn check(&self, body: BodyId, positions: &NewPositions<'_>) -> Result<(), Error> {
-        self.check_number(body, positions.len())?;
-        match &positions.0 {
-            Given::F32(rows) => check_positions(body, rows),
-            Given::F64(rows) => check_positions(body, rows),
-            Given::Whole(positions) => positions.check(body),
-        }
-    }
-
-    /// Sets checked positions at the end of a step.
-    fn set_end(&mut self, mut end: Positions) {
-        self.positions.widen_as(&end);
-        end.widen_as(&self.positions);
-        self.end = Some(end);
-        self.moves = true;
-        self.step_stamp = new_stamp();
-    }
-
-    fn has_moved(&mut self, checked: bool) {
-        self.positions_stamp = new_stamp();
-        self.step_stamp = self.positions_stamp;
-        self.moves = false;
-        self.motion = None;
-        self.checked = checked;
-    }
-}
+use crate::scene::positions::{Positions, Real};
 
 /// A slot for one body; empty after the body was removed.
 #[derive(Debug, Clone)]
@@ -318,7 +99,7 @@ impl Scene {
             })?,
         };
         let id = BodyId::new(slot);
-        let body = checked_body(id, mesh.into(), Filter::default())?;
+        let body = Body::new(id, mesh.into(), Filter::default())?;
         let held = Slot(Some((id, body)));
         match self.free.pop() {
             Some(_) => self.slots[id.index()] = held,
@@ -403,223 +184,11 @@ impl Scene {
     pub fn remesh(&mut self, body: BodyId, mesh: impl Into<Mesh>) -> Result<(), Error> {
         let old = self.body(body)?;
         let (filter, thickness) = (old.filter, old.thickness);
-        let remeshed = checked_body(body, mesh.into(), filter)?;
+        let remeshed = Body::new(body, mesh.into(), filter)?;
         *self.body_mut(body)? = Body {
             thickness,
             ..remeshed
         };
-        Ok(())
-    }
-
-    /// Moves the vertices: `(v, 3)` positions, as many as the body has vertices, and checked now.
-    /// The precision may differ from frame to frame. A new step starts: the body stands still until
-    /// its end positions are [set](Scene::set_end_positions).
-    ///
-    /// A slice, and a reference to a `Vec`, an array or [`Positions`], is copied. A `Vec` and
-    /// `Positions` are taken over, and an `Arc` of something that has rows is shared, without a
-    /// copy: the body drops it when it gets other positions or is removed. Two shared arrays serve
-    /// a simulation: write the one that the scene has dropped, give it, and go on with the other.
-    ///
-    /// ```
-    /// use std::sync::Arc;
-    /// use impinge::Scene;
-    /// # fn main() -> Result<(), impinge::Error> {
-    /// let mut scene = Scene::new();
-    /// let body = scene.add_triangles(&[[0, 1, 2]], &[[0.0f32, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])?;
-    /// let mut frames = [vec![[0.0f32; 3]; 3], vec![[0.0f32; 3]; 3]].map(Arc::new);
-    /// for step in 0..10u8 {
-    ///     let next = Arc::get_mut(&mut frames[usize::from(step % 2)]).expect("dropped by the scene");
-    ///     next[1] = [1.0, 0.0, step.into()];
-    ///     scene.set_positions(body, Arc::clone(&frames[usize::from(step % 2)]))?;
-    /// }
-    /// assert_eq!(scene.body(body)?.positions().point(1), [1.0, 0.0, 9.0]);
-    /// # Ok(()) }
-    /// ```
-    ///
-    /// Where a body must write its positions ([`positions_mut`](Scene::positions_mut),
-    /// [`set_transform`](Scene::set_transform)), it copies a shared array first.
-    ///
-    /// # Errors
-    /// A wrong number of positions, or one that is refused: the body keeps its old positions then.
-    pub fn set_positions<'a>(
-        &mut self,
-        body: BodyId,
-        positions: impl Into<NewPositions<'a>>,
-    ) -> Result<(), Error> {
-        let positions = positions.into();
-        let target = self.moved_body(body)?;
-        target.check(body, &positions)?;
-        store(&mut target.positions, positions);
-        target.has_moved(true);
-        Ok(())
-    }
-
-    /// Sets the vertex positions at the end of a step, `(v, 3)`, copied or not as by
-    /// [`set_positions`](Scene::set_positions). Each vertex moves from
-    /// [`positions`](Body::positions) to its end position on a straight line at constant speed.
-    /// They hold until the next [`set_positions`](Scene::set_positions),
-    /// [`positions_mut`](Scene::positions_mut), [`set_transform`](Scene::set_transform),
-    /// [`remesh`](Scene::remesh) or [`clear_end_positions`](Scene::clear_end_positions). A body
-    /// that has none stands still. For a rigid body, see
-    /// [`set_end_transform`](Scene::set_end_transform).
-    ///
-    /// If start and end have different precisions, the single-precision one is widened, which is
-    /// exact.
-    ///
-    /// # Errors
-    /// A wrong number of positions, or one that is refused: the body keeps its old end positions
-    /// then.
-    pub fn set_end_positions<'a>(
-        &mut self,
-        body: BodyId,
-        positions: impl Into<NewPositions<'a>>,
-    ) -> Result<(), Error> {
-        let positions = positions.into();
-        let target = self.moved_body(body)?;
-        target.check(body, &positions)?;
-        let mut end = target.end.take().unwrap_or_else(|| f32::store(&[]));
-        store(&mut end, positions);
-        target.set_end(end);
-        Ok(())
-    }
-
-    /// Clears a body's end positions: it stands still.
-    ///
-    /// # Errors
-    /// The id names no body.
-    pub fn clear_end_positions(&mut self, body: BodyId) -> Result<(), Error> {
-        let target = self.moved_body(body)?;
-        target.moves = false;
-        target.step_stamp = new_stamp();
-        Ok(())
-    }
-
-    /// The positions of a body that stores `R`, to be written in place without a copy. The next
-    /// detection checks them, and its error names a bad vertex. End positions are cleared, as by
-    /// [`set_positions`](Scene::set_positions).
-    ///
-    /// # Errors
-    /// The id names no body, or it stores the other precision.
-    pub fn positions_mut<R: Real>(&mut self, body: BodyId) -> Result<&mut [[R; 3]], Error> {
-        let target = self.moved_body(body)?;
-        target.has_moved(false);
-        stored(body, &mut target.positions).map(|stored| stored.own().as_mut_slice())
-    }
-
-    /// Moves a body by an affine matrix, such as a rigid motion, without passing its vertices
-    /// again. It moves the rest positions, which are those given last ([`add`](Scene::add),
-    /// [`set_positions`](Scene::set_positions), [`remesh`](Scene::remesh)). A second transform
-    /// replaces the first; they do not accumulate.
-    ///
-    /// Answers are exact for the moved vertices. These are rounded in a fixed way, so they have the
-    /// same bits on every backend: row `[a, b, c, d]` of the matrix takes `(x, y, z)` to
-    /// `((a x + b y) + c z) + d`. Each product and each sum is rounded to `f64` in this order, none
-    /// is fused with another, and the last sum is rounded once more to the precision of the rest
-    /// positions. So a rotation deforms a body by the rounding error.
-    ///
-    /// End positions are cleared, as by [`set_positions`](Scene::set_positions).
-    ///
-    /// ```
-    /// use impinge_core::{Positions, Scene};
-    /// # fn main() -> Result<(), impinge_core::Error> {
-    /// let mut scene = Scene::new();
-    /// let body = scene.add_triangles(&[[0, 1, 2]], &[[0.0f32, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])?;
-    /// let up = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.5], [0.0, 0.0, 0.0, 1.0]];
-    /// scene.set_transform(body, &up)?;
-    /// assert_eq!(scene.body(body)?.positions().point(1), [1.0, 0.0, 0.5]);
-    /// assert_eq!(scene.body(body)?.rest_positions().point(1), [1.0, 0.0, 0.0]);
-    /// # Ok(()) }
-    /// ```
-    ///
-    /// # Errors
-    /// The id names no body; a matrix that is not finite, or whose last row is not `[0, 0, 0, 1]`;
-    /// rest positions that were written in place and are refused; a moved position that is refused.
-    /// The body is unchanged then.
-    pub fn set_transform(&mut self, body: BodyId, matrix: &[[f64; 4]; 4]) -> Result<(), Error> {
-        let matrix = Affine::new(matrix)?;
-        let target = self.moved_body(body)?;
-        if !target.checked {
-            target.positions.check(body)?;
-        }
-        let previous = target.motion.take();
-        let (rest, before) = match previous {
-            Some(motion) => (motion.rest, Some(motion.matrix)),
-            None => (Arc::new(target.positions.clone()), None),
-        };
-        matrix.write(&rest, &mut target.positions);
-        if let Err(error) = target.positions.check(body) {
-            // Restore the previous positions: computing them again gives the same bits.
-            match before {
-                Some(matrix) => matrix.write(&rest, &mut target.positions),
-                None => target.positions.clone_from(&rest),
-            }
-            target.motion = before.map(|matrix| Box::new(RestPose { rest, matrix }));
-            return Err(error);
-        }
-        target.has_moved(true);
-        target.motion = Some(Box::new(RestPose { rest, matrix }));
-        Ok(())
-    }
-
-    /// Sets where a step takes a body, by an affine matrix: its end positions are the
-    /// [rest positions](Body::rest_positions) moved by the matrix, rounded as by
-    /// [`set_transform`](Scene::set_transform), and hold as long as any
-    /// [end positions](Scene::set_end_positions). The two matrices of a step are those of its two
-    /// ends; both start from rest, neither from the other.
-    ///
-    /// **Each vertex goes straight, at constant speed, from its rounded position to its rounded
-    /// end position**, not along the arc of a turn, and each point of an element goes straight
-    /// with its vertices. What is proven of a step is proven of this motion. Halfway through a
-    /// turn the body is smaller, by a factor of the cosine of half the angle; half a turn takes
-    /// it through its axis.
-    ///
-    /// At each moment, a point at distance r from the axis of a screw motion by the angle w
-    /// (radians) is at most r w² / 8 away from where that motion would have it, plus the rounding
-    /// of the two ends. So a large turn is cut into n equal steps with
-    /// `n = ceil(w * sqrt(r / (8.0 * d)))`, where r is that of the farthest vertex and `d` the
-    /// deviation that is allowed. With 2 d (d of each of two bodies) as
-    /// [`separation`](crate::Query::separation), a step that is free is free for the screw motion
-    /// as well, up to that rounding.
-    ///
-    /// After a step, call `set_transform` with the matrix of its end: the positions are then the
-    /// end positions, bit by bit. A step taken by [`apply`](crate::Advance::apply) gives the body
-    /// the positions reached, which are then its rest positions.
-    ///
-    /// ```
-    /// use impinge_core::Scene;
-    /// # fn main() -> Result<(), impinge_core::Error> {
-    /// let mut scene = Scene::new();
-    /// let blade = scene.add_triangles(&[[0, 1, 2]], &[[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 0.0, 0.1]])?;
-    /// let turned = |angle: f64| {
-    ///     let (sin, cos) = angle.sin_cos();
-    ///     [[cos, -sin, 0.0, 0.0], [sin, cos, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]]
-    /// };
-    /// // A half turn, of which no step may leave the arc by more than 0.01.
-    /// let (angle, radius, deviation) = (std::f64::consts::PI, 2.0, 0.01);
-    /// let n = (angle * f64::sqrt(radius / (8.0 * deviation))).ceil();
-    /// assert_eq!(n, 16.0);
-    /// for step in 0..16 {
-    ///     scene.set_transform(blade, &turned(angle * f64::from(step) / n))?;
-    ///     scene.set_end_transform(blade, &turned(angle * f64::from(step + 1) / n))?;
-    ///     // ... ask about the step
-    /// }
-    /// # Ok(()) }
-    /// ```
-    ///
-    /// # Errors
-    /// As [`set_transform`](Scene::set_transform); the body keeps its old end positions then.
-    pub fn set_end_transform(&mut self, body: BodyId, matrix: &[[f64; 4]; 4]) -> Result<(), Error> {
-        let matrix = Affine::new(matrix)?;
-        let target = self.moved_body(body)?;
-        if !target.checked {
-            target.positions.check(body)?;
-        }
-        // The memory of end positions that no longer count is used again.
-        let unused = target.end.take_if(|_| !target.moves);
-        let mut end = unused.unwrap_or_else(|| f32::store(&[]));
-        matrix.write(target.rest_positions(), &mut end);
-        end.check(body)?;
-        target.set_end(end);
         Ok(())
     }
 
@@ -707,7 +276,7 @@ impl Scene {
     }
 
     /// A body of which only positions are changed.
-    fn moved_body(&mut self, body: BodyId) -> Result<&mut Body, Error> {
+    pub(super) fn moved_body(&mut self, body: BodyId) -> Result<&mut Body, Error> {
         let unknown = self.unknown(body);
         self.stamp = new_stamp();
         match self.slots.get_mut(body.index()) {
@@ -759,16 +328,6 @@ impl Scene {
     }
 }
 
-/// The positions, if they are of this precision.
-fn stored<R: Real>(body: BodyId, positions: &mut Positions) -> Result<&mut PositionRows<R>, Error> {
-    let stored = positions.precision();
-    R::stored(positions).ok_or(Error::WrongPrecision {
-        body,
-        stored,
-        asked: if stored == "f32" { "f64" } else { "f32" },
-    })
-}
-
 /// Refuses offsets that do not partition `n` elements or positions.
 fn check_offsets(setting: &'static str, offsets: &[usize], n: usize) -> Result<(), Error> {
     let refused = |given, allowed| {
@@ -798,22 +357,6 @@ fn check_offsets(setting: &'static str, offsets: &[usize], n: usize) -> Result<(
     }
 }
 
-/// Stores checked positions. Memory of the body's own is reused.
-fn store(stored: &mut Positions, new: NewPositions<'_>) {
-    match new.0 {
-        Given::F32(rows) => copy(stored, rows),
-        Given::F64(rows) => copy(stored, rows),
-        Given::Whole(positions) => *stored = positions,
-    }
-}
-
-fn copy<R: Real>(stored: &mut Positions, rows: &[[R; 3]]) {
-    match R::stored(stored) {
-        Some(own) if own.len() == rows.len() => own.copy_from(rows),
-        _ => *stored = R::store(rows),
-    }
-}
-
 fn check_per_vertex(
     body: BodyId,
     what: &'static str,
@@ -829,48 +372,4 @@ fn check_per_vertex(
             n_vertices,
         }),
     }
-}
-
-fn checked_body(id: BodyId, mesh: Mesh, filter: Filter) -> Result<Body, Error> {
-    let Mesh {
-        elements,
-        positions,
-        ..
-    } = mesh;
-    let limit = u64::from(u32::MAX);
-    for (what, given) in [
-        ("primitives of one body", elements.len() as u64),
-        ("vertices of one body", positions.len() as u64),
-    ] {
-        if given > limit {
-            return Err(Error::TooMany { what, given, limit });
-        }
-    }
-    positions.check(id)?;
-    let n_vertices = positions.len();
-    let bad_index = elements.first_bad_index(n_vertices);
-    if let Some((primitive, index)) = bad_index {
-        return Err(Error::VertexIndexOutOfRange {
-            body: id,
-            primitive,
-            index,
-            n_vertices,
-        });
-    }
-    let stamp = new_stamp();
-    Ok(Body {
-        topology: Arc::new(Topology::new(elements)),
-        positions,
-        end: None,
-        moves: false,
-        motion: None,
-        filter,
-        thickness: 0.0,
-        groups: None,
-        pinned: None,
-        topology_stamp: new_stamp(),
-        positions_stamp: stamp,
-        step_stamp: stamp,
-        checked: true,
-    })
 }

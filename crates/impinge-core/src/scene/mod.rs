@@ -1,14 +1,17 @@
 //! Bodies: topology once, positions every frame; and the numbers that name them and their elements.
 
 mod bodies;
+mod body;
 pub(crate) mod elements;
 pub(crate) mod error;
 pub(crate) mod ids;
 pub mod index;
 pub(crate) mod mesh;
+mod motion;
 pub(crate) mod position_rows;
 pub(crate) mod positions;
 pub(crate) mod transform;
 pub(crate) mod words;
 
-pub use bodies::*;
+pub use bodies::Scene;
+pub use body::{Body, Filter};

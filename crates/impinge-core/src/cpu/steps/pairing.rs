@@ -215,6 +215,63 @@ fn pair<S: Simd>(
         ..
     } = worker;
     lane_pairs.clear();
+    let (slots, [lanes_a, lanes_b]) = cull(simd, world, item, lower, groups)?;
+    let [a, b] = slots.map(|slot| groups.at(slot));
+    // The lanes of the side with fewer of them are the rows.
+    let (side, rows, lanes, groups) = if lanes_a.count_ones() <= lanes_b.count_ones() {
+        (Side::A, lanes_a, lanes_b, [a, b])
+    } else {
+        (Side::B, lanes_b, lanes_a, [b, a])
+    };
+    let is_single = world.sweep.is_single();
+    let may_part = *is_still && is_single && directions.may_pay([rows, lanes]);
+    // Directions are tested lane by lane.
+    let is_whole = lanes == u64::MAX || may_part;
+    let mut map = [0; GROUP];
+    let n = simd.list_lanes(lanes, &mut map);
+    let is_own = (item.a, item.cluster_a) == (item.b, item.cluster_b);
+    let kinds = (is_single, is_own);
+    let listed = if is_whole { None } else { Some(n) };
+    overlap(simd, kinds, (groups, rows, lanes), listed, survivors, masks);
+    if may_part {
+        let reach = world.plan.reach(item.a, item.b).enclosing_f32();
+        decider.n_candidates += directions.thin(
+            simd,
+            world,
+            item,
+            (side, rows),
+            reach[1],
+            &[0; GROUP],
+            masks,
+        );
+    }
+    for row in Lanes(simd.rows_with_lanes(masks)) {
+        match is_whole {
+            true => lane_pairs.push_row(simd, side, row, masks.0[row]),
+            false => lane_pairs.push_mapped_row(simd, (side, row), masks.0[row], &map),
+        }
+    }
+    let ids = [item.a, item.b].map(|part| world.plan.part(part).id);
+    if ids[0] == ids[1] {
+        let corners = [&a.corners[..a.n_corners], &b.corners[..b.n_corners]];
+        lane_pairs.drop_sharing(simd, corners);
+    }
+    if world.plan.leaves_out() {
+        lane_pairs.retain(|lanes| !is_left_out(world, item, [a, b], lanes));
+    }
+    (lane_pairs.len() > 0).then_some(slots)
+}
+
+/// The slots of a work item's groups, and the lanes of each that meet the other's box and that have
+/// wanted keys; `None` if there are none.
+#[inline(always)]
+fn cull<S: Simd>(
+    simd: S,
+    world: World<'_>,
+    item: &WorkItem,
+    lower: Option<[Number; 2]>,
+    groups: &mut GroupCache<Group>,
+) -> Option<([usize; 2], [u64; 2])> {
     let sides = [(item.a, item.cluster_a), (item.b, item.cluster_b)];
     let is_own = sides[0] == sides[1];
     let boxes = sides.map(|(part, cluster)| world.cache(part).ends(cluster));
@@ -230,8 +287,8 @@ fn pair<S: Simd>(
     let (a, b) = (groups.at(slot_a), groups.at(slot_b));
     let ends = [&a.ends, &b.ends];
     let (mut lanes_a, mut lanes_b) = (full(a.size), full(b.size));
-    let is_single = world.sweep.is_single();
     if !is_own {
+        let is_single = world.sweep.is_single();
         // Boxes of clusters: where they are single, both ends have the same.
         lanes_a = if is_single {
             simd.overlaps_64(&a.start, &ends[1][0], lanes_a)
@@ -257,29 +314,30 @@ fn pair<S: Simd>(
             }
         }
     }
-    let ids = [item.a, item.b].map(|part| world.plan.part(part).id);
-    let same_body = ids[0] == ids[1];
-    // The lanes of the side with fewer of them are the rows.
-    let (side, rows, lanes, [own, other]) = if lanes_a.count_ones() <= lanes_b.count_ones() {
-        (Side::A, lanes_a, lanes_b, [a, b])
-    } else {
-        (Side::B, lanes_b, lanes_a, [b, a])
-    };
-    let mut map = [0; GROUP];
-    let [start, end] = &mut **survivors;
-    let n = simd.list_lanes(lanes, &mut map);
-    let may_part = *is_still && is_single && directions.may_pay([rows, lanes]);
-    // Directions are tested lane by lane.
-    let is_whole = lanes == u64::MAX || may_part;
-    if !is_whole {
-        simd.put_survivors(&other.start, lanes, start);
-        if !is_single {
-            simd.put_survivors(&other.end, lanes, end);
+    Some(([slot_a, slot_b], [lanes_a, lanes_b]))
+}
+
+/// Masks of the lanes of one group whose boxes meet those of each row of the other. `listed`: how
+/// many lanes are put side by side first, which is in whose places the masks then are.
+#[inline(always)]
+fn overlap<S: Simd>(
+    simd: S,
+    (is_single, is_own): (bool, bool),
+    ([own, other], rows, lanes): ([&Group; 2], u64, u64),
+    listed: Option<usize>,
+    survivors: &mut [LaneBounds; 2],
+    masks: &mut Masks,
+) {
+    let [start, end] = survivors;
+    let (boxes, among) = match listed {
+        None => ([&other.start, &other.end], lanes),
+        Some(n) => {
+            simd.put_survivors(&other.start, lanes, start);
+            if !is_single {
+                simd.put_survivors(&other.end, lanes, end);
+            }
+            ([&*start, &*end], full(n))
         }
-    }
-    let (boxes, among) = match is_whole {
-        true => ([&other.start, &other.end], lanes),
-        false => ([&*start, &*end], full(n)),
     };
     // All lanes of a cluster that meets itself survive, each in its place.
     match (is_single, is_own) {
@@ -288,32 +346,6 @@ fn pair<S: Simd>(
         (false, true) => simd.meets_within(boxes, among, masks),
         (false, false) => simd.meets_rows(boxes, among, [&own.start, &own.end], rows, masks),
     }
-    if may_part {
-        let reach = world.plan.reach(item.a, item.b).enclosing_f32();
-        decider.n_candidates += directions.thin(
-            simd,
-            world,
-            item,
-            (side, rows),
-            reach[1],
-            &[0; GROUP],
-            masks,
-        );
-    }
-    for row in Lanes(simd.rows_with_lanes(masks)) {
-        match is_whole {
-            true => lane_pairs.push_row(simd, side, row, masks.0[row]),
-            false => lane_pairs.push_mapped_row(simd, (side, row), masks.0[row], &map),
-        }
-    }
-    if same_body {
-        let corners = [&a.corners[..a.n_corners], &b.corners[..b.n_corners]];
-        lane_pairs.drop_sharing(simd, corners);
-    }
-    if world.plan.leaves_out() {
-        lane_pairs.retain(|lanes| !is_left_out(world, item, [a, b], lanes));
-    }
-    (lane_pairs.len() > 0).then_some([slot_a, slot_b])
 }
 
 /// Whether the elements of two lanes are left out.

@@ -1,0 +1,270 @@
+//! One body: its elements, its positions, and what was said about it.
+
+use std::sync::Arc;
+
+use crate::scene::elements::{BodyKind, Elements, Part, Topology, VertexRings};
+use crate::scene::error::Error;
+use crate::scene::ids::{BodyId, new_stamp};
+use crate::scene::index::ElementIx;
+use crate::scene::mesh::Mesh;
+use crate::scene::positions::{Given, NewPositions, Positions, check_positions};
+use crate::scene::transform::RestPose;
+
+/// Which bodies meet in [`Query::between_all`](crate::Query::between_all): two bodies meet when the
+/// `category` of each shares a bit with the `mask` of the other. By default all bodies meet.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Filter {
+    /// The categories to which the body belongs.
+    pub category: u64,
+    /// The categories that it meets.
+    pub mask: u64,
+}
+
+impl Default for Filter {
+    fn default() -> Self {
+        Filter {
+            category: 1,
+            mask: u64::MAX,
+        }
+    }
+}
+
+impl Filter {
+    /// Whether bodies with these two filters meet.
+    #[inline]
+    pub fn meets(self, other: Filter) -> bool {
+        self.category & other.mask != 0 && other.category & self.mask != 0
+    }
+}
+
+/// One body: elements, positions, filter.
+#[derive(Debug, Clone)]
+pub struct Body {
+    pub(super) topology: Arc<Topology>,
+    pub(super) positions: Positions,
+    /// Where the vertices are at the end of a step; as many as `positions`, or `None` so far.
+    pub(super) end: Option<Positions>,
+    /// Whether `end` counts. If not, only its memory is kept.
+    pub(super) moves: bool,
+    /// How the body was moved by a transform, if it was.
+    pub(super) motion: Option<Box<RestPose>>,
+    pub(super) filter: Filter,
+    pub(super) thickness: f64,
+    /// Of each vertex, if it was set.
+    pub(super) groups: Option<Arc<[u32]>>,
+    pub(super) pinned: Option<Arc<[bool]>>,
+    pub(super) topology_stamp: u64,
+    pub(super) positions_stamp: u64,
+    pub(super) step_stamp: u64,
+    /// False while positions written in place have not been checked.
+    pub(super) checked: bool,
+}
+
+impl Body {
+    /// A body of a mesh.
+    ///
+    /// # Errors
+    /// More primitives or vertices than 32 bits number, a position or an index that is refused.
+    pub(super) fn new(id: BodyId, mesh: Mesh, filter: Filter) -> Result<Body, Error> {
+        let Mesh {
+            elements,
+            positions,
+            ..
+        } = mesh;
+        let limit = u64::from(u32::MAX);
+        for (what, given) in [
+            ("primitives of one body", elements.len() as u64),
+            ("vertices of one body", positions.len() as u64),
+        ] {
+            if given > limit {
+                return Err(Error::TooMany { what, given, limit });
+            }
+        }
+        positions.check(id)?;
+        let n_vertices = positions.len();
+        let bad_index = elements.first_bad_index(n_vertices);
+        if let Some((primitive, index)) = bad_index {
+            return Err(Error::VertexIndexOutOfRange {
+                body: id,
+                primitive,
+                index,
+                n_vertices,
+            });
+        }
+        let stamp = new_stamp();
+        Ok(Body {
+            topology: Arc::new(Topology::new(elements)),
+            positions,
+            end: None,
+            moves: false,
+            motion: None,
+            filter,
+            thickness: 0.0,
+            groups: None,
+            pinned: None,
+            topology_stamp: new_stamp(),
+            positions_stamp: stamp,
+            step_stamp: stamp,
+            checked: true,
+        })
+    }
+
+    /// The elements that the body was given as.
+    pub fn elements(&self) -> &Elements {
+        self.topology.given()
+    }
+
+    /// The elements of one part: those that the body was given as, or its vertices, edges or faces,
+    /// which are found once per topology. Their numbers depend on the given elements alone.
+    pub fn part(&self, part: Part) -> &Elements {
+        self.topology.part(part)
+    }
+
+    /// The edges, `(n, 2)`: of tetrahedra those of their surface. They are found once per topology;
+    /// their numbers, which pairs of edges have, depend on the elements alone.
+    pub fn edges(&self) -> &Elements {
+        self.topology.part(Part::Edges)
+    }
+
+    /// The faces, `(n, 3)`: of tetrahedra those of their surface.
+    pub fn faces(&self) -> &Elements {
+        self.topology.part(Part::Faces)
+    }
+
+    /// One name for equal parts.
+    pub(crate) fn canonical(&self, part: Part) -> Part {
+        self.topology.canonical(part)
+    }
+
+    /// The corners of an element of a part.
+    pub(crate) fn corners<'a>(&'a self, part: Part, element: &'a ElementIx) -> &'a [u32] {
+        match part {
+            // Vertices are numbered as positions are.
+            Part::Vertices => element.as_corners(),
+            _ => self.part(part).corners(element.index()),
+        }
+    }
+
+    /// The current positions: where a step starts.
+    pub fn positions(&self) -> &Positions {
+        &self.positions
+    }
+
+    /// The positions at the end of a step, in the precision of [`positions`](Body::positions).
+    /// `None` for a body that stands still.
+    pub fn end_positions(&self) -> Option<&Positions> {
+        self.end.as_ref().filter(|_| self.moves)
+    }
+
+    /// The matrix that moved the vertices from the [rest positions](Body::rest_positions); `None`
+    /// without one ([`Scene::set_transform`]).
+    pub fn transform(&self) -> Option<[[f64; 4]; 4]> {
+        self.motion.as_ref().map(|motion| motion.matrix.matrix())
+    }
+
+    /// The positions that were given last, before any [transform](Scene::set_transform).
+    pub fn rest_positions(&self) -> &Positions {
+        match &self.motion {
+            Some(motion) => &motion.rest,
+            None => &self.positions,
+        }
+    }
+
+    /// Points, edges, triangles or tetrahedra.
+    pub fn kind(&self) -> BodyKind {
+        self.elements().kind()
+    }
+
+    /// The number of primitives.
+    pub fn n_primitives(&self) -> usize {
+        self.elements().len()
+    }
+
+    /// The number of vertices.
+    pub fn n_vertices(&self) -> usize {
+        self.positions.len()
+    }
+
+    /// Which bodies it meets.
+    pub fn filter(&self) -> Filter {
+        self.filter
+    }
+
+    /// The group of each vertex, if [groups](Scene::set_groups) were set.
+    pub(crate) fn groups(&self) -> Option<&Arc<[u32]>> {
+        self.groups.as_ref()
+    }
+
+    /// Whether each vertex is pinned, if [that](Scene::set_pinned) was set.
+    pub(crate) fn pinned(&self) -> Option<&Arc<[bool]>> {
+        self.pinned.as_ref()
+    }
+
+    /// The vertices at most some number of edges away from each vertex.
+    pub(crate) fn vertex_rings(&self, n_rings: u32) -> Arc<VertexRings> {
+        self.topology.rings(self.n_vertices(), n_rings)
+    }
+
+    /// How thick the body is, in the unit of the scene: see [`Scene::set_thickness`].
+    pub fn thickness(&self) -> f64 {
+        self.thickness
+    }
+
+    /// Changes when the body is re-meshed; equal stamps mean equal topology.
+    pub(crate) fn topology_stamp(&self) -> u64 {
+        self.topology_stamp
+    }
+
+    /// Changes whenever positions may have changed.
+    pub(crate) fn positions_stamp(&self) -> u64 {
+        self.positions_stamp
+    }
+
+    /// Changes whenever positions at the start or the end of a step may have changed.
+    pub(crate) fn step_stamp(&self) -> u64 {
+        self.step_stamp
+    }
+
+    pub(crate) fn is_checked(&self) -> bool {
+        self.checked
+    }
+
+    /// Refuses a number of positions other than that of the vertices.
+    fn check_number(&self, body: BodyId, given: usize) -> Result<(), Error> {
+        match self.n_vertices() {
+            expected if expected == given => Ok(()),
+            expected => Err(Error::WrongNumberOfPositions {
+                body,
+                given,
+                expected,
+            }),
+        }
+    }
+
+    /// Refuses new positions of another number, and the first that is not finite.
+    pub(super) fn check(&self, body: BodyId, positions: &NewPositions<'_>) -> Result<(), Error> {
+        self.check_number(body, positions.len())?;
+        match &positions.0 {
+            Given::F32(rows) => check_positions(body, rows),
+            Given::F64(rows) => check_positions(body, rows),
+            Given::Whole(positions) => positions.check(body),
+        }
+    }
+
+    /// Sets checked positions at the end of a step.
+    pub(super) fn set_end(&mut self, mut end: Positions) {
+        self.positions.widen_as(&end);
+        end.widen_as(&self.positions);
+        self.end = Some(end);
+        self.moves = true;
+        self.step_stamp = new_stamp();
+    }
+
+    pub(super) fn has_moved(&mut self, checked: bool) {
+        self.positions_stamp = new_stamp();
+        self.step_stamp = self.positions_stamp;
+        self.moves = false;
+        self.motion = None;
+        self.checked = checked;
+    }
+}

@@ -1,0 +1,251 @@
+//! Where the bodies of a scene are: their positions, the positions at the end of a step, and the
+//! transforms that move them.
+
+use std::sync::Arc;
+
+use crate::scene::bodies::Scene;
+use crate::scene::error::Error;
+use crate::scene::ids::{BodyId, new_stamp};
+use crate::scene::position_rows::PositionRows;
+use crate::scene::positions::{Given, NewPositions, Positions, Real};
+use crate::scene::transform::{Affine, RestPose};
+
+impl Scene {
+    /// Moves the vertices: `(v, 3)` positions, as many as the body has vertices, and checked now.
+    /// The precision may differ from frame to frame. A new step starts: the body stands still until
+    /// its end positions are [set](Scene::set_end_positions).
+    ///
+    /// A slice, and a reference to a `Vec`, an array or [`Positions`], is copied. A `Vec` and
+    /// `Positions` are taken over, and an `Arc` of something that has rows is shared, without a
+    /// copy: the body drops it when it gets other positions or is removed. Two shared arrays serve
+    /// a simulation: write the one that the scene has dropped, give it, and go on with the other.
+    ///
+    /// ```
+    /// use std::sync::Arc;
+    /// use impinge::Scene;
+    /// # fn main() -> Result<(), impinge::Error> {
+    /// let mut scene = Scene::new();
+    /// let body = scene.add_triangles(&[[0, 1, 2]], &[[0.0f32, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])?;
+    /// let mut frames = [vec![[0.0f32; 3]; 3], vec![[0.0f32; 3]; 3]].map(Arc::new);
+    /// for step in 0..10u8 {
+    ///     let next = Arc::get_mut(&mut frames[usize::from(step % 2)]).expect("dropped by the scene");
+    ///     next[1] = [1.0, 0.0, step.into()];
+    ///     scene.set_positions(body, Arc::clone(&frames[usize::from(step % 2)]))?;
+    /// }
+    /// assert_eq!(scene.body(body)?.positions().point(1), [1.0, 0.0, 9.0]);
+    /// # Ok(()) }
+    /// ```
+    ///
+    /// Where a body must write its positions ([`positions_mut`](Scene::positions_mut),
+    /// [`set_transform`](Scene::set_transform)), it copies a shared array first.
+    ///
+    /// # Errors
+    /// A wrong number of positions, or one that is refused: the body keeps its old positions then.
+    pub fn set_positions<'a>(
+        &mut self,
+        body: BodyId,
+        positions: impl Into<NewPositions<'a>>,
+    ) -> Result<(), Error> {
+        let positions = positions.into();
+        let target = self.moved_body(body)?;
+        target.check(body, &positions)?;
+        store(&mut target.positions, positions);
+        target.has_moved(true);
+        Ok(())
+    }
+
+    /// Sets the vertex positions at the end of a step, `(v, 3)`, copied or not as by
+    /// [`set_positions`](Scene::set_positions). Each vertex moves from
+    /// [`positions`](Body::positions) to its end position on a straight line at constant speed.
+    /// They hold until the next [`set_positions`](Scene::set_positions),
+    /// [`positions_mut`](Scene::positions_mut), [`set_transform`](Scene::set_transform),
+    /// [`remesh`](Scene::remesh) or [`clear_end_positions`](Scene::clear_end_positions). A body
+    /// that has none stands still. For a rigid body, see
+    /// [`set_end_transform`](Scene::set_end_transform).
+    ///
+    /// If start and end have different precisions, the single-precision one is widened, which is
+    /// exact.
+    ///
+    /// # Errors
+    /// A wrong number of positions, or one that is refused: the body keeps its old end positions
+    /// then.
+    pub fn set_end_positions<'a>(
+        &mut self,
+        body: BodyId,
+        positions: impl Into<NewPositions<'a>>,
+    ) -> Result<(), Error> {
+        let positions = positions.into();
+        let target = self.moved_body(body)?;
+        target.check(body, &positions)?;
+        let mut end = target.end.take().unwrap_or_else(|| f32::store(&[]));
+        store(&mut end, positions);
+        target.set_end(end);
+        Ok(())
+    }
+
+    /// Clears a body's end positions: it stands still.
+    ///
+    /// # Errors
+    /// The id names no body.
+    pub fn clear_end_positions(&mut self, body: BodyId) -> Result<(), Error> {
+        let target = self.moved_body(body)?;
+        target.moves = false;
+        target.step_stamp = new_stamp();
+        Ok(())
+    }
+
+    /// The positions of a body that stores `R`, to be written in place without a copy. The next
+    /// detection checks them, and its error names a bad vertex. End positions are cleared, as by
+    /// [`set_positions`](Scene::set_positions).
+    ///
+    /// # Errors
+    /// The id names no body, or it stores the other precision.
+    pub fn positions_mut<R: Real>(&mut self, body: BodyId) -> Result<&mut [[R; 3]], Error> {
+        let target = self.moved_body(body)?;
+        target.has_moved(false);
+        stored(body, &mut target.positions).map(|stored| stored.own().as_mut_slice())
+    }
+
+    /// Moves a body by an affine matrix, such as a rigid motion, without passing its vertices
+    /// again. It moves the rest positions, which are those given last ([`add`](Scene::add),
+    /// [`set_positions`](Scene::set_positions), [`remesh`](Scene::remesh)). A second transform
+    /// replaces the first; they do not accumulate.
+    ///
+    /// Answers are exact for the moved vertices. These are rounded in a fixed way, so they have the
+    /// same bits on every backend: row `[a, b, c, d]` of the matrix takes `(x, y, z)` to
+    /// `((a x + b y) + c z) + d`. Each product and each sum is rounded to `f64` in this order, none
+    /// is fused with another, and the last sum is rounded once more to the precision of the rest
+    /// positions. So a rotation deforms a body by the rounding error.
+    ///
+    /// End positions are cleared, as by [`set_positions`](Scene::set_positions).
+    ///
+    /// ```
+    /// use impinge_core::{Positions, Scene};
+    /// # fn main() -> Result<(), impinge_core::Error> {
+    /// let mut scene = Scene::new();
+    /// let body = scene.add_triangles(&[[0, 1, 2]], &[[0.0f32, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])?;
+    /// let up = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.5], [0.0, 0.0, 0.0, 1.0]];
+    /// scene.set_transform(body, &up)?;
+    /// assert_eq!(scene.body(body)?.positions().point(1), [1.0, 0.0, 0.5]);
+    /// assert_eq!(scene.body(body)?.rest_positions().point(1), [1.0, 0.0, 0.0]);
+    /// # Ok(()) }
+    /// ```
+    ///
+    /// # Errors
+    /// The id names no body; a matrix that is not finite, or whose last row is not `[0, 0, 0, 1]`;
+    /// rest positions that were written in place and are refused; a moved position that is refused.
+    /// The body is unchanged then.
+    pub fn set_transform(&mut self, body: BodyId, matrix: &[[f64; 4]; 4]) -> Result<(), Error> {
+        let matrix = Affine::new(matrix)?;
+        let target = self.moved_body(body)?;
+        if !target.checked {
+            target.positions.check(body)?;
+        }
+        let previous = target.motion.take();
+        let (rest, before) = match previous {
+            Some(motion) => (motion.rest, Some(motion.matrix)),
+            None => (Arc::new(target.positions.clone()), None),
+        };
+        matrix.write(&rest, &mut target.positions);
+        if let Err(error) = target.positions.check(body) {
+            // Restore the previous positions: computing them again gives the same bits.
+            match before {
+                Some(matrix) => matrix.write(&rest, &mut target.positions),
+                None => target.positions.clone_from(&rest),
+            }
+            target.motion = before.map(|matrix| Box::new(RestPose { rest, matrix }));
+            return Err(error);
+        }
+        target.has_moved(true);
+        target.motion = Some(Box::new(RestPose { rest, matrix }));
+        Ok(())
+    }
+
+    /// Sets where a step takes a body, by an affine matrix: its end positions are the
+    /// [rest positions](Body::rest_positions) moved by the matrix, rounded as by
+    /// [`set_transform`](Scene::set_transform), and hold as long as any
+    /// [end positions](Scene::set_end_positions). The two matrices of a step are those of its two
+    /// ends; both start from rest, neither from the other.
+    ///
+    /// **Each vertex goes straight, at constant speed, from its rounded position to its rounded
+    /// end position**, not along the arc of a turn, and each point of an element goes straight
+    /// with its vertices. What is proven of a step is proven of this motion. Halfway through a
+    /// turn the body is smaller, by a factor of the cosine of half the angle; half a turn takes
+    /// it through its axis.
+    ///
+    /// At each moment, a point at distance r from the axis of a screw motion by the angle w
+    /// (radians) is at most r w² / 8 away from where that motion would have it, plus the rounding
+    /// of the two ends. So a large turn is cut into n equal steps with
+    /// `n = ceil(w * sqrt(r / (8.0 * d)))`, where r is that of the farthest vertex and `d` the
+    /// deviation that is allowed. With 2 d (d of each of two bodies) as
+    /// [`separation`](crate::Query::separation), a step that is free is free for the screw motion
+    /// as well, up to that rounding.
+    ///
+    /// After a step, call `set_transform` with the matrix of its end: the positions are then the
+    /// end positions, bit by bit. A step taken by [`apply`](crate::Advance::apply) gives the body
+    /// the positions reached, which are then its rest positions.
+    ///
+    /// ```
+    /// use impinge_core::Scene;
+    /// # fn main() -> Result<(), impinge_core::Error> {
+    /// let mut scene = Scene::new();
+    /// let blade = scene.add_triangles(&[[0, 1, 2]], &[[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 0.0, 0.1]])?;
+    /// let turned = |angle: f64| {
+    ///     let (sin, cos) = angle.sin_cos();
+    ///     [[cos, -sin, 0.0, 0.0], [sin, cos, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]]
+    /// };
+    /// // A half turn, of which no step may leave the arc by more than 0.01.
+    /// let (angle, radius, deviation) = (std::f64::consts::PI, 2.0, 0.01);
+    /// let n = (angle * f64::sqrt(radius / (8.0 * deviation))).ceil();
+    /// assert_eq!(n, 16.0);
+    /// for step in 0..16 {
+    ///     scene.set_transform(blade, &turned(angle * f64::from(step) / n))?;
+    ///     scene.set_end_transform(blade, &turned(angle * f64::from(step + 1) / n))?;
+    ///     // ... ask about the step
+    /// }
+    /// # Ok(()) }
+    /// ```
+    ///
+    /// # Errors
+    /// As [`set_transform`](Scene::set_transform); the body keeps its old end positions then.
+    pub fn set_end_transform(&mut self, body: BodyId, matrix: &[[f64; 4]; 4]) -> Result<(), Error> {
+        let matrix = Affine::new(matrix)?;
+        let target = self.moved_body(body)?;
+        if !target.checked {
+            target.positions.check(body)?;
+        }
+        // The memory of end positions that no longer count is used again.
+        let unused = target.end.take_if(|_| !target.moves);
+        let mut end = unused.unwrap_or_else(|| f32::store(&[]));
+        matrix.write(target.rest_positions(), &mut end);
+        end.check(body)?;
+        target.set_end(end);
+        Ok(())
+    }
+}
+
+/// The positions, if they are of this precision.
+fn stored<R: Real>(body: BodyId, positions: &mut Positions) -> Result<&mut PositionRows<R>, Error> {
+    let stored = positions.precision();
+    R::stored(positions).ok_or(Error::WrongPrecision {
+        body,
+        stored,
+        asked: if stored == "f32" { "f64" } else { "f32" },
+    })
+}
+
+/// Stores checked positions. Memory of the body's own is reused.
+fn store(stored: &mut Positions, new: NewPositions<'_>) {
+    match new.0 {
+        Given::F32(rows) => copy(stored, rows),
+        Given::F64(rows) => copy(stored, rows),
+        Given::Whole(positions) => *stored = positions,
+    }
+}
+
+fn copy<R: Real>(stored: &mut Positions, rows: &[[R; 3]]) {
+    match R::stored(stored) {
+        Some(own) if own.len() == rows.len() => own.copy_from(rows),
+        _ => *stored = R::store(rows),
+    }
+}
