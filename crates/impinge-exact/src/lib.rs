@@ -49,7 +49,7 @@ mod triangle;
 mod tests;
 
 pub use distance::{
-    Closest, Feature, NearestFeatures, are_within, closest_points, edge_face_are_within,
+    Feature, NearestFeatures, NearestPoints, are_within, closest_points, edge_face_are_within,
     faces_are_within, first_within, nearest_features,
 };
 pub use element_pair::ElementPair;

@@ -19,7 +19,7 @@
 
 use core::cmp::Ordering;
 
-use crate::algebra::fixed::{Vector, cross, difference, dot};
+use crate::algebra::fixed::{WholeVector, cross, difference, dot};
 use crate::algebra::{Integer, common_integers, unit_of};
 use crate::distance::Feature;
 use crate::rounding::{two_product, two_sum};
@@ -114,7 +114,7 @@ pub fn meet(ray: &Ray, corners: &[Point]) -> Option<Meeting> {
     let (numbers, unit) = common_integers(numbers);
     let (direction, unit_of_direction) = common_integers(ray.direction);
     let exponent = unit - unit_of_direction;
-    let corners_from_origin: [Vector; 3] =
+    let corners_from_origin: [WholeVector; 3] =
         [3, 6, 9].map(|first| core::array::from_fn(|axis| &numbers[first + axis] - &numbers[axis]));
     let cast = Cast {
         direction,
@@ -256,7 +256,7 @@ impl Twice {
 }
 
 /// An axis along which a vector is not 0.
-fn axis_of(vector: &Vector) -> Option<usize> {
+fn axis_of(vector: &WholeVector) -> Option<usize> {
     vector.iter().position(|x| !x.is_zero())
 }
 
@@ -266,8 +266,8 @@ fn is_negative(x: &Integer) -> bool {
 
 /// A ray and an element in integers, relative to the origin of the ray.
 struct Cast {
-    direction: Vector,
-    corners: [Vector; 3],
+    direction: WholeVector,
+    corners: [WholeVector; 3],
     n_corners: usize,
     /// Values of t are multiples of 2^exponent.
     exponent: i64,
@@ -308,7 +308,7 @@ impl Cast {
     }
 
     /// A face that is not degenerate; its normal is not 0 along an axis.
-    fn face(&self, normal: &Vector, axis: usize) -> Option<At> {
+    fn face(&self, normal: &WholeVector, axis: usize) -> Option<At> {
         let [a, b, c] = &self.corners;
         let height = dot(a, normal);
         let slope = dot(&self.direction, normal);
@@ -334,10 +334,10 @@ impl Cast {
     }
 
     /// A ray in the plane of the face.
-    fn in_plane(&self, normal: &Vector, axis: usize) -> Option<At> {
+    fn in_plane(&self, normal: &WholeVector, axis: usize) -> Option<At> {
         let [a, b, c] = &self.corners;
         let is_reversed = is_negative(&normal[axis]);
-        let part = |p: &Vector, q: &Vector| {
+        let part = |p: &WholeVector, q: &WholeVector| {
             let [x, y, z] = cross(p, q);
             let part = [x, y, z][axis].clone();
             if is_reversed { -&part } else { part }

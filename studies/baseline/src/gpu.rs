@@ -19,7 +19,7 @@ use std::sync::Arc;
 
 use impinge_core::gpu::cells::Guest;
 use impinge_core::gpu::pass_buffers::Capacities;
-use impinge_core::host::gpu::Host;
+use impinge_core::host::gpu::GpuHost;
 use impinge_core::{BodyId, Query, Scene};
 
 use crate::{Counts, Error, Outcome, check_lambda};
@@ -53,7 +53,7 @@ impl Default for Settings {
 /// Parallel spatial hashing between two bodies on a GPU. Memory lives on the device and is reused.
 pub struct UniformGrid {
     settings: Settings,
-    host: Host,
+    host: GpuHost,
 }
 
 impl UniformGrid {
@@ -94,7 +94,7 @@ impl UniformGrid {
                 buffers.record(&kernels, owner_rule, recorder, lambda, cells)
             })
         });
-        let host = Host::new(device, settings.lambda, first, memory_budget, guest)?;
+        let host = GpuHost::new(device, settings.lambda, first, memory_budget, guest)?;
         Ok(UniformGrid { settings, host })
     }
 

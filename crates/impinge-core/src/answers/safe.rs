@@ -52,7 +52,7 @@ impl Bounds<'_> {
 /// The same input gives the same bytes on every method, backend, thread count and budget.
 #[derive(Clone, Default)]
 pub struct SafeDistances {
-    bodies: Vec<OfBody>,
+    bodies: Vec<BoundsOfBody>,
     /// Of all bodies, one after the other.
     singles: Vec<f32>,
     doubles: Vec<f64>,
@@ -65,7 +65,7 @@ pub struct SafeDistances {
 gives_back!(SafeDistances);
 
 #[derive(Debug, Clone, Copy)]
-struct OfBody {
+struct BoundsOfBody {
     id: BodyId,
     is_double: bool,
     first: usize,
@@ -111,7 +111,7 @@ impl SafeDistances {
                 self.singles.extend(own.map(round_down));
                 first
             };
-            self.bodies.push(OfBody {
+            self.bodies.push(BoundsOfBody {
                 id,
                 is_double,
                 first,
@@ -133,7 +133,7 @@ impl SafeDistances {
 
     /// Bytes of the answer.
     pub(crate) fn bytes(&self) -> u64 {
-        let bodies = size_of::<OfBody>() * self.bodies.capacity();
+        let bodies = size_of::<BoundsOfBody>() * self.bodies.capacity();
         let bounds = 4 * self.singles.capacity() + 8 * self.doubles.capacity();
         (bodies + bounds) as u64 + self.touching.bytes()
     }
@@ -143,7 +143,7 @@ impl SafeDistances {
     /// `most`, as has each vertex of a body that the query is not about.
     pub fn of(&self, body: BodyId) -> Option<Bounds<'_>> {
         let found = self.bodies.binary_search_by_key(&body, |of| of.id);
-        let OfBody {
+        let BoundsOfBody {
             is_double,
             first,
             n,

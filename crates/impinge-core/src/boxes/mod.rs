@@ -22,7 +22,7 @@ use vec4::{center_f32, extent};
 
 use crate::bvh::bounds::{Bounds, LaneBounds, greater, lesser, round_down, round_up};
 use crate::bvh::clusters::{Clustering, ToOrder};
-use crate::bvh::tree::Entry;
+use crate::bvh::tree::TreeEntry;
 use crate::bvh::{GROUP, made_from};
 use crate::scene::Body;
 use crate::scene::elements::{Elements, with_corners};
@@ -111,9 +111,9 @@ fn sizes(elements: &Elements, positions: &Positions) -> Option<Vec<u8>> {
 fn numbered<const N: usize>(
     elements: &[[u32; N]],
     center: impl Fn(&[u32; N]) -> [f32; 3] + Sync,
-) -> Vec<Entry> {
+) -> Vec<TreeEntry> {
     made_from(elements, |number, corners| {
-        Entry::new(center(corners), number as u32)
+        TreeEntry::new(center(corners), number as u32)
     })
 }
 

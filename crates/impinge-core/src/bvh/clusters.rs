@@ -15,7 +15,7 @@ use std::sync::OnceLock;
 use super::adjacency::Adjacency;
 use super::hubs::{self, Hubs};
 use super::rings::Rings;
-use super::tree::{Entry, GoOn, TreeShape, order_while};
+use super::tree::{GoOn, TreeEntry, TreeShape, order_while};
 use super::unique::{LocalCorners, Unique};
 use super::{GROUP, made_from};
 use crate::scene::elements::{Elements, with_corners};
@@ -48,7 +48,7 @@ pub(crate) struct Clustering {
 #[derive(Debug)]
 pub(crate) struct ToOrder {
     /// The centres of the elements' boxes.
-    pub centers: Vec<Entry>,
+    pub centers: Vec<TreeEntry>,
     /// Classes of sizes, if these differ much.
     pub sizes: Option<Vec<u8>>,
 }
@@ -253,7 +253,7 @@ fn with_sizes(
 
 /// The corners in the order of the entries, in their memory: the first use of new memory would take
 /// four times as long as this loop does.
-fn gather<const N: usize>(elements: &[[u32; N]], entries: Vec<Entry>) -> Vec<[u32; N]> {
+fn gather<const N: usize>(elements: &[[u32; N]], entries: Vec<TreeEntry>) -> Vec<[u32; N]> {
     let corners = entries
         .into_iter()
         .map(|entry| elements[entry.number as usize]);

@@ -116,18 +116,18 @@ pub(crate) struct Node {
 
 /// An entry to be ordered: a centre, and the number of what it stands for.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Entry {
+pub(crate) struct TreeEntry {
     /// The coordinates as integers in the same order, so that comparing needs no branch.
     keys: [u32; 3],
     pub number: u32,
 }
 
-impl Entry {
+impl TreeEntry {
     #[inline(always)]
     pub fn new(center: [f32; 3], number: u32) -> Self {
         // The order of `f32::total_cmp`: negative numbers are reversed and placed below all others.
         let key = |x: f32| x.to_bits() ^ (((x.to_bits() as i32) >> 31) as u32 | 1 << 31);
-        Entry {
+        TreeEntry {
             keys: center.map(key),
             number,
         }
@@ -153,7 +153,7 @@ pub(crate) fn order(
     shape: &TreeShape,
     leaf_size: usize,
     classes: Option<&[Option<u32>]>,
-    entries: &mut [Entry],
+    entries: &mut [TreeEntry],
 ) {
     order_while(&|| true, shape, leaf_size, classes, entries);
 }
@@ -164,7 +164,7 @@ pub(crate) fn order_while(
     shape: &TreeShape,
     leaf_size: usize,
     classes: Option<&[Option<u32>]>,
-    entries: &mut [Entry],
+    entries: &mut [TreeEntry],
 ) {
     debug_assert_eq!(shape.n_leaves, entries.len().div_ceil(leaf_size));
     if shape.n_levels() > 0 {
@@ -190,7 +190,13 @@ struct Split<'a> {
 
 impl Split<'_> {
     /// Splits the entries of a run of consecutive nodes; `first_leaf` is the run's first leaf.
-    fn nodes(&self, level: usize, nodes: Range<usize>, first_leaf: usize, entries: &mut [Entry]) {
+    fn nodes(
+        &self,
+        level: usize,
+        nodes: Range<usize>,
+        first_leaf: usize,
+        entries: &mut [TreeEntry],
+    ) {
         if nodes.len() == 1 {
             if level > 0 {
                 let children = self.shape.children(level, nodes.start);
@@ -226,7 +232,7 @@ impl Split<'_> {
 
 /// Moves the `cut` entries that are lowest along the widest axis to the front; lower classes come
 /// before higher ones. The two sets depend only on the input.
-fn split_at(entries: &mut [Entry], cut: usize, classes: Option<&[Option<u32>]>) {
+fn split_at(entries: &mut [TreeEntry], cut: usize, classes: Option<&[Option<u32>]>) {
     if cut == 0 || cut >= entries.len() {
         return;
     }
@@ -239,7 +245,7 @@ fn split_at(entries: &mut [Entry], cut: usize, classes: Option<&[Option<u32>]>) 
 }
 
 fn split_along<const AXIS: usize>(
-    entries: &mut [Entry],
+    entries: &mut [TreeEntry],
     cut: usize,
     classes: Option<&[Option<u32>]>,
 ) {
@@ -254,7 +260,7 @@ fn split_along<const AXIS: usize>(
 /// The axis on which a sample of the entries has the largest variance. The extent of all entries
 /// gives 3 % more pairs of clusters on scans, for a few outliers decide it, and takes four times as
 /// long.
-fn widest_axis(entries: &[Entry]) -> usize {
+fn widest_axis(entries: &[TreeEntry]) -> usize {
     let from = entries[0].center();
     let (mut sum, mut squares) = ([0.0; 3], [0.0; 3]);
     let sample = entries.iter().step_by(entries.len().div_ceil(SAMPLE));
@@ -300,10 +306,10 @@ mod tests {
     fn orders_are_permutations_even_of_equal_centers() {
         for n in [1usize, 63, 64, 65, 1000, 20_000] {
             let leaves = TreeShape::new(n.div_ceil(64));
-            let mut entries: Vec<Entry> = (0..n as u32)
+            let mut entries: Vec<TreeEntry> = (0..n as u32)
                 .map(|number| {
                     let center = [(number % 7) as f32, 0.0, f32::from(number % 3 == 0)];
-                    Entry::new(center, number)
+                    TreeEntry::new(center, number)
                 })
                 .collect();
             order(&leaves, 64, None, &mut entries);

@@ -67,14 +67,14 @@ pub(crate) struct Clusterings(Arc<Mutex<Entries>>);
 /// The clusterings that are known, by slot of the body.
 #[derive(Debug)]
 pub(crate) struct Entries {
-    slots: Vec<OfBody>,
+    slots: Vec<BodyClusterings>,
     recluster: Recluster,
     tuning: Tuning,
 }
 
 /// The clusterings of one body.
 #[derive(Debug, Default)]
-struct OfBody {
+struct BodyClusterings {
     /// The stamp of the topology that was clustered; 0 for none.
     topology_stamp: u64,
     parts: [Option<Arc<Clustering>>; PARTS],
@@ -268,7 +268,7 @@ impl Entries {
         for (slot, of_body) in self.slots.iter_mut().enumerate() {
             let body = scene.holds(slot).then(|| scene.body_in(slot as u32));
             if of_body.topology_stamp != body.map_or(0, Body::topology_stamp) {
-                *of_body = OfBody::default();
+                *of_body = BodyClusterings::default();
             }
         }
     }
@@ -313,13 +313,13 @@ impl Entries {
     fn put(&mut self, body_part: BodyPart<'_>, clustering: Arc<Clustering>) -> &Arc<Clustering> {
         let (slot, stamp) = (body_part.id.index(), body_part.body.topology_stamp());
         if self.slots.len() <= slot {
-            self.slots.resize_with(slot + 1, OfBody::default);
+            self.slots.resize_with(slot + 1, BodyClusterings::default);
         }
         let of_body = &mut self.slots[slot];
         if of_body.topology_stamp != stamp {
-            *of_body = OfBody {
+            *of_body = BodyClusterings {
                 topology_stamp: stamp,
-                ..OfBody::default()
+                ..BodyClusterings::default()
             };
         }
         #[cfg(feature = "gpu")]

@@ -4,7 +4,7 @@
 //! pair for signs and coordinates, `O(n log n)` for the names; both in parallel, in chunks whose
 //! results are concatenated in order.
 
-use super::coordinates::{Definition, Precision};
+use super::coordinates::{Definition, Rounding};
 use super::meet::{Local, ends, meet};
 use super::parts::ByBodies;
 use super::{Contacts, Doubles, Feature, PointName, Shape, lowest};
@@ -34,7 +34,7 @@ fn with_capacity<T>(n: usize) -> Result<Vec<T>, Error> {
 }
 
 pub(super) fn contacts(scene: &Scene, pairs: &Pairs, work: Work<'_>) -> Result<Contacts, Error> {
-    let bodies = Bodies::new(scene, pairs, work)?;
+    let bodies = ContactBodies::new(scene, pairs, work)?;
     let n = pairs.len();
     let mut rows: Vec<[u32; 4]> = sink::filled([0; 4], n, WHAT)?;
     let n_chunks = n.div_ceil(CHUNK);
@@ -129,7 +129,7 @@ fn numbers(met: &[ChunkContacts], names: &[PointName], work: Work<'_>) -> Result
 
 /// The point of each name.
 fn points(
-    bodies: &Bodies<'_>,
+    bodies: &ContactBodies<'_>,
     names: &[PointName],
     work: Work<'_>,
 ) -> Result<Vec<[f64; 3]>, Error> {
@@ -163,7 +163,7 @@ struct FoundContact {
 impl ChunkContacts {
     fn add(
         &mut self,
-        bodies: &Bodies<'_>,
+        bodies: &ContactBodies<'_>,
         &[body_a, a, body_b, b]: &[u32; 4],
     ) -> Result<(), Error> {
         let sides = [(body_a, a), (body_b, b)].map(|(body, face)| bodies.triangle(body, face));
@@ -224,7 +224,7 @@ impl Triangle {
 }
 
 /// The bodies of the pairs, by number.
-struct Bodies<'a> {
+struct ContactBodies<'a> {
     bodies: Vec<Option<Taking<'a>>>,
 }
 
@@ -234,7 +234,7 @@ struct Taking<'a> {
     doubles: Doubles,
 }
 
-impl<'a> Bodies<'a> {
+impl<'a> ContactBodies<'a> {
     fn new(scene: &'a Scene, pairs: &Pairs, work: Work<'_>) -> Result<Self, Error> {
         let mut bodies: Vec<Option<Taking<'a>>> = Vec::new();
         let mut colliding = pairs.all_colliding().into_iter().peekable();
@@ -249,7 +249,7 @@ impl<'a> Bodies<'a> {
                 doubles: doubles(body, &own, work)?,
             });
         }
-        Ok(Bodies { bodies })
+        Ok(ContactBodies { bodies })
     }
 
     /// The doubles of all bodies that have any.
@@ -281,12 +281,12 @@ impl<'a> Bodies<'a> {
         })
     }
 
-    fn precision(&self, bodies: [u32; 2]) -> Precision {
+    fn precision(&self, bodies: [u32; 2]) -> Rounding {
         let is_single = |body: u32| matches!(self.taking(body).body.positions(), Positions::F32(_));
         if bodies.into_iter().all(is_single) {
-            Precision::Single
+            Rounding::Single
         } else {
-            Precision::Double
+            Rounding::Double
         }
     }
 

@@ -9,7 +9,8 @@
 //!
 //! Everything is rounded, in one fixed order. Cost: `O(n)` per vertex that the polyhedron takes.
 
-use super::regions::{Vector, cross, dot, scaled, sub};
+use super::regions::{cross, dot, scaled, sub};
+use impinge_exact::Point;
 
 /// The shortest way that takes two convex bodies apart.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -27,7 +28,7 @@ pub struct ConvexOverlap {
 #[derive(Clone, Copy)]
 struct Face {
     corners: [usize; 3],
-    normal: Vector,
+    normal: Point,
     height: f64,
 }
 
@@ -40,7 +41,7 @@ const ROUNDING: f64 = 1e-12;
 /// The shortest way that takes the convex hulls of two sets of points apart; `None` if these are
 /// flat in sum, or empty.
 pub fn convex_overlap(a: &[[f64; 3]], b: &[[f64; 3]]) -> Option<ConvexOverlap> {
-    let farthest = |points: &[Vector], way: Vector| {
+    let farthest = |points: &[Point], way: Point| {
         let (mut best, mut most) = (None, f64::NEG_INFINITY);
         for (ix, &point) in points.iter().enumerate() {
             let height = dot(point, way);
@@ -50,7 +51,7 @@ pub fn convex_overlap(a: &[[f64; 3]], b: &[[f64; 3]]) -> Option<ConvexOverlap> {
         }
         best
     };
-    let support = |way: Vector| -> Option<Vector> {
+    let support = |way: Point| -> Option<Point> {
         let (i, j) = (farthest(a, way)?, farthest(b, scaled(way, -1.0))?);
         Some(sub(a[i], b[j]))
     };
@@ -70,7 +71,7 @@ pub fn convex_overlap(a: &[[f64; 3]], b: &[[f64; 3]]) -> Option<ConvexOverlap> {
     for corners in [[0, 1, 2], [0, 3, 1], [1, 3, 2], [2, 3, 0]] {
         faces.push(face(&points, corners)?);
     }
-    let mut best: Option<(f64, Vector)> = None;
+    let mut best: Option<(f64, Point)> = None;
     // Faces that were found to be faces of the whole.
     let mut is_final: Vec<[usize; 3]> = Vec::new();
     loop {
@@ -86,7 +87,7 @@ pub fn convex_overlap(a: &[[f64; 3]], b: &[[f64; 3]]) -> Option<ConvexOverlap> {
         }
         let point = support(nearest.normal)?;
         if dot(point, nearest.normal) - nearest.height <= noise || points.len() >= MOST {
-            let is_lower = |(height, normal): (f64, Vector)| {
+            let is_lower = |(height, normal): (f64, Point)| {
                 nearest.height < height - noise || rounded(nearest.normal) < rounded(normal)
             };
             if best.is_none_or(is_lower) {
@@ -122,38 +123,37 @@ pub fn convex_overlap(a: &[[f64; 3]], b: &[[f64; 3]]) -> Option<ConvexOverlap> {
 }
 
 /// The lowest of the points that are farthest along a way, but for rounding.
-fn farthest_of_tied(points: &[Vector], way: Vector, noise: f64) -> Option<usize> {
+fn farthest_of_tied(points: &[Point], way: Point, noise: f64) -> Option<usize> {
     let heights = || points.iter().map(|&point| dot(point, way));
     let most = heights().reduce(f64::max)?;
     heights().position(|height| height >= most - noise)
 }
 
 /// Without the noise that would decide which of two equal normals is lower.
-fn rounded(normal: Vector) -> [i64; 3] {
+fn rounded(normal: Point) -> [i64; 3] {
     normal.map(|x| (x * 1e9).round() as i64)
 }
 
 /// A tetrahedron of far points that turns outwards.
 fn first_corners(
-    ends: &[Vector; 6],
-    support: impl Fn(Vector) -> Option<Vector>,
+    ends: &[Point; 6],
+    support: impl Fn(Point) -> Option<Point>,
     size: f64,
-) -> Option<Vec<Vector>> {
-    let length = |p: Vector| dot(p, p).sqrt();
-    let farther =
-        |x: Vector, y: Vector, of: &dyn Fn(Vector) -> f64| if of(y) > of(x) { y } else { x };
+) -> Option<Vec<Point>> {
+    let length = |p: Point| dot(p, p).sqrt();
+    let farther = |x: Point, y: Point, of: &dyn Fn(Point) -> f64| if of(y) > of(x) { y } else { x };
     let p = ends[0];
     let q = ends
         .iter()
         .fold(p, |far, &end| farther(far, end, &|x| length(sub(x, p))));
     let along = sub(q, p);
-    let away = |x: Vector| length(cross(along, sub(x, p)));
+    let away = |x: Point| length(cross(along, sub(x, p)));
     let r = ends.iter().fold(p, |far, &end| farther(far, end, &away));
     let normal = cross(along, sub(r, p));
     if length(normal) <= 1e-9 * size * size {
         return None;
     }
-    let above = |x: Vector| dot(normal, sub(x, p)).abs();
+    let above = |x: Point| dot(normal, sub(x, p)).abs();
     let s = farther(support(normal)?, support(scaled(normal, -1.0))?, &above);
     let height = dot(normal, sub(s, p));
     if height.abs() <= 1e-9 * size * length(normal) {
@@ -166,7 +166,7 @@ fn first_corners(
     })
 }
 
-fn face(points: &[Vector], corners: [usize; 3]) -> Option<Face> {
+fn face(points: &[Point], corners: [usize; 3]) -> Option<Face> {
     let [p, q, r] = corners.map(|ix| points[ix]);
     let normal = cross(sub(q, p), sub(r, p));
     let length = dot(normal, normal).sqrt();
@@ -186,7 +186,7 @@ mod tests {
     use super::*;
     use impinge_scenes::{Random, surfaces};
 
-    fn points(model: &impinge_scenes::Model, by: Vector) -> Vec<Vector> {
+    fn points(model: &impinge_scenes::Model, by: Point) -> Vec<Point> {
         let moved = model.positions_f64().into_iter();
         moved
             .map(|point| [0, 1, 2].map(|k| point[k] + by[k]))
@@ -226,7 +226,7 @@ mod tests {
     fn it_is_the_shortest_way() {
         let mut random = Random::new(5);
         for _ in 0..200 {
-            let mut some = |n: u32| -> Vec<Vector> {
+            let mut some = |n: u32| -> Vec<Point> {
                 (0..n)
                     .map(|_| random.point(-1.0, 1.0).map(f64::from))
                     .collect()
@@ -236,8 +236,8 @@ mod tests {
             if found.depth == 0.0 {
                 continue;
             }
-            let apart = |way: Vector| {
-                let of = |points: &[Vector], way: Vector| {
+            let apart = |way: Point| {
+                let of = |points: &[Point], way: Point| {
                     points.iter().map(|&p| dot(p, way)).fold(f64::MIN, f64::max)
                 };
                 of(&a, way) + of(&b, scaled(way, -1.0))

@@ -21,7 +21,7 @@ use impinge_exact::internal::{Integer, Projection, unit_of};
 
 /// The precision to which coordinates are rounded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub(super) enum Precision {
+pub(super) enum Rounding {
     /// 24 bits.
     Single,
     /// 53 bits.
@@ -41,7 +41,7 @@ pub(super) enum Definition {
 impl Definition {
     /// The coordinates, rounded to nearest, ties to even. A vertex has the coordinates that it was
     /// given.
-    pub fn rounded(&self, precision: Precision) -> Point {
+    pub fn rounded(&self, precision: Rounding) -> Point {
         let rounded = match self {
             Definition::Vertex(point) => *point,
             Definition::OnPlane(ends, plane) => {
@@ -166,7 +166,7 @@ impl Offset {
     }
 }
 
-fn crossing(ends: &[Point; 2], offsets: [Offset; 2], precision: Precision) -> Point {
+fn crossing(ends: &[Point; 2], offsets: [Offset; 2], precision: Rounding) -> Point {
     in_single(ends, offsets, precision)
         .or_else(|| in_double(ends, offsets, precision))
         .unwrap_or_else(|| in_integers(ends, offsets, precision))
@@ -189,8 +189,8 @@ const ERROR_F64: f64 = 8.0 * f64::EPSILON / 2.0;
 ///
 /// With P and Q known to ε each, the weight P / (P + Q) is known to ε / (P + Q), since both have
 /// one sign.
-fn in_single(ends: &[Point; 2], offsets: [Offset; 2], precision: Precision) -> Option<Point> {
-    if precision != Precision::Single {
+fn in_single(ends: &[Point; 2], offsets: [Offset; 2], precision: Rounding) -> Option<Point> {
+    if precision != Rounding::Single {
         return None;
     }
     let permanent = greatest(offsets, precision)?;
@@ -210,7 +210,7 @@ fn in_single(ends: &[Point; 2], offsets: [Offset; 2], precision: Precision) -> O
 }
 
 /// Stage 2: the same in sums of two `f64`.
-fn in_double(ends: &[Point; 2], offsets: [Offset; 2], precision: Precision) -> Option<Point> {
+fn in_double(ends: &[Point; 2], offsets: [Offset; 2], precision: Rounding) -> Option<Point> {
     // Each determinant has a depth of eight operations.
     const ERROR: f64 = 16.0 * double::ERROR;
     let permanent = greatest(offsets, precision)?;
@@ -230,20 +230,20 @@ fn in_double(ends: &[Point; 2], offsets: [Offset; 2], precision: Precision) -> O
         let error = size * (weight_error + ERROR) + 4.0 * f64::EPSILON * x.low.abs();
         let (below, above) = (x.high + (x.low - error), x.high + (x.low + error));
         point[axis] = match precision {
-            Precision::Single => single_between(below, above)?,
-            Precision::Double => (below == above).then_some(below)?,
+            Rounding::Single => single_between(below, above)?,
+            Rounding::Double => (below == above).then_some(below)?,
         };
     }
     Some(point)
 }
 
 /// The larger permanent; `None` unless sizes are safe.
-fn greatest(offsets: [Offset; 2], precision: Precision) -> Option<f64> {
+fn greatest(offsets: [Offset; 2], precision: Rounding) -> Option<f64> {
     let [p, q] = offsets.map(|offset| offset.permanent());
     let greatest = p.max(q);
     let is_safe = match precision {
-        Precision::Single => SAFE.contains(&greatest),
-        Precision::Double => {
+        Rounding::Single => SAFE.contains(&greatest),
+        Rounding::Double => {
             SAFE_DOUBLE.contains(&greatest) && offsets.iter().all(|offset| offset.size() <= LARGEST)
         }
     };
@@ -258,7 +258,7 @@ fn single_between(below: f64, above: f64) -> Option<f64> {
 }
 
 /// Stage 3: all coordinates as multiples of one power of two.
-fn in_integers(ends: &[Point; 2], offsets: [Offset; 2], precision: Precision) -> Point {
+fn in_integers(ends: &[Point; 2], offsets: [Offset; 2], precision: Rounding) -> Point {
     let unit = offsets
         .iter()
         .flat_map(Offset::coordinates)
@@ -269,8 +269,8 @@ fn in_integers(ends: &[Point; 2], offsets: [Offset; 2], precision: Precision) ->
     let [p, q] = offsets.map(|offset| offset.exact(unit).abs());
     let sum = &p + &q;
     let (bits, lowest) = match precision {
-        Precision::Single => (24, -149),
-        Precision::Double => (53, -1074),
+        Rounding::Single => (24, -149),
+        Rounding::Double => (53, -1074),
     };
     [0, 1, 2].map(|axis| {
         let [from, to] = ends.map(|end| Integer::of_multiple(end[axis], unit));
@@ -285,7 +285,7 @@ fn in_integers(ends: &[Point; 2], offsets: [Offset; 2], precision: Precision) ->
 mod tests {
     use super::*;
 
-    fn stages(definition: &Definition, precision: Precision) -> [Option<Point>; 3] {
+    fn stages(definition: &Definition, precision: Rounding) -> [Option<Point>; 3] {
         let (ends, offsets) = match definition {
             Definition::Vertex(_) => unreachable!(),
             Definition::OnPlane(ends, plane) => (ends, ends.map(|end| Offset::Plane(end, *plane))),
@@ -305,12 +305,12 @@ mod tests {
         let mut sure = [0usize; 2];
         let mut n = 0usize;
         for round in 0..6_000 {
-            let precision = [Precision::Single, Precision::Double][round % 2];
+            let precision = [Rounding::Single, Rounding::Double][round % 2];
             let scale = [1.0, 1e-3, 1e12, 1e-25][round / 2 % 4];
             let mut point = || {
                 random.point(-1.0, 1.0).map(|x| match precision {
-                    Precision::Single => f64::from(x * scale as f32),
-                    Precision::Double => f64::from(x) * 1.1 * scale,
+                    Rounding::Single => f64::from(x * scale as f32),
+                    Rounding::Double => f64::from(x) * 1.1 * scale,
                 })
             };
             let definition = match round % 6 {

@@ -33,7 +33,7 @@ pub(super) type Corner = [Local; 2];
 
 /// The intersection of two triangles.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Meeting {
+pub(super) struct TriangleMeeting {
     corners: [Corner; MOST_CORNERS],
     n_corners: usize,
     /// Whether a segment leads in the direction of the product of the two normals.
@@ -43,8 +43,8 @@ pub(super) struct Meeting {
 /// Two coplanar triangles meet in a hexagon at most.
 const MOST_CORNERS: usize = 6;
 
-impl Meeting {
-    const EMPTY: Self = Meeting {
+impl TriangleMeeting {
+    const EMPTY: Self = TriangleMeeting {
         corners: [[Local::Face; 2]; MOST_CORNERS],
         n_corners: 0,
         directed: false,
@@ -213,13 +213,13 @@ fn feature_by_sides(sides: [Sign; 3], inside: Sign) -> Option<Local> {
 }
 
 /// The intersection of two closed triangles.
-pub(super) fn meet(a: &[Point; 3], b: &[Point; 3]) -> Meeting {
+pub(super) fn meet(a: &[Point; 3], b: &[Point; 3]) -> TriangleMeeting {
     let hulls = [ConvexTriangle::new(a), ConvexTriangle::new(b)];
     let heights = [
         heights(&hulls[1], hulls[0].points),
         heights(&hulls[0], hulls[1].points),
     ];
-    let mut meeting = Meeting::EMPTY;
+    let mut meeting = TriangleMeeting::EMPTY;
     for side in 0..2 {
         let one = One {
             hull: &hulls[side],
@@ -228,7 +228,7 @@ pub(super) fn meet(a: &[Point; 3], b: &[Point; 3]) -> Meeting {
             side,
         };
         if one.is_clear() {
-            return Meeting::EMPTY;
+            return TriangleMeeting::EMPTY;
         }
         one.find(&mut meeting);
     }
@@ -274,7 +274,7 @@ impl One<'_> {
     }
 
     /// Finds the corners at its vertices and along its edges.
-    fn find(&self, meeting: &mut Meeting) {
+    fn find(&self, meeting: &mut TriangleMeeting) {
         let (vertices, n) = self.hull.vertices();
         for &vertex in &vertices[..n] {
             let there = self
@@ -330,7 +330,11 @@ fn edges_cross([p, q]: [&Point; 2], [r, s]: [&Point; 2]) -> bool {
 
 /// Names a corner at the middle corner of a flat triangle by that vertex, not by the edge: the
 /// triangle's neighbours name it by the vertex too.
-fn name_middles(hulls: &[ConvexTriangle<'_>; 2], heights: [[Sign; 3]; 2], meeting: &mut Meeting) {
+fn name_middles(
+    hulls: &[ConvexTriangle<'_>; 2],
+    heights: [[Sign; 3]; 2],
+    meeting: &mut TriangleMeeting,
+) {
     for side in 0..2 {
         let Degeneracy::Segment {
             middle: Some(middle),
@@ -340,7 +344,7 @@ fn name_middles(hulls: &[ConvexTriangle<'_>; 2], heights: [[Sign; 3]; 2], meetin
             continue;
         };
         let there = hulls[1 - side].locate(&hulls[side].points[middle], heights[side][middle]);
-        let found = std::mem::replace(meeting, Meeting::EMPTY);
+        let found = std::mem::replace(meeting, TriangleMeeting::EMPTY);
         for &corner in found.corners() {
             let mut corner = corner;
             // The edge and the other feature have only this corner in common, and the middle is in
@@ -358,7 +362,7 @@ fn name_middles(hulls: &[ConvexTriangle<'_>; 2], heights: [[Sign; 3]; 2], meetin
 /// The line of both planes enters triangle a where a's boundary goes up through b's plane, and
 /// leaves a where the boundary goes down; for b it is the other way round. (With d = n_a × n_b and
 /// an edge e of a, n_a × e leads into a, and d · (n_a × e) = |n_a|² (n_b · e).)
-fn direct(hulls: &[ConvexTriangle<'_>; 2], heights: [[Sign; 3]; 2], meeting: &mut Meeting) {
+fn direct(hulls: &[ConvexTriangle<'_>; 2], heights: [[Sign; 3]; 2], meeting: &mut TriangleMeeting) {
     if !hulls.iter().all(ConvexTriangle::is_triangle) {
         return;
     }
@@ -390,7 +394,7 @@ fn direct(hulls: &[ConvexTriangle<'_>; 2], heights: [[Sign; 3]; 2], meeting: &mu
 /// Every side of the polygon lies on an edge of one of the triangles. The line of an edge holds two
 /// corners if a side lies on it, and fewer otherwise. So two corners are neighbours if and only if
 /// some edge has both.
-fn order(hulls: &[ConvexTriangle<'_>; 2], meeting: &mut Meeting) {
+fn order(hulls: &[ConvexTriangle<'_>; 2], meeting: &mut TriangleMeeting) {
     let found = *meeting;
     let n = found.n_corners;
     let are_neighbours = |i: usize, j: usize| {
@@ -420,7 +424,7 @@ fn is_on(feature: Local, edge: usize) -> bool {
 }
 
 /// Two neighbouring corners in counter-clockwise order.
-fn first_side(hulls: &[ConvexTriangle<'_>; 2], found: &Meeting) -> Option<(usize, usize)> {
+fn first_side(hulls: &[ConvexTriangle<'_>; 2], found: &TriangleMeeting) -> Option<(usize, usize)> {
     let Degeneracy::Triangle { projection, turn } = hulls[0].shape else {
         return None;
     };

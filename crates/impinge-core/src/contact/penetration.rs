@@ -19,7 +19,7 @@ use std::collections::HashMap;
 use super::curves::Curves;
 use super::inside::{Asked, ConnectedParts};
 use super::regions::{
-    NO_REGION, Region, Vector, WHAT, add, cross, dot, join_contacts, regions, scaled, sub,
+    NO_REGION, Region, WHAT, add, cross, dot, join_contacts, regions, scaled, sub,
 };
 use super::topology::EdgesAround;
 use super::{Contacts, Feature, PointName, Shape};
@@ -31,7 +31,7 @@ use crate::scene::{Body, Scene};
 use crate::search::sets::Sets;
 use crate::search::sink::grow;
 use crate::search::work::Work;
-use impinge_exact::{Sign, orient3d};
+use impinge_exact::{Point, Sign, orient3d};
 
 /// The topologies of closed bodies, from call to call.
 #[derive(Debug, Default)]
@@ -156,14 +156,14 @@ impl Topologies {
 }
 
 /// The two vertices of an edge, lower first where it is a name.
-type Edge = [VertexIx; 2];
+type EdgeVertices = [VertexIx; 2];
 
 /// The points of contact on the edges and vertices of one body.
 struct Crossings<'a> {
     contacts: &'a Contacts,
     body: u32,
     /// Edges with the points on them, sorted.
-    on_edges: Vec<(Edge, u32)>,
+    on_edges: Vec<(EdgeVertices, u32)>,
     /// Vertices on the other surface, sorted.
     on_vertices: Vec<VertexIx>,
     /// Whether any edge at a vertex is crossed.
@@ -227,13 +227,13 @@ impl<'a> Crossings<'a> {
         self.is_touched.get(lowest.index()) == Some(&true)
     }
 
-    fn name(&self, edge: Edge) -> Edge {
+    fn name(&self, edge: EdgeVertices) -> EdgeVertices {
         let mut name = edge.map(|vertex| self.lowest(vertex));
         name.sort_unstable();
         name
     }
 
-    fn is_crossed(&self, edge: Edge) -> bool {
+    fn is_crossed(&self, edge: EdgeVertices) -> bool {
         let [low, high] = self.name(edge);
         if !(self.is_touched_by_name(low) && self.is_touched_by_name(high)) {
             return false;
@@ -250,9 +250,9 @@ impl<'a> Crossings<'a> {
 /// A piece of an edge that is inside the other body, from the end nearer to the lower vertex, and a
 /// member of its region's set.
 struct Piece {
-    edge: Edge,
-    from: Vector,
-    to: Vector,
+    edge: EdgeVertices,
+    from: Point,
+    to: Point,
     node: u32,
 }
 
@@ -319,7 +319,7 @@ impl OverlapWork<'_> {
         Some((self.contacts.points().len() + n_before) as u32 + part)
     }
 
-    fn position(&self, side: usize, vertex: VertexIx) -> Vector {
+    fn position(&self, side: usize, vertex: VertexIx) -> Point {
         self.bodies[side].positions().point(vertex.index())
     }
 
@@ -355,7 +355,7 @@ impl OverlapWork<'_> {
     }
 
     /// Puts points in their order along an edge.
-    fn sort_along(&self, side: usize, edge: Edge, points: &mut [u32]) {
+    fn sort_along(&self, side: usize, edge: EdgeVertices, points: &mut [u32]) {
         let [from, to] = edge.map(|vertex| self.position(side, vertex));
         let along = sub(to, from);
         let axis = (1..3).fold(0, |best, k| {
@@ -372,7 +372,12 @@ impl OverlapWork<'_> {
 
     /// The pieces of one edge that are inside, each with the two set members that it joins; `None`
     /// if the edge does not just cross faces.
-    fn cut(&self, side: usize, edge: Edge, points: &[u32]) -> Option<Vec<(Piece, [u32; 2])>> {
+    fn cut(
+        &self,
+        side: usize,
+        edge: EdgeVertices,
+        points: &[u32],
+    ) -> Option<Vec<(Piece, [u32; 2])>> {
         let [low, high] = edge;
         let crossings = &self.crossings[side];
         if crossings.is_on(low) || crossings.is_on(high) {
@@ -440,7 +445,7 @@ impl OverlapWork<'_> {
     }
 
     /// How far a region extends along a direction.
-    fn extent(&self, region: &Region, normal: Vector) -> f64 {
+    fn extent(&self, region: &Region, normal: Point) -> f64 {
         let corners = region.contacts.iter().flat_map(|&contact| {
             let corners = self.contacts.corners(contact as usize).iter();
             corners.map(|&point| self.contacts.points()[point as usize])
@@ -466,12 +471,12 @@ impl OverlapWork<'_> {
         pieces: &[Vec<Piece>; 2],
         region: &mut dyn FnMut(u32) -> usize,
     ) -> Vec<f64> {
-        let origins: Vec<Vector> = regions
+        let origins: Vec<Point> = regions
             .iter()
             .map(|region| scaled(add(region.bounds[0], region.bounds[1]), 0.5))
             .collect();
         let mut volumes = vec![0.0; regions.len()];
-        let mut add_side = |at: usize, on: Vector, from: Vector, to: Vector| {
+        let mut add_side = |at: usize, on: Point, from: Point, to: Point| {
             let [x, p, q] = [on, from, to].map(|point| sub(point, origins[at]));
             volumes[at] += dot(x, cross(p, q)) / 6.0;
         };

@@ -15,6 +15,7 @@ use super::{Contacts, Shape};
 use crate::scene::error::Error;
 use crate::search::sets::Sets;
 use crate::search::sink::{filled, grow};
+use impinge_exact::Point;
 
 /// What memory is for.
 pub(super) const WHAT: &str = "regions of contact";
@@ -81,28 +82,26 @@ pub(super) fn join_contacts(contacts: &Contacts, sets: &mut Sets) {
     }
 }
 
-pub(super) type Vector = [f64; 3];
-
-pub(super) fn sub(p: Vector, q: Vector) -> Vector {
+pub(super) fn sub(p: Point, q: Point) -> Point {
     [0, 1, 2].map(|k| p[k] - q[k])
 }
 
-pub(super) fn add(p: Vector, q: Vector) -> Vector {
+pub(super) fn add(p: Point, q: Point) -> Point {
     [0, 1, 2].map(|k| p[k] + q[k])
 }
 
-pub(super) fn scaled(p: Vector, factor: f64) -> Vector {
+pub(super) fn scaled(p: Point, factor: f64) -> Point {
     p.map(|x| x * factor)
 }
 
-pub(super) fn cross(p: Vector, q: Vector) -> Vector {
+pub(super) fn cross(p: Point, q: Point) -> Point {
     [0, 1, 2].map(|k| {
         let (i, j) = ((k + 1) % 3, (k + 2) % 3);
         p[i] * q[j] - p[j] * q[i]
     })
 }
 
-pub(super) fn dot(p: Vector, q: Vector) -> f64 {
+pub(super) fn dot(p: Point, q: Point) -> f64 {
     p[0] * q[0] + p[1] * q[1] + p[2] * q[2]
 }
 
@@ -134,7 +133,7 @@ pub(super) fn regions(
         let (region, middle) = (&mut regions[at], &mut middles[at]);
         grow(&mut region.contacts, 1, WHAT)?;
         region.contacts.push(contact as u32);
-        let points: Vec<Vector> = corners
+        let points: Vec<Point> = corners
             .iter()
             .map(|&point| contacts.points()[point as usize])
             .collect();
@@ -183,17 +182,17 @@ pub(super) const NO_REGION: u32 = u32::MAX;
 /// A weighted sum of positions.
 #[derive(Default)]
 struct Sum {
-    place: Vector,
+    place: Point,
     weight: f64,
 }
 
 impl Sum {
-    fn take(&mut self, place: Vector, weight: f64) {
+    fn take(&mut self, place: Point, weight: f64) {
         self.place = add(self.place, scaled(place, weight));
         self.weight += weight;
     }
 
-    fn middle(&self) -> Option<Vector> {
+    fn middle(&self) -> Option<Point> {
         (self.weight > 0.0).then(|| scaled(self.place, 1.0 / self.weight))
     }
 }
@@ -205,7 +204,7 @@ struct Middles {
     patches: Sum,
     points: Sum,
     /// The area of all patches as a vector.
-    patch: Vector,
+    patch: Point,
 }
 
 impl Default for Middles {
@@ -221,7 +220,7 @@ impl Default for Middles {
 }
 
 impl Region {
-    pub(super) fn at(bodies: [u32; 2], point: Vector) -> Self {
+    pub(super) fn at(bodies: [u32; 2], point: Point) -> Self {
         Region {
             bodies,
             contacts: Vec::new(),
@@ -238,7 +237,7 @@ impl Region {
     }
 
     /// Extends the bounds.
-    pub(super) fn cover(&mut self, point: Vector) {
+    pub(super) fn cover(&mut self, point: Point) {
         let [low, high] = &mut self.bounds;
         for k in 0..3 {
             low[k] = low[k].min(point[k]);
@@ -269,7 +268,7 @@ impl Region {
             .or_else(|| middles.points.middle())
             .unwrap_or(self.position);
         let noise = self.noise(is_single);
-        let normal = |area: Vector| {
+        let normal = |area: Point| {
             let length = dot(area, area).sqrt();
             (length > noise).then(|| scaled(area, -1.0 / length))
         };

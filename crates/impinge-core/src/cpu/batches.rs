@@ -18,7 +18,7 @@ use crate::workers::clock::Instant;
 use super::lane_pairs::WorkItem;
 use super::pairing::{self, Worker};
 use super::top_level::TopLevel;
-use super::traversal::{self, NodePair, Tree};
+use super::traversal::{self, BodyTree, NodePair};
 use super::world::World;
 use crate::simd::{Isa, Simd, with_isa};
 
@@ -61,7 +61,7 @@ pub(crate) trait BatchStages: Copy + Sync {
     type Answer: Ending;
 
     /// The tree over the clusters of a part.
-    fn tree(&self, part: PartIx) -> Tree<'_>;
+    fn tree(&self, part: PartIx) -> BodyTree<'_>;
 
     /// Pairs the elements of some work items, and decides the candidates.
     fn pair<S: Simd>(self, simd: S, isa: Isa, items: &[WorkItem], worker: &mut Self::Worker);
@@ -114,7 +114,7 @@ impl<'a> BatchStages for World<'a> {
     type Answer = &'a Arc<Answer>;
 
     #[inline(always)]
-    fn tree(&self, part: PartIx) -> Tree<'_> {
+    fn tree(&self, part: PartIx) -> BodyTree<'_> {
         self.cache(part).tree()
     }
 

@@ -193,7 +193,7 @@ impl Cells {
         let items = size_of::<CellItem>() * self.items.capacity();
         answer.share(self.bytes() - items as u64 + batch_bytes(settings));
         answer.check()?;
-        let task = Task {
+        let task = CellsTask {
             job,
             answer,
             world: World::new(job.scene, job.plan),
@@ -296,7 +296,7 @@ impl Cells {
     /// Makes the work items of all cells, one batch at a time.
     fn traverse_items<R: Rule>(
         &mut self,
-        task: Task<'_, R>,
+        task: CellsTask<'_, R>,
         grid: Grid,
         settings: &Settings,
         stats: &mut Stats,
@@ -379,20 +379,20 @@ fn batch_bytes(settings: &Settings) -> u64 {
 }
 
 /// A frame and the rule for its pairs.
-struct Task<'a, R> {
+struct CellsTask<'a, R> {
     job: Job<'a>,
     answer: &'a Answer,
     world: World<'a>,
     rule: &'a R,
 }
 
-impl<R> Clone for Task<'_, R> {
+impl<R> Clone for CellsTask<'_, R> {
     fn clone(&self) -> Self {
         *self
     }
 }
 
-impl<R> Copy for Task<'_, R> {}
+impl<R> Copy for CellsTask<'_, R> {}
 
 /// Calls back for each coarse cell of a range.
 #[inline(always)]
@@ -492,11 +492,11 @@ fn pair<R: Rule>(
     lists: Lists<'_>,
     items: &[CellItem],
     scratches: &mut [Decider],
-    task: Task<'_, R>,
+    task: CellsTask<'_, R>,
     (done, total): (u64, u64),
 ) -> Result<f64, Error> {
     let start = Instant::now();
-    let Task {
+    let CellsTask {
         job, answer, rule, ..
     } = task;
     let Job {

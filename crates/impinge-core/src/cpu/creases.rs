@@ -403,7 +403,7 @@ fn is_below(axis: usize, arm: &[f64; 3]) -> bool {
 mod tests {
     use super::*;
     use crate::bvh::clusters::ToOrder;
-    use crate::bvh::tree::Entry;
+    use crate::bvh::tree::TreeEntry;
     use crate::query::settings::InstructionSet;
     use crate::scene::index::Slot;
 
@@ -412,7 +412,9 @@ mod tests {
         let elements = Elements::from(faces.to_vec());
         let numbers = 0..faces.len() as u32;
         let to_order = ToOrder {
-            centers: numbers.map(|number| Entry::new([0.0; 3], number)).collect(),
+            centers: numbers
+                .map(|number| TreeEntry::new([0.0; 3], number))
+                .collect(),
             sizes: None,
         };
         let clustering = Clustering::new(&elements, to_order, false, &|| true).expect("it goes on");

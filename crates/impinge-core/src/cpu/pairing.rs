@@ -120,7 +120,7 @@ pub(crate) fn run<S: Simd>(
             Some((Side::A, to)) => [lanes_up_to(world, item.a, item.cluster_a, to), u64::MAX],
             Some((Side::B, to)) => [u64::MAX, lanes_up_to(world, item.b, item.cluster_b, to)],
         };
-        let Some(Culled { slots, lanes }) = cull(simd, world, item, wanted, groups) else {
+        let Some(CulledItem { slots, lanes }) = cull(simd, world, item, wanted, groups) else {
             continue;
         };
         let groups = slots.map(|slot| groups.at(slot));
@@ -173,7 +173,7 @@ pub(crate) fn run<S: Simd>(
 
 /// The slots of a work item's groups, and the lanes of each that meet the intersection of the two
 /// clusters' boxes.
-struct Culled {
+struct CulledItem {
     slots: [usize; 2],
     lanes: [u64; 2],
 }
@@ -197,7 +197,7 @@ fn cull<S: Simd>(
     item: &WorkItem,
     wanted: [u64; 2],
     groups: &mut GroupCache<Group>,
-) -> Option<Culled> {
+) -> Option<CulledItem> {
     const NOWHERE: usize = usize::MAX;
     let sides = [(item.a, item.cluster_a), (item.b, item.cluster_b)];
     let caches = [world.cache(item.a), world.cache(item.b)];
@@ -224,7 +224,7 @@ fn cull<S: Simd>(
             return None;
         }
     }
-    Some(Culled { slots, lanes })
+    Some(CulledItem { slots, lanes })
 }
 
 /// Finds the pairs of lanes whose boxes overlap: one mask per row, which is a lane of the side that

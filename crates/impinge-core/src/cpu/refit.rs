@@ -40,7 +40,7 @@ const RUNS: usize = 256;
 /// Tasks and results of the stage; kept from frame to frame.
 #[derive(Default)]
 pub(super) struct Refit {
-    tasks: Vec<Task>,
+    tasks: Vec<RefitTask>,
     /// The result of each task.
     found: Vec<Mutex<FoundBoxes>>,
 }
@@ -58,7 +58,7 @@ enum What {
 }
 
 #[derive(Debug, Clone, Copy)]
-struct Task {
+struct RefitTask {
     part: PartIx,
     what: What,
     first: u32,
@@ -183,7 +183,7 @@ impl Refit {
             }
         };
         let step = workers.task(step);
-        let tasks = (0..n).step_by(step).map(|first| Task {
+        let tasks = (0..n).step_by(step).map(|first| RefitTask {
             part,
             what,
             first: first as u32,
@@ -225,7 +225,7 @@ impl Refit {
         let work = |_: &mut Worker, ix: usize| {
             let result = with_isa!(isa, work, (
                 world: World<'_> = world,
-                task: Task = tasks[ix],
+                task: RefitTask = tasks[ix],
             ) -> FoundBoxes);
             *found[ix].lock().unwrap_or_else(PoisonError::into_inner) = result;
         };
@@ -306,7 +306,7 @@ impl FoundBoxes {
 
 /// Does one task.
 #[inline(always)]
-fn work<S: Simd>(simd: S, world: World<'_>, task: Task) -> FoundBoxes {
+fn work<S: Simd>(simd: S, world: World<'_>, task: RefitTask) -> FoundBoxes {
     let positions = world.body(task.part).positions;
     let cache = world.cache(task.part);
     let (clustering, run) = (&cache.clustering, task.first as usize..task.end as usize);

@@ -1,13 +1,13 @@
 //! Which bodies' boxes meet, for frames of more than two bodies.
 
 use crate::bvh::bounds::Bounds;
-use crate::bvh::tree::{Entry, Node, TreeShape, order};
+use crate::bvh::tree::{Node, TreeEntry, TreeShape, order};
 use crate::clusterings::Fit;
 use crate::query::tuning::Tuning;
 use crate::scene::index::PartIx;
 
 use super::bounds::TreeBounds;
-use super::traversal::{self, NodePair, Tree};
+use super::traversal::{self, BodyTree, NodePair};
 use crate::simd::Simd;
 
 /// A tree over the parts' boxes, for frames of more than two bodies. Its order is kept from
@@ -17,7 +17,7 @@ pub(crate) struct TopLevel {
     shape: TreeShape,
     order: Vec<PartIx>,
     bounds: TreeBounds,
-    entries: Vec<Entry>,
+    entries: Vec<TreeEntry>,
     fit: Fit,
 }
 
@@ -54,8 +54,8 @@ impl TopLevel {
     }
 
     #[inline(always)]
-    fn tree(&self) -> Tree<'_> {
-        Tree {
+    fn tree(&self) -> BodyTree<'_> {
+        BodyTree {
             shape: &self.shape,
             bounds: &self.bounds,
         }
@@ -93,7 +93,7 @@ impl TopLevel {
     pub fn bytes(&self) -> usize {
         self.shape.bytes()
             + size_of_val(&self.order[..])
-            + size_of::<Entry>() * self.entries.capacity()
+            + size_of::<TreeEntry>() * self.entries.capacity()
             + self.bounds.bytes()
     }
 
@@ -108,8 +108,9 @@ impl TopLevel {
         self.refit_boxes(&root);
         if self.fit.is_stale(self.spread(), tuning) || is_new {
             self.entries.clear();
-            self.entries
-                .extend(PartIx::up_to(n).map(|part| Entry::new(root(part).center(), part.raw())));
+            self.entries.extend(
+                PartIx::up_to(n).map(|part| TreeEntry::new(root(part).center(), part.raw())),
+            );
             order(&self.shape, 1, None, &mut self.entries);
             for (part, entry) in self.order.iter_mut().zip(&self.entries) {
                 *part = PartIx::new(entry.number);

@@ -15,12 +15,12 @@ use crate::simd::Simd;
 
 /// A tree: its shape and its current boxes.
 #[derive(Clone, Copy)]
-pub(crate) struct Tree<'a> {
+pub(crate) struct BodyTree<'a> {
     pub shape: &'a TreeShape,
     pub bounds: &'a TreeBounds,
 }
 
-impl Tree<'_> {
+impl BodyTree<'_> {
     fn top(&self) -> Option<u32> {
         self.bounds
             .levels
@@ -85,8 +85,8 @@ pub(crate) struct NodePair {
 #[inline(always)]
 pub(crate) fn between<S: Simd, E>(
     simd: S,
-    a: Tree<'_>,
-    b: Tree<'_>,
+    a: BodyTree<'_>,
+    b: BodyTree<'_>,
     stack: &mut Vec<NodePair>,
     mut emit: impl FnMut(u32, u32) -> Result<(), E>,
 ) -> Result<(), E> {
@@ -113,7 +113,7 @@ pub(crate) fn between<S: Simd, E>(
 #[inline(always)]
 pub(crate) fn meeting<S: Simd, E>(
     simd: S,
-    tree: Tree<'_>,
+    tree: BodyTree<'_>,
     query: &Bounds,
     stack: &mut Vec<NodePair>,
     mut emit: impl FnMut(u32) -> Result<(), E>,
@@ -149,7 +149,7 @@ pub(crate) fn meeting<S: Simd, E>(
 #[inline(always)]
 pub(crate) fn within<S: Simd, E>(
     simd: S,
-    tree: Tree<'_>,
+    tree: BodyTree<'_>,
     hubs: Option<&Hubs>,
     stack: &mut Vec<NodePair>,
     mut emit: impl FnMut(u32, u32) -> Result<(), E>,
@@ -210,8 +210,8 @@ pub(crate) fn within<S: Simd, E>(
 #[inline(always)]
 fn descend<S: Simd, E>(
     simd: S,
-    a: Tree<'_>,
-    b: Tree<'_>,
+    a: BodyTree<'_>,
+    b: BodyTree<'_>,
     pair: NodePair,
     stack: &mut Vec<NodePair>,
     emit: &mut impl FnMut(u32, u32) -> Result<(), E>,

@@ -15,7 +15,7 @@ use impinge_exact::Point;
 use super::bounds::TreeBounds;
 use super::creases::Creases;
 use super::culled::body::Culled;
-use super::traversal::Tree;
+use super::traversal::BodyTree;
 
 /// The data kept per body from frame to frame.
 #[derive(Debug)]
@@ -111,8 +111,8 @@ impl<'a> World<'a> {
 
 impl BodyCache {
     #[inline(always)]
-    pub fn tree(&self) -> Tree<'_> {
-        Tree {
+    pub fn tree(&self) -> BodyTree<'_> {
+        BodyTree {
             shape: &self.clustering.shape,
             bounds: &self.bounds,
         }

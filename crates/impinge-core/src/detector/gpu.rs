@@ -8,7 +8,7 @@ use crate::clusterings::Clusterings;
 use crate::cpu::Cpu;
 use crate::cpu::steps::{ByDevice, StepClusters};
 use crate::gpu::recording::{Ran, Recording};
-use crate::gpu::{Capacities, Engine, Gpu, WantedAdapter};
+use crate::gpu::{Capacities, Engine, GpuContext, WantedAdapter};
 use crate::query::goal::Goal;
 use crate::query::settings::Backend;
 use crate::query::settings::Method;
@@ -24,7 +24,7 @@ pub(super) fn open(
     settings: &Settings,
     clusterings: &Clusterings,
 ) -> Result<Option<Engine>, Error> {
-    let gpu = wanted(settings).map(Gpu::open).transpose();
+    let gpu = wanted(settings).map(GpuContext::open).transpose();
     engine_of(gpu, settings, clusterings)
 }
 
@@ -34,7 +34,7 @@ pub(super) async fn open_async(
     clusterings: &Clusterings,
 ) -> Result<Option<Engine>, Error> {
     let gpu = match wanted(settings) {
-        Some(wanted) => Gpu::open_async(wanted).await.map(Some),
+        Some(wanted) => GpuContext::open_async(wanted).await.map(Some),
         None => Ok(None),
     };
     engine_of(gpu, settings, clusterings)
@@ -54,7 +54,7 @@ fn wanted(settings: &Settings) -> Option<WantedAdapter<'_>> {
 }
 
 fn engine_of(
-    gpu: Result<Option<Arc<Gpu>>, Error>,
+    gpu: Result<Option<Arc<GpuContext>>, Error>,
     settings: &Settings,
     clusterings: &Clusterings,
 ) -> Result<Option<Engine>, Error> {
@@ -229,7 +229,7 @@ impl Detector {
         queue: wgpu::Queue,
         settings: Settings,
     ) -> Result<Self, Error> {
-        Detector::on(Gpu::of_caller(device, queue)?, settings)
+        Detector::on(GpuContext::of_caller(device, queue)?, settings)
     }
 
     /// [`with_device`](Detector::with_device), with one line of one kernel replaced. For tests:
@@ -245,7 +245,7 @@ impl Detector {
         (kernel, line, damaged): (&str, &str, &str),
     ) -> Result<Self, Error> {
         let is_damaged = Cell::new(false);
-        let gpu = Gpu::of_caller_with(device, queue, |source| {
+        let gpu = GpuContext::of_caller_with(device, queue, |source| {
             let text = source.text();
             let is_it = source.name == kernel && text.contains(line);
             is_damaged.set(is_damaged.get() || is_it);
@@ -258,7 +258,7 @@ impl Detector {
         Detector::on(gpu, settings)
     }
 
-    fn on(gpu: Gpu, settings: Settings) -> Result<Self, Error> {
+    fn on(gpu: GpuContext, settings: Settings) -> Result<Self, Error> {
         let settings = Settings {
             backend: Backend::Gpu,
             device: None,
@@ -270,7 +270,7 @@ impl Detector {
         Ok(Detector::assemble(settings, clusterings, engine))
     }
 
-    pub(super) fn gpu_in_use(&self) -> Option<Arc<Gpu>> {
+    pub(super) fn gpu_in_use(&self) -> Option<Arc<GpuContext>> {
         self.gpu.as_ref().map(|engine| Arc::clone(engine.gpu()))
     }
 }

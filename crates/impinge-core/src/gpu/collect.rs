@@ -9,7 +9,7 @@
 
 use super::buffers::map;
 use super::layout::{Counter, Grid, N_COUNTERS, NEVER, PairKey, PairTimes, UnsureKey, time_by};
-use super::open::Gpu;
+use super::open::GpuContext;
 use super::pass_buffers::{PassBuffers, PassCounts};
 use super::recording::Recording;
 use crate::query::goal::Goal;
@@ -80,7 +80,7 @@ pub struct Collected {
 
 impl Collector {
     /// The queries that record the stages' times, if the device has a clock.
-    pub fn times(&mut self, gpu: &Gpu) -> Option<&wgpu::QuerySet> {
+    pub fn times(&mut self, gpu: &GpuContext) -> Option<&wgpu::QuerySet> {
         if gpu.has_timestamps && self.times.is_none() {
             self.times = Some(Times {
                 queries: gpu.device.create_query_set(&wgpu::QuerySetDescriptor {
@@ -99,7 +99,7 @@ impl Collector {
         self.times.as_ref().map(|times| &times.queries)
     }
 
-    fn reserve(&mut self, gpu: &Gpu, bytes: u64) -> wgpu::Buffer {
+    fn reserve(&mut self, gpu: &GpuContext, bytes: u64) -> wgpu::Buffer {
         match &self.staging {
             Some(staging) if staging.size() >= bytes => staging.clone(),
             _ => {
@@ -148,7 +148,12 @@ impl Collector {
     }
 
     /// Encodes the copies of what is read back, and of the times of the stages.
-    pub fn encode(&mut self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, recording: &Recording) {
+    pub fn encode(
+        &mut self,
+        gpu: &GpuContext,
+        encoder: &mut wgpu::CommandEncoder,
+        recording: &Recording,
+    ) {
         let bytes = recording.read_bytes();
         let staging = self.reserve(gpu, bytes + TIMES);
         recording.encode_reads(encoder, &staging);
@@ -166,7 +171,7 @@ impl Collector {
     /// Device errors.
     pub async fn take(
         &mut self,
-        gpu: &Gpu,
+        gpu: &GpuContext,
         pass_buffers: &PassBuffers,
         n_stages: usize,
         guess: Guess,
@@ -207,7 +212,7 @@ impl Collector {
     /// Device errors.
     async fn take_more(
         &mut self,
-        gpu: &Gpu,
+        gpu: &GpuContext,
         pass_buffers: &PassBuffers,
         guess: Guess,
         keys: &mut ReadKeys,

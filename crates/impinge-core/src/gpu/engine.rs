@@ -10,13 +10,13 @@ use super::cells::Guest;
 use super::collect::Collector;
 use super::device::Scopes;
 use super::layout::Cell;
-use super::open::Gpu;
+use super::open::GpuContext;
 use super::pass_buffers::{Capacities, CellsWanted, PassBuffers, PassCounts};
 use super::pieces;
 use super::recording::{Launcher, Ran, Recording};
 use super::topology::Most;
 use super::view::Motion;
-use super::world::{ResidentEnds, World, weigh};
+use super::world::{DeviceWorld, ResidentEnds, weigh};
 use crate::bvh::clusters::Clustering;
 use crate::clusterings::Clusterings;
 use crate::plan::Plan;
@@ -41,7 +41,7 @@ const WIDEST: u64 = 1 << 34;
 /// The GPU backend of one detector.
 #[derive(Debug)]
 pub struct Engine {
-    pub(super) gpu: Arc<Gpu>,
+    pub(super) gpu: Arc<GpuContext>,
     pub(super) settings: Settings,
     /// The number of primitives of the frame that was too large for `Cells`.
     too_much: Option<u64>,
@@ -50,7 +50,7 @@ pub struct Engine {
     /// Whether the device holds a piece of a frame, not a whole one.
     has_pieces: bool,
     clusterings: Clusterings,
-    pub(super) world: World,
+    pub(super) world: DeviceWorld,
     /// The method of another crate that is run instead of `Cells`.
     pub(super) guest: Option<Guest>,
     /// What the question at hand writes, and what the other kind of question has written: the
@@ -123,7 +123,7 @@ pub(super) enum PassSink<'a, 'b> {
 
 /// How a list of work ended.
 #[derive(Debug)]
-pub(super) enum Outcome {
+pub(super) enum PassesEnd {
     Complete,
     /// There is not enough room for work that cannot be split.
     Crowded(Error),
@@ -133,7 +133,7 @@ impl Engine {
     /// Creates an engine that shares clusterings. Of `Auto` it answers what `Clusters` are to
     /// answer.
     pub(crate) fn new(
-        gpu: Arc<Gpu>,
+        gpu: Arc<GpuContext>,
         settings: &Settings,
         clusterings: Clusterings,
         first: Capacities,
@@ -150,7 +150,7 @@ impl Engine {
 
     /// Creates an engine; with a method of another crate, if there is one, instead of `Cells`.
     pub fn with_guest(
-        gpu: Arc<Gpu>,
+        gpu: Arc<GpuContext>,
         settings: Settings,
         first: Capacities,
         guest: Option<Guest>,
@@ -164,7 +164,7 @@ impl Engine {
             too_much: None,
             most_bound: u64::MAX,
             has_pieces: false,
-            world: World::new(),
+            world: DeviceWorld::new(),
             guest,
             complete: Vec::new(),
             decided: Vec::new(),
@@ -183,7 +183,7 @@ impl Engine {
         (self.sought, self.touches_by) = (Goal::All, None);
     }
 
-    pub fn gpu(&self) -> &Arc<Gpu> {
+    pub fn gpu(&self) -> &Arc<GpuContext> {
         &self.gpu
     }
 
@@ -231,7 +231,7 @@ impl Engine {
         let before = self.falls_back().then(|| stats.clone());
         let work = Vec::from_iter(self.whole(plan));
         let outcome = self.work_off(job, PassSink::Answer(answer), work, stats);
-        if let Outcome::Crowded(error) = outcome.await? {
+        if let PassesEnd::Crowded(error) = outcome.await? {
             let Some(before) = before else {
                 return Err(error);
             };
@@ -246,7 +246,7 @@ impl Engine {
             }
             let work = Vec::from_iter(self.whole(plan));
             let outcome = self.work_off(job, PassSink::Answer(answer), work, stats);
-            if let Outcome::Crowded(error) = outcome.await? {
+            if let PassesEnd::Crowded(error) = outcome.await? {
                 return Err(error);
             }
         }
@@ -295,11 +295,11 @@ impl Engine {
         let work = Vec::from_iter(self.whole(job.plan));
         let outcome = self.work_off(job, PassSink::Undecided(take), work, stats);
         match outcome.await? {
-            Outcome::Complete => {
+            PassesEnd::Complete => {
                 stats.bytes_held += self.bytes();
                 Ok(true)
             }
-            Outcome::Crowded(error) => Err(error),
+            PassesEnd::Crowded(error) => Err(error),
         }
     }
 
@@ -411,7 +411,7 @@ impl Engine {
                 stats.n_pieces += 1;
                 let work = self.seeds_in_batches(plan, &pairs);
                 let outcome = self.work_off(job, PassSink::Answer(answer), work, stats);
-                if let Outcome::Crowded(error) = outcome.await? {
+                if let PassesEnd::Crowded(error) = outcome.await? {
                     return Err(error);
                 }
             }

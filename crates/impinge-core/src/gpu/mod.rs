@@ -37,7 +37,7 @@ pub use resident::{ResidentPairs, ResidentPart, ResidentStep};
 
 pub(crate) use engine::Engine;
 pub use kernels::shaders;
-pub use open::{Gpu, WantedAdapter, devices, devices_async};
+pub use open::{GpuContext, WantedAdapter, devices, devices_async};
 
 /// The texts from which kernels are assembled. `LAYOUT`, with the structs of all kernels, comes
 /// first.

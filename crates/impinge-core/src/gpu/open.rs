@@ -72,18 +72,18 @@ fn may_have_hardware() -> bool {
 }
 
 /// A device and its kernels, compiled when first needed. Detectors on the same adapter share one.
-pub struct Gpu {
+pub struct GpuContext {
     opened: Device,
     pub(crate) kernels: Kernels,
 }
 
-impl fmt::Debug for Gpu {
+impl fmt::Debug for GpuContext {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.opened.fmt(f)
     }
 }
 
-impl Deref for Gpu {
+impl Deref for GpuContext {
     type Target = Device;
 
     fn deref(&self) -> &Device {
@@ -103,22 +103,22 @@ pub enum WantedAdapter<'a> {
 }
 
 /// Devices in use, by name and interface.
-static SHARED: Mutex<Vec<(DeviceInfo, Weak<Gpu>)>> = Mutex::new(Vec::new());
+static SHARED: Mutex<Vec<(DeviceInfo, Weak<GpuContext>)>> = Mutex::new(Vec::new());
 
-impl Gpu {
+impl GpuContext {
     /// Opens an adapter, or shares the device of another detector.
     ///
     /// # Errors
     /// No adapter fits; the driver refuses. Always an error in a browser.
-    pub fn open(wanted: WantedAdapter<'_>) -> Result<Arc<Gpu>, Error> {
-        wait(Gpu::open_async(wanted))
+    pub fn open(wanted: WantedAdapter<'_>) -> Result<Arc<GpuContext>, Error> {
+        wait(GpuContext::open_async(wanted))
     }
 
-    /// [`open`](Gpu::open) without blocking.
+    /// [`open`](GpuContext::open) without blocking.
     ///
     /// # Errors
     /// No adapter fits; the driver refuses.
-    pub async fn open_async(wanted: WantedAdapter<'_>) -> Result<Arc<Gpu>, Error> {
+    pub async fn open_async(wanted: WantedAdapter<'_>) -> Result<Arc<GpuContext>, Error> {
         if wanted == WantedAdapter::Hardware && !may_have_hardware() {
             let found = "none in hardware: the system has no device of a GPU".to_owned();
             return Err(Error::NoAdapter { found });
@@ -142,13 +142,13 @@ impl Gpu {
             };
             return Err(Error::NoAdapter { found });
         };
-        if let Some(gpu) = Gpu::shared(info) {
+        if let Some(gpu) = GpuContext::shared(info) {
             return Ok(gpu);
         }
         // The lock is not held while the device is awaited, so another detector may have opened it
         // first.
-        let gpu = Arc::new(Gpu::request(adapter, info.clone()).await?);
-        if let Some(gpu) = Gpu::shared(info) {
+        let gpu = Arc::new(GpuContext::request(adapter, info.clone()).await?);
+        if let Some(gpu) = GpuContext::shared(info) {
             return Ok(gpu);
         }
         let mut shared = SHARED.lock().unwrap_or_else(PoisonError::into_inner);
@@ -157,7 +157,7 @@ impl Gpu {
     }
 
     /// The device that another detector has opened on this adapter.
-    fn shared(info: &DeviceInfo) -> Option<Arc<Gpu>> {
+    fn shared(info: &DeviceInfo) -> Option<Arc<GpuContext>> {
         let mut shared = SHARED.lock().unwrap_or_else(PoisonError::into_inner);
         shared.retain(|(_, gpu)| gpu.strong_count() > 0);
         shared
@@ -166,7 +166,7 @@ impl Gpu {
             .find_map(|(_, gpu)| gpu.upgrade().filter(|gpu| gpu.check_lost().is_ok()))
     }
 
-    async fn request(adapter: &wgpu::Adapter, info: DeviceInfo) -> Result<Gpu, Error> {
+    async fn request(adapter: &wgpu::Adapter, info: DeviceInfo) -> Result<GpuContext, Error> {
         let offered = adapter.limits();
         // WebGPU's guaranteed minimum, but buffers as large as the adapter allows.
         let required_limits = wgpu::Limits {
@@ -186,7 +186,7 @@ impl Gpu {
         })?;
         let opened = Device::new(device, queue, info);
         opened.listen();
-        Ok(Gpu {
+        Ok(GpuContext {
             opened,
             kernels: Kernels::new(|_| None),
         })
@@ -196,8 +196,8 @@ impl Gpu {
     ///
     /// # Errors
     /// It allows too little.
-    pub fn of_caller(device: wgpu::Device, queue: wgpu::Queue) -> Result<Gpu, Error> {
-        Gpu::of_caller_with(device, queue, |_| None)
+    pub fn of_caller(device: wgpu::Device, queue: wgpu::Queue) -> Result<GpuContext, Error> {
+        GpuContext::of_caller_with(device, queue, |_| None)
     }
 
     /// The same, where `damage` may replace a kernel's text.
@@ -205,7 +205,7 @@ impl Gpu {
         device: wgpu::Device,
         queue: wgpu::Queue,
         damage: impl Fn(&Source) -> Option<String>,
-    ) -> Result<Gpu, Error> {
+    ) -> Result<GpuContext, Error> {
         let limits = device.limits();
         if !suffices(&limits) {
             return Err(Error::Gpu {
@@ -219,7 +219,7 @@ impl Gpu {
             });
         }
         let info = describe(&device.adapter_info(), &limits);
-        Ok(Gpu {
+        Ok(GpuContext {
             opened: Device::new(device, queue, info),
             kernels: Kernels::new(damage),
         })

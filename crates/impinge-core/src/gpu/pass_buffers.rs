@@ -11,7 +11,7 @@ use super::layout::{
     N_TALLIES, N_UNSURE, NEVER, NodePair, PairKey, PairTimes, ROUNDS, Reach, Start, TOO_MUCH,
     TOUCHES_BY, Tally, UnsureKey, WorkItem, time_by,
 };
-use super::open::Gpu;
+use super::open::GpuContext;
 use crate::query::goal::Goal;
 use crate::query::settings::Method;
 use crate::scene::error::Error;
@@ -122,12 +122,12 @@ impl Capacities {
     }
 
     /// Whether the device can bind this much.
-    pub fn fit(self, gpu: &Gpu) -> bool {
+    pub fn fit(self, gpu: &GpuContext) -> bool {
         self.fits(Capacities::limit(gpu))
     }
 
     /// The most that one binding of the device may hold.
-    fn limit(gpu: &Gpu) -> Self {
+    fn limit(gpu: &GpuContext) -> Self {
         Capacities {
             queue: Storage::<NodePair>::limit(gpu),
             items: Storage::<CellItem>::limit(gpu),
@@ -229,7 +229,7 @@ impl PassBuffers {
     }
 
     /// Makes exactly this much room.
-    pub fn resize(&mut self, gpu: &Gpu, wanted: &Capacities, cells: Option<CellsWanted>) {
+    pub fn resize(&mut self, gpu: &GpuContext, wanted: &Capacities, cells: Option<CellsWanted>) {
         let is_cells = cells.is_some();
         let cells = cells.unwrap_or_default();
         let sizes = Some((*wanted, cells));
@@ -269,7 +269,7 @@ impl PassBuffers {
     /// As [`Storage::resize`].
     pub fn start(
         &mut self,
-        gpu: &Gpu,
+        gpu: &GpuContext,
         seeds: &[NodePair],
         touches_by: Option<f32>,
     ) -> Result<[(Slice, Slice); 2], Error> {
@@ -362,7 +362,12 @@ impl PassCounts {
 
     /// Compares the counts with the room that the pass had. `bytes`: the most that these buffers
     /// may take together.
-    pub fn judge(&self, gpu: &Gpu, pass_buffers: Capacities, bytes: Option<u64>) -> NextPass {
+    pub fn judge(
+        &self,
+        gpu: &GpuContext,
+        pass_buffers: Capacities,
+        bytes: Option<u64>,
+    ) -> NextPass {
         if self.too_much {
             return NextPass::Split;
         }

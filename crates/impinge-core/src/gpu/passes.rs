@@ -18,7 +18,7 @@ use super::cells::{self, CellWork};
 use super::clusters;
 use super::collect::{Collected, Guess};
 use super::device::Scopes;
-use super::engine::{Engine, Outcome, PassSink};
+use super::engine::{Engine, PassSink, PassesEnd};
 use super::layout::NodePair;
 use super::pass_buffers::{Capacities, CellsWanted, NextPass};
 use super::recording::{Recorder, Recording};
@@ -45,7 +45,7 @@ const DECIDED_BY_A_TASK: usize = 64;
 
 /// The work of a pass.
 #[derive(Debug, Clone)]
-pub(super) enum Work {
+pub(super) enum PassWork {
     Seeds(Vec<NodePair>),
     Cells(CellWork),
 }
@@ -56,17 +56,17 @@ impl Engine {
         &mut self,
         job: Job<'_>,
         mut sink: PassSink<'_, '_>,
-        mut waiting: Vec<Work>,
+        mut waiting: Vec<PassWork>,
         stats: &mut Stats,
-    ) -> Result<Outcome, Error> {
+    ) -> Result<PassesEnd, Error> {
         let Job { plan, control, .. } = job;
         let cells = self.cells_wanted(plan);
         let mut capacities = self.first_capacities(cells)?;
         while let Some(work) = waiting.pop() {
-            if let Work::Cells(cells) = work
+            if let PassWork::Cells(cells) = work
                 && let Some(parts) = cells.parts()
             {
-                waiting.extend(parts.into_iter().map(Work::Cells));
+                waiting.extend(parts.into_iter().map(PassWork::Cells));
                 continue;
             }
             let done = stats.n_batches;
@@ -101,11 +101,11 @@ impl Engine {
                         }),
                     })?;
                     if !goes_on {
-                        return Ok(Outcome::Complete);
+                        return Ok(PassesEnd::Complete);
                     }
-                    if let Work::Cells(cells) = work {
+                    if let PassWork::Cells(cells) = work {
                         let next = cells.next(&collected, self.settings.group_size);
-                        waiting.extend(next.map(Work::Cells));
+                        waiting.extend(next.map(PassWork::Cells));
                     }
                 }
                 NextPass::Grow(larger) => {
@@ -121,33 +121,33 @@ impl Engine {
                     }
                     match self.lean(&work, &collected, capacities, pass_buffers) {
                         Ok(lean) => capacities = lean,
-                        Err(error) => return Ok(Outcome::Crowded(error)),
+                        Err(error) => return Ok(PassesEnd::Crowded(error)),
                     }
                     waiting.push(work);
                 }
             }
         }
-        Ok(Outcome::Complete)
+        Ok(PassesEnd::Complete)
     }
 
     /// The whole work of a frame, if there is any.
-    pub(super) fn whole(&self, plan: &Plan) -> Option<Work> {
+    pub(super) fn whole(&self, plan: &Plan) -> Option<PassWork> {
         let seeds = self.world.seeds(plan, self.lane.motion);
         if seeds.is_empty() {
             return None;
         }
         Some(match self.lane.method {
-            Method::Cells => Work::Cells(CellWork::WHOLE),
-            _ => Work::Seeds(self.descend(plan, seeds)),
+            Method::Cells => PassWork::Cells(CellWork::WHOLE),
+            _ => PassWork::Seeds(self.descend(plan, seeds)),
         })
     }
 
     /// The work of a piece: pairs of its runs, in batches that a queue can hold.
-    pub(super) fn seeds_in_batches(&self, plan: &Plan, pairs: &[[u32; 2]]) -> Vec<Work> {
+    pub(super) fn seeds_in_batches(&self, plan: &Plan, pairs: &[[u32; 2]]) -> Vec<PassWork> {
         let most = (self.lane.pass_buffers.capacities().queue as usize).max(SEEDS);
         let batches = pairs.chunks(most);
         batches
-            .map(|batch| Work::Seeds(self.descend(plan, self.world.seeds_of_runs(batch))))
+            .map(|batch| PassWork::Seeds(self.descend(plan, self.world.seeds_of_runs(batch))))
             .collect()
     }
 
@@ -172,23 +172,25 @@ impl Engine {
     fn split(
         &self,
         plan: &Plan,
-        work: &Work,
+        work: &PassWork,
         collected: &Collected,
-    ) -> Result<Option<Vec<Work>>, Error> {
+    ) -> Result<Option<Vec<PassWork>>, Error> {
         let seeds = match work {
-            Work::Seeds(seeds) => seeds,
-            &Work::Cells(cells) => {
+            PassWork::Seeds(seeds) => seeds,
+            &PassWork::Cells(cells) => {
                 let parts = cells.split(collected, self.lane.pass_buffers.capacities().kept);
                 // Lists and tiles are our own: a method of another crate has no parts of a cell.
                 let is_list = |parts: &[CellWork]| matches!(parts, [CellWork::List(_)]);
                 let parts = parts.filter(|parts| self.guest.is_none() || !is_list(parts));
-                return Ok(parts.map(|parts| parts.into_iter().map(Work::Cells).collect()));
+                return Ok(parts.map(|parts| parts.into_iter().map(PassWork::Cells).collect()));
             }
         };
         if seeds.len() > 1 {
             let (low, high) = seeds.split_at(seeds.len() / 2);
             return Ok(Some(
-                [low, high].map(|half| Work::Seeds(half.to_vec())).into(),
+                [low, high]
+                    .map(|half| PassWork::Seeds(half.to_vec()))
+                    .into(),
             ));
         }
         let mut below = Vec::new();
@@ -199,14 +201,14 @@ impl Engine {
         }
         Ok(Some(match below.is_empty() {
             true => Vec::new(),
-            false => vec![Work::Seeds(below)],
+            false => vec![PassWork::Seeds(below)],
         }))
     }
 
     /// Room for work that cannot be split: the buffers that it needs grow, and all others shrink.
     fn lean(
         &self,
-        work: &Work,
+        work: &PassWork,
         collected: &Collected,
         now: Capacities,
         pass_buffers: Option<u64>,
@@ -214,8 +216,8 @@ impl Engine {
         let needed = &collected.counts.needed;
         let least = Capacities::LEAST.of(self.lane.method);
         let lean = match work {
-            Work::Cells(cells) => cells.lean(needed, now, least),
-            Work::Seeds(_) => CellWork::WHOLE.lean(needed, now, least),
+            PassWork::Cells(cells) => cells.lean(needed, now, least),
+            PassWork::Seeds(_) => CellWork::WHOLE.lean(needed, now, least),
         };
         let is_allowed = pass_buffers.is_none_or(|pass_buffers| lean.bytes() <= pass_buffers);
         if lean == now || !is_allowed || !lean.fit(&self.gpu) {
@@ -228,7 +230,7 @@ impl Engine {
     async fn pass(
         &mut self,
         plan: &Plan,
-        work: &Work,
+        work: &PassWork,
         capacities: Capacities,
         cells: Option<CellsWanted>,
         stats: &mut Stats,
@@ -262,7 +264,7 @@ impl Engine {
     fn submit(
         &mut self,
         plan: &Plan,
-        work: &Work,
+        work: &PassWork,
         capacities: Capacities,
         cells: Option<CellsWanted>,
     ) -> Result<(Recording, Guess), Error> {
@@ -288,12 +290,12 @@ impl Engine {
     pub(super) fn record(
         &mut self,
         plan: &Plan,
-        work: Option<&Work>,
+        work: Option<&PassWork>,
         mut capacities: Capacities,
         cells: Option<CellsWanted>,
     ) -> Result<Recording, Error> {
         let seeds: &[NodePair] = match work {
-            Some(Work::Seeds(seeds)) => seeds,
+            Some(PassWork::Seeds(seeds)) => seeds,
             _ => &[],
         };
         capacities.queue = capacities.queue.max(count(seeds.len()));
@@ -320,16 +322,16 @@ impl Engine {
         let resolve = plan.shared_vertex == SharedVertex::Resolve;
         match (work, &mut self.guest) {
             (None, _) => {}
-            (Some(Work::Seeds(seeds)), _) => recorder.clusters(clusters::ClusterPass {
+            (Some(PassWork::Seeds(seeds)), _) => recorder.clusters(clusters::ClusterPass {
                 n_seeds: count(seeds.len()),
                 n_rounds: self.world.rounds(seeds),
                 resolve,
                 sought,
             }),
-            (Some(Work::Cells(work)), Some(guest)) => {
+            (Some(PassWork::Cells(work)), Some(guest)) => {
                 guest.record(&mut recorder, lambda, work.cells())?;
             }
-            (Some(&Work::Cells(work)), None) => recorder.cells(cells::CellPass {
+            (Some(&PassWork::Cells(work)), None) => recorder.cells(cells::CellPass {
                 lambda,
                 group_size,
                 resolve,

@@ -10,11 +10,11 @@ use std::sync::Arc;
 
 use super::buffers::{Access, Bound, Slice, Storage, count, read};
 use super::layout::{Arguments, Params, Step};
-use super::open::Gpu;
+use super::open::GpuContext;
 use super::pass_buffers::PassBuffers;
 use super::pipeline::{Bindings, Entry, Kernel, Program};
 use super::view::{Motion, View};
-use super::world::World;
+use super::world::DeviceWorld;
 use crate::scene::error::Error;
 
 /// The widest row of workgroups; `shared/arguments.wgsl` has the same.
@@ -191,9 +191,9 @@ impl fmt::Display for Recording {
 /// Makes a recording from the buffers that its launches bind.
 pub struct Recorder<'a> {
     /// The kernels, and the limits of the device.
-    pub gpu: &'a Gpu,
+    pub gpu: &'a GpuContext,
     /// The data on parts.
-    pub world: &'a World,
+    pub world: &'a DeviceWorld,
     /// What a frame, or a step, sees of them.
     pub view: &'a View,
     /// Whether that is a frame or a step.
@@ -238,12 +238,12 @@ pub struct Written {
 pub struct Launcher {
     params: Storage<Step>,
     sent: Vec<Step>,
-    groups: Vec<Group>,
+    groups: Vec<BoundGroup>,
 }
 
 /// A bind group, and what it was made of.
 #[derive(Debug)]
-struct Group {
+struct BoundGroup {
     program: Arc<Program>,
     buffers: Vec<(wgpu::Buffer, u64)>,
     group: wgpu::BindGroup,
@@ -273,7 +273,7 @@ impl Launcher {
     /// As [`Storage::resize`]. Errors of kernels go to the open error scopes.
     pub fn encode(
         &mut self,
-        gpu: &Gpu,
+        gpu: &GpuContext,
         recording: &Recording,
         times: Option<&wgpu::QuerySet>,
         encoder: &mut wgpu::CommandEncoder,
@@ -305,7 +305,11 @@ impl Launcher {
     ///
     /// # Errors
     /// Those of [`encode`](Launcher::encode); a device that is lost.
-    pub async fn run_each(&mut self, gpu: &Gpu, recording: &Recording) -> Result<Vec<Ran>, Error> {
+    pub async fn run_each(
+        &mut self,
+        gpu: &GpuContext,
+        recording: &Recording,
+    ) -> Result<Vec<Ran>, Error> {
         let ready = self.prepare(gpu, recording)?;
         let encoder = || gpu.device.create_command_encoder(&Default::default());
         let mut first = encoder();
@@ -344,7 +348,7 @@ impl Launcher {
     }
 
     /// Sends the parameters, if they differ from those on the device, and binds all buffers.
-    fn prepare(&mut self, gpu: &Gpu, recording: &Recording) -> Result<Vec<Ready>, Error> {
+    fn prepare(&mut self, gpu: &GpuContext, recording: &Recording) -> Result<Vec<Ready>, Error> {
         let params = recording.launches.iter().filter_map(Launch::params);
         let planned: Vec<Step> = params.map(Step::from).collect();
         if planned != self.sent || self.params.bytes() == 0 {
@@ -368,20 +372,21 @@ impl Launcher {
 
     /// The number of the bind group of a launch: one of this recording, one of the recording
     /// before, or a new one.
-    fn group(&mut self, gpu: &Gpu, before: &mut Vec<Group>, launch: &Launch) -> usize {
+    fn group(&mut self, gpu: &GpuContext, before: &mut Vec<BoundGroup>, launch: &Launch) -> usize {
         let buffer = |bound: &Bound| match bound {
             Bound::Buffer(slice) => (slice.buffer.clone(), slice.bytes),
             Bound::Params(_) => (self.params.buffer().clone(), count(size_of::<Params>())),
         };
         let buffers: Vec<_> = launch.bound.iter().map(buffer).collect();
-        let is_it =
-            |held: &Group| Arc::ptr_eq(&held.program, &launch.program) && held.buffers == buffers;
+        let is_it = |held: &BoundGroup| {
+            Arc::ptr_eq(&held.program, &launch.program) && held.buffers == buffers
+        };
         if let Some(ix) = self.groups.iter().position(is_it) {
             return ix;
         }
         let held = match before.iter().position(is_it) {
             Some(ix) => before.swap_remove(ix),
-            None => Group {
+            None => BoundGroup {
                 program: Arc::clone(&launch.program),
                 group: launch.program.bind(gpu, &buffers),
                 buffers,

@@ -12,11 +12,11 @@ use crate::search::runner::Job;
 use super::layout::{
     BARE, BODY_SHIFT, Body, EDGES, FACES, NO_ROOT, NodePair, OWN_PARTS, POINTS, VERTICES,
 };
-use super::open::Gpu;
+use super::open::GpuContext;
 use super::view::{Motion, SLACK, View};
-use super::world::{ResidentEnds, World, sample};
+use super::world::{DeviceWorld, ResidentEnds, sample};
 
-impl World {
+impl DeviceWorld {
     /// Sends the records of all parts and the list of ignored pairs, if they differ from those on
     /// the device.
     ///
@@ -24,7 +24,7 @@ impl World {
     /// More than the device can bind at once.
     pub(super) fn send_records(
         &mut self,
-        gpu: &Gpu,
+        gpu: &GpuContext,
         job: Job<'_>,
         motion: Motion,
         resident: &ResidentEnds<'_>,

@@ -28,7 +28,7 @@ use crate::search::stats::Stats;
 /// before it. The order of pairs is not specified.
 ///
 /// A count may be larger than its list: the list then holds as many pairs as fit, and
-/// [`Gpu::grow`](crate::Gpu::grow) makes it larger.
+/// [`GpuContext::grow`](crate::Gpu::grow) makes it larger.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct ResidentPairs {
@@ -76,7 +76,7 @@ pub struct ResidentPairs {
 /// [`Body::part`](crate::Body::part) lists them. The order of pairs is not specified.
 ///
 /// The count may be larger than the list: the list then holds as many pairs as fit, and
-/// [`Gpu::grow`](crate::Gpu::grow) makes it larger.
+/// [`GpuContext::grow`](crate::Gpu::grow) makes it larger.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct ResidentStep {
@@ -237,7 +237,7 @@ impl Engine {
     /// Returns whether none was.
     ///
     /// # Errors
-    /// Those of [`Gpu::grow`](crate::Gpu::grow).
+    /// Those of [`GpuContext::grow`](crate::Gpu::grow).
     pub async fn make_room(&mut self) -> Result<bool, Error> {
         self.gpu().check_lost()?;
         let mut is_complete = true;

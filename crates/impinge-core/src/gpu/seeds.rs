@@ -5,9 +5,9 @@ use crate::scene::index::PartIx;
 
 use super::layout::{NO_ROOT, Node, NodePair};
 use super::view::Motion;
-use super::world::World;
+use super::world::DeviceWorld;
 
-impl World {
+impl DeviceWorld {
     fn root(&self, part: u32) -> u32 {
         self.trees.roots[part as usize]
     }

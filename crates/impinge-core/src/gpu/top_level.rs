@@ -1,7 +1,7 @@
 //! All trees of a frame, or of a piece of one, in one array of nodes: see [`world`](super::world).
 
 use crate::bvh::bounds::Bounds;
-use crate::bvh::tree::{Entry, FANOUT, TreeShape, order};
+use crate::bvh::tree::{FANOUT, TreeEntry, TreeShape, order};
 
 use super::layout::{Level, NO_ROOT, Node, NodePair};
 
@@ -30,7 +30,7 @@ pub struct Top {
     n_gates: u32,
     shape: TreeShape,
     best_spread: f64,
-    entries: Vec<Entry>,
+    entries: Vec<TreeEntry>,
 }
 
 impl Trees {
@@ -185,7 +185,7 @@ impl Top {
         let gates = &mut nodes[self.range()];
         for gate in &*gates {
             let number = gate.first_child;
-            self.entries.push(Entry::new(sample(number), number));
+            self.entries.push(TreeEntry::new(sample(number), number));
         }
         let spread = self.spread();
         let is_new = self.best_spread == 0.0;

@@ -5,7 +5,7 @@ use crate::scene::error::Error;
 
 use super::buffers::Storage;
 use super::layout::{Body, Level, NodePair};
-use super::open::Gpu;
+use super::open::GpuContext;
 use super::top_level::{Top, Trees};
 
 /// By how many keys the boxes of rounded positions are widened: see `boxes.wgsl`.
@@ -81,7 +81,7 @@ impl Default for View {
 impl View {
     /// A view of some of `n_parts` parts, with a tree over them if there are more than a few.
     pub(super) fn new(
-        gpu: &Gpu,
+        gpu: &GpuContext,
         trees: &mut Trees,
         parts: Vec<u32>,
         n_parts: usize,
@@ -122,7 +122,7 @@ impl View {
     /// Sends records and ignored pairs that differ from those on the device.
     pub(super) fn send(
         &mut self,
-        gpu: &Gpu,
+        gpu: &GpuContext,
         bodies: Vec<Body>,
         ignored: Vec<NodePair>,
     ) -> Result<(), Error> {

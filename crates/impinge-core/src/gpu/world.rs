@@ -45,7 +45,7 @@ use super::buffers::{Storage, count};
 use super::layout::{
     BODY_SHIFT, Body, Cluster, ClusterVertex, Coordinate, Corners, NO_ROOT, Node, Order,
 };
-use super::open::Gpu;
+use super::open::GpuContext;
 use super::pieces::{Chunk, Loaded};
 use super::top_level::Trees;
 use super::topology::{DeviceClusters, Most, Weight, narrowed};
@@ -70,7 +70,7 @@ struct Resident {
 
 /// A part of a body on the device.
 #[derive(Debug, Clone)]
-pub(super) struct Held {
+pub(super) struct HeldPart {
     pub id: BodyId,
     pub clustering: Arc<Clustering>,
 }
@@ -81,9 +81,9 @@ pub struct ResidentEnds<'a>(pub [BTreeMap<BodyId, &'a wgpu::Buffer>; 2]);
 
 /// The data on parts that the kernels read.
 #[derive(Debug)]
-pub struct World {
+pub struct DeviceWorld {
     bodies: Vec<Resident>,
-    pub(super) parts: Vec<Held>,
+    pub(super) parts: Vec<HeldPart>,
     /// The vertices of all bodies.
     n_vertices: u64,
     n_ends: u64,
@@ -150,9 +150,9 @@ fn weigh_parts<'a>(
     is_numbered.then_some(weight)
 }
 
-impl World {
+impl DeviceWorld {
     pub(crate) fn new() -> Self {
-        World {
+        DeviceWorld {
             bodies: Vec::new(),
             parts: Vec::new(),
             n_vertices: 0,
@@ -196,7 +196,7 @@ impl World {
 
     /// Frees all buffers.
     pub fn forget(&mut self) {
-        *self = World::new();
+        *self = DeviceWorld::new();
     }
 
     /// Says that the boxes that a view sees fit the positions.
@@ -223,7 +223,7 @@ impl World {
     /// More than the device can bind at once.
     pub(crate) fn update(
         &mut self,
-        gpu: &Gpu,
+        gpu: &GpuContext,
         job: Job<'_>,
         (motion, clusterings): (Motion, &[Arc<Clustering>]),
         (resident, most): (&ResidentEnds<'_>, Most),
@@ -232,7 +232,7 @@ impl World {
         let Job { scene, plan, .. } = job;
         if !self.is_seen(job, (motion, clusterings)) {
             let query_parts = plan.parts.iter().zip(clusterings);
-            let wanted = query_parts.map(|(query_part, clustering)| Held {
+            let wanted = query_parts.map(|(query_part, clustering)| HeldPart {
                 id: query_part.id,
                 clustering: Arc::clone(clustering),
             });
@@ -254,7 +254,7 @@ impl World {
         let query_parts = job.plan.parts.iter().zip(clusterings);
         self.views[motion as usize].as_ref().is_some_and(|view| {
             let parts = view.parts.iter().map(|&part| &self.parts[part as usize]);
-            let is_it = |(part, (query_part, clustering)): (&Held, (&QueryPart, _))| {
+            let is_it = |(part, (query_part, clustering)): (&HeldPart, (&QueryPart, _))| {
                 part.id == query_part.id && Arc::ptr_eq(&part.clustering, clustering)
             };
             view.parts.len() == clusterings.len() && parts.zip(query_parts).all(is_it)
@@ -262,7 +262,12 @@ impl World {
     }
 
     /// The parts of the other kind of question, if they are of the same bodies.
-    fn of_other(&self, scene: &Scene, motion: Motion, wanted: &[Held]) -> Option<Vec<Held>> {
+    fn of_other(
+        &self,
+        scene: &Scene,
+        motion: Motion,
+        wanted: &[HeldPart],
+    ) -> Option<Vec<HeldPart>> {
         let view = self.views[motion.other() as usize].as_ref()?;
         let same = |(body, id): (&Resident, BodyId)| {
             let stamp = body.topology_stamp;
@@ -282,9 +287,9 @@ impl World {
     /// the same bodies and fit.
     fn send_parts(
         &mut self,
-        gpu: &Gpu,
+        gpu: &GpuContext,
         scene: &Scene,
-        (motion, wanted): (Motion, Vec<Held>),
+        (motion, wanted): (Motion, Vec<HeldPart>),
         most: Most,
     ) -> Result<(), Error> {
         let other = self.of_other(scene, motion, &wanted);
@@ -292,7 +297,7 @@ impl World {
             Motion::Still => [wanted.clone(), other],
             Motion::Moving => [other, wanted.clone()],
         });
-        let fits = |both: &[Vec<Held>; 2]| {
+        let fits = |both: &[Vec<HeldPart>; 2]| {
             let parts = union(both);
             let parts = parts.iter().map(|part| (part.id, &part.clustering));
             weigh_parts(scene, Motion::Moving, parts).is_some_and(|weight| weight.fits(most))
@@ -354,7 +359,7 @@ impl World {
         Ok(())
     }
 
-    fn send_trees(&mut self, gpu: &Gpu, topology: &DeviceClusters) -> Result<(), Error> {
+    fn send_trees(&mut self, gpu: &GpuContext, topology: &DeviceClusters) -> Result<(), Error> {
         self.has_solids = topology.has_solids;
         self.clusters.upload(gpu, &topology.clusters)?;
         self.cluster_vertices
@@ -374,7 +379,7 @@ impl World {
     /// The piece is larger than the device can bind at once.
     pub(crate) fn send_piece<'a>(
         &mut self,
-        gpu: &Gpu,
+        gpu: &GpuContext,
         scene: &Scene,
         plan: &Plan,
         chunks: &[&Chunk],
@@ -413,7 +418,7 @@ impl World {
     /// bodies in one write.
     fn send_positions(
         &mut self,
-        gpu: &Gpu,
+        gpu: &GpuContext,
         scene: &Scene,
         motion: Motion,
         resident: &ResidentEnds<'_>,
@@ -498,27 +503,27 @@ impl World {
 }
 
 /// The parts of a step, then those of a frame that are none of them.
-fn union([still, moving]: &[Vec<Held>; 2]) -> Vec<Held> {
+fn union([still, moving]: &[Vec<HeldPart>; 2]) -> Vec<HeldPart> {
     let mut parts = moving.clone();
     if parts.is_empty() {
         return still.clone();
     }
     let mut known: Vec<(BodyId, *const Clustering)> = parts.iter().map(key).collect();
     known.sort_unstable();
-    let is_new = |part: &&Held| known.binary_search(&key(part)).is_err();
+    let is_new = |part: &&HeldPart| known.binary_search(&key(part)).is_err();
     parts.extend(still.iter().filter(is_new).cloned());
     parts
 }
 
 /// The ids of the bodies of parts, each once, in their order.
-fn ids(parts: &[Held]) -> Vec<BodyId> {
+fn ids(parts: &[HeldPart]) -> Vec<BodyId> {
     let mut ids: Vec<BodyId> = parts.iter().map(|part| part.id).collect();
     ids.sort_unstable();
     ids.dedup();
     ids
 }
 
-fn key(part: &Held) -> (BodyId, *const Clustering) {
+fn key(part: &HeldPart) -> (BodyId, *const Clustering) {
     (part.id, Arc::as_ptr(&part.clustering))
 }
 

@@ -41,7 +41,7 @@ const GROWN: f32 = 1.0 + 16.0 * f32::EPSILON;
 const FAR: f32 = (1u64 << 60) as f32;
 
 /// What rays hit: one list after the other, and where the lists end.
-pub(super) type Lists = (Vec<RayHit>, Vec<(usize, bool)>);
+pub(super) type HitLists = (Vec<RayHit>, Vec<(usize, bool)>);
 
 /// What rays hit.
 ///
@@ -52,14 +52,14 @@ pub(super) fn cast(
     bodies: &[(BodyId, Target<'_>)],
     rays: &[Ray],
     hits: Hit,
-    into: &mut Lists,
+    into: &mut HitLists,
     work: Work<'_>,
 ) -> Result<(), Error> {
     with_isa!(isa, cast_all, (
         bodies: &[(BodyId, Target<'_>)] = bodies,
         rays: &[Ray] = rays,
         hits: Hit = hits,
-        into: &mut Lists = into,
+        into: &mut HitLists = into,
         work: Work<'_> = work,
     ) -> Result<(), Error>)
 }
@@ -70,10 +70,10 @@ fn cast_all<S: Simd>(
     bodies: &[(BodyId, Target<'_>)],
     rays: &[Ray],
     hits: Hit,
-    into: &mut Lists,
+    into: &mut HitLists,
     work: Work<'_>,
 ) -> Result<(), Error> {
-    let mut search = Search {
+    let mut search = RaySearch {
         looks: Looks::new(work),
         hits,
         limit: f64::INFINITY,
@@ -93,7 +93,7 @@ fn cast_all<S: Simd>(
 }
 
 /// An element that a ray certainly meets.
-struct Candidate {
+struct RayCandidate {
     /// The ray does not come to it before this.
     low: f64,
     /// The place of the body among those that are looked at.
@@ -124,16 +124,16 @@ impl Met {
 }
 
 /// A hit among others of its ray.
-struct Found {
+struct RayFound {
     met: Met,
     body: usize,
     element: ElementIx,
     corners: Corners,
 }
 
-impl Found {
-    fn new(candidate: Candidate, bodies: &[(BodyId, Target<'_>)], ray: &Ray) -> Option<Self> {
-        let Candidate { body, slot, .. } = candidate;
+impl RayFound {
+    fn new(candidate: RayCandidate, bodies: &[(BodyId, Target<'_>)], ray: &Ray) -> Option<Self> {
+        let RayCandidate { body, slot, .. } = candidate;
         let target = bodies[body].1;
         let corners = corners(target, slot);
         let inside = || {
@@ -149,7 +149,7 @@ impl Found {
             })
         };
         let met = candidate.met.or_else(inside);
-        Some(Found {
+        Some(RayFound {
             met: met.or_else(|| Met::exactly(ray, corners.points()))?,
             body,
             element: target.boxes.clustering.order[slot],
@@ -158,7 +158,7 @@ impl Found {
     }
 
     /// The exact order of the hits of a ray.
-    fn compare(&self, other: &Found, ray: &Ray) -> Ordering {
+    fn compare(&self, other: &RayFound, ray: &Ray) -> Ordering {
         let exactly = || {
             let [one, two] = [self, other].map(|found| meet(ray, found.corners.points()));
             one.zip(two)
@@ -257,17 +257,17 @@ impl Slabs {
 }
 
 /// The search of one ray; the memory is kept for the next.
-struct Search<'a> {
+struct RaySearch<'a> {
     looks: Looks<'a>,
     hits: Hit,
     /// What the ray meets later is not asked for.
     limit: f64,
-    found: Vec<Candidate>,
+    found: Vec<RayCandidate>,
     /// When the ray comes to boxes, levels and nodes that wait.
     waiting: Vec<(f32, u32, u32)>,
 }
 
-impl Search<'_> {
+impl RaySearch<'_> {
     fn begin(&mut self, ray: &Ray) {
         self.found.clear();
         self.limit = ray.most;
@@ -344,9 +344,9 @@ impl Search<'_> {
             let slot = slots.start + lane;
             let corners = corners(target, slot);
             let (low, high, met) = match self.passes(ray, corners.points()) {
-                Passes::Not => continue,
-                Passes::Inside(low, high) => (low, high, None),
-                Passes::InDoubt => {
+                RayPasses::Not => continue,
+                RayPasses::Inside(low, high) => (low, high, None),
+                RayPasses::InDoubt => {
                     self.looks.step()?;
                     let Some(met) = Met::exactly(ray, corners.points()) else {
                         continue;
@@ -359,7 +359,7 @@ impl Search<'_> {
                 self.limit = high;
                 self.found.retain(|other| other.low <= high);
             }
-            self.found.push(Candidate {
+            self.found.push(RayCandidate {
                 low,
                 body,
                 slot,
@@ -372,16 +372,16 @@ impl Search<'_> {
     /// Whether floats tell that a ray misses a face, or meets it after the limit, or passes through
     /// its inside.
     #[inline(always)]
-    fn passes(&self, ray: &Ray, corners: &[Point]) -> Passes {
+    fn passes(&self, ray: &Ray, corners: &[Point]) -> RayPasses {
         let &[a, b, c] = corners else {
-            return Passes::InDoubt;
+            return RayPasses::InDoubt;
         };
         let d = &ray.direction;
         let [a, b, c] = [a, b, c].map(|corner| difference(&corner, &ray.origin));
         let largest = size(&a).max(size(&b)).max(size(&c));
         let of_way = size(d);
         if !MODERATE.contains(&largest) || !MODERATE.contains(&of_way) {
-            return Passes::InDoubt;
+            return RayPasses::InDoubt;
         }
         // The barycentrics times a common factor, whose sum that is.
         let error = ERROR * (largest * largest * of_way);
@@ -389,16 +389,16 @@ impl Search<'_> {
         let (of_b, of_c) = (dot(&c, &across), -dot(&b, &across));
         let are_apart = |x: f64, y: f64| x > error && y < -error || x < -error && y > error;
         if are_apart(of_b, of_c) {
-            return Passes::Not;
+            return RayPasses::Not;
         }
         let normal = cross(&difference(&b, &a), &difference(&c, &a));
         let slope = dot(d, &normal);
         let of_a = slope - of_b - of_c;
         if are_apart(of_a, of_b) || are_apart(of_a, of_c) {
-            return Passes::Not;
+            return RayPasses::Not;
         }
         if slope.abs() <= error {
-            return Passes::InDoubt;
+            return RayPasses::InDoubt;
         }
         let height = dot(&a, &normal);
         let of_height = ERROR * (largest * largest * largest);
@@ -406,13 +406,13 @@ impl Search<'_> {
         let (height, slope) = (sign * height, sign * slope);
         let low = (height - of_height) / (slope + error) * (1.0 - ROUNDING);
         if height < -of_height || low > self.limit {
-            return Passes::Not;
+            return RayPasses::Not;
         }
         let high = (height + of_height) / (slope - error) * (1.0 + ROUNDING);
         let is_inside = sign * of_a > error && sign * of_b > error && sign * of_c > error;
         match is_inside && height > of_height && high <= ray.most {
-            true => Passes::Inside(low, high),
-            false => Passes::InDoubt,
+            true => RayPasses::Inside(low, high),
+            false => RayPasses::InDoubt,
         }
     }
 
@@ -430,13 +430,13 @@ impl Search<'_> {
             return Ok(());
         }
         let found = self.found.drain(..);
-        let mut found = found.filter_map(|candidate| Found::new(candidate, bodies, ray));
+        let mut found = found.filter_map(|candidate| RayFound::new(candidate, bodies, ray));
         if self.hits == Hit::First {
             let first = found.min_by(|one, other| one.compare(other, ray));
             into.extend(first.map(|first| first.answer(bodies)));
             return Ok(());
         }
-        let mut all: Vec<Found> = Vec::new();
+        let mut all: Vec<RayFound> = Vec::new();
         for one in found.by_ref() {
             self.looks.step()?;
             all.push(one);
@@ -448,7 +448,7 @@ impl Search<'_> {
 }
 
 /// What floats tell of a ray and a face.
-enum Passes {
+enum RayPasses {
     Not,
     /// Through its inside, between these parameters.
     Inside(f64, f64),

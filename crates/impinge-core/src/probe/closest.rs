@@ -66,9 +66,9 @@ fn all_closest<S: Simd, R: Real>(
     found: &mut [Option<ClosestElement>],
     work: Work<'_>,
 ) -> Result<(), Error> {
-    let mut search = Search::new(work);
+    let mut search = PointSearch::new(work);
     let mut order: Vec<(f64, usize)> = Vec::new();
-    let mut likely: Option<Candidate> = None;
+    let mut likely: Option<PointCandidate> = None;
     for (point, found) in points.iter().zip(found) {
         let point = point.map(R::widen);
         search.begin(most);
@@ -96,7 +96,7 @@ fn all_closest<S: Simd, R: Real>(
 
 /// An element that may be nearest.
 #[derive(Debug, Clone, Copy)]
-struct Candidate {
+struct PointCandidate {
     /// The distance is certainly not below this.
     low: f64,
     /// The place of the body among those that are looked at.
@@ -105,7 +105,7 @@ struct Candidate {
     slot: usize,
 }
 
-impl Candidate {
+impl PointCandidate {
     fn corners(&self, bodies: &[(BodyId, Target<'_>)]) -> Corners {
         let (_, target) = &bodies[self.body];
         corners(target, self.slot)
@@ -153,7 +153,7 @@ fn corners(target: &Target<'_>, slot: usize) -> Corners {
 }
 
 /// The search for one point; the memory is kept for the next.
-struct Search<'a> {
+struct PointSearch<'a> {
     looks: Looks<'a>,
     /// The nearest element is certainly not farther away.
     high: f64,
@@ -162,14 +162,14 @@ struct Search<'a> {
     /// About the shortest way from that element to the point, and its length times `high`.
     way: Point,
     level: f64,
-    candidates: Vec<Candidate>,
+    candidates: Vec<PointCandidate>,
     /// Squared distances of boxes, levels and nodes that wait.
     waiting: Vec<(f64, usize, usize)>,
 }
 
-impl<'a> Search<'a> {
+impl<'a> PointSearch<'a> {
     fn new(work: Work<'a>) -> Self {
-        Search {
+        PointSearch {
             looks: Looks::new(work),
             high: f64::INFINITY,
             limit: f64::INFINITY,
@@ -291,7 +291,7 @@ impl<'a> Search<'a> {
                 self.tighten(high, way);
                 self.candidates.retain(|other| other.low <= high);
             }
-            self.candidates.push(Candidate { low, body, slot });
+            self.candidates.push(PointCandidate { low, body, slot });
         }
     }
 
@@ -303,10 +303,10 @@ impl<'a> Search<'a> {
         &mut self,
         bodies: &[(BodyId, Target<'_>)],
         point: &Point,
-    ) -> Result<Option<Candidate>, Error> {
+    ) -> Result<Option<PointCandidate>, Error> {
         let mut candidates = std::mem::take(&mut self.candidates);
         candidates.sort_unstable_by_key(|candidate| candidate.name(bodies));
-        let mut best: Option<Candidate> = None;
+        let mut best: Option<PointCandidate> = None;
         for &candidate in &candidates {
             if let Some(best) = best {
                 self.looks.step()?;

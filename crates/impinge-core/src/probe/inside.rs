@@ -75,7 +75,7 @@ fn all_places<S: Simd, R: Real>(
             None => Way::out(&whole, &at),
             Some(_) => (Way::ALONG_X, at),
         };
-        let mut found = Found::default();
+        let mut found = FoundAround::default();
         descent.start(target.boxes);
         while let Some(cluster) = descent.next(simd, target.boxes, &query) {
             n_seen += 1;
@@ -104,7 +104,7 @@ fn all_places<S: Simd, R: Real>(
 
 /// What the elements that were looked at say about a point.
 #[derive(Debug, Default)]
-struct Found {
+struct FoundAround {
     winding: i32,
     /// Whether the point is in a tetrahedron.
     is_held: bool,
@@ -114,7 +114,7 @@ struct Found {
     is_settled: bool,
 }
 
-impl Found {
+impl FoundAround {
     #[inline]
     fn add_face(&mut self, target: Target<'_>, slot: usize, point: &Point, way: Way) {
         let Elements::Triangles(faces) = &target.boxes.clustering.corners else {

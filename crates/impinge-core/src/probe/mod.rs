@@ -205,7 +205,7 @@ impl Probes {
             // Rays that start near each other, one after the other, find memory in the caches.
             let order = order::along_curve(origins);
             let size = work.workers.task(TASK);
-            let mut tasks: Vec<(&[u32], cast::Lists)> = order
+            let mut tasks: Vec<(&[u32], cast::HitLists)> = order
                 .chunks(size)
                 .map(|some| (some, Default::default()))
                 .collect();

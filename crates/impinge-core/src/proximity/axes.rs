@@ -76,7 +76,7 @@ fn unit(p: Point) -> Option<Point> {
 
 /// The boxes of two bodies' nodes along some axes.
 #[derive(Debug)]
-pub(super) struct View {
+pub(super) struct TurnedBoxes {
     pub axes: Axes,
     /// Which of the boxes is that of each cluster, for either body; [`UNKNOWN`] before it is asked
     /// for.
@@ -86,9 +86,9 @@ pub(super) struct View {
 
 const UNKNOWN: u32 = u32::MAX;
 
-impl View {
+impl TurnedBoxes {
     pub fn new(axes: Axes, trees: [&Tree; 2]) -> Self {
-        View {
+        TurnedBoxes {
             axes,
             box_ixs: trees.map(|tree| vec![UNKNOWN; tree.clustering.n_clusters()]),
             boxes: Vec::new(),

@@ -12,7 +12,7 @@
 use std::cmp::{Ordering, Reverse};
 use std::collections::BinaryHeap;
 
-use super::axes::{Axes, View};
+use super::axes::{Axes, TurnedBoxes};
 use super::features::{Gap, gap};
 use super::nearest::Nearest;
 use super::scale::Scale;
@@ -101,7 +101,7 @@ struct Best {
 struct FoundDistance {
     best: Best,
     /// The bodies along the best pair's shortest way.
-    view: Option<View>,
+    view: Option<TurnedBoxes>,
     /// Whether the best pair is another one than that of the view.
     is_newer: bool,
     /// What rounding may do to distances of boxes: along coordinate axes, and along others.
@@ -249,12 +249,12 @@ impl DistanceSearch<'_> {
         };
         match &mut found.view {
             Some(view) => view.turn_to(axes),
-            None => found.view = Some(View::new(axes, self.trees)),
+            None => found.view = Some(TurnedBoxes::new(axes, self.trees)),
         }
     }
 
     /// The boxes of two nodes in the view, if there is one.
-    fn turned(&self, view: &mut Option<View>, nodes: [Node; 2]) -> Option<[Extent; 2]> {
+    fn turned(&self, view: &mut Option<TurnedBoxes>, nodes: [Node; 2]) -> Option<[Extent; 2]> {
         let view = view.as_mut()?;
         Some([0, 1].map(|side| {
             let of_node = (self.bodies[side], self.trees[side], nodes[side]);

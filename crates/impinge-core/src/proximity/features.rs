@@ -7,19 +7,18 @@
 //! parameters that led to them. One fixed order of operations, no fused multiply-add: the same bits
 //! everywhere.
 
-/// A point, or a difference of points.
-type Vector = [f64; 3];
+use impinge_exact::Point;
 
-fn sub(p: Vector, q: Vector) -> Vector {
+fn sub(p: Point, q: Point) -> Point {
     [p[0] - q[0], p[1] - q[1], p[2] - q[2]]
 }
 
-pub(super) fn dot(p: Vector, q: Vector) -> f64 {
+pub(super) fn dot(p: Point, q: Point) -> f64 {
     p[0] * q[0] + p[1] * q[1] + p[2] * q[2]
 }
 
 /// `p + t d`
-fn along(p: Vector, t: f64, d: Vector) -> Vector {
+fn along(p: Point, t: f64, d: Point) -> Point {
     [p[0] + t * d[0], p[1] + t * d[1], p[2] + t * d[2]]
 }
 
@@ -27,11 +26,11 @@ fn along(p: Vector, t: f64, d: Vector) -> Vector {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Gap {
     pub squared: f64,
-    pub points: [Vector; 2],
+    pub points: [Point; 2],
 }
 
 impl Gap {
-    fn of(p: Vector, q: Vector) -> Self {
+    fn of(p: Point, q: Point) -> Self {
         let d = sub(q, p);
         Gap {
             squared: dot(d, d),
@@ -63,7 +62,7 @@ fn part(x: f64) -> f64 {
 }
 
 /// The nearest point of segment ab.
-fn on_segment(p: Vector, a: Vector, b: Vector) -> Vector {
+fn on_segment(p: Point, a: Point, b: Point) -> Point {
     let d = sub(b, a);
     along(a, part(dot(sub(p, a), d) / dot(d, d)), d)
 }
@@ -72,7 +71,7 @@ fn on_segment(p: Vector, a: Vector, b: Vector) -> Vector {
 ///
 /// The edges are always examined too. So a point of the triangle is found even if rounding
 /// misplaces the foot of the perpendicular.
-fn point_triangle(p: Vector, [a, b, c]: [Vector; 3]) -> Gap {
+fn point_triangle(p: Point, [a, b, c]: [Point; 3]) -> Gap {
     let (ab, ac, ap) = (sub(b, a), sub(c, a), sub(p, a));
     let (uu, uv, vv) = (dot(ab, ab), dot(ab, ac), dot(ac, ac));
     let (up, vp) = (dot(ab, ap), dot(ac, ap));
@@ -90,7 +89,7 @@ fn point_triangle(p: Vector, [a, b, c]: [Vector; 3]) -> Gap {
 }
 
 /// The nearest points of two segments.
-fn segments([p, q]: [Vector; 2], [r, s]: [Vector; 2]) -> Gap {
+fn segments([p, q]: [Point; 2], [r, s]: [Point; 2]) -> Gap {
     let (d, e, w) = (sub(q, p), sub(s, r), sub(p, r));
     let (a, b, c) = (dot(d, d), dot(d, e), dot(e, e));
     let (f, g) = (dot(d, w), dot(e, w));
@@ -129,7 +128,7 @@ fn features(n_corners: usize) -> Features {
 }
 
 /// The nearest points of two primitives of three or four corners each that do not meet.
-pub(super) fn gap(a: &[Vector], b: &[Vector]) -> Gap {
+pub(super) fn gap(a: &[Point], b: &[Point]) -> Gap {
     let (of_a, of_b) = (features(a.len()), features(b.len()));
     let mut least = Gap {
         squared: f64::INFINITY,
@@ -162,11 +161,11 @@ mod tests {
 
     /// The least distance of two triangles by numerical minimisation: never less than the true
     /// distance.
-    fn sampled(a: [Vector; 3], b: [Vector; 3]) -> f64 {
-        let blend = |t: &[Vector; 3], u: f64, v: f64| {
+    fn sampled(a: [Point; 3], b: [Point; 3]) -> f64 {
+        let blend = |t: &[Point; 3], u: f64, v: f64| {
             [0, 1, 2].map(|k| t[0][k] + u * (t[1][k] - t[0][k]) + v * (t[2][k] - t[0][k]))
         };
-        let nearest = |p: Vector, t: &[Vector; 3]| {
+        let nearest = |p: Point, t: &[Point; 3]| {
             // Grid search over barycentric coordinates, coarse to fine.
             let (mut best, mut at) = (f64::INFINITY, (0.0, 0.0));
             let mut step = 0.25;

@@ -18,10 +18,10 @@ pub(crate) type Numbered = (BodyId, Part, Number);
 
 /// Pairs by kind. Equal to itself and its clones only.
 #[derive(Debug, Clone)]
-pub(crate) struct PairSet(Arc<Held>);
+pub(crate) struct PairSet(Arc<HeldPairs>);
 
 #[derive(Debug)]
-struct Held {
+struct HeldPairs {
     pairs: [Vec<Named>; PairKind::ALL.len()],
     /// Their keys in the numbers of the last plan.
     keys: Mutex<Option<(Vec<Numbered>, SortedKeys)>>,
@@ -39,7 +39,7 @@ impl PairSet {
         for (kind, pair) in pairs {
             of_kinds[kind as usize].push(pair);
         }
-        PairSet(Arc::new(Held {
+        PairSet(Arc::new(HeldPairs {
             pairs: of_kinds,
             keys: Mutex::default(),
         }))

@@ -109,11 +109,11 @@ pub type ElementVertices<'a> = (BodyId, &'a [u32]);
 /// same time.
 #[derive(Clone)]
 pub struct PairFilter {
-    passes: Arc<Passes>,
+    passes: Arc<PairPasses>,
     is_early: bool,
 }
 
-type Passes = dyn Fn([ElementVertices<'_>; 2]) -> bool + Send + Sync;
+type PairPasses = dyn Fn([ElementVertices<'_>; 2]) -> bool + Send + Sync;
 
 impl PairFilter {
     /// A filter that lets the pairs pass for which a function is true. For one pair it must always

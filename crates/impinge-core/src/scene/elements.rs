@@ -340,14 +340,14 @@ impl Topology {
             face
         };
         /// How many tetrahedra share a face, and the corner opposite it in the first.
-        struct Shared {
+        struct SharedFace {
             n: u32,
             opposite: u32,
             is_surface: bool,
         }
-        let mut shared: HashMap<[u32; 3], Shared> = HashMap::with_capacity(2 * tets.len());
+        let mut shared: HashMap<[u32; 3], SharedFace> = HashMap::with_capacity(2 * tets.len());
         for (face, opposite) in tets.iter().flat_map(sides) {
-            let shared = shared.entry(sorted(face)).or_insert(Shared {
+            let shared = shared.entry(sorted(face)).or_insert(SharedFace {
                 n: 0,
                 opposite,
                 is_surface: true,

@@ -16,57 +16,57 @@ use std::sync::Arc;
 /// assert_eq!(own, shared);
 /// assert!(std::ptr::eq(&shared[..], &simulated[..]));
 /// ```
-pub struct PositionRows<R>(Held<R>);
+pub struct PositionRows<R>(HeldRows<R>);
 
-enum Held<R> {
+enum HeldRows<R> {
     Own(Vec<[R; 3]>),
-    Shared(Shared<R>),
+    Shared(SharedRows<R>),
 }
 
 /// A slice and the owner of its memory.
-struct Shared<R> {
+struct SharedRows<R> {
     rows: *const [[R; 3]],
     owner: Arc<dyn Any + Send + Sync>,
 }
 
-// SAFETY: a `Shared` is used like a reference to its rows, which may be sent if `R` is `Sync`. The
+// SAFETY: a `SharedRows` is used like a reference to its rows, which may be sent if `R` is `Sync`. The
 // owner is `Send` and `Sync`.
-unsafe impl<R: Sync> Send for Shared<R> {}
+unsafe impl<R: Sync> Send for SharedRows<R> {}
 // SAFETY: as above.
-unsafe impl<R: Sync> Sync for Shared<R> {}
+unsafe impl<R: Sync> Sync for SharedRows<R> {}
 
 impl<R: Copy> PositionRows<R> {
     /// Shares the rows of an owner, without a copy. The owner lives at least as long as these rows
     /// and their clones. It is asked for its rows once.
     pub fn shared<O: AsRef<[[R; 3]]> + Send + Sync + 'static>(owner: Arc<O>) -> Self {
         let rows: *const [[R; 3]] = (*owner).as_ref();
-        PositionRows(Held::Shared(Shared { rows, owner }))
+        PositionRows(HeldRows::Shared(SharedRows { rows, owner }))
     }
 
     /// The rows to be changed; shared ones are copied first.
     pub(crate) fn own(&mut self) -> &mut Vec<[R; 3]> {
-        if let Held::Shared(_) = self.0 {
-            self.0 = Held::Own(self.to_vec());
+        if let HeldRows::Shared(_) = self.0 {
+            self.0 = HeldRows::Own(self.to_vec());
         }
         match &mut self.0 {
-            Held::Own(rows) => rows,
-            Held::Shared(_) => unreachable!("copied above"),
+            HeldRows::Own(rows) => rows,
+            HeldRows::Shared(_) => unreachable!("copied above"),
         }
     }
 
     /// Copies as many rows as there are. Memory of one's own is reused.
     pub(crate) fn copy_from(&mut self, rows: &[[R; 3]]) {
         match &mut self.0 {
-            Held::Own(own) => own.copy_from_slice(rows),
-            Held::Shared(_) => self.0 = Held::Own(rows.to_vec()),
+            HeldRows::Own(own) => own.copy_from_slice(rows),
+            HeldRows::Shared(_) => self.0 = HeldRows::Own(rows.to_vec()),
         }
     }
 
     /// Bytes of one's own.
     pub(crate) fn bytes(&self) -> usize {
         match &self.0 {
-            Held::Own(rows) => size_of_val(&rows[..]),
-            Held::Shared(_) => 0,
+            HeldRows::Own(rows) => size_of_val(&rows[..]),
+            HeldRows::Shared(_) => 0,
         }
     }
 }
@@ -77,11 +77,11 @@ impl<R> Deref for PositionRows<R> {
     #[inline(always)]
     fn deref(&self) -> &[[R; 3]] {
         match &self.0 {
-            Held::Own(rows) => rows,
+            HeldRows::Own(rows) => rows,
             // SAFETY: `shared` got these rows from a reference to the owner. The `Arc` keeps the
             // owner alive and in its place, and while it exists nobody gets a `&mut` to the owner.
             // So the rows are borrowed as long as `self` is.
-            Held::Shared(shared) => unsafe { &*shared.rows },
+            HeldRows::Shared(shared) => unsafe { &*shared.rows },
         }
     }
 }
@@ -90,8 +90,8 @@ impl<R> Deref for PositionRows<R> {
 impl<R: Clone> Clone for PositionRows<R> {
     fn clone(&self) -> Self {
         PositionRows(match &self.0 {
-            Held::Own(rows) => Held::Own(rows.clone()),
-            Held::Shared(Shared { rows, owner }) => Held::Shared(Shared {
+            HeldRows::Own(rows) => HeldRows::Own(rows.clone()),
+            HeldRows::Shared(SharedRows { rows, owner }) => HeldRows::Shared(SharedRows {
                 rows: *rows,
                 owner: Arc::clone(owner),
             }),
@@ -113,7 +113,7 @@ impl<R: PartialEq> PartialEq for PositionRows<R> {
 
 impl<R> From<Vec<[R; 3]>> for PositionRows<R> {
     fn from(rows: Vec<[R; 3]>) -> Self {
-        PositionRows(Held::Own(rows))
+        PositionRows(HeldRows::Own(rows))
     }
 }
 

@@ -99,7 +99,7 @@ pub struct Sorter {
 }
 
 /// The runs of consecutive lower numbers, from `first` on.
-struct Task<'a> {
+struct SortTask<'a> {
     keys: &'a mut [u64],
     partners: &'a [AtomicU32],
     first: usize,
@@ -173,7 +173,7 @@ impl Sorter {
         workers.for_each(&mut vec![(); workers.n()], tasks.len(), |(), ix| {
             if let Ok(mut task) = tasks[ix].lock() {
                 let task = &mut *task;
-                with_isa!(isa, sort_runs, (task: &mut Task<'_> = task));
+                with_isa!(isa, sort_runs, (task: &mut SortTask<'_> = task));
             }
         });
         true
@@ -224,7 +224,7 @@ fn tasks<'a>(
     mut partners: &'a [AtomicU32],
     (mut first, mut ends): (usize, &'a [u32]),
     n_each: usize,
-) -> impl Iterator<Item = Task<'a>> {
+) -> impl Iterator<Item = SortTask<'a>> {
     let mut start = 0;
     std::iter::from_fn(move || {
         if ends.is_empty() {
@@ -233,7 +233,7 @@ fn tasks<'a>(
         let full = ends.partition_point(|&end| (end as usize) < start + n_each);
         let own = ends.split_off(..ends.len().min(full + 1))?;
         let end = own[own.len() - 1] as usize;
-        let task = Task {
+        let task = SortTask {
             keys: keys.split_off_mut(..end - start)?,
             partners: partners.split_off(..end - start)?,
             first,
@@ -246,8 +246,8 @@ fn tasks<'a>(
 
 /// Sorts the runs of a task.
 #[inline(always)]
-fn sort_runs(_: impl Simd, task: &mut Task<'_>) {
-    let Task {
+fn sort_runs(_: impl Simd, task: &mut SortTask<'_>) {
+    let SortTask {
         keys,
         partners,
         first,
@@ -255,7 +255,7 @@ fn sort_runs(_: impl Simd, task: &mut Task<'_>) {
     } = task;
     // Of the keys before this task.
     let offset = ends[ends.len() - 1] as usize - keys.len();
-    let mut batches = [const { Batch::new() }; N_BATCHES];
+    let mut batches = [const { SortBatch::new() }; N_BATCHES];
     let mut start = 0;
     for (lower, &end) in Number::each(*first..*first + ends.len()).zip(*ends) {
         let run = start..end as usize - offset;
@@ -292,7 +292,7 @@ struct Row([u32; LANES]);
 const END: Row = Row([u32::MAX; LANES]);
 
 /// Short runs, one per lane.
-struct Batch {
+struct SortBatch {
     rows: [Row; LONGEST],
     /// The lower number of each run, where its keys go, and how many.
     runs: [(Number, usize, usize); LANES],
@@ -301,9 +301,9 @@ struct Batch {
     n_rows: usize,
 }
 
-impl Batch {
+impl SortBatch {
     const fn new() -> Self {
-        Batch {
+        SortBatch {
             rows: [END; LONGEST],
             runs: [(Number::new(0), 0, 0); LANES],
             n: 0,

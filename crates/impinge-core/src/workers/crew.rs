@@ -12,7 +12,7 @@ use std::sync::PoisonError;
 use super::sync::{AtomicBool, AtomicU64, Mutex, Ordering, UnsafeCell, fence, park, pause};
 
 /// The work of a region: all workers call it, each with its number.
-pub(crate) type Work<'a> = dyn Fn(usize) + Sync + 'a;
+pub(crate) type RegionWork<'a> = dyn Fn(usize) + Sync + 'a;
 
 /// The state that caller and helpers share.
 ///
@@ -22,7 +22,7 @@ pub(crate) type Work<'a> = dyn Fn(usize) + Sync + 'a;
 pub(crate) struct Crew {
     gate: AtomicU64,
     /// Valid while the gate is open or a helper is inside.
-    work: UnsafeCell<Option<*const Work<'static>>>,
+    work: UnsafeCell<Option<*const RegionWork<'static>>>,
     /// Whether the caller is in a region.
     busy: AtomicBool,
     /// Whether helpers should end.
@@ -45,9 +45,9 @@ unsafe impl Sync for Crew {}
 
 /// A value of the gate that a helper has seen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Seen(u64);
+pub(crate) struct GateValue(u64);
 
-impl Seen {
+impl GateValue {
     /// The number of the region that is open.
     pub fn open_region(self) -> Option<u64> {
         (self.0 & OPEN != 0).then_some(self.0 / REGION)
@@ -82,7 +82,7 @@ impl Crew {
     }
 
     /// Does the work as worker 0, together with the helpers that come. Panics if one of them did.
-    pub fn region(&self, work: &Work<'_>) {
+    pub fn region(&self, work: &RegionWork<'_>) {
         if self.busy.swap(true, Ordering::Acquire) {
             // A region within a region, or of another thread: the helpers are busy.
             return work(0);
@@ -91,8 +91,9 @@ impl Crew {
         self.take_panic();
         // SAFETY: only the lifetime changes; `Closing` makes sure that all helpers are out before
         // it ends.
-        let work_ptr =
-            unsafe { std::mem::transmute::<*const Work<'_>, *const Work<'static>>(work) };
+        let work_ptr = unsafe {
+            std::mem::transmute::<*const RegionWork<'_>, *const RegionWork<'static>>(work)
+        };
         // SAFETY: the gate is closed and no helper is inside; `busy` excludes other callers.
         self.work.with_mut(|slot| unsafe { *slot = Some(work_ptr) });
         let number = self.gate.load(Ordering::Relaxed) & !(REGION - 1);
@@ -112,13 +113,13 @@ impl Crew {
     }
 
     /// What a helper sees of the gate.
-    pub fn look(&self) -> Seen {
-        Seen(self.gate.load(Ordering::Acquire))
+    pub fn look(&self) -> GateValue {
+        GateValue(self.gate.load(Ordering::Acquire))
     }
 
     /// Does a helper's part of the region that it has seen to be open. False if that has changed,
     /// or for no reason.
-    pub fn help(&self, seat: usize, Seen(gate): Seen) -> bool {
+    pub fn help(&self, seat: usize, GateValue(gate): GateValue) -> bool {
         let entered = self.gate.compare_exchange_weak(
             gate,
             gate + INSIDE,
@@ -143,7 +144,7 @@ impl Crew {
 
     /// Sleeps until woken, unless something has happened since the helper looked at the gate. A
     /// call that comes too early for it to be seen is lost: the region goes on without this helper.
-    pub fn sleep(&self, seat: usize, Seen(gate): Seen) {
+    pub fn sleep(&self, seat: usize, GateValue(gate): GateValue) {
         self.asleep[seat - 1].store(true, Ordering::Relaxed);
         fence(Ordering::SeqCst);
         if self.gate.load(Ordering::Acquire) == gate && !self.quit.load(Ordering::Relaxed) {

@@ -40,15 +40,18 @@ pub(crate) trait Coordinate: Factor<Product: Factor<Product: Factor>> {}
 impl<T: Factor<Product: Factor<Product: Factor>>> Coordinate for T {}
 
 /// A vector of integers.
-pub(crate) type Vector<T = Integer> = [T; 3];
+pub(crate) type WholeVector<T = Integer> = [T; 3];
 
 #[inline]
-pub(crate) fn difference<T: Whole>(a: &Vector<T>, b: &Vector<T>) -> Vector<T> {
+pub(crate) fn difference<T: Whole>(a: &WholeVector<T>, b: &WholeVector<T>) -> WholeVector<T> {
     [a[0].minus(&b[0]), a[1].minus(&b[1]), a[2].minus(&b[2])]
 }
 
 #[inline]
-pub(crate) fn cross<T: Factor>([x, y, z]: &Vector<T>, [u, v, w]: &Vector<T>) -> Vector<T::Product> {
+pub(crate) fn cross<T: Factor>(
+    [x, y, z]: &WholeVector<T>,
+    [u, v, w]: &WholeVector<T>,
+) -> WholeVector<T::Product> {
     [
         y.product(w).minus(&z.product(v)),
         z.product(u).minus(&x.product(w)),
@@ -57,7 +60,7 @@ pub(crate) fn cross<T: Factor>([x, y, z]: &Vector<T>, [u, v, w]: &Vector<T>) -> 
 }
 
 #[inline]
-pub(crate) fn dot<T: Factor>(a: &Vector<T>, b: &Vector<T>) -> T::Product {
+pub(crate) fn dot<T: Factor>(a: &WholeVector<T>, b: &WholeVector<T>) -> T::Product {
     let first = a[0].product(&b[0]).plus(&a[1].product(&b[1]));
     first.plus(&a[2].product(&b[2]))
 }

@@ -20,7 +20,7 @@ use crate::Sign;
 pub(crate) struct Polynomial(Vec<Integer>);
 
 /// A vector whose coordinates are polynomials of one degree.
-pub(crate) type Vector = [Polynomial; 3];
+pub(crate) type PolynomialVector = [Polynomial; 3];
 
 impl Polynomial {
     /// A number that moves from one value to another.
@@ -228,17 +228,17 @@ pub(crate) fn square_of_sum() -> Polynomial {
 }
 
 /// a - b
-pub(crate) fn difference(a: &Vector, b: &Vector) -> Vector {
+pub(crate) fn difference(a: &PolynomialVector, b: &PolynomialVector) -> PolynomialVector {
     core::array::from_fn(|k| &a[k] - &b[k])
 }
 
 /// a x b
-pub(crate) fn cross(a: &Vector, b: &Vector) -> Vector {
+pub(crate) fn cross(a: &PolynomialVector, b: &PolynomialVector) -> PolynomialVector {
     [(1, 2), (2, 0), (0, 1)].map(|(i, j)| &a[i].product(&b[j]) - &a[j].product(&b[i]))
 }
 
 /// a . b
-pub(crate) fn dot(a: &Vector, b: &Vector) -> Polynomial {
+pub(crate) fn dot(a: &PolynomialVector, b: &PolynomialVector) -> Polynomial {
     &(&a[0].product(&b[0]) + &a[1].product(&b[1])) + &a[2].product(&b[2])
 }
 

@@ -8,9 +8,9 @@ use alloc::vec::Vec;
 use core::cmp::Ordering;
 
 use super::features::PolygonPart;
-use super::nearest::Polygon;
+use super::nearest::ExactPolygon;
 use super::reach::Reach;
-use super::rounded::{self, Closest, between, quotient};
+use super::rounded::{self, NearestPoints, between, quotient};
 use super::{Feature, NearestFeatures, filter, nearest};
 use crate::algebra::Integer;
 use crate::element_pair::ElementPair;
@@ -181,12 +181,12 @@ pub fn closest_of_elements(a: &[Point], b: &[Point]) -> (NearestOfElements, f64,
     }
     let nearby = Nearby::new(a, b);
     match nearby.way {
-        Way::Between(simple) => {
+        NearestWay::Between(simple) => {
             let closest = super::closest_points(simple.pair, &simple.points);
             let points = simple.in_order(closest.points);
             (nearby.nearest, closest.distance, points)
         }
-        Way::Crossing(point) => (nearby.nearest, 0.0, [point, point]),
+        NearestWay::Crossing(point) => (nearby.nearest, 0.0, [point, point]),
     }
 }
 
@@ -248,7 +248,7 @@ impl Simple {
     fn distance_below(&self) -> f64 {
         let bounds = filter::bounds(self.pair, &self.points);
         bounds.and_then(below_by_bounds).unwrap_or_else(|| {
-            let Closest { distance, .. } = super::closest_points(self.pair, &self.points);
+            let NearestPoints { distance, .. } = super::closest_points(self.pair, &self.points);
             // Wrong by a few units in the last place, which this makes up for many times.
             let mut below = distance * (1.0 - 0.5 * POWER_20);
             // But for the smallest numbers, which have few bits.
@@ -341,10 +341,10 @@ impl PartOfPair {
 /// How two elements that no [`ElementPair`] stands for are nearest.
 struct Nearby {
     nearest: NearestOfElements,
-    way: Way,
+    way: NearestWay,
 }
 
-enum Way {
+enum NearestWay {
     /// Nearest points of a vertex and a face, or of two edges.
     Between(Simple),
     /// Where an edge passes through a face.
@@ -366,9 +366,9 @@ impl Nearby {
             .fold(f64::INFINITY, |most: f64, bounds| most.min(bounds[1]));
         // Those that may be nearest, compared exactly.
         let near = parts.iter().zip(&bounds).filter(|(_, of)| of[0] <= most);
-        let mut best: Option<Measured<'_>> = None;
+        let mut best: Option<MeasuredPart<'_>> = None;
         let mut has_tie = false;
-        for part in near.map(|(part, _)| Measured::new(part)) {
+        for part in near.map(|(part, _)| MeasuredPart::new(part)) {
             let Some(other) = &best else {
                 best = Some(part);
                 continue;
@@ -397,7 +397,7 @@ impl Nearby {
                     // Two faces that cross share a segment.
                     is_parallel: a.len() == b.len(),
                 },
-                way: Way::Crossing(point),
+                way: NearestWay::Crossing(point),
             };
         }
         Self {
@@ -405,24 +405,24 @@ impl Nearby {
                 features: best.features.map(|(_, feature)| feature),
                 is_parallel: has_tie || best.is_flat,
             },
-            way: Way::Between(best.part.simple),
+            way: NearestWay::Between(best.part.simple),
         }
     }
 }
 
 /// A part, its nearest features and its distance as an exact fraction.
-struct Measured<'a> {
+struct MeasuredPart<'a> {
     part: &'a PartOfPair,
     features: [(u8, Feature); 2],
     is_flat: bool,
-    polygon: Polygon<Integer>,
+    polygon: ExactPolygon<Integer>,
     nearest: PolygonPart,
 }
 
-impl<'a> Measured<'a> {
+impl<'a> MeasuredPart<'a> {
     fn new(part: &'a PartOfPair) -> Self {
         let Simple { pair, points, .. } = &part.simple;
-        let polygon = Polygon::of_any_size(*pair, points, &Reach::from(0.0));
+        let polygon = ExactPolygon::of_any_size(*pair, points, &Reach::from(0.0));
         let nearest = polygon.nearest();
         let is_flat = polygon.is_flat();
         Self {

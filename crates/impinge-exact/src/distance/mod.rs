@@ -31,7 +31,7 @@ mod rounded;
 mod tests;
 
 use super::Point;
-use super::algebra::fixed::{Vector, cross, difference, dot};
+use super::algebra::fixed::{WholeVector, cross, difference, dot};
 use super::element_pair::ElementPair;
 pub use apart::{Apart8, apart_by_lane, shares_apart};
 pub use elements::{NearestOfElements, are_within_certainly, elements_are_within};
@@ -46,7 +46,7 @@ pub use moving::first_within;
 pub use nearest::nearest_features;
 pub use point::{compare_point_distances, point_distance_below, point_distance_bounds};
 pub use reach::Reach;
-pub use rounded::{Closest, closest_points};
+pub use rounded::{NearestPoints, closest_points};
 
 /// Whether the distance of two elements is at most `distance`.
 ///

@@ -3,10 +3,10 @@
 use alloc::vec::Vec;
 
 use crate::algebra::{
-    Polynomial, Root, Roots, Time, Vector, cross, difference, dot, square_of_sum,
+    Polynomial, PolynomialVector, Root, Roots, Time, cross, difference, dot, square_of_sum,
 };
 use crate::element_pair::ElementPair;
-use crate::sweep::{Contact, Polygon};
+use crate::sweep::{Contact, SweptPolygon};
 use crate::{Point, Sign, first_contact};
 
 use super::are_within;
@@ -57,13 +57,13 @@ pub(super) fn first_within_by_roots(
     end: &[Point; 4],
     distance: f64,
 ) -> Option<Contact> {
-    let (polygon, distance) = Polygon::with_distance(pair.corners(), start, end, distance);
+    let (polygon, distance) = SweptPolygon::with_distance(pair.corners(), start, end, distance);
     let square = &distance * &distance;
     let corners = polygon.corners();
     let n = corners.len();
     let n_edges = if n > 2 { n } else { n - 1 };
-    let edges: Vec<Edge> = (0..n_edges)
-        .map(|ix| Edge::new(&corners[ix], &corners[(ix + 1) % n]))
+    let edges: Vec<MovingEdge> = (0..n_edges)
+        .map(|ix| MovingEdge::new(&corners[ix], &corners[(ix + 1) % n]))
         .collect();
     let mut times: Vec<Time> = Vec::new();
     for corner in corners {
@@ -109,23 +109,23 @@ fn first_root(polynomial: Polynomial, mut is_valid: impl FnMut(&mut Root) -> boo
     Roots::of(polynomial).find_map(|mut root| is_valid(&mut root).then(|| root.floor()))
 }
 
-fn is_zero(root: &mut Root, vector: &Vector) -> bool {
+fn is_zero(root: &mut Root, vector: &PolynomialVector) -> bool {
     vector.iter().all(|x| root.sign_of(x).is_zero())
 }
 
 /// An edge of the polygon.
-struct Edge {
-    along: Vector,
+struct MovingEdge {
+    along: PolynomialVector,
     /// Corner x edge.
-    moment: Vector,
+    moment: PolynomialVector,
     /// Corner . edge: at most 0 where the origin's projection does not lie before the edge.
     to_start: Polynomial,
     /// Next corner . edge: at least 0 where the origin's projection does not lie after the edge.
     to_end: Polynomial,
 }
 
-impl Edge {
-    fn new(from: &Vector, to: &Vector) -> Self {
+impl MovingEdge {
+    fn new(from: &PolynomialVector, to: &PolynomialVector) -> Self {
         let along = difference(to, from);
         Self {
             moment: cross(from, &along),

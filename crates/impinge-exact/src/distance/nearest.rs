@@ -5,7 +5,7 @@ use core::cmp::Ordering;
 use super::features::{NearestFeatures, PolygonPart};
 use super::filter;
 use super::reach::Reach;
-use super::{Vector, cross, difference, dot};
+use super::{WholeVector, cross, difference, dot};
 use crate::algebra::{Coordinate, Eight, Factor, Four, Integer, Two, Unit, Whole, common_integers};
 use crate::element_pair::ElementPair;
 use crate::{Point, Sign};
@@ -33,9 +33,9 @@ pub fn nearest_features(pair: ElementPair, points: &[Point; 4]) -> NearestFeatur
 #[inline(never)]
 fn nearest_features_exactly(pair: ElementPair, points: &[Point; 4]) -> NearestFeatures {
     let reach = Reach::from(0.0);
-    match Polygon::short(pair, points, &reach) {
+    match ExactPolygon::short(pair, points, &reach) {
         Some(polygon) => polygon.nearest_features(pair),
-        None => Polygon::of_any_size(pair, points, &reach).nearest_features(pair),
+        None => ExactPolygon::of_any_size(pair, points, &reach).nearest_features(pair),
     }
 }
 
@@ -46,26 +46,26 @@ pub(super) fn are_within(pair: ElementPair, points: &[Point; 4], reach: &Reach) 
 
 /// The sign of how much farther apart than a distance two elements are, by integers alone.
 pub(super) fn compare(pair: ElementPair, points: &[Point; 4], reach: &Reach) -> Sign {
-    match Polygon::short(pair, points, reach) {
+    match ExactPolygon::short(pair, points, reach) {
         Some(polygon) => polygon.compare(),
-        None => Polygon::of_any_size(pair, points, reach).compare(),
+        None => ExactPolygon::of_any_size(pair, points, reach).compare(),
     }
 }
 
 /// The difference polygon at one moment, and a distance, as integers times one power of two.
-pub(super) struct Polygon<T: Coordinate> {
+pub(super) struct ExactPolygon<T: Coordinate> {
     n_corners: usize,
     /// With fewer than four corners, the list repeats.
-    corners: [Vector<T>; 4],
+    corners: [WholeVector<T>; 4],
     /// From each corner to the next. A single corner has no edge, a segment one.
-    edges: [Vector<T>; 4],
-    normal: Option<Vector<Two<T>>>,
+    edges: [WholeVector<T>; 4],
+    normal: Option<WholeVector<Two<T>>>,
     distance: T,
     /// The exponent of the power of two.
     pub(super) exponent: i64,
 }
 
-impl Polygon<i64> {
+impl ExactPolygon<i64> {
     /// The polygon in integers of fixed width, if its coordinates and the distance are short
     /// enough.
     pub(super) fn short(pair: ElementPair, points: &[Point; 4], reach: &Reach) -> Option<Self> {
@@ -84,7 +84,7 @@ impl Polygon<i64> {
     }
 }
 
-impl Polygon<Integer> {
+impl ExactPolygon<Integer> {
     /// The polygon in integers of any size.
     pub(super) fn of_any_size(pair: ElementPair, points: &[Point; 4], reach: &Reach) -> Self {
         let finite = |x: f64| if x.is_finite() { x } else { 0.0 };
@@ -122,9 +122,9 @@ impl Polygon<Integer> {
     }
 }
 
-impl<T: Coordinate> Polygon<T> {
-    fn new(n_corners: usize, corners: [Vector<T>; 4], distance: T, exponent: i64) -> Self {
-        let edges: [Vector<T>; 4] =
+impl<T: Coordinate> ExactPolygon<T> {
+    fn new(n_corners: usize, corners: [WholeVector<T>; 4], distance: T, exponent: i64) -> Self {
+        let edges: [WholeVector<T>; 4] =
             core::array::from_fn(|ix| difference(&corners[(ix + 1) % n_corners], &corners[ix]));
         let normal = (n_corners > 2)
             .then(|| cross(&edges[0], &edges[1]))
@@ -139,12 +139,12 @@ impl<T: Coordinate> Polygon<T> {
         }
     }
 
-    pub(super) fn corners(&self) -> &[Vector<T>] {
+    pub(super) fn corners(&self) -> &[WholeVector<T>] {
         &self.corners[..self.n_corners]
     }
 
     /// From each corner to the next. A single corner has no edge, a segment one.
-    pub(super) fn edges(&self) -> &[Vector<T>] {
+    pub(super) fn edges(&self) -> &[WholeVector<T>] {
         let n = self.n_corners;
         &self.edges[..if n > 2 { n } else { n - 1 }]
     }
@@ -165,7 +165,7 @@ impl<T: Coordinate> Polygon<T> {
         over.minus(&square.product(&under)).sign()
     }
 
-    fn after(&self, ix: usize) -> &Vector<T> {
+    fn after(&self, ix: usize) -> &WholeVector<T> {
         &self.corners[(ix + 1) % self.n_corners]
     }
 
@@ -186,7 +186,7 @@ impl<T: Coordinate> Polygon<T> {
     /// The nearest part of a polygon with a normal. If the origin's projection is in the polygon,
     /// that is the face. If the projection is beyond an edge and between its ends, it is that edge.
     /// Else it is the corner from which both edges lead away from the origin.
-    fn nearest_of_polygon(&self, normal: &Vector<Two<T>>) -> PolygonPart {
+    fn nearest_of_polygon(&self, normal: &WholeVector<Two<T>>) -> PolygonPart {
         let n = self.n_corners;
         let mut is_inner = [Sign::Positive; 4];
         for (ix, edge) in self.edges().iter().enumerate() {

@@ -7,7 +7,7 @@ use core::cmp::Ordering;
 
 use super::features::PolygonPart;
 use super::filter;
-use super::nearest::{self, Polygon};
+use super::nearest::{self, ExactPolygon};
 use super::reach::Reach;
 use crate::element_pair::ElementPair;
 use crate::{Point, Sign};
@@ -71,7 +71,7 @@ pub fn compare_point_distances(point: &Point, a: &[Point], b: &[Point]) -> Order
     }
     let [(a, of_a), (b, of_b)] = [a, b].map(|corners| {
         let (pair, points) = paired(point, corners);
-        let polygon = Polygon::of_any_size(pair, &points, &Reach::from(0.0));
+        let polygon = ExactPolygon::of_any_size(pair, &points, &Reach::from(0.0));
         let nearest = polygon.nearest();
         (polygon, nearest)
     });

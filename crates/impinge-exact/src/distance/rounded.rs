@@ -1,9 +1,9 @@
 //! Distances and nearest points as `f64`: quotients of exact integers, rounded.
 
 use super::features::PolygonPart;
-use super::nearest::Polygon;
+use super::nearest::ExactPolygon;
 use super::reach::Reach;
-use super::{NearestFeatures, Vector, cross, difference, dot};
+use super::{NearestFeatures, WholeVector, cross, difference, dot};
 use crate::Point;
 use crate::algebra::{Coordinate, Integer, Whole, common_integers};
 use crate::element_pair::ElementPair;
@@ -11,7 +11,7 @@ use crate::rounding::{power_of_two, root};
 
 /// Nearest points of two elements.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Closest {
+pub struct NearestPoints {
     /// The features that contain them; exact.
     pub nearest: NearestFeatures,
     /// Their distance, wrong by a few units in the last place at most. For decisions use
@@ -35,19 +35,23 @@ pub struct Closest {
 /// assert_eq!((closest.distance, closest.points[1]), (3.0, [0.0, 0.0, 0.0]));
 /// ```
 #[must_use]
-pub fn closest_points(pair: ElementPair, points: &[Point; 4]) -> Closest {
+pub fn closest_points(pair: ElementPair, points: &[Point; 4]) -> NearestPoints {
     let reach = Reach::from(0.0);
-    match Polygon::short(pair, points, &reach) {
+    match ExactPolygon::short(pair, points, &reach) {
         Some(polygon) => closest_of(&polygon, pair, points),
-        None => closest_of(&Polygon::of_any_size(pair, points, &reach), pair, points),
+        None => closest_of(
+            &ExactPolygon::of_any_size(pair, points, &reach),
+            pair,
+            points,
+        ),
     }
 }
 
 pub(super) fn closest_of<T: Coordinate>(
-    polygon: &Polygon<T>,
+    polygon: &ExactPolygon<T>,
     pair: ElementPair,
     points: &[Point; 4],
-) -> Closest {
+) -> NearestPoints {
     let part = polygon.nearest();
     let [p, q, r, s] = points;
     let points = match (pair, part) {
@@ -88,7 +92,7 @@ pub(super) fn closest_of<T: Coordinate>(
         (_, PolygonPart::Corner(ix)) => [*p, points[1 + ix]],
     };
     let (over, under) = polygon.square_of_distance(part);
-    Closest {
+    NearestPoints {
         nearest: part.named(pair, polygon.is_flat()),
         distance: root_of_quotient(&over, &under, polygon.exponent),
         points,
@@ -96,14 +100,14 @@ pub(super) fn closest_of<T: Coordinate>(
 }
 
 /// How far along an edge of the polygon the point nearest to the origin is.
-fn edge_share<T: Coordinate>(polygon: &Polygon<T>, ix: usize) -> f64 {
+fn edge_share<T: Coordinate>(polygon: &ExactPolygon<T>, ix: usize) -> f64 {
     let edge = &polygon.edges()[ix];
     -quotient(&dot(&polygon.corners()[ix], edge), &dot(edge, edge))
 }
 
 /// How far along the first edge and the second the foot of the perpendicular is: with V_0 + s E_0 +
 /// t E_1 = c N, s = -N . (V_0 x E_1) / |N|^2 and t = N . (V_0 x E_0) / |N|^2.
-fn face_shares<T: Coordinate>(polygon: &Polygon<T>) -> [f64; 2] {
+fn face_shares<T: Coordinate>(polygon: &ExactPolygon<T>) -> [f64; 2] {
     let corner = &polygon.corners()[0];
     let [first, second] = [&polygon.edges()[0], &polygon.edges()[1]];
     let normal = cross(first, second);
@@ -151,7 +155,8 @@ pub(super) fn heights(p: &Point, q: &Point, [a, b, c]: [&Point; 3]) -> [Integer;
     let points = [p, q, a, b, c];
     let numbers: [f64; 15] = core::array::from_fn(|ix| points[ix / 3][ix % 3]);
     let (integers, _) = common_integers(numbers);
-    let point = |ix: usize| -> Vector { core::array::from_fn(|k| integers[3 * ix + k].clone()) };
+    let point =
+        |ix: usize| -> WholeVector { core::array::from_fn(|k| integers[3 * ix + k].clone()) };
     let [a, b, c] = [2, 3, 4].map(point);
     let normal = cross(&difference(&b, &a), &difference(&c, &a));
     [0, 1].map(|ix| dot(&normal, &difference(&point(ix), &a)))

@@ -216,7 +216,7 @@ fn filters_never_contradict_integers_and_roots() {
 
 /// The nearest part in integers; none of flat polygons.
 fn exact_part(pair: ElementPair, points: &[Point; 4]) -> Option<PolygonPart> {
-    let polygon = nearest::Polygon::of_any_size(pair, points, &Reach::from(0.0));
+    let polygon = nearest::ExactPolygon::of_any_size(pair, points, &Reach::from(0.0));
     (!polygon.is_flat()).then(|| polygon.nearest())
 }
 
@@ -319,8 +319,8 @@ fn integers_of_fixed_width_answer_as_those_of_any_size() {
     let mut check = |pair: ElementPair, points: &[Point; 4], d: f64| {
         let case = || format!("{pair:?} {points:?} {d:?}");
         let reach = Reach::from(d);
-        let long = nearest::Polygon::of_any_size(pair, points, &reach);
-        let Some(short) = nearest::Polygon::short(pair, points, &reach) else {
+        let long = nearest::ExactPolygon::of_any_size(pair, points, &reach);
+        let Some(short) = nearest::ExactPolygon::short(pair, points, &reach) else {
             n_long += 1;
             return;
         };
@@ -391,8 +391,8 @@ fn the_largest_short_numbers_fit() {
         });
         for pair in PAIRS {
             for reach in [tiny, Reach::from(almost)] {
-                let long = nearest::Polygon::of_any_size(pair, &points, &reach);
-                let short = nearest::Polygon::short(pair, &points, &reach);
+                let long = nearest::ExactPolygon::of_any_size(pair, &points, &reach);
+                let short = nearest::ExactPolygon::short(pair, &points, &reach);
                 let Some(short) = short else {
                     panic!("{pair:?} {points:?} {reach:?}");
                 };
@@ -401,9 +401,9 @@ fn the_largest_short_numbers_fit() {
             }
             let half = Reach::from(0.5);
             let far = points.map(|point| point.map(|x| 2.0 * x));
-            let largest = nearest::Polygon::of_any_size(pair, &far, &half);
+            let largest = nearest::ExactPolygon::of_any_size(pair, &far, &half);
             let differs = largest.corners().iter().flatten().any(|x| !x.is_zero());
-            let refused = nearest::Polygon::short(pair, &far, &half).is_none();
+            let refused = nearest::ExactPolygon::short(pair, &far, &half).is_none();
             assert_eq!(refused, differs, "{pair:?} {far:?}");
         }
     }

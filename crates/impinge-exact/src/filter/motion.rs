@@ -2,13 +2,13 @@
 //!
 //! What it does: tests the difference polygon of two moving elements (see `crate::sweep`) over an
 //! interval of time, in plain `f64` or `f32`. One pair per lane. The search of [0, 1] for the first
-//! contact is a sequence of two tests of an interval, [`Motion::look`] and [`Motion::enclose`],
+//! contact is a sequence of two tests of an interval, [`PolygonMotion::look`] and [`PolygonMotion::enclose`],
 //! which have no branches. The caller stores the intervals ([`Search`]), and so can keep all lanes
 //! busy.
 //!
-//! In: the points at the start and at the end ([`Motion`]). Out: masks and times. Cost in
-//! operations for all lanes: [`Motion::are_far`] about 200, [`Motion::are_across`] 300,
-//! [`Motion::are_aside`] 400, [`Motion::look`] 500, [`Motion::enclose`] 900.
+//! In: the points at the start and at the end ([`PolygonMotion`]). Out: masks and times. Cost in
+//! operations for all lanes: [`PolygonMotion::are_far`] about 200, [`PolygonMotion::are_across`] 300,
+//! [`PolygonMotion::are_aside`] 400, [`PolygonMotion::look`] 500, [`PolygonMotion::enclose`] 900.
 //!
 //! Method: over [a, b] the corners V and edges E of the polygon are computed at a and at b, and
 //! from them the Bernstein coefficients over [a, b] of the cubic f = N . V_0 and of the quartics w
@@ -29,7 +29,7 @@ use super::number::Number;
 /// The number of corners is a value, not a type parameter: the functions below are long, and this
 /// compiles them only once per instruction set.
 #[derive(Clone, Copy)]
-pub struct Motion<T: Number> {
+pub struct PolygonMotion<T: Number> {
     /// 3 or 4.
     n_corners: usize,
     /// At the start and at the end.
@@ -45,7 +45,7 @@ pub struct Motion<T: Number> {
     has_margin: bool,
 }
 
-/// The result of [`Motion::look`] for an interval.
+/// The result of [`PolygonMotion::look`] for an interval.
 #[derive(Clone, Copy)]
 pub struct Look<T: Number> {
     /// Certainly no contact.
@@ -56,7 +56,7 @@ pub struct Look<T: Number> {
     pub hopeless: T::Mask,
 }
 
-/// The result of [`Motion::enclose`] for an interval in which f has one root.
+/// The result of [`PolygonMotion::enclose`] for an interval in which f has one root.
 #[derive(Clone, Copy)]
 pub struct Enclosed<T: Number> {
     /// Certainly contact at the root.
@@ -119,16 +119,17 @@ impl<T: Number> Cubic<T> {
     }
 }
 
-type Vector<T> = [T; 3];
+/// A point or a direction, one pair per lane.
+pub type Vec3<T> = [T; 3];
 
 // Here and below no closures are passed to library functions: those would be compiled on their
 // own, without the instruction set, and every operation would become a call.
 
-impl<T: Number> Motion<T> {
+impl<T: Number> PolygonMotion<T> {
     /// A vertex, point 0, and a face, points 1 to 3; or two edges, points 0 and 1, and points 2 and
     /// 3.
     #[inline(always)]
-    pub fn new(are_edges: bool, start: &[Vector<T>; 4], end: &[Vector<T>; 4]) -> Self {
+    pub fn new(are_edges: bool, start: &[Vec3<T>; 4], end: &[Vec3<T>; 4]) -> Self {
         if are_edges {
             Self::of(
                 4,
@@ -146,7 +147,7 @@ impl<T: Number> Motion<T> {
 }
 
 #[inline(always)]
-fn face_corners<T: Number>([p, a, b, c]: &[Vector<T>; 4]) -> [Vector<T>; 4] {
+fn face_corners<T: Number>([p, a, b, c]: &[Vec3<T>; 4]) -> [Vec3<T>; 4] {
     let zero = T::splat(0.0);
     [
         difference(a, p),
@@ -157,12 +158,12 @@ fn face_corners<T: Number>([p, a, b, c]: &[Vector<T>; 4]) -> [Vector<T>; 4] {
 }
 
 #[inline(always)]
-fn face_edges<T: Number>([_, a, b, c]: &[Vector<T>; 4]) -> [Vector<T>; 3] {
+fn face_edges<T: Number>([_, a, b, c]: &[Vec3<T>; 4]) -> [Vec3<T>; 3] {
     [difference(b, a), difference(c, b), difference(a, c)]
 }
 
 #[inline(always)]
-fn edge_corners<T: Number>([p, q, r, s]: &[Vector<T>; 4]) -> [Vector<T>; 4] {
+fn edge_corners<T: Number>([p, q, r, s]: &[Vec3<T>; 4]) -> [Vec3<T>; 4] {
     [
         difference(p, r),
         difference(q, r),
@@ -172,14 +173,14 @@ fn edge_corners<T: Number>([p, q, r, s]: &[Vector<T>; 4]) -> [Vector<T>; 4] {
 }
 
 #[inline(always)]
-fn edge_edges<T: Number>([p, q, r, s]: &[Vector<T>; 4]) -> [Vector<T>; 3] {
+fn edge_edges<T: Number>([p, q, r, s]: &[Vec3<T>; 4]) -> [Vec3<T>; 3] {
     let zero = T::splat(0.0);
     [difference(q, p), difference(r, s), [zero, zero, zero]]
 }
 
-impl<T: Number> Motion<T> {
+impl<T: Number> PolygonMotion<T> {
     #[inline(always)]
-    fn of(n_corners: usize, corners: [[Vector<T>; 4]; 2], edges: [[Vector<T>; 3]; 2]) -> Self {
+    fn of(n_corners: usize, corners: [[Vec3<T>; 4]; 2], edges: [[Vec3<T>; 3]; 2]) -> Self {
         let zero = T::splat(0.0);
         let mut motion = Self {
             n_corners,
@@ -354,7 +355,7 @@ impl<T: Number> Motion<T> {
 
     /// The corners at the start and at a time.
     #[inline(always)]
-    fn corners_until(&self, until: f64) -> [[Vector<T>; 4]; 2] {
+    fn corners_until(&self, until: f64) -> [[Vec3<T>; 4]; 2] {
         let t = T::splat(until);
         let start = self.corners[0];
         let mut end = start;
@@ -418,8 +419,8 @@ impl<T: Number> Motion<T> {
     #[inline(always)]
     fn sides_over(
         &self,
-        normal: &[Vector<T>; 3],
-        edges: &[[Vector<T>; 2]; 3],
+        normal: &[Vec3<T>; 3],
+        edges: &[[Vec3<T>; 2]; 3],
         a: T,
         b: T,
     ) -> (T::Mask, T::Mask) {
@@ -447,9 +448,9 @@ impl<T: Number> Motion<T> {
     #[inline(always)]
     fn sides(
         &self,
-        normal: &[Vector<T>; 3],
-        corner: &[Vector<T>; 2],
-        edges: &[[Vector<T>; 2]; 3],
+        normal: &[Vec3<T>; 3],
+        corner: &[Vec3<T>; 2],
+        edges: &[[Vec3<T>; 2]; 3],
         ix: usize,
         edges_size: T,
     ) -> (T::Mask, T::Mask) {
@@ -544,22 +545,22 @@ impl<T: Number> Motion<T> {
     }
 
     #[inline(always)]
-    fn corner_at(&self, ix: usize, t: T) -> Vector<T> {
+    fn corner_at(&self, ix: usize, t: T) -> Vec3<T> {
         between(&self.corners[0][ix], &self.corners[1][ix], t)
     }
 
     #[inline(always)]
-    fn edge_at(&self, ix: usize, t: T) -> Vector<T> {
+    fn edge_at(&self, ix: usize, t: T) -> Vec3<T> {
         between(&self.edges[0][ix], &self.edges[1][ix], t)
     }
 
     #[inline(always)]
-    fn corner_over(&self, ix: usize, a: T, b: T) -> [Vector<T>; 2] {
+    fn corner_over(&self, ix: usize, a: T, b: T) -> [Vec3<T>; 2] {
         [self.corner_at(ix, a), self.corner_at(ix, b)]
     }
 
     #[inline(always)]
-    fn edge_over(&self, ix: usize, a: T, b: T) -> [Vector<T>; 2] {
+    fn edge_over(&self, ix: usize, a: T, b: T) -> [Vec3<T>; 2] {
         [self.edge_at(ix, a), self.edge_at(ix, b)]
     }
 }
@@ -574,7 +575,7 @@ const WIDENINGS: [f64; 2] = [16.0, 1.0];
 
 /// f = N . V over an interval: f_0, 3 f_1, 3 f_2, f_3.
 #[inline(always)]
-fn cubic<T: Number>(normal: &[Vector<T>; 3], corner: &[Vector<T>; 2]) -> [T; 4] {
+fn cubic<T: Number>(normal: &[Vec3<T>; 3], corner: &[Vec3<T>; 2]) -> [T; 4] {
     [
         dot(&normal[0], &corner[0]),
         dot(&normal[0], &corner[1]) + dot(&normal[1], &corner[0]),
@@ -586,7 +587,7 @@ fn cubic<T: Number>(normal: &[Vector<T>; 3], corner: &[Vector<T>; 2]) -> [T; 4] 
 /// Whether on some axis all corners at both ends are farther from the origin than a bound, on the
 /// same side.
 #[inline(always)]
-fn are_apart_on_an_axis<T: Number>(start: &[Vector<T>], end: &[Vector<T>], bound: T) -> T::Mask {
+fn are_apart_on_an_axis<T: Number>(start: &[Vec3<T>], end: &[Vec3<T>], bound: T) -> T::Mask {
     let (mut least, mut most) = (start[0], start[0]);
     for (start, end) in start.iter().zip(end) {
         for axis in 0..3 {
@@ -604,9 +605,9 @@ fn are_apart_on_an_axis<T: Number>(start: &[Vector<T>], end: &[Vector<T>], bound
 /// this normal, which is taken as exact. `corner_size` is the largest one.
 #[inline(always)]
 fn are_before<T: Number>(
-    normal: &Vector<T>,
-    start: &[Vector<T>],
-    end: &[Vector<T>],
+    normal: &Vec3<T>,
+    start: &[Vec3<T>],
+    end: &[Vec3<T>],
     corner_size: T,
 ) -> T::Mask {
     let bound = T::splat(T::BOUND) * (size(normal) * corner_size) + T::splat(T::TINY[0]);
@@ -638,7 +639,7 @@ fn smaller<T: Number>(a: T, b: T) -> T {
 }
 
 #[inline(always)]
-pub(crate) fn between<T: Number>(p: &Vector<T>, q: &Vector<T>, t: T) -> Vector<T> {
+pub(crate) fn between<T: Number>(p: &Vec3<T>, q: &Vec3<T>, t: T) -> Vec3<T> {
     let rest = T::splat(1.0) - t;
     [
         p[0] * rest + q[0] * t,
@@ -650,7 +651,7 @@ pub(crate) fn between<T: Number>(p: &Vector<T>, q: &Vector<T>, t: T) -> Vector<T
 /// Bernstein coefficients of the cross product of two moving vectors: the first, twice the middle
 /// one, the last.
 #[inline(always)]
-fn cross_over<T: Number>(d: &[Vector<T>; 2], e: &[Vector<T>; 2]) -> [Vector<T>; 3] {
+fn cross_over<T: Number>(d: &[Vec3<T>; 2], e: &[Vec3<T>; 2]) -> [Vec3<T>; 3] {
     let (one, two) = (cross(&d[0], &e[1]), cross(&d[1], &e[0]));
     [
         cross(&d[0], &e[0]),
@@ -661,7 +662,7 @@ fn cross_over<T: Number>(d: &[Vector<T>; 2], e: &[Vector<T>; 2]) -> [Vector<T>; 
 
 /// The cross product, each difference of products rounded as it stands.
 #[inline(always)]
-pub fn cross<T: Number>(d: &Vector<T>, e: &Vector<T>) -> Vector<T> {
+pub fn cross<T: Number>(d: &Vec3<T>, e: &Vec3<T>) -> Vec3<T> {
     [
         d[1] * e[2] - d[2] * e[1],
         d[2] * e[0] - d[0] * e[2],
@@ -671,18 +672,18 @@ pub fn cross<T: Number>(d: &Vector<T>, e: &Vector<T>) -> Vector<T> {
 
 /// The scalar product, summed from the left.
 #[inline(always)]
-pub fn dot<T: Number>(d: &Vector<T>, e: &Vector<T>) -> T {
+pub fn dot<T: Number>(d: &Vec3<T>, e: &Vec3<T>) -> T {
     d[0] * e[0] + d[1] * e[1] + d[2] * e[2]
 }
 
 /// The first less the second.
 #[inline(always)]
-pub fn difference<T: Number>(p: &Vector<T>, q: &Vector<T>) -> Vector<T> {
+pub fn difference<T: Number>(p: &Vec3<T>, q: &Vec3<T>) -> Vec3<T> {
     [p[0] - q[0], p[1] - q[1], p[2] - q[2]]
 }
 
 /// The largest magnitude of the three coordinates.
 #[inline(always)]
-pub fn size<T: Number>(d: &Vector<T>) -> T {
+pub fn size<T: Number>(d: &Vec3<T>) -> T {
     d[0].abs().larger(d[1].abs()).larger(d[2].abs())
 }

@@ -1,6 +1,6 @@
 //! Batches of moving elements: eight pairs in `f64`, or sixteen in `f32` from tables of two groups.
 
-use super::motion::Motion;
+use super::motion::PolygonMotion;
 use super::number::{Lookup, Vector, load_vertex};
 use super::{BATCH, LANES, TABLE};
 use crate::rounding::round_down;
@@ -229,9 +229,9 @@ pub fn enclose<V: Vector>(pair: ElementPair, steps: &Steps8, spans: &Spans8) -> 
 }
 
 #[inline(always)]
-fn load<V: Vector>(pair: ElementPair, Steps8(steps): &Steps8, first: usize) -> Motion<V> {
+fn load<V: Vector>(pair: ElementPair, Steps8(steps): &Steps8, first: usize) -> PolygonMotion<V> {
     let [start, end] = steps;
-    Motion::new(
+    PolygonMotion::new(
         are_edges(pair),
         &load_end(start, first),
         &load_end(end, first),
@@ -319,16 +319,16 @@ fn look_up_motion<V: Lookup>(
     [group_a, group_b]: [&Moving64; 2],
     [slots_a, slots_b]: [&[u8; BATCH]; 2],
     first: usize,
-) -> Motion<V> {
+) -> PolygonMotion<V> {
     let (a, b) = (V::slots(slots_a, first), V::slots(slots_b, first));
     if are_edges(pair) {
-        Motion::new(
+        PolygonMotion::new(
             true,
             &two_edges::<V>(&group_a[0], a, &group_b[0], b),
             &two_edges::<V>(&group_a[1], a, &group_b[1], b),
         )
     } else {
-        Motion::new(
+        PolygonMotion::new(
             false,
             &vertex_and_face::<V>(&group_a[0], a, &group_b[0], b),
             &vertex_and_face::<V>(&group_a[1], a, &group_b[1], b),
@@ -382,7 +382,7 @@ pub(crate) fn search_contact(
 
 #[inline(never)]
 fn search_one(are_edges: bool, start: &[Point; 4], end: &[Point; 4]) -> (Next, [f64; 2]) {
-    let motion = Motion::new(are_edges, start, end);
+    let motion = PolygonMotion::new(are_edges, start, end);
     let mut search = Search::new(1.0);
     if motion.are_apart(1.0) {
         return (Next::Apart, search.span());

@@ -19,13 +19,11 @@
 //! 22 u |n| |V| for any known n and a corner V at any time of a step, and a blend of corners by
 //! less than 24 u |V| (`docs/exactness.md`, "Distances"). NaN and overflow end as unsure.
 
-use super::motion::{between, cross, difference, dot, size};
+use super::motion::{Vec3, between, cross, difference, dot, size};
 use super::moving::{are_edges, two_edges, vertex_and_face};
 use super::number::{self, Lookup, Number, load_points};
 use super::{BATCH, LANES, Moving64, Points8, Spans8, Verdict16};
 use crate::ElementPair;
-
-type Vector<T> = [T; 3];
 
 /// The number of a part of a polygon, bit after bit from the lowest: corner i is i, edge i is 4 +
 /// i, the face is 8. All bits are set where signs are not certain to tell.
@@ -36,7 +34,7 @@ pub(crate) type PartBits<M> = [M; 4];
 pub(crate) struct Polygon<T: Number = f64> {
     /// 1 to 4.
     n_corners: usize,
-    corners: [Vector<T>; 4],
+    corners: [Vec3<T>; 4],
 }
 
 // Here and below no closures are passed to library functions: those would be compiled on their own,
@@ -45,7 +43,7 @@ pub(crate) struct Polygon<T: Number = f64> {
 impl<T: Number> Polygon<T> {
     /// The polygon of a pair.
     #[inline(always)]
-    pub(crate) fn of_pair(pair: ElementPair, points: &[Vector<T>; 4]) -> Self {
+    pub(crate) fn of_pair(pair: ElementPair, points: &[Vec3<T>; 4]) -> Self {
         let mut corners = [[T::splat(0.0); 3]; 4];
         let numbers = pair.corners();
         for (corner, &[i, j]) in corners.iter_mut().zip(numbers) {
@@ -59,13 +57,13 @@ impl<T: Number> Polygon<T> {
 
     /// Its corners.
     #[inline(always)]
-    pub(crate) fn corners(&self) -> &[Vector<T>] {
+    pub(crate) fn corners(&self) -> &[Vec3<T>] {
         &self.corners[..self.n_corners]
     }
 
     /// Of a vertex, point 0, and a face; or of two edges, points 0 and 1, and points 2 and 3.
     #[inline(always)]
-    fn new(are_edges: bool, [p, q, r, s]: &[Vector<T>; 4]) -> Self {
+    fn new(are_edges: bool, [p, q, r, s]: &[Vec3<T>; 4]) -> Self {
         if are_edges {
             Polygon {
                 n_corners: 4,
@@ -108,7 +106,7 @@ impl<T: Number> Polygon<T> {
 
     /// A normal; zero for a point or a segment.
     #[inline(always)]
-    pub(crate) fn normal(&self) -> Vector<T> {
+    pub(crate) fn normal(&self) -> Vec3<T> {
         let [a, b, c, _] = &self.corners;
         if self.n_corners > 2 {
             cross(&difference(b, a), &difference(c, b))
@@ -129,7 +127,7 @@ impl<T: Number> Polygon<T> {
 
     /// A point of the polygon that is nearest to the origin, but for rounding.
     #[inline(always)]
-    pub(crate) fn nearest(&self, normal: &Vector<T>) -> Vector<T> {
+    pub(crate) fn nearest(&self, normal: &Vec3<T>) -> Vec3<T> {
         let (zero, one) = (T::splat(0.0), T::splat(1.0));
         let n = self.n_corners;
         let mut best = self.corners[0];
@@ -159,7 +157,7 @@ impl<T: Number> Polygon<T> {
     /// The foot of the perpendicular from the origin, as a blend of the corners, and where it lies
     /// in the polygon.
     #[inline(always)]
-    fn foot(&self, normal: &Vector<T>) -> (T::Mask, Vector<T>) {
+    fn foot(&self, normal: &Vec3<T>) -> (T::Mask, Vec3<T>) {
         let (zero, one) = (T::splat(0.0), T::splat(1.0));
         let [a, b, c, d] = &self.corners;
         let square = dot(normal, normal);
@@ -209,7 +207,7 @@ impl<T: Number> Polygon<T> {
     /// V . E is wrong by less than 16 u |V| |E|, a coordinate of N by less than 9 u |E_0| |E_1|,
     /// and w by less than 133 u |E_0| |E_1| |V| |E| (`docs/exactness.md`, "Distances").
     #[inline(always)]
-    pub(crate) fn nearest_part(&self, edges: &[Vector<T>; 4]) -> PartBits<T::Mask> {
+    pub(crate) fn nearest_part(&self, edges: &[Vec3<T>; 4]) -> PartBits<T::Mask> {
         let (zero, n) = (T::splat(0.0), self.n_corners);
         let never = zero.gt(zero);
         let size = self.size();
@@ -269,7 +267,7 @@ impl<T: Number> Polygon<T> {
     /// Two numbers between which the distance from the origin certainly is, and about the shortest
     /// way from there, where the mask is set.
     #[inline(always)]
-    pub(crate) fn bounds(&self) -> (T::Mask, [T; 2], Vector<T>) {
+    pub(crate) fn bounds(&self) -> (T::Mask, [T; 2], Vec3<T>) {
         let size = self.size();
         let normal = self.normal();
         let near = self.nearest(&normal);
@@ -284,7 +282,7 @@ impl<T: Number> Polygon<T> {
 
     /// About the shortest way from the origin, where the mask is set.
     #[inline(always)]
-    pub(crate) fn way(&self) -> (T::Mask, Vector<T>) {
+    pub(crate) fn way(&self) -> (T::Mask, Vec3<T>) {
         let is_small = T::splat(T::LARGEST).gt(self.size());
         (is_small, self.nearest(&self.normal()))
     }
@@ -292,7 +290,7 @@ impl<T: Number> Polygon<T> {
     /// A distance from a plane through the origin that all corners certainly have, all on one side;
     /// 0 if that is not certain.
     #[inline(always)]
-    fn least_beyond(&self, normal: &Vector<T>, largest: T) -> T {
+    fn least_beyond(&self, normal: &Vec3<T>, largest: T) -> T {
         let zero = T::splat(0.0);
         let [_, error] = beyond(normal, largest, zero);
         let mut lowest = dot(normal, &self.corners[0]);
@@ -327,7 +325,7 @@ impl<T: Number> Polygon<T> {
 /// The edges of the polygon of a vertex and a face or of two edges, each a difference of two input
 /// points. A triangle has no fourth edge.
 #[inline(always)]
-fn edges_of<T: Number>(are_edges: bool, [p, q, r, s]: &[Vector<T>; 4]) -> [Vector<T>; 4] {
+fn edges_of<T: Number>(are_edges: bool, [p, q, r, s]: &[Vec3<T>; 4]) -> [Vec3<T>; 4] {
     if are_edges {
         [
             difference(q, p),
@@ -344,7 +342,7 @@ fn edges_of<T: Number>(are_edges: bool, [p, q, r, s]: &[Vector<T>; 4]) -> [Vecto
 /// A number that the length of a computed point of a polygon of some size certainly does not
 /// exceed.
 #[inline(always)]
-pub(crate) fn most<T: Number>(point: &Vector<T>, size: T) -> T {
+pub(crate) fn most<T: Number>(point: &Vec3<T>, size: T) -> T {
     dot(point, point).sqrt() * T::splat(1.0 + T::BOUND)
         + (T::splat(T::BOUND) * size + T::splat(T::SHORTEST))
 }
@@ -352,7 +350,7 @@ pub(crate) fn most<T: Number>(point: &Vector<T>, size: T) -> T {
 /// The least n . V that is certainly farther away than a distance along n: the distance times the
 /// length of n, and the error. The second number is the part of it that is for errors.
 #[inline(always)]
-pub(crate) fn beyond<T: Number>(normal: &Vector<T>, largest: T, distance: T) -> [T; 2] {
+pub(crate) fn beyond<T: Number>(normal: &Vec3<T>, largest: T, distance: T) -> [T; 2] {
     let error = T::splat(T::BOUND) * (size(normal) * largest) + T::splat(T::TINY[0]);
     let length = dot(normal, normal).sqrt();
     [distance * length * T::splat(1.0 + T::BOUND) + error, error]
@@ -362,7 +360,7 @@ pub(crate) fn beyond<T: Number>(normal: &Vector<T>, largest: T, distance: T) -> 
 /// n is taken as exact; `largest` is the largest coordinate of a corner.
 #[inline(always)]
 pub(crate) fn are_beyond<T: Number>(
-    normal: &Vector<T>,
+    normal: &Vec3<T>,
     polygons: &[Polygon<T>],
     largest: T,
     distance: T,
@@ -418,7 +416,7 @@ fn signs<T: Number>(value: T, bound: T) -> [T::Mask; 2] {
 }
 
 #[inline(always)]
-fn select<T: Number>(mask: T::Mask, yes: &Vector<T>, no: &Vector<T>) -> Vector<T> {
+fn select<T: Number>(mask: T::Mask, yes: &Vec3<T>, no: &Vec3<T>) -> Vec3<T> {
     [
         T::select(mask, yes[0], no[0]),
         T::select(mask, yes[1], no[1]),
@@ -608,7 +606,7 @@ fn look_up<V: Lookup>(
     [slots_a, slots_b]: [&[u8; BATCH]; 2],
     first: usize,
     end: usize,
-) -> (bool, [Vector<V>; 4]) {
+) -> (bool, [Vec3<V>; 4]) {
     let (a, b) = (V::slots(slots_a, first), V::slots(slots_b, first));
     let are_edges = are_edges(pair);
     let points = if are_edges {

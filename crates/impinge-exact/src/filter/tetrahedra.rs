@@ -15,7 +15,7 @@ pub fn classify_by_faces<V: Vector>(pairs: &TetrahedronPairs8) -> Verdict {
     let mut verdict = Verdict::default();
     for first in (0..LANES).step_by(V::N) {
         let (a, b) = (load::<V>(&pairs.a, first), load::<V>(&pairs.b, first));
-        let (of_a, of_b) = (Sides::new(&b, &a), Sides::new(&a, &b));
+        let (of_a, of_b) = (TetrahedronSides::new(&b, &a), TetrahedronSides::new(&a, &b));
         verdict.yes |= V::bits(of_a.any_inside() | of_b.any_inside()) << first;
         verdict.no |= V::bits(of_a.parted_by_face() | of_b.parted_by_face()) << first;
     }
@@ -33,8 +33,8 @@ pub fn classify_tetrahedra<V: Vector>(pairs: &TetrahedronPairs8) -> Verdict {
     let mut verdict = Verdict::default();
     for first in (0..LANES).step_by(V::N) {
         let (a, b) = (load::<V>(&pairs.a, first), load::<V>(&pairs.b, first));
-        let (of_a, of_b) = (Sides::new(&b, &a), Sides::new(&a, &b));
-        let passes = Passes::new(&a, &b);
+        let (of_a, of_b) = (TetrahedronSides::new(&b, &a), TetrahedronSides::new(&a, &b));
+        let passes = EdgePasses::new(&a, &b);
         let (a_crosses, a_may) = passes.crossings(&of_a);
         let (b_crosses, b_may) = passes.turned().crossings(&of_b);
         let meet = of_a.any_inside() | of_b.any_inside() | a_crosses | b_crosses;
@@ -48,16 +48,16 @@ pub fn classify_tetrahedra<V: Vector>(pairs: &TetrahedronPairs8) -> Verdict {
 
 /// On which side each edge of one tetrahedron passes each edge of the other, where that is certain:
 /// `[edge][edge of the other]`.
-struct Passes<T: Number> {
+struct EdgePasses<T: Number> {
     positive: [[T::Mask; 6]; 6],
     negative: [[T::Mask; 6]; 6],
 }
 
-impl<T: Number> Passes<T> {
+impl<T: Number> EdgePasses<T> {
     #[inline(always)]
     fn new(a: &[[T; 3]; 4], b: &[[T; 3]; 4]) -> Self {
         let none = T::splat(0.0).gt(T::splat(0.0));
-        let mut passes = Passes {
+        let mut passes = EdgePasses {
             positive: [[none; 6]; 6],
             negative: [[none; 6]; 6],
         };
@@ -88,7 +88,7 @@ impl<T: Number> Passes<T> {
     /// determinant.
     #[inline(always)]
     fn turned(&self) -> Self {
-        let mut turned = Passes {
+        let mut turned = EdgePasses {
             positive: self.positive,
             negative: self.negative,
         };
@@ -104,7 +104,7 @@ impl<T: Number> Passes<T> {
     /// Whether an edge certainly crosses a face of the other tetrahedron, and whether one may.
     /// `sides`: where the edges' ends lie relative to these faces.
     #[inline(always)]
-    fn crossings(&self, sides: &Sides<T>) -> (T::Mask, T::Mask) {
+    fn crossings(&self, sides: &TetrahedronSides<T>) -> (T::Mask, T::Mask) {
         let none = T::splat(0.0).gt(T::splat(0.0));
         let (mut certain, mut possible) = (none, none);
         for (edge, [from, to]) in EDGES.into_iter().enumerate() {
@@ -190,11 +190,11 @@ fn load<V: Vector>([p, q, r, s]: &Tetrahedra8, first: usize) -> [[V; 3]; 4] {
 /// other, with all its vertices, or they are apart.
 #[inline]
 pub(crate) fn tetrahedra_answer(a: &[Point; 4], b: &[Point; 4]) -> Option<bool> {
-    let of_b = Sides::new(a, b);
+    let of_b = TetrahedronSides::new(a, b);
     if of_b.parted_by_face() {
         return Some(false);
     }
-    let of_a = Sides::new(b, a);
+    let of_a = TetrahedronSides::new(b, a);
     if of_a.parted_by_face() {
         return Some(false);
     }
@@ -217,7 +217,7 @@ const FACES: [[usize; 3]; 4] = [[1, 3, 2], [0, 2, 3], [0, 3, 1], [0, 1, 2]];
 const EDGES: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
 
 /// Where the four points of one tetrahedron lie relative to the faces of the other.
-struct Sides<T: Number = f64>([FaceSides<T>; 4]);
+struct TetrahedronSides<T: Number = f64>([FaceSides<T>; 4]);
 
 /// Where four points lie relative to the plane of one face.
 #[derive(Clone, Copy)]
@@ -263,7 +263,7 @@ impl<T: Number> FaceSides<T> {
     }
 }
 
-impl<T: Number> Sides<T> {
+impl<T: Number> TetrahedronSides<T> {
     /// Where `points` lie relative to the faces of `k`.
     #[inline(always)]
     fn new([k0, k1, k2, k3]: &[[T; 3]; 4], points: &[[T; 3]; 4]) -> Self {
@@ -314,7 +314,7 @@ enum Crossing {
 
 /// The edges of `points` against the faces of `k`. `sides`: where `points` lie relative to these
 /// faces.
-fn edges_cross(points: &[Point; 4], sides: &Sides, k: &[Point; 4]) -> Crossing {
+fn edges_cross(points: &[Point; 4], sides: &TetrahedronSides, k: &[Point; 4]) -> Crossing {
     let mut crossing = Crossing::None;
     for [from, to] in EDGES {
         let (p, q) = (&points[from], &points[to]);

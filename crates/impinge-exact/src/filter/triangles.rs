@@ -15,7 +15,7 @@ pub fn reject_by_planes<V: Vector>(pairs: &TrianglePairs8) -> u8 {
     let mut no = 0;
     for first in (0..LANES).step_by(V::N) {
         let (a, b) = (load::<V>(&pairs.a, first), load::<V>(&pairs.b, first));
-        no |= V::bits(Sides::new(&a, &b).are_apart()) << first;
+        no |= V::bits(VertexSides::new(&a, &b).are_apart()) << first;
     }
     no
 }
@@ -27,7 +27,7 @@ pub fn classify<V: Vector>(pairs: &TrianglePairs8) -> Verdict {
     let mut verdict = Verdict::default();
     for first in (0..LANES).step_by(V::N) {
         let (a, b) = (load::<V>(&pairs.a, first), load::<V>(&pairs.b, first));
-        let sides = Sides::new(&a, &b);
+        let sides = VertexSides::new(&a, &b);
         let (apart, sure) = (sides.are_apart(), sides.are_sure());
         let (meet, miss) = cross_on_line(&a, &b, &sides);
         let (yes, mut no) = (
@@ -62,7 +62,7 @@ pub fn classify_in_tables<V: Lookup>(
     for first in (0..BATCH).step_by(V::N) {
         let a = look_up::<V>(a, V::slots(slots_a, first));
         let b = look_up::<V>(b, V::slots(slots_b, first));
-        let sides = Sides::new(&a, &b);
+        let sides = VertexSides::new(&a, &b);
         let (apart, sure) = (sides.are_apart(), sides.are_sure());
         let among = among >> first & u16::MAX >> (BATCH - V::N);
         let (mut yes, mut no) = (0, V::bits(apart));
@@ -120,7 +120,7 @@ fn look_up_vertex<V: Lookup>([x, y, z]: &[[f32; TABLE]; 3], slots: V::Slots) -> 
 /// [`classify`] for one pair, with an early exit; `None` when unsure.
 #[inline]
 pub(crate) fn triangles_answer(a: &[Point; 3], b: &[Point; 3]) -> Option<bool> {
-    let sides = Sides::new(a, b);
+    let sides = VertexSides::new(a, b);
     if sides.are_apart() {
         return Some(false);
     }
@@ -136,12 +136,12 @@ pub(crate) fn triangles_answer(a: &[Point; 3], b: &[Point; 3]) -> Option<bool> {
 
 /// How far (times a constant of the plane) each vertex of each triangle is above the plane of the
 /// other.
-struct Sides<T: Number> {
+struct VertexSides<T: Number> {
     a: [Determinant<T>; 3],
     b: [Determinant<T>; 3],
 }
 
-impl<T: Number> Sides<T> {
+impl<T: Number> VertexSides<T> {
     #[inline(always)]
     fn new(a: &[[T; 3]; 3], b: &[[T; 3]; 3]) -> Self {
         Self {
@@ -211,7 +211,7 @@ fn all_sure<T: Number>(&[x, y, z]: &[Determinant<T>; 3]) -> T::Mask {
 fn cross_on_line<T: Number>(
     a: &[[T; 3]; 3],
     b: &[[T; 3]; 3],
-    sides: &Sides<T>,
+    sides: &VertexSides<T>,
 ) -> (T::Mask, T::Mask) {
     let (a_alone, a_above) = alone(&sides.a);
     let (b_alone, b_above) = alone(&sides.b);

@@ -32,7 +32,7 @@ use super::filter::{Next, contact_answer, search_contact};
 use super::rounding::round_down;
 use super::segment::segments_intersect;
 use super::triangle::segment_meets_triangle;
-pub(super) use polygon::Polygon;
+pub(super) use polygon::SweptPolygon;
 
 /// The first time at which two moving elements share a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -103,7 +103,7 @@ pub fn first_contact(pair: ElementPair, start: &[Point; 4], end: &[Point; 4]) ->
         (Next::Apart, _) => None,
         // One root of f lies between these times, which are not roots: it is the first contact.
         (Next::Contact, [low, high]) => {
-            let polygon = Polygon::new(pair.corners(), start, end);
+            let polygon = SweptPolygon::new(pair.corners(), start, end);
             Some(Contact::later(polygon.time_between(low, high)))
         }
         _ => first_contact_by_roots(pair, start, end),
@@ -120,7 +120,7 @@ fn first_contact_by_roots(
         return Some(Contact::AT_START);
     }
     shift::first_time(pair.corners(), start, end)
-        .unwrap_or_else(|| Polygon::new(pair.corners(), start, end).first_time())
+        .unwrap_or_else(|| SweptPolygon::new(pair.corners(), start, end).first_time())
         .map(Contact::later)
 }
 

@@ -3,23 +3,23 @@
 use alloc::vec::Vec;
 
 use crate::algebra::{
-    Integer, Polynomial, Root, Roots, Time, Vector, common_integers, cross, difference, dot,
-    floor_between,
+    Integer, Polynomial, PolynomialVector, Root, Roots, Time, common_integers, cross, difference,
+    dot, floor_between,
 };
 use crate::{Point, Sign};
 
 /// A convex polygon of one to four corners, which move linearly.
-pub(crate) struct Polygon {
-    corners: Vec<Vector>,
+pub(crate) struct SweptPolygon {
+    corners: Vec<PolynomialVector>,
 }
 
-impl Polygon {
+impl SweptPolygon {
     /// The polygon whose corners are differences of points, each given by two numbers of points.
     pub(super) fn new(corners: &[[usize; 2]], start: &[Point; 4], end: &[Point; 4]) -> Self {
         Self::with_distance(corners, start, end, 0.0).0
     }
 
-    /// [`Polygon::new`], and a distance as an integer times the same power of two.
+    /// [`SweptPolygon::new`], and a distance as an integer times the same power of two.
     pub(crate) fn with_distance(
         corners: &[[usize; 2]],
         start: &[Point; 4],
@@ -56,7 +56,7 @@ impl Polygon {
         floor_between(&plane_and_height(&self.corners).1, low, high)
     }
 
-    pub(crate) fn corners(&self) -> &[Vector] {
+    pub(crate) fn corners(&self) -> &[PolynomialVector] {
         &self.corners
     }
 
@@ -65,18 +65,18 @@ impl Polygon {
     pub(super) fn first_time(&self) -> Option<Time> {
         match &self.corners[..] {
             [corner] => first_at_corner(corner),
-            [a, b] => Edge::new(a, b).first_time(),
+            [a, b] => SweptEdge::new(a, b).first_time(),
             corners => first_in_face(corners),
         }
     }
 }
 
-/// [`Polygon::first_time`] of a triangle or a parallelogram.
+/// [`SweptPolygon::first_time`] of a triangle or a parallelogram.
 ///
 /// Let f = N . V_0 and w_i = N . (V_i x V_(i+1)). The origin is inside at t if and only if f(t) = 0
 /// and all w_i(t) > 0, or it is on an edge. If all w_i(t) are at least 0 and one is greater, f(t) =
 /// 0 is sufficient.
-fn first_in_face(corners: &[Vector]) -> Option<Time> {
+fn first_in_face(corners: &[PolynomialVector]) -> Option<Time> {
     let (normal, f) = plane_and_height(corners);
     if f.is_zero() {
         // The first contact is on an edge.
@@ -87,13 +87,13 @@ fn first_in_face(corners: &[Vector]) -> Option<Time> {
     if f.has_no_root() {
         return None;
     }
-    let edges: Vec<Edge> = edges(corners).collect();
+    let edges: Vec<SweptEdge> = edges(corners).collect();
     let sides: Vec<Polynomial> = edges.iter().map(|edge| dot(&normal, &edge.cross)).collect();
     Roots::of(f).find_map(|mut root| is_inside(&mut root, &sides, &edges).then(|| root.floor()))
 }
 
 /// N and f.
-fn plane_and_height(corners: &[Vector]) -> (Vector, Polynomial) {
+fn plane_and_height(corners: &[PolynomialVector]) -> (PolynomialVector, Polynomial) {
     let normal = cross(
         &difference(&corners[1], &corners[0]),
         &difference(&corners[2], &corners[1]),
@@ -103,7 +103,7 @@ fn plane_and_height(corners: &[Vector]) -> (Vector, Polynomial) {
 }
 
 /// Whether the origin is in the polygon at a root of f.
-fn is_inside(root: &mut Root, sides: &[Polynomial], edges: &[Edge]) -> bool {
+fn is_inside(root: &mut Root, sides: &[Polynomial], edges: &[SweptEdge]) -> bool {
     let mut all_zero = true;
     for side in sides {
         match root.sign_of(side) {
@@ -115,19 +115,19 @@ fn is_inside(root: &mut Root, sides: &[Polynomial], edges: &[Edge]) -> bool {
     !all_zero || edges.iter().any(|edge| edge.has_origin(root))
 }
 
-fn edges(corners: &[Vector]) -> impl Iterator<Item = Edge> {
-    (0..corners.len()).map(|ix| Edge::new(&corners[ix], &corners[(ix + 1) % corners.len()]))
+fn edges(corners: &[PolynomialVector]) -> impl Iterator<Item = SweptEdge> {
+    (0..corners.len()).map(|ix| SweptEdge::new(&corners[ix], &corners[(ix + 1) % corners.len()]))
 }
 
 /// An edge AB of the polygon. The origin is on it at t if and only if A x B = 0 and A . B <= 0
 /// there.
-struct Edge {
-    cross: Vector,
+struct SweptEdge {
+    cross: PolynomialVector,
     dot: Polynomial,
 }
 
-impl Edge {
-    fn new(a: &Vector, b: &Vector) -> Self {
+impl SweptEdge {
+    fn new(a: &PolynomialVector, b: &PolynomialVector) -> Self {
         Self {
             cross: cross(a, b),
             dot: dot(a, b),
@@ -162,7 +162,7 @@ impl Edge {
 
 /// The first time in (0, 1] at which a corner is at the origin, provided that it is not there at
 /// the start.
-fn first_at_corner(corner: &Vector) -> Option<Time> {
+fn first_at_corner(corner: &PolynomialVector) -> Option<Time> {
     let first = corner.iter().find(|x| !x.is_zero())?;
     Roots::of(first.clone()).find_map(|mut root| {
         corner

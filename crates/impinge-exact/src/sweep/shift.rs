@@ -10,7 +10,7 @@
 //!
 //! `docs/exactness.md`, "Continuous collision", has the proof and the bounds.
 
-use crate::algebra::fixed::{Factor, Vector, Whole, Wide, cross, difference, dot};
+use crate::algebra::fixed::{Factor, Whole, WholeVector, Wide, cross, difference, dot};
 use crate::algebra::{Time, Unit, floor_of_share};
 use crate::{Point, Sign};
 
@@ -36,7 +36,7 @@ pub(super) fn first_time(
         numbers[ix % 4 % n].map(|ix| &points[ix])
     });
     let (_, corners) = Unit::differences(pairs, 0.0)?;
-    let corners: [[Vector<i64>; 4]; 2] =
+    let corners: [[WholeVector<i64>; 4]; 2] =
         [0, 4].map(|first| core::array::from_fn(|ix| corners[first + ix]));
     let shift = |ix: usize| difference(&corners[1][ix], &corners[0][ix]);
     if (1..n).any(|ix| shift(ix) != shift(0)) {
@@ -118,7 +118,7 @@ impl TimeShare<i128> {
     }
 
     /// A moving point at this time, times a positive number.
-    fn blend(&self, [start, end]: [Vector<i64>; 2]) -> Vector<Wide<4>> {
+    fn blend(&self, [start, end]: [WholeVector<i64>; 2]) -> WholeVector<Wide<4>> {
         core::array::from_fn(|k| {
             let [start, end] = [start[k], end[k]].map(i128::from);
             start.product(&self.after).plus(&end.product(&self.before))

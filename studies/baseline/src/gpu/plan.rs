@@ -14,7 +14,7 @@
 //! grows its buffers and runs the pass again, as for impinge's own methods.
 
 use impinge_core::Error;
-use impinge_core::gpu::Gpu;
+use impinge_core::gpu::GpuContext;
 use impinge_core::gpu::buffers::{Storage, Uniform};
 use impinge_core::gpu::cells::CellRange;
 use impinge_core::gpu::clusters::Counted;
@@ -62,7 +62,7 @@ impl Buffers {
     }
 
     /// Resizes the buffers to the engine's capacities.
-    fn resize(&mut self, gpu: &Gpu, pass_buffers: &PassBuffers) -> Result<(), Error> {
+    fn resize(&mut self, gpu: &GpuContext, pass_buffers: &PassBuffers) -> Result<(), Error> {
         let capacities = pass_buffers.capacities();
         let n_blocks = capacities.entries.div_ceil(u64::from(BLOCK));
         self.firsts.resize(gpu, capacities.kept)?;

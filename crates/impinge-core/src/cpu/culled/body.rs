@@ -11,7 +11,7 @@ use crate::scene::index::ClusterIx;
 use crate::simd::runs::{Members, RUN};
 use crate::simd::{Lanes, Simd};
 
-use super::extents::{self, Extents, FreeSide, Intervals, Sides};
+use super::extents::{self, Extents, FreeSide, FreeSides, Intervals};
 use super::outlook::Outlook;
 
 /// Some clusters of a node of level 1: bit `k` for child `k`.
@@ -36,7 +36,7 @@ pub(crate) struct Culled {
     /// The intervals of the groups in the current pose.
     groups: Intervals,
     /// Groups whose clusters are to be sorted again at the frame's end.
-    unsorted: Sides,
+    unsorted: FreeSides,
     /// Clusters just found to lie beside the other bodies, and on which side.
     fresh: Vec<(ClusterIx, FreeSide)>,
     /// Clusters stay sorted if at least one in this many is in a group.
@@ -53,7 +53,7 @@ impl Culled {
             members: Vec::new(),
             n_vertices: 0,
             groups: Intervals::EMPTY,
-            unsorted: Sides::default(),
+            unsorted: FreeSides::default(),
             fresh: Vec::new(),
             one_in: tuning.culled_one_in,
             outlook: Outlook::new(tuning),
@@ -104,14 +104,14 @@ impl Culled {
     }
 
     /// The groups that are not beside a box.
-    pub(super) fn back_at(&self, other: &Bounds) -> Sides {
+    pub(super) fn back_at(&self, other: &Bounds) -> FreeSides {
         self.groups.back_at(other)
     }
 
     /// Ends the sorting. Returns whether all boxes must be found again.
     #[must_use]
     pub(super) fn end(&mut self) -> bool {
-        self.unsorted = Sides::default();
+        self.unsorted = FreeSides::default();
         std::mem::take(&mut self.is_sorted)
     }
 
@@ -125,7 +125,7 @@ impl Culled {
 
     /// Some groups have come back: their clusters are near from now on. False if groups have come
     /// back too often lately: then the caller ends the sorting.
-    pub(super) fn come_back(&mut self, groups: Sides, clustering: &Clustering) -> bool {
+    pub(super) fn come_back(&mut self, groups: FreeSides, clustering: &Clustering) -> bool {
         if !self.outlook.affords(groups) {
             return false;
         }
@@ -162,7 +162,7 @@ impl Culled {
             return false;
         };
         if !self.is_sorted {
-            self.unsorted = Sides::ALL;
+            self.unsorted = FreeSides::ALL;
             self.outlook.begin();
             self.n_vertices = n_vertices;
             self.sides.clear();

@@ -19,7 +19,7 @@ pub(super) fn insert(members: &mut [Members], vertex: u32, side: FreeSide) {
 }
 
 /// Removes all members from some groups.
-pub(super) fn clear(members: &mut [Members], groups: Sides) {
+pub(super) fn clear(members: &mut [Members], groups: FreeSides) {
     let mut kept: Members = [[!0; 3]; 2];
     for side in groups.sides() {
         for coordinate in (side.axis()..COORDINATES).step_by(3) {
@@ -95,7 +95,7 @@ impl Intervals {
     }
 
     /// Empties the intervals of some groups.
-    pub fn clear(&mut self, which: Sides) {
+    pub fn clear(&mut self, which: FreeSides) {
         for side in which.sides() {
             let (groups, axis) = (&mut self.0[side.end()], side.axis());
             groups.min[axis] = f32::INFINITY;
@@ -104,9 +104,9 @@ impl Intervals {
     }
 
     /// The groups that are not beside a box: the closed intervals share a number.
-    pub fn back_at(&self, other: &Bounds) -> Sides {
-        let mut back = Sides::default();
-        for side in Sides::ALL.sides() {
+    pub fn back_at(&self, other: &Bounds) -> FreeSides {
+        let mut back = FreeSides::default();
+        for side in FreeSides::ALL.sides() {
             let (groups, axis) = (&self.0[side.end()], side.axis());
             if groups.min[axis] <= other.max[axis] && other.min[axis] <= groups.max[axis] {
                 back.insert(side);
@@ -178,10 +178,10 @@ impl FreeSide {
 
 /// Some of the groups.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub(crate) struct Sides(u8);
+pub(crate) struct FreeSides(u8);
 
-impl Sides {
-    pub const ALL: Sides = Sides(0b11_1111);
+impl FreeSides {
+    pub const ALL: FreeSides = FreeSides(0b11_1111);
 
     fn insert(&mut self, side: FreeSide) {
         self.0 |= 1 << side.number();
@@ -191,8 +191,8 @@ impl Sides {
         self.0 >> side.number() & 1 == 1
     }
 
-    pub fn union(self, other: Sides) -> Sides {
-        Sides(self.0 | other.0)
+    pub fn union(self, other: FreeSides) -> FreeSides {
+        FreeSides(self.0 | other.0)
     }
 
     pub fn is_empty(self) -> bool {

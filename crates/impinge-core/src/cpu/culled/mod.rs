@@ -42,7 +42,7 @@ use crate::search::stats::Stats;
 use super::pairing::Worker;
 use super::world::{BodyCache, Caches, World};
 use crate::simd::Isa;
-use extents::Sides;
+use extents::FreeSides;
 
 /// Clusters are sorted in frames of at most this many bodies: more bodies are everywhere.
 const MOST_BODIES: usize = 8;
@@ -184,11 +184,11 @@ fn lane_pairs(plan: &Plan, part: PartIx) -> impl Iterator<Item = PartIx> {
 
 /// The groups of a part that are not beside all bodies that it could meet; `None` if its clusters
 /// are not sorted.
-fn back(world: World<'_>, part: PartIx) -> Option<Sides> {
+fn back(world: World<'_>, part: PartIx) -> Option<FreeSides> {
     let sorted = world.cache(part).sorted()?;
     let groups =
         lane_pairs(world.plan, part).map(|other| sorted.back_at(&world.cache(other).whole));
-    Some(groups.fold(Sides::default(), Sides::union))
+    Some(groups.fold(FreeSides::default(), FreeSides::union))
 }
 
 /// Ends the sorting of a body; all its boxes must be found again.

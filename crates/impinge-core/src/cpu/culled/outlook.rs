@@ -6,7 +6,7 @@ use std::ops::RangeInclusive;
 use crate::bvh::bounds::{Bounds, greater};
 use crate::query::tuning::Tuning;
 
-use super::extents::Sides;
+use super::extents::FreeSides;
 
 /// When a body's clusters should be sorted, and how cautiously.
 #[derive(Debug, Clone, Copy)]
@@ -88,7 +88,7 @@ impl Outlook {
     }
 
     /// Groups have come back: returns whether it pays to sort them again.
-    pub fn affords(&mut self, groups: Sides) -> bool {
+    pub fn affords(&mut self, groups: FreeSides) -> bool {
         for side in groups.sides() {
             let group = side.number();
             self.slack[group] = slack_for(self.slack[group], self.ages[group]);

@@ -7,7 +7,7 @@ use crate::bvh::bounds::{Bounds, BoundsArray, RawBoundsArray};
 use crate::bvh::clusters::Clustering;
 use crate::clusterings::{BodyPart, Clustered, Clusterings, Fit, Store, spread};
 use crate::cpu::bounds::TreeBounds;
-use crate::cpu::traversal::Tree;
+use crate::cpu::traversal::BodyTree;
 use crate::query::settings::Settings;
 use crate::scene::Body;
 use crate::scene::error::Error;
@@ -21,7 +21,7 @@ use crate::simd::{Isa, Simd, with_isa};
 const CLUSTERS: usize = 128;
 
 /// By slot of the body, then by part: vertices, edges and faces.
-pub(super) type Caches = Store<PartCache, 3>;
+pub(super) type StepCaches = Store<PartCache, 3>;
 
 /// The data kept per part from step to step.
 #[derive(Debug)]
@@ -59,8 +59,8 @@ impl PartCache {
     }
 
     #[inline(always)]
-    pub fn tree(&self) -> Tree<'_> {
-        Tree {
+    pub fn tree(&self) -> BodyTree<'_> {
+        BodyTree {
             shape: &self.clustering.shape,
             bounds: &self.bounds,
         }
@@ -99,7 +99,7 @@ impl Clustered for PartCache {
 
 /// Some clusters of a part.
 #[derive(Debug, Clone, Copy)]
-struct Task {
+struct BoxTask {
     part: PartIx,
     first: usize,
     end: usize,
@@ -115,7 +115,7 @@ pub(super) fn refit<S: Send>(
     job: Job<'_>,
     settings: &Settings,
     sweep: Sweep,
-    (clusterings, caches): (&Clusterings, &mut Caches),
+    (clusterings, caches): (&Clusterings, &mut StepCaches),
     scratches: &mut [S],
     stats: &mut Stats,
 ) -> Result<(), Error> {
@@ -158,7 +158,7 @@ fn find_boxes<S: Send>(
     job: Job<'_>,
     settings: &Settings,
     sweep: Sweep,
-    caches: &mut Caches,
+    caches: &mut StepCaches,
     scratches: &mut [S],
 ) {
     let Job {
@@ -185,7 +185,7 @@ fn find_boxes<S: Send>(
             continue;
         };
         let n = clustering.n_clusters();
-        let task = Task {
+        let task = BoxTask {
             part: ix,
             first: 0,
             end: 0,
@@ -193,7 +193,7 @@ fn find_boxes<S: Send>(
             ends: [start.raw(), end.raw()],
         };
         let n_each = workers.task(CLUSTERS);
-        tasks.extend((0..n).step_by(n_each).map(|first| Task {
+        tasks.extend((0..n).step_by(n_each).map(|first| BoxTask {
             first,
             end: n.min(first + n_each),
             ..task
@@ -211,13 +211,13 @@ fn find_boxes<S: Send>(
         with_isa!(isa, find, (
             clustering: &Clustering = clustering,
             source: BoxSource<'_> = source,
-            task: Task = task,
+            task: BoxTask = task,
         ));
     });
 }
 
 #[inline(always)]
-fn find<S: Simd>(simd: S, clustering: &Clustering, source: BoxSource<'_>, task: Task) {
+fn find<S: Simd>(simd: S, clustering: &Clustering, source: BoxSource<'_>, task: BoxTask) {
     for cluster in task.first..task.end {
         let ends = source.of_cluster(simd, clustering, ClusterIx::from_usize(cluster));
         let mut both = ends[0];

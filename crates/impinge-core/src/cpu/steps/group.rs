@@ -12,12 +12,12 @@ use crate::scene::positions::Positions;
 use crate::simd::{LaneBounds, Lanes32, Simd};
 use impinge_exact::internal::filter::Moving64;
 
-use super::world::World;
+use super::world::StepWorld;
 
 /// One cluster's elements, one per lane.
 #[derive(Debug, Clone)]
 #[repr(C, align(64))]
-pub(super) struct Group {
+pub(super) struct StepGroup {
     /// The elements' boxes at the start and at the end; where boxes hold the whole path, only the
     /// first.
     pub start: LaneBounds,
@@ -42,8 +42,8 @@ pub(super) struct Group {
 /// The largest coordinate that is rounded to `f32`.
 const LARGEST: f64 = (1u64 << 32) as f64;
 
-impl<'a> PerCluster<World<'a>> for Group {
-    const EMPTY: Self = Group {
+impl<'a> PerCluster<StepWorld<'a>> for StepGroup {
+    const EMPTY: Self = StepGroup {
         start: LaneBounds::EMPTY,
         end: LaneBounds::EMPTY,
         ends: [Bounds::EMPTY; 2],
@@ -57,7 +57,7 @@ impl<'a> PerCluster<World<'a>> for Group {
     };
 
     #[inline(always)]
-    fn fill<S: Simd>(&mut self, simd: S, world: World<'a>, part: PartIx, cluster: ClusterIx) {
+    fn fill<S: Simd>(&mut self, simd: S, world: StepWorld<'a>, part: PartIx, cluster: ClusterIx) {
         let clustering = &world.cache(part).clustering;
         self.size = clustering.size(cluster);
         self.ends = world.ends(part, cluster);
@@ -105,7 +105,7 @@ impl<'a> PerCluster<World<'a>> for Group {
     }
 }
 
-impl Group {
+impl StepGroup {
     /// Fills the tables of points, and the boxes from those.
     #[inline(always)]
     fn put_points<S: Simd>(&mut self, simd: S, ends: [&Positions; 2]) {

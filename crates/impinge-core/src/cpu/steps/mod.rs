@@ -39,28 +39,28 @@ use crate::search::undecided::Undecided;
 
 use super::batches::{self, BatchScratch, BatchStages, Counts};
 use super::lane_pairs::WorkItem;
-use super::traversal::Tree;
+use super::traversal::BodyTree;
 use crate::query::settings::Settings;
 use crate::search::runner::Job;
 #[cfg(feature = "gpu")]
 use crate::search::sink::Ending;
 use crate::simd::{Isa, Simd};
 
-use cache::{Caches, PartCache};
-use pairing::Worker;
-use world::{SharedBound, World};
+use cache::{PartCache, StepCaches};
+use pairing::StepWorker;
+use world::{SharedBound, StepWorld};
 
-impl<'a> BatchStages for World<'a> {
-    type Worker = Worker;
+impl<'a> BatchStages for StepWorld<'a> {
+    type Worker = StepWorker;
     type Answer = StepAnswer<'a>;
 
     #[inline(always)]
-    fn tree(&self, part: PartIx) -> Tree<'_> {
+    fn tree(&self, part: PartIx) -> BodyTree<'_> {
         self.cache(part).tree()
     }
 
     #[inline(always)]
-    fn pair<S: Simd>(self, simd: S, isa: Isa, items: &[WorkItem], worker: &mut Worker) {
+    fn pair<S: Simd>(self, simd: S, isa: Isa, items: &[WorkItem], worker: &mut StepWorker) {
         pairing::run(simd, isa, self, items, worker);
     }
 
@@ -73,7 +73,7 @@ impl<'a> BatchStages for World<'a> {
         &self,
         job: Job<'_>,
         _: StepAnswer<'a>,
-        workers: &mut [Worker],
+        workers: &mut [StepWorker],
         stats: &mut Stats,
     ) -> Result<(), Error> {
         // Stages are listed in the order of their first times.
@@ -82,11 +82,11 @@ impl<'a> BatchStages for World<'a> {
         Ok(())
     }
 
-    fn end(worker: &mut Worker, answer: StepAnswer<'a>) {
+    fn end(worker: &mut StepWorker, answer: StepAnswer<'a>) {
         worker.end(answer);
     }
 
-    fn counts(worker: &Worker) -> Counts {
+    fn counts(worker: &StepWorker) -> Counts {
         worker.counts()
     }
 
@@ -110,8 +110,8 @@ pub(crate) enum ByDevice {
 pub(crate) struct StepClusters {
     isa: Isa,
     clusterings: Clusterings,
-    caches: Caches,
-    scratches: Vec<Worker>,
+    caches: StepCaches,
+    scratches: Vec<StepWorker>,
     scratch: BatchScratch,
 }
 
@@ -120,7 +120,7 @@ impl StepClusters {
         StepClusters {
             isa: Isa::detect(allowed),
             clusterings,
-            caches: Caches::default(),
+            caches: StepCaches::default(),
             scratches: Vec::new(),
             scratch: BatchScratch::default(),
         }
@@ -134,7 +134,8 @@ impl StepClusters {
         answer: StepAnswer<'_>,
         stats: &mut Stats,
     ) -> Result<(), Error> {
-        self.scratches.resize_with(job.workers.n(), Worker::default);
+        self.scratches
+            .resize_with(job.workers.n(), StepWorker::default);
         stats.n_clusters = 0;
         stats.time("clustering", |stats| self.cluster(job, stats))?;
         stats.time("bounds", |stats| self.refit(job, settings, stats))?;
@@ -147,7 +148,7 @@ impl StepClusters {
             isa: self.isa,
             job,
             answer,
-            world: World {
+            world: StepWorld {
                 isa: self.isa,
                 scene: job.scene,
                 plan: job.plan,
@@ -204,7 +205,8 @@ impl StepClusters {
             // All elements of a frame are numbered in 32 bits.
             first_slots.push(first_slots[first_slots.len() - 1] + clustering.order.len() as u32);
         }
-        self.scratches.resize_with(job.workers.n(), Worker::default);
+        self.scratches
+            .resize_with(job.workers.n(), StepWorker::default);
         for worker in &mut self.scratches {
             worker.begin(stats.n_clusters, job.plan, settings);
         }
@@ -212,7 +214,7 @@ impl StepClusters {
         let known = SharedBound::new(job.control);
         let mut deciding = undecided::Deciding {
             job,
-            world: World {
+            world: StepWorld {
                 isa: self.isa,
                 scene: job.scene,
                 plan: job.plan,
@@ -242,7 +244,7 @@ impl StepClusters {
 
     fn bytes_besides_scratch(&self) -> usize {
         let caches: usize = self.caches.iter().map(PartCache::bytes).sum();
-        let scratches: usize = self.scratches.iter().map(Worker::bytes).sum();
+        let scratches: usize = self.scratches.iter().map(StepWorker::bytes).sum();
         self.clusterings.bytes() + caches + scratches
     }
 

@@ -25,9 +25,9 @@ use crate::search::found::StepAnswer;
 use crate::simd::{Isa, LaneBounds, Lanes, Masks, Simd};
 use crate::workers::clock::Instant;
 
-use super::group::Group;
-use super::narrow::{Batch, Between, Decider, NarrowCounts, key_in};
-use super::world::World;
+use super::group::StepGroup;
+use super::narrow::{Batch, Between, NarrowCounts, StepDecider, key_in};
+use super::world::StepWorld;
 
 /// The narrow stage is timed for one work item in this many.
 const SAMPLED: u32 = 16;
@@ -36,8 +36,8 @@ const SAMPLED: u32 = 16;
 /// together.
 #[derive(Debug)]
 #[repr(align(128))]
-pub(crate) struct Worker {
-    groups: GroupCache<Group>,
+pub(crate) struct StepWorker {
+    groups: GroupCache<StepGroup>,
     directions: Directions,
     /// Whether only the start is asked about, so that directions at the start tell.
     is_still: bool,
@@ -50,14 +50,14 @@ pub(crate) struct Worker {
     survivors: Box<[LaneBounds; 2]>,
     /// Which lanes each row meets, where boxes are single.
     masks: Masks,
-    decider: Decider,
+    decider: StepDecider,
     busy: Duration,
     n_decided: u32,
 }
 
-impl Default for Worker {
+impl Default for StepWorker {
     fn default() -> Self {
-        Worker {
+        StepWorker {
             groups: GroupCache::default(),
             directions: Directions::default(),
             is_still: false,
@@ -67,18 +67,18 @@ impl Default for Worker {
             lane_pairs: LanePairs::default(),
             survivors: Box::new([LaneBounds::EMPTY, LaneBounds::EMPTY]),
             masks: Masks::default(),
-            decider: Decider::default(),
+            decider: StepDecider::default(),
             busy: Duration::ZERO,
             n_decided: 0,
         }
     }
 }
 
-impl Worker {
+impl StepWorker {
     /// Prepares for a step of `n_clusters` clusters.
     pub fn begin(&mut self, n_clusters: u64, plan: &Plan, settings: &Settings) {
-        self.groups.begin::<World<'_>>(n_clusters, settings);
-        self.directions.begin::<World<'_>>(n_clusters, settings);
+        self.groups.begin::<StepWorld<'_>>(n_clusters, settings);
+        self.directions.begin::<StepWorld<'_>>(n_clusters, settings);
         self.is_still = plan.question == Question::Nearness;
         self.sweep = plan.sweep();
         self.shorter_from = settings.tuning.step_shorter_from;
@@ -99,7 +99,7 @@ impl Worker {
     }
 
     /// Examines less of the step from now on, if a contact is known that is early enough.
-    fn shorten(&mut self, world: World<'_>) {
+    fn shorten(&mut self, world: StepWorld<'_>) {
         let until = self.decider.until(world);
         if until < (self.shorter_from * self.sweep.until).min(self.sweep.until) {
             self.sweep = Sweep::up_to(until);
@@ -136,12 +136,12 @@ impl Worker {
 pub(super) fn run<S: Simd>(
     simd: S,
     isa: Isa,
-    world: World<'_>,
+    world: StepWorld<'_>,
     items: &[WorkItem],
-    worker: &mut Worker,
+    worker: &mut StepWorker,
 ) {
     worker.shorten(world);
-    let world = World {
+    let world = StepWorld {
         sweep: worker.sweep,
         ..world
     };
@@ -171,7 +171,7 @@ pub(super) fn run<S: Simd>(
             b: item.b,
             kind,
         };
-        let Worker {
+        let StepWorker {
             decider,
             lane_pairs,
             groups,
@@ -199,12 +199,12 @@ pub(super) fn run<S: Simd>(
 #[inline(always)]
 fn pair<S: Simd>(
     simd: S,
-    world: World<'_>,
+    world: StepWorld<'_>,
     item: &WorkItem,
     lower: Option<[Number; 2]>,
-    worker: &mut Worker,
+    worker: &mut StepWorker,
 ) -> Option<[usize; 2]> {
-    let Worker {
+    let StepWorker {
         groups,
         directions,
         is_still,
@@ -267,10 +267,10 @@ fn pair<S: Simd>(
 #[inline(always)]
 fn cull<S: Simd>(
     simd: S,
-    world: World<'_>,
+    world: StepWorld<'_>,
     item: &WorkItem,
     lower: Option<[Number; 2]>,
-    groups: &mut GroupCache<Group>,
+    groups: &mut GroupCache<StepGroup>,
 ) -> Option<([usize; 2], [u64; 2])> {
     let sides = [(item.a, item.cluster_a), (item.b, item.cluster_b)];
     let is_own = sides[0] == sides[1];
@@ -323,7 +323,7 @@ fn cull<S: Simd>(
 fn overlap<S: Simd>(
     simd: S,
     (is_single, is_own): (bool, bool),
-    ([own, other], rows, lanes): ([&Group; 2], u64, u64),
+    ([own, other], rows, lanes): ([&StepGroup; 2], u64, u64),
     listed: Option<usize>,
     survivors: &mut [LaneBounds; 2],
     masks: &mut Masks,
@@ -349,7 +349,12 @@ fn overlap<S: Simd>(
 }
 
 /// Whether the elements of two lanes are left out.
-fn is_left_out(world: World<'_>, item: &WorkItem, groups: [&Group; 2], lanes: [u8; 2]) -> bool {
+fn is_left_out(
+    world: StepWorld<'_>,
+    item: &WorkItem,
+    groups: [&StepGroup; 2],
+    lanes: [u8; 2],
+) -> bool {
     let corners: [[u32; 3]; 2] = std::array::from_fn(|side| {
         let lane = usize::from(lanes[side]);
         groups[side]
@@ -366,7 +371,7 @@ fn is_left_out(world: World<'_>, item: &WorkItem, groups: [&Group; 2], lanes: [u
 /// `None` if no pair has.
 #[inline(always)]
 fn lanes_with_lower(
-    world: World<'_>,
+    world: StepWorld<'_>,
     item: &WorkItem,
     [low, high]: [Number; 2],
 ) -> Option<[u64; 2]> {

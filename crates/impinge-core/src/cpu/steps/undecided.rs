@@ -19,9 +19,9 @@ use crate::search::sink::Ending;
 use crate::search::undecided::{Undecided, UndecidedPair};
 
 use super::narrow::{Between, FirstContacts, Narrow};
-use super::pairing::Worker;
+use super::pairing::StepWorker;
 use super::unsure;
-use super::world::World;
+use super::world::StepWorld;
 
 /// Pairs per task.
 const TASK: usize = 2048;
@@ -32,9 +32,9 @@ const SOONEST: usize = 256;
 /// Decides pairs as they come.
 pub(super) struct Deciding<'a, 'b> {
     pub job: Job<'a>,
-    pub world: World<'a>,
+    pub world: StepWorld<'a>,
     pub answer: StepAnswer<'a>,
-    pub workers: &'b mut [Worker],
+    pub workers: &'b mut [StepWorker],
     /// The first slot of each part, then the end of the last part.
     pub first_slots: Vec<u32>,
 }
@@ -125,7 +125,7 @@ impl Deciding<'_, '_> {
 /// Decides the pairs of one task, sorted by their two parts. Pairs of the same two parts stay in
 /// the order of the device, which lists pairs of two clusters next to each other.
 fn decide(
-    world: World<'_>,
+    world: StepWorld<'_>,
     first_slots: &[u32],
     pairs: &[UndecidedPair],
     contacts: &mut FirstContacts,

@@ -6,14 +6,14 @@
 
 use crate::search::runner::Job;
 
-use super::pairing::Worker;
-use super::world::World;
+use super::pairing::StepWorker;
+use super::world::StepWorld;
 
 /// Pairs per task.
 const TASK: usize = 8;
 
 /// Decides the unsure pairs of all workers.
-pub(super) fn decide(job: Job<'_>, world: World<'_>, workers: &mut [Worker]) {
+pub(super) fn decide(job: Job<'_>, world: StepWorld<'_>, workers: &mut [StepWorker]) {
     let mut unsure = Vec::new();
     for worker in &mut *workers {
         unsure.append(worker.contacts().unsure());

@@ -16,7 +16,7 @@ use crate::scene::positions::Positions;
 use crate::search::found::StepAnswer;
 use crate::simd::Isa;
 
-use super::cache::{Caches, PartCache};
+use super::cache::{PartCache, StepCaches};
 
 /// What is known of the answer while workers look for it.
 #[derive(Debug)]
@@ -66,7 +66,7 @@ impl SharedBound {
 
 /// Read-only view shared by all stages of a step.
 #[derive(Clone, Copy)]
-pub(crate) struct World<'a> {
+pub(crate) struct StepWorld<'a> {
     pub isa: Isa,
     pub scene: &'a Scene,
     pub plan: &'a Plan,
@@ -77,10 +77,10 @@ pub(crate) struct World<'a> {
     pub(super) boxes: Sweep,
     pub(super) answer: StepAnswer<'a>,
     pub(super) known: &'a SharedBound,
-    pub(super) caches: &'a Caches,
+    pub(super) caches: &'a StepCaches,
 }
 
-impl Placed for World<'_> {
+impl Placed for StepWorld<'_> {
     #[inline(always)]
     fn placed(&self, part: PartIx) -> (&Clustering, &Positions) {
         let body = self.plan.body(self.scene, part);
@@ -88,7 +88,7 @@ impl Placed for World<'_> {
     }
 }
 
-impl<'a> World<'a> {
+impl<'a> StepWorld<'a> {
     /// What makes the boxes of a part.
     #[inline(always)]
     pub(super) fn source(&self, part: PartIx) -> BoxSource<'a> {

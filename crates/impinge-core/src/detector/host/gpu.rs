@@ -3,9 +3,9 @@
 use std::sync::Arc;
 
 use crate::answers::pairs::Pairs;
-use crate::gpu::cells::Guest as Recorded;
+use crate::gpu::cells::Guest;
 use crate::gpu::pass_buffers::{Capacities, PassCounts};
-use crate::gpu::{Engine, Gpu, WantedAdapter};
+use crate::gpu::{Engine, GpuContext, WantedAdapter};
 use crate::plan::Plan;
 use crate::query::Query;
 use crate::query::goal::{Goal, Limits};
@@ -18,13 +18,13 @@ use crate::search::sink::Answer;
 use crate::search::stats::Stats;
 
 /// The frame loop around a method of another crate.
-pub struct Host {
+pub struct GpuHost {
     runner: Runner,
     pairs: Pairs,
     engine: Engine,
 }
 
-impl Host {
+impl GpuHost {
     /// Opens the adapter whose name contains `device`, or the best one. `lambda` is the density of
     /// cells, and `first` the initial room. The engine's own buffers take at most `memory_budget`
     /// bytes; if that is not enough, the work is done in parts.
@@ -36,9 +36,9 @@ impl Host {
         lambda: f64,
         first: Option<Capacities>,
         memory_budget: Option<u64>,
-        guest: Recorded,
+        guest: Guest,
     ) -> Result<Self, Error> {
-        let gpu = Gpu::open(device.map_or(WantedAdapter::Any, WantedAdapter::Named))?;
+        let gpu = GpuContext::open(device.map_or(WantedAdapter::Any, WantedAdapter::Named))?;
         let settings = Settings {
             method: Method::Cells,
             backend: Backend::Gpu,
@@ -47,7 +47,7 @@ impl Host {
             ..Settings::default()
         };
         let first = first.unwrap_or_default();
-        Ok(Host {
+        Ok(GpuHost {
             runner: Runner::new(&settings),
             pairs: Pairs::default(),
             engine: Engine::with_guest(gpu, settings, first, Some(guest)),
@@ -66,7 +66,7 @@ impl Host {
     ) -> Result<(&Pairs, &[PassCounts]), Error> {
         let gpu = Arc::clone(self.engine.gpu());
         let engine = &mut self.engine;
-        let mut guest = Guest { name, engine };
+        let mut guest = GpuGuest { name, engine };
         let plan = Plan::intersections(scene, query, Goal::All, Limits::default())?;
         let (runner, pairs, control) = (&self.runner, &mut self.pairs, Control::new());
         gpu.block_on(runner.run(scene, &plan, &control, &mut guest, pairs))?;
@@ -74,12 +74,12 @@ impl Host {
     }
 }
 
-struct Guest<'a> {
+struct GpuGuest<'a> {
     name: &'static str,
     engine: &'a mut Engine,
 }
 
-impl Finder for Guest<'_> {
+impl Finder for GpuGuest<'_> {
     fn method(&self) -> &'static str {
         self.name
     }

@@ -49,19 +49,19 @@ impl Host {
         method: impl FnMut(Job<'_>, &Arc<Answer>, &mut Stats) -> Result<(), Error>,
     ) -> Result<&Pairs, Error> {
         let plan = Plan::intersections(scene, query, Goal::All, Limits::default())?;
-        let (mut guest, control) = (Guest { name, method }, Control::new());
+        let (mut guest, control) = (CpuGuest { name, method }, Control::new());
         let Host { runner, pairs } = self;
         ready(runner.run(scene, &plan, &control, &mut guest, pairs))?;
         Ok(&self.pairs)
     }
 }
 
-struct Guest<F> {
+struct CpuGuest<F> {
     name: &'static str,
     method: F,
 }
 
-impl<F> Finder for Guest<F>
+impl<F> Finder for CpuGuest<F>
 where
     F: FnMut(Job<'_>, &Arc<Answer>, &mut Stats) -> Result<(), Error>,
 {

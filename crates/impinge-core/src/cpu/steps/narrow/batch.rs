@@ -14,16 +14,16 @@ use crate::simd::Isa;
 use impinge_exact::internal::Reach;
 use impinge_exact::{ElementPair, Point};
 
-use super::super::group::Group;
-use super::super::world::World;
+use super::super::group::StepGroup;
+use super::super::world::StepWorld;
 
 /// One test of the candidates.
 pub(crate) trait Narrow {
     /// Takes the candidates of a work item; some may wait for more.
-    fn take(&mut self, isa: Isa, world: World<'_>, batch: Batch<'_>);
+    fn take(&mut self, isa: Isa, world: StepWorld<'_>, batch: Batch<'_>);
 
     /// Decides the candidates that wait.
-    fn decide(&mut self, _: Isa, _: World<'_>) {}
+    fn decide(&mut self, _: Isa, _: StepWorld<'_>) {}
 
     /// Ends a step: hands over what is left of the answer.
     fn end(&mut self, answer: StepAnswer<'_>);
@@ -44,7 +44,7 @@ pub(crate) struct NarrowCounts {
 pub(crate) struct Batch<'a> {
     pub item: &'a WorkItem,
     pub between: Between,
-    pub groups: [&'a Group; 2],
+    pub groups: [&'a StepGroup; 2],
     pub lane_pairs: &'a mut LanePairs,
 }
 
@@ -108,9 +108,9 @@ pub(crate) type Slots = [Slot; 2];
 
 /// Keys of pairs without a value, handed over in blocks.
 #[derive(Debug, Default)]
-pub(super) struct Keys(KeysByKind);
+pub(super) struct FoundKeys(KeysByKind);
 
-impl Keys {
+impl FoundKeys {
     pub fn begin(&mut self) {
         self.0.iter_mut().for_each(Vec::clear);
     }
@@ -122,7 +122,7 @@ impl Keys {
 
     /// Hands over the keys of a kind once they make a block.
     #[inline(always)]
-    pub fn hand_over(&mut self, world: World<'_>, kind: PairKind) {
+    pub fn hand_over(&mut self, world: StepWorld<'_>, kind: PairKind) {
         let keys = &mut self.0[kind as usize];
         if keys.len() >= BLOCK {
             world.answer.take_keys(kind, keys);
@@ -147,7 +147,7 @@ pub(super) fn exact_pair(kind: PairKind) -> Option<ElementPair> {
 
 /// The key of a pair.
 #[inline(always)]
-pub(super) fn key(world: World<'_>, between: Between, slots: Slots) -> u64 {
+pub(super) fn key(world: StepWorld<'_>, between: Between, slots: Slots) -> u64 {
     let [a, b] = [(between.a, slots[0]), (between.b, slots[1])].map(|(part, slot)| {
         let element = world.cache(part).clustering.primitive(slot);
         world.plan.part(part).number(element)
@@ -157,7 +157,7 @@ pub(super) fn key(world: World<'_>, between: Between, slots: Slots) -> u64 {
 
 /// The numbers of a pair's elements, by its lanes in two groups.
 #[inline(always)]
-pub(super) fn numbers_in([a, b]: [&Group; 2], [lane_a, lane_b]: [u8; 2]) -> [Number; 2] {
+pub(super) fn numbers_in([a, b]: [&StepGroup; 2], [lane_a, lane_b]: [u8; 2]) -> [Number; 2] {
     [
         Number::new(a.numbers.0[usize::from(lane_a)]),
         Number::new(b.numbers.0[usize::from(lane_b)]),
@@ -166,7 +166,7 @@ pub(super) fn numbers_in([a, b]: [&Group; 2], [lane_a, lane_b]: [u8; 2]) -> [Num
 
 /// The key of a pair, by its lanes in two groups.
 #[inline(always)]
-pub fn key_in(groups: [&Group; 2], lanes: [u8; 2]) -> u64 {
+pub fn key_in(groups: [&StepGroup; 2], lanes: [u8; 2]) -> u64 {
     let [a, b] = numbers_in(groups, lanes);
     pair_key(a, b)
 }
@@ -174,14 +174,14 @@ pub fn key_in(groups: [&Group; 2], lanes: [u8; 2]) -> u64 {
 /// Whether a pair counts: it belongs to the cell whose pairs are wanted, if only those of one are,
 /// and the filter lets it pass.
 #[inline(always)]
-pub(super) fn counts(world: World<'_>, between: Between, slots: Slots) -> bool {
+pub(super) fn counts(world: StepWorld<'_>, between: Between, slots: Slots) -> bool {
     let plan = world.plan;
     !(plan.has_cell() || plan.has_filter()) || plan.counts(world.scene, key(world, between, slots))
 }
 
 /// The points of a pair at the start and at the end, in the order of the exact test.
 pub(super) fn points(
-    world: World<'_>,
+    world: StepWorld<'_>,
     between: Between,
     pair: ElementPair,
     slots: Slots,
@@ -206,7 +206,7 @@ pub(super) fn points(
 
 /// The corners of an element, and its body's positions at both ends.
 pub(super) fn element<'a>(
-    world: World<'a>,
+    world: StepWorld<'a>,
     part: PartIx,
     slot: Slot,
 ) -> (&'a [u32], [&'a Positions; 2]) {

@@ -12,7 +12,7 @@ use crate::simd::Isa;
 use impinge_exact::internal::filter::{Search, time_between};
 use impinge_exact::{Contact, ElementPair};
 
-use super::super::world::World;
+use super::super::world::StepWorld;
 use super::batch::{Between, Narrow, NarrowCounts, Slots, counts, key, points};
 
 /// The most pairs of one worker that are decided last.
@@ -102,13 +102,13 @@ impl FirstContacts {
 
     /// Notes that some pair touches after the start and before this time.
     #[cfg(feature = "gpu")]
-    pub fn found_by(&self, world: World<'_>, time: f32) {
+    pub fn found_by(&self, world: StepWorld<'_>, time: f32) {
         world.known.found(self.goal, f64::from(time));
     }
 
     /// Contacts later than this are not wanted.
     #[inline(always)]
-    pub fn until(&self, world: World<'_>) -> f64 {
+    pub fn until(&self, world: StepWorld<'_>) -> f64 {
         match self.goal {
             // Contacts that are later by less than rounding are wanted, for their keys may be
             // lower.
@@ -124,7 +124,7 @@ impl FirstContacts {
     /// By how much rounding may move two vertices relative to each other; 0 if close pairs are not
     /// wanted.
     #[inline(always)]
-    pub(super) fn margin(&self, world: World<'_>, between: Between) -> f64 {
+    pub(super) fn margin(&self, world: StepWorld<'_>, between: Between) -> f64 {
         // Pairs that are decided last are remembered already.
         if self.is_last {
             return 0.0;
@@ -133,7 +133,7 @@ impl FirstContacts {
     }
 
     /// Remembers a pair that is not certainly farther apart than the margin.
-    pub(super) fn remember_close(&mut self, world: World<'_>, between: Between, slots: Slots) {
+    pub(super) fn remember_close(&mut self, world: StepWorld<'_>, between: Between, slots: Slots) {
         if self.margin(world, between) > 0.0 && self.close.len() <= self.most_close {
             self.close.push((between.kind, key(world, between, slots)));
         }
@@ -153,7 +153,7 @@ impl FirstContacts {
     #[inline(always)]
     pub(super) fn leave(
         &mut self,
-        world: World<'_>,
+        world: StepWorld<'_>,
         between: Between,
         pair: ElementPair,
         slots: Slots,
@@ -167,7 +167,7 @@ impl FirstContacts {
     }
 
     /// Decides pairs of two parts that were left.
-    pub fn decide_unsure(&mut self, isa: Isa, world: World<'_>, pairs: &[(Between, Slots)]) {
+    pub fn decide_unsure(&mut self, isa: Isa, world: StepWorld<'_>, pairs: &[(Between, Slots)]) {
         let until = self.until(world);
         if world.plan.keeps_distance() {
             self.is_last = true;
@@ -188,7 +188,7 @@ impl FirstContacts {
     #[inline(never)]
     pub(super) fn decide_exactly(
         &mut self,
-        world: World<'_>,
+        world: StepWorld<'_>,
         between: Between,
         pair: ElementPair,
         slots: Slots,
@@ -208,7 +208,7 @@ impl FirstContacts {
     #[inline(always)]
     pub(super) fn report(
         &mut self,
-        world: World<'_>,
+        world: StepWorld<'_>,
         between: Between,
         slots: Slots,
         contact: Contact,
@@ -224,7 +224,7 @@ impl FirstContacts {
     }
 
     #[inline(always)]
-    fn push(&mut self, world: World<'_>, between: Between, slots: Slots, contact: Contact) {
+    fn push(&mut self, world: StepWorld<'_>, between: Between, slots: Slots, contact: Contact) {
         let found = &mut self.found[between.kind as usize];
         found.push(Found {
             key: key(world, between, slots),
@@ -239,7 +239,7 @@ impl FirstContacts {
     #[inline(always)]
     pub(super) fn report_within(
         &mut self,
-        world: World<'_>,
+        world: StepWorld<'_>,
         (between, pair): (Between, ElementPair),
         slots: Slots,
         span: [f64; 2],

@@ -14,7 +14,7 @@ use impinge_exact::Contact;
 use impinge_exact::internal::filter::{self, BATCH};
 use impinge_exact::internal::{Approach, Reach, approach};
 
-use super::super::world::World;
+use super::super::world::StepWorld;
 use super::batch::{Batch, Between, Slots, counts, exact_pair, points};
 use super::contacts::FirstContacts;
 
@@ -23,7 +23,7 @@ use super::contacts::FirstContacts;
 pub(super) fn take<S: Simd>(
     _: S,
     contacts: &mut FirstContacts,
-    world: World<'_>,
+    world: StepWorld<'_>,
     batch: Batch<'_>,
 ) {
     let between = batch.between;
@@ -62,7 +62,7 @@ pub(super) fn take<S: Simd>(
 impl FirstContacts {
     /// Decides a pair in `f64`, or leaves it.
     #[inline(never)]
-    pub(super) fn decide_kept(&mut self, world: World<'_>, between: Between, slots: Slots) {
+    pub(super) fn decide_kept(&mut self, world: StepWorld<'_>, between: Between, slots: Slots) {
         let Some(pair) = exact_pair(between.kind) else {
             return;
         };

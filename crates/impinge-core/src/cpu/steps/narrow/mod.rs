@@ -24,7 +24,7 @@ use crate::query::tuning::Tuning;
 use crate::search::found::StepAnswer;
 use crate::simd::Isa;
 
-use super::world::World;
+use super::world::StepWorld;
 
 pub(super) use batch::{Batch, Between, Narrow, NarrowCounts, key_in};
 pub(super) use contacts::FirstContacts;
@@ -33,7 +33,7 @@ use overlaps::Overlaps;
 
 /// One worker's tests, of which each step needs one.
 #[derive(Debug, Default)]
-pub(super) struct Decider {
+pub(super) struct StepDecider {
     question: Question,
     contacts: FirstContacts,
     overlaps: Overlaps,
@@ -41,7 +41,7 @@ pub(super) struct Decider {
     pub n_candidates: u64,
 }
 
-impl Decider {
+impl StepDecider {
     /// Prepares for a step of `n_clusters` clusters.
     pub fn begin(&mut self, n_clusters: u64, plan: &Plan, tuning: &Tuning) {
         self.question = plan.question;
@@ -67,7 +67,7 @@ impl Decider {
     }
 
     /// Contacts after this time cannot change the answer.
-    pub fn until(&self, world: World<'_>) -> f64 {
+    pub fn until(&self, world: StepWorld<'_>) -> f64 {
         match self.question {
             Question::Contact => self.contacts.until(world),
             _ => world.sweep.until,
@@ -76,13 +76,13 @@ impl Decider {
 
     /// Takes the candidates of a work item.
     #[inline(always)]
-    pub fn take(&mut self, isa: Isa, world: World<'_>, batch: Batch<'_>) {
+    pub fn take(&mut self, isa: Isa, world: StepWorld<'_>, batch: Batch<'_>) {
         self.n_candidates += batch.lane_pairs.len() as u64;
         self.test().take(isa, world, batch);
     }
 
     /// Decides the candidates that wait.
-    pub fn decide(&mut self, isa: Isa, world: World<'_>) {
+    pub fn decide(&mut self, isa: Isa, world: StepWorld<'_>) {
         self.test().decide(isa, world);
     }
 

@@ -18,13 +18,13 @@ use crate::simd::{Isa, Lanes, Simd, with_isa};
 use impinge_exact::internal::filter::{self, BATCH, LARGEST_F32};
 use impinge_exact::internal::{Reach, are_within_certainly, elements_meet, unsure_are_within};
 
-use super::super::world::World;
-use super::batch::{Batch, Between, Keys, Narrow, NarrowCounts, Slots, numbers_in};
+use super::super::world::StepWorld;
+use super::batch::{Batch, Between, FoundKeys, Narrow, NarrowCounts, Slots, numbers_in};
 
 /// The test of one worker.
 #[derive(Debug, Default)]
 pub(super) struct NearElements {
-    keys: Keys,
+    keys: FoundKeys,
     n_unsure: u64,
 }
 
@@ -41,10 +41,10 @@ impl NearElements {
 }
 
 impl Narrow for NearElements {
-    fn take(&mut self, isa: Isa, world: World<'_>, batch: Batch<'_>) {
+    fn take(&mut self, isa: Isa, world: StepWorld<'_>, batch: Batch<'_>) {
         with_isa!(isa, take, (
             near: &mut NearElements = self,
-            world: World<'_> = world,
+            world: StepWorld<'_> = world,
             batch: Batch<'_> = batch,
         ));
     }
@@ -62,7 +62,7 @@ impl Narrow for NearElements {
 }
 
 #[inline(always)]
-fn take<S: Simd>(_: S, near: &mut NearElements, world: World<'_>, batch: Batch<'_>) {
+fn take<S: Simd>(_: S, near: &mut NearElements, world: StepWorld<'_>, batch: Batch<'_>) {
     let between = batch.between;
     if between.kind == PairKind::EdgeFace {
         take_edges_and_faces::<S>(near, world, &batch);
@@ -137,7 +137,7 @@ fn may_lower(
 
 /// An edge and a face are in the answer if they meet, whatever the distance.
 #[inline(always)]
-fn take_edges_and_faces<S: Simd>(near: &mut NearElements, world: World<'_>, batch: &Batch<'_>) {
+fn take_edges_and_faces<S: Simd>(near: &mut NearElements, world: StepWorld<'_>, batch: &Batch<'_>) {
     let pairs = PartPair::new(world, batch.between);
     let largest = f64::max(batch.groups[0].largest, batch.groups[1].largest);
     let in_tables = batch.rounded() == 0.0 && largest <= f64::from(LARGEST_F32);
@@ -166,7 +166,7 @@ fn take_edges_and_faces<S: Simd>(near: &mut NearElements, world: World<'_>, batc
 impl NearElements {
     /// Adds a candidate to the answer, with the part that is nearest.
     #[inline(always)]
-    fn put(&mut self, world: World<'_>, batch: &Batch<'_>, ix: usize, part: u8) {
+    fn put(&mut self, world: StepWorld<'_>, batch: &Batch<'_>, ix: usize, part: u8) {
         let numbers = numbers_in(batch.groups, batch.lane_pairs.lanes(ix));
         // Only edges meet others of the same part, where the second may have the lower number.
         let is_swapped = numbers[0] > numbers[1];
@@ -207,7 +207,7 @@ struct PartPair<'a> {
 }
 
 impl<'a> PartPair<'a> {
-    fn new(world: World<'a>, between: Between) -> Self {
+    fn new(world: StepWorld<'a>, between: Between) -> Self {
         let sides = [between.a, between.b].map(|part| {
             let body = world.plan.body(world.scene, part);
             (&world.cache(part).clustering.corners, body.positions())

@@ -13,14 +13,14 @@ use crate::simd::{Isa, LaneBounds, Simd, with_isa};
 use impinge_exact::internal::filter::BATCH;
 use impinge_exact::internal::filter::number::Lookup;
 
-use super::super::group::Group;
-use super::super::world::World;
-use super::batch::{Batch, Keys, Narrow, NarrowCounts, key_in};
+use super::super::group::StepGroup;
+use super::super::world::StepWorld;
+use super::batch::{Batch, FoundKeys, Narrow, NarrowCounts, key_in};
 
 /// The test of one worker.
 #[derive(Debug, Default)]
 pub(super) struct Overlaps {
-    keys: Keys,
+    keys: FoundKeys,
 }
 
 impl Overlaps {
@@ -35,12 +35,12 @@ impl Overlaps {
 }
 
 impl Narrow for Overlaps {
-    fn take(&mut self, isa: Isa, world: World<'_>, batch: Batch<'_>) {
+    fn take(&mut self, isa: Isa, world: StepWorld<'_>, batch: Batch<'_>) {
         let inflation = world.plan.inflation(batch.between.a);
         if batch.rounded() > 0.0 || inflation > 0.0 || world.plan.has_cell() {
             return with_isa!(isa, take, (
                 overlaps: &mut Overlaps = self,
-                world: World<'_> = world,
+                world: StepWorld<'_> = world,
                 batch: Batch<'_> = batch,
             ));
         }
@@ -62,7 +62,7 @@ impl Narrow for Overlaps {
 }
 
 #[inline(always)]
-fn take<S: Simd>(_: S, overlaps: &mut Overlaps, world: World<'_>, batch: Batch<'_>) {
+fn take<S: Simd>(_: S, overlaps: &mut Overlaps, world: StepWorld<'_>, batch: Batch<'_>) {
     let between = batch.between;
     // That of all parts.
     let distance = world.plan.inflation(between.a);
@@ -98,7 +98,7 @@ fn take<S: Simd>(_: S, overlaps: &mut Overlaps, world: World<'_>, batch: Batch<'
 /// An end is off by the rounding of points, at most 2^-24 of the largest coordinate, and moved
 /// outward by the distance, 2^-20 of all, and 2^-126 (`boxes::Sweep`): less than 2^-19 of the
 /// largest coordinate and of the distance, and 2^-125.
-fn farther_out([a, b]: [&Group; 2], distance: f64) -> f32 {
+fn farther_out([a, b]: [&StepGroup; 2], distance: f64) -> f32 {
     let largest = f64::max(a.largest, b.largest) + distance;
     if largest * (1.0 + 2f64.powi(-18)) > f64::from(f32::MAX) {
         // Boxes may have infinite ends.

@@ -13,13 +13,13 @@ use crate::simd::{Lanes, Simd};
 use impinge_exact::ElementPair;
 use impinge_exact::internal::filter::{self, Enclosed8, LANES, Look8, Next, Spans8, Steps8};
 
-use super::super::world::World;
+use super::super::world::StepWorld;
 use super::batch::{Between, Slots, exact_pair};
 use super::contacts::{FirstContacts, Open};
 
 /// Decides the open pairs of the current parts.
 #[inline(always)]
-pub(super) fn search<S: Simd>(simd: S, contacts: &mut FirstContacts, world: World<'_>) {
+pub(super) fn search<S: Simd>(simd: S, contacts: &mut FirstContacts, world: StepWorld<'_>) {
     let Some(between) = contacts.between else {
         return;
     };
@@ -90,7 +90,7 @@ impl FirstContacts {
     #[inline(always)]
     fn keep_close(
         &mut self,
-        world: World<'_>,
+        world: StepWorld<'_>,
         between: Between,
         chunk: &[Open],
         seen: &Look8,
@@ -114,7 +114,7 @@ impl FirstContacts {
     #[inline(always)]
     fn after_look(
         &mut self,
-        world: World<'_>,
+        world: StepWorld<'_>,
         (between, pair): (Between, ElementPair),
         chunk: &[Open],
         among: u8,
@@ -139,7 +139,7 @@ impl FirstContacts {
     #[inline(always)]
     fn after_enclosing(
         &mut self,
-        world: World<'_>,
+        world: StepWorld<'_>,
         (between, pair): (Between, ElementPair),
         chunk: &[Open],
         found: &Enclosed8,
@@ -178,7 +178,7 @@ enum PairCorners<'a> {
 }
 
 impl<'a> PairSides<'a> {
-    fn new(world: World<'a>, between: Between) -> Self {
+    fn new(world: StepWorld<'a>, between: Between) -> Self {
         use crate::scene::elements::Elements::{Edges, Points, Triangles};
         let parts = [between.a, between.b];
         let elements = parts.map(|part| &world.cache(part).clustering.corners);

@@ -26,7 +26,7 @@ use crate::simd::{Isa, Simd, with_isa};
 use impinge_exact::ElementPair;
 use impinge_exact::internal::filter::{self, BATCH, Moving64, Search};
 
-use super::super::world::World;
+use super::super::world::StepWorld;
 #[cfg(feature = "gpu")]
 use super::batch::Slots;
 use super::batch::{Batch, Between, Narrow, NarrowCounts, counts, exact_pair};
@@ -35,14 +35,14 @@ use super::kept;
 use super::search::search;
 
 impl Narrow for FirstContacts {
-    fn take(&mut self, isa: Isa, world: World<'_>, batch: Batch<'_>) {
+    fn take(&mut self, isa: Isa, world: StepWorld<'_>, batch: Batch<'_>) {
         let between = batch.between;
         self.go_to(isa, world, between);
         let has_clearance = world.plan.has_clearance();
         if world.plan.keeps_distance() && !has_clearance {
             return with_isa!(isa, kept, (
                 contacts: &mut FirstContacts = self,
-                world: World<'_> = world,
+                world: StepWorld<'_> = world,
                 batch: Batch<'_> = batch,
             ));
         }
@@ -94,7 +94,7 @@ impl Narrow for FirstContacts {
         if has_clearance {
             return with_isa!(isa, kept, (
                 contacts: &mut FirstContacts = self,
-                world: World<'_> = world,
+                world: StepWorld<'_> = world,
                 batch: Batch<'_> = batch,
             ));
         }
@@ -116,11 +116,11 @@ impl Narrow for FirstContacts {
 
     /// Searches the open pairs for first contacts.
     #[inline(never)]
-    fn decide(&mut self, isa: Isa, world: World<'_>) {
+    fn decide(&mut self, isa: Isa, world: StepWorld<'_>) {
         if self.open.is_empty() && self.single.is_empty() {
             return;
         }
-        with_isa!(isa, search, (contacts: &mut FirstContacts = self, world: World<'_> = world));
+        with_isa!(isa, search, (contacts: &mut FirstContacts = self, world: StepWorld<'_> = world));
         self.open.clear();
     }
 
@@ -136,7 +136,7 @@ impl Narrow for FirstContacts {
 impl FirstContacts {
     /// Turns to the pairs of two parts.
     #[inline(always)]
-    fn go_to(&mut self, isa: Isa, world: World<'_>, between: Between) {
+    fn go_to(&mut self, isa: Isa, world: StepWorld<'_>, between: Between) {
         if self.between != Some(between) {
             self.decide(isa, world);
             self.between = Some(between);
@@ -150,7 +150,7 @@ impl FirstContacts {
     pub fn take_left(
         &mut self,
         isa: Isa,
-        world: World<'_>,
+        world: StepWorld<'_>,
         between: Between,
         pairs: impl Iterator<Item = (Slots, f64, Option<f64>)>,
     ) {
@@ -194,7 +194,7 @@ impl FirstContacts {
 // thread has.
 
 #[inline(always)]
-fn kept<S: Simd>(simd: S, contacts: &mut FirstContacts, world: World<'_>, batch: Batch<'_>) {
+fn kept<S: Simd>(simd: S, contacts: &mut FirstContacts, world: StepWorld<'_>, batch: Batch<'_>) {
     kept::take(simd, contacts, world, batch);
 }
 
