@@ -6,7 +6,8 @@
 //! use
 //! [`Pool`]: each mesh is checked in a child process that may be killed, so that one bad file costs one row and
 //! not the run. [`RowStore`] keeps rows on disk, so that an interrupted run can continue where it
-//! stopped. [`fix_mesh`] mends what can be mended without moving a vertex.
+//! stopped. A [`Report`] says what is in many rows, as a table or for other programs. [`fix_mesh`] mends what can be
+//! mended without moving a vertex.
 //!
 //! ```
 //! use impinge_check::{Options, check_mesh};
@@ -37,9 +38,11 @@ mod limits;
 mod marks;
 mod places;
 mod pool;
+pub mod report;
 mod row;
 mod store;
 mod surface;
+pub mod text;
 mod union_find;
 mod volume;
 mod walls;
@@ -56,6 +59,7 @@ pub use limits::{Limits, apply_limits};
 pub use marks::{Marks, Problem};
 pub use places::Place;
 pub use pool::{Pool, PoolError};
+pub use report::{Failed, Finding, Report};
 pub use row::{Counts, ErrorKind, Failure, Row};
 pub use store::{RowStore, StoreError};
 pub use worker::serve;

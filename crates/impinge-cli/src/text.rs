@@ -2,28 +2,7 @@
 
 use impinge::{PairKind, Pairs};
 
-/// A number with a comma after every three digits.
-pub fn grouped(n: u64) -> String {
-    let digits = n.to_string();
-    let mut text = String::with_capacity(digits.len() * 4 / 3);
-    for (ix, digit) in digits.chars().enumerate() {
-        if ix > 0 && (digits.len() - ix).is_multiple_of(3) {
-            text.push(',');
-        }
-        text.push(digit);
-    }
-    text
-}
-
-/// `n` with a noun, in the plural unless `n` is 1.
-pub fn counted(n: u64, one: &str) -> String {
-    format!("{} {one}{}", grouped(n), if n == 1 { "" } else { "s" })
-}
-
-/// `n` with a noun that has a plural of its own, or with more words.
-pub fn several(n: u64, one: &str, many: &str) -> String {
-    format!("{} {}", grouped(n), if n == 1 { one } else { many })
-}
+pub use impinge_check::text::{counted, grouped, several};
 
 /// How many pairs of each kind there are, without those of which there are none: `2 vf, 6 ee`.
 pub fn kinds(kinds: impl IntoIterator<Item = (PairKind, u64)>) -> String {
@@ -62,14 +41,6 @@ pub fn hex(hash: u64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn digits_in_groups() {
-        assert_eq!(grouped(0), "0");
-        assert_eq!(grouped(999), "999");
-        assert_eq!(grouped(1000), "1,000");
-        assert_eq!(grouped(1234567), "1,234,567");
-    }
 
     #[test]
     fn bytes_are_short() {

@@ -9,8 +9,8 @@ use std::time::Duration;
 
 use impinge::{Backend, CancelToken, Control, Precision, Settings, SharedVertex, Start};
 use impinge_check::{
-    FixError, FixOptions, Limits, Options, Pool, PoolError, Repair, Row, apply_limits, fix_mesh,
-    serve,
+    Finding, FixError, FixOptions, Limits, Options, Pool, PoolError, Repair, Report, Row,
+    apply_limits, fix_mesh, serve,
 };
 use impinge_io::{Elements, Mesh, Positions};
 use impinge_tiles::{Ask, Error, Plan, PlanOptions, RunOptions, ScatterOptions};
@@ -184,6 +184,40 @@ pub fn _fix<'py>(
     let n = faces.len();
     let faces = PyArray1::from_vec(py, faces.into_flattened()).reshape([n, 3])?;
     Ok((positions_array(py, &held)?, faces, done.to_string()))
+}
+
+/// A report about rows, each as JSON: ``text``, ``github`` or ``markdown``, and why the run fails:
+/// a message, and whether a mesh has what ``fail_on`` names.
+#[pyfunction]
+pub fn _report(
+    rows: Vec<String>,
+    fail_on: Vec<String>,
+    format: &str,
+) -> PyResult<(String, Option<(String, bool)>)> {
+    let read = |row: &String| Row::from_json(&serde_json::from_str(row).ok()?);
+    let rows: Option<Vec<Row>> = rows.iter().map(read).collect();
+    let rows = rows.ok_or_else(|| invalid("rows: one of them is no row of a check"))?;
+    let fail_on: Result<Vec<Finding>, String> = fail_on.iter().map(|name| name.parse()).collect();
+    let report = Report {
+        rows: &rows,
+        fail_on: &fail_on.map_err(invalid)?,
+    };
+    let text = match format {
+        "github" => report.github(),
+        "markdown" => report.markdown(),
+        _ => report.text(),
+    };
+    let failed = report.failure();
+    Ok((
+        text,
+        failed.map(|failed| (failed.message, failed.is_finding)),
+    ))
+}
+
+/// The names of what a check can fail on.
+#[pyfunction]
+pub fn _findings() -> Vec<&'static str> {
+    Finding::ALL.map(Finding::name).to_vec()
 }
 
 /// The child's side of `_check`: answers paths on standard input by rows on standard output.

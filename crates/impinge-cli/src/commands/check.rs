@@ -2,10 +2,9 @@
 
 mod args;
 mod assembly;
+mod ending;
 mod html;
-mod report;
 mod shown;
-mod table;
 
 use std::collections::BTreeMap;
 use std::io::{BufRead, Write, stdin, stdout};
@@ -14,10 +13,12 @@ use std::process::Command;
 use std::time::Duration;
 
 use impinge::CancelToken;
-use impinge_check::{Options, Pool, PoolError, Row, RowStore, apply_limits, serve};
+use impinge_check::{
+    Finding, Options, Pool, PoolError, Report, Row, RowStore, apply_limits, serve,
+};
 
 pub use self::args::{CHECK_EXAMPLES, CheckArgs, CheckWorkerArgs, FailOn};
-pub use self::table::fail;
+pub use self::ending::fail;
 use crate::error::Error;
 use crate::output;
 use crate::stop::Patience;
@@ -40,7 +41,7 @@ pub fn check(args: &CheckArgs, cancel: &CancelToken) -> Result<(), Error> {
         let text = "--min-thickness: its rows are printed, not kept in a folder: use --json";
         return Err(Error::Usage(text.to_owned()));
     }
-    if args.fail_on.contains(&FailOn::Thin) && args.min_thickness.is_none() {
+    if args.fail_on.contains(&FailOn::Mesh(Finding::Thin)) && args.min_thickness.is_none() {
         let text = "--fail-on thin: --min-thickness T says how thin";
         return Err(Error::Usage(text.to_owned()));
     }
@@ -65,23 +66,48 @@ pub fn check(args: &CheckArgs, cancel: &CancelToken) -> Result<(), Error> {
     if let Some(args::Out::Mesh(file)) = &args.out {
         shown::write_mesh(file, &rows, args)?;
     }
-    if args.format != args::Format::Text {
-        report::print(&rows, args)?;
-    } else if !args.json {
-        table::print(&rows)?;
-        if matches!(args.out, Some(args::Out::Mesh(_))) {
-            shown::print_legend()?;
+    let fail_on = FailOn::findings(&args.fail_on);
+    let report = Report {
+        rows: &rows,
+        fail_on: &fail_on,
+    };
+    if !args.json {
+        let text = match args.format {
+            args::Format::Text => report.text(),
+            args::Format::Sarif => format!("{}\n", report.sarif(env!("CARGO_PKG_VERSION"))),
+            args::Format::Junit => report.junit(),
+            args::Format::Github => report.github(),
+        };
+        output::out().write_all(text.as_bytes())?;
+        if args.format == args::Format::Text {
+            if matches!(args.out, Some(args::Out::Mesh(_))) {
+                shown::print_legend()?;
+            }
+            ending::print_next(&rows, args)?;
         }
-        table::print_next(&rows, args)?;
+    }
+    if let Some(path) = &args.summary {
+        append(path, &report.markdown())?;
     }
     if let Some(file) = &args.html {
-        html::write(&file.0, &rows, args)?;
+        html::write(&file.0, &report, args)?;
     }
     // The picture comes last, so that the answer is printed even without an adapter.
     if let Some(png) = &args.png {
         shown::draw(&png.0, &rows, args)?;
     }
-    table::fail(&rows, &args.fail_on)
+    ending::fail(&report)
+}
+
+/// Appends text to a file: each step of a workflow adds to its summary.
+fn append(path: &Path, text: &str) -> Result<(), Error> {
+    let mut file = std::fs::OpenOptions::new();
+    let opened = file.append(true).create(true).open(path);
+    let written = opened.and_then(|mut file| file.write_all(text.as_bytes()));
+    written.map_err(|source| Error::Write {
+        path: path.to_owned(),
+        source,
+    })
 }
 
 /// `impinge check-worker`.

@@ -5,7 +5,7 @@ mod args;
 use std::io::Write;
 use std::path::Path;
 
-use impinge_check::{Counts, FixError, FixOptions, Fixed, Place, Repair, Row, fix_mesh};
+use impinge_check::{Counts, FixError, FixOptions, Fixed, Place, Repair, Report, Row, fix_mesh};
 use impinge_io::{
     Cell, ColoredMesh, ELEMENTS, Elements, Mesh, ReadOptions, printable, read, read_bytes,
     write_obj, write_ply, write_stl,
@@ -14,7 +14,7 @@ use serde_json::{Map, Value, json};
 
 pub use self::args::{FIX_EXAMPLES, FixArgs};
 use crate::apart::Inputs;
-use crate::commands::check::fail;
+use crate::commands::check::{FailOn, fail};
 use crate::error::Error;
 use crate::load::{NAME_OF_STDIN, STDIN, format_of_stdin, stdin_bytes};
 use crate::output;
@@ -74,10 +74,10 @@ pub fn fix(args: &FixArgs) -> Result<(), Error> {
     } else {
         output::say(text(args, &options, &fixed).as_bytes(), rows_file.as_ref())?;
     }
-    fail(
-        &[row(&args.out.path, false, fixed.after, &fixed.places_after)],
-        &args.fail_on,
-    )
+    fail(&Report {
+        rows: &[row(&args.out.path, false, fixed.after, &fixed.places_after)],
+        fail_on: &FailOn::findings(&args.fail_on),
+    })
 }
 
 fn read_mesh(args: &FixArgs) -> Result<Mesh, Error> {

@@ -469,10 +469,45 @@ fn junit_is_xml_with_the_numbers_that_it_announces() {
 }
 
 #[test]
+fn a_summary_is_appended_in_markdown() {
+    let folder = meshes();
+    let args = [
+        "check",
+        "closed.obj",
+        "pierced.obj",
+        "nan.obj",
+        "--summary",
+        "s.md",
+    ];
+    failed(folder.run(args), 1, 3);
+    let text = std::fs::read_to_string(folder.path("s.md")).unwrap();
+    assert!(text.starts_with(
+        "### impinge check\n\n1 of 3 meshes could not be checked\n\n| mesh | primitives |"
+    ));
+    assert!(
+        text.contains("\n| pierced.obj | 5 | 2 | 0 | 0 | 0 | 0 | 3 | 2 |\n\n- nan.obj:4: "),
+        "{text}"
+    );
+    folder
+        .run(["check", "closed.obj", "--summary", "s.md"])
+        .printed();
+    let longer = std::fs::read_to_string(folder.path("s.md")).unwrap();
+    assert_eq!(longer, text + "### impinge check\n\n1 mesh: clean\n\n\n");
+}
+
+#[test]
 fn github_gets_one_annotation_per_finding() {
     let run = reported(&["--format", "github", "--fail-on", "boundary"]);
     let lines: Vec<&str> = run.stdout.lines().collect();
-    assert_eq!(lines.len(), 4, "{}", run.stdout);
+    let n_annotations = lines.iter().filter(|line| line.starts_with("::")).count();
+    assert_eq!(n_annotations, 4, "{}", run.stdout);
+    // The text follows.
+    assert!(lines[4].starts_with("mesh  "), "{}", lines[4]);
+    assert!(
+        lines.last().unwrap().starts_with("4 meshes: "),
+        "{}",
+        run.stdout
+    );
     let start = "::warning file=a b%2C<&>%25%3A1.obj,title=self-intersections::2 pairs of elements intersect, near (";
     assert!(lines[0].starts_with(start), "{}", lines[0]);
     assert!(lines[1].starts_with("::error file=a b%2C"), "{}", lines[1]);

@@ -35,9 +35,11 @@ __all__ = [
     "_check",
     "_check_options",
     "_devices",
+    "_findings",
     "_groups",
     "_fix",
     "_hash_rows",
+    "_report",
     "_rest_pairs",
     "_rings",
     "_serve_check",
@@ -383,6 +385,8 @@ def _check(
 def _fix(
     vertices: _Array, faces: _Array, only: list[str], close_holes: int, threads: int
 ) -> tuple[npt.NDArray[Any], npt.NDArray[np.uint32], str]: ...
+def _report(rows: list[str], fail_on: list[str], format: str) -> tuple[str, tuple[str, bool] | None]: ...
+def _findings() -> list[str]: ...
 def _serve_check(weld: bool, threads: int, memory: int | None, min_thickness: float | None) -> None: ...
 def _tiles_plan(
     folder: str,

@@ -4,7 +4,9 @@ use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use std::str::FromStr;
 
+use clap::builder::PossibleValue;
 use clap::{Args, ValueEnum};
+use impinge_check::Finding;
 
 use crate::args::PictureArgs;
 use crate::values::{HtmlFile, MeshFile, PngFile, bytes};
@@ -75,12 +77,12 @@ pub struct CheckArgs {
     pub min_thickness: Option<f64>,
     /// Compare the parts of an assembly instead: the nodes of a glTF or 3MF file, the groups of an
     /// OBJ file, or whole files. Which share space, and which only touch, is decided exactly
-    #[arg(long, conflicts_with_all = ["list", "format", "out", "no_weld", "keep_seams", "min_thickness", "png"])]
+    #[arg(long, conflicts_with_all = ["list", "format", "out", "no_weld", "keep_seams", "min_thickness", "summary", "png"])]
     pub assembly: bool,
     /// With --assembly, which this implies: also find parts that are at most this far from each
     /// other
     #[arg(long, value_name = "D", value_parser = crate::values::distance,
-        conflicts_with_all = ["list", "format", "out", "no_weld", "keep_seams", "min_thickness", "png"])]
+        conflicts_with_all = ["list", "format", "out", "no_weld", "keep_seams", "min_thickness", "summary", "png"])]
     pub clearance: Option<f64>,
     /// With --assembly: what becomes of parts that only touch
     #[arg(long, value_enum, value_name = "RULE", default_value_t = Touching::Report)]
@@ -127,6 +129,9 @@ pub struct CheckArgs {
     /// Write a page with a table, and each mesh and place as a picture and to be turned (.html)
     #[arg(long, value_name = "FILE")]
     pub html: Option<HtmlFile>,
+    /// Append a table in Markdown to this file, as for the summary of a workflow
+    #[arg(long, value_name = "FILE")]
+    pub summary: Option<PathBuf>,
     /// Draw the problems as a picture (.png)
     #[arg(long, value_name = "FILE")]
     pub png: Option<PngFile>,
@@ -206,34 +211,83 @@ pub enum Touching {
 }
 
 /// A problem that makes a run fail.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FailOn {
-    /// Pairs that also meet outside their common vertices, edge or face
-    SelfIntersections,
-    /// Primitives of zero area or volume
-    Degenerate,
-    /// Primitives with the vertices of an earlier one
-    Duplicates,
-    /// Edges of more than two triangles, vertices of several fans
-    NonManifold,
-    /// Edges of only one triangle
-    Boundary,
-    /// Neighbours with opposite orientations
-    Orientation,
-    /// Walls that --min-thickness finds
-    Thin,
-    /// Coordinates that are NaN or infinite
-    Nan,
-    /// Parts of an assembly that share space
+    /// A finding of a mesh.
+    Mesh(Finding),
+    /// Parts of an assembly that share space.
     Interpenetrating,
-    /// Parts of an assembly that touch
+    /// Parts of an assembly that touch.
     Touching,
-    /// Parts of an assembly within --clearance
+    /// Parts of an assembly that are near.
     Near,
-    /// Meshes that could not be checked, whatever the reason
-    Error,
-    /// Any of these
+    /// Any of these.
     Any,
+}
+
+impl FailOn {
+    /// The findings of meshes that are named.
+    pub fn findings(named: &[FailOn]) -> Vec<Finding> {
+        let is_named = |&finding: &Finding| {
+            named.contains(&FailOn::Any) || named.contains(&FailOn::Mesh(finding))
+        };
+        Finding::ALL.into_iter().filter(is_named).collect()
+    }
+
+    /// The name of the option's value.
+    pub fn name(self) -> &'static str {
+        match self {
+            FailOn::Mesh(finding) => finding.name(),
+            FailOn::Interpenetrating => "interpenetrating",
+            FailOn::Touching => "touching",
+            FailOn::Near => "near",
+            FailOn::Any => "any",
+        }
+    }
+
+    fn help(self) -> &'static str {
+        match self {
+            FailOn::Mesh(Finding::SelfIntersections) => {
+                "Pairs that also meet outside their common vertices, edge or face"
+            }
+            FailOn::Mesh(Finding::Degenerate) => "Primitives of zero area or volume",
+            FailOn::Mesh(Finding::Duplicates) => "Primitives with the vertices of an earlier one",
+            FailOn::Mesh(Finding::NonManifold) => {
+                "Edges of more than two triangles, vertices of several fans"
+            }
+            FailOn::Mesh(Finding::Orientation) => "Neighbours with opposite orientations",
+            FailOn::Mesh(Finding::Boundary) => "Edges of only one triangle",
+            FailOn::Mesh(Finding::Thin) => "Walls that --min-thickness finds",
+            FailOn::Mesh(Finding::Nan) => "Coordinates that are NaN or infinite",
+            FailOn::Mesh(_) => "Meshes that could not be checked, whatever the reason",
+            FailOn::Interpenetrating => "Parts of an assembly that share space",
+            FailOn::Touching => "Parts of an assembly that touch",
+            FailOn::Near => "Parts of an assembly within --clearance",
+            FailOn::Any => "Any of these",
+        }
+    }
+}
+
+impl ValueEnum for FailOn {
+    fn value_variants<'a>() -> &'a [Self] {
+        const ALL: [FailOn; 13] = {
+            let mut all = [FailOn::Any; 13];
+            let mut ix = 0;
+            while ix < Finding::ALL.len() {
+                all[ix] = FailOn::Mesh(Finding::ALL[ix]);
+                ix += 1;
+            }
+            all[ix] = FailOn::Interpenetrating;
+            all[ix + 1] = FailOn::Touching;
+            all[ix + 2] = FailOn::Near;
+            all
+        };
+        &ALL
+    }
+
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        Some(PossibleValue::new(self.name()).help(self.help()))
+    }
 }
 
 fn length(text: &str) -> Result<f64, String> {

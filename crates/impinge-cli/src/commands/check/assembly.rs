@@ -4,6 +4,7 @@ use std::io::Write;
 use std::path::Path;
 
 use impinge::CancelToken;
+use impinge_check::report::escaped;
 use impinge_check::{
     Assembly, AssemblyError, AssemblyOptions, PartPair, Relation, check_assembly_with,
 };
@@ -12,7 +13,6 @@ use serde_json::{Value, json};
 
 use super::args::{CheckArgs, FailOn, Touching};
 use super::html::{END, start};
-use super::report::escaped;
 use crate::error::Error;
 use crate::load::part_name;
 use crate::output::out;
@@ -33,7 +33,7 @@ pub fn refuse_alone(args: &CheckArgs) -> Result<(), Error> {
         .iter()
         .find(|what| OF_ASSEMBLIES.contains(what));
     let text = match (named, args.touching) {
-        (Some(what), _) => format!("--fail-on {}: only with --assembly", what.key()),
+        (Some(what), _) => format!("--fail-on {}: only with --assembly", what.name()),
         (None, Touching::Ignore) => "--touching: only with --assembly".to_owned(),
         (None, Touching::Report) => return Ok(()),
     };
@@ -44,7 +44,7 @@ pub fn refuse_alone(args: &CheckArgs) -> Result<(), Error> {
 pub fn check(args: &CheckArgs, cancel: &CancelToken) -> Result<(), Error> {
     let of_meshes = |what: &&FailOn| !OF_ASSEMBLIES.contains(what) && **what != FailOn::Any;
     if let Some(what) = args.fail_on.iter().find(of_meshes) {
-        let text = format!("--fail-on {}: not with --assembly", what.key());
+        let text = format!("--fail-on {}: not with --assembly", what.name());
         return Err(Error::Usage(text));
     }
     if args.fail_on.contains(&FailOn::Near) && args.clearance.is_none() {
@@ -309,7 +309,12 @@ fn fail(args: &CheckArgs, answer: &Assembly) -> Result<(), Error> {
         .filter_map(|what| {
             let pairs = answer.pairs.iter();
             let n = pairs.filter(|pair| kind(pair.relation) == what).count() as u64;
-            (n > 0).then(|| format!("{} of {}", counted(n, "pair"), what.words()))
+            let words = match what {
+                FailOn::Touching => "parts that touch",
+                FailOn::Near => "parts that are near",
+                _ => "parts that share space",
+            };
+            (n > 0).then(|| format!("{} of {words}", counted(n, "pair")))
         })
         .collect();
     match found.is_empty() {

@@ -10,14 +10,13 @@ mod view;
 use std::io::Write;
 use std::path::Path;
 
-use impinge_check::{Checked, Place, Problem, Row, check_file_marked};
+use impinge_check::report::{COLUMNS, escaped, numbers};
+use impinge_check::{Checked, Place, Problem, Report, Row, check_file_marked};
 use impinge_io::AtomicFile;
 use impinge_render::{Camera, Focus, Picture, Surface};
 
-use super::args::{CheckArgs, FailOn};
-use super::report::escaped;
+use super::args::CheckArgs;
 use super::shown::{options, surface};
-use super::table::{line, summary};
 use crate::error::Error;
 use crate::text::grouped;
 
@@ -36,18 +35,6 @@ const SIZE: [u32; 2] = [240, 180];
 /// The most pictures of places per mesh; the others are listed.
 const MOST_PICTURES: usize = 6;
 
-/// The columns after the picture and the name, as in the table of the text.
-const COLUMNS: [(&str, Option<FailOn>); 8] = [
-    ("elements", None),
-    ("self-int.", Some(FailOn::SelfIntersections)),
-    ("degenerate", Some(FailOn::Degenerate)),
-    ("duplicate", Some(FailOn::Duplicates)),
-    ("non-man.", Some(FailOn::NonManifold)),
-    ("orient.", Some(FailOn::Orientation)),
-    ("border", Some(FailOn::Boundary)),
-    ("pieces", None),
-];
-
 /// The beginning of a page of its own that loads nothing.
 pub fn start(title: &str, summary: &str) -> String {
     let summary = escaped(summary);
@@ -63,13 +50,15 @@ pub fn start(title: &str, summary: &str) -> String {
 pub const END: &str = "</body></html>\n";
 
 /// Writes the report.
-pub fn write(path: &Path, rows: &[Row], args: &CheckArgs) -> Result<(), Error> {
+pub fn write(path: &Path, report: &Report<'_>, args: &CheckArgs) -> Result<(), Error> {
     let failed = |source| Error::Write {
         path: path.to_owned(),
         source,
     };
     let mut to = AtomicFile::create(path)?;
-    to.write_all(head(rows).as_bytes()).map_err(failed)?;
+    let rows = report.rows;
+    to.write_all(head(&report.summary()).as_bytes())
+        .map_err(failed)?;
     let most = view::share(rows.iter().filter(|row| row.result.is_ok()).count());
     for row in rows {
         to.write_all(of_row(row, most, args)?.as_bytes())
@@ -82,8 +71,8 @@ pub fn write(path: &Path, rows: &[Row], args: &CheckArgs) -> Result<(), Error> {
     Ok(to.finish()?)
 }
 
-fn head(rows: &[Row]) -> String {
-    let start = start("impinge check", &summary(rows));
+fn head(summary: &str) -> String {
+    let start = start("impinge check", summary);
     let legend: String = Problem::ALL
         .iter()
         .map(|problem| {
@@ -179,7 +168,7 @@ fn of_row(row: &Row, most: usize, args: &CheckArgs) -> Result<String, Error> {
     let mut text = format!(
         "<tr><td class=\"pic\">{thumbnail}</td><td class=\"name\" data-v=\"{name}\">{name}{details}</td>"
     );
-    for ((label, problem), n) in COLUMNS.into_iter().zip(line(counts)) {
+    for ((label, problem), n) in COLUMNS.into_iter().zip(numbers(counts)) {
         let class = match problem {
             Some(kind) if kind.is_in(row) => " class=\"bad\"",
             Some(_) => " class=\"ok\"",
