@@ -156,12 +156,7 @@ impl Detector {
             }
             if !touches && !are_all_known {
                 let trial = trial.get_or_insert_with(|| scene.clone());
-                for (id, positions) in &advance.positions {
-                    match positions {
-                        Positions::F32(positions) => trial.set_end_positions(*id, positions)?,
-                        Positions::F64(positions) => trial.set_end_positions(*id, positions)?,
-                    }
-                }
+                set_end_positions(trial, &advance.positions)?;
                 let plan = Plan::trial(trial, query, fraction, self.limits_of_steps())?;
                 self.find_contacts(trial, &plan, control, (None, false))?;
                 let found = self.steps.contacts.found();
@@ -230,6 +225,17 @@ pub(super) fn refuse_seams(
 pub(super) fn moving(scene: &Scene) -> impl Iterator<Item = (BodyId, &Positions, &Positions)> {
     let bodies = scene.bodies();
     bodies.filter_map(|(id, body)| Some((id, body.positions(), body.end_positions()?)))
+}
+
+/// Has bodies end elsewhere.
+pub(super) fn set_end_positions(
+    scene: &mut Scene,
+    ends: &[(BodyId, Positions)],
+) -> Result<(), Error> {
+    ends.iter().try_for_each(|(id, positions)| match positions {
+        Positions::F32(positions) => scene.set_end_positions(*id, positions),
+        Positions::F64(positions) => scene.set_end_positions(*id, positions),
+    })
 }
 
 /// Their positions at a fraction of the step, rounded.

@@ -13,6 +13,7 @@ use crate::query::step::Start;
 use crate::scene::error::Error;
 use crate::search::found::{ContactAnswer, Found, KeyAnswer, PairList, StepAnswer};
 use crate::search::key_ranges::{KeyRanges, Tally};
+use crate::search::moved::Moved;
 use crate::search::naive;
 use crate::search::narrow::{BoxOverlap, FirstContact, Within};
 use crate::search::runner::{Finder, Job};
@@ -32,6 +33,8 @@ pub(super) enum Keys<'a> {
     In(&'a KeyRanges),
     /// They are counted and forgotten.
     Counted(&'a Tally),
+    /// Of contacts that the CPU finds: all, or those of pairs with a vertex that has moved.
+    Moved(Option<Moved<'a>>),
 }
 
 /// On the CPU, where for contacts a device may find candidates.
@@ -71,12 +74,15 @@ impl InStep<'_> {
             });
         }
         let found = StepAnswer::Contacts(answer);
+        if let Keys::Moved(moved) = self.keys {
+            return self.clusters.run(job, self.settings, found, moved, stats);
+        }
         match self.find_on_device(job, found, stats)? {
             ByDevice::Done => return Ok(()),
             ByDevice::Touches => self.seen.touches = true,
             ByDevice::Not => {
                 answer.forget();
-                self.clusters.run(job, self.settings, found, stats)?;
+                self.clusters.run(job, self.settings, found, None, stats)?;
                 if job.plan.is_rounded() {
                     self.seen.close = self.clusters.close();
                 }
@@ -121,13 +127,13 @@ impl InStep<'_> {
         stats: &mut Stats,
     ) -> Result<(), Error> {
         let answer = match self.keys {
-            Keys::All => StepAnswer::Keys(answer),
+            Keys::All | Keys::Moved(_) => StepAnswer::Keys(answer),
             Keys::Lowering(shares) => StepAnswer::Lowering(answer, shares),
             Keys::In(ranges) => StepAnswer::KeysIn(answer, ranges),
             Keys::Counted(tally) => StepAnswer::Counts(tally),
         };
         if self.settings.method != Method::Naive {
-            return self.clusters.run(job, self.settings, answer, stats);
+            return self.clusters.run(job, self.settings, answer, None, stats);
         }
         let mut block = Vec::new();
         let mut emit = |kind, key| {

@@ -17,6 +17,7 @@ use crate::query::{Query, SharedVertex};
 use crate::scene::Scene;
 use crate::scene::error::Error;
 use crate::search::found::{Found, FoundByKind};
+use crate::search::moved::Moved;
 use crate::search::runner::{Job, Outcome, ready};
 use crate::search::stats::Stats;
 use crate::workers::clock::Instant;
@@ -58,10 +59,17 @@ pub(super) struct StartAnswer {
 }
 
 impl Contacts {
+    /// All contacts found, by the kind of the pair.
+    pub fn lists(&self) -> impl Iterator<Item = (PairKind, &[Found<Contact>])> {
+        PairKind::ALL
+            .into_iter()
+            .zip(self.found.iter().map(Vec::as_slice))
+    }
+
     /// All contacts found, with the kind of the pair.
     pub fn found(&self) -> impl Iterator<Item = (PairKind, &Found<Contact>)> {
-        let kinds = PairKind::ALL.into_iter().zip(&self.found);
-        kinds.flat_map(|(kind, found)| found.iter().map(move |found| (kind, found)))
+        self.lists()
+            .flat_map(|(kind, found)| found.iter().map(move |found| (kind, found)))
     }
 
     /// The earliest of them.
@@ -250,6 +258,29 @@ impl Detector {
         control: &Control,
         (start, names): (Option<StartAnswer>, bool),
     ) -> Result<Seen, Error> {
+        self.find_contacts_by((scene, plan), control, (start, names), Keys::All)
+    }
+
+    /// Finds all contacts on the CPU, without names; where `moved` is given, of pairs with a vertex
+    /// that has moved, and perhaps others.
+    pub(super) fn find_contacts_of(
+        &mut self,
+        (scene, plan): (&Scene, &Plan),
+        moved: Option<Moved<'_>>,
+    ) -> Result<(), Error> {
+        let control = &self.control.clone();
+        let keys = Keys::Moved(moved);
+        self.find_contacts_by((scene, plan), control, (None, false), keys)?;
+        Ok(())
+    }
+
+    fn find_contacts_by(
+        &mut self,
+        (scene, plan): (&Scene, &Plan),
+        control: &Control,
+        (start, names): (Option<StartAnswer>, bool),
+        keys: Keys<'_>,
+    ) -> Result<Seen, Error> {
         let contacts = &mut self.steps.contacts;
         (contacts.start, contacts.names) = (start, names);
         let mut finder = InStep {
@@ -257,7 +288,7 @@ impl Detector {
             settings: &self.settings,
             #[cfg(feature = "gpu")]
             gpu: &mut self.gpu,
-            keys: Keys::All,
+            keys,
             seen: Seen::default(),
         };
         let found = ready(self.runner.run(scene, plan, control, &mut finder, contacts));

@@ -1,11 +1,9 @@
 //! How far each vertex may go in a step, so that nothing touches on the way.
 //!
 //! ```text
-//! candidates (keys)   pairs whose boxes over the step meet; no others can meet, however short each vertex stops
-//! are they apart?     a pair stays apart if its vertices lie on either side of two planes, at the start and where they are now:
-//!                     eight pairs at a time, across one direction after the other
-//! else they stop      the vertices that go towards the other element, before planes between the two
-//! again               for pairs of which a vertex was stopped since, until there are none
+//! contacts     pairs that touch on the ways to where the vertices are now: as for all impacts
+//! they stop    the vertices that go towards the other element, before planes between the two
+//! again        for pairs of which a vertex was stopped since, until none touches
 //! ```
 //!
 //! Where the vertices are now is always rounded as it is stored, so what is asked last is the
@@ -15,27 +13,23 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::Detector;
-use super::advance::{moving, refuse_cell, refuse_seams};
-use super::in_step::Keys;
+use super::advance::{moving, refuse_cell, refuse_seams, set_end_positions};
 use crate::answers::truncation::Truncation;
 use crate::plan::{Plan, TestId};
 use crate::query::Query;
-use crate::query::pair_kind::PairKind;
-use crate::query::step::Start;
+use crate::query::goal::Goal;
 use crate::scene::Scene;
 use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
 use crate::scene::positions::Positions;
-use crate::search::found::KeysByKind;
+use crate::search::found::PairList;
+use crate::search::moved::Moved;
 use crate::search::narrow::exact_kind;
-use crate::search::runner::{Job, Outcome};
 use crate::search::sink::{filled, reserve};
 use crate::search::stats::Stats;
 use crate::search::work::Work;
-use crate::simd::{Isa, Simd, with_isa};
 use crate::workers::clock::Instant;
-use impinge_exact::internal::filter::{LANES, Points8};
-use impinge_exact::internal::{Apart8, apart_by_lane, shares_apart};
+use impinge_exact::internal::shares_apart;
 use impinge_exact::{ElementPair, Point};
 
 /// Pairs that a task looks at.
@@ -51,11 +45,12 @@ impl Detector {
     /// that touch at the start. Elements that are to keep a [separation](Query::separation) or a
     /// [clearance](Query::clearance) do so at every moment.
     ///
-    /// Elements that stay apart as they go the same way are not stopped. Where two come too near,
-    /// the vertices that go towards the other element stop before planes across their shortest way
-    /// at the start, or at the end: if only one of them comes nearer, it gets all of the room but a
-    /// thousandth, and if both do, each gets a share of it, by how far it wants to go. So some
-    /// vertices stop that might have passed; the next step takes them farther.
+    /// Elements that do not meet are not stopped. Where two do, the vertices that go towards the
+    /// other element stop before planes across their shortest way at the start, or at the end: if
+    /// only one of them comes nearer, it gets all of the room but a thousandth, and if both do, each
+    /// gets a share of it, by how far it wants to go. Then pairs of which a vertex was stopped are
+    /// looked at again, until none meets. So some vertices stop that might have passed; the next
+    /// step takes them farther.
     ///
     /// The vertices of pairs that touch at the start, or are nearer than they are to keep, stay
     /// where they are, and [are counted](Truncation::n_touching); under [`Start::Skip`] they go as
@@ -87,7 +82,9 @@ impl Detector {
     /// elements. Their proof in floats, and for rounded positions, is ours.
     pub fn truncate(&mut self, scene: &Scene, query: &Query) -> Result<Truncation, Error> {
         refuse_cell(query)?;
-        let plan = Plan::truncation(scene, query, self.settings.limits())?;
+        let begun = Instant::now();
+        let plan_of = |scene: &Scene, limits| Plan::contacts(scene, query, Goal::All, limits);
+        let mut plan = plan_of(scene, self.limits_of_steps())?;
         let start = self.verify(scene, query)?.map(|start| start.intersects);
         let mut truncation = Truncation {
             start_intersects: start,
@@ -98,65 +95,70 @@ impl Detector {
             truncation.positions = stay.collect();
             return Ok(truncation);
         }
-        let mut outcome = Truncated {
-            truncation,
-            keys: std::mem::take(&mut self.solver.keys),
-            isa: Isa::detect(self.settings.instruction_set),
-            stats: Stats::default(),
-        };
-        let found = self.find_keys(scene, &plan, Keys::All, &mut outcome);
-        self.stats.clone_from(&outcome.stats);
-        self.solver.keys = outcome.keys;
-        found.map(|_| outcome.truncation)
-    }
-}
-
-/// Candidates that become positions.
-struct Truncated {
-    truncation: Truncation,
-    keys: KeysByKind,
-    isa: Isa,
-    stats: Stats,
-}
-
-impl Outcome<u64, { PairKind::ALL.len() }> for Truncated {
-    fn begin(&mut self, _: &Plan) {
-        self.stats.clear();
-    }
-
-    fn stats_mut(&mut self) -> &mut Stats {
-        &mut self.stats
-    }
-
-    fn take_buffers(&mut self) -> KeysByKind {
-        std::mem::take(&mut self.keys)
-    }
-
-    fn fill(&mut self, job: Job<'_>, keys: KeysByKind) -> Result<(), Error> {
-        self.keys = keys;
-        let start = Instant::now();
-        let Job { scene, plan, .. } = job;
-        let mut vertices = Vertices::new(job)?;
-        let mut pairs = Pairs::new(job, self.isa, &self.keys);
-        let truncation = &mut self.truncation;
-        pairs.stop(&vertices)?;
-        // All that touch at the start are known now.
-        refuse_seams(scene, plan, pairs.touching())?;
-        truncation.n_touching = pairs.touching().count() as u64;
-        while vertices.go_back(scene) {
+        let mut vertices = Vertices::new(scene, &plan)?;
+        let mut now = scene.clone();
+        let mut stats = Stats::default();
+        loop {
+            let moved = Moved {
+                firsts: &vertices.firsts,
+                are: &vertices.are_moved,
+            };
+            let is_first = truncation.n_rounds == 0;
+            self.find_contacts_of((&now, &plan), (!is_first).then_some(moved))?;
+            stats.add(&self.stats);
+            let stops = Instant::now();
+            let touching = self.stop(&vertices, (scene, &plan))?;
+            if is_first {
+                // All that touch at the start are known now.
+                refuse_seams(scene, &plan, touching.iter().copied())?;
+                truncation.n_touching = touching.len() as u64;
+            }
+            let any = vertices.go_back(scene);
+            stats.add_ms("stops", stops.elapsed().as_secs_f64() * 1e3);
+            if !any {
+                break;
+            }
             truncation.n_rounds += 1;
-            pairs.stop(&vertices)?;
+            set_end_positions(&mut now, &vertices.positions(scene))?;
+            plan = plan_of(&now, self.limits_of_steps())?;
         }
         truncation.n_cut = vertices.n_cut();
         truncation.positions = vertices.positions(scene);
-        self.stats
-            .add_ms("truncate", start.elapsed().as_secs_f64() * 1e3);
-        Ok(())
+        stats.total_ms = begun.elapsed().as_secs_f64() * 1e3;
+        self.stats = stats;
+        Ok(truncation)
     }
 
-    fn bytes(&self) -> u64 {
-        let keys: usize = self.keys.iter().map(Vec::capacity).sum();
-        (size_of::<u64>() * keys) as u64
+    /// Stops the vertices of all pairs that touch. Returns those of which no vertex may move: they
+    /// touch at the start.
+    ///
+    /// # Errors
+    /// Cancellation.
+    fn stop(&self, vertices: &Vertices, (scene, plan): (&Scene, &Plan)) -> Result<PairList, Error> {
+        let workers = self.runner.workers();
+        let mut tasks = Vec::new();
+        for (kind, found) in self.steps.contacts.lists() {
+            // Steps have vertices, edges and faces.
+            let Some(pair) = exact_kind(TestId::Elements(kind)) else {
+                continue;
+            };
+            let chunks = found.chunks(workers.task(TASK));
+            tasks.extend(chunks.map(|found| (kind, pair, found, Vec::new())));
+        }
+        let work = Work {
+            workers,
+            control: &self.control,
+        };
+        work.each(&mut tasks, |_, (kind, pair, found, touching)| {
+            let keys = found.iter().map(|found| found.key);
+            let stay = keys.filter(|&key| vertices.stop(*pair, key, (scene, plan)));
+            touching.extend(stay.map(|key| (*kind, key)));
+            Ok(())
+        })?;
+        Ok(tasks
+            .into_iter()
+            .flat_map(|(.., touching)| touching)
+            .collect())
     }
 }
 
@@ -164,8 +166,8 @@ impl Outcome<u64, { PairKind::ALL.len() }> for Truncated {
 struct Vertices {
     /// Of each: the start, where it is now, rounded as it is stored, and the end.
     ways: Vec<[Point; 3]>,
-    /// How far each was taken back since the first round: at least that.
-    moved: Vec<f64>,
+    /// Whether each was taken back in the last round.
+    are_moved: Vec<bool>,
     all: Vec<Vertex>,
     /// The bits of the share of its way that each is to go at most: floats of at least 0 are in the
     /// order of their bits.
@@ -190,11 +192,10 @@ impl Vertices {
     ///
     /// # Errors
     /// There is no memory for them.
-    fn new(job: Job<'_>) -> Result<Self, Error> {
-        let Job { scene, plan, .. } = job;
+    fn new(scene: &Scene, plan: &Plan) -> Result<Self, Error> {
         let n = scene.bodies().map(|(_, body)| body.n_vertices()).sum();
         const WHAT: &str = "vertices";
-        let moved = filled(0.0, n, WHAT)?;
+        let are_moved = filled(false, n, WHAT)?;
         let (mut ways, mut all, mut most) = (Vec::new(), Vec::new(), Vec::new());
         reserve(&mut ways, n, WHAT)?;
         reserve(&mut all, n, WHAT)?;
@@ -214,7 +215,7 @@ impl Vertices {
         }
         Ok(Vertices {
             ways,
-            moved,
+            are_moved,
             all,
             most,
             firsts: plan.first_vertices(scene),
@@ -222,22 +223,23 @@ impl Vertices {
     }
 
     /// Lets a vertex go at most a share of its way.
-    fn stop(&self, vertex: usize, share: f64) {
+    fn stop_at(&self, vertex: usize, share: f64) {
         self.most[vertex].fetch_min(share.to_bits(), Ordering::Relaxed);
     }
 
     /// Takes the vertices back that were stopped. Returns whether there were any.
     fn go_back(&mut self, scene: &Scene) -> bool {
         let mut any = false;
-        let now = self.ways.iter_mut().zip(&mut self.moved);
+        let now = self.ways.iter_mut().zip(&mut self.are_moved);
         let mut all = self.all.iter_mut().zip(&mut self.most).zip(now);
         for (_, body) in scene.bodies() {
             let start = body.positions();
             let end = body.end_positions().unwrap_or(start);
             let own = all.by_ref().take(body.n_vertices());
-            for (ix, ((vertex, most), ([_, now, _], moved))) in own.enumerate() {
+            for (ix, ((vertex, most), ([_, now, _], is_moved))) in own.enumerate() {
                 let most = std::mem::replace(most.get_mut(), WHOLE);
-                if most < WHOLE {
+                *is_moved = most < WHOLE;
+                if *is_moved {
                     any = true;
                     let least = start.share_of_rounding(end, ix);
                     // Twice as much each time, and nothing in the end, whatever the numbers.
@@ -246,10 +248,7 @@ impl Vertices {
                     let is_last = vertex.n_stops >= MOST_STOPS;
                     vertex.share = if is_last { 0.0 } else { share.max(0.0) };
                     vertex.n_stops += 1;
-                    let at = start.blend_point(end, ix, vertex.share);
-                    let back: f64 = (0..3).map(|k| (at[k] - now[k]).abs()).sum();
-                    *moved = (*moved + back * (1.0 + 8.0 * f64::EPSILON)).next_up();
-                    *now = at;
+                    *now = start.blend_point(end, ix, vertex.share);
                 }
             }
         }
@@ -289,294 +288,53 @@ impl Vertices {
 const WHOLE: u64 = 1.0_f64.to_bits();
 
 impl Vertices {
-    /// The points of a pair at one of the times of [`ways`](Vertices::ways).
-    fn points(&self, pair: &Pair, time: usize) -> [Point; 4] {
-        pair.vertices.map(|vertex| self.ways[vertex as usize][time])
-    }
-
-    /// How far the vertices of a pair were taken back together, but for rounding.
-    fn moved(&self, pair: &Pair) -> f64 {
-        let [a, b, c, d] = pair.vertices.map(|vertex| self.moved[vertex as usize]);
-        a + b + c + d
-    }
-
-    /// Whether any vertex of a pair is not at its start.
-    fn any_moves(&self, pair: &Pair) -> bool {
-        let mut all = pair.vertices.iter();
-        all.any(|&vertex| {
-            let [start, now, _] = &self.ways[vertex as usize];
-            start != now
-        })
-    }
-}
-
-/// A pair that could meet.
-struct Pair {
-    key: u64,
-    /// Its vertices among all, in the order of the exact test; the first again, where there are
-    /// fewer.
-    vertices: [u32; 4],
-    /// How near its elements may come.
-    kept: f64,
-    /// It need not be looked at again before its vertices have been taken back so far together.
-    until: f64,
-}
-
-/// It need not be looked at again at all.
-const DONE: f64 = f64::INFINITY;
-
-/// Some pairs of one kind that could meet.
-struct PairsOfKind<'a> {
-    kind: PairKind,
-    pair: ElementPair,
-    /// Those that were not looked at yet.
-    keys: &'a [u64],
-    /// Those that may have to be looked at again.
-    pairs: Vec<Pair>,
-    /// Those of which no vertex may move: they touch at the start.
-    touching: Vec<u64>,
-}
-
-/// The pairs that could meet.
-struct Pairs<'a> {
-    job: Job<'a>,
-    isa: Isa,
-    /// By how much coordinates on the ways are rounded at most.
-    rounded: f64,
-    tasks: Vec<PairsOfKind<'a>>,
-}
-
-impl<'a> Pairs<'a> {
-    fn new(job: Job<'a>, isa: Isa, keys: &'a KeysByKind) -> Self {
-        let n_each = job.workers.task(TASK);
-        let mut tasks = Vec::new();
-        for (kind, keys) in PairKind::ALL.into_iter().zip(keys) {
-            // Steps have vertices, edges and faces.
-            let Some(pair) = exact_kind(TestId::Elements(kind)) else {
-                continue;
-            };
-            tasks.extend(keys.chunks(n_each).map(|keys| PairsOfKind {
-                kind,
-                pair,
-                keys,
-                pairs: Vec::new(),
-                touching: Vec::new(),
-            }));
+    /// Stops the vertices of a pair that go towards the other element. Returns whether the pair
+    /// touches at the start, so that none may move.
+    fn stop(&self, pair: ElementPair, key: u64, (scene, plan): (&Scene, &Plan)) -> bool {
+        let mut located = plan.located(key);
+        if pair == ElementPair::VertexEdge {
+            // Such pairs are named edge first, but tested vertex first.
+            located.reverse();
         }
-        let rounded = job.scene.bodies().map(|(_, body)| {
-            let end = body.end_positions();
-            end.map_or(0.0, |end| body.positions().most_rounded(end))
-        });
-        Pairs {
-            job,
-            isa,
-            rounded: rounded.fold(0.0, f64::max),
-            tasks,
+        // The first again, where there are fewer.
+        let mut own = [usize::MAX; 4];
+        let mut n = 0;
+        for (part, element) in &located {
+            let corners = plan
+                .body(scene, *part)
+                .corners(plan.part(*part).part, element);
+            for &corner in corners {
+                own[n] = self.firsts[part.index()] + corner as usize;
+                n += 1;
+            }
         }
-    }
-
-    /// Stops the vertices of all pairs that do not stay apart as they are now. Most need no second
-    /// look: their vertices are not taken back far enough, or they stay apart however far.
-    ///
-    /// # Errors
-    /// Cancellation; there is no memory.
-    fn stop(&mut self, vertices: &Vertices) -> Result<(), Error> {
-        let (job, isa, rounded) = (self.job, self.isa, self.rounded);
-        let Job {
-            workers, control, ..
-        } = job;
-        Work { workers, control }.each(&mut self.tasks, |_, task| {
-            task.take_new(job, vertices)?;
-            task.look((isa, rounded), vertices);
-            task.stop(job.plan, vertices);
-            task.pairs.retain(|pair| pair.until < DONE);
-            Ok(())
-        })
-    }
-
-    /// The pairs of which no vertex moves.
-    fn touching(&self) -> impl Iterator<Item = (PairKind, u64)> {
-        let tasks = self.tasks.iter();
-        tasks.flat_map(|task| task.touching.iter().map(|&key| (task.kind, key)))
-    }
-}
-
-impl PairsOfKind<'_> {
-    /// The pairs that count and of which some vertex moves.
-    ///
-    /// # Errors
-    /// There is no memory for them.
-    fn take_new(&mut self, job: Job<'_>, vertices: &Vertices) -> Result<(), Error> {
-        let Job { scene, plan, .. } = job;
-        let keys = std::mem::take(&mut self.keys);
-        reserve(&mut self.pairs, keys.len(), "pairs")?;
-        for &key in keys {
-            if !plan.counts(scene, key) {
-                continue;
-            }
-            let mut located = plan.located(key);
-            if self.pair == ElementPair::VertexEdge {
-                // Such pairs are named edge first, but tested vertex first.
-                located.reverse();
-            }
-            let mut numbers = [0; 4];
-            let mut n = 0;
-            for (part, element) in &located {
-                let corners = plan
-                    .body(scene, *part)
-                    .corners(plan.part(*part).part, element);
-                for &corner in corners {
-                    // All numbers of parts are below 2^32, and vertices are a part.
-                    numbers[n] = (vertices.firsts[part.index()] + corner as usize) as u32;
-                    n += 1;
-                }
-            }
-            let first = numbers[0];
-            numbers[n..].fill(first);
-            let mut pair = Pair {
-                key,
-                vertices: numbers,
-                kept: plan.bound(),
-                until: 0.0,
-            };
-            if !vertices.any_moves(&pair) {
-                continue;
-            }
-            if plan.has_clearance() {
-                let [start, end] = [0, 2].map(|time| vertices.points(&pair, time));
+        let first = own[0];
+        own[n..].fill(first);
+        let [start, now, end] = [0, 1, 2].map(|time| own.map(|vertex| self.ways[vertex][time]));
+        let mut moving = (0..n).filter(|&ix| now[ix] != start[ix]).peekable();
+        if moving.peek().is_none() {
+            // They touch at the start, and stay there.
+            return false;
+        }
+        let kept = match plan.has_clearance() {
+            true => {
                 let parts = [located[0].0, located[1].0];
-                pair.kept = plan.kept(scene, parts, self.pair, [&start, &end]);
+                plan.kept(scene, parts, pair, [&start, &end])
             }
-            self.pairs.push(pair);
+            false => plan.bound(),
+        };
+        let Some(shares) = shares_apart(pair, [&start, &now, &end], kept) else {
+            moving.for_each(|ix| self.stop_at(own[ix], 0.0));
+            return true;
+        };
+        // Where no share is less, the planes are too close for that: each goes back a little.
+        let is_any_less = shares.iter().any(|&share| share < 1.0);
+        for ix in moving {
+            let share = shares[ix];
+            if share < 1.0 || !is_any_less {
+                self.stop_at(own[ix], share.min(1.0 - f64::EPSILON));
+            }
         }
-        Ok(())
+        false
     }
-
-    /// Says of each pair that stays apart until when it does so. What is left has an `until` below
-    /// 0.
-    fn look(&mut self, (isa, rounded): (Isa, f64), vertices: &Vertices) {
-        const UNKNOWN: f64 = -1.0;
-        let mut open: Vec<u32> = Vec::new();
-        for (ix, pair) in self.pairs.iter_mut().enumerate() {
-            // Rounded up as far as four numbers can be rounded down.
-            if vertices.moved(pair) * (1.0 + 8.0 * f64::EPSILON) < pair.until {
-                continue;
-            }
-            if vertices.any_moves(pair) {
-                pair.until = UNKNOWN;
-                open.push(ix as u32);
-            } else {
-                pair.until = DONE;
-            }
-        }
-        let mut later = Vec::new();
-        let mut times: [Points8; 3] = Default::default();
-        // Where elements are far apart, a way between any two points does.
-        for at in [None, Some(0), Some(2), Some(1)] {
-            for eight in open.chunks(LANES) {
-                let mut kept = [0.0; LANES];
-                for (lane, &ix) in eight.iter().enumerate() {
-                    let pair = &self.pairs[ix as usize];
-                    kept[lane] = pair.kept;
-                    put_points(vertices, pair, lane, &mut times, at == Some(2));
-                }
-                let apart = apart_across(isa, self.pair, &times, at, &kept, rounded);
-                for (lane, &ix) in eight.iter().enumerate() {
-                    let pair = &mut self.pairs[ix as usize];
-                    let spare = apart.spare[lane];
-                    if apart.always >> lane & 1 == 1 {
-                        pair.until = DONE;
-                    } else if spare > 0.0 {
-                        let moved = vertices.moved(pair) * (1.0 - 8.0 * f64::EPSILON);
-                        pair.until = (moved + spare).next_down();
-                    } else {
-                        later.push(ix);
-                    }
-                }
-            }
-            std::mem::swap(&mut open, &mut later);
-            later.clear();
-        }
-    }
-
-    /// Stops the vertices that go towards the other element, of pairs that do not stay apart.
-    fn stop(&mut self, plan: &Plan, vertices: &Vertices) {
-        for pair in &mut self.pairs {
-            if pair.until >= 0.0 {
-                continue;
-            }
-            let [start, now, end] = [0, 1, 2].map(|time| vertices.points(pair, time));
-            let moving = (0..self.pair.n_points()).filter(|&ix| now[ix] != start[ix]);
-            let Some(shares) = shares_apart(self.pair, [&start, &now, &end], pair.kept) else {
-                pair.until = DONE;
-                if plan.start == Start::Skip && plan.at_start(self.pair, &start).at_start {
-                    continue;
-                }
-                moving.for_each(|ix| vertices.stop(pair.vertices[ix] as usize, 0.0));
-                self.touching.push(pair.key);
-                continue;
-            };
-            // Where no share is less, the planes are too close for that: each goes back a little.
-            let is_any_less = shares.iter().any(|&share| share < 1.0);
-            for ix in moving {
-                let share = shares[ix];
-                if share < 1.0 || !is_any_less {
-                    let share = share.min(1.0 - f64::EPSILON);
-                    vertices.stop(pair.vertices[ix] as usize, share);
-                }
-            }
-            // It is looked at in the next round.
-            pair.until = 0.0;
-        }
-    }
-}
-
-/// Writes the points of a pair into a lane: at the start and now, and on request at the end.
-fn put_points(
-    vertices: &Vertices,
-    pair: &Pair,
-    lane: usize,
-    times: &mut [Points8; 3],
-    with_end: bool,
-) {
-    let n_times = if with_end { 3 } else { 2 };
-    for (k, &vertex) in pair.vertices.iter().enumerate() {
-        let way = &vertices.ways[vertex as usize];
-        for (Points8(points), point) in times.iter_mut().zip(way).take(n_times) {
-            for (row, x) in points[k].iter_mut().zip(point) {
-                row[lane] = *x;
-            }
-        }
-    }
-}
-
-/// Whether eight pairs stay apart, across ways at one of some times.
-fn apart_across(
-    isa: Isa,
-    pair: ElementPair,
-    times: &[Points8; 3],
-    at: Option<usize>,
-    kept: &[f64; LANES],
-    rounded: f64,
-) -> Apart8 {
-    let at = at.map(|time| &times[time]);
-    with_isa!(isa, apart_in_registers, (
-        pair: ElementPair = pair,
-        times: &[Points8; 3] = times,
-        at: Option<&Points8> = at,
-        kept: &[f64; LANES] = kept,
-        rounded: f64 = rounded,
-    ) -> Apart8)
-}
-
-#[inline(always)]
-fn apart_in_registers<S: Simd>(
-    _: S,
-    pair: ElementPair,
-    [start, now, _]: &[Points8; 3],
-    at: Option<&Points8>,
-    kept: &[f64; LANES],
-    rounded: f64,
-) -> Apart8 {
-    apart_by_lane::<S::F64>(pair, [start, now], at, kept, rounded)
 }

@@ -317,17 +317,6 @@ impl Plan {
         Ok(plan)
     }
 
-    /// The question which pairs could be too near at some time of a step, however far each vertex
-    /// goes on its way: their boxes overlap, each inflated by half of what pairs keep.
-    pub(crate) fn truncation(scene: &Scene, query: &Query, limits: Limits) -> Result<Self, Error> {
-        query.check_step()?;
-        let mut plan = Plan::of(scene, query, Question::Overlap, Goal::All, limits)?;
-        plan.filter.clone_from(&query.filter);
-        plan.start = query.start;
-        plan.keep(scene, query.keep());
-        Ok(plan)
-    }
-
     /// Whether the query names the kinds of pairs.
     #[cfg(feature = "gpu")]
     pub(crate) fn names_kinds(&self) -> bool {

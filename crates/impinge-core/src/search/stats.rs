@@ -99,6 +99,29 @@ impl Stats {
         }
     }
 
+    /// Adds the stages and the work of a frame to those of the frames before.
+    pub(crate) fn add(&mut self, frame: &Self) {
+        let mut all = frame.clone();
+        for stage in &frame.stages {
+            self.add_ms(stage.name, stage.ms);
+        }
+        std::mem::swap(&mut all.stages, &mut self.stages);
+        let sums = [
+            (&mut all.n_culled, self.n_culled),
+            (&mut all.n_work_items, self.n_work_items),
+            (&mut all.n_candidates, self.n_candidates),
+            (&mut all.n_unsure, self.n_unsure),
+            (&mut all.n_clustered, self.n_clustered),
+            (&mut all.n_reclustered, self.n_reclustered),
+            (&mut all.n_batches, self.n_batches),
+        ];
+        for (sum, before) in sums {
+            *sum += before;
+        }
+        all.bytes_held = all.bytes_held.max(self.bytes_held);
+        *self = all;
+    }
+
     /// Runs one stage and adds its wall time.
     #[doc(hidden)]
     pub fn time<T>(&mut self, name: &'static str, stage: impl FnOnce(&mut Self) -> T) -> T {

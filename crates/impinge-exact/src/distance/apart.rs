@@ -1,25 +1,20 @@
-//! Directions across which moving elements stay apart, and where their points must stop so that
-//! they do.
+//! Where the points of two elements that meet must stop so that they stay apart.
 //!
 //! What it does: two elements whose points lie on either side of a space between two parallel
 //! planes, at the start and at the end, do so on all of their straight ways: the planes go along.
 //! No times are needed.
 //!
 //! How: the planes lie across the shortest way between the elements, at the start or at the end.
-//! Heights over a plane are computed in `f64` with a bound of their error; what is not certain
-//! counts as not so. If the elements do not stay apart, the points that go towards the other
-//! element are stopped: where both come nearer, each gets a share of the room, by how far it wants
-//! to go.
+//! The points that go towards the other element are stopped: where both come nearer, each gets a
+//! share of the room, by how far it wants to go. Heights over a plane are computed in `f64`, so this
+//! is where points should stop; that elements then stay apart is decided by the exact test.
 //!
 //! Source: A. Chen et al., "Divide and Truncate", SIGGRAPH 2026, for planes that divide the room
 //! between elements. There they rest.
 
 use crate::Point;
 use crate::element_pair::ElementPair;
-use crate::filter::motion::{dot, size};
 use crate::filter::nearness::Polygon;
-use crate::filter::number::{Number, Vector, load_points};
-use crate::filter::{LANES, Points8};
 use crate::rounding::root;
 
 /// The share of the room that stays free, so that elements are certainly apart when their points
@@ -29,118 +24,16 @@ const LEAST_SHARE: f64 = 1.0 / 1024.0;
 /// A bound of the relative error of a height: 8 roundings, where 5 happen.
 const ERROR: f64 = 4.0 * f64::EPSILON;
 
-/// What is known of eight pairs across one direction each.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Apart8 {
-    /// How far each point of a pair may be from where it is now, so that its elements certainly
-    /// stay farther apart than a distance, as their points go there from their start at the same
-    /// time. Not above 0 where they do not certainly stay apart.
-    pub spare: [f64; LANES],
-    /// Bit k: the elements of pair k certainly stay so far apart wherever each point stops on its
-    /// way from the start to where it is now, if no coordinate is rounded by more than a number.
-    pub always: u8,
-}
-
-/// Across a direction, whether the elements of eight pairs stay apart. The direction is about the
-/// shortest way between the elements where their points are `at`; if that is nowhere, a way
-/// between two of their points, which does where elements are far apart.
-#[inline(always)]
-#[must_use]
-pub fn apart_by_lane<V: Vector>(
-    pair: ElementPair,
-    [start, now]: [&Points8; 2],
-    at: Option<&Points8>,
-    distances: &[f64; LANES],
-    rounded: f64,
-) -> Apart8 {
-    let mut apart = Apart8::default();
-    for first in (0..LANES).step_by(V::N) {
-        let ends = [load_points::<V>(start, first), load_points(now, first)];
-        let way = match at {
-            Some(at) => shortest_way(pair, &load_points(at, first)),
-            None => some_way(pair, [&ends[0], &ends[1]]),
-        };
-        let distance = V::load(distances, first);
-        let (spare, always) = apart_across(pair, &ends, &way, distance, V::splat(rounded));
-        spare.store(&mut apart.spare, first);
-        apart.always |= V::bits(always) << first;
-    }
-    apart
-}
-
-/// From the second element to the first, between two of their points.
-#[inline(always)]
-fn some_way<T: Number>(pair: ElementPair, [start, now]: [&[[T; 3]; 4]; 2]) -> [T; 3] {
-    let mut way = [T::splat(0.0); 3];
-    for axis in 0..3 {
-        let [first, second] = [0, pair.n_first()];
-        way[axis] =
-            (start[first][axis] - start[second][axis]) + (now[first][axis] - now[second][axis]);
-    }
-    way
-}
-
 /// About the shortest way from the second element to the first; without a length where sizes are
 /// out of range.
-#[inline(always)]
-fn shortest_way<T: Number>(pair: ElementPair, points: &[[T; 3]; 4]) -> [T; 3] {
-    let (is_small, mut way) = Polygon::of_pair(pair, points).way();
-    let zero = T::splat(0.0);
-    for x in &mut way {
+fn shortest_way(pair: ElementPair, points: &[Point; 4]) -> Point {
+    let (is_small, way) = Polygon::of_pair(pair, points).way();
+    match (is_small, pair) {
+        (false, _) => [0.0; 3],
         // The polygon is the face minus the vertex, or the first edge minus the second.
-        let turned = if pair == ElementPair::EdgeEdge {
-            *x
-        } else {
-            zero - *x
-        };
-        *x = T::select(is_small, turned, zero);
+        (true, ElementPair::EdgeEdge) => way,
+        (true, _) => way.map(|x| -x),
     }
-    way
-}
-
-/// See [`Apart8`].
-#[inline(always)]
-fn apart_across<T: Number>(
-    pair: ElementPair,
-    ends: &[[[T; 3]; 4]; 2],
-    way: &[T; 3],
-    distance: T,
-    rounded: T,
-) -> (T, T::Mask) {
-    let (zero, largest) = (T::splat(0.0), T::splat(f64::MAX));
-    let length = size(way);
-    let normal = [way[0] / length, way[1] / length, way[2] / length];
-    // All heights over the same point. They are NaN or infinite where this sum is.
-    let origin = &ends[0][0];
-    let mut sum = zero;
-    let (mut low, mut high) = ([largest; 2], [zero - largest; 2]);
-    for (time, points) in ends.iter().enumerate() {
-        for (ix, point) in points.iter().enumerate().take(pair.n_points()) {
-            let x = normal[0] * (point[0] - origin[0]);
-            let y = normal[1] * (point[1] - origin[1]);
-            let z = normal[2] * (point[2] - origin[2]);
-            let height = x + y + z;
-            let magnitude = x.abs() + y.abs() + z.abs();
-            let error = T::splat(ERROR) * magnitude + T::splat(4.0 * f64::MIN_POSITIVE);
-            sum = sum + magnitude;
-            if ix < pair.n_first() {
-                low[time] = low[time].smaller(height - error);
-            } else {
-                high[time] = high[time].larger(height + error);
-            }
-        }
-    }
-    // Rounded up by more than the roundings here. Errors of heights allow for the differences.
-    let thick = distance * dot(&normal, &normal).sqrt() * T::splat(1.0 + 4.0 * ERROR);
-    let rooms = [low[0] - high[0] - thick, low[1] - high[1] - thick];
-    let is_apart = length.gt(zero) & largest.gt(length) & largest.gt(sum) & rooms[0].gt(zero);
-    // The normal is no longer than the root of 3, and two points may move.
-    let spare = rooms[1] * T::splat(0.99 / (2.0 * 1.733));
-    // A plane that rests. Each height is off by at most three coordinates, each of which is
-    // rounded there and then.
-    let room = low[0].smaller(low[1]) - high[0].larger(high[1]) - thick;
-    let always = is_apart & room.gt(T::splat(16.0) * rounded);
-    (T::select(is_apart, spare, zero), always)
 }
 
 /// How far each point of two elements may go from its start to its end, a share, so that the
@@ -296,21 +189,6 @@ mod tests {
         }
     }
 
-    /// As all directions in turn say it.
-    fn spare_apart(
-        pair: ElementPair,
-        [start, now, end]: [&[Point; 4]; 3],
-        distance: f64,
-    ) -> Option<f64> {
-        let ends = [*start, *now];
-        let about = some_way(pair, [start, now]);
-        let ways = [start, end, now].map(|points| shortest_way(pair, points));
-        core::iter::once(about).chain(ways).find_map(|way| {
-            let (spare, _) = apart_across(pair, &ends, &way, distance, 0.0);
-            (spare > 0.0).then_some(spare)
-        })
-    }
-
     const PAIRS: [ElementPair; 4] = [
         ElementPair::VertexVertex,
         ElementPair::VertexEdge,
@@ -319,9 +197,9 @@ mod tests {
     ];
 
     #[test]
-    fn what_stays_apart_never_comes_within_the_distance() {
+    fn what_is_stopped_never_comes_within_the_distance() {
         let mut numbers = Numbers(7);
-        let (mut n_apart, mut n_stopped) = (0, 0);
+        let (mut n_free, mut n_stopped) = (0, 0);
         for round in 0..20_000 {
             let pair = PAIRS[round % 4];
             let scale = [1.0, 0.1, 1e-3][round / 4 % 3];
@@ -336,16 +214,8 @@ mod tests {
                 continue;
             };
             assert!(!are_within(pair, &start, distance));
-            if let Some(spare) = spare_apart(pair, [&start, &end, &end], distance) {
-                n_apart += 1;
-                // Each point may be so far off, in any direction.
-                let mut off = || [(); 3].map(|()| (numbers.next(2) - 0.5) * 2.0 * spare / 1.7321);
-                let near = end.map(|p| {
-                    let off = off();
-                    core::array::from_fn(|k| p[k] + off[k])
-                });
-                assert_eq!(first_within(pair, &start, &near, distance), None);
-                assert_eq!(first_within(pair, &start, &end, distance), None);
+            if first_within(pair, &start, &end, distance).is_none() {
+                n_free += 1;
                 continue;
             }
             n_stopped += 1;
@@ -353,11 +223,13 @@ mod tests {
             let at: [Point; 4] = core::array::from_fn(|ix| {
                 core::array::from_fn(|k| start[ix][k] + shares[ix] * (end[ix][k] - start[ix][k]))
             });
-            let spare = spare_apart(pair, [&start, &at, &end], distance);
-            assert!(spare.is_some(), "{pair:?} {shares:?}");
-            assert_eq!(first_within(pair, &start, &at, distance), None);
+            assert_eq!(
+                first_within(pair, &start, &at, distance),
+                None,
+                "{shares:?}"
+            );
         }
-        assert!(n_apart > 2000 && n_stopped > 2000, "{n_apart} {n_stopped}");
+        assert!(n_free > 2000 && n_stopped > 2000, "{n_free} {n_stopped}");
     }
 
     const ORIGIN: Point = [0.0; 3];
@@ -366,15 +238,6 @@ mod tests {
     fn over(ends: [f64; 2]) -> [[Point; 4]; 2] {
         let at = |z: [f64; 2]| [[0.0, 0.0, z[0]], [0.0, 0.0, z[1]], ORIGIN, ORIGIN];
         [at([1.0, 0.0]), at(ends)]
-    }
-
-    #[test]
-    fn elements_that_go_the_same_way_stay_apart() {
-        let [start, end] = over([-8.0, -9.0]);
-        let ends = [&start, &end, &end];
-        let spare = |distance| spare_apart(ElementPair::VertexVertex, ends, distance);
-        assert!(spare(0.5).is_some_and(|spare| spare > 0.1 && spare < 0.25));
-        assert_eq!(spare(1.0), None);
     }
 
     #[test]

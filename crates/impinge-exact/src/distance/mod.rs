@@ -33,7 +33,7 @@ mod tests;
 use super::Point;
 use super::algebra::fixed::{WholeVector, cross, difference, dot};
 use super::element_pair::ElementPair;
-pub use apart::{Apart8, apart_by_lane, shares_apart};
+pub use apart::shares_apart;
 pub use elements::{NearestOfElements, are_within_certainly, elements_are_within};
 pub use elements::{
     below_by_bounds, closest_of_elements, distance_below, elements_meet, nearest_of_elements,

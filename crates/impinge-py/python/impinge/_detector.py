@@ -313,9 +313,9 @@ class Detector(DetectorBase):
 
         The straight way from the start to the *rounded* positions is free, if the start was, and but for pairs that touch at the
         start: their vertices stay, or are not looked at with ``start="skip"``. Elements that are to keep a `separation` or a
-        `clearance` do so at every moment. Elements that stay apart as they go the same way are not stopped. Where two come too
-        near, the vertices that go towards the other element stop before planes between the two; so some stop that might have
-        passed, and the next step takes them farther.
+        `clearance` do so at every moment. Elements that do not meet are not stopped. Where two do, the vertices that go
+        towards the other element stop before planes between the two, and pairs of which a vertex was stopped are looked at again;
+        so some stop that might have passed, and the next step takes them farther.
 
         Parameters
         ----------

@@ -33,6 +33,7 @@ use crate::query::settings::InstructionSet;
 use crate::scene::error::Error;
 use crate::scene::index::PartIx;
 use crate::search::found::StepAnswer;
+use crate::search::moved::Moved;
 use crate::search::stats::Stats;
 #[cfg(feature = "gpu")]
 use crate::search::undecided::Undecided;
@@ -48,7 +49,7 @@ use crate::simd::{Isa, Simd};
 
 use cache::{PartCache, StepCaches};
 use pairing::StepWorker;
-use world::{SharedBound, StepWorld};
+use world::{MovedLanes, SharedBound, StepWorld};
 
 impl<'a> BatchStages for StepWorld<'a> {
     type Worker = StepWorker;
@@ -126,12 +127,14 @@ impl StepClusters {
         }
     }
 
-    /// Hands over the contacts or candidates that are sought.
+    /// Hands over the contacts or candidates that are sought. Where `moved` is given, those of pairs
+    /// with a vertex that has moved, and perhaps others.
     pub fn run(
         &mut self,
         job: Job<'_>,
         settings: &Settings,
         answer: StepAnswer<'_>,
+        moved: Option<Moved<'_>>,
         stats: &mut Stats,
     ) -> Result<(), Error> {
         self.scratches
@@ -144,6 +147,12 @@ impl StepClusters {
         }
         let held = self.bytes_besides_scratch();
         let known = SharedBound::new(job.control);
+        let lanes = |moved: Moved<'_>| {
+            let parts = job.plan.numbered_parts();
+            let lanes = parts.map(|(ix, part)| moved.lanes(ix, &self.caches.at(part).clustering));
+            lanes.collect::<MovedLanes>()
+        };
+        let moved = moved.map(lanes);
         let task = batches::Task {
             isa: self.isa,
             job,
@@ -157,6 +166,7 @@ impl StepClusters {
                 answer,
                 known: &known,
                 caches: &self.caches,
+                moved: moved.as_ref(),
             },
             scratches: &mut self.scratches,
             settings,
@@ -223,6 +233,7 @@ impl StepClusters {
                 answer,
                 known: &known,
                 caches: &self.caches,
+                moved: None,
             },
             answer,
             workers: &mut self.scratches,

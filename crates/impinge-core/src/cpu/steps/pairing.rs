@@ -256,6 +256,9 @@ fn pair<S: Simd>(
         let corners = [&a.corners[..a.n_corners], &b.corners[..b.n_corners]];
         lane_pairs.drop_sharing(simd, corners);
     }
+    if let Some([of_a, of_b]) = world.moved(item) {
+        lane_pairs.retain(|[a, b]| (of_a >> a | of_b >> b) & 1 == 1);
+    }
     if world.plan.leaves_out() {
         lane_pairs.retain(|lanes| !is_left_out(world, item, [a, b], lanes));
     }
@@ -272,6 +275,10 @@ fn cull<S: Simd>(
     lower: Option<[Number; 2]>,
     groups: &mut GroupCache<StepGroup>,
 ) -> Option<([usize; 2], [u64; 2])> {
+    let moved = world.moved(item);
+    if moved == Some([0; 2]) {
+        return None;
+    }
     let sides = [(item.a, item.cluster_a), (item.b, item.cluster_b)];
     let is_own = sides[0] == sides[1];
     let boxes = sides.map(|(part, cluster)| world.cache(part).ends(cluster));
@@ -304,6 +311,15 @@ fn cull<S: Simd>(
             simd.meets_64([&b.start, &b.end], ends[0], lanes_b)
         };
         if lanes_b == 0 {
+            return None;
+        }
+        // Where one cluster has not moved, only the other one's lanes that have are wanted.
+        match moved {
+            Some([0, moved]) => lanes_b &= moved,
+            Some([moved, 0]) => lanes_a &= moved,
+            _ => {}
+        }
+        if lanes_a == 0 || lanes_b == 0 {
             return None;
         }
         if let Some(wanted) = wanted {

@@ -7,6 +7,7 @@ use crate::boxes::{BoxSource, Sweep};
 use crate::bvh::bounds::Bounds;
 use crate::bvh::clusters::Clustering;
 use crate::cpu::directions::Placed;
+use crate::cpu::lane_pairs::WorkItem;
 use crate::plan::Plan;
 use crate::query::goal::Goal;
 use crate::query::progress::{CancelToken, Control};
@@ -64,6 +65,10 @@ impl SharedBound {
     }
 }
 
+/// For each part and cluster, the lanes of elements with a vertex that has moved: only pairs with
+/// one of them are sought.
+pub(super) type MovedLanes = Vec<Vec<u64>>;
+
 /// Read-only view shared by all stages of a step.
 #[derive(Clone, Copy)]
 pub(crate) struct StepWorld<'a> {
@@ -78,6 +83,7 @@ pub(crate) struct StepWorld<'a> {
     pub(super) answer: StepAnswer<'a>,
     pub(super) known: &'a SharedBound,
     pub(super) caches: &'a StepCaches,
+    pub(super) moved: Option<&'a MovedLanes>,
 }
 
 impl Placed for StepWorld<'_> {
@@ -109,6 +115,15 @@ impl<'a> StepWorld<'a> {
             ..self.sweep
         };
         sweep.close(ends)
+    }
+
+    /// The lanes of two clusters' elements that have moved, if only pairs with one of them are
+    /// sought.
+    #[inline(always)]
+    pub(super) fn moved(&self, item: &WorkItem) -> Option<[u64; 2]> {
+        let sides = [(item.a, item.cluster_a), (item.b, item.cluster_b)];
+        let moved = self.moved?;
+        Some(sides.map(|(part, cluster)| moved[part.index()][cluster.index()]))
     }
 
     /// The cache of a part.
