@@ -21,6 +21,7 @@ pub mod query;
 pub mod scene;
 pub mod search;
 pub mod simd;
+mod stencil;
 pub mod workers;
 
 pub use answers::advance::Advance;
@@ -34,6 +35,7 @@ pub use answers::neighbours::{Csr, Neighbours};
 pub use answers::pairs::{Element, Pairs, hash_rows};
 pub use answers::places::Place;
 pub use answers::safe::{Bounds, SafeDistances};
+pub use answers::stencils::{Stencil, Stencils};
 pub use answers::truncation::Truncation;
 #[cfg(feature = "gpu")]
 pub use detector::Gpu;
@@ -58,5 +60,6 @@ pub use scene::position_rows::PositionRows;
 pub use scene::positions::{NewPositions, Positions, Real};
 pub use scene::{Body, Filter, Scene};
 pub use search::stats::{Stage, Stats};
+pub use stencil::{Gradient, Hessian, project_psd};
 #[cfg(feature = "gpu")]
 pub use wgpu;

@@ -15,8 +15,9 @@
 //!   the first contact of a step, [`Detector::is_free`] decides whether there is any, and
 //!   [`Detector::advance`] finds how far a step can be taken.
 //! * **Proximity.** [`Detector::near`] finds which vertices, edges and faces are within a distance
-//!   of each other, exactly, and which of their features are nearest. [`Detector::distance`] finds
-//!   the smallest distance of two bodies.
+//!   of each other, exactly, and which of their features are nearest. [`NearPairs::stencils`] has
+//!   their distances with gradients and Hessians, for barriers and other potentials.
+//!   [`Detector::distance`] finds the smallest distance of two bodies.
 //!
 //! ```toml
 //! [dependencies]
@@ -139,11 +140,11 @@ pub use impinge_core::wgpu;
 pub use impinge_core::{
     Advance, Affinity, Backend, Body, BodyId, BodyKind, Bounds, CancelToken, Candidates, Changes,
     Clearance, Closest, ClosestElement, ClosestPoints, Control, Csr, Detector, Element,
-    ElementVertices, Elements, Error, Exclusion, Filter, Hit, Hits, Impact, Impacts,
-    InstructionSet, Mesh, Method, NearIter, NearPair, NearPairs, Neighbours, NewPositions,
+    ElementVertices, Elements, Error, Exclusion, Filter, Gradient, Hessian, Hit, Hits, Impact,
+    Impacts, InstructionSet, Mesh, Method, NearIter, NearPair, NearPairs, Neighbours, NewPositions,
     PairFilter, PairKind, PairKinds, Pairs, Part, Place, Positions, Precision, Progress, Query,
     RayHit, Real, Recluster, SafeDistances, Scene, Settings, SharedVertex, Stage, Start, Stats,
-    Truncation, Weld, WrongNumber, hash_impact_rows, hash_rows,
+    Stencil, Stencils, Truncation, Weld, WrongNumber, hash_impact_rows, hash_rows, project_psd,
 };
 #[cfg(feature = "gpu")]
 pub use impinge_core::{
@@ -163,4 +164,5 @@ const _: () = {
     threads_may_share::<SafeDistances>();
     threads_may_share::<Neighbours>();
     threads_may_share::<Truncation>();
+    threads_may_share::<Stencils>();
 };

@@ -13,4 +13,5 @@ pub(crate) mod numbering;
 pub(crate) mod pairs;
 pub(crate) mod places;
 pub(crate) mod safe;
+pub(crate) mod stencils;
 pub(crate) mod truncation;

@@ -20,7 +20,7 @@ pub enum Error {
     /// from.
     #[error("{what}: row {row} is not finite ({}, {}, {})", value[0], value[1], value[2])]
     NonFinitePoint {
-        /// Which array: `"points"`, `"origins"` or `"directions"`.
+        /// Which array: `"points"`, `"origins"`, `"directions"` or `"rest"`.
         what: &'static str,
         /// The row of the array.
         row: usize,

@@ -70,7 +70,12 @@ impl NearPair {
     /// of vertices. Of an edge and a face, or of faces, the kinds of the features: `P_P`, `P_E`,
     /// `P_T`, `E_E`, and `E_T` where an edge passes through a face.
     pub fn name(&self) -> &'static str {
-        let pair = match self.kind {
+        Self::named(self.kind, self.features)
+    }
+
+    /// The name of a pair of this kind with these features.
+    pub(crate) fn named(kind: PairKind, features: [Feature; 2]) -> &'static str {
+        let pair = match kind {
             PairKind::VertexFace => Some((ElementPair::VertexFace, false)),
             PairKind::EdgeEdge => Some((ElementPair::EdgeEdge, false)),
             // The edge is named first.
@@ -79,8 +84,8 @@ impl NearPair {
             PairKind::EdgeFace | PairKind::FaceFace => None,
         };
         let nearest = NearestOfElements {
-            features: self.features,
-            is_parallel: self.is_parallel,
+            features,
+            is_parallel: false,
         };
         nearest.name(pair)
     }

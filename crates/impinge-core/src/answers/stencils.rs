@@ -1,0 +1,448 @@
+//! Near pairs as stencils: vertices, coefficients and distances with their derivatives.
+
+use crate::answers::near::{NearIter, NearPair, NearPairs};
+use crate::answers::pairs::Element;
+use crate::query::pair_kind::PairKind;
+use crate::scene::elements::Part;
+use crate::scene::error::Error;
+use crate::scene::index::ElementIx;
+use crate::scene::{Body, Scene};
+use crate::search::sink;
+use crate::stencil::{Gradient, Hessian, Mollifier, NearestWay};
+use impinge_exact::{Feature, Point};
+
+/// What memory is for.
+const WHAT: &str = "stencils";
+
+/// Up to four vertices, and how the squared distance between them depends on their positions: what
+/// a potential needs to know about two elements that are near each other.
+///
+/// | kind | vertices |
+/// |---|---|
+/// | [`VertexFace`](PairKind::VertexFace) | the vertex, three of the face |
+/// | [`EdgeEdge`](PairKind::EdgeEdge) | two of either edge |
+/// | [`EdgeVertex`](PairKind::EdgeVertex) | the vertex, two of the edge |
+/// | [`VertexVertex`](PairKind::VertexVertex) | the two |
+///
+/// These are the orders of ipc-toolkit. Where there are fewer than four vertices, the first is
+/// repeated. Coefficients and derivatives are 0 there, so sums over all four are right.
+///
+/// Numbers are computed in `f64` in one fixed order of operations: they have the same bits on every
+/// machine. They are accurate to a few units in the last place of the sizes of the elements, divided
+/// by the sine of the angle between edges that are nearly parallel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Stencil {
+    /// What is near what.
+    pub kind: PairKind,
+    /// The features that are nearest, in the order of the [kind](NearPair::features).
+    pub features: [Feature; 2],
+    /// The vertices by their numbers in the scene: see [`Stencils::offsets`].
+    pub vertices: [u32; 4],
+    /// How many pairs it stands for.
+    pub weight: f64,
+    /// The positions of the vertices.
+    pub points: [Point; 4],
+    /// What the mollifier compares with; 0 for none.
+    threshold: f64,
+}
+
+impl Stencil {
+    /// The numbers of the vertices that span the features, first those of the feature that comes
+    /// first in `vertices`.
+    fn spans(&self) -> [Span; 2] {
+        let [a, b] = self.features;
+        match self.kind {
+            PairKind::EdgeVertex => [Span::of(b, 0, 1), Span::of(a, 1, 2)],
+            PairKind::EdgeEdge => [Span::of(a, 0, 2), Span::of(b, 2, 2)],
+            _ => [Span::of(a, 0, 1), Span::of(b, 1, 3)],
+        }
+    }
+
+    fn way(&self) -> NearestWay {
+        let [a, b] = self.spans();
+        NearestWay::new(&self.points, a.all(), b.all())
+    }
+
+    fn mollifying(&self) -> Option<Mollifier> {
+        Mollifier::below(&self.points, self.threshold)
+    }
+
+    /// ipc-toolkit's name of the distance type, as [`NearPair::name`].
+    pub fn name(&self) -> &'static str {
+        NearPair::named(self.kind, self.features)
+    }
+
+    /// The way from one nearest point to the other is the sum of coefficients times positions.
+    ///
+    /// The coefficients of one element sum to 1, those of the other to -1. The first vertex counts
+    /// with plus.
+    pub fn coefficients(&self) -> [f64; 4] {
+        self.way().coefficients
+    }
+
+    /// The square of the distance.
+    pub fn squared_distance(&self) -> f64 {
+        self.way().squared_distance()
+    }
+
+    /// The derivatives of the squared distance by x, y and z of the first vertex, of the second and
+    /// so on.
+    pub fn gradient(&self) -> Gradient {
+        self.way().gradient()
+    }
+
+    /// The second derivatives of the squared distance, exactly symmetric. They hold while the same
+    /// features stay nearest.
+    pub fn hessian(&self) -> Hessian {
+        self.way().hessian()
+    }
+
+    /// Whether the mollifier is below 1: edges that are nearly parallel, where
+    /// [`NearPairs::stencils`] was given positions at rest.
+    pub fn is_mollified(&self) -> bool {
+        self.mollifying().is_some()
+    }
+
+    /// The factor that makes a potential of edges smooth where they become parallel and another
+    /// type of distance takes over (Li et al., *Incremental Potential Contact*, 2020, section 4.4).
+    pub fn mollifier(&self) -> f64 {
+        self.mollifying().map_or(1.0, |factor| factor.value())
+    }
+
+    /// The derivatives of the mollifier.
+    pub fn mollifier_gradient(&self) -> Gradient {
+        self.mollifying()
+            .map_or([0.0; 12], |factor| factor.gradient())
+    }
+
+    /// The second derivatives of the mollifier, exactly symmetric.
+    pub fn mollifier_hessian(&self) -> Hessian {
+        self.mollifying()
+            .map_or([[0.0; 12]; 12], |factor| factor.hessian())
+    }
+
+    /// Between the nearest features alone, unless it is mollified. What is spanned by equal
+    /// vertices is then equal: vertices of edges and pairs of vertices are in ascending order.
+    fn reduced(self) -> Self {
+        let [a, b] = self.spans();
+        // A vertex comes first.
+        let (a, b) = if a.n > b.n { (b, a) } else { (a, b) };
+        let kind = match (a.n, b.n) {
+            (1, 1) => PairKind::VertexVertex,
+            (1, 2) => PairKind::EdgeVertex,
+            // Nothing is left out.
+            _ => return self,
+        };
+        if self.is_mollified() {
+            return self;
+        }
+        let mut slots = [0; 4];
+        slots[0] = a.all()[0];
+        slots[1..=b.n].copy_from_slice(b.all());
+        let sorted = if b.n == 1 { 0..2 } else { 1..3 };
+        slots[sorted].sort_unstable_by_key(|&slot| self.vertices[slot]);
+        let n = 1 + b.n;
+        for ix in n..4 {
+            slots[ix] = slots[0];
+        }
+        Stencil {
+            kind,
+            features: match kind {
+                PairKind::EdgeVertex => [Feature::Edge(0), Feature::Vertex(0)],
+                _ => [Feature::Vertex(0); 2],
+            },
+            vertices: slots.map(|slot| self.vertices[slot]),
+            points: slots.map(|slot| self.points[slot]),
+            threshold: 0.0,
+            ..self
+        }
+    }
+}
+
+/// Up to three of the four vertices.
+struct Span {
+    slots: [usize; 3],
+    n: usize,
+}
+
+impl Span {
+    /// Of a feature of an element whose `n` vertices begin with `first`.
+    fn of(feature: Feature, first: usize, n: usize) -> Self {
+        let slot = |ix: u8| first + usize::from(ix) % n;
+        match feature {
+            Feature::Vertex(ix) => Span {
+                slots: [slot(ix); 3],
+                n: 1,
+            },
+            Feature::Edge(ix) => Span {
+                slots: [slot(ix), slot(ix + 1), first],
+                n: 2,
+            },
+            Feature::Face => Span {
+                slots: [first, first + 1, first + 2],
+                n: 3,
+            },
+        }
+    }
+
+    fn all(&self) -> &[usize] {
+        &self.slots[..self.n]
+    }
+}
+
+/// Stencils of near pairs: [`NearPairs::stencils`].
+#[derive(Debug, Clone, Default)]
+pub struct Stencils {
+    rows: Vec<Stencil>,
+    /// The first vertex of each body by its index, and one past the last.
+    offsets: Vec<u32>,
+}
+
+impl NearPairs {
+    /// A [`Stencil`] per pair, in the same order, at the positions that the scene has now: with
+    /// distances, gradients and Hessians for a potential. Features are those that were nearest when
+    /// the pairs were found.
+    ///
+    /// A potential of contact sums over [`Stencils::merged`] in place of pairs. Positions at `rest`,
+    /// in the order of the stencils' [numbers](Stencils::offsets), switch on the mollifier of
+    /// nearly parallel edges. Its threshold depends on their lengths at rest.
+    ///
+    /// ```
+    /// use impinge::{Backend, Detector, Query, Scene};
+    /// # fn main() -> Result<(), impinge::Error> {
+    /// let mut scene = Scene::new();
+    /// scene.add_triangles(&[[0, 1, 2]], &[[0.0f32, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]])?;
+    /// scene.add_points(&[[1.0f32, 1.0, 0.5]])?;
+    /// let mut detector = Detector::new(Backend::Cpu)?;
+    /// let near = detector.near(&scene, 0.5, &Query::between_all())?;
+    /// // Each contact pushes with 2000 times what is missing to a distance of 1.
+    /// let mut forces = vec![[0.0; 3]; 4];
+    /// for contact in &near.stencils(&scene, None)?.merged()? {
+    ///     let missing = 1.0 - contact.squared_distance().sqrt();
+    ///     let push = contact.weight * 2000.0 * missing / contact.squared_distance().sqrt() / 2.0;
+    ///     for (vertex, slope) in contact.vertices.iter().zip(contact.gradient().chunks(3)) {
+    ///         for k in 0..3 {
+    ///             forces[*vertex as usize][k] += push * slope[k];
+    ///         }
+    ///     }
+    /// }
+    /// assert_eq!(forces[3], [0.0, 0.0, 1000.0]); // the point is vertex 3 of the scene
+    /// # Ok(()) }
+    /// ```
+    ///
+    /// # Errors
+    /// Pairs with an edge and a face or two faces, which have no stencil; pairs of another scene or
+    /// of a body that was re-meshed; refused positions; a number of positions at rest that is not
+    /// that of the scene's vertices.
+    pub fn stencils(&self, scene: &Scene, rest: Option<&[Point]>) -> Result<Stencils, Error> {
+        self.iter().stencils(scene, rest)
+    }
+}
+
+impl NearIter<'_> {
+    /// [`NearPairs::stencils`] of the pairs that are left.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn stencils(self, scene: &Scene, rest: Option<&[Point]>) -> Result<Stencils, Error> {
+        let offsets = offsets(scene)?;
+        if let Some(rest) = rest {
+            check_rest(scene, &offsets, rest)?;
+        }
+        for (id, body) in scene.bodies() {
+            if !body.is_checked() {
+                body.positions().check(id)?;
+            }
+        }
+        let mut rows = sink::with_capacity(self.len(), WHAT)?;
+        for pair in self {
+            let parts = pair.kind.parts();
+            let (a, b) = match pair.kind {
+                PairKind::VertexFace | PairKind::EdgeEdge | PairKind::VertexVertex => {
+                    ((pair.a, parts[0]), (pair.b, parts[1]))
+                }
+                PairKind::EdgeVertex => ((pair.b, parts[1]), (pair.a, parts[0])),
+                PairKind::EdgeFace | PairKind::FaceFace => {
+                    return Err(Error::Setting {
+                        setting: "kinds",
+                        given: format!(
+                            "{} (element {} of body {} and {} of body {})",
+                            pair.kind.name(),
+                            pair.a.element,
+                            pair.a.body,
+                            pair.b.element,
+                            pair.b.body
+                        ),
+                        allowed: "vf, ee, ev or vv",
+                    });
+                }
+            };
+            let mut vertices = [0; 4];
+            let mut points = [[0.0; 3]; 4];
+            let mut n = 0;
+            for (element, part) in [a, b] {
+                let body = body_of(scene, element, part)?;
+                for &corner in body.corners(part, &ElementIx::new(element.element)) {
+                    vertices[n] = offsets[element.body.index()] + corner;
+                    points[n] = body.positions().point(corner as usize);
+                    n += 1;
+                }
+            }
+            for ix in n..4 {
+                (vertices[ix], points[ix]) = (vertices[0], points[0]);
+            }
+            let threshold = match (rest, pair.kind) {
+                (Some(rest), PairKind::EdgeEdge) => {
+                    Mollifier::threshold(&vertices.map(|vertex| rest[vertex as usize]))
+                }
+                _ => 0.0,
+            };
+            rows.push(Stencil {
+                kind: pair.kind,
+                features: pair.features,
+                vertices,
+                weight: 1.0,
+                points,
+                threshold,
+            });
+        }
+        Ok(Stencils { rows, offsets })
+    }
+}
+
+impl Stencils {
+    /// One stencil per contact: features that several pairs share are named once, with the sum of
+    /// their weights. Sorted by kind, then vertices.
+    ///
+    /// A vertex above an edge is near both of its faces and to the edges beside it; these pairs
+    /// become one stencil of the vertex and the edge. Nearly parallel edges stay pairs of edges,
+    /// since a mollifier belongs to each. These are the sets and weights of ipc-toolkit's
+    /// `NormalCollisions` of type IPC, without weights by area. Where two types have the same
+    /// distance, as for a vertex exactly above an edge, ipc-toolkit may name the other.
+    ///
+    /// # Errors
+    /// There is no memory for them.
+    pub fn merged(&self) -> Result<Self, Error> {
+        let mut rows = sink::with_capacity(self.rows.len(), WHAT)?;
+        rows.extend(self.rows.iter().map(|row| row.reduced()));
+        // Those with equal keys are equal but for weights, which are whole numbers.
+        rows.sort_unstable_by_key(Stencil::key);
+        rows.dedup_by(|next, kept| {
+            let is_same = next.key() == kept.key();
+            if is_same {
+                kept.weight += next.weight;
+            }
+            is_same
+        });
+        let mut offsets = sink::with_capacity(self.offsets.len(), WHAT)?;
+        offsets.extend_from_slice(&self.offsets);
+        Ok(Stencils { rows, offsets })
+    }
+
+    /// How many there are.
+    pub fn len(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.rows.is_empty()
+    }
+
+    /// All of them, in order.
+    pub fn iter(&self) -> std::slice::Iter<'_, Stencil> {
+        self.rows.iter()
+    }
+
+    /// Vertices are numbered through the whole scene, body after body in the order of their ids.
+    /// Vertex `v` of a body has number `offsets()[body.index()] + v`; the last entry is the number
+    /// of vertices of the scene.
+    pub fn offsets(&self) -> &[u32] {
+        &self.offsets
+    }
+}
+
+impl Stencil {
+    /// What is equal of stencils that are merged.
+    fn key(&self) -> (PairKind, [u32; 4], [Feature; 2]) {
+        (self.kind, self.vertices, self.features)
+    }
+}
+
+impl<'a> IntoIterator for &'a Stencils {
+    type Item = &'a Stencil;
+    type IntoIter = std::slice::Iter<'a, Stencil>;
+
+    fn into_iter(self) -> Self::IntoIter {
+        self.iter()
+    }
+}
+
+/// The first vertex of each body by its index, and one past the last.
+fn offsets(scene: &Scene) -> Result<Vec<u32>, Error> {
+    let n_slots = scene.bodies().last().map_or(0, |(id, _)| id.index() + 1);
+    let mut offsets = sink::filled(0, n_slots + 1, WHAT)?;
+    for (id, body) in scene.bodies() {
+        offsets[id.index() + 1] = body.n_vertices() as u64;
+    }
+    let mut n = 0;
+    for offset in &mut offsets {
+        n += *offset;
+        *offset = n;
+    }
+    match u32::try_from(n) {
+        Ok(_) => Ok(offsets.into_iter().map(|offset| offset as u32).collect()),
+        Err(_) => Err(Error::TooMany {
+            what: "vertices",
+            given: n,
+            limit: u64::from(u32::MAX),
+        }),
+    }
+}
+
+/// Refuses positions at rest that are not as many as the scene has, and those that are not finite.
+fn check_rest(scene: &Scene, offsets: &[u32], rest: &[Point]) -> Result<(), Error> {
+    let last = scene.bodies().last().map(|(id, _)| id);
+    for (body, of) in scene.bodies() {
+        let given = rest.len().saturating_sub(offsets[body.index()] as usize);
+        let expected = of.n_vertices();
+        if given < expected || Some(body) == last && given > expected {
+            return Err(Error::WrongNumberOfPositions {
+                body,
+                given,
+                expected,
+            });
+        }
+    }
+    let bad = |(_, value): &(usize, &Point)| !value.iter().all(|x| x.is_finite());
+    match rest.iter().enumerate().find(bad) {
+        None => Ok(()),
+        Some((row, &value)) => Err(Error::NonFinitePoint {
+            what: "rest",
+            row,
+            value,
+        }),
+    }
+}
+
+/// The body of an element, which must be there.
+fn body_of(scene: &Scene, element: Element, part: Part) -> Result<&Body, Error> {
+    let body = scene.body(element.body)?;
+    let n = match part {
+        Part::Vertices => body.n_vertices(),
+        _ => body.part(part).len(),
+    };
+    if (element.element as usize) < n {
+        return Ok(body);
+    }
+    Err(Error::ForeignPair {
+        body: element.body,
+        primitive: element.element,
+        n_primitives: n,
+        kind: match part {
+            Part::Vertices => "vertices",
+            Part::Edges => "edges",
+            Part::Faces | Part::Given => "faces",
+        },
+    })
+}

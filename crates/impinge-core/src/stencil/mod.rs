@@ -1,0 +1,39 @@
+//! The mathematics of stencils: squared distances and mollifiers with their derivatives.
+//!
+//! With them goes the projection of matrices onto those without negative eigenvalues.
+//!
+//! In: up to four points, and which of them span the features that are nearest. Out: numbers in
+//! `f64`, in one fixed order of operations without fused multiply-add: the same bits everywhere.
+
+mod distance;
+mod mollifier;
+mod projection;
+
+pub(crate) use distance::NearestWay;
+pub(crate) use mollifier::Mollifier;
+pub use projection::project_psd;
+
+/// A point, or a difference of points.
+type Vector = [f64; 3];
+
+/// Derivatives by the coordinates of four points.
+pub type Gradient = [f64; 12];
+
+/// Second derivatives by the coordinates of four points.
+pub type Hessian = [[f64; 12]; 12];
+
+fn sub(p: Vector, q: Vector) -> Vector {
+    [p[0] - q[0], p[1] - q[1], p[2] - q[2]]
+}
+
+fn dot(p: Vector, q: Vector) -> f64 {
+    p[0] * q[0] + p[1] * q[1] + p[2] * q[2]
+}
+
+fn cross(p: Vector, q: Vector) -> Vector {
+    [
+        p[1] * q[2] - p[2] * q[1],
+        p[2] * q[0] - p[0] * q[2],
+        p[0] * q[1] - p[1] * q[0],
+    ]
+}

@@ -1,0 +1,94 @@
+//! The factor that makes a potential of nearly parallel edges smooth, with its derivatives.
+//!
+//! Li et al., *Incremental Potential Contact* (2020), equations 24 and 25: with `s` the squared
+//! length of the cross product of the edges, and a threshold `e`, the factor is `s/e (2 - s/e)`
+//! below the threshold and 1 from there on. The threshold is 1e-3 of the product of the squared
+//! lengths at rest.
+
+use std::array::from_fn;
+
+use super::{Gradient, Hessian, Vector, cross, dot, sub};
+
+/// The mollifier of edges 0-1 and 2-3 of four points, below its threshold.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Mollifier {
+    edges: [Vector; 2],
+    normal: Vector,
+    threshold: f64,
+}
+
+impl Mollifier {
+    /// What the squared length of the cross product is compared with, from the points at rest.
+    pub fn threshold(rest: &[Vector; 4]) -> f64 {
+        let [u, v] = [sub(rest[1], rest[0]), sub(rest[3], rest[2])];
+        1e-3 * dot(u, u) * dot(v, v)
+    }
+
+    /// None at the threshold and above.
+    pub fn below(points: &[Vector; 4], threshold: f64) -> Option<Self> {
+        let edges = [sub(points[1], points[0]), sub(points[3], points[2])];
+        let normal = cross(edges[0], edges[1]);
+        (dot(normal, normal) < threshold).then_some(Mollifier {
+            edges,
+            normal,
+            threshold,
+        })
+    }
+
+    /// The share of the threshold.
+    fn share(&self) -> f64 {
+        dot(self.normal, self.normal) / self.threshold
+    }
+
+    pub fn value(&self) -> f64 {
+        let share = self.share();
+        share * (2.0 - share)
+    }
+
+    /// The derivative by the squared length of the cross product.
+    fn slope(&self) -> f64 {
+        2.0 * (1.0 - self.share()) / self.threshold
+    }
+
+    /// Of the squared length of the cross product `n` of `u` and `v`: `2 v x n` by `u` and
+    /// `2 n x u` by `v`.
+    fn gradient_of_square(&self) -> Gradient {
+        let [u, v] = self.edges;
+        let by_edge = [cross(v, self.normal), cross(self.normal, u)];
+        from_fn(|i| 2.0 * sign(i) * by_edge[i / 6][i % 3])
+    }
+
+    pub fn gradient(&self) -> Gradient {
+        let slope = self.slope();
+        self.gradient_of_square().map(|x| slope * x)
+    }
+
+    pub fn hessian(&self) -> Hessian {
+        let [u, v] = self.edges;
+        let (uu, uv, vv) = (dot(u, u), dot(u, v), dot(v, v));
+        let square = self.gradient_of_square();
+        let slope = self.slope();
+        let curvature = -2.0 / (self.threshold * self.threshold);
+        let second = |i: usize, j: usize| {
+            let (k, l) = (i % 3, j % 3);
+            let same = |x: f64| if k == l { x } else { 0.0 };
+            match (i / 6, j / 6) {
+                (0, 0) => 2.0 * (same(vv) - v[k] * v[l]),
+                (1, 1) => 2.0 * (same(uu) - u[k] * u[l]),
+                (0, 1) => 4.0 * u[k] * v[l] - 2.0 * v[k] * u[l] - same(2.0 * uv),
+                _ => 4.0 * u[l] * v[k] - 2.0 * v[l] * u[k] - same(2.0 * uv),
+            }
+        };
+        from_fn(|i| {
+            from_fn(|j| {
+                let signs = sign(i) * sign(j);
+                slope * signs * second(i, j) + curvature * (square[i] * square[j])
+            })
+        })
+    }
+}
+
+/// An edge goes from its first point, which counts with a minus.
+fn sign(i: usize) -> f64 {
+    if i % 6 < 3 { -1.0 } else { 1.0 }
+}
