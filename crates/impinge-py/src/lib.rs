@@ -25,6 +25,7 @@ mod scene;
 mod settings;
 mod solver;
 mod statistics;
+mod stencils;
 mod vertex_filter;
 mod watch;
 
@@ -72,6 +73,8 @@ mod _impinge {
     use super::scene::Scene;
     #[pymodule_export]
     use super::solver::{Neighbours, SafeDistances};
+    #[pymodule_export]
+    use super::stencils::{_project_psd, _stencils, Stencils};
     #[pymodule_export]
     use super::vertex_filter::VertexFilter;
     #[pymodule_export]

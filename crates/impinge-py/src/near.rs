@@ -43,7 +43,7 @@ impl Near {
         }
     }
 
-    fn iter(&self) -> NearIter<'_> {
+    pub fn iter(&self) -> NearIter<'_> {
         match self.kind {
             Some(kind) => self.inner.of(kind),
             None => self.inner.iter(),
@@ -73,20 +73,11 @@ impl Near {
     }
 
     fn types<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<u8>>> {
-        // The name depends on the kind and the two features alone.
-        const UNKNOWN: u8 = u8::MAX;
-        let mut known = [[[UNKNOWN; FEATURES.len()]; FEATURES.len()]; PairKind::ALL.len()];
-        let types = self.iter().map(|pair| {
-            let [a, b] = pair.features.map(|feature| usize::from(number(feature)));
-            let known = &mut known[pair.kind as usize][a][b];
-            if *known == UNKNOWN {
-                let name = pair.name();
-                let found = TYPES.iter().position(|&own| own == name);
-                *known = found.map_or(UNKNOWN, |ix| ix as u8);
-            }
-            *known
-        });
-        Ok(PyArray1::from_vec(py, collect(self.__len__(), types)?))
+        type_numbers(
+            py,
+            self.iter()
+                .map(|pair| (pair.kind, pair.features, pair.name())),
+        )
     }
 
     fn features<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u8>>> {
@@ -152,6 +143,27 @@ impl Near {
     fn __len__(&self) -> usize {
         self.iter().len()
     }
+}
+
+/// Types by their numbers, given kinds, features and names.
+pub fn type_numbers(
+    py: Python<'_>,
+    rows: impl ExactSizeIterator<Item = (PairKind, [Feature; 2], &'static str)>,
+) -> PyResult<Bound<'_, PyArray1<u8>>> {
+    // The name depends on the kind and the two features alone.
+    const UNKNOWN: u8 = u8::MAX;
+    let mut known = [[[UNKNOWN; FEATURES.len()]; FEATURES.len()]; PairKind::ALL.len()];
+    let n = rows.len();
+    let types = rows.map(|(kind, features, name)| {
+        let [a, b] = features.map(|feature| usize::from(number(feature)));
+        let known = &mut known[kind as usize][a][b];
+        if *known == UNKNOWN {
+            let found = TYPES.iter().position(|&own| own == name);
+            *known = found.map_or(UNKNOWN, |ix| ix as u8);
+        }
+        *known
+    });
+    Ok(PyArray1::from_vec(py, collect(n, types)?))
 }
 
 /// The number of a feature.

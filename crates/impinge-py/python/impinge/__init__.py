@@ -33,6 +33,7 @@ from ._answers import (
     Pairs,
     SafeDistances,
     Stats,
+    Stencils,
     Truncation,
 )
 from ._check import check
@@ -57,6 +58,7 @@ from ._functions import (
     devices,
     hash_rows,
     pairs,
+    project_psd,
     self_pairs,
     signed_distance,
     weld,
@@ -117,6 +119,7 @@ __all__ = [
     "Scene",
     "Seam",
     "Stats",
+    "Stencils",
     "TooManyPairs",
     "Truncation",
     "__version__",
@@ -130,6 +133,7 @@ __all__ = [
     "hash_rows",
     "ipc",
     "pairs",
+    "project_psd",
     "ray",
     "read",
     "read_bodies",

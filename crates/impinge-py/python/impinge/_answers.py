@@ -31,6 +31,7 @@ __all__ = [
     "Pairs",
     "SafeDistances",
     "Stats",
+    "Stencils",
     "Truncation",
 ]
 
@@ -591,6 +592,163 @@ class NearPairs(_OfKinds):
             A part of the same answer, which is not copied.
         """
         return NearPairs(self._inner.of(kind))
+
+    def stencils(self, scene: Scene, rest: _Array | None = None) -> Stencils:
+        """What a potential needs to know about each pair: vertices, squared distance, gradient and Hessian.
+
+        Parameters
+        ----------
+        scene : Scene
+            With the positions at which distances are taken: as it was when the pairs were found, or moved since. Features are
+            those that were nearest when the pairs were found.
+        rest : array_like, shape (v, 3), optional
+            Positions at rest of all vertices of the scene, body after body. They switch on the mollifier of nearly parallel edges,
+            whose threshold depends on their lengths at rest.
+
+        Returns
+        -------
+        Stencils
+            One per pair, in the same order. A potential sums over its `Stencils.merged`.
+
+        Raises
+        ------
+        ValueError, TypeError
+            Pairs of kind ``"ef"`` or ``"ff"``, which have no stencil, of another scene, or of a body that was re-meshed; another
+            number of positions at rest.
+
+        Examples
+        --------
+        A quadratic barrier of height 1 that begins at a distance of 1, and its derivatives:
+
+        >>> import impinge
+        >>> scene = impinge.Scene()
+        >>> floor = scene.add([[0, 0, 0], [4, 0, 0], [0, 4, 0]], [[0, 1, 2]])
+        >>> drop = scene.add_points([[1, 1, 0.5]])
+        >>> contacts = impinge.Detector("cpu").near(scene, 1.0).stencils(scene).merged()
+        >>> contacts.vertices.tolist(), impinge.TYPES[contacts.types[0]]
+        ([[3, 0, 1, 2]], 'P_T')
+        >>> s = contacts.squared_distances
+        >>> float((contacts.weights * (1 - s) ** 2).sum())
+        0.5625
+        >>> gradients = (contacts.weights * -2 * (1 - s))[:, None] * contacts.gradients
+        >>> gradients.reshape(-1, 4, 3)[0, 0].tolist()             # of the point: it is pushed up
+        [-0.0, -0.0, -1.5]
+        """
+        return Stencils(_impinge._stencils(self._inner, scene, rest))
+
+
+class Stencils:
+    """Up to four vertices per near pair or contact, and how their squared distance depends on their positions.
+
+    ``len(stencils)`` is their number. The attributes are arrays with one row per stencil; each access computes new ones. Numbers are computed
+    in float64 in one fixed order of operations: the same bits on every machine.
+
+    Vertices come in the order of ipc-toolkit: the vertex and the face's three, two of either edge, the vertex and the edge's two,
+    two vertices. Where there are fewer than four, the first is repeated. Coefficients and derivatives are 0 there, so sums over all
+    four are right, as of ``numpy.add.at`` and of sparse matrices.
+    """
+
+    __slots__ = ("_inner",)
+
+    def __init__(self, inner: _impinge.Stencils) -> None:
+        self._inner = inner
+
+    def merged(self) -> Stencils:
+        """One stencil per contact: features that several pairs share once, with the sum of their weights.
+
+        A vertex above an edge is near both of its faces and to the edges beside it; these pairs become one stencil of the vertex and the
+        edge. Nearly parallel edges stay pairs of edges, since a mollifier belongs to each. These are the sets and
+        weights of ipc-toolkit's ``NormalCollisions`` of type IPC, without weights by area. Where two types have the same distance, as
+        for a vertex exactly above an edge, ipc-toolkit may name the other.
+
+        Returns
+        -------
+        Stencils
+            Sorted by kind, then vertices.
+        """
+        return Stencils(self._inner.merged())
+
+    @property
+    def vertices(self) -> npt.NDArray[np.uint32]:
+        """numpy.ndarray of uint32, shape (n, 4) : vertices by their numbers in the whole scene: see `offsets`."""
+        return self._inner.vertices()
+
+    @property
+    def offsets(self) -> npt.NDArray[np.uint32]:
+        """numpy.ndarray of uint32, shape (b + 1,) : the number of the first vertex of each body by its index, and the number of all.
+
+        Vertices are numbered body after body, so they index ``numpy.concatenate([scene.positions(body) for body in scene.bodies])``.
+        """
+        return self._inner.offsets()
+
+    @property
+    def weights(self) -> npt.NDArray[np.float64]:
+        """numpy.ndarray of float64, shape (n,) : how many pairs each stands for."""
+        return self._inner.weights()
+
+    @property
+    def kinds(self) -> npt.NDArray[np.uint8]:
+        """numpy.ndarray of uint8, shape (n,) : what is near what, as an index of `impinge.KINDS`."""
+        return self._inner.kinds()
+
+    @property
+    def types(self) -> npt.NDArray[np.uint8]:
+        """numpy.ndarray of uint8, shape (n,) : types of distance, as `NearPairs.types`."""
+        return self._inner.types()
+
+    @property
+    def coefficients(self) -> npt.NDArray[np.float64]:
+        """numpy.ndarray of float64, shape (n, 4) : with ``c`` a row and ``x`` the positions of its vertices, ``c @ x`` is the way from
+        one nearest point to the other. Those of one element sum to 1, those of the other to -1."""
+        return self._inner.coefficients()
+
+    @property
+    def squared_distances(self) -> npt.NDArray[np.float64]:
+        """numpy.ndarray of float64, shape (n,) : squares of the distances."""
+        return self._inner.squared_distances()
+
+    @property
+    def gradients(self) -> npt.NDArray[np.float64]:
+        """numpy.ndarray of float64, shape (n, 12) : derivatives of the squared distances by x, y, z of the first vertex, then of the
+        second and so on."""
+        return self._inner.gradients()
+
+    @property
+    def hessians(self) -> npt.NDArray[np.float64]:
+        """numpy.ndarray of float64, shape (n, 12, 12) : second derivatives of the squared distances, exactly symmetric."""
+        return self._inner.hessians()
+
+    @property
+    def mollified(self) -> npt.NDArray[np.bool_]:
+        """numpy.ndarray of bool, shape (n,) : where the mollifier is below 1."""
+        return self._inner.mollified()
+
+    @property
+    def mollifiers(self) -> npt.NDArray[np.float64]:
+        """numpy.ndarray of float64, shape (n,) : the factor that makes a potential smooth where edges become parallel and another type of
+        distance takes over (Li et al., *Incremental Potential Contact*, 2020, 4.4). 1 where `rest` was not given."""
+        return self._inner.mollifiers()
+
+    @property
+    def mollifier_gradients(self) -> npt.NDArray[np.float64]:
+        """numpy.ndarray of float64, shape (n, 12) : derivatives of the mollifiers."""
+        return self._inner.mollifier_gradients()
+
+    @property
+    def mollifier_hessians(self) -> npt.NDArray[np.float64]:
+        """numpy.ndarray of float64, shape (n, 12, 12) : second derivatives of the mollifiers, exactly symmetric."""
+        return self._inner.mollifier_hessians()
+
+    def __len__(self) -> int:
+        return len(self._inner)
+
+    def __reduce__(self) -> NoReturn:
+        raise TypeError("Stencils name vertices of a live scene: pickle their arrays")
+
+    def __repr__(self) -> str:
+        counts = np.bincount(self.kinds, minlength=len(_impinge.KINDS)).tolist()
+        named = [f"{kind}: {n}" for kind, n in zip(_impinge.KINDS, counts) if n]
+        return f"Stencils({', '.join(named)})"
 
 
 class SafeDistances:

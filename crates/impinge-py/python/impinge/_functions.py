@@ -26,6 +26,7 @@ __all__ = [
     "devices",
     "hash_rows",
     "pairs",
+    "project_psd",
     "self_pairs",
     "signed_distance",
     "weld",
@@ -394,6 +395,39 @@ def hash_rows(rows: _Array) -> int:
     int
     """
     return _impinge._hash_rows(rows)
+
+
+def project_psd(matrices: _Array) -> npt.NDArray[np.float64]:
+    """The nearest symmetric matrices without negative eigenvalues, for Newton's method.
+
+    Parameters
+    ----------
+    matrices : array_like of float, shape (..., k, k), k one of 3, 6, 9 and 12
+        Symmetric; else the mean of each and its transpose is taken.
+
+    Returns
+    -------
+    numpy.ndarray of float64, of the same shape
+        Exactly symmetric. Negative eigenvalues became 0, as by ipc-toolkit's ``CLAMP``. The same bits on every machine.
+
+    Raises
+    ------
+    ValueError, TypeError
+        Another shape, or no numbers.
+
+    Examples
+    --------
+    >>> import impinge, numpy as np
+    >>> matrix = np.diag([2.0, -1.0, 0.5])
+    >>> impinge.project_psd(matrix).diagonal().tolist()
+    [2.0, 0.0, 0.5]
+    """
+    given = np.asarray(matrices)
+    if given.dtype.kind not in "biuf":
+        raise TypeError(f"matrices: numbers expected, {given.dtype} given")
+    if given.ndim < 2 or given.shape[-1] != given.shape[-2] or given.shape[-1] not in (3, 6, 9, 12):
+        raise ValueError(f"matrices: shape (..., k, k) with k of 3, 6, 9 or 12 expected, {given.shape} given")
+    return _impinge._project_psd(given.astype(np.float64, copy=False))
 
 
 class DeviceInfo(NamedTuple):
