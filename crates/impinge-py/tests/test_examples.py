@@ -1,5 +1,6 @@
 """Every example runs as its user would run it."""
 
+import importlib.util
 import subprocess
 import sys
 
@@ -69,6 +70,50 @@ def test_an_implicit_cloth_with_ipc_toolkit(root):
     most = int(first.partition("at most ")[2].split()[0])
     assert "no intersection" in first and most > 20
     assert last.endswith("sets of collisions are the same") and int(last.split()[0]) > 60
+
+
+def cloth_alone(root):
+    pytest.importorskip("scipy", reason="SciPy is not installed: no solver")
+    return root / "examples" / "ipc" / "cloth_alone.py"
+
+
+def test_an_implicit_cloth_alone(root):
+    """Contacts slide more slowly the more friction there is. The program ends with an error if anything ever intersects."""
+    speeds = []
+    for friction in [0, 0.1, 0.5]:
+        command = [sys.executable, str(cloth_alone(root)), "--size", "9", "--frames", "24", "--friction", str(friction)]
+        out = subprocess.run(command, capture_output=True, text=True, timeout=300)
+        assert out.returncode == 0 and "no intersection" in out.stdout, out.stdout + out.stderr
+        assert int(out.stdout.partition("at most ")[2].split()[0]) > 20
+        speeds.append(float(out.stdout.partition("slid at ")[2].split()[0]))
+    assert speeds[0] > 1.2 * speeds[1] > 1.2**2 * speeds[2] > 0
+
+
+def test_forces_of_the_cloth_alone_are_the_slope_of_its_energy(root):
+    spec = importlib.util.spec_from_file_location("cloth_alone", cloth_alone(root))
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    cloth = module.Cloth(9, 0.5)
+    for _ in range(20):
+        cloth.frame()
+    start = cloth.x
+    friction = module.Friction(cloth.contacts(start), start, 0.5)
+    random = np.random.default_rng(1)
+    x = start.copy()
+    x[: cloth.n] += 1e-5 * random.standard_normal((cloth.n, 3))
+    goal = start[: cloth.n] + module.FRAME * cloth.v
+    gradient, _ = cloth.derivatives(x, goal, friction)
+    assert len(friction.force) > 20 and friction.value(x) > friction.value(start)
+    total = module.Sum(len(x))
+    friction.add_to(total, x)
+    potentials = [(lambda x: cloth.energy(x, goal, friction), gradient), (friction.value, total.gradient[: 3 * cloth.n])]
+    for potential, gradient in potentials:
+        for _ in range(3):
+            way = np.zeros_like(x)
+            way[: cloth.n] = random.standard_normal((cloth.n, 3))
+            slope = (potential(x + 1e-8 * way) - potential(x - 1e-8 * way)) / 2e-8
+            expected = gradient @ way[: cloth.n].ravel()
+            assert abs(slope - expected) < 1e-4 * np.abs(gradient).max(), (slope, expected)
 
 
 def test_check_mesh(run, tmp_path):
