@@ -491,7 +491,14 @@ typedef struct impinge_stats {
  *   IS_HIT      r x 1 U8       of each ray: 1 if it hits anything                       hits
  *   STARTS      r + 1 x 1 U64  where the hits of each ray start, but for IMPINGE_HITS_ANY  hits
  *   T, T_END    n x 1 F64                                                               hits
- *   BARYCENTRICS n x 3 F64                                                              hits */
+ *   BARYCENTRICS n x 3 F64                                                              hits
+ * Of stencils, KIND is n x 1 U8, FEATURES n x 2 U8 in the order of the vertices, and these, which are computed when first looked at:
+ *   VERTICES    n x 4 U32      numbered through the scene, body after body
+ *   STARTS      b + 1 x 1 U64  the number of the first vertex of each body, and the number of all
+ *   WEIGHT      n x 1 F64      how many pairs it stands for
+ *   COEFFICIENTS n x 4 F64     times the vertices they sum to the way between the nearest points
+ *   SQUARED_DISTANCE, GRADIENT, HESSIAN        n x 1, n x 12, n x 144 F64: derivatives by x, y, z of the first vertex and so on
+ *   MOLLIFIER, MOLLIFIER_GRADIENT, MOLLIFIER_HESSIAN   the same of the mollifier */
 #define IMPINGE_COLUMN_KIND 1
 #define IMPINGE_COLUMN_ROWS 2
 #define IMPINGE_COLUMN_DISTANCE 3
@@ -514,6 +521,15 @@ typedef struct impinge_stats {
 #define IMPINGE_COLUMN_T 20
 #define IMPINGE_COLUMN_T_END 21
 #define IMPINGE_COLUMN_BARYCENTRICS 22
+#define IMPINGE_COLUMN_VERTICES 23
+#define IMPINGE_COLUMN_WEIGHT 24
+#define IMPINGE_COLUMN_COEFFICIENTS 25
+#define IMPINGE_COLUMN_SQUARED_DISTANCE 26
+#define IMPINGE_COLUMN_GRADIENT 27
+#define IMPINGE_COLUMN_HESSIAN 28
+#define IMPINGE_COLUMN_MOLLIFIER 29
+#define IMPINGE_COLUMN_MOLLIFIER_GRADIENT 30
+#define IMPINGE_COLUMN_MOLLIFIER_HESSIAN 31
 
 /* The shape of a contact: a pair that is no pair of triangles; nothing, because bodies have moved since; a point; a segment; a polygon
  * of two triangles in one plane. */
@@ -716,6 +732,27 @@ uint64_t impinge_near_hash(const impinge_near *near_pairs);
 impinge_status impinge_near_column(const impinge_near *near_pairs, uint32_t column, impinge_array *view);
 impinge_status impinge_near_stats(const impinge_near *near_pairs, impinge_stats *stats);
 void impinge_near_destroy(impinge_near *near_pairs);
+
+/* What a potential needs to know about near pairs: up to four vertices each, and how their squared distance depends on them. */
+typedef struct impinge_stencils impinge_stencils;
+
+/* One per near pair, in the same order, at the positions that the scene has now; the nearest features are those that were found. Vertices:
+ * the vertex and three of the face, two of either edge (whichever is first), the vertex and two of the edge, two vertices. Where there are
+ * fewer than four, the first is repeated, and coefficients and derivatives are 0 there. `rest` has the positions at rest of all vertices of
+ * the scene, body after body (3 columns of F32 or F64): with it, the mollifier of nearly parallel edges is below 1. NULL: it is 1.
+ * All numbers have the same bits on every machine. INVALID: pairs of IMPINGE_EF and IMPINGE_FF; pairs of another scene or of a body with new
+ * elements. */
+impinge_status impinge_near_stencils(const impinge_near *near_pairs, const impinge_scene *scene, const impinge_array *rest,
+    impinge_stencils **stencils);
+/* One per contact: features that several pairs share once, with the sum of their weights, sorted by kind and vertices. These are the
+ * sets and weights of ipc-toolkit's NormalCollisions of type IPC, without weights by area. */
+impinge_status impinge_stencils_merged(const impinge_stencils *stencils, impinge_stencils **merged);
+size_t impinge_stencils_count(const impinge_stencils *stencils);
+impinge_status impinge_stencils_column(const impinge_stencils *stencils, uint32_t column, impinge_array *view);
+void impinge_stencils_destroy(impinge_stencils *stencils);
+/* Replaces each of `n` symmetric matrices of `size` x `size` numbers (3, 6, 9 or 12), one after another, by the nearest one without
+ * negative eigenvalues. The same bits on every machine. */
+impinge_status impinge_project_psd(double *matrices, size_t n, size_t size);
 
 /* How far each vertex of a body may move: a view, n x 1 F32 or F64 as its positions, valid as long as the answer. A vertex that belongs to
  * no element has `most`, as has each vertex of a body that the query is not about. INVALID: no such body when it was asked. */

@@ -134,8 +134,10 @@ pub fn append_rows(
 
 /// An answer about distances.
 pub struct impinge_near {
-    near: NearPairs,
+    pub near: NearPairs,
     rows: Vec<impinge_pair>,
+    /// Where the rows are in `near`, if the caller's numbers of edges order them otherwise.
+    pub order: Vec<usize>,
     columns: NearColumns,
     /// The same pairs, to be left out of queries: made once, because it keeps their keys.
     exclusion: OnceLock<Exclusion>,
@@ -199,6 +201,7 @@ impl impinge_near {
         let mut answer = impinge_near {
             near,
             rows,
+            order: Vec::new(),
             columns: of,
             exclusion: OnceLock::new(),
             texts: Texts::default(),
@@ -236,7 +239,9 @@ impl impinge_near {
         ordered(features, &order)?;
         ordered(are_parallel, &order)?;
         ordered(distances, &order)?;
-        ordered(points, &order)
+        ordered(points, &order)?;
+        self.order = order;
+        Ok(())
     }
 }
 

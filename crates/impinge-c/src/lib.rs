@@ -27,6 +27,7 @@ mod scene;
 mod sized;
 mod stats;
 mod status;
+mod stencils;
 mod types;
 
 #[cfg(test)]

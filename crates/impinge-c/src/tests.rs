@@ -113,7 +113,16 @@ fn layout_in_rust() -> BTreeMap<String, usize> {
         COLUMN_IS_HIT,
         COLUMN_T,
         COLUMN_T_END,
-        COLUMN_BARYCENTRICS
+        COLUMN_BARYCENTRICS,
+        COLUMN_VERTICES,
+        COLUMN_WEIGHT,
+        COLUMN_COEFFICIENTS,
+        COLUMN_SQUARED_DISTANCE,
+        COLUMN_GRADIENT,
+        COLUMN_HESSIAN,
+        COLUMN_MOLLIFIER,
+        COLUMN_MOLLIFIER_GRADIENT,
+        COLUMN_MOLLIFIER_HESSIAN
     );
     for kind in PairKind::ALL {
         layout.insert(kind.name().to_uppercase(), bit(kind) as usize);

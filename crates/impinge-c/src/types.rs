@@ -79,6 +79,15 @@ pub const COLUMN_IS_HIT: u32 = 19;
 pub const COLUMN_T: u32 = 20;
 pub const COLUMN_T_END: u32 = 21;
 pub const COLUMN_BARYCENTRICS: u32 = 22;
+pub const COLUMN_VERTICES: u32 = 23;
+pub const COLUMN_WEIGHT: u32 = 24;
+pub const COLUMN_COEFFICIENTS: u32 = 25;
+pub const COLUMN_SQUARED_DISTANCE: u32 = 26;
+pub const COLUMN_GRADIENT: u32 = 27;
+pub const COLUMN_HESSIAN: u32 = 28;
+pub const COLUMN_MOLLIFIER: u32 = 29;
+pub const COLUMN_MOLLIFIER_GRADIENT: u32 = 30;
+pub const COLUMN_MOLLIFIER_HESSIAN: u32 = 31;
 
 pub const NO_FEATURE: u32 = 255;
 

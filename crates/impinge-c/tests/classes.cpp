@@ -62,6 +62,13 @@ void answers() {
   CHECK(near.size() > 100 && near.distances().size() == near.size() && near.closest_points().size() == near.size());
   CHECK(near.of(pair_kind::vf).size() + near.of(pair_kind::ee).size() + near.of(pair_kind::ef).size() == near.size());
   CHECK(near.of(pair_kind::ff).empty() && near.features().size() == near.size());
+  const auto pairs_of_parts = detector.near(scene, 0.01, query::between_all().kinds({pair_kind::vf, pair_kind::ee}));
+  const auto stencils = pairs_of_parts.stencils(scene);
+  const auto merged = stencils.merged();
+  double weight = 0;
+  for (const double of : merged.weights()) weight += of;
+  CHECK(merged.size() < stencils.size() && stencils.size() == pairs_of_parts.size() && weight == static_cast<double>(stencils.size()));
+  CHECK(merged.hessians().size() == merged.size() && merged.gradients()[0].size() == 12 && merged.vertices().size() == merged.size());
   const auto candidates = detector.candidates(scene, 0.01, query::all().kinds({pair_kind::ee}));
   CHECK(candidates.of(pair_kind::ee).size() == candidates.size() && candidates.size() > 100);
   std::size_t n = 0;

@@ -313,6 +313,83 @@ static void near_and_candidates(impinge_detector *detector) {
   impinge_scene_destroy(scene);
 }
 
+/* What a potential needs: against distances, the balance of forces, and another order of numbers. */
+static void stencils(impinge_detector *detector) {
+  impinge_scene *scene = two_balls();
+  impinge_near *near_pairs = NULL;
+  impinge_stencils *of = NULL, *merged = NULL, *plain = NULL;
+  impinge_array view, distances, rest, vertices, gradients, hessians, weights;
+  static double at_rest[2 * VERTICES][3];
+  double matrices[2][9] = {{2, 0, 0, 0, -1, 0, 0, 0, 0.5}, {-1, 0, 0, 0, -1, 0, 0, 0, -1}};
+  impinge_query query;
+  double total = 0;
+  size_t i, j, k, n;
+  impinge_query_default(&query);
+  query.self = 0;
+  query.kinds = IMPINGE_FF;
+  GOOD(impinge_find_near(detector, scene, 0.01, &query, &near_pairs));
+  REFUSED(impinge_near_stencils(near_pairs, scene, NULL, &of), "kinds: ff");
+  CHECK(of == NULL);
+  impinge_near_destroy(near_pairs);
+  query.kinds = IMPINGE_VF | IMPINGE_EE;
+  query.flags = IMPINGE_DISTANCES;
+  GOOD(impinge_find_near(detector, scene, 0.01, &query, &near_pairs));
+  n = impinge_near_count(near_pairs);
+  memcpy(at_rest, balls[0].positions, sizeof balls[0].positions);
+  memcpy(at_rest[VERTICES], balls[1].positions, sizeof balls[1].positions);
+  rest = packed(at_rest, 2 * VERTICES, IMPINGE_F64);
+  GOOD(impinge_near_stencils(near_pairs, scene, &rest, &of));
+  CHECK(n > 50 && impinge_stencils_count(of) == n);
+  GOOD(impinge_near_column(near_pairs, IMPINGE_COLUMN_DISTANCE, &distances));
+  GOOD(impinge_stencils_column(of, IMPINGE_COLUMN_SQUARED_DISTANCE, &view));
+  CHECK(view.rows == n && view.row_stride == sizeof(double) && view.type == IMPINGE_F64);
+  for (i = 0; i < n; ++i) CHECK(fabs(((const double *)view.data)[i] - pow(((const double *)distances.data)[i], 2)) < 1e-12);
+  GOOD(impinge_stencils_column(of, IMPINGE_COLUMN_VERTICES, &vertices));
+  GOOD(impinge_stencils_column(of, IMPINGE_COLUMN_GRADIENT, &gradients));
+  GOOD(impinge_stencils_column(of, IMPINGE_COLUMN_HESSIAN, &hessians));
+  CHECK(vertices.row_stride == 4 * sizeof(uint32_t) && gradients.row_stride == 12 * sizeof(double) && hessians.row_stride == 144 * sizeof(double));
+  for (i = 0; i < n; ++i) {
+    const double *gradient = (const double *)gradients.data + 12 * i, *hessian = (const double *)hessians.data + 144 * i;
+    for (k = 0; k < 4; ++k) CHECK(((const uint32_t *)vertices.data)[4 * i + k] < 2 * VERTICES);
+    for (k = 0; k < 3; ++k) {
+      CHECK(fabs(gradient[k] + gradient[3 + k] + gradient[6 + k] + gradient[9 + k]) < 1e-12);
+      for (j = 0; j < 12; ++j) CHECK(fabs(hessian[12 * k + j] - hessian[12 * j + k]) == 0);
+    }
+  }
+  GOOD(impinge_stencils_column(of, IMPINGE_COLUMN_STARTS, &view));
+  CHECK(view.rows == 3 && view.type == IMPINGE_U64 && ((const uint64_t *)view.data)[1] == VERTICES && ((const uint64_t *)view.data)[2] == 2 * VERTICES);
+  GOOD(impinge_stencils_merged(of, &merged));
+  GOOD(impinge_stencils_column(merged, IMPINGE_COLUMN_WEIGHT, &weights));
+  CHECK(weights.rows == impinge_stencils_count(merged) && weights.rows < n);
+  for (i = 0; i < weights.rows; ++i) total += ((const double *)weights.data)[i];
+  CHECK(total == (double)n);
+  for (i = IMPINGE_COLUMN_COEFFICIENTS; i <= IMPINGE_COLUMN_MOLLIFIER_HESSIAN; ++i) {
+    GOOD(impinge_stencils_column(merged, (uint32_t)i, &view));
+    CHECK(view.rows == weights.rows && view.type == IMPINGE_F64);
+  }
+  GOOD(impinge_stencils_column(merged, IMPINGE_COLUMN_KIND, &view));
+  CHECK(view.type == IMPINGE_U8 && ((const uint8_t *)view.data)[view.rows - 1] >= ((const uint8_t *)view.data)[0]);
+  GOOD(impinge_stencils_column(merged, IMPINGE_COLUMN_FEATURES, &view));
+  CHECK(view.row_stride == 2 && view.type == IMPINGE_U8);
+  /* Without positions at rest there is no mollifier. */
+  GOOD(impinge_near_stencils(near_pairs, scene, NULL, &plain));
+  GOOD(impinge_stencils_column(plain, IMPINGE_COLUMN_MOLLIFIER, &view));
+  for (i = 0; i < n; ++i) CHECK(((const double *)view.data)[i] == 1);
+  REFUSED(impinge_stencils_column(plain, IMPINGE_COLUMN_TOI, &view), "no column 7");
+  impinge_stencils_destroy(of);
+  rest.rows -= 1;
+  REFUSED(impinge_near_stencils(near_pairs, scene, &rest, &of), "positions given, but it has");
+  GOOD(impinge_project_psd(matrices[0], 2, 3));
+  CHECK(matrices[0][0] == 2 && matrices[0][4] == 0 && matrices[0][8] == 0.5 && matrices[1][0] == 0 && matrices[1][8] == 0);
+  GOOD(impinge_project_psd(NULL, 0, 12));
+  REFUSED(impinge_project_psd(NULL, 1, 12), "NULL");
+  REFUSED(impinge_project_psd(matrices[0], 2, 4), "size: 4 given");
+  impinge_stencils_destroy(merged);
+  impinge_stencils_destroy(plain);
+  impinge_near_destroy(near_pairs);
+  impinge_scene_destroy(scene);
+}
+
 /* Two balls at a distance of 0.9 cross in one circle, and share a lens. */
 static void contacts(impinge_detector *detector) {
   impinge_scene *scene = two_balls();
@@ -688,6 +765,7 @@ int main(void) {
   pairs_of_bodies(detector);
   steps(detector);
   near_and_candidates(detector);
+  stencils(detector);
   contacts(detector);
   solvers(detector);
   probes(detector);

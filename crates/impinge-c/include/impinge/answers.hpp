@@ -126,6 +126,45 @@ public:
   view<pair> of(pair_kind kind) const { return detail::of_kind(rows(), kinds(), kind); }
 };
 
+/// Up to four vertices per near pair or contact, and how their squared distance depends on them. Columns are computed when first looked at.
+class stencils {
+public:
+  stencils() = default;
+  explicit stencils(impinge_stencils *handle) : handle_(handle) {}
+  /// One per contact: features that several pairs share once, with the sum of their weights.
+  result<stencils> merged() const {
+    detail::made<impinge_stencils> made;
+    const auto status = impinge_stencils_merged(raw(), made.out());
+    return detail::give(status, stencils(made.take()));
+  }
+  std::size_t size() const noexcept { return impinge_stencils_count(raw()); }
+  bool empty() const noexcept { return size() == 0; }
+  view<std::array<std::uint32_t, 4>> vertices() const { return column<std::array<std::uint32_t, 4>>(IMPINGE_COLUMN_VERTICES); }
+  /// The number of the first vertex of each body, and the number of all.
+  view<std::uint64_t> starts() const { return column<std::uint64_t>(IMPINGE_COLUMN_STARTS); }
+  view<std::uint8_t> kinds() const { return column<std::uint8_t>(IMPINGE_COLUMN_KIND); }
+  view<std::array<std::uint8_t, 2>> features() const { return column<std::array<std::uint8_t, 2>>(IMPINGE_COLUMN_FEATURES); }
+  view<double> weights() const { return column<double>(IMPINGE_COLUMN_WEIGHT); }
+  view<std::array<double, 4>> coefficients() const { return column<std::array<double, 4>>(IMPINGE_COLUMN_COEFFICIENTS); }
+  view<double> squared_distances() const { return column<double>(IMPINGE_COLUMN_SQUARED_DISTANCE); }
+  view<std::array<double, 12>> gradients() const { return column<std::array<double, 12>>(IMPINGE_COLUMN_GRADIENT); }
+  view<std::array<std::array<double, 12>, 12>> hessians() const { return column<std::array<std::array<double, 12>, 12>>(IMPINGE_COLUMN_HESSIAN); }
+  view<double> mollifiers() const { return column<double>(IMPINGE_COLUMN_MOLLIFIER); }
+  view<std::array<double, 12>> mollifier_gradients() const { return column<std::array<double, 12>>(IMPINGE_COLUMN_MOLLIFIER_GRADIENT); }
+  view<std::array<std::array<double, 12>, 12>> mollifier_hessians() const {
+    return column<std::array<std::array<double, 12>, 12>>(IMPINGE_COLUMN_MOLLIFIER_HESSIAN);
+  }
+  const impinge_stencils *raw() const noexcept { return handle_.get(); }
+
+private:
+  template <class T> view<T> column(std::uint32_t column) const {
+    array rows{};
+    if (impinge_stencils_column(raw(), column, &rows) != IMPINGE_OK) return {};
+    return {static_cast<const T *>(rows.data), rows.rows};
+  }
+  detail::handle<impinge_stencils, impinge_stencils_destroy> handle_;
+};
+
 /// Sorted pairs of elements that are near each other.
 class near_pairs : public detail::near_answer {
 public:
@@ -139,6 +178,20 @@ public:
   view<double> distances() const { return packed<double>(IMPINGE_COLUMN_DISTANCE); }
   /// With `query::closest_points`: a point of `a`, and one of `b`.
   view<std::array<std::array<double, 3>, 2>> closest_points() const { return packed<std::array<std::array<double, 3>, 2>>(IMPINGE_COLUMN_POINTS); }
+  /// What a potential needs to know about each pair, at the positions that the scene has now.
+  result<impinge::stencils> stencils(const scene &in) const { return stencils_of(in, nullptr); }
+  /// With the mollifier of nearly parallel edges, from the positions at rest of all vertices of the scene, body after body.
+  template <class P> result<impinge::stencils> stencils(const scene &in, const P &rest) const {
+    const array rows = detail::rows_of(rest, 3);
+    return stencils_of(in, &rows);
+  }
+
+private:
+  result<impinge::stencils> stencils_of(const scene &in, const array *rest) const {
+    detail::made<impinge_stencils> made;
+    const auto status = impinge_near_stencils(raw(), in.raw(), rest, made.out());
+    return detail::give(status, impinge::stencils(made.take()));
+  }
 };
 
 /// Where the triangles of each pair meet.
