@@ -5,6 +5,8 @@
 //! share its frame, boxes, grid, threads, exact test and GPU engine, so that only the method
 //! differs.
 
+#![warn(missing_debug_implementations)]
+
 mod answers;
 mod boxes;
 pub mod bvh;

@@ -24,6 +24,7 @@
 //! one. It needs an allocator, for integers above 512 bits and polynomials. With default features
 //! it uses the standard library for square roots alone; without, the feature `libm` has them.
 
+#![warn(missing_debug_implementations)]
 #![cfg_attr(not(any(feature = "std", test)), no_std)]
 
 extern crate alloc;

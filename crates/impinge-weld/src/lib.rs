@@ -3,6 +3,8 @@
 //! The crates `impinge` and `impinge-io` re-export [`Weld`]; it stands in a crate of its own so
 //! that neither needs the other.
 
+#![warn(missing_debug_implementations)]
+
 use std::collections::HashMap;
 use std::hash::{BuildHasher, Hash, Hasher, RandomState};
 

@@ -23,6 +23,7 @@
 //! [dependencies]
 //! impinge = "0.1"                                            # reads OBJ, PLY, STL, OFF, glTF, MSH, VTK and others
 //! # impinge = { version = "0.1", features = ["gpu"] }        # and the GPU backend
+//! # impinge = { version = "0.1", features = ["serde"] }      # rows, settings, statistics and choices with serde
 //! # impinge = { version = "0.1", default-features = false }  # no files, and the fewest packages
 //! ```
 //!
@@ -127,6 +128,8 @@
 //! `nalgebra::Matrix4<f64>`.
 //!
 //! This crate is the stable interface of the engine in `impinge-core`.
+
+#![warn(missing_debug_implementations)]
 
 #[cfg(feature = "io")]
 mod read;

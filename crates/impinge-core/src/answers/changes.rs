@@ -33,6 +33,7 @@ use std::cmp::Ordering;
 /// ```
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 #[non_exhaustive]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Changes {
     /// Of each pair that is in both answers its index in the old one and in the new one; both
     /// ascend.

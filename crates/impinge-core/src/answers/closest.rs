@@ -8,6 +8,7 @@ use impinge_exact::Feature;
 /// The element that is nearest to a point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ClosestElement {
     /// The element. Decided exactly; of several at the same distance, the lowest by body and then
     /// by number.

@@ -8,6 +8,7 @@ use impinge_exact::Feature;
 /// Where a ray meets an element. Which elements it meets, their order and the features are exact.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RayHit {
     /// The element.
     pub element: Element,

@@ -16,6 +16,7 @@ use crate::search::stats::Stats;
 /// ascending.
 #[derive(Debug, Clone, Default, PartialEq)]
 #[non_exhaustive]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Csr {
     /// Where the list of each element starts, and the end of the last one: one more than there are
     /// elements.

@@ -16,6 +16,7 @@ use crate::search::stats::Stats;
 
 /// One primitive of one body.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Element {
     /// The body.
     pub body: BodyId,

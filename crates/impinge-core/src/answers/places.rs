@@ -15,6 +15,7 @@ use crate::search::sets::Sets;
 /// vertices.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Place {
     /// The bodies, the lower id first; the same twice for self-collision.
     pub bodies: [BodyId; 2],

@@ -19,6 +19,7 @@
 
 use std::sync::Arc;
 
+use crate::scene::words::debug_by_name;
 use crate::workers::clock::Instant;
 
 use crate::bvh::bounds::Bounds;
@@ -86,6 +87,8 @@ struct CellItem {
     n_a: u8,
     n_b: u8,
 }
+
+debug_by_name!(Cells => "Cells");
 
 /// Scratch of the method; kept from frame to frame.
 pub struct Cells {

@@ -12,6 +12,7 @@ use crate::bvh::bounds::Bounds;
 use crate::bvh::grid::FineRange;
 use crate::plan::Plan;
 use crate::scene::index::{ElementIx, PartIx, Slot};
+use crate::scene::words::debug_by_name;
 
 use super::cull::{BoundsTask, Cull};
 use super::top_level::TopLevel;
@@ -72,6 +73,8 @@ impl Kept {
 fn unclustered(primitive: ElementIx) -> Slot {
     Slot::new(primitive.raw())
 }
+
+debug_by_name!(KeptList => "KeptList");
 
 /// The kept primitives of a frame, and the memory for them.
 pub struct KeptList {

@@ -10,6 +10,7 @@ use crate::scene::Scene;
 use crate::scene::elements::Elements;
 use crate::scene::index::{ElementIx, Number, PartIx, Slot};
 use crate::scene::positions::Positions;
+use crate::scene::words::debug_by_name;
 use impinge_exact::Point;
 
 use super::bounds::TreeBounds;
@@ -51,6 +52,8 @@ impl Clustered for BodyCache {
 
 /// Caches by slot of the body.
 pub(crate) type Caches = Store<BodyCache>;
+
+debug_by_name!(World<'_> => "World", BodyRef<'_> => "BodyRef");
 
 /// The data that the narrow stage reads, for every method.
 #[derive(Clone, Copy)]

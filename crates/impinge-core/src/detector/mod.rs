@@ -79,6 +79,15 @@ pub struct Detector {
     gpu: Option<crate::gpu::Engine>,
 }
 
+impl std::fmt::Debug for Detector {
+    /// Its settings: what else it holds is memory for the next question.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let mut short = f.debug_struct("Detector");
+        short.field("settings", &self.settings);
+        short.finish_non_exhaustive()
+    }
+}
+
 /// Where the buffers of dropped answers are. With a memory budget they are freed: they would count
 /// twice.
 struct Homes {

@@ -57,6 +57,7 @@ macro_rules! bindings {
 pub use crate::bindings;
 
 /// A kernel's text: the shared files that it uses, then its own file.
+#[derive(Debug)]
 pub struct Source {
     /// The name of the file, without `.wgsl`.
     pub name: &'static str,
@@ -93,6 +94,14 @@ pub(crate) use source;
 pub struct Kernel<B> {
     program: Arc<Program>,
     takes: PhantomData<fn(B)>,
+}
+
+impl<B> fmt::Debug for Kernel<B> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("Kernel")
+            .field(&self.program.source.name)
+            .finish()
+    }
 }
 
 /// A kernel without the types of its bindings, compiled when it is first bound.

@@ -16,6 +16,7 @@ use super::pipeline::{Bindings, Entry, Kernel, Program};
 use super::view::{Motion, View};
 use super::world::DeviceWorld;
 use crate::scene::error::Error;
+use crate::scene::words::debug_by_name;
 
 /// The widest row of workgroups; `shared/arguments.wgsl` has the same.
 pub(super) const WIDEST: u64 = 32_768;
@@ -187,6 +188,8 @@ impl fmt::Display for Recording {
         }
     }
 }
+
+debug_by_name!(Recorder<'_> => "Recorder");
 
 /// Makes a recording from the buffers that its launches bind.
 pub struct Recorder<'a> {

@@ -8,6 +8,7 @@ use impinge_exact::Point;
 /// The nearest pair of elements of two bodies.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Nearest {
     /// Their distance in the unit of the scene. 0 if and only if they share a point, which is
     /// decided exactly. Otherwise rounded: it is computed in `f64` from two points of the

@@ -57,6 +57,7 @@ impl Cell {
 
 /// What is left out of a query: see [`Query::exclude`].
 #[derive(Debug, Clone, PartialEq)]
+#[must_use]
 pub struct Exclusion(Excluded);
 
 #[derive(Debug, Clone, PartialEq)]

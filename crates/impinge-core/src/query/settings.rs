@@ -107,8 +107,19 @@ pub enum Affinity {
 
 words!("affinity", "auto or inherited", Affinity: [Auto = "auto", Inherited = "inherited"; 2]);
 
-/// The settings of a detector.
+/// The settings of a detector: [`Settings::new`] and what differs from it, one call each.
+///
+/// ```
+/// use impinge_core::{Backend, Detector, Settings};
+/// # fn main() -> Result<(), impinge_core::Error> {
+/// let settings = Settings::new().backend(Backend::Cpu).threads(2);
+/// let mut detector = Detector::new(settings)?;
+/// # Ok(()) }
+/// ```
 #[derive(Debug, Clone)]
+#[must_use]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
 pub struct Settings {
     /// How candidates are found.
     pub method: Method,
@@ -139,6 +150,7 @@ pub struct Settings {
     pub device: Option<String>,
     /// Not for users: the thresholds of the CPU backend.
     #[doc(hidden)]
+    #[cfg_attr(feature = "serde", serde(skip))]
     pub tuning: Tuning,
 }
 
@@ -162,6 +174,85 @@ impl Default for Settings {
 }
 
 impl Settings {
+    /// The default settings.
+    pub fn new() -> Self {
+        Settings::default()
+    }
+
+    /// How candidates are found.
+    pub fn method(mut self, method: Method) -> Self {
+        self.method = method;
+        self
+    }
+
+    /// Where the work is done.
+    pub fn backend(mut self, backend: Backend) -> Self {
+        self.backend = backend;
+        self
+    }
+
+    /// CPU threads; 0 means one per core.
+    pub fn threads(mut self, threads: usize) -> Self {
+        self.threads = threads;
+        self
+    }
+
+    /// Which cores the helper threads may run on.
+    pub fn affinity(mut self, affinity: Affinity) -> Self {
+        self.affinity = affinity;
+        self
+    }
+
+    /// The widest vector instructions that the CPU backend may use.
+    pub fn instruction_set(mut self, instruction_set: InstructionSet) -> Self {
+        self.instruction_set = instruction_set;
+        self
+    }
+
+    /// `Cells`: the density coefficient of the grid, above 0.
+    pub fn density(mut self, density: f64) -> Self {
+        self.density = density;
+        self
+    }
+
+    /// Not for users.
+    #[doc(hidden)]
+    pub fn group_size(mut self, group_size: u32) -> Self {
+        self.group_size = group_size;
+        self
+    }
+
+    /// Bytes the detector may hold, the answer included; `None` for as many as it takes.
+    pub fn memory_budget(mut self, memory_budget: impl Into<Option<u64>>) -> Self {
+        self.memory_budget = memory_budget.into();
+        self
+    }
+
+    /// The most pairs that an answer may have; `None` for any number.
+    pub fn max_pairs(mut self, max_pairs: impl Into<Option<u64>>) -> Self {
+        self.max_pairs = max_pairs.into();
+        self
+    }
+
+    /// `Clusters`: whether bodies are clustered again.
+    pub fn recluster(mut self, recluster: Recluster) -> Self {
+        self.recluster = recluster;
+        self
+    }
+
+    /// GPU: part of an adapter's name, to choose among several.
+    pub fn device(mut self, device: impl Into<Option<String>>) -> Self {
+        self.device = device.into();
+        self
+    }
+
+    /// Not for users.
+    #[doc(hidden)]
+    pub fn tuning(mut self, tuning: Tuning) -> Self {
+        self.tuning = tuning;
+        self
+    }
+
     /// Limits on the size of an answer.
     pub(crate) fn limits(&self) -> Limits {
         Limits {

@@ -74,6 +74,7 @@ impl Precision {
 /// What a step leaves between elements: a distance, but of pairs that are near at the start only a
 /// share of theirs.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[must_use]
 pub struct Clearance {
     pub(crate) distance: f64,
     pub(crate) share: f64,
@@ -108,6 +109,7 @@ pub type ElementVertices<'a> = (BodyId, &'a [u32]);
 /// Which pairs of elements may collide, as a function of their vertices. Threads call it at the
 /// same time.
 #[derive(Clone)]
+#[must_use]
 pub struct PairFilter {
     passes: Arc<PairPasses>,
     is_early: bool,

@@ -31,6 +31,25 @@ impl BodyId {
     }
 }
 
+/// By its [`index`](BodyId::index), which rows have, too.
+#[cfg(feature = "serde")]
+impl serde::Serialize for BodyId {
+    fn serialize<S: serde::Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        to.serialize_u32(self.slot)
+    }
+}
+
+/// An id that was read has its [`index`](BodyId::index), but it names no body of any scene: the
+/// scene that it belonged to may be gone.
+#[cfg(feature = "serde")]
+impl<'de> serde::Deserialize<'de> for BodyId {
+    fn deserialize<D: serde::Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        let slot = <u32 as serde::Deserialize>::deserialize(from)?;
+        // Stamps begin with 1.
+        Ok(BodyId { slot, number: 0 })
+    }
+}
+
 impl std::fmt::Display for BodyId {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{}", self.slot)

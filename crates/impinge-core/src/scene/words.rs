@@ -1,4 +1,4 @@
-//! The words for the choices that users have: the same in every language.
+//! The words for the choices that users have: the same in every language; and types by their names.
 
 /// Gives an enum its words: `ALL`, `name`, `Display` and `FromStr`. An unknown word is an
 /// [`Error`](crate::Error) that names the setting and the words allowed.
@@ -34,9 +34,36 @@ macro_rules! words {
                 })
             }
         }
+
+        #[cfg(feature = "serde")]
+        impl serde::Serialize for $type {
+            fn serialize<S: serde::Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+                to.serialize_str(self.name())
+            }
+        }
+
+        #[cfg(feature = "serde")]
+        impl<'de> serde::Deserialize<'de> for $type {
+            fn deserialize<D: serde::Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+                let word = <String as serde::Deserialize>::deserialize(from)?;
+                word.parse().map_err(serde::de::Error::custom)
+            }
+        }
     };
 }
 pub(crate) use words;
+
+/// Gives types a `Debug` that says their name alone: what they hold is memory for later.
+macro_rules! debug_by_name {
+    ($($type:ty => $name:literal),+ $(,)?) => {$(
+        impl std::fmt::Debug for $type {
+            fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                f.debug_struct($name).finish_non_exhaustive()
+            }
+        }
+    )+};
+}
+pub(crate) use debug_by_name;
 
 #[cfg(test)]
 mod tests {

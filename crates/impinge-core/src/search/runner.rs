@@ -21,11 +21,14 @@ use crate::query::progress::Control;
 use crate::query::settings::{Method, Settings};
 use crate::scene::Scene;
 use crate::scene::error::Error;
+use crate::scene::words::debug_by_name;
 use crate::search::sink::Answer;
 use crate::search::sort::{Keyed, Sorter};
 use crate::search::stats::Stats;
 use crate::workers::Workers;
 use crate::workers::clock::Instant;
+
+debug_by_name!(Job<'_> => "Job", Runner => "Runner");
 
 /// One frame as a finder sees it.
 #[derive(Clone, Copy)]

@@ -3,11 +3,16 @@
 use crate::query::tuning::Ways;
 use crate::workers::clock::Instant;
 
+/// A word that the program knows. By this name serde does not take it for borrowed from its input.
+type Word = &'static str;
+
 /// Time spent in one stage.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Stage {
     /// The stage's name, the same on every backend: `bounds`, `traversal`, `pairing`, …
-    pub name: &'static str,
+    #[cfg_attr(feature = "serde", serde(with = "words"))]
+    pub name: Word,
     /// Wall time in milliseconds.
     pub ms: f64,
 }
@@ -15,11 +20,14 @@ pub struct Stage {
 /// Counts and times of one frame. The pairs never depend on any of this.
 #[derive(Debug, Default, PartialEq)]
 #[non_exhaustive]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(default))]
 pub struct Stats {
     /// `"cpu"` or the GPU's name.
     pub backend: String,
     /// `"clusters"`, `"cells"` or `"naive"`.
-    pub method: &'static str,
+    #[cfg_attr(feature = "serde", serde(with = "words"))]
+    pub method: Word,
     /// Threads used.
     pub n_threads: usize,
     /// The stages in the order in which they ran.
@@ -62,6 +70,7 @@ pub struct Stats {
     pub bytes_held: u64,
     /// Not for users: the ways that the frame went.
     #[doc(hidden)]
+    #[cfg_attr(feature = "serde", serde(skip))]
     pub ways: Ways,
 }
 
@@ -137,5 +146,39 @@ impl Stats {
             .iter()
             .find(|stage| stage.name == name)
             .map_or(0.0, |stage| stage.ms)
+    }
+}
+
+/// Words of statistics that were written by another run.
+#[cfg(feature = "serde")]
+mod words {
+    use std::collections::BTreeSet;
+    use std::sync::{Mutex, PoisonError};
+
+    use serde::{Deserialize, Deserializer, Serializer};
+
+    use super::Word;
+
+    pub fn serialize<S: Serializer>(word: &Word, to: S) -> Result<S::Ok, S::Error> {
+        to.serialize_str(word)
+    }
+
+    pub fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Word, D::Error> {
+        String::deserialize(from).map(kept)
+    }
+
+    /// The word as one that lives as long as the program. Each is kept once, and there are few:
+    /// methods and stages.
+    fn kept(word: String) -> Word {
+        static KEPT: Mutex<BTreeSet<Word>> = Mutex::new(BTreeSet::new());
+        let mut all = KEPT.lock().unwrap_or_else(PoisonError::into_inner);
+        match all.get(word.as_str()) {
+            Some(held) => held,
+            None => {
+                let word: Word = word.leak();
+                all.insert(word);
+                word
+            }
+        }
     }
 }

@@ -19,6 +19,7 @@ pub(crate) mod clock;
 mod crew;
 mod sync;
 
+use crate::scene::words::debug_by_name;
 use crate::workers::clock::Instant;
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
@@ -42,6 +43,8 @@ const LINGER: Duration = Duration::from_millis(1);
 const WORTH: Duration = Duration::from_micros(800);
 /// How often a helper checks the gate between two looks at the clock.
 const LOOKS: u32 = 64;
+
+debug_by_name!(Workers => "Workers", Shift<'_> => "Shift");
 
 /// The workers of a detector: the caller, its helpers and the rayon pool.
 pub struct Workers {

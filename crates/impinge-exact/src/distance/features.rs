@@ -4,6 +4,7 @@ use crate::element_pair::ElementPair;
 
 /// A feature of an element.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Feature {
     /// A vertex of the element, by its number in the element.
     Vertex(u8),

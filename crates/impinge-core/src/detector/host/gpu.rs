@@ -13,9 +13,12 @@ use crate::query::progress::Control;
 use crate::query::settings::{Backend, Method, Settings};
 use crate::scene::Scene;
 use crate::scene::error::Error;
+use crate::scene::words::debug_by_name;
 use crate::search::runner::{Finder, Job, Runner};
 use crate::search::sink::Answer;
 use crate::search::stats::Stats;
+
+debug_by_name!(GpuHost => "GpuHost");
 
 /// The frame loop around a method of another crate.
 pub struct GpuHost {
