@@ -43,6 +43,7 @@ impl Ours {
             scene,
             detector: Detector::new(Settings {
                 threads: options.threads,
+                instruction_set: options.instruction_set,
                 ..Settings::default()
             })?,
         })

@@ -36,7 +36,7 @@ mod tune;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use impinge::{Affinity, Backend, Method, Settings};
+use impinge::{Affinity, Backend, InstructionSet, Method, Settings};
 
 /// Anything that ends a run.
 pub type Failure = Box<dyn std::error::Error + Send + Sync>;
@@ -76,6 +76,7 @@ options:
   --affinity NAME   where its helper threads run: auto (default), inherited; in a contest also both, which take turns
   --backend NAME     cpu (default), gpu or auto
   --device NAME      part of a GPU's name, to choose among several
+  --instruction-set NAME  the widest that impinge may use on the CPU: portable, avx2 or avx512 (default)
   --no-cells         without impinge's other method, Cells
   --no-peers         without Embree and parry
   --json FILE        figures for machines
@@ -96,6 +97,7 @@ pub struct Options {
     affinities: Vec<Affinity>,
     backend: Backend,
     device: Option<String>,
+    instruction_set: InstructionSet,
     cells: bool,
     peers: bool,
     json: Option<PathBuf>,
@@ -111,6 +113,7 @@ impl Options {
             device: self.device.clone(),
             threads: self.threads,
             affinity: self.affinities[0],
+            instruction_set: self.instruction_set,
             ..Settings::default()
         }
     }
@@ -127,6 +130,7 @@ fn parse() -> Result<Option<(String, Options)>, lexopt::Error> {
         affinities: vec![Affinity::Auto],
         backend: Backend::Cpu,
         device: None,
+        instruction_set: InstructionSet::default(),
         cells: true,
         peers: true,
         json: None,
@@ -159,6 +163,7 @@ fn parse() -> Result<Option<(String, Options)>, lexopt::Error> {
                 })?;
             }
             Long("device") => options.device = Some(parser.value()?.string()?),
+            Long("instruction-set") => options.instruction_set = parser.value()?.parse()?,
             Long("no-cells") => options.cells = false,
             Long("no-peers") => options.peers = false,
             Long("json") => options.json = Some(parser.value()?.into()),

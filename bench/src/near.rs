@@ -171,6 +171,7 @@ fn measure(known: &Known, options: &Options, report: &mut Report) -> Result<(), 
             threads: n_threads,
             affinity: options.affinities[0],
             backend: options.backend,
+            instruction_set: options.instruction_set,
             ..Settings::default()
         })?;
         for kinds in [

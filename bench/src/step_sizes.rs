@@ -131,6 +131,7 @@ fn measure(mut layers: Layers, options: &Options, report: &mut Report) -> Result
             threads: options.threads,
             affinity: options.affinities[0],
             backend: options.backend,
+            instruction_set: options.instruction_set,
             ..Settings::default()
         })
     };
