@@ -6,12 +6,13 @@
 
 use core::arch::wasm32::*;
 
+use super::memory::{read, write};
 use super::*;
 
 macro_rules! register {
     (
         $(#[$doc:meta])* $type:ident, $mask:ident,
-        $bound:expr, $underflow:expr, $any_size:expr, $largest:expr, $tiny:expr, $shortest:expr,
+        $limits:expr,
         add $add:ident, sub $sub:ident, mul $mul:ident, div $div:ident, pmax $pmax:ident, splat |$x:ident| $splat:expr,
         abs $abs:ident, sqrt $sqrt:ident, gt $gt:ident $(,)?
     ) => {
@@ -41,13 +42,7 @@ macro_rules! register {
 
         impl Number for $type {
             type Mask = $mask;
-            const BOUND: f64 = $bound;
-            const UNDERFLOW: f64 = $underflow;
-            const UNDERFLOW_PER_SIZE: f64 = $any_size[0];
-            const HEADROOM: f64 = $any_size[1];
-            const LARGEST: f64 = $largest;
-            const TINY: [f64; 3] = $tiny;
-            const SHORTEST: f64 = $shortest;
+            const LIMITS: Limits = $limits;
 
             #[inline(always)]
             fn splat($x: f64) -> Self {
@@ -80,14 +75,14 @@ macro_rules! register {
 
 register! {
     /// Two numbers in a register of WebAssembly.
-    Wasm, WasmMask, BOUND_F64, UNDERFLOW_F64, ANY_SIZE_F64, LARGEST_DIFFERENCE_F64, TINY_F64, SHORTEST_F64,
+    Wasm, WasmMask, Limits::F64,
     add f64x2_add, sub f64x2_sub, mul f64x2_mul, div f64x2_div, pmax f64x2_pmax, splat |x| f64x2_splat(x),
     abs f64x2_abs, sqrt f64x2_sqrt, gt f64x2_gt,
 }
 
 register! {
     /// Four `f32` in a register of WebAssembly.
-    WasmF32, WasmF32Mask, BOUND_F32, UNDERFLOW_F32, ANY_SIZE_F32, LARGEST_DIFFERENCE_F32, TINY_F32, SHORTEST_F32,
+    WasmF32, WasmF32Mask, Limits::F32,
     add f32x4_add, sub f32x4_sub, mul f32x4_mul, div f32x4_div, pmax f32x4_pmax, splat |x| f32x4_splat(x as f32),
     abs f32x4_abs, sqrt f32x4_sqrt, gt f32x4_gt,
 }
@@ -97,15 +92,17 @@ impl Vector for Wasm {
 
     #[inline(always)]
     fn load(lanes: &[f64; LANES], first: usize) -> Self {
-        let two: &[f64; 2] = lanes[first..].first_chunk().expect("two lanes");
-        // SAFETY: the two numbers are 16 readable bytes; loads need no alignment.
-        Wasm(unsafe { v128_load(two.as_ptr().cast()) })
+        Wasm(read::<[f64; 2], _>(
+            lanes[first..].first_chunk().expect("two lanes"),
+        ))
+    }
+    #[inline(always)]
+    fn widen(lanes: &[f32; LANES], first: usize) -> Self {
+        Wasm(f64x2(lanes[first].into(), lanes[first + 1].into()))
     }
     #[inline(always)]
     fn store(self, lanes: &mut [f64; LANES], first: usize) {
-        let two: &mut [f64; 2] = lanes[first..].first_chunk_mut().expect("two lanes");
-        // SAFETY: the two numbers are 16 writable bytes; stores need no alignment.
-        unsafe { v128_store(two.as_mut_ptr().cast(), self.0) }
+        write::<[f64; 2], _>(self.0, lanes[first..].first_chunk_mut().expect("two lanes"));
     }
     #[inline(always)]
     fn bits(mask: WasmMask) -> u8 {
@@ -113,8 +110,73 @@ impl Vector for Wasm {
     }
 }
 
-impl Lookup for WasmF32 {
+impl Row for WasmF32 {
     const N: usize = 4;
+    const REGISTERS: usize = 16;
+    type Lanes = WasmF32Mask;
+
+    #[inline(always)]
+    fn row(numbers: &[f32], first: usize) -> Self {
+        WasmF32(read::<[f32; 4], _>(
+            numbers[first..].first_chunk().expect("four numbers"),
+        ))
+    }
+    #[inline(always)]
+    fn put(self, row: &mut [f32], first: usize) {
+        write::<[f32; 4], _>(
+            self.0,
+            row[first..].first_chunk_mut().expect("four numbers"),
+        );
+    }
+    #[inline(always)]
+    fn all(x: f32) -> Self {
+        WasmF32(f32x4_splat(x))
+    }
+    #[inline(always)]
+    fn lanes(is: bool) -> WasmF32Mask {
+        WasmF32Mask(i32x4_splat(-i32::from(is)))
+    }
+    #[inline(always)]
+    fn le(self, other: Self) -> WasmF32Mask {
+        WasmF32Mask(f32x4_le(self.0, other.0))
+    }
+    #[inline(always)]
+    fn exceeds(self, other: Self) -> WasmF32Mask {
+        !self.le(other)
+    }
+    #[inline(always)]
+    fn bits(mask: WasmF32Mask) -> u16 {
+        i32x4_bitmask(mask.0).into()
+    }
+    #[inline(always)]
+    fn lesser(self, other: Self) -> Self {
+        // `pmin(a, b)` is `b` where b < a, else `a`.
+        WasmF32(f32x4_pmin(other.0, self.0))
+    }
+    #[inline(always)]
+    fn greater(self, other: Self) -> Self {
+        self.larger(other)
+    }
+    #[inline(always)]
+    fn lesser_in(self, lanes: u16, other: Self) -> Self {
+        Self::select(Self::among(lanes), self.lesser(other), other)
+    }
+    #[inline(always)]
+    fn greater_in(self, lanes: u16, other: Self) -> Self {
+        Self::select(Self::among(lanes), self.greater(other), other)
+    }
+}
+
+impl WasmF32 {
+    /// The lanes whose bits are set.
+    #[inline(always)]
+    fn among(lanes: u16) -> WasmF32Mask {
+        let bits = i32x4(1, 2, 4, 8);
+        WasmF32Mask(i32x4_eq(v128_and(i32x4_splat(lanes.into()), bits), bits))
+    }
+}
+
+impl Lookup for WasmF32 {
     type Slots = [u8; 4];
 
     #[inline(always)]
@@ -127,21 +189,5 @@ impl Lookup for WasmF32 {
         let [a, b, c, d] = slots;
         let at = |slot: u8| table[slot as usize % TABLE];
         WasmF32(f32x4(at(a), at(b), at(c), at(d)))
-    }
-    #[inline(always)]
-    fn row(table: &[f32; TABLE], first: usize) -> Self {
-        let four: &[f32; 4] = table[first..].first_chunk().expect("four slots");
-        // SAFETY: the four numbers are 16 readable bytes; loads need no alignment.
-        WasmF32(unsafe { v128_load(four.as_ptr().cast()) })
-    }
-    #[inline(always)]
-    fn put(self, row: &mut [f32], first: usize) {
-        let four: &mut [f32; 4] = row[first..].first_chunk_mut().expect("four slots");
-        // SAFETY: the four numbers are 16 writable bytes; stores need no alignment.
-        unsafe { v128_store(four.as_mut_ptr().cast(), self.0) }
-    }
-    #[inline(always)]
-    fn bits(mask: WasmF32Mask) -> u16 {
-        i32x4_bitmask(mask.0).into()
     }
 }
