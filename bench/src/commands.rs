@@ -83,20 +83,14 @@ fn ours(
     let in_place = Ours::new(problem, clusters.clone(), Feed::InPlace)?;
     let mut runners: Vec<Box<dyn Runner>> = vec![Box::new(in_place)];
     for &affinity in &options.affinities[1..] {
-        let other = Settings {
-            affinity,
-            ..clusters.clone()
-        };
+        let other = clusters.clone().affinity(affinity);
         runners.push(Box::new(Ours::new(problem, other, Feed::InPlace)?));
     }
     if variants {
         let copied = Ours::new(problem, clusters.clone(), Feed::Copied)?;
         runners.push(Box::new(copied));
         if options.threads == 0 && options.backend == Backend::Cpu {
-            let single = Settings {
-                threads: 1,
-                ..clusters
-            };
+            let single = clusters.threads(1);
             runners.push(Box::new(Ours::new(problem, single, Feed::InPlace)?));
         }
     }

@@ -41,11 +41,11 @@ impl Ours {
         Ok(Ours {
             bodies: scans.into_iter().map(add).collect::<Result<_, _>>()?,
             scene,
-            detector: Detector::new(Settings {
-                threads: options.threads,
-                instruction_set: options.instruction_set,
-                ..Settings::default()
-            })?,
+            detector: Detector::new(
+                Settings::new()
+                    .threads(options.threads)
+                    .instruction_set(options.instruction_set),
+            )?,
         })
     }
 }

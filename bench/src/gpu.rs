@@ -84,12 +84,12 @@ fn row(
 ) -> Result<(), Failure> {
     let (mut scene, ids, query) = problem.scene()?;
     let detector = |backend: Backend| {
-        Detector::new(Settings {
-            method,
-            backend,
-            device: options.device.clone(),
-            ..Settings::default()
-        })
+        Detector::new(
+            Settings::new()
+                .method(method)
+                .backend(backend)
+                .device(options.device.clone()),
+        )
     };
     let mut gpu = detector(Backend::Gpu)?;
     let mut cpu = detector(Backend::Cpu)?;

@@ -107,15 +107,13 @@ pub struct Options {
 impl Options {
     /// The settings that the options name.
     pub fn settings(&self, method: Method) -> Settings {
-        Settings {
-            method,
-            backend: self.backend,
-            device: self.device.clone(),
-            threads: self.threads,
-            affinity: self.affinities[0],
-            instruction_set: self.instruction_set,
-            ..Settings::default()
-        }
+        Settings::new()
+            .method(method)
+            .backend(self.backend)
+            .device(self.device.clone())
+            .threads(self.threads)
+            .affinity(self.affinities[0])
+            .instruction_set(self.instruction_set)
     }
 }
 

@@ -239,11 +239,7 @@ mod tests {
     use impinge_scenes::{Model, adversarial, solids, surfaces};
 
     fn ours(problem: &Problem, method: Method, feed: Feed) -> Box<dyn Runner> {
-        let settings = Settings {
-            method,
-            backend: Backend::Cpu,
-            ..Settings::default()
-        };
+        let settings = Settings::new().method(method).backend(Backend::Cpu);
         Box::new(Ours::new(problem, settings, feed).expect("a valid problem"))
     }
 

@@ -167,13 +167,13 @@ fn measure(known: &Known, options: &Options, report: &mut Report) -> Result<(), 
         n => vec![n],
     };
     for n_threads in threads {
-        let mut detector = Detector::new(Settings {
-            threads: n_threads,
-            affinity: options.affinities[0],
-            backend: options.backend,
-            instruction_set: options.instruction_set,
-            ..Settings::default()
-        })?;
+        let mut detector = Detector::new(
+            Settings::new()
+                .threads(n_threads)
+                .affinity(options.affinities[0])
+                .instruction_set(options.instruction_set)
+                .backend(options.backend),
+        )?;
         for kinds in [
             &[PairKind::VertexFace, PairKind::EdgeEdge][..],
             &[PairKind::VertexFace],

@@ -134,11 +134,8 @@ impl Problem {
             return Ok(self);
         }
         let (scene, _, query) = self.scene()?;
-        let mut oracle = Detector::new(Settings {
-            method: Method::Naive,
-            backend: Backend::Cpu,
-            ..Settings::default()
-        })?;
+        let mut oracle =
+            Detector::new(Settings::new().method(Method::Naive).backend(Backend::Cpu))?;
         let n_pairs = oracle.detect(&scene, &query)?.len() as u64;
         let about = format!("{}; pairs counted by the oracle in this run", self.about);
         Ok(self.about(about).expecting(Some(n_pairs)))

@@ -127,13 +127,13 @@ fn measure(mut layers: Layers, options: &Options, report: &mut Report) -> Result
     let default = (3_000_000 / layers.n_faces).clamp(5, 100);
     let n_frames = options.frames.unwrap_or(default).max(1);
     let detector = || {
-        Detector::new(Settings {
-            threads: options.threads,
-            affinity: options.affinities[0],
-            backend: options.backend,
-            instruction_set: options.instruction_set,
-            ..Settings::default()
-        })
+        Detector::new(
+            Settings::new()
+                .threads(options.threads)
+                .affinity(options.affinities[0])
+                .instruction_set(options.instruction_set)
+                .backend(options.backend),
+        )
     };
     let query = Query::all();
     let n_faces = layers.n_faces as f64;

@@ -130,13 +130,13 @@ fn measure(known: &Known, options: &Options, report: &mut Report) -> Result<(), 
     };
     for question in QUESTIONS {
         for &n_threads in &threads {
-            let mut detector = Detector::new(Settings {
-                threads: n_threads,
-                affinity: options.affinities[0],
-                backend: options.backend,
-                instruction_set: options.instruction_set,
-                ..Settings::default()
-            })?;
+            let mut detector = Detector::new(
+                Settings::new()
+                    .threads(n_threads)
+                    .affinity(options.affinities[0])
+                    .instruction_set(options.instruction_set)
+                    .backend(options.backend),
+            )?;
             let mut frames = Vec::new();
             for frame in 0..N_WARM + n_frames {
                 moving.rewrite()?;

@@ -116,12 +116,7 @@ fn build(data: &[u8], moves: bool) -> Option<(Scene, u8)> {
 }
 
 fn detector(method: Method) -> Detector {
-    Detector::new(Settings {
-        method,
-        backend: Backend::Cpu,
-        threads: 1,
-        ..Settings::default()
-    })
+    Detector::new(Settings::new().method(method).backend(Backend::Cpu).threads(1))
     .expect("these settings are allowed")
 }
 

@@ -166,15 +166,13 @@ unsafe fn settings(given: &impinge_settings) -> Result<Settings, Failure> {
         ),
     };
     let some = |limit: u64| (limit != 0).then_some(limit);
-    Ok(Settings {
-        backend,
-        method,
-        threads: given.threads as usize,
-        memory_budget: some(given.memory_budget),
-        max_pairs: some(given.max_pairs),
-        device,
-        ..Settings::default()
-    })
+    Ok(Settings::new()
+        .backend(backend)
+        .method(method)
+        .threads(given.threads as usize)
+        .memory_budget(some(given.memory_budget))
+        .max_pairs(some(given.max_pairs))
+        .device(device))
 }
 
 #[unsafe(no_mangle)]

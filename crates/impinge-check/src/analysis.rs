@@ -96,11 +96,9 @@ pub fn intersecting_with_seams(mesh: &Mesh, options: &Options) -> Result<Vec<boo
 
 /// The settings of a detector that checks.
 fn settings(options: &Options) -> Settings {
-    Settings {
-        backend: Backend::Cpu,
-        threads: options.threads,
-        ..Settings::default()
-    }
+    Settings::new()
+        .backend(Backend::Cpu)
+        .threads(options.threads)
 }
 
 fn check(mut mesh: Mesh, options: &Options) -> Result<(Checked, Vec<[u32; 2]>), Error> {

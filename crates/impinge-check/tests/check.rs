@@ -400,11 +400,7 @@ fn copies_are_counted_as_if_each_were_tested() {
             Elements::Tetrahedra(tets) => scene.add_tetrahedra(tets, &positions),
         };
         let query = Query::self_of(body.unwrap()).shared_vertex(SharedVertex::Resolve);
-        let settings = Settings {
-            method: Method::Naive,
-            backend: Backend::Cpu,
-            ..Settings::default()
-        };
+        let settings = Settings::new().method(Method::Naive).backend(Backend::Cpu);
         let mut naive = Detector::new(settings).unwrap();
         let pairs = naive.detect(&scene, &query).unwrap();
         let counts = checked.counts;

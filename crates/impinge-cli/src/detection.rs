@@ -17,30 +17,26 @@ pub fn detector(args: &DetectorArgs) -> Result<Detector, Error> {
 
 /// The settings of a detector.
 pub fn settings(args: &DetectorArgs) -> Settings {
-    Settings {
-        method: args.method.into(),
-        backend: backend(args),
-        threads: args.threads.map_or(0, Into::into),
-        density: args.lambda,
-        group_size: args.group_size,
-        memory_budget: args.memory_budget,
-        max_pairs: args.max_pairs,
-        device: args.device.clone(),
+    Settings::new()
+        .method(args.method.into())
+        .backend(backend(args))
+        .threads(args.threads.map_or(0, Into::into))
+        .density(args.lambda)
+        .group_size(args.group_size)
+        .memory_budget(args.memory_budget)
+        .max_pairs(args.max_pairs)
+        .device(args.device.clone())
         // All threads of this process are its own.
-        affinity: Affinity::Auto,
-        ..Settings::default()
-    }
+        .affinity(Affinity::Auto)
 }
 
 /// The settings of a question that only the CPU answers.
 pub fn on_cpu(threads: Option<NonZeroUsize>) -> Settings {
-    Settings {
-        backend: Backend::Cpu,
-        threads: threads.map_or(0, Into::into),
+    Settings::new()
+        .backend(Backend::Cpu)
+        .threads(threads.map_or(0, Into::into))
         // All threads of this process are its own.
-        affinity: Affinity::Auto,
-        ..Settings::default()
-    }
+        .affinity(Affinity::Auto)
 }
 
 /// The backend to use.

@@ -43,11 +43,7 @@ impl<'a> Drawer<'a> {
                 Err(error) => return Err(error.into()),
             },
         };
-        let detector = Detector::new(Settings {
-            backend: Backend::Cpu,
-            threads,
-            ..Settings::default()
-        })?;
+        let detector = Detector::new(Settings::new().backend(Backend::Cpu).threads(threads))?;
         Ok(Drawer {
             args,
             #[cfg(feature = "gpu")]

@@ -13,11 +13,7 @@ fn main() -> Result<(), impinge_core::Error> {
         ball.translated([offset, 0.0, 0.0]).add_to(&mut scene)?;
     }
     for method in [Method::Clusters, Method::Cells] {
-        let settings = Settings {
-            method,
-            backend: Backend::Gpu,
-            ..Settings::default()
-        };
+        let settings = Settings::new().method(method).backend(Backend::Gpu);
         let mut detector = Detector::new(settings)?;
         detector.detect(&scene, &Query::between_all())?;
         if let Some(recording) = detector.recording() {

@@ -86,12 +86,10 @@ fn within_bytes<T>(more: usize, run: impl FnOnce() -> T) -> T {
 }
 
 fn settings(method: Method) -> Settings {
-    Settings {
-        method,
-        backend: Backend::Cpu,
-        threads: 2,
-        ..Settings::default()
-    }
+    Settings::new()
+        .method(method)
+        .backend(Backend::Cpu)
+        .threads(2)
 }
 
 fn detector(settings: Settings) -> Detector {
@@ -99,10 +97,7 @@ fn detector(settings: Settings) -> Detector {
 }
 
 fn detector_on_one_thread() -> Detector {
-    detector(Settings {
-        threads: 1,
-        ..settings(Method::Clusters)
-    })
+    detector(settings(Method::Clusters).threads(1))
 }
 
 const METHODS: [Method; 3] = [Method::Clusters, Method::Cells, Method::Naive];
@@ -197,10 +192,7 @@ fn more_pairs_than_allowed_are_refused_before_they_are_held() {
         let query = Query::self_of(body);
         let all = n_pairs_of_pile(n);
         for limit in [0, 1, 1_000, all - 1] {
-            let mut limited = detector(Settings {
-                max_pairs: Some(limit),
-                ..settings(method)
-            });
+            let mut limited = detector(settings(method).max_pairs(Some(limit)));
             let (result, peak) = peak(|| limited.detect(&scene, &query).map(|_| ()));
             match result {
                 Err(Error::TooManyPairs { found, limit: told }) => {
@@ -217,17 +209,10 @@ fn more_pairs_than_allowed_are_refused_before_they_are_held() {
                 assert!(peak < 8 << 20, "{method:?}: {peak} bytes");
             }
         }
-        let mut limited = detector(Settings {
-            max_pairs: Some(all),
-            ..settings(method)
-        });
+        let mut limited = detector(settings(method).max_pairs(Some(all)));
         assert_eq!(limited.detect(&scene, &query).unwrap().len() as u64, all);
         assert_eq!(limited.count(&scene, &query).unwrap(), all);
-        let error = detector(Settings {
-            max_pairs: Some(7),
-            ..settings(method)
-        })
-        .count(&scene, &query);
+        let error = detector(settings(method).max_pairs(Some(7))).count(&scene, &query);
         let text = error.unwrap_err().to_string();
         assert!(text.contains("at most 7"), "{text}");
     }
@@ -271,11 +256,8 @@ fn any_ends_with_the_first_pair() {
     let _alone = alone();
     let (scene, body) = pile(6_000);
     for method in METHODS {
-        let mut detector = detector(Settings {
-            // However many there are, one is enough.
-            max_pairs: Some(0),
-            ..settings(method)
-        });
+        // However many there are, one is enough.
+        let mut detector = detector(settings(method).max_pairs(Some(0)));
         let (any, peak) = peak(|| detector.any(&scene, &Query::self_of(body)));
         assert!(any.unwrap());
         assert!(peak < 16 << 20, "{method:?}: {peak} bytes");
@@ -332,10 +314,7 @@ fn budgets_count_the_answer() {
             // A part of what is to spare goes to work items.
             ((2 * answer + 2 * scratch + (3 << 20)) / 4 * 5, true),
         ] {
-            let mut detector = detector(Settings {
-                memory_budget: Some(budget),
-                ..settings(method)
-            });
+            let mut detector = detector(settings(method).memory_budget(Some(budget)));
             let before = HELD.load(Ordering::Relaxed);
             for frame in 0..2 {
                 let (result, peak) =
@@ -380,12 +359,7 @@ fn steps_keep_the_same_limits() {
         let candidates = free.candidates(&scene, 0.0, &swarm_candidates()).unwrap();
         assert_eq!(candidates.of(PairKind::VertexVertex).len() as u64, all);
 
-        let limited = |max_pairs| {
-            detector(Settings {
-                max_pairs: Some(max_pairs),
-                ..settings(method)
-            })
-        };
+        let limited = |max_pairs| detector(settings(method).max_pairs(Some(max_pairs)));
         let refused = |result: Result<(), Error>, limit: u64| match result {
             Err(Error::TooManyPairs { found, limit: told }) => {
                 assert!(found > limit && told == limit && found <= limit + 20_000);
@@ -429,10 +403,7 @@ fn steps_keep_the_same_limits() {
         assert_eq!(candidates.len() as u64, all);
 
         let budgeted = |budget| {
-            let mut detector = crate::detector(Settings {
-                memory_budget: Some(budget),
-                ..settings(method)
-            });
+            let mut detector = crate::detector(settings(method).memory_budget(Some(budget)));
             let impacts = detector
                 .impacts(&scene, &step())
                 .map(|impacts| impacts.len());
@@ -468,10 +439,7 @@ fn runs_of_candidates_keep_the_budget() {
     ] {
         let mut before = usize::MAX;
         for budget in budgets {
-            let mut detector = detector(Settings {
-                memory_budget: Some(budget),
-                ..settings(method)
-            });
+            let mut detector = detector(settings(method).memory_budget(Some(budget)));
             match detector.candidates(&scene, 0.0, &swarm_candidates()) {
                 Err(Error::MemoryBudget { .. }) => {}
                 other => panic!("{method:?}, {budget}: {:?}", other.map(|all| all.len())),
@@ -499,10 +467,7 @@ fn runs_of_candidates_keep_the_budget() {
             assert!((2..before).contains(&n_runs), "{method:?}: {n_runs} runs");
             before = n_runs;
         }
-        let mut detector = detector(Settings {
-            memory_budget: Some(100_000),
-            ..settings(method)
-        });
+        let mut detector = detector(settings(method).memory_budget(Some(100_000)));
         let nothing = |_| -> ControlFlow<()> { panic!("no run") };
         match detector.candidates_in_runs(&scene, 0.0, &swarm_candidates(), u64::MAX, nothing) {
             Err(Error::MemoryBudget { needed, budget, .. }) => {

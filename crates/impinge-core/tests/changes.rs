@@ -50,11 +50,7 @@ fn check<K: Eq + Hash + Copy + Debug>(old: &[K], new: &[K], changes: &Changes) {
 #[test]
 fn changes_are_differences_of_sets() {
     for method in [Method::Clusters, Method::Naive] {
-        let settings = Settings {
-            method,
-            backend: Backend::Cpu,
-            ..Settings::default()
-        };
+        let settings = Settings::new().method(method).backend(Backend::Cpu);
         let mut detector = Detector::new(settings).expect("good");
         let mut random = Random::new(7);
         let mut scene = Scene::new();

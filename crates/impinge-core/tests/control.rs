@@ -34,12 +34,12 @@ fn detector(threads: usize) -> Detector {
 }
 
 fn budgeted(threads: usize, memory_budget: Option<u64>) -> Detector {
-    Detector::new(Settings {
-        backend: Backend::Cpu,
-        threads,
-        memory_budget,
-        ..Settings::default()
-    })
+    Detector::new(
+        Settings::new()
+            .backend(Backend::Cpu)
+            .threads(threads)
+            .memory_budget(memory_budget),
+    )
     .unwrap()
 }
 

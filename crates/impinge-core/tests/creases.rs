@@ -8,12 +8,10 @@ use impinge_core::{Backend, Detector, Method, Query, Scene, Settings, SharedVert
 use impinge_scenes::Random;
 
 fn settings(threads: usize) -> Settings {
-    Settings {
-        method: Method::Clusters,
-        backend: Backend::Cpu,
-        threads,
-        ..Settings::default()
-    }
+    Settings::new()
+        .method(Method::Clusters)
+        .backend(Backend::Cpu)
+        .threads(threads)
 }
 
 /// Several fans around vertices of their own, open or closed, some of which share vertices.

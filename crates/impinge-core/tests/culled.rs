@@ -11,13 +11,11 @@ use impinge_scenes::deform::{self, Deform};
 use impinge_scenes::{Model, surfaces};
 
 fn settings(method: Method, threads: usize, instruction_set: InstructionSet) -> Settings {
-    Settings {
-        method,
-        threads,
-        instruction_set,
-        backend: Backend::Cpu,
-        ..Settings::default()
-    }
+    Settings::new()
+        .method(method)
+        .threads(threads)
+        .instruction_set(instruction_set)
+        .backend(Backend::Cpu)
 }
 
 /// Detectors that keep state between frames, and an oracle that keeps none.

@@ -28,12 +28,7 @@ fn detectors() -> Vec<Detector> {
             continue;
         }
         for method in [Method::Clusters, Method::Cells] {
-            let settings = Settings {
-                method,
-                backend,
-                threads: 2,
-                ..Settings::default()
-            };
+            let settings = Settings::new().method(method).backend(backend).threads(2);
             detectors.push(Detector::new(settings).expect("these tests need an adapter"));
         }
     }

@@ -400,12 +400,8 @@ fn touching_bodies_have_their_lowest_pair() {
     }
     for (scene, [a, b]) in scenes {
         for threads in [1, 2] {
-            let mut detector = Detector::new(Settings {
-                backend: Backend::Cpu,
-                threads,
-                ..Settings::default()
-            })
-            .unwrap();
+            let mut detector =
+                Detector::new(Settings::new().backend(Backend::Cpu).threads(threads)).unwrap();
             for [first, second] in [[a, b], [b, a]] {
                 let pairs = detector.detect(&scene, &Query::between(a, b)).unwrap();
                 let lowest = pairs.between(first, second).min().expect("they meet");

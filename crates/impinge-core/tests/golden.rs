@@ -49,12 +49,12 @@ fn is_the_same_for_1_to_16_threads(name: &str) {
     };
     for method in [Method::Clusters, Method::Cells] {
         for threads in 1..=16 {
-            let mut detector = Detector::new(Settings {
-                backend: Backend::Cpu,
-                method,
-                threads,
-                ..Settings::default()
-            })
+            let mut detector = Detector::new(
+                Settings::new()
+                    .backend(Backend::Cpu)
+                    .method(method)
+                    .threads(threads),
+            )
             .unwrap();
             // The second frame finds caches filled and helpers awake; positions are written again
             // before it.

@@ -24,19 +24,11 @@ fn gpu(method: Method) -> Settings {
         let open = Detector::new(Backend::Gpu);
         Mutex::new(open.expect("these tests need a GPU or a software driver"))
     });
-    Settings {
-        method,
-        backend: Backend::Gpu,
-        ..Settings::default()
-    }
+    Settings::new().method(method).backend(Backend::Gpu)
 }
 
 fn cpu(method: Method) -> Settings {
-    Settings {
-        method,
-        backend: Backend::Cpu,
-        ..Settings::default()
-    }
+    Settings::new().method(method).backend(Backend::Cpu)
 }
 
 fn assert_agree(name: &str, expected: &[[u32; 4]], detector: &mut Detector, case: &Case) {
@@ -59,11 +51,7 @@ fn cells_agree_with_the_oracle() {
         let default = gpu(Method::Cells);
         let by_default = (default.density, default.group_size);
         let (lambda, group_size) = [by_default, (0.01, 20), (20.0, 64), (1e6, 7)][ix % 4];
-        let settings = Settings {
-            density: lambda,
-            group_size,
-            ..default
-        };
+        let settings = default.density(lambda).group_size(group_size);
         check(&case, &naive(&case), settings);
     }
 }
@@ -90,11 +78,7 @@ fn one_detector_answers_scene_after_scene() {
 
 /// Settings of `Cells` that put everything into one cell, in small groups.
 fn one_cell(group_size: u32) -> Settings {
-    Settings {
-        density: 1e-9,
-        group_size,
-        ..gpu(Method::Cells)
-    }
+    gpu(Method::Cells).density(1e-9).group_size(group_size)
 }
 
 #[test]
@@ -154,10 +138,7 @@ fn a_crowded_cell_keeps_to_the_budget_or_is_left_to_clusters() {
         (Some(1_000_000), "cells"),
         (Some(700_000), "clusters"),
     ] {
-        let settings = Settings {
-            memory_budget: budget,
-            ..one_cell(20)
-        };
+        let settings = one_cell(20).memory_budget(budget);
         let mut detector = Detector::new(settings).unwrap();
         let pairs = detector.detect(&case.scene, &case.query).unwrap();
         agree(&expected, &rows(&pairs), pairs.hash()).unwrap();
@@ -277,11 +258,7 @@ fn a_memory_budget_is_kept_by_working_in_batches() {
     for method in [Method::Clusters, Method::Cells] {
         let mut seen_batches = false;
         for budget in [1_500_000, 1_000_000, 700_000, 300_000] {
-            let mut detector = Detector::new(Settings {
-                memory_budget: Some(budget),
-                ..gpu(method)
-            })
-            .unwrap();
+            let mut detector = Detector::new(gpu(method).memory_budget(Some(budget))).unwrap();
             assert_agree("budget", &expected, &mut detector, &case);
             let pairs = detector.detect(&case.scene, &case.query).unwrap();
             let stats = pairs.stats();
@@ -290,11 +267,7 @@ fn a_memory_budget_is_kept_by_working_in_batches() {
             assert_eq!(stats.n_pieces > 0, budget == 300_000, "{stats:?}");
         }
         assert!(seen_batches, "{method:?}");
-        let mut detector = Detector::new(Settings {
-            memory_budget: Some(100_000),
-            ..gpu(method)
-        })
-        .unwrap();
+        let mut detector = Detector::new(gpu(method).memory_budget(Some(100_000))).unwrap();
         assert!(matches!(
             detector.detect(&case.scene, &case.query),
             Err(Error::MemoryBudget { .. })
@@ -321,11 +294,9 @@ fn what_is_more_than_the_device_binds_is_answered_in_pieces() {
 #[test]
 fn auto_takes_the_cpu_where_the_gpu_would_need_pieces() {
     let case = cases().swap_remove(0);
-    let settings = Settings {
-        backend: Backend::Auto,
-        device: Some(devices()[0].name.clone()),
-        ..gpu(Method::Clusters)
-    };
+    let settings = gpu(Method::Clusters)
+        .backend(Backend::Auto)
+        .device(Some(devices()[0].name.clone()));
     let answer = |most_bound| {
         let mut detector = Detector::with_most_bound(settings.clone(), most_bound).unwrap();
         assert_agree("auto", &naive(&case), &mut detector, &case);
@@ -362,10 +333,7 @@ fn pieces_keep_to_filters_ignored_pairs_and_frames() {
         Query::between(c, d),
         Query::self_of(c).shared_vertex(SharedVertex::Resolve),
     ];
-    let budget = |memory_budget| Settings {
-        memory_budget,
-        ..gpu(Method::Clusters)
-    };
+    let budget = |memory_budget| gpu(Method::Clusters).memory_budget(memory_budget);
     let mut detectors = [
         Detector::with_most_bound(budget(None), 16 << 10).unwrap(),
         // Each answer takes its room beside that of the largest one before.
@@ -537,24 +505,15 @@ fn adapters_are_listed_and_chosen_by_name() {
     assert!(!all.is_empty(), "these tests need an adapter");
     for device in &all {
         let part = device.name.split(' ').next().unwrap().to_uppercase();
-        let named = Settings {
-            device: Some(part),
-            ..settings.clone()
-        };
+        let named = settings.clone().device(Some(part));
         assert!(Detector::new(named).is_ok(), "{device}");
     }
-    let nobody = Settings {
-        device: Some("no such adapter".into()),
-        ..settings
-    };
+    let nobody = settings.device(Some("no such adapter".into()));
     let error = Detector::new(nobody.clone()).err().unwrap();
     assert!(matches!(error, Error::NoAdapter { .. }), "{error}");
     assert!(error.to_string().contains(&all[0].name), "{error}");
     // A name that fits nothing is a mistake for Auto, too.
-    let auto = Settings {
-        backend: Backend::Auto,
-        ..nobody
-    };
+    let auto = nobody.backend(Backend::Auto);
     let error = Detector::new(auto).err().unwrap();
     assert!(matches!(error, Error::NoAdapter { .. }), "{error}");
 }
@@ -650,11 +609,7 @@ fn bodies_that_flow_away_are_clustered_again() {
     let b = scene.add((other.elements.clone(), other.positions_f64()));
     let query = Query::between(a, b.unwrap());
     let mut auto = Detector::new(gpu(Method::Clusters)).unwrap();
-    let mut never = Detector::new(Settings {
-        recluster: Recluster::Never,
-        ..gpu(Method::Clusters)
-    })
-    .unwrap();
+    let mut never = Detector::new(gpu(Method::Clusters).recluster(Recluster::Never)).unwrap();
     let mut oracle = Detector::new(cpu(Method::Clusters)).unwrap();
     assert_eq!(auto.detect(&scene, &query).unwrap().stats().n_clustered, 2);
     never.detect(&scene, &query).unwrap();
@@ -907,11 +862,9 @@ fn sizes_to_a_hundred_thousand_and_a_thousand_bodies() {
 /// All choices left to the detector, on the device that tests use: by itself, `Auto` takes only
 /// hardware.
 fn on_any_device() -> Settings {
-    Settings {
-        backend: Backend::Auto,
-        device: Some(devices()[0].name.clone()),
-        ..gpu(Method::Auto)
-    }
+    gpu(Method::Auto)
+        .backend(Backend::Auto)
+        .device(Some(devices()[0].name.clone()))
 }
 
 /// Two balls of many triangles that meet.
@@ -974,11 +927,7 @@ fn auto_leaves_small_and_crowded_scenes_resolved_neighbours_and_budgets_to_the_d
         let mut scene = Scene::new();
         model.add_to(&mut scene).unwrap();
         let query = Query::all().shared_vertex(rule);
-        let mut auto = Detector::new(Settings {
-            memory_budget,
-            ..on_any_device()
-        })
-        .unwrap();
+        let mut auto = Detector::new(on_any_device().memory_budget(memory_budget)).unwrap();
         let pairs = auto.detect(&scene, &query).unwrap();
         let mut cells = Detector::new(cpu(Method::Cells)).unwrap();
         assert!(

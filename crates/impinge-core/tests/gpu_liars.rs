@@ -245,18 +245,11 @@ fn damaged_kernels_of_clusters_are_caught() {
 
 #[test]
 fn damaged_kernels_of_cells_are_caught() {
-    let settings = Settings {
-        method: Method::Cells,
-        ..Settings::default()
-    };
+    let settings = Settings::new().method(Method::Cells);
     let (of_tiles, of_cells) = OF_CELLS.split_last().unwrap();
     let questions = questions();
     assert_all_are_caught(&settings, of_cells, &questions);
     // One cell, processed in tiles.
-    let crowded = Settings {
-        density: 1e-9,
-        group_size: 25,
-        ..settings
-    };
+    let crowded = settings.density(1e-9).group_size(25);
     assert_all_are_caught(&crowded, &[*of_tiles], &questions[1..2]);
 }

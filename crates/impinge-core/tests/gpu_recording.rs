@@ -117,11 +117,7 @@ fn the_launch_that_goes_wrong_is_found() {
 fn recordings_are_printed_one_line_per_launch() {
     let scene = balls();
     for method in [Method::Clusters, Method::Cells] {
-        let settings = Settings {
-            method,
-            backend: Backend::Gpu,
-            ..Settings::default()
-        };
+        let settings = Settings::new().method(method).backend(Backend::Gpu);
         let mut detector = Detector::new(settings).expect("an adapter");
         let asks: [Ask; 2] = [PAIRS, IMPACTS];
         let [still, moving] = asks.map(|ask| {
@@ -168,10 +164,7 @@ fn recordings_are_printed_one_line_per_launch() {
 fn parts_and_positions_are_on_the_device_once() {
     let scene = balls();
     let held = |asks: &[Ask]| {
-        let settings = Settings {
-            backend: Backend::Gpu,
-            ..Settings::default()
-        };
+        let settings = Settings::new().backend(Backend::Gpu);
         let mut detector = Detector::new(settings).expect("an adapter");
         for ask in asks {
             ask(&mut detector, &scene);
@@ -230,11 +223,7 @@ fn mixed() -> (Scene, Vec<BodyId>) {
 fn frames_and_steps_take_turns() {
     for method in [Method::Clusters, Method::Cells] {
         let [mut device, mut host] = [Backend::Gpu, Backend::Cpu].map(|backend| {
-            let settings = Settings {
-                method,
-                backend,
-                ..Settings::default()
-            };
+            let settings = Settings::new().method(method).backend(backend);
             Detector::new(settings).expect("an adapter")
         });
         let (mut scene, bodies) = mixed();

@@ -420,10 +420,7 @@ fn lists_that_are_too_small_grow() {
     assert_eq!(n, pairs.len());
     let n = caller.read(&frame.counts)[frame.n_pairs_offset as usize / 4];
     assert!(n > 100);
-    let small = Settings {
-        memory_budget: Some(100_000),
-        ..Settings::default()
-    };
+    let small = Settings::new().memory_budget(Some(100_000));
     let mut detector = caller.detector(small);
     let mut encoder = caller.encoder();
     let refused =

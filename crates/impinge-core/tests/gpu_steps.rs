@@ -17,10 +17,7 @@ fn gpu() -> Settings {
         let open = Detector::new(Backend::Gpu);
         Mutex::new(open.expect("these tests need a GPU or a software driver"))
     });
-    Settings {
-        backend: Backend::Gpu,
-        ..Settings::default()
-    }
+    Settings::new().backend(Backend::Gpu)
 }
 
 fn on_gpu() -> Detector {
@@ -603,11 +600,7 @@ fn a_memory_budget_is_kept_in_batches_or_by_the_cpu() {
     let (earliest, expected) = (expected.earliest(), expected.hash());
     let mut backends = Vec::new();
     for budget in (4..80).step_by(3).map(|n| n * 100_000) {
-        let settings = Settings {
-            memory_budget: Some(budget),
-            threads: 1,
-            ..gpu()
-        };
+        let settings = gpu().memory_budget(Some(budget)).threads(1);
         let mut device = Detector::new(settings).expect("settings");
         match device.impacts(&scene, &step) {
             Ok(impacts) => {
@@ -666,7 +659,7 @@ fn a_body_that_flows_away_from_its_clusters_is_clustered_again() {
     let cloth = surfaces::cloth(40, 40, 1.0);
     let body = cloth.add_to(&mut scene).expect("good");
     let mut devices = [Recluster::Auto, Recluster::Never]
-        .map(|recluster| Detector::new(Settings { recluster, ..gpu() }).expect("settings"));
+        .map(|recluster| Detector::new(gpu().recluster(recluster)).expect("settings"));
     let step = Query::all();
     for device in &mut devices {
         assert_alike("as it was", device, &scene, &step);
@@ -700,10 +693,7 @@ fn steps_advance_as_on_the_cpu() {
 #[test]
 fn limits_and_cancellation_end_a_step() {
     let scene = balls(400);
-    let settings = Settings {
-        max_pairs: Some(10),
-        ..gpu()
-    };
+    let settings = gpu().max_pairs(Some(10));
     let mut device = Detector::new(settings).expect("settings");
     let refused = device.impacts(&scene, &Query::all()).err();
     assert!(
@@ -730,11 +720,7 @@ fn threads_and_methods_do_not_matter() {
         .expect("good")
         .hash();
     for (threads, method) in [(1, Method::Auto), (3, Method::Cells), (2, Method::Clusters)] {
-        let settings = Settings {
-            threads,
-            method,
-            ..gpu()
-        };
+        let settings = gpu().threads(threads).method(method);
         let mut device = Detector::new(settings).expect("settings");
         let impacts = device.impacts(&scene, &Query::all()).expect("good");
         assert_eq!(impacts.hash(), expected);

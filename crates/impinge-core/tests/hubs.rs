@@ -11,12 +11,10 @@ use impinge_core::{
 const RULES: [SharedVertex; 2] = [SharedVertex::Skip, SharedVertex::Resolve];
 
 fn settings() -> Settings {
-    Settings {
-        method: Method::Clusters,
-        backend: Backend::Cpu,
-        threads: 2,
-        ..Settings::default()
-    }
+    Settings::new()
+        .method(Method::Clusters)
+        .backend(Backend::Cpu)
+        .threads(2)
 }
 
 fn case(name: &str, elements: Elements, positions: &[[f64; 3]], rule: SharedVertex) -> Case {
@@ -225,18 +223,12 @@ fn a_million_faces_with_the_same_vertices_cost_nothing() {
         matches!(memory, Error::OutOfMemory { needed, .. } if needed == bytes),
         "{memory}"
     );
-    let limit = refused(Settings {
-        max_pairs: Some(1_000),
-        ..settings()
-    });
+    let limit = refused(settings().max_pairs(Some(1_000)));
     assert!(
         matches!(limit, Error::TooManyPairs { found, limit: 1_000 } if found == n_pairs),
         "{limit}"
     );
-    let budget = refused(Settings {
-        memory_budget: Some(1 << 30),
-        ..settings()
-    });
+    let budget = refused(settings().memory_budget(Some(1 << 30)));
     assert!(
         matches!(budget, Error::MemoryBudget { needed, budget, .. } if needed >= bytes && budget == 1 << 30),
         "{budget}"

@@ -16,12 +16,12 @@ fn detectors() -> [Detector; 3] {
         (Method::Naive, 1),
     ]
     .map(|(method, threads)| {
-        Detector::new(Settings {
-            method,
-            threads,
-            backend: Backend::Cpu,
-            ..Settings::default()
-        })
+        Detector::new(
+            Settings::new()
+                .method(method)
+                .threads(threads)
+                .backend(Backend::Cpu),
+        )
         .expect("settings")
     })
 }

@@ -12,12 +12,10 @@ use impinge_core::{
 use impinge_scenes::{adversarial, surfaces};
 
 fn cpu(method: Method) -> Settings {
-    Settings {
-        method,
-        backend: Backend::Cpu,
-        threads: 2,
-        ..Settings::default()
-    }
+    Settings::new()
+        .method(method)
+        .backend(Backend::Cpu)
+        .threads(2)
 }
 
 const TRIANGLE: [[f32; 3]; 3] = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
@@ -188,26 +186,11 @@ fn the_largest_and_smallest_coordinates_are_answered() {
 #[test]
 fn settings_out_of_range_are_refused() {
     for settings in [
-        Settings {
-            density: 0.0,
-            ..Settings::default()
-        },
-        Settings {
-            density: f64::NAN,
-            ..Settings::default()
-        },
-        Settings {
-            group_size: 0,
-            ..Settings::default()
-        },
-        Settings {
-            group_size: 65,
-            ..Settings::default()
-        },
-        Settings {
-            threads: 1 << 20,
-            ..Settings::default()
-        },
+        Settings::new().density(0.0),
+        Settings::new().density(f64::NAN),
+        Settings::new().group_size(0),
+        Settings::new().group_size(65),
+        Settings::new().threads(1 << 20),
     ] {
         assert!(matches!(
             Detector::new(settings),
@@ -239,10 +222,7 @@ fn budgets_are_kept_by_batches() {
         let mut most_batches = 0;
         while enough - refused > held / 200 {
             let budget = (refused + enough) / 2;
-            let settings = Settings {
-                memory_budget: Some(budget),
-                ..cpu(method)
-            };
+            let settings = cpu(method).memory_budget(Some(budget));
             let mut detector = Detector::new(settings).unwrap();
             match detector.count(&built.scene, &query) {
                 Ok(n) => {
@@ -252,11 +232,8 @@ fn budgets_are_kept_by_batches() {
                     assert!(held <= budget, "{method:?}: {held} held, {budget} allowed");
                     most_batches = most_batches.max(stats.n_batches);
                     let budget_of_pairs = budget + of_answer;
-                    let mut detector = Detector::new(Settings {
-                        memory_budget: Some(budget_of_pairs),
-                        ..cpu(method)
-                    })
-                    .unwrap();
+                    let mut detector =
+                        Detector::new(cpu(method).memory_budget(Some(budget_of_pairs))).unwrap();
                     let pairs = detector.detect(&built.scene, &query).unwrap();
                     agree(&expected, &rows(&pairs), pairs.hash()).unwrap();
                     assert!(pairs.stats().bytes_held <= budget_of_pairs);

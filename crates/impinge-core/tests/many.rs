@@ -7,12 +7,7 @@ use impinge_core::{
 use impinge_scenes::{Model, Random, solids, soup, surfaces};
 
 fn cpu(method: Method) -> Detector {
-    Detector::new(Settings {
-        backend: Backend::Cpu,
-        method,
-        ..Settings::default()
-    })
-    .unwrap()
+    Detector::new(Settings::new().backend(Backend::Cpu).method(method)).unwrap()
 }
 
 /// Bodies of several kinds at random places of a cube.

@@ -13,12 +13,10 @@ use impinge_scenes::deform::{self, Deform};
 use impinge_scenes::{soup, surfaces};
 
 fn cpu(method: Method, threads: usize) -> Settings {
-    Settings {
-        method,
-        threads,
-        backend: Backend::Cpu,
-        ..Settings::default()
-    }
+    Settings::new()
+        .method(method)
+        .threads(threads)
+        .backend(Backend::Cpu)
 }
 
 #[test]
@@ -28,27 +26,19 @@ fn methods_agree_with_the_oracle() {
         check(&case, &expected, cpu(Method::Auto, 1));
         check(&case, &expected, cpu(Method::Clusters, 1));
         for affinity in [Affinity::Auto, Affinity::Inherited] {
-            let settings = Settings {
-                affinity,
-                ..cpu(Method::Clusters, 2)
-            };
+            let settings = cpu(Method::Clusters, 2).affinity(affinity);
             check(&case, &expected, settings);
         }
         for instruction_set in [InstructionSet::Portable, InstructionSet::Avx2] {
             for method in [Method::Clusters, Method::Cells] {
-                let settings = Settings {
-                    instruction_set,
-                    ..cpu(method, 1)
-                };
+                let settings = cpu(method, 1).instruction_set(instruction_set);
                 check(&case, &expected, settings);
             }
         }
         for (lambda, group_size) in [(1.0, 64), (0.01, 5), (20.0, 64)] {
-            let settings = Settings {
-                density: lambda,
-                group_size,
-                ..cpu(Method::Cells, 1 + usize::from(lambda > 1.0))
-            };
+            let settings = cpu(Method::Cells, 1 + usize::from(lambda > 1.0))
+                .density(lambda)
+                .group_size(group_size);
             check(&case, &expected, settings);
         }
     }
@@ -233,11 +223,7 @@ fn bodies_that_flow_away_are_clustered_again() {
     let b = rest.translated([0.4, 0.0, 0.0]).add_to(&mut scene).unwrap();
     let query = Query::between(a, b);
     let mut auto = Detector::new(cpu(Method::Clusters, 1)).unwrap();
-    let mut never = Detector::new(Settings {
-        recluster: Recluster::Never,
-        ..cpu(Method::Clusters, 1)
-    })
-    .unwrap();
+    let mut never = Detector::new(cpu(Method::Clusters, 1).recluster(Recluster::Never)).unwrap();
     assert_eq!(auto.detect(&scene, &query).unwrap().stats().n_clustered, 2);
     never.detect(&scene, &query).unwrap();
     let mut flowed = rest.positions.clone();
@@ -456,11 +442,7 @@ fn auto_leaves_crowded_cells_resolved_neighbours_and_budgets_to_clusters() {
         let mut scene = Scene::new();
         model.add_to(&mut scene).unwrap();
         let query = Query::all().shared_vertex(rule);
-        let mut auto = Detector::new(Settings {
-            memory_budget,
-            ..cpu(Method::Auto, 2)
-        })
-        .unwrap();
+        let mut auto = Detector::new(cpu(Method::Auto, 2).memory_budget(memory_budget)).unwrap();
         let pairs = auto.detect(&scene, &query).unwrap();
         let mut cells = Detector::new(cpu(Method::Cells, 2)).unwrap();
         assert!(
@@ -536,11 +518,7 @@ fn cells_are_refused_where_they_mean_nothing() {
     assert!(error.starts_with("owned_by: "), "{error}");
     // All pairs count, but not for a yes or no.
     let everywhere = Query::between(a, b).owned_by([f64::NEG_INFINITY; 3], [f64::INFINITY; 3]);
-    let mut few = Detector::new(Settings {
-        max_pairs: Some(1),
-        ..cpu(Method::Clusters, 1)
-    })
-    .unwrap();
+    let mut few = Detector::new(cpu(Method::Clusters, 1).max_pairs(Some(1))).unwrap();
     let refused = few.detect(&scene, &everywhere).unwrap_err();
     assert!(
         matches!(refused, impinge_core::Error::TooManyPairs { .. }),

@@ -14,12 +14,7 @@ use impinge_scenes::{Random, adversarial, soup, surfaces};
 type Point = [f64; 3];
 
 fn detector(method: Method) -> Detector {
-    Detector::new(Settings {
-        method,
-        backend: Backend::Cpu,
-        ..Settings::default()
-    })
-    .expect("settings")
+    Detector::new(Settings::new().method(method).backend(Backend::Cpu)).expect("settings")
 }
 
 fn detectors() -> [Detector; 2] {
@@ -428,13 +423,13 @@ fn the_answer_depends_on_the_input_alone() {
             (3, sets[2], Some(4_000_000)),
             (16, sets[2], None),
         ] {
-            let mut detector = Detector::new(Settings {
-                backend: Backend::Cpu,
-                threads,
-                instruction_set,
-                memory_budget,
-                ..Settings::default()
-            })
+            let mut detector = Detector::new(
+                Settings::new()
+                    .backend(Backend::Cpu)
+                    .threads(threads)
+                    .instruction_set(instruction_set)
+                    .memory_budget(memory_budget),
+            )
             .expect("settings");
             for frame in 0..2 {
                 let near = detector.near(&scene, distance, &query).expect("good");

@@ -7,12 +7,10 @@ use impinge_core::{Backend, Detector, Method, Query, Scene, Settings, SharedVert
 use impinge_scenes::{Model, regular};
 
 fn settings(method: Method) -> Settings {
-    Settings {
-        method,
-        backend: Backend::Cpu,
-        threads: 1,
-        ..Settings::default()
-    }
+    Settings::new()
+        .method(method)
+        .backend(Backend::Cpu)
+        .threads(1)
 }
 
 /// One case per precision: each has its own filters.

@@ -11,12 +11,7 @@ use impinge_core::{
 use impinge_scenes::Random;
 
 fn detector(method: Method) -> Detector {
-    Detector::new(Settings {
-        method,
-        backend: Backend::Cpu,
-        ..Settings::default()
-    })
-    .expect("settings")
+    Detector::new(Settings::new().method(method).backend(Backend::Cpu)).expect("settings")
 }
 
 fn detectors() -> [Detector; 2] {
@@ -555,13 +550,13 @@ fn is_the_same_everywhere(scene: &Scene, step: &Query) {
         (2, InstructionSet::Avx2, Some(3_000_000)),
         (7, InstructionSet::Avx512, None),
     ] {
-        let mut detector = Detector::new(Settings {
-            backend: Backend::Cpu,
-            threads,
-            instruction_set,
-            memory_budget,
-            ..Settings::default()
-        })
+        let mut detector = Detector::new(
+            Settings::new()
+                .backend(Backend::Cpu)
+                .threads(threads)
+                .instruction_set(instruction_set)
+                .memory_budget(memory_budget),
+        )
         .expect("settings");
         for _ in 0..2 {
             assert_eq!(rows(&impacts(&mut detector, scene, step)), expected);

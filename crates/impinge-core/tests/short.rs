@@ -23,11 +23,7 @@ fn answers_print_short() {
     let b = other.add_to(&mut scene).unwrap();
     let end = other.translated([0.2, 0.0, 0.0]);
     scene.set_end_positions(b, &end.positions).unwrap();
-    let mut detector = Detector::new(Settings {
-        backend: Backend::Cpu,
-        ..Settings::default()
-    })
-    .unwrap();
+    let mut detector = Detector::new(Settings::new().backend(Backend::Cpu)).unwrap();
     let query = Query::between(a, b);
     let pairs = detector.detect(&scene, &query).unwrap().clone();
     assert!(pairs.len() > 100);

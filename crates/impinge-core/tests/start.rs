@@ -9,11 +9,7 @@ use impinge::{
 fn detectors() -> Vec<Detector> {
     [Method::Clusters, Method::Naive]
         .map(|method| {
-            let settings = Settings {
-                backend: Backend::Cpu,
-                method,
-                ..Settings::default()
-            };
+            let settings = Settings::new().backend(Backend::Cpu).method(method);
             Detector::new(settings).expect("settings")
         })
         .into()

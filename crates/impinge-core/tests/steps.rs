@@ -14,11 +14,8 @@ const FACE: [[u32; 3]; 1] = [[0, 1, 2]];
 const CORNERS: [[f32; 3]; 3] = [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]];
 
 fn detectors() -> Vec<Detector> {
-    let settings = [Method::Clusters, Method::Naive].map(|method| Settings {
-        method,
-        backend: Backend::Cpu,
-        ..Settings::default()
-    });
+    let settings = [Method::Clusters, Method::Naive]
+        .map(|method| Settings::new().method(method).backend(Backend::Cpu));
     settings
         .map(|settings| Detector::new(settings).expect("settings"))
         .into()
@@ -207,11 +204,7 @@ fn a_step_is_advanced_freely_where_very_many_pairs_are_close() {
         scene.set_end_positions(body, &end).expect("good");
         let step = Query::all().start(Start::Skip);
         let advances = [1, 4].map(|threads| {
-            let settings = Settings {
-                backend: Backend::Cpu,
-                threads,
-                ..Settings::default()
-            };
+            let settings = Settings::new().backend(Backend::Cpu).threads(threads);
             let mut detector = Detector::new(settings).expect("settings");
             detector.advance(&scene, &step).expect("good")
         });
@@ -546,12 +539,12 @@ fn candidates_in_runs_are_all_candidates_in_their_order() {
                 (Method::Clusters, 1),
                 (Method::Clusters, 3),
             ] {
-                let mut detector = Detector::new(Settings {
-                    method,
-                    threads,
-                    backend: Backend::Cpu,
-                    ..Settings::default()
-                })
+                let mut detector = Detector::new(
+                    Settings::new()
+                        .method(method)
+                        .threads(threads)
+                        .backend(Backend::Cpu),
+                )
                 .expect("settings");
                 let whole = detector.candidates(&scene, 0.0625, &query).expect("good");
                 let hash = whole.hash();
@@ -803,11 +796,8 @@ fn runs_of_candidates_end_when_they_are_told_to() {
 
         // The limit of pairs is for all runs together.
         for (limit, most) in [(whole - 1, 20), (whole - 1, whole), (10, 20), (whole, 20)] {
-            let mut limited = Detector::new(Settings {
-                max_pairs: Some(limit),
-                ..detector.settings().clone()
-            })
-            .expect("settings");
+            let mut limited = Detector::new(detector.settings().clone().max_pairs(Some(limit)))
+                .expect("settings");
             let mut n = 0;
             let found = limited.candidates_in_runs(&scene, 0.0, &query, most, |run| {
                 n += run.len() as u64;

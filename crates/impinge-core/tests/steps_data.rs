@@ -92,13 +92,11 @@ fn rows(impacts: &[Impact]) -> Vec<(u32, u32, f64)> {
 }
 
 fn detector(threads: usize, instruction_set: InstructionSet, budget: Option<u64>) -> Detector {
-    let settings = Settings {
-        backend: Backend::Cpu,
-        threads,
-        instruction_set,
-        memory_budget: budget,
-        ..Settings::default()
-    };
+    let settings = Settings::new()
+        .backend(Backend::Cpu)
+        .threads(threads)
+        .instruction_set(instruction_set)
+        .memory_budget(budget);
     Detector::new(settings).expect("settings")
 }
 
@@ -140,10 +138,7 @@ fn a_device_leaves_every_pair_that_touches() {
     let mut room = impinge_core::Capacities::default();
     (room.items, room.candidates) = (1 << 16, 1 << 21);
     (room.pairs, room.unsure) = (1 << 19, 1 << 18);
-    let settings = Settings {
-        backend: Backend::Gpu,
-        ..Settings::default()
-    };
+    let settings = Settings::new().backend(Backend::Gpu);
     let device = Detector::with_capacities(settings, room);
     let mut device = device.expect("a GPU or a software driver");
     for (scenario, scene) in scenarios() {

@@ -119,11 +119,7 @@ fn answers_are_those_of_the_moved_vertices() {
         given.bodies().nth(1).expect("two").0,
     );
     for method in [Method::Clusters, Method::Cells] {
-        let settings = Settings {
-            method,
-            backend: Backend::Cpu,
-            ..Settings::default()
-        };
+        let settings = Settings::new().method(method).backend(Backend::Cpu);
         let mut detector = Detector::new(settings).expect("good");
         let mut hashes = Vec::new();
         for frame in 0..4 {

@@ -20,13 +20,11 @@ fn detector(method: Method, threads: usize, tuning: Tuning) -> Detector {
 }
 
 fn settings(method: Method, threads: usize, tuning: Tuning) -> Settings {
-    Settings {
-        method,
-        threads,
-        tuning,
-        backend: Backend::Cpu,
-        ..Settings::default()
-    }
+    Settings::new()
+        .method(method)
+        .threads(threads)
+        .tuning(tuning)
+        .backend(Backend::Cpu)
 }
 
 /// All thresholds where most of the code behind them is entered.

@@ -243,12 +243,8 @@ fn blocks_state(threads: usize, method: Method) -> State {
         ..scene.settings
     };
     let mut simulation = Simulation::new(&scene.solids, settings).unwrap();
-    let mut detector = Detector::new(impinge::Settings {
-        method,
-        threads,
-        ..impinge::Settings::default()
-    })
-    .unwrap();
+    let mut detector =
+        Detector::new(impinge::Settings::new().method(method).threads(threads)).unwrap();
     let mut n_contacts = 0;
     for _ in 0..60 {
         n_contacts += simulation.step(&mut detector).unwrap().n_contacts;

@@ -64,11 +64,7 @@ fn a_body_dropped_on_another_crushes_it_and_every_method_sees_the_same() {
         height(&simulation)
     );
     let expected = simulation.detect(&mut detector).unwrap();
-    let mut cells = Detector::new(Settings {
-        method: Method::Cells,
-        ..Settings::default()
-    })
-    .unwrap();
+    let mut cells = Detector::new(Settings::new().method(Method::Cells)).unwrap();
     let pairs = simulation.detect(&mut cells).unwrap();
     assert!(expected.len() > 500 && pairs.rows().eq(expected.rows()));
 }

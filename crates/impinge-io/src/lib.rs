@@ -42,6 +42,8 @@
 //! coordinates as f32, merge vertices, or report errors without a line. For XML, JSON, zlib and LZ4
 //! we use crates.
 
+#![warn(missing_debug_implementations)]
+
 mod base64;
 mod binary;
 mod bodies;

@@ -369,12 +369,10 @@ pub fn _tiles_run<'py>(
             start: choose_one(start, "start", words!(Start))?,
             precision: choose_one(precision, "precision", words!(Precision))?,
         },
-        settings: Settings {
-            backend: Backend::Cpu,
-            threads,
-            memory_budget,
-            ..Settings::default()
-        },
+        settings: Settings::new()
+            .backend(Backend::Cpu)
+            .threads(threads)
+            .memory_budget(memory_budget),
         again,
     };
     let plan = Plan::open(&folder).map_err(refuse)?;

@@ -30,7 +30,7 @@ impl Hits {
                 let all = self.inner.iter();
                 collect(all.len(), all.map(value))
             }
-            Hit::Any => Err(invalid(
+            _ => Err(invalid(
                 "hits: \"any\" given, which says of each ray only whether it hits: ask for \"first\" or \"all\"",
             )),
         }

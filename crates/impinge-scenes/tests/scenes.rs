@@ -4,11 +4,8 @@ use impinge::{Detector, Method, Settings};
 use impinge_scenes::{BuiltScene, adversarial, data, solids, surfaces};
 
 fn n_pairs(built: &BuiltScene) -> usize {
-    let mut detector = Detector::new(Settings {
-        method: Method::Naive,
-        ..Settings::default()
-    })
-    .expect("the oracle needs nothing");
+    let mut detector =
+        Detector::new(Settings::new().method(Method::Naive)).expect("the oracle needs nothing");
     detector
         .detect(&built.scene, &built.query)
         .expect("scenes are valid")

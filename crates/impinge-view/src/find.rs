@@ -97,12 +97,10 @@ impl Finder {
         let detector = match self.detector.take() {
             Some((held, detector)) if held == key => detector,
             _ => {
-                let settings = Settings {
-                    method: question.method,
-                    max_pairs: Some(MAX_PAIRS),
-                    backend: impinge::Backend::Cpu,
-                    ..Settings::default()
-                };
+                let settings = Settings::new()
+                    .method(question.method)
+                    .max_pairs(Some(MAX_PAIRS))
+                    .backend(impinge::Backend::Cpu);
                 match (question.backend, device) {
                     (Backend::Gpu, Some((device, queue))) => {
                         Detector::with_device(device.clone(), queue.clone(), settings)
@@ -118,12 +116,12 @@ impl Finder {
 
 /// A detector on one thread of the CPU: for work beside the window.
 pub(crate) fn quiet_detector() -> Result<Detector, impinge::Error> {
-    Detector::new(Settings {
-        backend: impinge::Backend::Cpu,
-        threads: 1,
-        max_pairs: Some(MAX_PAIRS),
-        ..Settings::default()
-    })
+    Detector::new(
+        Settings::new()
+            .backend(impinge::Backend::Cpu)
+            .threads(1)
+            .max_pairs(Some(MAX_PAIRS)),
+    )
 }
 
 /// The intersection curves as segments.

@@ -206,14 +206,12 @@ pub struct DetectorHandle {
 /// pairs, -1 for none.
 fn settings(backend: Backend, [method, recluster]: [u32; 2], limits: [f64; 2]) -> Thrown<Settings> {
     let [memory_budget, max_pairs] = limits.map(|limit| (limit >= 0.0).then_some(limit as u64));
-    Ok(Settings {
-        backend,
-        method: entry(Method::ALL, method)?,
-        recluster: entry([Recluster::Auto, Recluster::Never], recluster)?,
-        memory_budget,
-        max_pairs,
-        ..Settings::default()
-    })
+    Ok(Settings::new()
+        .backend(backend)
+        .method(entry(Method::ALL, method)?)
+        .recluster(entry([Recluster::Auto, Recluster::Never], recluster)?)
+        .memory_budget(memory_budget)
+        .max_pairs(max_pairs))
 }
 
 #[wasm_bindgen]

@@ -324,10 +324,7 @@ fn bad_input_is_refused_by_name() -> Result<(), Error> {
     // The refused calls changed nothing.
     assert!(rows(&mut asker, &world, [4, a, 0])?.is_empty());
     assert_eq!(world.body(a)?.n_vertices(), 3);
-    let mut limited = Asker::new(Settings {
-        max_pairs: Some(0),
-        ..Backend::Cpu.into()
-    })?;
+    let mut limited = Asker::new(Settings::from(Backend::Cpu).max_pairs(Some(0)))?;
     add(&mut world, &ACROSS)?;
     let error = rows(&mut limited, &world, ALL).expect_err("one pair");
     assert_eq!(error.code(), "too_many_pairs");

@@ -37,11 +37,11 @@ fn main() -> Result<(), Box<dyn Error>> {
     let b = scene.add((elements, moved))?;
     let n = scene.bodies().map(|(_, body)| body.n_primitives()).sum();
     for method in [Method::Clusters, Method::Cells] {
-        let mut detector = Detector::new(impinge_core::Settings {
-            method,
-            backend: Backend::Cpu,
-            ..impinge_core::Settings::default()
-        })?;
+        let mut detector = Detector::new(
+            impinge_core::Settings::new()
+                .method(method)
+                .backend(Backend::Cpu),
+        )?;
         let query = Query::between(a, b);
         show(method.name(), || {
             Ok(detector.detect(&scene, &query)?.clone())
@@ -95,11 +95,11 @@ fn on_gpu(scene: &Scene, a: BodyId, b: BodyId) -> Result<(), Box<dyn Error>> {
     };
     println!("on {device}");
     for method in [Method::Clusters, Method::Cells] {
-        let mut detector = Detector::new(impinge_core::Settings {
-            method,
-            backend: Backend::Gpu,
-            ..impinge_core::Settings::default()
-        })?;
+        let mut detector = Detector::new(
+            impinge_core::Settings::new()
+                .method(method)
+                .backend(Backend::Gpu),
+        )?;
         let query = Query::between(a, b);
         show(method.name(), || {
             Ok(detector.detect(scene, &query)?.clone())

@@ -251,10 +251,8 @@ impl TwoLevels {
 
 /// The settings for impinge's own stages.
 fn of_cells(settings: &Settings) -> impinge_core::Settings {
-    impinge_core::Settings {
-        density: settings.lambda,
-        group_size: settings.group_size,
-        instruction_set: settings.instruction_set,
-        ..impinge_core::Settings::default()
-    }
+    impinge_core::Settings::new()
+        .density(settings.lambda)
+        .group_size(settings.group_size)
+        .instruction_set(settings.instruction_set)
 }

@@ -42,11 +42,11 @@ fn uniform_grid_finds_what_impinge_finds() {
     let outcome = grid.detect(&case.scene, case.a, case.b).unwrap();
     assert!(outcome.pairs.len() > 100);
     for method in [Method::Clusters, Method::Cells] {
-        let mut detector = Detector::new(impinge_core::Settings {
-            method,
-            backend: Backend::Cpu,
-            ..impinge_core::Settings::default()
-        })
+        let mut detector = Detector::new(
+            impinge_core::Settings::new()
+                .method(method)
+                .backend(Backend::Cpu),
+        )
         .unwrap();
         let pairs = detector.detect(&case.scene, &case.query()).unwrap();
         assert!(pairs.rows().eq(outcome.pairs.rows()), "{method:?}");
@@ -73,11 +73,11 @@ fn owner_rule_tests_each_pair_once() {
     assert_eq!(repeated.n_box_tests, once.n_box_tests);
     assert!(once.n_tests < repeated.n_tests);
     // Candidates are pairs of boxes that overlap, for every method.
-    let mut cells = Detector::new(impinge_core::Settings {
-        method: Method::Cells,
-        backend: Backend::Cpu,
-        ..impinge_core::Settings::default()
-    })
+    let mut cells = Detector::new(
+        impinge_core::Settings::new()
+            .method(Method::Cells)
+            .backend(Backend::Cpu),
+    )
     .unwrap();
     let pairs = cells.detect(&balls.scene, &balls.query).unwrap();
     assert_eq!(pairs.stats().n_candidates, once.n_tests);

@@ -90,11 +90,7 @@ fn find(
     method: Method,
     control: &Control<'_>,
 ) -> Result<Vec<[u32; 4]>, Error> {
-    let mut detector = Detector::new(Settings {
-        method,
-        backend: Backend::Cpu,
-        ..Settings::default()
-    })?;
+    let mut detector = Detector::new(Settings::new().method(method).backend(Backend::Cpu))?;
     detector.set_control(impinge::Control::new().cancel(control.cancel));
     let pairs = detector.detect(course.scene(), &course.query())?;
     Ok(pairs.rows().collect())

@@ -191,11 +191,12 @@ fn owner(options: &Options) -> Result<Detector, Error> {
     let place = Place::Cpu {
         n_threads: options.n_threads,
     };
-    Ok(Detector::new(Settings {
-        method: Method::Cells,
-        density: published::LAMBDA,
-        ..place.settings()
-    })?)
+    Ok(Detector::new(
+        place
+            .settings()
+            .method(Method::Cells)
+            .density(published::LAMBDA),
+    )?)
 }
 
 /// Times a detection after a pause, in which idle workers fall asleep, and copies its pairs after

@@ -36,16 +36,10 @@ impl Place {
     /// The settings of the library's detector for this place.
     pub fn settings(&self) -> Settings {
         match self {
-            Place::Cpu { n_threads } => Settings {
-                backend: Backend::Cpu,
-                threads: *n_threads,
-                ..Settings::default()
-            },
-            Place::Gpu(adapter) => Settings {
-                backend: Backend::Gpu,
-                device: Some(adapter.name.clone()),
-                ..Settings::default()
-            },
+            Place::Cpu { n_threads } => Settings::new().backend(Backend::Cpu).threads(*n_threads),
+            Place::Gpu(adapter) => Settings::new()
+                .backend(Backend::Gpu)
+                .device(Some(adapter.name.clone())),
         }
     }
 }
@@ -92,11 +86,9 @@ impl Setup {
             Method::Clusters => impinge::Method::Clusters,
             Method::Fwzs11 => return self.place.uniform_grid(self.lambda),
         };
-        Ok(Box::new(Detector::new(Settings {
-            method,
-            density: self.lambda,
-            ..self.place.settings()
-        })?))
+        Ok(Box::new(Detector::new(
+            self.place.settings().method(method).density(self.lambda),
+        )?))
     }
 
     /// Whether the method has a λ.

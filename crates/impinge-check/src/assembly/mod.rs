@@ -171,11 +171,11 @@ pub fn check_assembly_with(
         scene,
         ids,
         parts,
-        detector: Detector::new(Settings {
-            backend: Backend::Cpu,
-            threads: options.threads,
-            ..Settings::default()
-        })?,
+        detector: Detector::new(
+            Settings::new()
+                .backend(Backend::Cpu)
+                .threads(options.threads),
+        )?,
     };
     asker.detector.set_control(control);
     let meeting = asker.meeting()?;

@@ -69,11 +69,7 @@ fn nest(surface: &Surface, shells: &mut [Shell], threads: usize) -> Result<(), E
         }
         open.push(shell);
     }
-    let mut detector = Detector::new(Settings {
-        backend: Backend::Cpu,
-        threads,
-        ..Settings::default()
-    })?;
+    let mut detector = Detector::new(Settings::new().backend(Backend::Cpu).threads(threads))?;
     for (outer, inner) in inner.iter().enumerate() {
         if inner.is_empty() || shells[outer].sign.is_zero() {
             continue;

@@ -102,15 +102,11 @@ fn check(
 ) -> Result<(), Error> {
     let told = settings(&args.detector);
     let reference = match told.method {
-        Method::Auto | Method::Clusters | Method::Cells => Method::Naive,
         Method::Naive => Method::Clusters,
+        _ => Method::Naive,
     };
     let sample = Sample::new(demo, pairs)?;
-    let mut detector = Detector::new(Settings {
-        method: reference,
-        memory_budget: None,
-        ..told
-    })?;
+    let mut detector = Detector::new(told.method(reference).memory_budget(None))?;
     let watch = Watch::detection(!args.detector.no_progress, "checking");
     let query = Query::all();
     detector.set_control(watch.control(cancel));
@@ -128,7 +124,7 @@ fn check(
     }
     let by = match reference {
         Method::Naive => "naive (every box against every box)",
-        Method::Auto | Method::Clusters | Method::Cells => reference.name(),
+        _ => reference.name(),
     };
     let n_pairs = counted(rows.len() as u64, "pair");
     let ms = expected.stats().total_ms;

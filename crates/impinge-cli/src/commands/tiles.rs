@@ -140,13 +140,11 @@ fn run(args: &RunArgs, cancel: &CancelToken) -> Result<(), Error> {
             start: args.start.into(),
             precision: args.precision.into(),
         },
-        settings: Settings {
-            backend: Backend::Cpu,
-            method: args.method.into(),
-            threads: args.threads.map_or(0, usize::from),
-            memory_budget: args.memory_budget,
-            ..Settings::default()
-        },
+        settings: Settings::new()
+            .backend(Backend::Cpu)
+            .method(args.method.into())
+            .threads(args.threads.map_or(0, usize::from))
+            .memory_budget(args.memory_budget),
         again: args.again,
     };
     let watch = Watch::things(!args.no_progress, tiles.len(), "tiles", args.json);

@@ -49,11 +49,7 @@ fn oracle(meshes: Vec<Mesh>, query: &Query) -> Value {
     for mesh in meshes {
         add(&mut scene, mesh);
     }
-    let mut detector = Detector::new(Settings {
-        method: Method::Naive,
-        ..Settings::default()
-    })
-    .unwrap();
+    let mut detector = Detector::new(Settings::new().method(Method::Naive)).unwrap();
     let pairs = detector.detect(&scene, query).unwrap();
     json!({ "pairs": pairs.len(), "hash": format!("{:016x}", pairs.hash()) })
 }

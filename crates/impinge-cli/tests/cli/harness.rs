@@ -155,11 +155,7 @@ pub fn oracle(
         .iter()
         .map(|model| model.add_to(&mut scene).unwrap())
         .collect();
-    let mut detector = Detector::new(Settings {
-        method: Method::Naive,
-        ..Settings::default()
-    })
-    .unwrap();
+    let mut detector = Detector::new(Settings::new().method(Method::Naive)).unwrap();
     let pairs = detector.detect(&scene, &ask(&ids)).unwrap();
     (pairs.rows().collect(), format!("{:016x}", pairs.hash()))
 }

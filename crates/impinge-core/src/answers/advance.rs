@@ -8,6 +8,7 @@ use crate::scene::positions::Positions;
 
 /// How far a step can be taken.
 #[derive(Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Advance {
     /// The part of the step that can be taken: 1 for all of it, 0 for none. With a
     /// [clearance](crate::Query::clearance) it holds for positions that solvers compute, and for

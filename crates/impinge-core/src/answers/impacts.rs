@@ -17,6 +17,7 @@ use impinge_exact::Contact;
 
 /// Two elements that touch during a step, and when first.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Impact {
     /// The kinds of the two elements.

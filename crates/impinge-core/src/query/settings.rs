@@ -7,6 +7,7 @@ use crate::scene::words::words;
 
 /// How candidates are found. All methods give the same pairs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[non_exhaustive]
 pub enum Method {
     /// `Cells` for a frame whose bodies are mostly new to the detector, if that is cheaper, and
     /// `Clusters` as soon as they come back: their second frame makes the clusters.
@@ -42,6 +43,7 @@ words!("method", "auto, clusters, cells or naive", Method: [Auto = "auto", Clust
 
 /// Where the work is done.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[non_exhaustive]
 pub enum Backend {
     /// A hardware GPU if there is one, else the CPU. The CPU also takes over if the GPU fails or
     /// cannot hold the scene.
@@ -58,6 +60,7 @@ words!("backend", "auto, cpu or gpu", Backend: [Auto = "auto", Cpu = "cpu", Gpu 
 /// Whether a body is clustered again after it has flowed far from the pose in which it was
 /// clustered.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[non_exhaustive]
 pub enum Recluster {
     /// Yes, when the summed surface of its cluster boxes has grown so much that it pays. A GPU
     /// judges by a sample of the boxes, and only bodies whose positions are in the scene, not in a
@@ -73,6 +76,7 @@ words!("recluster", "auto or never", Recluster: [Auto = "auto", Never = "never";
 /// The widest vector instructions that the CPU backend may use, if the processor has them.
 /// The pairs do not depend on it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
+#[non_exhaustive]
 pub enum InstructionSet {
     /// Plain loops, vectorised by the compiler for the target's baseline.
     Portable,
@@ -88,6 +92,7 @@ words!("instruction_set", "portable, avx2 or avx512", InstructionSet: [Portable 
 
 /// Which cores the helper threads of the CPU backend may run on. The answer does not depend on it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[non_exhaustive]
 pub enum Affinity {
     /// On Linux, with up to 8 threads: every core that the helper was started with, except the one
     /// on which the calling thread is running. Otherwise as `Inherited`.
@@ -117,6 +122,7 @@ words!("affinity", "auto or inherited", Affinity: [Auto = "auto", Inherited = "i
 /// # Ok(()) }
 /// ```
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 #[must_use]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]

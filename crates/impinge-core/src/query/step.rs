@@ -13,6 +13,7 @@ use crate::scene::words::words;
 /// What happens to pairs that touch at the start of a step, and whether the start is asked for
 /// intersections.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[non_exhaustive]
 pub enum Start {
     /// They are reported with the time 0. Surfaces that already pass through each other need not
     /// touch at all: an edge inside a face, or a body inside another, has no contact until it comes
@@ -36,6 +37,7 @@ words!("start", "report, skip or verify", Start: [Report = "report", Skip = "ski
 
 /// What is asked of rays.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[non_exhaustive]
 pub enum Hit {
     /// What each ray hits first: at the smallest parameter, of several the lowest by body and then
     /// by number.

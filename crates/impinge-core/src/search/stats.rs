@@ -8,6 +8,7 @@ type Word = &'static str;
 
 /// Time spent in one stage.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Stage {
     /// The stage's name, the same on every backend: `bounds`, `traversal`, `pairing`, …

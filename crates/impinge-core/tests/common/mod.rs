@@ -16,12 +16,12 @@ pub struct Case {
 
 /// A detector on the CPU.
 pub fn detector(method: Method, threads: usize) -> Detector {
-    Detector::new(Settings {
-        method,
-        threads,
-        backend: Backend::Cpu,
-        ..Settings::default()
-    })
+    Detector::new(
+        Settings::new()
+            .method(method)
+            .threads(threads)
+            .backend(Backend::Cpu),
+    )
     .expect("settings")
 }
 
@@ -41,12 +41,8 @@ pub fn rows(pairs: &Pairs) -> Vec<[u32; 4]> {
 
 /// The oracle's answer.
 pub fn naive(case: &Case) -> Vec<[u32; 4]> {
-    let mut detector = Detector::new(Settings {
-        method: Method::Naive,
-        backend: Backend::Cpu,
-        ..Settings::default()
-    })
-    .unwrap();
+    let mut detector =
+        Detector::new(Settings::new().method(Method::Naive).backend(Backend::Cpu)).unwrap();
     rows(&detector.detect(&case.scene, &case.query).unwrap())
 }
 

@@ -216,12 +216,8 @@ fn threads_change_nothing() {
     let ids = [&a, &b].map(|model| model.add_to(&mut scene).unwrap());
     let pairs = detect(&scene, &Query::between(ids[0], ids[1]));
     let run = |n_threads: usize| {
-        let mut detector = Detector::new(Settings {
-            backend: Backend::Cpu,
-            threads: n_threads,
-            ..Settings::default()
-        })
-        .unwrap();
+        let mut detector =
+            Detector::new(Settings::new().backend(Backend::Cpu).threads(n_threads)).unwrap();
         let contacts = detector.contacts(&scene, &pairs).unwrap();
         let bits: Vec<[u64; 3]> = contacts
             .points()

@@ -221,12 +221,12 @@ fn every_way_gives_the_same_answer() {
     let mut first: Option<Closest> = None;
     for instruction_set in InstructionSet::ALL {
         for threads in [1, 4] {
-            let mut detector = Detector::new(Settings {
-                instruction_set,
-                threads,
-                backend: Backend::Cpu,
-                ..Settings::default()
-            })
+            let mut detector = Detector::new(
+                Settings::new()
+                    .instruction_set(instruction_set)
+                    .threads(threads)
+                    .backend(Backend::Cpu),
+            )
             .unwrap();
             let query = Query::all();
             let mut ask = |scene: &Scene, points: &[[f32; 3]]| {

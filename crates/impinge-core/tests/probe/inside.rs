@@ -183,12 +183,12 @@ fn every_way_gives_the_same_answer() {
     let mut answers = Vec::new();
     for instruction_set in InstructionSet::ALL {
         for threads in [1, 4] {
-            let mut detector = Detector::new(Settings {
-                instruction_set,
-                threads,
-                backend: Backend::Cpu,
-                ..Settings::default()
-            })
+            let mut detector = Detector::new(
+                Settings::new()
+                    .instruction_set(instruction_set)
+                    .threads(threads)
+                    .backend(Backend::Cpu),
+            )
             .unwrap();
             let mut moving = scene.clone();
             let first = detector.contains(&moving, body, &points).unwrap();

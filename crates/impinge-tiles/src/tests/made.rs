@@ -149,12 +149,7 @@ fn add(scene: &mut Scene, mesh: &Mesh) -> impinge::BodyId {
 
 /// Every box against every box.
 fn naive() -> Detector {
-    Detector::new(Settings {
-        method: Method::Naive,
-        threads: 1,
-        ..Settings::default()
-    })
-    .unwrap()
+    Detector::new(Settings::new().method(Method::Naive).threads(1)).unwrap()
 }
 
 fn query(ask: Ask) -> Query {
@@ -211,10 +206,7 @@ pub fn step_oracle(bodies: &[[Mesh; 2]], options: &PlanOptions, ask: Ask) -> Imp
 }
 
 pub fn one_thread() -> Settings {
-    Settings {
-        threads: 1,
-        ..Settings::default()
-    }
+    Settings::new().threads(1)
 }
 
 pub fn plan(folder: &Path, files: &[PathBuf], options: &PlanOptions) -> Result<Plan, crate::Error> {

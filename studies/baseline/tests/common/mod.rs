@@ -43,12 +43,8 @@ impl Case {
 
 /// The answer of the oracle.
 pub fn oracle(case: &Case) -> Vec<[u32; 4]> {
-    let mut detector = Detector::new(Settings {
-        method: Method::Naive,
-        backend: Backend::Cpu,
-        ..Settings::default()
-    })
-    .unwrap();
+    let mut detector =
+        Detector::new(Settings::new().method(Method::Naive).backend(Backend::Cpu)).unwrap();
     let pairs = detector.detect(&case.scene, &case.query()).unwrap();
     pairs.rows().collect()
 }

@@ -21,6 +21,7 @@ pub(crate) use labels::Labels;
 
 /// Two elements that are near each other.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct NearPair {
     /// What they are.
@@ -52,6 +53,7 @@ pub struct NearPair {
 /// every machine. Whether a pair is near is decided exactly, not by these numbers: a distance may
 /// be rounded to a number above the one asked for.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ClosestPoints {
     /// The distance, wrong by a few units in the last place at most. 0 for elements that touch.
