@@ -1,6 +1,6 @@
 //! The commands: their problems, contestants and tables.
 
-use impinge::{Backend, Method, Settings};
+use impinge::{Backend, Method};
 use impinge_scenes::deform::Wave;
 use impinge_scenes::{adversarial, regular, surfaces};
 

@@ -7,7 +7,7 @@
 use std::borrow::Borrow;
 use std::time::{Duration, Instant};
 
-use impinge::{BodyId, Detector, Method, Pairs, Settings};
+use impinge::{BodyId, Detector, Method, Pairs};
 use impinge_baseline::duplicates::{Checks, Missing, Possible, TwoLevels};
 
 use crate::control::Control;

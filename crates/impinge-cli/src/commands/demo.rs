@@ -5,7 +5,7 @@ use std::io::Write;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use impinge::{BodyId, CancelToken, Control, Detector, Method, Pairs, Query, Scene, Settings};
+use impinge::{BodyId, CancelToken, Control, Detector, Method, Pairs, Query, Scene};
 
 use impinge_io::printable;
 

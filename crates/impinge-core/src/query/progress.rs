@@ -28,7 +28,6 @@ impl CancelToken {
 
 /// The progress of a detection: `done` of `total` units of work. Units differ by stage.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[non_exhaustive]
 pub struct Progress {
     /// Units done.
     pub done: u64,
