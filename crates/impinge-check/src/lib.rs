@@ -6,8 +6,8 @@
 //! use
 //! [`Pool`]: each mesh is checked in a child process that may be killed, so that one bad file costs one row and
 //! not the run. [`RowStore`] keeps rows on disk, so that an interrupted run can continue where it
-//! stopped. A [`Report`] says what is in many rows, as a table or for other programs. [`fix_mesh`] mends what can be
-//! mended without moving a vertex.
+//! stopped. A [`Report`] says what is in many rows, as a table or for other programs. [`fix_mesh`]
+//! mends what can be mended without moving a vertex.
 //!
 //! ```
 //! use impinge_check::{Options, check_mesh};

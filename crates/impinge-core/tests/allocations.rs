@@ -84,8 +84,8 @@ fn counted<A>(ask: impl FnOnce() -> A) -> u64 {
 
 /// The most allocations of a steady frame: impacts, candidates, near, distance, contacts. Unlike
 /// detection, these questions do not do without yet: `near` needs a plan and its lists; impacts and
-/// candidates need more where answers are larger; `distance` and `contacts` keep no answer's memory.
-/// Measured: 36, 77, 8, 31 and 51.
+/// candidates need more where answers are larger; `distance` and `contacts` keep no answer's
+/// memory. Measured: 36, 77, 8, 31 and 51.
 const MOST: [u64; 5] = [48, 100, 12, 44, 72];
 
 #[test]

@@ -104,7 +104,8 @@ fn textbook(of: &Stencil) -> f64 {
     }
 }
 
-/// The sine of the angle between what spans the features: derivatives are as accurate as it is large.
+/// The sine of the angle between what spans the features: derivatives are as accurate as it is
+/// large.
 fn sine(of: &Stencil) -> f64 {
     let [a, b] = spanning(of);
     let ways: Vec<Point> = [a, b]
@@ -409,7 +410,8 @@ fn nearly_parallel_edges_are_mollified() {
                 assert_eq!(hessian[i][j].to_bits(), hessian[j][i].to_bits());
             }
         }
-        // It stays a pair of edges, with the type it has, and without positions at rest it does not.
+        // It stays a pair of edges, with the type it has, and without positions at rest it does
+        // not.
         let kept = merged.iter().find(|of| of.kind == PairKind::EdgeEdge);
         if is_below {
             assert_eq!(kept.map(Stencil::name), Some(of.name()));

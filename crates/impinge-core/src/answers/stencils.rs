@@ -28,8 +28,8 @@ const WHAT: &str = "stencils";
 /// repeated. Coefficients and derivatives are 0 there, so sums over all four are right.
 ///
 /// Numbers are computed in `f64` in one fixed order of operations: they have the same bits on every
-/// machine. They are accurate to a few units in the last place of the sizes of the elements, divided
-/// by the sine of the angle between edges that are nearly parallel.
+/// machine. They are accurate to a few units in the last place of the sizes of the elements,
+/// divided by the sine of the angle between edges that are nearly parallel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Stencil {
     /// What is near what.
@@ -203,9 +203,9 @@ impl NearPairs {
     /// distances, gradients and Hessians for a potential. Features are those that were nearest when
     /// the pairs were found.
     ///
-    /// A potential of contact sums over [`Stencils::merged`] in place of pairs. Positions at `rest`,
-    /// in the order of the stencils' [numbers](Stencils::offsets), switch on the mollifier of
-    /// nearly parallel edges. Its threshold depends on their lengths at rest.
+    /// A potential of contact sums over [`Stencils::merged`] in place of pairs. Positions at
+    /// `rest`, in the order of the stencils' [numbers](Stencils::offsets), switch on the mollifier
+    /// of nearly parallel edges. Its threshold depends on their lengths at rest.
     ///
     /// ```
     /// use impinge::{Backend, Detector, Query, Scene};

@@ -47,15 +47,15 @@ impl Detector {
     ///
     /// Elements that do not meet are not stopped. Where two do, the vertices that go towards the
     /// other element stop before planes across their shortest way at the start, or at the end: if
-    /// only one of them comes nearer, it gets all of the room but a thousandth, and if both do, each
-    /// gets a share of it, by how far it wants to go. Then pairs of which a vertex was stopped are
-    /// looked at again, until none meets. So some vertices stop that might have passed; the next
-    /// step takes them farther.
+    /// only one of them comes nearer, it gets all of the room but a thousandth, and if both do,
+    /// each gets a share of it, by how far it wants to go. Then pairs of which a vertex was stopped
+    /// are looked at again, until none meets. So some vertices stop that might have passed; the
+    /// next step takes them farther.
     ///
     /// The vertices of pairs that touch at the start, or are nearer than they are to keep, stay
-    /// where they are, and [are counted](Truncation::n_touching); under [`Start::Skip`] they go as
-    /// far as other pairs let them. The seams of a mesh that was not welded are refused by name.
-    /// Found on the CPU.
+    /// where they are, and [are counted](Truncation::n_touching); under
+    /// [`Start::Skip`](crate::Start::Skip) they go as far as other pairs let them. The seams of a
+    /// mesh that was not welded are refused by name. Found on the CPU.
     ///
     /// ```
     /// use impinge::{Backend, Detector, Positions, Query, Scene};

@@ -1,4 +1,5 @@
-//! What kernels know of each part besides its elements: whom it meets, and how its pairs are numbered.
+//! What kernels know of each part besides its elements: whom it meets, and how its pairs are
+//! numbered.
 
 use crate::plan::{Plan, QueryPart};
 use crate::scene::elements::Part;

@@ -1,6 +1,6 @@
-//! The smallest distance of two bodies, and what is kept of it from call to call: the bodies' trees,
-//! and what was found. The pair that was nearest in the last call is compared first: bodies that
-//! move little have a good bound from the start.
+//! The smallest distance of two bodies, and what is kept of it from call to call: the bodies'
+//! trees, and what was found. The pair that was nearest in the last call is compared first: bodies
+//! that move little have a good bound from the start.
 
 use std::collections::HashMap;
 use std::sync::Arc;

@@ -157,12 +157,12 @@ impl Body {
     }
 
     /// The matrix that moved the vertices from the [rest positions](Body::rest_positions); `None`
-    /// without one ([`Scene::set_transform`]).
+    /// without one ([`Scene::set_transform`](crate::Scene::set_transform)).
     pub fn transform(&self) -> Option<[[f64; 4]; 4]> {
         self.motion.as_ref().map(|motion| motion.matrix.matrix())
     }
 
-    /// The positions that were given last, before any [transform](Scene::set_transform).
+    /// The positions that were given last, before any [transform](crate::Scene::set_transform).
     pub fn rest_positions(&self) -> &Positions {
         match &self.motion {
             Some(motion) => &motion.rest,
@@ -205,7 +205,8 @@ impl Body {
         self.topology.rings(self.n_vertices(), n_rings)
     }
 
-    /// How thick the body is, in the unit of the scene: see [`Scene::set_thickness`].
+    /// How thick the body is, in the unit of the scene: see
+    /// [`Scene::set_thickness`](crate::Scene::set_thickness).
     pub fn thickness(&self) -> f64 {
         self.thickness
     }

@@ -56,8 +56,8 @@ impl Scene {
 
     /// Sets the vertex positions at the end of a step, `(v, 3)`, copied or not as by
     /// [`set_positions`](Scene::set_positions). Each vertex moves from
-    /// [`positions`](Body::positions) to its end position on a straight line at constant speed.
-    /// They hold until the next [`set_positions`](Scene::set_positions),
+    /// [`positions`](crate::Body::positions) to its end position on a straight line at constant
+    /// speed. They hold until the next [`set_positions`](Scene::set_positions),
     /// [`positions_mut`](Scene::positions_mut), [`set_transform`](Scene::set_transform),
     /// [`remesh`](Scene::remesh) or [`clear_end_positions`](Scene::clear_end_positions). A body
     /// that has none stands still. For a rigid body, see
@@ -162,7 +162,7 @@ impl Scene {
     }
 
     /// Sets where a step takes a body, by an affine matrix: its end positions are the
-    /// [rest positions](Body::rest_positions) moved by the matrix, rounded as by
+    /// [rest positions](crate::Body::rest_positions) moved by the matrix, rounded as by
     /// [`set_transform`](Scene::set_transform), and hold as long as any
     /// [end positions](Scene::set_end_positions). The two matrices of a step are those of its two
     /// ends; both start from rest, neither from the other.

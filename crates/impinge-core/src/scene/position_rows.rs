@@ -29,8 +29,8 @@ struct SharedRows<R> {
     owner: Arc<dyn Any + Send + Sync>,
 }
 
-// SAFETY: a `SharedRows` is used like a reference to its rows, which may be sent if `R` is `Sync`. The
-// owner is `Send` and `Sync`.
+// SAFETY: a `SharedRows` is used like a reference to its rows, which may be sent if `R` is `Sync`.
+// The owner is `Send` and `Sync`.
 unsafe impl<R: Sync> Send for SharedRows<R> {}
 // SAFETY: as above.
 unsafe impl<R: Sync> Sync for SharedRows<R> {}

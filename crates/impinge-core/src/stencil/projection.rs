@@ -1,8 +1,9 @@
 //! The symmetric matrix without negative eigenvalues that is nearest to a given one.
 //!
-//! Reflections make the matrix tridiagonal, and rotations with implicit shifts then make it diagonal
-//! (Householder's method and the QL algorithm: Bowdler, Martin, Reinsch and Wilkinson, *The QR and
-//! QL algorithms for symmetric matrices*, 1968). What negative eigenvalues contribute is taken off.
+//! Reflections make the matrix tridiagonal, and rotations with implicit shifts then make it
+//! diagonal (Householder's method and the QL algorithm: Bowdler, Martin, Reinsch and Wilkinson,
+//! *The QR and QL algorithms for symmetric matrices*, 1968). What negative eigenvalues contribute
+//! is taken off.
 
 use std::array::from_fn;
 

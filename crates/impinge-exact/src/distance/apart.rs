@@ -6,8 +6,8 @@
 //!
 //! How: the planes lie across the shortest way between the elements, at the start or at the end.
 //! The points that go towards the other element are stopped: where both come nearer, each gets a
-//! share of the room, by how far it wants to go. Heights over a plane are computed in `f64`, so this
-//! is where points should stop; that elements then stay apart is decided by the exact test.
+//! share of the room, by how far it wants to go. Heights over a plane are computed in `f64`, so
+//! this is where points should stop; that elements then stay apart is decided by the exact test.
 //!
 //! Source: A. Chen et al., "Divide and Truncate", SIGGRAPH 2026, for planes that divide the room
 //! between elements. There they rest.

@@ -2,13 +2,14 @@
 //!
 //! What it does: tests the difference polygon of two moving elements (see `crate::sweep`) over an
 //! interval of time, in plain `f64` or `f32`. One pair per lane. The search of [0, 1] for the first
-//! contact is a sequence of two tests of an interval, [`PolygonMotion::look`] and [`PolygonMotion::enclose`],
-//! which have no branches. The caller stores the intervals ([`Search`]), and so can keep all lanes
-//! busy.
+//! contact is a sequence of two tests of an interval, [`PolygonMotion::look`] and
+//! [`PolygonMotion::enclose`], which have no branches. The caller stores the intervals
+//! ([`Search`]), and so can keep all lanes busy.
 //!
 //! In: the points at the start and at the end ([`PolygonMotion`]). Out: masks and times. Cost in
-//! operations for all lanes: [`PolygonMotion::are_far`] about 200, [`PolygonMotion::are_across`] 300,
-//! [`PolygonMotion::are_aside`] 400, [`PolygonMotion::look`] 500, [`PolygonMotion::enclose`] 900.
+//! operations for all lanes: [`PolygonMotion::are_far`] about 200, [`PolygonMotion::are_across`]
+//! 300, [`PolygonMotion::are_aside`] 400, [`PolygonMotion::look`] 500, [`PolygonMotion::enclose`]
+//! 900.
 //!
 //! Method: over [a, b] the corners V and edges E of the polygon are computed at a and at b, and
 //! from them the Bernstein coefficients over [a, b] of the cubic f = N . V_0 and of the quartics w

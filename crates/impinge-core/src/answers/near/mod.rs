@@ -251,9 +251,9 @@ impl NearPairs {
     }
 
     /// Which pairs an older answer also has, which are new, and which are gone: two pairs are the
-    /// same if their kinds, bodies and elements are, whatever their features and distances. Pairs of
-    /// a body that was removed and of one in its slot differ; those of a body that was re-meshed are
-    /// named by their numbers alone.
+    /// same if their kinds, bodies and elements are, whatever their features and distances. Pairs
+    /// of a body that was removed and of one in its slot differ; those of a body that was re-meshed
+    /// are named by their numbers alone.
     pub fn changes(&self, old: &NearPairs) -> Changes {
         let key = |pair: NearPair| (pair.kind, pair.a, pair.b);
         Changes::between(old.iter().map(key), self.iter().map(key))

@@ -127,8 +127,8 @@ impl StepClusters {
         }
     }
 
-    /// Hands over the contacts or candidates that are sought. Where `moved` is given, those of pairs
-    /// with a vertex that has moved, and perhaps others.
+    /// Hands over the contacts or candidates that are sought. Where `moved` is given, those of
+    /// pairs with a vertex that has moved, and perhaps others.
     pub fn run(
         &mut self,
         job: Job<'_>,
