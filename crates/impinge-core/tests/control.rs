@@ -19,7 +19,7 @@ use impinge_core::contact::Contacts;
 use impinge_core::{
     Backend, BodyId, CancelToken, Control, Detector, Error, Pairs, Query, Scene, Settings,
 };
-use impinge_scenes::surfaces;
+use impinge_scenes::{solids, surfaces};
 
 /// Two balls that overlap, a third one beside them, and where they are at the end of a step.
 struct World {
@@ -27,6 +27,8 @@ struct World {
     bodies: [BodyId; 3],
     pairs: Pairs,
     contacts: Contacts,
+    /// A scene of its own.
+    block: (Scene, BodyId),
 }
 
 fn detector(threads: usize) -> Detector {
@@ -58,11 +60,15 @@ impl World {
         let mut detector = detector(1);
         let pairs = detector.detect(&scene, &Query::between_all()).unwrap();
         let contacts = detector.contacts(&scene, &pairs).unwrap();
+        let mut apart = Scene::new();
+        let block = solids::block(20, 20, 20, 0.1).add_to(&mut apart).unwrap();
+        let block = (apart, block);
         World {
             scene,
             bodies,
             pairs,
             contacts,
+            block,
         }
     }
 }
@@ -85,7 +91,7 @@ fn points(world: &World) -> Vec<[f64; 3]> {
 }
 
 /// By the names of the methods; where one is asked twice, with more after a space.
-const ALL: [(&str, Ask); 21] = [
+const ALL: [(&str, Ask); 23] = [
     ("detect", |d, w| {
         Ok(d.detect(&w.scene, &Query::all())?.hash())
     }),
@@ -152,6 +158,11 @@ const ALL: [(&str, Ask); 21] = [
         let closest = d.closest(&w.scene, &points, f64::INFINITY, &Query::of(w.bodies[2]))?;
         Ok(closest.hash())
     }),
+    ("closest of several", |d, w| {
+        let query = Query::of(w.bodies[2]).n_nearest(4);
+        let closest = d.closest(&w.scene, &points(w), f64::INFINITY, &query)?;
+        Ok(closest.hash())
+    }),
     ("cast", |d, w| {
         let points = points(w);
         let hits = d.cast(
@@ -168,6 +179,13 @@ const ALL: [(&str, Ask); 21] = [
         Ok(places
             .iter()
             .fold(0, |sum, &place| 3 * (sum % (1 << 60)) + (place + 1) as u64))
+    }),
+    ("locate", |d, w| {
+        let (scene, block) = &w.block;
+        let found = d.locate(scene, *block, &points(w))?;
+        Ok(found.iter().fold(0, |sum, number| {
+            sum.rotate_left(5) ^ u64::from(number.map_or(0, |number| number + 1))
+        }))
     }),
     ("nearest", |d, w| {
         let [a, ..] = w.bodies;

@@ -9,7 +9,7 @@ use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::answers::{Advance, Candidates, Impacts, Pairs, Row, Truncation, impact};
+use crate::answers::{Advance, Candidates, Impacts, Pairs, Row, Truncation, collect, impact};
 use crate::arrays::{PositionArray, Rows};
 use crate::bodies::Body;
 use crate::closest::Closest;
@@ -311,6 +311,34 @@ impl DetectorBase {
             },
         )?;
         Ok(PyArray1::from_vec(slf.py(), asked.answer))
+    }
+
+    fn _locate<'py>(
+        slf: &Bound<'py, Self>,
+        scene: &Bound<'_, PyAny>,
+        body: &Bound<'_, PyAny>,
+        points: &Bound<'py, PyAny>,
+        keywords: Keywords<'_, '_>,
+    ) -> PyResult<Bound<'py, PyArray1<i64>>> {
+        let points = PositionArray::new(points, "points")?;
+        let points = points.rows()?;
+        let options = Options::control(keywords)?;
+        let body = |scene: &Scene, _: &Options<'_>| scene.id(body, "body");
+        let asked = ask_about(
+            slf,
+            scene,
+            options,
+            body,
+            |detector, scene, &body| match points {
+                Rows::F32(points) => detector.locate(scene, body, points),
+                Rows::F64(points) => detector.locate(scene, body, points),
+            },
+        )?;
+        let numbers = asked.answer.iter().map(|found| found.map_or(-1, i64::from));
+        Ok(PyArray1::from_vec(
+            slf.py(),
+            collect(asked.answer.len(), numbers)?,
+        ))
     }
 
     fn _closest(

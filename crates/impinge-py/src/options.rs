@@ -10,12 +10,12 @@ use crate::arrays;
 use crate::errors::invalid;
 use crate::exclusion::Exclusion;
 use crate::scene::Scene;
-use crate::settings::{WHICH, choose_one, number, unexpected, words};
+use crate::settings::{WHICH, choose_one, number, unexpected, unsigned, words};
 use crate::vertex_filter::VertexFilter;
 use crate::watch::CancelToken;
 
 /// The options that users may name, in the order of the documentation.
-const NAMES: [&str; 20] = [
+const NAMES: [&str; 21] = [
     "which",
     "between",
     "self_of",
@@ -32,6 +32,7 @@ const NAMES: [&str; 20] = [
     "distances",
     "closest_points",
     "hits",
+    "n_nearest",
     "fixed",
     "query",
     "cancel",
@@ -57,6 +58,7 @@ pub struct Options<'py> {
     pub distances: bool,
     pub closest_points: bool,
     pub hits: Hit,
+    n_nearest: Option<u32>,
     fixed: Vec<Bound<'py, PyAny>>,
     pub cancel: Option<impinge::CancelToken>,
     pub progress: Option<Py<PyAny>>,
@@ -148,6 +150,10 @@ impl<'py> Options<'py> {
             "distances" => self.distances = flag(&value, name)?,
             "closest_points" => self.closest_points = flag(&value, name)?,
             "hits" => self.hits = choose_one(&value, name, words!(Hit))?,
+            "n_nearest" => {
+                let n = unsigned(&value, name, u64::from(u32::MAX))?;
+                self.n_nearest = Some(n as u32);
+            }
             "fixed" => {
                 let bodies = items(&value);
                 self.fixed =
@@ -226,6 +232,9 @@ impl<'py> Options<'py> {
             .clearance(clearance)
             .precision(self.precision)
             .hits(self.hits);
+        if let Some(n) = self.n_nearest {
+            query = query.n_nearest(n);
+        }
         let fixed = self.fixed.iter().enumerate();
         let fixed = fixed.map(|(ix, body)| scene.id(body, &format!("fixed[{ix}]")));
         query = query.fixed(fixed.collect::<PyResult<Vec<BodyId>>>()?);

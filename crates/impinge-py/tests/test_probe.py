@@ -119,6 +119,75 @@ def test_closest_of_some():
         detector.closest(scene, points, nearest=1)
 
 
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_several_closest(dtype):
+    # Distances of points on a lattice have exact squares, and most are shared by several.
+    line = np.arange(4)
+    dots = np.stack(np.meshgrid(line, line, line), -1).reshape(-1, 3).astype(dtype)
+    points = grid(dtype) * 2
+    scene = impinge.Scene()
+    scene.add_points(dots[:40])
+    scene.add_points(dots[40:])
+    squares = ((points[:, None].astype(np.float64) - dots) ** 2).sum(2)
+    order = np.argsort(squares, axis=1, kind="stable")[:, :9]
+    rows = np.stack([order >= 40, np.where(order >= 40, order - 40, order)], -1)
+    least = np.take_along_axis(squares, order, 1)
+    detector = impinge.Detector("cpu", threads=2)
+    for n in (2, 9):
+        closest = detector.closest(scene, points, n_nearest=n)
+        assert len(closest) == len(points)
+        assert closest.rows.shape == (729, n, 2) and (closest.rows == rows[:, :n]).all()
+        assert (closest.elements == closest.rows[..., 1]).all()
+        assert closest.distances.shape == (729, n)
+        assert np.allclose(closest.distances, np.sqrt(least[:, :n]), rtol=1e-15)
+        assert closest.points.shape == (729, n, 3) and (closest.points == dots[order[:, :n]]).all()
+        assert closest.features.shape == (729, n) and (closest.features == 0).all()
+    near = detector.closest(scene, points, 0.75, n_nearest=9)
+    is_near = least <= 0.75**2
+    assert (near.rows == np.where(is_near[..., None], rows, 2**32 - 1)).all()
+    assert (np.isinf(near.distances) == ~is_near).all()
+    assert (np.isnan(near.points[..., 0]) == ~is_near).all() and 0 < is_near.sum() < is_near.size
+    one = detector.closest(scene, points, query=impinge.Query(n_nearest=2), n_nearest=1)
+    assert one.rows.shape == (729, 2) and (one.rows == rows[:, 0]).all()
+    assert detector.closest(scene, points, query=impinge.Query(n_nearest=2)).rows.shape == (729, 2, 2)
+    faces = impinge.closest_points(CORNERS, CUBE, [[0.5, 0.25, 2.0]], n_nearest=20)
+    assert faces.elements.shape == (1, 20) and (faces.elements[0, 12:] == 2**32 - 1).all()
+    assert sorted(faces.elements[0, :12]) == list(range(12))
+    assert (np.diff(faces.distances[0, :12]) >= 0).all() and np.isinf(faces.distances[0, 12:]).all()
+    for wrong in (0, -1, 2**32):
+        with pytest.raises(ValueError, match=f"n_nearest: {wrong} given"):
+            detector.closest(scene, points, n_nearest=wrong)
+    with pytest.raises(TypeError, match="n_nearest: a whole number"):
+        detector.closest(scene, points, n_nearest=1.5)
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_locate(dtype):
+    # Six tetrahedra around the diagonal of a cube, by the order of the coordinates.
+    orders = [(0, 1, 2), (0, 2, 1), (1, 0, 2), (1, 2, 0), (2, 0, 1), (2, 1, 0)]
+    steps = np.eye(3)
+    corners = CORNERS.astype(dtype)
+    ways = [np.cumsum([np.zeros(3), *(steps[axis] for axis in order)], 0) for order in orders]
+    number = {tuple(corner): ix for ix, corner in enumerate(corners.tolist())}
+    tetrahedra = [[number[tuple(corner)] for corner in way.tolist()] for way in ways]
+    points = grid(dtype)
+    inside = ((points >= 0) & (points <= 1)).all(1)
+    held = [inside & (points[:, i] >= points[:, j]) & (points[:, j] >= points[:, k]) for i, j, k in orders]
+    expected = np.where(inside, np.argmax(held, 0), -1)
+    scene = impinge.Scene()
+    body = scene.add(corners, tetrahedra)
+    detector = impinge.Detector("cpu", threads=2)
+    found = detector.locate(scene, body, points)
+    assert found.dtype == np.int64 and found.shape == (729,) and (found == expected).all()
+    assert set(found.tolist()) == {-1, 0, 1, 2, 3, 4, 5}
+    assert detector.locate(scene, body, np.empty((0, 3))).shape == (0,)
+    surface = scene.add(CORNERS, CUBE)
+    with pytest.raises(ValueError, match="tetrahedra"):
+        detector.locate(scene, surface, points)
+    with pytest.raises(TypeError):
+        detector.locate(scene, body, points, most=1)
+
+
 def axis_rays(dtype=np.float64):
     """Rays down onto the cube, and where they first meet it."""
     line = np.linspace(-0.5, 1.5, 9)

@@ -21,11 +21,14 @@ pub struct ClosestElement {
     pub point: [f64; 3],
 }
 
-/// The elements nearest to points, one entry per point:
-/// [`Detector::closest`](crate::Detector::closest).
+/// The elements nearest to points: [`Detector::closest`](crate::Detector::closest). One entry per
+/// point, or as many as [`Query::n_nearest`](crate::Query::n_nearest) says.
 #[derive(Clone, Default)]
 pub struct Closest {
+    /// Of each point as many as were asked for; `None` after the last that is near.
     pub(crate) found: Vec<Option<ClosestElement>>,
+    /// How many entries each point has; 0 in an answer about nothing.
+    pub(crate) n_nearest: usize,
     pub(crate) stats: Stats,
     /// Where its buffers go when it is dropped.
     home: Home<Closest>,
@@ -46,7 +49,12 @@ impl std::fmt::Debug for Closest {
 impl Closest {
     /// The number of points.
     pub fn len(&self) -> usize {
-        self.found.len()
+        self.found.len() / self.n_nearest()
+    }
+
+    /// How many entries there are per point: what the query said.
+    pub fn n_nearest(&self) -> usize {
+        self.n_nearest.max(1)
     }
 
     /// Whether there are no points.
@@ -57,16 +65,26 @@ impl Closest {
     /// What is nearest to a point; `None` if nothing is as near as was asked for, or there is no
     /// such point.
     pub fn get(&self, point: usize) -> Option<ClosestElement> {
-        self.found.get(point).copied().flatten()
+        let first = point.checked_mul(self.n_nearest())?;
+        self.found.get(first).copied().flatten()
     }
 
-    /// What is nearest to each point, in their order.
+    /// What is nearest to a point, nearest first: as many elements as were asked for, or fewer if
+    /// there are no more, or no more are as near as was asked for. Of several at the same distance
+    /// the lowest by body and then by number comes first.
+    pub fn of(&self, point: usize) -> impl Iterator<Item = ClosestElement> + '_ {
+        let rows = self.found.chunks_exact(self.n_nearest()).nth(point);
+        rows.unwrap_or_default().iter().map_while(|found| *found)
+    }
+
+    /// What is nearest to each point, in their order: [`n_nearest`](Closest::n_nearest) entries per
+    /// point, those after its last element `None`.
     pub fn iter(&self) -> std::iter::Copied<std::slice::Iter<'_, Option<ClosestElement>>> {
         self.found.iter().copied()
     }
 
     /// Rows `[body, element]`, with bodies by their [`index`](crate::BodyId::index);
-    /// `[u32::MAX, u32::MAX]` for points to which nothing is near.
+    /// `[u32::MAX, u32::MAX]` where nothing is near. As many as [`iter`](Closest::iter) has.
     pub fn rows(&self) -> impl ExactSizeIterator<Item = [u32; 2]> + '_ {
         self.iter().map(|found| match found {
             Some(found) => [found.element.body.slot(), found.element.element],

@@ -1,4 +1,4 @@
-//! A detector's answers about points: where they lie, and what is nearest to them.
+//! A detector's answers about points: where they lie, in which tetrahedra, and what is nearest.
 
 use super::Detector;
 use crate::answers::closest::Closest;
@@ -54,6 +54,39 @@ impl Detector {
         })
     }
 
+    /// Which tetrahedron of a body contains each point: the lowest by number, where several share
+    /// the face, edge or vertex on which a point is; `None` outside. Tetrahedra are closed, so
+    /// points on the surface of the body are in one. Decided exactly. A flat tetrahedron contains
+    /// the points of its faces.
+    ///
+    /// ```
+    /// use impinge::{Backend, Detector, Scene};
+    /// # fn main() -> Result<(), impinge::Error> {
+    /// let corners = [
+    ///     [0.0f32, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0], [0.0, 0.0, 4.0], [0.0, 0.0, -4.0],
+    /// ];
+    /// let mut scene = Scene::new();
+    /// let body = scene.add_tetrahedra(&[[0u32, 1, 2, 3], [0, 2, 1, 4]], &corners)?;
+    /// let mut detector = Detector::new(Backend::Cpu)?;
+    /// let points = [[1.0f32, 1.0, -1.0], [1.0, 1.0, 0.0], [3.0, 3.0, 3.0]];
+    /// assert_eq!(detector.locate(&scene, body, &points)?, [Some(1), Some(0), None]);
+    /// # Ok(()) }
+    /// ```
+    ///
+    /// # Errors
+    /// A stale id, a body of another kind than tetrahedra, positions or points that are not finite,
+    /// a memory budget too small for the trees of the body.
+    pub fn locate<R: Real>(
+        &mut self,
+        scene: &Scene,
+        body: BodyId,
+        points: &[[R; 3]],
+    ) -> Result<Vec<Option<u32>>, Error> {
+        self.probe(points.len(), |probes, shared, work| {
+            Ok((probes.locate(scene, body, points, shared, work)?, 0))
+        })
+    }
+
     /// The element that is nearest to each point, if it is at most `most` away, in the unit of the
     /// scene: with its distance, the nearest point of it and the feature on which that lies.
     /// Elements are the faces of bodies of triangles and of tetrahedra (their surface, so a point
@@ -66,6 +99,9 @@ impl Detector {
     /// A query for all bodies, the default, or [`Query::of`] one or [`Query::across`] several,
     /// which then are those that are looked at. Cost: per point a way down the tree of each body
     /// whose box may hold the nearest element.
+    ///
+    /// With [`Query::n_nearest`] the answer has that many elements per point, nearest first, those
+    /// at the same distance in their order: [`Closest::of`].
     ///
     /// ```
     /// use impinge::{Backend, Detector, Query, Scene, exact::Feature};
@@ -84,8 +120,9 @@ impl Detector {
     /// ```
     ///
     /// # Errors
-    /// A stale id, a query about pairs, a distance that is negative or NaN, positions or points
-    /// that are not finite, a memory budget too small for the trees of the bodies.
+    /// A stale id, a query about pairs, a distance that is negative or NaN, no element asked for,
+    /// positions or points that are not finite, a memory budget too small for the trees of the
+    /// bodies.
     pub fn closest<R: Real>(
         &mut self,
         scene: &Scene,
@@ -94,6 +131,7 @@ impl Detector {
         query: &Query,
     ) -> Result<Closest, Error> {
         let mut closest = self.homes.closest.take();
+        closest.n_nearest = query.n_nearest as usize;
         self.probe(points.len(), |probes, shared, work| {
             let asked = (query, most);
             probes.closest(scene, asked, points, &mut closest.found, shared, work)?;

@@ -1,17 +1,21 @@
-//! The element that is nearest to each point, by branch and bound.
+//! The elements that are nearest to each point, by branch and bound.
 //!
 //! Nodes are opened nearest box first, and skipped if their boxes are farther away than an element
 //! certainly is. Of an element, floats that enclose its distance are found. What may be nearest by
 //! these is kept, mostly one element, or the few that share the nearest edge or vertex. Exact
 //! comparisons decide among these. So the answer does not depend on the order of the search.
 //!
-//! Points come in an order in which most are near to the one before. So the element found last is a
-//! first bound for the next point.
+//! Where several are asked for, that many of the smallest upper bounds are kept, and the largest of
+//! these is the bound. Floats put most of them in order, exact comparisons the rest.
+//!
+//! Points come in an order in which most are near to the one before. So the elements found last are
+//! a first bound for the next point.
 //!
 //! Cost: per point some dozens of boxes per level of the tree, and in one or two clusters 64 boxes
 //! and a few elements.
 
 use std::cmp::Ordering;
+use std::collections::BinaryHeap;
 
 use super::{Looks, Target};
 use crate::answers::closest::ClosestElement;
@@ -36,7 +40,11 @@ const ROUNDING: f64 = 64.0 * f64::EPSILON;
 /// The square of the shortest way across which planes are taken.
 const SHORTEST: f64 = 1e-250;
 
-/// The nearest element to each point.
+/// Candidates that are held before those that are too far away are dropped, where several are asked
+/// for.
+const FIRST_DROP: usize = 64;
+
+/// The nearest elements to each point: as many entries as are asked for, nearest first.
 ///
 /// # Errors
 /// Cancellation.
@@ -44,7 +52,7 @@ pub(super) fn closest<R: Real>(
     isa: Isa,
     bodies: &[(BodyId, Target<'_>)],
     points: &[[R; 3]],
-    most: f64,
+    (most, n_nearest): (f64, usize),
     found: &mut [Option<ClosestElement>],
     work: Work<'_>,
 ) -> Result<(), Error> {
@@ -52,6 +60,7 @@ pub(super) fn closest<R: Real>(
         bodies: &[(BodyId, Target<'_>)] = bodies,
         points: &[[R; 3]] = points,
         most: f64 = most,
+        n_nearest: usize = n_nearest,
         found: &mut [Option<ClosestElement>] = found,
         work: Work<'_> = work,
     ) -> Result<(), Error>)
@@ -63,19 +72,17 @@ fn all_closest<S: Simd, R: Real>(
     bodies: &[(BodyId, Target<'_>)],
     points: &[[R; 3]],
     most: f64,
+    n_nearest: usize,
     found: &mut [Option<ClosestElement>],
     work: Work<'_>,
 ) -> Result<(), Error> {
-    let mut search = PointSearch::new(work);
+    let mut search = PointSearch::new(n_nearest, work);
     let mut order: Vec<(f64, usize)> = Vec::new();
-    let mut likely: Option<PointCandidate> = None;
-    for (point, found) in points.iter().zip(found) {
+    let (mut likely, mut nearest) = (Vec::new(), Vec::new());
+    for (point, found) in points.iter().zip(found.chunks_exact_mut(n_nearest)) {
         let point = point.map(R::widen);
         search.begin(most);
-        if let Some(likely) = likely {
-            let ([_, high], way) = point_distance_bounds(&point, likely.corners(bodies).points());
-            search.tighten(high, way);
-        }
+        search.expect(bodies, &point, &likely)?;
         order.clear();
         for (number, (_, target)) in bodies.iter().enumerate() {
             order.push((squared_distance(&target.boxes.root(), &point), number));
@@ -87,9 +94,21 @@ fn all_closest<S: Simd, R: Real>(
             }
             search.visit(body, bodies[body].1, &point)?;
         }
-        let nearest = search.nearest(bodies, &point)?;
-        likely = nearest.or(likely);
-        *found = nearest.and_then(|nearest| nearest.answer(bodies, &point, most));
+        nearest.clear();
+        match n_nearest {
+            1 => nearest.extend(search.nearest(bodies, &point)?),
+            _ => search.nearest_of_many(bodies, &point, &mut nearest)?,
+        }
+        for (found, one) in found.iter_mut().zip(&nearest) {
+            search.looks.step()?;
+            *found = one.answer(bodies, &point, most);
+            if found.is_none() {
+                break;
+            }
+        }
+        if nearest.len() == n_nearest {
+            std::mem::swap(&mut likely, &mut nearest);
+        }
     }
     Ok(())
 }
@@ -99,6 +118,8 @@ fn all_closest<S: Simd, R: Real>(
 struct PointCandidate {
     /// The distance is certainly not below this.
     low: f64,
+    /// Nor above this.
+    high: f64,
     /// The place of the body among those that are looked at.
     body: usize,
     /// The place of the element in the order of the clusters.
@@ -155,7 +176,9 @@ fn corners(target: &Target<'_>, slot: usize) -> Corners {
 /// The search for one point; the memory is kept for the next.
 struct PointSearch<'a> {
     looks: Looks<'a>,
-    /// The nearest element is certainly not farther away.
+    /// How many elements are asked for.
+    n_nearest: usize,
+    /// As many elements as are asked for are certainly not farther away.
     high: f64,
     /// Boxes whose squared distance is larger hold nothing as near.
     limit: f64,
@@ -163,28 +186,61 @@ struct PointSearch<'a> {
     way: Point,
     level: f64,
     candidates: Vec<PointCandidate>,
+    /// Where several are asked for: the smallest upper bounds of candidates, at most as many, as
+    /// bits, which have the same order.
+    highs: BinaryHeap<u64>,
+    /// How many candidates are held before those that are too far away are dropped.
+    drop_at: usize,
     /// Squared distances of boxes, levels and nodes that wait.
     waiting: Vec<(f64, usize, usize)>,
 }
 
 impl<'a> PointSearch<'a> {
-    fn new(work: Work<'a>) -> Self {
+    fn new(n_nearest: usize, work: Work<'a>) -> Self {
         PointSearch {
             looks: Looks::new(work),
+            n_nearest,
             high: f64::INFINITY,
             limit: f64::INFINITY,
             way: [0.0; 3],
             level: f64::INFINITY,
             candidates: Vec::new(),
+            highs: BinaryHeap::new(),
+            drop_at: FIRST_DROP,
             waiting: Vec::new(),
         }
     }
 
     fn begin(&mut self, most: f64) {
         self.candidates.clear();
+        self.highs.clear();
+        self.drop_at = FIRST_DROP;
         (self.high, self.limit) = (f64::INFINITY, f64::INFINITY);
         (self.way, self.level) = ([0.0; 3], f64::INFINITY);
         self.tighten(most, [0.0; 3]);
+    }
+
+    /// Takes the bound that as many elements as are asked for give, if there are as many: those
+    /// found last.
+    #[inline(always)]
+    fn expect(
+        &mut self,
+        bodies: &[(BodyId, Target<'_>)],
+        point: &Point,
+        likely: &[PointCandidate],
+    ) -> Result<(), Error> {
+        let mut largest: Option<(f64, Point)> = None;
+        for one in likely {
+            self.looks.step()?;
+            let ([_, high], way) = point_distance_bounds(point, one.corners(bodies).points());
+            if largest.is_none_or(|(largest, _)| high > largest) {
+                largest = Some((high, way));
+            }
+        }
+        if let Some((high, way)) = largest {
+            self.tighten(high, way);
+        }
+        Ok(())
     }
 
     #[inline(always)]
@@ -287,12 +343,80 @@ impl<'a> PointSearch<'a> {
             if low > self.high {
                 continue;
             }
+            let candidate = PointCandidate {
+                low,
+                high,
+                body,
+                slot,
+            };
+            if self.n_nearest > 1 {
+                self.add_to_many(candidate, way);
+                continue;
+            }
             if high < self.high {
                 self.tighten(high, way);
                 self.candidates.retain(|other| other.low <= high);
             }
-            self.candidates.push(PointCandidate { low, body, slot });
+            self.candidates.push(candidate);
         }
+    }
+
+    /// Adds an element that may be among the nearest, where several are asked for. `way` is about
+    /// the shortest way from it to the point; across any way there is a plane that is too far.
+    #[inline(never)]
+    fn add_to_many(&mut self, candidate: PointCandidate, way: Point) {
+        self.candidates.push(candidate);
+        let high = candidate.high.abs().to_bits();
+        if self.highs.len() < self.n_nearest {
+            self.highs.push(high);
+        } else if self.highs.peek().is_some_and(|&largest| high < largest) {
+            self.highs.pop();
+            self.highs.push(high);
+        } else {
+            return;
+        }
+        if self.highs.len() == self.n_nearest
+            && let Some(&largest) = self.highs.peek()
+        {
+            self.tighten(f64::from_bits(largest), way);
+        }
+        if self.candidates.len() >= self.drop_at {
+            let most = self.high;
+            self.candidates.retain(|other| other.low <= most);
+            self.drop_at = FIRST_DROP + 2 * self.candidates.len();
+        }
+    }
+
+    /// As many of the candidates as are asked for, nearest first; of several at one distance the
+    /// lowest first.
+    ///
+    /// # Errors
+    /// Cancellation.
+    fn nearest_of_many(
+        &mut self,
+        bodies: &[(BodyId, Target<'_>)],
+        point: &Point,
+        nearest: &mut Vec<PointCandidate>,
+    ) -> Result<(), Error> {
+        for candidate in &self.candidates {
+            self.looks.step()?;
+            if candidate.low <= self.high {
+                nearest.push(*candidate);
+            }
+        }
+        nearest.sort_unstable_by(|x, y| {
+            if x.high < y.low {
+                return Ordering::Less;
+            }
+            if y.high < x.low {
+                return Ordering::Greater;
+            }
+            let [a, b] = [x, y].map(|one| one.corners(bodies));
+            compare_point_distances(point, a.points(), b.points())
+                .then_with(|| x.name(bodies).cmp(&y.name(bodies)))
+        });
+        nearest.truncate(self.n_nearest);
+        Ok(())
     }
 
     /// The nearest of the candidates, of several the lowest.

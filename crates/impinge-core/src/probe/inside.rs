@@ -7,14 +7,15 @@
 //! surface is closed. So there is no ray that has to be tried again. A face that contains the point
 //! says that it is on the surface.
 //!
-//! Tetrahedra: those that contain the point, and the border of the body. No ray is needed.
+//! Tetrahedra: those that contain the point, and the border of the body. No ray is needed. Which of
+//! them is the lowest is asked in the same way.
 //!
 //! Cost: per point the clusters that a ray of half the body's size meets, and per cluster one test
 //! of 64 boxes.
 
-use super::Target;
 use super::border::{Border, FACES};
 use super::boxes::Descent;
+use super::{Looks, Target};
 use crate::bvh::bounds::{Bounds, round_down, round_up};
 use crate::contact::passes;
 use crate::scene::elements::Elements;
@@ -102,6 +103,65 @@ fn all_places<S: Simd, R: Real>(
     Ok(())
 }
 
+/// The lowest tetrahedron that contains each point.
+///
+/// # Errors
+/// Cancellation.
+pub(super) fn lowest<R: Real>(
+    isa: Isa,
+    target: Target<'_>,
+    points: &[[R; 3]],
+    lowest: &mut [Option<u32>],
+    work: Work<'_>,
+) -> Result<(), Error> {
+    with_isa!(isa, all_lowest, <R: Real>(
+        target: Target<'_> = target,
+        points: &[[R; 3]] = points,
+        lowest: &mut [Option<u32>] = lowest,
+        work: Work<'_> = work,
+    ) -> Result<(), Error>)
+}
+
+#[inline(always)]
+fn all_lowest<S: Simd, R: Real>(
+    simd: S,
+    target: Target<'_>,
+    points: &[[R; 3]],
+    lowest: &mut [Option<u32>],
+    work: Work<'_>,
+) -> Result<(), Error> {
+    let whole = target.boxes.root();
+    let clustering = &target.boxes.clustering;
+    let mut descent = Descent::default();
+    let mut looks = Looks::new(work);
+    for (point, lowest) in points.iter().zip(lowest) {
+        let point = point.map(R::widen);
+        let at = Bounds {
+            min: point.map(round_down),
+            max: point.map(round_up),
+        };
+        *lowest = None;
+        if !at.overlaps(&whole) {
+            continue;
+        }
+        descent.start(target.boxes);
+        while let Some(cluster) = descent.next(simd, target.boxes, &at) {
+            looks.step()?;
+            let lanes = target.boxes.elements(target.body, cluster);
+            let slots = clustering.slots(cluster);
+            for lane in Lanes(simd.overlaps_64(lanes, &at, up_to(slots.len() - 1))) {
+                let slot = slots.start + lane;
+                let number = clustering.order[slot].raw();
+                let is_lower = lowest.is_none_or(|lowest| number < lowest);
+                if is_lower && faces_at(target, slot, &point).is_some() {
+                    *lowest = Some(number);
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
 /// What the elements that were looked at say about a point.
 #[derive(Debug, Default)]
 struct FoundAround {
@@ -131,40 +191,14 @@ impl FoundAround {
 
     #[inline]
     fn add_tetrahedron(&mut self, target: Target<'_>, slot: usize, point: &Point, border: &Border) {
-        let clustering = &target.boxes.clustering;
-        let Elements::Tetrahedra(tetrahedra) = &clustering.corners else {
+        let Some(on) = faces_at(target, slot, point) else {
             return;
         };
-        let positions = target.body.positions();
-        let corners = tetrahedra[slot].map(|vertex| positions.point(vertex as usize));
-        let faces = FACES.map(|face| face.map(|corner| corners[corner]));
-        let whole = orient3d(&corners[0], &corners[1], &corners[2], &corners[3]);
-        // Bit `k`: the point is on face `k`.
-        let mut on = 0u8;
-        if whole.is_zero() {
-            // A flat one is the union of its faces.
-            for (k, face) in faces.iter().enumerate() {
-                on |= u8::from(is_on(point, face)) << k;
-            }
-            if on == 0 {
-                return;
-            }
-        } else {
-            for (k, [a, b, c]) in faces.iter().enumerate() {
-                // The side of the face on which the corner opposite is, and that of the point.
-                let [inner, side] = [&corners[k], point].map(|other| orient3d(a, b, c, other));
-                if side.is_zero() {
-                    on |= 1 << k;
-                } else if side != inner {
-                    return;
-                }
-            }
-        }
         self.is_held = true;
         if on == 0 {
             self.is_settled = true;
         }
-        let number = clustering.order[slot].index();
+        let number = target.boxes.clustering.order[slot].index();
         self.is_on |= on & border.mask(number) != 0;
     }
 
@@ -177,6 +211,36 @@ impl FoundAround {
             false => -1,
         }
     }
+}
+
+/// On which faces of a tetrahedron a point is: bit `k` says face `k`. `None` outside.
+#[inline]
+fn faces_at(target: Target<'_>, slot: usize, point: &Point) -> Option<u8> {
+    let Elements::Tetrahedra(tetrahedra) = &target.boxes.clustering.corners else {
+        return None;
+    };
+    let positions = target.body.positions();
+    let corners = tetrahedra[slot].map(|vertex| positions.point(vertex as usize));
+    let faces = FACES.map(|face| face.map(|corner| corners[corner]));
+    let whole = orient3d(&corners[0], &corners[1], &corners[2], &corners[3]);
+    let mut on = 0u8;
+    if whole.is_zero() {
+        // A flat one is the union of its faces.
+        for (k, face) in faces.iter().enumerate() {
+            on |= u8::from(is_on(point, face)) << k;
+        }
+        return (on != 0).then_some(on);
+    }
+    for (k, [a, b, c]) in faces.iter().enumerate() {
+        // The side of the face on which the corner opposite is, and that of the point.
+        let [inner, side] = [&corners[k], point].map(|other| orient3d(a, b, c, other));
+        if side.is_zero() {
+            on |= 1 << k;
+        } else if side != inner {
+            return None;
+        }
+    }
+    Some(on)
 }
 
 /// Whether a triangle contains a point.

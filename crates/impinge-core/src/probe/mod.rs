@@ -1,7 +1,7 @@
 //! Probes: where points lie, and what is nearest to them.
 //!
-//! What it does: says of points whether they are inside a body, on its surface or outside, and
-//! which element of some bodies is nearest to each of them.
+//! What it does: says of points whether they are inside a body, on its surface or outside, in which
+//! tetrahedron they are, and which elements of some bodies are nearest to each of them.
 //!
 //! How: a probe is a box of its own. It goes down the tree of the body's clusters, which all
 //! questions share, past the boxes of 64 elements at a time, to the elements that it may meet.
@@ -34,6 +34,7 @@ use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
 use crate::scene::positions::Real;
 use crate::scene::{Body, Scene};
+use crate::search::sink::{filled, reserve};
 use crate::search::work::Work;
 use crate::simd::Isa;
 
@@ -66,6 +67,8 @@ pub(crate) struct Shared<'a> {
 
 /// Points per task.
 const TASK: usize = 256;
+/// What memory is for.
+const WHAT: &str = "elements nearest to points";
 /// Points that are put in order at once: some 30 milliseconds.
 const BLOCK: usize = 1 << 19;
 
@@ -127,8 +130,44 @@ impl Probes {
         Ok(places)
     }
 
-    /// The nearest element of some bodies to each point, if it is at most a distance away: a face,
-    /// or of bodies without faces an edge or a point.
+    /// The lowest tetrahedron of a body that contains each point.
+    ///
+    /// # Errors
+    /// A stale id, a body of another kind than tetrahedra, positions or points that are not finite,
+    /// cancellation.
+    pub fn locate<R: Real>(
+        &mut self,
+        scene: &Scene,
+        id: BodyId,
+        points: &[[R; 3]],
+        shared: &mut Shared<'_>,
+        work: Work<'_>,
+    ) -> Result<Vec<Option<u32>>, Error> {
+        check_points("points", points)?;
+        let body = scene.body(id)?;
+        if body.kind() != BodyKind::Tetrahedra {
+            return Err(Error::WrongKind {
+                body: id,
+                kind: body.kind().name(),
+                expected: "tetrahedra",
+            });
+        }
+        self.know(scene, &[(id, Part::Given)], shared, work)?;
+        let target = Target {
+            body,
+            boxes: &self.boxes[&(id.index(), Part::Given)],
+        };
+        let mut lowest = vec![None; points.len()];
+        let size = work.workers.task(TASK);
+        let mut tasks: Vec<_> = points.chunks(size).zip(lowest.chunks_mut(size)).collect();
+        work.each(&mut tasks, |_, (points, lowest)| {
+            inside::lowest(self.isa, target, points, lowest, work)
+        })?;
+        Ok(lowest)
+    }
+
+    /// The nearest elements of some bodies to each point that are at most a distance away: faces,
+    /// or of bodies without faces edges or points. As many entries per point as the query says.
     ///
     /// # Errors
     /// A query that is not about whole bodies, a distance that is none, positions or points that
@@ -144,12 +183,23 @@ impl Probes {
     ) -> Result<(), Error> {
         check_most(most, "a length of at least 0, or infinity")?;
         check_points("points", points)?;
+        if query.n_nearest == 0 {
+            return Err(Error::Setting {
+                setting: "n_nearest",
+                given: "0".to_owned(),
+                allowed: "a number of at least 1",
+            });
+        }
+        let n_nearest = query.n_nearest as usize;
         let parts = surfaces(scene, query)?;
         self.know(scene, &parts, shared, work)?;
         let bodies = self.targets(scene, &parts)?;
         found.clear();
-        found.resize(points.len(), None);
-        for (points, found) in points.chunks(BLOCK).zip(found.chunks_mut(BLOCK)) {
+        let n_rows = points.len().saturating_mul(n_nearest);
+        reserve(found, n_rows, WHAT)?;
+        found.resize(n_rows, None);
+        let block = BLOCK.saturating_mul(n_nearest);
+        for (points, found) in points.chunks(BLOCK).zip(found.chunks_mut(block)) {
             // Neighbours one after the other: the element found last is a good first bound, and
             // memory is in the caches.
             let order = order::along_curve(points);
@@ -158,12 +208,12 @@ impl Probes {
                 order.chunks(size).map(|some| (some, Vec::new())).collect();
             work.each(&mut tasks, |_, (some, found)| {
                 let points: Vec<[R; 3]> = some.iter().map(|&ix| points[ix as usize]).collect();
-                found.resize(points.len(), None);
-                closest::closest(self.isa, &bodies, &points, most, found, work)
+                *found = filled(None, points.len() * n_nearest, WHAT)?;
+                closest::closest(self.isa, &bodies, &points, (most, n_nearest), found, work)
             })?;
             for (some, of_some) in tasks {
-                for (&ix, one) in some.iter().zip(of_some) {
-                    found[ix as usize] = one;
+                for (&ix, rows) in some.iter().zip(of_some.chunks_exact(n_nearest)) {
+                    found[ix as usize * n_nearest..][..n_nearest].copy_from_slice(rows);
                 }
             }
         }

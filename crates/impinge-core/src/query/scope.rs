@@ -135,6 +135,7 @@ pub struct Query {
     pub(crate) closest: bool,
     pub(crate) fixed: BTreeSet<BodyId>,
     pub(crate) hits: Hit,
+    pub(crate) n_nearest: u32,
 }
 
 impl Default for Query {
@@ -165,6 +166,7 @@ impl Query {
             closest: false,
             fixed: BTreeSet::new(),
             hits: Hit::default(),
+            n_nearest: 1,
         }
     }
 
@@ -394,6 +396,13 @@ impl Query {
     /// there is any, or all.
     pub fn hits(mut self, hits: Hit) -> Self {
         self.hits = hits;
+        self
+    }
+
+    /// Sets how many of the nearest elements [`closest`](crate::Detector::closest) finds for each
+    /// point: 1, unless it is said.
+    pub fn n_nearest(mut self, n: u32) -> Self {
+        self.n_nearest = n;
         self
     }
 

@@ -88,6 +88,49 @@ fn check(scene: &Scene, points: &[[f64; 3]], most: f64, closest: &Closest) {
     }
 }
 
+/// Holds the several nearest elements of each point against exact distances from all elements.
+fn check_many(scene: &Scene, points: &[[f64; 3]], most: f64, closest: &Closest) {
+    let elements = elements(scene);
+    let exact: Vec<Vec<Vector>> = elements
+        .iter()
+        .map(|(.., corners)| corners.iter().map(|&point| oracle::vector(point)).collect())
+        .collect();
+    let n_nearest = closest.n_nearest();
+    assert_eq!(closest.len(), points.len());
+    assert_eq!(closest.rows().len(), points.len() * n_nearest);
+    for (ix, point) in points.iter().enumerate() {
+        let whole = oracle::vector(*point);
+        let mut all: Vec<(Fraction, usize)> = exact
+            .iter()
+            .map(|corners| oracle::squared_distance(&whole, corners))
+            .zip(0..)
+            .filter(|(square, _)| most == f64::INFINITY || square.compare_root(most).is_le())
+            .collect();
+        // Equally near ones stay in their order.
+        all.sort_by(|x, y| x.0.compare(&y.0));
+        all.truncate(n_nearest);
+        let found: Vec<_> = closest.of(ix).collect();
+        let names = found.iter().map(|at| (at.element.body, at.element.element));
+        let names: Vec<_> = names.collect();
+        let expected = all.iter().map(|&(_, ix)| (elements[ix].0, elements[ix].1));
+        let expected: Vec<_> = expected.collect();
+        assert_eq!(names, expected, "{point:?}, the nearest {n_nearest}");
+        for (at, (square, _)) in found.iter().zip(&all) {
+            if at.distance == 0.0 {
+                assert_eq!(square.0, 0.into(), "{point:?} {at:?}");
+            } else {
+                assert!(square.compare_root(at.distance).is_ge());
+                assert!(square.compare_root(at.distance.next_up()).is_lt());
+            }
+        }
+        let rows = || closest.iter().skip(ix * n_nearest).take(n_nearest);
+        assert_eq!(closest.get(ix), found.first().copied());
+        assert!(rows().flatten().eq(found.iter().copied()));
+        assert!(rows().skip(found.len()).all(|row| row.is_none()));
+    }
+    assert_eq!(closest.of(points.len()).count(), 0);
+}
+
 fn lattice(n: i32) -> Vec<[f64; 3]> {
     let line = move || (-1..=2 * n + 1).map(|x| f64::from(x) / 2.0);
     let mut points = Vec::new();
@@ -119,6 +162,119 @@ fn lattices() {
         for most in [f64::INFINITY, 0.5, 0.0] {
             let closest = cpu().closest(&scene, &points, most, &Query::all()).unwrap();
             check(&scene, &points, most, &closest);
+        }
+    }
+}
+
+/// Where most points have several elements at one distance, and few have as many as are asked for.
+#[test]
+fn several_nearest_on_lattices() {
+    for seed in 0..2 {
+        let mut scene = Scene::new();
+        for seed in [seed, seed + 10] {
+            soup::lattice_triangles(25, 2, seed)
+                .add_to(&mut scene)
+                .unwrap();
+        }
+        let points = lattice(2);
+        let mut detector = cpu();
+        for (n_nearest, most) in [
+            (2, f64::INFINITY),
+            (7, f64::INFINITY),
+            (7, 0.5),
+            (3, 0.0),
+            (49, f64::INFINITY),
+            (60, f64::INFINITY),
+            (60, 1.0),
+        ] {
+            let query = Query::all().n_nearest(n_nearest);
+            let closest = detector.closest(&scene, &points, most, &query).unwrap();
+            check_many(&scene, &points, most, &closest);
+        }
+    }
+}
+
+/// Clusters that are passed over, and bodies of other kinds.
+#[test]
+fn several_nearest_of_meshes_and_soups() {
+    let mut random = Random::new(15);
+    let mut scene = Scene::new();
+    surfaces::icosphere(2).add_to(&mut scene).unwrap();
+    soup::triangles(200, 0.3, 7)
+        .translated([1.5, 0.0, 0.0])
+        .add_to(&mut scene)
+        .unwrap();
+    solids::block(2, 2, 2, 0.5).add_to(&mut scene).unwrap();
+    let dots: Vec<[f64; 3]> = (0..30)
+        .map(|_| random.point(-1.0, 2.0).map(f64::from))
+        .collect();
+    scene.add_points(&dots).unwrap();
+    let mut points: Vec<[f64; 3]> = (0..60)
+        .map(|_| random.point(-2.0, 3.0).map(f64::from))
+        .collect();
+    // All faces are about as far from the middle; several share a vertex.
+    points.extend([[0.0; 3], [1e-9, 0.0, 0.0], [1e6, 2.0, 3.0]]);
+    points.extend(surfaces::icosphere(0).positions_f64());
+    let mut detector = cpu();
+    for (n_nearest, most) in [
+        (2, f64::INFINITY),
+        (9, f64::INFINITY),
+        (40, 0.5),
+        (300, 2.0),
+    ] {
+        let query = Query::all().n_nearest(n_nearest);
+        let closest = detector.closest(&scene, &points, most, &query).unwrap();
+        check_many(&scene, &points, most, &closest);
+    }
+    // The first of several is the nearest, and one is asked for if nothing is said.
+    let one = detector
+        .closest(&scene, &points, f64::INFINITY, &Query::all())
+        .unwrap();
+    let query = Query::all().n_nearest(5);
+    let five = detector
+        .closest(&scene, &points, f64::INFINITY, &query)
+        .unwrap();
+    assert_eq!((one.n_nearest(), five.n_nearest()), (1, 5));
+    assert_ne!(query, Query::all());
+    for ix in 0..points.len() {
+        assert_eq!(one.get(ix), five.get(ix));
+        assert!(one.of(ix).eq(five.of(ix).take(1)));
+    }
+}
+
+/// The same bytes for every instruction set, number of threads and order of the points.
+#[test]
+fn several_nearest_are_the_same_in_every_way() {
+    let mut random = Random::new(19);
+    let mut scene = Scene::new();
+    surfaces::torus_knot(5000, surfaces::Knot::default())
+        .add_to(&mut scene)
+        .unwrap();
+    let points: Vec<[f32; 3]> = (0..1000).map(|_| random.point(-0.5, 0.5)).collect();
+    let reversed: Vec<[f32; 3]> = points.iter().rev().copied().collect();
+    let query = Query::all().n_nearest(6);
+    let mut first: Option<Closest> = None;
+    for instruction_set in InstructionSet::ALL {
+        for threads in [1, 4] {
+            let mut detector = Detector::new(
+                Settings::new()
+                    .instruction_set(instruction_set)
+                    .threads(threads)
+                    .backend(Backend::Cpu),
+            )
+            .unwrap();
+            let mut ask = |points: &[[f32; 3]]| {
+                detector
+                    .closest(&scene, points, f64::INFINITY, &query)
+                    .unwrap()
+            };
+            let closest = ask(&points);
+            let backwards = ask(&reversed);
+            let last = points.len() - 1;
+            assert!((0..=last).all(|ix| closest.of(ix).eq(backwards.of(last - ix))));
+            let first = first.get_or_insert_with(|| closest.clone());
+            assert!(first.iter().eq(closest.iter()));
+            assert_eq!(first.hash(), closest.hash());
         }
     }
 }
@@ -316,6 +472,13 @@ fn what_is_refused() {
             }
         ));
     }
+    let none = detector.closest(&scene, &point, 1.0, &Query::all().n_nearest(0));
+    let none = none.unwrap_err().to_string();
+    assert!(none.contains("n_nearest") && none.contains('0'), "{none}");
+    // More than there is memory for.
+    let points = vec![[0.0f32; 3]; 1 << 20];
+    let many = detector.closest(&scene, &points, 1.0, &Query::all().n_nearest(u32::MAX));
+    assert!(matches!(many, Err(Error::OutOfMemory { .. })));
     let error = detector
         .closest(&scene, &[[f32::INFINITY; 3]], 1.0, &Query::all())
         .unwrap_err();

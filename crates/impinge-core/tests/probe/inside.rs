@@ -1,4 +1,4 @@
-//! `contains`: inside, on the surface, outside.
+//! `contains`: inside, on the surface, outside; and `locate`: in which tetrahedron.
 
 use std::collections::HashMap;
 
@@ -319,6 +319,128 @@ fn flat_and_overlapping_tetrahedra() {
         let found = places(&tetrahedra, &positions, &points);
         assert_eq!(found, [1, 1, 1, 0], "{tetrahedra:?}");
     }
+}
+
+/// Whether a tetrahedron, which may be flat, contains a point.
+fn holds(corners: &[Vector; 4], point: &Vector) -> bool {
+    let [a, b, c, d] = corners;
+    let faces = [[b, c, d], [a, c, d], [a, b, d], [a, b, c]];
+    if faces
+        .iter()
+        .any(|face| oracle::is_on(point, &face.map(Clone::clone)))
+    {
+        return true;
+    }
+    let whole = oracle::volume(a, b, c, d);
+    let parts = [
+        oracle::volume(point, b, c, d),
+        oracle::volume(a, point, c, d),
+        oracle::volume(a, b, point, d),
+        oracle::volume(a, b, c, point),
+    ];
+    whole != 0 && parts.iter().all(|&part| part == whole)
+}
+
+/// The lowest that contains each point, of those that share faces, edges and vertices, overlap or
+/// are flat.
+#[test]
+fn the_tetrahedron_of_a_point() {
+    let mut random = Random::new(31);
+    let mut counts = [0; 3];
+    let mut ask = |tetrahedra: &[[u32; 4]], positions: &[[f64; 3]], points: &[[f64; 3]]| {
+        let mut scene = Scene::new();
+        let body = scene.add_tetrahedra(tetrahedra, positions).unwrap();
+        let exact: Vec<Vector> = positions.iter().map(|&p| oracle::vector(p)).collect();
+        let corners: Vec<[Vector; 4]> = tetrahedra
+            .iter()
+            .map(|corners| corners.map(|vertex| exact[vertex as usize].clone()))
+            .collect();
+        let all_holding = |point: &[f64; 3]| {
+            let point = oracle::vector(*point);
+            let numbered = (0u32..).zip(&corners);
+            let holding = numbered.filter(|(_, corners)| holds(corners, &point));
+            holding.map(|(number, _)| number).collect::<Vec<_>>()
+        };
+        let all: Vec<Vec<u32>> = points.iter().map(all_holding).collect();
+        for holding in &all {
+            counts[holding.len().min(2)] += 1;
+        }
+        let expected: Vec<Option<u32>> = all.iter().map(|of| of.first().copied()).collect();
+        for instruction_set in InstructionSet::ALL {
+            for threads in [1, 3] {
+                let settings = Settings::new()
+                    .instruction_set(instruction_set)
+                    .threads(threads)
+                    .backend(Backend::Cpu);
+                let mut detector = Detector::new(settings).unwrap();
+                let found = detector.locate(&scene, body, points).unwrap();
+                assert_eq!(found, expected);
+                // Inside and on the surface is in one, and outside in none.
+                let places = detector.contains(&scene, body, points).unwrap();
+                assert!(
+                    places
+                        .iter()
+                        .map(|&x| x >= 0)
+                        .eq(found.iter().map(Option::is_some))
+                );
+            }
+        }
+    };
+    for (n, k) in [(1, 1), (20, 2), (60, 3)] {
+        let mut lattice_point = || [(); 3].map(|()| f64::from(random.below(k + 1)));
+        let positions: Vec<[f64; 3]> = (0..4 * n).map(|_| lattice_point()).collect();
+        let tetrahedra: Vec<[u32; 4]> = (0..n).map(|ix| [0, 1, 2, 3].map(|c| 4 * ix + c)).collect();
+        ask(&tetrahedra, &positions, &lattice(k));
+    }
+    let block = solids::block(4, 3, 3, 1.0).mapped(|[x, y, z]| [x + 0.3 * y * y, y + 0.2 * z, z]);
+    let Elements::Tetrahedra(tetrahedra) = &block.elements else {
+        panic!("tetrahedra")
+    };
+    let positions = block.positions_f64();
+    let mut points = positions.clone();
+    points.extend((0..300).map(|_| random.point(-1.0, 4.0).map(f64::from)));
+    for corners in tetrahedra {
+        let [a, b, c, _] = corners.map(|vertex| positions[vertex as usize]);
+        points.push([0, 1, 2].map(|k| (a[k] + b[k]) / 2.0));
+        points.push([0, 1, 2].map(|k| (a[k] + b[k]) / 4.0 + c[k] / 2.0));
+    }
+    ask(tetrahedra, &positions, &points);
+    assert!(counts.iter().all(|&n| n > 100), "{counts:?}");
+}
+
+/// A body that moves takes its tetrahedra along; one of another kind has none.
+#[test]
+fn tetrahedra_that_move_and_what_has_none() {
+    let mut scene = Scene::new();
+    let corners = [
+        [0.0f32; 3],
+        [4.0, 0.0, 0.0],
+        [0.0, 4.0, 0.0],
+        [0.0, 0.0, 4.0],
+    ];
+    let body = scene.add_tetrahedra(&[[0u32, 1, 2, 3]], &corners).unwrap();
+    let cube = surfaces::cube([0.0; 3], 1.0).add_to(&mut scene).unwrap();
+    let mut detector = Detector::new(Backend::Cpu).unwrap();
+    let points = [[1.0f32; 3], [11.0, 1.0, 1.0]];
+    assert_eq!(
+        detector.locate(&scene, body, &points).unwrap(),
+        [Some(0), None]
+    );
+    let moved = corners.map(|[x, y, z]| [x + 10.0, y, z]);
+    scene.set_positions(body, &moved).unwrap();
+    assert_eq!(
+        detector.locate(&scene, body, &points).unwrap(),
+        [None, Some(0)]
+    );
+    let kind = detector.locate(&scene, cube, &points).unwrap_err();
+    assert!(
+        matches!(kind, Error::WrongKind { body, kind: "triangles", expected: "tetrahedra" } if body == cube)
+    );
+    let error = detector.locate(&scene, body, &[[0.0, f64::NAN, 1.0]]);
+    assert!(matches!(error, Err(Error::NonFinitePoint { row: 0, .. })));
+    scene.remove(body).unwrap();
+    let stale = detector.locate(&scene, body, &points);
+    assert!(matches!(stale, Err(Error::UnknownBody { .. })));
 }
 
 /// The next body in the place of one that is gone has a border of its own.

@@ -914,7 +914,8 @@ class Candidates(_OfKinds):
 
 class Closest:
     """The element that is nearest to each point. ``len(closest)`` is the number of points; the attributes are arrays with one row per
-    point.
+    point. Asked with ``n_nearest=k`` and k above 1, they have shape (n, k) and (n, k, 2) or (n, k, 3): of each point k elements, nearest
+    first, those at the same distance by body and number.
     """
 
     __slots__ = ("_inner", "_rows")
@@ -927,7 +928,7 @@ class Closest:
     def rows(self) -> npt.NDArray[np.uint32]:
         """numpy.ndarray of uint32, shape (n, 2) : number of the body and its element: a face as it was given (of tetrahedra as in
         `Scene.faces`), or an edge or a point of bodies that have no faces. Decided exactly; of several at the same distance the lowest.
-        4294967295 twice where nothing is as near as was asked for. Read-only, and made once.
+        4294967295 twice where nothing, or nothing more, is as near as was asked for. Read-only, and made once.
         """
         if self._rows is None:
             self._rows = _locked(self._inner.rows())
@@ -936,7 +937,7 @@ class Closest:
     @property
     def elements(self) -> npt.NDArray[np.uint32]:
         """numpy.ndarray of uint32, shape (n,) : the second column of `rows`."""
-        return self.rows[:, 1]
+        return self.rows[..., 1]
 
     @property
     def distances(self) -> npt.NDArray[np.float64]:

@@ -618,8 +618,8 @@ class Detector(DetectorBase):
         most : float
             Elements farther away, in the unit of the scene, are not looked for.
         **options
-            ``of=body`` looks at one body; else all are looked at. ``query``, ``cancel`` and ``progress`` as for `Detector`. Options
-            about pairs are refused.
+            ``n_nearest=k`` finds the k nearest elements of each point. ``of=body`` looks at one body; else all are looked at. ``query``,
+            ``cancel`` and ``progress`` as for `Detector`. Options about pairs are refused.
 
         Returns
         -------
@@ -628,7 +628,7 @@ class Detector(DetectorBase):
         Raises
         ------
         ValueError
-            A distance that is negative or NaN, a point that is not finite.
+            A distance that is negative or NaN, a point that is not finite, no element asked for.
 
         Examples
         --------
@@ -687,6 +687,42 @@ class Detector(DetectorBase):
         ([True, False], [2.0, inf], [0])
         """
         return Hits(self._cast(scene, origins, directions, most, options))
+
+    def locate(
+        self, scene: Scene, body: _Body, points: _Array, **control: Unpack[Control]
+    ) -> npt.NDArray[np.int64]:
+        """Which tetrahedron of a body contains each point. Decided exactly.
+
+        Parameters
+        ----------
+        scene : Scene
+        body : Body
+            Tetrahedra. They are closed: points on their faces are in them, and a flat one contains the points of its faces.
+        points : array_like, shape (n, 3)
+            Float32 or float64, taken as they are.
+        **control
+            ``cancel`` and ``progress``, as for `Detector`.
+
+        Returns
+        -------
+        numpy.ndarray of int64, shape (n,)
+            The number of the tetrahedron: the lowest, where several share the face, edge or vertex on which a point is. -1 outside.
+
+        Raises
+        ------
+        ValueError
+            A body of another kind, a point that is not finite.
+
+        Examples
+        --------
+        >>> import impinge
+        >>> scene = impinge.Scene()
+        >>> corners = [[0, 0, 0], [4, 0, 0], [0, 4, 0], [0, 0, 4], [0, 0, -4]]
+        >>> body = scene.add(corners, [[0, 1, 2, 3], [0, 2, 1, 4]])
+        >>> impinge.Detector("cpu").locate(scene, body, [[1, 1, -1], [1, 1, 0], [3, 3, 3]]).tolist()
+        [1, 0, -1]
+        """
+        return self._locate(scene, body, points, control)
 
     def contains(
         self, scene: Scene, body: _Body, points: _Array, **control: Unpack[Control]

@@ -151,10 +151,11 @@ def closest_points(
     faces: _Array,
     points: _Array,
     *,
+    n_nearest: SupportsIndex = 1,
     kind: _RowKind | None = None,
     **settings: Unpack[Settings],
 ) -> Closest:
-    """The face of a mesh that is nearest to each point, with the nearest point and its distance.
+    """The face of a mesh that is nearest to each point, with the nearest point and its distance, or the k nearest faces.
 
     Parameters
     ----------
@@ -164,6 +165,8 @@ def closest_points(
         Triangles, or tetrahedra, whose surface is looked at, as vertex indices.
     points : array_like, shape (n, 3)
         Float32 or float64, taken as they are.
+    n_nearest : int
+        How many faces to find for each point.
     kind : {"points", "edges", "triangles", "tetrahedra", "quads"}, optional
         What the rows of `faces` are, as for `Scene.add`.
     **settings
@@ -187,7 +190,7 @@ def closest_points(
     ([[1.0, 1.0, 0.0]], [2.0], [0])
     """
     scene, detector = _one_mesh(vertices, faces, kind, False, settings)
-    return Closest(detector._closest(scene, points, np.inf, {}))
+    return Closest(detector._closest(scene, points, np.inf, {"n_nearest": n_nearest}))
 
 
 def cast(

@@ -192,6 +192,9 @@ class DetectorBase:
     def _contains(
         self, scene: SceneBase, body: Any, points: Any, keywords: _Options
     ) -> npt.NDArray[np.int8]: ...
+    def _locate(
+        self, scene: SceneBase, body: Any, points: Any, keywords: _Options
+    ) -> npt.NDArray[np.int64]: ...
     def _closest(
         self, scene: SceneBase, points: Any, most: Any, keywords: _Options
     ) -> Closest: ...

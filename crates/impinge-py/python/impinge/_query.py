@@ -41,6 +41,7 @@ class Fields(TypedDict, total=False):
     distances: bool
     closest_points: bool
     hits: Literal["first", "any", "all"]
+    n_nearest: SupportsIndex
     fixed: Iterable[_Body]
 
 
@@ -75,6 +76,7 @@ _DEFAULTS: dict[str, Any] = {
     "distances": False,
     "closest_points": False,
     "hits": "first",
+    "n_nearest": 1,
     "fixed": (),
 }
 _SCOPE = ("which", "between", "self_of", "of")
@@ -139,6 +141,8 @@ class Query:
         `Detector.near`: whether to find distances and nearest points, too.
     hits : {"first", "any", "all"}
         `Detector.cast`: what each ray hits first, whether it hits anything, or all that it hits.
+    n_nearest : int
+        `Detector.closest`: how many of the nearest elements to find for each point.
     fixed : sequence of Body
         `Detector.safe_distances`: bodies that do not move, and leave the whole distance to what is near them.
 
@@ -177,6 +181,7 @@ class Query:
     distances: bool
     closest_points: bool
     hits: Literal["first", "any", "all"]
+    n_nearest: int
     fixed: tuple[_Body, ...]
 
     def __init__(self, **options: Unpack[Fields]) -> None:
@@ -296,6 +301,8 @@ def _canonical(name: str, value: Any) -> Any:
     """An option that was checked, in the one form in which it is compared."""
     if name in ("separation", "clearance", "clearance_share"):
         return float(value)
+    if name == "n_nearest":
+        return int(value)
     if name == "kinds":
         kinds = {value} if isinstance(value, str) else set(value)
         return tuple(kind for kind in KINDS if kind in kinds)
