@@ -18,14 +18,14 @@
 
 use std::array::from_fn;
 
-use super::{Gradient, Hessian, Vector, dot, sub};
+use super::{Gradient, Hessian, Point, dot, sub};
 
 /// The way between the nearest points of two features.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct NearestWay {
     /// The way from one nearest point to the other is the sum of coefficients times points.
     pub coefficients: [f64; 4],
-    way: Vector,
+    way: Point,
     /// Orthonormal, as far as there are parameters; 0 beyond.
     directions: [Direction; 2],
 }
@@ -34,7 +34,7 @@ pub(crate) struct NearestWay {
 #[derive(Debug, Clone, Copy, Default)]
 struct Direction {
     coefficients: [f64; 4],
-    way: Vector,
+    way: Point,
 }
 
 impl Direction {
@@ -66,7 +66,7 @@ impl Direction {
 impl NearestWay {
     /// Of the features that some of the points span, given by their numbers: one to three each,
     /// four together.
-    pub fn new(points: &[Vector; 4], a: &[usize], b: &[usize]) -> Self {
+    pub fn new(points: &[Point; 4], a: &[usize], b: &[usize]) -> Self {
         let between = |to: usize, from: usize| {
             let mut coefficients = [0.0; 4];
             coefficients[to] = 1.0;

@@ -9,12 +9,11 @@ mod distance;
 mod mollifier;
 mod projection;
 
+use impinge_exact::Point;
+
 pub(crate) use distance::NearestWay;
 pub(crate) use mollifier::Mollifier;
 pub use projection::project_psd;
-
-/// A point, or a difference of points.
-type Vector = [f64; 3];
 
 /// Derivatives by the coordinates of four points.
 pub type Gradient = [f64; 12];
@@ -22,15 +21,15 @@ pub type Gradient = [f64; 12];
 /// Second derivatives by the coordinates of four points.
 pub type Hessian = [[f64; 12]; 12];
 
-fn sub(p: Vector, q: Vector) -> Vector {
+fn sub(p: Point, q: Point) -> Point {
     [p[0] - q[0], p[1] - q[1], p[2] - q[2]]
 }
 
-fn dot(p: Vector, q: Vector) -> f64 {
+fn dot(p: Point, q: Point) -> f64 {
     p[0] * q[0] + p[1] * q[1] + p[2] * q[2]
 }
 
-fn cross(p: Vector, q: Vector) -> Vector {
+fn cross(p: Point, q: Point) -> Point {
     [
         p[1] * q[2] - p[2] * q[1],
         p[2] * q[0] - p[0] * q[2],

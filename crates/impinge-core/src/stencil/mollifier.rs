@@ -7,25 +7,25 @@
 
 use std::array::from_fn;
 
-use super::{Gradient, Hessian, Vector, cross, dot, sub};
+use super::{Gradient, Hessian, Point, cross, dot, sub};
 
 /// The mollifier of edges 0-1 and 2-3 of four points, below its threshold.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Mollifier {
-    edges: [Vector; 2],
-    normal: Vector,
+    edges: [Point; 2],
+    normal: Point,
     threshold: f64,
 }
 
 impl Mollifier {
     /// What the squared length of the cross product is compared with, from the points at rest.
-    pub fn threshold(rest: &[Vector; 4]) -> f64 {
+    pub fn threshold(rest: &[Point; 4]) -> f64 {
         let [u, v] = [sub(rest[1], rest[0]), sub(rest[3], rest[2])];
         1e-3 * dot(u, u) * dot(v, v)
     }
 
     /// None at the threshold and above.
-    pub fn below(points: &[Vector; 4], threshold: f64) -> Option<Self> {
+    pub fn below(points: &[Point; 4], threshold: f64) -> Option<Self> {
         let edges = [sub(points[1], points[0]), sub(points[3], points[2])];
         let normal = cross(edges[0], edges[1]);
         (dot(normal, normal) < threshold).then_some(Mollifier {

@@ -181,12 +181,12 @@ pub fn closest_of_elements(a: &[Point], b: &[Point]) -> (NearestOfElements, f64,
     }
     let nearby = Nearby::new(a, b);
     match nearby.way {
-        NearestWay::Between(simple) => {
+        Shortest::Between(simple) => {
             let closest = super::closest_points(simple.pair, &simple.points);
             let points = simple.in_order(closest.points);
             (nearby.nearest, closest.distance, points)
         }
-        NearestWay::Crossing(point) => (nearby.nearest, 0.0, [point, point]),
+        Shortest::Crossing(point) => (nearby.nearest, 0.0, [point, point]),
     }
 }
 
@@ -341,10 +341,10 @@ impl PartOfPair {
 /// How two elements that no [`ElementPair`] stands for are nearest.
 struct Nearby {
     nearest: NearestOfElements,
-    way: NearestWay,
+    way: Shortest,
 }
 
-enum NearestWay {
+enum Shortest {
     /// Nearest points of a vertex and a face, or of two edges.
     Between(Simple),
     /// Where an edge passes through a face.
@@ -397,7 +397,7 @@ impl Nearby {
                     // Two faces that cross share a segment.
                     is_parallel: a.len() == b.len(),
                 },
-                way: NearestWay::Crossing(point),
+                way: Shortest::Crossing(point),
             };
         }
         Self {
@@ -405,7 +405,7 @@ impl Nearby {
                 features: best.features.map(|(_, feature)| feature),
                 is_parallel: has_tie || best.is_flat,
             },
-            way: NearestWay::Between(best.part.simple),
+            way: Shortest::Between(best.part.simple),
         }
     }
 }
