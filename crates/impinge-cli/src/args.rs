@@ -314,10 +314,8 @@ pub struct AskArgs {
     pub shared_vertex: SharedVertexArg,
     #[command(flatten)]
     pub read: ReadArgs,
-    /// Leave out the pairs of bodies A and B, numbered from 0 as given (A,A: the self-collision of
-    /// A)
-    #[arg(long, value_name = "A,B", value_parser = body_numbers, alias = "ignore")]
-    pub exclude: Vec<(usize, usize)>,
+    #[command(flatten)]
+    pub exclude: ExcludeArgs,
     /// End with exit code 3 if anything is found
     #[arg(long)]
     pub fail_on_hit: bool,
@@ -327,6 +325,19 @@ pub struct AskArgs {
     /// Print JSON and nothing else (see docs/cli.md)
     #[arg(long)]
     pub json: bool,
+}
+
+/// Pairs that are left out.
+#[derive(Debug, Clone, Args)]
+pub struct ExcludeArgs {
+    /// Leave out the pairs of bodies A and B, numbered from 0 as given (A,A: the self-collision of
+    /// A)
+    #[arg(id = "exclude", long = "exclude", value_name = "A,B", value_parser = body_numbers, alias = "ignore")]
+    pub bodies: Vec<(usize, usize)>,
+    /// Leave out pairs of one body that are near each other in its surface: some vertices of the two
+    /// are at most N edges apart, 0 to 16
+    #[arg(id = "exclude_rings", long = "exclude-rings", value_name = "N", value_parser = clap::value_parser!(u32).range(..=16))]
+    pub rings: Option<u32>,
 }
 
 /// Outputs of the answer for one set of meshes.

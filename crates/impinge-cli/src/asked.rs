@@ -22,6 +22,8 @@ pub struct Asked {
     pub has_self: bool,
     /// Whether pairs of bodies were left out by their numbers.
     pub excludes: bool,
+    /// How near pairs that were left out are in the surface.
+    pub rings: Option<u32>,
     /// Whether kinds of pairs were chosen.
     pub has_kinds: bool,
 }
@@ -84,6 +86,12 @@ impl Asked {
         }
         if self.excludes {
             not_asked.push("what --exclude names".to_owned());
+        }
+        if let Some(n) = self.rings {
+            not_asked.push(format!(
+                "what is at most {} away in the surface",
+                counted(n.into(), "edge")
+            ));
         }
         if self.has_kinds {
             not_asked.push("other kinds of pairs (--kinds)".to_owned());
@@ -163,6 +171,7 @@ mod tests {
         question: Question::Pairs,
         has_self: true,
         excludes: false,
+        rings: None,
         has_kinds: false,
     };
 
@@ -206,6 +215,7 @@ mod tests {
         let skipped = Asked {
             shared_vertex: SharedVertex::Skip,
             excludes: true,
+            rings: Some(2),
             ..ASKED
         };
         assert_eq!(
@@ -218,7 +228,7 @@ mod tests {
                 }
             ),
             "between 2 nodes of a.glb, vertices as in the files, neighbours left out; not asked: self-collision (--self), what --exclude \
-             names"
+             names, what is at most 2 edges away in the surface"
         );
         let three = [of(Some(0), Some(0)); 3];
         let only = Asked {

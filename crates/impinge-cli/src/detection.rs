@@ -3,10 +3,11 @@
 use std::num::NonZeroUsize;
 
 use impinge::{
-    Affinity, Backend, BodyId, Detector, PairKind, Pairs, Positions, Query, Scene, Settings, Stats,
+    Affinity, Backend, BodyId, Detector, Exclusion, PairKind, Pairs, Positions, Query, Scene,
+    Settings, Stats,
 };
 
-use crate::args::{AskArgs, BackendArg, DetectorArgs, KindArg};
+use crate::args::{AskArgs, BackendArg, DetectorArgs, ExcludeArgs, KindArg};
 use crate::asked::{Asked, Question, body};
 use crate::error::Error;
 
@@ -78,16 +79,21 @@ pub fn asked((between, within): (bool, bool), args: &AskArgs) -> Asked {
         shared_vertex: args.shared_vertex.into(),
         question: Question::Pairs,
         has_self: true,
-        excludes: !args.exclude.is_empty(),
+        excludes: !args.exclude.bodies.is_empty(),
+        rings: args.exclude.rings,
         has_kinds: false,
     }
 }
 
-/// The query without the pairs of bodies that `--exclude` names.
-pub fn query(asked: Asked, excluded: &[(usize, usize)], bodies: &[BodyId]) -> Result<Query, Error> {
+/// The query without the pairs of bodies that `--exclude` names, and those of `--exclude-rings`.
+pub fn query(asked: Asked, excluded: &ExcludeArgs, bodies: &[BodyId]) -> Result<Query, Error> {
     let body = |number| body("--exclude", bodies, number);
     let query = asked.query(bodies)?;
-    excluded.iter().try_fold(query, |query, &(a, b)| {
+    let query = match excluded.rings {
+        Some(n) => query.exclude(Exclusion::rings(n)),
+        None => query,
+    };
+    excluded.bodies.iter().try_fold(query, |query, &(a, b)| {
         Ok(query.exclude((body(a)?, body(b)?)))
     })
 }

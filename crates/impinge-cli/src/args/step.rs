@@ -6,15 +6,15 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use impinge::Query;
 
-use super::DetectorArgs;
 use super::PictureArgs;
 use super::RowsArgs;
 use super::choices::{PrecisionArg, StartArg};
 use super::near::KindArg;
+use super::{DetectorArgs, ExcludeArgs};
 use crate::asked::Question;
 use crate::detection::of_kinds;
 use crate::values::PngFile;
-use crate::values::{MeshFile, ReachedFile, at_least_one, body_numbers, distance, two_bodies};
+use crate::values::{MeshFile, ReachedFile, at_least_one, distance, two_bodies};
 
 pub const STEP_EXAMPLES: &str = "\
 Examples:
@@ -65,10 +65,8 @@ pub struct StepArgs {
     /// Do not weld such vertices, except in STL files, where triangles share nothing else
     #[arg(long, overrides_with = "weld")]
     pub no_weld: bool,
-    /// Leave out the pairs of bodies A and B, numbered from 0 as given (A,A: the self-collision of
-    /// A)
-    #[arg(long, value_name = "A,B", value_parser = body_numbers, alias = "ignore")]
-    pub exclude: Vec<(usize, usize)>,
+    #[command(flatten)]
+    pub exclude: ExcludeArgs,
     /// End with exit code 3 unless the step is free (4 if the start intersects, with or without
     /// this option)
     #[arg(long, conflicts_with = "candidates")]

@@ -147,7 +147,8 @@ fn asked(args: &StepArgs, bodies: &Moving) -> Result<Asked, Error> {
             None => args.how.question(),
         },
         has_self: false,
-        excludes: !args.exclude.is_empty(),
+        excludes: !args.exclude.bodies.is_empty(),
+        rings: args.exclude.rings,
         has_kinds: !args.how.kinds.is_empty(),
     })
 }

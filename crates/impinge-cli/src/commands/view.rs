@@ -79,6 +79,7 @@ fn save(
         question: Question::Pairs,
         has_self: true,
         excludes: false,
+        rings: None,
         has_kinds: false,
     };
     writeln!(to, "{}", asked.line(&vertices, &nouns))?;

@@ -86,6 +86,42 @@ fn the_bounds_are_those_of_the_library() {
 }
 
 #[test]
+fn neighbours_in_the_surface_are_left_out() {
+    let folder = folder();
+    // Edges of the ball are shorter than 0.3, and its other side is far.
+    let ask = |command: &str, more: &[&str]| {
+        let args = [command, "a.ply", "--json"]
+            .into_iter()
+            .chain(more.iter().copied());
+        folder.run(args).json()
+    };
+    let bounded = |more: &[&str]| {
+        let answer = ask("safe", &[&["--most", "0.15"], more].concat());
+        answer["bounded"].as_u64().unwrap()
+    };
+    assert!(bounded(&[]) > 100);
+    assert_eq!(bounded(&["--exclude-rings", "3"]), 0);
+    let near = |rings: &str| {
+        let answer = ask(
+            "near",
+            &["--distance", "0.3", "--self", "--exclude-rings", rings],
+        );
+        answer["pairs"].as_u64().unwrap()
+    };
+    let [all, some, none] = ["0", "1", "3"].map(near);
+    assert!(
+        all > some && some > none && none == 0,
+        "{all} {some} {none}"
+    );
+    let text = folder.run(["safe", "a.ply", "--most", "0.15", "--exclude-rings", "1"]);
+    let said = "not asked: what is at most 1 edge away in the surface";
+    assert!(text.printed().contains(said));
+    folder
+        .run(["safe", "a.ply", "--most", "0.15", "--exclude-rings", "17"])
+        .misuse();
+}
+
+#[test]
 fn what_touches_or_intersects_is_told_and_colours_show_the_bounds() {
     let folder = folder();
     folder.ply("through.ply", &ball(320).translated([0.5, 0.1, 0.2]));
