@@ -2,7 +2,7 @@
 
 use std::arch::x86_64::*;
 
-use impinge_exact::internal::filter::number::{Lookup, Row};
+use impinge_exact::internal::filter::number::Lookup;
 use impinge_exact::internal::filter::{BATCH, TABLE};
 
 use super::{

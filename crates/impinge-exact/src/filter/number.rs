@@ -72,60 +72,16 @@ pub trait Vector: Number {
     const N: usize;
     /// `N` numbers from memory, from lane `first` on.
     fn load(lanes: &[f64; LANES], first: usize) -> Self;
-    /// `N` numbers from memory, from lane `first` on, widened.
-    fn widen(lanes: &[f32; LANES], first: usize) -> Self;
     /// Writes the numbers to memory, from lane `first` on.
     fn store(self, lanes: &mut [f64; LANES], first: usize);
     /// Bit k for number k.
     fn bits(mask: Self::Mask) -> u8;
 }
 
-/// A register of `f32` that are compared with others.
-pub trait Row: Copy + Add<Output = Self> + sealed::Sealed {
-    /// Numbers in a register.
+/// A register of `f32` that are looked up in tables.
+pub trait Lookup: Number {
+    /// Numbers in a register: a divisor of [`BATCH`].
     const N: usize;
-    /// Registers that the processor has.
-    const REGISTERS: usize;
-    /// One condition per number.
-    type Lanes: Copy + BitAnd<Output = Self::Lanes> + BitOr<Output = Self::Lanes>;
-
-    /// `N` numbers from memory, from place `first` on.
-    fn row(numbers: &[f32], first: usize) -> Self;
-    /// Writes the numbers to memory, from place `first` on.
-    fn put(self, row: &mut [f32], first: usize);
-    /// One number in every lane.
-    fn all(x: f32) -> Self;
-    /// Yes in all lanes, or no in all.
-    fn lanes(is: bool) -> Self::Lanes;
-    /// Whether `self <= other`; false for NaN.
-    fn le(self, other: Self) -> Self::Lanes;
-    /// Whether not `self <= other`; true for NaN.
-    fn exceeds(self, other: Self) -> Self::Lanes;
-    /// [`le`](Row::le) in some lanes, no in the others.
-    #[inline(always)]
-    fn le_in(self, lanes: Self::Lanes, other: Self) -> Self::Lanes {
-        lanes & self.le(other)
-    }
-    /// [`exceeds`](Row::exceeds) in some lanes, no in the others.
-    #[inline(always)]
-    fn exceeds_in(self, lanes: Self::Lanes, other: Self) -> Self::Lanes {
-        lanes & self.exceeds(other)
-    }
-    /// Bit k for number k.
-    fn bits(lanes: Self::Lanes) -> u16;
-    /// The lesser of two; if `self` is NaN, `other`.
-    fn lesser(self, other: Self) -> Self;
-    /// The greater of two; if `self` is NaN, `other`.
-    fn greater(self, other: Self) -> Self;
-    /// The lesser of two in the lanes whose bits are set, `other` in the rest.
-    fn lesser_in(self, lanes: u16, other: Self) -> Self;
-    /// The greater of two in the lanes whose bits are set, `other` in the rest.
-    fn greater_in(self, lanes: u16, other: Self) -> Self;
-}
-
-/// A register of `f32` that are looked up in tables, and computed with. `N` is a divisor of
-/// [`BATCH`].
-pub trait Lookup: Number + Row<Lanes = <Self as Number>::Mask> {
     /// Which numbers of a table to take.
     type Slots: Copy;
 
@@ -133,6 +89,12 @@ pub trait Lookup: Number + Row<Lanes = <Self as Number>::Mask> {
     fn slots(slots: &[u8; BATCH], first: usize) -> Self::Slots;
     /// The numbers at some slots.
     fn look_up(table: &[f32; TABLE], slots: Self::Slots) -> Self;
+    /// `N` numbers from memory, from place `first` on.
+    fn row(numbers: &[f32], first: usize) -> Self;
+    /// Writes the numbers to memory, from place `first` on.
+    fn put(self, row: &mut [f32], first: usize);
+    /// Bit k for number k.
+    fn bits(mask: Self::Mask) -> u16;
 }
 
 /// Points from memory, from lane `first` on.
@@ -157,7 +119,6 @@ mod sealed {
     impl Sealed for f64 {}
     impl Sealed for super::Portable {}
     impl Sealed for super::Portable32 {}
-    impl Sealed for super::PortableRow {}
     #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
     impl Sealed for super::Wasm {}
     #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
@@ -270,14 +231,18 @@ macro_rules! operator {
     };
 }
 
-pub mod memory;
+#[cfg(any(
+    target_arch = "x86_64",
+    all(target_arch = "wasm32", target_feature = "simd128")
+))]
+mod memory;
 mod portable;
 #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
 mod wasm;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 
-pub use portable::{Portable, Portable32, PortableRow};
+pub use portable::{Portable, Portable32};
 #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
 pub use wasm::{Wasm, WasmF32};
 #[cfg(target_arch = "x86_64")]

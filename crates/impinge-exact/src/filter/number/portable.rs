@@ -126,10 +126,6 @@ impl Vector for Portable {
         Portable([lanes[first], lanes[first + 1]])
     }
     #[inline(always)]
-    fn widen(lanes: &[f32; LANES], first: usize) -> Self {
-        Portable([lanes[first].into(), lanes[first + 1].into()])
-    }
-    #[inline(always)]
     fn store(self, lanes: &mut [f64; LANES], first: usize) {
         lanes[first..][..PORTABLE].copy_from_slice(&self.0);
     }
@@ -139,70 +135,8 @@ impl Vector for Portable {
     }
 }
 
-impl Row for Portable32 {
-    const N: usize = PORTABLE_F32;
-    const REGISTERS: usize = 16;
-    type Lanes = Portable32Mask;
-
-    #[inline(always)]
-    fn row(numbers: &[f32], first: usize) -> Self {
-        let four: &[f32; PORTABLE_F32] = numbers[first..].first_chunk().expect("four numbers");
-        Portable32(*four)
-    }
-    #[inline(always)]
-    fn put(self, row: &mut [f32], first: usize) {
-        row[first..][..PORTABLE_F32].copy_from_slice(&self.0);
-    }
-    #[inline(always)]
-    fn all(x: f32) -> Self {
-        Portable32([x; PORTABLE_F32])
-    }
-    #[inline(always)]
-    fn lanes(is: bool) -> Portable32Mask {
-        Portable32Mask([if is { u32::MAX } else { 0 }; PORTABLE_F32])
-    }
-    #[inline(always)]
-    fn le(self, other: Self) -> Portable32Mask {
-        !self.exceeds(other)
-    }
-    #[inline(always)]
-    fn exceeds(self, other: Self) -> Portable32Mask {
-        let is = |k: usize| if self.0[k] <= other.0[k] { 0 } else { u32::MAX };
-        Portable32Mask([is(0), is(1), is(2), is(3)])
-    }
-    #[inline(always)]
-    fn bits(mask: Portable32Mask) -> u16 {
-        let [a, b, c, d] = mask.0;
-        (a & 1 | (b & 1) << 1 | (c & 1) << 2 | (d & 1) << 3) as u16
-    }
-    #[inline(always)]
-    fn lesser(self, other: Self) -> Self {
-        self.zip(other, |x, y| if x < y { x } else { y })
-    }
-    #[inline(always)]
-    fn greater(self, other: Self) -> Self {
-        self.larger(other)
-    }
-    #[inline(always)]
-    fn lesser_in(self, lanes: u16, other: Self) -> Self {
-        Self::select(Self::among(lanes), self.lesser(other), other)
-    }
-    #[inline(always)]
-    fn greater_in(self, lanes: u16, other: Self) -> Self {
-        Self::select(Self::among(lanes), self.greater(other), other)
-    }
-}
-
-impl Portable32 {
-    /// The lanes whose bits are set.
-    #[inline(always)]
-    fn among(lanes: u16) -> Portable32Mask {
-        let is = |k: usize| u32::from(lanes >> k & 1).wrapping_neg();
-        Portable32Mask([is(0), is(1), is(2), is(3)])
-    }
-}
-
 impl Lookup for Portable32 {
+    const N: usize = PORTABLE_F32;
     type Slots = [u8; PORTABLE_F32];
 
     #[inline(always)]
@@ -216,114 +150,18 @@ impl Lookup for Portable32 {
         let at = |slot: u8| table[slot as usize % TABLE];
         Portable32([at(a), at(b), at(c), at(d)])
     }
-}
-
-const PORTABLE_ROW: usize = 8;
-
-/// Eight `f32` that are only compared. The conditions are bytes of 0 or 1: of these compilers make
-/// vector comparisons, and of loops over few.
-#[derive(Debug, Clone, Copy)]
-pub struct PortableRow([f32; PORTABLE_ROW]);
-
-/// One condition per number: 1 or 0.
-#[derive(Debug, Clone, Copy)]
-pub struct PortableLanes([u8; PORTABLE_ROW]);
-
-impl PortableRow {
-    #[inline(always)]
-    fn zip(mut self, other: Self, op: impl Fn(f32, f32) -> f32) -> Self {
-        for k in 0..PORTABLE_ROW {
-            self.0[k] = op(self.0[k], other.0[k]);
-        }
-        self
-    }
-
-    #[inline(always)]
-    fn zip_in(mut self, lanes: u16, other: Self, op: impl Fn(f32, f32) -> f32) -> Self {
-        for k in 0..PORTABLE_ROW {
-            self.0[k] = match lanes >> k & 1 {
-                1 => op(self.0[k], other.0[k]),
-                _ => other.0[k],
-            };
-        }
-        self
-    }
-}
-
-impl PortableLanes {
-    #[inline(always)]
-    fn zip(mut self, other: Self, op: impl Fn(u8, u8) -> u8) -> Self {
-        for k in 0..PORTABLE_ROW {
-            self.0[k] = op(self.0[k], other.0[k]);
-        }
-        self
-    }
-}
-
-operator!(PortableRow, Add, add, |a, b| a.zip(b, |x, y| x + y));
-operator!(PortableLanes, BitAnd, bitand, |a, b| a.zip(b, |x, y| x & y));
-operator!(PortableLanes, BitOr, bitor, |a, b| a.zip(b, |x, y| x | y));
-
-impl Row for PortableRow {
-    const N: usize = PORTABLE_ROW;
-    const REGISTERS: usize = 16;
-    type Lanes = PortableLanes;
-
     #[inline(always)]
     fn row(numbers: &[f32], first: usize) -> Self {
-        let eight: &[f32; PORTABLE_ROW] = numbers[first..].first_chunk().expect("eight numbers");
-        PortableRow(*eight)
+        let four: &[f32; PORTABLE_F32] = numbers[first..].first_chunk().expect("four numbers");
+        Portable32(*four)
     }
     #[inline(always)]
     fn put(self, row: &mut [f32], first: usize) {
-        row[first..][..PORTABLE_ROW].copy_from_slice(&self.0);
+        row[first..][..PORTABLE_F32].copy_from_slice(&self.0);
     }
     #[inline(always)]
-    fn all(x: f32) -> Self {
-        PortableRow([x; PORTABLE_ROW])
-    }
-    #[inline(always)]
-    fn lanes(is: bool) -> PortableLanes {
-        PortableLanes([u8::from(is); PORTABLE_ROW])
-    }
-    #[inline(always)]
-    fn le(self, other: Self) -> PortableLanes {
-        let mut lanes = [0; PORTABLE_ROW];
-        for (k, lane) in lanes.iter_mut().enumerate() {
-            *lane = u8::from(self.0[k] <= other.0[k]);
-        }
-        PortableLanes(lanes)
-    }
-    #[inline(always)]
-    fn exceeds(self, other: Self) -> PortableLanes {
-        let mut lanes = [0; PORTABLE_ROW];
-        for (k, lane) in lanes.iter_mut().enumerate() {
-            *lane = 1 - u8::from(self.0[k] <= other.0[k]);
-        }
-        PortableLanes(lanes)
-    }
-    #[inline(always)]
-    fn bits(lanes: PortableLanes) -> u16 {
-        let mut bits = 0;
-        for k in 0..PORTABLE_ROW {
-            bits |= u16::from(lanes.0[k]) << k;
-        }
-        bits
-    }
-    #[inline(always)]
-    fn lesser(self, other: Self) -> Self {
-        self.zip(other, |x, y| if x < y { x } else { y })
-    }
-    #[inline(always)]
-    fn greater(self, other: Self) -> Self {
-        self.zip(other, |x, y| if x > y { x } else { y })
-    }
-    #[inline(always)]
-    fn lesser_in(self, lanes: u16, other: Self) -> Self {
-        self.zip_in(lanes, other, |x, y| if x < y { x } else { y })
-    }
-    #[inline(always)]
-    fn greater_in(self, lanes: u16, other: Self) -> Self {
-        self.zip_in(lanes, other, |x, y| if x > y { x } else { y })
+    fn bits(mask: Portable32Mask) -> u16 {
+        let [a, b, c, d] = mask.0;
+        (a & 1 | (b & 1) << 1 | (c & 1) << 2 | (d & 1) << 3) as u16
     }
 }

@@ -97,10 +97,6 @@ impl Vector for Wasm {
         ))
     }
     #[inline(always)]
-    fn widen(lanes: &[f32; LANES], first: usize) -> Self {
-        Wasm(f64x2(lanes[first].into(), lanes[first + 1].into()))
-    }
-    #[inline(always)]
     fn store(self, lanes: &mut [f64; LANES], first: usize) {
         write::<[f64; 2], _>(self.0, lanes[first..].first_chunk_mut().expect("two lanes"));
     }
@@ -110,11 +106,21 @@ impl Vector for Wasm {
     }
 }
 
-impl Row for WasmF32 {
+impl Lookup for WasmF32 {
     const N: usize = 4;
-    const REGISTERS: usize = 16;
-    type Lanes = WasmF32Mask;
+    type Slots = [u8; 4];
 
+    #[inline(always)]
+    fn slots(slots: &[u8; BATCH], first: usize) -> Self::Slots {
+        let four: &[u8; 4] = slots[first..].first_chunk().expect("four lanes");
+        *four
+    }
+    #[inline(always)]
+    fn look_up(table: &[f32; TABLE], slots: Self::Slots) -> Self {
+        let [a, b, c, d] = slots;
+        let at = |slot: u8| table[slot as usize % TABLE];
+        WasmF32(f32x4(at(a), at(b), at(c), at(d)))
+    }
     #[inline(always)]
     fn row(numbers: &[f32], first: usize) -> Self {
         WasmF32(read::<[f32; 4], _>(
@@ -129,65 +135,7 @@ impl Row for WasmF32 {
         );
     }
     #[inline(always)]
-    fn all(x: f32) -> Self {
-        WasmF32(f32x4_splat(x))
-    }
-    #[inline(always)]
-    fn lanes(is: bool) -> WasmF32Mask {
-        WasmF32Mask(i32x4_splat(-i32::from(is)))
-    }
-    #[inline(always)]
-    fn le(self, other: Self) -> WasmF32Mask {
-        WasmF32Mask(f32x4_le(self.0, other.0))
-    }
-    #[inline(always)]
-    fn exceeds(self, other: Self) -> WasmF32Mask {
-        !self.le(other)
-    }
-    #[inline(always)]
     fn bits(mask: WasmF32Mask) -> u16 {
         i32x4_bitmask(mask.0).into()
-    }
-    #[inline(always)]
-    fn lesser(self, other: Self) -> Self {
-        // `pmin(a, b)` is `b` where b < a, else `a`.
-        WasmF32(f32x4_pmin(other.0, self.0))
-    }
-    #[inline(always)]
-    fn greater(self, other: Self) -> Self {
-        self.larger(other)
-    }
-    #[inline(always)]
-    fn lesser_in(self, lanes: u16, other: Self) -> Self {
-        Self::select(Self::among(lanes), self.lesser(other), other)
-    }
-    #[inline(always)]
-    fn greater_in(self, lanes: u16, other: Self) -> Self {
-        Self::select(Self::among(lanes), self.greater(other), other)
-    }
-}
-
-impl WasmF32 {
-    /// The lanes whose bits are set.
-    #[inline(always)]
-    fn among(lanes: u16) -> WasmF32Mask {
-        let bits = i32x4(1, 2, 4, 8);
-        WasmF32Mask(i32x4_eq(v128_and(i32x4_splat(lanes.into()), bits), bits))
-    }
-}
-
-impl Lookup for WasmF32 {
-    type Slots = [u8; 4];
-
-    #[inline(always)]
-    fn slots(slots: &[u8; BATCH], first: usize) -> Self::Slots {
-        let four: &[u8; 4] = slots[first..].first_chunk().expect("four lanes");
-        *four
-    }
-    #[inline(always)]
-    fn look_up(table: &[f32; TABLE], slots: Self::Slots) -> Self {
-        let [a, b, c, d] = slots;
-        let at = |slot: u8| table[slot as usize % TABLE];
-        WasmF32(f32x4(at(a), at(b), at(c), at(d)))
     }
 }

@@ -188,11 +188,6 @@ impl Vector for Avx2 {
         ))
     }
     #[inline(always)]
-    fn widen(lanes: &[f32; LANES], first: usize) -> Self {
-        let four: __m128 = read::<[f32; 4], _>(lanes[first..].first_chunk().expect("four lanes"));
-        Avx2(compiled!("avx2", (x: __m128 = four) -> __m256d { _mm256_cvtps_pd(x) }))
-    }
-    #[inline(always)]
     fn store(self, lanes: &mut [f64; LANES], first: usize) {
         write::<[f64; 4], _>(
             self.0,
@@ -213,10 +208,6 @@ impl Vector for Avx512 {
         Avx512(read(lanes))
     }
     #[inline(always)]
-    fn widen(lanes: &[f32; LANES], _: usize) -> Self {
-        Avx512(compiled!("avx512f", (x: __m256 = read(lanes)) -> __m512d { _mm512_cvtps_pd(x) }))
-    }
-    #[inline(always)]
     fn store(self, lanes: &mut [f64; LANES], _: usize) {
         write(self.0, lanes);
     }
@@ -226,98 +217,8 @@ impl Vector for Avx512 {
     }
 }
 
-/// Expands eight bits into lane masks. The lanes of the others become all ones, an f32 NaN, for
-/// which `minps` and `maxps` return their second operand.
-static NOT_AMONG: [[u32; 8]; 256] = {
-    let mut table = [[0; 8]; 256];
-    let mut k = 0;
-    while k < 8 * 256 {
-        if (k / 8) >> (k % 8) & 1 == 0 {
-            table[k / 8][k % 8] = u32::MAX;
-        }
-        k += 1;
-    }
-    table
-};
-
-impl Avx2F32 {
-    /// The numbers in some lanes, NaN in the others.
-    #[inline(always)]
-    fn among(self, lanes: u16) -> Self {
-        let nan: __m256 = read(&NOT_AMONG[usize::from(lanes as u8)]);
-        Avx2F32(compiled!(
-            "avx2", (x: __m256 = self.0, nan: __m256 = nan) -> __m256 { _mm256_or_ps(x, nan) }
-        ))
-    }
-}
-
-impl Row for Avx2F32 {
-    const N: usize = 8;
-    const REGISTERS: usize = 16;
-    type Lanes = Avx2F32Mask;
-
-    #[inline(always)]
-    fn row(numbers: &[f32], first: usize) -> Self {
-        Avx2F32(read::<[f32; 8], _>(
-            numbers[first..].first_chunk().expect("eight numbers"),
-        ))
-    }
-    #[inline(always)]
-    fn put(self, row: &mut [f32], first: usize) {
-        write::<[f32; 8], _>(
-            self.0,
-            row[first..].first_chunk_mut().expect("eight numbers"),
-        );
-    }
-    #[inline(always)]
-    fn all(x: f32) -> Self {
-        Avx2F32(compiled!("avx2", (x: f32 = x) -> __m256 { _mm256_set1_ps(x) }))
-    }
-    #[inline(always)]
-    fn lanes(is: bool) -> Avx2F32Mask {
-        Avx2F32Mask(compiled!("avx2", (is: i32 = -i32::from(is)) -> __m256 {
-            _mm256_castsi256_ps(_mm256_set1_epi32(is))
-        }))
-    }
-    #[inline(always)]
-    fn le(self, other: Self) -> Avx2F32Mask {
-        Avx2F32Mask(compiled!(
-            "avx2",
-            (a: __m256 = self.0, b: __m256 = other.0) -> __m256 { _mm256_cmp_ps::<_CMP_LE_OQ>(a, b) }
-        ))
-    }
-    #[inline(always)]
-    fn exceeds(self, other: Self) -> Avx2F32Mask {
-        Avx2F32Mask(compiled!(
-            "avx2",
-            (a: __m256 = self.0, b: __m256 = other.0) -> __m256 { _mm256_cmp_ps::<_CMP_NLE_UQ>(a, b) }
-        ))
-    }
-    #[inline(always)]
-    fn bits(mask: Avx2F32Mask) -> u16 {
-        compiled!("avx2", (mask: __m256 = mask.0) -> u16 { _mm256_movemask_ps(mask) as u16 })
-    }
-    #[inline(always)]
-    fn lesser(self, other: Self) -> Self {
-        Avx2F32(compiled!(
-            "avx2", (a: __m256 = self.0, b: __m256 = other.0) -> __m256 { _mm256_min_ps(a, b) }
-        ))
-    }
-    #[inline(always)]
-    fn greater(self, other: Self) -> Self {
-        self.larger(other)
-    }
-    #[inline(always)]
-    fn lesser_in(self, lanes: u16, other: Self) -> Self {
-        self.among(lanes).lesser(other)
-    }
-    #[inline(always)]
-    fn greater_in(self, lanes: u16, other: Self) -> Self {
-        self.among(lanes).greater(other)
-    }
-}
-
 impl Lookup for Avx2F32 {
+    const N: usize = 8;
     type Slots = __m256i;
 
     #[inline(always)]
@@ -344,105 +245,27 @@ impl Lookup for Avx2F32 {
         // `internal`.
         Avx2F32(unsafe { gather(table, slots) })
     }
-}
-
-impl Row for Avx512F32 {
-    const N: usize = 16;
-    const REGISTERS: usize = 32;
-    type Lanes = Avx512F32Mask;
-
     #[inline(always)]
     fn row(numbers: &[f32], first: usize) -> Self {
-        Avx512F32(read::<[f32; 16], _>(
-            numbers[first..].first_chunk().expect("sixteen numbers"),
+        Avx2F32(read::<[f32; 8], _>(
+            numbers[first..].first_chunk().expect("eight numbers"),
         ))
     }
     #[inline(always)]
     fn put(self, row: &mut [f32], first: usize) {
-        write::<[f32; 16], _>(
+        write::<[f32; 8], _>(
             self.0,
-            row[first..].first_chunk_mut().expect("sixteen numbers"),
+            row[first..].first_chunk_mut().expect("eight numbers"),
         );
     }
     #[inline(always)]
-    fn all(x: f32) -> Self {
-        Avx512F32(compiled!("avx512f", (x: f32 = x) -> __m512 { _mm512_set1_ps(x) }))
-    }
-    #[inline(always)]
-    fn lanes(is: bool) -> Avx512F32Mask {
-        Avx512F32Mask(if is { u16::MAX } else { 0 })
-    }
-    #[inline(always)]
-    fn le(self, other: Self) -> Avx512F32Mask {
-        Avx512F32Mask(compiled!(
-            "avx512f",
-            (a: __m512 = self.0, b: __m512 = other.0) -> __mmask16 {
-                _mm512_cmp_ps_mask::<_CMP_LE_OQ>(a, b)
-            }
-        ))
-    }
-    #[inline(always)]
-    fn exceeds(self, other: Self) -> Avx512F32Mask {
-        Avx512F32Mask(compiled!(
-            "avx512f",
-            (a: __m512 = self.0, b: __m512 = other.0) -> __mmask16 {
-                _mm512_cmp_ps_mask::<_CMP_NLE_UQ>(a, b)
-            }
-        ))
-    }
-    #[inline(always)]
-    fn le_in(self, lanes: Avx512F32Mask, other: Self) -> Avx512F32Mask {
-        Avx512F32Mask(compiled!(
-            "avx512f",
-            (lanes: u16 = lanes.0, a: __m512 = self.0, b: __m512 = other.0) -> __mmask16 {
-                _mm512_mask_cmp_ps_mask::<_CMP_LE_OQ>(lanes, a, b)
-            }
-        ))
-    }
-    #[inline(always)]
-    fn exceeds_in(self, lanes: Avx512F32Mask, other: Self) -> Avx512F32Mask {
-        Avx512F32Mask(compiled!(
-            "avx512f",
-            (lanes: u16 = lanes.0, a: __m512 = self.0, b: __m512 = other.0) -> __mmask16 {
-                _mm512_mask_cmp_ps_mask::<_CMP_NLE_UQ>(lanes, a, b)
-            }
-        ))
-    }
-    #[inline(always)]
-    fn bits(mask: Avx512F32Mask) -> u16 {
-        mask.0
-    }
-    #[inline(always)]
-    fn lesser(self, other: Self) -> Self {
-        Avx512F32(compiled!(
-            "avx512f", (a: __m512 = self.0, b: __m512 = other.0) -> __m512 { _mm512_min_ps(a, b) }
-        ))
-    }
-    #[inline(always)]
-    fn greater(self, other: Self) -> Self {
-        self.larger(other)
-    }
-    #[inline(always)]
-    fn lesser_in(self, lanes: u16, other: Self) -> Self {
-        Avx512F32(compiled!(
-            "avx512f",
-            (lanes: u16 = lanes, a: __m512 = self.0, b: __m512 = other.0) -> __m512 {
-                _mm512_mask_min_ps(b, lanes, a, b)
-            }
-        ))
-    }
-    #[inline(always)]
-    fn greater_in(self, lanes: u16, other: Self) -> Self {
-        Avx512F32(compiled!(
-            "avx512f",
-            (lanes: u16 = lanes, a: __m512 = self.0, b: __m512 = other.0) -> __m512 {
-                _mm512_mask_max_ps(b, lanes, a, b)
-            }
-        ))
+    fn bits(mask: Avx2F32Mask) -> u16 {
+        compiled!("avx2", (mask: __m256 = mask.0) -> u16 { _mm256_movemask_ps(mask) as u16 })
     }
 }
 
 impl Lookup for Avx512F32 {
+    const N: usize = 16;
     type Slots = __m512i;
 
     #[inline(always)]
@@ -468,5 +291,22 @@ impl Lookup for Avx512F32 {
                 _mm512_mask_blend_ps(is_high, low, high)
             }}
         ))
+    }
+    #[inline(always)]
+    fn row(numbers: &[f32], first: usize) -> Self {
+        Avx512F32(read::<[f32; 16], _>(
+            numbers[first..].first_chunk().expect("sixteen numbers"),
+        ))
+    }
+    #[inline(always)]
+    fn put(self, row: &mut [f32], first: usize) {
+        write::<[f32; 16], _>(
+            self.0,
+            row[first..].first_chunk_mut().expect("sixteen numbers"),
+        );
+    }
+    #[inline(always)]
+    fn bits(mask: Avx512F32Mask) -> u16 {
+        mask.0
     }
 }
