@@ -26,190 +26,217 @@ use crate::simd::{Isa, Lanes, Simd, up_to, with_isa};
 use impinge_exact::internal::{Reach, elements_are_within};
 use impinge_exact::{Point, Sign, orient3d};
 
-/// Clusters between two looks at the control.
-const LOOK: u32 = 1 << 12;
+/// A question about a point, asked of the elements whose boxes it may meet.
+pub(super) trait Question: Copy + Sync {
+    /// What the elements that were looked at say.
+    type Found;
+    type Answer: Copy + Send;
+    /// The answer about points beside the body.
+    const OUTSIDE: Self::Answer;
 
-/// Where each point is: inside (1), on the surface (0) or outside (-1).
+    /// Before any element, and the box that those to be looked at meet.
+    fn begin(self, whole: &Bounds, at: Bounds) -> (Self::Found, Bounds);
+
+    /// Adds an element. Returns whether no other one can change the answer.
+    fn add(self, found: &mut Self::Found, target: Target<'_>, slot: usize, point: &Point) -> bool;
+
+    fn answer(found: &Self::Found) -> Self::Answer;
+}
+
+/// Answers a question about each point.
 ///
 /// # Errors
 /// Cancellation.
-pub(super) fn places<R: Real>(
+pub(super) fn ask<R: Real, Q: Question>(
     isa: Isa,
+    question: Q,
     target: Target<'_>,
-    border: Option<&Border>,
     points: &[[R; 3]],
-    places: &mut [i8],
+    answers: &mut [Q::Answer],
     work: Work<'_>,
 ) -> Result<(), Error> {
-    with_isa!(isa, all_places, <R: Real>(
+    with_isa!(isa, ask_all, <R: Real, Q: Question>(
+        question: Q = question,
         target: Target<'_> = target,
-        border: Option<&Border> = border,
         points: &[[R; 3]] = points,
-        places: &mut [i8] = places,
+        answers: &mut [Q::Answer] = answers,
         work: Work<'_> = work,
     ) -> Result<(), Error>)
 }
 
 #[inline(always)]
-fn all_places<S: Simd, R: Real>(
+fn ask_all<S: Simd, R: Real, Q: Question>(
     simd: S,
+    question: Q,
     target: Target<'_>,
-    border: Option<&Border>,
     points: &[[R; 3]],
-    places: &mut [i8],
+    answers: &mut [Q::Answer],
     work: Work<'_>,
 ) -> Result<(), Error> {
     let whole = target.boxes.root();
     let mut descent = Descent::default();
-    let mut n_seen = 0u32;
-    for (point, place) in points.iter().zip(places) {
+    let mut looks = Looks::new(work);
+    for (point, answer) in points.iter().zip(answers) {
         let point = point.map(R::widen);
         let at = Bounds {
             min: point.map(round_down),
             max: point.map(round_up),
         };
-        *place = -1;
+        *answer = Q::OUTSIDE;
         if !at.overlaps(&whole) {
             continue;
         }
-        let (way, query) = match border {
-            None => Way::out(&whole, &at),
-            Some(_) => (Way::ALONG_X, at),
-        };
-        let mut found = FoundAround::default();
+        let (mut found, query) = question.begin(&whole, at);
         descent.start(target.boxes);
         while let Some(cluster) = descent.next(simd, target.boxes, &query) {
-            n_seen += 1;
-            if n_seen == LOOK {
-                n_seen = 0;
-                work.step()?;
-            }
+            looks.step()?;
             let lanes = target.boxes.elements(target.body, cluster);
             let slots = target.boxes.clustering.slots(cluster);
             let mask = simd.overlaps_64(lanes, &query, up_to(slots.len() - 1));
+            let mut is_settled = false;
             for lane in Lanes(mask) {
-                let slot = slots.start + lane;
-                match border {
-                    None => found.add_face(target, slot, &point, way),
-                    Some(border) => found.add_tetrahedron(target, slot, &point, border),
-                }
+                is_settled |= question.add(&mut found, target, slots.start + lane, &point);
             }
-            if found.is_settled {
+            if is_settled {
                 break;
             }
         }
-        *place = found.place();
+        *answer = Q::answer(&found);
     }
     Ok(())
 }
 
-/// The lowest tetrahedron that contains each point.
-///
-/// # Errors
-/// Cancellation.
-pub(super) fn lowest<R: Real>(
-    isa: Isa,
-    target: Target<'_>,
-    points: &[[R; 3]],
-    lowest: &mut [Option<u32>],
-    work: Work<'_>,
-) -> Result<(), Error> {
-    with_isa!(isa, all_lowest, <R: Real>(
-        target: Target<'_> = target,
-        points: &[[R; 3]] = points,
-        lowest: &mut [Option<u32>] = lowest,
-        work: Work<'_> = work,
-    ) -> Result<(), Error>)
-}
+/// Whether a point is inside a closed surface (1), on it (0) or outside (-1).
+#[derive(Debug, Clone, Copy)]
+pub(super) struct InSurface;
 
-#[inline(always)]
-fn all_lowest<S: Simd, R: Real>(
-    simd: S,
-    target: Target<'_>,
-    points: &[[R; 3]],
-    lowest: &mut [Option<u32>],
-    work: Work<'_>,
-) -> Result<(), Error> {
-    let whole = target.boxes.root();
-    let clustering = &target.boxes.clustering;
-    let mut descent = Descent::default();
-    let mut looks = Looks::new(work);
-    for (point, lowest) in points.iter().zip(lowest) {
-        let point = point.map(R::widen);
-        let at = Bounds {
-            min: point.map(round_down),
-            max: point.map(round_up),
-        };
-        *lowest = None;
-        if !at.overlaps(&whole) {
-            continue;
-        }
-        descent.start(target.boxes);
-        while let Some(cluster) = descent.next(simd, target.boxes, &at) {
-            looks.step()?;
-            let lanes = target.boxes.elements(target.body, cluster);
-            let slots = clustering.slots(cluster);
-            for lane in Lanes(simd.overlaps_64(lanes, &at, up_to(slots.len() - 1))) {
-                let slot = slots.start + lane;
-                let number = clustering.order[slot].raw();
-                let is_lower = lowest.is_none_or(|lowest| number < lowest);
-                if is_lower && faces_at(target, slot, &point).is_some() {
-                    *lowest = Some(number);
-                }
-            }
-        }
-    }
-    Ok(())
-}
-
-/// What the elements that were looked at say about a point.
-#[derive(Debug, Default)]
-struct FoundAround {
+/// What faces say about a point.
+pub(super) struct FoundFaces {
+    way: Way,
     winding: i32,
-    /// Whether the point is in a tetrahedron.
-    is_held: bool,
-    /// Whether it is on a face of the surface.
+    /// Whether it is on a face.
     is_on: bool,
-    /// Whether no other element can change the answer.
-    is_settled: bool,
 }
 
-impl FoundAround {
+impl Question for InSurface {
+    type Found = FoundFaces;
+    type Answer = i8;
+    const OUTSIDE: i8 = -1;
+
+    #[inline(always)]
+    fn begin(self, whole: &Bounds, at: Bounds) -> (FoundFaces, Bounds) {
+        let (way, query) = Way::out(whole, &at);
+        let found = FoundFaces {
+            way,
+            winding: 0,
+            is_on: false,
+        };
+        (found, query)
+    }
+
     #[inline]
-    fn add_face(&mut self, target: Target<'_>, slot: usize, point: &Point, way: Way) {
+    fn add(self, found: &mut FoundFaces, target: Target<'_>, slot: usize, point: &Point) -> bool {
         let Elements::Triangles(faces) = &target.boxes.clustering.corners else {
-            return;
+            return false;
         };
         let positions = target.body.positions();
         let corners = faces[slot].map(|vertex| positions.point(vertex as usize));
         if is_on(point, &corners) {
-            (self.is_on, self.is_settled) = (true, true);
+            found.is_on = true;
         } else {
-            self.winding += way.passes(point, &corners);
+            found.winding += found.way.passes(point, &corners);
         }
+        found.is_on
+    }
+
+    fn answer(found: &FoundFaces) -> i8 {
+        match (found.is_on, found.winding) {
+            (true, _) => 0,
+            (false, 0) => -1,
+            (false, _) => 1,
+        }
+    }
+}
+
+/// Whether a point is inside a body of tetrahedra (1), on its surface (0) or outside (-1).
+#[derive(Debug, Clone, Copy)]
+pub(super) struct InTetrahedra<'a> {
+    pub border: &'a Border,
+}
+
+/// What tetrahedra say about a point.
+#[derive(Debug, Default)]
+pub(super) struct FoundTetrahedra {
+    /// Whether it is in one.
+    is_held: bool,
+    /// Whether it is on a face of the surface.
+    is_on: bool,
+    /// Whether it is strictly inside one, whatever else it is on.
+    is_inner: bool,
+}
+
+impl Question for InTetrahedra<'_> {
+    type Found = FoundTetrahedra;
+    type Answer = i8;
+    const OUTSIDE: i8 = -1;
+
+    #[inline(always)]
+    fn begin(self, _: &Bounds, at: Bounds) -> (FoundTetrahedra, Bounds) {
+        (FoundTetrahedra::default(), at)
     }
 
     #[inline]
-    fn add_tetrahedron(&mut self, target: Target<'_>, slot: usize, point: &Point, border: &Border) {
-        let Some(on) = faces_at(target, slot, point) else {
-            return;
-        };
-        self.is_held = true;
-        if on == 0 {
-            self.is_settled = true;
+    fn add(
+        self,
+        found: &mut FoundTetrahedra,
+        target: Target<'_>,
+        slot: usize,
+        point: &Point,
+    ) -> bool {
+        if let Some(on) = faces_at(target, slot, point) {
+            let number = target.boxes.clustering.order[slot].index();
+            found.is_held = true;
+            found.is_inner |= on == 0;
+            found.is_on |= on & self.border.mask(number) != 0;
         }
-        let number = target.boxes.clustering.order[slot].index();
-        self.is_on |= on & border.mask(number) != 0;
+        found.is_inner
     }
 
-    fn place(&self) -> i8 {
-        // Strictly inside a tetrahedron, whatever else the point is on.
-        let is_inner = self.is_held && self.is_settled;
-        match self.is_on && !is_inner {
-            true => 0,
-            false if self.is_held || self.winding != 0 => 1,
+    fn answer(found: &FoundTetrahedra) -> i8 {
+        match found.is_held {
+            true if found.is_on && !found.is_inner => 0,
+            true => 1,
             false => -1,
         }
+    }
+}
+
+/// Which tetrahedron contains a point, of several the lowest.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Lowest;
+
+impl Question for Lowest {
+    type Found = Option<u32>;
+    type Answer = Option<u32>;
+    const OUTSIDE: Option<u32> = None;
+
+    #[inline(always)]
+    fn begin(self, _: &Bounds, at: Bounds) -> (Option<u32>, Bounds) {
+        (None, at)
+    }
+
+    #[inline]
+    fn add(self, found: &mut Option<u32>, target: Target<'_>, slot: usize, point: &Point) -> bool {
+        let number = target.boxes.clustering.order[slot].raw();
+        let is_lower = found.is_none_or(|found| number < found);
+        if is_lower && faces_at(target, slot, point).is_some() {
+            *found = Some(number);
+        }
+        false
+    }
+
+    fn answer(found: &Option<u32>) -> Option<u32> {
+        *found
     }
 }
 

@@ -41,6 +41,7 @@ use crate::simd::Isa;
 use border::Border;
 use boxes::Boxes;
 use impinge_exact::internal::Ray;
+use inside::{InSurface, InTetrahedra, Lowest, Question};
 
 /// What is kept of the bodies that were probed, from call to call.
 #[derive(Debug)]
@@ -120,14 +121,13 @@ impl Probes {
             body,
             boxes: &self.boxes[&(id.index(), Part::Given)],
         };
-        let border = self.borders.get(&id.index());
-        let mut places = vec![0i8; points.len()];
-        let size = work.workers.task(TASK);
-        let mut tasks: Vec<_> = points.chunks(size).zip(places.chunks_mut(size)).collect();
-        work.each(&mut tasks, |_, (points, places)| {
-            inside::places(self.isa, target, border, points, places, work)
-        })?;
-        Ok(places)
+        match body.kind() {
+            BodyKind::Tetrahedra => {
+                let border = &self.borders[&id.index()];
+                self.ask(InTetrahedra { border }, target, points, work)
+            }
+            _ => self.ask(InSurface, target, points, work),
+        }
     }
 
     /// The lowest tetrahedron of a body that contains each point.
@@ -157,13 +157,27 @@ impl Probes {
             body,
             boxes: &self.boxes[&(id.index(), Part::Given)],
         };
-        let mut lowest = vec![None; points.len()];
+        self.ask(Lowest, target, points, work)
+    }
+
+    /// The answer about each point of a body.
+    ///
+    /// # Errors
+    /// Cancellation.
+    fn ask<R: Real, Q: Question>(
+        &self,
+        question: Q,
+        target: Target<'_>,
+        points: &[[R; 3]],
+        work: Work<'_>,
+    ) -> Result<Vec<Q::Answer>, Error> {
+        let mut answers = vec![Q::OUTSIDE; points.len()];
         let size = work.workers.task(TASK);
-        let mut tasks: Vec<_> = points.chunks(size).zip(lowest.chunks_mut(size)).collect();
-        work.each(&mut tasks, |_, (points, lowest)| {
-            inside::lowest(self.isa, target, points, lowest, work)
+        let mut tasks: Vec<_> = points.chunks(size).zip(answers.chunks_mut(size)).collect();
+        work.each(&mut tasks, |_, (points, answers)| {
+            inside::ask(self.isa, question, target, points, answers, work)
         })?;
-        Ok(lowest)
+        Ok(answers)
     }
 
     /// The nearest elements of some bodies to each point that are at most a distance away: faces,

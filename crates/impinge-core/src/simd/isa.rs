@@ -70,21 +70,21 @@ impl Isa {
 
 /// Calls a kernel `fn kernel(simd: impl Simd, …)`, marked `inline(always)`, compiled for `$isa`.
 macro_rules! with_isa {
-    ($isa:expr, $kernel:path, $(<$generic:ident: $bound:ident>)? ($($name:ident: $type:ty = $value:expr),* $(,)?) $(-> $result:ty)?) => {{
+    ($isa:expr, $kernel:path, $(<$($generic:ident: $bound:ident),+>)? ($($name:ident: $type:ty = $value:expr),* $(,)?) $(-> $result:ty)?) => {{
         // A separate function, like the others: without optimisation, a kernel's stack frame is
         // half a megabyte.
-        fn portable$(<$generic: $bound>)?($($name: $type),*) $(-> $result)? {
+        fn portable$(<$($generic: $bound),+>)?($($name: $type),*) $(-> $result)? {
             $kernel($crate::simd::Portable, $($name),*)
         }
         #[cfg(target_arch = "x86_64")]
         #[target_feature(enable = "avx2,bmi1,bmi2,popcnt,lzcnt")]
-        fn avx2$(<$generic: $bound>)?($($name: $type),*) $(-> $result)? {
+        fn avx2$(<$($generic: $bound),+>)?($($name: $type),*) $(-> $result)? {
             // SAFETY: the caller's features include AVX2.
             $kernel(unsafe { $crate::simd::Avx2::new() }, $($name),*)
         }
         #[cfg(target_arch = "x86_64")]
         #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx512vbmi2,avx2,bmi1,bmi2,popcnt,lzcnt")]
-        fn avx512$(<$generic: $bound>)?($($name: $type),*) $(-> $result)? {
+        fn avx512$(<$($generic: $bound),+>)?($($name: $type),*) $(-> $result)? {
             // SAFETY: the caller's features include AVX-512 F, VL, DQ, BW and VBMI2.
             $kernel(unsafe { $crate::simd::Avx512::new() }, $($name),*)
         }

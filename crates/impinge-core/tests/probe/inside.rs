@@ -464,6 +464,33 @@ fn a_body_in_the_place_of_another() {
 }
 
 /// Coordinates beyond those of single precision, and points far out.
+/// The border of tetrahedra that are gone says nothing about a surface in their place.
+#[test]
+fn a_surface_in_the_place_of_tetrahedra() {
+    let corners = [
+        [0.0, 0.0, 0.0],
+        [4.0, 0.0, 0.0],
+        [0.0, 4.0, 0.0],
+        [0.0, 0.0, 4.0],
+    ];
+    let points = [[1.0, 1.0, 1.0], [0.0, 1.0, 1.0], [3.0, 3.0, 3.0]];
+    let mut detector = Detector::new(Backend::Cpu).unwrap();
+    let mut scene = Scene::new();
+    let solid = scene.add_tetrahedra(&[[0, 1, 2, 3]], &corners).unwrap();
+    assert_eq!(
+        detector.contains(&scene, solid, &points).unwrap(),
+        [1, 0, -1]
+    );
+    scene.remove(solid).unwrap();
+    let faces = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]];
+    let surface = scene.add_triangles(&faces, &corners).unwrap();
+    assert_eq!(surface.index(), solid.index());
+    assert_eq!(
+        detector.contains(&scene, surface, &points).unwrap(),
+        [1, 0, -1]
+    );
+}
+
 #[test]
 fn numbers_of_any_size() {
     let cube = surfaces::cube([0.0; 3], 2.0);
