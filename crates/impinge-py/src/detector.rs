@@ -296,21 +296,16 @@ impl DetectorBase {
         points: &Bound<'py, PyAny>,
         keywords: Keywords<'_, '_>,
     ) -> PyResult<Bound<'py, PyArray1<i8>>> {
-        let points = PositionArray::new(points, "points")?;
-        let points = points.rows()?;
-        let options = Options::control(keywords)?;
-        let body = |scene: &Scene, _: &Options<'_>| scene.id(body, "body");
-        let asked = ask_about(
+        let places = ask_of_body(
             slf,
-            scene,
-            options,
-            body,
-            |detector, scene, &body| match points {
+            (scene, body, points),
+            keywords,
+            |detector, scene, body, points| match points {
                 Rows::F32(points) => detector.contains(scene, body, points),
                 Rows::F64(points) => detector.contains(scene, body, points),
             },
         )?;
-        Ok(PyArray1::from_vec(slf.py(), asked.answer))
+        Ok(PyArray1::from_vec(slf.py(), places))
     }
 
     fn _locate<'py>(
@@ -320,25 +315,17 @@ impl DetectorBase {
         points: &Bound<'py, PyAny>,
         keywords: Keywords<'_, '_>,
     ) -> PyResult<Bound<'py, PyArray1<i64>>> {
-        let points = PositionArray::new(points, "points")?;
-        let points = points.rows()?;
-        let options = Options::control(keywords)?;
-        let body = |scene: &Scene, _: &Options<'_>| scene.id(body, "body");
-        let asked = ask_about(
+        let found = ask_of_body(
             slf,
-            scene,
-            options,
-            body,
-            |detector, scene, &body| match points {
+            (scene, body, points),
+            keywords,
+            |detector, scene, body, points| match points {
                 Rows::F32(points) => detector.locate(scene, body, points),
                 Rows::F64(points) => detector.locate(scene, body, points),
             },
         )?;
-        let numbers = asked.answer.iter().map(|found| found.map_or(-1, i64::from));
-        Ok(PyArray1::from_vec(
-            slf.py(),
-            collect(asked.answer.len(), numbers)?,
-        ))
+        let numbers = found.iter().map(|found| found.map_or(-1, i64::from));
+        Ok(PyArray1::from_vec(slf.py(), collect(found.len(), numbers)?))
     }
 
     fn _closest(
@@ -492,6 +479,29 @@ fn ask<T: Send>(
 ) -> PyResult<Asked<T>> {
     let query = |scene: &Scene, options: &Options<'_>| options.query(scene);
     ask_about(detector, scene, options, query, answer)
+}
+
+/// Asks where points are in a body.
+fn ask_of_body<'py, T: Send>(
+    detector: &Bound<'py, DetectorBase>,
+    (scene, body, points): (&Bound<'py, PyAny>, &Bound<'py, PyAny>, &Bound<'py, PyAny>),
+    keywords: Keywords<'_, 'py>,
+    ask: impl FnOnce(
+        &mut impinge::Detector,
+        &impinge::Scene,
+        impinge::BodyId,
+        Rows<'_>,
+    ) -> Result<T, impinge::Error>
+    + Send,
+) -> PyResult<T> {
+    let points = PositionArray::new(points, "points")?;
+    let points = points.rows()?;
+    let options = Options::control(keywords)?;
+    let body = |scene: &Scene, _: &Options<'_>| scene.id(body, "body");
+    let asked = ask_about(detector, scene, options, body, |detector, scene, &body| {
+        ask(detector, scene, body, points)
+    })?;
+    Ok(asked.answer)
 }
 
 /// Asks about a scene and answers with the interpreter released, watched for Ctrl-C, progress and

@@ -9,7 +9,7 @@
 //!
 //! Everything is rounded, in one fixed order. Cost: `O(n)` per vertex that the polyhedron takes.
 
-use super::regions::{cross, dot, scaled, sub};
+use crate::scene::vector::{cross, dot, scaled, sub};
 use impinge_exact::Point;
 
 /// The shortest way that takes two convex bodies apart.

@@ -18,15 +18,14 @@ use std::collections::HashMap;
 
 use super::curves::Curves;
 use super::inside::{Asked, ConnectedParts};
-use super::regions::{
-    NO_REGION, Region, WHAT, add, cross, dot, join_contacts, regions, scaled, sub,
-};
+use super::regions::{NO_REGION, Region, WHAT, join_contacts, regions};
 use super::topology::EdgesAround;
 use super::{Contacts, Feature, PointName, Shape};
 use crate::scene::elements::{BodyKind, Elements};
 use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
 use crate::scene::index::VertexIx;
+use crate::scene::vector::{add, cross, dot, scaled, sub};
 use crate::scene::{Body, Scene};
 use crate::search::sets::Sets;
 use crate::search::sink::grow;

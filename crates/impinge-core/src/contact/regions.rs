@@ -13,6 +13,7 @@
 use super::curves::{Curves, distance};
 use super::{Contacts, Shape};
 use crate::scene::error::Error;
+use crate::scene::vector::{add, cross, dot, scaled, sub};
 use crate::search::sets::Sets;
 use crate::search::sink::{filled, grow};
 use impinge_exact::Point;
@@ -80,29 +81,6 @@ pub(super) fn join_contacts(contacts: &Contacts, sets: &mut Sets) {
             sets.join(pair[0], pair[1]);
         }
     }
-}
-
-pub(super) fn sub(p: Point, q: Point) -> Point {
-    [0, 1, 2].map(|k| p[k] - q[k])
-}
-
-pub(super) fn add(p: Point, q: Point) -> Point {
-    [0, 1, 2].map(|k| p[k] + q[k])
-}
-
-pub(super) fn scaled(p: Point, factor: f64) -> Point {
-    p.map(|x| x * factor)
-}
-
-pub(super) fn cross(p: Point, q: Point) -> Point {
-    [0, 1, 2].map(|k| {
-        let (i, j) = ((k + 1) % 3, (k + 2) % 3);
-        p[i] * q[j] - p[j] * q[i]
-    })
-}
-
-pub(super) fn dot(p: Point, q: Point) -> f64 {
-    p[0] * q[0] + p[1] * q[1] + p[2] * q[2]
 }
 
 /// The regions of sets of points, in the order of their first contacts, and the region of each

@@ -3,6 +3,7 @@
 //! Cost: about a microsecond per pair; no memory is allocated after the first pairs. Coordinates
 //! are rounded in `f64`, in one fixed order.
 
+use crate::scene::vector::{add, cross, dot, scaled, sub};
 use impinge_exact::Point;
 
 /// The faces' corners, and the corner on the other side.
@@ -127,30 +128,6 @@ fn prism(low: [Point; 3], high: [Point; 3], out: &mut Vec<[Point; 4]>) {
     out.push([low[0], low[1], low[2], high[0]]);
     out.push([low[1], low[2], high[0], high[1]]);
     out.push([low[2], high[0], high[1], high[2]]);
-}
-
-fn sub(p: Point, q: Point) -> Point {
-    [p[0] - q[0], p[1] - q[1], p[2] - q[2]]
-}
-
-fn add(p: Point, q: Point) -> Point {
-    [p[0] + q[0], p[1] + q[1], p[2] + q[2]]
-}
-
-fn scaled(p: Point, by: f64) -> Point {
-    p.map(|x| x * by)
-}
-
-fn dot(p: Point, q: Point) -> f64 {
-    p[0] * q[0] + p[1] * q[1] + p[2] * q[2]
-}
-
-fn cross(p: Point, q: Point) -> Point {
-    [
-        p[1] * q[2] - p[2] * q[1],
-        p[2] * q[0] - p[0] * q[2],
-        p[0] * q[1] - p[1] * q[0],
-    ]
 }
 
 #[cfg(test)]

@@ -30,6 +30,7 @@
 use crate::bvh::bounds::{Bounds, round_down, round_up};
 use crate::bvh::hubs::{HubSet, Hubs};
 use crate::scene::index::Slot;
+use crate::scene::vector::cross;
 use impinge_exact::Point;
 use impinge_exact::internal::{collinear, strictly_between};
 
@@ -314,7 +315,7 @@ fn seen(body: &BodyRef<'_>, shared: &[u32], slot: Slot) -> SeenFrom {
             of_length_one(difference(&v, &u)),
             of_length_one(difference(&p, &u)),
         );
-        let normal = cross(&along, &to);
+        let normal = cross(along, to);
         if size(&normal) > SHORTEST * (size(&along) * size(&to)) {
             cone.add(normal);
         } else if corners.len() > 3 || !collinear(&u, &v, &p) {
@@ -409,14 +410,6 @@ fn of_length_one(d: Point) -> Point {
         0.0 => d,
         size => d.map(|x| x / size),
     }
-}
-
-fn cross(d: &Point, e: &Point) -> Point {
-    [
-        d[1] * e[2] - d[2] * e[1],
-        d[2] * e[0] - d[0] * e[2],
-        d[0] * e[1] - d[1] * e[0],
-    ]
 }
 
 /// The largest magnitude of a coordinate.

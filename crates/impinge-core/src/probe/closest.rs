@@ -26,6 +26,7 @@ use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
 use crate::scene::index::{ClusterIx, ElementIx};
 use crate::scene::positions::Real;
+use crate::scene::vector::dot;
 use crate::search::narrow::Corners;
 use crate::search::work::Work;
 use crate::simd::{Isa, LaneBounds, Lanes, Simd, up_to, with_isa};
@@ -249,7 +250,7 @@ impl<'a> PointSearch<'a> {
             self.high = high;
             self.limit = high * high * (1.0 + ROUNDING) + f64::MIN_POSITIVE;
             self.way = way;
-            let square = dot(&way, &way);
+            let square = dot(way, way);
             // The squares of shorter ways lose bits.
             self.level = match square > SHORTEST {
                 true => high * square.sqrt() * (1.0 + ROUNDING),
@@ -266,7 +267,7 @@ impl<'a> PointSearch<'a> {
         let (mut lowest, mut size) = (f64::INFINITY, 0.0f64);
         for corner in corners {
             let to = [0, 1, 2].map(|k| point[k] - corner[k]);
-            lowest = lowest.min(dot(&self.way, &to));
+            lowest = lowest.min(dot(self.way, to));
             size = size.max(to[0].abs() + to[1].abs() + to[2].abs());
         }
         let of_way = self.way[0]
@@ -445,10 +446,6 @@ impl<'a> PointSearch<'a> {
         self.candidates = candidates;
         Ok(best)
     }
-}
-
-fn dot(p: &Point, q: &Point) -> f64 {
-    p[0] * q[0] + p[1] * q[1] + p[2] * q[2]
 }
 
 /// The square of a point's distance from a box, rounded.

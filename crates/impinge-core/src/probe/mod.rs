@@ -41,7 +41,6 @@ use crate::simd::Isa;
 use border::Border;
 use boxes::Boxes;
 use impinge_exact::internal::Ray;
-use inside::{InSurface, InTetrahedra, Lowest, Question};
 
 /// What is kept of the bodies that were probed, from call to call.
 #[derive(Debug)]
@@ -124,9 +123,9 @@ impl Probes {
         match body.kind() {
             BodyKind::Tetrahedra => {
                 let border = &self.borders[&id.index()];
-                self.ask(InTetrahedra { border }, target, points, work)
+                self.ask(inside::InTetrahedra { border }, target, points, work)
             }
-            _ => self.ask(InSurface, target, points, work),
+            _ => self.ask(inside::InSurface, target, points, work),
         }
     }
 
@@ -157,14 +156,14 @@ impl Probes {
             body,
             boxes: &self.boxes[&(id.index(), Part::Given)],
         };
-        self.ask(Lowest, target, points, work)
+        self.ask(inside::Lowest, target, points, work)
     }
 
     /// The answer about each point of a body.
     ///
     /// # Errors
     /// Cancellation.
-    fn ask<R: Real, Q: Question>(
+    fn ask<R: Real, Q: inside::Question>(
         &self,
         question: Q,
         target: Target<'_>,

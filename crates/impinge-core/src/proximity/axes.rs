@@ -11,8 +11,8 @@
 //! Invariant: a distance of such boxes is never larger than that of what they hold by more than
 //! rounding (`docs/exactness.md`, "The smallest distance of two bodies").
 
-use super::features::dot;
 use crate::boxes::Extent;
+use crate::scene::vector::dot;
 
 use super::scale::Scale;
 use super::tree::{Node, Tree};

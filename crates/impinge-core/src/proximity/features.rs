@@ -7,15 +7,8 @@
 //! parameters that led to them. One fixed order of operations, no fused multiply-add: the same bits
 //! everywhere.
 
+use crate::scene::vector::{dot, sub};
 use impinge_exact::Point;
-
-fn sub(p: Point, q: Point) -> Point {
-    [p[0] - q[0], p[1] - q[1], p[2] - q[2]]
-}
-
-pub(super) fn dot(p: Point, q: Point) -> f64 {
-    p[0] * q[0] + p[1] * q[1] + p[2] * q[2]
-}
 
 /// `p + t d`
 fn along(p: Point, t: f64, d: Point) -> Point {

@@ -23,12 +23,12 @@ use crate::query::settings::Settings;
 use crate::query::tuning::Tuning;
 use crate::scene::error::Error;
 use crate::scene::index::PartIx;
+use crate::scene::vector::dot;
 use crate::scene::{Body, Scene};
 use crate::search::narrow::intersect;
 use crate::simd::{Isa, Simd, with_isa};
 
 use super::axes::Axes;
-use super::features::dot;
 use super::tree::{Node, Tree, box_of, corners};
 
 /// A tree over the boxes of the bodies of a frame.

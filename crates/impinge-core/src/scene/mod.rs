@@ -11,6 +11,7 @@ mod motion;
 pub(crate) mod position_rows;
 pub(crate) mod positions;
 pub(crate) mod transform;
+pub(crate) mod vector;
 pub(crate) mod words;
 
 pub use bodies::Scene;

@@ -9,6 +9,7 @@ mod distance;
 mod mollifier;
 mod projection;
 
+use crate::scene::vector::{cross, dot, sub};
 use impinge_exact::Point;
 
 pub(crate) use distance::NearestWay;
@@ -20,19 +21,3 @@ pub type Gradient = [f64; 12];
 
 /// Second derivatives by the coordinates of four points.
 pub type Hessian = [[f64; 12]; 12];
-
-fn sub(p: Point, q: Point) -> Point {
-    [p[0] - q[0], p[1] - q[1], p[2] - q[2]]
-}
-
-fn dot(p: Point, q: Point) -> f64 {
-    p[0] * q[0] + p[1] * q[1] + p[2] * q[2]
-}
-
-fn cross(p: Point, q: Point) -> Point {
-    [
-        p[1] * q[2] - p[2] * q[1],
-        p[2] * q[0] - p[0] * q[2],
-        p[0] * q[1] - p[1] * q[0],
-    ]
-}
