@@ -108,17 +108,23 @@ impl<'a> Drawer<'a> {
     }
 }
 
-/// The length of the diagonal of the box of all vertices.
-fn diagonal(surfaces: &[Surface]) -> f64 {
+/// The lowest and the highest coordinates of points.
+pub fn bounds<'a>(points: impl IntoIterator<Item = &'a [f64; 3]>) -> [[f64; 3]; 2] {
     let mut bounds = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
-    for point in surfaces.iter().flat_map(|surface| &surface.positions) {
+    for point in points {
         for k in 0..3 {
             bounds[0][k] = bounds[0][k].min(point[k]);
             bounds[1][k] = bounds[1][k].max(point[k]);
         }
     }
-    let [x, y, z] = [0, 1, 2].map(|k| bounds[1][k] - bounds[0][k]);
-    (x * x + y * y + z * z).sqrt()
+    bounds
+}
+
+/// The length of the diagonal of the box of all vertices.
+pub fn diagonal(surfaces: &[Surface]) -> f64 {
+    let [low, high] = bounds(surfaces.iter().flat_map(|surface| &surface.positions));
+    let [x, y, z] = [0, 1, 2].map(|k| high[k] - low[k]);
+    x.hypot(y).hypot(z)
 }
 
 /// The colour of the curves in which surfaces cross.

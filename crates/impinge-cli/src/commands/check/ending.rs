@@ -13,16 +13,18 @@ use crate::output::out;
 /// Prints the command that helps most: one that mends, or, where nothing can be mended, one that
 /// shows.
 pub fn print_next(rows: &[Row], args: &CheckArgs) -> Result<(), Error> {
+    const MENDED: [Finding; 4] = [
+        Finding::Degenerate,
+        Finding::Duplicates,
+        Finding::NonManifold,
+        Finding::Orientation,
+    ];
     let is_mendable = |row: &&Row| {
         row.result.as_ref().is_ok_and(|counts| {
-            let found = counts.degenerate
-                + counts.duplicates
-                + counts.non_manifold_facets
-                + counts.non_manifold_vertices
-                + counts.inconsistent_facets;
             let is_inside_out =
                 counts.volume.is_some_and(|volume| volume < 0.0) && counts.components == 1;
-            counts.n_tetrahedra == 0 && (found > 0 || is_inside_out)
+            let is_found = MENDED.iter().any(|finding| finding.is_in(row));
+            counts.n_tetrahedra == 0 && (is_found || is_inside_out)
         })
     };
     let crosses = |row: &&Row| Finding::SelfIntersections.is_in(row);

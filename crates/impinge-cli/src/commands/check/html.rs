@@ -13,11 +13,12 @@ use std::path::Path;
 use impinge_check::report::{COLUMNS, escaped, numbers};
 use impinge_check::{Checked, Place, Problem, Report, Row, check_file_marked};
 use impinge_io::AtomicFile;
-use impinge_render::{Camera, Focus, Picture, Surface};
+use impinge_render::{Camera, Focus, Picture};
 
 use super::args::CheckArgs;
 use super::shown::{options, surface};
 use crate::error::Error;
+use crate::picture::diagonal;
 use crate::text::grouped;
 
 const STYLE: &str = include_str!("report.css");
@@ -145,7 +146,7 @@ fn of_row(row: &Row, most: usize, args: &CheckArgs) -> Result<String, Error> {
         if !row.places.is_empty() {
             let what = crate::text::counted(row.places.len() as u64, "place");
             details += &format!("<details><summary>{what}</summary><div class=\"places\">");
-            let length = diagonal(&picture.surfaces[0]);
+            let length = diagonal(&picture.surfaces);
             for (ix, place) in row.places.iter().enumerate() {
                 look_at(&mut picture, place, &checked, length, args);
                 let shown = if ix < MOST_PICTURES {
@@ -241,18 +242,6 @@ fn look_at(picture: &mut Picture, place: &Place, checked: &Checked, length: f64,
         distance,
     });
     picture.see_through = args.picture.see_through;
-}
-
-fn diagonal(surface: &Surface) -> f64 {
-    let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-    for point in &surface.positions {
-        for k in 0..3 {
-            low[k] = low[k].min(point[k]);
-            high[k] = high[k].max(point[k]);
-        }
-    }
-    let size = [0, 1, 2].map(|k| high[k] - low[k]);
-    size[0].hypot(size[1]).hypot(size[2])
 }
 
 fn image(picture: &Picture, alt: &str) -> Result<String, Error> {

@@ -5,7 +5,7 @@ const dialog = document.querySelector("dialog"), canvas = dialog.querySelector("
 const zUp = document.currentScript.dataset.up === "z";
 const numbers = (text) => text.split(",").map(Number);
 const shown = { row: null, at: -1, places: [], target: [0, 0, 0], azimuth: 0, elevation: 0, distance: 3, mesh: null };
-let gl, program, buffer, drawn = 0;
+let gl, uniforms, drawn = 0;
 
 const VERTEX = `#version 300 es
 in vec3 point; in vec4 face; uniform mat4 view; uniform vec3 target; out vec3 at, side; out vec4 color;
@@ -28,7 +28,7 @@ void main() {
 function start() {
   gl = canvas.getContext("webgl2", { antialias: true });
   if (!gl) return false;
-  program = gl.createProgram();
+  const program = gl.createProgram();
   for (const [kind, source] of [[gl.VERTEX_SHADER, VERTEX], [gl.FRAGMENT_SHADER, FRAGMENT]]) {
     const shader = gl.createShader(kind);
     gl.shaderSource(shader, source);
@@ -40,8 +40,8 @@ function start() {
   gl.linkProgram(program);
   if (!gl.getProgramParameter(program, gl.LINK_STATUS)) throw new Error(gl.getProgramInfoLog(program));
   gl.useProgram(program);
-  buffer = gl.createBuffer();
-  gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
+  uniforms = Object.fromEntries(["view", "target", "eye", "alpha"].map((name) => [name, gl.getUniformLocation(program, name)]));
+  gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
   gl.enableVertexAttribArray(0);
   gl.enableVertexAttribArray(1);
   gl.vertexAttribPointer(0, 3, gl.FLOAT, false, 16, 0);
@@ -93,20 +93,19 @@ function draw() {
   rows[2].push((distance * (far + near) - 2 * far * near) / (far - near));
   rows[3].push(distance);
   const matrix = [0, 1, 2, 3].flatMap((column) => rows.map((row) => row[column]));
-  const at = (name) => gl.getUniformLocation(program, name);
-  gl.uniformMatrix4fv(at("view"), false, matrix);
-  gl.uniform3fv(at("target"), shown.target);
-  gl.uniform3fv(at("eye"), back.map((x) => x * distance));
+  gl.uniformMatrix4fv(uniforms.view, false, matrix);
+  gl.uniform3fv(uniforms.target, shown.target);
+  gl.uniform3fv(uniforms.eye, back.map((x) => x * distance));
   gl.clearColor(0.93, 0.94, 0.96, 1);
   gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
   const { fine, found } = shown.mesh;
   gl.enable(gl.DEPTH_TEST);
-  gl.uniform1f(at("alpha"), 1);
+  gl.uniform1f(uniforms.alpha, 1);
   gl.drawArrays(gl.TRIANGLES, 0, 3 * (fine + found));
   // What has a finding shows through what hides it.
   gl.disable(gl.DEPTH_TEST);
   gl.enable(gl.BLEND);
-  gl.uniform1f(at("alpha"), 0.3);
+  gl.uniform1f(uniforms.alpha, 0.3);
   gl.drawArrays(gl.TRIANGLES, 3 * fine, 3 * found);
   gl.disable(gl.BLEND);
 }

@@ -8,6 +8,7 @@ use impinge_check::{Checked, Place};
 use impinge_render::{Camera, Face, Focus, Surface};
 
 use super::base64;
+use crate::picture::bounds;
 
 /// The most faces on a page, for all meshes together: about 25 MB of text.
 const MOST_FACES: usize = 1_000_000;
@@ -116,13 +117,7 @@ fn around(surface: &Surface, places: &[Place], most: usize) -> Vec<Face> {
 /// The middle of the box around points, and how far its corners are from there; none where nothing
 /// can be drawn.
 fn ball(points: &[[f64; 3]]) -> Option<([f64; 3], f64)> {
-    let [mut low, mut high] = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
-    for point in points {
-        for k in 0..3 {
-            low[k] = low[k].min(point[k]);
-            high[k] = high[k].max(point[k]);
-        }
-    }
+    let [low, high] = bounds(points);
     let half = [0, 1, 2].map(|k| high[k] / 2.0 - low[k] / 2.0);
     let middle = [0, 1, 2].map(|k| low[k] + half[k]);
     let radius = half[0].hypot(half[1]).hypot(half[2]);
