@@ -146,7 +146,8 @@ def test_everything_is_as_in_ipc_toolkit(make, seed, scene_of):
         contacts.types,
     ]
     random = np.random.default_rng(0)
-    keys = list(named)
+    # Theirs come in another order in each run.
+    keys = sorted(named)
     keys = [keys[ix] for ix in random.permutation(len(keys))[:1500]]
     keys += [key for key, row in ours.items() if is_mollified[row]][:200]
     n_mollified = 0
@@ -159,12 +160,18 @@ def test_everything_is_as_in_ipc_toolkit(make, seed, scene_of):
         at = (3 * slots[:, None] + np.arange(3)).ravel()
         x = points[ids].ravel()
         # What neither knows better: parallel edges lose as many digits as the sine has zeros.
-        sine = 1.0
-        if key[0] == "ee" and impinge.TYPES[kind] == "EA_EB":
+        sine, is_tie = 1.0, False
+        if key[0] == "ee":
             u, v = points[own[1]] - points[own[0]], points[own[3]] - points[own[2]]
-            sine = np.linalg.norm(np.cross(u, v)) / np.linalg.norm(u) / np.linalg.norm(v)
+            between = np.linalg.norm(np.cross(u, v)) / np.linalg.norm(u) / np.linalg.norm(v)
+            if impinge.TYPES[kind] == "EA_EB":
+                sine = between
+            is_tie = between < 1e-12
         tolerance = 1e-9 / sine
         assert_close(d, of.compute_distance(x), tolerance)
+        if is_tie:
+            # Two ends of parallel edges are equally near: each may take the other, and the derivatives are of that one.
+            continue
         assert_close(gradient[at], of.compute_distance_gradient(x), tolerance)
         assert_close(hessian[np.ix_(at, at)], of.compute_distance_hessian(x), tolerance / sine)
         assert_close(m, of.mollifier(x), tolerance)
