@@ -1,4 +1,4 @@
-"""`impinge check` beside trimesh, Open3D, MeshLab and libigl (CGAL) on a few thousand meshes, and whose answers are right.
+"""`impinge check` beside its peers on a few thousand meshes, and whose answers are right.
 
     python bench/check.py                                  # looks for target/release/impinge
     python bench/check.py --files 500 --peers Trimesh,Libigl
@@ -14,8 +14,9 @@ is the sum over the files that it answered: reading, welding, asking; not its st
 the whole run with its child process, on the very files that the peer answered. A peer that crashes or takes too long loses that
 file, not the run.
 
-Checks: counts of impinge are compared with `check_truth.counts` on every file. Pairs (MeshLab: faces) of each peer are compared
-with those of impinge as sets, and what only one of the two has is decided in rational arithmetic (`check_truth.judged`):
+Checks: counts of impinge are compared with `check_truth.counts` on every file. Pairs of each peer (MeshLab: faces; trueform: yes
+or no) are compared with those of impinge as sets, and what only one of the two has is decided in rational arithmetic
+(`check_truth.judged`):
 
 - another definition: a self-intersection that the peer's own definition leaves out (see `check_peers.py`);
 - peer misses a true one: a self-intersection that its definition includes;
@@ -207,7 +208,7 @@ def run(arguments, data, folder, scratch):
         "*error*: says so. *counts*: answers with numbers all the same.",
         check_tables.broken_table(files, outcomes),
         "### Self-intersections that differ from those of impinge",
-        "Each is decided in rational arithmetic. MeshLab is compared by faces, the others by pairs.",
+        "Each is decided in rational arithmetic. MeshLab is compared by faces, trueform by its yes or no, the others by pairs.",
         check_tables.summary_table(selves),
         check_tables.self_table(selves),
         "### Counts that differ from the exact ones",
@@ -237,12 +238,14 @@ def run(arguments, data, folder, scratch):
             "speed": speed,
             "self_intersections": {label: {**agree, "differences": classes} for label, (agree, classes) in selves.items()},
             "counts": {label: tallies for label, (tallies, _) in counted.items()},
+            "broken": check_tables.broken_counts(files, outcomes),
+            "versions": {"impinge": ours.version} | {peer.label: peer.installed() for peer in present},
             "wrong": wrong,
         }
         target = record_folder(arguments.machine, today)
         (target / "check.md").write_text(text + "\n", encoding="utf-8")
         (target / "check.json").write_text(json.dumps(record, indent=1) + "\n")
-        print(f"recorded in {target.relative_to(ROOT)}", file=sys.stderr)
+        print(f"recorded in {target.relative_to(ROOT)}; now bench/check_page.py", file=sys.stderr)
     return 1 if wrong else 0
 
 

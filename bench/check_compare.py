@@ -2,6 +2,7 @@
 
 import collections
 import concurrent.futures
+import itertools
 import pathlib
 import sys
 import time
@@ -65,7 +66,9 @@ def collect(peer, answer, file, ours):
     corners, found = loaded(answer["files"]["corners"]), loaded(answer["files"]["found"])
     numbers, reading = numbering(corners, file)
     said = {"label": peer.label, "reading": reading, "numbers": numbers, "counts": answer["counts"]}
-    if peer.finds and found is not None and numbers is not None:
+    if peer.finds == "mesh" and found is not None:
+        said["says"] = bool(found[0])
+    elif peer.finds and found is not None and numbers is not None:
         if peer.finds == "faces":
             mine = set(ours.ravel().tolist())
             theirs = set(numbers[np.asarray(found, bool)].tolist())
@@ -84,6 +87,8 @@ def decide(file, pairs, truth, said):
         peer = PEERS_BY_LABEL[one["label"]]
         tally = collections.Counter()
         examples = {}
+        if "says" in one:
+            tally, examples = verdict(peer, one["says"], file, pairs, judge)
         read = set() if one["numbers"] is None else set(one["numbers"].tolist())
         for side in ["only ours", "only theirs"]:
             items = one.get(side, [])
@@ -117,8 +122,29 @@ def decide(file, pairs, truth, said):
             words = [*(["the reader drops faces"] if drops else []), *([name] if name != "exact" else [])]
             example = f"{theirs}, exact {truth[question]}"
             definitions[question] = ("; ".join(words) if name else "unexplained", example)
-        decided.append({"label": one["label"], "classes": dict(tally), "examples": examples, "definitions": definitions})
+        is_compared = "only ours" in one or "says" in one
+        decided.append({"label": one["label"], "compared": is_compared, "classes": dict(tally), "examples": examples, "definitions": definitions})
     return file.path.name, decided, sampled(file, pairs, judge)
+
+
+def verdict(peer, says, file, pairs, judge):
+    """The class of a yes or no about a whole mesh, if it is wrong, as a tally and examples."""
+    kinds = ((judge.pair(*pair)[1], tuple(pair)) for pair in pairs.tolist())
+    kind, pair = next((one for one in kinds if one[0] not in peer.leaves_out), (None, None))
+    # A yes because of a pair that the peer's definition leaves out is right all the same.
+    if says == (kind is not None) or (says and len(pairs)):
+        return collections.Counter(), {}
+    if kind:
+        key = f"peer says no of a mesh with: {kind}"
+        return collections.Counter([key]), {key: pair}
+    # Does impinge miss one? Pairs of all faces are decided, as far as the limit goes.
+    every = ((face, other) for face in range(len(file.faces)) for other in judge.near(face) if face < other)
+    for pair in itertools.islice(every, MOST_DECIDED):
+        is_true, kind = judge.pair(*pair)
+        if is_true:
+            return collections.Counter([f"IMPINGE misses a true one: {kind}"]), {}
+    key = "peer says yes of a mesh without any"
+    return collections.Counter([key]), {}
 
 
 def sampled(file, pairs, judge):
@@ -238,10 +264,8 @@ def compare(files, pairs, truths, said):
             label = one["label"]
             counted.setdefault(label, ({question: collections.Counter() for question in QUESTIONS}, {}))
             if PEERS_BY_LABEL[label].finds:
-                empty = {"files": 0, "same": 0, "reader": collections.Counter()}
+                empty = {"files": 0, "same": 0, "wrong": 0, "reader": collections.Counter()}
                 agree, _ = selves.setdefault(label, (empty, {}))
-                agree["files"] += "only ours" in one
-                agree["same"] += one.get("only ours") == one.get("only theirs") == []
                 if one["reading"]:
                     agree["reader"][one["reading"]] += 1
     with concurrent.futures.ProcessPoolExecutor() as pool:
@@ -254,6 +278,11 @@ def compare(files, pairs, truths, said):
             n_sampled += n
             wrong += errors
             for one in decided:
+                if one["compared"]:
+                    agree, _ = selves[one["label"]]
+                    agree["files"] += 1
+                    agree["same"] += not one["classes"]
+                    agree["wrong"] += any(key.startswith("peer") for key in one["classes"])
                 for key, n in one["classes"].items():
                     classes = selves[one["label"]][1]
                     entry = classes.setdefault(

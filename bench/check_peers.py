@@ -9,6 +9,7 @@ import contextlib
 import importlib.metadata
 import json
 import os
+import pathlib
 import select
 import signal
 import subprocess
@@ -18,6 +19,7 @@ import time
 import numpy as np
 
 from check_truth import FOLD, SAME, VERTEX_CROSS, VERTEX_PLANE, VERTEX_TOUCH, ZERO_AREA
+from meshes import read_ply
 
 
 class Peer:
@@ -31,7 +33,7 @@ class Peer:
     definition = ""
     #: Why it has wrong answers, as far as its source or a small test says.
     why = ""
-    #: Whether it finds self-intersections as pairs, as faces, or not at all.
+    #: Whether it finds self-intersections as pairs, as faces, as one yes or no per mesh, or not at all.
     finds = "pairs"
     #: The most triangles of a mesh that it is asked about, or None.
     most = None
@@ -51,7 +53,7 @@ class Peer:
         """What is wrong with the mesh, except self-intersections."""
 
     def intersections(self):
-        """Pairs of faces (n, 2), or a mask of faces (n,)."""
+        """Pairs of faces (n, 2), a mask of faces (n,), or one yes or no (1,)."""
 
 
 class Trimesh(Peer):
@@ -252,7 +254,97 @@ class LibiglPredicates(Libigl):
         return self.predicates.find_self_intersections(self.vertices, self.faces)[1]
 
 
-PEERS = {kind.__name__: kind for kind in [Trimesh, Open3d, MeshLab, Libigl, LibiglPredicates]}
+class MeshLib(Peer):
+    label, package = "MeshLib", "meshlib"
+    how = (
+        "`loadMesh`, `uniteCloseVertices(0)`, `findDegenerateFaces`, `getAllComponents`, `findSelfCollidingTriangles(touchIsIntersection=True)`"
+    )
+    definition = "no pair is left out (MRMeshCollide.cpp)"
+    why = (
+        "its meshes are manifold: where more than two faces meet at an edge, vertices are doubled, and neighbours then touch; "
+        "triangles are tested in doubles, those that share an edge with a tolerance of 1e-5"
+    )
+
+    def __init__(self):
+        from meshlib import mrmeshnumpy, mrmeshpy
+
+        self.meshlib, self.arrays = mrmeshpy, mrmeshnumpy
+
+    def read(self, path):
+        self.mesh = self.meshlib.loadMesh(path)
+        if not self.mesh.topology.numValidFaces():
+            raise ValueError("no triangles")
+        self.meshlib.uniteCloseVertices(self.mesh, 0.0, False)
+
+    def valid(self):
+        """Which faces of its numbering are there."""
+        return self.arrays.getNumpyBitSet(self.mesh.topology.getValidFaces())
+
+    def corners(self):
+        # Up to the last one that is there.
+        faces = self.arrays.getNumpyFaces(self.mesh.topology)
+        return self.arrays.getNumpyVerts(self.mesh)[faces[self.valid()[: len(faces)]]]
+
+    def intersections(self):
+        found = self.meshlib.findSelfCollidingTriangles(self.meshlib.MeshPart(self.mesh), touchIsIntersection=True)
+        pairs = np.array([(pair.aFace.get(), pair.bFace.get()) for pair in found], np.int64).reshape(-1, 2)
+        return (np.cumsum(self.valid()) - 1)[pairs]
+
+    def counts(self):
+        part = self.meshlib.MeshPart(self.mesh)
+        return {
+            "degenerate": self.meshlib.findDegenerateFaces(part).count(),
+            "components": len(self.meshlib.getAllComponents(part)),
+        }
+
+
+class Trueform(Peer):
+    label, package, finds = "trueform", "trueform", "mesh"
+    how = (
+        "`read_obj`, `read_stl` (PLY by this bench), `cleaned(remove_duplicate_primitives=False)`, `non_manifold_edges`, `boundary_edges`, "
+        "`manifold_edge_link` with `label_connected_components`, `has_self_intersections`, which answers yes or no"
+    )
+    leaves_out = (VERTEX_CROSS, VERTEX_TOUCH, VERTEX_PLANE, FOLD, SAME)
+    definition = "faces that share a vertex are never tested (its documentation)"
+    why = (
+        "vertices are moved to a lattice (its documentation); wrong are meshes with parts that are tiny beside the whole, and meshes "
+        "with faces of zero area"
+    )
+
+    def __init__(self):
+        import trueform
+
+        self.trueform = trueform
+
+    def read(self, path):
+        reader = {".obj": lambda path: self.trueform.read_obj(path, ngon=3), ".stl": self.trueform.read_stl}
+        faces, vertices = reader[path[-4:]](path) if path[-4:] in reader else read_ply(pathlib.Path(path))[::-1]
+        if not len(faces):
+            raise ValueError("no triangles")
+        if faces.min() < 0 or faces.max() >= len(vertices):
+            raise IndexError("a face names an absent vertex")
+        self.read_corners = vertices[faces]
+        faces, vertices = self.trueform.cleaned(
+            (np.ascontiguousarray(faces, np.int32), vertices), remove_duplicate_primitives=False
+        )
+        self.mesh = self.trueform.Mesh(faces, vertices)
+
+    def corners(self):
+        return self.read_corners
+
+    def intersections(self):
+        return np.array([self.trueform.has_self_intersections(self.mesh)])
+
+    def counts(self):
+        links = self.trueform.manifold_edge_link(self.mesh.faces, self.mesh.face_membership)
+        return {
+            "non_manifold_edges": len(self.trueform.non_manifold_edges(self.mesh)),
+            "boundary_edges": len(self.trueform.boundary_edges(self.mesh)),
+            "components": self.trueform.label_connected_components(links)[0],
+        }
+
+
+PEERS = {kind.__name__: kind for kind in [Trimesh, Open3d, MeshLab, MeshLib, Libigl, LibiglPredicates, Trueform]}
 
 
 def answered(peer, question):

@@ -47,6 +47,12 @@ def broken_table(files, columns):
     return "\n".join(lines)
 
 
+def broken_counts(files, columns):
+    """The same for all such files together: a number per outcome."""
+    broken = [file.path for file in files if not file.is_good]
+    return {label: collections.Counter(outcome(answers.get(path)) for path in broken) for label, answers in columns.items()}
+
+
 def self_table(compared):
     lines = [
         "| | files compared | the same | difference | pairs or faces | files | for example |",
@@ -69,11 +75,12 @@ def summary_table(compared):
         "another definition": "another definition",
         "peer misses": "misses true ones",
         "peer reports": "reports false ones",
+        "peer says": "wrong yes or no",
     }
     ends |= {"not decided": "not decided", "IMPINGE": "impinge is wrong"}
-    lines = ["| | files | the same | " + " | ".join(ends.values()) + " |", "|---|---:|---:" + "|---:" * len(ends) + "|"]
+    lines = ["| | files | the same | some answer wrong | " + " | ".join(ends.values()) + " |", "|---|---:|---:|---:" + "|---:" * len(ends) + "|"]
     for label, (agree, classes) in compared.items():
-        cells = [label, f"{agree['files']:,}", f"{agree['same']:,}"]
+        cells = [label, f"{agree['files']:,}", f"{agree['same']:,}", f"{agree['wrong']:,}"]
         for end in ends:
             cells.append(f"{sum(entry['n'] for name, entry in classes.items() if name.startswith(end)):,}")
         lines.append("| " + " | ".join(cells) + " |")
