@@ -89,20 +89,20 @@ pub enum Command {
     /// Find how far each vertex may move, on any path, so that nothing touches
     #[command(
         after_help = safe::SAFE_EXAMPLES,
-        mut_arg("rows", |rows| rows.help("Write a row per vertex (.csv, .jsonl or .npy; \"-\" is standard output)"))
+        mut_arg("rows", |rows| rows.help("Write a row per vertex (.csv, .jsonl, .npy or .parquet; \"-\" is standard output)"))
     )]
     Safe(SafeArgs),
     /// Find the element of a mesh that is nearest to each of many points, and which of them are
     /// inside
     #[command(
         after_help = probe::PROBE_EXAMPLES,
-        mut_arg("rows", |rows| rows.help("Write a row per point that is near enough (.csv, .jsonl or .npy; \"-\" is standard output)"))
+        mut_arg("rows", |rows| rows.help("Write a row per point that is near enough (.csv, .jsonl, .npy or .parquet; \"-\" is standard output)"))
     )]
     Probe(ProbeArgs),
     /// Find what rays hit of a mesh
     #[command(
         after_help = probe::CAST_EXAMPLES,
-        mut_arg("rows", |rows| rows.help("Write a row per hit (.csv, .jsonl or .npy; \"-\" is standard output)"))
+        mut_arg("rows", |rows| rows.help("Write a row per hit (.csv, .jsonl, .npy or .parquet; \"-\" is standard output)"))
     )]
     Cast(CastArgs),
     /// Find the pairs in every frame of a deforming mesh
@@ -355,7 +355,7 @@ pub struct AnswerArgs {
     pub repeat: NonZeroUsize,
     #[command(flatten)]
     pub rows: RowsArgs,
-    /// Write where the triangles of each pair meet, one row per corner (.csv, .jsonl or .npy)
+    /// Write where the triangles of each pair meet, one row per corner (.csv, .jsonl, .npy or .parquet)
     #[arg(long, value_name = "FILE")]
     pub contacts: Option<RowsFile>,
     /// Write the curves in which surfaces cross (.ply, .obj or .vtu)

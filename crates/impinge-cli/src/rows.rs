@@ -2,7 +2,7 @@
 //! output.
 
 use std::io::{BufWriter, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use impinge::exact::Feature;
 use impinge::{Impact, NearPair, NearPairs};
@@ -10,91 +10,165 @@ use impinge_io::{AtomicFile, Cell, Column, ELEMENTS, Holds, KIND, Table, TableFo
 
 use crate::error::Error;
 use crate::output::out;
-use crate::values::RowsFile;
+use crate::values::{RowsFile, RowsFormat};
+
+#[cfg(feature = "parquet")]
+mod parquet;
 
 /// A file of rows that is being written.
 pub struct Rows {
-    table: Table,
     path: PathBuf,
-    /// `None` for standard output.
-    file: Option<AtomicFile>,
-    /// The rows written, if their number was not known before.
-    n_late: Option<u64>,
+    format: Format,
+}
+
+/// How rows become bytes.
+enum Format {
+    Table {
+        table: Table,
+        /// `None` for standard output.
+        file: Option<AtomicFile>,
+        /// The rows written, if their number was not known before.
+        n_late: Option<u64>,
+    },
+    #[cfg(feature = "parquet")]
+    Parquet(parquet::Columns),
 }
 
 impl Rows {
     /// Starts a file. `n`: the number of rows, if it is known.
     pub fn create(file: &RowsFile, columns: Vec<Column>, n: Option<u64>) -> Result<Self, Error> {
-        if file.is_stdout() && n.is_none() && file.format == TableFormat::Npy {
-            let text = "--rows-format npy: such a file begins with the number of its rows, which is not known yet: \
-                        name a file instead of -";
-            return Err(Error::Usage(text.to_owned()));
-        }
-        let mut rows = Rows {
-            table: Table::new(file.format, columns),
-            path: file.path.clone(),
-            file: match file.is_stdout() {
-                true => None,
-                false => Some(AtomicFile::create(&file.path)?),
-            },
-            n_late: n.is_none().then_some(0),
+        let format = match file.format {
+            RowsFormat::Csv => TableFormat::Csv,
+            RowsFormat::Jsonl => TableFormat::Jsonl,
+            RowsFormat::Npy if file.is_stdout() && n.is_none() => {
+                let text = "--rows-format npy: such a file begins with the number of its rows, which is not known yet: \
+                            name a file instead of -";
+                return Err(Error::Usage(text.to_owned()));
+            }
+            RowsFormat::Npy => TableFormat::Npy,
+            #[cfg(feature = "parquet")]
+            RowsFormat::Parquet => return Self::in_columns(file, &columns),
         };
-        let header = rows.table.header(n);
-        rows.act(|_, to| to.write_all(&header))?;
+        let mut rows = Rows {
+            path: file.path.clone(),
+            format: Format::Table {
+                table: Table::new(format, columns),
+                file: match file.is_stdout() {
+                    true => None,
+                    false => Some(AtomicFile::create(&file.path)?),
+                },
+                n_late: n.is_none().then_some(0),
+            },
+        };
+        if let Format::Table { table, file, .. } = &mut rows.format {
+            let header = table.header(n);
+            write_to(&rows.path, file, |to| to.write_all(&header))?;
+        }
         Ok(rows)
     }
 
-    /// Adds rows.
-    pub fn put<'a, const N: usize>(
-        &mut self,
-        rows: impl IntoIterator<Item = [Cell<'a>; N]>,
-    ) -> Result<(), Error> {
-        let mut n = 0;
-        self.act(|table, to| {
-            rows.into_iter().try_for_each(|row| {
-                n += 1;
-                table.row(to, &row)
-            })
-        })?;
-        self.n_late = self.n_late.map(|before| before + n);
-        Ok(())
+    #[cfg(feature = "parquet")]
+    fn in_columns(file: &RowsFile, columns: &[Column]) -> Result<Self, Error> {
+        if file.is_stdout() {
+            let text = "--rows-format parquet: such a file is no text: name a file instead of -";
+            return Err(Error::Usage(text.to_owned()));
+        }
+        let path = file.path.clone();
+        let written = AtomicFile::create(&path)?;
+        match parquet::Columns::create(written, columns) {
+            Ok(columns) => Ok(Rows {
+                path,
+                format: Format::Parquet(columns),
+            }),
+            Err(source) => Err(Error::Write { path, source }),
+        }
     }
 
-    fn act(
+    /// Adds rows.
+    pub fn put<'a, R: AsRef<[Cell<'a>]>>(
         &mut self,
-        act: impl FnOnce(&Table, &mut dyn Write) -> std::io::Result<()>,
+        rows: impl IntoIterator<Item = R>,
     ) -> Result<(), Error> {
-        match &mut self.file {
-            Some(file) => act(&self.table, file).map_err(|source| Error::Write {
-                path: self.path.clone(),
-                source,
-            }),
-            None => {
-                let mut to = BufWriter::new(out());
-                act(&self.table, &mut to)?;
-                Ok(to.flush()?)
+        match &mut self.format {
+            Format::Table {
+                table,
+                file,
+                n_late,
+            } => {
+                let mut n = 0;
+                write_to(&self.path, file, |to| {
+                    rows.into_iter().try_for_each(|row| {
+                        n += 1;
+                        table.row(to, row.as_ref())
+                    })
+                })?;
+                *n_late = n_late.map(|before| before + n);
+                Ok(())
+            }
+            #[cfg(feature = "parquet")]
+            Format::Parquet(columns) => {
+                let put = rows
+                    .into_iter()
+                    .try_for_each(|row| columns.put(row.as_ref()));
+                put.map_err(|source| Error::Write {
+                    path: self.path.clone(),
+                    source,
+                })
             }
         }
     }
 
     /// Gives the file its name.
     pub fn finish(self) -> Result<(), Error> {
-        let Some(mut file) = self.file else {
-            return Ok(());
-        };
-        if let Some(header) = self.n_late.and_then(|n| self.table.late_header(n)) {
-            file.patch(0, &header)?;
+        match self.format {
+            Format::Table { file: None, .. } => Ok(()),
+            Format::Table {
+                table,
+                file: Some(mut file),
+                n_late,
+            } => {
+                if let Some(header) = n_late.and_then(|n| table.late_header(n)) {
+                    file.patch(0, &header)?;
+                }
+                Ok(file.finish()?)
+            }
+            #[cfg(feature = "parquet")]
+            Format::Parquet(columns) => {
+                let file = columns.finish().map_err(|source| Error::Write {
+                    path: self.path,
+                    source,
+                })?;
+                Ok(file.finish()?)
+            }
         }
-        Ok(file.finish()?)
+    }
+}
+
+/// Writes to a file, or to standard output.
+fn write_to(
+    path: &Path,
+    file: &mut Option<AtomicFile>,
+    act: impl FnOnce(&mut dyn Write) -> std::io::Result<()>,
+) -> Result<(), Error> {
+    match file {
+        Some(file) => act(file).map_err(|source| Error::Write {
+            path: path.to_owned(),
+            source,
+        }),
+        None => {
+            let mut to = BufWriter::new(out());
+            act(&mut to)?;
+            Ok(to.flush()?)
+        }
     }
 }
 
 /// Writes all rows of an answer.
-pub fn write<'a, const N: usize>(
+pub fn write<'a, R: AsRef<[Cell<'a>]>>(
     file: &RowsFile,
     columns: Vec<Column>,
     n: usize,
-    rows: impl IntoIterator<Item = [Cell<'a>; N]>,
+    rows: impl IntoIterator<Item = R>,
 ) -> Result<(), Error> {
     let mut to = Rows::create(file, columns, Some(n as u64))?;
     to.put(rows)?;

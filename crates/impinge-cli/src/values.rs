@@ -7,13 +7,12 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use clap::ValueEnum;
-use impinge_io::TableFormat;
 
 /// A file for rows.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RowsFile {
     pub path: PathBuf,
-    pub format: TableFormat,
+    pub format: RowsFormat,
 }
 
 /// The format of rows of pairs.
@@ -25,29 +24,28 @@ pub enum RowsFormat {
     Jsonl,
     /// A NumPy array
     Npy,
-}
-
-impl From<RowsFormat> for TableFormat {
-    fn from(format: RowsFormat) -> Self {
-        match format {
-            RowsFormat::Csv => TableFormat::Csv,
-            RowsFormat::Jsonl => TableFormat::Jsonl,
-            RowsFormat::Npy => TableFormat::Npy,
-        }
-    }
+    /// A Parquet file
+    #[cfg(feature = "parquet")]
+    Parquet,
 }
 
 impl RowsFile {
     /// A file whose name gives the format, unless that is told.
     pub fn new(path: &Path, format: Option<RowsFormat>) -> Result<Self, String> {
         let format = match format {
-            Some(format) => format.into(),
+            Some(format) => format,
             None => match extension(&path.to_string_lossy()).as_str() {
-                "npy" => TableFormat::Npy,
-                "csv" => TableFormat::Csv,
-                "jsonl" | "ndjson" => TableFormat::Jsonl,
-                _ if path == Path::new("-") => TableFormat::Csv,
-                _ => return Err("rows are written as .csv, .jsonl or .npy".to_owned()),
+                "npy" => RowsFormat::Npy,
+                "csv" => RowsFormat::Csv,
+                "jsonl" | "ndjson" => RowsFormat::Jsonl,
+                #[cfg(feature = "parquet")]
+                "parquet" => RowsFormat::Parquet,
+                #[cfg(not(feature = "parquet"))]
+                "parquet" => {
+                    return Err("this program was built without the feature parquet".to_owned());
+                }
+                _ if path == Path::new("-") => RowsFormat::Csv,
+                _ => return Err("rows are written as .csv, .jsonl, .npy or .parquet".to_owned()),
             },
         };
         let path = path.to_owned();
@@ -571,17 +569,11 @@ mod tests {
 
     #[test]
     fn files_by_extension() {
-        assert_eq!(
-            "a.NPY".parse::<RowsFile>().unwrap().format,
-            TableFormat::Npy
-        );
-        assert_eq!(
-            "a.csv".parse::<RowsFile>().unwrap().format,
-            TableFormat::Csv
-        );
+        assert_eq!("a.NPY".parse::<RowsFile>().unwrap().format, RowsFormat::Npy);
+        assert_eq!("a.csv".parse::<RowsFile>().unwrap().format, RowsFormat::Csv);
         assert_eq!(
             "a.jsonl".parse::<RowsFile>().unwrap().format,
-            TableFormat::Jsonl
+            RowsFormat::Jsonl
         );
         assert!("-".parse::<RowsFile>().unwrap().is_stdout());
         assert!("a.txt".parse::<RowsFile>().is_err());

@@ -1,6 +1,7 @@
 //! Tables of rows: CSV, lines of JSON, NumPy arrays. One description of the columns serves all
-//! three.
+//! formats, and those that others write.
 
+use std::fmt;
 use std::io::{self, Write};
 
 use crate::npy::{npy_header, npy_header_in};
@@ -24,6 +25,8 @@ pub struct Column {
     pub name: &'static str,
     /// What it holds.
     pub holds: Holds,
+    /// Whether rows may have [nothing](Cell::None) there.
+    pub may_be_none: bool,
 }
 
 /// What a column holds.
@@ -39,8 +42,12 @@ pub enum Holds {
     F64,
     /// Yes or no; 1 and 0 in CSV.
     Bool,
+    /// Whole numbers of 64 bits, with a sign.
+    Count,
     /// Text of so many ASCII characters at most.
     Text(usize),
+    /// Text of any length. Not in arrays.
+    Line,
     /// One of a few words, in arrays its number in 8 bits.
     Word,
     /// Three `f64`, in CSV under three names.
@@ -57,10 +64,16 @@ pub enum Cell<'a> {
     Number(u32),
     /// Of [`Holds::F32`] and [`Holds::F64`].
     Float(f64),
+    /// Of [`Holds::Count`].
+    Count(i64),
     /// Of [`Holds::Bool`].
     Bool(bool),
     /// Of [`Holds::Text`]: letters, digits and `_`.
     Text(&'a str),
+    /// Of [`Holds::Line`].
+    Line(&'a str),
+    /// Nothing, in a column that [may have none](Column::or_none).
+    None,
     /// Of [`Holds::Word`].
     Word(u8, &'a str),
     /// Of [`Holds::Point`].
@@ -99,10 +112,40 @@ impl<'a> Cell<'a> {
     }
 }
 
+/// As in CSV files, without quotes.
+impl fmt::Display for Cell<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Cell::Number(n) => write!(f, "{n}"),
+            Cell::Count(n) => write!(f, "{n}"),
+            Cell::Float(x) => write!(f, "{x:?}"),
+            Cell::Bool(is_so) => write!(f, "{}", u8::from(is_so)),
+            Cell::Text(text) | Cell::Word(_, text) | Cell::Line(text) => f.write_str(text),
+            Cell::Point([x, y, z]) => write!(f, "{x:?},{y:?},{z:?}"),
+            Cell::Feature(0, [vertex, _]) => write!(f, "v{vertex}"),
+            Cell::Feature(1, [low, high]) => write!(f, "e{low}-{high}"),
+            Cell::Feature(_, [face, _]) => write!(f, "f{face}"),
+            Cell::None => Ok(()),
+        }
+    }
+}
+
 impl Column {
     /// A column.
     pub const fn new(name: &'static str, holds: Holds) -> Self {
-        Column { name, holds }
+        Column {
+            name,
+            holds,
+            may_be_none: false,
+        }
+    }
+
+    /// The same, where rows may have nothing. Not in arrays.
+    pub const fn or_none(self) -> Self {
+        Column {
+            may_be_none: true,
+            ..self
+        }
     }
 }
 
@@ -115,11 +158,17 @@ pub struct Table {
 
 impl Table {
     /// A table with these columns, in this order.
+    ///
+    /// # Panics
+    /// If the format is that of arrays, and a column holds text of any length or may have none.
     pub fn new(format: TableFormat, columns: impl Into<Vec<Column>>) -> Self {
-        Table {
-            format,
-            columns: columns.into(),
-        }
+        let columns = columns.into();
+        let is_array = |column: &Column| column.holds != Holds::Line && !column.may_be_none;
+        assert!(
+            format != TableFormat::Npy || columns.iter().all(is_array),
+            "columns of text or with nothing are not in arrays"
+        );
+        Table { format, columns }
     }
 
     /// The bytes before the first row. Without the number of rows they are only as long as these
@@ -172,9 +221,8 @@ impl Table {
                 for (ix, (_, cell)) in columns {
                     to.write_all(if ix > 0 { b"," } else { b"" })?;
                     match cell {
-                        Cell::Bool(is_so) => write!(to, "{}", u8::from(*is_so))?,
-                        Cell::Point([x, y, z]) => write!(to, "{x:?},{y:?},{z:?}")?,
-                        cell => text(to, *cell)?,
+                        Cell::Line(line) => quoted(to, line)?,
+                        cell => write!(to, "{cell}")?,
                     }
                 }
                 to.write_all(b"\n")
@@ -183,16 +231,28 @@ impl Table {
                 for (ix, (column, cell)) in columns {
                     let start = if ix > 0 { ',' } else { '{' };
                     write!(to, "{start}\"{}\":", column.name)?;
-                    let is_text =
-                        matches!(cell, Cell::Text(_) | Cell::Word(..) | Cell::Feature(..));
-                    let quote: &[u8] = if is_text { b"\"" } else { b"" };
-                    to.write_all(quote)?;
-                    text(to, *cell)?;
-                    to.write_all(quote)?;
+                    match cell {
+                        Cell::Text(_) | Cell::Word(..) | Cell::Feature(..) => {
+                            write!(to, "\"{cell}\"")?;
+                        }
+                        Cell::Line(line) => write!(to, "{}", serde_json::Value::from(*line))?,
+                        Cell::Bool(is_so) => write!(to, "{is_so}")?,
+                        Cell::Point(_) => write!(to, "[{cell}]")?,
+                        Cell::None => to.write_all(b"null")?,
+                        Cell::Number(_) | Cell::Count(_) | Cell::Float(_) => write!(to, "{cell}")?,
+                    }
                 }
                 to.write_all(b"}\n")
             }
         }
+    }
+}
+
+/// Text in a CSV file, in quotes where it needs them (RFC 4180).
+fn quoted(to: &mut dyn Write, text: &str) -> io::Result<()> {
+    match text.contains([',', '"', '\n', '\r']) {
+        true => write!(to, "\"{}\"", text.replace('"', "\"\"")),
+        false => to.write_all(text.as_bytes()),
     }
 }
 
@@ -206,22 +266,10 @@ fn field(column: &Column) -> String {
         Holds::F64 => format!("('{name}', '<f8')"),
         Holds::Bool => format!("('{name}', '|b1')"),
         Holds::Text(width) => format!("('{name}', '<U{width}')"),
+        Holds::Count => format!("('{name}', '<i8')"),
+        Holds::Line => unreachable!("Table::new refuses it in arrays"),
         Holds::Point(_) => format!("('{name}', '<f8', (3,))"),
         Holds::Feature(kind) => format!("('{kind}', '|u1'), ('{name}', '<u4', (2,))"),
-    }
-}
-
-/// A value as text. Numbers read back to the same bits.
-fn text(to: &mut dyn Write, cell: Cell<'_>) -> io::Result<()> {
-    match cell {
-        Cell::Number(n) => write!(to, "{n}"),
-        Cell::Float(x) => write!(to, "{x:?}"),
-        Cell::Bool(is_so) => write!(to, "{is_so}"),
-        Cell::Text(text) | Cell::Word(_, text) => to.write_all(text.as_bytes()),
-        Cell::Point([x, y, z]) => write!(to, "[{x:?},{y:?},{z:?}]"),
-        Cell::Feature(0, [vertex, _]) => write!(to, "v{vertex}"),
-        Cell::Feature(1, [low, high]) => write!(to, "e{low}-{high}"),
-        Cell::Feature(_, [face, _]) => write!(to, "f{face}"),
     }
 }
 
@@ -232,6 +280,7 @@ fn put(to: &mut dyn Write, holds: Holds, cell: Cell<'_>) -> io::Result<()> {
         (Cell::Number(n), _) => to.write_all(&n.to_le_bytes()),
         (Cell::Float(x), Holds::F32) => to.write_all(&(x as f32).to_le_bytes()),
         (Cell::Float(x), _) => to.write_all(&x.to_le_bytes()),
+        (Cell::Count(n), _) => to.write_all(&n.to_le_bytes()),
         (Cell::Bool(is_so), _) => to.write_all(&[u8::from(is_so)]),
         (Cell::Text(text), Holds::Text(width)) => {
             // As in NumPy, a character is four bytes, and zeros fill the text up.
@@ -247,6 +296,7 @@ fn put(to: &mut dyn Write, holds: Holds, cell: Cell<'_>) -> io::Result<()> {
             to.write_all(&[kind])?;
             to.write_all(numbers.map(u32::to_le_bytes).as_flattened())
         }
+        (Cell::Line(_) | Cell::None, _) => unreachable!("Table::new refuses it in arrays"),
     }
 }
 
@@ -314,6 +364,7 @@ mod tests {
             Column::new("shape", Holds::Word),
             Column::new("point", Holds::Point(["px", "py", "pz"])),
             Column::new("feature", Holds::Feature("feature_kind")),
+            Column::new("count", Holds::Count),
         ];
         let row = [
             Cell::Number(255),
@@ -324,21 +375,22 @@ mod tests {
             Cell::Word(2, "segment"),
             Cell::Point([1.0, -2.5, 1e21]),
             Cell::Feature(1, [7, 9]),
+            Cell::Count(-3),
         ];
         let in_format = |format| written(&Table::new(format, columns), &[&row]);
         assert_eq!(
             String::from_utf8(in_format(TableFormat::Csv)).unwrap(),
-            "n,toi,x,parallel,type,shape,px,py,pz,feature\n255,0.5,1e-7,1,AB,segment,1.0,-2.5,1e21,e7-9\n"
+            "n,toi,x,parallel,type,shape,px,py,pz,feature,count\n255,0.5,1e-7,1,AB,segment,1.0,-2.5,1e21,e7-9,-3\n"
         );
         assert_eq!(
             String::from_utf8(in_format(TableFormat::Jsonl)).unwrap(),
             "{\"n\":255,\"toi\":0.5,\"x\":1e-7,\"parallel\":true,\"type\":\"AB\",\"shape\":\"segment\",\
-             \"point\":[1.0,-2.5,1e21],\"feature\":\"e7-9\"}\n"
+             \"point\":[1.0,-2.5,1e21],\"feature\":\"e7-9\",\"count\":-3}\n"
         );
         let bytes = in_format(TableFormat::Npy);
         let (header, data) = npy(&bytes);
         let fields = "[('n', '|u1'), ('toi', '<f4'), ('x', '<f8'), ('parallel', '|b1'), ('type', '<U3'), ('shape', '|u1'), \
-                      ('point', '<f8', (3,)), ('feature_kind', '|u1'), ('feature', '<u4', (2,))]";
+                      ('point', '<f8', (3,)), ('feature_kind', '|u1'), ('feature', '<u4', (2,)), ('count', '<i8')]";
         assert!(header.contains(fields), "{header}");
         let mut expected = vec![255];
         expected.extend(0.5f32.to_le_bytes());
@@ -346,6 +398,30 @@ mod tests {
         expected.extend([1, 65, 0, 0, 0, 66, 0, 0, 0, 0, 0, 0, 0, 2]);
         expected.extend([1.0f64, -2.5, 1e21].map(f64::to_le_bytes).as_flattened());
         expected.extend([1, 7, 0, 0, 0, 9, 0, 0, 0]);
+        expected.extend((-3i64).to_le_bytes());
         assert_eq!(data, expected);
+    }
+
+    #[test]
+    fn lines_are_quoted_and_nothing_is_empty() {
+        let columns = [
+            Column::new("path", Holds::Line),
+            Column::new("n", Holds::Count).or_none(),
+            Column::new("error", Holds::Line).or_none(),
+        ];
+        let rows: [&[Cell<'_>]; 2] = [
+            &[Cell::Line("a.stl"), Cell::Count(i64::MAX), Cell::None],
+            &[Cell::Line("b, c"), Cell::None, Cell::Line("no \"faces\"")],
+        ];
+        let in_format = |format| written(&Table::new(format, columns), &rows);
+        assert_eq!(
+            String::from_utf8(in_format(TableFormat::Csv)).unwrap(),
+            "path,n,error\na.stl,9223372036854775807,\n\"b, c\",,\"no \"\"faces\"\"\"\n"
+        );
+        assert_eq!(
+            String::from_utf8(in_format(TableFormat::Jsonl)).unwrap(),
+            "{\"path\":\"a.stl\",\"n\":9223372036854775807,\"error\":null}\n\
+             {\"path\":\"b, c\",\"n\":null,\"error\":\"no \\\"faces\\\"\"}\n"
+        );
     }
 }

@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use impinge::{Backend, CancelToken, Control, Precision, Settings, SharedVertex, Start};
 use impinge_check::{
-    Finding, FixError, FixOptions, Limits, Options, Pool, PoolError, Repair, Report, Row,
+    Finding, FixError, FixOptions, KeyKind, Limits, Options, Pool, PoolError, Repair, Report, Row,
     apply_limits, fix_mesh, serve,
 };
 use impinge_io::{Elements, Mesh, Positions};
@@ -218,6 +218,21 @@ pub fn _report(
 #[pyfunction]
 pub fn _findings() -> Vec<&'static str> {
     Finding::ALL.map(Finding::name).to_vec()
+}
+
+/// The columns of a table of meshes: their names, and what they hold.
+#[pyfunction]
+pub fn _check_columns() -> Vec<(&'static str, &'static str)> {
+    let of = |(name, kind)| {
+        let holds = match kind {
+            KeyKind::Text => "text",
+            KeyKind::Flag => "flag",
+            KeyKind::Count => "count",
+            KeyKind::Number => "number",
+        };
+        (name, holds)
+    };
+    Row::KEYS.map(of).to_vec()
 }
 
 /// The child's side of `_check`: answers paths on standard input by rows on standard output.

@@ -50,7 +50,7 @@ mod _impinge {
     use super::contact::{Contacts, Penetration};
     #[pymodule_export]
     use super::datasets::{
-        _check, _findings, _fix, _report, _serve_check, _tiles_describe, _tiles_merge, _tiles_plan,
+        _check, _check_columns, _findings, _fix, _report, _serve_check, _tiles_describe, _tiles_merge, _tiles_plan,
         _tiles_run, _tiles_scatter,
     };
     #[pymodule_export]

@@ -1,5 +1,6 @@
 """The program impinge-check, the GitHub Action and the hook of pre-commit: by running their commands as written."""
 
+import csv
 import json
 import os
 import pathlib
@@ -238,3 +239,31 @@ def test_the_hook_of_pre_commit(folder):
     assert hook["language"] == "python" and hook["entry"] == "impinge-check"
     assert run(*hook["args"], "clean.obj", "open.obj").returncode == 0
     assert run(*hook["args"], "clean.obj", "bad.obj").returncode == 3
+
+
+def test_rows_are_a_table_with_a_row_per_mesh(folder):
+    ran = run(*ALL, "--rows", "rows.csv", "--min-thickness", "0.5")
+    assert ran.returncode == 1, ran.stderr
+    with open("rows.csv", newline="") as file:
+        header, *rows = csv.reader(file)
+    assert header[:3] == ["path", "welded", "vertices"] and header[-1] == "error_kind"
+    assert [row[0] for row in rows] == ALL
+    assert rows[0][1:3] == ["1", "4"] and rows[5][2] == ""
+    # As the program impinge writes it: the keys of --json without places.
+    printed = [json.loads(line) for line in run(*ALL, "--json", "--min-thickness", "0.5", "--rows", "rows.jsonl").stdout.splitlines()]
+    table = [json.loads(line) for line in pathlib.Path("rows.jsonl").read_text().splitlines()]
+    for row, object in zip(table, printed):
+        assert list(row) == header
+        assert {key: value for key, value in object.items() if key != "places"}.items() <= row.items()
+    assert run("clean.obj", "--rows", "rows.npy").returncode == 2
+    assert run("clean.obj", "--rows", "absent/rows.csv").returncode == 1
+
+
+def test_rows_in_parquet(folder):
+    parquet = pytest.importorskip("pyarrow.parquet", reason="pyarrow is not installed")
+    run(*ALL, "--rows", "rows.jsonl")
+    assert run(*ALL, "--rows", "rows.parquet").returncode == 1
+    assert not pathlib.Path("rows.parquet.part").exists()
+    table = parquet.read_table("rows.parquet")
+    assert table.to_pylist() == [json.loads(line) for line in pathlib.Path("rows.jsonl").read_text().splitlines()]
+    assert str(table.schema.field("volume").type) == "double" and str(table.schema.field("euler").type) == "int64"

@@ -38,7 +38,7 @@ those of body 1 blue, then green, orange, …; hidden ones show through faintly.
         about: "Files of rows, one per pair that is found: --rows, --candidates, --contacts",
         options: RowsArgs::augment_args,
         text: "\
-Without --rows-format the name of the file decides: .csv, .jsonl or .npy; standard output is CSV. If the rows go to
+Without --rows-format the name of the file decides: .csv, .jsonl, .npy or .parquet; standard output is CSV. If the rows go to
 standard output, the summary goes to standard error. Rows are sorted. Bodies are numbered from 0 as given,
 vertices and faces as in the file; edges are the unique pairs (low, high) of vertices in the order of (high, low).
 Columns of numbers alone are a plain array in .npy files, others a structured one.

@@ -10,7 +10,7 @@ use crate::values::{RowsFile, RowsFormat};
 
 #[derive(Debug, Clone, Args)]
 pub struct RowsArgs {
-    /// Write a row per pair that is found (.csv, .jsonl or .npy; "-" is standard output)
+    /// Write a row per pair that is found (.csv, .jsonl, .npy or .parquet; "-" is standard output)
     #[arg(long, value_name = "FILE", aliases = ["pairs", "impacts"], group = "rows_file")]
     pub rows: Option<PathBuf>,
     /// The format of the rows, whatever the name of the file

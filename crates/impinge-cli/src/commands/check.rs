@@ -4,6 +4,7 @@ mod args;
 mod assembly;
 mod ending;
 mod html;
+mod rows;
 mod shown;
 
 use std::collections::BTreeMap;
@@ -19,6 +20,7 @@ use impinge_check::{
 
 pub use self::args::{CHECK_EXAMPLES, CheckArgs, CheckWorkerArgs, FailOn};
 pub use self::ending::fail;
+use crate::apart::Inputs;
 use crate::error::Error;
 use crate::output;
 use crate::stop::Patience;
@@ -31,6 +33,10 @@ pub fn check(args: &CheckArgs, cancel: &CancelToken) -> Result<(), Error> {
     }
     assembly::refuse_alone(args)?;
     let paths = paths(args)?;
+    if let Some(file) = &args.rows {
+        rows::refuse(file)?;
+        Inputs::new(paths.iter().chain(&args.list)).check("--rows", &file.path)?;
+    }
     if args.keep_seams && matches!(args.out, Some(args::Out::Folder(_))) {
         // Rows do not say by which of the two rules an unwelded mesh was checked.
         let text = "--keep-seams: its rows are printed, not kept in a folder: use --json";
@@ -85,6 +91,9 @@ pub fn check(args: &CheckArgs, cancel: &CancelToken) -> Result<(), Error> {
             }
             ending::print_next(&rows, args)?;
         }
+    }
+    if let Some(file) = &args.rows {
+        rows::write(file, &rows)?;
     }
     if let Some(path) = &args.summary {
         append(path, &report.markdown())?;

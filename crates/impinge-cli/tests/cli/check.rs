@@ -469,6 +469,53 @@ fn junit_is_xml_with_the_numbers_that_it_announces() {
 }
 
 #[test]
+fn rows_are_a_table_with_a_row_per_mesh() {
+    let folder = meshes();
+    folder.text("a, \"b\".obj", CLOSED);
+    let names = ["closed.obj", "a, \"b\".obj", "pierced.obj", "nan.obj"];
+    let run = |rows: &str| folder.run([&["check"], &names[..], &["--rows", rows]].concat());
+    failed(run("rows.csv"), 1, 4);
+    let csv = std::fs::read_to_string(folder.path("rows.csv")).unwrap();
+    let lines: Vec<&str> = csv.lines().collect();
+    assert_eq!(lines.len(), 5, "{csv}");
+    assert!(lines[0].starts_with("path,welded,vertices,vertices_welded,triangles,"));
+    assert!(lines[0].ends_with(",min_thickness,thin_faces,thinnest,error,error_kind"));
+    assert!(lines[1].starts_with("closed.obj,1,4,0,4,0,0,0,0000000000000000,0,"));
+    assert!(lines[2].starts_with("\"a, \"\"b\"\".obj\",1,4,0,4,0,0,"));
+    assert!(lines[4].starts_with("nan.obj,1,,,,,,,,") && lines[4].ends_with(",not_finite"));
+    // The same objects as those of --json, without places.
+    failed(run("rows.jsonl"), 1, 4);
+    let table = parsed(&std::fs::read_to_string(folder.path("rows.jsonl")).unwrap());
+    let json = parsed(&failed(
+        folder.run([&["check", "--json"], &names[..]].concat()),
+        1,
+        4,
+    ));
+    for (row, object) in table.iter().zip(&json) {
+        for (key, value) in object.as_object().unwrap() {
+            assert!(
+                key == "places" || row[key] == *value,
+                "{key}: {row} {object}"
+            );
+        }
+    }
+    #[cfg(feature = "parquet")]
+    {
+        failed(run("rows.parquet"), 1, 4);
+        let rows = crate::rows::csv_of_parquet(&folder.path("rows.parquet"));
+        assert_eq!(rows[0].join(","), lines[0]);
+        assert_eq!(rows[1].join(","), lines[1]);
+        assert_eq!(rows[2][0], names[1]);
+        assert_eq!(rows[4].last().unwrap(), "not_finite");
+    }
+    assert!(run("rows.npy").misuse().contains("arrays do not"));
+    assert!(run("-").misuse().contains("name a file, or use --json"));
+    folder.text("list.csv", "closed.obj\n");
+    let lost = folder.run(["check", "--list", "list.csv", "--rows", "list.csv"]);
+    assert!(lost.misuse().contains("would be lost"));
+}
+
+#[test]
 fn a_summary_is_appended_in_markdown() {
     let folder = meshes();
     let args = [

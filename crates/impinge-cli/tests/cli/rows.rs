@@ -132,7 +132,7 @@ fn every_answer_writes_rows_in_every_format() {
                 .contains("--rows - both write to standard output")
         );
         let unknown = folder.run(question.iter().chain(&["--rows", "rows.txt"]));
-        assert!(unknown.misuse().contains(".csv, .jsonl or .npy"));
+        assert!(unknown.misuse().contains(".csv, .jsonl, .npy or .parquet"));
         let alone = folder.run(question.iter().chain(&["--rows-format", "csv"]));
         assert_eq!(alone.code, Some(2));
         let lost = ["--rows", question[1], "--rows-format", "csv"];
@@ -147,6 +147,80 @@ fn every_answer_writes_rows_in_every_format() {
     );
     let refused = folder.run(ANSWERS[4].0.iter().chain(&stream));
     assert!(refused.misuse().contains("name a file"));
+}
+
+/// The rows of a Parquet file as those of a CSV file, its header first.
+#[cfg(feature = "parquet")]
+pub fn csv_of_parquet(path: &std::path::Path) -> Vec<Vec<String>> {
+    use parquet::file::reader::{FileReader, SerializedFileReader};
+    use parquet::record::Field;
+
+    let reader = SerializedFileReader::new(std::fs::File::open(path).unwrap()).unwrap();
+    let schema = reader.metadata().file_metadata().schema_descr();
+    let mut lines = vec![
+        (0..schema.num_columns())
+            .map(|ix| schema.column(ix).name().to_owned())
+            .collect(),
+    ];
+    for row in reader.get_row_iter(None).unwrap() {
+        let fields = row.unwrap().into_columns().into_iter();
+        let text = |field| match field {
+            Field::Null => String::new(),
+            Field::Bool(is_so) => u8::from(is_so).to_string(),
+            Field::UInt(n) => n.to_string(),
+            Field::Long(n) => n.to_string(),
+            // The text of such a number is that of the double.
+            Field::Float(x) => format!("{:?}", f64::from(x)),
+            Field::Double(x) => format!("{x:?}"),
+            Field::Str(text) => text,
+            other => panic!("{other:?}"),
+        };
+        lines.push(fields.map(|(_, field)| text(field)).collect());
+    }
+    lines
+}
+
+#[test]
+#[cfg(feature = "parquet")]
+fn every_answer_writes_parquet() {
+    let folder = folder();
+    for (question, _) in ANSWERS {
+        let run = |rows: &str| {
+            let run = folder.run(question.iter().chain(&["--rows", rows]));
+            assert_eq!(run.code, Some(0), "{question:?}: {}", run.stderr);
+            run.stdout
+        };
+        run("rows.parquet");
+        let rows = csv_of_parquet(&folder.path("rows.parquet"));
+        let csv: Vec<Vec<_>> = run("-")
+            .lines()
+            .map(|line| line.split(',').map(str::to_owned).collect())
+            .collect();
+        assert!(csv.len() > 1);
+        assert_eq!(rows, csv, "{question:?}");
+    }
+    let stream = ["--rows", "-", "--rows-format", "parquet"];
+    let refused = folder.run(ANSWERS[0].0.iter().chain(&stream));
+    assert!(refused.misuse().contains("name a file"));
+    // More rows than a group of the file has.
+    let soup = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+    folder.text(
+        "soup.obj",
+        &[&soup[..24], &"f 1 2 3\n".repeat(400)].concat(),
+    );
+    let many = ["self", "soup.obj", "--rows", "rows.parquet"];
+    assert!(folder.run(many).code == Some(0));
+    let rows = csv_of_parquet(&folder.path("rows.parquet"));
+    assert_eq!(rows.len(), 1 + 400 * 399 / 2);
+    assert_eq!(rows[79_800], ["0", "398", "0", "399"]);
+}
+
+#[test]
+#[cfg(not(feature = "parquet"))]
+fn parquet_is_a_feature() {
+    let folder = folder();
+    let run = folder.run(ANSWERS[0].0.iter().chain(&["--rows", "rows.parquet"]));
+    assert!(run.misuse().contains("built without the feature parquet"));
 }
 
 #[test]

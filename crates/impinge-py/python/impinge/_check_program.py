@@ -5,10 +5,12 @@ a workflow. It has the same options, words and exit codes.
 from __future__ import annotations
 
 import argparse
+import csv
 import json
 import os
 import sys
 from collections.abc import Sequence
+from typing import Any
 
 from . import _impinge
 from ._check import check
@@ -27,6 +29,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         _parser().error("the following arguments are required: MESH")
     if "thin" in args.fail_on and args.min_thickness is None and len(args.fail_on) < len(_FINDINGS):
         _parser().error("--fail-on thin: --min-thickness T says how thin")
+    if args.rows is not None and os.path.splitext(args.rows)[1].lower() not in _WRITERS:
+        _parser().error(f"--rows {args.rows}: rows of meshes are written as {', '.join(_WRITERS)}")
     options = {"weld": not args.no_weld, "min_thickness": args.min_thickness, "jobs": args.jobs, "timeout": args.timeout}
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
@@ -36,11 +40,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         rows = [json.dumps(row) for row in check(paths, **options)]
         text, failed = _impinge._report(rows, args.fail_on, args.format)
         print("".join(row + "\n" for row in rows) if args.json else text, end="")
+        if args.rows is not None:
+            _write_rows(args.rows, [json.loads(row) for row in rows])
         if args.summary is not None:
             # A workflow's summary is a file to which each step appends.
             with open(args.summary, "a", encoding="utf-8") as file:
                 file.write(_impinge._report(rows, args.fail_on, "markdown")[0])
-    except (OSError, ValueError, RuntimeError) as error:
+    except (ImportError, OSError, ValueError, RuntimeError) as error:
         print(f"impinge-check: {error}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
@@ -70,9 +76,50 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--timeout", metavar="S", type=float, help="seconds that one mesh may take")
     parser.add_argument("--jobs", metavar="N", type=int, help="child processes at a time; by default one per core")
     parser.add_argument("--format", choices=["text", "github"], default="text", help="github: annotations for a workflow")
+    parser.add_argument("--rows", metavar="FILE", help="write a table with a row per mesh (.csv, .jsonl, or with pyarrow .parquet)")
     parser.add_argument("--summary", metavar="FILE", help="append a table in Markdown to this file")
     parser.add_argument("--version", action="version", version=f"impinge-check {_impinge.__version__}")
     return parser
+
+
+def _write_rows(path: str, rows: list[dict[str, Any]]) -> None:
+    """Writes the columns of `impinge check --rows`. The file is whole or not there."""
+    columns = dict(_impinge._check_columns())
+    table = [{name: row.get(name) for name in columns} for row in rows]
+    part = f"{path}.part"
+    try:
+        _WRITERS[os.path.splitext(path)[1].lower()](part, table, columns)
+        os.replace(part, path)
+    finally:
+        if os.path.exists(part):
+            os.remove(part)
+
+
+def _write_csv(path: str, table: list[dict[str, Any]], columns: dict[str, str]) -> None:
+    with open(path, "w", encoding="utf-8", errors="surrogateescape", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(columns)
+        for row in table:
+            writer.writerow([int(cell) if isinstance(cell, bool) else cell for cell in row.values()])
+
+
+def _write_jsonl(path: str, table: list[dict[str, Any]], columns: dict[str, str]) -> None:
+    with open(path, "w", encoding="utf-8") as file:
+        file.writelines(json.dumps(row) + "\n" for row in table)
+
+
+def _write_parquet(path: str, table: list[dict[str, Any]], columns: dict[str, str]) -> None:
+    try:
+        import pyarrow
+        import pyarrow.parquet
+    except ImportError as error:
+        raise ImportError("--rows: .parquet needs pyarrow: pip install pyarrow") from error
+    types = {"text": pyarrow.string(), "flag": pyarrow.bool_(), "count": pyarrow.int64(), "number": pyarrow.float64()}
+    schema = pyarrow.schema([(name, types[kind]) for name, kind in columns.items()])
+    pyarrow.parquet.write_table(pyarrow.Table.from_pylist(table, schema), path)
+
+
+_WRITERS = {".csv": _write_csv, ".jsonl": _write_jsonl, ".parquet": _write_parquet}
 
 
 def _named(text: str) -> list[str]:

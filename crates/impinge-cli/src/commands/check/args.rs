@@ -9,7 +9,7 @@ use clap::{Args, ValueEnum};
 use impinge_check::Finding;
 
 use crate::args::PictureArgs;
-use crate::values::{HtmlFile, MeshFile, PngFile, bytes};
+use crate::values::{HtmlFile, MeshFile, PngFile, RowsFile, bytes};
 
 /// Shown below the help.
 pub const CHECK_EXAMPLES: &str = "\
@@ -19,6 +19,7 @@ Examples:
   impinge check part.ply --fail-on self-intersections,boundary       exit code 3 in CI
   impinge check parts/*.stl --format sarif > meshes.sarif            for code scanning; also junit, github
   impinge check parts/*.stl --html report.html                       a page with pictures of what is wrong
+  impinge check --list meshes.txt --rows meshes.parquet              a table for pandas, DuckDB, Excel
   impinge check part.stl --min-thickness 0.8 --fail-on thin           walls at most 0.8 thick
   impinge check --assembly robot.glb --touching ignore               which parts share space
   impinge check a.stl b.stl --clearance 0.2 --fail-on any            … or are nearer than that
@@ -129,6 +130,9 @@ pub struct CheckArgs {
     /// Write a page with a table, and each mesh and place as a picture and to be turned (.html)
     #[arg(long, value_name = "FILE")]
     pub html: Option<HtmlFile>,
+    /// Write a table with a row per mesh (.csv, .jsonl or .parquet)
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["assembly", "clearance"])]
+    pub rows: Option<RowsFile>,
     /// Append a table in Markdown to this file, as for the summary of a workflow
     #[arg(long, value_name = "FILE")]
     pub summary: Option<PathBuf>,
