@@ -50,8 +50,8 @@ mod _impinge {
     use super::contact::{Contacts, Penetration};
     #[pymodule_export]
     use super::datasets::{
-        _check, _check_columns, _findings, _fix, _report, _serve_check, _tiles_describe, _tiles_merge, _tiles_plan,
-        _tiles_run, _tiles_scatter,
+        _check, _check_columns, _findings, _fix, _report, _serve_check, _tiles_describe,
+        _tiles_merge, _tiles_plan, _tiles_run, _tiles_scatter,
     };
     #[pymodule_export]
     use super::detector::DetectorBase;
