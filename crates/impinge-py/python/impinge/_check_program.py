@@ -110,8 +110,8 @@ def _write_jsonl(path: str, table: list[dict[str, Any]], columns: dict[str, str]
 
 def _write_parquet(path: str, table: list[dict[str, Any]], columns: dict[str, str]) -> None:
     try:
-        import pyarrow
-        import pyarrow.parquet
+        import pyarrow  # type: ignore[import-not-found, import-untyped, unused-ignore]
+        import pyarrow.parquet  # type: ignore[import-not-found, import-untyped, unused-ignore]
     except ImportError as error:
         raise ImportError("--rows: .parquet needs pyarrow: pip install pyarrow") from error
     types = {"text": pyarrow.string(), "flag": pyarrow.bool_(), "count": pyarrow.int64(), "number": pyarrow.float64()}
