@@ -47,6 +47,7 @@ blender *arguments:
 release *arguments:
     scripts/release {{arguments}}
 
-# The moving picture of the front page
+# The pictures of the documents
 picture:
-    scripts/picture
+    scripts/picture moving
+    scripts/picture cloth
