@@ -6,6 +6,7 @@
 //! differs.
 
 #![warn(missing_debug_implementations)]
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
 mod answers;
 mod boxes;

@@ -25,6 +25,7 @@
 //! it uses the standard library for square roots alone; without, the feature `libm` has them.
 
 #![warn(missing_debug_implementations)]
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 #![cfg_attr(not(any(feature = "std", test)), no_std)]
 
 extern crate alloc;

@@ -49,6 +49,10 @@ impl Grid {
     /// gets one cell and the other axes share the cells (with the square root, or no root, in place
     /// of the cube root). So a flat cloth, with V = 0, gets a grid of squares, and a needle gets a
     /// row of cells.
+    #[allow(
+        clippy::disallowed_methods,
+        reason = "how large cells are changes no answer"
+    )]
     pub fn new(region: &Bounds, n_primitives: u64, lambda: f64) -> Self {
         let extent: [f64; 3] = std::array::from_fn(|axis| {
             (f64::from(region.max[axis]) - f64::from(region.min[axis])).clamp(0.0, 2f64.powi(129))

@@ -243,7 +243,7 @@ impl Vertices {
                     any = true;
                     let least = start.share_of_rounding(end, ix);
                     // Twice as much each time, and nothing in the end, whatever the numbers.
-                    let back = least * f64::from(vertex.n_stops).exp2();
+                    let back = least * (1u64 << vertex.n_stops.min(MOST_STOPS)) as f64;
                     let share = f64::from_bits(most).min(vertex.share - back);
                     let is_last = vertex.n_stops >= MOST_STOPS;
                     vertex.share = if is_last { 0.0 } else { share.max(0.0) };
