@@ -291,7 +291,7 @@ typedef struct impinge_element {
  *                       Columns that near pairs come with.
  *   hits                IMPINGE_HITS_FIRST (default), IMPINGE_HITS_ANY or IMPINGE_HITS_ALL, of rays.
  *   fixed, n_fixed      Bodies that do not move, of safe distances: they leave the whole distance to what is near them.
- *   n_nearest           Not known to this version: anything but 0 is refused. */
+ *   n_nearest           How many nearest elements of each point impinge_find_closest gives: at least 1. Default: 1. */
 typedef struct impinge_query {
   uint32_t size; /* sizeof(impinge_query) of the caller */
   uint32_t between, self, shared_vertex;
@@ -414,8 +414,12 @@ typedef struct impinge_nearest {
  * element. */
 #define IMPINGE_NO_FEATURE 255
 
+/* The number of no element: where nothing is near enough, or no tetrahedron contains a point. */
+#define IMPINGE_NO_ELEMENT UINT32_C(0xffffffff)
+
 /* The element that is nearest to a point. Which it is, is decided exactly; of several at the same distance it is the lowest by body and
- * then by number. Without any that is near enough `found` is 0, `body` IMPINGE_ANY_BODY, `distance` infinity and `point` NaN. */
+ * then by number. Without any that is near enough `found` is 0, `body` IMPINGE_ANY_BODY, `element` IMPINGE_NO_ELEMENT, `distance` infinity
+ * and `point` NaN. */
 typedef struct impinge_closest_element {
   double distance; /* rounded down: never above the true one, and 0 if they touch */
   double point[3]; /* the nearest point of the element, rounded to nearest */
@@ -653,12 +657,20 @@ impinge_status impinge_contains(impinge_detector *detector, const impinge_scene 
 impinge_status impinge_signed_distance(impinge_detector *detector, const impinge_scene *scene, uint32_t body, impinge_array points,
     double *distances);
 
-/* The elements nearest to points, one row per point. */
+/* Which tetrahedron of a body contains each point (3 columns of F32 or F64): `tetrahedra` gets one number per row, the lowest of several
+ * that share the face, edge or vertex on which a point is, or IMPINGE_NO_ELEMENT outside. Tetrahedra are closed: points on the surface are
+ * in one. Decided exactly. A flat one contains the points of its faces.
+ * INVALID: also a body of another kind than tetrahedra, a point that is not finite. */
+impinge_status impinge_locate(impinge_detector *detector, const impinge_scene *scene, uint32_t body, impinge_array points,
+    uint32_t *tetrahedra);
+
+/* The elements nearest to points, as many rows per point as the query says. */
 typedef struct impinge_closest impinge_closest;
 
 /* The element that is nearest to each point (3 columns of F32 or F64), if it is at most `most` away, a length of 0 or more, or infinity.
  * Elements are faces, those of the surface of tetrahedra, and the edges and points of other bodies. The query is about all bodies, or about
- * the body `a` alone. INVALID: also a query about pairs, a point that is not finite. */
+ * the body `a` alone. Its field `n_nearest` asks for that many elements of each point, nearest first, those at the same distance by body and
+ * number. INVALID: also a query about pairs, n_nearest 0, a point that is not finite. */
 impinge_status impinge_find_closest(impinge_detector *detector, const impinge_scene *scene, impinge_array points, double most,
     const impinge_query *query, impinge_closest **closest);
 
@@ -777,8 +789,11 @@ impinge_status impinge_neighbours_lists(const impinge_neighbours *neighbours, ui
 impinge_status impinge_neighbours_stats(const impinge_neighbours *neighbours, impinge_stats *stats);
 void impinge_neighbours_destroy(impinge_neighbours *neighbours);
 
-/* One row per point, in their order. The hash is of rows and their order. */
+/* The rows of the points, in their order: of point i those from i * n to (i + 1) * n, n being impinge_closest_n_nearest. Where fewer are
+ * near enough, the last of them have `found` 0. The hash is of rows and their order. */
 size_t impinge_closest_count(const impinge_closest *closest);
+/* How many rows each point has: the field `n_nearest` of the query. 0 for NULL. */
+size_t impinge_closest_n_nearest(const impinge_closest *closest);
 const impinge_closest_element *impinge_closest_data(const impinge_closest *closest);
 uint64_t impinge_closest_hash(const impinge_closest *closest);
 impinge_status impinge_closest_column(const impinge_closest *closest, uint32_t column, impinge_array *view);

@@ -1,5 +1,5 @@
 //! Questions about points and rays: `impinge_contains`, `impinge_signed_distance`,
-//! `impinge_find_closest`, `impinge_cast`.
+//! `impinge_locate`, `impinge_find_closest`, `impinge_cast`.
 
 use std::mem::offset_of;
 
@@ -35,7 +35,7 @@ fn closest_row(found: Option<ClosestElement>) -> impinge_closest_element {
             distance: f64::INFINITY,
             point: [f64::NAN; 3],
             body: ANY_BODY,
-            element: u32::MAX,
+            element: NO_ELEMENT,
             feature: NO_FEATURE,
             found: 0,
         },
@@ -159,6 +159,12 @@ pub unsafe extern "C" fn impinge_closest_hash(closest: *const impinge_closest) -
 }
 
 #[unsafe(no_mangle)]
+pub unsafe extern "C" fn impinge_closest_n_nearest(closest: *const impinge_closest) -> usize {
+    // SAFETY: see `answer!`.
+    unsafe { closest.as_ref() }.map_or(0, |of| of.closest.n_nearest())
+}
+
+#[unsafe(no_mangle)]
 pub unsafe extern "C" fn impinge_hits_hash(hits: *const impinge_hits) -> u64 {
     // SAFETY: see `answer!`.
     unsafe { hits.as_ref() }.map_or(0, |of| of.hits.hash())
@@ -263,6 +269,30 @@ pub unsafe extern "C" fn impinge_signed_distance(
 }
 
 #[unsafe(no_mangle)]
+pub unsafe extern "C" fn impinge_locate(
+    detector: *mut impinge_detector,
+    scene: *const impinge_scene,
+    body: u32,
+    points: impinge_array,
+    tetrahedra: *mut u32,
+) -> Status {
+    // SAFETY: see `impinge_contains`.
+    unsafe {
+        value((detector, scene, std::ptr::null()), |of| {
+            let body = of.scene.id(body)?;
+            let points = arrays::floats::<3>(&points, "points")?;
+            let scene = &of.scene.scene;
+            let found = match &points {
+                Floats::F32(points) => of.detector.locate(scene, body, points)?,
+                Floats::F64(points) => of.detector.locate(scene, body, points)?,
+            };
+            let numbers = found.into_iter().map(|of| of.unwrap_or(NO_ELEMENT));
+            put_each(tetrahedra, "tetrahedra", numbers)
+        })
+    }
+}
+
+#[unsafe(no_mangle)]
 pub unsafe extern "C" fn impinge_find_closest(
     detector: *mut impinge_detector,
     scene: *const impinge_scene,
@@ -278,10 +308,7 @@ pub unsafe extern "C" fn impinge_find_closest(
             let points = arrays::floats::<3>(&points, "points")?;
             let found = find_closest(of.detector, &of.scene.scene, &points, most, &query)?;
             Ok(impinge_closest {
-                rows: collect(
-                    (0..found.len()).map(|ix| closest_row(found.get(ix))),
-                    "rows",
-                )?,
+                rows: collect(found.iter().map(closest_row), "rows")?,
                 closest: found,
                 texts: Texts::default(),
             })

@@ -47,9 +47,6 @@ impl<'a> Asked<'a> {
                 return refuse(field, given, "0 or 1 allowed");
             }
         }
-        if given.n_nearest != 0 {
-            return refuse("n_nearest", given.n_nearest, "0 allowed in this version");
-        }
         Ok(Asked { given, scene })
     }
 
@@ -176,6 +173,7 @@ impl<'a> Asked<'a> {
         Ok(query
             .fixed(self.fixed()?)
             .hits(self.hits()?)
+            .n_nearest(self.given.n_nearest)
             .start(match self.given.start {
                 START_REPORT => Start::Report,
                 START_SKIP => Start::Skip,

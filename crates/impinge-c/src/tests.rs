@@ -90,6 +90,7 @@ fn layout_in_rust() -> BTreeMap<String, usize> {
         EXCLUDE_RINGS,
         EXCLUDE_GROUPS,
         NO_FEATURE,
+        NO_ELEMENT,
         LOG_ERROR,
         LOG_INFO,
         COLUMN_KIND,

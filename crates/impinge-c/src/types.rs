@@ -90,6 +90,8 @@ pub const COLUMN_MOLLIFIER_GRADIENT: u32 = 30;
 pub const COLUMN_MOLLIFIER_HESSIAN: u32 = 31;
 
 pub const NO_FEATURE: u32 = 255;
+/// No element.
+pub const NO_ELEMENT: u32 = u32::MAX;
 
 /// The bit of a kind of pairs, `IMPINGE_VF` and so on.
 pub fn bit(kind: PairKind) -> u32 {
@@ -169,7 +171,7 @@ impl Default for impinge_query {
             start: START_REPORT,
             precision: F32,
             hits: HITS_FIRST,
-            n_nearest: 0,
+            n_nearest: 1,
             flags: 0,
             separation: 0.0,
             clearance: 0.0,

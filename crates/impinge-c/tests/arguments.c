@@ -22,6 +22,7 @@ int main(void) {
   impinge_motion *motion = (impinge_motion *)detector;
   impinge_nearest nearest;
   int8_t places[VERTICES];
+  uint32_t tetrahedra[VERTICES] = {9};
   uint32_t fixed = 3, beyond[3] = {0, 1, VERTICES};
   int32_t found = -1;
   uint64_t n = 7;
@@ -135,6 +136,29 @@ int main(void) {
   one.positions[7][1] = number;
   REFUSED(impinge_find_closest(detector, scene, at, -1, NULL, &closest), "most: -1");
   REFUSED(impinge_find_closest(detector, scene, at, 1, NULL, NULL), "closest is NULL");
+  impinge_query_default(&query);
+  CHECK(query.n_nearest == 1);
+  query.n_nearest = 0;
+  REFUSED(impinge_find_closest(detector, scene, at, 1, &query, &closest), "n_nearest: 0");
+  CHECK(closest == NULL);
+  REFUSED(impinge_locate(NULL, scene, 0, at, tetrahedra), "detector is NULL");
+  REFUSED(impinge_locate(detector, NULL, 0, at, tetrahedra), "scene is NULL");
+  REFUSED(impinge_locate(detector, scene, 0, at, tetrahedra), "body 0");
+  CHECK(strstr(impinge_error_message(), "tetrahedra") != NULL);
+  REFUSED(impinge_locate(detector, scene, 4, at, tetrahedra), "no body 4");
+  {
+    static const uint32_t cell[1][4] = {{0, 1, 2, 3}};
+    uint32_t solid = 9;
+    GOOD(impinge_scene_add_tetrahedra(scene, packed(cell, 1, IMPINGE_U32), at, &solid));
+    REFUSED(impinge_locate(detector, scene, solid, at, NULL), "tetrahedra is NULL");
+    REFUSED(impinge_locate(detector, scene, solid, faces, tetrahedra), "points: its type is IMPINGE_U32");
+    one.positions[7][1] = NAN;
+    REFUSED(impinge_locate(detector, scene, solid, at, tetrahedra), "points: row 7");
+    one.positions[7][1] = number;
+    CHECK(tetrahedra[0] == 9);
+    GOOD(impinge_locate(detector, scene, solid, packed(NULL, 0, IMPINGE_F32), NULL));
+    GOOD(impinge_scene_remove(scene, solid));
+  }
   REFUSED(impinge_cast(detector, scene, at, at, NAN, NULL, &hits), "most: NaN");
   REFUSED(impinge_find_safe_distances(detector, scene, -1, NULL, &safe), "most: -1");
   REFUSED(impinge_find_safe_distances(detector, scene, HUGE_VAL, NULL, &safe), "most: inf");
@@ -151,7 +175,7 @@ int main(void) {
   REFUSED(impinge_neighbours_first(NULL, 0, NULL), "neighbours is NULL");
   REFUSED(impinge_safe_distances_of(NULL, 0, &bad), "safe_distances is NULL");
   CHECK(impinge_safe_distances_touching(NULL) == NULL && impinge_neighbours_count(NULL) == 0 && impinge_closest_count(NULL) == 0);
-  CHECK(impinge_hits_n_rays(NULL) == 0 && impinge_hits_hash(NULL) == 0 && impinge_closest_hash(NULL) == 0 && impinge_devices_count(NULL) == 0);
+  CHECK(impinge_hits_n_rays(NULL) == 0 && impinge_hits_hash(NULL) == 0 && impinge_closest_hash(NULL) == 0 && impinge_closest_n_nearest(NULL) == 0 && impinge_devices_count(NULL) == 0);
   CHECK(impinge_motion_n_cut(NULL) == 0 && impinge_motion_n_touching(NULL) == 0 && impinge_motion_rounds(NULL) == 0);
   impinge_safe_distances_destroy(NULL);
   impinge_neighbours_destroy(NULL);
@@ -172,7 +196,6 @@ int main(void) {
   QUERY(b, 0, "b: 0");
   QUERY(kinds, IMPINGE_VF, "kinds: ");
   QUERY(hits, 3, "hits: 3");
-  QUERY(n_nearest, 3, "n_nearest: 3");
   QUERY(flags, IMPINGE_SIGNED, "flags: 4");
   QUERY(flags, 1u << 20, "flags");
   impinge_query_default(&query);

@@ -125,6 +125,17 @@ void probes() {
   const auto closest = detector.closest(scene, points, 1.5, query::of(a));
   CHECK(closest.size() == 3 && closest[0].found == 1 && closest[2].found == 0 && closest[1].distance == 0 && closest.hash() != 0);
   CHECK(detector.closest(scene, points)[2].found == 1);
+  CHECK(closest.n_nearest() == 1 && closest.of(0).size() == 1 && closest.of(2).empty() && closest.of(3).empty());
+  const auto few = detector.closest(scene, points, 1.5, query::of(a).n_nearest(3));
+  CHECK(few.size() == 9 && few.n_nearest() == 3 && few.of(1).size() == 3 && few.of(2).empty() && few.hash() != closest.hash());
+  CHECK(few.of(1).begin() == &few[3] && few.of(1)[2].distance == 0 && few[3].element < few[4].element && few[4].element < few[5].element);
+  throws(IMPINGE_ERROR_INVALID, "n_nearest: 0", [&] { detector.closest(scene, points, 1.5, query::all().n_nearest(0)); });
+  const std::vector<double> corners = {0, 0, 0, 4, 0, 0, 0, 4, 0, 0, 0, 4, 0, 0, -4};
+  const auto solid = scene.add_tetrahedra(std::vector<std::int32_t>{0, 1, 2, 3, 0, 2, 1, 4}, corners);
+  const std::vector<std::array<double, 3>> where = {{1, 1, -1}, {1, 1, 0}, {3, 3, 3}};
+  CHECK(detector.locate(scene, solid, where) == (std::vector<std::uint32_t>{1, 0, IMPINGE_NO_ELEMENT}));
+  throws(IMPINGE_ERROR_INVALID, "tetrahedra", [&] { detector.locate(scene, a, where); });
+  scene.remove(solid);
   const std::vector<double> origins = {0, 0, 5, 0, 3, 5}, down = {0, 0, -1, 0, 0, -1};
   const auto hits = detector.cast(scene, origins, down);
   CHECK(hits.n_rays() == 2 && hits.size() == 1 && hits[0].t == 4 && hits.of(0).size() == 1 && hits.of(1).empty() && hits.of(2).empty());

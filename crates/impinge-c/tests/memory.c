@@ -100,6 +100,7 @@ int main(void) {
   {
     /* The answers about points and bounds: what was asked once has its working memory, the rows of the answer are new each time. */
     static double origins[VERTICES][3];
+    impinge_query query;
     impinge_closest *closest = NULL;
     impinge_hits *hits = NULL;
     impinge_array from = packed(origins, VERTICES, IMPINGE_F64), to = positions_of(&one);
@@ -111,6 +112,11 @@ int main(void) {
     most = 50000; /* The rows of an answer have more bytes, and what the engine works with has less. */
     CHECK(impinge_find_closest(detector, scene, to, HUGE_VAL, NULL, &closest) == IMPINGE_ERROR_OUT_OF_MEMORY && closest == NULL);
     CHECK(impinge_cast(detector, scene, from, to, 9, NULL, &hits) == IMPINGE_ERROR_OUT_OF_MEMORY && hits == NULL);
+    most = 1 << 30;
+    impinge_query_default(&query);
+    query.n_nearest = UINT32_MAX;
+    CHECK(impinge_find_closest(detector, scene, to, HUGE_VAL, &query, &closest) == IMPINGE_ERROR_OUT_OF_MEMORY && closest == NULL);
+    CHECK(strstr(impinge_error_message(), "nearest") != NULL);
     most = SIZE_MAX;
   }
   impinge_scene_destroy(scene);

@@ -653,6 +653,29 @@ static void probes(impinge_detector *detector) {
   stats.size = sizeof stats;
   GOOD(impinge_closest_stats(closest, &stats));
   impinge_closest_destroy(closest);
+  /* Three faces of each point: those around the poles touch there, and the lowest is first. */
+  impinge_query_default(&query);
+  query.n_nearest = 3;
+  GOOD(impinge_find_closest(detector, scene, at, 1.75, &query, &closest));
+  CHECK(impinge_closest_count(closest) == 12 && impinge_closest_n_nearest(closest) == 3);
+  near_to = impinge_closest_data(closest);
+  CHECK(near_to[3].distance == 0 && near_to[5].distance == 0 && near_to[3].element < near_to[4].element);
+  CHECK(near_to[4].element < near_to[5].element && near_to[6].found == 0 && near_to[8].element == IMPINGE_NO_ELEMENT);
+  CHECK(near_to[9].distance == 0.5 && near_to[11].distance == 0.5 && near_to[9].element < near_to[10].element);
+  GOOD(impinge_closest_column(closest, IMPINGE_COLUMN_POINTS, &view));
+  CHECK(view.rows == 12);
+  impinge_closest_destroy(closest);
+  {
+    /* Two tetrahedra that share a face. The points: in the second, on that face, outside. */
+    static const double corners[5][3] = {{0, 0, 0}, {4, 0, 0}, {0, 4, 0}, {0, 0, 4}, {0, 0, -4}};
+    static const uint32_t cells[2][4] = {{0, 1, 2, 3}, {0, 2, 1, 4}};
+    static const float where[3][3] = {{1, 1, -1}, {1, 1, 0}, {3, 3, 3}};
+    uint32_t tetrahedra[3] = {9, 9, 9}, body = 9;
+    GOOD(impinge_scene_add_tetrahedra(scene, packed(cells, 2, IMPINGE_U32), packed(corners, 5, IMPINGE_F64), &body));
+    GOOD(impinge_locate(detector, scene, body, packed(where, 3, IMPINGE_F32), tetrahedra));
+    CHECK(tetrahedra[0] == 1 && tetrahedra[1] == 0 && tetrahedra[2] == IMPINGE_NO_ELEMENT);
+    GOOD(impinge_scene_remove(scene, body));
+  }
   /* One ray down the axis, one beside the ball: origins in double precision, directions in single. */
   GOOD(impinge_cast(detector, scene, from, to, HUGE_VAL, NULL, &hits));
   CHECK(impinge_hits_n_rays(hits) == 2 && impinge_hits_count(hits) == 1);

@@ -222,11 +222,22 @@ public:
   view<std::uint32_t> inside_b() const { return packed<std::uint32_t>(IMPINGE_COLUMN_INSIDE_B); }
 };
 
-/// The elements nearest to points, one row per point: `found` of a row is 0 where nothing is near enough.
+/// The elements nearest to points, one row per point, or `n_nearest()` of them: `found` of a row is 0 where nothing is near enough.
 class closest : public detail::closest_answer {
 public:
   using answer::answer;
   std::uint64_t hash() const noexcept { return impinge_closest_hash(raw()); }
+  /// How many rows each point has: what the query said.
+  std::size_t n_nearest() const noexcept { return impinge_closest_n_nearest(raw()); }
+  /// What is nearest to a point, nearest first: as many elements as were asked for, or fewer if no more are near enough.
+  view<closest_element> of(std::size_t point) const {
+    const std::size_t n = n_nearest();
+    if (n == 0 || point >= size() / n) return {};
+    const closest_element *first = data() + point * n;
+    std::size_t n_found = 0;
+    while (n_found < n && first[n_found].found != 0) ++n_found;
+    return {first, n_found};
+  }
 };
 
 /// What rays hit, one ray after the other.

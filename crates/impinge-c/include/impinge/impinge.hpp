@@ -169,7 +169,14 @@ public:
     const auto status = impinge_signed_distance(raw(), in.raw(), of, at, distances.data());
     return give(status, std::move(distances));
   }
-  /// The element nearest to each point, if it is at most `most` away.
+  /// The lowest tetrahedron of a body that contains each point, or IMPINGE_NO_ELEMENT.
+  template <class P> result<std::vector<std::uint32_t>> locate(const scene &in, body of, const P &points) {
+    const array at = detail::rows_of(points, 3);
+    std::vector<std::uint32_t> tetrahedra(at.rows);
+    const auto status = impinge_locate(raw(), in.raw(), of, at, tetrahedra.data());
+    return give(status, std::move(tetrahedra));
+  }
+  /// The element nearest to each point, if it is at most `most` away; with `query::n_nearest` the nearest few.
   template <class P>
   result<impinge::closest> closest(const scene &in, const P &points, double most = std::numeric_limits<double>::infinity(), const query &of = {}) {
     const impinge_query raw = of.raw();

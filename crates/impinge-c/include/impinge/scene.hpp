@@ -281,6 +281,8 @@ public:
     fixed_ = std::move(bodies);
     return *this;
   }
+  /// How many nearest elements of each point `detector::closest` gives.
+  query &n_nearest(std::uint32_t n) { return set(raw_.n_nearest, n); }
   /// Of `detector::cast`.
   query &hits(hits_of_ray which) { return set(raw_.hits, static_cast<std::uint32_t>(which)); }
   /// Only the pairs of a half-open box of space.

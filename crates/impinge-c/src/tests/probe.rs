@@ -4,6 +4,7 @@
 use std::ptr::{null, null_mut};
 
 use impinge::{Backend, Bounds, Csr, Detector, Exclusion, Hit, PairKind, Part, Query, Scene};
+use impinge_scenes::solids::solid_ball;
 use impinge_scenes::{Random, surfaces};
 
 use super::{Built, catalogue, of_models, own_edges, through_c};
@@ -39,25 +40,42 @@ unsafe fn numbers<T>(of: &impinge_array) -> &[T] {
 fn points_and_rays_are_those_of_rust() {
     let (at, directions) = (points(300, 1), points(300, 2));
     let narrow: Vec<[f32; 3]> = at.iter().map(|x| x.map(|x| x as f32)).collect();
-    for (name, scene) in catalogue() {
+    let mut n_located = 0;
+    let cells = of_models(&[solid_ball(200), surfaces::ball(500)]);
+    for (name, scene) in catalogue().into_iter().chain([("cells", cells)]) {
         let built = through_c(&scene);
         let (on, of) = (built.detector, built.scene.cast_const());
         let mut detector = Detector::new(Backend::Cpu).expect("the CPU");
         // SAFETY: as in `through_c`.
         unsafe {
-            for most in [0.1, f64::INFINITY] {
-                let expected = detector.closest(&scene, &narrow, most, &Query::all());
+            for (most, n_nearest) in [(0.1, 1), (f64::INFINITY, 1), (0.5, 7)] {
+                let query = Query::all().n_nearest(n_nearest);
+                let expected = detector.closest(&scene, &narrow, most, &query);
                 let expected = expected.expect("nearest elements");
+                let several = impinge_query {
+                    n_nearest,
+                    ..impinge_query::default()
+                };
+                // One is the default.
+                let query = if n_nearest == 1 {
+                    null()
+                } else {
+                    &raw const several
+                };
                 let mut closest = null_mut();
-                let status =
-                    impinge_find_closest(on, of, view(&narrow), most, null(), &mut closest);
+                let status = impinge_find_closest(on, of, view(&narrow), most, query, &mut closest);
                 assert_eq!(status, OK);
                 assert_eq!(impinge_closest_hash(closest), expected.hash(), "{name}");
+                assert_eq!(impinge_closest_n_nearest(closest), n_nearest as usize);
                 let n = impinge_closest_count(closest);
+                assert_eq!(n, narrow.len() * n_nearest as usize);
                 let rows = std::slice::from_raw_parts(impinge_closest_data(closest), n);
                 for (row, found) in rows.iter().zip(expected.iter()) {
                     assert_eq!(row.found, u32::from(found.is_some()));
-                    let Some(found) = found else { continue };
+                    let Some(found) = found else {
+                        assert_eq!((row.body, row.element), (ANY_BODY, NO_ELEMENT));
+                        continue;
+                    };
                     assert_eq!((row.distance, row.point), (found.distance, found.point));
                     assert_eq!(row.element, found.element.element);
                 }
@@ -99,6 +117,18 @@ fn points_and_rays_are_those_of_rust() {
             }
             for (id, _) in scene.bodies() {
                 let body = id.index() as u32;
+                let mut tetrahedra = vec![9; at.len()];
+                let status = impinge_locate(on, of, body, view(&narrow), tetrahedra.as_mut_ptr());
+                match detector.locate(&scene, id, &narrow) {
+                    Ok(expected) => {
+                        let numbers = expected.iter().map(|of| of.unwrap_or(NO_ELEMENT));
+                        assert!(status == OK && numbers.eq(tetrahedra), "{name}");
+                        n_located += expected.iter().flatten().count();
+                    }
+                    Err(_) => {
+                        assert!(status == INVALID && tetrahedra.iter().all(|&of| of == 9));
+                    }
+                }
                 let (mut places, mut signed) = (vec![9; at.len()], vec![f64::NAN; at.len()]);
                 let status = impinge_contains(on, of, body, view(&at), places.as_mut_ptr());
                 match detector.contains(&scene, id, &at) {
@@ -141,6 +171,7 @@ fn points_and_rays_are_those_of_rust() {
             assert_eq!((found == 1).then_some(row), expected, "{name}");
         }
     }
+    assert!(n_located > 20);
 }
 
 /// Compares the lists of one kind, seen from one side.
