@@ -92,11 +92,11 @@ pub enum Command {
         mut_arg("rows", |rows| rows.help("Write a row per vertex (.csv, .jsonl, .npy or .parquet; \"-\" is standard output)"))
     )]
     Safe(SafeArgs),
-    /// Find the element of a mesh that is nearest to each of many points, and which of them are
-    /// inside
+    /// Find the elements of a mesh that are nearest to each of many points, which points are inside,
+    /// and in which tetrahedra
     #[command(
         after_help = probe::PROBE_EXAMPLES,
-        mut_arg("rows", |rows| rows.help("Write a row per point that is near enough (.csv, .jsonl, .npy or .parquet; \"-\" is standard output)"))
+        mut_arg("rows", |rows| rows.help("Write a row per element that is near enough (.csv, .jsonl, .npy or .parquet; \"-\" is standard output)"))
     )]
     Probe(ProbeArgs),
     /// Find what rays hit of a mesh
@@ -351,7 +351,7 @@ pub struct AnswerArgs {
     pub any: bool,
     /// Run N frames, rewriting positions before each, and show median times; with N above 1, the
     /// method auto is clusters
-    #[arg(long, value_name = "N", default_value = "1", value_parser = at_least_one)]
+    #[arg(long, value_name = "N", default_value = "1", value_parser = at_least_one::<NonZeroUsize>)]
     pub repeat: NonZeroUsize,
     #[command(flatten)]
     pub rows: RowsArgs,

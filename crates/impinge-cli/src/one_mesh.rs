@@ -51,17 +51,19 @@ impl OneMesh {
 
     /// The error with the name of the file, and vertices as the file numbers them.
     pub fn refused(&self, mut error: impinge::Error) -> Error {
-        let impinge::Error::NotClosed { edge, .. } = &mut error else {
-            return error.into();
-        };
-        if let Some(weld) = &self.weld {
+        if let impinge::Error::NotClosed { edge, .. } = &mut error
+            && let Some(weld) = &self.weld
+        {
             // Of welded vertices the first one stays.
             let first = |welded| weld.map().iter().position(|&index| index == welded);
             *edge = edge.map(|welded| first(welded).map_or(welded, |ix| ix as u32));
         }
-        Error::Refused {
-            what: self.name.clone(),
-            source: error,
+        match error {
+            impinge::Error::NotClosed { .. } | impinge::Error::WrongKind { .. } => Error::Refused {
+                what: self.name.clone(),
+                source: error,
+            },
+            error => error.into(),
         }
     }
 

@@ -246,7 +246,7 @@ pub fn mesh_format(text: &str) -> Result<impinge_io::Format, String> {
 }
 
 /// A number of at least 1.
-pub fn at_least_one(text: &str) -> Result<NonZeroUsize, String> {
+pub fn at_least_one<N: FromStr>(text: &str) -> Result<N, String> {
     text.parse()
         .map_err(|_| "expected a whole number of at least 1".to_owned())
 }
@@ -255,7 +255,7 @@ pub fn at_least_one(text: &str) -> Result<NonZeroUsize, String> {
 pub fn threads(text: &str) -> Result<NonZeroUsize, String> {
     at_least_one(text)
         .ok()
-        .filter(|threads| threads.get() <= 1024)
+        .filter(|threads: &NonZeroUsize| threads.get() <= 1024)
         .ok_or_else(|| "expected a whole number of at least 1 and at most 1024".to_owned())
 }
 

@@ -50,7 +50,8 @@ Columns of numbers alone are a plain array in .npy files, others a structured on
   the element), e0, e1 or e2 (edge k goes from vertex k to the next) or f. Points are point_a and point_b
   in .jsonl and .npy files. Distance and points are rounded.
 `probe`: point, element, feature, distance, x, y, z, with --signed then place: inside, on or outside, and the distance is
-  negative outside. Distances are rounded down. The nearest point is one column, nearest, in .jsonl and .npy files.
+  negative outside. Distances are rounded down. The nearest point is one column, nearest, in .jsonl and .npy files. With
+  --nearest K up to K rows per point, nearest first. --locate adds a last column: tetrahedron, -1 for none.
 `safe`: body, vertex, safe: how far it may move, rounded down
 `cast`: ray, element, feature, t, t_end, b0, b1, b2 (barycentrics in .jsonl and .npy files); with --hits any: ray, hit
 `step`: kind, body_a, element_a, body_b, element_b, toi. Of kind vf, a is the vertex and b the face. Mesh files

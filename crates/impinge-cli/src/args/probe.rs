@@ -1,13 +1,13 @@
 //! The command lines of `impinge probe` and `impinge cast`.
 
-use std::num::NonZeroUsize;
+use std::num::{NonZeroU32, NonZeroUsize};
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use impinge::Hit;
 
 use super::RowsArgs;
-use crate::values::{distance, mesh_format, threads};
+use crate::values::{at_least_one, distance, mesh_format, threads};
 
 pub const PROBE_EXAMPLES: &str = "\
 Examples:
@@ -15,9 +15,11 @@ Examples:
   impinge probe part.stl --points scan.ply --signed        and are they inside, on the surface or outside?
   impinge probe part.stl --points points.npy --rows -      the nearest element and point of each, as CSV
   impinge probe part.stl --points points.npy --most 0.01   only points that are as near as that
+  impinge probe part.stl --points points.npy --nearest 8   the eight nearest elements of each
+  impinge probe solid.msh --points skin.obj --locate       which tetrahedron contains each point?
 
 Which element is nearest, and whether a point is inside, is decided exactly. Distances are rounded down. --signed needs
-a closed surface, which `impinge check` and `impinge fix` help with, or tetrahedra.";
+a closed surface, which `impinge check` and `impinge fix` help with, or tetrahedra; --locate needs tetrahedra.";
 
 pub const CAST_EXAMPLES: &str = "\
 Examples:
@@ -41,6 +43,14 @@ pub struct ProbeArgs {
     /// negative outside
     #[arg(long)]
     pub signed: bool,
+    /// Also find which tetrahedron contains each point: the lowest, where several share the face,
+    /// edge or vertex on which it is
+    #[arg(long)]
+    pub locate: bool,
+    /// How many nearest elements are found of each point, nearest first, of several at the same
+    /// distance the lowest
+    #[arg(long, value_name = "K", default_value = "1", allow_negative_numbers = true, value_parser = at_least_one::<NonZeroU32>)]
+    pub nearest: NonZeroU32,
     /// Leave out points that are farther than this from the mesh [default: none]
     #[arg(long, value_name = "D", allow_negative_numbers = true, value_parser = distance)]
     pub most: Option<f64>,

@@ -84,7 +84,7 @@ pub struct StepArgs {
     #[arg(long, value_name = "R", default_value = "0", requires = "candidates", allow_negative_numbers = true, value_parser = distance)]
     pub inflation: f64,
     /// Ask N times, rewriting positions at both ends before each, and show median times
-    #[arg(long, value_name = "N", default_value = "1", value_parser = at_least_one)]
+    #[arg(long, value_name = "N", default_value = "1", value_parser = at_least_one::<NonZeroUsize>)]
     pub repeat: NonZeroUsize,
     /// Write the meshes at the start of the step, coloured by the time of contact (.ply, .glb or
     /// .vtu)

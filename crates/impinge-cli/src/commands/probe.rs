@@ -1,5 +1,5 @@
-//! `impinge probe`: which element of a mesh is nearest to each of many points, and which of them
-//! are inside.
+//! `impinge probe`: which elements of a mesh are nearest to each of many points, which of them are
+//! inside, and which tetrahedron contains each.
 
 use std::io::Write;
 
@@ -39,14 +39,25 @@ pub fn probe(args: &ProbeArgs, cancel: &CancelToken) -> Result<(), Error> {
     if args.signed {
         times.add(detector.stats());
     }
+    let tetrahedra = match args.locate {
+        true => {
+            let found = detector.locate(scene, mesh.id, &points);
+            let found = found.map_err(|error| mesh.refused(error))?;
+            times.add(detector.stats());
+            Some(found)
+        }
+        false => None,
+    };
     let most = args.most.unwrap_or(f64::INFINITY);
-    let closest = detector.closest(scene, &points, most, &Query::all())?;
+    let query = Query::all().n_nearest(args.nearest.get());
+    let closest = detector.closest(scene, &points, most, &query)?;
     times.add(closest.stats());
     let answer = Answer {
         args,
         mesh: &mesh,
         closest: &closest,
         places: places.as_deref(),
+        tetrahedra: tetrahedra.as_deref(),
         ms: times.sum_ms(),
     };
     // Files are written first: if one can't be written, no answer is printed that looks like
@@ -79,14 +90,28 @@ struct Answer<'a> {
     closest: &'a Closest,
     /// 1 inside, 0 on the surface, -1 outside.
     places: Option<&'a [i8]>,
+    tetrahedra: Option<&'a [Option<u32>]>,
     ms: f64,
 }
 
 impl Answer<'_> {
     /// The points that are near enough, by their numbers, with what is nearest to them.
     fn found(&self) -> impl Iterator<Item = (usize, ClosestElement)> + '_ {
-        let found = self.closest.iter().enumerate();
-        found.filter_map(|(point, found)| Some((point, found?)))
+        let points = 0..self.closest.len();
+        points.filter_map(|point| Some((point, self.closest.get(point)?)))
+    }
+
+    /// All elements that were found, with the numbers of their points.
+    fn all_found(&self) -> impl Iterator<Item = (usize, ClosestElement)> + '_ {
+        let n_nearest = self.closest.n_nearest();
+        let rows = self.closest.iter().enumerate();
+        rows.filter_map(move |(row, found)| Some((row / n_nearest, found?)))
+    }
+
+    /// How many points are in a tetrahedron.
+    fn n_located(&self) -> Option<u64> {
+        let tetrahedra = self.tetrahedra?;
+        Some(tetrahedra.iter().flatten().count() as u64)
     }
 
     /// How many points are inside, on the surface and outside.
@@ -110,38 +135,41 @@ impl Answer<'_> {
     }
 
     fn write_rows(&self, file: &RowsFile) -> Result<(), Error> {
-        let columns = [
+        let mut columns = vec![
             Column::new("point", Holds::U32),
             Column::new("element", Holds::U32),
             Column::new("feature", Holds::Text(2)),
             Column::new("distance", Holds::F64),
             Column::new("nearest", Holds::Point(["x", "y", "z"])),
         ];
-        let n = self.found().count();
+        if self.places.is_some() {
+            columns.push(Column::new("place", Holds::Text(7)));
+        }
+        if self.tetrahedra.is_some() {
+            columns.push(Column::new("tetrahedron", Holds::Count));
+        }
         let row = |(point, found): (usize, ClosestElement)| {
             let is_outside = self.places.is_some_and(|places| places[point] < 0);
             let distance = match is_outside {
                 true => -found.distance,
                 false => found.distance,
             };
-            [
+            let mut cells = vec![
                 rows::number(point),
                 Cell::Number(found.element.element),
                 Cell::Text(rows::feature_name(found.feature)),
                 Cell::Float(distance),
                 Cell::Point(found.point),
-            ]
+            ];
+            cells.extend(self.places.map(|places| Cell::Text(word(places[point]))));
+            cells.extend(
+                self.tetrahedra
+                    .map(|of| Cell::Count(of[point].map_or(-1, i64::from))),
+            );
+            cells
         };
-        let Some(places) = self.places else {
-            return rows::write(file, columns.to_vec(), n, self.found().map(row));
-        };
-        let columns = [&columns[..], &[Column::new("place", Holds::Text(7))]].concat();
-        let signed = self.found().map(|(point, found)| {
-            let [point_cell, element, feature, distance, nearest] = row((point, found));
-            let place = Cell::Text(word(places[point]));
-            [point_cell, element, feature, distance, nearest, place]
-        });
-        rows::write(file, columns, n, signed)
+        let n = self.all_found().count();
+        rows::write(file, columns, n, self.all_found().map(row))
     }
 
     /// The object that `docs/probe.schema.json` describes.
@@ -162,11 +190,18 @@ impl Answer<'_> {
             .counts()
             .map(|[inside, on, outside]| json!({ "inside": inside, "on": on, "outside": outside }));
         let mut object = Map::new();
-        let asked = json!({ "signed": self.args.signed, "most": self.args.most });
+        let asked = json!({
+            "signed": self.args.signed,
+            "locate": self.args.locate,
+            "nearest": self.args.nearest.get(),
+            "most": self.args.most,
+        });
         object.insert("asked".into(), asked);
         object.insert("points".into(), self.closest.len().into());
         object.insert("near".into(), self.found().count().into());
+        object.insert("found".into(), self.all_found().count().into());
         object.insert("places".into(), places.into());
+        object.insert("located".into(), self.n_located().into());
         object.insert("nearest".into(), nearest);
         object.insert("farthest".into(), farthest);
         object.insert("hash".into(), hex(self.closest.hash()).into());
@@ -205,6 +240,11 @@ impl Answer<'_> {
                 to,
                 "{inside} inside, {on} on the surface, {outside} outside"
             )?;
+        }
+        if let Some(n_located) = self.n_located() {
+            let n_outside = self.closest.len() as u64 - n_located;
+            let [located, outside] = [n_located, n_outside].map(grouped);
+            writeln!(to, "{located} in a tetrahedron, {outside} in none")?;
         }
         writeln!(to, "{}", how_alone(self.closest.stats(), self.ms))?;
         let not_asked = match self.args.signed {

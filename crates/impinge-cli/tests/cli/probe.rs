@@ -141,6 +141,91 @@ fn points_are_answered_as_by_the_library() {
 }
 
 #[test]
+fn the_nearest_few_and_the_tetrahedra_of_points_are_those_of_the_library() {
+    let folder = Folder::new();
+    let schema = schema("probe");
+    let solid = solid_ball(100);
+    folder.medit("solid.mesh", &solid);
+    let mut points = points();
+    points.extend(solid.positions.iter().map(|at| at.map(f64::from)));
+    folder.text("points.csv", &csv(&points));
+    let (scene, id, mut detector) = scene(&solid);
+    let held = detector.locate(&scene, id, &points).unwrap();
+    let n_held = held.iter().flatten().count();
+    assert!(n_held > 20 && n_held < points.len() - 20);
+    let places = detector.contains(&scene, id, &points).unwrap();
+    let probe = ["probe", "solid.mesh", "--points", "points.csv", "--locate"];
+    for (n_nearest, most) in [(1, f64::INFINITY), (5, f64::INFINITY), (5, 0.3)] {
+        let query = Query::all().n_nearest(n_nearest);
+        let closest = detector.closest(&scene, &points, most, &query).unwrap();
+        let found: Vec<_> = (0..points.len())
+            .flat_map(|point| closest.of(point).map(move |of| (point, of)))
+            .collect();
+        let n = n_nearest.to_string();
+        let mut args = probe.to_vec();
+        if n_nearest > 1 {
+            args.extend(["--nearest", &n, "--signed"]);
+        }
+        if most.is_finite() {
+            args.extend(["--most", "0.3"]);
+            assert!(found.len() < 5 * points.len() && found.len() > 100);
+        }
+        let answer = folder.run(args.iter().chain(&["--json"])).json();
+        assert_eq!(wrong(&schema, &answer, "$"), [""; 0]);
+        assert_eq!(answer["hash"], format!("{:016x}", closest.hash()));
+        assert_eq!(
+            (&answer["found"], &answer["located"]),
+            (&json!(found.len()), &json!(n_held))
+        );
+        let near = (0..points.len()).filter_map(|point| closest.get(point));
+        assert_eq!(answer["near"], near.clone().count());
+        let farthest = near.map(|of| of.distance).fold(0.0, f64::max);
+        assert_eq!(answer["farthest"]["distance"], farthest);
+        assert_eq!(answer["asked"]["nearest"], n_nearest);
+
+        let text = folder.run(args.iter().chain(&["--rows", "-"])).printed();
+        let mut lines = text.lines();
+        let place = if n_nearest > 1 { ",place" } else { "" };
+        let header = format!("point,element,feature,distance,x,y,z{place},tetrahedron");
+        assert_eq!(lines.next(), Some(&header[..]));
+        assert_eq!(lines.clone().count(), found.len());
+        for (line, (point, of)) in lines.zip(found) {
+            let fields: Vec<&str> = line.split(',').collect();
+            assert_eq!(fields[0], point.to_string());
+            assert_eq!(fields[1], of.element.element.to_string());
+            let is_negative = n_nearest > 1 && places[point] < 0;
+            let sign = if is_negative { -1.0 } else { 1.0 };
+            assert_eq!(numbers(&fields[3..4]), [sign * of.distance]);
+            let tetrahedron = held[point].map_or("-1".to_owned(), |of| of.to_string());
+            assert_eq!(*fields.last().unwrap(), tetrahedron);
+        }
+    }
+    let text = folder.run(probe).printed();
+    let said = format!(
+        "\n{n_held} in a tetrahedron, {} in none\n",
+        points.len() - n_held
+    );
+    assert!(text.contains(&said), "{text}");
+
+    folder.ply("surface.ply", &ball(320));
+    let args = ["probe", "surface.ply", "--points", "points.csv"];
+    let error = folder.run(args.iter().chain(&["--locate"])).error();
+    let said = "surface.ply: body 0 is made of triangles, where tetrahedra are needed";
+    assert!(error.starts_with(said), "{error}");
+    for wrong in ["0", "-1", "1.5", "4294967296"] {
+        let misuse = folder
+            .run(args.iter().chain(&["--nearest", wrong]))
+            .misuse();
+        assert!(misuse.contains("a whole number of at least 1"), "{misuse}");
+    }
+    // More elements than there are: all of them.
+    let few = folder
+        .run(args.iter().chain(&["--nearest", "400", "--json"]))
+        .json();
+    assert_eq!(few["found"], points.len() * 320);
+}
+
+#[test]
 fn points_may_be_vertices_of_a_mesh_or_an_array() {
     let folder = Folder::new();
     let model = ball(320);
@@ -198,6 +283,8 @@ fn an_open_surface_is_refused_by_an_edge_of_the_file() {
     let error = probe("open.obj", &["--signed"]).error();
     let said = "open.obj: body 0: the surface is not closed: the edge of vertices 0 and 3 has ";
     assert!(error.starts_with(said), "{error}");
+    let advice = "; weld vertices, close holes or turn faces round first";
+    assert!(error.trim_end().ends_with(advice), "{error}");
     // How far it is needs no inside.
     let text = probe("open.obj", &[]).printed();
     assert!(text.starts_with("open.obj: 2 points, hash "), "{text}");

@@ -107,7 +107,7 @@ pub enum Error {
     /// A surface with a border, or with faces whose orientations disagree. Weld vertices, fill
     /// holes, orient faces.
     #[error(
-        "body {body}: the surface is not closed: the edge of vertices {} and {} has {n_forward} faces along it and {n_backward} against it",
+        "body {body}: the surface is not closed: the edge of vertices {} and {} has {n_forward} faces along it and {n_backward} against it; weld vertices, close holes or turn faces round first",
         edge[0], edge[1]
     )]
     NotClosed {
