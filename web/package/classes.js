@@ -1,8 +1,8 @@
 // The classes that both builds have, made of the functions of either module.
 
 import { Advance, Candidates, Contacts, Impacts, NearPairs, Pairs, Penetration, earliest, nearest, numberOf, statsOf } from "./answers.js";
-import { Closest, Hits, Neighbours, SafeDistances, Truncation, places } from "./probe.js";
-import { packed, plain, withPoints } from "./query.js";
+import { Closest, Hits, Neighbours, SafeDistances, Truncation, places, signed, tetrahedra } from "./probe.js";
+import { RestPairs, packed, plain, whole, withPoints } from "./query.js";
 import { body, call, isSingle, mustBeNone, number, refuse, wide, word } from "./shared.js";
 
 const BODY_KINDS = ["points", "edges", "triangles", "tetrahedra"];
@@ -53,13 +53,17 @@ export const QUESTIONS = {
     const words = before([numberOf(contacts), body(a), body(b)], rows);
     return { question: 11, ...plain(words, control), shape: (lists, stats) => new Penetration(lists, stats) };
   },
-  contains: (which, points, control) => ({
-    ...{ question: 12, ...withPoints(plain(Uint32Array.of(body(which)), control), [rowsOf("points", points)]) },
-    shape: places,
-  }),
+  candidatesInRuns(inflation, each, query) {
+    if (typeof each !== "function") refuse("each: a function is needed");
+    const most = whole("most", query?.most ?? 1 << 22, 1, Number.MAX_SAFE_INTEGER);
+    const hand = (lists) => each(new Candidates(lists));
+    const enter = (detector, scene, id, { words, numbers }) => detector.candidates_in_runs(scene, id, words, numbers, most, hand);
+    return { enter, ...packed(query, number("inflation", inflation)), shape: (n) => n };
+  },
+  contains: (which, points, control) => ({ question: 12, ...aboutPoints(which, points, control), shape: places }),
   closest: (points, query) => ({
     ...{ question: 13, ...withPoints(packed(query, query?.most ?? Infinity), [rowsOf("points", points)]) },
-    shape: (lists, stats) => new Closest(lists, stats),
+    shape: (lists, stats) => new Closest(lists, stats, query?.nNearest ?? 1),
   }),
   cast(origins, directions, query) {
     const rays = [rowsOf("origins", origins), rowsOf("directions", directions)];
@@ -79,8 +83,13 @@ export const QUESTIONS = {
     ...{ question: 17, ...packed(query, number("distance", distance)) },
     shape: (lists, stats) => new Neighbours(lists, stats),
   }),
+  locate: (which, points, control) => ({ question: 19, ...aboutPoints(which, points, control), shape: tetrahedra }),
+  signedDistance: (which, points, control) => ({ question: 20, ...aboutPoints(which, points, control), shape: signed }),
   nearest: (query) => ({ question: 18, ...packed({ which: "between", ...query }), shape: nearest }),
 };
+
+// A question about a body and points.
+const aboutPoints = (which, points, control) => withPoints(plain(Uint32Array.of(body(which)), control), [rowsOf("points", points)]);
 
 // x, y, z of points.
 function rowsOf(name, given) {
@@ -209,6 +218,19 @@ export function makeScene({ SceneHandle }, mustBeReady) {
       call(() => this.#held.set_thickness(body(which), number("thickness", thickness)));
     }
 
+    setGroups(which, groups) {
+      call(() => this.#held.set_groups(body(which), wide(groups, "groups")));
+    }
+
+    setPinned(which, pinned) {
+      call(() => this.#held.set_pinned(body(which), Uint8Array.from(pinned, (of) => (of ? 1 : 0))));
+    }
+
+    restPairs(distance) {
+      const next = RestPairs.next();
+      return new RestPairs(next, call(() => this.#held.rest_pairs(next, number("distance", distance))));
+    }
+
     #size(which) {
       return call(() => this.#held.size(body(which)));
     }
@@ -275,8 +297,9 @@ export function disposable(type) {
 }
 
 // Asks the module at once. `detector` and `scene` are the module's.
-export function ask(detector, scene, { question, words, numbers, watch, shape }) {
-  const lists = watch.during((id) => call(() => detector.ask(question, scene, id, words, numbers)));
+export function ask(detector, scene, { question, enter, words, numbers, watch, shape }) {
+  const asked = enter ?? ((on, of, id) => on.ask(question, of, id, words, numbers));
+  const lists = watch.during((id) => call(() => asked(detector, scene, id, { words, numbers })));
   return shape(lists, statsOf(detector.stats(false)));
 }
 

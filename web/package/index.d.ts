@@ -99,8 +99,9 @@ export interface Query extends Control {
    */
   sharedVertex?: "resolve" | "skip";
   /**
-   * Pairs that are left out: those of two bodies; with the same body twice, its self-collision; or with `{ rings: n }` the pairs of one
-   * body that are near in its surface: some vertex of one element is at most n edges, 0 to 16, away from some vertex of the other.
+   * Pairs that are left out: those of two bodies; with the same body twice, its self-collision; with `{ rings: n }` the pairs of one
+   * body that are near in its surface: some vertex of one element is at most n edges, 0 to 16, away from some vertex of the other; with
+   * `{ groups: [g, h] }` those of two groups of vertices, or of one with itself, see `setGroups`; or those of `scene.restPairs()`.
    */
   exclude?: readonly Exclusion[];
   /** Only pairs of the half-open box from a low to a high corner: that of the larger of the lower corners of both elements' boxes. */
@@ -130,12 +131,26 @@ export interface Query extends Control {
   fixed?: readonly Body[];
   /** `cast`: the first hit of each ray (the default), whether there is any, or all. */
   hits?: "first" | "any" | "all";
-  /** `closest`: a length, nothing farther away is found. `cast`: the largest t, 1 for segments. Infinity by default. */
+  /** `closest`: how many nearest elements of each point, 1 by default. */
+  nNearest?: number;
+  /**
+   * `closest`: a length, nothing farther away is found. `cast`: the largest t, 1 for segments. Infinity by default. `candidatesInRuns`: how
+   * many candidates a run has at most, 4,194,304 by default.
+   */
   most?: number;
 }
 
 /** What a query leaves out. */
-export type Exclusion = readonly [Body, Body] | { readonly rings: number };
+export type Exclusion = readonly [Body, Body] | { readonly rings: number } | { readonly groups: readonly [number, number] } | RestPairs;
+
+/** Pairs of elements that were near when `scene.restPairs()` was asked, to be left out of later questions about that scene. */
+declare class RestPairs {
+  private constructor();
+  #number;
+  /** How many there are. */
+  readonly length: number;
+}
+export type { RestPairs };
 
 /**
  * Bodies, and where their vertices are. Topology is given once, positions each frame. Arrays are copied.
@@ -174,6 +189,17 @@ export declare class Scene {
   setFilter(body: Body, category?: number | bigint, mask?: number | bigint): void;
   /** A length that `near` adds to the distance for each element of this body. */
   setThickness(body: Body, thickness: number): void;
+  /** Puts each vertex of a body into a group, for `exclude: [{ groups: [g, h] }]`. A body whose groups were never set is in none. */
+  setGroups(body: Body, groups: Index): void;
+  /**
+   * Which vertices of a body never move, 1 or true. Pairs of elements all of whose vertices are pinned are left out of every question.
+   */
+  setPinned(body: Body, pinned: ArrayLike<number | boolean>): void;
+  /**
+   * The pairs of elements that are within a distance of each other now, mostly at rest, to be left out of later questions by `exclude`. The
+   * scene keeps them until it is disposed of.
+   */
+  restPairs(distance: number): RestPairs;
   kind(body: Body): "points" | "edges" | "triangles" | "tetrahedra";
   nElements(body: Body): number;
   nVertices(body: Body): number;
@@ -281,6 +307,12 @@ export interface CandidateList extends OfKinds<Candidate> {
   of(kind: PairKind): CandidateList;
 }
 
+/** Some of the candidates, of which others are in other runs. */
+export interface CandidateRun extends CandidateList {
+  /** 16 hexadecimal digits. */
+  readonly hash: string;
+}
+
 /** Pairs of elements whose boxes overlap. */
 export interface Candidates extends Answer, CandidateList {}
 
@@ -379,19 +411,24 @@ export interface ClosestElement {
   point: [number, number, number];
 }
 
-/** What is nearest to each point: an entry per point, `null` where nothing is near enough. */
+/** What is nearest to each point: an entry per point, `null` where nothing is near enough; with `nNearest` the nearest few. */
 export interface Closest extends Answer, Iterable<ClosestElement | null> {
+  /** How many points there are. */
   readonly length: number;
-  /** `[body, element]` per point, 2^32 - 1 for none. */
+  /** How many entries each point has in the columns below: what the query said. */
+  readonly nNearest: number;
+  /** `[body, element]` per entry, 2^32 - 1 for none. Those of a point follow each other, nearest first. */
   readonly rows: Uint32Array;
   /** 255 for none. */
   readonly features: Uint8Array;
   /** Infinity for none. */
   readonly distances: Float64Array;
-  /** x, y, z per point, NaN for none. */
+  /** x, y, z per entry, NaN for none. */
   readonly points: Float64Array;
-  /** One entry; counted from the end if `ix` is negative. */
+  /** What is nearest to a point; counted from the end if `ix` is negative. */
   at(ix: number): ClosestElement | null;
+  /** What is nearest to a point, nearest first, those at the same distance by body and number: as many as were asked for, or fewer. */
+  of(point: number): ClosestElement[];
 }
 
 /** Where a ray meets an element. */
@@ -576,6 +613,12 @@ export declare class Detector {
   advance(scene: Scene, query?: Query): Advance;
   /** Pairs of elements whose boxes overlap during a step, inflated by a length on all sides. */
   candidates(scene: Scene, inflation: number, query?: Query): Candidates;
+  /**
+   * All `candidates` in sorted runs, so that memory need not hold all of them: `each` gets one run after the other, and stops the search with
+   * `false`. How many candidates it got. Each run is searched for alone, so short runs cost time. While it runs, the scene must not be
+   * changed and the detector not asked.
+   */
+  candidatesInRuns(scene: Scene, inflation: number, each: (run: CandidateRun) => boolean | void, query?: Query): number;
   /** Pairs of elements at most a length apart, thickness besides; decided exactly. */
   near(scene: Scene, distance: number, query?: Query): NearPairs;
   /**
@@ -583,7 +626,14 @@ export declare class Detector {
    * seams of a geometry first; the error names an edge of one that is not.
    */
   contains(scene: Scene, body: Body, points: Positions, control?: Control): Int8Array;
-  /** The element nearest to each point: of all bodies, or of one with `of`. */
+  /** How far points are from the surface of a body: above 0 inside, below 0 outside; the sign is exact. Bodies as for `contains`. */
+  signedDistance(scene: Scene, body: Body, points: Positions, control?: Control): Float64Array;
+  /**
+   * Which tetrahedron of a body contains each point: the lowest of several that share the face, edge or vertex on which it is; -1 outside.
+   * Decided exactly.
+   */
+  locate(scene: Scene, body: Body, points: Positions, control?: Control): Int32Array;
+  /** The element nearest to each point, or with `nNearest` the nearest few: of all bodies, or of one with `of`. */
   closest(scene: Scene, points: Positions, query?: Query): Closest;
   /** What rays hit: the points origin + t direction, for t from 0 to `most`. Grazing an edge or a vertex is a hit. */
   cast(scene: Scene, origins: Positions, directions: Positions, query?: Query): Hits;

@@ -9,19 +9,36 @@ const NO_FEATURE = 255;
 // Where points lie: a number per point.
 export const places = ([, bytes]) => new Int8Array(bytes.buffer, bytes.byteOffset, bytes.length);
 
-// What is nearest to each point.
+// The tetrahedron that contains each point, or -1.
+export const tetrahedra = ([, , , words]) => new Int32Array(words.buffer, words.byteOffset, words.length);
+
+// How far inside each point is.
+export const signed = ([, , numbers]) => numbers;
+
+// What is nearest to each point: as many entries as the query says.
 export class Closest {
-  constructor([rows, features, numbers, , , hash], stats) {
+  constructor([rows, features, numbers, , , hash], stats, nNearest) {
     const n = features.length;
-    Object.assign(this, { rows, features, distances: numbers.subarray(0, n), points: numbers.subarray(n), hash: hex(hash), stats });
+    const columns = { distances: numbers.subarray(0, n), points: numbers.subarray(n) };
+    Object.assign(this, { nNearest, rows, features, ...columns, hash: hex(hash), stats });
   }
 
   get length() {
-    return this.features.length;
+    return this.features.length / this.nNearest;
   }
 
   at(ix) {
-    const of = ix < 0 ? ix + this.length : ix;
+    const point = ix < 0 ? ix + this.length : ix;
+    return Number.isInteger(ix) && point >= 0 ? this.#entry(point * this.nNearest) : null;
+  }
+
+  of(point) {
+    if (!Number.isInteger(point) || point < 0) return [];
+    const from = point * this.nNearest;
+    return Array.from({ length: this.nNearest }, (_, ix) => this.#entry(from + ix)).filter((of) => of !== null);
+  }
+
+  #entry(of) {
     if (!(of in this.features) || this.features[of] === NO_FEATURE) return null;
     return {
       body: this.rows[2 * of],

@@ -6,7 +6,7 @@ export const KINDS = ["vf", "ee", "ev", "vv", "ef", "ff"];
 
 const FIELDS = [
   ...["which", "between", "selfOf", "of", "kinds", "sharedVertex", "exclude", "ownedBy", "start", "separation", "clearance"],
-  ...["clearanceShare", "precision", "distances", "closestPoints", "fixed", "hits", "most", "signal", "progress"],
+  ...["clearanceShare", "precision", "distances", "closestPoints", "fixed", "hits", "nNearest", "most", "signal", "progress"],
 ];
 
 // The words and numbers of a query, and what watches the question. `length` is the question's own: a distance, an inflation.
@@ -29,6 +29,7 @@ export function packed(query, length = 0) {
     closestPoints = false,
     fixed = [],
     hits = "first",
+    nNearest = 1,
     most = Infinity,
     signal,
     progress,
@@ -40,11 +41,10 @@ export function packed(query, length = 0) {
     word("start", start, ["report", "skip", "verify"]),
     word("precision", precision, ["f32", "f64"]),
   ];
-  const rings = Array.from(exclude).filter((of) => of?.rings !== undefined).map(ringsOf);
-  const places = [word("hits", hits, ["first", "any", "all"]) << 3, rings.length === 0 ? 0 : (Math.max(...rings) + 1) << 5, fixed.length << 10];
-  const flags = (distances ? 1 : 0) | (closestPoints ? 2 : 0) | (ownedBy === undefined ? 0 : 4) | places.reduce((all, of) => all | of);
-  const words = [...bodies({ which, between, selfOf, of }), ...rules, bits(kinds), flags, ...Array.from(fixed, body)];
-  for (const of of exclude) if (of?.rings === undefined) words.push(...two("exclude", of));
+  const flags = (distances ? 1 : 0) | (closestPoints ? 2 : 0) | (ownedBy === undefined ? 0 : 4) | (word("hits", hits, ["first", "any", "all"]) << 3);
+  const n = whole("nNearest", nNearest, 1, 2 ** 32 - 1);
+  const words = [...bodies({ which, between, selfOf, of }), ...rules, bits(kinds), flags | (fixed.length << 5), n, ...Array.from(fixed, body)];
+  for (const of of exclude) words.push(...excluded(of));
   number("most", most);
   const lengths = Object.entries({ separation, clearance, clearanceShare }).map((entry) => number(...entry));
   return {
@@ -54,11 +54,34 @@ export function packed(query, length = 0) {
   };
 }
 
-// How many rings around each element are left out.
-function ringsOf({ rings, ...others }) {
-  mustBeNone("exclude", others, ["rings"]);
-  if (Number.isInteger(rings) && rings >= 0 && rings <= 16) return rings;
-  return refuse(`rings: ${String(rings)} given, 0 to 16 allowed`);
+// Pairs that were near when a scene was asked: the module knows them by a number.
+export class RestPairs {
+  static #last = 0;
+  static next = () => (RestPairs.#last += 1);
+  static numberOf = (given) => given.#number;
+  #number;
+
+  constructor(number, length) {
+    this.#number = number;
+    this.length = length;
+  }
+}
+
+// Three words for what is left out: rings around each element, two groups of vertices, pairs at rest or two bodies.
+function excluded(given) {
+  if (given instanceof RestPairs) return [3, RestPairs.numberOf(given), 0];
+  const { rings, groups, ...others } = given ?? {};
+  if (rings === undefined && groups === undefined) return [0, ...two("exclude", given)];
+  mustBeNone("exclude", others, ["rings", "groups"]);
+  if (groups === undefined) return [1, whole("rings", rings, 0, 16), 0];
+  if (rings !== undefined || groups?.length !== 2) refuse(`groups: ${String(groups)} given, two groups are needed, without rings`);
+  return [2, ...Array.from(groups, (group) => whole("groups", group, 0, 2 ** 32 - 1))];
+}
+
+// A whole number in a range.
+export function whole(name, given, least, most) {
+  if (Number.isInteger(given) && given >= least && given <= most) return given;
+  return refuse(`${name}: ${String(given)} given, ${least} to ${most} allowed`);
 }
 
 // The numbers of a question, followed by those of points.

@@ -62,10 +62,10 @@ async function source(given, beside) {
 }
 
 // Vertex numbers with 32 bits. three.js uses 16 bits if they suffice.
-export function wide(index) {
+export function wide(index, name = "index") {
   if (index instanceof Uint32Array) return index;
   if (index instanceof Uint16Array || index instanceof Uint8Array) return Uint32Array.from(index);
-  return refuse("index: a Uint32Array, a Uint16Array or a Uint8Array is needed");
+  return refuse(`${name}: a Uint32Array, a Uint16Array or a Uint8Array is needed`);
 }
 
 export function isSingle(positions) {

@@ -1,4 +1,4 @@
-import type { Advance, Body, Candidates, Closest, Contacts, Control, Hits, Impact, Impacts, Mesh, Module, NearPairs, Nearest, Neighbours, Pairs, Penetration, Positions, Query, SafeDistances, Scene, Settings, Stats, Truncation } from "./index.js";
+import type { Advance, Body, CandidateRun, Candidates, Closest, Contacts, Control, Hits, Impact, Impacts, Mesh, Module, NearPairs, Nearest, Neighbours, Pairs, Penetration, Positions, Query, SafeDistances, Scene, Settings, Stats, Truncation } from "./index.js";
 
 /** Loads the WebAssembly module, which is another one than that of `impinge`. Later calls wait for the first. */
 export default function init(module?: Module | Promise<Module>): Promise<void>;
@@ -25,8 +25,12 @@ export declare class Detector {
   isFree(scene: Scene, query?: Query): Promise<boolean>;
   advance(scene: Scene, query?: Query): Promise<Advance>;
   candidates(scene: Scene, inflation: number, query?: Query): Promise<Candidates>;
+  /** `each` is called while the device's queue waits: what it asks of this detector is answered after the last run. */
+  candidatesInRuns(scene: Scene, inflation: number, each: (run: CandidateRun) => boolean | void, query?: Query): Promise<number>;
   near(scene: Scene, distance: number, query?: Query): Promise<NearPairs>;
   contains(scene: Scene, body: Body, points: Positions, control?: Control): Promise<Int8Array>;
+  signedDistance(scene: Scene, body: Body, points: Positions, control?: Control): Promise<Float64Array>;
+  locate(scene: Scene, body: Body, points: Positions, control?: Control): Promise<Int32Array>;
   closest(scene: Scene, points: Positions, query?: Query): Promise<Closest>;
   cast(scene: Scene, origins: Positions, directions: Positions, query?: Query): Promise<Hits>;
   safeDistances(scene: Scene, most: number, query?: Query): Promise<SafeDistances>;

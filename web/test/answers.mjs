@@ -197,7 +197,7 @@ export const REFUSALS = {
   start: 'invalid: start: "never" given, "report", "skip" or "verify" allowed',
   field:
     'invalid: query: "seperation" given, which, between, selfOf, of, kinds, sharedVertex, exclude, ownedBy, start, separation, clearance, ' +
-    "clearanceShare, precision, distances, closestPoints, fixed, hits, most, signal or progress allowed",
+    "clearanceShare, precision, distances, closestPoints, fixed, hits, nNearest, most, signal or progress allowed",
   which: 'invalid: which: "none" given, "all", "between" or "self" allowed',
   both: 'invalid: query: "which" and "of" given, one of them allowed',
   separation: "invalid: separation: NaN given, a finite number that is not below 0 allowed",
@@ -393,6 +393,57 @@ export async function others(module) {
     body: await refusal(() => safe.of(7)),
   };
   step.dispose();
+  // The nearest few elements, and cells.
+  const few = await detector.closest(scene, points, { of: low, most: 1, nNearest: 5 });
+  const signed = await detector.signedDistance(scene, low, points);
+  const corners = new Float64Array([0, 0, 0, 4, 0, 0, 0, 4, 0, 0, 0, 4, 0, 0, -4]);
+  const cells = scene.addTetrahedra(new Uint8Array([0, 1, 2, 3, 0, 2, 1, 4]), corners);
+  const held2 = await detector.locate(scene, cells, new Float32Array([1, 1, -1, 1, 1, 0, 3, 3, 3]));
+  const nearest5 = {
+    few: [few.length, few.nNearest, few.rows.length, few.of(0).map(({ element }) => element), few.of(2), few.of(4), few.at(-2), few.at(1).distance],
+    signed: [...signed.subarray(0, 3), signed[3] > -0.289 && signed[3] < -0.288],
+    cells: [held2.constructor.name, ...held2],
+    faces: await refusal(() => detector.locate(scene, low, points)),
+    ragged: await refusal(() => detector.locate(scene, cells, points.subarray(1))),
+    number: await refusal(() => detector.locate(scene, cells, new Float32Array([0, NaN, 0]))),
+    none: await refusal(() => detector.closest(scene, points, { nNearest: 0 })),
+    half: await refusal(() => detector.closest(scene, points, { nNearest: 1.5 })),
+  };
+  scene.remove(cells);
+  // What is left out of pairs, and candidates in runs.
+  const pile = new Scene();
+  const [base, top] = [0, 0.5].map((z) => pile.addTriangles(index, new Float32Array(TRIANGLE.map((x, ix) => (ix % 3 === 2 ? z : x)))));
+  const count = async (...exclude) => (await detector.near(pile, 1, { exclude })).length;
+  const every = await count();
+  pile.setGroups(base, new Uint8Array([1, 1, 1]));
+  pile.setGroups(top, new Uint32Array([2, 2, 3]));
+  const grouped = await count({ groups: [2, 1] });
+  const atRest = pile.restPairs(1);
+  const left = {
+    groups: [grouped > 0 && grouped < every, (await count({ groups: [7, 7] })) === every],
+    rest: [atRest.length === every, await count(atRest)],
+    foreign: await refusal(() => detector.near(scene, 1, { exclude: [atRest] })),
+    one: await refusal(() => count({ groups: [1] })),
+    both: await refusal(() => count({ groups: [1, 2], rings: 1 })),
+    group: await refusal(() => count({ groups: [1, -1] })),
+    misspelt: await refusal(() => count({ ring: 1 })),
+    plain: await refusal(() => pile.setGroups(base, [1, 1, 1])),
+    short: await refusal(() => pile.setGroups(top, new Uint8Array(2))),
+    distance: await refusal(() => pile.restPairs(-1)),
+  };
+  const whole = await detector.candidates(pile, 1);
+  const [runs, lengths] = [[], []];
+  const sum = await detector.candidatesInRuns(pile, 1, (run) => { runs.push(...run.rows); lengths.push(run.length); }, { most: 4 });
+  left.runs = [sum === whole.length, String(runs) === String([...whole.rows]), lengths.length > 1, Math.max(...lengths)];
+  left.stopped = await detector.candidatesInRuns(pile, 1, () => false, { most: 4 });
+  left.thrown = await refusal(() => detector.candidatesInRuns(pile, 1, () => { throw new Error("mine"); }));
+  left.each = await refusal(() => detector.candidatesInRuns(pile, 1, { most: 4 }));
+  left.most = await refusal(() => detector.candidatesInRuns(pile, 1, () => true, { most: 0 }));
+  pile.setPinned(base, new Uint8Array([1, 1, 1]));
+  left.pinned = [(await count()) === every];
+  pile.setPinned(top, [true, true, true]);
+  left.pinned.push(await count(), await refusal(() => pile.setPinned(top, [true])));
+  pile.dispose();
   let n = 0;
   let stopped = null;
   try {
@@ -425,6 +476,8 @@ export async function others(module) {
     none: [none.length, none.hash, none.points.length, none.curves().length, none.regions()],
     probes,
     solver,
+    nearest5,
+    left,
     stopped: [n > 0, stopped],
     aborted,
     thrown,
@@ -481,6 +534,34 @@ export const OTHERS = {
     rings: "invalid: rings: 17 given, 0 to 16 allowed",
     unknown: "invalid: there is no body 5: 2 have been added, and 0 of them removed",
     body: "invalid: body: 7 given, which was not in the scene",
+  },
+  nearest5: {
+    few: [4, 5, 40, [0, 1, 2, 3], [], [], null, 0],
+    signed: [0.125, 0, -2, true],
+    cells: ["Int32Array", 1, 0, -1],
+    faces: "invalid: body 0 is made of triangles, where tetrahedra are needed",
+    ragged: "invalid: points: 11 numbers given, not a multiple of 3",
+    number: "invalid: points: row 0 is not finite (0, NaN, 0)",
+    none: "invalid: nNearest: 0 given, 1 to 4294967295 allowed",
+    half: "invalid: nNearest: 1.5 given, 1 to 4294967295 allowed",
+  },
+  left: {
+    groups: [true, true],
+    rest: [true, 0],
+    foreign: "invalid: exclude: pairs at rest of another scene given, those of this scene allowed",
+    one: "invalid: groups: 1 given, two groups are needed, without rings",
+    both: "invalid: groups: 1,2 given, two groups are needed, without rings",
+    group: "invalid: groups: -1 given, 0 to 4294967295 allowed",
+    misspelt: "invalid: exclude: [object Object] given, two bodies are needed",
+    plain: "invalid: groups: a Uint32Array, a Uint16Array or a Uint8Array is needed",
+    short: "invalid: body 1: 2 groups given, but there are 3 vertices",
+    distance: "invalid: distance: -1 given, a finite number that is not below 0 allowed",
+    runs: [true, true, true, 4],
+    stopped: 4,
+    thrown: "Error: mine",
+    each: "invalid: each: a function is needed",
+    most: "invalid: most: 0 given, 1 to 9007199254740991 allowed",
+    pinned: [true, 0, "invalid: body 1: 1 pinned given, but there are 3 vertices"],
   },
   stopped: [true, "cancelled"],
   aborted: "cancelled: cancelled",

@@ -13,8 +13,9 @@ import { OTHERS, REFUSALS, STEPS } from "./answers.mjs";
 import { launch, serve } from "./browser.mjs";
 
 // Without them, it is smaller by: near pairs 6 kB, distance 13, contacts 40 (14 of these penetration), candidates 2, points and rays 25 (5 of
-// these contains), bounds and lists 8, truncate 7.
-const MOST_BROTLI = 367_000;
+// these contains), bounds and lists 8, truncate 7. Together 7 more: the nearest few, locate, signedDistance, candidatesInRuns, groups,
+// pinned vertices and pairs at rest, which the other languages have.
+const MOST_BROTLI = 375_000;
 
 const [built, scenesFile] = process.argv.slice(2);
 const tarball = (await readdir(built)).find((name) => name.endsWith(".tgz"));

@@ -1,7 +1,7 @@
 // Uses all of the package's types; tsc checks it.
 
 import init, { Detector, ImpingeError, KINDS, SHAPES, Scene, weld } from "impinge";
-import type { Advance, Body, ClosestElement, Contacts, Impact, Nearest, NearPairs, Neighbours, PairKind, Pairs, Penetration, Query, RayHit, Region, Stats, Truncation } from "impinge";
+import type { Advance, Body, ClosestElement, Contacts, Impact, Nearest, NearPairs, Neighbours, PairKind, Pairs, Penetration, Query, RayHit, Region, RestPairs, Stats, Truncation } from "impinge";
 import initGpu, { Detector as GpuDetector, Scene as GpuScene, read, readBodies, readFrames, type FileMesh } from "impinge/webgpu";
 
 await init();
@@ -36,6 +36,14 @@ const nearest: Nearest | null = detector.distance(scene, a, b, { progress: () =>
 const points = new Float32Array(6);
 const places: Int8Array = detector.contains(scene, a, points, { progress: () => true });
 const closest: ClosestElement | null = detector.closest(scene, points, { of: a, most: 2 }).at(-1);
+const few: ClosestElement[] = detector.closest(scene, points, { nNearest: 3 }).of(0);
+const cells: Int32Array = detector.locate(scene, b, points);
+const inside: Float64Array = detector.signedDistance(scene, a, points, { progress: () => true });
+scene.setGroups(a, new Uint16Array(3));
+scene.setPinned(a, [true, false, true]);
+scene.setPinned(a, new Uint8Array(3));
+const rest: RestPairs = scene.restPairs(0.5);
+const handed: number = detector.candidatesInRuns(scene, 0.5, (run) => run.of("ee").length > 0, { exclude: [rest, { groups: [0, 1] }], most: 100 });
 const hits: RayHit[] = detector.cast(scene, points, new Float64Array(6), { hits: "all", most: 1 }).of(0);
 const bounds: Float32Array | Float64Array = detector.safeDistances(scene, 0.5, { fixed: [b], exclude: [[a, b], { rings: 2 }] }).of(a);
 const truncation: Truncation = detector.truncate(scene, { clearance: 1e-3 });
@@ -63,6 +71,8 @@ try {
 }
 // @ts-expect-error: positions are not plain arrays
 scene.setPositions(a, [0, 0, 0]);
+// @ts-expect-error: numbers are no pairs at rest
+detector.near(scene, 1, { exclude: [[1, 2, 3]] });
 // @ts-expect-error: not a method
 new Detector({ method: "octree" });
 // @ts-expect-error: pairs are between two bodies
@@ -82,7 +92,7 @@ const any: Promise<boolean> = gpu.any(theirs);
 const parts: FileMesh[] = readBodies("a.glb", new Uint8Array());
 const frames: Float32Array[] = readFrames("a.pc2", new Uint8Array());
 const map: Uint32Array = mesh.map;
-console.log(places, closest, hits, bounds, listed, nearestTwo);
+console.log(few, cells, inside, rest.length, handed, places, closest, hits, bounds, listed, nearestTwo);
 console.log(rows, numbers, first, times, kind, free, known, lengths, nearest, regions, penetration, loops, next, single, told, sizes, bodies, held);
 console.log(answer.hash, any, parts[0]?.name, frames, map, (await gpu.impacts(theirs)).length, gpu.stats?.backend);
 await gpu.dispose();

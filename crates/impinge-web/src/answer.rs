@@ -1,9 +1,11 @@
 //! Answers as flat lists. `shared.js` of the package gives them their shapes.
 
+use std::ops::ControlFlow;
+
 use impinge::contact::{Contacts, Curves, Penetration, Region, Shape};
 use impinge::exact::Feature;
 use impinge::proximity::Nearest;
-use impinge::{BodyId, Impact, NearPairs, PairKind, Pairs, Positions};
+use impinge::{BodyId, Candidates, Impact, NearPairs, PairKind, Pairs, Positions};
 
 use crate::ask::{Asker, Question, query};
 use crate::error::Error;
@@ -112,6 +114,21 @@ impl Answer {
         Ok(answer)
     }
 
+    /// The kind of each row.
+    fn of_candidates(candidates: &Candidates, world: &World) -> Self {
+        let mut answer = Answer {
+            hash: candidates.hash(),
+            ..Answer::default()
+        };
+        for kind in PairKind::ALL {
+            let rows = candidates.rows(kind);
+            let n = answer.bytes.len() + rows.len();
+            answer.bytes.resize(n, kind as u8);
+            answer.add_rows(rows, world.numbers());
+        }
+        answer
+    }
+
     /// A row, the distance and two points, if there is any pair.
     pub(crate) fn of_nearest(nearest: Option<Nearest>, number: impl Fn(BodyId) -> u32) -> Self {
         let mut answer = Answer::default();
@@ -185,8 +202,8 @@ pub(crate) fn of_pairs(pairs: &Pairs, world: &World) -> Answer {
 
 impl Asker {
     /// Asks. For questions with a query, `words` and `numbers` are those of [`query`].
-    /// [`Question::Distance`]: two bodies; [`Question::Contains`]: one. Points, or origins and then
-    /// directions, come after these numbers.
+    /// [`Question::Distance`]: two bodies; [`Question::Contains`], [`Question::Locate`] and
+    /// [`Question::SignedDistance`]: one. Points, or origins and then directions, come after these numbers.
     /// [`Question::Contacts`]: a number of the caller's for the answer, then rows of pairs; [`Question::Penetration`]: that number, two
     /// bodies, and the rows again; its rows are the two bodies, in the order of what is inside.
     ///
@@ -201,7 +218,9 @@ impl Asker {
     ) -> Result<Answer, Error> {
         let (numbers, given) = numbers.split_first_chunk().ok_or(Error::Foreign)?;
         match question {
-            Question::Contains => return self.contains(world, words, given),
+            Question::Contains | Question::Locate | Question::SignedDistance => {
+                return self.about_points(question, world, words, given);
+            }
             Question::Distance => return self.distance(world, words),
             Question::Contacts | Question::Penetration => {
                 return self.about_contacts(question, world, words);
@@ -241,18 +260,7 @@ impl Asker {
                 answer
             }
             Question::Candidates => {
-                let candidates = detector.candidates(scene, length, query)?;
-                let mut answer = Answer {
-                    hash: candidates.hash(),
-                    ..Answer::default()
-                };
-                for kind in PairKind::ALL {
-                    let rows = candidates.rows(kind);
-                    let n = answer.bytes.len() + rows.len();
-                    answer.bytes.resize(n, kind as u8);
-                    answer.add_rows(rows, world.numbers());
-                }
-                answer
+                Answer::of_candidates(&detector.candidates(scene, length, query)?, world)
             }
             Question::Closest
             | Question::Cast
@@ -263,6 +271,33 @@ impl Asker {
             Question::Near => Answer::of_near(&detector.near(scene, length, query)?, world),
             _ => of_pairs(&detector.detect(scene, query)?, world),
         })
+    }
+
+    /// [`Detector::candidates_in_runs`], with the words and the numbers of a query. `each` gets the
+    /// answer of each run, and says whether to go on. Returns how many candidates it got.
+    ///
+    /// # Errors
+    /// No such body; those of the question.
+    pub fn candidates_in_runs(
+        &mut self,
+        world: &World,
+        (words, numbers): (&[u32], &[f64]),
+        most: u64,
+        mut each: impl FnMut(Answer) -> bool,
+    ) -> Result<f64, Error> {
+        let numbers = numbers.first_chunk().ok_or(Error::Foreign)?;
+        let query = query(world, words, numbers)?;
+        let mut n_given = 0;
+        let hand_out = |run: Candidates| {
+            n_given += run.len();
+            match each(Answer::of_candidates(&run, world)) {
+                true => ControlFlow::Continue(()),
+                false => ControlFlow::Break(()),
+            }
+        };
+        let detector = &mut self.detector;
+        let _ = detector.candidates_in_runs(&world.scene, numbers[9], &query, most, hand_out)?;
+        Ok(n_given as f64)
     }
 
     /// The nearest pair of two bodies: a row, the distance and two points; nothing, if one of them

@@ -51,11 +51,15 @@ pub enum Question {
     Neighbours,
     /// [`Detector::nearest`].
     Nearest,
+    /// [`Detector::locate`].
+    Locate,
+    /// [`Detector::contains`], then [`Detector::closest`].
+    SignedDistance,
 }
 
 impl Question {
     /// All of them, by their number in the package.
-    pub const ALL: [Question; 19] = [
+    pub const ALL: [Question; 21] = [
         Question::Detect,
         Question::Count,
         Question::Any,
@@ -75,6 +79,8 @@ impl Question {
         Question::Truncate,
         Question::Neighbours,
         Question::Nearest,
+        Question::Locate,
+        Question::SignedDistance,
     ];
 }
 
@@ -83,19 +89,29 @@ impl Question {
 /// `words`: which pairs (0 all, 1 of different bodies, 2 of one body, 3 between `a` and `b`, 4 of
 /// `a` with itself, 5 all of `a`), `a`, `b`, the rule of shared vertices, the rule of the start,
 /// the precision (0 is the default of each), kinds as bits with 64 if they were said, flags (1
-/// distances, 2 nearest points, 4 a cell; from 8 on which hits of rays; from 32 on how many rings
-/// are left out and one, 0 for none; from 1024 on how many bodies are fixed), the fixed bodies, and
-/// two bodies for each exclusion. `numbers`: separation, clearance, its share, the low and the high
-/// corner of the cell, and the question's own length.
+/// distances, 2 nearest points, 4 a cell; from 8 on which hits of rays; from 32 on how many bodies
+/// are fixed), how many nearest elements, the fixed bodies, and three words for each exclusion: 0 and
+/// two bodies, 1 and rings, 2 and two groups, 3 and the number of pairs at rest. `numbers`:
+/// separation, clearance, its share, the low and the high corner of the cell, and the question's own
+/// length.
 ///
 /// # Errors
 /// No such body; lists that are not as described.
 pub fn query(world: &World, words: &[u32], numbers: &[f64; 10]) -> Result<Query, Error> {
-    let Some((&[which, a, b, shared_vertex, start, precision, kinds, flags], rest)) =
-        words.split_first_chunk()
-    else {
+    let Some((head, rest)) = words.split_first_chunk() else {
         return Err(Error::Foreign);
     };
+    let &[
+        which,
+        a,
+        b,
+        shared_vertex,
+        start,
+        precision,
+        kinds,
+        flags,
+        n_nearest,
+    ] = head;
     let [separation, clearance, share, x, y, z, to_x, to_y, to_z, _] = *numbers;
     let id = |number| world.id(number);
     let mut query = match which {
@@ -127,18 +143,21 @@ pub fn query(world: &World, words: &[u32], numbers: &[f64; 10]) -> Result<Query,
         1 => Hit::Any,
         _ => Hit::All,
     });
-    if let Some(n) = (flags >> 5 & 31).checked_sub(1) {
-        query = query.exclude(Exclusion::rings(n));
-    }
     let (fixed, excluded) = rest
-        .split_at_checked((flags >> 10) as usize)
+        .split_at_checked((flags >> 5) as usize)
         .ok_or(Error::Foreign)?;
     let fixed: Result<Vec<_>, Error> = fixed.iter().map(|&body| id(body)).collect();
     query = query.fixed(fixed?);
-    for &[a, b] in excluded.as_chunks().0 {
-        query = query.exclude((id(a)?, id(b)?));
+    for &[kind, a, b] in excluded.as_chunks().0 {
+        query = query.exclude(match kind {
+            0 => (id(a)?, id(b)?).into(),
+            1 => Exclusion::rings(a),
+            2 => Exclusion::groups(a, b),
+            _ => world.pairs_at_rest(a)?,
+        });
     }
     Ok(query
+        .n_nearest(n_nearest)
         .start(match start {
             0 => Start::Report,
             1 => Start::Skip,

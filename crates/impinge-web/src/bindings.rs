@@ -144,6 +144,21 @@ impl SceneHandle {
         self.0.set_thickness(body, thickness).map_err(thrown)
     }
 
+    /// See [`World::set_groups`].
+    pub fn set_groups(&mut self, body: u32, groups: &[u32]) -> Thrown<()> {
+        self.0.set_groups(body, groups).map_err(thrown)
+    }
+
+    /// See [`World::set_pinned`].
+    pub fn set_pinned(&mut self, body: u32, pinned: &[u8]) -> Thrown<()> {
+        self.0.set_pinned(body, pinned).map_err(thrown)
+    }
+
+    /// See [`World::keep_at_rest`].
+    pub fn rest_pairs(&mut self, number: u32, distance: f64) -> Thrown<u32> {
+        self.0.keep_at_rest(number, distance).map_err(thrown)
+    }
+
     /// See [`World::remove`].
     pub fn remove(&mut self, body: u32) -> Thrown<()> {
         self.0.remove(body).map_err(thrown)
@@ -267,6 +282,36 @@ impl DetectorHandle {
         self.asker.set_control(control(watcher));
         let answer = self.asker.ask(question, &scene.0, words, numbers);
         answer.map(|answer| lists(&answer)).map_err(thrown)
+    }
+
+    /// See [`Asker::candidates_in_runs`]. `each` gets the lists of each run, and stops the search with
+    /// `false` or with what it throws, which is thrown here.
+    pub fn candidates_in_runs(
+        &mut self,
+        scene: &SceneHandle,
+        watcher: u32,
+        words: &[u32],
+        numbers: &[f64],
+        most: f64,
+        each: &Function,
+    ) -> Thrown<f64> {
+        self.asker.set_control(control(watcher));
+        let mut failure = None;
+        let hand_out = |run: Answer| match each.call1(&JsValue::NULL, &lists(&run)) {
+            Ok(said) => said != JsValue::FALSE,
+            Err(error) => {
+                failure = Some(error);
+                false
+            }
+        };
+        let asked = (words, numbers);
+        let n = self
+            .asker
+            .candidates_in_runs(&scene.0, asked, most as u64, hand_out);
+        match failure {
+            Some(error) => Err(error),
+            None => n.map_err(thrown),
+        }
     }
 
     /// Which elements intersect, found on the device.

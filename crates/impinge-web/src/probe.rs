@@ -8,7 +8,8 @@ use crate::error::Error;
 use crate::world::{World, rows};
 
 impl Answer {
-    /// Rows `[body, element]`, features; distances, then points. Where nothing is near, a row of
+    /// Rows `[body, element]`, features; distances, then points; as many of these per point as the
+    /// query says. Where nothing is near, a row of
     /// `u32::MAX`, an infinite distance and no point.
     fn of_closest(closest: &Closest, world: &World) -> Self {
         let number = world.numbers();
@@ -131,9 +132,11 @@ impl Answer {
 }
 
 impl Asker {
-    /// Where points lie: a byte each, -1, 0 or 1. `words`: the body.
-    pub(crate) fn contains(
+    /// Where points lie: a byte each, -1, 0 or 1; or how far inside they are, a number each; or the
+    /// tetrahedra that contain them, a word each, -1 for none. `words`: the body.
+    pub(crate) fn about_points(
         &mut self,
+        question: Question,
         world: &World,
         words: &[u32],
         points: &[f64],
@@ -142,13 +145,31 @@ impl Asker {
             return Err(Error::Foreign);
         };
         let points = rows::<_, 3>(points, "points")?;
-        let places = self
-            .detector
-            .contains(&world.scene, world.id(body)?, points)?;
-        Ok(Answer {
-            bytes: places.iter().map(|&place| place as u8).collect(),
-            ..Answer::default()
-        })
+        let (detector, scene, body) = (&mut self.detector, &world.scene, world.id(body)?);
+        let mut answer = Answer::default();
+        if question == Question::Locate {
+            let found = detector.locate(scene, body, points)?;
+            let numbers = found.into_iter().map(|found| found.unwrap_or(u32::MAX));
+            answer.words.extend(numbers);
+            return Ok(answer);
+        }
+        let places = detector.contains(scene, body, points)?;
+        if question == Question::Contains {
+            answer.bytes.extend(places.iter().map(|&place| place as u8));
+            return Ok(answer);
+        }
+        let query = impinge::Query::of(body);
+        let closest = detector.closest(scene, points, f64::INFINITY, &query)?;
+        let distances = closest
+            .iter()
+            .map(|found| found.map_or(f64::INFINITY, |of| of.distance));
+        answer
+            .numbers
+            .extend(distances.zip(places).map(|(distance, place)| match place {
+                0 => 0.0,
+                place => distance * f64::from(place),
+            }));
+        Ok(answer)
     }
 
     /// Questions about points, rays and bounds. `given`: points, or origins and then directions.

@@ -1,7 +1,10 @@
 //! A scene whose bodies are numbered 0, 1, 2 … in the order in which they were added. Numbers are
 //! not used again.
 
-use impinge::{Body, BodyId, BodyKind, Elements, Filter, Part, Positions, Real, Scene, Weld};
+use impinge::{
+    Backend, Body, BodyId, BodyKind, Detector, Elements, Exclusion, Filter, Part, Positions, Query,
+    Real, Scene, Weld,
+};
 
 use crate::error::Error;
 
@@ -29,6 +32,8 @@ pub struct World {
     pub(crate) scene: Scene,
     /// Ids by number; `None` once removed.
     ids: Vec<Option<BodyId>>,
+    /// Pairs that were near when the caller asked, by the caller's number.
+    at_rest: Vec<(u32, Exclusion)>,
 }
 
 impl World {
@@ -138,6 +143,45 @@ impl World {
     pub fn set_thickness(&mut self, body: u32, thickness: f64) -> Result<(), Error> {
         let set = self.scene.set_thickness(self.id(body)?, thickness);
         self.renumbered(body, set).map(|_| ())
+    }
+
+    /// Puts each vertex of a body into a group.
+    ///
+    /// # Errors
+    /// No such body; those of [`Scene::set_groups`].
+    pub fn set_groups(&mut self, body: u32, groups: &[u32]) -> Result<(), Error> {
+        let set = self.scene.set_groups(self.id(body)?, groups);
+        self.renumbered(body, set).map(|_| ())
+    }
+
+    /// Says which vertices of a body never move: those whose byte is not 0.
+    ///
+    /// # Errors
+    /// No such body; those of [`Scene::set_pinned`].
+    pub fn set_pinned(&mut self, body: u32, pinned: &[u8]) -> Result<(), Error> {
+        let pinned: Vec<bool> = pinned.iter().map(|&byte| byte != 0).collect();
+        let set = self.scene.set_pinned(self.id(body)?, &pinned);
+        self.renumbered(body, set).map(|_| ())
+    }
+
+    /// Keeps the pairs that are within a distance now under a number, as long as the scene is kept.
+    /// Returns how many there are.
+    ///
+    /// # Errors
+    /// Those of [`Detector::near`].
+    pub fn keep_at_rest(&mut self, number: u32, distance: f64) -> Result<u32, Error> {
+        let mut detector = Detector::new(Backend::Cpu)?;
+        let near = detector.near(&self.scene, distance, &Query::all())?;
+        self.at_rest.push((number, Exclusion::from(&near)));
+        // A module of 32 bits holds no more.
+        Ok(near.len() as u32)
+    }
+
+    /// Pairs at rest by their number.
+    pub(crate) fn pairs_at_rest(&self, number: u32) -> Result<Exclusion, Error> {
+        let held = self.at_rest.iter().find(|(of, _)| *of == number);
+        held.map(|(_, pairs)| pairs.clone())
+            .ok_or(Error::PairsOfAnotherScene)
     }
 
     /// Removes a body. Its number is not used again.

@@ -37,7 +37,7 @@ fn files_have_the_answers_of_the_program() {
         let mut world = World::new();
         let body = add(&mut world, &read(name, &bytes, true).unwrap());
         let mut asker = Asker::new(Backend::Cpu.into()).unwrap();
-        let words = [4, body, 0, 0, 0, 0, 0, 0];
+        let words = [4, body, 0, 0, 0, 0, 0, 0, 1];
         let found = asker.ask(Question::Detect, &world, &words, &[0.0; 10]);
         let found = found.unwrap();
         let (n_pairs, hash) = (found.rows.len() / 4, found.hash);

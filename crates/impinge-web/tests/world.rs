@@ -17,9 +17,9 @@ fn asker() -> Result<Asker, Error> {
 }
 
 /// The words of a query with a scope, and nothing else said.
-fn words(scope: [u32; 3]) -> [u32; 8] {
+fn words(scope: [u32; 3]) -> [u32; 9] {
     let [which, a, b] = scope;
-    [which, a, b, 0, 0, 0, 0, 0]
+    [which, a, b, 0, 0, 0, 0, 0, 1]
 }
 
 const ALL: [u32; 3] = [0, 0, 0];
@@ -84,7 +84,11 @@ fn queries_are_what_the_package_writes() -> Result<(), Error> {
         assert_eq!(sort(&said), sort(&made));
     }
     let numbers = [0.5, 0.25, 0.125, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 0.0];
-    let said = query(&world, &[0, 0, 0, 1, 2, 1, 64 | 1 | 2, 1 | 2 | 4], &numbers)?;
+    let said = query(
+        &world,
+        &[0, 0, 0, 1, 2, 1, 64 | 1 | 2, 1 | 2 | 4, 1],
+        &numbers,
+    )?;
     let expected = Query::all()
         .shared_vertex(SharedVertex::Skip)
         .start(Start::Verify)
@@ -97,7 +101,7 @@ fn queries_are_what_the_package_writes() -> Result<(), Error> {
     assert_eq!(said, expected);
     let mut asker = asker()?;
     assert_eq!(rows(&mut asker, &world, [5, a, 0])?, [b, 0, a, 0]);
-    let excluded = [&words(ALL)[..], &[a, b]].concat();
+    let excluded = [&words(ALL)[..], &[0, a, b]].concat();
     let answer = asker.ask(Question::Detect, &world, &excluded, &NUMBERS)?;
     assert!(answer.rows.is_empty());
     Ok(())
@@ -195,7 +199,7 @@ fn answers_about_steps() -> Result<(), Error> {
     let n = impacts.rows.len() / 4;
     assert_eq!(impacts.numbers, vec![0.25; n]);
     assert_eq!((impacts.bytes.len(), impacts.bytes[2 * n]), (2 * n + 1, 2));
-    let verify = [0, 0, 0, 0, 2, 1, 0, 0];
+    let verify = [0, 0, 0, 0, 2, 1, 0, 0, 1];
     let advance = asker.ask(Question::Advance, &world, &verify, &NUMBERS)?;
     assert_eq!((advance.rows.len(), &advance.words[..]), (4, &[b][..]));
     assert_eq!((advance.bytes[2], advance.positions.len()), (0, 1));
@@ -205,7 +209,7 @@ fn answers_about_steps() -> Result<(), Error> {
     assert!(toi == 0.25 && (0.2499..=0.25).contains(&fraction) && n_tried >= 1.0);
     let mut near = NUMBERS;
     near[0] = 0.5;
-    let skip = [0, 0, 0, 0, 1, 1, 0, 0];
+    let skip = [0, 0, 0, 0, 1, 1, 0, 0, 1];
     let earliest = asker.ask(Question::Earliest, &world, &skip, &near)?;
     assert_eq!(earliest.numbers, [0.125]);
     Ok(())
@@ -218,7 +222,7 @@ fn answers_about_distances_and_contacts() -> Result<(), Error> {
     let b = add(&mut world, &TRIANGLE.map(|x| x + 0.5))?;
     let mut numbers = NUMBERS;
     numbers[9] = 0.5;
-    let points = [0, 0, 0, 0, 0, 0, 0, 2];
+    let points = [0, 0, 0, 0, 0, 0, 0, 2, 1];
     let near = asker.ask(Question::Near, &world, &points, &numbers)?;
     let n = near.rows.len() / 4;
     assert!(n > 0);
@@ -271,6 +275,102 @@ fn answers_about_distances_and_contacts() -> Result<(), Error> {
     Ok(())
 }
 
+/// Two tetrahedra that share a face.
+#[test]
+fn points_are_located_in_tetrahedra() -> Result<(), Error> {
+    let (mut world, mut asker) = (World::new(), asker()?);
+    let corners = [
+        0.0, 0.0, 0.0, 4.0, 0.0, 0.0, 0.0, 4.0, 0.0, 0.0, 0.0, 4.0, 0.0, 0.0, -4.0f32,
+    ];
+    let index = [0, 1, 2, 3, 0, 2, 1, 4];
+    let solid = world.put(Put::Add, 0, BodyKind::Tetrahedra, &index, &corners)?;
+    let points = [1.0, 1.0, -1.0, 1.0, 1.0, 0.0, 3.0, 3.0, 3.0];
+    let given = [&NUMBERS[..], &points].concat();
+    let answer = asker.ask(Question::Locate, &world, &[solid], &given)?;
+    assert_eq!(answer.words, [1, 0, u32::MAX]);
+    let ragged = asker.ask(Question::Locate, &world, &[solid], &given[..12]);
+    let text = ragged.expect_err("two numbers").to_string();
+    assert_eq!(text, "points: 2 numbers given, not a multiple of 3");
+    Ok(())
+}
+
+/// Groups, pinned vertices, pairs at rest and runs, beside the library.
+#[test]
+fn what_is_left_out_is_what_the_library_leaves_out() -> Result<(), Error> {
+    let (mut world, mut asker) = (World::new(), asker()?);
+    let gone = add(&mut world, &TRIANGLE)?;
+    let below = add(&mut world, &TRIANGLE)?;
+    world.remove(gone)?;
+    let lifted = TRIANGLE.map(|x| if x == 0.0 { 0.25 } else { x });
+    let above = add(&mut world, &lifted)?;
+    let mut numbers = NUMBERS;
+    numbers[9] = 1.0;
+    let near = |asker: &mut Asker, world: &World, excluded: &[u32]| {
+        let words = [&words(ALL), excluded].concat();
+        Ok::<_, Error>(
+            asker
+                .ask(Question::Near, world, &words, &numbers)?
+                .rows
+                .len()
+                / 4,
+        )
+    };
+    let all = near(&mut asker, &world, &[])?;
+    assert!(all > 4);
+    world.set_groups(below, &[1, 1, 1])?;
+    world.set_groups(above, &[2, 2, 3])?;
+    let some = near(&mut asker, &world, &[2, 2, 1])?;
+    assert!(0 < some && some < all);
+    // What has vertices of two groups is in neither.
+    assert!(near(&mut asker, &world, &[2, 2, 1, 2, 1, 3])? < some);
+    assert_eq!(near(&mut asker, &world, &[2, 7, 9])?, all);
+    let n = world.keep_at_rest(5, 1.0)?;
+    assert_eq!(n as usize, all);
+    assert_eq!(near(&mut asker, &world, &[3, 5, 0])?, 0);
+    let refused = near(&mut asker, &World::new(), &[3, 5, 0]).expect_err("another scene");
+    assert!(refused.to_string().starts_with("exclude: pairs at rest"));
+    world.set_pinned(below, &[1, 1, 1])?;
+    assert_eq!(near(&mut asker, &world, &[])?, all);
+    world.set_pinned(above, &[1, 1, 1])?;
+    assert_eq!(near(&mut asker, &world, &[])?, 0);
+    world.set_pinned(above, &[0, 0, 0])?;
+    let said = |result: Result<(), Error>| result.expect_err("refused").to_string();
+    // In the library the second one added is body 0.
+    let text = said(world.set_groups(above, &[1, 2]));
+    assert!(
+        text.starts_with("body 2, in the library's words: ") && text.contains("groups"),
+        "{text}"
+    );
+    let text = said(world.set_pinned(below, &[1, 0, 0, 1]));
+    assert!(
+        text.starts_with("body 1: ") && text.contains("pinned"),
+        "{text}"
+    );
+
+    let whole = asker.ask(Question::Candidates, &world, &words(ALL), &numbers)?;
+    let asked = (&words(ALL)[..], &numbers[..]);
+    let (mut rows, mut kinds, mut lengths) = (Vec::new(), Vec::new(), Vec::new());
+    let n = asker.candidates_in_runs(&world, asked, 4, |run| {
+        lengths.push(run.bytes.len());
+        rows.extend(run.rows);
+        kinds.extend(run.bytes);
+        true
+    })?;
+    assert_eq!((rows, kinds), (whole.rows, whole.bytes.clone()));
+    assert_eq!(n, whole.bytes.len() as f64);
+    assert!(lengths.len() > 2 && lengths.iter().all(|&n| 0 < n && n <= 4));
+    let n = asker.candidates_in_runs(&world, asked, 4, |_| false)?;
+    assert_eq!(n, 4.0);
+    let refused = asker.candidates_in_runs(&world, asked, 0, |_| true);
+    assert!(
+        refused
+            .expect_err("none")
+            .to_string()
+            .starts_with("most: 0")
+    );
+    Ok(())
+}
+
 #[test]
 fn vertices_at_one_position_are_welded() -> Result<(), Error> {
     let seam = [TRIANGLE, TRIANGLE.map(|x| -x)].concat();
@@ -313,12 +413,16 @@ fn bad_input_is_refused_by_name() -> Result<(), Error> {
         ask(Question::Impacts, &words(ALL), &negative).1,
         "separation: -1 given, a finite number that is not below 0 allowed"
     );
-    let kinds = [0, 0, 0, 0, 0, 0, 64 | 1, 0];
+    let kinds = [0, 0, 0, 0, 0, 0, 64 | 1, 0, 1];
     let (code, text) = ask(Question::Detect, &kinds, &NUMBERS);
     assert!(code == "invalid" && text.starts_with("kinds: "), "{text}");
-    let (_, text) = ask(Question::Impacts, &[0, 0, 0, 0, 0, 0, 64 | 16, 0], &NUMBERS);
+    let (_, text) = ask(
+        Question::Impacts,
+        &[0, 0, 0, 0, 0, 0, 64 | 16, 0, 1],
+        &NUMBERS,
+    );
     assert_eq!(text, "kinds: ef given, of a step: vf, ee, ev, vv allowed");
-    let (_, text) = ask(Question::Advance, &[0, 0, 0, 0, 0, 0, 0, 4], &NUMBERS);
+    let (_, text) = ask(Question::Advance, &[0, 0, 0, 0, 0, 0, 0, 4, 1], &NUMBERS);
     assert!(text.starts_with("owned_by: "), "{text}");
     assert_eq!(ask(Question::Detect, &[], &NUMBERS).0, "invalid");
     // The refused calls changed nothing.
@@ -488,6 +592,31 @@ fn points_rays_and_bounds_are_those_of_the_library() -> Result<(), Error> {
     assert_eq!(answer.bytes[2], u8::MAX);
     assert_eq!(answer.hash, closest.hash());
 
+    let mut few = words(ALL);
+    few[8] = 3;
+    let answer = asker.ask(Question::Closest, &world, &few, &with(5.0, &points))?;
+    let closest = detector.closest(&scene, &points, 5.0, &all.clone().n_nearest(3))?;
+    assert_eq!((answer.hash, answer.bytes.len()), (closest.hash(), 9));
+    assert!(answer.bytes[6..].iter().all(|&feature| feature == u8::MAX));
+    let distances = closest.iter().flatten().map(|of| of.distance);
+    assert!(distances.eq(answer.numbers[..6].iter().copied()));
+    few[8] = 0;
+    let refused = asker.ask(Question::Closest, &world, &few, &with(5.0, &points));
+    let text = refused.expect_err("none asked for").to_string();
+    assert!(text.starts_with("n_nearest: 0 given"), "{text}");
+
+    let around = [[0.25, 0.125, 0.25], points[1]];
+    let answer = asker.ask(Question::SignedDistance, &world, &[a], &with(0.0, &around))?;
+    let closest = detector.closest(&scene, &around, f64::INFINITY, &Query::of(own_a))?;
+    let places = detector.contains(&scene, own_a, &around)?;
+    let signed = closest.iter().flatten().zip(&places);
+    let signed = signed.map(|(of, &place)| of.distance * f64::from(place));
+    assert!(signed.eq(answer.numbers.iter().copied()));
+    assert!(answer.numbers[0] > 0.0 && answer.numbers[1] < 0.0);
+    let refused = asker.ask(Question::Locate, &world, &[a], &with(0.0, &points));
+    let text = refused.expect_err("no tetrahedra").to_string();
+    assert!(text.contains("tetrahedra are needed"), "{text}");
+
     let rays = [
         [0.1, 0.2, 5.0],
         [2.0, 0.25, 5.0],
@@ -516,7 +645,7 @@ fn points_rays_and_bounds_are_those_of_the_library() -> Result<(), Error> {
     assert_eq!(answer.words, [&[3], &offsets[..]].concat());
 
     let mut fixed = [&words([1, 0, 0])[..], &[a]].concat();
-    fixed[7] = 1 << 10;
+    fixed[7] = 1 << 5;
     let answer = asker.ask(Question::SafeDistances, &world, &fixed, &with(1.0, &[]))?;
     let query = Query::between_all().fixed([own_a]);
     let safe = detector.safe_distances(&scene, 1.0, &query)?;
@@ -530,8 +659,7 @@ fn points_rays_and_bounds_are_those_of_the_library() -> Result<(), Error> {
             .all(|&bound| bound == 0.0)
     );
 
-    let mut ringed = words(ALL);
-    ringed[7] = 3 << 5;
+    let ringed = [&words(ALL)[..], &[1, 2, 0]].concat();
     let answer = asker.ask(Question::Neighbours, &world, &ringed, &with(1.3, &[]))?;
     let query = Query::all().exclude(impinge::Exclusion::rings(2));
     let near = detector.neighbours(&scene, 1.3, &query)?;
