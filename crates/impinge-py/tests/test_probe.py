@@ -180,6 +180,15 @@ def test_locate(dtype):
     found = detector.locate(scene, body, points)
     assert found.dtype == np.int64 and found.shape == (729,) and (found == expected).all()
     assert set(found.tolist()) == {-1, 0, 1, 2, 3, 4, 5}
+    alone = impinge.locate(corners, tetrahedra, points, threads=2)
+    assert alone.dtype == np.int64 and (alone == expected).all()
+    assert impinge.locate(corners, tetrahedra, np.empty((0, 3))).shape == (0,)
+    with pytest.raises(ValueError, match="tetrahedra"):
+        impinge.locate(corners, CUBE, points)
+    with pytest.raises(ValueError, match="points"):
+        impinge.locate(corners, tetrahedra, points[:, :2])
+    with pytest.raises(ValueError, match="points: row 0"):
+        impinge.locate(corners, tetrahedra, [[np.nan, 0, 0]])
     assert detector.locate(scene, body, np.empty((0, 3))).shape == (0,)
     surface = scene.add(CORNERS, CUBE)
     with pytest.raises(ValueError, match="tetrahedra"):

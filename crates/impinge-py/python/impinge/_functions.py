@@ -330,12 +330,52 @@ def contains(
     return detector._contains(scene, 0, points, {})
 
 
+def locate(
+    vertices: _Array,
+    tetrahedra: _Array,
+    points: _Array,
+    **settings: Unpack[Settings],
+) -> npt.NDArray[np.int64]:
+    """Which tetrahedron contains each point: the lowest, where several share the face, edge or vertex on which it is. Decided exactly.
+
+    Parameters
+    ----------
+    vertices : array_like, shape (v, 3)
+        Positions, float32 or float64.
+    tetrahedra : array_like of int, shape (n, 4)
+        Vertex indices.
+    points : array_like, shape (n, 3)
+        Float32 or float64, taken as they are.
+    **settings
+        As for `Detector`, but for ``backend``, which is ``"cpu"`` unless it is given.
+
+    Returns
+    -------
+    numpy.ndarray of int64, shape (n,)
+        Numbers of tetrahedra, -1 outside, as `Detector.locate`.
+
+    Raises
+    ------
+    ValueError, TypeError
+        As `Scene.add` and `Detector.locate`.
+
+    Examples
+    --------
+    >>> import impinge
+    >>> corners = [[0, 0, 0], [4, 0, 0], [0, 4, 0], [0, 0, 4], [0, 0, -4]]
+    >>> impinge.locate(corners, [[0, 1, 2, 3], [0, 2, 1, 4]], [[1, 1, -1], [1, 1, 0], [3, 3, 3]])
+    array([ 1,  0, -1])
+    """
+    scene, detector = _one_mesh(vertices, tetrahedra, "tetrahedra", False, settings, "tetrahedra")
+    return detector._locate(scene, 0, points, {})
+
+
 def _one_mesh(
-    vertices: _Array, faces: _Array, kind: _RowKind | None, weld: bool, settings: Settings
+    vertices: _Array, faces: _Array, kind: _RowKind | None, weld: bool, settings: Settings, name: str = "faces"
 ) -> tuple[Scene, Detector]:
     """A scene of one mesh, and a detector, on the CPU unless the settings say otherwise."""
     scene = Scene()
-    scene._add_named(vertices, faces, kind, ("vertices", "faces"), weld)
+    scene._add_named(vertices, faces, kind, ("vertices", name), weld)
     settings.setdefault("backend", "cpu")
     return scene, Detector(**settings)
 
