@@ -49,22 +49,23 @@ impl Rows {
             #[cfg(feature = "parquet")]
             RowsFormat::Parquet => return Self::in_columns(file, &columns),
         };
-        let mut rows = Rows {
-            path: file.path.clone(),
-            format: Format::Table {
-                table: Table::new(format, columns),
-                file: match file.is_stdout() {
-                    true => None,
-                    false => Some(AtomicFile::create(&file.path)?),
-                },
-                n_late: n.is_none().then_some(0),
-            },
+        let path = file.path.clone();
+        let table = Table::new(format, columns);
+        let mut file = match file.is_stdout() {
+            true => None,
+            false => Some(AtomicFile::create(&path)?),
         };
-        if let Format::Table { table, file, .. } = &mut rows.format {
-            let header = table.header(n);
-            write_to(&rows.path, file, |to| to.write_all(&header))?;
-        }
-        Ok(rows)
+        let header = table.header(n);
+        write_to(&path, &mut file, |to| to.write_all(&header))?;
+        let n_late = n.is_none().then_some(0);
+        Ok(Rows {
+            path,
+            format: Format::Table {
+                table,
+                file,
+                n_late,
+            },
+        })
     }
 
     #[cfg(feature = "parquet")]
