@@ -187,7 +187,7 @@ def test_locate(dtype):
         impinge.locate(corners, CUBE, points)
     with pytest.raises(ValueError, match="points"):
         impinge.locate(corners, tetrahedra, points[:, :2])
-    with pytest.raises(ValueError, match="points: row 0"):
+    with pytest.raises(ValueError, match=r"points\[0, 0\] = nan"):
         impinge.locate(corners, tetrahedra, [[np.nan, 0, 0]])
     assert detector.locate(scene, body, np.empty((0, 3))).shape == (0,)
     surface = scene.add(CORNERS, CUBE)
