@@ -496,7 +496,8 @@ typedef struct impinge_stats {
  *   STARTS      r + 1 x 1 U64  where the hits of each ray start, but for IMPINGE_HITS_ANY  hits
  *   T, T_END    n x 1 F64                                                               hits
  *   BARYCENTRICS n x 3 F64                                                              hits
- * Of stencils, KIND is n x 1 U8, FEATURES n x 2 U8 in the order of the vertices, and these, which are computed when first looked at:
+ * Of stencils, KIND is n x 1 U8, FEATURES n x 2 U8 in the order of the vertices, and these, which are computed when first looked at,
+ * on at most as many threads as the detector had that found the pairs:
  *   VERTICES    n x 4 U32      numbered through the scene, body after body
  *   STARTS      b + 1 x 1 U64  the number of the first vertex of each body, and the number of all
  *   WEIGHT      n x 1 F64      how many pairs it stands for
@@ -763,7 +764,7 @@ size_t impinge_stencils_count(const impinge_stencils *stencils);
 impinge_status impinge_stencils_column(const impinge_stencils *stencils, uint32_t column, impinge_array *view);
 void impinge_stencils_destroy(impinge_stencils *stencils);
 /* Replaces each of `n` symmetric matrices of `size` x `size` numbers (3, 6, 9 or 12), one after another, by the nearest one without
- * negative eigenvalues. The same bits on every machine. */
+ * negative eigenvalues. Many are shared by as many threads as there are cores. The same bits on every machine and by any number of threads. */
 impinge_status impinge_project_psd(double *matrices, size_t n, size_t size);
 
 /* How far each vertex of a body may move: a view, n x 1 F32 or F64 as its positions, valid as long as the answer. A vertex that belongs to

@@ -2,10 +2,10 @@
 
 use std::sync::OnceLock;
 
-use impinge::{PairKind, Stencil, Stencils, project_psd};
+use impinge::{Error, PairKind, Stencil, Stencils, project_psd_all};
 
 use crate::answers::{code, impinge_near};
-use crate::arrays::{self, Floats, collect, reserve};
+use crate::arrays::{self, Floats, collect};
 use crate::scene::impinge_scene;
 use crate::status::{Failure, clear, destroy, guard, held, put};
 use crate::types::*;
@@ -15,8 +15,6 @@ const WHAT: &str = "stencils";
 /// Vertices of near pairs or contacts, and how their distances depend on them.
 pub struct impinge_stencils {
     stencils: Stencils,
-    /// Where the rows are in `stencils`, if they have another order.
-    order: Vec<usize>,
     vertices: Vec<[u32; 4]>,
     kinds: Vec<u8>,
     features: Vec<[u8; 2]>,
@@ -25,35 +23,40 @@ pub struct impinge_stencils {
     numbers: [OnceLock<Option<Vec<f64>>>; NUMBERS.len()],
 }
 
-/// How many numbers a stencil has in a column, and which.
-type Numbers = (u32, usize, fn(&Stencil, &mut Vec<f64>));
+/// How many numbers a stencil has in a column, and these of all.
+type Numbers = (u32, usize, fn(&Stencils) -> Result<Vec<f64>, Error>);
 
 const NUMBERS: [Numbers; 8] = [
-    (COLUMN_WEIGHT, 1, |of, to| to.push(of.weight)),
-    (COLUMN_COEFFICIENTS, 4, |of, to| {
-        to.extend(of.coefficients())
+    (COLUMN_WEIGHT, 1, |of| of.column(|of| of.weight)),
+    (COLUMN_COEFFICIENTS, 4, |of| {
+        Ok(of.column(Stencil::coefficients)?.into_flattened())
     }),
-    (COLUMN_SQUARED_DISTANCE, 1, |of, to| {
-        to.push(of.squared_distance())
+    (COLUMN_SQUARED_DISTANCE, 1, |of| {
+        of.column(Stencil::squared_distance)
     }),
-    (COLUMN_GRADIENT, 12, |of, to| to.extend(of.gradient())),
-    (COLUMN_HESSIAN, 144, |of, to| {
-        to.extend_from_slice(of.hessian().as_flattened())
+    (COLUMN_GRADIENT, 12, |of| {
+        Ok(of.column(Stencil::gradient)?.into_flattened())
     }),
-    (COLUMN_MOLLIFIER, 1, |of, to| to.push(of.mollifier())),
-    (COLUMN_MOLLIFIER_GRADIENT, 12, |of, to| {
-        to.extend(of.mollifier_gradient())
+    (COLUMN_HESSIAN, 144, |of| {
+        Ok(of
+            .column(Stencil::hessian)?
+            .into_flattened()
+            .into_flattened())
     }),
-    (COLUMN_MOLLIFIER_HESSIAN, 144, |of, to| {
-        to.extend_from_slice(of.mollifier_hessian().as_flattened());
+    (COLUMN_MOLLIFIER, 1, |of| of.column(Stencil::mollifier)),
+    (COLUMN_MOLLIFIER_GRADIENT, 12, |of| {
+        Ok(of.column(Stencil::mollifier_gradient)?.into_flattened())
+    }),
+    (COLUMN_MOLLIFIER_HESSIAN, 144, |of| {
+        let column = of.column(Stencil::mollifier_hessian)?;
+        Ok(column.into_flattened().into_flattened())
     }),
 ];
 
 impl impinge_stencils {
-    fn new(stencils: Stencils, order: Vec<usize>) -> Result<Self, Failure> {
+    fn new(stencils: Stencils) -> Result<Self, Failure> {
         let starts = stencils.offsets().iter().map(|&start| u64::from(start));
         let mut answer = impinge_stencils {
-            order,
             vertices: Vec::new(),
             kinds: Vec::new(),
             features: Vec::new(),
@@ -61,11 +64,10 @@ impl impinge_stencils {
             numbers: Default::default(),
             stencils,
         };
-        let rows = 0..answer.stencils.len();
-        answer.vertices = collect(rows.clone().map(|ix| answer.row(ix).vertices), WHAT)?;
-        answer.kinds = collect(rows.clone().map(|ix| bit(answer.row(ix).kind) as u8), WHAT)?;
-        let features = rows.map(|ix| {
-            let row = answer.row(ix);
+        let rows = || answer.stencils.iter();
+        answer.vertices = collect(rows().map(|row| row.vertices), WHAT)?;
+        answer.kinds = collect(rows().map(|row| bit(row.kind) as u8), WHAT)?;
+        let features = rows().map(|row| {
             let [a, b] = row.features.map(|feature| code(feature, false));
             match row.kind {
                 // As vertices are: the vertex comes first.
@@ -77,14 +79,6 @@ impl impinge_stencils {
         Ok(answer)
     }
 
-    fn row(&self, ix: usize) -> &Stencil {
-        let rows = self.stencils.iter().as_slice();
-        match self.order.get(ix) {
-            Some(&at) => &rows[at],
-            None => &rows[ix],
-        }
-    }
-
     fn numbers(&self, column: u32) -> Result<impinge_array, Failure> {
         let Some(ix) = NUMBERS.iter().position(|&(of, ..)| of == column) else {
             return Err(Failure::invalid(format!(
@@ -93,13 +87,8 @@ impl impinge_stencils {
         };
         let (_, n_columns, of) = NUMBERS[ix];
         let n = self.stencils.len();
-        let find = || {
-            let mut numbers = Vec::new();
-            reserve(&mut numbers, n_columns * n, WHAT).ok()?;
-            (0..n).for_each(|ix| of(self.row(ix), &mut numbers));
-            Some(numbers)
-        };
-        let numbers = self.numbers[ix].get_or_init(find).as_ref();
+        let numbers = self.numbers[ix].get_or_init(|| of(&self.stencils).ok());
+        let numbers = numbers.as_ref();
         let numbers = numbers.ok_or_else(|| Failure::out_of_memory(WHAT, n_columns * n))?;
         Ok(impinge_array {
             rows: n,
@@ -142,9 +131,11 @@ pub unsafe extern "C" fn impinge_near_stencils(
                     }
                 }),
             };
-            let found = near.near.stencils(scene, rest.as_deref())?;
-            let order = arrays::copied(&near.order, WHAT)?;
-            let answer = Box::new(impinge_stencils::new(found, order)?);
+            let mut found = near.near.stencils(scene, rest.as_deref())?;
+            if !near.order.is_empty() {
+                found = found.select(&near.order)?;
+            }
+            let answer = Box::new(impinge_stencils::new(found)?);
             put(stencils, "stencils", Box::into_raw(answer))
         }
     })
@@ -160,7 +151,7 @@ pub unsafe extern "C" fn impinge_stencils_merged(
         unsafe {
             clear(merged, "merged")?;
             let found = held(stencils, "stencils")?.stencils.merged()?;
-            let answer = Box::new(impinge_stencils::new(found, Vec::new())?);
+            let answer = Box::new(impinge_stencils::new(found)?);
             put(merged, "merged", Box::into_raw(answer))
         }
     })
@@ -194,37 +185,24 @@ pub unsafe extern "C" fn impinge_stencils_destroy(stencils: *mut impinge_stencil
 
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn impinge_project_psd(matrices: *mut f64, n: usize, size: usize) -> Status {
-    fn each<const N: usize>(numbers: &mut [f64]) {
-        let rows = numbers.as_chunks_mut::<N>().0;
-        rows.as_chunks_mut::<N>().0.iter_mut().for_each(project_psd);
-    }
     guard(|| {
-        let project = match size {
-            3 => each::<3>,
-            6 => each::<6>,
-            9 => each::<9>,
-            12 => each::<12>,
-            _ => {
-                return Err(Failure::invalid(format!(
-                    "size: {size} given, 3, 6, 9 or 12 allowed"
-                )));
-            }
-        };
-        if n == 0 {
-            return Ok(());
-        }
-        if matrices.is_null() {
+        if n > 0 && matrices.is_null() {
             return Err(Failure::invalid(format!(
                 "matrices: NULL, but there are {n} matrices"
             )));
         }
-        let n_numbers = n.checked_mul(size * size);
+        let n_numbers = size.checked_mul(size).and_then(|each| n.checked_mul(each));
         let n_numbers = n_numbers.filter(|&n| n <= isize::MAX as usize / size_of::<f64>());
         let n_numbers = n_numbers.ok_or_else(|| {
-            Failure::invalid(format!("n: {n} matrices given, which no memory can hold"))
+            Failure::invalid(format!(
+                "n: {n} matrices of size {size} given, which no memory can hold"
+            ))
         })?;
-        // SAFETY: see `impinge_near_stencils`.
-        project(unsafe { std::slice::from_raw_parts_mut(matrices, n_numbers) });
-        Ok(())
+        let numbers = match n_numbers {
+            0 => &mut [],
+            // SAFETY: see `impinge_near_stencils`.
+            _ => unsafe { std::slice::from_raw_parts_mut(matrices, n_numbers) },
+        };
+        Ok(project_psd_all(numbers, size, 0)?)
     })
 }

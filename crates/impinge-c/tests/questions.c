@@ -321,6 +321,7 @@ static void stencils(impinge_detector *detector) {
   impinge_array view, distances, rest, vertices, gradients, hessians, weights;
   static double at_rest[2 * VERTICES][3];
   double matrices[2][9] = {{2, 0, 0, 0, -1, 0, 0, 0, 0.5}, {-1, 0, 0, 0, -1, 0, 0, 0, -1}};
+  static double many[1000][9], copies[1000][9];
   impinge_query query;
   double total = 0;
   size_t i, j, k, n;
@@ -381,6 +382,14 @@ static void stencils(impinge_detector *detector) {
   REFUSED(impinge_near_stencils(near_pairs, scene, &rest, &of), "positions given, but it has");
   GOOD(impinge_project_psd(matrices[0], 2, 3));
   CHECK(matrices[0][0] == 2 && matrices[0][4] == 0 && matrices[0][8] == 0.5 && matrices[1][0] == 0 && matrices[1][8] == 0);
+  /* Many at once, which threads share, as each of them. */
+  for (i = 0; i < 1000 * 9; ++i) many[i / 9][i % 9] = i % 9 == 4 ? -1 - (double)(i / 9) : i % 9 % 4 == 0 ? 1 : 0.25 * (double)(i % 9 == 1 || i % 9 == 3);
+  memcpy(copies, many, sizeof many);
+  GOOD(impinge_project_psd(many[0], 1000, 3));
+  for (i = 0; i < 1000; ++i) {
+    GOOD(impinge_project_psd(copies[i], 1, 3));
+    CHECK(memcmp(copies[i], many[i], sizeof many[i]) == 0 && many[i][4] >= 0 && many[i][4] < 0.1);
+  }
   GOOD(impinge_project_psd(NULL, 0, 12));
   REFUSED(impinge_project_psd(NULL, 1, 12), "NULL");
   REFUSED(impinge_project_psd(matrices[0], 2, 4), "size: 4 given");

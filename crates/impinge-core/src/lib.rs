@@ -63,6 +63,6 @@ pub use scene::position_rows::PositionRows;
 pub use scene::positions::{NewPositions, Positions, Real};
 pub use scene::{Body, Filter, Scene};
 pub use search::stats::{Stage, Stats};
-pub use stencil::{Gradient, Hessian, project_psd};
+pub use stencil::{Gradient, Hessian, project_psd, project_psd_all};
 #[cfg(feature = "gpu")]
 pub use wgpu;

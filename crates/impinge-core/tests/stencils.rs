@@ -4,7 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use impinge_core::exact::Feature;
 use impinge_core::{
-    Backend, Detector, Error, NearPairs, PairKind, Query, Scene, Stencil, Stencils, project_psd,
+    Backend, Detector, Error, NearPairs, PairKind, Query, Scene, Settings, Stencil, Stencils,
+    project_psd, project_psd_all,
 };
 use impinge_scenes::Random;
 
@@ -610,6 +611,54 @@ fn refusals_name_what_is_wrong() {
         pairs.stencils(&scene, None),
         Err(Error::ForeignPair { .. })
     ));
+}
+
+/// Columns and projections are those of one stencil after another, however many threads compute
+/// them.
+#[test]
+fn threads_change_no_bit() {
+    let scene = folded();
+    let rest = positions(&scene);
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(4);
+    let pool = pool.build().expect("threads");
+    let mut first: Option<Vec<f64>> = None;
+    for threads in [1, 2, 5, 0] {
+        let settings = Settings::new().backend(Backend::Cpu).threads(threads);
+        let mut detector = Detector::new(settings).unwrap();
+        let query = Query::all().kinds(KINDS);
+        let near = detector.near(&scene, 0.3, &query).unwrap();
+        let stencils = near.stencils(&scene, Some(&rest)).unwrap();
+        // More than one part for a thread.
+        assert!(stencils.len() > 2000, "{}", stencils.len());
+        pool.install(|| {
+            let column = stencils.column(|of| *of).unwrap();
+            assert!(column.iter().eq(&stencils), "each in its place");
+            let each = stencils.iter().map(Stencil::squared_distance);
+            let column = stencils.column(Stencil::squared_distance).unwrap();
+            assert!(column.into_iter().eq(each));
+            let mut hessians = stencils.column(Stencil::hessian).unwrap();
+            for (hessian, of) in hessians.iter_mut().zip(&stencils) {
+                assert_eq!(*hessian, of.hessian());
+                let negative = hessian.map(|row| row.map(|x| -x));
+                *hessian = negative;
+            }
+            let mut together = hessians.as_flattened().as_flattened().to_vec();
+            project_psd_all(&mut together, 12, threads).unwrap();
+            hessians.iter_mut().for_each(project_psd);
+            assert_eq!(together, hessians.as_flattened().as_flattened());
+            assert_eq!(first.get_or_insert(together.clone()), &together);
+        });
+        let some = stencils.select(&[7, 0, 7]).unwrap();
+        let of = |ix: usize| stencils.iter().as_slice()[ix];
+        assert!(some.iter().eq(&[of(7), of(0), of(7)]));
+        assert_eq!(some.offsets(), stencils.offsets());
+    }
+    let refused = |n: usize, size: usize| {
+        let error = project_psd_all(&mut vec![0.0; n], size, 0).unwrap_err();
+        error.to_string()
+    };
+    assert!(refused(16, 4).starts_with("size: 4 given, 3, 6, 9 or 12"));
+    assert!(refused(19, 3).starts_with("matrices: 19 numbers given"));
 }
 
 /// The same bits on every machine: a hash of all numbers.

@@ -9,10 +9,13 @@ use crate::scene::index::ElementIx;
 use crate::scene::{Body, Scene};
 use crate::search::sink;
 use crate::stencil::{Gradient, Hessian, Mollifier, NearestWay};
+use crate::workers::in_parts::in_parts;
 use impinge_exact::{Feature, Point};
 
 /// What memory is for.
 const WHAT: &str = "stencils";
+/// Stencils that a thread takes at a time.
+const PART: usize = 256;
 
 /// Up to four vertices, and how the squared distance between them depends on their positions: what
 /// a potential needs to know about two elements that are near each other.
@@ -196,6 +199,8 @@ pub struct Stencils {
     rows: Vec<Stencil>,
     /// The first vertex of each body by its index, and one past the last.
     offsets: Vec<u32>,
+    /// How many threads compute columns, at most.
+    threads: usize,
 }
 
 impl NearPairs {
@@ -255,6 +260,7 @@ impl NearIter<'_> {
             }
         }
         let mut rows = sink::with_capacity(self.len(), WHAT)?;
+        let threads = self.threads();
         for pair in self {
             let parts = pair.kind.parts();
             let (a, b) = match pair.kind {
@@ -306,7 +312,11 @@ impl NearIter<'_> {
                 threshold,
             });
         }
-        Ok(Stencils { rows, offsets })
+        Ok(Stencils {
+            rows,
+            offsets,
+            threads,
+        })
     }
 }
 
@@ -334,9 +344,68 @@ impl Stencils {
             }
             is_same
         });
+        self.with(rows)
+    }
+
+    /// Some of them, or all in another order: those with these numbers.
+    ///
+    /// # Errors
+    /// There is no memory for them.
+    ///
+    /// # Panics
+    /// There is no stencil with such a number.
+    pub fn select(&self, numbers: &[usize]) -> Result<Self, Error> {
+        let mut rows = sink::with_capacity(numbers.len(), WHAT)?;
+        rows.extend(numbers.iter().map(|&ix| self.rows[ix]));
+        self.with(rows)
+    }
+
+    /// Others of the same scene.
+    fn with(&self, rows: Vec<Stencil>) -> Result<Self, Error> {
         let mut offsets = sink::with_capacity(self.offsets.len(), WHAT)?;
         offsets.extend_from_slice(&self.offsets);
-        Ok(Stencils { rows, offsets })
+        Ok(Stencils {
+            rows,
+            offsets,
+            threads: self.threads,
+        })
+    }
+
+    /// A number, row or matrix of each, in order: computed on threads of the rayon pool at hand, at
+    /// most as many as the detector has that found the pairs. However many there are, the bytes are
+    /// the same.
+    ///
+    /// ```
+    /// # use impinge::{Backend, Detector, Query, Scene};
+    /// # fn main() -> Result<(), impinge::Error> {
+    /// use impinge::Stencil;
+    /// let mut scene = Scene::new();
+    /// scene.add_triangles(&[[0, 1, 2]], &[[0.0f32, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]])?;
+    /// scene.add_points(&[[1.0f32, 1.0, 0.5]])?;
+    /// let near = Detector::new(Backend::Cpu)?.near(&scene, 1.0, &Query::between_all())?;
+    /// let contacts = near.stencils(&scene, None)?.merged()?;
+    /// assert_eq!(contacts.column(Stencil::squared_distance)?, [0.25]);
+    /// assert_eq!(contacts.column(Stencil::hessian)?[0][2][2], 2.0);
+    /// # Ok(()) }
+    /// ```
+    ///
+    /// # Errors
+    /// There is no memory for them.
+    pub fn column<T: Copy + Send>(
+        &self,
+        of: impl Fn(&Stencil) -> T + Sync,
+    ) -> Result<Vec<T>, Error> {
+        let n = self.rows.len();
+        let mut column = sink::with_capacity(n, WHAT)?;
+        let room = &mut column.spare_capacity_mut()[..n];
+        in_parts(room, PART, self.threads, |first, room| {
+            for (to, row) in room.iter_mut().zip(&self.rows[first..]) {
+                to.write(of(row));
+            }
+        });
+        // SAFETY: the room has `n` entries, and each was written.
+        unsafe { column.set_len(n) };
+        Ok(column)
     }
 
     /// How many there are.

@@ -153,6 +153,7 @@ pub(super) fn name_features(
         control,
     } = job;
     let labels = Labels::new(plan.n_primitives());
+    near.set_threads(workers.n());
     let (mut unnamed, numbering) = near.fill(keys, query, workers.task(TASK))?;
     let n_tasks = unnamed.len() as u64;
     Work { workers, control }.each(&mut unnamed, |_, unnamed| {

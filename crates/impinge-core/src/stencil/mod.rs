@@ -14,7 +14,7 @@ use impinge_exact::Point;
 
 pub(crate) use distance::NearestWay;
 pub(crate) use mollifier::Mollifier;
-pub use projection::project_psd;
+pub use projection::{project_psd, project_psd_all};
 
 /// Derivatives by the coordinates of four points.
 pub type Gradient = [f64; 12];

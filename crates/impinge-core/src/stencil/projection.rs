@@ -7,6 +7,14 @@
 
 use std::array::from_fn;
 
+use crate::query::settings::InstructionSet;
+use crate::scene::error::Error;
+use crate::simd::{Isa, Simd, with_isa};
+use crate::workers::in_parts::in_parts;
+
+/// Matrices that a thread takes at a time.
+const PART: usize = 64;
+
 /// More steps per eigenvalue than any matrix needs: two are usual.
 const MOST_STEPS: usize = 60;
 
@@ -28,6 +36,12 @@ type Square<const N: usize> = [[f64; N]; N];
 /// assert!(matrix.as_flattened().iter().all(|x| (x - 1.5).abs() < 1e-15));
 /// ```
 pub fn project_psd<const N: usize>(matrix: &mut Square<N>) {
+    project(matrix);
+}
+
+/// Inlined, as all that it calls, so that it is compiled for each instruction set.
+#[inline(always)]
+fn project<const N: usize>(matrix: &mut Square<N>) {
     let mean = |i: usize, j: usize| 0.5 * matrix[i][j] + 0.5 * matrix[j][i];
     let symmetric: Square<N> = from_fn(|i| from_fn(|j| mean(i, j)));
     let largest = symmetric.as_flattened().iter();
@@ -52,11 +66,64 @@ pub fn project_psd<const N: usize>(matrix: &mut Square<N>) {
     }
 }
 
+/// [`project_psd`] of many matrices of `size` rows and columns, one after another, on threads of the
+/// rayon pool at hand: on at most `threads` of them, or on all if that is 0. The bytes are those of
+/// [`project_psd`], however many there are.
+///
+/// ```
+/// # fn main() -> Result<(), impinge::Error> {
+/// let mut matrices = [2.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.5];
+/// impinge::project_psd_all(&mut matrices, 3, 0)?;
+/// assert_eq!(matrices, [2.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.5]);
+/// # Ok(()) }
+/// ```
+///
+/// # Errors
+/// A size that is not 3, 6, 9 or 12; numbers that are no whole matrices.
+pub fn project_psd_all(matrices: &mut [f64], size: usize, threads: usize) -> Result<(), Error> {
+    if !matches!(size, 3 | 6 | 9 | 12) {
+        return Err(Error::Setting {
+            setting: "size",
+            given: size.to_string(),
+            allowed: "3, 6, 9 or 12",
+        });
+    }
+    if !matrices.len().is_multiple_of(size * size) {
+        return Err(Error::Setting {
+            setting: "matrices",
+            given: format!("{} numbers", matrices.len()),
+            allowed: "size x size numbers of each",
+        });
+    }
+    let isa = Isa::detect(InstructionSet::default());
+    in_parts(matrices, PART * size * size, threads, |_, part| {
+        with_isa!(isa, project_part, (part: &mut [f64] = part, size: usize = size));
+    });
+    Ok(())
+}
+
+#[inline(always)]
+fn project_part<S: Simd>(_: S, matrices: &mut [f64], size: usize) {
+    #[inline(always)]
+    fn each<const N: usize>(matrices: &mut [f64]) {
+        let rows = matrices.as_chunks_mut::<N>().0;
+        rows.as_chunks_mut::<N>().0.iter_mut().for_each(project);
+    }
+    match size {
+        3 => each::<3>(matrices),
+        6 => each::<6>(matrices),
+        9 => each::<9>(matrices),
+        _ => each::<12>(matrices),
+    }
+}
+
+#[inline(always)]
 fn dot<const N: usize>(x: &[f64; N], y: &[f64; N]) -> f64 {
     x.iter().zip(y).fold(0.0, |sum, (x, y)| sum + x * y)
 }
 
 /// Eigenvalues of a symmetric matrix whose largest entry is about 1, and its eigenvectors as rows.
+#[inline(always)]
 fn eigen<const N: usize>(mut matrix: Square<N>) -> ([f64; N], Square<N>) {
     let mut vectors = from_fn(|i| from_fn(|j| if i == j { 1.0 } else { 0.0 }));
     for k in 0..N.saturating_sub(2) {
@@ -83,6 +150,7 @@ fn eigen<const N: usize>(mut matrix: Square<N>) -> ([f64; N], Square<N>) {
 }
 
 /// Reflects so that row and column `k` are zero beyond the entry beside the diagonal.
+#[inline(always)]
 fn reflect<const N: usize>(matrix: &mut Square<N>, vectors: &mut Square<N>, k: usize) {
     let mut normal: [f64; N] = from_fn(|i| if i > k { matrix[k][i] } else { 0.0 });
     let head = std::mem::take(&mut normal[k + 1]);
@@ -113,6 +181,7 @@ fn reflect<const N: usize>(matrix: &mut Square<N>, vectors: &mut Square<N>, k: u
 }
 
 /// A step of the QL algorithm with an implicit shift, on a block of a tridiagonal matrix.
+#[inline(always)]
 fn step<const N: usize>(
     values: &mut [f64; N],
     beside: &mut [f64; N],

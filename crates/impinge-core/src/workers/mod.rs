@@ -17,6 +17,7 @@ mod affinity;
 pub(crate) mod alone;
 pub(crate) mod clock;
 mod crew;
+pub(crate) mod in_parts;
 mod sync;
 
 use crate::scene::words::debug_by_name;

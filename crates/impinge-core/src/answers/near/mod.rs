@@ -109,6 +109,8 @@ pub struct NearPairs {
     distances: Vec<f64>,
     points: Vec<[[f64; 3]; 2]>,
     stats: Stats,
+    /// How many threads computed it.
+    threads: usize,
     /// Where its buffers go when it is dropped.
     home: Home<NearPairs>,
 }
@@ -143,6 +145,11 @@ impl NearPairs {
 
     pub(crate) fn stats_mut(&mut self) -> &mut Stats {
         &mut self.stats
+    }
+
+    /// Says how many threads computed it: no more compute with it later.
+    pub(crate) fn set_threads(&mut self, threads: usize) {
+        self.threads = threads;
     }
 
     /// Takes what was found: sorted keys with their [`Labels`]. Parts of about `n_each` pairs are
@@ -315,6 +322,11 @@ pub struct NearIter<'a> {
 }
 
 impl NearIter<'_> {
+    /// How many threads computed the answer.
+    pub(crate) fn threads(&self) -> usize {
+        self.pairs.threads
+    }
+
     /// [`NearPairs::hash`] of the pairs that are left.
     pub fn hash(self) -> u64 {
         self.fold(0, |sum, pair| {

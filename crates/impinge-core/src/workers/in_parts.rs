@@ -1,0 +1,84 @@
+//! Loops over an answer that was found before: no detector is at hand, so no helpers.
+
+use std::sync::{Mutex, PoisonError};
+
+use rayon::prelude::*;
+
+use super::alone::is_alone;
+use super::is_forked;
+
+/// Gives all items to `work`, in parts of at most `size` with the number of the first, on at most
+/// so many threads of the rayon pool at hand; 0 for all of its threads. Few items, and all of them
+/// in a fork, whose pool has no threads, are one part for the thread at hand.
+pub(crate) fn in_parts<T: Send>(
+    items: &mut [T],
+    size: usize,
+    threads: usize,
+    work: impl Fn(usize, &mut [T]) + Sync,
+) {
+    // What a pool needs would be a tenth of a wasm module, so the compiler must know this.
+    if is_alone() || threads == 1 || items.len() <= size || is_forked() {
+        return work(0, items);
+    }
+    let n_threads = match (threads, rayon::current_num_threads()) {
+        (0, all) => all,
+        (some, all) => some.min(all),
+    };
+    let parts = Mutex::new(items.chunks_mut(size).enumerate());
+    let next = || parts.lock().unwrap_or_else(PoisonError::into_inner).next();
+    let numbers = (0..n_threads).into_par_iter().with_max_len(1);
+    numbers.for_each(|_| {
+        while let Some((ix, part)) = next() {
+            work(ix * size, part);
+        }
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::HashSet;
+    use std::sync::Barrier;
+    use std::thread;
+
+    use super::*;
+
+    fn in_pool(n_threads: usize, work: impl FnOnce() + Send) {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(n_threads);
+        pool.build().expect("threads").install(work);
+    }
+
+    #[test]
+    fn every_item_is_worked_on_once() {
+        in_pool(3, || {
+            for threads in 0..5 {
+                for n in [0, 1, 7, 8, 9, 100] {
+                    let mut items: Vec<usize> = (0..n).collect();
+                    in_parts(&mut items, 8, threads, |first, part| {
+                        for (ix, item) in part.iter_mut().enumerate() {
+                            assert_eq!(*item, first + ix);
+                            *item += 1000;
+                        }
+                    });
+                    assert!(items.into_iter().eq(1000..1000 + n));
+                }
+            }
+        });
+    }
+
+    #[test]
+    fn as_many_threads_work_as_were_asked_for() {
+        in_pool(4, || {
+            for (threads, expected) in [(0, 4), (1, 1), (2, 2), (4, 4), (9, 4)] {
+                // All threads wait until each of them has a part.
+                let barrier = Barrier::new(expected);
+                let seen = Mutex::new(HashSet::new());
+                in_parts(&mut [(); 64], 1, threads, |_, _| {
+                    if seen.lock().unwrap().insert(thread::current().id()) {
+                        barrier.wait();
+                    }
+                });
+                assert_eq!(seen.into_inner().unwrap().len(), expected, "{threads}");
+            }
+        });
+    }
+}
