@@ -101,6 +101,8 @@ int main(void) {
     /* The answers about points and bounds: what was asked once has its working memory, the rows of the answer are new each time. */
     static double origins[VERTICES][3];
     impinge_query query;
+    static int8_t places[VERTICES];
+    static const size_t limits[] = {30000, 10000, 3000, 1000};
     impinge_closest *closest = NULL;
     impinge_hits *hits = NULL;
     impinge_array from = packed(origins, VERTICES, IMPINGE_F64), to = positions_of(&one);
@@ -118,6 +120,19 @@ int main(void) {
     CHECK(impinge_find_closest(detector, scene, to, HUGE_VAL, &query, &closest) == IMPINGE_ERROR_OUT_OF_MEMORY && closest == NULL);
     CHECK(strstr(impinge_error_message(), "nearest") != NULL);
     most = SIZE_MAX;
+    /* What the engine works with too. */
+    GOOD(impinge_contains(detector, scene, 0, from, places));
+    for (j = 0; j < sizeof limits / sizeof *limits; ++j) {
+      most = limits[j];
+      CHECK(impinge_find_closest(detector, scene, to, HUGE_VAL, NULL, &closest) == IMPINGE_ERROR_OUT_OF_MEMORY && closest == NULL);
+      CHECK(impinge_cast(detector, scene, from, to, 9, NULL, &hits) == IMPINGE_ERROR_OUT_OF_MEMORY && hits == NULL);
+      CHECK(strstr(impinge_error_message(), "out of memory") != NULL);
+      if (most < VERTICES) CHECK(impinge_contains(detector, scene, 0, from, places) == IMPINGE_ERROR_OUT_OF_MEMORY);
+      most = SIZE_MAX;
+    }
+    GOOD(impinge_cast(detector, scene, from, to, 9, NULL, &hits));
+    CHECK(impinge_hits_count(hits) == VERTICES);
+    impinge_hits_destroy(hits);
   }
   impinge_scene_destroy(scene);
   impinge_detector_destroy(detector);

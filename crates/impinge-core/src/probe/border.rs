@@ -5,6 +5,7 @@
 use crate::scene::Body;
 use crate::scene::elements::Elements;
 use crate::scene::error::Error;
+use crate::search::sink::{filled, reserve};
 use crate::search::work::{Equal, Work};
 
 /// Tetrahedra whose faces are sorted by one task.
@@ -27,7 +28,7 @@ impl Border {
     /// # Errors
     /// Cancellation, no memory.
     pub fn new(body: &Body, work: Work<'_>) -> Result<Self, Error> {
-        let mut masks = vec![0u8; body.n_primitives()];
+        let mut masks = filled(0u8, body.n_primitives(), WHAT)?;
         let Elements::Tetrahedra(tetrahedra) = body.elements() else {
             unreachable!("asked for bodies of tetrahedra alone")
         };
@@ -37,6 +38,7 @@ impl Border {
         work.each(&mut runs, |ix, run| {
             let first = ix * TETRAHEDRA;
             let some = tetrahedra[first..].iter().take(TETRAHEDRA);
+            reserve(run, FACES.len() * some.len(), WHAT)?;
             for (number, corners) in (first as u32..).zip(some) {
                 run.extend(FACES.iter().zip(0..).map(|(face, k)| {
                     let mut face = face.map(|corner| corners[corner]);

@@ -13,7 +13,7 @@
 
 use std::cmp::Ordering;
 
-use super::{Looks, Target};
+use super::{HITS, Looks, Target};
 use crate::answers::hits::RayHit;
 use crate::answers::pairs::Element;
 use crate::bvh::bounds::{Bounds, BoundsArray, round_down, round_up};
@@ -23,6 +23,7 @@ use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
 use crate::scene::index::{ClusterIx, ElementIx};
 use crate::search::narrow::Corners;
+use crate::search::sink::grow;
 use crate::search::work::Work;
 use crate::simd::{Isa, LaneBounds, Lanes, Simd, up_to, with_isa};
 use impinge_exact::internal::filter::{cross, difference, dot, size};
@@ -359,6 +360,7 @@ impl RaySearch<'_> {
                 self.limit = high;
                 self.found.retain(|other| other.low <= high);
             }
+            grow(&mut self.found, 1, HITS)?;
             self.found.push(RayCandidate {
                 low,
                 body,
@@ -433,14 +435,17 @@ impl RaySearch<'_> {
         let mut found = found.filter_map(|candidate| RayFound::new(candidate, bodies, ray));
         if self.hits == Hit::First {
             let first = found.min_by(|one, other| one.compare(other, ray));
+            grow(into, 1, HITS)?;
             into.extend(first.map(|first| first.answer(bodies)));
             return Ok(());
         }
         let mut all: Vec<RayFound> = Vec::new();
         for one in found.by_ref() {
             self.looks.step()?;
+            grow(&mut all, 1, HITS)?;
             all.push(one);
         }
+        grow(into, all.len(), HITS)?;
         all.sort_unstable_by(|one, other| one.compare(other, ray));
         into.extend(all.iter().map(|found| found.answer(bodies)));
         Ok(())

@@ -17,7 +17,7 @@
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
-use super::{Looks, Target};
+use super::{Looks, Target, WHAT};
 use crate::answers::closest::ClosestElement;
 use crate::answers::pairs::Element;
 use crate::bvh::bounds::Bounds;
@@ -28,6 +28,7 @@ use crate::scene::index::{ClusterIx, ElementIx};
 use crate::scene::positions::Real;
 use crate::scene::vector::dot;
 use crate::search::narrow::Corners;
+use crate::search::sink::grow;
 use crate::search::work::Work;
 use crate::simd::{Isa, LaneBounds, Lanes, Simd, up_to, with_isa};
 use impinge_exact::Point;
@@ -292,7 +293,7 @@ impl<'a> PointSearch<'a> {
             }
             self.looks.step()?;
             if level == 0 {
-                self.compare(body, target, ClusterIx::new(node as u32), point);
+                self.compare(body, target, ClusterIx::new(node as u32), point)?;
                 continue;
             }
             let first = self.waiting.len();
@@ -315,7 +316,13 @@ impl<'a> PointSearch<'a> {
 
     /// Adds the elements of a cluster that may be nearest.
     #[inline(always)]
-    fn compare(&mut self, body: usize, target: Target<'_>, cluster: ClusterIx, point: &Point) {
+    fn compare(
+        &mut self,
+        body: usize,
+        target: Target<'_>,
+        cluster: ClusterIx,
+        point: &Point,
+    ) -> Result<(), Error> {
         let slots = target.boxes.clustering.slots(cluster);
         let lows = squared_distances(target.boxes.elements(target.body, cluster), point);
         // The nearest box first: then most others are too far away.
@@ -328,7 +335,7 @@ impl<'a> PointSearch<'a> {
             }
         }
         if mask >> nearest & 1 == 0 {
-            return;
+            return Ok(());
         }
         let rest = mask & up_to(slots.len() - 1) & !(1 << nearest);
         for lane in std::iter::once(nearest).chain(Lanes(rest)) {
@@ -350,6 +357,7 @@ impl<'a> PointSearch<'a> {
                 body,
                 slot,
             };
+            grow(&mut self.candidates, 1, WHAT)?;
             if self.n_nearest > 1 {
                 self.add_to_many(candidate, way);
                 continue;
@@ -360,6 +368,7 @@ impl<'a> PointSearch<'a> {
             }
             self.candidates.push(candidate);
         }
+        Ok(())
     }
 
     /// Adds an element that may be among the nearest, where several are asked for. `way` is about
@@ -402,6 +411,7 @@ impl<'a> PointSearch<'a> {
         for candidate in &self.candidates {
             self.looks.step()?;
             if candidate.low <= self.high {
+                grow(nearest, 1, WHAT)?;
                 nearest.push(*candidate);
             }
         }

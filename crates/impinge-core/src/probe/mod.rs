@@ -34,7 +34,7 @@ use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
 use crate::scene::positions::Real;
 use crate::scene::{Body, Scene};
-use crate::search::sink::{filled, reserve};
+use crate::search::sink::{filled, grow, reserve, with_capacity};
 use crate::search::work::Work;
 use crate::simd::Isa;
 
@@ -69,6 +69,7 @@ pub(crate) struct Shared<'a> {
 const TASK: usize = 256;
 /// What memory is for.
 const WHAT: &str = "elements nearest to points";
+const HITS: &str = "hits of rays";
 /// Points that are put in order at once: some 30 milliseconds.
 const BLOCK: usize = 1 << 19;
 
@@ -170,7 +171,7 @@ impl Probes {
         points: &[[R; 3]],
         work: Work<'_>,
     ) -> Result<Vec<Q::Answer>, Error> {
-        let mut answers = vec![Q::OUTSIDE; points.len()];
+        let mut answers = filled(Q::OUTSIDE, points.len(), "answers about points")?;
         let size = work.workers.task(TASK);
         let mut tasks: Vec<_> = points.chunks(size).zip(answers.chunks_mut(size)).collect();
         work.each(&mut tasks, |_, (points, answers)| {
@@ -215,14 +216,16 @@ impl Probes {
         for (points, found) in points.chunks(BLOCK).zip(found.chunks_mut(block)) {
             // Neighbours one after the other: the element found last is a good first bound, and
             // memory is in the caches.
-            let order = order::along_curve(points);
+            let order = order::along_curve(points, WHAT)?;
             let size = work.workers.task(TASK);
             let mut tasks: Vec<(&[u32], Vec<_>)> =
                 order.chunks(size).map(|some| (some, Vec::new())).collect();
             work.each(&mut tasks, |_, (some, found)| {
-                let points: Vec<[R; 3]> = some.iter().map(|&ix| points[ix as usize]).collect();
+                let mut some_points = with_capacity(some.len(), WHAT)?;
+                some_points.extend(some.iter().map(|&ix| points[ix as usize]));
+                let points: &[[R; 3]] = &some_points;
                 *found = filled(None, points.len() * n_nearest, WHAT)?;
-                closest::closest(self.isa, &bodies, &points, (most, n_nearest), found, work)
+                closest::closest(self.isa, &bodies, points, (most, n_nearest), found, work)
             })?;
             for (some, of_some) in tasks {
                 for (&ix, rows) in some.iter().zip(of_some.chunks_exact(n_nearest)) {
@@ -263,10 +266,12 @@ impl Probes {
         into.found.clear();
         into.offsets.clear();
         into.is_hit.clear();
+        reserve(&mut into.offsets, origins.len() + 1, HITS)?;
+        reserve(&mut into.is_hit, origins.len(), HITS)?;
         into.offsets.push(0);
         for (origins, directions) in origins.chunks(BLOCK).zip(directions.chunks(BLOCK)) {
             // Rays that start near each other, one after the other, find memory in the caches.
-            let order = order::along_curve(origins);
+            let order = order::along_curve(origins, HITS)?;
             let size = work.workers.task(TASK);
             let mut tasks: Vec<(&[u32], cast::HitLists)> = order
                 .chunks(size)
@@ -278,11 +283,14 @@ impl Probes {
                     direction: directions[ix as usize].map(R::widen),
                     most,
                 };
-                let rays: Vec<Ray> = some.iter().map(ray).collect();
+                let mut rays: Vec<Ray> = with_capacity(some.len(), HITS)?;
+                rays.extend(some.iter().map(ray));
+                reserve(&mut found.1, some.len(), HITS)?;
                 cast::cast(self.isa, &bodies, &rays, query.hits, found, work)
             })?;
             // The list of each ray, and whether it hits anything.
-            let mut lists: Vec<(&[RayHit], bool)> = vec![(&[], false); origins.len()];
+            let none: (&[RayHit], bool) = (&[], false);
+            let mut lists = filled(none, origins.len(), HITS)?;
             for (some, (found, ends)) in &tasks {
                 let mut from = 0;
                 for (&ix, &(to, is_hit)) in some.iter().zip(ends) {
@@ -291,6 +299,7 @@ impl Probes {
                 }
             }
             for (list, is_hit) in lists {
+                grow(&mut into.found, list.len(), HITS)?;
                 into.found.extend_from_slice(list);
                 into.offsets.push(into.found.len());
                 into.is_hit.push(is_hit);

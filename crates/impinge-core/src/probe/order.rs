@@ -2,13 +2,21 @@
 //!
 //! Cost: `O(n log n)` comparisons of single numbers. No answer depends on this order.
 
+use crate::scene::error::Error;
 use crate::scene::positions::Real;
+use crate::search::sink::with_capacity;
 
 /// Bits per axis.
 const BITS: u32 = 10;
 
 /// The numbers of the points in the order of the curve; of equal places, the lower number first.
-pub(super) fn along_curve<R: Real>(points: &[[R; 3]]) -> Vec<u32> {
+///
+/// # Errors
+/// There is no memory for them.
+pub(super) fn along_curve<R: Real>(
+    points: &[[R; 3]],
+    what: &'static str,
+) -> Result<Vec<u32>, Error> {
     let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
     for point in points {
         for (axis, &x) in point.iter().enumerate() {
@@ -29,11 +37,12 @@ pub(super) fn along_curve<R: Real>(points: &[[R; 3]]) -> Vec<u32> {
         code
     };
     let numbered = (0u64..).zip(points);
-    let mut keys: Vec<u64> = numbered
-        .map(|(ix, point)| u64::from(place(point)) << 32 | ix)
-        .collect();
+    let mut keys = with_capacity(points.len(), what)?;
+    keys.extend(numbered.map(|(ix, point)| u64::from(place(point)) << 32 | ix));
     keys.sort_unstable();
-    keys.into_iter().map(|key| key as u32).collect()
+    let mut numbers = with_capacity(points.len(), what)?;
+    numbers.extend(keys.into_iter().map(|key| key as u32));
+    Ok(numbers)
 }
 
 /// Two zeros after each of the lowest ten bits.
