@@ -61,7 +61,7 @@ pub use scene::ids::BodyId;
 pub use scene::mesh::Mesh;
 pub use scene::position_rows::PositionRows;
 pub use scene::positions::{NewPositions, Positions, Real};
-pub use scene::{Body, Filter, Scene};
+pub use scene::{Body, Filter, Scene, Thickness};
 pub use search::stats::{Stage, Stats};
 pub use stencil::{Gradient, Hessian, project_psd, project_psd_all};
 #[cfg(feature = "gpu")]

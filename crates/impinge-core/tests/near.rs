@@ -7,7 +7,7 @@ use impinge_core::exact::{
 };
 use impinge_core::{
     Backend, BodyId, BodyKind, Control, Detector, Elements, Error, InstructionSet, Method,
-    NearPair, NearPairs, PairKind, Part, Query, Scene, Settings,
+    NearPair, NearPairs, PairKind, Part, Query, Scene, Settings, Thickness,
 };
 use impinge_scenes::{Random, adversarial, soup, surfaces};
 
@@ -99,6 +99,11 @@ fn decide(kind: PairKind, a: &[Point], b: &[Point], distance: f64) -> Option<Opt
 
 /// Pair by pair: all kinds, everything with everything.
 fn expected(scene: &Scene, distance: f64) -> Vec<Row> {
+    expected_of(scene, |_, _| distance)
+}
+
+/// As [`expected`], where each pair is near within its own distance.
+fn expected_of(scene: &Scene, within: impl Fn([&Element; 2], [Part; 2]) -> f64) -> Vec<Row> {
     let mut expected = Vec::new();
     for kind in PairKind::ALL {
         let [of_a, of_b] = kind.parts().map(|part| elements(scene, part));
@@ -116,6 +121,7 @@ fn expected(scene: &Scene, distance: f64) -> Vec<Row> {
                     b.body.index() as u32,
                     b.number,
                 ];
+                let distance = within([a, b], kind.parts());
                 match decide(kind, &a.corners, &b.corners, distance) {
                     Some(Some((kind, _, features, parallel))) => {
                         expected.push((kind, row, features, parallel));
@@ -287,6 +293,302 @@ fn thickness_is_added_as_real_numbers() {
             assert_eq!(near.len(), n);
         }
     }
+}
+
+/// A thickness per element of some part of a body, on a lattice so that sums are exact.
+fn thickness_by(random: &mut Random, scene: &Scene, body: BodyId, part: Part) -> Vec<f64> {
+    let body = scene.body(body).expect("known");
+    let n = match part {
+        Part::Vertices => body.n_vertices(),
+        _ => body.part(part).len(),
+    };
+    (0..n).map(|_| f64::from(random.below(4)) * 0.25).collect()
+}
+
+fn thickness(part: Part, each: &[f64]) -> Thickness<'_> {
+    match part {
+        Part::Vertices => Thickness::vertices(each),
+        Part::Edges => Thickness::edges(each),
+        _ => Thickness::faces(each),
+    }
+}
+
+/// How thick an element is, if the elements of one part have these: that of the thickest one whose
+/// vertices it has, or that has all of its vertices.
+fn thickness_of(scene: &Scene, of: &Element, by: Part, (part, each): (Part, &[f64])) -> f64 {
+    if by == part {
+        return each[of.number as usize];
+    }
+    let beside = elements(scene, part);
+    let beside = beside.iter().filter(|other| other.body == of.body);
+    let holds = |a: &[u32], b: &[u32]| b.iter().all(|id| a.contains(id));
+    beside
+        .filter(|other| holds(&other.ids, &of.ids) || holds(&of.ids, &other.ids))
+        .fold(0.0, |most: f64, other| {
+            most.max(each[other.number as usize])
+        })
+}
+
+const PARTS: [Part; 3] = [Part::Vertices, Part::Edges, Part::Faces];
+
+/// One number per vertex, edge or face, each beside bodies with one number: as pair by pair.
+#[test]
+fn each_element_may_have_its_own_thickness() {
+    let mut n_by_part = [0; 3];
+    for seed in 0..12 {
+        let mut scene = lattice(seed, seed % 2 == 1);
+        let bodies: Vec<BodyId> = scene.bodies().map(|(id, _)| id).collect();
+        let mut random = Random::new(seed);
+        let part = PARTS[seed as usize % 3];
+        let mut of_bodies = vec![None; bodies.len()];
+        for (ix, &body) in bodies.iter().enumerate() {
+            if ix % 2 == 0 || seed % 4 == 0 {
+                let each = thickness_by(&mut random, &scene, body, part);
+                scene
+                    .set_thickness(body, thickness(part, &each))
+                    .expect("good");
+                of_bodies[ix] = Some(each);
+            } else {
+                scene.set_thickness(body, 0.5).expect("good");
+            }
+        }
+        let own = |of: &Element, by: Part| {
+            let ix = bodies.iter().position(|&body| body == of.body);
+            match &of_bodies[ix.expect("known")] {
+                Some(each) => thickness_of(&scene, of, by, (part, each)),
+                None => 0.5,
+            }
+        };
+        for distance in [0.0, 0.25, 1.0] {
+            // An edge and a face meet or not.
+            let expected = expected_of(&scene, |[a, b], [of_a, of_b]| {
+                distance + own(a, of_a) + own(b, of_b)
+            });
+            n_by_part[seed as usize % 3] += expected.len();
+            for mut detector in detectors() {
+                let near = detector.near(&scene, distance, &all_kinds()).expect("good");
+                assert_eq!(
+                    without_compound_features(rows(&near)),
+                    without_compound_features(expected.clone()),
+                    "seed {seed}, {distance}"
+                );
+            }
+        }
+    }
+    assert!(n_by_part.iter().all(|&n| n > 1000), "{n_by_part:?}");
+}
+
+/// 0.1 + 0.2 as real numbers is less than the float 0.1 + 0.2, for each pair by itself.
+#[test]
+fn the_thickness_of_each_element_is_added_as_a_real_number() {
+    let mut scene = Scene::new();
+    let at = [0.0, 0.1 + 0.2, 5.0, 5.25_f64];
+    let points = scene.add_points(&at.map(|x| [x, 0.0, 0.0])).expect("good");
+    for mut detector in detectors() {
+        let mut pairs = |each: &[f64], distance: f64| {
+            scene
+                .set_thickness(points, Thickness::vertices(each))
+                .expect("good");
+            let near = detector.near(&scene, distance, &Query::all());
+            let near = near.expect("good");
+            near.iter()
+                .map(|pair| [pair.a.element, pair.b.element])
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(pairs(&[0.1, 0.2, 0.0, 0.0], 0.0), [[0u32; 2]; 0]);
+        assert_eq!(pairs(&[0.1, 0.2_f64.next_up(), 0.0, 0.0], 0.0), [[0, 1]]);
+        assert_eq!(
+            pairs(&[0.0, 0.2, 0.125, 0.0625], 0.0625_f64.next_down()),
+            [[0u32; 2]; 0]
+        );
+        assert_eq!(pairs(&[0.0, 0.2, 0.125, 0.0625], 0.0625), [[2, 3]]);
+        assert_eq!(pairs(&[f64::MAX, 0.0, 0.0, f64::MAX], 0.0).len(), 5);
+    }
+}
+
+/// The same bytes for every thread count, instruction set, budget and precision, as the oracle
+/// says; and where all elements have the same, those of one number.
+#[test]
+fn answers_with_a_thickness_of_each_element_depend_on_the_input_alone() {
+    let ball = surfaces::icosphere(3);
+    let shell = ball.mapped(|[x, y, z]| [1.05 * x, 1.05 * y, 1.05 * z + 0.01]);
+    for (round, is_double) in [(0, false), (1, true), (2, false), (3, true)] {
+        let mut scene = Scene::new();
+        let mut random = Random::new(round);
+        let bodies = [&ball, &shell].map(|model| {
+            let added = match is_double {
+                true => {
+                    // Not rounded to single precision.
+                    let at = model
+                        .positions
+                        .iter()
+                        .map(|p| p.map(|x| f64::from(x) / 3.0));
+                    scene.add((model.elements.clone(), at.collect::<Vec<_>>()))
+                }
+                false => model.add_to(&mut scene),
+            };
+            added.expect("good")
+        });
+        let scale = if is_double { 1.0 / 3.0 } else { 1.0 };
+        let part = PARTS[round as usize % 3];
+        let mut each = |body, most: f64| -> Vec<f64> {
+            let n = thickness_by(&mut random, &scene, body, part).len();
+            (0..n)
+                .map(|_| most * scale * f64::from(random.unit()))
+                .collect()
+        };
+        let thick = [each(bodies[0], 0.02), each(bodies[1], 0.01)];
+        let n_own = if round == 3 { 1 } else { 2 };
+        for (&body, each) in bodies.iter().zip(&thick).take(n_own) {
+            scene
+                .set_thickness(body, thickness(part, each))
+                .expect("good");
+        }
+        let distance = 0.045 * scale;
+        let query = Query::all().closest_points();
+        let mut oracle = detector(Method::Naive);
+        let naive = oracle.near(&scene, distance, &query).expect("good");
+        let lists = oracle.neighbours(&scene, distance, &query).expect("good");
+        let safe = oracle
+            .safe_distances(&scene, distance, &query)
+            .expect("good");
+        assert!(naive.len() > 100, "{}", naive.len());
+        let sets = [
+            InstructionSet::Portable,
+            InstructionSet::Avx2,
+            InstructionSet::Avx512,
+        ];
+        for (threads, instruction_set, memory_budget) in [
+            (1, sets[0], None),
+            (2, sets[1], None),
+            (3, sets[2], Some(12_000_000)),
+            (16, sets[2], None),
+        ] {
+            let settings = Settings::new()
+                .backend(Backend::Cpu)
+                .threads(threads)
+                .instruction_set(instruction_set)
+                .memory_budget(memory_budget);
+            let mut detector = Detector::new(settings).expect("settings");
+            for frame in 0..2 {
+                let near = detector.near(&scene, distance, &query).expect("good");
+                assert!(near.iter().eq(naive.iter()), "{threads}, {frame}");
+                assert_eq!(near.hash(), naive.hash());
+            }
+            let near = detector.near(&scene, distance, &Query::all());
+            assert!(rows(&near.expect("good")) == rows(&naive), "{threads}");
+            let own = detector.neighbours(&scene, distance, &query).expect("good");
+            assert_eq!((own.vf(), own.ee()), (lists.vf(), lists.ee()));
+            assert!(own.vf().distances.contains(&0.0));
+            let own = detector.safe_distances(&scene, distance, &query);
+            let own = own.expect("good");
+            for body in bodies {
+                assert_eq!(own.of(body), safe.of(body));
+            }
+            assert!(own.touching().iter().eq(safe.touching().iter()));
+            assert!(!own.touching().is_empty());
+        }
+    }
+    let mut scene = Scene::new();
+    let body = ball.add_to(&mut scene).expect("good");
+    let mut detector = detector(Method::Clusters);
+    let mut hash = |scene: &Scene| {
+        let near = detector.near(scene, 0.1, &Query::all()).expect("good");
+        (near.hash(), near.len())
+    };
+    let thin = hash(&scene);
+    scene.set_thickness(body, 0.03).expect("good");
+    let one = hash(&scene);
+    assert!(thin.1 < one.1);
+    for part in PARTS {
+        let n = scene.body(body).expect("known").part(part).len();
+        // Boxes of before would be too small, and then too large.
+        for (most, expected) in [(0.0, thin), (0.03, one)] {
+            scene
+                .set_thickness(body, thickness(part, &vec![most; n]))
+                .expect("good");
+            assert_eq!(hash(&scene), expected, "{part:?}");
+        }
+    }
+}
+
+/// One thick vertex does not make all boxes larger.
+#[test]
+fn boxes_reach_as_far_as_their_own_elements_are_thick() {
+    let mut scene = Scene::new();
+    let sheet = surfaces::cloth(60, 60, 1.0);
+    let body = sheet.add_to(&mut scene).expect("good");
+    let mut detector = detector(Method::Clusters);
+    let mut count = |scene: &Scene| {
+        let near = detector.near(scene, 0.1, &Query::all()).expect("good");
+        near.stats().n_candidates
+    };
+    let thin = count(&scene);
+    let mut each = vec![0.0; sheet.positions.len()];
+    each[1800] = 5.0;
+    scene
+        .set_thickness(body, Thickness::vertices(&each[..]))
+        .expect("good");
+    let one = count(&scene);
+    scene.set_thickness(body, 5.0).expect("good");
+    let all = count(&scene);
+    assert!(thin < one && one < thin + all / 20, "{thin} {one} {all}");
+}
+
+#[test]
+fn wrong_thicknesses_are_refused_by_name() {
+    let mut scene = lattice(1, false);
+    let (body, _) = scene.bodies().next().expect("some");
+    let message = |scene: &mut Scene, thickness: Thickness<'_>| {
+        let error = scene.set_thickness(body, thickness).unwrap_err();
+        assert_eq!(error.code(), "invalid");
+        error.to_string()
+    };
+    let n_edges = scene.body(body).expect("known").edges().len();
+    let of = |n: usize| vec![0.5; n];
+    assert_eq!(
+        message(&mut scene, Thickness::vertices(of(14))),
+        "body 0: 14 thicknesses given, but there are 15 vertices"
+    );
+    assert_eq!(
+        message(&mut scene, Thickness::edges(of(n_edges + 1))),
+        format!(
+            "body 0: {} thicknesses given, but there are {n_edges} edges",
+            n_edges + 1
+        )
+    );
+    assert_eq!(
+        message(&mut scene, Thickness::faces(of(0))),
+        "body 0: 0 thicknesses given, but there are 5 faces"
+    );
+    for bad in [-0.25, f64::NAN, f64::INFINITY] {
+        let mut each = of(5);
+        each[3] = bad;
+        assert_eq!(
+            message(&mut scene, Thickness::faces(each)),
+            format!(
+                "body 0: a thickness of {bad} is given as number 3 of its faces, where a finite number that is not below 0 is allowed"
+            )
+        );
+        assert!(message(&mut scene, bad.into()).starts_with("thickness: "));
+    }
+    assert_eq!(
+        scene.body(body).expect("known").thickness(),
+        0.0,
+        "unchanged"
+    );
+    scene
+        .set_thickness(body, Thickness::faces(&[0.0, 2.0, 0.0, 1.0, 0.0][..]))
+        .expect("good");
+    let held = scene.body(body).expect("known");
+    let given = held.thickness_by_element().expect("of each face");
+    assert_eq!(given, (Part::Faces, &[0.0, 2.0, 0.0, 1.0, 0.0][..]));
+    assert_eq!(held.thickness(), 2.0);
+    // Other faces: which is how thick is not known.
+    let (elements, positions) = (held.elements().clone(), held.positions().clone());
+    scene.remesh(body, (elements, positions)).expect("good");
+    let held = scene.body(body).expect("known");
+    assert_eq!((held.thickness(), held.thickness_by_element()), (0.0, None));
 }
 
 /// Faces and edges near faces: the distance is that of the nearest parts, points have it, and

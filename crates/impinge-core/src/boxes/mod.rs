@@ -179,14 +179,17 @@ pub(crate) struct BoxSource<'a> {
     /// `None` if the body does not move.
     end: Option<&'a Positions>,
     sweep: Sweep,
+    /// How far the box of each element reaches farther than the sweep says.
+    each: Option<&'a [f64]>,
 }
 
 impl<'a> BoxSource<'a> {
-    pub fn new(body: &'a Body, sweep: Sweep) -> Self {
+    pub fn new(body: &'a Body, sweep: Sweep, each: Option<&'a [f64]>) -> Self {
         BoxSource {
             start: body.positions(),
             end: body.end_positions(),
             sweep,
+            each,
         }
     }
 
@@ -203,7 +206,16 @@ impl<'a> BoxSource<'a> {
             Some(end) => of_cluster(simd, end, clustering, cluster).0,
             None => start,
         };
-        self.sweep.close([start, end])
+        let sweep = match self.each {
+            None => self.sweep,
+            Some(each) => {
+                let elements = clustering.primitives(cluster).iter();
+                let own = elements.map(|element| each[element.index()]);
+                let most = own.fold(0.0, f64::max);
+                self.sweep.inflated_by(most.next_up())
+            }
+        };
+        sweep.close([start, end])
     }
 
     /// The positions at the start and at the end.
@@ -242,11 +254,26 @@ impl<'a> BoxSource<'a> {
         both
     }
 
-    /// Makes the boxes to be tested from those of a group's elements at both ends:
+    /// Makes the boxes to be tested from those of a cluster's elements at both ends:
     /// [`Sweep::close_all`].
     #[inline(always)]
-    pub fn close(&self, boxes: [&mut LaneBounds; 2], size: usize) {
-        self.sweep.close_all(boxes, size);
+    pub fn close(
+        &self,
+        clustering: &Clustering,
+        cluster: ClusterIx,
+        [start, end]: [&mut LaneBounds; 2],
+    ) {
+        let size = clustering.size(cluster);
+        if let Some(each) = self.each {
+            let elements = clustering.primitives(cluster);
+            let mut by = [0.0; GROUP];
+            for (by, element) in by.iter_mut().zip(elements) {
+                *by = round_up(each[element.index()]);
+            }
+            sweep::inflate_each(start, &by);
+            sweep::inflate_each(end, &by);
+        }
+        self.sweep.close_all([start, end], size);
     }
 }
 

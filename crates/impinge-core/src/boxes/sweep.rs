@@ -184,10 +184,29 @@ impl Sweep {
         }
         let inflation = round_up(self.inflation);
         for x in ends {
-            let slack = SLACK * (x.abs() + inflation) + f32::MIN_POSITIVE;
-            *x += outward * (inflation + slack);
+            *x = moved(*x, outward, inflation);
         }
     }
+}
+
+/// Makes the boxes of a group's elements reach farther, each by its own number, before they are
+/// [closed](Sweep::close_all).
+#[inline(always)]
+pub(super) fn inflate_each(boxes: &mut LaneBounds, by: &[f32; GROUP]) {
+    for (ends, outward) in [(&mut boxes.min, -1.0), (&mut boxes.max, 1.0)] {
+        for ends in ends {
+            for (x, &by) in ends.iter_mut().zip(by) {
+                *x = moved(*x, outward, by);
+            }
+        }
+    }
+}
+
+/// An end of a box moved outward; `outward` is 1 or -1.
+#[inline(always)]
+fn moved(x: f32, outward: f32, by: f32) -> f32 {
+    let slack = SLACK * (x.abs() + by) + f32::MIN_POSITIVE;
+    x + outward * (by + slack)
 }
 
 /// By how much boxes of elements are rounded outward, relative to their coordinates: 2^-20, sixteen

@@ -24,9 +24,9 @@ const TASK: usize = 1024;
 
 impl Detector {
     /// All pairs of elements whose distance is at most `distance` plus the
-    /// [thickness](Scene::set_thickness) of both bodies, at the bodies' positions, in the unit of
-    /// the scene; of two elements of one body, plus twice its thickness. End positions are ignored.
-    /// Each pair comes with its nearest features and, on request, with its distance and nearest
+    /// [thickness](Scene::set_thickness) of both, at the bodies' positions, in the unit of the
+    /// scene; of two elements of one body that is equally thick, plus twice its thickness. End
+    /// positions are ignored. Each pair comes with its nearest features and, on request, with its distance and nearest
     /// points.
     ///
     /// The answer is exact: a pair is reported if and only if the distance of the two closed

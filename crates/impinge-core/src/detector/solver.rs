@@ -51,7 +51,7 @@ impl Detector {
     /// How far each vertex may move, on any path, so that nothing touches: for each pair of
     /// elements that do not share a vertex, the largest number of the vertices of one and the
     /// largest of the other add up to less than their distance, minus the
-    /// [thickness](Scene::set_thickness) of both bodies. No number is above `most`, which is a
+    /// [thickness](Scene::set_thickness) of both. No number is above `most`, which is a
     /// length in the unit of the scene.
     ///
     /// Both elements get half of the distance; what is [fixed](Query::fixed) gets 0 and leaves all
@@ -155,7 +155,7 @@ impl Detector {
 struct Measured<'a> {
     parts: [PartIx; 2],
     corners: [&'a [u32]; 2],
-    /// A number below its distance minus the thickness of both bodies; 0 if and only if that is not
+    /// A number below its distance minus the thickness of both; 0 if and only if that is not
     /// above 0.
     distance: f64,
 }
@@ -228,7 +228,7 @@ impl SolverMemory {
                             distance_below(a.points(), b.points())
                         }
                     });
-                    *to = without(plan.thickness(parts), distance);
+                    *to = without(plan.thickness(*located), distance);
                     each(Measured {
                         parts,
                         corners: [a.1, b.1],
@@ -317,9 +317,7 @@ impl Outcome<u64, { PairKind::ALL.len() }> for Safe<'_> {
         let shares = self.shares;
         let stats = self.safe.stats_mut();
         (self.memory).measure(job, self.isa, keys, stats, |pair| {
-            shares
-                .between(plan, pair.parts)
-                .take(pair.corners, pair.distance);
+            shares.between(pair.parts).take(pair.corners, pair.distance);
         })?;
         self.safe.fill(scene, shares.iter())?;
         // The keys of the pairs that touch, which have no labels now.

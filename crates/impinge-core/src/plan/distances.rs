@@ -2,16 +2,16 @@
 //!
 //! ```text
 //! distance      what is asked: of a query for near pairs, or the separation of a step
-//! thickness     what a body adds to it; of candidates, the distance by which each box is inflated
+//! thickness     what a body adds to it, or each of its elements; of candidates, the distance by which each box is inflated
 //! bound         what any pair of a step keeps at most: the separation, and a clearance
 //! inflation     how far the boxes of a part reach beyond its elements: its thickness, and half of the bound
 //! ```
 
 use std::collections::BTreeMap;
 
-use crate::boxes::Sweep;
+use crate::boxes::{BoxSource, Sweep};
 use crate::scene::Scene;
-use crate::scene::index::PartIx;
+use crate::scene::index::{ElementIx, PartIx};
 use impinge_exact::internal::{Keep, Reach};
 use impinge_exact::{Contact, ElementPair, Point};
 
@@ -93,15 +93,52 @@ impl Plan {
         units[0].max(units[1])
     }
 
-    /// Within which distance elements of two parts are near.
+    /// Makes elements as thick as the scene says.
+    pub(super) fn thicken(&mut self, scene: &Scene) {
+        for part in &mut self.parts {
+            part.thickness = scene.body_in(part.id.slot()).thickness();
+        }
+        let each: Vec<_> = (self.part_ixs())
+            .map(|part| self.body(scene, part).thickness_of_each().cloned())
+            .collect();
+        if each.iter().any(Option::is_some) {
+            self.thickness = each;
+        }
+    }
+
+    /// How thick each element of a part is, by its number in the part, and a number that differs
+    /// from that of all others; `None` if all are equally thick.
+    #[inline(always)]
+    pub(crate) fn thickness_of_each(&self, part: PartIx) -> Option<(&[f64], u64)> {
+        let each = self.thickness.get(part.index())?.as_ref()?;
+        Some((each.of(self.part(part).part), each.stamp()))
+    }
+
+    /// How thick an element of a part is.
+    #[inline(always)]
+    pub(crate) fn thickness_of(&self, part: PartIx, element: ElementIx) -> f64 {
+        match self.thickness_of_each(part) {
+            None => self.part(part).thickness,
+            Some((each, _)) => each[element.index()],
+        }
+    }
+
+    /// Within which distance elements of two parts are near; at most, where each element has a
+    /// thickness of its own.
     pub(crate) fn reach(&self, a: PartIx, b: PartIx) -> Reach {
         let [a, b] = [a, b].map(|part| self.part(part).thickness);
         Reach::of_sum([self.distance, a, b])
     }
 
-    /// How thick the bodies of two parts are together, rounded up.
-    pub(crate) fn thickness(&self, parts: [PartIx; 2]) -> f64 {
-        let [a, b] = parts.map(|part| self.part(part).thickness);
+    /// Within which distance two elements are near.
+    pub(crate) fn reach_of(&self, pair: [(PartIx, ElementIx); 2]) -> Reach {
+        let [a, b] = pair.map(|(part, element)| self.thickness_of(part, element));
+        Reach::of_sum([self.distance, a, b])
+    }
+
+    /// How thick two elements are together, rounded up.
+    pub(crate) fn thickness(&self, pair: [(PartIx, ElementIx); 2]) -> f64 {
+        let [a, b] = pair.map(|(part, element)| self.thickness_of(part, element));
         match a + b {
             0.0 => 0.0,
             sum => sum.next_up(),
@@ -110,8 +147,20 @@ impl Plan {
 
     /// How far the boxes of a part must reach beyond its elements, so that those of near elements
     /// overlap: those of two parts reach at least as far together as their elements may be apart.
+    /// Where each element has a thickness of its own, its box must reach farther by that.
     pub(crate) fn inflation(&self, part: PartIx) -> f64 {
-        let thickness = self.part(part).thickness;
+        self.inflation_by(match self.thickness_of_each(part) {
+            None => self.part(part).thickness,
+            Some(_) => 0.0,
+        })
+    }
+
+    /// How far the box of an element must reach beyond it.
+    pub(crate) fn inflation_of(&self, part: PartIx, element: ElementIx) -> f64 {
+        self.inflation_by(self.thickness_of(part, element))
+    }
+
+    fn inflation_by(&self, thickness: f64) -> f64 {
         match (self.bound, thickness) {
             (0.0, thickness) => thickness,
             (distance, thickness) => (thickness + (distance / 2.0).next_up()).next_up(),
@@ -144,9 +193,21 @@ impl Plan {
     }
 
     /// The sweep of a part: its boxes also reach by its [`inflation`](Plan::inflation), and as far
-    /// as positions are rounded.
+    /// as positions are rounded. Of elements that have a thickness of their own, see [`BoxSource`].
     #[inline(always)]
     pub(crate) fn sweep_of(&self, sweep: Sweep, part: PartIx) -> Sweep {
         sweep.inflated_by(self.inflation(part) + self.part(part).rounded)
+    }
+
+    /// What makes the boxes of a part.
+    #[inline(always)]
+    pub(crate) fn boxes_of<'a>(
+        &'a self,
+        scene: &'a Scene,
+        sweep: Sweep,
+        part: PartIx,
+    ) -> BoxSource<'a> {
+        let each = self.thickness_of_each(part).map(|(each, _)| each);
+        BoxSource::new(self.body(scene, part), self.sweep_of(sweep, part), each)
     }
 }

@@ -39,7 +39,7 @@ use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
 pub use crate::scene::index::pair_key;
 use crate::scene::index::{ElementIx, Number, PartIx, pair_numbers};
-use crate::scene::{Body, Filter, Scene};
+use crate::scene::{Body, Each, Filter, Scene};
 use crate::workers::clock::Instant;
 use impinge_exact::internal::Keep;
 
@@ -64,7 +64,8 @@ pub struct QueryPart {
     /// Whether the body has no edges either.
     pub(crate) is_points: bool,
     filter: Filter,
-    /// How thick the body is: what its elements add to the distance that is asked.
+    /// How thick the body is: what its elements add to the distance that is asked; the most of
+    /// them, where each has its own.
     thickness: f64,
     /// How far vertices may be from their ways, because positions on these are rounded.
     rounded: f64,
@@ -162,6 +163,8 @@ pub struct Plan {
     /// What the elements of a step keep, at most: the distance, and a clearance if there is one.
     bound: f64,
     keep: Keep,
+    /// How thick the elements of each part are, where they differ; empty where none do.
+    thickness: Vec<Option<Arc<Each>>>,
     /// Which pairs of a step count.
     filter: Option<PairFilter>,
     /// Which pairs are left out because of their elements.
@@ -295,9 +298,7 @@ impl Plan {
         };
         let mut plan = Plan::of(scene, query, Question::Nearness, Goal::All, limits)?;
         (plan.distance, plan.bound) = (distance, distance);
-        for part in &mut plan.parts {
-            part.thickness = scene.body(part.id)?.thickness();
-        }
+        plan.thicken(scene);
         Ok(plan)
     }
 
@@ -383,6 +384,7 @@ impl Plan {
             distance: 0.0,
             bound: 0.0,
             keep: Keep::default(),
+            thickness: Vec::new(),
             filter: None,
             left_out: None,
             start: Start::default(),

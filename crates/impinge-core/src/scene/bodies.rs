@@ -6,6 +6,7 @@ use crate::scene::error::Error;
 use crate::scene::ids::{BodyId, new_stamp};
 use crate::scene::mesh::Mesh;
 use crate::scene::positions::{Positions, Real};
+use crate::scene::thickness::{HeldThickness, Thickness};
 
 /// A slot for one body; empty after the body was removed.
 #[derive(Debug, Clone)]
@@ -183,7 +184,12 @@ impl Scene {
     /// As [`add`](Scene::add); the body is unchanged then.
     pub fn remesh(&mut self, body: BodyId, mesh: impl Into<Mesh>) -> Result<(), Error> {
         let old = self.body(body)?;
-        let (filter, thickness) = (old.filter, old.thickness);
+        // The elements are others now.
+        let thickness = match old.thickness.each {
+            None => old.thickness.clone(),
+            Some(_) => HeldThickness::default(),
+        };
+        let filter = old.filter;
         let remeshed = Body::new(body, mesh.into(), filter)?;
         *self.body_mut(body)? = Body {
             thickness,
@@ -228,18 +234,39 @@ impl Scene {
     }
 
     /// Sets how thick a body is, in the unit of the scene: what its elements add to the distance of
-    /// [`near`](crate::Detector::near). 0 for a new body. Two elements of one body add it twice.
+    /// [`near`](crate::Detector::near), and what is taken from that of
+    /// [`neighbours`](crate::Detector::neighbours) and
+    /// [`safe_distances`](crate::Detector::safe_distances). 0 for a new body. Of two elements,
+    /// whether of one body or of two, each adds its own.
+    ///
+    /// One number holds for all elements, and [`remesh`](Scene::remesh) keeps it. [`Thickness`]
+    /// also takes one number per vertex, edge or face, which `remesh` forgets: the body has a
+    /// thickness of 0 then.
+    ///
+    /// ```
+    /// use impinge::{Backend, Detector, Query, Scene, Thickness};
+    /// # fn main() -> Result<(), impinge::Error> {
+    /// let mut scene = Scene::new();
+    /// let points = scene.add_points(&[[0.0f32, 0.0, 0.0], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]])?;
+    /// scene.set_thickness(points, Thickness::vertices(&[0.75, 0.25, 0.5][..]))?;
+    /// let near = Detector::new(Backend::Cpu)?.near(&scene, 0.0, &Query::all())?;
+    /// // 0.75 + 0.25 reaches over 1, 0.25 + 0.5 does not, and 0.75 + 0.5 not over 2.
+    /// assert_eq!(near.iter().map(|pair| pair.row()).collect::<Vec<_>>(), [[0, 0, 0, 1]]);
+    /// # Ok(()) }
+    /// ```
     ///
     /// # Errors
-    /// The id names no body; a thickness that is negative or not finite.
-    pub fn set_thickness(&mut self, body: BodyId, thickness: f64) -> Result<(), Error> {
-        if !(thickness >= 0.0 && thickness.is_finite()) {
-            return Err(Error::Setting {
-                setting: "thickness",
-                given: thickness.to_string(),
-                allowed: "a finite number that is not below 0",
-            });
-        }
+    /// The id names no body; a thickness that is negative or not finite; more or fewer numbers than
+    /// the body has vertices, edges or faces.
+    pub fn set_thickness<'a>(
+        &mut self,
+        body: BodyId,
+        thickness: impl Into<Thickness<'a>>,
+    ) -> Result<(), Error> {
+        let held = self.body(body)?;
+        let thickness = thickness
+            .into()
+            .held(body, &held.topology, held.n_vertices())?;
         self.body_mut(body)?.thickness = thickness;
         Ok(())
     }

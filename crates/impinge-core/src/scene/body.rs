@@ -8,6 +8,7 @@ use crate::scene::ids::{BodyId, new_stamp};
 use crate::scene::index::ElementIx;
 use crate::scene::mesh::Mesh;
 use crate::scene::positions::{Given, NewPositions, Positions, check_positions};
+use crate::scene::thickness::{Each, HeldThickness};
 use crate::scene::transform::RestPose;
 
 /// Which bodies meet in [`Query::between_all`](crate::Query::between_all): two bodies meet when the
@@ -49,7 +50,7 @@ pub struct Body {
     /// How the body was moved by a transform, if it was.
     pub(super) motion: Option<Box<RestPose>>,
     pub(super) filter: Filter,
-    pub(super) thickness: f64,
+    pub(super) thickness: HeldThickness,
     /// Of each vertex, if it was set.
     pub(super) groups: Option<Arc<[u32]>>,
     pub(super) pinned: Option<Arc<[bool]>>,
@@ -99,7 +100,7 @@ impl Body {
             moves: false,
             motion: None,
             filter,
-            thickness: 0.0,
+            thickness: HeldThickness::default(),
             groups: None,
             pinned: None,
             topology_stamp: new_stamp(),
@@ -205,10 +206,21 @@ impl Body {
         self.topology.rings(self.n_vertices(), n_rings)
     }
 
-    /// How thick the body is, in the unit of the scene: see
+    /// How thick the body is, in the unit of the scene: the thickness of its thickest element. See
     /// [`Scene::set_thickness`](crate::Scene::set_thickness).
     pub fn thickness(&self) -> f64 {
-        self.thickness
+        self.thickness.most
+    }
+
+    /// The thickness of each vertex, edge or face, as it was given, and which of these; `None` if
+    /// all of the body is equally thick.
+    pub fn thickness_by_element(&self) -> Option<(Part, &[f64])> {
+        self.thickness.each.as_ref().map(|each| each.given())
+    }
+
+    /// How thick each element is, if it was given by element.
+    pub(crate) fn thickness_of_each(&self) -> Option<&Arc<Each>> {
+        self.thickness.each.as_ref()
     }
 
     /// Changes when the body is re-meshed; equal stamps mean equal topology.

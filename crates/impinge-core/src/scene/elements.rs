@@ -173,7 +173,8 @@ pub(crate) struct Topology {
 /// Rings, and how many.
 type NumberedRings = (u32, Arc<VertexRings>);
 
-/// The vertices at most some number of edges away from each vertex, itself included.
+/// For each vertex, a sorted list of vertices: those at most some number of edges away, itself
+/// included, or those that a caller listed.
 #[derive(Debug)]
 pub(crate) struct VertexRings {
     starts: Vec<usize>,
@@ -221,6 +222,20 @@ impl VertexRings {
             vertices[first..].sort_unstable();
             starts.push(vertices.len());
         }
+        VertexRings { starts, vertices }
+    }
+
+    /// The second vertex of each pair, at the first one, of `n_vertices`. Pairs are sorted, and none
+    /// is there twice.
+    pub fn of_pairs(n_vertices: usize, pairs: &[[u32; 2]]) -> Self {
+        let mut starts = vec![0; n_vertices + 1];
+        for &[from, _] in pairs {
+            starts[from as usize + 1] += 1;
+        }
+        for vertex in 0..n_vertices {
+            starts[vertex + 1] += starts[vertex];
+        }
+        let vertices = pairs.iter().map(|&[_, to]| to).collect();
         VertexRings { starts, vertices }
     }
 

@@ -74,6 +74,42 @@ pub enum Error {
         /// How many vertices the body has.
         n_vertices: usize,
     },
+    /// What is given per vertex, edge or face has another length than the body has of these.
+    #[error("body {body}: {given} {what} given, but there are {n} {elements}")]
+    PerElement {
+        /// The body.
+        body: BodyId,
+        /// What was given: `"thicknesses"`.
+        what: &'static str,
+        /// How many were given.
+        given: usize,
+        /// How many elements the body has.
+        n: usize,
+        /// Which elements: `"vertices"`, `"edges"` or `"faces"`.
+        elements: &'static str,
+    },
+    /// An element is to have a thickness that is negative or not finite.
+    #[error(
+        "body {body}: a thickness of {given} is given as number {element} of its {elements}, where a finite number that is not below 0 is allowed"
+    )]
+    Thickness {
+        /// The body.
+        body: BodyId,
+        /// Which elements: `"vertices"`, `"edges"` or `"faces"`.
+        elements: &'static str,
+        /// The index of the element.
+        element: usize,
+        /// The thickness as given.
+        given: f64,
+    },
+    /// Lists of vertices to be left out do not fit their bodies.
+    #[error("exclude: lists for the vertices of body {}, of vertices of body {}: {given}", bodies[0], bodies[1])]
+    Lists {
+        /// The body whose vertices have lists, and that whose vertices are listed.
+        bodies: [BodyId; 2],
+        /// What does not fit, with both numbers.
+        given: String,
+    },
     /// The id names no body of this scene: the body was removed, or belongs to another scene.
     #[error(
         "there is no such body {body} among the {n_bodies} of this scene: it was removed, or is another scene's"

@@ -10,9 +10,12 @@ pub(crate) mod mesh;
 mod motion;
 pub(crate) mod position_rows;
 pub(crate) mod positions;
+mod thickness;
 pub(crate) mod transform;
 pub(crate) mod vector;
 pub(crate) mod words;
 
 pub use bodies::Scene;
 pub use body::{Body, Filter};
+pub(crate) use thickness::Each;
+pub use thickness::Thickness;

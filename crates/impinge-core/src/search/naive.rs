@@ -54,6 +54,7 @@ fn elements<'a, T: Test>(
                     scene,
                     plan,
                     part,
+                    element: plan.part(part).element(number),
                     corners,
                 };
                 (number, element)

@@ -69,12 +69,11 @@ impl Shares {
     }
 
     /// Those of the vertices of two parts.
-    pub fn between(&self, plan: &Plan, parts: [PartIx; 2]) -> SharesBetween<'_> {
+    pub fn between(&self, parts: [PartIx; 2]) -> SharesBetween<'_> {
         let [a, b] = parts.map(|part| self.parts[part.index()]);
         SharesBetween {
             all: [&self.all[a.0..], &self.all[b.0..]],
             are_fixed: [a.1, b.1],
-            thickness: plan.thickness(parts),
         }
     }
 }
@@ -83,7 +82,6 @@ impl Shares {
 pub(crate) struct SharesBetween<'a> {
     all: [&'a [AtomicU64]; 2],
     are_fixed: [bool; 2],
-    thickness: f64,
 }
 
 impl SharesBetween<'_> {
@@ -98,14 +96,19 @@ impl SharesBetween<'_> {
         }
     }
 
-    /// Takes a pair, by numbers between which its distance is: none of its vertices has more than
+    /// Takes a pair, by numbers between which its distance is, and how thick both elements are: none of its vertices has more than
     /// the second one gives. Returns whether the pair may give less than they have, or not be
     /// apart. Its corners are those at a slot of some lists.
     // No closures: this is inlined into kernels.
     #[inline(always)]
-    pub fn lower_by(&self, corners: [(&[Lanes32], u8); 2], [low, high]: [f64; 2]) -> bool {
-        let low = without(self.thickness, low * BELOW);
-        let high = without(self.thickness, high);
+    pub fn lower_by(
+        &self,
+        corners: [(&[Lanes32], u8); 2],
+        [low, high]: [f64; 2],
+        thickness: f64,
+    ) -> bool {
+        let low = without(thickness, low * BELOW);
+        let high = without(thickness, high);
         // As those of the distance itself: no number here is larger for a smaller distance.
         let (low_shares, high_shares) = (self.divided(low), self.divided(high));
         let mut is_less = low <= 0.0;
@@ -145,7 +148,7 @@ impl SharesBetween<'_> {
     }
 }
 
-/// A number below the distance of two elements, minus the thickness of their bodies: 0 if that is
+/// A number below the distance of two elements, minus their thickness: 0 if that is
 /// not certainly above 0.
 #[inline(always)]
 pub(crate) fn without(thickness: f64, distance: f64) -> f64 {

@@ -424,6 +424,27 @@ fn select<T: Number>(mask: T::Mask, yes: &Vec3<T>, no: &Vec3<T>) -> Vec3<T> {
     ]
 }
 
+/// Numbers between which the distance is that each of sixteen pairs is held against: two for all of
+/// them, or two for each.
+pub trait Reaches16: Copy {
+    /// Those of the pairs from lane `first` on.
+    fn at<V: Lookup>(&self, first: usize) -> [V; 2];
+}
+
+impl Reaches16 for [f32; 2] {
+    #[inline(always)]
+    fn at<V: Lookup>(&self, _: usize) -> [V; 2] {
+        [V::splat(f64::from(self[0])), V::splat(f64::from(self[1]))]
+    }
+}
+
+impl Reaches16 for [[f32; BATCH]; 2] {
+    #[inline(always)]
+    fn at<V: Lookup>(&self, first: usize) -> [V; 2] {
+        [V::row(&self[0], first), V::row(&self[1], first)]
+    }
+}
+
 /// Which of sixteen pairs are within a distance at the start. The elements are those of two groups,
 /// named by their slots; the distance is between two numbers.
 #[cfg_attr(target_family = "wasm", inline(never))]
@@ -496,13 +517,12 @@ pub struct Bounded16 {
 #[cfg_attr(target_family = "wasm", inline(never))]
 #[cfg_attr(not(target_family = "wasm"), inline(always))]
 #[must_use]
-pub fn bounded_in_tables<V: Lookup>(
+pub fn bounded_in_tables<V: Lookup, R: Reaches16>(
     pair: ElementPair,
     groups: [&Moving64; 2],
     slots: [&[u8; BATCH]; 2],
-    reach: [f32; 2],
+    reach: R,
 ) -> Bounded16 {
-    let [least, most] = [V::splat(f64::from(reach[0])), V::splat(f64::from(reach[1]))];
     let mut bounded = Bounded16 {
         verdict: Verdict16::default(),
         low: [0.0; BATCH],
@@ -511,6 +531,7 @@ pub fn bounded_in_tables<V: Lookup>(
     for first in (0..BATCH).step_by(V::N) {
         let (are_edges, points) = look_up::<V>(pair, groups, slots, first, 0);
         let polygon = Polygon::new(are_edges, &points);
+        let [least, most] = reach.at::<V>(first);
         let (yes, no) = polygon.verdict(least, most);
         let yes = V::bits(yes);
         bounded.verdict.yes |= yes << first;
@@ -544,17 +565,17 @@ pub fn distance_bounds<V: number::Vector>(pair: ElementPair, points: &Points8) -
 #[cfg_attr(target_family = "wasm", inline(never))]
 #[cfg_attr(not(target_family = "wasm"), inline(always))]
 #[must_use]
-pub fn nearest_in_tables<V: Lookup>(
+pub fn nearest_in_tables<V: Lookup, R: Reaches16>(
     pair: ElementPair,
     groups: [&Moving64; 2],
     slots: [&[u8; BATCH]; 2],
-    reach: [f32; 2],
+    reach: R,
 ) -> Near16 {
-    let [low, high] = [V::splat(f64::from(reach[0])), V::splat(f64::from(reach[1]))];
     let mut near = Near16::default();
     for first in (0..BATCH).step_by(V::N) {
         let (are_edges, points) = look_up::<V>(pair, groups, slots, first, 0);
         let polygon = Polygon::new(are_edges, &points);
+        let [low, high] = reach.at::<V>(first);
         let (yes, no) = polygon.verdict(low, high);
         let yes = V::bits(yes);
         near.verdict.yes |= yes << first;

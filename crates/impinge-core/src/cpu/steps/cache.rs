@@ -8,6 +8,7 @@ use crate::bvh::clusters::Clustering;
 use crate::clusterings::{BodyPart, Clustered, Clusterings, Fit, Store, spread};
 use crate::cpu::bounds::TreeBounds;
 use crate::cpu::traversal::BodyTree;
+use crate::plan::Plan;
 use crate::query::settings::Settings;
 use crate::scene::Body;
 use crate::scene::error::Error;
@@ -23,13 +24,22 @@ const CLUSTERS: usize = 128;
 /// By slot of the body, then by part: vertices, edges and faces.
 pub(super) type StepCaches = Store<PartCache, 3>;
 
+/// What boxes belong to: the stamp of the step, their sweep, and the stamp of the thickness of
+/// elements that have their own.
+type BoxesOf = (u64, Sweep, Option<u64>);
+
+fn boxes_of(plan: &Plan, body: &Body, sweep: Sweep, part: PartIx) -> BoxesOf {
+    let each = plan.thickness_of_each(part).map(|(_, stamp)| stamp);
+    (body.step_stamp(), plan.sweep_of(sweep, part), each)
+}
+
 /// The data kept per part from step to step.
 #[derive(Debug)]
 pub(super) struct PartCache {
     /// The stamp of the topology that was clustered.
     pub topology_stamp: u64,
-    /// The stamp of the step that the boxes belong to, and their sweep.
-    of: Option<(u64, Sweep)>,
+    /// What the boxes belong to.
+    of: Option<BoxesOf>,
     pub clustering: Arc<Clustering>,
     /// Boxes that hold the start and the end.
     bounds: TreeBounds,
@@ -131,12 +141,12 @@ pub(super) fn refit<S: Send>(
     for (ix, part) in plan.numbered_parts() {
         let body = plan.body(scene, ix);
         let cache = caches.at_mut(part);
-        let sweep = plan.sweep_of(sweep, ix);
-        if cache.of == Some((body.step_stamp(), sweep)) {
+        let of = boxes_of(plan, body, sweep, ix);
+        if cache.of == Some(of) {
             continue;
         }
         cache.bounds.refit_above(0, &cache.clustering.shape);
-        cache.of = Some((body.step_stamp(), sweep));
+        cache.of = Some(of);
         let spread = cache.spread();
         let (body_part, fit) = (BodyPart::new(part.id, body, part.part), &mut cache.fit);
         let mut known = clusterings.lock();
@@ -171,7 +181,7 @@ fn find_boxes<S: Send>(
     for (ix, part) in plan.numbered_parts() {
         let body = plan.body(scene, ix);
         let cache = caches.at_mut(part);
-        if cache.of == Some((body.step_stamp(), plan.sweep_of(sweep, ix))) {
+        if cache.of == Some(boxes_of(plan, body, sweep, ix)) {
             continue;
         }
         cache.of = None;
@@ -206,8 +216,7 @@ fn find_boxes<S: Send>(
         let task = tasks[ix];
         let part = plan.part(task.part);
         let clustering = &caches.at(part).clustering;
-        let body = plan.body(scene, task.part);
-        let source = BoxSource::new(body, plan.sweep_of(sweep, task.part));
+        let source = plan.boxes_of(scene, sweep, task.part);
         with_isa!(isa, find, (
             clustering: &Clustering = clustering,
             source: BoxSource<'_> = source,

@@ -101,7 +101,7 @@ impl<'a> PerCluster<StepWorld<'a>> for StepGroup {
         } else {
             source.fill(clustering, cluster, [&mut self.start, &mut self.end]);
         }
-        source.close([&mut self.start, &mut self.end], self.size);
+        source.close(clustering, cluster, [&mut self.start, &mut self.end]);
     }
 }
 

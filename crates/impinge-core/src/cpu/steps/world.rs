@@ -98,8 +98,7 @@ impl<'a> StepWorld<'a> {
     /// What makes the boxes of a part.
     #[inline(always)]
     pub(super) fn source(&self, part: PartIx) -> BoxSource<'a> {
-        let body = self.plan.body(self.scene, part);
-        BoxSource::new(body, self.plan.sweep_of(self.sweep, part))
+        self.plan.boxes_of(self.scene, self.sweep, part)
     }
 
     /// The boxes of a cluster at the start and at the end.

@@ -56,6 +56,7 @@ pub(crate) fn decide(scene: &Scene, plan: &Plan, key: u64) -> bool {
             scene,
             plan,
             part,
+            element,
             corners: elements.corners(element.index()),
         }
     });

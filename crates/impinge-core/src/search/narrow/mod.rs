@@ -25,6 +25,8 @@ pub(crate) struct PairElement<'a> {
     pub plan: &'a Plan,
     /// The part.
     pub part: PartIx,
+    /// Its number in the part.
+    pub element: ElementIx,
     /// Its corners, as vertices of the part's body.
     pub corners: &'a [u32],
 }
@@ -55,6 +57,7 @@ impl<'a> PairElement<'a> {
             scene,
             plan,
             part: *part,
+            element: *element,
             corners: plan.body(scene, *part).corners(of, element),
         }
     }

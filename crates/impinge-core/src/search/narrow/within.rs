@@ -17,14 +17,15 @@ impl Test for Within {
 
     fn extent(&self, element: PairElement<'_>) -> Extent {
         let extent = Extent::of(element.corners().points().iter().copied());
-        extent.inflated(element.plan.inflation(element.part))
+        extent.inflated(element.plan.inflation_of(element.part, element.element))
     }
 
     fn decide(&self, test: TestId, a: PairElement<'_>, b: PairElement<'_>) -> Option<()> {
         if a.shares_vertex(&b) {
             return None;
         }
-        let reach = a.plan.reach(a.part, b.part);
+        let pair = [&a, &b].map(|of| (of.part, of.element));
+        let reach = a.plan.reach_of(pair);
         let (a, b) = (a.corners(), b.corners());
         match test {
             // What else is near has vertices and edges that are.

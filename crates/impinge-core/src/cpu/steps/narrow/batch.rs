@@ -5,7 +5,7 @@ use crate::bvh::bounds::{round_down, round_up};
 use crate::cpu::lane_pairs::{LanePairs, WorkItem};
 use crate::plan::{TestId, pair_key};
 use crate::query::pair_kind::PairKind;
-use crate::scene::index::{Number, PartIx, Slot};
+use crate::scene::index::{ElementIx, Number, PartIx, Slot};
 use crate::scene::positions::Positions;
 use crate::search::found::{KeysByKind, StepAnswer};
 use crate::search::narrow::exact_kind;
@@ -69,30 +69,45 @@ impl Batch<'_> {
     }
 
     /// The kind of the pairs, and two numbers between which a distance is, if a filter decides from
-    /// tables whether such pairs are within the distance. Where tables are rounded, the numbers
-    /// allow for that.
+    /// tables whether such pairs are within the distance.
     #[inline(always)]
     pub fn near_in_tables(&self, reach: &Reach) -> Option<(ElementPair, [f32; 2])> {
+        let pair = self.pair_in_tables()?;
+        Some((pair, reach_in_tables(reach, self.off_in_tables())))
+    }
+
+    /// The kind of the pairs, if a filter decides from tables whether such pairs are within a
+    /// distance.
+    #[inline(always)]
+    pub fn pair_in_tables(&self) -> Option<ElementPair> {
         let pair = match self.between.kind {
             PairKind::VertexFace => ElementPair::VertexFace,
             PairKind::EdgeEdge => ElementPair::EdgeEdge,
             _ => return None,
         };
-        let [low, high] = reach.enclosing_f32();
-        let rounded = self.rounded();
-        if rounded == 0.0 {
-            return Some((pair, [low, high]));
-        }
-        // Two points are each off by that along three axes: their distance by at most 2 sqrt(3)
-        // times as much.
-        let off = 4.0 * rounded;
-        let [low, high] = [f64::from(low) - off, f64::from(high) + off];
-        // Where rounding is larger than the distance, the tables only tell that elements are
-        // farther apart.
-        rounded
-            .is_finite()
-            .then(|| (pair, [round_down(low.max(0.0)), round_up(high)]))
+        self.rounded().is_finite().then_some(pair)
     }
+
+    /// By how much the distance of points in tables is off at most. Two points are each off by what
+    /// coordinates are rounded by, along three axes: their distance by at most 2 sqrt(3) times as
+    /// much.
+    #[inline(always)]
+    pub fn off_in_tables(&self) -> f64 {
+        4.0 * self.rounded()
+    }
+}
+
+/// Two numbers between which a distance is. Where points in tables are off by so much, the numbers
+/// allow for that; where that is more than the distance, the tables only tell that elements are
+/// farther apart.
+#[inline(always)]
+pub(super) fn reach_in_tables(reach: &Reach, off: f64) -> [f32; 2] {
+    let [low, high] = reach.enclosing_f32();
+    if off == 0.0 {
+        return [low, high];
+    }
+    let [low, high] = [f64::from(low) - off, f64::from(high) + off];
+    [round_down(low.max(0.0)), round_up(high)]
 }
 
 /// Two parts, and the kind of their pairs.
@@ -101,6 +116,13 @@ pub(crate) struct Between {
     pub a: PartIx,
     pub b: PartIx,
     pub kind: PairKind,
+}
+
+impl Between {
+    /// Some element of either part, where all are alike.
+    pub fn any(self) -> [(PartIx, ElementIx); 2] {
+        [self.a, self.b].map(|part| (part, ElementIx::new(0)))
+    }
 }
 
 /// Slots of two elements in their clusters' orders.

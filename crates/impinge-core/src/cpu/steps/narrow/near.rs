@@ -9,7 +9,7 @@
 use crate::answers::near::Labels;
 use crate::query::pair_kind::PairKind;
 use crate::scene::elements::Elements;
-use crate::scene::index::pair_key;
+use crate::scene::index::{ElementIx, PartIx, pair_key};
 use crate::scene::positions::Positions;
 use crate::search::found::StepAnswer;
 use crate::search::narrow::Corners;
@@ -19,7 +19,9 @@ use impinge_exact::internal::filter::{self, BATCH, LARGEST_F32};
 use impinge_exact::internal::{Reach, are_within_certainly, elements_meet, unsure_are_within};
 
 use super::super::world::StepWorld;
-use super::batch::{Batch, Between, FoundKeys, Narrow, NarrowCounts, Slots, numbers_in};
+use super::batch::{
+    Batch, Between, FoundKeys, Narrow, NarrowCounts, Slots, numbers_in, reach_in_tables,
+};
 
 /// The test of one worker.
 #[derive(Debug, Default)]
@@ -68,13 +70,35 @@ fn take<S: Simd>(_: S, near: &mut NearElements, world: StepWorld<'_>, batch: Bat
         take_edges_and_faces::<S>(near, world, &batch);
         return;
     }
-    let pairs = PartPair::new(world, between);
-    let in_tables = batch.near_in_tables(&pairs.reach);
+    let sides = sides(world, between);
+    let has_own = |part| world.plan.thickness_of_each(part).is_some();
+    if has_own(between.a) || has_own(between.b) {
+        let reach = OfEach { world, between };
+        take_pairs::<S, _>(near, world, &batch, PartPair { sides, reach });
+    } else {
+        let reach = OfAll {
+            reach: world.plan.reach(between.a, between.b),
+            thickness: world.plan.thickness(between.any()),
+        };
+        take_pairs::<S, _>(near, world, &batch, PartPair { sides, reach });
+    }
+}
+
+#[inline(always)]
+fn take_pairs<S: Simd, R: Reaches>(
+    near: &mut NearElements,
+    world: StepWorld<'_>,
+    batch: &Batch<'_>,
+    pairs: PartPair<'_, R>,
+) {
+    let between = batch.between;
+    let in_tables = batch.pair_in_tables();
+    let off = batch.off_in_tables();
     let is_exact = batch.rounded() == 0.0;
     let shares = match world.answer {
         // It is known later only whether a pair belongs to a cell.
         StepAnswer::Lowering(_, shares) if !world.plan.has_cell() => {
-            Some(shares.between(world.plan, [between.a, between.b]))
+            Some(shares.between([between.a, between.b]))
         }
         _ => None,
     };
@@ -83,18 +107,21 @@ fn take<S: Simd>(_: S, near: &mut NearElements, world: StepWorld<'_>, batch: Bat
         let lanes = batch.lane_pairs.batch(first);
         let n = (batch.lane_pairs.len() - first).min(BATCH);
         let mut open = u16::MAX >> (BATCH - n);
-        if let (Some((pair, reach)), Some(shares)) = (in_tables, &shares) {
-            let found = filter::bounded_in_tables::<S::F32>(pair, tables, lanes, reach);
+        if let (Some(pair), Some(shares)) = (in_tables, &shares) {
+            let reach = pairs.reach.in_tables(batch, first, off);
+            let found = filter::bounded_in_tables::<S::F32, _>(pair, tables, lanes, reach);
             let yes = found.verdict.yes & open;
             open &= !(found.verdict.yes | found.verdict.no);
             for lane in Lanes(u64::from(yes)) {
                 let bounds = [found.low[lane], found.high[lane]];
-                if may_lower(shares, &batch, first + lane, bounds) {
-                    near.put(world, &batch, first + lane, Labels::UNKNOWN);
+                let thickness = pairs.reach.thickness(batch, first + lane);
+                if may_lower(shares, batch, first + lane, bounds, thickness) {
+                    near.put(world, batch, first + lane, Labels::UNKNOWN);
                 }
             }
-        } else if let Some((pair, reach)) = in_tables {
-            let found = filter::nearest_in_tables::<S::F32>(pair, tables, lanes, reach);
+        } else if let Some(pair) = in_tables {
+            let reach = pairs.reach.in_tables(batch, first, off);
+            let found = filter::nearest_in_tables::<S::F32, _>(pair, tables, lanes, reach);
             let yes = found.verdict.yes & open;
             open &= !(found.verdict.yes | found.verdict.no);
             for lane in Lanes(u64::from(yes)) {
@@ -103,12 +130,13 @@ fn take<S: Simd>(_: S, near: &mut NearElements, world: StepWorld<'_>, batch: Bat
                 } else {
                     Labels::UNKNOWN
                 };
-                near.put(world, &batch, first + lane, part);
+                near.put(world, batch, first + lane, part);
             }
         }
         for lane in Lanes(u64::from(open)) {
-            if near.decide_open(&pairs, batch.slots(first + lane)) {
-                near.put(world, &batch, first + lane, Labels::UNKNOWN);
+            let reach = pairs.reach.exact(batch, first + lane);
+            if near.decide_open(&pairs.sides, batch.slots(first + lane), &reach) {
+                near.put(world, batch, first + lane, Labels::UNKNOWN);
             }
         }
     }
@@ -123,6 +151,7 @@ fn may_lower(
     batch: &Batch<'_>,
     ix: usize,
     [low, high]: [f32; 2],
+    thickness: f64,
 ) -> bool {
     let [slot_a, slot_b] = batch.lane_pairs.lanes(ix);
     let [a, b] = batch.groups;
@@ -130,15 +159,15 @@ fn may_lower(
         (&a.corners[..a.n_corners], slot_a),
         (&b.corners[..b.n_corners], slot_b),
     ];
-    // As in `near_in_tables`.
-    let off = 4.0 * batch.rounded();
-    shares.lower_by(corners, [f64::from(low) - off, f64::from(high) + off])
+    let off = batch.off_in_tables();
+    let bounds = [f64::from(low) - off, f64::from(high) + off];
+    shares.lower_by(corners, bounds, thickness)
 }
 
 /// An edge and a face are in the answer if they meet, whatever the distance.
 #[inline(always)]
 fn take_edges_and_faces<S: Simd>(near: &mut NearElements, world: StepWorld<'_>, batch: &Batch<'_>) {
-    let pairs = PartPair::new(world, batch.between);
+    let sides = sides(world, batch.between);
     let largest = f64::max(batch.groups[0].largest, batch.groups[1].largest);
     let in_tables = batch.rounded() == 0.0 && largest <= f64::from(LARGEST_F32);
     let tables = batch.groups.map(|group| &group.points[0]);
@@ -155,7 +184,7 @@ fn take_edges_and_faces<S: Simd>(near: &mut NearElements, world: StepWorld<'_>, 
             }
         }
         for lane in Lanes(u64::from(open)) {
-            if near.decide_meeting(&pairs, batch.slots(first + lane)) {
+            if near.decide_meeting(&sides, batch.slots(first + lane)) {
                 near.put(world, batch, first + lane, Labels::UNKNOWN);
             }
         }
@@ -183,44 +212,120 @@ impl NearElements {
 
     /// Whether an edge and a face at two slots meet, exactly.
     #[inline(never)]
-    fn decide_meeting(&mut self, pairs: &PartPair<'_>, slots: Slots) -> bool {
-        let [edge, face] = pairs.corners(slots);
+    fn decide_meeting(&mut self, sides: &Sides<'_>, slots: Slots) -> bool {
+        let [edge, face] = corners(sides, slots);
         self.n_unsure += 1;
         elements_meet(edge.points(), face.points())
     }
 
     /// Whether the elements at two slots are near, in `f64` or exactly.
     #[inline(never)]
-    fn decide_open(&mut self, pairs: &PartPair<'_>, slots: Slots) -> bool {
-        let [a, b] = pairs.corners(slots);
-        are_within_certainly(a.points(), b.points(), &pairs.reach).unwrap_or_else(|| {
+    fn decide_open(&mut self, sides: &Sides<'_>, slots: Slots, reach: &Reach) -> bool {
+        let [a, b] = corners(sides, slots);
+        are_within_certainly(a.points(), b.points(), reach).unwrap_or_else(|| {
             self.n_unsure += 1;
-            unsure_are_within(a.points(), b.points(), &pairs.reach)
+            unsure_are_within(a.points(), b.points(), reach)
         })
     }
 }
 
 /// Two parts, and within which distance their elements are near.
-struct PartPair<'a> {
-    sides: [(&'a Elements, &'a Positions); 2],
-    reach: Reach,
+struct PartPair<'a, R> {
+    sides: Sides<'a>,
+    reach: R,
 }
 
-impl<'a> PartPair<'a> {
-    fn new(world: StepWorld<'a>, between: Between) -> Self {
-        let sides = [between.a, between.b].map(|part| {
-            let body = world.plan.body(world.scene, part);
-            (&world.cache(part).clustering.corners, body.positions())
-        });
-        let reach = world.plan.reach(between.a, between.b);
-        PartPair { sides, reach }
+/// Of two parts, the elements in the order of their clusters, and the positions of their bodies.
+type Sides<'a> = [(&'a Elements, &'a Positions); 2];
+
+fn sides(world: StepWorld<'_>, between: Between) -> Sides<'_> {
+    [between.a, between.b].map(|part| {
+        let body = world.plan.body(world.scene, part);
+        (&world.cache(part).clustering.corners, body.positions())
+    })
+}
+
+#[inline(always)]
+fn corners(sides: &Sides<'_>, slots: Slots) -> [Corners; 2] {
+    [0, 1].map(|side| {
+        let (elements, positions) = sides[side];
+        Corners::new(positions, elements.corners(slots[side].index()))
+    })
+}
+
+/// Within which distance the elements of candidates are near: all within one, or each pair within
+/// its own.
+trait Reaches {
+    type InTables: filter::Reaches16;
+
+    /// Of sixteen candidates, two numbers between which the distance is, if points are off by so
+    /// much.
+    fn in_tables(&self, batch: &Batch<'_>, first: usize, off: f64) -> Self::InTables;
+    /// Of one candidate, exactly.
+    fn exact(&self, batch: &Batch<'_>, ix: usize) -> Reach;
+    /// How thick both elements of a candidate are together, rounded up.
+    fn thickness(&self, batch: &Batch<'_>, ix: usize) -> f64;
+}
+
+struct OfAll {
+    reach: Reach,
+    thickness: f64,
+}
+
+impl Reaches for OfAll {
+    type InTables = [f32; 2];
+
+    #[inline(always)]
+    fn in_tables(&self, _: &Batch<'_>, _: usize, off: f64) -> [f32; 2] {
+        reach_in_tables(&self.reach, off)
     }
 
     #[inline(always)]
-    fn corners(&self, slots: Slots) -> [Corners; 2] {
-        [0, 1].map(|side| {
-            let (elements, positions) = self.sides[side];
-            Corners::new(positions, elements.corners(slots[side].index()))
-        })
+    fn exact(&self, _: &Batch<'_>, _: usize) -> Reach {
+        self.reach
+    }
+
+    #[inline(always)]
+    fn thickness(&self, _: &Batch<'_>, _: usize) -> f64 {
+        self.thickness
+    }
+}
+
+struct OfEach<'a> {
+    world: StepWorld<'a>,
+    between: Between,
+}
+
+impl OfEach<'_> {
+    #[inline(always)]
+    fn located(&self, batch: &Batch<'_>, ix: usize) -> [(PartIx, ElementIx); 2] {
+        let [a, b] = numbers_in(batch.groups, batch.lane_pairs.lanes(ix));
+        let located = |part, number| (part, self.world.plan.part(part).element(number));
+        [located(self.between.a, a), located(self.between.b, b)]
+    }
+}
+
+impl Reaches for OfEach<'_> {
+    type InTables = [[f32; BATCH]; 2];
+
+    #[inline(always)]
+    fn in_tables(&self, batch: &Batch<'_>, first: usize, off: f64) -> [[f32; BATCH]; 2] {
+        let mut reaches = [[0.0; BATCH]; 2];
+        let n = (batch.lane_pairs.len() - first).min(BATCH);
+        let [lows, highs] = &mut reaches;
+        for (lane, (low, high)) in lows.iter_mut().zip(highs).enumerate().take(n) {
+            [*low, *high] = reach_in_tables(&self.exact(batch, first + lane), off);
+        }
+        reaches
+    }
+
+    #[inline(always)]
+    fn exact(&self, batch: &Batch<'_>, ix: usize) -> Reach {
+        self.world.plan.reach_of(self.located(batch, ix))
+    }
+
+    #[inline(always)]
+    fn thickness(&self, batch: &Batch<'_>, ix: usize) -> f64 {
+        self.world.plan.thickness(self.located(batch, ix))
     }
 }
