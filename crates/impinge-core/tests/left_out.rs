@@ -273,6 +273,114 @@ fn groups_that_do_not_meet_are_left_out() {
     }
 }
 
+/// Random lists, unsorted and with repetitions: of one body, of two in either order, and two
+/// exclusions at once.
+#[test]
+fn listed_vertices_are_left_out() {
+    let mut random = Random::new(3);
+    for [from, to] in [[0, 0], [0, 1], [1, 0], [1, 1]] {
+        let (scene, bodies) = scene(6);
+        let n = bodies.map(|body| scene.body(body).expect("held").n_vertices() as u32);
+        let mut lists = |from: usize, to: usize| -> (Vec<u64>, Vec<u32>) {
+            let (mut offsets, mut vertices) = (vec![0], Vec::new());
+            for _ in 0..n[from] {
+                let n_listed = random.below(3) * random.below(6);
+                vertices.extend((0..n_listed).map(|_| random.below(n[to])));
+                offsets.push(vertices.len() as u64);
+            }
+            (offsets, vertices)
+        };
+        let given = [(from, to, lists(from, to)), (1, 1, lists(1, 1))];
+        let mut query = Query::all();
+        let mut listed = BTreeSet::new();
+        for (from, to, (offsets, vertices)) in given {
+            for (v, of) in offsets.windows(2).enumerate() {
+                for &w in &vertices[of[0] as usize..of[1] as usize] {
+                    let pair = [(bodies[from], v as u32), (bodies[to], w)];
+                    listed.extend([pair, [pair[1], pair[0]]]);
+                }
+            }
+            let (a, b) = (bodies[from], bodies[to]);
+            query = query.exclude(Exclusion::vertices(a, b, offsets, vertices));
+        }
+        check(
+            &scene,
+            &query,
+            &scene,
+            &Query::all(),
+            true,
+            |(parts, [a, b])| {
+                let [of_a, of_b] =
+                    [(parts[0], *a), (parts[1], *b)].map(|(part, of)| corners(&scene, part, of));
+                of_a.iter().all(|&v| {
+                    of_b.iter()
+                        .all(|&w| !listed.contains(&[(a.body, v), (b.body, w)]))
+                })
+            },
+        );
+    }
+}
+
+#[test]
+fn lists_that_do_not_fit_are_refused_by_name() {
+    let mut scene = Scene::new();
+    let at = [[0.0f32; 3], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]];
+    let a = scene.add_points(&at).expect("good");
+    let b = scene.add_points(&at[..2]).expect("good");
+    let mut detector = detectors().into_iter().next().expect("some");
+    let mut message = |scene: &Scene, offsets: &[u64], vertices: &[u32]| {
+        let query = Query::all().exclude(Exclusion::vertices(a, b, offsets, vertices));
+        let near = detector.near(scene, 1.0, &query);
+        near.map_err(|error| error.to_string())
+    };
+    let of = "exclude: lists for the vertices of body 0, of vertices of body 1: ";
+    for (offsets, vertices, expected) in [
+        (
+            &[0, 0, 1][..],
+            &[1][..],
+            "3 offsets, but body 0 has 3 vertices: one more is needed",
+        ),
+        (&[1, 1, 1, 1], &[1], "1 as the first offset, which is 0"),
+        (
+            &[0, 2, 1, 2],
+            &[1, 1],
+            "offset 1 after 2 at 2, which never fall",
+        ),
+        (
+            &[0, 0, 1, 2],
+            &[1],
+            "2 as the last offset, but there are 1 listed vertices",
+        ),
+        (
+            &[0, 0, 1, 2],
+            &[1, 2],
+            "vertex 2 at 1, but body 1 has 2 vertices",
+        ),
+    ] {
+        let refused = message(&scene, offsets, vertices).unwrap_err();
+        assert_eq!(refused, format!("{of}{expected}"));
+    }
+    let all = message(&scene, &[0, 0, 0, 0], &[]).expect("good").len();
+    let fewer = message(&scene, &[0, 2, 3, 3], &[1, 0, 1])
+        .expect("good")
+        .len();
+    assert_eq!((all, fewer), (8, 5));
+    // Pairs of a body that is no longer there are none.
+    scene.remove(b).expect("held");
+    assert_eq!(message(&scene, &[0], &[7]).expect("good").len(), 2);
+    // The same lists are equal, other ones are not.
+    let lists =
+        |vertices: &[u32]| Query::all().exclude(Exclusion::vertices(a, a, [0, 1, 1, 1], vertices));
+    assert_eq!(lists(&[1]), lists(&[1]));
+    assert_ne!(lists(&[1]), lists(&[2]));
+    // A question about whole bodies has no use for them.
+    let refused = detector.nearest(&scene, &lists(&[1])).unwrap_err();
+    assert!(
+        refused.to_string().contains("lists of vertices"),
+        "{refused}"
+    );
+}
+
 #[test]
 fn what_is_pinned_does_not_meet_what_is_pinned() {
     let (full, bodies) = scene(8);

@@ -1,5 +1,5 @@
-//! Pairs that are left out because of their vertices, or by name: rings, groups, pinned vertices,
-//! pairs of an answer.
+//! Pairs that are left out because of their vertices, or by name: rings, groups, lists of vertices,
+//! pinned vertices, pairs of an answer.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -10,6 +10,7 @@ use crate::query::{Exclusion, Query};
 use crate::scene::Scene;
 use crate::scene::elements::VertexRings;
 use crate::scene::error::Error;
+use crate::scene::ids::BodyId;
 use crate::scene::index::PartIx;
 
 use super::{Plan, Question};
@@ -20,7 +21,26 @@ pub(crate) struct LeftOut {
     /// By part.
     parts: Vec<OfPart>,
     groups: BTreeSet<(u32, u32)>,
+    vertices: Vec<Listed>,
     pairs: Vec<SortedKeys>,
+}
+
+/// For each vertex of one body, vertices of another, or of the same.
+#[derive(Debug, Clone)]
+struct Listed {
+    bodies: [BodyId; 2],
+    lists: Arc<VertexRings>,
+}
+
+impl Listed {
+    /// Whether some vertex of either element is listed with one of the other.
+    #[inline]
+    fn has(&self, bodies: [BodyId; 2], [a, b]: [&[u32]; 2]) -> bool {
+        let reaches = |a: &[u32], b: &[u32]| a.iter().any(|&of| self.lists.reaches_any(of, b));
+        // Lists of one body are both ways.
+        (self.bodies == bodies && reaches(a, b))
+            || (self.bodies == [bodies[1], bodies[0]] && reaches(b, a))
+    }
 }
 
 /// What is known of the vertices of a part.
@@ -41,7 +61,7 @@ impl LeftOut {
         &self,
         (kind, key): (Option<PairKind>, u64),
         [a, b]: [Cornered<'_>; 2],
-        are_of_one_body: bool,
+        bodies: [BodyId; 2],
     ) -> bool {
         let of = [&self.parts[a.0.index()], &self.parts[b.0.index()]];
         if let [Some(of_a), Some(of_b)] = of.map(|of| of.pinned.as_ref()) {
@@ -52,7 +72,7 @@ impl LeftOut {
                 return true;
             }
         }
-        if let (true, Some(rings)) = (are_of_one_body, &of[0].rings)
+        if let (true, Some(rings)) = (bodies[0] == bodies[1], &of[0].rings)
             && a.1.iter().any(|&from| rings.reaches_any(from, b.1))
         {
             return true;
@@ -70,6 +90,9 @@ impl LeftOut {
             if a.1.iter().all(are_apart) {
                 return true;
             }
+        }
+        if (self.vertices.iter()).any(|listed| listed.has(bodies, [a.1, b.1])) {
+            return true;
         }
         kind.is_some_and(|kind| {
             let has = |keys: &SortedKeys| keys[kind as usize].binary_search(&key).is_ok();
@@ -91,9 +114,17 @@ impl Plan {
             });
         }
         let has_pinned = scene.bodies().any(|(_, body)| body.pinned().is_some());
-        if !has_pinned && query.rings.is_none() && query.groups.is_empty() && query.pairs.is_empty()
-        {
+        if !has_pinned && query.leaves_out_elements().is_none() {
             return Ok(());
+        }
+        let mut vertices = Vec::new();
+        for lists in &query.vertices {
+            let bodies = lists.bodies();
+            // Pairs of a body that is no longer there are none.
+            if let [Ok(a), Ok(b)] = bodies.map(|body| scene.body(body)) {
+                let lists = lists.sorted([a.n_vertices(), b.n_vertices()])?;
+                vertices.push(Listed { bodies, lists });
+            }
         }
         let of_part = |part: PartIx| {
             let body = self.body(scene, part);
@@ -112,6 +143,7 @@ impl Plan {
         self.left_out = Some(Arc::new(LeftOut {
             parts: self.part_ixs().map(of_part).collect(),
             groups: query.groups.clone(),
+            vertices,
             pairs: query.pairs.iter().map(keys).collect(),
         }));
         Ok(())
@@ -133,7 +165,7 @@ impl Plan {
             Question::Intersection => None,
             _ => PairKind::of(parts[0].part, parts[1].part),
         };
-        left_out.has((kind, key), [a, b], parts[0].id == parts[1].id)
+        left_out.has((kind, key), [a, b], parts.map(|part| part.id))
     }
 
     /// Whether a pair is left out, by its key alone.

@@ -8,5 +8,6 @@ mod scope;
 pub(crate) mod settings;
 pub(crate) mod step;
 pub(crate) mod tuning;
+pub(crate) mod vertex_lists;
 
 pub use scope::*;

@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use crate::query::pair_kind::{PairKind, PairKinds};
 use crate::query::pair_set::PairSet;
 use crate::query::step::{Clearance, Hit, PairFilter, Precision, Start, check_distance};
+use crate::query::vertex_lists::VertexLists;
 use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
 use crate::scene::words::words;
@@ -65,6 +66,7 @@ enum Excluded {
     Bodies(BodyId, BodyId),
     Rings(u32),
     Groups(u32, u32),
+    Vertices(VertexLists),
     Pairs(PairSet),
 }
 
@@ -83,6 +85,35 @@ impl Exclusion {
     /// vertex of one element and each vertex of the other must be in such groups.
     pub fn groups(g: u32, h: u32) -> Self {
         Exclusion(Excluded::Groups(g.min(h), g.max(h)))
+    }
+
+    /// Pairs of an element of body `a` and one of body `b` of which some vertices are listed
+    /// together, as compressed sparse rows: the list of vertex `v` of `a` is
+    /// `vertices[offsets[v]..offsets[v + 1]]`, vertices of `b`. With `a == b` these are pairs of
+    /// that body, in either order. Lists need not be sorted. Whether they fit both bodies is
+    /// checked when something is asked.
+    ///
+    /// For what only the caller knows: vertices that are sewn or glued together, or that a solver
+    /// handles in another way.
+    ///
+    /// ```
+    /// use impinge::{Backend, Detector, Exclusion, Query, Scene};
+    /// # fn main() -> Result<(), impinge::Error> {
+    /// let mut scene = Scene::new();
+    /// let points = scene.add_points(&[[0.0f32, 0.0, 0.0], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]])?;
+    /// let query = Query::all().exclude(Exclusion::vertices(points, points, [0, 1, 1, 1], [1]));
+    /// let near = Detector::new(Backend::Cpu)?.near(&scene, 1.0, &query)?;
+    /// assert_eq!(near.iter().map(|pair| pair.row()).collect::<Vec<_>>(), [[0, 1, 0, 2]]);
+    /// # Ok(()) }
+    /// ```
+    pub fn vertices(
+        a: BodyId,
+        b: BodyId,
+        offsets: impl Into<Vec<u64>>,
+        vertices: impl Into<Vec<u32>>,
+    ) -> Self {
+        let lists = VertexLists::new([a, b], offsets.into(), vertices.into());
+        Exclusion(Excluded::Vertices(lists))
     }
 }
 
@@ -121,6 +152,7 @@ pub struct Query {
     pub(crate) excluded: BTreeSet<(BodyId, BodyId)>,
     pub(crate) rings: Option<u32>,
     pub(crate) groups: BTreeSet<(u32, u32)>,
+    pub(crate) vertices: Vec<VertexLists>,
     pub(crate) pairs: Vec<PairSet>,
     pub(crate) cell: Option<Cell>,
     /// Only of [`Scope::Across`].
@@ -153,6 +185,7 @@ impl Query {
             excluded: BTreeSet::new(),
             rings: None,
             groups: BTreeSet::new(),
+            vertices: Vec::new(),
             pairs: Vec::new(),
             cell: None,
             across: BTreeSet::new(),
@@ -231,15 +264,16 @@ impl Query {
 
     /// Leaves pairs out, before they are decided: `(a, b)`, those of two bodies; `(a, a)`, the
     /// self-collision of one; [`Exclusion::rings`], what is near in the surface;
-    /// [`Exclusion::groups`], groups of vertices that do not meet; the pairs of
-    /// [`near`](crate::Detector::near), those that were near at rest. Each call leaves out more.
+    /// [`Exclusion::groups`], groups of vertices that do not meet; [`Exclusion::vertices`], what the
+    /// caller lists; the pairs of [`near`](crate::Detector::near), those that were near at rest.
+    /// Each call leaves out more.
     ///
     /// Besides, pairs of elements all of whose vertices are [pinned](crate::Scene::set_pinned) are
     /// left out of every query.
     ///
     /// [`detect`](crate::Detector::detect), [`count`](crate::Detector::count) and
-    /// [`any`](crate::Detector::any) find all pairs first and leave out rings, groups and pinned
-    /// vertices then: limits count what is left out, too. They are about the elements that bodies
+    /// [`any`](crate::Detector::any) find all pairs first and leave out rings, groups, lists and
+    /// pinned vertices then: limits count what is left out, too. They are about the elements that bodies
     /// were given as, and refuse pairs of an answer. [`nearest`](crate::Detector::nearest) and
     /// frames that stay on a device refuse all but bodies.
     ///
@@ -268,6 +302,7 @@ impl Query {
             Excluded::Groups(g, h) => {
                 self.groups.insert((g, h));
             }
+            Excluded::Vertices(lists) => self.vertices.push(lists),
             Excluded::Pairs(pairs) => self.pairs.push(pairs),
         }
         self
@@ -462,6 +497,9 @@ impl Query {
         if !self.groups.is_empty() {
             return Some("groups of vertices");
         }
+        if !self.vertices.is_empty() {
+            return Some("lists of vertices");
+        }
         (!self.pairs.is_empty()).then_some("pairs of vertices, edges and faces")
     }
 
@@ -472,7 +510,7 @@ impl Query {
             false => Err(Error::Setting {
                 setting: "exclude",
                 given: "pairs of vertices, edges and faces".to_owned(),
-                allowed: "bodies, rings and groups: this question is about the elements that bodies were given as",
+                allowed: "bodies, rings, groups and lists of vertices: this question is about the elements that bodies were given as",
             }),
         }
     }
