@@ -17,7 +17,6 @@ use super::advance::{moving, refuse_cell, refuse_seams, set_end_positions};
 use crate::answers::truncation::Truncation;
 use crate::plan::{Plan, TestId};
 use crate::query::Query;
-use crate::query::goal::Goal;
 use crate::scene::Scene;
 use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
@@ -83,7 +82,7 @@ impl Detector {
     pub fn truncate(&mut self, scene: &Scene, query: &Query) -> Result<Truncation, Error> {
         refuse_cell(query)?;
         let begun = Instant::now();
-        let plan_of = |scene: &Scene, limits| Plan::contacts(scene, query, Goal::All, limits);
+        let plan_of = |scene: &Scene, limits| Plan::touching(scene, query, limits);
         let mut plan = plan_of(scene, self.limits_of_steps())?;
         let start = self.verify(scene, query)?.map(|start| start.intersects);
         let mut truncation = Truncation {

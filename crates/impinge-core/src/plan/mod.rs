@@ -173,6 +173,8 @@ pub struct Plan {
     pub(crate) start: Start,
     /// The precision of times.
     pub(crate) precision: Precision,
+    /// Whether it is asked when pairs touch, or only which do.
+    pub(crate) asks_when: bool,
     /// What of the pairs is wanted.
     pub goal: Goal,
     /// What the answer may be.
@@ -215,6 +217,16 @@ impl Plan {
         limits: Limits,
     ) -> Result<Self, Error> {
         Plan::of_step(scene, query, query.keep(), goal, limits)
+    }
+
+    /// The question which elements touch during a step, whenever. Times are bounds.
+    pub(crate) fn touching(scene: &Scene, query: &Query, limits: Limits) -> Result<Self, Error> {
+        let plan = Plan::contacts(scene, query, Goal::All, limits)?;
+        Ok(Plan {
+            precision: Precision::F32,
+            asks_when: false,
+            ..plan
+        })
     }
 
     /// The question how far a step can be taken: about its earliest contact, at a time in `f64`, or
@@ -389,6 +401,7 @@ impl Plan {
             left_out: None,
             start: Start::default(),
             precision: Precision::default(),
+            asks_when: true,
             goal,
             limits,
             since: Instant::now(),

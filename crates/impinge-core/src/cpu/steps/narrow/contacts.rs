@@ -33,7 +33,8 @@ pub(super) struct Open {
 pub(crate) struct FirstContacts {
     pub(super) goal: Goal,
     start: Start,
-    toi: Precision,
+    /// The precision of times; `None` if only bounds of them are wanted.
+    toi: Option<Precision>,
     /// Contacts found, handed over in blocks.
     found: FoundByKind,
     pub(super) counts: NarrowCounts,
@@ -63,7 +64,9 @@ pub(crate) struct FirstContacts {
 impl FirstContacts {
     /// Prepares for a step.
     pub fn begin(&mut self, n_clusters: u64, plan: &Plan, tuning: &Tuning) {
-        (self.goal, self.start, self.toi) = (plan.goal, plan.start, plan.precision);
+        (self.goal, self.start) = (plan.goal, plan.start);
+        let asks_when = plan.asks_when && plan.goal != Goal::Any;
+        self.toi = asks_when.then_some(plan.precision);
         self.most_close = MOST_CLOSE.max(2 * n_clusters as usize);
         self.full = tuning.decide_from;
         self.counts = NarrowCounts::default();
@@ -249,10 +252,10 @@ impl FirstContacts {
         }
         // Other pairs need not be searched beyond this time.
         world.known.found(self.goal, span[1]);
-        let time = match (self.goal, self.toi) {
-            (Goal::Any, _) => Some(span[0]),
-            (_, Precision::F32) => time_between(span).map(f64::from),
-            (_, Precision::F64) => None,
+        let time = match self.toi {
+            None => Some(span[0]),
+            Some(Precision::F32) => time_between(span).map(f64::from),
+            Some(Precision::F64) => None,
         };
         let Some(time) = time else {
             return self.decide_exactly(world, between, pair, slots);
