@@ -5,6 +5,7 @@ import { Closest, Hits, Neighbours, SafeDistances, Truncation, places, signed, t
 import { RestPairs, packed, plain, whole, withPoints } from "./query.js";
 import { body, call, isSingle, mustBeNone, number, refuse, wide, word } from "./shared.js";
 
+const PARTS = ["vertices", "edges", "faces"];
 const BODY_KINDS = ["points", "edges", "triangles", "tetrahedra"];
 
 // How the arrays of a body are used.
@@ -214,8 +215,13 @@ export function makeScene({ SceneHandle }, mustBeReady) {
       call(() => this.#held.set_filter(body(which), ...bits));
     }
 
-    setThickness(which, thickness) {
-      call(() => this.#held.set_thickness(body(which), number("thickness", thickness)));
+    setThickness(which, thickness, part = "vertices") {
+      const of = word("part", part, PARTS);
+      if (typeof thickness !== "object" || thickness === null) {
+        call(() => this.#held.set_thickness(body(which), number("thickness", thickness)));
+      } else {
+        call(() => this.#held.set_element_thickness(body(which), of, Float64Array.from(thickness)));
+      }
     }
 
     setGroups(which, groups) {

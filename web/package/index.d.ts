@@ -172,7 +172,7 @@ export declare class Scene {
   addEdges(edges: Index, positions: Positions): Body;
   addPoints(positions: Positions): Body;
   remove(body: Body): void;
-  /** Gives a body new elements and positions. Its filter and thickness stay. */
+  /** Gives a body new elements and positions. Its filter stays, and its thickness if it is one number. */
   remesh(body: Body, mesh: Mesh): void;
   /** Moves the vertices of a body: as many positions as it has vertices. It stands still until it gets end positions. */
   setPositions(body: Body, positions: Positions): void;
@@ -187,8 +187,11 @@ export declare class Scene {
   setEndTransform(body: Body, matrix: ArrayLike<number>): void;
   /** Bodies meet if the category of each shares a bit with the mask of the other; 64 bits. Category 1 and all bits by default. */
   setFilter(body: Body, category?: number | bigint, mask?: number | bigint): void;
-  /** A length that `near` adds to the distance for each element of this body. */
-  setThickness(body: Body, thickness: number): void;
+  /**
+   * A length that each element of this body adds to the distance of `near`: one number, or one per vertex, edge or face. With one per vertex, edges and faces are as thick
+   * as the thickest of their vertices; otherwise other elements are as thick as the thickest of these that they have or are part of.
+   */
+  setThickness(body: Body, thickness: number | ArrayLike<number>, part?: "vertices" | "edges" | "faces"): void;
   /** Puts each vertex of a body into a group, for `exclude: [{ groups: [g, h] }]`. A body whose groups were never set is in none. */
   setGroups(body: Body, groups: Index): void;
   /**

@@ -18,6 +18,7 @@ scene.setTransform(strand, [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]);
 scene.setEndTransform(strand, new Float32Array(16));
 scene.setFilter(cloud, 2, 0xffn);
 scene.setThickness(cloud, 0.5);
+scene.setThickness(cloud, new Float32Array(3), "vertices");
 scene.remesh(cloud, { positions: new Float32Array(3) });
 const pairs: Pairs = detector.detect(scene, { between: [a, b] });
 const rows: Uint32Array[] = [pairs.rows, pairs.between(a, b), pairs.selfOf(a), pairs.colliding(b)];

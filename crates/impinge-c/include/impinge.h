@@ -116,7 +116,7 @@ impinge_status impinge_scene_add_points(impinge_scene *scene, impinge_array posi
 impinge_status impinge_scene_remove(impinge_scene *scene, uint32_t body);
 
 /* Gives a body new elements and positions under its number. `kind` is IMPINGE_TRIANGLES ...; for IMPINGE_POINTS `elements` has no rows.
- * Its filter and thickness stay; the end of its step, its transform and the caller's numbers of edges are forgotten.
+ * Its filter stays, and its thickness if it is one number; the end of its step, its transform and the caller's numbers of edges are forgotten.
  * INVALID: as impinge_scene_add_triangles, and no such body. */
 impinge_status impinge_scene_remesh(impinge_scene *scene, uint32_t body, uint32_t kind, impinge_array elements, impinge_array positions);
 
@@ -170,6 +170,13 @@ impinge_status impinge_scene_set_filter(impinge_scene *scene, uint32_t body, uin
 /* Sets how thick a body is, a length: what its elements add to the distance of impinge_find_near. Finite, 0 or more; 0 by default.
  * INVALID: no such body, another number. */
 impinge_status impinge_scene_set_thickness(impinge_scene *scene, uint32_t body, double thickness);
+
+/* Sets how thick each vertex (`kind`: IMPINGE_POINTS), edge (IMPINGE_EDGES) or face (IMPINGE_TRIANGLES) of a body is: as many rows as it
+ * has of these, 1 column of F32 or F64; edges in the caller's order, if impinge_scene_set_edges gave one. Other elements are as thick as
+ * the thickest of these that they have or are part of. Of two elements, the sum of both is what adds to the distance of
+ * impinge_find_near. impinge_scene_set_thickness and impinge_scene_remesh forget it.
+ * INVALID: no such body, another number of rows, a number that is negative or not finite. */
+impinge_status impinge_scene_set_element_thickness(impinge_scene *scene, uint32_t body, uint32_t kind, impinge_array thickness);
 
 /* Sets the group of each vertex of a body, for IMPINGE_EXCLUDE_GROUPS: as many rows as it has vertices, 1 column of any integer type. A
  * body whose groups were not set has none that could be left out. New elements (impinge_scene_remesh) have no groups.
@@ -239,7 +246,10 @@ impinge_status impinge_weld(impinge_array positions, uint32_t *map, uint32_t *fi
  *                       16, away from some vertex of the other
  *   EXCLUDE_GROUPS      pairs of elements of the groups `a` and `b` of vertices, which impinge_scene_set_groups sets, or of one with
  *                       itself: each vertex of one element and each of the other must be in such groups
- *   EXCLUDE_VERTICES    not known to this version
+ *   EXCLUDE_VERTICES    pairs of an element of body `a` and one of body `b` of which some vertices are listed together: the list of vertex v
+ *                       of `a` has the rows offsets[v] to offsets[v + 1] - 1 of `vertices`, vertices of `b`. Both have 1 column of any integer
+ *                       type; `offsets` has one row more than `a` has vertices. With a == b these are pairs of that body, in either order.
+ *                       Both arrays are copied
  * Pairs that are near at rest are left out by the field rest_pairs of impinge_query. */
 #define IMPINGE_EXCLUDE_BODIES 0
 #define IMPINGE_EXCLUDE_RINGS 1

@@ -58,6 +58,19 @@ impl EdgeNumbers {
         Ok(EdgeNumbers { rows, to_own })
     }
 
+    /// Numbers of the caller's rows in the order of the library's edges.
+    pub fn in_own_order(&self, number: u32, of_rows: &[f64]) -> Result<Vec<f64>, Failure> {
+        if of_rows.len() != self.rows.len() {
+            return Err(Failure::invalid(format!(
+                "body {number}: {} thicknesses given, but there are {} rows of edges",
+                of_rows.len(),
+                self.rows.len()
+            )));
+        }
+        let own = self.to_own.iter().map(|&(row, _)| of_rows[row as usize]);
+        collect(own, "thickness")
+    }
+
     /// The caller's number of an edge.
     pub fn own(&self, edge: u32) -> u32 {
         self.to_own[edge as usize].0

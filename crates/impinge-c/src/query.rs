@@ -8,6 +8,7 @@ use impinge::{
 };
 
 use crate::answers::impinge_near;
+use crate::arrays::{collect, indices};
 use crate::scene::impinge_scene;
 use crate::sized::read_sized;
 use crate::status::{Failure, held};
@@ -126,10 +127,22 @@ impl<'a> Asked<'a> {
             }
             EXCLUDE_RINGS => Ok(Exclusion::rings(given.n)),
             EXCLUDE_GROUPS => Ok(Exclusion::groups(given.a, given.b)),
+            EXCLUDE_VERTICES => {
+                let [a, b] = [given.a, given.b].map(|body| self.scene.id(body));
+                let numbers = |of, name| {
+                    // SAFETY: the caller's arrays, which live during the call.
+                    let rows = unsafe { indices::<1>(of, &format!("exclusions[{ix}].{name}")) }?;
+                    Ok::<_, Failure>(rows.into_flattened())
+                };
+                let offsets = numbers(&given.offsets, "offsets")?;
+                let offsets = collect(offsets.into_iter().map(u64::from), "offsets")?;
+                let vertices = numbers(&given.vertices, "vertices")?;
+                Ok(Exclusion::vertices(a?, b?, offsets, vertices))
+            }
             other => refuse(
                 &format!("exclusions[{ix}].kind"),
                 other,
-                "IMPINGE_EXCLUDE_BODIES, _RINGS and _GROUPS allowed in this version",
+                "IMPINGE_EXCLUDE_BODIES, _RINGS, _GROUPS and _VERTICES allowed",
             ),
         }
     }

@@ -5,7 +5,7 @@ use std::ffi::c_void;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use impinge::{Body, BodyId, Filter, Part, Positions, Scene, Weld};
+use impinge::{Body, BodyId, Filter, Part, Positions, Scene, Thickness, Weld};
 
 use crate::arrays::{self, Floats, elements_view, no_rows, positions_view};
 use crate::edges::EdgeNumbers;
@@ -450,6 +450,38 @@ pub unsafe extern "C" fn impinge_scene_set_thickness(
     unsafe {
         change(scene, |scene| {
             let id = scene.id(body)?;
+            Ok(scene.scene.set_thickness(id, thickness)?)
+        })
+    }
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn impinge_scene_set_element_thickness(
+    scene: *mut impinge_scene,
+    body: u32,
+    kind: u32,
+    thickness: impinge_array,
+) -> Status {
+    // SAFETY: see `impinge_scene_create`.
+    unsafe {
+        change(scene, |scene| {
+            let id = scene.id(body)?;
+            const WHAT: &str = "thickness";
+            let given = arrays::floats::<1>(&thickness, WHAT)?.widened(WHAT)?;
+            let given = given.into_flattened();
+            let thickness = match kind {
+                POINTS => Thickness::vertices(given),
+                TRIANGLES => Thickness::faces(given),
+                EDGES => match scene.edge_numbers(body) {
+                    None => Thickness::edges(given),
+                    Some(numbers) => Thickness::edges(numbers.in_own_order(body, &given)?),
+                },
+                other => {
+                    return Err(Failure::invalid(format!(
+                        "kind: {other} given, IMPINGE_POINTS, _EDGES and _TRIANGLES allowed, for vertices, edges and faces"
+                    )));
+                }
+            };
             Ok(scene.scene.set_thickness(id, thickness)?)
         })
     }

@@ -89,6 +89,7 @@ fn layout_in_rust() -> BTreeMap<String, usize> {
         EXCLUDE_BODIES,
         EXCLUDE_RINGS,
         EXCLUDE_GROUPS,
+        EXCLUDE_VERTICES,
         NO_FEATURE,
         NO_ELEMENT,
         LOG_ERROR,

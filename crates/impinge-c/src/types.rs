@@ -53,6 +53,7 @@ pub const HITS_ALL: u32 = 2;
 pub const EXCLUDE_BODIES: u32 = 0;
 pub const EXCLUDE_RINGS: u32 = 1;
 pub const EXCLUDE_GROUPS: u32 = 2;
+pub const EXCLUDE_VERTICES: u32 = 3;
 
 pub const LOG_ERROR: u32 = 1;
 pub const LOG_INFO: u32 = 2;

@@ -163,6 +163,21 @@ void probes() {
   CHECK(detector.near(scene, 0.2, query::between_all()).empty());
   scene.set_pinned(b, std::vector<std::uint8_t>(VERTICES, 0));
 
+  {
+    const std::vector<std::uint64_t> none(VERTICES + 1, 0);
+    const std::vector<std::uint32_t> listed;
+    CHECK(detector.near(scene, 0.2, query::between_all().exclude_vertices(a, b, none, listed)).size() == rest.size());
+    scene.set_thickness(a, 0.05);
+    const auto thick = detector.near(scene, 0.2, query::between_all()).size();
+    scene.set_vertex_thickness(a, std::vector<double>(VERTICES, 0.05));
+    CHECK(thick > rest.size() && detector.near(scene, 0.2, query::between_all()).size() == thick);
+    scene.set_edge_thickness(a, std::vector<double>(scene.edges(a).rows, 0.05));
+    CHECK(detector.near(scene, 0.2, query::between_all()).size() == thick);
+    scene.set_face_thickness(a, std::vector<double>(scene.faces(a).rows, 0.05));
+    CHECK(detector.near(scene, 0.2, query::between_all()).size() == thick);
+    scene.set_thickness(a, 0);
+  }
+
   scene.set_end_positions(b, numbers(balls[1]));
   const auto truncation = detector.truncate(scene);
   CHECK(truncation.n_cut() > 10 && truncation.n_touching() == 0 && truncation.rounds() > 0 && !truncation.start_intersects());

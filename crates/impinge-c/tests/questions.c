@@ -596,6 +596,51 @@ static void solvers(impinge_detector *detector) {
   GOOD(impinge_find_near(detector, scene, 0.02, &query, &again));
   CHECK(impinge_near_count(again) > 0);
   impinge_near_destroy(again);
+  /* The first vertex that is near the other ball is listed with all vertices of that. */
+  {
+    static uint64_t offsets[VERTICES + 1];
+    static uint32_t listed[VERTICES];
+    uint32_t vertex;
+    GOOD(impinge_near_column(near_pairs, IMPINGE_COLUMN_ROWS, &view));
+    vertex = ((const uint32_t *)view.data)[1];
+    CHECK(((const uint32_t *)view.data)[0] == 0 && vertex < VERTICES);
+    for (i = 0; i <= VERTICES; ++i) offsets[i] = i > vertex ? VERTICES : 0;
+    for (i = 0; i < VERTICES; ++i) listed[i] = (uint32_t)i;
+    query.self = 0;
+    query.between = 1;
+    memset(&exclusion, 0, sizeof exclusion);
+    exclusion.kind = IMPINGE_EXCLUDE_VERTICES;
+    exclusion.b = 1;
+    exclusion.offsets = packed(offsets, VERTICES + 1, IMPINGE_U64);
+    exclusion.vertices = packed(listed, VERTICES, IMPINGE_U32);
+    query.n_exclusions = 1;
+    GOOD(impinge_find_near(detector, scene, 0.2, &query, &again));
+    CHECK(impinge_near_count(again) < impinge_near_count(near_pairs) && impinge_near_count(again) > 0);
+    impinge_near_destroy(again);
+    exclusion.offsets.rows = VERTICES;
+    REFUSED(impinge_find_near(detector, scene, 0.2, &query, &again), "1154 offsets, but body 0 has 1154 vertices");
+    query.n_exclusions = 0;
+  }
+  /* One thickness per vertex is that of all, if all are the same. */
+  {
+    static double thick[VERTICES];
+    size_t n_one;
+    GOOD(impinge_scene_set_thickness(scene, 0, 0.05));
+    GOOD(impinge_find_near(detector, scene, 0.2, &query, &again));
+    n_one = impinge_near_count(again);
+    CHECK(n_one > impinge_near_count(near_pairs));
+    impinge_near_destroy(again);
+    for (i = 0; i < VERTICES; ++i) thick[i] = 0.05;
+    GOOD(impinge_scene_set_element_thickness(scene, 0, IMPINGE_POINTS, packed(thick, VERTICES, IMPINGE_F64)));
+    GOOD(impinge_find_near(detector, scene, 0.2, &query, &again));
+    CHECK(impinge_near_count(again) == n_one);
+    impinge_near_destroy(again);
+    REFUSED(impinge_scene_set_element_thickness(scene, 0, IMPINGE_EDGES, packed(thick, VERTICES, IMPINGE_F64)), "thicknesses given");
+    REFUSED(impinge_scene_set_element_thickness(scene, 0, IMPINGE_TETRAHEDRA, packed(thick, VERTICES, IMPINGE_F64)), "kind: 4 given");
+    thick[7] = -1;
+    REFUSED(impinge_scene_set_element_thickness(scene, 0, IMPINGE_POINTS, packed(thick, VERTICES, IMPINGE_F64)), "a thickness of -1 is given as number 7");
+    GOOD(impinge_scene_set_thickness(scene, 0, 0));
+  }
   impinge_near_destroy(near_pairs);
   /* The second ball wants into the first: its far side comes all the way. */
   GOOD(impinge_scene_set_end_positions(scene, 1, positions_of(&balls[1])));

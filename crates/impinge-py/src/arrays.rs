@@ -225,6 +225,37 @@ pub fn offsets(argument: &Bound<'_, PyAny>, name: &str) -> PyResult<Vec<usize>> 
     }
 }
 
+/// Whole numbers of 32 bits, `(n,)`, from 0.
+pub fn whole_numbers(argument: &Bound<'_, PyAny>, name: &str) -> PyResult<Vec<u32>> {
+    let number = |(ix, &number): (usize, &usize)| {
+        u32::try_from(number).map_err(|_| {
+            let most = u32::MAX;
+            invalid(format!(
+                "{name}[{ix}]: {number} given, at most {most} allowed"
+            ))
+        })
+    };
+    let numbers = offsets(argument, name)?;
+    numbers.iter().enumerate().map(number).collect()
+}
+
+/// Numbers, `(n,)`, of any type.
+pub fn numbers(argument: &Bound<'_, PyAny>, name: &str) -> PyResult<Vec<f64>> {
+    let array = as_array(argument, name)?;
+    NumberKind::of(&array, name)?;
+    let shape = array.shape();
+    if shape.len() != 1 {
+        return Err(invalid(format!(
+            "{name}: a number or a row of numbers expected, {} given",
+            array.getattr("shape")?.str()?
+        )));
+    }
+    let column = array.call_method1("reshape", ((shape[0], 1),))?;
+    let column = column.cast_into::<PyUntypedArray>()?;
+    let numbers = in_c_order::<f64>(&column, "=f8")?;
+    Ok(numbers.as_slice()?.to_vec())
+}
+
 /// Rows `(n, n_columns)` of unsigned 32-bit numbers, row after row.
 pub fn rows(argument: &Bound<'_, PyAny>, name: &str, n_columns: usize) -> PyResult<Vec<u32>> {
     let array = as_array(argument, name)?;

@@ -3,14 +3,15 @@
 use std::collections::hash_map::DefaultHasher;
 use std::hash::{Hash, Hasher};
 
-use impinge::Exclusion as Inner;
+use impinge::{BodyId, Exclusion as Inner};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 
 use crate::settings::unsigned;
 
-/// Pairs of elements that a question leaves out: made by `rings`, `groups` and `Scene.rest_pairs`.
+/// Pairs of elements that a question leaves out: made by `rings`, `groups`,
+/// `Scene.rest_pairs` and `Scene.vertex_pairs`.
 #[pyclass(module = "impinge", frozen)]
 pub struct Exclusion {
     pub inner: Inner,
@@ -25,6 +26,14 @@ impl Exclusion {
             name: Name::Pairs(near.len()),
         }
     }
+
+    /// What the caller lists.
+    pub fn vertices(bodies: [BodyId; 2], offsets: Vec<u64>, vertices: Vec<u32>) -> Self {
+        let name = Name::Vertices(vertices.len());
+        let [a, b] = bodies;
+        let inner = Inner::vertices(a, b, offsets, vertices);
+        Exclusion { inner, name }
+    }
 }
 
 #[derive(Clone, Copy, PartialEq, Hash)]
@@ -32,6 +41,7 @@ enum Name {
     Rings(u32),
     Groups([u32; 2]),
     Pairs(usize),
+    Vertices(usize),
 }
 
 #[pymethods]
@@ -52,6 +62,7 @@ impl Exclusion {
             Name::Rings(n) => format!("rings({n})"),
             Name::Groups([g, h]) => format!("groups({g}, {h})"),
             Name::Pairs(n) => format!("Exclusion({n} pairs)"),
+            Name::Vertices(n) => format!("Exclusion({n} pairs of vertices)"),
         }
     }
 
@@ -63,7 +74,7 @@ impl Exclusion {
         match self.name {
             Name::Rings(n) => Ok((module.getattr("rings")?, PyTuple::new(py, [n])?)),
             Name::Groups(both) => Ok((module.getattr("groups")?, PyTuple::new(py, both)?)),
-            Name::Pairs(_) => Err(PyTypeError::new_err(
+            Name::Pairs(_) | Name::Vertices(_) => Err(PyTypeError::new_err(
                 "an Exclusion of pairs names bodies of a live scene",
             )),
         }

@@ -1,14 +1,15 @@
 //! `impinge.Scene`: bodies, their topology and positions.
 
-use impinge::{BodyId, BodyKind, Elements, Filter, Positions, Real, Weld};
+use impinge::{BodyId, BodyKind, Elements, Filter, Part, Positions, Real, Thickness, Weld};
 use numpy::{PyArray1, PyArrayMethods};
-use pyo3::exceptions::PyRuntimeError;
+use pyo3::exceptions::{PyRuntimeError, PyTypeError};
 use pyo3::prelude::*;
-use pyo3::types::{PyList, PyTuple};
+use pyo3::types::{PyFloat, PyList, PyTuple};
 
 use crate::arrays::{self, PositionArray, RowKind, positions_array, slice_rows};
 use crate::bodies::{Body, body_id, new_scene_number};
 use crate::errors::{Names, invalid, raise, refuse};
+use crate::exclusion::Exclusion;
 use crate::lent;
 use crate::meshes;
 use crate::settings::{self, Argument, number, unsigned};
@@ -400,20 +401,7 @@ impl Scene {
         body: &Bound<'_, PyAny>,
         groups: &Bound<'_, PyAny>,
     ) -> PyResult<()> {
-        let groups = arrays::offsets(groups, "groups")?;
-        let group = |(ix, &group): (usize, &usize)| {
-            u32::try_from(group).map_err(|_| {
-                invalid(format!(
-                    "groups[{ix}]: {group} given, at most {} allowed",
-                    u32::MAX
-                ))
-            })
-        };
-        let groups = groups
-            .iter()
-            .enumerate()
-            .map(group)
-            .collect::<PyResult<Vec<u32>>>()?;
+        let groups = arrays::whole_numbers(groups, "groups")?;
         let mut scene = change(slf)?;
         let id = scene.id(body, "body")?;
         scene.inner.set_groups(id, &groups).map_err(raise)
@@ -435,11 +423,30 @@ impl Scene {
         slf: &Bound<'_, Self>,
         body: &Bound<'_, PyAny>,
         thickness: &Bound<'_, PyAny>,
+        part: &Bound<'_, PyAny>,
     ) -> PyResult<()> {
         let mut scene = change(slf)?;
         let id = scene.id(body, "body")?;
-        let thickness = number(thickness, "thickness")?;
+        let thickness = self::thickness(thickness, part)?;
         scene.inner.set_thickness(id, thickness).map_err(raise)
+    }
+
+    fn _vertex_pairs(
+        &self,
+        body: &Bound<'_, PyAny>,
+        offsets: &Bound<'_, PyAny>,
+        vertices: &Bound<'_, PyAny>,
+        other: &Bound<'_, PyAny>,
+    ) -> PyResult<Exclusion> {
+        let a = self.id(body, "body")?;
+        let b = match other.is_none() {
+            true => a,
+            false => self.id(other, "other")?,
+        };
+        let offsets = arrays::offsets(offsets, "offsets")?;
+        let offsets = offsets.into_iter().map(|offset| offset as u64).collect();
+        let vertices = arrays::whole_numbers(vertices, "vertices")?;
+        Ok(Exclusion::vertices([a, b], offsets, vertices))
     }
 
     fn _positions<'py>(
@@ -567,7 +574,7 @@ impl Scene {
                 scene._end_positions(py, &number)?,
                 filter.category,
                 filter.mask,
-                body.thickness(),
+                thickness_array(py, body),
             ))?;
         }
         (slf.get_type(), (), bodies).into_pyobject(py)
@@ -608,12 +615,55 @@ impl Scene {
                 mask: item(7)?.extract()?,
             };
             scene.inner.set_filter(id, filter).map_err(raise)?;
-            let thickness = item(8)?.extract()?;
+            let (part, thickness): (Bound<'_, PyAny>, Bound<'_, PyAny>) = item(8)?.extract()?;
+            let thickness = self::thickness(&thickness, &part)?;
             scene.inner.set_thickness(id, thickness).map_err(raise)?;
         }
         for id in gaps.into_iter().rev() {
             scene.inner.remove(id).map_err(raise)?;
         }
         Ok(())
+    }
+}
+
+/// One number; or one per vertex, edge or face.
+fn thickness(given: &Bound<'_, PyAny>, part: &Bound<'_, PyAny>) -> PyResult<Thickness<'static>> {
+    let part = match part.is_none() {
+        true => None,
+        false => Some(part.extract::<String>().map_err(|_| {
+            PyTypeError::new_err("part: \"vertices\", \"edges\" or \"faces\" expected")
+        })?),
+    };
+    // An array of one number would be read as that number.
+    let is_array = given.getattr("ndim").is_ok_and(|n| n.ne(0).unwrap_or(true));
+    if part.is_none() && !is_array && given.extract::<f64>().is_ok() {
+        return Ok(number(given, "thickness")?.into());
+    }
+    let each = arrays::numbers(given, "thickness")?;
+    match part.as_deref() {
+        None | Some("vertices") => Ok(Thickness::vertices(each)),
+        Some("edges") => Ok(Thickness::edges(each)),
+        Some("faces") => Ok(Thickness::faces(each)),
+        Some(other) => Err(invalid(format!(
+            "part: {other:?} given, \"vertices\", \"edges\" or \"faces\" allowed"
+        ))),
+    }
+}
+
+/// The part that it was given for, and what [`thickness`] reads.
+fn thickness_array(py: Python<'_>, body: &impinge::Body) -> (Option<&'static str>, Py<PyAny>) {
+    match body.thickness_by_element() {
+        None => (None, PyFloat::new(py, body.thickness()).into_any().unbind()),
+        Some((part, each)) => {
+            let part = match part {
+                Part::Edges => "edges",
+                Part::Faces | Part::Given => "faces",
+                Part::Vertices => "vertices",
+            };
+            (
+                Some(part),
+                PyArray1::from_slice(py, each).into_any().unbind(),
+            )
+        }
     }
 }

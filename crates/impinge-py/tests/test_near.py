@@ -103,6 +103,25 @@ def test_kinds_and_thickness(detector, two):
     assert len(detector.near(scene, 0)) == 0
 
 
+def test_thickness_of_each_element(detector):
+    scene = impinge.Scene()
+    points = scene.add_points([[0, 0, 0], [1, 0, 0], [2, 0, 0]])
+    for part in (None, "vertices"):
+        scene.set_thickness(points, [0.75, 0.25, 0.5], part)
+        for same in (scene, pickle.loads(pickle.dumps(scene))):
+            assert detector.near(same, 0.0).rows.tolist() == [[0, 0, 0, 1]]
+    near = detector.neighbours(scene, 0.25)
+    assert near.of("vv").distances.tolist() == [0.0, 0.0, 0.25, 0.25]
+    scene.set_thickness(points, 0)
+    assert len(detector.near(scene, 0.5)) == 0
+    cloth = scene.add([[0, 0, 3], [1, 0, 3], [0, 1, 3], [1, 1, 3]], [[0, 1, 2], [1, 3, 2]])
+    other = scene.add_points([[0.9, 0.9, 3.5]])
+    for part, thick in (("vertices", [0, 0, 0, 0.5]), ("edges", [0, 0, 0, 0.5, 0]), ("faces", np.float32([0, 0.5]))):
+        scene.set_thickness(cloth, thick, part=part)
+        near = detector.near(scene, 0, between=(cloth, other), kinds=["vf"])
+        assert near.rows.tolist() == [[int(other), 0, int(cloth), 1]]
+
+
 def test_refusals(detector, two):
     near = detector.near(two, 3.0)
     for name, keyword in [("distances", "distances"), ("points", "closest_points")]:
@@ -112,8 +131,17 @@ def test_refusals(detector, two):
         detector.near(two, -1.0)
     with pytest.raises(ValueError, match="thickness"):
         two.set_thickness(0, float("nan"))
-    with pytest.raises(TypeError, match="^thickness: a number expected, list given"):
+    n_edges = len(two.edges(0))
+    with pytest.raises(ValueError, match="^body 0: 1 thicknesses given, but there are 3 vertices"):
         two.set_thickness(0, [1.0])
+    with pytest.raises(ValueError, match=f"^body 0: 7 thicknesses given, but there are {n_edges} edges"):
+        two.set_thickness(0, np.ones(7), part="edges")
+    with pytest.raises(ValueError, match="^body 0: a thickness of -0.5 is given as number 2 of its vertices"):
+        two.set_thickness(0, [1, 2, -0.5])
+    with pytest.raises(ValueError, match='^part: "corners" given'):
+        two.set_thickness(0, [1, 2, 3], part="corners")
+    with pytest.raises(ValueError, match="a row of numbers expected"):
+        two.set_thickness(0, np.ones((3, 1)))
     with pytest.raises(ValueError, match='^kinds\\[0\\]: "xy" given'):
         detector.near(two, 1.0, kinds=["xy"])
     with pytest.raises(TypeError, match="^distance: a number expected, str given"):

@@ -167,6 +167,17 @@ def test_what_is_left_out(detector):
     assert len(detector.near(scene, 0.3)) > 0
     scene.set_pinned(points, np.ones(len(grid), bool))
     assert len(detector.near(scene, 0.3)) == 0
+    scene.set_pinned(points, np.zeros(len(grid), bool))
+    # A point and what is below it, as compressed sparse rows.
+    offsets, listed = np.arange(len(grid) + 1), np.arange(len(grid))
+    sewn = scene.vertex_pairs(points, offsets, listed, cloth)
+    kept = detector.near(scene, 0.3, between=(cloth, points), kinds=["vv"], exclude=sewn)
+    assert len(kept) == 0 < len(detector.near(scene, 0.3, between=(cloth, points), kinds=["vv"]))
+    assert repr(sewn) == "Exclusion(48 pairs of vertices)" and sewn == scene.vertex_pairs(points, offsets, listed, cloth)
+    with pytest.raises(ValueError, match="lists for the vertices of body 1, of vertices of body 0: 48 offsets, but body 1 has 48 vertices"):
+        detector.near(scene, 0.3, exclude=scene.vertex_pairs(points, offsets[1:], listed, cloth))
+    with pytest.raises(ValueError, match="vertex 48 at 0, but body 1 has 48 vertices"):
+        detector.near(scene, 0.3, exclude=scene.vertex_pairs(points, offsets, listed + 48))
     query = impinge.Query(exclude=[impinge.rings(2), (1, 0), impinge.groups(7, 1)])
     assert query == pickle.loads(pickle.dumps(query)) and len({query, query.replace()}) == 1
     assert repr(query) == "Query(exclude=((0, 1), groups(1, 7), rings(2)))"

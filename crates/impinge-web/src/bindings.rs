@@ -159,6 +159,12 @@ impl SceneHandle {
         self.0.keep_at_rest(number, distance).map_err(thrown)
     }
 
+    /// See [`World::set_element_thickness`].
+    pub fn set_element_thickness(&mut self, body: u32, part: u32, thickness: &[f64]) -> Thrown<()> {
+        let set = self.0.set_element_thickness(body, part, thickness);
+        set.map_err(thrown)
+    }
+
     /// See [`World::remove`].
     pub fn remove(&mut self, body: u32) -> Thrown<()> {
         self.0.remove(body).map_err(thrown)

@@ -3,7 +3,7 @@
 
 use impinge::{
     Backend, Body, BodyId, BodyKind, Detector, Elements, Exclusion, Filter, Part, Positions, Query,
-    Real, Scene, Weld,
+    Real, Scene, Thickness, Weld,
 };
 
 use crate::error::Error;
@@ -182,6 +182,25 @@ impl World {
         let held = self.at_rest.iter().find(|(of, _)| *of == number);
         held.map(|(_, pairs)| pairs.clone())
             .ok_or(Error::PairsOfAnotherScene)
+    }
+
+    /// Sets how thick each vertex (0), edge (1) or face (2) of a body is.
+    ///
+    /// # Errors
+    /// No such body; those of [`Scene::set_thickness`].
+    pub fn set_element_thickness(
+        &mut self,
+        body: u32,
+        part: u32,
+        thickness: &[f64],
+    ) -> Result<(), Error> {
+        let thickness = match part {
+            0 => Thickness::vertices(thickness),
+            1 => Thickness::edges(thickness),
+            _ => Thickness::faces(thickness),
+        };
+        let set = self.scene.set_thickness(self.id(body)?, thickness);
+        self.renumbered(body, set).map(|_| ())
     }
 
     /// Removes a body. Its number is not used again.

@@ -172,6 +172,15 @@ fn bodies_are_of_every_kind_and_get_new_elements() -> Result<(), Error> {
     assert!(world.body(points)?.end_positions().is_none());
     world.set_thickness(points, 0.5)?;
     assert_eq!(world.body(points)?.thickness(), 0.5);
+    let n = world.body(points)?.n_vertices();
+    world.set_element_thickness(points, 0, &vec![0.25; n])?;
+    assert_eq!(world.body(points)?.thickness(), 0.25);
+    let refused = world.set_element_thickness(points, 1, &[1.0]);
+    let refused = refused.expect_err("points have no edges").to_string();
+    assert_eq!(
+        refused,
+        "body 0: 1 thicknesses given, but there are 0 edges"
+    );
     world.set_filter(points, 2, 4)?;
     assert_eq!(world.body(points)?.filter().mask, 4);
     Ok(())

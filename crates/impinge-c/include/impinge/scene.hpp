@@ -271,6 +271,14 @@ public:
   query &exclude_rings(std::uint32_t n) { return leave_out(IMPINGE_EXCLUDE_RINGS, 0, 0, n); }
   /// Leaves out pairs of elements of two groups of vertices: see `scene::set_groups`.
   query &exclude_groups(std::uint32_t g, std::uint32_t h) { return leave_out(IMPINGE_EXCLUDE_GROUPS, g, h, 0); }
+  /// Leaves out pairs of an element of `a` and one of `b` of which some vertices are listed together: the list of vertex v of `a` is
+  /// vertices[offsets[v]] to vertices[offsets[v + 1] - 1], vertices of `b`. The arrays must live as long as the query is used.
+  template <class O, class V> query &exclude_vertices(body a, body b, const O &offsets, const V &vertices) {
+    leave_out(IMPINGE_EXCLUDE_VERTICES, a, b, 0);
+    exclusions_.back().offsets = detail::rows_of(offsets, 1);
+    exclusions_.back().vertices = detail::rows_of(vertices, 1);
+    return *this;
+  }
   /// Leaves out the pairs of an answer of `detector::near`, such as those that are near at rest. It must live as long as the query is asked.
   template <class Near> query &exclude(const Near &rest_pairs) {
     rest_pairs_.push_back(rest_pairs.raw());
@@ -414,6 +422,10 @@ public:
   /// Which vertices never move: 1 or 0 for each, as bytes or integers.
   template <class G> result<void> set_pinned(body of, const G &pinned) { return detail::give(impinge_scene_set_pinned(raw(), of, detail::rows_of(pinned, 1))); }
   result<void> set_thickness(body of, double thickness) { return detail::give(impinge_scene_set_thickness(raw(), of, thickness)); }
+  /// One thickness per vertex, edge or face; other elements are as thick as the thickest of these that they have or are part of.
+  template <class T> result<void> set_vertex_thickness(body of, const T &thickness) { return element_thickness(of, IMPINGE_POINTS, thickness); }
+  template <class T> result<void> set_edge_thickness(body of, const T &thickness) { return element_thickness(of, IMPINGE_EDGES, thickness); }
+  template <class T> result<void> set_face_thickness(body of, const T &thickness) { return element_thickness(of, IMPINGE_TRIANGLES, thickness); }
 
   std::size_t n_bodies() const noexcept { return impinge_scene_n_bodies(raw()); }
   /// Views, which live until the scene is changed.
@@ -433,6 +445,9 @@ private:
     const auto status = call(raw(), of, at, [](void *user) { delete static_cast<std::shared_ptr<P> *>(user); }, kept.get());
     if (status == IMPINGE_OK) kept.release();
     return detail::give(status);
+  }
+  template <class T> result<void> element_thickness(body of, std::uint32_t kind, const T &thickness) {
+    return detail::give(impinge_scene_set_element_thickness(raw(), of, kind, detail::rows_of(thickness, 1)));
   }
   template <class Look> result<array> look(Look call, body of) const {
     array view{};

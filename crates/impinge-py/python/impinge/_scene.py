@@ -407,22 +407,70 @@ class Scene(SceneBase):
         """
         return _rest_pairs(Detector("cpu").near(self, distance)._inner)
 
-    def set_thickness(self, body: _Body, thickness: SupportsFloat) -> None:
-        """Sets how thick a body is: what its elements add to the distance of `Detector.near`, of two elements of one body
-        twice. The sum is not rounded. A new body is not thick.
+    def vertex_pairs(self, body: _Body, offsets: _Array, vertices: _Array, other: _Body | None = None) -> Exclusion:
+        """Pairs of vertices, to be left out of questions with ``exclude=``: what is left out are the pairs of an element of one body and
+        one of another, or of two elements of one body, of which some vertices are listed together. For what only the caller knows:
+        vertices that are sewn together, or that a solver handles in another way.
 
         Parameters
         ----------
         body : Body or int
-        thickness : float
-            In the unit of the scene, 0 or more.
+            Whose vertices have lists.
+        offsets : array_like of int, shape (v + 1,)
+            The list of vertex ``i`` is ``vertices[offsets[i]:offsets[i + 1]]``.
+        vertices : array_like of int, shape (n,)
+            Vertices of `other`, in any order.
+        other : Body or int, optional
+            By default `body`: pairs of that body, in either order.
+
+        Returns
+        -------
+        Exclusion
+            Whether it fits both bodies is checked when something is asked.
+
+        Examples
+        --------
+        >>> import impinge
+        >>> scene = impinge.Scene()
+        >>> points = scene.add_points([[0, 0, 0], [1, 0, 0], [2, 0, 0]])
+        >>> detector = impinge.Detector("cpu")
+        >>> detector.near(scene, 1.0, exclude=scene.vertex_pairs(points, [0, 1, 1, 1], [1])).rows
+        array([[0, 1, 0, 2]], dtype=uint32)
+        """
+        return self._vertex_pairs(body, offsets, vertices, other)
+
+    def set_thickness(
+        self, body: _Body, thickness: SupportsFloat | _Array, part: Literal["vertices", "edges", "faces"] | None = None
+    ) -> None:
+        """Sets how thick a body is: what its elements add to the distance of `Detector.near` and `Detector.neighbours`, and what is
+        taken from that of `Detector.safe_distances`. Of two elements, each adds its own, and the sum is not rounded. A new body is not
+        thick.
+
+        Parameters
+        ----------
+        body : Body or int
+        thickness : float, or array_like of float, shape (n,)
+            In the unit of the scene, 0 or more: one number for all elements, which `remesh` keeps; or one per vertex, edge or face,
+            which it forgets.
+        part : {"vertices", "edges", "faces"}, optional
+            Of which elements an array is; of vertices by default. An edge or a face is then as thick as the thickest of its vertices.
+            If it is of edges or of faces, other elements are as thick as the thickest one of these that they have or are part of.
 
         Raises
         ------
         ValueError, TypeError
-            A thickness that is negative or not finite.
+            A thickness that is negative or not finite; more or fewer than the body has vertices, edges or faces.
+
+        Examples
+        --------
+        >>> import impinge
+        >>> scene = impinge.Scene()
+        >>> points = scene.add_points([[0, 0, 0], [1, 0, 0], [2, 0, 0]])
+        >>> scene.set_thickness(points, [0.75, 0.25, 0.5])
+        >>> impinge.Detector("cpu").near(scene, 0.0).rows
+        array([[0, 0, 0, 1]], dtype=uint32)
         """
-        self._set_thickness(body, thickness)
+        self._set_thickness(body, thickness, part)
 
     def positions(self, body: _Body) -> _Positions:
         """The current positions of a body.
