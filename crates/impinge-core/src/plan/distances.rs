@@ -98,11 +98,9 @@ impl Plan {
         for part in &mut self.parts {
             part.thickness = scene.body_in(part.id.slot()).thickness();
         }
-        let each: Vec<_> = (self.part_ixs())
-            .map(|part| self.body(scene, part).thickness_of_each().cloned())
-            .collect();
-        if each.iter().any(Option::is_some) {
-            self.thickness = each;
+        let each = |part| self.body(scene, part).thickness_of_each();
+        if self.part_ixs().any(|part| each(part).is_some()) {
+            self.thickness = self.part_ixs().map(|part| each(part).cloned()).collect();
         }
     }
 
