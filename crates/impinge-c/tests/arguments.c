@@ -208,9 +208,9 @@ int main(void) {
   query.n_exclusions = 1;
   REFUSED(impinge_detect(detector, scene, &query, &pairs), "exclusions: NULL");
   memset(&exclusion, 0, sizeof exclusion);
-  exclusion.kind = IMPINGE_EXCLUDE_VERTICES;
+  exclusion.kind = 4;
   query.exclusions = &exclusion;
-  REFUSED(impinge_detect(detector, scene, &query, &pairs), "exclusions[0].kind: 3");
+  REFUSED(impinge_detect(detector, scene, &query, &pairs), "exclusions[0].kind: 4");
   exclusion.kind = IMPINGE_EXCLUDE_RINGS;
   exclusion.n = 17;
   REFUSED(impinge_detect(detector, scene, &query, &pairs), "rings: 17");
