@@ -111,7 +111,7 @@ def test_thickness_of_each_element(detector):
         for same in (scene, pickle.loads(pickle.dumps(scene))):
             assert detector.near(same, 0.0).rows.tolist() == [[0, 0, 0, 1]]
     near = detector.neighbours(scene, 0.25)
-    assert near.of("vv").distances.tolist() == [0.0, 0.0, 0.25, 0.25]
+    assert near.of("vv").distances.tolist() == pytest.approx([0.0, 0.0, 0.25, 0.25])
     scene.set_thickness(points, 0)
     assert len(detector.near(scene, 0.5)) == 0
     cloth = scene.add([[0, 0, 3], [1, 0, 3], [0, 1, 3], [1, 1, 3]], [[0, 1, 2], [1, 3, 2]])
