@@ -392,6 +392,7 @@ export interface NearPairs extends Answer, NearList {}
 /** The nearest elements of two bodies. */
 export interface Nearest {
   /** A length, 0 if and only if they share a point. */
+  /** A length, rounded down: never above the true one, and 0 if and only if they touch. */
   distance: number;
   bodyA: Body;
   elementA: number;

@@ -414,7 +414,7 @@ typedef struct impinge_impact {
   uint32_t kind, body_a, element_a, body_b, element_b, at_start;
 } impinge_impact;
 
-/* The nearest two elements of two bodies. `distance` is 0 if and only if they touch. `points`: one of each element, rounded to nearest. */
+/* The nearest two elements of two bodies. `distance` is rounded down, and 0 if and only if they touch. `points`: one of each element, rounded to nearest. */
 typedef struct impinge_nearest {
   double distance, points[2][3];
   uint32_t body_a, element_a, body_b, element_b;

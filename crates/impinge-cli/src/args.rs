@@ -206,7 +206,7 @@ Examples:
   impinge distance a.obj b.ply
   impinge distance a.obj b.ply --json
 
-The distance is 0 if and only if the meshes touch, which is decided exactly; otherwise it is rounded. Meshes
+The distance is 0 if and only if the meshes touch, which is decided exactly; it is rounded down. Meshes
 of triangles are surfaces: a mesh that lies completely inside another one has a distance from it.";
 
 const SELF_EXAMPLES: &str = "\

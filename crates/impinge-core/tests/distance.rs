@@ -1,7 +1,7 @@
 //! Distances of bodies: compared with every pair of primitives, and their properties.
 
 use impinge_core::proximity::Nearest;
-use impinge_core::{Backend, BodyId, Detector, Query, Scene, Settings};
+use impinge_core::{Backend, BodyId, Detector, PairKind, Query, Scene, Settings};
 use impinge_scenes::{Model, adversarial, solids, soup, surfaces};
 
 fn scene(a: &Model, b: &Model) -> (Scene, [BodyId; 2]) {
@@ -78,6 +78,92 @@ fn the_search_loses_nothing() {
     }
 }
 
+/// Two sheets of triangles over a square, one over the other, turned about an axis that is no
+/// coordinate axis and stored in `f64`: hundreds of pairs whose distances differ by rounding alone.
+fn turned_sheets(n: u32, turned: bool) -> (Scene, [BodyId; 2]) {
+    let faces: Vec<[u32; 3]> = (0..n * n)
+        .flat_map(|cell| {
+            let at = cell / n * (n + 1) + cell % n;
+            [[at, at + 1, at + n + 1], [at + 1, at + n + 2, at + n + 1]]
+        })
+        .collect();
+    let (sin, cos) = if turned {
+        0.7_f64.sin_cos()
+    } else {
+        (0.0, 1.0)
+    };
+    let mut scene = Scene::new();
+    let ids = [0.0, 0.3].map(|height| {
+        let points: Vec<[f64; 3]> = (0..(n + 1) * (n + 1))
+            .map(|ix| {
+                let [x, y] = [ix % (n + 1), ix / (n + 1)].map(|k| f64::from(k) * 0.1);
+                let (x, z) = (cos * x - sin * height, sin * x + cos * height);
+                [x, cos * y - sin * z, sin * y + cos * z]
+            })
+            .collect();
+        scene.add_triangles(&faces, &points).unwrap()
+    });
+    (scene, ids)
+}
+
+/// The distance is the least of those that `near` gives to pairs of faces, to the last bit, and
+/// the pair is the lowest that has it. Those of `near` are the largest floats that are not above
+/// the true distances: `impinge-exact` tests that against fractions.
+#[test]
+fn distances_are_those_of_near() {
+    let needles = |seed| {
+        let mut model = soup::triangles(30, 0.3, seed);
+        for corners in model.positions.chunks_exact_mut(3) {
+            corners[2] = std::array::from_fn(|k| 0.999 * corners[0][k] + 0.001 * corners[1][k]);
+        }
+        model
+    };
+    let models = |a: Model, b: Model| scene(&a, &b);
+    let aside = [1.5, 0.2, 0.1];
+    let mut n_tied = 0;
+    for (scene, [a, b]) in [
+        turned_sheets(9, true),
+        turned_sheets(9, false),
+        models(needles(3), needles(4).translated(aside)),
+        models(
+            soup::triangles(40, 0.3, 1),
+            soup::triangles(40, 0.3, 2).translated(aside),
+        ),
+        models(
+            soup::lattice_triangles(30, 2, 1),
+            soup::lattice_triangles(30, 2, 2).translated([4.0, 1.0, 0.0]),
+        ),
+        models(
+            surfaces::bumpy_ball(800, 0.2),
+            surfaces::ball(600).translated([-1.7, 1.8, 0.9]),
+        ),
+    ] {
+        for threads in [1, 2] {
+            let settings = Settings::new().backend(Backend::Cpu).threads(threads);
+            let mut detector = Detector::new(settings).unwrap();
+            let nearest = detector.distance(&scene, a, b).unwrap().unwrap();
+            assert!(nearest.distance > 0.0);
+            let query = Query::between(a, b).kinds([PairKind::FaceFace]).distances();
+            let most = nearest.distance * (1.0 + 1e-9);
+            let near = detector.near(&scene, most, &query).unwrap();
+            let mut least = (f64::INFINITY, [0, 0]);
+            for pair in &near {
+                let distance = pair.distance.unwrap();
+                n_tied += usize::from(distance == nearest.distance);
+                let found = (distance, [pair.a.element, pair.b.element]);
+                if found.0 < least.0 || (found.0 == least.0 && found.1 < least.1) {
+                    least = found;
+                }
+            }
+            assert_eq!((nearest.distance, elements_of(&nearest)), least);
+            // Of many bodies the same.
+            let of_many = detector.nearest(&scene, &Query::between_all()).unwrap();
+            assert_eq!(of_many, Some(nearest));
+        }
+    }
+    assert!(n_tied > 100, "{n_tied}");
+}
+
 /// Bodies of any size: the distance scales with them, and is never 0 between bodies that do not
 /// meet.
 #[test]
@@ -103,7 +189,11 @@ fn distances_of_numbers_of_any_size() {
         for exponent in [-1074, -600, -130, 120, 500, 1000] {
             let scaled = of(&a, &b, [exponent; 3]);
             assert_eq!(elements_of(&scaled), elements_of(&plain), "{exponent}");
-            let expected = times_power(plain.distance, exponent);
+            let expected = match exponent {
+                // A multiple of the smallest number, rounded down.
+                -1074 => f64::from_bits(plain.distance as u64),
+                _ => times_power(plain.distance, exponent),
+            };
             assert_eq!(scaled.distance, expected, "{exponent}");
         }
         // Along x, everything is as good as at one place.

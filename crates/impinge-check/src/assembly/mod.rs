@@ -327,11 +327,10 @@ impl Asker {
             return Ok(said(relation, nearest.distance, point));
         }
         let most = clearance.unwrap_or(0.0);
-        // A distance is rounded; that elements are within one is not.
-        let is_near = nearest.distance <= most * (1.0 + 1e-12) && {
-            let certain = nearest.distance < most * (1.0 - 1e-12);
+        // A distance is rounded down: one that is less is less, and one that is equal may be more.
+        let is_near = nearest.distance < most || {
             let query = Query::between(a, b);
-            certain || !self.detector.near(&self.scene, most, &query)?.is_empty()
+            nearest.distance == most && !self.detector.near(&self.scene, most, &query)?.is_empty()
         };
         Ok(said(Relation::Near, nearest.distance, point).filter(|_| is_near))
     }

@@ -48,7 +48,7 @@ Columns of numbers alone are a plain array in .npy files, others a structured on
   by, bz. The kind names the elements: vf a vertex and a face, ee two edges, and so on. The type says which
   features are nearest, with ipc-toolkit's names: P_T, P_E0, EA_EB, ... A feature is v0, v1 or v2 (a vertex of
   the element), e0, e1 or e2 (edge k goes from vertex k to the next) or f. Points are point_a and point_b
-  in .jsonl and .npy files. Distance and points are rounded.
+  in .jsonl and .npy files. Points are rounded, the distance is rounded down.
 `probe`: point, element, feature, distance, x, y, z, with --signed then place: inside, on or outside, and the distance is
   negative outside. Distances are rounded down. The nearest point is one column, nearest, in .jsonl and .npy files. With
   --nearest K up to K rows per point, nearest first. --locate adds a last column: tetrahedron, -1 for none.

@@ -33,8 +33,7 @@ use crate::search::work::Work;
 use crate::simd::{Isa, LaneBounds, Lanes, Simd, up_to, with_isa};
 use impinge_exact::Point;
 use impinge_exact::internal::{
-    Reach, closest_of_elements, compare_point_distances, elements_are_within, point_distance_below,
-    point_distance_bounds,
+    Reach, closest_of_elements, compare_point_distances, elements_are_within, point_distance_bounds,
 };
 
 /// More than what rounding may do to squares of distances of boxes, which are of a few operations.
@@ -160,7 +159,7 @@ impl PointCandidate {
                 element: element.raw(),
             },
             feature: nearest.features[1],
-            distance: point_distance_below(point, corners, distance),
+            distance,
             point: points[1],
         })
     }

@@ -6,8 +6,10 @@
 //!
 //! A pair of nodes is skipped only if its boxes are farther apart than the best distance by more
 //! than the rounding error: those along the coordinate axes, or those along the best pair's
-//! shortest way and across it. So no pair of primitives is lost whose computed distance is as small
-//! or smaller, and the answer does not depend on the order of the search.
+//! shortest way and across it. Distances in `f64` lead the search. Pairs that bounds in `f64`
+//! cannot tell from the nearest are settled at the end by their exact distances, rounded down. So
+//! no pair of primitives is lost whose distance is as small or smaller, and the answer does not
+//! depend on the order of the search.
 
 use std::cmp::{Ordering, Reverse};
 use std::collections::BinaryHeap;
@@ -16,7 +18,7 @@ use super::axes::{Axes, TurnedBoxes};
 use super::features::{Gap, gap};
 use super::nearest::Nearest;
 use super::scale::Scale;
-use super::shared::shared_point;
+use super::shared::{exact_distance, shared_point};
 use super::tree::{Node, Tree, box_along, corners};
 use crate::boxes::Extent;
 use crate::bvh::bounds::round_up;
@@ -30,9 +32,10 @@ use crate::search::narrow::intersect;
 use impinge_exact::Point;
 use impinge_exact::internal::filter::Directions64;
 use impinge_exact::internal::filter::number::Portable32;
+use impinge_exact::internal::two_sum;
 
-/// The square of the smallest distance, and who has it; `None` if nothing is as near as was asked
-/// for.
+/// The square of the smallest distance as computed in `f64`, and who has it, with the exact one
+/// rounded down; `None` if nothing is as near as was asked for.
 pub(super) type FoundNearest = Option<(f64, Nearest)>;
 
 /// From this many pairs of triangles of two clusters on, their normals are tested first.
@@ -90,6 +93,17 @@ pub(super) struct DistanceSearch<'a> {
     pub scale: Scale,
 }
 
+/// From this many pairs on that may be nearest, they are settled before the search goes on.
+const MOST_CLOSE: usize = 4096;
+
+/// A pair that may be nearest.
+#[derive(Debug, Clone, Copy)]
+struct ClosePair {
+    primitives: [ElementIx; 2],
+    /// Its distance is certainly not below this; in the search's scale.
+    low: f64,
+}
+
 /// The best pair so far.
 struct Best {
     squared: f64,
@@ -100,6 +114,11 @@ struct Best {
 /// What a search has found, and its memory.
 struct FoundDistance {
     best: Best,
+    /// Pairs that may be as near as the best.
+    close: Vec<ClosePair>,
+    /// The smallest exact distance of those that are settled, rounded down, and the lowest pair
+    /// that has it.
+    nearest: Option<(f64, [ElementIx; 2])>,
     /// The bodies along the best pair's shortest way.
     view: Option<TurnedBoxes>,
     /// Whether the best pair is another one than that of the view.
@@ -117,6 +136,11 @@ impl FoundDistance {
         self.errors.map(|error| limit(self.best.squared, error))
     }
 
+    /// The best pair is certainly not farther apart than this.
+    fn high(&self) -> f64 {
+        self.best.squared.sqrt() + self.errors[0]
+    }
+
     fn take(&mut self, best: Best) {
         self.best = best;
         self.is_newer = true;
@@ -124,8 +148,8 @@ impl FoundDistance {
 }
 
 impl DistanceSearch<'_> {
-    /// The nearest pair and the square of its distance, if that is at most `most`; `likely` is one
-    /// to compare first. `None` if more pairs of clusters would have to be compared whose boxes
+    /// The nearest pair and the square of its distance, if that is at most `most`, or above it by no
+    /// more than rounding; `likely` is one to compare first. `None` if more pairs of clusters would have to be compared whose boxes
     /// overlap than `most_overlapping`.
     ///
     /// # Errors
@@ -147,6 +171,8 @@ impl DistanceSearch<'_> {
                 primitives: [NONE; 2],
                 points: None,
             },
+            close: Vec::new(),
+            nearest: None,
             view: None,
             is_newer: false,
             errors: [ROUNDING, ROUNDING_TURNED].map(|rounding| rounding * magnitude),
@@ -184,7 +210,7 @@ impl DistanceSearch<'_> {
             let [most, _] = found.limits();
             self.open(next.nodes, most, &mut waiting);
         }
-        Ok(Some(self.answer(&found.best)))
+        Ok(Some(self.answer(&mut found)))
     }
 
     /// Puts a node and the children of the other into the queue, if their boxes are near enough.
@@ -206,17 +232,49 @@ impl DistanceSearch<'_> {
         }
     }
 
-    fn answer(&self, best: &Best) -> FoundNearest {
-        if best.primitives == [NONE; 2] {
-            return None;
+    fn answer(&self, found: &mut FoundDistance) -> FoundNearest {
+        let touching = found.best.primitives;
+        if found.best.squared == 0.0 && touching != [NONE; 2] {
+            let points = [where_they_touch(self.bodies, touching); 2];
+            return Some((0.0, Nearest::new(0.0, self.ids, touching, points)));
         }
-        let distance = self.scale.length_back(best.squared.sqrt());
-        let points = match best.points {
-            Some(points) => points.map(|point| self.scale.point_back(point)),
-            None => [where_they_touch(self.bodies, best.primitives); 2],
-        };
-        let nearest = Nearest::new(distance, self.ids, best.primitives, points);
-        Some((best.squared, nearest))
+        self.settle(found);
+        let (distance, primitives) = found.nearest?;
+        let [a, b] = primitives;
+        let boxes = [0, 1].map(|side| self.box_of(side, primitives[side]));
+        let gap = self.gap(a, b, boxes[0].squared_distance(&boxes[1]));
+        let points = gap.points.map(|point| self.scale.point_back(point));
+        let nearest = Nearest::new(distance, self.ids, primitives, points);
+        Some((gap.squared, nearest))
+    }
+
+    /// Finds which of the pairs that may be nearest is. In ascending order: those after the first
+    /// of several at one distance need not be measured, but only be proven no nearer.
+    fn settle(&self, found: &mut FoundDistance) {
+        let high = found.high();
+        found.close.retain(|pair| pair.low <= high);
+        found.close.sort_unstable_by_key(|pair| pair.primitives);
+        found.close.dedup_by_key(|pair| pair.primitives);
+        let kinds = self.bodies.map(Body::kind);
+        for ClosePair { primitives, low } in found.close.drain(..) {
+            // Floats from here on are too far away.
+            let limit = match found.nearest {
+                None => f64::INFINITY,
+                Some((distance, best)) if best <= primitives => distance,
+                Some((distance, _)) => distance.next_up(),
+            };
+            if self.scale.is_one() && low >= limit {
+                continue;
+            }
+            let [a, b] = [0, 1].map(|side| corners(self.bodies[side], primitives[side]));
+            let [n_a, n_b] = kinds.map(BodyKind::n_corners);
+            if apart_along_axes(&a[..n_a], &b[..n_b]) >= limit {
+                continue;
+            }
+            if let Some(distance) = exact_distance(kinds, [&a, &b], limit) {
+                found.nearest = Some((distance, primitives));
+            }
+        }
     }
 
     /// The box of a node of the first or the second body.
@@ -387,7 +445,7 @@ impl DistanceSearch<'_> {
         self.improve(found, pair, boxes);
     }
 
-    /// Takes a pair if it is nearer, or as near and lower.
+    /// Takes a pair if it is nearer, or as near and lower, and notes it if it may be.
     fn improve(&self, found: &mut FoundDistance, [a, b]: [ElementIx; 2], boxes: [Extent; 2]) {
         let best = &found.best;
         let gap = self.gap(a, b, boxes[0].squared_distance(&boxes[1]));
@@ -399,6 +457,15 @@ impl DistanceSearch<'_> {
                 primitives: [a, b],
                 points: (gap.squared > 0.0).then_some(gap.points),
             });
+        }
+        if gap.squared > 0.0 && gap.low <= found.high() {
+            found.close.push(ClosePair {
+                primitives: [a, b],
+                low: gap.low,
+            });
+            if found.close.len() >= MOST_CLOSE {
+                self.settle(found);
+            }
         }
     }
 
@@ -412,17 +479,33 @@ impl DistanceSearch<'_> {
             return Gap {
                 squared: 0.0,
                 points: [a[0], b[0]],
+                low: 0.0,
             };
         }
         let [a, b] = [a, b].map(|corners| corners.map(|point| self.scale.point(point)));
         // Points and edges are triangles that repeat their last corner.
         let [n_a, n_b] = [body_a, body_b].map(|body| body.kind().n_corners().max(3));
-        let found = gap(&a[..n_a], &b[..n_b]);
+        let (a, b) = (&a[..n_a], &b[..n_b]);
+        let found = gap(a, b);
         Gap {
             squared: found.squared.max(f64::MIN_POSITIVE),
+            low: found.at_least(a, b),
             ..found
         }
     }
+}
+
+/// The largest float that is at most the gap of two primitives along some coordinate axis.
+fn apart_along_axes(a: &[Point], b: &[Point]) -> f64 {
+    let [a, b] = [a, b].map(|corners| Extent::of(corners.iter().copied()));
+    let gap = |high: f64, low: f64| match two_sum(high, -low) {
+        [gap, rest] if rest < 0.0 => gap.next_down(),
+        [gap, _] => gap,
+    };
+    (0..3).fold(0.0, |most: f64, k| {
+        most.max(gap(b.min[k], a.max[k]))
+            .max(gap(a.min[k], b.max[k]))
+    })
 }
 
 /// A point that two elements share.

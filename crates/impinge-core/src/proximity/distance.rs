@@ -87,7 +87,7 @@ impl Distances {
     }
 
     /// The two nearest of the bodies of a frame that may meet, and their nearest elements. Of
-    /// several pairs at the same computed distance the lowest.
+    /// several pairs at the same distance, rounded down, the lowest.
     ///
     /// # Errors
     /// Cancellation; errors of `touching`, which is asked as in [`between`](Distances::between).
@@ -237,7 +237,7 @@ struct NearestTwo<'a> {
     scale: Scale,
     /// What rounding may do to distances of boxes.
     error: f64,
-    /// The square of the smallest distance, in the scale, and who has it.
+    /// The square of the smallest distance, as computed and in the scale, and who has it.
     best: FoundNearest,
     /// How many pairs of bodies were searched.
     n_asked: u64,
@@ -260,7 +260,15 @@ impl NearestTwo<'_> {
             return Ok(());
         }
         let ids = pair.map(|part| plan.part(part).id);
-        let most = self.best.map_or(f64::INFINITY, |(squared, _)| squared);
+        let most = match self.best {
+            None => f64::INFINITY,
+            Some((0.0, _)) => 0.0,
+            // Not by the distance that was computed: other bodies may have larger coordinates, and
+            // larger errors.
+            Some((_, best)) => {
+                scale.length(best.distance.next_up()).powi(2) * (1.0 + 4.0 * f64::EPSILON)
+            }
+        };
         // Nothing is nearer than 0, and no lower pair of bodies is asked later.
         if most == 0.0 && self.best.is_some_and(|(_, best)| best.bodies() <= ids) {
             return Ok(());
@@ -277,8 +285,9 @@ impl NearestTwo<'_> {
         }
         let found = of_two.search_or_ask(scene, ids, (scale, most), control, || touching(ids))?;
         if let Some(found) = found
-            && self.best.is_none_or(|(squared, best)| {
-                found.0 < squared || (found.0 == squared && ids < best.bodies())
+            && self.best.is_none_or(|(_, best)| {
+                let distances = (found.1.distance, best.distance);
+                distances.0 < distances.1 || (distances.0 == distances.1 && ids < best.bodies())
             })
         {
             self.best = Some(found);

@@ -20,6 +20,9 @@ fn along(p: Point, t: f64, d: Point) -> Point {
 pub(super) struct Gap {
     pub squared: f64,
     pub points: [Point; 2],
+    /// A number that is certainly not above the distance of the primitives; 0 until that is asked
+    /// for ([`Gap::at_least`]).
+    pub low: f64,
 }
 
 impl Gap {
@@ -28,6 +31,7 @@ impl Gap {
         Gap {
             squared: dot(d, d),
             points: [p, q],
+            low: 0.0,
         }
     }
 
@@ -39,6 +43,30 @@ impl Gap {
         }
     }
 
+    /// A number that is certainly not above the distance of two primitives: how far apart they are
+    /// along the way between these points, less what rounding may do (`docs/exactness.md`, "The
+    /// smallest distance of two bodies").
+    pub fn at_least(&self, a: &[Point], b: &[Point]) -> f64 {
+        let [from, to] = self.points;
+        let way = sub(to, from);
+        let length = dot(way, way);
+        if !(SMALLEST..=LARGEST).contains(&length) {
+            return 0.0;
+        }
+        let mut size = 0.0_f64;
+        let mut height = |corner: &Point| {
+            let d = sub(*corner, from);
+            size = size.max(d[0].abs() + d[1].abs() + d[2].abs());
+            dot(way, d)
+        };
+        let low = a.iter().map(&mut height).fold(f64::NEG_INFINITY, f64::max);
+        let high = b.iter().map(&mut height).fold(f64::INFINITY, f64::min);
+        let largest = way.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+        let error = 128.0 * f64::EPSILON * largest * size;
+        let apart = (high - low - error) / length.sqrt() * (1.0 - 8.0 * f64::EPSILON);
+        apart.max(0.0)
+    }
+
     /// The smaller of two; the first if they are equal.
     fn lesser(self, other: Self) -> Self {
         if other.squared < self.squared {
@@ -48,6 +76,11 @@ impl Gap {
         }
     }
 }
+
+/// Squares of lengths between which [`Gap::at_least`] says something: far from the ends of the
+/// floats.
+const SMALLEST: f64 = 1e-250;
+const LARGEST: f64 = 1e250;
 
 /// Clamped to 0 to 1; 0 for NaN.
 fn part(x: f64) -> f64 {
@@ -126,6 +159,7 @@ pub(super) fn gap(a: &[Point], b: &[Point]) -> Gap {
     let mut least = Gap {
         squared: f64::INFINITY,
         points: [a[0], b[0]],
+        low: 0.0,
     };
     for face in of_b.faces {
         let face = face.map(|k| b[k]);

@@ -10,15 +10,15 @@ use impinge_exact::Point;
 #[non_exhaustive]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Nearest {
-    /// Their distance in the unit of the scene. 0 if and only if they share a point, which is
-    /// decided exactly. Otherwise rounded: it is computed in `f64` from two points of the
-    /// primitives, with an error of a few units in the last place of the largest coordinate.
+    /// Their distance in the unit of the scene, rounded down: the largest `f64` that is not above the
+    /// true one. 0 if and only if they share a point, which is decided exactly, or are nearer than
+    /// the smallest `f64`.
     pub distance: f64,
     /// The element of the first body: of the first that was asked for, or of the lower of the
     /// nearest two of many.
     pub a: Element,
-    /// The element of the second body. Of several pairs at the same computed distance, the lowest
-    /// by `a` and then by `b`.
+    /// The element of the second body. Of several pairs at the same distance, rounded down, the
+    /// lowest by `a` and then by `b`.
     pub b: Element,
     /// The point of each element that is nearest to the other, rounded. Where they touch, a point
     /// that they share, twice: see [`contact`](crate::contact) for all of them.

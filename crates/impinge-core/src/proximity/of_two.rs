@@ -48,7 +48,7 @@ struct Known {
 
 #[derive(Clone, Copy)]
 enum KnownDistance {
-    /// The square of the distance, and who has it.
+    /// The square of the distance as computed, and who has it.
     Is(f64, Nearest),
     /// The square of the distance is above this.
     Above(f64),
@@ -102,7 +102,7 @@ impl OfTwo {
     }
 
     /// The nearest elements of two bodies that are known, and the square of their distance in a
-    /// scale, if that is at most `most`. `None` if more pairs of clusters would have to be compared
+    /// scale; nothing, or what is farther away, if that is not at most `most`. `None` if more pairs of clusters would have to be compared
     /// whose boxes overlap than `most_overlapping`.
     fn search(
         &mut self,
@@ -126,9 +126,7 @@ impl OfTwo {
             && known.stamps == search.bodies.map(Body::positions_stamp)
         {
             match known.answer {
-                KnownDistance::Is(squared, nearest) => {
-                    return Ok(Some((squared <= most).then_some((squared, nearest))));
-                }
+                KnownDistance::Is(squared, nearest) => return Ok(Some(Some((squared, nearest)))),
                 KnownDistance::Above(squared) if most <= squared => return Ok(Some(None)),
                 KnownDistance::Above(_) => {}
             }

@@ -49,14 +49,13 @@ impl Scale {
         }
     }
 
-    /// The length that a scaled length is; above 0 if that is.
+    pub fn length(self, length: f64) -> f64 {
+        length * self.0
+    }
+
+    /// The length that a scaled length is.
     pub fn length_back(self, length: f64) -> f64 {
-        let back = length * (1.0 / self.0);
-        if length > 0.0 {
-            back.max(f64::from_bits(1))
-        } else {
-            back
-        }
+        length * (1.0 / self.0)
     }
 
     /// The point that a scaled point is.

@@ -1,7 +1,7 @@
-//! Where two elements meet that share points.
+//! Two elements by their surfaces: where they meet, and how far apart they are.
 
 use impinge_exact::Point;
-use impinge_exact::internal::closest_of_elements;
+use impinge_exact::internal::{closest_of_elements, distance_under};
 
 use crate::scene::elements::BodyKind;
 use crate::search::narrow::intersect;
@@ -24,6 +24,24 @@ pub(super) fn shared_point(kinds: [BodyKind; 2], corners: [&[Point; 4]; 2]) -> P
         true => b[0],
         false => a[0],
     }
+}
+
+/// The distance of two elements that do not meet, rounded down to the largest `f64` that is not
+/// above it, if that is below a limit.
+pub(super) fn exact_distance(
+    kinds: [BodyKind; 2],
+    corners: [&[Point; 4]; 2],
+    limit: f64,
+) -> Option<f64> {
+    let [of_a, of_b] = [0, 1].map(|side| surface(kinds[side], corners[side]));
+    let mut least = None;
+    for (a, n_a) in &of_a {
+        for (b, n_b) in &of_b {
+            let limit = least.unwrap_or(limit);
+            least = distance_under(&a[..*n_a], &b[..*n_b], limit).or(least);
+        }
+    }
+    least
 }
 
 /// The faces of a tetrahedron; any other element itself. Each with how many corners it has.

@@ -19,9 +19,15 @@ use crate::Sign;
 
 /// An integer of some type.
 pub(crate) trait Whole: Clone {
-    fn one() -> Self;
+    /// A number below 2^63.
+    fn small(x: u64) -> Self;
+    fn one() -> Self {
+        Self::small(1)
+    }
     fn plus(&self, other: &Self) -> Self;
     fn minus(&self, other: &Self) -> Self;
+    /// `self * 2^by`, which must fit.
+    fn shifted(&self, by: u64) -> Self;
     fn sign(&self) -> Sign;
     /// `x * 2^exponent` with 1 <= |x| < 2, rounded towards zero to 53 bits; (0, 0) for zero.
     fn approximate(&self) -> (f64, i64);
@@ -71,8 +77,8 @@ pub(crate) type Four<T> = Two<Two<T>>;
 pub(crate) type Eight<T> = Two<Four<T>>;
 
 impl Whole for Integer {
-    fn one() -> Self {
-        Integer::from(1)
+    fn small(x: u64) -> Self {
+        Integer::from(x)
     }
 
     fn plus(&self, other: &Self) -> Self {
@@ -81,6 +87,10 @@ impl Whole for Integer {
 
     fn minus(&self, other: &Self) -> Self {
         self - other
+    }
+
+    fn shifted(&self, by: u64) -> Self {
+        self.shifted(by)
     }
 
     fn sign(&self) -> Sign {
@@ -113,9 +123,11 @@ impl From<u64> for Wide<4> {
 macro_rules! whole {
     ($type:ty) => {
         impl Whole for $type {
+            #[allow(clippy::cast_possible_wrap, reason = "below 2^63")]
+            #[allow(clippy::cast_lossless, reason = "not from u64 to i64")]
             #[inline]
-            fn one() -> Self {
-                1
+            fn small(x: u64) -> Self {
+                x as $type
             }
 
             #[inline]
@@ -126,6 +138,11 @@ macro_rules! whole {
             #[inline]
             fn minus(&self, other: &Self) -> Self {
                 self - other
+            }
+
+            #[inline]
+            fn shifted(&self, by: u64) -> Self {
+                self << by
             }
 
             #[inline]
@@ -219,9 +236,10 @@ impl<const N: usize> Wide<N> {
 }
 
 impl<const N: usize> Whole for Wide<N> {
-    fn one() -> Self {
+    #[inline]
+    fn small(x: u64) -> Self {
         let mut limbs = [0; N];
-        limbs[0] = 1;
+        limbs[0] = x;
         Self(limbs)
     }
 
@@ -249,6 +267,16 @@ impl<const N: usize> Whole for Wide<N> {
             borrow = first | second;
         }
         difference
+    }
+
+    #[inline]
+    fn shifted(&self, by: u64) -> Self {
+        let (n_limbs, n_bits) = ((by / 64) as usize, (by % 64) as u32);
+        Self(core::array::from_fn(|ix| {
+            let limb = |back: usize| ix.checked_sub(back).map_or(0, |ix| self.0[ix]);
+            let below = limb(n_limbs + 1).checked_shr(64 - n_bits).unwrap_or(0);
+            limb(n_limbs) << n_bits | below
+        }))
     }
 
     #[inline]

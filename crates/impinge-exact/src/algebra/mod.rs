@@ -21,7 +21,7 @@ mod unit;
 
 pub(super) use fixed::{Coordinate, Eight, Factor, Four, Two, Whole};
 pub use integer::Integer;
-pub(super) use integer::common_integers;
+pub(super) use integer::{common_integers, parts};
 pub(super) use polynomial::{Polynomial, PolynomialVector, cross, difference, dot, square_of_sum};
 pub use quotient::unit_of;
 pub(super) use roots::{Root, Roots, Time, floor_between, floor_of_share};

@@ -10,12 +10,12 @@ use core::cmp::Ordering;
 use super::features::PolygonPart;
 use super::nearest::ExactPolygon;
 use super::reach::Reach;
-use super::rounded::{self, NearestPoints, between, quotient};
+use super::rounded::{self, between, quotient};
 use super::{Feature, NearestFeatures, filter, nearest};
 use crate::algebra::Integer;
 use crate::element_pair::ElementPair;
 use crate::triangle::{passes_inside, segment_meets_triangle};
-use crate::{Point, Sign, triangles_intersect};
+use crate::{Point, triangles_intersect};
 
 /// 2^-20
 const POWER_20: f64 = 1.0 / (1 << 20) as f64;
@@ -167,7 +167,7 @@ fn edge_passes_inside(a: &[Point], b: &[Point]) -> bool {
     }
 }
 
-/// Nearest points of two elements of one to three corners, and their distance: rounded as in
+/// Nearest points of two elements of one to three corners, and their distance, rounded down: as in
 /// [`closest_points`](super::closest_points).
 pub fn closest_of_elements(a: &[Point], b: &[Point]) -> (NearestOfElements, f64, [Point; 2]) {
     if let Some(simple) = Simple::new(a, b) {
@@ -194,8 +194,8 @@ pub fn closest_of_elements(a: &[Point], b: &[Point]) -> (NearestOfElements, f64,
 /// at most 2^-20 of it, or by a few times the smallest `f64`; 0 if and only if they touch or are as
 /// near as that.
 ///
-/// A bound in `f64` does for most pairs, and the exact distance, rounded down, for the others: the
-/// same bits on every machine.
+/// A bound in `f64` does for most pairs, and the largest `f64` that is not above the distance for
+/// the others: the same bits on every machine.
 pub fn distance_below(a: &[Point], b: &[Point]) -> f64 {
     match Simple::new(a, b) {
         Some(simple) => simple.distance_below(),
@@ -204,6 +204,20 @@ pub fn distance_below(a: &[Point], b: &[Point]) -> f64 {
             .map(|part| part.simple.distance_below())
             .fold(f64::INFINITY, f64::min),
     }
+}
+
+/// The distance of two elements of one to three corners that share no point, rounded down as in
+/// [`closest_points`](super::closest_points), if that is below a limit.
+pub fn distance_under(a: &[Point], b: &[Point], limit: f64) -> Option<f64> {
+    if let Some(simple) = Simple::new(a, b) {
+        return simple.distance_under(limit);
+    }
+    let mut least = None;
+    for part in parts(a, b) {
+        let limit = least.unwrap_or(limit);
+        least = part.simple.distance_under(limit).or(least);
+    }
+    least
 }
 
 /// [`distance_below`] by bounds of the distance in `f64`
@@ -247,20 +261,17 @@ impl Simple {
 
     fn distance_below(&self) -> f64 {
         let bounds = filter::bounds(self.pair, &self.points);
-        bounds.and_then(below_by_bounds).unwrap_or_else(|| {
-            let NearestPoints { distance, .. } = super::closest_points(self.pair, &self.points);
-            // Wrong by a few units in the last place, which this makes up for many times.
-            let mut below = distance * (1.0 - 0.5 * POWER_20);
-            // But for the smallest numbers, which have few bits.
-            while below > 0.0 && below < f64::MIN_POSITIVE && self.is_nearer_than(below) {
-                below = below.next_down();
-            }
-            below
-        })
+        bounds
+            .and_then(below_by_bounds)
+            .unwrap_or_else(|| rounded::distance(self.pair, &self.points))
     }
 
-    fn is_nearer_than(&self, distance: f64) -> bool {
-        nearest::compare(self.pair, &self.points, &Reach::from(distance)) == Sign::Negative
+    fn distance_under(&self, limit: f64) -> Option<f64> {
+        let bounds = filter::bounds(self.pair, &self.points);
+        if bounds.is_some_and(|[low, _]| low >= limit) {
+            return None;
+        }
+        Some(rounded::distance(self.pair, &self.points)).filter(|&distance| distance < limit)
     }
 
     fn in_order<T>(&self, [first, second]: [T; 2]) -> [T; 2] {

@@ -11,9 +11,9 @@
 //! convex polygon is inside, on an edge or at a corner. Then one comparison of degree six decides.
 //! Most pairs are settled before that by a nearest point in `f64` and the plane through it.
 //!
-//! In: positions and d. Out: booleans, [`NearestFeatures`], [`Contact`](super::Contact). Distances
-//! and points as `f64` are rounded, but computed in one fixed order of operations, so they are the
-//! same everywhere.
+//! In: positions and d. Out: booleans, [`NearestFeatures`], [`Contact`](super::Contact). A distance
+//! as `f64` is the largest that is not above the true one. Points are rounded, but computed in one
+//! fixed order of operations, so they are the same everywhere.
 //!
 //! `docs/exactness.md`, "Distances", has the proofs.
 
@@ -36,15 +36,15 @@ use super::element_pair::ElementPair;
 pub use apart::shares_apart;
 pub use elements::{NearestOfElements, are_within_certainly, elements_are_within};
 pub use elements::{
-    below_by_bounds, closest_of_elements, distance_below, elements_meet, nearest_of_elements,
-    unsure_are_within,
+    below_by_bounds, closest_of_elements, distance_below, distance_under, elements_meet,
+    nearest_of_elements, unsure_are_within,
 };
 pub use features::{Feature, NearestFeatures};
 pub use filter::{Approach, approach};
 pub use keep::Keep;
 pub use moving::first_within;
 pub use nearest::nearest_features;
-pub use point::{compare_point_distances, point_distance_below, point_distance_bounds};
+pub use point::{compare_point_distances, point_distance_bounds};
 pub use reach::Reach;
 pub use rounded::{NearestPoints, closest_points};
 

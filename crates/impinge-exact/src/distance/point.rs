@@ -7,10 +7,10 @@ use core::cmp::Ordering;
 
 use super::features::PolygonPart;
 use super::filter;
-use super::nearest::{self, ExactPolygon};
+use super::nearest::ExactPolygon;
 use super::reach::Reach;
+use crate::Point;
 use crate::element_pair::ElementPair;
-use crate::{Point, Sign};
 
 /// A point and an element of one to three corners as a pair of elements. A longer list counts as
 /// its first three corners.
@@ -33,32 +33,6 @@ fn paired(point: &Point, corners: &[Point]) -> (ElementPair, [Point; 4]) {
 pub fn point_distance_bounds(point: &Point, corners: &[Point]) -> ([f64; 2], Point) {
     let (pair, points) = paired(point, corners);
     filter::bounds_and_way(pair, &points).unwrap_or(([0.0, f64::INFINITY], [0.0; 3]))
-}
-
-/// The largest float that is at most the distance of a point from an element of one to three
-/// corners, given that distance rounded in any way: an estimate that is far off takes long. The
-/// largest finite float if the distance is larger.
-///
-/// 0 where they touch, and for distances below the smallest float.
-pub fn point_distance_below(point: &Point, corners: &[Point], rounded: f64) -> f64 {
-    let (pair, points) = paired(point, corners);
-    let is_below =
-        |distance: f64| nearest::compare(pair, &points, &Reach::from(distance)) != Sign::Negative;
-    let mut distance = rounded.clamp(0.0, f64::MAX);
-    if is_below(distance) {
-        let mut next = distance.next_up();
-        while next < f64::INFINITY && is_below(next) {
-            (distance, next) = (next, next.next_up());
-        }
-        return distance;
-    }
-    while distance > 0.0 {
-        distance = distance.next_down();
-        if is_below(distance) {
-            break;
-        }
-    }
-    distance
 }
 
 /// Which of two elements of one to three corners is nearer to a point: exact.

@@ -1,21 +1,23 @@
-//! Distances and nearest points as `f64`: quotients of exact integers, rounded.
+//! Distances and nearest points as `f64`: roots and quotients of exact integers. Distances are
+//! rounded down, to the largest float that is not above them.
 
 use super::features::PolygonPart;
 use super::nearest::ExactPolygon;
 use super::reach::Reach;
-use super::{NearestFeatures, WholeVector, cross, difference, dot};
-use crate::Point;
-use crate::algebra::{Coordinate, Integer, Whole, common_integers};
+use super::{NearestFeatures, WholeVector, cross, difference, dot, filter};
+use crate::algebra::{Coordinate, Eight, Factor, Four, Integer, Whole, common_integers, parts};
 use crate::element_pair::ElementPair;
 use crate::rounding::{power_of_two, root};
+use crate::{Point, Sign};
 
 /// Nearest points of two elements.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NearestPoints {
     /// The features that contain them; exact.
     pub nearest: NearestFeatures,
-    /// Their distance, wrong by a few units in the last place at most. For decisions use
-    /// [`are_within`](super::are_within).
+    /// Their distance, rounded down: the largest `f64` that is not above it. 0 if and only if the
+    /// elements touch, or are nearer than the smallest `f64`. To compare a distance with a number
+    /// exactly, use [`are_within`](super::are_within).
     pub distance: f64,
     /// The points of the first and of the second element. Their places on the elements are wrong by
     /// a few parts in 2^52, also where edges are nearly parallel; their coordinates are rounded.
@@ -24,9 +26,9 @@ pub struct NearestPoints {
 
 /// Nearest points of two elements and their distance.
 ///
-/// The features are exact. Distance and points are computed in `f64` from exact quotients, in one
-/// order of operations: the same on every machine, but rounded. The points and their order are
-/// those of the [`ElementPair`].
+/// The features are exact, and the distance is the largest `f64` that is not above the true one.
+/// The points are computed in `f64` from exact quotients, in one order of operations: the same on
+/// every machine, but rounded. The points and their order are those of the [`ElementPair`].
 ///
 /// ```
 /// use impinge_exact::{ElementPair, closest_points};
@@ -37,22 +39,38 @@ pub struct NearestPoints {
 #[must_use]
 pub fn closest_points(pair: ElementPair, points: &[Point; 4]) -> NearestPoints {
     let reach = Reach::from(0.0);
-    match ExactPolygon::short(pair, points, &reach) {
-        Some(polygon) => closest_of(&polygon, pair, points),
-        None => closest_of(
-            &ExactPolygon::of_any_size(pair, points, &reach),
-            pair,
-            points,
-        ),
+    if let Some(polygon) = ExactPolygon::short(pair, points, &reach) {
+        return closest_of(&polygon, polygon.nearest(), pair, points);
     }
+    let polygon = ExactPolygon::of_any_size(pair, points, &reach);
+    let part = filter::nearest_part(pair, points).unwrap_or_else(|| polygon.nearest());
+    closest_of(&polygon, part, pair, points)
 }
 
+/// The distance of [`closest_points`] alone.
+pub(super) fn distance(pair: ElementPair, points: &[Point; 4]) -> f64 {
+    let reach = Reach::from(0.0);
+    if let Some(polygon) = ExactPolygon::short(pair, points, &reach) {
+        return distance_of(&polygon, polygon.nearest());
+    }
+    let polygon = ExactPolygon::of_any_size(pair, points, &reach);
+    let part = filter::nearest_part(pair, points).unwrap_or_else(|| polygon.nearest());
+    distance_of(&polygon, part)
+}
+
+/// By the nearest part of the polygon.
+fn distance_of<T: Coordinate>(polygon: &ExactPolygon<T>, part: PolygonPart) -> f64 {
+    let (over, under) = polygon.square_of_distance(part);
+    root_below::<T>(&over, &under, polygon.exponent)
+}
+
+/// By the nearest part of the polygon.
 pub(super) fn closest_of<T: Coordinate>(
     polygon: &ExactPolygon<T>,
+    part: PolygonPart,
     pair: ElementPair,
     points: &[Point; 4],
 ) -> NearestPoints {
-    let part = polygon.nearest();
     let [p, q, r, s] = points;
     let points = match (pair, part) {
         (ElementPair::EdgeEdge, PolygonPart::Face) => {
@@ -91,10 +109,9 @@ pub(super) fn closest_of<T: Coordinate>(
         }
         (_, PolygonPart::Corner(ix)) => [*p, points[1 + ix]],
     };
-    let (over, under) = polygon.square_of_distance(part);
     NearestPoints {
         nearest: part.named(pair, polygon.is_flat()),
-        distance: root_of_quotient(&over, &under, polygon.exponent),
+        distance: distance_of(polygon, part),
         points,
     }
 }
@@ -124,12 +141,62 @@ pub(super) fn quotient<T: Whole>(over: &T, under: &T) -> f64 {
     times_power(x / y, i - j)
 }
 
-/// The square root of a quotient, times a power of two.
-fn root_of_quotient(over: &impl Whole, under: &impl Whole, exponent: i64) -> f64 {
+/// The largest float that is at most the square root of a quotient times 2^`exponent`; the largest
+/// finite one if that is larger.
+fn root_below<T: Coordinate>(over: &Eight<T>, under: &Four<T>, exponent: i64) -> f64 {
+    if over.sign().is_zero() {
+        return 0.0;
+    }
+    // over 4^exponent - x^2 under, as a multiple of 4 to the exponent that comes with it. For an x
+    // near the root both terms are about as long as the longer of `over` and 106 bits more than
+    // `under`, which fits the type of `over`.
+    let rest = |x: f64| {
+        let (mantissa, unit) = parts(x);
+        let mantissa = T::small(mantissa);
+        let square = mantissa.product(&mantissa).widened().product(under);
+        let shift = 2 * (unit - exponent);
+        if shift > 0 {
+            let square = square.shifted(shift.unsigned_abs());
+            (over.minus(&square), exponent)
+        } else {
+            (over.shifted(shift.unsigned_abs()).minus(&square), unit)
+        }
+    };
     let ((x, i), (y, j)) = (over.approximate(), under.approximate());
     let is_odd = (i - j).rem_euclid(2);
     let half = (i - j - is_odd) / 2;
-    times_power(root(times_power(x / y, is_odd)), half + exponent)
+    let estimate = times_power(root(times_power(x / y, is_odd)), half + exponent);
+    // Wrong by two units in the last place at most.
+    let mut found = estimate.min(f64::MAX);
+    let (left, unit) = rest(found);
+    if left.sign().is_zero() {
+        return found;
+    }
+    // The root is at found + left / (2 found under), wrong by far less than a unit in the last
+    // place: this says nearly always which floats it is between.
+    let (z, k) = left.approximate();
+    let gap = found.next_up() - found;
+    let units = times_power(z / (2.0 * y), k + 2 * unit - j) / found / gap;
+    if (1e-250..1e250).contains(&found) && units.abs() < 8.0 {
+        #[allow(clippy::cast_possible_truncation, reason = "a floor below 16")]
+        let n_units = f64::from((units + 8.0) as i32 - 8);
+        let next = found + n_units * gap;
+        if next.next_up() - next == gap && (1e-3..1.0 - 1e-3).contains(&(units - n_units)) {
+            return next;
+        }
+    }
+    let is_below = |x: f64| rest(x).0.sign() != Sign::Negative;
+    if left.sign() == Sign::Positive {
+        let mut next = found.next_up();
+        while next < f64::INFINITY && is_below(next) {
+            (found, next) = (next, next.next_up());
+        }
+        return found;
+    }
+    while !is_below(found) {
+        found = found.next_down();
+    }
+    found
 }
 
 fn times_power(x: f64, exponent: i64) -> f64 {

@@ -329,8 +329,8 @@ fn integers_of_fixed_width_answer_as_those_of_any_size() {
         assert_eq!(short.is_flat(), long.is_flat(), "{}", case());
         assert_eq!(short.compare(), long.compare(), "{}", case());
         let (a, b) = (
-            closest_of(&short, pair, points),
-            closest_of(&long, pair, points),
+            closest_of(&short, short.nearest(), pair, points),
+            closest_of(&long, long.nearest(), pair, points),
         );
         assert_eq!(a, b, "{}", case());
         assert_eq!(a.distance.to_bits(), b.distance.to_bits(), "{}", case());

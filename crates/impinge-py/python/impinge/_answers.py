@@ -143,10 +143,10 @@ class Impact(NamedTuple):
 class Nearest(NamedTuple):
     """The pair of elements of two bodies that are nearest to each other.
 
-    `distance` is in the unit of the scene. It is 0 if and only if they share a point, which is decided exactly; else it is rounded, with
-    an error of a few units in the last place of the largest coordinate. `points` is an array of float64, shape (2, 3): the point of
+    `distance` is in the unit of the scene, rounded down: the largest float that is not above the true one. It is 0 if and only if they
+    share a point, which is decided exactly, or are nearer than the smallest float. `points` is an array of float64, shape (2, 3): the point of
     each element that is nearest to the other, rounded; where they touch, a point that they share, twice. Of several pairs at the same
-    computed distance the lowest.
+    distance, rounded down, the lowest.
     """
 
     distance: float
@@ -551,7 +551,7 @@ class NearPairs(_OfKinds):
 
     @property
     def distances(self) -> npt.NDArray[np.float64]:
-        """numpy.ndarray of float64, shape (n,) : distances, rounded; the same bits on every machine. Only after
+        """numpy.ndarray of float64, shape (n,) : distances, rounded down: the largest floats that are not above the true ones. Only after
         ``distances=True`` or ``closest_points=True``.
         """
         return self._inner.distances()

@@ -39,24 +39,24 @@ pub struct NearPair {
     /// degenerate, or faces are parallel.
     pub is_parallel: bool,
     /// The distance, where [`Query::distances`](crate::Query::distances) or
-    /// [`Query::closest_points`](crate::Query::closest_points) asks for it: that of the nearest
-    /// points.
+    /// [`Query::closest_points`](crate::Query::closest_points) asks for it: rounded down, see
+    /// [`ClosestPoints::distance`].
     pub distance: Option<f64>,
     /// Distance and nearest points, where [`Query::closest_points`](crate::Query::closest_points)
     /// asks for them.
     pub closest: Option<ClosestPoints>,
 }
 
-/// Nearest points of two elements and their distance, rounded.
+/// Nearest points of two elements and their distance.
 ///
-/// They are computed from exact quotients in one order of operations, so they have the same bits on
-/// every machine. Whether a pair is near is decided exactly, not by these numbers: a distance may
-/// be rounded to a number above the one asked for.
+/// The points are computed from exact quotients in one order of operations, so they have the same
+/// bits on every machine, but they are rounded. The distance is exact but for being rounded down.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ClosestPoints {
-    /// The distance, wrong by a few units in the last place at most. 0 for elements that touch.
+    /// The distance, rounded down: the largest `f64` that is not above the true one. 0 if and only if
+    /// the elements touch, or are nearer than the smallest `f64`.
     pub distance: f64,
     /// A point of `a` and one of `b`, x, y, z each.
     pub points: [[f64; 3]; 2],
