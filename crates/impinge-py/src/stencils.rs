@@ -1,6 +1,6 @@
 //! What `impinge.Stencils` is made of: derivatives of distances, as arrays.
 
-use impinge::{Error, Stencil, project_psd};
+use impinge::{Error, Stencil, project_psd_all};
 use numpy::{
     Element, IxDyn, PyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArrayDyn,
     PyUntypedArrayMethods,
@@ -51,15 +51,16 @@ impl Stencils {
     }
 
     /// One number, row or matrix per stencil.
-    fn numbers<'py, T: Send>(
+    fn numbers<'py, T: Copy + Send>(
         &self,
         py: Python<'py>,
         shape: &[usize],
         flat: impl FnOnce(Vec<T>) -> Vec<f64> + Send,
-        of: impl Fn(&Stencil) -> T + Send + Sync,
+        of: impl Fn(&Stencil) -> T + Sync,
     ) -> PyResult<Numbers<'py>> {
         let n = self.inner.len();
-        let rows = py.detach(|| collect(n, self.inner.iter().map(of)).map(flat))?;
+        let rows = py.detach(|| self.inner.column(of).map(flat));
+        let rows = rows.map_err(raise)?;
         shaped(py, rows, &[&[n], shape].concat())
     }
 }
@@ -124,8 +125,8 @@ impl Stencils {
     }
 
     fn mollified<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<bool>>> {
-        let rows = self.inner.iter().map(Stencil::is_mollified);
-        Ok(PyArray1::from_vec(py, collect(self.__len__(), rows)?))
+        let rows = py.detach(|| self.inner.column(Stencil::is_mollified));
+        Ok(PyArray1::from_vec(py, rows.map_err(raise)?))
     }
 
     fn offsets<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<u32>> {
@@ -157,20 +158,13 @@ pub fn _stencils(
 pub fn _project_psd<'py>(
     py: Python<'py>,
     matrices: PyReadonlyArrayDyn<'py, f64>,
+    threads: usize,
 ) -> PyResult<Numbers<'py>> {
     let shape = matrices.shape().to_vec();
     // In the order of rows, however they are stored.
     let mut flat = collect(matrices.len(), matrices.as_array().iter().copied())?;
-    fn each<const N: usize>(flat: &mut [f64]) {
-        let rows = flat.as_chunks_mut::<N>().0;
-        rows.as_chunks_mut::<N>().0.iter_mut().for_each(project_psd);
-    }
-    let project = match shape.last() {
-        Some(3) => each::<3>,
-        Some(6) => each::<6>,
-        Some(9) => each::<9>,
-        _ => each::<12>,
-    };
-    py.detach(|| project(&mut flat));
+    let size = shape.last().copied().unwrap_or_default();
+    let projected = py.detach(|| project_psd_all(&mut flat, size, threads));
+    projected.map_err(raise)?;
     shaped(py, flat, &shape)
 }

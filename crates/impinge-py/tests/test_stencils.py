@@ -282,6 +282,24 @@ def test_projections_are_those_of_eigenvalues():
         assert_close(impinge.project_psd(matrix), ipctk.project_to_psd(matrix), 1e-12)
 
 
+@scenery(cubes)
+def test_threads_change_no_byte(make, seed, scene_of):
+    rest, points, faces, dhat = scene_of(make, seed)
+    scene = impinge.Scene()
+    scene.add(points, faces)
+    numbers = set()
+    for threads in (1, 2, 5, None):
+        settings = {} if threads is None else {"threads": threads}
+        near = impinge.Detector("cpu", **settings).near(scene, dhat, kinds=["vf", "ee"])
+        found = near.stencils(scene, rest)
+        columns = [found.coefficients, found.squared_distances, found.gradients, found.hessians, found.mollifier_hessians]
+        columns += [impinge.project_psd(-found.hessians, threads=threads or 0)]
+        numbers.add(b"".join(column.tobytes() for column in columns))
+    assert len(numbers) == 1 and len(found) > 20
+    with pytest.raises((ValueError, OverflowError)):
+        impinge.project_psd(np.eye(3), threads=-1)
+
+
 def test_columns():
     scene = impinge.Scene()
     scene.add(np.array(FLOOR, np.float32), [[0, 1, 2]])

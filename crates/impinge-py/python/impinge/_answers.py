@@ -640,8 +640,9 @@ class NearPairs(_OfKinds):
 class Stencils:
     """Up to four vertices per near pair or contact, and how their squared distance depends on their positions.
 
-    ``len(stencils)`` is their number. The attributes are arrays with one row per stencil; each access computes new ones. Numbers are computed
-    in float64 in one fixed order of operations: the same bits on every machine.
+    ``len(stencils)`` is their number. The attributes are arrays with one row per stencil; each access computes new ones, on at most as
+    many threads as the detector has that found the pairs. Numbers are computed in float64 in one fixed order of operations: the same bits
+    on every machine.
 
     Vertices come in the order of ipc-toolkit: the vertex and the face's three, two of either edge, the vertex and the edge's two,
     two vertices. Where there are fewer than four, the first is repeated. Coefficients and derivatives are 0 there, so sums over all

@@ -440,18 +440,21 @@ def hash_rows(rows: _Array) -> int:
     return _impinge._hash_rows(rows)
 
 
-def project_psd(matrices: _Array) -> npt.NDArray[np.float64]:
+def project_psd(matrices: _Array, *, threads: int = 0) -> npt.NDArray[np.float64]:
     """The nearest symmetric matrices without negative eigenvalues, for Newton's method.
 
     Parameters
     ----------
     matrices : array_like of float, shape (..., k, k), k one of 3, 6, 9 and 12
         Symmetric; else the mean of each and its transpose is taken.
+    threads : int, default 0
+        How many threads compute, at most; 0 for one per core.
 
     Returns
     -------
     numpy.ndarray of float64, of the same shape
-        Exactly symmetric. Negative eigenvalues became 0, as by ipc-toolkit's ``CLAMP``. The same bits on every machine.
+        Exactly symmetric. Negative eigenvalues became 0, as by ipc-toolkit's ``CLAMP``. The same bits on every machine
+        and by any number of threads.
 
     Raises
     ------
@@ -470,7 +473,7 @@ def project_psd(matrices: _Array) -> npt.NDArray[np.float64]:
         raise TypeError(f"matrices: numbers expected, {given.dtype} given")
     if given.ndim < 2 or given.shape[-1] != given.shape[-2] or given.shape[-1] not in (3, 6, 9, 12):
         raise ValueError(f"matrices: shape (..., k, k) with k of 3, 6, 9 or 12 expected, {given.shape} given")
-    return _impinge._project_psd(given.astype(np.float64, copy=False))
+    return _impinge._project_psd(given.astype(np.float64, copy=False), threads)
 
 
 class DeviceInfo(NamedTuple):
