@@ -56,7 +56,7 @@ impl Stencils {
         py: Python<'py>,
         shape: &[usize],
         flat: impl FnOnce(Vec<T>) -> Vec<f64> + Send,
-        of: impl Fn(&Stencil) -> T + Sync,
+        of: impl Fn(&Stencil) -> T + Send + Sync,
     ) -> PyResult<Numbers<'py>> {
         let n = self.inner.len();
         let rows = py.detach(|| self.inner.column(of).map(flat));
