@@ -92,8 +92,8 @@ pub enum Command {
         mut_arg("rows", |rows| rows.help("Write a row per vertex (.csv, .jsonl, .npy or .parquet; \"-\" is standard output)"))
     )]
     Safe(SafeArgs),
-    /// Find the elements of a mesh that are nearest to each of many points, which points are inside,
-    /// and in which tetrahedra
+    /// Find the elements of a mesh that are nearest to each of many points, which points are
+    /// inside, and in which tetrahedra
     #[command(
         after_help = probe::PROBE_EXAMPLES,
         mut_arg("rows", |rows| rows.help("Write a row per element that is near enough (.csv, .jsonl, .npy or .parquet; \"-\" is standard output)"))
@@ -334,8 +334,8 @@ pub struct ExcludeArgs {
     /// A)
     #[arg(id = "exclude", long = "exclude", value_name = "A,B", value_parser = body_numbers, alias = "ignore")]
     pub bodies: Vec<(usize, usize)>,
-    /// Leave out pairs of one body that are near each other in its surface: some vertices of the two
-    /// are at most N edges apart, 0 to 16
+    /// Leave out pairs of one body that are near each other in its surface: some vertices of the
+    /// two are at most N edges apart, 0 to 16
     #[arg(id = "exclude_rings", long = "exclude-rings", value_name = "N", value_parser = clap::value_parser!(u32).range(..=16))]
     pub rings: Option<u32>,
 }
@@ -355,7 +355,8 @@ pub struct AnswerArgs {
     pub repeat: NonZeroUsize,
     #[command(flatten)]
     pub rows: RowsArgs,
-    /// Write where the triangles of each pair meet, one row per corner (.csv, .jsonl, .npy or .parquet)
+    /// Write where the triangles of each pair meet, one row per corner (.csv, .jsonl, .npy or
+    /// .parquet)
     #[arg(long, value_name = "FILE")]
     pub contacts: Option<RowsFile>,
     /// Write the curves in which surfaces cross (.ply, .obj or .vtu)

@@ -273,8 +273,9 @@ impl Asker {
         })
     }
 
-    /// [`Detector::candidates_in_runs`], with the words and the numbers of a query. `each` gets the
-    /// answer of each run, and says whether to go on. Returns how many candidates it got.
+    /// [`candidates_in_runs`](impinge::Detector::candidates_in_runs), with the words and the
+    /// numbers of a query. `each` gets the answer of each run, and says whether to go on. Returns
+    /// how many candidates it got.
     ///
     /// # Errors
     /// No such body; those of the question.

@@ -90,10 +90,10 @@ impl Question {
 /// `a` with itself, 5 all of `a`), `a`, `b`, the rule of shared vertices, the rule of the start,
 /// the precision (0 is the default of each), kinds as bits with 64 if they were said, flags (1
 /// distances, 2 nearest points, 4 a cell; from 8 on which hits of rays; from 32 on how many bodies
-/// are fixed), how many nearest elements, the fixed bodies, and three words for each exclusion: 0 and
-/// two bodies, 1 and rings, 2 and two groups, 3 and the number of pairs at rest. `numbers`:
-/// separation, clearance, its share, the low and the high corner of the cell, and the question's own
-/// length.
+/// are fixed), how many nearest elements, the fixed bodies, and three words for each exclusion: 0
+/// and two bodies, 1 and rings, 2 and two groups, 3 and the number of pairs at rest. `numbers`:
+/// separation, clearance, its share, the low and the high corner of the cell, and the question's
+/// own length.
 ///
 /// # Errors
 /// No such body; lists that are not as described.

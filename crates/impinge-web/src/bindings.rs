@@ -290,8 +290,8 @@ impl DetectorHandle {
         answer.map(|answer| lists(&answer)).map_err(thrown)
     }
 
-    /// See [`Asker::candidates_in_runs`]. `each` gets the lists of each run, and stops the search with
-    /// `false` or with what it throws, which is thrown here.
+    /// See [`Asker::candidates_in_runs`]. `each` gets the lists of each run, and stops the search
+    /// with `false` or with what it throws, which is thrown here.
     pub fn candidates_in_runs(
         &mut self,
         scene: &SceneHandle,

@@ -76,8 +76,8 @@ pub struct StepArgs {
     pub json: bool,
     #[command(flatten)]
     pub rows: RowsArgs,
-    /// Write the pairs whose boxes over the whole step overlap (.csv, .jsonl, .npy or .parquet; "-" is
-    /// standard output, as CSV), and find no impacts
+    /// Write the pairs whose boxes over the whole step overlap (.csv, .jsonl, .npy or .parquet; "-"
+    /// is standard output, as CSV), and find no impacts
     #[arg(long, value_name = "FILE", group = "rows_file", conflicts_with_all = ["out", "repeat", "separation", "clearance", "png"])]
     pub candidates: Option<PathBuf>,
     /// How far the boxes of --candidates are inflated on all sides, a length

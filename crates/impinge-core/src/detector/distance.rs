@@ -58,10 +58,10 @@ impl Detector {
     }
 
     /// The smallest distance of two bodies at the positions that they have, and the pair of
-    /// elements that has it; `None` if one body has no elements. The distance is rounded down:
-    /// the largest `f64` that is not above the true one. It is 0 if and only if they share a point,
-    /// which is decided exactly, or are nearer than the smallest `f64`. Tetrahedra are solid: a body inside one has
-    /// distance 0.
+    /// elements that has it; `None` if one body has no elements. The distance is rounded down: the
+    /// largest `f64` that is not above the true one. It is 0 if and only if they share a point,
+    /// which is decided exactly, or are nearer than the smallest `f64`. Tetrahedra are solid: a
+    /// body inside one has distance 0.
     ///
     /// The detector keeps a tree per body and the nearest pair of each call. So repeated calls for
     /// bodies that move cost little more than to read their positions. The answer does not depend

@@ -26,8 +26,8 @@ impl Detector {
     /// All pairs of elements whose distance is at most `distance` plus the
     /// [thickness](Scene::set_thickness) of both, at the bodies' positions, in the unit of the
     /// scene; of two elements of one body that is equally thick, plus twice its thickness. End
-    /// positions are ignored. Each pair comes with its nearest features and, on request, with its distance and nearest
-    /// points.
+    /// positions are ignored. Each pair comes with its nearest features and, on request, with its
+    /// distance and nearest points.
     ///
     /// The answer is exact: a pair is reported if and only if the distance of the two closed
     /// elements, as a real number, is at most the distance asked for, which is a sum of real

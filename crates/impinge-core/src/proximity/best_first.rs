@@ -148,9 +148,9 @@ impl FoundDistance {
 }
 
 impl DistanceSearch<'_> {
-    /// The nearest pair and the square of its distance, if that is at most `most`, or above it by no
-    /// more than rounding; `likely` is one to compare first. `None` if more pairs of clusters would have to be compared whose boxes
-    /// overlap than `most_overlapping`.
+    /// The nearest pair and the square of its distance, if that is at most `most`, or above it by
+    /// no more than rounding; `likely` is one to compare first. `None` if more pairs of clusters
+    /// would have to be compared whose boxes overlap than `most_overlapping`.
     ///
     /// # Errors
     /// Cancellation.

@@ -10,9 +10,9 @@ use impinge_exact::Point;
 #[non_exhaustive]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Nearest {
-    /// Their distance in the unit of the scene, rounded down: the largest `f64` that is not above the
-    /// true one. 0 if and only if they share a point, which is decided exactly, or are nearer than
-    /// the smallest `f64`.
+    /// Their distance in the unit of the scene, rounded down: the largest `f64` that is not above
+    /// the true one. 0 if and only if they share a point, which is decided exactly, or are nearer
+    /// than the smallest `f64`.
     pub distance: f64,
     /// The element of the first body: of the first that was asked for, or of the lower of the
     /// nearest two of many.

@@ -102,8 +102,8 @@ impl OfTwo {
     }
 
     /// The nearest elements of two bodies that are known, and the square of their distance in a
-    /// scale; nothing, or what is farther away, if that is not at most `most`. `None` if more pairs of clusters would have to be compared
-    /// whose boxes overlap than `most_overlapping`.
+    /// scale; nothing, or what is farther away, if that is not at most `most`. `None` if more pairs
+    /// of clusters would have to be compared whose boxes overlap than `most_overlapping`.
     fn search(
         &mut self,
         scene: &Scene,

@@ -264,18 +264,18 @@ impl Query {
 
     /// Leaves pairs out, before they are decided: `(a, b)`, those of two bodies; `(a, a)`, the
     /// self-collision of one; [`Exclusion::rings`], what is near in the surface;
-    /// [`Exclusion::groups`], groups of vertices that do not meet; [`Exclusion::vertices`], what the
-    /// caller lists; the pairs of [`near`](crate::Detector::near), those that were near at rest.
-    /// Each call leaves out more.
+    /// [`Exclusion::groups`], groups of vertices that do not meet; [`Exclusion::vertices`], what
+    /// the caller lists; the pairs of [`near`](crate::Detector::near), those that were near at
+    /// rest. Each call leaves out more.
     ///
     /// Besides, pairs of elements all of whose vertices are [pinned](crate::Scene::set_pinned) are
     /// left out of every query.
     ///
     /// [`detect`](crate::Detector::detect), [`count`](crate::Detector::count) and
     /// [`any`](crate::Detector::any) find all pairs first and leave out rings, groups, lists and
-    /// pinned vertices then: limits count what is left out, too. They are about the elements that bodies
-    /// were given as, and refuse pairs of an answer. [`nearest`](crate::Detector::nearest) and
-    /// frames that stay on a device refuse all but bodies.
+    /// pinned vertices then: limits count what is left out, too. They are about the elements that
+    /// bodies were given as, and refuse pairs of an answer. [`nearest`](crate::Detector::nearest)
+    /// and frames that stay on a device refuse all but bodies.
     ///
     /// ```
     /// use impinge::{Backend, Detector, Exclusion, Query, Scene};

@@ -225,8 +225,8 @@ impl VertexRings {
         VertexRings { starts, vertices }
     }
 
-    /// The second vertex of each pair, at the first one, of `n_vertices`. Pairs are sorted, and none
-    /// is there twice.
+    /// The second vertex of each pair, at the first one, of `n_vertices`. Pairs are sorted, and
+    /// none is there twice.
     pub fn of_pairs(n_vertices: usize, pairs: &[[u32; 2]]) -> Self {
         let mut starts = vec![0; n_vertices + 1];
         for &[from, _] in pairs {

@@ -96,9 +96,9 @@ impl SharesBetween<'_> {
         }
     }
 
-    /// Takes a pair, by numbers between which its distance is, and how thick both elements are: none of its vertices has more than
-    /// the second one gives. Returns whether the pair may give less than they have, or not be
-    /// apart. Its corners are those at a slot of some lists.
+    /// Takes a pair, by numbers between which its distance is, and how thick both elements are:
+    /// none of its vertices has more than the second one gives. Returns whether the pair may give
+    /// less than they have, or not be apart. Its corners are those at a slot of some lists.
     // No closures: this is inlined into kernels.
     #[inline(always)]
     pub fn lower_by(

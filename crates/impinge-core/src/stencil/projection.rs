@@ -66,9 +66,9 @@ fn project<const N: usize>(matrix: &mut Square<N>) {
     }
 }
 
-/// [`project_psd`] of many matrices of `size` rows and columns, one after another, on threads of the
-/// rayon pool at hand: on at most `threads` of them, or on all if that is 0. The bytes are those of
-/// [`project_psd`], however many there are.
+/// [`project_psd`] of many matrices of `size` rows and columns, one after another, on threads of
+/// the rayon pool at hand: on at most `threads` of them, or on all if that is 0. The bytes are
+/// those of [`project_psd`], however many there are.
 ///
 /// ```
 /// # fn main() -> Result<(), impinge::Error> {

@@ -55,8 +55,8 @@ pub struct NearPair {
 #[non_exhaustive]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ClosestPoints {
-    /// The distance, rounded down: the largest `f64` that is not above the true one. 0 if and only if
-    /// the elements touch, or are nearer than the smallest `f64`.
+    /// The distance, rounded down: the largest `f64` that is not above the true one. 0 if and only
+    /// if the elements touch, or are nearer than the smallest `f64`.
     pub distance: f64,
     /// A point of `a` and one of `b`, x, y, z each.
     pub points: [[f64; 3]; 2],
