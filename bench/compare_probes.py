@@ -189,6 +189,8 @@ def measured(vertices, faces, kinds, frames, missing):
         [positions] = mirrored([(vertices, None)], frame % 2)
         exact = {}
         for contestant in contestants:
+            # Threads of the one before, which may wait for work by spinning, go to sleep.
+            time.sleep(0.5)
             _, *moved = clock(lambda: contestant.move(positions))
             if isinstance(contestant, Ours):
                 # Boxes are refitted by the first question.
