@@ -60,6 +60,6 @@ pub use marks::{Marks, Problem};
 pub use places::Place;
 pub use pool::{Pool, PoolError};
 pub use report::{Failed, Finding, Report};
-pub use row::{Counts, ErrorKind, Failure, KeyKind, Row};
+pub use row::{Counts, ErrorKind, Failure, Row};
 pub use store::{RowStore, StoreError};
 pub use worker::serve;

@@ -2,6 +2,7 @@
 
 mod finding;
 mod formats;
+mod table;
 
 use std::fmt::Write;
 

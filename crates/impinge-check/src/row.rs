@@ -118,19 +118,6 @@ pub struct Failure {
     pub message: String,
 }
 
-/// What a row's object holds under a key, if it is not `null`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum KeyKind {
-    /// Text.
-    Text,
-    /// Yes or no.
-    Flag,
-    /// A whole number.
-    Count,
-    /// A length or a volume.
-    Number,
-}
-
 /// The result for one mesh.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Row {
@@ -145,44 +132,6 @@ pub struct Row {
 }
 
 impl Row {
-    /// The keys of all objects made by [`to_json`](Self::to_json) but `places`, and what they hold:
-    /// the columns of a table of meshes.
-    pub const KEYS: [(&'static str, KeyKind); 30] = {
-        use KeyKind::{Count, Flag, Number, Text};
-        [
-            ("path", Text),
-            ("welded", Flag),
-            ("vertices", Count),
-            ("vertices_welded", Count),
-            ("triangles", Count),
-            ("tetrahedra", Count),
-            ("self_intersections", Count),
-            ("intersecting_primitives", Count),
-            ("hash", Text),
-            ("degenerate", Count),
-            ("duplicate_faces", Count),
-            ("non_manifold_edges", Count),
-            ("non_manifold_vertices", Count),
-            ("boundary_edges", Count),
-            ("boundaries", Count),
-            ("inconsistent_edges", Count),
-            ("components", Count),
-            ("unused_vertices", Count),
-            ("watertight", Flag),
-            ("volume", Number),
-            ("euler", Count),
-            ("duplicate_tetrahedra", Count),
-            ("non_manifold_faces", Count),
-            ("boundary_faces", Count),
-            ("inconsistent_faces", Count),
-            ("min_thickness", Number),
-            ("thin_faces", Count),
-            ("thinnest", Number),
-            ("error", Text),
-            ("error_kind", Text),
-        ]
-    };
-
     /// The row of a mesh that could not be checked.
     pub fn failed(path: &str, is_welded: bool, kind: ErrorKind, message: &str) -> Self {
         let lines = message
@@ -352,31 +301,6 @@ fn counts(value: &Value) -> Option<Counts> {
 mod tests {
     use super::*;
     use crate::marks::Problem;
-
-    /// A key that rows get later must be a column of tables, too.
-    #[test]
-    fn every_key_is_a_column() {
-        let failed = Row::failed("a.stl", true, ErrorKind::File, "no faces");
-        let mut thin = counted(4, 0);
-        if let Ok(counts) = &mut thin.result {
-            counts.min_thickness = Some(0.5);
-        }
-        for row in [failed, thin, counted(0, 4)] {
-            for (key, value) in row.to_json().as_object().unwrap() {
-                let Some((_, kind)) = Row::KEYS.iter().find(|(name, _)| name == key) else {
-                    assert_eq!(key, "places");
-                    continue;
-                };
-                let fits = match kind {
-                    KeyKind::Text => value.is_string(),
-                    KeyKind::Flag => value.is_boolean(),
-                    KeyKind::Count => value.is_i64() || value.is_u64(),
-                    KeyKind::Number => value.is_f64(),
-                };
-                assert!(fits || value.is_null(), "{key}: {value}");
-            }
-        }
-    }
 
     fn counted(n_triangles: u64, n_tetrahedra: u64) -> Row {
         Row {

@@ -1,7 +1,7 @@
 //! Files of rows: one writer for all answers. A file exists whole or not at all; "-" is standard
 //! output.
 
-use std::io::{BufWriter, Write};
+use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use impinge::exact::Feature;
@@ -74,15 +74,12 @@ impl Rows {
             let text = "--rows-format parquet: such a file is no text: name a file instead of -";
             return Err(Error::Usage(text.to_owned()));
         }
-        let path = file.path.clone();
-        let written = AtomicFile::create(&path)?;
-        match parquet::Columns::create(written, columns) {
-            Ok(columns) => Ok(Rows {
-                path,
-                format: Format::Parquet(columns),
-            }),
-            Err(source) => Err(Error::Write { path, source }),
-        }
+        let written = AtomicFile::create(&file.path)?;
+        let columns = parquet::Columns::create(written, columns);
+        Ok(Rows {
+            path: file.path.clone(),
+            format: Format::Parquet(columns.map_err(unwritten(&file.path))?),
+        })
     }
 
     /// Adds rows.
@@ -111,10 +108,7 @@ impl Rows {
                 let put = rows
                     .into_iter()
                     .try_for_each(|row| columns.put(row.as_ref()));
-                put.map_err(|source| Error::Write {
-                    path: self.path.clone(),
-                    source,
-                })
+                put.map_err(unwritten(&self.path))
             }
         }
     }
@@ -135,13 +129,17 @@ impl Rows {
             }
             #[cfg(feature = "parquet")]
             Format::Parquet(columns) => {
-                let file = columns.finish().map_err(|source| Error::Write {
-                    path: self.path,
-                    source,
-                })?;
+                let file = columns.finish().map_err(unwritten(&self.path))?;
                 Ok(file.finish()?)
             }
         }
+    }
+}
+
+fn unwritten(path: &Path) -> impl Fn(io::Error) -> Error {
+    |source| Error::Write {
+        path: path.to_owned(),
+        source,
     }
 }
 
@@ -149,13 +147,10 @@ impl Rows {
 fn write_to(
     path: &Path,
     file: &mut Option<AtomicFile>,
-    act: impl FnOnce(&mut dyn Write) -> std::io::Result<()>,
+    act: impl FnOnce(&mut dyn Write) -> io::Result<()>,
 ) -> Result<(), Error> {
     match file {
-        Some(file) => act(file).map_err(|source| Error::Write {
-            path: path.to_owned(),
-            source,
-        }),
+        Some(file) => act(file).map_err(unwritten(path)),
         None => {
             let mut to = BufWriter::new(out());
             act(&mut to)?;

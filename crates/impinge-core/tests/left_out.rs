@@ -64,6 +64,10 @@ fn corners(scene: &Scene, part: Part, of: Element) -> Vec<u32> {
     }
 }
 
+fn corners_of_both(scene: &Scene, (parts, pair): &Named) -> [Vec<u32>; 2] {
+    [0, 1].map(|side| corners(scene, parts[side], pair[side]))
+}
+
 /// The answers of all questions about a query, each as sorted pairs.
 fn answers(
     detector: &mut Detector,
@@ -174,10 +178,9 @@ fn rings_are_left_out() {
             &scene,
             &Query::all(),
             true,
-            |(parts, [a, b])| {
+            |pair @ (_, [a, b])| {
                 a.body != b.body || {
-                    let [from, to] = [(parts[0], *a), (parts[1], *b)]
-                        .map(|(part, of)| corners(&scene, part, of));
+                    let [from, to] = corners_of_both(&scene, pair);
                     from.iter().all(|&v| {
                         let near = around(&scene, a.body, v, n);
                         to.iter().all(|w| !near.contains(w))
@@ -257,9 +260,8 @@ fn groups_that_do_not_meet_are_left_out() {
             &scene,
             &Query::all(),
             true,
-            |(parts, [a, b])| {
-                let [from, to] =
-                    [(parts[0], *a), (parts[1], *b)].map(|(part, of)| corners(&scene, part, of));
+            |pair @ (_, [a, b])| {
+                let [from, to] = corners_of_both(&scene, pair);
                 from.iter().any(|&v| {
                     to.iter().any(|&w| {
                         let (Some(g), Some(h)) = (group(a.body, v), group(b.body, w)) else {
@@ -309,9 +311,8 @@ fn listed_vertices_are_left_out() {
             &scene,
             &Query::all(),
             true,
-            |(parts, [a, b])| {
-                let [of_a, of_b] =
-                    [(parts[0], *a), (parts[1], *b)].map(|(part, of)| corners(&scene, part, of));
+            |pair @ (_, [a, b])| {
+                let [of_a, of_b] = corners_of_both(&scene, pair);
                 of_a.iter().all(|&v| {
                     of_b.iter()
                         .all(|&w| !listed.contains(&[(a.body, v), (b.body, w)]))

@@ -13,6 +13,27 @@ use impinge_scenes::{Random, adversarial, soup, surfaces};
 
 type Point = [f64; 3];
 
+/// Detectors of several numbers of threads and all instruction sets, one of them with little
+/// memory.
+fn with_all_settings(memory_budget: u64) -> impl Iterator<Item = (usize, Detector)> {
+    let settings = [
+        (1, InstructionSet::Portable, None),
+        (2, InstructionSet::Avx2, None),
+        (3, InstructionSet::Avx512, Some(memory_budget)),
+        (16, InstructionSet::Avx512, None),
+    ];
+    settings
+        .into_iter()
+        .map(|(threads, instruction_set, memory_budget)| {
+            let settings = Settings::new()
+                .backend(Backend::Cpu)
+                .threads(threads)
+                .instruction_set(instruction_set)
+                .memory_budget(memory_budget);
+            (threads, Detector::new(settings).expect("settings"))
+        })
+}
+
 fn detector(method: Method) -> Detector {
     Detector::new(Settings::new().method(method).backend(Backend::Cpu)).expect("settings")
 }
@@ -453,23 +474,7 @@ fn answers_with_a_thickness_of_each_element_depend_on_the_input_alone() {
             .safe_distances(&scene, distance, &query)
             .expect("good");
         assert!(naive.len() > 100, "{}", naive.len());
-        let sets = [
-            InstructionSet::Portable,
-            InstructionSet::Avx2,
-            InstructionSet::Avx512,
-        ];
-        for (threads, instruction_set, memory_budget) in [
-            (1, sets[0], None),
-            (2, sets[1], None),
-            (3, sets[2], Some(12_000_000)),
-            (16, sets[2], None),
-        ] {
-            let settings = Settings::new()
-                .backend(Backend::Cpu)
-                .threads(threads)
-                .instruction_set(instruction_set)
-                .memory_budget(memory_budget);
-            let mut detector = Detector::new(settings).expect("settings");
+        for (threads, mut detector) in with_all_settings(12_000_000) {
             for frame in 0..2 {
                 let near = detector.near(&scene, distance, &query).expect("good");
                 assert!(near.iter().eq(naive.iter()), "{threads}, {frame}");
@@ -714,25 +719,7 @@ fn the_answer_depends_on_the_input_alone() {
             .near(&scene, distance, &query)
             .expect("good");
         assert!(naive.len() > 100, "{}", naive.len());
-        let sets = [
-            InstructionSet::Portable,
-            InstructionSet::Avx2,
-            InstructionSet::Avx512,
-        ];
-        for (threads, instruction_set, memory_budget) in [
-            (1, sets[0], None),
-            (2, sets[1], None),
-            (3, sets[2], Some(4_000_000)),
-            (16, sets[2], None),
-        ] {
-            let mut detector = Detector::new(
-                Settings::new()
-                    .backend(Backend::Cpu)
-                    .threads(threads)
-                    .instruction_set(instruction_set)
-                    .memory_budget(memory_budget),
-            )
-            .expect("settings");
+        for (threads, mut detector) in with_all_settings(4_000_000) {
             for frame in 0..2 {
                 let near = detector.near(&scene, distance, &query).expect("good");
                 assert!(near.iter().eq(naive.iter()), "{threads}, {frame}");

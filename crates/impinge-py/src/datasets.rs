@@ -9,10 +9,10 @@ use std::time::Duration;
 
 use impinge::{Backend, CancelToken, Control, Precision, Settings, SharedVertex, Start};
 use impinge_check::{
-    Finding, FixError, FixOptions, KeyKind, Limits, Options, Pool, PoolError, Repair, Report, Row,
+    Finding, FixError, FixOptions, Limits, Options, Pool, PoolError, Repair, Report, Row,
     apply_limits, fix_mesh, serve,
 };
-use impinge_io::{Elements, Mesh, Positions};
+use impinge_io::{Column, Elements, Holds, Mesh, Positions, TableFormat};
 use impinge_tiles::{Ask, Error, Plan, PlanOptions, RunOptions, ScatterOptions};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::exceptions::{PyOSError, PyRuntimeError};
@@ -186,8 +186,8 @@ pub fn _fix<'py>(
     Ok((positions_array(py, &held)?, faces, done.to_string()))
 }
 
-/// A report about rows, each as JSON: ``text``, ``github`` or ``markdown``, and why the run fails:
-/// a message, and whether a mesh has what ``fail_on`` names.
+/// A report about rows, each as JSON: ``text``, ``github``, ``markdown``, or a table as ``csv`` or
+/// ``jsonl``; and why the run fails: a message, and whether a mesh has what ``fail_on`` names.
 #[pyfunction]
 pub fn _report(
     rows: Vec<String>,
@@ -202,9 +202,12 @@ pub fn _report(
         rows: &rows,
         fail_on: &fail_on.map_err(invalid)?,
     };
+    let table = |format| String::from_utf8_lossy(&report.table(format)).into_owned();
     let text = match format {
         "github" => report.github(),
         "markdown" => report.markdown(),
+        "csv" => table(TableFormat::Csv),
+        "jsonl" => table(TableFormat::Jsonl),
         _ => report.text(),
     };
     let failed = report.failure();
@@ -223,16 +226,16 @@ pub fn _findings() -> Vec<&'static str> {
 /// The columns of a table of meshes: their names, and what they hold.
 #[pyfunction]
 pub fn _check_columns() -> Vec<(&'static str, &'static str)> {
-    let of = |(name, kind)| {
-        let holds = match kind {
-            KeyKind::Text => "text",
-            KeyKind::Flag => "flag",
-            KeyKind::Count => "count",
-            KeyKind::Number => "number",
+    let of = |column: Column| {
+        let holds = match column.holds {
+            Holds::Line => "text",
+            Holds::Bool => "flag",
+            Holds::Count => "count",
+            _ => "number",
         };
-        (name, holds)
+        (column.name, holds)
     };
-    Row::KEYS.map(of).to_vec()
+    Row::COLUMNS.map(of).to_vec()
 }
 
 /// The child's side of `_check`: answers paths on standard input by rows on standard output.

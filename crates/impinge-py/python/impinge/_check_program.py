@@ -5,12 +5,10 @@ a workflow. It has the same options, words and exit codes.
 from __future__ import annotations
 
 import argparse
-import csv
 import json
 import os
 import sys
 from collections.abc import Sequence
-from typing import Any
 
 from . import _impinge
 from ._check import check
@@ -29,8 +27,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         _parser().error("the following arguments are required: MESH")
     if "thin" in args.fail_on and args.min_thickness is None and len(args.fail_on) < len(_FINDINGS):
         _parser().error("--fail-on thin: --min-thickness T says how thin")
-    if args.rows is not None and os.path.splitext(args.rows)[1].lower() not in _WRITERS:
-        _parser().error(f"--rows {args.rows}: rows of meshes are written as {', '.join(_WRITERS)}")
+    if args.rows is not None and _suffix(args.rows) not in ("csv", "jsonl", "parquet"):
+        _parser().error(f"--rows {args.rows}: rows of meshes are written as .csv, .jsonl, .parquet")
     options = {"weld": not args.no_weld, "min_thickness": args.min_thickness, "jobs": args.jobs, "timeout": args.timeout}
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
@@ -41,7 +39,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         text, failed = _impinge._report(rows, args.fail_on, args.format)
         print("".join(row + "\n" for row in rows) if args.json else text, end="")
         if args.rows is not None:
-            _write_rows(args.rows, [json.loads(row) for row in rows])
+            _write_rows(args.rows, rows)
         if args.summary is not None:
             # A workflow's summary is a file to which each step appends.
             with open(args.summary, "a", encoding="utf-8") as file:
@@ -82,44 +80,36 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _write_rows(path: str, rows: list[dict[str, Any]]) -> None:
-    """Writes the columns of `impinge check --rows`. The file is whole or not there."""
-    columns = dict(_impinge._check_columns())
-    table = [{name: row.get(name) for name in columns} for row in rows]
+def _write_rows(path: str, rows: list[str]) -> None:
+    """Writes the table of `impinge check --rows`. The file is whole or not there."""
     part = f"{path}.part"
     try:
-        _WRITERS[os.path.splitext(path)[1].lower()](part, table, columns)
+        kind = _suffix(path)
+        if kind == "parquet":
+            _write_parquet(part, rows)
+        else:
+            with open(part, "w", encoding="utf-8", newline="") as file:
+                file.write(_impinge._report(rows, [], kind)[0])
         os.replace(part, path)
     finally:
         if os.path.exists(part):
             os.remove(part)
 
 
-def _write_csv(path: str, table: list[dict[str, Any]], columns: dict[str, str]) -> None:
-    with open(path, "w", encoding="utf-8", errors="surrogateescape", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(columns)
-        for row in table:
-            writer.writerow([int(cell) if isinstance(cell, bool) else cell for cell in row.values()])
-
-
-def _write_jsonl(path: str, table: list[dict[str, Any]], columns: dict[str, str]) -> None:
-    with open(path, "w", encoding="utf-8") as file:
-        file.writelines(json.dumps(row) + "\n" for row in table)
-
-
-def _write_parquet(path: str, table: list[dict[str, Any]], columns: dict[str, str]) -> None:
+def _write_parquet(path: str, rows: list[str]) -> None:
     try:
         import pyarrow  # type: ignore[import-not-found, import-untyped, unused-ignore]
         import pyarrow.parquet  # type: ignore[import-not-found, import-untyped, unused-ignore]
     except ImportError as error:
         raise ImportError("--rows: .parquet needs pyarrow: pip install pyarrow") from error
     types = {"text": pyarrow.string(), "flag": pyarrow.bool_(), "count": pyarrow.int64(), "number": pyarrow.float64()}
-    schema = pyarrow.schema([(name, types[kind]) for name, kind in columns.items()])
-    pyarrow.parquet.write_table(pyarrow.Table.from_pylist(table, schema), path)
+    schema = pyarrow.schema([(name, types[kind]) for name, kind in _impinge._check_columns()])
+    # Keys of a row that are no columns, its places, are left out.
+    pyarrow.parquet.write_table(pyarrow.Table.from_pylist([json.loads(row) for row in rows], schema), path)
 
 
-_WRITERS = {".csv": _write_csv, ".jsonl": _write_jsonl, ".parquet": _write_parquet}
+def _suffix(path: str) -> str:
+    return os.path.splitext(path)[1].lower().removeprefix(".")
 
 
 def _named(text: str) -> list[str]:

@@ -1,8 +1,6 @@
 //! `check --rows`: a table with a row per mesh, without places.
 
-use impinge_check::{KeyKind, Row};
-use impinge_io::{Cell, Column, Holds};
-use serde_json::Value;
+use impinge_check::Row;
 
 use crate::error::Error;
 use crate::rows;
@@ -24,26 +22,7 @@ pub fn refuse(file: &RowsFile) -> Result<(), Error> {
 
 /// Writes the rows.
 pub fn write(file: &RowsFile, rows: &[Row]) -> Result<(), Error> {
-    let columns = Row::KEYS.map(|(name, kind)| {
-        let holds = match kind {
-            KeyKind::Text => Holds::Line,
-            KeyKind::Flag => Holds::Bool,
-            KeyKind::Count => Holds::Count,
-            KeyKind::Number => Holds::F64,
-        };
-        Column::new(name, holds).or_none()
-    });
-    let objects = rows.iter().map(Row::to_json).collect::<Vec<_>>();
-    let cells = objects.iter().map(|object| {
-        Row::KEYS.map(|(name, kind)| match &object[name] {
-            Value::Bool(is_so) => Cell::Bool(*is_so),
-            Value::Number(n) if kind == KeyKind::Count => {
-                Cell::Count(n.as_i64().unwrap_or(i64::MAX))
-            }
-            Value::Number(x) => Cell::Float(x.as_f64().unwrap_or(f64::NAN)),
-            Value::String(text) => Cell::Line(text),
-            _ => Cell::None,
-        })
-    });
-    rows::write(file, columns.to_vec(), rows.len(), cells)
+    let objects: Vec<_> = rows.iter().map(Row::to_json).collect();
+    let cells = objects.iter().map(Row::cells);
+    rows::write(file, Row::COLUMNS.to_vec(), rows.len(), cells)
 }
