@@ -33,39 +33,20 @@ class IMPINGE_PT_check(Part, bpy.types.Panel):
         layout.prop(settings, "weld")
         if context.mode == "EDIT_MESH":
             layout.prop(settings, "selected_only")
-        draw_work(layout, "impinge.check")
-        found = state.found
-        if found is None:
-            return
-        layout.label(text=text.of_answer(found.answer, found.question))
-        if found.frame != context.scene.frame_current:
-            layout.label(text=f"in frame {found.frame}")
-        if found.answer.places:
-            draw_places(layout, context, found)
-        if found.answer.faces:
-            layout.operator("impinge.select").place_only = False
+        draw_work(layout, "impinge.check", "Check")
 
 
-def draw_work(layout, operator):
-    """The button, or the work in progress."""
-    if state.running is None:
-        layout.operator(operator)
+def draw_work(layout, operator, label):
+    """The button, or the work that it has begun."""
+    if state.running is None or state.running.label != label:
+        row = layout.row()
+        row.enabled = state.running is None
+        row.operator(operator)
         return
     done, total = state.running.frames or state.running.driver.progress
     row = layout.row(align=True)
     row.progress(factor=done / total if total else 0.0, text=f"{state.running.label} {done:,} of {total:,}" if total else state.running.label)
     row.operator("impinge.cancel", text="", icon="X")
-
-
-def draw_places(layout, context, found):
-    row = layout.row(align=True)
-    row.operator("impinge.step", text="", icon="TRIA_LEFT").by = -1
-    row.label(text=f"Place {found.place + 1:,} of {len(found.answer.places):,}")
-    row.operator("impinge.step", text="", icon="TRIA_RIGHT").by = 1
-    if 0 <= found.place < len(found.answer.places):
-        place = found.answer.places[found.place]
-        layout.label(text=text.of_place(place, lambda distance: length(context, distance)))
-        layout.operator("impinge.select", text="Select Faces of This Place").place_only = True
 
 
 class IMPINGE_PT_clearance(Part, bpy.types.Panel):
@@ -76,7 +57,45 @@ class IMPINGE_PT_clearance(Part, bpy.types.Panel):
         self.layout.prop(settings, "distance")
         if settings.which != "BETWEEN":
             self.layout.prop(settings, "rings")
-        draw_work(self.layout, "impinge.clearance")
+        draw_work(self.layout, "impinge.clearance", "Clearance")
+
+
+class IMPINGE_PT_found(Part, bpy.types.Panel):
+    bl_label = "Found"
+
+    @classmethod
+    def poll(cls, context):
+        return state.found is not None
+
+    def draw(self, context):
+        found = state.found
+        lines = text.lines_of_answer(found.answer, found.question)
+        if found.frame != context.scene.frame_current:
+            lines.append(f"in frame {found.frame}")
+        draw_lines(self.layout, lines)
+        if found.answer.places:
+            draw_places(self.layout, context, found)
+        if found.answer.faces:
+            self.layout.operator("impinge.select", text="Select All Faces").place_only = False
+
+
+def draw_lines(layout, lines):
+    column = layout.column(align=True)
+    column.scale_y = 0.8
+    for line in lines:
+        column.label(text=line)
+
+
+def draw_places(layout, context, found):
+    n_places = len(found.answer.places)
+    is_at_place = 0 <= found.place < n_places
+    row = layout.row(align=True)
+    row.operator("impinge.step", text="", icon="TRIA_LEFT").by = -1
+    row.label(text=f"Place {found.place + 1:,} of {n_places:,}" if is_at_place else "Go to a place")
+    row.operator("impinge.step", text="", icon="TRIA_RIGHT").by = 1
+    if is_at_place:
+        draw_lines(layout, text.lines_of_place(found.answer.places[found.place], lambda distance: length(context, distance)))
+        layout.operator("impinge.select", text="Select Faces of This Place").place_only = True
 
 
 class IMPINGE_PT_scan(Part, bpy.types.Panel):
@@ -88,7 +107,7 @@ class IMPINGE_PT_scan(Part, bpy.types.Panel):
         row = layout.row()
         row.prop(settings, "step")
         row.prop(settings, "mark")
-        draw_work(layout, "impinge.scan")
+        draw_work(layout, "impinge.scan", "Scan")
         if not settings.n_frames:
             return
         layout.label(text=f"{settings.n_hits:,} of {text.counted(settings.n_frames, 'frame')} intersect")
@@ -98,4 +117,4 @@ class IMPINGE_PT_scan(Part, bpy.types.Panel):
             row.operator("impinge.first_frame", text="", icon="PLAY")
 
 
-CLASSES = (IMPINGE_PT_check, IMPINGE_PT_clearance, IMPINGE_PT_scan)
+CLASSES = (IMPINGE_PT_check, IMPINGE_PT_clearance, IMPINGE_PT_found, IMPINGE_PT_scan)

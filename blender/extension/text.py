@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-__all__ = ["of_answer", "of_frames", "of_place", "pairs"]
+__all__ = ["lines_of_answer", "lines_of_place", "of_answer", "of_frames", "pairs"]
 
 
 def counted(n, noun):
@@ -22,12 +22,22 @@ def of_answer(answer, question):
     return f"{counted(answer.n_pairs, (near + ' pair').strip())} of {counted(answer.n_triangles, 'triangle')}{where}"
 
 
-def of_place(place, length):
-    """What a place is; `length` writes a distance in the units of the scene."""
+def lines_of_answer(answer, question):
+    """The same in lines that fit into the sidebar."""
+    is_near = question.distance is not None
+    if not answer.n_pairs:
+        first = ["nothing is near" if is_near else "nothing intersects"]
+    else:
+        found = counted(answer.n_pairs, "near pair" if is_near else "pair")
+        first = [f"{found} in {counted(answer.n_places, 'place')}"] if answer.is_placed else [found, "too many to find their places"]
+    return [*first, f"of {counted(answer.n_triangles, 'triangle')}"]
+
+
+def lines_of_place(place, length):
+    """What a place is, in such lines; `length` writes a distance in the units of the scene."""
     a, b = place.names
-    of = a if a == b else f"{a} and {b}"
     distance = "" if place.distance is None else f", {length(place.distance)} apart"
-    return f"{of}: {pairs(place.n_pairs)}{distance}"
+    return [*([a] if a == b else [f"{a} and", b]), f"{pairs(place.n_pairs)}{distance}"]
 
 
 def of_frames(seen):

@@ -60,6 +60,8 @@ def test_two_cubes(cube):
     assert place.names == ("a", "b") and place.n_pairs == answer.n_pairs
     assert np.all(np.abs(place.position - 0.75) < 0.3) and 0.4 < place.radius < 1.0
     assert text.of_answer(answer, state.found.question) == f"{answer.n_pairs} pairs of 24 triangles in 1 place"
+    assert text.lines_of_answer(answer, state.found.question) == [f"{answer.n_pairs} pairs in 1 place", "of 24 triangles"]
+    assert text.lines_of_place(place, str) == ["a and", "b", f"{answer.n_pairs} pairs"]
 
 
 def test_touching_counts_and_a_gap_does_not(cube):
@@ -163,6 +165,7 @@ def test_clearance(cube, scene):
     bpy.ops.impinge.clearance()
     assert state.found.answer.n_pairs == 0
     assert text.of_answer(state.found.answer, state.found.question) == "none of 36 triangles is near"
+    assert text.lines_of_answer(state.found.answer, state.found.question) == ["nothing is near", "of 36 triangles"]
     scene.impinge.distance = 0.5
     bpy.ops.impinge.clearance()
     answer = state.found.answer
@@ -379,6 +382,8 @@ class Layout:
     def row(self, align=False):
         return Layout(self.texts)
 
+    column = row
+
     def prop(self, holder, name, expand=False):
         assert name in holder.bl_rna.properties, name
         self.texts.append(name)
@@ -409,19 +414,23 @@ def test_the_panel_says_what_was_found(cube, scene):
     cube("a")
     cube("b", (1.5, 1.5, 1.5))
     assert drawn(panel.IMPINGE_PT_check) == ["which", "weld", "Check"]
+    assert not panel.IMPINGE_PT_found.poll(bpy.context)
     n = check("BETWEEN").n_pairs
-    texts = drawn(panel.IMPINGE_PT_check)
-    assert f"{n} pairs of 24 triangles in 1 place" in texts and "Place 0 of 1" in texts
+    assert panel.IMPINGE_PT_found.poll(bpy.context)
+    found = [f"{n} pairs in 1 place", "of 24 triangles"]
+    assert drawn(panel.IMPINGE_PT_found) == [*found, "", "Go to a place", "", "Select All Faces"]
     bpy.ops.impinge.step(by=1)
-    assert {f"a and b: {n} pairs", "Place 1 of 1", "Select Faces of This Place"} <= set(drawn(panel.IMPINGE_PT_check))
+    place = ["", "Place 1 of 1", "", "a and", "b", f"{n} pairs", "Select Faces of This Place"]
+    assert drawn(panel.IMPINGE_PT_found) == [*found, *place, "Select All Faces"]
     scene.frame_set(4)
-    assert "in frame 1" in drawn(panel.IMPINGE_PT_check)
+    assert drawn(panel.IMPINGE_PT_found)[2] == "in frame 1"
     assert drawn(panel.IMPINGE_PT_clearance) == ["distance", "Find Clearance"]
     assert drawn(panel.IMPINGE_PT_scan) == ["step", "mark", "Scan Frames"]
     bpy.ops.impinge.scan()
     assert {"20 of 20 frames intersect", "first_frame"} <= set(drawn(panel.IMPINGE_PT_scan))
     state.run(state.Running("Scan", SimpleNamespace(progress=(0, 0)), (3, 20)))
-    assert {"Scan 3 of 20", ""} <= set(drawn(panel.IMPINGE_PT_check))
+    # Its own panel shows the work, the others their buttons.
+    assert drawn(panel.IMPINGE_PT_scan)[2:4] == ["Scan 3 of 20", ""] and "Check" in drawn(panel.IMPINGE_PT_check)
     bpy.ops.object.mode_set(mode="EDIT")
     assert "selected_only" in drawn(panel.IMPINGE_PT_check)
 
