@@ -39,6 +39,9 @@ pub struct Options {
     /// faces that turn their backs to each other, with matter between them. None by default. Meshes
     /// of tetrahedra have none.
     pub min_thickness: Option<f64>,
+    /// Whether a [`Row`](crate::Row) holds the problems of each primitive, with which
+    /// [`Checked::of_row`] shows the mesh without another check. Off by default.
+    pub marks: bool,
     /// CPU threads of the self-intersection search; 0 means one per core. No count depends on it.
     pub threads: usize,
 }
@@ -51,6 +54,7 @@ impl Default for Options {
             places: 3,
             faces: false,
             min_thickness: None,
+            marks: false,
             threads: 0,
         }
     }

@@ -2,30 +2,56 @@
 
 use std::path::Path;
 
-use impinge_io::{Error as FileError, ReadOptions, read};
+use impinge_io::{Error as FileError, ReadOptions, read, weld};
 
 use crate::analysis::{Checked, Options, check_mesh};
+use crate::marks::MarkRuns;
 use crate::row::{ErrorKind, Failure, Row};
 
 /// Checks the mesh of one file. Errors are in the row.
 pub fn check_file(path: &Path, options: &Options) -> Row {
-    check_file_marked(path, options).0
-}
-
-/// Like [`check_file`], and also returns the mesh with the marks of its primitives if it could be
-/// checked.
-pub fn check_file_marked(path: &Path, options: &Options) -> (Row, Option<Checked>) {
-    let (result, places, checked) = match checked(path, options) {
-        Ok(checked) => (Ok(checked.counts), checked.places.clone(), Some(checked)),
+    let (result, places, marks) = match checked(path, options) {
+        Ok(checked) => {
+            let marks = options.marks.then(|| MarkRuns::new(&checked.marks));
+            (Ok(checked.counts), checked.places, marks)
+        }
         Err(failure) => (Err(failure), Vec::new(), None),
     };
-    let row = Row {
+    Row {
         path: path.display().to_string(),
         is_welded: options.weld,
         result,
         places,
-    };
-    (row, checked)
+        marks,
+    }
+}
+
+impl Checked {
+    /// The mesh of a row with [marks](Row::marks), which is read once more and not checked once
+    /// more. `None` without marks, and if the file has no longer the mesh that was checked.
+    pub fn of_row(row: &Row) -> Option<Self> {
+        let (counts, runs) = (*row.result.as_ref().ok()?, row.marks.as_ref()?);
+        let mut mesh = read(row.path.as_ref(), &ReadOptions::as_they_are()).ok()?;
+        let n_vertices = mesh.n_vertices();
+        let n_welded = if counts.n_welded > 0 {
+            weld(&mut mesh)
+        } else {
+            0
+        };
+        let n_primitives = (counts.n_triangles + counts.n_tetrahedra) as usize;
+        let is_same = [n_vertices, n_welded]
+            == [counts.n_vertices, counts.n_welded].map(|n| n as usize)
+            && mesh.n_primitives() == n_primitives;
+        if !is_same {
+            return None;
+        }
+        Some(Checked {
+            counts,
+            marks: runs.marks(n_primitives)?,
+            places: row.places.clone(),
+            mesh,
+        })
+    }
 }
 
 fn checked(path: &Path, options: &Options) -> Result<Checked, Failure> {

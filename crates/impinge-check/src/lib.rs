@@ -53,10 +53,10 @@ pub use assembly::{
     Assembly, AssemblyError, AssemblyOptions, PartKind, PartPair, Relation, check_assembly,
     check_assembly_with,
 };
-pub use file::{check_file, check_file_marked};
+pub use file::check_file;
 pub use fix::{FixError, FixOptions, Fixed, MOST_HOLE_EDGES, Repair, Repairs, fix_mesh};
 pub use limits::{Limits, apply_limits};
-pub use marks::{Marks, Problem};
+pub use marks::{MarkRuns, Marks, Problem};
 pub use places::Place;
 pub use pool::{Pool, PoolError};
 pub use report::{Failed, Finding, Report};

@@ -1,5 +1,7 @@
 //! The problems of each primitive, for pictures.
 
+use serde_json::{Value, json};
+
 /// One kind of problem of a primitive, in the order in which pictures show them: the first that
 /// applies gives the colour.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -106,5 +108,68 @@ impl Marks {
     /// The most serious problem, if there is any.
     pub fn first(self) -> Option<Problem> {
         Problem::ALL.into_iter().find(|&problem| self.has(problem))
+    }
+}
+
+/// The marks of all primitives of a mesh, as runs of primitives with the same problems; most
+/// primitives have none and are left out.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct MarkRuns(Vec<(u32, u32, Marks)>);
+
+impl MarkRuns {
+    pub(crate) fn new(marks: &[Marks]) -> Self {
+        let mut first = 0;
+        let runs = marks.chunk_by(|a, b| a == b).map(|run| {
+            let n = run.len() as u32;
+            first += n;
+            (first - n, n, run[0])
+        });
+        MarkRuns(runs.filter(|run| run.2 != Marks::default()).collect())
+    }
+
+    /// The marks of `n` primitives; `None` if there are marks of later ones.
+    pub(crate) fn marks(&self, n: usize) -> Option<Vec<Marks>> {
+        let mut marks = vec![Marks::default(); n];
+        for &(first, n, run) in &self.0 {
+            let end = (first as usize).checked_add(n as usize)?;
+            marks.get_mut(first as usize..end)?.fill(run);
+        }
+        Some(marks)
+    }
+
+    pub(crate) fn to_json(&self) -> Value {
+        let runs = self.0.iter();
+        runs.map(|&(first, n, marks)| json!([first, n, marks.0]))
+            .collect()
+    }
+
+    pub(crate) fn from_json(value: &Value) -> Option<Self> {
+        let run = |value: &Value| {
+            let number = |ix: usize| u32::try_from(value.get(ix)?.as_u64()?).ok();
+            Some((
+                number(0)?,
+                number(1)?,
+                Marks(u8::try_from(number(2)?).ok()?),
+            ))
+        };
+        let runs = value.as_array()?.iter().map(run);
+        Some(MarkRuns(runs.collect::<Option<_>>()?))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn runs_survive_json_and_give_all_marks_back() {
+        let marks: Vec<Marks> = [0, 0, 3, 3, 3, 0, 1, 64].map(Marks).to_vec();
+        let runs = MarkRuns::new(&marks);
+        assert_eq!(runs.to_json().to_string(), "[[2,3,3],[6,1,1],[7,1,64]]");
+        assert_eq!(MarkRuns::from_json(&runs.to_json()), Some(runs.clone()));
+        assert_eq!(runs.marks(marks.len()), Some(marks));
+        // Another mesh than the one that was checked.
+        assert_eq!(runs.marks(7), None);
+        assert_eq!(MarkRuns::from_json(&json!([[0, 1, 256]])), None);
     }
 }

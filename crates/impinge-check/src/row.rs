@@ -2,6 +2,7 @@
 
 use serde_json::{Map, Value, json};
 
+use crate::marks::MarkRuns;
 use crate::places::Place;
 
 /// The counts of one mesh. Facets are edges of triangles and faces of tetrahedra.
@@ -129,6 +130,9 @@ pub struct Row {
     pub result: Result<Counts, Failure>,
     /// Where the problems are: see [`Options::places`](crate::Options::places).
     pub places: Vec<Place>,
+    /// Which problems each primitive has: see [`Options::marks`](crate::Options::marks). Not part of
+    /// the [object](Self::to_json).
+    pub marks: Option<MarkRuns>,
 }
 
 impl Row {
@@ -146,6 +150,7 @@ impl Row {
                 message: lines.collect::<Vec<_>>().join("; "),
             }),
             places: Vec::new(),
+            marks: None,
         }
     }
 
@@ -261,6 +266,7 @@ impl Row {
                 }
                 _ => Vec::new(),
             },
+            marks: None,
         })
     }
 }
@@ -338,6 +344,7 @@ mod tests {
                 n_elements: 4,
                 elements: vec![1, 5],
             }],
+            marks: None,
         }
     }
 

@@ -8,6 +8,9 @@ use serde_json::Value;
 use crate::analysis::Options;
 use crate::file::check_file;
 
+/// The key under which a child says the marks of a row, for its parent alone.
+pub const MARKS: &str = "marks";
+
 /// Answers each line of `input`, a path as a JSON string, with the row of its mesh on a line of
 /// `output`, until the input ends.
 ///
@@ -22,7 +25,11 @@ pub fn serve(input: impl BufRead, mut output: impl Write, options: &Options) -> 
             ));
         };
         let row = check_file(Path::new(&path), options);
-        writeln!(output, "{}", row.to_json())?;
+        let mut object = row.to_json();
+        if let Some(marks) = &row.marks {
+            object[MARKS] = marks.to_json();
+        }
+        writeln!(output, "{object}")?;
         output.flush()?;
     }
     Ok(())

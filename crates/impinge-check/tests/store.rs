@@ -14,6 +14,7 @@ fn row(path: &Path) -> Row {
         is_welded: true,
         result: Ok(Counts::default()),
         places: Vec::new(),
+        marks: None,
     }
 }
 

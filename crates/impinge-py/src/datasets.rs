@@ -152,6 +152,7 @@ pub fn _fix<'py>(
             is_welded,
             result: Ok(counts),
             places: places.to_vec(),
+            marks: None,
         };
         let mut row = row.to_json();
         row.as_object_mut().map(|row| row.remove("path"));

@@ -9,7 +9,9 @@ use std::time::{Duration, Instant};
 use impinge::CancelToken;
 use serde_json::Value;
 
+use crate::marks::MarkRuns;
 use crate::row::{ErrorKind, Row};
+use crate::worker::MARKS;
 
 /// How often a waiting thread checks for cancellation.
 const GLANCE: Duration = Duration::from_millis(50);
@@ -90,7 +92,7 @@ impl Child {
             {
                 Ok(line) => {
                     let value = serde_json::from_str(&line).ok();
-                    return match value.as_ref().and_then(Row::from_json) {
+                    return match value.as_ref().and_then(of_child) {
                         Some(row) if row.path == path => Answer::Row(Box::new(row)),
                         _ => Answer::Ended {
                             kind: ErrorKind::Crash,
@@ -155,6 +157,15 @@ impl Drop for Child {
         let _ = self.process.kill();
         let _ = self.process.wait();
     }
+}
+
+/// The row of a child's line, with the marks that were asked for.
+fn of_child(value: &Value) -> Option<Row> {
+    let mut row = Row::from_json(value)?;
+    if let Some(marks) = value.get(MARKS) {
+        row.marks = Some(MarkRuns::from_json(marks)?);
+    }
+    Some(row)
 }
 
 /// Reads to the end and returns the last bytes as text.

@@ -58,19 +58,23 @@ pub fn check(args: &CheckArgs, cancel: &CancelToken) -> Result<(), Error> {
         "meshes",
         args.json || args.format != args::Format::Text,
     );
-    let rows = match &args.out {
+    let mut rows = match &args.out {
         Some(args::Out::Folder(folder)) => kept(args, folder, &paths, &watch, cancel)?,
         _ => {
             let mut rows = Ordered::new(args.json, &mine);
-            run(args, &paths, &mine, &watch, cancel, |ix, row| {
+            run(args, &paths, &mine, cancel, |ix, row| {
+                watch.frame_done();
                 rows.put(ix, row)
             })?;
             rows.finish()
         }
     };
     drop(watch);
+    if args.shows() {
+        mark(args, &mut rows, cancel)?;
+    }
     if let Some(args::Out::Mesh(file)) = &args.out {
-        shown::write_mesh(file, &rows, args)?;
+        shown::write_mesh(file, &rows)?;
     }
     let fail_on = FailOn::findings(&args.fail_on);
     let report = Report {
@@ -131,6 +135,7 @@ pub fn check_worker(args: &CheckWorkerArgs) -> Result<(), Error> {
         places: args.places,
         faces: args.faces,
         min_thickness: args.min_thickness,
+        marks: args.marks,
         threads: args.threads,
     };
     Ok(serve(stdin().lock(), stdout().lock(), &options)?)
@@ -179,7 +184,6 @@ fn run(
     args: &CheckArgs,
     paths: &[PathBuf],
     wanted: &[usize],
-    watch: &Watch,
     cancel: &CancelToken,
     mut put: impl FnMut(usize, Row) -> Result<(), Error>,
 ) -> Result<(), Error> {
@@ -209,6 +213,9 @@ fn run(
         if let Some(thickness) = args.min_thickness {
             command.arg("--min-thickness").arg(format!("{thickness:?}"));
         }
+        if args.shows() {
+            command.arg("--marks");
+        }
         if let Some(memory) = args.memory {
             command.arg("--memory").arg(memory.to_string());
         }
@@ -237,7 +244,6 @@ fn run(
             }
         });
         let ran = pool.run(&chosen, &stop, |ix, row| {
-            watch.frame_done();
             if result.is_ok() {
                 result = put(wanted[ix], row);
                 if result.is_err() {
@@ -253,6 +259,21 @@ fn run(
         Err(PoolError::Cancelled) => Err(impinge::Error::Cancelled.into()),
         other => Ok(other?),
     }
+}
+
+/// Marks the rows that an earlier run has kept, which have no marks: their meshes are checked once
+/// more, within the same limits. A row whose mesh has another answer now stays as it is.
+fn mark(args: &CheckArgs, rows: &mut [Row], cancel: &CancelToken) -> Result<(), Error> {
+    let is_bare = |row: &&mut Row| row.result.is_ok() && row.marks.is_none();
+    let mut bare: Vec<&mut Row> = rows.iter_mut().filter(is_bare).collect();
+    let paths: Vec<PathBuf> = bare.iter().map(|row| PathBuf::from(&row.path)).collect();
+    let all: Vec<usize> = (0..paths.len()).collect();
+    run(args, &paths, &all, cancel, |ix, row| {
+        if row.result == bare[ix].result {
+            bare[ix].marks = row.marks;
+        }
+        Ok(())
+    })
 }
 
 /// Checks the meshes without a row in the folder; returns all rows of this process.
@@ -274,7 +295,8 @@ fn kept(
     }
     // A request to stop waits until all finished rows are written.
     let _patience = Patience::new();
-    let ran = run(args, paths, &missing, watch, cancel, |ix, row| {
+    let ran = run(args, paths, &missing, cancel, |ix, row| {
+        watch.frame_done();
         printed.put(ix, row.clone())?;
         Ok(store.put(ix, row)?)
     });

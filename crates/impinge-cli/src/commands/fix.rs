@@ -118,6 +118,7 @@ fn row(path: &Path, is_welded: bool, counts: Counts, places: &[Place]) -> Row {
         path: path.display().to_string(),
         is_welded,
         result: Ok(counts),
+        marks: None,
         places: places.to_vec(),
     }
 }

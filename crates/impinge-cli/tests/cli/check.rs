@@ -679,6 +679,57 @@ fn the_page_stands_alone_and_its_pictures_are_pictures() {
         .misuse();
 }
 
+#[test]
+fn pictures_need_no_other_check_and_keep_its_limits() {
+    let folder = meshes();
+    let names = ["closed.obj", "pierced.obj", "nan.obj"];
+    let html = |page: &str, more: &[&str]| {
+        let args = [&["check", "--html", page][..], more, &names].concat();
+        failed(folder.run(args), 1, 3);
+        read(&folder, page)
+    };
+    // A run that goes on with kept rows draws what it would have drawn at once.
+    let fresh = html("fresh.html", &[]);
+    assert_eq!(fresh.matches("<img ").count(), 1 + 4);
+    failed(
+        folder.run([&["check", "--out", "rows"][..], &names].concat()),
+        1,
+        3,
+    );
+    assert_eq!(html("kept.html", &["--out", "rows"]), fresh);
+    // Now each of 20,000 triangles crosses all others: no check of them ends soon.
+    let mut soup = String::new();
+    for ix in 0..20_000 {
+        let angle = f64::from(ix) * 1e-4;
+        let (x, y) = (angle.cos(), angle.sin());
+        soup += &format!("v {x} {y} -1\nv {} {} -1\nv 0 0 1\n", -x, -y);
+        soup += &format!("f {} {} {}\n", 3 * ix + 1, 3 * ix + 2, 3 * ix + 3);
+    }
+    folder.text("pierced.obj", &soup);
+    let args = ["--out", "rows", "--timeout", "1", "--html", "late.html"];
+    let mut child = folder
+        .command([&["check"][..], &args, &names].concat())
+        .stdout(std::process::Stdio::null())
+        .stderr(std::process::Stdio::null())
+        .spawn()
+        .unwrap();
+    let started = std::time::Instant::now();
+    while child.try_wait().unwrap().is_none() {
+        if started.elapsed().as_secs() > 60 {
+            child.kill().unwrap();
+            panic!("the pictures know no limit");
+        }
+        std::thread::sleep(std::time::Duration::from_millis(50));
+    }
+    let late = read(&folder, "late.html");
+    assert_eq!(late.matches("<img ").count(), 1);
+    assert_eq!(late.matches("no picture: ").count(), 1);
+    // What a file shows is what its row says, or nothing.
+    folder.text("pierced.obj", CLOSED);
+    let changed = html("changed.html", &["--out", "rows"]);
+    assert_eq!(changed, late);
+}
+
 /// The bytes of a base64 text.
 fn decoded(text: &str) -> Vec<u8> {
     const DIGITS: &str = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";

@@ -143,6 +143,14 @@ pub struct CheckArgs {
     pub picture: PictureArgs,
 }
 
+impl CheckArgs {
+    /// Whether meshes are shown, for which their rows need marks.
+    pub fn shows(&self) -> bool {
+        let is_mesh = matches!(self.out, Some(Out::Mesh(_)));
+        is_mesh || self.html.is_some() || self.png.is_some()
+    }
+}
+
 #[derive(Debug, Args)]
 pub struct CheckWorkerArgs {
     /// CPU threads
@@ -163,6 +171,9 @@ pub struct CheckWorkerArgs {
     /// The thickness of walls to be found
     #[arg(long, value_name = "T")]
     pub min_thickness: Option<f64>,
+    /// Say the problems of each primitive
+    #[arg(long)]
+    pub marks: bool,
     /// Address space
     #[arg(long, value_name = "BYTES")]
     pub memory: Option<u64>,

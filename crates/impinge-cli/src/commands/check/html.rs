@@ -2,7 +2,7 @@
 //! one per place, and a view of each mesh that can be turned.
 //!
 //! Pictures are PNG in base64, drawn on the CPU. Browsers decode them when they come into view, and
-//! those of places when their list is opened. Meshes are checked and drawn one after another, so
+//! those of places when their list is opened. Meshes are read and drawn one after another, so
 //! memory holds one of them.
 
 mod view;
@@ -11,12 +11,12 @@ use std::io::Write;
 use std::path::Path;
 
 use impinge_check::report::{COLUMNS, escaped, numbers};
-use impinge_check::{Checked, Place, Problem, Report, Row, check_file_marked};
+use impinge_check::{Checked, Place, Problem, Report, Row};
 use impinge_io::AtomicFile;
 use impinge_render::{Camera, Focus, Picture};
 
 use super::args::CheckArgs;
-use super::shown::{options, surface};
+use super::shown::surface;
 use crate::error::Error;
 use crate::picture::diagonal;
 use crate::text::grouped;
@@ -33,6 +33,8 @@ const VIEW: &str = "<dialog><canvas tabindex=\"0\" aria-label=\"The mesh. Drag o
 
 /// Width and height of a picture.
 const SIZE: [u32; 2] = [240, 180];
+/// Said in place of pictures.
+const NO_PICTURE: &str = "<div class=\"error\">no picture: the mesh has changed since this row was written, or its check reached a limit</div>";
 /// The most pictures of places per mesh; the others are listed.
 const MOST_PICTURES: usize = 6;
 
@@ -124,9 +126,8 @@ fn of_row(row: &Row, most: usize, args: &CheckArgs) -> Result<String, Error> {
             ));
         }
     };
-    let (_, checked) = check_file_marked(Path::new(&row.path), &options(args));
     let (mut thumbnail, mut details) = (String::new(), String::new());
-    if let Some(checked) = checked {
+    if let Some(checked) = Checked::of_row(row) {
         let mut picture = Picture {
             surfaces: vec![surface(&checked)],
             camera: Camera {
@@ -165,6 +166,8 @@ fn of_row(row: &Row, most: usize, args: &CheckArgs) -> Result<String, Error> {
             }
             details += "</div></details>";
         }
+    } else {
+        details += NO_PICTURE;
     }
     let mut text = format!(
         "<tr><td class=\"pic\">{thumbnail}</td><td class=\"name\" data-v=\"{name}\">{name}{details}</td>"

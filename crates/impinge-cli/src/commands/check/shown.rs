@@ -1,12 +1,11 @@
 //! The problems of meshes in colours: mesh files and pictures.
 //!
-//! Child processes do not send marks of primitives, so meshes are checked once more in this
-//! process.
+//! Rows say which primitives have which problem, so meshes are only read once more.
 
 use std::io::Write;
 use std::path::Path;
 
-use impinge_check::{Checked, Options, Problem, Row, check_file_marked};
+use impinge_check::{Checked, Problem, Row};
 use impinge_io::{ColoredMesh, Elements, write_glb, write_ply, write_vtu};
 
 use impinge_render::{Face, Normals, Surface};
@@ -19,27 +18,11 @@ use crate::values::{MeshFile, MeshFormat};
 /// The colour of primitives without a finding.
 const FINE: [u8; 3] = [200, 200, 200];
 
-/// How meshes are checked once more.
-pub fn options(args: &CheckArgs) -> Options {
-    Options {
-        weld: !args.no_weld && !args.keep_seams,
-        keep_seams: args.keep_seams,
-        places: args.places,
-        faces: args.faces,
-        min_thickness: args.min_thickness,
-        threads: 0,
-    }
-}
-
 /// All meshes that could be checked, with the marks of their primitives.
-fn marked(rows: &[Row], args: &CheckArgs) -> Result<Vec<(String, Checked)>, Error> {
-    let options = options(args);
-    let sound = rows.iter().filter(|row| row.result.is_ok());
-    let checked: Vec<(String, Checked)> = sound
-        .filter_map(|row| {
-            let (_, checked) = check_file_marked(Path::new(&row.path), &options);
-            Some((row.path.clone(), checked?))
-        })
+fn marked(rows: &[Row]) -> Result<Vec<(String, Checked)>, Error> {
+    let checked: Vec<(String, Checked)> = rows
+        .iter()
+        .filter_map(|row| Some((row.path.clone(), Checked::of_row(row)?)))
         .collect();
     if checked.is_empty() {
         return Err(Error::Usage(
@@ -57,8 +40,8 @@ fn color(checked: &Checked, primitive: usize) -> [u8; 3] {
 
 /// Writes the meshes, welded as in the check; each primitive has the colour of its most serious
 /// problem.
-pub fn write_mesh(file: &MeshFile, rows: &[Row], args: &CheckArgs) -> Result<(), Error> {
-    let checked = marked(rows, args)?;
+pub fn write_mesh(file: &MeshFile, rows: &[Row]) -> Result<(), Error> {
+    let checked = marked(rows)?;
     let colors: Vec<Vec<[u8; 3]>> = checked
         .iter()
         .map(|(_, checked)| {
@@ -108,7 +91,7 @@ pub fn print_legend() -> Result<(), Error> {
 /// Draws the meshes in the same colours. Primitives with a problem show through faces that hide
 /// them.
 pub fn draw(path: &Path, rows: &[Row], args: &CheckArgs) -> Result<(), Error> {
-    let meshes = marked(rows, args)?;
+    let meshes = marked(rows)?;
     let surfaces = meshes.iter().map(|(_, checked)| surface(checked));
     crate::picture::Drawer::new(&args.picture, None, 1)?.draw(path, surfaces.collect())
 }
