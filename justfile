@@ -47,7 +47,6 @@ blender *arguments:
 release *arguments:
     scripts/release {{arguments}}
 
-# The pictures of the documents
-picture:
-    scripts/picture moving
-    scripts/picture cloth
+# The pictures of the documents: moving, cloth, examples or blender
+picture name:
+    scripts/picture {{name}}

@@ -1,4 +1,6 @@
 // A cloth of springs falls on a ball. Each step goes as far as nothing touches, so the cloth never passes through the ball or itself.
+//
+// cloth [FILE.obj]: with a file, what the cloth has come to is written to it.
 #include <impinge/impinge.hpp>
 
 #include <cmath>
@@ -31,7 +33,21 @@ static void ball(std::vector<vec> &at, std::vector<std::array<int, 3>> &faces, i
   }
 }
 
-int main() {
+/// Ball and cloth as groups of an OBJ file.
+static bool write(const char *path, const std::vector<vec> (&at)[2], const std::vector<std::array<int, 3>> (&faces)[2]) {
+  std::FILE *file = std::fopen(path, "w");
+  if (!file) return false;
+  int first = 1;
+  for (int body = 0; body < 2; ++body) {
+    std::fprintf(file, "g %s\n", body == 0 ? "ball" : "cloth");
+    for (const auto &p : at[body]) std::fprintf(file, "v %.9g %.9g %.9g\n", p[0], p[1], p[2]);
+    for (const auto &f : faces[body]) std::fprintf(file, "f %d %d %d\n", first + f[0], first + f[1], first + f[2]);
+    first += static_cast<int>(at[body].size());
+  }
+  return std::fclose(file) == 0;
+}
+
+int main(int argc, char **argv) {
   constexpr int n = 24, n_frames = 120;
   constexpr double side = 3.0 / n, h = 0.01, clearance = 1e-3, reach = 0.02;
   std::vector<vec> ball_at, x, v(n * n);
@@ -122,5 +138,9 @@ int main() {
   for (const auto &at : x) lowest = std::min(lowest, at[2]);
   std::printf("%d frames, %d of them whole steps, none with an intersection: the cloth hangs down to %.2f, %.4f away from the ball\n", n_frames,
               n_whole, lowest, detector.distance(scene, ground, cloth)->distance);
+  if (argc > 1 && !write(argv[1], {ball_at, x}, {ball_faces, faces})) {
+    std::fprintf(stderr, "cloth: cannot write %s\n", argv[1]);
+    return 1;
+  }
   return n_whole < n_frames / 2;
 }
