@@ -4,8 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use impinge_core::exact::Feature;
 use impinge_core::{
-    Backend, Detector, Error, NearPairs, PairKind, Query, Scene, Settings, Stencil, Stencils,
-    project_psd, project_psd_all,
+    Backend, Detector, Elements, Error, NearPairs, PairKind, Query, Scene, Settings, Stencil,
+    Stencils, project_psd, project_psd_all,
 };
 use impinge_scenes::Random;
 
@@ -243,6 +243,86 @@ fn derivatives_are_those_of_textbook_distances() {
     }
     let names = "P_T P_E0 P_E1 P_E2 P_T0 P_T1 P_T2 EA_EB EA_EB0 EA_EB1 EA0_EB EA1_EB EA0_EB0 EA0_EB1 EA1_EB0 EA1_EB1 P_E P_P";
     assert_eq!(seen, names.split(' ').collect());
+}
+
+/// The area at rest that belongs to the vertices of an element, found by looking at all elements.
+fn area_by_hand(elements: &Elements, of: &[u32], rest: &[Point]) -> f64 {
+    let at = |vertex: u32| rest[vertex as usize];
+    let length = |of: Point| dot(of, of).sqrt();
+    let has_all = |corners: &[u32]| of.iter().all(|vertex| corners.contains(vertex));
+    match elements {
+        Elements::Triangles(faces) => {
+            let around = faces.iter().filter(|face| has_all(&face[..]));
+            around
+                .map(|&[a, b, c]| length(cross(sub(at(b), at(a)), sub(at(c), at(a)))) / 6.0)
+                .sum()
+        }
+        Elements::Edges(edges) => {
+            let around = edges.iter().filter(|edge| has_all(&edge[..]));
+            let lengths = around.map(|&[a, b]| length(sub(at(b), at(a))));
+            lengths.sum::<f64>() * 0.5 * of.len() as f64
+        }
+        _ => 1.0,
+    }
+}
+
+#[test]
+fn weights_by_area_are_those_of_elements_at_rest() {
+    for scene in [folded(), soup(5, None)] {
+        let rest: Vec<Point> = positions(&scene)
+            .iter()
+            .map(|&[x, y, z]| [2.0 * x + 0.3 * z, y, z - 0.1 * y])
+            .collect();
+        let near = near(&scene, 0.3);
+        let by_area = near.stencils_by_area(&scene, &rest).unwrap();
+        let offsets = by_area.offsets();
+        let mut kinds = BTreeSet::new();
+        for (pair, of) in near.iter().zip(&by_area) {
+            let parts = [pair.a, pair.b].map(|element| {
+                let body = scene.body(element.body).unwrap();
+                let first = offsets[element.body.index()] as usize;
+                (element.element, body, &rest[first..])
+            });
+            let vertex = |ix: usize| {
+                let (vertex, body, rest) = parts[ix];
+                area_by_hand(body.elements(), &[vertex], rest)
+            };
+            let edge = |ix: usize| {
+                let (edge, body, rest) = parts[ix];
+                area_by_hand(body.elements(), body.edges().corners(edge as usize), rest)
+            };
+            let expected = match pair.kind {
+                PairKind::VertexFace => vertex(0) / 4.0,
+                PairKind::EdgeEdge => (edge(0) + edge(1)) / 4.0,
+                PairKind::EdgeVertex => vertex(1) / 2.0,
+                _ => (vertex(0) + vertex(1)) / 2.0,
+            };
+            assert!(
+                (of.weight - expected).abs() <= 1e-14 * expected,
+                "{pair:?}: {} {expected}",
+                of.weight
+            );
+            kinds.insert(pair.kind);
+        }
+        assert_eq!(kinds.len(), KINDS.len());
+        // The same in all else, and merged to the same sum, in whatever order they come.
+        let plain = near.stencils(&scene, Some(&rest)).unwrap();
+        let merged = by_area.merged().unwrap();
+        let numbers = |of: &Stencil| (of.vertices, of.features, of.mollifier().to_bits());
+        assert!(by_area.iter().map(numbers).eq(plain.iter().map(numbers)));
+        let counted = plain.merged().unwrap();
+        assert!(merged.iter().map(numbers).eq(counted.iter().map(numbers)));
+        let [all, of_merged] =
+            [&by_area, &merged].map(|list| list.iter().map(|of| of.weight).sum::<f64>());
+        assert!((all - of_merged).abs() <= 1e-12 * all && all > 0.1);
+        let mut order: Vec<usize> = (0..by_area.len()).collect();
+        let mut random = Random::new(3);
+        for ix in 1..order.len() {
+            order.swap(ix, random.below(ix as u32 + 1) as usize);
+        }
+        let shuffled = by_area.select(&order).unwrap().merged().unwrap();
+        assert!(shuffled.iter().eq(merged.iter()));
+    }
 }
 
 /// The numbers of the vertices that span the features, in an order of their own.

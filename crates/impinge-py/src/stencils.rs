@@ -26,13 +26,23 @@ pub struct Stencils {
 
 impl Stencils {
     /// Of near pairs, at the positions of a scene.
-    fn new(near: &Near, scene: &Bound<'_, PyAny>, rest: &Bound<'_, PyAny>) -> PyResult<Self> {
+    fn new(
+        near: &Near,
+        scene: &Bound<'_, PyAny>,
+        rest: &Bound<'_, PyAny>,
+        by_area: bool,
+    ) -> PyResult<Self> {
         let py = scene.py();
         let scene = scene
             .cast::<Scene>()
             .map_err(|_| unexpected(scene, "scene", "a Scene"))?
             .try_borrow()
             .map_err(|_| PyRuntimeError::new_err("the scene is being changed by another thread"))?;
+        if by_area && rest.is_none() {
+            return Err(invalid(
+                "by_area: areas are those at rest, but rest is None",
+            ));
+        }
         let rest = match rest.is_none() {
             true => None,
             false => Some(PositionArray::new(rest, "rest")?),
@@ -41,7 +51,10 @@ impl Stencils {
         let bodies = &scene.inner;
         let inner = py.detach(|| {
             let rest = rows.map(Rows::widened);
-            near.iter().stencils(bodies, rest.as_deref())
+            match &rest {
+                Some(rest) if by_area => near.iter().stencils_by_area(bodies, rest),
+                _ => near.iter().stencils(bodies, rest.as_deref()),
+            }
         });
         let inner = inner.map_err(|error| match error {
             Error::WrongNumberOfPositions { .. } => invalid(format!("rest: {error}")),
@@ -149,8 +162,9 @@ pub fn _stencils(
     near: &Bound<'_, Near>,
     scene: &Bound<'_, PyAny>,
     rest: &Bound<'_, PyAny>,
+    by_area: bool,
 ) -> PyResult<Stencils> {
-    Stencils::new(near.get(), scene, rest)
+    Stencils::new(near.get(), scene, rest, by_area)
 }
 
 /// Copies of square matrices without their negative eigenvalues.

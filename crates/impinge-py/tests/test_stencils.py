@@ -96,12 +96,13 @@ def sides(kind, ids):
     return (kind, *(sorted(parts) if n[0] == n[1] else parts))
 
 
-def theirs(rest, points, faces, dhat):
+def theirs(rest, points, faces, dhat, by_area=False):
     """The collisions of ipc-toolkit by what they are."""
     ipctk = pytest.importorskip("ipctk", reason="ipctk is not installed: nothing to compare with")
     edges = ipctk.edges(faces)
     mesh = ipctk.CollisionMesh(np.asfortranarray(rest), edges, faces)
     collisions = ipctk.NormalCollisions()
+    collisions.use_area_weighting = by_area
     collisions.build(mesh, np.asfortranarray(points), dhat)
     named = {}
     for kind, name in [("vf", "fv"), ("ee", "ee"), ("ev", "ev"), ("vv", "vv")]:
@@ -186,6 +187,57 @@ def test_everything_is_as_in_ipc_toolkit(make, seed, scene_of):
         given, expected = coefficients[slots], of.compute_coefficients(x)
         assert_close(given * np.sign(given @ expected), expected, tolerance)
     assert n_mollified > 0 or len(points) != len(sheets(1)[0])
+
+
+@scenery(cubes, rumba)
+def test_weights_by_area_are_those_of_ipc_toolkit(make, seed, scene_of):
+    rest, points, faces, dhat = scene_of(make, seed)
+    named = theirs(rest, points, faces, dhat, by_area=True)[3]
+    scene = impinge.Scene()
+    scene.add(points, faces)
+    near = impinge.Detector("cpu").near(scene, dhat, kinds=["vf", "ee"])
+    contacts = near.stencils(scene, rest, by_area=True).merged()
+    ours = {sides(impinge.KINDS[kind], ids): weight for kind, ids, weight in zip(contacts.kinds, contacts.vertices, contacts.weights)}
+    assert len(ours) == len(contacts) > 20 and ours.keys() == named.keys()
+    size = max(ours.values())
+    for key, (of, _) in named.items():
+        assert_close(ours[key], of.weight, 1e-12, size)
+    # They are areas, not counts, and those at rest.
+    assert not np.array_equal(contacts.weights, near.stencils(scene, rest).merged().weights)
+    once, twice = (near.stencils(scene, scale * rest, by_area=True).weights for scale in (1, 2))
+    np.testing.assert_allclose(twice, 4 * once, rtol=1e-12)
+    with pytest.raises(ValueError, match="by_area: .* rest is None"):
+        near.stencils(scene, by_area=True)
+
+
+def test_weights_by_area_of_edges_and_points():
+    """Of a body for each kind: ipc-toolkit has them in one mesh."""
+    ipctk = pytest.importorskip("ipctk", reason="ipctk is not installed: nothing to compare with")
+    random = np.random.default_rng(8)
+    points = random.random((24, 3))
+    faces = np.array([[0, 1, 2], [2, 1, 3], [4, 5, 6]], np.int32)
+    loose = np.array([[7, 8], [8, 9], [9, 10], [11, 12], [8, 13]], np.int32)
+    mesh = ipctk.CollisionMesh(np.asfortranarray(points), np.concatenate([ipctk.edges(faces), loose]), faces)
+    collisions = ipctk.NormalCollisions()
+    collisions.use_area_weighting = True
+    collisions.build(mesh, np.asfortranarray(points), 0.4)
+    scene = impinge.Scene()
+    scene.add(points[:7], faces)
+    scene.add_edges(points[7:14], loose - 7)
+    scene.add_points(points[14:])
+    near = impinge.Detector("cpu").near(scene, 0.4, kinds=["vf", "ee", "ev", "vv"])
+    found = {}
+    for kind, weight, ids in zip(near.kinds, near.stencils(scene, points, by_area=True).weights, near.stencils(scene).vertices):
+        found[sides(impinge.KINDS[kind], ids)] = weight
+    n = 0
+    for kind, name in [("vf", "fv"), ("ee", "ee"), ("ev", "ev"), ("vv", "vv")]:
+        for of in getattr(collisions, f"{name}_collisions"):
+            key = sides(kind, [ix for ix in of.vertex_ids(mesh.edges, mesh.faces) if ix >= 0])
+            # What was found as it is, and not reduced from something larger.
+            if kind in ("vf", "ee") or kind == "vv" and min(key[1] + key[2]) >= 14:
+                assert_close(found[key], of.weight, 1e-13)
+                n += 1
+    assert n > 20 and {kind for kind, *_ in found} == {"vf", "ee", "ev", "vv"}
 
 
 def barrier(s, dhat, stiffness):

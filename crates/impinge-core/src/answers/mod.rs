@@ -1,6 +1,7 @@
 //! Answers: what a detector hands to its user, one file per kind of question.
 
 pub(crate) mod advance;
+mod areas;
 pub(crate) mod candidates;
 pub(crate) mod changes;
 pub(crate) mod closest;

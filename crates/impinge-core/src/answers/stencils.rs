@@ -1,5 +1,6 @@
 //! Near pairs as stencils: vertices, coefficients and distances with their derivatives.
 
+use crate::answers::areas::Areas;
 use crate::answers::near::{NearIter, NearPair, NearPairs};
 use crate::answers::pairs::Element;
 use crate::query::pair_kind::PairKind;
@@ -41,7 +42,8 @@ pub struct Stencil {
     pub features: [Feature; 2],
     /// The vertices by their numbers in the scene: see [`Stencils::offsets`].
     pub vertices: [u32; 4],
-    /// How many pairs it stands for.
+    /// How many pairs it stands for; or the [area](NearPairs::stencils_by_area) at rest that they
+    /// stand for.
     pub weight: f64,
     /// The positions of the vertices.
     pub points: [Point; 4],
@@ -242,6 +244,24 @@ impl NearPairs {
     pub fn stencils(&self, scene: &Scene, rest: Option<&[Point]>) -> Result<Stencils, Error> {
         self.iter().stencils(scene, rest)
     }
+
+    /// The same, weighted by area, so that a potential does not depend on how fine a mesh is. Areas
+    /// are those of ipc-toolkit's `use_area_weighting`, at rest: of a vertex a third of each face
+    /// around it (without faces, half the length of each of its edges; without edges, 1), of an edge
+    /// a third of each face beside it (without faces, its length).
+    ///
+    /// | kind | weight |
+    /// |---|---|
+    /// | [`VertexFace`](PairKind::VertexFace) | 1/4 of the area of the vertex |
+    /// | [`EdgeEdge`](PairKind::EdgeEdge) | 1/4 of the areas of both edges |
+    /// | [`EdgeVertex`](PairKind::EdgeVertex) | 1/2 of the area of the vertex |
+    /// | [`VertexVertex`](PairKind::VertexVertex) | 1/2 of the areas of both vertices |
+    ///
+    /// # Errors
+    /// As [`stencils`](NearPairs::stencils).
+    pub fn stencils_by_area(&self, scene: &Scene, rest: &[Point]) -> Result<Stencils, Error> {
+        self.iter().stencils_by_area(scene, rest)
+    }
 }
 
 impl NearIter<'_> {
@@ -250,6 +270,24 @@ impl NearIter<'_> {
     /// # Errors
     /// As there.
     pub fn stencils(self, scene: &Scene, rest: Option<&[Point]>) -> Result<Stencils, Error> {
+        self.stencils_weighted(scene, rest, None)
+    }
+
+    /// [`NearPairs::stencils_by_area`] of the pairs that are left.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn stencils_by_area(self, scene: &Scene, rest: &[Point]) -> Result<Stencils, Error> {
+        self.stencils_weighted(scene, Some(rest), Some(AreasOfBodies::default()))
+    }
+
+    /// Weighted by areas, or not.
+    fn stencils_weighted(
+        self,
+        scene: &Scene,
+        rest: Option<&[Point]>,
+        mut areas: Option<AreasOfBodies>,
+    ) -> Result<Stencils, Error> {
         let offsets = offsets(scene)?;
         if let Some(rest) = rest {
             check_rest(scene, &offsets, rest)?;
@@ -303,11 +341,17 @@ impl NearIter<'_> {
                 }
                 _ => 0.0,
             };
+            let weight = match (&mut areas, rest) {
+                (Some(areas), Some(rest)) => {
+                    areas.weight(scene, &offsets, rest, pair.kind, [a, b])?
+                }
+                _ => 1.0,
+            };
             rows.push(Stencil {
                 kind: pair.kind,
                 features: pair.features,
                 vertices,
-                weight: 1.0,
+                weight,
                 points,
                 threshold,
             });
@@ -327,16 +371,17 @@ impl Stencils {
     /// A vertex above an edge is near both of its faces and to the edges beside it; these pairs
     /// become one stencil of the vertex and the edge. Nearly parallel edges stay pairs of edges,
     /// since a mollifier belongs to each. These are the sets and weights of ipc-toolkit's
-    /// `NormalCollisions` of type IPC, without weights by area. Where two types have the same
-    /// distance, as for a vertex exactly above an edge, ipc-toolkit may name the other.
+    /// `NormalCollisions` of type IPC; with weights by area, of
+    /// [those](NearPairs::stencils_by_area). Where two types have the same distance, as for a
+    /// vertex exactly above an edge, ipc-toolkit may name the other.
     ///
     /// # Errors
     /// There is no memory for them.
     pub fn merged(&self) -> Result<Self, Error> {
         let mut rows = sink::with_capacity(self.rows.len(), WHAT)?;
         rows.extend(self.rows.iter().map(|row| row.reduced()));
-        // Those with equal keys are equal but for weights, which are whole numbers.
-        rows.sort_unstable_by_key(Stencil::key);
+        // Those with equal keys are equal but for weights, which are summed from the smallest on.
+        rows.sort_unstable_by(|a, b| a.key().cmp(&b.key()).then(a.weight.total_cmp(&b.weight)));
         rows.dedup_by(|next, kept| {
             let is_same = next.key() == kept.key();
             if is_same {
@@ -444,6 +489,50 @@ impl<'a> IntoIterator for &'a Stencils {
 
     fn into_iter(self) -> Self::IntoIter {
         self.iter()
+    }
+}
+
+/// Areas of bodies by their indices, found when first needed.
+#[derive(Default)]
+struct AreasOfBodies(Vec<Option<Areas>>);
+
+impl AreasOfBodies {
+    /// The weight of a pair. A vertex comes before an edge or a face.
+    fn weight(
+        &mut self,
+        scene: &Scene,
+        offsets: &[u32],
+        rest: &[Point],
+        kind: PairKind,
+        pair: [(Element, Part); 2],
+    ) -> Result<f64, Error> {
+        // Each pair is seen from both sides, and faces as well as edges tell of the same surface.
+        let (share, weighing) = match kind {
+            PairKind::VertexFace => (0.25, &pair[..1]),
+            PairKind::EdgeEdge => (0.25, &pair[..]),
+            PairKind::EdgeVertex => (0.5, &pair[..1]),
+            _ => (0.5, &pair[..]),
+        };
+        let mut sum = 0.0;
+        for &(element, part) in weighing {
+            let ix = element.body.index();
+            if self.0.len() <= ix {
+                self.0.resize_with(ix + 1, || None);
+            }
+            let areas = match &mut self.0[ix] {
+                Some(areas) => areas,
+                none => none.insert(Areas::new(
+                    scene.body(element.body)?,
+                    &rest[offsets[ix] as usize..offsets[ix + 1] as usize],
+                )?),
+            };
+            let list = match part {
+                Part::Edges => &areas.edges,
+                _ => &areas.vertices,
+            };
+            sum += list[element.element as usize];
+        }
+        Ok(share * sum)
     }
 }
 

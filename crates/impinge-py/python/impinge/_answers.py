@@ -593,7 +593,7 @@ class NearPairs(_OfKinds):
         """
         return NearPairs(self._inner.of(kind))
 
-    def stencils(self, scene: Scene, rest: _Array | None = None) -> Stencils:
+    def stencils(self, scene: Scene, rest: _Array | None = None, *, by_area: bool = False) -> Stencils:
         """What a potential needs to know about each pair: vertices, squared distance, gradient and Hessian.
 
         Parameters
@@ -604,6 +604,11 @@ class NearPairs(_OfKinds):
         rest : array_like, shape (v, 3), optional
             Positions at rest of all vertices of the scene, body after body. They switch on the mollifier of nearly parallel edges,
             whose threshold depends on their lengths at rest.
+        by_area : bool, default False
+            Weights are areas at rest in place of numbers of pairs, as with ipc-toolkit's ``use_area_weighting``: a potential then does not
+            depend on how fine a mesh is. A pair of a vertex and a face weighs a quarter of the vertex's area, of edges a quarter of both
+            areas, of an edge and a vertex half of that of the vertex, of vertices half of both. To a vertex or an edge belongs a third
+            of each face around it; without faces, the length of an edge, and half that of each edge at a vertex; 1 to a vertex alone.
 
         Returns
         -------
@@ -634,7 +639,7 @@ class NearPairs(_OfKinds):
         >>> gradients.reshape(-1, 4, 3)[0, 0].tolist()             # of the point: it is pushed up
         [-0.0, -0.0, -1.5]
         """
-        return Stencils(_impinge._stencils(self._inner, scene, rest))
+        return Stencils(_impinge._stencils(self._inner, scene, rest, by_area))
 
 
 class Stencils:
@@ -659,8 +664,8 @@ class Stencils:
 
         A vertex above an edge is near both of its faces and to the edges beside it; these pairs become one stencil of the vertex and the
         edge. Nearly parallel edges stay pairs of edges, since a mollifier belongs to each. These are the sets and
-        weights of ipc-toolkit's ``NormalCollisions`` of type IPC, without weights by area. Where two types have the same distance, as
-        for a vertex exactly above an edge, ipc-toolkit may name the other.
+        weights of ipc-toolkit's ``NormalCollisions`` of type IPC. Where two types have the same distance, as for a vertex exactly above
+        an edge, ipc-toolkit may name the other.
 
         Returns
         -------
@@ -684,7 +689,7 @@ class Stencils:
 
     @property
     def weights(self) -> npt.NDArray[np.float64]:
-        """numpy.ndarray of float64, shape (n,) : how many pairs each stands for."""
+        """numpy.ndarray of float64, shape (n,) : how many pairs each stands for; with `by_area`, the area that they stand for."""
         return self._inner.weights()
 
     @property
