@@ -510,10 +510,13 @@ typedef struct impinge_stats {
  * on at most as many threads as the detector had that found the pairs:
  *   VERTICES    n x 4 U32      numbered through the scene, body after body
  *   STARTS      b + 1 x 1 U64  the number of the first vertex of each body, and the number of all
- *   WEIGHT      n x 1 F64      how many pairs it stands for
+ *   WEIGHT      n x 1 F64      how many pairs it stands for, or the area at rest that they stand for
  *   COEFFICIENTS n x 4 F64     times the vertices they sum to the way between the nearest points
  *   SQUARED_DISTANCE, GRADIENT, HESSIAN        n x 1, n x 12, n x 144 F64: derivatives by x, y, z of the first vertex and so on
- *   MOLLIFIER, MOLLIFIER_GRADIENT, MOLLIFIER_HESSIAN   the same of the mollifier */
+ *   MOLLIFIER, MOLLIFIER_GRADIENT, MOLLIFIER_HESSIAN   the same of the mollifier
+ * Of changes, each column in ascending order:
+ *   KEPT        n x 2 U64      the row in the old answer and the row in the new one
+ *   NEW, GONE   n x 1 U64      rows of the new answer; rows of the old one */
 #define IMPINGE_COLUMN_KIND 1
 #define IMPINGE_COLUMN_ROWS 2
 #define IMPINGE_COLUMN_DISTANCE 3
@@ -545,6 +548,9 @@ typedef struct impinge_stats {
 #define IMPINGE_COLUMN_MOLLIFIER 29
 #define IMPINGE_COLUMN_MOLLIFIER_GRADIENT 30
 #define IMPINGE_COLUMN_MOLLIFIER_HESSIAN 31
+#define IMPINGE_COLUMN_KEPT 32
+#define IMPINGE_COLUMN_NEW 33
+#define IMPINGE_COLUMN_GONE 34
 
 /* The shape of a contact: a pair that is no pair of triangles; nothing, because bodies have moved since; a point; a segment; a polygon
  * of two triangles in one plane. */
@@ -756,6 +762,18 @@ impinge_status impinge_near_column(const impinge_near *near_pairs, uint32_t colu
 impinge_status impinge_near_stats(const impinge_near *near_pairs, impinge_stats *stats);
 void impinge_near_destroy(impinge_near *near_pairs);
 
+/* Which rows two answers have in common. */
+typedef struct impinge_changes impinge_changes;
+
+/* Which pairs of an older answer the first one also has, which are new in it, and which are gone: what a solver keeps per pair moves with
+ * it. Two pairs are the same if their kinds, bodies and elements are, whatever their times, features and distances. Pairs of a body that
+ * was removed and of one that has its number now differ; those of a body with new elements are named by their numbers alone. */
+impinge_status impinge_pairs_changes(const impinge_pairs *pairs, const impinge_pairs *old, impinge_changes **changes);
+impinge_status impinge_impacts_changes(const impinge_impacts *impacts, const impinge_impacts *old, impinge_changes **changes);
+impinge_status impinge_near_changes(const impinge_near *near_pairs, const impinge_near *old, impinge_changes **changes);
+impinge_status impinge_changes_column(const impinge_changes *changes, uint32_t column, impinge_array *view);
+void impinge_changes_destroy(impinge_changes *changes);
+
 /* What a potential needs to know about near pairs: up to four vertices each, and how their squared distance depends on them. */
 typedef struct impinge_stencils impinge_stencils;
 
@@ -767,8 +785,14 @@ typedef struct impinge_stencils impinge_stencils;
  * elements. */
 impinge_status impinge_near_stencils(const impinge_near *near_pairs, const impinge_scene *scene, const impinge_array *rest,
     impinge_stencils **stencils);
+/* The same, weighted by area, so that a potential does not depend on how fine a mesh is. A pair of a vertex and a face weighs 1/4 of the area
+ * of the vertex, of edges 1/4 of both areas, of an edge and a vertex 1/2 of that of the vertex, of vertices 1/2 of both. Areas are those of
+ * ipc-toolkit's use_area_weighting, at rest: a third of each face at a vertex or beside an edge; without faces the length of an edge, and
+ * half that of each edge at a vertex; 1 for a vertex alone. INVALID: also no `rest`. */
+impinge_status impinge_near_stencils_by_area(const impinge_near *near_pairs, const impinge_scene *scene, const impinge_array *rest,
+    impinge_stencils **stencils);
 /* One per contact: features that several pairs share once, with the sum of their weights, sorted by kind and vertices. These are the
- * sets and weights of ipc-toolkit's NormalCollisions of type IPC, without weights by area. */
+ * sets and weights of ipc-toolkit's NormalCollisions of type IPC. */
 impinge_status impinge_stencils_merged(const impinge_stencils *stencils, impinge_stencils **merged);
 size_t impinge_stencils_count(const impinge_stencils *stencils);
 impinge_status impinge_stencils_column(const impinge_stencils *stencils, uint32_t column, impinge_array *view);

@@ -37,8 +37,10 @@ impl impinge_pairs {
 
 /// An answer about a step.
 pub struct impinge_impacts {
-    impacts: Impacts,
+    pub impacts: Impacts,
     rows: Vec<impinge_impact>,
+    /// Where the rows are in `impacts`, if the caller's numbers of edges order them otherwise.
+    pub order: Vec<usize>,
     texts: Texts,
 }
 
@@ -63,23 +65,23 @@ pub fn impact_row(impact: &Impact, scene: &impinge_scene) -> impinge_impact {
 
 impl impinge_impacts {
     pub fn new(impacts: Impacts, scene: &impinge_scene) -> Result<Self, Failure> {
+        const WHAT: &str = "impacts";
         let named = impacts.iter().map(|impact| impact_row(impact, scene));
-        let mut rows = collect(named, "impacts")?;
+        let mut rows = collect(named, WHAT)?;
+        let mut order = Vec::new();
         if scene.renames_edges() {
-            let key = |row: &impinge_impact| {
-                (
-                    row.kind,
-                    row.body_a,
-                    row.element_a,
-                    row.body_b,
-                    row.element_b,
-                )
-            };
-            rows.sort_unstable_by_key(key);
+            order = collect(0..rows.len(), WHAT)?;
+            order.sort_unstable_by_key(|&ix| {
+                let row: &impinge_impact = &rows[ix];
+                let [a, b] = [[row.body_a, row.element_a], [row.body_b, row.element_b]];
+                (row.kind, a, b)
+            });
+            rows = collect(order.iter().map(|&ix| rows[ix]), WHAT)?;
         }
         Ok(impinge_impacts {
             impacts,
             rows,
+            order,
             texts: Texts::default(),
         })
     }

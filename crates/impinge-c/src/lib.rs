@@ -13,6 +13,7 @@
 
 mod answers;
 mod arrays;
+mod changes;
 mod contacts;
 mod detector;
 mod devices;

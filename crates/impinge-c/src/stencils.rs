@@ -108,15 +108,17 @@ impl impinge_stencils {
     }
 }
 
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn impinge_near_stencils(
+/// # Safety
+/// As `impinge.h` says of `impinge_near_stencils`.
+unsafe fn near_stencils(
     near_pairs: *const impinge_near,
     scene: *const impinge_scene,
     rest: *const impinge_array,
     stencils: *mut *mut impinge_stencils,
+    by_area: bool,
 ) -> Status {
     guard(|| {
-        // SAFETY: `impinge.h` says what pointers are, here and in all functions below.
+        // SAFETY: the caller's promise.
         unsafe {
             clear(stencils, "stencils")?;
             let near = held(near_pairs, "near_pairs")?;
@@ -131,7 +133,14 @@ pub unsafe extern "C" fn impinge_near_stencils(
                     }
                 }),
             };
-            let mut found = near.near.stencils(scene, rest.as_deref())?;
+            let mut found = match (by_area, rest.as_deref()) {
+                (false, rest) => near.near.stencils(scene, rest)?,
+                (true, Some(rest)) => near.near.stencils_by_area(scene, rest)?,
+                (true, None) => {
+                    let missing = "rest: NULL, but areas are those at rest";
+                    return Err(Failure::invalid(missing));
+                }
+            };
             if !near.order.is_empty() {
                 found = found.select(&near.order)?;
             }
@@ -139,6 +148,28 @@ pub unsafe extern "C" fn impinge_near_stencils(
             put(stencils, "stencils", Box::into_raw(answer))
         }
     })
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn impinge_near_stencils(
+    near_pairs: *const impinge_near,
+    scene: *const impinge_scene,
+    rest: *const impinge_array,
+    stencils: *mut *mut impinge_stencils,
+) -> Status {
+    // SAFETY: `impinge.h` says what pointers are, here and in all functions below.
+    unsafe { near_stencils(near_pairs, scene, rest, stencils, false) }
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn impinge_near_stencils_by_area(
+    near_pairs: *const impinge_near,
+    scene: *const impinge_scene,
+    rest: *const impinge_array,
+    stencils: *mut *mut impinge_stencils,
+) -> Status {
+    // SAFETY: see `impinge_near_stencils`.
+    unsafe { near_stencils(near_pairs, scene, rest, stencils, true) }
 }
 
 #[unsafe(no_mangle)]

@@ -124,7 +124,10 @@ fn layout_in_rust() -> BTreeMap<String, usize> {
         COLUMN_HESSIAN,
         COLUMN_MOLLIFIER,
         COLUMN_MOLLIFIER_GRADIENT,
-        COLUMN_MOLLIFIER_HESSIAN
+        COLUMN_MOLLIFIER_HESSIAN,
+        COLUMN_KEPT,
+        COLUMN_NEW,
+        COLUMN_GONE
     );
     for kind in PairKind::ALL {
         layout.insert(kind.name().to_uppercase(), bit(kind) as usize);

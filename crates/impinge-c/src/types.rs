@@ -89,6 +89,9 @@ pub const COLUMN_HESSIAN: u32 = 28;
 pub const COLUMN_MOLLIFIER: u32 = 29;
 pub const COLUMN_MOLLIFIER_GRADIENT: u32 = 30;
 pub const COLUMN_MOLLIFIER_HESSIAN: u32 = 31;
+pub const COLUMN_KEPT: u32 = 32;
+pub const COLUMN_NEW: u32 = 33;
+pub const COLUMN_GONE: u32 = 34;
 
 pub const NO_FEATURE: u32 = 255;
 /// No element.

@@ -69,6 +69,21 @@ void answers() {
   for (const double of : merged.weights()) weight += of;
   CHECK(merged.size() < stencils.size() && stencils.size() == pairs_of_parts.size() && weight == static_cast<double>(stencils.size()));
   CHECK(merged.hessians().size() == merged.size() && merged.gradients()[0].size() == 12 && merged.vertices().size() == merged.size());
+  std::vector<double> rest = numbers(balls[0]), second = numbers(balls[1]);
+  rest.insert(rest.end(), second.begin(), second.end());
+  double area = 0;
+  const auto by_area = pairs_of_parts.stencils_by_area(scene, rest);
+  for (const double of : by_area.weights()) area += of;
+  CHECK(area > 0 && area < 0.01 * weight);
+  {
+    // What is kept is the same row; what is gone has no other.
+    const auto second_pairs = detector.near(scene, 0.005, query::between_all().kinds({pair_kind::vf, pair_kind::ee}));
+    const auto changes = second_pairs.changes(pairs_of_parts);
+    CHECK(changes.added().empty() && changes.kept().size() == second_pairs.size() && !changes.gone().empty() && !changes.empty());
+    CHECK(changes.kept().size() + changes.gone().size() == pairs_of_parts.size());
+    for (const auto &rows : changes.kept()) CHECK(memcmp(&pairs_of_parts[rows[0]], &second_pairs[rows[1]], sizeof(impinge::pair)) == 0);
+    CHECK(kept.changes(kept).empty() && kept.changes(kept).kept().size() == kept.size());
+  }
   const auto candidates = detector.candidates(scene, 0.01, query::all().kinds({pair_kind::ee}));
   CHECK(candidates.of(pair_kind::ee).size() == candidates.size() && candidates.size() > 100);
   std::size_t n = 0;

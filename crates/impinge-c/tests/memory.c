@@ -134,6 +134,36 @@ int main(void) {
     CHECK(impinge_hits_count(hits) == VERTICES);
     impinge_hits_destroy(hits);
   }
+  {
+    /* What has changed since an older answer, and weights by area. */
+    impinge_pairs *old = NULL;
+    impinge_changes *changes = (impinge_changes *)scene;
+    impinge_near *near_pairs = NULL;
+    impinge_stencils *stencils = (impinge_stencils *)scene;
+    impinge_query query;
+    static double at_rest[2 * VERTICES][3];
+    impinge_array rest = packed(at_rest, 2 * VERTICES, IMPINGE_F64);
+    memcpy(at_rest, one.positions, sizeof one.positions);
+    memcpy(at_rest[VERTICES], other.positions, sizeof other.positions);
+    GOOD(impinge_detect(detector, scene, NULL, &old));
+    GOOD(impinge_detect(detector, scene, NULL, &pairs));
+    impinge_query_default(&query);
+    query.kinds = IMPINGE_VF | IMPINGE_EE;
+    GOOD(impinge_find_near(detector, scene, 0.01, &query, &near_pairs));
+    most = 1000; /* The rows of an answer have more bytes; areas of vertices and of edges too. */
+    CHECK(impinge_pairs_changes(pairs, old, &changes) == IMPINGE_ERROR_OUT_OF_MEMORY && changes == NULL);
+    CHECK(strstr(impinge_error_message(), "changes") != NULL);
+    for (most = 1000; most < 60000; most *= 4)
+      CHECK(impinge_near_stencils_by_area(near_pairs, scene, &rest, &stencils) == IMPINGE_ERROR_OUT_OF_MEMORY && stencils == NULL);
+    most = SIZE_MAX;
+    GOOD(impinge_pairs_changes(pairs, old, &changes));
+    GOOD(impinge_near_stencils_by_area(near_pairs, scene, &rest, &stencils));
+    impinge_stencils_destroy(stencils);
+    impinge_changes_destroy(changes);
+    impinge_near_destroy(near_pairs);
+    impinge_pairs_destroy(old);
+    impinge_pairs_destroy(pairs);
+  }
   impinge_scene_destroy(scene);
   impinge_detector_destroy(detector);
   return finish("memory");

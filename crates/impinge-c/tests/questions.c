@@ -313,6 +313,161 @@ static void near_and_candidates(impinge_detector *detector) {
   impinge_scene_destroy(scene);
 }
 
+static uint32_t kind_of(const impinge_near *near_pairs, size_t ix) {
+  impinge_array view;
+  GOOD(impinge_near_column(near_pairs, IMPINGE_COLUMN_KIND, &view));
+  return ((const uint8_t *)view.data)[ix];
+}
+
+/* Changes against a search of each row in the other answer. Rows are kind, body_a, element_a, body_b, element_b. */
+typedef uint32_t named[5];
+static size_t find_row(const named *rows, size_t n, const named row) {
+  size_t i = 0;
+  while (i < n && memcmp(rows[i], row, sizeof(named)) != 0) ++i;
+  return i;
+}
+static void check_changes(impinge_changes *changes, const named *old, size_t n_old, const named *new_rows, size_t n_new, size_t *n_kept) {
+  impinge_array kept, added, gone;
+  size_t i, k = 0, a = 0, g = 0;
+  GOOD(impinge_changes_column(changes, IMPINGE_COLUMN_KEPT, &kept));
+  GOOD(impinge_changes_column(changes, IMPINGE_COLUMN_NEW, &added));
+  GOOD(impinge_changes_column(changes, IMPINGE_COLUMN_GONE, &gone));
+  CHECK(kept.type == IMPINGE_U64 && added.type == IMPINGE_U64 && gone.type == IMPINGE_U64);
+  for (i = 0; i < n_old; ++i) {
+    size_t at = find_row(new_rows, n_new, old[i]);
+    if (at == n_new) {
+      CHECK(g < gone.rows && ((const uint64_t *)gone.data)[g] == i);
+      ++g;
+    } else {
+      CHECK(k < kept.rows && ((const uint64_t *)kept.data)[2 * k] == i && ((const uint64_t *)kept.data)[2 * k + 1] == at);
+      ++k;
+    }
+  }
+  for (i = 0; i < n_new; ++i) {
+    if (find_row(old, n_old, new_rows[i]) < n_old) continue;
+    CHECK(a < added.rows && ((const uint64_t *)added.data)[a] == i);
+    ++a;
+  }
+  CHECK(k == kept.rows && a == added.rows && g == gone.rows);
+  *n_kept = k;
+  impinge_changes_destroy(changes);
+}
+enum { MOST_ROWS = 40000 };
+static size_t name_near(const impinge_near *of, named *rows) {
+  size_t i, n = impinge_near_count(of);
+  CHECK(n < MOST_ROWS);
+  for (i = 0; i < n; ++i) {
+    rows[i][0] = kind_of(of, i);
+    memcpy(&rows[i][1], &impinge_near_data(of)[i], sizeof(impinge_pair));
+  }
+  return n;
+}
+static size_t name_impacts(const impinge_impacts *of, named *rows) {
+  size_t i, n = impinge_impacts_count(of);
+  CHECK(n < MOST_ROWS);
+  for (i = 0; i < n; ++i) {
+    const impinge_impact *row = &impinge_impacts_data(of)[i];
+    rows[i][0] = row->kind, rows[i][1] = row->body_a, rows[i][2] = row->element_a, rows[i][3] = row->body_b, rows[i][4] = row->element_b;
+  }
+  return n;
+}
+static size_t name_pairs(const impinge_pairs *of, named *rows) {
+  size_t i, n = impinge_pairs_count(of);
+  CHECK(n < MOST_ROWS);
+  for (i = 0; i < n; ++i) {
+    rows[i][0] = 0;
+    memcpy(&rows[i][1], &impinge_pairs_data(of)[i], sizeof(impinge_pair));
+  }
+  return n;
+}
+
+/* What an older answer has too, is new and is gone; with the library's numbers of edges, and with the caller's. */
+static void changes(impinge_detector *detector) {
+  static named rows[2][MOST_ROWS];
+  static ball moved, far_away;
+  impinge_scene *scene;
+  impinge_pairs *pairs[2] = {NULL, NULL};
+  impinge_near *near_pairs[2] = {NULL, NULL};
+  impinge_impacts *impacts[2] = {NULL, NULL};
+  impinge_changes *found = (impinge_changes *)rows;
+  impinge_array view;
+  impinge_query query;
+  size_t n[2], kept;
+  uint32_t body = 7;
+  int round, ix;
+  make_ball(&moved, 0.93);
+  make_ball(&far_away, 2.2);
+  impinge_query_default(&query);
+  query.self = 0;
+  query.kinds = IMPINGE_VF | IMPINGE_EE;
+  for (round = 0; round < 2; ++round) {
+    scene = two_balls();
+    if (round == 1) {
+      static uint32_t edges[3 * FACES][2];
+      size_t i;
+      GOOD(impinge_scene_edges(scene, 1, &view));
+      CHECK(view.rows < 3 * FACES);
+      for (i = 0; i < view.rows; ++i) {
+        const uint32_t *row = (const uint32_t *)((const char *)view.data + (ptrdiff_t)(view.rows - 1 - i) * view.row_stride);
+        edges[i][0] = row[1], edges[i][1] = row[0];
+      }
+      GOOD(impinge_scene_set_edges(scene, 1, packed(edges, view.rows, IMPINGE_U32)));
+    }
+    for (ix = 0; ix < 2; ++ix) {
+      GOOD(impinge_scene_set_end_positions(scene, 1, packed(NULL, 0, IMPINGE_F64)));
+      GOOD(impinge_scene_set_positions(scene, 1, positions_of(ix ? &moved : &balls[1])));
+      GOOD(impinge_detect(detector, scene, NULL, &pairs[ix]));
+      GOOD(impinge_find_near(detector, scene, 0.01, &query, &near_pairs[ix]));
+      GOOD(impinge_scene_set_positions(scene, 1, positions_of(&far_away)));
+      GOOD(impinge_scene_set_end_positions(scene, 1, positions_of(ix ? &moved : &balls[1])));
+      GOOD(impinge_find_impacts(detector, scene, NULL, &impacts[ix]));
+    }
+    GOOD(impinge_pairs_changes(pairs[1], pairs[0], &found));
+    for (ix = 0; ix < 2; ++ix) n[ix] = name_pairs(pairs[ix], rows[ix]);
+    check_changes(found, (const named *)rows[0], n[0], (const named *)rows[1], n[1], &kept);
+    CHECK(kept > 10 && kept < n[0] && kept < n[1]);
+    GOOD(impinge_near_changes(near_pairs[1], near_pairs[0], &found));
+    for (ix = 0; ix < 2; ++ix) n[ix] = name_near(near_pairs[ix], rows[ix]);
+    check_changes(found, (const named *)rows[0], n[0], (const named *)rows[1], n[1], &kept);
+    CHECK(kept > 10 && kept < n[0] && kept < n[1]);
+    GOOD(impinge_impacts_changes(impacts[1], impacts[0], &found));
+    for (ix = 0; ix < 2; ++ix) n[ix] = name_impacts(impacts[ix], rows[ix]);
+    check_changes(found, (const named *)rows[0], n[0], (const named *)rows[1], n[1], &kept);
+    CHECK(kept > 10 && kept < n[0]);
+    /* Another body in the same place has no pair in common. */
+    GOOD(impinge_scene_remove(scene, 1));
+    GOOD(impinge_scene_add_triangles(scene, faces_of(&moved), positions_of(&moved), &body));
+    CHECK(body == 1);
+    impinge_pairs_destroy(pairs[0]);
+    GOOD(impinge_detect(detector, scene, NULL, &pairs[0]));
+    CHECK(impinge_pairs_hash(pairs[0]) == impinge_pairs_hash(pairs[1]));
+    GOOD(impinge_pairs_changes(pairs[1], pairs[0], &found));
+    GOOD(impinge_changes_column(found, IMPINGE_COLUMN_KEPT, &view));
+    CHECK(view.rows == 0);
+    GOOD(impinge_changes_column(found, IMPINGE_COLUMN_GONE, &view));
+    CHECK(view.rows == impinge_pairs_count(pairs[0]));
+    REFUSED(impinge_changes_column(found, IMPINGE_COLUMN_ROWS, &view), "changes have no column 2");
+    impinge_changes_destroy(found);
+    REFUSED(impinge_pairs_changes(pairs[1], NULL, &found), "old is NULL");
+    CHECK(found == NULL);
+    for (ix = 0; ix < 2; ++ix) {
+      impinge_pairs_destroy(pairs[ix]);
+      impinge_near_destroy(near_pairs[ix]);
+      impinge_impacts_destroy(impacts[ix]);
+    }
+    impinge_scene_destroy(scene);
+  }
+}
+
+static double area_of(const ball *of, size_t face) {
+  const double *p = of->positions[of->faces[face][0]], *q = of->positions[of->faces[face][1]], *r = of->positions[of->faces[face][2]];
+  double u[3], v[3], sum = 0;
+  int k;
+  for (k = 0; k < 3; ++k) u[k] = q[k] - p[k], v[k] = r[k] - p[k];
+  for (k = 0; k < 3; ++k) sum += pow(u[(k + 1) % 3] * v[(k + 2) % 3] - u[(k + 2) % 3] * v[(k + 1) % 3], 2);
+  return sqrt(sum) / 2;
+}
+
 /* What a potential needs: against distances, the balance of forces, and another order of numbers. */
 static void stencils(impinge_detector *detector) {
   impinge_scene *scene = two_balls();
@@ -378,6 +533,22 @@ static void stencils(impinge_detector *detector) {
   for (i = 0; i < n; ++i) CHECK(((const double *)view.data)[i] == 1);
   REFUSED(impinge_stencils_column(plain, IMPINGE_COLUMN_TOI, &view), "no column 7");
   impinge_stencils_destroy(of);
+  /* By area: the weights of all vertices over faces are quarters of their areas, those of edges the quarters of two. */
+  GOOD(impinge_near_stencils_by_area(near_pairs, scene, &rest, &of));
+  GOOD(impinge_stencils_column(of, IMPINGE_COLUMN_WEIGHT, &weights));
+  CHECK(weights.rows == n);
+  for (i = 0; i < n; ++i) {
+    const impinge_pair *row = &impinge_near_data(near_pairs)[i];
+    double by_hand = 0;
+    if (kind_of(near_pairs, i) != IMPINGE_VF) continue;
+    for (j = 0; j < FACES; ++j)
+      for (k = 0; k < 3; ++k)
+        if (balls[row->body_a].faces[j][k] == row->element_a) by_hand += area_of(&balls[row->body_a], j) / 12;
+    CHECK(fabs(((const double *)weights.data)[i] - by_hand) < 1e-15 && by_hand > 0);
+  }
+  impinge_stencils_destroy(of);
+  REFUSED(impinge_near_stencils_by_area(near_pairs, scene, NULL, &of), "rest: NULL");
+  CHECK(of == NULL);
   rest.rows -= 1;
   REFUSED(impinge_near_stencils(near_pairs, scene, &rest, &of), "positions given, but it has");
   GOOD(impinge_project_psd(matrices[0], 2, 3));
@@ -843,6 +1014,7 @@ int main(void) {
   steps(detector);
   near_and_candidates(detector);
   stencils(detector);
+  changes(detector);
   contacts(detector);
   solvers(detector);
   probes(detector);

@@ -76,11 +76,45 @@ template <class Row> view<Row> of_kind(view<Row> rows, view<std::uint8_t> kinds,
 }
 } // namespace detail
 
+/// Which rows of an older answer another one also has, which are new, and which are gone; all ascend.
+class changes {
+public:
+  changes() = default;
+  explicit changes(impinge_changes *handle) : handle_(handle) {}
+  /// The row in the old answer, and the row in the new one.
+  view<std::array<std::uint64_t, 2>> kept() const { return column<std::array<std::uint64_t, 2>>(IMPINGE_COLUMN_KEPT); }
+  /// Rows of the new answer.
+  view<std::uint64_t> added() const { return column<std::uint64_t>(IMPINGE_COLUMN_NEW); }
+  /// Rows of the old answer.
+  view<std::uint64_t> gone() const { return column<std::uint64_t>(IMPINGE_COLUMN_GONE); }
+  /// Whether both answers have the same pairs.
+  bool empty() const { return added().empty() && gone().empty(); }
+  const impinge_changes *raw() const noexcept { return handle_.get(); }
+
+private:
+  template <class T> view<T> column(std::uint32_t column) const {
+    array rows{};
+    if (impinge_changes_column(raw(), column, &rows) != IMPINGE_OK) return {};
+    return {static_cast<const T *>(rows.data), rows.rows};
+  }
+  detail::handle<impinge_changes, impinge_changes_destroy> handle_;
+};
+
+namespace detail {
+template <class Call, class Handle> result<changes> changes_of(Call call, const Handle *of, const Handle *old) {
+  made<impinge_changes> made;
+  const auto status = call(of, old, made.out());
+  return give(status, changes(made.take()));
+}
+} // namespace detail
+
 /// Sorted pairs of elements that intersect.
 class pairs : public detail::pairs_answer {
 public:
   using answer::answer;
   std::uint64_t hash() const noexcept { return impinge_pairs_hash(raw()); }
+  /// Which pairs an older answer also has, which are new, and which are gone.
+  result<impinge::changes> changes(const pairs &old) const { return detail::changes_of(impinge_pairs_changes, raw(), old.raw()); }
   /// The elements of `a` and of `b` of each pair of these two bodies.
   std::vector<std::array<std::uint32_t, 2>> between(body a, body b) const {
     std::vector<std::array<std::uint32_t, 2>> found;
@@ -104,6 +138,8 @@ class impacts : public detail::impacts_answer {
 public:
   using answer::answer;
   std::uint64_t hash() const noexcept { return impinge_impacts_hash(raw()); }
+  /// Which pairs an older answer also has, which are new, and which are gone.
+  result<impinge::changes> changes(const impacts &old) const { return detail::changes_of(impinge_impacts_changes, raw(), old.raw()); }
   /// Whether elements intersect at the start; nothing if nobody asked.
   std::optional<bool> start_intersects() const { return detail::asked(impinge_impacts_start_intersects(raw())); }
   /// Those of one kind.
@@ -170,6 +206,8 @@ class near_pairs : public detail::near_answer {
 public:
   using answer::answer;
   std::uint64_t hash() const noexcept { return impinge_near_hash(raw()); }
+  /// Which pairs an older answer also has, which are new, and which are gone.
+  result<impinge::changes> changes(const near_pairs &old) const { return detail::changes_of(impinge_near_changes, raw(), old.raw()); }
   view<std::uint8_t> kinds() const { return packed<std::uint8_t>(IMPINGE_COLUMN_KIND); }
   view<pair> of(pair_kind kind) const { return detail::of_kind(rows(), kinds(), kind); }
   /// The nearest features of `a` and of `b`: see IMPINGE_COLUMN_FEATURES.
@@ -185,11 +223,16 @@ public:
     const array rows = detail::rows_of(rest, 3);
     return stencils_of(in, &rows);
   }
+  /// The same, weighted by area: see impinge_near_stencils_by_area.
+  template <class P> result<impinge::stencils> stencils_by_area(const scene &in, const P &rest) const {
+    const array rows = detail::rows_of(rest, 3);
+    return stencils_of(in, &rows, impinge_near_stencils_by_area);
+  }
 
 private:
-  result<impinge::stencils> stencils_of(const scene &in, const array *rest) const {
+  result<impinge::stencils> stencils_of(const scene &in, const array *rest, decltype(impinge_near_stencils) *call = impinge_near_stencils) const {
     detail::made<impinge_stencils> made;
-    const auto status = impinge_near_stencils(raw(), in.raw(), rest, made.out());
+    const auto status = call(raw(), in.raw(), rest, made.out());
     return detail::give(status, impinge::stencils(made.take()));
   }
 };

@@ -4,6 +4,10 @@
 
 #include <impinge/eigen.hpp>
 
+#ifdef IMPINGE_NO_EXCEPTIONS
+#error "impinge/igl.hpp needs exceptions: its functions return answers"
+#endif
+
 namespace impinge::igl {
 
 namespace detail {

@@ -1,6 +1,7 @@
 //! What has changed from one answer to the next: which pairs are kept, new and gone.
 
 use std::cmp::Ordering;
+use std::convert::Infallible;
 
 /// The pairs of an answer beside those of an older one: [`Pairs::changes`](crate::Pairs::changes),
 /// [`Impacts::changes`](crate::Impacts::changes),
@@ -63,23 +64,42 @@ impl Changes {
         old: impl IntoIterator<Item = K>,
         new: impl IntoIterator<Item = K>,
     ) -> Self {
-        let (mut old, mut new) = (old.into_iter().enumerate(), new.into_iter().enumerate());
         let mut changes = Changes::default();
+        Self::each(old, new, |order, [before, after]| {
+            match order {
+                Ordering::Less => changes.gone.push(before),
+                Ordering::Greater => changes.new.push(after),
+                Ordering::Equal => changes.kept.push([before, after]),
+            }
+            Ok::<_, Infallible>(())
+        })
+        .unwrap_or_else(|never| match never {});
+        changes
+    }
+
+    /// [`between`](Changes::between) without memory of its own: calls `each` with the indices of
+    /// every pair in the old answer and in the new one, and `Less` if it is gone, `Greater` if it
+    /// is new, where the other index says nothing. Ends with the first error of `each`.
+    #[doc(hidden)]
+    pub fn each<K: Ord, E>(
+        old: impl IntoIterator<Item = K>,
+        new: impl IntoIterator<Item = K>,
+        mut each: impl FnMut(Ordering, [usize; 2]) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let (mut old, mut new) = (old.into_iter().enumerate(), new.into_iter().enumerate());
         let (mut before, mut after) = (old.next(), new.next());
         loop {
             let order = match (&before, &after) {
-                (None, None) => return changes,
+                (None, None) => return Ok(()),
                 (Some(_), None) => Ordering::Less,
                 (None, Some(_)) => Ordering::Greater,
                 (Some((_, before)), Some((_, after))) => before.cmp(after),
             };
             // At most one of them is absent.
-            let indices = [&before, &after].map(|at| at.as_ref().map_or(0, |(ix, _)| *ix));
-            match order {
-                Ordering::Less => changes.gone.push(indices[0]),
-                Ordering::Greater => changes.new.push(indices[1]),
-                Ordering::Equal => changes.kept.push(indices),
-            }
+            each(
+                order,
+                [&before, &after].map(|at| at.as_ref().map_or(0, |(ix, _)| *ix)),
+            )?;
             if order.is_le() {
                 before = old.next();
             }
