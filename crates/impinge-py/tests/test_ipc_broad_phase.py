@@ -489,6 +489,20 @@ def test_known_scenes(known, data):
     dhat = 1e-3 * float(np.ptp(start, axis=0).max())
     theirs = collisions_of(mesh, start, dhat)
     assert_same_collisions(collisions_of(mesh, start, dhat, broad_phase=broad_phase), theirs)
+    # The step, inflated: every pair that is within twice the radius at some moment, as ipctk finds them.
+    radius = dhat / 16
+    inflated = built(mesh, start, end, radius=radius, by=broad_phase)
+    exact = sets_of(inflated)
+    n_near = 0
+    for moment in [0.0, 0.3, 1.0]:
+        near = collisions_of(mesh, np.asfortranarray(start + moment * (end - start)), 2 * radius)
+        for kind in ["ee", "fv"]:
+            pairs = {key(pair)[1] for pair in getattr(near, f"{kind}_collisions")}
+            assert pairs <= exact[kind]
+            n_near += len(pairs)
+    n_inflated = len(built(mesh, start, end, radius=radius, by=ipctk.LBVH()))
+    print(f"{name}: {n_near} within {2 * radius:.3g}, {len(inflated)} candidates, LBVH {n_inflated}")
+    assert n_near > 10 and len(inflated) * (10 if name == "cloth-ball" else 1) <= n_inflated
     # The step: every pair that is known to touch, and few others.
     found = built(mesh, start, end, radius=0.0, by=broad_phase)
     n_boxes = len(built(mesh, start, end, radius=0.0, by=ipctk.LBVH()))
