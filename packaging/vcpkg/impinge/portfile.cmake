@@ -11,7 +11,7 @@ vcpkg_check_features(OUT_FEATURE_OPTIONS options FEATURES gpu IMPINGE_GPU)
 
 # The interface is C, and a debug build of Rust would only be slow: programs of both kinds get the same library.
 set(VCPKG_BUILD_TYPE release)
-vcpkg_cmake_configure(SOURCE_PATH "${SOURCE_PATH}" OPTIONS ${options} -DIMPINGE_PROFILE=release)
+vcpkg_cmake_configure(SOURCE_PATH "${SOURCE_PATH}" OPTIONS ${options} -DIMPINGE_PROFILE=library)
 vcpkg_cmake_install()
 vcpkg_cmake_config_fixup(CONFIG_PATH lib/cmake/impinge)
 # The package now lies in share/impinge, one folder nearer to the prefix.
