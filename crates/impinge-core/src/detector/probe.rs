@@ -11,6 +11,9 @@ use crate::scene::ids::BodyId;
 use crate::scene::positions::Real;
 use crate::search::work::Work;
 
+/// A point or a ray takes at least as long as so many elements of a frame.
+const ELEMENTS_PER_PROBE: u64 = 32;
+
 impl Detector {
     /// Where each point lies: inside a body (1), on its surface (0) or outside (-1). Decided
     /// exactly, also for points on faces, edges and vertices and in their planes.
@@ -205,7 +208,7 @@ impl Detector {
             ..
         } = self;
         runner.measure(measured, limits, |workers, stats| {
-            let _shift = workers.shift(n as u64);
+            let _shift = workers.shift((n as u64).saturating_mul(ELEMENTS_PER_PROBE));
             let work = Work { workers, control };
             let mut shared = Shared {
                 distances,

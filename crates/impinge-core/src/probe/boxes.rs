@@ -5,63 +5,133 @@
 //! level 1     [ eight boxes ]  …      read at once
 //! level 0     [ clusters ]     …
 //! elements    [ 64 boxes ]     …      found when a probe first comes to the cluster
+//! faces       [ 64 faces ]     …      as are their corners, side by side
 //! ```
 //!
-//! Cost: a copy of the boxes of clusters and nodes per pose, and the boxes of elements where they
-//! are needed.
+//! Cost: a copy of the boxes of clusters and nodes per pose, and the boxes and corners of elements
+//! where they are needed.
 
 use std::sync::{Arc, OnceLock};
 
 use crate::boxes;
+use crate::bvh::GROUP;
 use crate::bvh::bounds::{Bounds, BoundsArray};
 use crate::bvh::clusters::Clustering;
 use crate::scene::Body;
+use crate::scene::elements::Elements;
 use crate::scene::index::ClusterIx;
+use crate::scene::positions::{Positions, Real};
 use crate::simd::{LaneBounds, Simd};
+use impinge_exact::internal::filter::Triangles64;
 
 /// The boxes of one pose.
 #[derive(Debug)]
 pub(super) struct Boxes {
     pub clustering: Arc<Clustering>,
-    positions_stamp: u64,
+    positions_stamp: Option<u64>,
     /// Of each level's nodes, from the clusters up.
     levels: Vec<BoundsArray>,
     /// Of the elements of each cluster.
     elements: Vec<OnceLock<LaneBounds>>,
+    /// The corners of each cluster's faces, rounded to nearest; none for other elements.
+    faces: Vec<OnceLock<Triangles64>>,
+    /// More than a corner may be moved by rounding.
+    rounding: f64,
 }
 
 impl Boxes {
-    pub fn new(
-        clustering: Arc<Clustering>,
-        positions_stamp: u64,
-        of_levels: &[Vec<Bounds>],
-    ) -> Self {
-        let levels = of_levels.iter().map(|level| {
-            let mut boxes = BoundsArray::default();
+    /// Of no pose yet.
+    pub fn new(clustering: Arc<Clustering>) -> Self {
+        let n = clustering.n_clusters();
+        let n_of_faces = match clustering.corners {
+            Elements::Triangles(_) => n,
+            _ => 0,
+        };
+        Boxes {
+            clustering,
+            positions_stamp: None,
+            levels: Vec::new(),
+            elements: (0..n).map(|_| OnceLock::new()).collect(),
+            faces: (0..n_of_faces).map(|_| OnceLock::new()).collect(),
+            rounding: 0.0,
+        }
+    }
+
+    /// Takes the boxes of the body's pose, if they are of another one.
+    pub fn take(&mut self, body: &Body, of_levels: &[Vec<Bounds>]) {
+        let stamp = Some(body.positions_stamp());
+        if self.positions_stamp == stamp {
+            return;
+        }
+        self.positions_stamp = stamp;
+        self.levels.resize_with(of_levels.len(), Default::default);
+        for (boxes, level) in self.levels.iter_mut().zip(of_levels) {
             boxes.resize(level.len());
             for (ix, bounds) in level.iter().enumerate() {
                 boxes.put(ix, bounds);
             }
-            boxes
-        });
-        Boxes {
-            levels: levels.collect(),
-            elements: (0..clustering.n_clusters())
-                .map(|_| OnceLock::new())
-                .collect(),
-            clustering,
-            positions_stamp,
         }
+        for lanes in &mut self.elements {
+            lanes.take();
+        }
+        for faces in &mut self.faces {
+            faces.take();
+        }
+        self.rounding = match body.positions() {
+            Positions::F32(_) => 0.0,
+            Positions::F64(_) => {
+                let Bounds { min, max } = self.root();
+                rounding_of(min).max(rounding_of(max))
+            }
+        };
     }
 
-    /// Whether they are of these clusters in the pose with this stamp.
-    pub fn fits(&self, clustering: &Arc<Clustering>, positions_stamp: u64) -> bool {
-        Arc::ptr_eq(&self.clustering, clustering) && self.positions_stamp == positions_stamp
+    /// Whether they are of these clusters.
+    pub fn fits(&self, clustering: &Arc<Clustering>) -> bool {
+        Arc::ptr_eq(&self.clustering, clustering)
     }
 
     pub fn bytes(&self) -> usize {
         let levels: usize = self.levels.iter().map(BoundsArray::bytes).sum();
-        levels + size_of_val(&self.elements[..])
+        levels + size_of_val(&self.elements[..]) + size_of_val(&self.faces[..])
+    }
+
+    /// More than the corners of [`faces`](Boxes::faces) may be moved by rounding.
+    pub fn rounding(&self) -> f64 {
+        self.rounding
+    }
+
+    /// The corners of a cluster's faces, rounded to nearest; none if elements are no triangles.
+    #[inline(always)]
+    pub fn faces(&self, body: &Body, cluster: ClusterIx) -> Option<&Triangles64> {
+        let faces = self.faces.get(cluster.index())?;
+        Some(match faces.get() {
+            Some(faces) => faces,
+            None => self.find_faces(body, cluster, faces),
+        })
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn find_faces<'a>(
+        &self,
+        body: &Body,
+        cluster: ClusterIx,
+        into: &'a OnceLock<Triangles64>,
+    ) -> &'a Triangles64 {
+        into.get_or_init(|| {
+            let mut faces = [[[0.0; GROUP]; 3]; 3];
+            for (lane, slot) in self.clustering.slots(cluster).enumerate() {
+                let vertices = self.clustering.corners.corners(slot);
+                for (rows, &vertex) in faces.iter_mut().zip(vertices) {
+                    let point = body.positions().point(vertex as usize);
+                    for (row, x) in rows.iter_mut().zip(point) {
+                        row[lane] = <f32 as Real>::round(x);
+                    }
+                }
+            }
+            faces
+        })
     }
 
     /// The box of the whole body; the empty box without elements.
@@ -77,16 +147,15 @@ impl Boxes {
         self.levels.len()
     }
 
-    /// The boxes of a level's nodes.
+    /// Eight consecutive boxes of a level, low and high ends; levels are padded by as many.
     #[inline(always)]
-    pub fn level(&self, level: usize) -> &BoundsArray {
-        &self.levels[level]
-    }
-
-    /// The box of a node.
-    #[inline(always)]
-    pub fn node(&self, level: usize, node: usize) -> Bounds {
-        self.levels[level].at(node)
+    pub fn eight(&self, level: usize, first: usize) -> [[&[f32; 8]; 3]; 2] {
+        const NONE: &[f32; 8] = &[0.0; 8];
+        let boxes = &self.levels[level];
+        [&boxes.min, &boxes.max].map(|rows| {
+            rows.each_ref()
+                .map(|row| row[first..].first_chunk().unwrap_or(NONE))
+        })
     }
 
     /// The boxes of a cluster's elements.
@@ -108,6 +177,15 @@ impl Boxes {
             lanes
         })
     }
+}
+
+/// More than the length by which a point with some coordinates is moved where each is rounded to
+/// single precision.
+#[inline(always)]
+pub(super) fn rounding_of([x, y, z]: [f32; 3]) -> f64 {
+    let largest = x.abs().max(y.abs()).max(z.abs());
+    // Half a unit in the last place of each of three, and what is lost below the smallest float.
+    f64::from(largest) * f64::from(f32::EPSILON) + f64::from(f32::MIN_POSITIVE)
 }
 
 /// The way down a tree: siblings that are left to be visited.

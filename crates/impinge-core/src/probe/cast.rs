@@ -16,7 +16,7 @@ use std::cmp::Ordering;
 use super::{HITS, Looks, Target};
 use crate::answers::hits::RayHit;
 use crate::answers::pairs::Element;
-use crate::bvh::bounds::{Bounds, BoundsArray, round_down, round_up};
+use crate::bvh::bounds::{Bounds, round_down, round_up};
 use crate::query::step::Hit;
 use crate::scene::elements::with_corners;
 use crate::scene::error::Error;
@@ -113,6 +113,22 @@ struct Met {
 }
 
 impl Met {
+    /// In twice the precision of floats where that suffices.
+    #[inline(always)]
+    fn new(ray: &Ray, corners: &[Point]) -> Option<Self> {
+        if let &[a, b, c] = corners
+            && let Some((t, barycentrics)) = meet_inside(ray, &[a, b, c])
+        {
+            return Some(Met {
+                t,
+                t_end: t,
+                feature: Feature::Face,
+                barycentrics,
+            });
+        }
+        Met::exactly(ray, corners)
+    }
+
     fn exactly(ray: &Ray, corners: &[Point]) -> Option<Self> {
         let meeting = meet(ray, corners)?;
         Some(Met {
@@ -133,25 +149,17 @@ struct RayFound {
 }
 
 impl RayFound {
+    #[inline(always)]
     fn new(candidate: RayCandidate, bodies: &[(BodyId, Target<'_>)], ray: &Ray) -> Option<Self> {
         let RayCandidate { body, slot, .. } = candidate;
         let target = bodies[body].1;
         let corners = corners(target, slot);
-        let inside = || {
-            let &[a, b, c] = corners.points() else {
-                return None;
-            };
-            let (t, barycentrics) = meet_inside(ray, &[a, b, c])?;
-            Some(Met {
-                t,
-                t_end: t,
-                feature: Feature::Face,
-                barycentrics,
-            })
+        let met = match candidate.met {
+            Some(met) => met,
+            None => Met::new(ray, corners.points())?,
         };
-        let met = candidate.met.or_else(inside);
         Some(RayFound {
-            met: met.or_else(|| Met::exactly(ray, corners.points()))?,
+            met,
             body,
             element: target.boxes.clustering.order[slot],
             corners,
@@ -206,26 +214,33 @@ struct Slabs {
 
 impl Slabs {
     fn new(ray: &Ray, whole: &Bounds) -> Self {
-        let is_near = |x: f32| x.abs() <= FAR;
-        let origin = [ray.origin.map(round_down), ray.origin.map(round_up)];
-        let inverse = [0, 1, 2].map(|k| {
-            let inverse = 1.0 / ray.direction[k].abs();
-            let is_moderate = inverse == f64::INFINITY && ray.direction[k] == 0.0
+        let mut slabs = Slabs {
+            origin: [[0.0; 3]; 2],
+            inverse: [f32::NAN; 3],
+            is_down: [false; 3],
+        };
+        for axis in 0..3 {
+            let (origin, direction) = (ray.origin[axis], ray.direction[axis]);
+            let (below, above) = (round_down(origin), round_up(origin));
+            slabs.origin[0][axis] = below;
+            slabs.origin[1][axis] = above;
+            slabs.is_down[axis] = direction < 0.0;
+            let inverse = 1.0 / direction.abs();
+            let is_moderate = inverse == f64::INFINITY && direction == 0.0
                 || (1.0 / f64::from(FAR)..f64::from(FAR)).contains(&inverse);
-            let all = [origin[0][k], origin[1][k], whole.min[k], whole.max[k]];
-            let is_moderate = is_moderate && all.into_iter().all(is_near);
-            let is_down = ray.direction[k] < 0.0;
-            match is_moderate {
-                true if is_down => -(inverse as f32),
-                true => inverse as f32,
-                false => f32::NAN,
+            let [low, high] = [whole.min[axis], whole.max[axis]];
+            let is_near =
+                below.abs() <= FAR && above.abs() <= FAR && low.abs() <= FAR && high.abs() <= FAR;
+            if is_moderate && is_near {
+                let inverse = inverse as f32;
+                slabs.inverse[axis] = if slabs.is_down[axis] {
+                    -inverse
+                } else {
+                    inverse
+                };
             }
-        });
-        Slabs {
-            origin,
-            inverse,
-            is_down: ray.direction.map(|x| x < 0.0),
         }
+        slabs
     }
 
     /// When the ray comes to some boxes, about and never too late, and those that it may reach
@@ -307,7 +322,7 @@ impl RaySearch<'_> {
                 .clustering
                 .shape
                 .children(level as usize + 1, node as usize);
-            let eight = eight(boxes.level(level as usize), children.start);
+            let eight = boxes.eight(level as usize, children.start);
             let (nears, mask) = slabs.reach(eight, limit);
             for lane in Lanes(mask & up_to(children.len() - 1)) {
                 let near = nears[lane];
@@ -379,7 +394,9 @@ impl RaySearch<'_> {
             return RayPasses::InDoubt;
         };
         let d = &ray.direction;
-        let [a, b, c] = [a, b, c].map(|corner| difference(&corner, &ray.origin));
+        let a = difference(&a, &ray.origin);
+        let b = difference(&b, &ray.origin);
+        let c = difference(&c, &ray.origin);
         let largest = size(&a).max(size(&b)).max(size(&c));
         let of_way = size(d);
         if !MODERATE.contains(&largest) || !MODERATE.contains(&of_way) {
@@ -431,19 +448,28 @@ impl RaySearch<'_> {
         if self.hits == Hit::Any {
             return Ok(());
         }
-        let found = self.found.drain(..);
-        let mut found = found.filter_map(|candidate| RayFound::new(candidate, bodies, ray));
         if self.hits == Hit::First {
-            let first = found.min_by(|one, other| one.compare(other, ray));
+            let mut first: Option<RayFound> = None;
+            for candidate in self.found.drain(..) {
+                let Some(found) = RayFound::new(candidate, bodies, ray) else {
+                    continue;
+                };
+                match &first {
+                    Some(first) if found.compare(first, ray).is_ge() => {}
+                    _ => first = Some(found),
+                }
+            }
             grow(into, 1, HITS)?;
-            into.extend(first.map(|first| first.answer(bodies)));
+            if let Some(first) = first {
+                into.push(first.answer(bodies));
+            }
             return Ok(());
         }
         let mut all: Vec<RayFound> = Vec::new();
-        for one in found.by_ref() {
+        for candidate in self.found.drain(..) {
             self.looks.step()?;
             grow(&mut all, 1, HITS)?;
-            all.push(one);
+            all.extend(RayFound::new(candidate, bodies, ray));
         }
         grow(into, all.len(), HITS)?;
         all.sort_unstable_by(|one, other| one.compare(other, ray));
@@ -458,14 +484,4 @@ enum RayPasses {
     /// Through its inside, between these parameters.
     Inside(f64, f64),
     InDoubt,
-}
-
-/// Eight consecutive boxes; arrays are padded by as many.
-#[inline(always)]
-fn eight(boxes: &BoundsArray, first: usize) -> [[&[f32; 8]; 3]; 2] {
-    const NONE: &[f32; 8] = &[0.0; 8];
-    [&boxes.min, &boxes.max].map(|rows| {
-        rows.each_ref()
-            .map(|row| row[first..].first_chunk().unwrap_or(NONE))
-    })
 }

@@ -1,9 +1,10 @@
 //! The elements that are nearest to each point, by branch and bound.
 //!
 //! Nodes are opened nearest box first, and skipped if their boxes are farther away than an element
-//! certainly is. Of an element, floats that enclose its distance are found. What may be nearest by
-//! these is kept, mostly one element, or the few that share the nearest edge or vertex. Exact
-//! comparisons decide among these. So the answer does not depend on the order of the search.
+//! certainly is. Floats that enclose the distances of elements are found: of sixteen faces at a
+//! time in single precision, then in double precision of those that may still be nearest. These are
+//! mostly one element, or the few that share the nearest edge or vertex. Exact comparisons decide
+//! among them. So the answer does not depend on the order of the search.
 //!
 //! Where several are asked for, that many of the smallest upper bounds are kept, and the largest of
 //! these is the bound. Floats put most of them in order, exact comparisons the rest.
@@ -11,35 +12,37 @@
 //! Points come in an order in which most are near to the one before. So the elements found last are
 //! a first bound for the next point.
 //!
-//! Cost: per point some dozens of boxes per level of the tree, and in one or two clusters 64 boxes
-//! and a few elements.
+//! Cost: per point some dozens of boxes per level of the tree, eight at a time; 64 boxes in each of
+//! some six clusters, and about fifty faces in half of these.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
+use super::boxes::rounding_of;
 use super::{Looks, Target, WHAT};
 use crate::answers::closest::ClosestElement;
 use crate::answers::pairs::Element;
-use crate::bvh::bounds::Bounds;
+use crate::bvh::GROUP;
+use crate::bvh::bounds::{Bounds, round_down, round_up};
 use crate::scene::elements::with_corners;
 use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
 use crate::scene::index::{ClusterIx, ElementIx};
 use crate::scene::positions::Real;
-use crate::scene::vector::dot;
 use crate::search::narrow::Corners;
 use crate::search::sink::grow;
 use crate::search::work::Work;
-use crate::simd::{Isa, LaneBounds, Lanes, Simd, up_to, with_isa};
+use crate::simd::{Isa, Lanes, Simd, up_to, with_isa};
 use impinge_exact::Point;
+use impinge_exact::internal::filter::{BATCH, point_bounds_in_tables};
 use impinge_exact::internal::{
     Reach, closest_of_elements, compare_point_distances, elements_are_within, point_distance_bounds,
 };
 
 /// More than what rounding may do to squares of distances of boxes, which are of a few operations.
 const ROUNDING: f64 = 64.0 * f64::EPSILON;
-/// The square of the shortest way across which planes are taken.
-const SHORTEST: f64 = 1e-250;
+/// 1 and more than the relative error of a few operations in `f32`.
+const GROWN: f32 = 1.0 + 16.0 * f32::EPSILON;
 
 /// Candidates that are held before those that are too far away are dropped, where several are asked
 /// for.
@@ -69,7 +72,7 @@ pub(super) fn closest<R: Real>(
 
 #[inline(always)]
 fn all_closest<S: Simd, R: Real>(
-    _simd: S,
+    simd: S,
     bodies: &[(BodyId, Target<'_>)],
     points: &[[R; 3]],
     most: f64,
@@ -78,22 +81,23 @@ fn all_closest<S: Simd, R: Real>(
     work: Work<'_>,
 ) -> Result<(), Error> {
     let mut search = PointSearch::new(n_nearest, work);
-    let mut order: Vec<(f64, usize)> = Vec::new();
+    let mut order: Vec<(f32, usize)> = Vec::new();
     let (mut likely, mut nearest) = (Vec::new(), Vec::new());
     for (point, found) in points.iter().zip(found.chunks_exact_mut(n_nearest)) {
         let point = point.map(R::widen);
         search.begin(most);
         search.expect(bodies, &point, &likely)?;
         order.clear();
+        let rounded = RoundedPoint::new(&point);
         for (number, (_, target)) in bodies.iter().enumerate() {
-            order.push((squared_distance(&target.boxes.root(), &point), number));
+            order.push((rounded.squared_distance(&target.boxes.root()), number));
         }
         order.sort_unstable_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
         for &(low, body) in &order {
             if low > search.limit {
                 break;
             }
-            search.visit(body, bodies[body].1, &point)?;
+            search.visit(simd, (body, bodies[body].1), &point, &rounded)?;
         }
         nearest.clear();
         match n_nearest {
@@ -174,6 +178,12 @@ fn corners(target: &Target<'_>, slot: usize) -> Corners {
     ))
 }
 
+/// Two numbers between which the distance of an element from a point certainly is.
+#[inline(always)]
+fn bounds_of(target: &Target<'_>, slot: usize, point: &Point) -> [f64; 2] {
+    point_distance_bounds(point, corners(target, slot).points())
+}
+
 /// The search for one point; the memory is kept for the next.
 struct PointSearch<'a> {
     looks: Looks<'a>,
@@ -182,10 +192,7 @@ struct PointSearch<'a> {
     /// As many elements as are asked for are certainly not farther away.
     high: f64,
     /// Boxes whose squared distance is larger hold nothing as near.
-    limit: f64,
-    /// About the shortest way from that element to the point, and its length times `high`.
-    way: Point,
-    level: f64,
+    limit: f32,
     candidates: Vec<PointCandidate>,
     /// Where several are asked for: the smallest upper bounds of candidates, at most as many, as
     /// bits, which have the same order.
@@ -193,7 +200,7 @@ struct PointSearch<'a> {
     /// How many candidates are held before those that are too far away are dropped.
     drop_at: usize,
     /// Squared distances of boxes, levels and nodes that wait.
-    waiting: Vec<(f64, usize, usize)>,
+    waiting: Vec<(f32, u32, u32)>,
 }
 
 impl<'a> PointSearch<'a> {
@@ -202,9 +209,7 @@ impl<'a> PointSearch<'a> {
             looks: Looks::new(work),
             n_nearest,
             high: f64::INFINITY,
-            limit: f64::INFINITY,
-            way: [0.0; 3],
-            level: f64::INFINITY,
+            limit: f32::INFINITY,
             candidates: Vec::new(),
             highs: BinaryHeap::new(),
             drop_at: FIRST_DROP,
@@ -216,9 +221,8 @@ impl<'a> PointSearch<'a> {
         self.candidates.clear();
         self.highs.clear();
         self.drop_at = FIRST_DROP;
-        (self.high, self.limit) = (f64::INFINITY, f64::INFINITY);
-        (self.way, self.level) = ([0.0; 3], f64::INFINITY);
-        self.tighten(most, [0.0; 3]);
+        (self.high, self.limit) = (f64::INFINITY, f32::INFINITY);
+        self.tighten(most);
     }
 
     /// Takes the bound that as many elements as are asked for give, if there are as many: those
@@ -230,61 +234,42 @@ impl<'a> PointSearch<'a> {
         point: &Point,
         likely: &[PointCandidate],
     ) -> Result<(), Error> {
-        let mut largest: Option<(f64, Point)> = None;
+        let mut largest = None;
         for one in likely {
             self.looks.step()?;
-            let ([_, high], way) = point_distance_bounds(point, one.corners(bodies).points());
-            if largest.is_none_or(|(largest, _)| high > largest) {
-                largest = Some((high, way));
+            let [_, high] = point_distance_bounds(point, one.corners(bodies).points());
+            if largest.is_none_or(|largest| high > largest) {
+                largest = Some(high);
             }
         }
-        if let Some((high, way)) = largest {
-            self.tighten(high, way);
+        if let Some(high) = largest {
+            self.tighten(high);
         }
         Ok(())
     }
 
     #[inline(always)]
-    fn tighten(&mut self, high: f64, way: Point) {
+    fn tighten(&mut self, high: f64) {
         if high < self.high {
             self.high = high;
-            self.limit = high * high * (1.0 + ROUNDING) + f64::MIN_POSITIVE;
-            self.way = way;
-            let square = dot(way, way);
-            // The squares of shorter ways lose bits.
-            self.level = match square > SHORTEST {
-                true => high * square.sqrt() * (1.0 + ROUNDING),
-                false => f64::INFINITY,
-            };
+            let square = high * high * (1.0 + ROUNDING) + f64::MIN_POSITIVE;
+            self.limit = round_up(square) * GROWN;
         }
-    }
-
-    /// Whether all corners of an element are beyond a plane across the way, which is farther from
-    /// the point than the nearest element. Most elements whose boxes are near are seen to be
-    /// farther so.
-    #[inline(always)]
-    fn is_beyond(&self, point: &Point, corners: &[Point]) -> bool {
-        let (mut lowest, mut size) = (f64::INFINITY, 0.0f64);
-        for corner in corners {
-            let to = [0, 1, 2].map(|k| point[k] - corner[k]);
-            lowest = lowest.min(dot(self.way, to));
-            size = size.max(to[0].abs() + to[1].abs() + to[2].abs());
-        }
-        let of_way = self.way[0]
-            .abs()
-            .max(self.way[1].abs())
-            .max(self.way[2].abs());
-        // Three differences, products and sums.
-        lowest - ROUNDING * of_way * size > self.level
     }
 
     /// Adds the elements of a body that may be nearest.
     #[inline(always)]
-    fn visit(&mut self, body: usize, target: Target<'_>, point: &Point) -> Result<(), Error> {
+    fn visit<S: Simd>(
+        &mut self,
+        simd: S,
+        (body, target): (usize, Target<'_>),
+        point: &Point,
+        rounded: &RoundedPoint,
+    ) -> Result<(), Error> {
         let boxes = target.boxes;
         self.waiting.clear();
         if let Some(top) = boxes.n_levels().checked_sub(1) {
-            self.waiting.push((0.0, top, 0));
+            self.waiting.push((0.0, top as u32, 0));
         }
         while let Some((low, level, node)) = self.waiting.pop() {
             if low > self.limit {
@@ -292,19 +277,20 @@ impl<'a> PointSearch<'a> {
             }
             self.looks.step()?;
             if level == 0 {
-                self.compare(body, target, ClusterIx::new(node as u32), point)?;
+                self.compare(simd, (body, target), ClusterIx::new(node), point, rounded)?;
                 continue;
             }
-            let first = self.waiting.len();
-            for child in boxes.clustering.shape.children(level, node) {
-                let low = squared_distance(&boxes.node(level - 1, child), point);
-                if low > self.limit {
-                    continue;
-                }
+            let (below, first) = (level - 1, self.waiting.len());
+            let shape = &boxes.clustering.shape;
+            let children = shape.children(level as usize, node as usize);
+            let eight = boxes.eight(below as usize, children.start);
+            let (lows, mask) = rounded.squared_distances(eight, self.limit);
+            for lane in Lanes(mask & up_to(children.len() - 1)) {
                 // The nearest is popped first.
                 let mut place = self.waiting.len();
-                self.waiting.push((low, level - 1, child));
-                while place > first && self.waiting[place - 1].0 < low {
+                let child = (children.start + lane) as u32;
+                self.waiting.push((lows[lane], below, child));
+                while place > first && self.waiting[place - 1].0 < lows[lane] {
                     self.waiting.swap(place - 1, place);
                     place -= 1;
                 }
@@ -315,65 +301,87 @@ impl<'a> PointSearch<'a> {
 
     /// Adds the elements of a cluster that may be nearest.
     #[inline(always)]
-    fn compare(
+    fn compare<S: Simd>(
         &mut self,
-        body: usize,
-        target: Target<'_>,
+        simd: S,
+        (body, target): (usize, Target<'_>),
         cluster: ClusterIx,
         point: &Point,
+        rounded: &RoundedPoint,
     ) -> Result<(), Error> {
         let slots = target.boxes.clustering.slots(cluster);
-        let lows = squared_distances(target.boxes.elements(target.body, cluster), point);
-        // The nearest box first: then most others are too far away.
-        let mut nearest = 0;
-        let mut mask = 0u64;
-        for lane in 0..slots.len() {
-            mask |= u64::from(lows[lane] <= self.limit) << lane;
-            if lows[lane] < lows[nearest] {
-                nearest = lane;
-            }
-        }
-        if mask >> nearest & 1 == 0 {
+        let lanes = target.boxes.elements(target.body, cluster);
+        let rows = [lanes.min.each_ref(), lanes.max.each_ref()];
+        let (lows, mask) = rounded.squared_distances(rows, self.limit);
+        let mut mask = mask & up_to(slots.len() - 1);
+        if mask == 0 {
             return Ok(());
         }
-        let rest = mask & up_to(slots.len() - 1) & !(1 << nearest);
-        for lane in std::iter::once(nearest).chain(Lanes(rest)) {
-            if lows[lane] > self.limit {
-                continue;
+        grow(&mut self.candidates, GROUP, WHAT)?;
+        let Some(faces) = target.boxes.faces(target.body, cluster) else {
+            for lane in Lanes(mask) {
+                if lows[lane] <= self.limit {
+                    self.add(
+                        bounds_of(&target, slots.start + lane, point),
+                        body,
+                        slots.start + lane,
+                    );
+                }
             }
-            let slot = slots.start + lane;
-            let corners = corners(&target, slot);
-            if self.is_beyond(point, corners.points()) {
-                continue;
-            }
-            let ([low, high], way) = point_distance_bounds(point, corners.points());
-            if low > self.high {
-                continue;
-            }
-            let candidate = PointCandidate {
-                low,
-                high,
-                body,
-                slot,
+            return Ok(());
+        };
+        let error = rounded.error + target.boxes.rounding();
+        let mut list = [0u8; GROUP];
+        while mask != 0 {
+            let n = simd.list_lanes(mask, &mut list).min(BATCH);
+            let Some(batch) = list.first_chunk::<BATCH>() else {
+                break;
             };
-            grow(&mut self.candidates, 1, WHAT)?;
-            if self.n_nearest > 1 {
-                self.add_to_many(candidate, way);
-                continue;
+            let [lowest, highest] =
+                point_bounds_in_tables::<S::F32>(&rounded.nearest, faces, batch);
+            for ix in 0..n {
+                let slot = slots.start + usize::from(batch[ix]);
+                let (low, high) = (f64::from(lowest[ix]), f64::from(highest[ix]));
+                let bounds = match high < f64::INFINITY {
+                    true => [low - error, high + error],
+                    // Sizes are out of range.
+                    false => bounds_of(&target, slot, point),
+                };
+                self.add(bounds, body, slot);
             }
-            if high < self.high {
-                self.tighten(high, way);
-                self.candidates.retain(|other| other.low <= high);
-            }
-            self.candidates.push(candidate);
+            // Lanes after these, of boxes that are still near enough.
+            mask &= !up_to(usize::from(batch[n - 1])) & not_above(&lows, self.limit);
         }
         Ok(())
     }
 
-    /// Adds an element that may be among the nearest, where several are asked for. `way` is about
-    /// the shortest way from it to the point; across any way there is a plane that is too far.
+    /// Adds an element, whose distance is between two numbers, if it may be nearest. There is room
+    /// for it among the candidates.
+    #[inline(always)]
+    fn add(&mut self, [low, high]: [f64; 2], body: usize, slot: usize) {
+        if low > self.high {
+            return;
+        }
+        let candidate = PointCandidate {
+            low,
+            high,
+            body,
+            slot,
+        };
+        if self.n_nearest > 1 {
+            self.add_to_many(candidate);
+            return;
+        }
+        if high < self.high {
+            self.tighten(high);
+            self.candidates.retain(|other| other.low <= high);
+        }
+        self.candidates.push(candidate);
+    }
+
+    /// Adds an element that may be among the nearest, where several are asked for.
     #[inline(never)]
-    fn add_to_many(&mut self, candidate: PointCandidate, way: Point) {
+    fn add_to_many(&mut self, candidate: PointCandidate) {
         self.candidates.push(candidate);
         let high = candidate.high.abs().to_bits();
         if self.highs.len() < self.n_nearest {
@@ -387,13 +395,50 @@ impl<'a> PointSearch<'a> {
         if self.highs.len() == self.n_nearest
             && let Some(&largest) = self.highs.peek()
         {
-            self.tighten(f64::from_bits(largest), way);
+            self.tighten(f64::from_bits(largest));
         }
         if self.candidates.len() >= self.drop_at {
             let most = self.high;
             self.candidates.retain(|other| other.low <= most);
             self.drop_at = FIRST_DROP + 2 * self.candidates.len();
         }
+    }
+
+    /// Encloses the distances of candidates in double precision, and drops those that are certainly
+    /// farther away than as many as are asked for.
+    ///
+    /// # Errors
+    /// Cancellation.
+    fn narrow(&mut self, bodies: &[(BodyId, Target<'_>)], point: &Point) -> Result<(), Error> {
+        let Self {
+            looks,
+            high,
+            candidates,
+            ..
+        } = self;
+        candidates.retain(|one| one.low <= *high);
+        if candidates.len() <= self.n_nearest {
+            return Ok(());
+        }
+        let mut least = f64::INFINITY;
+        for one in candidates.iter_mut() {
+            looks.step()?;
+            let [low, high] = point_distance_bounds(point, one.corners(bodies).points());
+            // Either encloses the distance.
+            if low > one.low {
+                one.low = low;
+            }
+            if high < one.high {
+                one.high = high;
+            }
+            if one.high < least {
+                least = one.high;
+            }
+        }
+        if self.n_nearest == 1 {
+            candidates.retain(|one| one.low <= least);
+        }
+        Ok(())
     }
 
     /// As many of the candidates as are asked for, nearest first; of several at one distance the
@@ -407,13 +452,9 @@ impl<'a> PointSearch<'a> {
         point: &Point,
         nearest: &mut Vec<PointCandidate>,
     ) -> Result<(), Error> {
-        for candidate in &self.candidates {
-            self.looks.step()?;
-            if candidate.low <= self.high {
-                grow(nearest, 1, WHAT)?;
-                nearest.push(*candidate);
-            }
-        }
+        self.narrow(bodies, point)?;
+        grow(nearest, self.candidates.len(), WHAT)?;
+        nearest.extend_from_slice(&self.candidates);
         nearest.sort_unstable_by(|x, y| {
             if x.high < y.low {
                 return Ordering::Less;
@@ -438,6 +479,7 @@ impl<'a> PointSearch<'a> {
         bodies: &[(BodyId, Target<'_>)],
         point: &Point,
     ) -> Result<Option<PointCandidate>, Error> {
+        self.narrow(bodies, point)?;
         let mut candidates = std::mem::take(&mut self.candidates);
         candidates.sort_unstable_by_key(|candidate| candidate.name(bodies));
         let mut best: Option<PointCandidate> = None;
@@ -457,33 +499,74 @@ impl<'a> PointSearch<'a> {
     }
 }
 
-/// The square of a point's distance from a box, rounded.
-#[inline(always)]
-fn squared_distance(bounds: &Bounds, point: &Point) -> f64 {
-    let mut sum = 0.0;
-    for (axis, &x) in point.iter().enumerate() {
-        sum += squared_gap(bounds.min[axis], bounds.max[axis], x);
-    }
-    sum
+/// A point as boxes and faces in single precision are held against it.
+struct RoundedPoint {
+    /// Rounded down and up.
+    ends: [[f32; 3]; 2],
+    /// Rounded to nearest.
+    nearest: [f32; 3],
+    /// More than rounding to nearest may move it.
+    error: f64,
 }
 
-/// The squares of a point's distances from the boxes of a cluster, rounded.
-#[inline(always)]
-fn squared_distances(lanes: &LaneBounds, point: &Point) -> [f64; 64] {
-    let mut sums = [0.0; 64];
-    for (axis, &x) in point.iter().enumerate() {
-        let (min, max) = (&lanes.min[axis], &lanes.max[axis]);
-        for (lane, sum) in sums.iter_mut().enumerate() {
-            *sum += squared_gap(min[lane], max[lane], x);
+impl RoundedPoint {
+    #[inline(always)]
+    fn new(point: &Point) -> Self {
+        let mut rounded = RoundedPoint {
+            ends: [[0.0; 3]; 2],
+            nearest: [0.0; 3],
+            error: 0.0,
+        };
+        let mut is_exact = true;
+        for (axis, &x) in point.iter().enumerate() {
+            rounded.ends[0][axis] = round_down(x);
+            rounded.ends[1][axis] = round_up(x);
+            rounded.nearest[axis] = <f32 as Real>::round(x);
+            is_exact &= f64::from(rounded.nearest[axis]) == x;
         }
+        if !is_exact {
+            rounded.error = rounding_of(rounded.nearest);
+        }
+        rounded
     }
-    sums
+
+    /// As [`squared_distances`](Self::squared_distances), of one box.
+    fn squared_distance(&self, bounds: &Bounds) -> f32 {
+        let rows = [&bounds.min, &bounds.max].map(|ends| ends.each_ref().map(std::array::from_ref));
+        let ([square], _) = self.squared_distances(rows, f32::INFINITY);
+        square
+    }
+
+    /// The squares of the distances from some boxes, about and never too large but for
+    /// [`GROWN`], and those that are not above a limit that has grown.
+    #[inline(always)]
+    fn squared_distances<const N: usize>(
+        &self,
+        [low, high]: [[&[f32; N]; 3]; 2],
+        limit: f32,
+    ) -> ([f32; N], u64) {
+        let mut sums = [0.0; N];
+        let [down, up] = &self.ends;
+        for axis in 0..3 {
+            let (low, high) = (low[axis], high[axis]);
+            for (lane, sum) in sums.iter_mut().enumerate() {
+                let (below, above) = (low[lane] - up[axis], down[axis] - high[lane]);
+                let gap = if below > above { below } else { above };
+                let gap = if gap > 0.0 { gap } else { 0.0 };
+                *sum += gap * gap;
+            }
+        }
+        let mask = not_above(&sums, limit);
+        (sums, mask)
+    }
 }
 
+/// Bit k: number k is not above a limit.
 #[inline(always)]
-fn squared_gap(min: f32, max: f32, x: f64) -> f64 {
-    let (below, above) = (f64::from(min) - x, x - f64::from(max));
-    let gap = if below > above { below } else { above };
-    let gap = if gap > 0.0 { gap } else { 0.0 };
-    gap * gap
+fn not_above<const N: usize>(numbers: &[f32; N], limit: f32) -> u64 {
+    let mut mask = 0;
+    for (lane, &number) in numbers.iter().enumerate() {
+        mask |= u64::from(number <= limit) << lane;
+    }
+    mask
 }

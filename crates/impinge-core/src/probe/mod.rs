@@ -11,7 +11,7 @@
 //! Out: one answer per point.
 //!
 //! Cost: the trees as for distances of bodies; 24 bytes per element of the clusters that probes
-//! come to; then per point a way down the tree. Points are shared among the workers; each point's
+//! come to, and 36 for the corners of faces where nearest ones are sought; then per point a way down the tree. Points are shared among the workers; each point's
 //! answer depends on nothing but the point and the bodies.
 
 mod border;
@@ -338,13 +338,12 @@ impl Probes {
         for &(id, part) in parts {
             work.step()?;
             let tree = shared.distances.tree(scene, (id, part), work)?;
-            let stamp = scene.body(id)?.positions_stamp();
-            let name = (id.index(), part);
-            let known = self.boxes.get(&name);
-            if !known.is_some_and(|boxes| boxes.fits(&tree.clustering, stamp)) {
-                let boxes = Boxes::new(Arc::clone(&tree.clustering), stamp, tree.levels());
-                self.boxes.insert(name, boxes);
+            let new = || Boxes::new(Arc::clone(&tree.clustering));
+            let boxes = self.boxes.entry((id.index(), part)).or_insert_with(new);
+            if !boxes.fits(&tree.clustering) {
+                *boxes = new();
             }
+            boxes.take(scene.body(id)?, tree.levels());
         }
         Ok(())
     }

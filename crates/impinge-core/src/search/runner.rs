@@ -158,6 +158,7 @@ impl Runner {
         stats.n_threads = self.workers.n();
         stats.backend.push_str("cpu");
         let answer = find(&self.workers, stats)?;
+        self.workers.report(&mut stats.ways);
         stats.total_ms = start.elapsed().as_secs_f64() * 1e3;
         match limits.memory_budget {
             Some(budget) if stats.bytes_held > budget => Err(Error::MemoryBudget {

@@ -166,6 +166,45 @@ fn lattices() {
     }
 }
 
+/// Where single precision moves corners or points farther than elements are apart.
+#[test]
+fn far_from_the_origin() {
+    let mut random = Random::new(16);
+    let around = [1e4 + 1.0 / 3.0, -2e4 - 1.0 / 7.0, 3e4 + 0.1];
+    for (size, double) in [(1e-3, true), (1.0, false)] {
+        let mut place = |[x, y, z]: [f64; 3]| {
+            [
+                around[0] + size * x,
+                around[1] + size * y,
+                around[2] + size * z,
+            ]
+        };
+        let faces: Vec<[u32; 3]> = (0..150)
+            .map(|ix| [3 * ix, 3 * ix + 1, 3 * ix + 2])
+            .collect();
+        let corners: Vec<[f64; 3]> = soup::triangles(150, 0.3, 17)
+            .positions_f64()
+            .into_iter()
+            .map(&mut place)
+            .collect();
+        let mut scene = Scene::new();
+        match double {
+            true => scene.add_triangles(&faces, &corners).unwrap(),
+            false => {
+                let corners: Vec<_> = corners.iter().map(|x| x.map(|x| x as f32)).collect();
+                scene.add_triangles(&faces, &corners).unwrap()
+            }
+        };
+        let points: Vec<[f64; 3]> = (0..80)
+            .map(|_| place(random.point(0.0, 1.0).map(f64::from)))
+            .collect();
+        let closest = cpu()
+            .closest(&scene, &points, f64::INFINITY, &Query::all())
+            .unwrap();
+        check(&scene, &points, f64::INFINITY, &closest);
+    }
+}
+
 /// Where most points have several elements at one distance, and few have as many as are asked for.
 #[test]
 fn several_nearest_on_lattices() {

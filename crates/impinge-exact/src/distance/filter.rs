@@ -21,13 +21,8 @@ pub(super) fn answer(pair: ElementPair, points: &[Point; 4], reach: &Reach) -> O
 /// Two numbers between which the distance of two elements certainly is; none where sizes are out of
 /// range.
 pub(super) fn bounds(pair: ElementPair, points: &[Point; 4]) -> Option<[f64; 2]> {
-    bounds_and_way(pair, points).map(|(bounds, _)| bounds)
-}
-
-/// [`bounds`], and about the shortest way from the origin to the difference polygon.
-pub(super) fn bounds_and_way(pair: ElementPair, points: &[Point; 4]) -> Option<([f64; 2], Point)> {
-    let (is_small, bounds, way) = Polygon::of_pair(pair, points).bounds();
-    is_small.then_some((bounds, way))
+    let (is_small, bounds) = Polygon::of_pair(pair, points).bounds();
+    is_small.then_some(bounds)
 }
 
 /// When two moving elements are first within a distance, as far as plain floats can decide it.

@@ -28,11 +28,11 @@ fn paired(point: &Point, corners: &[Point]) -> (ElementPair, [Point; 4]) {
 }
 
 /// Two numbers between which the distance of a point from an element of one to three corners
-/// certainly is, and about the shortest way from the element to the point.
+/// certainly is.
 #[inline]
-pub fn point_distance_bounds(point: &Point, corners: &[Point]) -> ([f64; 2], Point) {
+pub fn point_distance_bounds(point: &Point, corners: &[Point]) -> [f64; 2] {
     let (pair, points) = paired(point, corners);
-    filter::bounds_and_way(pair, &points).unwrap_or(([0.0, f64::INFINITY], [0.0; 3]))
+    filter::bounds(pair, &points).unwrap_or([0.0, f64::INFINITY])
 }
 
 /// Which of two elements of one to three corners is nearer to a point: exact.

@@ -20,9 +20,9 @@
 //! less than 24 u |V| (`docs/exactness.md`, "Distances"). NaN and overflow end as unsure.
 
 use super::motion::{Vec3, between, cross, difference, dot, size};
-use super::moving::{are_edges, two_edges, vertex_and_face};
+use super::moving::{are_edges, look_up, two_edges, vertex_and_face};
 use super::number::{self, Lookup, Number, load_points};
-use super::{BATCH, LANES, Moving64, Points8, Spans8, Verdict16};
+use super::{BATCH, LANES, Moving64, Points8, Spans8, Triangles64, Verdict16};
 use crate::ElementPair;
 
 /// The number of a part of a polygon, bit after bit from the lowest: corner i is i, edge i is 4 +
@@ -264,10 +264,9 @@ impl<T: Number> Polygon<T> {
         ]
     }
 
-    /// Two numbers between which the distance from the origin certainly is, and about the shortest
-    /// way from there, where the mask is set.
+    /// Two numbers between which the distance from the origin certainly is, where the mask is set.
     #[inline(always)]
-    pub(crate) fn bounds(&self) -> (T::Mask, [T; 2], Vec3<T>) {
+    pub(crate) fn bounds(&self) -> (T::Mask, [T; 2]) {
         let size = self.size();
         let normal = self.normal();
         let near = self.nearest(&normal);
@@ -277,7 +276,7 @@ impl<T: Number> Polygon<T> {
         ];
         let is_small = T::splat(T::LARGEST).gt(size);
         let low = of_near.larger(of_normal);
-        (is_small, [low, most(&near, size)], near)
+        (is_small, [low, most(&near, size)])
     }
 
     /// About the shortest way from the origin, where the mask is set.
@@ -459,7 +458,7 @@ pub fn are_within_in_tables<V: Lookup>(
     let [low, high] = [V::splat(f64::from(reach[0])), V::splat(f64::from(reach[1]))];
     let mut verdict = Verdict16::default();
     for first in (0..BATCH).step_by(V::N) {
-        let (are_edges, points) = look_up::<V>(pair, groups, slots, first, 0);
+        let (are_edges, points) = points_of::<V>(pair, groups, slots, first, 0);
         let (yes, no) = Polygon::new(are_edges, &points).verdict(low, high);
         verdict.yes |= V::bits(yes) << first;
         verdict.no |= V::bits(no) << first;
@@ -529,7 +528,7 @@ pub fn bounded_in_tables<V: Lookup, R: Reaches16>(
         high: [f32::INFINITY; BATCH],
     };
     for first in (0..BATCH).step_by(V::N) {
-        let (are_edges, points) = look_up::<V>(pair, groups, slots, first, 0);
+        let (are_edges, points) = points_of::<V>(pair, groups, slots, first, 0);
         let polygon = Polygon::new(are_edges, &points);
         let [least, most] = reach.at::<V>(first);
         let (yes, no) = polygon.verdict(least, most);
@@ -537,7 +536,7 @@ pub fn bounded_in_tables<V: Lookup, R: Reaches16>(
         bounded.verdict.yes |= yes << first;
         bounded.verdict.no |= V::bits(no) << first;
         if yes != 0 {
-            let (_, [low, high], _) = polygon.bounds();
+            let (_, [low, high]) = polygon.bounds();
             low.put(&mut bounded.low, first);
             high.put(&mut bounded.high, first);
         }
@@ -553,12 +552,46 @@ pub fn distance_bounds<V: number::Vector>(pair: ElementPair, points: &Points8) -
     let mut bounds = Spans8::default();
     for first in (0..LANES).step_by(V::N) {
         let polygon = Polygon::of_pair(pair, &load_points::<V>(points, first));
-        let (is_small, [low, high], _) = polygon.bounds();
+        let (is_small, [low, high]) = polygon.bounds();
         let unknown = V::splat(f64::INFINITY);
         V::select(is_small, low, V::splat(0.0)).store(&mut bounds.low, first);
         V::select(is_small, high, unknown).store(&mut bounds.high, first);
     }
     bounds
+}
+
+/// Two numbers between which the distances of sixteen faces from a point certainly are, lowest and
+/// highest: 0 and infinity where sizes are out of range. The faces are those of a group, named by
+/// their slots. The point's coordinates are finite.
+#[cfg_attr(target_family = "wasm", inline(never))]
+#[cfg_attr(not(target_family = "wasm"), inline(always))]
+#[must_use]
+pub fn point_bounds_in_tables<V: Lookup>(
+    point: &[f32; 3],
+    faces: &Triangles64,
+    slots: &[u8; BATCH],
+) -> [[f32; BATCH]; 2] {
+    let [mut lowest, mut highest] = [[0.0; BATCH]; 2];
+    let [x, y, z] = *point;
+    let point = [
+        V::splat(f64::from(x)),
+        V::splat(f64::from(y)),
+        V::splat(f64::from(z)),
+    ];
+    for first in (0..BATCH).step_by(V::N) {
+        let slots = V::slots(slots, first);
+        let [q, r, s] = faces;
+        let points = [
+            point,
+            look_up(q, slots),
+            look_up(r, slots),
+            look_up(s, slots),
+        ];
+        let (is_small, [low, high]) = Polygon::new(false, &points).bounds();
+        V::select(is_small, low, V::splat(0.0)).put(&mut lowest, first);
+        V::select(is_small, high, V::splat(f64::INFINITY)).put(&mut highest, first);
+    }
+    [lowest, highest]
 }
 
 /// As [`are_within_in_tables`], with the nearest parts of pairs that are certainly near.
@@ -573,7 +606,7 @@ pub fn nearest_in_tables<V: Lookup, R: Reaches16>(
 ) -> Near16 {
     let mut near = Near16::default();
     for first in (0..BATCH).step_by(V::N) {
-        let (are_edges, points) = look_up::<V>(pair, groups, slots, first, 0);
+        let (are_edges, points) = points_of::<V>(pair, groups, slots, first, 0);
         let polygon = Polygon::new(are_edges, &points);
         let [low, high] = reach.at::<V>(first);
         let (yes, no) = polygon.verdict(low, high);
@@ -609,8 +642,8 @@ pub fn stay_beyond_in_tables<V: Lookup>(
     let (until, distance) = (V::splat(f64::from(until)), V::splat(f64::from(distance)));
     let mut stay = 0;
     for first in (0..BATCH).step_by(V::N) {
-        let (are_edges, start) = look_up::<V>(pair, groups, slots, first, 0);
-        let (_, end) = look_up::<V>(pair, groups, slots, first, 1);
+        let (are_edges, start) = points_of::<V>(pair, groups, slots, first, 0);
+        let (_, end) = points_of::<V>(pair, groups, slots, first, 1);
         let start = Polygon::new(are_edges, &start);
         let end = Polygon::new(are_edges, &end);
         let last = start.at(&end, until);
@@ -621,7 +654,7 @@ pub fn stay_beyond_in_tables<V: Lookup>(
 }
 
 #[inline(always)]
-fn look_up<V: Lookup>(
+fn points_of<V: Lookup>(
     pair: ElementPair,
     [group_a, group_b]: [&Moving64; 2],
     [slots_a, slots_b]: [&[u8; BATCH]; 2],

@@ -50,7 +50,7 @@ pub(crate) struct Corners {
 }
 
 impl Corners {
-    #[inline]
+    #[inline(always)]
     pub fn new(positions: &Positions, corners: &[u32]) -> Self {
         let mut points = [[0.0; 3]; 3];
         let n = corners.len().min(3);
