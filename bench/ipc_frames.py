@@ -127,25 +127,31 @@ def table(record):
     return "\n".join(lines)
 
 
+def worded(record, note):
+    asked = sum(len(scene["rows"]) * scene["frames"] for scene in record["scenes"])
+    note = note and f" {note}"
+    return (
+        f"# Frames of an implicit cloth beside ipc-toolkit, {record['date']}\n\n{record['machine']}. "
+        f"{', '.join(f'{name} {version}' for name, version in record['versions'].items())}. Made by `bench/ipc_frames.py`, which says what is on the "
+        f"clock. Means over frames; solvers take turns, frame by frame.{note}\n\n{table(record)}\n\nAt the ends of all {asked:,} frames both broad phases "
+        f"find the same collisions with the same weights, at most {max(scene['most'] for scene in record['scenes']):,}. No iteration intersects. The first "
+        f"two solvers of each cloth are at most {max(scene['apart'] for scene in record['scenes']):.1e} apart at the end of any frame."
+    )
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     parser.add_argument("--scenes", nargs="+", default=["32:300", "52:300", "148:12"], help="vertices along an edge : frames")
     parser.add_argument("--record", action="store_true", help="write to bench/record as well")
     parser.add_argument("--machine", default=machine(), help="the machine's name in the record")
+    parser.add_argument("--note", default="", help="what else the record is to say")
     arguments = parser.parse_args()
     ipctk.set_logger_level(ipctk.LoggerLevel.off)
     scenes = [raced(*map(int, scene.split(":"))) for scene in arguments.scenes]
     today = datetime.date.today().isoformat()
     versions = {name: importlib.metadata.version(name) for name in ["impinge", "ipctk", "numpy", "scipy"]}
     record = {"machine": arguments.machine, "date": today, "versions": versions, "scenes": scenes}
-    asked = sum(len(scene["rows"]) * scene["frames"] for scene in scenes)
-    text = (
-        f"# Frames of an implicit cloth beside ipc-toolkit, {today}\n\n{arguments.machine}. "
-        f"{', '.join(f'{name} {version}' for name, version in versions.items())}. Made by `bench/ipc_frames.py`, which says what is on the "
-        f"clock. Means over frames; solvers take turns, frame by frame.\n\n{table(record)}\n\nAt the ends of all {asked:,} frames both broad phases "
-        f"find the same collisions with the same weights, at most {max(scene['most'] for scene in scenes):,}. No iteration intersects. The first "
-        f"two solvers of each cloth are at most {max(scene['apart'] for scene in scenes):.1e} apart at the end of any frame."
-    )
+    text = worded(record, arguments.note)
     print(text)
     if arguments.record:
         target = record_folder(arguments.machine, today)
