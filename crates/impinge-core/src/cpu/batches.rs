@@ -375,7 +375,7 @@ fn all<S: Simd, W: BatchStages>(
     if plan.between() && plan.parts.len() == 2 {
         let [a, b] = [0, 1].map(PartIx::new);
         if plan.test(a, b).is_some() {
-            between(simd, a, b, stack, batches)?;
+            between_parts(batches, a, b, stack)?;
         }
     } else if plan.between() {
         top.refit(plan.parts.len(), batches.tuning, |ix| {
@@ -385,13 +385,7 @@ fn all<S: Simd, W: BatchStages>(
             if plan.test(a, b).is_none() {
                 return Ok(());
             }
-            // Compiled separately: inside this closure the instruction set would be lost.
-            with_isa!(batches.isa, between, <W: BatchStages> (
-                a: PartIx = a,
-                b: PartIx = b,
-                stack: &mut Vec<NodePair> = stack,
-                batches: &mut Batches<'_, W> = batches,
-            ) -> Result<(), Error>)
+            between_parts(batches, a, b, stack)
         })?;
     }
     for ix in plan.part_ixs() {
@@ -409,6 +403,22 @@ fn all<S: Simd, W: BatchStages>(
         }
     }
     Ok(())
+}
+
+/// Compiled once, and separately: inside of closures the instruction set would be lost.
+#[inline(never)]
+fn between_parts<W: BatchStages>(
+    batches: &mut Batches<'_, W>,
+    a: PartIx,
+    b: PartIx,
+    stack: &mut Vec<NodePair>,
+) -> Result<(), Error> {
+    with_isa!(batches.isa, between, <W: BatchStages> (
+        a: PartIx = a,
+        b: PartIx = b,
+        stack: &mut Vec<NodePair> = stack,
+        batches: &mut Batches<'_, W> = batches,
+    ) -> Result<(), Error>)
 }
 
 #[inline(always)]
