@@ -2,7 +2,7 @@
 
 # All tasks
 default:
-    @just --list
+    @{{quote(just_executable())}} --list
 
 # What a change must pass
 ci:
