@@ -62,8 +62,16 @@ impl Bounds {
     /// where the squares of f32 extents cannot overflow.
     #[inline]
     pub fn half_area(&self) -> f64 {
-        let [x, y, z]: [f64; 3] =
-            std::array::from_fn(|k| (f64::from(self.max[k]) - f64::from(self.min[k])).max(0.0));
+        self.half_area_within(0.0)
+    }
+
+    /// The same of the box that is smaller by a margin on all sides.
+    #[inline]
+    pub fn half_area_within(&self, margin: f64) -> f64 {
+        let [x, y, z]: [f64; 3] = std::array::from_fn(|k| {
+            let extent = f64::from(self.max[k]) - f64::from(self.min[k]);
+            (extent - 2.0 * margin).max(0.0)
+        });
         x * y + y * z + z * x
     }
 }

@@ -2,6 +2,7 @@
 
 #[cfg(feature = "gpu")]
 use crate::boxes;
+#[cfg(feature = "gpu")]
 use crate::bvh::bounds::Bounds;
 #[cfg(feature = "gpu")]
 use crate::bvh::clusters::Clustering;
@@ -60,13 +61,12 @@ pub(crate) fn sampled_spread(clustering: &Clustering, positions: &Positions) -> 
         sum += bounds.half_area();
         whole.join(&bounds);
     }
-    spread(sum, &whole)
+    spread(sum, whole.half_area())
 }
 
 /// The clusters' summed surface over that of the whole: how well they fit the pose at hand. Both
 /// are halves.
-pub(crate) fn spread(surface: f64, whole: &Bounds) -> f64 {
-    let whole = whole.half_area();
+pub(crate) fn spread(surface: f64, whole: f64) -> f64 {
     if whole > 0.0 && whole.is_finite() && surface.is_finite() {
         surface / whole
     } else {

@@ -249,6 +249,6 @@ impl BodyCache {
     /// The clusters' summed surface divided by the body's: how well the clusters fit the current
     /// pose.
     pub(super) fn spread(&self) -> f64 {
-        spread(self.surface, &self.bounds.root())
+        spread(self.surface, self.bounds.root().half_area())
     }
 }

@@ -375,11 +375,12 @@ impl Plan {
         limits: Limits,
     ) -> Result<Self, Error> {
         let mut plan = Plan {
-            parts: Vec::with_capacity(match query.scope {
-                Scope::Between(..) | Scope::SelfOf(_) => 2,
-                Scope::Across { .. } | Scope::All { .. } => {
-                    scene.n_bodies() * question.parts().len()
-                }
+            parts: Vec::with_capacity({
+                let n_bodies = match query.scope {
+                    Scope::Between(..) | Scope::SelfOf(_) => 2,
+                    Scope::Across { .. } | Scope::All { .. } => scene.n_bodies(),
+                };
+                n_bodies * question.parts().len()
             }),
             question,
             kinds: query.kinds,

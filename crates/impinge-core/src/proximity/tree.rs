@@ -84,7 +84,7 @@ impl Tree {
             return 1.0;
         };
         let surface = clusters.iter().map(Bounds::half_area).sum();
-        spread(surface, &self.bounds_f32(root))
+        spread(surface, self.bounds_f32(root).half_area())
     }
 
     /// Bytes held beside the clusters.

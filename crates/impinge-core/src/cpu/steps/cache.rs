@@ -45,8 +45,9 @@ pub(super) struct PartCache {
     bounds: TreeBounds,
     /// The clusters' boxes at the start, and at the end.
     ends: [BoundsArray; 2],
-    /// How well the clusters have fitted the part.
-    fit: Fit,
+    /// How well the clusters have fitted the part, by boxes of the start and by those of the whole
+    /// path, which are larger: questions with either take turns.
+    fits: [Fit; 2],
 }
 
 impl PartCache {
@@ -64,7 +65,7 @@ impl PartCache {
             clustering,
             bounds,
             ends,
-            fit: Fit::UNKNOWN,
+            fits: [Fit::UNKNOWN; 2],
         }
     }
 
@@ -89,11 +90,16 @@ impl PartCache {
     }
 
     /// How well the clusters fit the current pose: the clusters' summed surface divided by the
-    /// part's.
-    fn spread(&self) -> f64 {
-        let clusters = 0..self.clustering.n_clusters();
-        let surface: f64 = clusters.map(|ix| self.ends[0].at(ix).half_area()).sum();
-        spread(surface, &self.bounds.root())
+    /// part's. Of boxes at the start without their inflation: where bodies move to, and how far
+    /// boxes reach, differs from question to question.
+    fn spread(&self, inflation: f64) -> f64 {
+        let (mut surface, mut whole) = (0.0, Bounds::EMPTY);
+        for ix in 0..self.clustering.n_clusters() {
+            let bounds = self.ends[0].at(ix);
+            surface += bounds.half_area_within(inflation);
+            whole.join(&bounds);
+        }
+        spread(surface, whole.half_area_within(inflation))
     }
 }
 
@@ -147,8 +153,15 @@ pub(super) fn refit<S: Send>(
         }
         cache.bounds.refit_above(0, &cache.clustering.shape);
         cache.of = Some(of);
-        let spread = cache.spread();
-        let (body_part, fit) = (BodyPart::new(part.id, body, part.part), &mut cache.fit);
+        let Sweep {
+            inflation,
+            is_swept,
+            until,
+        } = of.1;
+        let spread = cache.spread(inflation);
+        let is_of_path = is_swept && until > Sweep::NEARLY_STILL;
+        let fit = &mut cache.fits[usize::from(is_of_path)];
+        let body_part = BodyPart::new(part.id, body, part.part);
         let mut known = clusterings.lock();
         if let Some(clustering) = known.renew_if_stale(body_part, (fit, spread), work, stats)? {
             *cache = PartCache::new(body, clustering);
@@ -177,7 +190,13 @@ fn find_boxes<S: Send>(
         workers,
         ..
     } = job;
-    let mut tasks = Vec::new();
+    let n_clusters = |part| caches.at(part).clustering.n_clusters();
+    let n_each = workers.task(CLUSTERS);
+    let n_tasks = plan
+        .parts
+        .iter()
+        .map(|part| n_clusters(part).div_ceil(n_each));
+    let mut tasks = Vec::with_capacity(n_tasks.sum());
     for (ix, part) in plan.numbered_parts() {
         let body = plan.body(scene, ix);
         let cache = caches.at_mut(part);
@@ -202,7 +221,6 @@ fn find_boxes<S: Send>(
             leaves: leaves.raw(),
             ends: [start.raw(), end.raw()],
         };
-        let n_each = workers.task(CLUSTERS);
         tasks.extend((0..n).step_by(n_each).map(|first| BoxTask {
             first,
             end: n.min(first + n_each),
