@@ -3,7 +3,7 @@
 
 use std::mem::offset_of;
 
-use impinge::{BodyId, Closest, ClosestElement, Detector, Error, Hit, Hits, Query, Scene, Stats};
+use impinge::{Closest, ClosestElement, Detector, Error, Hit, Hits, Query, Scene, Stats};
 
 use crate::answers::{Answer, answer, asked_for, code};
 use crate::arrays::{self, Floats, collect};
@@ -189,18 +189,6 @@ fn find_closest(
     }
 }
 
-fn find_places(
-    detector: &mut Detector,
-    scene: &Scene,
-    body: BodyId,
-    points: &Floats<'_, 3>,
-) -> Result<Vec<i8>, Error> {
-    match points {
-        Floats::F32(points) => detector.contains(scene, body, points),
-        Floats::F64(points) => detector.contains(scene, body, points),
-    }
-}
-
 /// Writes a number per point.
 ///
 /// # Safety
@@ -233,7 +221,11 @@ pub unsafe extern "C" fn impinge_contains(
         value((detector, scene, std::ptr::null()), |of| {
             let body = of.scene.id(body)?;
             let points = arrays::floats::<3>(&points, "points")?;
-            let found = find_places(of.detector, &of.scene.scene, body, &points)?;
+            let scene = &of.scene.scene;
+            let found = match &points {
+                Floats::F32(points) => of.detector.contains(scene, body, points)?,
+                Floats::F64(points) => of.detector.contains(scene, body, points)?,
+            };
             put_each(places, "places", found.into_iter())
         })
     }
@@ -253,17 +245,11 @@ pub unsafe extern "C" fn impinge_signed_distance(
             let body = of.scene.id(body)?;
             let points = arrays::floats::<3>(&points, "points")?;
             let scene = &of.scene.scene;
-            let places = find_places(of.detector, scene, body, &points)?;
-            let query = Query::of(body);
-            let closest = find_closest(of.detector, scene, &points, f64::INFINITY, &query)?;
-            let signed = (0..places.len()).map(|ix| {
-                let distance = closest.get(ix).map_or(f64::INFINITY, |of| of.distance);
-                match places[ix] {
-                    0 => 0.0,
-                    place => distance * f64::from(place),
-                }
-            });
-            put_each(distances, "distances", signed)
+            let signed = match &points {
+                Floats::F32(points) => of.detector.signed_distance(scene, body, points)?,
+                Floats::F64(points) => of.detector.signed_distance(scene, body, points)?,
+            };
+            put_each(distances, "distances", signed.into_iter())
         })
     }
 }

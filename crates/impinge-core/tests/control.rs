@@ -91,7 +91,7 @@ fn points(world: &World) -> Vec<[f64; 3]> {
 }
 
 /// By the names of the methods; where one is asked twice, with more after a space.
-const ALL: [(&str, Ask); 23] = [
+const ALL: [(&str, Ask); 24] = [
     ("detect", |d, w| {
         Ok(d.detect(&w.scene, &Query::all())?.hash())
     }),
@@ -179,6 +179,10 @@ const ALL: [(&str, Ask); 23] = [
         Ok(places
             .iter()
             .fold(0, |sum, &place| 3 * (sum % (1 << 60)) + (place + 1) as u64))
+    }),
+    ("signed_distance", |d, w| {
+        let signed = d.signed_distance(&w.scene, w.bodies[1], &points(w))?;
+        Ok(bits(&signed.iter().map(|&x| [x; 3]).collect::<Vec<_>>()))
     }),
     ("locate", |d, w| {
         let (scene, block) = &w.block;

@@ -308,6 +308,25 @@ impl DetectorBase {
         Ok(PyArray1::from_vec(slf.py(), places))
     }
 
+    fn _signed_distance<'py>(
+        slf: &Bound<'py, Self>,
+        scene: &Bound<'_, PyAny>,
+        body: &Bound<'_, PyAny>,
+        points: &Bound<'py, PyAny>,
+        keywords: Keywords<'_, '_>,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let distances = ask_of_body(
+            slf,
+            (scene, body, points),
+            keywords,
+            |detector, scene, body, points| match points {
+                Rows::F32(points) => detector.signed_distance(scene, body, points),
+                Rows::F64(points) => detector.signed_distance(scene, body, points),
+            },
+        )?;
+        Ok(PyArray1::from_vec(slf.py(), distances))
+    }
+
     fn _locate<'py>(
         slf: &Bound<'py, Self>,
         scene: &Bound<'_, PyAny>,

@@ -95,6 +95,9 @@ def test_closest():
     assert isinstance(closest.hash, int) and closest.stats.n_threads >= 1
     signed = impinge.signed_distance(CORNERS, CUBE, points)
     assert (signed == closest.distances * expected(points)).all()
+    scene = impinge.Scene()
+    body = scene.add(CORNERS, CUBE)
+    assert (impinge.Detector("cpu").signed_distance(scene, body, points) == signed).all()
     assert signed[expected(points) == 1].min() > 0 > signed[expected(points) == -1].max()
 
 

@@ -53,7 +53,7 @@ pub enum Question {
     Nearest,
     /// [`Detector::locate`].
     Locate,
-    /// [`Detector::contains`], then [`Detector::closest`].
+    /// [`Detector::signed_distance`].
     SignedDistance,
 }
 

@@ -147,28 +147,18 @@ impl Asker {
         let points = rows::<_, 3>(points, "points")?;
         let (detector, scene, body) = (&mut self.detector, &world.scene, world.id(body)?);
         let mut answer = Answer::default();
-        if question == Question::Locate {
-            let found = detector.locate(scene, body, points)?;
-            let numbers = found.into_iter().map(|found| found.unwrap_or(u32::MAX));
-            answer.words.extend(numbers);
-            return Ok(answer);
+        match question {
+            Question::Locate => {
+                let found = detector.locate(scene, body, points)?;
+                let numbers = found.into_iter().map(|found| found.unwrap_or(u32::MAX));
+                answer.words.extend(numbers);
+            }
+            Question::Contains => {
+                let places = detector.contains(scene, body, points)?;
+                answer.bytes.extend(places.iter().map(|&place| place as u8));
+            }
+            _ => answer.numbers = detector.signed_distance(scene, body, points)?,
         }
-        let places = detector.contains(scene, body, points)?;
-        if question == Question::Contains {
-            answer.bytes.extend(places.iter().map(|&place| place as u8));
-            return Ok(answer);
-        }
-        let query = impinge::Query::of(body);
-        let closest = detector.closest(scene, points, f64::INFINITY, &query)?;
-        let distances = closest
-            .iter()
-            .map(|found| found.map_or(f64::INFINITY, |of| of.distance));
-        answer
-            .numbers
-            .extend(distances.zip(places).map(|(distance, place)| match place {
-                0 => 0.0,
-                place => distance * f64::from(place),
-            }));
         Ok(answer)
     }
 

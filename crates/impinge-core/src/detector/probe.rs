@@ -1,4 +1,5 @@
-//! A detector's answers about points: where they lie, in which tetrahedra, and what is nearest.
+//! A detector's answers about points: where they lie and how far inside, in which tetrahedra, and
+//! what is nearest.
 
 use super::Detector;
 use crate::answers::closest::Closest;
@@ -9,6 +10,7 @@ use crate::scene::Scene;
 use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
 use crate::scene::positions::Real;
+use crate::search::sink;
 use crate::search::work::Work;
 
 /// A point or a ray takes at least as long as so many elements of a frame.
@@ -54,6 +56,49 @@ impl Detector {
         self.probe(points.len(), |probes, shared, work| {
             let places = probes.contains(scene, body, points, shared, work)?;
             Ok((places, shared.topologies.bytes()))
+        })
+    }
+
+    /// How far each point is from the surface of a body: positive inside, negative outside, 0 on
+    /// the surface. The sign is that of [`contains`](Detector::contains) and exact; the magnitude
+    /// is the distance of [`closest`](Detector::closest), rounded down: never above the true one.
+    ///
+    /// ```
+    /// use impinge::{Backend, Detector, Scene};
+    /// # fn main() -> Result<(), impinge::Error> {
+    /// let faces = [[0u32, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]];
+    /// let corners = [[0.0f32, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0], [0.0, 0.0, 4.0]];
+    /// let mut scene = Scene::new();
+    /// let body = scene.add_triangles(&faces, &corners)?;
+    /// let mut detector = Detector::new(Backend::Cpu)?;
+    /// let points = [[1.0f32, 1.0, 0.5], [0.0, 0.0, 2.0], [-1.0, 0.0, 0.0]];
+    /// assert_eq!(detector.signed_distance(&scene, body, &points)?, [0.5, 0.0, -1.0]);
+    /// # Ok(()) }
+    /// ```
+    ///
+    /// # Errors
+    /// As [`contains`](Detector::contains).
+    pub fn signed_distance<R: Real>(
+        &mut self,
+        scene: &Scene,
+        body: BodyId,
+        points: &[[R; 3]],
+    ) -> Result<Vec<f64>, Error> {
+        let mut closest = self.homes.closest.take();
+        self.probe(points.len(), |probes, shared, work| {
+            let places = probes.contains(scene, body, points, shared, work)?;
+            let asked = (&Query::of(body), f64::INFINITY);
+            probes.closest(scene, asked, points, &mut closest.found, shared, work)?;
+            let mut signed = sink::with_capacity(points.len(), "distances")?;
+            // A body without elements is infinitely far.
+            signed.extend(places.iter().zip(&closest.found).map(|(&place, found)| {
+                let distance = found.map_or(f64::INFINITY, |found| found.distance);
+                match place {
+                    0 => 0.0,
+                    _ => f64::from(place) * distance,
+                }
+            }));
+            Ok((signed, closest.bytes() + shared.topologies.bytes()))
         })
     }
 

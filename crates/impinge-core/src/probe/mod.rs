@@ -321,7 +321,10 @@ impl Probes {
             };
             Ok((id, target))
         };
-        parts.iter().map(target).collect()
+        let targets = parts.iter().map(target);
+        // No box holds anything of a body without elements.
+        let is_any = |found: &Result<(_, Target<'a>), _>| !matches!(found, Ok((_, target)) if target.boxes.clustering.n_clusters() == 0);
+        targets.filter(is_any).collect()
     }
 
     /// Refits the boxes of some parts of bodies, and forgets removed bodies.

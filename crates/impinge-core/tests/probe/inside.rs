@@ -1,10 +1,12 @@
-//! `contains`: inside, on the surface, outside; and `locate`: in which tetrahedron.
+//! `contains`: inside, on the surface, outside; `signed_distance`: how far; and `locate`: in which
+//! tetrahedron.
 
 use std::collections::HashMap;
 
 use crate::oracle::{self, Vector};
 use impinge_core::{
-    Backend, CancelToken, Control, Detector, Elements, Error, InstructionSet, Scene, Settings,
+    Backend, CancelToken, Control, Detector, Elements, Error, InstructionSet, Query, Scene,
+    Settings,
 };
 use impinge_scenes::{Model, Random, solids, soup, surfaces};
 
@@ -98,6 +100,43 @@ fn lattices_of_shells_are_decided_exactly() {
         all = [0, 1, 2].map(|k| all[k] + count(&expected)[k]);
     }
     assert!(all.iter().all(|&n| n > 100), "{all:?}");
+}
+
+/// The sign is that of the oracle, the magnitude the distance of this body alone, whatever else is
+/// nearer; and other answers do not depend on it.
+#[test]
+fn distances_have_the_sign_of_the_side() {
+    let mut all = [0; 3];
+    let mut detector = Detector::new(Backend::Cpu).unwrap();
+    for (n, k, seed) in [(1, 2, 2), (8, 2, 4), (30, 4, 6)] {
+        let (faces, positions) = shells(n, k, seed);
+        let points = lattice(k);
+        let mut scene = Scene::new();
+        scene.add_points(&points).unwrap();
+        let body = scene.add_triangles(&faces, &positions).unwrap();
+        let expected = expected(&faces, &positions, &points);
+        let signed = detector.signed_distance(&scene, body, &points).unwrap();
+        assert!(detector.stats().bytes_held > 0 && detector.stats().method == "clusters");
+        let most = f64::INFINITY;
+        let closest = detector.closest(&scene, &points, most, &Query::of(body));
+        let closest = closest.unwrap();
+        assert_eq!(signed.len(), points.len());
+        for ((signed, side), found) in signed.iter().zip(&expected).zip(&closest) {
+            assert_eq!(signed.abs(), found.unwrap().distance);
+            assert_eq!(signed.partial_cmp(&0.0), side.partial_cmp(&0));
+        }
+        all = [0, 1, 2].map(|k| all[k] + count(&expected)[k]);
+    }
+    assert!(all.iter().all(|&n| n > 20), "{all:?}");
+    let mut scene = Scene::new();
+    let none = scene.add_triangles::<f32>(&[], &[]).unwrap();
+    let signed = detector.signed_distance(&scene, none, &[[0.0f32; 3]]);
+    assert_eq!(signed.unwrap(), [f64::NEG_INFINITY]);
+    let open = scene
+        .add_triangles(&[[0, 1, 2]], &[[0.0f32; 3]; 3])
+        .unwrap();
+    let refused = detector.signed_distance(&scene, open, &[[f32::NAN; 3]]);
+    assert!(matches!(refused, Err(Error::NonFinitePoint { .. })));
 }
 
 /// Points on vertices and near the middles of edges and faces, whose coordinates are rounded: on

@@ -764,6 +764,37 @@ class Detector(DetectorBase):
         """
         return self._contains(scene, body, points, control)
 
+    def signed_distance(
+        self, scene: Scene, body: _Body, points: _Array, **control: Unpack[Control]
+    ) -> npt.NDArray[np.float64]:
+        """How far points are from the surface of a body: positive inside, negative outside.
+
+        Parameters
+        ----------
+        scene, body, points, **control
+            As for `contains`.
+
+        Returns
+        -------
+        numpy.ndarray of float64, shape (n,)
+            0 on the surface. The sign is exact, and the magnitude is rounded down: never above the true distance.
+
+        Raises
+        ------
+        ValueError, TypeError
+            As `contains`.
+
+        Examples
+        --------
+        >>> import impinge
+        >>> scene = impinge.Scene()
+        >>> corners = [[0, 0, 0], [4, 0, 0], [0, 4, 0], [0, 0, 4]]
+        >>> body = scene.add(corners, [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
+        >>> impinge.Detector("cpu").signed_distance(scene, body, [[1, 1, 0.5], [0, 0, 2], [-1, 0, 0]]).tolist()
+        [0.5, 0.0, -1.0]
+        """
+        return self._signed_distance(scene, body, points, control)
+
     def contacts(self, scene: Scene, pairs: Pairs, **control: Unpack[Control]) -> Contacts:
         """Where the triangles of each pair meet: points, segments, polygons, and the curves in which surfaces cross.
 

@@ -278,8 +278,7 @@ def signed_distance(
     [0.5, 0.0, -1.0]
     """
     scene, detector = _one_mesh(vertices, faces, kind, weld, settings)
-    places = detector._contains(scene, 0, points, {})
-    return detector._closest(scene, points, np.inf, {}).distances() * places
+    return detector._signed_distance(scene, 0, points, {})
 
 
 def contains(

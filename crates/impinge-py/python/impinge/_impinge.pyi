@@ -194,6 +194,9 @@ class DetectorBase:
     def _contains(
         self, scene: SceneBase, body: Any, points: Any, keywords: _Options
     ) -> npt.NDArray[np.int8]: ...
+    def _signed_distance(
+        self, scene: SceneBase, body: Any, points: Any, keywords: _Options
+    ) -> npt.NDArray[np.float64]: ...
     def _locate(
         self, scene: SceneBase, body: Any, points: Any, keywords: _Options
     ) -> npt.NDArray[np.int64]: ...

@@ -132,9 +132,7 @@ class ProximityQuery(_OfMesh):
         ValueError
             A surface that is not closed.
         """
-        surface = self._surface()
-        places = self._detector.contains(surface, 0, points)
-        return self._detector.closest(surface, points).distances * places
+        return self._detector.signed_distance(self._surface(), 0, points)
 
     def contains(self, points: _Array) -> npt.NDArray[np.bool_]:
         """Whether points are inside; what is on the surface is not. `impinge.contains` tells all three apart.
