@@ -575,6 +575,8 @@ impl Scene {
                 filter.category,
                 filter.mask,
                 thickness_array(py, body),
+                body.groups().map(|each| PyArray1::from_slice(py, each)),
+                body.pinned().map(|each| PyArray1::from_slice(py, each)),
             ))?;
         }
         (slf.get_type(), (), bodies).into_pyobject(py)
@@ -618,6 +620,16 @@ impl Scene {
             let (part, thickness): (Bound<'_, PyAny>, Bound<'_, PyAny>) = item(8)?.extract()?;
             let thickness = self::thickness(&thickness, &part)?;
             scene.inner.set_thickness(id, thickness).map_err(raise)?;
+            let groups: Option<Bound<'_, PyArray1<u32>>> = item(9)?.extract()?;
+            if let Some(groups) = groups {
+                let groups = groups.to_vec()?;
+                scene.inner.set_groups(id, &groups).map_err(raise)?;
+            }
+            let pinned: Option<Bound<'_, PyArray1<bool>>> = item(10)?.extract()?;
+            if let Some(pinned) = pinned {
+                let pinned = pinned.to_vec()?;
+                scene.inner.set_pinned(id, &pinned).map_err(raise)?;
+            }
         }
         for id in gaps.into_iter().rev() {
             scene.inner.remove(id).map_err(raise)?;

@@ -125,6 +125,34 @@ def test_scenes_pickle(duplicate):
     assert len(duplicate(impinge.Scene())) == 0
 
 
+@pytest.mark.parametrize("duplicate", [copy.copy, copy.deepcopy, lambda x: pickle.loads(pickle.dumps(x))])
+def test_scenes_pickle_what_was_said_of_vertices(duplicate):
+    scene = a_scene()
+    layer = np.repeat(np.arange(4, dtype=np.uint32), 4)
+    cloth = scene.add(np.indices((4, 4, 1), np.float32).reshape(3, -1).T, [[i, i + 1, i + 4] for i in range(11)])
+    scene.set_groups(cloth, layer)
+    scene.set_pinned(cloth, layer < 2)
+    scene.set_thickness(cloth, np.where(layer == 1, 0.75, 0.25))
+    scene.set_thickness(0, 0.5)
+    detector = impinge.Detector("cpu")
+
+    def answers(of):
+        asked = [detector.near(of, 2.5, exclude=exclude) for exclude in [[], impinge.groups(0, 2), impinge.groups(2, 2)]]
+        return [len(near) for near in asked], [near.hash for near in asked], detector.safe_distances(of, 0.5).of(int(cloth)).tolist()
+
+    expected = answers(scene)
+    assert answers(duplicate(scene)) == expected and len(set(expected[0])) == 3
+    # Each of them counts.
+    for change in [
+        lambda of: of.set_groups(int(cloth), layer[::-1]),
+        lambda of: of.set_pinned(int(cloth), np.zeros(16, bool)),
+        lambda of: of.set_thickness(int(cloth), 0),
+    ]:
+        other = duplicate(scene)
+        change(other)
+        assert answers(other) != expected
+
+
 def test_settings_pickle():
     settings = dict(method="cells", backend="cpu", threads=2, memory_budget=1 << 30, max_pairs=1000, density=2.0)
     detector = impinge.Detector(**settings, _group_size=32, recluster="never", instruction_set="avx2", affinity="auto")

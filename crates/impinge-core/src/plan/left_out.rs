@@ -130,8 +130,8 @@ impl Plan {
             let body = self.body(scene, part);
             OfPart {
                 rings: query.rings.map(|n| body.vertex_rings(n)),
-                groups: body.groups().cloned(),
-                pinned: body.pinned().cloned(),
+                groups: body.shared_groups(),
+                pinned: body.shared_pinned(),
             }
         };
         let numbered = || {

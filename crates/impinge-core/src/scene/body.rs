@@ -191,14 +191,24 @@ impl Body {
         self.filter
     }
 
-    /// The group of each vertex, if [groups](Scene::set_groups) were set.
-    pub(crate) fn groups(&self) -> Option<&Arc<[u32]>> {
-        self.groups.as_ref()
+    /// The group of each vertex, if [groups](crate::Scene::set_groups) were set.
+    pub fn groups(&self) -> Option<&[u32]> {
+        self.groups.as_deref()
     }
 
-    /// Whether each vertex is pinned, if [that](Scene::set_pinned) was set.
-    pub(crate) fn pinned(&self) -> Option<&Arc<[bool]>> {
-        self.pinned.as_ref()
+    /// Whether each vertex is [pinned](crate::Scene::set_pinned), if any is.
+    pub fn pinned(&self) -> Option<&[bool]> {
+        self.pinned.as_deref()
+    }
+
+    /// The same [groups](Body::groups), shared.
+    pub(crate) fn shared_groups(&self) -> Option<Arc<[u32]>> {
+        self.groups.clone()
+    }
+
+    /// What is [pinned](Body::pinned), shared.
+    pub(crate) fn shared_pinned(&self) -> Option<Arc<[bool]>> {
+        self.pinned.clone()
     }
 
     /// The vertices at most some number of edges away from each vertex.
