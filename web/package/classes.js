@@ -3,7 +3,7 @@
 import { Advance, Candidates, Contacts, Impacts, NearPairs, Pairs, Penetration, earliest, nearest, numberOf, statsOf } from "./answers.js";
 import { Closest, Hits, Neighbours, SafeDistances, Truncation, places, signed, tetrahedra } from "./probe.js";
 import { RestPairs, packed, plain, whole, withPoints } from "./query.js";
-import { body, call, isSingle, mustBeNone, number, refuse, wide, word } from "./shared.js";
+import { body, call, disposable, isSingle, mustBeNone, number, refuse, wide, word } from "./shared.js";
 
 const PARTS = ["vertices", "edges", "faces"];
 const BODY_KINDS = ["points", "edges", "triangles", "tetrahedra"];
@@ -234,7 +234,8 @@ export function makeScene({ SceneHandle }, mustBeReady) {
 
     restPairs(distance) {
       const next = RestPairs.next();
-      return new RestPairs(next, call(() => this.#held.rest_pairs(next, number("distance", distance))));
+      const n = call(() => this.#held.rest_pairs(next, number("distance", distance)));
+      return new RestPairs(next, n, () => this.#handle?.forget_rest_pairs(next));
     }
 
     #size(which) {
@@ -296,10 +297,6 @@ export function makeScene({ SceneHandle }, mustBeReady) {
   }
   disposable(Scene);
   return { Scene, handleOf };
-}
-
-export function disposable(type) {
-  if (Symbol.dispose) type.prototype[Symbol.dispose] = type.prototype.dispose;
 }
 
 // Asks the module at once. `detector` and `scene` are the module's.

@@ -149,6 +149,9 @@ declare class RestPairs {
   #number;
   /** How many there are. */
   readonly length: number;
+  /** Lets the scene forget them. So does it once they are collected as garbage, whenever that is. */
+  dispose(): void;
+  [Symbol.dispose](): void;
 }
 export type { RestPairs };
 
@@ -200,7 +203,7 @@ export declare class Scene {
   setPinned(body: Body, pinned: ArrayLike<number | boolean>): void;
   /**
    * The pairs of elements that are within a distance of each other now, mostly at rest, to be left out of later questions by `exclude`. The
-   * scene keeps them until it is disposed of.
+   * scene keeps them until either is disposed of, or the pairs are collected as garbage.
    */
   restPairs(distance: number): RestPairs;
   kind(body: Body): "points" | "edges" | "triangles" | "tetrahedra";

@@ -2,9 +2,9 @@
 
 import load, * as module from "./cpu/impinge.js";
 import { statsOf } from "./answers.js";
-import { answering, ask, disposable, makeScene, settings } from "./classes.js";
+import { answering, ask, makeScene, settings } from "./classes.js";
 import { watch } from "./query.js";
-import { call, loader, refuse, welder } from "./shared.js";
+import { call, disposable, loader, refuse, welder } from "./shared.js";
 
 export { KINDS, SHAPES } from "./answers.js";
 export { ImpingeError } from "./shared.js";

@@ -1,6 +1,6 @@
 // Questions as the lists of numbers that the module takes, and what watches them.
 
-import { ImpingeError, body, mustBeNone, number, refuse, word } from "./shared.js";
+import { ImpingeError, body, disposable, mustBeNone, number, refuse, word } from "./shared.js";
 
 export const KINDS = ["vf", "ee", "ev", "vv", "ef", "ff"];
 
@@ -54,18 +54,30 @@ export function packed(query, length = 0) {
   };
 }
 
+// Calls what makes the module forget pairs that nobody holds any more.
+const lost = new FinalizationRegistry((forget) => forget());
+
 // Pairs that were near when a scene was asked: the module knows them by a number.
 export class RestPairs {
   static #last = 0;
   static next = () => (RestPairs.#last += 1);
   static numberOf = (given) => given.#number;
   #number;
+  #forget;
 
-  constructor(number, length) {
+  constructor(number, length, forget) {
     this.#number = number;
+    this.#forget = forget;
     this.length = length;
+    lost.register(this, forget, this);
+  }
+
+  dispose() {
+    lost.unregister(this);
+    this.#forget();
   }
 }
+disposable(RestPairs);
 
 // Three words for what is left out: rings around each element, two groups of vertices, pairs at rest or two bodies.
 function excluded(given) {

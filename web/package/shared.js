@@ -9,6 +9,11 @@ export class ImpingeError extends Error {
   }
 }
 
+// Lets `using` dispose of what has a method for it.
+export function disposable(type) {
+  if (Symbol.dispose) type.prototype[Symbol.dispose] = type.prototype.dispose;
+}
+
 export function refuse(message) {
   throw new ImpingeError("invalid", message);
 }

@@ -2,9 +2,9 @@
 
 import load, * as module from "./gpu/impinge.js";
 import { Pairs, statsOf } from "./answers.js";
-import { answering, ask, disposable, makeScene, settings } from "./classes.js";
+import { answering, ask, makeScene, settings } from "./classes.js";
 import { watch } from "./query.js";
-import { ImpingeError, call, loader, mustBeNone, named, refuse, welder } from "./shared.js";
+import { ImpingeError, call, disposable, loader, mustBeNone, named, refuse, welder } from "./shared.js";
 
 export { KINDS, SHAPES } from "./answers.js";
 export { ImpingeError } from "./shared.js";

@@ -418,11 +418,14 @@ export async function others(module) {
   pile.setGroups(base, new Uint8Array([1, 1, 1]));
   pile.setGroups(top, new Uint32Array([2, 2, 3]));
   const grouped = await count({ groups: [2, 1] });
-  const atRest = pile.restPairs(1);
+  const [atRest, again] = [pile.restPairs(1), pile.restPairs(1)];
+  again.dispose();
+  again.dispose();
   const left = {
     groups: [grouped > 0 && grouped < every, (await count({ groups: [7, 7] })) === every],
     rest: [atRest.length === every, await count(atRest)],
     foreign: await refusal(() => detector.near(scene, 1, { exclude: [atRest] })),
+    disposed: [await refusal(() => count(again)), await count(atRest)],
     one: await refusal(() => count({ groups: [1] })),
     both: await refusal(() => count({ groups: [1, 2], rings: 1 })),
     group: await refusal(() => count({ groups: [1, -1] })),
@@ -548,7 +551,8 @@ export const OTHERS = {
   left: {
     groups: [true, true],
     rest: [true, 0],
-    foreign: "invalid: exclude: pairs at rest of another scene given, those of this scene allowed",
+    foreign: "invalid: exclude: pairs at rest given that are of another scene or disposed of, those of this scene allowed",
+    disposed: ["invalid: exclude: pairs at rest given that are of another scene or disposed of, those of this scene allowed", 0],
     one: "invalid: groups: 1 given, two groups are needed, without rings",
     both: "invalid: groups: 1,2 given, two groups are needed, without rings",
     group: "invalid: groups: -1 given, 0 to 4294967295 allowed",

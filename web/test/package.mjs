@@ -8,6 +8,9 @@ import { execFileSync } from "node:child_process";
 import { cp, mkdtemp, readFile, readdir, rm, writeFile } from "node:fs/promises";
 import { tmpdir } from "node:os";
 import { join, resolve } from "node:path";
+import { setTimeout } from "node:timers/promises";
+import { setFlagsFromString } from "node:v8";
+import { runInNewContext } from "node:vm";
 import { brotliCompressSync } from "node:zlib";
 import { OTHERS, REFUSALS, STEPS } from "./answers.mjs";
 import { launch, serve } from "./browser.mjs";
@@ -52,6 +55,18 @@ try {
   await cp(example, join(folder, "cloth-on-ball"), { recursive: true });
   const printed = execFileSync("node", ["cloth-on-ball/cloth_on_ball.mjs"], { cwd: folder, encoding: "utf8" });
   assert.equal(printed, await readFile(join(example, "expected.txt"), "utf8"));
+
+  // A scene forgets pairs at rest that nobody holds.
+  setFlagsFromString("--expose-gc");
+  const { RestPairs } = await import(join(installed, "query.js"));
+  const forgotten = [];
+  const [held] = [1, 2, 3].map((of) => new RestPairs(of, 0, () => forgotten.push(of)));
+  for (let turn = 0; turn < 1000 && forgotten.length < 2; turn += 1) {
+    runInNewContext("gc")();
+    await setTimeout(1);
+  }
+  held.dispose();
+  assert.deepEqual(forgotten.sort(), [1, 2, 3]);
 
   const scenes = JSON.parse(await readFile(scenesFile, "utf8"));
   assert.equal(scenes.length, 4);

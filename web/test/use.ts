@@ -45,6 +45,7 @@ scene.setPinned(a, [true, false, true]);
 scene.setPinned(a, new Uint8Array(3));
 const rest: RestPairs = scene.restPairs(0.5);
 const handed: number = detector.candidatesInRuns(scene, 0.5, (run) => run.of("ee").length > 0, { exclude: [rest, { groups: [0, 1] }], most: 100 });
+rest.dispose();
 const hits: RayHit[] = detector.cast(scene, points, new Float64Array(6), { hits: "all", most: 1 }).of(0);
 const bounds: Float32Array | Float64Array = detector.safeDistances(scene, 0.5, { fixed: [b], exclude: [[a, b], { rings: 2 }] }).of(a);
 const truncation: Truncation = detector.truncate(scene, { clearance: 1e-3 });

@@ -159,6 +159,11 @@ impl SceneHandle {
         self.0.keep_at_rest(number, distance).map_err(thrown)
     }
 
+    /// See [`World::forget_at_rest`].
+    pub fn forget_rest_pairs(&mut self, number: u32) {
+        self.0.forget_at_rest(number);
+    }
+
     /// See [`World::set_element_thickness`].
     pub fn set_element_thickness(&mut self, body: u32, part: u32, thickness: &[f64]) -> Thrown<()> {
         let set = self.0.set_element_thickness(body, part, thickness);

@@ -35,8 +35,10 @@ pub enum Error {
         /// Numbers in a row.
         row: usize,
     },
-    /// Pairs at rest that were asked for of another scene.
-    #[error("exclude: pairs at rest of another scene given, those of this scene allowed")]
+    /// Pairs at rest that were asked for of another scene, or are forgotten.
+    #[error(
+        "exclude: pairs at rest given that are of another scene or disposed of, those of this scene allowed"
+    )]
     PairsOfAnotherScene,
     /// Words that the package does not send.
     #[error("the package and its module do not fit together")]

@@ -164,8 +164,8 @@ impl World {
         self.renumbered(body, set).map(|_| ())
     }
 
-    /// Keeps the pairs that are within a distance now under a number, as long as the scene is kept.
-    /// Returns how many there are.
+    /// Keeps the pairs that are within a distance now under a number, until they are
+    /// [forgotten](Self::forget_at_rest). Returns how many there are.
     ///
     /// # Errors
     /// Those of [`Detector::near`].
@@ -175,6 +175,11 @@ impl World {
         self.at_rest.push((number, Exclusion::from(&near)));
         // A module of 32 bits holds no more.
         Ok(near.len() as u32)
+    }
+
+    /// Forgets the pairs at rest of a number, if they are kept.
+    pub fn forget_at_rest(&mut self, number: u32) {
+        self.at_rest.retain(|(of, _)| *of != number);
     }
 
     /// Pairs at rest by their number.

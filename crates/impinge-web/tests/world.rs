@@ -338,6 +338,12 @@ fn what_is_left_out_is_what_the_library_leaves_out() -> Result<(), Error> {
     assert_eq!(near(&mut asker, &world, &[3, 5, 0])?, 0);
     let refused = near(&mut asker, &World::new(), &[3, 5, 0]).expect_err("another scene");
     assert!(refused.to_string().starts_with("exclude: pairs at rest"));
+    assert_eq!(world.keep_at_rest(6, 1.0)?, n);
+    world.forget_at_rest(5);
+    world.forget_at_rest(5);
+    let refused = near(&mut asker, &world, &[3, 5, 0]).expect_err("forgotten");
+    assert!(refused.to_string().contains("disposed of"), "{refused}");
+    assert_eq!(near(&mut asker, &world, &[3, 6, 0])?, 0);
     world.set_pinned(below, &[1, 1, 1])?;
     assert_eq!(near(&mut asker, &world, &[])?, all);
     world.set_pinned(above, &[1, 1, 1])?;
