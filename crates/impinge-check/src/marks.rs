@@ -4,15 +4,19 @@ use serde_json::{Value, json};
 
 /// One kind of problem of a primitive, in the order in which pictures show them: the first that
 /// applies gives the colour.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Problem {
     /// Shares more points with another primitive than their common vertices, edge or face.
+    #[serde(rename = "self-intersections")]
     SelfIntersection,
     /// Has the same vertices as an earlier primitive.
+    #[serde(rename = "duplicates")]
     Duplicate,
     /// Has an edge (a tetrahedron: a face) of more than two primitives.
     NonManifold,
     /// Has an edge (a tetrahedron: a face) whose other primitive has the opposite orientation.
+    #[serde(rename = "orientation")]
     Inconsistent,
     /// Has zero area (a tetrahedron: zero volume).
     Degenerate,

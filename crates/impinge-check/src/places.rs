@@ -1,6 +1,6 @@
 //! Where the problems of a mesh are.
 
-use serde_json::{Value, json};
+use serde::{Deserialize, Serialize};
 
 use impinge_io::{Elements, Mesh};
 
@@ -12,7 +12,7 @@ const NAMED: usize = 8;
 
 /// One place with a problem: elements that have it and hang together by common vertices, or a
 /// vertex of several fans.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Place {
     /// The problem.
     pub problem: Problem,
@@ -29,43 +29,6 @@ pub struct Place {
     /// Their numbers, ascending: the first few, or all if [`Options::faces`](crate::Options::faces)
     /// asks for them.
     pub elements: Vec<u32>,
-}
-
-impl Place {
-    /// The place as an object of a row.
-    pub fn to_json(&self) -> Value {
-        json!({
-            "problem": self.problem.key(),
-            "vertex": self.vertex,
-            "point": self.point,
-            "size": self.size,
-            "n_elements": self.n_elements,
-            "elements": self.elements,
-        })
-    }
-
-    /// The place of an object made by [`to_json`](Self::to_json).
-    pub(crate) fn from_json(value: &Value) -> Option<Self> {
-        let key = value.get("problem")?.as_str()?;
-        let number = |value: &Value| u32::try_from(value.as_u64()?).ok();
-        let point = value.get("point")?;
-        let axis = |ix: usize| point.get(ix)?.as_f64();
-        Some(Place {
-            problem: Problem::ALL
-                .into_iter()
-                .find(|problem| problem.key() == key)?,
-            vertex: value.get("vertex").and_then(number),
-            point: [axis(0)?, axis(1)?, axis(2)?],
-            size: value.get("size")?.as_f64()?,
-            n_elements: value.get("n_elements")?.as_u64()?,
-            elements: value
-                .get("elements")?
-                .as_array()?
-                .iter()
-                .map(number)
-                .collect::<Option<_>>()?,
-        })
-    }
 }
 
 /// The largest places of each problem, at most `most` of each. `fans`: the vertices of several

@@ -1,49 +1,61 @@
 //! One row per mesh. It is printed, stored and sent between processes as a line of JSON.
 
+use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 
 use crate::marks::MarkRuns;
 use crate::places::Place;
 
 /// The counts of one mesh. Facets are edges of triangles and faces of tetrahedra.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Counts {
     /// Vertices, as in the file.
+    #[serde(rename = "vertices")]
     pub n_vertices: u64,
     /// Vertices removed by welding: they had exactly the position of another vertex.
+    #[serde(rename = "vertices_welded")]
     pub n_welded: u64,
     /// Triangles; 0 for a mesh of tetrahedra.
+    #[serde(rename = "triangles")]
     pub n_triangles: u64,
     /// Tetrahedra; 0 for a mesh of triangles.
+    #[serde(rename = "tetrahedra")]
     pub n_tetrahedra: u64,
     /// Pairs of primitives that share more points than their common vertices, edge or face
     /// ([`SharedVertex::Resolve`](impinge::SharedVertex::Resolve)).
     pub self_intersections: u64,
     /// Primitives in any such pair.
+    #[serde(rename = "intersecting_primitives")]
     pub n_intersecting: u64,
     /// [`Pairs::hash`](impinge::Pairs::hash) of these pairs. `None` if they are more than 2^32, and
     /// many of them of primitives with the same vertices: such pairs are counted without being
     /// listed.
+    #[serde(with = "hex")]
     pub hash: Option<u64>,
     /// Primitives of exactly zero area, or volume.
     pub degenerate: u64,
     /// Primitives with the vertices of an earlier one, in any order.
+    #[serde(rename = "duplicate_faces")]
     pub duplicates: u64,
     /// Facets of more than two primitives.
+    #[serde(rename = "non_manifold_edges")]
     pub non_manifold_facets: u64,
     /// Vertices around which the primitives form more than one fan.
     pub non_manifold_vertices: u64,
     /// Facets of only one primitive.
+    #[serde(rename = "boundary_edges")]
     pub boundary_facets: u64,
     /// Connected pieces of the border: holes, for most surfaces.
     pub boundaries: u64,
     /// Facets of two primitives with opposite orientations.
+    #[serde(rename = "inconsistent_edges")]
     pub inconsistent_facets: u64,
     /// Pieces connected through facets. Primitives that name a vertex twice belong to none.
     pub components: u64,
     /// Vertices of no primitive, counted after welding.
     pub unused_vertices: u64,
     /// Whether every edge belongs to exactly two triangles; `None` for tetrahedra.
+    #[serde(rename = "watertight")]
     pub is_watertight: Option<bool>,
     /// The volume that the triangles enclose, rounded once, negative if they are inside out. `None`
     /// unless they are watertight and of one orientation, and if it is larger than any `f64`. Of a
@@ -63,7 +75,8 @@ pub struct Counts {
 }
 
 /// Why a mesh has no counts.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum ErrorKind {
     /// The file can't be read: missing, damaged, of an unknown format, without primitives.
     File,
@@ -80,15 +93,6 @@ pub enum ErrorKind {
 }
 
 impl ErrorKind {
-    const ALL: [ErrorKind; 6] = [
-        ErrorKind::File,
-        ErrorKind::NotFinite,
-        ErrorKind::Refused,
-        ErrorKind::Timeout,
-        ErrorKind::Memory,
-        ErrorKind::Crash,
-    ];
-
     /// The name in a row: `file`, `not_finite`, `refused`, `timeout`, `memory` or `crash`.
     pub fn name(self) -> &'static str {
         match self {
@@ -158,102 +162,54 @@ impl Row {
     /// `null`: all counts of a mesh with an `error`, and the counts of edges of a mesh of
     /// tetrahedra, which has counts of faces instead.
     pub fn to_json(&self) -> Value {
-        let counts = self.result.as_ref().ok();
-        let number = |get: fn(&Counts) -> u64| counts.map(get);
-        let is_solid = counts.is_some_and(|counts| counts.n_tetrahedra > 0);
-        let of_kind =
-            |solid: bool, get: fn(&Counts) -> u64| counts.filter(|_| is_solid == solid).map(get);
+        let (counts, failure) = match &self.result {
+            Ok(counts) => (*counts, None),
+            Err(failure) => (Counts::default(), Some(failure)),
+        };
         let mut object = Map::new();
-        let mut put = |key: &str, value: Value| object.insert(key.to_owned(), value);
-        put("path", json!(self.path));
-        put("welded", json!(self.is_welded));
-        put("vertices", json!(number(|c| c.n_vertices)));
-        put("vertices_welded", json!(number(|c| c.n_welded)));
-        put("triangles", json!(number(|c| c.n_triangles)));
-        put("tetrahedra", json!(number(|c| c.n_tetrahedra)));
-        put(
-            "self_intersections",
-            json!(number(|c| c.self_intersections)),
-        );
-        put(
-            "intersecting_primitives",
-            json!(number(|c| c.n_intersecting)),
-        );
-        let hash = counts.and_then(|counts| counts.hash);
-        put("hash", json!(hash.map(|hash| format!("{hash:016x}"))));
-        put("degenerate", json!(number(|c| c.degenerate)));
-        put("duplicate_faces", json!(of_kind(false, |c| c.duplicates)));
-        put(
-            "non_manifold_edges",
-            json!(of_kind(false, |c| c.non_manifold_facets)),
-        );
-        put(
-            "non_manifold_vertices",
-            json!(number(|c| c.non_manifold_vertices)),
-        );
-        put(
-            "boundary_edges",
-            json!(of_kind(false, |c| c.boundary_facets)),
-        );
-        put("boundaries", json!(number(|c| c.boundaries)));
-        put(
-            "inconsistent_edges",
-            json!(of_kind(false, |c| c.inconsistent_facets)),
-        );
-        put("components", json!(number(|c| c.components)));
-        put("unused_vertices", json!(number(|c| c.unused_vertices)));
-        put("watertight", json!(counts.and_then(|c| c.is_watertight)));
-        put("volume", json!(counts.and_then(|c| c.volume)));
-        put("euler", json!(counts.and_then(|c| c.euler)));
-        if is_solid {
-            put(
-                "duplicate_tetrahedra",
-                json!(of_kind(true, |c| c.duplicates)),
-            );
-            put(
-                "non_manifold_faces",
-                json!(of_kind(true, |c| c.non_manifold_facets)),
-            );
-            put(
-                "boundary_faces",
-                json!(of_kind(true, |c| c.boundary_facets)),
-            );
-            put(
-                "inconsistent_faces",
-                json!(of_kind(true, |c| c.inconsistent_facets)),
-            );
+        object.insert("path".to_owned(), json!(self.path));
+        object.insert("welded".to_owned(), json!(self.is_welded));
+        for (key, count) in json!(counts).as_object_mut().into_iter().flatten() {
+            let count = if failure.is_some() {
+                Value::Null
+            } else {
+                count.take()
+            };
+            object.insert(key.clone(), count);
         }
-        if let Some(asked) = counts.and_then(|c| c.min_thickness) {
-            put("min_thickness", json!(asked));
-            put("thin_faces", json!(counts.and_then(|c| c.thin_faces)));
-            put("thinnest", json!(counts.and_then(|c| c.thinnest)));
+        let thickness = THICKNESS.map(|key| (key.to_owned(), object.shift_remove(key)));
+        if counts.n_tetrahedra > 0 {
+            for [edges, faces] in FACETS {
+                let count = object.insert(edges.to_owned(), Value::Null);
+                object.insert(faces.to_owned(), json!(count));
+            }
         }
-        let places = || self.places.iter().map(Place::to_json).collect();
-        put(
-            "places",
-            counts.map_or(Value::Null, |_| Value::Array(places())),
-        );
-        let failure = self.result.as_ref().err();
-        put("error", json!(failure.map(|failure| &failure.message)));
-        put(
-            "error_kind",
-            json!(failure.map(|failure| failure.kind.name())),
-        );
+        if counts.min_thickness.is_some() {
+            object.extend(thickness.map(|(key, of)| (key, json!(of))));
+        }
+        let places = failure.is_none().then_some(&self.places);
+        object.insert("places".to_owned(), json!(places));
+        object.insert("error".to_owned(), json!(failure.map(|of| &of.message)));
+        object.insert("error_kind".to_owned(), json!(failure.map(|of| of.kind)));
         Value::Object(object)
     }
 
     /// The row of an object made by [`to_json`](Self::to_json); `None` if the object is not a row.
     pub fn from_json(value: &Value) -> Option<Self> {
-        let result = match value.get("error")? {
-            Value::Null => Ok(counts(value)?),
-            message => {
-                let name = value.get("error_kind")?.as_str()?;
-                let kind = ErrorKind::ALL
-                    .into_iter()
-                    .find(|kind| kind.name() == name)?;
-                let message = message.as_str()?.to_owned();
-                Err(Failure { kind, message })
+        let mut object = value.as_object()?.clone();
+        let result = match object.get("error")? {
+            Value::Null => {
+                for [edges, faces] in FACETS {
+                    if let Some(count) = object.remove(faces) {
+                        object.insert(edges.to_owned(), count);
+                    }
+                }
+                Ok(Counts::deserialize(&Value::Object(object)).ok()?)
             }
+            message => Err(Failure {
+                kind: ErrorKind::deserialize(object.get("error_kind")?).ok()?,
+                message: message.as_str()?.to_owned(),
+            }),
         };
         Some(Row {
             path: value.get("path")?.as_str()?.to_owned(),
@@ -261,46 +217,39 @@ impl Row {
             result,
             // Rows of earlier versions have none.
             places: match value.get("places") {
-                Some(Value::Array(places)) => {
-                    places.iter().map(Place::from_json).collect::<Option<_>>()?
-                }
-                _ => Vec::new(),
+                None | Some(Value::Null) => Vec::new(),
+                Some(places) => Deserialize::deserialize(places).ok()?,
             },
             marks: None,
         })
     }
 }
 
-fn counts(value: &Value) -> Option<Counts> {
-    let number = |key: &str| value.get(key)?.as_u64();
-    let either = |edges: &str, faces: &str| number(edges).or_else(|| number(faces));
-    Some(Counts {
-        n_vertices: number("vertices")?,
-        n_welded: number("vertices_welded")?,
-        n_triangles: number("triangles")?,
-        n_tetrahedra: number("tetrahedra")?,
-        self_intersections: number("self_intersections")?,
-        n_intersecting: number("intersecting_primitives")?,
-        hash: match value.get("hash")? {
-            Value::Null => None,
-            hash => Some(u64::from_str_radix(hash.as_str()?, 16).ok()?),
-        },
-        degenerate: number("degenerate")?,
-        duplicates: either("duplicate_faces", "duplicate_tetrahedra")?,
-        non_manifold_facets: either("non_manifold_edges", "non_manifold_faces")?,
-        non_manifold_vertices: number("non_manifold_vertices")?,
-        boundary_facets: either("boundary_edges", "boundary_faces")?,
-        boundaries: number("boundaries")?,
-        inconsistent_facets: either("inconsistent_edges", "inconsistent_faces")?,
-        components: number("components")?,
-        unused_vertices: number("unused_vertices")?,
-        is_watertight: value.get("watertight").and_then(Value::as_bool),
-        volume: value.get("volume").and_then(Value::as_f64),
-        euler: value.get("euler").and_then(Value::as_i64),
-        thin_faces: value.get("thin_faces").and_then(Value::as_u64),
-        thinnest: value.get("thinnest").and_then(Value::as_f64),
-        min_thickness: value.get("min_thickness").and_then(Value::as_f64),
-    })
+/// Keys of counts: of triangles, and of tetrahedra.
+const FACETS: [[&str; 2]; 4] = [
+    ["duplicate_faces", "duplicate_tetrahedra"],
+    ["non_manifold_edges", "non_manifold_faces"],
+    ["boundary_edges", "boundary_faces"],
+    ["inconsistent_edges", "inconsistent_faces"],
+];
+
+/// Keys of meshes whose thickness was asked for.
+const THICKNESS: [&str; 3] = ["min_thickness", "thin_faces", "thinnest"];
+
+/// A hash as 16 hexadecimal digits.
+mod hex {
+    use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error};
+
+    #[expect(clippy::ref_option, reason = "serde calls it so")]
+    pub fn serialize<S: Serializer>(hash: &Option<u64>, to: S) -> Result<S::Ok, S::Error> {
+        hash.map(|hash| format!("{hash:016x}")).serialize(to)
+    }
+
+    pub fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Option<u64>, D::Error> {
+        let text = Option::<String>::deserialize(from)?;
+        let hash = text.map(|text| u64::from_str_radix(&text, 16));
+        hash.transpose().map_err(Error::custom)
+    }
 }
 
 #[cfg(test)]
@@ -345,6 +294,23 @@ mod tests {
                 elements: vec![1, 5],
             }],
             marks: None,
+        }
+    }
+
+    /// The bytes that rows of earlier versions have: what was stored is read, and compares.
+    #[test]
+    fn rows_keep_their_bytes() {
+        let failed = Row::failed("x", false, ErrorKind::NotFinite, "no number");
+        let rows = [counted(3, 0), counted(4, 0), counted(0, 3), failed];
+        let mut expected = include_str!("../tests/rows.jsonl").lines();
+        for row in rows {
+            assert_eq!(Some(row.to_json().to_string().as_str()), expected.next());
+        }
+        for problem in Problem::ALL {
+            assert_eq!(json!(problem), problem.key());
+        }
+        for kind in [ErrorKind::NotFinite, ErrorKind::File, ErrorKind::Crash] {
+            assert_eq!(json!(kind), kind.name());
         }
     }
 

@@ -33,7 +33,7 @@ impl Report<'_> {
                 let index = Finding::ALL.iter().position(|&each| each == kind);
                 let places = row.places.iter();
                 let places = places.filter(|place| Some(place.problem) == kind.problem());
-                let places: Vec<Value> = places.map(|place| place.to_json()).collect();
+                let places: Vec<_> = places.collect();
                 json!({
                     "ruleId": kind.name(),
                     "ruleIndex": index,
