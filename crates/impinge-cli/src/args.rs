@@ -15,6 +15,7 @@ use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use impinge::{Backend, Method, SharedVertex};
 use impinge_fem::scenes::SceneName;
 
 use crate::commands::{
@@ -23,14 +24,16 @@ use crate::commands::{
 use crate::values::PngFile;
 use crate::values::{
     CurvesFile, FrameRange, FramesFile, MeshFile, RowsFile, at_least_one, body_numbers, bytes,
-    lambda, mesh_format, threads, two_bodies,
+    distance, lambda, mesh_format, threads, two_bodies,
 };
 
-pub use choices::{BackendArg, BodiesArg, MethodArg, PrecisionArg, SharedVertexArg, StartArg};
+pub use choices::{
+    BodiesArg, backend, hits, kind, method, precision, repair, shared_vertex, start,
+};
 pub use help::parse;
-pub use near::{KindArg, NearArgs};
+pub use near::NearArgs;
 pub use picture::PictureArgs;
-pub use probe::{CastArgs, HitsArg, OneMeshArgs, ProbeArgs};
+pub use probe::{CastArgs, OneMeshArgs, ProbeArgs};
 pub use rows::RowsArgs;
 pub use safe::SafeArgs;
 pub use step::{StepArgs, StepHow};
@@ -205,6 +208,7 @@ const DISTANCE_EXAMPLES: &str = "\
 Examples:
   impinge distance a.obj b.ply
   impinge distance a.obj b.ply --json
+  impinge distance a.obj b.ply --below 0.5      a check: exit code 3 if it is less
 
 The distance is 0 if and only if the meshes touch, which is decided exactly; it is rounded down. Meshes
 of triangles are surfaces: a mesh that lies completely inside another one has a distance from it.";
@@ -249,11 +253,11 @@ If the mesh of a scene is absent, a generated ball stands in, and the first line
 #[command(next_help_heading = "Detection")]
 pub struct DetectorArgs {
     /// The method that finds candidates; all methods give the same pairs
-    #[arg(long, value_enum, default_value_t = MethodArg::Auto)]
-    pub method: MethodArg,
+    #[arg(long, value_parser = method(), default_value_t = Method::Auto)]
+    pub method: Method,
     /// Where detection runs
-    #[arg(long, value_enum, default_value_t = BackendArg::Auto)]
-    pub backend: BackendArg,
+    #[arg(long, value_parser = backend(), default_value_t = Backend::Auto)]
+    pub backend: Backend,
     /// A part of the GPU's name, to choose among several (`impinge devices` lists them)
     #[arg(long, value_name = "NAME")]
     pub device: Option<String>,
@@ -310,8 +314,8 @@ impl ReadArgs {
 #[derive(Debug, Clone, Args)]
 pub struct AskArgs {
     /// Which neighbours are reported: pairs of elements of one body that share a vertex
-    #[arg(long, value_enum, value_name = "RULE", default_value_t = SharedVertexArg::Resolve)]
-    pub shared_vertex: SharedVertexArg,
+    #[arg(long, value_parser = shared_vertex(), value_name = "RULE", default_value_t = SharedVertex::Resolve)]
+    pub shared_vertex: SharedVertex,
     #[command(flatten)]
     pub read: ReadArgs,
     #[command(flatten)]
@@ -432,6 +436,9 @@ pub struct DistanceArgs {
     /// Another mesh file
     #[arg(value_name = "B")]
     pub b: PathBuf,
+    /// End with exit code 3 if the distance is less than D, which is decided exactly
+    #[arg(long, value_name = "D", allow_negative_numbers = true, value_parser = distance)]
+    pub below: Option<f64>,
     /// CPU threads, 1 to 1024 [default: one per core]
     #[arg(long, value_name = "N", value_parser = threads)]
     pub threads: Option<NonZeroUsize>,
@@ -497,8 +504,8 @@ pub struct SequenceArgs {
 #[derive(Debug, Args)]
 pub struct SimulateArgs {
     /// The scene: two bodies, one dropped on the other
-    #[arg(value_enum, value_name = "SCENE")]
-    pub scene: SceneArg,
+    #[arg(value_parser = choices::scene(), value_name = "SCENE")]
+    pub scene: SceneName,
     /// The folder for all files
     #[arg(long, value_name = "FOLDER")]
     pub out: PathBuf,
@@ -513,37 +520,6 @@ pub struct SimulateArgs {
     pub resume: bool,
     #[command(flatten)]
     pub detector: DetectorArgs,
-}
-
-/// [`SceneName`] as an argument.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum SceneArg {
-    /// Two bunnies of 7,356 tetrahedra
-    #[value(name = "bunny-7k")]
-    Bunny7k,
-    /// Two bunnies of 19,379 tetrahedra
-    #[value(name = "bunny-19k")]
-    Bunny19k,
-    /// Two dragons of 8,408 tetrahedra
-    #[value(name = "dragon-8k")]
-    Dragon8k,
-    /// Two dragons of 15,047 tetrahedra
-    #[value(name = "dragon-15k")]
-    Dragon15k,
-    /// Two blocks of 1,296 tetrahedra
-    Blocks,
-}
-
-impl From<SceneArg> for SceneName {
-    fn from(scene: SceneArg) -> Self {
-        match scene {
-            SceneArg::Bunny7k => SceneName::Bunny7k,
-            SceneArg::Bunny19k => SceneName::Bunny19k,
-            SceneArg::Dragon8k => SceneName::Dragon8k,
-            SceneArg::Dragon15k => SceneName::Dragon15k,
-            SceneArg::Blocks => SceneName::Blocks,
-        }
-    }
 }
 
 /// The format of a simulated sequence.

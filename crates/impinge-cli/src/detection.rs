@@ -7,7 +7,7 @@ use impinge::{
     Settings, Stats,
 };
 
-use crate::args::{AskArgs, BackendArg, DetectorArgs, ExcludeArgs, KindArg};
+use crate::args::{AskArgs, DetectorArgs, ExcludeArgs};
 use crate::asked::{Asked, Question, body};
 use crate::error::Error;
 
@@ -19,7 +19,7 @@ pub fn detector(args: &DetectorArgs) -> Result<Detector, Error> {
 /// The settings of a detector.
 pub fn settings(args: &DetectorArgs) -> Settings {
     Settings::new()
-        .method(args.method.into())
+        .method(args.method)
         .backend(backend(args))
         .threads(args.threads.map_or(0, Into::into))
         .density(args.lambda)
@@ -44,9 +44,9 @@ pub fn on_cpu(threads: Option<NonZeroUsize>) -> Settings {
 fn backend(args: &DetectorArgs) -> Backend {
     match (args.backend, &args.device) {
         // A named device must exist, so its absence is an error.
-        (BackendArg::Auto, Some(_)) => Backend::Gpu,
-        (BackendArg::Auto, None) if !may_have_gpu() => Backend::Cpu,
-        (backend, _) => backend.into(),
+        (Backend::Auto, Some(_)) => Backend::Gpu,
+        (Backend::Auto, None) if !may_have_gpu() => Backend::Cpu,
+        (backend, _) => backend,
     }
 }
 
@@ -76,7 +76,7 @@ pub fn asked((between, within): (bool, bool), args: &AskArgs) -> Asked {
         between,
         within,
         only: None,
-        shared_vertex: args.shared_vertex.into(),
+        shared_vertex: args.shared_vertex,
         question: Question::Pairs,
         has_self: true,
         excludes: !args.exclude.bodies.is_empty(),
@@ -99,10 +99,10 @@ pub fn query(asked: Asked, excluded: &ExcludeArgs, bodies: &[BodyId]) -> Result<
 }
 
 /// The query with the kinds of pairs that `--kinds` names.
-pub fn of_kinds(query: Query, kinds: &[KindArg]) -> Query {
+pub fn of_kinds(query: Query, kinds: &[PairKind]) -> Query {
     match kinds.is_empty() {
         true => query,
-        false => query.kinds(kinds.iter().copied().map(PairKind::from)),
+        false => query.kinds(kinds.iter().copied()),
     }
 }
 

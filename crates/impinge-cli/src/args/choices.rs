@@ -1,107 +1,102 @@
-//! The library's enumerations as values of options.
+//! The words of the libraries' enumerations as values of options, each with a line of help.
 
 use clap::ValueEnum;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use impinge::{Backend, Hit, Method, PairKind, Precision, SharedVertex, Start};
+use impinge_check::Repair;
+use impinge_fem::scenes::SceneName;
 
-/// [`impinge::Method`] as an option.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum MethodArg {
-    /// The grid for large meshes that are asked about for the first time, clusters as soon as they
-    /// come back
-    Auto,
-    /// Groups fixed by topology; the fastest method for meshes that move
-    Clusters,
-    /// The two-level grid
-    Cells,
-    /// Every box against every box; slow, the reference for the other methods
-    Naive,
+/// Reads one of some words.
+fn one_of<T: Copy + Send + Sync + 'static>(
+    name: fn(T) -> &'static str,
+    words: &'static [(T, &'static str)],
+) -> impl TypedValueParser<Value = T> {
+    let values = words
+        .iter()
+        .map(|&(one, help)| PossibleValue::new(name(one)).help(help));
+    PossibleValuesParser::new(values).try_map(move |word| {
+        let found = words.iter().find(|&&(one, _)| name(one) == word);
+        found.map(|&(one, _)| one).ok_or("no such word")
+    })
 }
 
-impl From<MethodArg> for impinge::Method {
-    fn from(method: MethodArg) -> Self {
-        match method {
-            MethodArg::Auto => impinge::Method::Auto,
-            MethodArg::Clusters => impinge::Method::Clusters,
-            MethodArg::Cells => impinge::Method::Cells,
-            MethodArg::Naive => impinge::Method::Naive,
+/// Parsers of the words that enumerations have in every language, and a test that none is left out.
+macro_rules! words {
+    ($($parser:ident: $type:ident { $($variant:ident: $help:literal,)+ })+) => {
+        $(pub fn $parser() -> impl TypedValueParser<Value = $type> {
+            one_of($type::name, &[$(($type::$variant, $help)),+])
+        })+
+
+        #[test]
+        fn every_word_is_a_value() {
+            $(let parser = $parser();
+            let values = parser.possible_values().expect("values").map(|value| value.get_name().to_owned());
+            let (mut given, mut all) = (values.collect::<Vec<_>>(), $type::ALL.map($type::name));
+            given.sort_unstable();
+            all.sort_unstable();
+            assert_eq!(given, all);)+
         }
+    };
+}
+
+words! {
+    method: Method {
+        Auto: "The grid for large meshes that are asked about for the first time, clusters as \
+            soon as they come back",
+        Clusters: "Groups fixed by topology; the fastest method for meshes that move",
+        Cells: "The two-level grid",
+        Naive: "Every box against every box; slow, the reference for the other methods",
     }
-}
-
-/// [`impinge::Backend`] as an option.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum BackendArg {
-    /// A GPU if there is one, else the CPU
-    Auto,
-    /// The CPU
-    Cpu,
-    /// A GPU, or an error if there is none
-    Gpu,
-}
-
-impl From<BackendArg> for impinge::Backend {
-    fn from(backend: BackendArg) -> Self {
-        match backend {
-            BackendArg::Auto => impinge::Backend::Auto,
-            BackendArg::Cpu => impinge::Backend::Cpu,
-            BackendArg::Gpu => impinge::Backend::Gpu,
-        }
+    backend: Backend {
+        Auto: "A GPU if there is one, else the CPU",
+        Cpu: "The CPU",
+        Gpu: "A GPU, or an error if there is none",
     }
-}
-
-/// [`impinge::SharedVertex`] as an option.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum SharedVertexArg {
-    /// None
-    Skip,
-    /// Those that also meet outside their common vertices, edge or face
-    Resolve,
-}
-
-impl From<SharedVertexArg> for impinge::SharedVertex {
-    fn from(rule: SharedVertexArg) -> Self {
-        match rule {
-            SharedVertexArg::Skip => impinge::SharedVertex::Skip,
-            SharedVertexArg::Resolve => impinge::SharedVertex::Resolve,
-        }
+    shared_vertex: SharedVertex {
+        Skip: "None",
+        Resolve: "Those that also meet outside their common vertices, edge or face",
     }
-}
-
-/// [`impinge::Precision`] as an option.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum PrecisionArg {
-    /// Single precision
-    F32,
-    /// Double precision
-    F64,
-}
-
-impl From<PrecisionArg> for impinge::Precision {
-    fn from(precision: PrecisionArg) -> Self {
-        match precision {
-            PrecisionArg::F32 => impinge::Precision::F32,
-            PrecisionArg::F64 => impinge::Precision::F64,
-        }
+    precision: Precision {
+        F32: "Single precision",
+        F64: "Double precision",
     }
-}
-
-/// [`impinge::Start`] as an option.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum StartArg {
-    /// Reported with the time 0, and the start is asked for intersections
-    Verify,
-    /// Reported with the time 0
-    Report,
-    /// Ignored, whatever they do later in the step
-    Skip,
-}
-
-impl From<StartArg> for impinge::Start {
-    fn from(start: StartArg) -> Self {
-        match start {
-            StartArg::Verify => impinge::Start::Verify,
-            StartArg::Report => impinge::Start::Report,
-            StartArg::Skip => impinge::Start::Skip,
-        }
+    start: Start {
+        Verify: "Reported with the time 0, and the start is asked for intersections",
+        Report: "Reported with the time 0",
+        Skip: "Ignored, whatever they do later in the step",
+    }
+    kind: PairKind {
+        VertexFace: "A vertex and a face",
+        EdgeEdge: "Two edges",
+        EdgeVertex: "An edge and a vertex",
+        VertexVertex: "Two vertices",
+        EdgeFace: "An edge and a face",
+        FaceFace: "Two faces",
+    }
+    hits: Hit {
+        First: "What it hits first; of several elements there the lowest",
+        Any: "Whether it hits anything",
+        All: "All that it hits",
+    }
+    repair: Repair {
+        Weld: "Vertices at exactly the same position become one",
+        Duplicates: "Of faces with the same vertices the first stays; none where two of opposite \
+            orientations are an inner wall or a fin of a closed surface",
+        Degenerate: "Faces of zero area go; one along an edge divides its neighbour there, so \
+            that no gap opens",
+        Orient: "Neighbours get the same orientation, by turning the fewest faces of each piece",
+        SplitEdges: "Edges of more than two faces come apart",
+        SplitVertices: "Vertices of several fans come apart",
+        CloseHoles: "Holes of up to --close-holes edges are closed",
+        Outward: "Closed shells are turned outward, cavities inward",
+        Unused: "Vertices of no face go",
+    }
+    scene: SceneName {
+        Bunny7k: "Two bunnies of 7,356 tetrahedra",
+        Bunny19k: "Two bunnies of 19,379 tetrahedra",
+        Dragon8k: "Two dragons of 8,408 tetrahedra",
+        Dragon15k: "Two dragons of 15,047 tetrahedra",
+        Blocks: "Two blocks of 1,296 tetrahedra",
     }
 }
 

@@ -2,10 +2,10 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use impinge::PairKind;
 
-use super::{AskArgs, DetectorArgs, RowsArgs};
+use super::{AskArgs, DetectorArgs, RowsArgs, kind};
 use crate::values::{body_length, distance, two_bodies};
 
 pub const NEAR_EXAMPLES: &str = "\
@@ -35,8 +35,8 @@ pub struct NearArgs {
     pub within: bool,
     /// Which pairs: vertex-face, edge-edge, edge-vertex, vertex-vertex, edge-face, face-face
     /// [default: vf,ee,ef]
-    #[arg(long, value_enum, value_name = "KIND", value_delimiter = ',')]
-    pub kinds: Vec<KindArg>,
+    #[arg(long, value_parser = kind(), value_name = "KIND", value_delimiter = ',')]
+    pub kinds: Vec<PairKind>,
     /// Find only the pairs of bodies A and B, numbered from 0 as given
     #[arg(long, value_name = "A,B", value_parser = two_bodies, conflicts_with_all = ["within", "exclude"])]
     pub between: Option<(usize, usize)>,
@@ -50,34 +50,4 @@ pub struct NearArgs {
     pub rows: RowsArgs,
     #[command(flatten)]
     pub detector: DetectorArgs,
-}
-
-/// [`PairKind`] as an option.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum KindArg {
-    /// A vertex and a face
-    Vf,
-    /// Two edges
-    Ee,
-    /// An edge and a vertex
-    Ev,
-    /// Two vertices
-    Vv,
-    /// An edge and a face
-    Ef,
-    /// Two faces
-    Ff,
-}
-
-impl From<KindArg> for PairKind {
-    fn from(kind: KindArg) -> Self {
-        match kind {
-            KindArg::Vf => PairKind::VertexFace,
-            KindArg::Ee => PairKind::EdgeEdge,
-            KindArg::Ev => PairKind::EdgeVertex,
-            KindArg::Vv => PairKind::VertexVertex,
-            KindArg::Ef => PairKind::EdgeFace,
-            KindArg::Ff => PairKind::FaceFace,
-        }
-    }
 }

@@ -3,10 +3,10 @@
 use std::num::{NonZeroU32, NonZeroUsize};
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use impinge::Hit;
 
-use super::RowsArgs;
+use super::{RowsArgs, hits};
 use crate::values::{at_least_one, distance, mesh_format, threads};
 
 pub const PROBE_EXAMPLES: &str = "\
@@ -69,8 +69,8 @@ pub struct CastArgs {
     #[arg(long, value_name = "FILE", required = true)]
     pub rays: PathBuf,
     /// What is found of each ray
-    #[arg(long, value_enum, value_name = "WHICH", default_value_t = HitsArg::First)]
-    pub hits: HitsArg,
+    #[arg(long, value_parser = hits(), value_name = "WHICH", default_value_t = Hit::First)]
+    pub hits: Hit,
     /// Rays end at origin + T direction: 1 makes them segments [default: they do not end]
     #[arg(long, value_name = "T", allow_negative_numbers = true, value_parser = distance)]
     pub most: Option<f64>,
@@ -99,25 +99,4 @@ pub struct OneMeshArgs {
     /// Print JSON and nothing else (see docs/cli.md)
     #[arg(long)]
     pub json: bool,
-}
-
-/// [`Hit`] as an option.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum HitsArg {
-    /// What it hits first; of several elements there the lowest
-    First,
-    /// Whether it hits anything
-    Any,
-    /// All that it hits
-    All,
-}
-
-impl From<HitsArg> for Hit {
-    fn from(hits: HitsArg) -> Self {
-        match hits {
-            HitsArg::First => Hit::First,
-            HitsArg::Any => Hit::Any,
-            HitsArg::All => Hit::All,
-        }
-    }
 }

@@ -4,13 +4,11 @@ use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use impinge::Query;
+use impinge::{PairKind, Precision, Query, Start};
 
 use super::PictureArgs;
 use super::RowsArgs;
-use super::choices::{PrecisionArg, StartArg};
-use super::near::KindArg;
-use super::{DetectorArgs, ExcludeArgs};
+use super::{DetectorArgs, ExcludeArgs, kind, precision, start};
 use crate::asked::Question;
 use crate::detection::of_kinds;
 use crate::values::PngFile;
@@ -103,8 +101,8 @@ impl StepHow {
     /// The query with these options.
     pub fn of(&self, query: Query) -> Query {
         of_kinds(query, &self.kinds)
-            .start(self.start.into())
-            .precision(self.precision.into())
+            .start(self.start)
+            .precision(self.precision)
             .separation(self.separation)
             .clearance(self.clearance)
     }
@@ -112,7 +110,7 @@ impl StepHow {
     /// What is asked of a step.
     pub fn question(&self) -> Question {
         Question::Step {
-            start: self.start == StartArg::Verify,
+            start: self.start == Start::Verify,
         }
     }
 }
@@ -141,15 +139,15 @@ impl StepArgs {
 pub struct StepHow {
     /// Which pairs: vertex-face, edge-edge, edge-vertex, vertex-vertex; of --candidates also
     /// edge-face, face-face [default: vf,ee]
-    #[arg(long, value_enum, value_name = "KIND", value_delimiter = ',')]
-    pub kinds: Vec<KindArg>,
+    #[arg(long, value_parser = kind(), value_name = "KIND", value_delimiter = ',')]
+    pub kinds: Vec<PairKind>,
     /// The precision to which times are rounded down
-    #[arg(long, value_enum, value_name = "P", default_value_t = PrecisionArg::F32, alias = "toi")]
-    pub precision: PrecisionArg,
+    #[arg(long, value_parser = precision(), value_name = "P", default_value_t = Precision::F32, alias = "toi")]
+    pub precision: Precision,
     /// Pairs that touch at the start: reported with the time 0, or ignored; and whether the start
     /// is asked for intersections
-    #[arg(long, value_enum, value_name = "RULE", default_value_t = StartArg::Verify)]
-    pub start: StartArg,
+    #[arg(long, value_parser = start(), value_name = "RULE", default_value_t = Start::Verify)]
+    pub start: Start,
     /// The distance that elements must keep: report the first time at which they are as near as
     /// that
     #[arg(long, value_name = "D", default_value = "0", allow_negative_numbers = true, value_parser = distance)]

@@ -4,9 +4,10 @@ use std::num::NonZeroU32;
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
+use impinge::{Method, SharedVertex};
 
 use super::picture::UpArg;
-use super::{BodiesArg, MethodArg, SharedVertexArg};
+use super::{BodiesArg, method, shared_vertex};
 use crate::values::{PngFile, azimuth, body_matrix, elevation, lambda, point, size};
 
 pub const VIEW_EXAMPLES: &str = "\
@@ -40,14 +41,14 @@ pub struct ViewArgs {
     #[arg(long = "self")]
     pub within: bool,
     /// Which neighbours are reported: pairs of elements of one body that share a vertex
-    #[arg(long, value_enum, value_name = "RULE", default_value_t = SharedVertexArg::Resolve)]
-    pub shared_vertex: SharedVertexArg,
+    #[arg(long, value_parser = shared_vertex(), value_name = "RULE", default_value_t = SharedVertex::Resolve)]
+    pub shared_vertex: SharedVertex,
     /// Do not weld vertices at the same position, except in STL files
     #[arg(long)]
     pub no_weld: bool,
     /// The method that finds candidates; all methods give the same pairs
-    #[arg(long, value_enum, default_value_t = MethodArg::Clusters)]
-    pub method: MethodArg,
+    #[arg(long, value_parser = method(), default_value_t = Method::Clusters)]
+    pub method: Method,
     /// Where detection runs
     #[arg(long, value_enum, default_value_t = WhereArg::Cpu)]
     pub backend: WhereArg,

@@ -2,12 +2,12 @@
 
 use std::io::Write;
 
-use impinge::{CancelToken, Hits, Query, RayHit};
+use impinge::{CancelToken, Hit, Hits, Query, RayHit};
 use impinge_io::{Cell, Column, Holds, ReadOptions, printable, read_rows};
 use serde_json::{Map, Value, json};
 
 use crate::apart::Inputs;
-use crate::args::{CastArgs, HitsArg};
+use crate::args::CastArgs;
 use crate::detection::hit;
 use crate::error::Error;
 use crate::one_mesh::OneMesh;
@@ -30,7 +30,7 @@ pub fn cast(args: &CastArgs, cancel: &CancelToken) -> Result<(), Error> {
         .unzip();
     drop(rays);
     let mut detector = mesh.detector(&args.how, cancel)?;
-    let query = Query::all().hits(args.hits.into());
+    let query = Query::all().hits(args.hits);
     let most = args.most.unwrap_or(f64::INFINITY);
     let hits = detector.cast(mesh.scene(), &origins, &directions, most, &query)?;
     let answer = Answer {
@@ -79,7 +79,7 @@ impl Answer<'_> {
 
     fn write_rows(&self, file: &RowsFile) -> Result<(), Error> {
         let ray = Column::new("ray", Holds::U32);
-        if self.args.hits == HitsArg::Any {
+        if self.args.hits == Hit::Any {
             let columns = vec![ray, Column::new("hit", Holds::Bool)];
             let of_rays = self.hits.is_hit().iter().enumerate();
             let of_rays = of_rays.map(|(ray, &is_hit)| [rows::number(ray), Cell::Bool(is_hit)]);
@@ -108,11 +108,11 @@ impl Answer<'_> {
 
     /// The object that `docs/cast.schema.json` describes.
     fn object(&self) -> Result<Map<String, Value>, Error> {
-        let n_hits = (self.args.hits != HitsArg::Any).then(|| self.hits.iter().len());
+        let n_hits = (self.args.hits != Hit::Any).then(|| self.hits.iter().len());
         let nearest = self
             .nearest()
             .map(|(ray, hit)| json!({ "ray": ray, "element": hit.element.element, "t": hit.t }));
-        let asked = json!({ "hits": self.which(), "most": self.args.most });
+        let asked = json!({ "hits": self.args.hits.name(), "most": self.args.most });
         let mut object = Map::new();
         object.insert("asked".into(), asked);
         object.insert("rays".into(), self.hits.len().into());
@@ -127,20 +127,12 @@ impl Answer<'_> {
         Ok(object)
     }
 
-    fn which(&self) -> &'static str {
-        match self.args.hits {
-            HitsArg::First => "first",
-            HitsArg::Any => "any",
-            HitsArg::All => "all",
-        }
-    }
-
     /// The answer in the first line, then the nearest hit.
     fn print(&self, to: &mut impl Write) -> Result<(), Error> {
         let subject = printable(&self.mesh.name);
         let rays = counted(self.hits.len() as u64, "ray");
         let all = match self.args.hits {
-            HitsArg::All => format!(" ({})", counted(self.hits.iter().len() as u64, "hit")),
+            Hit::All => format!(" ({})", counted(self.hits.iter().len() as u64, "hit")),
             _ => String::new(),
         };
         let (n_hit, hash) = (grouped(self.n_hit()), hex(self.hits.hash()));
@@ -152,9 +144,9 @@ impl Answer<'_> {
         let stats = self.hits.stats();
         writeln!(to, "{}", how_alone(stats, stats.total_ms))?;
         let not_asked = match self.args.hits {
-            HitsArg::First => "; not asked: what rays hit after that (--hits all)",
-            HitsArg::Any => "; not asked: what they hit (--hits first)",
-            HitsArg::All => "",
+            Hit::First => "; not asked: what rays hit after that (--hits all)",
+            Hit::Any => "; not asked: what they hit (--hits first)",
+            _ => "",
         };
         let (file, welded) = (printable(&self.args.rays), self.mesh.welded());
         writeln!(to, "{rays} of {file} and 1 mesh, {welded}{not_asked}")?;

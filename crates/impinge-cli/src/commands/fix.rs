@@ -28,12 +28,7 @@ pub fn fix(args: &FixArgs) -> Result<(), Error> {
     inputs.check("--out", &args.out.path)?;
     let rows_file = args.rows.file(&inputs, args.json)?;
     let repairs = args.repairs();
-    if args
-        .only
-        .iter()
-        .any(|&it| Repair::from(it) == Repair::CloseHoles)
-        && args.close_holes.is_none()
-    {
+    if args.only.contains(&Repair::CloseHoles) && args.close_holes.is_none() {
         let text = "--only close-holes: --close-holes N says of how many edges";
         return Err(Error::Usage(text.to_owned()));
     }

@@ -76,7 +76,7 @@ impl Record {
 
     /// Starts a new run; existing files of these names are replaced.
     pub fn create(args: &SimulateArgs, simulation: &Simulation) -> Result<Self, Error> {
-        let stem = impinge_fem::scenes::SceneName::from(args.scene).name();
+        let stem = args.scene.name();
         let folder = args.out.clone();
         let n_bodies = simulation.bodies().len();
         Ok(Record {
@@ -100,7 +100,7 @@ impl Record {
 
     /// Continues after the steps that the simulation has made.
     pub fn resume(args: &SimulateArgs, simulation: &Simulation) -> Result<Self, Error> {
-        let stem = impinge_fem::scenes::SceneName::from(args.scene).name();
+        let stem = args.scene.name();
         let folder = args.out.clone();
         let n_done = simulation.n_steps();
         let frames = match numbered(args.format) {

@@ -3,13 +3,13 @@
 use std::io::{Write, stderr};
 use std::path::Path;
 
-use impinge::{BodyId, CancelToken, Control, Pairs, Scene};
+use impinge::{BodyId, CancelToken, Control, Pairs, Precision, Scene};
 use impinge_io::{Cell, ELEMENTS, Sequence, Weld, impact_columns, printable};
 use serde_json::{Map, Value};
 
 use super::step::{self, Frames as _, Shown, steps_of_sequence};
 use crate::apart::Inputs;
-use crate::args::{BodiesArg, PrecisionArg, SequenceArgs};
+use crate::args::{BodiesArg, SequenceArgs};
 use crate::asked::Asked;
 use crate::detection::{Times, asked, detector, hit, query, set_positions, settings};
 use crate::error::Error;
@@ -77,7 +77,7 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
     let prints = !args.ask.json && !file.as_ref().is_some_and(RowsFile::is_stdout);
     let watch = Watch::frames(!args.detector.no_progress, range.len(), true);
     if args.ccd {
-        let in_f64 = args.step.precision == PrecisionArg::F64;
+        let in_f64 = args.step.precision == Precision::F64;
         let columns = rows::of_frames(&impact_columns(in_f64));
         let create = |file| Rows::create(file, columns, None);
         let shown = Shown {

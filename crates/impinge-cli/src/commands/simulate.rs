@@ -26,7 +26,7 @@ const NAMES: [&str; 2] = ["lower", "upper"];
 /// `impinge simulate`.
 pub fn simulate(args: &SimulateArgs, cancel: &CancelToken) -> Result<(), Error> {
     let mut detector = detector(&args.detector)?;
-    let scene = drop_scene(args.scene.into())?;
+    let scene = drop_scene(args.scene)?;
     let n_steps = args.steps.map_or(scene.n_steps, u64::from);
     let mut settings = scene.settings.clone();
     settings.threads = args.detector.threads.map_or(0, Into::into);

@@ -9,12 +9,12 @@ mod reached;
 
 use std::io::Write;
 
-use impinge::{CancelToken, SharedVertex};
+use impinge::{CancelToken, Precision, SharedVertex};
 use impinge_io::impact_columns;
 use serde_json::Value;
 
 use crate::apart::Inputs;
-use crate::args::{PrecisionArg, StepArgs};
+use crate::args::StepArgs;
 use crate::asked::{Asked, Question};
 use crate::detection::{Times, detector, query};
 use crate::error::Error;
@@ -114,7 +114,7 @@ pub fn step(args: &StepArgs, cancel: &CancelToken) -> Result<(), Error> {
     // Files are written first: if one can't be written, no answer is printed that looks like
     // success.
     if let Some(file) = &rows_file {
-        let columns = impact_columns(args.how.precision == PrecisionArg::F64);
+        let columns = impact_columns(args.how.precision == Precision::F64);
         let rows = impacts.iter().map(rows::impact);
         rows::write(file, columns, impacts.len(), rows)?;
     }

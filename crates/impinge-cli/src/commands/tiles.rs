@@ -136,13 +136,13 @@ fn run(args: &RunArgs, cancel: &CancelToken) -> Result<(), Error> {
         ask: Ask {
             between: !args.within,
             within: !args.between,
-            shared_vertex: args.shared_vertex.into(),
-            start: args.start.into(),
-            precision: args.precision.into(),
+            shared_vertex: args.shared_vertex,
+            start: args.start,
+            precision: args.precision,
         },
         settings: Settings::new()
             .backend(Backend::Cpu)
-            .method(args.method.into())
+            .method(args.method)
             .threads(args.threads.map_or(0, usize::from))
             .memory_budget(args.memory_budget),
         again: args.again,

@@ -75,7 +75,7 @@ fn save(
         between: true,
         within: args.within || bodies.len() == 1,
         only: None,
-        shared_vertex: args.shared_vertex.into(),
+        shared_vertex: args.shared_vertex,
         question: Question::Pairs,
         has_self: true,
         excludes: false,
@@ -96,8 +96,8 @@ fn picture(content: Content, options: &Options, path: &Path) -> Result<Pairs, Er
 fn options(args: &ViewArgs) -> Options {
     Options {
         within: args.within.then_some(true),
-        shared_vertex: args.shared_vertex.into(),
-        method: args.method.into(),
+        shared_vertex: args.shared_vertex,
+        method: args.method,
         backend: args.backend.into(),
         frame: args.frame,
         plays: !args.paused,

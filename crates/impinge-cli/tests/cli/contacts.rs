@@ -1,7 +1,7 @@
 //! `--contacts` and `--curves` of `pairs` and `self`, and `impinge distance`.
 
 use impinge_scenes::surfaces::{ball, cube};
-use serde_json::json;
+use serde_json::{Value, json};
 
 use crate::harness::Folder;
 
@@ -109,4 +109,23 @@ fn distances_are_told() {
     }
     let printed = folder.run(["distance", "a.ply", "b.ply"]).printed();
     assert!(printed.starts_with("distance 2\nelement "), "{printed}");
+    // Less than a limit, which the true distance decides: 2 is not less than 2.
+    for (limit, code, said) in [
+        ("2", 0, "distance 2, not less than 2\n"),
+        (
+            "2.0000000000000004",
+            3,
+            "distance 2, less than 2.0000000000000004\n",
+        ),
+        ("0", 0, "distance 2, not less than 0\n"),
+    ] {
+        let run = folder.run(["distance", "a.ply", "b.ply", "--below", limit]);
+        assert_eq!(run.code, Some(code), "{}", run.stderr);
+        assert!(run.stdout.starts_with(said), "{}", run.stdout);
+    }
+    let run = folder.run(["distance", "a.ply", "c.ply", "--below", "1e-9", "--json"]);
+    let object: Value = serde_json::from_str(&run.stdout).unwrap();
+    assert_eq!((run.code, &object["below"]), (Some(3), &json!(true)));
+    let misuse = folder.run(["distance", "a.ply", "b.ply", "--below", "-1"]);
+    assert!(misuse.misuse().contains("not below 0"));
 }

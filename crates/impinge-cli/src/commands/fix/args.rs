@@ -3,10 +3,10 @@
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use impinge_check::{MOST_HOLE_EDGES, Repair};
 
-use crate::args::RowsArgs;
+use crate::args::{RowsArgs, repair};
 use crate::commands::check::FailOn;
 use crate::values::{MendedFile, mesh_format, threads};
 
@@ -35,17 +35,17 @@ pub struct FixArgs {
     #[arg(long)]
     pub force: bool,
     /// Mend only this (comma-separated) [default: everything]
-    #[arg(long, value_name = "WHAT", value_enum, value_delimiter = ',')]
-    pub only: Vec<RepairArg>,
+    #[arg(long, value_name = "WHAT", value_parser = repair(), value_delimiter = ',')]
+    pub only: Vec<Repair>,
     /// Mend everything but this (comma-separated)
     #[arg(
         long,
         value_name = "WHAT",
-        value_enum,
+        value_parser = repair(),
         value_delimiter = ',',
         conflicts_with = "only"
     )]
-    pub skip: Vec<RepairArg>,
+    pub skip: Vec<Repair>,
     /// Close holes of up to N edges, 3 to 256 [default: none]
     #[arg(long, value_name = "N", value_parser = hole_edges)]
     pub close_holes: Option<usize>,
@@ -68,53 +68,12 @@ pub struct FixArgs {
 impl FixArgs {
     /// The repairs that are asked for, in the order in which they run.
     pub fn repairs(&self) -> Vec<Repair> {
-        let named = |list: &[RepairArg], repair| list.iter().any(|&it| Repair::from(it) == repair);
         let asks = |repair: &Repair| {
-            let chosen = self.only.is_empty() || named(&self.only, *repair);
+            let chosen = self.only.is_empty() || self.only.contains(repair);
             let has_limit = *repair != Repair::CloseHoles || self.close_holes.is_some();
-            chosen && has_limit && !named(&self.skip, *repair)
+            chosen && has_limit && !self.skip.contains(repair)
         };
         Repair::ALL.into_iter().filter(asks).collect()
-    }
-}
-
-/// [`Repair`] as an option.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum RepairArg {
-    /// Vertices at exactly the same position become one
-    Weld,
-    /// Of faces with the same vertices the first stays; none where two of opposite orientations are
-    /// an inner wall or a fin of a closed surface
-    Duplicates,
-    /// Faces of zero area go; one along an edge divides its neighbour there, so that no gap opens
-    Degenerate,
-    /// Neighbours get the same orientation, by turning the fewest faces of each piece
-    Orient,
-    /// Edges of more than two faces come apart
-    SplitEdges,
-    /// Vertices of several fans come apart
-    SplitVertices,
-    /// Holes of up to --close-holes edges are closed
-    CloseHoles,
-    /// Closed shells are turned outward, cavities inward
-    Outward,
-    /// Vertices of no face go
-    Unused,
-}
-
-impl From<RepairArg> for Repair {
-    fn from(arg: RepairArg) -> Repair {
-        match arg {
-            RepairArg::Weld => Repair::Weld,
-            RepairArg::Duplicates => Repair::Duplicates,
-            RepairArg::Degenerate => Repair::Degenerate,
-            RepairArg::Orient => Repair::Orient,
-            RepairArg::SplitEdges => Repair::SplitEdges,
-            RepairArg::SplitVertices => Repair::SplitVertices,
-            RepairArg::CloseHoles => Repair::CloseHoles,
-            RepairArg::Outward => Repair::Outward,
-            RepairArg::Unused => Repair::Unused,
-        }
     }
 }
 

@@ -5,7 +5,9 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 
-use crate::args::{MethodArg, PrecisionArg, SharedVertexArg, StartArg};
+use impinge::{Method, Precision, SharedVertex, Start};
+
+use crate::args::{method, precision, shared_vertex, start};
 use crate::values::{bytes, count, distance, threads};
 
 /// Shown below the help.
@@ -129,17 +131,17 @@ pub struct RunArgs {
     #[arg(long)]
     pub between: bool,
     /// Which neighbours are reported: pairs of primitives of one body that share a vertex
-    #[arg(long, value_enum, value_name = "RULE", default_value_t = SharedVertexArg::Resolve)]
-    pub shared_vertex: SharedVertexArg,
+    #[arg(long, value_parser = shared_vertex(), value_name = "RULE", default_value_t = SharedVertex::Resolve)]
+    pub shared_vertex: SharedVertex,
     /// Of a step: the precision to which times are rounded down
-    #[arg(long, value_enum, value_name = "P", default_value_t = PrecisionArg::F32, alias = "toi")]
-    pub precision: PrecisionArg,
+    #[arg(long, value_parser = precision(), value_name = "P", default_value_t = Precision::F32, alias = "toi")]
+    pub precision: Precision,
     /// Of a step: pairs that touch at the start are reported with the time 0, or ignored
-    #[arg(long, value_enum, value_name = "RULE", default_value_t = StartArg::Report)]
-    pub start: StartArg,
+    #[arg(long, value_parser = start(), value_name = "RULE", default_value_t = Start::Report)]
+    pub start: Start,
     /// The method that finds candidates; all methods give the same pairs
-    #[arg(long, value_enum, default_value_t = MethodArg::Auto)]
-    pub method: MethodArg,
+    #[arg(long, value_parser = method(), default_value_t = Method::Auto)]
+    pub method: Method,
     /// CPU threads, 1 to 1024 [default: one per core]
     #[arg(long, value_name = "N", value_parser = threads)]
     pub threads: Option<NonZeroUsize>,
