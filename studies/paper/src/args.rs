@@ -24,7 +24,7 @@ The full run takes about a quarter of an hour on two cores.";
 #[derive(Debug, Parser)]
 #[command(name = "impinge-paper", after_help = EXAMPLES)]
 pub struct Args {
-    /// The folder for the report: report.md, report.html, report.json and figures
+    /// The folder for the report: report.md, report.json and figures
     #[arg(long, value_name = "FOLDER", default_value = "out/paper")]
     pub out: PathBuf,
     /// A benchmark to run: ball, bunny, buddha, dragon (surfaces), bunny-7k, bunny-19k, dragon-8k,

@@ -46,10 +46,10 @@ pub(crate) struct Figure {
 /// A picture, drawn or plotted.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Image {
-    /// The file's name without its extension; there is always a PNG.
+    /// The file's name without its extension.
     pub name: String,
-    /// Whether there is an SVG too.
-    pub has_svg: bool,
+    /// Whether it is an SVG, else a PNG.
+    pub is_plot: bool,
     /// The label below the picture, if a figure has several.
     pub label: String,
 }
@@ -86,7 +86,7 @@ impl Figure {
             caption: caption.into(),
             images: vec![Image {
                 name: name.to_owned(),
-                has_svg: true,
+                is_plot: true,
                 label: String::new(),
             }],
         }

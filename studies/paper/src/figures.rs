@@ -5,7 +5,7 @@ use plotters::style::RGBColor;
 use crate::document::{density, ms};
 use crate::error::Error;
 use crate::pictures::File;
-use crate::plots::{Axis, Bars, COLORS, Curve, Curves, Group, Height, Mark, files};
+use crate::plots::{Axis, Bars, COLORS, Curve, Curves, Group, Height, Mark, file};
 use crate::published;
 use crate::report::{Method, Report, Run, Scene};
 
@@ -25,19 +25,19 @@ pub(crate) fn plots(report: &Report) -> Result<Vec<File>, Error> {
     let mut all = Vec::new();
     for (name, is_gpu) in COMPARISON.into_iter().zip([false, true]) {
         if let Some(bars) = comparison(report, is_gpu) {
-            all.extend(files(name, &bars)?);
+            all.push(file(name, &bars)?);
         }
     }
     for (name, method, is_gpu) in LAMBDA {
         if let Some(curves) = lambda(report, method, is_gpu) {
-            all.extend(files(name, &curves)?);
+            all.push(file(name, &curves)?);
         }
     }
     if let Some(curves) = table_sizes(report) {
-        all.extend(files(TABLE_SIZES, &curves)?);
+        all.push(file(TABLE_SIZES, &curves)?);
     }
     if let Some(curves) = steps(report) {
-        all.extend(files(STEPS, &curves)?);
+        all.push(file(STEPS, &curves)?);
     }
     Ok(all)
 }

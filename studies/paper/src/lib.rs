@@ -14,7 +14,6 @@ mod duplicates;
 mod error;
 mod figures;
 mod finders;
-mod html;
 mod machine;
 mod markdown;
 mod options;

@@ -52,7 +52,8 @@ fn figure(text: &mut String, figure: &Figure) {
             "" => &image.name,
             label => label,
         };
-        let _ = writeln!(text, "![{label}]({}.png)", image.name);
+        let ending = if image.is_plot { "svg" } else { "png" };
+        let _ = writeln!(text, "![{label}]({}.{ending})", image.name);
     }
     let _ = writeln!(text, "\n{}\n", figure.caption);
 }
@@ -74,7 +75,7 @@ mod tests {
         assert_eq!(
             text,
             "## Here\n\nTable 0: numbers.\n\n| who | how many |\n|---|---:|\n| *paper* | *1* |\n\
-             | a\\|b | 2 |\n\n![plot](plot.png)\n\nFigure 0.\n\n"
+             | a\\|b | 2 |\n\n![plot](plot.svg)\n\nFigure 0.\n\n"
         );
     }
 }

@@ -4,11 +4,11 @@ use std::path::Path;
 
 use crate::error::Error;
 use crate::run::Outcome;
-use crate::{chapters, html, markdown};
+use crate::{chapters, markdown};
 
 impl Outcome {
-    /// Writes `report.md`, `report.html`, `report.json` and all figures to a folder, which is
-    /// created if it does not exist. Files of the same names are replaced.
+    /// Writes `report.md`, `report.json` and all figures to a folder, which is created if it does
+    /// not exist. Files of the same names are replaced.
     ///
     /// # Errors
     /// The folder cannot be created, or a file cannot be written.
@@ -27,7 +27,6 @@ impl Outcome {
         }
         let document = chapters::all(&self.report);
         put("report.md", markdown::write(&document).as_bytes())?;
-        put("report.html", html::write(&document).as_bytes())?;
         // Plain data: numbers, strings and lists.
         let json = serde_json::to_string_pretty(&self.report)
             .map_err(|error| failed(&folder.join("report.json"), error.into()))?;

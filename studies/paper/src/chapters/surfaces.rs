@@ -47,7 +47,7 @@ pub(super) fn pictures(scenes: &[Scene], caption: &str) -> Option<Block> {
         .filter_map(|scene| {
             Some(Image {
                 name: scene.picture.as_ref()?.trim_end_matches(".png").to_owned(),
-                has_svg: false,
+                is_plot: false,
                 label: scene.name.clone(),
             })
         })

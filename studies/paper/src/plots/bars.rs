@@ -1,13 +1,11 @@
 //! Groups of bars, each bar with its number on top.
 
 use plotters::chart::{ChartBuilder, LabelAreaPosition};
-use plotters::coord::Shift;
 use plotters::element::{PathElement, Rectangle, Text};
-use plotters::prelude::{DrawingArea, DrawingBackend};
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use plotters::style::{Color, IntoFont, RGBColor, ShapeStyle, TextStyle, WHITE};
 
-use super::{AXIS, FONT, GRID, Plot, failed};
+use super::{AXIS, Area, FONT, GRID, Plot, failed};
 use crate::error::Error;
 
 /// The height of a bar and the text on top of it; `None` if it was not run.
@@ -30,12 +28,8 @@ pub(crate) struct Bars {
 }
 
 impl Plot for Bars {
-    fn draw<B: DrawingBackend>(&self, area: &DrawingArea<B, Shift>, scale: u32) -> Result<(), Error>
-    where
-        B::ErrorType: 'static,
-    {
-        let px = |size: u32| size * scale;
-        let text = |size: u32| TextStyle::from((FONT, px(size)).into_font()).color(&AXIS);
+    fn draw(&self, area: &Area<'_>) -> Result<(), Error> {
+        let text = |size: u32| TextStyle::from((FONT, size).into_font()).color(&AXIS);
         area.fill(&WHITE).map_err(failed)?;
         let heights = self.groups.iter().flat_map(|(_, bars)| bars).flatten();
         let most = heights.fold(0.0, |most: f64, (height, _)| most.max(*height));
@@ -44,10 +38,10 @@ impl Plot for Bars {
         let end = self.groups.len().max(1) as f64;
         let mut chart = ChartBuilder::on(area)
             .caption(&self.title, text(17))
-            .margin(px(10))
-            .margin_bottom(px(34))
-            .set_label_area_size(LabelAreaPosition::Left, px(58))
-            .set_label_area_size(LabelAreaPosition::Bottom, px(26))
+            .margin(10)
+            .margin_bottom(34)
+            .set_label_area_size(LabelAreaPosition::Left, 58)
+            .set_label_area_size(LabelAreaPosition::Bottom, 26)
             .build_cartesian_2d(0.0..end, 0.0..most)
             .map_err(failed)?;
         chart
@@ -55,8 +49,8 @@ impl Plot for Bars {
             .disable_x_mesh()
             .disable_x_axis()
             .light_line_style(WHITE)
-            .bold_line_style(ShapeStyle::from(&GRID).stroke_width(scale))
-            .axis_style(ShapeStyle::from(&AXIS).stroke_width(scale))
+            .bold_line_style(ShapeStyle::from(&GRID).stroke_width(1))
+            .axis_style(ShapeStyle::from(&AXIS).stroke_width(1))
             .y_desc(&self.y)
             .y_label_style(text(12))
             .axis_desc_style(text(13))
@@ -75,21 +69,17 @@ impl Plot for Bars {
                     .draw_series([Rectangle::new(corners, color.filled())])
                     .map_err(failed)?;
                 let top = chart.backend_coord(&(left + 0.5 * width, *height));
-                labels.push((label, (top.0, top.1 - px(3) as i32)));
+                labels.push((label, (top.0, top.1 - 3)));
             }
             let foot = chart.backend_coord(&(group as f64 + 0.5, 0.0));
             let style = text(13).pos(Pos::new(HPos::Center, VPos::Top));
-            area.draw(&Text::new(
-                name.clone(),
-                (foot.0, foot.1 + px(7) as i32),
-                style,
-            ))
-            .map_err(failed)?;
+            area.draw(&Text::new(name.clone(), (foot.0, foot.1 + 7), style))
+                .map_err(failed)?;
         }
         if let Some((height, _)) = &self.mark {
-            let line = ShapeStyle::from(&AXIS).stroke_width(scale);
+            let line = ShapeStyle::from(&AXIS).stroke_width(1);
             let [from, to] = [0.0, end].map(|x| chart.backend_coord(&(x, *height)));
-            let dash = px(6) as i32;
+            let dash = 6;
             for start in (from.0..to.0).step_by(2 * dash as usize) {
                 let stop = (start + dash).min(to.0);
                 area.draw(&PathElement::new([(start, from.1), (stop, to.1)], line))
@@ -113,21 +103,13 @@ impl Plot for Bars {
             .map(|(name, color)| (name.as_str(), Some(*color)))
             .collect();
         kinds.extend(self.mark.iter().map(|(_, name)| (name.as_str(), None)));
-        legend(area, &kinds, scale)
+        legend(area, &kinds)
     }
 }
 
 /// Names and colours in a row below the plot; without a colour, a dashed line.
-pub(super) fn legend<B: DrawingBackend>(
-    area: &DrawingArea<B, Shift>,
-    kinds: &[(&str, Option<RGBColor>)],
-    scale: u32,
-) -> Result<(), Error>
-where
-    B::ErrorType: 'static,
-{
-    let px = |size: u32| (size * scale) as i32;
-    let style = TextStyle::from((FONT, 12 * scale).into_font()).color(&AXIS);
+pub(super) fn legend(area: &Area<'_>, kinds: &[(&str, Option<RGBColor>)]) -> Result<(), Error> {
+    let style = TextStyle::from((FONT, 12).into_font()).color(&AXIS);
     let style = style.pos(Pos::new(HPos::Left, VPos::Center));
     let width = |name: &str| {
         area.estimate_text_size(name, &style)
@@ -135,33 +117,29 @@ where
     };
     let mut widths = Vec::with_capacity(kinds.len());
     for (name, _) in kinds {
-        widths.push(px(16) + width(name).map_err(failed)?);
+        widths.push(16 + width(name).map_err(failed)?);
     }
-    let gap = px(22);
+    let gap = 22;
     let total: i32 = widths.iter().sum::<i32>() + gap * (kinds.len() as i32 - 1).max(0);
     let (all, height) = area.dim_in_pixel();
     let mut x = (all as i32 - total) / 2;
-    let y = height as i32 - px(20);
+    let y = height as i32 - 20;
     for ((name, color), width) in kinds.iter().zip(widths) {
-        let corners = [(x, y - px(5)), (x + px(10), y + px(5))];
+        let corners = [(x, y - 5), (x + 10, y + 5)];
         match color {
             Some(color) => area
                 .draw(&Rectangle::new(corners, color.filled()))
                 .map_err(failed)?,
             None => {
-                let line = ShapeStyle::from(&AXIS).stroke_width(scale);
-                for start in [x - px(5), x + px(3)] {
-                    let dash = [(start, y), (start + px(5), y)];
+                let line = ShapeStyle::from(&AXIS).stroke_width(1);
+                for start in [x - 5, x + 3] {
+                    let dash = [(start, y), (start + 5, y)];
                     area.draw(&PathElement::new(dash, line)).map_err(failed)?;
                 }
             }
         }
-        area.draw(&Text::new(
-            (*name).to_owned(),
-            (x + px(16), y),
-            style.clone(),
-        ))
-        .map_err(failed)?;
+        area.draw(&Text::new((*name).to_owned(), (x + 16, y), style.clone()))
+            .map_err(failed)?;
         x += width + gap;
     }
     Ok(())

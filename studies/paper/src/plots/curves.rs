@@ -1,15 +1,13 @@
 //! Curves over one axis, linear or logarithmic.
 
 use plotters::chart::{ChartBuilder, LabelAreaPosition};
-use plotters::coord::Shift;
 use plotters::element::{Circle, PathElement, Text};
-use plotters::prelude::{DrawingArea, DrawingBackend};
 use plotters::series::LineSeries;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use plotters::style::{Color, IntoFont, RGBColor, ShapeStyle, TextStyle, WHITE};
 
 use super::bars::legend;
-use super::{AXIS, FONT, GRID, Plot, failed};
+use super::{AXIS, Area, FONT, GRID, Plot, failed};
 use crate::error::Error;
 
 /// An axis and its labels.
@@ -122,22 +120,18 @@ impl Axis {
 }
 
 impl Plot for Curves {
-    fn draw<B: DrawingBackend>(&self, area: &DrawingArea<B, Shift>, scale: u32) -> Result<(), Error>
-    where
-        B::ErrorType: 'static,
-    {
-        let px = |size: u32| size * scale;
-        let text = |size: u32| TextStyle::from((FONT, px(size)).into_font()).color(&AXIS);
-        let line = |color: &RGBColor, width: u32| ShapeStyle::from(color).stroke_width(px(width));
+    fn draw(&self, area: &Area<'_>) -> Result<(), Error> {
+        let text = |size: u32| TextStyle::from((FONT, size).into_font()).color(&AXIS);
+        let line = |color: &RGBColor, width: u32| ShapeStyle::from(color).stroke_width(width);
         area.fill(&WHITE).map_err(failed)?;
         let ((x0, x1), (y0, y1)) = (self.x.ends(), self.y.ends());
         let mut chart = ChartBuilder::on(area)
             .caption(&self.title, text(17))
-            .margin(px(10))
-            .margin_right(px(24))
-            .margin_bottom(px(34))
-            .set_label_area_size(LabelAreaPosition::Left, px(66))
-            .set_label_area_size(LabelAreaPosition::Bottom, px(44))
+            .margin(10)
+            .margin_right(24)
+            .margin_bottom(34)
+            .set_label_area_size(LabelAreaPosition::Left, 66)
+            .set_label_area_size(LabelAreaPosition::Bottom, 44)
             .build_cartesian_2d(x0..x1, y0..y1)
             .map_err(failed)?;
         let pixel = |at: (f64, f64)| chart.backend_coord(&(self.x.place(at.0), self.y.place(at.1)));
@@ -147,7 +141,7 @@ impl Plot for Curves {
             area.draw(&PathElement::new([(x, low.1), (x, high.1)], line(&GRID, 1)))
                 .map_err(failed)?;
             let style = text(12).pos(Pos::new(HPos::Center, VPos::Top));
-            area.draw(&Text::new(label.clone(), (x, low.1 + px(6) as i32), style))
+            area.draw(&Text::new(label.clone(), (x, low.1 + 6), style))
                 .map_err(failed)?;
         }
         for (value, label) in &self.y.ticks {
@@ -155,23 +149,23 @@ impl Plot for Curves {
             area.draw(&PathElement::new([(low.0, y), (high.0, y)], line(&GRID, 1)))
                 .map_err(failed)?;
             let style = text(12).pos(Pos::new(HPos::Right, VPos::Center));
-            area.draw(&Text::new(label.clone(), (low.0 - px(6) as i32, y), style))
+            area.draw(&Text::new(label.clone(), (low.0 - 6, y), style))
                 .map_err(failed)?;
         }
         let frame = [(low.0, high.1), (low.0, low.1), (high.0, low.1)];
         area.draw(&PathElement::new(frame, line(&AXIS, 1)))
             .map_err(failed)?;
         let style = text(13).pos(Pos::new(HPos::Center, VPos::Top));
-        let below = ((low.0 + high.0) / 2, low.1 + px(24) as i32);
+        let below = ((low.0 + high.0) / 2, low.1 + 24);
         area.draw(&Text::new(self.x.name.clone(), below, style))
             .map_err(failed)?;
-        let turned = (FONT, px(13))
+        let turned = (FONT, 13)
             .into_font()
             .transform(plotters::style::FontTransform::Rotate270);
         let style = TextStyle::from(turned)
             .color(&AXIS)
             .pos(Pos::new(HPos::Center, VPos::Top));
-        let beside = (px(8) as i32, (low.1 + high.1) / 2);
+        let beside = (8, (low.1 + high.1) / 2);
         area.draw(&Text::new(self.y.name.clone(), beside, style))
             .map_err(failed)?;
         let marks: Vec<((i32, i32), &str)> = self
@@ -194,15 +188,15 @@ impl Plot for Curves {
             if curve.has_dots {
                 let dots = points
                     .iter()
-                    .map(|&at| Circle::new(at, px(3), curve.color.filled()));
+                    .map(|&at| Circle::new(at, 3, curve.color.filled()));
                 chart.draw_series(dots).map_err(failed)?;
             }
         }
         for (at, name) in marks {
-            area.draw(&Circle::new(at, px(5), line(&AXIS, 2)))
+            area.draw(&Circle::new(at, 5, line(&AXIS, 2)))
                 .map_err(failed)?;
             let style = text(12).pos(Pos::new(HPos::Left, VPos::Bottom));
-            let beside = (at.0 + px(8) as i32, at.1 - px(4) as i32);
+            let beside = (at.0 + 8, at.1 - 4);
             area.draw(&Text::new(name.to_owned(), beside, style))
                 .map_err(failed)?;
         }
@@ -211,7 +205,7 @@ impl Plot for Curves {
             .iter()
             .map(|curve| (curve.name.as_str(), Some(curve.color)))
             .collect();
-        legend(area, &kinds, scale)
+        legend(area, &kinds)
     }
 }
 
