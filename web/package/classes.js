@@ -1,7 +1,7 @@
 // The classes that both builds have, made of the functions of either module.
 
 import { Advance, Candidates, Contacts, Impacts, NearPairs, Pairs, Penetration, earliest, nearest, numberOf, statsOf } from "./answers.js";
-import { Closest, Hits, Neighbours, SafeDistances, Truncation, places, signed, tetrahedra } from "./probe.js";
+import { Closest, Hits, Neighbours, SafeDistances, Truncation, integers, places, signed } from "./probe.js";
 import { RestPairs, packed, plain, whole, withPoints } from "./query.js";
 import { body, call, disposable, isSingle, mustBeNone, number, refuse, wide, word } from "./shared.js";
 
@@ -84,8 +84,9 @@ export const QUESTIONS = {
     ...{ question: 17, ...packed(query, number("distance", distance)) },
     shape: (lists, stats) => new Neighbours(lists, stats),
   }),
-  locate: (which, points, control) => ({ question: 19, ...aboutPoints(which, points, control), shape: tetrahedra }),
+  locate: (which, points, control) => ({ question: 19, ...aboutPoints(which, points, control), shape: integers }),
   signedDistance: (which, points, control) => ({ question: 20, ...aboutPoints(which, points, control), shape: signed }),
+  windingNumbers: (which, points, control) => ({ question: 21, ...aboutPoints(which, points, control), shape: integers }),
   nearest: (query) => ({ question: 18, ...packed({ which: "between", ...query }), shape: nearest }),
 };
 

@@ -640,6 +640,11 @@ export declare class Detector {
    * Decided exactly.
    */
   locate(scene: Scene, body: Body, points: Positions, control?: Control): Int32Array;
+  /**
+   * How often a closed surface winds around each point: 0 outside, 1 inside where faces are counterclockwise seen from outside, sums of
+   * these where the surface overlaps itself; -(2 ** 31) on the surface. Decided exactly. Bodies of triangles, as for `contains`.
+   */
+  windingNumbers(scene: Scene, body: Body, points: Positions, control?: Control): Int32Array;
   /** The element nearest to each point, or with `nNearest` the nearest few: of all bodies, or of one with `of`. */
   closest(scene: Scene, points: Positions, query?: Query): Closest;
   /** What rays hit: the points origin + t direction, for t from 0 to `most`. Grazing an edge or a vertex is a hit. */

@@ -9,8 +9,8 @@ const NO_FEATURE = 255;
 // Where points lie: a number per point.
 export const places = ([, bytes]) => new Int8Array(bytes.buffer, bytes.byteOffset, bytes.length);
 
-// The tetrahedron that contains each point, or -1.
-export const tetrahedra = ([, , , words]) => new Int32Array(words.buffer, words.byteOffset, words.length);
+// The tetrahedron that contains each point, or -1; or how often a surface winds around it.
+export const integers = ([, , , words]) => new Int32Array(words.buffer, words.byteOffset, words.length);
 
 // How far inside each point is.
 export const signed = ([, , numbers]) => numbers;

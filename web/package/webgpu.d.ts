@@ -31,6 +31,7 @@ export declare class Detector {
   contains(scene: Scene, body: Body, points: Positions, control?: Control): Promise<Int8Array>;
   signedDistance(scene: Scene, body: Body, points: Positions, control?: Control): Promise<Float64Array>;
   locate(scene: Scene, body: Body, points: Positions, control?: Control): Promise<Int32Array>;
+  windingNumbers(scene: Scene, body: Body, points: Positions, control?: Control): Promise<Int32Array>;
   closest(scene: Scene, points: Positions, query?: Query): Promise<Closest>;
   cast(scene: Scene, origins: Positions, directions: Positions, query?: Query): Promise<Hits>;
   safeDistances(scene: Scene, most: number, query?: Query): Promise<SafeDistances>;

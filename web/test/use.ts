@@ -39,6 +39,7 @@ const places: Int8Array = detector.contains(scene, a, points, { progress: () => 
 const closest: ClosestElement | null = detector.closest(scene, points, { of: a, most: 2 }).at(-1);
 const few: ClosestElement[] = detector.closest(scene, points, { nNearest: 3 }).of(0);
 const cells: Int32Array = detector.locate(scene, b, points);
+const wound: Int32Array = detector.windingNumbers(scene, a, points);
 const inside: Float64Array = detector.signedDistance(scene, a, points, { progress: () => true });
 scene.setGroups(a, new Uint16Array(3));
 scene.setPinned(a, [true, false, true]);

@@ -427,6 +427,9 @@ typedef struct impinge_nearest {
 /* The number of no element: where nothing is near enough, or no tetrahedron contains a point. */
 #define IMPINGE_NO_ELEMENT UINT32_C(0xffffffff)
 
+/* The winding number of a point on the surface. */
+#define IMPINGE_ON_SURFACE INT32_MIN
+
 /* The element that is nearest to a point. Which it is, is decided exactly; of several at the same distance it is the lowest by body and
  * then by number. Without any that is near enough `found` is 0, `body` IMPINGE_ANY_BODY, `element` IMPINGE_NO_ELEMENT, `distance` infinity
  * and `point` NaN. */
@@ -673,6 +676,12 @@ impinge_status impinge_contains(impinge_detector *detector, const impinge_scene 
  * exact, and the magnitude rounded down. INVALID: as impinge_contains. */
 impinge_status impinge_signed_distance(impinge_detector *detector, const impinge_scene *scene, uint32_t body, impinge_array points,
     double *distances);
+
+/* How often a closed surface of triangles winds around each point (3 columns of F32 or F64): `windings` gets one number per row, 0 outside,
+ * 1 inside where faces are counterclockwise seen from outside and -1 where they are clockwise, and sums of these where the surface overlaps
+ * itself; IMPINGE_ON_SURFACE on the surface. Decided exactly. INVALID: as impinge_contains; and a body of tetrahedra. */
+impinge_status impinge_winding_numbers(impinge_detector *detector, const impinge_scene *scene, uint32_t body, impinge_array points,
+    int32_t *windings);
 
 /* Which tetrahedron of a body contains each point (3 columns of F32 or F64): `tetrahedra` gets one number per row, the lowest of several
  * that share the face, edge or vertex on which a point is, or IMPINGE_NO_ELEMENT outside. Tetrahedra are closed: points on the surface are

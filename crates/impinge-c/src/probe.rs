@@ -1,5 +1,5 @@
 //! Questions about points and rays: `impinge_contains`, `impinge_signed_distance`,
-//! `impinge_locate`, `impinge_find_closest`, `impinge_cast`.
+//! `impinge_winding_numbers`, `impinge_locate`, `impinge_find_closest`, `impinge_cast`.
 
 use std::mem::offset_of;
 
@@ -250,6 +250,30 @@ pub unsafe extern "C" fn impinge_signed_distance(
                 Floats::F64(points) => of.detector.signed_distance(scene, body, points)?,
             };
             put_each(distances, "distances", signed.into_iter())
+        })
+    }
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn impinge_winding_numbers(
+    detector: *mut impinge_detector,
+    scene: *const impinge_scene,
+    body: u32,
+    points: impinge_array,
+    windings: *mut i32,
+) -> Status {
+    // SAFETY: see `impinge_contains`.
+    unsafe {
+        value((detector, scene, std::ptr::null()), |of| {
+            let body = of.scene.id(body)?;
+            let points = arrays::floats::<3>(&points, "points")?;
+            let scene = &of.scene.scene;
+            let found = match &points {
+                Floats::F32(points) => of.detector.winding_numbers(scene, body, points)?,
+                Floats::F64(points) => of.detector.winding_numbers(scene, body, points)?,
+            };
+            let numbers = found.into_iter().map(|of| of.unwrap_or(ON_SURFACE));
+            put_each(windings, "windings", numbers)
         })
     }
 }

@@ -92,6 +92,7 @@ fn layout_in_rust() -> BTreeMap<String, usize> {
         EXCLUDE_VERTICES,
         NO_FEATURE,
         NO_ELEMENT,
+        ON_SURFACE,
         LOG_ERROR,
         LOG_INFO,
         COLUMN_KIND,

@@ -96,6 +96,8 @@ pub const COLUMN_GONE: u32 = 34;
 pub const NO_FEATURE: u32 = 255;
 /// No element.
 pub const NO_ELEMENT: u32 = u32::MAX;
+/// `IMPINGE_ON_SURFACE`
+pub const ON_SURFACE: i32 = i32::MIN;
 
 /// The bit of a kind of pairs, `IMPINGE_VF` and so on.
 pub fn bit(kind: PairKind) -> u32 {

@@ -23,6 +23,7 @@ int main(void) {
   impinge_nearest nearest;
   int8_t places[VERTICES];
   uint32_t tetrahedra[VERTICES] = {9};
+  int32_t windings[VERTICES] = {9};
   uint32_t fixed = 3, beyond[3] = {0, 1, VERTICES};
   int32_t found = -1;
   uint64_t n = 7;
@@ -141,6 +142,12 @@ int main(void) {
   query.n_nearest = 0;
   REFUSED(impinge_find_closest(detector, scene, at, 1, &query, &closest), "n_nearest: 0");
   CHECK(closest == NULL);
+  REFUSED(impinge_winding_numbers(NULL, scene, 0, at, windings), "detector is NULL");
+  REFUSED(impinge_winding_numbers(detector, NULL, 0, at, windings), "scene is NULL");
+  REFUSED(impinge_winding_numbers(detector, scene, 0, at, NULL), "windings is NULL");
+  REFUSED(impinge_winding_numbers(detector, scene, 4, at, windings), "no body 4");
+  REFUSED(impinge_winding_numbers(detector, scene, 0, faces, windings), "points: its type is IMPINGE_U32");
+  CHECK(windings[0] == 9);
   REFUSED(impinge_locate(NULL, scene, 0, at, tetrahedra), "detector is NULL");
   REFUSED(impinge_locate(detector, NULL, 0, at, tetrahedra), "scene is NULL");
   REFUSED(impinge_locate(detector, scene, 0, at, tetrahedra), "body 0");

@@ -135,6 +135,7 @@ void probes() {
   impinge::detector detector(impinge::backend::cpu);
   const std::vector<std::array<float, 3>> points = {{0, 0, 0}, {0, 0, 1}, {0, 0, -3}};
   CHECK(detector.contains(scene, a, points) == (std::vector<std::int8_t>{1, 0, -1}));
+  CHECK(detector.winding_numbers(scene, a, points) == (std::vector<std::int32_t>{1, IMPINGE_ON_SURFACE, 0}));
   const auto signed_ = detector.signed_distance(scene, a, points);
   CHECK(signed_[0] > 0.99 && signed_[1] == 0 && signed_[2] == -2);
   const auto closest = detector.closest(scene, points, 1.5, query::of(a));

@@ -901,6 +901,18 @@ static void probes(impinge_detector *detector) {
     CHECK(tetrahedra[0] == 1 && tetrahedra[1] == 0 && tetrahedra[2] == IMPINGE_NO_ELEMENT);
     GOOD(impinge_scene_remove(scene, body));
   }
+  {
+    /* Two surfaces as one: in both, in one, on one, outside. */
+    static const double corners[8][3] = {{0, 0, 0}, {4, 0, 0}, {0, 4, 0}, {0, 0, 4}, {-1, -1, -1}, {15, -1, -1}, {-1, 15, -1}, {-1, -1, 15}};
+    static const uint32_t shells[8][3] = {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {2, 0, 3}, {4, 6, 5}, {4, 5, 7}, {5, 6, 7}, {6, 4, 7}};
+    static const float where[4][3] = {{1, 1, 1}, {3, 3, 3}, {0, 1, 1}, {-2, 0, 0}};
+    int32_t windings[4] = {9, 9, 9, 9};
+    uint32_t body = 9;
+    GOOD(impinge_scene_add_triangles(scene, packed(shells, 8, IMPINGE_U32), packed(corners, 8, IMPINGE_F64), &body));
+    GOOD(impinge_winding_numbers(detector, scene, body, packed(where, 4, IMPINGE_F32), windings));
+    CHECK(windings[0] == 2 && windings[1] == 1 && windings[2] == IMPINGE_ON_SURFACE && windings[3] == 0);
+    GOOD(impinge_scene_remove(scene, body));
+  }
   /* One ray down the axis, one beside the ball: origins in double precision, directions in single. */
   GOOD(impinge_cast(detector, scene, from, to, HUGE_VAL, NULL, &hits));
   CHECK(impinge_hits_n_rays(hits) == 2 && impinge_hits_count(hits) == 1);

@@ -91,7 +91,7 @@ fn points(world: &World) -> Vec<[f64; 3]> {
 }
 
 /// By the names of the methods; where one is asked twice, with more after a space.
-const ALL: [(&str, Ask); 24] = [
+const ALL: [(&str, Ask); 25] = [
     ("detect", |d, w| {
         Ok(d.detect(&w.scene, &Query::all())?.hash())
     }),
@@ -183,6 +183,12 @@ const ALL: [(&str, Ask); 24] = [
     ("signed_distance", |d, w| {
         let signed = d.signed_distance(&w.scene, w.bodies[1], &points(w))?;
         Ok(bits(&signed.iter().map(|&x| [x; 3]).collect::<Vec<_>>()))
+    }),
+    ("winding_numbers", |d, w| {
+        let windings = d.winding_numbers(&w.scene, w.bodies[1], &points(w))?;
+        Ok(windings.iter().fold(0, |sum: u64, winding| {
+            sum.rotate_left(5) ^ u64::from(winding.map_or(9, i32::unsigned_abs))
+        }))
     }),
     ("locate", |d, w| {
         let (scene, block) = &w.block;

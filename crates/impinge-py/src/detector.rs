@@ -327,6 +327,26 @@ impl DetectorBase {
         Ok(PyArray1::from_vec(slf.py(), distances))
     }
 
+    fn _winding_numbers<'py>(
+        slf: &Bound<'py, Self>,
+        scene: &Bound<'_, PyAny>,
+        body: &Bound<'_, PyAny>,
+        points: &Bound<'py, PyAny>,
+        keywords: Keywords<'_, '_>,
+    ) -> PyResult<Bound<'py, PyArray1<i32>>> {
+        let found = ask_of_body(
+            slf,
+            (scene, body, points),
+            keywords,
+            |detector, scene, body, points| match points {
+                Rows::F32(points) => detector.winding_numbers(scene, body, points),
+                Rows::F64(points) => detector.winding_numbers(scene, body, points),
+            },
+        )?;
+        let numbers = found.iter().map(|winding| winding.unwrap_or(i32::MIN));
+        Ok(PyArray1::from_vec(slf.py(), collect(found.len(), numbers)?))
+    }
+
     fn _locate<'py>(
         slf: &Bound<'py, Self>,
         scene: &Bound<'_, PyAny>,

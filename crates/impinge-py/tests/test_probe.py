@@ -200,6 +200,31 @@ def test_locate(dtype):
         detector.locate(scene, body, points, most=1)
 
 
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_surfaces_wind_around_points(dtype):
+    # A cube, and one of half its size in the same corner, as one surface: twice around, and not at all where that is reversed.
+    faces, corners = np.array(CUBE), np.array(CORNERS, dtype)
+    points = grid(dtype)
+    inside, on = (np.abs(2 * points - 1).max(1) < 1), np.abs(2 * points - 1).max(1) == 1
+    small, on_small = (np.abs(4 * points - 1).max(1) < 1), np.abs(4 * points - 1).max(1) == 1
+    scene, detector = impinge.Scene(), impinge.Detector("cpu", threads=2)
+    for sign, inner in [(1, faces), (-1, faces[:, ::-1])]:
+        both, vertices = np.concatenate([faces, inner + 8]), np.concatenate([corners, corners / 2])
+        body = scene.add(vertices, both)
+        expected = np.where(on | on_small, impinge.ON_SURFACE, inside.astype(int) + sign * small)
+        found = detector.winding_numbers(scene, body, points)
+        assert found.dtype == np.int32 and (found == expected).all() and (small & ~on).any()
+        assert (impinge.winding_numbers(vertices, both, points, threads=2) == expected).all()
+        places = np.where(found == impinge.ON_SURFACE, 0, np.where(found == 0, -1, 1))
+        assert (detector.contains(scene, body, points) == places).all()
+    assert impinge.winding_numbers(corners, faces, np.empty((0, 3))).shape == (0,)
+    with pytest.raises(ValueError, match="closed"):
+        impinge.winding_numbers(corners, faces[1:], points)
+    solid = scene.add([[0, 0, 0], [4, 0, 0], [0, 4, 0], [0, 0, 4]], [[0, 1, 2, 3]])
+    with pytest.raises(ValueError, match="triangles"):
+        detector.winding_numbers(scene, solid, points)
+
+
 def axis_rays(dtype=np.float64):
     """Rays down onto the cube, and where they first meet it."""
     line = np.linspace(-0.5, 1.5, 9)

@@ -202,8 +202,8 @@ pub(crate) fn of_pairs(pairs: &Pairs, world: &World) -> Answer {
 
 impl Asker {
     /// Asks. For questions with a query, `words` and `numbers` are those of [`query`].
-    /// [`Question::Distance`]: two bodies; [`Question::Contains`], [`Question::Locate`] and
-    /// [`Question::SignedDistance`]: one. Points, or origins and then directions, come after these numbers.
+    /// [`Question::Distance`]: two bodies; [`Question::Contains`], [`Question::Locate`],
+    /// [`Question::SignedDistance`] and [`Question::WindingNumbers`]: one. Points, or origins and then directions, come after these numbers.
     /// [`Question::Contacts`]: a number of the caller's for the answer, then rows of pairs; [`Question::Penetration`]: that number, two
     /// bodies, and the rows again; its rows are the two bodies, in the order of what is inside.
     ///
@@ -218,7 +218,10 @@ impl Asker {
     ) -> Result<Answer, Error> {
         let (numbers, given) = numbers.split_first_chunk().ok_or(Error::Foreign)?;
         match question {
-            Question::Contains | Question::Locate | Question::SignedDistance => {
+            Question::Contains
+            | Question::Locate
+            | Question::SignedDistance
+            | Question::WindingNumbers => {
                 return self.about_points(question, world, words, given);
             }
             Question::Distance => return self.distance(world, words),

@@ -55,11 +55,13 @@ pub enum Question {
     Locate,
     /// [`Detector::signed_distance`].
     SignedDistance,
+    /// [`Detector::winding_numbers`].
+    WindingNumbers,
 }
 
 impl Question {
     /// All of them, by their number in the package.
-    pub const ALL: [Question; 21] = [
+    pub const ALL: [Question; 22] = [
         Question::Detect,
         Question::Count,
         Question::Any,
@@ -81,6 +83,7 @@ impl Question {
         Question::Nearest,
         Question::Locate,
         Question::SignedDistance,
+        Question::WindingNumbers,
     ];
 }
 

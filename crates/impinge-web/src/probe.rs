@@ -133,7 +133,8 @@ impl Answer {
 
 impl Asker {
     /// Where points lie: a byte each, -1, 0 or 1; or how far inside they are, a number each; or the
-    /// tetrahedra that contain them, a word each, -1 for none. `words`: the body.
+    /// tetrahedra that contain them, a word each, -1 for none; or how often the surface winds around
+    /// them, a word each, the lowest number on the surface. `words`: the body.
     pub(crate) fn about_points(
         &mut self,
         question: Question,
@@ -156,6 +157,11 @@ impl Asker {
             Question::Contains => {
                 let places = detector.contains(scene, body, points)?;
                 answer.bytes.extend(places.iter().map(|&place| place as u8));
+            }
+            Question::WindingNumbers => {
+                let found = detector.winding_numbers(scene, body, points)?;
+                let numbers = found.into_iter().map(|found| found.unwrap_or(i32::MIN));
+                answer.words.extend(numbers.map(i32::cast_unsigned));
             }
             _ => answer.numbers = detector.signed_distance(scene, body, points)?,
         }

@@ -169,6 +169,13 @@ public:
     const auto status = impinge_signed_distance(raw(), in.raw(), of, at, distances.data());
     return give(status, std::move(distances));
   }
+  /// How often a closed surface winds around each point, or IMPINGE_ON_SURFACE.
+  template <class P> result<std::vector<std::int32_t>> winding_numbers(const scene &in, body of, const P &points) {
+    const array at = detail::rows_of(points, 3);
+    std::vector<std::int32_t> windings(at.rows);
+    const auto status = impinge_winding_numbers(raw(), in.raw(), of, at, windings.data());
+    return give(status, std::move(windings));
+  }
   /// The lowest tetrahedron of a body that contains each point, or IMPINGE_NO_ELEMENT.
   template <class P> result<std::vector<std::uint32_t>> locate(const scene &in, body of, const P &points) {
     const array at = detail::rows_of(points, 3);

@@ -40,7 +40,7 @@ unsafe fn numbers<T>(of: &impinge_array) -> &[T] {
 fn points_and_rays_are_those_of_rust() {
     let (at, directions) = (points(300, 1), points(300, 2));
     let narrow: Vec<[f32; 3]> = at.iter().map(|x| x.map(|x| x as f32)).collect();
-    let mut n_located = 0;
+    let (mut n_located, mut n_wound) = (0, 0);
     let cells = of_models(&[solid_ball(200), surfaces::ball(500)]);
     for (name, scene) in catalogue().into_iter().chain([("cells", cells)]) {
         let built = through_c(&scene);
@@ -129,6 +129,19 @@ fn points_and_rays_are_those_of_rust() {
                         assert!(status == INVALID && tetrahedra.iter().all(|&of| of == 9));
                     }
                 }
+                let mut windings = vec![9; at.len()];
+                let to = windings.as_mut_ptr();
+                let status = impinge_winding_numbers(on, of, body, view(&narrow), to);
+                match detector.winding_numbers(&scene, id, &narrow) {
+                    Ok(expected) => {
+                        let numbers = expected.iter().map(|of| of.unwrap_or(ON_SURFACE));
+                        assert!(status == OK && numbers.eq(windings), "{name}");
+                        n_wound += expected.iter().flatten().filter(|&&n| n != 0).count();
+                    }
+                    Err(_) => {
+                        assert!(status == INVALID && windings.iter().all(|&of| of == 9));
+                    }
+                }
                 let (mut places, mut signed) = (vec![9; at.len()], vec![f64::NAN; at.len()]);
                 let status = impinge_contains(on, of, body, view(&at), places.as_mut_ptr());
                 match detector.contains(&scene, id, &at) {
@@ -167,7 +180,7 @@ fn points_and_rays_are_those_of_rust() {
             assert_eq!((found == 1).then_some(row), expected, "{name}");
         }
     }
-    assert!(n_located > 3);
+    assert!(n_located > 3 && n_wound > 3, "{n_located} {n_wound}");
 }
 
 /// Compares the lists of one kind, seen from one side.

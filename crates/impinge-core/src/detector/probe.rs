@@ -102,6 +102,44 @@ impl Detector {
         })
     }
 
+    /// How often a closed surface winds around each point: 0 outside, 1 inside where faces are
+    /// counterclockwise seen from outside and -1 where they are clockwise, and sums of these where
+    /// the surface overlaps itself; `None` on the surface. Decided exactly.
+    /// [`contains`](Detector::contains) says whether it is 0.
+    ///
+    /// ```
+    /// use impinge::{Backend, Detector, Scene};
+    /// # fn main() -> Result<(), impinge::Error> {
+    /// // Twice the same surface, of which one is four times as large.
+    /// let faces = [[0u32, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]];
+    /// let both = [faces, faces.map(|face| face.map(|vertex| vertex + 4))].concat();
+    /// let corners = [[0.0f32, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0], [0.0, 0.0, 4.0]];
+    /// let corners = [corners, corners.map(|corner| corner.map(|x| 4.0 * x - 1.0))].concat();
+    /// let mut scene = Scene::new();
+    /// let body = scene.add_triangles(&both, &corners)?;
+    /// let mut detector = Detector::new(Backend::Cpu)?;
+    /// let points = [[1.0f32, 1.0, 1.0], [3.0, 3.0, 3.0], [0.0, 1.0, 1.0], [-2.0, 0.0, 0.0]];
+    /// let windings = detector.winding_numbers(&scene, body, &points)?;
+    /// assert_eq!(windings, [Some(2), Some(1), None, Some(0)]);
+    /// # Ok(()) }
+    /// ```
+    ///
+    /// # Errors
+    /// A stale id, a body of another kind than triangles, a surface that is not closed (the error
+    /// names an edge), positions or points that are not finite, a memory budget too small for the
+    /// trees of the body.
+    pub fn winding_numbers<R: Real>(
+        &mut self,
+        scene: &Scene,
+        body: BodyId,
+        points: &[[R; 3]],
+    ) -> Result<Vec<Option<i32>>, Error> {
+        self.probe(points.len(), |probes, shared, work| {
+            let windings = probes.winding_numbers(scene, body, points, shared, work)?;
+            Ok((windings, shared.topologies.bytes()))
+        })
+    }
+
     /// Which tetrahedron of a body contains each point: the lowest by number, where several share
     /// the face, edge or vertex on which a point is; `None` outside. Tetrahedra are closed, so
     /// points on the surface of the body are in one. Decided exactly. A flat tetrahedron contains

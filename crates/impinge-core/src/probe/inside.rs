@@ -150,11 +150,35 @@ impl Question for InSurface {
     }
 
     fn answer(found: &FoundFaces) -> i8 {
-        match (found.is_on, found.winding) {
-            (true, _) => 0,
-            (false, 0) => -1,
-            (false, _) => 1,
+        match Around::answer(found) {
+            None => 0,
+            Some(0) => -1,
+            Some(_) => 1,
         }
+    }
+}
+
+/// How often a closed surface winds around a point; none on the surface.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Around;
+
+impl Question for Around {
+    type Found = FoundFaces;
+    type Answer = Option<i32>;
+    const OUTSIDE: Option<i32> = Some(0);
+
+    #[inline(always)]
+    fn begin(self, whole: &Bounds, at: Bounds) -> (FoundFaces, Bounds) {
+        InSurface.begin(whole, at)
+    }
+
+    #[inline]
+    fn add(self, found: &mut FoundFaces, target: Target<'_>, slot: usize, point: &Point) -> bool {
+        InSurface.add(found, target, slot, point)
+    }
+
+    fn answer(found: &FoundFaces) -> Option<i32> {
+        (!found.is_on).then_some(found.winding)
     }
 }
 

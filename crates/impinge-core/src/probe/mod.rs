@@ -117,10 +117,7 @@ impl Probes {
             }
         }
         self.know(scene, &[(id, Part::Given)], shared, work)?;
-        let target = Target {
-            body,
-            boxes: &self.boxes[&(id.index(), Part::Given)],
-        };
+        let target = self.target(scene, id)?;
         match body.kind() {
             BodyKind::Tetrahedra => {
                 let border = &self.borders[&id.index()];
@@ -128,6 +125,24 @@ impl Probes {
             }
             _ => self.ask(inside::InSurface, target, points, work),
         }
+    }
+
+    /// How often a closed surface winds around each point; none on the surface.
+    ///
+    /// # Errors
+    /// As [`contains`](Self::contains), and a body of tetrahedra.
+    pub fn winding_numbers<R: Real>(
+        &mut self,
+        scene: &Scene,
+        id: BodyId,
+        points: &[[R; 3]],
+        shared: &mut Shared<'_>,
+        work: Work<'_>,
+    ) -> Result<Vec<Option<i32>>, Error> {
+        check_points("points", points)?;
+        self.know_one(scene, id, BodyKind::Triangles, shared, work)?;
+        shared.topologies.know(scene, id, work)?;
+        self.ask(inside::Around, self.target(scene, id)?, points, work)
     }
 
     /// The lowest tetrahedron of a body that contains each point.
@@ -144,20 +159,39 @@ impl Probes {
         work: Work<'_>,
     ) -> Result<Vec<Option<u32>>, Error> {
         check_points("points", points)?;
-        let body = scene.body(id)?;
-        if body.kind() != BodyKind::Tetrahedra {
+        self.know_one(scene, id, BodyKind::Tetrahedra, shared, work)?;
+        self.ask(inside::Lowest, self.target(scene, id)?, points, work)
+    }
+
+    /// Learns the boxes of a body, which must be of one kind.
+    ///
+    /// # Errors
+    /// A stale id, another kind, positions that are not finite, cancellation.
+    fn know_one(
+        &mut self,
+        scene: &Scene,
+        id: BodyId,
+        kind: BodyKind,
+        shared: &mut Shared<'_>,
+        work: Work<'_>,
+    ) -> Result<(), Error> {
+        let given = scene.body(id)?.kind();
+        if given != kind {
             return Err(Error::WrongKind {
                 body: id,
-                kind: body.kind().name(),
-                expected: "tetrahedra",
+                kind: given.name(),
+                expected: kind.name(),
             });
         }
-        self.know(scene, &[(id, Part::Given)], shared, work)?;
-        let target = Target {
-            body,
+        self.know(scene, &[(id, Part::Given)], shared, work)
+    }
+
+    /// A body whose boxes are known.
+    fn target<'a>(&'a self, scene: &'a Scene, id: BodyId) -> Result<Target<'a>, Error> {
+        Ok(Target {
+            body: scene.body(id)?,
             boxes: &self.boxes[&(id.index(), Part::Given)],
-        };
-        self.ask(inside::Lowest, target, points, work)
+        })
     }
 
     /// The answer about each point of a body.

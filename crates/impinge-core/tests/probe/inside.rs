@@ -38,24 +38,30 @@ fn lattice(k: u32) -> Vec<[f64; 3]> {
     points
 }
 
-fn expected(faces: &[[u32; 3]], positions: &[[f64; 3]], points: &[[f64; 3]]) -> Vec<i8> {
+/// The winding number of each point; none on the surface.
+fn windings(faces: &[[u32; 3]], positions: &[[f64; 3]], points: &[[f64; 3]]) -> Vec<Option<i32>> {
     let mut random = Random::new(77);
     let faces: Vec<[Vector; 3]> = faces
         .iter()
         .map(|face| face.map(|vertex| oracle::vector(positions[vertex as usize])))
         .collect();
-    let place = |point: &[f64; 3]| {
+    let winding = |point: &[f64; 3]| {
         let point = oracle::vector(*point);
-        if faces.iter().any(|face| oracle::is_on(&point, face)) {
-            return 0;
-        }
+        let is_on = faces.iter().any(|face| oracle::is_on(&point, face));
         // A flat face is on both sides of a segment at once, or on none.
-        match oracle::winding(&point, &faces, &mut random) {
-            0 => -1,
-            _ => 1,
-        }
+        (!is_on).then(|| oracle::winding(&point, &faces, &mut random))
     };
-    points.iter().map(place).collect()
+    points.iter().map(winding).collect()
+}
+
+/// Where the points are.
+fn places(windings: &[Option<i32>]) -> Vec<i8> {
+    let place = |winding: &Option<i32>| winding.map_or(0, |n| if n == 0 { -1 } else { 1 });
+    windings.iter().map(place).collect()
+}
+
+fn expected(faces: &[[u32; 3]], positions: &[[f64; 3]], points: &[[f64; 3]]) -> Vec<i8> {
+    places(&windings(faces, positions, points))
 }
 
 fn found(
@@ -76,7 +82,7 @@ fn count(places: &[i8]) -> [usize; 3] {
 
 #[test]
 fn lattices_of_shells_are_decided_exactly() {
-    let mut all = [0; 3];
+    let (mut all, mut several) = ([0; 3], 0);
     for (n, k, seed) in [
         (1, 1, 1),
         (1, 2, 2),
@@ -85,11 +91,20 @@ fn lattices_of_shells_are_decided_exactly() {
         (12, 3, 5),
         (40, 4, 6),
         (30, 2, 7),
+        (150, 3, 8),
     ] {
         let (faces, positions) = shells(n, k, seed);
         let points = lattice(k);
-        let expected = expected(&faces, &positions, &points);
-        let found = found(&faces, &positions, &points, Backend::Cpu);
+        let windings = windings(&faces, &positions, &points);
+        let expected = places(&windings);
+        let mut scene = Scene::new();
+        let body = scene.add_triangles(&faces, &positions).unwrap();
+        let mut detector = Detector::new(Backend::Cpu).unwrap();
+        let around = detector.winding_numbers(&scene, body, &points).unwrap();
+        let wrong = around.iter().zip(&windings).position(|(x, y)| x != y);
+        assert_eq!(wrong.map(|ix| (points[ix], around[ix], windings[ix])), None);
+        several += around.iter().flatten().filter(|n| n.abs() > 1).count();
+        let found = detector.contains(&scene, body, &points).unwrap();
         let wrong = found.iter().zip(&expected).position(|(x, y)| x != y);
         if let Some(ix) = wrong {
             panic!(
@@ -99,7 +114,10 @@ fn lattices_of_shells_are_decided_exactly() {
         }
         all = [0, 1, 2].map(|k| all[k] + count(&expected)[k]);
     }
-    assert!(all.iter().all(|&n| n > 100), "{all:?}");
+    assert!(
+        all.iter().all(|&n| n > 100) && several > 10,
+        "{all:?} {several}"
+    );
 }
 
 /// The sign is that of the oracle, the magnitude the distance of this body alone, whatever else is
@@ -471,6 +489,15 @@ fn tetrahedra_that_move_and_what_has_none() {
         detector.locate(&scene, body, &points).unwrap(),
         [None, Some(0)]
     );
+    let kind = detector.winding_numbers(&scene, body, &points);
+    assert!(matches!(
+        kind,
+        Err(Error::WrongKind {
+            kind: "tetrahedra",
+            expected: "triangles",
+            ..
+        })
+    ));
     let kind = detector.locate(&scene, cube, &points).unwrap_err();
     assert!(
         matches!(kind, Error::WrongKind { body, kind: "triangles", expected: "tetrahedra" } if body == cube)

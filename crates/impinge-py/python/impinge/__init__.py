@@ -51,6 +51,7 @@ from ._errors import (
 )
 from ._fix import Fixed, fix
 from ._functions import (
+    ON_SURFACE,
     DeviceInfo,
     cast,
     closest_points,
@@ -63,6 +64,7 @@ from ._functions import (
     self_pairs,
     signed_distance,
     weld,
+    winding_numbers,
 )
 from ._impinge import (
     FEATURES,
@@ -85,6 +87,7 @@ from ._scene import Scene
 __all__ = [
     "FEATURES",
     "KINDS",
+    "ON_SURFACE",
     "TYPES",
     "Advance",
     "Body",
@@ -145,6 +148,7 @@ __all__ = [
     "tiles",
     "trimesh",
     "weld",
+    "winding_numbers",
 ]
 
 for _name in __all__:

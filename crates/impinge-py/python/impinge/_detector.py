@@ -795,6 +795,47 @@ class Detector(DetectorBase):
         """
         return self._signed_distance(scene, body, points, control)
 
+    def winding_numbers(
+        self, scene: Scene, body: _Body, points: _Array, **control: Unpack[Control]
+    ) -> npt.NDArray[np.int32]:
+        """How often a closed surface winds around each point. Decided exactly.
+
+        Parameters
+        ----------
+        scene : Scene
+        body : Body or int
+            Triangles.
+        points : array_like, shape (n, 3)
+            Float32 or float64, taken as they are.
+        **control
+            ``cancel`` and ``progress``, as for `Detector`.
+
+        Returns
+        -------
+        numpy.ndarray of int32, shape (n,)
+            0 outside, 1 inside where faces are counterclockwise seen from outside and -1 where they are clockwise, and sums of these
+            where the surface overlaps itself. `ON_SURFACE`, the lowest int32, on the surface. `contains` says whether it is 0.
+
+        Raises
+        ------
+        ValueError, TypeError
+            As `contains`; and a body of tetrahedra.
+
+        Examples
+        --------
+        >>> import impinge, numpy
+        >>> scene = impinge.Scene()
+        >>> faces = numpy.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
+        >>> corners = numpy.array([[0, 0, 0], [4, 0, 0], [0, 4, 0], [0, 0, 4]])
+        >>> body = scene.add([*corners, *(4 * corners - 1)], [*faces, *(faces + 4)])
+        >>> detector = impinge.Detector("cpu")
+        >>> detector.winding_numbers(scene, body, [[1, 1, 1], [3, 3, 3], [-2, 0, 0]]).tolist()
+        [2, 1, 0]
+        >>> detector.winding_numbers(scene, body, [[0, 1, 1]])[0] == impinge.ON_SURFACE
+        True
+        """
+        return self._winding_numbers(scene, body, points, control)
+
     def contacts(self, scene: Scene, pairs: Pairs, **control: Unpack[Control]) -> Contacts:
         """Where the triangles of each pair meet: points, segments, polygons, and the curves in which surfaces cross.
 

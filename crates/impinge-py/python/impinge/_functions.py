@@ -329,6 +329,55 @@ def contains(
     return detector._contains(scene, 0, points, {})
 
 
+#: The winding number of a point on the surface (`winding_numbers`): the lowest int32.
+ON_SURFACE = -(2**31)
+
+
+def winding_numbers(
+    vertices: _Array,
+    faces: _Array,
+    points: _Array,
+    *,
+    weld: bool = False,
+    **settings: Unpack[Settings],
+) -> npt.NDArray[np.int32]:
+    """How often a closed surface winds around each point; more than once where it overlaps itself. Decided exactly.
+
+    Parameters
+    ----------
+    vertices : array_like, shape (v, 3)
+        Positions, float32 or float64.
+    faces : array_like of int, shape (n, 3)
+        Vertex indices.
+    points : array_like, shape (n, 3)
+        Float32 or float64, taken as they are.
+    weld : bool
+        As `Scene.add`: vertices at the same place count as one.
+    **settings
+        As for `Detector`, but for ``backend``, which is ``"cpu"`` unless it is given.
+
+    Returns
+    -------
+    numpy.ndarray of int32, shape (n,)
+        As `Detector.winding_numbers`: 0 outside, `ON_SURFACE` on the surface.
+
+    Raises
+    ------
+    ValueError, TypeError
+        As `Scene.add` and `Detector.winding_numbers`.
+
+    Examples
+    --------
+    >>> import impinge
+    >>> corners = [[0, 0, 0], [4, 0, 0], [0, 4, 0], [0, 0, 4]]
+    >>> faces = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]
+    >>> impinge.winding_numbers(corners, faces, [[1, 1, 1], [-1, 0, 0]])
+    array([1, 0], dtype=int32)
+    """
+    scene, detector = _one_mesh(vertices, faces, "triangles", weld, settings)
+    return detector._winding_numbers(scene, 0, points, {})
+
+
 def locate(
     vertices: _Array,
     tetrahedra: _Array,
