@@ -2,14 +2,15 @@
 
 use std::path::PathBuf;
 
-/// The folder of shared data: `$IMPINGE_DATA` if set, else `../shared/data` beside the repository.
-/// `None` if it does not exist.
+/// The folder of shared data: `$IMPINGE_DATA` if set, else `shared/data` in the first folder above
+/// the current one that has it, as beside the repository. `None` if it does not exist.
 pub fn data_dir() -> Option<PathBuf> {
-    let folder = match std::env::var_os("IMPINGE_DATA") {
-        Some(folder) => PathBuf::from(folder),
-        None => PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data"),
-    };
-    folder.is_dir().then_some(folder)
+    if let Some(folder) = std::env::var_os("IMPINGE_DATA") {
+        return Some(PathBuf::from(folder)).filter(|folder| folder.is_dir());
+    }
+    let current = std::env::current_dir().ok()?;
+    let mut folders = current.ancestors().map(|above| above.join("shared/data"));
+    folders.find(|folder| folder.is_dir())
 }
 
 /// A file of [`data_dir`] for a test. `None` only if the file is absent and `IMPINGE_NO_DATA=1` is
