@@ -195,9 +195,16 @@ fn far_from_the_origin() {
                 scene.add_triangles(&faces, &corners).unwrap()
             }
         };
-        let points: Vec<[f64; 3]> = (0..80)
+        let mut points: Vec<[f64; 3]> = (0..80)
             .map(|_| place(random.point(0.0, 1.0).map(f64::from)))
             .collect();
+        // Some that are not moved, where corners are.
+        points.extend(
+            points
+                .clone()
+                .iter()
+                .map(|x| x.map(|x| f64::from(x as f32))),
+        );
         let closest = cpu()
             .closest(&scene, &points, f64::INFINITY, &Query::all())
             .unwrap();
