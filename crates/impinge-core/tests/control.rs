@@ -219,10 +219,9 @@ const ALL: [(&str, Ask); 25] = [
 ];
 
 /// Methods of the detector that ask nothing, or what is asked above in another way.
-const NO_QUESTIONS: [&str; 16] = [
+const NO_QUESTIONS: [&str; 14] = [
     "new",
     "open",
-    "with_device",
     "with_damage",
     "with_capacities",
     "with_most_bound",
@@ -231,7 +230,6 @@ const NO_QUESTIONS: [&str; 16] = [
     "stats",
     "set_control",
     // On a device.
-    "detect_async",
     "gpu",
     "bytes_on_device",
     "trace",

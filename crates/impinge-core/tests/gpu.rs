@@ -727,7 +727,8 @@ fn resident_frames_take_positions_and_leave_pairs_on_the_device() {
     queue.write_buffer(&positions, 0, &bytes);
     for method in [Method::Clusters, Method::Cells] {
         let settings = gpu(method);
-        let mut detector = Detector::with_device(device.clone(), queue.clone(), settings).unwrap();
+        let mut detector =
+            Detector::new(settings.on_device(device.clone(), queue.clone())).unwrap();
         let mut n_tries = 0;
         let found = loop {
             let mut encoder = device.create_command_encoder(&Default::default());
@@ -798,7 +799,10 @@ fn a_lost_device_is_an_error_and_a_new_detector_works() {
     let (device, queue) = device.unwrap();
     let case = cases().swap_remove(0);
     let settings = gpu(Method::Clusters);
-    let mut detector = Detector::with_device(device.clone(), queue, settings.clone()).unwrap();
+    let on_device = settings.clone().on_device(device.clone(), queue);
+    let mut on_cpu = Detector::new(on_device.clone().backend(Backend::Cpu)).unwrap();
+    assert!(on_cpu.gpu().is_none());
+    let mut detector = Detector::new(on_device).unwrap();
     assert!(detector.detect(&case.scene, &case.query).is_ok());
     device.destroy();
     for _ in 0..2 {
@@ -816,7 +820,8 @@ fn frames_can_be_awaited() {
     let mut context = std::task::Context::from_waker(std::task::Waker::noop());
     let mut n_pending = 0;
     let answer = {
-        let mut frame = std::pin::pin!(detector.detect_async(&case.scene, &case.query));
+        let mut device = detector.gpu().expect("a device");
+        let mut frame = std::pin::pin!(device.detect_async(&case.scene, &case.query));
         loop {
             match frame.as_mut().poll(&mut context) {
                 std::task::Poll::Ready(pairs) => break rows(&pairs.unwrap()),

@@ -31,7 +31,7 @@ impl Caller {
 
     fn detector(&self, settings: Settings) -> Detector {
         let (device, queue) = (self.device.clone(), self.queue.clone());
-        Detector::with_device(device, queue, settings).expect("settings")
+        Detector::new(settings.on_device(device, queue)).expect("settings")
     }
 
     fn encoder(&self) -> wgpu::CommandEncoder {

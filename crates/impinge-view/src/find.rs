@@ -101,13 +101,13 @@ impl Finder {
                     .method(question.method)
                     .max_pairs(Some(MAX_PAIRS))
                     .backend(impinge::Backend::Cpu);
-                match (question.backend, device) {
+                let settings = match (question.backend, device) {
                     (Backend::Gpu, Some((device, queue))) => {
-                        Detector::with_device(device.clone(), queue.clone(), settings)
+                        settings.on_device(device.clone(), queue.clone())
                     }
-                    _ => Detector::new(settings),
-                }
-                .map_err(|error| error.to_string())?
+                    _ => settings,
+                };
+                Detector::new(settings).map_err(|error| error.to_string())?
             }
         };
         Ok(&mut self.detector.insert((key, detector)).1)

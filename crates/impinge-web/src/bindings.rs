@@ -338,6 +338,7 @@ impl DetectorHandle {
         let query = crate::ask::query(&scene.0, &words, numbers).map_err(thrown)?;
         let device = self.device.as_mut().ok_or_else(|| thrown(Error::Foreign))?;
         device.set_control(control(watcher));
+        let mut device = device.gpu().ok_or_else(|| thrown(Error::Foreign))?;
         let pairs = device.detect_async(&scene.0.scene, &query).await;
         let pairs = pairs.map_err(thrown)?;
         Ok(lists(&crate::answer::of_pairs(&pairs, &scene.0)))

@@ -100,7 +100,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let moving = ball.add_to(&mut scene)?;
     let resting = ball.add_to(&mut scene)?;
     let query = Query::between(moving, resting);
-    let mut detector = Detector::with_device(device.clone(), queue.clone(), Settings::default())?;
+    let mut detector = Detector::new(Settings::new().on_device(device.clone(), queue.clone()))?;
     let mut gpu = detector.gpu().expect("it has one");
 
     let words: Vec<u8> = ball

@@ -137,7 +137,7 @@ mod read;
 #[cfg(feature = "io")]
 pub use read::read;
 
-/// The GPU interface of [`Detector::with_device`] and [`Gpu`].
+/// The GPU interface of [`Settings::on_device`] and [`Gpu`].
 #[cfg(feature = "gpu")]
 pub use impinge_core::wgpu;
 pub use impinge_core::{

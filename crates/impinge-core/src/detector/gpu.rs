@@ -24,7 +24,10 @@ pub(super) fn open(
     settings: &Settings,
     clusterings: &Clusterings,
 ) -> Result<Option<Engine>, Error> {
-    let gpu = wanted(settings).map(GpuContext::open).transpose();
+    let gpu = match of_caller(settings) {
+        Some(gpu) => gpu.map(Some),
+        None => wanted(settings).map(GpuContext::open).transpose(),
+    };
     engine_of(gpu, settings, clusterings)
 }
 
@@ -33,11 +36,19 @@ pub(super) async fn open_async(
     settings: &Settings,
     clusterings: &Clusterings,
 ) -> Result<Option<Engine>, Error> {
-    let gpu = match wanted(settings) {
-        Some(wanted) => GpuContext::open_async(wanted).await.map(Some),
-        None => Ok(None),
+    let gpu = match (of_caller(settings), wanted(settings)) {
+        (Some(gpu), _) => gpu.map(Some),
+        (None, Some(wanted)) => GpuContext::open_async(wanted).await.map(Some),
+        (None, None) => Ok(None),
     };
     engine_of(gpu, settings, clusterings)
+}
+
+/// The caller's device, if the settings have one.
+fn of_caller(settings: &Settings) -> Option<Result<Arc<GpuContext>, Error>> {
+    let (device, queue) = settings.on_device.clone()?;
+    let is_used = settings.backend != Backend::Cpu;
+    is_used.then(|| GpuContext::of_caller(device, queue).map(Arc::new))
 }
 
 fn wanted(settings: &Settings) -> Option<WantedAdapter<'_>> {
@@ -214,29 +225,11 @@ impl Detector {
         self.gpu.as_ref().map_or(0, Engine::bytes_of_world)
     }
 
-    /// A detector on the caller's device, which must allow 8 storage buffers per stage and
-    /// workgroups of 256 (WebGPU's defaults do). `settings.backend` and `settings.device` are
-    /// ignored.
-    ///
-    /// Such a detector answers like any other, and also through [`gpu`](Detector::gpu), where
-    /// positions and pairs stay on the device. This constructor waits for nothing, so it works in a
-    /// browser too. Kernels are compiled when the first frame needs them.
+    /// [`new`](Detector::new) on the caller's device, with one line of one kernel replaced. For
+    /// tests: answers may be wrong.
     ///
     /// # Errors
-    /// A setting out of its range; a device that allows too little.
-    pub fn with_device(
-        device: wgpu::Device,
-        queue: wgpu::Queue,
-        settings: Settings,
-    ) -> Result<Self, Error> {
-        Detector::on(GpuContext::of_caller(device, queue)?, settings)
-    }
-
-    /// [`with_device`](Detector::with_device), with one line of one kernel replaced. For tests:
-    /// answers may be wrong.
-    ///
-    /// # Errors
-    /// As `with_device`; a kernel without this line.
+    /// As `new`; a kernel without this line.
     #[doc(hidden)]
     pub fn with_damage(
         device: wgpu::Device,
@@ -255,10 +248,6 @@ impl Detector {
             let what = format!("kernel {kernel} has no line \"{line}\"");
             return Err(Error::Gpu { what });
         }
-        Detector::on(gpu, settings)
-    }
-
-    fn on(gpu: GpuContext, settings: Settings) -> Result<Self, Error> {
         let settings = Settings {
             backend: Backend::Gpu,
             device: None,

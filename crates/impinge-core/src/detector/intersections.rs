@@ -91,20 +91,6 @@ impl Detector {
         });
     }
 
-    /// [`detect`](Detector::detect) without blocking. On a GPU the future waits for the device,
-    /// which must be polled meanwhile (a browser does that; natively call `wgpu::Device::poll`). On
-    /// the CPU it is ready at once.
-    ///
-    /// # Errors
-    /// As `detect`.
-    pub async fn detect_async(&mut self, scene: &Scene, query: &Query) -> Result<Pairs, Error> {
-        let plan = Plan::intersections(scene, query, Goal::All, self.settings.limits())?;
-        let control = &self.control.clone();
-        let mut pairs = self.homes.pairs.take();
-        self.answer(scene, &plan, control, &mut pairs).await?;
-        Ok(pairs)
-    }
-
     /// Whether any of many bodies meet, on the CPU, if that is soon known.
     fn any_soon(
         &mut self,
@@ -173,7 +159,7 @@ impl Detector {
 
     /// One frame. With `Backend::Auto`, the CPU takes over for good if the GPU fails or cannot hold
     /// the scene.
-    async fn answer(
+    pub(super) async fn answer(
         &mut self,
         scene: &Scene,
         plan: &Plan,

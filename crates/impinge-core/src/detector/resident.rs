@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::Detector;
+use crate::answers::pairs::Pairs;
 use crate::gpu::{ResidentPairs, ResidentStep};
 use crate::plan::Plan;
 use crate::query::Query;
@@ -32,6 +33,20 @@ impl Detector {
 }
 
 impl Gpu<'_> {
+    /// [`detect`](Detector::detect) without blocking: the future waits for the device, which must
+    /// be polled meanwhile (a browser does that; natively call `wgpu::Device::poll`).
+    ///
+    /// # Errors
+    /// As `detect`.
+    pub async fn detect_async(&mut self, scene: &Scene, query: &Query) -> Result<Pairs, Error> {
+        let detector = &mut *self.detector;
+        let plan = Plan::intersections(scene, query, Goal::All, detector.settings.limits())?;
+        let control = &detector.control.clone();
+        let mut pairs = detector.homes.pairs.take();
+        detector.answer(scene, &plan, control, &mut pairs).await?;
+        Ok(pairs)
+    }
+
     /// Encodes a whole frame into the caller's encoder: positions come from buffers on the device
     /// and pairs stay there. Nothing is read back.
     ///

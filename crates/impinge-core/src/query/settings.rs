@@ -154,6 +154,10 @@ pub struct Settings {
     pub recluster: Recluster,
     /// GPU: part of an adapter's name, to choose among several.
     pub device: Option<String>,
+    /// GPU: the caller's device.
+    #[cfg(feature = "gpu")]
+    #[cfg_attr(feature = "serde", serde(skip))]
+    pub(crate) on_device: Option<(wgpu::Device, wgpu::Queue)>,
     /// Not for users: the thresholds of the CPU backend.
     #[doc(hidden)]
     #[cfg_attr(feature = "serde", serde(skip))]
@@ -174,6 +178,8 @@ impl Default for Settings {
             max_pairs: None,
             recluster: Recluster::default(),
             device: None,
+            #[cfg(feature = "gpu")]
+            on_device: None,
             tuning: Tuning::default(),
         }
     }
@@ -249,6 +255,21 @@ impl Settings {
     /// GPU: part of an adapter's name, to choose among several.
     pub fn device(mut self, device: impl Into<Option<String>>) -> Self {
         self.device = device.into();
+        self
+    }
+
+    /// Work on the caller's device, which must allow 8 storage buffers per stage and workgroups of
+    /// 256 (WebGPU's defaults do).
+    ///
+    /// Such a detector answers like any other, and also through
+    /// [`gpu`](crate::Detector::gpu), where positions and pairs stay on the device. To make it
+    /// waits for nothing, so that works in a browser too. Kernels are compiled when the first frame
+    /// needs them.
+    #[cfg(feature = "gpu")]
+    pub fn on_device(mut self, device: wgpu::Device, queue: wgpu::Queue) -> Self {
+        self.backend = Backend::Gpu;
+        self.device = None;
+        self.on_device = Some((device, queue));
         self
     }
 
