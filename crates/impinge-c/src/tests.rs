@@ -92,7 +92,6 @@ fn layout_in_rust() -> BTreeMap<String, usize> {
         EXCLUDE_VERTICES,
         NO_FEATURE,
         NO_ELEMENT,
-        ON_SURFACE,
         LOG_ERROR,
         LOG_INFO,
         COLUMN_KIND,
