@@ -220,7 +220,7 @@ def test_surfaces_wind_around_points(dtype):
     assert impinge.winding_numbers(corners, faces, np.empty((0, 3))).shape == (0,)
     with pytest.raises(ValueError, match="closed"):
         impinge.winding_numbers(corners, faces[1:], points)
-    solid = scene.add([[0, 0, 0], [4, 0, 0], [0, 4, 0], [0, 0, 4]], [[0, 1, 2, 3]])
+    solid = scene.add([[0, 0, 0], [4, 0, 0], [0, 4, 0], [0, 0, 4]], [[0, 1, 2, 3]], kind="tetrahedra")
     with pytest.raises(ValueError, match="triangles"):
         detector.winding_numbers(scene, solid, points)
 

@@ -831,7 +831,7 @@ class Detector(DetectorBase):
         >>> detector = impinge.Detector("cpu")
         >>> detector.winding_numbers(scene, body, [[1, 1, 1], [3, 3, 3], [-2, 0, 0]]).tolist()
         [2, 1, 0]
-        >>> detector.winding_numbers(scene, body, [[0, 1, 1]])[0] == impinge.ON_SURFACE
+        >>> detector.winding_numbers(scene, body, [[0, 1, 1]]).tolist() == [impinge.ON_SURFACE]
         True
         """
         return self._winding_numbers(scene, body, points, control)

@@ -200,6 +200,9 @@ class DetectorBase:
     def _locate(
         self, scene: SceneBase, body: Any, points: Any, keywords: _Options
     ) -> npt.NDArray[np.int64]: ...
+    def _winding_numbers(
+        self, scene: SceneBase, body: Any, points: Any, keywords: _Options
+    ) -> npt.NDArray[np.int32]: ...
     def _closest(
         self, scene: SceneBase, points: Any, most: Any, keywords: _Options
     ) -> Closest: ...
