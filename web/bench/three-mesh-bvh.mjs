@@ -1,4 +1,4 @@
-// impinge beside three-mesh-bvh, in Node, on the same frames: node three-mesh-bvh.mjs PACKAGE [--record FOLDER]
+// impinge beside three-mesh-bvh, in Node, on the same frames: node three-mesh-bvh.mjs PACKAGE [--record FOLDER | --check]
 //
 // Two deforming balls. Before each frame all vertices are rewritten, off the clock, into the arrays of the three.js
 // geometries. The clock then runs until the pairs are in an array: impinge copies the positions and answers,
@@ -9,7 +9,8 @@
 // bounds. Every frame is the first pose or its mirror image (x to -x, which rounds nothing), so the number of pairs is known.
 //
 // Then 10,000 points and as many rays in each frame, of one ball: the nearest face of each, and the first hit. Both write numbers
-// into arrays: distances, and parameters of hits. All of these are compared, to single precision.
+// into arrays: distances, and parameters of hits. All of these are compared, to single precision. `--check` only shows, with small
+// balls, that all of this runs.
 
 import assert from "node:assert/strict";
 import { mkdir, readFile, writeFile } from "node:fs/promises";
@@ -137,8 +138,9 @@ function race(contestants, bodies, rounds) {
   return times.map(median);
 }
 
+const isCheck = option === "--check";
 const results = [];
-for (const n of [1_000, 15_000, 70_000]) {
+for (const n of isCheck ? [200] : [1_000, 15_000, 70_000]) {
   const bodies = [body(n, [0, 0, 0]), body(n, [0.5, 0.25, 0.125])];
   const ours = impinge(bodies);
   pose(ours, bodies, 0);
@@ -160,7 +162,7 @@ for (const n of [1_000, 15_000, 70_000]) {
     if (best === null || ms < best.ms) best = { peer, ms };
   }
   const { peer } = best;
-  const [mine, theirs] = race([ours, peer], bodies, 10);
+  const [mine, theirs] = race([ours, peer], bodies, isCheck ? 1 : 10);
   results.push({
     triangles: n,
     pairs: exact.size,
@@ -215,7 +217,7 @@ function probed(ours, peer, { points, directions }) {
 }
 
 const probeResults = [];
-for (const n of [15_000, 70_000]) {
+for (const n of isCheck ? [200] : [15_000, 70_000]) {
   const bodies = [body(n, [0, 0, 0])];
   const contestants = [0, 1].map(() => ({ geometries: bodies.map(({ geometry }) => geometry()) }));
   const [ours, peer] = contestants;
@@ -225,10 +227,10 @@ for (const n of [15_000, 70_000]) {
   ours.refit = () => scene.setPositions(ours.tools[2], attributes.position.array);
   peer.tree = new MeshBVH(peer.geometries[0], { strategy: SAH });
   peer.refit = () => peer.tree.refit();
-  for (const [question, asks] of Object.entries(probed(ours, peer, probes(10_000, 7)))) {
+  for (const [question, asks] of Object.entries(probed(ours, peer, probes(isCheck ? 100 : 10_000, 7)))) {
     const times = [[], []];
     let differ = 0;
-    for (let frame = 0; frame < 40; frame += 1) {
+    for (let frame = 0; frame < (isCheck ? 2 : 40); frame += 1) {
       const answers = contestants.map((contestant, which) => {
         pose(contestant, bodies, frame % 2);
         const start = performance.now();

@@ -21,7 +21,7 @@ function closedGrid(n, m, point) {
 }
 
 // A sphere of about n triangles: rings between two poles.
-function ball(n, radius) {
+export function ball(n, radius) {
   const rings = Math.max(3, Math.round(Math.sqrt(n / 4)));
   const around = 2 * rings;
   const positions = [0, 0, radius];
