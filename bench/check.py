@@ -48,7 +48,7 @@ import check_tables
 import check_truth
 from check_compare import check_ours, collect, compare
 from check_peers import PEERS, Child
-from records import ROOT, machine, record_folder
+from records import ROOT, machine, write_record
 
 
 class Ours:
@@ -242,9 +242,7 @@ def run(arguments, data, folder, scratch):
             "versions": {"impinge": ours.version} | {peer.label: peer.installed() for peer in present},
             "wrong": wrong,
         }
-        target = record_folder(arguments.machine, today)
-        (target / "check.md").write_text(text + "\n", encoding="utf-8")
-        (target / "check.json").write_text(json.dumps(record, indent=1) + "\n")
+        target = write_record(arguments.machine, today, "check", text, record)
         print(f"recorded in {target.relative_to(ROOT)}; now bench/check_page.py", file=sys.stderr)
     return 1 if wrong else 0
 

@@ -36,7 +36,7 @@ except ModuleNotFoundError as missing:
     sys.exit(f"{missing}: pip install . (in the root of the checkout) installs impinge and NumPy")
 
 from meshes import read_ply
-from records import ROOT, machine, record_folder
+from records import ROOT, machine, write_record
 
 #: The twist of the last frame, in radians per unit length.
 TWIST = 1.5
@@ -288,12 +288,8 @@ def main():
     )
     print(text)
     if arguments.record:
-        folder = record_folder(arguments.machine, today)
-        (folder / "compare.md").write_text(text + "\n", encoding="utf-8")
         head = {"machine": arguments.machine, "date": today, "python": platform.python_version()}
-        (folder / "compare.json").write_text(
-            json.dumps({**head, "scenes": record}, indent=1) + "\n"
-        )
+        folder = write_record(arguments.machine, today, "compare", text, {**head, "scenes": record})
         print(f"recorded in {folder.relative_to(ROOT)}", file=sys.stderr)
     return 1 if failed else 0
 

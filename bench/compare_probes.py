@@ -20,7 +20,6 @@ relative 1e-5. What differs is counted, not decided: `crates/impinge-core/tests/
 import argparse
 import datetime
 import importlib.metadata
-import json
 import os
 import pathlib
 import statistics
@@ -31,7 +30,7 @@ import numpy as np
 
 import impinge
 from near import mirrored, read_scan
-from records import ROOT, machine, record_folder
+from records import ROOT, machine, write_record
 
 N_POINTS, N_RAYS, SIDE = 200_000, 200_000, 448
 #: Points of peers that take long.
@@ -284,9 +283,7 @@ def main():
     for error in sorted(missing):
         print(f"missing: {error}", file=sys.stderr)
     if arguments.record:
-        target = record_folder(arguments.machine, today)
-        (target / "probes.md").write_text(text + "\n", encoding="utf-8")
-        (target / "probes.json").write_text(json.dumps(record, indent=1) + "\n")
+        write_record(arguments.machine, today, "probes", text, record)
 
 
 if __name__ == "__main__":

@@ -19,12 +19,11 @@ equal, take another number of iterations, or come to positions more than 1e-10 a
 import argparse
 import datetime
 import importlib.metadata
-import json
 import sys
 import time
 
 import numpy as np
-from records import ROOT, machine, record_folder
+from records import ROOT, machine, write_record
 
 sys.path.insert(0, str(ROOT / "examples" / "ipc"))
 
@@ -154,9 +153,7 @@ def main():
     text = worded(record, arguments.note)
     print(text)
     if arguments.record:
-        target = record_folder(arguments.machine, today)
-        (target / "ipc_frames.md").write_text(text + "\n", encoding="utf-8")
-        (target / "ipc_frames.json").write_text(json.dumps(record, indent=1) + "\n")
+        write_record(arguments.machine, today, "ipc_frames", text, record)
 
 
 if __name__ == "__main__":

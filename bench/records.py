@@ -1,5 +1,6 @@
 """Where the benches in Python keep their records: a folder per machine and date."""
 
+import json
 import os
 import pathlib
 import platform
@@ -19,9 +20,11 @@ def machine():
     return f"{model}, {os.cpu_count()} threads, {platform.system()}"
 
 
-def record_folder(machine, date):
-    """The folder of a machine's records of one date; created if it is absent."""
+def write_record(machine, date, name, text, record):
+    """Writes a record as text and as JSON. Returns the folder of the machine's records of that date, which is created if it is absent."""
     slug = re.sub(r"[^a-z0-9]+", "-", machine.lower()).strip("-")
     folder = ROOT / "bench" / "record" / f"{slug}-{date}"
     folder.mkdir(parents=True, exist_ok=True)
+    (folder / f"{name}.md").write_text(text + "\n", encoding="utf-8")
+    (folder / f"{name}.json").write_text(json.dumps(record, indent=1) + "\n")
     return folder

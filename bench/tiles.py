@@ -17,7 +17,7 @@ import time
 
 import numpy as np
 from meshes import read_ply
-from records import ROOT, machine, record_folder
+from records import ROOT, machine, write_record
 
 
 def generated():
@@ -202,10 +202,8 @@ def main():
     )
     print(text)
     if arguments.record:
-        folder = record_folder(arguments.machine, today)
-        (folder / "tiles.md").write_text(text + "\n", encoding="utf-8")
         head = {"machine": arguments.machine, "date": today, "of": mesh, "cap": arguments.cap}
-        (folder / "tiles.json").write_text(json.dumps({**head, "scenes": scenes}, indent=1) + "\n")
+        write_record(arguments.machine, today, "tiles", text, {**head, "scenes": scenes})
 
 
 if __name__ == "__main__":

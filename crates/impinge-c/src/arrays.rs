@@ -142,12 +142,20 @@ pub enum Floats<'a, const N: usize> {
     F64(Cow<'a, [[f64; N]]>),
 }
 
+/// Runs the same code for both precisions: `with_rows!(floats, |rows| …)`.
+macro_rules! with_rows {
+    ($floats:expr, |$rows:ident| $body:expr) => {
+        match $floats {
+            $crate::arrays::Floats::F32($rows) => $body,
+            $crate::arrays::Floats::F64($rows) => $body,
+        }
+    };
+}
+pub(crate) use with_rows;
+
 impl<const N: usize> Floats<'_, N> {
     pub fn len(&self) -> usize {
-        match self {
-            Floats::F32(rows) => rows.len(),
-            Floats::F64(rows) => rows.len(),
-        }
+        with_rows!(self, |rows| rows.len())
     }
 
     /// One row in double precision.

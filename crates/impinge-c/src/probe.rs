@@ -3,10 +3,10 @@
 
 use std::mem::offset_of;
 
-use impinge::{Closest, ClosestElement, Detector, Error, Hit, Hits, Query, Scene, Stats};
+use impinge::{BodyId, Closest, ClosestElement, Detector, Error, Hit, Hits, Scene, Stats};
 
 use crate::answers::{Answer, answer, asked_for, code};
-use crate::arrays::{self, Floats, collect};
+use crate::arrays::{self, Floats, collect, with_rows};
 use crate::detector::impinge_detector;
 use crate::questions::{question, value};
 use crate::scene::impinge_scene;
@@ -176,36 +176,32 @@ pub unsafe extern "C" fn impinge_hits_n_rays(hits: *const impinge_hits) -> usize
     unsafe { hits.as_ref() }.map_or(0, |of| of.hits.len())
 }
 
-fn find_closest(
-    detector: &mut Detector,
-    scene: &Scene,
-    points: &Floats<'_, 3>,
-    most: f64,
-    query: &Query,
-) -> Result<Closest, Error> {
-    match points {
-        Floats::F32(points) => detector.closest(scene, points, most, query),
-        Floats::F64(points) => detector.closest(scene, points, most, query),
-    }
-}
-
-/// Writes a number per point.
+/// Asks about points and a body, and writes a number per point.
 ///
 /// # Safety
-/// `to` is NULL or has room for the values.
-unsafe fn put_each<T>(
-    to: *mut T,
-    what: &str,
-    values: impl ExactSizeIterator<Item = T>,
-) -> Result<(), Failure> {
-    if to.is_null() && values.len() > 0 {
-        return Err(Failure::null(what));
+/// As `impinge.h` says; `to` is NULL or has room for a number per point.
+unsafe fn per_point<A, T>(
+    (detector, scene): (*mut impinge_detector, *const impinge_scene),
+    (body, points): (u32, &impinge_array),
+    (to, what): (*mut T, &str),
+    ask: impl FnOnce(&mut Detector, &Scene, BodyId, &Floats<'_, 3>) -> Result<Vec<A>, Error>,
+    written: impl Fn(A) -> T,
+) -> Status {
+    // SAFETY: the caller's promise.
+    unsafe {
+        value((detector, scene, std::ptr::null()), |of| {
+            let body = of.scene.id(body)?;
+            let points = arrays::floats::<3>(points, "points")?;
+            let found = ask(of.detector, &of.scene.scene, body, &points)?;
+            if to.is_null() && !found.is_empty() {
+                return Err(Failure::null(what));
+            }
+            for (ix, one) in found.into_iter().enumerate() {
+                to.add(ix).write(written(one));
+            }
+            Ok(())
+        })
     }
-    for (ix, value) in values.enumerate() {
-        // SAFETY: the caller's promise.
-        unsafe { to.add(ix).write(value) };
-    }
-    Ok(())
 }
 
 #[unsafe(no_mangle)]
@@ -216,18 +212,18 @@ pub unsafe extern "C" fn impinge_contains(
     points: impinge_array,
     places: *mut i8,
 ) -> Status {
+    let ask = |detector: &mut Detector, scene: &Scene, body, points: &Floats<'_, 3>| {
+        with_rows!(points, |points| detector.contains(scene, body, points))
+    };
     // SAFETY: `impinge.h` says what pointers are, here and in all functions below.
     unsafe {
-        value((detector, scene, std::ptr::null()), |of| {
-            let body = of.scene.id(body)?;
-            let points = arrays::floats::<3>(&points, "points")?;
-            let scene = &of.scene.scene;
-            let found = match &points {
-                Floats::F32(points) => of.detector.contains(scene, body, points)?,
-                Floats::F64(points) => of.detector.contains(scene, body, points)?,
-            };
-            put_each(places, "places", found.into_iter())
-        })
+        per_point(
+            (detector, scene),
+            (body, &points),
+            (places, "places"),
+            ask,
+            |place| place,
+        )
     }
 }
 
@@ -239,18 +235,19 @@ pub unsafe extern "C" fn impinge_signed_distance(
     points: impinge_array,
     distances: *mut f64,
 ) -> Status {
+    let ask = |detector: &mut Detector, scene: &Scene, body, points: &Floats<'_, 3>| {
+        with_rows!(points, |points| detector
+            .signed_distance(scene, body, points))
+    };
     // SAFETY: see `impinge_contains`.
     unsafe {
-        value((detector, scene, std::ptr::null()), |of| {
-            let body = of.scene.id(body)?;
-            let points = arrays::floats::<3>(&points, "points")?;
-            let scene = &of.scene.scene;
-            let signed = match &points {
-                Floats::F32(points) => of.detector.signed_distance(scene, body, points)?,
-                Floats::F64(points) => of.detector.signed_distance(scene, body, points)?,
-            };
-            put_each(distances, "distances", signed.into_iter())
-        })
+        per_point(
+            (detector, scene),
+            (body, &points),
+            (distances, "distances"),
+            ask,
+            |distance| distance,
+        )
     }
 }
 
@@ -262,19 +259,19 @@ pub unsafe extern "C" fn impinge_winding_numbers(
     points: impinge_array,
     windings: *mut i32,
 ) -> Status {
+    let ask = |detector: &mut Detector, scene: &Scene, body, points: &Floats<'_, 3>| {
+        with_rows!(points, |points| detector
+            .winding_numbers(scene, body, points))
+    };
     // SAFETY: see `impinge_contains`.
     unsafe {
-        value((detector, scene, std::ptr::null()), |of| {
-            let body = of.scene.id(body)?;
-            let points = arrays::floats::<3>(&points, "points")?;
-            let scene = &of.scene.scene;
-            let found = match &points {
-                Floats::F32(points) => of.detector.winding_numbers(scene, body, points)?,
-                Floats::F64(points) => of.detector.winding_numbers(scene, body, points)?,
-            };
-            let numbers = found.into_iter().map(|of| of.unwrap_or(ON_SURFACE));
-            put_each(windings, "windings", numbers)
-        })
+        per_point(
+            (detector, scene),
+            (body, &points),
+            (windings, "windings"),
+            ask,
+            |winding| winding.unwrap_or(ON_SURFACE),
+        )
     }
 }
 
@@ -286,19 +283,18 @@ pub unsafe extern "C" fn impinge_locate(
     points: impinge_array,
     tetrahedra: *mut u32,
 ) -> Status {
+    let ask = |detector: &mut Detector, scene: &Scene, body, points: &Floats<'_, 3>| {
+        with_rows!(points, |points| detector.locate(scene, body, points))
+    };
     // SAFETY: see `impinge_contains`.
     unsafe {
-        value((detector, scene, std::ptr::null()), |of| {
-            let body = of.scene.id(body)?;
-            let points = arrays::floats::<3>(&points, "points")?;
-            let scene = &of.scene.scene;
-            let found = match &points {
-                Floats::F32(points) => of.detector.locate(scene, body, points)?,
-                Floats::F64(points) => of.detector.locate(scene, body, points)?,
-            };
-            let numbers = found.into_iter().map(|of| of.unwrap_or(NO_ELEMENT));
-            put_each(tetrahedra, "tetrahedra", numbers)
-        })
+        per_point(
+            (detector, scene),
+            (body, &points),
+            (tetrahedra, "tetrahedra"),
+            ask,
+            |tetrahedron| tetrahedron.unwrap_or(NO_ELEMENT),
+        )
     }
 }
 
@@ -316,7 +312,10 @@ pub unsafe extern "C" fn impinge_find_closest(
         question((detector, scene, query), (closest, "closest"), |of| {
             let query = of.asked.query()?;
             let points = arrays::floats::<3>(&points, "points")?;
-            let found = find_closest(of.detector, &of.scene.scene, &points, most, &query)?;
+            let scene = &of.scene.scene;
+            let found = with_rows!(&points, |points| of
+                .detector
+                .closest(scene, points, most, &query)?);
             Ok(impinge_closest {
                 rows: collect(found.iter().map(closest_row), "rows")?,
                 closest: found,

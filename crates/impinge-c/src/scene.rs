@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use impinge::{Body, BodyId, Filter, Part, Positions, Scene, Thickness, Weld};
 
-use crate::arrays::{self, Floats, elements_view, no_rows, positions_view};
+use crate::arrays::{self, Floats, elements_view, no_rows, positions_view, with_rows};
 use crate::edges::EdgeNumbers;
 use crate::status::{Failure, Handle, broken, change, clear, destroy, guard, held, put};
 use crate::types::*;
@@ -235,10 +235,8 @@ pub unsafe extern "C" fn impinge_scene_set_positions(
     unsafe {
         change(scene, |scene| {
             let id = scene.id(body)?;
-            match arrays::floats::<3>(&positions, "positions")? {
-                Floats::F32(rows) => scene.scene.set_positions(id, &rows[..])?,
-                Floats::F64(rows) => scene.scene.set_positions(id, &rows[..])?,
-            }
+            let positions = arrays::floats::<3>(&positions, "positions")?;
+            with_rows!(positions, |rows| scene.scene.set_positions(id, &rows[..]))?;
             Ok(())
         })
     }
@@ -257,10 +255,10 @@ pub unsafe extern "C" fn impinge_scene_set_end_positions(
             if positions.rows == 0 {
                 return Ok(scene.scene.clear_end_positions(id)?);
             }
-            match arrays::floats::<3>(&positions, "positions")? {
-                Floats::F32(rows) => scene.scene.set_end_positions(id, &rows[..])?,
-                Floats::F64(rows) => scene.scene.set_end_positions(id, &rows[..])?,
-            }
+            let positions = arrays::floats::<3>(&positions, "positions")?;
+            with_rows!(positions, |rows| scene
+                .scene
+                .set_end_positions(id, &rows[..]))?;
             Ok(())
         })
     }

@@ -134,8 +134,8 @@ pub struct Row {
     pub result: Result<Counts, Failure>,
     /// Where the problems are: see [`Options::places`](crate::Options::places).
     pub places: Vec<Place>,
-    /// Which problems each primitive has: see [`Options::marks`](crate::Options::marks). Not part of
-    /// the [object](Self::to_json).
+    /// Which problems each primitive has: see [`Options::marks`](crate::Options::marks). Not part
+    /// of the [object](Self::to_json).
     pub marks: Option<MarkRuns>,
 }
 

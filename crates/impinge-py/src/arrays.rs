@@ -76,6 +76,17 @@ pub enum Rows<'a> {
     F64(&'a [[f64; 3]]),
 }
 
+/// Runs the same code for both precisions: `with_rows!(rows, |rows| …)`.
+macro_rules! with_rows {
+    ($given:expr, |$rows:ident| $body:expr) => {
+        match $given {
+            $crate::arrays::Rows::F32($rows) => $body,
+            $crate::arrays::Rows::F64($rows) => $body,
+        }
+    };
+}
+pub(crate) use with_rows;
+
 impl<'a> Rows<'a> {
     /// The same as doubles, which loses nothing.
     pub fn widened(self) -> Cow<'a, [[f64; 3]]> {

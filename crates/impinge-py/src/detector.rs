@@ -10,7 +10,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::answers::{Advance, Candidates, Impacts, Pairs, Row, Truncation, collect, impact};
-use crate::arrays::{PositionArray, Rows};
+use crate::arrays::{PositionArray, Rows, with_rows};
 use crate::bodies::Body;
 use crate::closest::Closest;
 use crate::contact::{Contacts, Penetration};
@@ -300,9 +300,8 @@ impl DetectorBase {
             slf,
             (scene, body, points),
             keywords,
-            |detector, scene, body, points| match points {
-                Rows::F32(points) => detector.contains(scene, body, points),
-                Rows::F64(points) => detector.contains(scene, body, points),
+            |detector, scene, body, points| {
+                with_rows!(points, |points| detector.contains(scene, body, points))
             },
         )?;
         Ok(PyArray1::from_vec(slf.py(), places))
@@ -319,9 +318,9 @@ impl DetectorBase {
             slf,
             (scene, body, points),
             keywords,
-            |detector, scene, body, points| match points {
-                Rows::F32(points) => detector.signed_distance(scene, body, points),
-                Rows::F64(points) => detector.signed_distance(scene, body, points),
+            |detector, scene, body, points| {
+                with_rows!(points, |points| detector
+                    .signed_distance(scene, body, points))
             },
         )?;
         Ok(PyArray1::from_vec(slf.py(), distances))
@@ -338,9 +337,9 @@ impl DetectorBase {
             slf,
             (scene, body, points),
             keywords,
-            |detector, scene, body, points| match points {
-                Rows::F32(points) => detector.winding_numbers(scene, body, points),
-                Rows::F64(points) => detector.winding_numbers(scene, body, points),
+            |detector, scene, body, points| {
+                with_rows!(points, |points| detector
+                    .winding_numbers(scene, body, points))
             },
         )?;
         let numbers = found.iter().map(|winding| winding.unwrap_or(i32::MIN));
@@ -358,9 +357,8 @@ impl DetectorBase {
             slf,
             (scene, body, points),
             keywords,
-            |detector, scene, body, points| match points {
-                Rows::F32(points) => detector.locate(scene, body, points),
-                Rows::F64(points) => detector.locate(scene, body, points),
+            |detector, scene, body, points| {
+                with_rows!(points, |points| detector.locate(scene, body, points))
             },
         )?;
         let numbers = found.iter().map(|found| found.map_or(-1, i64::from));
@@ -378,9 +376,9 @@ impl DetectorBase {
         let points = points.rows()?;
         let most = number(most, "most")?;
         let options = Options::new(keywords)?;
-        let asked = ask(slf, scene, options, |detector, scene, query| match points {
-            Rows::F32(points) => detector.closest(scene, points, most, query),
-            Rows::F64(points) => detector.closest(scene, points, most, query),
+        let asked = ask(slf, scene, options, |detector, scene, query| {
+            with_rows!(points, |points| detector
+                .closest(scene, points, most, query))
         })?;
         Ok(Closest {
             inner: asked.answer,

@@ -203,7 +203,8 @@ pub(crate) fn of_pairs(pairs: &Pairs, world: &World) -> Answer {
 impl Asker {
     /// Asks. For questions with a query, `words` and `numbers` are those of [`query`].
     /// [`Question::Distance`]: two bodies; [`Question::Contains`], [`Question::Locate`],
-    /// [`Question::SignedDistance`] and [`Question::WindingNumbers`]: one. Points, or origins and then directions, come after these numbers.
+    /// [`Question::SignedDistance`] and [`Question::WindingNumbers`]: one. Points, or origins and
+    /// then directions, come after these numbers.
     /// [`Question::Contacts`]: a number of the caller's for the answer, then rows of pairs; [`Question::Penetration`]: that number, two
     /// bodies, and the rows again; its rows are the two bodies, in the order of what is inside.
     ///

@@ -133,8 +133,8 @@ impl Answer {
 
 impl Asker {
     /// Where points lie: a byte each, -1, 0 or 1; or how far inside they are, a number each; or the
-    /// tetrahedra that contain them, a word each, -1 for none; or how often the surface winds around
-    /// them, a word each, the lowest number on the surface. `words`: the body.
+    /// tetrahedra that contain them, a word each, -1 for none; or how often the surface winds
+    /// around them, a word each, the lowest number on the surface. `words`: the body.
     pub(crate) fn about_points(
         &mut self,
         question: Question,

@@ -1,4 +1,5 @@
-//! The plots, as SVG. The font that text is measured with is embedded, so the machine needs no fonts.
+//! The plots, as SVG. The font that text is measured with is embedded, so the machine needs no
+//! fonts.
 
 mod bars;
 mod curves;

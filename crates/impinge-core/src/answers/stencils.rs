@@ -247,8 +247,8 @@ impl NearPairs {
 
     /// The same, weighted by area, so that a potential does not depend on how fine a mesh is. Areas
     /// are those of ipc-toolkit's `use_area_weighting`, at rest: of a vertex a third of each face
-    /// around it (without faces, half the length of each of its edges; without edges, 1), of an edge
-    /// a third of each face beside it (without faces, its length).
+    /// around it (without faces, half the length of each of its edges; without edges, 1), of an
+    /// edge a third of each face beside it (without faces, its length).
     ///
     /// | kind | weight |
     /// |---|---|

@@ -179,6 +179,23 @@ impl Boxes {
     }
 }
 
+/// 1 and more than the relative error of a few operations in `f32`.
+pub(super) const GROWN: f32 = 1.0 + 16.0 * f32::EPSILON;
+
+/// A node that waits to be opened: how far it is, its level and its number there.
+pub(super) type Waiting = (f32, u32, u32);
+
+/// Adds a node to those from `first` on, so that the nearest of these is popped first.
+#[inline(always)]
+pub(super) fn wait_in_order(waiting: &mut Vec<Waiting>, first: usize, node: Waiting) {
+    let mut place = waiting.len();
+    waiting.push(node);
+    while place > first && waiting[place - 1].0 < node.0 {
+        waiting.swap(place - 1, place);
+        place -= 1;
+    }
+}
+
 /// More than the length by which a point with some coordinates is moved where each is rounded to
 /// single precision.
 #[inline(always)]

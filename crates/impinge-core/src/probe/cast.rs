@@ -13,6 +13,7 @@
 
 use std::cmp::Ordering;
 
+use super::boxes::{GROWN, Waiting, wait_in_order};
 use super::{HITS, Looks, Target};
 use crate::answers::hits::RayHit;
 use crate::answers::pairs::Element;
@@ -36,8 +37,6 @@ const ROUNDING: f64 = 64.0 * f64::EPSILON;
 const ERROR: f64 = 512.0 * f64::EPSILON;
 /// Sizes of numbers of which no product of three is wrong by underflow, or overflows.
 const MODERATE: std::ops::Range<f64> = 1e-60..1e60;
-/// 1 and more than the relative error of a few operations in `f32`.
-const GROWN: f32 = 1.0 + 16.0 * f32::EPSILON;
 /// The largest coordinates of rays and boxes that are held against each other: 2^60.
 const FAR: f32 = (1u64 << 60) as f32;
 
@@ -279,8 +278,8 @@ struct RaySearch<'a> {
     /// What the ray meets later is not asked for.
     limit: f64,
     found: Vec<RayCandidate>,
-    /// When the ray comes to boxes, levels and nodes that wait.
-    waiting: Vec<(f32, u32, u32)>,
+    /// By when the ray comes to their boxes.
+    waiting: Vec<Waiting>,
 }
 
 impl RaySearch<'_> {
@@ -325,15 +324,8 @@ impl RaySearch<'_> {
             let eight = boxes.eight(level as usize, children.start);
             let (nears, mask) = slabs.reach(eight, limit);
             for lane in Lanes(mask & up_to(children.len() - 1)) {
-                let near = nears[lane];
-                // The nearest is popped first.
-                let mut place = self.waiting.len();
-                self.waiting
-                    .push((near, level, (children.start + lane) as u32));
-                while place > first && self.waiting[place - 1].0 < near {
-                    self.waiting.swap(place - 1, place);
-                    place -= 1;
-                }
+                let child = (children.start + lane) as u32;
+                wait_in_order(&mut self.waiting, first, (nears[lane], level, child));
             }
         }
         Ok(())

@@ -18,7 +18,7 @@
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
-use super::boxes::rounding_of;
+use super::boxes::{GROWN, Waiting, rounding_of, wait_in_order};
 use super::{Looks, Target, WHAT};
 use crate::answers::closest::ClosestElement;
 use crate::answers::pairs::Element;
@@ -41,8 +41,6 @@ use impinge_exact::internal::{
 
 /// More than what rounding may do to squares of distances of boxes, which are of a few operations.
 const ROUNDING: f64 = 64.0 * f64::EPSILON;
-/// 1 and more than the relative error of a few operations in `f32`.
-const GROWN: f32 = 1.0 + 16.0 * f32::EPSILON;
 
 /// Candidates that are held before those that are too far away are dropped, where several are asked
 /// for.
@@ -199,8 +197,8 @@ struct PointSearch<'a> {
     highs: BinaryHeap<u64>,
     /// How many candidates are held before those that are too far away are dropped.
     drop_at: usize,
-    /// Squared distances of boxes, levels and nodes that wait.
-    waiting: Vec<(f32, u32, u32)>,
+    /// By the squared distances of their boxes.
+    waiting: Vec<Waiting>,
 }
 
 impl<'a> PointSearch<'a> {
@@ -286,14 +284,8 @@ impl<'a> PointSearch<'a> {
             let eight = boxes.eight(below as usize, children.start);
             let (lows, mask) = rounded.squared_distances(eight, self.limit);
             for lane in Lanes(mask & up_to(children.len() - 1)) {
-                // The nearest is popped first.
-                let mut place = self.waiting.len();
                 let child = (children.start + lane) as u32;
-                self.waiting.push((lows[lane], below, child));
-                while place > first && self.waiting[place - 1].0 < lows[lane] {
-                    self.waiting.swap(place - 1, place);
-                    place -= 1;
-                }
+                wait_in_order(&mut self.waiting, first, (lows[lane], below, child));
             }
         }
         Ok(())
@@ -321,11 +313,8 @@ impl<'a> PointSearch<'a> {
         let Some(faces) = target.boxes.faces(target.body, cluster) else {
             for lane in Lanes(mask) {
                 if lows[lane] <= self.limit {
-                    self.add(
-                        bounds_of(&target, slots.start + lane, point),
-                        body,
-                        slots.start + lane,
-                    );
+                    let slot = slots.start + lane;
+                    self.add(bounds_of(&target, slot, point), body, slot);
                 }
             }
             return Ok(());
@@ -425,15 +414,9 @@ impl<'a> PointSearch<'a> {
             looks.step()?;
             let [low, high] = point_distance_bounds(point, one.corners(bodies).points());
             // Either encloses the distance.
-            if low > one.low {
-                one.low = low;
-            }
-            if high < one.high {
-                one.high = high;
-            }
-            if one.high < least {
-                least = one.high;
-            }
+            one.low = one.low.max(low);
+            one.high = one.high.min(high);
+            least = least.min(one.high);
         }
         if self.n_nearest == 1 {
             candidates.retain(|one| one.low <= least);

@@ -11,8 +11,9 @@
 //! Out: one answer per point.
 //!
 //! Cost: the trees as for distances of bodies; 24 bytes per element of the clusters that probes
-//! come to, and 36 for the corners of faces where nearest ones are sought; then per point a way down the tree. Points are shared among the workers; each point's
-//! answer depends on nothing but the point and the bodies.
+//! come to, and 36 for the corners of faces where nearest ones are sought; then per point a way
+//! down the tree. Points are shared among the workers; each point's answer depends on nothing but
+//! the point and the bodies.
 
 mod border;
 mod boxes;
@@ -140,8 +141,9 @@ impl Probes {
         work: Work<'_>,
     ) -> Result<Vec<Option<i32>>, Error> {
         check_points("points", points)?;
-        self.know_one(scene, id, BodyKind::Triangles, shared, work)?;
+        check_kind(scene, id, BodyKind::Triangles)?;
         shared.topologies.know(scene, id, work)?;
+        self.know(scene, &[(id, Part::Given)], shared, work)?;
         self.ask(inside::Around, self.target(scene, id)?, points, work)
     }
 
@@ -159,31 +161,9 @@ impl Probes {
         work: Work<'_>,
     ) -> Result<Vec<Option<u32>>, Error> {
         check_points("points", points)?;
-        self.know_one(scene, id, BodyKind::Tetrahedra, shared, work)?;
+        check_kind(scene, id, BodyKind::Tetrahedra)?;
+        self.know(scene, &[(id, Part::Given)], shared, work)?;
         self.ask(inside::Lowest, self.target(scene, id)?, points, work)
-    }
-
-    /// Learns the boxes of a body, which must be of one kind.
-    ///
-    /// # Errors
-    /// A stale id, another kind, positions that are not finite, cancellation.
-    fn know_one(
-        &mut self,
-        scene: &Scene,
-        id: BodyId,
-        kind: BodyKind,
-        shared: &mut Shared<'_>,
-        work: Work<'_>,
-    ) -> Result<(), Error> {
-        let given = scene.body(id)?.kind();
-        if given != kind {
-            return Err(Error::WrongKind {
-                body: id,
-                kind: given.name(),
-                expected: kind.name(),
-            });
-        }
-        self.know(scene, &[(id, Part::Given)], shared, work)
     }
 
     /// A body whose boxes are known.
@@ -449,6 +429,19 @@ fn check_most(most: f64, allowed: &'static str) -> Result<(), Error> {
         setting: "most",
         given: most.to_string(),
         allowed,
+    })
+}
+
+/// Refuses a body of another kind.
+fn check_kind(scene: &Scene, id: BodyId, expected: BodyKind) -> Result<(), Error> {
+    let given = scene.body(id)?.kind();
+    if given == expected {
+        return Ok(());
+    }
+    Err(Error::WrongKind {
+        body: id,
+        kind: given.name(),
+        expected: expected.name(),
     })
 }
 
