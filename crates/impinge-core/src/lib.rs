@@ -18,13 +18,11 @@ mod detector;
 #[cfg(feature = "gpu")]
 pub mod gpu;
 pub mod plan;
-mod probe;
 pub mod proximity;
 pub mod query;
 pub mod scene;
 pub mod search;
 pub mod simd;
-mod stencil;
 pub mod workers;
 
 pub use answers::advance::Advance;
@@ -38,6 +36,7 @@ pub use answers::neighbours::{Csr, Neighbours};
 pub use answers::pairs::{Element, Pairs, hash_rows};
 pub use answers::places::Place;
 pub use answers::safe::{Bounds, SafeDistances};
+pub use answers::stencil::{Gradient, Hessian, project_psd, project_psd_all};
 pub use answers::stencils::{Stencil, Stencils};
 pub use answers::truncation::Truncation;
 #[cfg(feature = "gpu")]
@@ -63,6 +62,5 @@ pub use scene::position_rows::PositionRows;
 pub use scene::positions::{NewPositions, Positions, Real};
 pub use scene::{Body, Filter, Scene, Thickness};
 pub use search::stats::{Stage, Stats};
-pub use stencil::{Gradient, Hessian, project_psd, project_psd_all};
 #[cfg(feature = "gpu")]
 pub use wgpu;

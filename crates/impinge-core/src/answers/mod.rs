@@ -14,5 +14,6 @@ pub(crate) mod numbering;
 pub(crate) mod pairs;
 pub(crate) mod places;
 pub(crate) mod safe;
+pub(crate) mod stencil;
 pub(crate) mod stencils;
 pub(crate) mod truncation;

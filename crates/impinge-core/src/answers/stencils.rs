@@ -3,13 +3,13 @@
 use crate::answers::areas::Areas;
 use crate::answers::near::{NearIter, NearPair, NearPairs};
 use crate::answers::pairs::Element;
+use crate::answers::stencil::{Gradient, Hessian, Mollifier, NearestWay};
 use crate::query::pair_kind::PairKind;
 use crate::scene::elements::Part;
 use crate::scene::error::Error;
 use crate::scene::index::ElementIx;
 use crate::scene::{Body, Scene};
 use crate::search::sink;
-use crate::stencil::{Gradient, Hessian, Mollifier, NearestWay};
 use crate::workers::in_parts::in_parts;
 use impinge_exact::{Feature, Point};
 

@@ -4,7 +4,7 @@
 use super::Detector;
 use crate::answers::closest::Closest;
 use crate::answers::hits::Hits;
-use crate::probe::{Probes, Shared};
+use crate::proximity::probe::{Probes, Shared};
 use crate::query::Query;
 use crate::scene::Scene;
 use crate::scene::error::Error;

@@ -1,4 +1,4 @@
-//! Proximity: how near two bodies are.
+//! Proximity: how near two bodies are, and where points and rays lie among them.
 
 mod axes;
 mod best_first;
@@ -7,6 +7,7 @@ mod features;
 mod many;
 mod nearest;
 mod of_two;
+pub(crate) mod probe;
 mod scale;
 mod shared;
 mod tree;
