@@ -82,7 +82,7 @@ void answers() {
     CHECK(changes.added().empty() && changes.kept().size() == second_pairs.size() && !changes.gone().empty() && !changes.empty());
     CHECK(changes.kept().size() + changes.gone().size() == pairs_of_parts.size());
     for (const auto &rows : changes.kept()) CHECK(memcmp(&pairs_of_parts[rows[0]], &second_pairs[rows[1]], sizeof(impinge::pair)) == 0);
-    CHECK(kept.changes(kept).empty() && kept.changes(kept).kept().size() == kept.size());
+    CHECK(kept.changes(kept).empty());
   }
   const auto candidates = detector.candidates(scene, 0.01, query::all().kinds({pair_kind::ee}));
   CHECK(candidates.of(pair_kind::ee).size() == candidates.size() && candidates.size() > 100);
@@ -158,7 +158,8 @@ void probes() {
   CHECK(hits.is_hit()[0] == 1 && hits.is_hit()[1] == 0);
   const auto all = detector.cast(scene, origins, down, 9, query::all().hits(impinge::hits_of_ray::all));
   CHECK(all.size() == 2 * SEGMENTS && all.starts().size() == 3 && all.of(0).size() == all.size() && all.hash() != hits.hash());
-  CHECK(detector.cast(scene, origins, down, 1, query::all().hits(impinge::hits_of_ray::any)).starts().empty());
+  const auto any = detector.cast(scene, origins, down, 1, query::all().hits(impinge::hits_of_ray::any));
+  CHECK(any.starts().empty());
   const auto nearest = detector.nearest(scene);
   CHECK(nearest && nearest->body_a == a && nearest->body_b == b && nearest->distance < 0.11);
 

@@ -24,24 +24,32 @@ public:
   explicit answer(Handle *handle) : handle_(handle) {}
   std::size_t size() const noexcept { return count_of(raw()); }
   bool empty() const noexcept { return size() == 0; }
-  const Row *data() const noexcept { return data_of(raw()); }
-  const Row *begin() const noexcept { return data(); }
-  const Row *end() const noexcept { return data() + size(); }
-  const Row &operator[](std::size_t ix) const { return data()[ix]; }
-  view<Row> rows() const noexcept { return {data(), size()}; }
+  const Row *data() const & noexcept { return data_of(raw()); }
+  const Row *begin() const & noexcept { return data(); }
+  const Row *end() const & noexcept { return data() + size(); }
+  const Row &operator[](std::size_t ix) const & { return data()[ix]; }
+  Row operator[](std::size_t ix) const && { return data_of(raw())[ix]; }
+  view<Row> rows() const & noexcept { return {data(), size()}; }
   /// IMPINGE_COLUMN_KIND and so on.
-  result<array> column(std::uint32_t column) const {
+  result<array> column(std::uint32_t column) const & {
     array view{};
     return detail::give(column_of(raw(), column, &view), std::move(view));
   }
   /// Its strings live as long as this answer.
-  impinge_stats stats() const { return detail::stats_of(of_stats, raw()); }
+  impinge_stats stats() const & { return detail::stats_of(of_stats, raw()); }
   Handle *raw() noexcept { return handle_.get(); }
   const Handle *raw() const noexcept { return handle_.get(); }
+  // A temporary ends before its views are read.
+  void data() const && = delete;
+  void begin() const && = delete;
+  void end() const && = delete;
+  void rows() const && = delete;
+  void column(std::uint32_t) const && = delete;
+  void stats() const && = delete;
 
 protected:
   /// A column of packed numbers; nothing if it was not asked for.
-  template <class T> view<T> packed(std::uint32_t column) const {
+  template <class T> view<T> packed(std::uint32_t column) const & {
     array view{};
     if (column_of(raw(), column, &view) != IMPINGE_OK) return {};
     return {static_cast<const T *>(view.data), view.rows};
@@ -82,17 +90,21 @@ public:
   changes() = default;
   explicit changes(impinge_changes *handle) : handle_(handle) {}
   /// The row in the old answer, and the row in the new one.
-  view<std::array<std::uint64_t, 2>> kept() const { return column<std::array<std::uint64_t, 2>>(IMPINGE_COLUMN_KEPT); }
+  view<std::array<std::uint64_t, 2>> kept() const & { return column<std::array<std::uint64_t, 2>>(IMPINGE_COLUMN_KEPT); }
   /// Rows of the new answer.
-  view<std::uint64_t> added() const { return column<std::uint64_t>(IMPINGE_COLUMN_NEW); }
+  view<std::uint64_t> added() const & { return column<std::uint64_t>(IMPINGE_COLUMN_NEW); }
   /// Rows of the old answer.
-  view<std::uint64_t> gone() const { return column<std::uint64_t>(IMPINGE_COLUMN_GONE); }
+  view<std::uint64_t> gone() const & { return column<std::uint64_t>(IMPINGE_COLUMN_GONE); }
   /// Whether both answers have the same pairs.
   bool empty() const { return added().empty() && gone().empty(); }
   const impinge_changes *raw() const noexcept { return handle_.get(); }
+  // A temporary ends before its views are read.
+  void kept() const && = delete;
+  void added() const && = delete;
+  void gone() const && = delete;
 
 private:
-  template <class T> view<T> column(std::uint32_t column) const {
+  template <class T> view<T> column(std::uint32_t column) const & {
     array rows{};
     if (impinge_changes_column(raw(), column, &rows) != IMPINGE_OK) return {};
     return {static_cast<const T *>(rows.data), rows.rows};
@@ -143,13 +155,15 @@ public:
   /// Whether elements intersect at the start; nothing if nobody asked.
   std::optional<bool> start_intersects() const { return detail::asked(impinge_impacts_start_intersects(raw())); }
   /// Those of one kind.
-  view<impact> of(pair_kind kind) const {
+  view<impact> of(pair_kind kind) const & {
     const auto bit = static_cast<std::uint32_t>(kind);
     auto first = begin(), last = end();
     while (first != last && first->kind < bit) ++first;
     while (last != first && (last - 1)->kind > bit) --last;
     return {first, static_cast<std::size_t>(last - first)};
   }
+  // A temporary ends before its views are read.
+  void of(pair_kind) const && = delete;
 };
 
 /// Sorted pairs whose boxes overlap.
@@ -158,8 +172,11 @@ public:
   using answer::answer;
   std::uint64_t hash() const noexcept { return impinge_candidates_hash(raw()); }
   /// The kind of each, as the number of a `pair_kind`.
-  view<std::uint8_t> kinds() const { return packed<std::uint8_t>(IMPINGE_COLUMN_KIND); }
-  view<pair> of(pair_kind kind) const { return detail::of_kind(rows(), kinds(), kind); }
+  view<std::uint8_t> kinds() const & { return packed<std::uint8_t>(IMPINGE_COLUMN_KIND); }
+  view<pair> of(pair_kind kind) const & { return detail::of_kind(rows(), kinds(), kind); }
+  // A temporary ends before its views are read.
+  void kinds() const && = delete;
+  void of(pair_kind) const && = delete;
 };
 
 /// Up to four vertices per near pair or contact, and how their squared distance depends on them. Columns are computed when first looked at.
@@ -175,25 +192,38 @@ public:
   }
   std::size_t size() const noexcept { return impinge_stencils_count(raw()); }
   bool empty() const noexcept { return size() == 0; }
-  view<std::array<std::uint32_t, 4>> vertices() const { return column<std::array<std::uint32_t, 4>>(IMPINGE_COLUMN_VERTICES); }
+  view<std::array<std::uint32_t, 4>> vertices() const & { return column<std::array<std::uint32_t, 4>>(IMPINGE_COLUMN_VERTICES); }
   /// The number of the first vertex of each body, and the number of all.
-  view<std::uint64_t> starts() const { return column<std::uint64_t>(IMPINGE_COLUMN_STARTS); }
-  view<std::uint8_t> kinds() const { return column<std::uint8_t>(IMPINGE_COLUMN_KIND); }
-  view<std::array<std::uint8_t, 2>> features() const { return column<std::array<std::uint8_t, 2>>(IMPINGE_COLUMN_FEATURES); }
-  view<double> weights() const { return column<double>(IMPINGE_COLUMN_WEIGHT); }
-  view<std::array<double, 4>> coefficients() const { return column<std::array<double, 4>>(IMPINGE_COLUMN_COEFFICIENTS); }
-  view<double> squared_distances() const { return column<double>(IMPINGE_COLUMN_SQUARED_DISTANCE); }
-  view<std::array<double, 12>> gradients() const { return column<std::array<double, 12>>(IMPINGE_COLUMN_GRADIENT); }
-  view<std::array<std::array<double, 12>, 12>> hessians() const { return column<std::array<std::array<double, 12>, 12>>(IMPINGE_COLUMN_HESSIAN); }
-  view<double> mollifiers() const { return column<double>(IMPINGE_COLUMN_MOLLIFIER); }
-  view<std::array<double, 12>> mollifier_gradients() const { return column<std::array<double, 12>>(IMPINGE_COLUMN_MOLLIFIER_GRADIENT); }
-  view<std::array<std::array<double, 12>, 12>> mollifier_hessians() const {
+  view<std::uint64_t> starts() const & { return column<std::uint64_t>(IMPINGE_COLUMN_STARTS); }
+  view<std::uint8_t> kinds() const & { return column<std::uint8_t>(IMPINGE_COLUMN_KIND); }
+  view<std::array<std::uint8_t, 2>> features() const & { return column<std::array<std::uint8_t, 2>>(IMPINGE_COLUMN_FEATURES); }
+  view<double> weights() const & { return column<double>(IMPINGE_COLUMN_WEIGHT); }
+  view<std::array<double, 4>> coefficients() const & { return column<std::array<double, 4>>(IMPINGE_COLUMN_COEFFICIENTS); }
+  view<double> squared_distances() const & { return column<double>(IMPINGE_COLUMN_SQUARED_DISTANCE); }
+  view<std::array<double, 12>> gradients() const & { return column<std::array<double, 12>>(IMPINGE_COLUMN_GRADIENT); }
+  view<std::array<std::array<double, 12>, 12>> hessians() const & { return column<std::array<std::array<double, 12>, 12>>(IMPINGE_COLUMN_HESSIAN); }
+  view<double> mollifiers() const & { return column<double>(IMPINGE_COLUMN_MOLLIFIER); }
+  view<std::array<double, 12>> mollifier_gradients() const & { return column<std::array<double, 12>>(IMPINGE_COLUMN_MOLLIFIER_GRADIENT); }
+  view<std::array<std::array<double, 12>, 12>> mollifier_hessians() const & {
     return column<std::array<std::array<double, 12>, 12>>(IMPINGE_COLUMN_MOLLIFIER_HESSIAN);
   }
   const impinge_stencils *raw() const noexcept { return handle_.get(); }
+  // A temporary ends before its views are read.
+  void vertices() const && = delete;
+  void starts() const && = delete;
+  void kinds() const && = delete;
+  void features() const && = delete;
+  void weights() const && = delete;
+  void coefficients() const && = delete;
+  void squared_distances() const && = delete;
+  void gradients() const && = delete;
+  void hessians() const && = delete;
+  void mollifiers() const && = delete;
+  void mollifier_gradients() const && = delete;
+  void mollifier_hessians() const && = delete;
 
 private:
-  template <class T> view<T> column(std::uint32_t column) const {
+  template <class T> view<T> column(std::uint32_t column) const & {
     array rows{};
     if (impinge_stencils_column(raw(), column, &rows) != IMPINGE_OK) return {};
     return {static_cast<const T *>(rows.data), rows.rows};
@@ -208,14 +238,14 @@ public:
   std::uint64_t hash() const noexcept { return impinge_near_hash(raw()); }
   /// Which pairs an older answer also has, which are new, and which are gone.
   result<impinge::changes> changes(const near_pairs &old) const { return detail::changes_of(impinge_near_changes, raw(), old.raw()); }
-  view<std::uint8_t> kinds() const { return packed<std::uint8_t>(IMPINGE_COLUMN_KIND); }
-  view<pair> of(pair_kind kind) const { return detail::of_kind(rows(), kinds(), kind); }
+  view<std::uint8_t> kinds() const & { return packed<std::uint8_t>(IMPINGE_COLUMN_KIND); }
+  view<pair> of(pair_kind kind) const & { return detail::of_kind(rows(), kinds(), kind); }
   /// The nearest features of `a` and of `b`: see IMPINGE_COLUMN_FEATURES.
-  view<std::array<std::uint8_t, 2>> features() const { return packed<std::array<std::uint8_t, 2>>(IMPINGE_COLUMN_FEATURES); }
+  view<std::array<std::uint8_t, 2>> features() const & { return packed<std::array<std::uint8_t, 2>>(IMPINGE_COLUMN_FEATURES); }
   /// With `query::distances`.
-  view<double> distances() const { return packed<double>(IMPINGE_COLUMN_DISTANCE); }
+  view<double> distances() const & { return packed<double>(IMPINGE_COLUMN_DISTANCE); }
   /// With `query::closest_points`: a point of `a`, and one of `b`.
-  view<std::array<std::array<double, 3>, 2>> closest_points() const { return packed<std::array<std::array<double, 3>, 2>>(IMPINGE_COLUMN_POINTS); }
+  view<std::array<std::array<double, 3>, 2>> closest_points() const & { return packed<std::array<std::array<double, 3>, 2>>(IMPINGE_COLUMN_POINTS); }
   /// What a potential needs to know about each pair, at the positions that the scene has now.
   result<impinge::stencils> stencils(const scene &in) const { return stencils_of(in, nullptr); }
   /// With the mollifier of nearly parallel edges, from the positions at rest of all vertices of the scene, body after body.
@@ -228,6 +258,12 @@ public:
     const array rows = detail::rows_of(rest, 3);
     return stencils_of(in, &rows, impinge_near_stencils_by_area);
   }
+  // A temporary ends before its views are read.
+  void kinds() const && = delete;
+  void of(pair_kind) const && = delete;
+  void features() const && = delete;
+  void distances() const && = delete;
+  void closest_points() const && = delete;
 
 private:
   result<impinge::stencils> stencils_of(const scene &in, const array *rest, decltype(impinge_near_stencils) *call = impinge_near_stencils) const {
@@ -243,15 +279,23 @@ public:
   using answer::answer;
   std::uint64_t hash() const noexcept { return impinge_contacts_hash(raw()); }
   /// Where they meet; corners and curves name these points by their numbers.
-  view<std::array<double, 3>> points() const { return packed<std::array<double, 3>>(IMPINGE_COLUMN_CONTACT_POINTS); }
+  view<std::array<double, 3>> points() const & { return packed<std::array<double, 3>>(IMPINGE_COLUMN_CONTACT_POINTS); }
   /// The corners of contact i are those from `starts()[i]` to `starts()[i + 1]`.
-  view<std::uint64_t> starts() const { return packed<std::uint64_t>(IMPINGE_COLUMN_STARTS); }
-  view<std::uint32_t> corners() const { return packed<std::uint32_t>(IMPINGE_COLUMN_CORNERS); }
+  view<std::uint64_t> starts() const & { return packed<std::uint64_t>(IMPINGE_COLUMN_STARTS); }
+  view<std::uint32_t> corners() const & { return packed<std::uint32_t>(IMPINGE_COLUMN_CORNERS); }
   /// The points of curve i are those from `curve_starts()[i]` to `curve_starts()[i + 1]`.
-  view<std::uint64_t> curve_starts() const { return packed<std::uint64_t>(IMPINGE_COLUMN_CURVE_STARTS); }
-  view<std::uint32_t> curve_points() const { return packed<std::uint32_t>(IMPINGE_COLUMN_CURVE_POINTS); }
-  view<std::uint8_t> curve_closed() const { return packed<std::uint8_t>(IMPINGE_COLUMN_CURVE_CLOSED); }
-  view<double> curve_lengths() const { return packed<double>(IMPINGE_COLUMN_CURVE_LENGTH); }
+  view<std::uint64_t> curve_starts() const & { return packed<std::uint64_t>(IMPINGE_COLUMN_CURVE_STARTS); }
+  view<std::uint32_t> curve_points() const & { return packed<std::uint32_t>(IMPINGE_COLUMN_CURVE_POINTS); }
+  view<std::uint8_t> curve_closed() const & { return packed<std::uint8_t>(IMPINGE_COLUMN_CURVE_CLOSED); }
+  view<double> curve_lengths() const & { return packed<double>(IMPINGE_COLUMN_CURVE_LENGTH); }
+  // A temporary ends before its views are read.
+  void points() const && = delete;
+  void starts() const && = delete;
+  void corners() const && = delete;
+  void curve_starts() const && = delete;
+  void curve_points() const && = delete;
+  void curve_closed() const && = delete;
+  void curve_lengths() const && = delete;
 };
 
 /// How deep two closed bodies are in each other: one row per region.
@@ -261,8 +305,11 @@ public:
   /// NaN if unknown.
   double volume() const noexcept { return impinge_penetration_volume(raw()); }
   /// Vertices of the first body inside the second, and of the second inside the first.
-  view<std::uint32_t> inside_a() const { return packed<std::uint32_t>(IMPINGE_COLUMN_INSIDE_A); }
-  view<std::uint32_t> inside_b() const { return packed<std::uint32_t>(IMPINGE_COLUMN_INSIDE_B); }
+  view<std::uint32_t> inside_a() const & { return packed<std::uint32_t>(IMPINGE_COLUMN_INSIDE_A); }
+  view<std::uint32_t> inside_b() const & { return packed<std::uint32_t>(IMPINGE_COLUMN_INSIDE_B); }
+  // A temporary ends before its views are read.
+  void inside_a() const && = delete;
+  void inside_b() const && = delete;
 };
 
 /// The elements nearest to points, one row per point, or `n_nearest()` of them: `found` of a row is 0 where nothing is near enough.
@@ -273,7 +320,7 @@ public:
   /// How many rows each point has: what the query said.
   std::size_t n_nearest() const noexcept { return impinge_closest_n_nearest(raw()); }
   /// What is nearest to a point, nearest first: as many elements as were asked for, or fewer if no more are near enough.
-  view<closest_element> of(std::size_t point) const {
+  view<closest_element> of(std::size_t point) const & {
     const std::size_t n = n_nearest();
     if (n == 0 || point >= size() / n) return {};
     const closest_element *first = data() + point * n;
@@ -281,6 +328,8 @@ public:
     while (n_found < n && first[n_found].found != 0) ++n_found;
     return {first, n_found};
   }
+  // A temporary ends before its views are read.
+  void of(std::size_t) const && = delete;
 };
 
 /// What rays hit, one ray after the other.
@@ -290,15 +339,19 @@ public:
   std::uint64_t hash() const noexcept { return impinge_hits_hash(raw()); }
   std::size_t n_rays() const noexcept { return impinge_hits_n_rays(raw()); }
   /// Of each ray: 1 if it hits anything.
-  view<std::uint8_t> is_hit() const { return packed<std::uint8_t>(IMPINGE_COLUMN_IS_HIT); }
+  view<std::uint8_t> is_hit() const & { return packed<std::uint8_t>(IMPINGE_COLUMN_IS_HIT); }
   /// The hits of ray i are those from `starts()[i]` to `starts()[i + 1]`; nothing if only yes or no was asked for.
-  view<std::uint64_t> starts() const { return packed<std::uint64_t>(IMPINGE_COLUMN_STARTS); }
+  view<std::uint64_t> starts() const & { return packed<std::uint64_t>(IMPINGE_COLUMN_STARTS); }
   /// What a ray hits: the first, or all.
-  view<ray_hit> of(std::size_t ray) const {
+  view<ray_hit> of(std::size_t ray) const & {
     const auto at = starts();
     if (ray + 1 >= at.size()) return {};
     return {data() + at[ray], static_cast<std::size_t>(at[ray + 1] - at[ray])};
   }
+  // A temporary ends before its views are read.
+  void is_hit() const && = delete;
+  void starts() const && = delete;
+  void of(std::size_t) const && = delete;
 };
 
 /// How far each vertex may move, on any path, so that nothing touches.
@@ -307,17 +360,21 @@ public:
   safe_distances() = default;
   explicit safe_distances(impinge_safe_distances *handle) : handle_(handle) {}
   /// Those of a body, in the precision of its positions.
-  result<array> of(body of) const {
+  result<array> of(body of) const & {
     array view{};
     return detail::give(impinge_safe_distances_of(raw(), of, &view), std::move(view));
   }
   /// The pairs at distance 0, whose vertices may not move at all.
-  view<pair> touching() const noexcept {
+  view<pair> touching() const & noexcept {
     const auto *touching = impinge_safe_distances_touching(raw());
     return {impinge_near_data(touching), impinge_near_count(touching)};
   }
-  impinge_stats stats() const { return detail::stats_of(impinge_safe_distances_stats, raw()); }
+  impinge_stats stats() const & { return detail::stats_of(impinge_safe_distances_stats, raw()); }
   const impinge_safe_distances *raw() const noexcept { return handle_.get(); }
+  // A temporary ends before its views are read.
+  void of(body) const && = delete;
+  void touching() const && = delete;
+  void stats() const && = delete;
 
 private:
   detail::handle<impinge_safe_distances, impinge_safe_distances_destroy> handle_;
@@ -345,17 +402,24 @@ public:
     return detail::give(status, std::array<std::uint32_t, 3>{first[0], first[1], first[2]});
   }
   /// The lists of the elements that a kind names first, and of those that it names second.
-  csr of(pair_kind kind) const { return lists(kind, 0); }
-  csr reversed(pair_kind kind) const { return lists(kind, 1); }
+  csr of(pair_kind kind) const & { return lists(kind, 0); }
+  csr reversed(pair_kind kind) const & { return lists(kind, 1); }
   /// The faces near each vertex, the vertices near each face, the edges near each edge.
-  csr vf() const { return of(pair_kind::vf); }
-  csr fv() const { return reversed(pair_kind::vf); }
-  csr ee() const { return of(pair_kind::ee); }
-  impinge_stats stats() const { return detail::stats_of(impinge_neighbours_stats, raw()); }
+  csr vf() const & { return of(pair_kind::vf); }
+  csr fv() const & { return reversed(pair_kind::vf); }
+  csr ee() const & { return of(pair_kind::ee); }
+  impinge_stats stats() const & { return detail::stats_of(impinge_neighbours_stats, raw()); }
   const impinge_neighbours *raw() const noexcept { return handle_.get(); }
+  // A temporary ends before its views are read.
+  void of(pair_kind) const && = delete;
+  void reversed(pair_kind) const && = delete;
+  void vf() const && = delete;
+  void fv() const && = delete;
+  void ee() const && = delete;
+  void stats() const && = delete;
 
 private:
-  csr lists(pair_kind kind, std::uint32_t reversed) const {
+  csr lists(pair_kind kind, std::uint32_t reversed) const & {
     array offsets{}, indices{}, distances{};
     if (impinge_neighbours_lists(raw(), static_cast<std::uint32_t>(kind), reversed, &offsets, &indices, &distances) != IMPINGE_OK) return {};
     return {{static_cast<const std::uint64_t *>(offsets.data), offsets.rows},
@@ -372,14 +436,17 @@ public:
   explicit motion(impinge_motion *handle) : handle_(handle) {}
   std::optional<bool> start_intersects() const { return detail::asked(impinge_motion_start_intersects(raw())); }
   /// Where the vertices of a body are then; no rows for one that stands still.
-  result<array> positions(body of) const {
+  result<array> positions(body of) const & {
     array view{};
     return detail::give(impinge_motion_positions(raw(), of, &view), std::move(view));
   }
   /// Takes the step.
   result<void> apply(scene &to) const { return detail::give(impinge_motion_apply(raw(), to.raw())); }
-  impinge_stats stats() const { return detail::stats_of(impinge_motion_stats, raw()); }
+  impinge_stats stats() const & { return detail::stats_of(impinge_motion_stats, raw()); }
   const impinge_motion *raw() const noexcept { return handle_.get(); }
+  // A temporary ends before its views are read.
+  void positions(body) const && = delete;
+  void stats() const && = delete;
 
 private:
   detail::handle<impinge_motion, impinge_motion_destroy> handle_;

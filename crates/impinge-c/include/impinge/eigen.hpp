@@ -36,6 +36,7 @@ inline Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor
   static_assert(sizeof(closest_element) % sizeof(double) == 0, "rows are a number of doubles apart");
   return {of.empty() ? nullptr : of.data()->point, static_cast<Eigen::Index>(of.size()), 3, Eigen::OuterStride<>(stride)};
 }
+void points_of(const closest &&) = delete;
 
 /// Numbers that belong to an answer, such as lists and columns, as a vector. A view.
 template <class T> Eigen::Map<const Eigen::Matrix<T, Eigen::Dynamic, 1>> as_vector(view<T> numbers) {

@@ -229,7 +229,7 @@ public:
   /// Whether the start of the last step intersects; nothing if nobody asked.
   std::optional<bool> start_intersects() const { return detail::asked(impinge_detector_start_intersects(raw())); }
   /// What the last question cost. Its strings live as long as the detector.
-  impinge_stats stats() const {
+  impinge_stats stats() const & {
     impinge_stats stats{};
     stats.size = sizeof stats;
     if (impinge_detector_stats(raw(), &stats) != IMPINGE_OK) stats = {};
@@ -237,6 +237,8 @@ public:
   }
   impinge_detector *raw() noexcept { return handle_.get(); }
   const impinge_detector *raw() const noexcept { return handle_.get(); }
+  // A temporary ends before its views are read.
+  void stats() const && = delete;
 
 private:
   struct watch {

@@ -72,13 +72,18 @@ public:
   /// Whether there is a value.
   explicit operator bool() const noexcept { return value_.has_value(); }
   /// The value, if there is one.
-  T &operator*() { return *value_; }
-  const T &operator*() const { return *value_; }
-  T *operator->() { return &*value_; }
-  const T *operator->() const { return &*value_; }
+  T &operator*() & { return *value_; }
+  const T &operator*() const & { return *value_; }
+  T operator*() && { return std::move(*value_); }
+  T *operator->() & { return &*value_; }
+  const T *operator->() const & { return &*value_; }
+  // A temporary ends with its value: `*detector.near(scene, 1)` moves it out.
+  void operator*() const && = delete;
+  void operator->() const && = delete;
   /// IMPINGE_OK, or what failed.
   impinge_status status() const noexcept { return status_; }
-  const std::string &message() const noexcept { return message_; }
+  const std::string &message() const & noexcept { return message_; }
+  std::string message() && { return std::move(message_); }
 
 private:
   std::optional<T> value_;
@@ -92,7 +97,8 @@ public:
   result(impinge_status status, const char *message) : status_(status), message_(message) {}
   explicit operator bool() const noexcept { return status_ == IMPINGE_OK; }
   impinge_status status() const noexcept { return status_; }
-  const std::string &message() const noexcept { return message_; }
+  const std::string &message() const & noexcept { return message_; }
+  std::string message() && { return std::move(message_); }
 
 private:
   impinge_status status_ = IMPINGE_OK;
@@ -429,14 +435,20 @@ public:
 
   std::size_t n_bodies() const noexcept { return impinge_scene_n_bodies(raw()); }
   /// Views, which live until the scene is changed.
-  result<array> positions(body of) const { return look(impinge_scene_positions, of); }
-  result<array> end_positions(body of) const { return look(impinge_scene_end_positions, of); }
-  result<array> elements(body of) const { return look(impinge_scene_elements, of); }
-  result<array> edges(body of) const { return look(impinge_scene_edges, of); }
-  result<array> faces(body of) const { return look(impinge_scene_faces, of); }
+  result<array> positions(body of) const & { return look(impinge_scene_positions, of); }
+  result<array> end_positions(body of) const & { return look(impinge_scene_end_positions, of); }
+  result<array> elements(body of) const & { return look(impinge_scene_elements, of); }
+  result<array> edges(body of) const & { return look(impinge_scene_edges, of); }
+  result<array> faces(body of) const & { return look(impinge_scene_faces, of); }
 
   impinge_scene *raw() noexcept { return handle_.get(); }
   const impinge_scene *raw() const noexcept { return handle_.get(); }
+  // A temporary ends before its views are read.
+  void positions(body) const && = delete;
+  void end_positions(body) const && = delete;
+  void elements(body) const && = delete;
+  void edges(body) const && = delete;
+  void faces(body) const && = delete;
 
 private:
   template <class Lend, class P> result<void> lend(Lend call, body of, std::shared_ptr<P> owner) {
@@ -449,7 +461,7 @@ private:
   template <class T> result<void> element_thickness(body of, std::uint32_t kind, const T &thickness) {
     return detail::give(impinge_scene_set_element_thickness(raw(), of, kind, detail::rows_of(thickness, 1)));
   }
-  template <class Look> result<array> look(Look call, body of) const {
+  template <class Look> result<array> look(Look call, body of) const & {
     array view{};
     return detail::give(call(raw(), of, &view), std::move(view));
   }

@@ -1,0 +1,131 @@
+// What a temporary answer does not give: views, which would outlive it. Nothing here runs: it compiles, or it does not.
+#include <impinge/impinge.hpp>
+#ifdef WITH_EIGEN
+#include <impinge/eigen.hpp>
+#endif
+
+namespace {
+
+template <class T, class Call> constexpr bool compiles(Call) { return std::is_invocable_v<Call, T>; }
+#define CALL(call) [](auto &&of) -> decltype(std::forward<decltype(of)>(of) call) { return std::forward<decltype(of)>(of) call; }
+
+// A call that an answer with a name takes, and a temporary one does not.
+#define OF_NAMED(type, call)                                                                                                          \
+  static_assert(compiles<type &>(CALL(call)) && compiles<const type &>(CALL(call)), #type #call " of one with a name");               \
+  static_assert(!compiles<type>(CALL(call)) && !compiles<const type>(CALL(call)), #type #call " of a temporary")
+// A call whose result is a value of its own.
+#define OF_ANY(type, call) static_assert(compiles<const type &>(CALL(call)) && compiles<type>(CALL(call)), #type #call)
+
+using namespace impinge;
+constexpr auto kind = pair_kind::ee;
+
+#define ROWS(type)                                                                                                                    \
+  OF_NAMED(type, .data());                                                                                                            \
+  OF_NAMED(type, .begin());                                                                                                           \
+  OF_NAMED(type, .end());                                                                                                             \
+  OF_NAMED(type, .rows());                                                                                                            \
+  OF_NAMED(type, .column(0));                                                                                                         \
+  OF_NAMED(type, .stats());                                                                                                           \
+  OF_ANY(type, .size());                                                                                                              \
+  OF_ANY(type, .empty());                                                                                                             \
+  OF_ANY(type, [0]);                                                                                                                  \
+  static_assert(!std::is_reference_v<decltype(std::declval<type>()[0])>)
+ROWS(pairs);
+ROWS(impacts);
+ROWS(candidates);
+ROWS(near_pairs);
+ROWS(contacts);
+ROWS(penetration);
+ROWS(closest);
+ROWS(hits);
+
+OF_ANY(pairs, .hash());
+OF_ANY(pairs, .between(0, 1));
+OF_ANY(pairs, .self_of(0));
+OF_NAMED(changes, .kept());
+OF_NAMED(changes, .added());
+OF_NAMED(changes, .gone());
+OF_ANY(changes, .empty());
+OF_NAMED(impacts, .of(kind));
+OF_NAMED(candidates, .kinds());
+OF_NAMED(candidates, .of(kind));
+OF_NAMED(near_pairs, .kinds());
+OF_NAMED(near_pairs, .of(kind));
+OF_NAMED(near_pairs, .features());
+OF_NAMED(near_pairs, .distances());
+OF_NAMED(near_pairs, .closest_points());
+OF_ANY(near_pairs, .stencils(scene()));
+OF_ANY(stencils, .merged());
+OF_ANY(stencils, .size());
+OF_NAMED(stencils, .vertices());
+OF_NAMED(stencils, .starts());
+OF_NAMED(stencils, .kinds());
+OF_NAMED(stencils, .features());
+OF_NAMED(stencils, .weights());
+OF_NAMED(stencils, .coefficients());
+OF_NAMED(stencils, .squared_distances());
+OF_NAMED(stencils, .gradients());
+OF_NAMED(stencils, .hessians());
+OF_NAMED(stencils, .mollifiers());
+OF_NAMED(stencils, .mollifier_gradients());
+OF_NAMED(stencils, .mollifier_hessians());
+OF_NAMED(contacts, .points());
+OF_NAMED(contacts, .starts());
+OF_NAMED(contacts, .corners());
+OF_NAMED(contacts, .curve_starts());
+OF_NAMED(contacts, .curve_points());
+OF_NAMED(contacts, .curve_closed());
+OF_NAMED(contacts, .curve_lengths());
+OF_NAMED(penetration, .inside_a());
+OF_NAMED(penetration, .inside_b());
+OF_ANY(penetration, .volume());
+OF_NAMED(closest, .of(0));
+OF_NAMED(hits, .is_hit());
+OF_NAMED(hits, .starts());
+OF_NAMED(hits, .of(0));
+OF_NAMED(safe_distances, .of(0));
+OF_NAMED(safe_distances, .touching());
+OF_NAMED(safe_distances, .stats());
+OF_ANY(neighbours, .first(0));
+OF_NAMED(neighbours, .of(kind));
+OF_NAMED(neighbours, .reversed(kind));
+OF_NAMED(neighbours, .vf());
+OF_NAMED(neighbours, .fv());
+OF_NAMED(neighbours, .ee());
+OF_NAMED(neighbours, .stats());
+OF_NAMED(truncation, .positions(0));
+OF_NAMED(impinge::advance, .positions(0));
+OF_NAMED(impinge::advance, .stats());
+OF_ANY(impinge::advance, .fraction());
+OF_ANY(impinge::advance, .first());
+OF_NAMED(scene, .positions(0));
+OF_NAMED(scene, .end_positions(0));
+OF_NAMED(scene, .elements(0));
+OF_NAMED(scene, .edges(0));
+OF_NAMED(scene, .faces(0));
+OF_NAMED(detector, .stats());
+
+#ifdef IMPINGE_NO_EXCEPTIONS
+OF_NAMED(result<pairs>, .operator->());
+static_assert(std::is_same_v<decltype(*std::declval<result<pairs>>()), pairs>, "a temporary gives its value away");
+static_assert(std::is_same_v<decltype(*std::declval<result<pairs> &>()), pairs &>);
+static_assert(std::is_same_v<decltype(std::declval<result<pairs>>().message()), std::string>);
+#endif
+
+#ifdef WITH_EIGEN
+#define MATRIX [](auto &&of) -> decltype(points_of(std::forward<decltype(of)>(of))) { return points_of(std::forward<decltype(of)>(of)); }
+static_assert(compiles<const closest &>(MATRIX) && !compiles<closest>(MATRIX), "points_of");
+#endif
+
+// A loop keeps the answer that it goes through.
+[[maybe_unused]] void loop(detector &on, const scene &in) {
+#ifdef IMPINGE_NO_EXCEPTIONS
+  for (const auto &row : *on.detect(in)) (void)row;
+  for (const auto &at : (*on.detect(in)).between(0, 1)) (void)at;
+#else
+  for (const auto &row : on.detect(in)) (void)row;
+  for (const auto &at : on.detect(in).between(0, 1)) (void)at;
+#endif
+}
+
+} // namespace
