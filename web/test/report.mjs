@@ -2,7 +2,7 @@
 //
 // A clean mesh, one with problems and one that is too large for the page are checked. The page is opened as a file, on a large
 // screen and on a phone's with touch; meshes are opened, turned and visited place by place. Then a page of 1,000 meshes has to
-// scroll without a long stop. Screenshots are written to FOLDER/shots.
+// scroll without a long stop. An assembly's places are visited from its matrix and its list. Screenshots are written to FOLDER/shots.
 
 import assert from "node:assert/strict";
 import { spawnSync } from "node:child_process";
@@ -54,21 +54,22 @@ function report(name, meshes, status = 0) {
   return pathToFileURL(page).href;
 }
 
-// Pixels of the view that look like no background, and those that are red.
+// Pixels of the view that look like no background, and those that are red or blue.
 const seen = (page) =>
   page.evaluate(async () => {
     await new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));
     draw();
     const gl = canvas.getContext("webgl2"), [w, h] = [canvas.width, canvas.height], pixels = new Uint8Array(4 * w * h);
     gl.readPixels(0, 0, w, h, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
-    let [mesh, red, hash] = [0, 0, 0];
+    let [mesh, red, blue, hash] = [0, 0, 0, 0];
     for (let ix = 0; ix < pixels.length; ix += 4) {
       const [r, g, b] = pixels.subarray(ix, ix + 3);
       mesh += Math.abs(r - 237) + Math.abs(g - 240) + Math.abs(b - 245) > 12;
       red += r > g + 40 && r > b + 40;
+      blue += b > r + 40 && b > g + 40;
       hash = (Math.imul(hash, 31) + r + 3 * g + 7 * b) | 0;
     }
-    return { mesh: mesh / (w * h), red: red / (w * h), hash };
+    return { mesh: mesh / (w * h), red: red / (w * h), blue: blue / (w * h), hash };
   });
 
 await writeFile(join(files, "clean.obj"), slab(24));
@@ -132,6 +133,54 @@ try {
     assert.ok((await seen(page)).red > 0);
     await press("[data-do=close]");
     await page.screenshot({ path: join(shots, `report-${kind}.png`) });
+    assert.deepEqual(problems, []);
+    await context.close();
+  }
+
+  // Three parts: one passes through the block, and the lid lies on it.
+  const box = (name, low, high, first) => {
+    const lines = [`g ${name}`];
+    for (let ix = 0; ix < 8; ix++) lines.push(`v ${[0, 1, 2].map((k) => ((ix >> k) & 1 ? high : low)[k]).join(" ")}`);
+    for (const side of ["1 3 4 2", "5 6 8 7", "1 2 6 5", "3 7 8 4", "1 5 7 3", "2 4 8 6"]) {
+      lines.push(`f ${side.split(" ").map((n) => +n + first).join(" ")}`);
+    }
+    return lines.join("\n") + "\n";
+  };
+  const machine = box("block", [0, 0, 0], [2, 2, 2], 0) + box("through", [1, 0.5, 0.5], [3, 1.5, 1.5], 8) + box("lid", [0, 2, 0], [2, 2.5, 2], 16);
+  await writeFile(join(files, "machine.obj"), machine);
+  const run = spawnSync(resolve(program), ["check", "--assembly", "machine.obj", "--html", "machine.html", "--no-progress"], { cwd: files, encoding: "utf8" });
+  assert.equal(run.status, 0, run.stderr);
+  for (const [kind, options] of [
+    ["desktop", { viewport: { width: 1200, height: 760 } }],
+    ["phone", { viewport: { width: 390, height: 844 }, deviceScaleFactor: 2, hasTouch: true, isMobile: true }],
+  ]) {
+    const context = await browser.newContext(options), page = await context.newPage(), problems = [];
+    page.on("pageerror", (error) => problems.push(String(error)));
+    page.on("console", (text) => text.type() === "error" && problems.push(text.text()));
+    await page.goto(pathToFileURL(join(files, "machine.html")).href);
+    await page.screenshot({ path: join(shots, `assembly-${kind}.png`) });
+    const press = (selector) => (kind === "phone" ? page.locator(selector).tap() : page.locator(selector).click());
+    const line = () => page.locator(".at").textContent();
+    await press("section > div > button.see");
+    const whole = await seen(page);
+    assert.equal(await line(), "2 places. 36 faces.");
+    await press("[data-do=next]");
+    assert.match(await line(), /^Place 1 of 2: block and through interpenetrate: /);
+    const first = await seen(page);
+    assert.ok(first.red > 0.01 && first.blue > 0.005 && first.hash !== whole.hash, JSON.stringify(first));
+    await page.screenshot({ path: join(shots, `assembly-${kind}-place.png`) });
+    // The third part is seen, though it is not of this place.
+    await page.evaluate(() => (shown.others = []));
+    assert.notEqual((await seen(page)).hash, first.hash);
+    await press("[data-do=next]");
+    assert.match(await line(), /^Place 2 of 2: block and lid touch: /);
+    await press("[data-do=close]");
+    // A cell of the matrix opens the same place as the list.
+    await press("tbody tr:nth-child(2) td:nth-child(2) button");
+    assert.equal((await seen(page)).hash, first.hash);
+    await press("[data-do=close]");
+    await press(".pairs button.place >> nth=1");
+    assert.match(await line(), /^Place 2 of 2: /);
     assert.deepEqual(problems, []);
     await context.close();
   }

@@ -4,6 +4,7 @@ mod args;
 mod assembly;
 mod ending;
 mod html;
+mod relations;
 mod rows;
 mod shown;
 

@@ -892,6 +892,15 @@ fn parts_of_an_assembly_are_compared() {
     );
     let page = read(&folder, "report.html");
     assert!(page.contains("through") && page.contains(last), "{page}");
+    // All parts are in the view, and each place names its two.
+    assert!(page.contains(" data-parts=\"12,24,36,48,60\" "), "{page}");
+    for pair in &ask(&[])["pairs"].as_array().unwrap()[..] {
+        let place = format!(
+            "<button class=\"see place\" data-parts=\"{},{}\" ",
+            pair["parts"][0], pair["parts"][1]
+        );
+        assert_eq!(page.matches(&place).count(), 1, "{place}");
+    }
     // Several files are parts, too; --clearance alone says so.
     folder.text("left.obj", &cube("one", [0.0; 3], 1.0, 0));
     folder.text("right.obj", &cube("one", [1.0, 0.0, 0.0], 1.0, 0));

@@ -50,9 +50,12 @@ class _OfMesh:
         #: The vertices as a body of points, and the surface whose they are.
         self._vertices: tuple[Scene, Scene] | None = None
 
+    def _arrays(self) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
+        return np.asarray(self._mesh.vertices), np.asarray(self._mesh.faces)
+
     def _surface(self) -> Scene:
         """A scene of the mesh as it is now."""
-        vertices, faces = np.asarray(self._mesh.vertices), np.asarray(self._mesh.faces)
+        vertices, faces = self._arrays()
         if self._read is not None:
             if np.array_equal(vertices, self._read[0]) and np.array_equal(faces, self._read[1]):
                 return self._scene

@@ -4,15 +4,13 @@ use std::io::Write;
 use std::path::Path;
 
 use impinge::CancelToken;
-use impinge_check::report::escaped;
-use impinge_check::{
-    Assembly, AssemblyError, AssemblyOptions, PartPair, Relation, check_assembly_with,
-};
-use impinge_io::{AtomicFile, Format, Mesh, ReadOptions, printable, read, read_bodies};
+use impinge_check::{Assembly, AssemblyError, AssemblyOptions, Relation, check_assembly_with};
+use impinge_io::{Format, Mesh, ReadOptions, printable, read, read_bodies};
 use serde_json::{Value, json};
 
 use super::args::{CheckArgs, FailOn, Touching};
-use super::html::{END, start};
+use super::html::write_assembly;
+use super::relations::{matrix, said, summary};
 use crate::error::Error;
 use crate::load::part_name;
 use crate::output::out;
@@ -68,6 +66,7 @@ pub fn check(args: &CheckArgs, cancel: &CancelToken) -> Result<(), Error> {
         ignores_touching: args.touching == Touching::Ignore,
         threads: 0,
     };
+    let shown = args.html.as_ref().map(|file| (file, meshes.clone()));
     let watch = Watch::detection(!args.no_progress, "comparing");
     let answer =
         check_assembly_with(meshes, &options, watch.control(cancel)).map_err(
@@ -86,8 +85,8 @@ pub fn check(args: &CheckArgs, cancel: &CancelToken) -> Result<(), Error> {
             },
         )?;
     drop(watch);
-    if let Some(file) = &args.html {
-        write_page(&file.0, args, &names, &answer)?;
+    if let Some((file, meshes)) = shown {
+        write_assembly(&file.0, args, &names, &meshes, &answer)?;
     }
     if args.json {
         writeln!(out(), "{}", object(args, &names, &answer))?;
@@ -115,39 +114,6 @@ fn parts(path: &Path, are_several: bool) -> Result<Vec<(String, Mesh)>, Error> {
     Ok(named.collect())
 }
 
-/// What a pair is, seen from one of its parts, as a letter of the matrix.
-fn letter(relation: Relation) -> char {
-    match relation {
-        Relation::Interpenetrating => 'X',
-        Relation::Inside => 'I',
-        Relation::Around => 'O',
-        Relation::Touching => 't',
-        Relation::Near => 'n',
-    }
-}
-
-/// A row of letters per part: `.` for parts that are apart, `-` for the part itself.
-fn matrix(answer: &Assembly) -> Vec<Vec<char>> {
-    let n = answer.parts.len();
-    let mut rows = vec![vec!['.'; n]; n];
-    for (ix, row) in rows.iter_mut().enumerate() {
-        row[ix] = '-';
-    }
-    for PartPair {
-        parts, relation, ..
-    } in &answer.pairs
-    {
-        let [a, b] = *parts;
-        rows[a][b] = letter(*relation);
-        rows[b][a] = letter(match relation {
-            Relation::Inside => Relation::Around,
-            Relation::Around => Relation::Inside,
-            same => *same,
-        });
-    }
-    rows
-}
-
 /// The object that `docs/assembly.schema.json` describes.
 fn object(args: &CheckArgs, names: &[String], answer: &Assembly) -> Value {
     let parts = names
@@ -171,50 +137,6 @@ fn object(args: &CheckArgs, names: &[String], answer: &Assembly) -> Value {
         "pairs": pairs.collect::<Vec<_>>(),
         "matrix": rows.collect::<Vec<_>>(),
     })
-}
-
-/// What a pair is, in words.
-fn said(names: &[String], pair: &PartPair) -> String {
-    let [a, b] = pair.parts.map(|part| printable(&names[part]));
-    let [x, y, z] = pair.point;
-    let faces = several(pair.n_pairs, "pair of faces", "pairs of faces");
-    let at = format!("near ({x}, {y}, {z})");
-    let apart = pair.distance;
-    match pair.relation {
-        Relation::Interpenetrating => format!("{a} and {b} interpenetrate: {faces}, {at}"),
-        Relation::Inside => format!("{a} is inside {b}, {apart} from the surface, {at}"),
-        Relation::Around => format!("{b} is inside {a}, {apart} from the surface, {at}"),
-        Relation::Touching => format!("{a} and {b} touch: {faces}, {at}"),
-        Relation::Near => format!("{a} and {b} are {apart} apart, {at}"),
-    }
-}
-
-fn summary(args: &CheckArgs, answer: &Assembly) -> String {
-    let n = |is: fn(Relation) -> bool| {
-        let found = answer.pairs.iter().filter(|pair| is(pair.relation));
-        found.count() as u64
-    };
-    let mut said = vec![several(
-        n(Relation::shares_space),
-        "pair shares space",
-        "pairs share space",
-    )];
-    if args.touching == Touching::Report {
-        let n = n(|relation| relation == Relation::Touching);
-        said.push(several(n, "only touches", "only touch"));
-    }
-    if let Some(clearance) = args.clearance {
-        let n = n(|relation| relation == Relation::Near);
-        let words = several(n, "is at most", "are at most");
-        said.push(format!("{words} {clearance} apart"));
-    }
-    let n_parts = answer.parts.len() as u64;
-    let n_sheets = answer.parts.iter().filter(|part| !part.is_solid).count() as u64;
-    let sheets = match n_sheets {
-        0 => String::new(),
-        n => format!(", {} not closed", several(n, "is", "are")),
-    };
-    format!("{}{sheets}: {}", counted(n_parts, "part"), said.join(", "))
 }
 
 fn text(args: &CheckArgs, names: &[String], answer: &Assembly) -> String {
@@ -241,58 +163,14 @@ fn text(args: &CheckArgs, names: &[String], answer: &Assembly) -> String {
         text += "X share space, I inside, O around, t touch, n near\n\n";
     }
     for pair in answer.pairs.iter().take(MOST_LISTED) {
-        text += &format!("{}\n", said(names, pair));
+        let [a, b] = pair.parts.map(|part| printable(&names[part]));
+        text += &format!("{}\n", said([&a, &b], pair));
     }
     if answer.pairs.len() > MOST_LISTED {
         let n = (answer.pairs.len() - MOST_LISTED) as u64;
         text += &format!("… and {} more: see --json\n", counted(n, "pair"));
     }
     text + &summary(args, answer) + "\n"
-}
-
-/// A page with the matrix and the list.
-fn write_page(
-    path: &Path,
-    args: &CheckArgs,
-    names: &[String],
-    answer: &Assembly,
-) -> Result<(), Error> {
-    let failed = |source| Error::Write {
-        path: path.to_owned(),
-        source,
-    };
-    let mut body = start("impinge check --assembly", &summary(args, answer));
-    body += "<p class=\"legend\"><span>X share space</span> <span>I inside</span> <span>O around</span> <span>t touch</span> <span>n near</span></p>\n";
-    body += "<div class=\"scroll\"><table class=\"matrix\"><thead><tr><th scope=\"col\"></th>";
-    for (number, name) in names.iter().enumerate() {
-        body += &format!(
-            "<th scope=\"col\" title=\"{}\">{number}</th>",
-            escaped(name)
-        );
-    }
-    body += "</tr></thead>\n<tbody>\n";
-    for (number, (name, row)) in names.iter().zip(matrix(answer)).enumerate() {
-        body += &format!("<tr><th scope=\"row\">{number} {}</th>", escaped(name));
-        for letter in row {
-            let class = match letter {
-                'X' | 'I' | 'O' => " class=\"bad\"",
-                'n' => " class=\"near\"",
-                _ => "",
-            };
-            let letter = if letter == '.' { ' ' } else { letter };
-            body += &format!("<td{class}>{letter}</td>");
-        }
-        body += "</tr>\n";
-    }
-    body += "</tbody></table></div>\n<ul>\n";
-    for pair in &answer.pairs {
-        body += &format!("<li>{}</li>\n", escaped(&said(names, pair)));
-    }
-    body += "</ul>\n";
-    body += END;
-    let mut to = AtomicFile::create(path)?;
-    to.write_all(body.as_bytes()).map_err(failed)?;
-    Ok(to.finish()?)
 }
 
 /// Fails if there is a pair that `--fail-on` names.

@@ -5,6 +5,7 @@
 //! those of places when their list is opened. Meshes are read and drawn one after another, so
 //! memory holds one of them.
 
+mod assembly;
 mod view;
 
 use std::io::Write;
@@ -15,6 +16,7 @@ use impinge_check::{Checked, Place, Problem, Report, Row};
 use impinge_io::AtomicFile;
 use impinge_render::{Camera, Focus, Picture};
 
+pub use self::assembly::write as write_assembly;
 use super::args::CheckArgs;
 use super::shown::surface;
 use crate::error::Error;
@@ -22,12 +24,13 @@ use crate::picture::diagonal;
 use crate::text::grouped;
 
 const STYLE: &str = include_str!("report.css");
-const SCRIPT: &str = concat!(include_str!("report.js"), include_str!("html/view.js"));
+const TABLE: &str = include_str!("report.js");
+const SCRIPT: &str = include_str!("html/view.js");
 
 /// The window that `view.js` draws in.
 const VIEW: &str = "<dialog><canvas tabindex=\"0\" aria-label=\"The mesh. Drag or use the arrow keys to turn it.\"></canvas>\
     <div class=\"panel\"><div class=\"bar\"><b></b><button data-do=\"previous\">Previous</button><button data-do=\"next\">Next</button>\
-    <button data-do=\"whole\">Whole mesh</button><button data-do=\"close\">Close</button></div><p class=\"at\"></p>\
+    <button data-do=\"whole\">Whole</button><button data-do=\"close\">Close</button></div><p class=\"at\"></p>\
     <p class=\"hint\">Drag: turn. Wheel or two fingers: nearer. <span>Shift or right button: move. N, P: next and previous place.</span></p>\
     </div></dialog>\n";
 
@@ -39,7 +42,7 @@ const NO_PICTURE: &str = "<div class=\"error\">no picture: the mesh has changed 
 const MOST_PICTURES: usize = 6;
 
 /// The beginning of a page of its own that loads nothing.
-pub fn start(title: &str, summary: &str) -> String {
+fn start(title: &str, summary: &str) -> String {
     let summary = escaped(summary);
     format!(
         "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
@@ -49,8 +52,11 @@ pub fn start(title: &str, summary: &str) -> String {
     )
 }
 
-/// Its end.
-pub const END: &str = "</body></html>\n";
+/// Its end: the view, and the scripts.
+fn end(table: &str, args: &CheckArgs) -> String {
+    let up = format!("{:?}", args.picture.up).to_lowercase();
+    format!("{VIEW}<script data-up=\"{up}\">\n{table}{SCRIPT}</script>\n</body></html>\n")
+}
 
 /// Writes the report.
 pub fn write(path: &Path, report: &Report<'_>, args: &CheckArgs) -> Result<(), Error> {
@@ -67,9 +73,7 @@ pub fn write(path: &Path, report: &Report<'_>, args: &CheckArgs) -> Result<(), E
         to.write_all(of_row(row, most, args)?.as_bytes())
             .map_err(failed)?;
     }
-    let up = format!("{:?}", args.picture.up).to_lowercase();
-    let tail =
-        format!("</tbody></table>\n{VIEW}<script data-up=\"{up}\">\n{SCRIPT}</script>\n{END}");
+    let tail = format!("</tbody></table>\n{}", end(TABLE, args));
     to.write_all(tail.as_bytes()).map_err(failed)?;
     Ok(to.finish()?)
 }
@@ -138,11 +142,14 @@ fn of_row(row: &Row, most: usize, args: &CheckArgs) -> Result<String, Error> {
             ..Picture::default()
         };
         thumbnail = image(&picture, &row.path)?;
-        let mesh = view::element(&picture.surfaces[0], &checked, most);
+        let spots: Vec<view::Spot> = checked
+            .places
+            .iter()
+            .map(|place| (place.point, place.size))
+            .collect();
+        let mesh = view::element(&picture.surfaces[0], &spots, &[], most);
         if let Some(mesh) = &mesh {
-            thumbnail = format!(
-                "<button class=\"see\" title=\"Look at it from all sides\">{thumbnail}</button>{mesh}"
-            );
+            thumbnail = see(&thumbnail) + mesh;
         }
         if !row.places.is_empty() {
             let what = crate::text::counted(row.places.len() as u64, "place");
@@ -190,6 +197,11 @@ fn of_row(row: &Row, most: usize, args: &CheckArgs) -> Result<String, Error> {
         None => "<td data-label=\"volume\"></td>".to_owned(),
     };
     Ok(text + &volume + "</tr>\n")
+}
+
+/// What opens the view when it is clicked.
+fn see(picture: &str) -> String {
+    format!("<button class=\"see\" title=\"Look at it from all sides\">{picture}</button>")
 }
 
 fn caption(place: &Place) -> String {

@@ -4,6 +4,11 @@
 const dialog = document.querySelector("dialog"), canvas = dialog.querySelector("canvas");
 const zUp = document.currentScript.dataset.up === "z";
 const numbers = (text) => text.split(",").map(Number);
+// The colours of the two parts at a place of an assembly.
+const PAIR = ["one", "two"].map((name) => {
+  const sample = document.querySelector(`i.${name}`);
+  return sample && [...getComputedStyle(sample).backgroundColor.match(/\d+/g).map((x) => x / 255), 1];
+});
 const shown = { row: null, at: -1, places: [], target: [0, 0, 0], azimuth: 0, elevation: 0, distance: 3, mesh: null };
 let gl, uniforms, drawn = 0;
 
@@ -16,17 +21,17 @@ void main() {
 }`;
 // Flat faces, darker from the back, with their edges where they are large enough to be told apart.
 const FRAGMENT = `#version 300 es
-precision highp float; in vec3 at, side; in vec4 color; uniform vec3 eye; uniform float alpha; out vec4 pixel;
+precision highp float; in vec3 at, side; in vec4 color; uniform vec3 eye; uniform float alpha; uniform vec4 paint; out vec4 pixel;
 void main() {
   vec3 toEye = normalize(eye - at), normal = normalize(cross(dFdx(at), dFdy(at)));
   float light = (gl_FrontFacing ? 0.45 : 0.3) + (gl_FrontFacing ? 0.55 : 0.3) * abs(dot(normal, toEye));
   vec3 width = fwidth(side), near = side / max(width, 1e-6);
   float edge = min(min(near.x, near.y), near.z), fine = 1.0 - smoothstep(0.03, 0.15, max(max(width.x, width.y), width.z));
-  pixel = vec4(color.rgb * light * mix(1.0, 0.72, fine * (1.0 - smoothstep(0.5, 1.5, edge))), alpha);
+  pixel = vec4(mix(color.rgb, paint.rgb, paint.a) * light * mix(1.0, 0.72, fine * (1.0 - smoothstep(0.5, 1.5, edge))), alpha);
 }`;
 
 function start() {
-  gl = canvas.getContext("webgl2", { antialias: true });
+  gl = canvas.getContext("webgl2", { antialias: true, alpha: false });
   if (!gl) return false;
   const program = gl.createProgram();
   for (const [kind, source] of [[gl.VERTEX_SHADER, VERTEX], [gl.FRAGMENT_SHADER, FRAGMENT]]) {
@@ -40,7 +45,7 @@ function start() {
   gl.linkProgram(program);
   if (!gl.getProgramParameter(program, gl.LINK_STATUS)) throw new Error(gl.getProgramInfoLog(program));
   gl.useProgram(program);
-  uniforms = Object.fromEntries(["view", "target", "eye", "alpha"].map((name) => [name, gl.getUniformLocation(program, name)]));
+  uniforms = Object.fromEntries(["view", "target", "eye", "alpha", "paint"].map((name) => [name, gl.getUniformLocation(program, name)]));
   gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
   gl.enableVertexAttribArray(0);
   gl.enableVertexAttribArray(1);
@@ -52,7 +57,7 @@ function start() {
 
 // Puts a mesh on the GPU: three corners per face, each with its position and the colour of the face.
 function load(element) {
-  const { points, fine, found, colors, middle, radius } = element.dataset;
+  const { points, fine, found, colors, parts, middle, radius } = element.dataset;
   const bytes = Uint8Array.from(atob(element.textContent), (c) => c.charCodeAt(0)), read = new DataView(bytes.buffer);
   const nPoints = +points, nFaces = +fine + +found, palette = numbers(colors);
   const to = new DataView(new ArrayBuffer(48 * nFaces));
@@ -64,7 +69,8 @@ function load(element) {
     }
   }
   gl.bufferData(gl.ARRAY_BUFFER, to, gl.STATIC_DRAW);
-  shown.mesh = { fine: +fine, found: +found, middle: numbers(middle), radius: +radius };
+  // Where the faces of each part of an assembly end.
+  shown.mesh = { fine: +fine, found: +found, ends: parts && numbers(parts), middle: numbers(middle), radius: +radius };
 }
 
 // Axes of the camera, and the matrix from places around the target to the screen.
@@ -98,15 +104,31 @@ function draw() {
   gl.uniform3fv(uniforms.eye, back.map((x) => x * distance));
   gl.clearColor(0.93, 0.94, 0.96, 1);
   gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
-  const { fine, found } = shown.mesh;
+  const { fine, found, ends } = shown.mesh, { pair, others } = shown;
+  const faces = (from, to, paint = [0, 0, 0, 0]) => {
+    gl.uniform4fv(uniforms.paint, paint);
+    gl.drawArrays(gl.TRIANGLES, 3 * from, 3 * (to - from));
+  };
+  // At a place of an assembly its two parts have a colour each.
+  const both = () => pair.forEach((part, ix) => faces(ends[part - 1] ?? 0, ends[part], PAIR[ix]));
   gl.enable(gl.DEPTH_TEST);
   gl.uniform1f(uniforms.alpha, 1);
-  gl.drawArrays(gl.TRIANGLES, 0, 3 * (fine + found));
-  // What has a finding shows through what hides it.
+  if (pair) both();
+  else faces(0, fine + found);
+  // What has a finding shows through what hides it, and so do the two parts.
   gl.disable(gl.DEPTH_TEST);
   gl.enable(gl.BLEND);
   gl.uniform1f(uniforms.alpha, 0.3);
-  gl.drawArrays(gl.TRIANGLES, 3 * fine, 3 * found);
+  if (pair) both();
+  else faces(fine, fine + found);
+  if (pair) {
+    // The other parts, faintly.
+    gl.enable(gl.DEPTH_TEST);
+    gl.depthMask(false);
+    gl.uniform1f(uniforms.alpha, 0.12);
+    for (const [from, to] of others) faces(from, to, [0.4, 0.4, 0.45, 1]);
+    gl.depthMask(true);
+  }
   gl.disable(gl.BLEND);
 }
 const redraw = () => (drawn ||= requestAnimationFrame(draw));
@@ -115,6 +137,11 @@ const redraw = () => (drawn ||= requestAnimationFrame(draw));
 function visit(at) {
   const { places, mesh } = shown, n = places.length, line = dialog.querySelector(".at");
   shown.at = at;
+  shown.pair = places[at]?.dataset.parts && numbers(places[at].dataset.parts);
+  if (shown.pair) {
+    const [a, b] = shown.pair, end = (part) => mesh.ends[part] ?? 0;
+    shown.others = [[0, end(a - 1)], [end(a), end(b - 1)], [end(b), mesh.fine]];
+  }
   if (at < 0) {
     Object.assign(shown, { target: [0, 0, 0], azimuth: -25, elevation: 20, distance: 4.2 });
     const { fine, found } = mesh, all = +shown.row.querySelector("script").dataset.all, grouped = (n) => n.toLocaleString("en");
@@ -124,7 +151,7 @@ function visit(at) {
     const { point, from } = places[at].dataset, [azimuth, elevation, distance] = numbers(from);
     const target = numbers(point).map((x, k) => (x - mesh.middle[k]) / mesh.radius);
     Object.assign(shown, { target, azimuth, elevation, distance: distance / mesh.radius });
-    line.textContent = `Place ${at + 1} of ${n}: ${places[at].textContent}`;
+    line.replaceChildren(`Place ${at + 1} of ${n}: `, ...places[at].querySelector("span").cloneNode(true).childNodes);
   }
   redraw();
 }
@@ -137,7 +164,7 @@ function open(row, at) {
   if (shown.row !== row) load(row.querySelector("script"));
   shown.row = row;
   shown.places = [...row.querySelectorAll("button.place")];
-  dialog.querySelector("b").textContent = row.cells[1].dataset.v;
+  dialog.querySelector("b").textContent = row.querySelector("[data-v]").dataset.v;
   for (const name of ["previous", "next"]) dialog.querySelector(`[data-do=${name}]`).hidden = !shown.places.length;
   dialog.showModal();
   canvas.focus();
@@ -154,8 +181,9 @@ document.addEventListener("click", (event) => {
   const see = event.target.closest("button.see"), act = event.target.closest("[data-do]");
   if (act) acts[act.dataset.do]();
   if (!see) return;
-  const row = see.closest("tr");
-  open(row, [...row.querySelectorAll("button.place")].indexOf(see));
+  // An assembly is a section; cells of its matrix have numbers of places.
+  const row = see.closest("section") ?? see.closest("tr");
+  open(row, see.dataset.at ? +see.dataset.at : [...row.querySelectorAll("button.place")].indexOf(see));
 });
 
 function turn(x, y) {

@@ -2,9 +2,9 @@
 //!
 //! A mesh is base64 in an element of the page that browsers do not read before it is asked for:
 //! positions as `f32` from the middle of the mesh in units of its radius, three corners per face as
-//! `u32`, one colour per face as `u8`, all little-endian. Faces without a finding come first.
+//! `u32`, one colour per face as `u8`, all little-endian. Faces without a finding come first; those of
+//! an assembly are in the order of its parts.
 
-use impinge_check::{Checked, Place};
 use impinge_render::{Camera, Face, Focus, Surface};
 
 use super::base64;
@@ -21,19 +21,32 @@ pub fn share(n_meshes: usize) -> usize {
     (MOST_FACES / n_meshes.max(1)).clamp(low, high)
 }
 
+/// A point to look at, and the size of what is there.
+pub type Spot = ([f64; 3], f64);
+
 /// The element with a mesh. Of a mesh with more than `most` faces it holds those that have a
-/// finding and those around the places; of one without places, nothing.
-pub fn element(surface: &Surface, checked: &Checked, most: usize) -> Option<String> {
+/// finding and those around the places; of one without places, nothing. `parts`: how many faces
+/// each part of an assembly has.
+pub fn element(surface: &Surface, places: &[Spot], parts: &[usize], most: usize) -> Option<String> {
     let n_faces = surface.faces.len();
-    let faces: Vec<Face> = if n_faces <= most {
-        surface.faces.clone()
-    } else if checked.places.is_empty() {
+    let chosen: Vec<usize> = if n_faces <= most {
+        (0..n_faces).collect()
+    } else if places.is_empty() {
         return None;
     } else {
-        around(surface, &checked.places, most)
+        around(surface, places, most)
     };
-    let (fine, found): (Vec<Face>, Vec<Face>) =
-        faces.into_iter().partition(|face| !face.shows_through);
+    let mut end = 0;
+    let ends = parts.iter().map(|n| {
+        end += n;
+        chosen.partition_point(|&ix| ix < end).to_string()
+    });
+    let parts = match parts {
+        [] => String::new(),
+        _ => format!("data-parts=\"{}\" ", ends.collect::<Vec<_>>().join(",")),
+    };
+    let faces = chosen.iter().map(|&ix| surface.faces[ix]);
+    let (fine, found): (Vec<Face>, Vec<Face>) = faces.partition(|face| !face.shows_through);
     let n_fine = fine.len();
 
     let mut number = vec![u32::MAX; surface.positions.len()];
@@ -72,7 +85,7 @@ pub fn element(surface: &Surface, checked: &Checked, most: usize) -> Option<Stri
     let colors: Vec<String> = palette.iter().flatten().map(u8::to_string).collect();
     let [x, y, z] = middle;
     let mut text = format!(
-        "<script type=\"application/octet-stream\" data-points=\"{}\" data-fine=\"{n_fine}\" data-found=\"{}\" \
+        "<script type=\"application/octet-stream\" {parts}data-points=\"{}\" data-fine=\"{n_fine}\" data-found=\"{}\" \
          data-all=\"{n_faces}\" data-middle=\"{x:?},{y:?},{z:?}\" data-radius=\"{radius:?}\" data-colors=\"{}\">",
         points.len(),
         found.len(),
@@ -92,26 +105,25 @@ pub fn attributes(camera: &Camera, focus: &Focus) -> String {
     )
 }
 
-/// The faces with a finding and those that are nearest to a place, by their first corner and in
-/// sizes of the place.
-fn around(surface: &Surface, places: &[Place], most: usize) -> Vec<Face> {
+/// The numbers of the faces with a finding and of those that are nearest to a place, by their first
+/// corner and in sizes of the place.
+fn around(surface: &Surface, places: &[Spot], most: usize) -> Vec<usize> {
     let far = |face: &Face| {
         if face.shows_through {
             return 0.0;
         }
         let corner = surface.positions[face.corners[0] as usize];
-        let to = |place: &Place| {
-            let [x, y, z] = [0, 1, 2].map(|k| corner[k] - place.point[k]);
-            x.hypot(y).hypot(z) / place.size.max(f64::MIN_POSITIVE)
+        let to = |(point, size): &Spot| {
+            let [x, y, z] = [0, 1, 2].map(|k| corner[k] - point[k]);
+            x.hypot(y).hypot(z) / size.max(f64::MIN_POSITIVE)
         };
         places.iter().map(to).fold(f64::INFINITY, f64::min)
     };
-    let mut order: Vec<(f64, u32)> = surface.faces.iter().map(far).zip(0..).collect();
+    let mut order: Vec<(f64, usize)> = surface.faces.iter().map(far).zip(0..).collect();
     order.select_nth_unstable_by(most, |a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-    let mut chosen: Vec<u32> = order[..most].iter().map(|&(_, ix)| ix).collect();
+    let mut chosen: Vec<usize> = order[..most].iter().map(|&(_, ix)| ix).collect();
     chosen.sort_unstable();
-    let chosen = chosen.into_iter();
-    chosen.map(|ix| surface.faces[ix as usize]).collect()
+    chosen
 }
 
 /// The middle of the box around points, and how far its corners are from there; none where nothing
