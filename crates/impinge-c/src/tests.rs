@@ -1,6 +1,8 @@
 //! Tests of the interface from within: layouts, hashes beside those of Rust, the caller's numbers
 //! of edges. `tests/` has those in C and C++, which `scripts/test-c` runs.
 
+#[cfg(feature = "gpu")]
+mod gpu;
 mod probe;
 
 use std::collections::BTreeMap;
@@ -188,8 +190,13 @@ impl Drop for Built {
     }
 }
 
-/// The same bodies, through C.
+/// The same bodies, through C, with a detector on the CPU.
 fn through_c(scene: &Scene) -> Built {
+    on_backend(1, scene)
+}
+
+/// The same bodies, through C, with a detector on a backend of `impinge.h`.
+fn on_backend(backend: u32, scene: &Scene) -> Built {
     let (mut built, mut detector) = (null_mut(), null_mut());
     // SAFETY: all pointers are to variables and arrays that live as long as the call.
     unsafe {
@@ -217,7 +224,7 @@ fn through_c(scene: &Scene) -> Built {
             }
         }
         let settings = impinge_settings {
-            backend: 1,
+            backend,
             threads: 2,
             ..impinge_settings::default()
         };
@@ -305,10 +312,10 @@ fn catalogue() -> Vec<(&'static str, Scene)> {
     ]
 }
 
-#[test]
-fn answers_have_the_hashes_of_rust() {
+/// Asks a backend about the whole catalogue through C, and the CPU through Rust.
+fn assert_hashes(backend: u32) {
     for (name, scene) in catalogue() {
-        let built = through_c(&scene);
+        let built = on_backend(backend, &scene);
         let mut detector = Detector::new(Backend::Cpu).expect("the CPU");
         let (on, of) = (built.detector, built.scene.cast_const());
         // SAFETY: as in `through_c`.
@@ -391,6 +398,11 @@ fn answers_have_the_hashes_of_rust() {
             impinge_motion_destroy(motion);
         }
     }
+}
+
+#[test]
+fn answers_have_the_hashes_of_rust() {
+    assert_hashes(1);
 }
 
 /// Edges in reverse order, every second one the other way round, and some that are none of the
