@@ -46,6 +46,7 @@ mod sign;
 mod sweep;
 mod tetrahedron;
 mod triangle;
+mod twice;
 
 #[cfg(test)]
 mod tests;
@@ -88,8 +89,8 @@ pub mod internal {
     };
     pub use crate::orientation::{Projection, collinear};
     pub use crate::ray::{Meeting, Parameter, Ray, meet, meet_inside};
-    pub use crate::rounding::{two_product, two_sum};
     pub use crate::segment::strictly_between;
+    pub use crate::twice::{two_product, two_sum};
 
     /// The tests of many pairs at a time, in the registers of an instruction set: certain answers,
     /// or none.

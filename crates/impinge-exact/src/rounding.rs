@@ -1,30 +1,4 @@
-//! Exact numbers rounded to floats, and what rounding leaves out.
-
-/// The sum of two floats, rounded, and its error, which is a float too (Knuth). NaN where it
-/// overflows.
-#[inline]
-pub fn two_sum(a: f64, b: f64) -> [f64; 2] {
-    let sum = a + b;
-    let part = sum - a;
-    [sum, (a - (sum - part)) + (b - part)]
-}
-
-/// The product of two floats, rounded, and its error, which is a float too unless it underflows
-/// (Dekker). No fused multiply-add, so the bits are the same on every machine. NaN beyond 2^996.
-#[inline]
-pub fn two_product(a: f64, b: f64) -> [f64; 2] {
-    // Two halves of 26 bits each (Veltkamp).
-    let halves = |x: f64| {
-        const SPLITTER: f64 = ((1u64 << 27) + 1) as f64;
-        let scaled = SPLITTER * x;
-        let high = scaled - (scaled - x);
-        [high, x - high]
-    };
-    let product = a * b;
-    let [[a_high, a_low], [b_high, b_low]] = [halves(a), halves(b)];
-    let rest = ((a_high * b_high - product) + a_high * b_low + a_low * b_high) + a_low * b_low;
-    [product, rest]
-}
+//! Exact numbers rounded to floats.
 
 /// 2^`exponent`: infinity above the largest `f64`, 0 below the smallest.
 #[inline]

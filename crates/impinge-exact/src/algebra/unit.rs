@@ -1,7 +1,7 @@
 //! Floats as whole numbers of a unit, in 64 bits.
 
 use crate::Point;
-use crate::rounding::two_sum;
+use crate::twice::two_sum;
 
 /// The magnitude of numbers of units is below 2^61.
 const BITS: i64 = 61;

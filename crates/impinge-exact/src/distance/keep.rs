@@ -12,8 +12,9 @@
 //! below d.
 
 use crate::element_pair::ElementPair;
-use crate::rounding::{power_of_two, two_sum};
+use crate::rounding::power_of_two;
 use crate::sweep::Contact;
+use crate::twice::two_sum;
 use crate::{Point, first_within};
 
 use super::reach::Reach;

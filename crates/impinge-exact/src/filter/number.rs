@@ -99,7 +99,7 @@ pub trait Lookup: Number {
 
 /// Points from memory, from lane `first` on.
 #[inline(always)]
-pub(super) fn load_vertex<V: Vector>([x, y, z]: &[[f64; LANES]; 3], first: usize) -> [V; 3] {
+pub(crate) fn load_vertex<V: Vector>([x, y, z]: &[[f64; LANES]; 3], first: usize) -> [V; 3] {
     [V::load(x, first), V::load(y, first), V::load(z, first)]
 }
 

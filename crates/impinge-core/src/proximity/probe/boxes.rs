@@ -1,9 +1,9 @@
 //! The boxes of a body as instruction sets read them, and the way down the tree past them.
 //!
 //! ```text
-//! level 2     [ root ]                one node
-//! level 1     [ eight boxes ]  …      read at once
-//! level 0     [ clusters ]     …
+//! top         [ root ]                one box
+//! level 2     [ eight boxes ]         of the children of a node, read at once
+//! level 1     [ eight clusters ]  …
 //! elements    [ 64 boxes ]     …      found when a probe first comes to the cluster
 //! faces       [ 64 faces ]     …      as are their corners, side by side
 //! ```
@@ -11,11 +11,12 @@
 //! Cost: a copy of the boxes of clusters and nodes per pose, and the boxes and corners of elements
 //! where they are needed.
 
+use std::ops::Range;
 use std::sync::{Arc, OnceLock};
 
 use crate::boxes;
 use crate::bvh::GROUP;
-use crate::bvh::bounds::{Bounds, BoundsArray};
+use crate::bvh::bounds::Bounds;
 use crate::bvh::clusters::Clustering;
 use crate::scene::Body;
 use crate::scene::elements::Elements;
@@ -23,14 +24,17 @@ use crate::scene::index::ClusterIx;
 use crate::scene::positions::{Positions, Real};
 use crate::simd::{LaneBounds, Simd};
 use impinge_exact::internal::filter::Triangles64;
+use impinge_exact::internal::filter::number::Lookup;
 
 /// The boxes of one pose.
 #[derive(Debug)]
 pub(super) struct Boxes {
     pub clustering: Arc<Clustering>,
     positions_stamp: Option<u64>,
-    /// Of each level's nodes, from the clusters up.
-    levels: Vec<BoundsArray>,
+    /// The box of the whole body; none without elements.
+    top: Siblings,
+    /// The children of each level's nodes, from those whose children are clusters up.
+    levels: Vec<Vec<Siblings>>,
     /// Of the elements of each cluster.
     elements: Vec<OnceLock<LaneBounds>>,
     /// The corners of each cluster's faces, rounded to nearest; none for other elements.
@@ -50,6 +54,7 @@ impl Boxes {
         Boxes {
             clustering,
             positions_stamp: None,
+            top: Siblings::EMPTY,
             levels: Vec::new(),
             elements: (0..n).map(|_| OnceLock::new()).collect(),
             faces: (0..n_of_faces).map(|_| OnceLock::new()).collect(),
@@ -64,12 +69,19 @@ impl Boxes {
             return;
         }
         self.positions_stamp = stamp;
-        self.levels.resize_with(of_levels.len(), Default::default);
-        for (boxes, level) in self.levels.iter_mut().zip(of_levels) {
-            boxes.resize(level.len());
-            for (ix, bounds) in level.iter().enumerate() {
-                boxes.put(ix, bounds);
-            }
+        self.top = match of_levels.last() {
+            Some(top) => Siblings::new(top, 0..top.len()),
+            None => Siblings::EMPTY,
+        };
+        let shape = &self.clustering.shape;
+        let n_above = of_levels.len().saturating_sub(1);
+        self.levels.resize_with(n_above, Default::default);
+        for (below, siblings) in self.levels.iter_mut().enumerate() {
+            siblings.clear();
+            siblings.extend(
+                (0..shape.n_nodes(below + 1))
+                    .map(|node| Siblings::new(&of_levels[below], shape.children(below + 1, node))),
+            );
         }
         for lanes in &mut self.elements {
             lanes.take();
@@ -92,7 +104,11 @@ impl Boxes {
     }
 
     pub fn bytes(&self) -> usize {
-        let levels: usize = self.levels.iter().map(BoundsArray::bytes).sum();
+        let levels: usize = self
+            .levels
+            .iter()
+            .map(|nodes| size_of_val(&nodes[..]))
+            .sum();
         levels + size_of_val(&self.elements[..]) + size_of_val(&self.faces[..])
     }
 
@@ -136,26 +152,19 @@ impl Boxes {
 
     /// The box of the whole body; the empty box without elements.
     pub fn root(&self) -> Bounds {
-        match self.levels.last() {
-            Some(top) => top.at(0),
-            None => Bounds::EMPTY,
-        }
+        self.top.at(0)
     }
 
-    /// How many levels of nodes there are, the clusters among them.
-    pub fn n_levels(&self) -> usize {
-        self.levels.len()
+    /// The box of the whole body as the children of nodes are: where the way down starts. What is
+    /// above clusters only has a level of 0.
+    pub fn top(&self) -> (&Siblings, u32) {
+        (&self.top, self.levels.len() as u32)
     }
 
-    /// Eight consecutive boxes of a level, low and high ends; levels are padded by as many.
+    /// The children of a node of a level above 0, which are of the level below.
     #[inline(always)]
-    pub fn eight(&self, level: usize, first: usize) -> [[&[f32; 8]; 3]; 2] {
-        const NONE: &[f32; 8] = &[0.0; 8];
-        let boxes = &self.levels[level];
-        [&boxes.min, &boxes.max].map(|rows| {
-            rows.each_ref()
-                .map(|row| row[first..].first_chunk().unwrap_or(NONE))
-        })
+    pub fn children(&self, level: u32, node: u32) -> &Siblings {
+        &self.levels[level as usize - 1][node as usize]
     }
 
     /// The boxes of a cluster's elements.
@@ -176,6 +185,101 @@ impl Boxes {
             boxes::fill(body.positions(), &self.clustering, cluster, &mut lanes);
             lanes
         })
+    }
+}
+
+/// Up to eight consecutive boxes of a level, side by side.
+#[derive(Debug, Clone)]
+#[repr(C, align(64))]
+pub(super) struct Siblings {
+    /// Rows of eight: low ends by axis, then high ends. Registers may read past a row, and past the
+    /// last.
+    ends: [f32; 7 * EIGHT],
+    /// The number of the first in its level.
+    pub first: u32,
+    n: u32,
+}
+
+/// Boxes side by side.
+const EIGHT: usize = 8;
+
+impl Siblings {
+    const EMPTY: Siblings = {
+        let mut ends = [f32::NEG_INFINITY; 7 * EIGHT];
+        let mut k = 0;
+        while k < 3 * EIGHT {
+            ends[k] = f32::INFINITY;
+            k += 1;
+        }
+        Siblings {
+            ends,
+            first: 0,
+            n: 0,
+        }
+    };
+
+    fn new(level: &[Bounds], siblings: Range<usize>) -> Self {
+        let mut boxes = Siblings {
+            first: siblings.start as u32,
+            n: siblings.len() as u32,
+            ..Siblings::EMPTY
+        };
+        for (k, bounds) in level[siblings].iter().enumerate() {
+            for axis in 0..3 {
+                boxes.ends[EIGHT * axis + k] = bounds.min[axis];
+                boxes.ends[EIGHT * (3 + axis) + k] = bounds.max[axis];
+            }
+        }
+        boxes
+    }
+
+    fn at(&self, k: usize) -> Bounds {
+        let ends = |row: usize| [0, 1, 2].map(|axis| self.ends[EIGHT * (row + axis) + k]);
+        Bounds {
+            min: ends(0),
+            max: ends(3),
+        }
+    }
+
+    /// Bit k for each of the boxes.
+    #[inline(always)]
+    pub fn all(&self) -> u64 {
+        (1 << self.n) - 1
+    }
+
+    /// The boxes as they are read.
+    #[inline(always)]
+    pub fn rows(&self) -> Rows<'_> {
+        Rows {
+            ends: [&self.ends, &self.ends[3 * EIGHT..]],
+            n: EIGHT,
+        }
+    }
+}
+
+/// Boxes side by side.
+#[derive(Clone, Copy)]
+pub(super) struct Rows<'a> {
+    /// Low ends by axis, and high ends.
+    ends: [&'a [f32]; 2],
+    /// How many boxes there are, which is the length of a row.
+    pub n: usize,
+}
+
+impl<'a> Rows<'a> {
+    /// Of the elements of a cluster.
+    #[inline(always)]
+    pub fn of_elements(lanes: &'a LaneBounds) -> Self {
+        Rows {
+            ends: [lanes.min.as_flattened(), lanes.max.as_flattened()],
+            n: GROUP,
+        }
+    }
+
+    /// The ends of some boxes along an axis, from one on: the low ends (0) or the high ones (1).
+    #[inline(always)]
+    pub fn ends<V: Lookup>(&self, end: usize, axis: usize, first: usize) -> V {
+        V::row(self.ends[end], self.n * axis + first)
     }
 }
 
@@ -208,54 +312,71 @@ pub(super) fn rounding_of([x, y, z]: [f32; 3]) -> f64 {
 /// The way down a tree: siblings that are left to be visited.
 #[derive(Debug, Default)]
 pub(super) struct Descent {
-    stack: Vec<Siblings>,
+    stack: Vec<Left>,
 }
 
-/// Up to eight consecutive nodes of one level.
+/// Of consecutive nodes of one level those whose boxes meet the query and that were not visited.
 #[derive(Debug)]
-struct Siblings {
-    level: usize,
-    first: usize,
-    /// Those whose boxes meet the query and that were not visited.
-    mask: u32,
+struct Left {
+    level: u32,
+    first: u32,
+    mask: u64,
 }
 
 impl Descent {
     /// Starts at the root, whose box must meet the query.
     pub fn start(&mut self, boxes: &Boxes) {
         self.stack.clear();
-        if let Some(level) = boxes.levels.len().checked_sub(1) {
-            self.stack.push(Siblings {
-                level,
-                first: 0,
-                mask: 1,
-            });
-        }
+        let (top, level) = boxes.top();
+        self.stack.push(Left {
+            level,
+            first: top.first,
+            mask: top.all(),
+        });
     }
 
     /// The next cluster whose box meets the query.
     #[inline(always)]
-    pub fn next<S: Simd>(&mut self, simd: S, boxes: &Boxes, query: &Bounds) -> Option<ClusterIx> {
+    pub fn next<S: Simd>(&mut self, _: S, boxes: &Boxes, query: &Bounds) -> Option<ClusterIx> {
         loop {
             let top = self.stack.last_mut()?;
             if top.mask == 0 {
                 self.stack.pop();
                 continue;
             }
-            let node = top.first + top.mask.trailing_zeros() as usize;
+            let node = top.first + top.mask.trailing_zeros();
             top.mask &= top.mask - 1;
-            if top.level == 0 {
-                return Some(ClusterIx::new(node as u32));
+            let level = top.level;
+            if level == 0 {
+                return Some(ClusterIx::new(node));
             }
-            let level = top.level - 1;
-            let children = boxes.clustering.shape.children(top.level, node);
-            let mask = simd.overlaps_8(&boxes.levels[level], children.start, query)
-                & ((1 << children.len()) - 1);
-            self.stack.push(Siblings {
-                level,
-                first: children.start,
+            let children = boxes.children(level, node);
+            let mask = overlapping::<S::F32>(children.rows(), query) & children.all();
+            self.stack.push(Left {
+                level: level - 1,
+                first: children.first,
                 mask,
             });
         }
     }
+}
+
+/// Bit k: box k overlaps a query.
+#[inline(always)]
+fn overlapping<V: Lookup>(rows: Rows<'_>, query: &Bounds) -> u64 {
+    let mut mask = 0;
+    for first in (0..rows.n).step_by(V::N) {
+        let mut is_apart = V::splat(0.0).gt(V::splat(0.0));
+        for axis in 0..3 {
+            let (low, high) = (
+                rows.ends::<V>(0, axis, first),
+                rows.ends::<V>(1, axis, first),
+            );
+            is_apart = is_apart
+                | low.gt(V::splat(f64::from(query.max[axis])))
+                | V::splat(f64::from(query.min[axis])).gt(high);
+        }
+        mask |= u64::from(V::bits(!is_apart)) << first;
+    }
+    mask
 }

@@ -13,10 +13,11 @@
 
 use std::cmp::Ordering;
 
-use super::boxes::{GROWN, Waiting, wait_in_order};
+use super::boxes::{GROWN, Rows, Waiting, wait_in_order};
 use super::{HITS, Looks, Target};
 use crate::answers::hits::RayHit;
 use crate::answers::pairs::Element;
+use crate::bvh::GROUP;
 use crate::bvh::bounds::{Bounds, round_down, round_up};
 use crate::query::step::Hit;
 use crate::scene::elements::with_corners;
@@ -26,8 +27,9 @@ use crate::scene::index::{ClusterIx, ElementIx};
 use crate::search::narrow::Corners;
 use crate::search::sink::grow;
 use crate::search::work::Work;
-use crate::simd::{Isa, LaneBounds, Lanes, Simd, up_to, with_isa};
-use impinge_exact::internal::filter::{cross, difference, dot, size};
+use crate::simd::{Isa, Lanes, Simd, up_to, with_isa};
+use impinge_exact::internal::filter::number::{Lookup, Vector};
+use impinge_exact::internal::filter::{LANES, cross, difference, dot, size};
 use impinge_exact::internal::{Ray, meet, meet_inside};
 use impinge_exact::{Feature, Point};
 
@@ -66,7 +68,7 @@ pub(super) fn cast(
 
 #[inline(always)]
 fn cast_all<S: Simd>(
-    _simd: S,
+    simd: S,
     bodies: &[(BodyId, Target<'_>)],
     rays: &[Ray],
     hits: Hit,
@@ -78,19 +80,28 @@ fn cast_all<S: Simd>(
         hits,
         limit: f64::INFINITY,
         found: Vec::new(),
+        first: 0,
+        n_answered: 0,
+        ends: Vec::new(),
         waiting: Vec::new(),
     };
-    for ray in rays {
+    let mut left = rays;
+    while let Some((ray, after)) = left.split_first() {
+        left = after;
         search.begin(ray);
         for (number, &(_, target)) in bodies.iter().enumerate() {
-            search.visit(number, target, ray)?;
+            search.visit(simd, number, target, ray)?;
         }
-        let is_hit = !search.found.is_empty();
-        search.answer(bodies, ray, &mut into.0)?;
-        into.1.push((into.0.len(), is_hit));
+        search.end()?;
+        if left.is_empty() || search.found.len() >= MANY {
+            search.answer(simd, bodies, rays, into)?;
+        }
     }
     Ok(())
 }
+
+/// Candidates of several rays, of which the numbers are found at once.
+const MANY: usize = 128;
 
 /// An element that a ray certainly meets.
 struct RayCandidate {
@@ -104,6 +115,7 @@ struct RayCandidate {
 }
 
 /// The numbers of a hit.
+#[derive(Clone, Copy)]
 struct Met {
     t: f64,
     t_end: f64,
@@ -112,22 +124,6 @@ struct Met {
 }
 
 impl Met {
-    /// In twice the precision of floats where that suffices.
-    #[inline(always)]
-    fn new(ray: &Ray, corners: &[Point]) -> Option<Self> {
-        if let &[a, b, c] = corners
-            && let Some((t, barycentrics)) = meet_inside(ray, &[a, b, c])
-        {
-            return Some(Met {
-                t,
-                t_end: t,
-                feature: Feature::Face,
-                barycentrics,
-            });
-        }
-        Met::exactly(ray, corners)
-    }
-
     fn exactly(ray: &Ray, corners: &[Point]) -> Option<Self> {
         let meeting = meet(ray, corners)?;
         Some(Met {
@@ -149,16 +145,14 @@ struct RayFound {
 
 impl RayFound {
     #[inline(always)]
-    fn new(candidate: RayCandidate, bodies: &[(BodyId, Target<'_>)], ray: &Ray) -> Option<Self> {
-        let RayCandidate { body, slot, .. } = candidate;
+    fn new(candidate: &RayCandidate, bodies: &[(BodyId, Target<'_>)]) -> Option<Self> {
+        let &RayCandidate {
+            body, slot, met, ..
+        } = candidate;
         let target = bodies[body].1;
         let corners = corners(target, slot);
-        let met = match candidate.met {
-            Some(met) => met,
-            None => Met::new(ray, corners.points())?,
-        };
         Some(RayFound {
-            met,
+            met: met?,
             body,
             element: target.boxes.clustering.order[slot],
             corners,
@@ -203,27 +197,30 @@ fn corners(target: Target<'_>, slot: usize) -> Corners {
 
 /// A ray as boxes are held against it, in single precision: rounded so that it meets all that the
 /// ray meets.
-struct Slabs {
+struct Slabs<V> {
     /// The origin, rounded down and up.
-    origin: [[f32; 3]; 2],
+    origin: [[V; 3]; 2],
     /// Of the direction: infinite for 0, and no number along axes that are not looked at.
-    inverse: [f32; 3],
-    is_down: [bool; 3],
+    inverse: [V; 3],
+    /// 1 along axes along which the ray goes down, which comes to high ends first; else 0.
+    is_down: [usize; 3],
 }
 
-impl Slabs {
+impl<V: Lookup> Slabs<V> {
+    #[inline(always)]
     fn new(ray: &Ray, whole: &Bounds) -> Self {
+        let nothing = V::splat(f64::NAN);
         let mut slabs = Slabs {
-            origin: [[0.0; 3]; 2],
-            inverse: [f32::NAN; 3],
-            is_down: [false; 3],
+            origin: [[nothing; 3]; 2],
+            inverse: [nothing; 3],
+            is_down: [0; 3],
         };
         for axis in 0..3 {
             let (origin, direction) = (ray.origin[axis], ray.direction[axis]);
             let (below, above) = (round_down(origin), round_up(origin));
-            slabs.origin[0][axis] = below;
-            slabs.origin[1][axis] = above;
-            slabs.is_down[axis] = direction < 0.0;
+            slabs.origin[0][axis] = V::splat(f64::from(below));
+            slabs.origin[1][axis] = V::splat(f64::from(above));
+            slabs.is_down[axis] = usize::from(direction < 0.0);
             let inverse = 1.0 / direction.abs();
             let is_moderate = inverse == f64::INFINITY && direction == 0.0
                 || (1.0 / f64::from(FAR)..f64::from(FAR)).contains(&inverse);
@@ -231,60 +228,63 @@ impl Slabs {
             let is_near =
                 below.abs() <= FAR && above.abs() <= FAR && low.abs() <= FAR && high.abs() <= FAR;
             if is_moderate && is_near {
-                let inverse = inverse as f32;
-                slabs.inverse[axis] = if slabs.is_down[axis] {
-                    -inverse
-                } else {
-                    inverse
-                };
+                let is_down = direction < 0.0;
+                slabs.inverse[axis] = V::splat(if is_down { -inverse } else { inverse });
             }
         }
         slabs
     }
 
     /// When the ray comes to some boxes, about and never too late, and those that it may reach
-    /// before a limit.
+    /// before a limit. What follows the boxes that there are is arbitrary.
     #[inline(always)]
-    fn reach<const N: usize>(&self, boxes: [[&[f32; N]; 3]; 2], limit: f32) -> ([f32; N], u64) {
-        let (mut near, mut far) = ([0.0f32; N], [limit; N]);
-        let [low, high] = boxes;
-        for (axis, (low, high)) in low.into_iter().zip(high).enumerate() {
-            let [below, above] = [self.origin[0][axis], self.origin[1][axis]];
-            let ((enter, at_enter), (leave, at_leave)) = match self.is_down[axis] {
-                true => ((high, below), (low, above)),
-                false => ((low, above), (high, below)),
-            };
-            let inverse = self.inverse[axis];
-            for (lane, (near, far)) in near.iter_mut().zip(&mut far).enumerate() {
-                // Comparisons with what is no number are false.
-                let t = (enter[lane] - at_enter) * inverse;
-                *near = if t > *near { t } else { *near };
-                let t = (leave[lane] - at_leave) * inverse;
-                *far = if t < *far { t } else { *far };
-            }
-        }
+    fn reach(&self, rows: Rows<'_>, limit: f32, nears: &mut [f32; GROUP]) -> u64 {
+        let limit = V::splat(f64::from(limit));
+        let (grown, least) = (f64::from(GROWN), f64::from(f32::MIN_POSITIVE));
         let mut mask = 0;
-        for (lane, (near, far)) in near.iter().zip(far).enumerate() {
-            mask |= u64::from(*near <= far * GROWN + f32::MIN_POSITIVE) << lane;
+        for first in (0..rows.n).step_by(V::N) {
+            let (mut near, mut far) = (V::splat(0.0), limit);
+            for axis in 0..3 {
+                let is_down = self.is_down[axis];
+                let [enter, leave] = [is_down, 1 - is_down];
+                let inverse = self.inverse[axis];
+                // Comparisons with what is no number are false.
+                let t = rows.ends::<V>(enter, axis, first) - self.origin[1 - is_down][axis];
+                near = (t * inverse).larger(near);
+                let t = rows.ends::<V>(leave, axis, first) - self.origin[is_down][axis];
+                let t = t * inverse;
+                far = V::select(far.gt(t), t, far);
+            }
+            near.put(nears, first);
+            let is_missed = near.gt(far * V::splat(grown) + V::splat(least));
+            mask |= u64::from(V::bits(!is_missed)) << first;
         }
-        (near, mask)
+        mask
     }
 }
 
-/// The search of one ray; the memory is kept for the next.
+/// The search of one ray after the other; the memory is kept.
 struct RaySearch<'a> {
     looks: Looks<'a>,
     hits: Hit,
     /// What the ray meets later is not asked for.
     limit: f64,
+    /// Of the rays that are not answered yet, one after the other.
     found: Vec<RayCandidate>,
+    /// The first of this ray.
+    first: usize,
+    /// How many rays are answered.
+    n_answered: usize,
+    /// Where the candidates of those that are not end.
+    ends: Vec<usize>,
     /// By when the ray comes to their boxes.
     waiting: Vec<Waiting>,
 }
 
 impl RaySearch<'_> {
+    #[inline(always)]
     fn begin(&mut self, ray: &Ray) {
-        self.found.clear();
+        self.first = self.found.len();
         self.limit = ray.most;
     }
 
@@ -296,55 +296,67 @@ impl RaySearch<'_> {
 
     /// Adds what the ray hits of a body.
     #[inline(always)]
-    fn visit(&mut self, body: usize, target: Target<'_>, ray: &Ray) -> Result<(), Error> {
+    fn visit<S: Simd>(
+        &mut self,
+        _: S,
+        body: usize,
+        target: Target<'_>,
+        ray: &Ray,
+    ) -> Result<(), Error> {
         let boxes = target.boxes;
-        let slabs = Slabs::new(ray, &boxes.root());
+        let slabs = Slabs::<S::F32>::new(ray, &boxes.root());
+        let mut nears = [0.0; GROUP];
+        let (mut siblings, mut level) = boxes.top();
         self.waiting.clear();
-        if let Some(top) = boxes.n_levels().checked_sub(1) {
-            self.waiting.push((0.0, top as u32, 0));
-        }
-        while let Some((near, level, node)) = self.waiting.pop() {
-            let limit = self.limit_of_boxes();
-            if near > limit * GROWN + f32::MIN_POSITIVE {
-                continue;
+        loop {
+            let mask = slabs.reach(siblings.rows(), self.limit_of_boxes(), &mut nears);
+            let first = self.waiting.len();
+            for lane in Lanes(mask & siblings.all()) {
+                let node = siblings.first + lane as u32;
+                wait_in_order(&mut self.waiting, first, (nears[lane], level, node));
             }
-            self.looks.step()?;
-            if level == 0 {
-                self.look(body, target, ClusterIx::new(node), ray, &slabs)?;
-                if self.hits == Hit::Any && !self.found.is_empty() {
+            // The next node above the clusters, whose children are looked at next.
+            loop {
+                let Some((near, of_node, node)) = self.waiting.pop() else {
+                    return Ok(());
+                };
+                let limit = self.limit_of_boxes();
+                if near > limit * GROWN + f32::MIN_POSITIVE {
+                    continue;
+                }
+                self.looks.step()?;
+                if of_node > 0 {
+                    siblings = boxes.children(of_node, node);
+                    level = of_node - 1;
+                    break;
+                }
+                self.look(
+                    (body, target),
+                    ClusterIx::new(node),
+                    ray,
+                    &slabs,
+                    &mut nears,
+                )?;
+                if self.hits == Hit::Any && self.found.len() > self.first {
                     return Ok(());
                 }
-                continue;
-            }
-            let (level, first) = (level - 1, self.waiting.len());
-            let children = boxes
-                .clustering
-                .shape
-                .children(level as usize + 1, node as usize);
-            let eight = boxes.eight(level as usize, children.start);
-            let (nears, mask) = slabs.reach(eight, limit);
-            for lane in Lanes(mask & up_to(children.len() - 1)) {
-                let child = (children.start + lane) as u32;
-                wait_in_order(&mut self.waiting, first, (nears[lane], level, child));
             }
         }
-        Ok(())
     }
 
     /// Adds what the ray hits of a cluster.
     #[inline(always)]
-    fn look(
+    fn look<V: Lookup>(
         &mut self,
-        body: usize,
-        target: Target<'_>,
+        (body, target): (usize, Target<'_>),
         cluster: ClusterIx,
         ray: &Ray,
-        slabs: &Slabs,
+        slabs: &Slabs<V>,
+        nears: &mut [f32; GROUP],
     ) -> Result<(), Error> {
         let slots = target.boxes.clustering.slots(cluster);
-        let lanes: &LaneBounds = target.boxes.elements(target.body, cluster);
-        let rows = [lanes.min.each_ref(), lanes.max.each_ref()];
-        let (nears, mask) = slabs.reach(rows, self.limit_of_boxes());
+        let lanes = target.boxes.elements(target.body, cluster);
+        let mask = slabs.reach(Rows::of_elements(lanes), self.limit_of_boxes(), nears);
         for lane in Lanes(mask & up_to(slots.len() - 1)) {
             if nears[lane] > self.limit_of_boxes() * GROWN + f32::MIN_POSITIVE {
                 continue;
@@ -365,7 +377,7 @@ impl RaySearch<'_> {
             };
             if self.hits != Hit::All && high < self.limit {
                 self.limit = high;
-                self.found.retain(|other| other.low <= high);
+                self.forget_later_than(high);
             }
             grow(&mut self.found, 1, HITS)?;
             self.found.push(RayCandidate {
@@ -375,6 +387,30 @@ impl RaySearch<'_> {
                 met,
             });
         }
+        Ok(())
+    }
+
+    /// Keeps of this ray's candidates those that may be met so early.
+    #[inline(always)]
+    fn forget_later_than(&mut self, high: f64) {
+        let mut kept = self.first;
+        for ix in self.first..self.found.len() {
+            if self.found[ix].low <= high {
+                self.found.swap(kept, ix);
+                kept += 1;
+            }
+        }
+        self.found.truncate(kept);
+    }
+
+    /// Ends the search of a ray.
+    ///
+    /// # Errors
+    /// Memory.
+    #[inline(always)]
+    fn end(&mut self) -> Result<(), Error> {
+        grow(&mut self.ends, 1, HITS)?;
+        self.ends.push(self.found.len());
         Ok(())
     }
 
@@ -427,46 +463,101 @@ impl RaySearch<'_> {
         }
     }
 
-    /// What is said of a ray: nothing, the first hit, or all in order.
+    /// What is said of the rays that are not answered yet: nothing, the first hits, or all in order.
     ///
     /// # Errors
     /// Cancellation.
-    fn answer(
+    #[inline(always)]
+    fn answer<S: Simd>(
         &mut self,
+        _: S,
         bodies: &[(BodyId, Target<'_>)],
-        ray: &Ray,
-        into: &mut Vec<RayHit>,
+        rays: &[Ray],
+        into: &mut HitLists,
     ) -> Result<(), Error> {
-        if self.hits == Hit::Any {
-            return Ok(());
-        }
-        if self.hits == Hit::First {
-            let mut first: Option<RayFound> = None;
-            for candidate in self.found.drain(..) {
-                let Some(found) = RayFound::new(candidate, bodies, ray) else {
-                    continue;
-                };
-                match &first {
-                    Some(first) if found.compare(first, ray).is_ge() => {}
-                    _ => first = Some(found),
-                }
-            }
-            grow(into, 1, HITS)?;
-            if let Some(first) = first {
-                into.push(first.answer(bodies));
-            }
-            return Ok(());
+        let rays = &rays[self.n_answered..][..self.ends.len()];
+        self.n_answered += rays.len();
+        if self.hits != Hit::Any {
+            self.find_numbers::<S::F64>(bodies, rays);
         }
         let mut all: Vec<RayFound> = Vec::new();
-        for candidate in self.found.drain(..) {
-            self.looks.step()?;
-            grow(&mut all, 1, HITS)?;
-            all.extend(RayFound::new(candidate, bodies, ray));
+        let mut first = 0;
+        for (ray, &end) in rays.iter().zip(&self.ends) {
+            let candidates = &self.found[first..end];
+            first = end;
+            match self.hits {
+                Hit::Any => {}
+                Hit::First => {
+                    let mut nearest: Option<RayFound> = None;
+                    for candidate in candidates {
+                        let Some(found) = RayFound::new(candidate, bodies) else {
+                            continue;
+                        };
+                        match &nearest {
+                            Some(nearest) if found.compare(nearest, ray).is_ge() => {}
+                            _ => nearest = Some(found),
+                        }
+                    }
+                    grow(&mut into.0, 1, HITS)?;
+                    into.0.extend(nearest.map(|hit| hit.answer(bodies)));
+                }
+                _ => {
+                    all.clear();
+                    for candidate in candidates {
+                        self.looks.step()?;
+                        grow(&mut all, 1, HITS)?;
+                        all.extend(RayFound::new(candidate, bodies));
+                    }
+                    grow(&mut into.0, all.len(), HITS)?;
+                    all.sort_unstable_by(|one, other| one.compare(other, ray));
+                    into.0.extend(all.iter().map(|found| found.answer(bodies)));
+                }
+            }
+            into.1.push((into.0.len(), !candidates.is_empty()));
         }
-        grow(into, all.len(), HITS)?;
-        all.sort_unstable_by(|one, other| one.compare(other, ray));
-        into.extend(all.iter().map(|found| found.answer(bodies)));
+        self.found.clear();
+        self.ends.clear();
         Ok(())
+    }
+
+    /// Finds the numbers of hits through the insides of faces, eight at a time, in twice the
+    /// precision of floats where that suffices.
+    #[inline(always)]
+    fn find_numbers<V: Vector>(&mut self, bodies: &[(BodyId, Target<'_>)], rays: &[Ray]) {
+        let mut batch = [(Ray::default(), [[0.0; 3]; 3]); LANES];
+        let mut of_batch = [0; LANES];
+        let (mut n, mut ray) = (0, 0);
+        for ix in 0..=self.found.len() {
+            if n == LANES || ix == self.found.len() {
+                let found = meet_inside::<V>(&batch[..n]);
+                for (lane, &of_lane) in of_batch[..n].iter().enumerate() {
+                    let (ray, face) = &batch[lane];
+                    self.found[of_lane].met = match found[lane] {
+                        Some((t, barycentrics)) => Some(Met {
+                            t,
+                            t_end: t,
+                            feature: Feature::Face,
+                            barycentrics,
+                        }),
+                        None => Met::exactly(ray, face),
+                    };
+                }
+                n = 0;
+            }
+            let Some(candidate) = self.found.get(ix) else {
+                break;
+            };
+            while self.ends[ray] <= ix {
+                ray += 1;
+            }
+            if candidate.met.is_none()
+                && let &[a, b, c] = corners(bodies[candidate.body].1, candidate.slot).points()
+            {
+                batch[n] = (rays[ray], [a, b, c]);
+                of_batch[n] = ix;
+                n += 1;
+            }
+        }
     }
 }
 

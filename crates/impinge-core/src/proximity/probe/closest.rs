@@ -18,12 +18,12 @@
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
-use super::boxes::{GROWN, Waiting, rounding_of, wait_in_order};
+use super::boxes::{GROWN, Rows, Waiting, rounding_of, wait_in_order};
 use super::{Looks, Target, WHAT};
 use crate::answers::closest::ClosestElement;
 use crate::answers::pairs::Element;
 use crate::bvh::GROUP;
-use crate::bvh::bounds::{Bounds, round_down, round_up};
+use crate::bvh::bounds::{round_down, round_up};
 use crate::scene::elements::with_corners;
 use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
@@ -34,6 +34,7 @@ use crate::search::sink::grow;
 use crate::search::work::Work;
 use crate::simd::{Isa, Lanes, Simd, up_to, with_isa};
 use impinge_exact::Point;
+use impinge_exact::internal::filter::number::Lookup;
 use impinge_exact::internal::filter::{BATCH, point_bounds_in_tables};
 use impinge_exact::internal::{
     Reach, closest_of_elements, compare_point_distances, elements_are_within, point_distance_bounds,
@@ -86,9 +87,12 @@ fn all_closest<S: Simd, R: Real>(
         search.begin(most);
         search.expect(bodies, &point, &likely)?;
         order.clear();
-        let rounded = RoundedPoint::new(&point);
+        let rounded = RoundedPoint::<S::F32>::new(&point);
+        let mut squares = [0.0; GROUP];
         for (number, (_, target)) in bodies.iter().enumerate() {
-            order.push((rounded.squared_distance(&target.boxes.root()), number));
+            let (top, _) = target.boxes.top();
+            rounded.squared_distances(top.rows(), search.limit, &mut squares);
+            order.push((squares[0], number));
         }
         order.sort_unstable_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
         for &(low, body) in &order {
@@ -262,33 +266,37 @@ impl<'a> PointSearch<'a> {
         simd: S,
         (body, target): (usize, Target<'_>),
         point: &Point,
-        rounded: &RoundedPoint,
+        rounded: &RoundedPoint<S::F32>,
     ) -> Result<(), Error> {
         let boxes = target.boxes;
+        let mut lows = [0.0; GROUP];
+        let (mut siblings, mut level) = boxes.top();
         self.waiting.clear();
-        if let Some(top) = boxes.n_levels().checked_sub(1) {
-            self.waiting.push((0.0, top as u32, 0));
+        loop {
+            let mask = rounded.squared_distances(siblings.rows(), self.limit, &mut lows);
+            let first = self.waiting.len();
+            for lane in Lanes(mask & siblings.all()) {
+                let node = siblings.first + lane as u32;
+                wait_in_order(&mut self.waiting, first, (lows[lane], level, node));
+            }
+            // The next node above the clusters, whose children are looked at next.
+            loop {
+                let Some((low, of_node, node)) = self.waiting.pop() else {
+                    return Ok(());
+                };
+                if low > self.limit {
+                    continue;
+                }
+                self.looks.step()?;
+                if of_node > 0 {
+                    siblings = boxes.children(of_node, node);
+                    level = of_node - 1;
+                    break;
+                }
+                let cluster = ClusterIx::new(node);
+                self.compare(simd, (body, target), cluster, point, rounded, &mut lows)?;
+            }
         }
-        while let Some((low, level, node)) = self.waiting.pop() {
-            if low > self.limit {
-                continue;
-            }
-            self.looks.step()?;
-            if level == 0 {
-                self.compare(simd, (body, target), ClusterIx::new(node), point, rounded)?;
-                continue;
-            }
-            let (below, first) = (level - 1, self.waiting.len());
-            let shape = &boxes.clustering.shape;
-            let children = shape.children(level as usize, node as usize);
-            let eight = boxes.eight(below as usize, children.start);
-            let (lows, mask) = rounded.squared_distances(eight, self.limit);
-            for lane in Lanes(mask & up_to(children.len() - 1)) {
-                let child = (children.start + lane) as u32;
-                wait_in_order(&mut self.waiting, first, (lows[lane], below, child));
-            }
-        }
-        Ok(())
     }
 
     /// Adds the elements of a cluster that may be nearest.
@@ -299,12 +307,12 @@ impl<'a> PointSearch<'a> {
         (body, target): (usize, Target<'_>),
         cluster: ClusterIx,
         point: &Point,
-        rounded: &RoundedPoint,
+        rounded: &RoundedPoint<S::F32>,
+        lows: &mut [f32; GROUP],
     ) -> Result<(), Error> {
         let slots = target.boxes.clustering.slots(cluster);
         let lanes = target.boxes.elements(target.body, cluster);
-        let rows = [lanes.min.each_ref(), lanes.max.each_ref()];
-        let (lows, mask) = rounded.squared_distances(rows, self.limit);
+        let mask = rounded.squared_distances(Rows::of_elements(lanes), self.limit, lows);
         let mut mask = mask & up_to(slots.len() - 1);
         if mask == 0 {
             return Ok(());
@@ -339,7 +347,7 @@ impl<'a> PointSearch<'a> {
                 self.add(bounds, body, slot);
             }
             // Lanes after these, of boxes that are still near enough.
-            mask &= !up_to(usize::from(batch[n - 1])) & not_above(&lows, self.limit);
+            mask &= !up_to(usize::from(batch[n - 1])) & not_above::<S::F32>(lows, self.limit);
         }
         Ok(())
     }
@@ -483,27 +491,27 @@ impl<'a> PointSearch<'a> {
 }
 
 /// A point as boxes and faces in single precision are held against it.
-struct RoundedPoint {
+struct RoundedPoint<V> {
     /// Rounded down and up.
-    ends: [[f32; 3]; 2],
+    ends: [[V; 3]; 2],
     /// Rounded to nearest.
     nearest: [f32; 3],
     /// More than rounding to nearest may move it.
     error: f64,
 }
 
-impl RoundedPoint {
+impl<V: Lookup> RoundedPoint<V> {
     #[inline(always)]
     fn new(point: &Point) -> Self {
         let mut rounded = RoundedPoint {
-            ends: [[0.0; 3]; 2],
+            ends: [[V::splat(0.0); 3]; 2],
             nearest: [0.0; 3],
             error: 0.0,
         };
         let mut is_exact = true;
         for (axis, &x) in point.iter().enumerate() {
-            rounded.ends[0][axis] = round_down(x);
-            rounded.ends[1][axis] = round_up(x);
+            rounded.ends[0][axis] = V::splat(f64::from(round_down(x)));
+            rounded.ends[1][axis] = V::splat(f64::from(round_up(x)));
             rounded.nearest[axis] = <f32 as Real>::round(x);
             is_exact &= f64::from(rounded.nearest[axis]) == x;
         }
@@ -513,43 +521,37 @@ impl RoundedPoint {
         rounded
     }
 
-    /// As [`squared_distances`](Self::squared_distances), of one box.
-    fn squared_distance(&self, bounds: &Bounds) -> f32 {
-        let rows = [&bounds.min, &bounds.max].map(|ends| ends.each_ref().map(std::array::from_ref));
-        let ([square], _) = self.squared_distances(rows, f32::INFINITY);
-        square
-    }
-
     /// The squares of the distances from some boxes, about and never too large but for
-    /// [`GROWN`], and those that are not above a limit that has grown.
+    /// [`GROWN`], and those that are not above a limit that has grown. What follows the boxes that
+    /// there are is arbitrary.
     #[inline(always)]
-    fn squared_distances<const N: usize>(
-        &self,
-        [low, high]: [[&[f32; N]; 3]; 2],
-        limit: f32,
-    ) -> ([f32; N], u64) {
-        let mut sums = [0.0; N];
+    fn squared_distances(&self, rows: Rows<'_>, limit: f32, squares: &mut [f32; GROUP]) -> u64 {
+        let limit = V::splat(f64::from(limit));
         let [down, up] = &self.ends;
-        for axis in 0..3 {
-            let (low, high) = (low[axis], high[axis]);
-            for (lane, sum) in sums.iter_mut().enumerate() {
-                let (below, above) = (low[lane] - up[axis], down[axis] - high[lane]);
-                let gap = if below > above { below } else { above };
-                let gap = if gap > 0.0 { gap } else { 0.0 };
-                *sum += gap * gap;
+        let mut mask = 0;
+        for first in (0..rows.n).step_by(V::N) {
+            let mut sum = V::splat(0.0);
+            for axis in 0..3 {
+                let below = rows.ends::<V>(0, axis, first) - up[axis];
+                let above = down[axis] - rows.ends::<V>(1, axis, first);
+                let gap = below.larger(above).larger(V::splat(0.0));
+                sum = sum + gap * gap;
             }
+            sum.put(squares, first);
+            mask |= u64::from(V::bits(!sum.gt(limit))) << first;
         }
-        let mask = not_above(&sums, limit);
-        (sums, mask)
+        mask
     }
 }
 
 /// Bit k: number k is not above a limit.
 #[inline(always)]
-fn not_above<const N: usize>(numbers: &[f32; N], limit: f32) -> u64 {
+fn not_above<V: Lookup>(numbers: &[f32; GROUP], limit: f32) -> u64 {
+    let limit = V::splat(f64::from(limit));
     let mut mask = 0;
-    for (lane, &number) in numbers.iter().enumerate() {
-        mask |= u64::from(number <= limit) << lane;
+    for first in (0..GROUP).step_by(V::N) {
+        let is_above = V::row(numbers, first).gt(limit);
+        mask |= u64::from(V::bits(!is_above)) << first;
     }
     mask
 }
