@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use impinge::{Detector, Method, PairKind, Pairs, Scene, Settings};
+use impinge::{Detector, Method, PairKind, Pairs, Query, Scene, Settings};
 use impinge_render::wgpu;
 
 use crate::options::{Backend, Question};
@@ -134,6 +134,30 @@ pub(crate) fn curves(scene: &Scene, pairs: &Pairs) -> Result<Vec<[[f64; 3]; 2]>,
     Ok(segments
         .map(|ends| ends.map(|point| contacts.points()[point as usize]))
         .collect())
+}
+
+/// The distance of a point from the nearest other body, and which that is; `None` if there is no
+/// other.
+pub(crate) fn nearest(
+    detector: &mut Detector,
+    stage: &Stage,
+    body: usize,
+    point: [f64; 3],
+) -> Result<Option<(usize, f64)>, String> {
+    let bodies = &stage.content.bodies;
+    let others = bodies.iter().map(|shown| shown.id);
+    let others = others.filter(|&id| stage.id(body) != Some(id));
+    let query = Query::across(others);
+    let closest = detector
+        .closest(stage.scene(), &[point], f64::INFINITY, &query)
+        .map_err(|error| error.to_string())?;
+    let nearest = closest.iter().next().flatten();
+    Ok(nearest.and_then(|found| {
+        let body = bodies
+            .iter()
+            .position(|shown| shown.id == found.element.body)?;
+        Some((body, found.distance))
+    }))
 }
 
 /// The faces of each body that are within a distance of another one's, as primitives of triangle

@@ -417,6 +417,7 @@ fn help(ui: &mut Ui) {
         "Drag beside the bodies, or with the right button: turn the view",
         "Drag with the middle button: shift the view",
         "Wheel: zoom to the pointer",
+        "Rest on a body: how far the nearest other body is from there",
     ] {
         ui.label(RichText::new(text).small());
     }

@@ -5,12 +5,12 @@ use std::path::PathBuf;
 
 use eframe::egui;
 use egui_wgpu::RenderState;
-use impinge::{Element, Method};
+use impinge::{Detector, Element, Method};
 use impinge_render::{Focus, Look, Orbit};
 
 use crate::content::Content;
 use crate::drag::Drag;
-use crate::find::{Answer, Finder, curves, near, quiet_detector};
+use crate::find::{Answer, Finder, curves, near, nearest, quiet_detector};
 use crate::flight::Flight;
 use crate::options::{Backend, Options, Question, Shows};
 use crate::pick::{Hit, pick};
@@ -76,6 +76,8 @@ pub(crate) struct Session {
     seeks: bool,
     screen: Screen,
     finder: Finder,
+    /// For distances from the point under the pointer, once they were asked for.
+    prober: Option<Detector>,
     /// For the next frame, once impacts were asked for.
     scratch: Option<Stage>,
     flight: Option<Flight>,
@@ -137,6 +139,7 @@ impl Session {
         };
         Ok(Session {
             scratch: None,
+            prober: None,
             orbit,
             bounds,
             aspect: 1.0,
@@ -334,6 +337,28 @@ impl Session {
             false => self.screen.live.faces(body),
         };
         pick(&self.stage, faces, self.orbit.ray(aspect, at), only)
+    }
+
+    /// What is said of a point of the view: the triangle there, and how far from that point the
+    /// nearest other body is.
+    pub fn under(&mut self, aspect: f64, at: [f64; 2]) -> Option<String> {
+        let hit = self.hit(aspect, at)?;
+        let name = |body: usize| self.stage.content.bodies[body].name.as_str();
+        let mut text = format!("{}, triangle {}", name(hit.body), hit.primitive);
+        if self.prober.is_none() {
+            self.prober = quiet_detector().ok();
+        }
+        let [start, along] = self.orbit.ray(aspect, at);
+        let point = std::array::from_fn(|k| start[k] + hit.t * along[k]);
+        let found = nearest(self.prober.as_mut()?, &self.stage, hit.body, point);
+        match found {
+            Ok(Some((other, distance))) => {
+                text += &format!("\n{} from {}", four_digits(distance), name(other));
+            }
+            Ok(None) => {}
+            Err(why) => text += &format!("\n{why}"),
+        }
+        Some(text)
     }
 
     pub fn select(&mut self, selected: Option<(usize, u32)>) {
@@ -717,6 +742,12 @@ fn start_timeline(
     let ctx = ctx.clone();
     let wake = move || ctx.request_repaint_after(NEWS);
     Timeline::start(stage, question, with_earliest, wake)
+}
+
+/// A number with four digits.
+fn four_digits(x: f64) -> String {
+    let rounded = format!("{x:.3e}").parse::<f64>();
+    rounded.map_or_else(|_| x.to_string(), |x| x.to_string())
 }
 
 /// The diagonal of a box.

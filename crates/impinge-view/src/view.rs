@@ -1,6 +1,6 @@
 //! The bodies in the middle of the window, and what the mouse does there.
 
-use eframe::egui::{self, PointerButton, Pos2, Rect, Response, Sense, Ui};
+use eframe::egui::{self, PointerButton, Pos2, Rect, Response, Sense, Tooltip, Ui};
 
 use crate::drag::{self, Drag};
 use crate::panel;
@@ -28,6 +28,7 @@ pub(crate) fn show(ui: &mut Ui, session: &mut Session) {
             let whole = Rect::from_min_max(Pos2::ZERO, Pos2::new(1.0, 1.0));
             ui.painter().image(id, rect, whole, egui::Color32::WHITE);
         }
+        under_pointer(&response, rect, session);
         overlay(ui, rect, session);
         legend(ui, rect, session);
     });
@@ -88,6 +89,19 @@ fn pointer(response: &Response, rect: Rect, session: &mut Session) {
         if factor != 1.0 {
             zoom(session, rect, at, factor);
         }
+    }
+}
+
+/// Says what is under a pointer that rests.
+fn under_pointer(response: &Response, rect: Rect, session: &mut Session) {
+    let is_free = session.drag.is_none() && !session.player.plays;
+    let Some(at) = response.hover_pos().filter(|_| is_free) else {
+        return;
+    };
+    if Tooltip::should_show_tooltip(response, false)
+        && let Some(text) = session.under(aspect(rect), in_view(rect, at))
+    {
+        response.clone().on_hover_text_at_pointer(text);
     }
 }
 

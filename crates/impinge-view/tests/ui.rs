@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use eframe::egui::{Key, Modifiers, Pos2, UiBuilder};
 use egui_kittest::Harness;
-use egui_kittest::kittest::Queryable as _;
+use egui_kittest::kittest::{NodeT as _, Queryable as _};
 use egui_kittest::wgpu::{WgpuTestRenderer, create_render_state, default_wgpu_setup};
 use egui_wgpu::wgpu::PollType;
 use egui_wgpu::{RenderState, RendererOptions};
@@ -1236,6 +1236,56 @@ fn a_picture_that_is_saved_at_last_leaves_no_message_that_it_is_not() {
     press(&mut harness, Key::S);
     click(&mut harness, "Save");
     assert_eq!(harness.state().message().map(str::to_owned), other);
+}
+
+/// A pointer that rests on a body is told how far the nearest other body is from there.
+#[test]
+fn distances_are_told_where_the_pointer_rests() {
+    let mut harness = open_content(still(600, 3.0));
+    harness
+        .ctx
+        .all_styles_mut(|style| style.interaction.tooltip_delay = 0.0);
+    let (scene, [first, second]) = balls(600, 3.0);
+    let orbit = harness.state().orbit().expect("shown");
+    let depth = |point: [f64; 3]| orbit.project(1.0, point).expect("in front").1;
+    let positions = scene.body(first).expect("a ball").positions();
+    let vertices = (0..positions.len()).map(|vertex| positions.point(vertex));
+    // The vertices that are nearest to the eye: of all, and of those on the right.
+    let mut told = Vec::new();
+    for least in [-9.0, 0.3] {
+        let seen = vertices.clone().filter(|point| point[0] > least);
+        let point = seen
+            .min_by(|&p, &q| depth(p).total_cmp(&depth(q)))
+            .expect("a vertex");
+        let at = in_window(&harness, point, false);
+        harness.hover_at(at);
+        harness.run_steps(6);
+        let text = harness
+            .query_all_by_label_contains("from second")
+            .find_map(|node| {
+                node.accesskit_node()
+                    .label()
+                    .or(node.accesskit_node().value())
+            })
+            .expect("a distance");
+        let (triangle, distance) = text.split_once('\n').expect("two lines");
+        assert!(triangle.starts_with("first, triangle "), "{text}");
+        let (number, _) = distance.split_once(' ').expect("a number");
+        let number: f64 = number.parse().expect("a number");
+        let closest = Detector::new(Backend::Cpu)
+            .and_then(|mut detector| {
+                detector.closest(&scene, &[point], f64::INFINITY, &Query::across([second]))
+            })
+            .expect("a distance");
+        let expected = closest.iter().next().flatten().expect("near").distance;
+        assert!((number - expected).abs() < 0.02, "{text}: {expected}");
+        told.push(number);
+        harness.hover_at(Pos2::new(5.0, SIZE[1] - 5.0));
+        harness.run_steps(6);
+        let n_told = harness.query_all_by_label_contains("from second").count();
+        assert_eq!(n_told, 0, "nothing is under the pointer");
+    }
+    assert!(told[1] < told[0] - 0.1, "{told:?}");
 }
 
 /// Each control says what it does to a pointer that rests on it.
