@@ -49,7 +49,8 @@ class BroadPhase(ipctk.BroadPhase):  # type: ignore[misc, unused-ignore]
             raise ValueError(f"mode: {mode!r} given, 'exact' or 'boxes' allowed")
         super().__init__()
         self._mode: _Mode = mode
-        self._meshes: list[CollisionMesh] = []
+        #: The last ones first, with their edges and faces as ipctk gave them.
+        self._meshes: list[tuple[CollisionMesh, Any, Any]] = []
         self._question: Question | None = None
         self._flat: Any = None
 
@@ -127,12 +128,13 @@ class BroadPhase(ipctk.BroadPhase):  # type: ignore[misc, unused-ignore]
         """The mesh with this topology, which is kept."""
         from .ipc import CollisionMesh
 
-        edges, faces = edges.reshape(-1, 2), faces.reshape(-1, 3)
-        for ix, mesh in enumerate(self._meshes):
+        for ix, (mesh, own_edges, own_faces) in enumerate(self._meshes):
             same = mesh.num_vertices == len(vertices)
-            if same and np.array_equal(mesh.edges, edges) and np.array_equal(mesh.faces, faces):
+            if same and np.array_equal(own_edges, edges) and np.array_equal(own_faces, faces):
                 self._meshes.insert(0, self._meshes.pop(ix))
                 return mesh
-        self._meshes.insert(0, CollisionMesh(vertices, edges, faces))
+        mesh = CollisionMesh(vertices, edges.reshape(-1, 2), faces.reshape(-1, 3))
+        # Copies that lie in memory as theirs do, which are compared at once.
+        self._meshes.insert(0, (mesh, edges.copy("K"), faces.copy("K")))
         del self._meshes[_MESHES_KEPT:]
-        return self._meshes[0]
+        return mesh

@@ -160,7 +160,9 @@ class Question:
             # Vertices that a face and a loose edge have are vertices of two bodies; and threads collect in any order.
             keys = np.unique(first << 32 | second)
             first, second = keys >> 32, keys & 0xFFFFFFFF
-        return np.stack([first, second], axis=1).astype(np.int32)
+        rows = np.empty((len(first), 2), np.int32)
+        rows[:, 0], rows[:, 1] = first, second
+        return rows
 
     def _is_by_boxes(self, kind: str, bodies: tuple[Any, Any] | None) -> bool:
         of_step = kind in ("vf", "ee") or (kind in ("vv", "ev") and self._faces is None)
@@ -248,7 +250,10 @@ class Question:
         numbers = elements.astype(np.int64)
         if part == "f":
             return numbers
-        for body, (_, _, rows) in enumerate(self._mesh._parts):
+        parts = self._mesh._parts
+        if part == "e" and len(parts) == 1:
+            return self._mesh._edges_of_body(0)[elements]
+        for body, (_, _, rows) in enumerate(parts):
             of_body = bodies == body
             if part == "e" and of_body.any():
                 numbers[of_body] = self._mesh._edges_of_body(body)[elements[of_body]]
@@ -272,7 +277,10 @@ class Question:
         a, b = (self._corners(part, rows[:, ix].astype(np.int64)) for ix, part in enumerate(parts))
         if labels is not None:
             of_all = labels[np.concatenate([a, b], axis=1)]
-            rows, a, b = _chosen((of_all != of_all[:, :1]).any(axis=1), rows, a, b)
+            keep: npt.NDArray[np.bool_] = (of_all != of_all[:, :1]).any(axis=1)
+            if may is None:
+                return rows[keep]
+            rows, a, b = _chosen(keep, rows, a, b)
         return rows if may is None else rows[any_may(a, b, may)]
 
     def all_found(self, labels: npt.NDArray[np.int64] | None, may: _May) -> dict[str, _Ids]:
