@@ -45,7 +45,10 @@ pub use detector::{Detector, host};
 #[cfg(feature = "gpu")]
 pub use gpu::Capacities;
 #[cfg(feature = "gpu")]
-pub use gpu::{DeviceInfo, ResidentPairs, ResidentPart, ResidentStep, devices, devices_async};
+pub use gpu::{
+    DeviceInfo, ResidentPairs, ResidentPart, ResidentSafe, ResidentStep, ResidentVertices, devices,
+    devices_async,
+};
 pub use impinge_exact as exact;
 pub use impinge_weld::{Coordinate, Weld, WrongNumber};
 pub use query::pair_kind::{PairKind, PairKinds};

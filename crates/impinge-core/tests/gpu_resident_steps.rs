@@ -3,7 +3,12 @@
 //! These tests fail where no adapter is found; a software driver is enough.
 #![cfg(feature = "gpu")]
 
+#[path = "common/caller.rs"]
+mod caller;
+
 use std::collections::{BTreeMap, BTreeSet};
+
+use caller::Caller;
 
 use impinge_core::{
     Backend, BodyId, Detector, Error, PairKind, Part, Query, ResidentStep, Scene, Settings, wgpu,
@@ -13,107 +18,42 @@ use impinge_scenes::{Random, surfaces};
 /// Pairs, until when each certainly does not touch, and by when it certainly does.
 type Listed = BTreeMap<[u32; 2], [f32; 2]>;
 
-/// A device of the caller's.
-struct Caller {
-    device: wgpu::Device,
-    queue: wgpu::Queue,
-}
-
-impl Caller {
-    fn new() -> Self {
-        let instance = wgpu::Instance::default();
-        let adapter = pollster::block_on(instance.request_adapter(&Default::default()));
-        let adapter = adapter.expect("these tests need a GPU or a software driver");
-        let device = pollster::block_on(adapter.request_device(&Default::default()));
-        let (device, queue) = device.expect("a device");
-        Caller { device, queue }
-    }
-
-    fn detector(&self, settings: Settings) -> Detector {
-        let (device, queue) = (self.device.clone(), self.queue.clone());
-        Detector::new(settings.on_device(device, queue)).expect("settings")
-    }
-
-    fn encoder(&self) -> wgpu::CommandEncoder {
-        self.device.create_command_encoder(&Default::default())
-    }
-
-    fn buffer(&self, size: u64, usage: wgpu::BufferUsages) -> wgpu::Buffer {
-        self.device.create_buffer(&wgpu::BufferDescriptor {
-            label: None,
-            size,
-            usage,
-            mapped_at_creation: false,
-        })
-    }
-
-    /// Positions on the device.
-    fn upload(&self, positions: &[[f32; 3]]) -> wgpu::Buffer {
-        use wgpu::BufferUsages as Usage;
-        let bytes: Vec<u8> = positions
-            .as_flattened()
-            .iter()
-            .flat_map(|x| x.to_le_bytes())
-            .collect();
-        let buffer = self.buffer(bytes.len() as u64, Usage::COPY_SRC | Usage::COPY_DST);
-        self.queue.write_buffer(&buffer, 0, &bytes);
-        buffer
-    }
-
-    /// Words of a buffer on the device.
-    fn read(&self, buffer: &wgpu::Buffer) -> Vec<u32> {
-        use wgpu::BufferUsages as Usage;
-        let staging = self.buffer(buffer.size(), Usage::MAP_READ | Usage::COPY_DST);
-        let mut encoder = self.encoder();
-        encoder.copy_buffer_to_buffer(buffer, 0, &staging, 0, buffer.size());
-        self.queue.submit([encoder.finish()]);
-        staging.map_async(wgpu::MapMode::Read, .., |_| ());
-        let polled = self.device.poll(wgpu::PollType::wait_indefinitely());
-        polled.expect("the device runs");
-        let view = staging.get_mapped_range(..).expect("mapped");
-        let words = view.as_chunks::<4>().0.iter();
-        words.map(|word| u32::from_le_bytes(*word)).collect()
-    }
-
-    /// Encodes a step until there is room for its pairs, and reads them. Also returns how often the
-    /// step was encoded.
-    fn pairs(
-        &self,
-        detector: &mut Detector,
-        scene: &Scene,
-        step: &Query,
-        [starts, ends]: [&[(BodyId, &wgpu::Buffer)]; 2],
-    ) -> (ResidentStep, Listed, u32) {
-        for n_tries in 1..9 {
-            let mut encoder = self.encoder();
-            let found = detector.gpu().expect("a device").encode_step(
-                scene,
-                step,
-                starts,
-                ends,
-                &mut encoder,
-            );
-            let found = found.expect("good buffers");
-            self.queue.submit([encoder.finish()]);
-            if !detector.gpu().expect("a device").grow().expect("room") {
-                continue;
-            }
-            let n = self.read(&found.counts)[found.n_pairs_offset as usize / 4] as usize;
-            assert!(n as u64 <= found.pairs_capacity);
-            let pairs = self.read(&found.pairs);
-            let times = self.read(&found.times);
-            let times = times.as_chunks::<2>().0.iter();
-            let times = times.map(|times| times.map(f32::from_bits));
-            let each = pairs.as_chunks::<2>().0[..n].iter().copied();
-            let pairs = Listed::from_iter(each.zip(times));
-            assert_eq!(pairs.len(), n, "each pair is listed once");
-            let least = self.read(&found.counts)[found.touches_by_offset as usize / 4];
-            let times = pairs.values().map(|[_, touches_by]| *touches_by);
-            assert_eq!(f32::from_bits(least), times.fold(2.0, f32::min));
-            return (found, pairs, n_tries);
+/// Encodes a step until there is room for its pairs, and reads them. Also returns how often the
+/// step was encoded.
+fn listed(
+    caller: &Caller,
+    detector: &mut Detector,
+    scene: &Scene,
+    step: &Query,
+    [starts, ends]: [&[(BodyId, &wgpu::Buffer)]; 2],
+) -> (ResidentStep, Listed, u32) {
+    for n_tries in 1..9 {
+        let mut encoder = caller.encoder();
+        let found =
+            detector
+                .gpu()
+                .expect("a device")
+                .encode_step(scene, step, starts, ends, &mut encoder);
+        let found = found.expect("good buffers");
+        caller.queue.submit([encoder.finish()]);
+        if !detector.gpu().expect("a device").grow().expect("room") {
+            continue;
         }
-        panic!("there never is enough room");
+        let n = caller.read(&found.counts)[found.n_pairs_offset as usize / 4] as usize;
+        assert!(n as u64 <= found.pairs_capacity);
+        let pairs = caller.read(&found.pairs);
+        let times = caller.read(&found.times);
+        let times = times.as_chunks::<2>().0.iter();
+        let times = times.map(|times| times.map(f32::from_bits));
+        let each = pairs.as_chunks::<2>().0[..n].iter().copied();
+        let pairs = Listed::from_iter(each.zip(times));
+        assert_eq!(pairs.len(), n, "each pair is listed once");
+        let least = caller.read(&found.counts)[found.touches_by_offset as usize / 4];
+        let times = pairs.values().map(|[_, touches_by]| *touches_by);
+        assert_eq!(f32::from_bits(least), times.fold(2.0, f32::min));
+        return (found, pairs, n_tries);
     }
+    panic!("there never is enough room");
 }
 
 /// The numbers of a pair in the list.
@@ -247,10 +187,10 @@ fn pairs_that_may_touch_stay_on_the_device() {
     ] {
         let name = format!("{query:?}");
         let step = query.clone();
-        let (found, pairs, _) = caller.pairs(&mut detector, &known, &step, [&starts, &ends]);
+        let (found, pairs, _) = listed(&caller, &mut detector, &known, &step, [&starts, &ends]);
         let n = assert_between(&name, &found, &pairs, &truth, &step, &query);
         // The same as from the host's positions, and as many as the host would be handed over.
-        let (_, by_host, _) = caller.pairs(&mut detector, &truth, &step, [&[], &[]]);
+        let (_, by_host, _) = listed(&caller, &mut detector, &truth, &step, [&[], &[]]);
         assert!(pairs == by_host, "{name}");
         let impacts = detector.impacts(&truth, &step).expect("good");
         assert_eq!(impacts.len(), n, "{name}");
@@ -266,7 +206,13 @@ fn pairs_that_may_touch_stay_on_the_device() {
             .expect("good");
         half.set_positions(moving[1].0, &moving[1].1[0])
             .expect("good");
-        let (_, mixed, _) = caller.pairs(&mut detector, &half, &step, [&starts[..1], &ends[1..]]);
+        let (_, mixed, _) = listed(
+            &caller,
+            &mut detector,
+            &half,
+            &step,
+            [&starts[..1], &ends[1..]],
+        );
         assert!(pairs == mixed, "{name}");
     }
     assert!(counts[0] > 100 && counts[2] == 0, "{counts:?}");
@@ -282,8 +228,8 @@ fn pairs_that_may_touch_stay_on_the_device() {
         still.clear_end_positions(*body).expect("known");
     }
     let step = Query::all();
-    let (_, pairs, _) = caller.pairs(&mut detector, &known, &step, [&ends, &[]]);
-    let (found, by_host, _) = caller.pairs(&mut detector, &still, &step, [&[], &[]]);
+    let (_, pairs, _) = listed(&caller, &mut detector, &known, &step, [&ends, &[]]);
+    let (found, by_host, _) = listed(&caller, &mut detector, &still, &step, [&[], &[]]);
     assert!(pairs == by_host);
     let query = Query::all();
     assert_between("still", &found, &pairs, &still, &step, &query);
@@ -341,9 +287,9 @@ fn numbers_name_elements_of_every_kind_of_body() {
             Vec::from_iter(each.map(|(&(_, body), ends)| (body, &ends[end])))
         };
         let step = Query::all();
-        let (_, pairs, _) = caller.pairs(&mut detector, &known, &step, [&at(0), &at(1)]);
+        let (_, pairs, _) = listed(&caller, &mut detector, &known, &step, [&at(0), &at(1)]);
         // Numbers do not depend on the scene's precision.
-        let (found, by_host, _) = caller.pairs(&mut detector, &truth, &step, [&[], &[]]);
+        let (found, by_host, _) = listed(&caller, &mut detector, &truth, &step, [&[], &[]]);
         assert!(pairs == by_host, "{seed}");
         let name = format!("bare {seed}");
         assert!(assert_between(&name, &found, &pairs, &truth, &step, &Query::all()) > 100);
@@ -366,7 +312,7 @@ fn numbers_name_elements_of_every_kind_of_body() {
             let wide = Vec::from_iter(end.iter().map(|p| p.map(f64::from)));
             known.set_end_positions(*body, &wide).expect("good");
         }
-        let (_, rounded, _) = caller.pairs(&mut detector, &known, &step, [&at(0), &[]]);
+        let (_, rounded, _) = listed(&caller, &mut detector, &known, &step, [&at(0), &[]]);
         assert!(pairs.keys().all(|pair| rounded.contains_key(pair)));
     }
 }
@@ -391,7 +337,7 @@ fn lists_that_are_too_small_grow() {
             .grow()
             .expect("nothing was encoded")
     );
-    let (found, pairs, n_tries) = caller.pairs(&mut detector, &scene, &step, none);
+    let (found, pairs, n_tries) = listed(&caller, &mut detector, &scene, &step, none);
     assert!(
         n_tries > 1 && pairs.len() > 1 << 14,
         "{n_tries} {}",
@@ -399,7 +345,7 @@ fn lists_that_are_too_small_grow() {
     );
     let query = Query::all();
     assert_between("web", &found, &pairs, &scene, &step, &query);
-    let (_, again, n_tries) = caller.pairs(&mut detector, &scene, &step, none);
+    let (_, again, n_tries) = listed(&caller, &mut detector, &scene, &step, none);
     assert_eq!(n_tries, 1, "it has grown");
     assert!(again == pairs);
     // A frame and a step in one submission.
@@ -514,7 +460,7 @@ fn damaged_names_are_noticed() {
     let (truth, _, _) = balls(600);
     let step = Query::all();
     let mut sound = caller.detector(Settings::default());
-    let (_, expected, _) = caller.pairs(&mut sound, &truth, &step, [&[], &[]]);
+    let (_, expected, _) = listed(&caller, &mut sound, &truth, &step, [&[], &[]]);
     assert!(!expected.is_empty());
     for (line, damaged) in [
         ("if params.by_number == 0u {", "if params.by_number != 0u {"),

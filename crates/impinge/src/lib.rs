@@ -152,7 +152,8 @@ pub use impinge_core::{
 };
 #[cfg(feature = "gpu")]
 pub use impinge_core::{
-    DeviceInfo, Gpu, ResidentPairs, ResidentPart, ResidentStep, devices, devices_async,
+    DeviceInfo, Gpu, ResidentPairs, ResidentPart, ResidentSafe, ResidentStep, ResidentVertices,
+    devices, devices_async,
 };
 pub use impinge_core::{contact, exact, proximity};
 

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::Detector;
 use crate::answers::pairs::Pairs;
-use crate::gpu::{ResidentPairs, ResidentStep};
+use crate::gpu::{ResidentPairs, ResidentSafe, ResidentStep};
 use crate::plan::Plan;
 use crate::query::Query;
 use crate::query::goal::Goal;
@@ -123,42 +123,7 @@ impl Gpu<'_> {
         ends: &[(BodyId, &wgpu::Buffer)],
         encoder: &mut wgpu::CommandEncoder,
     ) -> Result<ResidentStep, Error> {
-        query.check_step()?;
-        if query.separation > 0.0 {
-            return Err(Error::Setting {
-                setting: "separation",
-                given: query.separation.to_string(),
-                allowed: "0 for a step that stays on a device",
-            });
-        }
-        if query.clearance.distance > 0.0 {
-            return Err(Error::Setting {
-                setting: "clearance",
-                given: query.clearance.distance.to_string(),
-                allowed: "0 for a step that stays on a device",
-            });
-        }
-        if query.filter.is_some() {
-            return Err(Error::Setting {
-                setting: "filter",
-                given: "a filter of pairs in a step that stays on a device".to_owned(),
-                allowed: "only steps that are read back",
-            });
-        }
-        if query.kinds.is_some() {
-            return Err(Error::Setting {
-                setting: "kinds",
-                given: "kinds of pairs in a step that stays on a device".to_owned(),
-                allowed: "only steps that are read back",
-            });
-        }
-        if query.cell.is_some() {
-            return Err(Error::Setting {
-                setting: "owned_by",
-                given: "a cell in a step that stays on a device".to_owned(),
-                allowed: "only steps and candidates that are read back",
-            });
-        }
+        refuse_unknown(query)?;
         let Some(engine) = &mut self.detector.gpu else {
             return Err(Error::NoAdapter {
                 found: "this detector works on the CPU".to_owned(),
@@ -173,6 +138,72 @@ impl Gpu<'_> {
         let stats = &mut Stats::default();
         let clusterings = self.detector.clusterings.of_frame(job, judges, stats)?;
         engine.encode_step(job, &clusterings, [starts, ends], encoder)
+    }
+
+    /// Encodes [`safe_distances`](Detector::safe_distances) into the caller's encoder: positions
+    /// come from buffers on the device, and how far each vertex may move stays there. Nothing is
+    /// read back, so a solver on the device needs no answer from the host between its steps.
+    ///
+    /// The numbers are `f32`, proven under any rounding that WGSL allows: if every vertex moves by
+    /// at most its number, on any path, no pair of elements touches that the device looks at: those
+    /// of [`encode_step`](Gpu::encode_step), a vertex and a face or two edges, and for bare bodies
+    /// an edge and a vertex or two vertices. An edge that passes through a face is not looked for:
+    /// a scene is to begin free of intersections. Each number is below what `safe_distances` gives,
+    /// by at most 2^-6 of it where no pair is nearer than a thousandth of its elements' size, and
+    /// larger than 2^-32; it is 0 for pairs that touch, that are nearer than about 2^-19 of their
+    /// size, or beyond 2^40.
+    ///
+    /// `positions` names bodies whose positions are taken from a buffer, as in `encode_step`; all
+    /// other positions come from the scene. Positions at the end of a step are ignored.
+    ///
+    /// At most one step, or one question about safe distances, may be encoded per submission,
+    /// besides one frame of [`encode`](Gpu::encode). If there is not enough room, all numbers are
+    /// 0, which is safe; [`grow`](Gpu::grow) then makes more.
+    ///
+    /// # Errors
+    /// As `encode_step`, with a `most` that is negative or above 2^100, for fixed bodies that are
+    /// not in the scene, and for bodies with a [thickness](Scene::set_thickness).
+    pub fn encode_safe_distances(
+        &mut self,
+        scene: &Scene,
+        most: f64,
+        query: &Query,
+        positions: &[(BodyId, &wgpu::Buffer)],
+        encoder: &mut wgpu::CommandEncoder,
+    ) -> Result<ResidentSafe, Error> {
+        if !(0.0..=2f64.powi(100)).contains(&most) {
+            return Err(Error::Setting {
+                setting: "most",
+                given: most.to_string(),
+                allowed: "from 0 to 2^100 where it stays on a device",
+            });
+        }
+        refuse_unknown(query)?;
+        for &body in &query.fixed {
+            scene.body(body)?;
+        }
+        if let Some((id, body)) = scene.bodies().find(|(_, body)| body.thickness() > 0.0) {
+            return Err(Error::Setting {
+                setting: "thickness",
+                given: format!("{} of body {id}", body.thickness()),
+                allowed: "0 for safe distances that stay on a device",
+            });
+        }
+        let Some(engine) = &mut self.detector.gpu else {
+            return Err(Error::NoAdapter {
+                found: "this detector works on the CPU".to_owned(),
+            });
+        };
+        let plan = Plan::contacts(scene, query, Goal::All, self.detector.settings.limits())?;
+        refuse_left_out(&plan)?;
+        let control = Control::new();
+        let job = self.detector.runner.job(scene, &plan, &control)?;
+        let resident: BTreeMap<BodyId, &wgpu::Buffer> = positions.iter().copied().collect();
+        let judges = |body| !resident.contains_key(&body);
+        let stats = &mut Stats::default();
+        let clusterings = self.detector.clusterings.of_frame(job, judges, stats)?;
+        let limits = (most, &query.fixed);
+        engine.encode_safe(job, &clusterings, positions, limits, encoder)
     }
 
     /// The positions of a body in the buffer from which the last frame read them, `(v, 3)` f32
@@ -225,4 +256,45 @@ fn refuse_left_out(plan: &Plan) -> Result<(), Error> {
             allowed: "bodies",
         }),
     }
+}
+
+/// Refuses what kernels of steps do not know.
+fn refuse_unknown(query: &Query) -> Result<(), Error> {
+    query.check_step()?;
+    if query.separation > 0.0 {
+        return Err(Error::Setting {
+            setting: "separation",
+            given: query.separation.to_string(),
+            allowed: "0 for a step that stays on a device",
+        });
+    }
+    if query.clearance.distance > 0.0 {
+        return Err(Error::Setting {
+            setting: "clearance",
+            given: query.clearance.distance.to_string(),
+            allowed: "0 for a step that stays on a device",
+        });
+    }
+    if query.filter.is_some() {
+        return Err(Error::Setting {
+            setting: "filter",
+            given: "a filter of pairs in a step that stays on a device".to_owned(),
+            allowed: "only steps that are read back",
+        });
+    }
+    if query.kinds.is_some() {
+        return Err(Error::Setting {
+            setting: "kinds",
+            given: "kinds of pairs in a step that stays on a device".to_owned(),
+            allowed: "only steps that are read back",
+        });
+    }
+    if query.cell.is_some() {
+        return Err(Error::Setting {
+            setting: "owned_by",
+            given: "a cell in a step that stays on a device".to_owned(),
+            allowed: "only steps and candidates that are read back",
+        });
+    }
+    Ok(())
 }

@@ -10,8 +10,8 @@
 
 use super::buffers::Uniform;
 use super::kernels::{
-    BoundsClusters, BoundsLevel, BoundsTop, Narrow, NarrowMoving, NarrowSearch, Pairing, Prepare,
-    Traversal,
+    BoundsClusters, BoundsLevel, BoundsTop, Narrow, NarrowMoving, NarrowSafe, NarrowSearch,
+    Pairing, Prepare, SafeEnd, Traversal,
 };
 use super::layout::{
     N_CANDIDATES, N_ITEMS, N_PAIRS, Params, ROUNDS, SEEK_ALL, SEEK_ANY, SEEK_EARLIEST,
@@ -38,6 +38,9 @@ pub(super) struct ClusterPass {
     pub n_rounds: u32,
     /// Whether pairs that share a vertex are resolved.
     pub resolve: bool,
+    /// Whether how far vertices may move is asked, instead of contacts, and by how much boxes are
+    /// widened then: the bits of an f32.
+    pub safe: Option<u32>,
     /// In a step: which contacts the host seeks; none if results stay on the device.
     pub sought: Option<Goal>,
 }
@@ -58,12 +61,13 @@ pub struct Counted {
 impl Recorder<'_> {
     /// All stages.
     pub(super) fn clusters(&mut self, of_pass: ClusterPass) {
-        self.bounds();
+        self.bounds_widened(of_pass.safe.unwrap_or(0));
         self.traversal(of_pass);
         self.recording.stage("pairing");
-        self.pairing(of_pass.resolve);
+        self.pairing(of_pass);
         self.recording.stage("narrow");
         match self.motion {
+            Motion::Moving if of_pass.safe.is_some() => self.narrow_safe(),
             Motion::Moving => self.narrow_step(of_pass.sought),
             Motion::Still => self.narrow(),
         }
@@ -71,6 +75,10 @@ impl Recorder<'_> {
 
     /// Stage `bounds`: the boxes of clusters and of the trees above them, if anything has moved.
     pub fn bounds(&mut self) {
+        self.bounds_widened(0);
+    }
+
+    fn bounds_widened(&mut self, reach: u32) {
         self.recording.stage("bounds");
         let (gpu, world, view) = (self.gpu, self.world, self.view);
         if !view.is_moved {
@@ -100,6 +108,7 @@ impl Recorder<'_> {
             params: Uniform(Params {
                 first: leaves.first,
                 count: leaves.count,
+                reach,
                 ..Params::default()
             }),
         };
@@ -174,7 +183,7 @@ impl Recorder<'_> {
     }
 
     /// Work items to candidates.
-    fn pairing(&mut self, resolve: bool) {
+    fn pairing(&mut self, of_pass: ClusterPass) {
         let (gpu, world, view, pass_buffers) = (self.gpu, self.world, self.view, self.pass_buffers);
         let groups = self.counted_items();
         let kernel = match self.motion {
@@ -191,7 +200,8 @@ impl Recorder<'_> {
             candidates: pass_buffers.candidates.write_to(),
             counters: pass_buffers.counters.write_to(),
             params: Uniform(Params {
-                resolve: u32::from(resolve),
+                resolve: u32::from(of_pass.resolve),
+                reach: of_pass.safe.unwrap_or(0),
                 ..Params::default()
             }),
         };
@@ -302,5 +312,37 @@ impl Recorder<'_> {
         };
         self.recording
             .launch(&gpu.kernels.narrow_search, &bindings, groups);
+    }
+
+    /// Stage `narrow` of safe distances.
+    fn narrow_safe(&mut self) {
+        let (gpu, world, pass_buffers) = (self.gpu, self.world, self.pass_buffers);
+        let capacities = pass_buffers.capacities();
+        let groups = self.counted_candidates();
+        let bindings = NarrowSafe {
+            candidates: pass_buffers.candidates.read(),
+            corners: world.corners.read(),
+            positions: world.positions.read(),
+            limits: pass_buffers.limits.read(),
+            shares: pass_buffers.shares.write_to(),
+            counters: pass_buffers.counters.write_to(),
+        };
+        self.recording
+            .launch(&gpu.kernels.narrow_safe, &bindings, groups);
+        let bindings = SafeEnd {
+            counters: pass_buffers.counters.write_to(),
+            shares: pass_buffers.shares.write_to(),
+            // Capacities fit 32 bits.
+            params: Uniform(Params {
+                queue_room: capacities.queue as u32,
+                items_room: capacities.items as u32,
+                capacity: capacities.candidates as u32,
+                ..Params::default()
+            }),
+        };
+        let groups = pass_buffers.shares.len().div_ceil(u64::from(GROUP));
+        let groups = Workgroups::Known(groups);
+        self.recording
+            .launch(&gpu.kernels.safe_end, &bindings, groups);
     }
 }

@@ -65,6 +65,8 @@ pub struct Engine {
     /// touches, as far as passes have said.
     pub(super) sought: Goal,
     pub(super) touches_by: Option<f32>,
+    /// By how much boxes are widened, the bits of an f32, where safe distances are asked.
+    pub(super) safe: Option<u32>,
     /// Whether passes are run launch by launch too.
     pub is_traced: bool,
 }
@@ -170,6 +172,7 @@ impl Engine {
             decided: Vec::new(),
             sought: Goal::All,
             touches_by: None,
+            safe: None,
             is_traced: false,
         }
     }
@@ -180,7 +183,7 @@ impl Engine {
             std::mem::swap(&mut self.lane, &mut self.other);
         }
         self.complete.clear();
-        (self.sought, self.touches_by) = (Goal::All, None);
+        (self.sought, self.touches_by, self.safe) = (Goal::All, None, None);
     }
 
     pub fn gpu(&self) -> &Arc<GpuContext> {

@@ -3,7 +3,7 @@
 use super::layout::{
     Arguments, Body, Candidate, Cell, CellItem, Cluster, ClusterVertex, Coordinate, Corners,
     Counter, Grid, Kept, Level, ListEntry, Node, NodePair, Order, PairKey, PairTimes, Params,
-    Reach, Start, Tally, UnsureKey, WorkItem,
+    Reach, Share, Start, Tally, UnsureKey, WorkItem,
 };
 use super::pipeline::{Kernel, Source, bindings, source};
 
@@ -113,6 +113,27 @@ bindings! {
         counters: Write<Counter>,
         params: Uniform<Params>,
         bodies: Read<Body>,
+    }
+}
+
+bindings! {
+    /// `narrow_safe.wgsl`
+    NarrowSafe {
+        candidates: Read<Candidate>,
+        corners: Read<Corners>,
+        positions: Read<Coordinate>,
+        limits: Read<Share>,
+        shares: Write<Share>,
+        counters: Write<Counter>,
+    }
+}
+
+bindings! {
+    /// `safe_end.wgsl`
+    SafeEnd {
+        counters: Write<Counter>,
+        shares: Write<Share>,
+        params: Uniform<Params>,
     }
 }
 
@@ -289,6 +310,8 @@ kernels! {
         from "narrow_moving" ("filter", "polygon", "pair", "reserve", "slots", "groups");
     narrow_search: NarrowSearch = NARROW_SEARCH []
         from "narrow_search" ("filter", "polygon", "pair", "numbers", "reserve", "slots", "groups");
+    narrow_safe: NarrowSafe = NARROW_SAFE [] from "narrow_safe" ("filter", "groups");
+    safe_end: SafeEnd = SAFE_END [] from "safe_end" ("groups");
     narrow: Narrow = NARROW [("WITH_SOLIDS", 0.0)]
         from "narrow" ("filter", "projections", "triangles", "neighbours", "solids", "numbers", "reserve", "groups");
     narrow_solids: Narrow = NARROW_SOLIDS [("WITH_SOLIDS", 1.0)]

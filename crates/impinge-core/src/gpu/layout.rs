@@ -64,6 +64,7 @@ words! {
         group_size: u32, lambda: u32, most_cells: u32, owner_rule: u32,
         lists_only: u32, n_entries: u32, tile_row: u32, tile_column: u32, tile_side: u32,
         by_number: u32, sought: u32,
+        reach: u32, queue_room: u32, items_room: u32,
     }
     /// A primitive within its body's reach.
     Kept { low: [u32; 3], slot: u32, high: [u32; 3], body: u32, range: [u32; 3], unused: u32 }
@@ -88,6 +89,8 @@ words! {
     Arguments { x: u32, y: u32, z: u32 }
     /// One word of a position: the bits of a coordinate.
     Coordinate { bits: u32 }
+    /// How far a vertex may move: the bits of an f32.
+    Share { bits: u32 }
     /// The corners of a primitive; a triangle repeats its last corner.
     Corners { vertices: [u32; 4] }
     /// A vertex of a cluster.
@@ -211,14 +214,14 @@ impl fmt::Display for Params {
 pub struct Step {
     /// The parameters.
     pub params: Params,
-    padding: [u32; 45],
+    padding: [u32; 42],
 }
 
 impl From<Params> for Step {
     fn from(params: Params) -> Self {
         Step {
             params,
-            padding: [0; 45],
+            padding: [0; 42],
         }
     }
 }

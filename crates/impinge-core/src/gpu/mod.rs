@@ -33,7 +33,7 @@ pub mod world;
 
 pub use device::{Device, DeviceInfo};
 pub use pass_buffers::Capacities;
-pub use resident::{ResidentPairs, ResidentPart, ResidentStep};
+pub use resident::{ResidentPairs, ResidentPart, ResidentSafe, ResidentStep, ResidentVertices};
 
 pub(crate) use engine::Engine;
 pub use kernels::shaders;

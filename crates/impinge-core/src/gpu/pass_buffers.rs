@@ -8,8 +8,8 @@ use super::buffers::{Slice, Storage, count};
 use super::layout::{
     Arguments, Candidate, Cell, CellItem, Counter, Grid, Kept, ListEntry, N_BOX_TESTS,
     N_BOX_TESTS_HIGH, N_CANDIDATES, N_COUNTERS, N_ENTRIES, N_ITEMS, N_KEPT, N_PAIRS, N_SUBDIVIDED,
-    N_TALLIES, N_UNSURE, NEVER, NodePair, PairKey, PairTimes, ROUNDS, Reach, Start, TOO_MUCH,
-    TOUCHES_BY, Tally, UnsureKey, WorkItem, time_by,
+    N_TALLIES, N_UNSURE, NEVER, NodePair, PairKey, PairTimes, ROUNDS, Reach, Share, Start,
+    TOO_MUCH, TOUCHES_BY, Tally, UnsureKey, WorkItem, time_by,
 };
 use super::open::GpuContext;
 use crate::query::goal::Goal;
@@ -155,6 +155,10 @@ pub struct PassBuffers {
     pub unsure: Storage<UnsureKey>,
     /// In a step: between which times each unsure pair first touches.
     pub times: Storage<PairTimes>,
+    /// Safe distances: the most that each vertex may move, 0 if it is fixed.
+    pub limits: Storage<Share>,
+    /// Safe distances: how far each vertex may move.
+    pub shares: Storage<Share>,
     /// What stages counted, at the indices of `layout`.
     pub counters: Storage<Counter>,
     /// Workgroups of indirect launches: of each round, then of the stages after them.
@@ -211,6 +215,8 @@ impl PassBuffers {
             pairs: Storage::plain("pairs"),
             unsure: Storage::plain("unsure"),
             times: Storage::plain("times of pairs"),
+            limits: Storage::plain("limits"),
+            shares: Storage::plain("safe distances"),
             counters: Storage::plain("counters"),
             arguments: Storage::new("arguments", indirect),
             cell_items: Storage::plain("work items of cells"),
@@ -304,6 +310,8 @@ impl PassBuffers {
     pub fn bytes(&self) -> u64 {
         self.sizes
             .map_or(0, |(wanted, cells)| wanted.bytes() + cells.bytes())
+            + self.limits.bytes()
+            + self.shares.bytes()
     }
 }
 

@@ -20,7 +20,7 @@ use super::collect::{Collected, Guess};
 use super::device::Scopes;
 use super::engine::{Engine, PassSink, PassesEnd};
 use super::layout::NodePair;
-use super::pass_buffers::{Capacities, CellsWanted, NextPass};
+use super::pass_buffers::{Capacities, CellsWanted, NextPass, PassBuffers};
 use super::recording::{Recorder, Recording};
 use super::view::Motion;
 use crate::plan::{Plan, pair_key};
@@ -310,6 +310,10 @@ impl Engine {
         for (from, to) in start {
             recording.copy(from, to);
         }
+        if self.safe.is_some() {
+            let PassBuffers { limits, shares, .. } = &self.lane.pass_buffers;
+            recording.copy(limits.all(), shares.all());
+        }
         let mut recorder = Recorder {
             gpu: &self.gpu,
             world: &self.world,
@@ -325,7 +329,8 @@ impl Engine {
             (Some(PassWork::Seeds(seeds)), _) => recorder.clusters(clusters::ClusterPass {
                 n_seeds: count(seeds.len()),
                 n_rounds: self.world.rounds(seeds),
-                resolve,
+                resolve: resolve && self.safe.is_none(),
+                safe: self.safe,
                 sought,
             }),
             (Some(PassWork::Cells(work)), Some(guest)) => {

@@ -1,15 +1,16 @@
 //! Frames and steps that stay on the device: positions come from the caller's buffers, pairs go to
 //! ours.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use super::buffers::{count, read};
 use super::engine::Engine;
-use super::layout::{Counter, N_PAIRS, N_UNSURE, TOUCHES_BY};
+use super::layout::{Counter, N_PAIRS, N_UNSURE, Share, TOUCHES_BY};
 use super::pass_buffers::{Capacities, NextPass, PassCounts};
 use super::view::Motion;
 use super::world::ResidentEnds;
+use crate::bvh::bounds::{round_down, round_up};
 use crate::bvh::clusters::Clustering;
 use crate::plan::Plan;
 use crate::scene::elements::Part;
@@ -118,6 +119,34 @@ pub struct ResidentPart {
     pub len: u32,
 }
 
+/// The buffer that holds how far each vertex may move, once the commands of encoded safe distances
+/// have run.
+///
+/// ```text
+/// distances   vertices of the first body | of the second | …
+///             first                        first
+/// ```
+#[derive(Debug, Clone)]
+#[non_exhaustive]
+pub struct ResidentSafe {
+    /// Holds an `f32` per vertex, which is not below 0: it may move as far, on any path.
+    pub distances: wgpu::Buffer,
+    /// Where the vertices of each body that takes part are, in the order of their ids.
+    pub bodies: Vec<ResidentVertices>,
+}
+
+/// Where the vertices of a body are in a buffer that has one number for each.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct ResidentVertices {
+    /// The body.
+    pub body: BodyId,
+    /// The number of its first vertex.
+    pub first: u32,
+    /// How many vertices it has.
+    pub len: u32,
+}
+
 const COUNTER: u64 = size_of::<Counter>() as u64;
 
 impl Engine {
@@ -205,6 +234,54 @@ impl Engine {
         })
     }
 
+    /// Encodes how far vertices may move as one pass: at most `most`, and not at all those of
+    /// `fixed` bodies.
+    ///
+    /// # Errors
+    /// Those of [`Gpu::encode_safe_distances`](crate::Gpu::encode_safe_distances).
+    pub fn encode_safe(
+        &mut self,
+        job: Job<'_>,
+        clusterings: &[Arc<Clustering>],
+        positions: &[(BodyId, &wgpu::Buffer)],
+        (most, fixed): (f64, &BTreeSet<BodyId>),
+        encoder: &mut wgpu::CommandEncoder,
+    ) -> Result<ResidentSafe, Error> {
+        self.gpu.check_lost()?;
+        for &(body, buffer) in positions {
+            check_buffer(job.scene, body, buffer, "positions")?;
+        }
+        self.turn_to(Motion::Moving);
+        if !self.is_held(job, clusterings) {
+            return Err(self.too_small("the bodies at once", Capacities::LEAST));
+        }
+        let positions: BTreeMap<_, _> = positions.iter().copied().collect();
+        let resident = ResidentEnds([positions.clone(), positions]);
+        self.update(job, clusterings, &resident, &mut Stats::default())?;
+        let (mut limits, mut bodies) = (Vec::new(), Vec::new());
+        for (body, n_vertices) in self.world.bodies() {
+            let own = if fixed.contains(&body) { 0.0 } else { most };
+            // Vertices fit 32 bits, or the bodies would not be held.
+            let (first, len) = (limits.len() as u32, n_vertices as u32);
+            bodies.push(ResidentVertices { body, first, len });
+            let bits = round_down(own).to_bits();
+            limits.extend((0..len).map(|_| Share { bits }));
+        }
+        let pass_buffers = &mut self.lane.pass_buffers;
+        pass_buffers.limits.upload(&self.gpu, &limits)?;
+        pass_buffers.shares.resize(&self.gpu, count(limits.len()))?;
+        // A little more than asked for, and more than what is flushed.
+        let reach = round_up(most * (1.0 + 2f64.powi(-20)) + 2f64.powi(-100));
+        self.safe = Some(reach.to_bits());
+        // Boxes that were widened by another length do not fit, nor do these fit a step.
+        self.world.is_moved();
+        self.encode_work(job.plan, &resident, encoder)?;
+        Ok(ResidentSafe {
+            distances: self.lane.pass_buffers.shares.buffer().clone(),
+            bodies,
+        })
+    }
+
     /// Encodes all work of a frame or a step as one pass.
     fn encode_whole(
         &mut self,
@@ -214,12 +291,22 @@ impl Engine {
         encoder: &mut wgpu::CommandEncoder,
     ) -> Result<(), Error> {
         self.update(job, clusterings, resident, &mut Stats::default())?;
+        self.encode_work(job.plan, resident, encoder)
+    }
+
+    /// Encodes all work of what was sent.
+    fn encode_work(
+        &mut self,
+        plan: &Plan,
+        resident: &ResidentEnds<'_>,
+        encoder: &mut wgpu::CommandEncoder,
+    ) -> Result<(), Error> {
         self.world.copy_positions(resident, encoder);
-        let cells = self.cells_wanted(job.plan);
+        let cells = self.cells_wanted(plan);
         let capacities = self.first_capacities(cells)?;
-        let work = self.whole(job.plan);
+        let work = self.whole(plan);
         self.lane.is_encoded = true;
-        let recording = self.record(job.plan, work.as_ref(), capacities, cells)?;
+        let recording = self.record(plan, work.as_ref(), capacities, cells)?;
         let launcher = &mut self.lane.launcher;
         launcher.encode(&self.gpu, &recording, None, encoder)
     }

@@ -131,7 +131,7 @@ fn structs_are_laid_out_as_on_the_host() {
         Params {
             first, count, counter, per_group, capacity, slot, n_ignored, resolve, group_size,
             lambda, most_cells, owner_rule, lists_only, n_entries, tile_row, tile_column, tile_side,
-            by_number, sought
+            by_number, sought, reach, queue_room, items_room
         }
         Kept { low, slot, high, body, range, unused }
         Grid { origin, shift, scale, n_cells, finest, unused, resolution, unused_too }

@@ -204,7 +204,8 @@ impl DeviceWorld {
         self.view_mut(motion).is_moved = false;
     }
 
-    fn is_moved(&mut self) {
+    /// Says that the boxes do not fit the positions.
+    pub(super) fn is_moved(&mut self) {
         for view in self.views.iter_mut().flatten() {
             view.is_moved = true;
         }
@@ -491,6 +492,11 @@ impl DeviceWorld {
         if has_moved {
             self.is_moved();
         }
+    }
+
+    /// The bodies whose positions are on the device, in their order, and how many vertices each has.
+    pub fn bodies(&self) -> impl Iterator<Item = (BodyId, u64)> {
+        self.bodies.iter().map(|body| (body.id, body.n_vertices))
     }
 
     /// Where the positions of a body are on the device, if they are those of the pose with this

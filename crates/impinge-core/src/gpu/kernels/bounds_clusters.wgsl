@@ -4,7 +4,8 @@
 // those at the end.
 // One workgroup per cluster and end. Each lane takes every 64th vertex; then two steps reduce eight boxes to one.
 // Cost: 12 bytes per vertex and 4 per index, for each unique vertex of a cluster once.
-// Invariant: a box holds all its vertices exactly, or widened by `slack` when they were rounded.
+// Invariant: a box holds all its vertices exactly, or widened by `slack` when they were rounded; for safe
+// distances by `reach` too.
 
 @group(0) @binding(0) var<storage, read> clusters: array<Cluster>;
 @group(0) @binding(1) var<storage, read> cluster_vertices: array<u32>;
@@ -58,7 +59,8 @@ fn main(
             high = max(high, highs[ix]);
         }
         let slack = bodies[cluster.body].slack;
-        nodes[node_ix].low = low - slack;
-        nodes[node_ix].high = high + slack;
+        let box = widened(Box(low - slack, high + slack), params.reach);
+        nodes[node_ix].low = box.low;
+        nodes[node_ix].high = box.high;
     }
 }

@@ -16,6 +16,34 @@ struct Box {
     high: vec3<u32>,
 }
 
+fn float_of(key: u32) -> f32 {
+    return bitcast<f32>(select(~key, key & ~FLAG, key >= FLAG));
+}
+
+// A key that is lower by a length and more, and one that is higher: the sum is off by at most one f32, or by a subnormal
+// number, which the length allows for. Numbers that have no room for it stay as they are but for two keys.
+fn lowered(low: u32, reach: f32) -> u32 {
+    let inside = clamp(low, 0x017fffffu, 0xfe800000u); // up to 2^126
+    return min(low, key(bitcast<u32>(float_of(inside) - reach))) - 2u;
+}
+
+fn raised(high: u32, reach: f32) -> u32 {
+    let inside = clamp(high, 0x017fffffu, 0xfe800000u);
+    return max(high, key(bitcast<u32>(float_of(inside) + reach))) + 2u;
+}
+
+// A box widened on all sides by a length, given by its bits.
+fn widened(box: Box, reach: u32) -> Box {
+    if reach == 0u {
+        return box;
+    }
+    let by = bitcast<f32>(reach);
+    return Box(
+        vec3<u32>(lowered(box.low.x, by), lowered(box.low.y, by), lowered(box.low.z, by)),
+        vec3<u32>(raised(box.high.x, by), raised(box.high.y, by), raised(box.high.z, by)),
+    );
+}
+
 fn empty_box() -> Box {
     return Box(vec3<u32>(0xffffffffu), vec3<u32>(0u));
 }

@@ -111,6 +111,10 @@ struct Params {
     by_number: u32,
     // Steps: which contacts are sought.
     sought: u32,
+    // Safe distances: how far boxes are widened (bits of an f32), and the room of queues and of work items.
+    reach: u32,
+    queue_room: u32,
+    items_room: u32,
 }
 
 const SEEK_ALL: u32 = 0u;

@@ -2,7 +2,10 @@
 
 fn primitive_extent(corner: vec4<u32>, slack: u32) -> Extent {
     let n_vertices = arrayLength(&positions) / (3u * ENDS);
-    return Extent(primitive_box(corner, slack), primitive_box(corner + n_vertices, slack));
+    return Extent(
+        widened(primitive_box(corner, slack), params.reach),
+        widened(primitive_box(corner + n_vertices, slack), params.reach),
+    );
 }
 
 fn put_extent(entry: u32, extent: Extent) {

@@ -1,0 +1,31 @@
+// Stage `narrow` of safe distances, last kernel: takes everything back if pairs were lost.
+//
+// In: counters; the room that queues, work items and candidates had. Out: 0 for all vertices if any of it was too small.
+// Invariant: no number is left that pairs which did not fit might have lowered.
+
+@group(0) @binding(0) var<storage, read_write> counters: array<atomic<u32>>;
+@group(0) @binding(1) var<storage, read_write> shares: array<u32>;
+@group(0) @binding(2) var<uniform> params: Params;
+
+fn are_lost() -> bool {
+    var most = 0u;
+    for (var round = 0u; round < ROUNDS; round++) {
+        most = max(most, atomicLoad(&counters[round]));
+    }
+    return most > params.queue_room
+        || atomicLoad(&counters[N_ITEMS]) > params.items_room
+        || atomicLoad(&counters[N_CANDIDATES]) > params.capacity
+        || atomicLoad(&counters[TOO_MUCH]) != 0u;
+}
+
+@compute @workgroup_size(64)
+fn main(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(num_workgroups) n_groups: vec3<u32>,
+    @builtin(local_invocation_index) lane: u32,
+) {
+    let vertex = group_number(group, n_groups) * 64u + lane;
+    if vertex < arrayLength(&shares) && are_lost() {
+        shares[vertex] = 0u;
+    }
+}

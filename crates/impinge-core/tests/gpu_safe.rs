@@ -1,0 +1,497 @@
+//! Safe distances that stay on the device, held by exact tests against every pair that is near.
+//!
+//! These tests fail where no adapter is found; a software driver is enough.
+#![cfg(feature = "gpu")]
+
+#[path = "common/caller.rs"]
+mod caller;
+
+use std::collections::BTreeMap;
+
+use caller::Caller;
+use impinge_core::exact::{ElementPair, Point, are_within};
+use impinge_core::{
+    Backend, BodyId, Detector, Element, Error, PairKind, Query, Scene, Settings, wgpu,
+};
+use impinge_scenes::data::test_file;
+use impinge_scenes::{Model, Random, soup, surfaces};
+
+/// The bounds of each body.
+type Safe = BTreeMap<BodyId, Vec<f32>>;
+
+/// Encodes safe distances, and reads them. Also returns whether there was room.
+fn encoded(
+    caller: &Caller,
+    detector: &mut Detector,
+    scene: &Scene,
+    most: f64,
+    query: &Query,
+    positions: &[(BodyId, &wgpu::Buffer)],
+) -> (Safe, bool) {
+    let mut encoder = caller.encoder();
+    let mut gpu = detector.gpu().expect("a device");
+    let found = gpu.encode_safe_distances(scene, most, query, positions, &mut encoder);
+    let found = found.expect("good buffers");
+    caller.queue.submit([encoder.finish()]);
+    let words = caller.read(&found.distances);
+    let own = |at: &impinge_core::ResidentVertices| {
+        let words = &words[at.first as usize..][..at.len as usize];
+        (at.body, words.iter().map(|&x| f32::from_bits(x)).collect())
+    };
+    let safe = found.bodies.iter().map(own).collect();
+    let has_room = detector.gpu().expect("a device").grow().expect("room");
+    (safe, has_room)
+}
+
+/// Encodes them until there is room.
+fn safe_of(
+    caller: &Caller,
+    detector: &mut Detector,
+    scene: &Scene,
+    most: f64,
+    query: &Query,
+    positions: &[(BodyId, &wgpu::Buffer)],
+) -> Safe {
+    for _ in 0..9 {
+        let (safe, has_room) = encoded(caller, detector, scene, most, query, positions);
+        if has_room {
+            return safe;
+        }
+        assert!(safe.values().flatten().all(|&bound| bound == 0.0));
+    }
+    panic!("there never is enough room");
+}
+
+/// The corners of an element, and where they are.
+fn corners(scene: &Scene, kind: PairKind, side: usize, of: Element) -> (Vec<u32>, Vec<Point>) {
+    let body = scene.body(of.body).expect("held");
+    let corners = match kind.parts()[side] {
+        impinge_core::Part::Vertices => vec![of.element],
+        part => body.part(part).corners(of.element as usize).to_vec(),
+    };
+    let point = |&corner: &u32| body.positions().point(corner as usize);
+    let points = corners.iter().map(point).collect();
+    (corners, points)
+}
+
+/// Holds the bounds against every pair that is near: together, two elements certainly move less
+/// than they are apart, and no bound is much smaller than it must be. Returns how many pairs
+/// touch, and how many vertices have a bound that is neither 0 nor `most`.
+fn check(name: &str, scene: &Scene, safe: &Safe, most: f64, fixed: &[BodyId]) -> [usize; 2] {
+    let mut cpu = Detector::new(Backend::Cpu).expect("settings");
+    let near = cpu.near(scene, 2.0 * most, &Query::all().distances());
+    let near = near.expect("good");
+    let mut least: BTreeMap<(BodyId, u32), f64> = BTreeMap::new();
+    let mut width = 0.0f64;
+    let mut n_touching = 0;
+    for pair in near.iter() {
+        let test = match pair.kind {
+            PairKind::VertexFace => ElementPair::VertexFace,
+            PairKind::EdgeEdge => ElementPair::EdgeEdge,
+            PairKind::EdgeVertex => ElementPair::VertexEdge,
+            PairKind::VertexVertex => ElementPair::VertexVertex,
+            // Their edges and vertices are looked at.
+            _ => continue,
+        };
+        let elements = [pair.a, pair.b];
+        let sides = [0, 1].map(|side| corners(scene, pair.kind, side, elements[side]));
+        let moves = [0, 1].map(|side| {
+            let bounds = &safe[&elements[side].body];
+            let own = sides[side].0.iter().map(|&corner| bounds[corner as usize]);
+            f64::from(own.fold(0.0, f32::max))
+        });
+        let mut order = [0, 1];
+        if pair.kind == PairKind::EdgeVertex {
+            order.reverse();
+        }
+        let mut four = [[0.0; 3]; 4];
+        let all = order.iter().flat_map(|&side| &sides[side].1);
+        for (to, from) in four.iter_mut().zip(all) {
+            *to = *from;
+        }
+        // Both are floats in single precision: their sum is exact, but for very different ones.
+        let sum = (moves[0] + moves[1]).next_up();
+        if are_within(test, &four, if moves == [0.0; 2] { 0.0 } else { sum }) {
+            assert_eq!(moves, [0.0; 2], "{name}: {pair:?}");
+            n_touching += 1;
+        }
+        let distance = pair.distance.expect("asked for");
+        let are_fixed = elements.map(|of| fixed.contains(&of.body));
+        for side in 0..2 {
+            let share = match are_fixed {
+                [false, false] => distance / 2.0,
+                _ => distance,
+            };
+            for &corner in &sides[side].0 {
+                let least = least.entry((elements[side].body, corner)).or_insert(most);
+                *least = least.min(share);
+            }
+            for (p, q) in sides[0]
+                .1
+                .iter()
+                .flat_map(|p| sides[1].1.iter().map(move |q| (p, q)))
+            {
+                for k in 0..3 {
+                    width = width.max((p[k] - q[k]).abs());
+                }
+            }
+        }
+    }
+    let mut n_bounded = 0;
+    for (&body, bounds) in safe {
+        let is_fixed = fixed.contains(&body);
+        for (vertex, &bound) in (0..).zip(bounds) {
+            let bound = f64::from(bound);
+            if is_fixed {
+                assert_eq!(bound, 0.0, "{name}");
+                continue;
+            }
+            let least = least.get(&(body, vertex)).copied().unwrap_or(most);
+            assert!(bound <= most, "{name}");
+            let slack = width * 2f64.powi(-16) + most * 2f64.powi(-23);
+            assert!(
+                bound >= least * (1.0 - 1.0 / 64.0) - slack,
+                "{name}: {body} {vertex}: {bound} {least}"
+            );
+            n_bounded += usize::from(bound > 0.0 && bound < most * 0.999);
+        }
+    }
+    [n_touching, n_bounded]
+}
+
+/// Numbers that are exact in single precision.
+fn singles(points: &[[f64; 3]]) -> Vec<[f32; 3]> {
+    points.iter().map(|p| p.map(|x| x as f32)).collect()
+}
+
+/// A body and its positions.
+type Placed = (BodyId, Vec<[f32; 3]>);
+
+/// Small bodies of every kind: on a lattice, where many elements touch, are parallel or degenerate,
+/// or at random; with their positions in single precision.
+fn small(seed: u64, is_lattice: bool) -> (Scene, Vec<Placed>) {
+    let mut random = Random::new(seed);
+    let mut points = |n: usize| -> Vec<[f64; 3]> {
+        let point = |_| match is_lattice {
+            true => [0; 3].map(|_| f64::from(random.below(5))),
+            false => random.point(-1.0, 1.0).map(f64::from),
+        };
+        (0..n).map(point).collect()
+    };
+    let all = [points(9), points(5), points(6), points(5)];
+    let mut scene = Scene::new();
+    // In double precision: of these the device has positions that nobody has rounded.
+    let bodies = [
+        scene.add_triangles(&[[0, 1, 2], [2, 1, 3], [4, 5, 6], [6, 5, 5]], &all[0]),
+        scene.add_tetrahedra(&[[0, 1, 2, 3]], &all[1]),
+        scene.add_edges(&[[0, 1], [1, 2], [3, 4], [5, 5]], &all[2]),
+        scene.add_points(&all[3]),
+    ];
+    let bodies = bodies.map(|body| body.expect("good"));
+    let held = bodies.into_iter().zip(all.iter().map(|at| singles(at)));
+    (scene, held.collect())
+}
+
+#[test]
+fn together_two_elements_move_less_than_they_are_apart() {
+    let caller = Caller::new();
+    let mut detector = caller.detector(Settings::default());
+    let (mut n_touching, mut n_bounded) = (0, 0);
+    for seed in 0..24 {
+        let (scene, bodies) = small(seed, seed % 2 == 0);
+        let fixed = match seed % 3 {
+            0 => vec![],
+            1 => vec![bodies[0].0],
+            _ => vec![bodies[1].0, bodies[3].0],
+        };
+        let most = [0.05, 0.3, 2.0][seed as usize / 2 % 3];
+        let query = Query::all().fixed(fixed.iter().copied());
+        let buffers = Vec::from_iter(bodies.iter().map(|(_, at)| caller.upload(at)));
+        let ids = bodies.iter().map(|(body, _)| *body);
+        let positions = Vec::from_iter(ids.zip(&buffers));
+        let mut truth = scene.clone();
+        for (body, at) in &bodies {
+            truth.set_positions(*body, at).expect("good");
+        }
+        // Of the bodies on the device the host knows another pose.
+        let mut known = scene.clone();
+        for (body, at) in &bodies {
+            let moved = Vec::from_iter(at.iter().map(|p| p.map(|x| f64::from(x) + 0.25)));
+            known.set_positions(*body, &moved).expect("good");
+        }
+        let of_device = safe_of(&caller, &mut detector, &known, most, &query, &positions);
+        let of_host = safe_of(&caller, &mut detector, &truth, most, &query, &[]);
+        assert_eq!(of_device, of_host, "{seed}");
+        let own = check(&format!("{seed}"), &truth, &of_host, most, &fixed);
+        (n_touching, n_bounded) = (n_touching + own[0], n_bounded + own[1]);
+        // Positions that the host has rounded.
+        let rounded = safe_of(
+            &caller,
+            &mut detector,
+            &scene,
+            most,
+            &query,
+            &positions[..1],
+        );
+        let mut half = scene.clone();
+        half.set_positions(bodies[0].0, &bodies[0].1).expect("good");
+        check(&format!("rounded {seed}"), &half, &rounded, most, &fixed);
+    }
+    assert!(
+        n_touching > 100 && n_bounded > 150,
+        "{n_touching} {n_bounded}"
+    );
+}
+
+/// A scene of one body.
+fn alone(model: &Model) -> Scene {
+    let mut scene = Scene::new();
+    model.add_to(&mut scene).expect("good");
+    scene
+}
+
+#[test]
+fn bounds_of_larger_scenes_hold() {
+    let caller = Caller::new();
+    let mut detector = caller.detector(Settings::default());
+    let ball = surfaces::ball(1500);
+    let mut near = alone(&ball);
+    let (low, high) = ball.bounds().expect("not empty");
+    let above = ball.translated([0.0, 0.0, (high[2] - low[2]) * 1.002]);
+    above.add_to(&mut near).expect("good");
+    for (name, scene, most) in [
+        ("balls", near.clone(), 0.06),
+        // The same boxes were widened by another length, and then by none.
+        ("balls", near, 0.15),
+        ("soup", alone(&soup::triangles(300, 0.1, 4)), 0.03),
+        ("lattice", alone(&soup::lattice_triangles(120, 9, 4)), 0.8),
+        ("web", alone(&soup::lattice_web(150, 6, 4)), 0.8),
+    ] {
+        let safe = safe_of(&caller, &mut detector, &scene, most, &Query::all(), &[]);
+        let [n_touching, n_bounded] = check(name, &scene, &safe, most, &[]);
+        assert!(
+            n_bounded > 20 || n_touching > 20,
+            "{name}: {n_bounded} {n_touching}"
+        );
+        // Boxes of a step are not widened.
+        let step = detector.impacts(&scene, &Query::all());
+        assert!(step.expect("good").stats().backend != "cpu");
+    }
+}
+
+#[test]
+fn bounds_of_real_frames_hold() {
+    let caller = Caller::new();
+    let mut detector = caller.detector(Settings::default());
+    for (name, frame, share) in [
+        ("cloth-ball", "cloth_ball92", 1e-3),
+        ("cloth-funnel", "227", 1e-3),
+    ] {
+        let Some(path) = test_file(&format!("ccd/{name}/frames/{frame}.ply")) else {
+            continue;
+        };
+        let options = impinge_io::ReadOptions::as_they_are();
+        let mesh = impinge_io::read(&path, &options).expect("a mesh");
+        let impinge_io::Elements::Triangles(faces) = mesh.elements else {
+            panic!("a surface");
+        };
+        let at = match mesh.positions {
+            impinge_io::Positions::F32(at) => at,
+            impinge_io::Positions::F64(at) => singles(&at),
+        };
+        let size = |k: usize| {
+            let all = || at.iter().map(|p| f64::from(p[k]));
+            all().fold(f64::MIN, f64::max) - all().fold(f64::MAX, f64::min)
+        };
+        let most = share * size(0).max(size(1)).max(size(2));
+        let mut scene = Scene::new();
+        let body = scene.add((faces, at.clone())).expect("good");
+        let buffer = caller.upload(&at);
+        let positions = [(body, &buffer)];
+        let safe = safe_of(
+            &caller,
+            &mut detector,
+            &scene,
+            most,
+            &Query::all(),
+            &positions,
+        );
+        let [_, n_bounded] = check(name, &scene, &safe, most, &[]);
+        assert!(n_bounded > 100, "{name}: {n_bounded}");
+    }
+}
+
+#[test]
+fn without_room_nothing_may_move() {
+    let caller = Caller::new();
+    let scene = alone(&soup::triangles(300, 0.1, 7));
+    let most = 3.0;
+    let query = Query::all();
+    let mut detector = caller.detector(Settings::default());
+    let (safe, has_room) = encoded(&caller, &mut detector, &scene, most, &query, &[]);
+    assert!(!has_room, "more candidates than there is room for");
+    assert!(safe.values().flatten().all(|&bound| bound == 0.0));
+    let safe = safe_of(&caller, &mut detector, &scene, most, &query, &[]);
+    let [_, n_bounded] = check("soup", &scene, &safe, most, &[]);
+    assert!(n_bounded > 100, "{n_bounded}");
+}
+
+#[test]
+fn what_the_device_does_not_know_is_refused_by_name() {
+    let caller = Caller::new();
+    let mut detector = caller.detector(Settings::default());
+    let mut scene = Scene::new();
+    let triangle = [[0.0f32; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    let body = scene.add_triangles(&[[0, 1, 2]], &triangle).expect("good");
+    let gone = scene.add_triangles(&[[0, 1, 2]], &triangle).expect("good");
+    scene.remove(gone).expect("known");
+    let mut refused = |scene: &Scene, most: f64, query: &Query| -> Error {
+        let mut encoder = caller.encoder();
+        let mut gpu = detector.gpu().expect("a device");
+        let refused = gpu.encode_safe_distances(scene, most, query, &[], &mut encoder);
+        refused.expect_err("refused")
+    };
+    for most in [-1.0, f64::NAN, f64::INFINITY, 1e31] {
+        let text = refused(&scene, most, &Query::all()).to_string();
+        assert!(text.contains("most"), "{text}");
+    }
+    let text = refused(&scene, 1.0, &Query::all().fixed([gone])).to_string();
+    assert!(text.contains(&gone.to_string()), "{text}");
+    scene.set_thickness(body, 0.5).expect("good");
+    let text = refused(&scene, 1.0, &Query::all()).to_string();
+    assert!(text.contains("thickness") && text.contains("0.5"), "{text}");
+}
+
+/// Large triangles, and points that are very near each: where rounding is as large as distances.
+fn thin(seed: u64) -> Scene {
+    let mut random = Random::new(seed);
+    let (mut corners, mut faces, mut points) = (Vec::new(), Vec::new(), Vec::new());
+    for n in 0..60u32 {
+        let far = 100.0 * n as f32;
+        let at = |p: [f32; 3]| [p[0] + far, p[1], p[2]];
+        let [a, b, c] = [0; 3].map(|_| at(random.point(-9.0, 9.0)));
+        let (s, t) = (0.5 * random.unit(), 0.5 * random.unit());
+        let inside = [0, 1, 2].map(|k| a[k] + s * (b[k] - a[k]) + t * (c[k] - a[k]));
+        let off = random
+            .point(-1.0, 1.0)
+            .map(|x| x * 10f32.powi(-(n as i32 % 7)));
+        points.push([0, 1, 2].map(|k| inside[k] + off[k]));
+        corners.extend([a, b, c]);
+        faces.push([3 * n, 3 * n + 1, 3 * n + 2]);
+    }
+    let mut scene = Scene::new();
+    scene.add_triangles(&faces, &corners).expect("good");
+    scene.add_points(&points).expect("good");
+    scene
+}
+
+#[test]
+fn bounds_hold_where_rounding_is_as_large_as_distances() {
+    let caller = Caller::new();
+    let mut detector = caller.detector(Settings::default());
+    let mut n_all = 0;
+    for seed in 0..8 {
+        let scene = thin(seed);
+        let safe = safe_of(&caller, &mut detector, &scene, 2.0, &Query::all(), &[]);
+        let [_, n_bounded] = check("thin", &scene, &safe, 2.0, &[]);
+        n_all += n_bounded;
+    }
+    assert!(n_all > 500, "{n_all}");
+}
+
+/// Two faces whose boxes are apart.
+fn apart() -> Scene {
+    let mut scene = Scene::new();
+    let face = |z: f32| [[0.0, 0.0, z], [1.0, 0.0, z], [0.0, 1.0, z]];
+    for z in [0.0, 0.5] {
+        scene.add_triangles(&[[0, 1, 2]], &face(z)).expect("good");
+    }
+    scene
+}
+
+#[test]
+fn damaged_kernels_are_noticed() {
+    let caller = Caller::new();
+    // With a small budget there is no room for the pairs of the last one.
+    let small = Settings::new().memory_budget(Some(3 << 20));
+    let scenes = [
+        (thin(3), 2.0, Settings::default()),
+        (apart(), 1.0, Settings::default()),
+        (
+            alone(&soup::lattice_triangles(90, 9, 4)),
+            0.8,
+            Settings::default(),
+        ),
+        (alone(&soup::triangles(100, 0.1, 7)), 3.0, small),
+    ];
+    let holds = |detector: &dyn Fn(&Settings) -> Detector| {
+        scenes.iter().all(|(scene, most, settings)| {
+            let asks = || {
+                let mut detector = detector(settings);
+                let all = Query::all();
+                let (safe, _) = encoded(&caller, &mut detector, scene, *most, &all, &[]);
+                // Numbers of 0 are safe, and say nothing.
+                if safe.values().flatten().any(|&bound| bound > 0.0) {
+                    check("damaged", scene, &safe, *most, &[]);
+                }
+            };
+            std::panic::catch_unwind(std::panic::AssertUnwindSafe(asks)).is_ok()
+        })
+    };
+    assert!(holds(&|settings| caller.detector(settings.clone())));
+    let mut unnoticed = Vec::new();
+    for damage in [
+        (
+            "bounds_clusters_moving",
+            "widened(Box(low - slack, high + slack), params.reach)",
+            "widened(Box(low - slack, high + slack), 0u)",
+        ),
+        ("narrow_safe", "low = min(low,", "low = max(-1.0,"),
+        (
+            "narrow_safe",
+            "opposite = min(opposite,",
+            "opposite = max(-1.0,",
+        ),
+        (
+            "narrow_safe",
+            "select(distance, 0.5 * distance,",
+            "select(distance, distance,",
+        ),
+        (
+            "narrow_safe",
+            "if corner.z != corner.y {",
+            "if corner.z == corner.y {",
+        ),
+        (
+            "narrow_safe",
+            "if corner.y != corner.x {",
+            "if corner.y == corner.x {",
+        ),
+        (
+            "narrow_safe",
+            "cross3(polygon.edges[0], polygon.edges[1])",
+            "polygon.edges[0]",
+        ),
+        (
+            "narrow_safe",
+            "found * BELOW, is_below)",
+            "found * 1.125, is_below)",
+        ),
+        ("safe_end", "shares[vertex] = 0u;", ""),
+        (
+            "safe_end",
+            "atomicLoad(&counters[N_CANDIDATES]) > params.capacity",
+            "atomicLoad(&counters[N_CANDIDATES]) < params.capacity",
+        ),
+    ] {
+        let damaged = |settings: &Settings| {
+            let (device, queue) = (caller.device.clone(), caller.queue.clone());
+            let detector = Detector::with_damage(device, queue, settings.clone(), damage);
+            detector.expect("a line")
+        };
+        if holds(&damaged) {
+            unnoticed.push(damage);
+        }
+    }
+    assert!(unnoticed.is_empty(), "{unnoticed:#?}");
+}
