@@ -31,6 +31,9 @@ ITERATIONS = 20
 STRETCH, SHEAR, BEND = 0.0, 1e-6, 1e-4
 #: Elements are pushed apart to this share of an edge, and looked for within that one.
 THICKNESS, REACH = 0.3, 0.5
+#: Of a contact. Beside pinned vertices the sum of squares of weights may be tiny, and what it divides
+#: would move others by 10^11 metres.
+LEAST_MASS = 0.01
 #: Of a denominator that may be 0.
 TINY = 1e-30
 #: Tangent of half the angle by which an end of the twisted cloth turns per step, about 1.4 degrees.
@@ -287,7 +290,7 @@ class World:
         masses = np.zeros(len(contacts[0]))
         for k in range(4):
             masses = masses + contacts[1][:, k] * contacts[1][:, k] * cloth.moves[contacts[0][:, k]]
-        masses = np.maximum(masses, TINY)
+        masses = np.maximum(masses, LEAST_MASS)
         forces = [np.zeros(len(ends)) for ends, _ in cloth.springs]
         for _ in range(ITERATIONS):
             for (ends, compliance), rest, force in zip(cloth.springs, cloth.lengths, forces):

@@ -43,6 +43,9 @@ const BEND: f64 = 1e-4;
 /// Elements are pushed apart to this share of an edge, and looked for within [`REACH`].
 const THICKNESS: f64 = 0.3;
 const REACH: f64 = 0.5;
+/// Of a contact. Beside pinned vertices the sum of squares of weights may be tiny, and what it
+/// divides would move others by 10^11 metres.
+const LEAST_MASS: f64 = 0.01;
 /// Of a denominator that may be 0.
 const TINY: f64 = 1e-30;
 /// Tangent of half the angle by which an end of the twisted cloth turns per step, about 1.4
@@ -436,7 +439,7 @@ impl World {
             corners,
             normal,
             offset: of_other(pair.a, a) - of_other(pair.b, b),
-            mass: mass.max(TINY),
+            mass: mass.max(LEAST_MASS),
         })
     }
 
