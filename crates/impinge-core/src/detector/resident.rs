@@ -148,10 +148,10 @@ impl Gpu<'_> {
     /// at most its number, on any path, no pair of elements touches that the device looks at: those
     /// of [`encode_step`](Gpu::encode_step), a vertex and a face or two edges, and for bare bodies
     /// an edge and a vertex or two vertices. An edge that passes through a face is not looked for:
-    /// a scene is to begin free of intersections. Each number is below what `safe_distances` gives,
-    /// by at most 2^-6 of it where no pair is nearer than a thousandth of its elements' size, and
-    /// larger than 2^-32; it is 0 for pairs that touch, that are nearer than about 2^-19 of their
-    /// size, or beyond 2^40.
+    /// a scene is to begin free of intersections. Each number is below what the smallest distance
+    /// of its vertex allows, by at most 2^-6 of it where no pair is nearer than a thousandth of its
+    /// elements' size; it is 0 for pairs that touch, that are nearer than about 2^-19 of their
+    /// size, whose size is below 2^-32, or that have a coordinate beyond 2^40.
     ///
     /// `positions` names bodies whose positions are taken from a buffer, as in `encode_step`; all
     /// other positions come from the scene. Positions at the end of a step are ignored.
