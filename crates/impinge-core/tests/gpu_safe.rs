@@ -495,3 +495,297 @@ fn damaged_kernels_are_noticed() {
     }
     assert!(unnoticed.is_empty(), "{unnoticed:#?}");
 }
+
+/// Positions on the host, and where the device has moved them towards wished ones, within its own
+/// safe distances, in one submission.
+struct Truncated {
+    safe: Safe,
+    starts: Vec<Placed>,
+    wished: Vec<Vec<[f32; 3]>>,
+    reached: Vec<Vec<[f32; 3]>>,
+}
+
+fn truncated(
+    caller: &Caller,
+    detector: &mut Detector,
+    (scene, starts): (&Scene, Vec<Placed>),
+    most: f64,
+    query: &Query,
+    wished: Vec<Vec<[f32; 3]>>,
+) -> Truncated {
+    let buffers = Vec::from_iter(starts.iter().map(|(_, at)| caller.upload(at)));
+    let ids = || starts.iter().map(|(body, _)| *body);
+    let positions = Vec::from_iter(ids().zip(&buffers));
+    // As much room as is needed.
+    safe_of(caller, detector, scene, most, query, &positions);
+    let goals = Vec::from_iter(wished.iter().map(|at| caller.upload(at)));
+    let ends = Vec::from_iter(ids().zip(&goals));
+    let mut encoder = caller.encoder();
+    let mut gpu = detector.gpu().expect("a device");
+    let found = gpu.encode_safe_distances(scene, most, query, &positions, &mut encoder);
+    let found = found.expect("good buffers");
+    gpu.encode_truncate(&found, &positions, &ends, &mut encoder)
+        .expect("good buffers");
+    caller.queue.submit([encoder.finish()]);
+    let words = caller.read(&found.distances);
+    let own = |at: &impinge_core::ResidentVertices| {
+        let words = &words[at.first as usize..][..at.len as usize];
+        (at.body, words.iter().map(|&x| f32::from_bits(x)).collect())
+    };
+    let points = |buffer: &wgpu::Buffer| {
+        let words = caller.read(buffer);
+        let rows = words.as_chunks::<3>().0.iter();
+        Vec::from_iter(rows.map(|row| row.map(f32::from_bits)))
+    };
+    Truncated {
+        safe: found.bodies.iter().map(own).collect(),
+        reached: goals.iter().map(points).collect(),
+        starts,
+        wished,
+    }
+}
+
+/// The length of a way, in double precision: wrong by a few parts in 2^52.
+fn length(from: [f32; 3], to: [f32; 3]) -> f64 {
+    let way = [0, 1, 2].map(|k| f64::from(to[k]) - f64::from(from[k]));
+    way.iter().map(|x| x * x).sum::<f64>().sqrt()
+}
+
+/// Holds each position against how far its vertex may move. Returns how many vertices are where
+/// they were wished to be, how many on the way, and how many stay though they were to move.
+fn check_reached(of: &Truncated) -> [usize; 3] {
+    let mut n = [0; 3];
+    for (ix, (body, starts)) in of.starts.iter().enumerate() {
+        for (vertex, &start) in starts.iter().enumerate() {
+            let room = f64::from(of.safe[body][vertex]);
+            let (wish, to) = (of.wished[ix][vertex], of.reached[ix][vertex]);
+            let (wanted, moved) = (length(start, wish), length(start, to));
+            assert!(moved <= room, "{start:?} {to:?}: {moved} {room}");
+            let size = start
+                .iter()
+                .fold(0.0f64, |most, &x| most.max(x.abs().into()));
+            if to.map(f32::to_bits) == wish.map(f32::to_bits) {
+                n[0] += 1;
+                continue;
+            }
+            // What is near enough, but for the error of the check, is reached.
+            let is_near = wanted < room * (1.0 - 2f64.powi(-17));
+            assert!(!is_near, "{start:?} {wish:?} {room}");
+            if moved == 0.0 {
+                n[2] += 1;
+                let rounding = 2f64.powi(-19) * size.max(wanted);
+                assert!(
+                    !wanted.is_finite() || wanted > 1e12 || room < rounding,
+                    "{room}"
+                );
+                continue;
+            }
+            n[1] += 1;
+            let slack = 2f64.powi(-19) * size.max(wanted) + 2f64.powi(-14) * room;
+            assert!(moved > room - slack, "{start:?} {to:?}: {moved} {room}");
+            let part = moved / wanted;
+            for k in 0..3 {
+                let on = f64::from(start[k]) + part * (f64::from(wish[k]) - f64::from(start[k]));
+                assert!(
+                    (f64::from(to[k]) - on).abs() < slack,
+                    "{start:?} {wish:?} {to:?}"
+                );
+            }
+        }
+    }
+    n
+}
+
+/// Positions that are wished for: some as they are, some near, some far, some no numbers.
+fn wishes(random: &mut Random, starts: &[Placed], most: f32) -> Vec<Vec<[f32; 3]>> {
+    let mut wish = |&at: &[f32; 3]| {
+        let reach = match random.below(16) {
+            0 => 0.0,
+            1 => return [f32::NAN, at[1], f32::INFINITY],
+            2 => return [at[0], f32::MAX, at[2]],
+            3 => 1e9,
+            4..=7 => 0.2 * most,
+            8..=10 => most,
+            _ => 3.0 * most,
+        };
+        let by = random.point(-1.0, 1.0);
+        // A little farther than vertices may go that have nothing near them.
+        let length = by.iter().map(|x| x * x).sum::<f32>().sqrt();
+        let reach = if reach == most {
+            1.05 * most / length
+        } else {
+            reach
+        };
+        [0, 1, 2].map(|k| at[k] + reach * by[k])
+    };
+    let own = |(_, at): &Placed| at.iter().map(&mut wish).collect();
+    starts.iter().map(own).collect()
+}
+
+#[test]
+fn no_vertex_goes_farther_than_it_may() {
+    let caller = Caller::new();
+    let mut detector = caller.detector(Settings::default());
+    let mut random = Random::new(7);
+    let mut n = [0; 3];
+    for seed in 0..16 {
+        let (scene, bodies) = small(seed, seed % 2 == 0);
+        // Far from the origin positions are rounded, and near it they are tiny.
+        let factor = [1.0, 1e-12, 1.0, 64.0][seed as usize % 4];
+        let far = [0.0, 0.0, 1000.0, 0.0][seed as usize / 2 % 4];
+        let scaled =
+            |at: &Vec<[f32; 3]>| Vec::from_iter(at.iter().map(|p| p.map(|x| factor * x + far)));
+        let bodies = Vec::from_iter(bodies.iter().map(|(body, at)| (*body, scaled(at))));
+        let most = 0.3 * factor;
+        let query = Query::all().fixed((seed % 3 == 0).then_some(bodies[0].0));
+        let wished = wishes(&mut random, &bodies, most);
+        let all = (&scene, bodies);
+        let found = truncated(&caller, &mut detector, all, f64::from(most), &query, wished);
+        let own = check_reached(&found);
+        n = [0, 1, 2].map(|k| n[k] + own[k]);
+    }
+    assert!(n.iter().all(|&n| n > 30), "{n:?}");
+}
+
+/// Two balls one above the other, and wishes that bring them together.
+fn meeting() -> (Scene, Vec<Placed>, Vec<Vec<[f32; 3]>>) {
+    let ball = surfaces::ball(600);
+    let (low, high) = ball.bounds().expect("not empty");
+    let above = ball.translated([0.0, 0.0, (high[2] - low[2]) * 1.01]);
+    let mut scene = Scene::new();
+    let (mut starts, mut wished) = (Vec::new(), Vec::new());
+    for (model, down) in [(ball, 0.0), (above, 0.2)] {
+        let body = model.add_to(&mut scene).expect("good");
+        let at = Vec::from_iter(
+            (0..scene.body(body).expect("held").n_vertices()).map(|vertex| {
+                let point = scene.body(body).expect("held").positions().point(vertex);
+                point.map(|x| x as f32)
+            }),
+        );
+        wished.push(Vec::from_iter(at.iter().map(|&[x, y, z]| [x, y, z - down])));
+        starts.push((body, at));
+    }
+    (scene, starts, wished)
+}
+
+/// Whether nothing touches on the way from where bodies are to some positions.
+fn is_free(scene: &Scene, starts: &[Placed], ends: &[Vec<[f32; 3]>]) -> bool {
+    let mut scene = scene.clone();
+    for ((body, at), end) in starts.iter().zip(ends) {
+        scene.set_positions(*body, at).expect("good");
+        scene.set_end_positions(*body, end).expect("good");
+    }
+    let mut cpu = Detector::new(Backend::Cpu).expect("settings");
+    cpu.is_free(&scene, &Query::all()).expect("good")
+}
+
+#[test]
+fn nothing_touches_on_the_way_to_what_is_reached() {
+    let caller = Caller::new();
+    let mut detector = caller.detector(Settings::default());
+    let (scene, mut starts, mut wished) = meeting();
+    assert!(
+        !is_free(&scene, &starts, &wished),
+        "the wishes bring them together"
+    );
+    let mut nearest = f64::INFINITY;
+    for _ in 0..6 {
+        let all = (&scene, starts);
+        let query = Query::all();
+        let found = truncated(&caller, &mut detector, all, 0.05, &query, wished);
+        let [n_there, n_on_the_way, _] = check_reached(&found);
+        assert!(
+            n_there > 100 && n_on_the_way > 10,
+            "{n_there} {n_on_the_way}"
+        );
+        assert!(is_free(&scene, &found.starts, &found.reached));
+        let room = found.safe.values().flatten();
+        nearest = room.fold(nearest, |least, &room| least.min(room.into()));
+        // The next step begins where this one ends.
+        let ids = found.starts.iter().map(|(body, _)| *body);
+        starts = ids.zip(found.reached).collect();
+        wished = found.wished;
+    }
+    assert!(nearest < 1e-3, "they come near each other: {nearest}");
+}
+
+#[test]
+fn buffers_of_a_truncation_are_refused_by_name() {
+    let caller = Caller::new();
+    let mut detector = caller.detector(Settings::default());
+    let (scene, starts, wished) = meeting();
+    let [(a, at), (b, _)] = &starts[..] else {
+        panic!("two bodies");
+    };
+    let (start, end) = (caller.upload(at), caller.upload(&wished[0]));
+    let short = caller.upload(&at[1..]);
+    let plain = caller.buffer(start.size(), wgpu::BufferUsages::COPY_DST);
+    let mut encoder = caller.encoder();
+    let mut gpu = detector.gpu().expect("a device");
+    let safe = gpu.encode_safe_distances(&scene, 0.1, &Query::of(*a), &[], &mut encoder);
+    let mut safe = safe.expect("good buffers");
+    safe.bodies.retain(|own| own.body == *a);
+    for (body, start, end, words) in [
+        (*b, &start, &end, "it has no safe distances"),
+        (*a, &short, &end, "positions take"),
+        (*a, &start, &short, "end positions take"),
+        (*a, &start, &plain, "end positions lacks the usage STORAGE"),
+        (*a, &start, &start, "in the buffer of its positions"),
+    ] {
+        let (starts, ends) = ([(body, start)], [(body, end)]);
+        let refused = gpu.encode_truncate(&safe, &starts, &ends, &mut encoder);
+        let text = refused.expect_err("refused").to_string();
+        assert!(
+            text.contains(words) && text.contains(&body.to_string()),
+            "{text}"
+        );
+    }
+    let refused = gpu.encode_truncate(&safe, &[], &[(*a, &end)], &mut encoder);
+    let text = refused.expect_err("refused").to_string();
+    assert!(text.contains("end positions alone"), "{text}");
+}
+
+#[test]
+fn damaged_truncations_are_noticed() {
+    let caller = Caller::new();
+    let (scene, bodies) = small(3, false);
+    let holds = |mut detector: Detector| {
+        let asks = || {
+            let mut random = Random::new(5);
+            for _ in 0..6 {
+                let wished = wishes(&mut random, &bodies, 0.3);
+                let all = (&scene, bodies.clone());
+                let found = truncated(&caller, &mut detector, all, 0.3, &Query::all(), wished);
+                check_reached(&found);
+            }
+        };
+        std::panic::catch_unwind(std::panic::AssertUnwindSafe(asks)).is_ok()
+    };
+    assert!(holds(caller.detector(Settings::default())));
+    let mut unnoticed = Vec::new();
+    for damage in [
+        (
+            "truncate",
+            "(1.0 + OF_PRODUCT) <= r * r",
+            "(1.0 + OF_PRODUCT) <= 1.25 * r * r",
+        ),
+        (
+            "truncate",
+            "let aim = room * (1.0",
+            "let aim = 0.5 * room * (1.0",
+        ),
+        ("truncate", "<= LARGEST_BITS", "> LARGEST_BITS"),
+        (
+            "truncate",
+            "shares[params.first + vertex]",
+            "shares[vertex]",
+        ),
+    ] {
+        let (device, queue) = (caller.device.clone(), caller.queue.clone());
+        let damaged = Detector::with_damage(device, queue, Settings::default(), damage);
+        if holds(damaged.expect("a line")) {
+            unnoticed.push(damage);
+        }
+    }
+    assert!(unnoticed.is_empty(), "{unnoticed:#?}");
+}

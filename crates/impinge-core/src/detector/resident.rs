@@ -142,7 +142,8 @@ impl Gpu<'_> {
 
     /// Encodes [`safe_distances`](Detector::safe_distances) into the caller's encoder: positions
     /// come from buffers on the device, and how far each vertex may move stays there. Nothing is
-    /// read back, so a solver on the device needs no answer from the host between its steps.
+    /// read back, so a solver on the device needs no answer from the host between its steps;
+    /// [`encode_truncate`](Gpu::encode_truncate) moves its vertices by at most these numbers.
     ///
     /// The numbers are `f32`, proven under any rounding that WGSL allows: if every vertex moves by
     /// at most its number, on any path, no pair of elements touches that the device looks at: those
@@ -204,6 +205,39 @@ impl Gpu<'_> {
         let clusterings = self.detector.clusterings.of_frame(job, judges, stats)?;
         let limits = (most, &query.fixed);
         engine.encode_safe(job, &clusterings, positions, limits, encoder)
+    }
+
+    /// Encodes [`truncate`](Detector::truncate) into the caller's encoder, after safe distances:
+    /// each vertex moves towards its wished position as far as these allow. The wished position is
+    /// reached where it is certainly near enough; else the vertex ends on the way to it, or stays.
+    ///
+    /// `starts` has the positions of which `safe` was found, as they were given to
+    /// [`encode_safe_distances`](Gpu::encode_safe_distances), or a copy. `ends` has the wished ones,
+    /// and then those that are reached: no vertex is farther from its start than it may move,
+    /// proven under any rounding that WGSL allows. So nothing touches on the way that was looked at,
+    /// if all bodies that move are given, bodies that are not fixed move no other way, and others
+    /// do not move. A wished position may be any number, infinite too.
+    ///
+    /// Buffers hold `(v, 3)` f32 coordinates, and need the usage `STORAGE`. At most one truncation
+    /// may be encoded per submission.
+    ///
+    /// # Errors
+    /// A body without safe distances or with `ends` alone, a buffer that is too small, lacks a
+    /// usage, is larger than a binding may be, or is that of both ends; a lost device, a detector
+    /// that works on the CPU.
+    pub fn encode_truncate(
+        &mut self,
+        safe: &ResidentSafe,
+        starts: &[(BodyId, &wgpu::Buffer)],
+        ends: &[(BodyId, &wgpu::Buffer)],
+        encoder: &mut wgpu::CommandEncoder,
+    ) -> Result<(), Error> {
+        let Some(engine) = &mut self.detector.gpu else {
+            return Err(Error::NoAdapter {
+                found: "this detector works on the CPU".to_owned(),
+            });
+        };
+        engine.encode_truncate(safe, starts, ends, encoder)
     }
 
     /// The positions of a body in the buffer from which the last frame read them, `(v, 3)` f32

@@ -199,6 +199,20 @@ impl<T: Pod> Storage<T> {
     }
 }
 
+impl<T> Read<T> {
+    /// Binds the first bytes of a buffer of the caller's for reading.
+    pub fn of_caller(slice: Slice) -> Self {
+        Read(slice, PhantomData)
+    }
+}
+
+impl<T> Write<T> {
+    /// Binds the first bytes of a buffer of the caller's for reading and writing.
+    pub fn of_caller(slice: Slice) -> Self {
+        Write(slice, PhantomData)
+    }
+}
+
 /// How a kernel uses a binding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Access {

@@ -24,7 +24,7 @@ use crate::query::goal::Goal;
 /// above them.
 const NARROW_LEVEL: u32 = 2048;
 /// Candidates per workgroup.
-const GROUP: u32 = 64;
+pub(super) const GROUP: u32 = 64;
 /// The slots of the arguments of pairing, of narrow, and of a search. Those below are the rounds'.
 const PAIRING: u32 = ROUNDS;
 const NARROW: u32 = ROUNDS + 1;

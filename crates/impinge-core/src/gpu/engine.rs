@@ -67,6 +67,9 @@ pub struct Engine {
     pub(super) touches_by: Option<f32>,
     /// By how much boxes are widened, the bits of an f32, where safe distances are asked.
     pub(super) safe: Option<u32>,
+    /// Runs truncations, whose parameters are apart from those of safe distances: one submission
+    /// has both.
+    pub(super) truncations: Launcher,
     /// Whether passes are run launch by launch too.
     pub is_traced: bool,
 }
@@ -173,6 +176,7 @@ impl Engine {
             sought: Goal::All,
             touches_by: None,
             safe: None,
+            truncations: Launcher::default(),
             is_traced: false,
         }
     }

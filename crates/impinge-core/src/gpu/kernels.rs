@@ -138,6 +138,16 @@ bindings! {
 }
 
 bindings! {
+    /// `truncate.wgsl`
+    Truncate {
+        shares: Read<Share>,
+        starts: Read<Coordinate>,
+        ends: Write<Coordinate>,
+        params: Uniform<Params>,
+    }
+}
+
+bindings! {
     /// `bounds_reach.wgsl`
     BoundsReach {
         nodes: Read<Node>,
@@ -310,8 +320,9 @@ kernels! {
         from "narrow_moving" ("filter", "polygon", "pair", "reserve", "slots", "groups");
     narrow_search: NarrowSearch = NARROW_SEARCH []
         from "narrow_search" ("filter", "polygon", "pair", "numbers", "reserve", "slots", "groups");
-    narrow_safe: NarrowSafe = NARROW_SAFE [] from "narrow_safe" ("filter", "groups");
+    narrow_safe: NarrowSafe = NARROW_SAFE [] from "narrow_safe" ("filter", "lengths", "groups");
     safe_end: SafeEnd = SAFE_END [] from "safe_end" ("groups");
+    truncate: Truncate = TRUNCATE [] from "truncate" ("filter", "lengths", "groups");
     narrow: Narrow = NARROW [("WITH_SOLIDS", 0.0)]
         from "narrow" ("filter", "projections", "triangles", "neighbours", "solids", "numbers", "reserve", "groups");
     narrow_solids: Narrow = NARROW_SOLIDS [("WITH_SOLIDS", 1.0)]

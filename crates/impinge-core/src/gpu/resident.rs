@@ -4,10 +4,13 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use super::buffers::{count, read};
+use super::buffers::{Read, Slice, Uniform, Write, count, read};
+use super::clusters::GROUP;
 use super::engine::Engine;
-use super::layout::{Counter, N_PAIRS, N_UNSURE, Share, TOUCHES_BY};
+use super::kernels::Truncate;
+use super::layout::{Counter, N_PAIRS, N_UNSURE, Params, Share, TOUCHES_BY};
 use super::pass_buffers::{Capacities, NextPass, PassCounts};
+use super::recording::{Recording, Workgroups};
 use super::view::Motion;
 use super::world::ResidentEnds;
 use crate::bvh::bounds::{round_down, round_up};
@@ -282,6 +285,77 @@ impl Engine {
         })
     }
 
+    /// Encodes how vertices move towards wished positions, which become those that they reach.
+    ///
+    /// # Errors
+    /// Those of [`Gpu::encode_truncate`](crate::Gpu::encode_truncate).
+    pub fn encode_truncate(
+        &mut self,
+        safe: &ResidentSafe,
+        starts: &[(BodyId, &wgpu::Buffer)],
+        ends: &[(BodyId, &wgpu::Buffer)],
+        encoder: &mut wgpu::CommandEncoder,
+    ) -> Result<(), Error> {
+        self.gpu.check_lost()?;
+        let mut recording = Recording::default();
+        recording.stage("truncate");
+        for &(body, end) in ends {
+            let refused = |why: &str| Error::Gpu {
+                what: format!("body {body}: {why}"),
+            };
+            let of_body = |&&(id, _): &&(BodyId, &wgpu::Buffer)| id == body;
+            let vertices = safe.bodies.iter().find(|vertices| vertices.body == body);
+            let vertices = vertices.ok_or_else(|| refused("it has no safe distances"))?;
+            let start = starts.iter().find(of_body);
+            let &(_, start) = start.ok_or_else(|| refused("it has end positions alone"))?;
+            if start == end {
+                return Err(refused(
+                    "its end positions are in the buffer of its positions",
+                ));
+            }
+            let n_vertices = u64::from(vertices.len);
+            if n_vertices == 0 {
+                continue;
+            }
+            let storage = wgpu::BufferUsages::STORAGE;
+            let of_caller = |label, buffer: &wgpu::Buffer| {
+                check_holds(body, buffer, label, n_vertices, (storage, "STORAGE"))?;
+                let bytes = 12 * n_vertices;
+                if bytes > self.gpu.max_binding() {
+                    let most = self.gpu.max_binding();
+                    return Err(refused(&format!(
+                        "its {label} take {bytes} bytes, and the device binds at most {most}"
+                    )));
+                }
+                let buffer = buffer.clone();
+                Ok(Slice {
+                    label,
+                    buffer,
+                    bytes,
+                })
+            };
+            let shares = Slice {
+                label: "safe distances",
+                buffer: safe.distances.clone(),
+                bytes: safe.distances.size(),
+            };
+            let bindings = Truncate {
+                shares: Read::of_caller(shares),
+                starts: Read::of_caller(of_caller("positions", start)?),
+                ends: Write::of_caller(of_caller("end positions", end)?),
+                params: Uniform(Params {
+                    first: vertices.first,
+                    count: vertices.len,
+                    ..Params::default()
+                }),
+            };
+            let groups = Workgroups::Known(n_vertices.div_ceil(u64::from(GROUP)));
+            recording.launch(&self.gpu.kernels.truncate, &bindings, groups);
+        }
+        self.truncations
+            .encode(&self.gpu, &recording, None, encoder)
+    }
+
     /// Encodes all work of a frame or a step as one pass.
     fn encode_whole(
         &mut self,
@@ -353,14 +427,27 @@ impl Engine {
     }
 }
 
-/// Refuses a buffer that does not hold a body's positions.
+/// Refuses a buffer that does not hold a body's positions, or cannot be copied from.
 fn check_buffer(
     scene: &Scene,
     body: BodyId,
     buffer: &wgpu::Buffer,
     what: &str,
 ) -> Result<(), Error> {
-    let needed = 12 * count(scene.body(body)?.n_vertices());
+    let n_vertices = count(scene.body(body)?.n_vertices());
+    let copied = (wgpu::BufferUsages::COPY_SRC, "COPY_SRC");
+    check_holds(body, buffer, what, n_vertices, copied)
+}
+
+/// Refuses a buffer without room for positions, or without a usage.
+fn check_holds(
+    body: BodyId,
+    buffer: &wgpu::Buffer,
+    what: &str,
+    n_vertices: u64,
+    (usage, name): (wgpu::BufferUsages, &str),
+) -> Result<(), Error> {
+    let needed = 12 * n_vertices;
     if buffer.size() < needed {
         return Err(Error::Gpu {
             what: format!(
@@ -369,9 +456,9 @@ fn check_buffer(
             ),
         });
     }
-    if !buffer.usage().contains(wgpu::BufferUsages::COPY_SRC) {
+    if !buffer.usage().contains(usage) {
         return Err(Error::Gpu {
-            what: format!("body {body}: the buffer of its {what} lacks the usage COPY_SRC"),
+            what: format!("body {body}: the buffer of its {what} lacks the usage {name}"),
         });
     }
     Ok(())

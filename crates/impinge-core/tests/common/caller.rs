@@ -36,7 +36,7 @@ impl Caller {
         })
     }
 
-    /// Positions on the device.
+    /// Positions on the device, which kernels may read and write too.
     pub fn upload(&self, positions: &[[f32; 3]]) -> wgpu::Buffer {
         use wgpu::BufferUsages as Usage;
         let bytes: Vec<u8> = positions
@@ -44,7 +44,8 @@ impl Caller {
             .iter()
             .flat_map(|x| x.to_le_bytes())
             .collect();
-        let buffer = self.buffer(bytes.len() as u64, Usage::COPY_SRC | Usage::COPY_DST);
+        let usage = Usage::COPY_SRC | Usage::COPY_DST | Usage::STORAGE;
+        let buffer = self.buffer(bytes.len() as u64, usage);
         self.queue.write_buffer(&buffer, 0, &bytes);
         buffer
     }

@@ -16,8 +16,6 @@
 // Each step leaves its numbers in workgroup memory: a compiler that computed a direction twice might round it in two ways.
 
 const N_DIRECTIONS: u32 = 5u;
-// Bounds of the relative error of n . V, of n . n, and of what is divided; see the proof.
-const OF_PRODUCT: f32 = 0x1p-19f;
 // Of numbers that are flushed.
 const FLUSHED: f32 = 0x1p-76f;
 // The least height that is divided: its square is a normal number.
@@ -42,22 +40,8 @@ fn vertex_bits(vertex: u32) -> vec3<u32> {
     return vec3<u32>(positions[word], positions[word + 1u], positions[word + 2u]);
 }
 
-fn magnitude(bits: vec3<u32>) -> u32 {
-    let each = bits & vec3<u32>(0x7fffffffu);
-    return max(max(each.x, each.y), each.z);
-}
-
-fn dot3(d: vec3<f32>, e: vec3<f32>) -> f32 {
-    return d.x * e.x + d.y * e.y + d.z * e.z;
-}
-
 fn cross3(d: vec3<f32>, e: vec3<f32>) -> vec3<f32> {
     return vec3<f32>(d.y * e.z - d.z * e.y, d.z * e.x - d.x * e.z, d.x * e.y - d.y * e.x);
-}
-
-// The power of two that brings a size into [1, 2), for sizes from 2^-126 to 2^126.
-fn scale_of(size: f32) -> f32 {
-    return bitcast<f32>((254u - (bitcast<u32>(size) >> 23u)) << 23u);
 }
 
 // A direction whose largest coordinate is in [1, 2), or none: 0.
