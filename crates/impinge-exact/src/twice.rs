@@ -2,7 +2,7 @@
 //!
 //! Algorithms: Joldes, Muller & Popescu, *Tight and rigorous error bounds for basic building blocks
 //! of double-word arithmetic*, 2017. No fused multiply-add, so the bits are the same on every
-//! machine and in every register.
+//! machine and in every register. In WebAssembly, where size counts, they are functions.
 
 use crate::filter::number::Number;
 
@@ -46,7 +46,8 @@ impl<N: Number> Twice<N> {
         [minus(p[0], q[0]), minus(p[1], q[1]), minus(p[2], q[2])]
     }
 
-    #[inline(always)]
+    #[cfg_attr(target_family = "wasm", inline(never))]
+    #[cfg_attr(not(target_family = "wasm"), inline(always))]
     pub fn plus(self, other: Self) -> Self {
         let [sum, rest] = two_sum(self.0[0], other.0[0]);
         Self(two_sum(sum, rest + (self.0[1] + other.0[1])))
@@ -63,7 +64,8 @@ impl<N: Number> Twice<N> {
         Self([self.0[0] * sign, self.0[1] * sign])
     }
 
-    #[inline(always)]
+    #[cfg_attr(target_family = "wasm", inline(never))]
+    #[cfg_attr(not(target_family = "wasm"), inline(always))]
     pub fn times(self, other: Self) -> Self {
         let [product, rest] = two_product(self.0[0], other.0[0]);
         let rest = rest + (self.0[0] * other.0[1] + self.0[1] * other.0[0]);
@@ -75,13 +77,15 @@ impl<N: Number> Twice<N> {
         [p[0].minus(q[0]), p[1].minus(q[1]), p[2].minus(q[2])]
     }
 
-    #[inline(always)]
+    #[cfg_attr(target_family = "wasm", inline(never))]
+    #[cfg_attr(not(target_family = "wasm"), inline(always))]
     pub fn dot(p: &[Self; 3], q: &[Self; 3]) -> Self {
         let (x, y, z) = (p[0].times(q[0]), p[1].times(q[1]), p[2].times(q[2]));
         x.plus(y).plus(z)
     }
 
-    #[inline(always)]
+    #[cfg_attr(target_family = "wasm", inline(never))]
+    #[cfg_attr(not(target_family = "wasm"), inline(always))]
     pub fn cross(p: &[Self; 3], q: &[Self; 3]) -> [Self; 3] {
         [
             p[1].times(q[2]).minus(p[2].times(q[1])),
@@ -92,7 +96,8 @@ impl<N: Number> Twice<N> {
 
     /// The quotient of two positive numbers with errors: the nearest float or one beside it, what
     /// is left, at most half a last bit, and more than the error of both together.
-    #[inline(always)]
+    #[cfg_attr(target_family = "wasm", inline(never))]
+    #[cfg_attr(not(target_family = "wasm"), inline(always))]
     pub fn over(self, divisor: Self, error: N, of_divisor: N) -> [N; 3] {
         const UNIT: f64 = f64::EPSILON * f64::EPSILON;
         let quotient = self.0[0] / divisor.0[0];

@@ -362,7 +362,8 @@ impl Descent {
 }
 
 /// Bit k: box k overlaps a query.
-#[inline(always)]
+#[cfg_attr(target_family = "wasm", inline(never))]
+#[cfg_attr(not(target_family = "wasm"), inline(always))]
 fn overlapping<V: Lookup>(rows: Rows<'_>, query: &Bounds) -> u64 {
     let mut mask = 0;
     for first in (0..rows.n).step_by(V::N) {

@@ -237,7 +237,8 @@ impl<V: Lookup> Slabs<V> {
 
     /// When the ray comes to some boxes, about and never too late, and those that it may reach
     /// before a limit. What follows the boxes that there are is arbitrary.
-    #[inline(always)]
+    #[cfg_attr(target_family = "wasm", inline(never))]
+    #[cfg_attr(not(target_family = "wasm"), inline(always))]
     fn reach(&self, rows: Rows<'_>, limit: f32, nears: &mut [f32; GROUP]) -> u64 {
         let limit = V::splat(f64::from(limit));
         let (grown, least) = (f64::from(GROWN), f64::from(f32::MIN_POSITIVE));

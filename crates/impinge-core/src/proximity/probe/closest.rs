@@ -524,7 +524,8 @@ impl<V: Lookup> RoundedPoint<V> {
     /// The squares of the distances from some boxes, about and never too large but for
     /// [`GROWN`], and those that are not above a limit that has grown. What follows the boxes that
     /// there are is arbitrary.
-    #[inline(always)]
+    #[cfg_attr(target_family = "wasm", inline(never))]
+    #[cfg_attr(not(target_family = "wasm"), inline(always))]
     fn squared_distances(&self, rows: Rows<'_>, limit: f32, squares: &mut [f32; GROUP]) -> u64 {
         let limit = V::splat(f64::from(limit));
         let [down, up] = &self.ends;
