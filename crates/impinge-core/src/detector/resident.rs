@@ -1,10 +1,12 @@
 //! What stays on the device of a detector.
 
-use std::collections::BTreeMap;
+use std::collections::BTreeSet;
+use std::sync::Arc;
 
 use super::Detector;
 use crate::answers::pairs::Pairs;
-use crate::gpu::{ResidentPairs, ResidentSafe, ResidentStep};
+use crate::bvh::clusters::Clustering;
+use crate::gpu::{Engine, ResidentPairs, ResidentSafe, ResidentStep};
 use crate::plan::Plan;
 use crate::query::Query;
 use crate::query::goal::Goal;
@@ -12,6 +14,7 @@ use crate::query::progress::Control;
 use crate::scene::Scene;
 use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
+use crate::search::runner::Job;
 use crate::search::stats::Stats;
 
 /// The device of a detector, for frames whose positions and pairs stay there: [`Detector::gpu`].
@@ -82,12 +85,7 @@ impl Gpu<'_> {
         refuse_left_out(&plan)?;
         let control = Control::new();
         let job = self.detector.runner.job(scene, &plan, &control)?;
-        let Some(engine) = &mut self.detector.gpu else {
-            return Err(Error::NoAdapter {
-                found: "this detector works on the CPU".to_owned(),
-            });
-        };
-        engine.encode(job, positions, encoder)
+        on_device(&mut self.detector.gpu)?.encode(job, positions, encoder)
     }
 
     /// Encodes a whole step into the caller's encoder: positions at the start and at the end come
@@ -124,20 +122,9 @@ impl Gpu<'_> {
         encoder: &mut wgpu::CommandEncoder,
     ) -> Result<ResidentStep, Error> {
         refuse_unknown(query)?;
-        let Some(engine) = &mut self.detector.gpu else {
-            return Err(Error::NoAdapter {
-                found: "this detector works on the CPU".to_owned(),
-            });
-        };
-        let plan = Plan::contacts(scene, query, Goal::All, self.detector.settings.limits())?;
-        refuse_left_out(&plan)?;
-        let control = Control::new();
-        let job = self.detector.runner.job(scene, &plan, &control)?;
-        let resident: BTreeMap<BodyId, &wgpu::Buffer> = starts.iter().copied().collect();
-        let judges = |body| !resident.contains_key(&body);
-        let stats = &mut Stats::default();
-        let clusterings = self.detector.clusterings.of_frame(job, judges, stats)?;
-        engine.encode_step(job, &clusterings, [starts, ends], encoder)
+        self.with_contacts(scene, query, starts, |engine, job, clusterings| {
+            engine.encode_step(job, clusterings, [starts, ends], encoder)
+        })
     }
 
     /// Encodes [`safe_distances`](Detector::safe_distances) into the caller's encoder: positions
@@ -190,21 +177,10 @@ impl Gpu<'_> {
                 allowed: "0 for safe distances that stay on a device",
             });
         }
-        let Some(engine) = &mut self.detector.gpu else {
-            return Err(Error::NoAdapter {
-                found: "this detector works on the CPU".to_owned(),
-            });
-        };
-        let plan = Plan::contacts(scene, query, Goal::All, self.detector.settings.limits())?;
-        refuse_left_out(&plan)?;
-        let control = Control::new();
-        let job = self.detector.runner.job(scene, &plan, &control)?;
-        let resident: BTreeMap<BodyId, &wgpu::Buffer> = positions.iter().copied().collect();
-        let judges = |body| !resident.contains_key(&body);
-        let stats = &mut Stats::default();
-        let clusterings = self.detector.clusterings.of_frame(job, judges, stats)?;
         let limits = (most, &query.fixed);
-        engine.encode_safe(job, &clusterings, positions, limits, encoder)
+        self.with_contacts(scene, query, positions, |engine, job, clusterings| {
+            engine.encode_safe(job, clusterings, positions, limits, encoder)
+        })
     }
 
     /// Encodes [`truncate`](Detector::truncate) into the caller's encoder, after safe distances:
@@ -232,12 +208,28 @@ impl Gpu<'_> {
         ends: &[(BodyId, &wgpu::Buffer)],
         encoder: &mut wgpu::CommandEncoder,
     ) -> Result<(), Error> {
-        let Some(engine) = &mut self.detector.gpu else {
-            return Err(Error::NoAdapter {
-                found: "this detector works on the CPU".to_owned(),
-            });
-        };
-        engine.encode_truncate(safe, starts, ends, encoder)
+        on_device(&mut self.detector.gpu)?.encode_truncate(safe, starts, ends, encoder)
+    }
+
+    /// Encodes a question about contacts, with the clusters of its parts: those of bodies whose
+    /// positions are on the device are kept as they are.
+    fn with_contacts<T>(
+        &mut self,
+        scene: &Scene,
+        query: &Query,
+        resident: &[(BodyId, &wgpu::Buffer)],
+        encode: impl FnOnce(&mut Engine, Job<'_>, &[Arc<Clustering>]) -> Result<T, Error>,
+    ) -> Result<T, Error> {
+        let engine = on_device(&mut self.detector.gpu)?;
+        let plan = Plan::contacts(scene, query, Goal::All, self.detector.settings.limits())?;
+        refuse_left_out(&plan)?;
+        let control = Control::new();
+        let job = self.detector.runner.job(scene, &plan, &control)?;
+        let resident: BTreeSet<BodyId> = resident.iter().map(|&(body, _)| body).collect();
+        let judges = |body| !resident.contains(&body);
+        let stats = &mut Stats::default();
+        let clusterings = self.detector.clusterings.of_frame(job, judges, stats)?;
+        encode(engine, job, &clusterings)
     }
 
     /// The positions of a body in the buffer from which the last frame read them, `(v, 3)` f32
@@ -290,6 +282,13 @@ fn refuse_left_out(plan: &Plan) -> Result<(), Error> {
             allowed: "bodies",
         }),
     }
+}
+
+/// The device of a detector that has one.
+fn on_device(gpu: &mut Option<Engine>) -> Result<&mut Engine, Error> {
+    gpu.as_mut().ok_or_else(|| Error::NoAdapter {
+        found: "this detector works on the CPU".to_owned(),
+    })
 }
 
 /// Refuses what kernels of steps do not know.

@@ -317,9 +317,9 @@ kernels! {
         from "pairing" as "pairing_moving"
         ("boxes", "moving", "moving_groups", "vertices", "ids", "reserve", "groups");
     narrow_moving: NarrowMoving = NARROW_MOVING []
-        from "narrow_moving" ("filter", "polygon", "pair", "reserve", "slots", "groups");
+        from "narrow_moving" ("filter", "lengths", "polygon", "pair", "reserve", "slots", "groups");
     narrow_search: NarrowSearch = NARROW_SEARCH []
-        from "narrow_search" ("filter", "polygon", "pair", "numbers", "reserve", "slots", "groups");
+        from "narrow_search" ("filter", "lengths", "polygon", "pair", "numbers", "reserve", "slots", "groups");
     narrow_safe: NarrowSafe = NARROW_SAFE [] from "narrow_safe" ("filter", "lengths", "groups");
     safe_end: SafeEnd = SAFE_END [] from "safe_end" ("groups");
     truncate: Truncate = TRUNCATE [] from "truncate" ("filter", "lengths", "groups");

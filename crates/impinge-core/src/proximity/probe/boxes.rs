@@ -22,7 +22,7 @@ use crate::scene::Body;
 use crate::scene::elements::Elements;
 use crate::scene::index::ClusterIx;
 use crate::scene::positions::{Positions, Real};
-use crate::simd::{LaneBounds, Simd};
+use crate::simd::{LaneBounds, Lanes, Simd};
 use impinge_exact::internal::filter::Triangles64;
 use impinge_exact::internal::filter::number::Lookup;
 
@@ -289,14 +289,22 @@ pub(super) const GROWN: f32 = 1.0 + 16.0 * f32::EPSILON;
 /// A node that waits to be opened: how far it is, its level and its number there.
 pub(super) type Waiting = (f32, u32, u32);
 
-/// Adds a node to those from `first` on, so that the nearest of these is popped first.
+/// Has some siblings of a level wait, the nearest of which is opened first.
 #[inline(always)]
-pub(super) fn wait_in_order(waiting: &mut Vec<Waiting>, first: usize, node: Waiting) {
-    let mut place = waiting.len();
-    waiting.push(node);
-    while place > first && waiting[place - 1].0 < node.0 {
-        waiting.swap(place - 1, place);
-        place -= 1;
+pub(super) fn wait_in_order(
+    waiting: &mut Vec<Waiting>,
+    (siblings, level): (&Siblings, u32),
+    mask: u64,
+    nears: &[f32; GROUP],
+) {
+    let first = waiting.len();
+    for lane in Lanes(mask & siblings.all()) {
+        let mut place = waiting.len();
+        waiting.push((nears[lane], level, siblings.first + lane as u32));
+        while place > first && waiting[place - 1].0 < waiting[place].0 {
+            waiting.swap(place - 1, place);
+            place -= 1;
+        }
     }
 }
 

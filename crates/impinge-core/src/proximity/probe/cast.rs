@@ -311,11 +311,7 @@ impl RaySearch<'_> {
         self.waiting.clear();
         loop {
             let mask = slabs.reach(siblings.rows(), self.limit_of_boxes(), &mut nears);
-            let first = self.waiting.len();
-            for lane in Lanes(mask & siblings.all()) {
-                let node = siblings.first + lane as u32;
-                wait_in_order(&mut self.waiting, first, (nears[lane], level, node));
-            }
+            wait_in_order(&mut self.waiting, (siblings, level), mask, &nears);
             // The next node above the clusters, whose children are looked at next.
             loop {
                 let Some((near, of_node, node)) = self.waiting.pop() else {

@@ -274,11 +274,7 @@ impl<'a> PointSearch<'a> {
         self.waiting.clear();
         loop {
             let mask = rounded.squared_distances(siblings.rows(), self.limit, &mut lows);
-            let first = self.waiting.len();
-            for lane in Lanes(mask & siblings.all()) {
-                let node = siblings.first + lane as u32;
-                wait_in_order(&mut self.waiting, first, (lows[lane], level, node));
-            }
+            wait_in_order(&mut self.waiting, (siblings, level), mask, &lows);
             // The next node above the clusters, whose children are looked at next.
             loop {
                 let Some((low, of_node, node)) = self.waiting.pop() else {

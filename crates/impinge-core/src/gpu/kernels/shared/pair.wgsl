@@ -8,11 +8,6 @@ fn vertex_bits(vertex: u32) -> vec3<u32> {
     return vec3<u32>(positions[word], positions[word + 1u], positions[word + 2u]);
 }
 
-fn magnitude(bits: vec3<u32>) -> u32 {
-    let each = bits & vec3<u32>(0x7fffffffu);
-    return max(max(each.x, each.y), each.z);
-}
-
 // A vertex at both ends, as bits.
 struct Path {
     start: vec3<u32>,

@@ -43,10 +43,6 @@ fn cross3(d: vec3<f32>, e: vec3<f32>) -> vec3<f32> {
     return vec3<f32>(d.y * e.z - d.z * e.y, d.z * e.x - d.x * e.z, d.x * e.y - d.y * e.x);
 }
 
-fn dot3(d: vec3<f32>, e: vec3<f32>) -> f32 {
-    return d.x * e.x + d.y * e.y + d.z * e.z;
-}
-
 // Bernstein coefficients of a cross product: the first, twice the middle one, the last.
 struct Crossed {
     first: vec3<f32>,
