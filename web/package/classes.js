@@ -225,6 +225,10 @@ export function makeScene({ SceneHandle }, mustBeReady) {
       }
     }
 
+    setEdges(which, edges) {
+      call(() => this.#held.set_edges(body(which), edges === null ? new Uint32Array() : wide(edges, "edges")));
+    }
+
     setGroups(which, groups) {
       call(() => this.#held.set_groups(body(which), wide(groups, "groups")));
     }

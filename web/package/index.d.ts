@@ -195,6 +195,11 @@ export declare class Scene {
    * as the thickest of their vertices; otherwise other elements are as thick as the thickest of these that they have or are part of.
    */
   setThickness(body: Body, thickness: number | ArrayLike<number>, part?: "vertices" | "edges" | "faces"): void;
+  /**
+   * Numbers the edges of a body as its caller does: edge i of answers, of `edges` and of `setThickness` is row i, two vertices. Every edge of the surface must be there
+   * once, in any order. `null`: the library's own numbers again. Set them before the first question: afterwards `RestPairs` from before name other edges.
+   */
+  setEdges(body: Body, edges: Index | null): void;
   /** Puts each vertex of a body into a group, for `exclude: [{ groups: [g, h] }]`. A body whose groups were never set is in none. */
   setGroups(body: Body, groups: Index): void;
   /**

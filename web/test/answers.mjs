@@ -448,6 +448,21 @@ export async function others(module) {
   left.pinned = [(await count()) === every];
   pile.setPinned(top, [true, true, true]);
   left.pinned.push(await count(), await refusal(() => pile.setPinned(top, [true])));
+  // The caller's numbers of edges: the same edges, the other way round.
+  const rowsOf = (numbers) => { const list = []; for (let ix = 0; ix < numbers.length; ix += 4) list.push(numbers.slice(ix, ix + 4)); return list; };
+  pile.setPinned(top, [false, false, false]);
+  const edgesBefore = pile.edges(top), nEdges = edgesBefore.length / 2;
+  const touching = async () => rowsOf([...(await detector.near(pile, 1, { kinds: ["ee"], between: [base, top] })).rows]);
+  const named = await touching();
+  pile.setEdges(top, edgesBefore.slice().reverse());
+  const renamed = (await touching()).map(([a, ea, b, eb]) => [a, ea, b, nEdges - 1 - eb]);
+  left.edges = [
+    String([...pile.edges(top)]) === String([...edgesBefore].reverse()), named.length > 0, String(renamed.map(String).sort()) === String(named.map(String).sort()),
+    await refusal(() => pile.setEdges(top, new Uint16Array([0, 1, 1, 2, 0, 1]))),
+    await refusal(() => pile.setEdges(top, [0, 1])),
+  ];
+  pile.setEdges(top, null);
+  left.edges.push(String(pile.edges(top)) === String(edgesBefore), String(await touching()) === String(named));
   pile.dispose();
   let n = 0;
   let stopped = null;
@@ -570,6 +585,10 @@ export const OTHERS = {
     each: "invalid: each: a function is needed",
     most: "invalid: most: 0 given, 1 to 9007199254740991 allowed",
     pinned: [true, 0, "invalid: body 1: 1 pinned given, but there are 3 vertices"],
+    edges: [
+      true, true, true, "invalid: body 1: row 2 of edges has vertices 0 and 1, as row 0 has",
+      "invalid: edges: a Uint32Array, a Uint16Array or a Uint8Array is needed", true, true,
+    ],
   },
   stopped: [true, "cancelled"],
   aborted: "cancelled: cancelled",

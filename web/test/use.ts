@@ -41,6 +41,8 @@ const few: ClosestElement[] = detector.closest(scene, points, { nNearest: 3 }).o
 const cells: Int32Array = detector.locate(scene, b, points);
 const wound: Int32Array = detector.windingNumbers(scene, a, points);
 const inside: Float64Array = detector.signedDistance(scene, a, points, { progress: () => true });
+scene.setEdges(a, new Uint32Array([2, 1, 2, 0, 0, 1]));
+scene.setEdges(a, null);
 scene.setGroups(a, new Uint16Array(3));
 scene.setPinned(a, [true, false, true]);
 scene.setPinned(a, new Uint8Array(3));

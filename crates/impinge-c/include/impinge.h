@@ -120,11 +120,12 @@ impinge_status impinge_scene_remove(impinge_scene *scene, uint32_t body);
  * INVALID: as impinge_scene_add_triangles, and no such body. */
 impinge_status impinge_scene_remesh(impinge_scene *scene, uint32_t body, uint32_t kind, impinge_array elements, impinge_array positions);
 
-/* Sets the caller's own numbering of the edges of a body: `edges` has 2 columns, vertex indices in either order. Steps, candidates and
- * near pairs
- * then name edge i for row i, and are sorted by these numbers. Every edge of the body must be there, and none twice; rows that are no
- * edge of the body are allowed and never named. No rows: back to the library's own numbers, which impinge_scene_edges shows.
- * INVALID: no such body, an edge that is missing or there twice, a body of edges, whose numbers are the caller's already. */
+/* Numbers the edges of a body as its caller does: `edges` has 2 columns, vertex indices in either order, and edge i of answers, of
+ * impinge_scene_edges and of impinge_scene_set_element_thickness is row i. Every edge of the body must be there once, in any order; of
+ * tetrahedra these are the edges of their surface. No rows: the library's own numbers again. Set them before the first question:
+ * afterwards answers and exclusions from before name other edges.
+ * INVALID: no such body, a row that is no edge or the same as another, an edge that no row has; a body of edges, whose numbers are the
+ * caller's already, or of points. The body keeps its numbers then. */
 impinge_status impinge_scene_set_edges(impinge_scene *scene, uint32_t body, impinge_array edges);
 
 /* Moves the vertices of a body: as many rows as it has vertices, 3 columns of F32 or F64, copied. The type may differ from call to call.

@@ -11,8 +11,6 @@ use impinge::{
 
 use crate::arrays::{self, collect, reserve};
 use crate::detector::asked;
-use crate::edges::name;
-use crate::scene::impinge_scene;
 use crate::stats::{Texts, fill};
 use crate::status::{Failure, guard, held, put};
 use crate::types::*;
@@ -39,19 +37,12 @@ impl impinge_pairs {
 pub struct impinge_impacts {
     pub impacts: Impacts,
     rows: Vec<impinge_impact>,
-    /// Where the rows are in `impacts`, if the caller's numbers of edges order them otherwise.
-    pub order: Vec<usize>,
     texts: Texts,
 }
 
 /// The row of an impact.
-pub fn impact_row(impact: &Impact, scene: &impinge_scene) -> impinge_impact {
-    let numbers = |body| scene.edge_numbers(body);
-    let row = match scene.renames_edges() {
-        true => name(&numbers, impact.kind, impact.row()).row,
-        false => impact.row(),
-    };
-    let [body_a, element_a, body_b, element_b] = row;
+pub fn impact_row(impact: &Impact) -> impinge_impact {
+    let [body_a, element_a, body_b, element_b] = impact.row();
     impinge_impact {
         toi: impact.toi,
         kind: bit(impact.kind),
@@ -64,24 +55,11 @@ pub fn impact_row(impact: &Impact, scene: &impinge_scene) -> impinge_impact {
 }
 
 impl impinge_impacts {
-    pub fn new(impacts: Impacts, scene: &impinge_scene) -> Result<Self, Failure> {
-        const WHAT: &str = "impacts";
-        let named = impacts.iter().map(|impact| impact_row(impact, scene));
-        let mut rows = collect(named, WHAT)?;
-        let mut order = Vec::new();
-        if scene.renames_edges() {
-            order = collect(0..rows.len(), WHAT)?;
-            order.sort_unstable_by_key(|&ix| {
-                let row: &impinge_impact = &rows[ix];
-                let [a, b] = [[row.body_a, row.element_a], [row.body_b, row.element_b]];
-                (row.kind, a, b)
-            });
-            rows = collect(order.iter().map(|&ix| rows[ix]), WHAT)?;
-        }
+    pub fn new(impacts: Impacts) -> Result<Self, Failure> {
+        let rows = collect(impacts.iter().map(impact_row), "impacts")?;
         Ok(impinge_impacts {
             impacts,
             rows,
-            order,
             texts: Texts::default(),
         })
     }
@@ -96,13 +74,13 @@ pub struct impinge_candidates {
 }
 
 impl impinge_candidates {
-    pub fn new(candidates: Candidates, scene: &impinge_scene) -> Result<Self, Failure> {
+    pub fn new(candidates: Candidates) -> Result<Self, Failure> {
         let n = candidates.len();
         let (mut rows, mut kinds) = (Vec::new(), Vec::new());
         reserve(&mut rows, n, "candidates")?;
         reserve(&mut kinds, n, "candidates")?;
         for kind in PairKind::ALL {
-            append_rows(&mut rows, &candidates, kind, scene)?;
+            rows.extend(candidates.rows(kind).map(impinge_pair::from));
             kinds.resize(rows.len(), bit(kind) as u8);
         }
         Ok(impinge_candidates {
@@ -114,32 +92,10 @@ impl impinge_candidates {
     }
 }
 
-/// Appends the rows of one kind, sorted.
-pub fn append_rows(
-    rows: &mut Vec<impinge_pair>,
-    candidates: &Candidates,
-    kind: PairKind,
-    scene: &impinge_scene,
-) -> Result<(), Failure> {
-    let first = rows.len();
-    let of_kind = candidates.rows(kind);
-    reserve(rows, of_kind.len(), "candidates")?;
-    if !scene.renames_edges() {
-        rows.extend(of_kind.map(impinge_pair::from));
-        return Ok(());
-    }
-    let numbers = |body| scene.edge_numbers(body);
-    rows.extend(of_kind.map(|row| impinge_pair::from(name(&numbers, kind, row).row)));
-    rows[first..].sort_unstable();
-    Ok(())
-}
-
 /// An answer about distances.
 pub struct impinge_near {
     pub near: NearPairs,
     rows: Vec<impinge_pair>,
-    /// Where the rows are in `near`, if the caller's numbers of edges order them otherwise.
-    pub order: Vec<usize>,
     columns: NearColumns,
     /// The same pairs, to be left out of queries: made once, because it keeps their keys.
     exclusion: OnceLock<Exclusion>,
@@ -156,9 +112,8 @@ struct NearColumns {
 }
 
 /// A feature as one number: a vertex of the element, its edges from 8 on, its face.
-pub fn code(feature: Feature, is_reversed: bool) -> u8 {
+pub fn code(feature: Feature) -> u8 {
     match feature {
-        Feature::Vertex(ix) if is_reversed => 1 - ix,
         Feature::Vertex(ix) => ix,
         Feature::Edge(ix) => 8 + ix,
         Feature::Face => 16,
@@ -166,7 +121,7 @@ pub fn code(feature: Feature, is_reversed: bool) -> u8 {
 }
 
 impl impinge_near {
-    pub fn new(near: NearPairs, scene: &impinge_scene) -> Result<Self, Failure> {
+    pub fn new(near: NearPairs) -> Result<Self, Failure> {
         const WHAT: &str = "near pairs";
         let n = near.len();
         let first = near.iter().next();
@@ -182,68 +137,29 @@ impl impinge_near {
         if first.is_some_and(|pair| pair.closest.is_some()) {
             reserve(&mut of.points, n, WHAT)?;
         }
-        let numbers = |body| scene.edge_numbers(body);
         for pair in near.iter() {
-            let named = name(&numbers, pair.kind, pair.row());
-            let order = if named.is_swapped { [1, 0] } else { [0, 1] };
-            let features = order.map(|ix| pair.features[ix]);
-            rows.push(impinge_pair::from(named.row));
+            rows.push(impinge_pair::from(pair.row()));
             of.kinds.push(bit(pair.kind) as u8);
-            of.features.push([
-                code(features[0], named.is_reversed[0]),
-                code(features[1], named.is_reversed[1]),
-            ]);
+            of.features.push(pair.features.map(code));
             of.are_parallel.push(pair.is_parallel.into());
             of.distances.extend(pair.distance);
             if let Some(closest) = pair.closest {
-                let [[a, b, c], [d, e, f]] = order.map(|ix| closest.points[ix]);
+                let [[a, b, c], [d, e, f]] = closest.points;
                 of.points.push([a, b, c, d, e, f]);
             }
         }
-        let mut answer = impinge_near {
+        Ok(impinge_near {
             near,
             rows,
-            order: Vec::new(),
             columns: of,
             exclusion: OnceLock::new(),
             texts: Texts::default(),
-        };
-        if scene.renames_edges() {
-            answer.sort()?;
-        }
-        Ok(answer)
+        })
     }
 
     /// The pairs, for queries that leave them out.
     pub fn exclusion(&self) -> Exclusion {
         self.exclusion.get_or_init(|| (&self.near).into()).clone()
-    }
-
-    /// Puts rows and columns into the order of the rows.
-    fn sort(&mut self) -> Result<(), Failure> {
-        fn ordered<T: Copy>(list: &mut Vec<T>, order: &[usize]) -> Result<(), Failure> {
-            if !list.is_empty() {
-                *list = collect(order.iter().map(|&ix| list[ix]), "near pairs")?;
-            }
-            Ok(())
-        }
-        let mut order = collect(0..self.rows.len(), "near pairs")?;
-        order.sort_unstable_by_key(|&ix| (self.columns.kinds[ix], self.rows[ix]));
-        let NearColumns {
-            kinds,
-            features,
-            are_parallel,
-            distances,
-            points,
-        } = &mut self.columns;
-        ordered(&mut self.rows, &order)?;
-        ordered(kinds, &order)?;
-        ordered(features, &order)?;
-        ordered(are_parallel, &order)?;
-        ordered(distances, &order)?;
-        ordered(points, &order)?;
-        self.order = order;
-        Ok(())
     }
 }
 

@@ -5,7 +5,7 @@ use std::cmp::Ordering;
 use impinge::Changes;
 
 use crate::answers::{impinge_impacts, impinge_near, impinge_pairs};
-use crate::arrays::{self, collect, reserve};
+use crate::arrays::{self, reserve};
 use crate::status::{Failure, clear, destroy, guard, held, put};
 use crate::types::*;
 
@@ -19,22 +19,17 @@ pub struct impinge_changes {
     gone: Vec<u64>,
 }
 
-/// The pairs of an answer in the library's order.
+/// The pairs of an answer.
 trait Compared {
     const NAME: &'static str;
     /// What makes each pair the same.
     fn keys(&self) -> impl Iterator<Item: Ord>;
-    /// Where the answer's rows are in that order; empty if they have it.
-    fn order(&self) -> &[usize];
 }
 
 impl Compared for impinge_pairs {
     const NAME: &'static str = "pairs";
     fn keys(&self) -> impl Iterator<Item: Ord> {
         self.pairs.iter()
-    }
-    fn order(&self) -> &[usize] {
-        &[]
     }
 }
 
@@ -44,9 +39,6 @@ impl Compared for impinge_impacts {
         let impacts = self.impacts.iter();
         impacts.map(|impact| (impact.kind, impact.a, impact.b))
     }
-    fn order(&self) -> &[usize] {
-        &self.order
-    }
 }
 
 impl Compared for impinge_near {
@@ -54,9 +46,6 @@ impl Compared for impinge_near {
     fn keys(&self) -> impl Iterator<Item: Ord> {
         let near = self.near.iter();
         near.map(|pair| (pair.kind, pair.a, pair.b))
-    }
-    fn order(&self) -> &[usize] {
-        &self.order
     }
 }
 
@@ -69,30 +58,14 @@ fn push<T>(list: &mut Vec<T>, item: T) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The row of each pair.
-fn rows(order: &[usize]) -> Result<Vec<u64>, Failure> {
-    let mut rows = collect(order.iter().map(|_| 0), WHAT)?;
-    for (row, &ix) in order.iter().enumerate() {
-        rows[ix] = row as u64;
-    }
-    Ok(rows)
-}
-
 impl impinge_changes {
     fn new<A: Compared>(answer: &A, old: &A) -> Result<Self, Failure> {
-        let (before, after) = (rows(old.order())?, rows(answer.order())?);
-        let row = |rows: &[u64], ix: usize| rows.get(ix).map_or(ix as u64, |&row| row);
         let mut changes = impinge_changes::default();
         Changes::each(old.keys(), answer.keys(), |order, [old, new]| match order {
-            Ordering::Less => push(&mut changes.gone, row(&before, old)),
-            Ordering::Greater => push(&mut changes.new, row(&after, new)),
-            Ordering::Equal => push(&mut changes.kept, [row(&before, old), row(&after, new)]),
+            Ordering::Less => push(&mut changes.gone, old as u64),
+            Ordering::Greater => push(&mut changes.new, new as u64),
+            Ordering::Equal => push(&mut changes.kept, [old as u64, new as u64]),
         })?;
-        if !before.is_empty() || !after.is_empty() {
-            changes.kept.sort_unstable();
-            changes.new.sort_unstable();
-            changes.gone.sort_unstable();
-        }
         Ok(changes)
     }
 }

@@ -17,7 +17,6 @@ mod changes;
 mod contacts;
 mod detector;
 mod devices;
-mod edges;
 mod motion;
 mod neighbours;
 mod probe;

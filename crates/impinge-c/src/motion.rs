@@ -62,8 +62,8 @@ impl Motion {
 }
 
 impl impinge_motion {
-    pub fn new(advance: Advance, stats: Stats, scene: &impinge_scene) -> Self {
-        let first = advance.first.map(|impact| impact_row(&impact, scene));
+    pub fn new(advance: Advance, stats: Stats) -> Self {
+        let first = advance.first.map(|impact| impact_row(&impact));
         impinge_motion {
             of: Motion::Whole { advance, first },
             stats,

@@ -2,7 +2,7 @@
 
 use impinge::{Csr, Neighbours, PairKind, Part};
 
-use crate::arrays::{collect, reserve, view_of};
+use crate::arrays::view_of;
 use crate::detector::impinge_detector;
 use crate::questions::question;
 use crate::scene::impinge_scene;
@@ -15,148 +15,38 @@ pub struct impinge_neighbours {
     neighbours: Neighbours,
     /// The first vertex, edge and face of each body, by its number.
     firsts: Vec<(u32, [u32; 3])>,
-    /// In the caller's numbers of edges, where these are not the library's: by kind, and then from
-    /// either side.
-    own: Option<[[Lists; 2]; PairKind::ALL.len()]>,
     texts: Texts,
 }
 
-#[derive(Default)]
-struct Lists {
-    offsets: Vec<u64>,
-    indices: Vec<u32>,
-    distances: Vec<f64>,
-}
-
-const WHAT: &str = "neighbours";
-
 impl impinge_neighbours {
-    fn new(neighbours: Neighbours, scene: &impinge_scene) -> Result<Self, Failure> {
+    fn new(neighbours: Neighbours) -> Self {
         let parts = [Part::Vertices, Part::Edges, Part::Faces];
-        let mut firsts: Vec<_> = neighbours
+        let firsts = neighbours
             .bodies()
             .map(|id| {
                 let first = parts.map(|part| neighbours.first(id, part).unwrap_or(0));
                 (id.index() as u32, first)
             })
             .collect();
-        let own = match scene.renames_edges() {
-            true => Some(rename(&neighbours, scene, &mut firsts)?),
-            false => None,
-        };
-        Ok(impinge_neighbours {
+        impinge_neighbours {
             neighbours,
             firsts,
-            own,
             texts: Texts::default(),
-        })
+        }
     }
 
     /// Offsets, indices and distances of the lists of one kind.
     fn lists(&self, kind: PairKind, is_reversed: bool) -> [impinge_array; 3] {
-        let [a, b] = kind.parts();
-        match &self.own {
-            Some(own) => {
-                let of = &own[kind as usize][usize::from(is_reversed && a != b)];
-                [
-                    view_of(&of.offsets),
-                    view_of(&of.indices),
-                    view_of(&of.distances),
-                ]
-            }
-            None => {
-                let of: &Csr = match is_reversed {
-                    true => self.neighbours.reversed(kind),
-                    false => self.neighbours.of(kind),
-                };
-                [
-                    view_of(&of.offsets),
-                    view_of(&of.indices),
-                    view_of(&of.distances),
-                ]
-            }
-        }
+        let of: &Csr = match is_reversed {
+            true => self.neighbours.reversed(kind),
+            false => self.neighbours.of(kind),
+        };
+        [
+            view_of(&of.offsets),
+            view_of(&of.indices),
+            view_of(&of.distances),
+        ]
     }
-}
-
-/// Numbers edges as the caller does, and makes `firsts` those of these numbers: a list of the
-/// caller's may have more rows than its body has edges.
-fn rename(
-    neighbours: &Neighbours,
-    scene: &impinge_scene,
-    firsts: &mut [(u32, [u32; 3])],
-) -> Result<[[Lists; 2]; PairKind::ALL.len()], Failure> {
-    // By the library's numbers.
-    let mut own_of = Vec::new();
-    let mut start = 0;
-    for (body, first) in firsts.iter_mut() {
-        let (n, numbers) = (scene.n_edges(*body)?, scene.edge_numbers(*body));
-        reserve(&mut own_of, n, WHAT)?;
-        own_of.extend((0..n as u32).map(|edge| start + numbers.map_or(edge, |of| of.own(edge))));
-        first[1] = start;
-        let n_rows = numbers.map_or(n, |of| of.rows.len());
-        let end = start as usize + n_rows;
-        start = u32::try_from(end).map_err(|_| {
-            Failure::invalid(format!(
-                "edges: {end} rows of all bodies given, at most 2^32 - 1 can be listed"
-            ))
-        })?;
-    }
-    let mut own: [[Lists; 2]; PairKind::ALL.len()] = Default::default();
-    for kind in PairKind::ALL {
-        let [a, b] = kind.parts();
-        let sides = [
-            (neighbours.of(kind), [a, b]),
-            (neighbours.reversed(kind), [b, a]),
-        ];
-        let n_sides = if a == b { 1 } else { 2 };
-        for (side, (of, parts)) in sides.into_iter().take(n_sides).enumerate() {
-            own[kind as usize][side] = renamed(of, parts, &own_of, start as usize)?;
-        }
-    }
-    Ok(own)
-}
-
-/// Lists in the caller's numbers: those of edges in another order, each ascending.
-fn renamed(
-    of: &Csr,
-    [rows, columns]: [Part; 2],
-    own_of: &[u32],
-    n_edges: usize,
-) -> Result<Lists, Failure> {
-    // Kinds that were not asked for have no lists.
-    let Some(n_given) = of.offsets.len().checked_sub(1) else {
-        return Ok(Lists::default());
-    };
-    let own = |part: Part, element: u32| match part {
-        Part::Edges => own_of[element as usize],
-        _ => element,
-    };
-    let n = if rows == Part::Edges {
-        n_edges
-    } else {
-        n_given
-    };
-    let mut given_of = collect((0..n).map(|_| None), WHAT)?;
-    for element in 0..n_given {
-        given_of[own(rows, element as u32) as usize] = Some(element);
-    }
-    let mut lists = Lists::default();
-    reserve(&mut lists.offsets, n + 1, WHAT)?;
-    reserve(&mut lists.indices, of.indices.len(), WHAT)?;
-    reserve(&mut lists.distances, of.indices.len(), WHAT)?;
-    let mut list: Vec<(u32, f64)> = Vec::new();
-    for given in given_of {
-        lists.offsets.push(lists.indices.len() as u64);
-        let Some(given) = given else { continue };
-        list.clear();
-        list.extend(of.of(given).map(|(column, x)| (own(columns, column), x)));
-        list.sort_unstable_by_key(|&(column, _)| column);
-        lists.indices.extend(list.iter().map(|&(column, _)| column));
-        lists.distances.extend(list.iter().map(|&(_, x)| x));
-    }
-    lists.offsets.push(lists.indices.len() as u64);
-    Ok(lists)
 }
 
 #[unsafe(no_mangle)]
@@ -173,7 +63,7 @@ pub unsafe extern "C" fn impinge_find_neighbours(
             let query = of.asked.query()?;
             let scene = &of.scene.scene;
             let found = of.detector.neighbours(scene, distance, &query)?;
-            impinge_neighbours::new(found, of.scene)
+            Ok(impinge_neighbours::new(found))
         })
     }
 }

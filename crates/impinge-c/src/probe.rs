@@ -28,7 +28,7 @@ fn closest_row(found: Option<ClosestElement>) -> impinge_closest_element {
             point: found.point,
             body: found.element.body.index() as u32,
             element: found.element.element,
-            feature: code(found.feature, false).into(),
+            feature: code(found.feature).into(),
             found: 1,
         },
         None => impinge_closest_element {
@@ -96,7 +96,7 @@ impl impinge_hits {
                 ray: ray as u64,
                 body: hit.element.body.index() as u32,
                 element: hit.element.element,
-                feature: code(hit.feature, false).into(),
+                feature: code(hit.feature).into(),
                 reserved: 0,
             }));
         }

@@ -9,9 +9,9 @@ use impinge::proximity::Nearest;
 use impinge::{Detector, PairKind};
 
 use crate::answers::{
-    append_rows, impact_row, impinge_candidates, impinge_impacts, impinge_near, impinge_pairs,
+    impact_row, impinge_candidates, impinge_impacts, impinge_near, impinge_pairs,
 };
-use crate::arrays;
+use crate::arrays::{self, reserve};
 use crate::detector::{ask, impinge_detector};
 use crate::motion::{impinge_motion, put_found};
 use crate::query::{Asked, check_length};
@@ -158,7 +158,7 @@ pub unsafe extern "C" fn impinge_find_impacts(
         question((detector, scene, step), (impacts, "impacts"), |of| {
             let step = of.asked.step()?;
             let impacts = of.detector.impacts(&of.scene.scene, &step)?;
-            impinge_impacts::new(impacts, of.scene)
+            impinge_impacts::new(impacts)
         })
     }
 }
@@ -176,7 +176,7 @@ pub unsafe extern "C" fn impinge_find_earliest(
         value((detector, scene, step), |of| {
             let step = of.asked.step()?;
             let first = of.detector.earliest(&of.scene.scene, &step)?;
-            let row = first.map(|impact| impact_row(&impact, of.scene));
+            let row = first.map(|impact| impact_row(&impact));
             put_found(row, (impact, "impact"), found)
         })
     }
@@ -223,7 +223,7 @@ pub unsafe extern "C" fn impinge_advance(
             }
             if !motion.is_null() {
                 let stats = of.detector.stats().clone();
-                let made = impinge_motion::new(found, stats, of.scene);
+                let made = impinge_motion::new(found, stats);
                 motion.write(Box::into_raw(Box::new(made)));
             }
             Ok(())
@@ -263,7 +263,7 @@ pub unsafe extern "C" fn impinge_find_candidates(
             let query = of.asked.query()?;
             let scene = &of.scene.scene;
             let candidates = of.detector.candidates(scene, inflation, &query)?;
-            impinge_candidates::new(candidates, of.scene)
+            impinge_candidates::new(candidates)
         })
     }
 }
@@ -289,9 +289,11 @@ pub unsafe extern "C" fn impinge_find_candidates_in_runs(
             let hand_out = |run: impinge::Candidates| {
                 for kind in PairKind::ALL {
                     rows.clear();
-                    if let Err(failure) = append_rows(&mut rows, &run, kind, of.scene) {
+                    let of_kind = run.rows(kind);
+                    if let Err(failure) = reserve(&mut rows, of_kind.len(), "candidates") {
                         return ControlFlow::Break(Err(failure));
                     }
+                    rows.extend(of_kind.map(impinge_pair::from));
                     if rows.is_empty() {
                         continue;
                     }
@@ -330,7 +332,7 @@ pub unsafe extern "C" fn impinge_find_near(
         question((detector, scene, query), (near_pairs, "near_pairs"), |of| {
             let query = of.asked.query()?;
             let near = of.detector.near(&of.scene.scene, distance, &query)?;
-            impinge_near::new(near, of.scene)
+            impinge_near::new(near)
         })
     }
 }

@@ -33,7 +33,7 @@ pub unsafe extern "C" fn impinge_find_safe_distances(
             let query = of.asked.query()?;
             let safe = of.detector.safe_distances(&of.scene.scene, most, &query)?;
             Ok(impinge_safe_distances {
-                touching: impinge_near::new(safe.touching().clone(), of.scene)?,
+                touching: impinge_near::new(safe.touching().clone())?,
                 safe,
                 texts: Texts::default(),
             })

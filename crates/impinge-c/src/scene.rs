@@ -5,27 +5,19 @@ use std::ffi::c_void;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use impinge::{Body, BodyId, Filter, Part, Positions, Scene, Thickness, Weld};
+use impinge::{Body, BodyId, Filter, Positions, Scene, Thickness, Weld};
 
 use crate::arrays::{self, Floats, elements_view, no_rows, positions_view, with_rows};
-use crate::edges::EdgeNumbers;
 use crate::status::{Failure, Handle, broken, change, clear, destroy, guard, held, put};
 use crate::types::*;
 
-/// A scene, and what callers say about its bodies beside.
+/// A scene, and the ids of its bodies.
 #[derive(Default)]
 pub struct impinge_scene {
     pub scene: Scene,
     /// By the number of the body.
-    bodies: Vec<Option<Known>>,
-    n_with_edges: usize,
+    ids: Vec<Option<BodyId>>,
     is_broken: bool,
-}
-
-/// A body as the caller knows it.
-struct Known {
-    id: BodyId,
-    edges: Option<EdgeNumbers>,
 }
 
 impl Handle for impinge_scene {
@@ -36,24 +28,6 @@ impl Handle for impinge_scene {
 }
 
 impl impinge_scene {
-    fn known(&self, body: u32) -> Result<&Known, Failure> {
-        let known = self.bodies.get(body as usize).and_then(Option::as_ref);
-        known.ok_or_else(|| self.no_such(body))
-    }
-
-    fn known_mut(&mut self, body: u32) -> Result<&mut Known, Failure> {
-        let unknown = self.no_such(body);
-        let known = self.bodies.get_mut(body as usize);
-        known.and_then(Option::as_mut).ok_or(unknown)
-    }
-
-    fn no_such(&self, body: u32) -> Failure {
-        Failure::invalid(format!(
-            "there is no body {body} among the {} of this scene",
-            self.scene.n_bodies()
-        ))
-    }
-
     /// The scene, unless an internal error has left it half changed.
     pub fn sound(&self) -> Result<&Self, Failure> {
         match self.is_broken {
@@ -64,26 +38,17 @@ impl impinge_scene {
 
     /// The id of a body.
     pub fn id(&self, body: u32) -> Result<BodyId, Failure> {
-        Ok(self.known(body)?.id)
+        let id = self.ids.get(body as usize).copied().flatten();
+        id.ok_or_else(|| {
+            Failure::invalid(format!(
+                "there is no body {body} among the {} of this scene",
+                self.scene.n_bodies()
+            ))
+        })
     }
 
     fn body(&self, body: u32) -> Result<&Body, Failure> {
         Ok(self.scene.body(self.id(body)?)?)
-    }
-
-    /// How many edges a body has.
-    pub fn n_edges(&self, body: u32) -> Result<usize, Failure> {
-        Ok(self.body(body)?.edges().len())
-    }
-
-    /// The caller's numbers of the edges of a body.
-    pub fn edge_numbers(&self, body: u32) -> Option<&EdgeNumbers> {
-        self.bodies.get(body as usize)?.as_ref()?.edges.as_ref()
-    }
-
-    /// Whether edges of any body have the caller's numbers.
-    pub fn renames_edges(&self) -> bool {
-        self.n_with_edges > 0
     }
 
     /// Adds a body.
@@ -103,20 +68,14 @@ impl impinge_scene {
         let elements = unsafe { arrays::elements(kind, elements, at.len()) }?;
         let id = self.scene.add((elements, at.into_owned()?))?;
         let number = id.index();
-        if number >= self.bodies.len() {
-            self.bodies.resize_with(number + 1, || None);
+        if number >= self.ids.len() {
+            self.ids.resize(number + 1, None);
         }
-        self.bodies[number] = Some(Known { id, edges: None });
+        self.ids[number] = Some(id);
         if !body.is_null() {
             // SAFETY: the caller's promise.
             unsafe { body.write(number as u32) };
         }
-        Ok(())
-    }
-
-    fn forget_edges(&mut self, body: u32) -> Result<(), Failure> {
-        let had = self.known_mut(body)?.edges.take().is_some();
-        self.n_with_edges -= usize::from(had);
         Ok(())
     }
 }
@@ -176,8 +135,7 @@ pub unsafe extern "C" fn impinge_scene_remove(scene: *mut impinge_scene, body: u
     unsafe {
         change(scene, |scene| {
             scene.scene.remove(scene.id(body)?)?;
-            scene.forget_edges(body)?;
-            scene.bodies[body as usize] = None;
+            scene.ids[body as usize] = None;
             Ok(())
         })
     }
@@ -197,8 +155,7 @@ pub unsafe extern "C" fn impinge_scene_remesh(
             let id = scene.id(body)?;
             let at = arrays::floats::<3>(&positions, "positions")?;
             let elements = arrays::elements(kind, &elements, at.len())?;
-            scene.scene.remesh(id, (elements, at.into_owned()?))?;
-            scene.forget_edges(body)
+            Ok(scene.scene.remesh(id, (elements, at.into_owned()?))?)
         })
     }
 }
@@ -212,15 +169,9 @@ pub unsafe extern "C" fn impinge_scene_set_edges(
     // SAFETY: see `impinge_scene_create`.
     unsafe {
         change(scene, |scene| {
-            if edges.rows == 0 {
-                return scene.forget_edges(body);
-            }
-            let rows = arrays::indices::<2>(&edges, "edges")?;
-            let numbers = EdgeNumbers::new(body, scene.body(body)?, rows)?;
-            scene.forget_edges(body)?;
-            scene.known_mut(body)?.edges = Some(numbers);
-            scene.n_with_edges += 1;
-            Ok(())
+            let id = scene.id(body)?;
+            let edges = arrays::indices::<2>(&edges, "edges")?;
+            Ok(scene.scene.set_edges(id, &edges)?)
         })
     }
 }
@@ -470,10 +421,7 @@ pub unsafe extern "C" fn impinge_scene_set_element_thickness(
             let thickness = match kind {
                 POINTS => Thickness::vertices(given),
                 TRIANGLES => Thickness::faces(given),
-                EDGES => match scene.edge_numbers(body) {
-                    None => Thickness::edges(given),
-                    Some(numbers) => Thickness::edges(numbers.in_own_order(body, &given)?),
-                },
+                EDGES => Thickness::edges(given),
                 other => {
                     return Err(Failure::invalid(format!(
                         "kind: {other} given, IMPINGE_POINTS, _EDGES and _TRIANGLES allowed, for vertices, edges and faces"
@@ -531,13 +479,13 @@ unsafe fn show(
     scene: *const impinge_scene,
     body: u32,
     to: *mut impinge_array,
-    view: impl FnOnce(&impinge_scene, &Body) -> impinge_array,
+    view: impl FnOnce(&Body) -> impinge_array,
 ) -> Status {
     guard(|| {
         // SAFETY: the caller's promise.
         let scene = unsafe { held(scene, "scene") }?.sound()?;
         // SAFETY: the caller's promise.
-        unsafe { put(to, "view", view(scene, scene.body(body)?)) }
+        unsafe { put(to, "view", view(scene.body(body)?)) }
     })
 }
 
@@ -548,11 +496,7 @@ pub unsafe extern "C" fn impinge_scene_positions(
     view: *mut impinge_array,
 ) -> Status {
     // SAFETY: see `impinge_scene_create`.
-    unsafe {
-        show(scene, body, view, |_, body| {
-            positions_view(body.positions())
-        })
-    }
+    unsafe { show(scene, body, view, |body| positions_view(body.positions())) }
 }
 
 #[unsafe(no_mangle)]
@@ -561,7 +505,7 @@ pub unsafe extern "C" fn impinge_scene_end_positions(
     body: u32,
     view: *mut impinge_array,
 ) -> Status {
-    let end = |_: &impinge_scene, body: &Body| match body.end_positions() {
+    let end = |body: &Body| match body.end_positions() {
         Some(end) => positions_view(end),
         None => no_rows(positions_view(body.positions()).r#type),
     };
@@ -576,7 +520,7 @@ pub unsafe extern "C" fn impinge_scene_elements(
     view: *mut impinge_array,
 ) -> Status {
     // SAFETY: see `impinge_scene_create`.
-    unsafe { show(scene, body, view, |_, body| elements_view(body.elements())) }
+    unsafe { show(scene, body, view, |body| elements_view(body.elements())) }
 }
 
 #[unsafe(no_mangle)]
@@ -585,12 +529,8 @@ pub unsafe extern "C" fn impinge_scene_edges(
     body: u32,
     view: *mut impinge_array,
 ) -> Status {
-    let edges = |scene: &impinge_scene, held: &Body| match scene.edge_numbers(body) {
-        Some(numbers) => arrays::view(&numbers.rows),
-        None => elements_view(held.part(Part::Edges)),
-    };
     // SAFETY: see `impinge_scene_create`.
-    unsafe { show(scene, body, view, edges) }
+    unsafe { show(scene, body, view, |body| elements_view(body.edges())) }
 }
 
 #[unsafe(no_mangle)]
@@ -600,11 +540,7 @@ pub unsafe extern "C" fn impinge_scene_faces(
     view: *mut impinge_array,
 ) -> Status {
     // SAFETY: see `impinge_scene_create`.
-    unsafe {
-        show(scene, body, view, |_, body| {
-            elements_view(body.part(Part::Faces))
-        })
-    }
+    unsafe { show(scene, body, view, |body| elements_view(body.faces())) }
 }
 
 #[unsafe(no_mangle)]

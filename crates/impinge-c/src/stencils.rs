@@ -68,7 +68,7 @@ impl impinge_stencils {
         answer.vertices = collect(rows().map(|row| row.vertices), WHAT)?;
         answer.kinds = collect(rows().map(|row| bit(row.kind) as u8), WHAT)?;
         let features = rows().map(|row| {
-            let [a, b] = row.features.map(|feature| code(feature, false));
+            let [a, b] = row.features.map(code);
             match row.kind {
                 // As vertices are: the vertex comes first.
                 PairKind::EdgeVertex => [b, a],
@@ -133,7 +133,7 @@ unsafe fn near_stencils(
                     }
                 }),
             };
-            let mut found = match (by_area, rest.as_deref()) {
+            let found = match (by_area, rest.as_deref()) {
                 (false, rest) => near.near.stencils(scene, rest)?,
                 (true, Some(rest)) => near.near.stencils_by_area(scene, rest)?,
                 (true, None) => {
@@ -141,9 +141,6 @@ unsafe fn near_stencils(
                     return Err(Failure::invalid(missing));
                 }
             };
-            if !near.order.is_empty() {
-                found = found.select(&near.order)?;
-            }
             let answer = Box::new(impinge_stencils::new(found)?);
             put(stencils, "stencils", Box::into_raw(answer))
         }

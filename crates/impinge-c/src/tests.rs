@@ -11,7 +11,7 @@ use std::path::Path;
 use std::process::Command;
 use std::ptr::{null, null_mut};
 
-use impinge::{Backend, Detector, Elements, PairKind, Part, Positions, Query, Scene};
+use impinge::{Backend, Detector, Elements, PairKind, Positions, Query, Scene};
 use impinge_scenes::{BuiltScene, Model, adversarial, soup, surfaces};
 
 use crate::answers::*;
@@ -405,146 +405,66 @@ fn answers_have_the_hashes_of_rust() {
     assert_hashes(1);
 }
 
-/// Edges in reverse order, every second one the other way round, and some that are none of the
-/// body's.
-fn own_edges(scene: &Scene, body: usize) -> Vec<[u32; 2]> {
-    let (_, held) = scene.bodies().nth(body).expect("it is there");
-    let Elements::Edges(edges) = held.part(Part::Edges) else {
-        panic!("edges are edges");
-    };
-    let turned = edges.iter().rev().enumerate();
-    let mut rows: Vec<_> = turned
-        .map(|(ix, &[a, b])| if ix % 2 == 0 { [b, a] } else { [a, b] })
-        .collect();
-    rows.insert(3, [0, 0]);
-    rows
-}
-
 #[test]
 fn edges_have_the_numbers_of_the_caller() {
     let ball = surfaces::ball(500);
-    let scene = of_models(&[ball.clone(), ball.translated([0.9, 0.0, 0.0])]);
-    let (with, without) = (through_c(&scene), through_c(&scene));
-    let rows = [own_edges(&scene, 0), own_edges(&scene, 1)];
-    // SAFETY: as in `through_c`.
-    unsafe {
-        for (body, rows) in (0u32..).zip(&rows) {
-            assert_eq!(
-                impinge_scene_set_edges(with.scene, body, crate::arrays::view(rows)),
-                OK
-            );
-            let mut view = crate::arrays::no_rows(U32);
-            assert_eq!(impinge_scene_edges(with.scene, body, &mut view), OK);
-            assert_eq!(view.rows, rows.len());
-        }
-        let query = impinge_query {
-            kinds: 63,
-            flags: DISTANCES | CLOSEST_POINTS,
-            ..impinge_query::default()
-        };
-        let mut all = Vec::new();
-        for built in [&with, &without] {
-            let mut near = null_mut();
-            assert_eq!(
-                impinge_find_near(built.detector, built.scene, 0.02, &query, &mut near),
-                OK
-            );
-            let mut impacts = null_mut();
-            assert_eq!(
-                impinge_find_impacts(built.detector, built.scene, null(), &mut impacts),
-                OK
-            );
-            let n = impinge_near_count(near);
-            assert!(n > 100 && impinge_impacts_count(impacts) > 100);
-            let is_own = std::ptr::eq(built, &with);
-            all.push((
-                listed(built, near, is_own.then_some(&rows)),
-                impinge_near_hash(near),
-                impinge_impacts_hash(impacts),
-            ));
+    let mut scene = of_models(&[ball.clone(), ball.translated([0.9, 0.0, 0.0])]);
+    let built = through_c(&scene);
+    let hashes = || {
+        let (mut near, mut impacts) = (null_mut(), null_mut());
+        // SAFETY: as in `through_c`.
+        unsafe {
+            let (on, of) = (built.detector, built.scene.cast_const());
+            assert_eq!(impinge_find_near(on, of, 0.02, null(), &mut near), OK);
+            assert_eq!(impinge_find_impacts(on, of, null(), &mut impacts), OK);
+            assert!(impinge_near_count(near) > 100 && impinge_impacts_count(impacts) > 100);
+            let hashes = [impinge_near_hash(near), impinge_impacts_hash(impacts)];
             impinge_near_destroy(near);
             impinge_impacts_destroy(impacts);
+            hashes
         }
-        assert_eq!(all[0], all[1]);
+    };
+    let expected = |scene: &Scene| {
+        let mut detector = Detector::new(Backend::Cpu).expect("the CPU");
+        let near = detector.near(scene, 0.02, &Query::all());
+        let impacts = detector.impacts(scene, &Query::all());
+        [
+            near.expect("near pairs").hash(),
+            impacts.expect("impacts").hash(),
+        ]
+    };
+    let before = hashes();
+    assert_eq!(before, expected(&scene));
+    let ids: Vec<_> = scene.bodies().map(|(id, _)| id).collect();
+    for id in ids {
+        let Elements::Edges(mut rows) = scene.body(id).expect("held").edges().clone() else {
+            panic!("edges are edges");
+        };
+        rows.reverse();
+        rows.iter_mut().step_by(2).for_each(|edge| edge.reverse());
+        scene.set_edges(id, &rows).expect("the same edges");
+        let body = id.index() as u32;
+        // SAFETY: as in `through_c`; the view has as many rows as it says.
+        unsafe {
+            let given = crate::arrays::view(&rows);
+            assert_eq!(impinge_scene_set_edges(built.scene, body, given), OK);
+            let mut view = crate::arrays::no_rows(U32);
+            assert_eq!(impinge_scene_edges(built.scene, body, &mut view), OK);
+            let own = std::slice::from_raw_parts(view.data.cast::<[u32; 2]>(), view.rows);
+            assert_eq!(own, rows);
+        }
     }
-}
-
-/// What a near pair is, without numbers of edges: its kind, the vertices of both elements and of
-/// both features, its points.
-type Described = (u8, Vec<(Vec<u32>, Vec<u32>, [u64; 3])>);
-
-/// # Safety
-/// As in `through_c`.
-unsafe fn listed(
-    built: &Built,
-    near: *mut impinge_near,
-    own: Option<&[Vec<[u32; 2]>; 2]>,
-) -> Vec<Described> {
-    // SAFETY: the caller's promise; columns have as many rows as the answer.
-    unsafe {
-        let n = impinge_near_count(near);
-        let rows = std::slice::from_raw_parts(impinge_near_data(near), n);
-        let column = |which| {
-            let mut view = crate::arrays::no_rows(U8);
-            assert_eq!(impinge_near_column(near, which, &mut view), OK);
-            assert_eq!(view.rows, n);
-            view.data
-        };
-        let kinds = std::slice::from_raw_parts(column(COLUMN_KIND).cast::<u8>(), n);
-        let features = std::slice::from_raw_parts(column(COLUMN_FEATURES).cast::<[u8; 2]>(), n);
-        let points = std::slice::from_raw_parts(column(COLUMN_POINTS).cast::<[[f64; 3]; 2]>(), n);
-        let order: Vec<_> = kinds.iter().zip(rows).collect();
-        assert!(order.is_sorted());
-        let parts = |body: u32, part: Part, element: u32| -> Vec<u32> {
-            let held = (*built.scene)
-                .scene
-                .bodies()
-                .nth(body as usize)
-                .expect("it is there")
-                .1;
-            match (part, own) {
-                (Part::Vertices, _) => vec![element],
-                (Part::Edges, Some(rows)) => rows[body as usize][element as usize].to_vec(),
-                _ => held.part(part).corners(element as usize).to_vec(),
-            }
-        };
-        let named = |corners: &[u32], feature: u8| -> Vec<u32> {
-            match feature {
-                0..8 => vec![corners[usize::from(feature)]],
-                16 => corners.to_vec(),
-                edge => {
-                    let first = usize::from(edge - 8);
-                    vec![corners[first], corners[(first + 1) % corners.len()]]
-                }
-            }
-        };
-        let sorted = |mut list: Vec<u32>| {
-            list.sort_unstable();
-            list
-        };
-        let mut all: Vec<Described> = (0..n)
-            .map(|ix| {
-                let kind = kind_of(kinds[ix].into()).expect("a kind");
-                let row = rows[ix];
-                let of = [(row.body_a, row.element_a), (row.body_b, row.element_b)];
-                let mut sides: Vec<_> = (0..2)
-                    .map(|side| {
-                        let corners = parts(of[side].0, kind.parts()[side], of[side].1);
-                        let feature = named(&corners, features[ix][side]);
-                        (
-                            sorted(corners),
-                            sorted(feature),
-                            points[ix][side].map(f64::to_bits),
-                        )
-                    })
-                    .collect();
-                sides.sort();
-                (kinds[ix], sides)
-            })
-            .collect();
-        all.sort();
-        all
+    let after = hashes();
+    assert_eq!(after, expected(&scene));
+    assert!(before[0] != after[0] && before[1] != after[1]);
+    // No rows: the library's numbers again.
+    for body in 0..2 {
+        // SAFETY: as above.
+        let set =
+            unsafe { impinge_scene_set_edges(built.scene, body, crate::arrays::no_rows(U32)) };
+        assert_eq!(set, OK);
     }
+    assert_eq!(hashes(), before);
 }
 
 #[test]

@@ -104,10 +104,10 @@ int main(void) {
   REFUSED(impinge_scene_set_positions(scene, 1, at), "no body 1 among the 1");
   REFUSED(impinge_scene_set_filter(scene, IMPINGE_ANY_BODY, 1, 1), "no body");
   REFUSED(impinge_scene_set_thickness(scene, 0, -1), "thickness: -1");
-  REFUSED(impinge_scene_set_edges(scene, 0, packed(beyond, 1, IMPINGE_U32)), "is not among the 1 rows");
+  REFUSED(impinge_scene_set_edges(scene, 0, packed(beyond, 1, IMPINGE_U32)), "1 rows of edges given, but there are");
   {
     static const uint32_t twice[2][2] = {{0, 1}, {1, 0}};
-    REFUSED(impinge_scene_set_edges(scene, 0, packed(twice, 2, IMPINGE_U32)), "row 1 has vertices 1 and 0");
+    REFUSED(impinge_scene_set_edges(scene, 0, packed(twice, 2, IMPINGE_U32)), "row 1 of edges has vertices 1 and 0, as row 0 has");
   }
   REFUSED(impinge_find_distance(detector, scene, 0, 0, NULL, &found), "body 0");
   REFUSED(impinge_find_distance(detector, scene, 0, 3, NULL, &found), "no body 3");

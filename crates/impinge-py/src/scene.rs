@@ -396,6 +396,21 @@ impl Scene {
         scene.inner.set_filter(id, filter).map_err(raise)
     }
 
+    fn _set_edges(
+        slf: &Bound<'_, Self>,
+        body: &Bound<'_, PyAny>,
+        edges: Argument<'_, '_>,
+    ) -> PyResult<()> {
+        let mut scene = change(slf)?;
+        let id = scene.id(body, "body")?;
+        let n_vertices = scene.inner.body(id).map_err(raise)?.n_vertices();
+        let edges = match edges {
+            None => Vec::new(),
+            Some(edges) => arrays::index_rows(edges, "edges", &[2], n_vertices)?.0,
+        };
+        (scene.inner.set_edges(id, edges.as_chunks().0)).map_err(raise)
+    }
+
     fn _set_groups(
         slf: &Bound<'_, Self>,
         body: &Bound<'_, PyAny>,
@@ -577,6 +592,9 @@ impl Scene {
                 thickness_array(py, body),
                 body.groups().map(|each| PyArray1::from_slice(py, each)),
                 body.pinned().map(|each| PyArray1::from_slice(py, each)),
+                (body.has_own_edges())
+                    .then(|| scene._edges(py, &number))
+                    .transpose()?,
             ))?;
         }
         (slf.get_type(), (), bodies).into_pyobject(py)
@@ -617,6 +635,11 @@ impl Scene {
                 mask: item(7)?.extract()?,
             };
             scene.inner.set_filter(id, filter).map_err(raise)?;
+            let edges = item(11)?;
+            if !edges.is_none() {
+                let edges = arrays::index_rows(&edges, "edges", &[2], usize::MAX)?.0;
+                (scene.inner.set_edges(id, edges.as_chunks().0)).map_err(raise)?;
+            }
             let (part, thickness): (Bound<'_, PyAny>, Bound<'_, PyAny>) = item(8)?.extract()?;
             let thickness = self::thickness(&thickness, &part)?;
             scene.inner.set_thickness(id, thickness).map_err(raise)?;

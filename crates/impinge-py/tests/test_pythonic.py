@@ -133,6 +133,7 @@ def test_scenes_pickle_what_was_said_of_vertices(duplicate):
     scene.set_groups(cloth, layer)
     scene.set_pinned(cloth, layer < 2)
     scene.set_thickness(cloth, np.where(layer == 1, 0.75, 0.25))
+    scene.set_edges(cloth, scene.edges(cloth)[::-1, ::-1])
     scene.set_thickness(0, 0.5)
     detector = impinge.Detector("cpu")
 
@@ -147,6 +148,7 @@ def test_scenes_pickle_what_was_said_of_vertices(duplicate):
         lambda of: of.set_groups(int(cloth), layer[::-1]),
         lambda of: of.set_pinned(int(cloth), np.zeros(16, bool)),
         lambda of: of.set_thickness(int(cloth), 0),
+        lambda of: of.set_edges(int(cloth), None),
     ]:
         other = duplicate(scene)
         change(other)

@@ -144,6 +144,11 @@ impl SceneHandle {
         self.0.set_thickness(body, thickness).map_err(thrown)
     }
 
+    /// See [`World::set_edges`].
+    pub fn set_edges(&mut self, body: u32, edges: &[u32]) -> Thrown<()> {
+        self.0.set_edges(body, edges).map_err(thrown)
+    }
+
     /// See [`World::set_groups`].
     pub fn set_groups(&mut self, body: u32, groups: &[u32]) -> Thrown<()> {
         self.0.set_groups(body, groups).map_err(thrown)

@@ -86,13 +86,15 @@ impl World {
             Put::EndPositions => self.scene.set_end_positions(id, positions),
             _ => self.scene.set_positions(id, positions),
         };
-        self.renumbered(body, set)
+        self.renumbered(body, set)?;
+        Ok(body)
     }
 
     /// Says of which body an error is in the caller's numbers.
-    fn renumbered(&self, body: u32, set: Result<(), impinge::Error>) -> Result<u32, Error> {
+    #[inline(never)]
+    fn renumbered(&self, body: u32, set: Result<(), impinge::Error>) -> Result<(), Error> {
         match set {
-            Ok(()) => Ok(body),
+            Ok(()) => Ok(()),
             Err(error) if self.id(body)?.index() == body as usize => Err(Error::Library(error)),
             Err(error) => Err(Error::Renumbered {
                 number: body,
@@ -115,7 +117,7 @@ impl World {
     /// No such body; those of [`Scene::set_transform`].
     pub fn set_transform(&mut self, body: u32, columns: &[f64; 16]) -> Result<(), Error> {
         let set = self.scene.set_transform(self.id(body)?, &by_rows(columns));
-        self.renumbered(body, set).map(|_| ())
+        self.renumbered(body, set)
     }
 
     /// Moves the rest positions of a body by a matrix, column by column, to the end of a step.
@@ -124,7 +126,7 @@ impl World {
     /// No such body; those of [`Scene::set_end_transform`].
     pub fn set_end_transform(&mut self, body: u32, columns: &[f64; 16]) -> Result<(), Error> {
         let set = (self.scene).set_end_transform(self.id(body)?, &by_rows(columns));
-        self.renumbered(body, set).map(|_| ())
+        self.renumbered(body, set)
     }
 
     /// Sets which bodies a body meets.
@@ -142,7 +144,16 @@ impl World {
     /// No such body; those of [`Scene::set_thickness`].
     pub fn set_thickness(&mut self, body: u32, thickness: f64) -> Result<(), Error> {
         let set = self.scene.set_thickness(self.id(body)?, thickness);
-        self.renumbered(body, set).map(|_| ())
+        self.renumbered(body, set)
+    }
+
+    /// Numbers the edges of a body as the caller does; no rows: as the library does.
+    ///
+    /// # Errors
+    /// No such body; an odd number of vertices; those of [`Scene::set_edges`].
+    pub fn set_edges(&mut self, body: u32, edges: &[u32]) -> Result<(), Error> {
+        let set = (self.scene).set_edges(self.id(body)?, rows(edges, "edges")?);
+        self.renumbered(body, set)
     }
 
     /// Puts each vertex of a body into a group.
@@ -151,7 +162,7 @@ impl World {
     /// No such body; those of [`Scene::set_groups`].
     pub fn set_groups(&mut self, body: u32, groups: &[u32]) -> Result<(), Error> {
         let set = self.scene.set_groups(self.id(body)?, groups);
-        self.renumbered(body, set).map(|_| ())
+        self.renumbered(body, set)
     }
 
     /// Says which vertices of a body never move: those whose byte is not 0.
@@ -161,7 +172,7 @@ impl World {
     pub fn set_pinned(&mut self, body: u32, pinned: &[u8]) -> Result<(), Error> {
         let pinned: Vec<bool> = pinned.iter().map(|&byte| byte != 0).collect();
         let set = self.scene.set_pinned(self.id(body)?, &pinned);
-        self.renumbered(body, set).map(|_| ())
+        self.renumbered(body, set)
     }
 
     /// Keeps the pairs that are within a distance now under a number, until they are
@@ -205,7 +216,7 @@ impl World {
             _ => Thickness::faces(thickness),
         };
         let set = self.scene.set_thickness(self.id(body)?, thickness);
-        self.renumbered(body, set).map(|_| ())
+        self.renumbered(body, set)
     }
 
     /// Removes a body. Its number is not used again.

@@ -356,6 +356,18 @@ fn what_is_left_out_is_what_the_library_leaves_out() -> Result<(), Error> {
         text.starts_with("body 2, in the library's words: ") && text.contains("groups"),
         "{text}"
     );
+    let text = said(world.set_edges(above, &[0, 1, 2, 0, 1, 0]));
+    assert!(
+        text.starts_with("body 2, in the library's words: ")
+            && text.ends_with("row 2 of edges has vertices 1 and 0, as row 0 has"),
+        "{text}"
+    );
+    let text = said(world.set_edges(above, &[0, 1, 2]));
+    assert_eq!(text, "edges: 3 numbers given, not a multiple of 2");
+    world.set_edges(above, &[2, 1, 0, 1, 2, 0])?;
+    assert_eq!(world.index(above, Part::Edges)?, [2, 1, 0, 1, 2, 0]);
+    world.set_edges(above, &[])?;
+    assert_eq!(world.index(above, Part::Edges)?, [0, 1, 0, 2, 1, 2]);
     let text = said(world.set_pinned(below, &[1, 0, 0, 1]));
     assert!(
         text.starts_with("body 1: ") && text.contains("pinned"),

@@ -44,7 +44,7 @@ namespace detail {
 using ids = std::vector<std::uint32_t>;
 
 /// Vertices, edges and faces of ipc-toolkit as up to three bodies of a scene: faces, with the edges of the caller; edges of no face; vertices of
-/// neither.
+/// neither. The edges of a body are those of the caller that it has, in the caller's order.
 class bodies {
 public:
   bodies(Eigen::Index n, const Eigen::MatrixXi &edges, const Eigen::MatrixXi &faces, settings of)
@@ -60,8 +60,9 @@ public:
     std::sort(sides.begin(), sides.end());
     for (Eigen::Index e = 0; e < edges.rows(); ++e) {
       const auto [a, b] = std::minmax(edges(e, 0), edges(e, 1));
-      if (std::binary_search(sides.begin(), sides.end(), std::array<int, 2>{a, b})) continue;
-      loose_edges_.push_back(static_cast<std::uint32_t>(e));
+      const bool is_side = std::binary_search(sides.begin(), sides.end(), std::array<int, 2>{a, b});
+      (is_side ? sides_ : loose_edges_).push_back(static_cast<std::uint32_t>(e));
+      if (is_side) continue;
       is_used[static_cast<std::size_t>(a)] = is_used[static_cast<std::size_t>(b)] = 1;
     }
     for (std::size_t v = 0; v < is_used.size(); ++v)
@@ -88,6 +89,7 @@ public:
   std::uint32_t number(int part, body of, std::uint32_t element) const {
     if (part == 0 && of == of_points_) return points_[element];
     if (part == 1 && of == of_loose_edges_) return loose_edges_[element];
+    if (part == 1 && !sides_.empty()) return sides_[element];
     return element;
   }
   /// Whether an element is a vertex that another body has too, with all that it meets.
@@ -123,18 +125,19 @@ private:
     for (std::size_t ix = 0; ix < points_.size(); ++ix) rows.row(static_cast<Eigen::Index>(ix)) = at.row(static_cast<Eigen::Index>(points_[ix]));
     return rows;
   }
+  Eigen::MatrixXi edges(const ids &of) const {
+    Eigen::MatrixXi rows(static_cast<Eigen::Index>(of.size()), 2);
+    for (std::size_t ix = 0; ix < of.size(); ++ix) rows.row(static_cast<Eigen::Index>(ix)) = edges_.row(static_cast<Eigen::Index>(of[ix]));
+    return rows;
+  }
   void add(Eigen::Ref<const Eigen::MatrixXd> at) {
     if (at.rows() != n_ || at.cols() != 3) impinge::detail::refuse("vertices: not 3 columns");
     impinge::scene made;
     if (has_faces()) {
       of_faces_ = made.add_triangles(faces_, at);
-      if (edges_.rows() > 0) made.set_edges(of_faces_, edges_);
+      if (!sides_.empty()) made.set_edges(of_faces_, edges(sides_));
     }
-    if (!loose_edges_.empty()) {
-      Eigen::MatrixXi rows(static_cast<Eigen::Index>(loose_edges_.size()), 2);
-      for (std::size_t ix = 0; ix < loose_edges_.size(); ++ix) rows.row(static_cast<Eigen::Index>(ix)) = edges_.row(static_cast<Eigen::Index>(loose_edges_[ix]));
-      of_loose_edges_ = made.add_edges(rows, at);
-    }
+    if (!loose_edges_.empty()) of_loose_edges_ = made.add_edges(edges(loose_edges_), at);
     if (!points_.empty()) of_points_ = made.add_points(points(at));
     scene_ = std::move(made);
   }
@@ -142,7 +145,7 @@ private:
   Eigen::Index n_;
   Eigen::MatrixXi edges_, faces_;
   std::vector<char> on_faces_;
-  ids loose_edges_, points_;
+  ids sides_, loose_edges_, points_;
   body of_faces_ = IMPINGE_ANY_BODY, of_loose_edges_ = IMPINGE_ANY_BODY, of_points_ = IMPINGE_ANY_BODY;
   impinge::scene scene_;
   impinge::detector detector_;

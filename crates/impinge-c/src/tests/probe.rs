@@ -7,7 +7,7 @@ use impinge::{Backend, Bounds, Csr, Detector, Exclusion, Hit, PairKind, Part, Qu
 use impinge_scenes::solids::solid_ball;
 use impinge_scenes::{Random, surfaces};
 
-use super::{Built, catalogue, of_models, own_edges, through_c};
+use super::{Built, catalogue, of_models, through_c};
 use crate::arrays::{no_rows, positions_view, view, view_of};
 use crate::motion::*;
 use crate::neighbours::*;
@@ -398,79 +398,5 @@ fn what_is_left_out_is_what_rust_leaves_out() {
         let hash = check(&scene, &query, &own);
         assert!(hash != left && hash != 0 && !at_rest.is_empty());
         crate::answers::impinge_near_destroy(rest);
-    }
-}
-
-/// Pairs of edges by the vertices of both, with their distance.
-type ByVertices = Vec<([[u32; 2]; 2], u64)>;
-
-/// # Safety
-/// As in `through_c`.
-unsafe fn edge_lists(built: &Built, edges: &[Vec<[u32; 2]>; 2]) -> ByVertices {
-    let mut near = null_mut();
-    let [mut offsets, mut indices, mut distances] = [no_rows(U8); 3];
-    // SAFETY: the caller's promise.
-    unsafe {
-        let status = impinge_find_neighbours(built.detector, built.scene, 0.02, null(), &mut near);
-        assert_eq!(status, OK);
-        let status = impinge_neighbours_lists(
-            near,
-            bit(PairKind::EdgeEdge),
-            0,
-            &mut offsets,
-            &mut indices,
-            &mut distances,
-        );
-        assert_eq!(status, OK);
-        let mut first = [0; 3];
-        assert_eq!(impinge_neighbours_first(near, 1, &mut first), OK);
-        assert_eq!(first[1] as usize, edges[0].len());
-        let offsets = numbers::<u64>(&offsets);
-        assert_eq!(offsets.len(), edges[0].len() + edges[1].len() + 1);
-        // Vertices of the second body are told from those of the first.
-        let vertices = |edge: usize| {
-            let mut of = match edge.checked_sub(edges[0].len()) {
-                None => edges[0][edge],
-                Some(edge) => edges[1][edge].map(|vertex| vertex + 100_000),
-            };
-            of.sort_unstable();
-            of
-        };
-        let mut all = Vec::new();
-        for (edge, range) in offsets.array_windows().enumerate() {
-            let [from, to] = range.map(|ix| ix as usize);
-            let list = &numbers::<u32>(&indices)[from..to];
-            assert!(list.is_sorted());
-            for (&other, x) in list.iter().zip(&numbers::<f64>(&distances)[from..to]) {
-                all.push(([vertices(edge), vertices(other as usize)], x.to_bits()));
-            }
-        }
-        impinge_neighbours_destroy(near);
-        all.sort_unstable();
-        all
-    }
-}
-
-#[test]
-fn lists_have_the_callers_numbers_of_edges() {
-    let ball = surfaces::ball(500);
-    let scene = of_models(&[ball.clone(), ball.translated([0.9, 0.0, 0.0])]);
-    let (with, without) = (through_c(&scene), through_c(&scene));
-    let rows = [own_edges(&scene, 0), own_edges(&scene, 1)];
-    let given = [0, 1].map(|body| {
-        let (_, held) = scene.bodies().nth(body).expect("it is there");
-        let impinge::Elements::Edges(edges) = held.edges() else {
-            panic!("edges are edges");
-        };
-        edges.clone()
-    });
-    // SAFETY: as in `through_c`.
-    unsafe {
-        for (body, rows) in (0..).zip(&rows) {
-            assert_eq!(impinge_scene_set_edges(with.scene, body, view(rows)), OK);
-        }
-        let own = edge_lists(&with, &rows);
-        assert!(own.len() > 100);
-        assert_eq!(own, edge_lists(&without, &given));
     }
 }

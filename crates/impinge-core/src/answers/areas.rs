@@ -4,6 +4,7 @@
 //! length, and a vertex half the length of each of its edges; a vertex alone has 1.
 
 use crate::scene::Body;
+use crate::scene::edges::EdgeFinder;
 use crate::scene::elements::Elements;
 use crate::scene::error::Error;
 use crate::scene::vector::{cross, dot, sub};
@@ -40,14 +41,14 @@ impl Areas {
         }
         match body.faces() {
             Elements::Triangles(faces) if !faces.is_empty() => {
+                let numbers = EdgeFinder::new(body.edges());
                 for &[a, b, c] in faces {
                     let [p, q, r] = [a, b, c].map(at);
                     let third = 0.5 * length(cross(sub(q, p), sub(r, p))) / 3.0;
                     for (i, j) in [(a, b), (b, c), (c, a)] {
                         vertices[i as usize] += third;
                         // The same vertex twice is no edge.
-                        let key = (i.max(j), i.min(j));
-                        if let Ok(edge) = ends.binary_search_by_key(&key, |&[a, b]| (b, a)) {
+                        if let Some(edge) = numbers.find([i, j]) {
                             edges[edge] += third;
                         }
                     }

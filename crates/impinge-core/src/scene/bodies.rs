@@ -264,9 +264,7 @@ impl Scene {
         thickness: impl Into<Thickness<'a>>,
     ) -> Result<(), Error> {
         let held = self.body(body)?;
-        let thickness = thickness
-            .into()
-            .held(body, &held.topology, held.n_vertices())?;
+        let thickness = thickness.into().held(body, held)?;
         self.body_mut(body)?.thickness = thickness;
         Ok(())
     }
@@ -297,7 +295,7 @@ impl Scene {
         self.arrangement = self.stamp;
     }
 
-    fn body_mut(&mut self, body: BodyId) -> Result<&mut Body, Error> {
+    pub(super) fn body_mut(&mut self, body: BodyId) -> Result<&mut Body, Error> {
         self.rearranged();
         self.moved_body(body)
     }
@@ -335,6 +333,7 @@ impl Scene {
         self.bodies()
             .map(|(_, body)| {
                 body.topology.bytes()
+                    + body.own_edges.as_ref().map_or(0, |edges| edges.bytes())
                     + body.positions.bytes()
                     + body.end.as_ref().map_or(0, Positions::bytes)
                     + body.motion.as_ref().map_or(0, |motion| motion.rest.bytes())

@@ -42,6 +42,8 @@ impl Filter {
 #[derive(Debug, Clone)]
 pub struct Body {
     pub(super) topology: Arc<Topology>,
+    /// The edges as the caller numbers them, if that was said.
+    pub(super) own_edges: Option<Arc<Elements>>,
     pub(super) positions: Positions,
     /// Where the vertices are at the end of a step; as many as `positions`, or `None` so far.
     pub(super) end: Option<Positions>,
@@ -95,6 +97,7 @@ impl Body {
         let stamp = new_stamp();
         Ok(Body {
             topology: Arc::new(Topology::new(elements)),
+            own_edges: None,
             positions,
             end: None,
             moves: false,
@@ -116,15 +119,25 @@ impl Body {
     }
 
     /// The elements of one part: those that the body was given as, or its vertices, edges or faces,
-    /// which are found once per topology. Their numbers depend on the given elements alone.
+    /// which are found once per topology. Their numbers depend on the given elements alone, but for
+    /// edges that were [set](crate::Scene::set_edges).
     pub fn part(&self, part: Part) -> &Elements {
-        self.topology.part(part)
+        match (part, &self.own_edges) {
+            (Part::Edges, Some(edges)) => edges,
+            _ => self.topology.part(part),
+        }
     }
 
     /// The edges, `(n, 2)`: of tetrahedra those of their surface. They are found once per topology;
-    /// their numbers, which pairs of edges have, depend on the elements alone.
+    /// their numbers, which pairs of edges have, depend on the elements alone, unless they were
+    /// [set](crate::Scene::set_edges).
     pub fn edges(&self) -> &Elements {
-        self.topology.part(Part::Edges)
+        self.part(Part::Edges)
+    }
+
+    /// Whether the edges have the numbers that the caller [set](crate::Scene::set_edges).
+    pub fn has_own_edges(&self) -> bool {
+        self.own_edges.is_some()
     }
 
     /// The faces, `(n, 3)`: of tetrahedra those of their surface.

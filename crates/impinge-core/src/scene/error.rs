@@ -79,7 +79,7 @@ pub enum Error {
     PerElement {
         /// The body.
         body: BodyId,
-        /// What was given: `"thicknesses"`.
+        /// What was given: `"thicknesses"`, `"rows of edges"`.
         what: &'static str,
         /// How many were given.
         given: usize,
@@ -87,6 +87,19 @@ pub enum Error {
         n: usize,
         /// Which elements: `"vertices"`, `"edges"` or `"faces"`.
         elements: &'static str,
+    },
+    /// A row of a caller's edges is no edge of the body, or the same as another. Check whose edges
+    /// they are.
+    #[error("body {body}: row {row} of edges has vertices {} and {}, {why}", vertices[0], vertices[1])]
+    Edge {
+        /// The body.
+        body: BodyId,
+        /// The row.
+        row: usize,
+        /// Its vertices.
+        vertices: [u32; 2],
+        /// What is wrong with them: there is no such edge, or which row has it too.
+        why: String,
     },
     /// An element is to have a thickness that is negative or not finite.
     #[error(

@@ -3,7 +3,9 @@
 use std::borrow::Cow;
 use std::sync::Arc;
 
-use crate::scene::elements::{Part, Topology};
+use crate::scene::body::Body;
+use crate::scene::edges::EdgeFinder;
+use crate::scene::elements::Part;
 use crate::scene::error::Error;
 use crate::scene::ids::{BodyId, new_stamp};
 
@@ -47,12 +49,7 @@ impl<'a> Thickness<'a> {
     ///
     /// # Errors
     /// A number that is negative or not finite; more or fewer numbers than elements.
-    pub(super) fn held(
-        self,
-        body: BodyId,
-        topology: &Topology,
-        n_vertices: usize,
-    ) -> Result<HeldThickness, Error> {
+    pub(super) fn held(self, body: BodyId, of: &Body) -> Result<HeldThickness, Error> {
         match self.0 {
             Given::One(one) if is_length(one) => Ok(HeldThickness {
                 most: one,
@@ -65,11 +62,11 @@ impl<'a> Thickness<'a> {
             }),
             Given::Each(part, given) => {
                 let n = match part {
-                    Part::Vertices => n_vertices,
-                    _ => topology.part(part).len(),
+                    Part::Vertices => of.n_vertices(),
+                    _ => of.part(part).len(),
                 };
                 check(body, part, &given, n)?;
-                let each = Each::new(part, given.into_owned(), topology, n_vertices);
+                let each = Each::new(part, given.into_owned(), of);
                 let all = [&each.vertices, &each.edges, &each.faces];
                 let most = all.into_iter().flat_map(|of| of.iter());
                 Ok(HeldThickness {
@@ -134,13 +131,13 @@ pub(crate) struct Each {
 }
 
 impl Each {
-    fn new(part: Part, given: Vec<f64>, topology: &Topology, n_vertices: usize) -> Self {
+    fn new(part: Part, given: Vec<f64>, of: &Body) -> Self {
         let of_vertices = match part {
             Part::Vertices => given.clone(),
             _ => {
-                let mut of_vertices = vec![0.0; n_vertices];
+                let mut of_vertices = vec![0.0; of.n_vertices()];
                 for (ix, &own) in given.iter().enumerate() {
-                    for &corner in topology.part(part).corners(ix) {
+                    for &corner in of.part(part).corners(ix) {
                         raise(&mut of_vertices[corner as usize], own);
                     }
                 }
@@ -151,7 +148,7 @@ impl Each {
             match part {
                 _ if part == other => given.clone(),
                 Part::Vertices => {
-                    let elements = topology.part(other);
+                    let elements = of.part(other);
                     let most = |corners: &[u32]| {
                         let own = corners.iter().map(|&corner| given[corner as usize]);
                         own.fold(0.0, f64::max)
@@ -160,7 +157,7 @@ impl Each {
                         .map(|ix| most(elements.corners(ix)))
                         .collect()
                 }
-                _ => across(part, &given, other, topology),
+                _ => across(part, &given, other, of),
             }
         };
         Each {
@@ -168,6 +165,17 @@ impl Each {
             edges: of_part(Part::Edges).into(),
             faces: of_part(Part::Faces).into(),
             vertices: of_vertices.into(),
+            stamp: new_stamp(),
+        }
+    }
+
+    /// The same elements, with edges in the order of these numbers.
+    pub fn with_edges(&self, old_numbers: &[usize]) -> Self {
+        Each {
+            given: self.given,
+            edges: Vec::from_iter(old_numbers.iter().map(|&ix| self.edges[ix])).into(),
+            faces: Arc::clone(&self.faces),
+            vertices: Arc::clone(&self.vertices),
             stamp: new_stamp(),
         }
     }
@@ -193,23 +201,15 @@ impl Each {
 }
 
 /// From edges to faces or back: of each element, the most of those that have it or that it has.
-fn across(part: Part, given: &[f64], other: Part, topology: &Topology) -> Vec<f64> {
-    let (edges, faces) = (topology.part(Part::Edges), topology.part(Part::Faces));
-    // Edges by their ends, sorted.
-    let mut numbered: Vec<([u32; 2], usize)> = (0..edges.len())
-        .map(|ix| (ends(edges.corners(ix)[0], edges.corners(ix)[1]), ix))
-        .collect();
-    numbered.sort_unstable();
-    let mut most = vec![0.0; topology.part(other).len()];
+fn across(part: Part, given: &[f64], other: Part, of: &Body) -> Vec<f64> {
+    let faces = of.faces();
+    let edges = EdgeFinder::new(of.edges());
+    let mut most = vec![0.0; of.part(other).len()];
     for face in 0..faces.len() {
         let corners = faces.corners(face);
         for k in 0..3 {
-            let sought = ends(corners[k], corners[(k + 1) % 3]);
-            let first = numbered.partition_point(|&(own, _)| own < sought);
-            let own = numbered[first..]
-                .iter()
-                .take_while(|&&(own, _)| own == sought);
-            for &(_, edge) in own {
+            // The same vertex twice is no edge.
+            if let Some(edge) = edges.find([corners[k], corners[(k + 1) % 3]]) {
                 match part {
                     Part::Edges => raise(&mut most[face], given[edge]),
                     _ => raise(&mut most[edge], given[face]),
@@ -220,10 +220,6 @@ fn across(part: Part, given: &[f64], other: Part, topology: &Topology) -> Vec<f6
     most
 }
 
-fn ends(a: u32, b: u32) -> [u32; 2] {
-    [a.min(b), a.max(b)]
-}
-
 fn raise(to: &mut f64, by: f64) {
     *to = to.max(by);
 }
@@ -231,15 +227,17 @@ fn raise(to: &mut f64, by: f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::elements::Elements;
+    use crate::scene::body::Filter;
 
     /// Two triangles across an edge, and a vertex that no face names.
     #[test]
     fn other_elements_are_as_thick_as_the_thickest_beside_them() {
-        let topology = Topology::new(Elements::from(vec![[0, 1, 2], [1, 3, 2]]));
+        let mesh = (vec![[0, 1, 2], [1, 3, 2]], vec![[0.0f32; 3]; 5]);
+        let id = BodyId::new(0);
+        let body = Body::new(id, mesh.into(), Filter::default()).expect("good");
         // 0-1, 0-2, 1-2, 1-3, 2-3.
         let each = |thickness: Thickness<'_>| {
-            let held = thickness.held(BodyId::new(0), &topology, 5);
+            let held = thickness.held(id, &body);
             let held = held.expect("good");
             let each = held.each.expect("of each element");
             let of = |part| each.of(part).to_vec();

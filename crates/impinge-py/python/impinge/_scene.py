@@ -350,6 +350,39 @@ class Scene(SceneBase):
         """
         self._set_filter(body, category, mask)
 
+    def set_edges(self, body: _Body, edges: _Array | None) -> None:
+        """Numbers the edges of a body as its caller does: edge i of answers, of `edges` and of `set_thickness` is row i.
+
+        Set them before the first question: afterwards answers and exclusions from before name other edges. `remesh` forgets them.
+
+        Parameters
+        ----------
+        body : Body or int
+            Of triangles or tetrahedra.
+        edges : array_like of int, shape (n, 2), or None
+            Vertex indices, in either direction: every edge once, in any order; of tetrahedra the edges of their surface. None, or no
+            rows: the library's own numbers again, which are those of ``igl.edges``.
+
+        Raises
+        ------
+        ValueError, TypeError
+            A row that is no edge, or the same as another; an edge that no row has; a body of edges, which have the numbers of their
+            rows, or of points. The body keeps its numbers then.
+
+        Examples
+        --------
+        >>> import numpy as np, impinge
+        >>> scene = impinge.Scene()
+        >>> face = scene.add(np.eye(3), [[0, 1, 2]])
+        >>> scene.edges(face).tolist()
+        [[0, 1], [0, 2], [1, 2]]
+        >>> scene.set_edges(face, [[2, 1], [2, 0], [0, 1]])
+        >>> rod = scene.add_edges([[0.5, 0.5, 0.1], [1, 1, 1]], [[0, 1]])
+        >>> impinge.Detector("cpu").near(scene, 0.1, between=(face, rod), kinds=("ee",)).rows.tolist()
+        [[0, 2, 1, 0]]
+        """
+        self._set_edges(body, edges)
+
     def set_groups(self, body: _Body, groups: _Array) -> None:
         """Puts each vertex of a body into a group, for ``exclude=groups(g, h)``. A body whose groups were never set is in no group.
 

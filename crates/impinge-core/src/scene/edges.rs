@@ -1,0 +1,129 @@
+//! The numbers of edges: the library's own, or those of the caller.
+
+use std::sync::Arc;
+
+use crate::scene::bodies::Scene;
+use crate::scene::elements::{BodyKind, Elements, Part};
+use crate::scene::error::Error;
+use crate::scene::ids::{BodyId, new_stamp};
+
+/// Finds edges, none of which is there twice, by their vertices.
+pub(crate) struct EdgeFinder<'a> {
+    edges: &'a [[u32; 2]],
+    /// By higher and lower vertex: the order of the library's own numbers.
+    sorted: Vec<u32>,
+}
+
+/// Where an edge is among sorted ones, whatever its direction.
+fn place(&[a, b]: &[u32; 2]) -> [u32; 2] {
+    [a.max(b), a.min(b)]
+}
+
+impl<'a> EdgeFinder<'a> {
+    pub fn new(edges: &'a Elements) -> Self {
+        let edges = match edges {
+            Elements::Edges(edges) => &edges[..],
+            _ => &[],
+        };
+        let mut sorted: Vec<u32> = (0..edges.len() as u32).collect();
+        sorted.sort_unstable_by_key(|&ix| place(&edges[ix as usize]));
+        EdgeFinder { edges, sorted }
+    }
+
+    /// The number of the edge between two vertices.
+    pub fn find(&self, ends: [u32; 2]) -> Option<usize> {
+        let of = |&ix: &u32| place(&self.edges[ix as usize]);
+        let found = self.sorted.binary_search_by_key(&place(&ends), of);
+        found.ok().map(|at| self.sorted[at] as usize)
+    }
+}
+
+impl Scene {
+    /// Numbers the edges of a body as its caller does: edge `i` of [`Body::edges`], of every
+    /// answer and of [`Thickness::edges`] is row `i` of `edges`, `(n, 2)` vertex indices, and goes
+    /// in its direction. Every edge must be there once, in any order; of tetrahedra these are the
+    /// edges of their surface. No rows: the library's own numbers again. [`remesh`](Scene::remesh)
+    /// forgets them.
+    ///
+    /// Set them before the first question: afterwards answers and exclusions from before name other
+    /// edges.
+    ///
+    /// ```
+    /// use impinge::{Backend, Detector, Elements, PairKind, Query, Scene};
+    /// # fn main() -> Result<(), impinge::Error> {
+    /// let mut scene = Scene::new();
+    /// let face = scene.add_triangles(&[[0, 1, 2]], &[[0.0f32, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])?;
+    /// scene.add_edges(&[[0, 1]], &[[0.5f32, -0.5, 0.25], [0.5, 0.25, 0.25]])?;
+    /// scene.set_edges(face, &[[2, 1], [2, 0], [0, 1]])?;
+    /// assert_eq!(*scene.body(face)?.edges(), Elements::from(vec![[2, 1], [2, 0], [0, 1]]));
+    /// let query = Query::between_all().kinds([PairKind::EdgeEdge]);
+    /// let near = Detector::new(Backend::Cpu)?.near(&scene, 0.25, &query)?;
+    /// // The strand passes over the edge between vertices 0 and 1, which is row 2.
+    /// assert_eq!(near.iter().map(|pair| pair.row()).collect::<Vec<_>>(), [[0, 2, 1, 0]]);
+    /// # Ok(()) }
+    /// ```
+    ///
+    /// [`Body::edges`]: crate::Body::edges
+    /// [`Thickness::edges`]: crate::Thickness::edges
+    ///
+    /// # Errors
+    /// The id names no body; a body of edges, which have the numbers of their rows, or of points;
+    /// a row that is no edge of the body, or the same as another; an edge that no row has. The body
+    /// keeps its numbers then.
+    pub fn set_edges(&mut self, body: BodyId, edges: &[[u32; 2]]) -> Result<(), Error> {
+        let held = self.body_mut(body)?;
+        if let kind @ (BodyKind::Points | BodyKind::Edges) = held.kind() {
+            return Err(Error::WrongKind {
+                body,
+                kind: kind.name(),
+                expected: "triangles or tetrahedra",
+            });
+        }
+        let own = (!edges.is_empty()).then(|| Arc::new(Elements::from(edges.to_vec())));
+        let new = own.as_deref();
+        let new = new.unwrap_or_else(|| held.topology.part(Part::Edges));
+        let before = old_numbers(body, held.edges(), new)?;
+        if let Some(each) = &mut held.thickness.each {
+            *each = Arc::new(each.with_edges(&before));
+        }
+        held.own_edges = own;
+        held.topology_stamp = new_stamp();
+        Ok(())
+    }
+}
+
+/// The old number of each of the new edges, which must be the same edges.
+fn old_numbers(body: BodyId, old: &Elements, new: &Elements) -> Result<Vec<usize>, Error> {
+    let old = EdgeFinder::new(old);
+    let (n, given) = (old.edges.len(), new.len());
+    let mut row_of: Vec<Option<usize>> = vec![None; n];
+    let mut numbers = Vec::with_capacity(given);
+    for row in 0..given {
+        let vertices = [0, 1].map(|end| new.corners(row)[end]);
+        let number = old.find(vertices);
+        let why = match number.and_then(|number| row_of[number].replace(row)) {
+            None if number.is_none() => "between which there is no edge".to_owned(),
+            None => {
+                numbers.extend(number);
+                continue;
+            }
+            Some(first) => format!("as row {first} has"),
+        };
+        return Err(Error::Edge {
+            body,
+            row,
+            vertices,
+            why,
+        });
+    }
+    match given == n {
+        true => Ok(numbers),
+        false => Err(Error::PerElement {
+            body,
+            what: "rows of edges",
+            given,
+            n,
+            elements: "edges",
+        }),
+    }
+}
