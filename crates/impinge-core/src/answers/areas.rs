@@ -4,8 +4,7 @@
 //! length, and a vertex half the length of each of its edges; a vertex alone has 1.
 
 use crate::scene::Body;
-use crate::scene::edges::EdgeFinder;
-use crate::scene::elements::Elements;
+use crate::scene::elements::{EdgeFinder, Elements};
 use crate::scene::error::Error;
 use crate::scene::vector::{cross, dot, sub};
 use crate::search::sink;

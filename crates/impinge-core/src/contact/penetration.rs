@@ -14,8 +14,6 @@
 //! coordinates. Crossings that round to one place may be swapped; the piece between them is then no
 //! longer than the rounding error.
 
-use std::collections::HashMap;
-
 use super::curves::Curves;
 use super::inside::{Asked, ConnectedParts};
 use super::regions::{NO_REGION, Region, WHAT, join_contacts, regions};
@@ -36,7 +34,7 @@ use impinge_exact::{Point, Sign, orient3d};
 #[derive(Debug, Default)]
 pub(crate) struct Topologies {
     /// By the number of the body; the first of the pair is the stamp of the topology.
-    edges: HashMap<usize, (u64, EdgesAround)>,
+    edges: Vec<Option<(u64, EdgesAround)>>,
 }
 
 /// How deep two closed bodies are in each other:
@@ -82,13 +80,16 @@ impl Topologies {
         if a == b {
             return Err(Error::SameBody { body: a });
         }
-        self.edges.retain(|&slot, _| scene.holds(slot));
+        for (slot, known) in self.edges.iter_mut().enumerate() {
+            known.take_if(|_| !scene.holds(slot));
+        }
         let ids = [a.min(b), a.max(b)];
         for id in ids {
             self.know(scene, id, work)?;
         }
+        let known = |id: BodyId| self.edges[id.index()].as_ref().expect("known now");
         let bodies = [scene.body(ids[0])?, scene.body(ids[1])?];
-        let topologies = ids.map(|id| &self.edges[&id.index()].1);
+        let topologies = ids.map(|id| &known(id).1);
         let numbers = ids.map(|id| id.index() as u32);
         let (contacts, contact_numbers) = &contacts.part(numbers)?;
         let crossings = [
@@ -126,7 +127,7 @@ impl Topologies {
 
     /// Bytes held.
     pub fn bytes(&self) -> u64 {
-        let edges = self.edges.values().map(|(_, edges)| edges.bytes());
+        let edges = self.edges.iter().flatten().map(|(_, edges)| edges.bytes());
         edges.sum::<usize>() as u64
     }
 
@@ -137,8 +138,9 @@ impl Topologies {
     pub fn know(&mut self, scene: &Scene, id: BodyId, work: Work<'_>) -> Result<(), Error> {
         let body = scene.body(id)?;
         let stamp = body.topology_stamp();
-        let known = self.edges.get(&id.index());
-        if known.is_some_and(|(known, _)| *known == stamp) {
+        if let Some(Some((known, _))) = self.edges.get(id.index())
+            && *known == stamp
+        {
             return Ok(());
         }
         let Elements::Triangles(faces) = body.elements() else {
@@ -149,7 +151,10 @@ impl Topologies {
             });
         };
         let edges = EdgesAround::new(id, faces, body.n_vertices(), work)?;
-        self.edges.insert(id.index(), (stamp, edges));
+        if self.edges.len() <= id.index() {
+            self.edges.resize_with(id.index() + 1, || None);
+        }
+        self.edges[id.index()] = Some((stamp, edges));
         Ok(())
     }
 }

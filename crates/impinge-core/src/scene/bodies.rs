@@ -264,7 +264,9 @@ impl Scene {
         thickness: impl Into<Thickness<'a>>,
     ) -> Result<(), Error> {
         let held = self.body(body)?;
-        let thickness = thickness.into().held(body, held)?;
+        let thickness = thickness
+            .into()
+            .held(body, &held.parts, held.n_vertices())?;
         self.body_mut(body)?.thickness = thickness;
         Ok(())
     }
@@ -332,8 +334,7 @@ impl Scene {
     pub fn bytes(&self) -> usize {
         self.bodies()
             .map(|(_, body)| {
-                body.topology.bytes()
-                    + body.own_edges.as_ref().map_or(0, |edges| edges.bytes())
+                body.parts.bytes()
                     + body.positions.bytes()
                     + body.end.as_ref().map_or(0, Positions::bytes)
                     + body.motion.as_ref().map_or(0, |motion| motion.rest.bytes())

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::scene::elements::{BodyKind, Elements, Part, Topology, VertexRings};
+use crate::scene::elements::{BodyKind, Elements, Part, Parts, VertexRings};
 use crate::scene::error::Error;
 use crate::scene::ids::{BodyId, new_stamp};
 use crate::scene::index::ElementIx;
@@ -41,9 +41,7 @@ impl Filter {
 /// One body: elements, positions, filter.
 #[derive(Debug, Clone)]
 pub struct Body {
-    pub(super) topology: Arc<Topology>,
-    /// The edges as the caller numbers them, if that was said.
-    pub(super) own_edges: Option<Arc<Elements>>,
+    pub(super) parts: Parts,
     pub(super) positions: Positions,
     /// Where the vertices are at the end of a step; as many as `positions`, or `None` so far.
     pub(super) end: Option<Positions>,
@@ -96,8 +94,7 @@ impl Body {
         }
         let stamp = new_stamp();
         Ok(Body {
-            topology: Arc::new(Topology::new(elements)),
-            own_edges: None,
+            parts: Parts::new(elements),
             positions,
             end: None,
             moves: false,
@@ -115,17 +112,14 @@ impl Body {
 
     /// The elements that the body was given as.
     pub fn elements(&self) -> &Elements {
-        self.topology.given()
+        self.parts.given()
     }
 
     /// The elements of one part: those that the body was given as, or its vertices, edges or faces,
     /// which are found once per topology. Their numbers depend on the given elements alone, but for
     /// edges that were [set](crate::Scene::set_edges).
     pub fn part(&self, part: Part) -> &Elements {
-        match (part, &self.own_edges) {
-            (Part::Edges, Some(edges)) => edges,
-            _ => self.topology.part(part),
-        }
+        self.parts.part(part)
     }
 
     /// The edges, `(n, 2)`: of tetrahedra those of their surface. They are found once per topology;
@@ -137,17 +131,17 @@ impl Body {
 
     /// Whether the edges have the numbers that the caller [set](crate::Scene::set_edges).
     pub fn has_own_edges(&self) -> bool {
-        self.own_edges.is_some()
+        self.parts.own_edges.is_some()
     }
 
     /// The faces, `(n, 3)`: of tetrahedra those of their surface.
     pub fn faces(&self) -> &Elements {
-        self.topology.part(Part::Faces)
+        self.parts.part(Part::Faces)
     }
 
     /// One name for equal parts.
     pub(crate) fn canonical(&self, part: Part) -> Part {
-        self.topology.canonical(part)
+        self.parts.canonical(part)
     }
 
     /// The corners of an element of a part.
@@ -226,7 +220,7 @@ impl Body {
 
     /// The vertices at most some number of edges away from each vertex.
     pub(crate) fn vertex_rings(&self, n_rings: u32) -> Arc<VertexRings> {
-        self.topology.rings(self.n_vertices(), n_rings)
+        self.parts.rings(self.n_vertices(), n_rings)
     }
 
     /// How thick the body is, in the unit of the scene: the thickness of its thickest element. See

@@ -3,40 +3,9 @@
 use std::sync::Arc;
 
 use crate::scene::bodies::Scene;
-use crate::scene::elements::{BodyKind, Elements, Part};
+use crate::scene::elements::{BodyKind, EdgeFinder, Elements};
 use crate::scene::error::Error;
 use crate::scene::ids::{BodyId, new_stamp};
-
-/// Finds edges, none of which is there twice, by their vertices.
-pub(crate) struct EdgeFinder<'a> {
-    edges: &'a [[u32; 2]],
-    /// By higher and lower vertex: the order of the library's own numbers.
-    sorted: Vec<u32>,
-}
-
-/// Where an edge is among sorted ones, whatever its direction.
-fn place(&[a, b]: &[u32; 2]) -> [u32; 2] {
-    [a.max(b), a.min(b)]
-}
-
-impl<'a> EdgeFinder<'a> {
-    pub fn new(edges: &'a Elements) -> Self {
-        let edges = match edges {
-            Elements::Edges(edges) => &edges[..],
-            _ => &[],
-        };
-        let mut sorted: Vec<u32> = (0..edges.len() as u32).collect();
-        sorted.sort_unstable_by_key(|&ix| place(&edges[ix as usize]));
-        EdgeFinder { edges, sorted }
-    }
-
-    /// The number of the edge between two vertices.
-    pub fn find(&self, ends: [u32; 2]) -> Option<usize> {
-        let of = |&ix: &u32| place(&self.edges[ix as usize]);
-        let found = self.sorted.binary_search_by_key(&place(&ends), of);
-        found.ok().map(|at| self.sorted[at] as usize)
-    }
-}
 
 impl Scene {
     /// Numbers the edges of a body as its caller does: edge `i` of [`Body::edges`], of every
@@ -81,12 +50,12 @@ impl Scene {
         }
         let own = (!edges.is_empty()).then(|| Arc::new(Elements::from(edges.to_vec())));
         let new = own.as_deref();
-        let new = new.unwrap_or_else(|| held.topology.part(Part::Edges));
+        let new = new.unwrap_or_else(|| held.parts.found_edges());
         let before = old_numbers(body, held.edges(), new)?;
         if let Some(each) = &mut held.thickness.each {
             *each = Arc::new(each.with_edges(&before));
         }
-        held.own_edges = own;
+        held.parts.own_edges = own;
         held.topology_stamp = new_stamp();
         Ok(())
     }
@@ -95,7 +64,7 @@ impl Scene {
 /// The old number of each of the new edges, which must be the same edges.
 fn old_numbers(body: BodyId, old: &Elements, new: &Elements) -> Result<Vec<usize>, Error> {
     let old = EdgeFinder::new(old);
-    let (n, given) = (old.edges.len(), new.len());
+    let (n, given) = (old.len(), new.len());
     let mut row_of: Vec<Option<usize>> = vec![None; n];
     let mut numbers = Vec::with_capacity(given);
     for row in 0..given {

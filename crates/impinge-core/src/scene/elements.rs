@@ -1,6 +1,5 @@
 //! The elements of bodies, given and derived: vertices, edges, boundary faces.
 
-use std::collections::HashMap;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use crate::scene::words::words;
@@ -346,40 +345,31 @@ impl Topology {
         let Elements::Tetrahedra(tets) = &self.given else {
             return Elements::Triangles(Vec::new());
         };
-        let sides = |&[a, b, c, d]: &[u32; 4]| {
-            let sides = [[b, c, d], [a, d, c], [a, b, d], [a, c, b]];
-            sides.into_iter().zip([a, b, c, d])
-        };
-        let sorted = |mut face: [u32; 3]| {
-            face.sort_unstable();
-            face
-        };
-        /// How many tetrahedra share a face, and the corner opposite it in the first.
-        struct SharedFace {
-            n: u32,
-            opposite: u32,
-            is_surface: bool,
-        }
-        let mut shared: HashMap<[u32; 3], SharedFace> = HashMap::with_capacity(2 * tets.len());
-        for (face, opposite) in tets.iter().flat_map(sides) {
-            let shared = shared.entry(sorted(face)).or_insert(SharedFace {
-                n: 0,
-                opposite,
-                is_surface: true,
-            });
-            shared.n += 1;
-            shared.is_surface = shared.n != 2 || shared.opposite == opposite;
-        }
-        let mut boundary = Vec::new();
-        for (face, _) in tets.iter().flat_map(sides) {
-            let is_surface = match shared.get_mut(&sorted(face)) {
-                Some(shared) => std::mem::take(&mut shared.is_surface),
-                None => false,
-            };
-            if is_surface {
-                boundary.push(face);
+        // The face opposite a corner. The number of a side is four times that of its tetrahedron,
+        // and that of the corner.
+        let face = |side: usize| {
+            let [a, b, c, d] = tets[side / 4];
+            match side % 4 {
+                0 => [b, c, d],
+                1 => [a, d, c],
+                2 => [a, b, d],
+                _ => [a, c, b],
             }
-        }
+        };
+        let sorted = |side: usize| {
+            let mut face = face(side);
+            face.sort_unstable();
+            (face, side)
+        };
+        let mut sides: Vec<([u32; 3], usize)> = (0..4 * tets.len()).map(sorted).collect();
+        sides.sort_unstable();
+        let shared = sides.chunk_by(|a, b| a.0 == b.0).filter(|shared| {
+            let opposite = |ix: usize| tets[shared[ix].1 / 4][shared[ix].1 % 4];
+            shared.len() != 2 || opposite(0) == opposite(1)
+        });
+        let mut firsts: Vec<usize> = shared.map(|shared| shared[0].1).collect();
+        firsts.sort_unstable();
+        let boundary = firsts.into_iter().map(face).collect();
         Elements::Triangles(boundary)
     }
 
@@ -387,6 +377,84 @@ impl Topology {
         let found = [&self.vertices, &self.edges, &self.boundary];
         let found = found.into_iter().filter_map(OnceLock::get);
         self.given.bytes() + found.map(Elements::bytes).sum::<usize>()
+    }
+}
+
+/// The elements of a body by part: as found, or with edges as the caller numbers them.
+#[derive(Debug, Clone)]
+pub(crate) struct Parts {
+    topology: Arc<Topology>,
+    /// The edges of the caller, if there are any.
+    pub own_edges: Option<Arc<Elements>>,
+}
+
+impl Parts {
+    pub fn new(given: Elements) -> Self {
+        Parts {
+            topology: Arc::new(Topology::new(given)),
+            own_edges: None,
+        }
+    }
+
+    /// The elements of a part.
+    pub fn part(&self, part: Part) -> &Elements {
+        match (part, &self.own_edges) {
+            (Part::Edges, Some(edges)) => edges,
+            _ => self.topology.part(part),
+        }
+    }
+
+    /// The edges in the order of the library.
+    pub fn found_edges(&self) -> &Elements {
+        self.topology.part(Part::Edges)
+    }
+
+    pub fn bytes(&self) -> usize {
+        let own = self.own_edges.as_ref();
+        self.topology.bytes() + own.map_or(0, |edges| edges.bytes())
+    }
+}
+
+impl std::ops::Deref for Parts {
+    type Target = Topology;
+    fn deref(&self) -> &Topology {
+        &self.topology
+    }
+}
+
+/// Finds edges, none of which is there twice, by their vertices.
+pub(crate) struct EdgeFinder<'a> {
+    edges: &'a [[u32; 2]],
+    /// By higher and lower vertex: the order of the library's own numbers.
+    sorted: Vec<u32>,
+}
+
+/// Where an edge is among sorted ones, whatever its direction.
+fn place(&[a, b]: &[u32; 2]) -> [u32; 2] {
+    [a.max(b), a.min(b)]
+}
+
+impl<'a> EdgeFinder<'a> {
+    pub fn new(edges: &'a Elements) -> Self {
+        let edges = match edges {
+            Elements::Edges(edges) => &edges[..],
+            _ => &[],
+        };
+        let mut sorted: Vec<u32> = (0..edges.len() as u32).collect();
+        sorted.sort_unstable_by_key(|&ix| place(&edges[ix as usize]));
+        EdgeFinder { edges, sorted }
+    }
+
+    /// How many there are.
+    pub fn len(&self) -> usize {
+        self.edges.len()
+    }
+
+    /// The number of the edge between two vertices.
+    pub fn find(&self, ends: [u32; 2]) -> Option<usize> {
+        let of = |&ix: &u32| place(&self.edges[ix as usize]);
+        let found = self.sorted.binary_search_by_key(&place(&ends), of);
+        found.ok().map(|at| self.sorted[at] as usize)
     }
 }
 

@@ -2,7 +2,7 @@
 
 mod bodies;
 mod body;
-pub(crate) mod edges;
+mod edges;
 pub(crate) mod elements;
 pub(crate) mod error;
 pub(crate) mod ids;

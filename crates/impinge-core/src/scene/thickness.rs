@@ -3,9 +3,7 @@
 use std::borrow::Cow;
 use std::sync::Arc;
 
-use crate::scene::body::Body;
-use crate::scene::edges::EdgeFinder;
-use crate::scene::elements::Part;
+use crate::scene::elements::{EdgeFinder, Part, Parts};
 use crate::scene::error::Error;
 use crate::scene::ids::{BodyId, new_stamp};
 
@@ -49,7 +47,12 @@ impl<'a> Thickness<'a> {
     ///
     /// # Errors
     /// A number that is negative or not finite; more or fewer numbers than elements.
-    pub(super) fn held(self, body: BodyId, of: &Body) -> Result<HeldThickness, Error> {
+    pub(super) fn held(
+        self,
+        body: BodyId,
+        of: &Parts,
+        n_vertices: usize,
+    ) -> Result<HeldThickness, Error> {
         match self.0 {
             Given::One(one) if is_length(one) => Ok(HeldThickness {
                 most: one,
@@ -62,11 +65,11 @@ impl<'a> Thickness<'a> {
             }),
             Given::Each(part, given) => {
                 let n = match part {
-                    Part::Vertices => of.n_vertices(),
+                    Part::Vertices => n_vertices,
                     _ => of.part(part).len(),
                 };
                 check(body, part, &given, n)?;
-                let each = Each::new(part, given.into_owned(), of);
+                let each = Each::new(part, given.into_owned(), of, n_vertices);
                 let all = [&each.vertices, &each.edges, &each.faces];
                 let most = all.into_iter().flat_map(|of| of.iter());
                 Ok(HeldThickness {
@@ -131,11 +134,11 @@ pub(crate) struct Each {
 }
 
 impl Each {
-    fn new(part: Part, given: Vec<f64>, of: &Body) -> Self {
+    fn new(part: Part, given: Vec<f64>, of: &Parts, n_vertices: usize) -> Self {
         let of_vertices = match part {
             Part::Vertices => given.clone(),
             _ => {
-                let mut of_vertices = vec![0.0; of.n_vertices()];
+                let mut of_vertices = vec![0.0; n_vertices];
                 for (ix, &own) in given.iter().enumerate() {
                     for &corner in of.part(part).corners(ix) {
                         raise(&mut of_vertices[corner as usize], own);
@@ -201,9 +204,9 @@ impl Each {
 }
 
 /// From edges to faces or back: of each element, the most of those that have it or that it has.
-fn across(part: Part, given: &[f64], other: Part, of: &Body) -> Vec<f64> {
-    let faces = of.faces();
-    let edges = EdgeFinder::new(of.edges());
+fn across(part: Part, given: &[f64], other: Part, of: &Parts) -> Vec<f64> {
+    let faces = of.part(Part::Faces);
+    let edges = EdgeFinder::new(of.part(Part::Edges));
     let mut most = vec![0.0; of.part(other).len()];
     for face in 0..faces.len() {
         let corners = faces.corners(face);
@@ -227,17 +230,15 @@ fn raise(to: &mut f64, by: f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::body::Filter;
+    use crate::scene::elements::Elements;
 
     /// Two triangles across an edge, and a vertex that no face names.
     #[test]
     fn other_elements_are_as_thick_as_the_thickest_beside_them() {
-        let mesh = (vec![[0, 1, 2], [1, 3, 2]], vec![[0.0f32; 3]; 5]);
-        let id = BodyId::new(0);
-        let body = Body::new(id, mesh.into(), Filter::default()).expect("good");
+        let parts = Parts::new(Elements::from(vec![[0, 1, 2], [1, 3, 2]]));
         // 0-1, 0-2, 1-2, 1-3, 2-3.
         let each = |thickness: Thickness<'_>| {
-            let held = thickness.held(id, &body);
+            let held = thickness.held(BodyId::new(0), &parts, 5);
             let held = held.expect("good");
             let each = held.each.expect("of each element");
             let of = |part| each.of(part).to_vec();

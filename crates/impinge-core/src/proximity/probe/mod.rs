@@ -50,7 +50,7 @@ pub(crate) struct Probes {
     /// By the number of the body and the part of it.
     boxes: HashMap<(usize, Part), Boxes>,
     /// By the number of the body.
-    borders: HashMap<usize, Border>,
+    borders: Vec<Option<Border>>,
 }
 
 /// A body that is probed.
@@ -80,14 +80,14 @@ impl Probes {
         Probes {
             isa,
             boxes: HashMap::new(),
-            borders: HashMap::new(),
+            borders: Vec::new(),
         }
     }
 
     /// Bytes held beside the clusters and their trees.
     pub fn bytes(&self) -> u64 {
         let boxes: usize = self.boxes.values().map(Boxes::bytes).sum();
-        let borders: usize = self.borders.values().map(Border::bytes).sum();
+        let borders: usize = self.borders.iter().flatten().map(Border::bytes).sum();
         (boxes + borders) as u64
     }
 
@@ -121,7 +121,7 @@ impl Probes {
         let target = self.target(scene, id)?;
         match body.kind() {
             BodyKind::Tetrahedra => {
-                let border = &self.borders[&id.index()];
+                let border = self.borders[id.index()].as_ref().expect("known now");
                 self.ask(inside::InTetrahedra { border }, target, points, work)
             }
             _ => self.ask(inside::InSurface, target, points, work),
@@ -350,7 +350,9 @@ impl Probes {
         work: Work<'_>,
     ) -> Result<(), Error> {
         self.boxes.retain(|&(slot, _), _| scene.holds(slot));
-        self.borders.retain(|&slot, _| scene.holds(slot));
+        for (slot, known) in self.borders.iter_mut().enumerate() {
+            known.take_if(|_| !scene.holds(slot));
+        }
         shared.distances.begin(scene);
         for &(id, part) in parts {
             work.step()?;
@@ -367,10 +369,12 @@ impl Probes {
 
     /// Caches which faces of tetrahedra are the border of the body.
     fn know_border(&mut self, id: BodyId, body: &Body, work: Work<'_>) -> Result<(), Error> {
-        let known = self.borders.get(&id.index());
-        if !known.is_some_and(|border| border.fits(body)) {
-            let border = Border::new(body, work)?;
-            self.borders.insert(id.index(), border);
+        if self.borders.len() <= id.index() {
+            self.borders.resize_with(id.index() + 1, || None);
+        }
+        let known = &mut self.borders[id.index()];
+        if !known.as_ref().is_some_and(|border| border.fits(body)) {
+            *known = Some(Border::new(body, work)?);
         }
         Ok(())
     }
