@@ -1,7 +1,7 @@
 // Answers: the lists of the module, with names and shapes. They were copied out of it, so there is nothing to free.
 
 import { KINDS } from "./query.js";
-import { body, word } from "./shared.js";
+import { body, refuse, word } from "./shared.js";
 
 export { KINDS };
 
@@ -46,6 +46,35 @@ class List {
   }
 }
 
+// The entries of a list, by kind, bodies and elements. They come so already, unless a body has the place of a removed one in the module.
+function ordered(list) {
+  const { rows, kinds } = list;
+  const each = Array.from({ length: list.length }, (_, ix) => [ix, kinds?.[ix] ?? 0, ...rows.subarray(4 * ix, 4 * ix + 4)]);
+  return each.sort(inOrder);
+}
+
+function inOrder(a, b) {
+  for (let column = 1; column < a.length; column += 1) if (a[column] !== b[column]) return a[column] - b[column];
+  return 0;
+}
+
+// What both lists have, and what only the newer or the older one has.
+function changesOf(list, old) {
+  if (!(old instanceof list.constructor)) refuse(`old: ${list.constructor.name} are needed, as these are`);
+  const [before, after] = [ordered(old), ordered(list)];
+  const [kept, added, gone] = [[], [], []];
+  for (let was = 0, is = 0; was < before.length || is < after.length; ) {
+    const order = was === before.length ? 1 : is === after.length ? -1 : inOrder(before[was], after[is]);
+    if (order === 0) kept.push([before[was][0], after[is][0]]);
+    else if (order < 0) gone.push(before[was][0]);
+    else added.push(after[is][0]);
+    was += order <= 0;
+    is += order >= 0;
+  }
+  const flat = (numbers) => Uint32Array.from(numbers.sort((a, b) => a - b));
+  return { kept: Uint32Array.from(kept.sort(([a], [b]) => a - b).flat()), new: flat(added), gone: flat(gone) };
+}
+
 export class Pairs extends List {
   // Where the rows of each first body are.
   #runs;
@@ -58,6 +87,10 @@ export class Pairs extends List {
 
   entry(ix) {
     return Array.from(this.rows.subarray(4 * ix, 4 * ix + 4));
+  }
+
+  changes(old) {
+    return changesOf(this, old);
   }
 
   between(a, b) {
@@ -150,6 +183,10 @@ class ImpactList extends OfKinds {
     return new ImpactList(this.rows.subarray(4 * from, 4 * to), this.kinds.subarray(from, to), { toi, atStart });
   }
 
+  changes(old) {
+    return changesOf(this, old);
+  }
+
   entry(ix) {
     return { ...this.pair(ix), toi: this.toi[ix], atStart: this.atStart[ix] === 1 };
   }
@@ -180,6 +217,10 @@ class NearList extends OfKinds {
       distances: this.distances?.subarray(from, to) ?? null,
       points: this.points?.subarray(6 * from, 6 * to) ?? null,
     });
+  }
+
+  changes(old) {
+    return changesOf(this, old);
   }
 
   entry(ix) {

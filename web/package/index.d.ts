@@ -285,6 +285,16 @@ export interface Answer {
   readonly stats: Stats;
 }
 
+/** The pairs of an answer beside those of an older one, as indices that ascend. */
+export interface Changes {
+  /** `[old, new, old, new, …]`: pairs that both have. */
+  readonly kept: Uint32Array;
+  /** Of the newer answer: pairs that the older one does not have. */
+  readonly new: Uint32Array;
+  /** Of the older answer: pairs that the newer one does not have. */
+  readonly gone: Uint32Array;
+}
+
 /** Pairs that intersect, sorted by bodies and elements. */
 export interface Pairs extends Answer, List<[Body, number, Body, number]> {
   /** `[i0, j0, i1, j1, …]`: element i of `a` and element j of `b`. */
@@ -293,6 +303,8 @@ export interface Pairs extends Answer, List<[Body, number, Body, number]> {
   selfOf(body: Body): Uint32Array;
   /** The elements of a body that are in any pair: sorted, each once. */
   colliding(body: Body): Uint32Array;
+  /** Which pairs an older answer also has, which are new, and which are gone. Pairs are the same if their bodies and elements are. */
+  changes(old: Pairs): Changes;
 }
 
 /**
@@ -342,6 +354,8 @@ export interface ImpactList extends OfKinds<Impact> {
   readonly atStart: Uint8Array;
   /** Those of one kind, a part of this list. */
   of(kind: PairKind): ImpactList;
+  /** As that of `Pairs`; also of lists of one kind. */
+  changes(old: ImpactList): Changes;
 }
 
 /** All impacts of a step. */
@@ -392,6 +406,8 @@ export interface NearList extends OfKinds<NearPair> {
   readonly points: Float64Array | null;
   /** Those of one kind, a part of this list. */
   of(kind: PairKind): NearList;
+  /** As that of `Pairs`; also of lists of one kind. */
+  changes(old: NearList): Changes;
 }
 
 /** All pairs of elements within a distance. */

@@ -448,14 +448,54 @@ export async function others(module) {
   left.pinned = [(await count()) === every];
   pile.setPinned(top, [true, true, true]);
   left.pinned.push(await count(), await refusal(() => pile.setPinned(top, [true])));
+  // What has changed since an older answer: by pairs, beside what a set of them says.
+  pile.setPinned(top, [false, false, false]);
+  const nearNow = () => detector.near(pile, 1);
+  const key = ({ kind, bodyA, elementA, bodyB, elementB }) => [kind, bodyA, elementA, bodyB, elementB].join();
+  const keys = (list) => Array.from(list, Array.isArray(list.at(0)) ? String : key);
+  const compared = (is, was) => {
+    const [before, after] = [keys(was), keys(is)];
+    const expected = {
+      kept: before.flatMap((name, ix) => (after.includes(name) ? [ix, after.indexOf(name)] : [])),
+      new: after.flatMap((name, ix) => (before.includes(name) ? [] : [ix])),
+      gone: before.flatMap((name, ix) => (after.includes(name) ? [] : [ix])),
+    };
+    const found = is.changes(was);
+    const sizes = ["kept", "new", "gone"].map((name) => found[name].length > 0);
+    return [Object.keys(expected).every((name) => String([...found[name]]) === String(expected[name])), ...sizes];
+  };
+  const byHeight = (z, body = top) => pile.setPositions(body, new Float32Array(TRIANGLE.map((x, ix) => (ix % 3 === 2 ? (ix > 5 ? z : 0.5) : x))));
+  const [first, apart] = [await nearNow(), pile.positions(top)];
+  byHeight(9);
+  const second = await nearNow();
+  left.changes = [compared(second, first), compared(first, second), compared(first, await nearNow()), compared(second.of("vf"), first.of("vf"))];
+  // A body that has the place of the removed one comes before an older body, and has a number of its own.
+  pile.setPositions(top, apart);
+  pile.remove(base);
+  const third = pile.addTriangles(index, new Float32Array(TRIANGLE.map((x, ix) => (ix % 3 === 2 ? 0.25 : x))));
+  const fourth = pile.addTriangles(index, new Float32Array(TRIANGLE.map((x, ix) => (ix % 3 === 2 ? 0.75 : x))));
+  const fifth = await nearNow();
+  byHeight(9);
+  left.changes.push(compared(await nearNow(), fifth), compared(fifth, first));
+  pile.setPositions(top, new Float32Array([0.2, 0.2, -1, 0.2, 0.2, 1, 0.3, 0.2, 1]));
+  const crossed = await detector.detect(pile);
+  pile.setPositions(top, new Float32Array([0.2, 0.2, -1, 0.2, 0.2, 0.5, 0.3, 0.2, 0.5]));
+  const less = await detector.detect(pile);
+  left.changes.push(compared(less, crossed), await refusal(() => less.changes(fifth)));
+  pile.setEndPositions(top, apart);
+  const moving = await detector.impacts(pile);
+  pile.setEndPositions(top, pile.positions(top));
+  left.changes.push(compared(await detector.impacts(pile), moving));
+  pile.remove(fourth);
+  pile.setPositions(top, apart);
+  const below = third;
   // The caller's numbers of edges: the same edges, the other way round.
   const rowsOf = (numbers) => { const list = []; for (let ix = 0; ix < numbers.length; ix += 4) list.push(numbers.slice(ix, ix + 4)); return list; };
-  pile.setPinned(top, [false, false, false]);
   const edgesBefore = pile.edges(top), nEdges = edgesBefore.length / 2;
-  const touching = async () => rowsOf([...(await detector.near(pile, 1, { kinds: ["ee"], between: [base, top] })).rows]);
+  const touching = async () => rowsOf([...(await detector.near(pile, 1, { kinds: ["ee"], between: [below, top] })).rows]);
   const named = await touching();
   pile.setEdges(top, edgesBefore.slice().reverse());
-  const renamed = (await touching()).map(([a, ea, b, eb]) => [a, ea, b, nEdges - 1 - eb]);
+  const renamed = (await touching()).map(([a, ea, b, eb]) => (a === top ? [a, nEdges - 1 - ea, b, eb] : [a, ea, b, nEdges - 1 - eb]));
   left.edges = [
     String([...pile.edges(top)]) === String([...edgesBefore].reverse()), named.length > 0, String(renamed.map(String).sort()) === String(named.map(String).sort()),
     await refusal(() => pile.setEdges(top, new Uint16Array([0, 1, 1, 2, 0, 1]))),
@@ -585,6 +625,11 @@ export const OTHERS = {
     each: "invalid: each: a function is needed",
     most: "invalid: most: 0 given, 1 to 9007199254740991 allowed",
     pinned: [true, 0, "invalid: body 1: 1 pinned given, but there are 3 vertices"],
+    // Whether they are what sets say, and whether any is kept, new, gone.
+    changes: [
+      [true, true, false, true], [true, true, true, false], [true, true, true, false], [true, true, false, true], [true, true, true, true], [true, false, true, true],
+      [true, true, false, true], "invalid: old: Pairs are needed, as these are", [true, false, false, true],
+    ],
     edges: [
       true, true, true, "invalid: body 1: row 2 of edges has vertices 0 and 1, as row 0 has",
       "invalid: edges: a Uint32Array, a Uint16Array or a Uint8Array is needed", true, true,

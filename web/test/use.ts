@@ -1,7 +1,7 @@
 // Uses all of the package's types; tsc checks it.
 
 import init, { Detector, ImpingeError, KINDS, SHAPES, Scene, weld } from "impinge";
-import type { Advance, Body, ClosestElement, Contacts, Impact, Nearest, NearPairs, Neighbours, PairKind, Pairs, Penetration, Query, RayHit, Region, RestPairs, Stats, Truncation } from "impinge";
+import type { Advance, Body, Changes, ClosestElement, Contacts, Impact, Nearest, NearPairs, Neighbours, PairKind, Pairs, Penetration, Query, RayHit, Region, RestPairs, Stats, Truncation } from "impinge";
 import initGpu, { Detector as GpuDetector, Scene as GpuScene, read, readBodies, readFrames, type FileMesh } from "impinge/webgpu";
 
 await init();
@@ -101,3 +101,6 @@ console.log(few, cells, inside, rest.length, handed, places, closest, hits, boun
 console.log(rows, numbers, first, times, kind, free, known, lengths, nearest, regions, penetration, loops, next, single, told, sizes, bodies, held);
 console.log(answer.hash, any, parts[0]?.name, frames, map, (await gpu.impacts(theirs)).length, gpu.stats?.backend);
 await gpu.dispose();
+const changes: Changes = detector.detect(scene).changes(detector.detect(scene));
+const kept: Uint32Array = detector.near(scene, 1).of("vf").changes(detector.near(scene, 1)).kept;
+void [changes, kept];
