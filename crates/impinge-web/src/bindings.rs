@@ -1,4 +1,4 @@
-//! The functions that JavaScript calls. `web/package` wraps them; their names are private to the
+//! The functions that JavaScript calls. `js` wraps them; their names are private to the
 //! package.
 //!
 //! An error is thrown as a string: its code, a line break, its text.

@@ -1,7 +1,7 @@
 //! impinge in browsers and in Node: the crate that the npm package `impinge` is compiled from.
 //!
 //! [`World`] is a scene whose bodies are numbered, [`Asker`] a detector. Questions and answers are
-//! lists of numbers: `web/package` gives them the names and shapes that users see. All of this is
+//! lists of numbers: `js` gives them the names and shapes that users see. All of this is
 //! plain Rust and tested natively; `bindings` exposes it to JavaScript and exists on wasm alone.
 
 mod answer;

@@ -8,7 +8,7 @@ import pytest
 
 import impinge
 
-FOLDER = pathlib.Path(__file__).parents[2] / "impinge-cli" / "tests" / "doors"
+FOLDER = pathlib.Path(__file__).parents[2] / "crates" / "impinge-cli" / "tests" / "doors"
 ANSWERS = json.loads((FOLDER / "answers.json").read_text())
 
 
