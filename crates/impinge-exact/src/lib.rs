@@ -82,10 +82,10 @@ pub type Point = [f64; 3];
 pub mod internal {
     pub use crate::algebra::{Integer, unit_of};
     pub use crate::distance::{
-        Approach, Keep, NearestOfElements, Reach, approach, are_within_certainly, below_by_bounds,
-        closest_of_elements, compare_point_distances, distance_below, distance_under,
-        elements_are_within, elements_meet, nearest_of_elements, point_distance_bounds,
-        shares_apart, unsure_are_within,
+        Approach, Keep, NearestOfElements, PairAtPart, Reach, approach, are_within_certainly,
+        below_by_bounds, closest_by_part, closest_of_elements, compare_point_distances,
+        distance_below, distance_under, elements_are_within, elements_meet, nearest_of_elements,
+        nearest_part_of_element, paired, point_distance_bounds, shares_apart, unsure_are_within,
     };
     pub use crate::orientation::{Projection, collinear};
     pub use crate::ray::{Meeting, Parameter, Ray, meet, meet_inside};

@@ -24,7 +24,7 @@ use crate::algebra::{Integer, common_integers, unit_of};
 use crate::distance::Feature;
 use crate::filter::number::{Vector, load_points, load_vertex};
 use crate::filter::{LANES, Points8};
-use crate::twice::Twice;
+use crate::twice::{ERROR, MODERATE, Twice, size};
 use crate::{Point, Sign};
 
 /// The points `origin + t direction` for t from 0 to `most`, read as real numbers. A direction of
@@ -255,19 +255,6 @@ impl Inside8 {
         Some((t, barycentrics))
     }
 }
-
-/// The largest coordinate of a vector.
-#[inline(always)]
-fn size<V: Vector>(v: &[Twice<V>; 3]) -> V {
-    let [x, y, z] = v;
-    x.0[0].abs().larger(y.0[0].abs()).larger(z.0[0].abs())
-}
-
-/// Sizes of numbers of which no product and no quotient overflows or loses bits to underflow.
-const MODERATE: core::ops::Range<f64> = 1e-30..1e30;
-/// More than the error of a determinant in twice the precision, relative to the cube of its largest
-/// number.
-const ERROR: f64 = f64::EPSILON * f64::EPSILON * 4096.0;
 
 /// An axis along which a vector is not 0.
 fn axis_of(vector: &WholeVector) -> Option<usize> {

@@ -110,3 +110,16 @@ impl<N: Number> Twice<N> {
         [quotient, rest, doubt]
     }
 }
+
+/// The largest coordinate of a vector.
+#[inline(always)]
+pub(crate) fn size<N: Number>(v: &[Twice<N>; 3]) -> N {
+    let [x, y, z] = v;
+    x.0[0].abs().larger(y.0[0].abs()).larger(z.0[0].abs())
+}
+
+/// Sizes of numbers of which no product and no quotient overflows or loses bits to underflow.
+pub(crate) const MODERATE: core::ops::Range<f64> = 1e-30..1e30;
+/// More than the error of a determinant in twice the precision, relative to the cube of its largest
+/// number.
+pub(crate) const ERROR: f64 = f64::EPSILON * f64::EPSILON * 4096.0;

@@ -141,26 +141,32 @@ pub fn approach(
 ///
 /// As the exact decision goes by signs (`Polygon::nearest`), with none of them zero.
 pub(super) fn nearest_part(pair: ElementPair, points: &[Point; 4]) -> Option<PolygonPart> {
+    PolygonPart::numbered(part_number(pair, points))
+}
+
+/// The number of that part; of no part, if signs cannot decide it.
+pub(super) fn part_number(pair: ElementPair, points: &[Point; 4]) -> u8 {
     let n = pair.corners().len();
     let mut edges = [[0.0; 3]; 4];
     for (ix, edge) in edges.iter_mut().enumerate().take(n) {
         *edge = edge_of(pair, points, ix);
     }
     let bits = Polygon::of_pair(pair, points).nearest_part(&edges);
-    PolygonPart::numbered(
-        bits.iter()
-            .rev()
-            .fold(0, |number, &bit| 2 * number + u8::from(bit)),
-    )
+    bits.iter()
+        .rev()
+        .fold(0, |number, &bit| 2 * number + u8::from(bit))
 }
 
 /// From a corner of the polygon to the next: a difference of two points, rounded once.
 fn edge_of(pair: ElementPair, points: &[Point; 4], ix: usize) -> Point {
+    let [from, to] = edge_ends(pair, ix);
+    difference(&points[to], &points[from])
+}
+
+/// Between which points a corner of the polygon leads to the next.
+#[inline]
+pub(super) fn edge_ends(pair: ElementPair, ix: usize) -> [usize; 2] {
     let numbers = pair.corners();
     let ([i, j], [k, l]) = (numbers[ix], numbers[(ix + 1) % numbers.len()]);
-    if i == k {
-        difference(&points[j], &points[l])
-    } else {
-        difference(&points[k], &points[i])
-    }
+    if i == k { [l, j] } else { [i, k] }
 }

@@ -18,6 +18,7 @@
 //! `docs/exactness.md`, "Distances", has the proofs.
 
 mod apart;
+mod by_part;
 mod elements;
 mod features;
 mod filter;
@@ -34,6 +35,7 @@ use super::Point;
 use super::algebra::fixed::{WholeVector, cross, difference, dot};
 use super::element_pair::ElementPair;
 pub use apart::shares_apart;
+pub use by_part::{PairAtPart, closest_by_part};
 pub use elements::{NearestOfElements, are_within_certainly, elements_are_within};
 pub use elements::{
     below_by_bounds, closest_of_elements, distance_below, distance_under, elements_meet,
@@ -44,7 +46,7 @@ pub use filter::{Approach, approach};
 pub use keep::Keep;
 pub use moving::first_within;
 pub use nearest::nearest_features;
-pub use point::{compare_point_distances, point_distance_bounds};
+pub use point::{compare_point_distances, nearest_part_of_element, paired, point_distance_bounds};
 pub use reach::Reach;
 pub use rounded::{NearestPoints, closest_points};
 

@@ -71,26 +71,40 @@ pub(super) fn closest_of<T: Coordinate>(
     pair: ElementPair,
     points: &[Point; 4],
 ) -> NearestPoints {
+    let shares = match part {
+        PolygonPart::Face => face_shares(polygon),
+        PolygonPart::Edge(ix) => [edge_share(polygon, ix), 0.0],
+        PolygonPart::Corner(_) => [0.0; 2],
+    };
+    NearestPoints {
+        nearest: part.named(pair, polygon.is_flat()),
+        distance: distance_of(polygon, part),
+        points: points_at(pair, part, points, shares),
+    }
+}
+
+/// The points at some shares of the first two edges of the polygon, or of the one edge that is
+/// nearest.
+#[inline]
+pub(super) fn points_at(
+    pair: ElementPair,
+    part: PolygonPart,
+    points: &[Point; 4],
+    [first, second]: [f64; 2],
+) -> [Point; 2] {
     let [p, q, r, s] = points;
-    let points = match (pair, part) {
-        (ElementPair::EdgeEdge, PolygonPart::Face) => {
-            let [share_a, share_b] = face_shares(polygon);
-            [between(p, q, share_a), between(r, s, share_b)]
-        }
-        (ElementPair::EdgeEdge, PolygonPart::Edge(ix)) => {
-            let share = edge_share(polygon, ix);
-            match ix {
-                0 => [between(p, q, share), *r],
-                1 => [*q, between(r, s, share)],
-                2 => [between(q, p, share), *s],
-                _ => [*p, between(s, r, share)],
-            }
-        }
+    match (pair, part) {
+        (ElementPair::EdgeEdge, PolygonPart::Face) => [between(p, q, first), between(r, s, second)],
+        (ElementPair::EdgeEdge, PolygonPart::Edge(ix)) => match ix {
+            0 => [between(p, q, first), *r],
+            1 => [*q, between(r, s, first)],
+            2 => [between(q, p, first), *s],
+            _ => [*p, between(s, r, first)],
+        },
         (ElementPair::EdgeEdge, PolygonPart::Corner(ix)) => {
             [[*p, *q, *q, *p][ix], [*r, *r, *s, *s][ix]]
         }
         (_, PolygonPart::Face) => {
-            let [first, second] = face_shares(polygon);
             let foot: Point =
                 core::array::from_fn(|k| q[k] + (r[k] - q[k]) * first + (s[k] - r[k]) * second);
             if foot.iter().all(|x| x.is_finite()) {
@@ -103,16 +117,10 @@ pub(super) fn closest_of<T: Coordinate>(
             }
         }
         (_, PolygonPart::Edge(ix)) => {
-            let next = points[1 + (ix + 1) % polygon.corners().len()];
-            let share = edge_share(polygon, ix);
-            [*p, between(&points[1 + ix], &next, share)]
+            let next = points[1 + (ix + 1) % pair.corners().len()];
+            [*p, between(&points[1 + ix], &next, first)]
         }
         (_, PolygonPart::Corner(ix)) => [*p, points[1 + ix]],
-    };
-    NearestPoints {
-        nearest: part.named(pair, polygon.is_flat()),
-        distance: distance_of(polygon, part),
-        points,
     }
 }
 

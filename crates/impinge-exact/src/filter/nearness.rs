@@ -560,6 +560,36 @@ pub fn distance_bounds<V: number::Vector>(pair: ElementPair, points: &Points8) -
     bounds
 }
 
+/// Two numbers between which the distance of each of eight pairs certainly is, as
+/// [`distance_bounds`] says, and the numbers of the nearest parts of their difference polygons, as
+/// in [`Near16`]. The pairs are a vertex and a face each, or two edges.
+#[inline(always)]
+#[must_use]
+pub fn bounds_and_parts<V: number::Vector>(
+    pair: ElementPair,
+    points: &Points8,
+) -> (Spans8, [u8; LANES]) {
+    let bounds = distance_bounds::<V>(pair, points);
+    let mut parts = [0; LANES];
+    for first in (0..LANES).step_by(V::N) {
+        let points = load_points::<V>(points, first);
+        let are_edges = are_edges(pair);
+        let polygon = Polygon::new(are_edges, &points);
+        let bits = polygon.nearest_part(&edges_of(are_edges, &points));
+        let bits = [
+            V::bits(bits[0]),
+            V::bits(bits[1]),
+            V::bits(bits[2]),
+            V::bits(bits[3]),
+        ];
+        for (ix, part) in parts[first..first + V::N].iter_mut().enumerate() {
+            let bit = |of: usize| (bits[of] >> ix & 1) << of;
+            *part = bit(0) | bit(1) | bit(2) | bit(3);
+        }
+    }
+    (bounds, parts)
+}
+
 /// Two numbers between which the distances of sixteen faces from a point certainly are, lowest and
 /// highest: 0 and infinity where sizes are out of range. The faces are those of a group, named by
 /// their slots. The point's coordinates are finite.

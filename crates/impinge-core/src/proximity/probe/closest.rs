@@ -2,15 +2,16 @@
 //!
 //! Nodes are opened nearest box first, and skipped if their boxes are farther away than an element
 //! certainly is. Floats that enclose the distances of elements are found: of sixteen faces at a
-//! time in single precision, then in double precision of those that may still be nearest. These are
-//! mostly one element, or the few that share the nearest edge or vertex. Exact comparisons decide
-//! among them. So the answer does not depend on the order of the search.
+//! time in single precision, then, of the candidates of many points, eight at a time in double
+//! precision. What then may be nearest is mostly one element, or the few that share the nearest
+//! edge or vertex. Exact comparisons decide among them. So the answer does not depend on the order
+//! of the search. Distances and points are found last, eight at a time.
 //!
 //! Where several are asked for, that many of the smallest upper bounds are kept, and the largest of
 //! these is the bound. Floats put most of them in order, exact comparisons the rest.
 //!
-//! Points come in an order in which most are near to the one before. So the elements found last are
-//! a first bound for the next point.
+//! Points come in an order in which most are near to the one before. So the elements that seemed
+//! nearest to it are a first bound for the next point.
 //!
 //! Cost: per point some dozens of boxes per level of the tree, eight at a time; 64 boxes in each of
 //! some six clusters, and about fifty faces in half of these.
@@ -34,11 +35,15 @@ use crate::search::sink::grow;
 use crate::search::work::Work;
 use crate::simd::{Isa, Lanes, Simd, up_to, with_isa};
 use impinge_exact::Point;
-use impinge_exact::internal::filter::number::Lookup;
-use impinge_exact::internal::filter::{BATCH, point_bounds_in_tables};
-use impinge_exact::internal::{
-    Reach, closest_of_elements, compare_point_distances, elements_are_within, point_distance_bounds,
+use impinge_exact::internal::filter::number::{Lookup, Vector};
+use impinge_exact::internal::filter::{
+    BATCH, LANES, Points8, bounds_and_parts, point_bounds_in_tables,
 };
+use impinge_exact::internal::{
+    PairAtPart, Reach, closest_by_part, compare_point_distances, elements_are_within,
+    nearest_part_of_element, paired, point_distance_bounds,
+};
+use impinge_exact::{ElementPair, NearestPoints};
 
 /// More than what rounding may do to squares of distances of boxes, which are of a few operations.
 const ROUNDING: f64 = 64.0 * f64::EPSILON;
@@ -81,11 +86,11 @@ fn all_closest<S: Simd, R: Real>(
 ) -> Result<(), Error> {
     let mut search = PointSearch::new(n_nearest, work);
     let mut order: Vec<(f32, usize)> = Vec::new();
-    let (mut likely, mut nearest) = (Vec::new(), Vec::new());
-    for (point, found) in points.iter().zip(found.chunks_exact_mut(n_nearest)) {
+    let mut n_answered = 0;
+    for (ix, point) in points.iter().enumerate() {
         let point = point.map(R::widen);
         search.begin(most);
-        search.expect(bodies, &point, &likely)?;
+        search.expect(bodies, &point)?;
         order.clear();
         let rounded = RoundedPoint::<S::F32>::new(&point);
         let mut squares = [0.0; GROUP];
@@ -101,24 +106,23 @@ fn all_closest<S: Simd, R: Real>(
             }
             search.visit(simd, (body, bodies[body].1), &point, &rounded)?;
         }
-        nearest.clear();
-        match n_nearest {
-            1 => nearest.extend(search.nearest(bodies, &point)?),
-            _ => search.nearest_of_many(bodies, &point, &mut nearest)?,
-        }
-        for (found, one) in found.iter_mut().zip(&nearest) {
-            search.looks.step()?;
-            *found = one.answer(bodies, &point, most);
-            if found.is_none() {
-                break;
-            }
-        }
-        if nearest.len() == n_nearest {
-            std::mem::swap(&mut likely, &mut nearest);
+        search.end(&point)?;
+        let n_waiting = search.candidates.len().max(search.of_points.len());
+        if n_waiting >= MANY || ix + 1 == points.len() {
+            let n = search.of_points.len();
+            let found = &mut found[n_answered * n_nearest..][..n * n_nearest];
+            search.answer::<S::F64>(bodies, most, found)?;
+            n_answered += n;
         }
     }
     Ok(())
 }
+
+/// Candidates of several points, of which the numbers are found at once.
+const MANY: usize = 256;
+
+/// A number that no part has.
+const UNKNOWN: u8 = u8::MAX;
 
 /// An element that may be nearest.
 #[derive(Debug, Clone, Copy)]
@@ -131,9 +135,12 @@ struct PointCandidate {
     body: usize,
     /// The place of the element in the order of the clusters.
     slot: usize,
+    /// The number of its nearest part, if that is known.
+    part: u8,
 }
 
 impl PointCandidate {
+    #[inline(always)]
     fn corners(&self, bodies: &[(BodyId, Target<'_>)]) -> Corners {
         let (_, target) = &bodies[self.body];
         corners(target, self.slot)
@@ -145,29 +152,46 @@ impl PointCandidate {
         (self.body, target.boxes.clustering.order[self.slot])
     }
 
-    /// What is said about it, if it is at most a distance away.
-    fn answer(
-        &self,
-        bodies: &[(BodyId, Target<'_>)],
-        point: &Point,
-        most: f64,
-    ) -> Option<ClosestElement> {
-        let corners = self.corners(bodies);
-        let corners = corners.points();
-        if most < f64::INFINITY && !elements_are_within(&[*point], corners, &Reach::from(most)) {
-            return None;
+    /// Takes another enclosure of the distance, and the nearest part.
+    #[inline(always)]
+    fn narrow(&mut self, [low, high]: [f64; 2], part: u8) {
+        self.low = self.low.max(low);
+        self.high = self.high.min(high);
+        self.part = part;
+    }
+
+    /// Which is nearer to a point; of two at one distance the lower one is.
+    fn compare(&self, other: &Self, bodies: &[(BodyId, Target<'_>)], point: &Point) -> Ordering {
+        if self.high < other.low {
+            return Ordering::Less;
         }
-        let (nearest, distance, points) = closest_of_elements(&[*point], corners);
+        if other.high < self.low {
+            return Ordering::Greater;
+        }
+        let [a, b] = [self, other].map(|one| one.corners(bodies));
+        compare_point_distances(point, (a.points(), self.part), (b.points(), other.part))
+            .then_with(|| self.name(bodies).cmp(&other.name(bodies)))
+    }
+
+    /// Whether it is at most a distance away.
+    fn is_within(&self, most: f64, bodies: &[(BodyId, Target<'_>)], point: &Point) -> bool {
+        self.high <= most
+            || self.low <= most
+                && elements_are_within(&[*point], self.corners(bodies).points(), &Reach::from(most))
+    }
+
+    /// What is said about it.
+    fn answer(&self, bodies: &[(BodyId, Target<'_>)], closest: &NearestPoints) -> ClosestElement {
         let (body, element) = self.name(bodies);
-        Some(ClosestElement {
+        ClosestElement {
             element: Element {
                 body: bodies[body].0,
                 element: element.raw(),
             },
-            feature: nearest.features[1],
-            distance,
-            point: points[1],
-        })
+            feature: closest.nearest.b,
+            distance: closest.distance,
+            point: closest.points[1],
+        }
     }
 }
 
@@ -186,7 +210,14 @@ fn bounds_of(target: &Target<'_>, slot: usize, point: &Point) -> [f64; 2] {
     point_distance_bounds(point, corners(target, slot).points())
 }
 
-/// The search for one point; the memory is kept for the next.
+/// A point that is not answered yet.
+struct WaitingPoint {
+    point: Point,
+    /// Where its candidates end.
+    end: usize,
+}
+
+/// The search for one point after the other; the memory is kept.
 struct PointSearch<'a> {
     looks: Looks<'a>,
     /// How many elements are asked for.
@@ -195,7 +226,18 @@ struct PointSearch<'a> {
     high: f64,
     /// Boxes whose squared distance is larger hold nothing as near.
     limit: f32,
+    /// Of the points that are not answered yet, one after the other.
     candidates: Vec<PointCandidate>,
+    /// The first of this point.
+    first: usize,
+    /// The points that are not answered yet.
+    of_points: Vec<WaitingPoint>,
+    /// As many elements as are asked for that seem nearest to the point before.
+    likely: Vec<PointCandidate>,
+    /// The nearest elements, each with the place of its answer.
+    nearest: Vec<(PointCandidate, usize)>,
+    /// The same, as pairs with their points.
+    pairs: Vec<PairAtPart>,
     /// Where several are asked for: the smallest upper bounds of candidates, at most as many, as
     /// bits, which have the same order.
     highs: BinaryHeap<u64>,
@@ -213,6 +255,11 @@ impl<'a> PointSearch<'a> {
             high: f64::INFINITY,
             limit: f32::INFINITY,
             candidates: Vec::new(),
+            first: 0,
+            of_points: Vec::new(),
+            likely: Vec::new(),
+            nearest: Vec::new(),
+            pairs: Vec::new(),
             highs: BinaryHeap::new(),
             drop_at: FIRST_DROP,
             waiting: Vec::new(),
@@ -220,7 +267,7 @@ impl<'a> PointSearch<'a> {
     }
 
     fn begin(&mut self, most: f64) {
-        self.candidates.clear();
+        self.first = self.candidates.len();
         self.highs.clear();
         self.drop_at = FIRST_DROP;
         (self.high, self.limit) = (f64::INFINITY, f32::INFINITY);
@@ -228,16 +275,11 @@ impl<'a> PointSearch<'a> {
     }
 
     /// Takes the bound that as many elements as are asked for give, if there are as many: those
-    /// found last.
+    /// that seemed nearest to the point before.
     #[inline(always)]
-    fn expect(
-        &mut self,
-        bodies: &[(BodyId, Target<'_>)],
-        point: &Point,
-        likely: &[PointCandidate],
-    ) -> Result<(), Error> {
+    fn expect(&mut self, bodies: &[(BodyId, Target<'_>)], point: &Point) -> Result<(), Error> {
         let mut largest = None;
-        for one in likely {
+        for one in &self.likely {
             self.looks.step()?;
             let [_, high] = point_distance_bounds(point, one.corners(bodies).points());
             if largest.is_none_or(|largest| high > largest) {
@@ -360,6 +402,7 @@ impl<'a> PointSearch<'a> {
             high,
             body,
             slot,
+            part: UNKNOWN,
         };
         if self.n_nearest > 1 {
             self.add_to_many(candidate);
@@ -367,9 +410,22 @@ impl<'a> PointSearch<'a> {
         }
         if high < self.high {
             self.tighten(high);
-            self.candidates.retain(|other| other.low <= high);
+            self.forget_farther_than(high);
         }
         self.candidates.push(candidate);
+    }
+
+    /// Keeps of this point's candidates those that may be so near.
+    #[inline(always)]
+    fn forget_farther_than(&mut self, high: f64) {
+        let mut kept = self.first;
+        for ix in self.first..self.candidates.len() {
+            if self.candidates[ix].low <= high {
+                self.candidates.swap(kept, ix);
+                kept += 1;
+            }
+        }
+        self.candidates.truncate(kept);
     }
 
     /// Adds an element that may be among the nearest, where several are asked for.
@@ -390,99 +446,140 @@ impl<'a> PointSearch<'a> {
         {
             self.tighten(f64::from_bits(largest));
         }
-        if self.candidates.len() >= self.drop_at {
-            let most = self.high;
-            self.candidates.retain(|other| other.low <= most);
-            self.drop_at = FIRST_DROP + 2 * self.candidates.len();
+        if self.candidates.len() - self.first >= self.drop_at {
+            self.forget_farther_than(self.high);
+            self.drop_at = FIRST_DROP + 2 * (self.candidates.len() - self.first);
         }
     }
 
-    /// Encloses the distances of candidates in double precision, and drops those that are certainly
-    /// farther away than as many as are asked for.
+    /// Ends the search for a point.
     ///
     /// # Errors
-    /// Cancellation.
-    fn narrow(&mut self, bodies: &[(BodyId, Target<'_>)], point: &Point) -> Result<(), Error> {
-        let Self {
-            looks,
-            high,
-            candidates,
-            ..
-        } = self;
-        candidates.retain(|one| one.low <= *high);
-        if candidates.len() <= self.n_nearest {
-            return Ok(());
-        }
-        let mut least = f64::INFINITY;
-        for one in candidates.iter_mut() {
-            looks.step()?;
-            let [low, high] = point_distance_bounds(point, one.corners(bodies).points());
-            // Either encloses the distance.
-            one.low = one.low.max(low);
-            one.high = one.high.min(high);
-            least = least.min(one.high);
-        }
-        if self.n_nearest == 1 {
-            candidates.retain(|one| one.low <= least);
-        }
-        Ok(())
-    }
-
-    /// As many of the candidates as are asked for, nearest first; of several at one distance the
-    /// lowest first.
-    ///
-    /// # Errors
-    /// Cancellation.
-    fn nearest_of_many(
-        &mut self,
-        bodies: &[(BodyId, Target<'_>)],
-        point: &Point,
-        nearest: &mut Vec<PointCandidate>,
-    ) -> Result<(), Error> {
-        self.narrow(bodies, point)?;
-        grow(nearest, self.candidates.len(), WHAT)?;
-        nearest.extend_from_slice(&self.candidates);
-        nearest.sort_unstable_by(|x, y| {
-            if x.high < y.low {
-                return Ordering::Less;
-            }
-            if y.high < x.low {
-                return Ordering::Greater;
-            }
-            let [a, b] = [x, y].map(|one| one.corners(bodies));
-            compare_point_distances(point, a.points(), b.points())
-                .then_with(|| x.name(bodies).cmp(&y.name(bodies)))
+    /// Memory.
+    #[inline(always)]
+    fn end(&mut self, point: &Point) -> Result<(), Error> {
+        self.forget_farther_than(self.high);
+        grow(&mut self.of_points, 1, WHAT)?;
+        self.of_points.push(WaitingPoint {
+            point: *point,
+            end: self.candidates.len(),
         });
-        nearest.truncate(self.n_nearest);
+        let candidates = &self.candidates[self.first..];
+        if self.n_nearest == 1 {
+            let likely = candidates.iter().min_by(|x, y| x.high.total_cmp(&y.high));
+            if let Some(&likely) = likely {
+                self.likely.clear();
+                self.likely.push(likely);
+            }
+        } else if candidates.len() >= self.n_nearest {
+            self.likely.clear();
+            grow(&mut self.likely, candidates.len(), WHAT)?;
+            self.likely.extend_from_slice(candidates);
+            self.likely
+                .sort_unstable_by(|x, y| x.high.total_cmp(&y.high));
+            self.likely.truncate(self.n_nearest);
+        }
         Ok(())
     }
 
-    /// The nearest of the candidates, of several the lowest.
+    /// What is said of the points that are not answered yet: as many of their candidates as are
+    /// asked for, nearest first; of several at one distance the lowest first.
     ///
     /// # Errors
-    /// Cancellation.
-    fn nearest(
+    /// Cancellation, memory.
+    #[inline(always)]
+    fn answer<V: Vector>(
         &mut self,
         bodies: &[(BodyId, Target<'_>)],
-        point: &Point,
-    ) -> Result<Option<PointCandidate>, Error> {
-        self.narrow(bodies, point)?;
-        let mut candidates = std::mem::take(&mut self.candidates);
-        candidates.sort_unstable_by_key(|candidate| candidate.name(bodies));
-        let mut best: Option<PointCandidate> = None;
-        for &candidate in &candidates {
-            if let Some(best) = best {
+        most: f64,
+        found: &mut [Option<ClosestElement>],
+    ) -> Result<(), Error> {
+        self.narrow::<V>(bodies)?;
+        self.nearest.clear();
+        grow(&mut self.nearest, self.candidates.len(), WHAT)?;
+        let mut first = 0;
+        for (ix, &WaitingPoint { point, end }) in self.of_points.iter().enumerate() {
+            let candidates = &mut self.candidates[first..end];
+            first = end;
+            if self.n_nearest > 1 {
                 self.looks.step()?;
-                let [other, corners] = [candidate, best].map(|one| one.corners(bodies));
-                let order = compare_point_distances(point, other.points(), corners.points());
-                if order != Ordering::Less {
-                    continue;
+                candidates.sort_unstable_by(|x, y| x.compare(y, bodies, &point));
+            } else if let Some((nearest, others)) = candidates.split_first_mut() {
+                for other in others {
+                    self.looks.step()?;
+                    if other.compare(nearest, bodies, &point).is_lt() {
+                        *nearest = *other;
+                    }
                 }
             }
-            best = Some(candidate);
+            for (nth, one) in candidates.iter().take(self.n_nearest).enumerate() {
+                if !one.is_within(most, bodies, &point) {
+                    break;
+                }
+                self.nearest.push((*one, ix * self.n_nearest + nth));
+            }
         }
-        self.candidates = candidates;
-        Ok(best)
+        self.pairs.clear();
+        grow(&mut self.pairs, self.nearest.len(), WHAT)?;
+        for (one, place) in &self.nearest {
+            let point = &self.of_points[place / self.n_nearest].point;
+            let (pair, points) = paired(point, one.corners(bodies).points());
+            let part = one.part;
+            self.pairs.push(PairAtPart { pair, points, part });
+        }
+        found.fill(None);
+        let nearest = &self.nearest;
+        closest_by_part::<V>(&self.pairs, &mut |ix, closest| {
+            let (one, place) = &nearest[ix];
+            found[*place] = Some(one.answer(bodies, &closest));
+        });
+        self.candidates.clear();
+        self.of_points.clear();
+        Ok(())
+    }
+
+    /// Encloses the distances of candidates in double precision, and finds their nearest parts.
+    ///
+    /// # Errors
+    /// Cancellation.
+    #[inline(always)]
+    fn narrow<V: Vector>(&mut self, bodies: &[(BodyId, Target<'_>)]) -> Result<(), Error> {
+        let mut points = Points8::default();
+        let mut of_lane = [0; LANES];
+        let (mut n, mut waiting) = (0, 0);
+        for ix in 0..=self.candidates.len() {
+            if n == LANES || ix == self.candidates.len() {
+                let (bounds, parts) = bounds_and_parts::<V>(ElementPair::VertexFace, &points);
+                for (lane, &of_lane) in of_lane[..n].iter().enumerate() {
+                    let one = &mut self.candidates[of_lane];
+                    one.narrow([bounds.low[lane], bounds.high[lane]], parts[lane]);
+                }
+                n = 0;
+            }
+            let Some(one) = self.candidates.get_mut(ix) else {
+                break;
+            };
+            self.looks.step()?;
+            while self.of_points[waiting].end <= ix {
+                waiting += 1;
+            }
+            let point = &self.of_points[waiting].point;
+            let corners = one.corners(bodies);
+            let corners = corners.points();
+            if let &[a, b, c] = corners {
+                for (of_corner, at) in points.0.iter_mut().zip([point, &a, &b, &c]) {
+                    for (row, &x) in of_corner.iter_mut().zip(at) {
+                        row[n] = x;
+                    }
+                }
+                of_lane[n] = ix;
+                n += 1;
+            } else {
+                let part = nearest_part_of_element(point, corners);
+                one.narrow(point_distance_bounds(point, corners), part);
+            }
+        }
+        Ok(())
     }
 }
 
