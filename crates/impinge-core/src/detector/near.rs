@@ -2,7 +2,7 @@
 
 use super::Detector;
 use super::in_step::{InStep, Keys, Seen};
-use crate::answers::near::{ClosestPoints, Labels, NearPairs};
+use crate::answers::near::{Labels, NearPairs};
 use crate::answers::pairs::Element;
 use crate::plan::{Plan, TestId};
 use crate::query::Query;
@@ -16,8 +16,8 @@ use crate::search::narrow::{Corners, exact_kind};
 use crate::search::runner::{Job, Outcome, ready};
 use crate::search::stats::Stats;
 use crate::search::work::Work;
+use crate::simd::Isa;
 use crate::workers::clock::Instant;
-use impinge_exact::internal::{NearestOfElements, closest_of_elements, nearest_of_elements};
 
 /// Pairs whose features a task finds.
 const TASK: usize = 1024;
@@ -68,6 +68,7 @@ impl Detector {
         let mut outcome = WithFeatures {
             near: &mut near,
             query,
+            isa: Isa::detect(self.settings.instruction_set),
         };
         let found = self.find_near(scene, distance, query, &mut outcome);
         self.stats.clone_from(near.stats());
@@ -111,6 +112,7 @@ impl Detector {
 struct WithFeatures<'a> {
     near: &'a mut NearPairs,
     query: &'a Query,
+    isa: Isa,
 }
 
 impl Outcome<u64, { PairKind::ALL.len() }> for WithFeatures<'_> {
@@ -127,7 +129,7 @@ impl Outcome<u64, { PairKind::ALL.len() }> for WithFeatures<'_> {
     }
 
     fn fill(&mut self, job: Job<'_>, keys: KeysByKind) -> Result<(), Error> {
-        name_features(self.near, job, keys, self.query)
+        name_features(self.near, job, keys, self.query, self.isa)
     }
 
     fn bytes(&self) -> u64 {
@@ -144,6 +146,7 @@ pub(super) fn name_features(
     job: Job<'_>,
     keys: KeysByKind,
     query: &Query,
+    isa: Isa,
 ) -> Result<(), Error> {
     let features = Instant::now();
     let Job {
@@ -158,11 +161,12 @@ pub(super) fn name_features(
     let n_tasks = unnamed.len() as u64;
     Work { workers, control }.each(&mut unnamed, |_, unnamed| {
         let kind = unnamed.kind;
-        let find = |key| {
+        let parts = kind.parts();
+        let corners = |key| {
             let (a, b) = numbering.pair(key);
-            find_features(scene, kind, [a, b], query.distances)
+            [(a, parts[0]), (b, parts[1])].map(|(one, part)| corners_of(scene, one, part))
         };
-        unnamed.name(labels, exact_kind(TestId::Elements(kind)), find);
+        unnamed.name(labels, exact_kind(TestId::Elements(kind)), isa, corners);
         Ok(())
     })?;
     control.step(n_tasks, n_tasks)?;
@@ -171,24 +175,8 @@ pub(super) fn name_features(
     Ok(())
 }
 
-/// The nearest features of a pair, and on request the nearest points.
-fn find_features(
-    scene: &Scene,
-    kind: PairKind,
-    pair: [Element; 2],
-    closest: bool,
-) -> (NearestOfElements, Option<ClosestPoints>) {
-    let parts = kind.parts();
-    let corners = |Element { body, element }: Element, part: Part| {
-        let body = scene.body_in(body.slot());
-        let element = ElementIx::new(element);
-        Corners::new(body.positions(), body.corners(part, &element))
-    };
-    let (a, b) = (corners(pair[0], parts[0]), corners(pair[1], parts[1]));
-    if closest {
-        let (nearest, distance, points) = closest_of_elements(a.points(), b.points());
-        (nearest, Some(ClosestPoints { distance, points }))
-    } else {
-        (nearest_of_elements(a.points(), b.points()), None)
-    }
+fn corners_of(scene: &Scene, Element { body, element }: Element, part: Part) -> Corners {
+    let body = scene.body_in(body.slot());
+    let element = ElementIx::new(element);
+    Corners::new(body.positions(), body.corners(part, &element))
 }

@@ -329,7 +329,7 @@ impl Outcome<u64, { PairKind::ALL.len() }> for Safe<'_> {
             let own = all.filter(|&(_, &distance)| distance == 0.0);
             touching.extend(own.map(|(&key, _)| labels.put(key, Labels::UNKNOWN)));
         }
-        name_features(&mut self.safe.touching, job, touching, self.query)
+        name_features(&mut self.safe.touching, job, touching, self.query, self.isa)
     }
 
     fn bytes(&self) -> u64 {

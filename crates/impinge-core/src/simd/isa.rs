@@ -4,6 +4,8 @@ use crate::bvh::bounds::Bounds;
 use crate::query::settings::InstructionSet;
 
 use super::{LaneBounds, Simd};
+use impinge_exact::NearestPoints;
+use impinge_exact::internal::{PairAtPart, closest_by_part};
 
 /// The instruction sets that kernels are compiled for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -100,6 +102,19 @@ macro_rules! with_isa {
     }};
 }
 pub(crate) use with_isa;
+
+/// The nearest points of each pair.
+pub fn closest_of_pairs(isa: Isa, pairs: &[PairAtPart], found: &mut [Option<NearestPoints>]) {
+    with_isa!(isa, all_closest, (
+        pairs: &[PairAtPart] = pairs,
+        found: &mut [Option<NearestPoints>] = found,
+    ));
+}
+
+#[inline(always)]
+fn all_closest<S: Simd>(_: S, pairs: &[PairAtPart], found: &mut [Option<NearestPoints>]) {
+    closest_by_part::<S::F64>(pairs, &mut |ix, closest| found[ix] = Some(closest));
+}
 
 /// For each query, which of the lanes of `among` it overlaps: `overlaps_64` for callers that are
 /// not themselves compiled once per instruction set. Answers as many queries as there are masks.

@@ -460,6 +460,6 @@ mod wasm;
 mod x86;
 
 pub(crate) use isa::with_isa;
-pub use isa::{Isa, masks};
+pub use isa::{Isa, closest_of_pairs, masks};
 #[cfg(target_arch = "x86_64")]
 pub(crate) use x86::{Avx2, Avx512};

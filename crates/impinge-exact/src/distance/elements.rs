@@ -32,16 +32,22 @@ pub struct NearestOfElements {
     pub is_parallel: bool,
 }
 
+impl From<NearestFeatures> for NearestOfElements {
+    /// Of the two elements of a pair, in its order.
+    fn from(nearest: NearestFeatures) -> Self {
+        Self {
+            features: [nearest.a, nearest.b],
+            is_parallel: nearest.is_parallel,
+        }
+    }
+}
+
 impl NearestOfElements {
     /// What a filter's number of a part stands for (`crate::filter::Near16`): none if the part is
     /// not known.
     #[inline]
     pub fn of_part(pair: ElementPair, number: u8) -> Option<Self> {
-        let nearest = PolygonPart::numbered(number)?.named(pair, false);
-        Some(Self {
-            features: [nearest.a, nearest.b],
-            is_parallel: nearest.is_parallel,
-        })
+        Some(PolygonPart::numbered(number)?.named(pair, false).into())
     }
 
     /// In one byte:

@@ -128,6 +128,19 @@ impl<T: Number> Polygon<T> {
     /// A point of the polygon that is nearest to the origin, but for rounding.
     #[inline(always)]
     pub(crate) fn nearest(&self, normal: &Vec3<T>) -> Vec3<T> {
+        let (mut best, square) = self.nearest_of_border();
+        if self.n_corners > 2 {
+            let (is_inside, foot) = self.foot(normal);
+            let is_nearer = is_inside & square.gt(dot(&foot, &foot));
+            best = select(is_nearer, &foot, &best);
+        }
+        best
+    }
+
+    /// A point of the edges that is nearest to the origin, but for rounding, and the square of its
+    /// distance.
+    #[inline(always)]
+    fn nearest_of_border(&self) -> (Vec3<T>, T) {
         let (zero, one) = (T::splat(0.0), T::splat(1.0));
         let n = self.n_corners;
         let mut best = self.corners[0];
@@ -146,12 +159,7 @@ impl<T: Number> Polygon<T> {
             best = select(is_nearer, &point, &best);
             square = T::select(is_nearer, of_point, square);
         }
-        if n > 2 {
-            let (is_inside, foot) = self.foot(normal);
-            let is_nearer = is_inside & square.gt(dot(&foot, &foot));
-            best = select(is_nearer, &foot, &best);
-        }
-        best
+        (best, square)
     }
 
     /// The foot of the perpendicular from the origin, as a blend of the corners, and where it lies
@@ -277,6 +285,36 @@ impl<T: Number> Polygon<T> {
         let is_small = T::splat(T::LARGEST).gt(size);
         let low = of_near.larger(of_normal);
         (is_small, [low, most(&near, size)])
+    }
+
+    /// [`bounds`](Self::bounds) of a triangle by about half of the operations: 0 is said of a low
+    /// bound where the origin nearly lies in the face.
+    #[inline(always)]
+    fn bounds_of_triangle(&self) -> (T::Mask, [T; 2]) {
+        let zero = T::splat(0.0);
+        let size = self.size();
+        let (best, square) = self.nearest_of_border();
+        let [a, b, c, _] = &self.corners;
+        let normal = self.normal();
+        let weights = [
+            dot(&normal, &cross(b, c)),
+            dot(&normal, &cross(c, a)),
+            dot(&normal, &cross(a, b)),
+        ];
+        let sum = weights[0] + weights[1] + weights[2];
+        // Otherwise the weights mean nothing; and they must not overflow.
+        let all = dot(&normal, &normal);
+        let is_sum = sum.gt(T::splat(0.5) * all) & (all + all).gt(sum);
+        let is_negative = zero.gt(weights[0]) | zero.gt(weights[1]) | zero.gt(weights[2]);
+        let shares = [weights[0] / sum, weights[1] / sum, weights[2] / sum];
+        let mut foot = *a;
+        for axis in 0..3 {
+            foot[axis] = (a[axis] * shares[0] + b[axis] * shares[1]) + c[axis] * shares[2];
+        }
+        let is_nearer = is_sum & !is_negative & square.gt(dot(&foot, &foot));
+        let near = select(is_nearer, &foot, &best);
+        let low = self.least_beyond(&near, size);
+        (T::splat(T::LARGEST).gt(size), [low, most(&near, size)])
     }
 
     /// About the shortest way from the origin, where the mask is set.
@@ -617,7 +655,7 @@ pub fn point_bounds_in_tables<V: Lookup>(
             look_up(r, slots),
             look_up(s, slots),
         ];
-        let (is_small, [low, high]) = Polygon::new(false, &points).bounds();
+        let (is_small, [low, high]) = Polygon::new(false, &points).bounds_of_triangle();
         V::select(is_small, low, V::splat(0.0)).put(&mut lowest, first);
         V::select(is_small, high, V::splat(f64::INFINITY)).put(&mut highest, first);
     }

@@ -12,9 +12,13 @@ use crate::query::pair_set::PairSet;
 use crate::query::{Exclusion, Query};
 use crate::scene::error::Error;
 use crate::search::found::KeysByKind;
+use crate::search::narrow::Corners;
 use crate::search::sink::reserve;
 use crate::search::stats::Stats;
-use impinge_exact::internal::NearestOfElements;
+use crate::simd::{Isa, closest_of_pairs};
+use impinge_exact::internal::{
+    NearestOfElements, PairAtPart, closest_of_elements, nearest_of_elements,
+};
 use impinge_exact::{ElementPair, Feature};
 
 pub(crate) use labels::Labels;
@@ -371,15 +375,25 @@ fn first<'a, T>(list: &mut &'a mut [T], n: usize) -> &'a mut [T] {
     own
 }
 
+/// Pairs whose nearest points are found at once.
+const BATCH: usize = 64;
+
 impl Unnamed<'_> {
-    /// Names the features of all pairs. Features that keys do not carry come from `find`, with
-    /// nearest points where they were asked for.
+    /// Names the features of all pairs, and finds distances and nearest points where they were
+    /// asked for, of elements whose `corners` come by key.
     pub fn name(
         &mut self,
         labels: Labels,
         pair: Option<ElementPair>,
-        mut find: impl FnMut(u64) -> (NearestOfElements, Option<ClosestPoints>),
+        isa: Isa,
+        corners: impl Fn(u64) -> [Corners; 2],
     ) {
+        if let Some(pair @ (ElementPair::VertexFace | ElementPair::EdgeEdge)) = pair
+            && !self.distances.is_empty()
+        {
+            self.measure(labels, pair, isa, corners);
+            return;
+        }
         let of_parts: [Option<u8>; 1 + Labels::UNKNOWN as usize] = std::array::from_fn(|part| {
             NearestOfElements::of_part(pair?, part as u8).map(NearestOfElements::packed)
         });
@@ -392,16 +406,52 @@ impl Unnamed<'_> {
                 *nearest = known;
                 continue;
             }
-            let (found, closest) = find(own);
-            *nearest = found.packed();
-            let Some(closest) = closest else {
+            let [a, b] = corners(own);
+            if !has_distances {
+                *nearest = nearest_of_elements(a.points(), b.points()).packed();
                 continue;
-            };
-            if let Some(to) = self.distances.get_mut(ix) {
-                *to = closest.distance;
             }
+            let (found, distance, points) = closest_of_elements(a.points(), b.points());
+            *nearest = found.packed();
+            self.distances[ix] = distance;
             if let Some(to) = self.points.get_mut(ix) {
-                *to = closest.points;
+                *to = points;
+            }
+        }
+    }
+
+    /// Does so for vertices and faces, or edges and edges, some pairs at a time.
+    fn measure(
+        &mut self,
+        labels: Labels,
+        pair: ElementPair,
+        isa: Isa,
+        corners: impl Fn(u64) -> [Corners; 2],
+    ) {
+        let (points, part) = ([[0.0; 3]; 4], Labels::UNKNOWN);
+        let mut pairs = [PairAtPart { pair, points, part }; BATCH];
+        let mut found = [None; BATCH];
+        for first in (0..self.keys.len()).step_by(BATCH) {
+            let keys = self.keys[first..].iter_mut().take(BATCH);
+            let n = keys.len();
+            for (key, at) in keys.zip(&mut pairs) {
+                (*key, at.part) = labels.split(*key);
+                let [a, b] = corners(*key);
+                let points = a.points().iter().chain(b.points());
+                for (to, from) in at.points.iter_mut().zip(points) {
+                    *to = *from;
+                }
+            }
+            closest_of_pairs(isa, &pairs[..n], &mut found);
+            for (ix, closest) in (first..self.keys.len()).zip(&found).take(n) {
+                let Some(closest) = closest else {
+                    continue;
+                };
+                self.nearest[ix] = NearestOfElements::from(closest.nearest).packed();
+                self.distances[ix] = closest.distance;
+                if let Some(to) = self.points.get_mut(ix) {
+                    *to = closest.points;
+                }
             }
         }
     }

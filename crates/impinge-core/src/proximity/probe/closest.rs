@@ -31,17 +31,17 @@ use crate::scene::ids::BodyId;
 use crate::scene::index::{ClusterIx, ElementIx};
 use crate::scene::positions::Real;
 use crate::search::narrow::Corners;
-use crate::search::sink::grow;
+use crate::search::sink::{grow, reserve};
 use crate::search::work::Work;
-use crate::simd::{Isa, Lanes, Simd, up_to, with_isa};
+use crate::simd::{Isa, Lanes, Simd, closest_of_pairs, up_to, with_isa};
 use impinge_exact::Point;
 use impinge_exact::internal::filter::number::{Lookup, Vector};
 use impinge_exact::internal::filter::{
     BATCH, LANES, Points8, bounds_and_parts, point_bounds_in_tables,
 };
 use impinge_exact::internal::{
-    PairAtPart, Reach, closest_by_part, compare_point_distances, elements_are_within,
-    nearest_part_of_element, paired, point_distance_bounds,
+    PairAtPart, Reach, compare_point_distances, elements_are_within, nearest_part_of_element,
+    paired, point_distance_bounds,
 };
 use impinge_exact::{ElementPair, NearestPoints};
 
@@ -60,15 +60,15 @@ pub(super) fn closest<R: Real>(
     isa: Isa,
     bodies: &[(BodyId, Target<'_>)],
     points: &[[R; 3]],
-    (most, n_nearest): (f64, usize),
+    asked: (f64, usize),
     found: &mut [Option<ClosestElement>],
     work: Work<'_>,
 ) -> Result<(), Error> {
     with_isa!(isa, all_closest, <R: Real>(
+        isa: Isa = isa,
         bodies: &[(BodyId, Target<'_>)] = bodies,
         points: &[[R; 3]] = points,
-        most: f64 = most,
-        n_nearest: usize = n_nearest,
+        asked: (f64, usize) = asked,
         found: &mut [Option<ClosestElement>] = found,
         work: Work<'_> = work,
     ) -> Result<(), Error>)
@@ -77,14 +77,14 @@ pub(super) fn closest<R: Real>(
 #[inline(always)]
 fn all_closest<S: Simd, R: Real>(
     simd: S,
+    isa: Isa,
     bodies: &[(BodyId, Target<'_>)],
     points: &[[R; 3]],
-    most: f64,
-    n_nearest: usize,
+    (most, n_nearest): (f64, usize),
     found: &mut [Option<ClosestElement>],
     work: Work<'_>,
 ) -> Result<(), Error> {
-    let mut search = PointSearch::new(n_nearest, work);
+    let mut search = PointSearch::new(isa, n_nearest, work);
     let mut order: Vec<(f32, usize)> = Vec::new();
     let mut n_answered = 0;
     for (ix, point) in points.iter().enumerate() {
@@ -220,6 +220,7 @@ struct WaitingPoint {
 /// The search for one point after the other; the memory is kept.
 struct PointSearch<'a> {
     looks: Looks<'a>,
+    isa: Isa,
     /// How many elements are asked for.
     n_nearest: usize,
     /// As many elements as are asked for are certainly not farther away.
@@ -238,6 +239,8 @@ struct PointSearch<'a> {
     nearest: Vec<(PointCandidate, usize)>,
     /// The same, as pairs with their points.
     pairs: Vec<PairAtPart>,
+    /// What is found of these.
+    closest: Vec<Option<NearestPoints>>,
     /// Where several are asked for: the smallest upper bounds of candidates, at most as many, as
     /// bits, which have the same order.
     highs: BinaryHeap<u64>,
@@ -248,9 +251,10 @@ struct PointSearch<'a> {
 }
 
 impl<'a> PointSearch<'a> {
-    fn new(n_nearest: usize, work: Work<'a>) -> Self {
+    fn new(isa: Isa, n_nearest: usize, work: Work<'a>) -> Self {
         PointSearch {
             looks: Looks::new(work),
+            isa,
             n_nearest,
             high: f64::INFINITY,
             limit: f32::INFINITY,
@@ -260,6 +264,7 @@ impl<'a> PointSearch<'a> {
             likely: Vec::new(),
             nearest: Vec::new(),
             pairs: Vec::new(),
+            closest: Vec::new(),
             highs: BinaryHeap::new(),
             drop_at: FIRST_DROP,
             waiting: Vec::new(),
@@ -372,9 +377,16 @@ impl<'a> PointSearch<'a> {
             let Some(batch) = list.first_chunk::<BATCH>() else {
                 break;
             };
-            let [lowest, highest] =
+            let [lowest, mut highest] =
                 point_bounds_in_tables::<S::F32>(&rounded.nearest, faces, batch);
-            for ix in 0..n {
+            for (ix, high) in highest.iter_mut().enumerate() {
+                *high = if ix < n { *high } else { f32::INFINITY };
+            }
+            if self.n_nearest == 1 {
+                self.tighten(f64::from(least(highest)) + error);
+            }
+            let near = not_above::<S::F32>(&lowest, round_up(self.high + error));
+            for ix in Lanes(near & up_to(n - 1)) {
                 let slot = slots.start + usize::from(batch[ix]);
                 let (low, high) = (f64::from(lowest[ix]), f64::from(highest[ix]));
                 let bounds = match high < f64::INFINITY {
@@ -527,12 +539,13 @@ impl<'a> PointSearch<'a> {
             let part = one.part;
             self.pairs.push(PairAtPart { pair, points, part });
         }
+        reserve(&mut self.closest, self.pairs.len(), WHAT)?;
+        self.closest.resize(self.pairs.len(), None);
+        closest_of_pairs(self.isa, &self.pairs, &mut self.closest);
         found.fill(None);
-        let nearest = &self.nearest;
-        closest_by_part::<V>(&self.pairs, &mut |ix, closest| {
-            let (one, place) = &nearest[ix];
-            found[*place] = Some(one.answer(bodies, &closest));
-        });
+        for ((one, place), closest) in self.nearest.iter().zip(&self.closest) {
+            found[*place] = closest.as_ref().map(|closest| one.answer(bodies, closest));
+        }
         self.candidates.clear();
         self.of_points.clear();
         Ok(())
@@ -638,14 +651,27 @@ impl<V: Lookup> RoundedPoint<V> {
     }
 }
 
-/// Bit k: number k is not above a limit.
+/// Bit k: number k of whole registers is not above a limit.
 #[inline(always)]
-fn not_above<V: Lookup>(numbers: &[f32; GROUP], limit: f32) -> u64 {
+fn not_above<V: Lookup>(numbers: &[f32], limit: f32) -> u64 {
     let limit = V::splat(f64::from(limit));
     let mut mask = 0;
-    for first in (0..GROUP).step_by(V::N) {
+    for first in (0..numbers.len()).step_by(V::N) {
         let is_above = V::row(numbers, first).gt(limit);
         mask |= u64::from(V::bits(!is_above)) << first;
     }
     mask
+}
+
+/// The least of some numbers.
+#[inline(always)]
+fn least(mut numbers: [f32; BATCH]) -> f32 {
+    let mut n = BATCH;
+    while n > 1 {
+        n /= 2;
+        for ix in 0..n {
+            numbers[ix] = numbers[ix].min(numbers[ix + n]);
+        }
+    }
+    numbers[0]
 }
