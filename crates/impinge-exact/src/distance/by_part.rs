@@ -421,9 +421,9 @@ mod tests {
             }
             if round % 11 == 0 {
                 // Nearly along a line.
-                for axis in 0..3 {
-                    let middle = 0.5 * (points[1][axis] + points[2][axis]);
-                    points[3][axis] = middle + 1e-3 * points[3][axis];
+                let [_, p, q, r] = &mut points;
+                for ((p, q), r) in p.iter().zip(q.iter()).zip(r) {
+                    *r = 0.5 * (p + q) + 1e-3 * *r;
                 }
             }
             let pair = [
@@ -503,8 +503,8 @@ mod tests {
             let mut points = Points8::default();
             for (lane, of_lane) in all.iter().enumerate() {
                 for (ix, point) in of_lane.iter().enumerate() {
-                    for axis in 0..3 {
-                        points.0[ix][axis][lane] = point[axis];
+                    for (row, x) in points.0[ix].iter_mut().zip(point) {
+                        row[lane] = *x;
                     }
                 }
             }
