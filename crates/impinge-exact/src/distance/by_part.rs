@@ -123,7 +123,8 @@ struct Found8 {
 }
 
 impl Found8 {
-    #[inline(always)]
+    #[cfg_attr(target_family = "wasm", inline(never))]
+    #[cfg_attr(not(target_family = "wasm"), inline(always))]
     fn new<V: Vector>(parts: &Parts8, n_edges: usize, n: usize) -> Self {
         let mut found = Self::default();
         let mut first = 0;
@@ -204,7 +205,8 @@ fn of_edge<V: Vector>(corner: &[Twice<V>; 3], edge: &[Twice<V>; 3]) -> Certain<V
     (is_certain, distance, [over / under, zero])
 }
 
-#[inline(always)]
+#[cfg_attr(target_family = "wasm", inline(never))]
+#[cfg_attr(not(target_family = "wasm"), inline(always))]
 fn of_face<V: Vector>(corner: &[Twice<V>; 3], e: &[Twice<V>; 3], f: &[Twice<V>; 3]) -> Certain<V> {
     let zero = V::splat(0.0);
     let (of_c, of_e, of_f) = (size(corner), size(e), size(f));

@@ -139,7 +139,8 @@ impl<T: Number> Polygon<T> {
 
     /// A point of the edges that is nearest to the origin, but for rounding, and the square of its
     /// distance.
-    #[inline(always)]
+    #[cfg_attr(target_family = "wasm", inline(never))]
+    #[cfg_attr(not(target_family = "wasm"), inline(always))]
     fn nearest_of_border(&self) -> (Vec3<T>, T) {
         let (zero, one) = (T::splat(0.0), T::splat(1.0));
         let n = self.n_corners;
@@ -584,7 +585,8 @@ pub fn bounded_in_tables<V: Lookup, R: Reaches16>(
 
 /// Two numbers between which the distance of each of eight pairs certainly is: 0 and infinity where
 /// sizes are out of range. The same bits as those of one pair after the other.
-#[inline(always)]
+#[cfg_attr(target_family = "wasm", inline(never))]
+#[cfg_attr(not(target_family = "wasm"), inline(always))]
 #[must_use]
 pub fn distance_bounds<V: number::Vector>(pair: ElementPair, points: &Points8) -> Spans8 {
     let mut bounds = Spans8::default();
@@ -601,7 +603,8 @@ pub fn distance_bounds<V: number::Vector>(pair: ElementPair, points: &Points8) -
 /// Two numbers between which the distance of each of eight pairs certainly is, as
 /// [`distance_bounds`] says, and the numbers of the nearest parts of their difference polygons, as
 /// in [`Near16`]. The pairs are a vertex and a face each, or two edges.
-#[inline(always)]
+#[cfg_attr(target_family = "wasm", inline(never))]
+#[cfg_attr(not(target_family = "wasm"), inline(always))]
 #[must_use]
 pub fn bounds_and_parts<V: number::Vector>(
     pair: ElementPair,
