@@ -19,11 +19,14 @@ install() {
   as_root apt-get install -y -qq --no-install-recommends "$@" >/dev/null
 }
 
-# cross_std TARGET...
-# Installs what scripts/cross-cargo needs for these targets, unless rustup has installed the standard library of each.
+# cross_std [TARGET...]
+# Installs what scripts/cross-cargo needs to build a standard library, unless rustup has installed that of each target.
 cross_std() {
-  local libraries present="true" target
-  libraries=$(rustc --print sysroot)/lib/rustlib
-  for target; do present+=" && ls -d $libraries/$target/lib"; done
-  install "($present) || ls -d /usr/lib/rustlib/src/rust/library/std /usr/bin/cargo" rustc-web cargo-web rust-web-src
+  local sysroot present=${1:+true} target
+  sysroot=$(rustc --print sysroot)
+  for target; do present+=" && ls -d $sysroot/lib/rustlib/$target/lib"; done
+  # An old compiler does not know how to panic without a message, as scripts/web asks it to.
+  install "(${present:-false}) || ls -d $sysroot/lib/rustlib/src/rust/library/std ||
+    (ls -d /usr/lib/rustlib/src/rust/library/std /usr/bin/cargo &&
+      RUSTC_BOOTSTRAP=1 /usr/bin/rustc -Zunstable-options -Cpanic=immediate-abort --print=sysroot)" rustc-web cargo-web rust-web-src
 }

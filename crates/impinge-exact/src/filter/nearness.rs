@@ -602,7 +602,7 @@ pub fn distance_bounds<V: number::Vector>(pair: ElementPair, points: &Points8) -
 
 /// Two numbers between which the distance of each of eight pairs certainly is, as
 /// [`distance_bounds`] says, and the numbers of the nearest parts of their difference polygons, as
-/// in [`Near16`]. The pairs are a vertex and a face each, or two edges.
+/// in `Near16`. The pairs are a vertex and a face each, or two edges.
 #[cfg_attr(target_family = "wasm", inline(never))]
 #[cfg_attr(not(target_family = "wasm"), inline(always))]
 #[must_use]
