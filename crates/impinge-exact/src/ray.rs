@@ -23,7 +23,7 @@ use crate::algebra::fixed::{WholeVector, cross, difference, dot};
 use crate::algebra::{Integer, common_integers, unit_of};
 use crate::distance::Feature;
 use crate::filter::number::{Vector, load_points, load_vertex};
-use crate::filter::{LANES, Points8};
+use crate::filter::{LANES, Points8, Vertex8, put_point};
 use crate::twice::{ERROR, MODERATE, Twice, size};
 use crate::{Point, Sign};
 
@@ -148,15 +148,13 @@ pub fn meet_inside<V: Vector>(
     rays_and_faces: &[(Ray, [Point; 3])],
 ) -> [Option<(f64, [f64; 3])>; LANES] {
     let mut points = Points8::default();
-    let mut directions = [[0.0; LANES]; 3];
+    let mut directions = Vertex8::default();
     for (lane, (ray, corners)) in rays_and_faces.iter().enumerate().take(LANES) {
-        for axis in 0..3 {
-            points.0[0][axis][lane] = ray.origin[axis];
-            points.0[1][axis][lane] = corners[0][axis];
-            points.0[2][axis][lane] = corners[1][axis];
-            points.0[3][axis][lane] = corners[2][axis];
-            directions[axis][lane] = ray.direction[axis];
+        let [a, b, c] = corners;
+        for (row, point) in points.0.iter_mut().zip([&ray.origin, a, b, c]) {
+            put_point(row, lane, point);
         }
+        put_point(&mut directions, lane, &ray.direction);
     }
     let mut inside = Inside8::default();
     let mut first = 0;
@@ -181,7 +179,7 @@ struct Inside8 {
 
 impl Inside8 {
     #[inline(always)]
-    fn find<V: Vector>(&mut self, points: &Points8, directions: &[[f64; LANES]; 3], first: usize) {
+    fn find<V: Vector>(&mut self, points: &Points8, directions: &Vertex8, first: usize) {
         let [origin, a, b, c] = load_points::<V>(points, first);
         let d = load_vertex::<V>(directions, first);
         let [zero, one] = [V::splat(0.0), V::splat(1.0)];
@@ -497,19 +495,10 @@ fn feature_of(weights: &[Integer; 3]) -> Feature {
 mod tests {
     use super::*;
     use crate::filter::number;
+    use crate::tests::Numbers;
     use crate::triangle::segment_meets_triangle;
 
-    /// A generator of small numbers.
-    struct Numbers(u64);
-
     impl Numbers {
-        fn below(&mut self, n: u64) -> u64 {
-            self.0 ^= self.0 << 13;
-            self.0 ^= self.0 >> 7;
-            self.0 ^= self.0 << 17;
-            (self.0 >> 11) % n
-        }
-
         fn point(&mut self, low: i32, n: u64) -> Point {
             [(); 3].map(|()| f64::from(low) + self.below(n) as f64)
         }

@@ -10,6 +10,18 @@ use super::tetrahedron::tetrahedra_intersect_by_signs;
 use super::triangle::triangles_intersect_by_signs;
 use super::{tetrahedra_intersect_beyond_shared, triangles_intersect_beyond_shared};
 
+/// A generator of small numbers.
+pub(crate) struct Numbers(pub u64);
+
+impl Numbers {
+    pub fn below(&mut self, n: u64) -> u64 {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        (self.0 >> 11) % n
+    }
+}
+
 impl TrianglePairs8 {
     /// Puts a pair into a lane.
     fn set(&mut self, lane: usize, a: &[Point; 3], b: &[Point; 3]) {

@@ -5,6 +5,7 @@ use crate::answers::near::{NearIter, NearPair, NearPairs};
 use crate::answers::pairs::Element;
 use crate::answers::stencil::{Gradient, Hessian, Mollifier, NearestWay};
 use crate::query::pair_kind::PairKind;
+use crate::scene::by_body::ByBody;
 use crate::scene::elements::Part;
 use crate::scene::error::Error;
 use crate::scene::index::ElementIx;
@@ -492,9 +493,9 @@ impl<'a> IntoIterator for &'a Stencils {
     }
 }
 
-/// Areas of bodies by their indices, found when first needed.
+/// Areas of bodies, found when first needed.
 #[derive(Default)]
-struct AreasOfBodies(Vec<Option<Areas>>);
+struct AreasOfBodies(ByBody<Areas>);
 
 impl AreasOfBodies {
     /// The weight of a pair. A vertex comes before an edge or a face.
@@ -516,10 +517,7 @@ impl AreasOfBodies {
         let mut sum = 0.0;
         for &(element, part) in weighing {
             let ix = element.body.index();
-            if self.0.len() <= ix {
-                self.0.resize_with(ix + 1, || None);
-            }
-            let areas = match &mut self.0[ix] {
+            let areas = match self.0.entry(element.body) {
                 Some(areas) => areas,
                 none => none.insert(Areas::new(
                     scene.body(element.body)?,

@@ -19,6 +19,7 @@ use super::inside::{Asked, ConnectedParts};
 use super::regions::{NO_REGION, Region, WHAT, join_contacts, regions};
 use super::topology::EdgesAround;
 use super::{Contacts, Feature, PointName, Shape};
+use crate::scene::by_body::ByBody;
 use crate::scene::elements::{BodyKind, Elements};
 use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
@@ -34,7 +35,7 @@ use impinge_exact::{Point, Sign, orient3d};
 #[derive(Debug, Default)]
 pub(crate) struct Topologies {
     /// By the number of the body; the first of the pair is the stamp of the topology.
-    edges: Vec<Option<(u64, EdgesAround)>>,
+    edges: ByBody<(u64, EdgesAround)>,
 }
 
 /// How deep two closed bodies are in each other:
@@ -80,14 +81,12 @@ impl Topologies {
         if a == b {
             return Err(Error::SameBody { body: a });
         }
-        for (slot, known) in self.edges.iter_mut().enumerate() {
-            known.take_if(|_| !scene.holds(slot));
-        }
+        self.edges.forget_removed(scene);
         let ids = [a.min(b), a.max(b)];
         for id in ids {
             self.know(scene, id, work)?;
         }
-        let known = |id: BodyId| self.edges[id.index()].as_ref().expect("known now");
+        let known = |id: BodyId| self.edges.get(id).expect("known now");
         let bodies = [scene.body(ids[0])?, scene.body(ids[1])?];
         let topologies = ids.map(|id| &known(id).1);
         let numbers = ids.map(|id| id.index() as u32);
@@ -127,7 +126,7 @@ impl Topologies {
 
     /// Bytes held.
     pub fn bytes(&self) -> u64 {
-        let edges = self.edges.iter().flatten().map(|(_, edges)| edges.bytes());
+        let edges = self.edges.values().map(|(_, edges)| edges.bytes());
         edges.sum::<usize>() as u64
     }
 
@@ -138,9 +137,8 @@ impl Topologies {
     pub fn know(&mut self, scene: &Scene, id: BodyId, work: Work<'_>) -> Result<(), Error> {
         let body = scene.body(id)?;
         let stamp = body.topology_stamp();
-        if let Some(Some((known, _))) = self.edges.get(id.index())
-            && *known == stamp
-        {
+        let known = self.edges.get(id);
+        if known.is_some_and(|(known, _)| *known == stamp) {
             return Ok(());
         }
         let Elements::Triangles(faces) = body.elements() else {
@@ -151,10 +149,7 @@ impl Topologies {
             });
         };
         let edges = EdgesAround::new(id, faces, body.n_vertices(), work)?;
-        if self.edges.len() <= id.index() {
-            self.edges.resize_with(id.index() + 1, || None);
-        }
-        self.edges[id.index()] = Some((stamp, edges));
+        *self.edges.entry(id) = Some((stamp, edges));
         Ok(())
     }
 }

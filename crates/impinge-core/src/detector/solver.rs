@@ -33,7 +33,7 @@ use crate::search::work::Work;
 use crate::simd::{Isa, Simd, with_isa};
 use crate::workers::clock::Instant;
 use impinge_exact::ElementPair;
-use impinge_exact::internal::filter::{LANES, Points8, Spans8, distance_bounds};
+use impinge_exact::internal::filter::{LANES, Points8, Spans8, distance_bounds, put_point};
 use impinge_exact::internal::{below_by_bounds, distance_below};
 
 /// Pairs that a task measures.
@@ -269,9 +269,7 @@ fn put_points(
         let positions = body.positions();
         let corners = body.corners(plan.part(*part).part, element);
         for (&corner, row) in corners.iter().zip(&mut rows) {
-            for (to, x) in row.iter_mut().zip(positions.point(corner as usize)) {
-                to[lane] = x;
-            }
+            put_point(row, lane, &positions.point(corner as usize));
         }
     }
 }

@@ -69,21 +69,19 @@ fn old_numbers(body: BodyId, old: &Elements, new: &Elements) -> Result<Vec<usize
     let mut numbers = Vec::with_capacity(given);
     for row in 0..given {
         let vertices = [0, 1].map(|end| new.corners(row)[end]);
-        let number = old.find(vertices);
-        let why = match number.and_then(|number| row_of[number].replace(row)) {
-            None if number.is_none() => "between which there is no edge".to_owned(),
-            None => {
-                numbers.extend(number);
-                continue;
-            }
-            Some(first) => format!("as row {first} has"),
-        };
-        return Err(Error::Edge {
+        let wrong = |why: String| Error::Edge {
             body,
             row,
             vertices,
             why,
-        });
+        };
+        let Some(number) = old.find(vertices) else {
+            return Err(wrong("between which there is no edge".to_owned()));
+        };
+        if let Some(first) = row_of[number].replace(row) {
+            return Err(wrong(format!("as row {first} has")));
+        }
+        numbers.push(number);
     }
     match given == n {
         true => Ok(numbers),

@@ -2,6 +2,7 @@
 
 mod bodies;
 mod body;
+pub(crate) mod by_body;
 mod edges;
 pub(crate) mod elements;
 pub(crate) mod error;

@@ -25,8 +25,8 @@ use super::filter::edge_ends;
 use super::rounded::{NearestPoints, closest_points, points_at};
 use crate::Point;
 use crate::element_pair::ElementPair;
-use crate::filter::LANES;
 use crate::filter::number::{Number, Vector, load_vertex};
+use crate::filter::{LANES, Vertex8, put_point};
 use crate::twice::{ERROR, MODERATE, Twice, size, two_product, two_sum};
 
 /// A pair of elements, and the part of their difference polygon that is nearest.
@@ -82,9 +82,6 @@ pub fn closest_by_part<V: Vector>(
     }
 }
 
-/// Points, one per lane: `[axis][lane]`.
-type Vertex8 = [[f64; LANES]; 3];
-
 /// A corner of a polygon and up to two edges from there on per lane, each a difference of two
 /// points: of the first from the second.
 #[derive(Default)]
@@ -108,9 +105,7 @@ impl Parts8 {
 #[inline(always)]
 fn set_ends(ends: &mut [Vertex8; 2], lane: usize, points: &[Point; 4], numbers: [usize; 2]) {
     for (end, number) in ends.iter_mut().zip(numbers) {
-        for (row, x) in end.iter_mut().zip(points[number]) {
-            row[lane] = x;
-        }
+        put_point(end, lane, &points[number]);
     }
 }
 
@@ -325,18 +320,7 @@ mod tests {
     use crate::distance::filter::part_number;
     use crate::filter::number;
     use crate::filter::{Points8, bounds_and_parts};
-
-    /// A generator of small numbers.
-    struct Numbers(u64);
-
-    impl Numbers {
-        fn below(&mut self, n: u64) -> u64 {
-            self.0 ^= self.0 << 13;
-            self.0 ^= self.0 >> 7;
-            self.0 ^= self.0 << 17;
-            (self.0 >> 11) % n
-        }
-    }
+    use crate::tests::Numbers;
 
     type Bits = (crate::NearestFeatures, u64, [[u64; 3]; 2]);
 
@@ -505,9 +489,7 @@ mod tests {
             let mut points = Points8::default();
             for (lane, of_lane) in all.iter().enumerate() {
                 for (ix, point) in of_lane.iter().enumerate() {
-                    for (row, x) in points.0[ix].iter_mut().zip(point) {
-                        row[lane] = *x;
-                    }
+                    put_point(&mut points.0[ix], lane, point);
                 }
             }
             let (bounds, parts) = bounds_and_parts::<number::Portable>(pair, &points);

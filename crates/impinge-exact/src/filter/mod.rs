@@ -109,7 +109,18 @@ pub struct TetrahedronPairs8 {
 /// [`ElementPair`](crate::ElementPair).
 #[derive(Clone, Debug, Default, PartialEq)]
 #[repr(align(64))]
-pub struct Points8(pub [[[f64; LANES]; 3]; 4]);
+pub struct Points8(pub [Vertex8; 4]);
+
+/// One point per lane: `[axis][lane]`.
+pub type Vertex8 = [[f64; LANES]; 3];
+
+/// Writes a point into a lane.
+#[inline(always)]
+pub fn put_point(row: &mut Vertex8, lane: usize, point: &Point) {
+    for (of_axis, &x) in row.iter_mut().zip(point) {
+        of_axis[lane] = x;
+    }
+}
 
 /// A filter's answers: bit k stands for lane k. A lane with neither bit is unsure; no lane has
 /// both.

@@ -6,7 +6,7 @@
 
 use core::ops::{Add, BitAnd, BitOr, BitXor, Div, Mul, Not, Sub};
 
-use super::{BATCH, LANES, Points8, TABLE};
+use super::{BATCH, LANES, Points8, TABLE, Vertex8};
 use crate::rounding::root;
 
 /// One number or several, side by side.
@@ -99,7 +99,7 @@ pub trait Lookup: Number {
 
 /// Points from memory, from lane `first` on.
 #[inline(always)]
-pub(crate) fn load_vertex<V: Vector>([x, y, z]: &[[f64; LANES]; 3], first: usize) -> [V; 3] {
+pub(crate) fn load_vertex<V: Vector>([x, y, z]: &Vertex8, first: usize) -> [V; 3] {
     [V::load(x, first), V::load(y, first), V::load(z, first)]
 }
 

@@ -398,25 +398,30 @@ impl Unnamed<'_> {
             NearestOfElements::of_part(pair?, part as u8).map(NearestOfElements::packed)
         });
         let has_distances = !self.distances.is_empty();
-        for (ix, (key, nearest)) in self.keys.iter_mut().zip(&mut *self.nearest).enumerate() {
-            let (own, part) = labels.split(*key);
-            *key = own;
+        for ix in 0..self.keys.len() {
+            let (own, part) = labels.split(self.keys[ix]);
+            self.keys[ix] = own;
             let known = of_parts[usize::from(part) % of_parts.len()];
             if let (Some(known), false) = (known, has_distances) {
-                *nearest = known;
+                self.nearest[ix] = known;
                 continue;
             }
             let [a, b] = corners(own);
             if !has_distances {
-                *nearest = nearest_of_elements(a.points(), b.points()).packed();
+                self.nearest[ix] = nearest_of_elements(a.points(), b.points()).packed();
                 continue;
             }
             let (found, distance, points) = closest_of_elements(a.points(), b.points());
-            *nearest = found.packed();
-            self.distances[ix] = distance;
-            if let Some(to) = self.points.get_mut(ix) {
-                *to = points;
-            }
+            self.nearest[ix] = found.packed();
+            self.put(ix, distance, points);
+        }
+    }
+
+    /// Takes the distance of a pair, and its nearest points if they were asked for.
+    fn put(&mut self, ix: usize, distance: f64, points: [[f64; 3]; 2]) {
+        self.distances[ix] = distance;
+        if let Some(to) = self.points.get_mut(ix) {
+            *to = points;
         }
     }
 
@@ -448,10 +453,7 @@ impl Unnamed<'_> {
                     continue;
                 };
                 self.nearest[ix] = NearestOfElements::from(closest.nearest).packed();
-                self.distances[ix] = closest.distance;
-                if let Some(to) = self.points.get_mut(ix) {
-                    *to = closest.points;
-                }
+                self.put(ix, closest.distance, closest.points);
             }
         }
     }

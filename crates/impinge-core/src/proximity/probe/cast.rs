@@ -14,7 +14,7 @@
 use std::cmp::Ordering;
 
 use super::boxes::{GROWN, Rows, Waiting, wait_in_order};
-use super::{HITS, Looks, Target};
+use super::{HITS, Looks, Target, keep_from};
 use crate::answers::hits::RayHit;
 use crate::answers::pairs::Element;
 use crate::bvh::GROUP;
@@ -374,7 +374,8 @@ impl RaySearch<'_> {
             };
             if self.hits != Hit::All && high < self.limit {
                 self.limit = high;
-                self.forget_later_than(high);
+                // What may be met so early.
+                keep_from(&mut self.found, self.first, |one| one.low <= high);
             }
             grow(&mut self.found, 1, HITS)?;
             self.found.push(RayCandidate {
@@ -385,19 +386,6 @@ impl RaySearch<'_> {
             });
         }
         Ok(())
-    }
-
-    /// Keeps of this ray's candidates those that may be met so early.
-    #[inline(always)]
-    fn forget_later_than(&mut self, high: f64) {
-        let mut kept = self.first;
-        for ix in self.first..self.found.len() {
-            if self.found[ix].low <= high {
-                self.found.swap(kept, ix);
-                kept += 1;
-            }
-        }
-        self.found.truncate(kept);
     }
 
     /// Ends the search of a ray.

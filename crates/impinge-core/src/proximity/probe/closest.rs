@@ -20,7 +20,7 @@ use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
 use super::boxes::{GROWN, Rows, Waiting, rounding_of, wait_in_order};
-use super::{Looks, Target, WHAT};
+use super::{Looks, Target, WHAT, keep_from};
 use crate::answers::closest::ClosestElement;
 use crate::answers::pairs::Element;
 use crate::bvh::GROUP;
@@ -37,7 +37,7 @@ use crate::simd::{Isa, Lanes, Simd, closest_of_pairs, up_to, with_isa};
 use impinge_exact::Point;
 use impinge_exact::internal::filter::number::{Lookup, Vector};
 use impinge_exact::internal::filter::{
-    BATCH, LANES, Points8, bounds_and_parts, point_bounds_in_tables,
+    BATCH, LANES, Points8, bounds_and_parts, point_bounds_in_tables, put_point,
 };
 use impinge_exact::internal::{
     PairAtPart, Reach, compare_point_distances, elements_are_within, nearest_part_of_element,
@@ -430,14 +430,7 @@ impl<'a> PointSearch<'a> {
     /// Keeps of this point's candidates those that may be so near.
     #[inline(always)]
     fn forget_farther_than(&mut self, high: f64) {
-        let mut kept = self.first;
-        for ix in self.first..self.candidates.len() {
-            if self.candidates[ix].low <= high {
-                self.candidates.swap(kept, ix);
-                kept += 1;
-            }
-        }
-        self.candidates.truncate(kept);
+        keep_from(&mut self.candidates, self.first, |one| one.low <= high);
     }
 
     /// Adds an element that may be among the nearest, where several are asked for.
@@ -580,10 +573,8 @@ impl<'a> PointSearch<'a> {
             let corners = one.corners(bodies);
             let corners = corners.points();
             if let &[a, b, c] = corners {
-                for (of_corner, at) in points.0.iter_mut().zip([point, &a, &b, &c]) {
-                    for (row, &x) in of_corner.iter_mut().zip(at) {
-                        row[n] = x;
-                    }
+                for (row, at) in points.0.iter_mut().zip([point, &a, &b, &c]) {
+                    put_point(row, n, at);
                 }
                 of_lane[n] = ix;
                 n += 1;

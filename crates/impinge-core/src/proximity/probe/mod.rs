@@ -30,6 +30,7 @@ use crate::answers::hits::{Hits, RayHit};
 use crate::contact::Topologies;
 use crate::proximity::Distances;
 use crate::query::{Query, Scope, SharedVertex};
+use crate::scene::by_body::ByBody;
 use crate::scene::elements::{BodyKind, Part};
 use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
@@ -50,7 +51,7 @@ pub(crate) struct Probes {
     /// By the number of the body and the part of it.
     boxes: HashMap<(usize, Part), Boxes>,
     /// By the number of the body.
-    borders: Vec<Option<Border>>,
+    borders: ByBody<Border>,
 }
 
 /// A body that is probed.
@@ -80,14 +81,14 @@ impl Probes {
         Probes {
             isa,
             boxes: HashMap::new(),
-            borders: Vec::new(),
+            borders: ByBody::default(),
         }
     }
 
     /// Bytes held beside the clusters and their trees.
     pub fn bytes(&self) -> u64 {
         let boxes: usize = self.boxes.values().map(Boxes::bytes).sum();
-        let borders: usize = self.borders.iter().flatten().map(Border::bytes).sum();
+        let borders: usize = self.borders.values().map(Border::bytes).sum();
         (boxes + borders) as u64
     }
 
@@ -121,7 +122,7 @@ impl Probes {
         let target = self.target(scene, id)?;
         match body.kind() {
             BodyKind::Tetrahedra => {
-                let border = self.borders[id.index()].as_ref().expect("known now");
+                let border = self.borders.get(id).expect("known now");
                 self.ask(inside::InTetrahedra { border }, target, points, work)
             }
             _ => self.ask(inside::InSurface, target, points, work),
@@ -350,9 +351,7 @@ impl Probes {
         work: Work<'_>,
     ) -> Result<(), Error> {
         self.boxes.retain(|&(slot, _), _| scene.holds(slot));
-        for (slot, known) in self.borders.iter_mut().enumerate() {
-            known.take_if(|_| !scene.holds(slot));
-        }
+        self.borders.forget_removed(scene);
         shared.distances.begin(scene);
         for &(id, part) in parts {
             work.step()?;
@@ -369,10 +368,7 @@ impl Probes {
 
     /// Caches which faces of tetrahedra are the border of the body.
     fn know_border(&mut self, id: BodyId, body: &Body, work: Work<'_>) -> Result<(), Error> {
-        if self.borders.len() <= id.index() {
-            self.borders.resize_with(id.index() + 1, || None);
-        }
-        let known = &mut self.borders[id.index()];
+        let known = self.borders.entry(id);
         if !known.as_ref().is_some_and(|border| border.fits(body)) {
             *known = Some(Border::new(body, work)?);
         }
@@ -451,6 +447,19 @@ fn check_kind(scene: &Scene, id: BodyId, expected: BodyKind) -> Result<(), Error
 
 /// Nodes, or exact decisions, between two looks at the control.
 const LOOK: u32 = 1 << 10;
+
+/// Of the candidates from one on keeps those of which this is true, in any order.
+#[inline(always)]
+fn keep_from<T>(candidates: &mut Vec<T>, first: usize, keep: impl Fn(&T) -> bool) {
+    let mut kept = first;
+    for ix in first..candidates.len() {
+        if keep(&candidates[ix]) {
+            candidates.swap(kept, ix);
+            kept += 1;
+        }
+    }
+    candidates.truncate(kept);
+}
 
 /// Looks at the control from time to time.
 struct Looks<'a> {
