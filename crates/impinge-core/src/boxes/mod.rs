@@ -10,6 +10,24 @@
 //! in tables hold these as they are rounded: rounding keeps the order of coordinates, so boxes that
 //! are apart prove the elements apart.
 
+/// Functions of what every x86-64 processor has: SSE2. In functions compiled for it its operations
+/// are safe, and these are inlined everywhere.
+#[cfg(target_arch = "x86_64")]
+macro_rules! sse2 {
+    ($(fn $name:ident($($argument:ident: $type:ty),*) -> $result:ty $body:block)*) => {$(
+        #[inline(always)]
+        pub fn $name($($argument: $type),*) -> $result {
+            #[inline]
+            #[target_feature(enable = "sse2")]
+            fn compiled($($argument: $type),*) -> $result $body
+            // SAFETY: every x86-64 processor has SSE2.
+            unsafe { compiled($($argument),*) }
+        }
+    )*};
+}
+#[cfg(target_arch = "x86_64")]
+pub(crate) use sse2;
+
 mod extent;
 mod sweep;
 mod vec4;

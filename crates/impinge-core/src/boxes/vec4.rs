@@ -2,133 +2,191 @@
 //! chosen.
 
 use crate::bvh::bounds::Bounds;
-#[cfg(not(target_arch = "x86_64"))]
-use crate::bvh::bounds::{greater, lesser};
+
+use four::Four;
 
 /// x, y, z and a fourth number that is ignored.
-#[cfg(target_arch = "x86_64")]
 #[derive(Clone, Copy)]
-pub(crate) struct Vec4(pub(crate) std::arch::x86_64::__m128);
+pub(crate) struct Vec4(pub(crate) Four);
 
-#[cfg(target_arch = "x86_64")]
 impl Vec4 {
     #[inline(always)]
     pub(crate) fn splat(x: f32) -> Self {
-        // SAFETY: every x86-64 processor has SSE2 (here and below).
-        Vec4(unsafe { std::arch::x86_64::_mm_set1_ps(x) })
+        Vec4(four::from(&[x; 4]))
     }
 
-    /// Loads one vertex. All but the last are read as 16 bytes: the fourth number is the next
-    /// vertex's x.
+    /// Loads one vertex. All but the last are read as four numbers: the fourth is the next vertex's
+    /// x.
     #[inline(always)]
     pub(crate) fn load(positions: &[[f32; 3]], vertex: usize) -> Self {
-        use std::arch::x86_64::*;
-        if vertex + 1 < positions.len() {
-            // SAFETY: 16 bytes from a vertex that has a successor lie within the slice.
-            Vec4(unsafe { _mm_loadu_ps(positions.as_ptr().add(vertex).cast()) })
-        } else {
-            let [x, y, z] = positions[vertex];
-            // SAFETY: SSE2.
-            Vec4(unsafe { _mm_set_ps(z, z, y, x) })
-        }
+        let vertex = &positions[vertex..];
+        Vec4(match vertex.first_chunk::<2>() {
+            Some(&[[x, y, z], [next, ..]]) => four::from(&[x, y, z, next]),
+            None => {
+                let [x, y, z] = vertex[0];
+                four::from(&[x, y, z, z])
+            }
+        })
     }
 
     #[inline(always)]
     pub(crate) fn min(self, other: Self) -> Self {
-        // SAFETY: SSE2.
-        Vec4(unsafe { std::arch::x86_64::_mm_min_ps(self.0, other.0) })
+        Vec4(four::min(self.0, other.0))
     }
 
     #[inline(always)]
     pub(crate) fn max(self, other: Self) -> Self {
-        // SAFETY: SSE2.
-        Vec4(unsafe { std::arch::x86_64::_mm_max_ps(self.0, other.0) })
+        Vec4(four::max(self.0, other.0))
     }
 
     #[inline(always)]
     pub(crate) fn add(self, other: Self) -> Self {
-        // SAFETY: SSE2.
-        Vec4(unsafe { std::arch::x86_64::_mm_add_ps(self.0, other.0) })
+        Vec4(four::add(self.0, other.0))
     }
 
     #[inline(always)]
     fn half(self) -> Self {
-        // SAFETY: SSE2.
-        Vec4(unsafe { std::arch::x86_64::_mm_mul_ps(self.0, Self::splat(0.5).0) })
+        Vec4(four::mul(self.0, Self::splat(0.5).0))
     }
 
     #[inline(always)]
     pub(crate) fn xyz(self) -> [f32; 3] {
-        let mut out = [0.0f32; 4];
-        // SAFETY: `out` holds 16 bytes.
-        unsafe { std::arch::x86_64::_mm_storeu_ps(out.as_mut_ptr(), self.0) };
-        [out[0], out[1], out[2]]
+        let [x, y, z, _] = four::to(self.0);
+        [x, y, z]
     }
 
     /// Four vertices as the rows of x, of y and of z.
     #[inline(always)]
-    pub(crate) fn transpose([a, b, c, d]: [Self; 4]) -> [[f32; 4]; 3] {
-        use std::arch::x86_64::*;
-        let mut rows = [[0.0f32; 4]; 3];
-        // SAFETY: SSE2; each row holds 16 bytes.
-        unsafe {
-            let xy_ab = _mm_unpacklo_ps(a.0, b.0);
-            let xy_cd = _mm_unpacklo_ps(c.0, d.0);
-            let zw_ab = _mm_unpackhi_ps(a.0, b.0);
-            let zw_cd = _mm_unpackhi_ps(c.0, d.0);
-            _mm_storeu_ps(rows[0].as_mut_ptr(), _mm_movelh_ps(xy_ab, xy_cd));
-            _mm_storeu_ps(rows[1].as_mut_ptr(), _mm_movehl_ps(xy_cd, xy_ab));
-            _mm_storeu_ps(rows[2].as_mut_ptr(), _mm_movelh_ps(zw_ab, zw_cd));
-        }
-        rows
+    pub(crate) fn transpose(vertices: [Self; 4]) -> [[f32; 4]; 3] {
+        four::transpose(vertices.map(|vertex| vertex.0)).map(four::to)
     }
 }
 
-#[cfg(not(target_arch = "x86_64"))]
-#[derive(Clone, Copy)]
-pub(crate) struct Vec4([f32; 4]);
+/// Four numbers in a register. A minimum or maximum with what is no number is the second number.
+#[cfg(target_arch = "x86_64")]
+mod four {
+    use impinge_exact::internal::filter::number::memory::{read, write};
+    use std::arch::x86_64::*;
 
-#[cfg(not(target_arch = "x86_64"))]
-impl Vec4 {
+    pub type Four = __m128;
+
     #[inline(always)]
-    pub(crate) fn splat(x: f32) -> Self {
-        Vec4([x; 4])
+    pub fn from(numbers: &[f32; 4]) -> Four {
+        read(numbers)
     }
 
     #[inline(always)]
-    pub(crate) fn load(positions: &[[f32; 3]], vertex: usize) -> Self {
-        let [x, y, z] = positions[vertex];
-        Vec4([x, y, z, z])
+    pub fn to(four: Four) -> [f32; 4] {
+        let mut numbers = [0.0; 4];
+        write(four, &mut numbers);
+        numbers
+    }
+
+    sse2! {
+        fn min(a: Four, b: Four) -> Four { _mm_min_ps(a, b) }
+        fn max(a: Four, b: Four) -> Four { _mm_max_ps(a, b) }
+        fn add(a: Four, b: Four) -> Four { _mm_add_ps(a, b) }
+        fn mul(a: Four, b: Four) -> Four { _mm_mul_ps(a, b) }
+
+        fn transpose(rows: [Four; 4]) -> [Four; 3] {
+            let [a, b, c, d] = rows;
+            let (xy_ab, xy_cd) = (_mm_unpacklo_ps(a, b), _mm_unpacklo_ps(c, d));
+            let (zw_ab, zw_cd) = (_mm_unpackhi_ps(a, b), _mm_unpackhi_ps(c, d));
+            [
+                _mm_movelh_ps(xy_ab, xy_cd),
+                _mm_movehl_ps(xy_cd, xy_ab),
+                _mm_movelh_ps(zw_ab, zw_cd),
+            ]
+        }
+    }
+}
+
+#[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+mod four {
+    use impinge_exact::internal::filter::number::memory::{read, write};
+    use std::arch::wasm32::*;
+
+    pub type Four = v128;
+    pub use std::arch::wasm32::{f32x4_add as add, f32x4_mul as mul};
+
+    #[inline(always)]
+    pub fn from(numbers: &[f32; 4]) -> Four {
+        read(numbers)
     }
 
     #[inline(always)]
-    pub(crate) fn min(self, other: Self) -> Self {
-        Vec4(std::array::from_fn(|k| lesser(self.0[k], other.0[k])))
+    pub fn to(four: Four) -> [f32; 4] {
+        let mut numbers = [0.0; 4];
+        write(four, &mut numbers);
+        numbers
     }
 
     #[inline(always)]
-    pub(crate) fn max(self, other: Self) -> Self {
-        Vec4(std::array::from_fn(|k| greater(self.0[k], other.0[k])))
+    pub fn min(a: Four, b: Four) -> Four {
+        // `pmin(b, a)` is a where a < b, else b.
+        f32x4_pmin(b, a)
     }
 
     #[inline(always)]
-    pub(crate) fn add(self, other: Self) -> Self {
-        Vec4(std::array::from_fn(|k| self.0[k] + other.0[k]))
+    pub fn max(a: Four, b: Four) -> Four {
+        f32x4_pmax(b, a)
     }
 
     #[inline(always)]
-    fn half(self) -> Self {
-        Vec4(self.0.map(|x| 0.5 * x))
+    pub fn transpose([a, b, c, d]: [Four; 4]) -> [Four; 3] {
+        let [xy_ab, xy_cd] = [[a, b], [c, d]].map(|[a, b]| i32x4_shuffle::<0, 4, 1, 5>(a, b));
+        let [zw_ab, zw_cd] = [[a, b], [c, d]].map(|[a, b]| i32x4_shuffle::<2, 6, 3, 7>(a, b));
+        [
+            i64x2_shuffle::<0, 2>(xy_ab, xy_cd),
+            i64x2_shuffle::<1, 3>(xy_ab, xy_cd),
+            i64x2_shuffle::<0, 2>(zw_ab, zw_cd),
+        ]
+    }
+}
+
+#[cfg(not(any(
+    target_arch = "x86_64",
+    all(target_arch = "wasm32", target_feature = "simd128")
+)))]
+mod four {
+    use crate::bvh::bounds::{greater, lesser};
+    use std::array::from_fn;
+
+    pub type Four = [f32; 4];
+
+    #[inline(always)]
+    pub fn from(numbers: &[f32; 4]) -> Four {
+        *numbers
     }
 
     #[inline(always)]
-    pub(crate) fn xyz(self) -> [f32; 3] {
-        [self.0[0], self.0[1], self.0[2]]
+    pub fn to(four: Four) -> [f32; 4] {
+        four
     }
 
     #[inline(always)]
-    pub(crate) fn transpose(vertices: [Self; 4]) -> [[f32; 4]; 3] {
-        std::array::from_fn(|axis| std::array::from_fn(|k| vertices[k].0[axis]))
+    pub fn min(a: Four, b: Four) -> Four {
+        from_fn(|k| lesser(a[k], b[k]))
+    }
+
+    #[inline(always)]
+    pub fn max(a: Four, b: Four) -> Four {
+        from_fn(|k| greater(a[k], b[k]))
+    }
+
+    #[inline(always)]
+    pub fn add(a: Four, b: Four) -> Four {
+        from_fn(|k| a[k] + b[k])
+    }
+
+    #[inline(always)]
+    pub fn mul(a: Four, b: Four) -> Four {
+        from_fn(|k| a[k] * b[k])
+    }
+
+    #[inline(always)]
+    pub fn transpose(rows: [Four; 4]) -> [Four; 3] {
+        from_fn(|axis| rows.map(|row| row[axis]))
     }
 }
 

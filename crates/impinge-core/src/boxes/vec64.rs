@@ -1,94 +1,44 @@
 //! A vertex in double precision, on every processor, whatever instruction set is chosen.
 
-/// x, y and z.
-#[cfg(target_arch = "x86_64")]
+use two::Two;
+
+/// x and y, and z.
 #[derive(Clone, Copy)]
 pub(super) struct Vec64 {
-    xy: std::arch::x86_64::__m128d,
-    z: std::arch::x86_64::__m128d,
+    xy: Two,
+    z: f64,
 }
 
-// Minima and maxima are written out, because the compiler makes several instructions of a
-// comparison of each coordinate.
-#[cfg(target_arch = "x86_64")]
 impl Vec64 {
     #[inline(always)]
     pub fn load(positions: &[[f64; 3]], vertex: u32) -> Self {
-        use std::arch::x86_64::*;
-        let point = &positions[vertex as usize];
-        // SAFETY: every x86-64 processor has SSE2 (here and below); a point holds two numbers, and
-        // a third.
-        unsafe {
-            Vec64 {
-                xy: _mm_loadu_pd(point.as_ptr()),
-                z: _mm_load_sd(&raw const point[2]),
-            }
+        let [x, y, z] = positions[vertex as usize];
+        Vec64 {
+            xy: two::from(&[x, y]),
+            z,
         }
     }
 
     #[inline(always)]
     pub fn min(self, other: Self) -> Self {
-        use std::arch::x86_64::*;
-        // SAFETY: SSE2.
-        unsafe {
-            Vec64 {
-                xy: _mm_min_pd(self.xy, other.xy),
-                z: _mm_min_sd(self.z, other.z),
-            }
+        Vec64 {
+            xy: two::min(self.xy, other.xy),
+            z: if self.z < other.z { self.z } else { other.z },
         }
     }
 
     #[inline(always)]
     pub fn max(self, other: Self) -> Self {
-        use std::arch::x86_64::*;
-        // SAFETY: SSE2.
-        unsafe {
-            Vec64 {
-                xy: _mm_max_pd(self.xy, other.xy),
-                z: _mm_max_sd(self.z, other.z),
-            }
+        Vec64 {
+            xy: two::max(self.xy, other.xy),
+            z: if self.z > other.z { self.z } else { other.z },
         }
     }
 
     #[inline(always)]
     pub fn xyz(self) -> [f64; 3] {
-        use std::arch::x86_64::*;
-        let mut point = [0.0; 3];
-        // SAFETY: SSE2; `point` holds two numbers, and a third.
-        unsafe {
-            _mm_storeu_pd(point.as_mut_ptr(), self.xy);
-            _mm_store_sd(&raw mut point[2], self.z);
-        }
-        point
-    }
-}
-
-#[cfg(not(target_arch = "x86_64"))]
-#[derive(Clone, Copy)]
-pub(super) struct Vec64([f64; 3]);
-
-#[cfg(not(target_arch = "x86_64"))]
-impl Vec64 {
-    #[inline(always)]
-    pub fn load(positions: &[[f64; 3]], vertex: u32) -> Self {
-        Vec64(positions[vertex as usize])
-    }
-
-    #[inline(always)]
-    pub fn min(self, other: Self) -> Self {
-        let lesser = |a, b| if a < b { a } else { b };
-        Vec64(std::array::from_fn(|k| lesser(self.0[k], other.0[k])))
-    }
-
-    #[inline(always)]
-    pub fn max(self, other: Self) -> Self {
-        let greater = |a, b| if a > b { a } else { b };
-        Vec64(std::array::from_fn(|k| greater(self.0[k], other.0[k])))
-    }
-
-    #[inline(always)]
-    pub fn xyz(self) -> [f64; 3] {
-        self.0
+        let [x, y] = two::to(self.xy);
+        [x, y, self.z]
     }
 }
 
@@ -106,4 +56,58 @@ pub(super) fn ends(positions: &[[f64; 3]], vertices: &[u32]) -> [[f64; 3]; 2] {
         max = max.max(point);
     }
     [min.xyz(), max.xyz()]
+}
+
+/// Two numbers in a register. Minima and maxima are written out, because the compiler makes several
+/// instructions of a comparison of each number.
+#[cfg(target_arch = "x86_64")]
+mod two {
+    use impinge_exact::internal::filter::number::memory::{read, write};
+    use std::arch::x86_64::*;
+
+    pub type Two = __m128d;
+
+    #[inline(always)]
+    pub fn from(numbers: &[f64; 2]) -> Two {
+        read(numbers)
+    }
+
+    #[inline(always)]
+    pub fn to(two: Two) -> [f64; 2] {
+        let mut numbers = [0.0; 2];
+        write(two, &mut numbers);
+        numbers
+    }
+
+    sse2! {
+        fn min(a: Two, b: Two) -> Two { _mm_min_pd(a, b) }
+        fn max(a: Two, b: Two) -> Two { _mm_max_pd(a, b) }
+    }
+}
+
+#[cfg(not(target_arch = "x86_64"))]
+mod two {
+    use std::array::from_fn;
+
+    pub type Two = [f64; 2];
+
+    #[inline(always)]
+    pub fn from(numbers: &[f64; 2]) -> Two {
+        *numbers
+    }
+
+    #[inline(always)]
+    pub fn to(two: Two) -> [f64; 2] {
+        two
+    }
+
+    #[inline(always)]
+    pub fn min(a: Two, b: Two) -> Two {
+        from_fn(|k| if a[k] < b[k] { a[k] } else { b[k] })
+    }
+
+    #[inline(always)]
+    pub fn max(a: Two, b: Two) -> Two {
+        from_fn(|k| if a[k] > b[k] { a[k] } else { b[k] })
+    }
 }

@@ -4,7 +4,9 @@
 //! them. These functions are smaller and faster. They are not inlined: a module for browsers is
 //! loaded over the network.
 
-use std::arch::wasm32::{f32x4_le, f32x4_splat, i32x4_bitmask, v128, v128_and, v128_load, v128_or};
+use std::arch::wasm32::{f32x4_le, f32x4_splat, i32x4_bitmask, v128, v128_and, v128_or};
+
+use impinge_exact::internal::filter::number::memory::read;
 
 use super::LaneBounds;
 use crate::bvh::bounds::{Bounds, BoundsArray};
@@ -15,8 +17,7 @@ const FOUR: usize = 4;
 #[inline(always)]
 fn load(row: &[f32], first: usize) -> v128 {
     let row: &[f32; FOUR] = row[first..].first_chunk().expect("whole registers");
-    // SAFETY: the four numbers are 16 readable bytes; loads need no alignment.
-    unsafe { v128_load(row.as_ptr().cast()) }
+    read(row)
 }
 
 /// Bit `k`: box `first + k` overlaps `query`, for `k` below 4.

@@ -3,6 +3,7 @@
 use std::arch::x86_64::*;
 
 use impinge_exact::internal::filter::number::Lookup;
+use impinge_exact::internal::filter::number::memory::write;
 use impinge_exact::internal::filter::{BATCH, TABLE};
 
 use super::{
@@ -142,8 +143,7 @@ unsafe fn put_corners_by_eights(
             for axis in 0..3 {
                 let row = into[corner][axis][slot..].first_chunk_mut::<8>();
                 let row = row.expect("at most 64 faces");
-                // SAFETY: a row of eight.
-                unsafe { _mm256_storeu_ps(row.as_mut_ptr(), rows[axis]) };
+                write(rows[axis], row);
             }
         }
     }
@@ -169,8 +169,7 @@ unsafe fn put_points<R: Load4>(
             for axis in 0..3 {
                 let row = into[axis][first..].first_chunk_mut::<LANES>();
                 let row = row.expect("eights of 64");
-                // SAFETY: a row of eight.
-                unsafe { _mm256_storeu_ps(row.as_mut_ptr(), rows[axis]) };
+                write(rows[axis], row);
             }
         } else {
             for (slot, vertex) in (first..).zip(eight) {
@@ -202,8 +201,7 @@ unsafe fn put_corners_by_vertices(
             for (table, row) in points.0.iter_mut().zip(rows) {
                 let eight = table[first..].first_chunk_mut::<CHUNK>();
                 let eight = eight.expect("at most 64 vertices");
-                // SAFETY: a row of eight.
-                unsafe { _mm256_storeu_ps(eight.as_mut_ptr(), row) };
+                write(row, eight);
             }
         } else {
             for (slot, vertex) in (first..).zip(chunk) {

@@ -111,36 +111,38 @@ fn quantised(x: f32, origin: f32, scale: f32, limit: f32) -> u8 {
     (unsafe { cell.to_int_unchecked::<i32>() }) as u8
 }
 
-/// The lesser of two numbers, byte by byte.
-#[inline(always)]
-pub(super) fn lesser_bytes(a: u32, b: u32) -> u32 {
-    #[cfg(target_arch = "x86_64")]
-    // SAFETY: SSE2 belongs to every x86-64 processor.
-    unsafe {
-        use std::arch::x86_64::*;
-        let both = _mm_min_epu8(_mm_cvtsi32_si128(a as i32), _mm_cvtsi32_si128(b as i32));
-        _mm_cvtsi128_si32(both) as u32
-    }
-    #[cfg(not(target_arch = "x86_64"))]
-    {
-        let (a, b) = (a.to_le_bytes(), b.to_le_bytes());
-        u32::from_le_bytes([0, 1, 2, 3].map(|k| a[k].min(b[k])))
+/// Four numbers in the bytes of one.
+#[cfg(target_arch = "x86_64")]
+mod bytes {
+    use std::arch::x86_64::*;
+
+    crate::boxes::sse2! {
+        fn lesser_bytes(a: u32, b: u32) -> u32 {
+            let both = _mm_min_epu8(_mm_cvtsi32_si128(a as i32), _mm_cvtsi32_si128(b as i32));
+            _mm_cvtsi128_si32(both) as u32
+        }
+
+        fn greater_bytes(a: u32, b: u32) -> u32 {
+            let both = _mm_max_epu8(_mm_cvtsi32_si128(a as i32), _mm_cvtsi32_si128(b as i32));
+            _mm_cvtsi128_si32(both) as u32
+        }
     }
 }
 
-/// The greater of two numbers, byte by byte.
-#[inline(always)]
-pub(super) fn greater_bytes(a: u32, b: u32) -> u32 {
-    #[cfg(target_arch = "x86_64")]
-    // SAFETY: SSE2 belongs to every x86-64 processor.
-    unsafe {
-        use std::arch::x86_64::*;
-        let both = _mm_max_epu8(_mm_cvtsi32_si128(a as i32), _mm_cvtsi32_si128(b as i32));
-        _mm_cvtsi128_si32(both) as u32
+#[cfg(not(target_arch = "x86_64"))]
+mod bytes {
+    #[inline(always)]
+    pub fn lesser_bytes(a: u32, b: u32) -> u32 {
+        let (a, b) = (a.to_le_bytes(), b.to_le_bytes());
+        u32::from_le_bytes([0, 1, 2, 3].map(|k| a[k].min(b[k])))
     }
-    #[cfg(not(target_arch = "x86_64"))]
-    {
+
+    #[inline(always)]
+    pub fn greater_bytes(a: u32, b: u32) -> u32 {
         let (a, b) = (a.to_le_bytes(), b.to_le_bytes());
         u32::from_le_bytes([0, 1, 2, 3].map(|k| a[k].max(b[k])))
     }
 }
+
+/// The lesser, and the greater, of two numbers, byte by byte.
+pub(super) use bytes::{greater_bytes, lesser_bytes};

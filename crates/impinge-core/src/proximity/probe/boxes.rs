@@ -246,40 +246,34 @@ impl Siblings {
     pub fn all(&self) -> u64 {
         (1 << self.n) - 1
     }
+}
 
-    /// The boxes as they are read.
+/// Boxes side by side, in rows of `READ` numbers.
+pub(super) trait SideBySide<const READ: usize> {
+    /// How many boxes there are, at most.
+    const N: usize;
+
+    /// The low ends of the boxes along an axis, or the high ones; what follows them is arbitrary.
+    fn row(&self, is_high: bool, axis: usize) -> &[f32; READ];
+}
+
+impl SideBySide<{ 2 * EIGHT }> for Siblings {
+    const N: usize = EIGHT;
+
     #[inline(always)]
-    pub fn rows(&self) -> Rows<'_> {
-        Rows {
-            ends: [&self.ends, &self.ends[3 * EIGHT..]],
-            n: EIGHT,
-        }
+    fn row(&self, is_high: bool, axis: usize) -> &[f32; 2 * EIGHT] {
+        let first = EIGHT * (3 * usize::from(is_high) + axis);
+        self.ends[first..].first_chunk().expect("two rows")
     }
 }
 
-/// Boxes side by side.
-#[derive(Clone, Copy)]
-pub(super) struct Rows<'a> {
-    /// Low ends by axis, and high ends.
-    ends: [&'a [f32]; 2],
-    /// How many boxes there are, which is the length of a row.
-    pub n: usize,
-}
+impl SideBySide<GROUP> for LaneBounds {
+    const N: usize = GROUP;
 
-impl<'a> Rows<'a> {
-    /// Of the elements of a cluster.
     #[inline(always)]
-    pub fn of_elements(lanes: &'a LaneBounds) -> Self {
-        Rows {
-            ends: [lanes.min.as_flattened(), lanes.max.as_flattened()],
-            n: GROUP,
-        }
-    }
-
-    /// The ends of some boxes along an axis, from one on: the low ends (0) or the high ones (1).
-    #[inline(always)]
-    pub fn ends<V: Lookup>(&self, end: usize, axis: usize, first: usize) -> V {
-        V::row(self.ends[end], self.n * axis + first)
+    fn row(&self, is_high: bool, axis: usize) -> &[f32; GROUP] {
+        let ends = if is_high { &self.max } else { &self.min };
+        &ends[axis]
     }
 }
 
@@ -359,7 +353,7 @@ impl Descent {
                 return Some(ClusterIx::new(node));
             }
             let children = boxes.children(level, node);
-            let mask = overlapping::<S::F32>(children.rows(), query) & children.all();
+            let mask = overlapping::<S::F32, _, _>(children, query) & children.all();
             self.stack.push(Left {
                 level: level - 1,
                 first: children.first,
@@ -372,19 +366,19 @@ impl Descent {
 /// Bit k: box k overlaps a query.
 #[cfg_attr(target_family = "wasm", inline(never))]
 #[cfg_attr(not(target_family = "wasm"), inline(always))]
-fn overlapping<V: Lookup>(rows: Rows<'_>, query: &Bounds) -> u64 {
+fn overlapping<V: Lookup, B: SideBySide<READ>, const READ: usize>(
+    boxes: &B,
+    query: &Bounds,
+) -> u64 {
+    let [min, max] = [query.min, query.max].map(|end| end.map(|x| V::splat(f64::from(x))));
+    let is_apart = |axis: usize, first: usize| {
+        let low = V::row(boxes.row(false, axis), first);
+        let high = V::row(boxes.row(true, axis), first);
+        low.gt(max[axis]) | min[axis].gt(high)
+    };
     let mut mask = 0;
-    for first in (0..rows.n).step_by(V::N) {
-        let mut is_apart = V::splat(0.0).gt(V::splat(0.0));
-        for axis in 0..3 {
-            let (low, high) = (
-                rows.ends::<V>(0, axis, first),
-                rows.ends::<V>(1, axis, first),
-            );
-            is_apart = is_apart
-                | low.gt(V::splat(f64::from(query.max[axis])))
-                | V::splat(f64::from(query.min[axis])).gt(high);
-        }
+    for first in (0..B::N).step_by(V::N) {
+        let is_apart = is_apart(0, first) | is_apart(1, first) | is_apart(2, first);
         mask |= u64::from(V::bits(!is_apart)) << first;
     }
     mask

@@ -13,7 +13,7 @@
 
 use std::cmp::Ordering;
 
-use super::boxes::{GROWN, Rows, Waiting, wait_in_order};
+use super::boxes::{GROWN, SideBySide, Waiting, wait_in_order};
 use super::{HITS, Looks, Target, keep_from};
 use crate::answers::hits::RayHit;
 use crate::answers::pairs::Element;
@@ -198,29 +198,59 @@ fn corners(target: Target<'_>, slot: usize) -> Corners {
 /// A ray as boxes are held against it, in single precision: rounded so that it meets all that the
 /// ray meets.
 struct Slabs<V> {
-    /// The origin, rounded down and up.
-    origin: [[V; 3]; 2],
-    /// Of the direction: infinite for 0, and no number along axes that are not looked at.
-    inverse: [V; 3],
-    /// 1 along axes along which the ray goes down, which comes to high ends first; else 0.
-    is_down: [usize; 3],
+    axes: [Slab<V>; 3],
+    /// Axes along which the ray goes down: it comes to high ends first.
+    is_down: [bool; 3],
+}
+
+/// A ray along an axis.
+#[derive(Clone, Copy)]
+struct Slab<V> {
+    /// The origin, rounded towards where the ray comes from and where it goes.
+    origin: [V; 2],
+    /// Of the direction: infinite for 0, and no number if the axis is not looked at.
+    inverse: V,
+}
+
+impl<V: Lookup> Slab<V> {
+    /// Narrows when the ray is in some boxes: from then on, and until then, negated, which leaves
+    /// larger numbers for both. Comparisons with what is no number are false.
+    #[inline(always)]
+    fn narrow(
+        &self,
+        [near, minus_far]: [V; 2],
+        [enters, leaves]: [&[f32]; 2],
+        first: usize,
+    ) -> [V; 2] {
+        let t = (V::row(enters, first) - self.origin[1]) * self.inverse;
+        let minus_t = (self.origin[0] - V::row(leaves, first)) * self.inverse;
+        [t.larger(near), minus_t.larger(minus_far)]
+    }
 }
 
 impl<V: Lookup> Slabs<V> {
     #[inline(always)]
     fn new(ray: &Ray, whole: &Bounds) -> Self {
         let nothing = V::splat(f64::NAN);
+        let none = Slab {
+            origin: [nothing; 2],
+            inverse: nothing,
+        };
         let mut slabs = Slabs {
-            origin: [[nothing; 3]; 2],
-            inverse: [nothing; 3],
-            is_down: [0; 3],
+            axes: [none; 3],
+            is_down: ray.direction.map(|x| x < 0.0),
         };
         for axis in 0..3 {
             let (origin, direction) = (ray.origin[axis], ray.direction[axis]);
             let (below, above) = (round_down(origin), round_up(origin));
-            slabs.origin[0][axis] = V::splat(f64::from(below));
-            slabs.origin[1][axis] = V::splat(f64::from(above));
-            slabs.is_down[axis] = usize::from(direction < 0.0);
+            let is_down = slabs.is_down[axis];
+            let slab = &mut slabs.axes[axis];
+            slab.origin = if is_down {
+                [above, below]
+            } else {
+                [below, above]
+            }
+            .map(|x| V::splat(f64::from(x)));
             let inverse = 1.0 / direction.abs();
             let is_moderate = inverse == f64::INFINITY && direction == 0.0
                 || (1.0 / f64::from(FAR)..f64::from(FAR)).contains(&inverse);
@@ -228,8 +258,7 @@ impl<V: Lookup> Slabs<V> {
             let is_near =
                 below.abs() <= FAR && above.abs() <= FAR && low.abs() <= FAR && high.abs() <= FAR;
             if is_moderate && is_near {
-                let is_down = direction < 0.0;
-                slabs.inverse[axis] = V::splat(if is_down { -inverse } else { inverse });
+                slab.inverse = V::splat(if is_down { -inverse } else { inverse });
             }
         }
         slabs
@@ -239,25 +268,31 @@ impl<V: Lookup> Slabs<V> {
     /// before a limit. What follows the boxes that there are is arbitrary.
     #[cfg_attr(target_family = "wasm", inline(never))]
     #[cfg_attr(not(target_family = "wasm"), inline(always))]
-    fn reach(&self, rows: Rows<'_>, limit: f32, nears: &mut [f32; GROUP]) -> u64 {
-        let limit = V::splat(f64::from(limit));
+    fn reach<B: SideBySide<READ>, const READ: usize>(
+        &self,
+        boxes: &B,
+        limit: f32,
+        nears: &mut [f32; GROUP],
+    ) -> u64 {
+        let limit = V::splat(f64::from(-limit));
         let (grown, least) = (f64::from(GROWN), f64::from(f32::MIN_POSITIVE));
+        let [x, y, z] = &self.axes;
+        let rows = |axis: usize| {
+            let is_down = self.is_down[axis];
+            [
+                &boxes.row(is_down, axis)[..],
+                &boxes.row(!is_down, axis)[..],
+            ]
+        };
+        let [of_x, of_y, of_z] = [rows(0), rows(1), rows(2)];
         let mut mask = 0;
-        for first in (0..rows.n).step_by(V::N) {
-            let (mut near, mut far) = (V::splat(0.0), limit);
-            for axis in 0..3 {
-                let is_down = self.is_down[axis];
-                let [enter, leave] = [is_down, 1 - is_down];
-                let inverse = self.inverse[axis];
-                // Comparisons with what is no number are false.
-                let t = rows.ends::<V>(enter, axis, first) - self.origin[1 - is_down][axis];
-                near = (t * inverse).larger(near);
-                let t = rows.ends::<V>(leave, axis, first) - self.origin[is_down][axis];
-                let t = t * inverse;
-                far = V::select(far.gt(t), t, far);
-            }
+        for first in (0..B::N).step_by(V::N) {
+            let ends = [V::splat(0.0), limit];
+            let ends = x.narrow(ends, of_x, first);
+            let ends = y.narrow(ends, of_y, first);
+            let [near, minus_far] = z.narrow(ends, of_z, first);
             near.put(nears, first);
-            let is_missed = near.gt(far * V::splat(grown) + V::splat(least));
+            let is_missed = near.gt(V::splat(least) - minus_far * V::splat(grown));
             mask |= u64::from(V::bits(!is_missed)) << first;
         }
         mask
@@ -310,7 +345,7 @@ impl RaySearch<'_> {
         let (mut siblings, mut level) = boxes.top();
         self.waiting.clear();
         loop {
-            let mask = slabs.reach(siblings.rows(), self.limit_of_boxes(), &mut nears);
+            let mask = slabs.reach(siblings, self.limit_of_boxes(), &mut nears);
             wait_in_order(&mut self.waiting, (siblings, level), mask, &nears);
             // The next node above the clusters, whose children are looked at next.
             loop {
@@ -353,7 +388,7 @@ impl RaySearch<'_> {
     ) -> Result<(), Error> {
         let slots = target.boxes.clustering.slots(cluster);
         let lanes = target.boxes.elements(target.body, cluster);
-        let mask = slabs.reach(Rows::of_elements(lanes), self.limit_of_boxes(), nears);
+        let mask = slabs.reach(lanes, self.limit_of_boxes(), nears);
         for lane in Lanes(mask & up_to(slots.len() - 1)) {
             if nears[lane] > self.limit_of_boxes() * GROWN + f32::MIN_POSITIVE {
                 continue;

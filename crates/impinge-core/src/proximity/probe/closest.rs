@@ -19,7 +19,7 @@
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
-use super::boxes::{GROWN, Rows, Waiting, rounding_of, wait_in_order};
+use super::boxes::{GROWN, SideBySide, Waiting, rounding_of, wait_in_order};
 use super::{Looks, Target, WHAT, keep_from};
 use crate::answers::closest::ClosestElement;
 use crate::answers::pairs::Element;
@@ -96,7 +96,7 @@ fn all_closest<S: Simd, R: Real>(
         let mut squares = [0.0; GROUP];
         for (number, (_, target)) in bodies.iter().enumerate() {
             let (top, _) = target.boxes.top();
-            rounded.squared_distances(top.rows(), search.limit, &mut squares);
+            rounded.squared_distances(top, search.limit, &mut squares);
             order.push((squares[0], number));
         }
         order.sort_unstable_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
@@ -320,7 +320,7 @@ impl<'a> PointSearch<'a> {
         let (mut siblings, mut level) = boxes.top();
         self.waiting.clear();
         loop {
-            let mask = rounded.squared_distances(siblings.rows(), self.limit, &mut lows);
+            let mask = rounded.squared_distances(siblings, self.limit, &mut lows);
             wait_in_order(&mut self.waiting, (siblings, level), mask, &lows);
             // The next node above the clusters, whose children are looked at next.
             loop {
@@ -355,7 +355,7 @@ impl<'a> PointSearch<'a> {
     ) -> Result<(), Error> {
         let slots = target.boxes.clustering.slots(cluster);
         let lanes = target.boxes.elements(target.body, cluster);
-        let mask = rounded.squared_distances(Rows::of_elements(lanes), self.limit, lows);
+        let mask = rounded.squared_distances(lanes, self.limit, lows);
         let mut mask = mask & up_to(slots.len() - 1);
         if mask == 0 {
             return Ok(());
@@ -623,18 +623,23 @@ impl<V: Lookup> RoundedPoint<V> {
     /// there are is arbitrary.
     #[cfg_attr(target_family = "wasm", inline(never))]
     #[cfg_attr(not(target_family = "wasm"), inline(always))]
-    fn squared_distances(&self, rows: Rows<'_>, limit: f32, squares: &mut [f32; GROUP]) -> u64 {
+    fn squared_distances<B: SideBySide<READ>, const READ: usize>(
+        &self,
+        boxes: &B,
+        limit: f32,
+        squares: &mut [f32; GROUP],
+    ) -> u64 {
         let limit = V::splat(f64::from(limit));
         let [down, up] = &self.ends;
+        let square = |axis: usize, first: usize| {
+            let below = V::row(boxes.row(false, axis), first) - up[axis];
+            let above = down[axis] - V::row(boxes.row(true, axis), first);
+            let gap = below.larger(above).larger(V::splat(0.0));
+            gap * gap
+        };
         let mut mask = 0;
-        for first in (0..rows.n).step_by(V::N) {
-            let mut sum = V::splat(0.0);
-            for axis in 0..3 {
-                let below = rows.ends::<V>(0, axis, first) - up[axis];
-                let above = down[axis] - rows.ends::<V>(1, axis, first);
-                let gap = below.larger(above).larger(V::splat(0.0));
-                sum = sum + gap * gap;
-            }
+        for first in (0..B::N).step_by(V::N) {
+            let sum = square(0, first) + square(1, first) + square(2, first);
             sum.put(squares, first);
             mask |= u64::from(V::bits(!sum.gt(limit))) << first;
         }
