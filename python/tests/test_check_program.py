@@ -241,6 +241,18 @@ def test_the_hook_of_pre_commit(folder):
     assert run(*hook["args"], "clean.obj", "bad.obj").returncode == 3
 
 
+def test_the_action_and_the_hook_know_every_format_that_can_be_read(folder):
+    yaml = pytest.importorskip("yaml", reason="PyYAML is not installed")
+    pathlib.Path("mesh.unknown").write_text("")
+    known = re.search(r"\(known: (.*?)\)", run("mesh.unknown").stdout)[1].split(", ")
+    [hook] = yaml.safe_load((ROOT / ".pre-commit-hooks.yaml").read_text())
+    action = re.search(r"^kinds='(.*)'$", (ROOT / "scripts/action").read_text(), re.M)[1]
+    # A mesh of TetGen is several files, which are checked when one is named.
+    wanted = [kind for kind in known if kind not in ("node", "ele", "face")]
+    assert len(wanted) > 10 and hook["files"] == f"(?i){action}"
+    assert [kind for kind in known if re.search(hook["files"], f"part.{kind}")] == wanted
+
+
 def test_rows_are_a_table_with_a_row_per_mesh(folder):
     ran = run(*ALL, "--rows", "rows.csv", "--min-thickness", "0.5")
     assert ran.returncode == 1, ran.stderr
