@@ -102,7 +102,7 @@ pub enum Error {
     /// A part that this program was built without: its name, its feature, and what else it needs.
     #[cfg(not(feature = "view"))]
     #[error(
-        "this impinge was built without {0}: build it with --features {1}{2}, such as `cargo install --git \
+        "this impinge was built without {0}: build it with --features {1}{2}, such as `cargo install --locked --git \
          https://github.com/impinge-rs/impinge impinge-cli --features {1}`"
     )]
     NotBuilt(&'static str, &'static str, &'static str),
