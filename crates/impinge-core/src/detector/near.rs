@@ -164,7 +164,11 @@ pub(super) fn name_features(
         let parts = kind.parts();
         let corners = |key| {
             let (a, b) = numbering.pair(key);
-            [(a, parts[0]), (b, parts[1])].map(|(one, part)| corners_of(scene, one, part))
+            // Mapping an array would copy it.
+            [
+                corners_of(scene, a, parts[0]),
+                corners_of(scene, b, parts[1]),
+            ]
         };
         unnamed.name(labels, exact_kind(TestId::Elements(kind)), isa, corners);
         Ok(())
@@ -175,6 +179,7 @@ pub(super) fn name_features(
     Ok(())
 }
 
+#[inline(always)]
 fn corners_of(scene: &Scene, Element { body, element }: Element, part: Part) -> Corners {
     let body = scene.body_in(body.slot());
     let element = ElementIx::new(element);

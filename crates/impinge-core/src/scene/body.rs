@@ -145,6 +145,7 @@ impl Body {
     }
 
     /// The corners of an element of a part.
+    #[inline]
     pub(crate) fn corners<'a>(&'a self, part: Part, element: &'a ElementIx) -> &'a [u32] {
         match part {
             // Vertices are numbered as positions are.
