@@ -3,16 +3,19 @@
 
 use std::collections::HashMap;
 
-use crate::oracle::{self, Vector};
+use crate::oracle::{self, Vector, Whole};
 use impinge_core::{
     Backend, CancelToken, Control, Detector, Elements, Error, InstructionSet, Query, Scene,
     Settings,
 };
 use impinge_scenes::{Model, Random, solids, soup, surfaces};
 
+/// Faces and positions.
+type Surface = (Vec<[u32; 3]>, Vec<[f64; 3]>);
+
 /// Boundaries of tetrahedra with corners on a lattice, each turned outward or inward: closed
 /// surfaces that overlap, coincide, touch in faces, edges and vertices, with some that are flat.
-fn shells(n: usize, k: u32, seed: u64) -> (Vec<[u32; 3]>, Vec<[f64; 3]>) {
+fn shells(n: usize, k: u32, seed: u64) -> Surface {
     let mut random = Random::new(seed);
     let mut faces: Vec<[u32; 3]> = Vec::new();
     let mut positions = Vec::new();
@@ -40,13 +43,23 @@ fn lattice(k: u32) -> Vec<[f64; 3]> {
 
 /// The winding number of each point; none on the surface.
 fn windings(faces: &[[u32; 3]], positions: &[[f64; 3]], points: &[[f64; 3]]) -> Vec<Option<i32>> {
+    windings_in(oracle::vector, faces, positions, points)
+}
+
+/// With coordinates that are whole numbers of some unit.
+fn windings_in<N: Whole>(
+    vector: impl Fn([f64; 3]) -> Vector<N>,
+    faces: &[[u32; 3]],
+    positions: &[[f64; 3]],
+    points: &[[f64; 3]],
+) -> Vec<Option<i32>> {
     let mut random = Random::new(77);
-    let faces: Vec<[Vector; 3]> = faces
+    let faces: Vec<[Vector<N>; 3]> = faces
         .iter()
-        .map(|face| face.map(|vertex| oracle::vector(positions[vertex as usize])))
+        .map(|face| face.map(|vertex| vector(positions[vertex as usize])))
         .collect();
     let winding = |point: &[f64; 3]| {
-        let point = oracle::vector(*point);
+        let point = vector(*point);
         let is_on = faces.iter().any(|face| oracle::is_on(&point, face));
         // A flat face is on both sides of a segment at once, or on none.
         (!is_on).then(|| oracle::winding(&point, &faces, &mut random))
@@ -118,6 +131,86 @@ fn lattices_of_shells_are_decided_exactly() {
         all.iter().all(|&n| n > 100) && several > 10,
         "{all:?} {several}"
     );
+}
+
+/// Closed surfaces on lattices with every degeneracy: shells that overlap, coincide, touch and are
+/// flat, turned either way; and round bodies whose vertices are put on a lattice, so that faces
+/// fold, become flat and coincide.
+fn catalogue(round: u64) -> Vec<Surface> {
+    let mut all: Vec<_> = [(1, 1), (2, 2), (6, 2), (20, 3), (60, 4), (40, 8), (150, 3)]
+        .into_iter()
+        .zip(10 * round..)
+        .map(|((n, k), seed)| shells(n, k, seed))
+        .collect();
+    let turn = 0.7 * round as f32;
+    for model in [
+        surfaces::icosphere(2),
+        surfaces::bumpy_ball(300, 0.4),
+        surfaces::torus(16, 8, 1.0, 0.4),
+        surfaces::torus_knot(400, surfaces::Knot::default()),
+    ] {
+        let model = surfaces::unit_diagonal(model).mapped(|[x, y, z]| {
+            let (sin, cos) = turn.sin_cos();
+            [cos * x - sin * y, sin * x + cos * y, z]
+        });
+        let Elements::Triangles(faces) = &model.elements else {
+            panic!("triangles")
+        };
+        for k in [4.0, 12.0] {
+            let (low, _) = model.bounds().unwrap();
+            let on_lattice = |point: &[f32; 3]| {
+                [0, 1, 2].map(|axis| f64::from(((point[axis] - low[axis]) * k).round()))
+            };
+            let positions = model.positions.iter().map(on_lattice).collect();
+            all.push((faces.clone(), positions));
+        }
+    }
+    all
+}
+
+/// Points of a lattice of quarters, many of which lie on vertices, edges and faces and in their
+/// planes, around all of the catalogue: none is wrong.
+fn are_decided_exactly(n_points: usize) {
+    const PARTS: f64 = 4.0;
+    let vector = |point: [f64; 3]| point.map(|x| (PARTS * x) as i64);
+    let (mut n, mut all, mut random) = (0, [0; 3], Random::new(5));
+    let mut detector = Detector::new(Backend::Cpu).unwrap();
+    for round in 1.. {
+        for (ix, (faces, positions)) in catalogue(round).into_iter().enumerate() {
+            let most = positions.iter().flatten().copied().fold(0.0, f64::max);
+            let n_along = ((most + 1.0) * PARTS) as u32;
+            let mut coordinate = |()| f64::from(random.below(n_along)) / PARTS - 0.5;
+            let points: Vec<[f64; 3]> = (0..1000).map(|_| [(); 3].map(&mut coordinate)).collect();
+            let expected = windings_in(vector, &faces, &positions, &points);
+            let mut scene = Scene::new();
+            let body = scene.add_triangles(&faces, &positions).unwrap();
+            let around = detector.winding_numbers(&scene, body, &points).unwrap();
+            let inside = detector.contains(&scene, body, &points).unwrap();
+            let expected_inside = places(&expected);
+            for (point, (found, expected)) in points.iter().zip(around.iter().zip(&expected)) {
+                assert_eq!(found, expected, "round {round}, mesh {ix}, {point:?}");
+            }
+            assert!(inside == expected_inside, "round {round}, mesh {ix}");
+            all = [0, 1, 2].map(|k| all[k] + count(&expected_inside)[k]);
+            n += points.len();
+        }
+        if n >= n_points {
+            break;
+        }
+    }
+    println!("{n} points: {all:?} outside, on the surface, inside");
+    assert!(all.iter().all(|&some| some > n / 50), "{all:?}");
+}
+
+#[test]
+fn points_around_a_catalogue_of_degeneracies() {
+    are_decided_exactly(15_000);
+}
+
+#[test]
+#[ignore = "takes a minute"]
+fn a_million_points_around_a_catalogue_of_degeneracies() {
+    are_decided_exactly(1_000_000);
 }
 
 /// The sign is that of the oracle, the magnitude the distance of this body alone, whatever else is
@@ -211,7 +304,7 @@ fn nested_and_inverted_shells() {
     }
 }
 
-fn joined(models: &[Model]) -> (Vec<[u32; 3]>, Vec<[f64; 3]>) {
+fn joined(models: &[Model]) -> Surface {
     let (mut faces, mut positions) = (Vec::new(), Vec::new());
     for model in models {
         let first = positions.len() as u32;

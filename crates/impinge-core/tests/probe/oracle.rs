@@ -3,8 +3,41 @@
 use dashu_int::IBig;
 use impinge_scenes::Random;
 
+/// Whole numbers without rounding or overflow.
+pub trait Whole: Clone + Ord + Default {
+    fn plus(&self, other: &Self) -> Self;
+    fn minus(&self, other: &Self) -> Self;
+    fn times(&self, other: &Self) -> Self;
+    /// A random number that is larger than all coordinates, on average.
+    fn far(random: &mut Random) -> Self;
+}
+
+macro_rules! whole {
+    ($type:ty, |$random:ident| $far:expr) => {
+        impl Whole for $type {
+            fn plus(&self, other: &Self) -> Self {
+                self + other
+            }
+            fn minus(&self, other: &Self) -> Self {
+                self - other
+            }
+            fn times(&self, other: &Self) -> Self {
+                self * other
+            }
+            fn far($random: &mut Random) -> Self {
+                let x = $far;
+                if $random.below(2) == 0 { x } else { -x }
+            }
+        }
+    };
+}
+
+whole!(IBig, |random| IBig::from(random.bits() >> 1) << 70);
+// Coordinates below 2^9. (Tests look for overflows.)
+whole!(i64, |random| (random.bits() >> 34) as i64);
+
 /// A vector in multiples of the unit.
-pub type Vector = [IBig; 3];
+pub type Vector<N = IBig> = [N; 3];
 
 /// Coordinates are multiples of 2^-120.
 const UNIT: i32 = -120;
@@ -28,20 +61,21 @@ pub fn vector(point: [f64; 3]) -> Vector {
     point.map(whole)
 }
 
-pub fn sub(p: &Vector, q: &Vector) -> Vector {
-    [0, 1, 2].map(|k| &p[k] - &q[k])
+pub fn sub<N: Whole>(p: &Vector<N>, q: &Vector<N>) -> Vector<N> {
+    [0, 1, 2].map(|k| p[k].minus(&q[k]))
 }
 
-pub fn cross(p: &Vector, q: &Vector) -> Vector {
-    [(1, 2), (2, 0), (0, 1)].map(|(i, j)| &p[i] * &q[j] - &p[j] * &q[i])
+pub fn cross<N: Whole>(p: &Vector<N>, q: &Vector<N>) -> Vector<N> {
+    [(1, 2), (2, 0), (0, 1)].map(|(i, j)| p[i].times(&q[j]).minus(&p[j].times(&q[i])))
 }
 
-pub fn dot(p: &Vector, q: &Vector) -> IBig {
-    (0..3).map(|k| &p[k] * &q[k]).fold(IBig::ZERO, |x, y| x + y)
+pub fn dot<N: Whole>(p: &Vector<N>, q: &Vector<N>) -> N {
+    let [x, y, z] = [0, 1, 2].map(|k| p[k].times(&q[k]));
+    x.plus(&y).plus(&z)
 }
 
-pub fn sign(x: &IBig) -> i32 {
-    match x.cmp(&IBig::ZERO) {
+pub fn sign<N: Whole>(x: &N) -> i32 {
+    match x.cmp(&N::default()) {
         std::cmp::Ordering::Less => -1,
         std::cmp::Ordering::Equal => 0,
         std::cmp::Ordering::Greater => 1,
@@ -49,44 +83,39 @@ pub fn sign(x: &IBig) -> i32 {
 }
 
 /// The sign of the volume of a tetrahedron.
-pub fn volume(a: &Vector, b: &Vector, c: &Vector, d: &Vector) -> i32 {
+pub fn volume<N: Whole>(a: &Vector<N>, b: &Vector<N>, c: &Vector<N>, d: &Vector<N>) -> i32 {
     sign(&dot(&cross(&sub(b, a), &sub(c, a)), &sub(d, a)))
 }
 
 /// Whether a segment contains a point.
-fn is_on_segment(p: &Vector, a: &Vector, b: &Vector) -> bool {
+fn is_on_segment<N: Whole>(p: &Vector<N>, a: &Vector<N>, b: &Vector<N>) -> bool {
     if a == b {
         return p == a;
     }
     let (way, to) = (sub(b, a), sub(p, a));
     let along = dot(&way, &to);
-    cross(&way, &to).iter().all(|x| *x == IBig::ZERO)
-        && along >= IBig::ZERO
-        && along <= dot(&way, &way)
+    cross(&way, &to).iter().all(|x| sign(x) == 0) && sign(&along) >= 0 && along <= dot(&way, &way)
 }
 
 /// Whether a triangle, which may be degenerate, contains a point.
-pub fn is_on(p: &Vector, [a, b, c]: &[Vector; 3]) -> bool {
+pub fn is_on<N: Whole>(p: &Vector<N>, [a, b, c]: &[Vector<N>; 3]) -> bool {
     let edges = [(a, b), (b, c), (c, a)];
     if edges.iter().any(|(x, y)| is_on_segment(p, x, y)) {
         return true;
     }
     let normal = cross(&sub(b, a), &sub(c, a));
-    dot(&normal, &sub(p, a)) == IBig::ZERO
+    sign(&dot(&normal, &sub(p, a))) == 0
         && edges.iter().all(|(x, y)| {
             let inner = cross(&normal, &sub(y, x));
-            dot(&inner, &sub(p, x)) > IBig::ZERO
+            sign(&dot(&inner, &sub(p, x))) > 0
         })
 }
 
 /// How often a closed surface winds around a point that is not on it: the crossings of a segment to
 /// a random far point, and of another one if it meets any edge.
-pub fn winding(p: &Vector, faces: &[[Vector; 3]], random: &mut Random) -> i32 {
+pub fn winding<N: Whole>(p: &Vector<N>, faces: &[[Vector<N>; 3]], random: &mut Random) -> i32 {
     'ways: loop {
-        let far: Vector = [(); 3].map(|()| {
-            let x = IBig::from(random.bits() >> 1) << 70;
-            if random.below(2) == 0 { x } else { -x }
-        });
+        let far: Vector<N> = [(); 3].map(|()| N::far(random));
         let mut sum = 0;
         for [a, b, c] in faces {
             let (near_side, far_side) = (volume(a, b, c, p), volume(a, b, c, &far));
