@@ -2,6 +2,7 @@
 //! chosen.
 
 use crate::bvh::bounds::Bounds;
+use impinge_exact::internal::filter::number::memory::{read, write};
 
 use four::Four;
 
@@ -12,7 +13,7 @@ pub(crate) struct Vec4(pub(crate) Four);
 impl Vec4 {
     #[inline(always)]
     pub(crate) fn splat(x: f32) -> Self {
-        Vec4(four::from(&[x; 4]))
+        Vec4(read(&[x; 4]))
     }
 
     /// Loads one vertex. All but the last are read as four numbers: the fourth is the next vertex's
@@ -21,10 +22,10 @@ impl Vec4 {
     pub(crate) fn load(positions: &[[f32; 3]], vertex: usize) -> Self {
         let vertex = &positions[vertex..];
         Vec4(match vertex.first_chunk::<2>() {
-            Some(&[[x, y, z], [next, ..]]) => four::from(&[x, y, z, next]),
+            Some(&[[x, y, z], [next, ..]]) => read(&[x, y, z, next]),
             None => {
                 let [x, y, z] = vertex[0];
-                four::from(&[x, y, z, z])
+                read(&[x, y, z, z])
             }
         })
     }
@@ -51,36 +52,30 @@ impl Vec4 {
 
     #[inline(always)]
     pub(crate) fn xyz(self) -> [f32; 3] {
-        let [x, y, z, _] = four::to(self.0);
+        let [x, y, z, _] = numbers(self.0);
         [x, y, z]
     }
 
     /// Four vertices as the rows of x, of y and of z.
     #[inline(always)]
     pub(crate) fn transpose(vertices: [Self; 4]) -> [[f32; 4]; 3] {
-        four::transpose(vertices.map(|vertex| vertex.0)).map(four::to)
+        four::transpose(vertices.map(|vertex| vertex.0)).map(numbers)
     }
+}
+
+#[inline(always)]
+fn numbers(four: Four) -> [f32; 4] {
+    let mut numbers = [0.0; 4];
+    write(four, &mut numbers);
+    numbers
 }
 
 /// Four numbers in a register. A minimum or maximum with what is no number is the second number.
 #[cfg(target_arch = "x86_64")]
 mod four {
-    use impinge_exact::internal::filter::number::memory::{read, write};
     use std::arch::x86_64::*;
 
     pub type Four = __m128;
-
-    #[inline(always)]
-    pub fn from(numbers: &[f32; 4]) -> Four {
-        read(numbers)
-    }
-
-    #[inline(always)]
-    pub fn to(four: Four) -> [f32; 4] {
-        let mut numbers = [0.0; 4];
-        write(four, &mut numbers);
-        numbers
-    }
 
     sse2! {
         fn min(a: Four, b: Four) -> Four { _mm_min_ps(a, b) }
@@ -103,23 +98,10 @@ mod four {
 
 #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
 mod four {
-    use impinge_exact::internal::filter::number::memory::{read, write};
     use std::arch::wasm32::*;
 
     pub type Four = v128;
     pub use std::arch::wasm32::{f32x4_add as add, f32x4_mul as mul};
-
-    #[inline(always)]
-    pub fn from(numbers: &[f32; 4]) -> Four {
-        read(numbers)
-    }
-
-    #[inline(always)]
-    pub fn to(four: Four) -> [f32; 4] {
-        let mut numbers = [0.0; 4];
-        write(four, &mut numbers);
-        numbers
-    }
 
     #[inline(always)]
     pub fn min(a: Four, b: Four) -> Four {
@@ -153,16 +135,6 @@ mod four {
     use std::array::from_fn;
 
     pub type Four = [f32; 4];
-
-    #[inline(always)]
-    pub fn from(numbers: &[f32; 4]) -> Four {
-        *numbers
-    }
-
-    #[inline(always)]
-    pub fn to(four: Four) -> [f32; 4] {
-        four
-    }
 
     #[inline(always)]
     pub fn min(a: Four, b: Four) -> Four {

@@ -1,5 +1,7 @@
 //! A vertex in double precision, on every processor, whatever instruction set is chosen.
 
+use impinge_exact::internal::filter::number::memory::{read, write};
+
 use two::Two;
 
 /// x and y, and z.
@@ -14,7 +16,7 @@ impl Vec64 {
     pub fn load(positions: &[[f64; 3]], vertex: u32) -> Self {
         let [x, y, z] = positions[vertex as usize];
         Vec64 {
-            xy: two::from(&[x, y]),
+            xy: read(&[x, y]),
             z,
         }
     }
@@ -37,8 +39,9 @@ impl Vec64 {
 
     #[inline(always)]
     pub fn xyz(self) -> [f64; 3] {
-        let [x, y] = two::to(self.xy);
-        [x, y, self.z]
+        let mut xy = [0.0; 2];
+        write(self.xy, &mut xy);
+        [xy[0], xy[1], self.z]
     }
 }
 
@@ -62,22 +65,9 @@ pub(super) fn ends(positions: &[[f64; 3]], vertices: &[u32]) -> [[f64; 3]; 2] {
 /// instructions of a comparison of each number.
 #[cfg(target_arch = "x86_64")]
 mod two {
-    use impinge_exact::internal::filter::number::memory::{read, write};
     use std::arch::x86_64::*;
 
     pub type Two = __m128d;
-
-    #[inline(always)]
-    pub fn from(numbers: &[f64; 2]) -> Two {
-        read(numbers)
-    }
-
-    #[inline(always)]
-    pub fn to(two: Two) -> [f64; 2] {
-        let mut numbers = [0.0; 2];
-        write(two, &mut numbers);
-        numbers
-    }
 
     sse2! {
         fn min(a: Two, b: Two) -> Two { _mm_min_pd(a, b) }
@@ -90,16 +80,6 @@ mod two {
     use std::array::from_fn;
 
     pub type Two = [f64; 2];
-
-    #[inline(always)]
-    pub fn from(numbers: &[f64; 2]) -> Two {
-        *numbers
-    }
-
-    #[inline(always)]
-    pub fn to(two: Two) -> [f64; 2] {
-        two
-    }
 
     #[inline(always)]
     pub fn min(a: Two, b: Two) -> Two {

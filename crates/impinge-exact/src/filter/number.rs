@@ -231,10 +231,6 @@ macro_rules! operator {
     };
 }
 
-#[cfg(any(
-    target_arch = "x86_64",
-    all(target_arch = "wasm32", target_feature = "simd128")
-))]
 pub mod memory;
 mod portable;
 #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]

@@ -245,12 +245,10 @@ impl<V: Lookup> Slabs<V> {
             let (below, above) = (round_down(origin), round_up(origin));
             let is_down = slabs.is_down[axis];
             let slab = &mut slabs.axes[axis];
-            slab.origin = if is_down {
-                [above, below]
-            } else {
-                [below, above]
+            slab.origin = [below, above].map(|x| V::splat(f64::from(x)));
+            if is_down {
+                slab.origin.reverse();
             }
-            .map(|x| V::splat(f64::from(x)));
             let inverse = 1.0 / direction.abs();
             let is_moderate = inverse == f64::INFINITY && direction == 0.0
                 || (1.0 / f64::from(FAR)..f64::from(FAR)).contains(&inverse);

@@ -17,6 +17,10 @@ macro_rules! plain_arrays {
 
 plain_arrays!(u8, u32, u64, f32, f64);
 
+#[cfg(any(
+    target_arch = "x86_64",
+    all(target_arch = "wasm32", target_feature = "simd128")
+))]
 macro_rules! plain_registers {
     ($($register:ty),* $(,)?) => {
         $(
