@@ -24,6 +24,8 @@ class Frames:
     def __init__(self, first, last, step=1):
         self.wanted = range(first, last + 1, step)
         self.counts = {}
+        #: Whether only selected faces count.
+        self.is_selected = False
 
     def add(self, frame, n_pairs):
         self.counts[frame] = n_pairs

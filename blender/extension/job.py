@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import threading
+import time
 
 import impinge
 
 __all__ = ["Driver", "Job"]
+
+#: Seconds to wait for a job that may be short.
+SHORT = 0.005
 
 
 class Job:
@@ -48,8 +52,8 @@ class Job:
 
 
 class Driver:
-    """Moves a generator on, which yields jobs and is sent their results. One step per call of `poll`, which never waits, so an interface has
-    time between the steps. A job that fails, or is cancelled, raises in the generator, and from `poll` what the generator lets through.
+    """Moves a generator on, which yields jobs and is sent their results, step by step, so that an interface has time between the steps. A job
+    that fails, or is cancelled, raises in the generator, and from `poll` what the generator lets through.
     """
 
     def __init__(self, steps):
@@ -62,8 +66,18 @@ class Driver:
     def progress(self):
         return (0, 0) if self._job is None else self._job.progress
 
-    def poll(self):
-        """Whether the generator has returned; `value` then has what."""
+    def poll(self, seconds=0.0):
+        """Whether the generator has returned; `value` then has what. One step, and while jobs are short, more of them for this long."""
+        end = time.perf_counter() + seconds
+        while not self._step():
+            if time.perf_counter() >= end:
+                return False
+            self._job.wait(SHORT)
+            if not self._job.is_done:
+                return False
+        return True
+
+    def _step(self):
         if self._job is not None and not self._job.is_done:
             return False
         try:
@@ -86,9 +100,8 @@ class Driver:
 
     def run(self):
         """Waits until the generator has returned, and returns what it has."""
-        while not self.poll():
-            if self._job is not None:
-                self._job.wait()
+        while not self._step():
+            self._job.wait()
         return self.value
 
     def cancel(self):

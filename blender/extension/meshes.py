@@ -29,7 +29,9 @@ def read(context, names, selected_only=False):
 
     Where `selected_only`, triangles count that come from selected faces of objects in Edit Mode; if none is selected, all count.
     """
-    objects = [context.scene.objects[name] for name in names]
+    objects = [context.scene.objects.get(name) for name in names]
+    if None in objects:
+        raise ValueError(f"{names[objects.index(None)]} is no longer in the scene")
     for object in objects:
         if object.mode == "EDIT":
             object.update_from_editmode()
@@ -103,7 +105,8 @@ def _is_same(object, mesh):
 @contextmanager
 def _numbered(context, objects):
     """Numbers the faces of the objects' own meshes meanwhile: modifiers hand the numbers on to the faces that they make of them."""
-    meshes = {object.data: object.mode == "EDIT" for object in objects if object.type == "MESH" and object.data.is_editable}
+    # Of objects that share a mesh in Edit Mode only one is in that mode.
+    meshes = {object.data: object.data.is_editmode for object in objects if object.type == "MESH" and object.data.is_editable}
     for mesh, is_edited in meshes.items():
         if is_edited:
             edited = bmesh.from_edit_mesh(mesh)

@@ -45,7 +45,8 @@ def draw_work(layout, operator, label):
         return
     done, total = state.running.frames or state.running.driver.progress
     row = layout.row(align=True)
-    row.progress(factor=done / total if total else 0.0, text=f"{state.running.label} {done:,} of {total:,}" if total else state.running.label)
+    frames = f" {done:,} of {total:,}" if state.running.frames else ""
+    row.progress(factor=done / total if total else 0.0, text=f"{label}{frames}")
     row.operator("impinge.cancel", text="", icon="X")
 
 
@@ -75,7 +76,7 @@ class IMPINGE_PT_found(Part, bpy.types.Panel):
         draw_lines(self.layout, lines)
         if found.answer.places:
             draw_places(self.layout, context, found)
-        if found.answer.faces:
+        if found.answer.has_faces:
             self.layout.operator("impinge.select", text="Select All Faces").place_only = False
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from . import places
 from .bodies import World
 
-__all__ = ["MOST_PAIRS", "Answer", "Asker", "Question"]
+__all__ = ["MOST_PAIRS", "Answer", "Asker", "Question", "is_selected"]
 
 #: The most pairs that are held: 16 bytes each. More is an error that says so.
 MOST_PAIRS = 50_000_000
@@ -35,7 +35,8 @@ class Question:
 @dataclass
 class Answer:
     """`faces` has, by name of the object, faces of its own mesh. `n_made`: triangles without one, because a modifier made them.
-    `is_placed` is false where there were too many pairs for finding places. Of `n_places`, the first are described.
+    `is_placed` is false where there were too many pairs for finding places. Of `n_places`, the first are described. `is_selected`: only
+    pairs with a selected face count.
     """
 
     n_pairs: int = 0
@@ -46,7 +47,12 @@ class Answer:
     n_triangles: int = 0
     is_placed: bool = True
     n_places: int = 0
+    is_selected: bool = False
     seconds: float = 0.0
+
+    @property
+    def has_faces(self):
+        return any(map(len, self.faces.values()))
 
 
 class Asker:
@@ -73,6 +79,7 @@ class Asker:
         began = time.perf_counter()
         answer = Answer(n_polygons={body.name: body.n_polygons for body in bodies})
         answer.n_triangles = sum(len(body.triangles) for body in bodies)
+        answer.is_selected = is_selected(bodies)
         if self.question.distance is not None:
             self._near(answer, bodies, cancel, progress)
         else:
@@ -107,7 +114,7 @@ class Asker:
             scene = self._world(part[0].name if is_local else None, part, is_local)
             which = "self" if is_local else "between"
             pairs = self._detector.detect(scene, which=which, cancel=cancel, progress=progress)
-            if any(body.selected is not None for body in part):
+            if is_selected(part):
                 pairs = pairs.retain(_either_selected(part, pairs.rows))
             yield part, scene, pairs, is_local
 
@@ -136,6 +143,11 @@ class Asker:
         if found.n_pairs:
             answer.faces = found.faces()
             answer.places, answer.n_places = found.places()
+
+
+def is_selected(bodies):
+    """Whether only selected faces count."""
+    return any(body.selected is not None for body in bodies)
 
 
 def _is_selected(body, triangles):

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-__all__ = ["Found", "Running", "found", "run", "running", "show"]
+from bpy.app.handlers import persistent
+
+__all__ = ["Found", "Running", "forget", "found", "run", "running", "show"]
 
 
 @dataclass
@@ -36,6 +38,13 @@ def show(answer, question, frame):
     """Makes this the answer that the panel shows."""
     global found
     found = Found(answer, question, frame)
+
+
+@persistent
+def forget(*_):
+    """Another file has been opened."""
+    global found
+    found = None
 
 
 def run(work):

@@ -5,6 +5,10 @@ from __future__ import annotations
 __all__ = ["lines_of_answer", "lines_of_place", "of_answer", "of_frames", "pairs"]
 
 
+#: As the option is called.
+ONLY = "selected faces only"
+
+
 def counted(n, noun):
     return f"{n:,} {noun}" if n == 1 else f"{n:,} {noun}s"
 
@@ -16,10 +20,11 @@ def pairs(n):
 def of_answer(answer, question):
     """`83 pairs of 5,804 triangles in 3 places`, as the program says it."""
     near = "" if question.distance is None else " near"
+    only = f", {ONLY}" if answer.is_selected else ""
     if not answer.n_pairs:
-        return f"none of {counted(answer.n_triangles, 'triangle')}{' is near' if near else ' intersects'}"
+        return f"none of {counted(answer.n_triangles, 'triangle')}{' is near' if near else ' intersects'}{only}"
     where = f" in {counted(answer.n_places, 'place')}" if answer.is_placed else ", too many to find their places"
-    return f"{counted(answer.n_pairs, (near + ' pair').strip())} of {counted(answer.n_triangles, 'triangle')}{where}"
+    return f"{counted(answer.n_pairs, (near + ' pair').strip())} of {counted(answer.n_triangles, 'triangle')}{where}{only}"
 
 
 def lines_of_answer(answer, question):
@@ -30,7 +35,7 @@ def lines_of_answer(answer, question):
     else:
         found = counted(answer.n_pairs, "near pair" if is_near else "pair")
         first = [f"{found} in {counted(answer.n_places, 'place')}"] if answer.is_placed else [found, "too many to find their places"]
-    return [*first, f"of {counted(answer.n_triangles, 'triangle')}"]
+    return [*first, f"of {counted(answer.n_triangles, 'triangle')}", *([ONLY] if answer.is_selected else [])]
 
 
 def lines_of_place(place, length):
@@ -43,6 +48,7 @@ def lines_of_place(place, length):
 def of_frames(seen):
     """What a scan has found."""
     n = len(seen.counts)
+    only = f", {ONLY}" if seen.is_selected else ""
     if seen.first is None:
-        return f"none of {counted(n, 'frame')} intersects"
-    return f"{seen.n_hits:,} of {counted(n, 'frame')} intersect, the first is {seen.first}"
+        return f"none of {counted(n, 'frame')} intersects{only}"
+    return f"{seen.n_hits:,} of {counted(n, 'frame')} intersect, the first is {seen.first}{only}"

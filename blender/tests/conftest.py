@@ -35,7 +35,7 @@ def scene():
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     from bl_ext.user_default.impinge import state
 
-    state.found = state.running = None
+    state.running = None
     scene = bpy.context.scene
     scene.frame_start, scene.frame_end = 1, 20
     return scene

@@ -295,6 +295,10 @@ def test_edit_mode_counts_selected_faces(cube, scene):
     some = check("BETWEEN")
     assert 0 < some.n_pairs < everything.n_pairs
     assert some.faces["a"].tolist() == [1] and len(some.faces["c"]) == 0 and len(some.faces["b"])
+    # The panel says so, for there may be more.
+    assert text.lines_of_answer(some, state.found.question)[-1] == "selected faces only"
+    assert text.of_answer(some, state.found.question).endswith(", selected faces only")
+    assert "selected" not in text.of_answer(everything, state.found.question)
     assert check("BETWEEN", selected_only=False).n_pairs == everything.n_pairs
     # What was moved in Edit Mode is seen there.
     scene.impinge.selected_only = True
@@ -338,6 +342,56 @@ def test_select(cube):
         bpy.ops.impinge.select()
 
 
+def test_select_of_objects_that_share_a_mesh(cube):
+    a, b = cube("a"), cube("b", (1.5, 1.5, 1.5))
+    b.data = a.data
+    answer = check("BETWEEN")
+    assert answer.faces["a"].tolist() == [1, 3, 5] and answer.faces["b"].tolist() == [0, 2, 4]
+    bpy.ops.impinge.select()
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert selected(a) == [0, 1, 2, 3, 4, 5]
+
+
+def test_objects_that_share_a_mesh_in_edit_mode(grid):
+    # Both orders: only one of the two is in Edit Mode, and the mesh of both.
+    for active, other in (("a", "b"), ("b", "a")):
+        a = grid("a", 4)
+        b = bpy.data.objects.new("b", a.data)
+        bpy.context.scene.collection.objects.link(b)
+        b.select_set(True)
+        b.rotation_euler = (np.pi / 2, 0, 0)
+        b.location = (0, 0.5, -0.5)
+        for made in (a, b):
+            made.modifiers.new("finer", "SUBSURF").levels = 1
+        bpy.context.view_layer.objects.active = bpy.data.objects[active]
+        bpy.data.objects[other].select_set(False)
+        bpy.ops.object.mode_set(mode="EDIT")
+        bpy.data.objects[other].select_set(True)
+        answer = check("BETWEEN", selected_only=False)
+        assert answer.n_pairs > 0 and answer.n_made == 0 and all(len(answer.faces[name]) for name in "ab")
+        bpy.ops.object.mode_set(mode="OBJECT")
+        assert meshes.NUMBER not in a.data.attributes
+        for made in (a, b):
+            bpy.data.objects.remove(made)
+
+
+def test_a_mesh_of_another_file_cannot_be_selected(cube, tmp_path):
+    a = cube("a")
+    a.data.name = "theirs"
+    bpy.data.libraries.write(str(tmp_path / "library.blend"), {a.data})
+    with bpy.data.libraries.load(str(tmp_path / "library.blend"), link=True) as (_, wanted):
+        wanted.meshes = ["theirs"]
+    a.data = wanted.meshes[0]
+    b = cube("b", (1.5, 1.5, 1.5))
+    answer = check("BETWEEN")
+    assert answer.n_pairs > 0 and len(answer.faces["a"])
+    bpy.context.view_layer.objects.active = a
+    bpy.ops.impinge.select()
+    assert {made.name for made in bpy.context.objects_in_mode} == {"b"}
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert selected(b) == answer.faces["b"].tolist()
+
+
 def test_select_one_place(cube):
     a = cube("a")
     cube("b", (1.5, 0, 0), 0.6)
@@ -371,6 +425,30 @@ def test_step_takes_the_view_there(cube, scene):
         assert np.allclose(view.view_location, place.position, atol=1e-5) and view.view_distance == pytest.approx(4 * place.radius)
     assert at[0] == at[2] == at[4] != at[1] == at[3]
     assert view.view_perspective == "PERSP" and scene.frame_current == 3
+
+
+def test_the_view_stays_far_enough_from_a_small_place_to_draw_it(add, scene):
+    add("floor", [[-2, -2, 0], [2, -2, 0], [2, 2, 0], [-2, 2, 0]], [(0, 1, 2, 3)])
+    add("tip", [[0.1, 0.2, 1e-5], [-0.5, 0, -1], [0.5, 0, -1]], [(0, 1, 2)])
+    [place] = check("BETWEEN").places
+    assert 0 < place.radius < 1e-4
+    [space] = [area.spaces.active for area in bpy.context.screen.areas if area.type == "VIEW_3D"]
+    bpy.ops.impinge.step(by=1)
+    # The view draws nothing nearer than this.
+    assert space.region_3d.view_distance > 1.4 * space.clip_start
+    space.clip_start = 1e-4
+    bpy.ops.impinge.step(by=1)
+    assert space.region_3d.view_distance < 0.01
+
+
+def test_another_file_begins_without_an_answer(cube):
+    cube("a")
+    check()
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    assert state.found is None
+    from bl_ext.user_default.impinge import panel
+
+    assert not panel.IMPINGE_PT_found.poll(bpy.context)
 
 
 class Layout:
@@ -431,11 +509,33 @@ def test_the_panel_says_what_was_found(cube, scene):
     state.run(state.Running("Scan", SimpleNamespace(progress=(0, 0)), (3, 20)))
     # Its own panel shows the work, the others their buttons.
     assert drawn(panel.IMPINGE_PT_scan)[2:4] == ["Scan 3 of 20", ""] and "Check" in drawn(panel.IMPINGE_PT_check)
+    # Progress of a check is counted in parts of its work, which mean nothing to a user.
+    state.run(state.Running("Check", SimpleNamespace(progress=(449, 3903))))
+    assert drawn(panel.IMPINGE_PT_check)[2:] == ["Check", ""]
     bpy.ops.object.mode_set(mode="EDIT")
     assert "selected_only" in drawn(panel.IMPINGE_PT_check)
 
 
+def test_the_panel_offers_no_faces_where_none_were_found(cube):
+    from bl_ext.user_default.impinge import panel
+
+    cube("a")
+    check()
+    assert drawn(panel.IMPINGE_PT_found) == ["nothing intersects", "of 12 triangles"]
+    assert not bpy.ops.impinge.select.poll()
+
+
 # Animations.
+
+
+def scan_counts(scene, frames):
+    """Pairs of frames, as Check sees them."""
+    before, counts = scene.frame_current, []
+    for frame in frames:
+        scene.frame_set(frame)
+        counts.append(check("BETWEEN").n_pairs)
+    scene.frame_set(before)
+    return counts
 
 
 def test_scan(cube, scene):
@@ -458,7 +558,10 @@ def test_scan(cube, scene):
     assert (settings.is_hit, settings.first_frame, settings.n_frames, settings.n_hits) == (True, 8, 20, 5)
     assert scene.frame_current == 5
     marks = {marker.frame: marker.name for marker in scene.timeline_markers}
-    assert list(sorted(marks)) == [2, 8, 13] and marks[13] == "impinge: free" and marks[8].endswith("pairs")
+    assert list(sorted(marks)) == [2, 8, 13] and marks[13] == "free (impinge)"
+    # The most pairs of the run. The number comes first, because the next marker cuts the name off.
+    most = max(scan_counts(scene, range(8, 13)))
+    assert marks[8] == f"{most} pairs at most (impinge)"
     # Each frame as Check sees it.
     for frame in (7, 8, 10, 12, 13):
         scene.frame_set(frame)
@@ -518,10 +621,10 @@ def test_errors_name_the_object(cube):
 
 def test_nothing_to_ask(cube):
     bpy.context.scene.impinge.which = "BETWEEN"
-    with pytest.raises(RuntimeError, match="0 objects"):
+    with pytest.raises(RuntimeError, match="Check: select 2 or more objects that have faces; 0 objects are selected"):
         bpy.ops.impinge.check()
     cube("a")
-    with pytest.raises(RuntimeError, match="1 object"):
+    with pytest.raises(RuntimeError, match="1 object is selected"):
         bpy.ops.impinge.check()
 
 
@@ -583,6 +686,8 @@ def test_a_scan_can_be_stopped(cube, scene, monkeypatch):
         moving.location.x = frame
         moving.keyframe_insert("location", frame=frame)
     scene.impinge.which = "BETWEEN"
+    # More than the frames of one look, for short ones share a look.
+    scene.frame_end = 9999
     context = Fake()
     operator = invoke(Scan, context, monkeypatch)
     # A second button says that the first is busy.
@@ -595,9 +700,43 @@ def test_a_scan_can_be_stopped(cube, scene, monkeypatch):
     while result == {"PASS_THROUGH"}:
         result = tick(operator, context)
     assert result == {"CANCELLED"} and context.reports[-1] == ({"INFO"}, "Scan was cancelled")
-    assert state.running is None and context.timers == [] and context.drawn > 5
+    assert state.running is None and context.timers == [] and context.drawn > 1
     # What was seen by then is kept, and the frame is the one from before.
-    assert 7 <= scene.impinge.n_frames < 20 and scene.impinge.is_hit and scene.frame_current == 1
+    assert 7 <= scene.impinge.n_frames < 9999 and scene.impinge.is_hit and scene.frame_current == 1
+
+
+def test_an_object_that_goes_away_ends_a_scan(cube, scene, monkeypatch):
+    cube("gone")
+    cube("still")
+    scene.impinge.which = "BETWEEN"
+    scene.frame_end = 9999
+    context = Fake()
+    operator = invoke(Scan, context, monkeypatch)
+    while not state.running.frames:
+        assert tick(operator, context) == {"PASS_THROUGH"}
+    # As an undo does it.
+    bpy.data.objects.remove(bpy.data.objects["gone"])
+    while tick(operator, context) == {"PASS_THROUGH"}:
+        pass
+    assert context.reports == [({"ERROR"}, "Scan: gone is no longer in the scene")]
+    assert state.running is None and scene.frame_current == 1
+
+
+class Broken(waiting.Waiting):
+    label = "Broken"
+
+    def steps(self, context):
+        yield job.Job(lambda cancel, progress: 1)
+        raise TypeError("not foreseen")
+
+
+def test_what_is_not_foreseen_ends_the_work(monkeypatch):
+    context = Fake()
+    operator = invoke(Broken, context, monkeypatch)
+    with pytest.raises(TypeError, match="not foreseen"):
+        while tick(operator, context) == {"PASS_THROUGH"}:
+            time.sleep(0.001)
+    assert state.running is None and context.timers == []
 
 
 class Check(waiting.Waiting):
@@ -690,6 +829,23 @@ def test_jobs_fail_where_they_are_waited_for():
     gate.set()
     with pytest.raises(impinge.Cancelled):
         driver.run()
+
+
+def test_short_jobs_do_not_wait_for_the_next_look():
+    def steps():
+        for _ in range(500):
+            yield job.Job(lambda cancel, progress: 1)
+
+    driver, n_looks = job.Driver(steps()), 1
+    while not driver.poll(10.0):
+        n_looks += 1
+    assert n_looks < 250
+    # One that is not short is not waited for.
+    gate = threading.Event()
+    driver = job.Driver(iter_of(job.Job(lambda cancel, progress: gate.wait(30))))
+    assert not driver.poll(1000.0) and not driver.poll(1000.0)
+    gate.set()
+    driver.run()
 
 
 def iter_of(one):

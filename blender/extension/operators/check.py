@@ -29,8 +29,10 @@ def wanted(context):
     names = meshes.chosen(context, which)
     if which == "ACTIVE" and not names:
         raise ValueError("there is no active object with faces")
-    if len(names) < (2 if which == "BETWEEN" else 1):
-        raise ValueError(f"{text.counted(len(names), 'object')} with faces selected, {'2' if which == 'BETWEEN' else '1'} or more needed")
+    least = 2 if which == "BETWEEN" else 1
+    if len(names) < least:
+        selected = f"{text.counted(len(names), 'object')} {'is' if len(names) == 1 else 'are'} selected"
+        raise ValueError(f"select {least} or more objects that have faces; {selected}")
     return names
 
 

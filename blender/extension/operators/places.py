@@ -36,8 +36,8 @@ class IMPINGE_OT_step(bpy.types.Operator):
         if context.scene.frame_current != found.frame:
             context.scene.frame_set(found.frame)
         place = found.answer.places[found.place]
-        for view in views(context):
-            look_at(view, place.position, place.radius)
+        for space in views(context):
+            look_at(space, place.position, place.radius)
         return {"FINISHED"}
 
 
@@ -47,17 +47,17 @@ def views(context):
     if space is None or space.type != "VIEW_3D":
         areas = [area for area in context.screen.areas if area.type == "VIEW_3D"] if context.screen else []
         space = areas[0].spaces.active if areas else None
-    return [space.region_3d] if space is not None else []
+    return [space] if space is not None else []
 
 
-def look_at(view, position, radius):
+def look_at(space, position, radius):
     """Turns nothing: the place comes into the middle, a few times its size around it."""
+    view = space.region_3d
     if view.view_perspective == "CAMERA":
         view.view_perspective = "PERSP"
     view.view_location = Vector(position)
-    # A place can be a point.
-    nearest = 1e-3 * max(1.0, float(np.abs(position).max()))
-    view.view_distance = max(4.0 * radius, nearest)
+    # A place can be a point, and nothing nearer than `clip_start` is drawn.
+    view.view_distance = max(4.0 * radius, 1e-3 * float(np.abs(position).max()), 1.5 * space.clip_start)
 
 
 class IMPINGE_OT_select(bpy.types.Operator):
@@ -71,7 +71,7 @@ class IMPINGE_OT_select(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return state.found is not None and bool(state.found.answer.faces)
+        return state.found is not None and state.found.answer.has_faces
 
     def execute(self, context):
         found = state.found
@@ -91,21 +91,25 @@ class IMPINGE_OT_select(bpy.types.Operator):
             if len(object.data.polygons) != found.answer.n_polygons[name]:
                 self.report({"ERROR"}, f"Select: {name} has changed since the check")
                 return {"CANCELLED"}
-            if object.visible_get():
+            if object.visible_get() and object.data.is_editable:
                 objects[object] = polygons
         if not objects:
-            self.report({"WARNING"}, "Select: no face that was found belongs to a visible mesh")
+            self.report({"WARNING"}, "Select: no face that was found belongs to a visible mesh of this file")
             return {"CANCELLED"}
         for object in context.selected_objects:
             object.select_set(False)
+        of_meshes = {}
         for object, polygons in objects.items():
-            set_selection(object.data, polygons)
+            # Objects can share a mesh.
+            of_meshes[object.data] = np.union1d(of_meshes.get(object.data, polygons[:0]), polygons)
             object.select_set(True)
+        for mesh, polygons in of_meshes.items():
+            set_selection(mesh, polygons)
         if context.view_layer.objects.active not in objects:
             context.view_layer.objects.active = next(iter(objects))
         context.tool_settings.mesh_select_mode = (False, False, True)
         bpy.ops.object.mode_set(mode="EDIT")
-        n_faces = sum(len(polygons) for polygons in objects.values())
+        n_faces = sum(len(polygons) for polygons in of_meshes.values())
         unknown = f", {found.answer.n_made} triangles belong to no face of a mesh" if found.answer.n_made and not self.place_only else ""
         self.report({"INFO"}, f"{n_faces} faces selected{unknown}")
         return {"FINISHED"}

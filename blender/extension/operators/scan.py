@@ -7,14 +7,14 @@ import bpy
 from .. import meshes, state, text
 from ..frames import Frames
 from ..job import Job
-from ..question import Asker
+from ..question import Asker, is_selected
 from .check import question, wanted
 from .waiting import Waiting
 
 __all__ = ["CLASSES"]
 
-#: Markers that begin with this are ours, and the next scan replaces them.
-MARK = "impinge: "
+#: Markers that end with this are ours, and the next scan replaces them. The timeline cuts names off at the next marker.
+MARK = " (impinge)"
 
 
 class IMPINGE_OT_scan(Waiting, bpy.types.Operator):
@@ -36,6 +36,7 @@ class IMPINGE_OT_scan(Waiting, bpy.types.Operator):
             for frame in seen.wanted:
                 bpy.data.scenes[scene_name].frame_set(frame)
                 bodies = meshes.read(context, names, selected_only)
+                seen.is_selected |= is_selected(bodies)
                 seen.add(frame, (yield Job(lambda cancel, progress, bodies=bodies: asker.count(bodies, cancel, progress))))
                 state.running.frames = (len(seen.counts), len(seen.wanted))
         finally:
@@ -60,13 +61,13 @@ def show(scene, seen):
     settings.n_frames, settings.n_hits = len(seen.counts), seen.n_hits
     settings.is_hit = seen.first is not None
     settings.first_frame = seen.first if seen.first is not None else 0
-    for marker in [marker for marker in scene.timeline_markers if marker.name.startswith(MARK)]:
+    for marker in [marker for marker in scene.timeline_markers if marker.name.endswith(MARK)]:
         scene.timeline_markers.remove(marker)
     if settings.mark:
         for run in seen.runs():
-            scene.timeline_markers.new(f"{MARK}{text.pairs(run.most)}", frame=run.first)
+            scene.timeline_markers.new(f"{text.pairs(run.most)} at most{MARK}", frame=run.first)
             if run.free is not None:
-                scene.timeline_markers.new(f"{MARK}free", frame=run.free)
+                scene.timeline_markers.new(f"free{MARK}", frame=run.free)
 
 
 class IMPINGE_OT_first_frame(bpy.types.Operator):

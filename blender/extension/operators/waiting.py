@@ -49,12 +49,16 @@ class Waiting:
             return {"RUNNING_MODAL"}
         if event.type != "TIMER":
             return {"PASS_THROUGH"}
-        result = self._poll(self._driver.poll)
+        result = {"CANCELLED"}
+        try:
+            # Half of the time is the interface's.
+            result = self._poll(lambda: self._driver.poll(TICK / 2))
+        finally:
+            # Whatever goes wrong, other work can begin.
+            if result is not None:
+                self._end(context)
         redraw(context)
-        if result is None:
-            return {"PASS_THROUGH"}
-        self._end(context)
-        return result
+        return result or {"PASS_THROUGH"}
 
     def cancel(self, context):
         """Blender ends the operator: another file is opened, or the window is closed."""
