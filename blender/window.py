@@ -1,12 +1,8 @@
 """Shows the extension in a window of Blender, step by step, and takes a picture of each step: what `scripts/picture blender` runs.
 
-Run by Blender with `--python window.py -- SITE OUT`: a folder with the Python module, and one for the pictures.
-
-Blender 4.2 is the first that the extension is for. Of what it uses, Blender 3.4 lacks three names, which are added here, so that Debian 12's
-package can show it.
+Run by Blender, with the extension installed, as `--python window.py -- OUT`: a folder for the pictures.
 """
 
-import importlib
 import os
 import subprocess
 import sys
@@ -14,37 +10,9 @@ import traceback
 from pathlib import Path
 
 import bpy
+from bl_ext.user_default.impinge import state
 
-SITE, OUT = map(Path, sys.argv[sys.argv.index("--") + 1 :])
-#: The name of a package, which "extension" is not.
-sys.path[:0] = [str(SITE), str(OUT)]
-if not (OUT / "impinge_extension").exists():
-    (OUT / "impinge_extension").symlink_to(Path(__file__).resolve().parent / "extension")
-extension = importlib.import_module("impinge_extension")
-state = importlib.import_module("impinge_extension.state")
-
-
-class Polygons:
-    """`Mesh.loop_triangle_polygons` of Blender 4.1."""
-
-    def __init__(self, mesh):
-        self.triangles = mesh.loop_triangles
-
-    def __len__(self):
-        return len(self.triangles)
-
-    def foreach_get(self, _, out):
-        self.triangles.foreach_get("polygon_index", out)
-
-
-def add_names():
-    for kind, name, value in (
-        (bpy.types.Mesh, "loop_triangle_polygons", property(Polygons)),
-        (bpy.types.ID, "is_editable", property(lambda self: self.library is None)),
-        (bpy.types.UILayout, "progress", lambda self, factor, text: self.label(text=text)),
-    ):
-        if not hasattr(kind, name):
-            setattr(kind, name, value)
+OUT = Path(sys.argv[-1])
 
 
 def area(kind):
@@ -55,10 +23,6 @@ def within(kind, region="WINDOW"):
     window, inside = bpy.context.window_manager.windows[0], area(kind)
     [region] = [one for one in inside.regions if one.type == region]
     return bpy.context.temp_override(window=window, screen=window.screen, area=inside, region=region)
-
-
-def mouse(*what):
-    subprocess.run(["xdotool", "mousemove", *map(str, what)], check=True)
 
 
 def press(operator, **options):
@@ -73,6 +37,7 @@ def press(operator, **options):
 
 
 def picture(name):
+    # Blender's own screenshot is black where software draws.
     subprocess.run(["import", "-window", "root", str(OUT / f"{name}.png")], check=True)
 
 
@@ -83,7 +48,7 @@ def window():
             bpy.ops.screen.area_close()
         yield 0.5
     with within("VIEW_3D"):
-        bpy.ops.screen.area_split(direction="HORIZONTAL", factor=0.17)
+        bpy.ops.screen.area_split(direction="HORIZONTAL", factor=0.15)
     yield 0.5
     lower = min((one for one in bpy.context.window_manager.windows[0].screen.areas if one.type == "VIEW_3D"), key=lambda one: one.y)
     lower.ui_type = "TIMELINE"
@@ -127,14 +92,10 @@ def steps():
     with within("DOPESHEET_EDITOR"):
         bpy.ops.action.view_all()
     yield 0.5
-    ui = next(region for region in area("VIEW_3D").regions if region.type == "UI")
-    # The tab, which newer versions can name.
-    try:
-        ui.active_panel_category = "impinge"
-    except AttributeError:
-        mouse(ui.x + ui.width - 12, bpy.context.window_manager.windows[0].height - ui.y - ui.height + 170, "click", 1)
+    next(region for region in area("VIEW_3D").regions if region.type == "UI").active_panel_category = "impinge"
+    area("VIEW_3D").tag_redraw()
+    bpy.context.window_manager.windows[0].cursor_warp(300, 500)
     yield 1
-    mouse(300, 200)
     settings, press_it = bpy.context.scene.impinge, bpy.ops.impinge
     yield 0.5
     picture("before")
@@ -152,6 +113,7 @@ def steps():
     yield from press(press_it.first_frame)
     picture("scanned")
     yield from press(press_it.check)
+    yield from press(press_it.step, by=1)
     yield from press(press_it.select, place_only=False)
     picture("between")
 
@@ -168,7 +130,5 @@ def go(script=steps()):
     os._exit(0 if (OUT / "between.png").exists() else 1)
 
 
-add_names()
-extension.register()
 bpy.context.preferences.view.show_splash = False
 bpy.app.timers.register(go, first_interval=3)

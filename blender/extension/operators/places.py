@@ -57,7 +57,7 @@ def look_at(space, position, radius):
         view.view_perspective = "PERSP"
     view.view_location = Vector(position)
     # A place can be a point, and nothing nearer than `clip_start` is drawn.
-    view.view_distance = max(4.0 * radius, 1e-3 * float(np.abs(position).max()), 1.5 * space.clip_start)
+    view.view_distance = max(4.0 * radius, 1e-3 * float(np.abs(position).max()), 3.0 * space.clip_start)
 
 
 class IMPINGE_OT_select(bpy.types.Operator):
