@@ -14,9 +14,16 @@ install() {
     echo "$0: please install these packages (Debian names): $*" >&2
     return
   fi
-  echo "== install $*"
-  as_root apt-get update -qq
-  as_root apt-get install -y -qq --no-install-recommends "$@" >/dev/null
+  (
+    # One at a time: scripts run beside each other.
+    flock 9
+    if sh -c "$present" >/dev/null 2>&1; then exit; fi
+    echo "== install $*"
+    [ -n "${IMPINGE_APT_UPDATED:-}" ] || as_root apt-get update -qq
+    as_root apt-get install -y -qq --no-install-recommends "$@" >/dev/null
+  ) 9>"${TMPDIR:-/tmp}/impinge-apt.lock"
+  # Once is enough for this script and those that it calls.
+  export IMPINGE_APT_UPDATED=1
 }
 
 # cross_std [TARGET...]

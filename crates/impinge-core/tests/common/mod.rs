@@ -191,7 +191,7 @@ pub fn cases() -> Vec<Case> {
             &ball.translated([9.0, 0.0, 0.0]),
             double,
         ));
-        for (n, k) in [(1, 1), (7, 1), (64, 2), (65, 2), (130, 3), (400, 6)] {
+        for (n, k) in [(1, 1), (7, 1), (64, 2), (65, 2), (130, 3), (260, 5)] {
             let a = soup::lattice_triangles(n, k, 1);
             let b = soup::lattice_triangles(n + 3, k, 2);
             cases.push(two(
@@ -230,7 +230,7 @@ pub fn cases() -> Vec<Case> {
         cases.push(one("soup", &soup::triangles(900, 0.15, 7), rule));
         cases.push(one("tetrahedra", &soup::tetrahedra(300, 0.2, 8), rule));
         cases.push(one("torus", &torus, rule));
-        for (n, k) in [(1, 1), (20, 1), (100, 2), (300, 4)] {
+        for (n, k) in [(1, 1), (20, 1), (100, 2), (200, 3)] {
             let web = soup::lattice_web(n, k, 9);
             cases.push(one(&format!("lattice web {n} in {k}"), &web, rule));
             let web = soup::lattice_web_tetrahedra(n, k, 10);

@@ -2,7 +2,7 @@
 //! arithmetic: results rounded up or down at random, sums in random order, products fused or
 //! distributed at random, subnormal numbers flushed or not. Signs that it calls sure must be right.
 
-use crate::generators::{Kind, Random};
+use super::generators::{Kind, Random};
 use impinge_exact::{Sign, orient3d};
 
 const BOUND: f32 = 1.0 / 65_536.0;

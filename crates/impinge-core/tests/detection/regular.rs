@@ -1,8 +1,6 @@
 //! Flat and regular meshes: the oracle's answers, without exact arithmetic.
 
-mod common;
-
-use common::{Case, check, naive};
+use crate::common::{Case, check, naive};
 use impinge_core::{Backend, Detector, Method, Query, Scene, Settings, SharedVertex};
 use impinge_scenes::{Model, regular};
 

@@ -1,9 +1,7 @@
 //! Clusters that are proven culled are left out of a frame. Whatever moves and whatever the query,
 //! no pair may be lost.
 
-mod common;
-
-use common::leaves_out;
+use crate::common::leaves_out;
 use impinge_core::{
     Backend, BodyId, Detector, Error, Filter, InstructionSet, Method, Query, Scene, Settings,
 };

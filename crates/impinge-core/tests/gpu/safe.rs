@@ -1,14 +1,10 @@
 //! Safe distances that stay on the device, held by exact tests against every pair that is near.
 //!
 //! These tests fail where no adapter is found; a software driver is enough.
-#![cfg(feature = "gpu")]
-
-#[path = "common/caller.rs"]
-mod caller;
 
 use std::collections::BTreeMap;
 
-use caller::Caller;
+use crate::caller::Caller;
 use impinge_core::exact::{ElementPair, Point, are_within};
 use impinge_core::{
     Backend, BodyId, Detector, Element, Error, PairKind, Query, Scene, Settings, wgpu,

@@ -1,9 +1,7 @@
 //! Triangles around a vertex, under `SharedVertex::Resolve`: where the vertex says that none of
 //! them meet, none do.
 
-mod common;
-
-use common::{Case, check, naive, rows};
+use crate::common::{Case, check, naive, rows};
 use impinge_core::{Backend, Detector, Method, Query, Scene, Settings, SharedVertex};
 use impinge_scenes::Random;
 

@@ -1,8 +1,6 @@
 //! How far each vertex may go in a step: by the exact test of the whole step.
 
-mod common;
-
-use common::{detector, detectors};
+use crate::common::{detector, detectors};
 use impinge_core::{
     BodyId, Error, Method, PairFilter, Positions, Query, Real, Scene, Start, Truncation,
 };

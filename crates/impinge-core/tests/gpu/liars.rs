@@ -1,10 +1,7 @@
 //! Proof that the comparison with the oracle can fail: the GPU's answers are falsified, and its
 //! kernels damaged.
-#![cfg(feature = "gpu")]
 
-mod common;
-
-use common::{Case, agree, cases, naive, rows};
+use crate::common::{Case, agree, cases, naive, rows};
 use impinge_core::{
     Backend, Detector, Method, Query, Scene, Settings, SharedVertex, hash_rows, wgpu,
 };

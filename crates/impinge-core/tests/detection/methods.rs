@@ -1,10 +1,8 @@
 //! Every method against the oracle, on every case; and proof that the comparison can fail.
 
-mod common;
-
 use std::sync::Arc;
 
-use common::{agree, cases, check, naive, rows};
+use crate::common::{self, agree, cases, check, naive, rows};
 use impinge_core::{
     Affinity, Backend, Detector, InstructionSet, Method, Positions, Query, Recluster, Scene,
     Settings, SharedVertex, hash_rows,

@@ -2,21 +2,17 @@
 //! self-intersections; and against the oracle, on frames of a sequence. Without the data folder
 //! (`../shared/data` or `$IMPINGE_DATA`) these tests fail, unless `IMPINGE_NO_DATA=1` is set.
 
-mod common;
-#[path = "../../impinge-exact/tests/common/published.rs"]
-mod published;
-
 use std::collections::HashSet;
 use std::path::PathBuf;
 
-use common::{Case, agree, naive, rows};
+use crate::common::{Case, agree, naive, rows};
+use crate::published::{self, Published};
 use impinge_core::{
     Backend, BodyId, Detector, Filter, Method, Query, Scene, Settings, SharedVertex, hash_rows,
 };
 use impinge_io::{Mesh, ReadOptions, Sequence};
-use published::Published;
 
-fn file(path: &str) -> Option<PathBuf> {
+pub fn file(path: &str) -> Option<PathBuf> {
     impinge_scenes::data::test_file(path)
 }
 

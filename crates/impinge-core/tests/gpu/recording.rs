@@ -1,5 +1,4 @@
 //! Passes as data: printed, and run launch by launch, which finds the kernel that goes wrong.
-#![cfg(feature = "gpu")]
 
 use impinge_core::gpu::recording::Ran;
 use impinge_core::{Backend, BodyId, Detector, Method, Positions, Query, Scene, Settings, wgpu};

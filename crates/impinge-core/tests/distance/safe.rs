@@ -1,8 +1,6 @@
 //! How far vertices may move, and neighbours by element: against every pair by the exact tests.
 
-mod common;
-
-use common::{detector, detectors};
+use crate::common::{detector, detectors};
 use impinge_core::exact::{ElementPair, Point, are_within, closest_points, edge_face_are_within};
 use impinge_core::{
     BodyId, Bounds, Csr, Elements, Error, Method, PairKind, Part, Query, SafeDistances, Scene,

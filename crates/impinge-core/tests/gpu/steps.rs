@@ -1,7 +1,6 @@
 //! Steps on the GPU backend against the CPU: every pair, every time to the last bit.
 //!
 //! These tests fail where no adapter is found; a software driver is enough.
-#![cfg(feature = "gpu")]
 
 use std::sync::{Mutex, OnceLock};
 

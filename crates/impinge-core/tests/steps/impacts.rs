@@ -1,7 +1,6 @@
 //! Steps: what touches while bodies move, when first, and how far a step can be taken.
 
-mod common;
-
+use crate::common;
 use std::ops::ControlFlow;
 
 use impinge_core::exact::{ElementPair, first_contact};

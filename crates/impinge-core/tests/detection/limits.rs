@@ -1,11 +1,9 @@
 //! Bad input, memory budgets, cancellation.
 
-mod common;
-
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use common::{agree, naive, rows};
+use crate::common::{self, agree, naive, rows};
 use impinge_core::{
     Backend, CancelToken, Control, Detector, Error, Method, Query, Scene, Settings, SharedVertex,
 };

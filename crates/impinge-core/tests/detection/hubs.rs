@@ -1,9 +1,7 @@
 //! Hubs, vertices that very many primitives name: the oracle's answers, with work bounded by input
 //! plus output.
 
-mod common;
-
-use common::{Case, check, naive};
+use crate::common::{Case, check, naive};
 use impinge_core::{
     Backend, Detector, Elements, Error, Method, Query, Scene, Settings, SharedVertex, Stats,
 };

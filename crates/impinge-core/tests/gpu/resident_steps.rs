@@ -1,14 +1,10 @@
 //! Steps whose positions and pairs stay on the device, against the CPU.
 //!
 //! These tests fail where no adapter is found; a software driver is enough.
-#![cfg(feature = "gpu")]
-
-#[path = "common/caller.rs"]
-mod caller;
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use caller::Caller;
+use crate::caller::Caller;
 
 use impinge_core::{
     Backend, BodyId, Detector, Error, PairKind, Part, Query, ResidentStep, Scene, Settings, wgpu,

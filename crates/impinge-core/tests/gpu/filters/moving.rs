@@ -3,8 +3,8 @@
 //! for intervals of it. Elements that it drops must not touch, all others not before the one time
 //! that it says, and certainly before the other one.
 
-use crate::bound::{Device, LARGEST, NARROWING, SMALLEST};
-use crate::generators::{Kind, Random};
+use super::bound::{Device, LARGEST, NARROWING, SMALLEST};
+use super::generators::{Kind, Random};
 use impinge_exact::{ElementPair, first_contact};
 
 const TINY: f32 = f32::from_bits((127 - 76) << 23);

@@ -1,14 +1,11 @@
 //! The GPU backend against the oracle and the CPU: whole sorted sets and their hash.
 //!
 //! These tests fail where no adapter is found; a software driver is enough.
-#![cfg(feature = "gpu")]
-
-mod common;
 
 use std::future::Future;
 use std::sync::{Mutex, OnceLock};
 
-use common::{Case, agree, cases, check, naive, rows};
+use crate::common::{Case, agree, cases, check, naive, rows};
 use impinge_core::{
     Backend, Capacities, Detector, Error, Method, Query, Recluster, Scene, Settings, SharedVertex,
     Stats, devices, wgpu,

@@ -1,0 +1,24 @@
+//! Which elements intersect, on the CPU: against the oracle, whatever the method, threshold,
+//! instruction set and history.
+
+mod changes;
+#[path = "../common/mod.rs"]
+mod common;
+mod creases;
+mod culled;
+mod data;
+mod edges;
+mod golden;
+mod hubs;
+mod left_out;
+mod limits;
+mod many;
+mod methods;
+#[path = "../../../impinge-exact/tests/common/published.rs"]
+mod published;
+mod regular;
+mod short;
+mod transform;
+mod tuning;
+
+use data::file;

@@ -1,0 +1,10 @@
+//! What is near, how near, and how far it may go.
+
+#[path = "../common/mod.rs"]
+mod common;
+mod near;
+mod safe;
+mod separation;
+mod smallest;
+mod stencils;
+mod truncate;

@@ -1,0 +1,21 @@
+//! The GPU backend: against the oracle and the CPU, and its filters in a model of its arithmetic,
+//! which needs neither device nor feature.
+
+#[cfg(feature = "gpu")]
+mod caller;
+#[cfg(feature = "gpu")]
+#[path = "../common/mod.rs"]
+mod common;
+mod filters;
+#[cfg(feature = "gpu")]
+mod liars;
+#[cfg(feature = "gpu")]
+mod pairs;
+#[cfg(feature = "gpu")]
+mod recording;
+#[cfg(feature = "gpu")]
+mod resident_steps;
+#[cfg(feature = "gpu")]
+mod safe;
+#[cfg(feature = "gpu")]
+mod steps;
