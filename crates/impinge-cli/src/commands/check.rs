@@ -18,6 +18,7 @@ use impinge::CancelToken;
 use impinge_check::{
     Finding, Options, Pool, PoolError, Report, Row, RowStore, apply_limits, serve,
 };
+use impinge_io::printable;
 
 pub use self::args::{CHECK_EXAMPLES, CheckArgs, CheckWorkerArgs, FailOn};
 pub use self::ending::fail;
@@ -105,12 +106,22 @@ pub fn check(args: &CheckArgs, cancel: &CancelToken) -> Result<(), Error> {
     }
     if let Some(file) = &args.html {
         html::write(&file.0, &report, args)?;
+        say_wrote(&file.0, args)?;
     }
     // The picture comes last, so that the answer is printed even without an adapter.
     if let Some(png) = &args.png {
         shown::draw(&png.0, &rows, args)?;
+        say_wrote(&png.0, args)?;
     }
     ending::fail(&report)
+}
+
+/// Names a file that was written, where people read the answer.
+fn say_wrote(path: &Path, args: &CheckArgs) -> Result<(), Error> {
+    if !args.json && args.format == args::Format::Text {
+        writeln!(output::out(), "wrote {}", printable(path))?;
+    }
+    Ok(())
 }
 
 /// Appends text to a file: each step of a workflow adds to its summary.

@@ -620,7 +620,8 @@ fn the_page_stands_alone_and_its_pictures_are_pictures() {
         "--html",
         "report.html",
     ];
-    failed(folder.run(args), 1, 3);
+    let text = failed(folder.run(args), 1, 3);
+    assert!(text.ends_with("\nwrote report.html\n"), "{text}");
     let page = std::fs::read_to_string(folder.path("report.html")).unwrap();
     assert!(page.starts_with("<!DOCTYPE html>") && page.ends_with("</html>\n"));
     // Nothing is loaded from elsewhere.
@@ -886,6 +887,7 @@ fn parts_of_an_assembly_are_compared() {
         .printed();
     let last = "5 parts: 2 pairs share space, 1 only touches";
     assert_eq!(text.lines().last(), Some(last), "{text}");
+    assert!(text.starts_with("wrote report.html\n"), "{text}");
     assert!(
         text.contains("within is inside block, 1 from the surface"),
         "{text}"

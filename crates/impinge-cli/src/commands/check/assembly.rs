@@ -91,6 +91,9 @@ pub fn check(args: &CheckArgs, cancel: &CancelToken) -> Result<(), Error> {
     if args.json {
         writeln!(out(), "{}", object(args, &names, &answer))?;
     } else {
+        if let Some(file) = &args.html {
+            writeln!(out(), "wrote {}", printable(&file.0))?;
+        }
         write!(out(), "{}", text(args, &names, &answer))?;
     }
     fail(args, &answer)
