@@ -21,4 +21,5 @@ mod short;
 mod transform;
 mod tuning;
 
+// `published` reads its files by it.
 use data::file;

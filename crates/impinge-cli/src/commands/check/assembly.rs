@@ -11,6 +11,7 @@ use serde_json::{Value, json};
 use super::args::{CheckArgs, FailOn, Touching};
 use super::html::write_assembly;
 use super::relations::{matrix, said, summary};
+use super::say_wrote;
 use crate::error::Error;
 use crate::load::part_name;
 use crate::output::out;
@@ -87,13 +88,11 @@ pub fn check(args: &CheckArgs, cancel: &CancelToken) -> Result<(), Error> {
     drop(watch);
     if let Some((file, meshes)) = shown {
         write_assembly(&file.0, args, &names, &meshes, &answer)?;
+        say_wrote(&file.0, args)?;
     }
     if args.json {
         writeln!(out(), "{}", object(args, &names, &answer))?;
     } else {
-        if let Some(file) = &args.html {
-            writeln!(out(), "wrote {}", printable(&file.0))?;
-        }
         write!(out(), "{}", text(args, &names, &answer))?;
     }
     fail(args, &answer)
