@@ -18,7 +18,7 @@ use super::world::DeviceWorld;
 use crate::scene::error::Error;
 use crate::scene::words::debug_by_name;
 
-/// The widest row of workgroups; `shared/arguments.wgsl` has the same.
+/// The widest row of workgroups; `shared/layout.wgsl` has the same.
 pub(super) const WIDEST: u64 = 32_768;
 
 /// The number of workgroups of a launch.

@@ -211,6 +211,20 @@ fn constants_of_single_kernels_are_those_of_the_host() {
     }
 }
 
+/// Direct3D 12 says 0 in indirect dispatches, and large scenes would lose pairs there.
+#[test]
+fn no_kernel_asks_for_the_number_of_workgroups() {
+    for (source, _) in ALL {
+        let module = parse(source);
+        let arguments = module.entry_points.iter();
+        let arguments = arguments.flat_map(|entry| &entry.function.arguments);
+        for argument in arguments {
+            let number = naga::Binding::BuiltIn(naga::BuiltIn::NumWorkGroups);
+            assert_ne!(argument.binding, Some(number), "{}", source.name);
+        }
+    }
+}
+
 #[test]
 fn a_broken_kernel_is_noticed() {
     let broken = Source {

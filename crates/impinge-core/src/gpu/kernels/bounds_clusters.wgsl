@@ -20,11 +20,10 @@ var<workgroup> highs: array<vec3<u32>, 64>;
 @compute @workgroup_size(64)
 fn main(
     @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) n_groups: vec3<u32>,
     @builtin(local_invocation_index) lane: u32,
 ) {
     let n_clusters = params.count;
-    let ix = group_number(group, n_groups);
+    let ix = group_number(group);
     if ix >= ENDS * n_clusters {
         return;
     }

@@ -16,10 +16,9 @@
 @compute @workgroup_size(64)
 fn main(
     @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) n_groups: vec3<u32>,
     @builtin(local_invocation_index) lane: u32,
 ) {
-    let cluster_ix = group_number(group, n_groups);
+    let cluster_ix = group_number(group);
     if cluster_ix >= arrayLength(&clusters) {
         return;
     }

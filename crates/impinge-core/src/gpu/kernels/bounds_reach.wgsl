@@ -36,10 +36,9 @@ fn visit(body: u32, other: u32) {
 @compute @workgroup_size(64)
 fn main(
     @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) n_groups: vec3<u32>,
     @builtin(local_invocation_index) lane: u32,
 ) {
-    let body = group_number(group, n_groups) * 64u + lane;
+    let body = group_number(group) * 64u + lane;
     if body >= params.count {
         return;
     }

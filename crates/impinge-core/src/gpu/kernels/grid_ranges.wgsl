@@ -26,14 +26,13 @@ fn cells(at: vec3<f32>, margin: f32) -> vec3<u32> {
 @compute @workgroup_size(64)
 fn main(
     @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) n_groups: vec3<u32>,
     @builtin(local_invocation_index) lane: u32,
 ) {
     if lane < SHIFTS {
         atomicStore(&n_entries[lane], 0u);
     }
     workgroupBarrier();
-    let ix = group_number(group, n_groups) * 64u + lane;
+    let ix = group_number(group) * 64u + lane;
     if ix < min(atomicLoad(&counters[N_KEPT]), arrayLength(&kept)) {
         let low = cells(values(kept[ix].low), -MARGIN);
         let high = max(cells(values(kept[ix].high), MARGIN), low);

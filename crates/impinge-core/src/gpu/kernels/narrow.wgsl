@@ -80,10 +80,9 @@ fn decide(candidate: Candidate) -> i32 {
 @compute @workgroup_size(64)
 fn main(
     @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) n_groups: vec3<u32>,
     @builtin(local_invocation_index) lane: u32,
 ) {
-    let ix = group_number(group, n_groups) * 64u + lane;
+    let ix = group_number(group) * 64u + lane;
     let n = min(atomicLoad(&counters[N_CANDIDATES]), arrayLength(&candidates));
     if lane == 0u {
         atomicStore(&n_yes, 0u);

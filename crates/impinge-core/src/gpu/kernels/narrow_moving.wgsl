@@ -25,10 +25,9 @@ fn may_touch(candidate: Candidate) -> bool {
 @compute @workgroup_size(64)
 fn main(
     @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) n_groups: vec3<u32>,
     @builtin(local_invocation_index) lane: u32,
 ) {
-    let ix = group_number(group, n_groups) * 64u + lane;
+    let ix = group_number(group) * 64u + lane;
     let n = min(atomicLoad(&counters[N_CANDIDATES]), arrayLength(&candidates));
     var is_left = false;
     var candidate = Candidate(0u, 0u);

@@ -130,10 +130,9 @@ fn name_of(pair: PairKey) -> UnsureKey {
 @compute @workgroup_size(64)
 fn main(
     @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) n_groups: vec3<u32>,
     @builtin(local_invocation_index) lane: u32,
 ) {
-    let ix = group_number(group, n_groups) * 64u + lane;
+    let ix = group_number(group) * 64u + lane;
     let n = min(atomicLoad(&counters[N_PAIRS]), arrayLength(&pairs));
     var bracket = Bracket(0u, NONE, false);
     var pair = PairKey(0u, 0u);

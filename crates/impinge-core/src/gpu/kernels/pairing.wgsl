@@ -68,10 +68,9 @@ fn put(mask: u32, first_partner: u32, mine: u32, flags: vec2<u32>, swap: bool, p
 @compute @workgroup_size(64)
 fn main(
     @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) n_groups: vec3<u32>,
     @builtin(local_invocation_index) lane: u32,
 ) {
-    let ix = group_number(group, n_groups);
+    let ix = group_number(group);
     let n_items = min(atomicLoad(&counters[N_ITEMS]), arrayLength(&items));
     if lane < 4u {
         atomicStore(&survivors[lane], 0u);

@@ -110,10 +110,9 @@ fn put(mask: u32, first: u32, own: Kept, flag: u32, pass_buffers: u32) -> u32 {
 @compute @workgroup_size(64)
 fn main(
     @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) n_groups: vec3<u32>,
     @builtin(local_invocation_index) lane: u32,
 ) {
-    let ix = group_number(group, n_groups);
+    let ix = group_number(group);
     let n_items = min(atomicLoad(&counters[N_ITEMS]), arrayLength(&items));
     if lane == 0u {
         atomicStore(&n_found, 0u);

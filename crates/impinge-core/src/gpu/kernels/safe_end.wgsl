@@ -21,10 +21,9 @@ fn are_lost() -> bool {
 @compute @workgroup_size(64)
 fn main(
     @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) n_groups: vec3<u32>,
     @builtin(local_invocation_index) lane: u32,
 ) {
-    let vertex = group_number(group, n_groups) * 64u + lane;
+    let vertex = group_number(group) * 64u + lane;
     if vertex < arrayLength(&shares) && are_lost() {
         shares[vertex] = 0u;
     }

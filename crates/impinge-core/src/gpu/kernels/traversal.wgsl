@@ -85,10 +85,9 @@ fn task(pair: NodePair, lane: u32) -> Task {
 @compute @workgroup_size(64)
 fn main(
     @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) n_groups: vec3<u32>,
     @builtin(local_invocation_index) lane: u32,
 ) {
-    let ix = group_number(group, n_groups);
+    let ix = group_number(group);
     let n_pairs = min(atomicLoad(&counters[params.first]), arrayLength(&queue));
     if lane == 0u {
         atomicStore(&n_next, 0u);

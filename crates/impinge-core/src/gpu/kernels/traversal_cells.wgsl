@@ -43,10 +43,9 @@ fn count_items(groups: u32) -> u32 {
 @compute @workgroup_size(64)
 fn main(
     @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) n_groups: vec3<u32>,
     @builtin(local_invocation_index) lane: u32,
 ) {
-    let ix = group_number(group, n_groups) * 64u + lane;
+    let ix = group_number(group) * 64u + lane;
     if lane == 0u {
         atomicStore(&n_wanted, 0u);
         atomicStore(&n_items, 0u);

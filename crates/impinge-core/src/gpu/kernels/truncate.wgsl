@@ -61,10 +61,9 @@ fn three(first: u32, is_start: bool) -> vec3<u32> {
 @compute @workgroup_size(64)
 fn main(
     @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) n_groups: vec3<u32>,
     @builtin(local_invocation_index) lane: u32,
 ) {
-    let vertex = group_number(group, n_groups) * 64u + lane;
+    let vertex = group_number(group) * 64u + lane;
     let is_one = vertex < params.count;
     var start = vec3<u32>(0u);
     var end = start;

@@ -47,10 +47,9 @@ fn n_groups_of(n: u32) -> u32 {
 @compute @workgroup_size(256)
 fn main(
     @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) n_groups: vec3<u32>,
     @builtin(local_invocation_index) lane: u32,
 ) {
-    let ix = group_number(group, n_groups) * 256u + lane;
+    let ix = group_number(group) * 256u + lane;
     let n = min(atomicLoad(&counters[N_ENTRIES]), arrayLength(&entries));
     if lane == 0u {
         atomicStore(&n_items, 0u);

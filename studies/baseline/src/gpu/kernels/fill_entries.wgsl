@@ -13,10 +13,9 @@
 @compute @workgroup_size(64)
 fn main(
     @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) n_groups: vec3<u32>,
     @builtin(local_invocation_index) lane: u32,
 ) {
-    let block = group_number(group, n_groups);
+    let block = group_number(group);
     let ix = block * 64u + lane;
     if ix >= min(atomicLoad(&counters[N_KEPT]), arrayLength(&kept)) {
         return;

@@ -45,10 +45,9 @@ fn is_candidate(a: u32, b: u32, cell: u32) -> bool {
 @compute @workgroup_size(64)
 fn main(
     @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) n_groups: vec3<u32>,
     @builtin(local_invocation_index) lane: u32,
 ) {
-    let ix = group_number(group, n_groups);
+    let ix = group_number(group);
     let n_items = min(atomicLoad(&counters[N_ITEMS]), arrayLength(&items));
     let is_item = ix < n_items;
     if lane == 0u {

@@ -13,10 +13,9 @@ var<workgroup> found: array<atomic<u32>, 256>;
 @compute @workgroup_size(256)
 fn main(
     @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) n_groups: vec3<u32>,
     @builtin(local_invocation_index) lane: u32,
 ) {
-    let block = group_number(group, n_groups);
+    let block = group_number(group);
     let n = min(atomicLoad(&counters[N_ENTRIES]), arrayLength(&entries));
     let n_blocks = n_blocks_of(n);
     atomicStore(&found[lane], 0u);

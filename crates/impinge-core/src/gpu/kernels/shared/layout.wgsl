@@ -1,6 +1,9 @@
 // The data that host and device exchange. The Rust twins are in `gpu/layout.rs`; a test
 // parses this file and compares sizes, offsets and constants.
 
+// Workgroups in a row of a dispatch that has more than one.
+const WIDEST: u32 = 32768u;
+
 // A node of the trees: a box in ordered keys (see boxes.wgsl) and where its children are.
 //
 //   shape  31           13   12   11       4 3        0
