@@ -14,6 +14,7 @@ use super::pass_buffers::{PassBuffers, PassCounts};
 use super::recording::Recording;
 use crate::query::goal::Goal;
 use crate::scene::error::Error;
+use crate::search::sink::reserve;
 use crate::search::undecided::UndecidedPair;
 
 const COUNTERS: u64 = N_COUNTERS as u64 * size_of::<Counter>() as u64;
@@ -346,10 +347,8 @@ impl ReadKeys {
 /// # Errors
 /// There is no memory for them.
 fn reserve_all<K>(keys: &mut Vec<K>, n: u64) -> Result<(), Error> {
-    let reserved = keys.try_reserve_exact(usize::try_from(n).unwrap_or(usize::MAX));
-    let what = "pairs of one pass";
-    let needed = n * size_of::<K>() as u64;
-    reserved.map_err(|_| Error::OutOfMemory { what, n, needed })
+    let n = usize::try_from(n).unwrap_or(usize::MAX);
+    reserve(keys, n, "pairs of one pass")
 }
 
 /// Appends keys as the device wrote them, within the room that was made.

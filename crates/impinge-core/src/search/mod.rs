@@ -2,6 +2,7 @@
 
 pub(crate) mod found;
 pub(crate) mod key_ranges;
+pub(crate) mod memory;
 pub(crate) mod moved;
 pub(crate) mod naive;
 pub(crate) mod narrow;

@@ -16,6 +16,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use crate::query::goal::{Goal, Limits};
 use crate::scene::error::Error;
 use crate::scene::index::Number;
+use crate::search::memory;
 
 /// Pairs that a worker gathers before it hands them over.
 pub const BLOCK: usize = 1024;
@@ -35,8 +36,11 @@ pub(crate) fn reserve<T>(
     what: &'static str,
 ) -> Result<(), Error> {
     let n = list.len();
-    let reserved = list.try_reserve_exact(n_more);
-    reserved.map_err(|_| out_of_memory::<T>(n, n_more, what))
+    let bytes = n.saturating_add(n_more).saturating_mul(size_of::<T>());
+    if memory::may_hold(bytes as u64) && list.try_reserve_exact(n_more).is_ok() {
+        return Ok(());
+    }
+    Err(out_of_memory::<T>(n, n_more, what))
 }
 
 /// An empty list with space for `n` items.
@@ -416,7 +420,12 @@ impl<T: Copy, const LISTS: usize> State<T, LISTS> {
         let last = chunks.last().map_or(0, Vec::capacity);
         let size = (2 * last).clamp(first, largest);
         let mut chunk = Vec::new();
-        if chunk.try_reserve_exact(size).is_err() || chunks.try_reserve(1).is_err() {
+        // Joining the chunks takes the same once more.
+        let joined = self.n.saturating_mul(2 * size_of::<T>() as u64);
+        if !memory::may_hold(joined)
+            || chunk.try_reserve_exact(size).is_err()
+            || chunks.try_reserve(1).is_err()
+        {
             return Err(self.no_memory(size));
         }
         chunks.push(chunk);
@@ -435,10 +444,9 @@ impl<T: Copy, const LISTS: usize> State<T, LISTS> {
                 budget,
             });
         }
-        let mut trial = Vec::<T>::new();
         let n = usize::try_from(n_more).unwrap_or(usize::MAX);
-        let reserved = trial.try_reserve_exact(n);
-        reserved.map_err(|_| self.no_memory(n))
+        with_capacity::<T>(n, "pairs").map_err(|_| self.no_memory(n))?;
+        Ok(())
     }
 
     /// Appends the chunks to what is held.
