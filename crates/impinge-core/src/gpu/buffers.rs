@@ -158,6 +158,26 @@ impl<T: Pod> Storage<T> {
         }
     }
 
+    /// Has `len` elements written from `first` on, which must fit: by `fill`, straight into what is
+    /// sent.
+    pub fn write_with(
+        &self,
+        gpu: &Device,
+        (first, len): (u64, u64),
+        fill: impl FnOnce(wgpu::WriteOnly<'_, [u8]>),
+    ) {
+        let Some(size) = wgpu::BufferSize::new(len * Self::SIZE) else {
+            return;
+        };
+        // What the device refuses goes to the open error scopes.
+        let view = gpu
+            .queue
+            .write_buffer_with(self.buffer(), first * Self::SIZE, size);
+        if let Some(mut view) = view {
+            fill(view.slice(..));
+        }
+    }
+
     /// The underlying buffer; it exists from the first `resize` on.
     pub fn buffer(&self) -> &wgpu::Buffer {
         self.buffer.as_ref().expect("resized before it is used")

@@ -28,7 +28,8 @@
 //! Parts are sent once; each frame sends the positions that have changed.
 
 use std::collections::BTreeMap;
-use std::sync::Arc;
+use std::ops::Range;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::bvh::clusters::Clustering;
 use crate::bvh::tree::TreeShape;
@@ -40,6 +41,7 @@ use crate::scene::index::{Number, PartIx};
 use crate::scene::positions::Positions;
 use crate::search::runner::Job;
 use crate::search::stats::Stats;
+use crate::workers::Workers;
 
 use super::buffers::{Storage, count};
 use super::layout::{
@@ -53,6 +55,8 @@ use super::view::{Motion, SLACK, View};
 
 /// Bit 31 of a slot is a flag.
 pub const MOST_PRIMITIVES: u64 = 1 << 31;
+/// Vertices whose positions a task sends.
+const SENT_BY_A_TASK: u64 = 1 << 14;
 /// Bytes of a vertex.
 const VERTEX: u64 = 3 * size_of::<Coordinate>() as u64;
 
@@ -66,6 +70,13 @@ struct Resident {
     n_vertices: u64,
     /// The stamps of the positions that were sent: at the start, and of the step at the end.
     sent: [u64; 2],
+}
+
+impl Resident {
+    /// Its vertices among those of one end.
+    fn vertices(&self) -> Range<u64> {
+        self.first_vertex..self.first_vertex + self.n_vertices
+    }
 }
 
 /// A part of a body on the device.
@@ -89,7 +100,6 @@ pub struct DeviceWorld {
     n_ends: u64,
     /// The nodes on the device, without their boxes.
     pub(super) trees: Trees,
-    words: Vec<u32>,
     pub(super) views: [Option<View>; 2],
     /// Whether some part has tetrahedra.
     pub has_solids: bool,
@@ -158,7 +168,6 @@ impl DeviceWorld {
             n_vertices: 0,
             n_ends: 1,
             trees: Trees::default(),
-            words: Vec::new(),
             views: [None, None],
             has_solids: false,
             nodes: Storage::plain("nodes"),
@@ -230,7 +239,12 @@ impl DeviceWorld {
         (resident, most): (&ResidentEnds<'_>, Most),
         stats: &mut Stats,
     ) -> Result<(), Error> {
-        let Job { scene, plan, .. } = job;
+        let Job {
+            scene,
+            plan,
+            workers,
+            ..
+        } = job;
         if !self.is_seen(job, (motion, clusterings)) {
             let query_parts = plan.parts.iter().zip(clusterings);
             let wanted = query_parts.map(|(query_part, clustering)| HeldPart {
@@ -239,7 +253,7 @@ impl DeviceWorld {
             });
             self.send_parts(gpu, scene, (motion, wanted.collect()), most)?;
         }
-        self.send_positions(gpu, scene, motion, resident);
+        self.send_positions(gpu, (scene, workers), motion, resident);
         self.send_records(gpu, job, motion, resident)?;
         let clusters = clusterings.iter().map(|held| held.n_clusters());
         stats.n_clusters = clusters.map(count).sum();
@@ -416,11 +430,11 @@ impl DeviceWorld {
     }
 
     /// Sends the positions of bodies that have moved, at one end or at both; runs of consecutive
-    /// bodies in one write.
+    /// bodies in one write, which all threads fill.
     fn send_positions(
         &mut self,
         gpu: &GpuContext,
-        scene: &Scene,
+        (scene, workers): (&Scene, &Workers),
         motion: Motion,
         resident: &ResidentEnds<'_>,
     ) {
@@ -438,7 +452,6 @@ impl DeviceWorld {
                     continue;
                 }
                 has_moved = true;
-                self.words.clear();
                 let positions = |body: &Resident| {
                     let body = scene.body_in(body.id.slot());
                     let start = body.positions();
@@ -447,17 +460,11 @@ impl DeviceWorld {
                         _ => body.end_positions().unwrap_or(start),
                     }
                 };
-                let words: &[Coordinate] = match (&*run, positions(&run[0])) {
-                    ([_], Positions::F32(positions)) => bytemuck::cast_slice(positions),
-                    _ => {
-                        for body in &*run {
-                            put_words(positions(body), &mut self.words);
-                        }
-                        bytemuck::cast_slice(&self.words)
-                    }
-                };
-                let first = end * self.n_vertices + run[0].first_vertex;
-                self.positions.write(gpu, 3 * first, words);
+                let at = end * self.n_vertices + run[0].first_vertex;
+                let len = run[run.len() - 1].vertices().end - run[0].first_vertex;
+                self.positions.write_with(gpu, (3 * at, 3 * len), |to| {
+                    fill(to, run, positions, workers)
+                });
                 for body in run {
                     body.sent[end as usize] = stamp(body);
                 }
@@ -533,11 +540,60 @@ fn key(part: &HeldPart) -> (BodyId, *const Clustering) {
     (part.id, Arc::as_ptr(&part.clustering))
 }
 
-/// Appends the coordinates as the device has them.
-fn put_words(positions: &Positions, words: &mut Vec<u32>) {
+/// A part of what is sent, for one of the threads.
+struct Sent<'a>(wgpu::WriteOnly<'a, [u8]>);
+
+// SAFETY: a `WriteOnly<T>` is `Send` where `T` is, but wgpu says so of sized types alone. It is like a
+// mutable reference, and bytes may be sent.
+unsafe impl Send for Sent<'_> {}
+
+/// Writes the positions of consecutive bodies as the device has them, on all threads.
+fn fill<'a>(
+    mut to: wgpu::WriteOnly<'_, [u8]>,
+    run: &[Resident],
+    positions: impl Fn(&Resident) -> &'a Positions + Sync,
+    workers: &Workers,
+) {
+    let size = SENT_BY_A_TASK * VERTEX;
+    let mut tasks = Vec::new();
+    while let Some(part) = to.split_off(..to.len().min(size as usize))
+        && !part.is_empty()
+    {
+        tasks.push(Mutex::new(Some(Sent(part))));
+    }
+    workers.for_each(&mut vec![(); workers.n()], tasks.len(), |(), ix| {
+        let part = tasks[ix]
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .take();
+        let Some(Sent(mut to)) = part else { return };
+        let start = run[0].first_vertex + count(ix) * SENT_BY_A_TASK;
+        let end = start + count(to.len()) / VERTEX;
+        let first = run.partition_point(|body| body.vertices().end <= start);
+        for body in &run[first..] {
+            let vertices = body.vertices();
+            let (from, until) = (vertices.start.max(start), vertices.end.min(end));
+            if from >= until {
+                break;
+            }
+            let own = [from, until].map(|vertex| (vertex - vertices.start) as usize);
+            let bytes = (until - from) * VERTEX;
+            let Some(to) = to.split_off(..bytes as usize) else {
+                break;
+            };
+            put(positions(body), own[0]..own[1], to);
+        }
+    });
+}
+
+/// Writes coordinates as the device has them.
+fn put(positions: &Positions, vertices: Range<usize>, mut to: wgpu::WriteOnly<'_, [u8]>) {
     match positions {
-        Positions::F32(positions) => words.extend_from_slice(bytemuck::cast_slice(positions)),
-        Positions::F64(positions) => words.extend(positions.as_flattened().iter().map(narrowed)),
+        Positions::F32(positions) => to.copy_from_slice(bytemuck::cast_slice(&positions[vertices])),
+        Positions::F64(positions) => {
+            let words = positions[vertices].as_flattened().iter().map(narrowed);
+            to.into_chunks().0.write_iter(words.map(u32::to_ne_bytes));
+        }
     }
 }
 

@@ -833,6 +833,48 @@ fn frames_can_be_awaited() {
     assert!(n_pending > 0, "the device was waited for");
 }
 
+/// Several threads write them; bodies begin and end within the share of a thread.
+#[test]
+fn large_bodies_of_both_precisions_are_sent_whole() {
+    let (ball, small) = (surfaces::ball(60_000), surfaces::ball(300));
+    let mut scene = Scene::new();
+    let mut ids = Vec::new();
+    for _ in 0..2 {
+        ids.push(ball.add_to(&mut scene).unwrap());
+        ids.push(small.add_to(&mut scene).unwrap());
+        let double = (ball.elements.clone(), ball.positions_f64());
+        ids.push(scene.add(double).unwrap());
+    }
+    assert!(ball.positions.len() > 1 << 14, "for several threads");
+    let mut on_gpu = Detector::new(gpu(Method::Clusters).threads(3)).unwrap();
+    let mut on_cpu = Detector::new(cpu(Method::Clusters)).unwrap();
+    for frame in 0..3 {
+        for (ix, &id) in ids.iter().enumerate() {
+            // They move one after the other, so runs of bodies that have moved differ.
+            if frame > 0 && ix % 3 == frame {
+                continue;
+            }
+            let x = (ix * ix % 7 + frame) as f32 * 0.37;
+            let positions = match ix % 3 {
+                1 => &small.positions,
+                _ => &ball.positions,
+            };
+            let moved = positions.iter().map(|p| [p[0] + x, p[1], p[2]]);
+            match ix % 3 {
+                2 => {
+                    let wide: Vec<[f64; 3]> = moved.map(|p| p.map(f64::from)).collect();
+                    scene.set_positions(id, &wide).unwrap();
+                }
+                _ => scene.set_positions(id, &moved.collect::<Vec<_>>()).unwrap(),
+            }
+        }
+        let pairs = on_gpu.detect(&scene, &Query::all()).unwrap();
+        let expected = on_cpu.detect(&scene, &Query::all()).unwrap();
+        assert!(expected.len() > 1000, "{}", expected.len());
+        assert_eq!(pairs.hash(), expected.hash(), "frame {frame}");
+    }
+}
+
 #[test]
 fn sizes_to_a_hundred_thousand_and_a_thousand_bodies() {
     let mut detectors =
