@@ -97,7 +97,7 @@ impl Cpu {
         answer: &Arc<Answer>,
         stats: &mut Stats,
     ) -> Result<bool, Error> {
-        job.plan.check(job.scene)?;
+        job.plan.check(job.scene, job.workers)?;
         let settings = &self.settings;
         let mut cells = Cells::new(settings);
         let Some(grid) = cells.divide(job, answer, settings, stats)? else {

@@ -111,7 +111,7 @@ impl Refit {
             self.push_needed(workers, ix, plan.parts.len(), cache, needed);
         }
         if !self.work(isa, job, tuning, caches, scratches) {
-            plan.check(scene)?;
+            plan.check(scene, workers)?;
         }
         if is_allowed {
             self.tasks.clear();

@@ -1,14 +1,30 @@
 //! Which parts of bodies take part, and whether their positions are fit for it.
 
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use crate::query::{Query, Scope};
 use crate::scene::elements::{BodyKind, Part};
 use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
 use crate::scene::index::{Number, PartIx};
-use crate::scene::positions::{Positions, check_positions};
+use crate::scene::positions::{Positions, Real, check_positions};
 use crate::scene::{Filter, Scene};
+use crate::workers::Workers;
 
 use super::{Plan, QueryPart};
+
+/// Vertices whose positions a task checks: half a megabyte.
+const CHECKED_BY_A_TASK: usize = 1 << 15;
+
+/// Whether the positions of a task are finite.
+fn are_finite(positions: &Positions, task: usize) -> bool {
+    let first = task * CHECKED_BY_A_TASK;
+    let vertices = first..positions.len().min(first + CHECKED_BY_A_TASK);
+    match positions {
+        Positions::F32(positions) => Real::all_finite(positions[vertices].as_flattened()),
+        Positions::F64(positions) => Real::all_finite(positions[vertices].as_flattened()),
+    }
+}
 
 impl Plan {
     pub(super) fn push_part(
@@ -50,10 +66,26 @@ impl Plan {
         Ok(())
     }
 
-    /// Refuses positions that were written in place and are not finite or out of range.
-    pub fn check(&self, scene: &Scene) -> Result<(), Error> {
-        self.part_ixs()
-            .try_for_each(|part| self.check_one(scene, part))
+    /// Refuses positions that were written in place and are not finite or out of range. All threads
+    /// read those of a large body.
+    pub fn check(&self, scene: &Scene, workers: &Workers) -> Result<(), Error> {
+        self.part_ixs().try_for_each(|part| {
+            let body = self.body(scene, part);
+            let n_tasks = body.n_vertices().div_ceil(CHECKED_BY_A_TASK);
+            if !body.is_checked() && n_tasks > 1 && workers.n() > 1 {
+                let is_bad = AtomicBool::new(false);
+                workers.for_each(&mut vec![(); workers.n()], n_tasks, |(), task| {
+                    if !are_finite(body.positions(), task) {
+                        is_bad.store(true, Ordering::Relaxed);
+                    }
+                });
+                if !is_bad.into_inner() {
+                    return Ok(());
+                }
+            }
+            // It names the first.
+            self.check_one(scene, part)
+        })
     }
 
     /// As [`check`](Plan::check), for one part.

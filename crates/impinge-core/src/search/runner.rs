@@ -131,7 +131,7 @@ impl Runner {
         plan: &'a Plan,
         control: &'a Control,
     ) -> Result<Job<'a>, Error> {
-        plan.check(scene)?;
+        plan.check(scene, &self.workers)?;
         Ok(Job {
             scene,
             plan,
@@ -187,7 +187,7 @@ impl Runner {
         let _shift = workers.shift(plan.n_primitives());
         outcome.begin(plan);
         if !finder.checks_positions() {
-            plan.check(scene)?;
+            plan.check(scene, &self.workers)?;
         }
         let answer = Answer::new(plan.limits, plan.held(), outcome.take_buffers());
         let answer = Arc::new(answer);

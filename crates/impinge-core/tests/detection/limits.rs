@@ -157,6 +157,30 @@ fn positions_written_in_place_are_checked_wherever_the_vertex_is() {
 }
 
 #[test]
+fn the_first_bad_position_of_a_large_body_is_named() {
+    let ball = surfaces::ball(160_000);
+    let mut scene = Scene::new();
+    let body = ball.add_to(&mut scene).unwrap();
+    let mut detector = Detector::new(cpu(Method::Cells).threads(3)).unwrap();
+    let query = Query::self_of(body);
+    let last = ball.positions.len() - 1;
+    assert!(last > 2 << 15, "for several threads: {last}");
+    for bad in [vec![last], vec![40_000, 70_000], vec![0, last]] {
+        for &vertex in &bad {
+            scene.positions_mut::<f32>(body).unwrap()[vertex][2] = f32::NAN;
+        }
+        match detector.detect(&scene, &query) {
+            Err(Error::NonFinitePosition { vertex, .. }) => assert_eq!(vertex, bad[0]),
+            other => panic!("{bad:?}: {other:?}"),
+        }
+        for &vertex in &bad {
+            scene.positions_mut::<f32>(body).unwrap()[vertex] = ball.positions[vertex];
+        }
+        detector.detect(&scene, &query).unwrap();
+    }
+}
+
+#[test]
 fn the_largest_and_smallest_coordinates_are_answered() {
     let mut scene = Scene::new();
     for scale in [f32::MAX, f32::MIN_POSITIVE, 1e-44] {
