@@ -11,9 +11,15 @@ use crate::scene::error::Error;
 #[cfg(doc)]
 use crate::scene::ids::BodyId;
 use crate::search::found::{Found, FoundByKind};
+use crate::search::runner::Job;
 use crate::search::sink::reserve;
 use crate::search::stats::Stats;
+use crate::workers::alone::is_alone;
 use impinge_exact::Contact;
+use rayon::prelude::*;
+
+/// Fewer impacts are named by one thread.
+const NAMED_BY_A_TASK: usize = 1 << 12;
 
 /// Two elements that touch during a step, and when first.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -138,19 +144,27 @@ impl Impacts {
     /// All that was found, each kind in the order of the keys.
     ///
     /// # Errors
-    /// There is no memory for them.
-    pub(crate) fn fill(&mut self, precision: Precision, found: &FoundByKind) -> Result<(), Error> {
+    /// There is no memory for them; the pool's threads do not start.
+    pub(crate) fn fill(&mut self, job: Job<'_>, found: &FoundByKind) -> Result<(), Error> {
+        let (precision, workers) = (job.plan.precision, job.workers);
         let n: usize = found.iter().map(Vec::len).sum();
         let Impacts {
             numbering, impacts, ..
         } = self;
         reserve(impacts, n, "impacts")?;
         for (kind, found) in PairKind::ALL.into_iter().zip(found) {
-            impacts.extend(
-                found
-                    .iter()
-                    .map(|found| name(numbering, kind, precision, found)),
-            );
+            let named = |found| name(numbering, kind, precision, found);
+            if found.len() <= NAMED_BY_A_TASK {
+                impacts.extend(found.iter().map(named));
+                continue;
+            }
+            workers.install(found.len(), || match is_alone() {
+                true => impacts.extend(found.iter().map(named)),
+                false => {
+                    let found = found.par_iter().with_min_len(NAMED_BY_A_TASK);
+                    impacts.par_extend(found.map(named));
+                }
+            })?;
         }
         Ok(())
     }

@@ -101,7 +101,7 @@ impl Outcome<Found<Contact>, { PairKind::ALL.len() }> for Contacts {
     fn fill(&mut self, job: Job<'_>, found: FoundByKind) -> Result<(), Error> {
         self.found = found;
         match self.names {
-            true => self.impacts.fill(job.plan.precision, &self.found),
+            true => self.impacts.fill(job, &self.found),
             false => Ok(()),
         }
     }

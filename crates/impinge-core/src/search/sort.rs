@@ -18,6 +18,8 @@ use std::ops::Range;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU32, Ordering};
 
+use rayon::prelude::*;
+
 use crate::plan::{Plan, Question};
 use crate::query::pair_kind::PairKind;
 use crate::query::settings::Settings;
@@ -27,6 +29,7 @@ use crate::search::found::Found;
 use crate::search::sink;
 use crate::simd::{Isa, Simd, with_isa};
 use crate::workers::Workers;
+use crate::workers::alone::is_alone;
 
 /// Keys per task.
 const TASK: usize = 1 << 14;
@@ -68,19 +71,30 @@ impl Keyed for u64 {
     }
 }
 
-impl<V: Copy> Keyed for Found<V> {
+impl<V: Copy + Send> Keyed for Found<V> {
     fn key(&self) -> u64 {
         self.key
     }
 
-    /// Contacts are few beside what finding them takes.
+    /// In place: contacts are far fewer than the keys of candidates.
     fn sort(
         list: &mut [Found<V>],
-        _: &mut Sorter,
+        sorter: &mut Sorter,
         _: impl FnOnce() -> Range<Number>,
-        _: &Workers,
+        workers: &Workers,
     ) -> bool {
-        list.sort_unstable_by_key(|found| found.key);
+        let by_one = |list: &mut [Found<V>]| list.sort_unstable_by_key(|found| found.key);
+        if list.len() < sorter.from {
+            by_one(list);
+            return false;
+        }
+        let sorted = workers.install(list.len(), || match is_alone() {
+            true => by_one(list),
+            false => list.par_sort_unstable_by_key(|found| found.key),
+        });
+        if sorted.is_err() {
+            by_one(list);
+        }
         false
     }
 }
