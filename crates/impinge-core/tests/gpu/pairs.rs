@@ -61,7 +61,8 @@ fn one_detector_answers_scene_after_scene() {
     let expected: Vec<_> = cases.iter().map(naive).collect();
     for method in [Method::Clusters, Method::Cells] {
         let mut detector = Detector::new(gpu(method)).unwrap();
-        let order = (0..cases.len()).chain((0..cases.len()).rev());
+        // Forth, and back by other steps.
+        let order = (0..cases.len()).chain((0..cases.len()).rev().step_by(3));
         for ix in order {
             assert_agree(
                 "scene after scene",

@@ -737,13 +737,13 @@ fn device() -> (wgpu::Device, wgpu::Queue) {
 /// The hash of a step's impacts, the earliest one, and whether there is none.
 type Answers = Result<(u64, Option<Impact>, bool), Error>;
 
-/// The answers about some steps, on a device one of whose kernels has one line replaced.
-fn damaged(steps: &[(Scene, Query)], damage: (&str, &str, &str)) -> Vec<Answers> {
+/// Whether a device, one line of whose kernels is replaced, answers about some step wrongly.
+fn is_noticed(steps: &[(Scene, Query, Answers)], damage: (&str, &str, &str)) -> bool {
     let (open, queue) = device();
     let device = Detector::with_damage(open, queue, Settings::default(), damage);
     let mut device = device.expect("a line");
-    let ask = |(scene, step): &(Scene, Query)| answers(&mut device, scene, step);
-    steps.iter().map(ask).collect()
+    let mut steps = steps.iter();
+    steps.any(|(scene, step, truth)| answers(&mut device, scene, step) != *truth)
 }
 
 fn answers(detector: &mut Detector, scene: &Scene, step: &Query) -> Answers {
@@ -759,8 +759,12 @@ fn damaged_kernels_are_noticed() {
     let some = pairs.fold(Query::between_all(), |query, (&a, &b)| {
         query.exclude((a, b))
     });
+    // Small ones first.
     let scenes = [
-        (balls(6000), Query::all()),
+        (turning_edge(), Query::all()),
+        (three_contacts(), Query::all()),
+        (leaving_points(100), Query::all().start(Start::Skip)),
+        (passing_points(100), Query::all()),
         (five_bodies().0, Query::all()),
         (many_edges(), Query::all()),
         (boxes, some),
@@ -768,14 +772,12 @@ fn damaged_kernels_are_noticed() {
             moved_until_contact(&balls(3000), &Query::all()),
             Query::all(),
         ),
-        (leaving_points(100), Query::all().start(Start::Skip)),
-        (passing_points(100), Query::all()),
-        (turning_edge(), Query::all()),
-        (three_contacts(), Query::all()),
+        (balls(6000), Query::all()),
     ];
-    let truth = scenes
-        .each_ref()
-        .map(|(scene, step)| Ok(answers(&mut on_cpu(), scene, step).expect("good")));
+    let scenes = scenes.map(|(scene, step)| {
+        let truth = answers(&mut on_cpu(), &scene, &step).expect("good");
+        (scene, step, Ok(truth))
+    });
     for harmless in [
         ("traversal_moving", "let a_first =", "let  a_first ="),
         // A device that drops nothing is slow, not wrong.
@@ -797,7 +799,7 @@ fn damaged_kernels_are_noticed() {
             "if false {",
         ),
     ] {
-        assert_eq!(damaged(&scenes, harmless), truth, "{harmless:?}");
+        assert!(!is_noticed(&scenes, harmless), "{harmless:?}");
     }
     for damage in [
         (
@@ -952,7 +954,7 @@ fn damaged_kernels_are_noticed() {
             "let a = pair.low;",
         ),
     ] {
-        assert_ne!(damaged(&scenes, damage), truth, "{damage:?}");
+        assert!(is_noticed(&scenes, damage), "{damage:?}");
     }
 }
 
