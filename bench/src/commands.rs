@@ -9,13 +9,15 @@ use crate::ours::{Feed, Ours};
 use crate::problem::{Ask, Problem, models, posed};
 use crate::report::{Report, figures, grouped};
 use crate::runner::Runner;
-use crate::{Failure, Options, distance, files, gpu, near, once, step_sizes, steps};
+use crate::{Failure, Options, distance, files, gpu, near, once, resident, step_sizes, steps};
 
 /// Runs a command by its name.
 pub fn run(command: &str, options: &Options) -> Result<(), Failure> {
     let mut report = match command {
         "two-body" | "motion" | "self" | "tets" | "bodies" | "sizes" | "adversarial" | "gpu"
-        | "regular" | "steps" | "step-sizes" | "near" | "distance" | "once" => Report::new(command),
+        | "resident" | "regular" | "steps" | "step-sizes" | "near" | "distance" | "once" => {
+            Report::new(command)
+        }
         "device" => {
             println!("{}", gpu::slug(&gpu::device(options)?));
             return Ok(());
@@ -30,6 +32,7 @@ pub fn run(command: &str, options: &Options) -> Result<(), Failure> {
         "bodies" => bodies(options, &mut report)?,
         "sizes" => sizes(options, &mut report)?,
         "gpu" => gpu::scenes(options, &mut report)?,
+        "resident" => resident::run(options, &mut report)?,
         "regular" => regular_surfaces(options, &mut report)?,
         "steps" => steps::run(options, &mut report)?,
         "step-sizes" => step_sizes::run(options, &mut report)?,

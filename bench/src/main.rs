@@ -26,6 +26,7 @@ mod parry;
 mod plain;
 mod problem;
 mod report;
+mod resident;
 mod runner;
 mod step_sizes;
 mod steps;
@@ -64,6 +65,7 @@ commands:
   near          elements within a distance, of a mesh with itself: --scene cloth-ball|rumba
   once          the first frame of a new detector, by each method: --scene ball|bunny|buddha|dragon
   gpu           the scenes of two-body and self on a GPU: stages on the device beside a lower bound
+  resident      what stays on a GPU: pairs, steps, safe distances, beside the CPU
   device        prints the name of the GPU in a form for --record
 
 options:
