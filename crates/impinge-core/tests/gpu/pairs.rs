@@ -866,7 +866,7 @@ fn large_bodies_of_both_precisions_are_sent_whole() {
                     let wide: Vec<[f64; 3]> = moved.map(|p| p.map(f64::from)).collect();
                     scene.set_positions(id, &wide).unwrap();
                 }
-                _ => scene.set_positions(id, &moved.collect::<Vec<_>>()).unwrap(),
+                _ => scene.set_positions(id, moved.collect::<Vec<_>>()).unwrap(),
             }
         }
         let pairs = on_gpu.detect(&scene, &Query::all()).unwrap();
