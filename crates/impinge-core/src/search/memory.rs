@@ -13,18 +13,20 @@ pub fn may_hold(bytes: u64) -> bool {
 /// nobody says.
 #[cfg(target_os = "linux")]
 fn most() -> Option<u64> {
+    use std::path::Path;
     use std::sync::OnceLock;
 
     static MOST: OnceLock<u64> = OnceLock::new();
     Some(*MOST.get_or_init(|| {
         let info = rustix::system::sysinfo();
+        let unit = u64::from(info.mem_unit.max(1));
         // 32 or 64 bits, as the machine has.
         #[allow(clippy::useless_conversion)]
-        let [ram, swap] = [info.totalram, info.totalswap].map(u64::from);
-        let machine = ram.saturating_add(swap);
-        let bytes = machine.saturating_mul(u64::from(info.mem_unit.max(1)));
+        let [ram, swap] =
+            [info.totalram, info.totalswap].map(|n| u64::from(n).saturating_mul(unit));
         let own = std::fs::read_to_string("/proc/self/cgroup").unwrap_or_default();
-        bytes.min(groups::most(std::path::Path::new("/sys/fs/cgroup"), &own))
+        let of_container = groups::most(Path::new("/sys/fs/cgroup"), &own, swap);
+        ram.saturating_add(swap).min(of_container)
     }))
 }
 
@@ -38,27 +40,24 @@ fn most() -> Option<u64> {
 mod groups {
     use std::path::Path;
 
-    /// The least limit, with its swap space, of a group below `root` and of those that it is in.
-    /// `own` is what the system says about the process.
-    pub(super) fn most(root: &Path, own: &str) -> u64 {
+    /// The least limit of a group below `root` and of those that it is in, each with its share of
+    /// the machine's swap space. `own` is what the system says about the process.
+    pub(super) fn most(root: &Path, own: &str, swap: u64) -> u64 {
         let path = own.lines().find_map(|line| line.strip_prefix("0::/"));
         let group = root.join(path.unwrap_or(""));
         let groups = group
             .ancestors()
             .take_while(|group| group.starts_with(root));
-        groups.map(of_group).min().unwrap_or(u64::MAX)
-    }
-
-    fn of_group(group: &Path) -> u64 {
-        let limit = |name| {
-            let text = std::fs::read_to_string(group.join(name)).ok();
-            text.and_then(|text| text.trim().parse().ok())
-        };
-        let memory: Option<u64> = limit("memory.max");
-        let swap = limit("memory.swap.max");
-        memory.map_or(u64::MAX, |memory| {
-            memory.saturating_add(swap.unwrap_or(u64::MAX))
-        })
+        let limits = groups.map(|group| {
+            // No limit is the word `max`.
+            let limit = |name| -> Option<u64> {
+                let text = std::fs::read_to_string(group.join(name)).ok();
+                text.and_then(|text| text.trim().parse().ok())
+            };
+            let own_swap = limit("memory.swap.max").map_or(swap, |limit| limit.min(swap));
+            limit("memory.max").map_or(u64::MAX, |memory| memory.saturating_add(own_swap))
+        });
+        limits.min().unwrap_or(u64::MAX)
     }
 }
 
@@ -75,19 +74,20 @@ mod tests {
             std::fs::write(folder.join(name), text).unwrap();
         };
         let own = "1:cpu:/elsewhere\n0::/outer/inner\n";
-        let none = groups::most(&root, own);
+        let most = || groups::most(&root, own, 800);
+        let none = most();
         write(&inner, "memory.max", "max\n");
         write(&root.join("outer"), "memory.max", "3000\n");
         write(&root.join("outer"), "memory.swap.max", "0\n");
-        let of_outer = groups::most(&root, own);
+        let of_outer = most();
         write(&inner, "memory.max", "1000\n");
         write(&inner, "memory.swap.max", "500\n");
-        let of_inner = groups::most(&root, own);
+        let of_inner = most();
         write(&inner, "memory.swap.max", "max\n");
-        let with_any_swap = groups::most(&root, own);
+        let with_any_swap = most();
         std::fs::remove_dir_all(&root).unwrap();
         assert_eq!(none, u64::MAX);
-        assert_eq!([of_outer, of_inner, with_any_swap], [3000, 1500, 3000]);
+        assert_eq!([of_outer, of_inner, with_any_swap], [3000, 1500, 1800]);
     }
 
     #[test]
