@@ -64,7 +64,7 @@ impl Cpu {
 
     /// Of `Auto`: answers the frame in the grid if most bodies are new and it is not crowded;
     /// otherwise returns false, and clusters are to answer it.
-    pub fn find_as_new(
+    fn find_as_new(
         &mut self,
         job: Job<'_>,
         answer: &Arc<Answer>,

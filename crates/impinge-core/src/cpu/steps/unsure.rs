@@ -1,6 +1,7 @@
-//! Pairs that filters have left to exact arithmetic, decided last where the answer is one contact.
+//! Pairs that filters have left to exact arithmetic, decided last.
 //!
-//! Reason: one such pair costs as much as a thousand pairs in a filter. The search for the earliest
+//! Reason: one such pair costs as much as a thousand pairs in a filter, and most of them are in one
+//! place, where one worker finds them; now all workers share them. The search for the earliest
 //! contact ends with an earlier time limit than it had when these pairs were found; up to that
 //! limit, the filter drops most of them. The search for any contact has usually found one by then.
 

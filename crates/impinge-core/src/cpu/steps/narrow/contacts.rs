@@ -48,7 +48,7 @@ pub(crate) struct FirstContacts {
     /// Pairs with one candidate for a contact.
     pub(super) single: Vec<Open>,
     pub(super) between: Option<Between>,
-    /// Pairs for exact arithmetic, which are decided last where one contact is sought.
+    /// Pairs for exact arithmetic, which are decided last.
     unsure: Vec<(Between, Slots)>,
     /// Whether the pairs of `unsure` are being decided.
     is_last: bool,
@@ -161,8 +161,7 @@ impl FirstContacts {
         pair: ElementPair,
         slots: Slots,
     ) {
-        let waits = self.goal != Goal::All && !self.is_last;
-        if waits && self.unsure.len() < MOST_UNSURE {
+        if !self.is_last && self.unsure.len() < MOST_UNSURE {
             self.unsure.push((between, slots));
         } else {
             self.decide_exactly(world, between, pair, slots);
