@@ -154,7 +154,7 @@ impl Impacts {
         reserve(impacts, n, "impacts")?;
         for (kind, found) in PairKind::ALL.into_iter().zip(found) {
             let named = |found| name(numbering, kind, precision, found);
-            if found.len() <= NAMED_BY_A_TASK {
+            if is_alone() || found.len() <= NAMED_BY_A_TASK {
                 impacts.extend(found.iter().map(named));
                 continue;
             }

@@ -10,6 +10,7 @@ use crate::scene::index::{Number, PartIx};
 use crate::scene::positions::{Positions, Real, check_positions};
 use crate::scene::{Filter, Scene};
 use crate::workers::Workers;
+use crate::workers::alone::is_alone;
 
 use super::{Plan, QueryPart};
 
@@ -72,7 +73,7 @@ impl Plan {
         self.part_ixs().try_for_each(|part| {
             let body = self.body(scene, part);
             let n_tasks = body.n_vertices().div_ceil(CHECKED_BY_A_TASK);
-            if !body.is_checked() && n_tasks > 1 && workers.n() > 1 {
+            if !is_alone() && !body.is_checked() && n_tasks > 1 && workers.n() > 1 {
                 let is_bad = AtomicBool::new(false);
                 workers.for_each(&mut vec![(); workers.n()], n_tasks, |(), task| {
                     if !are_finite(body.positions(), task) {

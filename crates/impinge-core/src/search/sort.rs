@@ -84,7 +84,7 @@ impl<V: Copy + Send> Keyed for Found<V> {
         workers: &Workers,
     ) -> bool {
         let by_one = |list: &mut [Found<V>]| list.sort_unstable_by_key(|found| found.key);
-        if list.len() < sorter.from {
+        if is_alone() || list.len() < sorter.from {
             by_one(list);
             return false;
         }
