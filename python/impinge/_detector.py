@@ -60,7 +60,7 @@ class Detector(DetectorBase):
     Parameters
     ----------
     backend : {"auto", "cpu", "gpu"}
-        Where. ``"auto"`` takes a GPU where there is one. With the method "auto", large new bodies are first answered on the CPU.
+        Where. ``"auto"`` takes a GPU where there is one and it pays: for steps, and for frames after one with 50,000 candidates or more.
     method : {"auto", "clusters", "cells", "naive"}
         How candidates are found. ``"clusters"``: groups fixed by topology, the fast one for bodies that
         come back. ``"cells"``: the two-level grid of the paper. ``"auto"``: cells for large bodies that are new,

@@ -176,7 +176,9 @@ impl Detector {
 
     /// Whether the search for the earliest contact also lists the pairs that rounding may bring
     /// together.
-    fn lists_close_pairs(&self) -> bool {
+    fn lists_close_pairs(&mut self) -> bool {
+        #[cfg(feature = "gpu")]
+        self.open_gpu();
         #[cfg(feature = "gpu")]
         let is_on_device = self.gpu.is_some();
         #[cfg(not(feature = "gpu"))]

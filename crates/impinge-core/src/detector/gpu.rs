@@ -5,7 +5,6 @@ use std::sync::Arc;
 
 use super::{Detector, Settings};
 use crate::clusterings::Clusterings;
-use crate::cpu::Cpu;
 use crate::cpu::steps::{ByDevice, StepClusters};
 use crate::gpu::recording::{Ran, Recording};
 use crate::gpu::{Capacities, Engine, GpuContext, WantedAdapter};
@@ -14,10 +13,12 @@ use crate::query::settings::Backend;
 use crate::query::settings::Method;
 use crate::scene::error::Error;
 use crate::search::found::StepAnswer;
-use crate::search::runner::{Finder, Job};
-use crate::search::sink::Answer;
+use crate::search::runner::Job;
 use crate::search::stats::Stats;
 use crate::workers::is_forked;
+
+/// Candidates of the last frame from which on a device pays.
+const PAYS_FROM: u64 = 50_000;
 
 /// Opens the GPU that the settings ask for, if they ask for one.
 pub(super) fn open(
@@ -29,6 +30,11 @@ pub(super) fn open(
         None => wanted(settings).map(GpuContext::open).transpose(),
     };
     engine_of(gpu, settings, clusterings)
+}
+
+/// Whether a GPU is opened when it first pays: one that nobody has asked for by name.
+pub(super) fn may_wait(settings: &Settings) -> bool {
+    settings.backend == Backend::Auto && settings.device.is_none() && !pays(settings, 0)
 }
 
 /// [`open`] without blocking.
@@ -127,40 +133,23 @@ pub(super) fn find_in_step(
     Ok(ByDevice::Not)
 }
 
-/// A device, and with `Backend::Auto` the CPU for frames of new bodies.
+/// Whether a device pays for a frame, with `Backend::Auto`, if the last one had so many candidates.
 ///
-/// Every method of the device works on clusters, which the host makes. That takes the host about
-/// twice as long as the whole frame takes in its own grid. So `Method::Auto` answers such a frame
-/// there, by the rule of the CPU backend.
-pub(super) struct OnDevice<'a> {
-    pub engine: &'a mut Engine,
-    pub cpu: Option<&'a mut Cpu>,
-}
-
-impl Finder for OnDevice<'_> {
-    fn method(&self) -> &'static str {
-        self.engine.method()
-    }
-
-    fn backend(&self) -> &str {
-        self.engine.backend()
-    }
-
-    async fn find(
-        &mut self,
-        job: Job<'_>,
-        answer: &Arc<Answer>,
-        stats: &mut Stats,
-    ) -> Result<(), Error> {
-        if let Some(cpu) = &mut self.cpu
-            && cpu.find_as_new(job, answer, stats)?
-        {
-            cpu.backend().clone_into(&mut stats.backend);
-            stats.bytes_held += self.engine.bytes();
-            return Ok(());
-        }
-        self.engine.find(job, answer, stats).await
-    }
+/// With few, the CPU has answered before the device has the positions. What was measured
+/// (docs/lab/gpu.md), milliseconds:
+///
+/// ```text
+/// candidates            20,000   64,000   149,000   650,000
+/// the CPU, 16 threads     0.38     1.62      2.65      13.0
+/// the device              0.97     0.77      1.09       8.3
+/// ```
+///
+/// A first frame is the CPU's: it has large new bodies in its grid, where a device would wait for
+/// the host to make their clusters. A memory budget is for one of both, so the device answers, and
+/// so it does by `Cells`, which takes the CPU four times as long.
+pub(super) fn pays(settings: &Settings, n_candidates: u64) -> bool {
+    let may_wait = settings.memory_budget.is_none() && settings.method != Method::Cells;
+    n_candidates >= PAYS_FROM || !may_wait
 }
 
 impl Detector {
@@ -259,7 +248,39 @@ impl Detector {
         Ok(Detector::assemble(settings, clusterings, engine))
     }
 
+    /// Opens the GPU that has waited, for a question for which it pays. If there is none, the CPU
+    /// answers from now on.
+    pub(super) fn open_gpu(&mut self) {
+        if std::mem::take(&mut self.gpu_waits) {
+            self.gpu = open(&self.settings, &self.clusterings).unwrap_or_default();
+        }
+    }
+
     pub(super) fn gpu_in_use(&self) -> Option<Arc<GpuContext>> {
         self.gpu.as_ref().map(|engine| Arc::clone(engine.gpu()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::query::Query;
+    use crate::scene::Scene;
+
+    #[test]
+    fn a_device_that_nobody_named_waits_for_a_question_for_which_it_pays() {
+        let mut scene = Scene::new();
+        let corners = [[0.0f32, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+        scene.add_triangles(&[[0, 1, 2]], &corners).unwrap();
+        let waits = |detector: &Detector| detector.gpu_waits;
+        let mut detector = Detector::new(Settings::new()).unwrap();
+        detector.detect(&scene, &Query::all()).unwrap();
+        detector.near(&scene, 0.5, &Query::all()).unwrap();
+        assert!(waits(&detector) && detector.gpu.is_none());
+        detector.earliest(&scene, &Query::all()).unwrap();
+        assert!(!waits(&detector));
+        let budget = Settings::new().memory_budget(Some(1 << 24));
+        assert!(!waits(&Detector::new(budget).unwrap()));
+        assert!(!waits(&Detector::new(Backend::Cpu).unwrap()));
     }
 }

@@ -11,6 +11,8 @@ use crate::query::settings::{Method, Settings};
 use crate::query::{Query, Scope};
 use crate::scene::Scene;
 use crate::scene::error::Error;
+#[cfg(feature = "gpu")]
+use crate::search::runner::Outcome;
 use crate::search::runner::ready;
 use crate::search::work::Work;
 
@@ -151,14 +153,18 @@ impl Detector {
         pairs: &mut Pairs,
     ) -> Result<u64, Error> {
         #[cfg(feature = "gpu")]
+        if super::gpu::pays(&self.settings, self.n_candidates) {
+            self.open_gpu();
+        }
+        #[cfg(feature = "gpu")]
         if let Some(gpu) = self.gpu_in_use() {
             return gpu.block_on(self.answer(scene, plan, control, pairs));
         }
         ready(self.answer(scene, plan, control, pairs))
     }
 
-    /// One frame. With `Backend::Auto`, the CPU takes over for good if the GPU fails or cannot hold
-    /// the scene.
+    /// One frame. With `Backend::Auto`, the GPU answers where the last frame had much to test, and
+    /// the CPU takes over for good if it fails or cannot hold the scene.
     pub(super) async fn answer(
         &mut self,
         scene: &Scene,
@@ -168,6 +174,10 @@ impl Detector {
     ) -> Result<u64, Error> {
         let n = self.find_pairs(scene, plan, control, pairs).await;
         self.stats.clone_from(pairs.stats());
+        #[cfg(feature = "gpu")]
+        {
+            self.n_candidates = self.stats.n_candidates;
+        }
         n
     }
 
@@ -182,14 +192,19 @@ impl Detector {
         #[cfg(feature = "gpu")]
         if let Some(engine) = &mut self.gpu {
             let may_choose = self.settings.backend == Backend::Auto;
-            let cpu = may_choose.then_some(&mut *cpu);
-            let mut finder = super::gpu::OnDevice { engine, cpu };
-            let found = runner.run(scene, plan, control, &mut finder, pairs);
-            match found.await {
-                Err(Error::Gpu { .. }) if may_choose => self.gpu = None,
-                result => return result,
+            if !may_choose || super::gpu::pays(&self.settings, self.n_candidates) {
+                let found = runner.run(scene, plan, control, engine, pairs);
+                match found.await {
+                    Err(Error::Gpu { .. }) if may_choose => self.gpu = None,
+                    result => return result,
+                }
             }
         }
-        runner.run(scene, plan, control, cpu, pairs).await
+        let found = runner.run(scene, plan, control, cpu, pairs).await;
+        #[cfg(feature = "gpu")]
+        if let Some(engine) = &self.gpu {
+            pairs.stats_mut().bytes_held += engine.bytes();
+        }
+        found
     }
 }

@@ -77,6 +77,12 @@ pub struct Detector {
     probes: Probes,
     #[cfg(feature = "gpu")]
     gpu: Option<crate::gpu::Engine>,
+    /// Whether a GPU is still to be opened, when it first pays.
+    #[cfg(feature = "gpu")]
+    gpu_waits: bool,
+    /// Of the last frame: whether a GPU pays for the next one.
+    #[cfg(feature = "gpu")]
+    n_candidates: u64,
 }
 
 impl std::fmt::Debug for Detector {
@@ -127,7 +133,10 @@ impl Detector {
         settings.check()?;
         let clusterings = Clusterings::new(&settings);
         #[cfg(feature = "gpu")]
-        let gpu = gpu::open(&settings, &clusterings)?;
+        let gpu = match gpu::may_wait(&settings) {
+            true => None,
+            false => gpu::open(&settings, &clusterings)?,
+        };
         Ok(Detector::assemble(
             settings,
             clusterings,
@@ -160,7 +169,11 @@ impl Detector {
     ) -> Self {
         Detector {
             #[cfg(feature = "gpu")]
+            gpu_waits: gpu.is_none() && gpu::may_wait(&settings),
+            #[cfg(feature = "gpu")]
             gpu,
+            #[cfg(feature = "gpu")]
+            n_candidates: 0,
             runner: Runner::new(&settings),
             homes: Homes::new(&settings),
             control: Control::new(),

@@ -31,6 +31,7 @@ impl std::fmt::Debug for Gpu<'_> {
 impl Detector {
     /// The device, if the detector works on one: for frames whose positions and pairs stay there.
     pub fn gpu(&mut self) -> Option<Gpu<'_>> {
+        self.open_gpu();
         self.gpu.is_some().then_some(Gpu { detector: self })
     }
 }

@@ -281,6 +281,8 @@ impl Detector {
         (start, names): (Option<StartAnswer>, bool),
         keys: Keys<'_>,
     ) -> Result<Seen, Error> {
+        #[cfg(feature = "gpu")]
+        self.open_gpu();
         let contacts = &mut self.steps.contacts;
         (contacts.start, contacts.names) = (start, names);
         let mut finder = InStep {

@@ -13,10 +13,6 @@ pub enum Method {
     /// `Clusters` as soon as they come back: their second frame makes the clusters.
     /// [`Stats::method`](crate::Stats::method) says which one answered. With a memory budget, and
     /// for steps and distances always `Clusters`.
-    ///
-    /// With `Backend::Auto`, a detector on a GPU answers such a first frame on the CPU, and
-    /// [`Stats::backend`](crate::Stats::backend) says so: all methods of a device work on clusters,
-    /// and making them takes the CPU longer than the whole frame in its grid.
     #[default]
     Auto,
     /// Groups are fixed by topology; in each frame only their boxes move. The fastest method for
@@ -45,8 +41,11 @@ words!("method", "auto, clusters, cells or naive", Method: [Auto = "auto", Clust
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[non_exhaustive]
 pub enum Backend {
-    /// A hardware GPU if there is one, else the CPU. The CPU also takes over if the GPU fails or
-    /// cannot hold the scene.
+    /// A hardware GPU if there is one and it pays, else the CPU;
+    /// [`Stats::backend`](crate::Stats::backend) says which one. It pays for steps, and for frames
+    /// after one with at least 50,000 pairs of boxes that overlap; with a memory budget, and by
+    /// `Cells`, it answers all frames. The CPU also takes over if the GPU fails or cannot hold the
+    /// scene.
     #[default]
     Auto,
     /// The CPU, with one thread per core or as many as [`Settings::threads`] says.

@@ -291,15 +291,20 @@ fn what_is_more_than_the_device_binds_is_answered_in_pieces() {
 
 #[test]
 fn auto_takes_the_cpu_where_the_gpu_would_need_pieces() {
-    let case = cases().swap_remove(0);
-    let settings = gpu(Method::Clusters)
-        .backend(Backend::Auto)
-        .device(Some(devices()[0].name.clone()));
+    let (scene, query) = much_to_test();
+    let case = Case {
+        name: "much to test".into(),
+        scene,
+        query,
+    };
+    let expected = naive(&case);
     let answer = |most_bound| {
-        let mut detector = Detector::with_most_bound(settings.clone(), most_bound).unwrap();
-        assert_agree("auto", &naive(&case), &mut detector, &case);
-        let pairs = detector.detect(&case.scene, &case.query).unwrap();
-        pairs.stats().backend.clone()
+        let mut detector = Detector::with_most_bound(on_any_device(), most_bound).unwrap();
+        // The first frame is the CPU's.
+        for _ in 0..3 {
+            assert_agree("auto", &expected, &mut detector, &case);
+        }
+        detector.stats().backend.clone()
     };
     assert_eq!(answer(8 << 10), "cpu");
     assert_ne!(answer(u64::MAX), "cpu");
@@ -912,17 +917,15 @@ fn on_any_device() -> Settings {
         .device(Some(devices()[0].name.clone()))
 }
 
-/// Two balls of many triangles that meet.
-fn large_balls(scene: &mut Scene) -> [impinge_core::BodyId; 2] {
-    let ball = surfaces::ball(12_000);
-    let b = ball.translated([0.5, 0.1, 0.0]);
-    [ball, b].map(|model| model.add_to(scene).unwrap())
+/// A soup with 100,000 candidates.
+fn much_to_test() -> (Scene, Query) {
+    let mut scene = Scene::new();
+    soup::triangles(700, 1.5, 3).add_to(&mut scene).unwrap();
+    (scene, Query::all())
 }
 
 #[test]
-fn auto_meets_new_bodies_in_the_grid_of_the_host_and_known_ones_on_the_device() {
-    let mut scene = Scene::new();
-    let [a, b] = large_balls(&mut scene);
+fn auto_takes_the_device_where_the_last_frame_had_much_to_test() {
     let mut auto = Detector::new(on_any_device()).unwrap();
     let mut clusters = Detector::new(cpu(Method::Clusters)).unwrap();
     let mut ask = |scene: &Scene, query: &Query| {
@@ -930,70 +933,48 @@ fn auto_meets_new_bodies_in_the_grid_of_the_host_and_known_ones_on_the_device() 
         let expected = clusters.detect(scene, query).unwrap();
         assert!(!expected.is_empty() && pairs.rows().eq(expected.rows()));
         let stats = pairs.stats();
-        assert_eq!(stats.method == "cells", stats.backend == "cpu");
-        assert_eq!(stats.method == "cells", stats.grid.is_some());
-        stats.method
+        (
+            stats.backend != "cpu",
+            stats.method,
+            stats.n_candidates >= 50_000,
+        )
     };
-    let query = Query::between(a, b);
-    assert_eq!(ask(&scene, &query), "cells");
-    for frame in 1..3 {
-        let moved = surfaces::ball(12_000).translated([0.4, 0.1 * frame as f32, 0.0]);
-        scene.set_positions(b, &moved.positions).unwrap();
-        assert_eq!(ask(&scene, &query), "clusters");
-    }
-    let remeshed = surfaces::ball(30_000);
-    scene
-        .remesh(a, (remeshed.elements.clone(), remeshed.positions.clone()))
-        .unwrap();
-    assert_eq!(ask(&scene, &query), "cells", "most of it is new");
-    assert_eq!(ask(&scene, &query), "clusters");
+    // Two balls that meet in one place.
+    let mut scene = Scene::new();
+    let ball = surfaces::ball(12_000);
+    let a = ball.add_to(&mut scene).unwrap();
+    let b = ball.translated([0.5, 0.1, 0.0]).add_to(&mut scene).unwrap();
+    let few = Query::between(a, b);
+    assert_eq!(ask(&scene, &few), (false, "cells", false));
+    assert_eq!(ask(&scene, &few), (false, "clusters", false));
+    let (crowd, all) = much_to_test();
+    assert_eq!(ask(&crowd, &all), (false, "clusters", true));
+    assert_eq!(ask(&crowd, &all), (true, "clusters", true));
+    assert_eq!(ask(&scene, &few), (true, "clusters", false));
+    assert_eq!(ask(&scene, &few), (false, "clusters", false));
     // Also through what holds no pairs.
-    let [c, d] = large_balls(&mut scene);
-    let query = Query::between(c, d);
-    let n = clusters.count(&scene, &query).unwrap();
-    assert_eq!(auto.count(&scene, &query).unwrap(), n);
-    assert_eq!(auto.stats().backend, "cpu");
-    assert!(auto.any(&scene, &query).unwrap());
-    assert_ne!(auto.stats().backend, "cpu");
-    // A device that was asked for by name of the backend gets the first frame too.
-    let mut asked = Detector::new(gpu(Method::Auto)).unwrap();
-    assert_eq!(asked.count(&scene, &query).unwrap(), n);
-    assert_ne!(asked.stats().backend, "cpu");
-    // What the grid does not look at is refused all the same.
-    let [e, f] = large_balls(&mut scene);
-    scene.positions_mut::<f32>(e).unwrap()[7] = [f32::NAN; 3];
-    let error = auto.detect(&scene, &Query::between(e, f)).unwrap_err();
-    assert!(error.to_string().contains("vertex 7"), "{error}");
-}
-
-#[test]
-fn auto_leaves_small_and_crowded_scenes_resolved_neighbours_and_budgets_to_the_device() {
-    let ask = |model: &impinge_scenes::Model, rule, memory_budget| {
-        let mut scene = Scene::new();
-        model.add_to(&mut scene).unwrap();
-        let query = Query::all().shared_vertex(rule);
-        let mut auto = Detector::new(on_any_device().memory_budget(memory_budget)).unwrap();
-        let pairs = auto.detect(&scene, &query).unwrap();
-        let mut cells = Detector::new(cpu(Method::Cells)).unwrap();
-        assert!(
-            pairs
-                .rows()
-                .eq(cells.detect(&scene, &query).unwrap().rows())
+    let n = clusters.count(&crowd, &all).unwrap();
+    for on_device in [false, true] {
+        assert_eq!(auto.count(&crowd, &all).unwrap(), n);
+        assert_eq!(auto.stats().backend != "cpu", on_device);
+    }
+    // A device that is asked for has the first frame too, and so has one under a budget.
+    let budget = on_any_device().memory_budget(Some(1 << 28));
+    for settings in [gpu(Method::Auto), budget] {
+        let mut asked = Detector::new(settings).unwrap();
+        assert_eq!(
+            asked.count(&scene, &few).unwrap(),
+            clusters.count(&scene, &few).unwrap()
         );
-        let stats = pairs.stats();
-        assert_eq!(stats.method == "cells", stats.backend == "cpu");
-        assert_eq!(stats.method == "cells", stats.grid.is_some());
-        stats.method
-    };
-    let knot = surfaces::torus_knot(20_000, Default::default());
-    assert_eq!(ask(&knot, SharedVertex::Skip, None), "cells");
-    assert_eq!(ask(&knot, SharedVertex::Resolve, None), "clusters");
-    assert_eq!(ask(&knot, SharedVertex::Skip, Some(1 << 28)), "clusters");
-    let small = surfaces::torus_knot(2_000, Default::default());
-    assert_eq!(ask(&small, SharedVertex::Skip, None), "clusters");
-    // Almost all triangles in a small part of the whole.
-    let mut crowded = knot.scaled(1.0 / 1024.0);
-    crowded.positions[0] = [1.0, 1.0, 1.0];
-    crowded.positions[1] = [-1.0, -1.0, -1.0];
-    assert_eq!(ask(&crowded, SharedVertex::Skip, None), "clusters");
+        assert_ne!(asked.stats().backend, "cpu");
+    }
+    // What the grid does not look at is refused all the same.
+    let mut scene = Scene::new();
+    let a = ball.add_to(&mut scene).unwrap();
+    scene.positions_mut::<f32>(a).unwrap()[7] = [f32::NAN; 3];
+    let error = Detector::new(on_any_device())
+        .unwrap()
+        .detect(&scene, &Query::self_of(a));
+    let error = error.unwrap_err();
+    assert!(error.to_string().contains("vertex 7"), "{error}");
 }
