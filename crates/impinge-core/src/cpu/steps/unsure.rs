@@ -15,16 +15,24 @@ const TASK: usize = 8;
 
 /// Decides the unsure pairs of all workers.
 pub(super) fn decide(job: Job<'_>, world: StepWorld<'_>, workers: &mut [StepWorker]) {
-    let mut unsure = Vec::new();
-    for worker in &mut *workers {
-        unsure.append(worker.contacts().unsure());
-    }
+    let taken = workers.iter_mut();
+    let mut lists: Vec<_> = taken
+        .map(|worker| std::mem::take(worker.contacts().unsure()))
+        .collect();
     // They come in runs of two parts, as workers find them.
-    let runs = unsure.chunk_by(|(between, _), (next, _)| between == next);
-    let tasks: Vec<_> = runs.flat_map(|run| run.chunks(TASK)).collect();
+    let tasks: Vec<_> = lists
+        .iter()
+        .flat_map(|list| list.chunk_by(|(between, _), (next, _)| between == next))
+        .flat_map(|run| run.chunks(TASK))
+        .collect();
     job.workers.for_each(workers, tasks.len(), |worker, ix| {
         if !world.known.is_over() {
             worker.contacts().decide_unsure(world.isa, world, tasks[ix]);
         }
     });
+    // Their memory serves the next step.
+    for (worker, list) in workers.iter_mut().zip(&mut lists) {
+        list.clear();
+        std::mem::swap(worker.contacts().unsure(), list);
+    }
 }
