@@ -15,6 +15,10 @@ const TASK: usize = 8;
 
 /// Decides the unsure pairs of all workers.
 pub(super) fn decide(job: Job<'_>, world: StepWorld<'_>, workers: &mut [StepWorker]) {
+    let mut are_empty = workers.iter_mut();
+    if are_empty.all(|worker| worker.contacts().unsure().is_empty()) {
+        return;
+    }
     let taken = workers.iter_mut();
     let mut lists: Vec<_> = taken
         .map(|worker| std::mem::take(worker.contacts().unsure()))
