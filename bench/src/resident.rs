@@ -19,6 +19,14 @@ const N_WARM: usize = 4;
 /// How far vertices of the cloth may move at most, as a part of the longest side of its box.
 const MOST: f64 = 1e-3;
 
+/// Encodes a frame of this number.
+trait Encode: Fn(usize, &mut Gpu<'_>, &mut wgpu::CommandEncoder) -> Result<(), impinge::Error> {}
+
+impl<F> Encode for F where
+    F: Fn(usize, &mut Gpu<'_>, &mut wgpu::CommandEncoder) -> Result<(), impinge::Error>
+{
+}
+
 /// A device, as a solver would own it.
 struct Caller {
     device: wgpu::Device,
@@ -54,54 +62,38 @@ impl Caller {
         Ok(())
     }
 
-    /// Milliseconds per frame: alone, and in a row.
-    fn measure(
-        &self,
-        n_frames: usize,
-        detector: &mut Detector,
-        encode: impl Fn(usize, &mut Gpu<'_>, &mut wgpu::CommandEncoder) -> Result<(), impinge::Error>,
-    ) -> Result<[f64; 2], Failure> {
+    /// Encodes a frame and submits it.
+    fn submit(&self, frame: usize, gpu: &mut Gpu<'_>, encode: &impl Encode) -> Result<(), Failure> {
+        let mut encoder = self.device.create_command_encoder(&Default::default());
+        encode(frame, gpu, &mut encoder)?;
+        self.queue.submit([encoder.finish()]);
+        Ok(())
+    }
+
+    /// Milliseconds per frame of a new detector, once all lists have room: alone, and in a row.
+    fn measure(&self, n_frames: usize, encode: impl Encode) -> Result<[f64; 2], Failure> {
+        let mut detector = self.detector()?;
         let mut gpu = detector.gpu().ok_or("the detector has no device")?;
-        let mut submit = |frame| -> Result<(), Failure> {
-            let mut encoder = self.device.create_command_encoder(&Default::default());
-            encode(frame, &mut gpu, &mut encoder)?;
-            self.queue.submit([encoder.finish()]);
-            Ok(())
-        };
-        submit(0)?;
-        self.wait()?;
+        for frame in 0.. {
+            self.submit(frame, &mut gpu, &encode)?;
+            if gpu.grow()? && frame >= N_WARM {
+                break;
+            }
+        }
         let mut alone = Vec::new();
         for frame in 0..n_frames {
             let start = Instant::now();
-            submit(frame)?;
+            self.submit(frame, &mut gpu, &encode)?;
             self.wait()?;
             alone.push(start.elapsed().as_secs_f64() * 1e3);
         }
         let start = Instant::now();
         for frame in 0..n_frames {
-            submit(frame)?;
+            self.submit(frame, &mut gpu, &encode)?;
         }
         self.wait()?;
         let in_a_row = start.elapsed().as_secs_f64() * 1e3 / n_frames as f64;
         Ok([median(alone.into_iter()), in_a_row])
-    }
-
-    /// Runs frames until all lists have room.
-    fn make_room(
-        &self,
-        detector: &mut Detector,
-        encode: impl Fn(usize, &mut Gpu<'_>, &mut wgpu::CommandEncoder) -> Result<(), impinge::Error>,
-    ) -> Result<(), Failure> {
-        for frame in 0.. {
-            let mut gpu = detector.gpu().ok_or("the detector has no device")?;
-            let mut encoder = self.device.create_command_encoder(&Default::default());
-            encode(frame, &mut gpu, &mut encoder)?;
-            self.queue.submit([encoder.finish()]);
-            if gpu.grow()? && frame >= N_WARM {
-                return Ok(());
-            }
-        }
-        Ok(())
     }
 }
 
@@ -209,9 +201,7 @@ fn frames(
         gpu.encode(&scene, &query, &positions, encoder)?;
         Ok(())
     };
-    let mut detector = caller.detector()?;
-    caller.make_room(&mut detector, encode)?;
-    let times = caller.measure(n_frames, &mut detector, encode)?;
+    let times = caller.measure(n_frames, encode)?;
     let cpu = on_cpu(n_frames, |frame, detector| {
         for (&id, body) in ids.iter().zip(&problem.bodies) {
             let pose = &body.poses[frame % problem.n_poses()];
@@ -257,10 +247,7 @@ fn cloth(options: &Options, caller: &Caller, report: &mut Report) -> Result<(), 
         )?;
         Ok(())
     };
-    let mut detector = caller.detector()?;
-    encoder_copy(caller, &wished, &ends);
-    caller.make_room(&mut detector, step)?;
-    let times = caller.measure(n_frames, &mut detector, step)?;
+    let times = caller.measure(n_frames, step)?;
     let cpu = on_cpu(n_frames, |_, detector| {
         scene.set_end_positions(body, &end)?;
         detector.impacts(&scene, &query)?;
@@ -280,9 +267,7 @@ fn cloth(options: &Options, caller: &Caller, report: &mut Report) -> Result<(), 
         let safe = gpu.encode_safe_distances(&scene, most, &query, &[(body, &starts)], encoder)?;
         gpu.encode_truncate(&safe, &[(body, &starts)], &[(body, &ends)], encoder)
     };
-    let mut detector = caller.detector()?;
-    caller.make_room(&mut detector, truncated)?;
-    let times = caller.measure(n_frames, &mut detector, truncated)?;
+    let times = caller.measure(n_frames, truncated)?;
     let cpu = on_cpu(n_frames, |_, detector| {
         scene.set_positions(body, &start)?;
         detector.safe_distances(&scene, most, &query)?;
@@ -291,10 +276,4 @@ fn cloth(options: &Options, caller: &Caller, report: &mut Report) -> Result<(), 
     let question = format!("safe distances to {}, wishes cut", figures(most));
     row(report, "cloth-ball", &question, n_faces, times, cpu);
     Ok(())
-}
-
-fn encoder_copy(caller: &Caller, from: &wgpu::Buffer, to: &wgpu::Buffer) {
-    let mut encoder = caller.device.create_command_encoder(&Default::default());
-    encoder.copy_buffer_to_buffer(from, 0, to, 0, from.size());
-    caller.queue.submit([encoder.finish()]);
 }

@@ -272,15 +272,14 @@ mod tests {
         let mut scene = Scene::new();
         let corners = [[0.0f32, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
         scene.add_triangles(&[[0, 1, 2]], &corners).unwrap();
-        let waits = |detector: &Detector| detector.gpu_waits;
         let mut detector = Detector::new(Settings::new()).unwrap();
         detector.detect(&scene, &Query::all()).unwrap();
         detector.near(&scene, 0.5, &Query::all()).unwrap();
-        assert!(waits(&detector) && detector.gpu.is_none());
+        assert!(detector.gpu_waits && detector.gpu.is_none());
         detector.earliest(&scene, &Query::all()).unwrap();
-        assert!(!waits(&detector));
+        assert!(!detector.gpu_waits);
         let budget = Settings::new().memory_budget(Some(1 << 24));
-        assert!(!waits(&Detector::new(budget).unwrap()));
-        assert!(!waits(&Detector::new(Backend::Cpu).unwrap()));
+        assert!(!Detector::new(budget).unwrap().gpu_waits);
+        assert!(!Detector::new(Backend::Cpu).unwrap().gpu_waits);
     }
 }
