@@ -225,7 +225,7 @@ void callbacks() {
   } catch (const std::runtime_error &error) {
     CHECK(strcmp(error.what(), "from a callback") == 0);
   }
-  throws(IMPINGE_ERROR_DEVICE, "gpu", [] { impinge::detector none(impinge::backend::gpu); });
+  throws(IMPINGE_ERROR_DEVICE, "no GPU adapter", [] { impinge::detector none(impinge::backend::gpu); });
   const std::vector<std::array<float, 3>> seam = {{0, 0, 0}, {1, 0, 0}, {0, 0, 0}};
   const auto weld = impinge::weld(seam);
   CHECK(weld.map == (std::vector<std::uint32_t>{0, 1, 0}) && weld.firsts == (std::vector<std::uint32_t>{0, 1}));

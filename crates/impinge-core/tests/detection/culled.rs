@@ -142,8 +142,8 @@ fn no_motion_loses_a_pair() {
         for mover in 0..3 {
             let (ball, mut scene, a, b) = pair();
             let mut contest = Contest::new();
-            for frame in 0..24 {
-                let t = frame as f32 / 24.0;
+            for frame in 0..20 {
+                let t = frame as f32 / 20.0;
                 for (ix, body) in [a, b].into_iter().enumerate() {
                     let motion = if ix == mover % 2 { motion } else { still };
                     if ix == mover || mover == 2 || frame < 5 {

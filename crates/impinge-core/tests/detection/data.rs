@@ -211,7 +211,7 @@ fn published_triangle_pairs_are_answered_as_bodies() {
     };
     cases.extend(special);
     let mut detectors = detectors();
-    for cases in cases.chunks(400) {
+    for cases in cases.chunks(100) {
         let case = side_by_side(cases);
         let expected = naive(&case);
         let found: HashSet<[u32; 2]> = expected.iter().map(|row| [row[0], row[2]]).collect();

@@ -172,7 +172,7 @@ const OF_CELLS: &[Damage] = &[
 ];
 
 fn questions() -> Vec<(Case, Vec<[u32; 4]>)> {
-    let ball = surfaces::bumpy_ball(3500, 0.2);
+    let ball = surfaces::bumpy_ball(1500, 0.2);
     let mut scene = Scene::new();
     let a = ball.add_to(&mut scene).unwrap();
     let b = ball.translated([0.3, 0.1, 0.2]).add_to(&mut scene).unwrap();
@@ -247,6 +247,6 @@ fn damaged_kernels_of_cells_are_caught() {
     let questions = questions();
     assert_all_are_caught(&settings, of_cells, &questions);
     // One cell, processed in tiles.
-    let crowded = settings.density(1e-9).group_size(25);
+    let crowded = settings.density(1e-9).group_size(10);
     assert_all_are_caught(&crowded, &[*of_tiles], &questions[1..2]);
 }
