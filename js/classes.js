@@ -102,13 +102,13 @@ function rowsOf(name, given) {
 
 // The settings of a detector, as the module takes them.
 export function settings(given) {
-  const { method = "auto", recluster = "auto", memoryBudget, maxPairs, ...others } = given ?? {};
-  mustBeNone("settings", others, ["method", "recluster", "memoryBudget", "maxPairs"]);
+  const { method = "auto", recluster = "auto", memoryBudget, maxPairs, reuseMargin = 0, ...others } = given ?? {};
+  mustBeNone("settings", others, ["method", "recluster", "memoryBudget", "maxPairs", "reuseMargin"]);
   const words = [
     word("method", method, ["auto", "clusters", "cells", "naive"]),
     word("recluster", recluster, ["auto", "never"]),
   ];
-  return [...words, limit("memoryBudget", memoryBudget), limit("maxPairs", maxPairs)];
+  return [...words, limit("memoryBudget", memoryBudget), limit("maxPairs", maxPairs), number("reuseMargin", reuseMargin)];
 }
 
 // A limit, or -1 for none.

@@ -242,6 +242,12 @@ export interface Settings {
   memoryBudget?: number;
   /** The most pairs that an answer may have: with more, the question fails with the code `"too_many_pairs"`. */
   maxPairs?: number;
+  /**
+   * A distance, for solvers that ask again and again while little moves. If it is above 0, questions about near pairs list those within their
+   * distance and this margin, and look at no others until some vertex has moved farther than half of it, or anything but positions has
+   * changed. The answers are the same.
+   */
+  reuseMargin?: number;
 }
 
 /** Counts and times of an answer. The answer never depends on them. */

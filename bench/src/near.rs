@@ -2,7 +2,8 @@
 //!
 //! Positions alternate between a pose and its mirror image, and are written before each frame.
 //! Every answer of the library is held against the known number of pairs and their hash, names of
-//! nearest features included.
+//! nearest features included. Then every vertex trembles about the pose, so little that lists with a
+//! margin hold: near pairs from such a list beside those without one, on the same frames.
 //!
 //! Peers answer a part of the question in floating point. Their rows are compared with those of the
 //! library, off the clock, and the numbers of rows that only one of them has are printed.
@@ -212,11 +213,75 @@ fn measure(known: &Known, options: &Options, report: &mut Report) -> Result<(), 
                 &stages.join(", "),
             );
         }
+        for share in [0.125, 0.5] {
+            let at = (&mut scene, body, &poses[0][..]);
+            tremble(known, (at, distance, share), n_threads, options, report)?;
+        }
     }
     if options.peers {
         against_peers(known, (&mut scene, body), &faces, &poses, options, report)?;
     }
     report.say("");
+    Ok(())
+}
+
+/// Times near pairs of a mesh that trembles: without a list, from one with a margin of a share of the
+/// distance, and where that is made.
+fn tremble(
+    known: &Known,
+    ((scene, body, pose), distance, share): ((&mut Scene, BodyId, &[[f32; 3]]), f64, f64),
+    n_threads: usize,
+    options: &Options,
+    report: &mut Report,
+) -> Result<(), Failure> {
+    let margin = share * distance;
+    let settings = Settings::new()
+        .threads(n_threads)
+        .affinity(options.affinities[0])
+        .instruction_set(options.instruction_set)
+        .backend(options.backend);
+    let query = Query::all().kinds([PairKind::VertexFace, PairKind::EdgeEdge]);
+    let mut without = Detector::new(settings.clone())?;
+    let mut listing = Detector::new(settings.reuse_margin(margin))?;
+    let [mut alone, mut made, mut listed] = [const { Vec::new() }; 3];
+    let mut n = 0;
+    // Along each axis by less than a third of half of the margin: lists hold.
+    let most = (margin / 8.0) as f32;
+    for frame in 0..N_WARM + options.frames.unwrap_or(10).max(1) {
+        let moved = pose.iter().enumerate().map(|(vertex, p)| {
+            std::array::from_fn(|axis| {
+                let turn = (vertex * 7 + frame * 5 + axis * 3) % 9;
+                p[axis] + most * (turn as f32 / 4.0 - 1.0)
+            })
+        });
+        scene.set_positions(body, moved.collect::<Vec<[f32; 3]>>())?;
+        let start = Instant::now();
+        let near = without.near(scene, distance, &query)?;
+        let ms = start.elapsed().as_secs_f64() * 1e3;
+        let start = Instant::now();
+        let same = listing.near(scene, distance, &query)?;
+        let times = match frame {
+            0 => &mut made,
+            _ => &mut listed,
+        };
+        times.push(start.elapsed().as_secs_f64() * 1e3);
+        if (near.len(), near.hash()) != (same.len(), same.hash()) {
+            return Err(format!("{}: {} pairs from a list", known.name, same.len()).into());
+        }
+        n = near.len();
+        if frame >= N_WARM {
+            alone.push(ms);
+        }
+    }
+    let said = format!("a margin of {share} distances");
+    for (name, times) in [
+        ("impinge, trembling", &mut alone),
+        ("… from a list", &mut listed),
+        ("… where it is made, the first frame", &mut made),
+    ] {
+        let kinds = &[PairKind::VertexFace, PairKind::EdgeEdge][..];
+        row(report, known, (name, kinds), n_threads, times, n, &said);
+    }
     Ok(())
 }
 

@@ -79,6 +79,10 @@ class Detector(DetectorBase):
         The widest vector instructions that the CPU may use, where it has them; by default any.
     density : float
         ``"cells"``: the density coefficient of the paper's equation (1), above 0.
+    reuse_margin : float
+        A distance, for solvers that ask again and again while little moves. If it is above 0, `near`, `neighbours` and `safe_distances` list
+        the pairs within their distance and this margin, and look at no others until some vertex has moved farther than half of it, or
+        anything but positions has changed. The answers are the same. With a `memory_budget` nothing is listed.
     affinity : {"inherited", "auto"}
         Which cores helper threads may run on. ``"inherited"``: the affinity of no thread is ever set. ``"auto"``: on Linux, with up to 8
         threads, not the core on which the calling thread is running, which makes frames faster where nobody else places threads.
@@ -111,6 +115,7 @@ class Detector(DetectorBase):
         recluster: Literal["auto", "never"] = "auto",
         instruction_set: Literal["portable", "avx2", "avx512"] | None = None,
         density: SupportsFloat = 1.0,
+        reuse_margin: SupportsFloat = 0.0,
         affinity: Literal["inherited", "auto"] = "inherited",
         _group_size: SupportsIndex | None = None,
     ) -> Detector:
@@ -124,6 +129,7 @@ class Detector(DetectorBase):
             "recluster": recluster,
             "instruction_set": instruction_set,
             "density": density,
+            "reuse_margin": reuse_margin,
             "affinity": affinity,
             "_group_size": _group_size,
         }
@@ -927,6 +933,7 @@ _DEFAULTS = {
     "recluster": "auto",
     "instruction_set": "avx512",
     "density": 1.0,
+    "reuse_margin": 0.0,
     "affinity": "inherited",
 }
 

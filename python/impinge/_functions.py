@@ -45,6 +45,7 @@ class Settings(TypedDict, total=False):
     recluster: Literal["auto", "never"]
     instruction_set: Literal["portable", "avx2", "avx512"] | None
     density: SupportsFloat
+    reuse_margin: SupportsFloat
     affinity: Literal["inherited", "auto"]
 
 

@@ -189,6 +189,7 @@ def test_questions_refused(scene, question, error, message):
         ({"density": 0}, ValueError, "^density: 0 given, a number above 0 allowed"),
         ({"density": float("nan")}, ValueError, "^density: NaN given"),
         ({"density": "1"}, TypeError, "^density: a number expected, str given"),
+        ({"reuse_margin": -1}, ValueError, "^reuse_margin: -1 given, a number that is not below 0 allowed"),
         ({"_group_size": 0}, ValueError, "^group size: 0 given, 1 to 64 allowed"),
         ({"_group_size": 65}, ValueError, "^_group_size: 65 given"),
         ({"device": 3}, TypeError, "^device: a string expected, int given"),

@@ -122,6 +122,23 @@ def test_neighbours_are_near_pairs(scene, detector):
     assert np.isin(turned.indices, np.unique(np.flatnonzero(np.diff(lists.vf.offsets.astype(np.int64))))).all()
 
 
+def test_lists_with_a_margin_give_the_same(scene, detector):
+    listing = impinge.Detector("cpu", threads=2, reuse_margin=0.05)
+    assert listing.settings["reuse_margin"] == 0.05
+    rng = np.random.default_rng(4)
+    for _ in range(20):
+        for body in scene.bodies:
+            at = scene.positions(body)
+            scene.set_positions(body, (at + rng.uniform(-0.01, 0.01, at.shape)).astype(at.dtype))
+        near, listed = (by.near(scene, 0.2, closest_points=True) for by in (detector, listing))
+        assert listed.hash == near.hash and len(near) > 100
+        assert np.array_equal(listed.rows, near.rows) and np.array_equal(listed.points, near.points)
+        safe, listed = (by.safe_distances(scene, 0.1) for by in (detector, listing))
+        assert all(np.array_equal(listed.of(body), safe.of(body)) for body in range(2))
+        lists, listed = (by.neighbours(scene, 0.2) for by in (detector, listing))
+        assert np.array_equal(listed.vf.indices, lists.vf.indices)
+
+
 @pytest.mark.parametrize("most", [-1, float("nan"), float("inf")])
 def test_bad_lengths_are_refused(scene, detector, most):
     with pytest.raises(ValueError, match="^most: "):

@@ -6,7 +6,7 @@ import initGpu, { Detector as GpuDetector, Scene as GpuScene, read, readBodies, 
 
 await init();
 using scene = new Scene();
-using detector = new Detector({ method: "cells", recluster: "never", memoryBudget: 2 ** 30, maxPairs: 1e6 });
+using detector = new Detector({ method: "cells", recluster: "never", memoryBudget: 2 ** 30, maxPairs: 1e6, reuseMargin: 0.01 });
 const a: Body = scene.addTriangles(new Uint16Array([0, 1, 2]), new Float32Array(9));
 const b: Body = scene.addTetrahedra(new Uint32Array([0, 1, 2, 3]), new Float64Array(12));
 const strand: Body = scene.addEdges(new Uint8Array([0, 1]), new Float32Array(6));

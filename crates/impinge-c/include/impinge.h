@@ -359,7 +359,10 @@ typedef struct impinge_detector impinge_detector;
  * call. May be NULL.
  *   user                The first argument of these callbacks. They are called by the thread that asks, and must not call this library with
  *                       the same detector.
- *   device              Part of a GPU's name, to choose among several; NULL for any. It is copied. */
+ *   device              Part of a GPU's name, to choose among several; NULL for any. It is copied.
+ *   reuse_margin        For solvers that ask again and again while little moves. If it is above 0, questions about near pairs, neighbours and
+ *                       safe distances list the pairs within their distance and this margin, and look at no others until some vertex has
+ *                       moved farther than half of it, or anything but positions has changed. The answers are the same. Default: 0. */
 typedef struct impinge_settings {
   uint32_t size; /* sizeof(impinge_settings) of the caller */
   uint32_t backend, method, threads;
@@ -369,6 +372,7 @@ typedef struct impinge_settings {
   void (*progress)(void *user, uint64_t done, uint64_t total);
   void (*log)(void *user, uint32_t level, const char *message);
   const char *device;
+  double reuse_margin;
 } impinge_settings;
 
 /* Fills in the defaults, and `size`. NULL is ignored. */

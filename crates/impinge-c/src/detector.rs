@@ -172,6 +172,7 @@ unsafe fn settings(given: &impinge_settings) -> Result<Settings, Failure> {
         .threads(given.threads as usize)
         .memory_budget(some(given.memory_budget))
         .max_pairs(some(given.max_pairs))
+        .reuse_margin(given.reuse_margin)
         .device(device))
 }
 

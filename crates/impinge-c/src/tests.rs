@@ -46,7 +46,7 @@ fn layout_in_rust() -> BTreeMap<String, usize> {
     structure!(impinge_exclusion: kind, a, b, n, offsets, vertices);
     structure!(impinge_query: size, between, own, shared_vertex, a, b, kinds, start, precision, hits, n_nearest, flags, separation, clearance, clearance_share, cell_low, cell_high, exclusions, n_exclusions, fixed, n_fixed, passes, passes_user, rest_pairs, n_rest_pairs);
     structure!(impinge_element: vertices, n_vertices, body);
-    structure!(impinge_settings: size, backend, method, threads, memory_budget, max_pairs, cancelled, user, progress, log, device);
+    structure!(impinge_settings: size, backend, method, threads, memory_budget, max_pairs, cancelled, user, progress, log, device, reuse_margin);
     structure!(impinge_pair: body_a, element_a, body_b, element_b);
     structure!(impinge_impact: toi, kind, body_a, element_a, body_b, element_b, at_start);
     structure!(impinge_nearest: distance, points, body_a, element_a, body_b, element_b);

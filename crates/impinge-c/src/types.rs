@@ -226,6 +226,7 @@ pub struct impinge_settings {
     pub progress: Option<ProgressCallback>,
     pub log: Option<LogCallback>,
     pub device: *const c_char,
+    pub reuse_margin: f64,
 }
 
 impl Default for impinge_settings {
@@ -242,6 +243,7 @@ impl Default for impinge_settings {
             progress: None,
             log: None,
             device: std::ptr::null(),
+            reuse_margin: 0.0,
         }
     }
 }

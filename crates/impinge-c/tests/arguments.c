@@ -266,6 +266,16 @@ int main(void) {
   SETTING(backend, 7, "backend: 7");
   SETTING(method, 4, "method: 4");
   SETTING(threads, 100000, "threads");
+  SETTING(reuse_margin, -1, "reuse_margin: -1");
+  {
+    /* Settings of an older header have no margin. */
+    impinge_settings_default(&settings);
+    settings.size = offsetof(impinge_settings, reuse_margin);
+    settings.reuse_margin = -1;
+    GOOD(impinge_detector_create(&settings, &refused));
+    impinge_detector_destroy(refused);
+    refused = NULL;
+  }
 #ifndef WITH_GPU
   impinge_settings_default(&settings);
   settings.backend = IMPINGE_BACKEND_GPU;

@@ -308,6 +308,22 @@ static void near_and_candidates(impinge_detector *detector) {
   GOOD(impinge_find_near(detector, scene, 0, &query, &thick));
   CHECK(impinge_near_hash(thick) == impinge_near_hash(near_pairs));
   REFUSED(impinge_near_column(thick, IMPINGE_COLUMN_DISTANCE, &view), "did not ask");
+  {
+    /* From a list, and again where nothing has moved. */
+    impinge_settings settings;
+    impinge_detector *listing = NULL;
+    impinge_settings_default(&settings);
+    settings.backend = IMPINGE_BACKEND_CPU;
+    settings.reuse_margin = 0.01;
+    GOOD(impinge_detector_create(&settings, &listing));
+    for (i = 0; i < 3; ++i) {
+      impinge_near *listed = NULL;
+      GOOD(impinge_find_near(listing, scene, 0, &query, &listed));
+      CHECK(impinge_near_hash(listed) == impinge_near_hash(near_pairs));
+      impinge_near_destroy(listed);
+    }
+    impinge_detector_destroy(listing);
+  }
   impinge_near_destroy(thick);
   impinge_near_destroy(near_pairs);
   impinge_scene_destroy(scene);

@@ -125,6 +125,7 @@ pub fn read(keywords: &Bound<'_, PyDict>) -> PyResult<Settings> {
                 settings.instruction_set = choose_one(&value, &name, words!(InstructionSet))?;
             }
             "density" => settings.density = number(&value, &name)?,
+            "reuse_margin" => settings.reuse_margin = number(&value, &name)?,
             "affinity" => settings.affinity = choose_one(&value, &name, words!(Affinity))?,
             _ => settings.group_size = unsigned(&value, &name, 64)? as u32,
         }
@@ -146,6 +147,7 @@ pub fn to_dict<'py>(py: Python<'py>, settings: &Settings) -> PyResult<Bound<'py,
     let instruction_set = settings.instruction_set.name();
     all.set_item("instruction_set", instruction_set)?;
     all.set_item("density", settings.density)?;
+    all.set_item("reuse_margin", settings.reuse_margin)?;
     all.set_item("affinity", settings.affinity.name())?;
     all.set_item("_group_size", settings.group_size)?;
     Ok(all)

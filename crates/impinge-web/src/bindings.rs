@@ -234,15 +234,20 @@ pub struct DetectorHandle {
 }
 
 /// The method and the rule of new clusterings by their number; the memory budget and the most
-/// pairs, -1 for none.
-fn settings(backend: Backend, [method, recluster]: [u32; 2], limits: [f64; 2]) -> Thrown<Settings> {
-    let [memory_budget, max_pairs] = limits.map(|limit| (limit >= 0.0).then_some(limit as u64));
+/// pairs, -1 for none, and the margin of lists.
+fn settings(
+    backend: Backend,
+    [method, recluster]: [u32; 2],
+    [memory_budget, max_pairs, reuse_margin]: [f64; 3],
+) -> Thrown<Settings> {
+    let limit = |limit: f64| (limit >= 0.0).then_some(limit as u64);
     Ok(Settings::new()
         .backend(backend)
         .method(entry(Method::ALL, method)?)
         .recluster(entry([Recluster::Auto, Recluster::Never], recluster)?)
-        .memory_budget(memory_budget)
-        .max_pairs(max_pairs))
+        .memory_budget(limit(memory_budget))
+        .max_pairs(limit(max_pairs))
+        .reuse_margin(reuse_margin))
 }
 
 #[wasm_bindgen]
@@ -254,11 +259,12 @@ impl DetectorHandle {
         recluster: u32,
         memory_budget: f64,
         max_pairs: f64,
+        reuse_margin: f64,
     ) -> Thrown<DetectorHandle> {
         let settings = settings(
             Backend::Cpu,
             [method, recluster],
-            [memory_budget, max_pairs],
+            [memory_budget, max_pairs, reuse_margin],
         )?;
         Ok(DetectorHandle {
             asker: Asker::new(settings).map_err(thrown)?,
@@ -274,8 +280,10 @@ impl DetectorHandle {
         recluster: u32,
         memory_budget: f64,
         max_pairs: f64,
+        reuse_margin: f64,
     ) -> Thrown<DetectorHandle> {
-        let (words, limits) = ([method, recluster], [memory_budget, max_pairs]);
+        let words = [method, recluster];
+        let limits = [memory_budget, max_pairs, reuse_margin];
         let on_device = settings(Backend::Gpu, words, limits)?;
         let device = impinge::Detector::open(on_device).await.map_err(thrown)?;
         let on_cpu = settings(Backend::Cpu, words, limits)?;

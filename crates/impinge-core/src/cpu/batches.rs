@@ -109,6 +109,17 @@ pub(crate) struct Counts {
     pub n_parted: u64,
 }
 
+impl Counts {
+    pub fn add_to(&self, stats: &mut Stats) {
+        stats.n_candidates += self.n_candidates;
+        stats.n_unsure += self.n_unsure;
+        stats.ways.n_evicted += self.n_evicted;
+        stats.ways.n_full += self.n_full;
+        stats.ways.n_shortened += self.n_shortened;
+        stats.ways.n_parted += self.n_parted;
+    }
+}
+
 impl<'a> BatchStages for World<'a> {
     type Worker = Worker;
     type Answer = &'a Arc<Answer>;
@@ -285,12 +296,7 @@ impl<W: BatchStages> Batches<'_, W> {
         for worker in &*self.scratches {
             let counts = W::counts(worker);
             busy_ms += counts.busy.as_secs_f64() * 1e3;
-            stats.n_candidates += counts.n_candidates;
-            stats.n_unsure += counts.n_unsure;
-            stats.ways.n_evicted += counts.n_evicted;
-            stats.ways.n_full += counts.n_full;
-            stats.ways.n_shortened += counts.n_shortened;
-            stats.ways.n_parted += counts.n_parted;
+            counts.add_to(stats);
         }
         let narrow_ms = (busy_ms / self.scratches.len() as f64).min(self.ms);
         stats.add_ms("pairing", self.ms - narrow_ms);

@@ -49,6 +49,16 @@ pub(crate) enum Side {
 }
 
 impl LanePairs {
+    /// Takes these candidates, of which there are no more than two groups have.
+    #[inline(always)]
+    pub fn set(&mut self, lanes: &[[u8; 2]]) {
+        let LaneLists { a, b } = &mut *self.lanes;
+        for ((&[of_a, of_b], a), b) in lanes.iter().zip(a).zip(b) {
+            (*a, *b) = (of_a, of_b);
+        }
+        self.n = lanes.len().min(MOST_PAIRS - GROUP);
+    }
+
     /// Appends a lane of one group with some lanes of the other.
     #[inline(always)]
     pub fn push_row<S: Simd>(&mut self, simd: S, side: Side, row: usize, mask: u64) {

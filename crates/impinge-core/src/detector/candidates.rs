@@ -142,6 +142,7 @@ impl Detector {
                 #[cfg(feature = "gpu")]
                 gpu: &mut self.gpu,
                 keys: Keys::All,
+                list: None,
                 seen: Seen::default(),
             },
         }
@@ -162,6 +163,7 @@ impl RunSearch<'_> {
             #[cfg(feature = "gpu")]
             gpu: &mut *self.finder.gpu,
             keys,
+            list: None,
             seen: Seen::default(),
         };
         ready(

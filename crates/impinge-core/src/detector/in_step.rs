@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::answers::near::Labels;
-use crate::cpu::steps::{ByDevice, StepClusters};
+use crate::cpu::steps::{ByDevice, StepClusters, VerletList};
 #[cfg(feature = "gpu")]
 use crate::gpu::Engine;
 use crate::plan::{Question, TestId};
@@ -44,6 +44,8 @@ pub(super) struct InStep<'a> {
     #[cfg(feature = "gpu")]
     pub gpu: &'a mut Option<Engine>,
     pub keys: Keys<'a>,
+    /// Where near pairs are listed, if they are, and the bytes of other lists.
+    pub list: Option<(&'a mut VerletList, usize)>,
     pub seen: Seen,
 }
 
@@ -133,7 +135,16 @@ impl InStep<'_> {
             Keys::Counted(tally) => StepAnswer::Counts(tally),
         };
         if self.settings.method != Method::Naive {
-            return self.clusters.run(job, self.settings, answer, None, stats);
+            let Self {
+                clusters, settings, ..
+            } = self;
+            return match &mut self.list {
+                Some((list, held_by_others)) => {
+                    let list = (&mut **list, *held_by_others);
+                    clusters.run_listed(job, settings, answer, list, stats)
+                }
+                None => clusters.run(job, settings, answer, None, stats),
+            };
         }
         let mut block = Vec::new();
         let mut emit = |kind, key| {

@@ -2,11 +2,14 @@
 
 use super::Detector;
 use super::in_step::{InStep, Keys, Seen};
+use super::steps::Listed;
 use crate::answers::near::{Labels, NearPairs};
 use crate::answers::pairs::Element;
+use crate::cpu::steps::VerletList;
 use crate::plan::{Plan, TestId};
 use crate::query::Query;
 use crate::query::pair_kind::PairKind;
+use crate::query::settings::Settings;
 use crate::scene::Scene;
 use crate::scene::elements::Part;
 use crate::scene::error::Error;
@@ -21,6 +24,8 @@ use crate::workers::clock::Instant;
 
 /// Pairs whose features a task finds.
 const TASK: usize = 1024;
+/// Questions whose pairs are listed: a solver asks few different ones.
+const MOST_LISTS: usize = 4;
 
 impl Detector {
     /// All pairs of elements whose distance is at most `distance` plus the
@@ -84,27 +89,65 @@ impl Detector {
         outcome: &mut impl Outcome<u64, { PairKind::ALL.len() }>,
     ) -> Result<u64, Error> {
         let plan = Plan::nearness(scene, query, distance, self.settings.limits())?;
-        self.find_keys(scene, &plan, Keys::All, outcome)
+        self.find_near_keys(scene, query, &plan, Keys::All, outcome)
     }
 
-    /// Finds pairs of vertices, edges and faces, for whatever becomes of them.
-    pub(super) fn find_keys(
+    /// The same by a plan; where they are listed, from the list.
+    pub(super) fn find_near_keys(
         &mut self,
         scene: &Scene,
+        query: &Query,
         plan: &Plan,
         keys: Keys<'_>,
         outcome: &mut impl Outcome<u64, { PairKind::ALL.len() }>,
     ) -> Result<u64, Error> {
         let control = &self.control.clone();
+        let mut listed = self.listed(scene, query, plan);
+        let others = self.steps.lists.iter().map(|other| other.list.bytes());
+        let held_by_others = others.sum();
         let mut finder = InStep {
             clusters: &mut self.steps.clusters,
             settings: &self.settings,
             #[cfg(feature = "gpu")]
             gpu: &mut self.gpu,
             keys,
+            list: (listed.as_mut()).map(|listed| (&mut listed.list, held_by_others)),
             seen: Seen::default(),
         };
-        ready(self.runner.run(scene, plan, control, &mut finder, outcome))
+        let found = ready(self.runner.run(scene, plan, control, &mut finder, outcome));
+        self.steps.lists.extend(listed);
+        found
+    }
+
+    /// Takes out the list of a question, or a new one, if near pairs are listed.
+    fn listed(&mut self, scene: &Scene, query: &Query, plan: &Plan) -> Option<Listed> {
+        let Settings {
+            reuse_margin,
+            memory_budget,
+            ..
+        } = self.settings;
+        let distance = plan.distance();
+        let farther = (distance + reuse_margin).next_up();
+        if reuse_margin == 0.0 || memory_budget.is_some() || !farther.is_finite() {
+            return None;
+        }
+        let lists = &mut self.steps.lists;
+        let is_same = |listed: &Listed| {
+            let of = (listed.arrangement, listed.distance);
+            of == (scene.arrangement(), distance) && listed.query == *query
+        };
+        if let Some(ix) = lists.iter().position(is_same) {
+            return Some(lists.remove(ix));
+        }
+        if lists.len() == MOST_LISTS {
+            lists.remove(0);
+        }
+        Some(Listed {
+            arrangement: scene.arrangement(),
+            query: query.clone(),
+            distance,
+            list: VerletList::default(),
+        })
     }
 }
 

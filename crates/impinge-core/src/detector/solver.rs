@@ -105,7 +105,8 @@ impl Detector {
             isa: Isa::detect(self.settings.instruction_set),
             query,
         };
-        let found = self.find_keys(scene, &plan, Keys::Lowering(&shares), &mut outcome);
+        let keys = Keys::Lowering(&shares);
+        let found = self.find_near_keys(scene, query, &plan, keys, &mut outcome);
         memory.shares = shares;
         self.solver = memory;
         self.stats.clone_from(safe.stats());

@@ -6,7 +6,7 @@ use super::in_step::{InStep, Keys, Seen};
 use crate::answers::impacts::{Impact, Impacts};
 use crate::answers::pairs::Element;
 use crate::clusterings::Clusterings;
-use crate::cpu::steps::StepClusters;
+use crate::cpu::steps::{StepClusters, VerletList};
 use crate::plan::Plan;
 use crate::query::goal::{Goal, Limits};
 use crate::query::pair_kind::PairKind;
@@ -29,6 +29,16 @@ pub(super) struct StepMemory {
     /// Whether the start of the last step intersects, if that was asked.
     start_intersects: Option<bool>,
     pub clusters: StepClusters,
+    /// The last lists of near pairs, the newest last.
+    pub lists: Vec<Listed>,
+}
+
+/// The near pairs of a question, and what they depend on besides positions.
+pub(super) struct Listed {
+    pub arrangement: u64,
+    pub query: Query,
+    pub distance: f64,
+    pub list: VerletList,
 }
 
 impl StepMemory {
@@ -37,6 +47,7 @@ impl StepMemory {
             contacts: Contacts::default(),
             start_intersects: None,
             clusters: StepClusters::new(settings.instruction_set, clusterings),
+            lists: Vec::new(),
         }
     }
 }
@@ -291,6 +302,7 @@ impl Detector {
             #[cfg(feature = "gpu")]
             gpu: &mut self.gpu,
             keys,
+            list: None,
             seen: Seen::default(),
         };
         let found = ready(self.runner.run(scene, plan, control, &mut finder, contacts));

@@ -15,6 +15,7 @@ use super::open::GpuContext;
 use crate::query::goal::Goal;
 use crate::query::settings::Method;
 use crate::scene::error::Error;
+use crate::scene::ids::BodyId;
 
 /// The number of elements that each buffer has room for. The answer never depends on it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -157,6 +158,8 @@ pub struct PassBuffers {
     pub times: Storage<PairTimes>,
     /// Safe distances: the most that each vertex may move, 0 if it is fixed.
     pub limits: Storage<Share>,
+    /// Of which bodies these are: each with its number of vertices and the bits of the most.
+    pub limits_of: Vec<(BodyId, u32, u32)>,
     /// Safe distances: how far each vertex may move.
     pub shares: Storage<Share>,
     /// What stages counted, at the indices of `layout`.
@@ -216,6 +219,7 @@ impl PassBuffers {
             unsure: Storage::plain("unsure"),
             times: Storage::plain("times of pairs"),
             limits: Storage::plain("limits"),
+            limits_of: Vec::new(),
             shares: Storage::plain("safe distances"),
             counters: Storage::plain("counters"),
             arguments: Storage::new("arguments", indirect),

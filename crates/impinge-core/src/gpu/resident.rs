@@ -262,17 +262,24 @@ impl Engine {
         let resident = ResidentEnds([positions.clone(), positions]);
         self.update(job, clusterings, &resident, &mut Stats::default())?;
         let (mut limits, mut bodies) = (Vec::new(), Vec::new());
+        let mut n = 0;
         for (body, n_vertices) in self.world.bodies() {
             let own = if fixed.contains(&body) { 0.0 } else { most };
             // Vertices fit 32 bits, or the bodies would not be held.
-            let (first, len) = (limits.len() as u32, n_vertices as u32);
+            let (first, len) = (n, n_vertices as u32);
             bodies.push(ResidentVertices { body, first, len });
-            let bits = round_down(own).to_bits();
-            limits.extend((0..len).map(|_| Share { bits }));
+            limits.push((body, len, round_down(own).to_bits()));
+            n += len;
         }
         let pass_buffers = &mut self.lane.pass_buffers;
-        pass_buffers.limits.upload(&self.gpu, &limits)?;
-        pass_buffers.shares.resize(&self.gpu, count(limits.len()))?;
+        if pass_buffers.limits_of != limits {
+            pass_buffers.limits_of.clear();
+            let of_body = |&(_, len, bits): &(_, u32, _)| (0..len).map(move |_| Share { bits });
+            let of_vertices: Vec<Share> = limits.iter().flat_map(of_body).collect();
+            pass_buffers.limits.upload(&self.gpu, &of_vertices)?;
+            pass_buffers.limits_of = limits;
+        }
+        pass_buffers.shares.resize(&self.gpu, u64::from(n))?;
         // A little more than asked for, and more than what is flushed.
         let reach = round_up(most * (1.0 + 2f64.powi(-20)) + 2f64.powi(-100));
         self.safe = Some(reach.to_bits());

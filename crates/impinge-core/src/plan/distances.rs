@@ -39,6 +39,21 @@ impl Plan {
         self.bound = keep.most(magnitude, unit);
     }
 
+    /// The question which elements are within a distance that is larger by a margin.
+    pub(crate) fn within_farther(&self, margin: f64) -> Plan {
+        let distance = (self.distance + margin).next_up();
+        Plan {
+            distance,
+            bound: distance,
+            ..self.clone()
+        }
+    }
+
+    /// The distance asked for.
+    pub(crate) fn distance(&self) -> f64 {
+        self.distance
+    }
+
     /// Whether elements keep a clearance, so that a pair keeps what its distance at the start says.
     pub(crate) fn has_clearance(&self) -> bool {
         !self.keep.is_plain()

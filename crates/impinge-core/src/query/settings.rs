@@ -151,6 +151,17 @@ pub struct Settings {
     pub max_pairs: Option<u64>,
     /// `Clusters`: whether bodies are clustered again.
     pub recluster: Recluster,
+    /// A distance in the unit of the scene, for solvers that ask again and again while little moves.
+    /// If it is above 0, [`near`](crate::Detector::near),
+    /// [`neighbours`](crate::Detector::neighbours) and
+    /// [`safe_distances`](crate::Detector::safe_distances) list the pairs within their distance and
+    /// this margin, and look at no others until some vertex has moved farther than half of it from
+    /// where it was then, or anything but positions has changed. The answers are the same. With a
+    /// memory budget nothing is listed.
+    ///
+    /// A list pays if it serves several questions. Its pairs are more with a larger margin; about
+    /// what vertices move in ten questions is a good one.
+    pub reuse_margin: f64,
     /// GPU: part of an adapter's name, to choose among several.
     pub device: Option<String>,
     /// GPU: the caller's device.
@@ -176,6 +187,7 @@ impl Default for Settings {
             memory_budget: None,
             max_pairs: None,
             recluster: Recluster::default(),
+            reuse_margin: 0.0,
             device: None,
             #[cfg(feature = "gpu")]
             on_device: None,
@@ -251,6 +263,12 @@ impl Settings {
         self
     }
 
+    /// The margin with which near pairs are listed, in the unit of the scene; 0 for no lists.
+    pub fn reuse_margin(mut self, reuse_margin: f64) -> Self {
+        self.reuse_margin = reuse_margin;
+        self
+    }
+
     /// GPU: part of an adapter's name, to choose among several.
     pub fn device(mut self, device: impl Into<Option<String>>) -> Self {
         self.device = device.into();
@@ -299,6 +317,10 @@ impl Settings {
         };
         if !(self.density.is_finite() && self.density > 0.0) {
             return refuse("density", self.density.to_string(), "a number above 0");
+        }
+        if !(self.reuse_margin.is_finite() && self.reuse_margin >= 0.0) {
+            let given = self.reuse_margin.to_string();
+            return refuse("reuse_margin", given, "a number that is not below 0");
         }
         if !(1..=64).contains(&self.group_size) {
             return refuse("group size", self.group_size.to_string(), "1 to 64");

@@ -162,4 +162,6 @@ pub struct Ways {
     pub n_parted: u64,
     /// Times that keys were sorted by counting.
     pub n_counted: u64,
+    /// Times that near pairs were listed with a margin.
+    pub n_listed: u64,
 }

@@ -39,6 +39,11 @@ pub(crate) enum StepAnswer<'a> {
     KeysIn(&'a KeyAnswer, &'a KeyRanges),
     /// Keys are counted and forgotten.
     Counts(&'a Tally),
+    /// Candidates that may come within the distance asked for, which the plan's exceeds by a
+    /// margin, stay with the workers.
+    Listed {
+        margin: f64,
+    },
 }
 
 impl<'a> StepAnswer<'a> {
@@ -63,7 +68,7 @@ impl<'a> StepAnswer<'a> {
                 tally.count(kind, block);
                 block.clear();
             }
-            StepAnswer::Contacts(_) => {}
+            StepAnswer::Contacts(_) | StepAnswer::Listed { .. } => {}
         }
     }
 
@@ -72,7 +77,10 @@ impl<'a> StepAnswer<'a> {
         match self {
             StepAnswer::KeysIn(_, ranges) => Some(ranges),
             StepAnswer::Counts(tally) => Some(tally.ranges()),
-            StepAnswer::Contacts(_) | StepAnswer::Keys(_) | StepAnswer::Lowering(..) => None,
+            StepAnswer::Contacts(_)
+            | StepAnswer::Keys(_)
+            | StepAnswer::Lowering(..)
+            | StepAnswer::Listed { .. } => None,
         }
     }
 }
@@ -84,7 +92,7 @@ impl Ending for StepAnswer<'_> {
             StepAnswer::Keys(answer)
             | StepAnswer::Lowering(answer, _)
             | StepAnswer::KeysIn(answer, _) => answer.is_over(),
-            StepAnswer::Counts(_) => false,
+            StepAnswer::Counts(_) | StepAnswer::Listed { .. } => false,
         }
     }
 
@@ -94,7 +102,7 @@ impl Ending for StepAnswer<'_> {
             StepAnswer::Keys(answer)
             | StepAnswer::Lowering(answer, _)
             | StepAnswer::KeysIn(answer, _) => answer.check(),
-            StepAnswer::Counts(_) => Ok(()),
+            StepAnswer::Counts(_) | StepAnswer::Listed { .. } => Ok(()),
         }
     }
 
@@ -104,7 +112,7 @@ impl Ending for StepAnswer<'_> {
             StepAnswer::Keys(answer)
             | StepAnswer::Lowering(answer, _)
             | StepAnswer::KeysIn(answer, _) => answer.share(held_by_finder),
-            StepAnswer::Counts(_) => {}
+            StepAnswer::Counts(_) | StepAnswer::Listed { .. } => {}
         }
     }
 

@@ -3,6 +3,7 @@
 #[path = "../common/mod.rs"]
 mod common;
 mod near;
+mod reuse;
 mod safe;
 mod separation;
 mod smallest;

@@ -20,6 +20,7 @@ mod pairing;
 #[cfg(feature = "gpu")]
 mod undecided;
 mod unsure;
+mod verlet;
 mod world;
 
 use std::sync::Arc;
@@ -49,6 +50,7 @@ use crate::simd::{Isa, Simd};
 
 use cache::{PartCache, StepCaches};
 use pairing::StepWorker;
+pub(crate) use verlet::VerletList;
 use world::{MovedLanes, SharedBound, StepWorld};
 
 impl<'a> BatchStages for StepWorld<'a> {
@@ -137,11 +139,33 @@ impl StepClusters {
         moved: Option<Moved<'_>>,
         stats: &mut Stats,
     ) -> Result<(), Error> {
+        self.prepare(job, settings, stats)?;
+        self.search(job, settings, answer, moved, stats)
+    }
+
+    /// Makes clusters and boxes.
+    fn prepare(
+        &mut self,
+        job: Job<'_>,
+        settings: &Settings,
+        stats: &mut Stats,
+    ) -> Result<(), Error> {
         self.scratches
             .resize_with(job.workers.n(), StepWorker::default);
         stats.n_clusters = 0;
         stats.time("clustering", |stats| self.cluster(job, stats))?;
-        stats.time("bounds", |stats| self.refit(job, settings, stats))?;
+        stats.time("bounds", |stats| self.refit(job, settings, stats))
+    }
+
+    /// Does the rest of [`run`](Self::run).
+    fn search(
+        &mut self,
+        job: Job<'_>,
+        settings: &Settings,
+        answer: StepAnswer<'_>,
+        moved: Option<Moved<'_>>,
+        stats: &mut Stats,
+    ) -> Result<(), Error> {
         for worker in &mut self.scratches {
             worker.begin(stats.n_clusters, job.plan, settings);
         }

@@ -26,7 +26,7 @@ use crate::simd::{Isa, LaneBounds, Lanes, Masks, Simd};
 use crate::workers::clock::Instant;
 
 use super::group::StepGroup;
-use super::narrow::{Batch, Between, NarrowCounts, StepDecider, key_in};
+use super::narrow::{Batch, Between, Listing, NarrowCounts, StepDecider, key_in};
 use super::world::StepWorld;
 
 /// The narrow stage is timed for one work item in this many.
@@ -91,6 +91,11 @@ impl StepWorker {
     /// The contacts that the worker has found.
     pub fn contacts(&mut self) -> &mut super::narrow::FirstContacts {
         self.decider.contacts()
+    }
+
+    /// What the worker has listed.
+    pub fn listing(&mut self) -> &mut Listing {
+        &mut self.decider.listing
     }
 
     /// Ends a step: hands over the remaining contacts.
@@ -192,6 +197,40 @@ pub(super) fn run<S: Simd>(
     let start = Instant::now();
     worker.decider.decide(isa, world);
     worker.busy += start.elapsed();
+}
+
+/// Decides candidates of a work item that were listed before.
+#[inline(always)]
+pub(super) fn decide_listed<S: Simd>(
+    simd: S,
+    world: StepWorld<'_>,
+    item: &WorkItem,
+    lanes: &[[u8; 2]],
+    worker: &mut StepWorker,
+) {
+    let Some(TestId::Elements(kind)) = world.plan.test(item.a, item.b) else {
+        return;
+    };
+    let StepWorker {
+        groups,
+        lane_pairs,
+        decider,
+        ..
+    } = worker;
+    let slot_a = groups.slot(simd, world, (item.a, item.cluster_a), usize::MAX);
+    let slot_b = groups.slot(simd, world, (item.b, item.cluster_b), slot_a);
+    lane_pairs.set(lanes);
+    let batch = Batch {
+        item,
+        between: Between {
+            a: item.a,
+            b: item.b,
+            kind,
+        },
+        groups: [groups.at(slot_a), groups.at(slot_b)],
+        lane_pairs,
+    };
+    decider.take(world.isa, world, batch);
 }
 
 /// Lists the candidates of a work item. Returns the slots of its groups; `None` if there are no

@@ -9,11 +9,13 @@
 //! kept       the same where elements keep a separation, or each pair a clearance of its own
 //! overlaps   BoxOverlap: whether the boxes over the whole step overlap
 //! near       Within: whether two elements are within a distance at the start
+//! listing    none: candidates that may come within a distance soon, kept for later questions
 //! ```
 
 mod batch;
 mod contacts;
 mod kept;
+mod listing;
 mod near;
 mod overlaps;
 mod search;
@@ -28,6 +30,7 @@ use super::world::StepWorld;
 
 pub(super) use batch::{Batch, Between, Narrow, NarrowCounts, key_in};
 pub(super) use contacts::FirstContacts;
+pub(super) use listing::Listing;
 use near::NearElements;
 use overlaps::Overlaps;
 
@@ -38,6 +41,7 @@ pub(super) struct StepDecider {
     contacts: FirstContacts,
     overlaps: Overlaps,
     near: NearElements,
+    pub listing: Listing,
     pub n_candidates: u64,
 }
 
@@ -46,6 +50,7 @@ impl StepDecider {
     pub fn begin(&mut self, n_clusters: u64, plan: &Plan, tuning: &Tuning) {
         self.question = plan.question;
         self.n_candidates = 0;
+        self.listing.begin();
         match self.question {
             Question::Contact => self.contacts.begin(n_clusters, plan, tuning),
             Question::Overlap => self.overlaps.begin(),
@@ -78,7 +83,10 @@ impl StepDecider {
     #[inline(always)]
     pub fn take(&mut self, isa: Isa, world: StepWorld<'_>, batch: Batch<'_>) {
         self.n_candidates += batch.lane_pairs.len() as u64;
-        self.test().take(isa, world, batch);
+        match world.answer {
+            StepAnswer::Listed { .. } => self.listing.take(isa, world, batch),
+            _ => self.test().take(isa, world, batch),
+        }
     }
 
     /// Decides the candidates that wait.
@@ -100,6 +108,7 @@ impl StepDecider {
     }
 
     pub fn bytes(&self) -> usize {
-        self.contacts.bytes() + self.overlaps.bytes() + self.near.bytes()
+        let listing = self.listing.bytes();
+        self.contacts.bytes() + self.overlaps.bytes() + self.near.bytes() + listing
     }
 }
