@@ -225,11 +225,14 @@ fn measure(known: &Known, options: &Options, report: &mut Report) -> Result<(), 
     Ok(())
 }
 
+/// A scene, its body, and the pose about which this trembles.
+type Trembling<'a> = (&'a mut Scene, BodyId, &'a [[f32; 3]]);
+
 /// Times near pairs of a mesh that trembles: without a list, from one with a margin of a share of the
 /// distance, and where that is made.
 fn tremble(
     known: &Known,
-    ((scene, body, pose), distance, share): ((&mut Scene, BodyId, &[[f32; 3]]), f64, f64),
+    ((scene, body, pose), distance, share): (Trembling<'_>, f64, f64),
     n_threads: usize,
     options: &Options,
     report: &mut Report,
