@@ -66,7 +66,7 @@ def rumba(data):
     mesh = impinge.read(data / "sequences" / "rumba.ply")
     frames = np.fromfile(data / "sequences" / "rumba.pc2", "<f4", offset=32).reshape(-1, len(mesh.vertices), 3)
     size = np.ptp(frames[0], axis=0).max()
-    return frames[0].astype(float), frames[20].astype(float), np.asarray(mesh.faces, np.int32), 2e-3 * size
+    return frames[0].astype(float), frames[20].astype(float), np.asarray(mesh.faces, np.int32), 1e-3 * size
 
 
 GENERATED = [(sheets, 1), (sheets, 2), (cloth_on_ball, 3), (noise, 4), (noise, 5)]
