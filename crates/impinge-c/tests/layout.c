@@ -27,7 +27,7 @@ int main(void) {
   SIZE(impinge_settings);
   FIELD(impinge_settings, size); FIELD(impinge_settings, backend); FIELD(impinge_settings, method); FIELD(impinge_settings, threads);
   FIELD(impinge_settings, memory_budget); FIELD(impinge_settings, max_pairs); FIELD(impinge_settings, cancelled);
-  FIELD(impinge_settings, user); FIELD(impinge_settings, progress); FIELD(impinge_settings, log); FIELD(impinge_settings, device);
+  FIELD(impinge_settings, user); FIELD(impinge_settings, progress); FIELD(impinge_settings, log); FIELD(impinge_settings, device); FIELD(impinge_settings, reuse_margin);
   SIZE(impinge_pair);
   FIELD(impinge_pair, body_a); FIELD(impinge_pair, element_a); FIELD(impinge_pair, body_b); FIELD(impinge_pair, element_b);
   SIZE(impinge_impact);
