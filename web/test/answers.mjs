@@ -451,7 +451,8 @@ export async function others(module) {
   // What has changed since an older answer: by pairs, beside what a set of them says.
   pile.setPinned(top, [false, false, false]);
   // From a list, which a small motion leaves as it is.
-  const listing = new Detector({ reuseMargin: 0.5 });
+  const margin = { reuseMargin: 0.5 };
+  const listing = Detector.open ? await Detector.open(margin) : new Detector(margin);
   const nearNow = async () => {
     const [found, listed] = [await detector.near(pile, 1), await listing.near(pile, 1)];
     left.listed = (left.listed ?? found.length > 0) && found.hash === listed.hash;
