@@ -1,13 +1,15 @@
-"""How long it takes to say how far vertices may move, and who is near whom: impinge beside ipc-toolkit, on the same positions.
+"""How long it takes to say how far vertices may move, and who is near whom: beside ipc-toolkit.
 
     python bench/time_bounds.py                  # a waved cloth, and the frames whose data exists
     python bench/time_bounds.py --rounds 9 cloth
 
-It needs `pip install ipctk` and the module (`pip install .`), and looks for data in $IMPINGE_DATA or ../shared/data. One radius is
-asked for, and pairs that share a vertex are left out, by both. Every vertex moves by a tenth of a radius between rounds, in which all take turns; times are
-medians of wall milliseconds, ipctk's with the fastest of its broad phases.
+It needs `pip install ipctk` and the module (`pip install .`), and looks for data in $IMPINGE_DATA or
+../shared/data. One radius is asked for, and pairs that share a vertex are left out, by both. Every
+vertex moves by up to a tenth of the radius between rounds, in which all take turns; times are medians
+of wall milliseconds, ipctk's with the fastest of its broad phases.
 
-    lists and bounds    `neighbours` and `safe_distances`; `Candidates.build` and `compute_per_vertex_safe_distances`
+    lists and bounds    `neighbours` and `safe_distances`; `Candidates.build` and
+                        `compute_per_vertex_safe_distances`
     bounds              `safe_distances`; `TrustRegion.update`
     from a list         `safe_distances` of a detector with a `reuse_margin` of half of the radius
 """
@@ -37,16 +39,28 @@ def read(name, data):
         x, y = (of.ravel() for of in np.mgrid[0:side, 0:side])
         vertices = np.column_stack([x, y, 2 * np.sin(x / 9) * np.cos(y / 7)]).astype(np.float32)
         a = (np.arange(side - 1)[:, None] * side + np.arange(side - 1)).ravel()
-        faces = np.vstack([np.column_stack([a, a + side, a + side + 1]), np.column_stack([a, a + side + 1, a + 1])])
+        faces = np.vstack(
+            [
+                np.column_stack([a, a + side, a + side + 1]),
+                np.column_stack([a, a + side + 1, a + 1]),
+            ]
+        )
         edges = ipctk.edges(faces.astype(np.int32))
         unit = np.median(np.linalg.norm(vertices[edges[:, 0]] - vertices[edges[:, 1]], axis=1))
     elif name == "rumba":
-        vertices, faces = read_frame(data / "sequences" / "rumba.pc2", 60), read_ply(data / "sequences" / "rumba.ply")[1]
+        vertices, faces = (
+            read_frame(data / "sequences" / "rumba.pc2", 60),
+            read_ply(data / "sequences" / "rumba.ply")[1],
+        )
         unit = np.linalg.norm(np.ptp(vertices, axis=0))
     else:
         vertices, faces = read_ply(data / "ccd" / "cloth-ball" / "frames" / "cloth_ball92.ply")
         unit = np.linalg.norm(np.ptp(vertices, axis=0))
-    return vertices.astype(np.float32), faces.astype(np.int32), [float(part * unit) for part in RADII[name]]
+    return (
+        vertices.astype(np.float32),
+        faces.astype(np.int32),
+        [float(part * unit) for part in RADII[name]],
+    )
 
 
 def clock(work):
@@ -88,7 +102,9 @@ def measure(name, vertices, faces, radius, rounds):
         contestants[f"region, {phase}"] = lambda at, broad=broad: region(broad, at)
     times = {of: [] for of in contestants}
     for _ in range(rounds + 1):
-        moved = vertices + random.uniform(-0.05, 0.05, vertices.shape).astype(np.float32) * np.float32(radius)
+        moved = vertices + random.uniform(-0.05, 0.05, vertices.shape).astype(
+            np.float32
+        ) * np.float32(radius)
         scene.set_positions(body, moved)
         at = np.asfortranarray(moved, dtype=np.float64)
         for of, ask in contestants.items():
@@ -96,7 +112,9 @@ def measure(name, vertices, faces, radius, rounds):
     # The first round makes clusters and the list.
     ms = {of: statistics.median(own[1:]) for of, own in times.items()}
     own, bounds, listed = (ms[of] for of in ("lists and bounds", "bounds", "from a list"))
-    lists, update = (min((ms[f"{of}, {phase}"], phase) for phase in phases) for of in ("candidates", "region"))
+    lists, update = (
+        min((ms[f"{of}, {phase}"], phase) for phase in phases) for of in ("candidates", "region")
+    )
     print(
         f"| {name} | {radius:.4g} | {own:.1f} | {lists[0]:.1f} ({lists[1]}) | {lists[0] / own:.1f} "
         f"| {bounds:.1f} | {update[0]:.1f} ({update[1]}) | {update[0] / bounds:.1f} | {listed:.1f} |",
