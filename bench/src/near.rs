@@ -149,6 +149,14 @@ fn diagonal(positions: &[[f32; 3]]) -> f64 {
     squares.sum::<f64>().sqrt()
 }
 
+fn settings(options: &Options, n_threads: usize) -> Settings {
+    Settings::new()
+        .threads(n_threads)
+        .affinity(options.affinities[0])
+        .instruction_set(options.instruction_set)
+        .backend(options.backend)
+}
+
 fn measure(known: &Known, options: &Options, report: &mut Report) -> Result<(), Failure> {
     let (faces, poses) = load(known)?;
     let distance = known.part * diagonal(&poses[0]);
@@ -168,13 +176,7 @@ fn measure(known: &Known, options: &Options, report: &mut Report) -> Result<(), 
         n => vec![n],
     };
     for n_threads in threads {
-        let mut detector = Detector::new(
-            Settings::new()
-                .threads(n_threads)
-                .affinity(options.affinities[0])
-                .instruction_set(options.instruction_set)
-                .backend(options.backend),
-        )?;
+        let mut detector = Detector::new(settings(options, n_threads))?;
         for kinds in [
             &[PairKind::VertexFace, PairKind::EdgeEdge][..],
             &[PairKind::VertexFace],
@@ -238,11 +240,7 @@ fn tremble(
     report: &mut Report,
 ) -> Result<(), Failure> {
     let margin = share * distance;
-    let settings = Settings::new()
-        .threads(n_threads)
-        .affinity(options.affinities[0])
-        .instruction_set(options.instruction_set)
-        .backend(options.backend);
+    let settings = settings(options, n_threads);
     let query = Query::all().kinds([PairKind::VertexFace, PairKind::EdgeEdge]);
     let mut without = Detector::new(settings.clone())?;
     let mut listing = Detector::new(settings.reuse_margin(margin))?;

@@ -127,8 +127,8 @@ impl Detector {
             ..
         } = self.settings;
         let distance = plan.distance();
-        let farther = (distance + reuse_margin).next_up();
-        if reuse_margin == 0.0 || memory_budget.is_some() || !farther.is_finite() {
+        if reuse_margin == 0.0 || memory_budget.is_some() || !plan.farther(reuse_margin).is_finite()
+        {
             return None;
         }
         let lists = &mut self.steps.lists;

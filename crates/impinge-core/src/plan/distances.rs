@@ -39,9 +39,14 @@ impl Plan {
         self.bound = keep.most(magnitude, unit);
     }
 
+    /// The distance and a margin, or more.
+    pub(crate) fn farther(&self, margin: f64) -> f64 {
+        (self.distance + margin).next_up()
+    }
+
     /// The question which elements are within a distance that is larger by a margin.
     pub(crate) fn within_farther(&self, margin: f64) -> Plan {
-        let distance = (self.distance + margin).next_up();
+        let distance = self.farther(margin);
         Plan {
             distance,
             bound: distance,

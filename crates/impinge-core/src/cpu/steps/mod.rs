@@ -182,15 +182,8 @@ impl StepClusters {
             job,
             answer,
             world: StepWorld {
-                isa: self.isa,
-                scene: job.scene,
-                plan: job.plan,
-                sweep: job.plan.sweep(),
-                boxes: job.plan.sweep(),
-                answer,
-                known: &known,
-                caches: &self.caches,
                 moved: moved.as_ref(),
+                ..StepWorld::new(self.isa, job, answer, &known, &self.caches)
             },
             scratches: &mut self.scratches,
             settings,
@@ -248,17 +241,7 @@ impl StepClusters {
         let known = SharedBound::new(job.control);
         let mut deciding = undecided::Deciding {
             job,
-            world: StepWorld {
-                isa: self.isa,
-                scene: job.scene,
-                plan: job.plan,
-                sweep: job.plan.sweep(),
-                boxes: job.plan.sweep(),
-                answer,
-                known: &known,
-                caches: &self.caches,
-                moved: None,
-            },
+            world: StepWorld::new(self.isa, job, answer, &known, &self.caches),
             answer,
             workers: &mut self.scratches,
             first_slots,

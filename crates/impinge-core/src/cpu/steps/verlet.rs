@@ -182,17 +182,7 @@ impl StepClusters {
             worker.begin(stats.n_clusters, plan, settings);
         }
         let known = SharedBound::new(job.control);
-        let world = StepWorld {
-            isa: self.isa,
-            scene,
-            plan,
-            sweep: plan.sweep(),
-            boxes: plan.sweep(),
-            answer,
-            known: &known,
-            caches: &self.caches,
-            moved: None,
-        };
+        let world = StepWorld::new(self.isa, job, answer, &known, &self.caches);
         let scratches = &mut self.scratches;
         stats.time("narrow", |stats| {
             decide(job, world, list, scratches)?;

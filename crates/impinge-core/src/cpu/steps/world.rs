@@ -15,6 +15,7 @@ use crate::scene::Scene;
 use crate::scene::index::{ClusterIx, PartIx};
 use crate::scene::positions::Positions;
 use crate::search::found::StepAnswer;
+use crate::search::runner::Job;
 use crate::simd::Isa;
 
 use super::cache::{PartCache, StepCaches};
@@ -95,6 +96,27 @@ impl Placed for StepWorld<'_> {
 }
 
 impl<'a> StepWorld<'a> {
+    /// All of a step, with boxes that were made for it, whatever has moved.
+    pub(super) fn new(
+        isa: Isa,
+        Job { scene, plan, .. }: Job<'a>,
+        answer: StepAnswer<'a>,
+        known: &'a SharedBound,
+        caches: &'a StepCaches,
+    ) -> Self {
+        StepWorld {
+            isa,
+            scene,
+            plan,
+            sweep: plan.sweep(),
+            boxes: plan.sweep(),
+            answer,
+            known,
+            caches,
+            moved: None,
+        }
+    }
+
     /// What makes the boxes of a part.
     #[inline(always)]
     pub(super) fn source(&self, part: PartIx) -> BoxSource<'a> {
