@@ -108,7 +108,7 @@ export function settings(given) {
     word("method", method, ["auto", "clusters", "cells", "naive"]),
     word("recluster", recluster, ["auto", "never"]),
   ];
-  return [...words, limit("memoryBudget", memoryBudget), limit("maxPairs", maxPairs), number("reuseMargin", reuseMargin)];
+  return [...words, limit("memoryBudget", memoryBudget), limit("maxPairs", maxPairs), limit("reuseMargin", reuseMargin)];
 }
 
 // A limit, or -1 for none.

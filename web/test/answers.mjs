@@ -125,6 +125,7 @@ export async function refusals(module) {
   said.self = await ask("detect", { between: [a, a] });
   said.method = await refusal(() => new Detector({ method: "octree" }));
   said.setting = await refusal(() => new Detector({ metod: "cells" }));
+  said.margin = await refusal(() => new Detector({ reuseMargin: -1 }));
   said.clearance = await ask("impacts", { clearance: -1 });
   said.start = await ask("isFree", { start: "never" });
   said.field = await ask("earliest", { selfOf: a, seperation: 5 });
@@ -193,6 +194,7 @@ export const REFUSALS = {
   self: "invalid: a query between body 0 and itself: ask for collisions within it instead",
   method: 'invalid: method: "octree" given, "auto", "clusters", "cells" or "naive" allowed',
   setting: 'invalid: settings: "metod" given, method, recluster, memoryBudget, maxPairs or reuseMargin allowed',
+  margin: "invalid: reuseMargin: -1 given, a number that is not below 0 is needed",
   clearance: "invalid: clearance: -1 given, a finite number that is not below 0 allowed",
   start: 'invalid: start: "never" given, "report", "skip" or "verify" allowed',
   field:
