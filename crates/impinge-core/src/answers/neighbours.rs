@@ -1,16 +1,21 @@
 //! The answer which elements are near each element: lists, as compressed sparse rows.
 
+use std::ops::Range;
+
 use crate::answers::home::{Home, gives_back};
-use crate::plan::Plan;
+use crate::plan::{Plan, QueryPart};
 use crate::query::pair_kind::PairKind;
 use crate::scene::Scene;
 use crate::scene::elements::Part;
 use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
-use crate::scene::index::pair_numbers;
 use crate::search::found::KeysByKind;
 use crate::search::sink::reserve;
 use crate::search::stats::Stats;
+use crate::search::work::Work;
+
+/// Pairs that a task takes.
+const TASK: usize = 1 << 13;
 
 /// Compressed sparse rows: the neighbours of element `i` are `indices[offsets[i]..offsets[i + 1]]`,
 /// ascending.
@@ -40,47 +45,167 @@ impl Csr {
         indices.zip(self.distances[range].iter().copied())
     }
 
-    fn clear(&mut self) {
-        self.offsets.clear();
-        self.indices.clear();
-        self.distances.clear();
-    }
-
-    /// Makes rows of entries `(row, column, distance)`, which are gone through twice and keep their
-    /// order within a row.
+    /// Makes rows of sorted pairs with their distances: a row for one side or for each, with the
+    /// other one as the column. Within a row, columns of `by` come in that order. Each task makes
+    /// some rows.
     fn fill(
         &mut self,
         n_rows: usize,
-        entries: impl Iterator<Item = (u32, u32, f64)> + Clone,
+        (pairs, distances): (&[u64], &[f64]),
+        by: &[By],
+        work: Work<'_>,
     ) -> Result<(), Error> {
-        const WHAT: &str = "neighbours";
-        reserve(&mut self.offsets, n_rows + 1, WHAT)?;
+        let n = by.len() * pairs.len();
+        fit(&mut self.offsets, n_rows + 1)?;
+        fit(&mut self.indices, n)?;
+        fit(&mut self.distances, n)?;
+        self.offsets.fill(0);
+        if n == 0 {
+            return Ok(());
+        }
+        let n_tasks = n.div_ceil(work.workers.task(TASK)).min(work.workers.n());
         // Counted one place later, so that the second pass can move each row's start to its end.
-        self.offsets.resize(n_rows + 1, 0);
-        let mut n = 0;
-        for (row, _, _) in entries.clone() {
-            n += 1;
-            if let Some(count) = self.offsets.get_mut(row as usize + 2) {
-                *count += 1;
+        let n_each = n_rows.div_ceil(n_tasks);
+        let counts = &mut self.offsets[2..];
+        let count = |first: usize, counts: &mut [u64]| {
+            let rows = first..first + counts.len();
+            for by in by {
+                by.each(&rows, pairs, |row, _, _| counts[row - first] += 1);
             }
+        };
+        if n_tasks == 1 {
+            count(0, counts);
+        } else {
+            let mut tasks: Vec<_> = counts.chunks_mut(n_each).collect();
+            work.each(&mut tasks, |task, counts| {
+                count(task * n_each, counts);
+                Ok(())
+            })?;
         }
         for row in 2..=n_rows {
             self.offsets[row] += self.offsets[row - 1];
         }
-        reserve(&mut self.indices, n, WHAT)?;
-        reserve(&mut self.distances, n, WHAT)?;
-        self.indices.resize(n, 0);
-        self.distances.resize(n, 0.0);
-        for (row, column, distance) in entries {
-            let at = &mut self.offsets[row as usize + 1];
-            (self.indices[*at as usize], self.distances[*at as usize]) = (column, distance);
-            *at += 1;
+        let place = |rows: &mut Rows<'_>| {
+            let Rows {
+                first,
+                before,
+                starts,
+                indices,
+                distances: into,
+            } = rows;
+            for by in by {
+                let rows = *first..*first + starts.len();
+                by.each(&rows, pairs, |row, column, ix| {
+                    let next = &mut starts[row - *first];
+                    let at = *next as usize - *before;
+                    (indices[at], into[at]) = (column, distances[ix]);
+                    *next += 1;
+                });
+            }
+        };
+        let mut rest = Rows {
+            first: 0,
+            before: 0,
+            starts: &mut self.offsets[1..],
+            indices: &mut self.indices,
+            distances: &mut self.distances,
+        };
+        if n_tasks == 1 {
+            place(&mut rest);
+            return Ok(());
         }
-        Ok(())
+        let mut tasks = Vec::with_capacity(n_tasks);
+        for task in 1..n_tasks {
+            let own;
+            (own, rest) = rest.split_before(n as u64 * task as u64 / n_tasks as u64);
+            tasks.push(own);
+        }
+        tasks.push(rest);
+        work.each(&mut tasks, |_, rows| {
+            place(rows);
+            Ok(())
+        })
     }
 
     fn bytes(&self) -> usize {
         8 * self.offsets.capacity() + 4 * self.indices.capacity() + 8 * self.distances.capacity()
+    }
+}
+
+/// Some rows that are being filled.
+struct Rows<'a> {
+    first: usize,
+    /// Entries of the rows before.
+    before: usize,
+    starts: &'a mut [u64],
+    indices: &'a mut [u32],
+    distances: &'a mut [f64],
+}
+
+impl Rows<'_> {
+    /// The rows that start before an entry, and the others.
+    fn split_before(self, entry: u64) -> (Self, Self) {
+        let n = self.starts.partition_point(|&start| start < entry);
+        let (starts, later) = self.starts.split_at_mut(n);
+        let n_own = match later.first() {
+            Some(&start) => start as usize - self.before,
+            None => self.indices.len(),
+        };
+        let (indices, later_indices) = self.indices.split_at_mut(n_own);
+        let (distances, later_distances) = self.distances.split_at_mut(n_own);
+        let own = Rows {
+            starts,
+            indices,
+            distances,
+            ..self
+        };
+        let rest = Rows {
+            first: self.first + n,
+            before: self.before + n_own,
+            starts: later,
+            indices: later_indices,
+            distances: later_distances,
+        };
+        (own, rest)
+    }
+}
+
+/// Gives a list a length, whatever it then holds.
+fn fit<T: Copy + Default>(list: &mut Vec<T>, n: usize) -> Result<(), Error> {
+    reserve(list, n.saturating_sub(list.len()), "neighbours")?;
+    list.resize(n, T::default());
+    Ok(())
+}
+
+/// Which side of a pair has the row.
+#[derive(Debug, Clone, Copy)]
+enum By {
+    First,
+    Second,
+}
+
+impl By {
+    /// Tells of the pairs with some rows: the row, the column, and which pair it is. Pairs are
+    /// sorted.
+    #[inline(always)]
+    fn each(self, rows: &Range<usize>, pairs: &[u64], mut tell: impl FnMut(usize, u32, usize)) {
+        match self {
+            By::First => {
+                let [first, end] = [rows.start, rows.end]
+                    .map(|row| pairs.partition_point(|pair| (pair >> 32) < row as u64));
+                for (ix, &pair) in (first..).zip(&pairs[first..end]) {
+                    tell((pair >> 32) as usize, pair as u32, ix);
+                }
+            }
+            By::Second => {
+                for (ix, &pair) in pairs.iter().enumerate() {
+                    let row = pair as u32 as usize;
+                    if rows.contains(&row) {
+                        tell(row, (pair >> 32) as u32, ix);
+                    }
+                }
+            }
+        }
     }
 }
 
@@ -93,6 +218,8 @@ impl Csr {
 pub struct Neighbours {
     /// The first vertex, edge and face of each body.
     bodies: Vec<(BodyId, [u32; 3])>,
+    /// How many vertices, edges and faces all bodies have.
+    n_elements: [usize; 3],
     /// By kind: of the elements that the kind names first, and of the others.
     lists: [[Csr; 2]; PairKind::ALL.len()],
     n_pairs: usize,
@@ -113,7 +240,7 @@ fn place(part: Part) -> usize {
 impl Neighbours {
     pub(crate) fn begin(&mut self) {
         self.bodies.clear();
-        self.lists.iter_mut().flatten().for_each(Csr::clear);
+        // Lists are overwritten as a whole.
         self.n_pairs = 0;
         self.stats.clear();
     }
@@ -122,16 +249,12 @@ impl Neighbours {
         &mut self.stats
     }
 
-    /// Takes sorted keys with the distances of their pairs.
+    /// Numbers the elements of all bodies. Returns the number of the first element of each part of
+    /// the plan, whose parts are in the same order.
     ///
     /// # Errors
-    /// There is no memory for the lists.
-    pub(crate) fn fill(
-        &mut self,
-        (scene, plan): (&Scene, &Plan),
-        keys: &KeysByKind,
-        distances: &[Vec<f64>; PairKind::ALL.len()],
-    ) -> Result<(), Error> {
+    /// There are too many.
+    pub(crate) fn number(&mut self, scene: &Scene, plan: &Plan) -> Result<Vec<u32>, Error> {
         let mut n = [0u64; 3];
         for (id, body) in scene.bodies() {
             self.bodies.push((id, n.map(|n| n as u32)));
@@ -145,36 +268,34 @@ impl Neighbours {
                 return Err(Error::TooMany { what, given, limit });
             }
         }
-        // What turns a number of the plan into one of the lists.
-        let shifts: Vec<u32> = plan
-            .parts
-            .iter()
-            .map(|part| {
-                let first = self.first(part.id, part.part).unwrap_or(0);
-                first.wrapping_sub(part.first.raw())
-            })
-            .collect();
-        let number = |number| {
-            let (part, _) = plan.locate(number);
-            number.raw().wrapping_add(shifts[part.index()])
-        };
-        let lists = self.lists.iter_mut().zip(keys.iter().zip(distances));
-        for (kind, ([own, others], (keys, distances))) in PairKind::ALL.into_iter().zip(lists) {
-            let pairs = keys.iter().zip(distances).map(|(&key, &distance)| {
-                let [a, b] = pair_numbers(key).map(number);
-                (a, b, distance)
-            });
-            let turned = pairs.clone().map(|(a, b, distance)| (b, a, distance));
+        self.n_elements = n.map(|n| n as usize);
+        let first = |part: &QueryPart| self.first(part.id, part.part).unwrap_or(0);
+        Ok(plan.parts.iter().map(first).collect())
+    }
+
+    /// Takes sorted pairs of numbers, the first one in the upper half, with their distances.
+    ///
+    /// # Errors
+    /// There is no memory for the lists; cancellation.
+    pub(crate) fn fill(
+        &mut self,
+        pairs: &KeysByKind,
+        distances: &[Vec<f64>; PairKind::ALL.len()],
+        work: Work<'_>,
+    ) -> Result<(), Error> {
+        let lists = self.lists.iter_mut().zip(pairs.iter().zip(distances));
+        for (kind, ([own, others], (pairs, distances))) in PairKind::ALL.into_iter().zip(lists) {
+            let pairs = (&pairs[..], &distances[..]);
             let [a, b] = kind.parts();
-            let [rows, columns] = [a, b].map(|part| n[place(part)] as usize);
+            let [rows, columns] = [a, b].map(|part| self.n_elements[place(part)]);
             if a == b {
                 // Listed at both: first the lower neighbours of each element, then the higher ones.
-                own.fill(rows, turned.chain(pairs))?;
+                own.fill(rows, pairs, &[By::Second, By::First], work)?;
             } else {
-                own.fill(rows, pairs)?;
-                others.fill(columns, turned)?;
+                own.fill(rows, pairs, &[By::First], work)?;
+                others.fill(columns, pairs, &[By::Second], work)?;
             }
-            self.n_pairs += keys.len();
+            self.n_pairs += pairs.0.len();
         }
         Ok(())
     }

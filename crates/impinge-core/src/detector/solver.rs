@@ -21,8 +21,10 @@ use crate::query::Query;
 use crate::query::pair_kind::PairKind;
 use crate::query::step::check_distance;
 use crate::scene::Scene;
+use crate::scene::elements::{Elements, Part};
 use crate::scene::error::Error;
-use crate::scene::index::{ElementIx, PartIx};
+use crate::scene::index::{ElementIx, Number, PartIx, pair_numbers};
+use crate::scene::positions::Positions;
 use crate::search::found::KeysByKind;
 use crate::search::narrow::{Corners, exact_kind};
 use crate::search::runner::{Job, Outcome};
@@ -154,16 +156,16 @@ impl Detector {
 
 /// A pair whose distance was measured.
 struct Measured<'a> {
-    parts: [PartIx; 2],
-    corners: [&'a [u32]; 2],
+    key: u64,
+    located: &'a [Located; 2],
     /// A number below its distance minus the thickness of both; 0 if and only if that is not
     /// above 0.
     distance: f64,
 }
 
 impl SolverMemory {
-    /// Takes keys with labels off, and measures the distance of each pair, in parallel. `each` is
-    /// told of each pair.
+    /// Measures the distance of each pair, in parallel, and takes the labels off keys. `each` is told
+    /// of each pair, and says which key it then has.
     ///
     /// # Errors
     /// There is no memory, cancellation.
@@ -173,7 +175,7 @@ impl SolverMemory {
         isa: Isa,
         keys: KeysByKind,
         stats: &mut Stats,
-        each: impl Fn(Measured<'_>) + Sync,
+        each: impl Fn(Measured<'_>) -> u64 + Sync,
     ) -> Result<(), Error> {
         let start = Instant::now();
         let Job {
@@ -198,41 +200,34 @@ impl SolverMemory {
         Work { workers, control }.each(&mut tasks, |_, (kind, keys, distances)| {
             let pair = exact_kind(TestId::Elements(*kind));
             let mut points = Points8::default();
+            let world = (scene, plan);
+            let [mut of_a, mut of_b] = [0, 0].map(|ix| Held::new(world, PartIx::new(ix)));
+            let mut located = [[Located::default(); 2]; LANES];
             for (keys, distances) in keys.chunks_mut(LANES).zip(distances.chunks_mut(LANES)) {
-                for key in &mut *keys {
+                for (lane, (key, located)) in keys.iter_mut().zip(&mut located).enumerate() {
                     (*key, _) = labels.split(*key);
-                }
-                let located: [_; LANES] =
-                    std::array::from_fn(|lane| keys.get(lane).map(|&key| plan.located(key)));
-                let located = || located.iter().flatten().enumerate();
-                let bounds = pair.map(|pair| {
-                    for (lane, located) in located() {
-                        put_points((scene, plan), pair, located, lane, &mut points);
+                    let [a, b] = pair_numbers(*key);
+                    *located = [of_a.locate(world, a), of_b.locate(world, b)];
+                    if let Some(pair) = pair {
+                        let sides = [of_a.side(&located[0].1), of_b.side(&located[1].1)];
+                        put_points(pair, sides, lane, &mut points);
                     }
-                    bounds_by_lane(isa, pair, &points)
-                });
-                for ((lane, located), to) in located().zip(distances) {
-                    let parts = [located[0].0, located[1].0];
-                    let [a, b] = located.each_ref().map(|(part, element)| {
-                        let body = plan.body(scene, *part);
-                        (body, body.corners(plan.part(*part).part, element))
-                    });
+                }
+                let bounds = pair.map(|pair| bounds_by_lane(isa, pair, &points));
+                let pairs = keys.iter_mut().zip(&located).enumerate();
+                for ((lane, (key, located)), to) in pairs.zip(distances) {
                     let known = bounds
                         .as_ref()
                         .and_then(|bounds| below_by_bounds([bounds.low[lane], bounds.high[lane]]));
                     let distance = known.unwrap_or_else(|| match kind {
                         // They meet.
                         PairKind::EdgeFace => 0.0,
-                        _ => {
-                            let [a, b] = [a, b]
-                                .map(|(body, corners)| Corners::new(body.positions(), corners));
-                            distance_below(a.points(), b.points())
-                        }
+                        _ => distance_of(world, located),
                     });
                     *to = without(plan.thickness(*located), distance);
-                    each(Measured {
-                        parts,
-                        corners: [a.1, b.1],
+                    *key = each(Measured {
+                        key: *key,
+                        located,
                         distance: *to,
                     });
                 }
@@ -251,26 +246,90 @@ impl SolverMemory {
     }
 }
 
+/// A part, and an element of it.
+type Located = (PartIx, ElementIx);
+
+/// An element of a pair.
+#[derive(Clone, Copy)]
+struct Side<'a> {
+    positions: &'a Positions,
+    corners: &'a [u32],
+}
+
+/// A part, held from pair to pair: most pairs are of the same two.
+struct Held<'a> {
+    part: PartIx,
+    of: Part,
+    elements: &'a Elements,
+    positions: &'a Positions,
+}
+
+impl<'a> Held<'a> {
+    fn new((scene, plan): (&'a Scene, &'a Plan), part: PartIx) -> Self {
+        let (of, body) = (plan.part(part).part, plan.body(scene, part));
+        Held {
+            part,
+            of,
+            elements: body.part(of),
+            positions: body.positions(),
+        }
+    }
+
+    /// Finds an element, and holds its part.
+    #[inline(always)]
+    fn locate(&mut self, world: (&'a Scene, &'a Plan), number: Number) -> Located {
+        let mut part = self.part;
+        let located = world.1.locate_after(number, &mut part);
+        if part != self.part {
+            *self = Self::new(world, part);
+        }
+        located
+    }
+
+    #[inline(always)]
+    fn side<'b>(&self, element: &'b ElementIx) -> Side<'b>
+    where
+        'a: 'b,
+    {
+        let corners = match self.of {
+            // Vertices are numbered as positions are.
+            Part::Vertices => element.as_corners(),
+            _ => self.elements.corners(element.index()),
+        };
+        Side {
+            positions: self.positions,
+            corners,
+        }
+    }
+}
+
+/// A number below the distance of a pair, by its exact value.
+#[inline(never)]
+fn distance_of((scene, plan): (&Scene, &Plan), located: &[Located; 2]) -> f64 {
+    let [a, b] = located.each_ref().map(|(part, element)| {
+        let body = plan.body(scene, *part);
+        let corners = body.corners(plan.part(*part).part, element);
+        Corners::new(body.positions(), corners)
+    });
+    distance_below(a.points(), b.points())
+}
+
 /// Writes the points of a pair into a lane, in the order of the exact test.
+#[inline(always)]
 fn put_points(
-    (scene, plan): (&Scene, &Plan),
     pair: ElementPair,
-    located: &[(PartIx, ElementIx); 2],
+    mut sides: [Side<'_>; 2],
     lane: usize,
     Points8(points): &mut Points8,
 ) {
-    let mut located = located.each_ref();
     if pair == ElementPair::VertexEdge {
         // Such pairs are named edge first, but tested vertex first.
-        located.reverse();
+        sides.reverse();
     }
     let mut rows = points.iter_mut();
-    for (part, element) in located {
-        let body = plan.body(scene, *part);
-        let positions = body.positions();
-        let corners = body.corners(plan.part(*part).part, element);
-        for (&corner, row) in corners.iter().zip(&mut rows) {
-            put_point(row, lane, &positions.point(corner as usize));
+    for side in sides {
+        for (&corner, row) in side.corners.iter().zip(&mut rows) {
+            put_point(row, lane, &side.positions.point(corner as usize));
         }
     }
 }
@@ -316,7 +375,14 @@ impl Outcome<u64, { PairKind::ALL.len() }> for Safe<'_> {
         let shares = self.shares;
         let stats = self.safe.stats_mut();
         (self.memory).measure(job, self.isa, keys, stats, |pair| {
-            shares.between(pair.parts).take(pair.corners, pair.distance);
+            let [(a, of_a), (b, of_b)] = pair.located;
+            let corners = |part, element| {
+                let body = plan.body(scene, part);
+                body.corners(plan.part(part).part, element)
+            };
+            let corners = [corners(*a, of_a), corners(*b, of_b)];
+            shares.between([*a, *b]).take(corners, pair.distance);
+            pair.key
         })?;
         self.safe.fill(scene, shares.iter())?;
         // The keys of the pairs that touch, which have no labels now.
@@ -357,14 +423,22 @@ impl Outcome<u64, { PairKind::ALL.len() }> for Listed<'_> {
     }
 
     fn fill(&mut self, job: Job<'_>, keys: KeysByKind) -> Result<(), Error> {
+        let firsts = self.neighbours.number(job.scene, job.plan)?;
         let stats = self.neighbours.stats_mut();
-        (self.memory).measure(job, self.isa, keys, stats, |_| ())?;
+        (self.memory).measure(job, self.isa, keys, stats, |pair| {
+            let [(a, of_a), (b, of_b)] = pair.located;
+            let number = |part: PartIx, element: ElementIx| firsts[part.index()] + element.raw();
+            u64::from(number(*a, *of_a)) << 32 | u64::from(number(*b, *of_b))
+        })?;
         let start = Instant::now();
         let SolverMemory {
             keys, distances, ..
         } = &*self.memory;
-        self.neighbours
-            .fill((job.scene, job.plan), keys, distances)?;
+        let Job {
+            workers, control, ..
+        } = job;
+        let work = Work { workers, control };
+        self.neighbours.fill(keys, distances, work)?;
         let ms = start.elapsed().as_secs_f64() * 1e3;
         self.neighbours.stats_mut().add_ms("lists", ms);
         Ok(())

@@ -54,15 +54,34 @@ struct OfPart {
 /// An element: its part, its corners.
 pub(crate) type Cornered<'a> = (PartIx, &'a [u32]);
 
+/// What is left out of the pairs of one body by lists and by names. It is the same as long as the
+/// topology and the query are.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct OwnRule {
+    /// Of each vertex: its elements are left out with those of these.
+    pub lists: Vec<Arc<VertexRings>>,
+    pub pairs: Vec<SortedKeys>,
+}
+
+impl OwnRule {
+    /// Whether nothing is left out.
+    pub fn is_empty(&self) -> bool {
+        self.lists.is_empty() && self.pairs.is_empty()
+    }
+
+    /// Whether two rules are of the same lists.
+    pub fn is(&self, other: &OwnRule) -> bool {
+        fn are_same<T: ?Sized>(a: &[Arc<T>], b: &[Arc<T>]) -> bool {
+            a.len() == b.len() && a.iter().zip(b).all(|(a, b)| Arc::ptr_eq(a, b))
+        }
+        are_same(&self.lists, &other.lists) && are_same(&self.pairs, &other.pairs)
+    }
+}
+
 impl LeftOut {
-    /// Whether a pair is left out.
+    /// Whether a pair is left out because of how its vertices are marked.
     #[inline]
-    fn has(
-        &self,
-        (kind, key): (Option<PairKind>, u64),
-        [a, b]: [Cornered<'_>; 2],
-        bodies: [BodyId; 2],
-    ) -> bool {
+    fn has_marked(&self, [a, b]: [Cornered<'_>; 2]) -> bool {
         let of = [&self.parts[a.0.index()], &self.parts[b.0.index()]];
         if let [Some(of_a), Some(of_b)] = of.map(|of| of.pinned.as_ref()) {
             let is_pinned = |pinned: &[bool], corners: &[u32]| {
@@ -71,11 +90,6 @@ impl LeftOut {
             if is_pinned(of_a, a.1) && is_pinned(of_b, b.1) {
                 return true;
             }
-        }
-        if let (true, Some(rings)) = (bodies[0] == bodies[1], &of[0].rings)
-            && a.1.iter().any(|&from| rings.reaches_any(from, b.1))
-        {
-            return true;
         }
         if let (false, [Some(of_a), Some(of_b)]) =
             (self.groups.is_empty(), of.map(|of| of.groups.as_ref()))
@@ -90,6 +104,22 @@ impl LeftOut {
             if a.1.iter().all(are_apart) {
                 return true;
             }
+        }
+        false
+    }
+
+    /// Whether a pair is left out by lists or by its name.
+    #[inline]
+    fn has_listed(
+        &self,
+        (kind, key): (Option<PairKind>, u64),
+        [a, b]: [Cornered<'_>; 2],
+        bodies: [BodyId; 2],
+    ) -> bool {
+        if let (true, Some(rings)) = (bodies[0] == bodies[1], &self.parts[a.0.index()].rings)
+            && a.1.iter().any(|&from| rings.reaches_any(from, b.1))
+        {
+            return true;
         }
         if (self.vertices.iter()).any(|listed| listed.has(bodies, [a.1, b.1])) {
             return true;
@@ -165,7 +195,54 @@ impl Plan {
             Question::Intersection => None,
             _ => PairKind::of(parts[0].part, parts[1].part),
         };
-        left_out.has((kind, key), [a, b], parts.map(|part| part.id))
+        left_out.has_marked([a, b])
+            || left_out.has_listed((kind, key), [a, b], parts.map(|part| part.id))
+    }
+
+    /// What is left out of the pairs of the body of a part, except for how vertices are marked.
+    pub(crate) fn own_rule(&self, part: PartIx) -> OwnRule {
+        let Some(left_out) = &self.left_out else {
+            return OwnRule::default();
+        };
+        let bodies = [self.part(part).id; 2];
+        let listed = left_out.vertices.iter().filter(|of| of.bodies == bodies);
+        let rings = left_out.parts[part.index()].rings.iter();
+        OwnRule {
+            lists: rings.chain(listed.map(|of| &of.lists)).cloned().collect(),
+            pairs: left_out.pairs.clone(),
+        }
+    }
+
+    /// Whether pairs are left out because of how their vertices are marked: pinned, or in groups.
+    pub(crate) fn leaves_out_marked(&self) -> bool {
+        let is_marked = |of: &OfPart| of.pinned.is_some();
+        let has = |left_out: &LeftOut| {
+            !left_out.groups.is_empty() || left_out.parts.iter().any(is_marked)
+        };
+        self.left_out.as_deref().is_some_and(has)
+    }
+
+    /// Whether a pair is left out because of how its vertices are marked.
+    #[inline]
+    pub(crate) fn is_left_out_marked(&self, pair: [Cornered<'_>; 2]) -> bool {
+        let left_out = self.left_out.as_deref();
+        left_out.is_some_and(|left_out| left_out.has_marked(pair))
+    }
+
+    /// Whether some pairs of two parts may be left out.
+    #[inline]
+    pub(crate) fn leaves_out_between(&self, a: PartIx, b: PartIx) -> bool {
+        let Some(left_out) = &self.left_out else {
+            return false;
+        };
+        let [of_a, of_b] = [a, b].map(|part| &left_out.parts[part.index()]);
+        let bodies = [a, b].map(|part| self.part(part).id);
+        (of_a.rings.is_some() && bodies[0] == bodies[1])
+            || (of_a.pinned.is_some() && of_b.pinned.is_some())
+            || !left_out.groups.is_empty()
+            || !left_out.pairs.is_empty()
+            || (left_out.vertices.iter())
+                .any(|of| of.bodies == bodies || of.bodies == [bodies[1], bodies[0]])
     }
 
     /// Whether a pair is left out, by its key alone.

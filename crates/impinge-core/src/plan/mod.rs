@@ -42,6 +42,7 @@ use crate::scene::index::{ElementIx, Number, PartIx, pair_numbers};
 use crate::scene::{Body, Each, Filter, Scene};
 use crate::workers::clock::Instant;
 use impinge_exact::internal::Keep;
+pub(crate) use left_out::OwnRule;
 
 /// One part of one body that takes part in a frame.
 #[derive(Debug, Clone, Copy)]
@@ -608,6 +609,18 @@ impl Plan {
     pub fn locate(&self, number: Number) -> (PartIx, ElementIx) {
         let ix = owner_by_first(&self.parts, number, |part| part.first);
         (PartIx::from_usize(ix), self.parts[ix].element(number))
+    }
+
+    /// The element with a number, which is often of the same part as the last one.
+    #[inline]
+    pub fn locate_after(&self, number: Number, last: &mut PartIx) -> (PartIx, ElementIx) {
+        let part = self.part(*last);
+        if part.numbers().contains(&number) {
+            return (*last, part.element(number));
+        }
+        let located = self.locate(number);
+        *last = located.0;
+        located
     }
 
     /// The elements of a pair, in the order of its key.

@@ -241,9 +241,15 @@ impl VertexRings {
     /// Whether any of some vertices is in the rings of a vertex.
     #[inline]
     pub fn reaches_any(&self, from: u32, to: &[u32]) -> bool {
-        let [start, end] = [0, 1].map(|next| self.starts[from as usize + next]);
-        let rings = &self.vertices[start..end];
+        let rings = self.of(from);
         to.iter().any(|to| rings.binary_search(to).is_ok())
+    }
+
+    /// The list of a vertex.
+    #[inline]
+    pub fn of(&self, vertex: u32) -> &[u32] {
+        let [start, end] = [0, 1].map(|next| self.starts[vertex as usize + next]);
+        &self.vertices[start..end]
     }
 }
 

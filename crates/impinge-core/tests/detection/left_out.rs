@@ -516,3 +516,127 @@ fn bad_exclusions_are_refused_by_name() {
         }
     ));
 }
+
+/// A detector with a memory budget compares the vertices of every candidate; one without knows the
+/// excluded pairs of a body as bits.
+#[test]
+fn excluded_pairs_are_known_whatever_was_asked_before() {
+    let settings = || Settings::new().threads(3).backend(Backend::Cpu);
+    let mut by_bits = Detector::new(settings()).expect("settings");
+    let mut one_by_one = Detector::new(settings().memory_budget(1 << 30)).expect("settings");
+    let mut scene = Scene::new();
+    let ball = surfaces::bumpy_ball(900, 0.4);
+    let mut random = Random::new(3);
+    let mut at = |positions: &[[f32; 3]], by: f32| -> Vec<[f32; 3]> {
+        let moved = |p: &[f32; 3]| {
+            let q = random.point(-by, by);
+            [0, 1, 2].map(|axis| p[axis] + q[axis])
+        };
+        positions.iter().map(moved).collect()
+    };
+    let body = scene
+        .add((ball.elements.clone(), at(&ball.positions, 0.05)))
+        .expect("good");
+    let cloth = surfaces::cloth(25, 20, 1.5);
+    let falling = scene
+        .add((cloth.elements.clone(), at(&cloth.positions, 0.1)))
+        .expect("good");
+    let mut n_pairs = BTreeSet::new();
+    for round in 0..6 {
+        match round {
+            // Other positions, other clusters, other elements, marked vertices.
+            1 => {
+                let positions = at(&ball.positions, 0.2);
+                scene.set_positions(body, positions).expect("good");
+            }
+            2 => {
+                // The clusters fit no more, and are made anew.
+                let mut positions = at(&ball.positions, 0.05);
+                positions.reverse();
+                scene.set_positions(body, positions).expect("good");
+            }
+            3 => {
+                let Elements::Triangles(mut faces) = ball.elements.clone() else {
+                    panic!("triangles")
+                };
+                faces.reverse();
+                faces.truncate(faces.len() - 7);
+                let mesh = (Elements::Triangles(faces), ball.positions.clone());
+                scene.remesh(body, mesh).expect("good");
+            }
+            4 => {
+                let n = scene.body(falling).expect("held").n_vertices();
+                let pinned: Vec<bool> = (0..n).map(|ix| ix % 3 != 1).collect();
+                scene.set_pinned(falling, &pinned).expect("good");
+                let groups: Vec<u32> = (0..n).map(|ix| (ix / 50) as u32).collect();
+                scene.set_groups(falling, &groups).expect("good");
+            }
+            _ => {}
+        }
+        let kinds = [
+            PairKind::VertexFace,
+            PairKind::EdgeEdge,
+            PairKind::EdgeFace,
+            PairKind::VertexVertex,
+        ];
+        let all = Query::all().kinds(kinds);
+        let n = scene.body(body).expect("held").n_vertices();
+        let offsets: Vec<u64> = (0..=n as u64).collect();
+        let next: Vec<u32> = (0..n as u32).map(|ix| (ix * 7 + 1) % n as u32).collect();
+        let lists = Exclusion::vertices(body, body, offsets, next);
+        let near = by_bits.near(&scene, 0.1, &all).expect("good");
+        let queries = [
+            all.clone(),
+            all.clone().exclude(Exclusion::rings(1)),
+            all.clone().exclude(lists.clone()),
+            all.clone().exclude(&near),
+            all.clone().exclude(Exclusion::rings(2)).exclude(lists),
+            Query::self_of(body).exclude(Exclusion::rings(2)),
+            all.exclude(Exclusion::rings(3))
+                .exclude(Exclusion::groups(1, 1)),
+        ];
+        for query in queries.iter().chain(&queries[..2]) {
+            let of = |detector: &mut Detector| {
+                let near = detector.near(&scene, 0.15, query).expect("good");
+                near.iter()
+                    .map(|pair| (pair.kind, pair.row()))
+                    .collect::<Vec<_>>()
+            };
+            let found = of(&mut by_bits);
+            assert!(found == of(&mut one_by_one), "{round}: {query:?}");
+            n_pairs.insert(found.len());
+        }
+    }
+    assert!(n_pairs.len() > 20, "{n_pairs:?}");
+}
+
+/// A fan whose middle all triangles share has no such bits: they would be one for each pair.
+#[test]
+fn rings_of_fans_are_left_out() {
+    let n = 300;
+    let mut positions = vec![[0.0f32; 3]];
+    positions.extend((0..n).map(|ix| {
+        let angle = ix as f32 * 0.02;
+        [angle.cos(), angle.sin(), 0.01 * ix as f32]
+    }));
+    let faces: Vec<[u32; 3]> = (1..n).map(|ix| [0, ix, ix + 1]).collect();
+    let mut scene = Scene::new();
+    let fan = scene.add_triangles(&faces, &positions).expect("good");
+    let query = Query::all().exclude(Exclusion::rings(1));
+    for mut detector in detectors() {
+        // Everything is one edge from the middle, and shares a vertex with all faces; rims of the
+        // fan that are far apart in it are near.
+        let near = detector.near(&scene, 0.5, &query).expect("good");
+        assert!(!near.is_empty());
+        let edges = scene.body(fan).expect("held").edges();
+        for pair in near.iter() {
+            assert_eq!(pair.kind, PairKind::EdgeEdge);
+            let ends = [pair.a, pair.b].map(|of| edges.corners(of.element as usize));
+            assert!(ends[0].iter().all(|v| {
+                ends[1]
+                    .iter()
+                    .all(|w| *v != 0 && *w != 0 && v.abs_diff(*w) > 1)
+            }));
+        }
+    }
+}

@@ -488,6 +488,44 @@ fn neighbours_are_the_near_pairs_by_element() {
     }
 }
 
+/// So many that each thread makes some rows of the lists.
+#[test]
+fn lists_are_the_same_with_any_number_of_threads() {
+    let mut scene = Scene::new();
+    surfaces::bumpy_ball(900, 0.3)
+        .add_to(&mut scene)
+        .expect("good");
+    surfaces::cloth(20, 20, 1.0)
+        .add_to(&mut scene)
+        .expect("good");
+    let query = Query::all().kinds([PairKind::VertexFace, PairKind::EdgeEdge]);
+    let of = |threads| {
+        let mut detector = detector(Method::Clusters, threads);
+        detector.neighbours(&scene, 0.3, &query).expect("good")
+    };
+    let expected = of(1);
+    assert!(expected.vf().indices.len() > 1 << 15);
+    for threads in [2, 3, 7] {
+        let found = of(threads);
+        for kind in [PairKind::VertexFace, PairKind::EdgeEdge] {
+            assert!(found.of(kind) == expected.of(kind), "{threads}");
+            assert!(found.reversed(kind) == expected.reversed(kind), "{threads}");
+        }
+    }
+    // Each pair is in both lists, and rows ascend.
+    for (list, turned) in [
+        (expected.vf(), expected.fv()),
+        (expected.ee(), expected.ee()),
+    ] {
+        let mut pairs = entries(list);
+        assert!(pairs.is_sorted());
+        let mut back: Vec<_> = entries(turned).iter().map(|&(a, b)| (b, a)).collect();
+        pairs.sort_unstable();
+        back.sort_unstable();
+        assert!(pairs == back);
+    }
+}
+
 /// Where squares are no numbers any more, bounds in floats are of no use, and distances are still
 /// rounded down.
 #[test]

@@ -1,5 +1,6 @@
 //! The cache of a part: its clusters, and their boxes at the start and at the end of a step.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use crate::boxes::{BoxSource, Sweep};
@@ -8,15 +9,19 @@ use crate::bvh::clusters::Clustering;
 use crate::clusterings::{BodyPart, Clustered, Clusterings, Fit, Store, spread};
 use crate::cpu::bounds::TreeBounds;
 use crate::cpu::traversal::BodyTree;
-use crate::plan::Plan;
+use crate::plan::{OwnRule, Plan};
 use crate::query::settings::Settings;
 use crate::scene::Body;
+use crate::scene::elements::Part;
 use crate::scene::error::Error;
+use crate::scene::ids::BodyId;
 use crate::scene::index::{ClusterIx, PartIx};
 use crate::search::runner::Job;
 use crate::search::stats::Stats;
 use crate::search::work::Work;
 use crate::simd::{Isa, Simd, with_isa};
+
+use super::excluded::ExcludedLanes;
 
 /// Clusters per task.
 const CLUSTERS: usize = 128;
@@ -48,7 +53,23 @@ pub(super) struct PartCache {
     /// How well the clusters have fitted the part, by boxes of the start and by those of the whole
     /// path, which are larger: questions with either take turns.
     fits: [Fit; 2],
+    /// The pairs with the body's vertices, edges and faces that the question excludes.
+    excluded: [Option<Arc<ExcludedLanes>>; 3],
+    /// Those of the last questions, the latest last.
+    kept: Vec<Kept>,
 }
+
+/// The excluded pairs of a part with another of its body, and what they depend on.
+#[derive(Debug)]
+struct Kept {
+    other: Arc<Clustering>,
+    rule: OwnRule,
+    /// `None` if there are too many.
+    lanes: Option<Arc<ExcludedLanes>>,
+}
+
+/// For how many parts and rules a part keeps its excluded pairs.
+const MOST_KEPT: usize = 6;
 
 impl PartCache {
     /// What is kept beside the clusters of a part of a body; no boxes yet.
@@ -66,7 +87,15 @@ impl PartCache {
             bounds,
             ends,
             fits: [Fit::UNKNOWN; 2],
+            excluded: [const { None }; 3],
+            kept: Vec::new(),
         }
+    }
+
+    /// The pairs with another part of the body that the question excludes, if they are known.
+    #[inline(always)]
+    pub fn excluded_with(&self, other: Part) -> Option<&ExcludedLanes> {
+        self.excluded[ix_of(other)].as_deref()
     }
 
     #[inline(always)]
@@ -86,7 +115,9 @@ impl PartCache {
     /// Bytes held beside the clusters.
     pub fn bytes(&self) -> usize {
         let ends: usize = self.ends.iter().map(BoundsArray::bytes).sum();
-        size_of::<PartCache>() + self.bounds.bytes() + ends
+        let kept = self.kept.iter().filter_map(|kept| kept.lanes.as_ref());
+        let kept: usize = kept.map(|lanes| lanes.bytes()).sum();
+        size_of::<PartCache>() + self.bounds.bytes() + ends + kept
     }
 
     /// How well the clusters fit the current pose: the clusters' summed surface divided by the
@@ -100,6 +131,92 @@ impl PartCache {
             whole.join(&bounds);
         }
         spread(surface, whole.half_area_within(inflation))
+    }
+}
+
+/// Where a part is among those of its body.
+#[inline(always)]
+fn ix_of(part: Part) -> usize {
+    match part {
+        Part::Vertices => 0,
+        Part::Edges => 1,
+        Part::Faces | Part::Given => 2,
+    }
+}
+
+/// Finds the excluded pairs of each body of which some are left out, unless they are known. With a
+/// memory budget none are: candidates are compared one by one.
+///
+/// # Errors
+/// There is no memory; cancellation.
+pub(super) fn exclude(
+    job: Job<'_>,
+    settings: &Settings,
+    caches: &mut StepCaches,
+) -> Result<(), Error> {
+    let Job {
+        plan,
+        workers,
+        control,
+        ..
+    } = job;
+    let work = Work { workers, control };
+    for part in &plan.parts {
+        caches.at_mut(part).excluded = [const { None }; 3];
+    }
+    if !plan.leaves_out() || settings.memory_budget.is_some() {
+        return Ok(());
+    }
+    let mut of_bodies: BTreeMap<BodyId, Vec<PartIx>> = BTreeMap::new();
+    for (ix, part) in plan.numbered_parts() {
+        of_bodies.entry(part.id).or_default().push(ix);
+    }
+    for parts in of_bodies.values() {
+        // The parts of a body have the same.
+        let rule = plan.own_rule(parts[0]);
+        if rule.is_empty() {
+            continue;
+        }
+        for (n_before, &a) in parts.iter().enumerate() {
+            for &b in &parts[n_before..] {
+                if plan.test(a, b).is_some() {
+                    let other = plan.part(b);
+                    let of_other = Arc::clone(&caches.at(other).clustering);
+                    let cache = caches.at_mut(plan.part(a));
+                    let found = cache.find_excluded(plan, [a, b], of_other, &rule, work)?;
+                    cache.excluded[ix_of(other.part)] = found;
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+impl PartCache {
+    /// The pairs with a part of the same body that a rule excludes; `None` if there are too many.
+    fn find_excluded(
+        &mut self,
+        plan: &Plan,
+        parts: [PartIx; 2],
+        other: Arc<Clustering>,
+        rule: &OwnRule,
+        work: Work<'_>,
+    ) -> Result<Option<Arc<ExcludedLanes>>, Error> {
+        let is_same = |kept: &Kept| Arc::ptr_eq(&kept.other, &other) && kept.rule.is(rule);
+        let kept = match self.kept.iter().position(is_same) {
+            Some(known) => self.kept.remove(known),
+            None => Kept {
+                lanes: ExcludedLanes::new(plan, parts, [&self.clustering, &other], rule, work)?,
+                rule: rule.clone(),
+                other,
+            },
+        };
+        let lanes = kept.lanes.clone();
+        if self.kept.len() == MOST_KEPT {
+            self.kept.remove(0);
+        }
+        self.kept.push(kept);
+        Ok(lanes)
     }
 }
 

@@ -4,6 +4,7 @@
 //! ```text
 //! clustering  the vertices, edges and faces of each body, once per topology
 //! bounds      two boxes per cluster, at the start and at the end; the tree above holds both
+//! excluded    of each body, the pairs that share a vertex or are left out, once per topology and query
 //! traversal    parts whose boxes meet, then tree against tree: as for intersections
 //! pairing     boxes of elements at both ends; candidates per work item
 //! narrow      filters, then exact arithmetic
@@ -14,6 +15,7 @@
 //! ends, they never touch.
 
 mod cache;
+mod excluded;
 mod group;
 mod narrow;
 mod pairing;
@@ -154,7 +156,10 @@ impl StepClusters {
             .resize_with(job.workers.n(), StepWorker::default);
         stats.n_clusters = 0;
         stats.time("clustering", |stats| self.cluster(job, stats))?;
-        stats.time("bounds", |stats| self.refit(job, settings, stats))
+        stats.time("bounds", |stats| self.refit(job, settings, stats))?;
+        stats.time("clustering", |_| {
+            cache::exclude(job, settings, &mut self.caches)
+        })
     }
 
     /// Does the rest of [`run`](Self::run).

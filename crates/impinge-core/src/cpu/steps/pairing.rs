@@ -5,8 +5,9 @@
 //! 2. The boxes of the larger side's survivors are put side by side, and each survivor of the
 //!    smaller side is tested against them, 16 (or 8) lanes at a time; where boxes are single, 16
 //!    lanes against all of them.
-//! 3. Within one body, candidates that share a vertex are dropped, again 16 at a time: the vertices
-//!    of their corners are looked up in the tables of both groups.
+//! 3. Within one body, pairs that are [`excluded`](super::excluded) are taken away, as bits. Where
+//!    they are not known, candidates that share a vertex are dropped, again 16 at a time: the
+//!    vertices of their corners are looked up in the tables of both groups.
 
 use std::time::Duration;
 
@@ -256,22 +257,31 @@ fn pair<S: Simd>(
     lane_pairs.clear();
     let (slots, [lanes_a, lanes_b]) = cull(simd, world, item, lower, groups)?;
     let [a, b] = slots.map(|slot| groups.at(slot));
-    // The lanes of the side with fewer of them are the rows.
-    let (side, rows, lanes, groups) = if lanes_a.count_ones() <= lanes_b.count_ones() {
-        (Side::A, lanes_a, lanes_b, [a, b])
-    } else {
-        (Side::B, lanes_b, lanes_a, [b, a])
+    let is_of_body = world.plan.part(item.a).id == world.plan.part(item.b).id;
+    let known = match is_of_body {
+        true => (world.cache(item.a)).excluded_with(world.plan.part(item.b).part),
+        false => None,
+    };
+    let excluded = known.and_then(|known| known.of(item.cluster_a, item.cluster_b));
+    // The lanes of the side with fewer of them are the rows; excluded pairs are known by lanes of A.
+    let is_by_a = excluded.is_some() || lanes_a.count_ones() <= lanes_b.count_ones();
+    let (side, rows, lanes, groups) = match is_by_a {
+        true => (Side::A, lanes_a, lanes_b, [a, b]),
+        false => (Side::B, lanes_b, lanes_a, [b, a]),
     };
     let is_single = world.sweep.is_single();
     let may_part = *is_still && is_single && directions.may_pay([rows, lanes]);
-    // Directions are tested lane by lane.
-    let is_whole = lanes == u64::MAX || may_part;
+    // Excluded pairs are known, and directions are tested, lane by lane.
+    let is_whole = lanes == u64::MAX || may_part || excluded.is_some();
     let mut map = [0; GROUP];
     let n = simd.list_lanes(lanes, &mut map);
     let is_own = (item.a, item.cluster_a) == (item.b, item.cluster_b);
     let kinds = (is_single, is_own);
     let listed = if is_whole { None } else { Some(n) };
     overlap(simd, kinds, (groups, rows, lanes), listed, survivors, masks);
+    if let Some(excluded) = excluded {
+        excluded.take_from(masks);
+    }
     if may_part {
         let reach = world.plan.reach(item.a, item.b).enclosing_f32();
         decider.n_candidates += directions.thin(
@@ -290,16 +300,19 @@ fn pair<S: Simd>(
             false => lane_pairs.push_mapped_row(simd, (side, row), masks.0[row], &map),
         }
     }
-    let ids = [item.a, item.b].map(|part| world.plan.part(part).id);
-    if ids[0] == ids[1] {
+    if is_of_body && known.is_none() {
         let corners = [&a.corners[..a.n_corners], &b.corners[..b.n_corners]];
         lane_pairs.drop_sharing(simd, corners);
     }
     if let Some([of_a, of_b]) = world.moved(item) {
         lane_pairs.retain(|[a, b]| (of_a >> a | of_b >> b) & 1 == 1);
     }
-    if world.plan.leaves_out() {
-        lane_pairs.retain(|lanes| !is_left_out(world, item, [a, b], lanes));
+    let leaves_out = match known {
+        Some(_) => world.plan.leaves_out_marked(),
+        None => world.plan.leaves_out_between(item.a, item.b),
+    };
+    if leaves_out {
+        lane_pairs.retain(|lanes| !is_left_out(world, item, [a, b], lanes, known.is_some()));
     }
     (lane_pairs.len() > 0).then_some(slots)
 }
@@ -403,12 +416,14 @@ fn overlap<S: Simd>(
     }
 }
 
-/// Whether the elements of two lanes are left out.
+/// Whether the elements of two lanes are left out: because of how their vertices are marked, if
+/// other reasons have been looked at.
 fn is_left_out(
     world: StepWorld<'_>,
     item: &WorkItem,
     groups: [&StepGroup; 2],
     lanes: [u8; 2],
+    only_marked: bool,
 ) -> bool {
     let corners: [[u32; 3]; 2] = std::array::from_fn(|side| {
         let lane = usize::from(lanes[side]);
@@ -418,8 +433,11 @@ fn is_left_out(
             .map(|corners| corners.0[lane])
     });
     let of = |side: usize| &corners[side][..groups[side].n_corners];
-    let sides = [(item.a, of(0)), (item.b, of(1))];
-    world.plan.is_left_out(key_in(groups, lanes), sides)
+    let pair = [(item.a, of(0)), (item.b, of(1))];
+    match only_marked {
+        true => world.plan.is_left_out_marked(pair),
+        false => world.plan.is_left_out(key_in(groups, lanes), pair),
+    }
 }
 
 /// The lanes of two clusters that may have a key whose lower number is in a range, ends included;

@@ -1,0 +1,388 @@
+//! Which pairs of one body are never candidates, as bits of lanes: those that share a vertex, and
+//! those that the query leaves out by lists of vertices or by name.
+//!
+//! ```text
+//!   cluster a -> [cluster b, rows, ..]     clusters with a pair that is excluded
+//!                            |
+//!                  row -> lanes of b       bits that pairing takes away from those whose boxes meet
+//! ```
+//!
+//! Most elements near an element are its neighbours in the surface, so most boxes that meet are of
+//! pairs that are excluded. They depend on topology and query alone: found once, each costs a bit in
+//! place of a comparison of all corners. Bodies with hubs have none: all pairs of a fan share its
+//! middle, and pairing compares the corners of candidates.
+//!
+//! Cost: `O(n)` for each pair of parts, once per topology and query; 10 to 30 bytes per element.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use crate::bvh::GROUP;
+use crate::bvh::clusters::Clustering;
+use crate::plan::{OwnRule, Plan};
+use crate::query::pair_kind::PairKind;
+use crate::scene::elements::{VertexRings, with_corners};
+use crate::scene::error::Error;
+use crate::scene::index::{ClusterIx, Number, PartIx, Slot, pair_numbers};
+use crate::search::sink::{filled, grow, reserve};
+use crate::search::work::Work;
+use crate::simd::{Lanes, Masks};
+
+/// Clusters per task.
+const CLUSTERS: usize = 64;
+const WHAT: &str = "excluded pairs";
+
+/// The excluded pairs of two parts of a body, or of one part.
+#[derive(Debug)]
+pub(super) struct ExcludedLanes {
+    /// Where the entries of each cluster of the first part start, and one past the last.
+    starts: Vec<u32>,
+    entries: Vec<Entry>,
+    lanes: Vec<u64>,
+}
+
+/// Two clusters with a pair that is excluded.
+#[derive(Debug, Clone, Copy)]
+struct Entry {
+    /// Of the second part; of one part, the first cluster or a later one.
+    other: ClusterIx,
+    /// Rows with excluded pairs: lanes of the first part.
+    rows: u64,
+    /// Where the lanes of the first such row are; the others follow.
+    first: usize,
+}
+
+/// The excluded pairs of two clusters.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct ExcludedRows<'a> {
+    rows: u64,
+    lanes: &'a [u64],
+}
+
+impl ExcludedRows<'_> {
+    /// Takes the excluded pairs away.
+    #[inline(always)]
+    pub fn take_from(self, masks: &mut Masks) {
+        for (row, lanes) in Lanes(self.rows).zip(self.lanes) {
+            masks.0[row] &= !lanes;
+        }
+    }
+}
+
+impl ExcludedLanes {
+    /// Finds the excluded pairs of two parts of a body, the second of which may be the first.
+    /// `None` if hubs make them too many.
+    ///
+    /// # Errors
+    /// There is no memory; cancellation.
+    pub fn new(
+        plan: &Plan,
+        parts: [PartIx; 2],
+        clusterings: [&Clustering; 2],
+        rule: &OwnRule,
+        work: Work<'_>,
+    ) -> Result<Option<Arc<Self>>, Error> {
+        if clusterings.iter().any(|of| of.hubs().is_some()) {
+            return Ok(None);
+        }
+        let is_own = parts[0] == parts[1];
+        let finder = Finder {
+            clusterings,
+            is_own,
+            slots: SlotsOfVertices::new(clusterings[1])?,
+            lists: rule.lists.iter().map(|lists| &**lists).collect(),
+            named: named(plan, parts, clusterings, rule)?,
+        };
+        let n = clusterings[0].n_clusters();
+        let n_each = work.workers.task(CLUSTERS);
+        let tasks = (0..n).step_by(n_each).map(|first| Run {
+            clusters: first..n.min(first + n_each),
+            ..Run::default()
+        });
+        let mut runs: Vec<Run> = tasks.collect();
+        work.each(&mut runs, |_, run| {
+            let mut scratch = Scratch::default();
+            for cluster in ClusterIx::each(run.clusters.clone()) {
+                finder.put(cluster, &mut scratch, run)?;
+            }
+            Ok(())
+        })?;
+        let mut all = ExcludedLanes {
+            starts: vec![0],
+            entries: Vec::new(),
+            lanes: Vec::new(),
+        };
+        let [entries, lanes] = runs.iter().fold([0, 0], |[entries, lanes], run| {
+            [entries + run.entries.len(), lanes + run.lanes.len()]
+        });
+        reserve(&mut all.starts, n, WHAT)?;
+        reserve(&mut all.entries, entries, WHAT)?;
+        reserve(&mut all.lanes, lanes, WHAT)?;
+        for run in runs {
+            let [n_entries, n_lanes] = [all.entries.len(), all.lanes.len()];
+            all.starts
+                .extend(run.ends.iter().map(|end| n_entries as u32 + end));
+            let moved = run.entries.iter().map(|entry| Entry {
+                first: n_lanes + entry.first,
+                ..*entry
+            });
+            all.entries.extend(moved);
+            all.lanes.extend_from_slice(&run.lanes);
+        }
+        Ok(Some(Arc::new(all)))
+    }
+
+    /// The excluded pairs of two clusters, if there are any.
+    #[inline(always)]
+    pub fn of(&self, a: ClusterIx, b: ClusterIx) -> Option<ExcludedRows<'_>> {
+        let [start, end] = [0, 1].map(|next| self.starts[a.index() + next] as usize);
+        let own = &self.entries[start..end];
+        let found = own.binary_search_by_key(&b, |entry| entry.other).ok()?;
+        let Entry { rows, first, .. } = own[found];
+        Some(ExcludedRows {
+            rows,
+            lanes: &self.lanes[first..][..rows.count_ones() as usize],
+        })
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        size_of_val(&self.starts[..])
+            + size_of_val(&self.entries[..])
+            + size_of_val(&self.lanes[..])
+    }
+}
+
+/// What was found of some clusters.
+#[derive(Debug, Default)]
+struct Run {
+    clusters: Range<usize>,
+    /// Of each cluster, the entries up to its last one.
+    ends: Vec<u32>,
+    entries: Vec<Entry>,
+    lanes: Vec<u64>,
+}
+
+struct Finder<'a> {
+    clusterings: [&'a Clustering; 2],
+    is_own: bool,
+    slots: SlotsOfVertices,
+    lists: Vec<&'a VertexRings>,
+    /// Pairs that are left out by name, sorted.
+    named: Vec<[Slot; 2]>,
+}
+
+/// Of some clusters, lanes by row.
+#[derive(Debug, Default)]
+struct Found {
+    clusters: Vec<ClusterIx>,
+    /// `n_rows` for each cluster.
+    lanes: Vec<u64>,
+    n_rows: usize,
+    last: usize,
+}
+
+impl Found {
+    fn begin(&mut self, n_rows: usize) {
+        self.clusters.clear();
+        self.lanes.clear();
+        self.n_rows = n_rows;
+        self.last = 0;
+    }
+
+    /// Marks an element in a row.
+    #[inline]
+    fn put(&mut self, row: usize, slot: Slot) {
+        let cluster = slot.cluster();
+        // Slots of a vertex are near each other.
+        if self.clusters.get(self.last) != Some(&cluster) {
+            self.last = match self.clusters.iter().position(|&own| own == cluster) {
+                Some(ix) => ix,
+                None => {
+                    self.clusters.push(cluster);
+                    self.lanes.resize(self.lanes.len() + self.n_rows, 0);
+                    self.clusters.len() - 1
+                }
+            };
+        }
+        self.lanes[self.last * self.n_rows + row] |= 1 << slot.lane();
+    }
+
+    /// The rows of each cluster.
+    fn iter(&self) -> impl Iterator<Item = (ClusterIx, &[u64])> {
+        let rows = self.lanes.chunks_exact(self.n_rows.max(1));
+        self.clusters.iter().copied().zip(rows)
+    }
+}
+
+#[derive(Debug, Default)]
+struct Scratch {
+    vertices: Vec<u32>,
+    by_vertex: Found,
+    by_lane: Found,
+    order: Vec<usize>,
+}
+
+impl Finder<'_> {
+    /// Finds what is excluded of the elements of a cluster.
+    fn put(&self, cluster: ClusterIx, scratch: &mut Scratch, run: &mut Run) -> Result<(), Error> {
+        let Scratch {
+            vertices,
+            by_vertex,
+            by_lane,
+            order,
+        } = scratch;
+        let [of_a, _] = self.clusterings;
+        vertices.clear();
+        vertices.extend_from_slice(of_a.vertices(cluster));
+        vertices.dedup();
+        by_vertex.begin(vertices.len());
+        for (row, &vertex) in vertices.iter().enumerate() {
+            let mut put = |vertex| {
+                for &slot in self.slots.of(vertex) {
+                    if !self.is_own || slot.cluster() >= cluster {
+                        by_vertex.put(row, slot);
+                    }
+                }
+            };
+            put(vertex);
+            let listed = self.lists.iter().flat_map(|lists| lists.of(vertex));
+            listed.for_each(|&other| put(other));
+        }
+        by_lane.begin(GROUP);
+        for (other, of_vertices) in by_vertex.iter() {
+            by_lane.clusters.push(other);
+            let first = by_lane.lanes.len();
+            by_lane.lanes.resize(first + GROUP, 0);
+            let rows = &mut by_lane.lanes[first..];
+            for (row, slot) in rows.iter_mut().zip(of_a.slots(cluster)) {
+                for corner in of_a.corners.corners(slot) {
+                    let local = vertices.partition_point(|vertex| vertex < corner);
+                    *row |= of_vertices[local];
+                }
+            }
+        }
+        let named = self.named.partition_point(|[a, _]| a.cluster() < cluster);
+        for &[a, b] in &self.named[named..] {
+            if a.cluster() != cluster {
+                break;
+            }
+            by_lane.put(a.lane() as usize, b);
+        }
+        order.clear();
+        order.extend(0..by_lane.clusters.len());
+        order.sort_unstable_by_key(|&ix| by_lane.clusters[ix]);
+        for &ix in &*order {
+            let rows = &by_lane.lanes[ix * GROUP..][..GROUP];
+            let marked = (0..GROUP).filter(|&row| rows[row] != 0);
+            let first = run.lanes.len();
+            let marked = marked.fold(0u64, |marked, row| marked | 1 << row);
+            grow(&mut run.lanes, marked.count_ones() as usize, WHAT)?;
+            run.lanes.extend(Lanes(marked).map(|row| rows[row]));
+            grow(&mut run.entries, 1, WHAT)?;
+            run.entries.push(Entry {
+                other: by_lane.clusters[ix],
+                rows: marked,
+                first,
+            });
+        }
+        run.ends.push(run.entries.len() as u32);
+        Ok(())
+    }
+}
+
+/// The elements at each vertex.
+#[derive(Debug)]
+struct SlotsOfVertices {
+    starts: Vec<u32>,
+    slots: Vec<Slot>,
+}
+
+impl SlotsOfVertices {
+    fn new(clustering: &Clustering) -> Result<Self, Error> {
+        with_corners!(&clustering.corners, |elements| {
+            let corners = elements.as_flattened();
+            let n = corners.iter().max().map_or(0, |&last| last as usize + 1);
+            let mut starts = filled(0u32, n + 1, WHAT)?;
+            for &corner in corners {
+                starts[corner as usize + 1] += 1;
+            }
+            for vertex in 0..n {
+                starts[vertex + 1] += starts[vertex];
+            }
+            let mut next = starts.clone();
+            let mut slots = filled(Slot::default(), corners.len(), WHAT)?;
+            for (slot, corners) in elements.iter().enumerate() {
+                for &corner in corners {
+                    let next = &mut next[corner as usize];
+                    slots[*next as usize] = Slot::from_usize(slot);
+                    *next += 1;
+                }
+            }
+            Ok(SlotsOfVertices { starts, slots })
+        })
+    }
+
+    #[inline]
+    fn of(&self, vertex: u32) -> &[Slot] {
+        let vertex = vertex as usize;
+        match self.starts.get(vertex + 1) {
+            None => &[],
+            Some(&end) => &self.slots[self.starts[vertex] as usize..end as usize],
+        }
+    }
+}
+
+/// The pairs of two parts that are left out by name, sorted; those of one cluster both ways.
+fn named(
+    plan: &Plan,
+    [a, b]: [PartIx; 2],
+    clusterings: [&Clustering; 2],
+    rule: &OwnRule,
+) -> Result<Vec<[Slot; 2]>, Error> {
+    let parts = [a, b].map(|part| plan.part(part));
+    let Some(kind) = PairKind::of(parts[0].part, parts[1].part) else {
+        return Ok(Vec::new());
+    };
+    let ends = parts.map(|part| part.first.raw() + part.n_primitives);
+    // Keys of both parts: the lower number is of the first one.
+    let of_parts = |keys: &[u64]| {
+        let [low, high] = [parts[0].first.raw(), ends[0]]
+            .map(|number| keys.partition_point(|&key| (key >> 32) < u64::from(number)));
+        low..high
+    };
+    let lists = rule.pairs.iter().map(|keys| &keys[kind as usize][..]);
+    let lists: Vec<&[u64]> = lists.map(|keys| &keys[of_parts(keys)]).collect();
+    if lists.iter().all(|keys| keys.is_empty()) {
+        return Ok(Vec::new());
+    }
+    let mut slots = [Vec::new(), Vec::new()];
+    for (clustering, slots) in clusterings.iter().zip(&mut slots) {
+        *slots = filled(Slot::default(), clustering.order.len(), WHAT)?;
+        for (slot, element) in clustering.order.iter().enumerate() {
+            slots[element.index()] = Slot::from_usize(slot);
+        }
+    }
+    let mut named = Vec::new();
+    for keys in lists {
+        reserve(&mut named, 2 * keys.len(), WHAT)?;
+        for numbers in keys.iter().map(|&key| pair_numbers(key)) {
+            if !(parts[1].first <= numbers[1] && numbers[1].raw() < ends[1]) {
+                continue;
+            }
+            let [of_a, of_b] = [0, 1].map(|side| {
+                let first: Number = parts[side].first;
+                slots[side][(numbers[side].raw() - first.raw()) as usize]
+            });
+            let clusters = [of_a.cluster(), of_b.cluster()];
+            if a != b || clusters[0] <= clusters[1] {
+                named.push([of_a, of_b]);
+            }
+            if a == b && clusters[1] <= clusters[0] {
+                named.push([of_b, of_a]);
+            }
+        }
+    }
+    named.sort_unstable();
+    Ok(named)
+}
