@@ -13,6 +13,7 @@ use crate::search::found::KeysByKind;
 use crate::search::sink::reserve;
 use crate::search::stats::Stats;
 use crate::search::work::Work;
+use crate::workers::alone::is_alone;
 
 /// Pairs that a task takes.
 const TASK: usize = 1 << 13;
@@ -73,7 +74,7 @@ impl Csr {
                 by.each(&rows, pairs, |row, _, _| counts[row - first] += 1);
             }
         };
-        if n_tasks == 1 {
+        if is_alone() || n_tasks == 1 {
             count(0, counts);
         } else {
             let mut tasks: Vec<_> = counts.chunks_mut(n_each).collect();
@@ -110,7 +111,7 @@ impl Csr {
             indices: &mut self.indices,
             distances: &mut self.distances,
         };
-        if n_tasks == 1 {
+        if is_alone() || n_tasks == 1 {
             place(&mut rest);
             return Ok(());
         }

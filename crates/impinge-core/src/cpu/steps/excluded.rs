@@ -21,7 +21,7 @@ use crate::bvh::GROUP;
 use crate::bvh::clusters::Clustering;
 use crate::plan::{OwnRule, Plan};
 use crate::query::pair_kind::PairKind;
-use crate::scene::elements::{VertexRings, with_corners};
+use crate::scene::elements::VertexRings;
 use crate::scene::error::Error;
 use crate::scene::index::{ClusterIx, Number, PartIx, Slot, pair_numbers};
 use crate::search::sink::{filled, grow, reserve};
@@ -168,8 +168,8 @@ struct Finder<'a> {
     is_own: bool,
     slots: SlotsOfVertices,
     lists: Vec<&'a VertexRings>,
-    /// Pairs that are left out by name, sorted.
-    named: Vec<[Slot; 2]>,
+    /// Pairs that are left out by name, sorted: the first slot in the upper half.
+    named: Vec<u64>,
 }
 
 /// Of some clusters, lanes by row.
@@ -220,7 +220,8 @@ struct Scratch {
     vertices: Vec<u32>,
     by_vertex: Found,
     by_lane: Found,
-    order: Vec<usize>,
+    /// Clusters in the upper half, and where they are.
+    order: Vec<u64>,
 }
 
 impl Finder<'_> {
@@ -262,17 +263,20 @@ impl Finder<'_> {
                 }
             }
         }
-        let named = self.named.partition_point(|[a, _]| a.cluster() < cluster);
-        for &[a, b] in &self.named[named..] {
+        let first = u64::from(cluster.slot(0).raw()) << 32;
+        let named = self.named.partition_point(|&pair| pair < first);
+        for &pair in &self.named[named..] {
+            let [a, b] = [(pair >> 32) as u32, pair as u32].map(Slot::new);
             if a.cluster() != cluster {
                 break;
             }
             by_lane.put(a.lane() as usize, b);
         }
         order.clear();
-        order.extend(0..by_lane.clusters.len());
-        order.sort_unstable_by_key(|&ix| by_lane.clusters[ix]);
-        for &ix in &*order {
+        let clusters = (0u64..).zip(&by_lane.clusters);
+        order.extend(clusters.map(|(ix, other)| u64::from(other.raw()) << 32 | ix));
+        order.sort_unstable();
+        for ix in order.iter().map(|&ix| ix as u32 as usize) {
             let rows = &by_lane.lanes[ix * GROUP..][..GROUP];
             let marked = (0..GROUP).filter(|&row| rows[row] != 0);
             let first = run.lanes.len();
@@ -300,46 +304,52 @@ struct SlotsOfVertices {
 
 impl SlotsOfVertices {
     fn new(clustering: &Clustering) -> Result<Self, Error> {
-        with_corners!(&clustering.corners, |elements| {
-            let corners = elements.as_flattened();
-            let n = corners.iter().max().map_or(0, |&last| last as usize + 1);
-            let mut starts = filled(0u32, n + 1, WHAT)?;
+        let elements = || (0..clustering.order.len()).map(|slot| clustering.corners.corners(slot));
+        let last = clustering.vertices.iter().max();
+        let n = last.map_or(0, |&last| last as usize + 1);
+        // Counted one place later, so that the second pass can move each start to its end.
+        let mut starts = filled(0u32, n + 2, WHAT)?;
+        let mut n_corners = 0;
+        for &corner in elements().flatten() {
+            starts[corner as usize + 2] += 1;
+            n_corners += 1;
+        }
+        for vertex in 0..n {
+            starts[vertex + 2] += starts[vertex + 1];
+        }
+        let mut slots = filled(Slot::default(), n_corners, WHAT)?;
+        for (slot, corners) in elements().enumerate() {
             for &corner in corners {
-                starts[corner as usize + 1] += 1;
+                let next = &mut starts[corner as usize + 1];
+                slots[*next as usize] = Slot::from_usize(slot);
+                *next += 1;
             }
-            for vertex in 0..n {
-                starts[vertex + 1] += starts[vertex];
-            }
-            let mut next = starts.clone();
-            let mut slots = filled(Slot::default(), corners.len(), WHAT)?;
-            for (slot, corners) in elements.iter().enumerate() {
-                for &corner in corners {
-                    let next = &mut next[corner as usize];
-                    slots[*next as usize] = Slot::from_usize(slot);
-                    *next += 1;
-                }
-            }
-            Ok(SlotsOfVertices { starts, slots })
-        })
+        }
+        Ok(SlotsOfVertices { starts, slots })
     }
 
     #[inline]
     fn of(&self, vertex: u32) -> &[Slot] {
         let vertex = vertex as usize;
-        match self.starts.get(vertex + 1) {
+        // One more start than there are vertices is the end.
+        match self.starts.get(vertex + 2) {
             None => &[],
-            Some(&end) => &self.slots[self.starts[vertex] as usize..end as usize],
+            Some(_) => {
+                let [start, end] = [0, 1].map(|next| self.starts[vertex + next] as usize);
+                &self.slots[start..end]
+            }
         }
     }
 }
 
-/// The pairs of two parts that are left out by name, sorted; those of one cluster both ways.
+/// The pairs of two parts that are left out by name, sorted: the first slot in the upper half. Those
+/// of one cluster are there both ways.
 fn named(
     plan: &Plan,
     [a, b]: [PartIx; 2],
     clusterings: [&Clustering; 2],
     rule: &OwnRule,
-) -> Result<Vec<[Slot; 2]>, Error> {
+) -> Result<Vec<u64>, Error> {
     let parts = [a, b].map(|part| plan.part(part));
     let Some(kind) = PairKind::of(parts[0].part, parts[1].part) else {
         return Ok(Vec::new());
@@ -363,6 +373,7 @@ fn named(
             slots[element.index()] = Slot::from_usize(slot);
         }
     }
+    let pair = |a: Slot, b: Slot| u64::from(a.raw()) << 32 | u64::from(b.raw());
     let mut named = Vec::new();
     for keys in lists {
         reserve(&mut named, 2 * keys.len(), WHAT)?;
@@ -376,10 +387,10 @@ fn named(
             });
             let clusters = [of_a.cluster(), of_b.cluster()];
             if a != b || clusters[0] <= clusters[1] {
-                named.push([of_a, of_b]);
+                named.push(pair(of_a, of_b));
             }
             if a == b && clusters[1] <= clusters[0] {
-                named.push([of_b, of_a]);
+                named.push(pair(of_b, of_a));
             }
         }
     }
