@@ -4,18 +4,16 @@ use super::Detector;
 use super::in_step::{InStep, Keys, Seen};
 use super::steps::Listed;
 use crate::answers::near::{Labels, NearPairs};
-use crate::answers::pairs::Element;
 use crate::cpu::steps::VerletList;
 use crate::plan::{Plan, TestId};
 use crate::query::Query;
 use crate::query::pair_kind::PairKind;
 use crate::query::settings::Settings;
 use crate::scene::Scene;
-use crate::scene::elements::Part;
 use crate::scene::error::Error;
-use crate::scene::index::ElementIx;
 use crate::search::found::KeysByKind;
-use crate::search::narrow::{Corners, exact_kind};
+use crate::search::narrow::exact_kind;
+use crate::search::pair_reader::PairReader;
 use crate::search::runner::{Job, Outcome, ready};
 use crate::search::stats::Stats;
 use crate::search::work::Work;
@@ -200,31 +198,16 @@ pub(super) fn name_features(
     } = job;
     let labels = Labels::new(plan.n_primitives());
     near.set_threads(workers.n());
-    let (mut unnamed, numbering) = near.fill(keys, query, workers.task(TASK))?;
+    let mut unnamed = near.fill(keys, query, workers.task(TASK))?;
     let n_tasks = unnamed.len() as u64;
     Work { workers, control }.each(&mut unnamed, |_, unnamed| {
         let kind = unnamed.kind;
-        let parts = kind.parts();
-        let corners = |key| {
-            let (a, b) = numbering.pair(key);
-            // Mapping an array would copy it.
-            [
-                corners_of(scene, a, parts[0]),
-                corners_of(scene, b, parts[1]),
-            ]
-        };
-        unnamed.name(labels, exact_kind(TestId::Elements(kind)), isa, corners);
+        let mut reader = PairReader::new(scene, plan);
+        unnamed.name(labels, exact_kind(TestId::Elements(kind)), isa, &mut reader);
         Ok(())
     })?;
     control.step(n_tasks, n_tasks)?;
     let ms = features.elapsed().as_secs_f64() * 1e3;
     near.stats_mut().add_ms("features", ms);
     Ok(())
-}
-
-#[inline(always)]
-fn corners_of(scene: &Scene, Element { body, element }: Element, part: Part) -> Corners {
-    let body = scene.body_in(body.slot());
-    let element = ElementIx::new(element);
-    Corners::new(body.positions(), body.corners(part, &element))
 }

@@ -21,12 +21,11 @@ use crate::query::Query;
 use crate::query::pair_kind::PairKind;
 use crate::query::step::check_distance;
 use crate::scene::Scene;
-use crate::scene::elements::{Elements, Part};
 use crate::scene::error::Error;
-use crate::scene::index::{ElementIx, Number, PartIx, pair_numbers};
-use crate::scene::positions::Positions;
+use crate::scene::index::{ElementIx, PartIx};
 use crate::search::found::KeysByKind;
 use crate::search::narrow::{Corners, exact_kind};
+use crate::search::pair_reader::{Located, PairReader, Side};
 use crate::search::runner::{Job, Outcome};
 use crate::search::shares::{Shares, without};
 use crate::search::sink::reserve;
@@ -200,17 +199,14 @@ impl SolverMemory {
         Work { workers, control }.each(&mut tasks, |_, (kind, keys, distances)| {
             let pair = exact_kind(TestId::Elements(*kind));
             let mut points = Points8::default();
-            let world = (scene, plan);
-            let [mut of_a, mut of_b] = [0, 0].map(|ix| Held::new(world, PartIx::new(ix)));
+            let mut reader = PairReader::new(scene, plan);
             let mut located = [[Located::default(); 2]; LANES];
             for (keys, distances) in keys.chunks_mut(LANES).zip(distances.chunks_mut(LANES)) {
                 for (lane, (key, located)) in keys.iter_mut().zip(&mut located).enumerate() {
                     (*key, _) = labels.split(*key);
-                    let [a, b] = pair_numbers(*key);
-                    *located = [of_a.locate(world, a), of_b.locate(world, b)];
+                    *located = reader.locate(*key);
                     if let Some(pair) = pair {
-                        let sides = [of_a.side(&located[0].1), of_b.side(&located[1].1)];
-                        put_points(pair, sides, lane, &mut points);
+                        put_points(pair, reader.sides(located), lane, &mut points);
                     }
                 }
                 let bounds = pair.map(|pair| bounds_by_lane(isa, pair, &points));
@@ -222,7 +218,7 @@ impl SolverMemory {
                     let distance = known.unwrap_or_else(|| match kind {
                         // They meet.
                         PairKind::EdgeFace => 0.0,
-                        _ => distance_of(world, located),
+                        _ => distance_of((scene, plan), located),
                     });
                     *to = without(plan.thickness(*located), distance);
                     *key = each(Measured {
@@ -243,63 +239,6 @@ impl SolverMemory {
         let distances: usize = self.distances.iter().map(Vec::capacity).sum();
         let keys: usize = self.keys.iter().map(Vec::capacity).sum();
         (size_of::<f64>() * (distances + keys)) as u64
-    }
-}
-
-/// A part, and an element of it.
-type Located = (PartIx, ElementIx);
-
-/// An element of a pair.
-#[derive(Clone, Copy)]
-struct Side<'a> {
-    positions: &'a Positions,
-    corners: &'a [u32],
-}
-
-/// A part, held from pair to pair: most pairs are of the same two.
-struct Held<'a> {
-    part: PartIx,
-    of: Part,
-    elements: &'a Elements,
-    positions: &'a Positions,
-}
-
-impl<'a> Held<'a> {
-    fn new((scene, plan): (&'a Scene, &'a Plan), part: PartIx) -> Self {
-        let (of, body) = (plan.part(part).part, plan.body(scene, part));
-        Held {
-            part,
-            of,
-            elements: body.part(of),
-            positions: body.positions(),
-        }
-    }
-
-    /// Finds an element, and holds its part.
-    #[inline(always)]
-    fn locate(&mut self, world: (&'a Scene, &'a Plan), number: Number) -> Located {
-        let mut part = self.part;
-        let located = world.1.locate_after(number, &mut part);
-        if part != self.part {
-            *self = Self::new(world, part);
-        }
-        located
-    }
-
-    #[inline(always)]
-    fn side<'b>(&self, element: &'b ElementIx) -> Side<'b>
-    where
-        'a: 'b,
-    {
-        let corners = match self.of {
-            // Vertices are numbered as positions are.
-            Part::Vertices => element.as_corners(),
-            _ => self.elements.corners(element.index()),
-        };
-        Side {
-            positions: self.positions,
-            corners,
-        }
     }
 }
 
@@ -328,8 +267,8 @@ fn put_points(
     }
     let mut rows = points.iter_mut();
     for side in sides {
-        for (&corner, row) in side.corners.iter().zip(&mut rows) {
-            put_point(row, lane, &side.positions.point(corner as usize));
+        for (point, row) in side.points().zip(&mut rows) {
+            put_point(row, lane, &point);
         }
     }
 }

@@ -6,6 +6,7 @@ pub(crate) mod memory;
 pub(crate) mod moved;
 pub(crate) mod naive;
 pub(crate) mod narrow;
+pub(crate) mod pair_reader;
 pub mod runner;
 pub(crate) mod sets;
 pub(crate) mod shares;

@@ -12,7 +12,7 @@ use crate::query::pair_set::PairSet;
 use crate::query::{Exclusion, Query};
 use crate::scene::error::Error;
 use crate::search::found::KeysByKind;
-use crate::search::narrow::Corners;
+use crate::search::pair_reader::{PairReader, Side};
 use crate::search::sink::reserve;
 use crate::search::stats::Stats;
 use crate::simd::{Isa, closest_of_pairs};
@@ -166,7 +166,7 @@ impl NearPairs {
         keys: KeysByKind,
         query: &Query,
         n_each: usize,
-    ) -> Result<(Vec<Unnamed<'_>>, &Numbering), Error> {
+    ) -> Result<Vec<Unnamed<'_>>, Error> {
         const WHAT: &str = "nearest features";
         self.keys = keys;
         for (nearest, keys) in self.nearest.iter_mut().zip(&self.keys) {
@@ -198,7 +198,7 @@ impl NearPairs {
                 });
             }
         }
-        Ok((unnamed, &self.numbering))
+        Ok(unnamed)
     }
 
     /// Bytes of the answer.
@@ -380,18 +380,18 @@ const BATCH: usize = 64;
 
 impl Unnamed<'_> {
     /// Names the features of all pairs, and finds distances and nearest points where they were
-    /// asked for, of elements whose `corners` come by key.
+    /// asked for.
     pub fn name(
         &mut self,
         labels: Labels,
         pair: Option<ElementPair>,
         isa: Isa,
-        corners: impl Fn(u64) -> [Corners; 2],
+        reader: &mut PairReader<'_>,
     ) {
         if let Some(pair @ (ElementPair::VertexFace | ElementPair::EdgeEdge)) = pair
             && !self.distances.is_empty()
         {
-            self.measure(labels, pair, isa, corners);
+            self.measure(labels, pair, isa, reader);
             return;
         }
         let of_parts: [Option<u8>; 1 + Labels::UNKNOWN as usize] = std::array::from_fn(|part| {
@@ -406,7 +406,8 @@ impl Unnamed<'_> {
                 self.nearest[ix] = known;
                 continue;
             }
-            let [a, b] = corners(own);
+            let located = reader.locate(own);
+            let [a, b] = reader.sides(&located).map(Side::corners);
             if !has_distances {
                 self.nearest[ix] = nearest_of_elements(a.points(), b.points()).packed();
                 continue;
@@ -431,7 +432,7 @@ impl Unnamed<'_> {
         labels: Labels,
         pair: ElementPair,
         isa: Isa,
-        corners: impl Fn(u64) -> [Corners; 2],
+        reader: &mut PairReader<'_>,
     ) {
         let (points, part) = ([[0.0; 3]; 4], Labels::UNKNOWN);
         let mut pairs = [PairAtPart { pair, points, part }; BATCH];
@@ -441,10 +442,10 @@ impl Unnamed<'_> {
             let n = keys.len();
             for (key, at) in keys.zip(&mut pairs) {
                 (*key, at.part) = labels.split(*key);
-                let [a, b] = corners(*key);
-                let points = a.points().iter().chain(b.points());
-                for (to, from) in at.points.iter_mut().zip(points) {
-                    *to = *from;
+                let located = reader.locate(*key);
+                let mut to = at.points.iter_mut();
+                for side in reader.sides(&located) {
+                    side.points().zip(&mut to).for_each(|(from, to)| *to = from);
                 }
             }
             closest_of_pairs(isa, &pairs[..n], &mut found);

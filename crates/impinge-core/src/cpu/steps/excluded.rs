@@ -12,7 +12,8 @@
 //! place of a comparison of all corners. Bodies with hubs have none: all pairs of a fan share its
 //! middle, and pairing compares the corners of candidates.
 //!
-//! Cost: `O(n)` for each pair of parts, once per topology and query; 10 to 30 bytes per element.
+//! Cost: `O(n)` for each pair of parts, once per topology and query; some 50 bytes per element of a
+//! surface without two rings.
 
 use std::ops::Range;
 use std::sync::Arc;
