@@ -20,6 +20,8 @@ use super::{Plan, Question};
 pub(crate) struct LeftOut {
     /// By part.
     parts: Vec<OfPart>,
+    /// Whether some vertices are marked: pinned, or in groups that do not meet.
+    is_marked: bool,
     groups: BTreeSet<(u32, u32)>,
     vertices: Vec<Listed>,
     pairs: Vec<SortedKeys>,
@@ -171,6 +173,7 @@ impl Plan {
         };
         let keys = |pairs: &PairSet| pairs.keys(numbered().collect());
         self.left_out = Some(Arc::new(LeftOut {
+            is_marked: has_pinned || !query.groups.is_empty(),
             parts: self.part_ixs().map(of_part).collect(),
             groups: query.groups.clone(),
             vertices,
@@ -214,12 +217,11 @@ impl Plan {
     }
 
     /// Whether pairs are left out because of how their vertices are marked: pinned, or in groups.
+    #[inline]
     pub(crate) fn leaves_out_marked(&self) -> bool {
-        let is_marked = |of: &OfPart| of.pinned.is_some();
-        let has = |left_out: &LeftOut| {
-            !left_out.groups.is_empty() || left_out.parts.iter().any(is_marked)
-        };
-        self.left_out.as_deref().is_some_and(has)
+        self.left_out
+            .as_ref()
+            .is_some_and(|left_out| left_out.is_marked)
     }
 
     /// Whether a pair is left out because of how its vertices are marked.
