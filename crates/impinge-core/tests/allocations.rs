@@ -1,8 +1,7 @@
 //! A steady frame allocates only its plan and its answer's lock, however large it is.
 
 use std::alloc::{GlobalAlloc, Layout, System};
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::cell::Cell;
 
 use impinge_core::contact::Contacts;
 use impinge_core::{
@@ -12,12 +11,23 @@ use impinge_scenes::surfaces;
 
 struct Counting;
 
-static N_ALLOCATIONS: AtomicU64 = AtomicU64::new(0);
+thread_local! {
+    /// Of one thread: the thread that runs the tests allocates when another test ends.
+    static N_ALLOCATIONS: Cell<u64> = const { Cell::new(0) };
+}
+
+fn n_allocations() -> u64 {
+    N_ALLOCATIONS.get()
+}
+
+fn count() {
+    N_ALLOCATIONS.set(n_allocations() + 1);
+}
 
 // SAFETY: all calls go on to the system's allocator.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        N_ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
+        count();
         // SAFETY: passed on.
         unsafe { System.alloc(layout) }
     }
@@ -26,7 +36,7 @@ unsafe impl GlobalAlloc for Counting {
         unsafe { System.dealloc(pointer, layout) }
     }
     unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, new_size: usize) -> *mut u8 {
-        N_ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
+        count();
         // SAFETY: passed on.
         unsafe { System.realloc(pointer, layout, new_size) }
     }
@@ -35,12 +45,8 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
-/// All allocations of the process are counted: one test at a time.
-static ALONE: Mutex<()> = Mutex::new(());
-
 #[test]
 fn steady_frames_allocate_a_plan_and_no_lists() {
-    let _alone = ALONE.lock().unwrap();
     let ball = surfaces::bumpy_ball(5000, 0.3);
     for method in [Method::Clusters, Method::Cells] {
         let mut scene = Scene::new();
@@ -63,9 +69,9 @@ fn steady_frames_allocate_a_plan_and_no_lists() {
             for frame in 0..6 {
                 let pose = &poses[frame % 2];
                 scene.positions_mut(a).unwrap().copy_from_slice(pose);
-                let before = N_ALLOCATIONS.load(Ordering::Relaxed);
+                let before = n_allocations();
                 n_pairs = detector.detect(&scene, &query).unwrap().len();
-                let allocated = N_ALLOCATIONS.load(Ordering::Relaxed) - before;
+                let allocated = n_allocations() - before;
                 // Two poses alternate: after one frame in each, all buffers have their final size.
                 // What is left is the plan's list of bodies, and what the threads share.
                 assert!(
@@ -80,9 +86,9 @@ fn steady_frames_allocate_a_plan_and_no_lists() {
 
 /// Counts the allocations of one question, whose answer is dropped.
 fn counted(ask: impl FnOnce() -> usize) -> (u64, usize) {
-    let before = N_ALLOCATIONS.load(Ordering::Relaxed);
+    let before = n_allocations();
     let n = ask();
-    (N_ALLOCATIONS.load(Ordering::Relaxed) - before, n)
+    (n_allocations() - before, n)
 }
 
 /// The most allocations of a steady frame: impacts, candidates, near, neighbours, distance,
@@ -92,7 +98,6 @@ const MOST: [u64; 6] = [3, 3, 5, 6, 50, 80];
 
 #[test]
 fn other_questions_allocate_little_in_steady_frames() {
-    let _alone = ALONE.lock().unwrap();
     for n in [1000, 4000] {
         let ball = surfaces::bumpy_ball(n, 0.3);
         let mut scene = Scene::new();
