@@ -37,7 +37,7 @@ impl<T, const PARTS: usize> Default for Store<T, PARTS> {
 impl<T, const PARTS: usize> Store<T, PARTS> {
     /// Where a part is among those of its body.
     #[inline(always)]
-    fn ix(part: Part) -> usize {
+    pub fn ix(part: Part) -> usize {
         let ix = match part {
             Part::Vertices => 0,
             Part::Edges => 1,

@@ -1,6 +1,5 @@
 //! The cache of a part: its clusters, and their boxes at the start and at the end of a step.
 
-use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use crate::boxes::{BoxSource, Sweep};
@@ -14,7 +13,6 @@ use crate::query::settings::Settings;
 use crate::scene::Body;
 use crate::scene::elements::Part;
 use crate::scene::error::Error;
-use crate::scene::ids::BodyId;
 use crate::scene::index::{ClusterIx, PartIx};
 use crate::search::runner::Job;
 use crate::search::stats::Stats;
@@ -95,7 +93,7 @@ impl PartCache {
     /// The pairs with another part of the body that the question excludes, if they are known.
     #[inline(always)]
     pub fn excluded_with(&self, other: Part) -> Option<&ExcludedLanes> {
-        self.excluded[ix_of(other)].as_deref()
+        self.excluded[StepCaches::ix(other)].as_deref()
     }
 
     #[inline(always)]
@@ -134,16 +132,6 @@ impl PartCache {
     }
 }
 
-/// Where a part is among those of its body.
-#[inline(always)]
-fn ix_of(part: Part) -> usize {
-    match part {
-        Part::Vertices => 0,
-        Part::Edges => 1,
-        Part::Faces | Part::Given => 2,
-    }
-}
-
 /// Finds the excluded pairs of each body of which some are left out, unless they are known. With a
 /// memory budget none are: candidates are compared one by one.
 ///
@@ -167,24 +155,29 @@ pub(super) fn exclude(
     if !plan.leaves_out() || settings.memory_budget.is_some() {
         return Ok(());
     }
-    let mut of_bodies: BTreeMap<BodyId, Vec<PartIx>> = BTreeMap::new();
+    // By slot of the body, in the order of the plan.
+    let mut of_bodies: Vec<[Option<PartIx>; 3]> = Vec::new();
     for (ix, part) in plan.numbered_parts() {
-        of_bodies.entry(part.id).or_default().push(ix);
+        let slot = part.id.index();
+        of_bodies.resize(of_bodies.len().max(slot + 1), [None; 3]);
+        of_bodies[slot][StepCaches::ix(part.part)] = Some(ix);
     }
-    for parts in of_bodies.values() {
+    for parts in &of_bodies {
         // The parts of a body have the same.
-        let rule = plan.own_rule(parts[0]);
-        if rule.is_empty() {
+        let rule = parts.iter().flatten().next().map(|&of| plan.own_rule(of));
+        let Some(rule) = rule.filter(|rule| !rule.is_empty()) else {
             continue;
-        }
+        };
         for (n_before, &a) in parts.iter().enumerate() {
             for &b in &parts[n_before..] {
-                if plan.test(a, b).is_some() {
+                if let (Some(a), Some(b)) = (a, b)
+                    && plan.test(a, b).is_some()
+                {
                     let other = plan.part(b);
                     let of_other = Arc::clone(&caches.at(other).clustering);
                     let cache = caches.at_mut(plan.part(a));
                     let found = cache.find_excluded(plan, [a, b], of_other, &rule, work)?;
-                    cache.excluded[ix_of(other.part)] = found;
+                    cache.excluded[StepCaches::ix(other.part)] = found;
                 }
             }
         }

@@ -22,7 +22,7 @@ use crate::bvh::GROUP;
 use crate::bvh::clusters::Clustering;
 use crate::plan::{OwnRule, Plan};
 use crate::query::pair_kind::PairKind;
-use crate::scene::elements::VertexRings;
+use crate::query::pair_set::SortedKeys;
 use crate::scene::error::Error;
 use crate::scene::index::{ClusterIx, Number, PartIx, Slot, pair_numbers};
 use crate::search::sink::{filled, grow, reserve};
@@ -91,7 +91,7 @@ impl ExcludedLanes {
             clusterings,
             is_own,
             slots: SlotsOfVertices::new(clusterings[1])?,
-            lists: rule.lists.iter().map(|lists| &**lists).collect(),
+            rule,
             named: named(plan, parts, clusterings, rule)?,
         };
         let n = clusterings[0].n_clusters();
@@ -168,7 +168,7 @@ struct Finder<'a> {
     clusterings: [&'a Clustering; 2],
     is_own: bool,
     slots: SlotsOfVertices,
-    lists: Vec<&'a VertexRings>,
+    rule: &'a OwnRule,
     /// Pairs that are left out by name, sorted: the first slot in the upper half.
     named: Vec<u64>,
 }
@@ -248,7 +248,7 @@ impl Finder<'_> {
                 }
             };
             put(vertex);
-            let listed = self.lists.iter().flat_map(|lists| lists.of(vertex));
+            let listed = self.rule.lists.iter().flat_map(|lists| lists.of(vertex));
             listed.for_each(|&other| put(other));
         }
         by_lane.begin(GROUP);
@@ -351,19 +351,21 @@ fn named(
     clusterings: [&Clustering; 2],
     rule: &OwnRule,
 ) -> Result<Vec<u64>, Error> {
-    let parts = [a, b].map(|part| plan.part(part));
-    let Some(kind) = PairKind::of(parts[0].part, parts[1].part) else {
+    let [of_a, of_b] = [a, b].map(|part| plan.part(part));
+    let Some(kind) = PairKind::of(of_a.part, of_b.part) else {
         return Ok(Vec::new());
     };
-    let ends = parts.map(|part| part.first.raw() + part.n_primitives);
-    // Keys of both parts: the lower number is of the first one.
-    let of_parts = |keys: &[u64]| {
-        let [low, high] = [parts[0].first.raw(), ends[0]]
-            .map(|number| keys.partition_point(|&key| (key >> 32) < u64::from(number)));
-        low..high
+    // The lower number is of the first part.
+    let with_first = |keys: &SortedKeys| {
+        let keys = &keys[kind as usize];
+        let before = |number: Number| keys.partition_point(|&key| key < number.first_key());
+        let numbers = of_a.numbers();
+        before(numbers.start)..before(numbers.end)
     };
-    let lists = rule.pairs.iter().map(|keys| &keys[kind as usize][..]);
-    let lists: Vec<&[u64]> = lists.map(|keys| &keys[of_parts(keys)]).collect();
+    let lists = rule.pairs.iter();
+    let lists: Vec<&[u64]> = lists
+        .map(|keys| &keys[kind as usize][with_first(keys)])
+        .collect();
     if lists.iter().all(|keys| keys.is_empty()) {
         return Ok(Vec::new());
     }
@@ -378,20 +380,18 @@ fn named(
     let mut named = Vec::new();
     for keys in lists {
         reserve(&mut named, 2 * keys.len(), WHAT)?;
-        for numbers in keys.iter().map(|&key| pair_numbers(key)) {
-            if !(parts[1].first <= numbers[1] && numbers[1].raw() < ends[1]) {
+        for [low, high] in keys.iter().map(|&key| pair_numbers(key)) {
+            if !of_b.numbers().contains(&high) {
                 continue;
             }
-            let [of_a, of_b] = [0, 1].map(|side| {
-                let first: Number = parts[side].first;
-                slots[side][(numbers[side].raw() - first.raw()) as usize]
-            });
-            let clusters = [of_a.cluster(), of_b.cluster()];
+            let low = slots[0][of_a.element(low).index()];
+            let high = slots[1][of_b.element(high).index()];
+            let clusters = [low.cluster(), high.cluster()];
             if a != b || clusters[0] <= clusters[1] {
-                named.push(pair(of_a, of_b));
+                named.push(pair(low, high));
             }
             if a == b && clusters[1] <= clusters[0] {
-                named.push(pair(of_b, of_a));
+                named.push(pair(high, low));
             }
         }
     }
