@@ -82,7 +82,8 @@ class Detector(DetectorBase):
     reuse_margin : float
         A distance, for solvers that ask again and again while little moves. If it is above 0, `near`, `neighbours` and `safe_distances` list
         the pairs within their distance and this margin, and look at no others until some vertex has moved farther than half of it, or
-        anything but positions has changed. The answers are the same. With a `memory_budget` nothing is listed.
+        anything but positions has changed. The answers are the same. With a `memory_budget` nothing is listed. After a list that served no
+        second question, the next is made when vertices have moved at most half of the margin between two.
     affinity : {"inherited", "auto"}
         Which cores helper threads may run on. ``"inherited"``: the affinity of no thread is ever set. ``"auto"``: on Linux, with up to 8
         threads, not the core on which the calling thread is running, which makes frames faster where nobody else places threads.

@@ -160,8 +160,10 @@ pub struct Settings {
     /// memory budget nothing is listed.
     ///
     /// To make a list takes up to twice as long as to answer without one, and a question that it
-    /// serves half to nine tenths of that: it pays from the third or so. With a larger margin it
-    /// holds longer and has more pairs; an eighth of the distance is a good start.
+    /// serves half to nine tenths of that: it pays from the third or so. After a list that served
+    /// none, the next is made when vertices have moved at most half of the margin between two
+    /// questions. With a larger margin it holds longer and has more pairs; an eighth of the distance
+    /// is a good start.
     pub reuse_margin: f64,
     /// GPU: part of an adapter's name, to choose among several.
     pub device: Option<String>,

@@ -8,6 +8,9 @@
 //! Reason: two points come nearer by at most what both move. So a pair that is within the distance
 //! was within distance + margin when the list was made. In molecular dynamics the margin is called
 //! skin (Verlet 1967, <https://doi.org/10.1103/PhysRev.159.98>).
+//!
+//! To make a list costs as much as an answer. After one that was of no use, the next is made when
+//! vertices have moved little from one question to the next.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -38,13 +41,27 @@ const TASK: usize = 2048;
 /// The pairs of one question within its distance and a margin.
 #[derive(Debug, Default)]
 pub(crate) struct VerletList {
-    /// Of each body that takes part, when the list was made.
+    state: State,
+    /// Of each body that takes part, when the list was made; or at the last question.
     positions: Vec<(BodyId, Positions)>,
     /// Of each part: lanes are those of these.
     clusterings: Vec<Arc<Clustering>>,
     /// By worker.
     listings: Vec<Listing>,
     tasks: Vec<Task>,
+}
+
+#[derive(Debug, Default, PartialEq)]
+enum State {
+    /// Nothing was asked.
+    #[default]
+    New,
+    /// Pairs are listed, and no later question was answered from them.
+    Unused,
+    /// Pairs are listed, and one was.
+    Used,
+    /// Only positions are known.
+    Unlisted,
 }
 
 /// Some listed work items.
@@ -56,17 +73,36 @@ struct Task {
 }
 
 impl VerletList {
-    /// Whether all pairs within a distance are listed, as no vertex has moved farther than half of
-    /// the margin.
-    fn holds(&self, scene: &Scene, plan: &Plan, caches: &StepCaches, margin: f64) -> bool {
+    /// Whether no vertex has moved farther than half of the margin.
+    fn is_near(&self, scene: &Scene, margin: f64) -> bool {
+        self.positions.iter().all(|(body, then)| {
+            let now = scene.body_in(body.slot()).positions();
+            have_moved_at_most(margin / 2.0, then, now)
+        })
+    }
+
+    /// Whether pairs are listed, by clusters as they are.
+    fn is_of(&self, plan: &Plan, caches: &StepCaches) -> bool {
         let is_of =
             |(part, own): (_, &Arc<Clustering>)| Arc::ptr_eq(&caches.at(part).clustering, own);
-        self.clusterings.len() == plan.parts.len()
+        matches!(self.state, State::Unused | State::Used)
+            && self.clusterings.len() == plan.parts.len()
             && plan.parts.iter().zip(&self.clusterings).all(is_of)
-            && self.positions.iter().all(|(body, then)| {
-                let now = scene.body_in(body.slot()).positions();
-                have_moved_at_most(margin / 2.0, then, now)
-            })
+    }
+
+    /// Remembers where the bodies that take part are.
+    fn place(&mut self, scene: &Scene, plan: &Plan) {
+        self.positions.clear();
+        for part in &plan.parts {
+            if self.positions.iter().all(|(body, _)| *body != part.id) {
+                // An owner may write where shared rows are.
+                let copy = match scene.body_in(part.id.slot()).positions() {
+                    Positions::F32(rows) => f32::store(rows),
+                    Positions::F64(rows) => f64::store(rows),
+                };
+                self.positions.push((part.id, copy));
+            }
+        }
     }
 
     /// Takes what the workers have listed.
@@ -80,17 +116,8 @@ impl VerletList {
         self.clusterings.clear();
         let clusterings = plan.parts.iter().map(|part| &caches.at(part).clustering);
         self.clusterings.extend(clusterings.cloned());
-        self.positions.clear();
-        for part in &plan.parts {
-            if self.positions.iter().all(|(body, _)| *body != part.id) {
-                // An owner may write where shared rows are.
-                let copy = match scene.body_in(part.id.slot()).positions() {
-                    Positions::F32(rows) => f32::store(rows),
-                    Positions::F64(rows) => f64::store(rows),
-                };
-                self.positions.push((part.id, copy));
-            }
-        }
+        self.place(scene, plan);
+        self.state = State::Unused;
         self.listings.resize_with(workers.len(), Listing::default);
         self.tasks.clear();
         for (ix, (worker, listing)) in workers.iter_mut().zip(&mut self.listings).enumerate() {
@@ -145,8 +172,8 @@ fn have_moved_at_most(length: f64, then: &Positions, now: &Positions) -> bool {
 }
 
 impl StepClusters {
-    /// As [`run`](Self::run), for near pairs: by a list, which is made anew if it does not hold.
-    /// Other lists hold some bytes, too.
+    /// As [`run`](Self::run), for near pairs: by a list, which is made anew if it does not hold and
+    /// may be of use. Other lists hold some bytes, too.
     pub fn run_listed(
         &mut self,
         job: Job<'_>,
@@ -157,10 +184,21 @@ impl StepClusters {
     ) -> Result<(), Error> {
         let Job { scene, plan, .. } = job;
         let margin = settings.reuse_margin;
+        let is_near = list.is_near(scene, margin);
+        if !is_near && matches!(list.state, State::Unused | State::Unlisted) {
+            *list = VerletList {
+                state: State::Unlisted,
+                ..VerletList::default()
+            };
+            list.place(scene, plan);
+            return self.run(job, settings, answer, None, stats);
+        }
         let wide = plan.within_farther(margin);
         let wider = Job { plan: &wide, ..job };
         self.prepare(wider, settings, stats)?;
-        if !list.holds(scene, plan, &self.caches, margin) {
+        if is_near && list.is_of(plan, &self.caches) {
+            list.state = State::Used;
+        } else {
             // A list that fails holds nothing.
             *list = VerletList::default();
             stats.ways.n_listed += 1;
