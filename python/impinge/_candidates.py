@@ -177,12 +177,18 @@ class Question:
     ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
         if self._is_collected(kind, bodies):
             return self._numbers_in_step(kind, bodies)
-        ask, distance = (
-            (self._held.detector.candidates, self._radius)
-            if self._is_by_boxes(kind, bodies)
-            else (self._held.detector.near, 2 * self._radius * _SLACK)
-        )
-        found = self._once(kind, bodies, lambda options: ask(self._held.scene, distance, **options))
+        held, radius = self._held, self._radius
+        if self._is_by_boxes(kind, bodies):
+
+            def ask(options: dict[str, Any]) -> Any:
+                return held.detector.candidates(held.scene, radius, **options)
+
+        else:
+
+            def ask(options: dict[str, Any]) -> Any:
+                return held.near(2 * radius * _SLACK, **options)
+
+        found = self._once(kind, bodies, ask)
         body_a, a, body_b, b = found.of(kind).rows.T
         return self._numbers(kind[0], body_a, a), self._numbers(kind[1], body_b, b)
 

@@ -315,6 +315,15 @@ class _Held:
         self.detector = Detector("cpu")
         self.scene = Scene()
         self._parts = mesh._parts
+        self._margin = 0.0
+
+    def near(self, distance: float, **options: Any) -> Any:
+        """The pairs within a distance. A solver asks again and again while little moves."""
+        # A margin fits other distances of about the same size. Another one takes a new detector.
+        if distance > 0 and not distance / 16 <= self._margin <= distance / 2:
+            self._margin = distance / 4
+            self.detector = Detector("cpu", reuse_margin=self._margin)
+        return self.detector.near(self.scene, distance, **options)
 
     def place(self, vertices: npt.NDArray[Any], end: npt.NDArray[Any] | None = None) -> Scene:
         """The bodies at these positions, and where they move to."""

@@ -28,6 +28,7 @@ public:
   settings &max_pairs(std::uint64_t n) { return set(raw_.max_pairs, n); }
   /// Near pairs are listed with this margin, and only those looked at while no vertex has moved farther than half of it; 0 for no lists.
   settings &reuse_margin(double length) { return set(raw_.reuse_margin, length); }
+  double reuse_margin() const { return raw_.reuse_margin; }
   settings &device(std::string name) { return set(device_, std::move(name)); }
   /// Stops a question when it gives true. What a callback throws stops the question too, and comes out of it.
   settings &cancelled(std::function<bool()> call) { return set(cancelled_, std::move(call)); }

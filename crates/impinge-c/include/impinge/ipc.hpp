@@ -48,7 +48,7 @@ using ids = std::vector<std::uint32_t>;
 class bodies {
 public:
   bodies(Eigen::Index n, const Eigen::MatrixXi &edges, const Eigen::MatrixXi &faces, settings of)
-      : n_(n), edges_(edges), faces_(faces), on_faces_(static_cast<std::size_t>(n)), detector_(std::move(of)) {
+      : n_(n), edges_(edges), faces_(faces), on_faces_(static_cast<std::size_t>(n)), settings_(of), detector_(std::move(of)) {
     std::vector<char> is_used(static_cast<std::size_t>(n));
     std::vector<std::array<int, 2>> sides;
     for (Eigen::Index f = 0; f < faces.rows(); ++f)
@@ -111,6 +111,16 @@ public:
 
   const impinge::scene &scene() const { return scene_; }
   impinge::detector &detector() { return detector_; }
+  /// The pairs within a distance. A solver asks again and again while little moves.
+  near_pairs near(double distance, const query &of) {
+    const double margin = settings_.reuse_margin();
+    // A margin fits other distances of about the same size. Another one takes a new detector; one of the caller's stays.
+    if (distance > 0 && (is_margin_ours_ || margin == 0) && !(distance / 16 <= margin && margin <= distance / 2)) {
+      is_margin_ours_ = true;
+      detector_ = impinge::detector(settings_.reuse_margin(distance / 4));
+    }
+    return detector_.near(scene_, distance, of);
+  }
   bool has_faces() const { return faces_.rows() > 0; }
 
 private:
@@ -148,6 +158,8 @@ private:
   ids sides_, loose_edges_, points_;
   body of_faces_ = IMPINGE_ANY_BODY, of_loose_edges_ = IMPINGE_ANY_BODY, of_points_ = IMPINGE_ANY_BODY;
   impinge::scene scene_;
+  settings settings_;
+  bool is_margin_ours_ = false;
   impinge::detector detector_;
 };
 
@@ -385,7 +397,7 @@ private:
     // Edges and faces, and faces and faces, are near where others are: their boxes are all that is asked for.
     if (mode_ == mode::boxes || are_boxes_ || !is_of_step) return all(on.candidates(bodies_->scene(), inflation_, query::all().kinds({kind})));
     if (is_still_) {
-      if (!near_) near_ = on.near(bodies_->scene(), 2 * inflation_ * slack, query::all().kinds({pair_kind::vf, pair_kind::ee, pair_kind::ev, pair_kind::vv}));
+      if (!near_) near_ = bodies_->near(2 * inflation_ * slack, query::all().kinds({pair_kind::vf, pair_kind::ee, pair_kind::ev, pair_kind::vv}));
       return all(near_->of(kind));
     }
     if (!impacts_) impacts_ = on.impacts(bodies_->scene(), query::all().separation(by_axes * (2 * inflation_ + kept_in_steps)));
