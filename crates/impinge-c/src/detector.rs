@@ -102,6 +102,20 @@ pub unsafe fn ask(
     detector: *mut impinge_detector,
     question: impl FnOnce(&mut Detector) -> Result<(), Failure>,
 ) -> Status {
+    let mut question = Some(question);
+    let mut once = |detector: &mut Detector| match question.take() {
+        Some(question) => question(detector),
+        None => Ok(()),
+    };
+    // SAFETY: the caller's promise.
+    unsafe { ask_by(detector, &mut once) }
+}
+
+/// The same, compiled once for all questions.
+unsafe fn ask_by(
+    detector: *mut impinge_detector,
+    question: &mut dyn FnMut(&mut Detector) -> Result<(), Failure>,
+) -> Status {
     let callbacks = Cell::new(None);
     // SAFETY: the caller's promise.
     let status = unsafe {

@@ -29,6 +29,7 @@ fn refuse<T>(field: &str, given: impl std::fmt::Display, allowed: &str) -> Resul
 impl<'a> Asked<'a> {
     /// # Safety
     /// `query` is NULL or points to a query as `impinge.h` describes it.
+    #[inline(never)]
     pub unsafe fn read(
         query: *const impinge_query,
         scene: &'a impinge_scene,
@@ -62,6 +63,7 @@ impl<'a> Asked<'a> {
     }
 
     /// The query of a question about a step.
+    #[inline(never)]
     pub fn step(&self) -> Result<Query, Failure> {
         let query = self.how(self.bodies()?)?;
         Ok(match self.given.passes {
@@ -71,6 +73,7 @@ impl<'a> Asked<'a> {
     }
 
     /// The query of any other question.
+    #[inline(never)]
     pub fn query(&self) -> Result<Query, Failure> {
         match self.given.passes {
             None => self.how(self.bodies()?),

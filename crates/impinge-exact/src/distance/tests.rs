@@ -61,13 +61,14 @@ impl Asked {
         let within = are_within_in_tables::<V>(self.pair, groups, slots, self.reach);
         let high = self.reach[1];
         let stay = stay_beyond_in_tables::<V>(self.pair, groups, slots, self.until, high);
-        let mut near = nearest_in_tables::<V, _>(self.pair, groups, slots, self.reach);
+        let reach = self.reach.map(|of_all| [of_all; BATCH]);
+        let mut near = nearest_in_tables::<V>(self.pair, groups, slots, &reach);
         assert_eq!(near.verdict, within);
         // Parts of pairs that are not certainly near depend on the length of registers.
         for bits in &mut near.parts {
             *bits &= within.yes;
         }
-        let mut bounded = bounded_in_tables::<V, _>(self.pair, groups, slots, self.reach);
+        let mut bounded = bounded_in_tables::<V>(self.pair, groups, slots, &reach);
         assert_eq!(bounded.verdict, within);
         for lane in 0..BATCH {
             if within.yes >> lane & 1 == 0 {

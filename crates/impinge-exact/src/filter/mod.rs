@@ -49,7 +49,7 @@ pub(super) use moving::{contact_answer, search_contact};
 #[cfg(test)]
 pub use nearness::Near16;
 pub use nearness::{
-    Bounded16, Reaches16, SWAPPED_PARTS, are_within_in_tables, bounded_in_tables, bounds_and_parts,
+    Bounded16, SWAPPED_PARTS, are_within_in_tables, bounded_in_tables, bounds_and_parts,
     distance_bounds, nearest_in_tables, point_bounds_in_tables, stay_beyond_in_tables,
 };
 pub(super) use neighbours::{shared_edge, shared_vertex};

@@ -462,27 +462,6 @@ fn select<T: Number>(mask: T::Mask, yes: &Vec3<T>, no: &Vec3<T>) -> Vec3<T> {
     ]
 }
 
-/// Numbers between which the distance is that each of sixteen pairs is held against: two for all of
-/// them, or two for each.
-pub trait Reaches16: Copy {
-    /// Those of the pairs from lane `first` on.
-    fn at<V: Lookup>(&self, first: usize) -> [V; 2];
-}
-
-impl Reaches16 for [f32; 2] {
-    #[inline(always)]
-    fn at<V: Lookup>(&self, _: usize) -> [V; 2] {
-        [V::splat(f64::from(self[0])), V::splat(f64::from(self[1]))]
-    }
-}
-
-impl Reaches16 for [[f32; BATCH]; 2] {
-    #[inline(always)]
-    fn at<V: Lookup>(&self, first: usize) -> [V; 2] {
-        [V::row(&self[0], first), V::row(&self[1], first)]
-    }
-}
-
 /// Which of sixteen pairs are within a distance at the start. The elements are those of two groups,
 /// named by their slots; the distance is between two numbers.
 #[cfg_attr(target_family = "wasm", inline(never))]
@@ -551,15 +530,16 @@ pub struct Bounded16 {
     pub high: [f32; BATCH],
 }
 
-/// As [`are_within_in_tables`], with bounds of the distances of pairs that are certainly near.
+/// As [`are_within_in_tables`], with bounds of the distances of pairs that are certainly near, and
+/// two numbers for the distance of each pair.
 #[cfg_attr(target_family = "wasm", inline(never))]
 #[cfg_attr(not(target_family = "wasm"), inline(always))]
 #[must_use]
-pub fn bounded_in_tables<V: Lookup, R: Reaches16>(
+pub fn bounded_in_tables<V: Lookup>(
     pair: ElementPair,
     groups: [&Moving64; 2],
     slots: [&[u8; BATCH]; 2],
-    reach: R,
+    reach: &[[f32; BATCH]; 2],
 ) -> Bounded16 {
     let mut bounded = Bounded16 {
         verdict: Verdict16::default(),
@@ -569,7 +549,7 @@ pub fn bounded_in_tables<V: Lookup, R: Reaches16>(
     for first in (0..BATCH).step_by(V::N) {
         let (are_edges, points) = points_of::<V>(pair, groups, slots, first, 0);
         let polygon = Polygon::new(are_edges, &points);
-        let [least, most] = reach.at::<V>(first);
+        let [least, most] = reach.each_ref().map(|of| V::row(of, first));
         let (yes, no) = polygon.verdict(least, most);
         let yes = V::bits(yes);
         bounded.verdict.yes |= yes << first;
@@ -665,21 +645,22 @@ pub fn point_bounds_in_tables<V: Lookup>(
     [lowest, highest]
 }
 
-/// As [`are_within_in_tables`], with the nearest parts of pairs that are certainly near.
+/// As [`are_within_in_tables`], with the nearest parts of pairs that are certainly near, and two
+/// numbers for the distance of each pair.
 #[cfg_attr(target_family = "wasm", inline(never))]
 #[cfg_attr(not(target_family = "wasm"), inline(always))]
 #[must_use]
-pub fn nearest_in_tables<V: Lookup, R: Reaches16>(
+pub fn nearest_in_tables<V: Lookup>(
     pair: ElementPair,
     groups: [&Moving64; 2],
     slots: [&[u8; BATCH]; 2],
-    reach: R,
+    reach: &[[f32; BATCH]; 2],
 ) -> Near16 {
     let mut near = Near16::default();
     for first in (0..BATCH).step_by(V::N) {
         let (are_edges, points) = points_of::<V>(pair, groups, slots, first, 0);
         let polygon = Polygon::new(are_edges, &points);
-        let [low, high] = reach.at::<V>(first);
+        let [low, high] = reach.each_ref().map(|of| V::row(of, first));
         let (yes, no) = polygon.verdict(low, high);
         let yes = V::bits(yes);
         near.verdict.yes |= yes << first;

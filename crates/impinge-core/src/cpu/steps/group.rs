@@ -9,7 +9,7 @@ use crate::cpu::group_cache::PerCluster;
 use crate::scene::elements::with_corners;
 use crate::scene::index::{ClusterIx, PartIx};
 use crate::scene::positions::Positions;
-use crate::simd::{LaneBounds, Lanes32, Simd};
+use crate::simd::{LaneBounds, Lanes32, Simd, with_isa};
 use impinge_exact::internal::filter::Moving64;
 
 use super::world::StepWorld;
@@ -57,7 +57,30 @@ impl<'a> PerCluster<StepWorld<'a>> for StepGroup {
     };
 
     #[inline(always)]
-    fn fill<S: Simd>(&mut self, simd: S, world: StepWorld<'a>, part: PartIx, cluster: ClusterIx) {
+    fn fill<S: Simd>(&mut self, _: S, world: StepWorld<'a>, part: PartIx, cluster: ClusterIx) {
+        self.fill_by(world, (part, cluster));
+    }
+}
+
+impl StepGroup {
+    /// It is long, called from many places, and seldom.
+    #[cold]
+    #[inline(never)]
+    fn fill_by(&mut self, world: StepWorld<'_>, whose: (PartIx, ClusterIx)) {
+        with_isa!(world.isa, fill, (
+            group: &mut StepGroup = self,
+            world: StepWorld<'_> = world,
+            whose: (PartIx, ClusterIx) = whose,
+        ));
+    }
+
+    #[inline(always)]
+    fn fill_with<S: Simd>(
+        &mut self,
+        simd: S,
+        world: StepWorld<'_>,
+        (part, cluster): (PartIx, ClusterIx),
+    ) {
         let clustering = &world.cache(part).clustering;
         self.size = clustering.size(cluster);
         self.ends = world.ends(part, cluster);
@@ -103,9 +126,7 @@ impl<'a> PerCluster<StepWorld<'a>> for StepGroup {
         }
         source.close(clustering, cluster, [&mut self.start, &mut self.end]);
     }
-}
 
-impl StepGroup {
     /// Fills the tables of points, and the boxes from those.
     #[inline(always)]
     fn put_points<S: Simd>(&mut self, simd: S, ends: [&Positions; 2]) {
@@ -134,4 +155,9 @@ impl StepGroup {
             }
         }
     }
+}
+
+#[inline(always)]
+fn fill<S: Simd>(simd: S, group: &mut StepGroup, world: StepWorld<'_>, whose: (PartIx, ClusterIx)) {
+    group.fill_with(simd, world, whose);
 }

@@ -70,28 +70,23 @@ fn take<S: Simd>(_: S, near: &mut NearElements, world: StepWorld<'_>, batch: Bat
         take_edges_and_faces::<S>(near, world, &batch);
         return;
     }
-    let sides = sides(world, between);
     let has_own = |part| world.plan.thickness_of_each(part).is_some();
-    if has_own(between.a) || has_own(between.b) {
-        let reach = OfEach { world, between };
-        take_pairs::<S, _>(near, world, &batch, PartPair { sides, reach });
-    } else {
-        let reach = OfAll {
-            reach: world.plan.reach(between.a, between.b),
-            thickness: world.plan.thickness(between.any()),
-        };
-        take_pairs::<S, _>(near, world, &batch, PartPair { sides, reach });
-    }
+    let of_all = (!has_own(between.a) && !has_own(between.b)).then(|| {
+        let reach = world.plan.reach(between.a, between.b);
+        (reach, world.plan.thickness(between.any()))
+    });
+    let pairs = PartPair {
+        world,
+        between,
+        sides: sides(world, between),
+        of_all,
+    };
+    take_pairs::<S>(near, &batch, &pairs);
 }
 
 #[inline(always)]
-fn take_pairs<S: Simd, R: Reaches>(
-    near: &mut NearElements,
-    world: StepWorld<'_>,
-    batch: &Batch<'_>,
-    pairs: PartPair<'_, R>,
-) {
-    let between = batch.between;
+fn take_pairs<S: Simd>(near: &mut NearElements, batch: &Batch<'_>, pairs: &PartPair<'_>) {
+    let PartPair { world, between, .. } = *pairs;
     let in_tables = batch.pair_in_tables();
     let off = batch.off_in_tables();
     let is_exact = batch.rounded() == 0.0;
@@ -103,25 +98,33 @@ fn take_pairs<S: Simd, R: Reaches>(
         _ => None,
     };
     let tables = batch.groups.map(|group| &group.points);
+    let mut reach = [[0.0; BATCH]; 2];
+    if let Some((of_all, _)) = &pairs.of_all {
+        reach = reach_in_tables(of_all, off).map(|of_all| [of_all; BATCH]);
+    }
     for first in (0..batch.lane_pairs.len()).step_by(BATCH) {
         let lanes = batch.lane_pairs.batch(first);
         let n = (batch.lane_pairs.len() - first).min(BATCH);
         let mut open = u16::MAX >> (BATCH - n);
+        if pairs.of_all.is_none() {
+            for (lane, ix) in (first..first + n).enumerate() {
+                let of_pair = reach_in_tables(&pairs.reach(batch, ix), off);
+                [reach[0][lane], reach[1][lane]] = of_pair;
+            }
+        }
         if let (Some(pair), Some(shares)) = (in_tables, &shares) {
-            let reach = pairs.reach.in_tables(batch, first, off);
-            let found = filter::bounded_in_tables::<S::F32, _>(pair, tables, lanes, reach);
+            let found = filter::bounded_in_tables::<S::F32>(pair, tables, lanes, &reach);
             let yes = found.verdict.yes & open;
             open &= !(found.verdict.yes | found.verdict.no);
             for lane in Lanes(u64::from(yes)) {
                 let bounds = [found.low[lane], found.high[lane]];
-                let thickness = pairs.reach.thickness(batch, first + lane);
+                let thickness = pairs.thickness(batch, first + lane);
                 if may_lower(shares, batch, first + lane, bounds, thickness) {
                     near.put(world, batch, first + lane, Labels::UNKNOWN);
                 }
             }
         } else if let Some(pair) = in_tables {
-            let reach = pairs.reach.in_tables(batch, first, off);
-            let found = filter::nearest_in_tables::<S::F32, _>(pair, tables, lanes, reach);
+            let found = filter::nearest_in_tables::<S::F32>(pair, tables, lanes, &reach);
             let yes = found.verdict.yes & open;
             open &= !(found.verdict.yes | found.verdict.no);
             for lane in Lanes(u64::from(yes)) {
@@ -134,7 +137,7 @@ fn take_pairs<S: Simd, R: Reaches>(
             }
         }
         for lane in Lanes(u64::from(open)) {
-            let reach = pairs.reach.exact(batch, first + lane);
+            let reach = pairs.reach(batch, first + lane);
             if near.decide_open(&pairs.sides, batch.slots(first + lane), &reach) {
                 near.put(world, batch, first + lane, Labels::UNKNOWN);
             }
@@ -230,9 +233,40 @@ impl NearElements {
 }
 
 /// Two parts, and within which distance their elements are near.
-struct PartPair<'a, R> {
+struct PartPair<'a> {
+    world: StepWorld<'a>,
+    between: Between,
     sides: Sides<'a>,
-    reach: R,
+    /// The distance, and how thick both elements of a pair are together, rounded up; `None` where
+    /// elements are not equally thick.
+    of_all: Option<(Reach, f64)>,
+}
+
+impl PartPair<'_> {
+    #[inline(always)]
+    fn located(&self, batch: &Batch<'_>, ix: usize) -> [(PartIx, ElementIx); 2] {
+        let [a, b] = numbers_in(batch.groups, batch.lane_pairs.lanes(ix));
+        let located = |part, number| (part, self.world.plan.part(part).element(number));
+        [located(self.between.a, a), located(self.between.b, b)]
+    }
+
+    /// Within which distance the elements of a candidate are near, exactly.
+    #[inline(always)]
+    fn reach(&self, batch: &Batch<'_>, ix: usize) -> Reach {
+        match self.of_all {
+            Some((reach, _)) => reach,
+            None => self.world.plan.reach_of(self.located(batch, ix)),
+        }
+    }
+
+    /// How thick both elements of a candidate are together, rounded up.
+    #[inline(always)]
+    fn thickness(&self, batch: &Batch<'_>, ix: usize) -> f64 {
+        match self.of_all {
+            Some((_, thickness)) => thickness,
+            None => self.world.plan.thickness(self.located(batch, ix)),
+        }
+    }
 }
 
 /// Of two parts, the elements in the order of their clusters, and the positions of their bodies.
@@ -251,81 +285,4 @@ fn corners(sides: &Sides<'_>, slots: Slots) -> [Corners; 2] {
         let (elements, positions) = sides[side];
         Corners::new(positions, elements.corners(slots[side].index()))
     })
-}
-
-/// Within which distance the elements of candidates are near: all within one, or each pair within
-/// its own.
-trait Reaches {
-    type InTables: filter::Reaches16;
-
-    /// Of sixteen candidates, two numbers between which the distance is, if points are off by so
-    /// much.
-    fn in_tables(&self, batch: &Batch<'_>, first: usize, off: f64) -> Self::InTables;
-    /// Of one candidate, exactly.
-    fn exact(&self, batch: &Batch<'_>, ix: usize) -> Reach;
-    /// How thick both elements of a candidate are together, rounded up.
-    fn thickness(&self, batch: &Batch<'_>, ix: usize) -> f64;
-}
-
-struct OfAll {
-    reach: Reach,
-    thickness: f64,
-}
-
-impl Reaches for OfAll {
-    type InTables = [f32; 2];
-
-    #[inline(always)]
-    fn in_tables(&self, _: &Batch<'_>, _: usize, off: f64) -> [f32; 2] {
-        reach_in_tables(&self.reach, off)
-    }
-
-    #[inline(always)]
-    fn exact(&self, _: &Batch<'_>, _: usize) -> Reach {
-        self.reach
-    }
-
-    #[inline(always)]
-    fn thickness(&self, _: &Batch<'_>, _: usize) -> f64 {
-        self.thickness
-    }
-}
-
-struct OfEach<'a> {
-    world: StepWorld<'a>,
-    between: Between,
-}
-
-impl OfEach<'_> {
-    #[inline(always)]
-    fn located(&self, batch: &Batch<'_>, ix: usize) -> [(PartIx, ElementIx); 2] {
-        let [a, b] = numbers_in(batch.groups, batch.lane_pairs.lanes(ix));
-        let located = |part, number| (part, self.world.plan.part(part).element(number));
-        [located(self.between.a, a), located(self.between.b, b)]
-    }
-}
-
-impl Reaches for OfEach<'_> {
-    type InTables = [[f32; BATCH]; 2];
-
-    #[inline(always)]
-    fn in_tables(&self, batch: &Batch<'_>, first: usize, off: f64) -> [[f32; BATCH]; 2] {
-        let mut reaches = [[0.0; BATCH]; 2];
-        let n = (batch.lane_pairs.len() - first).min(BATCH);
-        let [lows, highs] = &mut reaches;
-        for (lane, (low, high)) in lows.iter_mut().zip(highs).enumerate().take(n) {
-            [*low, *high] = reach_in_tables(&self.exact(batch, first + lane), off);
-        }
-        reaches
-    }
-
-    #[inline(always)]
-    fn exact(&self, batch: &Batch<'_>, ix: usize) -> Reach {
-        self.world.plan.reach_of(self.located(batch, ix))
-    }
-
-    #[inline(always)]
-    fn thickness(&self, batch: &Batch<'_>, ix: usize) -> f64 {
-        self.world.plan.thickness(self.located(batch, ix))
-    }
 }
