@@ -191,7 +191,7 @@ class World:
         self.fixed = [(np.array(points, np.float32), np.array(faces, np.uint32)) for points, faces in fixed]
         for points, faces in self.fixed:
             self.scene.add(points, faces)
-        self.edges = self.scene.edges(self.body).astype(int)
+        self.others = [points.astype(np.float64) for points, _ in self.fixed]
         self.detector = impinge.Detector("cpu")
         self.velocities = np.zeros_like(self.cloth.rest)
         self.n_steps = self.n_near = self.n_cut = 0
@@ -218,46 +218,24 @@ class World:
     def contacts(self, at):
         """For each near pair: four vertices with signed weights, the normal, and what is not of the cloth of the distance along it."""
         reach = REACH * self.cloth.edge
-        near = self.timed("near", lambda: self.detector.near(self.scene, reach, of=self.body, kinds=("vf", "ee"), closest_points=True))
+        near = self.timed("near", lambda: self.detector.near(self.scene, reach, of=self.body, kinds=("vf", "ee")))
         self.n_near = len(near)
-        start_of_solver = time.perf_counter()
-        nobody = len(at) - 1
-        vertices, weights = [], []
-        for kind in ("vf", "ee"):
-            rows, points = near.of(kind).rows, near.of(kind).points
-            sides = []
-            for column, side in ((0, 0), (2, 1)):
-                ours = rows[:, column] == int(self.body)
-                element = np.where(ours, rows[:, column + 1], 0)
-                point = points[:, side]
-                if kind == "ee":
-                    corners = self.edges[element]
-                    start, along = at[corners[:, 0]], at[corners[:, 1]] - at[corners[:, 0]]
-                    share = dot(point - start, along) / np.maximum(dot(along, along), TINY)
-                    share = np.minimum(np.maximum(share, 0.0), 1.0)
-                    shares = np.stack([1.0 - share, share], axis=1)
-                elif side == 0:
-                    corners, shares = element[:, None], np.ones((len(element), 1))
-                else:
-                    corners = self.cloth.faces[element].astype(int)
-                    start = at[corners[:, 0]]
-                    e, f, r = at[corners[:, 1]] - start, at[corners[:, 2]] - start, point - start
-                    ee, ef, ff, re, rf = dot(e, e), dot(e, f), dot(f, f), dot(r, e), dot(r, f)
-                    area = np.maximum(ee * ff - ef * ef, TINY)
-                    second, third = (ff * re - ef * rf) / area, (ee * rf - ef * re) / area
-                    shares = np.stack([1.0 - second - third, second, third], axis=1)
-                corners = np.where(ours[:, None], corners, nobody)
-                shares = np.where(ours[:, None], shares, 0.0)
-                sides.append((corners, shares if side == 0 else -shares))
-            vertices.append(np.concatenate([sides[0][0], sides[1][0]], axis=1))
-            weights.append(np.concatenate([sides[0][1], sides[1][1]], axis=1))
-        rows, points = near.rows, near.points
-        across = points[:, 0] - points[:, 1]
+        start = time.perf_counter()
+        stencils = near.stencils(self.scene)
+        vertices, weights = stencils.vertices.astype(int), stencils.coefficients
+        points = np.concatenate([at[:-1], *self.others])[vertices]
+        across = np.zeros((len(near), 3))
+        for k in range(4):
+            across = across + weights[:, k, None] * points[:, k]
         normal = across / np.maximum(length(across), TINY)[:, None]
-        offset = np.where(rows[:, 0] == int(self.body), 0.0, dot(normal, points[:, 0]))
-        offset = offset - np.where(rows[:, 2] == int(self.body), 0.0, dot(normal, points[:, 1]))
-        self.seconds["solve"] += time.perf_counter() - start_of_solver
-        return np.concatenate(vertices).astype(int), np.concatenate(weights), normal, offset
+        # The cloth is the first body of the scene, so its vertices are the first.
+        nobody = len(at) - 1
+        ours = vertices < nobody
+        offset = np.zeros(len(near))
+        for k in range(4):
+            offset = offset + np.where(ours[:, k], 0.0, weights[:, k] * dot(normal, points[:, k]))
+        self.seconds["solve"] += time.perf_counter() - start
+        return np.where(ours, vertices, nobody), np.where(ours, weights, 0.0), normal, offset
 
     def push(self, to, contacts, masses):
         """Moves vertices of pairs that are too near apart, each by the mean over its pairs."""

@@ -320,9 +320,10 @@ class _Held:
     def near(self, distance: float, **options: Any) -> Any:
         """The pairs within a distance. A solver asks again and again while little moves."""
         # A margin fits other distances of about the same size. Another one takes a new detector.
-        if distance > 0 and not distance / 16 <= self._margin <= distance / 2:
+        fits = distance / 16 <= self._margin <= distance / 2
+        if 0 < distance < math.inf and not fits:
+            self.detector = Detector("cpu", reuse_margin=distance / 4)
             self._margin = distance / 4
-            self.detector = Detector("cpu", reuse_margin=self._margin)
         return self.detector.near(self.scene, distance, **options)
 
     def place(self, vertices: npt.NDArray[Any], end: npt.NDArray[Any] | None = None) -> Scene:

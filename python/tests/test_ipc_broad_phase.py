@@ -213,6 +213,23 @@ def test_one_object_serves_many_meshes_in_turn():
     assert broad_phase.name() == "impinge" and ipc.BroadPhase("boxes").name() == "impinge (boxes)"
 
 
+def test_near_pairs_come_from_a_list_while_little_moves():
+    mesh, at, _ = scene(5)
+    random = np.random.default_rng(5)
+    broad_phase = ipc.BroadPhase()
+    margins = []
+    for radius in [0.05, 0.05, 0.05, 0.08, 0.0, 0.08, 1.0, 1.0, 0.004, 0.05, 0.05]:
+        at = at + 0.0005 * random.standard_normal(at.shape)
+        found = built(mesh, at, radius=radius, by=broad_phase)
+        # A new object has no list yet.
+        assert sets_of(found) == sets_of(built(mesh, at, radius=radius, by=ipc.BroadPhase()))
+        margins.append(broad_phase._meshes[0][0]._held().detector.settings["reuse_margin"])
+    # A quarter of the distance, twice the radius; the same for others of about that size.
+    np.testing.assert_allclose(margins, [0.025] * 6 + [0.5, 0.5, 0.002] + [0.025] * 2, rtol=1e-6)
+    with pytest.raises(ValueError, match="^distance: inf given"):
+        ipc.candidates(mesh, at, inflation_radius=1e308)
+
+
 def test_a_seldom_question():
     """Kinds of pairs that ipctk asks no mesh in three dimensions for."""
     mesh, start, end = scene(3)

@@ -362,7 +362,9 @@ typedef struct impinge_detector impinge_detector;
  *   device              Part of a GPU's name, to choose among several; NULL for any. It is copied.
  *   reuse_margin        For solvers that ask again and again while little moves. If it is above 0, questions about near pairs, neighbours and
  *                       safe distances list the pairs within their distance and this margin, and look at no others until some vertex has
- *                       moved farther than half of it, or anything but positions has changed. The answers are the same. Default: 0. */
+ *                       moved farther than half of it, or anything but positions has changed. The answers are the same. After a list that
+ *                       served no second question, the next is made when vertices have moved at most half of the margin between two.
+ *                       Default: 0. */
 typedef struct impinge_settings {
   uint32_t size; /* sizeof(impinge_settings) of the caller */
   uint32_t backend, method, threads;

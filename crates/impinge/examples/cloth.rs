@@ -9,8 +9,8 @@
 //!
 //! Each step: vertices go where their velocities take them; distance constraints along edges,
 //! across faces and across edges are solved (XPBD, Macklin et al. 2016), together with one
-//! constraint per pair of elements that `near` finds; then `truncate` says how far each vertex can
-//! go. Its positions are proven free, rounding included. The program ends with an error if the
+//! constraint per pair of elements that `near` finds, by its stencil; then `truncate` says how far
+//! each vertex can go. Its positions are proven free, rounding included. The program ends with an error if the
 //! exact test `any` ever finds an intersection in a stored state. There is no friction.
 //!
 //! `examples/cloth` has the same program in Python, and what both print: all arithmetic is adding,
@@ -23,9 +23,7 @@ use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use impinge::{
-    Backend, BodyId, Detector, Element, NearPair, PairKind, Part, Positions, Query, Scene,
-};
+use impinge::{Backend, BodyId, Detector, PairKind, Positions, Query, Scene, Stencil};
 
 type Point = [f64; 3];
 type Surface = (Vec<Point>, Vec<[u32; 3]>);
@@ -263,7 +261,7 @@ struct Contact {
     /// Vertices of the cloth with signed weights; a vertex of another body has the weight 0.
     corners: [(usize, f64); 4],
     normal: Point,
-    /// What other bodies add to the distance along the normal.
+    /// What vertices of other bodies add to the distance along the normal.
     offset: f64,
     /// Sum of the weights, squared, by the inverse masses.
     mass: f64,
@@ -375,78 +373,38 @@ impl World {
         }
     }
 
-    /// The corners of an element of the cloth, with the weights of a point of it; the first is
-    /// repeated with the weight 0. Nothing of another body.
-    fn weigh(
-        &self,
-        at: &[Point],
-        part: Part,
-        of: Element,
-        point: Point,
-    ) -> Result<[(usize, f64); 3], impinge::Error> {
-        if of.body != self.body {
-            return Ok([(0, 0.0); 3]);
+    fn contact(&self, stencil: &Stencil) -> Contact {
+        let (weights, points) = (stencil.coefficients(), &stencil.points);
+        let mut across = [0.0; 3];
+        for (weight, point) in weights.iter().zip(points) {
+            for (across, x) in across.iter_mut().zip(point) {
+                *across += weight * x;
+            }
         }
-        if part == Part::Vertices {
-            return Ok([(of.element as usize, 1.0), (0, 0.0), (0, 0.0)]);
-        }
-        let elements = self.scene.body(self.body)?.part(part);
-        let corners = elements.corners(of.element as usize);
-        let corner = |k: usize| corners[k] as usize;
-        let start = at[corner(0)];
-        let (e, r) = (minus(at[corner(1)], start), minus(point, start));
-        if part == Part::Edges {
-            let share = (dot(r, e) / dot(e, e).max(TINY)).clamp(0.0, 1.0);
-            return Ok([(corner(0), 1.0 - share), (corner(1), share), (0, 0.0)]);
-        }
-        let f = minus(at[corner(2)], start);
-        let (ee, ef, ff, re, rf) = (dot(e, e), dot(e, f), dot(f, f), dot(r, e), dot(r, f));
-        let area = (ee * ff - ef * ef).max(TINY);
-        let second = (ff * re - ef * rf) / area;
-        let third = (ee * rf - ef * re) / area;
-        Ok([
-            (corner(0), 1.0 - second - third),
-            (corner(1), second),
-            (corner(2), third),
-        ])
-    }
-
-    fn contact(&self, at: &[Point], pair: &NearPair) -> Result<Contact, impinge::Error> {
-        let [a, b] = pair.closest.expect("asked for").points;
-        let parts = match pair.kind {
-            PairKind::VertexFace => [Part::Vertices, Part::Faces],
-            _ => [Part::Edges, Part::Edges],
-        };
-        let first = self.weigh(at, parts[0], pair.a, a)?;
-        let second = self.weigh(at, parts[1], pair.b, b)?;
-        let negative = second.map(|(vertex, weight)| (vertex, -weight));
-        let corners = match pair.kind {
-            PairKind::VertexFace => [first[0], negative[0], negative[1], negative[2]],
-            _ => [first[0], first[1], negative[0], negative[1]],
-        };
-        let across = minus(a, b);
         let distance = length(across).max(TINY);
         let normal = across.map(|x| x / distance);
-        let of_other = |of: Element, point| match of.body == self.body {
-            true => 0.0,
-            false => dot(normal, point),
-        };
-        let mut mass = 0.0;
-        for (vertex, weight) in corners {
-            mass += weight * weight * self.cloth.moves[vertex];
+        let mut corners = [(0, 0.0); 4];
+        let (mut offset, mut mass) = (0.0, 0.0);
+        for (ix, corner) in corners.iter_mut().enumerate() {
+            let (vertex, weight) = (stencil.vertices[ix] as usize, weights[ix]);
+            // The cloth is the first body of the scene, so its vertices are the first.
+            if let Some(moves) = self.cloth.moves.get(vertex) {
+                *corner = (vertex, weight);
+                mass += weight * weight * moves;
+            } else {
+                offset += weight * dot(normal, points[ix]);
+            }
         }
-        Ok(Contact {
+        Contact {
             corners,
             normal,
-            offset: of_other(pair.a, a) - of_other(pair.b, b),
+            offset,
             mass: mass.max(LEAST_MASS),
-        })
+        }
     }
 
-    fn contacts(&mut self, at: &[Point]) -> Result<Vec<Contact>, impinge::Error> {
-        let query = Query::of(self.body)
-            .kinds([PairKind::VertexFace, PairKind::EdgeEdge])
-            .closest_points();
+    fn contacts(&mut self) -> Result<Vec<Contact>, impinge::Error> {
+        let query = Query::of(self.body).kinds([PairKind::VertexFace, PairKind::EdgeEdge]);
         let reach = REACH * self.cloth.edge;
         let (detector, scene) = (&mut self.detector, &self.scene);
         let near = timed(&mut self.seconds.near, || {
@@ -454,14 +412,16 @@ impl World {
         })?;
         self.n_near = near.len();
         let start = Instant::now();
-        let contacts = near.iter().map(|pair| self.contact(at, &pair)).collect();
+        let stencils = near.stencils(&self.scene, None)?;
+        let contacts = stencils.iter().map(|stencil| self.contact(stencil));
+        let contacts = contacts.collect();
         self.seconds.solve += start.elapsed().as_secs_f64();
-        contacts
+        Ok(contacts)
     }
 
     fn step(&mut self) -> Result<(), Box<dyn Error>> {
         let at: Vec<Point> = self.positions()?.iter().map(|p| p.map(f64::from)).collect();
-        let contacts = self.contacts(&at)?;
+        let contacts = self.contacts()?;
         let start = Instant::now();
         if self.name != "twist" {
             for velocity in &mut self.velocities {

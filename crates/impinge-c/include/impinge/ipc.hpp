@@ -17,6 +17,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cmath>
 #include <exception>
 #include <list>
 
@@ -115,7 +116,7 @@ public:
   near_pairs near(double distance, const query &of) {
     const double margin = settings_.reuse_margin();
     // A margin fits other distances of about the same size. Another one takes a new detector; one of the caller's stays.
-    if (distance > 0 && (is_margin_ours_ || margin == 0) && !(distance / 16 <= margin && margin <= distance / 2)) {
+    if (distance > 0 && std::isfinite(distance) && (is_margin_ours_ || margin == 0) && !(distance / 16 <= margin && margin <= distance / 2)) {
       is_margin_ours_ = true;
       detector_ = impinge::detector(settings_.reuse_margin(distance / 4));
     }
@@ -294,7 +295,8 @@ inline double compute_collision_free_stepsize(const ::ipc::CollisionMesh &mesh, 
   return fraction;
 }
 
-/// Finds the pairs that ipc-toolkit asks for. In two dimensions ipc-toolkit's own default does.
+/// Finds the pairs that ipc-toolkit asks for. In two dimensions ipc-toolkit's own default does. Without a `reuse_margin` of the caller's, near
+/// pairs are listed with one of a quarter of their distance.
 class BroadPhase : public ::ipc::BroadPhase {
 public:
   explicit BroadPhase(ipc::mode of = mode::exact, settings how = backend::cpu) : mode_(of), known_(std::move(how)) {}

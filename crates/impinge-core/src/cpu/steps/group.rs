@@ -63,7 +63,7 @@ impl<'a> PerCluster<StepWorld<'a>> for StepGroup {
 }
 
 impl StepGroup {
-    /// It is long, called from many places, and seldom.
+    /// It is long and seldom called, from many places: compiled once per instruction set.
     #[cold]
     #[inline(never)]
     fn fill_by(&mut self, world: StepWorld<'_>, whose: (PartIx, ClusterIx)) {

@@ -51,7 +51,7 @@ pub(crate) struct VerletList {
     tasks: Vec<Task>,
 }
 
-#[derive(Debug, Default, PartialEq)]
+#[derive(Debug, Default)]
 enum State {
     /// Nothing was asked.
     #[default]
@@ -191,7 +191,9 @@ impl StepClusters {
                 ..VerletList::default()
             };
             list.place(scene, plan);
-            return self.run(job, settings, answer, None, stats);
+            self.run(job, settings, answer, None, stats)?;
+            stats.bytes_held += (list.bytes() + held_by_others) as u64;
+            return Ok(());
         }
         let wide = plan.within_farther(margin);
         let wider = Job { plan: &wide, ..job };
@@ -209,7 +211,9 @@ impl StepClusters {
                 .iter_mut()
                 .any(|worker| worker.listing().is_cut)
             {
-                return self.run(job, settings, answer, None, stats);
+                self.run(job, settings, answer, None, stats)?;
+                stats.bytes_held += held_by_others as u64;
+                return Ok(());
             }
             list.fill(scene, plan, &self.caches, &mut self.scratches);
         }

@@ -106,7 +106,7 @@ fn take_pairs<S: Simd>(near: &mut NearElements, batch: &Batch<'_>, pairs: &PartP
         let lanes = batch.lane_pairs.batch(first);
         let n = (batch.lane_pairs.len() - first).min(BATCH);
         let mut open = u16::MAX >> (BATCH - n);
-        if pairs.of_all.is_none() {
+        if in_tables.is_some() && pairs.of_all.is_none() {
             for (lane, ix) in (first..first + n).enumerate() {
                 let of_pair = reach_in_tables(&pairs.reach(batch, ix), off);
                 [reach[0][lane], reach[1][lane]] = of_pair;
