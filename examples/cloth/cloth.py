@@ -218,20 +218,21 @@ class World:
     def contacts(self, at):
         """For each near pair: four vertices with signed weights, the normal, and what is not of the cloth of the distance along it."""
         reach = REACH * self.cloth.edge
-        near = self.timed("near", lambda: self.detector.near(self.scene, reach, of=self.body, kinds=("vf", "ee")))
-        self.n_near = len(near)
+        stencils = self.timed(
+            "near", lambda: self.detector.near(self.scene, reach, of=self.body, kinds=("vf", "ee")).stencils(self.scene)
+        )
+        self.n_near = len(stencils)
         start = time.perf_counter()
-        stencils = near.stencils(self.scene)
         vertices, weights = stencils.vertices.astype(int), stencils.coefficients
         points = np.concatenate([at[:-1], *self.others])[vertices]
-        across = np.zeros((len(near), 3))
+        across = np.zeros((len(stencils), 3))
         for k in range(4):
             across = across + weights[:, k, None] * points[:, k]
         normal = across / np.maximum(length(across), TINY)[:, None]
         # The cloth is the first body of the scene, so its vertices are the first.
         nobody = len(at) - 1
         ours = vertices < nobody
-        offset = np.zeros(len(near))
+        offset = np.zeros(len(stencils))
         for k in range(4):
             offset = offset + np.where(ours[:, k], 0.0, weights[:, k] * dot(normal, points[:, k]))
         self.seconds["solve"] += time.perf_counter() - start

@@ -257,6 +257,7 @@ fn turned(n_steps: usize) -> [f64; 2] {
 }
 
 /// Two elements to be kept apart.
+#[derive(Clone, Copy)]
 struct Contact {
     /// Vertices of the cloth with signed weights; a vertex of another body has the weight 0.
     corners: [(usize, f64); 4],
@@ -407,16 +408,14 @@ impl World {
         let query = Query::of(self.body).kinds([PairKind::VertexFace, PairKind::EdgeEdge]);
         let reach = REACH * self.cloth.edge;
         let (detector, scene) = (&mut self.detector, &self.scene);
-        let near = timed(&mut self.seconds.near, || {
-            detector.near(scene, reach, &query)
+        let stencils = timed(&mut self.seconds.near, || {
+            detector.near(scene, reach, &query)?.stencils(scene, None)
         })?;
-        self.n_near = near.len();
+        self.n_near = stencils.len();
         let start = Instant::now();
-        let stencils = near.stencils(&self.scene, None)?;
-        let contacts = stencils.iter().map(|stencil| self.contact(stencil));
-        let contacts = contacts.collect();
+        let contacts = stencils.column(|stencil| self.contact(stencil));
         self.seconds.solve += start.elapsed().as_secs_f64();
-        Ok(contacts)
+        contacts
     }
 
     fn step(&mut self) -> Result<(), Box<dyn Error>> {
