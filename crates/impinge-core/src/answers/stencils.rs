@@ -1,5 +1,7 @@
 //! Near pairs as stencils: vertices, coefficients and distances with their derivatives.
 
+use std::sync::{Mutex, PoisonError};
+
 use crate::answers::areas::Areas;
 use crate::answers::near::{NearIter, NearPair, NearPairs};
 use crate::answers::pairs::Element;
@@ -298,64 +300,36 @@ impl NearIter<'_> {
                 body.positions().check(id)?;
             }
         }
-        let mut rows = sink::with_capacity(self.len(), WHAT)?;
-        let threads = self.threads();
-        for pair in self {
-            let parts = pair.kind.parts();
-            let (a, b) = match pair.kind {
-                PairKind::VertexFace | PairKind::EdgeEdge | PairKind::VertexVertex => {
-                    ((pair.a, parts[0]), (pair.b, parts[1]))
-                }
-                PairKind::EdgeVertex => ((pair.b, parts[1]), (pair.a, parts[0])),
-                PairKind::EdgeFace | PairKind::FaceFace => {
-                    return Err(Error::Setting {
-                        setting: "kinds",
-                        given: format!(
-                            "{} (element {} of body {} and {} of body {})",
-                            pair.kind.name(),
-                            pair.a.element,
-                            pair.a.body,
-                            pair.b.element,
-                            pair.b.body
-                        ),
-                        allowed: "vf, ee, ev or vv",
-                    });
-                }
-            };
-            let mut vertices = [0; 4];
-            let mut points = [[0.0; 3]; 4];
-            let mut n = 0;
-            for (element, part) in [a, b] {
-                let body = body_of(scene, element, part)?;
-                for &corner in body.corners(part, &ElementIx::new(element.element)) {
-                    vertices[n] = offsets[element.body.index()] + corner;
-                    points[n] = body.positions().point(corner as usize);
-                    n += 1;
+        let (n, threads) = (self.len(), self.threads());
+        let mut rows = sink::with_capacity(n, WHAT)?;
+        let room = &mut rows.spare_capacity_mut()[..n];
+        let refused = Mutex::new(None);
+        in_parts(room, PART, threads, |first, room| {
+            for (ix, (to, pair)) in room.iter_mut().zip(self.clone().after(first)).enumerate() {
+                match stencil(scene, &offsets, rest, pair) {
+                    Ok(row) => _ = to.write(row),
+                    Err(error) => {
+                        let mut refused = refused.lock().unwrap_or_else(PoisonError::into_inner);
+                        if refused
+                            .as_ref()
+                            .is_none_or(|(other, _)| first + ix < *other)
+                        {
+                            *refused = Some((first + ix, error));
+                        }
+                        return;
+                    }
                 }
             }
-            for ix in n..4 {
-                (vertices[ix], points[ix]) = (vertices[0], points[0]);
+        });
+        if let Some((_, error)) = refused.into_inner().unwrap_or_else(PoisonError::into_inner) {
+            return Err(error);
+        }
+        // SAFETY: the room has `n` entries, and each was written, as no pair was refused.
+        unsafe { rows.set_len(n) };
+        if let (Some(areas), Some(rest)) = (&mut areas, rest) {
+            for (row, pair) in rows.iter_mut().zip(self) {
+                row.weight = areas.weight(scene, &offsets, rest, pair.kind, sides(&pair)?)?;
             }
-            let threshold = match (rest, pair.kind) {
-                (Some(rest), PairKind::EdgeEdge) => {
-                    Mollifier::threshold(&vertices.map(|vertex| rest[vertex as usize]))
-                }
-                _ => 0.0,
-            };
-            let weight = match (&mut areas, rest) {
-                (Some(areas), Some(rest)) => {
-                    areas.weight(scene, &offsets, rest, pair.kind, [a, b])?
-                }
-                _ => 1.0,
-            };
-            rows.push(Stencil {
-                kind: pair.kind,
-                features: pair.features,
-                vertices,
-                weight,
-                points,
-                threshold,
-            });
         }
         Ok(Stencils {
             rows,
@@ -363,6 +337,69 @@ impl NearIter<'_> {
             threads,
         })
     }
+}
+
+/// The elements of a pair, a vertex before an edge or a face.
+///
+/// # Errors
+/// An edge and a face, or two faces.
+fn sides(pair: &NearPair) -> Result<[(Element, Part); 2], Error> {
+    let parts = pair.kind.parts();
+    match pair.kind {
+        PairKind::VertexFace | PairKind::EdgeEdge | PairKind::VertexVertex => {
+            Ok([(pair.a, parts[0]), (pair.b, parts[1])])
+        }
+        PairKind::EdgeVertex => Ok([(pair.b, parts[1]), (pair.a, parts[0])]),
+        PairKind::EdgeFace | PairKind::FaceFace => Err(Error::Setting {
+            setting: "kinds",
+            given: format!(
+                "{} (element {} of body {} and {} of body {})",
+                pair.kind.name(),
+                pair.a.element,
+                pair.a.body,
+                pair.b.element,
+                pair.b.body
+            ),
+            allowed: "vf, ee, ev or vv",
+        }),
+    }
+}
+
+/// The stencil of a pair, which stands for itself.
+fn stencil(
+    scene: &Scene,
+    offsets: &[u32],
+    rest: Option<&[Point]>,
+    pair: NearPair,
+) -> Result<Stencil, Error> {
+    let mut vertices = [0; 4];
+    let mut points = [[0.0; 3]; 4];
+    let mut n = 0;
+    for (element, part) in sides(&pair)? {
+        let body = body_of(scene, element, part)?;
+        for &corner in body.corners(part, &ElementIx::new(element.element)) {
+            vertices[n] = offsets[element.body.index()] + corner;
+            points[n] = body.positions().point(corner as usize);
+            n += 1;
+        }
+    }
+    for ix in n..4 {
+        (vertices[ix], points[ix]) = (vertices[0], points[0]);
+    }
+    let threshold = match (rest, pair.kind) {
+        (Some(rest), PairKind::EdgeEdge) => {
+            Mollifier::threshold(&vertices.map(|vertex| rest[vertex as usize]))
+        }
+        _ => 0.0,
+    };
+    Ok(Stencil {
+        kind: pair.kind,
+        features: pair.features,
+        vertices,
+        weight: 1.0,
+        points,
+        threshold,
+    })
 }
 
 impl Stencils {

@@ -693,8 +693,8 @@ fn refusals_name_what_is_wrong() {
     ));
 }
 
-/// Columns and projections are those of one stencil after another, however many threads compute
-/// them.
+/// Stencils are those of one pair after another, columns and projections those of one stencil after
+/// another, however many threads compute them.
 #[test]
 fn threads_change_no_bit() {
     let scene = folded();
@@ -711,6 +711,22 @@ fn threads_change_no_bit() {
         // More than one part for a thread.
         assert!(stencils.len() > 2000, "{}", stencils.len());
         pool.install(|| {
+            // More threads than made the first ones, perhaps.
+            let again = near.stencils(&scene, Some(&rest)).unwrap();
+            assert!(again.iter().eq(&stencils));
+            let pairs = near.iter().map(|pair| (pair.kind, pair.features));
+            assert!(again.iter().map(|of| (of.kind, of.features)).eq(pairs));
+            // Of all pairs that are refused, the first is named.
+            let query = Query::all().kinds([PairKind::FaceFace]);
+            let faces = detector.near(&scene, 0.3, &query).unwrap();
+            let message = faces.stencils(&scene, None).unwrap_err().to_string();
+            let pair = faces.iter().next().unwrap();
+            let [a, b] = [pair.a, pair.b].map(|of| format!("{} of body {}", of.element, of.body));
+            let expected = format!("kinds: ff (element {a} and {b}) given");
+            assert!(
+                faces.len() > 2000 && message.starts_with(&expected),
+                "{message}"
+            );
             let column = stencils.column(|of| *of).unwrap();
             assert!(column.iter().eq(&stencils), "each in its place");
             let each = stencils.iter().map(Stencil::squared_distance);

@@ -331,6 +331,20 @@ impl NearIter<'_> {
         self.pairs.threads
     }
 
+    /// Without the next `n`.
+    pub(crate) fn after(mut self, n: usize) -> Self {
+        self.ix += n;
+        self.n_left -= n;
+        while let Some((&kind, rest)) = self.kinds.split_first() {
+            let n_of_kind = self.pairs.keys[kind as usize].len();
+            if self.ix < n_of_kind {
+                break;
+            }
+            (self.kinds, self.ix) = (rest, self.ix - n_of_kind);
+        }
+        self
+    }
+
     /// [`NearPairs::hash`] of the pairs that are left.
     pub fn hash(self) -> u64 {
         self.fold(0, |sum, pair| {
