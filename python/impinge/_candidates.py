@@ -178,15 +178,11 @@ class Question:
         if self._is_collected(kind, bodies):
             return self._numbers_in_step(kind, bodies)
         held, radius = self._held, self._radius
-        if self._is_by_boxes(kind, bodies):
 
-            def ask(options: dict[str, Any]) -> Any:
+        def ask(options: dict[str, Any]) -> Any:
+            if self._is_by_boxes(kind, bodies):
                 return held.detector.candidates(held.scene, radius, **options)
-
-        else:
-
-            def ask(options: dict[str, Any]) -> Any:
-                return held.near(2 * radius * _SLACK, **options)
+            return held.near(2 * radius * _SLACK, **options)
 
         found = self._once(kind, bodies, ask)
         body_a, a, body_b, b = found.of(kind).rows.T

@@ -10,8 +10,9 @@
 //! Each step: vertices go where their velocities take them; distance constraints along edges,
 //! across faces and across edges are solved (XPBD, Macklin et al. 2016), together with one
 //! constraint per pair of elements that `near` finds, by its stencil; then `truncate` says how far
-//! each vertex can go. Its positions are proven free, rounding included. The program ends with an error if the
-//! exact test `any` ever finds an intersection in a stored state. There is no friction.
+//! each vertex can go. Its positions are proven free, rounding included. The program ends with an
+//! error if the exact test `any` ever finds an intersection in a stored state. There is no
+//! friction.
 //!
 //! `examples/cloth` has the same program in Python, and what both print: all arithmetic is adding,
 //! multiplying, dividing and square roots of `f64` in one order, and the answers are the same in

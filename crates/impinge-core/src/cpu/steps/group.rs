@@ -67,7 +67,7 @@ impl StepGroup {
     #[cold]
     #[inline(never)]
     fn fill_by(&mut self, world: StepWorld<'_>, whose: (PartIx, ClusterIx)) {
-        with_isa!(world.isa, fill, (
+        with_isa!(world.isa, StepGroup::fill_with, (
             group: &mut StepGroup = self,
             world: StepWorld<'_> = world,
             whose: (PartIx, ClusterIx) = whose,
@@ -76,31 +76,31 @@ impl StepGroup {
 
     #[inline(always)]
     fn fill_with<S: Simd>(
-        &mut self,
         simd: S,
+        group: &mut StepGroup,
         world: StepWorld<'_>,
         (part, cluster): (PartIx, ClusterIx),
     ) {
         let clustering = &world.cache(part).clustering;
-        self.size = clustering.size(cluster);
-        self.ends = world.ends(part, cluster);
+        group.size = clustering.size(cluster);
+        group.ends = world.ends(part, cluster);
         let slots = clustering.slots(cluster);
         with_corners!(&clustering.corners, |elements| {
             let elements = &elements[slots];
             // Tetrahedra, which steps never have, would have no list for their fourth corner.
-            self.n_corners = elements.first().map_or(0, |corners| corners.len().min(3));
-            for (k, lanes) in self.corners.iter_mut().enumerate().take(self.n_corners) {
+            group.n_corners = elements.first().map_or(0, |corners| corners.len().min(3));
+            for (k, lanes) in group.corners.iter_mut().enumerate().take(group.n_corners) {
                 // Lanes without an element hold a vertex that exists.
                 let of_first = elements[0][k];
                 for (lane, corners) in elements.iter().enumerate() {
                     lanes.0[lane] = corners[k];
                 }
-                lanes.0[self.size..].fill(of_first);
+                lanes.0[group.size..].fill(of_first);
             }
         });
         let first = world.plan.part(part).first;
         let elements = clustering.primitives(cluster);
-        for (number, &element) in self.numbers.0.iter_mut().zip(elements) {
+        for (number, &element) in group.numbers.0.iter_mut().zip(elements) {
             *number = first.plus(element).raw();
         }
         let source = world.source(part);
@@ -108,23 +108,23 @@ impl StepGroup {
         let are_single = ends.iter().all(|end| matches!(end, Positions::F32(_)));
         let boxes = world.cache(part).ends(cluster);
         let largest = boxes.map(|bounds| Extent::from(&bounds).magnitude());
-        self.largest = f64::max(largest[0], largest[1]);
-        self.rounded = if are_single {
+        group.largest = f64::max(largest[0], largest[1]);
+        group.rounded = if are_single {
             0.0
-        } else if self.largest <= LARGEST {
+        } else if group.largest <= LARGEST {
             // Half a unit in the last place, or of the smallest number.
-            self.largest * 2f64.powi(-24) + 2f64.powi(-149)
+            group.largest * 2f64.powi(-24) + 2f64.powi(-149)
         } else {
             f64::INFINITY
         };
-        if self.rounded.is_finite() {
+        if group.rounded.is_finite() {
             // Rounding keeps the order of coordinates: boxes that are apart then are so of the
             // points as they are.
-            self.put_points(simd, ends);
+            group.put_points(simd, ends);
         } else {
-            source.fill(clustering, cluster, [&mut self.start, &mut self.end]);
+            source.fill(clustering, cluster, [&mut group.start, &mut group.end]);
         }
-        source.close(clustering, cluster, [&mut self.start, &mut self.end]);
+        source.close(clustering, cluster, [&mut group.start, &mut group.end]);
     }
 
     /// Fills the tables of points, and the boxes from those.
@@ -155,9 +155,4 @@ impl StepGroup {
             }
         }
     }
-}
-
-#[inline(always)]
-fn fill<S: Simd>(simd: S, group: &mut StepGroup, world: StepWorld<'_>, whose: (PartIx, ClusterIx)) {
-    group.fill_with(simd, world, whose);
 }
