@@ -98,7 +98,7 @@ fn the_launch_that_goes_wrong_is_found() {
     for damage in [
         (
             "narrow_moving",
-            "return decide(&polygon, &sizes, pair.are_edges) != FREE;",
+            "return decide(pair.polygon, pair.sizes, pair.are_edges) != FREE;",
             "return true;",
         ),
         (

@@ -783,7 +783,7 @@ fn damaged_kernels_are_noticed() {
         // A device that drops nothing is slow, not wrong.
         (
             "narrow_moving",
-            "return decide(&polygon, &sizes, pair.are_edges) != FREE;",
+            "return decide(pair.polygon, pair.sizes, pair.are_edges) != FREE;",
             "return true;",
         ),
         ("narrow_search", "n < N_INTERVALS;", "n < 0u;"),
@@ -842,8 +842,8 @@ fn damaged_kernels_are_noticed() {
         ),
         (
             "narrow_moving",
-            "return least > bound || most < -bound;",
-            "return least > -1.0 || most < -bound;",
+            "return least(min(at_start, at_end)) > bound ||",
+            "return least(min(at_start, at_end)) > -1.0 ||",
         ),
         (
             "narrow_moving",
@@ -852,8 +852,8 @@ fn damaged_kernels_are_noticed() {
         ),
         (
             "narrow_moving",
-            "opposite(second), w_bound);",
-            "second, w_bound);",
+            "between(p, q), between(s, r)),",
+            "between(p, q), between(r, s)),",
         ),
         (
             "narrow_moving",
@@ -862,13 +862,13 @@ fn damaged_kernels_are_noticed() {
         ),
         (
             "narrow_search",
-            "d.start * time_of(TICKS - time)",
-            "d.end * time_of(TICKS - time)",
+            "four_scaled(d.start, time_of(TICKS - time))",
+            "four_scaled(d.end, time_of(TICKS - time))",
         ),
         (
             "narrow_search",
-            "Moving(at(d, low), at(d, high))",
-            "Moving(at(d, high), at(d, high))",
+            "MovingFour(at(d, low), at(d, high))",
+            "MovingFour(at(d, high), at(d, high))",
         ),
         (
             "narrow_search",
@@ -899,8 +899,8 @@ fn damaged_kernels_are_noticed() {
         // side.
         (
             "narrow_search",
-            "var touches = falls || rises;",
-            "var touches = true;",
+            "let touches = (falls || rises) &&",
+            "let touches =",
         ),
         (
             "narrow_search",
@@ -914,18 +914,18 @@ fn damaged_kernels_are_noticed() {
         ),
         (
             "narrow_search",
-            "touches = touches && side.is_inside;",
-            "touches = touches && !side.is_outside;",
+            "&& all(sides.are_inside);",
+            "&& !any(sides.are_outside);",
         ),
         (
             "narrow_search",
-            "let is_inside = min(w_0, w_4) > bound",
-            "let is_inside = max(w_0, w_4) > bound",
+            "let are_inside = (min(w_0, w_4) > bound)",
+            "let are_inside = (max(w_0, w_4) > bound)",
         ),
         (
             "narrow_search",
-            "> bound && min(w_1, w_3) > next && w_2 > middle;",
-            "> bound;",
+            "> bound) & (min(w_1, w_3) > next) & (w_2 > middle);",
+            "> bound);",
         ),
         // What follows from it.
         (

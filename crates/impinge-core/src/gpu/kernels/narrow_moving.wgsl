@@ -17,9 +17,7 @@ fn may_touch(candidate: Candidate) -> bool {
     if !pair.sizes.are_in_range {
         return true;
     }
-    var polygon = pair.polygon;
-    var sizes = pair.sizes;
-    return decide(&polygon, &sizes, pair.are_edges) != FREE;
+    return decide(pair.polygon, pair.sizes, pair.are_edges) != FREE;
 }
 
 @compute @workgroup_size(64)

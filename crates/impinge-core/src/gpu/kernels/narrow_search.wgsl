@@ -44,12 +44,14 @@ fn ticks_of(bits: u32) -> u32 {
 }
 
 // Not `mix`, which a device may compute in other ways.
-fn at(d: Moving, time: u32) -> vec3<f32> {
-    return d.start * time_of(TICKS - time) + d.end * time_of(time);
+fn at(d: MovingFour, time: u32) -> Four {
+    let start = four_scaled(d.start, time_of(TICKS - time));
+    let end = four_scaled(d.end, time_of(time));
+    return Four(start.x + end.x, start.y + end.y, start.z + end.z);
 }
 
-fn over(d: Moving, low: u32, high: u32) -> Moving {
-    return Moving(at(d, low), at(d, high));
+fn over(d: MovingFour, low: u32, high: u32) -> MovingFour {
+    return MovingFour(at(d, low), at(d, high));
 }
 
 // The times of a pair, in ticks.
@@ -66,7 +68,6 @@ fn bracket_of(candidate: Candidate) -> Bracket {
     if !pair.sizes.are_in_range {
         return found;
     }
-    var sizes = pair.sizes;
     var length = TICKS / 2u;
     for (var n = 0u; n < N_INTERVALS; n++) {
         // The first time by which any pair touches.
@@ -82,14 +83,8 @@ fn bracket_of(candidate: Candidate) -> Bracket {
             break;
         }
         let high = min(low + length, end);
-        var part: Polygon;
-        for (var k = 0u; k < 4u; k++) {
-            part.corners[k] = over(pair.polygon.corners[k], low, high);
-        }
-        for (var k = 0u; k < 3u; k++) {
-            part.edges[k] = over(pair.polygon.edges[k], low, high);
-        }
-        let decided = decide(&part, &sizes, pair.are_edges);
+        let part = Polygon(over(pair.polygon.corners, low, high), over(pair.polygon.edges, low, high));
+        let decided = decide(part, pair.sizes, pair.are_edges);
         if decided == FREE {
             found.free_until = high;
             length = 2u * length;

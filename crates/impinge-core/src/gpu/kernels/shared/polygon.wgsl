@@ -31,14 +31,6 @@ fn between(p: Moving, q: Moving) -> Moving {
     return Moving(p.start - q.start, p.end - q.end);
 }
 
-fn scaled(d: Moving, scale: f32) -> Moving {
-    return Moving(d.start * scale, d.end * scale);
-}
-
-fn opposite(d: Moving) -> Moving {
-    return Moving(-d.start, -d.end);
-}
-
 fn cross3(d: vec3<f32>, e: vec3<f32>) -> vec3<f32> {
     return vec3<f32>(d.y * e.z - d.z * e.y, d.z * e.x - d.x * e.z, d.x * e.y - d.y * e.x);
 }
@@ -58,66 +50,120 @@ fn crossed(d: Moving, e: Moving) -> Crossed {
     );
 }
 
-// The corners V_0 to V_3 of the difference polygon, and its edges from V_0, V_1 and V_2; a triangle repeats V_2.
+// Four vectors, by coordinate. Corners and edges are no arrays: those in a loop, which wgpu keeps compilers from unrolling, may be kept
+// outside of registers.
+struct Four {
+    x: vec4<f32>,
+    y: vec4<f32>,
+    z: vec4<f32>,
+}
+
+// Four vectors at the start and at the end.
+struct MovingFour {
+    start: Four,
+    end: Four,
+}
+
+fn four(a: vec3<f32>, b: vec3<f32>, c: vec3<f32>, d: vec3<f32>) -> Four {
+    return Four(vec4<f32>(a.x, b.x, c.x, d.x), vec4<f32>(a.y, b.y, c.y, d.y), vec4<f32>(a.z, b.z, c.z, d.z));
+}
+
+fn moving_four(a: Moving, b: Moving, c: Moving, d: Moving) -> MovingFour {
+    return MovingFour(four(a.start, b.start, c.start, d.start), four(a.end, b.end, c.end, d.end));
+}
+
+fn four_scaled(d: Four, scale: f32) -> Four {
+    return Four(d.x * scale, d.y * scale, d.z * scale);
+}
+
+// The product of a vector with each of four.
+fn dot_four(n: vec3<f32>, d: Four) -> vec4<f32> {
+    return n.x * d.x + n.y * d.y + n.z * d.z;
+}
+
+fn cross_four(d: Four, e: Four) -> Four {
+    return Four(d.y * e.z - d.z * e.y, d.z * e.x - d.x * e.z, d.x * e.y - d.y * e.x);
+}
+
+fn size_four(d: Four) -> vec4<f32> {
+    return max(max(abs(d.x), abs(d.y)), abs(d.z));
+}
+
+fn total(d: vec4<f32>, weight: f32) -> f32 {
+    return d.x + d.y + d.z + weight * d.w;
+}
+
+fn least(d: vec4<f32>) -> f32 {
+    return min(min(d.x, d.y), min(d.z, d.w));
+}
+
+fn most(d: vec4<f32>) -> f32 {
+    return max(max(d.x, d.y), max(d.z, d.w));
+}
+
+// The corners V_0 to V_3 of the difference polygon, and the edges from them; a triangle repeats the last of both.
 struct Polygon {
-    corners: array<Moving, 4>,
-    edges: array<Moving, 3>,
+    corners: MovingFour,
+    edges: MovingFour,
 }
 
 // Points p and a, b, c of a vertex and a face.
 fn triangle(p: Moving, a: Moving, b: Moving, c: Moving) -> Polygon {
-    let last = between(c, p);
+    let corner = between(c, p);
+    let edge = between(a, c);
     return Polygon(
-        array<Moving, 4>(between(a, p), between(b, p), last, last),
-        array<Moving, 3>(between(b, a), between(c, b), between(a, c)),
+        moving_four(between(a, p), between(b, p), corner, corner),
+        moving_four(between(b, a), between(c, b), edge, edge),
     );
 }
 
 // Points p, q and r, s of two edges.
 fn parallelogram(p: Moving, q: Moving, r: Moving, s: Moving) -> Polygon {
     return Polygon(
-        array<Moving, 4>(between(p, r), between(q, r), between(q, s), between(p, s)),
-        array<Moving, 3>(between(q, p), between(r, s), between(p, q)),
+        moving_four(between(p, r), between(q, r), between(q, s), between(p, s)),
+        moving_four(between(q, p), between(r, s), between(p, q), between(s, r)),
     );
 }
 
+fn scaled_four(d: MovingFour, scale: f32) -> MovingFour {
+    return MovingFour(four_scaled(d.start, scale), four_scaled(d.end, scale));
+}
+
 // Whether all corners at both ends are on one side of the plane through the origin across `direction`.
-fn are_aside(polygon: ptr<function, Polygon>, direction: vec3<f32>, bound: f32) -> bool {
-    var least = dot3(direction, (*polygon).corners[0].start);
-    var most = least;
-    for (var k = 0u; k < 4u; k++) {
-        let at_start = dot3(direction, (*polygon).corners[k].start);
-        let at_end = dot3(direction, (*polygon).corners[k].end);
-        least = min(least, min(at_start, at_end));
-        most = max(most, max(at_start, at_end));
-    }
-    return least > bound || most < -bound;
+fn are_aside(corners: MovingFour, direction: vec3<f32>, bound: f32) -> bool {
+    let at_start = dot_four(direction, corners.start);
+    let at_end = dot_four(direction, corners.end);
+    return least(min(at_start, at_end)) > bound || most(max(at_start, at_end)) < -bound;
 }
 
-// What is certain of w = N . (V x E): that all its coefficients are negative, or that all are positive.
-struct Side {
-    is_outside: bool,
-    is_inside: bool,
+// What is certain of w = N . (V x E) for each edge: that all its coefficients are negative, or that all are positive.
+struct Sides {
+    are_outside: vec4<bool>,
+    are_inside: vec4<bool>,
 }
 
-fn side_of(n: Crossed, corner: Moving, edge: Moving, bound: f32) -> Side {
-    let m = crossed(corner, edge);
-    let w_0 = dot3(n.first, m.first);
-    let w_1 = dot3(n.first, m.twice) + dot3(n.twice, m.first);
-    let w_2 = dot3(n.first, m.last) + dot3(n.twice, m.twice) + dot3(n.last, m.first);
-    let w_3 = dot3(n.twice, m.last) + dot3(n.last, m.twice);
-    let w_4 = dot3(n.last, m.last);
+fn sides_of(n: Crossed, corners: MovingFour, edges: MovingFour, bound: vec4<f32>) -> Sides {
+    let first = cross_four(corners.start, edges.start);
+    let one = cross_four(corners.start, edges.end);
+    let other = cross_four(corners.end, edges.start);
+    let twice = Four(one.x + other.x, one.y + other.y, one.z + other.z);
+    let last = cross_four(corners.end, edges.end);
+    let w_0 = dot_four(n.first, first);
+    let w_1 = dot_four(n.first, twice) + dot_four(n.twice, first);
+    let w_2 = dot_four(n.first, last) + dot_four(n.twice, twice) + dot_four(n.last, first);
+    let w_3 = dot_four(n.twice, last) + dot_four(n.last, twice);
+    let w_4 = dot_four(n.last, last);
     let next = NEXT * bound;
     let middle = MIDDLE * bound;
-    let is_outside = max(w_0, w_4) < -bound && max(w_1, w_3) < -next && w_2 < -middle;
-    let is_inside = min(w_0, w_4) > bound && min(w_1, w_3) > next && w_2 > middle;
-    return Side(is_outside, is_inside);
+    let are_outside = (max(w_0, w_4) < -bound) & (max(w_1, w_3) < -next) & (w_2 < -middle);
+    let are_inside = (min(w_0, w_4) > bound) & (min(w_1, w_3) > next) & (w_2 > middle);
+    return Sides(are_outside, are_inside);
 }
 
 // Sizes of corners and edges over the whole step, after scaling, with what rounded positions add.
 struct Sizes {
-    corners: array<f32, 4>,
-    edges: array<f32, 3>,
+    corners: vec4<f32>,
+    edges: vec4<f32>,
     // The largest of a corner.
     wide: f32,
     slack: f32,
@@ -127,34 +173,18 @@ struct Sizes {
 
 // Scales all differences. `narrowing`: by how much a difference may be wrong because positions were rounded.
 fn scale_all(polygon: ptr<function, Polygon>, narrowing: f32) -> Sizes {
-    var sizes = Sizes();
-    var widest = 0.0;
-    for (var k = 0u; k < 4u; k++) {
-        sizes.corners[k] = size_of((*polygon).corners[k]);
-        widest = max(widest, sizes.corners[k]);
-    }
-    var largest = widest;
-    for (var k = 0u; k < 3u; k++) {
-        sizes.edges[k] = size_of((*polygon).edges[k]);
-        largest = max(largest, sizes.edges[k]);
-    }
+    let corners = max(size_four((*polygon).corners.start), size_four((*polygon).corners.end));
+    let edges = max(size_four((*polygon).edges.start), size_four((*polygon).edges.end));
+    let widest = most(corners);
+    let largest = max(widest, most(edges));
     if largest < SMALLEST || largest < narrowing {
-        return sizes;
+        return Sizes();
     }
     let scale = bitcast<f32>((254u - (bitcast<u32>(largest) >> 23u)) << 23u);
     let slack = narrowing * scale;
-    for (var k = 0u; k < 4u; k++) {
-        (*polygon).corners[k] = scaled((*polygon).corners[k], scale);
-        sizes.corners[k] = sizes.corners[k] * scale + slack;
-    }
-    for (var k = 0u; k < 3u; k++) {
-        (*polygon).edges[k] = scaled((*polygon).edges[k], scale);
-        sizes.edges[k] = sizes.edges[k] * scale + slack;
-    }
-    sizes.wide = widest * scale + slack;
-    sizes.slack = slack;
-    sizes.are_in_range = true;
-    return sizes;
+    (*polygon).corners = scaled_four((*polygon).corners, scale);
+    (*polygon).edges = scaled_four((*polygon).edges, scale);
+    return Sizes(corners * scale + slack, edges * scale + slack, widest * scale + slack, slack, true);
 }
 
 // What is certain of two elements between the two ends of their polygon: nothing, that they do not touch, or that they do, at one time
@@ -163,33 +193,43 @@ const UNCLEAR: u32 = 0u;
 const FREE: u32 = 1u;
 const TOUCHES: u32 = 2u;
 
-fn decide(polygon: ptr<function, Polygon>, sizes: ptr<function, Sizes>, are_edges: bool) -> u32 {
-    let slack = (*sizes).slack;
-    let wide = (*sizes).wide;
+fn decide(polygon: Polygon, sizes: Sizes, are_edges: bool) -> u32 {
+    let slack = sizes.slack;
+    let wide = sizes.wide;
+    let corners = polygon.corners;
+    let edges = polygon.edges;
 
-    // Free along the sum of all corners.
-    var sum = vec3<f32>(0.0);
-    for (var k = 0u; k < 3u; k++) {
-        sum += (*polygon).corners[k].start + (*polygon).corners[k].end;
-    }
-    if are_edges {
-        sum += (*polygon).corners[3].start + (*polygon).corners[3].end;
-    }
-    if are_aside(polygon, sum, wide * (OF_SUM * wide + 32.0 * slack) + TINY) {
+    // Free along the sum of all corners. A triangle's last corner comes twice, and counts once.
+    let weight = select(0.0, 1.0, are_edges);
+    let sum = vec3<f32>(
+        total(corners.start.x + corners.end.x, weight),
+        total(corners.start.y + corners.end.y, weight),
+        total(corners.start.z + corners.end.z, weight),
+    );
+    if are_aside(corners, sum, wide * (OF_SUM * wide + 32.0 * slack) + TINY) {
         return FREE;
     }
 
     // Free along the normal at either end, or by the sign of f = N . V_0.
-    let first = (*polygon).edges[0];
-    let second = (*polygon).edges[1];
+    let first = Moving(
+        vec3<f32>(edges.start.x.x, edges.start.y.x, edges.start.z.x),
+        vec3<f32>(edges.end.x.x, edges.end.y.x, edges.end.z.x),
+    );
+    let second = Moving(
+        vec3<f32>(edges.start.x.y, edges.start.y.y, edges.start.z.y),
+        vec3<f32>(edges.end.x.y, edges.end.y.y, edges.end.z.y),
+    );
     let n = crossed(first, second);
-    let d = (*sizes).edges[0];
-    let e = (*sizes).edges[1];
+    let d = sizes.edges.x;
+    let e = sizes.edges.y;
     let bound = OF_CUBIC * (d * e * wide) + 4.0 * slack * (d * e + (d + e) * wide) + TINY;
-    if are_aside(polygon, n.first, bound) || are_aside(polygon, n.last, bound) {
+    if are_aside(corners, n.first, bound) || are_aside(corners, n.last, bound) {
         return FREE;
     }
-    let v = (*polygon).corners[0];
+    let v = Moving(
+        vec3<f32>(corners.start.x.x, corners.start.y.x, corners.start.z.x),
+        vec3<f32>(corners.end.x.x, corners.end.y.x, corners.end.z.x),
+    );
     let f_0 = dot3(n.first, v.start);
     let f_1 = dot3(n.first, v.end) + dot3(n.twice, v.start);
     let f_2 = dot3(n.twice, v.end) + dot3(n.last, v.start);
@@ -206,27 +246,13 @@ fn decide(polygon: ptr<function, Polygon>, sizes: ptr<function, Sizes>, are_edge
     // all the time.
     let falls = f_0 > bound && f_3 < -bound && (f_1 > inner || f_2 < -inner);
     let rises = f_0 < -bound && f_3 > bound && (f_1 < -inner || f_2 > inner);
-    var touches = falls || rises;
-    for (var k = 0u; k < 3u; k++) {
-        let c = (*sizes).corners[k];
-        let g = (*sizes).edges[k];
-        let w_bound = OF_QUARTIC * (d * e * c * g)
-            + 8.0 * slack * (d * e * (c + g) + c * g * (d + e)) + TINY;
-        let side = side_of(n, (*polygon).corners[k], (*polygon).edges[k], w_bound);
-        if side.is_outside {
-            return FREE;
-        }
-        touches = touches && side.is_inside;
+    let c = sizes.corners;
+    let g = sizes.edges;
+    let w_bound = OF_QUARTIC * (d * e * c * g) + 8.0 * slack * (d * e * (c + g) + c * g * (d + e)) + TINY;
+    let sides = sides_of(n, corners, edges, w_bound);
+    if any(sides.are_outside) {
+        return FREE;
     }
-    if are_edges {
-        // The last edge is the opposite of the second one.
-        let c = (*sizes).corners[3];
-        let w_bound = OF_QUARTIC * (d * e * c * e) + 8.0 * slack * (d * e * (c + e) + c * e * (d + e)) + TINY;
-        let side = side_of(n, (*polygon).corners[3], opposite(second), w_bound);
-        if side.is_outside {
-            return FREE;
-        }
-        touches = touches && side.is_inside;
-    }
+    let touches = (falls || rises) && all(sides.are_inside);
     return select(UNCLEAR, TOUCHES, touches);
 }
