@@ -862,8 +862,8 @@ fn damaged_kernels_are_noticed() {
         ),
         (
             "narrow_search",
-            "four_scaled(d.start, time_of(TICKS - time))",
-            "four_scaled(d.end, time_of(TICKS - time))",
+            "scaled_four(d.start, time_of(TICKS - time))",
+            "scaled_four(d.end, time_of(TICKS - time))",
         ),
         (
             "narrow_search",

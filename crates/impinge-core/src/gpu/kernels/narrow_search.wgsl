@@ -45,9 +45,7 @@ fn ticks_of(bits: u32) -> u32 {
 
 // Not `mix`, which a device may compute in other ways.
 fn at(d: MovingFour, time: u32) -> Four {
-    let start = four_scaled(d.start, time_of(TICKS - time));
-    let end = four_scaled(d.end, time_of(time));
-    return Four(start.x + end.x, start.y + end.y, start.z + end.z);
+    return sum_four(scaled_four(d.start, time_of(TICKS - time)), scaled_four(d.end, time_of(time)));
 }
 
 fn over(d: MovingFour, low: u32, high: u32) -> MovingFour {

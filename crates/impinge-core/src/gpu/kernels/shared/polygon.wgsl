@@ -23,10 +23,6 @@ struct Moving {
     end: vec3<f32>,
 }
 
-fn size_of(d: Moving) -> f32 {
-    return max(size(d.start), size(d.end));
-}
-
 fn between(p: Moving, q: Moving) -> Moving {
     return Moving(p.start - q.start, p.end - q.end);
 }
@@ -72,8 +68,24 @@ fn moving_four(a: Moving, b: Moving, c: Moving, d: Moving) -> MovingFour {
     return MovingFour(four(a.start, b.start, c.start, d.start), four(a.end, b.end, c.end, d.end));
 }
 
-fn four_scaled(d: Four, scale: f32) -> Four {
+fn first_of(d: MovingFour) -> Moving {
+    return Moving(vec3<f32>(d.start.x.x, d.start.y.x, d.start.z.x), vec3<f32>(d.end.x.x, d.end.y.x, d.end.z.x));
+}
+
+fn second_of(d: MovingFour) -> Moving {
+    return Moving(vec3<f32>(d.start.x.y, d.start.y.y, d.start.z.y), vec3<f32>(d.end.x.y, d.end.y.y, d.end.z.y));
+}
+
+fn sum_four(d: Four, e: Four) -> Four {
+    return Four(d.x + e.x, d.y + e.y, d.z + e.z);
+}
+
+fn scaled_four(d: Four, scale: f32) -> Four {
     return Four(d.x * scale, d.y * scale, d.z * scale);
+}
+
+fn scaled_moving(d: MovingFour, scale: f32) -> MovingFour {
+    return MovingFour(scaled_four(d.start, scale), scaled_four(d.end, scale));
 }
 
 // The product of a vector with each of four.
@@ -125,10 +137,6 @@ fn parallelogram(p: Moving, q: Moving, r: Moving, s: Moving) -> Polygon {
     );
 }
 
-fn scaled_four(d: MovingFour, scale: f32) -> MovingFour {
-    return MovingFour(four_scaled(d.start, scale), four_scaled(d.end, scale));
-}
-
 // Whether all corners at both ends are on one side of the plane through the origin across `direction`.
 fn are_aside(corners: MovingFour, direction: vec3<f32>, bound: f32) -> bool {
     let at_start = dot_four(direction, corners.start);
@@ -144,9 +152,7 @@ struct Sides {
 
 fn sides_of(n: Crossed, corners: MovingFour, edges: MovingFour, bound: vec4<f32>) -> Sides {
     let first = cross_four(corners.start, edges.start);
-    let one = cross_four(corners.start, edges.end);
-    let other = cross_four(corners.end, edges.start);
-    let twice = Four(one.x + other.x, one.y + other.y, one.z + other.z);
+    let twice = sum_four(cross_four(corners.start, edges.end), cross_four(corners.end, edges.start));
     let last = cross_four(corners.end, edges.end);
     let w_0 = dot_four(n.first, first);
     let w_1 = dot_four(n.first, twice) + dot_four(n.twice, first);
@@ -180,10 +186,10 @@ fn scale_all(polygon: ptr<function, Polygon>, narrowing: f32) -> Sizes {
     if largest < SMALLEST || largest < narrowing {
         return Sizes();
     }
-    let scale = bitcast<f32>((254u - (bitcast<u32>(largest) >> 23u)) << 23u);
+    let scale = scale_of(largest);
     let slack = narrowing * scale;
-    (*polygon).corners = scaled_four((*polygon).corners, scale);
-    (*polygon).edges = scaled_four((*polygon).edges, scale);
+    (*polygon).corners = scaled_moving((*polygon).corners, scale);
+    (*polygon).edges = scaled_moving((*polygon).edges, scale);
     return Sizes(corners * scale + slack, edges * scale + slack, widest * scale + slack, slack, true);
 }
 
@@ -211,25 +217,14 @@ fn decide(polygon: Polygon, sizes: Sizes, are_edges: bool) -> u32 {
     }
 
     // Free along the normal at either end, or by the sign of f = N . V_0.
-    let first = Moving(
-        vec3<f32>(edges.start.x.x, edges.start.y.x, edges.start.z.x),
-        vec3<f32>(edges.end.x.x, edges.end.y.x, edges.end.z.x),
-    );
-    let second = Moving(
-        vec3<f32>(edges.start.x.y, edges.start.y.y, edges.start.z.y),
-        vec3<f32>(edges.end.x.y, edges.end.y.y, edges.end.z.y),
-    );
-    let n = crossed(first, second);
+    let n = crossed(first_of(edges), second_of(edges));
     let d = sizes.edges.x;
     let e = sizes.edges.y;
     let bound = OF_CUBIC * (d * e * wide) + 4.0 * slack * (d * e + (d + e) * wide) + TINY;
     if are_aside(corners, n.first, bound) || are_aside(corners, n.last, bound) {
         return FREE;
     }
-    let v = Moving(
-        vec3<f32>(corners.start.x.x, corners.start.y.x, corners.start.z.x),
-        vec3<f32>(corners.end.x.x, corners.end.y.x, corners.end.z.x),
-    );
+    let v = first_of(corners);
     let f_0 = dot3(n.first, v.start);
     let f_1 = dot3(n.first, v.end) + dot3(n.twice, v.start);
     let f_2 = dot3(n.twice, v.end) + dot3(n.last, v.start);
