@@ -14,9 +14,8 @@ mod view;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::{Args, Parser, Subcommand};
 use impinge::{Backend, Method, SharedVertex};
-use impinge_fem::scenes::SceneName;
 
 use crate::commands::{
     CHECK_EXAMPLES, CheckArgs, CheckWorkerArgs, FIX_EXAMPLES, FixArgs, TILES_EXAMPLES, TilesArgs,
@@ -63,7 +62,6 @@ Examples:
   impinge fix part.stl --out mended.ply         mend what can be mended without moving a vertex
   impinge sequence body.ply run.pc2 --self      the pairs of every frame of an animation
   impinge step cloth_0.ply cloth_1.ply          does anything touch on the way, and when first
-  impinge simulate blocks --out out/blocks      bodies that fall, deform and collide
 
 Exit codes: 0 done, 2 bad usage, 3 pairs or contacts were found and --fail-on-hit was given,
 4 the start of a step already intersects, 130 stopped by Ctrl-C (128 and the signal's number), 1 any other error
@@ -124,9 +122,6 @@ pub enum Command {
         override_usage = "impinge step [OPTIONS] <START> <END> [<START> <END>]..."
     )]
     Step(StepArgs),
-    /// Simulate an elastic body that drops on another one, and write every step
-    #[command(after_help = SIMULATE_EXAMPLES)]
-    Simulate(SimulateArgs),
     /// Check meshes for self-intersections, degenerate faces, borders, …
     #[command(after_help = CHECK_EXAMPLES)]
     Check(CheckArgs),
@@ -237,16 +232,6 @@ Examples:
 FRAMES is a .pc2 or .mdd file, the first of numbered mesh files, or a pattern of their names.
 Without --other, the pairs within the body are found; with it, those between bodies, and with --self both. The last line
 says which.";
-
-const SIMULATE_EXAMPLES: &str = "\
-Examples:
-  impinge simulate blocks --out out/blocks
-  impinge simulate bunny-7k --out out/bunny --format vtu
-  impinge simulate bunny-7k --out out/bunny --format vtu --resume
-
-Corotated finite elements on tetrahedra; contact forces come from the pairs found. Ctrl-C saves
-the state and stops; --resume continues and gives the same bits as a run that was never stopped.
-If the mesh of a scene is absent, a generated ball stands in, and the first line says so.";
 
 /// Options of the detector.
 #[derive(Debug, Clone, Args)]
@@ -499,38 +484,6 @@ pub struct SequenceArgs {
     pub picture: PictureArgs,
     #[command(flatten)]
     pub detector: DetectorArgs,
-}
-
-#[derive(Debug, Args)]
-pub struct SimulateArgs {
-    /// The scene: two bodies, one dropped on the other
-    #[arg(value_parser = choices::scene(), value_name = "SCENE")]
-    pub scene: SceneName,
-    /// The folder for all files
-    #[arg(long, value_name = "FOLDER")]
-    pub out: PathBuf,
-    /// Time steps [default: 240]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
-    pub steps: Option<u32>,
-    /// The format of the sequence
-    #[arg(long, value_enum, default_value_t = SequenceFormatArg::Pc2)]
-    pub format: SequenceFormatArg,
-    /// Continue from the state saved in the folder; start a new run if there is none
-    #[arg(long)]
-    pub resume: bool,
-    #[command(flatten)]
-    pub detector: DetectorArgs,
-}
-
-/// The format of a simulated sequence.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum SequenceFormatArg {
-    /// One mesh (.ply), its positions (.pc2), and a table of colliding elements
-    Pc2,
-    /// One VTU file per step, with a field `colliding`
-    Vtu,
-    /// One PLY file per step with colliding tetrahedra coloured
-    Ply,
 }
 
 #[derive(Debug, Args)]

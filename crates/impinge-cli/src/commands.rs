@@ -11,11 +11,9 @@ mod distance;
 mod fix;
 mod near;
 mod probe;
-mod record;
 mod render;
 mod safe;
 mod sequence;
-mod simulate;
 mod step;
 mod tiles;
 #[cfg(feature = "view")]
@@ -34,7 +32,6 @@ pub use probe::probe;
 pub use render::render;
 pub use safe::safe;
 pub use sequence::sequence;
-pub use simulate::simulate;
 pub use step::step;
 pub use tiles::{TILES_EXAMPLES, TilesArgs, tiles};
 #[cfg(feature = "view")]

@@ -50,22 +50,6 @@ pub enum Error {
     /// The detection failed, or was cancelled.
     #[error(transparent)]
     Detection(#[from] impinge::Error),
-    /// The simulation could not be set up or continue, or was cancelled.
-    #[error(transparent)]
-    Simulation(#[from] impinge_fem::Error),
-    /// A saved state that is damaged or belongs to another simulation.
-    #[error("{}: {source}", printable(.path))]
-    SavedState {
-        path: PathBuf,
-        source: impinge_fem::Error,
-    },
-    /// A simulation was stopped, and has saved its state.
-    #[error("stopped after step {step} of {n_steps}; --resume continues in {}", printable(.folder))]
-    Stopped {
-        step: u64,
-        n_steps: u64,
-        folder: PathBuf,
-    },
     /// A file of an earlier run could not be read.
     #[error("{}: cannot read: {source}", printable(.path))]
     Read { path: PathBuf, source: io::Error },
@@ -125,9 +109,7 @@ impl Error {
         matches!(
             self,
             Error::Detection(impinge::Error::Cancelled)
-                | Error::Simulation(impinge_fem::Error::Detection(impinge::Error::Cancelled))
                 | Error::Tiles(impinge_tiles::Error::Cancelled)
-                | Error::Stopped { .. }
         )
     }
 

@@ -45,7 +45,6 @@ fn main() -> ExitCode {
         Command::Within(args) => commands::within(&args, &cancel),
         Command::Sequence(args) => commands::sequence(&args, &cancel),
         Command::Step(args) => commands::step(&args, &cancel),
-        Command::Simulate(args) => commands::simulate(&args, &cancel),
         Command::Check(args) => commands::check(&args, &cancel),
         Command::Fix(args) => commands::fix(&args),
         Command::CheckWorker(args) => commands::check_worker(&args),

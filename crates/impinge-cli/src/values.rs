@@ -113,17 +113,6 @@ pub enum MeshFormat {
     Vtu,
 }
 
-impl MeshFormat {
-    /// The extension of files of this format.
-    pub fn extension(self) -> &'static str {
-        match self {
-            MeshFormat::Ply => "ply",
-            MeshFormat::Glb => "glb",
-            MeshFormat::Vtu => "vtu",
-        }
-    }
-}
-
 impl FromStr for MeshFile {
     type Err = String;
 

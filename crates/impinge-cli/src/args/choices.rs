@@ -4,7 +4,6 @@ use clap::ValueEnum;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use impinge::{Backend, Hit, Method, PairKind, Precision, SharedVertex, Start};
 use impinge_check::Repair;
-use impinge_fem::scenes::SceneName;
 
 /// Reads one of some words.
 fn one_of<T: Copy + Send + Sync + 'static>(
@@ -90,13 +89,6 @@ words! {
         CloseHoles: "Holes of up to --close-holes edges are closed",
         Outward: "Closed shells are turned outward, cavities inward",
         Unused: "Vertices of no face go",
-    }
-    scene: SceneName {
-        Bunny7k: "Two bunnies of 7,356 tetrahedra",
-        Bunny19k: "Two bunnies of 19,379 tetrahedra",
-        Dragon8k: "Two dragons of 8,408 tetrahedra",
-        Dragon15k: "Two dragons of 15,047 tetrahedra",
-        Blocks: "Two blocks of 1,296 tetrahedra",
     }
 }
 

@@ -21,7 +21,6 @@ mod schema;
 mod sequence;
 mod shared_data;
 mod signals;
-mod simulate;
 mod step;
 mod tiles;
 mod usage;

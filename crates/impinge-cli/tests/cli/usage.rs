@@ -108,7 +108,6 @@ fn shared_options_are_explained_once() {
     }
     for command in [
         "pairs", "self", "near", "safe", "probe", "cast", "sequence", "step", "check", "render",
-        "simulate",
     ] {
         for help in [folder.run([command, "--help"]), folder.run([command, "-h"])] {
             let help = help.printed();

@@ -1,9 +1,7 @@
-//! Writing coloured meshes and point caches. Except for [`GrowingPc2`], a file gets its name only
-//! when it is complete.
+//! Writing coloured meshes and point caches. A file gets its name only when it is complete.
 
 mod atomic;
 mod glb;
-mod growing;
 mod obj;
 mod pc2;
 mod ply;
@@ -14,7 +12,6 @@ mod vtu;
 
 pub use atomic::{AtomicFile, remove_temporary_files};
 pub use glb::write_glb;
-pub use growing::GrowingPc2;
 pub use obj::write_obj;
 pub use pc2::Pc2Writer;
 pub use ply::write_ply;

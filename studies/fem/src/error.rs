@@ -99,9 +99,14 @@ pub enum Error {
         /// The most that can be held.
         limit: usize,
     },
-    /// A saved state that is damaged or belongs to another simulation.
-    #[error("saved state: {0}")]
-    State(String),
+    /// The folder for files could not be made.
+    #[error("{path}: cannot be made: {source}")]
+    Folder {
+        /// Its path.
+        path: String,
+        /// The system's error.
+        source: std::io::Error,
+    },
     /// The threads of the pool could not be started.
     #[error("thread pool: {0}")]
     Threads(String),

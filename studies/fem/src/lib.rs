@@ -1,5 +1,5 @@
-//! Elastic solids of tetrahedra that deform, collide and push each other: a source of large
-//! deformations for collision detection, and an example of its use.
+//! Elastic solids of tetrahedra that deform, collide and push each other: the large deformations of
+//! the paper's table 2 and figure 6.
 //!
 //! * **Elasticity** is linear in a frame that turns with each element (corotated: Müller & Gross,
 //!   "Interactive virtual materials", 2004) and recovers from inversion (signed singular values:
@@ -35,11 +35,9 @@ mod settings;
 mod simulation;
 mod solid;
 mod solver;
-mod state;
 
 pub use error::Error;
 pub use rotation::rotation;
 pub use settings::{Damping, Ground, Settings};
 pub use simulation::{Energy, Simulation, StepReport};
 pub use solid::{Material, Solid};
-pub use state::State;

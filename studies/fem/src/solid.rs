@@ -199,11 +199,7 @@ impl Solid {
 }
 
 /// Refuses the first vector that is not finite.
-pub(crate) fn check_finite(
-    solid: usize,
-    what: &'static str,
-    values: &[[f64; 3]],
-) -> Result<(), Error> {
+fn check_finite(solid: usize, what: &'static str, values: &[[f64; 3]]) -> Result<(), Error> {
     let bad = values
         .iter()
         .position(|value| value.iter().any(|x| !x.is_finite()));

@@ -1,8 +1,9 @@
 //! The simulation loop: detection, then a step of backward Euler.
 
+use std::time::Instant;
+
 use impinge::{BodyId, Detector, Pairs, Query, Scene, Stats};
 use rayon::prelude::*;
-use web_time::Instant;
 
 use crate::contact::{Couplings, Now, numbered, outward_directions};
 use crate::elasticity::{GRAIN, Turned, energy, forces, turn};
@@ -11,9 +12,8 @@ use crate::error::Error;
 use crate::matrix::BlockMatrix;
 use crate::mesh::Mesh;
 use crate::settings::Settings;
-use crate::solid::{Solid, check_finite};
+use crate::solid::Solid;
 use crate::solver::{Scratch, Solved, System};
-use crate::state::{State, fingerprint};
 
 /// Elastic solids in contact, moved by backward Euler.
 ///
@@ -47,7 +47,6 @@ pub struct Simulation {
     mesh: Mesh,
     settings: Settings,
     pool: rayon::ThreadPool,
-    fingerprint: u64,
     scene: Scene,
     bodies: Vec<BodyId>,
     query: Query,
@@ -149,7 +148,6 @@ impl Simulation {
         }
         Ok(Simulation {
             matrix: BlockMatrix::new(&mesh),
-            fingerprint: fingerprint(solids, &settings),
             query: if settings.self_contact {
                 Query::all()
             } else {
@@ -357,45 +355,6 @@ impl Simulation {
             }
         }
         Ok(())
-    }
-
-    /// The current state, from which a simulation can continue later.
-    pub fn state(&self) -> State {
-        State {
-            fingerprint: self.fingerprint,
-            step: self.step,
-            positions: self.positions(),
-            velocities: self.velocities(),
-        }
-    }
-
-    /// Continues from a state of a simulation of the same solids with the same settings; the number
-    /// of threads may differ. The following steps give the same bits as they would have given
-    /// there.
-    ///
-    /// # Errors
-    /// [`Error::State`] for a state of another simulation; [`Error::NotFinite`].
-    pub fn restore(&mut self, state: &State) -> Result<(), Error> {
-        let n_vertices = self.mesh.n_vertices();
-        if state.fingerprint != self.fingerprint || state.positions.len() != n_vertices {
-            return Err(Error::State(
-                "it belongs to other solids or other settings".to_owned(),
-            ));
-        }
-        for part in &self.mesh.parts {
-            let (solid, _) = self.mesh.locate(part.vertices.start);
-            for (what, values) in [
-                ("position", &state.positions),
-                ("velocity", &state.velocities),
-            ] {
-                check_finite(solid, what, &values[part.vertices.clone()])?;
-            }
-        }
-        let vectors = |values: &[[f64; 3]]| values.iter().map(|&v| v.into()).collect();
-        self.step = state.step;
-        self.positions = vectors(&state.positions);
-        self.velocities = vectors(&state.velocities);
-        self.show()
     }
 
     fn now<'a>(&'a self, outward: &'a [Vec3]) -> Now<'a> {
