@@ -196,6 +196,7 @@ Examples:
   impinge pairs a.ply b.ply c.ply --exclude 0,1 --out seen.glb
   impinge pairs a.ply b.ply c.ply --between 0,2
   impinge pairs a.ply b.ply --curves curves.obj --contacts contacts.csv
+  impinge pairs a.ply b.ply --regions regions.csv   how deep, and the volume in common
   impinge pairs machine.glb                     the nodes of one file with each other
   impinge pairs a.glb b.obj --bodies nodes      each node of a.glb, and all of b.obj";
 
@@ -351,6 +352,10 @@ pub struct AnswerArgs {
     /// Write the curves in which surfaces cross (.ply, .obj or .vtu)
     #[arg(long, value_name = "FILE")]
     pub curves: Option<CurvesFile>,
+    /// Write where surfaces overlap and how deep, one row per region (.csv, .jsonl, .npy or
+    /// .parquet)
+    #[arg(long, value_name = "FILE")]
+    pub regions: Option<RowsFile>,
     /// Write the meshes with colliding elements coloured (.ply, .glb or .vtu)
     #[arg(long, value_name = "FILE")]
     pub out: Option<MeshFile>,
@@ -370,7 +375,10 @@ impl AnswerArgs {
         let curves = curves.map(|file| ("--curves", file.path.as_path()));
         let out = self.out.as_ref().map(|file| ("--out", file.path.as_path()));
         let png = self.png.as_ref().map(|file| ("--png", file.0.as_path()));
-        [contacts, curves, out, png].into_iter().flatten().collect()
+        let regions = self.regions.as_ref();
+        let regions = regions.map(|file| ("--regions", file.path.as_path()));
+        let all = [contacts, curves, regions, out, png];
+        all.into_iter().flatten().collect()
     }
 }
 

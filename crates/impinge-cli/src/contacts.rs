@@ -1,6 +1,9 @@
-//! Contact geometry as files: corners as rows, curves as polylines.
+//! Contact geometry as files: corners and regions as rows, curves as polylines.
 
-use impinge::contact::{Contacts, Curves, Feature, Shape};
+use std::collections::BTreeSet;
+
+use impinge::contact::{Contacts, Curves, Feature, Region, Shape};
+use impinge::{BodyId, Detector, Scene};
 use impinge_io::{
     Cell, Column, ELEMENTS, Holds, Polylines, write_polylines_obj, write_polylines_ply,
     write_polylines_vtu,
@@ -81,6 +84,96 @@ pub fn write_curves(file: &CurvesFile, contacts: &Contacts, curves: &Curves) -> 
         CurvesFormat::Vtu => write_polylines_vtu(&file.path, &lines)?,
     }
     Ok(())
+}
+
+/// Writes one row per region: of two closed bodies with what is inside, how deep, and the volume.
+pub fn write_regions(
+    file: &RowsFile,
+    detector: &mut Detector,
+    scene: &Scene,
+    bodies: &[(BodyId, &str)],
+    contacts: &Contacts,
+) -> Result<(), Error> {
+    let columns = vec![
+        Column::new("body_a", Holds::U32),
+        Column::new("body_b", Holds::U32),
+        Column::new("contacts", Holds::U32),
+        Column::new("position", Holds::Point(["x", "y", "z"])),
+        Column::new("low", Holds::Point(["low_x", "low_y", "low_z"])),
+        Column::new("high", Holds::Point(["high_x", "high_y", "high_z"])),
+        Column::new("length", Holds::F64),
+        Column::new("patch_area", Holds::F64),
+        Column::new("area", Holds::Point(["area_x", "area_y", "area_z"])),
+        Column::new("nx", Holds::F64).or_none(),
+        Column::new("ny", Holds::F64).or_none(),
+        Column::new("nz", Holds::F64).or_none(),
+        Column::new("depth", Holds::F64).or_none(),
+        Column::new("volume", Holds::F64).or_none(),
+        Column::new("inside_a", Holds::U32),
+        Column::new("inside_b", Holds::U32),
+    ];
+    let regions = overlaps(detector, scene, bodies, contacts)?;
+    let rows = regions.iter().map(|region| {
+        let [a, b] = region.bodies.map(Cell::Number);
+        let [low, high] = region.bounds.map(Cell::Point);
+        let [nx, ny, nz] = match region.normal {
+            Some(normal) => normal.map(Cell::Float),
+            None => [Cell::None; 3],
+        };
+        let or_none = |number: Option<f64>| number.map_or(Cell::None, Cell::Float);
+        let [in_a, in_b] = region
+            .inside
+            .each_ref()
+            .map(|inside| rows::number(inside.len()));
+        [
+            a,
+            b,
+            rows::number(region.contacts.len()),
+            Cell::Point(region.position),
+            low,
+            high,
+            Cell::Float(region.length),
+            Cell::Float(region.patch_area),
+            Cell::Point(region.area),
+            nx,
+            ny,
+            nz,
+            or_none(region.depth),
+            or_none(region.volume),
+            in_a,
+            in_b,
+        ]
+    });
+    rows::write(file, columns, regions.len(), rows)
+}
+
+/// The regions of all contacts, by their bodies.
+fn overlaps(
+    detector: &mut Detector,
+    scene: &Scene,
+    bodies: &[(BodyId, &str)],
+    contacts: &Contacts,
+) -> Result<Vec<Region>, Error> {
+    let plain = contacts.regions()?;
+    let met: BTreeSet<[u32; 2]> = plain.iter().map(|region| region.bodies).collect();
+    let mut all = Vec::new();
+    for pair in met {
+        let [a, b] = pair.map(|number| bodies[number as usize].0);
+        let inside = match a == b {
+            true => None,
+            false => match detector.penetration(scene, contacts, a, b) {
+                Ok(found) => Some(found.regions),
+                // Only what is closed has an inside.
+                Err(impinge::Error::NotClosed { .. }) => None,
+                Err(error) => return Err(error.into()),
+            },
+        };
+        match inside {
+            Some(regions) => all.extend(regions),
+            None => all.extend(plain.iter().filter(|of| of.bodies == pair).cloned()),
+        }
+    }
+    Ok(all)
 }
 
 /// A summary of contacts for the terminal.

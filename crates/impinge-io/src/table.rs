@@ -72,7 +72,7 @@ pub enum Cell<'a> {
     Text(&'a str),
     /// Of [`Holds::Line`].
     Line(&'a str),
-    /// Nothing, in a column that [may have none](Column::or_none).
+    /// Nothing, in a column that [may have none](Column::or_none); NaN in arrays.
     None,
     /// Of [`Holds::Word`].
     Word(u8, &'a str),
@@ -140,7 +140,7 @@ impl Column {
         }
     }
 
-    /// The same, where rows may have nothing. Not in arrays.
+    /// The same, where rows may have nothing. In arrays only of [`Holds::F64`].
     pub const fn or_none(self) -> Self {
         Column {
             may_be_none: true,
@@ -163,10 +163,12 @@ impl Table {
     /// If the format is that of arrays, and a column holds text of any length or may have none.
     pub fn new(format: TableFormat, columns: impl Into<Vec<Column>>) -> Self {
         let columns = columns.into();
-        let is_array = |column: &Column| column.holds != Holds::Line && !column.may_be_none;
+        let is_array = |column: &Column| {
+            column.holds != Holds::Line && (!column.may_be_none || column.holds == Holds::F64)
+        };
         assert!(
             format != TableFormat::Npy || columns.iter().all(is_array),
-            "columns of text or with nothing are not in arrays"
+            "columns of text are not in arrays, and only numbers may be nothing"
         );
         Table { format, columns }
     }
@@ -296,7 +298,8 @@ fn put(to: &mut dyn Write, holds: Holds, cell: Cell<'_>) -> io::Result<()> {
             to.write_all(&[kind])?;
             to.write_all(numbers.map(u32::to_le_bytes).as_flattened())
         }
-        (Cell::Line(_) | Cell::None, _) => unreachable!("Table::new refuses it in arrays"),
+        (Cell::None, _) => to.write_all(&f64::NAN.to_le_bytes()),
+        (Cell::Line(_), _) => unreachable!("Table::new refuses it in arrays"),
     }
 }
 

@@ -35,7 +35,7 @@ those of body 1 blue, then green, orange, …; hidden ones show through faintly.
     },
     Topic {
         name: "rows",
-        about: "Files of rows, one per pair that is found: --rows, --candidates, --contacts",
+        about: "Files of rows, one per pair that is found: --rows, --candidates, --contacts, --regions",
         options: RowsArgs::augment_args,
         text: "\
 Without --rows-format the name of the file decides: .csv, .jsonl, .npy or .parquet; standard output is CSV. If the rows go to
@@ -62,12 +62,17 @@ Columns of numbers alone are a plain array in .npy files, others a structured on
   them: see --memory-budget
 --contacts of `pairs` and `self`: one row per corner of the intersection of two triangles, which is a point, the
   two ends of a segment, or the corners of a polygon if both lie in one plane. feature_a and feature_b say
-  where the corner lies in each triangle: on vertex 7 (v7), edge 7-9 (e7-9) or face 3 (f3).",
+  where the corner lies in each triangle: on vertex 7 (v7), edge 7-9 (e7-9) or face 3 (f3).
+--regions of `pairs` and `self`: body_a, body_b, contacts, x, y, z, low_x, …, high_z, length, patch_area, area_x, area_y,
+  area_z, nx, ny, nz, depth, volume, inside_a, inside_b. A region is connected contacts of two bodies: how many, its
+  middle, its box, the length of its curves, the area in common planes, the area that the curves span. Push body a along
+  (nx, ny, nz), and the overlap shrinks fastest; by depth, and it is gone. Of two closed surfaces also the volume in
+  common, and how many vertices of each are inside the other. What is not known is empty, in .npy files NaN.",
     },
 ];
 
 /// Options that write rows, whichever command has them.
-const ROWS: [&str; 4] = ["rows", "rows_format", "candidates", "contacts"];
+const ROWS: [&str; 5] = ["rows", "rows_format", "candidates", "contacts", "regions"];
 
 /// Reads the command line. Prints help, or an error of usage, and ends the program if that is all
 /// there is to do.

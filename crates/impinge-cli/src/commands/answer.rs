@@ -63,9 +63,11 @@ fn answer(
         inputs.check(option, path)?;
     }
     let rows_file = answer.rows.file(&inputs, ask.json)?;
-    if answer.contacts.as_ref().is_some_and(RowsFile::is_stdout) {
-        let text = "--contacts: contacts are written to files";
-        return Err(Error::Usage(text.to_owned()));
+    for (option, file) in [("contacts", &answer.contacts), ("regions", &answer.regions)] {
+        if file.as_ref().is_some_and(RowsFile::is_stdout) {
+            let text = format!("--{option}: {option} are written to files");
+            return Err(Error::Usage(text));
+        }
     }
     let holds_no_pairs = answer.count || answer.any;
     let is_one_frame = answer.repeat.get() == 1;
@@ -155,7 +157,8 @@ fn answer(
     if let Some(file) = &answer.out {
         meshes::write(file, &scene, &bodies, pairs)?;
     }
-    let met = if answer.contacts.is_some() || answer.curves.is_some() {
+    let wants_contacts = answer.contacts.is_some() || answer.curves.is_some();
+    let met = if wants_contacts || answer.regions.is_some() {
         let contacts = detector.contacts(&scene, pairs)?;
         let curves = contacts.curves()?;
         Some((contacts, curves))
@@ -168,6 +171,9 @@ fn answer(
         }
         if let Some(file) = &answer.curves {
             contacts::write_curves(file, found, curves)?;
+        }
+        if let Some(file) = &answer.regions {
+            contacts::write_regions(file, &mut detector, &scene, &bodies, found)?;
         }
     }
     let regions = regions::regions(&scene, &bodies, pairs)?;

@@ -129,3 +129,70 @@ fn distances_are_told() {
     let misuse = folder.run(["distance", "a.ply", "b.ply", "--below", "-1"]);
     assert!(misuse.misuse().contains("not below 0"));
 }
+
+#[test]
+fn regions_say_how_deep_and_how_much() {
+    let folder = Folder::new();
+    folder.ply("a.ply", &cube([0.0; 3], 1.0));
+    folder.ply("b.ply", &cube([0.75, 0.25, 0.125], 1.0));
+    // A sheet with a border, all through a: it has no inside.
+    folder.text(
+        "sheet.obj",
+        "v -2 -2 0.25\nv 4 -2 0.25\nv -2 4 0.25\nf 1 2 3\n",
+    );
+    let csv = |args: &[&str]| -> Vec<Vec<String>> {
+        let mut all = vec!["pairs"];
+        all.extend(args);
+        folder
+            .run(all.into_iter().chain(["--regions", "regions.csv"]))
+            .printed();
+        let text = std::fs::read_to_string(folder.path("regions.csv")).unwrap();
+        let fields = |line: &str| line.split(',').map(str::to_owned).collect();
+        text.lines().map(fields).collect()
+    };
+    let rows = csv(&["a.ply", "b.ply"]);
+    let column = |name: &str| rows[0].iter().position(|own| own == name).unwrap();
+    assert_eq!(rows.len(), 2);
+    let number = |name: &str| rows[1][column(name)].parse::<f64>().unwrap();
+    assert_eq!([number("body_a"), number("body_b")], [0.0, 1.0]);
+    assert!(
+        (number("volume") - 0.25 * 0.75 * 0.875).abs() < 1e-12,
+        "{rows:?}"
+    );
+    assert_eq!([number("inside_a"), number("inside_b")], [1.0, 1.0]);
+    assert_eq!([number("low_x"), number("high_x")], [0.25, 0.5]);
+    // a is to go where b is not, and then nothing overlaps.
+    assert!(number("nx") < -0.8, "{rows:?}");
+    let depth = number("depth");
+    assert!(depth > 0.25 && depth < 0.75, "{depth}");
+    let moved: [f64; 3] = ["nx", "ny", "nz"].map(|axis| number(axis) * depth * 1.000_001);
+    let apart = cube(moved.map(|x| x as f32), 1.0);
+    folder.ply("apart.ply", &apart);
+    let printed = folder.run(["pairs", "apart.ply", "b.ply"]).printed();
+    assert!(printed.contains(": no pairs"), "{printed}");
+
+    let rows = csv(&["a.ply", "sheet.obj"]);
+    assert_eq!(rows.len(), 2);
+    for name in ["depth", "volume"] {
+        assert_eq!(rows[1][column(name)], "", "{rows:?}");
+    }
+    assert_eq!(rows[1][column("length")], "4.0");
+    let args = ["pairs", "a.ply", "sheet.obj", "--regions"];
+    let run = |file: &str| {
+        folder
+            .run(args.into_iter().chain([file, "--json"]))
+            .printed()
+    };
+    run("regions.jsonl");
+    let text = std::fs::read_to_string(folder.path("regions.jsonl")).unwrap();
+    let object: Value = serde_json::from_str(&text).unwrap();
+    assert_eq!(object["volume"], Value::Null);
+    assert_eq!(object["position"].as_array().unwrap().len(), 3);
+    // In arrays what is not known is not a number.
+    run("regions.npy");
+    let npy = std::fs::read(folder.path("regions.npy")).unwrap();
+    let nan = f64::NAN.to_le_bytes();
+    assert_eq!(npy[npy.len() - 16..npy.len() - 8], nan, "the volume");
+    let said = folder.run(args.into_iter().chain(["-"])).misuse();
+    assert!(said.contains("--regions: regions are written to files"));
+}
