@@ -3,6 +3,7 @@
 mod apart;
 mod args;
 mod asked;
+mod colors;
 mod commands;
 mod contacts;
 mod detection;

@@ -5,14 +5,15 @@ use std::path::PathBuf;
 use clap::Args;
 use impinge::PairKind;
 
-use super::{AskArgs, DetectorArgs, RowsArgs, kind};
-use crate::values::{body_length, distance, two_bodies};
+use super::{AskArgs, DetectorArgs, PictureArgs, RowsArgs, kind};
+use crate::values::{MeshFile, PngFile, body_length, distance, two_bodies};
 
 pub const NEAR_EXAMPLES: &str = "\
 Examples:
   impinge near a.obj b.obj --distance 0.01                which elements are within 0.01 of each other?
   impinge near cloth.ply --distance 0.002                 of one mesh: parts that do not share a vertex
   impinge near a.ply b.ply --distance 0.01 --rows -       the pairs themselves, as CSV
+  impinge near a.stl b.stl --distance 0.5 --png near.png  where it is narrow, red to yellow
   impinge near a.stl b.stl --distance 0.5 --fail-on-hit   a check of clearance: exit code 3 if it is less
   impinge near a.ply b.ply --distance 1 --kinds ff        pairs of faces
   impinge near cloth.ply b.ply --distance 0 --thickness 0,0.01
@@ -48,6 +49,15 @@ pub struct NearArgs {
     pub ask: AskArgs,
     #[command(flatten)]
     pub rows: RowsArgs,
+    /// Write the meshes, coloured by how near something is (.ply, .glb or .vtu)
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<MeshFile>,
+    /// Draw the meshes, coloured by how near something is: red where they touch, yellow at the
+    /// distance (.png)
+    #[arg(long, value_name = "FILE")]
+    pub png: Option<PngFile>,
+    #[command(flatten)]
+    pub picture: PictureArgs,
     #[command(flatten)]
     pub detector: DetectorArgs,
 }

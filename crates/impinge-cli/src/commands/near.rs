@@ -2,7 +2,7 @@
 
 use std::io::Write;
 
-use impinge::{CancelToken, NearPairs, PairKind};
+use impinge::{BodyId, CancelToken, NearPair, NearPairs, PairKind};
 use serde_json::{Map, Value};
 
 use crate::apart::Inputs;
@@ -12,14 +12,22 @@ use crate::detection::{Times, asked, detector, hit, of_kinds, query};
 use crate::error::Error;
 use crate::load::{Bodies, Loading};
 use crate::output::{out, say, stage_table};
+use crate::picture::Drawer;
 use crate::text::{self, counted, hex};
 use crate::watch::Watch;
-use crate::{headline, json, output, rows};
+use crate::{colors, headline, json, output, rows};
 
 /// `impinge near`.
 pub fn near(args: &NearArgs, cancel: &CancelToken) -> Result<(), Error> {
     let ask = &args.ask;
-    let rows_file = args.rows.file(&Inputs::new(&args.meshes), ask.json)?;
+    let inputs = Inputs::new(&args.meshes);
+    if let Some(file) = &args.out {
+        inputs.check("--out", &file.path)?;
+    }
+    if let Some(png) = &args.png {
+        inputs.check("--png", &png.0)?;
+    }
+    let rows_file = args.rows.file(&inputs, ask.json)?;
     let is_self = args.within || args.meshes.len() == 1;
     let mut bodies = Bodies::read(&args.meshes, Loading::new(ask, is_self, cancel))?;
     for &(number, thickness) in &args.thickness {
@@ -35,8 +43,11 @@ pub fn near(args: &NearArgs, cancel: &CancelToken) -> Result<(), Error> {
     };
     let intersect = query(asked, &ask.exclude, &bodies.ids)?;
     let mut query = of_kinds(intersect.clone(), &args.kinds);
+    let is_shown = args.out.is_some() || args.png.is_some();
     if rows_file.is_some() {
         query = query.closest_points();
+    } else if is_shown {
+        query = query.distances();
     }
 
     let watch = Watch::detection(!args.detector.no_progress, "detecting");
@@ -52,6 +63,18 @@ pub fn near(args: &NearArgs, cancel: &CancelToken) -> Result<(), Error> {
     if let Some(file) = &rows_file {
         rows::write_near(file, near)?;
     }
+    let named = bodies.names.iter().map(String::as_str);
+    let named: Vec<(BodyId, &str)> = bodies.ids.iter().copied().zip(named).collect();
+    let colored: Vec<colors::Found> = match is_shown {
+        true => near
+            .iter()
+            .map(|pair| colored(&pair, args.distance))
+            .collect(),
+        false => Vec::new(),
+    };
+    if let Some(file) = &args.out {
+        colors::write(file, &bodies.scene, &named, &colored)?;
+    }
     if ask.json {
         let object = Value::Object(answer(args, asked, &bodies, near, intersects)?);
         writeln!(out(), "{object}")?;
@@ -61,7 +84,23 @@ pub fn near(args: &NearArgs, cancel: &CancelToken) -> Result<(), Error> {
         writeln!(text, "{}", asked.line(&bodies.vertices, &bodies.nouns))?;
         say(&text, rows_file.as_ref())?;
     }
+    if let Some(png) = &args.png {
+        let surfaces = colors::surfaces(&bodies.scene, &named, &colored)?;
+        let device = args.detector.device.as_deref();
+        Drawer::new(&args.picture, device, 1)?.draw(&png.0, surfaces)?;
+    }
     hit(ask.fail_on_hit, !near.is_empty() || intersects)
+}
+
+/// A pair, and its share of the distance that was asked for. With thickness it may be farther.
+fn colored(pair: &NearPair, most: f64) -> colors::Found {
+    let distance = pair.distance.unwrap_or(0.0);
+    let share = if distance > 0.0 {
+        (distance / most).min(1.0)
+    } else {
+        0.0
+    };
+    (pair.kind, [pair.a, pair.b], share)
 }
 
 /// The object that `docs/near.schema.json` describes.

@@ -235,7 +235,7 @@ impl Answer<'_> {
             .map(|&corner| bounds.get(corner as usize))
             .fold(f64::INFINITY, f64::min);
         match least < self.most(body) && !self.args.fixed.contains(&body) {
-            true => (palette::time(least / self.args.most), true),
+            true => (palette::ramp(least / self.args.most), true),
             false => (palette::body(body).other, false),
         }
     }

@@ -2,14 +2,13 @@
 
 mod answer;
 mod candidates;
-mod colors;
 mod frames;
 mod load;
 mod reached;
 
 use std::io::Write;
 
-use impinge::{CancelToken, Precision, SharedVertex};
+use impinge::{BodyId, CancelToken, Precision, SharedVertex};
 use impinge_io::impact_columns;
 use serde_json::Value;
 
@@ -21,9 +20,9 @@ use crate::error::Error;
 use crate::load::Nouns;
 use crate::output::{out, say};
 use crate::picture::Drawer;
-use crate::rows;
 use crate::values::RowsFile;
 use crate::watch::Watch;
+use crate::{colors, rows};
 
 use answer::Found;
 pub use answer::impact_row;
@@ -118,13 +117,22 @@ pub fn step(args: &StepArgs, cancel: &CancelToken) -> Result<(), Error> {
         let rows = impacts.iter().map(rows::impact);
         rows::write(file, columns, impacts.len(), rows)?;
     }
+    let named = bodies.names.iter().map(|[start, _]| start.as_str());
+    let named: Vec<(BodyId, &str)> = bodies.ids.iter().copied().zip(named).collect();
+    let colored: Vec<colors::Found> = match args.out.is_some() || args.png.is_some() {
+        true => impacts
+            .iter()
+            .map(|i| (i.kind, [i.a, i.b], i.toi))
+            .collect(),
+        false => Vec::new(),
+    };
     if let Some(file) = &args.out {
-        colors::write(file, &bodies, impacts)?;
+        colors::write(file, &bodies.scene, &named, &colored)?;
     }
     let found = Found::all(impacts, times);
     print(args, asked, &bodies, &found, rows_file.as_ref())?;
     if let Some(png) = &args.png {
-        let surfaces = colors::surfaces(&bodies, impacts)?;
+        let surfaces = colors::surfaces(&bodies.scene, &named, &colored)?;
         let device = args.detector.device.as_deref();
         Drawer::new(&args.picture, device, 1)?.draw(&png.0, surfaces)?;
     }

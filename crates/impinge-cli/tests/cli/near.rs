@@ -294,3 +294,42 @@ fn what_intersects_is_never_clear() {
     assert_eq!(run.code, Some(0), "{}", run.stdout);
     assert!(run.stdout.contains("nothing intersects"), "{}", run.stdout);
 }
+
+#[test]
+fn what_is_near_is_coloured_by_how_near_it_is() {
+    let folder = Folder::new();
+    folder.ply("a.ply", &cube([0.0; 3], 1.0));
+    folder.ply("b.ply", &cube([1.5, 0.0, 0.0], 1.0));
+    let near = ["near", "a.ply", "b.ply", "--out", "near.vtu", "--distance"];
+    // Red where they touch, yellow at the distance, half way at half of it; and grey, if nothing
+    // is near.
+    let colors = |distance: &str| {
+        folder.run(near.iter().chain(&[distance])).printed();
+        std::fs::read(folder.path("near.vtu")).unwrap()
+    };
+    let half = colors("1");
+    let edge = colors("0.5");
+    let none = colors("0.25");
+    let has = |bytes: &[u8], color: [u8; 3]| bytes.windows(3).any(|at| at == color);
+    assert!(has(&half, [235, 130, 64]), "half way");
+    assert!(has(&edge, [255, 221, 87]) && !has(&edge, [235, 130, 64]));
+    assert!(!has(&none, [255, 221, 87]));
+    // With rows, and as a picture.
+    let more = ["0.5", "--rows", "near.csv", "--png", "near.png"];
+    folder.run(near.iter().chain(&more)).printed();
+    let png = std::fs::read(folder.path("near.png")).unwrap();
+    assert!(png.starts_with(b"\x89PNG"));
+    // No input is lost.
+    let said = folder
+        .run([
+            "near",
+            "a.ply",
+            "b.ply",
+            "--distance",
+            "1",
+            "--out",
+            "a.ply",
+        ])
+        .misuse();
+    assert!(said.contains("--out a.ply is the input"), "{said}");
+}
