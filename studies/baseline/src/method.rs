@@ -14,10 +14,10 @@
 use std::sync::{Arc, Mutex};
 use std::time::Instant;
 
-use impinge_core::bvh::bounds::Bounds;
+use impinge_core::bvh::bounds::Aabb;
 use impinge_core::bvh::grid::Grid;
 use impinge_core::cpu::cells::{MOST_ENTRIES_EACH, for_cells};
-use impinge_core::cpu::cull_map::{Kept, KeptList};
+use impinge_core::cpu::cull_map::{InRegion, KeptList};
 use impinge_core::cpu::world::World;
 use impinge_core::search::runner::Job;
 use impinge_core::search::sink::Answer;
@@ -132,7 +132,7 @@ impl Method {
     fn grid(
         &mut self,
         job: Job<'_>,
-        region: &Bounds,
+        region: &Aabb,
         n_near: usize,
         settings: &Settings,
         stats: &mut Stats,
@@ -148,7 +148,7 @@ impl Method {
             .min(u64::from(u32::MAX));
         let mut grid = Grid::new(region, n_near as u64, settings.lambda);
         loop {
-            let parts: Vec<Mutex<&mut [Kept]>> =
+            let parts: Vec<Mutex<&mut [InRegion]>> =
                 kept.chunks_mut(PRIMITIVES).map(Mutex::new).collect();
             let firsts = &self.firsts;
             job.workers.for_each(&mut self.scratches, n_tasks, |_, ix| {

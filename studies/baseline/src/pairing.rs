@@ -9,9 +9,9 @@
 use std::sync::Arc;
 
 use impinge_core::bvh::GROUP;
-use impinge_core::bvh::bounds::Bounds;
+use impinge_core::bvh::bounds::Aabb;
 use impinge_core::bvh::grid::Grid;
-use impinge_core::cpu::cull_map::Kept;
+use impinge_core::cpu::cull_map::InRegion;
 use impinge_core::cpu::narrow::{Candidate, Decider};
 use impinge_core::cpu::world::World;
 use impinge_core::search::sink::Answer;
@@ -37,7 +37,7 @@ pub(crate) struct Run {
 pub(crate) struct Lists<'a> {
     pub world: World<'a>,
     pub grid: &'a Grid,
-    pub kept: &'a [Kept],
+    pub kept: &'a [InRegion],
     /// `cell << 32 | slot in kept`, sorted.
     pub entries: &'a [u64],
     /// Whether a pair is tested in only one of its cells.
@@ -50,7 +50,7 @@ pub(crate) struct Scratch {
     pub decider: Decider,
     pub n_box_tests: u64,
     lanes: LaneBounds,
-    boxes: Vec<Bounds>,
+    boxes: Vec<Aabb>,
     masks: [u64; GROUP],
 }
 
@@ -73,7 +73,7 @@ impl Scratch {
     }
 
     pub fn bytes(&self) -> usize {
-        size_of::<Scratch>() + self.decider.bytes() + size_of::<Bounds>() * self.boxes.capacity()
+        size_of::<Scratch>() + self.decider.bytes() + size_of::<Aabb>() * self.boxes.capacity()
     }
 
     /// Tests the boxes of all pairs of these cells, and decides the candidates.
@@ -128,7 +128,7 @@ impl Scratch {
     }
 
     #[inline(always)]
-    fn put(&mut self, lists: Lists<'_>, cell: u32, a: &Kept, b: &Kept) {
+    fn put(&mut self, lists: Lists<'_>, cell: u32, a: &InRegion, b: &InRegion) {
         if lists.owner_rule && lists.owner(a, b) != cell as usize {
             return;
         }
@@ -143,13 +143,13 @@ impl Scratch {
 
 impl<'a> Lists<'a> {
     #[inline(always)]
-    fn kept(&self, entry: u64) -> &'a Kept {
+    fn kept(&self, entry: u64) -> &'a InRegion {
         &self.kept[entry as u32 as usize]
     }
 
     /// The common cell to which a pair belongs, as in impinge's owner rule.
     #[inline(always)]
-    fn owner(&self, a: &Kept, b: &Kept) -> usize {
+    fn owner(&self, a: &InRegion, b: &InRegion) -> usize {
         self.grid.index(std::array::from_fn(|axis| {
             u32::from(a.range.lo[axis].max(b.range.lo[axis]) >> 2)
         }))

@@ -1,6 +1,6 @@
 //! Boxes in double precision: of elements exactly as they are, where few boxes are asked for.
 
-use crate::bvh::bounds::Bounds;
+use crate::bvh::bounds::Aabb;
 use impinge_exact::Point;
 
 /// A closed box. The empty one has `min > max`.
@@ -10,8 +10,8 @@ pub(crate) struct Extent {
     pub max: Point,
 }
 
-impl From<&Bounds> for Extent {
-    fn from(bounds: &Bounds) -> Self {
+impl From<&Aabb> for Extent {
+    fn from(bounds: &Aabb) -> Self {
         Extent {
             min: bounds.min.map(f64::from),
             max: bounds.max.map(f64::from),

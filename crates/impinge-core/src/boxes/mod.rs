@@ -38,7 +38,7 @@ pub(crate) use sweep::Sweep;
 pub(crate) use vec4::{Vec4, of_vertices_f32};
 use vec4::{center_f32, extent};
 
-use crate::bvh::bounds::{Bounds, LaneBounds, greater, lesser, round_down, round_up};
+use crate::bvh::bounds::{Aabb, LaneBounds, greater, lesser, round_down, round_up};
 use crate::bvh::clusters::{Clustering, ToOrder};
 use crate::bvh::tree::TreeEntry;
 use crate::bvh::{GROUP, made_from};
@@ -57,17 +57,17 @@ pub(crate) trait ReadVertices: Copy {
     ///
     /// # Safety
     /// `vertices` must not descend.
-    unsafe fn of_ascending(self, positions: &[[f32; 3]], vertices: &[u32]) -> (Bounds, bool);
+    unsafe fn of_ascending(self, positions: &[[f32; 3]], vertices: &[u32]) -> (Aabb, bool);
 }
 
 /// The box of some vertices.
 #[inline]
-pub(crate) fn of_vertices(positions: &Positions, vertices: &[u32]) -> Bounds {
+pub(crate) fn of_vertices(positions: &Positions, vertices: &[u32]) -> Aabb {
     match positions {
         Positions::F32(positions) => of_vertices_f32(positions, vertices).0,
         Positions::F64(positions) => {
             let [min, max] = vec64::ends(positions, vertices);
-            Bounds {
+            Aabb {
                 min: min.map(round_down),
                 max: max.map(round_up),
             }
@@ -143,7 +143,7 @@ pub(crate) fn of_cluster<S: ReadVertices>(
     positions: &Positions,
     clustering: &Clustering,
     cluster: ClusterIx,
-) -> (Bounds, bool) {
+) -> (Aabb, bool) {
     let vertices = clustering.vertices(cluster);
     match positions {
         // SAFETY: a cluster's vertices ascend.
@@ -156,8 +156,8 @@ pub(crate) fn of_cluster<S: ReadVertices>(
 const TOGETHER: usize = 24;
 
 /// The box of a run of a body's vertices.
-pub(crate) fn of_run(positions: &Positions, run: std::ops::Range<usize>) -> Bounds {
-    let mut bounds = Bounds::EMPTY;
+pub(crate) fn of_run(positions: &Positions, run: std::ops::Range<usize>) -> Aabb {
+    let mut bounds = Aabb::EMPTY;
     match positions {
         Positions::F32(positions) => {
             let mut min = [f32::INFINITY; TOGETHER];
@@ -180,7 +180,7 @@ pub(crate) fn of_run(positions: &Positions, run: std::ops::Range<usize>) -> Boun
         }
         Positions::F64(positions) => {
             for point in &positions[run] {
-                bounds.join(&Bounds {
+                bounds.join(&Aabb {
                     min: point.map(round_down),
                     max: point.map(round_up),
                 });
@@ -218,7 +218,7 @@ impl<'a> BoxSource<'a> {
         simd: S,
         clustering: &Clustering,
         cluster: ClusterIx,
-    ) -> [Bounds; 2] {
+    ) -> [Aabb; 2] {
         let (start, _) = of_cluster(simd, self.start, clustering, cluster);
         let end = match self.end {
             Some(end) => of_cluster(simd, end, clustering, cluster).0,
@@ -337,7 +337,7 @@ fn of_elements<const N: usize>(
             for (lane, corners) in (done..).zip(rest) {
                 let (min, max) = extent(positions, corners);
                 let (min, max) = (min.xyz(), max.xyz());
-                lanes.put(lane, &Bounds { min, max });
+                lanes.put(lane, &Aabb { min, max });
             }
         }
         Positions::F64(positions) => {

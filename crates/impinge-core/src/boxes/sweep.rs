@@ -1,7 +1,7 @@
 //! The boxes that are tested, made from moving boxes.
 
 use crate::bvh::GROUP;
-use crate::bvh::bounds::{Bounds, LaneBounds, greater, lesser, round_down, round_up};
+use crate::bvh::bounds::{Aabb, LaneBounds, greater, lesser, round_down, round_up};
 
 /// Which part of a step is examined, and by how much boxes are inflated.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -67,7 +67,7 @@ impl Sweep {
     /// The box at a time between lies within the interpolation of the boxes at both ends: each
     /// coordinate is at least the interpolated minimum. Everything is rounded outward.
     #[inline(always)]
-    pub fn close(self, [start, end]: [Bounds; 2]) -> [Bounds; 2] {
+    pub fn close(self, [start, end]: [Aabb; 2]) -> [Aabb; 2] {
         if self.is_plain() {
             return [start, end];
         }
@@ -80,7 +80,7 @@ impl Sweep {
         };
         // Two roundings of numbers up to twice the larger end: 2^-51 of it is more than enough.
         let slack = |x: f32, y: f32| f64::from(greater(x.abs(), y.abs())) * 2f64.powi(-50);
-        let mut end = Bounds {
+        let mut end = Aabb {
             min: std::array::from_fn(|axis| {
                 let (x, y) = (start.min[axis], end.min[axis]);
                 if self.until < 1.0 {
@@ -106,11 +106,11 @@ impl Sweep {
         [self.inflated(start), self.inflated(end)]
     }
 
-    fn inflated(self, bounds: Bounds) -> Bounds {
+    fn inflated(self, bounds: Aabb) -> Aabb {
         if self.inflation == 0.0 {
             return bounds;
         }
-        Bounds {
+        Aabb {
             min: bounds
                 .min
                 .map(|x| round_down((f64::from(x) - self.inflation).next_down())),
@@ -245,11 +245,11 @@ mod tests {
                 };
                 for round in 0..1000 {
                     let (points, mut boxes) =
-                        ([[next(), next()], [next(), next()]], [Bounds::EMPTY; 2]);
+                        ([[next(), next()], [next(), next()]], [Aabb::EMPTY; 2]);
                     for point in points {
                         for end in 0..2 {
                             let at = [point[end]; 3];
-                            boxes[end].join(&Bounds { min: at, max: at });
+                            boxes[end].join(&Aabb { min: at, max: at });
                         }
                     }
                     let closed = sweep.close(boxes);

@@ -1,7 +1,7 @@
 //! Vertices as four lanes: the box of some vertices on every processor, whatever instruction set is
 //! chosen.
 
-use crate::bvh::bounds::Bounds;
+use crate::bvh::bounds::Aabb;
 use impinge_exact::internal::filter::number::memory::{read, write};
 
 use four::Four;
@@ -166,7 +166,7 @@ mod four {
 /// per vertex: a sum is finite only if all its terms are. (If a sum of finite terms overflows, they
 /// are checked one by one.)
 #[inline]
-pub(crate) fn of_vertices_f32(positions: &[[f32; 3]], vertices: &[u32]) -> (Bounds, bool) {
+pub(crate) fn of_vertices_f32(positions: &[[f32; 3]], vertices: &[u32]) -> (Aabb, bool) {
     const CHAINS: usize = 4;
     let mut min = [Vec4::splat(f32::INFINITY); CHAINS];
     let mut max = [Vec4::splat(f32::NEG_INFINITY); CHAINS];
@@ -187,7 +187,7 @@ pub(crate) fn of_vertices_f32(positions: &[[f32; 3]], vertices: &[u32]) -> (Boun
         max[0] = max[0].max(vertex);
         sum[0] = sum[0].add(vertex);
     }
-    let bounds = Bounds {
+    let bounds = Aabb {
         min: min[0].min(min[1]).min(min[2].min(min[3])).xyz(),
         max: max[0].max(max[1]).max(max[2].max(max[3])).xyz(),
     };
@@ -208,7 +208,7 @@ pub(super) fn extent<const N: usize>(positions: &[[f32; 3]], corners: &[u32; N])
     (min, max)
 }
 
-/// The middle of an element's box: the result of [`Bounds::center`].
+/// The middle of an element's box: the result of [`Aabb::center`].
 #[inline(always)]
 pub(crate) fn center_f32<const N: usize>(positions: &[[f32; 3]], corners: &[u32; N]) -> [f32; 3] {
     let (min, max) = extent(positions, corners);

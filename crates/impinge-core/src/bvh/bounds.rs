@@ -8,23 +8,23 @@ use super::GROUP;
 
 /// A closed box. The empty one has `min > max` and overlaps nothing.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Bounds {
+pub struct Aabb {
     /// Low ends.
     pub min: [f32; 3],
     /// High ends.
     pub max: [f32; 3],
 }
 
-impl Bounds {
+impl Aabb {
     /// The empty box.
-    pub const EMPTY: Bounds = Bounds {
+    pub const EMPTY: Aabb = Aabb {
         min: [f32::INFINITY; 3],
         max: [f32::NEG_INFINITY; 3],
     };
 
     /// Whether the two share a point.
     #[inline(always)]
-    pub fn overlaps(&self, other: &Bounds) -> bool {
+    pub fn overlaps(&self, other: &Aabb) -> bool {
         let mut overlap = true;
         for axis in 0..3 {
             overlap &= self.min[axis] <= other.max[axis] && other.min[axis] <= self.max[axis];
@@ -34,7 +34,7 @@ impl Bounds {
 
     /// Grows to hold another box.
     #[inline(always)]
-    pub fn join(&mut self, other: &Bounds) {
+    pub fn join(&mut self, other: &Aabb) {
         for axis in 0..3 {
             self.min[axis] = lesser(self.min[axis], other.min[axis]);
             self.max[axis] = greater(self.max[axis], other.max[axis]);
@@ -43,7 +43,7 @@ impl Bounds {
 
     /// The intersection; empty when they do not overlap.
     #[inline(always)]
-    pub fn intersection(&self, other: &Bounds) -> Bounds {
+    pub fn intersection(&self, other: &Aabb) -> Aabb {
         let mut both = *self;
         for axis in 0..3 {
             both.min[axis] = greater(self.min[axis], other.min[axis]);
@@ -132,8 +132,8 @@ impl LaneBounds {
 
     /// The box of a lane.
     #[inline(always)]
-    pub fn at(&self, lane: usize) -> Bounds {
-        Bounds {
+    pub fn at(&self, lane: usize) -> Aabb {
+        Aabb {
             min: [self.min[0][lane], self.min[1][lane], self.min[2][lane]],
             max: [self.max[0][lane], self.max[1][lane], self.max[2][lane]],
         }
@@ -141,7 +141,7 @@ impl LaneBounds {
 
     /// Sets the box of a lane.
     #[inline(always)]
-    pub fn put(&mut self, lane: usize, bounds: &Bounds) {
+    pub fn put(&mut self, lane: usize, bounds: &Aabb) {
         for axis in 0..3 {
             self.min[axis][lane] = bounds.min[axis];
             self.max[axis][lane] = bounds.max[axis];
@@ -191,15 +191,15 @@ impl BoundsArray {
     }
 
     #[inline(always)]
-    pub fn at(&self, ix: usize) -> Bounds {
-        Bounds {
+    pub fn at(&self, ix: usize) -> Aabb {
+        Aabb {
             min: [self.min[0][ix], self.min[1][ix], self.min[2][ix]],
             max: [self.max[0][ix], self.max[1][ix], self.max[2][ix]],
         }
     }
 
     #[inline(always)]
-    pub fn put(&mut self, ix: usize, bounds: &Bounds) {
+    pub fn put(&mut self, ix: usize, bounds: &Aabb) {
         for axis in 0..3 {
             self.min[axis][ix] = bounds.min[axis];
             self.max[axis][ix] = bounds.max[axis];
@@ -236,7 +236,7 @@ impl RawBoundsArray {
     /// `ix` must lie within the array, which must still live; no other thread may use that box at
     /// the same time.
     #[inline(always)]
-    pub unsafe fn put(self, ix: usize, bounds: &Bounds) {
+    pub unsafe fn put(self, ix: usize, bounds: &Aabb) {
         for axis in 0..3 {
             // SAFETY: by the contract of `put`.
             unsafe {

@@ -13,7 +13,7 @@
 //!                 [---- box ----]                       fine 2..=5, coarse 0..=1
 //! ```
 
-use super::bounds::Bounds;
+use super::bounds::Aabb;
 
 /// The most cells along one axis, so that fine coordinates fit 16 bits.
 pub(crate) const MOST_ALONG: u32 = 1 << 14;
@@ -53,7 +53,7 @@ impl Grid {
         clippy::disallowed_methods,
         reason = "how large cells are changes no answer"
     )]
-    pub fn new(region: &Bounds, n_primitives: u64, lambda: f64) -> Self {
+    pub fn new(region: &Aabb, n_primitives: u64, lambda: f64) -> Self {
         let extent: [f64; 3] = std::array::from_fn(|axis| {
             (f64::from(region.max[axis]) - f64::from(region.min[axis])).clamp(0.0, 2f64.powi(129))
         });
@@ -83,7 +83,7 @@ impl Grid {
         Grid::with_resolution(region, resolution)
     }
 
-    fn with_resolution(region: &Bounds, resolution: [u32; 3]) -> Self {
+    fn with_resolution(region: &Aabb, resolution: [u32; 3]) -> Self {
         let extent: [f32; 3] = std::array::from_fn(|axis| region.max[axis] - region.min[axis]);
         let scale = std::array::from_fn(|axis| {
             let scale = (4 * resolution[axis]) as f32 / extent[axis];
@@ -99,7 +99,7 @@ impl Grid {
 
     /// The same region with half the cells along each axis; `None` when there is one cell left.
     pub fn coarser(&self) -> Option<Self> {
-        let region = Bounds {
+        let region = Aabb {
             min: self.origin,
             max: std::array::from_fn(|axis| self.origin[axis] + self.extent[axis]),
         };
@@ -117,7 +117,7 @@ impl Grid {
 
     /// Equation (3) at four times the resolution, clamped to the grid.
     #[inline(always)]
-    pub fn range(&self, bounds: &Bounds) -> FineRange {
+    pub fn range(&self, bounds: &Aabb) -> FineRange {
         FineRange {
             lo: self.fine(&bounds.min),
             hi: self.fine(&bounds.max),
@@ -210,8 +210,8 @@ pub fn owns(cell: [u32; 3], a: &FineRange, b: &FineRange) -> bool {
 mod tests {
     use super::*;
 
-    fn region(max: [f32; 3]) -> Bounds {
-        Bounds { min: [0.0; 3], max }
+    fn region(max: [f32; 3]) -> Aabb {
+        Aabb { min: [0.0; 3], max }
     }
 
     #[test]
@@ -237,7 +237,7 @@ mod tests {
             [10, 10, 1]
         );
         assert_eq!(Grid::new(&region([0.0; 3]), 100, 1.0).resolution, [1, 1, 1]);
-        let huge = Bounds {
+        let huge = Aabb {
             min: [-3e38; 3],
             max: [3e38; 3],
         };
@@ -248,7 +248,7 @@ mod tests {
     fn occupancy_has_the_bits_of_the_range() {
         let grid = Grid::new(&region([8.0; 3]), 8, 1.0);
         assert_eq!(grid.resolution, [2, 2, 2]);
-        let range = grid.range(&Bounds {
+        let range = grid.range(&Aabb {
             min: [1.5, 0.0, 3.0],
             max: [5.0, 1.0, 9.0],
         });

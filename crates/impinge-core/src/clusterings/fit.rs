@@ -3,7 +3,7 @@
 #[cfg(feature = "gpu")]
 use crate::boxes;
 #[cfg(feature = "gpu")]
-use crate::bvh::bounds::Bounds;
+use crate::bvh::bounds::Aabb;
 #[cfg(feature = "gpu")]
 use crate::bvh::clusters::Clustering;
 use crate::query::tuning::Tuning;
@@ -53,7 +53,7 @@ const SAMPLES: usize = 64;
 pub(crate) fn sampled_spread(clustering: &Clustering, positions: &Positions) -> f64 {
     let n = clustering.n_clusters();
     let n_samples = n.min(SAMPLES);
-    let mut whole = Bounds::EMPTY;
+    let mut whole = Aabb::EMPTY;
     let mut sum = 0.0;
     for sample in 0..n_samples {
         let cluster = ClusterIx::from_usize(sample * n / n_samples);

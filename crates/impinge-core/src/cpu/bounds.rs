@@ -6,7 +6,7 @@
 //! Invariant: a box holds all its vertices; f64 positions are rounded outward.
 
 use crate::boxes::{self, ReadVertices};
-use crate::bvh::bounds::{Bounds, BoundsArray, RawBoundsArray};
+use crate::bvh::bounds::{Aabb, BoundsArray, RawBoundsArray};
 use crate::bvh::clusters::Clustering;
 use crate::bvh::tree::TreeShape;
 use crate::scene::index::ClusterIx;
@@ -16,7 +16,7 @@ use crate::scene::positions::Positions;
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Summary {
     /// The box of all of these vertices.
-    pub bounds: Bounds,
+    pub bounds: Aabb,
     /// Half their summed surface; infinite if squares of extents overflow.
     pub surface: f32,
     /// Whether all positions that were read are certainly finite. (f64 positions are checked
@@ -27,7 +27,7 @@ pub(crate) struct Summary {
 impl Summary {
     /// The summary of no clusters.
     pub const EMPTY: Summary = Summary {
-        bounds: Bounds::EMPTY,
+        bounds: Aabb::EMPTY,
         surface: 0.0,
         all_finite: true,
     };
@@ -91,7 +91,7 @@ impl TreeBounds {
             let (below, above) = self.levels.split_at_mut(level);
             let (children, nodes) = (&below[level - 1], &mut above[0]);
             for node in 0..nodes.len() {
-                let mut bounds = Bounds::EMPTY;
+                let mut bounds = Aabb::EMPTY;
                 for child in shape.children(level, node) {
                     bounds.join(&children.at(child));
                 }
@@ -101,8 +101,8 @@ impl TreeBounds {
     }
 
     /// The box of the whole tree.
-    pub fn root(&self) -> Bounds {
-        self.levels.last().map_or(Bounds::EMPTY, |root| root.at(0))
+    pub fn root(&self) -> Aabb {
+        self.levels.last().map_or(Aabb::EMPTY, |root| root.at(0))
     }
 
     pub fn bytes(&self) -> usize {

@@ -22,7 +22,7 @@ use std::sync::Arc;
 use crate::scene::words::debug_by_name;
 use crate::workers::clock::Instant;
 
-use crate::bvh::bounds::Bounds;
+use crate::bvh::bounds::Aabb;
 pub use crate::bvh::grid::MOST_ENTRIES_EACH;
 use crate::bvh::grid::{FineRange, Grid};
 use crate::query::SharedVertex;
@@ -32,7 +32,7 @@ use crate::scene::error::Error;
 use crate::scene::index::PartIx;
 use crate::search::stats::Stats;
 
-use super::cull_map::{Kept, KeptList};
+use super::cull_map::{InRegion, KeptList};
 use super::narrow::{Candidate, Decider};
 use super::subcells::{GroupPair, Lanes64, SubcellQuery};
 use super::world::World;
@@ -55,7 +55,7 @@ pub trait Rule: Sync {
 
     /// Whether such a pair is a candidate here. Keys that the rule appends to `keys` become part of
     /// the answer.
-    fn admits(&self, a: &Kept, b: &Kept, keys: &mut Vec<u64>) -> bool;
+    fn admits(&self, a: &InRegion, b: &InRegion, keys: &mut Vec<u64>) -> bool;
 }
 
 /// Boxes overlap, and the cell owns the pair: each candidate comes once.
@@ -73,7 +73,7 @@ impl Rule for Owner {
     }
 
     #[inline(always)]
-    fn admits(&self, _: &Kept, _: &Kept, _: &mut Vec<u64>) -> bool {
+    fn admits(&self, _: &InRegion, _: &InRegion, _: &mut Vec<u64>) -> bool {
         true
     }
 }
@@ -226,7 +226,7 @@ impl Cells {
     /// Finds the grid, counts, and scatters primitives into cell lists.
     fn scatter(
         &mut self,
-        region: &Bounds,
+        region: &Aabb,
         n_near: u64,
         settings: &Settings,
         control: &Control,
@@ -428,7 +428,7 @@ fn for_indices(grid: &Grid, range: &FineRange, mut call: impl FnMut(usize)) {
 #[derive(Clone, Copy)]
 struct Lists<'a> {
     world: World<'a>,
-    kept: &'a [Kept],
+    kept: &'a [InRegion],
     entries: &'a [u32],
 }
 

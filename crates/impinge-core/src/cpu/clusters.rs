@@ -16,7 +16,7 @@
 use std::sync::Arc;
 
 use crate::boxes;
-use crate::bvh::bounds::Bounds;
+use crate::bvh::bounds::Aabb;
 use crate::bvh::clusters::Clustering;
 use crate::clusterings::{Clusterings, Fit, spread};
 use crate::query::settings::{InstructionSet, Settings};
@@ -177,7 +177,7 @@ impl BodyCache {
             positions_stamp: 0,
             clustering,
             bounds,
-            whole: Bounds::EMPTY,
+            whole: Aabb::EMPTY,
             creases: None,
             culled: (body.n_primitives() >= tuning.culled_from)
                 .then(|| Box::new(Culled::new(tuning))),

@@ -8,7 +8,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use crate::boxes;
-use crate::bvh::bounds::Bounds;
+use crate::bvh::bounds::Aabb;
 use crate::bvh::grid::FineRange;
 use crate::plan::Plan;
 use crate::scene::index::{ElementIx, PartIx, Slot};
@@ -29,9 +29,9 @@ const VERTICES: usize = 1 << 15;
 
 /// A primitive that reaches the region.
 #[derive(Debug, Clone, Copy)]
-pub struct Kept {
+pub struct InRegion {
     /// Its box.
-    pub bounds: Bounds,
+    pub bounds: Aabb,
     /// The fine cells that it touches; the grid fills them in.
     pub range: FineRange,
     /// Its part.
@@ -40,7 +40,7 @@ pub struct Kept {
     pub primitive: ElementIx,
 }
 
-impl Kept {
+impl InRegion {
     /// Its slot, where there are no clusters.
     #[inline(always)]
     pub fn slot(&self) -> Slot {
@@ -53,10 +53,10 @@ impl Kept {
         body: &BodyRef<'_>,
         part: PartIx,
         primitive: ElementIx,
-        reach: &Bounds,
-    ) -> Option<Kept> {
+        reach: &Aabb,
+    ) -> Option<InRegion> {
         let bounds = boxes::of_vertices(body.positions, body.corners(unclustered(primitive)));
-        bounds.overlaps(reach).then_some(Kept {
+        bounds.overlaps(reach).then_some(InRegion {
             bounds,
             range: FineRange {
                 lo: [0; 3],
@@ -80,22 +80,22 @@ debug_by_name!(KeptList => "KeptList");
 pub struct KeptList {
     isa: Isa,
     tuning: Tuning,
-    bodies: Vec<Bounds>,
+    bodies: Vec<Aabb>,
     /// For each part, the box in which others may meet it.
-    reach: Vec<Bounds>,
+    reach: Vec<Aabb>,
     top: TopLevel,
     stack: Vec<NodePair>,
     /// Runs of primitives.
     runs: Vec<BoundsTask>,
     /// The kept primitives of each run.
-    parts: Vec<Mutex<Vec<Kept>>>,
+    parts: Vec<Mutex<Vec<InRegion>>>,
     /// Runs of vertices, with their boxes.
-    vertices: Vec<(BoundsTask, Mutex<Bounds>)>,
+    vertices: Vec<(BoundsTask, Mutex<Aabb>)>,
     cull: Cull,
     /// The bodies in the map; 0 if none was made.
     n_mapped: u64,
     /// The kept primitives.
-    pub kept: Vec<Kept>,
+    pub kept: Vec<InRegion>,
 }
 
 impl KeptList {
@@ -124,10 +124,10 @@ impl KeptList {
             .iter()
             .map(|part| part.lock().map_or(0, |part| part.capacity()))
             .sum();
-        size_of::<Kept>() * (self.kept.capacity() + parts)
-            + size_of::<Bounds>() * (self.bodies.capacity() + self.reach.capacity())
+        size_of::<InRegion>() * (self.kept.capacity() + parts)
+            + size_of::<Aabb>() * (self.bodies.capacity() + self.reach.capacity())
             + self.top.bytes()
-            + size_of::<(BoundsTask, Mutex<Bounds>)>() * self.vertices.capacity()
+            + size_of::<(BoundsTask, Mutex<Aabb>)>() * self.vertices.capacity()
             + self.cull.bytes()
     }
 
@@ -161,7 +161,7 @@ impl KeptList {
             let mut part = parts[ix].lock().expect("no task panics");
             part.clear();
             for primitive in (run.first..run.end).map(ElementIx::new) {
-                part.extend(Kept::reaching(&body, run.part, primitive, reach));
+                part.extend(InRegion::reaching(&body, run.part, primitive, reach));
             }
         });
         self.gather();
@@ -219,7 +219,7 @@ impl KeptList {
             let mut part = parts[ix].lock().expect("no task panics");
             part.clear();
             let n = cull.for_live(ix, |primitive| {
-                part.extend(Kept::reaching(&body, run.part, primitive, reach));
+                part.extend(InRegion::reaching(&body, run.part, primitive, reach));
             });
             n_near.fetch_add(n, Ordering::Relaxed);
         });
@@ -243,7 +243,7 @@ impl KeptList {
                 .extend(BoundsTask::cut(ix, part.n_primitives, n_primitives));
             self.vertices.extend(
                 BoundsTask::cut(ix, n_vertices, n_vertices_each)
-                    .map(|run| (run, Mutex::new(Bounds::EMPTY))),
+                    .map(|run| (run, Mutex::new(Aabb::EMPTY))),
             );
         }
         self.parts
@@ -256,7 +256,7 @@ impl KeptList {
             *bounds.lock().expect("no task panics") = boxes::of_run(positions, range);
         });
         self.bodies.clear();
-        self.bodies.resize(world.plan.parts.len(), Bounds::EMPTY);
+        self.bodies.resize(world.plan.parts.len(), Aabb::EMPTY);
         for (run, bounds) in &mut self.vertices {
             let bounds = bounds.get_mut().expect("no task panics");
             self.bodies[run.part.index()].join(bounds);
@@ -300,7 +300,7 @@ impl KeptList {
                 .zip(&*bodies)
                 .map(|(part, bounds)| match part.within {
                     true => *bounds,
-                    false => Bounds::EMPTY,
+                    false => Aabb::EMPTY,
                 }),
         );
         if plan.between() {
@@ -310,23 +310,23 @@ impl KeptList {
                 top: &TopLevel = top,
                 stack: &mut Vec<NodePair> = stack,
                 plan: &Plan = plan,
-                bodies: &[Bounds] = bodies,
-                reach: &mut [Bounds] = reach,
+                bodies: &[Aabb] = bodies,
+                reach: &mut [Aabb] = reach,
             ));
         }
     }
 
     /// The box of all reaches; `None` if no primitives were kept.
-    pub fn region(&self) -> Option<Bounds> {
+    pub fn region(&self) -> Option<Aabb> {
         self.joined_reach().filter(|_| !self.kept.is_empty())
     }
 
-    fn joined_reach(&self) -> Option<Bounds> {
-        let mut region = Bounds::EMPTY;
+    fn joined_reach(&self) -> Option<Aabb> {
+        let mut region = Aabb::EMPTY;
         for reach in &self.reach {
             region.join(reach);
         }
-        (region != Bounds::EMPTY).then_some(region)
+        (region != Aabb::EMPTY).then_some(region)
     }
 }
 
@@ -336,8 +336,8 @@ fn reach_pairs<S: Simd>(
     top: &TopLevel,
     stack: &mut Vec<NodePair>,
     plan: &Plan,
-    bodies: &[Bounds],
-    reach: &mut [Bounds],
+    bodies: &[Aabb],
+    reach: &mut [Aabb],
 ) {
     let lane_pairs = top.pairs(simd, stack, |a, b| {
         if plan.test(a, b).is_some() {

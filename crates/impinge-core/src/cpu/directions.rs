@@ -21,7 +21,7 @@ use crate::scene::positions::Positions;
 use impinge_exact::internal::filter::Directions64;
 
 use super::group_cache::{GroupCache, PerCluster};
-use super::lane_pairs::{Side, WorkItem};
+use super::lane_pairs::{RowSide, WorkItem};
 use super::world::World;
 use crate::simd::{Lanes, Masks, Simd};
 
@@ -149,7 +149,7 @@ impl Directions {
         simd: S,
         world: W,
         item: &WorkItem,
-        (side, rows): (Side, u64),
+        (side, rows): (RowSide, u64),
         distance: f32,
         aside: &[u64; GROUP],
         masks: &mut Masks,
@@ -174,8 +174,8 @@ impl Directions {
             .slot(simd, world, (item.b, item.cluster_b), slot_a);
         let [a, b] = [slot_a, slot_b].map(|slot| self.groups.at(slot));
         let (of_rows, of_lanes) = match side {
-            Side::A => (a, b),
-            Side::B => (b, a),
+            RowSide::A => (a, b),
+            RowSide::B => (b, a),
         };
         if !of_rows.can_part(of_lanes) {
             return 0;

@@ -8,7 +8,7 @@
 
 use crate::boxes;
 use crate::bvh::GROUP;
-use crate::bvh::bounds::Bounds;
+use crate::bvh::bounds::Aabb;
 use crate::query::settings::Settings;
 use crate::scene::elements::Elements;
 use crate::scene::index::{ClusterIx, PartIx};
@@ -60,7 +60,7 @@ impl PerCluster<World<'_>> for Group {
 }
 
 /// Whether all coordinates are small enough for the filter in f32.
-fn is_small(bounds: &Bounds) -> bool {
+fn is_small(bounds: &Aabb) -> bool {
     let largest = |ends: &[f32; 3]| ends.iter().all(|x| x.abs() <= LARGEST_F32);
     largest(&bounds.min) && largest(&bounds.max)
 }

@@ -27,7 +27,7 @@
 //! overlap. Reason for each discard: cones without a common direction. `docs/exactness.md`, "Hubs",
 //! has the proof and the bound.
 
-use crate::bvh::bounds::{Bounds, round_down, round_up};
+use crate::bvh::bounds::{Aabb, round_down, round_up};
 use crate::bvh::hubs::{HubSet, Hubs};
 use crate::scene::index::Slot;
 use crate::scene::vector::cross;
@@ -46,7 +46,7 @@ const ERROR: f64 = f64::from_bits((1023 - 24) << 52);
 const SHORTEST: f64 = f64::from_bits((1023 - 23) << 52);
 
 /// All directions.
-const EVERYWHERE: Bounds = Bounds {
+const EVERYWHERE: Aabb = Aabb {
     min: [-1.0; 3],
     max: [1.0; 3],
 };
@@ -78,7 +78,7 @@ impl Alike {
 
 #[derive(Debug, Clone, Copy)]
 struct ConeEntry {
-    cone: Bounds,
+    cone: Aabb,
     alike: Alike,
     /// The hubs of the primitive with which the current hub forms an axis.
     partners: HubSet,
@@ -86,7 +86,7 @@ struct ConeEntry {
 
 #[derive(Debug, Clone, Copy)]
 struct ConeNode {
-    cone: Bounds,
+    cone: Aabb,
     partners: HubSet,
 }
 
@@ -100,7 +100,7 @@ struct ConePair {
 
 /// Where a primitive lies as seen from the shared hub or axis.
 enum SeenFrom {
-    Cone(Bounds),
+    Cone(Aabb),
     Nowhere,
     Beyond(usize),
 }
@@ -177,7 +177,7 @@ impl HubScratch {
         }
         let depth = n.div_ceil(LEAF).next_power_of_two().ilog2();
         let nothing = ConeNode {
-            cone: Bounds::EMPTY,
+            cone: Aabb::EMPTY,
             partners: HubSet::EMPTY,
         };
         self.nodes.clear();
@@ -258,7 +258,7 @@ impl ConeTree<'_> {
         let n = self.entries.len();
         let entries = &mut self.entries[range(n, at, node)];
         let mut all = ConeNode {
-            cone: Bounds::EMPTY,
+            cone: Aabb::EMPTY,
             partners: entries[0].partners,
         };
         for entry in &*entries {
@@ -356,7 +356,7 @@ impl Cone {
     }
 
     /// The box of all directions between those added.
-    fn bounds(&self) -> Option<Bounds> {
+    fn bounds(&self) -> Option<Aabb> {
         if self.n == 0 {
             return None;
         }
@@ -388,7 +388,7 @@ impl Cone {
                 x
             }
         };
-        Some(Bounds {
+        Some(Aabb {
             min: min.map(|x| round_down(low(x))),
             max: max.map(|x| round_up(high(x))),
         })

@@ -43,7 +43,7 @@ impl Default for LaneLists {
 
 /// The group whose lanes are the rows.
 #[derive(Debug, Clone, Copy)]
-pub(crate) enum Side {
+pub(crate) enum RowSide {
     A,
     B,
 }
@@ -61,11 +61,11 @@ impl LanePairs {
 
     /// Appends a lane of one group with some lanes of the other.
     #[inline(always)]
-    pub fn push_row<S: Simd>(&mut self, simd: S, side: Side, row: usize, mask: u64) {
+    pub fn push_row<S: Simd>(&mut self, simd: S, side: RowSide, row: usize, mask: u64) {
         let LaneLists { a, b } = &mut *self.lanes;
         let (own, other) = match side {
-            Side::A => (a, b),
-            Side::B => (b, a),
+            RowSide::A => (a, b),
+            RowSide::B => (b, a),
         };
         own[self.n..][..GROUP].fill(row as u8);
         let list = other[self.n..].first_chunk_mut().expect("padded");
@@ -77,14 +77,14 @@ impl LanePairs {
     pub fn push_mapped_row<S: Simd>(
         &mut self,
         simd: S,
-        (side, row): (Side, usize),
+        (side, row): (RowSide, usize),
         mask: u64,
         map: &[u8; GROUP],
     ) {
         let LaneLists { a, b } = &mut *self.lanes;
         let (own, other) = match side {
-            Side::A => (a, b),
-            Side::B => (b, a),
+            RowSide::A => (a, b),
+            RowSide::B => (b, a),
         };
         own[self.n..][..GROUP].fill(row as u8);
         let list = other[self.n..].first_chunk_mut().expect("padded");

@@ -24,7 +24,7 @@ use impinge_exact::internal::filter::{
 };
 
 use super::group_cache::Group;
-use super::lane_pairs::{LanePairs, Side, WorkItem};
+use super::lane_pairs::{LanePairs, RowSide, WorkItem};
 use super::world::{BodyRef, World};
 use crate::simd::{Isa, Lanes, Simd, with_isa};
 
@@ -128,10 +128,10 @@ impl Decider {
     /// Where only the lowest pair is wanted: of which side's elements only those up to a number
     /// still matter.
     #[inline(always)]
-    pub(super) fn up_to(&self) -> Option<(Side, Number)> {
+    pub(super) fn up_to(&self) -> Option<(RowSide, Number)> {
         let side = match self.seeks_lowest? {
-            false => Side::A,
-            true => Side::B,
+            false => RowSide::A,
+            true => RowSide::B,
         };
         Some((side, self.answer.as_ref()?.up_to()))
     }

@@ -31,7 +31,7 @@ use crate::search::sink::Answer;
 use super::directions::Directions;
 use super::group_cache::{Group, GroupCache};
 use super::hubs::HubScratch;
-use super::lane_pairs::{LanePairs, Side, WorkItem};
+use super::lane_pairs::{LanePairs, RowSide, WorkItem};
 use super::narrow::Decider;
 use super::world::{BodyCache, BodyRef, World};
 use crate::simd::{Isa, Lanes, Masks, Simd};
@@ -117,8 +117,8 @@ pub(crate) fn run<S: Simd>(
         }
         let wanted = match decider.up_to() {
             None => [u64::MAX; 2],
-            Some((Side::A, to)) => [lanes_up_to(world, item.a, item.cluster_a, to), u64::MAX],
-            Some((Side::B, to)) => [u64::MAX, lanes_up_to(world, item.b, item.cluster_b, to)],
+            Some((RowSide::A, to)) => [lanes_up_to(world, item.a, item.cluster_a, to), u64::MAX],
+            Some((RowSide::B, to)) => [u64::MAX, lanes_up_to(world, item.b, item.cluster_b, to)],
         };
         let Some(CulledItem { slots, lanes }) = cull(simd, world, item, wanted, groups) else {
             continue;
@@ -235,22 +235,22 @@ fn overlap<S: Simd>(
     item: &WorkItem,
     ([group_a, group_b], [lanes_a, lanes_b]): ([&Group; 2], [u64; 2]),
     masks: &mut Masks,
-) -> (Side, u64) {
+) -> (RowSide, u64) {
     let (boxes_a, boxes_b) = (&group_a.boxes, &group_b.boxes);
     let [n_a, n_b] = [lanes_a, lanes_b].map(u64::count_ones);
     let is_same_body = item.a == item.b;
     if is_same_body && item.cluster_a == item.cluster_b {
         simd.overlaps_within(boxes_a, lanes_a, masks);
-        return (Side::A, lanes_a);
+        return (RowSide::A, lanes_a);
     }
     // Adjacency is stored by lanes of a: transposing it costs more than a few more rows.
     let n_b = if is_same_body { 2 * n_b } else { n_b };
     if n_a <= n_b {
         simd.overlaps_rows(boxes_b, lanes_b, boxes_a, lanes_a, masks);
-        (Side::A, lanes_a)
+        (RowSide::A, lanes_a)
     } else {
         simd.overlaps_rows(boxes_a, lanes_a, boxes_b, lanes_b, masks);
-        (Side::B, lanes_b)
+        (RowSide::B, lanes_b)
     }
 }
 
@@ -260,7 +260,7 @@ fn within_body<S: Simd>(
     simd: S,
     world: World<'_>,
     item: &WorkItem,
-    (side, rows): (Side, u64),
+    (side, rows): (RowSide, u64),
     (masks, shared): (&Masks, &[u64; GROUP]),
     lane_pairs: &mut LanePairs,
     decider: &mut Decider,
@@ -296,7 +296,7 @@ fn within_body<S: Simd>(
 fn put_shared(
     cache: &BodyCache,
     item: &WorkItem,
-    (side, rows): (Side, u64),
+    (side, rows): (RowSide, u64),
     masks: &mut Masks,
     shared: &mut [u64; GROUP],
 ) {
@@ -313,19 +313,19 @@ fn put_shared(
     shared.fill(0);
     for (lane, mask) in adjacency.between(cluster_a, cluster_b) {
         match side {
-            Side::A => shared[lane] = mask,
-            Side::B => Lanes(mask & rows).for_each(|lane_b| shared[lane_b] |= 1 << lane),
+            RowSide::A => shared[lane] = mask,
+            RowSide::B => Lanes(mask & rows).for_each(|lane_b| shared[lane_b] |= 1 << lane),
         }
     }
 }
 
 /// Clears the pairs that share a hub.
 #[inline(never)]
-fn clear_hubs(hubs: &Hubs, item: &WorkItem, rows: Side, masks: &mut Masks) {
+fn clear_hubs(hubs: &Hubs, item: &WorkItem, rows: RowSide, masks: &mut Masks) {
     for (lanes_a, lanes_b) in hubs.between(item.cluster_a, item.cluster_b) {
         let (rows, lanes) = match rows {
-            Side::A => (lanes_a, lanes_b),
-            Side::B => (lanes_b, lanes_a),
+            RowSide::A => (lanes_a, lanes_b),
+            RowSide::B => (lanes_b, lanes_a),
         };
         for row in Lanes(rows) {
             masks.0[row] &= !lanes;
@@ -350,7 +350,7 @@ impl VertexRule<'_> {
     fn put_row<S: Simd>(
         &self,
         simd: S,
-        side: Side,
+        side: RowSide,
         row: usize,
         mask: u64,
         shared: u64,
@@ -362,8 +362,8 @@ impl VertexRule<'_> {
             return;
         }
         let (folded_rows, folded_lanes) = match side {
-            Side::A => (self.folded[0], self.folded[1]),
-            Side::B => (self.folded[1], self.folded[0]),
+            RowSide::A => (self.folded[0], self.folded[1]),
+            RowSide::B => (self.folded[1], self.folded[0]),
         };
         let neighbors = mask & shared;
         let open = match folded_rows >> row & 1 {
@@ -373,8 +373,8 @@ impl VertexRule<'_> {
         decider.n_candidates += u64::from((neighbors & !open).count_ones());
         for lane in Lanes(open) {
             let (lane_a, lane_b) = match side {
-                Side::A => (row, lane),
-                Side::B => (lane, row),
+                RowSide::A => (row, lane),
+                RowSide::B => (lane, row),
             };
             let slot_a = self.cluster_a.slot(lane_a as u32);
             let slot_b = self.cluster_b.slot(lane_b as u32);

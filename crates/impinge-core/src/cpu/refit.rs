@@ -12,7 +12,7 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use crate::bvh::bounds::{Bounds, BoundsArray, RawBoundsArray};
+use crate::bvh::bounds::{Aabb, BoundsArray, RawBoundsArray};
 use crate::clusterings::{BodyPart, Clusterings};
 use crate::query::settings::Settings;
 use crate::query::tuning::Tuning;
@@ -107,7 +107,7 @@ impl Refit {
             if !cache.can_be_read(body) {
                 plan.check_one(scene, ix)?;
             }
-            cache.whole = Bounds::EMPTY;
+            cache.whole = Aabb::EMPTY;
             self.push_needed(workers, ix, plan.parts.len(), cache, needed);
         }
         if !self.work(isa, job, tuning, caches, scratches) {

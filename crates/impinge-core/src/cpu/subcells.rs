@@ -15,7 +15,7 @@
 
 use crate::bvh::GROUP;
 
-use super::cull_map::Kept;
+use super::cull_map::InRegion;
 use super::pairing::full;
 use super::world::BodyRef;
 use crate::simd::{Isa, LaneBounds, Lanes32, Simd, with_isa};
@@ -34,7 +34,7 @@ pub struct SubcellQuery {
 /// Two groups of one cell: indices in `kept`.
 #[derive(Clone, Copy)]
 pub(crate) struct GroupPair<'a> {
-    pub kept: &'a [Kept],
+    pub kept: &'a [InRegion],
     pub a: &'a [u32],
     pub b: &'a [u32],
     pub cell: [u32; 3],
@@ -79,7 +79,7 @@ impl Lanes64 {
 /// The first and the last sub-cell along an axis, from 1 to 4. The first is 0 if the range begins
 /// in an earlier cell.
 #[inline(always)]
-fn along(kept: &Kept, cell: [u32; 3], axis: usize) -> (usize, usize) {
+fn along(kept: &InRegion, cell: [u32; 3], axis: usize) -> (usize, usize) {
     let before = 4 * cell[axis];
     let first = (u32::from(kept.range.lo[axis]) + 1).saturating_sub(before);
     let last = (u32::from(kept.range.hi[axis]) + 1 - before).min(4);
@@ -160,14 +160,14 @@ fn find<S: Simd>(simd: S, lanes: &mut Lanes64, groups: GroupPair<'_>, query: Sub
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bvh::bounds::Bounds;
+    use crate::bvh::bounds::Aabb;
     use crate::bvh::grid::{Grid, owns};
     use crate::query::settings::InstructionSet;
     use crate::scene::index::{ElementIx, PartIx};
 
     #[test]
     fn partners_are_those_of_the_occupancy_bits() {
-        let region = Bounds {
+        let region = Aabb {
             min: [0.0; 3],
             max: [3.0; 3],
         };
@@ -178,14 +178,14 @@ mod tests {
             state = state.wrapping_mul(6364136223846793005).wrapping_add(99);
             (state >> 33) % n
         };
-        let kept: Vec<Kept> = ElementIx::up_to(400)
+        let kept: Vec<InRegion> = ElementIx::up_to(400)
             .map(|primitive| {
                 let min: [f32; 3] = std::array::from_fn(|_| random(30) as f32 / 10.0);
-                let bounds = Bounds {
+                let bounds = Aabb {
                     min,
                     max: min.map(|x| x + random(14) as f32 / 10.0),
                 };
-                Kept {
+                InRegion {
                     bounds,
                     range: grid.range(&bounds),
                     part: PartIx::new(0),

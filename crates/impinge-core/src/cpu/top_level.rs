@@ -1,6 +1,6 @@
 //! Which bodies' boxes meet, for frames of more than two bodies.
 
-use crate::bvh::bounds::Bounds;
+use crate::bvh::bounds::Aabb;
 use crate::bvh::tree::{Node, TreeEntry, TreeShape, order};
 use crate::clusterings::Fit;
 use crate::query::tuning::Tuning;
@@ -44,7 +44,7 @@ impl TopLevel {
     pub fn meeting<S: Simd, E>(
         &self,
         simd: S,
-        query: &Bounds,
+        query: &Aabb,
         stack: &mut Vec<NodePair>,
         mut emit: impl FnMut(PartIx) -> Result<(), E>,
     ) -> Result<(), E> {
@@ -71,12 +71,12 @@ impl TopLevel {
     }
 
     /// The box of all parts.
-    pub fn root(&self) -> Bounds {
+    pub fn root(&self) -> Aabb {
         self.bounds.root()
     }
 
     /// The box of a node.
-    pub fn bounds(&self, node: Node) -> Bounds {
+    pub fn bounds(&self, node: Node) -> Aabb {
         self.bounds.levels[node.level as usize].at(node.number as usize)
     }
 
@@ -98,7 +98,7 @@ impl TopLevel {
     }
 
     /// Updates the tree to the current boxes of `n` parts.
-    pub fn refit(&mut self, n: usize, tuning: &Tuning, root: impl Fn(PartIx) -> Bounds) {
+    pub fn refit(&mut self, n: usize, tuning: &Tuning, root: impl Fn(PartIx) -> Aabb) {
         let is_new = self.order.len() != n;
         if is_new {
             self.shape = TreeShape::new(n);
@@ -121,7 +121,7 @@ impl TopLevel {
         }
     }
 
-    fn refit_boxes(&mut self, root: &impl Fn(PartIx) -> Bounds) {
+    fn refit_boxes(&mut self, root: &impl Fn(PartIx) -> Aabb) {
         for (leaf, &part) in self.order.iter().enumerate() {
             self.bounds.levels[0].put(leaf, &root(part));
         }
@@ -143,7 +143,7 @@ impl TopLevel {
     }
 }
 
-fn area(bounds: &Bounds) -> f64 {
+fn area(bounds: &Aabb) -> f64 {
     let area = bounds.half_area();
     if area.is_finite() { area } else { 0.0 }
 }

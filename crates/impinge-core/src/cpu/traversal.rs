@@ -6,7 +6,7 @@
 //! pairs that overlap. Reason for each discard: boxes that do not overlap hold primitives that
 //! cannot meet.
 
-use crate::bvh::bounds::Bounds;
+use crate::bvh::bounds::Aabb;
 use crate::bvh::hubs::Hubs;
 use crate::bvh::tree::TreeShape;
 
@@ -30,7 +30,7 @@ impl BodyTree<'_> {
     }
 
     #[inline(always)]
-    fn at(&self, level: u32, node: u32) -> Bounds {
+    fn at(&self, level: u32, node: u32) -> Aabb {
         self.bounds.levels[level as usize].at(node as usize)
     }
 
@@ -41,7 +41,7 @@ impl BodyTree<'_> {
         simd: S,
         level: u32,
         node: u32,
-        query: &Bounds,
+        query: &Aabb,
     ) -> MeetingChildren {
         let children = self.shape.children(level as usize, node as usize);
         let boxes = &self.bounds.levels[level as usize - 1];
@@ -114,7 +114,7 @@ pub(crate) fn between<S: Simd, E>(
 pub(crate) fn meeting<S: Simd, E>(
     simd: S,
     tree: BodyTree<'_>,
-    query: &Bounds,
+    query: &Aabb,
     stack: &mut Vec<NodePair>,
     mut emit: impl FnMut(u32) -> Result<(), E>,
 ) -> Result<(), E> {

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::bvh::bounds::Bounds;
+use crate::bvh::bounds::Aabb;
 use crate::bvh::clusters::Clustering;
 use crate::clusterings::{Clustered, Fit, Store};
 use crate::plan::{Plan, QueryPart};
@@ -28,7 +28,7 @@ pub(crate) struct BodyCache {
     pub clustering: Arc<Clustering>,
     pub bounds: TreeBounds,
     /// The box of all primitives.
-    pub whole: Bounds,
+    pub whole: Aabb,
     /// The clusters that lie beside all bodies that this one could meet; only for bodies that are
     /// large enough.
     pub culled: Option<Box<Culled>>,

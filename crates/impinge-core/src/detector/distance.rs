@@ -176,7 +176,7 @@ impl Touching {
         let by_second = b < a;
         let goal = Goal::Lowest { by_second };
         let plan = Plan::intersections(scene, &Query::between(a, b), goal, limits)?;
-        let mut finder = Lowest {
+        let mut finder = LowestPair {
             clusters: cpu.clusters(),
             settings,
             key: None,
@@ -193,13 +193,13 @@ impl Touching {
 }
 
 /// Finds the lowest pair by clusters, whatever the method is.
-struct Lowest<'a> {
+struct LowestPair<'a> {
     clusters: &'a mut Clusters,
     settings: &'a Settings,
     key: Option<u64>,
 }
 
-impl Finder for Lowest<'_> {
+impl Finder for LowestPair<'_> {
     fn method(&self) -> &'static str {
         Method::Clusters.name()
     }

@@ -2,7 +2,7 @@
 
 use super::Detector;
 use super::in_step::{InStep, Keys, Seen};
-use super::steps::Listed;
+use super::steps::NearList;
 use crate::answers::near::{Labels, NearPairs};
 use crate::cpu::steps::VerletList;
 use crate::plan::{Plan, TestId};
@@ -118,7 +118,7 @@ impl Detector {
     }
 
     /// Takes out the list of a question, or a new one, if near pairs are listed.
-    fn listed(&mut self, scene: &Scene, query: &Query, plan: &Plan) -> Option<Listed> {
+    fn listed(&mut self, scene: &Scene, query: &Query, plan: &Plan) -> Option<NearList> {
         let Settings {
             reuse_margin,
             memory_budget,
@@ -130,7 +130,7 @@ impl Detector {
             return None;
         }
         let lists = &mut self.steps.lists;
-        let is_same = |listed: &Listed| {
+        let is_same = |listed: &NearList| {
             let of = (listed.arrangement, listed.distance);
             of == (scene.arrangement(), distance) && listed.query == *query
         };
@@ -140,7 +140,7 @@ impl Detector {
         if lists.len() == MOST_LISTS {
             lists.remove(0);
         }
-        Some(Listed {
+        Some(NearList {
             arrangement: scene.arrangement(),
             query: query.clone(),
             distance,

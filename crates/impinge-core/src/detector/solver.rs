@@ -141,7 +141,7 @@ impl Detector {
     ) -> Result<Neighbours, Error> {
         let mut neighbours = self.homes.neighbours.take();
         let mut memory = std::mem::take(&mut self.solver);
-        let mut outcome = Listed {
+        let mut outcome = NeighbourLists {
             neighbours: &mut neighbours,
             memory: &mut memory,
             isa: Isa::detect(self.settings.instruction_set),
@@ -342,13 +342,13 @@ impl Outcome<u64, { PairKind::ALL.len() }> for Safe<'_> {
 }
 
 /// Near pairs that become lists.
-struct Listed<'a> {
+struct NeighbourLists<'a> {
     neighbours: &'a mut Neighbours,
     memory: &'a mut SolverMemory,
     isa: Isa,
 }
 
-impl Outcome<u64, { PairKind::ALL.len() }> for Listed<'_> {
+impl Outcome<u64, { PairKind::ALL.len() }> for NeighbourLists<'_> {
     fn begin(&mut self, _: &Plan) {
         self.neighbours.begin();
     }

@@ -25,16 +25,16 @@ use impinge_exact::Contact;
 
 /// The memory kept from step to step.
 pub(super) struct StepMemory {
-    pub contacts: Contacts,
+    pub contacts: StepContacts,
     /// Whether the start of the last step intersects, if that was asked.
     start_intersects: Option<bool>,
     pub clusters: StepClusters,
     /// The last lists of near pairs, the newest last.
-    pub lists: Vec<Listed>,
+    pub lists: Vec<NearList>,
 }
 
 /// The near pairs of a question, and what they depend on besides positions.
-pub(super) struct Listed {
+pub(super) struct NearList {
     pub arrangement: u64,
     pub query: Query,
     pub distance: f64,
@@ -44,7 +44,7 @@ pub(super) struct Listed {
 impl StepMemory {
     pub fn new(settings: &Settings, clusterings: Clusterings) -> Self {
         StepMemory {
-            contacts: Contacts::default(),
+            contacts: StepContacts::default(),
             start_intersects: None,
             clusters: StepClusters::new(settings.instruction_set, clusterings),
             lists: Vec::new(),
@@ -54,7 +54,7 @@ impl StepMemory {
 
 /// The answer about contacts.
 #[derive(Default)]
-pub(super) struct Contacts {
+pub(super) struct StepContacts {
     pub impacts: Impacts,
     found: FoundByKind,
     /// Whether all that is found gets its name.
@@ -69,7 +69,7 @@ pub(super) struct StartAnswer {
     ms: f64,
 }
 
-impl Contacts {
+impl StepContacts {
     /// All contacts found, by the kind of the pair.
     pub fn lists(&self) -> impl Iterator<Item = (PairKind, &[Found<Contact>])> {
         PairKind::ALL
@@ -92,7 +92,7 @@ impl Contacts {
     }
 }
 
-impl Outcome<Found<Contact>, { PairKind::ALL.len() }> for Contacts {
+impl Outcome<Found<Contact>, { PairKind::ALL.len() }> for StepContacts {
     fn begin(&mut self, plan: &Plan) {
         self.impacts.begin(plan);
         if let Some(start) = self.start {

@@ -287,7 +287,7 @@ macro_rules! kernels {
         }
 
         /// Every kernel's source and its bindings.
-        pub(crate) const ALL: &[(Source, &[super::pipeline::Entry])] = &[
+        pub(crate) const ALL: &[(Source, &[super::pipeline::BindingEntry])] = &[
             $(($source, <$bindings as super::pipeline::Bindings>::ENTRIES),)*
         ];
     };

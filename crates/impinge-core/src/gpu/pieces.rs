@@ -23,7 +23,7 @@ use std::ops::Range;
 use super::buffers::count;
 use super::topology::{DeviceClusters, Most, Weight, narrowed};
 use crate::boxes;
-use crate::bvh::bounds::Bounds;
+use crate::bvh::bounds::Aabb;
 use crate::bvh::clusters::Clustering;
 use crate::bvh::for_each;
 use crate::bvh::tree::TreeShape;
@@ -39,14 +39,14 @@ use crate::search::runner::Job;
 pub struct ClusterRun {
     part: PartIx,
     clusters: Range<usize>,
-    bounds: Bounds,
+    bounds: Aabb,
 }
 
 /// Consecutive runs, at most one per part.
 #[derive(Debug)]
 pub struct Chunk {
     pub runs: Vec<ClusterRun>,
-    bounds: Bounds,
+    bounds: Aabb,
 }
 
 /// Cuts the clusters of a frame into chunks that weigh at most `most`, but have at least one
@@ -77,7 +77,7 @@ pub fn cut<'a>(
                 weight.add_cluster(count(n), count(n_vertices));
                 chunks.push(Chunk {
                     runs: Vec::new(),
-                    bounds: Bounds::EMPTY,
+                    bounds: Aabb::EMPTY,
                 });
             }
             let runs = &mut chunks.last_mut().expect("just pushed").runs;
@@ -86,7 +86,7 @@ pub fn cut<'a>(
                 _ => runs.push(ClusterRun {
                     part,
                     clusters: cluster.index()..cluster.index() + 1,
-                    bounds: Bounds::EMPTY,
+                    bounds: Aabb::EMPTY,
                 }),
             }
         }

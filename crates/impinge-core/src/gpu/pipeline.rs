@@ -9,7 +9,7 @@ use super::device::Device;
 
 /// One binding as a kernel declares it.
 #[derive(Debug, Clone, Copy)]
-pub struct Entry {
+pub struct BindingEntry {
     /// Its name in the kernel; tests compare the two.
     pub name: &'static str,
     /// How the kernel uses it.
@@ -21,7 +21,7 @@ pub struct Entry {
 /// All bindings of a kernel, in the order of their numbers.
 pub trait Bindings {
     /// The bindings as the kernel declares them.
-    const ENTRIES: &'static [Entry];
+    const ENTRIES: &'static [BindingEntry];
     /// What is bound, in the same order.
     fn bound(&self) -> Vec<Bound>;
 }
@@ -37,8 +37,8 @@ macro_rules! bindings {
         }
 
         impl $crate::gpu::pipeline::Bindings for $name {
-            const ENTRIES: &'static [$crate::gpu::pipeline::Entry] = &[
-                $($crate::gpu::pipeline::Entry {
+            const ENTRIES: &'static [$crate::gpu::pipeline::BindingEntry] = &[
+                $($crate::gpu::pipeline::BindingEntry {
                     name: stringify!($field),
                     access: <$crate::gpu::buffers::$access<$type>
                         as $crate::gpu::buffers::Binding>::ACCESS,
@@ -108,7 +108,7 @@ impl<B> fmt::Debug for Kernel<B> {
 pub struct Program {
     source: Source,
     constants: &'static [(&'static str, f64)],
-    entries: &'static [Entry],
+    entries: &'static [BindingEntry],
     /// Replaces the text of `source`, for tests.
     damaged: Option<String>,
     compiled: OnceLock<Compiled>,
@@ -132,7 +132,7 @@ impl Compiled {
         name: &str,
         text: String,
         constants: &[(&str, f64)],
-        entries: &[Entry],
+        entries: &[BindingEntry],
     ) -> Self {
         let entries: Vec<wgpu::BindGroupLayoutEntry> = (0u32..)
             .zip(entries)
@@ -215,7 +215,7 @@ impl Program {
         self.source.name
     }
 
-    pub(super) fn entries(&self) -> &'static [Entry] {
+    pub(super) fn entries(&self) -> &'static [BindingEntry] {
         self.entries
     }
 

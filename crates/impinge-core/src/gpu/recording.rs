@@ -12,7 +12,7 @@ use super::buffers::{Access, Bound, Slice, Storage, count, read};
 use super::layout::{Arguments, Params, Step};
 use super::open::GpuContext;
 use super::pass_buffers::PassBuffers;
-use super::pipeline::{Bindings, Entry, Kernel, Program};
+use super::pipeline::{BindingEntry, Bindings, Kernel, Program};
 use super::view::{Motion, View};
 use super::world::DeviceWorld;
 use crate::scene::error::Error;
@@ -141,7 +141,7 @@ impl Launch {
     }
 
     /// The buffers that the kernel uses in one way, each with its binding.
-    fn used(&self, access: Access) -> impl Iterator<Item = (&'static Entry, &Slice)> {
+    fn used(&self, access: Access) -> impl Iterator<Item = (&'static BindingEntry, &Slice)> {
         let entries = self.program.entries().iter().zip(&self.bound);
         entries.filter_map(move |(entry, bound)| match bound {
             Bound::Buffer(slice) if entry.access == access => Some((entry, slice)),

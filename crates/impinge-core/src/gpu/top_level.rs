@@ -1,6 +1,6 @@
 //! All trees of a frame, or of a piece of one, in one array of nodes: see [`world`](super::world).
 
-use crate::bvh::bounds::Bounds;
+use crate::bvh::bounds::Aabb;
 use crate::bvh::tree::{FANOUT, TreeEntry, TreeShape, order};
 
 use super::layout::{Level, NO_ROOT, Node, NodePair};
@@ -208,9 +208,9 @@ impl Top {
         let boxes = self.entries.chunks(FANOUT);
         boxes
             .map(|entries| {
-                let mut bounds = Bounds::EMPTY;
+                let mut bounds = Aabb::EMPTY;
                 for entry in entries {
-                    bounds.join(&Bounds {
+                    bounds.join(&Aabb {
                         min: entry.center(),
                         max: entry.center(),
                     });

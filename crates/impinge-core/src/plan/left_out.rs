@@ -23,18 +23,18 @@ pub(crate) struct LeftOut {
     /// Whether some vertices are marked: pinned, or in groups that do not meet.
     is_marked: bool,
     groups: BTreeSet<(u32, u32)>,
-    vertices: Vec<Listed>,
+    vertices: Vec<VertexList>,
     pairs: Vec<SortedKeys>,
 }
 
 /// For each vertex of one body, vertices of another, or of the same.
 #[derive(Debug, Clone)]
-struct Listed {
+struct VertexList {
     bodies: [BodyId; 2],
     lists: Arc<VertexRings>,
 }
 
-impl Listed {
+impl VertexList {
     /// Whether some vertex of either element is listed with one of the other.
     #[inline]
     fn has(&self, bodies: [BodyId; 2], [a, b]: [&[u32]; 2]) -> bool {
@@ -155,7 +155,7 @@ impl Plan {
             // Pairs of a body that is no longer there are none.
             if let [Ok(a), Ok(b)] = bodies.map(|body| scene.body(body)) {
                 let lists = lists.sorted([a.n_vertices(), b.n_vertices()])?;
-                vertices.push(Listed { bodies, lists });
+                vertices.push(VertexList { bodies, lists });
             }
         }
         let of_part = |part: PartIx| {

@@ -15,7 +15,7 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 use crate::boxes::{self, Extent};
-use crate::bvh::bounds::Bounds;
+use crate::bvh::bounds::Aabb;
 use crate::cpu::top_level::TopLevel;
 use crate::cpu::traversal::NodePair;
 use crate::plan::Plan;
@@ -39,7 +39,7 @@ pub(super) struct Bodies {
     scene: u64,
     /// The slot and the stamp of the positions of each part's body.
     stamps: Vec<(u32, u64)>,
-    boxes: Vec<Bounds>,
+    boxes: Vec<Aabb>,
     tree: TopLevel,
     stack: Vec<NodePair>,
 }
@@ -75,7 +75,7 @@ impl Bodies {
         }
         self.scene = 0;
         self.stamps.resize(n, (u32::MAX, 0));
-        self.boxes.resize(n, Bounds::EMPTY);
+        self.boxes.resize(n, Aabb::EMPTY);
         for (ix, part) in plan.numbered_parts() {
             let body = plan.body(scene, ix);
             let stamp = (part.id.slot(), body.positions_stamp());
@@ -93,7 +93,7 @@ impl Bodies {
     }
 
     /// The boxes of two parts' bodies.
-    pub fn boxes(&self, parts: [PartIx; 2]) -> [&Bounds; 2] {
+    pub fn boxes(&self, parts: [PartIx; 2]) -> [&Aabb; 2] {
         parts.map(|part| &self.boxes[part.index()])
     }
 
@@ -114,7 +114,7 @@ impl Bodies {
         let few = last.filter(|last| last.index() < self.boxes.len() / FEW);
         let found = with_isa!(self.isa, overlapping, (
             tree: &TopLevel = &self.tree,
-            few: Option<&[Bounds]> = few.map(|last| &self.boxes[..=last.index()]),
+            few: Option<&[Aabb]> = few.map(|last| &self.boxes[..=last.index()]),
             stack: &mut Vec<NodePair> = &mut self.stack,
             each: &mut Each<'_> = each,
         ) -> Result<(), Option<Error>>);
@@ -137,7 +137,7 @@ impl Bodies {
 fn overlapping<S: Simd>(
     simd: S,
     tree: &TopLevel,
-    few: Option<&[Bounds]>,
+    few: Option<&[Aabb]>,
     stack: &mut Vec<NodePair>,
     each: &mut Each<'_>,
 ) -> Result<(), Option<Error>> {
@@ -215,12 +215,7 @@ const MOST_VERTICES: usize = 1024;
 /// most whose boxes are near are told apart so.
 ///
 /// `error` is what rounding may do to heights along that way, and to a distance that is computed.
-pub(super) fn are_apart(
-    bodies: [&Body; 2],
-    boxes: [&Bounds; 2],
-    distance: f64,
-    error: f64,
-) -> bool {
+pub(super) fn are_apart(bodies: [&Body; 2], boxes: [&Aabb; 2], distance: f64, error: f64) -> bool {
     if bodies.iter().any(|body| body.n_vertices() > MOST_VERTICES) {
         return false;
     }
@@ -290,7 +285,7 @@ fn compare(
     bodies: [&Body; 2],
     trees: [&Tree; 2],
     nodes: [Node; 2],
-    common: Bounds,
+    common: Aabb,
     allowance: &mut Allowance,
 ) -> Option<bool> {
     let common = Extent::from(&common);

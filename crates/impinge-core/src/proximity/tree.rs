@@ -6,7 +6,7 @@
 use std::sync::Arc;
 
 use crate::boxes::{self, Extent};
-use crate::bvh::bounds::Bounds;
+use crate::bvh::bounds::Aabb;
 use crate::bvh::clusters::Clustering;
 pub(crate) use crate::bvh::tree::Node;
 use crate::clusterings::{Fit, spread};
@@ -21,7 +21,7 @@ pub(crate) struct Tree {
     topology_stamp: u64,
     positions_stamp: u64,
     /// The boxes of each level's nodes, from the clusters up.
-    levels: Vec<Vec<Bounds>>,
+    levels: Vec<Vec<Aabb>>,
     /// How well the clusters have fitted the body.
     pub fit: Fit,
 }
@@ -61,7 +61,7 @@ impl Tree {
             let nodes = 0..shape.n_nodes(level);
             let boxes = nodes
                 .map(|node| {
-                    let mut all = Bounds::EMPTY;
+                    let mut all = Aabb::EMPTY;
                     below[shape.children(level, node)]
                         .iter()
                         .for_each(|one| all.join(one));
@@ -74,7 +74,7 @@ impl Tree {
     }
 
     /// The boxes of each level's nodes, from the clusters up.
-    pub fn levels(&self) -> &[Vec<Bounds>] {
+    pub fn levels(&self) -> &[Vec<Aabb>] {
         &self.levels
     }
 
@@ -83,7 +83,7 @@ impl Tree {
         let (Some(clusters), Some(root)) = (self.levels.first(), self.root()) else {
             return 1.0;
         };
-        let surface = clusters.iter().map(Bounds::half_area).sum();
+        let surface = clusters.iter().map(Aabb::half_area).sum();
         spread(surface, self.bounds_f32(root).half_area())
     }
 
@@ -106,7 +106,7 @@ impl Tree {
         Extent::from(&self.bounds_f32(node))
     }
 
-    pub fn bounds_f32(&self, node: Node) -> Bounds {
+    pub fn bounds_f32(&self, node: Node) -> Aabb {
         self.levels[node.level as usize][node.number as usize]
     }
 

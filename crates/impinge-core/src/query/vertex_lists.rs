@@ -8,9 +8,9 @@ use crate::scene::ids::BodyId;
 
 /// For each vertex of one body, vertices of another, or of the same.
 #[derive(Clone)]
-pub(crate) struct VertexLists(Arc<Held>);
+pub(crate) struct VertexLists(Arc<ListsByVertex>);
 
-struct Held {
+struct ListsByVertex {
     bodies: [BodyId; 2],
     offsets: Vec<u64>,
     vertices: Vec<u32>,
@@ -36,7 +36,7 @@ impl std::fmt::Debug for VertexLists {
 
 impl VertexLists {
     pub fn new(bodies: [BodyId; 2], offsets: Vec<u64>, vertices: Vec<u32>) -> Self {
-        VertexLists(Arc::new(Held {
+        VertexLists(Arc::new(ListsByVertex {
             bodies,
             offsets,
             vertices,
@@ -56,7 +56,7 @@ impl VertexLists {
     /// Offsets of another number of vertices, or that do not ascend from 0 to the number of listed
     /// vertices; a vertex that does not exist.
     pub fn sorted(&self, n_vertices: [usize; 2]) -> Result<Arc<VertexRings>, Error> {
-        let Held { bodies, sorted, .. } = &*self.0;
+        let ListsByVertex { bodies, sorted, .. } = &*self.0;
         let mut sorted = sorted.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some((of, lists)) = &*sorted
             && *of == n_vertices
@@ -86,7 +86,7 @@ impl VertexLists {
     }
 
     fn check(&self, n_vertices: [usize; 2]) -> Result<(), Error> {
-        let Held {
+        let ListsByVertex {
             bodies,
             offsets,
             vertices,

@@ -11,36 +11,36 @@ use crate::scene::ids::{BodyId, new_stamp};
 /// [`Scene::set_thickness`](crate::Scene::set_thickness).
 #[derive(Debug, Clone, PartialEq)]
 #[must_use]
-pub struct Thickness<'a>(Given<'a>);
+pub struct Thickness<'a>(GivenThickness<'a>);
 
 #[derive(Debug, Clone, PartialEq)]
-enum Given<'a> {
+enum GivenThickness<'a> {
     One(f64),
     Each(Part, Cow<'a, [f64]>),
 }
 
 impl From<f64> for Thickness<'_> {
     fn from(one: f64) -> Self {
-        Thickness(Given::One(one))
+        Thickness(GivenThickness::One(one))
     }
 }
 
 impl<'a> Thickness<'a> {
     /// One number per vertex. An edge or a face is as thick as the thickest of its vertices.
     pub fn vertices(each: impl Into<Cow<'a, [f64]>>) -> Self {
-        Thickness(Given::Each(Part::Vertices, each.into()))
+        Thickness(GivenThickness::Each(Part::Vertices, each.into()))
     }
 
     /// One number per [edge](crate::Body::edges). A vertex is as thick as the thickest edge that
     /// has it, a face as the thickest of its edges.
     pub fn edges(each: impl Into<Cow<'a, [f64]>>) -> Self {
-        Thickness(Given::Each(Part::Edges, each.into()))
+        Thickness(GivenThickness::Each(Part::Edges, each.into()))
     }
 
     /// One number per [face](crate::Body::faces). A vertex or an edge is as thick as the thickest
     /// face that has it.
     pub fn faces(each: impl Into<Cow<'a, [f64]>>) -> Self {
-        Thickness(Given::Each(Part::Faces, each.into()))
+        Thickness(GivenThickness::Each(Part::Faces, each.into()))
     }
 
     /// How thick the elements of a body are.
@@ -54,16 +54,16 @@ impl<'a> Thickness<'a> {
         n_vertices: usize,
     ) -> Result<HeldThickness, Error> {
         match self.0 {
-            Given::One(one) if is_length(one) => Ok(HeldThickness {
+            GivenThickness::One(one) if is_length(one) => Ok(HeldThickness {
                 most: one,
                 each: None,
             }),
-            Given::One(one) => Err(Error::Setting {
+            GivenThickness::One(one) => Err(Error::Setting {
                 setting: "thickness",
                 given: one.to_string(),
                 allowed: "a finite number that is not below 0",
             }),
-            Given::Each(part, given) => {
+            GivenThickness::Each(part, given) => {
                 let n = match part {
                     Part::Vertices => n_vertices,
                     _ => of.part(part).len(),

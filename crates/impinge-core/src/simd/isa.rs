@@ -1,6 +1,6 @@
 //! Which instruction set is used, and how a kernel is compiled once per set.
 
-use crate::bvh::bounds::Bounds;
+use crate::bvh::bounds::Aabb;
 use crate::query::settings::InstructionSet;
 
 use super::{LaneBounds, Simd};
@@ -118,11 +118,11 @@ fn all_closest<S: Simd>(_: S, pairs: &[PairAtPart], found: &mut [Option<NearestP
 
 /// For each query, which of the lanes of `among` it overlaps: `overlaps_64` for callers that are
 /// not themselves compiled once per instruction set. Answers as many queries as there are masks.
-pub fn masks(isa: Isa, boxes: &LaneBounds, among: u64, queries: &[Bounds], masks: &mut [u64]) {
+pub fn masks(isa: Isa, boxes: &LaneBounds, among: u64, queries: &[Aabb], masks: &mut [u64]) {
     with_isa!(isa, all_masks, (
         boxes: &LaneBounds = boxes,
         among: u64 = among,
-        queries: &[Bounds] = queries,
+        queries: &[Aabb] = queries,
         masks: &mut [u64] = masks,
     ));
 }
@@ -132,7 +132,7 @@ fn all_masks<S: Simd>(
     simd: S,
     boxes: &LaneBounds,
     among: u64,
-    queries: &[Bounds],
+    queries: &[Aabb],
     masks: &mut [u64],
 ) {
     for (mask, query) in masks.iter_mut().zip(queries) {

@@ -11,7 +11,7 @@
 use crate::bvh::CHUNK;
 use crate::bvh::GROUP;
 pub use crate::bvh::bounds::LaneBounds;
-use crate::bvh::bounds::{Bounds, BoundsArray};
+use crate::bvh::bounds::{Aabb, BoundsArray};
 use crate::bvh::clusters::LocalFaces;
 use impinge_exact::internal::filter::number::{self, Lookup, Vector};
 use impinge_exact::internal::filter::{BATCH, LANES, Triangles64};
@@ -87,10 +87,10 @@ pub(crate) trait Simd: ReadVertices {
     type F32: Lookup;
 
     /// Bit `k`: box `first + k` overlaps `query`, for `k` below 8.
-    fn overlaps_8(self, boxes: &BoundsArray, first: usize, query: &Bounds) -> u32;
+    fn overlaps_8(self, boxes: &BoundsArray, first: usize, query: &Aabb) -> u32;
 
     /// Bit `k`: lane `k` overlaps `query`; only lanes of `among` are tested.
-    fn overlaps_64(self, boxes: &LaneBounds, query: &Bounds, among: u64) -> u64;
+    fn overlaps_64(self, boxes: &LaneBounds, query: &Aabb, among: u64) -> u64;
 
     /// Bit `k`: lane `k`, whose box moves from `start` to `end`, is not beside `query` on the same
     /// side of one axis at both ends; only lanes of `among` are tested. A box that is beside it at
@@ -99,7 +99,7 @@ pub(crate) trait Simd: ReadVertices {
     fn meets_64(
         self,
         [start, end]: [&LaneBounds; 2],
-        [query_start, query_end]: &[Bounds; 2],
+        [query_start, query_end]: &[Aabb; 2],
         among: u64,
     ) -> u64 {
         let mut mask = 0;
@@ -348,7 +348,7 @@ pub(crate) struct Portable;
 
 impl ReadVertices for Portable {
     #[inline(always)]
-    unsafe fn of_ascending(self, positions: &[[f32; 3]], vertices: &[u32]) -> (Bounds, bool) {
+    unsafe fn of_ascending(self, positions: &[[f32; 3]], vertices: &[u32]) -> (Aabb, bool) {
         of_vertices_f32(positions, vertices)
     }
 }
@@ -366,25 +366,25 @@ impl Simd for Portable {
 
     #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
     #[inline(always)]
-    fn overlaps_8(self, boxes: &BoundsArray, first: usize, query: &Bounds) -> u32 {
+    fn overlaps_8(self, boxes: &BoundsArray, first: usize, query: &Aabb) -> u32 {
         wasm::overlaps_8(boxes, first, query)
     }
 
     #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
     #[inline(always)]
-    fn overlaps_64(self, boxes: &LaneBounds, query: &Bounds, among: u64) -> u64 {
+    fn overlaps_64(self, boxes: &LaneBounds, query: &Aabb, among: u64) -> u64 {
         wasm::overlaps_64(boxes, query, among)
     }
 
     #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
     #[inline(always)]
-    fn meets_64(self, boxes: [&LaneBounds; 2], query: &[Bounds; 2], among: u64) -> u64 {
+    fn meets_64(self, boxes: [&LaneBounds; 2], query: &[Aabb; 2], among: u64) -> u64 {
         wasm::meets_64(boxes, query, among)
     }
 
     #[cfg(not(all(target_arch = "wasm32", target_feature = "simd128")))]
     #[inline(always)]
-    fn overlaps_8(self, boxes: &BoundsArray, first: usize, query: &Bounds) -> u32 {
+    fn overlaps_8(self, boxes: &BoundsArray, first: usize, query: &Aabb) -> u32 {
         let mut overlap = [1u8; 8];
         for axis in 0..3 {
             let min: &[f32; 8] = boxes.min[axis][first..].first_chunk().expect("padded");
@@ -399,7 +399,7 @@ impl Simd for Portable {
 
     #[cfg(not(all(target_arch = "wasm32", target_feature = "simd128")))]
     #[inline(always)]
-    fn overlaps_64(self, boxes: &LaneBounds, query: &Bounds, among: u64) -> u64 {
+    fn overlaps_64(self, boxes: &LaneBounds, query: &Aabb, among: u64) -> u64 {
         let mut mask = 0;
         for chunk in 0..8 {
             if among >> (8 * chunk) & 0xff == 0 {

@@ -9,7 +9,7 @@ use std::arch::wasm32::{f32x4_le, f32x4_splat, i32x4_bitmask, v128, v128_and, v1
 use impinge_exact::internal::filter::number::memory::read;
 
 use super::LaneBounds;
-use crate::bvh::bounds::{Bounds, BoundsArray};
+use crate::bvh::bounds::{Aabb, BoundsArray};
 
 /// Lanes of a register.
 const FOUR: usize = 4;
@@ -22,7 +22,7 @@ fn load(row: &[f32], first: usize) -> v128 {
 
 /// Bit `k`: box `first + k` overlaps `query`, for `k` below 4.
 #[inline(always)]
-fn overlaps_4(min: [&[f32]; 3], max: [&[f32]; 3], first: usize, query: &Bounds) -> u32 {
+fn overlaps_4(min: [&[f32]; 3], max: [&[f32]; 3], first: usize, query: &Aabb) -> u32 {
     let axis = |axis: usize| {
         let below = f32x4_le(load(min[axis], first), f32x4_splat(query.max[axis]));
         let above = f32x4_le(f32x4_splat(query.min[axis]), load(max[axis], first));
@@ -34,7 +34,7 @@ fn overlaps_4(min: [&[f32]; 3], max: [&[f32]; 3], first: usize, query: &Bounds) 
 
 /// See [`Simd::overlaps_8`](super::Simd::overlaps_8).
 #[inline(never)]
-pub fn overlaps_8(boxes: &BoundsArray, first: usize, query: &Bounds) -> u32 {
+pub fn overlaps_8(boxes: &BoundsArray, first: usize, query: &Aabb) -> u32 {
     let min = [0, 1, 2].map(|axis| &boxes.min[axis][..]);
     let max = [0, 1, 2].map(|axis| &boxes.max[axis][..]);
     overlaps_4(min, max, first, query) | overlaps_4(min, max, first + FOUR, query) << FOUR
@@ -42,7 +42,7 @@ pub fn overlaps_8(boxes: &BoundsArray, first: usize, query: &Bounds) -> u32 {
 
 /// See [`Simd::overlaps_64`](super::Simd::overlaps_64).
 #[inline(never)]
-pub fn overlaps_64(boxes: &LaneBounds, query: &Bounds, among: u64) -> u64 {
+pub fn overlaps_64(boxes: &LaneBounds, query: &Aabb, among: u64) -> u64 {
     let min = [0, 1, 2].map(|axis| &boxes.min[axis][..]);
     let max = [0, 1, 2].map(|axis| &boxes.max[axis][..]);
     by_fours(among, |first| overlaps_4(min, max, first, query))
@@ -52,15 +52,15 @@ pub fn overlaps_64(boxes: &LaneBounds, query: &Bounds, among: u64) -> u64 {
 #[inline(never)]
 pub fn meets_64(
     [start, end]: [&LaneBounds; 2],
-    [query_start, query_end]: &[Bounds; 2],
+    [query_start, query_end]: &[Aabb; 2],
     among: u64,
 ) -> u64 {
     by_fours(among, |first| {
         let axis = |axis: usize| {
-            let below = |boxes: &LaneBounds, query: &Bounds| {
+            let below = |boxes: &LaneBounds, query: &Aabb| {
                 f32x4_le(load(&boxes.min[axis], first), f32x4_splat(query.max[axis]))
             };
-            let above = |boxes: &LaneBounds, query: &Bounds| {
+            let above = |boxes: &LaneBounds, query: &Aabb| {
                 f32x4_le(f32x4_splat(query.min[axis]), load(&boxes.max[axis], first))
             };
             v128_and(

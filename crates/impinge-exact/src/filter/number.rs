@@ -26,20 +26,20 @@ pub trait Number:
         + Not<Output = Self::Mask>;
 
     /// What rounding, underflow and overflow may do to these numbers.
-    const LIMITS: Limits;
-    /// See [`Limits::bound`].
+    const LIMITS: FormatLimits;
+    /// See [`FormatLimits::bound`].
     const BOUND: f64 = Self::LIMITS.bound;
-    /// See [`Limits::underflow`].
+    /// See [`FormatLimits::underflow`].
     const UNDERFLOW: f64 = Self::LIMITS.underflow;
-    /// See [`Limits::underflow_per_size`].
+    /// See [`FormatLimits::underflow_per_size`].
     const UNDERFLOW_PER_SIZE: f64 = Self::LIMITS.underflow_per_size;
-    /// See [`Limits::headroom`].
+    /// See [`FormatLimits::headroom`].
     const HEADROOM: f64 = Self::LIMITS.headroom;
-    /// See [`Limits::largest`].
+    /// See [`FormatLimits::largest`].
     const LARGEST: f64 = Self::LIMITS.largest;
-    /// See [`Limits::tiny`].
+    /// See [`FormatLimits::tiny`].
     const TINY: [f64; 3] = Self::LIMITS.tiny;
-    /// See [`Limits::shortest`].
+    /// See [`FormatLimits::shortest`].
     const SHORTEST: f64 = Self::LIMITS.shortest;
 
     /// A bound plus the error that underflow may add.
@@ -135,7 +135,7 @@ mod sealed {
 
 /// What rounding, underflow and overflow may do to numbers of a format.
 #[derive(Debug, Clone, Copy)]
-pub struct Limits {
+pub struct FormatLimits {
     /// 64 unit roundoffs: the error of a determinant, relative to the product of its vectors'
     /// sizes. The derivation needs a little more than 60.
     pub bound: f64,
@@ -159,9 +159,9 @@ pub struct Limits {
     pub shortest: f64,
 }
 
-impl Limits {
+impl FormatLimits {
     /// Of double precision.
-    pub const F64: Limits = Limits {
+    pub const F64: FormatLimits = FormatLimits {
         bound: power(-47),
         underflow: power(-1000),
         underflow_per_size: power(-900),
@@ -171,7 +171,7 @@ impl Limits {
         shortest: power(-450),
     };
     /// Of single precision.
-    pub const F32: Limits = Limits {
+    pub const F32: FormatLimits = FormatLimits {
         bound: power(-18),
         underflow: power(-69),
         underflow_per_size: 0.0,
@@ -189,7 +189,7 @@ const fn power(exponent: i64) -> f64 {
 
 impl Number for f64 {
     type Mask = bool;
-    const LIMITS: Limits = Limits::F64;
+    const LIMITS: FormatLimits = FormatLimits::F64;
 
     #[inline(always)]
     fn splat(x: f64) -> Self {

@@ -10,7 +10,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use impinge_core::cpu::cells::Rule;
-use impinge_core::cpu::cull_map::Kept;
+use impinge_core::cpu::cull_map::InRegion;
 use impinge_core::cpu::narrow::{Candidate, Decider};
 use impinge_core::cpu::subcells::SubcellQuery;
 use impinge_core::cpu::world::World;
@@ -126,7 +126,7 @@ impl Rule for Insert<'_> {
     }
 
     #[inline(always)]
-    fn admits(&self, a: &Kept, b: &Kept, _: &mut Vec<u64>) -> bool {
+    fn admits(&self, a: &InRegion, b: &InRegion, _: &mut Vec<u64>) -> bool {
         let (a, b) = (a.primitive.raw(), b.primitive.raw());
         let pair = u64::from(a) << 32 | u64::from(b);
         let slot = &self.slots[djb2(a, b) as usize % self.slots.len()];

@@ -1,7 +1,7 @@
 //! Rules for a pair found in a cell, in place of impinge's owner rule.
 
 use impinge_core::cpu::cells::Rule;
-use impinge_core::cpu::cull_map::Kept;
+use impinge_core::cpu::cull_map::InRegion;
 use impinge_core::cpu::subcells::SubcellQuery;
 use impinge_core::plan::{Plan, pair_key};
 
@@ -27,7 +27,7 @@ impl Rule for Every {
     }
 
     #[inline(always)]
-    fn admits(&self, _: &Kept, _: &Kept, _: &mut Vec<u64>) -> bool {
+    fn admits(&self, _: &InRegion, _: &InRegion, _: &mut Vec<u64>) -> bool {
         true
     }
 }
@@ -44,7 +44,7 @@ impl Rule for Recorded<'_> {
     }
 
     #[inline(always)]
-    fn admits(&self, a: &Kept, b: &Kept, keys: &mut Vec<u64>) -> bool {
+    fn admits(&self, a: &InRegion, b: &InRegion, keys: &mut Vec<u64>) -> bool {
         let [a, b] = [a, b].map(|kept| self.plan.part(kept.part).number(kept.primitive));
         keys.push(pair_key(a, b));
         false

@@ -170,7 +170,7 @@ macro_rules! kernels {
         }
 
         /// The source and the bindings of every kernel.
-        fn all() -> Vec<(Source, &'static [impinge_core::gpu::pipeline::Entry])> {
+        fn all() -> Vec<(Source, &'static [impinge_core::gpu::pipeline::BindingEntry])> {
             use impinge_core::gpu::pipeline::Bindings;
             vec![$((source::$name(), $bindings::ENTRIES),)*]
         }

@@ -18,7 +18,7 @@ mod codes;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 
-use crate::bvh::bounds::Bounds;
+use crate::bvh::bounds::Aabb;
 use crate::bvh::grid::Grid;
 use crate::query::tuning::Tuning;
 use crate::scene::elements::with_corners;
@@ -104,7 +104,7 @@ impl Cull {
 
     /// Prepares for a frame of at most [`MOST_MAPS`](Self::MOST_MAPS) parts, which meet within the
     /// region; their primitives come in `n_runs` runs.
-    pub fn begin(&mut self, world: World<'_>, region: &Bounds, n_runs: usize, tuning: &Tuning) {
+    pub fn begin(&mut self, world: World<'_>, region: &Aabb, n_runs: usize, tuning: &Tuning) {
         self.most_marked = tuning.most_marked;
         let plan = world.plan;
         let wanted = plan.n_primitives() / tuning.map_cell.max(1);
@@ -175,7 +175,7 @@ impl Cull {
     }
 
     /// Lists the primitives of a run that are near `reach`, and marks their cells.
-    pub fn mark(&self, world: World<'_>, run: BoundsTask, run_ix: usize, reach: &Bounds) {
+    pub fn mark(&self, world: World<'_>, run: BoundsTask, run_ix: usize, reach: &Aabb) {
         let mut near = self.near[run_ix].lock().expect("no task panics");
         near.clear();
         let body = world.body(run.part);

@@ -3,7 +3,7 @@
 
 use std::ops::Range;
 
-use crate::bvh::bounds::Bounds;
+use crate::bvh::bounds::Aabb;
 use crate::bvh::clusters::Clustering;
 use crate::cpu::bounds::TreeBounds;
 use crate::query::tuning::Tuning;
@@ -104,7 +104,7 @@ impl Culled {
     }
 
     /// The groups that are not beside a box.
-    pub(super) fn back_at(&self, other: &Bounds) -> FreeSides {
+    pub(super) fn back_at(&self, other: &Aabb) -> FreeSides {
         self.groups.back_at(other)
     }
 
@@ -155,8 +155,8 @@ impl Culled {
         clustering: &Clustering,
         n_vertices: usize,
         bounds: &mut TreeBounds,
-        whole: &Bounds,
-        others: &Bounds,
+        whole: &Aabb,
+        others: &Aabb,
     ) -> bool {
         let [leaves, parents, ..] = &mut bounds.levels[..] else {
             return false;
@@ -193,7 +193,7 @@ impl Culled {
         self.groups.clear(unsorted);
         for &(cluster, side) in &self.fresh {
             self.groups.extend(side, &leaves.at(cluster.index()));
-            leaves.put(cluster.index(), &Bounds::EMPTY);
+            leaves.put(cluster.index(), &Aabb::EMPTY);
             for &vertex in clustering.vertices(cluster) {
                 extents::insert(&mut self.members, vertex, side);
             }
@@ -202,7 +202,7 @@ impl Culled {
         let mut near = self.near.iter().map(|near| near.node as usize).peekable();
         for node in 0..parents.len() {
             if near.next_if_eq(&node).is_none() {
-                parents.put(node, &Bounds::EMPTY);
+                parents.put(node, &Aabb::EMPTY);
             }
         }
         true
@@ -233,7 +233,7 @@ impl Culled {
 
 /// The side on which a box is farthest beside others, measured in units of that side's slack;
 /// `None` if no gap is larger than its slack.
-fn side(cluster: &Bounds, others: &Bounds, slack: &[f32; 6]) -> Option<FreeSide> {
+fn side(cluster: &Aabb, others: &Aabb, slack: &[f32; 6]) -> Option<FreeSide> {
     let mut best = None;
     let mut farthest = 1.0;
     for axis in 0..3 {

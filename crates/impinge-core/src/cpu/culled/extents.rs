@@ -5,7 +5,7 @@
 //! fill three 512-bit registers of interleaved x, y, z. Axes are separated once, after the last
 //! run. Cost: 12 bytes of positions and 0.75 bytes of membership per vertex, read once.
 
-use crate::bvh::bounds::{Bounds, greater, lesser};
+use crate::bvh::bounds::{Aabb, greater, lesser};
 
 use crate::simd::Simd;
 use crate::simd::runs::{COORDINATES, Members, ROW, RUN, RunExtents};
@@ -42,7 +42,7 @@ pub(super) fn clear(members: &mut [Members], groups: FreeSides) {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Extents {
     /// The box of all of these vertices.
-    pub whole: Bounds,
+    pub whole: Aabb,
     pub(super) groups: Intervals,
     /// Whether all positions are certainly finite. If not, the other fields mean nothing.
     pub all_finite: bool,
@@ -51,13 +51,13 @@ pub(crate) struct Extents {
 impl Extents {
     /// The extents of no vertices.
     pub const EMPTY: Extents = Extents {
-        whole: Bounds::EMPTY,
+        whole: Aabb::EMPTY,
         groups: Intervals::EMPTY,
         all_finite: true,
     };
 
     /// The extents of vertices that were read for their boxes, and none for their groups.
-    pub fn without_groups(whole: Bounds, all_finite: bool) -> Extents {
+    pub fn without_groups(whole: Aabb, all_finite: bool) -> Extents {
         Extents {
             whole,
             all_finite,
@@ -69,7 +69,7 @@ impl Extents {
 /// The intervals that the groups span: those below along x, y and z, then those above. Each axis
 /// stands for itself, so these are not boxes. Sides without members have empty intervals.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Intervals([Bounds; 2]);
+pub(crate) struct Intervals([Aabb; 2]);
 
 impl Default for Intervals {
     fn default() -> Self {
@@ -78,7 +78,7 @@ impl Default for Intervals {
 }
 
 impl Intervals {
-    pub const EMPTY: Intervals = Intervals([Bounds::EMPTY; 2]);
+    pub const EMPTY: Intervals = Intervals([Aabb::EMPTY; 2]);
 
     /// Adds the intervals of other vertices.
     pub fn join(&mut self, other: &Intervals) {
@@ -88,7 +88,7 @@ impl Intervals {
     }
 
     /// Extends a group's interval to that of a box.
-    pub fn extend(&mut self, side: FreeSide, bounds: &Bounds) {
+    pub fn extend(&mut self, side: FreeSide, bounds: &Aabb) {
         let (groups, axis) = (&mut self.0[side.end()], side.axis());
         groups.min[axis] = lesser(groups.min[axis], bounds.min[axis]);
         groups.max[axis] = greater(groups.max[axis], bounds.max[axis]);
@@ -104,7 +104,7 @@ impl Intervals {
     }
 
     /// The groups that are not beside a box: the closed intervals share a number.
-    pub fn back_at(&self, other: &Bounds) -> FreeSides {
+    pub fn back_at(&self, other: &Aabb) -> FreeSides {
         let mut back = FreeSides::default();
         for side in FreeSides::ALL.sides() {
             let (groups, axis) = (&self.0[side.end()], side.axis());
@@ -223,7 +223,7 @@ mod tests {
     fn one_by_one(positions: &[[f32; 3]], members: &[Members]) -> Extents {
         let mut extents = Extents::EMPTY;
         for (vertex, point) in positions.iter().enumerate() {
-            let only = Bounds {
+            let only = Aabb {
                 min: *point,
                 max: *point,
             };

@@ -31,7 +31,7 @@ mod outlook;
 
 use std::sync::{Mutex, PoisonError};
 
-use crate::bvh::bounds::Bounds;
+use crate::bvh::bounds::Aabb;
 use crate::plan::Plan;
 use crate::query::settings::Settings;
 use crate::scene::Body;
@@ -140,7 +140,7 @@ pub(super) fn learn(job: Job<'_>, caches: &mut Caches, scratches: &mut [Worker])
         plan,
         caches: Some(caches),
     };
-    let mut others = [Bounds::EMPTY; MOST_BODIES];
+    let mut others = [Aabb::EMPTY; MOST_BODIES];
     for (part, others) in plan.part_ixs().zip(&mut others) {
         for other in lane_pairs(plan, part) {
             others.join(&world.cache(other).whole);
@@ -202,7 +202,7 @@ fn unsort(cache: &mut BodyCache) {
 struct Due<'a> {
     n_vertices: usize,
     cache: &'a mut BodyCache,
-    others: Bounds,
+    others: Aabb,
 }
 
 impl Due<'_> {

@@ -3,7 +3,7 @@
 
 use std::ops::RangeInclusive;
 
-use crate::bvh::bounds::{Bounds, greater};
+use crate::bvh::bounds::{Aabb, greater};
 use crate::query::tuning::Tuning;
 
 use super::extents::FreeSides;
@@ -60,7 +60,7 @@ impl Outlook {
     }
 
     /// The slacks for a body of this size.
-    pub fn slack(&self, whole: &Bounds) -> [f32; 6] {
+    pub fn slack(&self, whole: &Aabb) -> [f32; 6] {
         let sides = [0, 1, 2].map(|axis| whole.max[axis] - whole.min[axis]);
         let longest = greater(sides[0], greater(sides[1], sides[2]));
         self.slack.map(|slack| slack * longest)

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::boxes::{BoxSource, Sweep};
-use crate::bvh::bounds::{Bounds, BoundsArray, RawBoundsArray};
+use crate::bvh::bounds::{Aabb, BoundsArray, RawBoundsArray};
 use crate::bvh::clusters::Clustering;
 use crate::clusterings::{BodyPart, Clustered, Clusterings, Fit, Store, spread};
 use crate::cpu::bounds::TreeBounds;
@@ -54,12 +54,12 @@ pub(super) struct PartCache {
     /// The pairs with the body's vertices, edges and faces that the question excludes.
     excluded: [Option<Arc<ExcludedLanes>>; 3],
     /// Those of the last questions, the latest last.
-    kept: Vec<Kept>,
+    kept: Vec<Exclusions>,
 }
 
 /// The excluded pairs of a part with another of its body, and what they depend on.
 #[derive(Debug)]
-struct Kept {
+struct Exclusions {
     other: Arc<Clustering>,
     rule: OwnRule,
     /// `None` if there are too many.
@@ -106,7 +106,7 @@ impl PartCache {
 
     /// The boxes of a cluster at the start and at the end.
     #[inline(always)]
-    pub fn ends(&self, cluster: ClusterIx) -> [Bounds; 2] {
+    pub fn ends(&self, cluster: ClusterIx) -> [Aabb; 2] {
         self.ends.each_ref().map(|end| end.at(cluster.index()))
     }
 
@@ -122,7 +122,7 @@ impl PartCache {
     /// part's. Of boxes at the start without their inflation: where bodies move to, and how far
     /// boxes reach, differs from question to question.
     fn spread(&self, inflation: f64) -> f64 {
-        let (mut surface, mut whole) = (0.0, Bounds::EMPTY);
+        let (mut surface, mut whole) = (0.0, Aabb::EMPTY);
         for ix in 0..self.clustering.n_clusters() {
             let bounds = self.ends[0].at(ix);
             surface += bounds.half_area_within(inflation);
@@ -195,10 +195,10 @@ impl PartCache {
         rule: &OwnRule,
         work: Work<'_>,
     ) -> Result<Option<Arc<ExcludedLanes>>, Error> {
-        let is_same = |kept: &Kept| Arc::ptr_eq(&kept.other, &other) && kept.rule.is(rule);
+        let is_same = |kept: &Exclusions| Arc::ptr_eq(&kept.other, &other) && kept.rule.is(rule);
         let kept = match self.kept.iter().position(is_same) {
             Some(known) => self.kept.remove(known),
-            None => Kept {
+            None => Exclusions {
                 lanes: ExcludedLanes::new(plan, parts, [&self.clustering, &other], rule, work)?,
                 rule: rule.clone(),
                 other,

@@ -38,13 +38,13 @@ const WHAT: &str = "excluded pairs";
 pub(super) struct ExcludedLanes {
     /// Where the entries of each cluster of the first part start, and one past the last.
     starts: Vec<u32>,
-    entries: Vec<Entry>,
+    entries: Vec<ExcludedClusters>,
     lanes: Vec<u64>,
 }
 
 /// Two clusters with a pair that is excluded.
 #[derive(Debug, Clone, Copy)]
-struct Entry {
+struct ExcludedClusters {
     /// Of the second part; of one part, the first cluster or a later one.
     other: ClusterIx,
     /// Rows with excluded pairs: lanes of the first part.
@@ -87,7 +87,7 @@ impl ExcludedLanes {
             return Ok(None);
         }
         let is_own = parts[0] == parts[1];
-        let finder = Finder {
+        let finder = ExclusionFinder {
             clusterings,
             is_own,
             slots: SlotsOfVertices::new(clusterings[1])?,
@@ -96,11 +96,11 @@ impl ExcludedLanes {
         };
         let n = clusterings[0].n_clusters();
         let n_each = work.workers.task(CLUSTERS);
-        let tasks = (0..n).step_by(n_each).map(|first| Run {
+        let tasks = (0..n).step_by(n_each).map(|first| ExcludedRun {
             clusters: first..n.min(first + n_each),
-            ..Run::default()
+            ..ExcludedRun::default()
         });
-        let mut runs: Vec<Run> = tasks.collect();
+        let mut runs: Vec<ExcludedRun> = tasks.collect();
         work.each(&mut runs, |_, run| {
             let mut scratch = Scratch::default();
             for cluster in ClusterIx::each(run.clusters.clone()) {
@@ -123,7 +123,7 @@ impl ExcludedLanes {
             let [n_entries, n_lanes] = [all.entries.len(), all.lanes.len()];
             all.starts
                 .extend(run.ends.iter().map(|end| n_entries as u32 + end));
-            let moved = run.entries.iter().map(|entry| Entry {
+            let moved = run.entries.iter().map(|entry| ExcludedClusters {
                 first: n_lanes + entry.first,
                 ..*entry
             });
@@ -139,7 +139,7 @@ impl ExcludedLanes {
         let [start, end] = [0, 1].map(|next| self.starts[a.index() + next] as usize);
         let own = &self.entries[start..end];
         let found = own.binary_search_by_key(&b, |entry| entry.other).ok()?;
-        let Entry { rows, first, .. } = own[found];
+        let ExcludedClusters { rows, first, .. } = own[found];
         Some(ExcludedRows {
             rows,
             lanes: &self.lanes[first..][..rows.count_ones() as usize],
@@ -156,15 +156,15 @@ impl ExcludedLanes {
 
 /// What was found of some clusters.
 #[derive(Debug, Default)]
-struct Run {
+struct ExcludedRun {
     clusters: Range<usize>,
     /// Of each cluster, the entries up to its last one.
     ends: Vec<u32>,
-    entries: Vec<Entry>,
+    entries: Vec<ExcludedClusters>,
     lanes: Vec<u64>,
 }
 
-struct Finder<'a> {
+struct ExclusionFinder<'a> {
     clusterings: [&'a Clustering; 2],
     is_own: bool,
     slots: SlotsOfVertices,
@@ -175,7 +175,7 @@ struct Finder<'a> {
 
 /// Of some clusters, lanes by row.
 #[derive(Debug, Default)]
-struct Found {
+struct LanesByRow {
     clusters: Vec<ClusterIx>,
     /// `n_rows` for each cluster.
     lanes: Vec<u64>,
@@ -183,7 +183,7 @@ struct Found {
     last: usize,
 }
 
-impl Found {
+impl LanesByRow {
     fn begin(&mut self, n_rows: usize) {
         self.clusters.clear();
         self.lanes.clear();
@@ -219,15 +219,20 @@ impl Found {
 #[derive(Debug, Default)]
 struct Scratch {
     vertices: Vec<u32>,
-    by_vertex: Found,
-    by_lane: Found,
+    by_vertex: LanesByRow,
+    by_lane: LanesByRow,
     /// Clusters in the upper half, and where they are.
     order: Vec<u64>,
 }
 
-impl Finder<'_> {
+impl ExclusionFinder<'_> {
     /// Finds what is excluded of the elements of a cluster.
-    fn put(&self, cluster: ClusterIx, scratch: &mut Scratch, run: &mut Run) -> Result<(), Error> {
+    fn put(
+        &self,
+        cluster: ClusterIx,
+        scratch: &mut Scratch,
+        run: &mut ExcludedRun,
+    ) -> Result<(), Error> {
         let Scratch {
             vertices,
             by_vertex,
@@ -285,7 +290,7 @@ impl Finder<'_> {
             grow(&mut run.lanes, marked.count_ones() as usize, WHAT)?;
             run.lanes.extend(Lanes(marked).map(|row| rows[row]));
             grow(&mut run.entries, 1, WHAT)?;
-            run.entries.push(Entry {
+            run.entries.push(ExcludedClusters {
                 other: by_lane.clusters[ix],
                 rows: marked,
                 first,

@@ -4,7 +4,7 @@
 
 use crate::boxes::Extent;
 use crate::bvh::GROUP;
-use crate::bvh::bounds::Bounds;
+use crate::bvh::bounds::Aabb;
 use crate::cpu::group_cache::PerCluster;
 use crate::scene::elements::with_corners;
 use crate::scene::index::{ClusterIx, PartIx};
@@ -23,7 +23,7 @@ pub(super) struct StepGroup {
     pub start: LaneBounds,
     pub end: LaneBounds,
     /// The cluster's own boxes.
-    pub ends: [Bounds; 2],
+    pub ends: [Aabb; 2],
     /// The vertices of each corner; lists past an element's number of corners mean nothing.
     pub corners: [Lanes32; 3],
     pub n_corners: usize,
@@ -46,7 +46,7 @@ impl<'a> PerCluster<StepWorld<'a>> for StepGroup {
     const EMPTY: Self = StepGroup {
         start: LaneBounds::EMPTY,
         end: LaneBounds::EMPTY,
-        ends: [Bounds::EMPTY; 2],
+        ends: [Aabb::EMPTY; 2],
         corners: [const { Lanes32([0; GROUP]) }; 3],
         n_corners: 0,
         numbers: Lanes32([0; GROUP]),

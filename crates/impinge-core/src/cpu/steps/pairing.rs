@@ -13,11 +13,11 @@ use std::time::Duration;
 
 use crate::boxes::Sweep;
 use crate::bvh::GROUP;
-use crate::bvh::bounds::Bounds;
+use crate::bvh::bounds::Aabb;
 use crate::cpu::batches::{BatchStages, Counts};
 use crate::cpu::directions::Directions;
 use crate::cpu::group_cache::GroupCache;
-use crate::cpu::lane_pairs::{LanePairs, Side, WorkItem};
+use crate::cpu::lane_pairs::{LanePairs, RowSide, WorkItem};
 use crate::cpu::pairing::full;
 use crate::plan::{Plan, Question, TestId};
 use crate::query::settings::Settings;
@@ -266,8 +266,8 @@ fn pair<S: Simd>(
     // The lanes of the side with fewer of them are the rows; excluded pairs are known by lanes of A.
     let is_by_a = excluded.is_some() || lanes_a.count_ones() <= lanes_b.count_ones();
     let (side, rows, lanes, groups) = match is_by_a {
-        true => (Side::A, lanes_a, lanes_b, [a, b]),
-        false => (Side::B, lanes_b, lanes_a, [b, a]),
+        true => (RowSide::A, lanes_a, lanes_b, [a, b]),
+        false => (RowSide::B, lanes_b, lanes_a, [b, a]),
     };
     let is_single = world.sweep.is_single();
     let may_part = *is_still && is_single && directions.may_pay([rows, lanes]);
@@ -486,8 +486,8 @@ fn lanes_with_lower(
 
 /// Whether two moving boxes are not beside each other on the same side of an axis at both ends.
 #[inline(always)]
-fn meet(a: &[Bounds; 2], b: &[Bounds; 2]) -> bool {
-    let beside = |a: &[Bounds; 2], b: &[Bounds; 2], axis: usize| {
+fn meet(a: &[Aabb; 2], b: &[Aabb; 2]) -> bool {
+    let beside = |a: &[Aabb; 2], b: &[Aabb; 2], axis: usize| {
         (0..2).all(|end| a[end].max[axis] < b[end].min[axis])
     };
     (0..3).all(|axis| !beside(a, b, axis) && !beside(b, a, axis))

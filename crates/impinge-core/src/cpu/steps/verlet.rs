@@ -41,18 +41,18 @@ const TASK: usize = 2048;
 /// The pairs of one question within its distance and a margin.
 #[derive(Debug, Default)]
 pub(crate) struct VerletList {
-    state: State,
+    state: ListState,
     /// Of each body that takes part, when the list was made; or at the last question.
     positions: Vec<(BodyId, Positions)>,
     /// Of each part: lanes are those of these.
     clusterings: Vec<Arc<Clustering>>,
     /// By worker.
     listings: Vec<Listing>,
-    tasks: Vec<Task>,
+    tasks: Vec<ListedItems>,
 }
 
 #[derive(Debug, Default)]
-enum State {
+enum ListState {
     /// Nothing was asked.
     #[default]
     New,
@@ -66,7 +66,7 @@ enum State {
 
 /// Some listed work items.
 #[derive(Debug)]
-struct Task {
+struct ListedItems {
     listing: usize,
     items: Range<usize>,
     lanes: Range<usize>,
@@ -85,7 +85,7 @@ impl VerletList {
     fn is_of(&self, plan: &Plan, caches: &StepCaches) -> bool {
         let is_of =
             |(part, own): (_, &Arc<Clustering>)| Arc::ptr_eq(&caches.at(part).clustering, own);
-        matches!(self.state, State::Unused | State::Used)
+        matches!(self.state, ListState::Unused | ListState::Used)
             && self.clusterings.len() == plan.parts.len()
             && plan.parts.iter().zip(&self.clusterings).all(is_of)
     }
@@ -117,12 +117,12 @@ impl VerletList {
         let clusterings = plan.parts.iter().map(|part| &caches.at(part).clustering);
         self.clusterings.extend(clusterings.cloned());
         self.place(scene, plan);
-        self.state = State::Unused;
+        self.state = ListState::Unused;
         self.listings.resize_with(workers.len(), Listing::default);
         self.tasks.clear();
         for (ix, (worker, listing)) in workers.iter_mut().zip(&mut self.listings).enumerate() {
             std::mem::swap(worker.listing(), listing);
-            let mut task = Task {
+            let mut task = ListedItems {
                 listing: ix,
                 items: 0..0,
                 lanes: 0..0,
@@ -131,7 +131,7 @@ impl VerletList {
                 task.items.end += 1;
                 task.lanes.end += n as usize;
                 if task.lanes.len() >= TASK {
-                    let next = Task {
+                    let next = ListedItems {
                         listing: ix,
                         items: task.items.end..task.items.end,
                         lanes: task.lanes.end..task.lanes.end,
@@ -149,7 +149,7 @@ impl VerletList {
     pub fn bytes(&self) -> usize {
         let positions: usize = self.positions.iter().map(|(_, own)| own.bytes()).sum();
         let listings: usize = self.listings.iter().map(Listing::bytes).sum();
-        positions + listings + size_of::<Task>() * self.tasks.capacity()
+        positions + listings + size_of::<ListedItems>() * self.tasks.capacity()
     }
 }
 
@@ -185,9 +185,9 @@ impl StepClusters {
         let Job { scene, plan, .. } = job;
         let margin = settings.reuse_margin;
         let is_near = list.is_near(scene, margin);
-        if !is_near && matches!(list.state, State::Unused | State::Unlisted) {
+        if !is_near && matches!(list.state, ListState::Unused | ListState::Unlisted) {
             *list = VerletList {
-                state: State::Unlisted,
+                state: ListState::Unlisted,
                 ..VerletList::default()
             };
             list.place(scene, plan);
@@ -199,7 +199,7 @@ impl StepClusters {
         let wider = Job { plan: &wide, ..job };
         self.prepare(wider, settings, stats)?;
         if is_near && list.is_of(plan, &self.caches) {
-            list.state = State::Used;
+            list.state = ListState::Used;
         } else {
             // A list that fails holds nothing.
             *list = VerletList::default();

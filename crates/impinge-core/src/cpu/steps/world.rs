@@ -4,7 +4,7 @@
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use crate::boxes::{BoxSource, Sweep};
-use crate::bvh::bounds::Bounds;
+use crate::bvh::bounds::Aabb;
 use crate::bvh::clusters::Clustering;
 use crate::cpu::directions::Placed;
 use crate::cpu::lane_pairs::WorkItem;
@@ -125,7 +125,7 @@ impl<'a> StepWorld<'a> {
 
     /// The boxes of a cluster at the start and at the end.
     #[inline(always)]
-    pub(super) fn ends(&self, part: PartIx, cluster: ClusterIx) -> [Bounds; 2] {
+    pub(super) fn ends(&self, part: PartIx, cluster: ClusterIx) -> [Aabb; 2] {
         let ends = self.cache(part).ends(cluster);
         if self.sweep == self.boxes {
             return ends;

@@ -16,7 +16,7 @@ use std::sync::{Arc, OnceLock};
 
 use crate::boxes;
 use crate::bvh::GROUP;
-use crate::bvh::bounds::Bounds;
+use crate::bvh::bounds::Aabb;
 use crate::bvh::clusters::Clustering;
 use crate::scene::Body;
 use crate::scene::elements::Elements;
@@ -63,7 +63,7 @@ impl Boxes {
     }
 
     /// Takes the boxes of the body's pose, if they are of another one.
-    pub fn take(&mut self, body: &Body, of_levels: &[Vec<Bounds>]) {
+    pub fn take(&mut self, body: &Body, of_levels: &[Vec<Aabb>]) {
         let stamp = Some(body.positions_stamp());
         if self.positions_stamp == stamp {
             return;
@@ -92,7 +92,7 @@ impl Boxes {
         self.rounding = match body.positions() {
             Positions::F32(_) => 0.0,
             Positions::F64(_) => {
-                let Bounds { min, max } = self.root();
+                let Aabb { min, max } = self.root();
                 rounding_of(min).max(rounding_of(max))
             }
         };
@@ -151,7 +151,7 @@ impl Boxes {
     }
 
     /// The box of the whole body; the empty box without elements.
-    pub fn root(&self) -> Bounds {
+    pub fn root(&self) -> Aabb {
         self.top.at(0)
     }
 
@@ -218,7 +218,7 @@ impl Siblings {
         }
     };
 
-    fn new(level: &[Bounds], siblings: Range<usize>) -> Self {
+    fn new(level: &[Aabb], siblings: Range<usize>) -> Self {
         let mut boxes = Siblings {
             first: siblings.start as u32,
             n: siblings.len() as u32,
@@ -233,9 +233,9 @@ impl Siblings {
         boxes
     }
 
-    fn at(&self, k: usize) -> Bounds {
+    fn at(&self, k: usize) -> Aabb {
         let ends = |row: usize| [0, 1, 2].map(|axis| self.ends[EIGHT * (row + axis) + k]);
-        Bounds {
+        Aabb {
             min: ends(0),
             max: ends(3),
         }
@@ -339,7 +339,7 @@ impl Descent {
 
     /// The next cluster whose box meets the query.
     #[inline(always)]
-    pub fn next<S: Simd>(&mut self, _: S, boxes: &Boxes, query: &Bounds) -> Option<ClusterIx> {
+    pub fn next<S: Simd>(&mut self, _: S, boxes: &Boxes, query: &Aabb) -> Option<ClusterIx> {
         loop {
             let top = self.stack.last_mut()?;
             if top.mask == 0 {
@@ -366,10 +366,7 @@ impl Descent {
 /// Bit k: box k overlaps a query.
 #[cfg_attr(target_family = "wasm", inline(never))]
 #[cfg_attr(not(target_family = "wasm"), inline(always))]
-fn overlapping<V: Lookup, B: SideBySide<READ>, const READ: usize>(
-    boxes: &B,
-    query: &Bounds,
-) -> u64 {
+fn overlapping<V: Lookup, B: SideBySide<READ>, const READ: usize>(boxes: &B, query: &Aabb) -> u64 {
     let [min, max] = [query.min, query.max].map(|end| end.map(|x| V::splat(f64::from(x))));
     let is_apart = |axis: usize, first: usize| {
         let low = V::row(boxes.row(false, axis), first);

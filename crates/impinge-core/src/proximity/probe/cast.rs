@@ -18,7 +18,7 @@ use super::{HITS, Looks, Target, keep_from};
 use crate::answers::hits::RayHit;
 use crate::answers::pairs::Element;
 use crate::bvh::GROUP;
-use crate::bvh::bounds::{Bounds, round_down, round_up};
+use crate::bvh::bounds::{Aabb, round_down, round_up};
 use crate::query::step::Hit;
 use crate::scene::elements::with_corners;
 use crate::scene::error::Error;
@@ -230,7 +230,7 @@ impl<V: Lookup> Slab<V> {
 
 impl<V: Lookup> Slabs<V> {
     #[inline(always)]
-    fn new(ray: &Ray, whole: &Bounds) -> Self {
+    fn new(ray: &Ray, whole: &Aabb) -> Self {
         let nothing = V::splat(f64::NAN);
         let none = Slab {
             origin: [nothing; 2],

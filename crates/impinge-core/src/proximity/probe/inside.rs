@@ -16,7 +16,7 @@
 use super::border::{Border, FACES};
 use super::boxes::Descent;
 use super::{Looks, Target};
-use crate::bvh::bounds::{Bounds, round_down, round_up};
+use crate::bvh::bounds::{Aabb, round_down, round_up};
 use crate::contact::passes;
 use crate::scene::elements::Elements;
 use crate::scene::error::Error;
@@ -27,7 +27,7 @@ use impinge_exact::internal::{Reach, elements_are_within};
 use impinge_exact::{Point, Sign, orient3d};
 
 /// A question about a point, asked of the elements whose boxes it may meet.
-pub(super) trait Question: Copy + Sync {
+pub(super) trait PointTest: Copy + Sync {
     /// What the elements that were looked at say.
     type Found;
     type Answer: Copy + Send;
@@ -35,7 +35,7 @@ pub(super) trait Question: Copy + Sync {
     const OUTSIDE: Self::Answer;
 
     /// Before any element, and the box that those to be looked at meet.
-    fn begin(self, whole: &Bounds, at: Bounds) -> (Self::Found, Bounds);
+    fn begin(self, whole: &Aabb, at: Aabb) -> (Self::Found, Aabb);
 
     /// Adds an element. Returns whether no other one can change the answer.
     fn add(self, found: &mut Self::Found, target: Target<'_>, slot: usize, point: &Point) -> bool;
@@ -47,7 +47,7 @@ pub(super) trait Question: Copy + Sync {
 ///
 /// # Errors
 /// Cancellation.
-pub(super) fn ask<R: Real, Q: Question>(
+pub(super) fn ask<R: Real, Q: PointTest>(
     isa: Isa,
     question: Q,
     target: Target<'_>,
@@ -55,7 +55,7 @@ pub(super) fn ask<R: Real, Q: Question>(
     answers: &mut [Q::Answer],
     work: Work<'_>,
 ) -> Result<(), Error> {
-    with_isa!(isa, ask_all, <R: Real, Q: Question>(
+    with_isa!(isa, ask_all, <R: Real, Q: PointTest>(
         question: Q = question,
         target: Target<'_> = target,
         points: &[[R; 3]] = points,
@@ -65,7 +65,7 @@ pub(super) fn ask<R: Real, Q: Question>(
 }
 
 #[inline(always)]
-fn ask_all<S: Simd, R: Real, Q: Question>(
+fn ask_all<S: Simd, R: Real, Q: PointTest>(
     simd: S,
     question: Q,
     target: Target<'_>,
@@ -78,7 +78,7 @@ fn ask_all<S: Simd, R: Real, Q: Question>(
     let mut looks = Looks::new(work);
     for (point, answer) in points.iter().zip(answers) {
         let point = point.map(R::widen);
-        let at = Bounds {
+        let at = Aabb {
             min: point.map(round_down),
             max: point.map(round_up),
         };
@@ -118,13 +118,13 @@ pub(super) struct FoundFaces {
     is_on: bool,
 }
 
-impl Question for InSurface {
+impl PointTest for InSurface {
     type Found = FoundFaces;
     type Answer = i8;
     const OUTSIDE: i8 = -1;
 
     #[inline(always)]
-    fn begin(self, whole: &Bounds, at: Bounds) -> (FoundFaces, Bounds) {
+    fn begin(self, whole: &Aabb, at: Aabb) -> (FoundFaces, Aabb) {
         let (way, query) = Way::out(whole, &at);
         let found = FoundFaces {
             way,
@@ -162,13 +162,13 @@ impl Question for InSurface {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Around;
 
-impl Question for Around {
+impl PointTest for Around {
     type Found = FoundFaces;
     type Answer = Option<i32>;
     const OUTSIDE: Option<i32> = Some(0);
 
     #[inline(always)]
-    fn begin(self, whole: &Bounds, at: Bounds) -> (FoundFaces, Bounds) {
+    fn begin(self, whole: &Aabb, at: Aabb) -> (FoundFaces, Aabb) {
         InSurface.begin(whole, at)
     }
 
@@ -199,13 +199,13 @@ pub(super) struct FoundTetrahedra {
     is_inner: bool,
 }
 
-impl Question for InTetrahedra<'_> {
+impl PointTest for InTetrahedra<'_> {
     type Found = FoundTetrahedra;
     type Answer = i8;
     const OUTSIDE: i8 = -1;
 
     #[inline(always)]
-    fn begin(self, _: &Bounds, at: Bounds) -> (FoundTetrahedra, Bounds) {
+    fn begin(self, _: &Aabb, at: Aabb) -> (FoundTetrahedra, Aabb) {
         (FoundTetrahedra::default(), at)
     }
 
@@ -239,13 +239,13 @@ impl Question for InTetrahedra<'_> {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Lowest;
 
-impl Question for Lowest {
+impl PointTest for Lowest {
     type Found = Option<u32>;
     type Answer = Option<u32>;
     const OUTSIDE: Option<u32> = None;
 
     #[inline(always)]
-    fn begin(self, _: &Bounds, at: Bounds) -> (Option<u32>, Bounds) {
+    fn begin(self, _: &Aabb, at: Aabb) -> (Option<u32>, Aabb) {
         (None, at)
     }
 
@@ -322,7 +322,7 @@ impl Way {
 
     /// The shortest way out of a box, and the box of a ray that goes that way.
     #[inline(always)]
-    fn out(whole: &Bounds, at: &Bounds) -> (Self, Bounds) {
+    fn out(whole: &Aabb, at: &Aabb) -> (Self, Aabb) {
         let (mut way, mut least) = (Way::ALONG_X, f32::INFINITY);
         for axis in 0..3 {
             let down = at.min[axis] - whole.min[axis];

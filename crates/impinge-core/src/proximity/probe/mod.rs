@@ -179,7 +179,7 @@ impl Probes {
     ///
     /// # Errors
     /// Cancellation.
-    fn ask<R: Real, Q: inside::Question>(
+    fn ask<R: Real, Q: inside::PointTest>(
         &self,
         question: Q,
         target: Target<'_>,

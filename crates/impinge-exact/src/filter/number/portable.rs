@@ -60,7 +60,7 @@ macro_rules! portable {
 
         impl Number for $type {
             type Mask = $mask;
-            const LIMITS: Limits = $limits;
+            const LIMITS: FormatLimits = $limits;
 
             #[inline(always)]
             fn splat(x: f64) -> Self {
@@ -104,7 +104,7 @@ portable!(
     u64,
     PORTABLE,
     [0, 1],
-    Limits::F64,
+    FormatLimits::F64,
     root
 );
 portable!(
@@ -114,7 +114,7 @@ portable!(
     u32,
     PORTABLE_F32,
     [0, 1, 2, 3],
-    Limits::F32,
+    FormatLimits::F32,
     root_f32
 );
 

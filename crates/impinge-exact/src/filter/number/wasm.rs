@@ -42,7 +42,7 @@ macro_rules! register {
 
         impl Number for $type {
             type Mask = $mask;
-            const LIMITS: Limits = $limits;
+            const LIMITS: FormatLimits = $limits;
 
             #[inline(always)]
             fn splat($x: f64) -> Self {
@@ -75,14 +75,14 @@ macro_rules! register {
 
 register! {
     /// Two numbers in a register of WebAssembly.
-    Wasm, WasmMask, Limits::F64,
+    Wasm, WasmMask, FormatLimits::F64,
     add f64x2_add, sub f64x2_sub, mul f64x2_mul, div f64x2_div, pmax f64x2_pmax, splat |x| f64x2_splat(x),
     abs f64x2_abs, sqrt f64x2_sqrt, gt f64x2_gt,
 }
 
 register! {
     /// Four `f32` in a register of WebAssembly.
-    WasmF32, WasmF32Mask, Limits::F32,
+    WasmF32, WasmF32Mask, FormatLimits::F32,
     add f32x4_add, sub f32x4_sub, mul f32x4_mul, div f32x4_div, pmax f32x4_pmax, splat |x| f32x4_splat(x as f32),
     abs f32x4_abs, sqrt f32x4_sqrt, gt f32x4_gt,
 }

@@ -79,7 +79,7 @@ macro_rules! register {
 
         impl Number for $type {
             type Mask = $mask;
-            const LIMITS: Limits = $limits;
+            const LIMITS: FormatLimits = $limits;
 
             #[inline(always)]
             fn splat(x: f64) -> Self {
@@ -120,7 +120,7 @@ macro_rules! register {
 
 register! {
     /// Four numbers in a 256-bit register. To be used where `avx2` was detected.
-    "avx2" Avx2(__m256d), Avx2Mask(__m256d), Limits::F64,
+    "avx2" Avx2(__m256d), Avx2Mask(__m256d), FormatLimits::F64,
     add _mm256_add_pd, sub _mm256_sub_pd, mul _mm256_mul_pd, div _mm256_div_pd,
     max _mm256_max_pd, sqrt _mm256_sqrt_pd,
     splat |x| _mm256_set1_pd(x),
@@ -135,7 +135,7 @@ register! {
 
 register! {
     /// Eight `f32` in a 256-bit register. To be used where `avx2` was detected.
-    "avx2" Avx2F32(__m256), Avx2F32Mask(__m256), Limits::F32,
+    "avx2" Avx2F32(__m256), Avx2F32Mask(__m256), FormatLimits::F32,
     add _mm256_add_ps, sub _mm256_sub_ps, mul _mm256_mul_ps, div _mm256_div_ps,
     max _mm256_max_ps, sqrt _mm256_sqrt_ps,
     splat |x| _mm256_set1_ps(x as f32),
@@ -150,7 +150,7 @@ register! {
 
 register! {
     /// Eight numbers in a 512-bit register. To be used where `avx512f` was detected.
-    "avx512f" Avx512(__m512d), Avx512Mask(__mmask8), Limits::F64,
+    "avx512f" Avx512(__m512d), Avx512Mask(__mmask8), FormatLimits::F64,
     add _mm512_add_pd, sub _mm512_sub_pd, mul _mm512_mul_pd, div _mm512_div_pd,
     max _mm512_max_pd, sqrt _mm512_sqrt_pd,
     splat |x| _mm512_set1_pd(x),
@@ -165,7 +165,7 @@ register! {
 
 register! {
     /// Sixteen `f32` in a 512-bit register. To be used where `avx512f` was detected.
-    "avx512f" Avx512F32(__m512), Avx512F32Mask(__mmask16), Limits::F32,
+    "avx512f" Avx512F32(__m512), Avx512F32Mask(__mmask16), FormatLimits::F32,
     add _mm512_add_ps, sub _mm512_sub_ps, mul _mm512_mul_ps, div _mm512_div_ps,
     max _mm512_max_ps, sqrt _mm512_sqrt_ps,
     splat |x| _mm512_set1_ps(x as f32),
