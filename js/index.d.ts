@@ -192,7 +192,8 @@ export declare class Scene {
   setFilter(body: Body, category?: number | bigint, mask?: number | bigint): void;
   /**
    * A length that each element of this body adds to the distance of `near`: one number, or one per vertex, edge or face. With one per vertex, edges and faces are as thick
-   * as the thickest of their vertices; otherwise other elements are as thick as the thickest of these that they have or are part of.
+   * as the thickest of their vertices; otherwise other elements are as thick as the thickest of these that they have or are part of. Steps do not look at it: there
+   * `separation` and `clearance` keep bodies apart, one number for all.
    */
   setThickness(body: Body, thickness: number | ArrayLike<number>, part?: "vertices" | "edges" | "faces"): void;
   /**

@@ -268,8 +268,10 @@ class Detector(DetectorBase):
         return None if first is None else Impact(*first)
 
     def is_free(self, scene: Scene, **options: Unpack[Options]) -> bool:
-        """Whether nothing touches during a step; with ``start="skip"``, but for pairs that touch at its start. If the start was
-        free of intersections, so is each moment of a free step; ``start="verify"`` asks that, too.
+        """Whether nothing touches during a step; with ``start="skip"``, but for pairs that touch at its start.
+
+        Elements that intersect all the way, an edge deep in a face, touch nothing new: a step is free only of what begins. If the
+        start was free of intersections, so is each moment of a free step; ``start="verify"`` asks that, too.
 
         Parameters
         ----------

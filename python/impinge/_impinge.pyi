@@ -38,6 +38,7 @@ __all__ = [
     "_devices",
     "_check_columns",
     "_findings",
+    "_mesh",
     "_groups",
     "_fix",
     "_hash_rows",
@@ -401,6 +402,9 @@ class Mesh:
     @property
     def n_welded(self) -> int: ...
 
+def _mesh(
+    vertices: npt.NDArray[np.floating[Any]], faces: npt.NDArray[np.uint32], name: str, n_welded: int
+) -> Mesh: ...
 def read(path: str | PathLike[str], *, weld: bool = True) -> Mesh: ...
 def read_bodies(path: str | PathLike[str], *, weld: bool = True) -> list[Mesh]: ...
 def _check_options(options: _Options) -> None: ...

@@ -479,6 +479,9 @@ class Scene(SceneBase):
         taken from that of `Detector.safe_distances`. Of two elements, each adds its own, and the sum is not rounded. A new body is not
         thick.
 
+        Questions about steps and distances do not look at it: a step keeps bodies apart by `separation` or `clearance`, one
+        number for all.
+
         Parameters
         ----------
         body : Body or int

@@ -466,3 +466,16 @@ def test_changes_between_frames():
         before[0].changes(before[1])
     with pytest.raises(TypeError):
         before[1].changes(None)
+
+
+@pytest.mark.parametrize("duplicate", [copy.copy, copy.deepcopy, lambda x: pickle.loads(pickle.dumps(x))])
+def test_meshes_pickle(duplicate, tmp_path):
+    path = tmp_path / "a.obj"
+    path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 1 0\nf 1 2 3\n")
+    mesh = impinge.read(path)
+    same = duplicate(mesh)
+    assert np.array_equal(same.vertices, mesh.vertices) and same.vertices.dtype == mesh.vertices.dtype
+    assert np.array_equal(same.faces, mesh.faces) and same.faces.dtype == np.uint32
+    assert (same.kind, same.name, same.n_welded) == ("triangles", str(path), mesh.n_welded)
+    scene = impinge.Scene()
+    assert scene.add(same) in scene

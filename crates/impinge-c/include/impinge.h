@@ -169,6 +169,7 @@ impinge_status impinge_scene_set_end_transform(impinge_scene *scene, uint32_t bo
 impinge_status impinge_scene_set_filter(impinge_scene *scene, uint32_t body, uint64_t category, uint64_t mask);
 
 /* Sets how thick a body is, a length: what its elements add to the distance of impinge_find_near. Finite, 0 or more; 0 by default.
+ * Steps do not look at it: `separation` and `clearance` of a query keep bodies apart there, one number for all.
  * INVALID: no such body, another number. */
 impinge_status impinge_scene_set_thickness(impinge_scene *scene, uint32_t body, double thickness);
 

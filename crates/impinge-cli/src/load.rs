@@ -405,6 +405,13 @@ pub fn stdin_bytes(options: &ReadOptions) -> Result<Vec<u8>, Error> {
 
 /// Notes on a file for users who look at primitive numbers, or wonder about pairs.
 pub fn note(name: &str, summary: &Summary, vertices: Vertices) {
+    if let Some(unit) = summary.unit {
+        let _ = writeln!(
+            stderr(),
+            "note: {}: its unit is the {unit}; numbers are read as they are, whatever the unit of other files",
+            printable(name)
+        );
+    }
     for (n, what) in [
         (
             summary.n_polygons_fanned,
@@ -417,6 +424,10 @@ pub fn note(name: &str, summary: &Summary, vertices: Vertices) {
         (
             summary.n_lines_skipped,
             "lines skipped, which are edges or faces of two corners",
+        ),
+        (
+            summary.n_at_rest,
+            "meshes with a skin or morph targets, which are not applied: they are read at rest",
         ),
         (vertices.n_welded as u64, "vertices welded to others"),
         (

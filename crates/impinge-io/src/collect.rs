@@ -21,6 +21,9 @@ pub(crate) struct Collector<'a> {
     fans: Vec<Range<usize>>,
     pub n_lines: u64,
     pub n_points: u64,
+    /// Meshes that are moved by what is not applied.
+    pub n_at_rest: u64,
+    pub unit: Option<&'static str>,
     /// The corners of the current polygon or strip; its memory is reused.
     pub corners: Vec<u32>,
     /// Which triangles belong to which node or group.
@@ -37,6 +40,8 @@ impl<'a> Collector<'a> {
             fans: Vec::new(),
             n_lines: 0,
             n_points: 0,
+            n_at_rest: 0,
+            unit: None,
             corners: Vec::new(),
             parts: Parts::default(),
         }
@@ -177,6 +182,8 @@ impl<'a> Collector<'a> {
             n_triangles_skipped: if tetrahedra { n_triangles } else { 0 },
             n_tetrahedra_skipped: if tetrahedra { 0 } else { n_tetrahedra },
             n_welded: n_welded as u64,
+            n_at_rest: self.n_at_rest,
+            unit: self.unit,
         };
         Ok((mesh, summary))
     }

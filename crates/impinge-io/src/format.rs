@@ -65,13 +65,19 @@ impl Format {
     /// The format of the file at `path`, by its extension.
     ///
     /// # Errors
-    /// [`Error::UnknownFormat`] if the extension is not known.
+    /// [`Error::UnknownFormat`] if the extension is not known; [`Error::NotAFile`] of a folder.
     pub fn from_path(path: &Path) -> Result<Self, Error> {
         let extension = path.extension().unwrap_or_default().to_string_lossy();
-        Self::from_extension(&extension).ok_or_else(|| Error::UnknownFormat {
-            path: path.to_owned(),
-            extension: extension.into_owned(),
-            known: KNOWN,
+        Self::from_extension(&extension).ok_or_else(|| match path.is_dir() {
+            true => Error::NotAFile {
+                path: path.to_owned(),
+                what: "a folder",
+            },
+            false => Error::UnknownFormat {
+                path: path.to_owned(),
+                extension: extension.into_owned(),
+                known: KNOWN,
+            },
         })
     }
 }

@@ -69,4 +69,9 @@ pub struct Summary {
     pub n_tetrahedra_skipped: u64,
     /// Vertices removed by welding.
     pub n_welded: u64,
+    /// Meshes of a glTF file that a skin moves, or morph targets with weights: they are read at
+    /// rest.
+    pub n_at_rest: u64,
+    /// The unit that a 3MF file names, unless it is a millimetre: numbers are read as they are.
+    pub unit: Option<&'static str>,
 }

@@ -438,3 +438,20 @@ fn a_polygon_of_many_corners_is_read_at_once() {
         assert_eq!(mesh.n_primitives(), N - 2, "{format:?}");
     }
 }
+
+/// What a checkout without Git LFS has in place of a mesh is no damaged mesh, and a folder no file
+/// of an unknown format.
+#[test]
+fn pointers_and_folders_are_called_what_they_are() {
+    let pointer = b"version https://git-lfs.github.com/spec/v1\noid sha256:00\nsize 5\n";
+    for format in [Format::Obj, Format::Stl, Format::Gltf, Format::Ply] {
+        let options = ReadOptions::as_they_are();
+        let said = read_bytes(pointer, format, "a", &options)
+            .unwrap_err()
+            .to_string();
+        assert!(said.contains("git lfs pull"), "{said}");
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let said = Format::from_path(folder.path()).unwrap_err().to_string();
+    assert!(said.ends_with("is a folder, not a regular file"), "{said}");
+}

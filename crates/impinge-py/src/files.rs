@@ -28,6 +28,9 @@ impl Mesh {
     }
 }
 
+/// Vertices, faces, name and how many vertices were welded.
+type Parts = (Py<PyAny>, Py<PyArray2<u32>>, String, usize);
+
 #[pymethods]
 impl Mesh {
     /// numpy.ndarray, shape (v, 3) : positions, in the precision of the file; numbers in text are
@@ -62,6 +65,14 @@ impl Mesh {
         self.n_welded
     }
 
+    /// Pickles and copies hold the same arrays.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Parts)> {
+        let make = py.import("impinge._impinge")?.getattr("_mesh")?;
+        let faces = self.faces(py);
+        let name = self.name.clone();
+        Ok((make, (self.vertices(py), faces, name, self.n_welded)))
+    }
+
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
         let n = |array: &Bound<'_, PyAny>| array.len();
         Ok(format!(
@@ -75,7 +86,28 @@ impl Mesh {
     }
 }
 
-/// Reads a mesh file: OBJ, PLY, STL, OFF, glTF/GLB, MSH, VTK, VTU, Medit or TetGen.
+/// A mesh of the parts that a pickle holds.
+#[pyfunction]
+pub fn _mesh(
+    vertices: Py<PyAny>,
+    faces: Bound<'_, PyArray2<u32>>,
+    name: String,
+    n_welded: usize,
+) -> Mesh {
+    let kind = match faces.dims()[1] {
+        4 => impinge::BodyKind::Tetrahedra,
+        _ => impinge::BodyKind::Triangles,
+    };
+    Mesh {
+        vertices,
+        faces: faces.unbind(),
+        kind,
+        name,
+        n_welded,
+    }
+}
+
+/// Reads a mesh file: OBJ, PLY, STL, OFF, glTF/GLB, 3MF, MSH, VTK, VTU, Medit or TetGen.
 ///
 /// All bodies, groups and nodes of a file become one mesh; `read_bodies` tells them apart.
 ///

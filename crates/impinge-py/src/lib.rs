@@ -60,7 +60,7 @@ mod _impinge {
     #[pymodule_export]
     use super::exclusion::{_groups, _rings, Exclusion};
     #[pymodule_export]
-    use super::files::{Mesh, read, read_bodies};
+    use super::files::{_mesh, Mesh, read, read_bodies};
     #[pymodule_export]
     use super::functions::{_hash_rows, _weld};
     #[pymodule_export]

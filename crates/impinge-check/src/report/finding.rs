@@ -21,6 +21,8 @@ pub enum Finding {
     NonManifold,
     /// Neighbours with opposite orientations.
     Orientation,
+    /// A closed surface that encloses a negative volume: its faces are inside out.
+    InsideOut,
     /// Edges of only one triangle.
     Boundary,
     /// Walls that are thinner than [was asked](crate::Options::min_thickness).
@@ -33,22 +35,24 @@ pub enum Finding {
 
 impl Finding {
     /// All kinds, in the order of a summary.
-    pub const ALL: [Finding; 9] = [
+    pub const ALL: [Finding; 10] = [
         Finding::SelfIntersections,
         Finding::Degenerate,
         Finding::Duplicates,
         Finding::NonManifold,
         Finding::Orientation,
+        Finding::InsideOut,
         Finding::Boundary,
         Finding::Thin,
         Finding::Nan,
         Finding::Error,
     ];
 
-    /// The name: that of the [problem](Problem::key), `nan` or `error`.
+    /// The name: that of the [problem](Problem::key), `inside-out`, `nan` or `error`.
     pub fn name(self) -> &'static str {
         match (self.problem(), self) {
             (Some(problem), _) => problem.key(),
+            (None, Finding::InsideOut) => "inside-out",
             (None, Finding::Nan) => "nan",
             (None, _) => "error",
         }
@@ -63,13 +67,14 @@ impl Finding {
             Finding::NonManifold => "non-manifold edges or vertices",
             Finding::Boundary => "an open border",
             Finding::Orientation => "inconsistent orientation",
+            Finding::InsideOut => "faces inside out",
             Finding::Thin => "thin walls",
             Finding::Nan => "coordinates that are not finite",
             Finding::Error => "an error",
         }
     }
 
-    /// The problem of primitives that it counts; `None` where the mesh could not be checked.
+    /// The problem of primitives that it counts; `None` where it is one of the whole mesh.
     pub fn problem(self) -> Option<Problem> {
         match self {
             Finding::SelfIntersections => Some(Problem::SelfIntersection),
@@ -79,7 +84,7 @@ impl Finding {
             Finding::Orientation => Some(Problem::Inconsistent),
             Finding::Boundary => Some(Problem::Boundary),
             Finding::Thin => Some(Problem::Thin),
-            Finding::Nan | Finding::Error => None,
+            Finding::InsideOut | Finding::Nan | Finding::Error => None,
         }
     }
 
@@ -99,6 +104,7 @@ impl Finding {
             Finding::Duplicates => counts.duplicates,
             Finding::NonManifold => counts.non_manifold_facets + counts.non_manifold_vertices,
             Finding::Orientation => counts.inconsistent_facets,
+            Finding::InsideOut => counts.volume.is_some_and(|volume| volume < 0.0).into(),
             // Meshes of tetrahedra always have a border.
             Finding::Boundary if counts.n_tetrahedra > 0 => 0,
             Finding::Boundary => counts.boundary_facets,
@@ -148,6 +154,7 @@ impl Finding {
                 let facets = several(n, facet, facets);
                 format!("inconsistent orientation at {facets}")
             }
+            Finding::InsideOut => "the faces are inside out".to_owned(),
             Finding::Thin => several(n, "face at a thin wall", "faces at thin walls"),
             Finding::Nan | Finding::Error => self.words().to_owned(),
         }

@@ -71,7 +71,7 @@ impl Report<'_> {
         let asks_walls = self.rows.iter().any(of_walls);
         let kinds: Vec<Finding> = Finding::ALL
             .into_iter()
-            .filter(|&kind| kind.problem().is_some() && asks(kind))
+            .filter(|&kind| !matches!(kind, Finding::Nan | Finding::Error) && asks(kind))
             .filter(|&kind| kind != Finding::Thin || asks_walls)
             .collect();
         let (mut cases, mut n_cases, mut n_failures, mut n_errors) = (String::new(), 0, 0, 0);

@@ -59,6 +59,11 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
         .zip(names.iter().map(String::as_str))
         .collect();
 
+    if frames.n_frames() == 0 {
+        // A check of nothing would find nothing.
+        let text = format!("{}: there are no frames", printable(&frames.name));
+        return Err(Error::Usage(text));
+    }
     let range = args.frames.within(frames.n_frames()).ok_or_else(|| {
         Error::Usage(format!(
             "--frames reaches beyond the {} of {}",
@@ -125,7 +130,7 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
             let regions = regions::regions(&scene, &bodies, pairs)?;
             let regions = regions.as_deref();
             let mut line = Map::new();
-            line.insert("frame".into(), frame_ix.into());
+            step::Frames::name_in(&frames, &mut line, frame_ix);
             let answer = json::answer((asked, &scene), &bodies, &vertices, pairs, regions, &times)?;
             line.extend(answer);
             let mut to = out();
@@ -279,6 +284,14 @@ impl step::Frames for Frames {
         Error::Refused {
             what: format!("{}: frame {frame_ix}", self.name),
             source,
+        }
+    }
+
+    fn name_in(&self, line: &mut Map<String, Value>, frame_ix: usize) {
+        line.insert("frame".into(), frame_ix.into());
+        let files = self.sequence.files();
+        if files.len() == self.n_frames() && files.len() > 1 {
+            line.insert("file".into(), files[frame_ix].display().to_string().into());
         }
     }
 }

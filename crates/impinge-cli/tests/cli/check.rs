@@ -436,7 +436,7 @@ fn sarif_has_what_the_standard_requires() {
 #[test]
 fn junit_is_xml_with_the_numbers_that_it_announces() {
     use quick_xml::events::Event;
-    for (fail_on, n_cases, n_failures) in [(&[][..], 14, 2), (&["--fail-on", "boundary"], 4, 1)] {
+    for (fail_on, n_cases, n_failures) in [(&[][..], 16, 2), (&["--fail-on", "boundary"], 4, 1)] {
         let run = reported(&[&["--format", "junit"], fail_on].concat());
         let mut reader = quick_xml::Reader::from_str(&run.stdout);
         let mut counts = std::collections::BTreeMap::<String, u64>::new();
@@ -919,4 +919,34 @@ fn parts_of_an_assembly_are_compared() {
     assert_eq!(code(&["left.obj", "--fail-on", "near"]), Some(2));
     assert_eq!(code(&["left.obj", "--assembly"]), Some(2));
     assert_eq!(code(&["left.obj", "missing.ply", "--assembly"]), Some(1));
+}
+
+#[test]
+fn a_closed_mesh_that_is_inside_out_is_not_clean() {
+    let folder = Folder::new();
+    let inward = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 4 2\nf 2 4 3\nf 1 3 4\n";
+    let outward = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n";
+    folder.text("inward.obj", inward);
+    folder.text("outward.obj", outward);
+    let printed = folder.run(["check", "outward.obj"]).printed();
+    assert!(printed.contains("1 mesh: clean"), "{printed}");
+    let printed = folder.run(["check", "inward.obj"]).printed();
+    let said = "1 mesh: 0 without any finding, 1 with faces inside out";
+    assert!(printed.contains(said), "{printed}");
+    for (file, code) in [("outward.obj", 0), ("inward.obj", 3)] {
+        let run = folder.run(["check", file, "--fail-on", "inside-out"]);
+        assert_eq!(run.code, Some(code), "{}", run.stderr);
+    }
+    // `fix` turns it, and then nothing is left.
+    let fix = [
+        "fix",
+        "inward.obj",
+        "--out",
+        "mended.ply",
+        "--fail-on",
+        "inside-out",
+    ];
+    folder.run(fix).printed();
+    let check = ["check", "mended.ply", "--fail-on", "any"];
+    assert_eq!(folder.run(check).code, Some(0));
 }

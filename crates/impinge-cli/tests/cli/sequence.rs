@@ -80,22 +80,21 @@ fn every_frame_is_the_oracle_s() {
             let lines = lines(&text);
             assert_eq!(lines.len(), frames.len());
             for (frame_ix, (line, (n, hash))) in lines.iter().zip(&expected).enumerate() {
-                assert_eq!(
-                    keys(line),
-                    [
-                        "frame",
-                        "pairs",
-                        "hash",
-                        "backend",
-                        "method",
-                        "ms",
-                        "stats",
-                        "asked",
-                        "bodies",
-                        "n_regions",
-                        "regions"
-                    ]
-                );
+                let file = (sequence != "run.pc2").then_some("file");
+                let rest = [
+                    "pairs",
+                    "hash",
+                    "backend",
+                    "method",
+                    "ms",
+                    "stats",
+                    "asked",
+                    "bodies",
+                    "n_regions",
+                    "regions",
+                ];
+                let expected: Vec<&str> = ["frame"].into_iter().chain(file).chain(rest).collect();
+                assert_eq!(keys(line), expected);
                 assert_eq!(line["frame"], json!(frame_ix));
                 assert_eq!(
                     (&line["pairs"], &line["hash"]),
@@ -313,4 +312,39 @@ fn a_mesh_that_comes_apart_where_it_was_welded_is_refused() {
     );
     let text = folder.run(args.iter().chain(&["--no-weld"])).printed();
     assert_eq!(text.lines().collect::<Vec<_>>()[1..], ["0,0,0,0,1"]);
+}
+
+#[test]
+fn a_cache_without_frames_is_no_check() {
+    let folder = Folder::new();
+    folder.ply("a.ply", &ball(320));
+    let n = ball(320).n_vertices();
+    let cache = Pc2Writer::create(&folder.path("none.pc2"), n, 0.0, 1.0).unwrap();
+    cache.finish().unwrap();
+    let run = folder.run(["sequence", "a.ply", "none.pc2", "--fail-on-hit"]);
+    assert!(run.misuse().contains("none.pc2: there are no frames"));
+}
+
+#[test]
+fn frames_of_numbered_files_name_their_files() {
+    let folder = Folder::new();
+    for number in [1001, 1002, 1005] {
+        folder.ply(&format!("f_{number}.ply"), &ball(320));
+    }
+    for more in [&[][..], &["--ccd"]] {
+        let sequence = ["sequence", "f_1001.ply", "f_*.ply", "--json"];
+        let printed = folder.run(sequence.iter().chain(more)).printed();
+        let lines = printed
+            .lines()
+            .map(|line| serde_json::from_str(line).unwrap());
+        let named: Vec<Value> = lines
+            .map(|line: Value| json!([line["frame"], line["file"]]))
+            .collect();
+        let files = ["f_1001.ply", "f_1002.ply", "f_1005.ply"];
+        let expected = (0..named.len()).map(|ix| json!([ix, files[ix]]));
+        assert!(
+            named.len() >= 2 && named.iter().cloned().eq(expected),
+            "{named:?}"
+        );
+    }
 }

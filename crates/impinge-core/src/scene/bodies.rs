@@ -239,6 +239,10 @@ impl Scene {
     /// [`safe_distances`](crate::Detector::safe_distances). 0 for a new body. Of two elements,
     /// whether of one body or of two, each adds its own.
     ///
+    /// Questions about steps and distances do not look at it: a step keeps bodies apart by
+    /// [`Query::separation`](crate::Query::separation) or
+    /// [`Query::clearance`](crate::Query::clearance), one number for all.
+    ///
     /// One number holds for all elements, and [`remesh`](Scene::remesh) keeps it. [`Thickness`]
     /// also takes one number per vertex, edge or face, which `remesh` forgets: the body has a
     /// thickness of 0 then.

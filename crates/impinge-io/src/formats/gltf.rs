@@ -229,6 +229,10 @@ impl<'a> Scene<'a, '_> {
                 let named = named.filter(|name| !name.is_empty());
                 let named = named.map_or_else(|| format!("node {node_ix}"), str::to_owned);
                 self.parts.begin_part(&named, true);
+                let weights = node.weights.as_ref().unwrap_or(&mesh.weights);
+                if node.skin.is_some() || weights.iter().any(|&weight| weight != 0.0) {
+                    self.parts.n_at_rest += 1;
+                }
                 let mut bases = HashMap::new();
                 for primitive in &mesh.primitives {
                     self.add(primitive, transform, &mut bases)?;

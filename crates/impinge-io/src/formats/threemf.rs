@@ -25,6 +25,9 @@ const DEEPEST: usize = 32;
 /// The part that is the model if no relationship names one.
 const USUAL: &str = "3D/3dmodel.model";
 
+/// Units of a model; without one, numbers are millimetres.
+const UNITS: [&str; 5] = ["micron", "centimeter", "inch", "foot", "meter"];
+
 /// Rows for x, y, z and the shift: a point is a row vector before it.
 type Matrix = [[f64; 3]; 4];
 
@@ -49,6 +52,8 @@ struct Use {
 struct Model {
     objects: HashMap<String, Object>,
     items: Vec<Use>,
+    /// If it is not a millimetre.
+    unit: Option<&'static str>,
 }
 
 pub(crate) fn read<'a>(
@@ -69,6 +74,7 @@ pub(crate) fn read<'a>(
     package.load(&root)?;
     let items = package.models[&root].items.clone();
     let mut out = Collector::new(name);
+    out.unit = package.models[&root].unit;
     let mut points = Vec::new();
     for item in &items {
         let part = item.part.clone().unwrap_or_else(|| root.clone());
@@ -290,6 +296,10 @@ fn parse(bytes: &[u8], name: Name) -> Result<Model, Error> {
         };
         let tag_name = tag.name();
         match local(tag_name.as_ref()) {
+            "model" => {
+                let unit = attribute(tag, "unit");
+                model.unit = UNITS.into_iter().find(|own| unit.as_deref() == Some(own));
+            }
             "object" => {
                 let id = needed("id")?;
                 let object = Object {

@@ -226,3 +226,21 @@ fn gltf_instances_are_held_to_the_budget() {
     let error = read_bytes(&glb, Format::Gltf, "g", &options).unwrap_err();
     assert!(matches!(error, Error::TooLarge { .. }), "{error}");
 }
+
+#[test]
+fn what_moves_a_mesh_but_is_not_applied_is_counted() {
+    let summary = |json: &str| {
+        let glb = glb_of(json, &gltf_buffer());
+        let options = ReadOptions::as_they_are();
+        let read = read_bytes_with_summary(&glb, Format::Gltf, "g", &options);
+        read.or_show().1.n_at_rest
+    };
+    let json = gltf_json("", "");
+    assert_eq!(summary(&json), 0);
+    let with = |more: &str| json.replace(r#"[{"mesh":0}]"#, &format!(r#"[{{"mesh":0{more}}}]"#));
+    assert_ne!(with(r#","skin":0"#), json);
+    assert_eq!(summary(&with(r#","skin":0"#)), 1);
+    assert_eq!(summary(&with(r#","weights":[0,0.5]"#)), 1);
+    // Targets without weight change nothing.
+    assert_eq!(summary(&with(r#","weights":[0,0]"#)), 0);
+}

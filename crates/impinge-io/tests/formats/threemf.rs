@@ -1,6 +1,8 @@
 //! 3MF: items, components, transforms, parts, and archives that are damaged or lie.
 
-use impinge_io::{Error, Format, Mesh, ReadOptions, read_bodies_bytes, read_bytes};
+use impinge_io::{
+    Error, Format, Mesh, ReadOptions, read_bodies_bytes, read_bytes, read_bytes_with_summary,
+};
 
 use crate::common::{MODEL, TRIANGLES, VERTICES, threemf_mesh, threemf_model, zip};
 use crate::triangles;
@@ -159,4 +161,17 @@ fn archives_that_lie_are_refused_and_cost_nothing() {
     let bytes = model(&(object("1") + &doubled), "<item objectid=\"30\"/>");
     let said = read_bytes(&bytes, Format::ThreeMf, "a.3mf", &options).unwrap_err();
     assert!(matches!(said, Error::TooLarge { .. }), "{said}");
+}
+
+#[test]
+fn a_unit_other_than_a_millimetre_is_told() {
+    for (unit, told) in [("millimeter", None), ("inch", Some("inch")), ("?", None)] {
+        let text = threemf_model(&object("1"), "<item objectid=\"1\"/>");
+        let with_unit = text.replacen("<model", &format!("<model unit=\"{unit}\""), 1);
+        assert_ne!(with_unit, text);
+        let bytes = zip(&[(MODEL, with_unit.as_bytes())], true);
+        let options = ReadOptions::as_they_are();
+        let read = read_bytes_with_summary(&bytes, Format::ThreeMf, "a.3mf", &options);
+        assert_eq!(read.unwrap().1.unit, told, "{unit}");
+    }
 }

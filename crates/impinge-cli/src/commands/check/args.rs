@@ -271,6 +271,7 @@ impl FailOn {
                 "Edges of more than two triangles, vertices of several fans"
             }
             FailOn::Mesh(Finding::Orientation) => "Neighbours with opposite orientations",
+            FailOn::Mesh(Finding::InsideOut) => "Closed surfaces whose faces point inward",
             FailOn::Mesh(Finding::Boundary) => "Edges of only one triangle",
             FailOn::Mesh(Finding::Thin) => "Walls that --min-thickness finds",
             FailOn::Mesh(Finding::Nan) => "Coordinates that are NaN or infinite",
@@ -285,8 +286,8 @@ impl FailOn {
 
 impl ValueEnum for FailOn {
     fn value_variants<'a>() -> &'a [Self] {
-        const ALL: [FailOn; 13] = {
-            let mut all = [FailOn::Any; 13];
+        const ALL: [FailOn; 14] = {
+            let mut all = [FailOn::Any; 14];
             let mut ix = 0;
             while ix < Finding::ALL.len() {
                 all[ix] = FailOn::Mesh(Finding::ALL[ix]);

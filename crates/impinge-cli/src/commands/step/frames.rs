@@ -48,6 +48,8 @@ pub trait Frames {
     fn read(&self, frame_ix: usize) -> Result<Positions, Error>;
     /// The error for a frame that the library refuses.
     fn refused(&self, frame_ix: usize, source: impinge::Error) -> Error;
+    /// Says in a line of JSON which frame it is about, and in which file that is, if each has one.
+    fn name_in(&self, line: &mut Map<String, Value>, frame_ix: usize);
 }
 
 /// Steps from each frame of a range to the next, the body `moving` in motion and all others at
@@ -96,7 +98,7 @@ pub fn steps_of_sequence(
         }
         if shown.json {
             let mut line = Map::new();
-            line.insert("frame".into(), frame_ix.into());
+            frames.name_in(&mut line, frame_ix);
             line.extend(found.numbers());
             line.insert("ms".into(), found.ms());
             writeln!(out(), "{}", Value::Object(line))?;

@@ -44,6 +44,9 @@ pub(super) struct Node {
     #[serde(default)]
     pub children: Vec<usize>,
     pub mesh: Option<usize>,
+    pub skin: Option<usize>,
+    /// Of morph targets, in place of the mesh's.
+    pub weights: Option<Vec<f64>>,
     /// Column by column.
     pub matrix: Option<[f64; 16]>,
     pub translation: Option<[f64; 3]>,
@@ -58,6 +61,9 @@ pub(super) struct Node {
 pub(super) struct Mesh {
     pub name: Option<String>,
     pub primitives: Vec<Primitive>,
+    /// Of morph targets.
+    #[serde(default)]
+    pub weights: Vec<f64>,
 }
 
 #[derive(Debug, Deserialize)]
