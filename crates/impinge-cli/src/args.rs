@@ -31,7 +31,7 @@ pub use choices::{
 };
 pub use help::parse;
 pub use near::NearArgs;
-pub use picture::PictureArgs;
+pub use picture::{PictureArgs, ShownArgs};
 pub use probe::{CastArgs, OneMeshArgs, ProbeArgs};
 pub use rows::RowsArgs;
 pub use safe::SafeArgs;
@@ -356,14 +356,8 @@ pub struct AnswerArgs {
     /// .parquet)
     #[arg(long, value_name = "FILE")]
     pub regions: Option<RowsFile>,
-    /// Write the meshes with colliding elements coloured (.ply, .glb or .vtu)
-    #[arg(long, value_name = "FILE")]
-    pub out: Option<MeshFile>,
-    /// Draw the meshes with colliding elements coloured (.png)
-    #[arg(long, value_name = "FILE")]
-    pub png: Option<PngFile>,
     #[command(flatten)]
-    pub picture: PictureArgs,
+    pub shown: ShownArgs,
 }
 
 impl AnswerArgs {
@@ -373,12 +367,10 @@ impl AnswerArgs {
         let contacts = contacts.map(|file| ("--contacts", file.path.as_path()));
         let curves = self.curves.as_ref();
         let curves = curves.map(|file| ("--curves", file.path.as_path()));
-        let out = self.out.as_ref().map(|file| ("--out", file.path.as_path()));
-        let png = self.png.as_ref().map(|file| ("--png", file.0.as_path()));
         let regions = self.regions.as_ref();
         let regions = regions.map(|file| ("--regions", file.path.as_path()));
-        let all = [contacts, curves, regions, out, png];
-        all.into_iter().flatten().collect()
+        let all = [contacts, curves, regions].into_iter().flatten();
+        all.chain(self.shown.outputs()).collect()
     }
 }
 

@@ -31,7 +31,9 @@ const TOPICS: [Topic; 3] = [
         },
         text: "\
 Pictures are drawn on a GPU if there is one, else on the CPU; they look alike. Colliding elements of body 0 are red,
-those of body 1 blue, then green, orange, …; hidden ones show through faintly.",
+those of body 1 blue, then green, orange, …; hidden ones show through faintly. Elsewhere colours go from red to yellow:
+`near` red where bodies touch, yellow at --distance; `safe` red at a bound of 0, yellow at --most; `step` at the start,
+red what touches then, yellow what touches at the end.",
     },
     Topic {
         name: "rows",

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use clap::Args;
 use impinge::PairKind;
 
-use super::{AskArgs, DetectorArgs, PictureArgs, RowsArgs, kind};
-use crate::values::{MeshFile, PngFile, body_length, distance, two_bodies};
+use super::{AskArgs, DetectorArgs, RowsArgs, ShownArgs, kind};
+use crate::values::{body_length, distance, two_bodies};
 
 pub const NEAR_EXAMPLES: &str = "\
 Examples:
@@ -49,15 +49,8 @@ pub struct NearArgs {
     pub ask: AskArgs,
     #[command(flatten)]
     pub rows: RowsArgs,
-    /// Write the meshes, coloured by how near something is (.ply, .glb or .vtu)
-    #[arg(long, value_name = "FILE")]
-    pub out: Option<MeshFile>,
-    /// Draw the meshes, coloured by how near something is: red where they touch, yellow at the
-    /// distance (.png)
-    #[arg(long, value_name = "FILE")]
-    pub png: Option<PngFile>,
     #[command(flatten)]
-    pub picture: PictureArgs,
+    pub shown: ShownArgs,
     #[command(flatten)]
     pub detector: DetectorArgs,
 }

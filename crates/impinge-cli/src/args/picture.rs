@@ -1,8 +1,37 @@
-//! Options of pictures.
+//! Options of coloured meshes and pictures.
+
+use std::path::Path;
 
 use clap::{Args, ValueEnum};
 
-use crate::values::{azimuth, elevation, part, size};
+use crate::values::{MeshFile, PngFile, azimuth, elevation, part, size};
+
+/// Where an answer is shown in colours.
+#[derive(Debug, Clone, Args)]
+pub struct ShownArgs {
+    /// Write the meshes in the colours of the answer (.ply, .glb or .vtu)
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<MeshFile>,
+    /// Draw the meshes in the colours of the answer (.png)
+    #[arg(long, value_name = "FILE")]
+    pub png: Option<PngFile>,
+    #[command(flatten)]
+    pub picture: PictureArgs,
+}
+
+impl ShownArgs {
+    /// The files, each with its option.
+    pub fn outputs(&self) -> impl Iterator<Item = (&'static str, &Path)> {
+        let out = self.out.as_ref().map(|file| ("--out", file.path.as_path()));
+        let png = self.png.as_ref().map(|file| ("--png", file.0.as_path()));
+        out.into_iter().chain(png)
+    }
+
+    /// Whether it is shown at all.
+    pub fn any(&self) -> bool {
+        self.outputs().next().is_some()
+    }
+}
 
 /// Options of pictures.
 #[derive(Debug, Clone, Args)]

@@ -1,11 +1,11 @@
 //! The command line of `impinge safe`.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{AskArgs, DetectorArgs, PictureArgs, RowsArgs};
-use crate::values::{MeshFile, PngFile, body_length, distance};
+use super::{AskArgs, DetectorArgs, RowsArgs, ShownArgs};
+use crate::values::{body_length, distance};
 
 pub const SAFE_EXAMPLES: &str = "\
 Examples:
@@ -42,23 +42,8 @@ pub struct SafeArgs {
     pub ask: AskArgs,
     #[command(flatten)]
     pub rows: RowsArgs,
-    /// Write the meshes coloured by the least bound of each element (.ply, .glb or .vtu)
-    #[arg(long, value_name = "FILE")]
-    pub out: Option<MeshFile>,
-    /// Draw the meshes coloured by the least bound of each face (.png)
-    #[arg(long, value_name = "FILE")]
-    pub png: Option<PngFile>,
     #[command(flatten)]
-    pub picture: PictureArgs,
+    pub shown: ShownArgs,
     #[command(flatten)]
     pub detector: DetectorArgs,
-}
-
-impl SafeArgs {
-    /// The output files without the rows, each with its option.
-    pub fn outputs(&self) -> Vec<(&'static str, &Path)> {
-        let out = self.out.as_ref().map(|file| ("--out", file.path.as_path()));
-        let png = self.png.as_ref().map(|file| ("--png", file.0.as_path()));
-        [out, png].into_iter().flatten().collect()
-    }
 }

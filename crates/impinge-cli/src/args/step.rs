@@ -6,13 +6,10 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use impinge::{PairKind, Precision, Query, Start};
 
-use super::PictureArgs;
-use super::RowsArgs;
-use super::{DetectorArgs, ExcludeArgs, kind, precision, start};
+use super::{DetectorArgs, ExcludeArgs, RowsArgs, ShownArgs, kind, precision, start};
 use crate::asked::Question;
 use crate::detection::of_kinds;
-use crate::values::PngFile;
-use crate::values::{MeshFile, ReachedFile, at_least_one, distance, two_bodies};
+use crate::values::{ReachedFile, at_least_one, distance, two_bodies};
 
 pub const STEP_EXAMPLES: &str = "\
 Examples:
@@ -84,15 +81,8 @@ pub struct StepArgs {
     /// Ask N times, rewriting positions at both ends before each, and show median times
     #[arg(long, value_name = "N", default_value = "1", value_parser = at_least_one::<NonZeroUsize>)]
     pub repeat: NonZeroUsize,
-    /// Write the meshes at the start of the step, coloured by the time of contact (.ply, .glb or
-    /// .vtu)
-    #[arg(long, value_name = "FILE")]
-    pub out: Option<MeshFile>,
-    /// Draw the meshes at the start of the step, coloured by the time of contact (.png)
-    #[arg(long, value_name = "FILE")]
-    pub png: Option<PngFile>,
     #[command(flatten)]
-    pub picture: PictureArgs,
+    pub shown: ShownArgs,
     #[command(flatten)]
     pub detector: DetectorArgs,
 }
@@ -118,11 +108,9 @@ impl StepHow {
 impl StepArgs {
     /// The output files without the rows, each with its option.
     pub fn outputs(&self) -> Vec<(&'static str, &Path)> {
-        let out = self.out.as_ref().map(|file| ("--out", file.path.as_path()));
-        let png = self.png.as_ref().map(|file| ("--png", file.0.as_path()));
         let (option, reached) = self.reached();
         let reached = reached.iter().map(|file| (option, file.path.as_path()));
-        [out, png].into_iter().flatten().chain(reached).collect()
+        self.shown.outputs().chain(reached).collect()
     }
 
     /// The files for the bodies where the step ends, and the option that names them.

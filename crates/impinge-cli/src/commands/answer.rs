@@ -154,7 +154,7 @@ fn answer(
             pairs.rows().map(|row| row.map(Cell::Number)),
         )?;
     }
-    if let Some(file) = &answer.out {
+    if let Some(file) = &answer.shown.out {
         meshes::write(file, &scene, &bodies, pairs)?;
     }
     let wants_contacts = answer.contacts.is_some() || answer.curves.is_some();
@@ -198,8 +198,8 @@ fn answer(
         output::say(&text, rows_file.as_ref())?;
     }
     // The picture comes last, so that the answer is printed even without an adapter.
-    if let Some(png) = &answer.png {
-        let mut drawer = Drawer::new(&answer.picture, how.device.as_deref(), threads)?;
+    if let Some(png) = &answer.shown.png {
+        let mut drawer = Drawer::new(&answer.shown.picture, how.device.as_deref(), threads)?;
         drawer.write(&png.0, &scene, &bodies, pairs)?;
     }
     end(ask, !pairs.is_empty(), &unread, paths.len())

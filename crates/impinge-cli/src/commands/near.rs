@@ -21,11 +21,8 @@ use crate::{colors, headline, json, output, rows};
 pub fn near(args: &NearArgs, cancel: &CancelToken) -> Result<(), Error> {
     let ask = &args.ask;
     let inputs = Inputs::new(&args.meshes);
-    if let Some(file) = &args.out {
-        inputs.check("--out", &file.path)?;
-    }
-    if let Some(png) = &args.png {
-        inputs.check("--png", &png.0)?;
+    for (option, path) in args.shown.outputs() {
+        inputs.check(option, path)?;
     }
     let rows_file = args.rows.file(&inputs, ask.json)?;
     let is_self = args.within || args.meshes.len() == 1;
@@ -43,7 +40,7 @@ pub fn near(args: &NearArgs, cancel: &CancelToken) -> Result<(), Error> {
     };
     let intersect = query(asked, &ask.exclude, &bodies.ids)?;
     let mut query = of_kinds(intersect.clone(), &args.kinds);
-    let is_shown = args.out.is_some() || args.png.is_some();
+    let is_shown = args.shown.any();
     if rows_file.is_some() {
         query = query.closest_points();
     } else if is_shown {
@@ -72,7 +69,7 @@ pub fn near(args: &NearArgs, cancel: &CancelToken) -> Result<(), Error> {
             .collect(),
         false => Vec::new(),
     };
-    if let Some(file) = &args.out {
+    if let Some(file) = &args.shown.out {
         colors::write(file, &bodies.scene, &named, &colored)?;
     }
     if ask.json {
@@ -84,10 +81,10 @@ pub fn near(args: &NearArgs, cancel: &CancelToken) -> Result<(), Error> {
         writeln!(text, "{}", asked.line(&bodies.vertices, &bodies.nouns))?;
         say(&text, rows_file.as_ref())?;
     }
-    if let Some(png) = &args.png {
+    if let Some(png) = &args.shown.png {
         let surfaces = colors::surfaces(&bodies.scene, &named, &colored)?;
         let device = args.detector.device.as_deref();
-        Drawer::new(&args.picture, device, 1)?.draw(&png.0, surfaces)?;
+        Drawer::new(&args.shown.picture, device, 1)?.draw(&png.0, surfaces)?;
     }
     hit(ask.fail_on_hit, !near.is_empty() || intersects)
 }

@@ -25,7 +25,7 @@ use crate::{headline, json, output, palette, rows};
 pub fn safe(args: &SafeArgs, cancel: &CancelToken) -> Result<(), Error> {
     let ask = &args.ask;
     let inputs = Inputs::new(&args.meshes);
-    for (option, path) in args.outputs() {
+    for (option, path) in args.shown.outputs() {
         inputs.check(option, path)?;
     }
     let rows_file = args.rows.file(&inputs, ask.json)?;
@@ -78,12 +78,12 @@ pub fn safe(args: &SafeArgs, cancel: &CancelToken) -> Result<(), Error> {
             |(body, vertex, bound)| [rows::number(body), rows::number(vertex), Cell::Float(bound)];
         rows::write(file, columns.to_vec(), safe.n_vertices(), each.map(row))?;
     }
-    if let Some(file) = &args.out {
+    if let Some(file) = &args.shown.out {
         answer.write_colored(file)?;
     }
-    if let Some(png) = &args.png {
+    if let Some(png) = &args.shown.png {
         let device = args.detector.device.as_deref();
-        Drawer::new(&args.picture, device, 1)?.draw(&png.0, answer.surfaces()?)?;
+        Drawer::new(&args.shown.picture, device, 1)?.draw(&png.0, answer.surfaces()?)?;
     }
     if ask.json {
         writeln!(out(), "{}", Value::Object(answer.object()?))?;

@@ -119,22 +119,22 @@ pub fn step(args: &StepArgs, cancel: &CancelToken) -> Result<(), Error> {
     }
     let named = bodies.names.iter().map(|[start, _]| start.as_str());
     let named: Vec<(BodyId, &str)> = bodies.ids.iter().copied().zip(named).collect();
-    let colored: Vec<colors::Found> = match args.out.is_some() || args.png.is_some() {
+    let colored: Vec<colors::Found> = match args.shown.any() {
         true => impacts
             .iter()
             .map(|i| (i.kind, [i.a, i.b], i.toi))
             .collect(),
         false => Vec::new(),
     };
-    if let Some(file) = &args.out {
+    if let Some(file) = &args.shown.out {
         colors::write(file, &bodies.scene, &named, &colored)?;
     }
     let found = Found::all(impacts, times);
     print(args, asked, &bodies, &found, rows_file.as_ref())?;
-    if let Some(png) = &args.png {
+    if let Some(png) = &args.shown.png {
         let surfaces = colors::surfaces(&bodies.scene, &named, &colored)?;
         let device = args.detector.device.as_deref();
-        Drawer::new(&args.picture, device, 1)?.draw(&png.0, surfaces)?;
+        Drawer::new(&args.shown.picture, device, 1)?.draw(&png.0, surfaces)?;
     }
     found.end(args.fail_on_hit)
 }
