@@ -186,17 +186,18 @@ impinge_status impinge_scene_set_element_thickness(impinge_scene *scene, uint32_
 impinge_status impinge_scene_set_groups(impinge_scene *scene, uint32_t body, impinge_array groups);
 
 /* Says which vertices of a body are pinned, where they never move: as many rows as it has vertices, 1 column of U8 or any integer type,
- * 1 or 0. Pairs of elements all of whose vertices are pinned are left out of every query.
+ * 1 or 0. Pairs of elements all of whose vertices are pinned are left out of every query, so pin no vertices that you move by a script:
+ * two such bodies would pass through each other.
  * INVALID: no such body, another number of rows, another number than 0 or 1. */
 impinge_status impinge_scene_set_pinned(impinge_scene *scene, uint32_t body, impinge_array pinned);
 
 /* The number of bodies; 0 for NULL. */
 size_t impinge_scene_n_bodies(const impinge_scene *scene);
 
-/* Views of a body, valid until the scene is changed: its positions (3 columns of F32 or F64, as they were given), its end positions (no
- * rows if it stands still),
- * its elements as they were given (U32), its edges (U32, 2 columns) and its faces (U32, 3 columns): those of tetrahedra are its
- * boundary, by tetrahedron and then by the opposite corner. INVALID: no such body. */
+/* Views of a body. Valid until the scene is changed: its positions (3 columns of F32 or F64, as they were given) and its end positions
+ * (no rows if it stands still). Valid until it is re-meshed or removed, or its edges are set: its elements as they were given (U32), its
+ * edges (U32, 2 columns) and its faces (U32, 3 columns): those of tetrahedra are its boundary, by tetrahedron and then by the opposite
+ * corner. INVALID: no such body. */
 impinge_status impinge_scene_positions(const impinge_scene *scene, uint32_t body, impinge_array *view);
 impinge_status impinge_scene_end_positions(const impinge_scene *scene, uint32_t body, impinge_array *view);
 impinge_status impinge_scene_elements(const impinge_scene *scene, uint32_t body, impinge_array *view);

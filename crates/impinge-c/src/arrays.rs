@@ -70,6 +70,13 @@ impl<T: Copy, const N: usize> Strided<T, N> {
             ("row_stride", strides[0], array.rows),
             ("column_stride", strides[1], N),
         ] {
+            if stride == 1 && size > 1 {
+                // So the classes of C++ pass on a matrix or a list that does not fit.
+                return Err(Failure::invalid(format!(
+                    "{what}: rows are not of {N} numbers each: one row per position or element, so transpose a matrix with one per \
+                     column ({name} is 1: strides are in bytes)"
+                )));
+            }
             if stride % size != 0 {
                 return Err(Failure::invalid(format!(
                     "{what}: {name} is {stride}, which is no multiple of the {size} bytes of a number: strides are in bytes"

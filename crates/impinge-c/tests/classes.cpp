@@ -242,6 +242,10 @@ int main() {
   const auto a = scene.add_triangles(faces(balls[0]), numbers(balls[0]));
   const auto b = scene.add_triangles(faces(balls[1]), numbers(balls[1]));
   CHECK(a && b && *a == 0 && *b == 1);
+  const auto no_detector = impinge::detector::make(impinge::settings().reuse_margin(-1));
+  CHECK(!no_detector && no_detector.status() == IMPINGE_ERROR_INVALID && no_detector.message().find("reuse_margin") != std::string::npos);
+  auto made = impinge::detector::make();
+  CHECK(made && made->any(scene) && *made->any(scene));
   const auto none = scene.set_positions(9, numbers(balls[0]));
   CHECK(!none && none.status() == IMPINGE_ERROR_INVALID && none.message().find("no body 9") != std::string::npos);
   impinge::detector detector(impinge::backend::cpu);

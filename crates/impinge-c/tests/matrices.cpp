@@ -65,6 +65,23 @@ int main() {
     CHECK(!"it has thrown");
   } catch (const impinge::error &error) {
     CHECK(error.status() == IMPINGE_ERROR_INVALID);
+    CHECK(std::strstr(error.what(), "rows are not of 3 numbers each") != nullptr);
+  }
+  // Views of the library, each as what it is.
+  const auto triangles = impinge::as_indices(scene.faces(body));
+  CHECK(triangles.cols() == 3 && triangles(0, 1) == static_cast<const std::uint32_t *>(scene.faces(body).data)[1]);
+  const auto edges = impinge::as_indices(scene.edges(body));
+  CHECK(edges.cols() == 2 && edges(1, 0) == static_cast<const std::uint32_t *>(scene.edges(body).data)[2]);
+  const auto safe = detector.safe_distances(scene, 1.0);
+  const auto bounds = impinge::to_vector(safe.of(body));
+  CHECK(bounds.size() == static_cast<Eigen::Index>(safe.of(body).rows) && bounds.minCoeff() >= 0 && bounds.maxCoeff() <= 1);
+  for (const auto &other : {scene.faces(body), scene.edges(body), safe.of(body)}) {
+    try {
+      (void)impinge::to_matrix(other);
+      CHECK(!"it has thrown");
+    } catch (const impinge::error &error) {
+      CHECK(error.status() == IMPINGE_ERROR_INVALID);
+    }
   }
   // Points of any layout, and what is nearest to them, without a copy.
   const Eigen::MatrixXf probes = Eigen::MatrixXf::Random(20, 5);

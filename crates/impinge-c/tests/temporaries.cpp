@@ -112,6 +112,15 @@ static_assert(std::is_same_v<decltype(*std::declval<result<pairs> &>()), pairs &
 static_assert(std::is_same_v<decltype(std::declval<result<pairs>>().message()), std::string>);
 #endif
 
+// What a query only looks at must outlive it.
+template <class Near, class = void> struct excludes : std::false_type {};
+template <class Near> struct excludes<Near, std::void_t<decltype(std::declval<query &>().exclude(std::declval<Near>()))>> : std::true_type {};
+static_assert(excludes<near_pairs &>::value && excludes<const near_pairs &>::value && !excludes<near_pairs>::value);
+static_assert(detail::is_lost<std::vector<int>>::value && !detail::is_lost<std::vector<int> &>::value && !detail::is_lost<view<int>>::value);
+#ifdef WITH_EIGEN
+static_assert(detail::is_lost<Eigen::VectorXi>::value && !detail::is_lost<Eigen::Map<Eigen::VectorXi>>::value);
+#endif
+
 #ifdef WITH_EIGEN
 #define MATRIX [](auto &&of) -> decltype(points_of(std::forward<decltype(of)>(of))) { return points_of(std::forward<decltype(of)>(of)); }
 static_assert(compiles<const closest &>(MATRIX) && !compiles<closest>(MATRIX), "points_of");

@@ -460,10 +460,10 @@ public:
   double fraction() const noexcept { return impinge_motion_fraction(raw()); }
   /// The first contact of the whole step.
   std::optional<impact> first() const {
-    impact impact{};
+    impact contact{};
     std::int32_t found = 0;
-    if (impinge_motion_first(raw(), &impact, &found) != IMPINGE_OK || found == 0) return std::nullopt;
-    return impact;
+    if (impinge_motion_first(raw(), &contact, &found) != IMPINGE_OK || found == 0) return std::nullopt;
+    return contact;
   }
 };
 

@@ -43,8 +43,46 @@ template <class T> Eigen::Map<const Eigen::Matrix<T, Eigen::Dynamic, 1>> as_vect
   return {numbers.data(), static_cast<Eigen::Index>(numbers.size())};
 }
 
-/// Positions or points as a matrix of n x 3 numbers in double precision. A copy.
+namespace detail {
+/// The columns of an array of the library, whose rows are packed; 0 of what is no number of its type.
+inline Eigen::Index columns_of(const array &of, bool of_indices) {
+  const bool is_right = of_indices ? of.type == IMPINGE_U32 : of.type == IMPINGE_F32 || of.type == IMPINGE_F64;
+  return is_right && of.column_stride > 0 ? of.row_stride / of.column_stride : 0;
+}
+/// Throws; without exceptions, what is asked for is empty.
+inline void misfit(const char *message) {
+#ifndef IMPINGE_NO_EXCEPTIONS
+  refuse(message);
+#else
+  (void)message;
+#endif
+}
+} // namespace detail
+
+/// Elements, edges or faces of a body as a matrix of vertex numbers, one row each: `scene::faces` and so on. A view.
+inline Eigen::Map<const Eigen::Matrix<std::uint32_t, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>> as_indices(const array &elements) {
+  const auto n = detail::columns_of(elements, true);
+  if (elements.rows > 0 && n == 0) detail::misfit("as_indices: no vertex numbers");
+  return {static_cast<const std::uint32_t *>(elements.data), n == 0 ? 0 : static_cast<Eigen::Index>(elements.rows), n};
+}
+
+/// One number per vertex in double precision, such as `safe_distances::of`. A copy.
+inline Eigen::VectorXd to_vector(const array &numbers) {
+  const auto n = static_cast<Eigen::Index>(numbers.rows);
+  if (n > 0 && detail::columns_of(numbers, false) != 1) {
+    detail::misfit("to_vector: not one number per row");
+    return {};
+  }
+  if (numbers.type == IMPINGE_F64) return Eigen::Map<const Eigen::VectorXd>(static_cast<const double *>(numbers.data), n);
+  return Eigen::Map<const Eigen::VectorXf>(static_cast<const float *>(numbers.data), n).cast<double>();
+}
+
+/// Positions or points as a matrix of n x 3 numbers in double precision. A copy. Vertex numbers have `as_indices`, one number per row `to_vector`.
 inline Eigen::MatrixXd to_matrix(const array &positions) {
+  if (positions.rows > 0 && detail::columns_of(positions, false) < 3) {
+    detail::misfit("to_matrix: not three coordinates per row: as_indices is for vertex numbers, to_vector for one number per row");
+    return Eigen::MatrixXd(0, 3);
+  }
   using strides = Eigen::Stride<Eigen::Dynamic, Eigen::Dynamic>;
   using wide = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>;
   using narrow = Eigen::Matrix<float, Eigen::Dynamic, 3, Eigen::RowMajor>;

@@ -70,10 +70,20 @@ public:
 #ifndef IMPINGE_NO_EXCEPTIONS
     give(status);
 #else
-    (void)status; // Without a handle every question fails.
+    status_ = status; // Without a handle every question fails.
 #endif
   }
   detector(impinge::backend of) : detector(settings(of)) {}
+  /// The same as a result: without exceptions, it says why there is none.
+  static result<detector> make(settings of = {}) {
+    detector made(std::move(of));
+#ifndef IMPINGE_NO_EXCEPTIONS
+    return made;
+#else
+    const auto status = made.status_;
+    return detail::give(status, std::move(made));
+#endif
+  }
 
   result<pairs> detect(const scene &in, const query &of = {}) { return ask<pairs, impinge_pairs>(impinge_detect, in, of); }
   result<std::uint64_t> count(const scene &in, const query &of = {}) { return value<std::uint64_t>(impinge_count, in, of); }
@@ -244,6 +254,9 @@ public:
   void stats() const && = delete;
 
 private:
+#ifdef IMPINGE_NO_EXCEPTIONS
+  impinge_status status_ = IMPINGE_OK;
+#endif
   struct watch {
     std::function<bool()> cancelled;
     std::function<void(std::uint64_t, std::uint64_t)> progress;

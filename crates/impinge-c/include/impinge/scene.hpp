@@ -231,6 +231,13 @@ template <class T> struct as_array<T, std::enable_if_t<detail::is_container<T>::
 
 namespace detail {
 template <class T> array rows_of(const T &given, std::size_t columns) { return as_array<T>::of(given, columns); }
+/// Whether something owns its numbers: containers, and matrices of Eigen that are no views.
+template <class T, class = void> struct owns : std::false_type {};
+template <class T> struct owns<T, std::void_t<typename T::allocator_type>> : std::true_type {};
+template <class T> struct owns<T, std::enable_if_t<std::is_same_v<T, typename T::PlainObject>>> : std::true_type {};
+template <class V, std::size_t N> struct owns<std::array<V, N>> : std::true_type {};
+/// Whether a forwarded argument is a temporary whose numbers end with it.
+template <class T> struct is_lost : std::bool_constant<!std::is_lvalue_reference_v<T> && owns<std::remove_cv_t<T>>::value> {};
 } // namespace detail
 
 /// What happens to pairs that touch at the start of a step.
@@ -279,17 +286,20 @@ public:
   query &exclude_groups(std::uint32_t g, std::uint32_t h) { return leave_out(IMPINGE_EXCLUDE_GROUPS, g, h, 0); }
   /// Leaves out pairs of an element of `a` and one of `b` of which some vertices are listed together: the list of vertex v of `a` is
   /// vertices[offsets[v]] to vertices[offsets[v + 1] - 1], vertices of `b`. The arrays must live as long as the query is used.
-  template <class O, class V> query &exclude_vertices(body a, body b, const O &offsets, const V &vertices) {
+  template <class O, class V> query &exclude_vertices(body a, body b, O &&offsets, V &&vertices) {
+    static_assert(!detail::is_lost<O>::value && !detail::is_lost<V>::value, "the arrays must live as long as the query: give them names");
     leave_out(IMPINGE_EXCLUDE_VERTICES, a, b, 0);
     exclusions_.back().offsets = detail::rows_of(offsets, 1);
     exclusions_.back().vertices = detail::rows_of(vertices, 1);
     return *this;
   }
-  /// Leaves out the pairs of an answer of `detector::near`, such as those that are near at rest. It must live as long as the query is asked.
+  /// Leaves out the pairs of an answer of `detector::near`, such as those that are near at rest. It must live as long as the query is asked,
+  /// so a temporary answer is refused.
   template <class Near> query &exclude(const Near &rest_pairs) {
     rest_pairs_.push_back(rest_pairs.raw());
     return *this;
   }
+  template <class Near> query &exclude(const Near &&) = delete;
   /// Bodies that do not move, of `detector::safe_distances`.
   query &fixed(std::vector<body> bodies) {
     fixed_ = std::move(bodies);
@@ -425,7 +435,7 @@ public:
   result<void> set_filter(body of, std::uint64_t category, std::uint64_t mask) { return detail::give(impinge_scene_set_filter(raw(), of, category, mask)); }
   /// The group of each vertex, for `query::exclude_groups`.
   template <class G> result<void> set_groups(body of, const G &groups) { return detail::give(impinge_scene_set_groups(raw(), of, detail::rows_of(groups, 1))); }
-  /// Which vertices never move: 1 or 0 for each, as bytes or integers.
+  /// Which vertices never move: 1 or 0 for each, as bytes or integers. Not for vertices that you move yourself: see impinge.h.
   template <class G> result<void> set_pinned(body of, const G &pinned) { return detail::give(impinge_scene_set_pinned(raw(), of, detail::rows_of(pinned, 1))); }
   result<void> set_thickness(body of, double thickness) { return detail::give(impinge_scene_set_thickness(raw(), of, thickness)); }
   /// One thickness per vertex, edge or face; other elements are as thick as the thickest of these that they have or are part of.
@@ -434,7 +444,7 @@ public:
   template <class T> result<void> set_face_thickness(body of, const T &thickness) { return element_thickness(of, IMPINGE_TRIANGLES, thickness); }
 
   std::size_t n_bodies() const noexcept { return impinge_scene_n_bodies(raw()); }
-  /// Views, which live until the scene is changed.
+  /// Views. Positions live until the scene is changed; elements, edges and faces until the body is re-meshed or removed, or its edges are set.
   result<array> positions(body of) const & { return look(impinge_scene_positions, of); }
   result<array> end_positions(body of) const & { return look(impinge_scene_end_positions, of); }
   result<array> elements(body of) const & { return look(impinge_scene_elements, of); }

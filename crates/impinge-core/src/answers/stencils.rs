@@ -353,7 +353,7 @@ fn sides(pair: &NearPair) -> Result<[(Element, Part); 2], Error> {
         PairKind::EdgeFace | PairKind::FaceFace => Err(Error::Setting {
             setting: "kinds",
             given: format!(
-                "{} (element {} of body {} and {} of body {})",
+                "{} (element {} of body {} and {} of body {}; `near` gives no such pairs if its query names the kinds vf and ee)",
                 pair.kind.name(),
                 pair.a.element,
                 pair.a.body,
