@@ -670,7 +670,8 @@ fn refusals_name_what_is_wrong() {
     let faces = detector.near(&scene, 0.1, &query).unwrap();
     let message = refused(&faces, &scene, None);
     assert!(
-        message.starts_with("kinds: ff (element 0 of body 0 and 3 of body 0) given, vf, ee"),
+        message.starts_with("kinds: ff (element 0 of body 0 and 3 of body 0; ")
+            && message.ends_with("the kinds vf and ee) given, vf, ee, ev or vv allowed"),
         "{message}"
     );
     assert!(matches!(
@@ -722,7 +723,7 @@ fn threads_change_no_bit() {
             let message = faces.stencils(&scene, None).unwrap_err().to_string();
             let pair = faces.iter().next().unwrap();
             let [a, b] = [pair.a, pair.b].map(|of| format!("{} of body {}", of.element, of.body));
-            let expected = format!("kinds: ff (element {a} and {b}) given");
+            let expected = format!("kinds: ff (element {a} and {b}; ");
             assert!(
                 faces.len() > 2000 && message.starts_with(&expected),
                 "{message}"
