@@ -173,7 +173,8 @@ impl Curves {
 
     /// The total length of all curves.
     pub fn total_length(&self) -> f64 {
-        self.lengths.iter().sum()
+        // The sum of nothing is -0.
+        self.lengths.iter().sum::<f64>() + 0.0
     }
 
     /// Points of contact that are not a corner of any segment or polygon: two bodies touch there

@@ -65,7 +65,9 @@ impl std::fmt::Debug for Penetration {
 impl Penetration {
     /// The volume of all regions together; `None` if the volume of any region is unknown.
     pub fn volume(&self) -> Option<f64> {
-        self.regions.iter().map(|region| region.volume).sum()
+        let volumes = self.regions.iter().map(|region| region.volume);
+        // The sum of nothing is -0.
+        volumes.sum::<Option<f64>>().map(|volume| volume + 0.0)
     }
 }
 

@@ -269,3 +269,15 @@ fn pairs_of_another_scene_are_refused_by_name() {
     assert!(contacts.shapes().iter().all(|&shape| shape == Shape::Apart));
     assert!(contacts.points().is_empty() && contacts.curves().unwrap().is_empty());
 }
+
+/// A sum of nothing is 0, which nobody should read as -0.
+#[test]
+fn what_does_not_meet_has_length_and_volume_0() {
+    let ball = surfaces::ball(80);
+    let apart = ball.translated([5.0, 0.0, 0.0]);
+    let (contacts, curves) = crossing(&ball, &apart);
+    assert!(contacts.is_empty() && curves.is_empty());
+    assert_eq!(curves.total_length().to_bits(), 0);
+    let volume = impinge_core::contact::Penetration::default().volume();
+    assert_eq!(volume.map(f64::to_bits), Some(0));
+}
