@@ -1,5 +1,6 @@
-//! What was found of bodies, coloured by a number from 0 to 1: red to yellow. Of a step it is the
-//! time of contact, of near elements the share of the distance that was asked for.
+//! Bodies in the colours of an answer: as meshes for files, and as surfaces for pictures. And
+//! colours for a number from 0 to 1, red to yellow: of a step it is the time of contact, of near
+//! elements the share of the distance that was asked for.
 
 use std::collections::HashMap;
 
@@ -11,8 +12,67 @@ use crate::meshes::{self, Colored};
 use crate::values::MeshFile;
 use crate::{palette, picture};
 
+/// Writes bodies. `color`: of an element, by its body and its corners, and whether it shows through.
+pub fn write(
+    file: &MeshFile,
+    scene: &Scene,
+    bodies: &[(BodyId, &str)],
+    color: impl Fn(usize, &[u32]) -> ([u8; 3], bool),
+) -> Result<(), Error> {
+    let mut colored = Vec::new();
+    for (ix, &(id, name)) in bodies.iter().enumerate() {
+        let color = |_, corners: &[u32]| color(ix, corners);
+        colored.push(Colored::new(scene.body(id)?, name, color));
+    }
+    meshes::write_all(file, &colored)
+}
+
+/// The bodies' surfaces, in colours as for [`write`].
+pub fn surfaces(
+    scene: &Scene,
+    bodies: &[(BodyId, &str)],
+    color: impl Fn(usize, &[u32]) -> ([u8; 3], bool),
+) -> Result<Vec<Surface>, Error> {
+    let surface = |(ix, &(id, _)): (usize, &(BodyId, &str))| {
+        let color = |corners: &[u32; 3]| color(ix, corners);
+        Ok(picture::surface(scene.body(id)?, color))
+    };
+    bodies.iter().enumerate().map(surface).collect()
+}
+
 /// Two elements, and their number.
 pub type Found = (PairKind, [Element; 2], f64);
+
+/// The colours of numbers; what has none is grey.
+pub struct Ramp(Vec<Least>);
+
+impl Ramp {
+    pub fn new(
+        scene: &Scene,
+        bodies: &[(BodyId, &str)],
+        found: impl IntoIterator<Item = Found>,
+    ) -> Result<Self, Error> {
+        let numbers: HashMap<BodyId, usize> =
+            (0..).zip(bodies).map(|(ix, of)| (of.0, ix)).collect();
+        let mut all: Vec<Least> = bodies.iter().map(|_| Least::default()).collect();
+        for (kind, elements, number) in found {
+            for (part, element) in kind.parts().into_iter().zip(elements) {
+                if let Some(&ix) = numbers.get(&element.body) {
+                    all[ix].add(scene.body(element.body)?, part, element.element, number);
+                }
+            }
+        }
+        Ok(Ramp(all))
+    }
+
+    /// The colour of an element, by its body and its corners.
+    pub fn color(&self, body: usize, corners: &[u32]) -> ([u8; 3], bool) {
+        match self.0[body].among(corners) {
+            Some(number) => (palette::ramp(number), true),
+            None => (palette::body(body).other, false),
+        }
+    }
+}
 
 /// The least numbers of the elements of one body.
 #[derive(Default)]
@@ -23,23 +83,13 @@ struct Least {
 }
 
 impl Least {
-    fn of(body: &Body, id: BodyId, found: &[Found]) -> Least {
-        let (edges, faces) = (body.part(Part::Edges), body.part(Part::Faces));
-        let mut least = Least::default();
-        for &(kind, elements, number) in found {
-            for (part, element) in kind.parts().into_iter().zip(elements) {
-                if element.body != id {
-                    continue;
-                }
-                let ix = element.element as usize;
-                match part {
-                    Part::Edges => put(&mut least.edges, sorted(edges.corners(ix)), number),
-                    Part::Faces => put(&mut least.faces, sorted(faces.corners(ix)), number),
-                    _ => put(&mut least.vertices, element.element, number),
-                }
-            }
+    fn add(&mut self, body: &Body, part: Part, element: u32, number: f64) {
+        let ix = element as usize;
+        match part {
+            Part::Edges => put(&mut self.edges, sorted(body.part(part).corners(ix)), number),
+            Part::Faces => put(&mut self.faces, sorted(body.part(part).corners(ix)), number),
+            _ => put(&mut self.vertices, element, number),
         }
-        least
     }
 
     /// The least number of a primitive and its edges and vertices, if any of them was found.
@@ -67,49 +117,4 @@ fn sorted<const N: usize>(corners: &[u32]) -> [u32; N] {
 fn put<K: Eq + std::hash::Hash>(all: &mut HashMap<K, f64>, key: K, number: f64) {
     let least = all.entry(key).or_insert(number);
     *least = least.min(number);
-}
-
-/// Writes the bodies.
-pub fn write(
-    file: &MeshFile,
-    scene: &Scene,
-    bodies: &[(BodyId, &str)],
-    found: &[Found],
-) -> Result<(), Error> {
-    let mut colored = Vec::new();
-    for (ix, &(id, name)) in bodies.iter().enumerate() {
-        let body = scene.body(id)?;
-        let color = color(ix, body, id, found);
-        colored.push(Colored::new(body, name, |_, corners| color(corners)));
-    }
-    meshes::write_all(file, &colored)
-}
-
-/// The bodies' surfaces.
-pub fn surfaces(
-    scene: &Scene,
-    bodies: &[(BodyId, &str)],
-    found: &[Found],
-) -> Result<Vec<Surface>, Error> {
-    let surface = |(ix, &(id, _)): (usize, &(BodyId, &str))| {
-        let body = scene.body(id)?;
-        let color = color(ix, body, id, found);
-        Ok(picture::surface(body, |corners| color(corners)))
-    };
-    bodies.iter().enumerate().map(surface).collect()
-}
-
-/// The colour of an element, by its corners.
-fn color(
-    ix: usize,
-    body: &Body,
-    id: BodyId,
-    found: &[Found],
-) -> impl Fn(&[u32]) -> ([u8; 3], bool) {
-    let least = Least::of(body, id, found);
-    let other = palette::body(ix).other;
-    move |corners| match least.among(corners) {
-        Some(number) => (palette::ramp(number), true),
-        None => (other, false),
-    }
 }

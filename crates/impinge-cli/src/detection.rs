@@ -205,7 +205,7 @@ impl Times {
 }
 
 /// The percentile, by linear interpolation between the two nearest ranks; 0 if there are no values.
-pub fn percentile(values: &[f64], percent: u32) -> f64 {
+fn percentile(values: &[f64], percent: u32) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_unstable_by(f64::total_cmp);
     let Some(last) = sorted.len().checked_sub(1) else {

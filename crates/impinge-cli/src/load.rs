@@ -405,12 +405,12 @@ pub fn stdin_bytes(options: &ReadOptions) -> Result<Vec<u8>, Error> {
 
 /// Notes on a file for users who look at primitive numbers, or wonder about pairs.
 pub fn note(name: &str, summary: &Summary, vertices: Vertices) {
+    // A note that nobody can read does no harm.
+    let tell = |what: String| _ = writeln!(stderr(), "note: {}: {what}", printable(name));
     if let Some(unit) = summary.unit {
-        let _ = writeln!(
-            stderr(),
-            "note: {}: its unit is the {unit}; numbers are read as they are, whatever the unit of other files",
-            printable(name)
-        );
+        tell(format!(
+            "its unit is the {unit}; numbers are read as they are, whatever the unit of other files"
+        ));
     }
     for (n, what) in [
         (
@@ -436,13 +436,7 @@ pub fn note(name: &str, summary: &Summary, vertices: Vertices) {
         ),
     ] {
         if n > 0 {
-            // A note that nobody can read does no harm.
-            let _ = writeln!(
-                stderr(),
-                "note: {}: {what}: {}",
-                printable(name),
-                grouped(n)
-            );
+            tell(format!("{what}: {}", grouped(n)));
         }
     }
 }

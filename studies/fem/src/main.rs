@@ -9,7 +9,7 @@ use std::process::ExitCode;
 
 use clap::Parser;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
-use impinge::{Backend, Detector, Elements, Positions};
+use impinge::{Backend, Detector, Elements};
 use impinge_fem::scenes::{DropScene, SceneName, drop_scene};
 use impinge_fem::{Error, Simulation, StepReport};
 use impinge_io::{ColoredMesh, Pc2Writer, write_ply};
@@ -146,12 +146,9 @@ fn files(folder: &Path, name: &str, simulation: &Simulation) -> Result<Pc2Writer
 
 /// The positions that the detector gets, body by body.
 fn positions(simulation: &Simulation) -> Result<Vec<[f32; 3]>, Error> {
-    let mut all = Vec::new();
-    for &id in simulation.bodies() {
-        // A simulation's scene holds f32.
-        if let Positions::F32(positions) = simulation.scene().body(id)?.positions() {
-            all.extend_from_slice(positions);
-        }
-    }
-    Ok(all)
+    let bodies = simulation.bodies().iter();
+    let shown: Vec<_> = bodies
+        .map(|&id| simulation.shown(id))
+        .collect::<Result<_, _>>()?;
+    Ok(shown.concat())
 }

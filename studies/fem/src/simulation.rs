@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use impinge::{BodyId, Detector, Pairs, Query, Scene, Stats};
+use impinge::{BodyId, Detector, Pairs, Positions, Query, Scene, Stats};
 use rayon::prelude::*;
 
 use crate::contact::{Couplings, Now, numbered, outward_directions};
@@ -344,6 +344,17 @@ impl Simulation {
         self.positions.copy_from_slice(next_positions);
         self.velocities.copy_from_slice(next_velocities);
         self.show()
+    }
+
+    /// The positions of a body as the scene holds them: in f32.
+    ///
+    /// # Errors
+    /// Another simulation's body.
+    pub fn shown(&self, body: BodyId) -> Result<&[[f32; 3]], Error> {
+        match self.scene.body(body)?.positions() {
+            Positions::F32(positions) => Ok(positions),
+            Positions::F64(_) => unreachable!("solids are added in f32"),
+        }
     }
 
     /// Copies the positions to the scene.

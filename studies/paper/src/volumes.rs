@@ -61,8 +61,8 @@ impl Recorded {
         detector.set_control(impinge::Control::new().cancel(control.cancel));
         for frame in 0..n_frames {
             control.go_on()?;
-            let positions = |body| positions(simulation.scene(), body);
-            frames.push([positions(lower)?, positions(upper)?]);
+            let shown = |body| simulation.shown(body).map(<[_]>::to_vec);
+            frames.push([shown(lower)?, shown(upper)?]);
             let pairs = simulation.detect(&mut detector)?;
             times.push(simulation.advance(&pairs)?.advance_ms);
             control.report(&what, frame + 1, n_frames);
@@ -82,19 +82,6 @@ impl Recorded {
             frames,
             simulation_ms: Samples::of(times),
         }))
-    }
-}
-
-/// The positions of a body's vertices. The simulation's scene holds them in f32.
-fn positions(scene: &Scene, body: BodyId) -> Result<Vec<[f32; 3]>, Error> {
-    match scene.body(body)?.positions() {
-        impinge::Positions::F32(positions) => Ok(positions.to_vec()),
-        impinge::Positions::F64(_) => Err(impinge::Error::WrongPrecision {
-            body,
-            stored: "f64",
-            asked: "f32",
-        }
-        .into()),
     }
 }
 

@@ -8,6 +8,7 @@ use serde_json::{Map, Value};
 use crate::apart::Inputs;
 use crate::args::NearArgs;
 use crate::asked::{Asked, Question, body};
+use crate::colors::{self, Ramp};
 use crate::detection::{Times, asked, detector, hit, of_kinds, query};
 use crate::error::Error;
 use crate::load::{Bodies, Loading};
@@ -15,7 +16,7 @@ use crate::output::{out, say, stage_table};
 use crate::picture::Drawer;
 use crate::text::{self, counted, hex};
 use crate::watch::Watch;
-use crate::{colors, headline, json, output, rows};
+use crate::{headline, json, output, rows};
 
 /// `impinge near`.
 pub fn near(args: &NearArgs, cancel: &CancelToken) -> Result<(), Error> {
@@ -62,15 +63,12 @@ pub fn near(args: &NearArgs, cancel: &CancelToken) -> Result<(), Error> {
     }
     let named = bodies.names.iter().map(String::as_str);
     let named: Vec<(BodyId, &str)> = bodies.ids.iter().copied().zip(named).collect();
-    let colored: Vec<colors::Found> = match is_shown {
-        true => near
-            .iter()
-            .map(|pair| colored(&pair, args.distance))
-            .collect(),
-        false => Vec::new(),
-    };
+    let shown = near.iter().take_while(|_| is_shown);
+    let shown = shown.map(|pair| numbered(&pair, args.distance));
+    let ramp = Ramp::new(&bodies.scene, &named, shown)?;
+    let color = |body: usize, corners: &[u32]| ramp.color(body, corners);
     if let Some(file) = &args.shown.out {
-        colors::write(file, &bodies.scene, &named, &colored)?;
+        colors::write(file, &bodies.scene, &named, color)?;
     }
     if ask.json {
         let object = Value::Object(answer(args, asked, &bodies, near, intersects)?);
@@ -82,7 +80,7 @@ pub fn near(args: &NearArgs, cancel: &CancelToken) -> Result<(), Error> {
         say(&text, rows_file.as_ref())?;
     }
     if let Some(png) = &args.shown.png {
-        let surfaces = colors::surfaces(&bodies.scene, &named, &colored)?;
+        let surfaces = colors::surfaces(&bodies.scene, &named, color)?;
         let device = args.detector.device.as_deref();
         Drawer::new(&args.shown.picture, device, 1)?.draw(&png.0, surfaces)?;
     }
@@ -90,7 +88,7 @@ pub fn near(args: &NearArgs, cancel: &CancelToken) -> Result<(), Error> {
 }
 
 /// A pair, and its share of the distance that was asked for. With thickness it may be farther.
-fn colored(pair: &NearPair, most: f64) -> colors::Found {
+fn numbered(pair: &NearPair, most: f64) -> colors::Found {
     let distance = pair.distance.unwrap_or(0.0);
     let share = if distance > 0.0 {
         (distance / most).min(1.0)

@@ -4,7 +4,6 @@ use std::io::Write;
 
 use impinge::{BodyId, Bounds, CancelToken, SafeDistances};
 use impinge_io::{Cell, Column, Holds, printable};
-use impinge_render::Surface;
 use serde_json::{Map, Value, json};
 
 use crate::apart::Inputs;
@@ -13,13 +12,11 @@ use crate::asked::{Asked, Question, body};
 use crate::detection::{Times, asked, detector, hit, query};
 use crate::error::Error;
 use crate::load::{Bodies, Loading};
-use crate::meshes::{self, Colored};
 use crate::output::{out, say, stage_table};
-use crate::picture::{self, Drawer};
+use crate::picture::Drawer;
 use crate::text::{counted, grouped};
-use crate::values::MeshFile;
 use crate::watch::Watch;
-use crate::{headline, json, output, palette, rows};
+use crate::{colors, headline, json, output, palette, rows};
 
 /// `impinge safe`.
 pub fn safe(args: &SafeArgs, cancel: &CancelToken) -> Result<(), Error> {
@@ -78,12 +75,18 @@ pub fn safe(args: &SafeArgs, cancel: &CancelToken) -> Result<(), Error> {
             |(body, vertex, bound)| [rows::number(body), rows::number(vertex), Cell::Float(bound)];
         rows::write(file, columns.to_vec(), safe.n_vertices(), each.map(row))?;
     }
+    let named = bodies.names.iter().map(String::as_str);
+    let named: Vec<(BodyId, &str)> = bodies.ids.iter().copied().zip(named).collect();
+    let color = |body: usize, corners: &[u32]| answer.color(body, corners);
     if let Some(file) = &args.shown.out {
-        answer.write_colored(file)?;
+        colors::write(file, &bodies.scene, &named, color)?;
     }
     if let Some(png) = &args.shown.png {
         let device = args.detector.device.as_deref();
-        Drawer::new(&args.shown.picture, device, 1)?.draw(&png.0, answer.surfaces()?)?;
+        // All that is near something else would show through.
+        let color = |body: usize, corners: &[u32]| (color(body, corners).0, false);
+        let surfaces = colors::surfaces(&bodies.scene, &named, color)?;
+        Drawer::new(&args.shown.picture, device, 1)?.draw(&png.0, surfaces)?;
     }
     if ask.json {
         writeln!(out(), "{}", Value::Object(answer.object()?))?;
@@ -238,27 +241,5 @@ impl Answer<'_> {
             true => (palette::ramp(least / self.args.most), true),
             false => (palette::body(body).other, false),
         }
-    }
-
-    fn write_colored(&self, file: &MeshFile) -> Result<(), Error> {
-        let Bodies {
-            scene, ids, names, ..
-        } = self.bodies;
-        let mut colored = Vec::new();
-        for (ix, (&id, name)) in ids.iter().zip(names).enumerate() {
-            let color = |_, corners: &[u32]| self.color(ix, corners);
-            colored.push(Colored::new(scene.body(id)?, name, color));
-        }
-        meshes::write_all(file, &colored)
-    }
-
-    fn surfaces(&self) -> Result<Vec<Surface>, Error> {
-        let Bodies { scene, ids, .. } = self.bodies;
-        let surface = |(ix, &id): (usize, &BodyId)| {
-            // All that is near something else would show through.
-            let color = |corners: &[u32; 3]| (self.color(ix, corners).0, false);
-            Ok(picture::surface(scene.body(id)?, color))
-        };
-        ids.iter().enumerate().map(surface).collect()
     }
 }

@@ -130,7 +130,7 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
             let regions = regions::regions(&scene, &bodies, pairs)?;
             let regions = regions.as_deref();
             let mut line = Map::new();
-            step::Frames::name_in(&frames, &mut line, frame_ix);
+            frames.name_in(&mut line, frame_ix);
             let answer = json::answer((asked, &scene), &bodies, &vertices, pairs, regions, &times)?;
             line.extend(answer);
             let mut to = out();

@@ -15,14 +15,15 @@ use serde_json::Value;
 use crate::apart::Inputs;
 use crate::args::StepArgs;
 use crate::asked::{Asked, Question};
+use crate::colors::{self, Ramp};
 use crate::detection::{Times, detector, query};
 use crate::error::Error;
 use crate::load::Nouns;
 use crate::output::{out, say};
 use crate::picture::Drawer;
+use crate::rows;
 use crate::values::RowsFile;
 use crate::watch::Watch;
-use crate::{colors, rows};
 
 use answer::Found;
 pub use answer::impact_row;
@@ -119,20 +120,17 @@ pub fn step(args: &StepArgs, cancel: &CancelToken) -> Result<(), Error> {
     }
     let named = bodies.names.iter().map(|[start, _]| start.as_str());
     let named: Vec<(BodyId, &str)> = bodies.ids.iter().copied().zip(named).collect();
-    let colored: Vec<colors::Found> = match args.shown.any() {
-        true => impacts
-            .iter()
-            .map(|i| (i.kind, [i.a, i.b], i.toi))
-            .collect(),
-        false => Vec::new(),
-    };
+    let shown = impacts.iter().take_while(|_| args.shown.any());
+    let shown = shown.map(|impact| (impact.kind, [impact.a, impact.b], impact.toi));
+    let ramp = Ramp::new(&bodies.scene, &named, shown)?;
+    let color = |body: usize, corners: &[u32]| ramp.color(body, corners);
     if let Some(file) = &args.shown.out {
-        colors::write(file, &bodies.scene, &named, &colored)?;
+        colors::write(file, &bodies.scene, &named, color)?;
     }
     let found = Found::all(impacts, times);
     print(args, asked, &bodies, &found, rows_file.as_ref())?;
     if let Some(png) = &args.shown.png {
-        let surfaces = colors::surfaces(&bodies.scene, &named, &colored)?;
+        let surfaces = colors::surfaces(&bodies.scene, &named, color)?;
         let device = args.detector.device.as_deref();
         Drawer::new(&args.shown.picture, device, 1)?.draw(&png.0, surfaces)?;
     }
