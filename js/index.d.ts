@@ -112,7 +112,7 @@ export interface Query extends Control {
    * `startIntersects`. A step whose start intersects is then not free, and `advance` allows none of it.
    */
   start?: "report" | "skip" | "verify";
-  /** A length, 0 by default: in a step, a pair this near counts as touching. */
+  /** A length, 0 by default: in a step, a pair this near counts as touching. The thickness of both elements adds to it. */
   separation?: number;
   /**
    * A length, 0 by default: what a step leaves between elements. A pair counts as in contact when its distance is at most this, but a
@@ -191,9 +191,9 @@ export declare class Scene {
   /** Bodies meet if the category of each shares a bit with the mask of the other; 64 bits. Category 1 and all bits by default. */
   setFilter(body: Body, category?: number | bigint, mask?: number | bigint): void;
   /**
-   * A length that each element of this body adds to the distance of `near`: one number, or one per vertex, edge or face. With one per vertex, edges and faces are as thick
-   * as the thickest of their vertices; otherwise other elements are as thick as the thickest of these that they have or are part of. Steps do not look at it: there
-   * `separation` and `clearance` keep bodies apart, one number for all.
+   * A length that each element of this body adds to the distance of `near`, to the `separation` that elements keep in a step, and to the gap that boxes of `candidates` may
+   * have; it is taken from the distances of `neighbours` and `safeDistances`. One number, or one per vertex, edge or face. With one per vertex, edges and faces are as thick
+   * as the thickest of their vertices; otherwise other elements are as thick as the thickest of these that they have or are part of.
    */
   setThickness(body: Body, thickness: number | ArrayLike<number>, part?: "vertices" | "edges" | "faces"): void;
   /**
@@ -646,7 +646,7 @@ export declare class Detector {
   isFree(scene: Scene, query?: Query): boolean;
   /** How far a step can be taken. */
   advance(scene: Scene, query?: Query): Advance;
-  /** Pairs of elements whose boxes overlap during a step, inflated by a length on all sides. */
+  /** Pairs of elements whose boxes overlap during a step, inflated by a length, and by how thick elements are, on all sides. */
   candidates(scene: Scene, inflation: number, query?: Query): Candidates;
   /**
    * All `candidates` in sorted runs, so that memory need not hold all of them: `each` gets one run after the other, and stops the search with

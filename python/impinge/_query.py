@@ -127,7 +127,7 @@ class Query:
         `Detector.advance` allows no step.
     separation : float
         In the unit of the scene, 0 or more: a distance that counts as touching in a step. A pair is reported with the first time at which its
-        distance is at most that, decided exactly.
+        distance is at most that, decided exactly. The thickness of both elements adds to it (`Scene.set_thickness`).
     clearance, clearance_share : float
         What a step leaves, a length in the unit of the scene: every pair keeps
         ``separation + min(clearance, clearance_share * (d - separation))``, with d its distance at the start. A pair is then reported

@@ -475,12 +475,12 @@ class Scene(SceneBase):
     def set_thickness(
         self, body: _Body, thickness: SupportsFloat | _Array, part: Literal["vertices", "edges", "faces"] | None = None
     ) -> None:
-        """Sets how thick a body is: what its elements add to the distance of `Detector.near` and `Detector.neighbours`, and what is
-        taken from that of `Detector.safe_distances`. Of two elements, each adds its own, and the sum is not rounded. A new body is not
-        thick.
+        """Sets how thick a body is. A new body is not thick. Of two elements, each adds its own: to the distance of `Detector.near`,
+        without rounding; to the `separation` that elements keep in a step (`Detector.impacts` to `Detector.truncate`) and to the gap that
+        boxes of `Detector.candidates` may have, where ``a + b`` and ``separation + (a + b)`` are rounded up. From the distances of
+        `Detector.neighbours` and `Detector.safe_distances` it is taken.
 
-        Questions about steps and distances do not look at it: a step keeps bodies apart by `separation` or `clearance`, one
-        number for all.
+        What intersects, what is nearest to a point, and how far apart bodies are, is asked of the elements themselves.
 
         Parameters
         ----------

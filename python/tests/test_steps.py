@@ -29,6 +29,18 @@ def falling():
     return scene
 
 
+def test_thick_bodies_keep_their_thickness(detector, falling):
+    apart = detector.impacts(falling, separation=0.5)
+    assert apart.earliest().toi == 0.125 and detector.earliest(falling).toi == 0.25
+    falling.set_thickness(0, [0.125, 0.125, 0.125])
+    assert detector.impacts(falling, separation=0.375).hash == apart.hash
+    falling.set_thickness(1, 0.375)
+    assert detector.earliest(falling, which="between") == apart.earliest()
+    assert detector.advance(falling).fraction < 0.125
+    near = detector.candidates(falling, which="between", kinds=["vf"])
+    assert len(near) == len(detector.candidates(falling, 0.25, which="between", kinds=["vf"]))
+
+
 def lattice_step(n=40, k=6, seed=3, dtype=np.float32):
     """Lattice triangles of three bodies whose vertices go to other places of the lattice."""
     scene = impinge.Scene()

@@ -317,7 +317,10 @@ export async function others(module) {
   const [pair] = near;
   const candidates = await detector.candidates(scene, 0.5, { kinds: ["vf", "ee"] });
   const nearest = await detector.distance(scene, strand, flat);
+  const isFree = () => detector.isFree(scene, { between: [flat, strand] });
+  const kept = [await isFree()];
   scene.setThickness(strand, 1);
+  kept.push(await isFree());
   const thick = await detector.near(scene, 0, { between: [flat, strand] });
   scene.setTransform(cloud, [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, -3, 1]);
   const onFlat = [...(await detector.detect(scene)).rows];
@@ -530,6 +533,7 @@ export async function others(module) {
     near: [near.length, pair.kind, pair.bodyA, pair.elementA, pair.bodyB, pair.distance, pair.points, pair.features],
     columns: [near.distances.length, near.points.length / 6, near.kinds.length, near.of("ee").length, near.of("vf").at(-1).distance],
     noColumns: [thick.length, thick.distances, thick.points],
+    kept,
     candidates: [candidates.length, [...candidates.of("ee").rows].length / 4, candidates.at(0)?.kind ?? null],
     nearest,
     onFlat,
@@ -560,6 +564,7 @@ export const OTHERS = {
   near: [1, "vf", 1, 0, 0, 1, [[0.25, 0.25, 1], [0.25, 0.25, 0]], [0, 16]],
   columns: [1, 1, 1, 0, 1],
   noColumns: [1, null, null],
+  kept: [true, false],
   candidates: [4, 3, "vf"],
   nearest: { distance: 1, bodyA: 1, elementA: 0, bodyB: 0, elementB: 0, points: [[0.25, 0.25, 1], [0.25, 0.25, 0]] },
   onFlat: [0, 0, 2, 1],

@@ -168,15 +168,16 @@ impinge_status impinge_scene_set_end_transform(impinge_scene *scene, uint32_t bo
  * other. By default category is 1 and mask has all bits. INVALID: no such body. */
 impinge_status impinge_scene_set_filter(impinge_scene *scene, uint32_t body, uint64_t category, uint64_t mask);
 
-/* Sets how thick a body is, a length: what its elements add to the distance of impinge_find_near. Finite, 0 or more; 0 by default.
- * Steps do not look at it: `separation` and `clearance` of a query keep bodies apart there, one number for all.
+/* Sets how thick a body is, a length: finite, 0 or more; 0 by default. Of two elements, each adds its own to the distance of
+ * impinge_find_near, to the `separation` that elements keep in a step (sums are rounded up there) and to the gap that boxes of
+ * impinge_find_candidates may have. It is taken from the distances of impinge_find_neighbours and impinge_find_safe_distances. What
+ * intersects, and how far apart bodies are, is asked of the elements themselves.
  * INVALID: no such body, another number. */
 impinge_status impinge_scene_set_thickness(impinge_scene *scene, uint32_t body, double thickness);
 
 /* Sets how thick each vertex (`kind`: IMPINGE_POINTS), edge (IMPINGE_EDGES) or face (IMPINGE_TRIANGLES) of a body is: as many rows as it
  * has of these, 1 column of F32 or F64; edges in the caller's order, if impinge_scene_set_edges gave one. Other elements are as thick as
- * the thickest of these that they have or are part of. Of two elements, the sum of both is what adds to the distance of
- * impinge_find_near. impinge_scene_set_thickness and impinge_scene_remesh forget it.
+ * the thickest of these that they have or are part of. impinge_scene_set_thickness and impinge_scene_remesh forget it.
  * INVALID: no such body, another number of rows, a number that is negative or not finite. */
 impinge_status impinge_scene_set_element_thickness(impinge_scene *scene, uint32_t body, uint32_t kind, impinge_array thickness);
 
@@ -296,7 +297,7 @@ typedef struct impinge_element {
  * How: a question without use for one of these fields ignores it.
  *   start               IMPINGE_START_REPORT ...
  *   precision           IMPINGE_F32 (default) or IMPINGE_F64: that of times, which are rounded down.
- *   separation          A length, 0 or more: elements that are so near count as touching. Of steps.
+ *   separation          A length, 0 or more: elements that are so near count as touching. Of steps. Thickness adds to it.
  *   clearance           A length, 0 or more: what a step leaves. A pair at the distance d at the start keeps
  *                       separation + min(clearance, clearance_share * (d - separation)).
  *   clearance_share     From 0 to less than 1. Default: 0.2.

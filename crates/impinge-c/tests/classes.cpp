@@ -199,6 +199,12 @@ void probes() {
   const auto truncation = detector.truncate(scene);
   CHECK(truncation.n_cut() > 10 && truncation.n_touching() == 0 && truncation.rounds() > 0 && !truncation.start_intersects());
   CHECK(truncation.positions(b).rows == VERTICES && truncation.positions(a).rows == 0);
+  const auto apart = detector.impacts(scene, query::between_all().separation(0.1)).size();
+  scene.set_vertex_thickness(a, std::vector<double>(VERTICES, 0.0625));
+  scene.set_thickness(b, 0.0375);
+  CHECK(apart > 0 && detector.impacts(scene, query::between_all()).size() == apart);
+  scene.set_thickness(a, 0);
+  scene.set_thickness(b, 0);
   truncation.apply(scene);
   CHECK(!detector.any(scene) && impinge::devices().empty());
   throws(IMPINGE_ERROR_INVALID, "most: -1", [&] { detector.safe_distances(scene, -1); });

@@ -22,8 +22,8 @@ use crate::commands::{
 };
 use crate::values::PngFile;
 use crate::values::{
-    CurvesFile, FrameRange, FramesFile, MeshFile, RowsFile, at_least_one, body_numbers, bytes,
-    distance, lambda, mesh_format, threads, two_bodies,
+    CurvesFile, FrameRange, FramesFile, MeshFile, RowsFile, at_least_one, body_length,
+    body_numbers, bytes, distance, lambda, mesh_format, threads, two_bodies,
 };
 
 pub use choices::{
@@ -328,6 +328,15 @@ pub struct ExcludeArgs {
     /// two are at most N edges apart, 0 to 16
     #[arg(id = "exclude_rings", long = "exclude-rings", value_name = "N", value_parser = clap::value_parser!(u32).range(..=16))]
     pub rings: Option<u32>,
+}
+
+/// How thick bodies are.
+#[derive(Debug, Clone, Args)]
+pub struct ThicknessArgs {
+    /// The thickness T of body N, a length that adds to what its pairs are asked for or keep (twice
+    /// within it) [default: 0]
+    #[arg(long = "thickness", value_name = "N,T", value_parser = body_length)]
+    pub of_bodies: Vec<(usize, f64)>,
 }
 
 /// Outputs of the answer for one set of meshes.

@@ -1,8 +1,9 @@
 //! What an answer is about: its last line, and an object in JSON.
 
-use impinge::{BodyId, Query, SharedVertex};
+use impinge::{BodyId, Query, Scene, SharedVertex};
 use serde_json::{Value, json};
 
+use crate::args::ThicknessArgs;
 use crate::error::Error;
 use crate::load::{Nouns, Vertices};
 use crate::text::{counted, grouped};
@@ -142,6 +143,19 @@ pub fn body(option: &str, bodies: &[BodyId], number: usize) -> Result<BodyId, Er
         };
         Error::Usage(format!("{option} names body {number}, but {given}"))
     })
+}
+
+/// Makes the bodies of a scene as thick as the program is told.
+pub fn thicken(
+    scene: &mut Scene,
+    bodies: &[BodyId],
+    thickness: &ThicknessArgs,
+) -> Result<(), Error> {
+    for &(number, thickness) in &thickness.of_bodies {
+        let id = body("--thickness", bodies, number)?;
+        scene.set_thickness(id, thickness)?;
+    }
+    Ok(())
 }
 
 /// How many vertices were welded, and how many were not though they coincide with another one.

@@ -437,6 +437,7 @@ public:
   template <class G> result<void> set_groups(body of, const G &groups) { return detail::give(impinge_scene_set_groups(raw(), of, detail::rows_of(groups, 1))); }
   /// Which vertices never move: 1 or 0 for each, as bytes or integers. Not for vertices that you move yourself: see impinge.h.
   template <class G> result<void> set_pinned(body of, const G &pinned) { return detail::give(impinge_scene_set_pinned(raw(), of, detail::rows_of(pinned, 1))); }
+  /// How thick all elements of a body are: see impinge.h. Steps keep it, too.
   result<void> set_thickness(body of, double thickness) { return detail::give(impinge_scene_set_thickness(raw(), of, thickness)); }
   /// One thickness per vertex, edge or face; other elements are as thick as the thickest of these that they have or are part of.
   template <class T> result<void> set_vertex_thickness(body of, const T &thickness) { return element_thickness(of, IMPINGE_POINTS, thickness); }

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use clap::Args;
 use impinge::PairKind;
 
-use super::{AskArgs, DetectorArgs, RowsArgs, ShownArgs, kind};
-use crate::values::{body_length, distance, two_bodies};
+use super::{AskArgs, DetectorArgs, RowsArgs, ShownArgs, ThicknessArgs, kind};
+use crate::values::{distance, two_bodies};
 
 pub const NEAR_EXAMPLES: &str = "\
 Examples:
@@ -41,10 +41,8 @@ pub struct NearArgs {
     /// Find only the pairs of bodies A and B, numbered from 0 as given
     #[arg(long, value_name = "A,B", value_parser = two_bodies, conflicts_with_all = ["within", "exclude"])]
     pub between: Option<(usize, usize)>,
-    /// The thickness T of body N, a length that adds to the distance of its pairs (twice within it)
-    /// [default: 0]
-    #[arg(long, value_name = "N,T", value_parser = body_length)]
-    pub thickness: Vec<(usize, f64)>,
+    #[command(flatten)]
+    pub thickness: ThicknessArgs,
     #[command(flatten)]
     pub ask: AskArgs,
     #[command(flatten)]

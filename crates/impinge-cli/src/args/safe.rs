@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{AskArgs, DetectorArgs, RowsArgs, ShownArgs};
-use crate::values::{body_length, distance};
+use super::{AskArgs, DetectorArgs, RowsArgs, ShownArgs, ThicknessArgs};
+use crate::values::distance;
 
 pub const SAFE_EXAMPLES: &str = "\
 Examples:
@@ -34,10 +34,8 @@ pub struct SafeArgs {
     /// Leave out the pairs within each body
     #[arg(long)]
     pub no_self: bool,
-    /// The thickness T of body N, a length that is taken from the distance of its pairs (twice
-    /// within it) [default: 0]
-    #[arg(long, value_name = "N,T", value_parser = body_length)]
-    pub thickness: Vec<(usize, f64)>,
+    #[command(flatten)]
+    pub thickness: ThicknessArgs,
     #[command(flatten)]
     pub ask: AskArgs,
     #[command(flatten)]

@@ -6,7 +6,9 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use impinge::{PairKind, Precision, Query, Start};
 
-use super::{DetectorArgs, ExcludeArgs, RowsArgs, ShownArgs, kind, precision, start};
+use super::{
+    DetectorArgs, ExcludeArgs, RowsArgs, ShownArgs, ThicknessArgs, kind, precision, start,
+};
 use crate::asked::Question;
 use crate::detection::of_kinds;
 use crate::values::{ReachedFile, at_least_one, distance, two_bodies};
@@ -53,6 +55,8 @@ pub struct StepArgs {
     pub between: Option<(usize, usize)>,
     #[command(flatten)]
     pub how: StepHow,
+    #[command(flatten)]
+    pub thickness: ThicknessArgs,
     /// Weld vertices that are at the same position both at the start and at the end, within each
     /// body; this is the default
     #[arg(long, overrides_with = "no_weld")]

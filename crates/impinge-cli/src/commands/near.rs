@@ -7,7 +7,7 @@ use serde_json::{Map, Value};
 
 use crate::apart::Inputs;
 use crate::args::NearArgs;
-use crate::asked::{Asked, Question, body};
+use crate::asked::{Asked, Question, thicken};
 use crate::colors::{self, Ramp};
 use crate::detection::{Times, asked, detector, hit, of_kinds, query};
 use crate::error::Error;
@@ -28,10 +28,7 @@ pub fn near(args: &NearArgs, cancel: &CancelToken) -> Result<(), Error> {
     let rows_file = args.rows.file(&inputs, ask.json)?;
     let is_self = args.within || args.meshes.len() == 1;
     let mut bodies = Bodies::read(&args.meshes, Loading::new(ask, is_self, cancel))?;
-    for &(number, thickness) in &args.thickness {
-        let id = body("--thickness", &bodies.ids, number)?;
-        bodies.scene.set_thickness(id, thickness)?;
-    }
+    thicken(&mut bodies.scene, &bodies.ids, &args.thickness)?;
     let mut detector = detector(&args.detector)?;
     let asked = Asked {
         only: args.between,

@@ -8,7 +8,7 @@ use serde_json::{Map, Value, json};
 
 use crate::apart::Inputs;
 use crate::args::SafeArgs;
-use crate::asked::{Asked, Question, body};
+use crate::asked::{Asked, Question, body, thicken};
 use crate::detection::{Times, asked, detector, hit, query};
 use crate::error::Error;
 use crate::load::{Bodies, Loading};
@@ -27,10 +27,7 @@ pub fn safe(args: &SafeArgs, cancel: &CancelToken) -> Result<(), Error> {
     }
     let rows_file = args.rows.file(&inputs, ask.json)?;
     let mut bodies = Bodies::read(&args.meshes, Loading::new(ask, !args.no_self, cancel))?;
-    for &(number, thickness) in &args.thickness {
-        let id = body("--thickness", &bodies.ids, number)?;
-        bodies.scene.set_thickness(id, thickness)?;
-    }
+    thicken(&mut bodies.scene, &bodies.ids, &args.thickness)?;
     let fixed = args.fixed.iter();
     let fixed = fixed.map(|&number| body("--fixed", &bodies.ids, number));
     let fixed: Vec<BodyId> = fixed.collect::<Result<_, _>>()?;

@@ -14,7 +14,7 @@ use serde_json::Value;
 
 use crate::apart::Inputs;
 use crate::args::StepArgs;
-use crate::asked::{Asked, Question};
+use crate::asked::{Asked, Question, thicken};
 use crate::colors::{self, Ramp};
 use crate::detection::{Times, detector, query};
 use crate::error::Error;
@@ -43,6 +43,7 @@ pub fn step(args: &StepArgs, cancel: &CancelToken) -> Result<(), Error> {
         .checked("--candidates", candidates, &inputs, args.json)?;
     let mut detector = detector(&args.detector)?;
     let mut bodies = Moving::read(args, cancel)?;
+    thicken(&mut bodies.scene, &bodies.ids, &args.thickness)?;
     let asked = asked(args, &bodies)?;
     let step = args.how.of(query(asked, &args.exclude, &bodies.ids)?);
 

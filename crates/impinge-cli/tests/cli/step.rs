@@ -587,6 +587,46 @@ fn a_separation_is_kept() {
     assert!(with["impacts"].as_u64() > without["impacts"].as_u64());
 }
 
+/// Thick bodies keep their thickness: as with a separation of the sum.
+#[test]
+fn a_thickness_is_kept() {
+    let folder = folder();
+    let step = |more: &[&str]| folder.run(["step"].iter().chain(&FILES).chain(more));
+    let kept = step(&["--no-self", "--json", "--separation", "0.0625"]).json();
+    let thick = ["--no-self", "--json", "--thickness", "0,0.03125"];
+    for more in [["--separation", "0.03125"], ["--thickness", "1,0.03125"]] {
+        let more = [&thick[..], &more].concat();
+        let answer = step(&more).json();
+        for key in ["hash", "earliest", "impacts", "start_intersects"] {
+            assert_eq!(answer[key], kept[key], "{more:?}");
+        }
+    }
+    let printed = |more: &[&str]| step(more).printed().to_owned();
+    let said = printed(&["--thickness", "0,0.0625"]);
+    assert!(
+        said.contains(" come within the thickness first, "),
+        "{said}"
+    );
+    let said = printed(&["--thickness", "0,0.0625", "--separation", "0.5"]);
+    assert!(
+        said.contains(" come within 0.5 and the thickness "),
+        "{said}"
+    );
+    let boxes = |more: &[&str]| {
+        let args = ["--no-self", "--json", "--candidates", "boxes.csv"];
+        step(&[&args[..], more].concat()).json()["hash"].clone()
+    };
+    let inflated = boxes(&["--inflation", "0.25"]);
+    let both = ["--thickness", "0,0.25", "--thickness", "1,0.25"];
+    assert_eq!(boxes(&both), inflated);
+    assert_ne!(boxes(&["--thickness", "0,0.25"]), inflated);
+    assert!(
+        step(&["--thickness", "7,1"])
+            .misuse()
+            .contains("names body 7")
+    );
+}
+
 /// Asks about a crash without and with an option that makes elements keep 0.0625, compares it with
 /// the library, and returns both answers.
 fn keeps(option: &str, asked: Query, said: &str) -> [Value; 2] {

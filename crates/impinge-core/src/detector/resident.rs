@@ -111,7 +111,7 @@ impl Gpu<'_> {
     ///
     /// # Errors
     /// A stale id, a buffer that is too small or lacks its usage, a step with a separation, a
-    /// clearance or a filter, or for one cell, a step larger than the device or the memory budget
+    /// clearance or a filter, bodies with a [thickness](Scene::set_thickness), or for one cell, a step larger than the device or the memory budget
     /// can hold, a detector without a GPU. Device errors go to the device's owner, and so do those
     /// of kernels, which the first step compiles.
     pub fn encode_step(
@@ -122,7 +122,7 @@ impl Gpu<'_> {
         ends: &[(BodyId, &wgpu::Buffer)],
         encoder: &mut wgpu::CommandEncoder,
     ) -> Result<ResidentStep, Error> {
-        refuse_unknown(query)?;
+        refuse_unknown(scene, query)?;
         self.with_contacts(scene, query, starts, |engine, job, clusterings| {
             engine.encode_step(job, clusterings, [starts, ends], encoder)
         })
@@ -150,8 +150,8 @@ impl Gpu<'_> {
     /// 0, which is safe; [`grow`](Gpu::grow) then makes more.
     ///
     /// # Errors
-    /// As `encode_step`, with a `most` that is negative or above 2^100, for fixed bodies that are
-    /// not in the scene, and for bodies with a [thickness](Scene::set_thickness).
+    /// As `encode_step`, with a `most` that is negative or above 2^100, and for fixed bodies that
+    /// are not in the scene.
     pub fn encode_safe_distances(
         &mut self,
         scene: &Scene,
@@ -167,16 +167,9 @@ impl Gpu<'_> {
                 allowed: "from 0 to 2^100 where it stays on a device",
             });
         }
-        refuse_unknown(query)?;
+        refuse_unknown(scene, query)?;
         for &body in &query.fixed {
             scene.body(body)?;
-        }
-        if let Some((id, body)) = scene.bodies().find(|(_, body)| body.thickness() > 0.0) {
-            return Err(Error::Setting {
-                setting: "thickness",
-                given: format!("{} of body {id}", body.thickness()),
-                allowed: "0 for safe distances that stay on a device",
-            });
         }
         let limits = (most, &query.fixed);
         self.with_contacts(scene, query, positions, |engine, job, clusterings| {
@@ -293,8 +286,15 @@ fn on_device(gpu: &mut Option<Engine>) -> Result<&mut Engine, Error> {
 }
 
 /// Refuses what kernels of steps do not know.
-fn refuse_unknown(query: &Query) -> Result<(), Error> {
+fn refuse_unknown(scene: &Scene, query: &Query) -> Result<(), Error> {
     query.check_step()?;
+    if let Some((id, body)) = scene.bodies().find(|(_, body)| body.thickness() > 0.0) {
+        return Err(Error::Setting {
+            setting: "thickness",
+            given: format!("{} of body {id}", body.thickness()),
+            allowed: "0 for a question that stays on a device",
+        });
+    }
     if query.separation > 0.0 {
         return Err(Error::Setting {
             setting: "separation",

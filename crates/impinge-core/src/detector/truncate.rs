@@ -315,13 +315,7 @@ impl Vertices {
             // They touch at the start, and stay there.
             return false;
         }
-        let kept = match plan.has_clearance() {
-            true => {
-                let parts = [located[0].0, located[1].0];
-                plan.kept(scene, parts, pair, [&start, &end])
-            }
-            false => plan.bound(),
-        };
+        let kept = plan.kept(scene, located, pair, [&start, &end]);
         let Some(shares) = shares_apart(pair, [&start, &now, &end], kept) else {
             moving.for_each(|ix| self.stop_at(own[ix], 0.0));
             return true;

@@ -1,9 +1,9 @@
 //! How near elements may come, and how far boxes must reach so that those of near elements overlap.
 //!
 //! ```text
-//! distance      what is asked: of a query for near pairs, or the separation of a step
-//! thickness     what a body adds to it, or each of its elements; of candidates, the distance by which each box is inflated
-//! bound         what any pair of a step keeps at most: the separation, and a clearance
+//! distance      what is asked: of a query for near pairs, the separation of a step, or twice the inflation of candidates
+//! thickness     what a body adds to it, or each of its elements
+//! bound         what any pair of a step keeps at most, besides its thickness: the separation, and a clearance
 //! inflation     how far the boxes of a part reach beyond its elements: its thickness, and half of the bound
 //! ```
 
@@ -18,25 +18,31 @@ use impinge_exact::{Contact, ElementPair, Point};
 use super::Plan;
 
 impl Plan {
-    /// Makes elements keep a separation, and a clearance if there is one.
+    /// Makes elements keep a separation, their thickness, and a clearance if there is one.
     pub(super) fn keep(&mut self, scene: &Scene, keep: Keep) {
         self.keep = keep;
         (self.distance, self.bound) = (keep.separation, keep.separation);
-        if keep.is_plain() {
-            return;
-        }
-        let (mut magnitude, mut unit) = (0.0, 0.0);
-        for (_, body) in scene.bodies() {
-            if let (true, Some(end)) = (keep.is_rounded, body.end_positions()) {
-                magnitude = body
-                    .positions()
-                    .magnitude()
-                    .max(end.magnitude())
-                    .max(magnitude);
-                unit = f64::max(unit, body.positions().unit_roundoff(end));
+        self.thicken(scene);
+        if !keep.is_plain() {
+            let (mut magnitude, mut unit) = (0.0, 0.0);
+            for (_, body) in scene.bodies() {
+                if let (true, Some(end)) = (keep.is_rounded, body.end_positions()) {
+                    magnitude = body
+                        .positions()
+                        .magnitude()
+                        .max(end.magnitude())
+                        .max(magnitude);
+                    unit = f64::max(unit, body.positions().unit_roundoff(end));
+                }
             }
+            self.bound = keep.most(magnitude, unit);
         }
-        self.bound = keep.most(magnitude, unit);
+        let thickest = (self.parts.iter()).fold(0.0, |most: f64, part| most.max(part.thickness));
+        if thickest > 0.0 {
+            // What a pair keeps is a sum that is rounded up a few times: by less than this.
+            let rounded = (self.bound + 2.0 * thickest) * 2f64.powi(-50);
+            self.bound = (self.bound + rounded).next_up();
+        }
     }
 
     /// The distance and a margin, or more.
@@ -64,43 +70,65 @@ impl Plan {
         !self.keep.is_plain()
     }
 
-    /// Whether elements of a step keep a separation or a clearance.
+    /// Whether elements of a step keep a separation, a thickness or a clearance.
     pub(crate) fn keeps_distance(&self) -> bool {
         self.bound > 0.0
     }
 
-    /// At least what any pair keeps.
-    pub(crate) fn bound(&self) -> f64 {
-        self.bound
+    /// At least what any pair of two parts keeps, and whether all of them keep just that.
+    pub(crate) fn most_kept(&self, a: PartIx, b: PartIx) -> (f64, bool) {
+        let thickness = [a, b].map(|part| self.part(part).thickness);
+        if self.has_clearance() {
+            let [a, b] = thickness;
+            return ((self.bound + (a + b).next_up()).next_up(), false);
+        }
+        let are_alike = [a, b].map(|part| self.thickness_of_each(part).is_none()) == [true; 2];
+        (self.keep.with_thickness(thickness).separation, are_alike)
     }
 
-    /// What a pair of two parts keeps, by its points at both ends.
+    /// What two elements keep.
+    fn keep_of(&self, pair: [(PartIx, ElementIx); 2]) -> Keep {
+        let thickness = pair.map(|(part, element)| self.thickness_of(part, element));
+        self.keep.with_thickness(thickness)
+    }
+
+    /// The separation of two elements, with their thickness.
+    pub(crate) fn separation(&self, pair: [(PartIx, ElementIx); 2]) -> f64 {
+        self.keep_of(pair).separation
+    }
+
+    /// What two elements keep, by their points at both ends.
     pub(crate) fn kept(
         &self,
         scene: &Scene,
-        parts: [PartIx; 2],
+        elements: [(PartIx, ElementIx); 2],
         pair: ElementPair,
         ends: [&[Point; 4]; 2],
     ) -> f64 {
-        self.keep
-            .distance(pair, ends, self.unit_roundoff(scene, parts))
+        let unit = self.unit_roundoff(scene, elements.map(|(part, _)| part));
+        self.keep_of(elements).distance(pair, ends, unit)
     }
 
-    /// When a pair of two parts is first as near as it may come.
+    /// When two elements are first as near as they may come.
     pub(crate) fn first(
         &self,
         scene: &Scene,
-        parts: [PartIx; 2],
+        elements: [(PartIx, ElementIx); 2],
         pair: ElementPair,
         ends: [&[Point; 4]; 2],
     ) -> Option<Contact> {
-        self.keep
-            .first(pair, ends, self.unit_roundoff(scene, parts))
+        let unit = self.unit_roundoff(scene, elements.map(|(part, _)| part));
+        self.keep_of(elements).first(pair, ends, unit)
     }
 
-    /// The contact of a pair that is as near as it may come from the start on.
-    pub(crate) fn at_start(&self, pair: ElementPair, start: &[Point; 4]) -> Contact {
-        self.keep.at_start(pair, start)
+    /// The contact of two elements that are as near as they may come from the start on.
+    pub(crate) fn at_start(
+        &self,
+        elements: [(PartIx, ElementIx); 2],
+        pair: ElementPair,
+        start: &[Point; 4],
+    ) -> Contact {
+        self.keep_of(elements).at_start(pair, start)
     }
 
     /// The unit roundoff of the positions of two parts that move; the larger one.

@@ -161,7 +161,7 @@ pub struct Plan {
     sweep: Sweep,
     /// The distance within which elements are near, besides what their bodies add.
     distance: f64,
-    /// What the elements of a step keep, at most: the distance, and a clearance if there is one.
+    /// What the elements of a step keep at most, besides their thickness.
     bound: f64,
     keep: Keep,
     /// How thick the elements of each part are, where they differ; empty where none do.
@@ -253,7 +253,7 @@ impl Plan {
         } else {
             Precision::F64
         };
-        if !has_clearance && query.separation == 0.0 && with_close {
+        if !plan.keeps_distance() && with_close {
             plan.round(scene);
         }
         Ok(plan)
@@ -315,7 +315,7 @@ impl Plan {
         Ok(plan)
     }
 
-    /// The question which boxes overlap. Each body is as thick as the inflation.
+    /// The question which boxes overlap, each inflated by a distance and the thickness of its element.
     pub(crate) fn candidates(
         scene: &Scene,
         inflation: f64,
@@ -325,9 +325,12 @@ impl Plan {
         check_distance("inflation", inflation)?;
         query.check_without_filter()?;
         let mut plan = Plan::of(scene, query, Question::Overlap, Goal::All, limits)?;
-        for part in &mut plan.parts {
-            part.thickness = inflation;
-        }
+        let separation = 2.0 * inflation;
+        let keep = Keep {
+            separation,
+            ..Keep::default()
+        };
+        plan.keep(scene, keep);
         Ok(plan)
     }
 

@@ -333,8 +333,8 @@ impl Query {
     /// For a step, boxes hold their elements from the start to the end. If pairs at a distance
     /// count as well, a process needs all elements whose boxes touch its cell when they are
     /// inflated, on all sides, by that distance: the separation of a step, the distance of
-    /// [`near`](crate::Detector::near) with both bodies' thickness, twice the inflation of
-    /// [`candidates`](crate::Detector::candidates).
+    /// [`near`](crate::Detector::near), twice the inflation of
+    /// [`candidates`](crate::Detector::candidates); with both bodies' thickness.
     ///
     /// All intersections of the query are found and held first:
     /// [`Settings::max_pairs`](crate::Settings::max_pairs) and the memory budget count them, also
@@ -369,7 +369,8 @@ impl Query {
     ///
     /// A pair is then reported with the first time at which its distance is at most the separation,
     /// decided exactly and rounded down, and pairs within the separation at the start count as
-    /// touching at the start. With 0, which is the default, elements must touch.
+    /// touching at the start. With 0, which is the default, elements must touch. The
+    /// [thickness](crate::Scene::set_thickness) of both elements adds to it.
     pub fn separation(mut self, separation: f64) -> Self {
         self.separation = separation;
         self

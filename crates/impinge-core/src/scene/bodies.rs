@@ -233,15 +233,19 @@ impl Scene {
         Ok(())
     }
 
-    /// Sets how thick a body is, in the unit of the scene: what its elements add to the distance of
-    /// [`near`](crate::Detector::near), and what is taken from that of
-    /// [`neighbours`](crate::Detector::neighbours) and
-    /// [`safe_distances`](crate::Detector::safe_distances). 0 for a new body. Of two elements,
-    /// whether of one body or of two, each adds its own.
+    /// Sets how thick a body is, in the unit of the scene; 0 for a new body. Of two elements,
+    /// whether of one body or of two, each adds its own:
     ///
-    /// Questions about steps and distances do not look at it: a step keeps bodies apart by
-    /// [`Query::separation`](crate::Query::separation) or
-    /// [`Query::clearance`](crate::Query::clearance), one number for all.
+    /// - to the distance of [`near`](crate::Detector::near), without rounding;
+    /// - to the [separation](crate::Query::separation) that elements keep in a step
+    ///   ([`impacts`](crate::Detector::impacts) to [`truncate`](crate::Detector::truncate)), and to
+    ///   the gap that boxes of [`candidates`](crate::Detector::candidates) may have. `a + b`, and
+    ///   then `separation + (a + b)`, are rounded up to `f64`.
+    ///
+    /// From the distances of [`neighbours`](crate::Detector::neighbours) and
+    /// [`safe_distances`](crate::Detector::safe_distances) it is taken. What intersects, what
+    /// touches or is nearest to a point, and how far apart bodies are, is asked of the elements
+    /// themselves.
     ///
     /// One number holds for all elements, and [`remesh`](Scene::remesh) keeps it. [`Thickness`]
     /// also takes one number per vertex, edge or face, which `remesh` forgets: the body has a

@@ -8,4 +8,5 @@ mod safe;
 mod separation;
 mod smallest;
 mod stencils;
+mod thickness;
 mod truncate;

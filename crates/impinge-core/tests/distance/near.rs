@@ -51,14 +51,14 @@ fn rows(near: &NearPairs) -> Vec<Row> {
 }
 
 /// An element with its body, its number and its corners.
-struct Element {
-    body: BodyId,
-    number: u32,
+pub struct Element {
+    pub body: BodyId,
+    pub number: u32,
     ids: Vec<u32>,
     corners: Vec<Point>,
 }
 
-fn elements(scene: &Scene, part: Part) -> Vec<Element> {
+pub fn elements(scene: &Scene, part: Part) -> Vec<Element> {
     let mut all = Vec::new();
     for (id, body) in scene.bodies() {
         let elements: &Elements = body.part(part);
@@ -317,7 +317,7 @@ fn thickness_is_added_as_real_numbers() {
 }
 
 /// A thickness per element of some part of a body, on a lattice so that sums are exact.
-fn thickness_by(random: &mut Random, scene: &Scene, body: BodyId, part: Part) -> Vec<f64> {
+pub fn thickness_by(random: &mut Random, scene: &Scene, body: BodyId, part: Part) -> Vec<f64> {
     let body = scene.body(body).expect("known");
     let n = match part {
         Part::Vertices => body.n_vertices(),
@@ -326,7 +326,7 @@ fn thickness_by(random: &mut Random, scene: &Scene, body: BodyId, part: Part) ->
     (0..n).map(|_| f64::from(random.below(4)) * 0.25).collect()
 }
 
-fn thickness(part: Part, each: &[f64]) -> Thickness<'_> {
+pub fn thickness(part: Part, each: &[f64]) -> Thickness<'_> {
     match part {
         Part::Vertices => Thickness::vertices(each),
         Part::Edges => Thickness::edges(each),
@@ -336,7 +336,7 @@ fn thickness(part: Part, each: &[f64]) -> Thickness<'_> {
 
 /// How thick an element is, if the elements of one part have these: that of the thickest one whose
 /// vertices it has, or that has all of its vertices.
-fn thickness_of(scene: &Scene, of: &Element, by: Part, (part, each): (Part, &[f64])) -> f64 {
+pub fn thickness_of(scene: &Scene, of: &Element, by: Part, (part, each): (Part, &[f64])) -> f64 {
     if by == part {
         return each[of.number as usize];
     }
@@ -350,7 +350,7 @@ fn thickness_of(scene: &Scene, of: &Element, by: Part, (part, each): (Part, &[f6
         })
 }
 
-const PARTS: [Part; 3] = [Part::Vertices, Part::Edges, Part::Faces];
+pub const PARTS: [Part; 3] = [Part::Vertices, Part::Edges, Part::Faces];
 
 /// One number per vertex, edge or face, each beside bodies with one number: as pair by pair.
 #[test]

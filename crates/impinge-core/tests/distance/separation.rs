@@ -10,21 +10,21 @@ use impinge_core::{
 };
 use impinge_scenes::Random;
 
-fn detector(method: Method) -> Detector {
+pub fn detector(method: Method) -> Detector {
     Detector::new(Settings::new().method(method).backend(Backend::Cpu)).expect("settings")
 }
 
-fn detectors() -> [Detector; 2] {
+pub fn detectors() -> [Detector; 2] {
     [Method::Clusters, Method::Naive].map(detector)
 }
 
-fn impacts(detector: &mut Detector, scene: &Scene, step: &Query) -> Vec<Impact> {
+pub fn impacts(detector: &mut Detector, scene: &Scene, step: &Query) -> Vec<Impact> {
     let impacts = detector.impacts(scene, step).expect("good");
     impacts.iter().copied().collect()
 }
 
 /// A body of triangles on a lattice that goes anywhere, bare edges, and points.
-fn lattice(seed: u64) -> Scene {
+pub fn lattice(seed: u64) -> Scene {
     let mut random = Random::new(seed);
     let mut points = |n: usize| -> Vec<[f32; 3]> {
         let mut at = || random.below(6) as f32;
@@ -47,9 +47,9 @@ fn lattice(seed: u64) -> Scene {
 }
 
 /// A pair as its kind and row, with its time and whether it is so from the start.
-type Row = (PairKind, [u32; 4], f64, bool);
+pub type Row = (PairKind, [u32; 4], f64, bool);
 
-fn rows(impacts: &[Impact]) -> Vec<Row> {
+pub fn rows(impacts: &[Impact]) -> Vec<Row> {
     impacts
         .iter()
         .map(|i| (i.kind, i.row(), i.toi, i.at_start))
@@ -58,14 +58,14 @@ fn rows(impacts: &[Impact]) -> Vec<Row> {
 
 /// Pair by pair: the kinds of a step, with all bodies.
 fn expected(scene: &Scene, separation: f64) -> Vec<Row> {
-    contacts(scene, |pair, start, end| {
+    contacts(scene, |pair, _, [start, end]| {
         first_within(pair, start, end, separation)
     })
 }
 
 /// When a pair is first as near as a clearance lets it come. For separations that a float with few
 /// bits holds.
-fn first_kept(
+pub fn first_kept(
     pair: ElementPair,
     [start, end]: [&[Point; 4]; 2],
     separation: f64,
@@ -94,10 +94,13 @@ fn first_kept(
     )
 }
 
+/// The elements of a pair: their bodies, parts and numbers.
+pub type Elements = [(BodyId, Part, u32); 2];
+
 /// Pair by pair: the kinds of a step, with all bodies.
-fn contacts(
+pub fn contacts(
     scene: &Scene,
-    first: impl Fn(ElementPair, &[Point; 4], &[Point; 4]) -> Option<Contact>,
+    first: impl Fn(ElementPair, Elements, [&[Point; 4]; 2]) -> Option<Contact>,
 ) -> Vec<Row> {
     use Part::{Edges, Faces, Vertices};
     let bodies: Vec<_> = scene.bodies().collect();
@@ -166,8 +169,8 @@ fn contacts(
                                 *to = from;
                             }
                         }
-                        let [start, end] = &ends;
-                        if let Some(contact) = first(pair, start, end) {
+                        let elements = [(*id_a, parts[0], row[1]), (*id_b, parts[1], row[3])];
+                        if let Some(contact) = first(pair, elements, ends.each_ref()) {
                             expected.push((kind, row, contact.time, contact.at_start));
                         }
                     }
@@ -239,8 +242,8 @@ fn a_clearance_is_kept_pair_by_pair() {
             (0.5, 0.1, 0.2),
             (0.5, 1.0, 0.75),
         ] {
-            let expected = contacts(&scene, |pair, start, end| {
-                first_kept(pair, [start, end], separation, (clearance, share))
+            let expected = contacts(&scene, |pair, _, ends| {
+                first_kept(pair, ends, separation, (clearance, share))
             });
             let step = Query::all()
                 .separation(separation)
@@ -290,7 +293,7 @@ fn more_clearance_is_never_later() {
 }
 
 /// Two soups of triangles that move apart from each other's places and into new ones.
-fn two_soups(is_double: bool) -> (Scene, [BodyId; 2]) {
+pub fn two_soups(is_double: bool) -> (Scene, [BodyId; 2]) {
     let mut scene = Scene::new();
     let bodies = [1, 3].map(|seed| {
         let [start, end] = [0, 1].map(|k| impinge_scenes::soup::triangles(24, 0.2, seed + k));
@@ -542,7 +545,7 @@ fn the_answer_depends_on_the_input_alone() {
     }
 }
 
-fn is_the_same_everywhere(scene: &Scene, step: &Query) {
+pub fn is_the_same_everywhere(scene: &Scene, step: &Query) {
     let expected = rows(&impacts(&mut detector(Method::Naive), scene, step));
     assert!(expected.len() > 50, "{}", expected.len());
     for (threads, instruction_set, memory_budget) in [

@@ -446,6 +446,13 @@ fn what_does_not_fit_is_refused_by_name() {
     let cell = Query::all().owned_by([0.0; 3], [1.0; 3]);
     let error = refused(&cell, &[], &[]);
     assert!(error.contains("owned_by"), "{error}");
+    let mut thick = scene.clone();
+    thick.set_thickness(body, 0.5).expect("good");
+    let mut encoder = caller.encoder();
+    let mut device = detector.gpu().expect("a device");
+    let refused = device.encode_step(&thick, &step, &[], &[], &mut encoder);
+    let error = refused.expect_err("refused").to_string();
+    assert!(error.contains("thickness: 0.5 of body"), "{error}");
     let mut cpu = Detector::new(Backend::Cpu).expect("settings");
     assert!(cpu.gpu().is_none());
 }

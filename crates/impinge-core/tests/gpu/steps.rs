@@ -644,12 +644,18 @@ fn what_the_device_cannot_hold_or_answer_the_cpu_does() {
     );
     let apart = Query::all().separation(0.001);
     let expected = on_cpu().impacts(&scene, &apart).expect("good").hash();
+    let mut thick = scene.clone();
+    for (body, _) in scene.bodies() {
+        thick.set_thickness(body, 0.0005).expect("good");
+    }
     let mut device = on_gpu();
-    let impacts = device.impacts(&scene, &apart).expect("good");
-    assert_eq!(
-        (impacts.hash(), &*impacts.stats().backend),
-        (expected, "cpu")
-    );
+    for (scene, query) in [(&scene, &apart), (&thick, &Query::all())] {
+        let impacts = device.impacts(scene, query).expect("good");
+        assert_eq!(
+            (impacts.hash(), &*impacts.stats().backend),
+            (expected, "cpu")
+        );
+    }
 }
 
 #[test]

@@ -44,6 +44,17 @@ impl Keep {
         self.clearance == 0.0 || self.share == 0.0
     }
 
+    /// What two elements keep that are so thick: their thickness adds to the separation. Each of
+    /// the two sums is rounded up, and none is above the largest float.
+    #[inline]
+    #[must_use]
+    pub fn with_thickness(self, [a, b]: [f64; 2]) -> Self {
+        Self {
+            separation: sum_up(self.separation, sum_up(a, b)),
+            ..self
+        }
+    }
+
     /// A distance that is at least what any pair keeps, for coordinates up to a magnitude, stored
     /// in a precision with this unit roundoff.
     pub fn most(&self, magnitude: f64, unit: f64) -> f64 {
@@ -196,6 +207,13 @@ fn sum_below(a: f64, b: f64) -> f64 {
     if error < 0.0 { sum.next_down() } else { sum }
 }
 
+/// The least float that is not below the sum of two; the largest one if there is none.
+#[inline]
+fn sum_up(a: f64, b: f64) -> f64 {
+    let [sum, error] = two_sum(a, b);
+    if error > 0.0 { sum.next_up() } else { sum }.min(f64::MAX)
+}
+
 /// A float that is not below the sum of a number and another one; the number itself if that is 0.
 fn sum_above(kept: f64, rounded: f64) -> f64 {
     if rounded > 0.0 {
@@ -313,6 +331,23 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn thickness_adds_to_the_separation_and_is_rounded_up() {
+        let of = |separation, thickness| {
+            let keep = keep(separation, 0.0, 0.0).with_thickness(thickness);
+            keep.separation
+        };
+        assert_eq!(of(0.0, [0.0; 2]), 0.0);
+        assert_eq!(of(0.5, [0.25, 0.125]), 0.875);
+        // 0.1 and 0.2 add up to less than 0.30000000000000004, and to more than the float before.
+        assert_eq!(of(0.0, [0.1, 0.2]), 0.1 + 0.2);
+        assert_eq!(of(0.0, [1.0, 1e-300]), 1f64.next_up());
+        assert_eq!(of(1e-300, [1.0, 0.0]), 1f64.next_up());
+        assert_eq!(of(1.0, [0.1, 0.7]), of(1.0, [0.7, 0.1]));
+        assert_eq!(of(0.0, [f64::MAX, f64::MAX]), f64::MAX);
+        assert_eq!(of(f64::MAX, [5e-324, 0.0]), f64::MAX);
     }
 
     /// No number of 24 bits reaches elements that are farther apart than the largest of them.

@@ -152,17 +152,25 @@ impl<'a> Found<'a> {
             clearance,
             ..
         } = *how;
-        let besides = match separation > 0.0 {
-            true => format!(" besides {separation}"),
-            false => String::new(),
+        let is_thick = bodies
+            .scene
+            .bodies()
+            .any(|(_, body)| body.thickness() > 0.0);
+        let kept = match (separation > 0.0, is_thick) {
+            (false, false) => None,
+            (true, false) => Some(separation.to_string()),
+            (true, true) => Some(format!("{separation} and the thickness")),
+            (false, true) => Some("the thickness".to_owned()),
         };
+        let besides = kept.as_ref().map(|kept| format!(" besides {kept}"));
+        let besides = besides.unwrap_or_default();
         let name = |body: impinge::BodyId| printable(&bodies.names[body.index()][0]);
         let nothing = if clearance > 0.0 {
             format!(
                 "every pair keeps its clearance of {clearance}{besides} from start to end, or a fifth of its distance"
             )
-        } else if separation > 0.0 {
-            format!("nothing comes within {separation} from start to end")
+        } else if let Some(kept) = &kept {
+            format!("nothing comes within {kept} from start to end")
         } else {
             "nothing touches from start to end".to_owned()
         };
@@ -186,12 +194,12 @@ impl<'a> Found<'a> {
                 },
                 element(first.kind, first.b.element, false),
                 name(first.b.body),
-                match (separation > 0.0, clearance > 0.0) {
+                match (&kept, clearance > 0.0) {
                     (_, true) if !first.at_start => {
                         format!("come as near as a clearance of {clearance}{besides} lets them")
                     }
-                    (true, _) => format!("come within {separation}"),
-                    (false, _) => "touch".to_owned(),
+                    (Some(kept), _) => format!("come within {kept}"),
+                    (None, _) => "touch".to_owned(),
                 },
                 match first.at_start {
                     true => "at the start".to_owned(),

@@ -15,7 +15,7 @@ impl Test for FirstContact {
 
     fn extent(&self, element: PairElement<'_>) -> Extent {
         let extent = Extent::of(element.ends().flatten());
-        match element.plan.inflation(element.part) {
+        match element.plan.inflation_of(element.part, element.element) {
             0.0 => extent,
             inflation => extent.inflated(inflation),
         }
@@ -39,8 +39,8 @@ impl FirstContact {
             return None;
         }
         let (pair, [a, b], [start, end]) = Self::ends(test, [a, b], fraction)?;
-        let parts = [a.part, b.part];
-        a.plan.first(a.scene, parts, pair, [&start, &end])
+        let elements = [&a, &b].map(|of| (of.part, of.element));
+        a.plan.first(a.scene, elements, pair, [&start, &end])
     }
 
     /// The pair as the exact predicate names it, with its elements in that order, and their points

@@ -170,11 +170,21 @@ pub(super) fn exact_pair(kind: PairKind) -> Option<ElementPair> {
 /// The key of a pair.
 #[inline(always)]
 pub(super) fn key(world: StepWorld<'_>, between: Between, slots: Slots) -> u64 {
-    let [a, b] = [(between.a, slots[0]), (between.b, slots[1])].map(|(part, slot)| {
-        let element = world.cache(part).clustering.primitive(slot);
-        world.plan.part(part).number(element)
-    });
+    let [a, b] =
+        located(world, between, slots).map(|(part, element)| world.plan.part(part).number(element));
     pair_key(a, b)
+}
+
+/// The elements of a pair.
+#[inline(always)]
+pub(super) fn located(
+    world: StepWorld<'_>,
+    between: Between,
+    slots: Slots,
+) -> [(PartIx, ElementIx); 2] {
+    let [a, b] = slots;
+    [(between.a, a), (between.b, b)]
+        .map(|(part, slot)| (part, world.cache(part).clustering.primitive(slot)))
 }
 
 /// The numbers of a pair's elements, by its lanes in two groups.

@@ -13,7 +13,7 @@ use impinge_exact::internal::filter::{Search, time_between};
 use impinge_exact::{Contact, ElementPair};
 
 use super::super::world::StepWorld;
-use super::batch::{Between, Narrow, NarrowCounts, Slots, counts, key, points};
+use super::batch::{Between, Narrow, NarrowCounts, Slots, counts, key, located, points};
 
 /// The most pairs of one worker that are decided last.
 const MOST_UNSURE: usize = 4096;
@@ -171,19 +171,22 @@ impl FirstContacts {
     /// Decides pairs of two parts that were left.
     pub fn decide_unsure(&mut self, isa: Isa, world: StepWorld<'_>, pairs: &[(Between, Slots)]) {
         let until = self.until(world);
-        if world.plan.keeps_distance() {
-            self.is_last = true;
+        self.between = pairs.first().map(|(between, _)| *between);
+        (self.is_first, self.is_last) = (true, true);
+        let most_kept = |between: &Between| world.plan.most_kept(between.a, between.b).0;
+        if self
+            .between
+            .is_some_and(|between| most_kept(&between) > 0.0)
+        {
             for &(between, slots) in pairs {
                 self.decide_kept(world, between, slots);
             }
-            return;
+            return self.decide(isa, world);
         }
         self.open.extend(pairs.iter().map(|&(_, slots)| Open {
             slots,
             search: Search::new(until),
         }));
-        self.between = pairs.first().map(|(between, _)| *between);
-        (self.is_first, self.is_last) = (true, true);
         self.decide(isa, world);
     }
 
@@ -200,8 +203,8 @@ impl FirstContacts {
         }
         self.counts.n_unsure += 1;
         let ends = points(world, between, pair, slots);
-        let parts = [between.a, between.b];
-        if let Some(contact) = (world.plan).first(world.scene, parts, pair, ends.each_ref()) {
+        let elements = located(world, between, slots);
+        if let Some(contact) = (world.plan).first(world.scene, elements, pair, ends.each_ref()) {
             self.report(world, between, slots, contact);
         }
     }

@@ -15,7 +15,7 @@ use impinge_exact::internal::filter::number::Lookup;
 
 use super::super::group::StepGroup;
 use super::super::world::StepWorld;
-use super::batch::{Batch, FoundKeys, Narrow, NarrowCounts, key_in};
+use super::batch::{Batch, FoundKeys, Narrow, NarrowCounts, key_in, located};
 
 /// The test of one worker.
 #[derive(Debug, Default)]
@@ -36,8 +36,8 @@ impl Overlaps {
 
 impl Narrow for Overlaps {
     fn take(&mut self, isa: Isa, world: StepWorld<'_>, batch: Batch<'_>) {
-        let inflation = world.plan.inflation(batch.between.a);
-        if batch.rounded() > 0.0 || inflation > 0.0 || world.plan.has_cell() {
+        let (most, _) = world.plan.most_kept(batch.between.a, batch.between.b);
+        if batch.rounded() > 0.0 || most > 0.0 || world.plan.has_cell() {
             return with_isa!(isa, take, (
                 overlaps: &mut Overlaps = self,
                 world: StepWorld<'_> = world,
@@ -64,10 +64,9 @@ impl Narrow for Overlaps {
 #[inline(always)]
 fn take<S: Simd>(_: S, overlaps: &mut Overlaps, world: StepWorld<'_>, batch: Batch<'_>) {
     let between = batch.between;
-    // That of all parts.
-    let distance = world.plan.inflation(between.a);
+    let (most, are_alike) = world.plan.most_kept(between.a, between.b);
     let boxes = batch.groups.map(|group| &group.start);
-    let farther_out = farther_out(batch.groups, distance);
+    let farther_out = farther_out(batch.groups, most);
     let sides = [between.a, between.b].map(|part| PartSide {
         elements: &world.cache(part).clustering.corners,
         source: world.source(part),
@@ -79,7 +78,11 @@ fn take<S: Simd>(_: S, overlaps: &mut Overlaps, world: StepWorld<'_>, batch: Bat
             let ix = first + lane;
             if sure >> lane & 1 == 0 {
                 let [a, b] = batch.slots(ix);
-                if !are_near(&sides[0].extent(a), &sides[1].extent(b), distance) {
+                let most = match are_alike {
+                    true => most,
+                    false => world.plan.separation(located(world, between, [a, b])),
+                };
+                if !are_near(&sides[0].extent(a), &sides[1].extent(b), most) {
                     continue;
                 }
             }
@@ -96,15 +99,16 @@ fn take<S: Simd>(_: S, overlaps: &mut Overlaps, world: StepWorld<'_>, batch: Bat
 /// one axis.
 ///
 /// An end is off by the rounding of points, at most 2^-24 of the largest coordinate, and moved
-/// outward by the distance, 2^-20 of all, and 2^-126 (`boxes::Sweep`): less than 2^-19 of the
-/// largest coordinate and of the distance, and 2^-125.
-fn farther_out([a, b]: [&StepGroup; 2], distance: f64) -> f32 {
-    let largest = f64::max(a.largest, b.largest) + distance;
-    if largest * (1.0 + 2f64.powi(-18)) > f64::from(f32::MAX) {
+/// outward by a part of the gap that is allowed, 2^-20 of all, and 2^-126 (`boxes::Sweep`), twice
+/// where elements differ in thickness: by less than 2^-18 of the largest coordinate and of that
+/// gap, and 2^-124.
+fn farther_out([a, b]: [&StepGroup; 2], most: f64) -> f32 {
+    let largest = f64::max(a.largest, b.largest) + most;
+    if largest * (1.0 + 2f64.powi(-17)) > f64::from(f32::MAX) {
         // Boxes may have infinite ends.
         return f32::INFINITY;
     }
-    round_up(largest * 2f64.powi(-18) + 2f64.powi(-120))
+    round_up(largest * 2f64.powi(-17) + 2f64.powi(-120))
 }
 
 /// Which of sixteen pairs of boxes of two groups overlap by so much that the inflated boxes of the

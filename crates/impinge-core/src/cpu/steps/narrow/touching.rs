@@ -39,12 +39,9 @@ impl Narrow for FirstContacts {
         let between = batch.between;
         self.go_to(isa, world, between);
         let has_clearance = world.plan.has_clearance();
-        if world.plan.keeps_distance() && !has_clearance {
-            return with_isa!(isa, kept, (
-                contacts: &mut FirstContacts = self,
-                world: StepWorld<'_> = world,
-                batch: Batch<'_> = batch,
-            ));
+        let (most_kept, _) = world.plan.most_kept(between.a, between.b);
+        if most_kept > 0.0 && !has_clearance {
+            return self.take_kept(isa, world, batch);
         }
         if !matches!(between.kind, PairKind::VertexFace | PairKind::EdgeEdge) {
             if has_clearance {
@@ -71,12 +68,7 @@ impl Narrow for FirstContacts {
             let tables = batch.groups.map(|group| &group.points);
             // With a clearance, an element that is moved by what a pair keeps may be in contact:
             // then coordinates of the polygon's corners, not of its edges, differ by up to that.
-            let kept = if has_clearance {
-                world.plan.bound()
-            } else {
-                0.0
-            };
-            let margin = self.margin(world, between) + kept + 2.0 * rounded;
+            let margin = self.margin(world, between) + most_kept + 2.0 * rounded;
             let (limits, lane_pairs) = ((round_up(until), margin), &mut *batch.lane_pairs);
             match between.kind {
                 PairKind::VertexFace => with_isa!(isa, drop_vertices_and_faces, (
@@ -92,11 +84,7 @@ impl Narrow for FirstContacts {
             }
         }
         if has_clearance {
-            return with_isa!(isa, kept, (
-                contacts: &mut FirstContacts = self,
-                world: StepWorld<'_> = world,
-                batch: Batch<'_> = batch,
-            ));
+            return self.take_kept(isa, world, batch);
         }
         let filters_early = world.plan.filters_early();
         for ix in 0..batch.lane_pairs.len() {
@@ -108,10 +96,7 @@ impl Narrow for FirstContacts {
                 search: Search::new(until),
             });
         }
-        if self.open.len() >= self.full {
-            self.counts.n_full += u64::from(!self.open.is_empty());
-            self.decide(isa, world);
-        }
+        self.decide_if_full(isa, world);
     }
 
     /// Searches the open pairs for first contacts.
@@ -140,6 +125,25 @@ impl FirstContacts {
         if self.between != Some(between) {
             self.decide(isa, world);
             self.between = Some(between);
+        }
+    }
+
+    /// Takes candidates that keep a distance.
+    #[inline(always)]
+    fn take_kept(&mut self, isa: Isa, world: StepWorld<'_>, batch: Batch<'_>) {
+        with_isa!(isa, kept, (
+            contacts: &mut FirstContacts = self,
+            world: StepWorld<'_> = world,
+            batch: Batch<'_> = batch,
+        ));
+        self.decide_if_full(isa, world);
+    }
+
+    #[inline(always)]
+    fn decide_if_full(&mut self, isa: Isa, world: StepWorld<'_>) {
+        if self.open.len() >= self.full {
+            self.counts.n_full += u64::from(!self.open.is_empty());
+            self.decide(isa, world);
         }
     }
 
