@@ -3,7 +3,7 @@
 import { Advance, Candidates, Contacts, Impacts, NearPairs, Pairs, Penetration, earliest, nearest, numberOf, statsOf } from "./answers.js";
 import { Closest, Hits, Neighbours, SafeDistances, Truncation, integers, places, signed } from "./probe.js";
 import { RestPairs, packed, plain, whole, withPoints } from "./query.js";
-import { body, call, disposable, isSingle, mustBeNone, number, refuse, wide, word } from "./shared.js";
+import { body, call, disposable, isSingle, kindOf, list, meshOf, mustBeNone, number, options, refuse, wide, word } from "./shared.js";
 
 const PARTS = ["vertices", "edges", "faces"];
 const BODY_KINDS = ["points", "edges", "triangles", "tetrahedra"];
@@ -102,7 +102,7 @@ function rowsOf(name, given) {
 
 // The settings of a detector, as the module takes them.
 export function settings(given) {
-  const { method = "auto", recluster = "auto", memoryBudget, maxPairs, reuseMargin = 0, ...others } = given ?? {};
+  const { method = "auto", recluster = "auto", memoryBudget, maxPairs, reuseMargin = 0, ...others } = options("settings", given);
   mustBeNone("settings", others, ["method", "recluster", "memoryBudget", "maxPairs", "reuseMargin"]);
   const words = [
     word("method", method, ["auto", "clusters", "cells", "naive"]),
@@ -120,9 +120,16 @@ function limit(name, given) {
 
 // A matrix, column by column.
 function columns(matrix) {
-  const numbers = Float64Array.from(matrix);
-  if (numbers.length !== 16) refuse(`transform: ${numbers.length} numbers given, 16 allowed, column by column`);
-  return numbers;
+  const numbers = Float64Array.from(matrix ?? []);
+  if (numbers.length === 16) return numbers;
+  return refuse(`transform: ${matrix?.elements ? kindOf(matrix) : `${numbers.length} numbers`} given, 16 numbers allowed, column by column, as elements of a Matrix4`);
+}
+
+// 64 bits, of a number or a bigint. -1 has all of them.
+function bitsOf(name, given) {
+  const bits = typeof given === "bigint" ? given : Number.isInteger(given) ? BigInt(given) : null;
+  if (bits !== null && bits >= -(2n ** 63n) && bits < 2n ** 64n) return BigInt.asUintN(64, bits);
+  return refuse(`${name}: ${String(given)} given, a whole number of 64 bits is needed`);
 }
 
 // Numbers, then rows.
@@ -133,9 +140,9 @@ function before(numbers, rows) {
   return words;
 }
 
-// The kind of a mesh's elements by the number of their corners, its index and its positions. A mesh that was read has a name and a map.
-function arrays({ positions, faces, tetrahedra, edges, name: _name, map: _map, ...others }) {
-  mustBeNone("mesh", others, ["positions", "faces", "tetrahedra", "edges"]);
+// The kind of a mesh's elements by the number of their corners, its index and its positions.
+function arrays(mesh) {
+  const { positions, faces, tetrahedra, edges } = meshOf(mesh);
   const given = [[1, edges], [2, faces], [3, tetrahedra]].filter(([, index]) => index !== undefined);
   if (given.length > 1) refuse("mesh: elements of several kinds given, one of faces, tetrahedra and edges allowed");
   const [[kind, index] = [0, NONE]] = given;
@@ -212,7 +219,7 @@ export function makeScene({ SceneHandle }, mustBeReady) {
     }
 
     setFilter(which, category = 1, mask = 0xffff_ffff_ffff_ffffn) {
-      const bits = [category, mask].map((given) => BigInt.asUintN(64, BigInt(given)));
+      const bits = Object.entries({ category, mask }).map((entry) => bitsOf(...entry));
       call(() => this.#held.set_filter(body(which), ...bits));
     }
 
@@ -234,7 +241,8 @@ export function makeScene({ SceneHandle }, mustBeReady) {
     }
 
     setPinned(which, pinned) {
-      call(() => this.#held.set_pinned(body(which), Uint8Array.from(pinned, (of) => (of ? 1 : 0))));
+      const flags = list("pinned", pinned).map((of) => (of === true || of === 1 ? 1 : of === false || of === 0 ? 0 : refuse(`pinned: ${String(of)} given, true or false is needed`)));
+      call(() => this.#held.set_pinned(body(which), Uint8Array.from(flags)));
     }
 
     restPairs(distance) {
@@ -296,7 +304,7 @@ export function makeScene({ SceneHandle }, mustBeReady) {
     }
 
     dispose() {
-      this.#handle?.free();
+      call(() => this.#handle?.free());
       this.#handle = null;
     }
   }

@@ -1,10 +1,16 @@
 /// <reference lib="esnext.disposable" />
 
-/** Vertex numbers: two per edge, three per triangle, four per tetrahedron. */
-export type Index = Uint32Array | Uint16Array | Uint8Array;
+/** Any typed array: what `array` of an attribute of three.js is declared as. Those that are not taken are refused by name. */
+export type TypedArray = ArrayBufferView & ArrayLike<number>;
+
+/** Vertex numbers, two per edge, three per triangle, four per tetrahedron: a `Uint32Array`, a `Uint16Array` or a `Uint8Array`. */
+export type Index = TypedArray;
 
 /** x, y, z per vertex, in the unit of the scene, read as the real numbers that they are. */
 export type Positions = Float32Array | Float64Array;
+
+/** Positions as they are given: a `Float32Array` or a `Float64Array`. Those of an interleaved attribute have other numbers between them. */
+export type GivenPositions = Positions | TypedArray;
 
 /** x, y, z. */
 export type Vec3 = readonly [number, number, number];
@@ -21,7 +27,10 @@ export type PairKind = "vf" | "ee" | "ev" | "vv" | "ef" | "ff";
 /** The kinds that `kinds` of an answer refer to by number. */
 export declare const KINDS: readonly PairKind[];
 
-/** The shapes that `shapes` of contacts refer to by number. */
+/**
+ * The shapes that `shapes` of contacts refer to by number. `"solid"`: one of the two is a tetrahedron. `"apart"`: they do not meet, because
+ * the scene has moved since the pairs were found.
+ */
 export declare const SHAPES: readonly ["solid", "apart", "point", "segment", "polygon"];
 
 /** Why a call failed. After every error but `"internal"`, scenes and detectors stay usable. */
@@ -34,32 +43,36 @@ export interface Mesh {
   faces?: Index;
   tetrahedra?: Index;
   edges?: Index;
-  positions: Positions;
+  positions: GivenPositions;
 }
 
 /** A mesh of which vertices at the same position have become one. */
-export interface Welded<P extends Positions = Positions> {
+export interface Welded<P extends GivenPositions = Positions> {
   mesh: { positions: P; faces?: Uint32Array; tetrahedra?: Uint32Array; edges?: Uint32Array };
   /** For each vertex before the welding, its number after it. */
   map: Uint32Array;
   /** The positions of the welded vertices, taken from those of all vertices, of any frame. */
-  positions<Q extends Positions>(positions: Q): Q;
+  positions<Q extends GivenPositions>(positions: Q): Q;
 }
 
 /**
  * Welds vertices whose coordinates are equal, without a tolerance. A `BufferGeometry` repeats vertices along seams, and the faces
  * on both sides of a seam touch but are neighbours only once it is welded. Elements keep their number and order.
  *
+ * The vertices of a seam may differ in their last digits, as those of a sphere of three.js do, where sin(2 pi) is not 0: then round
+ * them before.
+ *
  * ```js
- * const { mesh, positions } = weld({ faces: geometry.index.array, positions: geometry.attributes.position.array });
+ * const rounded = (positions) => positions.map((x) => Math.round(x * 1e6) / 1e6);
+ * const { mesh, positions } = weld({ faces: geometry.index.array, positions: rounded(geometry.attributes.position.array) });
  * const body = scene.add(mesh);
- * scene.setPositions(body, positions(nextFrame));
+ * scene.setPositions(body, positions(rounded(nextFrame)));
  * ```
  */
-export function weld<P extends Positions>(mesh: Mesh & { positions: P }): Welded<P>;
+export function weld<P extends GivenPositions>(mesh: Mesh & { positions: P }): Welded<P>;
 
-/** Everything that a WebAssembly module can be loaded from. */
-export type Module = WebAssembly.Module | BufferSource | Response | URL | string;
+/** What a WebAssembly module can be loaded from: its address, in Node a path, too; its bytes; a `Response`; a `WebAssembly.Module`. */
+export type Module = string | ArrayBufferView | ArrayBufferLike | object;
 
 /**
  * Loads the WebAssembly module. Later calls wait for the first. Without an argument the module is loaded from the
@@ -115,8 +128,9 @@ export interface Query extends Control {
   /** A length, 0 by default: in a step, a pair this near counts as touching. The thickness of both elements adds to it. */
   separation?: number;
   /**
-   * A length, 0 by default: what a step leaves between elements. A pair counts as in contact when its distance is at most this, but a
-   * pair that is near at the start keeps only a share of its distance there.
+   * A length, 0 by default: what a step leaves between elements. A pair whose distance at the start is d keeps
+   * `separation + Math.min(clearance, clearanceShare * (d - separation))`: the clearance if it starts five times as far away or farther,
+   * else a fifth of what it has. It counts as in contact when its distance is at most that.
    */
   clearance?: number;
   /** That share: from 0 to less than 1, 0.2 by default. */
@@ -169,18 +183,18 @@ export declare class Scene {
   constructor();
   /** Adds a body. A mesh that was read can be given as it is. */
   add(mesh: Mesh): Body;
-  addTriangles(faces: Index, positions: Positions): Body;
-  addTetrahedra(tetrahedra: Index, positions: Positions): Body;
+  addTriangles(faces: Index, positions: GivenPositions): Body;
+  addTetrahedra(tetrahedra: Index, positions: GivenPositions): Body;
   /** Edges such as strands of hair. */
-  addEdges(edges: Index, positions: Positions): Body;
-  addPoints(positions: Positions): Body;
+  addEdges(edges: Index, positions: GivenPositions): Body;
+  addPoints(positions: GivenPositions): Body;
   remove(body: Body): void;
   /** Gives a body new elements and positions. Its filter stays, and its thickness if it is one number. */
   remesh(body: Body, mesh: Mesh): void;
   /** Moves the vertices of a body: as many positions as it has vertices. It stands still until it gets end positions. */
-  setPositions(body: Body, positions: Positions): void;
+  setPositions(body: Body, positions: GivenPositions): void;
   /** Sets the positions at the end of a step, to which each vertex moves on a straight line from time 0 to time 1; `null`: it stands still. */
-  setEndPositions(body: Body, positions: Positions | null): void;
+  setEndPositions(body: Body, positions: GivenPositions | null): void;
   /** Moves a body from the positions that were given last: 16 numbers, column by column, as `elements` of a `Matrix4`; affine. */
   setTransform(body: Body, matrix: ArrayLike<number>): void;
   /**
@@ -422,7 +436,6 @@ export interface NearPairs extends Answer, NearList {}
 
 /** The nearest elements of two bodies. */
 export interface Nearest {
-  /** A length, 0 if and only if they share a point. */
   /** A length, rounded down: never above the true one, and 0 if and only if they touch. */
   distance: number;
   bodyA: Body;
@@ -660,23 +673,23 @@ export declare class Detector {
    * Where points lie: 1 inside a body, 0 on its surface, -1 outside, decided exactly. Triangles must be a closed surface, so weld the
    * seams of a geometry first; the error names an edge of one that is not.
    */
-  contains(scene: Scene, body: Body, points: Positions, control?: Control): Int8Array;
+  contains(scene: Scene, body: Body, points: GivenPositions, control?: Control): Int8Array;
   /** How far points are from the surface of a body: above 0 inside, below 0 outside; the sign is exact. Bodies as for `contains`. */
-  signedDistance(scene: Scene, body: Body, points: Positions, control?: Control): Float64Array;
+  signedDistance(scene: Scene, body: Body, points: GivenPositions, control?: Control): Float64Array;
   /**
    * Which tetrahedron of a body contains each point: the lowest of several that share the face, edge or vertex on which it is; -1 outside.
    * Decided exactly.
    */
-  locate(scene: Scene, body: Body, points: Positions, control?: Control): Int32Array;
+  locate(scene: Scene, body: Body, points: GivenPositions, control?: Control): Int32Array;
   /**
    * How often a closed surface winds around each point: 0 outside, 1 inside where faces are counterclockwise seen from outside, sums of
    * these where the surface overlaps itself; -(2 ** 31) on the surface. Decided exactly. Bodies of triangles, as for `contains`.
    */
-  windingNumbers(scene: Scene, body: Body, points: Positions, control?: Control): Int32Array;
+  windingNumbers(scene: Scene, body: Body, points: GivenPositions, control?: Control): Int32Array;
   /** The element nearest to each point, or with `nNearest` the nearest few: of all bodies, or of one with `of`. */
-  closest(scene: Scene, points: Positions, query?: Query): Closest;
+  closest(scene: Scene, points: GivenPositions, query?: Query): Closest;
   /** What rays hit: the points origin + t direction, for t from 0 to `most`. Grazing an edge or a vertex is a hit. */
-  cast(scene: Scene, origins: Positions, directions: Positions, query?: Query): Hits;
+  cast(scene: Scene, origins: GivenPositions, directions: GivenPositions, query?: Query): Hits;
   /** How far each vertex may move, at most `most`, so that nothing touches. */
   safeDistances(scene: Scene, most: number, query?: Query): SafeDistances;
   /** How far each vertex can go in a step: each stops for itself, where `advance` stops all of them at one fraction. */

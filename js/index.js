@@ -9,7 +9,7 @@ import { call, disposable, loader, refuse, welder } from "./shared.js";
 export { KINDS, SHAPES } from "./answers.js";
 export { ImpingeError } from "./shared.js";
 
-const beside = new URL("./cpu/impinge_bg.wasm", import.meta.url);
+const beside = () => new URL("./cpu/impinge_bg.wasm", import.meta.url);
 const [init, mustBeReady] = loader(load, beside, () => module.set_watch(watch));
 export default init;
 
@@ -40,7 +40,7 @@ export class Detector {
   }
 
   dispose() {
-    this.#handle?.free();
+    call(() => this.#handle?.free());
     this.#handle = null;
   }
 }

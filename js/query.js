@@ -1,6 +1,6 @@
 // Questions as the lists of numbers that the module takes, and what watches them.
 
-import { ImpingeError, body, disposable, mustBeNone, number, refuse, word } from "./shared.js";
+import { ImpingeError, body, disposable, kindOf, list, mustBeNone, number, options, refuse, word } from "./shared.js";
 
 export const KINDS = ["vf", "ee", "ev", "vv", "ef", "ff"];
 
@@ -34,7 +34,7 @@ export function packed(query, length = 0) {
     signal,
     progress,
     ...others
-  } = query ?? {};
+  } = options("query", query);
   mustBeNone("query", others, FIELDS);
   const rules = [
     word("sharedVertex", sharedVertex, ["resolve", "skip"]),
@@ -42,9 +42,10 @@ export function packed(query, length = 0) {
     word("precision", precision, ["f32", "f64"]),
   ];
   const flags = (distances ? 1 : 0) | (closestPoints ? 2 : 0) | (ownedBy === undefined ? 0 : 4) | (word("hits", hits, ["first", "any", "all"]) << 3);
+  const still = list("fixed", fixed);
   const n = whole("nNearest", nNearest, 1, 2 ** 32 - 1);
-  const words = [...bodies({ which, between, selfOf, of }), ...rules, bits(kinds), flags | (fixed.length << 5), n, ...Array.from(fixed, body)];
-  for (const of of exclude) words.push(...excluded(of));
+  const words = [...bodies({ which, between, selfOf, of }), ...rules, bits(kinds), flags | (still.length << 5), n, ...still.map(body)];
+  for (const of of list("exclude", exclude)) words.push(...excluded(of));
   number("most", most);
   const lengths = Object.entries({ separation, clearance, clearanceShare }).map((entry) => number(...entry));
   return {
@@ -82,9 +83,11 @@ disposable(RestPairs);
 // Three words for what is left out: rings around each element, two groups of vertices, pairs at rest or two bodies.
 function excluded(given) {
   if (given instanceof RestPairs) return [3, RestPairs.numberOf(given), 0];
-  const { rings, groups, ...others } = given ?? {};
-  if (rings === undefined && groups === undefined) return [0, ...two("exclude", given)];
+  if (given === null || typeof given !== "object") refuse(`exclude: ${kindOf(given)} given, as in [[a, b]] an array of two bodies or an object is needed`);
+  if (Symbol.iterator in given) return [0, ...two("exclude", given)];
+  const { rings, groups, ...others } = given;
   mustBeNone("exclude", others, ["rings", "groups"]);
+  if (rings === undefined && groups === undefined) refuse("exclude: an empty object given, rings or groups are needed");
   if (groups === undefined) return [1, whole("rings", rings, 0, 16), 0];
   if (rings !== undefined || groups?.length !== 2) refuse(`groups: ${String(groups)} given, two groups are needed, without rings`);
   return [2, ...Array.from(groups, (group) => whole("groups", group, 0, 2 ** 32 - 1))];
@@ -110,7 +113,7 @@ export function withPoints({ numbers, ...asked }, points) {
 
 // A question without a query: words alone.
 export function plain(words, control) {
-  const { signal, progress, ...others } = control ?? {};
+  const { signal, progress, ...others } = options("control", control);
   mustBeNone("control", others, ["signal", "progress"]);
   return { words, numbers: new Float64Array(10), watch: new Watch(signal, progress) };
 }
@@ -119,10 +122,15 @@ function bodies(given) {
   const names = Object.keys(given).filter((name) => given[name] !== undefined);
   if (names.length > 1) refuse(`query: "${names[0]}" and "${names[1]}" given, one of them allowed`);
   const { which = "all", between, selfOf, of } = given;
-  if (between !== undefined) return [3, ...two("between", between)];
+  if (between !== undefined) return [3, ...apart(two("between", between))];
   if (selfOf !== undefined) return [4, body(selfOf), 0];
   if (of !== undefined) return [5, body(of), 0];
   return [word("which", which, ["all", "between", "self"]), 0, 0];
+}
+
+function apart([a, b]) {
+  if (a === b) refuse(`between: body ${a} given twice, selfOf: ${a} asks for its self-collision`);
+  return [a, b];
 }
 
 function two(name, given) {
@@ -133,12 +141,12 @@ function two(name, given) {
 // Kinds as bits. That they were said is a bit of its own.
 function bits(kinds) {
   if (kinds === undefined) return 0;
-  return Array.from(kinds, (kind) => 1 << word("kinds", kind, KINDS)).reduce((all, bit) => all | bit, 64);
+  return list("kinds", kinds).map((kind) => 1 << word("kinds", kind, KINDS)).reduce((all, bit) => all | bit, 64);
 }
 
 function cell(given) {
   if (given === undefined) return [0, 0, 0, 0, 0, 0];
-  const corners = Array.from(given, (corner) => Array.from(corner, (x) => number("ownedBy", x)));
+  const corners = list("ownedBy", given).map((corner) => list("ownedBy", corner).map((x) => number("ownedBy", x)));
   if (corners.length === 2 && corners.every(({ length }) => length === 3)) return corners.flat();
   return refuse("ownedBy: two corners of three numbers each are needed");
 }

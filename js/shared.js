@@ -30,12 +30,20 @@ export function call(entry) {
 export function named(error) {
   if (typeof error === "string") {
     const [code] = error.split("\n", 1);
-    return new ImpingeError(code, error.slice(code.length + 1));
+    return new ImpingeError(code, camelized(error.slice(code.length + 1)));
+  }
+  // Words of the module's own JavaScript.
+  if (/^(recursive use of an object|attempted to take ownership)/.test(error?.message)) {
+    const message = "a scene or a detector is used while it answers a question, or after the module has stopped";
+    return new ImpingeError("invalid", message, { cause: error });
   }
   if (!(error instanceof WebAssembly.RuntimeError)) return error;
   const message = `the module has stopped (${error.message}): it has no more memory, or this is a bug`;
   return new ImpingeError("internal", message, { cause: error });
 }
+
+// The module's errors begin with names of options as other languages write them.
+const camelized = (text) => text.replace(/^[a-z]+(?:_[a-z]+)+(?=: )/, (name) => name.replace(/_(.)/g, (_, letter) => letter.toUpperCase()));
 
 // Returns two functions: one loads the module, once; the other throws as long as it has not been loaded.
 export function loader(load, beside, begin) {
@@ -59,24 +67,46 @@ export function loader(load, beside, begin) {
 
 // The module's bytes, or where they are. Node's fetch does not read files.
 async function source(given, beside) {
-  const wanted = given ?? beside;
-  const isFile = wanted instanceof URL && wanted.protocol === "file:";
-  if (!isFile || globalThis.process?.versions?.node === undefined) return wanted;
-  const { readFile } = await import("node:fs/promises");
-  return readFile(wanted);
+  const wanted = (await given) ?? beside();
+  if (globalThis.process?.versions?.node === undefined) return wanted;
+  const isUrl = wanted instanceof URL || (typeof wanted === "string" && /^[a-z][a-z+.-]+:/i.test(wanted));
+  const url = isUrl ? new URL(wanted) : null;
+  if (url === null ? typeof wanted !== "string" : url.protocol !== "file:") return wanted;
+  // Bundlers for browsers look for what a string names here.
+  const name = "node:fs/promises";
+  const { readFile } = await import(/* webpackIgnore: true */ /* @vite-ignore */ name);
+  return readFile(url ?? wanted);
+}
+
+// What was given, in a word or two.
+export function kindOf(given) {
+  if (given === null || typeof given !== "object") return typeof given === "function" ? "a function" : String(given);
+  return given.constructor?.name ? `${/^[AEIOU]/.test(given.constructor.name) ? "an" : "a"} ${given.constructor.name}` : "an object";
+}
+
+// Options, an object; none are given by undefined or null.
+export function options(name, given) {
+  if (given === undefined || given === null || (typeof given === "object" && !Array.isArray(given))) return given ?? {};
+  return refuse(`${name}: ${kindOf(given)} given, an object is needed`);
+}
+
+// The list that was given.
+export function list(name, given) {
+  if (given !== null && typeof given === "object" && Symbol.iterator in given) return Array.from(given);
+  return refuse(`${name}: ${kindOf(given)} given, an array is needed`);
 }
 
 // Vertex numbers with 32 bits. three.js uses 16 bits if they suffice.
 export function wide(index, name = "index") {
   if (index instanceof Uint32Array) return index;
   if (index instanceof Uint16Array || index instanceof Uint8Array) return Uint32Array.from(index);
-  return refuse(`${name}: a Uint32Array, a Uint16Array or a Uint8Array is needed`);
+  return refuse(`${name}: ${kindOf(index)} given, a Uint32Array, a Uint16Array or a Uint8Array is needed`);
 }
 
 export function isSingle(positions) {
   if (positions instanceof Float32Array) return true;
   if (positions instanceof Float64Array) return false;
-  return refuse("positions: a Float32Array or a Float64Array is needed");
+  return refuse(`positions: ${kindOf(positions)} given, a Float32Array or a Float64Array is needed`);
 }
 
 // The number of a body. The module would cut it to 32 bits without an error.
@@ -105,11 +135,24 @@ export function mustBeNone(what, others, allowed) {
   if (unknown !== undefined) refuse(`${what}: "${unknown}" given, ${listed(allowed)} allowed`);
 }
 
+// The arrays of a mesh. One that was read has a name and a map.
+export function meshOf(given) {
+  if (given === null || typeof given !== "object") refuse(`mesh: ${kindOf(given)} given, an object with positions is needed`);
+  const { positions, faces, tetrahedra, edges, name: _name, map: _map, ...others } = given;
+  mustBeNone("mesh", others, ["positions", "faces", "tetrahedra", "edges"]);
+  // Without elements, vertices are points: whoever names elements has forgotten them.
+  const named = ["faces", "tetrahedra", "edges"].filter((name) => name in given);
+  if (named.length > 0 && named.every((name) => given[name] === undefined)) {
+    refuse(`${named[0]}: undefined given; a geometry without an index has the faces 0, 1, 2, 3, …, and points have no ${named[0]}`);
+  }
+  return { positions, faces, tetrahedra, edges };
+}
+
 // Makes `weld` of the two functions of a module.
 export function welder(mustBeReady, { weld_f32, weld_f64 }) {
-  return ({ positions, faces, tetrahedra, edges, ...others }) => {
+  return (given) => {
     mustBeReady();
-    mustBeNone("mesh", others, ["positions", "faces", "tetrahedra", "edges"]);
+    const { positions, faces, tetrahedra, edges } = meshOf(given);
     const map = call(() => (isSingle(positions) ? weld_f32(positions) : weld_f64(positions)));
     // The first vertex of each welded one.
     const firsts = [];

@@ -1,4 +1,4 @@
-import type { Advance, Body, CandidateRun, Candidates, Closest, Contacts, Control, Hits, Impact, Impacts, Mesh, Module, NearPairs, Nearest, Neighbours, Pairs, Penetration, Positions, Query, SafeDistances, Scene, Settings, Stats, Truncation } from "./index.js";
+import type { Advance, Body, CandidateRun, Candidates, Closest, Contacts, Control, GivenPositions, Hits, Impact, Impacts, Mesh, Module, NearPairs, Nearest, Neighbours, Pairs, Penetration, Positions, Query, SafeDistances, Scene, Settings, Stats, Truncation } from "./index.js";
 
 /** Loads the WebAssembly module, which is another one than that of `impinge`. Later calls wait for the first. */
 export default function init(module?: Module | Promise<Module>): Promise<void>;
@@ -28,12 +28,12 @@ export declare class Detector {
   /** `each` is called while the device's queue waits: what it asks of this detector is answered after the last run. */
   candidatesInRuns(scene: Scene, inflation: number, each: (run: CandidateRun) => boolean | void, query?: Query): Promise<number>;
   near(scene: Scene, distance: number, query?: Query): Promise<NearPairs>;
-  contains(scene: Scene, body: Body, points: Positions, control?: Control): Promise<Int8Array>;
-  signedDistance(scene: Scene, body: Body, points: Positions, control?: Control): Promise<Float64Array>;
-  locate(scene: Scene, body: Body, points: Positions, control?: Control): Promise<Int32Array>;
-  windingNumbers(scene: Scene, body: Body, points: Positions, control?: Control): Promise<Int32Array>;
-  closest(scene: Scene, points: Positions, query?: Query): Promise<Closest>;
-  cast(scene: Scene, origins: Positions, directions: Positions, query?: Query): Promise<Hits>;
+  contains(scene: Scene, body: Body, points: GivenPositions, control?: Control): Promise<Int8Array>;
+  signedDistance(scene: Scene, body: Body, points: GivenPositions, control?: Control): Promise<Float64Array>;
+  locate(scene: Scene, body: Body, points: GivenPositions, control?: Control): Promise<Int32Array>;
+  windingNumbers(scene: Scene, body: Body, points: GivenPositions, control?: Control): Promise<Int32Array>;
+  closest(scene: Scene, points: GivenPositions, query?: Query): Promise<Closest>;
+  cast(scene: Scene, origins: GivenPositions, directions: GivenPositions, query?: Query): Promise<Hits>;
   safeDistances(scene: Scene, most: number, query?: Query): Promise<SafeDistances>;
   truncate(scene: Scene, query?: Query): Promise<Truncation>;
   neighbours(scene: Scene, distance: number, query?: Query): Promise<Neighbours>;
@@ -51,14 +51,15 @@ export interface FileMesh extends Mesh {
   name: string;
   faces?: Uint32Array;
   tetrahedra?: Uint32Array;
-  edges?: undefined;
+  edges?: never;
   positions: Positions;
   /** For each vertex of the file, its number in the mesh: they differ if vertices were welded. */
   map: Uint32Array;
 }
 
 /**
- * Reads a mesh file. The extension of its name is that of its format: obj, ply, stl, off, gltf, glb, msh, vtk, vtu or mesh.
+ * Reads a mesh file. The extension of its name is that of its format: obj, ply, stl, off, coff, noff, gltf, glb, 3mf, msh, vtk, vtu
+ * or mesh. Files beside it are not read: a glTF file must hold its buffers, as a glb file does.
  * Vertices at the same position become one, unless `weld` is false. Needs no GPU.
  */
 export function read(name: string, bytes: Uint8Array, options?: { weld?: boolean }): FileMesh;

@@ -4,12 +4,12 @@ import load, * as module from "./gpu/impinge.js";
 import { Pairs, statsOf } from "./answers.js";
 import { answering, ask, makeScene, settings } from "./classes.js";
 import { watch } from "./query.js";
-import { ImpingeError, call, disposable, loader, mustBeNone, named, refuse, welder } from "./shared.js";
+import { ImpingeError, call, disposable, kindOf, loader, mustBeNone, named, options, refuse, welder } from "./shared.js";
 
 export { KINDS, SHAPES } from "./answers.js";
 export { ImpingeError } from "./shared.js";
 
-const beside = new URL("./gpu/impinge_bg.wasm", import.meta.url);
+const beside = () => new URL("./gpu/impinge_bg.wasm", import.meta.url);
 const [init, mustBeReady] = loader(load, beside, () => module.set_watch(watch));
 export default init;
 
@@ -94,26 +94,32 @@ async function detect(handle, scene, { words, numbers, watch }) {
   return new Pairs(lists, statsOf(handle.stats(true)));
 }
 
-function readers(name, bytes, options, inBodies) {
+function checkBytes(bytes) {
+  if (!(bytes instanceof Uint8Array)) refuse(`bytes: ${kindOf(bytes)} given, a Uint8Array is needed`);
+}
+
+function readers(name, bytes, given, inBodies) {
   mustBeReady();
-  const { weld = true, ...others } = options ?? {};
+  const { weld = true, ...others } = options("options", given);
   mustBeNone("options", others, ["weld"]);
+  checkBytes(bytes);
   const meshes = call(() => module.read(String(name), bytes, Boolean(weld), inBodies));
   return meshes.map(([name, corners, index, positions, map]) => {
     return { name, [corners === 4 ? "tetrahedra" : "faces"]: index, positions, map };
   });
 }
 
-export function read(name, bytes, options) {
-  const [mesh] = readers(name, bytes, options, false);
+export function read(name, bytes, given) {
+  const [mesh] = readers(name, bytes, given, false);
   return mesh;
 }
 
-export function readBodies(name, bytes, options) {
-  return readers(name, bytes, options, true);
+export function readBodies(name, bytes, given) {
+  return readers(name, bytes, given, true);
 }
 
 export function readFrames(name, bytes) {
   mustBeReady();
+  checkBytes(bytes);
   return call(() => module.read_frames(String(name), bytes));
 }

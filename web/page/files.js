@@ -8,11 +8,15 @@ const isCache = ({ name }) => /\.(pc2|mdd)$/i.test(name);
 const mayHaveParts = ({ name }) => /\.(obj|gltf|glb)$/i.test(name);
 const byName = new Intl.Collator("en", { numeric: true }).compare;
 
+// A buffer of a glTF file among the others: the error about that says how to give it.
+const isBeside = ({ name }, list) => /\.bin$/i.test(name) && list.some((file) => /\.gltf$/i.test(file.name));
+
 // Reads files. Those that cannot be read are left out, and `refused` says why.
 export async function read({ read: readMesh, readBodies, readFrames }, list) {
   const [meshes, caches, refused] = [[], [], []];
   for (const file of list) {
     try {
+      if (isBeside(file, list)) continue;
       const bytes = new Uint8Array(await file.arrayBuffer());
       if (isCache(file)) {
         caches.push({ name: file.name, frames: readFrames(file.name, bytes) });
@@ -24,7 +28,8 @@ export async function read({ read: readMesh, readBodies, readFrames }, list) {
       const parts = mayHaveParts(file) ? readBodies(file.name, bytes, { weld: true }).map(indexed) : [];
       meshes.push({ ...mesh, name: file.name, parts });
     } catch (error) {
-      refused.push(String(error.message ?? error));
+      const text = String(error.message ?? error);
+      refused.push(text.includes(file.name) ? text : `${file.name}: ${text}`);
     }
   }
   return { meshes, caches, refused };

@@ -30,7 +30,7 @@ const useGpu = element("use-gpu");
 let files = null;
 let bodies = [];
 // From coordinates to those that are drawn: subtract the centre, divide by the radius.
-let stage = { centre: [0, 0, 0], radius: 1 };
+let stage = { centre: [0, 0, 0], radius: 1, reach: 1 };
 // The last moment: 1 for a scene that changes steadily, the last frame's number for frames, 0 if nothing moves.
 let end = 0;
 let isFramed = false;
@@ -64,6 +64,7 @@ const view = new View(element("view"), {
     element("back").hidden = false;
     isMoved = true;
   },
+  press: () => document.body.classList.add("pressed"),
   click: (hit) => choose(hit),
   hover(hit, { clientX, clientY }) {
     const tip = element("tip");
@@ -110,7 +111,7 @@ const isYUp = () => files !== null && up.value === "y";
 const which = () => (bodies.length === 1 || self.checked ? "all" : "between");
 
 // Replaces the bodies. Throws, and changes nothing, if they are refused.
-function setBodies(given, { centre, radius } = {}) {
+function setBodies(given, { centre, radius, reach = radius, begin = 0 } = {}) {
   const made = given.map((body) => {
     const all = body.frames ?? [body.positions];
     const isDouble = all.some((positions) => positions instanceof Float64Array);
@@ -125,9 +126,10 @@ function setBodies(given, { centre, radius } = {}) {
   isFramed = bodies.some(({ frames }) => frames?.length > 1);
   end = isFramed ? Math.max(...bodies.map(({ frames }) => (frames?.length ?? 1) - 1)) : 0;
   if (bodies.some(({ pose }) => pose)) end = 1;
-  now = 0;
+  now = begin;
   direction = 1;
-  stage = centre ? { centre, radius } : ballAround(extentOf(bodies));
+  const ball = centre ? { centre, radius } : ballAround(extentOf(bodies));
+  stage = { ...ball, reach: reach ?? ball.radius };
   chosen = null;
   touching = [];
   step = null;
@@ -140,7 +142,7 @@ function setBodies(given, { centre, radius } = {}) {
   panel.showBodies(bodies, (ix, isHidden) => view.hide(ix, isHidden));
   panel.showChosen(null);
   leaveRoom();
-  view.frame([0, 0, 0], 1);
+  seeAll();
   isMoved = true;
   void openGpu();
 }
@@ -276,6 +278,8 @@ function mark() {
   view.choose(chosen ? [[chosen.body, chosen.primitive], ...partners] : touching);
 }
 
+const seeAll = () => view.frame([0, 0, 0], 1, stage.reach / stage.radius);
+
 function flyTo({ centre, radius }) {
   const near = Math.max(LEAST_PLACE, radius / stage.radius);
   view.flyTo(drawn(centre, 0, [], isYUp()), near / PLACE_SHARE);
@@ -369,8 +373,8 @@ function showScene(name, { triangles = Number(size.value), withSelf = SCENES[nam
   scene.value = name;
   self.checked = withSelf;
   isPlaying = plays;
-  const { make, centre, radius } = SCENES[name];
-  setBodies(make(triangles), { centre, radius });
+  const { make, ...where } = SCENES[name];
+  setBodies(make(triangles), where);
 }
 
 function showFileControls() {
@@ -400,15 +404,18 @@ function showFiles(given, how) {
   return refused;
 }
 
-async function open(list) {
+async function open(given, folders = []) {
+  const list = given.filter(({ name }) => !folders.includes(name));
+  const refusals = folders.map((name) => `${name} is a folder: open the files in it`);
+  complain(refusals.join("\n"));
   if (list.length === 0) return;
-  complain("");
   say("status", `Reading ${list.map(({ name }) => name).join(", ")} …`);
   try {
     const readers = await withReaders();
     // Lets the browser show the line above.
     await new Promise((done) => setTimeout(done));
     const given = await read(readers, list);
+    given.refused.unshift(...refusals);
     // A point cache alone moves the meshes that are there.
     if (given.meshes.length === 0 && given.caches.length > 0) given.meshes = files?.meshes ?? [];
     if (given.meshes.length === 0) {
@@ -482,6 +489,7 @@ time.addEventListener("input", () => setTime(Number(time.value)));
 element("previous").addEventListener("click", () => nextFrame(-1));
 element("next").addEventListener("click", () => nextFrame(1));
 element("step-show").addEventListener("click", showContact);
+element("all").addEventListener("click", seeAll);
 element("share").addEventListener("click", () => void share());
 scene.addEventListener("change", () => showScene(scene.value));
 size.addEventListener("change", () => showScene(scene.value, { withSelf: self.checked, plays: isPlaying }));
@@ -515,7 +523,7 @@ const KEYS = {
   " ": () => end > 0 && setPlaying(!isPlaying),
   j: () => nextPlace(1),
   J: () => nextPlace(-1),
-  f: () => view.frame([0, 0, 0], 1),
+  f: seeAll,
   Escape: () => choose(null),
   ",": () => isFramed && nextFrame(-1),
   ".": () => isFramed && nextFrame(1),
@@ -548,7 +556,9 @@ for (const done of ["dragleave", "drop"]) {
 }
 window.addEventListener("drop", (event) => {
   event.preventDefault();
-  void open([...event.dataTransfer.files]);
+  const { files: dropped, items } = event.dataTransfer;
+  const entries = [...items].filter(({ kind }) => kind === "file").map((item) => item.webkitGetAsEntry?.());
+  void open([...dropped], entries.filter((entry) => entry?.isDirectory).map(({ name }) => name));
 });
 window.addEventListener("hashchange", followLink);
 if (matchMedia("(max-width: 720px)").matches) {

@@ -169,8 +169,9 @@ function fall(nTriangles) {
   ];
 }
 
-// Scenes by name: bodies of about as many triangles as asked for, and the ball of space that they move in.
+// Scenes by name: bodies of about as many triangles as asked for, the ball of space where they meet, how far they ever are from its
+// centre, and the moment at which the scene begins to play, shortly before they meet.
 export const SCENES = {
-  ring: { make: ring, centre: [0.1, -0.05, 0.05], radius: 0.95, self: true },
-  fall: { make: fall, centre: [0, 0, 0.12], radius: 1.2, self: false },
+  ring: { make: ring, centre: [0.1, -0.05, 0.05], radius: 0.95, reach: 1.75, begin: 0.6, self: true },
+  fall: { make: fall, centre: [0, 0, 0.12], radius: 1.2, reach: 1.2, begin: 0, self: false },
 };

@@ -101,7 +101,7 @@ export class View {
   #flight = null;
   #chosen = [];
 
-  // What the pointer does is told to `on`: `drag(body, dx, dy, dz)` moves a body, `click(hit)` and `hover(hit, event)` name the
+  // What the pointer does is told to `on`: `press()`, `drag(body, dx, dy, dz)` moves a body, `click(hit)` and `hover(hit, event)` name the
   // primitive there or `null`, `change()` says that the picture must be drawn again.
   constructor(canvas, on) {
     this.canvas = canvas;
@@ -175,10 +175,10 @@ export class View {
     for (const figure of this.#figures) this.scene.add(...figure.meshes);
   }
 
-  // Places the camera so that a ball around `centre` fills the picture.
-  frame([x, y, z], radius) {
+  // Places the camera so that a ball around `centre` fills the picture, and what is as far as `reach` from there is not cut at its sides.
+  frame([x, y, z], radius, reach = radius) {
     this.#flight = null;
-    const away = this.#distance(radius);
+    const away = this.#distance(radius, reach);
     this.controls.target.set(x, y, z);
     this.camera.position.set(x - 0.25 * away, y - 0.82 * away, z + 0.52 * away);
     this.camera.near = away / 1000;
@@ -187,11 +187,11 @@ export class View {
     this.controls.update();
   }
 
-  // How far away the camera sees a ball as large as the room that it has.
-  #distance(radius) {
+  // How far away the camera sees a ball as high and as wide as the room that it has.
+  #distance(radius, reach = radius) {
     const [wide, high] = this.#room();
-    const half = Math.tan((this.camera.fov * Math.PI) / 360) * Math.min(high, this.camera.aspect * wide);
-    return radius / Math.sin(Math.atan(half));
+    const half = Math.tan((this.camera.fov * Math.PI) / 360);
+    return Math.max(radius / Math.sin(Math.atan(half * high)), reach / Math.sin(Math.atan(half * this.camera.aspect * wide)));
   }
 
   // Moves the camera, in its direction, to where a ball around `centre` fills a part of the picture.
@@ -335,16 +335,29 @@ export class View {
 
   #press(event) {
     this.#flight = null;
-    if (!event.isPrimary || event.button !== 0) return;
+    this.on.press();
+    if (!event.isPrimary) return this.#pinch();
+    if (event.button !== 0) return;
     const hit = this.#hit(event);
     this.#drag = { hit, at: [event.clientX, event.clientY], id: event.pointerId, isClick: true };
     // The only body is not moved: the view is turned.
     if (!hit || this.#figures.length < 2) return;
     const ahead = this.camera.getWorldDirection(new THREE.Vector3());
     this.#drag.plane = new THREE.Plane().setFromNormalAndCoplanarPoint(ahead, hit.point);
-    this.#drag.last = hit.point;
-    this.controls.enabled = false;
+    Object.assign(this.#drag, { last: hit.point, first: hit.point, eye: this.eye });
+    // The controls must know the first finger of a pinch, and turn the view until it has moved.
+    this.controls.enabled = event.pointerType === "touch";
     this.canvas.setPointerCapture(event.pointerId);
+  }
+
+  // A second finger: both zoom and turn the view, and the body that the first one has moved goes back.
+  #pinch() {
+    const drag = this.#drag;
+    this.#drag = null;
+    this.controls.enabled = true;
+    if (!drag?.plane || drag.isClick) return;
+    const back = drag.first.clone().sub(drag.last);
+    this.on.drag(drag.hit.body, back.x, back.y, back.z);
   }
 
   #move(event) {
@@ -358,6 +371,10 @@ export class View {
     const [x, y] = drag.at;
     drag.isClick &&= Math.hypot(event.clientX - x, event.clientY - y) < CLICK;
     if (drag.isClick || !drag.plane) return;
+    if (this.controls.enabled) {
+      this.controls.enabled = false;
+      this.eye = drag.eye;
+    }
     const now = this.#ray(event).ray.intersectPlane(drag.plane, new THREE.Vector3());
     if (!now) return;
     const by = now.clone().sub(drag.last);

@@ -101,7 +101,7 @@ const TRIANGLE = [0, 0, 0, 1, 0, 0, 0, 1, 0];
 
 // Calls that must be refused, and what they say.
 export async function refusals(module) {
-  const { default: init, Detector, ImpingeError, Scene } = await import(module);
+  const { default: init, Detector, ImpingeError, Scene, weld } = await import(module);
   const said = {};
   said.early = await refusal(() => new Detector());
   await init();
@@ -125,6 +125,19 @@ export async function refusals(module) {
   said.self = await ask("detect", { between: [a, a] });
   said.method = await refusal(() => new Detector({ method: "octree" }));
   said.setting = await refusal(() => new Detector({ metod: "cells" }));
+  said.settings = await refusal(() => new Detector(5));
+  said.query = await ask("detect", 5);
+  said.fixed = await ask("safeDistances", 1, { fixed: a });
+  said.exclude = await ask("detect", { exclude: [a, a] });
+  said.ring = await ask("detect", { exclude: [{ ring: 1 }] });
+  said.rings = await ask("detect", { exclude: { rings: 2 } });
+  said.matrix4 = await refusal(() => scene.setTransform(a, { elements: Array(16).fill(0) }));
+  said.filter = await refusal(() => scene.setFilter(a, 2n ** 64n));
+  said.pinned = await refusal(() => scene.setPinned(a, ["no", "no", "no"]));
+  said.nothing = await refusal(() => scene.add());
+  said.forgotten = await refusal(() => scene.add({ faces: undefined, positions: triangle }));
+  said.welded = await refusal(() => weld({ faces: undefined, positions: triangle }));
+  said.within = await ask("detect", { progress: () => detector.count(scene) });
   said.margin = await refusal(() => new Detector({ reuseMargin: -1 }));
   said.clearance = await ask("impacts", { clearance: -1 });
   said.start = await ask("isFree", { start: "never" });
@@ -182,18 +195,31 @@ export const REFUSALS = {
   number: "invalid: body 0: vertex 0 has a non-finite position (0, 0, NaN)",
   index: "invalid: body 1: primitive 0 names vertex 7, but there are 3 vertices",
   ragged: "invalid: positions: 8 numbers given, not a multiple of 3",
-  plain: "invalid: index: a Uint32Array, a Uint16Array or a Uint8Array is needed",
-  list: "invalid: positions: a Float32Array or a Float64Array is needed",
+  plain: "invalid: index: an Array given, a Uint32Array, a Uint16Array or a Uint8Array is needed",
+  list: "invalid: positions: an Array given, a Float32Array or a Float64Array is needed",
   kinds: "invalid: mesh: elements of several kinds given, one of faces, tetrahedra and edges allowed",
   mesh: 'invalid: mesh: "index" given, positions, faces, tetrahedra or edges allowed',
-  matrix: "invalid: transform: 3 numbers given, 16 allowed, column by column",
+  matrix: "invalid: transform: 3 numbers given, 16 numbers allowed, column by column, as elements of a Matrix4",
   thickness: "invalid: thickness: -1 given, a finite number that is not below 0 allowed",
   unknown: "invalid: there is no body 4: 1 have been added, and 0 of them removed",
   wrong: "invalid: body: b given, a number that a scene returned is needed",
   two: "invalid: between: 0 given, two bodies are needed",
-  self: "invalid: a query between body 0 and itself: ask for collisions within it instead",
+  self: "invalid: between: body 0 given twice, selfOf: 0 asks for its self-collision",
   method: 'invalid: method: "octree" given, "auto", "clusters", "cells" or "naive" allowed',
   setting: 'invalid: settings: "metod" given, method, recluster, memoryBudget, maxPairs or reuseMargin allowed',
+  settings: "invalid: settings: 5 given, an object is needed",
+  query: "invalid: query: 5 given, an object is needed",
+  fixed: "invalid: fixed: 0 given, an array is needed",
+  exclude: "invalid: exclude: 0 given, as in [[a, b]] an array of two bodies or an object is needed",
+  ring: 'invalid: exclude: "ring" given, rings or groups allowed',
+  rings: "invalid: exclude: an Object given, an array is needed",
+  matrix4: "invalid: transform: an Object given, 16 numbers allowed, column by column, as elements of a Matrix4",
+  filter: "invalid: category: 18446744073709551616 given, a whole number of 64 bits is needed",
+  pinned: "invalid: pinned: no given, true or false is needed",
+  nothing: "invalid: mesh: undefined given, an object with positions is needed",
+  forgotten: "invalid: faces: undefined given; a geometry without an index has the faces 0, 1, 2, 3, …, and points have no faces",
+  welded: "invalid: faces: undefined given; a geometry without an index has the faces 0, 1, 2, 3, …, and points have no faces",
+  within: "invalid: a scene or a detector is used while it answers a question, or after the module has stopped",
   margin: "invalid: reuseMargin: -1 given, a number that is not below 0 is needed",
   clearance: "invalid: clearance: -1 given, a finite number that is not below 0 allowed",
   start: 'invalid: start: "never" given, "report", "skip" or "verify" allowed',
@@ -217,7 +243,7 @@ export const REFUSALS = {
     "earliest kinds": "invalid: kinds: ef",
     "isFree kinds": "invalid: kinds: ef",
     "advance kinds": "invalid: kinds: ef",
-    "advance ownedBy": "invalid: owned_by: a cell for the way that a step can be taken",
+    "advance ownedBy": "invalid: ownedBy: a cell for the way that a step can be taken",
   },
   aborted: "cancelled: cancelled",
   reason: "Error: enough",
@@ -569,7 +595,7 @@ export const OTHERS = {
   nearest: { distance: 1, bodyA: 1, elementA: 0, bodyB: 0, elementB: 0, points: [[0.25, 0.25, 1], [0.25, 0.25, 0]] },
   onFlat: [0, 0, 2, 1],
   moved: [0, 3],
-  turned: [6, "invalid: transform: 1 numbers given, 16 allowed, column by column"],
+  turned: [6, "invalid: transform: 1 numbers given, 16 numbers allowed, column by column, as elements of a Matrix4"],
   filtered: false,
   excluded: 0,
   described: ["edges", 1, 2, [0, 1], [0, 1, 0, 2, 1, 2]],
@@ -592,7 +618,7 @@ export const OTHERS = {
     ],
     all: [[[0, true], [0, true], [1, true], [1, true]], [0, 4, 4], 4, [0, 0], []],
     ragged: "invalid: points: 11 numbers given, not a multiple of 3",
-    list: "invalid: positions: a Float32Array or a Float64Array is needed",
+    list: "invalid: positions: an Array given, a Float32Array or a Float64Array is needed",
     rays: "invalid: directions: 1 directions given, as many as the 2 origins allowed",
     hit: 'invalid: hits: "last" given, "first", "any" or "all" allowed',
     most: "invalid: most: -1 given, a length of at least 0, or infinity allowed",
@@ -631,8 +657,8 @@ export const OTHERS = {
     one: "invalid: groups: 1 given, two groups are needed, without rings",
     both: "invalid: groups: 1,2 given, two groups are needed, without rings",
     group: "invalid: groups: -1 given, 0 to 4294967295 allowed",
-    misspelt: "invalid: exclude: [object Object] given, two bodies are needed",
-    plain: "invalid: groups: a Uint32Array, a Uint16Array or a Uint8Array is needed",
+    misspelt: 'invalid: exclude: "ring" given, rings or groups allowed',
+    plain: "invalid: groups: an Array given, a Uint32Array, a Uint16Array or a Uint8Array is needed",
     short: "invalid: body 1: 2 groups given, but there are 3 vertices",
     distance: "invalid: distance: -1 given, a finite number that is not below 0 allowed",
     runs: [true, true, true, 4],
@@ -649,7 +675,7 @@ export const OTHERS = {
     ],
     edges: [
       true, true, true, "invalid: body 1: row 2 of edges has vertices 0 and 1, as row 0 has",
-      "invalid: edges: a Uint32Array, a Uint16Array or a Uint8Array is needed", true, true,
+      "invalid: edges: an Array given, a Uint32Array, a Uint16Array or a Uint8Array is needed", true, true,
     ],
   },
   stopped: [true, "cancelled"],
@@ -686,10 +712,11 @@ if (globalThis.process?.argv?.[1]?.endsWith("answers.mjs")) {
   const frames = readFrames("run.mdd", mdd).map((frame) => [...frame]);
   const noGpu = await refusal(() => Detector.open());
   const broken = await refusal(() => read("a.txt", new Uint8Array()));
+  const buffers = await Promise.all([read, readFrames].map((read) => refusal(() => read("a.pc2", new ArrayBuffer(8)))));
   const cut = await refusal(() => readFrames("cut.mdd", mdd.subarray(1)));
   const misspelt = [read, readBodies].map((read) => refusal(() => read("triangle.obj", new TextEncoder().encode(text), { wield: false })));
   const options = await Promise.all(misspelt);
   const { map: welded } = weld({ positions: new Float64Array([1, 2, 3, 1, 2, 3]) });
   const files = { welded: [...welded], faces: [...mesh.faces], positions: [...mesh.positions], map: [...mesh.map], frames };
-  process.stdout.write(JSON.stringify({ said, answers, taken, more, read: { ...files, noGpu, broken, cut, options }, doors }));
+  process.stdout.write(JSON.stringify({ said, answers, taken, more, read: { ...files, noGpu, broken, buffers, cut, options }, doors }));
 }

@@ -12,6 +12,7 @@ import { setTimeout } from "node:timers/promises";
 import { setFlagsFromString } from "node:v8";
 import { runInNewContext } from "node:vm";
 import { brotliCompressSync } from "node:zlib";
+import { buildSync } from "esbuild";
 import { OTHERS, REFUSALS, STEPS } from "./answers.mjs";
 import { launch, serve } from "./browser.mjs";
 
@@ -48,7 +49,7 @@ try {
 
   assert.match(await readFile(join(installed, "README.md"), "utf8"), /^# impinge/);
   const tsc = new URL("../node_modules/.bin/tsc", here).pathname;
-  const options = ["--noEmit", "--strict", "--target", "es2022", "--module", "nodenext"];
+  const options = ["--noEmit", "--strict", "--exactOptionalPropertyTypes", "--target", "es2022", "--module", "nodenext"];
   execFileSync(tsc, [...options, "--lib", "es2022,dom", "use.ts"], { cwd: folder, stdio: "inherit" });
   console.log("types: checked");
 
@@ -56,6 +57,8 @@ try {
   await cp(example, join(folder, "cloth-on-ball"), { recursive: true });
   const printed = execFileSync("node", ["cloth-on-ball/cloth_on_ball.mjs"], { cwd: folder, encoding: "utf8" });
   assert.equal(printed, await readFile(join(example, "expected.txt"), "utf8"));
+
+  await testBundles(folder);
 
   // A scene forgets pairs at rest that nobody holds.
   setFlagsFromString("--expose-gc");
@@ -87,6 +90,7 @@ try {
     frames: [[1, 2, 3], [4, 5, 6]],
     noGpu: "device: there is no WebGPU here",
     broken: read.broken,
+    buffers: Array(2).fill("invalid: bytes: an ArrayBuffer given, a Uint8Array is needed"),
     cut: read.cut,
     options: Array(2).fill('invalid: options: "wield" given, weld allowed'),
   });
@@ -101,6 +105,11 @@ try {
     const problems = [];
     page.on("pageerror", (error) => problems.push(error));
     await page.goto(`${server.url}empty.html`);
+    const bundled = await page.evaluate(async () => {
+      const { answer, wasm } = await import("./bundles/page.js");
+      return answer(new URL(wasm, new URL("bundles/", location.href)));
+    });
+    assert.equal(bundled, 1);
     const answers = (gpu) =>
       page.evaluate(async (gpu) => {
         const { cpu, others, refusals, steps, webgpu } = await import("./answers.mjs");
@@ -132,6 +141,34 @@ try {
   }
 } finally {
   await rm(folder, { recursive: true });
+}
+
+// The package in one file, for Node in both of its forms and for a page; the module is loaded from beside it, from bytes, or from a path.
+async function testBundles(folder) {
+  const question = `
+    const scene = new Scene();
+    for (const z of [0, 0.25]) scene.addTriangles(new Uint8Array([0, 1, 2]), new Float32Array([0, 0, z, 1, 0, -z, 0, 1, z]));
+    return new Detector().count(scene);`;
+  const source = `
+    import init, { Detector, Scene } from "impinge";
+    import wasm from "impinge/cpu/impinge_bg.wasm";
+    export { wasm };
+    export const answer = async (from = wasm) => { await init(from); ${question} };`;
+  await writeFile(join(folder, "bundled.js"), source);
+  const bundle = (options) => {
+    const given = { absWorkingDir: folder, entryPoints: ["bundled.js"], bundle: true, outdir: "bundles", logLevel: "silent", ...options };
+    const { errors, warnings } = buildSync(given);
+    assert.deepEqual([errors, warnings.filter(({ id }) => id !== "empty-import-meta")], [[], []]);
+  };
+  const wasm = join(folder, "node_modules/impinge/cpu/impinge_bg.wasm");
+  for (const [format, loader] of [["esm", "binary"], ["cjs", "file"]]) {
+    const name = `${format}-${loader}`;
+    bundle({ platform: "node", target: "node18", format, loader: { ".wasm": loader }, outExtension: { ".js": format === "esm" ? ".mjs" : ".cjs" }, entryNames: name });
+    const { answer } = await import(join(folder, `bundles/${name}.${format === "esm" ? "mjs" : "cjs"}`));
+    assert.equal(await answer(...(loader === "binary" ? [] : [wasm])), 1, name);
+  }
+  bundle({ platform: "browser", format: "esm", loader: { ".wasm": "file" }, entryNames: "page", minify: true });
+  console.log("bundles: answered");
 }
 
 // Three methods answer each scene.

@@ -586,7 +586,21 @@ async function fits(page, ...ids) {
 
 async function phone(browser) {
   const { page, problems } = await open(browser, PHONE);
+  assert.match(await page.locator("#hint").innerText(), /^Drag a body .* tap a triangle/);
+  assert.ok(await page.locator("#hint").isVisible());
   await page.locator("#play").tap();
+  for (const time of [0, 0.5]) {
+    await pauseAt(page, time);
+    const widest = await page.evaluate(() => {
+      const { view, bodies } = window.page;
+      const points = bodies.flatMap((_, ix) => {
+        const all = view.positions(ix);
+        return Array.from({ length: all.length / 300 }, (_, at) => view.camera.position.clone().fromArray(all, 300 * at).project(view.camera).x);
+      });
+      return Math.max(...points.map(Math.abs));
+    });
+    assert.ok(widest > 0.6 && widest < 1, `${widest} of the width at ${time}`);
+  }
   await pauseAt(page, 1);
   const before = await pairs(page);
   const room = await fits(page, "play", "time", "files", "scene", "size", "self", "share", "answer");
@@ -601,7 +615,23 @@ async function phone(browser) {
   // A finger drags the ball.
   const [x, y] = await where(page, 2);
   const touch = await page.context().newCDPSession(page);
-  const send = (type, at) => touch.send("Input.dispatchTouchEvent", { type, touchPoints: at ? [{ x: at[0], y: at[1] }] : [] });
+  const send = (type, ...points) => touch.send("Input.dispatchTouchEvent", { type, touchPoints: points.map(([x, y], id) => ({ x, y, id })) });
+  // Two fingers on it zoom, and leave it where it is.
+  const away = () => page.evaluate(() => window.page.view.camera.position.distanceTo(window.page.view.controls.target));
+  const far = await away();
+  await send("touchStart", [x, y]);
+  await send("touchMove", [x - 9, y]);
+  await send("touchStart", [x - 9, y], [x + 30, y]);
+  for (let step = 1; step <= 5; step += 1) await send("touchMove", [x - 9 - 10 * step, y], [x + 30 + 10 * step, y]);
+  await send("touchEnd");
+  await settled(page);
+  assert.ok((await away()) < 0.7 * far, `${await away()} instead of ${far} away`);
+  const offsets = await page.evaluate(() => window.page.bodies.flatMap(({ offset }) => offset));
+  assert.ok(offsets.every((offset) => Math.abs(offset) < 1e-12), String(offsets));
+  assert.ok(!(await page.locator("#hint").isVisible()));
+  await page.locator("#all").tap();
+  await settled(page);
+  assert.ok(Math.abs((await away()) - far) < 1e-6);
   await send("touchStart", [x, y]);
   for (let step = 1; step <= 5; step += 1) await send("touchMove", [x, y - 30 * step]);
   await send("touchEnd");
@@ -625,6 +655,12 @@ async function phone(browser) {
   await page.screenshot({ path: join(shots, "phone-frames.png") });
   await drop(page, "broken.obj", "box.obj", "notes.txt", "tip.stl");
   await fits(page, "files", "message");
+  // A folder, which Playwright cannot drop.
+  await page.evaluate(() => {
+    const items = [{ kind: "file", webkitGetAsEntry: () => ({ isDirectory: true, name: "scans" }) }];
+    window.dispatchEvent(Object.assign(new Event("drop"), { dataTransfer: { files: [new File([], "scans")], items } }));
+  });
+  assert.equal(await text(page, "#message"), "scans is a folder: open the files in it");
   assert.deepEqual(problems, []);
   console.log("a phone's screen: everything fits; fingers drag, choose and go to places");
   await page.context().close();

@@ -74,6 +74,13 @@ try {
 } catch (error) {
   if (error instanceof ImpingeError && error.code === "too_many_pairs") console.log(detector.any(scene));
 }
+// As three.js declares the arrays of a geometry.
+declare const geometry: { index: { array: Uint16Array | Uint32Array | Float32Array }; position: { array: Float32Array | Int8Array } };
+const drawn: Body = scene.addTriangles(geometry.index.array, geometry.position.array);
+scene.add(weld({ faces: geometry.index.array, positions: geometry.position.array }).mesh);
+detector.closest(scene, geometry.position.array, { of: drawn });
+await init("module.wasm");
+await init(new Uint8Array());
 // @ts-expect-error: positions are not plain arrays
 scene.setPositions(a, [0, 0, 0]);
 // @ts-expect-error: numbers are no pairs at rest

@@ -89,7 +89,7 @@ pub enum Error {
     },
     /// The format is chosen by the file's extension, and this extension is not known. Check the
     /// name.
-    #[error("{}: no mesh format has the extension '{extension}' (known: {known})", crate::printable(.path))]
+    #[error("{}: {} (known: {known})", crate::printable(.path), no_format(.extension))]
     UnknownFormat {
         /// The file.
         path: PathBuf,
@@ -320,6 +320,14 @@ impl Name<'_> {
             limit,
             found,
         }
+    }
+}
+
+/// Why an extension tells no mesh format.
+fn no_format(extension: &str) -> String {
+    match extension {
+        "" => "its name has no extension, which tells the format".to_owned(),
+        _ => format!("no mesh format has the extension '{extension}'"),
     }
 }
 

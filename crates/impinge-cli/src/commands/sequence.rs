@@ -41,7 +41,7 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
     let loading = loading.asked(weld, asked.within, args.ask.read.format);
     let mut bodies = Bodies::default();
     let (moving, weld) = bodies.add(&args.mesh, loading)?;
-    let frames = Frames::open(&args.sequence, weld)?;
+    let mut frames = Frames::open(&args.sequence, weld, args.ask.json)?;
     for other in &args.others {
         bodies.add(other, loading)?;
     }
@@ -93,7 +93,7 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
         let steps = steps_of_sequence(
             (&mut detector, &mut scene, moving),
             &args.step.of(query),
-            &frames,
+            &mut frames,
             range,
             shown,
             || watch.frame_done(),
@@ -108,6 +108,7 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
             let line = asked.line(&vertices, &nouns) + "\n";
             output::say(line.as_bytes(), file.as_ref())?;
         }
+        frames.end()?;
         return steps.end(args.ask.fail_on_hit);
     }
     let mut outputs = Outputs::new(args, inputs, file.as_ref())?;
@@ -118,9 +119,14 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
     let mut n_pairs = 0;
     for frame_ix in range {
         go_on(cancel)?;
-        let positions = frames.read(frame_ix)?;
-        set_positions(&mut scene, moving, &positions)
-            .map_err(|source| frames.refused(frame_ix, source))?;
+        let set = frames.read(frame_ix).and_then(|positions| {
+            let set = set_positions(&mut scene, moving, &positions);
+            set.map_err(|source| frames.refused(frame_ix, source))
+        });
+        if let Err(error) = set {
+            frames.pass_over(frame_ix, error)?;
+            continue;
+        }
         let pairs = &detector.detect(&scene, &query)?;
         n_pairs += pairs.len();
         outputs.frame(frame_ix, &scene, &bodies, pairs)?;
@@ -150,6 +156,7 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
         let line = asked.line(&vertices, &nouns) + "\n";
         output::say(line.as_bytes(), file.as_ref())?;
     }
+    frames.end()?;
     hit(args.ask.fail_on_hit, n_pairs > 0)
 }
 
@@ -216,10 +223,13 @@ pub(super) struct Frames {
     sequence: Sequence,
     weld: Option<Weld>,
     name: String,
+    /// Whether frames that are passed over get a line of JSON.
+    json: bool,
+    n_passed_over: u64,
 }
 
 impl Frames {
-    pub(super) fn open(path: &Path, weld: Option<Weld>) -> Result<Self, Error> {
+    pub(super) fn open(path: &Path, weld: Option<Weld>, json: bool) -> Result<Self, Error> {
         let sequence = Sequence::open(path)?;
         for [before, after] in sequence.gaps() {
             // A note that nobody can read does no harm.
@@ -234,7 +244,27 @@ impl Frames {
             sequence,
             weld,
             name: path.display().to_string(),
+            json,
+            n_passed_over: 0,
         })
+    }
+
+    /// Whether each frame has a file of its own.
+    fn has_files(&self) -> bool {
+        self.sequence.files().len() == self.n_frames() && self.n_frames() > 1
+    }
+
+    /// # Errors
+    /// Frames were passed over.
+    fn end(&self) -> Result<(), Error> {
+        match self.n_passed_over {
+            0 => Ok(()),
+            n => Err(Error::Unread(format!(
+                "{} of {} not asked about; all others were",
+                counted(n, "frame"),
+                printable(&self.name)
+            ))),
+        }
     }
 }
 
@@ -287,11 +317,38 @@ impl step::Frames for Frames {
         }
     }
 
+    fn pass_over(&mut self, frame_ix: usize, error: Error) -> Result<(), Error> {
+        // Welded vertices that come apart ask for another option, and one file has frames of one size.
+        let is_of_all = match &error {
+            Error::Usage(_) => true,
+            Error::File(impinge_io::Error::Mismatch { .. }) => !self.has_files(),
+            _ => false,
+        };
+        if is_of_all {
+            return Err(error);
+        }
+        self.n_passed_over += 1;
+        if self.json {
+            let mut line = Map::new();
+            self.name_in(&mut line, frame_ix);
+            line.insert("error".into(), error.line().into());
+            writeln!(out(), "{}", Value::Object(line))?;
+        } else {
+            // A line that nobody can read does no harm.
+            let _ = writeln!(
+                stderr(),
+                "frame {frame_ix} is passed over: {}",
+                error.line()
+            );
+        }
+        Ok(())
+    }
+
     fn name_in(&self, line: &mut Map<String, Value>, frame_ix: usize) {
         line.insert("frame".into(), frame_ix.into());
-        let files = self.sequence.files();
-        if files.len() == self.n_frames() && files.len() > 1 {
-            line.insert("file".into(), files[frame_ix].display().to_string().into());
+        if self.has_files() {
+            let file = self.sequence.files()[frame_ix].display().to_string();
+            line.insert("file".into(), file.into());
         }
     }
 }

@@ -199,6 +199,10 @@ fn every_command_that_prints_json_has_a_schema() {
         .append(&a.translated([0.1, 0.0, 0.0]).positions)
         .unwrap();
     cache.finish().unwrap();
+    let exploded = folder.path("exploded.pc2");
+    let mut cache = Pc2Writer::create(&exploded, a.n_vertices(), 0.0, 1.0).unwrap();
+    cache.append(&vec![[f32::NAN; 3]; a.n_vertices()]).unwrap();
+    cache.finish().unwrap();
     let cases: &[(&str, &str)] = &[
         ("answer", "pairs a.ply b.ply"),
         ("answer", "pairs a.ply far.ply"),
@@ -215,6 +219,7 @@ fn every_command_that_prints_json_has_a_schema() {
             "sequence a.ply run.pc2 --other b.ply --ccd",
         ),
         ("sequence-step", "sequence a.ply run.pc2 --ccd"),
+        ("sequence-error", "sequence a.ply exploded.pc2"),
         ("count", "pairs a.ply b.ply --count"),
         ("count", "pairs a.ply b.ply --any"),
         ("count", "self a.ply broken.obj --count"),

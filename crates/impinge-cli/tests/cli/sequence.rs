@@ -7,6 +7,7 @@ use impinge_scenes::surfaces::{ball, torus};
 use serde_json::{Value, json};
 
 use crate::harness::{Folder, keys, oracle};
+use crate::schema::{schema, wrong};
 
 /// A ball that falls through a ring, and folds in two on its way.
 fn falling(n_frames: usize) -> (Model, Vec<Model>) {
@@ -323,6 +324,72 @@ fn a_cache_without_frames_is_no_check() {
     cache.finish().unwrap();
     let run = folder.run(["sequence", "a.ply", "none.pc2", "--fail-on-hit"]);
     assert!(run.misuse().contains("none.pc2: there are no frames"));
+}
+
+/// A simulation that has exploded in one frame, or a file that was cut: the others are asked about.
+#[test]
+fn frames_that_cannot_be_read_are_passed_over() {
+    let folder = Folder::new();
+    let frames = write(&folder, 6);
+    folder.text("run_002.ply", "ply\nformat ascii 1.0\nelement vert");
+    let mut exploded =
+        Pc2Writer::create(&folder.path("run.pc2"), frames[0].n_vertices(), 0.0, 1.0).unwrap();
+    for (ix, frame) in frames.iter().enumerate() {
+        let mut positions = frame.positions.clone();
+        if ix == 2 {
+            positions[7] = [f32::NAN, 0.0, 0.0];
+        }
+        exploded.append(&positions).unwrap();
+    }
+    exploded.finish().unwrap();
+    for sequence in ["run.pc2", "run_%03d.ply"] {
+        let ask = |more: &[&str]| {
+            let args = ["sequence", "ball.ply", sequence, "--rows", "rows.csv"];
+            folder.run(args.iter().chain(more))
+        };
+        let run = ask(&[]);
+        assert_eq!(run.code, Some(1));
+        assert!(
+            run.stderr.contains("frame 2 is passed over: run"),
+            "{}",
+            run.stderr
+        );
+        let last = format!("1 frame of {sequence} not asked about; all others were");
+        assert!(run.stderr.contains(&last), "{}", run.stderr);
+        assert!(run.stdout.contains("\n5 frames, "), "{}", run.stdout);
+        let rows = std::fs::read_to_string(folder.path("rows.csv")).unwrap();
+        let run = ask(&["--json"]);
+        assert_eq!(run.code, Some(1));
+        let lines = run
+            .stdout
+            .lines()
+            .map(|line| serde_json::from_str(line).unwrap());
+        let lines: Vec<Value> = lines.collect();
+        assert_eq!(lines.len(), 6);
+        let (mut n, mut of_frames) = (0, rows.lines().skip(1));
+        for (ix, line) in lines.iter().enumerate() {
+            assert_eq!(line["frame"], json!(ix));
+            let form = ["answer", "sequence-error"][usize::from(ix == 2)];
+            assert_eq!(wrong(&schema(form), line, form), [""; 0]);
+            let n_pairs = line["pairs"].as_u64().unwrap_or(0);
+            n += n_pairs;
+            let own = of_frames.by_ref().take(n_pairs as usize);
+            assert!(
+                own.into_iter()
+                    .all(|row| row.starts_with(&format!("{ix},")))
+            );
+        }
+        assert!(n > 0 && of_frames.next().is_none());
+        // Of a step, both of its frames are needed.
+        let run = ask(&["--ccd", "--start", "report"]);
+        assert_eq!(run.code, Some(1));
+        assert!(run.stdout.contains("\n3 steps, "), "{}", run.stdout);
+        let lines = run.stdout.lines().filter(|line| line.contains(" to "));
+        let steps: Vec<&str> = lines.filter_map(|line| line.trim().get(..6)).collect();
+        assert_eq!(steps, ["0 to 1", "3 to 4", "4 to 5"]);
+        let run = ask(&["--ccd", "--json"]);
+        assert_eq!((run.code, run.stdout.lines().count()), (Some(1), 4));
+    }
 }
 
 #[test]

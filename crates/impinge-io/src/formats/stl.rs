@@ -31,6 +31,16 @@ pub(crate) fn read<'a>(bytes: &[u8], name: Name<'a>) -> Result<Collector<'a>, Er
     {
         return read_ascii(bytes, name);
     }
+    // Numbers of triangles have zeros; other text is no binary file that was cut.
+    if !bytes.contains(&0) {
+        let found = if bytes.is_empty() {
+            "an empty file"
+        } else {
+            "other text"
+        };
+        let expected = "an STL file: text that begins with 'solid', or a binary file";
+        return Err(name.syntax(Place::File, expected, found));
+    }
     read_binary(bytes, name)
 }
 

@@ -108,6 +108,13 @@ fn unknown_extension_and_missing_file() {
         message.starts_with("a.xyz: no mesh format has the extension 'xyz' (known: obj, ply"),
         "{message}"
     );
+    let message = read("scan".as_ref(), &ReadOptions::as_they_are())
+        .unwrap_err()
+        .to_string();
+    assert!(
+        message.starts_with("scan: its name has no extension, which tells the format (known: obj"),
+        "{message}"
+    );
     let message = read("no/such/file.ply".as_ref(), &ReadOptions::as_they_are())
         .unwrap_err()
         .to_string();

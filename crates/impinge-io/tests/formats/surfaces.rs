@@ -409,9 +409,16 @@ fn stl_of_several_solids() {
         message(Format::Stl, &format!("solid\n{facet}\n")),
         "file:3: expected 'endsolid', found the end of the file"
     );
+    for (text, found) in [("garbage", "other text"), ("", "an empty file")] {
+        let expected = "an STL file: text that begins with 'solid', or a binary file";
+        assert_eq!(
+            message(Format::Stl, text),
+            format!("file: expected {expected}, found {found}")
+        );
+    }
     assert_eq!(
-        message(Format::Stl, "garbage"),
-        "file: byte 0: the title: 80 bytes are needed, but 7 are left"
+        message(Format::Stl, "cut\0"),
+        "file: byte 0: the title: 80 bytes are needed, but 4 are left"
     );
 }
 

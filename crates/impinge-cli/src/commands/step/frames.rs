@@ -48,6 +48,11 @@ pub trait Frames {
     fn read(&self, frame_ix: usize) -> Result<Positions, Error>;
     /// The error for a frame that the library refuses.
     fn refused(&self, frame_ix: usize, source: impinge::Error) -> Error;
+    /// Takes note of a frame that was not read or is refused.
+    ///
+    /// # Errors
+    /// The same error, if it is about all frames.
+    fn pass_over(&mut self, frame_ix: usize, error: Error) -> Result<(), Error>;
     /// Says in a line of JSON which frame it is about, and in which file that is, if each has one.
     fn name_in(&self, line: &mut Map<String, Value>, frame_ix: usize);
 }
@@ -57,7 +62,7 @@ pub trait Frames {
 pub fn steps_of_sequence(
     (detector, scene, moving): (&mut Detector, &mut Scene, BodyId),
     step: &Query,
-    frames: &impl Frames,
+    frames: &mut impl Frames,
     range: Range<usize>,
     mut shown: Shown,
     frame_done: impl Fn(),
@@ -73,15 +78,29 @@ pub fn steps_of_sequence(
         )?;
     }
     let mut steps = Steps::default();
-    let mut start = match range.is_empty() {
-        true => return Ok(steps),
-        false => frames.read(range.start)?,
-    };
-    for frame_ix in range.start..range.end - 1 {
-        let end = frames.read(frame_ix + 1)?;
-        set_positions(scene, moving, &start).map_err(|source| frames.refused(frame_ix, source))?;
-        set_end_positions(scene, moving, &end)
-            .map_err(|source| frames.refused(frame_ix + 1, source))?;
+    let mut before = false;
+    for end_ix in range {
+        let is_first = !std::mem::replace(&mut before, false);
+        let end = frames.read(end_ix).and_then(|end| {
+            let set = match is_first {
+                true => set_positions(scene, moving, &end),
+                false => set_end_positions(scene, moving, &end),
+            };
+            set.map_err(|source| frames.refused(end_ix, source))?;
+            Ok(end)
+        });
+        let end = match end {
+            Ok(end) => end,
+            Err(error) => {
+                frames.pass_over(end_ix, error)?;
+                continue;
+            }
+        };
+        before = true;
+        if is_first {
+            continue;
+        }
+        let frame_ix = end_ix - 1;
         let impacts = detector.impacts(scene, step)?;
         let found = Found::all(&impacts, Times::default());
         steps.n += 1;
@@ -120,7 +139,7 @@ pub fn steps_of_sequence(
         }
         out().flush()?;
         frame_done();
-        start = end;
+        set_positions(scene, moving, &end)?;
     }
     if let Some(rows) = shown.rows {
         rows.finish()?;
