@@ -122,7 +122,8 @@ impl Gpu<'_> {
         ends: &[(BodyId, &wgpu::Buffer)],
         encoder: &mut wgpu::CommandEncoder,
     ) -> Result<ResidentStep, Error> {
-        refuse_unknown(scene, query)?;
+        refuse_unknown(query)?;
+        refuse_thickness(scene, 0.0, "0 for a step that stays on a device")?;
         self.with_contacts(scene, query, starts, |engine, job, clusterings| {
             engine.encode_step(job, clusterings, [starts, ends], encoder)
         })
@@ -143,15 +144,18 @@ impl Gpu<'_> {
     /// size, whose size is below 2^-32, or that have a coordinate beyond 2^40.
     ///
     /// `positions` names bodies whose positions are taken from a buffer, as in `encode_step`; all
-    /// other positions come from the scene. Positions at the end of a step are ignored.
+    /// other positions come from the scene. Positions at the end of a step are ignored. How
+    /// [thick](Scene::set_thickness) both elements are is taken from their distance: an edge or a
+    /// face is as thick as its thickest vertex, and if edges or faces have a thickness of their
+    /// own, a vertex is as thick as the thickest of its own.
     ///
     /// At most one step, or one question about safe distances, may be encoded per submission,
     /// besides one frame of [`encode`](Gpu::encode). If there is not enough room, all numbers are
     /// 0, which is safe; [`grow`](Gpu::grow) then makes more.
     ///
     /// # Errors
-    /// As `encode_step`, with a `most` that is negative or above 2^100, and for fixed bodies that
-    /// are not in the scene.
+    /// As `encode_step`, with a `most` that is negative or above 2^100, for fixed bodies that are
+    /// not in the scene, and for a thickness above 2^100.
     pub fn encode_safe_distances(
         &mut self,
         scene: &Scene,
@@ -167,7 +171,12 @@ impl Gpu<'_> {
                 allowed: "from 0 to 2^100 where it stays on a device",
             });
         }
-        refuse_unknown(scene, query)?;
+        refuse_unknown(query)?;
+        refuse_thickness(
+            scene,
+            2f64.powi(100),
+            "from 0 to 2^100 where it stays on a device",
+        )?;
         for &body in &query.fixed {
             scene.body(body)?;
         }
@@ -285,16 +294,21 @@ fn on_device(gpu: &mut Option<Engine>) -> Result<&mut Engine, Error> {
     })
 }
 
-/// Refuses what kernels of steps do not know.
-fn refuse_unknown(scene: &Scene, query: &Query) -> Result<(), Error> {
-    query.check_step()?;
-    if let Some((id, body)) = scene.bodies().find(|(_, body)| body.thickness() > 0.0) {
-        return Err(Error::Setting {
+/// Refuses bodies that are thicker than so much.
+fn refuse_thickness(scene: &Scene, most: f64, allowed: &'static str) -> Result<(), Error> {
+    match scene.bodies().find(|(_, body)| body.thickness() > most) {
+        None => Ok(()),
+        Some((id, body)) => Err(Error::Setting {
             setting: "thickness",
             given: format!("{} of body {id}", body.thickness()),
-            allowed: "0 for a question that stays on a device",
-        });
+            allowed,
+        }),
     }
+}
+
+/// Refuses what kernels of steps do not know.
+fn refuse_unknown(query: &Query) -> Result<(), Error> {
+    query.check_step()?;
     if query.separation > 0.0 {
         return Err(Error::Setting {
             setting: "separation",

@@ -324,6 +324,7 @@ impl Recorder<'_> {
             corners: world.corners.read(),
             positions: world.positions.read(),
             limits: pass_buffers.limits.read(),
+            thickness: pass_buffers.thickness.read(),
             shares: pass_buffers.shares.write_to(),
             counters: pass_buffers.counters.write_to(),
         };

@@ -123,6 +123,7 @@ bindings! {
         corners: Read<Corners>,
         positions: Read<Coordinate>,
         limits: Read<Share>,
+        thickness: Read<Share>,
         shares: Write<Share>,
         counters: Write<Counter>,
     }

@@ -158,8 +158,10 @@ pub struct PassBuffers {
     pub times: Storage<PairTimes>,
     /// Safe distances: the most that each vertex may move, 0 if it is fixed.
     pub limits: Storage<Share>,
-    /// Of which bodies these are: each with its number of vertices and the bits of the most.
-    pub limits_of: Vec<(BodyId, u32, u32)>,
+    /// Safe distances: how thick each vertex is; one 0 if none is.
+    pub thickness: Storage<Share>,
+    /// Of which bodies these are: see [`LimitsOf`].
+    pub limits_of: Vec<LimitsOf>,
     /// Safe distances: how far each vertex may move.
     pub shares: Storage<Share>,
     /// What stages counted, at the indices of `layout`.
@@ -208,6 +210,21 @@ impl CellsWanted {
     }
 }
 
+/// What the limits of a body's vertices, and their thickness, belong to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct LimitsOf {
+    /// The body.
+    pub body: BodyId,
+    /// How many vertices it has.
+    pub len: u32,
+    /// The bits of the most that they may move.
+    pub most: u32,
+    /// The bits of how thick the body is.
+    pub thickness: u64,
+    /// The stamp of the thickness of its elements, where they have their own.
+    pub each: Option<u64>,
+}
+
 impl PassBuffers {
     pub(crate) fn new() -> Self {
         let indirect = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::INDIRECT;
@@ -219,6 +236,7 @@ impl PassBuffers {
             unsure: Storage::plain("unsure"),
             times: Storage::plain("times of pairs"),
             limits: Storage::plain("limits"),
+            thickness: Storage::plain("thickness"),
             limits_of: Vec::new(),
             shares: Storage::plain("safe distances"),
             counters: Storage::plain("counters"),
@@ -315,6 +333,7 @@ impl PassBuffers {
         self.sizes
             .map_or(0, |(wanted, cells)| wanted.bytes() + cells.bytes())
             + self.limits.bytes()
+            + self.thickness.bytes()
             + self.shares.bytes()
     }
 }

@@ -2,6 +2,7 @@
 //! ours.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::iter::repeat_n;
 use std::sync::Arc;
 
 use super::buffers::{Read, Slice, Uniform, Write, count, read};
@@ -9,7 +10,7 @@ use super::clusters::GROUP;
 use super::engine::Engine;
 use super::kernels::Truncate;
 use super::layout::{Counter, N_PAIRS, N_UNSURE, Params, Share, TOUCHES_BY};
-use super::pass_buffers::{Capacities, NextPass, PassCounts};
+use super::pass_buffers::{Capacities, LimitsOf, NextPass, PassCounts};
 use super::recording::{Recording, Workgroups};
 use super::view::Motion;
 use super::world::ResidentEnds;
@@ -262,26 +263,36 @@ impl Engine {
         let resident = ResidentEnds([positions.clone(), positions]);
         self.update(job, clusterings, &resident, &mut Stats::default())?;
         let (mut limits, mut bodies) = (Vec::new(), Vec::new());
-        let mut n = 0;
+        let (mut n, mut thickest) = (0, 0.0f64);
         for (body, n_vertices) in self.world.bodies() {
             let own = if fixed.contains(&body) { 0.0 } else { most };
             // Vertices fit 32 bits, or the bodies would not be held.
             let (first, len) = (n, n_vertices as u32);
             bodies.push(ResidentVertices { body, first, len });
-            limits.push((body, len, round_down(own).to_bits()));
+            let held = job.scene.body(body)?;
+            thickest = thickest.max(held.thickness());
+            limits.push(LimitsOf {
+                body,
+                len,
+                most: round_down(own).to_bits(),
+                thickness: held.thickness().to_bits(),
+                each: held.thickness_of_each().map(|each| each.stamp()),
+            });
             n += len;
         }
         let pass_buffers = &mut self.lane.pass_buffers;
         if pass_buffers.limits_of != limits {
             pass_buffers.limits_of.clear();
-            let of_body = |&(_, len, bits): &(_, u32, _)| (0..len).map(move |_| Share { bits });
+            let of_body = |of: &LimitsOf| repeat_n(Share { bits: of.most }, of.len as usize);
             let of_vertices: Vec<Share> = limits.iter().flat_map(of_body).collect();
             pass_buffers.limits.upload(&self.gpu, &of_vertices)?;
+            let thickness = thickness(job.scene, &limits)?;
+            pass_buffers.thickness.upload(&self.gpu, &thickness)?;
             pass_buffers.limits_of = limits;
         }
         pass_buffers.shares.resize(&self.gpu, u64::from(n))?;
         // A little more than asked for, and more than what is flushed.
-        let reach = round_up(most * (1.0 + 2f64.powi(-20)) + 2f64.powi(-100));
+        let reach = round_up((most + thickest) * (1.0 + 2f64.powi(-20)) + 2f64.powi(-100));
         self.safe = Some(reach.to_bits());
         // Boxes that were widened by another length do not fit, nor do these fit a step.
         self.world.is_moved();
@@ -432,6 +443,25 @@ impl Engine {
             NextPass::Split => Err(self.too_small("the plan at once", counts.needed)),
         }
     }
+}
+
+/// How thick each vertex is, rounded up: as the thickest of its elements. One 0 if none is thick.
+fn thickness(scene: &Scene, limits: &[LimitsOf]) -> Result<Vec<Share>, Error> {
+    if limits.iter().all(|of| f64::from_bits(of.thickness) == 0.0) {
+        return Ok(vec![Share { bits: 0 }]);
+    }
+    let share = |of_vertex: f64| Share {
+        bits: round_up(of_vertex).to_bits(),
+    };
+    let mut all = Vec::new();
+    for of in limits {
+        let body = scene.body(of.body)?;
+        match body.thickness_of_each() {
+            Some(each) => all.extend(each.of(Part::Vertices).iter().map(|&own| share(own))),
+            None => all.extend(repeat_n(share(body.thickness()), of.len as usize)),
+        }
+    }
+    Ok(all)
 }
 
 /// Refuses a buffer that does not hold a body's positions, or cannot be copied from.

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use crate::caller::Caller;
 use impinge_core::exact::{ElementPair, Point, are_within};
 use impinge_core::{
-    Backend, BodyId, Detector, Element, Error, PairKind, Query, Scene, Settings, wgpu,
+    Backend, BodyId, Detector, Element, Error, PairKind, Query, Scene, Settings, Thickness, wgpu,
 };
 use impinge_scenes::data::test_file;
 use impinge_scenes::{Model, Random, soup, surfaces};
@@ -70,8 +70,20 @@ fn corners(scene: &Scene, kind: PairKind, side: usize, of: Element) -> (Vec<u32>
     (corners, points)
 }
 
+/// How thick an element is: as its thickest vertex.
+fn thickness_of(scene: &Scene, body: BodyId, corners: &[u32]) -> f64 {
+    let body = scene.body(body).expect("held");
+    match body.thickness_by_element() {
+        None => body.thickness(),
+        Some((_, each)) => {
+            let own = corners.iter().map(|&corner| each[corner as usize]);
+            own.fold(0.0, f64::max)
+        }
+    }
+}
+
 /// Holds the bounds against every pair that is near: together, two elements certainly move less
-/// than they are apart, and no bound is much smaller than it must be. Returns how many pairs
+/// than they are apart, and how thick they are, and no bound is much smaller than it must be. Returns how many pairs
 /// touch, and how many vertices have a bound that is neither 0 nor `most`.
 fn check(name: &str, scene: &Scene, safe: &Safe, most: f64, fixed: &[BodyId]) -> [usize; 2] {
     let mut cpu = Detector::new(Backend::Cpu).expect("settings");
@@ -105,13 +117,15 @@ fn check(name: &str, scene: &Scene, safe: &Safe, most: f64, fixed: &[BodyId]) ->
         for (to, from) in four.iter_mut().zip(all) {
             *to = *from;
         }
+        let thick = [0, 1].map(|side| thickness_of(scene, elements[side].body, &sides[side].0));
+        let thick = thick[0] + thick[1];
         // Both are floats in single precision: their sum is exact, but for very different ones.
-        let sum = (moves[0] + moves[1]).next_up();
-        if are_within(test, &four, if moves == [0.0; 2] { 0.0 } else { sum }) {
+        let sum = (moves[0] + moves[1]).next_up() + thick;
+        if are_within(test, &four, if moves == [0.0; 2] { thick } else { sum }) {
             assert_eq!(moves, [0.0; 2], "{name}: {pair:?}");
             n_touching += 1;
         }
-        let distance = pair.distance.expect("asked for");
+        let distance = (pair.distance.expect("asked for") - thick).max(0.0);
         let are_fixed = elements.map(|of| fixed.contains(&of.body));
         for side in 0..2 {
             let share = match are_fixed {
@@ -239,6 +253,54 @@ fn together_two_elements_move_less_than_they_are_apart() {
     );
 }
 
+/// Bodies with a thickness each, or of each vertex, one after the other on one detector.
+#[test]
+fn how_thick_elements_are_is_taken_from_their_distance() {
+    let caller = Caller::new();
+    let mut detector = caller.detector(Settings::default());
+    let (mut n_touching, mut n_bounded) = (0, 0);
+    for seed in 0..24 {
+        let (scene, bodies) = small(seed, seed % 2 == 0);
+        let mut truth = scene.clone();
+        let mut random = Random::new(seed);
+        for (ix, (body, at)) in bodies.iter().enumerate() {
+            truth.set_positions(*body, at).expect("good");
+            let mut any = || 0.1 * f64::from(random.unit());
+            let thickness = match (ix as u64 + seed) % 4 {
+                0 => 0.0.into(),
+                1 => any().into(),
+                _ => Thickness::vertices(Vec::from_iter(at.iter().map(|_| any()))),
+            };
+            truth.set_thickness(*body, thickness).expect("good");
+        }
+        let query = Query::all().fixed((seed % 3 == 0).then_some(bodies[2].0));
+        let fixed = Vec::from_iter((seed % 3 == 0).then_some(bodies[2].0));
+        let most = [0.05, 0.3][seed as usize / 2 % 2];
+        let safe = safe_of(&caller, &mut detector, &truth, most, &query, &[]);
+        let own = check(&format!("thick {seed}"), &truth, &safe, most, &fixed);
+        (n_touching, n_bounded) = (n_touching + own[0], n_bounded + own[1]);
+    }
+    assert!(
+        n_touching > 200 && n_bounded > 100,
+        "{n_touching} {n_bounded}"
+    );
+    // A thickness of each face is that of its vertices, and nothing is thick afterwards.
+    let mut scene = alone(&surfaces::ball(300));
+    let (body, held) = scene.bodies().next().expect("one");
+    let faces = vec![0.02; held.part(impinge_core::Part::Faces).len()];
+    let mut ask = |scene: &Scene| safe_of(&caller, &mut detector, scene, 0.1, &Query::all(), &[]);
+    let thin = ask(&scene);
+    scene.set_thickness(body, 0.02).expect("good");
+    let thick = ask(&scene);
+    assert_ne!(thin, thick);
+    scene
+        .set_thickness(body, Thickness::faces(faces))
+        .expect("good");
+    assert_eq!(ask(&scene), thick);
+    scene.set_thickness(body, 0.0).expect("good");
+    assert_eq!(ask(&scene), thin);
+}
+
 /// A scene of one body.
 fn alone(model: &Model) -> Scene {
     let mut scene = Scene::new();
@@ -353,9 +415,9 @@ fn what_the_device_does_not_know_is_refused_by_name() {
     }
     let text = refused(&scene, 1.0, &Query::all().fixed([gone])).to_string();
     assert!(text.contains(&gone.to_string()), "{text}");
-    scene.set_thickness(body, 0.5).expect("good");
+    scene.set_thickness(body, 1e31).expect("good");
     let text = refused(&scene, 1.0, &Query::all()).to_string();
-    assert!(text.contains("thickness") && text.contains("0.5"), "{text}");
+    assert!(text.starts_with("thickness: 1000000"), "{text}");
 }
 
 /// Large triangles, and points that are very near each: where rounding is as large as distances.
@@ -410,6 +472,11 @@ fn damaged_kernels_are_noticed() {
     let caller = Caller::new();
     // With a small budget there is no room for the pairs of the last one.
     let small = Settings::new().memory_budget(Some(3 << 20));
+    let mut thick = alone(&soup::triangles(60, 0.1, 9));
+    let (body, _) = thick.bodies().next().expect("one");
+    let each = Vec::from_iter((0..180).map(|ix| [0.0, 0.02, 0.05][ix % 3]));
+    let each = Thickness::vertices(each);
+    thick.set_thickness(body, each).expect("good");
     let scenes = [
         (thin(3), 2.0, Settings::default()),
         (apart(), 1.0, Settings::default()),
@@ -419,6 +486,7 @@ fn damaged_kernels_are_noticed() {
             Settings::default(),
         ),
         (alone(&soup::triangles(100, 0.1, 7)), 3.0, small),
+        (thick, 0.1, Settings::default()),
     ];
     let holds = |detector: &dyn Fn(&Settings) -> Detector| {
         scenes.iter().all(|(scene, most, settings)| {
@@ -443,6 +511,16 @@ fn damaged_kernels_are_noticed() {
             "widened(Box(low - slack, high + slack), 0u)",
         ),
         ("narrow_safe", "low = min(low,", "low = max(-1.0,"),
+        (
+            "narrow_safe",
+            "(thickness_of(a) + thickness_of(b))",
+            "(thickness_of(a) + thickness_of(a))",
+        ),
+        (
+            "narrow_safe",
+            "thickness[corner.y]), thickness[corner.z]",
+            "0.0), thickness[corner.x]",
+        ),
         (
             "narrow_safe",
             "opposite = min(opposite,",

@@ -1,8 +1,9 @@
 // Stage `narrow` of safe distances: how far the vertices of two elements may move, so that the elements do not touch.
 //
-// In: candidates, and the most that each vertex may move: 0 if it is fixed. Out: per vertex, the bits of the least number that its
-// pairs leave it. One thread per candidate.
-// Cost: 32 bytes of corners and 48 of positions read; 20 products of a direction and a corner; up to six atomics.
+// In: candidates; the most that each vertex may move, 0 if it is fixed; how thick each is, or one number where none is thick. Out: per
+// vertex, the bits of the least number that its pairs leave it. One thread per candidate.
+// Cost: 32 bytes of corners and 48 of positions read; 20 products of a direction and a corner; up to six atomics. Of thick bodies 24
+// bytes more.
 // Invariant: a number is at most what a lower bound of the distance gives, whatever the device's rounding (`docs/exactness.md`, "Safe
 // distances on the GPU").
 //
@@ -29,8 +30,9 @@ const SHORTEST: f32 = 0x1p-100f;
 @group(0) @binding(1) var<storage, read> corners: array<vec4<u32>>;
 @group(0) @binding(2) var<storage, read> positions: array<u32>;
 @group(0) @binding(3) var<storage, read> limits: array<u32>;
-@group(0) @binding(4) var<storage, read_write> shares: array<atomic<u32>>;
-@group(0) @binding(5) var<storage, read_write> counters: array<atomic<u32>>;
+@group(0) @binding(4) var<storage, read> thickness: array<f32>;
+@group(0) @binding(5) var<storage, read_write> shares: array<atomic<u32>>;
+@group(0) @binding(6) var<storage, read_write> counters: array<atomic<u32>>;
 
 var<workgroup> directions: array<vec3<f32>, 64u * N_DIRECTIONS>;
 var<workgroup> heights: array<f32, 64u * N_DIRECTIONS>;
@@ -170,6 +172,11 @@ fn lower_all(corner: vec4<u32>, share: f32) {
     }
 }
 
+// How thick an element is: as its thickest vertex.
+fn thickness_of(corner: vec4<u32>) -> f32 {
+    return max(max(thickness[corner.x], thickness[corner.y]), thickness[corner.z]);
+}
+
 @compute @workgroup_size(64)
 fn main(
     @builtin(workgroup_id) group: vec3<u32>,
@@ -202,12 +209,16 @@ fn main(
             distance = max(distance, quotient(heights[own], directions[own]));
         }
         distance = max(0.0, distance - polygon.off) * BELOW * scale_of(polygon.scale);
-        if distance < SHORTEST {
-            distance = 0.0;
-        }
     }
     let a = corners[candidate.a & ~FLAG];
     let b = corners[candidate.b & ~FLAG];
+    if arrayLength(&thickness) > 1u {
+        let both = (thickness_of(a) + thickness_of(b)) * (1.0 + OF_PRODUCT);
+        distance = max(0.0, distance - both) * BELOW;
+    }
+    if distance < SHORTEST {
+        distance = 0.0;
+    }
     let a_moves = limits[a.x] != 0u;
     let b_moves = limits[b.x] != 0u;
     let share = select(distance, 0.5 * distance, a_moves && b_moves);
