@@ -912,7 +912,7 @@ class Detector(DetectorBase):
         ------
         ValueError, TypeError
             A body that the scene does not have or that is not made of triangles, twice the same body, a surface that is not
-            closed, contacts of another scene.
+            closed, contacts of another scene, or without these two though they intersect.
         """
         return self._penetration(scene, contacts, a, b, control)
 

@@ -3,6 +3,7 @@
 use super::Detector;
 use crate::answers::pairs::Pairs;
 use crate::contact::{Contacts, Penetration};
+use crate::query::Query;
 use crate::scene::Scene;
 use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
@@ -74,7 +75,7 @@ impl Detector {
     ///
     /// # Errors
     /// A body that is not in the scene, the same body twice, a body not made of triangles, a
-    /// surface that is not closed.
+    /// surface that is not closed, contacts without these two though they intersect.
     pub fn penetration(
         &mut self,
         scene: &Scene,
@@ -82,6 +83,7 @@ impl Detector {
         a: BodyId,
         b: BodyId,
     ) -> Result<Penetration, Error> {
+        self.refuse_others(scene, contacts, [a, b])?;
         let control = &self.control.clone();
         let limits = self.settings.limits();
         let Detector {
@@ -97,5 +99,31 @@ impl Detector {
             stats.bytes_held = topologies.bytes();
             Ok(found)
         })
+    }
+
+    /// Refuses contacts of other bodies: two bodies that intersect would seem to be apart.
+    fn refuse_others(
+        &mut self,
+        scene: &Scene,
+        contacts: &Contacts,
+        [a, b]: [BodyId; 2],
+    ) -> Result<(), Error> {
+        let [one, other] = [a, b].map(|id| id.index() as u32);
+        let is_of_two = |row: &[u32; 4]| {
+            let bodies = [row[0], row[2]];
+            bodies == [one, other] || bodies == [other, one]
+        };
+        if a == b || contacts.rows().iter().any(is_of_two) {
+            return Ok(());
+        }
+        let intersect = self.any(scene, &Query::between(a, b))?;
+        match intersect {
+            false => Ok(()),
+            true => Err(Error::Setting {
+                setting: "contacts",
+                given: format!("none of bodies {a} and {b}, which intersect,"),
+                allowed: "those of all pairs of the two",
+            }),
+        }
     }
 }

@@ -305,6 +305,25 @@ fn open_surfaces_are_refused_by_name() {
     );
 }
 
+/// Contacts of other pairs say nothing of two bodies.
+#[test]
+fn contacts_of_other_bodies_are_refused() {
+    let mut scene = Scene::new();
+    let ball = surfaces::ball(100);
+    let [a, b] = [0.0, 0.3].map(|x| ball.translated([x, 0.0, 0.0]).add_to(&mut scene).unwrap());
+    let far = ball.translated([9.0, 0.0, 0.0]).add_to(&mut scene).unwrap();
+    let mut detector = Detector::new(Backend::Cpu).unwrap();
+    let pairs = detect(&scene, &Query::self_of(a));
+    let contacts = detector.contacts(&scene, &pairs).unwrap();
+    let error = detector.penetration(&scene, &contacts, b, a).unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        "contacts: none of bodies 1 and 0, which intersect, given, those of all pairs of the two allowed"
+    );
+    let apart = detector.penetration(&scene, &contacts, a, far).unwrap();
+    assert_eq!((apart.volume(), apart.regions.len()), (Some(0.0), 0));
+}
+
 /// Each pair of many bodies is as if it were alone in the scene, but for the numbers of its
 /// contacts.
 #[test]
