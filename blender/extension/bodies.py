@@ -16,14 +16,14 @@ class Body:
 
     `vertices`, (v, 3) float32, are in the object's own space; `matrix`, (4, 4) float64, takes them to the world. `triangles`, (t, 3), name
     vertices. `polygons`, (t,), are the faces of the object's own mesh that the triangles come from, -1 where a modifier made one.
-    `n_polygons` is the number of faces of that mesh. `selected`, (t,) bool, is None where all triangles count.
+    `topology` is that of this mesh, to be compared. `selected`, (t,) bool, is None where all triangles count.
     """
 
     name: str
     vertices: np.ndarray
     triangles: np.ndarray
     polygons: np.ndarray
-    n_polygons: int
+    topology: object
     matrix: np.ndarray
     selected: np.ndarray | None = None
 

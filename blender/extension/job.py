@@ -47,7 +47,11 @@ class Job:
         """What the work has returned, or its exception raised."""
         self.wait()
         if self._error is not None:
-            raise self._error
+            error, self._error = self._error, None
+            if isinstance(error, MemoryError):
+                # Its frames hold the arrays for which there was no more room.
+                error = error.with_traceback(None)
+            raise error
         return self._result
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from contextlib import contextmanager
 
 import bmesh
@@ -9,7 +10,7 @@ import numpy as np
 
 from .bodies import Body
 
-__all__ = ["KINDS", "chosen", "read"]
+__all__ = ["KINDS", "chosen", "instancers", "named", "read", "topology"]
 
 #: Kinds of objects that have faces.
 KINDS = ("MESH", "CURVE", "SURFACE", "FONT", "META")
@@ -21,7 +22,32 @@ def chosen(context, which):
     """Names of the objects that a question is about: the active one, or all that are selected."""
     active = context.view_layer.objects.active
     objects = ([active] if active else []) if which == "ACTIVE" else context.selected_objects
-    return [object.name for object in objects if object.type in KINDS]
+    return [object.name_full for object in objects if object.type in KINDS]
+
+
+def named(scene, names):
+    """Objects by their full names, in which a linked object has its library; None for those that are no longer there."""
+    objects = {object.name_full: object for object in scene.objects}
+    return [objects.get(name) for name in names]
+
+
+def instancers(context, which):
+    """Full names of the objects that a question is about whose instances are seen, but are no faces of theirs."""
+    active = context.view_layer.objects.active
+    objects = ([active] if active else []) if which == "ACTIVE" else context.selected_objects
+    depsgraph = context.evaluated_depsgraph_get()
+    parents = {instance.parent.original for instance in depsgraph.object_instances if instance.is_instance and instance.parent}
+    return [object.name_full for object in objects if object in parents]
+
+
+def topology(object):
+    """Equal for an object whose own mesh has the faces that it had."""
+    if object.type != "MESH":
+        return None
+    mesh = object.data
+    digest = hashlib.blake2b(_corners(mesh).tobytes(), digest_size=16)
+    digest.update(_get(mesh.polygons, "loop_start", np.int32).tobytes())
+    return object.session_uid, len(mesh.polygons), digest.digest()
 
 
 def read(context, names, selected_only=False):
@@ -29,7 +55,7 @@ def read(context, names, selected_only=False):
 
     Where `selected_only`, triangles count that come from selected faces of objects in Edit Mode; if none is selected, all count.
     """
-    objects = [context.scene.objects.get(name) for name in names]
+    objects = named(context.scene, names)
     if None in objects:
         raise ValueError(f"{names[objects.index(None)]} is no longer in the scene")
     for object in objects:
@@ -75,8 +101,7 @@ def _read(context, object, is_numbered=False):
 
 
 def _body(object, vertices, triangles, polygons, evaluated):
-    n_polygons = len(object.data.polygons) if object.type == "MESH" else 0
-    return Body(object.name, vertices, triangles, polygons, n_polygons, np.array(evaluated.matrix_world, np.float64))
+    return Body(object.name_full, vertices, triangles, polygons, topology(object), np.array(evaluated.matrix_world, np.float64))
 
 
 def _get(rows, name, dtype, width=1):

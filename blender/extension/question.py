@@ -15,6 +15,8 @@ __all__ = ["MOST_PAIRS", "Answer", "Asker", "Question", "is_selected"]
 
 #: The most pairs that are held: 16 bytes each. More is an error that says so.
 MOST_PAIRS = 50_000_000
+#: The most near pairs, whose places are found here: about a second and 500 bytes for 100,000.
+MOST_NEAR = 2_000_000
 #: The most pairs whose places are found. Their contacts take about 200 bytes each.
 MOST_PLACED = 2_000_000
 
@@ -36,13 +38,16 @@ class Question:
 class Answer:
     """`faces` has, by name of the object, faces of its own mesh. `n_made`: triangles without one, because a modifier made them.
     `is_placed` is false where there were too many pairs for finding places. Of `n_places`, the first are described. `is_selected`: only
-    pairs with a selected face count.
+    pairs with a selected face count. `names` of the objects that were asked about, by which `topology` has that of their own meshes.
+    `instancers`: those whose instances were not looked at.
     """
 
     n_pairs: int = 0
     places: list = field(default_factory=list)
     faces: dict = field(default_factory=dict)
-    n_polygons: dict = field(default_factory=dict)
+    names: list = field(default_factory=list)
+    topology: dict = field(default_factory=dict)
+    instancers: list = field(default_factory=list)
     n_made: int = 0
     n_triangles: int = 0
     is_placed: bool = True
@@ -77,7 +82,7 @@ class Asker:
         Raises ValueError for positions that cannot be used, `impinge.Cancelled` and the other errors of impinge.
         """
         began = time.perf_counter()
-        answer = Answer(n_polygons={body.name: body.n_polygons for body in bodies})
+        answer = Answer(names=[body.name for body in bodies], topology={body.name: body.topology for body in bodies})
         answer.n_triangles = sum(len(body.triangles) for body in bodies)
         answer.is_selected = is_selected(bodies)
         if self.question.distance is not None:
@@ -135,7 +140,10 @@ class Asker:
         scene = self._world(None, bodies, False)
         exclude = [impinge.rings(question.rings)] if question.itself else []
         options = {"which": which, "exclude": exclude, "closest_points": True, "cancel": cancel, "progress": progress}
-        near = self._detector.near(scene, question.distance, **options)
+        try:
+            near = impinge.Detector("cpu", max_pairs=MOST_NEAR).near(scene, question.distance, **options)
+        except impinge.TooManyPairs:
+            raise ValueError(f"more than {MOST_NEAR:,} pairs are near: choose a smaller distance, or more rings") from None
         if not len(near):
             return
         found = places.Near(bodies, scene, near)

@@ -47,7 +47,7 @@ class Settings(bpy.types.PropertyGroup):
         max=16,
         default=2,
     )
-    step: IntProperty(name="Step", description="Look at each frame, each second frame, …", min=1, default=1)
+    step: IntProperty(name="Step", description="Look at each frame, each second frame, … Where something is simulated, frames between are gone through, too", min=1, default=1)
     mark: BoolProperty(
         name="Markers",
         description="Put a marker on the timeline where frames that intersect begin, and where they end",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-__all__ = ["lines_of_answer", "lines_of_place", "of_answer", "of_frames", "pairs"]
+__all__ = ["counted", "lines_of_answer", "lines_of_place", "of_answer", "of_frames", "pairs", "whom"]
 
 
 #: As the option is called.
@@ -17,6 +17,23 @@ def pairs(n):
     return counted(n, "pair")
 
 
+def whom(answer, question):
+    """Which objects were asked about: `Cube with itself`."""
+    if len(answer.names) == 1:
+        return f"{answer.names[0]} with itself"
+    return f"{counted(len(answer.names), 'object')} with each other{' and themselves' if question.itself else ''}"
+
+
+def besides(answer, question):
+    """What was not looked at."""
+    said = []
+    if answer.instancers:
+        said.append(f"instances of {', '.join(answer.instancers)} were not looked at")
+    if question.distance is not None and question.itself and question.rings:
+        said.append(f"within an object, what is at most {counted(question.rings, 'edge')} away along the surface is left out")
+    return said
+
+
 def of_answer(answer, question):
     """`83 pairs of 5,804 triangles in 3 places`, as the program says it."""
     near = "" if question.distance is None else " near"
@@ -24,7 +41,8 @@ def of_answer(answer, question):
     if not answer.n_pairs:
         return f"none of {counted(answer.n_triangles, 'triangle')}{' is near' if near else ' intersects'}{only}"
     where = f" in {counted(answer.n_places, 'place')}" if answer.is_placed else ", too many to find their places"
-    return f"{counted(answer.n_pairs, (near + ' pair').strip())} of {counted(answer.n_triangles, 'triangle')}{where}{only}"
+    elements = " of elements" if near else ""
+    return f"{counted(answer.n_pairs, (near + ' pair').strip())}{elements} of {counted(answer.n_triangles, 'triangle')}{where}{only}"
 
 
 def lines_of_answer(answer, question):
@@ -35,7 +53,8 @@ def lines_of_answer(answer, question):
     else:
         found = counted(answer.n_pairs, "near pair" if is_near else "pair")
         first = [f"{found} in {counted(answer.n_places, 'place')}"] if answer.is_placed else [found, "too many to find their places"]
-    return [*first, f"of {counted(answer.n_triangles, 'triangle')}", *([ONLY] if answer.is_selected else [])]
+    instances = ["instances not looked at"] if answer.instancers else []
+    return [*first, f"of {counted(answer.n_triangles, 'triangle')}", *([ONLY] if answer.is_selected else []), *instances]
 
 
 def lines_of_place(place, length):

@@ -336,10 +336,121 @@ def test_select(cube):
     assert bpy.context.tool_settings.mesh_select_mode[:] == (False, False, True)
     bpy.ops.object.mode_set(mode="OBJECT")
     assert selected(a) == answer.faces["a"].tolist() and selected(b) == answer.faces["b"].tolist()
-    # Another mesh than the one that was checked.
-    a.data = bpy.data.meshes.new("other")
+    # Another mesh than the one that was checked, or as many faces in another order; nothing changes then, nor does the mode.
+    for of_faces in (list(reversed(SIDES)), []):
+        other = bpy.data.meshes.new("other")
+        other.from_pydata(CUBE.tolist(), [], of_faces)
+        a.data = other
+        bpy.context.view_layer.objects.active = a
+        bpy.ops.object.mode_set(mode="EDIT")
+        with pytest.raises(RuntimeError, match="a has changed"):
+            bpy.ops.impinge.select()
+        assert bpy.context.mode == "EDIT_MESH"
+        bpy.ops.object.mode_set(mode="OBJECT")
+
+
+def test_select_knows_objects_by_more_than_their_names(cube):
+    a, b = cube("a"), cube("b", (1.5, 1.5, 1.5))
+    check("BETWEEN")
+    a.name, b.name = "c", "a"
     with pytest.raises(RuntimeError, match="a has changed"):
         bpy.ops.impinge.select()
+    b.name = "b"
+    # Of two objects one is no longer there.
+    assert bpy.ops.impinge.select() == {"FINISHED"}
+    assert {o.name for o in bpy.context.objects_in_mode} == {"b"}
+
+
+def test_hidden_faces_are_counted_apart(cube):
+    a = cube("a")
+    cube("b", (1.5, 1.5, 1.5))
+    hidden = np.zeros(6, bool)
+    hidden[[1, 2]] = True
+    a.data.polygons.foreach_set("hide", hidden)
+    check("BETWEEN")
+    assert state.found.answer.faces["a"].tolist() == [1, 3, 5]
+    assert bpy.ops.impinge.select() == {"FINISHED"}
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert selected(a) == [3, 5]
+
+
+def test_linked_objects_may_have_the_same_name(cube, tmp_path):
+    made = cube("same", (9, 0, 0))
+    path = str(tmp_path / "other.blend")
+    bpy.data.libraries.write(path, {made})
+    bpy.data.objects.remove(made)
+    with bpy.data.libraries.load(path, link=True) as (_, to):
+        to.objects = ["same"]
+    [linked] = to.objects
+    bpy.context.scene.collection.objects.link(linked)
+    cube("same")
+    linked.select_set(True)
+    answer = check("BETWEEN")
+    assert len(answer.names) == 2 and answer.n_pairs == 0 and answer.n_triangles == 24
+    cube("third", (10.5, 1.5, 1.5))
+    linked.select_set(True)
+    assert check("BETWEEN").n_pairs > 0
+
+
+def test_instances_are_not_looked_at_and_that_is_said(cube):
+    a, b, part = cube("a"), cube("b", (5, 0, 0)), cube("part")
+    collection = bpy.data.collections.new("parts")
+    collection.objects.link(part)
+    bpy.context.scene.collection.objects.unlink(part)
+    instance = bpy.data.objects.new("instance", None)
+    instance.instance_type, instance.instance_collection = "COLLECTION", collection
+    bpy.context.scene.collection.objects.link(instance)
+    for object in (a, b, instance):
+        object.select_set(True)
+    bpy.context.view_layer.update()
+    answer = check("BETWEEN")
+    assert answer.n_pairs == 0 and answer.instancers == ["instance"]
+    asked = state.found.question
+    assert text.besides(answer, asked) == ["instances of instance were not looked at"]
+    assert text.lines_of_answer(answer, asked)[-1] == "instances not looked at"
+    instance.select_set(False)
+    answer = check("BETWEEN")
+    assert answer.instancers == [] and text.besides(answer, asked) == []
+
+
+def test_whom_was_asked_about(cube):
+    cube("a")
+    cube("b", (1.5, 1.5, 1.5))
+    said = {}
+    for which in ("ACTIVE", "BETWEEN", "ALL"):
+        answer = check(which)
+        said[which] = text.whom(answer, state.found.question)
+    assert said == {
+        "ACTIVE": "b with itself", "BETWEEN": "2 objects with each other", "ALL": "2 objects with each other and themselves"
+    }
+
+
+def test_more_near_pairs_than_places_can_be_found_for(grid, monkeypatch):
+    grid("a")
+    bpy.context.scene.impinge.which = "ACTIVE"
+    bpy.context.scene.impinge.rings = 0
+    bpy.context.scene.impinge.distance = 0.5
+    monkeypatch.setattr(question, "MOST_NEAR", 100)
+    with pytest.raises(RuntimeError, match="more than 100 pairs are near: choose a smaller distance, or more rings"):
+        bpy.ops.impinge.clearance()
+
+
+def test_steps_of_a_scan_go_through_what_is_simulated(cube, grid, scene):
+    cube("a", half=0.3).location = (0.5, 0.5, -0.4)
+    cloth = grid("cloth", 6)
+    cloth.modifiers.new("cloth", "CLOTH")
+    bpy.context.view_layer.update()
+    scene.frame_end = 21
+    found = []
+    for step in (5, 1):
+        scene.impinge.which, scene.impinge.step = "BETWEEN", step
+        assert bpy.ops.impinge.scan() == {"FINISHED"}
+        found.append(scene.impinge.first_frame)
+    first, fine = found
+    assert fine and first and fine <= first < fine + 5, found
+    assert list(scan.visited(scene, range(11, 22, 5))) == list(range(1, 22))
+    cloth.modifiers.clear()
+    assert list(scan.visited(scene, range(11, 22, 5))) == [11, 16, 21]
 
 
 def test_select_of_objects_that_share_a_mesh(cube):

@@ -45,9 +45,12 @@ class Asking(Waiting):
         asked = question(settings, self.distance(settings))
         frame = context.scene.frame_current
         bodies = meshes.read(context, names, settings.selected_only)
+        instancers = meshes.instancers(context, settings.which)
         answer = yield Job(lambda cancel, progress: Asker(asked).find(bodies, cancel, progress))
+        answer.instancers = instancers
         state.show(answer, asked, frame)
-        self.report({"INFO"}, text.of_answer(answer, asked))
+        said = "; ".join([f"{text.whom(answer, asked)}: {text.of_answer(answer, asked)}", *text.besides(answer, asked)])
+        self.report({"WARNING"} if instancers else {"INFO"}, said)
 
 
 class IMPINGE_OT_check(Asking, bpy.types.Operator):

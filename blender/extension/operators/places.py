@@ -7,7 +7,7 @@ import numpy as np
 from bpy.props import BoolProperty, IntProperty
 from mathutils import Vector
 
-from .. import state
+from .. import meshes, state, text
 
 __all__ = ["CLASSES"]
 
@@ -81,21 +81,28 @@ class IMPINGE_OT_select(bpy.types.Operator):
                 self.report({"ERROR"}, "Select: go to a place first")
                 return {"CANCELLED"}
             faces = found.answer.places[found.place].faces
-        if context.mode != "OBJECT":
-            bpy.ops.object.mode_set(mode="OBJECT")
-        objects = {}
-        for name, polygons in faces.items():
-            object = context.scene.objects.get(name)
-            if object is None or object.type != "MESH" or not len(polygons):
+        objects, gone = {}, []
+        for object, (name, polygons) in zip(meshes.named(context.scene, faces), faces.items()):
+            if not len(polygons):
                 continue
-            if len(object.data.polygons) != found.answer.n_polygons[name]:
+            if object is None:
+                gone.append(name)
+                continue
+            if object.mode == "EDIT":
+                object.update_from_editmode()
+            if meshes.topology(object) != found.answer.topology[name]:
                 self.report({"ERROR"}, f"Select: {name} has changed since the check")
                 return {"CANCELLED"}
             if object.visible_get() and object.data.is_editable:
                 objects[object] = polygons
+        if not objects and gone:
+            self.report({"WARNING"}, f"Select: {', '.join(gone)} {'is' if len(gone) == 1 else 'are'} no longer in the scene")
+            return {"CANCELLED"}
         if not objects:
             self.report({"WARNING"}, "Select: no face that was found belongs to a visible mesh of this file")
             return {"CANCELLED"}
+        if context.mode != "OBJECT":
+            bpy.ops.object.mode_set(mode="OBJECT")
         for object in context.selected_objects:
             object.select_set(False)
         of_meshes = {}
@@ -103,28 +110,40 @@ class IMPINGE_OT_select(bpy.types.Operator):
             # Objects can share a mesh.
             of_meshes[object.data] = np.union1d(of_meshes.get(object.data, polygons[:0]), polygons)
             object.select_set(True)
-        for mesh, polygons in of_meshes.items():
-            set_selection(mesh, polygons)
+        n_hidden = sum(set_selection(mesh, polygons) for mesh, polygons in of_meshes.items())
         if context.view_layer.objects.active not in objects:
             context.view_layer.objects.active = next(iter(objects))
         context.tool_settings.mesh_select_mode = (False, False, True)
         bpy.ops.object.mode_set(mode="EDIT")
-        n_faces = sum(len(polygons) for polygons in of_meshes.values())
-        unknown = f", {found.answer.n_made} triangles belong to no face of a mesh" if found.answer.n_made and not self.place_only else ""
-        self.report({"INFO"}, f"{n_faces} faces selected{unknown}")
+        n_faces = sum(len(polygons) for polygons in of_meshes.values()) - n_hidden
+        said = [f"{text.counted(n_faces, 'face')} selected"]
+        if n_hidden:
+            said.append(f"{n_hidden:,} more {'is' if n_hidden == 1 else 'are'} hidden")
+        if found.answer.n_made and not self.place_only:
+            made = text.counted(found.answer.n_made, "triangle")
+            said.append(f"{made} {'belongs' if found.answer.n_made == 1 else 'belong'} to no face of a mesh")
+        if gone:
+            said.append(f"{', '.join(gone)} {'is' if len(gone) == 1 else 'are'} no longer in the scene")
+        self.report({"WARNING"} if gone or n_hidden else {"INFO"}, ", ".join(said))
         return {"FINISHED"}
 
 
 def set_selection(mesh, polygons):
-    """Selects these faces, and nothing else, in Object Mode. Entering Edit Mode selects their edges and vertices."""
-    selected = np.zeros(len(mesh.polygons), bool)
+    """Selects these faces, and nothing else, in Object Mode. Entering Edit Mode selects their edges and vertices. Returns how many are
+    hidden, which cannot be selected.
+    """
+    selected, hidden = np.zeros((2, len(mesh.polygons)), bool)
+    mesh.polygons.foreach_get("hide", hidden)
     selected[polygons] = True
+    n_hidden = int((selected & hidden).sum())
+    selected &= ~hidden
     mesh.polygons.foreach_set("select", selected)
     for name in (".select_vert", ".select_edge"):
         # Where there is no such attribute nothing is selected. `mesh.edges.foreach_set("select", ...)` crashes Blender 5.0.
         if name in mesh.attributes:
             mesh.attributes.remove(mesh.attributes[name])
     mesh.update_tag()
+    return n_hidden
 
 
 CLASSES = (IMPINGE_OT_step, IMPINGE_OT_select)

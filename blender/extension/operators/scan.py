@@ -33,8 +33,10 @@ class IMPINGE_OT_scan(Waiting, bpy.types.Operator):
         scene_name, before = context.scene.name, context.scene.frame_current
         seen = Frames(*span(context.scene), settings.step)
         try:
-            for frame in seen.wanted:
+            for frame in visited(context.scene, seen.wanted):
                 bpy.data.scenes[scene_name].frame_set(frame)
+                if frame not in seen.wanted:
+                    continue
                 bodies = meshes.read(context, names, selected_only)
                 seen.is_selected |= is_selected(bodies)
                 seen.add(frame, (yield Job(lambda cancel, progress, bodies=bodies: asker.count(bodies, cancel, progress))))
@@ -46,6 +48,30 @@ class IMPINGE_OT_scan(Waiting, bpy.types.Operator):
                 # A scan that was stopped shows how far it has come.
                 show(scene, seen)
         self.report({"INFO"}, text.of_frames(seen))
+
+
+#: Modifiers whose state in a frame follows from the frames before.
+SIMULATIONS = {"CLOTH", "SOFT_BODY", "PARTICLE_SYSTEM", "DYNAMIC_PAINT", "FLUID"}
+
+
+def visited(scene, wanted):
+    """The frames to be gone through: all of them, from the first of the scene on, where something is simulated."""
+    if not simulates(scene) or not len(wanted):
+        return wanted
+    return range(min(scene.frame_start, wanted[0]), wanted[-1] + 1)
+
+
+def simulates(scene):
+    if scene.rigidbody_world is not None:
+        return True
+    for object in scene.objects:
+        for modifier in object.modifiers:
+            if modifier.type in SIMULATIONS:
+                return True
+            group = modifier.node_group if modifier.type == "NODES" else None
+            if group is not None and any(node.bl_idname == "GeometryNodeSimulationOutput" for node in group.nodes):
+                return True
+    return False
 
 
 def span(scene):
