@@ -241,7 +241,7 @@ export function makeScene({ SceneHandle }, mustBeReady) {
     }
 
     setPinned(which, pinned) {
-      const flags = list("pinned", pinned).map((of) => (of === true || of === 1 ? 1 : of === false || of === 0 ? 0 : refuse(`pinned: ${String(of)} given, true or false is needed`)));
+      const flags = list("pinned", pinned).map((of) => (/^(boolean|number)$/.test(typeof of) ? Number(Boolean(of)) : refuse(`pinned: ${String(of)} given, true or false is needed`)));
       call(() => this.#held.set_pinned(body(which), Uint8Array.from(flags)));
     }
 
