@@ -43,7 +43,8 @@ export function named(error) {
 }
 
 // The module's errors begin with names of options as other languages write them.
-const camelized = (text) => text.replace(/^[a-z]+(?:_[a-z]+)+(?=: )/, (name) => name.replace(/_(.)/g, (_, letter) => letter.toUpperCase()));
+const OPTION = /^(clearance_share|closest_points|max_pairs|memory_budget|n_nearest|owned_by|reuse_margin|shared_vertex)(?=: )/;
+const camelized = (text) => text.replace(OPTION, (name) => name.replace(/_(.)/g, (_, letter) => letter.toUpperCase()));
 
 // Returns two functions: one loads the module, once; the other throws as long as it has not been loaded.
 export function loader(load, beside, begin) {
@@ -68,7 +69,8 @@ export function loader(load, beside, begin) {
 // The module's bytes, or where they are. Node's fetch does not read files.
 async function source(given, beside) {
   const wanted = (await given) ?? beside();
-  if (globalThis.process?.versions?.node === undefined) return wanted;
+  // A window may have Node's process, too; its addresses are those of its page.
+  if (globalThis.process?.versions?.node === undefined || globalThis.document !== undefined) return wanted;
   const isUrl = wanted instanceof URL || (typeof wanted === "string" && /^[a-z][a-z+.-]+:/i.test(wanted));
   const url = isUrl ? new URL(wanted) : null;
   if (url === null ? typeof wanted !== "string" : url.protocol !== "file:") return wanted;
@@ -80,8 +82,9 @@ async function source(given, beside) {
 
 // What was given, in a word or two.
 export function kindOf(given) {
-  if (given === null || typeof given !== "object") return typeof given === "function" ? "a function" : String(given);
-  return given.constructor?.name ? `${/^[AEIOU]/.test(given.constructor.name) ? "an" : "a"} ${given.constructor.name}` : "an object";
+  if (/^(function|string|symbol)$/.test(typeof given)) return `a ${typeof given}`;
+  if (given === null || typeof given !== "object") return String(given);
+  return given.constructor?.name ? `${/^[AEIO]/.test(given.constructor.name) ? "an" : "a"} ${given.constructor.name}` : "an object";
 }
 
 // Options, an object; none are given by undefined or null.
@@ -92,7 +95,7 @@ export function options(name, given) {
 
 // The list that was given.
 export function list(name, given) {
-  if (given !== null && typeof given === "object" && Symbol.iterator in given) return Array.from(given);
+  if (given !== null && typeof given === "object" && (Symbol.iterator in given || given.length >= 0)) return Array.from(given);
   return refuse(`${name}: ${kindOf(given)} given, an array is needed`);
 }
 

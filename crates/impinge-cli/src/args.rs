@@ -333,8 +333,8 @@ pub struct ExcludeArgs {
 /// How thick bodies are.
 #[derive(Debug, Clone, Args)]
 pub struct ThicknessArgs {
-    /// The thickness T of body N, a length that adds to what its pairs are asked for or keep (twice
-    /// within it) [default: 0]
+    /// The thickness T of body N, a length that adds to what its pairs are asked for or keep, and is
+    /// taken from how far its vertices may move (twice within it) [default: 0]
     #[arg(long = "thickness", value_name = "N,T", value_parser = body_length)]
     pub of_bodies: Vec<(usize, f64)>,
 }

@@ -108,8 +108,7 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
             let line = asked.line(&vertices, &nouns) + "\n";
             output::say(line.as_bytes(), file.as_ref())?;
         }
-        frames.end()?;
-        return steps.end(args.ask.fail_on_hit);
+        return frames.end(steps.end(args.ask.fail_on_hit));
     }
     let mut outputs = Outputs::new(args, inputs, file.as_ref())?;
     let mut lines = Lines::default();
@@ -156,8 +155,7 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
         let line = asked.line(&vertices, &nouns) + "\n";
         output::say(line.as_bytes(), file.as_ref())?;
     }
-    frames.end()?;
-    hit(args.ask.fail_on_hit, n_pairs > 0)
+    frames.end(hit(args.ask.fail_on_hit, n_pairs > 0))
 }
 
 /// The output files of each frame.
@@ -254,17 +252,23 @@ impl Frames {
         self.sequence.files().len() == self.n_frames() && self.n_frames() > 1
     }
 
+    /// What the program ends with.
+    ///
     /// # Errors
-    /// Frames were passed over.
-    fn end(&self) -> Result<(), Error> {
-        match self.n_passed_over {
-            0 => Ok(()),
-            n => Err(Error::Unread(format!(
-                "{} of {} not asked about; all others were",
-                counted(n, "frame"),
-                printable(&self.name)
-            ))),
+    /// That of the frames that were asked about; if there is none, that some were passed over.
+    fn end(&self, asked: Result<(), Error>) -> Result<(), Error> {
+        if self.n_passed_over == 0 {
+            return asked;
         }
+        let passed_over = format!(
+            "{} of {} not asked about",
+            counted(self.n_passed_over, "frame"),
+            printable(&self.name)
+        );
+        if asked.is_err() {
+            let _ = writeln!(stderr(), "note: {passed_over}");
+        }
+        asked.and(Err(Error::Unread(passed_over)))
     }
 }
 
@@ -321,7 +325,11 @@ impl step::Frames for Frames {
         // Welded vertices that come apart ask for another option, and one file has frames of one size.
         let is_of_all = match &error {
             Error::Usage(_) => true,
-            Error::File(impinge_io::Error::Mismatch { .. }) => !self.has_files(),
+            Error::File(impinge_io::Error::Mismatch { .. })
+            | Error::Refused {
+                source: impinge::Error::WrongNumberOfPositions { .. },
+                ..
+            } => !self.has_files(),
             _ => false,
         };
         if is_of_all {

@@ -218,7 +218,11 @@ fn frames_that_do_not_fit_are_named() {
     write(&folder, 2);
     folder.ply("other.ply", &ball(80));
     let n = ball(300).n_vertices();
-    for weld in [&["--json"][..], &["--json", "--weld"]] {
+    for weld in [
+        &["--json"][..],
+        &["--json", "--weld"],
+        &["--json", "--no-weld"],
+    ] {
         let args = ["sequence", "other.ply", "run.pc2"];
         let line = folder.run(args.iter().chain(weld)).error();
         assert!(
@@ -354,9 +358,16 @@ fn frames_that_cannot_be_read_are_passed_over() {
             "{}",
             run.stderr
         );
-        let last = format!("1 frame of {sequence} not asked about; all others were");
+        let last = format!("1 frame of {sequence} not asked about");
         assert!(run.stderr.contains(&last), "{}", run.stderr);
         assert!(run.stdout.contains("\n5 frames, "), "{}", run.stdout);
+        let found = ask(&["--fail-on-hit"]);
+        assert_eq!(found.code, Some(3));
+        assert!(
+            found.stderr.contains(&format!("note: {last}")),
+            "{}",
+            found.stderr
+        );
         let rows = std::fs::read_to_string(folder.path("rows.csv")).unwrap();
         let run = ask(&["--json"]);
         assert_eq!(run.code, Some(1));
@@ -388,7 +399,7 @@ fn frames_that_cannot_be_read_are_passed_over() {
         let steps: Vec<&str> = lines.filter_map(|line| line.trim().get(..6)).collect();
         assert_eq!(steps, ["0 to 1", "3 to 4", "4 to 5"]);
         let run = ask(&["--ccd", "--json"]);
-        assert_eq!((run.code, run.stdout.lines().count()), (Some(1), 4));
+        assert_eq!((run.code, run.stdout.lines().count()), (Some(4), 4));
     }
 }
 

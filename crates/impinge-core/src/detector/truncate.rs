@@ -41,8 +41,8 @@ impl Detector {
     ///
     /// The straight way from the start to the *rounded* positions is free in the sense of
     /// [`is_free`](Detector::is_free), if the start was free of intersections, and except for pairs
-    /// that touch at the start. Elements that are to keep a [separation](Query::separation) or a
-    /// [clearance](Query::clearance) do so at every moment.
+    /// that touch at the start. Elements that are to keep a [separation](Query::separation), their
+    /// [thickness](Scene::set_thickness) or a [clearance](Query::clearance) do so at every moment.
     ///
     /// Elements that do not meet are not stopped. Where two do, the vertices that go towards the
     /// other element stop before planes across their shortest way at the start, or at the end: if

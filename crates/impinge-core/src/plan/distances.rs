@@ -75,6 +75,14 @@ impl Plan {
         self.bound > 0.0
     }
 
+    /// By how much boxes reach farther together than elements keep, at most, besides rounding.
+    pub(crate) fn farther_than_kept(&self) -> f64 {
+        match self.bound - self.distance {
+            0.0 => 0.0,
+            farther => farther.next_up(),
+        }
+    }
+
     /// At least what any pair of two parts keeps, and whether all of them keep just that.
     pub(crate) fn most_kept(&self, a: PartIx, b: PartIx) -> (f64, bool) {
         let thickness = [a, b].map(|part| self.part(part).thickness);

@@ -148,6 +148,42 @@ fn candidates_are_boxes_that_reach_by_the_thickness_too() {
     assert!(n_found > 1000, "{n_found}");
 }
 
+/// A thick body, far away, makes no pair of others: their boxes are tested as if it were not there.
+#[test]
+fn boxes_of_thin_elements_do_not_reach_farther_beside_thick_ones() {
+    let triangle = |x: f32| [[x, 0.0, 0.0], [x, 1.0, 0.0], [x, 0.0, 1.0]];
+    let mut thin = Scene::new();
+    for x in [1.0, 1.0 + f32::EPSILON] {
+        thin.add_triangles(&[[0, 1, 2]], &triangle(x))
+            .expect("good");
+    }
+    let far = thin.add_points(&[[900.0f32, 0.0, 0.0]]).expect("good");
+    thin.set_thickness(far, 1.0).expect("good");
+    let mut points = Scene::new();
+    for x in [1.0f64, 1.001] {
+        let body = points.add_points(&[[x, 0.0, 0.0]]).expect("good");
+        points.set_thickness(body, 1e-9).expect("good");
+    }
+    let edge = [[1e15f64, 0.0, 0.0], [1e15, 1.0, 0.0]];
+    let far = points.add_edges(&[[0, 1]], &edge).expect("good");
+    points.set_thickness(far, 1e12).expect("good");
+    for scene in [thin, points] {
+        for mut detector in detectors() {
+            let found = detector.candidates(&scene, 0.0, &Query::all());
+            assert_eq!(found.expect("good").len(), 0);
+        }
+    }
+    // Beyond the largest float, nothing is too far away.
+    let mut wide = Scene::new();
+    for x in [-0.95e308, 0.95e308] {
+        wide.add_points(&[[x, 0.0, 0.0]]).expect("good");
+    }
+    for mut detector in detectors() {
+        let found = detector.candidates(&wide, 1e308, &Query::all());
+        assert_eq!(found.expect("good").len(), 1);
+    }
+}
+
 /// Where all elements are equally thick, that is a separation of twice as much.
 #[test]
 fn one_thickness_for_all_is_a_separation() {

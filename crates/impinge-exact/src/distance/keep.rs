@@ -45,7 +45,7 @@ impl Keep {
     }
 
     /// What two elements keep that are so thick: their thickness adds to the separation. Each of
-    /// the two sums is rounded up, and none is above the largest float.
+    /// the two sums is rounded up, and none is above the largest float, unless the separation is.
     #[inline]
     #[must_use]
     pub fn with_thickness(self, [a, b]: [f64; 2]) -> Self {
@@ -207,11 +207,17 @@ fn sum_below(a: f64, b: f64) -> f64 {
     if error < 0.0 { sum.next_down() } else { sum }
 }
 
-/// The least float that is not below the sum of two; the largest one if there is none.
+/// The least float that is not below the sum of two; the largest one if there is none. Infinity,
+/// if that is the first of them.
 #[inline]
 fn sum_up(a: f64, b: f64) -> f64 {
     let [sum, error] = two_sum(a, b);
-    if error > 0.0 { sum.next_up() } else { sum }.min(f64::MAX)
+    let sum = if error > 0.0 { sum.next_up() } else { sum };
+    if a < f64::INFINITY {
+        sum.min(f64::MAX)
+    } else {
+        a
+    }
 }
 
 /// A float that is not below the sum of a number and another one; the number itself if that is 0.
@@ -348,6 +354,7 @@ mod tests {
         assert_eq!(of(1.0, [0.1, 0.7]), of(1.0, [0.7, 0.1]));
         assert_eq!(of(0.0, [f64::MAX, f64::MAX]), f64::MAX);
         assert_eq!(of(f64::MAX, [5e-324, 0.0]), f64::MAX);
+        assert_eq!(of(f64::INFINITY, [1.0, f64::MAX]), f64::INFINITY);
     }
 
     /// No number of 24 bits reaches elements that are farther apart than the largest of them.

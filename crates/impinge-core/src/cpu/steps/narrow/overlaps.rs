@@ -36,8 +36,7 @@ impl Overlaps {
 
 impl Narrow for Overlaps {
     fn take(&mut self, isa: Isa, world: StepWorld<'_>, batch: Batch<'_>) {
-        let (most, _) = world.plan.most_kept(batch.between.a, batch.between.b);
-        if batch.rounded() > 0.0 || most > 0.0 || world.plan.has_cell() {
+        if batch.rounded() > 0.0 || world.plan.keeps_distance() || world.plan.has_cell() {
             return with_isa!(isa, take, (
                 overlaps: &mut Overlaps = self,
                 world: StepWorld<'_> = world,
@@ -66,7 +65,7 @@ fn take<S: Simd>(_: S, overlaps: &mut Overlaps, world: StepWorld<'_>, batch: Bat
     let between = batch.between;
     let (most, are_alike) = world.plan.most_kept(between.a, between.b);
     let boxes = batch.groups.map(|group| &group.start);
-    let farther_out = farther_out(batch.groups, most);
+    let farther_out = farther_out(batch.groups, most, world.plan.farther_than_kept());
     let sides = [between.a, between.b].map(|part| PartSide {
         elements: &world.cache(part).clustering.corners,
         source: world.source(part),
@@ -101,14 +100,14 @@ fn take<S: Simd>(_: S, overlaps: &mut Overlaps, world: StepWorld<'_>, batch: Bat
 /// An end is off by the rounding of points, at most 2^-24 of the largest coordinate, and moved
 /// outward by a part of the gap that is allowed, 2^-20 of all, and 2^-126 (`boxes::Sweep`), twice
 /// where elements differ in thickness: by less than 2^-18 of the largest coordinate and of that
-/// gap, and 2^-124.
-fn farther_out([a, b]: [&StepGroup; 2], most: f64) -> f32 {
-    let largest = f64::max(a.largest, b.largest) + most;
+/// gap, and 2^-124. Besides, boxes reach `farther` than any pair keeps.
+fn farther_out([a, b]: [&StepGroup; 2], most: f64, farther: f64) -> f32 {
+    let largest = f64::max(a.largest, b.largest) + most + farther;
     if largest * (1.0 + 2f64.powi(-17)) > f64::from(f32::MAX) {
         // Boxes may have infinite ends.
         return f32::INFINITY;
     }
-    round_up(largest * 2f64.powi(-17) + 2f64.powi(-120))
+    round_up(farther + largest * 2f64.powi(-17) + 2f64.powi(-120))
 }
 
 /// Which of sixteen pairs of boxes of two groups overlap by so much that the inflated boxes of the
