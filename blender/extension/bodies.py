@@ -16,14 +16,13 @@ class Body:
 
     `vertices`, (v, 3) float32, are in the object's own space; `matrix`, (4, 4) float64, takes them to the world. `triangles`, (t, 3), name
     vertices. `polygons`, (t,), are the faces of the object's own mesh that the triangles come from, -1 where a modifier made one.
-    `topology` is that of this mesh, to be compared. `selected`, (t,) bool, is None where all triangles count.
+    `selected`, (t,) bool, is None where all triangles count.
     """
 
     name: str
     vertices: np.ndarray
     triangles: np.ndarray
     polygons: np.ndarray
-    topology: object
     matrix: np.ndarray
     selected: np.ndarray | None = None
 

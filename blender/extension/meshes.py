@@ -19,10 +19,14 @@ NUMBER = "impinge_number"
 
 
 def chosen(context, which):
-    """Names of the objects that a question is about: the active one, or all that are selected."""
+    """Full names of the objects with faces that a question is about."""
+    return [object.name_full for object in _meant(context, which) if object.type in KINDS]
+
+
+def _meant(context, which):
+    """The active object, or all that are selected."""
     active = context.view_layer.objects.active
-    objects = ([active] if active else []) if which == "ACTIVE" else context.selected_objects
-    return [object.name_full for object in objects if object.type in KINDS]
+    return ([active] if active else []) if which == "ACTIVE" else context.selected_objects
 
 
 def named(scene, names):
@@ -33,11 +37,9 @@ def named(scene, names):
 
 def instancers(context, which):
     """Full names of the objects that a question is about whose instances are seen, but are no faces of theirs."""
-    active = context.view_layer.objects.active
-    objects = ([active] if active else []) if which == "ACTIVE" else context.selected_objects
     depsgraph = context.evaluated_depsgraph_get()
     parents = {instance.parent.original for instance in depsgraph.object_instances if instance.is_instance and instance.parent}
-    return [object.name_full for object in objects if object in parents]
+    return [object.name_full for object in _meant(context, which) if object in parents]
 
 
 def topology(object):
@@ -101,7 +103,7 @@ def _read(context, object, is_numbered=False):
 
 
 def _body(object, vertices, triangles, polygons, evaluated):
-    return Body(object.name_full, vertices, triangles, polygons, topology(object), np.array(evaluated.matrix_world, np.float64))
+    return Body(object.name_full, vertices, triangles, polygons, np.array(evaluated.matrix_world, np.float64))
 
 
 def _get(rows, name, dtype, width=1):

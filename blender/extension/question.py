@@ -38,8 +38,8 @@ class Question:
 class Answer:
     """`faces` has, by name of the object, faces of its own mesh. `n_made`: triangles without one, because a modifier made them.
     `is_placed` is false where there were too many pairs for finding places. Of `n_places`, the first are described. `is_selected`: only
-    pairs with a selected face count. `names` of the objects that were asked about, by which `topology` has that of their own meshes.
-    `instancers`: those whose instances were not looked at.
+    pairs with a selected face count. `names` are those of the objects that were asked about. Whoever asks adds, by name, the `topology`
+    of their own meshes, and the `instancers`: those whose instances were not looked at.
     """
 
     n_pairs: int = 0
@@ -82,7 +82,7 @@ class Asker:
         Raises ValueError for positions that cannot be used, `impinge.Cancelled` and the other errors of impinge.
         """
         began = time.perf_counter()
-        answer = Answer(names=[body.name for body in bodies], topology={body.name: body.topology for body in bodies})
+        answer = Answer(names=[body.name for body in bodies])
         answer.n_triangles = sum(len(body.triangles) for body in bodies)
         answer.is_selected = is_selected(bodies)
         if self.question.distance is not None:

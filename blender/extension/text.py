@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-__all__ = ["counted", "lines_of_answer", "lines_of_place", "of_answer", "of_frames", "pairs", "whom"]
+__all__ = ["are", "counted", "gone", "lines_of_answer", "lines_of_place", "of_answer", "of_frames", "pairs", "whom"]
 
 
 #: As the option is called.
@@ -11,6 +11,14 @@ ONLY = "selected faces only"
 
 def counted(n, noun):
     return f"{n:,} {noun}" if n == 1 else f"{n:,} {noun}s"
+
+
+def are(n):
+    return "is" if n == 1 else "are"
+
+
+def gone(names):
+    return f"{', '.join(names)} {are(len(names))} no longer in the scene"
 
 
 def pairs(n):

@@ -404,8 +404,8 @@ function showFiles(given, how) {
   return refused;
 }
 
-async function open(given, folders = []) {
-  const list = given.filter(({ name }) => !folders.includes(name));
+async function open(offered, folders = []) {
+  const list = offered.filter(({ name }) => !folders.includes(name));
   const refusals = folders.map((name) => `${name} is a folder: open the files in it`);
   complain(refusals.join("\n"));
   if (list.length === 0) return;

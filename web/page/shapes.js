@@ -169,9 +169,9 @@ function fall(nTriangles) {
   ];
 }
 
-// Scenes by name: bodies of about as many triangles as asked for, the ball of space where they meet, how far they ever are from its
-// centre, and the moment at which the scene begins to play, shortly before they meet.
+// Scenes by name: bodies of about as many triangles as asked for, the ball of space where they meet, and, if they come
+// from farther away, how far they ever are from its centre, and the moment shortly before they meet at which the scene begins to play.
 export const SCENES = {
   ring: { make: ring, centre: [0.1, -0.05, 0.05], radius: 0.95, reach: 1.75, begin: 0.6, self: true },
-  fall: { make: fall, centre: [0, 0, 0.12], radius: 1.2, reach: 1.2, begin: 0, self: false },
+  fall: { make: fall, centre: [0, 0, 0.12], radius: 1.2, self: false },
 };

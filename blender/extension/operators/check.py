@@ -31,7 +31,7 @@ def wanted(context):
         raise ValueError("there is no active object with faces")
     least = 2 if which == "BETWEEN" else 1
     if len(names) < least:
-        selected = f"{text.counted(len(names), 'object')} {'is' if len(names) == 1 else 'are'} selected"
+        selected = f"{text.counted(len(names), 'object')} {text.are(len(names))} selected"
         raise ValueError(f"select {least} or more objects that have faces; {selected}")
     return names
 
@@ -45,9 +45,10 @@ class Asking(Waiting):
         asked = question(settings, self.distance(settings))
         frame = context.scene.frame_current
         bodies = meshes.read(context, names, settings.selected_only)
+        topology = {name: meshes.topology(object) for name, object in zip(names, meshes.named(context.scene, names))}
         instancers = meshes.instancers(context, settings.which)
         answer = yield Job(lambda cancel, progress: Asker(asked).find(bodies, cancel, progress))
-        answer.instancers = instancers
+        answer.topology, answer.instancers = topology, instancers
         state.show(answer, asked, frame)
         said = "; ".join([f"{text.whom(answer, asked)}: {text.of_answer(answer, asked)}", *text.besides(answer, asked)])
         self.report({"WARNING"} if instancers else {"INFO"}, said)

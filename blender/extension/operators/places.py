@@ -96,7 +96,7 @@ class IMPINGE_OT_select(bpy.types.Operator):
             if object.visible_get() and object.data.is_editable:
                 objects[object] = polygons
         if not objects and gone:
-            self.report({"WARNING"}, f"Select: {', '.join(gone)} {'is' if len(gone) == 1 else 'are'} no longer in the scene")
+            self.report({"WARNING"}, f"Select: {text.gone(gone)}")
             return {"CANCELLED"}
         if not objects:
             self.report({"WARNING"}, "Select: no face that was found belongs to a visible mesh of this file")
@@ -118,12 +118,12 @@ class IMPINGE_OT_select(bpy.types.Operator):
         n_faces = sum(len(polygons) for polygons in of_meshes.values()) - n_hidden
         said = [f"{text.counted(n_faces, 'face')} selected"]
         if n_hidden:
-            said.append(f"{n_hidden:,} more {'is' if n_hidden == 1 else 'are'} hidden")
+            said.append(f"{n_hidden:,} more {text.are(n_hidden)} hidden")
         if found.answer.n_made and not self.place_only:
             made = text.counted(found.answer.n_made, "triangle")
             said.append(f"{made} {'belongs' if found.answer.n_made == 1 else 'belong'} to no face of a mesh")
         if gone:
-            said.append(f"{', '.join(gone)} {'is' if len(gone) == 1 else 'are'} no longer in the scene")
+            said.append(text.gone(gone))
         self.report({"WARNING"} if gone or n_hidden else {"INFO"}, ", ".join(said))
         return {"FINISHED"}
 

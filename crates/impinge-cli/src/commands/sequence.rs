@@ -118,12 +118,8 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
     let mut n_pairs = 0;
     for frame_ix in range {
         go_on(cancel)?;
-        let set = frames.read(frame_ix).and_then(|positions| {
-            let set = set_positions(&mut scene, moving, &positions);
-            set.map_err(|source| frames.refused(frame_ix, source))
-        });
-        if let Err(error) = set {
-            frames.pass_over(frame_ix, error)?;
+        let set = |positions: &_| set_positions(&mut scene, moving, positions);
+        if frames.take(frame_ix, set)?.is_none() {
             continue;
         }
         let pairs = &detector.detect(&scene, &query)?;

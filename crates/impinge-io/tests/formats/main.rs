@@ -101,27 +101,21 @@ fn by_path_and_with_windows_line_ends() {
 
 #[test]
 fn unknown_extension_and_missing_file() {
-    let message = read("a.xyz".as_ref(), &ReadOptions::as_they_are())
-        .unwrap_err()
-        .to_string();
-    assert!(
-        message.starts_with("a.xyz: no mesh format has the extension 'xyz' (known: obj, ply"),
-        "{message}"
-    );
-    let message = read("scan".as_ref(), &ReadOptions::as_they_are())
-        .unwrap_err()
-        .to_string();
-    assert!(
-        message.starts_with("scan: its name has no extension, which tells the format (known: obj"),
-        "{message}"
-    );
-    let message = read("no/such/file.ply".as_ref(), &ReadOptions::as_they_are())
-        .unwrap_err()
-        .to_string();
-    assert!(
-        message.starts_with("no/such/file.ply: cannot read: "),
-        "{message}"
-    );
+    for (name, said) in [
+        (
+            "a.xyz",
+            "no mesh format has the extension 'xyz' (known: obj, ply",
+        ),
+        (
+            "scan",
+            "its name has no extension, which tells the format (known: obj",
+        ),
+        ("no/such/file.ply", "cannot read: "),
+    ] {
+        let error = read(name.as_ref(), &ReadOptions::as_they_are()).unwrap_err();
+        let message = error.to_string();
+        assert!(message.starts_with(&format!("{name}: {said}")), "{message}");
+    }
 }
 
 #[test]

@@ -53,6 +53,22 @@ pub trait Frames {
     /// # Errors
     /// The same error, if it is about all frames.
     fn pass_over(&mut self, frame_ix: usize, error: Error) -> Result<(), Error>;
+    /// Reads a frame and has `set` take its positions; `None` if that cannot be, and it is passed over.
+    fn take(
+        &mut self,
+        frame_ix: usize,
+        set: impl FnOnce(&Positions) -> Result<(), impinge::Error>,
+    ) -> Result<Option<Positions>, Error> {
+        let taken = self.read(frame_ix).and_then(|positions| {
+            set(&positions).map_err(|source| self.refused(frame_ix, source))?;
+            Ok(positions)
+        });
+        match taken {
+            Ok(positions) => Ok(Some(positions)),
+            Err(error) => self.pass_over(frame_ix, error).map(|()| None),
+        }
+    }
+
     /// Says in a line of JSON which frame it is about, and in which file that is, if each has one.
     fn name_in(&self, line: &mut Map<String, Value>, frame_ix: usize);
 }
@@ -81,20 +97,12 @@ pub fn steps_of_sequence(
     let mut before = false;
     for end_ix in range {
         let is_first = !std::mem::replace(&mut before, false);
-        let end = frames.read(end_ix).and_then(|end| {
-            let set = match is_first {
-                true => set_positions(scene, moving, &end),
-                false => set_end_positions(scene, moving, &end),
-            };
-            set.map_err(|source| frames.refused(end_ix, source))?;
-            Ok(end)
-        });
-        let end = match end {
-            Ok(end) => end,
-            Err(error) => {
-                frames.pass_over(end_ix, error)?;
-                continue;
-            }
+        let end = frames.take(end_ix, |end| match is_first {
+            true => set_positions(scene, moving, end),
+            false => set_end_positions(scene, moving, end),
+        })?;
+        let Some(end) = end else {
+            continue;
         };
         before = true;
         if is_first {

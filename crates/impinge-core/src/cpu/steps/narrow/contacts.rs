@@ -170,23 +170,22 @@ impl FirstContacts {
 
     /// Decides pairs of two parts that were left.
     pub fn decide_unsure(&mut self, isa: Isa, world: StepWorld<'_>, pairs: &[(Between, Slots)]) {
-        let until = self.until(world);
-        self.between = pairs.first().map(|(between, _)| *between);
-        (self.is_first, self.is_last) = (true, true);
-        let most_kept = |between: &Between| world.plan.most_kept(between.a, between.b).0;
-        if self
-            .between
-            .is_some_and(|between| most_kept(&between) > 0.0)
-        {
+        let Some(&(between, _)) = pairs.first() else {
+            return;
+        };
+        (self.between, self.is_first, self.is_last) = (Some(between), true, true);
+        let (most_kept, _) = world.plan.most_kept(between.a, between.b);
+        if most_kept > 0.0 {
             for &(between, slots) in pairs {
                 self.decide_kept(world, between, slots);
             }
-            return self.decide(isa, world);
+        } else {
+            let until = self.until(world);
+            self.open.extend(pairs.iter().map(|&(_, slots)| Open {
+                slots,
+                search: Search::new(until),
+            }));
         }
-        self.open.extend(pairs.iter().map(|&(_, slots)| Open {
-            slots,
-            search: Search::new(until),
-        }));
         self.decide(isa, world);
     }
 

@@ -63,7 +63,7 @@ impl Narrow for Overlaps {
 #[inline(always)]
 fn take<S: Simd>(_: S, overlaps: &mut Overlaps, world: StepWorld<'_>, batch: Batch<'_>) {
     let between = batch.between;
-    let (most, are_alike) = world.plan.most_kept(between.a, between.b);
+    let (most, _) = world.plan.most_kept(between.a, between.b);
     let boxes = batch.groups.map(|group| &group.start);
     let farther_out = farther_out(batch.groups, most, world.plan.farther_than_kept());
     let sides = [between.a, between.b].map(|part| PartSide {
@@ -76,12 +76,9 @@ fn take<S: Simd>(_: S, overlaps: &mut Overlaps, world: StepWorld<'_>, batch: Bat
         for lane in 0..n {
             let ix = first + lane;
             if sure >> lane & 1 == 0 {
-                let [a, b] = batch.slots(ix);
-                let most = match are_alike {
-                    true => most,
-                    false => world.plan.separation(located(world, between, [a, b])),
-                };
-                if !are_near(&sides[0].extent(a), &sides[1].extent(b), most) {
+                let slots @ [a, b] = batch.slots(ix);
+                let gap = world.plan.separation(located(world, between, slots));
+                if !are_near(&sides[0].extent(a), &sides[1].extent(b), gap) {
                     continue;
                 }
             }
