@@ -19,17 +19,31 @@ impl Numbering {
         self.parts.extend(parts);
     }
 
-    fn name(&self, number: Number) -> Element {
-        let (body, first) = self.parts[owner_by_first(&self.parts, number, |part| part.1)];
+    pub fn pair(&self, key: u64) -> (Element, Element) {
+        self.pair_after(key, &mut [0; 2])
+    }
+
+    /// The elements of a pair, which are often of the same parts as those of the last one.
+    #[inline]
+    pub fn pair_after(&self, key: u64, last: &mut [usize; 2]) -> (Element, Element) {
+        let [a, b] = pair_numbers(key);
+        let [of_a, of_b] = last;
+        (self.name_after(a, of_a), self.name_after(b, of_b))
+    }
+
+    #[inline]
+    fn name_after(&self, number: Number, last: &mut usize) -> Element {
+        let is_below = |&(_, first): &(BodyId, Number)| number < first;
+        let is_of_last =
+            !is_below(&self.parts[*last]) && self.parts.get(*last + 1).is_none_or(is_below);
+        if !is_of_last {
+            *last = owner_by_first(&self.parts, number, |part| part.1);
+        }
+        let (body, first) = self.parts[*last];
         Element {
             body,
             element: number.minus(first).raw(),
         }
-    }
-
-    pub fn pair(&self, key: u64) -> (Element, Element) {
-        let [a, b] = pair_numbers(key).map(|number| self.name(number));
-        (a, b)
     }
 }
 

@@ -1,5 +1,6 @@
 //! Near pairs as stencils: vertices, coefficients and distances with their derivatives.
 
+use std::mem::MaybeUninit;
 use std::sync::{Mutex, PoisonError};
 
 use crate::answers::areas::Areas;
@@ -7,11 +8,13 @@ use crate::answers::near::{NearIter, NearPair, NearPairs};
 use crate::answers::pairs::Element;
 use crate::answers::stencil::{Gradient, Hessian, Mollifier, NearestWay};
 use crate::query::pair_kind::PairKind;
+use crate::scene::Scene;
 use crate::scene::by_body::ByBody;
-use crate::scene::elements::Part;
+use crate::scene::elements::{Elements, Part};
 use crate::scene::error::Error;
+use crate::scene::ids::BodyId;
 use crate::scene::index::ElementIx;
-use crate::scene::{Body, Scene};
+use crate::scene::positions::Positions;
 use crate::search::sink;
 use crate::workers::in_parts::in_parts;
 use impinge_exact::{Feature, Point};
@@ -305,19 +308,17 @@ impl NearIter<'_> {
         let room = &mut rows.spare_capacity_mut()[..n];
         let refused = Mutex::new(None);
         in_parts(room, PART, threads, |first, room| {
+            let mut reader = Reader::new(scene, &offsets, rest);
             for (ix, (to, pair)) in room.iter_mut().zip(self.clone().after(first)).enumerate() {
-                match stencil(scene, &offsets, rest, pair) {
-                    Ok(row) => _ = to.write(row),
-                    Err(error) => {
-                        let mut refused = refused.lock().unwrap_or_else(PoisonError::into_inner);
-                        if refused
-                            .as_ref()
-                            .is_none_or(|(other, _)| first + ix < *other)
-                        {
-                            *refused = Some((first + ix, error));
-                        }
-                        return;
+                if let Err(error) = reader.read(&pair, to) {
+                    let mut refused = refused.lock().unwrap_or_else(PoisonError::into_inner);
+                    if refused
+                        .as_ref()
+                        .is_none_or(|(other, _)| first + ix < *other)
+                    {
+                        *refused = Some((first + ix, error));
                     }
+                    return;
                 }
             }
         });
@@ -343,6 +344,7 @@ impl NearIter<'_> {
 ///
 /// # Errors
 /// An edge and a face, or two faces.
+#[inline(always)]
 fn sides(pair: &NearPair) -> Result<[(Element, Part); 2], Error> {
     let parts = pair.kind.parts();
     match pair.kind {
@@ -350,56 +352,134 @@ fn sides(pair: &NearPair) -> Result<[(Element, Part); 2], Error> {
             Ok([(pair.a, parts[0]), (pair.b, parts[1])])
         }
         PairKind::EdgeVertex => Ok([(pair.b, parts[1]), (pair.a, parts[0])]),
-        PairKind::EdgeFace | PairKind::FaceFace => Err(Error::Setting {
-            setting: "kinds",
-            given: format!(
-                "{} (element {} of body {} and {} of body {}; `near` gives no such pairs if its query names the kinds vf and ee)",
-                pair.kind.name(),
-                pair.a.element,
-                pair.a.body,
-                pair.b.element,
-                pair.b.body
-            ),
-            allowed: "vf, ee, ev or vv",
-        }),
+        PairKind::EdgeFace | PairKind::FaceFace => Err(no_stencil(pair)),
     }
 }
 
-/// The stencil of a pair, which stands for itself.
-fn stencil(
-    scene: &Scene,
-    offsets: &[u32],
-    rest: Option<&[Point]>,
-    pair: NearPair,
-) -> Result<Stencil, Error> {
-    let mut vertices = [0; 4];
-    let mut points = [[0.0; 3]; 4];
-    let mut n = 0;
-    for (element, part) in sides(&pair)? {
-        let body = body_of(scene, element, part)?;
-        for &corner in body.corners(part, &ElementIx::new(element.element)) {
-            vertices[n] = offsets[element.body.index()] + corner;
-            points[n] = body.positions().point(corner as usize);
-            n += 1;
+#[cold]
+fn no_stencil(pair: &NearPair) -> Error {
+    Error::Setting {
+        setting: "kinds",
+        given: format!(
+            "{} (element {} of body {} and {} of body {}; `near` gives no such pairs if its query names the kinds vf and ee)",
+            pair.kind.name(),
+            pair.a.element,
+            pair.a.body,
+            pair.b.element,
+            pair.b.body
+        ),
+        allowed: "vf, ee, ev or vv",
+    }
+}
+
+/// Reads the stencils of pairs. The bodies of one are often those of the next, so they are held.
+struct Reader<'a> {
+    scene: &'a Scene,
+    offsets: &'a [u32],
+    rest: Option<&'a [Point]>,
+    sides: [Option<Side<'a>>; 2],
+}
+
+/// A part of a body.
+#[derive(Clone, Copy)]
+struct Side<'a> {
+    id: BodyId,
+    part: Part,
+    elements: &'a Elements,
+    positions: &'a Positions,
+    n_elements: usize,
+    /// The number of its first vertex.
+    offset: u32,
+}
+
+impl<'a> Side<'a> {
+    fn new(scene: &'a Scene, offsets: &[u32], id: BodyId, part: Part) -> Result<Self, Error> {
+        let body = scene.body(id)?;
+        let elements = body.part(part);
+        Ok(Side {
+            id,
+            part,
+            elements,
+            positions: body.positions(),
+            n_elements: match part {
+                Part::Vertices => body.n_vertices(),
+                _ => elements.len(),
+            },
+            offset: offsets[id.index()],
+        })
+    }
+
+    /// An element that is not there.
+    #[cold]
+    fn refusal(&self, element: u32) -> Error {
+        Error::ForeignPair {
+            body: self.id,
+            primitive: element,
+            n_primitives: self.n_elements,
+            kind: match self.part {
+                Part::Vertices => "vertices",
+                Part::Edges => "edges",
+                Part::Faces | Part::Given => "faces",
+            },
         }
     }
-    for ix in n..4 {
-        (vertices[ix], points[ix]) = (vertices[0], points[0]);
-    }
-    let threshold = match (rest, pair.kind) {
-        (Some(rest), PairKind::EdgeEdge) => {
-            Mollifier::threshold(&vertices.map(|vertex| rest[vertex as usize]))
+}
+
+impl<'a> Reader<'a> {
+    fn new(scene: &'a Scene, offsets: &'a [u32], rest: Option<&'a [Point]>) -> Self {
+        Reader {
+            scene,
+            offsets,
+            rest,
+            sides: [None; 2],
         }
-        _ => 0.0,
-    };
-    Ok(Stencil {
-        kind: pair.kind,
-        features: pair.features,
-        vertices,
-        weight: 1.0,
-        points,
-        threshold,
-    })
+    }
+
+    /// The stencil of a pair, which stands for itself.
+    #[inline(always)]
+    fn read(&mut self, pair: &NearPair, to: &mut MaybeUninit<Stencil>) -> Result<(), Error> {
+        let mut vertices = [0; 4];
+        let mut points = [[0.0; 3]; 4];
+        let mut n = 0;
+        for ((element, part), held) in sides(pair)?.into_iter().zip(&mut self.sides) {
+            let side = match held {
+                Some(side) if (side.id, side.part) == (element.body, part) => side,
+                _ => held.insert(Side::new(self.scene, self.offsets, element.body, part)?),
+            };
+            if element.element as usize >= side.n_elements {
+                return Err(side.refusal(element.element));
+            }
+            let ix = ElementIx::new(element.element);
+            let corners = match part {
+                // Vertices are numbered as positions are.
+                Part::Vertices => ix.as_corners(),
+                _ => side.elements.corners(ix.index()),
+            };
+            for &corner in corners {
+                vertices[n] = side.offset + corner;
+                points[n] = side.positions.point(corner as usize);
+                n += 1;
+            }
+        }
+        for ix in n..4 {
+            (vertices[ix], points[ix]) = (vertices[0], points[0]);
+        }
+        let threshold = match (self.rest, pair.kind) {
+            (Some(rest), PairKind::EdgeEdge) => {
+                Mollifier::threshold(&vertices.map(|vertex| rest[vertex as usize]))
+            }
+            _ => 0.0,
+        };
+        to.write(Stencil {
+            kind: pair.kind,
+            features: pair.features,
+            vertices,
+            weight: 1.0,
+            points,
+            threshold,
+        });
+        Ok(())
+    }
 }
 
 impl Stencils {
@@ -616,26 +696,4 @@ fn check_rest(scene: &Scene, offsets: &[u32], rest: &[Point]) -> Result<(), Erro
             value,
         }),
     }
-}
-
-/// The body of an element, which must be there.
-fn body_of(scene: &Scene, element: Element, part: Part) -> Result<&Body, Error> {
-    let body = scene.body(element.body)?;
-    let n = match part {
-        Part::Vertices => body.n_vertices(),
-        _ => body.part(part).len(),
-    };
-    if (element.element as usize) < n {
-        return Ok(body);
-    }
-    Err(Error::ForeignPair {
-        body: element.body,
-        primitive: element.element,
-        n_primitives: n,
-        kind: match part {
-            Part::Vertices => "vertices",
-            Part::Edges => "edges",
-            Part::Faces | Part::Given => "faces",
-        },
-    })
 }

@@ -226,7 +226,9 @@ impl NearPairs {
             pairs: self,
             kinds: &PairKind::ALL,
             ix: 0,
+            n_before: 0,
             n_left: self.len(),
+            parts: [0; 2],
         }
     }
 
@@ -236,29 +238,10 @@ impl NearPairs {
             pairs: self,
             kinds: &PairKind::ALL[kind as usize..=kind as usize],
             ix: 0,
+            n_before: self.keys[..kind as usize].iter().map(Vec::len).sum(),
             n_left: self.keys[kind as usize].len(),
+            parts: [0; 2],
         }
-    }
-
-    /// One pair of a kind.
-    fn at(&self, kind: PairKind, ix: usize) -> Option<NearPair> {
-        let &key = self.keys[kind as usize].get(ix)?;
-        let before: usize = self.keys[..kind as usize].iter().map(Vec::len).sum();
-        let (a, b) = self.numbering.pair(key);
-        let nearest = NearestOfElements::unpacked(self.nearest[kind as usize][ix]);
-        let distance = self.distances.get(before + ix).copied();
-        let points = self.points.get(before + ix).copied();
-        Some(NearPair {
-            kind,
-            a,
-            b,
-            features: nearest.features,
-            is_parallel: nearest.is_parallel,
-            distance,
-            closest: distance
-                .zip(points)
-                .map(|(distance, points)| ClosestPoints { distance, points }),
-        })
     }
 
     /// Which pairs an older answer also has, which are new, and which are gone: two pairs are the
@@ -322,7 +305,11 @@ pub struct NearIter<'a> {
     kinds: &'a [PairKind],
     /// The next pair of the kind at hand.
     ix: usize,
+    /// How many pairs the answer has before it.
+    n_before: usize,
     n_left: usize,
+    /// The parts of the last pair.
+    parts: [usize; 2],
 }
 
 impl NearIter<'_> {
@@ -334,6 +321,7 @@ impl NearIter<'_> {
     /// Without the next `n`.
     pub(crate) fn after(mut self, n: usize) -> Self {
         self.ix += n;
+        self.n_before += n;
         self.n_left -= n;
         while let Some((&kind, rest)) = self.kinds.split_first() {
             let n_of_kind = self.pairs.keys[kind as usize].len();
@@ -362,16 +350,34 @@ impl NearIter<'_> {
 impl Iterator for NearIter<'_> {
     type Item = NearPair;
 
+    #[inline]
     fn next(&mut self) -> Option<NearPair> {
-        loop {
+        let pairs = self.pairs;
+        let (kind, key) = loop {
             let (&kind, rest) = self.kinds.split_first()?;
-            if let Some(pair) = self.pairs.at(kind, self.ix) {
-                self.ix += 1;
-                self.n_left -= 1;
-                return Some(pair);
+            match pairs.keys[kind as usize].get(self.ix) {
+                Some(&key) => break (kind, key),
+                None => (self.kinds, self.ix) = (rest, 0),
             }
-            (self.kinds, self.ix) = (rest, 0);
-        }
+        };
+        let (a, b) = pairs.numbering.pair_after(key, &mut self.parts);
+        let nearest = NearestOfElements::unpacked(pairs.nearest[kind as usize][self.ix]);
+        let distance = pairs.distances.get(self.n_before).copied();
+        let points = pairs.points.get(self.n_before).copied();
+        self.ix += 1;
+        self.n_before += 1;
+        self.n_left -= 1;
+        Some(NearPair {
+            kind,
+            a,
+            b,
+            features: nearest.features,
+            is_parallel: nearest.is_parallel,
+            distance,
+            closest: distance
+                .zip(points)
+                .map(|(distance, points)| ClosestPoints { distance, points }),
+        })
     }
 
     fn size_hint(&self) -> (usize, Option<usize>) {

@@ -85,7 +85,7 @@ impl NearestWay {
                 break;
             };
             // Once more, since rounding leaves a part of what is nearly parallel.
-            for _ in 0..2 {
+            for _ in 0..2 * ix {
                 next.remove(&directions[0]);
             }
             directions[ix] = next.normalised();
