@@ -401,7 +401,10 @@ export interface Advance {
    * straight path to them is free, if the start was free of intersections, and except for pairs that touch at the start.
    */
   positions(body: Body): Positions | null;
-  /** Moves the bodies of the scene to these positions. */
+  /**
+   * Moves the bodies of the scene to these positions; where transforms move a body, its rest positions stay the same. It throws if a body
+   * has other positions than when this was found, or is new: nothing would be known of the step.
+   */
   apply(scene: Scene): void;
 }
 
@@ -534,7 +537,10 @@ export interface Truncation {
   readonly stats: Stats;
   /** The positions of a body afterwards; `null` for one that does not move. */
   positions(body: Body): Positions | null;
-  /** Moves the bodies of the scene to these positions. */
+  /**
+   * Moves the bodies of the scene to these positions; where transforms move a body, its rest positions stay the same. It throws if a body
+   * has other positions than when this was found, or is new: nothing would be known of the step.
+   */
   apply(scene: Scene): void;
 }
 

@@ -1105,7 +1105,7 @@ class _Motion:
 
     def apply(self, scene: Scene) -> None:
         """Takes the step: these positions become those of the scene, and its bodies stand still until they are
-        given end positions again.
+        given end positions again. Of bodies that transforms move, the rest positions stay the same.
 
         Parameters
         ----------
@@ -1115,7 +1115,8 @@ class _Motion:
         Raises
         ------
         ValueError
-            A body that is gone, or that has another number of vertices now.
+            A body that has other positions than when the step was found, also one that does not move: nothing would be known of
+            the step. A body that is new, or that moves and is gone. The scene is unchanged then.
         """
         self._inner.apply(scene)
 

@@ -291,8 +291,9 @@ class Scene(SceneBase):
         ``n = ceil(w * sqrt(r / (8 * d)))`` equal steps, where r is that of the farthest vertex and d the deviation that is allowed.
         With ``separation=2 * d`` (d of each of two bodies), a step that is free is free for the screw motion as well.
 
-        After a step, call `set_transform` with the matrix of its end: the positions are then the end positions, bit by bit. A step
-        taken by `Advance.apply` gives the body the positions reached, which are then its rest positions.
+        After a step, call `set_transform` with the matrix of its end: the positions are then the end positions, bit by bit. Or take
+        it by `Advance.apply`, which gives the body the positions reached. The rest positions stay the same: the next matrix begins
+        with them, too.
 
         Parameters
         ----------

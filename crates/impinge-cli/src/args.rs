@@ -113,7 +113,8 @@ pub enum Command {
         mut_arg("kinds", |kinds| kinds.requires("ccd")),
         mut_arg("start", |start| start.requires("ccd")),
         mut_arg("separation", |separation| separation.requires("ccd")),
-        mut_arg("clearance", |clearance| clearance.requires("ccd"))
+        mut_arg("clearance", |clearance| clearance.requires("ccd")),
+        mut_arg("of_bodies", |thickness| thickness.requires("ccd"))
     )]
     Sequence(SequenceArgs),
     /// Find what touches while meshes move from one pose to another, and when first

@@ -137,6 +137,8 @@ mod read;
 #[cfg(feature = "io")]
 pub use read::read;
 
+pub use impinge_core::exact::Feature;
+pub use impinge_core::proximity::Nearest;
 /// The GPU interface of [`Settings::on_device`] and [`Gpu`].
 #[cfg(feature = "gpu")]
 pub use impinge_core::wgpu;

@@ -55,8 +55,6 @@ pub struct StepArgs {
     pub between: Option<(usize, usize)>,
     #[command(flatten)]
     pub how: StepHow,
-    #[command(flatten)]
-    pub thickness: ThicknessArgs,
     /// Weld vertices that are at the same position both at the start and at the end, within each
     /// body; this is the default
     #[arg(long, overrides_with = "no_weld")]
@@ -148,4 +146,6 @@ pub struct StepHow {
     /// their distance; report the first time at which one is as near as that
     #[arg(long, value_name = "C", default_value = "0", allow_negative_numbers = true, value_parser = distance)]
     pub clearance: f64,
+    #[command(flatten)]
+    pub thickness: ThicknessArgs,
 }

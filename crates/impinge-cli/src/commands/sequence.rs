@@ -10,7 +10,7 @@ use serde_json::{Map, Value};
 use super::step::{self, Frames as _, Shown, steps_of_sequence};
 use crate::apart::Inputs;
 use crate::args::{BodiesArg, SequenceArgs};
-use crate::asked::Asked;
+use crate::asked::{Asked, thicken};
 use crate::detection::{Times, asked, detector, hit, query, set_positions, settings};
 use crate::error::Error;
 use crate::load::{Bodies, Loading, to_positions};
@@ -53,6 +53,7 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
         nouns,
         ..
     } = bodies;
+    thicken(&mut scene, &ids, &args.step.thickness)?;
     let query = query(asked, &args.ask.exclude, &ids)?;
     let bodies: Vec<(BodyId, &str)> = ids
         .into_iter()

@@ -43,7 +43,7 @@ pub fn step(args: &StepArgs, cancel: &CancelToken) -> Result<(), Error> {
         .checked("--candidates", candidates, &inputs, args.json)?;
     let mut detector = detector(&args.detector)?;
     let mut bodies = Moving::read(args, cancel)?;
-    thicken(&mut bodies.scene, &bodies.ids, &args.thickness)?;
+    thicken(&mut bodies.scene, &bodies.ids, &args.how.thickness)?;
     let asked = asked(args, &bodies)?;
     let step = args.how.of(query(asked, &args.exclude, &bodies.ids)?);
 

@@ -529,6 +529,11 @@ fn a_sequence_is_followed_step_by_step() {
     assert_eq!(lines[1]["touching_at_start"], 0);
     assert!(lines[2]["touching_at_start"].as_u64() > Some(0));
     assert_eq!(lines[2]["start_intersects"], true);
+    // Thick bodies meet halfway: a gap of 2 becomes 1, and 1.5 are kept.
+    let thick = ["--thickness", "0,1", "--thickness", "1,0.5"];
+    let run = folder.run(arguments.iter().chain(&thick).chain(&["--frames", "0..2"]));
+    let line: Value = serde_json::from_str(&run.printed()).unwrap();
+    assert_eq!(line["earliest"]["toi"], 0.5);
     // The last step starts in contact.
     let text = &arguments[..6];
     let run = folder.run(text);

@@ -27,6 +27,45 @@ pub struct Advance {
     pub positions: Vec<(BodyId, Positions)>,
     /// How many fractions were tried.
     pub n_tried: u32,
+    pub(crate) start: StartPositions,
+}
+
+/// Which positions each body of a scene had when a step was found.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(crate) struct StartPositions(Vec<(BodyId, u64)>);
+
+impl StartPositions {
+    pub fn of(scene: &Scene) -> Self {
+        let bodies = scene.bodies();
+        StartPositions(
+            bodies
+                .map(|(id, body)| (id, body.positions_stamp()))
+                .collect(),
+        )
+    }
+
+    /// Sets the positions of the bodies that move, if all bodies still are where they were.
+    ///
+    /// # Errors
+    /// A body that was moved since, or is new; one that moves and was removed.
+    pub fn take_step(
+        &self,
+        scene: &mut Scene,
+        positions: &[(BodyId, Positions)],
+    ) -> Result<(), Error> {
+        for (id, body) in scene.bodies() {
+            let known = self.0.binary_search_by_key(&id, |(id, _)| *id);
+            let stamp = known.map(|ix| self.0[ix].1);
+            if stamp != Ok(body.positions_stamp()) {
+                return Err(Error::Moved { body: id });
+            }
+        }
+        for (body, _) in positions {
+            scene.body(*body)?;
+        }
+        let mut all = positions.iter();
+        all.try_for_each(|(body, positions)| scene.take_step(*body, positions))
+    }
 }
 
 impl std::fmt::Debug for Advance {
@@ -43,26 +82,14 @@ impl std::fmt::Debug for Advance {
 }
 
 impl Advance {
-    /// Takes the step: sets these positions in the scene.
+    /// Takes the step: sets these positions in the scene, or in a clone of it. Of bodies that
+    /// [transforms](Scene::set_end_transform) move, the rest positions stay the same.
     ///
     /// # Errors
-    /// A body that was removed, or that now has another number of vertices.
+    /// A body that has other positions than when the step was found, also one that does not move:
+    /// nothing would be known of the step; a body that is new, or that moves and was removed. The
+    /// scene is unchanged then.
     pub fn apply(&self, scene: &mut Scene) -> Result<(), Error> {
-        set_positions(scene, &self.positions)
+        self.start.take_step(scene, &self.positions)
     }
-}
-
-/// Sets the positions of bodies in a scene.
-///
-/// # Errors
-/// A body that was removed, or that now has another number of vertices.
-pub(crate) fn set_positions(
-    scene: &mut Scene,
-    positions: &[(BodyId, Positions)],
-) -> Result<(), Error> {
-    let mut all = positions.iter();
-    all.try_for_each(|(body, positions)| match positions {
-        Positions::F32(positions) => scene.set_positions(*body, positions),
-        Positions::F64(positions) => scene.set_positions(*body, positions),
-    })
 }

@@ -1,5 +1,7 @@
 //! Names of the elements of an answer: the body and the element of each global number.
 
+use std::collections::BTreeMap;
+
 use crate::answers::pairs::Element;
 use crate::plan::{Plan, owner_by_first};
 use crate::scene::ids::BodyId;
@@ -10,6 +12,8 @@ use crate::scene::index::{Number, pair_numbers};
 pub(crate) struct Numbering {
     /// Bodies, and the first number of each of their parts.
     parts: Vec<(BodyId, Number)>,
+    /// The topology of each body when it was asked about.
+    topologies: BTreeMap<BodyId, u64>,
 }
 
 impl Numbering {
@@ -17,6 +21,15 @@ impl Numbering {
         self.parts.clear();
         let parts = plan.parts.iter().map(|part| (part.id, part.first));
         self.parts.extend(parts);
+        self.topologies.clear();
+        let topologies = plan.parts.iter().map(|part| (part.id, part.topology_stamp));
+        self.topologies.extend(topologies);
+    }
+
+    /// The topology of each body when it was asked about: its elements have these numbers only as
+    /// long as it has that.
+    pub fn topologies(&self) -> &BTreeMap<BodyId, u64> {
+        &self.topologies
     }
 
     pub fn pair(&self, key: u64) -> (Element, Element) {

@@ -306,9 +306,16 @@ impl NearIter<'_> {
         let (n, threads) = (self.len(), self.threads());
         let mut rows = sink::with_capacity(n, WHAT)?;
         let room = &mut rows.spare_capacity_mut()[..n];
+        let remeshed = self.remeshed(scene);
         let refused = Mutex::new(None);
         in_parts(room, PART, threads, |first, room| {
-            let mut reader = Reader::new(scene, &offsets, rest);
+            let mut reader = Reader {
+                scene,
+                offsets: &offsets,
+                remeshed: &remeshed,
+                rest,
+                sides: [None; 2],
+            };
             for (ix, (to, pair)) in room.iter_mut().zip(self.clone().after(first)).enumerate() {
                 if let Err(error) = reader.read(&pair, to) {
                     let mut refused = refused.lock().unwrap_or_else(PoisonError::into_inner);
@@ -376,6 +383,7 @@ fn no_stencil(pair: &NearPair) -> Error {
 struct Reader<'a> {
     scene: &'a Scene,
     offsets: &'a [u32],
+    remeshed: &'a [BodyId],
     rest: Option<&'a [Point]>,
     sides: [Option<Side<'a>>; 2],
 }
@@ -387,52 +395,24 @@ struct Side<'a> {
     part: Part,
     elements: &'a Elements,
     positions: &'a Positions,
-    n_elements: usize,
     /// The number of its first vertex.
     offset: u32,
 }
 
-impl<'a> Side<'a> {
-    fn new(scene: &'a Scene, offsets: &[u32], id: BodyId, part: Part) -> Result<Self, Error> {
-        let body = scene.body(id)?;
-        let elements = body.part(part);
+impl<'a> Reader<'a> {
+    /// A part that is seen first.
+    fn side(&self, id: BodyId, part: Part) -> Result<Side<'a>, Error> {
+        if self.remeshed.contains(&id) {
+            return Err(Error::Remeshed { body: id });
+        }
+        let body = self.scene.body(id)?;
         Ok(Side {
             id,
             part,
-            elements,
+            elements: body.part(part),
             positions: body.positions(),
-            n_elements: match part {
-                Part::Vertices => body.n_vertices(),
-                _ => elements.len(),
-            },
-            offset: offsets[id.index()],
+            offset: self.offsets[id.index()],
         })
-    }
-
-    /// An element that is not there.
-    #[cold]
-    fn refusal(&self, element: u32) -> Error {
-        Error::ForeignPair {
-            body: self.id,
-            primitive: element,
-            n_primitives: self.n_elements,
-            kind: match self.part {
-                Part::Vertices => "vertices",
-                Part::Edges => "edges",
-                Part::Faces | Part::Given => "faces",
-            },
-        }
-    }
-}
-
-impl<'a> Reader<'a> {
-    fn new(scene: &'a Scene, offsets: &'a [u32], rest: Option<&'a [Point]>) -> Self {
-        Reader {
-            scene,
-            offsets,
-            rest,
-            sides: [None; 2],
-        }
     }
 
     /// The stencil of a pair, which stands for itself.
@@ -441,14 +421,11 @@ impl<'a> Reader<'a> {
         let mut vertices = [0; 4];
         let mut points = [[0.0; 3]; 4];
         let mut n = 0;
-        for ((element, part), held) in sides(pair)?.into_iter().zip(&mut self.sides) {
-            let side = match held {
+        for (ix, (element, part)) in sides(pair)?.into_iter().enumerate() {
+            let side = match self.sides[ix] {
                 Some(side) if (side.id, side.part) == (element.body, part) => side,
-                _ => held.insert(Side::new(self.scene, self.offsets, element.body, part)?),
+                _ => *self.sides[ix].insert(self.side(element.body, part)?),
             };
-            if element.element as usize >= side.n_elements {
-                return Err(side.refusal(element.element));
-            }
             let ix = ElementIx::new(element.element);
             let corners = match part {
                 // Vertices are numbered as positions are.

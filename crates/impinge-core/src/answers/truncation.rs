@@ -1,6 +1,6 @@
 //! How far each vertex may go in a step, and where it is afterwards.
 
-use crate::answers::advance::set_positions;
+use crate::answers::advance::StartPositions;
 use crate::scene::Scene;
 use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
@@ -17,6 +17,7 @@ pub struct Truncation {
     pub(crate) n_touching: u64,
     pub(crate) n_rounds: u32,
     pub(crate) start_intersects: Option<bool>,
+    pub(crate) start: StartPositions,
 }
 
 impl Truncation {
@@ -56,12 +57,15 @@ impl Truncation {
         self.start_intersects
     }
 
-    /// Takes the step: sets these positions in the scene.
+    /// Takes the step: sets these positions in the scene, or in a clone of it. Of bodies that
+    /// [transforms](Scene::set_end_transform) move, the rest positions stay the same.
     ///
     /// # Errors
-    /// A body that was removed, or that now has another number of vertices.
+    /// A body that has other positions than when the step was found, also one that does not move:
+    /// nothing would be known of the step; a body that is new, or that moves and was removed. The
+    /// scene is unchanged then.
     pub fn apply(&self, scene: &mut Scene) -> Result<(), Error> {
-        set_positions(scene, &self.positions)
+        self.start.take_step(scene, &self.positions)
     }
 }
 

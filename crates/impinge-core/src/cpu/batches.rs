@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use crate::bvh::hubs::Hubs;
 use crate::query::SharedVertex;
+use crate::query::progress::Pieces;
 use crate::query::settings::Settings;
 use crate::query::tuning::Tuning;
 use crate::scene::error::Error;
@@ -322,7 +323,7 @@ impl<W: BatchStages> Batches<'_, W> {
     #[inline(never)]
     fn flush(&mut self) -> Result<(), Error> {
         let start = Instant::now();
-        let (isa, world, control) = (self.isa, self.world, self.job.control);
+        let (isa, world) = (self.isa, self.world);
         let (workers, answer) = (self.job.workers, self.answer);
         let items = &self.items[..];
         let n_workers = if items.len() < self.tuning.pairing_parallel_from {
@@ -334,9 +335,10 @@ impl<W: BatchStages> Batches<'_, W> {
         let task = workers.task(task);
         let n_tasks = items.len().div_ceil(task);
         let scratches = &mut self.scratches[..n_workers];
+        let pieces = Pieces::new(self.job.control, n_tasks);
         workers.for_each(scratches, n_tasks, |worker, ix| {
             let is_over = answer.is_over() || world.is_over();
-            if is_over || control.step(ix as u64, n_tasks as u64).is_err() {
+            if is_over || pieces.take().is_err() {
                 return;
             }
             let items = &items[ix * task..items.len().min((ix + 1) * task)];
@@ -347,7 +349,7 @@ impl<W: BatchStages> Batches<'_, W> {
                 worker: &mut W::Worker = worker,
             ));
         });
-        control.step(n_tasks as u64, n_tasks as u64)?;
+        pieces.end()?;
         answer.check()?;
         self.stats.n_work_items += items.len() as u64;
         self.stats.n_batches += 1;

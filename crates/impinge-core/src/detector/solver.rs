@@ -157,8 +157,8 @@ impl Detector {
 struct Measured<'a> {
     key: u64,
     located: &'a [Located; 2],
-    /// A number below its distance minus the thickness of both; 0 if and only if that is not
-    /// above 0.
+    /// A number that is at most its distance minus the thickness of both; 0 if and only if that is
+    /// not above 0.
     distance: f64,
 }
 
@@ -242,7 +242,7 @@ impl SolverMemory {
     }
 }
 
-/// A number below the distance of a pair, by its exact value.
+/// A number that is at most the distance of a pair, by its exact value.
 #[inline(never)]
 fn distance_of((scene, plan): (&Scene, &Plan), located: &[Located; 2]) -> f64 {
     let [a, b] = located.each_ref().map(|(part, element)| {

@@ -14,6 +14,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::Detector;
 use super::advance::{moving, refuse_cell, refuse_seams, set_end_positions};
+use crate::answers::advance::StartPositions;
 use crate::answers::truncation::Truncation;
 use crate::plan::{Plan, TestId};
 use crate::query::Query;
@@ -87,6 +88,7 @@ impl Detector {
         let start = self.verify(scene, query)?.map(|start| start.intersects);
         let mut truncation = Truncation {
             start_intersects: start,
+            start: StartPositions::of(scene),
             ..Truncation::default()
         };
         if start == Some(true) {

@@ -158,6 +158,10 @@ impl Plan {
                 vertices.push(VertexList { bodies, lists });
             }
         }
+        query
+            .pairs
+            .iter()
+            .try_for_each(|pairs| pairs.check(scene))?;
         let of_part = |part: PartIx| {
             let body = self.body(scene, part);
             OfPart {

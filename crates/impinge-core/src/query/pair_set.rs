@@ -1,9 +1,12 @@
 //! Pairs of vertices, edges and faces that a query leaves out by name.
 
+use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::query::pair_kind::PairKind;
+use crate::scene::Scene;
 use crate::scene::elements::Part;
+use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
 use crate::scene::index::{Number, pair_key};
 
@@ -23,6 +26,8 @@ pub(crate) struct PairSet(Arc<HeldPairs>);
 #[derive(Debug)]
 struct HeldPairs {
     pairs: [Vec<Named>; PairKind::ALL.len()],
+    /// The topology of each body when they were found.
+    topologies: BTreeMap<BodyId, u64>,
     /// Their keys in the numbers of the last plan.
     keys: Mutex<Option<(Vec<Numbered>, SortedKeys)>>,
 }
@@ -34,15 +39,31 @@ impl PartialEq for PairSet {
 }
 
 impl PairSet {
-    pub fn new(pairs: impl Iterator<Item = (PairKind, Named)>) -> Self {
+    pub fn new(
+        pairs: impl Iterator<Item = (PairKind, Named)>,
+        topologies: BTreeMap<BodyId, u64>,
+    ) -> Self {
         let mut of_kinds: [Vec<Named>; PairKind::ALL.len()] = Default::default();
         for (kind, pair) in pairs {
             of_kinds[kind as usize].push(pair);
         }
         PairSet(Arc::new(HeldPairs {
             pairs: of_kinds,
+            topologies,
             keys: Mutex::default(),
         }))
+    }
+
+    /// Refuses a body that was re-meshed: its elements have other numbers now. Pairs of a body that
+    /// is no longer there are none.
+    ///
+    /// # Errors
+    /// Names the body.
+    pub fn check(&self, scene: &Scene) -> Result<(), Error> {
+        match scene.remeshed(&self.0.topologies).next() {
+            Some(body) => Err(Error::Remeshed { body }),
+            None => Ok(()),
+        }
     }
 
     /// The keys of the pairs in the numbers of a plan; those of bodies that do not take part have

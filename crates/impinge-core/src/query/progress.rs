@@ -1,7 +1,7 @@
 //! Cancellation and progress on long runs.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use crate::scene::error::Error;
 
@@ -26,12 +26,13 @@ impl CancelToken {
     }
 }
 
-/// The progress of a detection: `done` of `total` units of work. Units differ by stage.
+/// The progress of a detection: `done` of `total` units of work. Units differ by stage, and each
+/// stage begins with 0. Where several threads report, one may be a few units late.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Progress {
     /// Units done.
     pub done: u64,
-    /// All units.
+    /// All units; at least 1.
     pub total: u64,
 }
 
@@ -78,10 +79,45 @@ impl Control {
         if self.cancel.as_ref().is_some_and(CancelToken::is_cancelled) {
             return Err(Error::Cancelled);
         }
-        if let Some(callback) = &self.progress {
-            callback(Progress { done, total });
+        match &self.progress {
+            Some(callback) if total > 0 => callback(Progress { done, total }),
+            _ => {}
         }
         Ok(())
+    }
+}
+
+/// Pieces of work that several threads take, in any order.
+pub(crate) struct Pieces<'a> {
+    control: &'a Control,
+    n_taken: AtomicU64,
+    n: u64,
+}
+
+impl<'a> Pieces<'a> {
+    pub fn new(control: &'a Control, n: usize) -> Self {
+        Pieces {
+            control,
+            n_taken: AtomicU64::new(0),
+            n: n as u64,
+        }
+    }
+
+    /// Called before each.
+    ///
+    /// # Errors
+    /// Cancellation.
+    pub fn take(&self) -> Result<(), Error> {
+        let n_taken = self.n_taken.fetch_add(1, Ordering::Relaxed);
+        self.control.step(n_taken, self.n)
+    }
+
+    /// Called after all.
+    ///
+    /// # Errors
+    /// Cancellation.
+    pub fn end(&self) -> Result<(), Error> {
+        self.control.step(self.n, self.n)
     }
 }
 

@@ -1,5 +1,7 @@
 //! The bodies of a scene: added, removed, found, and told whom they meet.
 
+use std::collections::BTreeMap;
+
 use crate::scene::body::{Body, Filter};
 use crate::scene::elements::{Elements, with_corners};
 use crate::scene::error::Error;
@@ -360,6 +362,18 @@ impl Scene {
     pub(crate) fn body_in(&self, slot: u32) -> &Body {
         let held = self.slots[slot as usize].0.as_ref();
         &held.expect("a part's slot is in use").1
+    }
+
+    /// The bodies that have another topology than they had.
+    pub(crate) fn remeshed(
+        &self,
+        topologies: &BTreeMap<BodyId, u64>,
+    ) -> impl Iterator<Item = BodyId> {
+        let is_new = |(id, stamp): &(&BodyId, &u64)| {
+            let body = self.body(**id);
+            body.is_ok_and(|body| body.topology_stamp() != **stamp)
+        };
+        topologies.iter().filter(is_new).map(|(&id, _)| id)
     }
 }
 

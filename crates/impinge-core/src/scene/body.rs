@@ -47,6 +47,8 @@ pub struct Body {
     pub(super) end: Option<Positions>,
     /// Whether `end` counts. If not, only its memory is kept.
     pub(super) moves: bool,
+    /// Whether it was made from the rest positions.
+    pub(super) is_end_transformed: bool,
     /// How the body was moved by a transform, if it was.
     pub(super) motion: Option<Box<RestPose>>,
     pub(super) filter: Filter,
@@ -98,6 +100,7 @@ impl Body {
             positions,
             end: None,
             moves: false,
+            is_end_transformed: false,
             motion: None,
             filter,
             thickness: HeldThickness::default(),
@@ -166,12 +169,15 @@ impl Body {
     }
 
     /// The matrix that moved the vertices from the [rest positions](Body::rest_positions); `None`
-    /// without one ([`Scene::set_transform`](crate::Scene::set_transform)).
+    /// without one ([`Scene::set_transform`](crate::Scene::set_transform)), and after a step was
+    /// [taken](crate::Advance::apply).
     pub fn transform(&self) -> Option<[[f64; 4]; 4]> {
-        self.motion.as_ref().map(|motion| motion.matrix.matrix())
+        let matrix = self.motion.as_ref().and_then(|motion| motion.matrix);
+        matrix.map(|matrix| matrix.matrix())
     }
 
-    /// The positions that were given last, before any [transform](crate::Scene::set_transform).
+    /// The positions that were given last, before any [transform](crate::Scene::set_transform). Of a
+    /// body that transforms move, they stay the same when a step is [taken](crate::Advance::apply).
     pub fn rest_positions(&self) -> &Positions {
         match &self.motion {
             Some(motion) => &motion.rest,
@@ -283,11 +289,12 @@ impl Body {
     }
 
     /// Sets checked positions at the end of a step.
-    pub(super) fn set_end(&mut self, mut end: Positions) {
+    pub(super) fn set_end(&mut self, mut end: Positions, is_transformed: bool) {
         self.positions.widen_as(&end);
         end.widen_as(&self.positions);
         self.end = Some(end);
         self.moves = true;
+        self.is_end_transformed = is_transformed;
         self.step_stamp = new_stamp();
     }
 
@@ -295,6 +302,7 @@ impl Body {
         self.positions_stamp = new_stamp();
         self.step_stamp = self.positions_stamp;
         self.moves = false;
+        self.is_end_transformed = false;
         self.motion = None;
         self.checked = checked;
     }

@@ -153,6 +153,21 @@ pub enum Error {
         /// The kind of the body's primitives, such as `"triangles"`.
         kind: &'static str,
     },
+    /// Pairs from before a body was re-meshed: its elements have other numbers now. Ask again.
+    #[error("body {body}: the pairs were found before it was re-meshed, and name other elements")]
+    Remeshed {
+        /// The body.
+        body: BodyId,
+    },
+    /// A step that was found before a body was moved or added: nothing is known of it now. Ask
+    /// again.
+    #[error(
+        "body {body}: the step was found for other positions than it has now, so nothing is known of it; ask again"
+    )]
+    Moved {
+        /// The body.
+        body: BodyId,
+    },
     /// A surface with a border, or with faces whose orientations disagree. Weld vertices, fill
     /// holes, orient faces.
     #[error(

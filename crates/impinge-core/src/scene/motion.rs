@@ -79,7 +79,7 @@ impl Scene {
         target.check(body, &positions)?;
         let mut end = target.end.take().unwrap_or_else(|| f32::store(&[]));
         store(&mut end, positions);
-        target.set_end(end);
+        target.set_end(end, false);
         Ok(())
     }
 
@@ -109,7 +109,8 @@ impl Scene {
     /// Moves a body by an affine matrix, such as a rigid motion, without passing its vertices
     /// again. It moves the rest positions, which are those given last ([`add`](Scene::add),
     /// [`set_positions`](Scene::set_positions), [`remesh`](Scene::remesh)). A second transform
-    /// replaces the first; they do not accumulate.
+    /// replaces the first; they do not accumulate, also where a step was
+    /// [taken](crate::Advance::apply) in between.
     ///
     /// Answers are exact for the moved vertices. These are rounded in a fixed way, so they have the
     /// same bits on every backend: row `[a, b, c, d]` of the matrix takes `(x, y, z)` to
@@ -142,21 +143,25 @@ impl Scene {
             target.positions.check(body)?;
         }
         let previous = target.motion.take();
-        let (rest, before) = match previous {
-            Some(motion) => (motion.rest, Some(motion.matrix)),
+        let (rest, before) = match &previous {
+            Some(motion) => (Arc::clone(&motion.rest), motion.matrix),
             None => (Arc::new(target.positions.clone()), None),
         };
+        // A step has taken it to where no matrix does.
+        let reached = (previous.is_some() && before.is_none()).then(|| target.positions.clone());
         matrix.write(&rest, &mut target.positions);
         if let Err(error) = target.positions.check(body) {
             // Restore the previous positions: computing them again gives the same bits.
-            match before {
-                Some(matrix) => matrix.write(&rest, &mut target.positions),
-                None => target.positions.clone_from(&rest),
+            match (before, reached) {
+                (Some(matrix), _) => matrix.write(&rest, &mut target.positions),
+                (None, Some(reached)) => target.positions = reached,
+                (None, None) => target.positions.clone_from(&rest),
             }
-            target.motion = before.map(|matrix| Box::new(RestPose { rest, matrix }));
+            target.motion = previous;
             return Err(error);
         }
         target.has_moved(true);
+        let matrix = Some(matrix);
         target.motion = Some(Box::new(RestPose { rest, matrix }));
         Ok(())
     }
@@ -182,8 +187,9 @@ impl Scene {
     /// as well, up to that rounding.
     ///
     /// After a step, call `set_transform` with the matrix of its end: the positions are then the
-    /// end positions, bit by bit. A step taken by [`apply`](crate::Advance::apply) gives the body
-    /// the positions reached, which are then its rest positions.
+    /// end positions, bit by bit. Or take it by [`apply`](crate::Advance::apply), which gives the
+    /// body the positions reached. The rest positions stay the same: the next matrix begins with
+    /// them, too.
     ///
     /// ```
     /// use impinge_core::Scene;
@@ -219,7 +225,26 @@ impl Scene {
         let mut end = unused.unwrap_or_else(|| f32::store(&[]));
         matrix.write(target.rest_positions(), &mut end);
         end.check(body)?;
-        target.set_end(end);
+        target.set_end(end, true);
+        Ok(())
+    }
+
+    /// Gives a body the positions that a step has reached. The rest positions of one that
+    /// transforms move stay the same.
+    ///
+    /// # Errors
+    /// As [`set_positions`](Scene::set_positions).
+    pub(crate) fn take_step(&mut self, body: BodyId, positions: &Positions) -> Result<(), Error> {
+        let positions = positions.into();
+        let target = self.moved_body(body)?;
+        target.check(body, &positions)?;
+        let rest = match target.motion.take() {
+            Some(motion) => Some(motion.rest),
+            None => (target.is_end_transformed).then(|| Arc::new(target.positions.clone())),
+        };
+        store(&mut target.positions, positions);
+        target.has_moved(true);
+        target.motion = rest.map(|rest| Box::new(RestPose { rest, matrix: None }));
         Ok(())
     }
 }

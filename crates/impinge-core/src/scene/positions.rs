@@ -186,6 +186,18 @@ impl<R: Real> From<Vec<[R; 3]>> for Positions {
     }
 }
 
+impl<R: Real, const N: usize> From<[[R; 3]; N]> for Positions {
+    fn from(positions: [[R; 3]; N]) -> Self {
+        positions.to_vec().into()
+    }
+}
+
+impl<R: Real> From<&[[R; 3]]> for Positions {
+    fn from(positions: &[[R; 3]]) -> Self {
+        positions.to_vec().into()
+    }
+}
+
 impl<R: Real> From<PositionRows<R>> for Positions {
     fn from(positions: PositionRows<R>) -> Self {
         R::held(positions)

@@ -5,11 +5,11 @@ use std::sync::Arc;
 use crate::scene::error::Error;
 use crate::scene::positions::{Positions, Real};
 
-/// The rest positions of a body, and the matrix that moved them.
+/// The rest positions of a body, and the matrix that moved them; `None` if a step did.
 #[derive(Debug, Clone)]
 pub(crate) struct RestPose {
     pub rest: Arc<Positions>,
-    pub matrix: Affine,
+    pub matrix: Option<Affine>,
 }
 
 /// The upper three rows of a 4 x 4 matrix whose last row is `0 0 0 1`.

@@ -85,7 +85,7 @@ pub(crate) struct SharesBetween<'a> {
 }
 
 impl SharesBetween<'_> {
-    /// Takes a pair, by a number below its distance [`without`] the thickness, and both
+    /// Takes a pair, by a number that is at most its distance [`without`] the thickness, and both
     /// elements' corners.
     pub fn take(&self, corners: [&[u32]; 2], distance: f64) {
         let shares = self.divided(distance);
@@ -132,24 +132,23 @@ impl SharesBetween<'_> {
     fn divided(&self, distance: f64) -> [f64; 2] {
         match self.are_fixed {
             [true, true] => [0.0; 2],
-            [true, false] => [0.0, distance],
-            [false, true] => [distance, 0.0],
-            [false, false] => {
-                let half = distance / 2.0;
-                // Half of an odd multiple of the smallest number may be rounded up.
-                let half = if half + half > distance {
-                    half.next_down()
-                } else {
-                    half
-                };
-                [half; 2]
-            }
+            [true, false] => [0.0, below(distance)],
+            [false, true] => [below(distance), 0.0],
+            // Half of an odd multiple of the smallest number may be rounded up.
+            [false, false] => [below(distance / 2.0); 2],
         }
     }
 }
 
-/// A number below the distance of two elements, minus their thickness: 0 if that is
-/// not certainly above 0.
+/// The next number below one that is not negative; 0 below 0.
+#[inline(always)]
+fn below(number: f64) -> f64 {
+    // Floats are in the order of their bits.
+    f64::from_bits(number.to_bits().saturating_sub(1))
+}
+
+/// A number that is at most the distance of two elements minus their thickness, from one that is at
+/// most their distance: 0 if that is not certainly above 0.
 #[inline(always)]
 pub(crate) fn without(thickness: f64, distance: f64) -> f64 {
     match thickness {

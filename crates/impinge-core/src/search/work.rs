@@ -2,7 +2,7 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use crate::query::progress::Control;
+use crate::query::progress::{Control, Pieces};
 use crate::scene::error::Error;
 use crate::search::sink::{reserve, with_capacity};
 use crate::workers::Workers;
@@ -43,12 +43,13 @@ impl Work<'_> {
         let items: Vec<Mutex<&mut T>> = items.iter_mut().map(Mutex::new).collect();
         let failed: Mutex<Option<Error>> = Mutex::new(None);
         let failure = || failed.lock().unwrap_or_else(PoisonError::into_inner);
+        let pieces = Pieces::new(self.control, n);
         self.workers
             .for_each(&mut vec![(); self.workers.n()], n, |(), ix| {
                 if failure().is_some() {
                     return;
                 }
-                let step = self.control.step(ix as u64, n as u64);
+                let step = pieces.take();
                 let mut item = items[ix].lock().unwrap_or_else(PoisonError::into_inner);
                 if let Err(error) = step.and_then(|()| task(ix, &mut item)) {
                     failure().get_or_insert(error);

@@ -1,7 +1,7 @@
 //! Bad input, memory budgets, cancellation.
 
-use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex};
 
 use crate::common::{self, agree, naive, rows};
 use impinge_core::{
@@ -320,6 +320,36 @@ fn directions_tell_long_elements_apart() {
     let pairs = detector.detect(&built.scene, &built.query).unwrap();
     let (n, n_parted) = (pairs.stats().n_candidates, pairs.stats().ways.n_parted);
     assert!(4 * n_parted > n, "{n_parted} of {n} candidates");
+}
+
+/// Threads take tasks in any order, but what is done is counted.
+#[test]
+fn progress_counts_what_is_done() {
+    const THREADS: usize = 4;
+    let built = adversarial::plain(20_000).unwrap();
+    let mut detector = Detector::new(cpu(Method::Clusters).threads(THREADS)).unwrap();
+    let seen = Arc::new(Mutex::new(Vec::new()));
+    let all = Arc::clone(&seen);
+    let see = move |progress: impinge_core::Progress| all.lock().unwrap().push(progress);
+    detector.set_control(Control::new().progress(see));
+    detector.detect(&built.scene, &built.query).unwrap();
+    let seen = seen.lock().unwrap();
+    assert!(
+        seen.iter()
+            .any(|progress| progress.total > 2 * THREADS as u64)
+    );
+    for (ix, progress) in seen.iter().enumerate() {
+        assert!(progress.total > 0 && progress.done <= progress.total);
+        // A report may be late, by as many as there are other threads.
+        let before = progress.done.saturating_sub(THREADS as u64);
+        let is_before =
+            |other: &impinge_core::Progress| (other.done, other.total) == (before, progress.total);
+        let has_begun = progress.done < THREADS as u64;
+        assert!(
+            has_begun || seen[..ix].iter().any(is_before),
+            "{ix}: {progress:?}"
+        );
+    }
 }
 
 #[test]

@@ -107,11 +107,12 @@ fn test_of(kind: PairKind) -> ElementPair {
     }
 }
 
-/// At least the sum.
+/// At least the sum, and the sum itself if it is a float.
 fn sum_up(numbers: &[f64]) -> f64 {
-    numbers.iter().fold(0.0, |sum: f64, &x| match x {
-        0.0 => sum,
-        x => (sum + x).next_up(),
+    numbers.iter().fold(0.0, |sum: f64, &x| {
+        let found = sum + x;
+        let rest = (sum - (found - x)) + (x - (found - (found - x)));
+        if rest > 0.0 { found.next_up() } else { found }
     })
 }
 
@@ -296,9 +297,62 @@ fn bounds_of_multiples_of_the_smallest_number() {
             let query = Query::all().fixed(fixed.iter().copied());
             let safe = detector.safe_distances(&scene, 1.0, &query).expect("good");
             let [a, b] = bodies.map(|body| multiple(safe.of(body).expect("held").get(0)));
-            assert!((a + b).pow(2) <= square, "{x} {y} {z}: {a} {b}");
-            // Less than what two roundings may take away.
-            assert!((a + b + 3).pow(2) > square, "{x} {y} {z}: {a} {b}");
+            assert!(
+                (a + b).pow(2) < square || a + b == 0,
+                "{x} {y} {z}: {a} {b}"
+            );
+            // Less than what roundings may take away.
+            assert!((a + b + 4).pow(2) > square, "{x} {y} {z}: {a} {b}");
+        }
+    }
+}
+
+/// Where elements are large beside their distance, distances are measured exactly, and many are
+/// floats: bounds are still less.
+#[test]
+fn bounds_are_less_than_distances_that_are_floats() {
+    let mut detectors = detectors();
+    for exponent in 0..48 {
+        let (size, gap) = (2f64.powi(exponent), 2f64.powi(exponent % 3 - exponent));
+        let faces = [
+            vec![[-size, -size, 0.0], [size, -size, 0.0], [0.0, size, 0.0]],
+            vec![[0.0, 0.0, gap], [size, 0.0, size], [0.0, size, size]],
+        ];
+        let edges = [
+            vec![[-size, 0.0, 0.0], [size, 0.0, 0.0]],
+            vec![[0.0, -size, gap], [0.0, size, gap]],
+        ];
+        for (is_double, points) in [
+            (true, &faces),
+            (false, &faces),
+            (true, &edges),
+            (false, &edges),
+        ] {
+            let mut scene = Scene::new();
+            let bodies = points.each_ref().map(|points| {
+                let elements = match points.len() {
+                    2 => Elements::Edges(vec![[0, 1]]),
+                    _ => Elements::Triangles(vec![[0, 1, 2]]),
+                };
+                let single: Vec<_> = points.iter().map(|p| p.map(|x| x as f32)).collect();
+                let body = match is_double {
+                    true => scene.add((elements, points.clone())),
+                    false => scene.add((elements, single)),
+                };
+                body.expect("good")
+            });
+            for fixed in [&[][..], &bodies[..1]] {
+                let most = 2.0 * gap;
+                // Those that `check` looks at.
+                let kinds = &PairKind::ALL[..4];
+                let query = Query::all().kinds(kinds.iter().copied());
+                let query = query.fixed(fixed.iter().copied());
+                for detector in &mut detectors {
+                    let safe = detector.safe_distances(&scene, most, &query).expect("good");
+                    let [n_touching, n_bounded] = check(&scene, &safe, most, fixed);
+                    assert!(n_touching == 0 && n_bounded > 0, "{size} {gap}");
+                }
+            }
         }
     }
 }

@@ -678,20 +678,27 @@ fn refusals_name_what_is_wrong() {
         pairs.stencils(&soup(1, None), None),
         Err(Error::UnknownBody { .. })
     ));
-    let id = scene.bodies().next().unwrap().0;
-    scene
-        .remesh(
-            id,
-            (
-                vec![[0, 1, 2]],
-                vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
-            ),
-        )
-        .unwrap();
-    assert!(matches!(
-        pairs.stencils(&scene, None),
-        Err(Error::ForeignPair { .. })
-    ));
+    // A body may have as many elements as before, with other numbers.
+    let (id, body) = scene.bodies().next().unwrap();
+    let Elements::Triangles(mut faces) = body.elements().clone() else {
+        panic!("a soup");
+    };
+    let points = body.positions().clone();
+    let query = Query::all().exclude(&pairs);
+    assert!(detector.near(&scene, 0.1, &query).is_ok());
+    for few in [false, true] {
+        faces.reverse();
+        faces.truncate(if few { 1 } else { faces.len() });
+        scene.remesh(id, (faces.clone(), points.clone())).unwrap();
+        let text = "body 0: the pairs were found before it was re-meshed, and name other elements";
+        assert_eq!(refused(&pairs, &scene, None), text);
+        // So it is with pairs that are left out.
+        let refused = detector.near(&scene, 0.1, &query);
+        assert_eq!(refused.unwrap_err().to_string(), text);
+    }
+    // Those of a body that is no longer there are none.
+    scene.remove(id).unwrap();
+    assert!(detector.near(&scene, 0.1, &query).is_ok());
 }
 
 /// Stencils are those of one pair after another, columns and projections those of one stencil after

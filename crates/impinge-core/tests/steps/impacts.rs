@@ -153,6 +153,102 @@ fn a_step_that_is_advanced_is_free_to_its_rounded_end() {
     }
 }
 
+/// Nothing is known of a step once any body is somewhere else.
+#[test]
+fn a_step_is_taken_from_where_it_was_found_only() {
+    let mut detector = Detector::new(Backend::Cpu).expect("a CPU");
+    let (scene, ground, other) = falling();
+    let advance = detector.advance(&scene, &Query::all()).expect("good");
+    let truncation = detector.truncate(&scene, &Query::all()).expect("good");
+    let takes: [&dyn Fn(&mut Scene) -> Result<(), Error>; 2] =
+        [&|scene| advance.apply(scene), &|scene| {
+            truncation.apply(scene)
+        }];
+    for take in takes {
+        let refused = |scene: &Scene, body: BodyId| {
+            let mut now = scene.clone();
+            let positions = |scene: &Scene| scene.body(other).map(|body| body.positions().clone());
+            let error = take(&mut now).expect_err("somewhere else").to_string();
+            let text = "the step was found for other positions than it has now";
+            assert!(
+                error.starts_with(&format!("body {body}: {text}")),
+                "{error}"
+            );
+            assert_eq!(positions(&now).ok(), positions(scene).ok());
+        };
+        // A clone does as well, but only once; where it goes to next does not matter.
+        let mut taken = scene.clone();
+        taken.set_end_positions(other, &lifted(5.0)).expect("good");
+        take(&mut taken).expect("the same positions");
+        refused(&taken, other);
+        // A body that does not move.
+        let mut moved = scene.clone();
+        let positions = moved.body(ground).expect("known").positions().clone();
+        moved.set_positions(ground, positions).expect("good");
+        refused(&moved, ground);
+        let mut more = scene.clone();
+        let new = more.add_points(&[[9.0f32; 3]]).expect("good");
+        refused(&more, new);
+        // What is gone is met by nothing.
+        let mut fewer = scene.clone();
+        fewer.remove(ground).expect("known");
+        take(&mut fewer).expect("the others are the same");
+        fewer.remove(other).expect("known");
+        assert!(matches!(take(&mut fewer), Err(Error::UnknownBody { .. })));
+    }
+}
+
+/// Transforms are those of the rest positions, also after a step was taken.
+#[test]
+fn transforms_do_not_accumulate_over_steps() {
+    let at = |z: f64| {
+        [
+            [1.0, 0.0, 0.0, 0.0],
+            [0.0, 1.0, 0.0, 0.0],
+            [0.0, 0.0, 1.0, z],
+            [0.0, 0.0, 0.0, 1.0],
+        ]
+    };
+    for begins_with_one in [false, true] {
+        let mut detector = Detector::new(Backend::Cpu).expect("a CPU");
+        let (mut scene, _, other) = falling();
+        scene.set_positions(other, &lifted(1.0)).expect("good");
+        if begins_with_one {
+            scene.set_transform(other, &at(0.0)).expect("good");
+        }
+        for height in [1.0, 2.0, 3.0] {
+            scene.set_end_transform(other, &at(height)).expect("good");
+            if height == 2.0 {
+                let truncation = detector.truncate(&scene, &Query::all()).expect("good");
+                truncation.apply(&mut scene).expect("the same positions");
+            } else {
+                let advance = detector.advance(&scene, &Query::all()).expect("good");
+                advance.apply(&mut scene).expect("the same positions");
+            }
+            let body = scene.body(other).expect("known");
+            let expected = lifted(1.0 + height as f32).to_vec().into();
+            assert_eq!(body.positions(), &expected);
+            assert_eq!(body.rest_positions(), &lifted(1.0).to_vec().into());
+            assert_eq!(body.transform(), None);
+        }
+        // A refused one changes nothing.
+        let scaled = [[1e38, 1e38, 0.0, 1e38], at(0.0)[1], at(0.0)[2], at(0.0)[3]];
+        scene
+            .set_transform(other, &scaled.map(|row| row.map(|x| x * 1e10)))
+            .expect_err("no floats");
+        let body = scene.body(other).expect("known");
+        assert_eq!(body.positions(), &lifted(4.0).to_vec().into());
+        scene.set_transform(other, &at(0.5)).expect("good");
+        let body = scene.body(other).expect("known");
+        assert_eq!(body.positions(), &lifted(1.5).to_vec().into());
+        // What is given is where the next begins.
+        scene.set_positions(other, &lifted(2.0)).expect("good");
+        scene.set_end_transform(other, &at(1.0)).expect("good");
+        let body = scene.body(other).expect("known");
+        assert_eq!(body.end_positions(), Some(&lifted(3.0).to_vec().into()));
+    }
+}
+
 /// Triangles that land on a slope nearly at once: rounding makes others touch than the first. The
 /// naive method searches all pairs for every fraction.
 #[test]

@@ -10,7 +10,9 @@ use crate::plan::Plan;
 use crate::query::pair_kind::PairKind;
 use crate::query::pair_set::PairSet;
 use crate::query::{Exclusion, Query};
+use crate::scene::Scene;
 use crate::scene::error::Error;
+use crate::scene::ids::BodyId;
 use crate::search::found::KeysByKind;
 use crate::search::pair_reader::{PairReader, Side};
 use crate::search::sink::reserve;
@@ -270,9 +272,10 @@ impl NearPairs {
 impl From<&NearPairs> for Exclusion {
     fn from(near: &NearPairs) -> Self {
         let named = |of: Element| (of.body, of.element);
+        let pairs = near.iter();
         PairSet::new(
-            near.iter()
-                .map(|pair| (pair.kind, [named(pair.a), named(pair.b)])),
+            pairs.map(|pair| (pair.kind, [named(pair.a), named(pair.b)])),
+            near.numbering.topologies().clone(),
         )
         .into()
     }
@@ -313,6 +316,11 @@ pub struct NearIter<'a> {
 }
 
 impl NearIter<'_> {
+    /// Bodies that were re-meshed since: their elements have other numbers now.
+    pub(crate) fn remeshed(&self, scene: &Scene) -> Vec<BodyId> {
+        scene.remeshed(self.pairs.numbering.topologies()).collect()
+    }
+
     /// How many threads computed the answer.
     pub(crate) fn threads(&self) -> usize {
         self.pairs.threads

@@ -11,6 +11,7 @@
 use std::sync::{Mutex, PoisonError};
 
 use crate::plan::{TestId, owner_by_first};
+use crate::query::progress::Pieces;
 use crate::scene::error::Error;
 use crate::scene::index::{PartIx, Slot};
 use crate::search::found::StepAnswer;
@@ -94,17 +95,18 @@ impl Deciding<'_, '_> {
         let wrong = Mutex::new(None);
         let tasks: Vec<&[UndecidedPair]> = pairs.chunks(TASK).collect();
         let n_workers = workers.len().min(tasks.len()).max(1);
+        let pieces = Pieces::new(job.control, tasks.len());
         job.workers
             .for_each(&mut workers[..n_workers], tasks.len(), |worker, ix| {
                 let is_over = answer.is_over() || world.known.is_over();
-                if is_over || job.control.step(ix as u64, tasks.len() as u64).is_err() {
+                if is_over || pieces.take().is_err() {
                     return;
                 }
                 if let Err(error) = decide(world, first_slots, tasks[ix], worker.contacts()) {
                     *wrong.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
                 }
             });
-        job.control.step(tasks.len() as u64, tasks.len() as u64)?;
+        pieces.end()?;
         answer.check()?;
         match wrong.into_inner().unwrap_or_else(PoisonError::into_inner) {
             Some(error) => Err(error),

@@ -18,6 +18,7 @@ use std::sync::Arc;
 use crate::bvh::clusters::Clustering;
 use crate::cpu::lane_pairs::WorkItem;
 use crate::plan::Plan;
+use crate::query::progress::Pieces;
 use crate::query::settings::Settings;
 use crate::scene::Scene;
 use crate::scene::error::Error;
@@ -249,9 +250,9 @@ fn decide(
     let VerletList {
         listings, tasks, ..
     } = list;
-    let n_tasks = tasks.len() as u64;
+    let pieces = Pieces::new(job.control, tasks.len());
     job.workers.for_each(workers, tasks.len(), |worker, ix| {
-        if world.answer.is_over() || job.control.step(ix as u64, n_tasks).is_err() {
+        if world.answer.is_over() || pieces.take().is_err() {
             return;
         }
         let task = &tasks[ix];
@@ -263,7 +264,7 @@ fn decide(
             worker: &mut StepWorker = worker,
         ));
     });
-    job.control.step(n_tasks, n_tasks)
+    pieces.end()
 }
 
 #[inline(always)]
