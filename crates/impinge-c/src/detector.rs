@@ -10,7 +10,7 @@ use impinge::{Backend, CancelToken, Control, Detector, Error, Method, Progress, 
 
 use crate::sized::read_sized;
 use crate::stats::{Texts, fill};
-use crate::status::{Failure, Handle, change, clear, destroy, guard, held, put};
+use crate::status::{Failure, Handle, State, change, clear, destroy, guard, held, put};
 use crate::types::*;
 
 /// A detector, and the callbacks of its settings.
@@ -19,13 +19,16 @@ pub struct impinge_detector {
     callbacks: Callbacks,
     /// The strings of `impinge_detector_stats`.
     texts: Texts,
-    is_broken: bool,
+    state: State,
 }
 
 impl Handle for impinge_detector {
     const NAME: &'static str = "detector";
-    fn is_broken(&mut self) -> &mut bool {
-        &mut self.is_broken
+    const ONE_AT_A_TIME: &'static str = "a detector answers one question at a time; make one per thread, and ask none from its own callbacks";
+
+    unsafe fn state<'a>(handle: *const Self) -> &'a State {
+        // SAFETY: the caller's promise.
+        unsafe { &(*handle).state }
     }
 }
 
@@ -97,7 +100,7 @@ impl Watch {
 /// Asks a detector, which calls the callbacks of its settings meanwhile. A failure is logged too.
 ///
 /// # Safety
-/// `detector` is NULL or a detector that nobody else uses at the same time.
+/// `detector` is NULL or a detector that nobody destroys during the call.
 pub unsafe fn ask(
     detector: *mut impinge_detector,
     question: impl FnOnce(&mut Detector) -> Result<(), Failure>,
@@ -227,7 +230,7 @@ pub unsafe extern "C" fn impinge_detector_create(
             detector: made,
             callbacks,
             texts: Texts::default(),
-            is_broken: false,
+            state: State::default(),
         };
         // SAFETY: as above.
         unsafe { put(detector, "detector", Box::into_raw(Box::new(made))) }

@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use impinge::{Body, BodyId, Filter, Positions, Scene, Thickness, Weld};
 
 use crate::arrays::{self, Floats, elements_view, no_rows, positions_view, with_rows};
-use crate::status::{Failure, Handle, broken, change, clear, destroy, guard, held, put};
+use crate::status::{Failure, Handle, State, change, clear, destroy, guard, held, put};
 use crate::types::*;
 
 /// A scene, and the ids of its bodies.
@@ -17,23 +17,23 @@ pub struct impinge_scene {
     pub scene: Scene,
     /// By the number of the body.
     ids: Vec<Option<BodyId>>,
-    is_broken: bool,
+    state: State,
 }
 
 impl Handle for impinge_scene {
     const NAME: &'static str = "scene";
-    fn is_broken(&mut self) -> &mut bool {
-        &mut self.is_broken
+    const ONE_AT_A_TIME: &'static str = "another call is changing it; one call at a time changes a scene, and no question is asked about it meanwhile";
+
+    unsafe fn state<'a>(handle: *const Self) -> &'a State {
+        // SAFETY: the caller's promise.
+        unsafe { &(*handle).state }
     }
 }
 
 impl impinge_scene {
-    /// The scene, unless an internal error has left it half changed.
+    /// The scene, unless a call is changing it, or an internal error has left it half changed.
     pub fn sound(&self) -> Result<&Self, Failure> {
-        match self.is_broken {
-            true => Err(broken(Self::NAME)),
-            false => Ok(self),
-        }
+        self.state.sound::<Self>().map(|()| self)
     }
 
     /// The id of a body.

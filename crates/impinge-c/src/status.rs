@@ -6,6 +6,7 @@ use std::cell::{Cell, RefCell};
 use std::ffi::{CString, c_char};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Once;
+use std::sync::atomic::{AtomicU8, Ordering};
 
 use impinge::Error;
 
@@ -119,43 +120,81 @@ fn describe(panic: &(dyn Any + Send)) -> String {
     format!("internal error, please report it: {what} ({place})")
 }
 
-/// A handle that a panic makes unusable.
-pub trait Handle {
-    const NAME: &'static str;
-    fn is_broken(&mut self) -> &mut bool;
-}
+/// Whether a call may use a handle: one call at a time, and none after a panic.
+#[derive(Default)]
+pub struct State(AtomicU8);
 
-/// That a handle is unusable.
-pub fn broken(name: &str) -> Failure {
-    Failure {
-        status: INTERNAL,
-        message: format!(
-            "the {name} is broken: an earlier call ended in an internal error; destroy it and make another"
-        ),
+const FREE: u8 = 0;
+const IN_USE: u8 = 1;
+const BROKEN: u8 = 2;
+
+impl State {
+    /// Reserves the handle for one call. `change` releases it.
+    fn reserve<H: Handle>(&self) -> Result<(), Failure> {
+        let reserved = self
+            .0
+            .compare_exchange(FREE, IN_USE, Ordering::Acquire, Ordering::Relaxed);
+        reserved.map(drop).map_err(refused::<H>)
+    }
+
+    /// That no call is changing the handle, and none has ended in a panic.
+    pub fn sound<H: Handle>(&self) -> Result<(), Failure> {
+        match self.0.load(Ordering::Acquire) {
+            FREE => Ok(()),
+            state => Err(refused::<H>(state)),
+        }
     }
 }
 
-/// Runs an entry that changes a handle. The handle is given to `entry`, and refuses further use
-/// after a panic.
+/// Why a handle in such a state is refused.
+fn refused<H: Handle>(state: u8) -> Failure {
+    match state {
+        IN_USE => Failure::invalid(format!("the {} is in use: {}", H::NAME, H::ONE_AT_A_TIME)),
+        _ => Failure {
+            status: INTERNAL,
+            message: format!(
+                "the {} is broken: an earlier call ended in an internal error; destroy it and make another",
+                H::NAME
+            ),
+        },
+    }
+}
+
+/// A handle that one call at a time changes, and that a panic makes unusable.
+pub trait Handle {
+    const NAME: &'static str;
+    /// What a caller is told who asks for a handle that is in use.
+    const ONE_AT_A_TIME: &'static str;
+
+    /// The state alone: another call may be changing the rest of the handle.
+    ///
+    /// # Safety
+    /// `handle` points to a handle that lives as long as the reference.
+    unsafe fn state<'a>(handle: *const Self) -> &'a State;
+}
+
+/// Runs an entry that changes a handle. The handle is given to `entry`. Until the entry returns,
+/// other calls are refused: those of other threads, and those of callbacks. After a panic all are.
 ///
 /// # Safety
-/// `handle` is NULL or a handle of this library that nobody else uses at the same time.
+/// `handle` is NULL or a handle of this library that nobody destroys during the call.
 pub unsafe fn change<H: Handle>(
     handle: *mut H,
     entry: impl FnOnce(&mut H) -> Result<(), Failure>,
 ) -> Status {
-    // SAFETY: the caller's promise.
-    let Some(handle) = (unsafe { handle.as_mut() }) else {
+    if handle.is_null() {
         return guard(|| Err(Failure::null(H::NAME)));
-    };
-    if *handle.is_broken() {
-        remember(&broken(H::NAME).message);
-        return INTERNAL;
     }
-    // Until the entry returns. A panic leaves it so.
-    *handle.is_broken() = true;
-    let status = guard(|| entry(handle));
-    *handle.is_broken() = status == INTERNAL;
+    // SAFETY: the caller's promise. No reference to the whole handle is made before it is reserved.
+    let state = unsafe { H::state(handle) };
+    if let Err(failure) = state.reserve::<H>() {
+        remember(&failure.message);
+        return failure.status;
+    }
+    // SAFETY: the caller's promise, and other calls are refused until the state is FREE.
+    let status = guard(|| entry(unsafe { &mut *handle }));
+    let left = if status == INTERNAL { BROKEN } else { FREE };
+    state.0.store(left, Ordering::Release);
     status
 }
 

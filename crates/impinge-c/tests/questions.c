@@ -1014,6 +1014,40 @@ static void callbacks(void) {
   impinge_scene_destroy(scene);
 }
 
+/* A detector that is asked by its own callback refuses, and goes on with the first question. */
+typedef struct {
+  impinge_detector *detector;
+  const impinge_scene *scene;
+  int n_refused;
+} asked_again;
+static int ask_again(void *user) {
+  asked_again *of = (asked_again *)user;
+  impinge_pairs *pairs = (impinge_pairs *)of;
+  int32_t any = -1;
+  REFUSED(impinge_any(of->detector, of->scene, NULL, &any), "the detector is in use: a detector answers one question at a time");
+  REFUSED(impinge_detect(of->detector, of->scene, NULL, &pairs), "the detector is in use");
+  CHECK(any == -1 && pairs == NULL);
+  ++of->n_refused;
+  return 0;
+}
+static void in_use(void) {
+  asked_again user = {NULL, NULL, 0};
+  impinge_settings settings;
+  impinge_scene *scene = two_balls();
+  int32_t any = 0;
+  impinge_settings_default(&settings);
+  settings.backend = IMPINGE_BACKEND_CPU;
+  settings.cancelled = ask_again;
+  settings.user = &user;
+  GOOD(impinge_detector_create(&settings, &user.detector));
+  user.scene = scene;
+  GOOD(impinge_any(user.detector, scene, NULL, &any));
+  CHECK(any == 1 && user.n_refused > 0);
+  GOOD(impinge_any(user.detector, scene, NULL, &any));
+  impinge_detector_destroy(user.detector);
+  impinge_scene_destroy(scene);
+}
+
 #ifdef TEST_PANIC
 impinge_status impinge_test_panic(impinge_detector *detector);
 /* A defect breaks the handle, and nothing else. */
@@ -1049,6 +1083,7 @@ int main(void) {
   gpus();
   other_bodies(detector);
   callbacks();
+  in_use();
 #ifdef TEST_PANIC
   panics();
 #endif

@@ -1,4 +1,4 @@
-/* Two threads, each with a detector of its own, ask about one scene at the same time. */
+/* Two threads, each with a detector of its own, ask about one scene at the same time. One detector refuses the question of a second thread. */
 #include "common.h"
 #include <pthread.h>
 
@@ -21,6 +21,42 @@ static void *ask(void *hash) {
   return NULL;
 }
 
+static impinge_detector *shared = NULL;
+static int n_refused = 0;
+
+static void *ask_shared(void *user) {
+  int32_t any = -1;
+  (void)user;
+  REFUSED(impinge_any(shared, scene, NULL, &any), "the detector is in use");
+  CHECK(any == -1);
+  return NULL;
+}
+
+/* Asks from another thread, while this one is in a question. */
+static int while_in_use(void *user) {
+  pthread_t other;
+  (void)user;
+  if (n_refused++ > 0) return 0;
+  CHECK(pthread_create(&other, NULL, ask_shared, NULL) == 0);
+  CHECK(pthread_join(other, NULL) == 0);
+  return 0;
+}
+
+static void in_use(void) {
+  impinge_settings settings;
+  int32_t any = 0;
+  int i;
+  impinge_settings_default(&settings);
+  settings.backend = IMPINGE_BACKEND_CPU;
+  settings.cancelled = while_in_use;
+  GOOD(impinge_detector_create(&settings, &shared));
+  for (i = 0; i < 2; ++i) {
+    GOOD(impinge_any(shared, scene, NULL, &any));
+    CHECK(any == 1 && n_refused > 0);
+  }
+  impinge_detector_destroy(shared);
+}
+
 int main(void) {
   static ball one, other;
   pthread_t threads[2];
@@ -36,6 +72,7 @@ int main(void) {
   CHECK(strlen(impinge_error_message()) == 0);
   ask(&hashes[2]);
   CHECK(hashes[0] != 0 && hashes[0] == hashes[1] && hashes[1] == hashes[2]);
+  in_use();
   impinge_scene_destroy(scene);
   return finish("threads");
 }
