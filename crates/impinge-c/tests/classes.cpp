@@ -119,6 +119,17 @@ void steps() {
   CHECK(advance.positions(a).rows == 0 && advance.positions(b).rows == VERTICES && advance.start_intersects() == false);
   advance.apply(scene);
   CHECK(far_away.use_count() == 1);
+  // No rows are a mistake, and not the wish to stand still.
+  scene.set_end_positions(b, numbers(balls[1]));
+  throws(IMPINGE_ERROR_INVALID, "body 1: 0 end positions given", [&] { scene.set_end_positions(b, std::vector<double>()); });
+  throws(IMPINGE_ERROR_INVALID, "clear_end_positions", [&] { scene.lend_end_positions(b, std::make_shared<std::vector<double>>()); });
+  throws(IMPINGE_ERROR_INVALID, "no body 9", [&] { scene.set_end_positions(9, std::vector<double>()); });
+  CHECK(scene.end_positions(b).rows == VERTICES);
+  scene.clear_end_positions(b);
+  CHECK(scene.end_positions(b).rows == 0);
+  const auto nothing = scene.add_points(std::vector<double>());
+  scene.set_end_positions(nothing, std::vector<double>());
+  scene.remove(nothing);
   const auto nearest = detector.distance(scene, a, b);
   CHECK(nearest && nearest->distance >= 1e-3 && nearest->distance < 1.01e-3);
   throws(IMPINGE_ERROR_INVALID, "no body 9", [&] { scene.set_positions(9, numbers(balls[0])); });
@@ -247,13 +258,17 @@ int main() {
   impinge::scene scene;
   const auto a = scene.add_triangles(faces(balls[0]), numbers(balls[0]));
   const auto b = scene.add_triangles(faces(balls[1]), numbers(balls[1]));
-  CHECK(a && b && *a == 0 && *b == 1);
+  CHECK(a && b && a.ok() && *a == 0 && *b == 1);
   const auto no_detector = impinge::detector::make(impinge::settings().reuse_margin(-1));
   CHECK(!no_detector && no_detector.status() == IMPINGE_ERROR_INVALID && no_detector.message().find("reuse_margin") != std::string::npos);
   auto made = impinge::detector::make();
-  CHECK(made && made->any(scene) && *made->any(scene));
+  CHECK(made);
+  const auto any = made->any(scene), none_of_self = made->any(scene, impinge::query::self_all());
+  CHECK(any.ok() && *any && none_of_self.ok() && !*none_of_self);
+  const auto first = made->earliest(scene, impinge::query::self_all());
+  CHECK(first.ok() && !*first);
   const auto none = scene.set_positions(9, numbers(balls[0]));
-  CHECK(!none && none.status() == IMPINGE_ERROR_INVALID && none.message().find("no body 9") != std::string::npos);
+  CHECK(!none && !none.ok() && none.status() == IMPINGE_ERROR_INVALID && none.message().find("no body 9") != std::string::npos);
   impinge::detector detector(impinge::backend::cpu);
   const auto pairs = detector.detect(scene);
   CHECK(pairs && pairs->size() > 100);
@@ -263,7 +278,10 @@ int main() {
   const auto refused = detector.safe_distances(scene, -1);
   CHECK(!refused && refused.status() == IMPINGE_ERROR_INVALID);
   const auto gpu = impinge::detector(impinge::backend::gpu).any(scene);
-  CHECK(!gpu && gpu.status() == IMPINGE_ERROR_INVALID);
+  CHECK(!gpu.ok() && gpu.status() == IMPINGE_ERROR_INVALID);
+  const auto no_rows = scene.set_end_positions(*a, std::vector<double>());
+  CHECK(!no_rows && no_rows.status() == IMPINGE_ERROR_INVALID && no_rows.message().find("clear_end_positions") != std::string::npos);
+  CHECK(scene.clear_end_positions(*a));
   return finish("classes without exceptions");
 #else
   answers();

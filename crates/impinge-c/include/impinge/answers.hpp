@@ -5,6 +5,7 @@
 #include <impinge/scene.hpp>
 
 namespace impinge {
+inline namespace IMPINGE_MODE {
 
 namespace detail {
 /// What an answer cost; nothing of none.
@@ -248,7 +249,8 @@ public:
   view<std::array<std::array<double, 3>, 2>> closest_points() const & { return packed<std::array<std::array<double, 3>, 2>>(IMPINGE_COLUMN_POINTS); }
   /// What a potential needs to know about each pair, at the positions that the scene has now.
   result<impinge::stencils> stencils(const scene &in) const { return stencils_of(in, nullptr); }
-  /// With the mollifier of nearly parallel edges, from the positions at rest of all vertices of the scene, body after body.
+  /// With the mollifier of nearly parallel edges, from positions at rest: of all vertices of all bodies of the scene, one body after another,
+  /// whatever bodies the pairs are of. If rows are missing, the message names the first body without enough of them.
   template <class P> result<impinge::stencils> stencils(const scene &in, const P &rest) const {
     const array rows = detail::rows_of(rest, 3);
     return stencils_of(in, &rows);
@@ -364,7 +366,7 @@ public:
     array view{};
     return detail::give(impinge_safe_distances_of(raw(), of, &view), std::move(view));
   }
-  /// The pairs at distance 0, whose vertices may not move at all.
+  /// The pairs at distance 0, or nearer than their bodies are thick, whose vertices may not move at all.
   view<pair> touching() const & noexcept {
     const auto *touching = impinge_safe_distances_touching(raw());
     return {impinge_near_data(touching), impinge_near_count(touching)};
@@ -479,6 +481,7 @@ public:
   std::uint32_t rounds() const noexcept { return impinge_motion_rounds(raw()); }
 };
 
+} // namespace IMPINGE_MODE
 } // namespace impinge
 
 #endif // IMPINGE_ANSWERS_HPP

@@ -8,6 +8,7 @@
 #include <Eigen/Core>
 
 namespace impinge {
+inline namespace IMPINGE_MODE {
 
 /// Everything of Eigen that lies in memory: one row per position or element.
 template <class T>
@@ -97,6 +98,7 @@ inline Eigen::MatrixXd to_matrix(const array &positions) {
   return Eigen::Map<const narrow, Eigen::Unaligned, strides>(static_cast<const float *>(positions.data), n, 3, stride(sizeof(float))).cast<double>();
 }
 
+} // namespace IMPINGE_MODE
 } // namespace impinge
 
 #endif // IMPINGE_EIGEN_HPP

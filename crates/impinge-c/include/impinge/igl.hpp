@@ -8,7 +8,9 @@
 #error "impinge/igl.hpp needs exceptions: its functions return answers"
 #endif
 
-namespace impinge::igl {
+namespace impinge {
+inline namespace IMPINGE_MODE {
+namespace igl {
 
 namespace detail {
 /// Element numbers of both sides as n x 2 integers.
@@ -50,6 +52,8 @@ bool intersect_other(const Eigen::MatrixBase<DerivedVA> &VA, const Eigen::Matrix
   return IF.rows() > 0;
 }
 
-} // namespace impinge::igl
+} // namespace igl
+} // namespace IMPINGE_MODE
+} // namespace impinge
 
 #endif // IMPINGE_IGL_HPP

@@ -4,8 +4,11 @@
 /// Ownership. Scenes, detectors and answers own their handle and can be moved. An answer outlives its scene and its detector; the views that it
 ///   gives live as long as it does. Arrays that are passed in are read during the call, but for those of `lend_positions`.
 /// Errors. A call that fails throws `impinge::error`. Where exceptions are off, or IMPINGE_NO_EXCEPTIONS is defined, each call gives a
-///   `result<T>` instead, which is false after a failure.
-/// Threads. As in impinge.h: one thread at a time changes a handle, and each question changes its detector.
+///   `result<T>` instead. `ok()` says whether the call succeeded. So does a test such as `if (pairs)`, but a `result<bool>` or a result of a
+///   std::optional cannot be tested: write `any.ok() && *any`. Units of both modes may be in one program. Their classes are different types,
+///   so that a unit that hands an object to one of the other mode does not link.
+/// Threads. As in impinge.h: one thread at a time changes a handle, and each question changes its detector. A detector that is in use
+///   refuses another question.
 #ifndef IMPINGE_HPP
 #define IMPINGE_HPP
 
@@ -14,6 +17,7 @@
 #include <functional>
 
 namespace impinge {
+inline namespace IMPINGE_MODE {
 
 /// The settings of a detector, and the callbacks that its questions call on the thread that asks.
 class settings {
@@ -149,13 +153,15 @@ public:
 #endif
     return give(status, std::move(n));
   }
+  /// Pairs at most `distance` apart; an edge and a face only if they meet.
   result<near_pairs> near(const scene &in, double distance, const query &of = {}) {
     const impinge_query raw = of.raw();
     detail::made<impinge_near> made;
     const auto status = impinge_find_near(this->raw(), in.raw(), distance, &raw, made.out());
     return give(status, near_pairs(made.take()));
   }
-  /// How far each vertex may move, at most `most`, so that nothing touches.
+  /// How far each vertex may move, at most `most`, so that nothing touches. The time grows with `most`: let it be no more than a vertex moves
+  /// in one step.
   result<impinge::safe_distances> safe_distances(const scene &in, double most, const query &of = {}) {
     const impinge_query raw = of.raw();
     detail::made<impinge_safe_distances> made;
@@ -369,6 +375,7 @@ template <class P> result<weld_map> weld(const P &positions) {
   return detail::give(status, std::move(of));
 }
 
+} // namespace IMPINGE_MODE
 } // namespace impinge
 
 #endif // IMPINGE_HPP

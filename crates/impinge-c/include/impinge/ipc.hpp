@@ -21,7 +21,9 @@
 #include <exception>
 #include <list>
 
-namespace impinge::ipc {
+namespace impinge {
+inline namespace IMPINGE_MODE {
+namespace ipc {
 
 /// What a `BroadPhase` finds. `boxes`: pairs whose inflated boxes overlap, as ipc-toolkit's own do. `exact`: only pairs that come within
 /// twice the inflation radius; in a step all that Tight Inclusion may stop for, which compares axis by axis: pairs that come within the
@@ -461,6 +463,8 @@ private:
   }
 };
 
-} // namespace impinge::ipc
+} // namespace ipc
+} // namespace IMPINGE_MODE
+} // namespace impinge
 
 #endif // IMPINGE_IPC_HPP

@@ -19,6 +19,13 @@
 #define IMPINGE_NO_EXCEPTIONS
 #endif
 
+// Classes differ with and without exceptions. Each mode has names of its own for the linker, so a program may have units of both.
+#ifndef IMPINGE_NO_EXCEPTIONS
+#define IMPINGE_MODE with_exceptions
+#else
+#define IMPINGE_MODE without_exceptions
+#endif
+
 // Old macros of windows.h.
 #undef near
 
@@ -28,6 +35,7 @@
 #endif
 
 namespace impinge {
+inline namespace IMPINGE_MODE {
 
 /// A body of a scene.
 using body = std::uint32_t;
@@ -64,13 +72,20 @@ template <class T> using result = T;
 
 #else
 
+/// Values that answer yes or no themselves: in `if (detector.any(scene))` a test of the result would ask only whether the call succeeded.
+template <class T> struct says_yes_or_no : std::is_same<T, bool> {};
+template <class T> struct says_yes_or_no<std::optional<T>> : std::true_type {};
+
 /// What a call gives, or why it failed.
-template <class T> class result {
+template <class T> class [[nodiscard]] result {
 public:
   result(T value) : value_(std::move(value)) {}
   result(impinge_status status, const char *message) : status_(status), message_(message) {}
-  /// Whether there is a value.
-  explicit operator bool() const noexcept { return value_.has_value(); }
+  /// Whether the call succeeded, so that there is a value.
+  bool ok() const noexcept { return value_.has_value(); }
+  /// The same, but not where the value says yes or no itself: write `found.ok() && *found`.
+  template <class V = T, std::enable_if_t<!says_yes_or_no<V>::value, int> = 0> explicit operator bool() const noexcept { return ok(); }
+  template <class V = T, std::enable_if_t<says_yes_or_no<V>::value, int> = 0> explicit operator bool() const = delete;
   /// The value, if there is one.
   T &operator*() & { return *value_; }
   const T &operator*() const & { return *value_; }
@@ -91,11 +106,13 @@ private:
   std::string message_;
 };
 
-template <> class result<void> {
+template <> class [[nodiscard]] result<void> {
 public:
   result() = default;
   result(impinge_status status, const char *message) : status_(status), message_(message) {}
-  explicit operator bool() const noexcept { return status_ == IMPINGE_OK; }
+  /// Whether the call succeeded.
+  bool ok() const noexcept { return status_ == IMPINGE_OK; }
+  explicit operator bool() const noexcept { return ok(); }
   impinge_status status() const noexcept { return status_; }
   const std::string &message() const & noexcept { return message_; }
   std::string message() && { return std::move(message_); }
@@ -137,6 +154,7 @@ template <class T> T give(impinge_status status, T &&value) {
 }
 [[noreturn]] inline void refuse(const char *message) { throw error(IMPINGE_ERROR_INVALID, message); }
 #else
+inline result<void> refuse(const char *message) { return {IMPINGE_ERROR_INVALID, message}; }
 inline result<void> give(impinge_status status) {
   return status == IMPINGE_OK ? result<void>() : result<void>(status, impinge_error_message());
 }
@@ -330,7 +348,9 @@ public:
   query &distances() { return set(raw_.flags, raw_.flags | IMPINGE_DISTANCES); }
   query &closest_points() { return set(raw_.flags, raw_.flags | IMPINGE_CLOSEST_POINTS); }
 
-  /// Which pairs of elements may collide, of steps: see `impinge_query`. `user` must live as long as the query is asked.
+  /// Which pairs of elements may collide, of steps: see `impinge_query`. `user` must live as long as the query is asked. Several threads call
+  /// the function at the same time. It must not throw: it is called by code that cannot unwind, unlike the callbacks of `settings`. Catch
+  /// within it, keep the first std::exception_ptr under a lock, return 0, and rethrow after the question.
   query &passes(int (*function)(void *user, const impinge_element *a, const impinge_element *b), void *user) {
     raw_.passes_user = user;
     raw_.passes = function;
@@ -418,14 +438,20 @@ public:
   template <class P> result<void> set_positions(body of, const P &positions) {
     return detail::give(impinge_scene_set_positions(raw(), of, detail::rows_of(positions, 3)));
   }
+  /// No rows are refused for a body that has vertices: `clear_end_positions` lets it stand still.
   template <class P> result<void> set_end_positions(body of, const P &positions) {
-    return detail::give(impinge_scene_set_end_positions(raw(), of, detail::rows_of(positions, 3)));
+    const array at = detail::rows_of(positions, 3);
+    if (lacks_rows(of, at)) return refuse_no_rows(of);
+    return detail::give(impinge_scene_set_end_positions(raw(), of, at));
   }
   /// The body stands still.
   result<void> clear_end_positions(body of) { return detail::give(impinge_scene_set_end_positions(raw(), of, array{nullptr, 0, 0, 0, IMPINGE_F64})); }
-  /// Positions that the scene reads where they lie, and shares the owner of.
+  /// Positions that the scene reads where they lie, and shares the owner of. They are checked in this call, and must not change afterwards.
   template <class P> result<void> lend_positions(body of, std::shared_ptr<P> owner) { return lend(impinge_scene_lend_positions, of, std::move(owner)); }
-  template <class P> result<void> lend_end_positions(body of, std::shared_ptr<P> owner) { return lend(impinge_scene_lend_end_positions, of, std::move(owner)); }
+  template <class P> result<void> lend_end_positions(body of, std::shared_ptr<P> owner) {
+    if (lacks_rows(of, detail::rows_of<std::remove_const_t<P>>(*owner, 3))) return refuse_no_rows(of);
+    return lend(impinge_scene_lend_end_positions, of, std::move(owner));
+  }
   /// Four rows of four numbers.
   template <class M> result<void> set_transform(body of, const M &matrix) { return detail::give(impinge_scene_set_transform(raw(), of, detail::rows_of(matrix, 4))); }
   /// The end of the step, in the same way.
@@ -462,6 +488,14 @@ public:
   void faces(body) const && = delete;
 
 private:
+  bool lacks_rows(body of, const array &at) const {
+    array now{};
+    return at.rows == 0 && impinge_scene_positions(raw(), of, &now) == IMPINGE_OK && now.rows > 0;
+  }
+  static result<void> refuse_no_rows(body of) {
+    const std::string which = "body " + std::to_string(of);
+    return detail::refuse((which + ": 0 end positions given, but it has vertices; clear_end_positions lets it stand still").c_str());
+  }
   template <class Lend, class P> result<void> lend(Lend call, body of, std::shared_ptr<P> owner) {
     const array at = detail::rows_of<std::remove_const_t<P>>(*owner, 3);
     auto kept = std::make_unique<std::shared_ptr<P>>(std::move(owner));
@@ -479,6 +513,7 @@ private:
   detail::handle<impinge_scene, impinge_scene_destroy> handle_;
 };
 
+} // namespace IMPINGE_MODE
 } // namespace impinge
 
 #endif // IMPINGE_SCENE_HPP
