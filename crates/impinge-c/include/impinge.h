@@ -11,6 +11,8 @@
  *   is allowed is IMPINGE_ERROR_INVALID. After IMPINGE_ERROR_INTERNAL the handle, a scene or a detector, refuses everything but its end.
  * Threads. A handle may move between threads, and one thread at a time may change it. A detector is changed by each question. A scene
  *   is only read by a question, so threads with a detector each may ask about one scene at the same time; answers are only read too.
+ *   A detector that is asked while it answers, by another thread or by one of its own callbacks, refuses the second question: INVALID, with
+ *   a message that it is in use. The first question goes on. The same holds for a scene that another call is changing.
  * Units. Lengths are in the unit of the scene. Times are fractions of a step, from 0 to 1.
  * The library prints nothing, reads no environment variables, and installs no signal handlers.
  */
@@ -30,7 +32,7 @@ extern "C" {
 typedef int32_t impinge_status;
 
 #define IMPINGE_OK 0                  /* It did what it says. */
-#define IMPINGE_ERROR_INVALID 1       /* An argument, or positions that were lent, are refused. */
+#define IMPINGE_ERROR_INVALID 1       /* An argument is refused, or the handle is in use by another call. */
 #define IMPINGE_ERROR_OUT_OF_MEMORY 2 /* There is no memory for the input or the answer. */
 #define IMPINGE_ERROR_BUDGET 3        /* The memory budget of the settings is too small for this question. */
 #define IMPINGE_ERROR_TOO_MANY_PAIRS 4 /* More pairs than the settings allow. */
@@ -139,10 +141,10 @@ impinge_status impinge_scene_set_positions(impinge_scene *scene, uint32_t body, 
  * otherwise. No rows: the body stands still. If start and end differ in type, the F32 one is widened. */
 impinge_status impinge_scene_set_end_positions(impinge_scene *scene, uint32_t body, impinge_array positions);
 
-/* Moves the vertices without a copy: the scene reads `positions` where they lie. They must neither change nor move until `release` is
- * called with
- * `user`, which happens once: when the body gets other positions or is removed, when the scene is destroyed, or when the last answer
- * that needs them is; on whatever thread does that. `release` may be NULL and must not call this library.
+/* Moves the vertices without a copy: the scene reads `positions` where they lie. They are checked in this call and not again, so they must
+ * neither change nor move until `release` is called with `user`, which happens once: when the body gets other positions or is removed, when
+ * the scene is destroyed, or when the last answer that needs them is; on whatever thread does that. `release` may be NULL and must not call
+ * this library.
  * Nothing is copied if rows are packed (3 numbers of F32 or F64 without a gap). Other rows, such as columns of a column-major matrix, are
  * copied, and `release` is called
  * before this function returns. If it fails, `release` is not called.
@@ -299,7 +301,7 @@ typedef struct impinge_element {
  *   precision           IMPINGE_F32 (default) or IMPINGE_F64: that of times, which are rounded down.
  *   separation          A length, 0 or more: elements that are so near count as touching. Of steps. Thickness adds to it.
  *   clearance           A length, 0 or more: what a step leaves. A pair at the distance d at the start keeps
- *                       separation + min(clearance, clearance_share * (d - separation)).
+ *                       s + min(clearance, clearance_share * (d - s)), where s is separation plus the thickness of both elements.
  *   clearance_share     From 0 to less than 1. Default: 0.2.
  *   flags IMPINGE_DISTANCES, IMPINGE_CLOSEST_POINTS
  *                       Columns that near pairs come with.
@@ -361,7 +363,7 @@ typedef struct impinge_detector impinge_detector;
  *   log                 Called with the message of every question that fails, and how a detector was opened. The text is valid during the
  * call. May be NULL.
  *   user                The first argument of these callbacks. They are called by the thread that asks, and must not call this library with
- *                       the same detector.
+ *                       the same detector, which is in use.
  *   device              Part of a GPU's name, to choose among several; NULL for any. It is copied.
  *   reuse_margin        For solvers that ask again and again while little moves. If it is above 0, questions about near pairs, neighbours and
  *                       safe distances list the pairs within their distance and this margin, and look at no others until some vertex has
@@ -575,9 +577,13 @@ typedef struct impinge_stats {
 #define IMPINGE_SHAPE_POLYGON 4
 
 /* ---- Questions ----
- * All read the scene and change the detector. All may fail with any status: INVALID for a query that names no body of the scene, or lent
- * positions
- * that are not finite; the others as the statuses say. After every failure but INTERNAL the detector can be used again. */
+ * All read the scene and change the detector. All may fail with any status: INVALID for a query that names no body of the scene, or a
+ * detector that is in use; the others as the statuses say. After every failure but INTERNAL the detector can be used again. Positions are
+ * checked when they are given or lent, and not by questions: answers about lent positions that have changed since mean nothing.
+ *
+ * Near pairs, neighbours, safe distances, candidates and steps are about vertices, edges and faces: those of a body of triangles are its
+ * faces with their edges and vertices, of tetrahedra the same of their surface, of edges these with their vertices. Other vertices, such as
+ * those of no face of a body of triangles, take no part. */
 
 /* Sorted pairs of elements that intersect. */
 typedef struct impinge_pairs impinge_pairs;
@@ -595,8 +601,8 @@ impinge_status impinge_any(impinge_detector *detector, const impinge_scene *scen
 typedef struct impinge_impacts impinge_impacts;
 
 /* All pairs of vertices and faces, of edges and edges, and where bodies have no faces of edges and vertices, that touch during the step,
- * while
- * vertices move on straight lines from their positions to their end positions. */
+ * while vertices move on straight lines from their positions to their end positions. Vertices of no face of a body of triangles take no
+ * part: nothing stops them. */
 impinge_status impinge_find_impacts(impinge_detector *detector, const impinge_scene *scene, const impinge_step *step,
     impinge_impacts **impacts);
 
@@ -643,7 +649,8 @@ impinge_status impinge_find_candidates_in_runs(impinge_detector *detector, const
     uint64_t *n);
 
 /* Pairs of elements at most `distance` apart, a length of 0 or more, plus the thickness of both bodies; decided exactly, at the positions
- * of the scene. */
+ * of the scene. A pair of an edge and a face is reported if and only if the two meet, whatever `distance` is: otherwise a vertex and a face,
+ * or two edges, of theirs are as near. Vertices of no face of a body of triangles take no part. */
 impinge_status impinge_find_near(impinge_detector *detector, const impinge_scene *scene, double distance, const impinge_query *query,
     impinge_near **near_pairs);
 
@@ -653,7 +660,8 @@ typedef struct impinge_safe_distances impinge_safe_distances;
 /* How far each vertex may move, on any path, so that nothing touches: for each pair of elements that do not share a vertex, the largest
  * number of the vertices of one and the largest of the other add up to less than their distance, minus the thickness of both bodies. No
  * number is above `most`, a length of 0 or more. Pairs that touch get 0. Each number is rounded down, and the rounding of a new position
- * counts as motion. End positions are ignored. INVALID: also a body of `fixed` that is none of the scene. */
+ * counts as motion. End positions are ignored. All pairs within twice `most` are looked at, so the time grows about with its square, and in
+ * crowds with its cube: let it be no more than a vertex moves in one step. INVALID: also a body of `fixed` that is none of the scene. */
 impinge_status impinge_find_safe_distances(impinge_detector *detector, const impinge_scene *scene, double most, const impinge_query *query,
     impinge_safe_distances **safe_distances);
 
@@ -800,9 +808,11 @@ typedef struct impinge_stencils impinge_stencils;
 /* One per near pair, in the same order, at the positions that the scene has now; the nearest features are those that were found. Vertices:
  * the vertex and three of the face, two of either edge (whichever is first), the vertex and two of the edge, two vertices. Where there are
  * fewer than four, the first is repeated, and coefficients and derivatives are 0 there. `rest` has the positions at rest of all vertices of
- * the scene, body after body (3 columns of F32 or F64): with it, the mollifier of nearly parallel edges is below 1. NULL: it is 1.
+ * the scene, body after body (3 columns of F32 or F64): with it, the mollifier of nearly parallel edges is below 1. NULL: it is 1. It has as
+ * many rows as all bodies of the scene together have vertices, those of the lowest body first, whatever bodies the pairs are of. If rows are
+ * missing, the message names the first body without enough of them.
  * All numbers have the same bits on every machine. INVALID: pairs of IMPINGE_EF and IMPINGE_FF; pairs of another scene or of a body with new
- * elements. */
+ * elements; another number of rows. */
 impinge_status impinge_near_stencils(const impinge_near *near_pairs, const impinge_scene *scene, const impinge_array *rest,
     impinge_stencils **stencils);
 /* The same, weighted by area, so that a potential does not depend on how fine a mesh is. A pair of a vertex and a face weighs 1/4 of the area
