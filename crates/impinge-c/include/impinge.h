@@ -158,7 +158,7 @@ impinge_status impinge_scene_lend_end_positions(impinge_scene *scene, uint32_t b
 
 /* Moves a body by an affine matrix without passing its vertices again. `matrix` has 4 rows and 4 columns of F32 or F64, and takes
  * the column (x, y, z, 1) to the moved one; its last row is 0 0 0 1. It moves the positions given last; a second transform replaces the
- * first. End positions are cleared.
+ * first, also where a step was taken in between by impinge_motion_apply. End positions are cleared.
  * INVALID: no such body, a matrix that is not as described, a moved position that is not finite. */
 impinge_status impinge_scene_set_transform(impinge_scene *scene, uint32_t body, impinge_array matrix);
 
@@ -907,8 +907,10 @@ uint64_t impinge_motion_n_touching(const impinge_motion *motion);
 uint32_t impinge_motion_rounds(const impinge_motion *motion);
 /* Where the vertices of a body are then: a view, valid as long as the motion. No rows for a body that stands still. */
 impinge_status impinge_motion_positions(const impinge_motion *motion, uint32_t body, impinge_array *view);
-/* Takes the step: these positions become those of the scene, and its bodies stand still until they get end positions again.
- * INVALID: a body that was removed, or that has another number of vertices now. */
+/* Takes the step: these positions become those of the scene, and its bodies stand still until they get end positions again. Of bodies
+ * that transforms move, the positions given last stay the same: the next transform begins with them, too.
+ * INVALID: a body that has other positions than when the step was found, also one that does not move: nothing would be known of the step.
+ * A body that is new, or that moves and was removed. The scene is unchanged then. */
 impinge_status impinge_motion_apply(const impinge_motion *motion, impinge_scene *scene);
 impinge_status impinge_motion_stats(const impinge_motion *motion, impinge_stats *stats);
 void impinge_motion_destroy(impinge_motion *motion);

@@ -153,6 +153,8 @@ fn a_step_that_is_advanced_is_free_to_its_rounded_end() {
     }
 }
 
+type Take<'a> = &'a dyn Fn(&mut Scene) -> Result<(), Error>;
+
 /// Nothing is known of a step once any body is somewhere else.
 #[test]
 fn a_step_is_taken_from_where_it_was_found_only() {
@@ -160,10 +162,9 @@ fn a_step_is_taken_from_where_it_was_found_only() {
     let (scene, ground, other) = falling();
     let advance = detector.advance(&scene, &Query::all()).expect("good");
     let truncation = detector.truncate(&scene, &Query::all()).expect("good");
-    let takes: [&dyn Fn(&mut Scene) -> Result<(), Error>; 2] =
-        [&|scene| advance.apply(scene), &|scene| {
-            truncation.apply(scene)
-        }];
+    let takes: [Take<'_>; 2] = [&|scene| advance.apply(scene), &|scene| {
+        truncation.apply(scene)
+    }];
     for take in takes {
         let refused = |scene: &Scene, body: BodyId| {
             let mut now = scene.clone();
