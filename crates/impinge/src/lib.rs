@@ -21,10 +21,10 @@
 //!
 //! ```toml
 //! [dependencies]
-//! impinge = "0.1"                                            # reads OBJ, PLY, STL, OFF, glTF, MSH, VTK and others
-//! # impinge = { version = "0.1", features = ["gpu"] }        # and the GPU backend
-//! # impinge = { version = "0.1", features = ["serde"] }      # rows, settings, statistics and choices with serde
-//! # impinge = { version = "0.1", default-features = false }  # no files, and the fewest packages
+//! impinge = "0.2"                                            # reads OBJ, PLY, STL, OFF, glTF, MSH, VTK and others
+//! # impinge = { version = "0.2", features = ["gpu"] }        # and the GPU backend
+//! # impinge = { version = "0.2", features = ["serde"] }      # rows, settings, statistics and choices with serde
+//! # impinge = { version = "0.2", default-features = false }  # no files, and the fewest packages
 //! ```
 //!
 //! A whole program: which triangles of two meshes intersect.
