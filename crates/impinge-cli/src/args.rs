@@ -75,7 +75,8 @@ pub enum Command {
     #[command(after_help = DEMO_EXAMPLES)]
     Demo(DemoArgs),
     /// Find the pairs of elements that intersect, between different meshes
-    #[command(after_help = PAIRS_EXAMPLES)]
+    // The library's word for this question.
+    #[command(alias = "detect", after_help = PAIRS_EXAMPLES)]
     Pairs(PairsArgs),
     /// Find the pairs of elements that intersect, within each mesh
     #[command(name = "self", after_help = SELF_EXAMPLES)]

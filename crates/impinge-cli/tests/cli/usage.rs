@@ -133,6 +133,27 @@ fn shared_options_are_explained_once() {
     assert!(folder.run(["help", "step"]).printed().contains("- skip:"));
 }
 
+/// The library's word for the question of `pairs`.
+#[test]
+fn detect_is_pairs() {
+    let folder = Folder::new();
+    folder.ply("a.ply", &ball(200));
+    folder.ply("b.ply", &ball(200).translated([0.3, 0.1, 0.0]));
+    let ask = |command| {
+        folder
+            .run([command, "a.ply", "b.ply", "--rows", "-"])
+            .printed()
+    };
+    assert!(ask("pairs").lines().count() > 10);
+    assert_eq!(ask("detect"), ask("pairs"));
+    assert_eq!(
+        folder.run(["help", "detect"]).printed(),
+        folder.run(["help", "pairs"]).printed()
+    );
+    let help = folder.run(["--help"]).printed();
+    assert!(!help.contains("  detect "), "{help}");
+}
+
 #[cfg(not(feature = "view"))]
 #[test]
 fn a_part_that_was_not_built_says_how_to_get_it() {
