@@ -86,8 +86,8 @@ pub enum Error {
     /// A part that this program was built without: its name, its feature, and what else it needs.
     #[cfg(not(feature = "view"))]
     #[error(
-        "this impinge was built without {0}: build it with --features {1}{2}, such as `cargo install --locked --git \
-         https://github.com/impinge-rs/impinge impinge-cli --features {1}`"
+        "this impinge was built without {0}: build it with --features {1}{2}, such as `cargo install --locked --path \
+         crates/impinge-cli --features {1}` in a checkout of its repository"
     )]
     NotBuilt(&'static str, &'static str, &'static str),
     /// Two methods gave different answers: a defect of the library.

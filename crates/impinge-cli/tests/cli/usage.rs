@@ -165,13 +165,16 @@ fn a_part_that_was_not_built_says_how_to_get_it() {
     ] {
         let line = folder.run(args).error();
         assert!(
-            line.contains("without the window") && line.contains("--features view"),
+            line.contains("without the window")
+                && line
+                    .contains("`cargo install --locked --path crates/impinge-cli --features view`"),
             "{line}"
         );
     }
     if cfg!(not(feature = "gpu")) {
         let line = folder.run(["devices", "--json"]).error();
-        assert!(line.contains("--features gpu"), "{line}");
+        let command = "`cargo install --locked --path crates/impinge-cli --features gpu`";
+        assert!(line.contains(command), "{line}");
     }
 }
 
