@@ -143,7 +143,7 @@ def test_frames_follow_the_positions():
 @pytest.mark.parametrize(
     "question, error, message",
     [
-        ({"between": (0, 0)}, ValueError, "between body 0 and itself"),
+        ({"between": (0, 0)}, ValueError, "^body 0 is named twice, where two different bodies are needed"),
         ({"between": (0, 9)}, ValueError, "^between: there is no body 9"),
         ({"between": (0, 1, 2)}, ValueError, "^between: two bodies expected, 3 given"),
         ({"between": 0}, TypeError, "^between: a pair of bodies expected"),

@@ -133,8 +133,11 @@ pub enum Error {
         /// How many bodies the scene has.
         n_bodies: usize,
     },
-    /// A query between two bodies names one body twice. Use `within` instead.
-    #[error("a query between body {body} and itself: ask for collisions within it instead")]
+    /// A question about two bodies names one body twice. Name two different ones; to find
+    /// self-collision of a body, ask with [`Query::self_of`](crate::Query::self_of).
+    #[error(
+        "body {body} is named twice, where two different bodies are needed: self-collision is a query of its own"
+    )]
     SameBody {
         /// The body named twice.
         body: BodyId,

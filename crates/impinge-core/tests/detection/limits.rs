@@ -80,10 +80,20 @@ fn bad_bodies_are_refused_by_name() {
     // None of these bodies was added.
     assert_eq!(scene.n_bodies(), 1);
     let mut detector = Detector::new(cpu(Method::Clusters)).unwrap();
-    assert!(matches!(
-        detector.detect(&scene, &Query::between(good, good)),
-        Err(Error::SameBody { .. })
-    ));
+    // One text for pairs and for distances.
+    let same = [
+        detector.detect(&scene, &Query::between(good, good)).err(),
+        detector.distance(&scene, good, good).err(),
+    ];
+    for error in same {
+        assert!(matches!(error, Some(Error::SameBody { body }) if body == good));
+        assert_eq!(
+            error.map(|error| error.to_string()),
+            Some(format!(
+                "body {good} is named twice, where two different bodies are needed: self-collision is a query of its own"
+            ))
+        );
+    }
     scene.remove(good).unwrap();
     assert!(matches!(
         detector.detect(&scene, &Query::self_of(good)),
