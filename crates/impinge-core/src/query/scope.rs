@@ -16,10 +16,15 @@ use impinge_exact::internal::Keep;
 pub enum SharedVertex {
     /// Pairs that share a vertex index are not reported.
     Skip,
-    /// The default: they are reported when they meet in more than the parts that they share.
-    /// Triangles: sharing one vertex, when the edge opposite it in one meets the other triangle;
-    /// sharing an edge, when they are coplanar and fold to the same side; sharing all three,
-    /// always. Tetrahedra: when the intersection is larger than the common vertex, edge or face.
+    /// The default: they are reported if and only if their intersection is larger than the convex
+    /// hull of the vertices with common indices; if they have the same vertex indices, always.
+    ///
+    /// For triangles that are not degenerate: sharing one vertex, when the edge opposite it in one
+    /// meets the other triangle; sharing an edge, when they are coplanar and fold to the same side.
+    /// For tetrahedra: when the intersection is larger than the common vertex, edge or face. If the
+    /// indices of one primitive are some of those of the other, but not all, the intersection is
+    /// the hull, and the pair is not reported: a triangle with a repeated index, for example.
+    ///
     /// Edges and points of one body that share a vertex are not reported under either rule.
     #[default]
     Resolve,
