@@ -202,7 +202,10 @@ export declare class Scene {
    * distance r from the axis of a turn by w radians is at most r * w * w / 8 away from where it would be.
    */
   setEndTransform(body: Body, matrix: ArrayLike<number>): void;
-  /** Bodies meet if the category of each shares a bit with the mask of the other; 64 bits. Category 1 and all bits by default. */
+  /**
+   * Different bodies meet if the category of each shares a bit with the mask of the other, where a query names no bodies; 64 bits. Category 1 and
+   * all bits by default. Self-collision does not depend on it.
+   */
   setFilter(body: Body, category?: number | bigint, mask?: number | bigint): void;
   /**
    * A length that each element of this body adds to the distance of `near`, to the `separation` that elements keep in a step, and to the gap that boxes of `candidates` may

@@ -332,9 +332,10 @@ class Scene(SceneBase):
         category: SupportsIndex | None = None,
         mask: SupportsIndex | None = None,
     ) -> None:
-        """Sets who a body meets when a question is about all bodies.
+        """Sets which other bodies a body meets when a question is about all bodies, which is the default, or about pairs of different ones.
 
-        Two bodies meet when each one's `category` shares a bit with the other one's `mask`.
+        Two bodies meet when each one's `category` shares a bit with the other one's `mask`. Self-collision does not depend on it, and
+        questions that name bodies ignore it.
 
         Parameters
         ----------

@@ -234,7 +234,8 @@ impl Query {
         })
     }
 
-    /// Pairs of different bodies and of one body, all together.
+    /// Pairs of different bodies and of one body, all together: the default. Different bodies meet
+    /// if their [`Filter`](crate::Filter)s let them; no filter keeps a body from self-collision.
     pub fn all() -> Self {
         Query::new(Scope::All {
             between: true,

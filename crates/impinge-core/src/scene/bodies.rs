@@ -200,7 +200,9 @@ impl Scene {
         Ok(())
     }
 
-    /// Sets which bodies a body meets in [`Query::between_all`](crate::Query::between_all).
+    /// Sets which other bodies a body meets in [`Query::all`](crate::Query::all), the default, and in
+    /// [`Query::between_all`](crate::Query::between_all). Self-collision does not depend on it, nor do
+    /// queries that name their bodies.
     ///
     /// # Errors
     /// The id names no body.

@@ -11,8 +11,11 @@ use crate::scene::positions::{Given, NewPositions, Positions, check_positions};
 use crate::scene::thickness::{Each, HeldThickness};
 use crate::scene::transform::RestPose;
 
-/// Which bodies meet in [`Query::between_all`](crate::Query::between_all): two bodies meet when the
-/// `category` of each shares a bit with the `mask` of the other. By default all bodies meet.
+/// Which different bodies meet in [`Query::all`](crate::Query::all), the default, and in
+/// [`Query::between_all`](crate::Query::between_all): two bodies meet when the `category` of each
+/// shares a bit with the `mask` of the other. By default all bodies meet. Filters never decide
+/// about self-collision, and queries that name bodies ([`between`](crate::Query::between),
+/// [`of`](crate::Query::of), [`across`](crate::Query::across)) ignore them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Filter {
     /// The categories to which the body belongs.
