@@ -161,7 +161,7 @@ def test_frames_follow_the_positions():
         ({"query": {}}, TypeError, "^query: a Query expected, dict given"),
         ({"betwen": (0, 1)}, TypeError, "^betwen: no such option, which, between, self_of, of, kinds, .*, progress allowed"),
         ({"distances": 1}, TypeError, "^distances: True or False expected, int given"),
-        ({"kinds": "vf"}, ValueError, "^kinds: .* this question is about the elements that bodies were given as"),
+        ({"kinds": "vf"}, ValueError, "^kinds: kinds of pairs .* given, in this question only pairs of the bodies' own elements allowed$"),
         ({"progress": 1}, TypeError, "^progress: a callable expected, int given"),
         ({"cancel": 1}, TypeError, "^cancel: a CancelToken expected, int given"),
     ],

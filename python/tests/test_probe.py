@@ -294,7 +294,7 @@ def test_cast_refuses():
     scene.add(CORNERS, CUBE)
     detector = impinge.Detector("cpu")
     row = [[0.0, 0.0, 1.0]]
-    with pytest.raises(ValueError, match="directions: 2 directions given, as many directions as"):
+    with pytest.raises(ValueError, match="^directions: 1 origins and 2 directions given, as many directions as origins allowed$"):
         detector.cast(scene, row, row * 2)
     with pytest.raises(ValueError, match="most: -1 given"):
         detector.cast(scene, row, row, -1)

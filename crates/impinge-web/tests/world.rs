@@ -448,7 +448,10 @@ fn bad_input_is_refused_by_name() -> Result<(), Error> {
         &[0, 0, 0, 0, 0, 0, 64 | 16, 0, 1],
         &NUMBERS,
     );
-    assert_eq!(text, "kinds: ef given, of a step: vf, ee, ev, vv allowed");
+    assert_eq!(
+        text,
+        "kinds: ef given, in a step only vf, ee, ev and vv allowed"
+    );
     let (_, text) = ask(Question::Advance, &[0, 0, 0, 0, 0, 0, 0, 4, 1], &NUMBERS);
     assert!(text.starts_with("owned_by: "), "{text}");
     assert_eq!(ask(Question::Detect, &[], &NUMBERS).0, "invalid");

@@ -265,7 +265,7 @@ pub(super) fn refuse_cell(query: &Query) -> Result<(), Error> {
         Some(_) => Err(Error::Setting {
             setting: "owned_by",
             given: "a cell for the way that a step can be taken".to_owned(),
-            allowed: "all pairs; or let each process ask for its earliest contact, and take the least of them",
+            allowed: "only all of space (each process may ask for its earliest contact instead, and the least of these counts)",
         }),
     }
 }

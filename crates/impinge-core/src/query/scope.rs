@@ -469,7 +469,7 @@ impl Query {
             return Err(Error::Setting {
                 setting: "kinds",
                 given: kind.name().to_owned(),
-                allowed: "of a step: vf, ee, ev, vv",
+                allowed: "in a step only vf, ee, ev and vv",
             });
         }
         check_distance("separation", self.separation)?;
@@ -491,7 +491,7 @@ impl Query {
             Some(_) => Err(Error::Setting {
                 setting: "filter",
                 given: "a filter of pairs".to_owned(),
-                allowed: "none: only questions about the contacts of a step ask one",
+                allowed: "a filter only in questions about the contacts of a step",
             }),
         }
     }
@@ -517,7 +517,7 @@ impl Query {
             false => Err(Error::Setting {
                 setting: "exclude",
                 given: "pairs of vertices, edges and faces".to_owned(),
-                allowed: "bodies, rings, groups and lists of vertices: this question is about the elements that bodies were given as",
+                allowed: "in this question only bodies, rings, groups and lists of vertices",
             }),
         }
     }
@@ -529,7 +529,7 @@ impl Query {
             Some(_) => Err(Error::Setting {
                 setting: "kinds",
                 given: "kinds of pairs of vertices, edges and faces".to_owned(),
-                allowed: "none: this question is about the elements that bodies were given as",
+                allowed: "in this question only pairs of the bodies' own elements",
             }),
         }
     }

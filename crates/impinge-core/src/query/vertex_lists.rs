@@ -107,11 +107,14 @@ impl VertexLists {
             ));
         }
         if offsets[0] != 0 {
-            return refused(format!("{} as the first offset, which is 0", offsets[0]));
+            return refused(format!(
+                "{} as the first offset, which must be 0",
+                offsets[0]
+            ));
         }
         if let Some(ix) = offsets.windows(2).position(|two| two[0] > two[1]) {
             return refused(format!(
-                "offset {} after {} at {}, which never fall",
+                "offset {} after {} at {}, but no offset may be below the one before it",
                 offsets[ix + 1],
                 offsets[ix],
                 ix + 1

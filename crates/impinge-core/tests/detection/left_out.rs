@@ -341,11 +341,15 @@ fn lists_that_do_not_fit_are_refused_by_name() {
             &[1][..],
             "3 offsets, but body 0 has 3 vertices: one more is needed",
         ),
-        (&[1, 1, 1, 1], &[1], "1 as the first offset, which is 0"),
+        (
+            &[1, 1, 1, 1],
+            &[1],
+            "1 as the first offset, which must be 0",
+        ),
         (
             &[0, 2, 1, 2],
             &[1, 1],
-            "offset 1 after 2 at 2, which never fall",
+            "offset 1 after 2 at 2, but no offset may be below the one before it",
         ),
         (
             &[0, 0, 1, 2],

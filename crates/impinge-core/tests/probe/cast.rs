@@ -241,6 +241,11 @@ fn what_is_refused() {
             .unwrap_err();
         assert!(matches!(error, Error::Setting { setting: given, .. } if given == setting));
     }
+    let error = detector.cast(&scene, &row, &[row[0]; 2], 1.0, &Query::all());
+    assert_eq!(
+        error.unwrap_err().to_string(),
+        "directions: 1 origins and 2 directions given, as many directions as origins allowed"
+    );
     let error = detector
         .cast(&scene, &row, &[[f32::NAN; 3]], 1.0, &Query::all())
         .unwrap_err();

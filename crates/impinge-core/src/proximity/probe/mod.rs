@@ -269,7 +269,11 @@ impl Probes {
         if origins.len() != directions.len() {
             return Err(Error::Setting {
                 setting: "directions",
-                given: format!("{} directions", directions.len()),
+                given: format!(
+                    "{} origins and {} directions",
+                    origins.len(),
+                    directions.len()
+                ),
                 allowed: "as many directions as origins",
             });
         }
