@@ -699,7 +699,10 @@ export declare class Detector {
   closest(scene: Scene, points: GivenPositions, query?: Query): Closest;
   /** What rays hit: the points origin + t direction, for t from 0 to `most`. Grazing an edge or a vertex is a hit. */
   cast(scene: Scene, origins: GivenPositions, directions: GivenPositions, query?: Query): Hits;
-  /** How far each vertex may move, at most `most`, so that nothing touches. */
+  /**
+   * How far each vertex may move, at most `most`, so that nothing touches. The cost grows with `most`, since all pairs within twice `most` are
+   * looked at: take no more than a vertex moves in a step.
+   */
   safeDistances(scene: Scene, most: number, query?: Query): SafeDistances;
   /** How far each vertex can go in a step: each stops for itself, where `advance` stops all of them at one fraction. */
   truncate(scene: Scene, query?: Query): Truncation;

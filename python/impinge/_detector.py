@@ -487,7 +487,8 @@ class Detector(DetectorBase):
         ----------
         scene : Scene
         most : float
-            No number is above this length, in the unit of the scene. Pairs farther apart than twice of it play no part.
+            No number is above this length, in the unit of the scene. Pairs farther apart than twice of it play no part, and the cost grows
+            with it: take no more than a vertex moves in a step.
         **options
             As for `Query`, and ``query``, ``cancel`` and ``progress``, as for `Detector`.
 

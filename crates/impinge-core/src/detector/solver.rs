@@ -53,7 +53,8 @@ impl Detector {
     /// elements that do not share a vertex, the largest number of the vertices of one and the
     /// largest of the other add up to less than their distance, minus the
     /// [thickness](Scene::set_thickness) of both. No number is above `most`, which is a
-    /// length in the unit of the scene.
+    /// length in the unit of the scene. The cost grows with `most`, since all pairs within twice
+    /// `most` are looked at: take no more than a vertex moves in a step.
     ///
     /// Both elements get half of the distance; what is [fixed](Query::fixed) gets 0 and leaves all
     /// of it to the other. Each number is rounded down: it is below what the smallest distance of
