@@ -385,12 +385,12 @@ struct Reader<'a> {
     offsets: &'a [u32],
     remeshed: &'a [BodyId],
     rest: Option<&'a [Point]>,
-    sides: [Option<HeldPart<'a>>; 2],
+    sides: [Option<PartOfBody<'a>>; 2],
 }
 
 /// A part of a body.
 #[derive(Clone, Copy)]
-struct HeldPart<'a> {
+struct PartOfBody<'a> {
     id: BodyId,
     part: Part,
     elements: &'a Elements,
@@ -401,12 +401,12 @@ struct HeldPart<'a> {
 
 impl<'a> Reader<'a> {
     /// A part that is seen first.
-    fn side(&self, id: BodyId, part: Part) -> Result<HeldPart<'a>, Error> {
+    fn side(&self, id: BodyId, part: Part) -> Result<PartOfBody<'a>, Error> {
         if self.remeshed.contains(&id) {
             return Err(Error::Remeshed { body: id });
         }
         let body = self.scene.body(id)?;
-        Ok(HeldPart {
+        Ok(PartOfBody {
             id,
             part,
             elements: body.part(part),
