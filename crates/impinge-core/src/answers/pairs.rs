@@ -30,6 +30,7 @@ struct PairBody {
     /// The global number of its first primitive.
     first: Number,
     kind: BodyKind,
+    topology_stamp: u64,
 }
 
 /// The numbers of no primitives.
@@ -74,6 +75,7 @@ impl Pairs {
                 id,
                 first: Number::new(end),
                 kind: body.kind(),
+                topology_stamp: body.topology_stamp(),
             });
             end = end.saturating_add(body.elements().len() as u32);
         }
@@ -259,6 +261,12 @@ impl Pairs {
         self.bodies.iter().map(|body| (body.id, body.kind))
     }
 
+    /// The same bodies, and the topology of each.
+    pub(crate) fn topologies(&self) -> impl Iterator<Item = (BodyId, u64)> + '_ {
+        let bodies = self.bodies.iter();
+        bodies.map(|body| (body.id, body.topology_stamp))
+    }
+
     /// Which pairs an older answer also has, which are new, and which are gone: two pairs are the
     /// same if their bodies and elements are. Pairs of a body that was removed and of one in
     /// its slot differ; those of a body that was re-meshed are named by their numbers alone.
@@ -286,6 +294,7 @@ impl Outcome<u64, 1> for Pairs {
             id: part.id,
             first: part.first,
             kind: part.kind,
+            topology_stamp: part.topology_stamp,
         }));
         self.stats.clear();
     }

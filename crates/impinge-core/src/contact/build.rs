@@ -9,11 +9,10 @@ use super::meet::{Local, ends, meet};
 use super::parts::ByBodies;
 use super::{Contacts, Doubles, Feature, PointName, Shape, lowest};
 use crate::answers::pairs::Pairs;
-use crate::scene::elements::{BodyKind, Elements};
+use crate::scene::elements::Elements;
 use crate::scene::error::Error;
-use crate::scene::ids::BodyId;
 use crate::scene::index::VertexIx;
-use crate::scene::positions::{Positions, check_positions};
+use crate::scene::positions::Positions;
 use crate::scene::{Body, Scene};
 use crate::search::sink::{self, grow, reserve};
 use crate::search::work::{Equal, Work};
@@ -238,11 +237,16 @@ impl<'a> ContactBodies<'a> {
     fn new(scene: &'a Scene, pairs: &Pairs, work: Work<'_>) -> Result<Self, Error> {
         let mut bodies: Vec<Option<Taking<'a>>> = Vec::new();
         let mut colliding = pairs.all_colliding().into_iter().peekable();
-        for (id, kind) in pairs.bodies() {
+        for (id, topology_stamp) in pairs.topologies() {
             let body = scene.body(id)?;
             let own = colliding.next_if(|(of, _)| *of == id);
             let own = own.map_or(Vec::new(), |(_, own)| own);
-            check(id, body, kind, &own)?;
+            if !own.is_empty() && body.topology_stamp() != topology_stamp {
+                return Err(Error::Remeshed { body: id });
+            }
+            if !body.is_checked() {
+                body.positions().check(id)?;
+            }
             bodies.resize_with(bodies.len().max(id.index() + 1), || None);
             bodies[id.index()] = Some(Taking {
                 body,
@@ -310,28 +314,6 @@ impl<'a> ContactBodies<'a> {
             [Feature::Edge(a), Feature::Edge(b)] => Definition::OnLine(edge(0, a), edge(1, b)),
             [Feature::Face(a), Feature::Face(_)] => Definition::Vertex(face(0, a)[0]),
         }
-    }
-}
-
-/// Refuses pairs that do not fit the body, and bad positions.
-fn check(id: BodyId, body: &Body, kind: BodyKind, colliding: &[u32]) -> Result<(), Error> {
-    let n_primitives = body.n_primitives();
-    if let Some(&primitive) = colliding.last()
-        && (primitive as usize >= n_primitives || body.kind() != kind)
-    {
-        return Err(Error::ForeignPair {
-            body: id,
-            primitive,
-            n_primitives,
-            kind: body.kind().name(),
-        });
-    }
-    if body.is_checked() {
-        return Ok(());
-    }
-    match body.positions() {
-        Positions::F32(positions) => check_positions(id, positions),
-        Positions::F64(positions) => check_positions(id, positions),
     }
 }
 

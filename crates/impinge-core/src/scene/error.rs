@@ -142,20 +142,6 @@ pub enum Error {
         /// The body named twice.
         body: BodyId,
     },
-    /// Pairs of another scene, or from before a body was re-meshed. Detect again.
-    #[error(
-        "body {body}: a pair names primitive {primitive}, but the body has {n_primitives} {kind} now"
-    )]
-    ForeignPair {
-        /// The body.
-        body: BodyId,
-        /// The highest primitive that a pair names.
-        primitive: u32,
-        /// How many primitives the body has.
-        n_primitives: usize,
-        /// The kind of the body's primitives, such as `"triangles"`.
-        kind: &'static str,
-    },
     /// Pairs from before a body was re-meshed: its elements have other numbers now. Ask again.
     #[error("body {body}: the pairs were found before it was re-meshed, and name other elements")]
     Remeshed {

@@ -246,24 +246,21 @@ fn pairs_of_another_scene_are_refused_by_name() {
     let a = ball.add_to(&mut scene).unwrap();
     let b = ball.translated([0.5, 0.0, 0.0]).add_to(&mut scene).unwrap();
     let pairs = detect(&scene, &Query::between(a, b));
-    scene
-        .remesh(b, (vec![[0u32, 1, 2]], vec![[0.0f32; 3]; 3]))
-        .unwrap();
     let mut detector = Detector::new(Backend::Cpu).unwrap();
-    let error = detector.contacts(&scene, &pairs).unwrap_err().to_string();
-    assert!(
-        error.starts_with("body 1: a pair names primitive"),
-        "{error}"
-    );
+    // Also if there are as many elements as before.
+    let triangle = (vec![[0u32, 1, 2]].into(), vec![[0.0f32; 3]; 3]);
+    for mesh in [triangle, (ball.elements.clone(), ball.positions.clone())] {
+        let mut scene = scene.clone();
+        scene.remesh(b, mesh).unwrap();
+        let error = detector.contacts(&scene, &pairs).unwrap_err().to_string();
+        assert!(
+            error.starts_with("body 1: the pairs were found before it was re-meshed"),
+            "{error}"
+        );
+    }
     // After the scene has changed, pairs may no longer meet.
     scene
-        .remesh(
-            b,
-            (
-                ball.elements.clone(),
-                vec![[50.0f32; 3]; ball.positions.len()],
-            ),
-        )
+        .set_positions(b, vec![[50.0f32; 3]; ball.positions.len()])
         .unwrap();
     let contacts = contacts_of(&scene, &pairs);
     assert!(contacts.shapes().iter().all(|&shape| shape == Shape::Apart));
