@@ -704,7 +704,10 @@ export declare class Detector {
    * looked at: take no more than a vertex moves in a step.
    */
   safeDistances(scene: Scene, most: number, query?: Query): SafeDistances;
-  /** How far each vertex can go in a step: each stops for itself, where `advance` stops all of them at one fraction. */
+  /**
+   * How far each vertex can go in a step: each stops for itself, where `advance` stops all of them at one fraction. A body whose end
+   * `setEndTransform` made keeps its shape: all of its vertices go the least share of their ways that one of them may go.
+   */
   truncate(scene: Scene, query?: Query): Truncation;
   /** The pairs of `near` as lists per element. */
   neighbours(scene: Scene, distance: number, query?: Query): Neighbours;

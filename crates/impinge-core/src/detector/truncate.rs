@@ -50,7 +50,9 @@ impl Detector {
     /// only one of them comes nearer, it gets all of the room but a thousandth, and if both do,
     /// each gets a share of it, by how far it wants to go. Then pairs of which a vertex was stopped
     /// are looked at again, until none meets. So some vertices stop that might have passed; the
-    /// next step takes them farther.
+    /// next step takes them farther. A body whose end a
+    /// [transform](Scene::set_end_transform) made keeps its shape: all of its vertices go the least
+    /// share of their ways that one of them may go.
     ///
     /// The vertices of pairs that touch at the start, or are nearer than they are to keep, stay
     /// where they are, and [are counted](Truncation::n_touching); under
@@ -178,6 +180,7 @@ struct Vertices {
 }
 
 /// How far a vertex goes.
+#[derive(Clone, Copy)]
 struct Vertex {
     /// The share of its way.
     share: f64,
@@ -231,17 +234,19 @@ impl Vertices {
     /// Takes the vertices back that were stopped. Returns whether there were any.
     fn go_back(&mut self, scene: &Scene) -> bool {
         let mut any = false;
-        let now = self.ways.iter_mut().zip(&mut self.are_moved);
-        let mut all = self.all.iter_mut().zip(&mut self.most).zip(now);
+        let mut first = 0;
         for (_, body) in scene.bodies() {
             let start = body.positions();
             let end = body.end_positions().unwrap_or(start);
-            let own = all.by_ref().take(body.n_vertices());
-            for (ix, ((vertex, most), ([_, now, _], is_moved))) in own.enumerate() {
+            let own = first..first + body.n_vertices();
+            first = own.end;
+            let vertices = &mut self.all[own.clone()];
+            let are_moved = &mut self.are_moved[own.clone()];
+            let mosts = &mut self.most[own.clone()];
+            for (ix, (vertex, most)) in vertices.iter_mut().zip(mosts).enumerate() {
                 let most = std::mem::replace(most.get_mut(), WHOLE);
-                *is_moved = most < WHOLE;
-                if *is_moved {
-                    any = true;
+                are_moved[ix] = most < WHOLE;
+                if are_moved[ix] {
                     let least = start.share_of_rounding(end, ix);
                     // Twice as much each time, and nothing in the end, whatever the numbers.
                     let back = least * (1u64 << vertex.n_stops.min(MOST_STOPS)) as f64;
@@ -249,7 +254,25 @@ impl Vertices {
                     let is_last = vertex.n_stops >= MOST_STOPS;
                     vertex.share = if is_last { 0.0 } else { share.max(0.0) };
                     vertex.n_stops += 1;
-                    *now = start.blend_point(end, ix, vertex.share);
+                }
+            }
+            if !are_moved.contains(&true) {
+                continue;
+            }
+            any = true;
+            if body.stops_as_a_whole() {
+                let share = vertices
+                    .iter()
+                    .map(|vertex| vertex.share)
+                    .fold(1.0, f64::min);
+                let n_stops = vertices.iter().map(|vertex| vertex.n_stops).max();
+                let n_stops = n_stops.unwrap_or(0);
+                vertices.fill(Vertex { share, n_stops });
+                are_moved.fill(true);
+            }
+            for (ix, [_, now, _]) in self.ways[own].iter_mut().enumerate() {
+                if are_moved[ix] {
+                    *now = start.blend_point(end, ix, vertices[ix].share);
                 }
             }
         }

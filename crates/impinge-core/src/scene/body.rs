@@ -250,6 +250,11 @@ impl Body {
         self.thickness.each.as_ref()
     }
 
+    /// Whether all vertices are to go the same share of their ways: a transform moves them.
+    pub(crate) fn stops_as_a_whole(&self) -> bool {
+        self.moves && self.is_end_transformed
+    }
+
     /// Changes when the body is re-meshed; equal stamps mean equal topology.
     pub(crate) fn topology_stamp(&self) -> u64 {
         self.topology_stamp

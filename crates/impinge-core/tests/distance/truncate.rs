@@ -126,6 +126,70 @@ fn steps_to_where_vertices_are_stopped_are_free() {
     assert!(n_rounds > 0);
 }
 
+/// The shares of their ways that the vertices of a body go, from the least to the most.
+fn shares_of(scene: &Scene, body: BodyId, truncation: &Truncation) -> [f64; 2] {
+    let held = scene.body(body).expect("known");
+    let (start, end) = (held.positions(), held.end_positions().expect("it moves"));
+    let at = truncation.positions(body).expect("it moves");
+    let mut shares = [1.0f64, 0.0];
+    for vertex in 0..start.len() {
+        let [start, end, at] = [start, end, at].map(|positions| positions.point(vertex));
+        // Along the axis on which it goes farthest, as far as rounding tells.
+        let of_axis = (0..3).map(|k| (end[k] - start[k], at[k] - start[k]));
+        let (whole, gone) = of_axis.fold((0.0f64, 0.0), |most, axis| {
+            if axis.0.abs() > most.0.abs() {
+                axis
+            } else {
+                most
+            }
+        });
+        shares = [shares[0].min(gone / whole), shares[1].max(gone / whole)];
+    }
+    shares
+}
+
+/// A body that a transform moves keeps its shape: it stops as a whole, and others for themselves.
+#[test]
+fn a_rigid_body_stops_as_a_whole() {
+    let mut random = Random::new(8);
+    let ball = surfaces::ball(80);
+    let ball: Vec<[f64; 3]> = ball.positions.iter().map(|p| p.map(f64::from)).collect();
+    let (sin, cos) = 0.6f64.sin_cos();
+    let (mut n_stopped, mut n_apart) = (0, 0);
+    for round in 0..12 {
+        let mut scene = flying(&mut random, 20, 0.5, |x| x);
+        let still: Vec<_> = scene.bodies().map(|(id, _)| id).take(10).collect();
+        for id in still {
+            scene.clear_end_positions(id).expect("known");
+        }
+        let far = 6.0 + f64::from(round);
+        let faces = surfaces::ball(80).elements;
+        let ball = ball
+            .iter()
+            .map(|[x, y, z]| [x - 4.0, *y, *z])
+            .collect::<Vec<_>>();
+        let body = scene.add((faces, ball)).expect("a ball");
+        let turn = [
+            [cos, -sin, 0.0, far],
+            [sin, cos, 0.0, 2.0],
+            [0.0, 0.0, 1.0, 0.1],
+            [0.0, 0.0, 0.0, 1.0],
+        ];
+        scene.set_end_transform(body, &turn).expect("good");
+        let [least, most] = shares_of(&scene, body, &checked(&scene, &Query::all()));
+        assert!(most - least < 1e-12, "{least} {most}");
+        n_stopped += usize::from(most > 0.0 && most < 1.0);
+        // Given as positions, each of its vertices stops for itself.
+        let end = scene.body(body).expect("known").end_positions().cloned();
+        scene
+            .set_end_positions(body, end.expect("it moves"))
+            .expect("as many");
+        let [least, most] = shares_of(&scene, body, &checked(&scene, &Query::all()));
+        n_apart += usize::from(most - least > 1e-3);
+    }
+    assert!(n_stopped > 6 && n_apart > 6, "{n_stopped} {n_apart}");
+}
+
 #[test]
 fn a_chain_of_such_steps_never_touches() {
     let mut random = Random::new(5);
