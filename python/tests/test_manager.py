@@ -173,7 +173,7 @@ def test_distances():
     found = detector.nearest(scene, across=[a])
     assert (found.body_a, found.body_b) == (a, b)
     assert detector.nearest(scene, across=[a, b]) is None
-    with pytest.raises(ValueError, match="itself"):
+    with pytest.raises(ValueError, match="is named twice"):
         detector.distance(scene, a, a)
     with pytest.raises(TypeError, match="^scene: a Scene expected"):
         detector.distance(3, a, b)

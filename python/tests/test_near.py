@@ -194,7 +194,7 @@ def test_loops_end_where_they_start(detector):
     assert [len(inside) > 0 for inside in found.inside] == [True, True]
     assert region["inside"][0].tolist() == found.inside[0].tolist()
     assert repr(found).startswith("Penetration(1 regions, ")
-    with pytest.raises(ValueError, match="itself"):
+    with pytest.raises(ValueError, match="body 1 is named twice"):
         detector.penetration(scene, contacts, 1, 1)
     with pytest.raises(TypeError, match="^contacts: Contacts expected"):
         detector.penetration(scene, result, 0, 1)
