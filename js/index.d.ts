@@ -404,10 +404,7 @@ export interface Advance {
    * straight path to them is free, if the start was free of intersections, and except for pairs that touch at the start.
    */
   positions(body: Body): Positions | null;
-  /**
-   * Moves the bodies of the scene to these positions; where transforms move a body, its rest positions stay the same. It throws if a body
-   * has other positions than when this was found, or is new: nothing would be known of the step.
-   */
+  /** Moves the bodies of the scene to these positions, which are then their rest positions, too. */
   apply(scene: Scene): void;
 }
 
@@ -540,10 +537,7 @@ export interface Truncation {
   readonly stats: Stats;
   /** The positions of a body afterwards; `null` for one that does not move. */
   positions(body: Body): Positions | null;
-  /**
-   * Moves the bodies of the scene to these positions; where transforms move a body, its rest positions stay the same. It throws if a body
-   * has other positions than when this was found, or is new: nothing would be known of the step.
-   */
+  /** Moves the bodies of the scene to these positions, which are then their rest positions, too. */
   apply(scene: Scene): void;
 }
 
@@ -706,7 +700,7 @@ export declare class Detector {
   safeDistances(scene: Scene, most: number, query?: Query): SafeDistances;
   /**
    * How far each vertex can go in a step: each stops for itself, where `advance` stops all of them at one fraction. A body whose end
-   * `setEndTransform` made keeps its shape: all of its vertices go the least share of their ways that one of them may go.
+   * `setEndTransform` made stops as a whole: all of its vertices go the least share of their ways that one of them may go.
    */
   truncate(scene: Scene, query?: Query): Truncation;
   /** The pairs of `near` as lists per element. */

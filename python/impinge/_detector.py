@@ -325,7 +325,7 @@ class Detector(DetectorBase):
         `clearance` do so at every moment. Elements that do not meet are not stopped. Where two do, the vertices that go
         towards the other element stop before planes between the two, and pairs of which a vertex was stopped are looked at again;
         so some stop that might have passed, and the next step takes them farther. A body whose end `Scene.set_end_transform` made
-        keeps its shape: all of its vertices go the least share of their ways that one of them may go.
+        stops as a whole: all of its vertices go the least share of their ways that one of them may go.
 
         Parameters
         ----------

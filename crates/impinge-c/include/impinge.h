@@ -629,7 +629,7 @@ impinge_status impinge_advance(impinge_detector *detector, const impinge_scene *
 /* How far each vertex can go on its way to its end position: each stops for itself, where impinge_advance stops all at one fraction. The
  * straight way to the rounded positions is free in the sense of impinge_is_free, if the start was, but for pairs that touch at the start:
  * their vertices stay where they are, unless IMPINGE_START_SKIP leaves the pairs out, and are counted. Separation and clearance are kept at
- * every moment. A body whose end impinge_scene_set_end_transform made keeps its shape: all of its vertices go the least share of their ways
+ * every moment. A body whose end impinge_scene_set_end_transform made stops as a whole: all of its vertices go the least share of their ways
  * that one of them may go. INVALID: as impinge_advance. Found on the CPU. */
 impinge_status impinge_truncate(impinge_detector *detector, const impinge_scene *scene, const impinge_step *step, impinge_motion **motion);
 

@@ -366,7 +366,11 @@ fn kinds_of_a_step() {
                 whether the start intersects (--start verify)\n";
     let text = ask(&["--kinds", "ee"]).printed();
     assert!(text.ends_with(last), "{text}");
-    assert!(ask(&["--kinds", "ef"]).misuse().contains("only vf, ee, ev and vv"));
+    assert!(
+        ask(&["--kinds", "ef"])
+            .misuse()
+            .contains("only vf, ee, ev and vv")
+    );
 }
 
 /// An answer that resolves neighbours in one line does not leave them out in another.

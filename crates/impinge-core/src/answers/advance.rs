@@ -31,8 +31,15 @@ pub struct Advance {
 }
 
 /// Which positions each body of a scene had when a step was found.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default)]
 pub(crate) struct StartPositions(Vec<(BodyId, u64)>);
+
+/// Steps are equal if what they reach is.
+impl PartialEq for StartPositions {
+    fn eq(&self, _: &Self) -> bool {
+        true
+    }
+}
 
 impl StartPositions {
     pub fn of(scene: &Scene) -> Self {

@@ -1,9 +1,8 @@
 //! Names of the elements of an answer: the body and the element of each global number.
 
-use std::collections::BTreeMap;
-
 use crate::answers::pairs::Element;
 use crate::plan::{Plan, owner_by_first};
+use crate::scene::bodies::NumberedPart;
 use crate::scene::ids::BodyId;
 use crate::scene::index::{Number, pair_numbers};
 
@@ -12,8 +11,7 @@ use crate::scene::index::{Number, pair_numbers};
 pub(crate) struct Numbering {
     /// Bodies, and the first number of each of their parts.
     parts: Vec<(BodyId, Number)>,
-    /// The topology of each body when it was asked about.
-    topologies: BTreeMap<BodyId, u64>,
+    numbered: Vec<NumberedPart>,
 }
 
 impl Numbering {
@@ -21,15 +19,15 @@ impl Numbering {
         self.parts.clear();
         let parts = plan.parts.iter().map(|part| (part.id, part.first));
         self.parts.extend(parts);
-        self.topologies.clear();
-        let topologies = plan.parts.iter().map(|part| (part.id, part.topology_stamp));
-        self.topologies.extend(topologies);
+        self.numbered.clear();
+        let parts = plan.parts.iter();
+        (self.numbered).extend(parts.map(|part| (part.id, part.part, part.numbers_stamp)));
     }
 
-    /// The topology of each body when it was asked about: its elements have these numbers only as
-    /// long as it has that.
-    pub fn topologies(&self) -> &BTreeMap<BodyId, u64> {
-        &self.topologies
+    /// The parts that were asked about: their elements have these numbers as long as their stamps
+    /// are the same.
+    pub fn numbered(&self) -> &[NumberedPart] {
+        &self.numbered
     }
 
     pub fn pair(&self, key: u64) -> (Element, Element) {

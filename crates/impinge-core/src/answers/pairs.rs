@@ -6,7 +6,7 @@ use crate::answers::changes::Changes;
 use crate::answers::home::{Home, gives_back};
 use crate::plan::{Plan, owner_by_first};
 use crate::scene::Scene;
-use crate::scene::elements::BodyKind;
+use crate::scene::elements::{BodyKind, Part};
 use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
 use crate::scene::index::{ElementIx, Number, lower_number, pair_numbers};
@@ -30,7 +30,7 @@ struct PairBody {
     /// The global number of its first primitive.
     first: Number,
     kind: BodyKind,
-    topology_stamp: u64,
+    numbers_stamp: u64,
 }
 
 /// The numbers of no primitives.
@@ -75,7 +75,7 @@ impl Pairs {
                 id,
                 first: Number::new(end),
                 kind: body.kind(),
-                topology_stamp: body.topology_stamp(),
+                numbers_stamp: body.numbers_stamp(Part::Given),
             });
             end = end.saturating_add(body.elements().len() as u32);
         }
@@ -261,10 +261,10 @@ impl Pairs {
         self.bodies.iter().map(|body| (body.id, body.kind))
     }
 
-    /// The same bodies, and the topology of each.
-    pub(crate) fn topologies(&self) -> impl Iterator<Item = (BodyId, u64)> + '_ {
+    /// The same bodies, and the stamp of the numbers of their elements.
+    pub(crate) fn numbered(&self) -> impl Iterator<Item = (BodyId, u64)> + '_ {
         let bodies = self.bodies.iter();
-        bodies.map(|body| (body.id, body.topology_stamp))
+        bodies.map(|body| (body.id, body.numbers_stamp))
     }
 
     /// Which pairs an older answer also has, which are new, and which are gone: two pairs are the
@@ -294,7 +294,7 @@ impl Outcome<u64, 1> for Pairs {
             id: part.id,
             first: part.first,
             kind: part.kind,
-            topology_stamp: part.topology_stamp,
+            numbers_stamp: part.numbers_stamp,
         }));
         self.stats.clear();
     }

@@ -306,13 +306,13 @@ impl NearIter<'_> {
         let (n, threads) = (self.len(), self.threads());
         let mut rows = sink::with_capacity(n, WHAT)?;
         let room = &mut rows.spare_capacity_mut()[..n];
-        let remeshed = self.remeshed(scene);
+        let renumbered = self.renumbered(scene);
         let refused = Mutex::new(None);
         in_parts(room, PART, threads, |first, room| {
             let mut reader = Reader {
                 scene,
                 offsets: &offsets,
-                remeshed: &remeshed,
+                renumbered: &renumbered,
                 rest,
                 sides: [None; 2],
             };
@@ -383,7 +383,7 @@ fn no_stencil(pair: &NearPair) -> Error {
 struct Reader<'a> {
     scene: &'a Scene,
     offsets: &'a [u32],
-    remeshed: &'a [BodyId],
+    renumbered: &'a [(BodyId, Part)],
     rest: Option<&'a [Point]>,
     sides: [Option<PartOfBody<'a>>; 2],
 }
@@ -402,7 +402,7 @@ struct PartOfBody<'a> {
 impl<'a> Reader<'a> {
     /// A part that is seen first.
     fn side(&self, id: BodyId, part: Part) -> Result<PartOfBody<'a>, Error> {
-        if self.remeshed.contains(&id) {
+        if self.renumbered.contains(&(id, part)) {
             return Err(Error::Remeshed { body: id });
         }
         let body = self.scene.body(id)?;

@@ -9,7 +9,7 @@ use super::meet::{Local, ends, meet};
 use super::parts::ByBodies;
 use super::{Contacts, Doubles, Feature, PointName, Shape, lowest};
 use crate::answers::pairs::Pairs;
-use crate::scene::elements::Elements;
+use crate::scene::elements::{Elements, Part};
 use crate::scene::error::Error;
 use crate::scene::index::VertexIx;
 use crate::scene::positions::Positions;
@@ -237,11 +237,11 @@ impl<'a> ContactBodies<'a> {
     fn new(scene: &'a Scene, pairs: &Pairs, work: Work<'_>) -> Result<Self, Error> {
         let mut bodies: Vec<Option<Taking<'a>>> = Vec::new();
         let mut colliding = pairs.all_colliding().into_iter().peekable();
-        for (id, topology_stamp) in pairs.topologies() {
+        for (id, numbers_stamp) in pairs.numbered() {
             let body = scene.body(id)?;
             let own = colliding.next_if(|(of, _)| *of == id);
             let own = own.map_or(Vec::new(), |(_, own)| own);
-            if !own.is_empty() && body.topology_stamp() != topology_stamp {
+            if !own.is_empty() && body.numbers_stamp(Part::Given) != numbers_stamp {
                 return Err(Error::Remeshed { body: id });
             }
             if !body.is_checked() {

@@ -51,7 +51,7 @@ impl Detector {
     /// each gets a share of it, by how far it wants to go. Then pairs of which a vertex was stopped
     /// are looked at again, until none meets. So some vertices stop that might have passed; the
     /// next step takes them farther. A body whose end a
-    /// [transform](Scene::set_end_transform) made keeps its shape: all of its vertices go the least
+    /// [transform](Scene::set_end_transform) made stops as a whole: all of its vertices go the least
     /// share of their ways that one of them may go.
     ///
     /// The vertices of pairs that touch at the start, or are nearer than they are to keep, stay

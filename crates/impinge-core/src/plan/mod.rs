@@ -60,8 +60,8 @@ pub struct QueryPart {
     pub kind: BodyKind,
     /// Whether its self-collision is queried.
     pub within: bool,
-    /// The topology of the body.
-    pub(crate) topology_stamp: u64,
+    /// Of the numbers of its elements.
+    pub(crate) numbers_stamp: u64,
     /// Whether the body has no faces.
     pub(crate) is_bare: bool,
     /// Whether the body has no edges either.

@@ -134,7 +134,7 @@ impl Plan {
             first: Number::new(first as u32),
             n_primitives: n as u32,
             kind: elements.kind(),
-            topology_stamp: body.topology_stamp(),
+            numbers_stamp: body.numbers_stamp(part),
             is_bare: body.kind() < BodyKind::Triangles,
             is_points: body.kind() == BodyKind::Points,
             within: within && !self.excluded.contains(&(id, id)),

@@ -1,10 +1,11 @@
 //! Pairs of vertices, edges and faces that a query leaves out by name.
 
-use std::collections::BTreeMap;
+use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::query::pair_kind::PairKind;
 use crate::scene::Scene;
+use crate::scene::bodies::NumberedPart;
 use crate::scene::elements::Part;
 use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
@@ -26,8 +27,8 @@ pub(crate) struct PairSet(Arc<HeldPairs>);
 #[derive(Debug)]
 struct HeldPairs {
     pairs: [Vec<Named>; PairKind::ALL.len()],
-    /// The topology of each body when they were found.
-    topologies: BTreeMap<BodyId, u64>,
+    /// The parts that they name.
+    parts: Vec<NumberedPart>,
     /// Their keys in the numbers of the last plan.
     keys: Mutex<Option<(Vec<Numbered>, SortedKeys)>>,
 }
@@ -39,29 +40,30 @@ impl PartialEq for PairSet {
 }
 
 impl PairSet {
-    pub fn new(
-        pairs: impl Iterator<Item = (PairKind, Named)>,
-        topologies: BTreeMap<BodyId, u64>,
-    ) -> Self {
+    pub fn new(pairs: impl Iterator<Item = (PairKind, Named)>, parts: &[NumberedPart]) -> Self {
         let mut of_kinds: [Vec<Named>; PairKind::ALL.len()] = Default::default();
+        let mut named = BTreeSet::new();
         for (kind, pair) in pairs {
             of_kinds[kind as usize].push(pair);
+            named.extend(pair.map(|(body, _)| body).into_iter().zip(kind.parts()));
         }
+        let parts = parts.iter().copied();
+        let parts = parts.filter(|&(body, part, _)| named.contains(&(body, part)));
         PairSet(Arc::new(HeldPairs {
             pairs: of_kinds,
-            topologies,
+            parts: parts.collect(),
             keys: Mutex::default(),
         }))
     }
 
-    /// Refuses a body that was re-meshed: its elements have other numbers now. Pairs of a body that
-    /// is no longer there are none.
+    /// Refuses a body whose elements have other numbers now. Pairs of a body that is no longer there
+    /// are none.
     ///
     /// # Errors
     /// Names the body.
     pub fn check(&self, scene: &Scene) -> Result<(), Error> {
-        match scene.remeshed(&self.0.topologies).next() {
-            Some(body) => Err(Error::Remeshed { body }),
+        match scene.renumbered(&self.0.parts).next() {
+            Some((body, _)) => Err(Error::Remeshed { body }),
             None => Ok(()),
         }
     }

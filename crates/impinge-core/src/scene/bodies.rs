@@ -1,14 +1,15 @@
 //! The bodies of a scene: added, removed, found, and told whom they meet.
 
-use std::collections::BTreeMap;
-
 use crate::scene::body::{Body, Filter};
-use crate::scene::elements::{Elements, with_corners};
+use crate::scene::elements::{Elements, Part, with_corners};
 use crate::scene::error::Error;
 use crate::scene::ids::{BodyId, new_stamp};
 use crate::scene::mesh::Mesh;
 use crate::scene::positions::{Positions, Real};
 use crate::scene::thickness::{HeldThickness, Thickness};
+
+/// A part of a body, and the stamp of the numbers of its elements.
+pub(crate) type NumberedPart = (BodyId, Part, u64);
 
 /// A slot for one body; empty after the body was removed.
 #[derive(Debug, Clone)]
@@ -366,16 +367,16 @@ impl Scene {
         &held.expect("a part's slot is in use").1
     }
 
-    /// The bodies that have another topology than they had.
-    pub(crate) fn remeshed(
+    /// The parts whose elements have other numbers than they had.
+    pub(crate) fn renumbered(
         &self,
-        topologies: &BTreeMap<BodyId, u64>,
-    ) -> impl Iterator<Item = BodyId> {
-        let is_new = |(id, stamp): &(&BodyId, &u64)| {
-            let body = self.body(**id);
-            body.is_ok_and(|body| body.topology_stamp() != **stamp)
+        parts: &[NumberedPart],
+    ) -> impl Iterator<Item = (BodyId, Part)> {
+        let is_new = |(id, part, stamp): &&NumberedPart| {
+            let body = self.body(*id);
+            body.is_ok_and(|body| body.numbers_stamp(*part) != *stamp)
         };
-        topologies.iter().filter(is_new).map(|(&id, _)| id)
+        parts.iter().filter(is_new).map(|&(id, part, _)| (id, part))
     }
 }
 

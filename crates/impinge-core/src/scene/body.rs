@@ -59,6 +59,7 @@ pub struct Body {
     /// Of each vertex, if it was set.
     pub(super) groups: Option<Arc<[u32]>>,
     pub(super) pinned: Option<Arc<[bool]>>,
+    pub(super) mesh_stamp: u64,
     pub(super) topology_stamp: u64,
     pub(super) positions_stamp: u64,
     pub(super) step_stamp: u64,
@@ -109,6 +110,7 @@ impl Body {
             thickness: HeldThickness::default(),
             groups: None,
             pinned: None,
+            mesh_stamp: stamp,
             topology_stamp: new_stamp(),
             positions_stamp: stamp,
             step_stamp: stamp,
@@ -258,6 +260,15 @@ impl Body {
     /// Changes when the body is re-meshed; equal stamps mean equal topology.
     pub(crate) fn topology_stamp(&self) -> u64 {
         self.topology_stamp
+    }
+
+    /// Changes when the elements of a part get other numbers: when the body is re-meshed, of edges
+    /// also when they are [set](crate::Scene::set_edges).
+    pub(crate) fn numbers_stamp(&self, part: Part) -> u64 {
+        match part {
+            Part::Edges => self.topology_stamp,
+            _ => self.mesh_stamp,
+        }
     }
 
     /// Changes whenever positions may have changed.

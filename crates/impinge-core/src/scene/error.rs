@@ -142,8 +142,11 @@ pub enum Error {
         /// The body named twice.
         body: BodyId,
     },
-    /// Pairs from before a body was re-meshed: its elements have other numbers now. Ask again.
-    #[error("body {body}: the pairs were found before it was re-meshed, and name other elements")]
+    /// Pairs from before a body was re-meshed, or pairs with edges from before these were
+    /// [set](crate::Scene::set_edges): its elements have other numbers now. Ask again.
+    #[error(
+        "body {body}: the pairs were found before it was re-meshed or its edges were set, and name other elements"
+    )]
     Remeshed {
         /// The body.
         body: BodyId,

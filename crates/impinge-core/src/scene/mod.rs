@@ -1,6 +1,6 @@
 //! Bodies: topology once, positions every frame; and the numbers that name them and their elements.
 
-mod bodies;
+pub(crate) mod bodies;
 mod body;
 pub(crate) mod by_body;
 mod edges;

@@ -90,6 +90,7 @@ impl Scene {
     pub fn clear_end_positions(&mut self, body: BodyId) -> Result<(), Error> {
         let target = self.moved_body(body)?;
         target.moves = false;
+        target.is_end_transformed = false;
         target.step_stamp = new_stamp();
         Ok(())
     }

@@ -690,12 +690,41 @@ fn refusals_name_what_is_wrong() {
         faces.reverse();
         faces.truncate(if few { 1 } else { faces.len() });
         scene.remesh(id, (faces.clone(), points.clone())).unwrap();
-        let text = "body 0: the pairs were found before it was re-meshed, and name other elements";
+        let text = "body 0: the pairs were found before it was re-meshed or its edges were set, and name other elements";
         assert_eq!(refused(&pairs, &scene, None), text);
         // So it is with pairs that are left out.
         let refused = detector.near(&scene, 0.1, &query);
         assert_eq!(refused.unwrap_err().to_string(), text);
     }
+    // A body that no pair names may change, and edges are not what pairs of vertices and faces name.
+    let mut add = |x: f64, faces: &[[u32; 3]]| {
+        let corners = [
+            [0.0, 0.0, 0.0],
+            [1.0, 0.0, 0.0],
+            [0.0, 1.0, 0.0],
+            [0.0, 0.2, 0.1],
+        ];
+        let corners = corners.map(|[a, b, c]| [a + x, b, c]);
+        scene.add_triangles(faces, &corners).unwrap()
+    };
+    let [near, far] = [add(70.0, &[[0, 1, 2], [1, 2, 3]]), add(90.0, &[[0, 1, 2]])];
+    let query = Query::all().kinds([PairKind::VertexFace]);
+    let pairs = detector.near(&scene, 0.2, &query).unwrap();
+    let names = |body| {
+        pairs
+            .iter()
+            .any(|pair| [pair.a.body, pair.b.body].contains(&body))
+    };
+    assert!(names(near) && !names(far));
+    let all = Query::all().exclude(&pairs);
+    scene
+        .remesh(far, (vec![[0u32, 1, 2]], points.clone()))
+        .unwrap();
+    scene
+        .set_edges(near, &[[1, 0], [2, 0], [2, 1], [3, 1], [3, 2]])
+        .unwrap();
+    assert!(pairs.stencils(&scene, None).is_ok());
+    assert!(detector.near(&scene, 0.1, &all).is_ok());
     // Those of a body that is no longer there are none.
     scene.remove(id).unwrap();
     assert!(detector.near(&scene, 0.1, &query).is_ok());

@@ -11,6 +11,7 @@ use crate::query::pair_kind::PairKind;
 use crate::query::pair_set::PairSet;
 use crate::query::{Exclusion, Query};
 use crate::scene::Scene;
+use crate::scene::elements::Part;
 use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
 use crate::search::found::KeysByKind;
@@ -275,7 +276,7 @@ impl From<&NearPairs> for Exclusion {
         let pairs = near.iter();
         PairSet::new(
             pairs.map(|pair| (pair.kind, [named(pair.a), named(pair.b)])),
-            near.numbering.topologies().clone(),
+            near.numbering.numbered(),
         )
         .into()
     }
@@ -316,9 +317,10 @@ pub struct NearIter<'a> {
 }
 
 impl NearIter<'_> {
-    /// Bodies that were re-meshed since: their elements have other numbers now.
-    pub(crate) fn remeshed(&self, scene: &Scene) -> Vec<BodyId> {
-        scene.remeshed(self.pairs.numbering.topologies()).collect()
+    /// The parts whose elements have other numbers now.
+    pub(crate) fn renumbered(&self, scene: &Scene) -> Vec<(BodyId, Part)> {
+        let parts = self.pairs.numbering.numbered();
+        scene.renumbered(parts).collect()
     }
 
     /// How many threads computed the answer.

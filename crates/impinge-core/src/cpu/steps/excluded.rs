@@ -375,8 +375,10 @@ fn named(
         return Ok(Vec::new());
     }
     let mut slots = [Vec::new(), Vec::new()];
-    for (clustering, slots) in clusterings.iter().zip(&mut slots) {
-        *slots = filled(Slot::default(), clustering.order.len(), WHAT)?;
+    let of = clusterings.iter().zip([of_a, of_b]);
+    for ((clustering, part), slots) in of.zip(&mut slots) {
+        // Vertices of no element have numbers, too.
+        *slots = filled(Slot::default(), part.n_primitives as usize, WHAT)?;
         for (slot, element) in clustering.order.iter().enumerate() {
             slots[element.index()] = Slot::from_usize(slot);
         }
