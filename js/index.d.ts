@@ -215,7 +215,7 @@ export declare class Scene {
   setThickness(body: Body, thickness: number | ArrayLike<number>, part?: "vertices" | "edges" | "faces"): void;
   /**
    * Numbers the edges of a body as its caller does: edge i of answers, of `edges` and of `setThickness` is row i, two vertices. Every edge of the surface must be there
-   * once, in any order. `null`: the library's own numbers again. Set them before the first question: afterwards `RestPairs` from before name other edges.
+   * once, in any order. `null`: the library's own numbers again. Set them before the first question: afterwards `RestPairs` of edges from before are refused.
    */
   setEdges(body: Body, edges: Index | null): void;
   /** Puts each vertex of a body into a group, for `exclude: [{ groups: [g, h] }]`. A body whose groups were never set is in none. */

@@ -355,7 +355,8 @@ class Scene(SceneBase):
     def set_edges(self, body: _Body, edges: _Array | None) -> None:
         """Numbers the edges of a body as its caller does: edge i of answers, of `edges` and of `set_thickness` is row i.
 
-        Set them before the first question: afterwards answers and exclusions from before name other edges. `remesh` forgets them.
+        Set them before the first question: afterwards answers from before name other edges, and are refused by `exclude` and
+        `stencils`. `remesh` forgets them.
 
         Parameters
         ----------

@@ -125,7 +125,7 @@ impinge_status impinge_scene_remesh(impinge_scene *scene, uint32_t body, uint32_
 /* Numbers the edges of a body as its caller does: `edges` has 2 columns, vertex indices in either order, and edge i of answers, of
  * impinge_scene_edges and of impinge_scene_set_element_thickness is row i. Every edge of the body must be there once, in any order; of
  * tetrahedra these are the edges of their surface. No rows: the library's own numbers again. Set them before the first question:
- * afterwards answers and exclusions from before name other edges.
+ * afterwards answers from before name other edges, and are refused where they are left out or made stencils of.
  * INVALID: no such body, a row that is no edge or the same as another, an edge that no row has; a body of edges, whose numbers are the
  * caller's already, or of points. The body keeps its numbers then. */
 impinge_status impinge_scene_set_edges(impinge_scene *scene, uint32_t body, impinge_array edges);

@@ -9,25 +9,21 @@ use crate::scene::index::{Number, pair_numbers};
 /// Maps global numbers to elements of bodies.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Numbering {
-    /// Bodies, and the first number of each of their parts.
-    parts: Vec<(BodyId, Number)>,
-    numbered: Vec<NumberedPart>,
+    /// The first number of each part.
+    parts: Vec<(Number, NumberedPart)>,
 }
 
 impl Numbering {
     pub fn begin(&mut self, plan: &Plan) {
         self.parts.clear();
-        let parts = plan.parts.iter().map(|part| (part.id, part.first));
-        self.parts.extend(parts);
-        self.numbered.clear();
         let parts = plan.parts.iter();
-        (self.numbered).extend(parts.map(|part| (part.id, part.part, part.numbers_stamp)));
+        (self.parts).extend(parts.map(|of| (of.first, (of.id, of.part, of.numbers_stamp))));
     }
 
     /// The parts that were asked about: their elements have these numbers as long as their stamps
     /// are the same.
-    pub fn numbered(&self) -> &[NumberedPart] {
-        &self.numbered
+    pub fn numbered(&self) -> impl Iterator<Item = NumberedPart> + '_ {
+        self.parts.iter().map(|&(_, part)| part)
     }
 
     pub fn pair(&self, key: u64) -> (Element, Element) {
@@ -44,13 +40,13 @@ impl Numbering {
 
     #[inline]
     fn name_after(&self, number: Number, last: &mut usize) -> Element {
-        let is_below = |&(_, first): &(BodyId, Number)| number < first;
+        let is_below = |&(first, _): &(Number, NumberedPart)| number < first;
         let is_of_last =
             !is_below(&self.parts[*last]) && self.parts.get(*last + 1).is_none_or(is_below);
         if !is_of_last {
-            *last = owner_by_first(&self.parts, number, |part| part.1);
+            *last = owner_by_first(&self.parts, number, |part| part.0);
         }
-        let (body, first) = self.parts[*last];
+        let (first, (body, ..)) = self.parts[*last];
         Element {
             body,
             element: number.minus(first).raw(),

@@ -260,7 +260,7 @@ impl Vertices {
                 continue;
             }
             any = true;
-            if body.stops_as_a_whole() {
+            if body.has_end_by_transform() {
                 let share = vertices
                     .iter()
                     .map(|vertex| vertex.share)

@@ -40,14 +40,16 @@ impl PartialEq for PairSet {
 }
 
 impl PairSet {
-    pub fn new(pairs: impl Iterator<Item = (PairKind, Named)>, parts: &[NumberedPart]) -> Self {
+    pub fn new(
+        pairs: impl Iterator<Item = (PairKind, Named)>,
+        parts: impl Iterator<Item = NumberedPart>,
+    ) -> Self {
         let mut of_kinds: [Vec<Named>; PairKind::ALL.len()] = Default::default();
         let mut named = BTreeSet::new();
         for (kind, pair) in pairs {
             of_kinds[kind as usize].push(pair);
             named.extend(pair.map(|(body, _)| body).into_iter().zip(kind.parts()));
         }
-        let parts = parts.iter().copied();
         let parts = parts.filter(|&(body, part, _)| named.contains(&(body, part)));
         PairSet(Arc::new(HeldPairs {
             pairs: of_kinds,
@@ -62,7 +64,7 @@ impl PairSet {
     /// # Errors
     /// Names the body.
     pub fn check(&self, scene: &Scene) -> Result<(), Error> {
-        match scene.renumbered(&self.0.parts).next() {
+        match scene.renumbered(self.0.parts.iter().copied()).next() {
             Some((body, _)) => Err(Error::Remeshed { body }),
             None => Ok(()),
         }

@@ -370,13 +370,13 @@ impl Scene {
     /// The parts whose elements have other numbers than they had.
     pub(crate) fn renumbered(
         &self,
-        parts: &[NumberedPart],
+        parts: impl Iterator<Item = NumberedPart>,
     ) -> impl Iterator<Item = (BodyId, Part)> {
-        let is_new = |(id, part, stamp): &&NumberedPart| {
-            let body = self.body(*id);
-            body.is_ok_and(|body| body.numbers_stamp(*part) != *stamp)
+        let is_new = |&(id, part, stamp): &NumberedPart| {
+            let body = self.body(id);
+            body.is_ok_and(|body| body.numbers_stamp(part) != stamp)
         };
-        parts.iter().filter(is_new).map(|&(id, part, _)| (id, part))
+        parts.filter(is_new).map(|(id, part, _)| (id, part))
     }
 }
 

@@ -50,7 +50,7 @@ pub struct Body {
     pub(super) end: Option<Positions>,
     /// Whether `end` counts. If not, only its memory is kept.
     pub(super) moves: bool,
-    /// Whether it was made from the rest positions.
+    /// Whether a transform made it, while it counts.
     pub(super) is_end_transformed: bool,
     /// How the body was moved by a transform, if it was.
     pub(super) motion: Option<Box<RestPose>>,
@@ -252,8 +252,8 @@ impl Body {
         self.thickness.each.as_ref()
     }
 
-    /// Whether all vertices are to go the same share of their ways: a transform moves them.
-    pub(crate) fn stops_as_a_whole(&self) -> bool {
+    /// Whether there is an end that a transform made.
+    pub(crate) fn has_end_by_transform(&self) -> bool {
         self.moves && self.is_end_transformed
     }
 
@@ -321,7 +321,6 @@ impl Body {
         self.positions_stamp = new_stamp();
         self.step_stamp = self.positions_stamp;
         self.moves = false;
-        self.is_end_transformed = false;
         self.motion = None;
         self.checked = checked;
     }

@@ -14,8 +14,8 @@ impl Scene {
     /// edges of their surface. No rows: the library's own numbers again. [`remesh`](Scene::remesh)
     /// forgets them.
     ///
-    /// Set them before the first question: afterwards answers and exclusions from before name other
-    /// edges.
+    /// Set them before the first question: afterwards answers from before name other edges, and are
+    /// refused where they are left out or made stencils of.
     ///
     /// ```
     /// use impinge::{Backend, Detector, Elements, PairKind, Query, Scene};

@@ -90,7 +90,6 @@ impl Scene {
     pub fn clear_end_positions(&mut self, body: BodyId) -> Result<(), Error> {
         let target = self.moved_body(body)?;
         target.moves = false;
-        target.is_end_transformed = false;
         target.step_stamp = new_stamp();
         Ok(())
     }
@@ -241,7 +240,7 @@ impl Scene {
         target.check(body, &positions)?;
         let rest = match target.motion.take() {
             Some(motion) => Some(motion.rest),
-            None => (target.is_end_transformed).then(|| Arc::new(target.positions.clone())),
+            None => (target.has_end_by_transform()).then(|| Arc::new(target.positions.clone())),
         };
         store(&mut target.positions, positions);
         target.has_moved(true);
