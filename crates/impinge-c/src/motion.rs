@@ -30,8 +30,7 @@ impl Motion {
         let is_of = |index: usize| index == body as usize;
         match self {
             Motion::Whole { advance, .. } => {
-                let mut all = advance.positions.iter();
-                Some(&all.find(|(id, _)| is_of(id.index()))?.1)
+                Some(advance.iter().find(|(id, _)| is_of(id.index()))?.1)
             }
             Motion::ByVertex(truncation) => {
                 Some(truncation.iter().find(|(id, _)| is_of(id.index()))?.1)

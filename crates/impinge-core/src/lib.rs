@@ -26,6 +26,8 @@ pub mod simd;
 pub mod workers;
 
 pub use answers::advance::Advance;
+#[doc(hidden)]
+pub use answers::advance::{StartOfBody, StepStart};
 pub use answers::candidates::Candidates;
 pub use answers::changes::Changes;
 pub use answers::closest::{Closest, ClosestElement};

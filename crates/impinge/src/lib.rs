@@ -157,6 +157,8 @@ pub use impinge_core::{
     DeviceInfo, Gpu, ResidentPairs, ResidentPart, ResidentSafe, ResidentStep, ResidentVertices,
     devices, devices_async,
 };
+#[doc(hidden)]
+pub use impinge_core::{StartOfBody, StepStart};
 pub use impinge_core::{contact, exact, proximity};
 
 // The types that users hold are `Send` and `Sync`.

@@ -83,11 +83,7 @@ pub fn step(args: &StepArgs, cancel: &CancelToken) -> Result<(), Error> {
             .advance(&bodies.scene, &step)
             .map_err(|error| bodies.named(error))?;
         drop(watch);
-        let reached = |id| {
-            let mut moved = advance.positions.iter();
-            Some(&moved.find(|(body, _)| *body == id)?.1)
-        };
-        reached::write(&args.advance, &bodies, reached)?;
+        reached::write(&args.advance, &bodies, |id| advance.positions(id))?;
         let found = Found::advance(&advance, detector.stats());
         print(args, asked, &bodies, &found, None)?;
         return found.end(args.fail_on_hit);

@@ -1,10 +1,10 @@
 //! How far a step can be taken, and where the vertices are afterwards.
 
 use crate::answers::impacts::Impact;
-use crate::scene::Scene;
 use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
 use crate::scene::positions::Positions;
+use crate::scene::{Body, Scene};
 
 /// How far a step can be taken.
 #[derive(Clone, PartialEq)]
@@ -21,57 +21,86 @@ pub struct Advance {
     /// Whether elements intersect at the start; the fraction is then 0, whether or not there is a
     /// first contact. `None` if nobody asked: only [`Start::Verify`](crate::Start::Verify) does.
     pub start_intersects: Option<bool>,
-    /// The vertex positions of all moving bodies at that fraction, rounded to the precision in
-    /// which they are stored. The straight path from the start to these rounded positions is free,
-    /// if the start was free of intersections, and except for pairs that touch at the start.
-    pub positions: Vec<(BodyId, Positions)>,
     /// How many fractions were tried.
     pub n_tried: u32,
-    pub(crate) start: StartPositions,
+    pub(crate) positions: Vec<(BodyId, Positions)>,
+    pub(crate) start: StepStart,
 }
 
-/// Which positions each body of a scene had when a step was found.
+/// Where the bodies of a scene were when a step was found.
+#[doc(hidden)]
 #[derive(Debug, Clone, Default)]
-pub(crate) struct StartPositions(Vec<(BodyId, u64)>);
+pub struct StepStart(Vec<StartOfBody>);
+
+/// Where a body was when a step was found.
+#[doc(hidden)]
+#[derive(Debug, Clone, Copy)]
+pub struct StartOfBody {
+    pub body: BodyId,
+    /// The stamp of its positions.
+    pub stamp: u64,
+    /// Whether a transform made its end, so that the next one begins with its rest positions, too.
+    pub keeps_rest: bool,
+}
 
 /// Steps are equal if what they reach is.
-impl PartialEq for StartPositions {
+impl PartialEq for StepStart {
     fn eq(&self, _: &Self) -> bool {
         true
     }
 }
 
-impl StartPositions {
-    pub fn of(scene: &Scene) -> Self {
-        let bodies = scene.bodies();
-        StartPositions(
-            bodies
-                .map(|(id, body)| (id, body.positions_stamp()))
-                .collect(),
-        )
+impl FromIterator<StartOfBody> for StepStart {
+    fn from_iter<I: IntoIterator<Item = StartOfBody>>(bodies: I) -> Self {
+        let mut bodies: Vec<_> = bodies.into_iter().collect();
+        bodies.sort_unstable_by_key(|start| start.body);
+        StepStart(bodies)
+    }
+}
+
+impl StepStart {
+    pub(crate) fn of(scene: &Scene) -> Self {
+        let start = |(body, held): (_, &Body)| StartOfBody {
+            body,
+            stamp: held.positions_stamp(),
+            keeps_rest: held.has_end_by_transform(),
+        };
+        scene.bodies().map(start).collect()
+    }
+
+    /// Each body.
+    pub fn bodies(&self) -> &[StartOfBody] {
+        &self.0
+    }
+
+    fn of_body(&self, body: BodyId) -> Option<&StartOfBody> {
+        let found = self.0.binary_search_by_key(&body, |start| start.body);
+        Some(&self.0[found.ok()?])
     }
 
     /// Sets the positions of the bodies that move, if all bodies still are where they were.
     ///
     /// # Errors
-    /// A body that was moved since, or is new; one that moves and was removed.
+    /// A body that was moved since, or is new; one that moves and was removed. The scene is
+    /// unchanged then.
     pub fn take_step(
         &self,
         scene: &mut Scene,
         positions: &[(BodyId, Positions)],
     ) -> Result<(), Error> {
         for (id, body) in scene.bodies() {
-            let known = self.0.binary_search_by_key(&id, |(id, _)| *id);
-            let stamp = known.map(|ix| self.0[ix].1);
-            if stamp != Ok(body.positions_stamp()) {
+            let start = self.of_body(id);
+            if start.is_none_or(|start| start.stamp != body.positions_stamp()) {
                 return Err(Error::Moved { body: id });
             }
         }
-        for (body, _) in positions {
-            scene.body(*body)?;
+        for (id, positions) in positions {
+            scene.body(*id)?.check(*id, &positions.into())?;
         }
-        let mut all = positions.iter();
-        all.try_for_each(|(body, positions)| scene.take_step(*body, positions))
+        positions.iter().try_for_each(|(id, positions)| {
+            let keeps_rest = self.of_body(*id).is_some_and(|start| start.keeps_rest);
+            scene.take_step(*id, positions, keeps_rest)
+        })
     }
 }
 
@@ -89,8 +118,28 @@ impl std::fmt::Debug for Advance {
 }
 
 impl Advance {
-    /// Takes the step: sets these positions in the scene, or in a clone of it. Of bodies that
-    /// [transforms](Scene::set_end_transform) move, the rest positions stay the same.
+    /// The vertex positions of a body at that fraction, rounded to the precision in which they are
+    /// stored; `None` for one that does not move or was not in the scene. The straight path from
+    /// the start to these rounded positions is free, if the start was free of intersections, and
+    /// except for pairs that touch at the start.
+    pub fn positions(&self, body: BodyId) -> Option<&Positions> {
+        positions_of(&self.positions, body)
+    }
+
+    /// The bodies that move, each with its positions.
+    pub fn iter(&self) -> impl ExactSizeIterator<Item = (BodyId, &Positions)> {
+        self.positions
+            .iter()
+            .map(|(id, positions)| (*id, positions))
+    }
+
+    #[doc(hidden)]
+    pub fn start(&self) -> &StepStart {
+        &self.start
+    }
+
+    /// Takes the step: sets these positions in the scene, or in a clone of it. Of bodies whose end
+    /// a [transform](Scene::set_end_transform) set, the rest positions stay the same.
     ///
     /// # Errors
     /// A body that has other positions than when the step was found, also one that does not move:
@@ -99,4 +148,10 @@ impl Advance {
     pub fn apply(&self, scene: &mut Scene) -> Result<(), Error> {
         self.start.take_step(scene, &self.positions)
     }
+}
+
+/// The positions of a body among those of all that move, sorted.
+pub(crate) fn positions_of(all: &[(BodyId, Positions)], body: BodyId) -> Option<&Positions> {
+    let found = all.binary_search_by_key(&body, |(id, _)| *id);
+    Some(&all[found.ok()?].1)
 }

@@ -1,6 +1,6 @@
 //! How far each vertex may go in a step, and where it is afterwards.
 
-use crate::answers::advance::StartPositions;
+use crate::answers::advance::{StepStart, positions_of};
 use crate::scene::Scene;
 use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
@@ -17,15 +17,14 @@ pub struct Truncation {
     pub(crate) n_touching: u64,
     pub(crate) n_rounds: u32,
     pub(crate) start_intersects: Option<bool>,
-    pub(crate) start: StartPositions,
+    pub(crate) start: StepStart,
 }
 
 impl Truncation {
     /// The positions of a body, in the precision of its positions; `None` for one that does not
     /// move or was not in the scene.
     pub fn positions(&self, body: BodyId) -> Option<&Positions> {
-        let found = self.positions.binary_search_by_key(&body, |(id, _)| *id);
-        Some(&self.positions[found.ok()?].1)
+        positions_of(&self.positions, body)
     }
 
     /// The bodies that move, each with its positions.
@@ -57,8 +56,13 @@ impl Truncation {
         self.start_intersects
     }
 
-    /// Takes the step: sets these positions in the scene, or in a clone of it. Of bodies that
-    /// [transforms](Scene::set_end_transform) move, the rest positions stay the same.
+    #[doc(hidden)]
+    pub fn start(&self) -> &StepStart {
+        &self.start
+    }
+
+    /// Takes the step: sets these positions in the scene, or in a clone of it. Of bodies whose end
+    /// a [transform](Scene::set_end_transform) set, the rest positions stay the same.
     ///
     /// # Errors
     /// A body that has other positions than when the step was found, also one that does not move:

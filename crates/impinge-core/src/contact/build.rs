@@ -11,6 +11,7 @@ use super::{Contacts, Doubles, Feature, PointName, Shape, lowest};
 use crate::answers::pairs::Pairs;
 use crate::scene::elements::{Elements, Part};
 use crate::scene::error::Error;
+use crate::scene::ids::BodyId;
 use crate::scene::index::VertexIx;
 use crate::scene::positions::Positions;
 use crate::scene::{Body, Scene};
@@ -62,6 +63,7 @@ pub(super) fn contacts(scene: &Scene, pairs: &Pairs, work: Work<'_>) -> Result<C
         corners,
         names,
         points,
+        stamps: bodies.stamps(),
         doubles: bodies.doubles().into(),
         by_bodies: ByBodies::default(),
     };
@@ -228,6 +230,7 @@ struct ContactBodies<'a> {
 }
 
 struct Taking<'a> {
+    id: BodyId,
     body: &'a Body,
     /// Of the triangles in contact. Empty for most meshes.
     doubles: Doubles,
@@ -249,11 +252,19 @@ impl<'a> ContactBodies<'a> {
             }
             bodies.resize_with(bodies.len().max(id.index() + 1), || None);
             bodies[id.index()] = Some(Taking {
+                id,
                 body,
                 doubles: doubles(body, &own, work)?,
             });
         }
         Ok(ContactBodies { bodies })
+    }
+
+    fn stamps(&self) -> Vec<(BodyId, u64)> {
+        let taking = self.bodies.iter().flatten();
+        taking
+            .map(|taking| (taking.id, taking.body.positions_stamp()))
+            .collect()
     }
 
     /// The doubles of all bodies that have any.

@@ -61,6 +61,7 @@ use std::sync::Arc;
 use crate::answers::pairs::Pairs;
 use crate::scene::Scene;
 use crate::scene::error::Error;
+use crate::scene::ids::BodyId;
 use crate::scene::index::VertexIx;
 use crate::search::sets::Sets;
 use crate::search::work::Work;
@@ -126,6 +127,8 @@ pub struct Contacts {
     /// For each body that has any: vertices that are not the lowest one at their position, each
     /// with the lowest.
     doubles: Arc<[(u32, Doubles)]>,
+    /// The stamps of the positions of the bodies that take part.
+    stamps: Vec<(BodyId, u64)>,
     by_bodies: parts::ByBodies,
 }
 
@@ -143,6 +146,19 @@ impl Contacts {
     /// The contacts of all pairs.
     pub(crate) fn new(scene: &Scene, pairs: &Pairs, work: Work<'_>) -> Result<Self, Error> {
         build::contacts(scene, pairs, work)
+    }
+
+    /// Refuses a body that has moved since.
+    ///
+    /// # Errors
+    /// Names the body.
+    pub(crate) fn refuse_moved(&self, scene: &Scene, id: BodyId) -> Result<(), Error> {
+        let found = self.stamps.binary_search_by_key(&id, |(id, _)| *id);
+        let stamp = found.map(|ix| self.stamps[ix].1);
+        match stamp == Ok(scene.body(id)?.positions_stamp()) {
+            true => Ok(()),
+            false => Err(Error::Moved { body: id }),
+        }
     }
 
     /// Bytes of the lists with an entry per contact, corner or point.

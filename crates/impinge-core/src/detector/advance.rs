@@ -2,7 +2,7 @@
 
 use super::Detector;
 use super::steps::StartAnswer;
-use crate::answers::advance::{Advance, StartPositions};
+use crate::answers::advance::{Advance, StepStart};
 use crate::answers::impacts::Impact;
 use crate::plan::{Plan, TestId};
 use crate::query::Query;
@@ -70,7 +70,7 @@ impl Detector {
             start_intersects: start.map(|StartAnswer { intersects, .. }| intersects),
             positions: Vec::new(),
             n_tried: 1,
-            start: StartPositions::of(scene),
+            start: StepStart::of(scene),
         };
         self.take_positions(scene, query, &plan, seen.close, control, &mut advance)?;
         Ok(advance)

@@ -29,8 +29,8 @@ impl Detector {
     /// ```
     ///
     /// # Errors
-    /// A body of the pairs is no longer in the scene, is of another kind or has too few primitives;
-    /// positions written in slot since then are refused.
+    /// A body of the pairs is no longer in the scene, or was re-meshed since; positions written in
+    /// place since then that are refused.
     pub fn contacts(&mut self, scene: &Scene, pairs: &Pairs) -> Result<Contacts, Error> {
         let control = &self.control.clone();
         let limits = self.settings.limits();
@@ -75,7 +75,8 @@ impl Detector {
     ///
     /// # Errors
     /// A body that is not in the scene, the same body twice, a body not made of triangles, a
-    /// surface that is not closed, contacts without these two though they intersect.
+    /// surface that is not closed, contacts without these two though they intersect; a body that
+    /// was moved or re-meshed since its contacts were found ([`Error::Moved`]).
     pub fn penetration(
         &mut self,
         scene: &Scene,
@@ -101,7 +102,7 @@ impl Detector {
         })
     }
 
-    /// Refuses contacts of other bodies: two bodies that intersect would seem to be apart.
+    /// Refuses contacts of other bodies or other positions: two bodies that intersect would seem to be apart.
     fn refuse_others(
         &mut self,
         scene: &Scene,
@@ -113,8 +114,12 @@ impl Detector {
             let bodies = [row[0], row[2]];
             bodies == [one, other] || bodies == [other, one]
         };
-        if a == b || contacts.rows().iter().any(is_of_two) {
+        if a == b {
             return Ok(());
+        }
+        if contacts.rows().iter().any(is_of_two) {
+            contacts.refuse_moved(scene, a)?;
+            return contacts.refuse_moved(scene, b);
         }
         let intersect = self.any(scene, &Query::between(a, b))?;
         match intersect {

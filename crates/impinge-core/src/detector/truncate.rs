@@ -14,7 +14,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::Detector;
 use super::advance::{moving, refuse_cell, refuse_seams, set_end_positions};
-use crate::answers::advance::StartPositions;
+use crate::answers::advance::StepStart;
 use crate::answers::truncation::Truncation;
 use crate::plan::{Plan, TestId};
 use crate::query::Query;
@@ -90,12 +90,13 @@ impl Detector {
         let start = self.verify(scene, query)?.map(|start| start.intersects);
         let mut truncation = Truncation {
             start_intersects: start,
-            start: StartPositions::of(scene),
+            start: StepStart::of(scene),
             ..Truncation::default()
         };
         if start == Some(true) {
             let stay = moving(scene).map(|(id, at, _)| (id, at.clone()));
             truncation.positions = stay.collect();
+            truncation.n_cut = moving(scene).map(n_ways).sum();
             return Ok(truncation);
         }
         let mut vertices = Vertices::new(scene, &plan)?;
@@ -280,7 +281,9 @@ impl Vertices {
     }
 
     fn n_cut(&self) -> u64 {
-        self.all.iter().filter(|vertex| vertex.share < 1.0).count() as u64
+        let each = self.all.iter().zip(&self.ways);
+        each.filter(|(vertex, [start, _, end])| vertex.share < 1.0 && start != end)
+            .count() as u64
     }
 
     /// The positions of all bodies that move.
@@ -306,6 +309,12 @@ impl Vertices {
         }
         positions
     }
+}
+
+/// How many vertices of a body move.
+fn n_ways((_, start, end): (BodyId, &Positions, &Positions)) -> u64 {
+    let moves = |&ix: &usize| start.point(ix) != end.point(ix);
+    (0..start.len()).filter(moves).count() as u64
 }
 
 /// The bits of 1: all of a way.

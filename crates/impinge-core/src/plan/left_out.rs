@@ -8,7 +8,7 @@ use crate::query::pair_kind::PairKind;
 use crate::query::pair_set::{PairSet, SortedKeys};
 use crate::query::{Exclusion, Query};
 use crate::scene::Scene;
-use crate::scene::elements::VertexRings;
+use crate::scene::elements::{Part, VertexRings};
 use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
 use crate::scene::index::PartIx;
@@ -158,10 +158,17 @@ impl Plan {
                 vertices.push(VertexList { bodies, lists });
             }
         }
+        let asked = self.kinds_asked();
+        let takes_part = |body: BodyId, of: Part| {
+            let mut kinds = PairKind::ALL.into_iter();
+            let mut parts = self.parts.iter();
+            kinds.any(|kind| asked.contains(kind) && kind.parts().contains(&of))
+                && parts.any(|part| part.id == body && part.part == of)
+        };
         query
             .pairs
             .iter()
-            .try_for_each(|pairs| pairs.check(scene))?;
+            .try_for_each(|pairs| pairs.check(scene, takes_part))?;
         let of_part = |part: PartIx| {
             let body = self.body(scene, part);
             OfPart {

@@ -58,13 +58,19 @@ impl PairSet {
         }))
     }
 
-    /// Refuses a body whose elements have other numbers now. Pairs of a body that is no longer there
-    /// are none.
+    /// Refuses a body whose elements have other numbers now, if they take part. Pairs of a body that
+    /// is no longer there are none.
     ///
     /// # Errors
     /// Names the body.
-    pub fn check(&self, scene: &Scene) -> Result<(), Error> {
-        match scene.renumbered(self.0.parts.iter().copied()).next() {
+    pub fn check(
+        &self,
+        scene: &Scene,
+        takes_part: impl Fn(BodyId, Part) -> bool,
+    ) -> Result<(), Error> {
+        let parts = self.0.parts.iter().copied();
+        let parts = parts.filter(|&(body, part, _)| takes_part(body, part));
+        match scene.renumbered(parts).next() {
             Some((body, _)) => Err(Error::Remeshed { body }),
             None => Ok(()),
         }

@@ -181,8 +181,9 @@ impl Body {
         matrix.map(|matrix| matrix.matrix())
     }
 
-    /// The positions that were given last, before any [transform](crate::Scene::set_transform). Of a
-    /// body that transforms move, they stay the same when a step is [taken](crate::Advance::apply).
+    /// The positions from which [transforms](crate::Scene::set_transform) start: those that were
+    /// given last, or reached by the last step that was [taken](crate::Advance::apply). A step whose
+    /// end a [transform](crate::Scene::set_end_transform) set leaves them as they are.
     pub fn rest_positions(&self) -> &Positions {
         match &self.motion {
             Some(motion) => &motion.rest,
@@ -253,7 +254,8 @@ impl Body {
     }
 
     /// Whether there is an end that a transform made.
-    pub(crate) fn has_end_by_transform(&self) -> bool {
+    #[doc(hidden)]
+    pub fn has_end_by_transform(&self) -> bool {
         self.moves && self.is_end_transformed
     }
 
@@ -298,7 +300,7 @@ impl Body {
     }
 
     /// Refuses new positions of another number, and the first that is not finite.
-    pub(super) fn check(&self, body: BodyId, positions: &NewPositions<'_>) -> Result<(), Error> {
+    pub(crate) fn check(&self, body: BodyId, positions: &NewPositions<'_>) -> Result<(), Error> {
         self.check_number(body, positions.len())?;
         match &positions.0 {
             Given::F32(rows) => check_positions(body, rows),

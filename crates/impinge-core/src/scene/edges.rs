@@ -55,8 +55,11 @@ impl Scene {
         if let Some(each) = &mut held.thickness.each {
             *each = Arc::new(each.with_edges(&before));
         }
+        let are_new = new != held.edges();
         held.parts.own_edges = own;
-        held.topology_stamp = new_stamp();
+        if are_new {
+            held.topology_stamp = new_stamp();
+        }
         Ok(())
     }
 }

@@ -151,10 +151,10 @@ pub enum Error {
         /// The body.
         body: BodyId,
     },
-    /// A step that was found before a body was moved or added: nothing is known of it now. Ask
-    /// again.
+    /// A step or contacts that were found before a body was moved, re-meshed or added: nothing is
+    /// known of it now. Ask again.
     #[error(
-        "body {body}: the step was found for other positions than it has now, so nothing is known of it; ask again"
+        "body {body}: this was found for other positions than it has now, so nothing is known of it; ask again"
     )]
     Moved {
         /// The body.

@@ -3,6 +3,7 @@
 
 use std::sync::Arc;
 
+use crate::scene::Body;
 use crate::scene::bodies::Scene;
 use crate::scene::error::Error;
 use crate::scene::ids::{BodyId, new_stamp};
@@ -109,8 +110,8 @@ impl Scene {
     /// Moves a body by an affine matrix, such as a rigid motion, without passing its vertices
     /// again. It moves the rest positions, which are those given last ([`add`](Scene::add),
     /// [`set_positions`](Scene::set_positions), [`remesh`](Scene::remesh)). A second transform
-    /// replaces the first; they do not accumulate, also where a step was
-    /// [taken](crate::Advance::apply) in between.
+    /// replaces the first; they do not accumulate, also where a step whose end a
+    /// [transform](Scene::set_end_transform) set was [taken](crate::Advance::apply) in between.
     ///
     /// Answers are exact for the moved vertices. These are rounded in a fixed way, so they have the
     /// same bits on every backend: row `[a, b, c, d]` of the matrix takes `(x, y, z)` to
@@ -142,24 +143,17 @@ impl Scene {
         if !target.checked {
             target.positions.check(body)?;
         }
-        let previous = target.motion.take();
-        let (rest, before) = match &previous {
-            Some(motion) => (Arc::clone(&motion.rest), motion.matrix),
-            None => (Arc::new(target.positions.clone()), None),
-        };
-        // A step has taken it to where no matrix does.
-        let reached = (previous.is_some() && before.is_none()).then(|| target.positions.clone());
-        matrix.write(&rest, &mut target.positions);
-        if let Err(error) = target.positions.check(body) {
-            // Restore the previous positions: computing them again gives the same bits.
-            match (before, reached) {
-                (Some(matrix), _) => matrix.write(&rest, &mut target.positions),
-                (None, Some(reached)) => target.positions = reached,
-                (None, None) => target.positions.clone_from(&rest),
+        let moved = target.moved_by(body, &matrix)?;
+        let motion = target.motion.take();
+        let before = std::mem::replace(&mut target.positions, moved);
+        let rest = match motion {
+            Some(motion) => {
+                // The next transform writes into this memory.
+                target.end = (before.bytes() > 0).then_some(before);
+                motion.rest
             }
-            target.motion = previous;
-            return Err(error);
-        }
+            None => Arc::new(before),
+        };
         target.has_moved(true);
         let matrix = Some(matrix);
         target.motion = Some(Box::new(RestPose { rest, matrix }));
@@ -220,32 +214,71 @@ impl Scene {
         if !target.checked {
             target.positions.check(body)?;
         }
-        // The memory of end positions that no longer count is used again.
-        let unused = target.end.take_if(|_| !target.moves);
-        let mut end = unused.unwrap_or_else(|| f32::store(&[]));
-        matrix.write(target.rest_positions(), &mut end);
-        end.check(body)?;
+        let end = target.moved_by(body, &matrix)?;
         target.set_end(end, true);
         Ok(())
     }
 
-    /// Gives a body the positions that a step has reached. The rest positions of one that
-    /// transforms move stay the same.
+    /// Gives a body the positions that a step has reached. `keeps_rest`: transforms go on from its
+    /// rest positions.
     ///
     /// # Errors
     /// As [`set_positions`](Scene::set_positions).
-    pub(crate) fn take_step(&mut self, body: BodyId, positions: &Positions) -> Result<(), Error> {
+    pub(crate) fn take_step(
+        &mut self,
+        body: BodyId,
+        positions: &Positions,
+        keeps_rest: bool,
+    ) -> Result<(), Error> {
         let positions = positions.into();
         let target = self.moved_body(body)?;
         target.check(body, &positions)?;
-        let rest = match target.motion.take() {
-            Some(motion) => Some(motion.rest),
-            None => (target.has_end_by_transform()).then(|| Arc::new(target.positions.clone())),
-        };
+        let rest = keeps_rest.then(|| match target.motion.take() {
+            Some(motion) => motion.rest,
+            None => Arc::new(target.positions.clone()),
+        });
         store(&mut target.positions, positions);
         target.has_moved(true);
         target.motion = rest.map(|rest| Box::new(RestPose { rest, matrix: None }));
         Ok(())
+    }
+
+    /// Restores what a saved body had besides its rest positions and its transform: where a step
+    /// had taken it, where the next ends, and whether a transform made this end.
+    ///
+    /// # Errors
+    /// As [`set_positions`](Scene::set_positions) and
+    /// [`set_end_positions`](Scene::set_end_positions).
+    #[doc(hidden)]
+    pub fn restore_step(
+        &mut self,
+        body: BodyId,
+        reached: Option<&Positions>,
+        end: Option<&Positions>,
+        by_transform: bool,
+    ) -> Result<(), Error> {
+        if let Some(reached) = reached {
+            self.take_step(body, reached, true)?;
+        }
+        if let Some(end) = end {
+            self.set_end_positions(body, end)?;
+            self.moved_body(body)?.is_end_transformed = by_transform;
+        }
+        Ok(())
+    }
+}
+
+impl Body {
+    /// The rest positions, moved, in memory of end positions that do not count.
+    ///
+    /// # Errors
+    /// A position that is refused.
+    fn moved_by(&mut self, id: BodyId, matrix: &Affine) -> Result<Positions, Error> {
+        let unused = self.end.take_if(|_| !self.moves);
+        let mut moved = unused.unwrap_or_else(|| f32::store(&[]));
+        matrix.write(self.rest_positions(), &mut moved);
+        moved.check(id)?;
+        Ok(moved)
     }
 }
 

@@ -1,7 +1,7 @@
 //! What lies inside, and the regions' normals, depths and volumes.
 
 use impinge_core::contact::{Penetration, Region};
-use impinge_core::{Backend, Detector, Query, Scene};
+use impinge_core::{Backend, Detector, Elements, Error, Query, Scene};
 use impinge_scenes::{Model, surfaces};
 
 use super::detect;
@@ -322,6 +322,44 @@ fn contacts_of_other_bodies_are_refused() {
     );
     let apart = detector.penetration(&scene, &contacts, a, far).unwrap();
     assert_eq!((apart.volume(), apart.regions.len()), (Some(0.0), 0));
+}
+
+/// Points where surfaces crossed say nothing of surfaces that are elsewhere or of other faces.
+#[test]
+fn contacts_of_before_are_refused() {
+    let mut scene = Scene::new();
+    let (ball, small) = (surfaces::ball(100), surfaces::ball(20));
+    let [a, b] = [0.0, 0.3].map(|x| ball.translated([x, 0.0, 0.0]).add_to(&mut scene).unwrap());
+    let far = ball.translated([9.0, 0.0, 0.0]).add_to(&mut scene).unwrap();
+    let mut detector = Detector::new(Backend::Cpu).unwrap();
+    let pairs = detect(&scene, &Query::all());
+    let contacts = detector.contacts(&scene, &pairs).unwrap();
+    scene.set_positions(far, &ball.positions).unwrap();
+    let known = detector.penetration(&scene, &contacts, a, b);
+    assert_eq!(known.unwrap().regions.len(), 1, "they did not move");
+    let before = scene.clone();
+    let mut mirrored = scene.clone();
+    // The same surface, whose faces have other numbers.
+    let elements = ball.elements.clone();
+    let Elements::Triangles(mut faces) = elements else {
+        panic!("a surface");
+    };
+    faces.reverse();
+    let positions = before.body(b).unwrap().positions().clone();
+    mirrored.remesh(b, (faces, positions)).unwrap();
+    scene
+        .remesh(b, (small.elements.clone(), small.positions.clone()))
+        .unwrap();
+    let mut moved = before.clone();
+    moved.set_positions(b, &ball.positions).unwrap();
+    for now in [&scene, &mirrored, &moved] {
+        let error = detector.penetration(now, &contacts, a, b).unwrap_err();
+        assert!(
+            matches!(error, Error::Moved { body } if body == b),
+            "{error}"
+        );
+    }
+    assert!(detector.penetration(&before, &contacts, a, b).is_ok());
 }
 
 /// Each pair of many bodies is as if it were alone in the scene, but for the numbers of its

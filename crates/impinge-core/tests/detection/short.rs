@@ -48,7 +48,7 @@ fn answers_print_short() {
     scene.set_positions(b, &far.positions).unwrap();
     scene.set_end_positions(b, &end.positions).unwrap();
     let advance = detector.advance(&scene, &step).unwrap();
-    assert_eq!(advance.positions.len(), 1);
+    assert_eq!(advance.iter().len(), 1);
     check(&advance);
     let candidates = detector.candidates(&scene, 0.0, &query);
     let candidates = candidates.unwrap();

@@ -172,6 +172,17 @@ fn a_refused_transform_changes_nothing() {
         );
         assert_eq!(points(&scene, body), held);
         assert_eq!(scene.body(body).expect("known").transform(), before);
+        // Positions that were widened with their end stay wide.
+        let wide = TRIANGLE.map(|p| p.map(f64::from));
+        scene.set_end_positions(body, &wide).expect("good");
+        let mut far = IDENTITY;
+        far[0][0] = 1e300;
+        far[0][3] = f64::MAX;
+        scene.set_transform(body, &far).expect_err("infinite");
+        let held = scene.body(body).expect("known");
+        assert!(matches!(held.positions(), Positions::F64(_)));
+        assert_eq!(held.end_positions(), Some(&wide.to_vec().into()));
+        scene.set_positions(body, &TRIANGLE).expect("good");
     }
     scene.remove(body).expect("known");
     assert!(matches!(

@@ -614,11 +614,11 @@ fn a_step_is_advanced_freely_however_early_boxes_end() {
             "seed {seed}: {advance:?}"
         );
         n_backed_off += u32::from(advance.n_tried > 2);
-        for (body, positions) in &advance.positions {
+        for (body, positions) in advance.iter() {
             let Positions::F32(positions) = positions else {
                 panic!("double precision")
             };
-            scene.set_end_positions(*body, positions).unwrap();
+            scene.set_end_positions(body, positions).unwrap();
         }
         assert!(detector.is_free(&scene, &step).unwrap(), "seed {seed}");
     }

@@ -725,6 +725,25 @@ fn refusals_name_what_is_wrong() {
         .unwrap();
     assert!(pairs.stencils(&scene, None).is_ok());
     assert!(detector.near(&scene, 0.1, &all).is_ok());
+    // Pairs of edges are in the way only of questions about edges of this body.
+    let kinds = [PairKind::VertexFace, PairKind::EdgeEdge];
+    let edges = detector.near(&scene, 0.2, &Query::all().kinds(kinds));
+    let edges = edges.unwrap();
+    let [one, other] = [0.0, 0.1].map(|z| {
+        let corners = [[50.0, 0.0, z], [51.0, 0.0, z], [50.0, 1.0, z]];
+        scene.add_triangles(&[[0, 1, 2]], &corners).unwrap()
+    });
+    let own = [[1, 0], [2, 0], [2, 1], [3, 1], [3, 2]];
+    scene.set_edges(near, &own).unwrap();
+    let same = edges.stencils(&scene, None).err();
+    assert!(same.is_none(), "{same:?}");
+    scene.set_edges(near, &[]).unwrap();
+    let without = |query: Query| query.exclude(&edges);
+    let [faces, two] = [query.clone(), Query::between(one, other)].map(without);
+    detector.near(&scene, 0.1, &faces).unwrap();
+    assert!(detector.near(&scene, 0.2, &two).unwrap().len() > 3);
+    let all = without(Query::all());
+    assert!(detector.near(&scene, 0.1, &all).is_err());
     // Those of a body that is no longer there are none.
     scene.remove(id).unwrap();
     assert!(detector.near(&scene, 0.1, &query).is_ok());

@@ -259,10 +259,10 @@ fn a_step_of_cloth_can_be_taken_up_to_its_first_contact() {
             scenario.name, advance.fraction, advance.n_tried
         );
         assert!(advance.fraction <= first && advance.fraction > 0.5 * first);
-        for (body, positions) in &advance.positions {
+        for (body, positions) in advance.iter() {
             match positions {
-                impinge_core::Positions::F32(end) => scene.set_end_positions(*body, end),
-                impinge_core::Positions::F64(end) => scene.set_end_positions(*body, end),
+                impinge_core::Positions::F32(end) => scene.set_end_positions(body, end),
+                impinge_core::Positions::F64(end) => scene.set_end_positions(body, end),
             }
             .expect("good");
         }

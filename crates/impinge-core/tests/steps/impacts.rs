@@ -170,7 +170,7 @@ fn a_step_is_taken_from_where_it_was_found_only() {
             let mut now = scene.clone();
             let positions = |scene: &Scene| scene.body(other).map(|body| body.positions().clone());
             let error = take(&mut now).expect_err("somewhere else").to_string();
-            let text = "the step was found for other positions than it has now";
+            let text = "this was found for other positions than it has now";
             assert!(
                 error.starts_with(&format!("body {body}: {text}")),
                 "{error}"
@@ -197,6 +197,34 @@ fn a_step_is_taken_from_where_it_was_found_only() {
         fewer.remove(other).expect("known");
         assert!(matches!(take(&mut fewer), Err(Error::UnknownBody { .. })));
     }
+}
+
+/// Only the end of a step says whether the next transform begins at rest or where the step led.
+#[test]
+fn a_step_to_positions_ends_where_transforms_begin() {
+    let mut detector = Detector::new(Backend::Cpu).expect("a CPU");
+    let raised = |z: f64| {
+        let mut matrix = [[0.0; 4]; 4];
+        (0..4).for_each(|ix| matrix[ix][ix] = 1.0);
+        matrix[2][3] = z;
+        matrix
+    };
+    let rest = |scene: &Scene, body| scene.body(body).expect("known").rest_positions().point(0)[2];
+    let (mut scene, _, other) = falling();
+    scene.set_positions(other, &lifted(1.0)).expect("good");
+    scene.set_transform(other, &raised(1.0)).expect("good");
+    scene.set_end_positions(other, &lifted(3.0)).expect("good");
+    let bent = detector.advance(&scene, &Query::all()).expect("good");
+    bent.apply(&mut scene).expect("the same positions");
+    assert_eq!(rest(&scene, other), 3.0);
+    scene.set_end_transform(other, &raised(1.0)).expect("good");
+    let raised_by_one = detector.truncate(&scene, &Query::all()).expect("good");
+    // Where it is to go afterwards does not matter.
+    scene.clear_end_positions(other).expect("known");
+    raised_by_one.apply(&mut scene).expect("the same positions");
+    let body = scene.body(other).expect("known");
+    assert_eq!(body.positions().point(0)[2], 4.0);
+    assert_eq!(rest(&scene, other), 3.0);
 }
 
 /// Transforms are those of the rest positions, also after a step was taken.
@@ -307,11 +335,11 @@ fn a_step_is_advanced_freely_where_very_many_pairs_are_close() {
         assert_eq!(advances[0], advances[1], "{seed}");
         let advance = &advances[0];
         n_backed_off += u32::from(advance.n_tried > 2);
-        for (body, positions) in &advance.positions {
+        for (body, positions) in advance.iter() {
             let Positions::F32(positions) = positions else {
                 panic!("double precision")
             };
-            scene.set_end_positions(*body, positions).expect("good");
+            scene.set_end_positions(body, positions).expect("good");
         }
         let mut detector = Detector::new(Backend::Cpu).expect("settings");
         assert!(detector.is_free(&scene, &step).expect("good"), "{seed}");
@@ -450,13 +478,13 @@ fn numbers_of_any_size_are_answered_as_pair_by_pair() {
             // What is left of the way is free, to the rounded positions.
             let advance = detector.advance(&scene, &skip).expect("good");
             let mut advanced = scene.clone();
-            for (body, positions) in &advance.positions {
+            for (body, positions) in advance.iter() {
                 assert!(
                     (0..positions.len())
                         .all(|ix| positions.point(ix).iter().all(|x| x.is_finite()))
                 );
                 match positions {
-                    Positions::F64(rows) => advanced.set_end_positions(*body, rows).expect("good"),
+                    Positions::F64(rows) => advanced.set_end_positions(body, rows).expect("good"),
                     Positions::F32(_) => unreachable!("given as f64"),
                 }
             }
@@ -464,7 +492,13 @@ fn numbers_of_any_size_are_answered_as_pair_by_pair() {
                 detector.is_free(&advanced, &skip).expect("good"),
                 "{size:?}"
             );
-            let rest = (earliest, is_free, advance.fraction, advance.positions);
+            let reached = advance.iter().map(|(body, at)| (body, at.clone()));
+            let rest = (
+                earliest,
+                is_free,
+                advance.fraction,
+                reached.collect::<Vec<_>>(),
+            );
             ([impacts, near, kept, candidates], rest)
         }));
         assert_eq!(answers[0], answers[1], "{size:?} {seed}");

@@ -105,8 +105,8 @@ fn a_start_that_intersects_is_not_free_if_asked() {
         assert_eq!((advance.fraction, advance.first), (0.0, None));
         assert_eq!(advance.start_intersects, Some(true));
         assert_eq!(
-            &advance.positions[0].1,
-            scene.body(rod).expect("known").positions()
+            advance.positions(rod),
+            Some(scene.body(rod).expect("known").positions())
         );
         let impacts = detector.impacts(&scene, &verify).expect("good");
         assert_eq!((impacts.len(), impacts.start_intersects()), (0, Some(true)));
