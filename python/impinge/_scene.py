@@ -441,7 +441,7 @@ class Scene(SceneBase):
         >>> len(detector.near(scene, 1.0)) > 0, len(detector.near(scene, 1.0, exclude=scene.rest_pairs(1.0)))
         (True, 0)
         """
-        return _rest_pairs(Detector("cpu").near(self, distance)._inner)
+        return _rest_pairs(Detector("cpu").near(self, distance)._inner, self)
 
     def vertex_pairs(self, body: _Body, offsets: _Array, vertices: _Array, other: _Body | None = None) -> Exclusion:
         """Pairs of vertices, to be left out of questions with ``exclude=``: what is left out are the pairs of an element of one body and

@@ -126,6 +126,37 @@ def test_scenes_pickle(duplicate):
 
 
 @pytest.mark.parametrize("duplicate", [copy.copy, copy.deepcopy, lambda x: pickle.loads(pickle.dumps(x))])
+@pytest.mark.parametrize("wide", [False, True])
+def test_scenes_pickle_where_steps_led(duplicate, wide):
+    scene, detector = a_scene(), impinge.Detector("cpu")
+    turned = np.array([[np.cos(0.3), 0, np.sin(0.3), 0], [0, 1, 0, 0], [-np.sin(0.3), 0, np.cos(0.3), -1.5], [0, 0, 0, 1]])
+    turning = scene.add(TRIANGLE + np.float32([0, 0, 5]), FACE)
+    scene.set_end_transform(turning, turned)
+    detector.advance(scene).apply(scene)
+    assert scene.transform(turning) is None
+    scene.set_end_transform(turning, turned @ turned)
+    halfway = (scene.positions(turning) + scene.end_positions(turning)) / 2
+    scene.add_points([[0.1, 0.8, 0.1] @ halfway])  # It stops one of the vertices most.
+    if wide:  # The end of another body is as it was given.
+        scene.set_end_positions(3, scene.positions(3).astype(np.float64) - 1)
+    other = duplicate(scene)
+    for body in map(int, scene.bodies):
+        for of in ["positions", "rest_positions", "end_positions"]:
+            ours, theirs = getattr(other, of)(body), getattr(scene, of)(body)
+            assert (ours is None) == (theirs is None)
+            if ours is not None:
+                assert ours.dtype == theirs.dtype and np.array_equal(ours, theirs), (body, of)
+    # What a transform moves is stopped as a whole, and the next one begins at rest.
+    both = [detector.truncate(of) for of in (scene, other)]
+    assert both[0].n_cut == both[1].n_cut == (6 if wide else 3)
+    for of, step in zip([scene, other], both):
+        step.apply(of)
+        of.set_transform(int(turning), np.eye(4))
+    assert np.array_equal(scene.positions(turning), TRIANGLE + np.float32([0, 0, 5]))
+    assert np.array_equal(other.positions(int(turning)), scene.positions(turning))
+
+
+@pytest.mark.parametrize("duplicate", [copy.copy, copy.deepcopy, lambda x: pickle.loads(pickle.dumps(x))])
 def test_scenes_pickle_what_was_said_of_vertices(duplicate):
     scene = a_scene()
     layer = np.repeat(np.arange(4, dtype=np.uint32), 4)

@@ -352,10 +352,7 @@ impl Advance {
     }
 
     fn moving(&self) -> impl Iterator<Item = (BodyId, &Positions)> {
-        self.inner
-            .positions
-            .iter()
-            .map(|(id, positions)| (*id, positions))
+        self.inner.iter()
     }
 }
 

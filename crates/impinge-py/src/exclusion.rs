@@ -16,23 +16,37 @@ use crate::settings::unsigned;
 pub struct Exclusion {
     pub inner: Inner,
     name: Name,
+    /// The number of the scene whose bodies it names, if it names any.
+    scene: Option<u64>,
 }
 
 impl Exclusion {
-    /// The pairs of an answer.
-    pub fn pairs(near: &impinge::NearPairs) -> Self {
+    /// The pairs of an answer about a scene.
+    pub fn pairs(near: &impinge::NearPairs, scene: u64) -> Self {
         Exclusion {
             inner: Inner::from(near),
             name: Name::Pairs(near.len()),
+            scene: Some(scene),
         }
     }
 
     /// What the caller lists.
-    pub fn vertices(bodies: [BodyId; 2], offsets: Vec<u64>, vertices: Vec<u32>) -> Self {
-        let name = Name::Vertices(vertices.len());
-        let [a, b] = bodies;
-        let inner = Inner::vertices(a, b, offsets, vertices);
-        Exclusion { inner, name }
+    pub fn vertices(
+        [a, b]: [BodyId; 2],
+        offsets: Vec<u64>,
+        vertices: Vec<u32>,
+        scene: u64,
+    ) -> Self {
+        Exclusion {
+            name: Name::Vertices(vertices.len()),
+            inner: Inner::vertices(a, b, offsets, vertices),
+            scene: Some(scene),
+        }
+    }
+
+    /// Whether it can be asked of a scene: its pairs would be none in another one.
+    pub fn is_of(&self, scene: u64) -> bool {
+        self.scene.is_none_or(|own| own == scene)
     }
 }
 
@@ -87,6 +101,7 @@ pub fn _rings(n: &Bound<'_, PyAny>) -> PyResult<Exclusion> {
     Ok(Exclusion {
         inner: Inner::rings(n),
         name: Name::Rings(n),
+        scene: None,
     })
 }
 
@@ -97,5 +112,6 @@ pub fn _groups(g: &Bound<'_, PyAny>, h: &Bound<'_, PyAny>) -> PyResult<Exclusion
     Ok(Exclusion {
         inner: Inner::groups(g, h),
         name: Name::Groups([g.min(h), g.max(h)]),
+        scene: None,
     })
 }

@@ -12,6 +12,7 @@ use crate::answers::{ChangeArrays, changes, collect, kind_numbers, to_array};
 use crate::errors::invalid;
 use crate::exclusion::Exclusion;
 use crate::options::pair_kind;
+use crate::scene::Scene;
 use crate::statistics;
 
 /// The names of nearest features together by their numbers.
@@ -175,8 +176,8 @@ pub fn number(feature: Feature) -> u8 {
     }
 }
 
-/// What leaves out all pairs of an answer.
+/// What leaves out all pairs of an answer about a scene.
 #[pyfunction]
-pub fn _rest_pairs(near: &Bound<'_, Near>) -> Exclusion {
-    Exclusion::pairs(&near.get().inner)
+pub fn _rest_pairs(near: &Bound<'_, Near>, scene: &Scene) -> Exclusion {
+    Exclusion::pairs(&near.get().inner, scene.number)
 }

@@ -212,6 +212,9 @@ impl<'py> Options<'py> {
                     let name = format!("exclude[{ix}]");
                     query.exclude((scene.id(a, &name)?, scene.id(b, &name)?))
                 }
+                Excluded::Ready(exclusion) if !exclusion.get().is_of(scene.number) => {
+                    return Err(invalid(format!("exclude[{ix}]: of another scene")));
+                }
                 Excluded::Ready(exclusion) => query.exclude(exclusion.get().inner.clone()),
             };
         }

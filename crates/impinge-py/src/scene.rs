@@ -461,7 +461,7 @@ impl Scene {
         let offsets = arrays::offsets(offsets, "offsets")?;
         let offsets = offsets.into_iter().map(|offset| offset as u64).collect();
         let vertices = arrays::whole_numbers(vertices, "vertices")?;
-        Ok(Exclusion::vertices([a, b], offsets, vertices))
+        Ok(Exclusion::vertices([a, b], offsets, vertices, self.number))
     }
 
     fn _positions<'py>(
@@ -586,7 +586,14 @@ impl Scene {
                 positions_array(py, body.rest_positions())?,
                 scene._elements(py, &number)?,
                 scene._transform(py, &number)?,
-                scene._end_positions(py, &number)?,
+                // A step has taken it from rest to where no matrix does.
+                (
+                    (body.transform().is_none() && body.positions() != body.rest_positions())
+                        .then(|| positions_array(py, body.positions()))
+                        .transpose()?,
+                    scene._end_positions(py, &number)?,
+                    body.has_end_by_transform(),
+                ),
                 filter.category,
                 filter.mask,
                 thickness_array(py, body),
@@ -614,22 +621,16 @@ impl Scene {
             let (kind, vertices, elements) = (item(1)?, item(2)?, item(3)?);
             let kind = settings::kind(Some(&kind))?;
             let id = scene.add_named(&vertices, &elements, kind, ARGUMENTS)?;
-            let (matrix, end) = (item(4)?, item(5)?);
+            let matrix = item(4)?;
             if !matrix.is_none() {
                 let matrix = arrays::matrix(&matrix, "matrix")?;
                 scene.inner.set_transform(id, &matrix).map_err(raise)?;
             }
-            if !end.is_none() {
-                match PositionArray::new(&end, "vertices")? {
-                    PositionArray::F32(end) => scene
-                        .inner
-                        .set_end_positions(id, slice_rows::<f32, 3>(&end)?),
-                    PositionArray::F64(end) => scene
-                        .inner
-                        .set_end_positions(id, slice_rows::<f64, 3>(&end)?),
-                }
+            let step: (Bound<'_, PyAny>, Bound<'_, PyAny>, bool) = item(5)?.extract()?;
+            let [reached, end] = [saved_positions(&step.0)?, saved_positions(&step.1)?];
+            let held = &mut scene.inner;
+            held.restore_step(id, reached.as_ref(), end.as_ref(), step.2)
                 .map_err(raise)?;
-            }
             let filter = Filter {
                 category: item(6)?.extract()?,
                 mask: item(7)?.extract()?,
@@ -659,6 +660,17 @@ impl Scene {
         }
         Ok(())
     }
+}
+
+/// Positions of a saved body, or `None`.
+fn saved_positions(saved: &Bound<'_, PyAny>) -> PyResult<Option<Positions>> {
+    if saved.is_none() {
+        return Ok(None);
+    }
+    Ok(Some(match PositionArray::new(saved, "vertices")? {
+        PositionArray::F32(rows) => slice_rows::<f32, 3>(&rows)?.to_vec().into(),
+        PositionArray::F64(rows) => slice_rows::<f64, 3>(&rows)?.to_vec().into(),
+    }))
 }
 
 /// One number; or one per vertex, edge or face.
