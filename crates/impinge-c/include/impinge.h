@@ -8,11 +8,16 @@
  *   An answer outlives the scene, the detector and later questions. A view of a handle ends when the handle is destroyed or changed.
  * Errors. Most functions return a status: IMPINGE_OK, or what is wrong, and impinge_error_message() says which body, row and value. Then
  *   a handle that the call should have made is NULL, other results are unchanged, and a scene is as it was before. NULL where no NULL
- *   is allowed is IMPINGE_ERROR_INVALID. After IMPINGE_ERROR_INTERNAL the handle, a scene or a detector, refuses everything but its end.
+ *   is allowed is IMPINGE_ERROR_INVALID. After IMPINGE_ERROR_INTERNAL the handle that the call would have changed, a scene or a detector,
+ *   refuses everything but its end, with the same status and a message that it is broken. That does not break what it is used with: a
+ *   detector that was asked about a broken scene answers about others.
  * Threads. A handle may move between threads, and one thread at a time may change it. A detector is changed by each question. A scene
  *   is only read by a question, so threads with a detector each may ask about one scene at the same time; answers are only read too.
  *   A detector that is asked while it answers, by another thread or by one of its own callbacks, refuses the second question: INVALID, with
- *   a message that it is in use. The first question goes on. The same holds for a scene that another call is changing.
+ *   a message that it is in use. The first question goes on. In the same way a scene refuses changes while a question, or another call,
+ *   reads it, also those of the question's callbacks; and it refuses to be read while another call changes it.
+ *   A scene or a detector must not be destroyed while another thread may call a function with it. Where a call is using it, as in a callback,
+ *   its `_destroy` does nothing: impinge_error_message() says so, and it must be called again.
  * Units. Lengths are in the unit of the scene. Times are fractions of a step, from 0 to 1.
  * The library prints nothing, reads no environment variables, and installs no signal handlers.
  */
@@ -38,7 +43,7 @@ typedef int32_t impinge_status;
 #define IMPINGE_ERROR_TOO_MANY_PAIRS 4 /* More pairs than the settings allow. */
 #define IMPINGE_ERROR_CANCELLED 5     /* The callback `cancelled` stopped it. */
 #define IMPINGE_ERROR_DEVICE 6        /* There is no such GPU, or it failed. */
-#define IMPINGE_ERROR_INTERNAL 7      /* A defect of this library. The handle refuses further use. */
+#define IMPINGE_ERROR_INTERNAL 7      /* A defect of this library, now or in an earlier call with the handle, which refuses further use. */
 
 /* The message of the last call of this thread that failed, in English. Never NULL; empty if none has failed. Valid until this thread's
  * next call that fails. */
@@ -96,7 +101,7 @@ typedef struct impinge_scene impinge_scene;
 /* Makes an empty scene. */
 impinge_status impinge_scene_create(impinge_scene **scene);
 
-/* Ends a scene. Positions that were lent are released, unless an answer still needs them. */
+/* Ends a scene, but none that a call is using. Positions that were lent are released, unless an answer still needs them. */
 void impinge_scene_destroy(impinge_scene *scene);
 
 /* Adds a body of triangles. `faces` has 3 columns of vertex indices of any integer type, `positions` 3 columns of F32 or F64; both are
@@ -194,13 +199,13 @@ impinge_status impinge_scene_set_groups(impinge_scene *scene, uint32_t body, imp
  * INVALID: no such body, another number of rows, another number than 0 or 1. */
 impinge_status impinge_scene_set_pinned(impinge_scene *scene, uint32_t body, impinge_array pinned);
 
-/* The number of bodies; 0 for NULL. */
+/* The number of bodies; 0 for NULL, while another call changes the scene, and of a broken one. */
 size_t impinge_scene_n_bodies(const impinge_scene *scene);
 
 /* Views of a body. Valid until the scene is changed: its positions (3 columns of F32 or F64, as they were given) and its end positions
  * (no rows if it stands still). Valid until it is re-meshed or removed, or its edges are set: its elements as they were given (U32), its
  * edges (U32, 2 columns) and its faces (U32, 3 columns): those of tetrahedra are its boundary, by tetrahedron and then by the opposite
- * corner. INVALID: no such body. */
+ * corner. INVALID: no such body, a scene that another call is changing. */
 impinge_status impinge_scene_positions(const impinge_scene *scene, uint32_t body, impinge_array *view);
 impinge_status impinge_scene_end_positions(const impinge_scene *scene, uint32_t body, impinge_array *view);
 impinge_status impinge_scene_elements(const impinge_scene *scene, uint32_t body, impinge_array *view);
@@ -360,10 +365,11 @@ typedef struct impinge_detector impinge_detector;
  *   max_pairs           The most pairs that an answer may have; 0, the default, for any number.
  *   cancelled           Called now and then during a question: anything but 0 stops it with IMPINGE_ERROR_CANCELLED. May be NULL.
  *   progress            Called now and then with units of work done and of all, which differ by stage. May be NULL.
- *   log                 Called with the message of every question that fails, and how a detector was opened. The text is valid during the
- * call. May be NULL.
- *   user                The first argument of these callbacks. They are called by the thread that asks, and must not call this library with
- *                       the same detector, which is in use.
+ *   log                 Called with the message of every question that fails, and how a detector was opened; but not with that of a question
+ *                       that is refused because the detector is in use, as another thread may be in these callbacks then. The text is valid
+ *                       during the call. May be NULL.
+ *   user                The first argument of these callbacks. They are called by the thread that asks. The detector is in use then, and so is
+ *                       the scene: calls that would use the one, or change the other, are refused.
  *   device              Part of a GPU's name, to choose among several; NULL for any. It is copied.
  *   reuse_margin        For solvers that ask again and again while little moves. If it is above 0, questions about near pairs, neighbours and
  *                       safe distances list the pairs within their distance and this margin, and look at no others until some vertex has
@@ -389,7 +395,7 @@ void impinge_settings_default(impinge_settings *settings);
  * INVALID: a setting out of its range. DEVICE: no such GPU, or a library without the GPU backend. */
 impinge_status impinge_detector_create(const impinge_settings *settings, impinge_detector **detector);
 
-/* Ends a detector and its threads. */
+/* Ends a detector and its threads, but none that a call is using. */
 void impinge_detector_destroy(impinge_detector *detector);
 
 /* A GPU that can run the kernels of the library. Strings live as long as the list. */
@@ -577,9 +583,9 @@ typedef struct impinge_stats {
 #define IMPINGE_SHAPE_POLYGON 4
 
 /* ---- Questions ----
- * All read the scene and change the detector. All may fail with any status: INVALID for a query that names no body of the scene, or a
- * detector that is in use; the others as the statuses say. After every failure but INTERNAL the detector can be used again. Positions are
- * checked when they are given or lent, and not by questions: answers about lent positions that have changed since mean nothing.
+ * All read the scene and change the detector. All may fail with any status: INVALID for a query that names no body of the scene, a
+ * detector that is in use, or a scene that another call is changing; the others as the statuses say. After every failure but INTERNAL the
+ * detector can be used again, and after INTERNAL if the message says that the scene is broken. Positions are checked when they are given or lent, and not by questions: answers about lent positions that have changed since mean nothing.
  *
  * Near pairs, neighbours, safe distances, candidates and steps are about vertices, edges and faces: those of a body of triangles are its
  * faces with their edges and vertices, of tetrahedra the same of their surface, of edges these with their vertices. Other vertices, such as
@@ -746,10 +752,11 @@ typedef struct impinge_penetration impinge_penetration;
 impinge_status impinge_find_penetration(impinge_detector *detector, const impinge_scene *scene, const impinge_contacts *contacts,
     uint32_t a, uint32_t b, impinge_penetration **penetration);
 
-/* Counts and times of the last question. INVALID: NULL, or a size of 0. */
+/* Counts and times of the last question. INVALID: NULL, a size of 0, a detector that is in use. */
 impinge_status impinge_detector_stats(const impinge_detector *detector, impinge_stats *stats);
 
-/* Whether elements intersect at the start of the last step: 1 or 0, or -1 if nobody asked, which only IMPINGE_START_VERIFY does. */
+/* Whether elements intersect at the start of the last step: 1 or 0, or -1 if nobody asked, which only IMPINGE_START_VERIFY does. -1 also
+ * for NULL, and of a detector that is in use or broken. */
 int32_t impinge_detector_start_intersects(const impinge_detector *detector);
 
 /* ---- Answers ----
@@ -813,7 +820,7 @@ typedef struct impinge_stencils impinge_stencils;
  * many rows as all bodies of the scene together have vertices, those of the lowest body first, whatever bodies the pairs are of. If rows are
  * missing, the message names the first body without enough of them.
  * All numbers have the same bits on every machine. INVALID: pairs of IMPINGE_EF and IMPINGE_FF; pairs of another scene or of a body with new
- * elements; another number of rows. */
+ * elements; another number of rows; a scene that another call is changing. */
 impinge_status impinge_near_stencils(const impinge_near *near_pairs, const impinge_scene *scene, const impinge_array *rest,
     impinge_stencils **stencils);
 /* The same, weighted by area, so that a potential does not depend on how fine a mesh is. A pair of a vertex and a face weighs 1/4 of the area

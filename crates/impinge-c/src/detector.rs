@@ -1,6 +1,5 @@
 //! Detectors: `impinge_detector_*`, their settings, and the callbacks that questions call.
 
-use std::cell::Cell;
 use std::ffi::{CStr, CString, c_void};
 use std::sync::{Arc, Mutex};
 use std::thread::ThreadId;
@@ -8,28 +7,26 @@ use std::time::{Duration, Instant};
 
 use impinge::{Backend, CancelToken, Control, Detector, Error, Method, Progress, Settings};
 
+use crate::scene::{Bodies, impinge_scene};
 use crate::sized::read_sized;
 use crate::stats::{Texts, fill};
-use crate::status::{Failure, Handle, State, change, clear, destroy, guard, held, put};
+use crate::status::{Failure, Handle, Held, answer, clear, end, guard, held, look, put, remember};
 use crate::types::*;
 
 /// A detector, and the callbacks of its settings.
-pub struct impinge_detector {
-    pub detector: Detector,
+pub struct Opened {
+    detector: Detector,
     callbacks: Callbacks,
     /// The strings of `impinge_detector_stats`.
     texts: Texts,
-    state: State,
 }
 
-impl Handle for impinge_detector {
-    const NAME: &'static str = "detector";
-    const ONE_AT_A_TIME: &'static str = "a detector answers one question at a time; make one per thread, and ask none from its own callbacks";
+pub type impinge_detector = Handle<Opened>;
 
-    unsafe fn state<'a>(handle: *const Self) -> &'a State {
-        // SAFETY: the caller's promise.
-        unsafe { &(*handle).state }
-    }
+impl Held for Opened {
+    const NAME: &'static str = "detector";
+    const CHANGED: &'static str = "a detector answers one question at a time; make one per thread, and ask none from its own callbacks";
+    const READ: &'static str = "another call is reading its statistics; make one per thread";
 }
 
 #[derive(Clone, Copy)]
@@ -97,39 +94,45 @@ impl Watch {
     }
 }
 
-/// Asks a detector, which calls the callbacks of its settings meanwhile. A failure is logged too.
+/// Asks a detector about a scene, and calls the callbacks of its settings meanwhile. A failure is
+/// logged too. Until the last callback has returned, no other call uses the detector, and none
+/// changes the scene.
 ///
 /// # Safety
-/// `detector` is NULL or a detector that nobody destroys during the call.
+/// `detector` and `scene` are NULL or handles of this library that nobody destroys during the call.
 pub unsafe fn ask(
     detector: *mut impinge_detector,
-    question: impl FnOnce(&mut Detector) -> Result<(), Failure>,
+    scene: *const impinge_scene,
+    question: impl FnOnce(&mut Detector, &Bodies) -> Result<(), Failure>,
 ) -> Status {
     let mut question = Some(question);
-    let mut once = |detector: &mut Detector| match question.take() {
-        Some(question) => question(detector),
+    let mut once = |detector: &mut Detector, scene: &Bodies| match question.take() {
+        Some(question) => question(detector, scene),
         None => Ok(()),
     };
     // SAFETY: the caller's promise.
-    unsafe { ask_by(detector, &mut once) }
+    let (detector, scene) = unsafe { (held(detector, "detector"), held(scene, "scene")) };
+    ask_by(detector, scene, &mut once)
 }
 
 /// The same, compiled once for all questions.
-unsafe fn ask_by(
-    detector: *mut impinge_detector,
-    question: &mut dyn FnMut(&mut Detector) -> Result<(), Failure>,
+fn ask_by(
+    detector: Result<&impinge_detector, Failure>,
+    scene: Result<&impinge_scene, Failure>,
+    question: &mut dyn FnMut(&mut Detector, &Bodies) -> Result<(), Failure>,
 ) -> Status {
-    let callbacks = Cell::new(None);
-    // SAFETY: the caller's promise.
-    let status = unsafe {
-        change(detector, |held| {
-            let callbacks_of = held.callbacks;
-            callbacks.set(Some(callbacks_of));
-            if callbacks_of.cancelled.is_none() && callbacks_of.progress.is_none() {
-                return question(&mut held.detector);
-            }
+    let mut reserved = match detector.and_then(Handle::reserve) {
+        Ok(reserved) => reserved,
+        // Whoever has the detector has its callbacks: they are not called by two threads at a time.
+        Err(failure) => return answer(Err(failure)),
+    };
+    let callbacks = reserved.get().callbacks;
+    let scene = scene.and_then(Handle::read);
+    let result = reserved.run(|held| {
+        let scene = scene.as_deref().map_err(Failure::clone)?;
+        if callbacks.cancelled.is_some() || callbacks.progress.is_some() {
             let watch = Arc::new(Watch {
-                callbacks: callbacks_of,
+                callbacks,
                 caller: std::thread::current().id(),
                 stop: CancelToken::new(),
                 called: Mutex::new(None),
@@ -142,16 +145,15 @@ unsafe fn ask_by(
             let control = Control::new().cancel(&watch.stop);
             let control = control.progress(move |at| watch.step(at));
             held.detector.set_control(control);
-            question(&mut held.detector)
-        })
-    };
-    if let (Some(callbacks), true) = (callbacks.get(), status != OK) {
-        // SAFETY: the message lives until this thread's next failure.
-        let message = unsafe { CStr::from_ptr(crate::status::impinge_error_message()) };
-        let message = message.to_string_lossy().into_owned();
-        callbacks.log(LOG_ERROR, &message);
+        }
+        question(&mut held.detector, scene)
+    });
+    if let Err(failure) = &result {
+        remember(&failure.message);
+        callbacks.log(LOG_ERROR, &failure.message);
     }
-    status
+    // Again, as calls of the callback may have failed.
+    answer(result)
 }
 
 /// Settings in the words of the crate `impinge`.
@@ -226,12 +228,11 @@ pub unsafe extern "C" fn impinge_detector_create(
                 env!("CARGO_PKG_VERSION")
             ),
         );
-        let made = impinge_detector {
+        let made = Handle::new(Opened {
             detector: made,
             callbacks,
             texts: Texts::default(),
-            state: State::default(),
-        };
+        });
         // SAFETY: as above.
         unsafe { put(detector, "detector", Box::into_raw(Box::new(made))) }
     })
@@ -240,7 +241,7 @@ pub unsafe extern "C" fn impinge_detector_create(
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn impinge_detector_destroy(detector: *mut impinge_detector) {
     // SAFETY: see `impinge_settings_default`.
-    unsafe { destroy(detector) }
+    unsafe { end(detector) }
 }
 
 #[unsafe(no_mangle)]
@@ -250,7 +251,7 @@ pub unsafe extern "C" fn impinge_detector_stats(
 ) -> Status {
     guard(|| {
         // SAFETY: see `impinge_settings_default`.
-        let detector = unsafe { held(detector, "detector") }?;
+        let detector = unsafe { held(detector, "detector") }?.read()?;
         // SAFETY: as above.
         unsafe { fill(detector.detector.stats(), &detector.texts, stats) }
     })
@@ -261,7 +262,7 @@ pub unsafe extern "C" fn impinge_detector_start_intersects(
     detector: *const impinge_detector,
 ) -> i32 {
     // SAFETY: see `impinge_settings_default`.
-    let detector = unsafe { detector.as_ref() };
+    let detector = unsafe { look(detector) };
     asked(detector.and_then(|held| held.detector.start_intersects()))
 }
 
@@ -274,6 +275,7 @@ pub fn asked(answer: Option<bool>) -> i32 {
 #[cfg(feature = "test-panic")]
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn impinge_test_panic(detector: *mut impinge_detector) -> Status {
+    let scene = impinge_scene::default();
     // SAFETY: see `impinge_settings_default`.
-    unsafe { ask(detector, |_| panic!("as a test asked")) }
+    unsafe { ask(detector, &scene, |_, _| panic!("as a test asked")) }
 }

@@ -9,7 +9,7 @@ use impinge::{
 
 use crate::answers::impinge_near;
 use crate::arrays::{collect, indices};
-use crate::scene::impinge_scene;
+use crate::scene::Bodies;
 use crate::sized::read_sized;
 use crate::status::{Failure, held};
 use crate::types::*;
@@ -17,7 +17,7 @@ use crate::types::*;
 /// A query of a caller, checked: its size, its flags and what this version does not know.
 pub struct Asked<'a> {
     given: impinge_query,
-    scene: &'a impinge_scene,
+    scene: &'a Bodies,
 }
 
 fn refuse<T>(field: &str, given: impl std::fmt::Display, allowed: &str) -> Result<T, Failure> {
@@ -30,10 +30,7 @@ impl<'a> Asked<'a> {
     /// # Safety
     /// `query` is NULL or points to a query as `impinge.h` describes it.
     #[inline(never)]
-    pub unsafe fn read(
-        query: *const impinge_query,
-        scene: &'a impinge_scene,
-    ) -> Result<Self, Failure> {
+    pub unsafe fn read(query: *const impinge_query, scene: &'a Bodies) -> Result<Self, Failure> {
         // SAFETY: the caller's promise.
         let given = unsafe { read_sized(query) }?;
         let known = DISTANCES | CLOSEST_POINTS | CELL;

@@ -15,15 +15,15 @@ use crate::arrays::{self, reserve};
 use crate::detector::{ask, impinge_detector};
 use crate::motion::{impinge_motion, put_found};
 use crate::query::{Asked, check_length};
-use crate::scene::impinge_scene;
+use crate::scene::{Bodies, impinge_scene};
 use crate::sized::read_sized;
-use crate::status::{Failure, clear, guard, held, put};
+use crate::status::{Failure, clear, guard, put};
 use crate::types::*;
 
 /// A question of a caller.
 pub struct Question<'a> {
     pub detector: &'a mut Detector,
-    pub scene: &'a impinge_scene,
+    pub scene: &'a Bodies,
     pub asked: Asked<'a>,
 }
 
@@ -45,9 +45,8 @@ pub unsafe fn question<A>(
         if !answer.is_null() {
             answer.write(std::ptr::null_mut());
         }
-        ask(detector, |detector| {
+        ask(detector, scene, |detector, scene| {
             clear(answer, what)?;
-            let scene = held(scene, "scene")?.sound()?;
             let found = find(Question {
                 detector,
                 scene,
@@ -72,8 +71,7 @@ pub unsafe fn value(
 ) -> Status {
     // SAFETY: the caller's promise, in all calls.
     unsafe {
-        ask(detector, |detector| {
-            let scene = held(scene, "scene")?.sound()?;
+        ask(detector, scene, |detector, scene| {
             find(Question {
                 detector,
                 scene,

@@ -8,34 +8,26 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use impinge::{Body, BodyId, Filter, Positions, Scene, Thickness, Weld};
 
 use crate::arrays::{self, Floats, elements_view, no_rows, positions_view, with_rows};
-use crate::status::{Failure, Handle, State, change, clear, destroy, guard, held, put};
+use crate::status::{Failure, Handle, Held, change, clear, end, guard, held, look, put};
 use crate::types::*;
 
 /// A scene, and the ids of its bodies.
 #[derive(Default)]
-pub struct impinge_scene {
+pub struct Bodies {
     pub scene: Scene,
     /// By the number of the body.
     ids: Vec<Option<BodyId>>,
-    state: State,
 }
 
-impl Handle for impinge_scene {
+pub type impinge_scene = Handle<Bodies>;
+
+impl Held for Bodies {
     const NAME: &'static str = "scene";
-    const ONE_AT_A_TIME: &'static str = "another call is changing it; one call at a time changes a scene, and no question is asked about it meanwhile";
-
-    unsafe fn state<'a>(handle: *const Self) -> &'a State {
-        // SAFETY: the caller's promise.
-        unsafe { &(*handle).state }
-    }
+    const CHANGED: &'static str = "another call is changing it; one call at a time changes a scene, and no question is asked about it meanwhile";
+    const READ: &'static str = "another call is reading it, as a question does; nothing changes a scene meanwhile, and no callback of the question does";
 }
 
-impl impinge_scene {
-    /// The scene, unless a call is changing it, or an internal error has left it half changed.
-    pub fn sound(&self) -> Result<&Self, Failure> {
-        self.state.sound::<Self>().map(|()| self)
-    }
-
+impl Bodies {
     /// The id of a body.
     pub fn id(&self, body: u32) -> Result<BodyId, Failure> {
         let id = self.ids.get(body as usize).copied().flatten();
@@ -94,7 +86,7 @@ pub unsafe extern "C" fn impinge_scene_create(scene: *mut *mut impinge_scene) ->
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn impinge_scene_destroy(scene: *mut impinge_scene) {
     // SAFETY: see `impinge_scene_create`.
-    unsafe { destroy(scene) }
+    unsafe { end(scene) }
 }
 
 macro_rules! add {
@@ -253,7 +245,7 @@ type Set = fn(&mut Scene, BodyId, Positions) -> Result<(), impinge::Error>;
 /// # Safety
 /// `positions` is as described and lies unchanged until `release` is called.
 unsafe fn lend(
-    scene: &mut impinge_scene,
+    scene: &mut Bodies,
     body: u32,
     positions: &impinge_array,
     (release, user): (Option<ReleaseCallback>, *mut c_void),
@@ -468,7 +460,7 @@ pub unsafe extern "C" fn impinge_scene_set_pinned(
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn impinge_scene_n_bodies(scene: *const impinge_scene) -> usize {
     // SAFETY: see `impinge_scene_create`.
-    unsafe { scene.as_ref() }.map_or(0, |scene| scene.scene.n_bodies())
+    unsafe { look(scene) }.map_or(0, |scene| scene.scene.n_bodies())
 }
 
 /// Shows a part of a body.
@@ -483,7 +475,7 @@ unsafe fn show(
 ) -> Status {
     guard(|| {
         // SAFETY: the caller's promise.
-        let scene = unsafe { held(scene, "scene") }?.sound()?;
+        let scene = unsafe { held(scene, "scene") }?.read()?;
         // SAFETY: the caller's promise.
         unsafe { put(to, "view", view(scene.body(body)?)) }
     })
@@ -572,4 +564,12 @@ pub unsafe extern "C" fn impinge_weld(
         }
         Ok(())
     })
+}
+
+/// Panics, for tests of what a broken scene does.
+#[cfg(feature = "test-panic")]
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn impinge_test_scene_panic(scene: *mut impinge_scene) -> Status {
+    // SAFETY: see `impinge_scene_create`.
+    unsafe { change(scene, |_| panic!("as a test asked")) }
 }

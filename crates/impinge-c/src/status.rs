@@ -2,18 +2,19 @@
 //! panic passes.
 
 use std::any::Any;
-use std::cell::{Cell, RefCell};
+use std::cell::{Cell, RefCell, UnsafeCell};
 use std::ffi::{CString, c_char};
+use std::ops::Deref;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Once;
-use std::sync::atomic::{AtomicU8, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 use impinge::Error;
 
 use crate::types::*;
 
 /// Why a call failed.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Failure {
     pub status: Status,
     pub message: String,
@@ -94,20 +95,30 @@ fn watch_panics() {
 /// Runs an entry of the library. A failure, or a panic, becomes a status and the thread's message.
 /// No panic leaves it, because callers in C cannot unwind.
 pub fn guard(entry: impl FnOnce() -> Result<(), Failure>) -> Status {
+    answer(catch(entry).unwrap_or_else(Err))
+}
+
+/// What a caller is told: a status, and the thread's message.
+pub fn answer(result: Result<(), Failure>) -> Status {
+    match result {
+        Ok(()) => OK,
+        Err(failure) => {
+            remember(&failure.message);
+            failure.status
+        }
+    }
+}
+
+/// What an entry gives, or that it has panicked: `Err` says so, and nothing else does.
+fn catch<T>(entry: impl FnOnce() -> T) -> Result<T, Failure> {
     watch_panics();
     GUARDS.with(|n| n.set(n.get() + 1));
     let result = catch_unwind(AssertUnwindSafe(entry));
     GUARDS.with(|n| n.set(n.get() - 1));
-    let failure = match result {
-        Ok(Ok(())) => return OK,
-        Ok(Err(failure)) => failure,
-        Err(panic) => Failure {
-            status: INTERNAL,
-            message: describe(&*panic),
-        },
-    };
-    remember(&failure.message);
-    failure.status
+    result.map_err(|panic| Failure {
+        status: INTERNAL,
+        message: describe(&*panic),
+    })
 }
 
 fn describe(panic: &(dyn Any + Send)) -> String {
@@ -120,82 +131,164 @@ fn describe(panic: &(dyn Any + Send)) -> String {
     format!("internal error, please report it: {what} ({place})")
 }
 
-/// Whether a call may use a handle: one call at a time, and none after a panic.
+/// What a handle holds that calls reserve: many to read it, or one to change it.
+pub trait Held {
+    const NAME: &'static str;
+    /// What a caller is told while another call changes it.
+    const CHANGED: &'static str;
+    /// What a caller who would change it is told while others read it.
+    const READ: &'static str;
+}
+
+/// A handle. References to what it holds are made only of a call that has reserved it, so that
+/// other threads, and callbacks, may try to reserve it at any time.
 #[derive(Default)]
-pub struct State(AtomicU8);
+pub struct Handle<T> {
+    /// How many calls read it; [`CHANGING`] while one changes it.
+    n_readers: AtomicU32,
+    /// Whether a change has ended in a panic. Set and read by calls that have reserved the handle.
+    is_broken: AtomicBool,
+    inner: UnsafeCell<T>,
+}
 
-const FREE: u8 = 0;
-const IN_USE: u8 = 1;
-const BROKEN: u8 = 2;
+const CHANGING: u32 = u32::MAX;
 
-impl State {
-    /// Reserves the handle for one call. `change` releases it.
-    fn reserve<H: Handle>(&self) -> Result<(), Failure> {
-        let reserved = self
-            .0
-            .compare_exchange(FREE, IN_USE, Ordering::Acquire, Ordering::Relaxed);
-        reserved.map(drop).map_err(refused::<H>)
+impl<T: Held> Handle<T> {
+    pub fn new(inner: T) -> Self {
+        Handle {
+            n_readers: AtomicU32::new(0),
+            is_broken: AtomicBool::new(false),
+            inner: UnsafeCell::new(inner),
+        }
     }
 
-    /// That no call is changing the handle, and none has ended in a panic.
-    pub fn sound<H: Handle>(&self) -> Result<(), Failure> {
-        match self.0.load(Ordering::Acquire) {
-            FREE => Ok(()),
-            state => Err(refused::<H>(state)),
+    /// Reserves the handle for one call that reads it. A broken one is refused.
+    pub fn read(&self) -> Result<Reading<'_, T>, Failure> {
+        let one_more = |n: u32| n.checked_add(1).filter(|&n| n < CHANGING);
+        let entered = self
+            .n_readers
+            .fetch_update(Ordering::Acquire, Ordering::Relaxed, one_more);
+        entered.map_err(|_| in_use::<T>(T::CHANGED))?;
+        let reading = Reading(self);
+        self.sound().map(|()| reading)
+    }
+
+    /// Reserves the handle for one call that changes it. [`Changing::run`] refuses a broken one.
+    pub fn reserve(&self) -> Result<Changing<'_, T>, Failure> {
+        let reserved =
+            self.n_readers
+                .compare_exchange(0, CHANGING, Ordering::Acquire, Ordering::Relaxed);
+        match reserved {
+            Ok(_) => Ok(Changing(self)),
+            Err(CHANGING) => Err(in_use::<T>(T::CHANGED)),
+            Err(_) => Err(in_use::<T>(T::READ)),
+        }
+    }
+
+    fn sound(&self) -> Result<(), Failure> {
+        match self.is_broken.load(Ordering::Relaxed) {
+            false => Ok(()),
+            true => Err(Failure {
+                status: INTERNAL,
+                message: format!(
+                    "the {} is broken: an earlier call ended in an internal error; destroy it and make another",
+                    T::NAME
+                ),
+            }),
         }
     }
 }
 
-/// Why a handle in such a state is refused.
-fn refused<H: Handle>(state: u8) -> Failure {
-    match state {
-        IN_USE => Failure::invalid(format!("the {} is in use: {}", H::NAME, H::ONE_AT_A_TIME)),
-        _ => Failure {
-            status: INTERNAL,
-            message: format!(
-                "the {} is broken: an earlier call ended in an internal error; destroy it and make another",
-                H::NAME
-            ),
-        },
+fn in_use<T: Held>(why: &str) -> Failure {
+    Failure::invalid(format!("the {} is in use: {why}", T::NAME))
+}
+
+/// A call that reads a handle. Until it is dropped, nothing changes the handle.
+pub struct Reading<'a, T>(&'a Handle<T>);
+
+impl<T> Deref for Reading<'_, T> {
+    type Target = T;
+
+    fn deref(&self) -> &T {
+        // SAFETY: this call is counted in `n_readers`, so `reserve` refuses, and only `Changing`
+        // makes references that change what the handle holds.
+        unsafe { &*self.0.inner.get() }
     }
 }
 
-/// A handle that one call at a time changes, and that a panic makes unusable.
-pub trait Handle {
-    const NAME: &'static str;
-    /// What a caller is told who asks for a handle that is in use.
-    const ONE_AT_A_TIME: &'static str;
-
-    /// The state alone: another call may be changing the rest of the handle.
-    ///
-    /// # Safety
-    /// `handle` points to a handle that lives as long as the reference.
-    unsafe fn state<'a>(handle: *const Self) -> &'a State;
+impl<T> Drop for Reading<'_, T> {
+    fn drop(&mut self) {
+        self.0.n_readers.fetch_sub(1, Ordering::Release);
+    }
 }
 
-/// Runs an entry that changes a handle. The handle is given to `entry`. Until the entry returns,
-/// other calls are refused: those of other threads, and those of callbacks. After a panic all are.
+/// The only call that uses a handle. Until it is dropped, all others are refused: those of other
+/// threads, and those of callbacks.
+pub struct Changing<'a, T>(&'a Handle<T>);
+
+impl<T: Held> Changing<'_, T> {
+    pub fn get(&mut self) -> &mut T {
+        // SAFETY: `n_readers` is CHANGING, so `read` and `reserve` refuse, and the reference
+        // borrows the only `Changing` of this handle.
+        unsafe { &mut *self.0.inner.get() }
+    }
+
+    /// Runs an entry that changes the handle. A panic breaks it; a failure, whatever its status,
+    /// does not.
+    pub fn run(
+        &mut self,
+        entry: impl FnOnce(&mut T) -> Result<(), Failure>,
+    ) -> Result<(), Failure> {
+        self.0.sound()?;
+        catch(|| entry(self.get())).unwrap_or_else(|panic| {
+            self.0.is_broken.store(true, Ordering::Relaxed);
+            Err(panic)
+        })
+    }
+}
+
+impl<T> Drop for Changing<'_, T> {
+    fn drop(&mut self) {
+        self.0.n_readers.store(0, Ordering::Release);
+    }
+}
+
+/// Runs an entry that changes a handle, while all other calls are refused.
 ///
 /// # Safety
 /// `handle` is NULL or a handle of this library that nobody destroys during the call.
-pub unsafe fn change<H: Handle>(
-    handle: *mut H,
-    entry: impl FnOnce(&mut H) -> Result<(), Failure>,
+pub unsafe fn change<T: Held>(
+    handle: *mut Handle<T>,
+    entry: impl FnOnce(&mut T) -> Result<(), Failure>,
 ) -> Status {
-    if handle.is_null() {
-        return guard(|| Err(Failure::null(H::NAME)));
+    // SAFETY: the caller's promise.
+    let reserved = unsafe { held(handle, T::NAME) }.and_then(Handle::reserve);
+    answer(reserved.and_then(|mut reserved| reserved.run(entry)))
+}
+
+/// Reserves a handle for reading. `None` for NULL, and where it is in use or broken.
+///
+/// # Safety
+/// As [`change`], while the answer lives.
+pub unsafe fn look<'a, T: Held>(handle: *const Handle<T>) -> Option<Reading<'a, T>> {
+    // SAFETY: the caller's promise.
+    unsafe { handle.as_ref() }?.read().ok()
+}
+
+/// Ends a handle that [`Box::into_raw`] gave out, unless a call is using it. NULL is none.
+///
+/// # Safety
+/// `handle` is NULL or comes from `Box::into_raw`, and is not used again.
+pub unsafe fn end<T: Held>(handle: *mut Handle<T>) {
+    // SAFETY: the caller's promise.
+    let Some(reserved) = unsafe { handle.as_ref() }.map(Handle::reserve) else {
+        return;
+    };
+    match reserved.map(std::mem::forget) {
+        Err(failure) => remember(&format!("{}; it is not destroyed", failure.message)),
+        // SAFETY: the caller's promise; the handle stays reserved, so that no call enters it.
+        Ok(()) => unsafe { destroy(handle) },
     }
-    // SAFETY: the caller's promise. No reference to the whole handle is made before it is reserved.
-    let state = unsafe { H::state(handle) };
-    if let Err(failure) = state.reserve::<H>() {
-        remember(&failure.message);
-        return failure.status;
-    }
-    // SAFETY: the caller's promise, and other calls are refused until the state is FREE.
-    let status = guard(|| entry(unsafe { &mut *handle }));
-    let left = if status == INTERNAL { BROKEN } else { FREE };
-    state.0.store(left, Ordering::Release);
-    status
 }
 
 /// The handle, or that it is NULL.
@@ -260,5 +353,59 @@ mod tests {
             "{message}"
         );
         assert_eq!(guard(|| Ok(())), OK);
+    }
+
+    struct Number {
+        value: u32,
+    }
+    impl Held for Number {
+        const NAME: &'static str = "number";
+        const CHANGED: &'static str = "it is changed";
+        const READ: &'static str = "it is read";
+    }
+
+    #[track_caller]
+    fn message<T>(refused: Result<T, Failure>) -> String {
+        refused.err().expect("it is refused").message
+    }
+
+    #[test]
+    fn many_calls_read_a_handle_or_one_changes_it() {
+        let handle = Handle::new(Number { value: 1 });
+        let (one, other) = (handle.read().expect("free"), handle.read().expect("read"));
+        assert_eq!((one.value, other.value), (1, 1));
+        drop(one);
+        let refused = message(handle.reserve());
+        assert_eq!(refused, "the number is in use: it is read");
+        drop(other);
+        let mut changing = handle.reserve().expect("free");
+        changing.get().value = 2;
+        for refused in [message(handle.reserve()), message(handle.read())] {
+            assert_eq!(refused, "the number is in use: it is changed");
+        }
+        drop(changing);
+        assert_eq!(handle.read().expect("free").value, 2);
+    }
+
+    #[test]
+    fn only_a_panic_breaks_a_handle() {
+        let handle = Handle::new(Number { value: 1 });
+        let internal = || {
+            Err(Failure {
+                status: INTERNAL,
+                message: "that of another handle".into(),
+            })
+        };
+        let change = |entry: &dyn Fn() -> Result<(), Failure>| {
+            handle.reserve().expect("free").run(|_| entry())
+        };
+        assert_eq!(message(change(&internal)), "that of another handle");
+        assert!(change(&|| Ok(())).is_ok());
+        assert!(message(change(&|| panic!("on purpose"))).contains("on purpose"));
+        for refused in [message(change(&|| Ok(()))), message(handle.read())] {
+            assert!(refused.contains("the number is broken"), "{refused}");
+        }
+        // A refused call has left it.
+        assert!(handle.reserve().is_ok());
     }
 }

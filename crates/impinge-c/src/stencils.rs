@@ -122,7 +122,7 @@ unsafe fn near_stencils(
         unsafe {
             clear(stencils, "stencils")?;
             let near = held(near_pairs, "near_pairs")?;
-            let scene = &held(scene, "scene")?.scene;
+            let scene = &held(scene, "scene")?.read()?.scene;
             let rest = match rest.as_ref() {
                 None => None,
                 Some(rest) => Some(match arrays::floats::<3>(rest, "rest")? {

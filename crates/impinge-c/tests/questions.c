@@ -1026,7 +1026,7 @@ static int ask_again(void *user) {
   int32_t any = -1;
   REFUSED(impinge_any(of->detector, of->scene, NULL, &any), "the detector is in use: a detector answers one question at a time");
   REFUSED(impinge_detect(of->detector, of->scene, NULL, &pairs), "the detector is in use");
-  CHECK(any == -1 && pairs == NULL);
+  CHECK(any == -1 && pairs == NULL && n_logged == 0);
   ++of->n_refused;
   return 0;
 }
@@ -1038,7 +1038,9 @@ static void in_use(void) {
   impinge_settings_default(&settings);
   settings.backend = IMPINGE_BACKEND_CPU;
   settings.cancelled = ask_again;
+  settings.log = logged;
   settings.user = &user;
+  n_logged = 0;
   GOOD(impinge_detector_create(&settings, &user.detector));
   user.scene = scene;
   GOOD(impinge_any(user.detector, scene, NULL, &any));
@@ -1048,8 +1050,180 @@ static void in_use(void) {
   impinge_scene_destroy(scene);
 }
 
+/* Callbacks of a question that change its scene, or end what it uses, are refused. They may read the scene, and ask another detector. */
+enum { BY_CANCELLED, BY_PROGRESS, BY_LOG, BY_RUN, BY_PASSES, CALLBACKS };
+typedef struct {
+  impinge_detector *detector, *other;
+  impinge_scene *scene;
+  impinge_near *near_pairs;
+  impinge_motion *motion;
+  uint64_t hash;
+  int n_refused[CALLBACKS];
+} changed_by;
+static void change_scene(changed_by *of, int by) {
+  static const char *const in_use_by_question = "the scene is in use: another call is reading it";
+  const impinge_array at = positions_of(&balls[0]);
+  impinge_array view;
+  impinge_stencils *stencils_of = NULL;
+  impinge_stats stats;
+  if (of->n_refused[by]++ > 0) return;
+  REFUSED(impinge_scene_remove(of->scene, 1), in_use_by_question);
+  REFUSED(impinge_scene_set_positions(of->scene, 1, at), in_use_by_question);
+  REFUSED(impinge_scene_lend_positions(of->scene, 1, at, NULL, NULL), in_use_by_question);
+  REFUSED(impinge_scene_add_points(of->scene, at, NULL), in_use_by_question);
+  REFUSED(impinge_motion_apply(of->motion, of->scene), in_use_by_question);
+  impinge_scene_destroy(of->scene);
+  CHECK(strstr(impinge_error_message(), "the scene is in use") && strstr(impinge_error_message(), "it is not destroyed"));
+  impinge_detector_destroy(of->detector);
+  CHECK(strstr(impinge_error_message(), "the detector is in use") && strstr(impinge_error_message(), "it is not destroyed"));
+  memset(&stats, 0, sizeof stats);
+  stats.size = sizeof stats;
+  REFUSED(impinge_detector_stats(of->detector, &stats), "the detector is in use");
+  CHECK(stats.total_ms == 0 && impinge_detector_start_intersects(of->detector) == -1);
+  CHECK(impinge_scene_n_bodies(of->scene) == 2);
+  GOOD(impinge_scene_positions(of->scene, 1, &view));
+  CHECK(view.rows == VERTICES);
+  GOOD(impinge_near_stencils(of->near_pairs, of->scene, NULL, &stencils_of));
+  impinge_stencils_destroy(stencils_of);
+  CHECK(hash_of(of->other, of->scene, NULL) == of->hash);
+}
+static int change_by_cancelled(void *user) {
+  change_scene((changed_by *)user, BY_CANCELLED);
+  return 0;
+}
+static void change_by_progress(void *user, uint64_t done, uint64_t total) {
+  (void)done, (void)total;
+  change_scene((changed_by *)user, BY_PROGRESS);
+}
+static void change_by_log(void *user, uint32_t level, const char *message) {
+  if (level != IMPINGE_LOG_ERROR) return;
+  change_scene((changed_by *)user, BY_LOG);
+  CHECK(strstr(message, "distance: -1 given") != NULL);
+}
+static int change_by_run(void *user, uint32_t kind, const impinge_pair *rows, size_t n) {
+  (void)kind, (void)rows, (void)n;
+  change_scene((changed_by *)user, BY_RUN);
+  return 0;
+}
+static int change_by_passes(void *user, const impinge_element *a, const impinge_element *b) {
+  change_scene((changed_by *)user, BY_PASSES);
+  return a->body != b->body;
+}
+static void changes_by_callbacks(void) {
+  static ball end;
+  changed_by user;
+  impinge_settings settings;
+  impinge_query query;
+  impinge_step step;
+  impinge_near *none = NULL;
+  impinge_impacts *impacts = NULL, *expected = NULL;
+  impinge_candidates *candidates = NULL;
+  uint64_t n = 0;
+  int by;
+  memset(&user, 0, sizeof user);
+  user.scene = two_balls();
+  user.other = open_detector(1);
+  user.hash = hash_of(user.other, user.scene, NULL);
+  impinge_query_default(&query);
+  query.kinds = IMPINGE_VF | IMPINGE_EE;
+  GOOD(impinge_find_near(user.other, user.scene, 0.01, &query, &user.near_pairs));
+  make_ball(&end, 0.89);
+  GOOD(impinge_scene_set_end_positions(user.scene, 1, positions_of(&end)));
+  impinge_query_default(&step);
+  step.self = 0;
+  GOOD(impinge_find_impacts(user.other, user.scene, &step, &expected));
+  GOOD(impinge_find_candidates(user.other, user.scene, 0.01, &query, &candidates));
+  GOOD(impinge_advance(user.other, user.scene, &step, NULL, &user.motion));
+  impinge_settings_default(&settings);
+  settings.backend = IMPINGE_BACKEND_CPU;
+  settings.threads = 1;
+  settings.cancelled = change_by_cancelled;
+  settings.progress = change_by_progress;
+  settings.log = change_by_log;
+  settings.user = &user;
+  GOOD(impinge_detector_create(&settings, &user.detector));
+  CHECK(hash_of(user.detector, user.scene, NULL) == user.hash);
+  step.passes = change_by_passes;
+  step.passes_user = &user;
+  GOOD(impinge_find_impacts(user.detector, user.scene, &step, &impacts));
+  CHECK(impinge_impacts_count(impacts) > 0 && impinge_impacts_hash(impacts) == impinge_impacts_hash(expected));
+  GOOD(impinge_find_candidates_in_runs(user.detector, user.scene, 0.01, &query, 1000, change_by_run, &user, &n));
+  CHECK(n > 1000 && n == impinge_candidates_count(candidates));
+  /* The message is that of the question, although calls of its callback have failed since. */
+  REFUSED(impinge_find_near(user.detector, user.scene, -1, NULL, &none), "distance: -1 given");
+  for (by = 0; by < CALLBACKS; ++by) CHECK(user.n_refused[by] > 0);
+  /* Afterwards all is as ever. */
+  GOOD(impinge_scene_remove(user.scene, 1));
+  CHECK(impinge_scene_n_bodies(user.scene) == 1);
+  impinge_impacts_destroy(impacts);
+  impinge_impacts_destroy(expected);
+  impinge_candidates_destroy(candidates);
+  impinge_motion_destroy(user.motion);
+  impinge_near_destroy(user.near_pairs);
+  impinge_detector_destroy(user.detector);
+  impinge_detector_destroy(user.other);
+  impinge_scene_destroy(user.scene);
+}
+
 #ifdef TEST_PANIC
 impinge_status impinge_test_panic(impinge_detector *detector);
+impinge_status impinge_test_scene_panic(impinge_scene *scene);
+#define BROKEN(call, text)                                                                                              \
+  do {                                                                                                                  \
+    CHECK((call) == IMPINGE_ERROR_INTERNAL);                                                                            \
+    CHECK(strstr(impinge_error_message(), (text " is broken")) != NULL);                                                \
+  } while (0)
+/* A broken detector refuses everything but its end, and logs that it does. */
+static void broken_detector(void) {
+  impinge_settings settings;
+  impinge_detector *detector = NULL;
+  impinge_scene *scene = two_balls();
+  impinge_stats stats;
+  int32_t any = -1;
+  impinge_settings_default(&settings);
+  settings.backend = IMPINGE_BACKEND_CPU;
+  settings.log = logged;
+  GOOD(impinge_detector_create(&settings, &detector));
+  GOOD(impinge_any(detector, scene, NULL, &any));
+  n_logged = 0;
+  CHECK(impinge_test_panic(detector) == IMPINGE_ERROR_INTERNAL && n_logged == 1);
+  BROKEN(impinge_any(detector, scene, NULL, &any), "the detector");
+  CHECK(n_logged == 2);
+  memset(&stats, 0, sizeof stats);
+  stats.size = sizeof stats;
+  BROKEN(impinge_detector_stats(detector, &stats), "the detector");
+  CHECK(stats.total_ms == 0 && impinge_detector_start_intersects(detector) == -1);
+  impinge_detector_destroy(detector);
+  impinge_scene_destroy(scene);
+}
+/* A broken scene refuses everything but its end. A detector that is asked about it stays sound. */
+static void broken_scene(void) {
+  impinge_detector *detector = open_detector(1);
+  impinge_scene *good = two_balls(), *bad = two_balls();
+  impinge_near *near_pairs = NULL;
+  impinge_stencils *found = NULL;
+  impinge_array view;
+  impinge_query query;
+  int32_t any = -1;
+  impinge_query_default(&query);
+  query.kinds = IMPINGE_VF | IMPINGE_EE;
+  GOOD(impinge_find_near(detector, bad, 0.01, &query, &near_pairs));
+  CHECK(impinge_test_scene_panic(bad) == IMPINGE_ERROR_INTERNAL && strstr(impinge_error_message(), "as a test asked"));
+  BROKEN(impinge_any(detector, bad, NULL, &any), "the scene");
+  CHECK(any == -1);
+  BROKEN(impinge_near_stencils(near_pairs, bad, NULL, &found), "the scene");
+  BROKEN(impinge_near_stencils_by_area(near_pairs, bad, NULL, &found), "the scene");
+  CHECK(found == NULL);
+  BROKEN(impinge_scene_positions(bad, 0, &view), "the scene");
+  BROKEN(impinge_scene_remove(bad, 0), "the scene");
+  CHECK(impinge_scene_n_bodies(bad) == 0);
+  GOOD(impinge_any(detector, good, NULL, &any));
+  CHECK(any == 1);
+  impinge_near_destroy(near_pairs);
+  impinge_detector_destroy(detector);
+  impinge_scene_destroy(bad);
+  impinge_scene_destroy(good);
+}
 /* A defect breaks the handle, and nothing else. */
 static void panics(void) {
   impinge_detector *detector = open_detector(1), *other = open_detector(1);
@@ -1084,8 +1258,11 @@ int main(void) {
   other_bodies(detector);
   callbacks();
   in_use();
+  changes_by_callbacks();
 #ifdef TEST_PANIC
   panics();
+  broken_detector();
+  broken_scene();
 #endif
   impinge_detector_destroy(detector);
   return finish("questions");

@@ -1,4 +1,5 @@
-/* Two threads, each with a detector of its own, ask about one scene at the same time. One detector refuses the question of a second thread. */
+/* Two threads, each with a detector of its own, ask about one scene at the same time. What one thread uses, it refuses to another that would
+ * change it. */
 #include "common.h"
 #include <pthread.h>
 
@@ -22,21 +23,30 @@ static void *ask(void *hash) {
 }
 
 static impinge_detector *shared = NULL;
-static int n_refused = 0;
+static const ball *moved = NULL;
+static int is_asked = 0, n_refused = 0;
 
+/* Asks the detector that is in use, changes the scene that it is asked about, and asks another detector about that. */
 static void *ask_shared(void *user) {
+  impinge_detector *own = open_detector(1);
   int32_t any = -1;
   (void)user;
   REFUSED(impinge_any(shared, scene, NULL, &any), "the detector is in use");
-  CHECK(any == -1);
+  REFUSED(impinge_scene_set_positions(scene, 1, positions_of(moved)), "the scene is in use: another call is reading it");
+  CHECK(any == -1 && impinge_scene_n_bodies(scene) == 2);
+  GOOD(impinge_any(own, scene, NULL, &any));
+  CHECK(any == 1);
+  impinge_detector_destroy(own);
+  ++n_refused;
   return NULL;
 }
 
-/* Asks from another thread, while this one is in a question. */
+/* Asks from another thread, while this one is in a question: once per question. */
 static int while_in_use(void *user) {
   pthread_t other;
   (void)user;
-  if (n_refused++ > 0) return 0;
+  if (is_asked) return 0;
+  is_asked = 1;
   CHECK(pthread_create(&other, NULL, ask_shared, NULL) == 0);
   CHECK(pthread_join(other, NULL) == 0);
   return 0;
@@ -44,17 +54,66 @@ static int while_in_use(void *user) {
 
 static void in_use(void) {
   impinge_settings settings;
-  int32_t any = 0;
   int i;
   impinge_settings_default(&settings);
   settings.backend = IMPINGE_BACKEND_CPU;
   settings.cancelled = while_in_use;
   GOOD(impinge_detector_create(&settings, &shared));
   for (i = 0; i < 2; ++i) {
+    int32_t any = 0;
+    is_asked = 0;
     GOOD(impinge_any(shared, scene, NULL, &any));
-    CHECK(any == 1 && n_refused > 0);
+    CHECK(any == 1 && n_refused == i + 1);
   }
   impinge_detector_destroy(shared);
+  /* Nothing is left of the questions. */
+  GOOD(impinge_scene_set_positions(scene, 1, positions_of(moved)));
+}
+
+static int n_asking = 0;
+
+/* Whether a call has done what it says, or has been refused because the scene is in use. */
+static int is_done(impinge_status status, const char *why) {
+  if (status == IMPINGE_OK) return 1;
+  REFUSED(status, why);
+  return 0;
+}
+
+static void *ask_on(void *hash) {
+  impinge_detector *detector = open_detector(1);
+  int n = 0;
+  while (n < 50) {
+    impinge_pairs *pairs = NULL;
+    if (!is_done(impinge_detect(detector, scene, NULL, &pairs), "the scene is in use: another call is changing it")) continue;
+    CHECK(impinge_pairs_hash(pairs) == *(uint64_t *)hash);
+    impinge_pairs_destroy(pairs);
+    ++n;
+  }
+  impinge_detector_destroy(detector);
+  __atomic_sub_fetch(&n_asking, 1, __ATOMIC_SEQ_CST);
+  return NULL;
+}
+
+/* One thread changes a scene, and changes it back, while others ask about it: each call is refused or right. */
+static void changed_meanwhile(void) {
+  impinge_detector *detector = open_detector(1);
+  const double point[3] = {9, 9, 9};
+  const impinge_array far_away = packed(point, 1, IMPINGE_F64);
+  uint64_t hash = hash_of(detector, scene, NULL);
+  pthread_t threads[2];
+  int i;
+  n_asking = 2;
+  for (i = 0; i < 2; ++i) CHECK(pthread_create(&threads[i], NULL, ask_on, &hash) == 0);
+  while (__atomic_load_n(&n_asking, __ATOMIC_SEQ_CST) > 0) {
+    /* New memory with what was in the old: sanitizers see a question that still reads that. */
+    uint32_t added;
+    if (is_done(impinge_scene_add_points(scene, far_away, &added), "the scene is in use"))
+      while (!is_done(impinge_scene_remove(scene, added), "the scene is in use")) continue;
+    is_done(impinge_scene_remesh(scene, 1, IMPINGE_TRIANGLES, faces_of(moved), positions_of(moved)), "the scene is in use");
+  }
+  for (i = 0; i < 2; ++i) CHECK(pthread_join(threads[i], NULL) == 0);
+  CHECK(hash_of(detector, scene, NULL) == hash);
+  impinge_detector_destroy(detector);
 }
 
 int main(void) {
@@ -72,7 +131,9 @@ int main(void) {
   CHECK(strlen(impinge_error_message()) == 0);
   ask(&hashes[2]);
   CHECK(hashes[0] != 0 && hashes[0] == hashes[1] && hashes[1] == hashes[2]);
+  moved = &other;
   in_use();
+  changed_meanwhile();
   impinge_scene_destroy(scene);
   return finish("threads");
 }
