@@ -258,13 +258,15 @@ int main() {
   impinge::scene scene;
   const auto a = scene.add_triangles(faces(balls[0]), numbers(balls[0]));
   const auto b = scene.add_triangles(faces(balls[1]), numbers(balls[1]));
-  CHECK(a && b && a.ok() && *a == 0 && *b == 1);
+  CHECK(a.ok() && b.ok() && *a == 0 && *b == 1);
   const auto no_detector = impinge::detector::make(impinge::settings().reuse_margin(-1));
   CHECK(!no_detector && no_detector.status() == IMPINGE_ERROR_INVALID && no_detector.message().find("reuse_margin") != std::string::npos);
   auto made = impinge::detector::make();
   CHECK(made);
   const auto any = made->any(scene), none_of_self = made->any(scene, impinge::query::self_all());
   CHECK(any.ok() && *any && none_of_self.ok() && !*none_of_self);
+  const auto n = made->count(scene), n_of_self = made->count(scene, impinge::query::self_all());
+  CHECK(n.ok() && *n > 100 && n_of_self.ok() && *n_of_self == 0);
   const auto first = made->earliest(scene, impinge::query::self_all());
   CHECK(first.ok() && !*first);
   const auto none = scene.set_positions(9, numbers(balls[0]));

@@ -111,12 +111,15 @@ OF_NAMED(result<pairs>, .operator->());
 static_assert(std::is_same_v<decltype(*std::declval<result<pairs>>()), pairs>, "a temporary gives its value away");
 static_assert(std::is_same_v<decltype(*std::declval<result<pairs> &>()), pairs &>);
 static_assert(std::is_same_v<decltype(std::declval<result<pairs>>().message()), std::string>);
-// With exceptions `if (on.any(in))` asks for the answer. Without them it would ask whether the call succeeded, so it does not compile.
+// With exceptions `if (on.any(in))` and `if (on.count(in))` ask for the answer. Without them they would ask whether the call succeeded, so they
+// do not compile.
 template <class T> constexpr bool is_tested = std::is_constructible_v<bool, T>;
 static_assert(!is_tested<decltype(std::declval<detector &>().any(scene()))> && !is_tested<const result<bool> &>);
 static_assert(!is_tested<decltype(std::declval<detector &>().is_free(scene()))>);
 static_assert(!is_tested<decltype(std::declval<detector &>().earliest(scene()))> && !is_tested<result<std::optional<nearest>>>);
-static_assert(is_tested<result<pairs>> && is_tested<const result<body> &> && is_tested<result<void>>);
+static_assert(!is_tested<decltype(std::declval<detector &>().count(scene()))> && !is_tested<decltype(std::declval<detector &>().advance_fraction(scene()))>);
+static_assert(!is_tested<const result<body> &> && !is_tested<result<std::int8_t>> && !is_tested<result<float>>);
+static_assert(is_tested<result<pairs>> && is_tested<const result<array> &> && is_tested<result<std::vector<double>>> && is_tested<result<void>>);
 static_assert(!std::is_convertible_v<result<pairs>, bool> && !std::is_convertible_v<result<bool>, bool> && !std::is_convertible_v<result<void>, bool>);
 static_assert(std::is_same_v<decltype(std::declval<const result<bool> &>().ok()), bool> && noexcept(std::declval<const result<void> &>().ok()));
 #endif

@@ -4,11 +4,12 @@
 /// Ownership. Scenes, detectors and answers own their handle and can be moved. An answer outlives its scene and its detector; the views that it
 ///   gives live as long as it does. Arrays that are passed in are read during the call, but for those of `lend_positions`.
 /// Errors. A call that fails throws `impinge::error`. Where exceptions are off, or IMPINGE_NO_EXCEPTIONS is defined, each call gives a
-///   `result<T>` instead. `ok()` says whether the call succeeded. So does a test such as `if (pairs)`, but a `result<bool>` or a result of a
-///   std::optional cannot be tested: write `any.ok() && *any`. Units of both modes may be in one program. Their classes are different types,
-///   so that a unit that hands an object to one of the other mode does not link.
+///   `result<T>` instead. `ok()` says whether the call succeeded. So does a test such as `if (pairs)`, but the result of a number, a body, a
+///   bool or a std::optional cannot be tested: write `any.ok() && *any`, `n.ok() && *n > 0`. Units of both modes may be in one program. Their
+///   classes are different types, so that a unit that hands an object to one of the other mode does not link.
 /// Threads. As in impinge.h: one thread at a time changes a handle, and each question changes its detector. A detector that is in use
-///   refuses another question.
+///   refuses another question, and a scene that is asked about refuses changes, also those of callbacks. A scene or a detector must not
+///   end, nor be moved from, while a call uses it.
 #ifndef IMPINGE_HPP
 #define IMPINGE_HPP
 

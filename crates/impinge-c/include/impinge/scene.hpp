@@ -72,9 +72,10 @@ template <class T> using result = T;
 
 #else
 
-/// Values that answer yes or no themselves: in `if (detector.any(scene))` a test of the result would ask only whether the call succeeded.
-template <class T> struct says_yes_or_no : std::is_same<T, bool> {};
-template <class T> struct says_yes_or_no<std::optional<T>> : std::true_type {};
+/// Values that can be tested themselves, as numbers and bodies can: with exceptions `if (detector.count(scene))` asks whether there are any,
+/// and a test of the result would ask only whether the call succeeded.
+template <class T> struct is_tested_itself : std::is_arithmetic<T> {};
+template <class T> struct is_tested_itself<std::optional<T>> : std::true_type {};
 
 /// What a call gives, or why it failed.
 template <class T> class [[nodiscard]] result {
@@ -83,9 +84,9 @@ public:
   result(impinge_status status, const char *message) : status_(status), message_(message) {}
   /// Whether the call succeeded, so that there is a value.
   bool ok() const noexcept { return value_.has_value(); }
-  /// The same, but not where the value says yes or no itself: write `found.ok() && *found`.
-  template <class V = T, std::enable_if_t<!says_yes_or_no<V>::value, int> = 0> explicit operator bool() const noexcept { return ok(); }
-  template <class V = T, std::enable_if_t<says_yes_or_no<V>::value, int> = 0> explicit operator bool() const = delete;
+  /// The same, but not where the value can be tested itself: write `any.ok() && *any`, `n.ok() && *n > 0`.
+  template <class V = T, std::enable_if_t<!is_tested_itself<V>::value, int> = 0> explicit operator bool() const noexcept { return ok(); }
+  template <class V = T, std::enable_if_t<is_tested_itself<V>::value, int> = 0> explicit operator bool() const = delete;
   /// The value, if there is one.
   T &operator*() & { return *value_; }
   const T &operator*() const & { return *value_; }
