@@ -121,7 +121,7 @@ void steps() {
   CHECK(far_away.use_count() == 1);
   // No rows are a mistake, and not the wish to stand still.
   scene.set_end_positions(b, numbers(balls[1]));
-  throws(IMPINGE_ERROR_INVALID, "body 1: 0 end positions given", [&] { scene.set_end_positions(b, std::vector<double>()); });
+  throws(IMPINGE_ERROR_INVALID, "body 1: 0 end positions given, but it has 1154 vertices; clear_end_positions", [&] { scene.set_end_positions(b, std::vector<double>()); });
   throws(IMPINGE_ERROR_INVALID, "clear_end_positions", [&] { scene.lend_end_positions(b, std::make_shared<std::vector<double>>()); });
   throws(IMPINGE_ERROR_INVALID, "no body 9", [&] { scene.set_end_positions(9, std::vector<double>()); });
   CHECK(scene.end_positions(b).rows == VERTICES);

@@ -442,7 +442,7 @@ public:
   /// No rows are refused for a body that has vertices: `clear_end_positions` lets it stand still.
   template <class P> result<void> set_end_positions(body of, const P &positions) {
     const array at = detail::rows_of(positions, 3);
-    if (lacks_rows(of, at)) return refuse_no_rows(of);
+    if (const auto n = vertices_without_rows(of, at)) return refuse_no_rows(of, n);
     return detail::give(impinge_scene_set_end_positions(raw(), of, at));
   }
   /// The body stands still.
@@ -450,7 +450,7 @@ public:
   /// Positions that the scene reads where they lie, and shares the owner of. They are checked in this call, and must not change afterwards.
   template <class P> result<void> lend_positions(body of, std::shared_ptr<P> owner) { return lend(impinge_scene_lend_positions, of, std::move(owner)); }
   template <class P> result<void> lend_end_positions(body of, std::shared_ptr<P> owner) {
-    if (lacks_rows(of, detail::rows_of<std::remove_const_t<P>>(*owner, 3))) return refuse_no_rows(of);
+    if (const auto n = vertices_without_rows(of, detail::rows_of<std::remove_const_t<P>>(*owner, 3))) return refuse_no_rows(of, n);
     return lend(impinge_scene_lend_end_positions, of, std::move(owner));
   }
   /// Four rows of four numbers.
@@ -471,6 +471,7 @@ public:
   template <class T> result<void> set_edge_thickness(body of, const T &thickness) { return element_thickness(of, IMPINGE_EDGES, thickness); }
   template <class T> result<void> set_face_thickness(body of, const T &thickness) { return element_thickness(of, IMPINGE_TRIANGLES, thickness); }
 
+  /// 0 also while another call changes the scene, and of a broken one.
   std::size_t n_bodies() const noexcept { return impinge_scene_n_bodies(raw()); }
   /// Views. Positions live until the scene is changed; elements, edges and faces until the body is re-meshed or removed, or its edges are set.
   result<array> positions(body of) const & { return look(impinge_scene_positions, of); }
@@ -489,13 +490,14 @@ public:
   void faces(body) const && = delete;
 
 private:
-  bool lacks_rows(body of, const array &at) const {
+  /// How many vertices a body has, if no rows are given for them.
+  std::size_t vertices_without_rows(body of, const array &at) const {
     array now{};
-    return at.rows == 0 && impinge_scene_positions(raw(), of, &now) == IMPINGE_OK && now.rows > 0;
+    return at.rows == 0 && impinge_scene_positions(raw(), of, &now) == IMPINGE_OK ? now.rows : 0;
   }
-  static result<void> refuse_no_rows(body of) {
-    const std::string which = "body " + std::to_string(of);
-    return detail::refuse((which + ": 0 end positions given, but it has vertices; clear_end_positions lets it stand still").c_str());
+  static result<void> refuse_no_rows(body of, std::size_t n) {
+    const std::string given = "body " + std::to_string(of) + ": 0 end positions given, but it has " + std::to_string(n);
+    return detail::refuse((given + " vertices; clear_end_positions lets it stand still").c_str());
   }
   template <class Lend, class P> result<void> lend(Lend call, body of, std::shared_ptr<P> owner) {
     const array at = detail::rows_of<std::remove_const_t<P>>(*owner, 3);
