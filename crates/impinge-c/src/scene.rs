@@ -24,7 +24,7 @@ pub type impinge_scene = Handle<Bodies>;
 impl Held for Bodies {
     const NAME: &'static str = "scene";
     const CHANGED: &'static str = "another call is changing it; one call at a time changes a scene, and no question is asked about it meanwhile";
-    const READ: &'static str = "another call is reading it, as a question does; nothing changes a scene meanwhile, and no callback of the question does";
+    const READ: &'static str = "another call is reading it, such as a question; change it afterwards, and not in that question's callbacks";
 }
 
 impl Bodies {

@@ -1,5 +1,5 @@
 //! What a call answers: its status, the message of the thread's last failure, and the guard that no
-//! panic passes.
+//! panic passes. And handles: which calls may use one at the same time.
 
 use std::any::Any;
 use std::cell::{Cell, RefCell, UnsafeCell};
