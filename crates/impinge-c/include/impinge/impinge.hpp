@@ -246,9 +246,9 @@ public:
     const auto status = impinge_find_penetration(raw(), in.raw(), of.raw(), a, b, made.out());
     return give(status, impinge::penetration(made.take()));
   }
-  /// Whether the start of the last step intersects; nothing if nobody asked.
+  /// Whether the start of the last step intersects; nothing if nobody asked, and while the detector is in use or where it is broken.
   std::optional<bool> start_intersects() const { return detail::asked(impinge_detector_start_intersects(raw())); }
-  /// What the last question cost. Its strings live as long as the detector.
+  /// What the last question cost. Its strings live as long as the detector; all 0 while the detector is in use or where it is broken.
   impinge_stats stats() const & {
     impinge_stats stats{};
     stats.size = sizeof stats;
