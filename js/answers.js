@@ -1,7 +1,7 @@
 // Answers: the lists of the module, with names and shapes. They were copied out of it, so there is nothing to free.
 
 import { KINDS } from "./query.js";
-import { body, refuse, word } from "./shared.js";
+import { TAKE_STEP, body, refuse, word } from "./shared.js";
 
 export { KINDS };
 
@@ -254,23 +254,35 @@ export function nearest([rows, , numbers]) {
   return { distance: numbers[0], ...element(rows, 0), points: twoPoints(numbers, 1) };
 }
 
-export class Advance {
+// Where a step leads.
+export class Step {
+  #start;
   #positions;
 
-  constructor(lists, stats) {
-    const [, , numbers, bodies, positions] = lists;
-    const [, , { startIntersects }] = impacts(lists);
-    const [fraction, nTried] = numbers.subarray(-2);
-    Object.assign(this, { fraction, nTried, first: earliest(lists), startIntersects, stats });
-    this.#positions = new Map(Array.from(bodies, (body, ix) => [body, positions[ix]]));
+  constructor([, , , words, positions]) {
+    const [bodies, start] = sections(words);
+    this.#start = start;
+    this.#positions = new Map(Array.from(bodies, (of, ix) => [of, positions[ix]]));
   }
 
+  // A copy: what is applied is what was found.
   positions(which) {
-    return this.#positions.get(body(which)) ?? null;
+    return this.#positions.get(body(which))?.slice() ?? null;
   }
 
   apply(scene) {
-    for (const [body, positions] of this.#positions) scene.setPositions(body, positions);
+    if (typeof scene?.[TAKE_STEP] !== "function") refuse("scene: a Scene is needed");
+    scene[TAKE_STEP](this.#start, this.#positions);
+  }
+}
+
+export class Advance extends Step {
+  constructor(lists, stats) {
+    super(lists);
+    const [, , numbers] = lists;
+    const [, , { startIntersects }] = impacts(lists);
+    const [fraction, nTried] = numbers.subarray(-2);
+    Object.assign(this, { fraction, nTried, first: earliest(lists), startIntersects, stats });
   }
 }
 

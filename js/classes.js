@@ -3,7 +3,7 @@
 import { Advance, Candidates, Contacts, Impacts, NearPairs, Pairs, Penetration, earliest, nearest, numberOf, statsOf } from "./answers.js";
 import { Closest, Hits, Neighbours, SafeDistances, Truncation, integers, places, signed } from "./probe.js";
 import { RestPairs, packed, plain, whole, withPoints } from "./query.js";
-import { body, call, disposable, isSingle, kindOf, list, meshOf, mustBeNone, number, options, refuse, wide, word } from "./shared.js";
+import { TAKE_STEP, body, call, disposable, isSingle, kindOf, list, meshOf, mustBeNone, number, options, refuse, wide, word } from "./shared.js";
 
 const PARTS = ["vertices", "edges", "faces"];
 const BODY_KINDS = ["points", "edges", "triangles", "tetrahedra"];
@@ -208,6 +208,10 @@ export function makeScene({ SceneHandle }, mustBeReady) {
     setEndPositions(which, positions) {
       if (positions === null) call(() => this.#held.clear_end_positions(body(which)));
       else this.#put(END_POSITIONS, body(which), 0, NONE, positions);
+    }
+
+    [TAKE_STEP](start, positions) {
+      call(() => this.#held.take_step(start, Uint32Array.from(positions.keys()), [...positions.values()]));
     }
 
     setTransform(which, matrix) {

@@ -404,7 +404,10 @@ export interface Advance {
    * straight path to them is free, if the start was free of intersections, and except for pairs that touch at the start.
    */
   positions(body: Body): Positions | null;
-  /** Moves the bodies of the scene to these positions, which are then their rest positions, too. */
+  /**
+   * Takes the step: moves the bodies of the scene to these positions. Bodies whose end `setEndTransform` set keep their rest positions; of
+   * others these are the rest positions then, too. Refuses a scene in which any body has moved since, or is new, and leaves it as it is.
+   */
   apply(scene: Scene): void;
 }
 
@@ -537,7 +540,10 @@ export interface Truncation {
   readonly stats: Stats;
   /** The positions of a body afterwards; `null` for one that does not move. */
   positions(body: Body): Positions | null;
-  /** Moves the bodies of the scene to these positions, which are then their rest positions, too. */
+  /**
+   * Takes the step: moves the bodies of the scene to these positions. Bodies whose end `setEndTransform` set keep their rest positions; of
+   * others these are the rest positions then, too. Refuses a scene in which any body has moved since, or is new, and leaves it as it is.
+   */
   apply(scene: Scene): void;
 }
 

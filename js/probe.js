@@ -1,6 +1,6 @@
 // Answers about points, rays and bounds of vertices. They were copied out of the module, so there is nothing to free.
 
-import { NearPairs, hex, sections } from "./answers.js";
+import { NearPairs, Step, hex, sections } from "./answers.js";
 import { KINDS } from "./query.js";
 import { body, refuse, word } from "./shared.js";
 
@@ -117,21 +117,11 @@ export class SafeDistances {
 }
 
 // Where the vertices are after each has gone as far as it may.
-export class Truncation {
-  #moved;
-
+export class Truncation extends Step {
   constructor(lists, stats) {
-    const [, [start], [nCut, nTouching, rounds], bodies, positions] = lists;
+    super(lists);
+    const [, [start], [nCut, nTouching, rounds]] = lists;
     Object.assign(this, { nCut, nTouching, rounds, startIntersects: [false, true, null][start], stats });
-    this.#moved = new Map(Array.from(bodies, (of, ix) => [of, positions[ix]]));
-  }
-
-  positions(which) {
-    return this.#moved.get(body(which)) ?? null;
-  }
-
-  apply(scene) {
-    for (const [of, positions] of this.#moved) scene.setPositions(of, positions);
   }
 }
 

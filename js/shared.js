@@ -14,6 +14,9 @@ export function disposable(type) {
   if (Symbol.dispose) type.prototype[Symbol.dispose] = type.prototype.dispose;
 }
 
+// The name under which scenes take steps that answers have found.
+export const TAKE_STEP = Symbol("take a step");
+
 export function refuse(message) {
   throw new ImpingeError("invalid", message);
 }

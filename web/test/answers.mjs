@@ -409,7 +409,22 @@ export async function others(module) {
   step.setEndPositions(upper, new Float64Array(TRIANGLE.map((x, ix) => (ix % 3 === 2 ? -1 : x))));
   const truncation = await detector.truncate(step, { start: "verify" });
   const reached = truncation.positions(upper)[2];
+  truncation.positions(upper).fill(9); // A copy, which is not what is applied.
   truncation.apply(step);
+  // What a transform moves: the next one begins at rest, and a step is taken once, in its own scene.
+  const rigid = new Scene();
+  const flying = rigid.addTriangles(index, new Float32Array(TRIANGLE));
+  const raised = (z) => [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, z, 1];
+  const heights = [];
+  for (const z of [1, 2, 3]) {
+    rigid.setEndTransform(flying, raised(z));
+    const way = await (z === 2 ? detector.advance(rigid) : detector.truncate(rigid));
+    way.apply(rigid);
+    heights.push(rigid.positions(flying)[2], rigid.restPositions(flying)[2]);
+  }
+  const late = [await refusal(() => truncation.apply(step)), await refusal(() => truncation.apply(rigid)), await refusal(() => truncation.apply({}))];
+  const still2 = rigid.positions(flying)[2];
+  rigid.dispose();
   const solver = {
     nearest: [near2.distance, near2.bodyA, near2.bodyB],
     safe: [safe.of(lower).constructor.name, safe.of(upper).constructor.name, safe.of(lower)[0] < 0.5 && safe.of(lower)[0] > 0.4995, safe.touching.length],
@@ -418,6 +433,8 @@ export async function others(module) {
     same: lists.ee === lists.reversed("ee"),
     ringed: ringed.length,
     truncation: [truncation.nCut, truncation.nTouching, truncation.rounds > 0, truncation.startIntersects, truncation.positions(lower)],
+    rigid: [...heights, still2],
+    late,
     reached: [reached > 0 && reached < 0.01, step.positions(upper)[2] === reached, await detector.any(step)],
     rings: await refusal(() => detector.near(scene, 1, { exclude: [{ rings: 17 }] })),
     unknown: await refusal(() => detector.safeDistances(step, 1, { fixed: [5] })),
@@ -632,6 +649,12 @@ export const OTHERS = {
     same: true,
     ringed: 0,
     truncation: [3, 0, true, false, null],
+    rigid: [1, 0, 2, 0, 3, 0, 3],
+    late: [
+      "invalid: body 1: this was found for other positions than it has now, so nothing is known of it; ask again",
+      "invalid: there is no body 1: 1 have been added, and 0 of them removed",
+      "invalid: scene: a Scene is needed",
+    ],
     reached: [true, true, false],
     rings: "invalid: rings: 17 given, 0 to 16 allowed",
     unknown: "invalid: there is no body 5: 2 have been added, and 0 of them removed",

@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use impinge::contact::{Contacts, Curves, Penetration, Region, Shape};
 use impinge::exact::Feature;
 use impinge::proximity::Nearest;
-use impinge::{BodyId, Candidates, Impact, NearPairs, PairKind, Pairs, Positions};
+use impinge::{BodyId, Candidates, Impact, NearPairs, PairKind, Pairs, Positions, StepStart};
 
 use crate::ask::{Asker, Question, query};
 use crate::error::Error;
@@ -48,6 +48,34 @@ impl Answer {
         self.words.push(0);
         self.words.extend(words);
         self.words[at] = (self.words.len() - at - 1) as u32;
+    }
+
+    /// The bodies that move and their positions, then what
+    /// [`take_step`](crate::world::World::take_step) takes.
+    pub(crate) fn add_step<'a>(
+        &mut self,
+        moving: impl Iterator<Item = (BodyId, &'a Positions)>,
+        start: &StepStart,
+        world: &World,
+    ) {
+        let number = world.numbers();
+        let number = |body: BodyId| number(body.index() as u32);
+        let positions = &mut self.positions;
+        let bodies = moving.map(|(body, at)| {
+            positions.push(at.clone());
+            number(body)
+        });
+        let bodies: Vec<u32> = bodies.collect();
+        self.section(bodies);
+        self.section(start.bodies().iter().flat_map(|start| {
+            let stamp = [start.stamp as u32, (start.stamp >> 32) as u32];
+            [
+                number(start.body),
+                stamp[0],
+                stamp[1],
+                u32::from(start.keeps_rest),
+            ]
+        }));
     }
 
     /// Kinds, whether at the start, then whether the start intersects: 0, 1, or 2 if nobody asked.
@@ -256,11 +284,7 @@ impl Asker {
                 answer
                     .numbers
                     .extend([found.fraction, f64::from(found.n_tried)]);
-                let number = world.numbers();
-                for (body, positions) in found.positions {
-                    answer.words.push(number(body.index() as u32));
-                    answer.positions.push(positions);
-                }
+                answer.add_step(found.iter(), found.start(), world);
                 answer
             }
             Question::Candidates => {

@@ -175,6 +175,21 @@ impl SceneHandle {
         set.map_err(thrown)
     }
 
+    /// See [`World::take_step`].
+    pub fn take_step(&mut self, start: &[u32], bodies: &[u32], positions: &Array) -> Thrown<()> {
+        let positions = positions.iter().map(|given| {
+            if let Some(single) = given.dyn_ref::<Float32Array>() {
+                return Ok(single.to_vec().as_chunks().0.to_vec().into());
+            }
+            let double = given.dyn_ref::<Float64Array>();
+            let double = double.ok_or_else(|| thrown(Error::Foreign))?;
+            Ok(double.to_vec().as_chunks().0.to_vec().into())
+        });
+        let positions = positions.collect::<Thrown<Vec<Positions>>>()?;
+        let taken = self.0.take_step(start, bodies, positions);
+        taken.map_err(thrown)
+    }
+
     /// See [`World::remove`].
     pub fn remove(&mut self, body: u32) -> Thrown<()> {
         self.0.remove(body).map_err(thrown)

@@ -84,7 +84,6 @@ impl Answer {
     /// How many vertices were stopped, how many pairs touch, rounds; whether the start intersects,
     /// as for impacts; the bodies that move and their positions.
     fn of_truncation(truncation: &Truncation, world: &World) -> Self {
-        let number = world.numbers();
         let mut answer = Answer::default();
         answer
             .bytes
@@ -94,10 +93,7 @@ impl Answer {
             truncation.n_touching() as f64,
             f64::from(truncation.rounds()),
         ]);
-        for (body, positions) in truncation.iter() {
-            answer.words.push(number(body.index() as u32));
-            answer.positions.push(positions.clone());
-        }
+        answer.add_step(truncation.iter(), truncation.start(), world);
         answer
     }
 

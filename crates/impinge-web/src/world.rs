@@ -3,7 +3,7 @@
 
 use impinge::{
     Backend, Body, BodyId, BodyKind, Detector, Elements, Exclusion, Filter, Part, Positions, Query,
-    Real, Scene, Thickness, Weld,
+    Real, Scene, StartOfBody, StepStart, Thickness, Weld,
 };
 
 use crate::error::Error;
@@ -217,6 +217,44 @@ impl World {
         };
         let set = self.scene.set_thickness(self.id(body)?, thickness);
         self.renumbered(body, set)
+    }
+
+    /// Takes a step: gives bodies the positions that an answer says, if all bodies are where they
+    /// were when it was found. `start`: for each body of then its number, two words of a stamp,
+    /// and whether it keeps its rest positions.
+    ///
+    /// # Errors
+    /// A body that was moved since, or is new; one that moves and was removed.
+    pub fn take_step(
+        &mut self,
+        start: &[u32],
+        bodies: &[u32],
+        positions: Vec<Positions>,
+    ) -> Result<(), Error> {
+        let held = start
+            .as_chunks()
+            .0
+            .iter()
+            .filter_map(|&[body, low, high, keeps_rest]| {
+                Some(StartOfBody {
+                    // What was removed is nowhere.
+                    body: self.id(body).ok()?,
+                    stamp: u64::from(high) << 32 | u64::from(low),
+                    keeps_rest: keeps_rest != 0,
+                })
+            });
+        let start: StepStart = held.collect();
+        let moving = bodies.iter().map(|&body| self.id(body)).zip(positions);
+        let moving = moving.map(|(id, positions)| Ok((id?, positions)));
+        let moving = moving.collect::<Result<Vec<_>, Error>>()?;
+        let taken = start.take_step(&mut self.scene, &moving);
+        match &taken {
+            Err(impinge::Error::Moved { body }) => {
+                let number = self.numbers()(body.index() as u32);
+                self.renumbered(number, taken)
+            }
+            _ => Ok(taken?),
+        }
     }
 
     /// Removes a body. Its number is not used again.

@@ -210,8 +210,23 @@ fn answers_about_steps() -> Result<(), Error> {
     assert_eq!((impacts.bytes.len(), impacts.bytes[2 * n]), (2 * n + 1, 2));
     let verify = [0, 0, 0, 0, 2, 1, 0, 0, 1];
     let advance = asker.ask(Question::Advance, &world, &verify, &NUMBERS)?;
-    assert_eq!((advance.rows.len(), &advance.words[..]), (4, &[b][..]));
+    let [1, moving, 8, ref start @ ..] = advance.words[..] else {
+        panic!("one body moves, of two: {:?}", advance.words);
+    };
+    assert_eq!((advance.rows.len(), moving), (4, b));
     assert_eq!((advance.bytes[2], advance.positions.len()), (0, 1));
+    let mut taken = world.clone();
+    let reached = || advance.positions.clone();
+    taken.take_step(start, &[b], reached())?;
+    assert_eq!(taken.body(b)?.positions(), &advance.positions[0]);
+    // Once is enough. The library's number of this body is another one.
+    let again = taken.take_step(start, &[b], reached());
+    let again = again.expect_err("somewhere else").to_string();
+    let text = format!("body {b}, in the library's words: body 0: this was found for other");
+    assert!(again.starts_with(&text), "{again}");
+    taken.remove(b)?;
+    let gone = taken.take_step(start, &[b], reached());
+    assert!(matches!(gone, Err(Error::NoBody { number, .. }) if number == b));
     let [toi, fraction, n_tried] = advance.numbers[..] else {
         panic!("three numbers");
     };
@@ -712,7 +727,10 @@ fn points_rays_and_bounds_are_those_of_the_library() -> Result<(), Error> {
     let truncation = detector.truncate(&scene, &all)?;
     assert!(truncation.n_cut() > 0);
     assert_eq!(answer.numbers[0], truncation.n_cut() as f64);
-    assert_eq!((&answer.words[..], &answer.bytes[..]), (&[a][..], &[2][..]));
+    assert_eq!(
+        (&answer.words[..2], &answer.bytes[..]),
+        (&[1, a][..], &[2][..])
+    );
     assert_eq!(Some(&answer.positions[0]), truncation.positions(own_a));
     Ok(())
 }
