@@ -1104,8 +1104,9 @@ class _Motion:
         return self._inner.positions(body)
 
     def apply(self, scene: Scene) -> None:
-        """Takes the step: these positions become those of the scene, and its bodies stand still until they are
-        given end positions again. Of bodies that transforms move, the rest positions stay the same.
+        """Takes the step: the bodies that move get these positions, and stand still until they are given end
+        positions again. Bodies whose end `Scene.set_end_transform` set keep their rest positions; of others
+        these are the rest positions then, too.
 
         Parameters
         ----------

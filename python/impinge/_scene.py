@@ -247,7 +247,7 @@ class Scene(SceneBase):
     def set_transform(self, body: _Body, matrix: _Array) -> None:
         """Moves a body by an affine matrix, such as a rigid motion, without its vertices being given again.
 
-        The body moves from its rest positions, which are those that were given last (`add`, `set_positions`, `remesh`);
+        The body moves from its `rest_positions`, such as those that were given last (`add`, `set_positions`, `remesh`);
         a second transform replaces the first. Answers are exact as if the moved vertices had been given, and these are
         rounded in one way: row ``a, b, c, d`` of the matrix takes ``(x, y, z)`` to ``((a*x + b*y) + c*z) + d``, each
         product and each sum rounded to float64 in this order, the last sum rounded once more to the dtype of the
@@ -532,7 +532,8 @@ class Scene(SceneBase):
         return self._end_positions(body)
 
     def rest_positions(self, body: _Body) -> _Positions:
-        """The positions that were given last, before any transform.
+        """The positions from which transforms start: those that were given last, or reached by the last step that was taken. A step
+        whose end `set_end_transform` set leaves them as they are.
 
         Returns
         -------
@@ -547,7 +548,7 @@ class Scene(SceneBase):
         Returns
         -------
         numpy.ndarray of float64, shape (4, 4), or None
-            ``None`` for a body that was not, or whose positions were given since.
+            ``None`` for a body that was not, or whose positions were given since, or after a step was taken.
         """
         return self._transform(body)
 

@@ -246,7 +246,7 @@ def test_many_bodies_at_once():
     for words, change in [
         (r"^vertex_offsets: 2 as the last of 3 given", {"vertex_offsets": [0, 2]}),
         (r"^face_offsets: 1 as the first given, 0 as the first allowed", {"face_offsets": [1, 1]}),
-        (r"^face_offsets\[1\] = -1: an offset is 0 or more", {"face_offsets": [0, -1]}),
+        (r"^face_offsets\[1\]: -1 given, 0 or more allowed", {"face_offsets": [0, -1]}),
         (r"^vertex_offsets: a row of whole numbers expected, \(1, 2\)", {"vertex_offsets": [[0, 3]]}),
         (r"^vertex_offsets: a row of whole numbers expected", {"vertex_offsets": [0.0, 3.0]}),
         (r"^faces\[0, 2\] = 3: there are 3 vertices", {"faces": [[0, 1, 3]]}),

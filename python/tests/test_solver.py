@@ -1,5 +1,6 @@
 """What penetration-free solvers ask: how far vertices may move, and neighbours by element."""
 
+import copy
 import pickle
 
 import numpy as np
@@ -195,6 +196,16 @@ def test_what_is_left_out(detector):
         detector.near(scene, 0.3, exclude=scene.vertex_pairs(points, offsets[1:], listed, cloth))
     with pytest.raises(ValueError, match="vertex 48 at 0, but body 1 has 48 vertices"):
         detector.near(scene, 0.3, exclude=scene.vertex_pairs(points, offsets, listed + 48))
+    none = scene.vertex_pairs(points, np.zeros(49, int), [])
+    assert len(detector.near(scene, 0.3, exclude=none)) == len(detector.near(scene, 0.3))
+    # Its pairs would be none in another scene.
+    for foreign in [rest, sewn]:
+        with pytest.raises(ValueError, match=r"^exclude\[1\]: of another scene"):
+            detector.near(copy.copy(scene), 0.3, exclude=[impinge.rings(1), foreign])
+    with pytest.raises(ValueError, match=r"^groups\[2\]: -1 given, 0 or more allowed"):
+        scene.set_groups(cloth, [0, 0, -1] + 45 * [0])
+    with pytest.raises(ValueError, match=r"^pinned: shape \(48,\) of bool expected, "):
+        scene.set_pinned(cloth, np.zeros(48, int))
     query = impinge.Query(exclude=[impinge.rings(2), (1, 0), impinge.groups(7, 1)])
     assert query == pickle.loads(pickle.dumps(query)) and len({query, query.replace()}) == 1
     assert repr(query) == "Query(exclude=((0, 1), groups(1, 7), rings(2)))"

@@ -198,7 +198,7 @@ pub fn mask(answer: &Bound<'_, PyAny>, name: &str, n: usize) -> PyResult<Vec<boo
         let dtype = array.dtype().str();
         match (given, dtype) {
             (Ok(shape), Ok(dtype)) => invalid(format!(
-                "{name}: shape ({n},) of bool expected as the answer, {shape} of {dtype} given"
+                "{name}: shape ({n},) of bool expected, {shape} of {dtype} given"
             )),
             (Err(error), _) | (_, Err(error)) => error,
         }
@@ -215,6 +215,9 @@ pub fn offsets(argument: &Bound<'_, PyAny>, name: &str) -> PyResult<Vec<usize>> 
     let array = as_array(argument, name)?;
     let kind = NumberKind::of(&array, name)?;
     let shape = array.shape();
+    if shape == [0] {
+        return Ok(Vec::new());
+    }
     if shape.len() != 1 || matches!(kind, NumberKind::Float(_)) {
         return Err(invalid(format!(
             "{name}: a row of whole numbers expected, {} of {} given",
@@ -229,7 +232,7 @@ pub fn offsets(argument: &Bound<'_, PyAny>, name: &str) -> PyResult<Vec<usize>> 
     let numbers = numbers.as_slice()?;
     match numbers.iter().position(|x| convert(x).is_none()) {
         Some(at) => Err(invalid(format!(
-            "{name}[{at}] = {}: an offset is 0 or more",
+            "{name}[{at}]: {} given, 0 or more allowed",
             numbers[at]
         ))),
         None => Ok(numbers.iter().filter_map(convert).collect()),
