@@ -915,8 +915,8 @@ uint64_t impinge_motion_n_touching(const impinge_motion *motion);
 uint32_t impinge_motion_rounds(const impinge_motion *motion);
 /* Where the vertices of a body are then: a view, valid as long as the motion. No rows for a body that stands still. */
 impinge_status impinge_motion_positions(const impinge_motion *motion, uint32_t body, impinge_array *view);
-/* Takes the step: these positions become those of the scene, and its bodies stand still until they get end positions again. Of bodies
- * that transforms move, the positions given last stay the same: the next transform begins with them, too.
+/* Takes the step: the bodies that move get these positions, and stand still until they get end positions again. Transforms of bodies whose
+ * end impinge_scene_set_end_transform set go on from the same positions as before; those of others start from these.
  * INVALID: a body that has other positions than when the step was found, also one that does not move: nothing would be known of the step.
  * A body that is new, or that moves and was removed. The scene is unchanged then. */
 impinge_status impinge_motion_apply(const impinge_motion *motion, impinge_scene *scene);

@@ -50,11 +50,10 @@ impl PartialEq for StepStart {
     }
 }
 
+/// From bodies in the order of a scene.
 impl FromIterator<StartOfBody> for StepStart {
     fn from_iter<I: IntoIterator<Item = StartOfBody>>(bodies: I) -> Self {
-        let mut bodies: Vec<_> = bodies.into_iter().collect();
-        bodies.sort_unstable_by_key(|start| start.body);
-        StepStart(bodies)
+        StepStart(bodies.into_iter().collect())
     }
 }
 

@@ -91,7 +91,7 @@ impl Detector {
         query: &Query,
     ) -> Result<SafeDistances, Error> {
         check_distance("most", most)?;
-        check_distance("most", 2.0 * most)?;
+        check_distance("twice most", 2.0 * most)?;
         for &body in &query.fixed {
             scene.body(body)?;
         }

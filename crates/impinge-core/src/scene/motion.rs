@@ -108,8 +108,8 @@ impl Scene {
     }
 
     /// Moves a body by an affine matrix, such as a rigid motion, without passing its vertices
-    /// again. It moves the rest positions, which are those given last ([`add`](Scene::add),
-    /// [`set_positions`](Scene::set_positions), [`remesh`](Scene::remesh)). A second transform
+    /// again. It moves the [rest positions](crate::Body::rest_positions), such as those given last
+    /// ([`add`](Scene::add), [`set_positions`](Scene::set_positions), [`remesh`](Scene::remesh)). A second transform
     /// replaces the first; they do not accumulate, also where a step whose end a
     /// [transform](Scene::set_end_transform) set was [taken](crate::Advance::apply) in between.
     ///
