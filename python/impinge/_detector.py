@@ -291,7 +291,8 @@ class Detector(DetectorBase):
 
         Rounding alone may make elements touch that did not. So for each fraction that is tried positions are
         rounded first, and the way to those is asked about. A chain of such steps is free from the first to the
-        last, if its start was free of intersections, which ``start="verify"`` asks. Pairs that touch at the start allow
+        last, if its start was free of intersections, which ``start="verify"`` asks; after the first contact it goes on only if what
+        met moves apart: a `clearance` keeps room. Pairs that touch at the start allow
         no step at all, or are not looked at with ``start="skip"``. The seams of a mesh that was not welded are refused by
         name: weld it (`weld`), or skip them.
 
@@ -558,7 +559,8 @@ class Detector(DetectorBase):
         Returns
         -------
         Nearest or None
-            ``None`` where one of them has no element. Its distance is 0 if and only if they share a point.
+            ``None`` where one of them has no element. Its distance is 0 if and only if they share a point. Of several pairs at
+            one distance the lowest, by the element of `a`, then of `b`.
 
         Raises
         ------
@@ -595,7 +597,7 @@ class Detector(DetectorBase):
         Returns
         -------
         Nearest or None
-            ``None`` where there are no two bodies that have elements. Of several pairs at one distance the lowest.
+            ``None`` where there are no two bodies that have elements. Of several pairs at one distance the lowest: by bodies, then by elements.
 
         Examples
         --------

@@ -227,7 +227,8 @@ class Scene(SceneBase):
         on a straight line at constant speed. They hold until the next `set_positions`, `set_transform` or `remesh`. A body without
         end positions stands still.
 
-        Where start and end come in different precisions, the single one is widened, which is exact.
+        Where start and end come in different precisions, the single one is widened, which is exact. The body's positions stay wide
+        until others are given.
 
         Parameters
         ----------
