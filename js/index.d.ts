@@ -717,7 +717,10 @@ export declare class Detector {
   distance(scene: Scene, a: Body, b: Body, control?: Control): Nearest | null;
   /** Where the triangles of pairs meet. The scene must not have changed since they were found. */
   contacts(scene: Scene, pairs: Pairs, control?: Control): Contacts;
-  /** How deep two closed bodies are in each other, given contacts among which are all of theirs. */
+  /**
+   * How deep two closed bodies are in each other, given contacts among which are all of theirs. Refuses bodies that have moved since these
+   * were found, if no others were asked for in between.
+   */
   penetration(scene: Scene, contacts: Contacts, a: Body, b: Body, control?: Control): Penetration;
   /** Frees the memory. */
   dispose(): void;

@@ -137,11 +137,15 @@ def test_scenes_pickle_where_steps_led(duplicate, wide):
     scene.set_end_transform(turning, turned @ turned)
     halfway = (scene.positions(turning) + scene.end_positions(turning)) / 2
     scene.add_points([[0.1, 0.8, 0.1] @ halfway])  # It stops one of the vertices most.
-    if wide:  # The end of another body is as it was given.
+    if wide:  # The end of another body is as it was given, and so is the start of one more.
         scene.set_end_positions(3, scene.positions(3).astype(np.float64) - 1)
+        scene.set_transform(0, np.eye(4))
+        scene.set_end_positions(0, TRIANGLE.astype(np.float64))
+        scene.set_end_positions(0, None)
+        assert (scene.positions(0).dtype, scene.rest_positions(0).dtype) == (np.float64, np.float32)
     other = duplicate(scene)
     for body in map(int, scene.bodies):
-        for of in ["positions", "rest_positions", "end_positions"]:
+        for of in ["positions", "rest_positions", "end_positions", "transform"]:
             ours, theirs = getattr(other, of)(body), getattr(scene, of)(body)
             assert (ours is None) == (theirs is None)
             if ours is not None:

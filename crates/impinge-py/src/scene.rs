@@ -586,9 +586,9 @@ impl Scene {
                 positions_array(py, body.rest_positions())?,
                 scene._elements(py, &number)?,
                 scene._transform(py, &number)?,
-                // A step has taken it from rest to where no matrix does.
+                // A step has taken it from rest to where no matrix does, or widened it.
                 (
-                    (body.transform().is_none() && body.positions() != body.rest_positions())
+                    (is_elsewhere(body))
                         .then(|| positions_array(py, body.positions()))
                         .transpose()?,
                     scene._end_positions(py, &number)?,
@@ -659,6 +659,15 @@ impl Scene {
             scene.inner.remove(id).map_err(raise)?;
         }
         Ok(())
+    }
+}
+
+/// Whether neither the rest positions of a body nor its matrix say all of where it is.
+fn is_elsewhere(body: &impinge::Body) -> bool {
+    let (now, rest) = (body.positions(), body.rest_positions());
+    match body.transform() {
+        None => now != rest,
+        Some(_) => std::mem::discriminant(now) != std::mem::discriminant(rest),
     }
 }
 

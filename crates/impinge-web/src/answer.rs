@@ -9,7 +9,7 @@ use impinge::{BodyId, Candidates, Impact, NearPairs, PairKind, Pairs, Positions,
 
 use crate::ask::{Asker, Question, query};
 use crate::error::Error;
-use crate::world::World;
+use crate::world::{MODULE, World};
 
 /// The lists of an answer. What they hold depends on the question; those with sections have the
 /// length of each before it.
@@ -67,15 +67,12 @@ impl Answer {
         });
         let bodies: Vec<u32> = bodies.collect();
         self.section(bodies);
-        self.section(start.bodies().iter().flat_map(|start| {
+        let start = start.bodies().iter().flat_map(|start| {
             let stamp = [start.stamp as u32, (start.stamp >> 32) as u32];
-            [
-                number(start.body),
-                stamp[0],
-                stamp[1],
-                u32::from(start.keeps_rest),
-            ]
-        }));
+            let number = number(start.body);
+            [number, stamp[0], stamp[1], u32::from(start.keeps_rest)]
+        });
+        self.section(std::iter::once(MODULE).chain(start));
     }
 
     /// Kinds, whether at the start, then whether the start intersects: 0, 1, or 2 if nobody asked.

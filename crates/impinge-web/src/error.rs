@@ -40,6 +40,9 @@ pub enum Error {
         "exclude: pairs at rest given that are of another scene or disposed of, those of this scene allowed"
     )]
     PairsOfAnotherScene,
+    /// A step that the other module has found.
+    #[error("scene: a Scene of the module that has found the step is needed")]
+    StepOfAnotherModule,
     /// Words that the package does not send.
     #[error("the package and its module do not fit together")]
     Foreign,

@@ -8,6 +8,9 @@ use impinge::{
 
 use crate::error::Error;
 
+/// Tells apart the modules of one page, each of which counts its stamps from 1.
+pub(crate) const MODULE: u32 = cfg!(feature = "gpu") as u32;
+
 /// What arrays are for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Put {
@@ -220,7 +223,7 @@ impl World {
     }
 
     /// Takes a step: gives bodies the positions that an answer says, if all bodies are where they
-    /// were when it was found. `start`: for each body of then its number, two words of a stamp,
+    /// were when it was found. `start`: the module; for each body of then its number, two words of a stamp,
     /// and whether it keeps its rest positions.
     ///
     /// # Errors
@@ -231,6 +234,10 @@ impl World {
         bodies: &[u32],
         positions: Vec<Positions>,
     ) -> Result<(), Error> {
+        let start = match start.split_first() {
+            Some((&MODULE, start)) => start,
+            _ => return Err(Error::StepOfAnotherModule),
+        };
         let held = start
             .as_chunks()
             .0

@@ -210,7 +210,7 @@ fn answers_about_steps() -> Result<(), Error> {
     assert_eq!((impacts.bytes.len(), impacts.bytes[2 * n]), (2 * n + 1, 2));
     let verify = [0, 0, 0, 0, 2, 1, 0, 0, 1];
     let advance = asker.ask(Question::Advance, &world, &verify, &NUMBERS)?;
-    let [1, moving, 8, ref start @ ..] = advance.words[..] else {
+    let [1, moving, 9, ref start @ ..] = advance.words[..] else {
         panic!("one body moves, of two: {:?}", advance.words);
     };
     assert_eq!((advance.rows.len(), moving), (4, b));
@@ -224,6 +224,9 @@ fn answers_about_steps() -> Result<(), Error> {
     let again = again.expect_err("somewhere else").to_string();
     let text = format!("body {b}, in the library's words: body 0: this was found for other");
     assert!(again.starts_with(&text), "{again}");
+    let of_another = [&[start[0] + 1], &start[1..]].concat();
+    let foreign = world.clone().take_step(&of_another, &[b], reached());
+    assert!(matches!(foreign, Err(Error::StepOfAnotherModule)));
     taken.remove(b)?;
     let gone = taken.take_step(start, &[b], reached());
     assert!(matches!(gone, Err(Error::NoBody { number, .. }) if number == b));

@@ -31,6 +31,7 @@ struct PairBody {
     first: Number,
     kind: BodyKind,
     numbers_stamp: u64,
+    positions_stamp: u64,
 }
 
 /// The numbers of no primitives.
@@ -76,6 +77,7 @@ impl Pairs {
                 first: Number::new(end),
                 kind: body.kind(),
                 numbers_stamp: body.numbers_stamp(Part::Given),
+                positions_stamp: body.positions_stamp(),
             });
             end = end.saturating_add(body.elements().len() as u32);
         }
@@ -261,10 +263,10 @@ impl Pairs {
         self.bodies.iter().map(|body| (body.id, body.kind))
     }
 
-    /// The same bodies, and the stamp of the numbers of their elements.
-    pub(crate) fn numbered(&self) -> impl Iterator<Item = (BodyId, u64)> + '_ {
+    /// The same bodies, and the stamps of the numbers of their elements and of their positions.
+    pub(crate) fn stamped(&self) -> impl Iterator<Item = (BodyId, [u64; 2])> + '_ {
         let bodies = self.bodies.iter();
-        bodies.map(|body| (body.id, body.numbers_stamp))
+        bodies.map(|body| (body.id, [body.numbers_stamp, body.positions_stamp]))
     }
 
     /// Which pairs an older answer also has, which are new, and which are gone: two pairs are the
@@ -295,6 +297,7 @@ impl Outcome<u64, 1> for Pairs {
             first: part.first,
             kind: part.kind,
             numbers_stamp: part.numbers_stamp,
+            positions_stamp: part.positions_stamp,
         }));
         self.stats.clear();
     }

@@ -230,7 +230,8 @@ struct ContactBodies<'a> {
 }
 
 struct Taking<'a> {
-    id: BodyId,
+    /// Of the positions for which the pairs were found.
+    stamp: (BodyId, u64),
     body: &'a Body,
     /// Of the triangles in contact. Empty for most meshes.
     doubles: Doubles,
@@ -240,7 +241,7 @@ impl<'a> ContactBodies<'a> {
     fn new(scene: &'a Scene, pairs: &Pairs, work: Work<'_>) -> Result<Self, Error> {
         let mut bodies: Vec<Option<Taking<'a>>> = Vec::new();
         let mut colliding = pairs.all_colliding().into_iter().peekable();
-        for (id, numbers_stamp) in pairs.numbered() {
+        for (id, [numbers_stamp, positions_stamp]) in pairs.stamped() {
             let body = scene.body(id)?;
             let own = colliding.next_if(|(of, _)| *of == id);
             let own = own.map_or(Vec::new(), |(_, own)| own);
@@ -252,7 +253,7 @@ impl<'a> ContactBodies<'a> {
             }
             bodies.resize_with(bodies.len().max(id.index() + 1), || None);
             bodies[id.index()] = Some(Taking {
-                id,
+                stamp: (id, positions_stamp),
                 body,
                 doubles: doubles(body, &own, work)?,
             });
@@ -262,9 +263,7 @@ impl<'a> ContactBodies<'a> {
 
     fn stamps(&self) -> Vec<(BodyId, u64)> {
         let taking = self.bodies.iter().flatten();
-        taking
-            .map(|taking| (taking.id, taking.body.positions_stamp()))
-            .collect()
+        taking.map(|taking| taking.stamp).collect()
     }
 
     /// The doubles of all bodies that have any.

@@ -127,7 +127,7 @@ pub struct Contacts {
     /// For each body that has any: vertices that are not the lowest one at their position, each
     /// with the lowest.
     doubles: Arc<[(u32, Doubles)]>,
-    /// The stamps of the positions of the bodies that take part.
+    /// The stamps of the positions of the bodies for which the pairs were found.
     stamps: Vec<(BodyId, u64)>,
     by_bodies: parts::ByBodies,
 }

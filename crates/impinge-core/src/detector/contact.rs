@@ -76,7 +76,7 @@ impl Detector {
     /// # Errors
     /// A body that is not in the scene, the same body twice, a body not made of triangles, a
     /// surface that is not closed, contacts without these two though they intersect; a body that
-    /// was moved or re-meshed since its contacts were found ([`Error::Moved`]).
+    /// was moved or re-meshed since the pairs were found ([`Error::Moved`]).
     pub fn penetration(
         &mut self,
         scene: &Scene,

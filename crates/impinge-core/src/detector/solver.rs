@@ -91,7 +91,13 @@ impl Detector {
         query: &Query,
     ) -> Result<SafeDistances, Error> {
         check_distance("most", most)?;
-        check_distance("twice most", 2.0 * most)?;
+        if (2.0 * most).is_infinite() {
+            return Err(Error::Setting {
+                setting: "most",
+                given: format!("{most:e}"),
+                allowed: "a number whose double is finite",
+            });
+        }
         for &body in &query.fixed {
             scene.body(body)?;
         }

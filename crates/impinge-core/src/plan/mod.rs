@@ -62,6 +62,8 @@ pub struct QueryPart {
     pub within: bool,
     /// Of the numbers of its elements.
     pub(crate) numbers_stamp: u64,
+    /// Of the positions of the body.
+    pub(crate) positions_stamp: u64,
     /// Whether the body has no faces.
     pub(crate) is_bare: bool,
     /// Whether the body has no edges either.

@@ -135,6 +135,7 @@ impl Plan {
             n_primitives: n as u32,
             kind: elements.kind(),
             numbers_stamp: body.numbers_stamp(part),
+            positions_stamp: body.positions_stamp(),
             is_bare: body.kind() < BodyKind::Triangles,
             is_points: body.kind() == BodyKind::Points,
             within: within && !self.excluded.contains(&(id, id)),

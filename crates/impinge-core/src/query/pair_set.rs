@@ -68,9 +68,8 @@ impl PairSet {
         scene: &Scene,
         takes_part: impl Fn(BodyId, Part) -> bool,
     ) -> Result<(), Error> {
-        let parts = self.0.parts.iter().copied();
-        let parts = parts.filter(|&(body, part, _)| takes_part(body, part));
-        match scene.renumbered(parts).next() {
+        let mut renumbered = scene.renumbered(self.0.parts.iter().copied());
+        match renumbered.find(|&(body, part)| takes_part(body, part)) {
             Some((body, _)) => Err(Error::Remeshed { body }),
             None => Ok(()),
         }

@@ -35,6 +35,9 @@ impl Scene {
     /// [`Body::edges`]: crate::Body::edges
     /// [`Thickness::edges`]: crate::Thickness::edges
     ///
+    /// Pairs of edges that were found before have old numbers, and are refused where they are given
+    /// back, unless the rows are those that the body has.
+    ///
     /// # Errors
     /// The id names no body; a body of edges, which have the numbers of their rows, or of points;
     /// a row that is no edge of the body, or the same as another; an edge that no row has. The body

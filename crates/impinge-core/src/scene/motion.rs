@@ -3,7 +3,6 @@
 
 use std::sync::Arc;
 
-use crate::scene::Body;
 use crate::scene::bodies::Scene;
 use crate::scene::error::Error;
 use crate::scene::ids::{BodyId, new_stamp};
@@ -143,17 +142,15 @@ impl Scene {
         if !target.checked {
             target.positions.check(body)?;
         }
-        let moved = target.moved_by(body, &matrix)?;
-        let motion = target.motion.take();
-        let before = std::mem::replace(&mut target.positions, moved);
-        let rest = match motion {
-            Some(motion) => {
-                // The next transform writes into this memory.
-                target.end = (before.bytes() > 0).then_some(before);
-                motion.rest
+        matrix.check(body, target.rest_positions())?;
+        let rest = match target.motion.take() {
+            Some(motion) => motion.rest,
+            None => {
+                let none = f32::store(&[]);
+                Arc::new(std::mem::replace(&mut target.positions, none))
             }
-            None => Arc::new(before),
         };
+        matrix.write(&rest, &mut target.positions);
         target.has_moved(true);
         let matrix = Some(matrix);
         target.motion = Some(Box::new(RestPose { rest, matrix }));
@@ -214,7 +211,9 @@ impl Scene {
         if !target.checked {
             target.positions.check(body)?;
         }
-        let end = target.moved_by(body, &matrix)?;
+        matrix.check(body, target.rest_positions())?;
+        let mut end = target.end.take().unwrap_or_else(|| f32::store(&[]));
+        matrix.write(target.rest_positions(), &mut end);
         target.set_end(end, true);
         Ok(())
     }
@@ -243,8 +242,8 @@ impl Scene {
         Ok(())
     }
 
-    /// Restores what a saved body had besides its rest positions and its transform: where a step
-    /// had taken it, where the next ends, and whether a transform made this end.
+    /// Restores what a saved body had besides its rest positions and its transform: where it was,
+    /// if these do not say so, where the next step ends, and whether a transform made this end.
     ///
     /// # Errors
     /// As [`set_positions`](Scene::set_positions) and
@@ -258,27 +257,18 @@ impl Scene {
         by_transform: bool,
     ) -> Result<(), Error> {
         if let Some(reached) = reached {
+            let target = self.moved_body(body)?;
+            let matrix = target.motion.as_ref().and_then(|motion| motion.matrix);
             self.take_step(body, reached, true)?;
+            if let Some(motion) = &mut self.moved_body(body)?.motion {
+                motion.matrix = matrix;
+            }
         }
         if let Some(end) = end {
             self.set_end_positions(body, end)?;
             self.moved_body(body)?.is_end_transformed = by_transform;
         }
         Ok(())
-    }
-}
-
-impl Body {
-    /// The rest positions, moved, in memory of end positions that do not count.
-    ///
-    /// # Errors
-    /// A position that is refused.
-    fn moved_by(&mut self, id: BodyId, matrix: &Affine) -> Result<Positions, Error> {
-        let unused = self.end.take_if(|_| !self.moves);
-        let mut moved = unused.unwrap_or_else(|| f32::store(&[]));
-        matrix.write(self.rest_positions(), &mut moved);
-        moved.check(id)?;
-        Ok(moved)
     }
 }
 

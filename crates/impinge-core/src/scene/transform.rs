@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use crate::scene::error::Error;
+use crate::scene::ids::BodyId;
 use crate::scene::positions::{Positions, Real};
 
 /// The rest positions of a body, and the matrix that moved them; `None` if a step did.
@@ -64,6 +65,27 @@ impl Affine {
                 let moved: Vec<[R; 3]> = rest.iter().map(|point| self.apply(point)).collect();
                 *to = R::store(&moved);
             }
+        }
+    }
+
+    /// Refuses a position that would be moved to no number; the error names the first.
+    pub fn check(&self, body: BodyId, rest: &Positions) -> Result<(), Error> {
+        match rest {
+            Positions::F32(rest) => self.check_each(body, rest),
+            Positions::F64(rest) => self.check_each(body, rest),
+        }
+    }
+
+    fn check_each<R: Real>(&self, body: BodyId, rest: &[[R; 3]]) -> Result<(), Error> {
+        let moved = |point| self.apply(point).map(R::widen);
+        let is_bad = |point| moved(point).iter().any(|x| !x.is_finite());
+        match rest.iter().position(is_bad) {
+            None => Ok(()),
+            Some(vertex) => Err(Error::NonFinitePosition {
+                body,
+                vertex,
+                value: moved(&rest[vertex]),
+            }),
         }
     }
 

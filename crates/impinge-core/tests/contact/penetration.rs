@@ -360,6 +360,10 @@ fn contacts_of_before_are_refused() {
         );
     }
     assert!(detector.penetration(&before, &contacts, a, b).is_ok());
+    // Where the pairs meet now is known, but not which others do.
+    let later = detector.contacts(&moved, &pairs).unwrap();
+    let error = detector.penetration(&moved, &later, a, b).unwrap_err();
+    assert!(matches!(error, Error::Moved { .. }), "{error}");
 }
 
 /// Each pair of many bodies is as if it were alone in the scene, but for the numbers of its

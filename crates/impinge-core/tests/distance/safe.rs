@@ -641,6 +641,11 @@ fn bad_lengths_and_bodies_are_refused_by_name() {
         );
         assert!(is_named, "{most}: {error}");
     }
+    let error = detector.safe_distances(&scene, 1e308, &Query::all());
+    assert_eq!(
+        error.expect_err("twice as much is too much").to_string(),
+        "most: 1e308 given, a number whose double is finite allowed"
+    );
     scene.remove(bodies[3]).expect("good");
     let query = Query::all().fixed([bodies[3]]);
     let error = detector.safe_distances(&scene, 1.0, &query);
