@@ -131,8 +131,9 @@ fn describe(panic: &(dyn Any + Send)) -> String {
     format!("internal error, please report it: {what} ({place})")
 }
 
-/// What a handle holds that calls reserve: many to read it, or one to change it.
-pub trait Held {
+/// What a handle holds that calls reserve: many to read it, or one to change it. Calls of any thread
+/// do, several at a time where they read, and C asks for no bound: so all that is held is `Sync`.
+pub trait Held: Send + Sync {
     const NAME: &'static str;
     /// What a caller is told while another call changes it.
     const CHANGED: &'static str;
