@@ -748,7 +748,8 @@ impinge_status impinge_find_contacts(impinge_detector *detector, const impinge_s
 typedef struct impinge_penetration impinge_penetration;
 
 /* How deep two closed bodies of triangles are in each other, from contacts among which are all of these two.
- * INVALID: also a surface that is not closed, contacts without these two though they intersect. */
+ * INVALID: also a surface that is not closed, contacts without these two though they intersect, a body of the two that has
+ * moved or was re-meshed since its contacts were found. */
 impinge_status impinge_find_penetration(impinge_detector *detector, const impinge_scene *scene, const impinge_contacts *contacts,
     uint32_t a, uint32_t b, impinge_penetration **penetration);
 
