@@ -8,11 +8,14 @@ namespace impinge {
 inline namespace IMPINGE_MODE {
 
 namespace detail {
-/// What an answer cost; nothing of none.
+/// What an answer cost; of none, numbers that are 0 and empty strings.
 template <class Call, class Handle> impinge_stats stats_of(Call call, const Handle *of) {
   impinge_stats stats{};
   stats.size = sizeof stats;
-  if (call(of, &stats) != IMPINGE_OK) stats = {};
+  if (call(of, &stats) != IMPINGE_OK) {
+    stats = {};
+    stats.backend = stats.method = "";
+  }
   return stats;
 }
 } // namespace detail

@@ -3,10 +3,11 @@
 ///
 /// Ownership. Scenes, detectors and answers own their handle and can be moved. An answer outlives its scene and its detector; the views that it
 ///   gives live as long as it does. Arrays that are passed in are read during the call, but for those of `lend_positions`.
-/// Errors. A call that fails throws `impinge::error`. Where exceptions are off, or IMPINGE_NO_EXCEPTIONS is defined, each call gives a
-///   `result<T>` instead. `ok()` says whether the call succeeded. So does a test such as `if (pairs)`, but the result of a number, a body, a
-///   bool or a std::optional cannot be tested: write `any.ok() && *any`, `n.ok() && *n > 0`. Units of both modes may be in one program. Their
-///   classes are different types, so that a unit that hands an object to one of the other mode does not link.
+/// Errors. A call that fails throws `impinge::error`; `stats()`, `start_intersects()` and `n_bodies()` never do, and say what they give then.
+///   Where exceptions are off, or IMPINGE_NO_EXCEPTIONS is defined, each call gives a `result<T>` instead. `ok()` says whether the call
+///   succeeded. So does a test such as `if (pairs)`, but the result of a number, a body, a bool or a std::optional cannot be tested: write
+///   `any.ok() && *any`, `n.ok() && *n > 0`. Units of both modes may be in one program. Their classes are different types, so that a unit that
+///   hands an object to one of the other mode does not link.
 /// Threads. As in impinge.h: one thread at a time changes a handle, and each question changes its detector. A detector that is in use
 ///   refuses another question, and a scene that is asked about refuses changes, also those of callbacks. A scene or a detector must not
 ///   end, nor be moved from, while a call uses it.
@@ -248,13 +249,9 @@ public:
   }
   /// Whether the start of the last step intersects; nothing if nobody asked, and while the detector is in use or where it is broken.
   std::optional<bool> start_intersects() const { return detail::asked(impinge_detector_start_intersects(raw())); }
-  /// What the last question cost. Its strings live as long as the detector; all 0 while the detector is in use or where it is broken.
-  impinge_stats stats() const & {
-    impinge_stats stats{};
-    stats.size = sizeof stats;
-    if (impinge_detector_stats(raw(), &stats) != IMPINGE_OK) stats = {};
-    return stats;
-  }
+  /// What the last question cost. Its strings live as long as the detector. While the detector is in use, or where it is broken, numbers are 0
+  /// and strings empty.
+  impinge_stats stats() const & { return detail::stats_of(impinge_detector_stats, raw()); }
   impinge_detector *raw() noexcept { return handle_.get(); }
   const impinge_detector *raw() const noexcept { return handle_.get(); }
   // A temporary ends before its views are read.
