@@ -17,6 +17,11 @@
 #include <impinge/answers.hpp>
 
 #include <functional>
+#ifndef IMPINGE_NO_EXCEPTIONS
+#include <map>
+#include <mutex>
+#include <thread>
+#endif
 
 namespace impinge {
 inline namespace IMPINGE_MODE {
@@ -151,7 +156,10 @@ public:
     const impinge_query raw = of.raw();
     const auto status = impinge_find_candidates_in_runs(this->raw(), in.raw(), inflation, &raw, most, run::hand_out, &user, &n);
 #ifndef IMPINGE_NO_EXCEPTIONS
-    if (user.thrown) std::rethrow_exception(user.thrown);
+    if (user.thrown) {
+      if (watch_) watch_->take(); // It is not for the next question.
+      std::rethrow_exception(user.thrown);
+    }
 #endif
     return give(status, std::move(n));
   }
@@ -266,16 +274,28 @@ private:
     std::function<void(std::uint64_t, std::uint64_t)> progress;
     std::function<void(std::uint32_t, const char *)> log;
 #ifndef IMPINGE_NO_EXCEPTIONS
-    std::exception_ptr thrown;
+    // What callbacks have thrown, each for the thread that asks: it takes that when the detector may be in use by the next thread already.
+    std::map<std::thread::id, std::exception_ptr> thrown;
+    std::mutex of_thrown;
     template <class Call> void guarded(Call call) {
-      if (thrown) return;
+      if (is_broken()) return;
       try {
         call();
       } catch (...) {
-        thrown = std::current_exception();
+        const std::lock_guard<std::mutex> lock(of_thrown);
+        thrown[std::this_thread::get_id()] = std::current_exception();
       }
     }
-    bool is_broken() const { return static_cast<bool>(thrown); }
+    bool is_broken() {
+      const std::lock_guard<std::mutex> lock(of_thrown);
+      return thrown.count(std::this_thread::get_id()) != 0;
+    }
+    /// What was thrown in the question that this thread asked; nothing if none was, or another thread's question refused this one.
+    std::exception_ptr take() {
+      const std::lock_guard<std::mutex> lock(of_thrown);
+      auto held = thrown.extract(std::this_thread::get_id());
+      return held ? std::move(held.mapped()) : nullptr;
+    }
 #else
     template <class Call> void guarded(Call call) { call(); }
     bool is_broken() const { return false; }
@@ -298,7 +318,7 @@ private:
 
 #ifndef IMPINGE_NO_EXCEPTIONS
   void give(impinge_status status) {
-    if (watch_ && watch_->thrown) std::rethrow_exception(std::exchange(watch_->thrown, nullptr));
+    if (const auto thrown = watch_ ? watch_->take() : nullptr) std::rethrow_exception(thrown);
     detail::give(status);
   }
   template <class T> T give(impinge_status status, T &&value) {
