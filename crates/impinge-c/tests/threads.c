@@ -2,6 +2,7 @@
  * change it. */
 #include "common.h"
 #include <pthread.h>
+#include <sched.h>
 
 static impinge_scene *scene = NULL;
 
@@ -70,24 +71,54 @@ static void in_use(void) {
   GOOD(impinge_scene_set_positions(scene, 1, positions_of(moved)));
 }
 
-static int n_asking = 0;
+/* Questions that still come, changes done, and changes and questions that were refused. */
+static int n_asking = 0, n_changes = 0, n_changes_refused = 0, n_questions_refused = 0;
+
+static int now(const int *of) { return __atomic_load_n(of, __ATOMIC_SEQ_CST); }
+static void count(int *of) { __atomic_add_fetch(of, 1, __ATOMIC_SEQ_CST); }
+
+/* Returns when the other thread has counted one more; after many seconds anyway, so that the checks at the end fail. */
+static void await_more(const int *of) {
+  const int before = now(of);
+  int n;
+  for (n = 0; n < 100000000 && now(of) == before; ++n) sched_yield();
+}
 
 /* Whether a call has done what it says, or has been refused because the scene is in use. */
-static int is_done(impinge_status status, const char *why) {
+static int is_done(impinge_status status, const char *why, int *n) {
   if (status == IMPINGE_OK) return 1;
   REFUSED(status, why);
+  count(n);
+  return 0;
+}
+
+/* Goes on with the question when a change was refused because of it. */
+static int until_refused(void *is_waiting) {
+  if (*(int *)is_waiting) await_more(&n_changes_refused);
+  *(int *)is_waiting = 0;
   return 0;
 }
 
 static void *ask_on(void *hash) {
-  impinge_detector *detector = open_detector(1);
-  int n = 0;
-  while (n < 50) {
+  impinge_settings settings;
+  impinge_detector *detector = NULL;
+  int n = 0, n_tries = 0, is_waiting = 0;
+  impinge_settings_default(&settings);
+  settings.backend = IMPINGE_BACKEND_CPU;
+  settings.threads = 1;
+  settings.cancelled = until_refused;
+  settings.user = &is_waiting;
+  GOOD(impinge_detector_create(&settings, &detector));
+  /* Until a question met a change, too: nothing holds a change up as a callback does a question. */
+  while (n < 50 || (now(&n_questions_refused) == 0 && n_tries < 20000)) {
     impinge_pairs *pairs = NULL;
-    if (!is_done(impinge_detect(detector, scene, NULL, &pairs), "the scene is in use: another call is changing it")) continue;
-    CHECK(impinge_pairs_hash(pairs) == *(uint64_t *)hash);
+    ++n_tries;
+    is_waiting = n % 10 == 5;
+    if (!is_done(impinge_detect(detector, scene, NULL, &pairs), "the scene is in use: another call is changing it", &n_questions_refused)) continue;
+    CHECK(impinge_pairs_hash(pairs) == *(uint64_t *)hash && !is_waiting);
     impinge_pairs_destroy(pairs);
-    ++n;
+    /* Changes do not queue: without a pause of both threads there may be none. */
+    if (++n % 5 == 0) await_more(&n_changes);
   }
   impinge_detector_destroy(detector);
   __atomic_sub_fetch(&n_asking, 1, __ATOMIC_SEQ_CST);
@@ -96,6 +127,7 @@ static void *ask_on(void *hash) {
 
 /* One thread changes a scene, and changes it back, while others ask about it: each call is refused or right. */
 static void changed_meanwhile(void) {
+  const char *in_use = "the scene is in use: another call is reading it";
   impinge_detector *detector = open_detector(1);
   const double point[3] = {9, 9, 9};
   const impinge_array far_away = packed(point, 1, IMPINGE_F64);
@@ -104,14 +136,16 @@ static void changed_meanwhile(void) {
   int i;
   n_asking = 2;
   for (i = 0; i < 2; ++i) CHECK(pthread_create(&threads[i], NULL, ask_on, &hash) == 0);
-  while (__atomic_load_n(&n_asking, __ATOMIC_SEQ_CST) > 0) {
+  while (now(&n_asking) > 0) {
     /* New memory with what was in the old: sanitizers see a question that still reads that. */
     uint32_t added;
-    if (is_done(impinge_scene_add_points(scene, far_away, &added), "the scene is in use"))
-      while (!is_done(impinge_scene_remove(scene, added), "the scene is in use")) continue;
-    is_done(impinge_scene_remesh(scene, 1, IMPINGE_TRIANGLES, faces_of(moved), positions_of(moved)), "the scene is in use");
+    if (is_done(impinge_scene_add_points(scene, far_away, &added), in_use, &n_changes_refused))
+      while (!is_done(impinge_scene_remove(scene, added), in_use, &n_changes_refused)) continue;
+    if (is_done(impinge_scene_remesh(scene, 1, IMPINGE_TRIANGLES, faces_of(moved), positions_of(moved)), in_use, &n_changes_refused)) count(&n_changes);
   }
   for (i = 0; i < 2; ++i) CHECK(pthread_join(threads[i], NULL) == 0);
+  /* The pauses and the callbacks of either thread alone make as many. */
+  CHECK(n_changes >= 10 && n_changes_refused >= 5 && n_questions_refused > 0);
   CHECK(hash_of(detector, scene, NULL) == hash);
   impinge_detector_destroy(detector);
 }
