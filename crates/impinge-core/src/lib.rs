@@ -26,8 +26,6 @@ pub mod simd;
 pub mod workers;
 
 pub use answers::advance::Advance;
-#[doc(hidden)]
-pub use answers::advance::{StartOfBody, StepStart};
 pub use answers::candidates::Candidates;
 pub use answers::changes::Changes;
 pub use answers::closest::{Closest, ClosestElement};
@@ -37,6 +35,8 @@ pub use answers::near::{ClosestPoints, NearIter, NearPair, NearPairs};
 pub use answers::neighbours::{Csr, Neighbours};
 pub use answers::pairs::{Element, Pairs, hash_rows};
 pub use answers::places::Place;
+#[doc(hidden)]
+pub use answers::reached::{StartOfBody, StepStart};
 pub use answers::safe::{Bounds, SafeDistances};
 pub use answers::stencil::{Gradient, Hessian, project_psd, project_psd_all};
 pub use answers::stencils::{Stencil, Stencils};

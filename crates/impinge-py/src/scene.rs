@@ -588,7 +588,7 @@ impl Scene {
                 scene._transform(py, &number)?,
                 // A step has taken it from rest to where no matrix does, or widened it.
                 (
-                    (is_elsewhere(body))
+                    is_elsewhere(body)
                         .then(|| positions_array(py, body.positions()))
                         .transpose()?,
                     scene._end_positions(py, &number)?,
@@ -676,10 +676,7 @@ fn saved_positions(saved: &Bound<'_, PyAny>) -> PyResult<Option<Positions>> {
     if saved.is_none() {
         return Ok(None);
     }
-    Ok(Some(match PositionArray::new(saved, "vertices")? {
-        PositionArray::F32(rows) => slice_rows::<f32, 3>(&rows)?.to_vec().into(),
-        PositionArray::F64(rows) => slice_rows::<f64, 3>(&rows)?.to_vec().into(),
-    }))
+    stored(&PositionArray::new(saved, "vertices")?).map(Some)
 }
 
 /// One number; or one per vertex, edge or face.

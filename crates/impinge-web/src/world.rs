@@ -223,8 +223,8 @@ impl World {
     }
 
     /// Takes a step: gives bodies the positions that an answer says, if all bodies are where they
-    /// were when it was found. `start`: the module; for each body of then its number, two words of a stamp,
-    /// and whether it keeps its rest positions.
+    /// were when it was found. `start`: the module; for each body of then its number, two words of
+    /// a stamp, and whether it keeps its rest positions.
     ///
     /// # Errors
     /// A body that was moved since, or is new; one that moves and was removed.

@@ -13,6 +13,7 @@ pub(crate) mod neighbours;
 pub(crate) mod numbering;
 pub(crate) mod pairs;
 pub(crate) mod places;
+pub(crate) mod reached;
 pub(crate) mod safe;
 pub(crate) mod stencil;
 pub(crate) mod stencils;

@@ -1,6 +1,6 @@
 //! How far each vertex may go in a step, and where it is afterwards.
 
-use crate::answers::advance::{StepStart, positions_of};
+use crate::answers::reached::{Reached, StepStart};
 use crate::scene::Scene;
 use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
@@ -12,26 +12,23 @@ use crate::scene::positions::Positions;
 /// The same input gives the same bytes on every method, backend, thread count and budget.
 #[derive(Clone, Default, PartialEq)]
 pub struct Truncation {
-    pub(crate) positions: Vec<(BodyId, Positions)>,
+    pub(crate) reached: Reached,
     pub(crate) n_cut: u64,
     pub(crate) n_touching: u64,
     pub(crate) n_rounds: u32,
     pub(crate) start_intersects: Option<bool>,
-    pub(crate) start: StepStart,
 }
 
 impl Truncation {
     /// The positions of a body, in the precision of its positions; `None` for one that does not
     /// move or was not in the scene.
     pub fn positions(&self, body: BodyId) -> Option<&Positions> {
-        positions_of(&self.positions, body)
+        self.reached.of(body)
     }
 
     /// The bodies that move, each with its positions.
     pub fn iter(&self) -> impl ExactSizeIterator<Item = (BodyId, &Positions)> {
-        self.positions
-            .iter()
-            .map(|(id, positions)| (*id, positions))
+        self.reached.iter()
     }
 
     /// How many vertices were stopped before the end of their way.
@@ -58,7 +55,7 @@ impl Truncation {
 
     #[doc(hidden)]
     pub fn start(&self) -> &StepStart {
-        &self.start
+        &self.reached.start
     }
 
     /// Takes the step: sets these positions in the scene, or in a clone of it. Of bodies whose end
@@ -69,7 +66,7 @@ impl Truncation {
     /// nothing would be known of the step; a body that is new, or that moves and was removed. The
     /// scene is unchanged then.
     pub fn apply(&self, scene: &mut Scene) -> Result<(), Error> {
-        self.start.take_step(scene, &self.positions)
+        self.reached.apply(scene)
     }
 }
 
@@ -81,7 +78,7 @@ impl std::fmt::Debug for Truncation {
         short.field("n_touching", &self.n_touching);
         short.field("n_rounds", &self.n_rounds);
         short.field("start_intersects", &self.start_intersects);
-        short.field("n_bodies", &self.positions.len());
+        short.field("n_bodies", &self.reached.positions.len());
         short.finish_non_exhaustive()
     }
 }

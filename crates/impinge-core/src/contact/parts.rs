@@ -8,6 +8,7 @@ use std::ops::Range;
 
 use super::{Contacts, PointName};
 use crate::scene::error::Error;
+use crate::scene::ids::BodyId;
 use crate::search::sink::{filled, with_capacity};
 use crate::search::work::Work;
 
@@ -54,6 +55,12 @@ impl ByBodies {
 }
 
 impl Contacts {
+    /// Whether there are contacts of two bodies, the lower first.
+    pub(crate) fn are_any_of(&self, bodies: [BodyId; 2]) -> bool {
+        let bodies = bodies.map(|id| id.index() as u32);
+        !self.by_bodies.of(bodies).is_empty()
+    }
+
     /// The contacts of two bodies alone, the lower number first, and their numbers among all
     /// contacts.
     pub(super) fn part(&self, bodies: [u32; 2]) -> Result<(Contacts, &[u32]), Error> {

@@ -2,8 +2,9 @@
 
 use super::Detector;
 use super::steps::StartAnswer;
-use crate::answers::advance::{Advance, StepStart};
+use crate::answers::advance::Advance;
 use crate::answers::impacts::Impact;
+use crate::answers::reached::Reached;
 use crate::plan::{Plan, TestId};
 use crate::query::Query;
 use crate::query::pair_kind::PairKind;
@@ -68,9 +69,8 @@ impl Detector {
             fraction: 1.0,
             first: self.steps.contacts.first(plan.precision),
             start_intersects: start.map(|StartAnswer { intersects, .. }| intersects),
-            positions: Vec::new(),
             n_tried: 1,
-            start: StepStart::of(scene),
+            reached: Reached::from_start(scene),
         };
         self.take_positions(scene, query, &plan, seen.close, control, &mut advance)?;
         Ok(advance)
@@ -89,19 +89,19 @@ impl Detector {
         let start_intersects = advance.start_intersects;
         if start_intersects == Some(true) {
             advance.fraction = 0.0;
-            advance.positions = moving(scene).map(|(id, at, _)| (id, at.clone())).collect();
+            advance.reached.positions = moving(scene).map(|(id, at, _)| (id, at.clone())).collect();
             return Ok(());
         }
         match advance.first {
             None => {
                 let ends = moving(scene).map(|(id, _, end)| (id, end.clone()));
-                advance.positions = ends.collect();
+                advance.reached.positions = ends.collect();
                 Ok(())
             }
             // Rounding is part of what the pairs keep.
             Some(first) if plan.has_clearance() => {
                 advance.fraction = first.toi;
-                advance.positions = blended(scene, first.toi);
+                advance.reached.positions = blended(scene, first.toi);
                 Ok(())
             }
             Some(first) => {
@@ -148,8 +148,8 @@ impl Detector {
             let touches = fraction > 0.0 && known.iter().any(is_known);
             let n_known = known.len();
             if !touches {
-                advance.positions = blended(scene, fraction);
-                let mut moved = moving(scene).zip(&advance.positions);
+                advance.reached.positions = blended(scene, fraction);
+                let mut moved = moving(scene).zip(&advance.reached.positions);
                 if moved.all(|((_, start, _), (_, at))| start == at) {
                     advance.fraction = 0.0;
                     return Ok(());
@@ -157,7 +157,7 @@ impl Detector {
             }
             if !touches && !are_all_known {
                 let trial = trial.get_or_insert_with(|| scene.clone());
-                set_end_positions(trial, &advance.positions)?;
+                set_end_positions(trial, &advance.reached.positions)?;
                 let plan = Plan::trial(trial, query, fraction, self.limits_of_steps())?;
                 self.find_contacts(trial, &plan, control, (None, false))?;
                 let found = self.steps.contacts.found();

@@ -102,22 +102,18 @@ impl Detector {
         })
     }
 
-    /// Refuses contacts of other bodies or other positions: two bodies that intersect would seem to be apart.
+    /// Refuses contacts of other bodies or other positions: two bodies that intersect would seem to
+    /// be apart.
     fn refuse_others(
         &mut self,
         scene: &Scene,
         contacts: &Contacts,
         [a, b]: [BodyId; 2],
     ) -> Result<(), Error> {
-        let [one, other] = [a, b].map(|id| id.index() as u32);
-        let is_of_two = |row: &[u32; 4]| {
-            let bodies = [row[0], row[2]];
-            bodies == [one, other] || bodies == [other, one]
-        };
         if a == b {
             return Ok(());
         }
-        if contacts.rows().iter().any(is_of_two) {
+        if contacts.are_any_of([a.min(b), a.max(b)]) {
             contacts.refuse_moved(scene, a)?;
             return contacts.refuse_moved(scene, b);
         }

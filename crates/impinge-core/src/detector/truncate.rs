@@ -14,7 +14,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::Detector;
 use super::advance::{moving, refuse_cell, refuse_seams, set_end_positions};
-use crate::answers::advance::StepStart;
+use crate::answers::reached::Reached;
 use crate::answers::truncation::Truncation;
 use crate::plan::{Plan, TestId};
 use crate::query::Query;
@@ -90,12 +90,12 @@ impl Detector {
         let start = self.verify(scene, query)?.map(|start| start.intersects);
         let mut truncation = Truncation {
             start_intersects: start,
-            start: StepStart::of(scene),
+            reached: Reached::from_start(scene),
             ..Truncation::default()
         };
         if start == Some(true) {
             let stay = moving(scene).map(|(id, at, _)| (id, at.clone()));
-            truncation.positions = stay.collect();
+            truncation.reached.positions = stay.collect();
             truncation.n_cut = moving(scene).map(n_ways).sum();
             return Ok(truncation);
         }
@@ -127,7 +127,7 @@ impl Detector {
             plan = plan_of(&now, self.limits_of_steps())?;
         }
         truncation.n_cut = vertices.n_cut();
-        truncation.positions = vertices.positions(scene);
+        truncation.reached.positions = vertices.positions(scene);
         stats.total_ms = begun.elapsed().as_secs_f64() * 1e3;
         self.stats = stats;
         Ok(truncation)

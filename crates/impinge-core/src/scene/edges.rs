@@ -15,7 +15,8 @@ impl Scene {
     /// forgets them.
     ///
     /// Set them before the first question: afterwards answers from before name other edges, and are
-    /// refused where they are left out or made stencils of.
+    /// refused where they are left out or made stencils of, unless the rows are those that the body
+    /// has.
     ///
     /// ```
     /// use impinge::{Backend, Detector, Elements, PairKind, Query, Scene};
@@ -34,9 +35,6 @@ impl Scene {
     ///
     /// [`Body::edges`]: crate::Body::edges
     /// [`Thickness::edges`]: crate::Thickness::edges
-    ///
-    /// Pairs of edges that were found before have old numbers, and are refused where they are given
-    /// back, unless the rows are those that the body has.
     ///
     /// # Errors
     /// The id names no body; a body of edges, which have the numbers of their rows, or of points;

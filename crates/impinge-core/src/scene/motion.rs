@@ -3,6 +3,7 @@
 
 use std::sync::Arc;
 
+use crate::scene::Body;
 use crate::scene::bodies::Scene;
 use crate::scene::error::Error;
 use crate::scene::ids::{BodyId, new_stamp};
@@ -108,8 +109,8 @@ impl Scene {
 
     /// Moves a body by an affine matrix, such as a rigid motion, without passing its vertices
     /// again. It moves the [rest positions](crate::Body::rest_positions), such as those given last
-    /// ([`add`](Scene::add), [`set_positions`](Scene::set_positions), [`remesh`](Scene::remesh)). A second transform
-    /// replaces the first; they do not accumulate, also where a step whose end a
+    /// ([`add`](Scene::add), [`set_positions`](Scene::set_positions), [`remesh`](Scene::remesh)). A
+    /// second transform replaces the first; they do not accumulate, also where a step whose end a
     /// [transform](Scene::set_end_transform) set was [taken](crate::Advance::apply) in between.
     ///
     /// Answers are exact for the moved vertices. These are rounded in a fixed way, so they have the
@@ -218,27 +219,23 @@ impl Scene {
         Ok(())
     }
 
-    /// Gives a body the positions that a step has reached. `keeps_rest`: transforms go on from its
-    /// rest positions.
+    /// Gives a body checked positions, which a step has reached. `keeps_rest`: transforms go on
+    /// from its rest positions.
     ///
     /// # Errors
-    /// As [`set_positions`](Scene::set_positions).
-    pub(crate) fn take_step(
+    /// The id names no body.
+    pub(crate) fn take_checked_step(
         &mut self,
         body: BodyId,
         positions: &Positions,
         keeps_rest: bool,
     ) -> Result<(), Error> {
-        let positions = positions.into();
         let target = self.moved_body(body)?;
-        target.check(body, &positions)?;
-        let rest = keeps_rest.then(|| match target.motion.take() {
-            Some(motion) => motion.rest,
-            None => Arc::new(target.positions.clone()),
+        let pose = keeps_rest.then(|| RestPose {
+            matrix: None,
+            ..target.rest_pose()
         });
-        store(&mut target.positions, positions);
-        target.has_moved(true);
-        target.motion = rest.map(|rest| Box::new(RestPose { rest, matrix: None }));
+        target.put_beside(positions, pose);
         Ok(())
     }
 
@@ -258,17 +255,35 @@ impl Scene {
     ) -> Result<(), Error> {
         if let Some(reached) = reached {
             let target = self.moved_body(body)?;
-            let matrix = target.motion.as_ref().and_then(|motion| motion.matrix);
-            self.take_step(body, reached, true)?;
-            if let Some(motion) = &mut self.moved_body(body)?.motion {
-                motion.matrix = matrix;
-            }
+            target.check(body, &reached.into())?;
+            let pose = target.rest_pose();
+            target.put_beside(reached, Some(pose));
         }
         if let Some(end) = end {
             self.set_end_positions(body, end)?;
             self.moved_body(body)?.is_end_transformed = by_transform;
         }
         Ok(())
+    }
+}
+
+impl Body {
+    /// From where transforms start, taken out of the body.
+    fn rest_pose(&mut self) -> RestPose {
+        match self.motion.take() {
+            Some(motion) => *motion,
+            None => RestPose {
+                rest: Arc::new(self.positions.clone()),
+                matrix: None,
+            },
+        }
+    }
+
+    /// Sets checked positions beside a rest pose, or as one.
+    fn put_beside(&mut self, positions: &Positions, pose: Option<RestPose>) {
+        store(&mut self.positions, positions.into());
+        self.has_moved(true);
+        self.motion = pose.map(Box::new);
     }
 }
 
