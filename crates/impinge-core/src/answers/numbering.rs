@@ -26,6 +26,15 @@ impl Numbering {
         self.parts.iter().map(|&(_, part)| part)
     }
 
+    /// The part that has the element with this number, and the first and the last of its numbers.
+    pub fn part_of(&self, number: Number) -> ([Number; 2], NumberedPart) {
+        let ix = owner_by_first(&self.parts, number, |part| part.0);
+        let (first, part) = self.parts[ix];
+        let after = self.parts.get(ix + 1).map(|&(first, _)| first.raw());
+        let last = after.map_or(u32::MAX, |after| after - 1);
+        ([first, Number::new(last)], part)
+    }
+
     pub fn pair(&self, key: u64) -> (Element, Element) {
         self.pair_after(key, &mut [0; 2])
     }

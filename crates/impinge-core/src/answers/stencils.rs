@@ -5,6 +5,7 @@ use std::sync::{Mutex, PoisonError};
 
 use crate::answers::areas::Areas;
 use crate::answers::near::{NearIter, NearPair, NearPairs};
+use crate::answers::numbering::Numbering;
 use crate::answers::pairs::Element;
 use crate::answers::stencil::{Gradient, Hessian, Mollifier, NearestWay};
 use crate::query::pair_kind::PairKind;
@@ -12,11 +13,11 @@ use crate::scene::Scene;
 use crate::scene::by_body::ByBody;
 use crate::scene::elements::{Elements, Part};
 use crate::scene::error::Error;
-use crate::scene::ids::BodyId;
-use crate::scene::index::ElementIx;
+use crate::scene::index::{ElementIx, Number, pair_numbers};
 use crate::scene::positions::Positions;
 use crate::search::sink;
 use crate::workers::in_parts::in_parts;
+use impinge_exact::internal::NearestOfElements;
 use impinge_exact::{Feature, Point};
 
 /// What memory is for.
@@ -306,26 +307,25 @@ impl NearIter<'_> {
         let (n, threads) = (self.len(), self.threads());
         let mut rows = sink::with_capacity(n, WHAT)?;
         let room = &mut rows.spare_capacity_mut()[..n];
-        let renumbered = self.renumbered(scene);
+        let parts = Parts {
+            scene,
+            offsets: &offsets,
+            numbering: self.numbering(),
+        };
         let refused = Mutex::new(None);
         in_parts(room, PART, threads, |first, room| {
             let mut reader = Reader {
-                scene,
-                offsets: &offsets,
-                renumbered: &renumbered,
+                parts,
                 rest,
-                sides: [None; 2],
+                sides: [None, None],
             };
-            for (ix, (to, pair)) in room.iter_mut().zip(self.clone().after(first)).enumerate() {
-                if let Err(error) = reader.read(&pair, to) {
-                    let mut refused = refused.lock().unwrap_or_else(PoisonError::into_inner);
-                    if refused
-                        .as_ref()
-                        .is_none_or(|(other, _)| first + ix < *other)
-                    {
-                        *refused = Some((first + ix, error));
+            let mut room = room.iter_mut().zip(first..);
+            for (kind, keys, nearest) in self.clone().after(first).runs() {
+                // The room may end before the pairs do.
+                for ((&key, &nearest), (to, ix)) in keys.iter().zip(nearest).zip(&mut room) {
+                    if let Err(error) = reader.read(kind, key, nearest, to) {
+                        return first_refused(&refused, ix, error);
                     }
-                    return;
                 }
             }
         });
@@ -359,39 +359,55 @@ fn sides(pair: &NearPair) -> Result<[(Element, Part); 2], Error> {
             Ok([(pair.a, parts[0]), (pair.b, parts[1])])
         }
         PairKind::EdgeVertex => Ok([(pair.b, parts[1]), (pair.a, parts[0])]),
-        PairKind::EdgeFace | PairKind::FaceFace => Err(no_stencil(pair)),
+        PairKind::EdgeFace | PairKind::FaceFace => Err(no_stencil(pair.kind, (pair.a, pair.b))),
     }
 }
 
 #[cold]
-fn no_stencil(pair: &NearPair) -> Error {
+fn no_stencil(kind: PairKind, (a, b): (Element, Element)) -> Error {
     Error::Setting {
         setting: "kinds",
         given: format!(
             "{} (element {} of body {} and {} of body {}; `near` gives no such pairs if its query names the kinds vf and ee)",
-            pair.kind.name(),
-            pair.a.element,
-            pair.a.body,
-            pair.b.element,
-            pair.b.body
+            kind.name(),
+            a.element,
+            a.body,
+            b.element,
+            b.body
         ),
         allowed: "vf, ee, ev or vv",
     }
 }
 
-/// Reads the stencils of pairs. The bodies of one are often those of the next, so they are held.
+/// Holds the error of the first pair that has one.
+#[cold]
+fn first_refused(refused: &Mutex<Option<(usize, Error)>>, ix: usize, error: Error) {
+    let mut refused = refused.lock().unwrap_or_else(PoisonError::into_inner);
+    if refused.as_ref().is_none_or(|(other, _)| ix < *other) {
+        *refused = Some((ix, error));
+    }
+}
+
+/// Reads the stencils of pairs by their keys. The parts of one are often those of the next, so they
+/// are held: to name the elements of a pair and to look these up takes three times as long.
 struct Reader<'a> {
-    scene: &'a Scene,
-    offsets: &'a [u32],
-    renumbered: &'a [(BodyId, Part)],
+    parts: Parts<'a>,
     rest: Option<&'a [Point]>,
     sides: [Option<PartOfBody<'a>>; 2],
 }
 
-/// A part of a body.
+/// The parts of a scene that pairs name.
 #[derive(Clone, Copy)]
+struct Parts<'a> {
+    scene: &'a Scene,
+    offsets: &'a [u32],
+    numbering: &'a Numbering,
+}
+
+/// A part of a body.
 struct PartOfBody<'a> {
-    id: BodyId,
+    /// The first and the last number of its elements.
+    numbers: [Number; 2],
     part: Part,
     elements: &'a Elements,
     positions: &'a Positions,
@@ -399,63 +415,120 @@ struct PartOfBody<'a> {
     offset: u32,
 }
 
-impl<'a> Reader<'a> {
-    /// A part that is seen first.
-    fn side(&self, id: BodyId, part: Part) -> Result<PartOfBody<'a>, Error> {
-        if self.renumbered.contains(&(id, part)) {
+impl<'a> Parts<'a> {
+    /// The part that has the element with this number: the one that is held, or held now.
+    #[inline(always)]
+    fn hold<'b>(
+        self,
+        held: &'b mut Option<PartOfBody<'a>>,
+        number: Number,
+    ) -> Result<&'b PartOfBody<'a>, Error> {
+        if !held.as_ref().is_some_and(|part| part.has(number)) {
+            *held = None;
+        }
+        match held {
+            Some(part) => Ok(part),
+            none => Ok(none.insert(self.find(number)?)),
+        }
+    }
+
+    #[cold]
+    fn find(self, number: Number) -> Result<PartOfBody<'a>, Error> {
+        let (numbers, (id, part, stamp)) = self.numbering.part_of(number);
+        let body = self.scene.body(id)?;
+        if body.numbers_stamp(part) != stamp {
             return Err(Error::Remeshed { body: id });
         }
-        let body = self.scene.body(id)?;
         Ok(PartOfBody {
-            id,
+            numbers,
             part,
             elements: body.part(part),
             positions: body.positions(),
             offset: self.offsets[id.index()],
         })
     }
+}
 
-    /// The stencil of a pair, which stands for itself.
+impl Reader<'_> {
+    /// The stencil of a pair, which stands for itself. Each vertex and point goes from where it is
+    /// to where it belongs: in between, the four would be stored apart and loaded together, for
+    /// which a processor waits.
     #[inline(always)]
-    fn read(&mut self, pair: &NearPair, to: &mut MaybeUninit<Stencil>) -> Result<(), Error> {
-        let mut vertices = [0; 4];
-        let mut points = [[0.0; 3]; 4];
-        let mut n = 0;
-        for (ix, (element, part)) in sides(pair)?.into_iter().enumerate() {
-            let side = match self.sides[ix] {
-                Some(side) if (side.id, side.part) == (element.body, part) => side,
-                _ => *self.sides[ix].insert(self.side(element.body, part)?),
-            };
-            let ix = ElementIx::new(element.element);
-            let corners = match part {
-                // Vertices are numbered as positions are.
-                Part::Vertices => ix.as_corners(),
-                _ => side.elements.corners(ix.index()),
-            };
-            for &corner in corners {
-                vertices[n] = side.offset + corner;
-                points[n] = side.positions.point(corner as usize);
-                n += 1;
+    fn read(
+        &mut self,
+        kind: PairKind,
+        key: u64,
+        nearest: u8,
+        to: &mut MaybeUninit<Stencil>,
+    ) -> Result<(), Error> {
+        let (parts, mut numbers) = (self.parts, pair_numbers(key));
+        // Which corner of which side each vertex is.
+        let slots = match kind {
+            PairKind::VertexFace => [(0, 0), (1, 0), (1, 1), (1, 2)],
+            PairKind::EdgeEdge => [(0, 0), (0, 1), (1, 0), (1, 1)],
+            PairKind::VertexVertex => [(0, 0), (1, 0), (0, 0), (0, 0)],
+            PairKind::EdgeVertex => {
+                // The vertex comes before the edge.
+                numbers.reverse();
+                [(0, 0), (1, 0), (1, 1), (0, 0)]
             }
-        }
-        for ix in n..4 {
-            (vertices[ix], points[ix]) = (vertices[0], points[0]);
-        }
-        let threshold = match (self.rest, pair.kind) {
+            PairKind::EdgeFace | PairKind::FaceFace => {
+                return Err(no_stencil(kind, parts.numbering.pair(key)));
+            }
+        };
+        let [a, b] = &mut self.sides;
+        let (a, b) = (parts.hold(a, numbers[0])?, parts.hold(b, numbers[1])?);
+        let elements = [a.element(numbers[0]), b.element(numbers[1])];
+        let corners = [a.corners(&elements[0]), b.corners(&elements[1])];
+        let corner = |ix: usize| {
+            let (side, ix) = slots[ix];
+            ([a, b][side], corners[side][ix])
+        };
+        let vertex = |ix| {
+            let (of, corner) = corner(ix);
+            of.offset + corner
+        };
+        let point = |ix| {
+            let (of, corner) = corner(ix);
+            of.positions.point(corner as usize)
+        };
+        let vertices = [vertex(0), vertex(1), vertex(2), vertex(3)];
+        let threshold = match (self.rest, kind) {
             (Some(rest), PairKind::EdgeEdge) => {
                 Mollifier::threshold(&vertices.map(|vertex| rest[vertex as usize]))
             }
             _ => 0.0,
         };
         to.write(Stencil {
-            kind: pair.kind,
-            features: pair.features,
+            kind,
+            features: NearestOfElements::unpacked(nearest).features,
             vertices,
             weight: 1.0,
-            points,
+            points: [point(0), point(1), point(2), point(3)],
             threshold,
         });
         Ok(())
+    }
+}
+
+impl PartOfBody<'_> {
+    #[inline(always)]
+    fn has(&self, number: Number) -> bool {
+        self.numbers[0] <= number && number <= self.numbers[1]
+    }
+
+    #[inline(always)]
+    fn element(&self, number: Number) -> ElementIx {
+        number.minus(self.numbers[0])
+    }
+
+    #[inline(always)]
+    fn corners<'b>(&'b self, element: &'b ElementIx) -> &'b [u32] {
+        match self.part {
+            // Vertices are numbered as positions are.
+            Part::Vertices => element.as_corners(),
+            _ => self.elements.corners(element.index()),
+        }
     }
 }
 

@@ -2,6 +2,8 @@
 
 mod labels;
 
+use std::iter;
+
 use crate::answers::changes::Changes;
 use crate::answers::home::{Home, gives_back};
 use crate::answers::numbering::{Numbering, row};
@@ -10,10 +12,7 @@ use crate::plan::Plan;
 use crate::query::pair_kind::PairKind;
 use crate::query::pair_set::PairSet;
 use crate::query::{Exclusion, Query};
-use crate::scene::Scene;
-use crate::scene::elements::Part;
 use crate::scene::error::Error;
-use crate::scene::ids::BodyId;
 use crate::search::found::KeysByKind;
 use crate::search::pair_reader::{PairReader, Side};
 use crate::search::sink::reserve;
@@ -316,11 +315,20 @@ pub struct NearIter<'a> {
     parts: [usize; 2],
 }
 
-impl NearIter<'_> {
-    /// The parts whose elements have other numbers now.
-    pub(crate) fn renumbered(&self, scene: &Scene) -> Vec<(BodyId, Part)> {
-        let parts = self.pairs.numbering.numbered();
-        scene.renumbered(parts).collect()
+impl<'a> NearIter<'a> {
+    /// What the keys of the pairs mean.
+    pub(crate) fn numbering(&self) -> &'a Numbering {
+        &self.pairs.numbering
+    }
+
+    /// The keys of the pairs that are left and their packed features, kind after kind.
+    pub(crate) fn runs(self) -> impl Iterator<Item = (PairKind, &'a [u64], &'a [u8])> {
+        let starts = iter::once(self.ix).chain(iter::repeat(0));
+        self.kinds.iter().zip(starts).map(move |(&kind, start)| {
+            let (keys, nearest) = (&self.pairs.keys, &self.pairs.nearest);
+            let ix = kind as usize;
+            (kind, &keys[ix][start..], &nearest[ix][start..])
+        })
     }
 
     /// How many threads computed the answer.
