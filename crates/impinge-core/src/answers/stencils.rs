@@ -1,6 +1,5 @@
 //! Near pairs as stencils: vertices, coefficients and distances with their derivatives.
 
-use std::mem::MaybeUninit;
 use std::sync::{Mutex, PoisonError};
 
 use crate::answers::areas::Areas;
@@ -16,7 +15,7 @@ use crate::scene::error::Error;
 use crate::scene::index::{ElementIx, Number, pair_numbers};
 use crate::scene::positions::Positions;
 use crate::search::sink;
-use crate::workers::in_parts::in_parts;
+use crate::workers::in_parts::{Room, filled_in_parts};
 use impinge_exact::internal::NearestOfElements;
 use impinge_exact::{Feature, Point};
 
@@ -305,26 +304,27 @@ impl NearIter<'_> {
             }
         }
         let (n, threads) = (self.len(), self.threads());
-        let mut rows = sink::with_capacity(n, WHAT)?;
-        let room = &mut rows.spare_capacity_mut()[..n];
+        let rows = sink::with_capacity(n, WHAT)?;
         let parts = Parts {
             scene,
             offsets: &offsets,
             numbering: self.numbering(),
         };
         let refused = Mutex::new(None);
-        in_parts(room, PART, threads, |first, room| {
+        let rows = filled_in_parts(rows, n, PART, threads, |first, room| {
             let mut reader = Reader {
                 parts,
                 rest,
                 sides: [None, None],
             };
-            let mut room = room.iter_mut().zip(first..);
             for (kind, keys, nearest) in self.clone().after(first).runs() {
-                // The room may end before the pairs do.
-                for ((&key, &nearest), (to, ix)) in keys.iter().zip(nearest).zip(&mut room) {
-                    if let Err(error) = reader.read(kind, key, nearest, to) {
-                        return first_refused(&refused, ix, error);
+                for (&key, &nearest) in keys.iter().zip(nearest).take(room.n_left()) {
+                    if let Err(error) = reader.read(kind, key, nearest, room) {
+                        let mut refused = refused.lock().unwrap_or_else(PoisonError::into_inner);
+                        if refused.as_ref().is_none_or(|(other, _)| first < *other) {
+                            *refused = Some((first, error));
+                        }
+                        return;
                     }
                 }
             }
@@ -332,8 +332,7 @@ impl NearIter<'_> {
         if let Some((_, error)) = refused.into_inner().unwrap_or_else(PoisonError::into_inner) {
             return Err(error);
         }
-        // SAFETY: the room has `n` entries, and each was written, as no pair was refused.
-        unsafe { rows.set_len(n) };
+        let mut rows = rows.unwrap_or_default();
         if let (Some(areas), Some(rest)) = (&mut areas, rest) {
             for (row, pair) in rows.iter_mut().zip(self) {
                 row.weight = areas.weight(scene, &offsets, rest, pair.kind, sides(&pair)?)?;
@@ -376,15 +375,6 @@ fn no_stencil(kind: PairKind, (a, b): (Element, Element)) -> Error {
             b.body
         ),
         allowed: "vf, ee, ev or vv",
-    }
-}
-
-/// Holds the error of the first pair that has one.
-#[cold]
-fn first_refused(refused: &Mutex<Option<(usize, Error)>>, ix: usize, error: Error) {
-    let mut refused = refused.lock().unwrap_or_else(PoisonError::into_inner);
-    if refused.as_ref().is_none_or(|(other, _)| ix < *other) {
-        *refused = Some((ix, error));
     }
 }
 
@@ -459,7 +449,7 @@ impl Reader<'_> {
         kind: PairKind,
         key: u64,
         nearest: u8,
-        to: &mut MaybeUninit<Stencil>,
+        to: &mut Room<'_, Stencil>,
     ) -> Result<(), Error> {
         let (parts, mut numbers) = (self.parts, pair_numbers(key));
         // Which corner of which side each vertex is.
@@ -499,7 +489,7 @@ impl Reader<'_> {
             }
             _ => 0.0,
         };
-        to.write(Stencil {
+        to.put(Stencil {
             kind,
             features: NearestOfElements::unpacked(nearest).features,
             vertices,
@@ -609,16 +599,13 @@ impl Stencils {
         of: impl Fn(&Stencil) -> T + Sync,
     ) -> Result<Vec<T>, Error> {
         let n = self.rows.len();
-        let mut column = sink::with_capacity(n, WHAT)?;
-        let room = &mut column.spare_capacity_mut()[..n];
-        in_parts(room, PART, self.threads, |first, room| {
-            for (to, row) in room.iter_mut().zip(&self.rows[first..]) {
-                to.write(of(row));
+        let column = sink::with_capacity(n, WHAT)?;
+        let column = filled_in_parts(column, n, PART, self.threads, |first, room| {
+            for row in self.rows[first..].iter().take(room.n_left()) {
+                room.put(of(row));
             }
         });
-        // SAFETY: the room has `n` entries, and each was written.
-        unsafe { column.set_len(n) };
-        Ok(column)
+        Ok(column.unwrap_or_default())
     }
 
     /// How many there are.

@@ -2,11 +2,10 @@
 //! [alone](crate::workers::alone). On wasm, which has one thread, that is known to the compiler:
 //! what a pool needs would be a tenth of the module.
 
-use std::mem::MaybeUninit;
-
 use rayon::prelude::*;
 
 use crate::workers::alone::is_alone;
+use crate::workers::in_parts::filled_in_parts;
 
 /// Entries that a thread makes at a time.
 const BLOCK: usize = 4096;
@@ -61,21 +60,11 @@ pub(crate) fn made_from<A: Sync, B: Copy + Send>(
     from: &[A],
     make: impl Fn(usize, &A) -> B + Sync,
 ) -> Vec<B> {
-    let mut made = Vec::with_capacity(from.len());
-    let room = &mut made.spare_capacity_mut()[..from.len()];
-    let fill = |block: usize, room: &mut [MaybeUninit<B>], from: &[A]| {
-        for (ix, (room, from)) in room.iter_mut().zip(from).enumerate() {
-            room.write(make(block * BLOCK + ix, from));
+    let (made, n) = (Vec::with_capacity(from.len()), from.len());
+    let made = filled_in_parts(made, n, BLOCK, 0, |first, room| {
+        for (ix, from) in (first..).zip(&from[first..]).take(room.n_left()) {
+            room.put(make(ix, from));
         }
-    };
-    if is_alone() {
-        fill(0, room, from);
-    } else {
-        let blocks = room.par_chunks_mut(BLOCK).zip(from.par_chunks(BLOCK));
-        let each = blocks.enumerate();
-        each.for_each(|(block, (room, from))| fill(block, room, from));
-    }
-    // SAFETY: the room is as long as `from`, and each of its entries was written.
-    unsafe { made.set_len(from.len()) };
-    made
+    });
+    made.unwrap_or_default()
 }
