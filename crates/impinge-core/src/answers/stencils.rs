@@ -305,7 +305,7 @@ impl NearIter<'_> {
         }
         let (n, threads) = (self.len(), self.threads());
         let rows = sink::with_capacity(n, WHAT)?;
-        let parts = Parts {
+        let parts = PartsOfScene {
             scene,
             offsets: &offsets,
             numbering: self.numbering(),
@@ -381,14 +381,14 @@ fn no_stencil(kind: PairKind, (a, b): (Element, Element)) -> Error {
 /// Reads the stencils of pairs by their keys. The parts of one are often those of the next, so they
 /// are held: to name the elements of a pair and to look these up takes three times as long.
 struct Reader<'a> {
-    parts: Parts<'a>,
+    parts: PartsOfScene<'a>,
     rest: Option<&'a [Point]>,
     sides: [Option<PartOfBody<'a>>; 2],
 }
 
 /// The parts of a scene that pairs name.
 #[derive(Clone, Copy)]
-struct Parts<'a> {
+struct PartsOfScene<'a> {
     scene: &'a Scene,
     offsets: &'a [u32],
     numbering: &'a Numbering,
@@ -405,7 +405,7 @@ struct PartOfBody<'a> {
     offset: u32,
 }
 
-impl<'a> Parts<'a> {
+impl<'a> PartsOfScene<'a> {
     /// The part that has the element with this number: the one that is held, or held now.
     #[inline(always)]
     fn hold<'b>(
