@@ -9,7 +9,7 @@
 use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 
 use impinge_io::AtomicFile;
 
@@ -77,8 +77,9 @@ struct Batch {
 
 impl RowStore {
     /// Opens or creates a folder for the rows of `paths`, the whole list of meshes. Takes the
-    /// batches of process `rank` of `world_size` and reads their existing rows. With `retry`, rows
-    /// of kind `timeout`, `memory` and `crash` count as missing.
+    /// batches of process `rank` of `world_size` and reads their existing rows. The row of a mesh
+    /// whose file was written after it counts as missing; with `retry`, so do rows of kind
+    /// `timeout`, `memory` and `crash`.
     ///
     /// # Errors
     /// A folder that can't be created or read; a file with a line that is not a row, or belongs to
@@ -183,6 +184,11 @@ fn file(folder: &Path, batch: usize) -> PathBuf {
     folder.join(format!("rows-{batch:08}.jsonl"))
 }
 
+/// When a file was written, if the system knows.
+fn modified(path: &Path) -> Option<SystemTime> {
+    fs::metadata(path).and_then(|of| of.modified()).ok()
+}
+
 /// Reads the rows of a batch into their places; some may be missing.
 fn read_batch(
     path: &Path,
@@ -201,6 +207,7 @@ fn read_batch(
             });
         }
     };
+    let written = modified(path);
     let mut ix = 0;
     for (line, held) in (1..).zip(text.lines()) {
         let value = serde_json::from_str(held).ok();
@@ -223,7 +230,10 @@ fn read_batch(
             None => return Err(other("its batch has no such mesh at this place")),
             Some(skipped) => ix += skipped,
         }
-        rows[ix] = Some(row);
+        // Times are counted in steps: what was written in the same step may be later.
+        let is_stale =
+            modified(&meshes[ix]).is_some_and(|mesh| written.is_none_or(|rows| mesh >= rows));
+        rows[ix] = (!is_stale).then_some(row);
         ix += 1;
     }
     Ok(())

@@ -1,27 +1,53 @@
-//! Refuses outputs that are also inputs.
+//! Refuses outputs that are also inputs, or other outputs.
 
+use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 
 use impinge_io::printable;
 
 use crate::error::Error;
 
-/// The input files.
-pub struct Inputs(Vec<(PathBuf, Id)>);
+/// The input files, and the outputs that were checked.
+pub struct Inputs {
+    inputs: Vec<(PathBuf, Id)>,
+    outputs: RefCell<Vec<(String, PathBuf)>>,
+}
 
 impl Inputs {
     pub fn new<'p>(paths: impl IntoIterator<Item = &'p PathBuf>) -> Self {
         let known = |path: &PathBuf| Some((path.clone(), Id::of(path)?));
-        Inputs(paths.into_iter().filter_map(known).collect())
+        Inputs {
+            inputs: paths.into_iter().filter_map(known).collect(),
+            outputs: RefCell::default(),
+        }
+    }
+
+    /// Fails if an output is one of the inputs, or the same file as one that was checked before:
+    /// one of them would be lost.
+    pub fn check(&self, option: &str, output: &Path) -> Result<(), Error> {
+        self.check_frame(option, output)?;
+        // A device takes whatever comes.
+        if output.exists() && Id::of(output).is_none() {
+            return Ok(());
+        }
+        let (real, mut outputs) = (real(output), self.outputs.borrow_mut());
+        if let Some((other, _)) = outputs.iter().find(|(_, path)| *path == real) {
+            return Err(Error::Usage(format!(
+                "{option} {} is also the file of {other}: choose another name",
+                printable(output)
+            )));
+        }
+        outputs.push((option.to_owned(), real));
+        Ok(())
     }
 
     /// Fails if an output is one of the inputs, under any name or link. Outputs contain less than a
     /// mesh file may contain (normals, colours, attributes, groups), and the input would be lost.
-    pub fn check(&self, option: &str, output: &Path) -> Result<(), Error> {
+    pub fn check_frame(&self, option: &str, output: &Path) -> Result<(), Error> {
         let Some(output_id) = Id::of(output) else {
             return Ok(());
         };
-        match self.0.iter().find(|(_, id)| *id == output_id) {
+        match self.inputs.iter().find(|(_, id)| *id == output_id) {
             None => Ok(()),
             Some((input, _)) => Err(Error::Usage(format!(
                 "{option} {} is the input {}, which would be lost: choose another name",
@@ -29,6 +55,19 @@ impl Inputs {
                 printable(input)
             ))),
         }
+    }
+}
+
+/// The file that a name leads to, whether it exists or not.
+fn real(path: &Path) -> PathBuf {
+    let folder = path
+        .parent()
+        .filter(|folder| !folder.as_os_str().is_empty());
+    let folder = folder.unwrap_or(Path::new(".")).canonicalize();
+    match (path.canonicalize(), folder, path.file_name()) {
+        (Ok(real), ..) => real,
+        (_, Ok(folder), Some(name)) => folder.join(name),
+        _ => path.to_owned(),
     }
 }
 

@@ -114,8 +114,7 @@ impl Error {
     }
 
     /// 128 plus the signal's number if a signal ended the program, 2 for bad usage, 3 for
-    /// `--fail-on-hit` and `--fail-on`, 4 if the start of a step already intersects, 0 if the
-    /// reader of standard output has closed it (it has what it wanted), else 1.
+    /// `--fail-on-hit` and `--fail-on`, 4 if the start of a step already intersects, else 1.
     pub fn exit_code(&self) -> u8 {
         match self {
             error if error.is_cancelled() => stop::exit_code().unwrap_or(1),
@@ -124,14 +123,13 @@ impl Error {
             | Error::Detection(impinge::Error::Setting { .. }) => 2,
             Error::Hit | Error::CheckFailed(_) => 3,
             Error::StartIntersects => 4,
-            Error::Output(error) if error.kind() == io::ErrorKind::BrokenPipe => 0,
             _ => 1,
         }
     }
 
     /// Whether nothing is printed on standard error.
     pub fn is_silent(&self) -> bool {
-        matches!(self, Error::Hit | Error::StartIntersects) || self.exit_code() == 0
+        matches!(self, Error::Hit | Error::StartIntersects)
     }
 
     /// The message on one line. Names of files are escaped in it; what a driver says may have

@@ -11,9 +11,30 @@ use crate::error::Error;
 use crate::text::{counted, grouped, hash, shown_bytes};
 use crate::values::RowsFile;
 
-/// Standard output. If the reader closes it, writing is an error, not a panic.
-pub fn out() -> StdoutLock<'static> {
-    stdout().lock()
+/// Standard output. Its reader may close it when it has what it wanted (`| head`): what is written
+/// then goes nowhere. Files are still written, and the exit code is that of the whole answer.
+pub struct Out(StdoutLock<'static>);
+
+/// Standard output.
+pub fn out() -> Out {
+    Out(stdout().lock())
+}
+
+impl Write for Out {
+    fn write(&mut self, text: &[u8]) -> io::Result<usize> {
+        unless_closed(self.0.write(text), text.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        unless_closed(self.0.flush(), ())
+    }
+}
+
+fn unless_closed<T>(done: io::Result<T>, closed: T) -> io::Result<T> {
+    match done {
+        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(closed),
+        done => done,
+    }
 }
 
 /// Prints the text of an answer: on standard error, if its rows have standard output.

@@ -52,8 +52,56 @@ enum Frames {
         start: u64,
         endian: Endian,
     },
-    /// One mesh file per frame, in the folder of the path that named them.
-    Files { files: Vec<PathBuf>, named: PathBuf },
+    /// One mesh file per frame, in the folder of the path that named them, with the faces of the
+    /// first.
+    Files {
+        files: Vec<PathBuf>,
+        named: PathBuf,
+        faces: Faces,
+    },
+}
+
+/// The triangles and tetrahedra of a mesh file; none of a file that has positions alone.
+#[derive(Debug, PartialEq, Eq)]
+struct Faces(Vec<[u32; 3]>, Vec<[u32; 4]>);
+
+impl Faces {
+    /// Whether positions of a file with these faces can be those of a mesh with others.
+    fn are_of(&self, mesh: &Faces) -> bool {
+        let is_empty = |faces: &Faces| faces.0.is_empty() && faces.1.is_empty();
+        self == mesh || is_empty(self) || is_empty(mesh)
+    }
+
+    /// The first place where they differ from those of the mesh.
+    fn mismatch(&self, mesh: &Faces, file: &Path) -> Error {
+        let counts = |of: &Faces| (of.0.len() + of.1.len()) as u64;
+        let file = file.display().to_string();
+        if counts(self) != counts(mesh) {
+            return Error::Mismatch {
+                file,
+                what: "faces of a frame, as the mesh has".to_owned(),
+                expected: counts(mesh),
+                found: counts(self),
+            };
+        }
+        let all = |of: &Faces| -> Vec<Vec<u32>> {
+            let faces = of.0.iter().map(|face| face.to_vec());
+            faces.chain(of.1.iter().map(|cell| cell.to_vec())).collect()
+        };
+        let (own, others) = (all(self), all(mesh));
+        let pairs = own.iter().zip(&others).enumerate();
+        let differing = pairs.clone().find_map(|(face, (own, other))| {
+            let corner = own.iter().zip(other).find(|(own, other)| own != other)?;
+            Some((face, corner))
+        });
+        let (face, (found, expected)) = differing.unwrap_or((0, (&0, &0)));
+        Error::Mismatch {
+            file,
+            what: format!("as the vertex of face {face}, which the mesh has"),
+            expected: u64::from(*expected),
+            found: u64::from(*found),
+        }
+    }
 }
 
 #[derive(Debug)]
@@ -80,8 +128,8 @@ impl Sequence {
     ///   digits compared as numbers.
     ///
     /// Patterns may occur in the file's name, but not in the name of a folder. Numbered files may
-    /// have any mesh format; only their positions are read, and they are never welded (see
-    /// [`Weld`](crate::Weld)).
+    /// have any mesh format; they are never welded (see [`Weld`](crate::Weld)). All have the faces
+    /// of the first, or no faces at all.
     ///
     /// # Errors
     /// As [`read`](crate::read); [`Error::Truncated`] if a cache is shorter than its header says.
@@ -129,16 +177,19 @@ impl Sequence {
         };
         let number = |path: &PathBuf| {
             let name = path.file_name()?.to_str()?;
-            let key = natural_key(name);
             // The last number of the name without its extension, as in `Matcher`.
-            let stem = name.rfind('.').map_or(name, |dot| &name[..dot]);
-            let n_numbers = natural_key(stem).len();
-            key.get(n_numbers - 1).map(|(number, _)| *number)
+            let key = natural_key(name.rsplit_once('.').map_or(name, |(stem, _)| stem));
+            Some((key.len(), key.last()?.0))
         };
-        let numbers: Option<Vec<u128>> = files.iter().map(number).collect();
+        let numbers: Option<Vec<(usize, i128)>> = files.iter().map(number).collect();
         let Some(numbers) = numbers else {
             return Vec::new();
         };
+        if numbers.iter().any(|(length, _)| *length != numbers[0].0) {
+            // Some have fractions of frames.
+            return Vec::new();
+        }
+        let numbers: Vec<i128> = numbers.into_iter().map(|(_, number)| number).collect();
         let steps = || numbers.windows(2).map(|two| two[1].saturating_sub(two[0]));
         let least = steps().min().unwrap_or(1).max(1);
         steps()
@@ -146,6 +197,28 @@ impl Sequence {
             .filter(|(step, _)| *step > least)
             .map(|(_, two)| [two[0].as_path(), two[1].as_path()])
             .collect()
+    }
+
+    /// Whether the frames are those of the mesh in a file: point caches are of any, numbered files
+    /// have its faces, or none.
+    ///
+    /// # Errors
+    /// [`Error::Mismatch`] if the first frame has other faces than the mesh; as
+    /// [`read`](crate::read).
+    pub fn check_faces(&self, mesh: &Path) -> Result<(), Error> {
+        let Frames::Files { files, faces, .. } = &self.frames else {
+            return Ok(());
+        };
+        // Mostly the mesh is the first frame.
+        if files.first().is_some_and(|first| first == mesh) {
+            return Ok(());
+        }
+        let (positions, of_mesh) = read_frame(Input::Named(mesh))?;
+        // Another number of vertices is an error of each frame.
+        if positions.len() != self.n_points || faces.are_of(&of_mesh) {
+            return Ok(());
+        }
+        Err(faces.mismatch(&of_mesh, &files[0]))
     }
 
     /// How many vertices each frame has.
@@ -158,7 +231,7 @@ impl Sequence {
     ///
     /// # Errors
     /// [`Error::Mismatch`] if there is no such frame, or a numbered file has another number of
-    /// vertices; [`Error::NotFinite`]; as [`read`](crate::read) for numbered files.
+    /// vertices or other faces; [`Error::NotFinite`]; as [`read`](crate::read) for numbered files.
     pub fn frame(&self, frame_ix: usize) -> Result<Positions, Error> {
         let mismatch = |file: &str, what: &str, expected: usize, found: usize| Error::Mismatch {
             file: file.to_owned(),
@@ -180,12 +253,13 @@ impl Sequence {
                 start,
                 endian,
             } => self.cached_frame(source, *start, *endian, frame_ix),
-            Frames::Files { files, named } => {
+            Frames::Files {
+                files,
+                named,
+                faces,
+            } => {
                 let path = &files[frame_ix];
-                let positions =
-                    collect(input(path, named), &ReadOptions::as_they_are(), |parts| {
-                        Ok(parts.positions)
-                    })?;
+                let (positions, own) = read_frame(input(path, named))?;
                 if positions.len() != self.n_points {
                     return Err(mismatch(
                         &path.display().to_string(),
@@ -193,6 +267,9 @@ impl Sequence {
                         self.n_points,
                         positions.len(),
                     ));
+                }
+                if !own.are_of(faces) {
+                    return Err(own.mismatch(faces, path));
                 }
                 Ok(positions)
             }
@@ -268,9 +345,8 @@ impl Sequence {
     fn open_files(path: &Path) -> Result<Self, Error> {
         let files = numbered_files(path)?;
         let first = input(&files[0], path);
-        let n_points = collect(first, &ReadOptions::as_they_are(), |parts| {
-            Ok(parts.positions.len())
-        })?;
+        let (positions, faces) = read_frame(first)?;
+        let n_points = positions.len();
         Ok(Sequence {
             name: path.display().to_string(),
             n_frames: files.len(),
@@ -278,9 +354,17 @@ impl Sequence {
             frames: Frames::Files {
                 files,
                 named: path.to_owned(),
+                faces,
             },
         })
     }
+}
+
+/// The positions and faces of a mesh file, as they are.
+fn read_frame(file: Input) -> Result<(Positions, Faces), Error> {
+    collect(file, &ReadOptions::as_they_are(), |parts| {
+        Ok((parts.positions, Faces(parts.triangles, parts.tetrahedra)))
+    })
 }
 
 impl Header {
@@ -388,12 +472,14 @@ fn numbered_files(path: &Path) -> Result<Vec<PathBuf>, Error> {
 /// Decides which file names belong to a sequence.
 #[derive(Debug)]
 enum Matcher<'p> {
-    /// A number from `least` on, of at least `width` digits, between two texts.
+    /// A number from `least` on between two texts. Zeros fill its digits up to one of two widths:
+    /// some count a minus, others do not.
     Number {
         prefix: &'p str,
         suffix: &'p str,
-        width: usize,
-        least: u128,
+        widths: [usize; 2],
+        negative_widths: [usize; 2],
+        least: i128,
     },
     Glob(&'p str),
 }
@@ -410,8 +496,9 @@ impl<'p> Matcher<'p> {
             return Some(Matcher::Number {
                 prefix,
                 suffix,
-                width,
-                least: 0,
+                widths: [width; 2],
+                negative_widths: [width, width.saturating_sub(1)],
+                least: i128::MIN,
             });
         }
         if pattern.contains(['*', '?']) {
@@ -426,37 +513,47 @@ impl<'p> Matcher<'p> {
                 // The character before the digits may take several bytes.
                 before + stem[before..].chars().next().map_or(1, char::len_utf8)
             });
-        let least = stem[start..end].parse().ok()?;
+        let width = end - start;
+        let before = stem[..start].strip_suffix('-');
+        let is_negative = before.is_some_and(|before| !before.ends_with(char::is_alphanumeric));
+        let start = start - usize::from(is_negative);
         Some(Matcher::Number {
             prefix: &pattern[..start],
             suffix: &pattern[end..],
-            width: end - start,
-            least,
+            widths: [width, width + usize::from(is_negative)],
+            negative_widths: [width; 2],
+            least: stem[start..end].parse().ok()?,
         })
     }
 
     /// The sort key of a file name; `None` if it does not belong to the sequence.
-    fn key(&self, candidate: &str) -> Option<Vec<(u128, String)>> {
+    fn key(&self, candidate: &str) -> Option<Vec<(i128, String)>> {
         match *self {
             Matcher::Number {
                 prefix,
                 suffix,
-                width,
+                widths,
+                negative_widths,
                 least,
             } => {
-                let digits = candidate.strip_prefix(prefix)?.strip_suffix(suffix)?;
+                let number = candidate.strip_prefix(prefix)?.strip_suffix(suffix)?;
+                let (digits, widths) = match number.strip_prefix('-') {
+                    Some(digits) => (digits, negative_widths),
+                    None => (number, widths),
+                };
                 let is_number = !digits.is_empty() && digits.bytes().all(|b| b.is_ascii_digit());
                 // Zeros only fill up to the width: 7 and 07 never belong to one sequence.
-                let is_padded =
-                    digits.len() == width || (digits.len() > width && !digits.starts_with('0'));
-                let number = digits
+                let is_padded = widths.into_iter().any(|width| {
+                    digits.len() == width || (digits.len() > width && !digits.starts_with('0'))
+                });
+                let number = number
                     .parse()
                     .ok()
                     .filter(|&number| is_number && is_padded && number >= least)?;
                 Some(vec![(number, String::new())])
             }
             Matcher::Glob(pattern) => {
-                matches_glob(pattern, candidate).then(|| natural_key(candidate))
+                matches_glob(pattern, candidate).then(|| key_of_file(candidate))
             }
         }
     }
@@ -491,23 +588,38 @@ fn matches_glob(pattern: &str, name: &str) -> bool {
     pattern[p..].iter().all(|&c| c == '*')
 }
 
-/// Splits a name into texts and numbers, so that 9 comes before 10; each entry is a number and the
-/// text after it.
-fn natural_key(name: &str) -> Vec<(u128, String)> {
+/// The key of a file's name: that of the name without its extension, so that frame 1001 comes
+/// before 1001.50, and then the extension.
+fn key_of_file(name: &str) -> Vec<(i128, String)> {
+    let (stem, extension) = name.rsplit_once('.').unwrap_or((name, ""));
+    let mut key = natural_key(stem);
+    // Less than any text that goes on.
+    key.push((i128::MIN, extension.to_owned()));
+    key
+}
+
+/// Splits a name into texts and numbers, so that 9 comes before 10, and -2 before -1; each entry is
+/// a number and the text after it. A minus is that of a number where no letter or digit comes
+/// before it.
+fn natural_key(name: &str) -> Vec<(i128, String)> {
+    let is_digit = |c: &char| c.is_ascii_digit();
     let mut key = vec![(0, String::new())];
-    let mut digits = String::new();
-    for c in name.chars().chain(['\0']) {
-        if c.is_ascii_digit() {
-            digits.push(c);
-            continue;
+    let (mut rest, mut before) = (name, None);
+    while let Some(first) = rest.chars().next() {
+        let signed = rest.strip_prefix('-');
+        let digits = signed.filter(|_| !before.is_some_and(char::is_alphanumeric));
+        let digits = digits.unwrap_or(rest);
+        let n_digits = digits.chars().take_while(is_digit).count();
+        let length = match n_digits {
+            0 => first.len_utf8(),
+            n => rest.len() - digits.len() + n,
+        };
+        let (own, after) = rest.split_at(length);
+        match key.last_mut() {
+            Some((_, text)) if n_digits == 0 => text.push(first),
+            _ => key.push((own.parse().unwrap_or(i128::MAX), String::new())),
         }
-        if !digits.is_empty() {
-            key.push((digits.parse().unwrap_or(u128::MAX), String::new()));
-            digits.clear();
-        }
-        if let Some((_, text)) = key.last_mut() {
-            text.push(c);
-        }
+        (rest, before) = (after, own.chars().next_back());
     }
     key
 }
@@ -555,8 +667,43 @@ mod tests {
         ] {
             assert_eq!(matches_glob(pattern, name), is_match, "{pattern} {name}");
         }
-        let mut names = ["f10.ply", "f9.ply", "f1b.ply", "f1.ply"];
-        names.sort_by_key(|name| natural_key(name));
-        assert_eq!(names, ["f1.ply", "f1b.ply", "f9.ply", "f10.ply"]);
+        for sorted in [
+            &["f1.ply", "f1b.ply", "f9.ply", "f10.ply"][..],
+            &["f_-10.ply", "f_-9.ply", "f_0.ply", "f_9.ply"],
+            &["-2.ply", "-1.ply", "0.ply", "1.ply"],
+            &["f.-2.ply", "f.1.ply"],
+            // Here it only parts the number from the name, or two numbers.
+            &["f-1.ply", "f-2.ply"],
+            &["1-1.ply", "1-2.ply"],
+            &["s.1001.obj", "s.1001.25.obj", "s.1001.50.obj", "s.1002.obj"],
+        ] {
+            let mut names = sorted.to_vec();
+            names.reverse();
+            names.sort_by_key(|name| key_of_file(name));
+            assert_eq!(names, sorted);
+        }
+        let printf = Matcher::new("a_%04d.b").unwrap();
+        for (name, is_match) in [
+            ("a_-0002.b", true),
+            ("a_-002.b", true),
+            ("a_-02.b", false),
+            ("a_--002.b", false),
+            ("a_-.b", false),
+        ] {
+            assert_eq!(printf.key(name).is_some(), is_match, "{name}");
+        }
+        for (first, name, is_match) in [
+            ("a_-02.b", "a_-01.b", true),
+            ("a_-02.b", "a_000.b", true),
+            ("a_-02.b", "a_00.b", true),
+            ("a_-02.b", "a_-03.b", false),
+            ("a_02.b", "a_-03.b", false),
+            // A line between a name and a number is no minus.
+            ("a-02.b", "a-03.b", true),
+            ("a-02.b", "a-01.b", false),
+        ] {
+            let matcher = Matcher::new(first).unwrap();
+            assert_eq!(matcher.key(name).is_some(), is_match, "{first} {name}");
+        }
     }
 }

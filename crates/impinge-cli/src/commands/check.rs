@@ -9,7 +9,7 @@ mod rows;
 mod shown;
 
 use std::collections::BTreeMap;
-use std::io::{BufRead, Write, stdin, stdout};
+use std::io::{BufRead, ErrorKind, Write, stdin, stdout};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
@@ -35,9 +35,20 @@ pub fn check(args: &CheckArgs, cancel: &CancelToken) -> Result<(), Error> {
     }
     assembly::refuse_alone(args)?;
     let paths = paths(args)?;
+    let inputs = Inputs::new(paths.iter().chain(&args.list));
     if let Some(file) = &args.rows {
         rows::refuse(file)?;
-        Inputs::new(paths.iter().chain(&args.list)).check("--rows", &file.path)?;
+        inputs.check("--rows", &file.path)?;
+    }
+    let mesh = match &args.out {
+        Some(args::Out::Mesh(file)) => Some(("--out", file.path.as_path())),
+        _ => None,
+    };
+    let summary = args.summary.as_deref().map(|path| ("--summary", path));
+    let html = args.html.as_ref().map(|file| ("--html", file.0.as_path()));
+    let png = args.png.as_ref().map(|file| ("--png", file.0.as_path()));
+    for (option, path) in [mesh, summary, html, png].into_iter().flatten() {
+        inputs.check(option, path)?;
     }
     if args.keep_seams && matches!(args.out, Some(args::Out::Folder(_))) {
         // Rows do not say by which of the two rules an unwelded mesh was checked.
@@ -150,7 +161,11 @@ pub fn check_worker(args: &CheckWorkerArgs) -> Result<(), Error> {
         marks: args.marks,
         threads: args.threads,
     };
-    Ok(serve(stdin().lock(), stdout().lock(), &options)?)
+    match serve(stdin().lock(), stdout().lock(), &options) {
+        // The process that asked is gone, and nobody waits for the rows.
+        Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(()),
+        served => Ok(served?),
+    }
 }
 
 /// The meshes of the command line and of the list.

@@ -42,6 +42,7 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
     let mut bodies = Bodies::default();
     let (moving, weld) = bodies.add(&args.mesh, loading)?;
     let mut frames = Frames::open(&args.sequence, weld, args.ask.json)?;
+    frames.sequence.check_faces(&args.mesh)?;
     for other in &args.others {
         bodies.add(other, loading)?;
     }
@@ -83,6 +84,11 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
     let prints = !args.ask.json && !file.as_ref().is_some_and(RowsFile::is_stdout);
     let watch = Watch::frames(!args.detector.no_progress, range.len(), true);
     if args.ccd {
+        if range.len() < 2 {
+            // As a check of nothing.
+            let text = "--ccd: a step is from one frame to the next, and there is one frame";
+            return Err(Error::Usage(text.to_owned()));
+        }
         let in_f64 = args.step.precision == Precision::F64;
         let columns = rows::of_frames(&impact_columns(in_f64));
         let create = |file| Rows::create(file, columns, None);
@@ -197,12 +203,12 @@ impl<'a> Outputs<'a> {
         }
         if let Some(files) = &self.args.out {
             let file = files.frame(frame_ix).map_err(Error::Usage)?;
-            self.inputs.check("--out", &file.path)?;
+            self.inputs.check_frame("--out", &file.path)?;
             meshes::write(&file, scene, bodies, pairs)?;
         }
         if let (Some(files), Some(drawer)) = (&self.args.png, &mut self.drawer) {
             let file = files.frame(frame_ix).map_err(Error::Usage)?;
-            self.inputs.check("--png", &file.0)?;
+            self.inputs.check_frame("--png", &file.0)?;
             drawer.write(&file.0, scene, bodies, pairs)?;
         }
         Ok(())
@@ -216,6 +222,8 @@ impl<'a> Outputs<'a> {
 /// The frames of the sequence, welded like the mesh.
 pub(super) struct Frames {
     sequence: Sequence,
+    /// Frames before which others are missing.
+    after_gaps: Vec<usize>,
     weld: Option<Weld>,
     name: String,
     /// Whether frames that are passed over get a line of JSON.
@@ -226,7 +234,9 @@ pub(super) struct Frames {
 impl Frames {
     pub(super) fn open(path: &Path, weld: Option<Weld>, json: bool) -> Result<Self, Error> {
         let sequence = Sequence::open(path)?;
+        let mut after_gaps = Vec::new();
         for [before, after] in sequence.gaps() {
+            after_gaps.extend(sequence.files().iter().position(|file| file == after));
             // A note that nobody can read does no harm.
             let _ = writeln!(
                 stderr(),
@@ -237,6 +247,7 @@ impl Frames {
         }
         Ok(Frames {
             sequence,
+            after_gaps,
             weld,
             name: path.display().to_string(),
             json,
@@ -316,6 +327,12 @@ impl step::Frames for Frames {
             what: format!("{}: frame {frame_ix}", self.name),
             source,
         }
+    }
+
+    fn follows(&mut self, frame_ix: usize) -> bool {
+        let is_after_gap = self.after_gaps.contains(&frame_ix);
+        self.n_passed_over += u64::from(is_after_gap);
+        !is_after_gap
     }
 
     fn pass_over(&mut self, frame_ix: usize, error: Error) -> Result<(), Error> {

@@ -223,7 +223,7 @@ fn ranks_make_the_rows_of_one_process_and_a_run_goes_on() {
     }
     assert_eq!(all, one);
     // Existing rows are not made again: this mesh would have another row now.
-    folder.text("open.obj", CLOSED);
+    folder.old_text("open.obj", CLOSED);
     assert_eq!(failed(folder.run(args), 2, 5), one);
     let first_two: String = one
         .lines()
@@ -706,7 +706,7 @@ fn pictures_need_no_other_check_and_keep_its_limits() {
         soup += &format!("v {x} {y} -1\nv {} {} -1\nv 0 0 1\n", -x, -y);
         soup += &format!("f {} {} {}\n", 3 * ix + 1, 3 * ix + 2, 3 * ix + 3);
     }
-    folder.text("pierced.obj", &soup);
+    folder.old_text("pierced.obj", &soup);
     let args = ["--out", "rows", "--timeout", "1", "--html", "late.html"];
     let mut child = folder
         .command([&["check"][..], &args, &names].concat())
@@ -726,9 +726,60 @@ fn pictures_need_no_other_check_and_keep_its_limits() {
     assert_eq!(late.matches("<img ").count(), 1);
     assert_eq!(late.matches("no picture: ").count(), 1);
     // What a file shows is what its row says, or nothing.
-    folder.text("pierced.obj", CLOSED);
+    folder.old_text("pierced.obj", CLOSED);
     let changed = html("changed.html", &["--out", "rows"]);
     assert_eq!(changed, late);
+}
+
+#[test]
+fn a_mesh_that_was_written_after_its_row_is_checked_again() {
+    let folder = meshes();
+    let kept = ["check", "--out", "rows", "--json", "a.obj", "closed.obj"];
+    let n_self = |text: String| -> Vec<Value> {
+        let rows = text.lines().map(|line| serde_json::from_str(line).unwrap());
+        rows.map(|row: Value| row["self_intersections"].clone())
+            .collect()
+    };
+    folder.text("a.obj", CLOSED);
+    assert_eq!(n_self(folder.run(kept).printed()), [0, 0]);
+    std::fs::copy(folder.path("pierced.obj"), folder.path("a.obj")).unwrap();
+    let found = n_self(folder.run(kept).printed());
+    assert_eq!(
+        found,
+        n_self(
+            folder
+                .run(["check", "--json", "pierced.obj", "closed.obj"])
+                .printed()
+        )
+    );
+    assert_ne!(found[0], 0);
+}
+
+#[test]
+fn no_output_of_check_is_an_input_or_another_output() {
+    let folder = meshes();
+    let text = read(&folder, "closed.obj");
+    folder.text("list.txt", "closed.obj\n");
+    for (args, said) in [
+        (
+            &["closed.obj", "--summary", "closed.obj"][..],
+            "is the input closed.obj",
+        ),
+        (
+            &["--list", "list.txt", "--summary", "list.txt"],
+            "is the input list.txt",
+        ),
+        (
+            &["closed.obj", "--rows", "q.csv", "--summary", "./q.csv"],
+            "is also the file of --rows",
+        ),
+    ] {
+        let said_here = folder.run([&["check"][..], args].concat()).misuse();
+        assert!(said_here.contains(said), "{said_here}");
+    }
+    assert_eq!(read(&folder, "closed.obj"), text);
+    assert_eq!(read(&folder, "list.txt"), "closed.obj\n");
+    assert!(!folder.path("q.csv").exists());
 }
 
 /// The bytes of a base64 text.

@@ -1,8 +1,10 @@
 //! Runs the binary, and makes files for it.
 
 use std::ffi::OsStr;
+use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
+use std::time::UNIX_EPOCH;
 
 use impinge::{Detector, Elements, Method, Query, Scene, Settings};
 use impinge_io::{ColoredMesh, Positions, write_ply};
@@ -111,6 +113,14 @@ impl Folder {
     }
 
     /// Writes triangles as a binary PLY file with exactly these f32 coordinates.
+    /// The same, with a time that does not tell that it was written now.
+    pub fn old_text(&self, name: &str, text: &str) {
+        self.text(name, text);
+        let mut options = File::options();
+        let file = options.append(true).open(self.path(name));
+        file.unwrap().set_modified(UNIX_EPOCH).unwrap();
+    }
+
     pub fn ply(&self, name: &str, model: &Model) {
         let Elements::Triangles(faces) = &model.elements else {
             panic!("PLY is for triangles");

@@ -296,6 +296,65 @@ fn a_missing_frame_is_named() {
         "note: no frame between run_002.ply and run_005.ply\n"
     );
     assert!(run.printed().contains("4 frames"));
+    // Nobody knows how the mesh moved in between, so there is no step.
+    let run = folder.run(["sequence", "ball.ply", "run_%03d.ply", "--ccd", "--json"]);
+    assert_eq!(run.code, Some(1));
+    assert!(
+        run.stderr
+            .contains("1 frame of run_%03d.ply not asked about"),
+        "{}",
+        run.stderr
+    );
+    let steps: Vec<Value> = lines(&run.stdout)
+        .iter()
+        .map(|line| line["file"].clone())
+        .collect();
+    assert_eq!(steps, ["run_000.ply", "run_001.ply"]);
+}
+
+#[test]
+fn one_frame_is_no_step() {
+    let folder = Folder::new();
+    write(&folder, 6);
+    let args = [
+        "sequence", "ball.ply", "run.pc2", "--ccd", "--frames", "3..4",
+    ];
+    assert!(folder.run(args).misuse().contains("there is one frame"));
+}
+
+/// Positions of another mesh, or of the same with other numbers, are no frame of this one.
+#[test]
+fn frames_have_the_faces_of_the_mesh() {
+    let folder = Folder::new();
+    let corners = "v 0 0 0\nv 4 0 0\nv 0 4 0\nv 1 1 -1\nv 1 1 1\nv 9 9 9\nv 9 8 9\nv 8 9 9\n";
+    let (apart, crossing) = ("f 1 2 3\nf 6 7 8\n", "f 1 2 3\nf 4 5 6\n");
+    folder.text("x_0.obj", &format!("{corners}{apart}"));
+    folder.text("x_1.obj", &format!("{corners}{crossing}"));
+    folder.text("x_2.obj", &format!("{corners}{apart}"));
+    let run = folder.run(["sequence", "x_0.obj", "x_0.obj", "--rows", "-"]);
+    assert_eq!(run.code, Some(1));
+    let said = "x_1.obj: 3 as the vertex of face 1, which the mesh has: 5";
+    assert!(
+        run.stderr.contains("frame 1 is passed over: "),
+        "{}",
+        run.stderr
+    );
+    assert!(run.stderr.contains("face 1"), "{said}: {}", run.stderr);
+    // The mesh and the frames.
+    folder.text("y_0.obj", &format!("{corners}{crossing}"));
+    let error = folder.run(["sequence", "x_0.obj", "y_0.obj"]).error();
+    assert!(
+        error.contains("y_0.obj") && error.contains("face 1"),
+        "{error}"
+    );
+    // Files of positions alone are frames of any mesh.
+    folder.text("z_0.obj", corners);
+    assert_eq!(
+        folder
+            .run(["sequence", "x_0.obj", "z_0.obj", "--fail-on-hit"])
+            .code,
+        Some(0)
+    );
 }
 
 #[test]
@@ -406,7 +465,7 @@ fn frames_that_cannot_be_read_are_passed_over() {
 #[test]
 fn frames_of_numbered_files_name_their_files() {
     let folder = Folder::new();
-    for number in [1001, 1002, 1005] {
+    for number in [1001, 1002, 1003] {
         folder.ply(&format!("f_{number}.ply"), &ball(320));
     }
     for more in [&[][..], &["--ccd"]] {
@@ -418,7 +477,7 @@ fn frames_of_numbered_files_name_their_files() {
         let named: Vec<Value> = lines
             .map(|line: Value| json!([line["frame"], line["file"]]))
             .collect();
-        let files = ["f_1001.ply", "f_1002.ply", "f_1005.ply"];
+        let files = ["f_1001.ply", "f_1002.ply", "f_1003.ply"];
         let expected = (0..named.len()).map(|ix| json!([ix, files[ix]]));
         assert!(
             named.len() >= 2 && named.iter().cloned().eq(expected),

@@ -281,6 +281,39 @@ fn a_budget_that_is_too_small_is_refused() {
 }
 
 #[test]
+fn two_outputs_are_two_files() {
+    let folder = Folder::new();
+    folder.ply("a.ply", &ball(200));
+    for args in [
+        &[
+            "pairs",
+            "a.ply",
+            "a.ply",
+            "--rows",
+            "x.csv",
+            "--regions",
+            "x.csv",
+        ][..],
+        &[
+            "pairs", "a.ply", "a.ply", "--curves", "c.ply", "--out", "./c.ply",
+        ],
+        &[
+            "step",
+            "a.ply",
+            "a.ply",
+            "a.ply",
+            "a.ply",
+            "--advance",
+            "z.ply",
+            "z.ply",
+        ],
+    ] {
+        let said = folder.run(args).misuse();
+        assert!(said.contains("is also the file of --"), "{said}");
+    }
+}
+
+#[test]
 fn closed_pipes_are_no_panic() {
     let folder = Folder::new();
     folder.ply("a.ply", &ball(200));
@@ -294,6 +327,45 @@ fn closed_pipes_are_no_panic() {
         let output = folder.command(args).stdout(writer).output().unwrap();
         assert_eq!(String::from_utf8(output.stderr).unwrap(), "", "{args:?}");
         assert_eq!(output.status.code(), Some(0), "{args:?}");
+    }
+    // Nobody reads the text, but the file and the exit code are those of the whole answer.
+    folder.ply("b.ply", &ball(200));
+    for args in [
+        &[
+            "pairs",
+            "a.ply",
+            "b.ply",
+            "--fail-on-hit",
+            "--rows",
+            "o.csv",
+        ][..],
+        &[
+            "near",
+            "a.ply",
+            "b.ply",
+            "--distance",
+            "1",
+            "--fail-on-hit",
+            "--rows",
+            "o.csv",
+        ],
+        &[
+            "sequence",
+            "a.ply",
+            "n_1.ply",
+            "--other",
+            "b.ply",
+            "--fail-on-hit",
+            "--rows",
+            "o.csv",
+        ],
+    ] {
+        folder.ply("n_1.ply", &ball(200));
+        let (reader, writer) = std::io::pipe().unwrap();
+        drop(reader);
+        let output = folder.command(args).stdout(writer).output().unwrap();
+        assert_eq!(output.status.code(), Some(3), "{args:?}");
+        std::fs::remove_file(folder.path("o.csv")).expect("rows");
     }
     // Standard error may be closed as well: the exit code is still right.
     let (reader, writer) = std::io::pipe().unwrap();

@@ -48,6 +48,9 @@ pub trait Frames {
     fn read(&self, frame_ix: usize) -> Result<Positions, Error>;
     /// The error for a frame that the library refuses.
     fn refused(&self, frame_ix: usize, source: impinge::Error) -> Error;
+    /// Whether a frame is the one after the frame before it. If some are missing between, there is
+    /// no step: nobody knows how the mesh moved.
+    fn follows(&mut self, frame_ix: usize) -> bool;
     /// Takes note of a frame that was not read or is refused.
     ///
     /// # Errors
@@ -96,7 +99,8 @@ pub fn steps_of_sequence(
     let mut steps = Steps::default();
     let mut before = false;
     for end_ix in range {
-        let is_first = !std::mem::replace(&mut before, false);
+        let has_before = std::mem::replace(&mut before, false);
+        let is_first = !(has_before && frames.follows(end_ix));
         let end = frames.take(end_ix, |end| match is_first {
             true => set_positions(scene, moving, end),
             false => set_end_positions(scene, moving, end),
