@@ -209,7 +209,7 @@ impl Plan {
             _ if ask.start == Start::Verify => refuse(
                 "start",
                 "verify",
-                "report or skip: no tile sees all of the start; whether it intersects, a plan of the starts without step says",
+                "report or skip (no tile sees all of the start; a plan of the starts without step says whether it intersects)",
             ),
             false if ask.start == Start::Skip => {
                 refuse("start", "skip", "only report without a step")

@@ -15,7 +15,7 @@ use super::step::impact_row;
 use crate::error::Error;
 use crate::json;
 use crate::output::out;
-use crate::text::{counted, grouped};
+use crate::text::{counted, grouped, several};
 use crate::watch::Watch;
 
 /// `impinge tiles`.
@@ -74,14 +74,10 @@ fn plan(args: &PlanArgs, cancel: &CancelToken) -> Result<(), Error> {
     let text = format!(
         "{} of {} in {}; {} to scatter",
         counted(n, "primitive"),
-        counted(
-            plan.files().len() as u64,
-            if plan.is_step() {
-                "moving body"
-            } else {
-                "file"
-            }
-        ),
+        match (plan.files().len() as u64, plan.is_step()) {
+            (n, true) => several(n, "moving body", "moving bodies"),
+            (n, false) => counted(n, "file"),
+        },
         counted(u64::from(plan.n_tiles()), "tile"),
         counted(plan.n_units() as u64, "unit"),
     );
@@ -233,8 +229,14 @@ fn merge(args: &MergeArgs) -> Result<(), Error> {
             grouped(step.touching_at_start),
         );
     }
+    let start = match plan.is_step() {
+        true => {
+            "\nwhether the start intersects was not asked: a plan of the starts without --step says it"
+        }
+        false => "",
+    };
     let text = format!(
-        "{found}, hash {} ({}, {}); rows in {}",
+        "{found}, hash {} ({}, {}); rows in {}{start}",
         hex(merged.hash),
         merged.asked,
         match plan.welds() {
@@ -253,6 +255,7 @@ fn of_step(step: &MergedStep) -> Value {
         .map(|(kind, row, toi)| impact_row(kind, row, toi));
     json!({
         "free": earliest.is_none(),
+        "start_intersects": Value::Null,
         "earliest": earliest,
         "kinds": json::kinds(step.kinds),
         "touching_at_start": step.touching_at_start,

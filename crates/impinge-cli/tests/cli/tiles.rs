@@ -130,6 +130,10 @@ fn a_step_gives_the_impacts_of_the_whole() {
         text.contains(" vf, ") && text.contains("touching at the start"),
         "{text}"
     );
+    assert!(
+        text.contains("whether the start intersects was not asked"),
+        "{text}"
+    );
     let merged = folder.run(["tiles", "merge", "big", "--json"]).json();
     assert_eq!(
         (&merged["pairs"], &merged["hash"]),
@@ -140,6 +144,7 @@ fn a_step_gives_the_impacts_of_the_whole() {
     for (path, file) in named.iter().zip(&files) {
         assert!(path.as_str().unwrap().ends_with(file), "{path}, {file}");
     }
+    assert_eq!(merged["step"]["start_intersects"], Value::Null);
     for key in ["free", "earliest", "touching_at_start"] {
         assert_eq!(merged["step"][key], expected[key], "{key}");
     }
