@@ -379,7 +379,7 @@ pub const NAME_OF_STDIN: &str = "standard input";
 /// The format of standard input, which has no ending.
 pub fn format_of_stdin(format: Option<Format>) -> Result<Format, Error> {
     format.ok_or_else(|| {
-        let text = "a mesh from standard input needs its format, such as --format ply";
+        let text = "a mesh from standard input needs its format, such as --format ply (`distance` and `step` read files alone)";
         Error::Usage(text.to_owned())
     })
 }
