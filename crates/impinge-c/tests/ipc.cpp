@@ -6,6 +6,7 @@
 #include <ipc/candidates/candidates.hpp>
 #include <ipc/ccd/tight_inclusion_ccd.hpp>
 
+#include <limits>
 #include <set>
 
 namespace {
@@ -131,6 +132,42 @@ void steps(const ::ipc::CollisionMesh &mesh, const model &of) {
   CHECK(!impinge::ipc::has_intersections(mesh, reached) && impinge::ipc::has_intersections(mesh, of.end));
 }
 
+template <class Call> bool refuses(Call call) {
+  try {
+    call();
+  } catch (const impinge::error &) {
+    return true;
+  }
+  return false;
+}
+
+template <class Candidate, class Detect> std::size_t count(Detect detect) {
+  std::vector<Candidate> found;
+  detect(found);
+  return found.size();
+}
+std::size_t n_ee(const ::ipc::BroadPhase &of) {
+  return count<::ipc::EdgeEdgeCandidate>([&](auto &found) { of.detect_edge_edge_candidates(found); });
+}
+std::size_t n_fv(const ::ipc::BroadPhase &of) {
+  return count<::ipc::FaceVertexCandidate>([&](auto &found) { of.detect_face_vertex_candidates(found); });
+}
+std::size_t n_ev(const ::ipc::BroadPhase &of) {
+  return count<::ipc::EdgeVertexCandidate>([&](auto &found) { of.detect_edge_vertex_candidates(found); });
+}
+
+// What ipc-toolkit's functions do not ask in this way, but a solver may ask a broad phase.
+void asked_alone(impinge::ipc::mode mode, const model &of) {
+  impinge::ipc::BroadPhase ours(mode);
+  // After positions that are refused it has found nothing.
+  Eigen::MatrixXd bad = of.start;
+  bad(5, 1) = std::numeric_limits<double>::quiet_NaN();
+  ours.build(of.start, of.edges, of.faces, 0.05);
+  CHECK(n_ee(ours) > 0);
+  CHECK(refuses([&] { ours.build(bad, of.edges, of.faces, 0.05); }) && n_ee(ours) == 0);
+  CHECK(refuses([&] { ours.build(of.start, bad, of.edges, of.faces, 0.05); }) && n_ee(ours) == 0);
+}
+
 } // namespace
 
 int main() {
@@ -152,5 +189,7 @@ int main() {
   } catch (const std::runtime_error &error) {
     CHECK(strcmp(error.what(), "from a filter") == 0);
   }
+  asked_alone(impinge::ipc::mode::boxes, of);
+  asked_alone(impinge::ipc::mode::exact, of);
   return finish("ipc");
 }

@@ -309,28 +309,31 @@ public:
   void build(Eigen::ConstRef<Eigen::MatrixXd> vertices, Eigen::ConstRef<Eigen::MatrixXi> edges, Eigen::ConstRef<Eigen::MatrixXi> faces,
              const double inflation_radius = 0) override {
     if (vertices.cols() == 2) return flat_with([&](::ipc::BroadPhase &flat) { flat.build(vertices, edges, faces, inflation_radius); });
-    start(vertices.rows(), edges, faces, inflation_radius);
-    bodies_->place(vertices);
+    auto &of = start(vertices.rows(), edges, faces, inflation_radius);
+    of.place(vertices);
+    bodies_ = &of;
     is_still_ = true;
   }
   void build(Eigen::ConstRef<Eigen::MatrixXd> vertices_t0, Eigen::ConstRef<Eigen::MatrixXd> vertices_t1, Eigen::ConstRef<Eigen::MatrixXi> edges,
              Eigen::ConstRef<Eigen::MatrixXi> faces, const double inflation_radius = 0) override {
     if (vertices_t0.cols() == 2) return flat_with([&](::ipc::BroadPhase &flat) { flat.build(vertices_t0, vertices_t1, edges, faces, inflation_radius); });
-    start(vertices_t0.rows(), edges, faces, inflation_radius);
-    bodies_->place(vertices_t0, vertices_t1);
+    auto &of = start(vertices_t0.rows(), edges, faces, inflation_radius);
+    of.place(vertices_t0, vertices_t1);
+    bodies_ = &of;
   }
   /// Of boxes alone, candidates are pairs of boxes, whatever the mode.
   void build(const ::ipc::AABBs &boxes, Eigen::ConstRef<Eigen::MatrixXi> edges, Eigen::ConstRef<Eigen::MatrixXi> faces, const uint8_t dimension) override {
     if (dimension == 2) return flat_with([&](::ipc::BroadPhase &flat) { flat.build(boxes, edges, faces, dimension); });
     const auto n = static_cast<Eigen::Index>(boxes.size());
-    start(n, edges, faces, 0);
+    auto &of = start(n, edges, faces, 0);
     // A vertex that moves from one corner of its box to the other has this box.
     Eigen::MatrixXd low(n, 3), high(n, 3);
     for (Eigen::Index v = 0; v < n; ++v) {
       low.row(v) = boxes[static_cast<std::size_t>(v)].min.transpose();
       high.row(v) = boxes[static_cast<std::size_t>(v)].max.transpose();
     }
-    bodies_->place(low, high);
+    of.place(low, high);
+    bodies_ = &of;
     are_boxes_ = true;
   }
 
@@ -376,11 +379,11 @@ private:
     build(*flat_);
     dim = 2;
   }
-  void start(Eigen::Index n, Eigen::ConstRef<Eigen::MatrixXi> edges, Eigen::ConstRef<Eigen::MatrixXi> faces, double inflation_radius) {
+  detail::bodies &start(Eigen::Index n, Eigen::ConstRef<Eigen::MatrixXi> edges, Eigen::ConstRef<Eigen::MatrixXi> faces, double inflation_radius) {
     clear();
-    bodies_ = &known_.of(n, edges, faces);
     inflation_ = inflation_radius;
     dim = 3;
+    return known_.of(n, edges, faces);
   }
 
   /// Hands out the pairs of one kind that share no vertex and pass the filter.
