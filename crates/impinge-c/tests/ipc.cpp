@@ -159,6 +159,8 @@ std::size_t n_ev(const ::ipc::BroadPhase &of) {
 // What ipc-toolkit's functions do not ask in this way, but a solver may ask a broad phase.
 void asked_alone(impinge::ipc::mode mode, const model &of) {
   impinge::ipc::BroadPhase ours(mode);
+  ::ipc::LBVH lbvh;
+  const Eigen::MatrixXi none;
   // After positions that are refused it has found nothing.
   Eigen::MatrixXd bad = of.start;
   bad(5, 1) = std::numeric_limits<double>::quiet_NaN();
@@ -166,6 +168,14 @@ void asked_alone(impinge::ipc::mode mode, const model &of) {
   CHECK(n_ee(ours) > 0);
   CHECK(refuses([&] { ours.build(bad, of.edges, of.faces, 0.05); }) && n_ee(ours) == 0);
   CHECK(refuses([&] { ours.build(of.start, bad, of.edges, of.faces, 0.05); }) && n_ee(ours) == 0);
+
+  // Elements whose vertices are not there.
+  for (const int vertex : {-1, static_cast<int>(of.start.rows()), 1 << 30}) {
+    Eigen::MatrixXi edges = of.edges, faces = of.faces;
+    edges(3, 1) = faces(3, 1) = vertex;
+    CHECK(refuses([&] { ours.build(of.start, edges, of.faces); }) && refuses([&] { ours.build(of.start, of.edges, faces); }));
+  }
+  CHECK(refuses([&] { ours.build(of.start, none, Eigen::MatrixXi::Zero(1, 2)); }));
 }
 
 } // namespace

@@ -52,6 +52,10 @@ class bodies {
 public:
   bodies(Eigen::Index n, const Eigen::MatrixXi &edges, const Eigen::MatrixXi &faces, settings of)
       : n_(n), edges_(edges), faces_(faces), on_faces_(static_cast<std::size_t>(n)), settings_(of), detector_(std::move(of)) {
+    const auto are_there = [n](const Eigen::MatrixXi &of, Eigen::Index corners) {
+      return of.rows() == 0 || (of.cols() == corners && of.minCoeff() >= 0 && of.maxCoeff() < n);
+    };
+    if (!are_there(edges, 2) || !are_there(faces, 3)) impinge::detail::refuse("edges or faces: not 2 or 3 vertices in a row, or a vertex that is not there");
     std::vector<char> is_used(static_cast<std::size_t>(n));
     std::vector<std::array<int, 2>> sides;
     for (Eigen::Index f = 0; f < faces.rows(); ++f)
