@@ -161,6 +161,11 @@ void asked_alone(impinge::ipc::mode mode, const model &of) {
   impinge::ipc::BroadPhase ours(mode);
   ::ipc::LBVH lbvh;
   const Eigen::MatrixXi none;
+  // Faces without edges have no pairs of edges.
+  ours.build(of.start, none, of.faces, 0.05);
+  lbvh.build(of.start, none, of.faces, 0.05);
+  CHECK(n_ee(ours) == 0 && n_ee(lbvh) == 0 && n_ev(ours) == 0 && n_fv(ours) > 0);
+
   // After positions that are refused it has found nothing.
   Eigen::MatrixXd bad = of.start;
   bad(5, 1) = std::numeric_limits<double>::quiet_NaN();

@@ -129,6 +129,7 @@ public:
     return detector_.near(scene_, distance, of);
   }
   bool has_faces() const { return faces_.rows() > 0; }
+  bool has_edges() const { return edges_.rows() > 0; }
 
 private:
   template <class Set> void for_parts(Eigen::Ref<const Eigen::MatrixXd> at, Set set) {
@@ -392,7 +393,8 @@ private:
 
   /// Hands out the pairs of one kind that share no vertex and pass the filter.
   template <class Found> void each(pair_kind kind, int part_a, int part_b, Found found) const {
-    if (bodies_ == nullptr) return;
+    // Faces without edges of the caller's have some in the scene.
+    if (bodies_ == nullptr || (!bodies_->has_edges() && (part_a == 1 || part_b == 1))) return;
     const auto hand_out = [&](const auto &row) {
       const auto &of = *bodies_;
       if (of.is_repeated(part_a, row.body_a, row.element_a) || of.is_repeated(part_b, row.body_b, row.element_b)) return;
