@@ -8,6 +8,7 @@
 
 #include <limits>
 #include <set>
+#include <thread>
 
 namespace {
 
@@ -181,6 +182,19 @@ void asked_alone(impinge::ipc::mode mode, const model &of) {
     CHECK(refuses([&] { ours.build(of.start, edges, of.faces); }) && refuses([&] { ours.build(of.start, of.edges, faces); }));
   }
   CHECK(refuses([&] { ours.build(of.start, none, Eigen::MatrixXi::Zero(1, 2)); }));
+
+  // Several threads ask at once.
+  ours.build(of.start, of.edges, of.faces, 0.05);
+  const std::size_t ee = n_ee(ours), fv = n_fv(ours);
+  std::atomic<int> n_same{0};
+  for (int turn = 0; turn < 20; ++turn) {
+    ours.build(of.start, of.edges, of.faces, 0.05);
+    std::thread first([&] { n_same += !refuses([&] { CHECK(n_ee(ours) == ee); }); });
+    std::thread second([&] { n_same += !refuses([&] { CHECK(n_fv(ours) == fv); }); });
+    first.join();
+    second.join();
+  }
+  CHECK(n_same == 40);
 }
 
 } // namespace

@@ -20,6 +20,7 @@
 #include <cmath>
 #include <exception>
 #include <list>
+#include <mutex>
 
 namespace impinge {
 inline namespace IMPINGE_MODE {
@@ -130,6 +131,8 @@ public:
   }
   bool has_faces() const { return faces_.rows() > 0; }
   bool has_edges() const { return edges_.rows() > 0; }
+  /// Held while a thread asks the detector, and not while a filter is called.
+  std::mutex asked;
 
 private:
   template <class Set> void for_parts(Eigen::Ref<const Eigen::MatrixXd> at, Set set) {
@@ -303,7 +306,7 @@ inline double compute_collision_free_stepsize(const ::ipc::CollisionMesh &mesh, 
 }
 
 /// Finds the pairs that ipc-toolkit asks for. In two dimensions ipc-toolkit's own default does. Without a `reuse_margin` of the caller's, near
-/// pairs are listed with one of a quarter of their distance.
+/// pairs are listed with one of a quarter of their distance. Several threads may ask for candidates of one object at once, in three dimensions.
 class BroadPhase : public ::ipc::BroadPhase {
 public:
   explicit BroadPhase(ipc::mode of = mode::exact, settings how = backend::cpu) : mode_(of), known_(std::move(how)) {}
@@ -407,13 +410,20 @@ private:
     const auto all = [&](const auto &rows) { std::for_each(rows.begin(), rows.end(), hand_out); };
     const bool is_of_step = kind == pair_kind::vf || kind == pair_kind::ee || (!bodies_->has_faces() && kind != pair_kind::ef && kind != pair_kind::ff);
     auto &on = bodies_->detector();
+    std::unique_lock<std::mutex> asks(bodies_->asked);
     // Edges and faces, and faces and faces, are near where others are: their boxes are all that is asked for.
-    if (mode_ == mode::boxes || are_boxes_ || !is_of_step) return all(on.candidates(bodies_->scene(), inflation_, query::all().kinds({kind})));
+    if (mode_ == mode::boxes || are_boxes_ || !is_of_step) {
+      const auto found = on.candidates(bodies_->scene(), inflation_, query::all().kinds({kind}));
+      asks.unlock();
+      return all(found);
+    }
     if (is_still_) {
       if (!near_) near_ = bodies_->near(2 * inflation_ * slack, query::all().kinds({pair_kind::vf, pair_kind::ee, pair_kind::ev, pair_kind::vv}));
+      asks.unlock();
       return all(near_->of(kind));
     }
     if (!impacts_) impacts_ = on.impacts(bodies_->scene(), query::all().separation(by_axes * (2 * inflation_ + kept_in_steps)));
+    asks.unlock();
     all(impacts_->of(kind));
   }
 
