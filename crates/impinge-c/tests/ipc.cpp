@@ -195,6 +195,14 @@ void asked_alone(impinge::ipc::mode mode, const model &of) {
     second.join();
   }
   CHECK(n_same == 40);
+
+  // In two dimensions, too, it is asked with the filter that it has then.
+  const Eigen::MatrixXd flat = of.start.leftCols(2);
+  ours.build(flat, of.edges, none, 0.05);
+  lbvh.build(flat, of.edges, none, 0.05);
+  CHECK(n_ev(ours) > 0 && n_ev(ours) == n_ev(lbvh));
+  ours.can_vertices_collide = [](std::size_t, std::size_t) { return false; };
+  CHECK(n_ev(ours) == 0);
 }
 
 } // namespace

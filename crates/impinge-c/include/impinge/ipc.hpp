@@ -355,27 +355,27 @@ public:
   }
 
   void detect_vertex_vertex_candidates(std::vector<::ipc::VertexVertexCandidate> &found) const override {
-    if (flat_) return flat_->detect_vertex_vertex_candidates(found);
+    if (flat_) return flat().detect_vertex_vertex_candidates(found);
     each(pair_kind::vv, 0, 0, [&](::ipc::index_t a, ::ipc::index_t b) { found.emplace_back(a, b); });
   }
   void detect_edge_vertex_candidates(std::vector<::ipc::EdgeVertexCandidate> &found) const override {
-    if (flat_) return flat_->detect_edge_vertex_candidates(found);
+    if (flat_) return flat().detect_edge_vertex_candidates(found);
     each(pair_kind::ev, 1, 0, [&](::ipc::index_t a, ::ipc::index_t b) { found.emplace_back(a, b); });
   }
   void detect_edge_edge_candidates(std::vector<::ipc::EdgeEdgeCandidate> &found) const override {
-    if (flat_) return flat_->detect_edge_edge_candidates(found);
+    if (flat_) return flat().detect_edge_edge_candidates(found);
     each(pair_kind::ee, 1, 1, [&](::ipc::index_t a, ::ipc::index_t b) { found.emplace_back(a, b); });
   }
   void detect_face_vertex_candidates(std::vector<::ipc::FaceVertexCandidate> &found) const override {
-    if (flat_) return flat_->detect_face_vertex_candidates(found);
+    if (flat_) return flat().detect_face_vertex_candidates(found);
     each(pair_kind::vf, 0, 2, [&](::ipc::index_t a, ::ipc::index_t b) { found.emplace_back(b, a); });
   }
   void detect_edge_face_candidates(std::vector<::ipc::EdgeFaceCandidate> &found) const override {
-    if (flat_) return flat_->detect_edge_face_candidates(found);
+    if (flat_) return flat().detect_edge_face_candidates(found);
     each(pair_kind::ef, 1, 2, [&](::ipc::index_t a, ::ipc::index_t b) { found.emplace_back(a, b); });
   }
   void detect_face_face_candidates(std::vector<::ipc::FaceFaceCandidate> &found) const override {
-    if (flat_) return flat_->detect_face_face_candidates(found);
+    if (flat_) return flat().detect_face_face_candidates(found);
     each(pair_kind::ff, 2, 2, [&](::ipc::index_t a, ::ipc::index_t b) { found.emplace_back(a, b); });
   }
 
@@ -383,9 +383,12 @@ private:
   template <class Build> void flat_with(Build build) {
     clear();
     flat_ = ::ipc::make_default_broad_phase();
-    flat_->can_vertices_collide = can_vertices_collide;
     build(*flat_);
     dim = 2;
+  }
+  const ::ipc::BroadPhase &flat() const {
+    flat_->can_vertices_collide = can_vertices_collide;
+    return *flat_;
   }
   detail::bodies &start(Eigen::Index n, Eigen::ConstRef<Eigen::MatrixXi> edges, Eigen::ConstRef<Eigen::MatrixXi> faces, double inflation_radius) {
     clear();
