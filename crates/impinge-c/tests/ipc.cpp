@@ -5,6 +5,7 @@
 #include <ipc/broad_phase/lbvh.hpp>
 #include <ipc/candidates/candidates.hpp>
 #include <ipc/ccd/tight_inclusion_ccd.hpp>
+#include <ipc/ipc.hpp>
 
 #include <limits>
 #include <set>
@@ -97,9 +98,7 @@ void candidates(const ::ipc::CollisionMesh &mesh, const model &of) {
     std::printf("%s: LBVH %zu, boxes %zu, exact %zu\n", moves ? "moving" : "still", expected.size(), in_boxes.size(), near.size());
     // Theirs may round boxes up by a little.
     CHECK(expected.holds(in_boxes) && in_boxes.size() * 1.01 > expected.size());
-    // In steps exact mode reaches as far as Tight Inclusion may: boxes that are as wide have all of it.
-    const auto wide = moves ? ask(boxes, moves, impinge::ipc::by_axes * (0.01 + impinge::ipc::kept_in_steps / 2) * (1 + 1e-9)) : in_boxes;
-    CHECK(wide.holds(near) && !near.ee.empty() && !near.fv.empty() && near.size() < wide.size());
+    CHECK(in_boxes.holds(near) && !near.ee.empty() && !near.fv.empty() && near.size() < in_boxes.size());
     // Nothing within twice the radius at the start is missing.
     ::ipc::Candidates all;
     all.build(mesh, of.start, 0.01, &lbvh);
@@ -131,6 +130,30 @@ void steps(const ::ipc::CollisionMesh &mesh, const model &of) {
   const Eigen::MatrixXd reached = of.start + whole * (of.end - of.start);
   CHECK(impinge::ipc::is_step_collision_free(mesh, of.start, reached) && !impinge::ipc::is_step_collision_free(mesh, of.start, of.end));
   CHECK(!impinge::ipc::has_intersections(mesh, reached) && impinge::ipc::has_intersections(mesh, of.end));
+}
+
+// A vertex that ends 5e-5 above a face: near enough for a narrow phase to stop it, but no boxes overlap, so none is asked.
+void gap() {
+  Eigen::MatrixXd start(4, 3), end;
+  start << -1, -1, 0, 1, -1, 0, 0, 1, 0, 0, 0, 0.01;
+  Eigen::MatrixXi edges(3, 2), faces(1, 3);
+  edges << 0, 1, 1, 2, 0, 2;
+  faces << 0, 1, 2;
+  const ::ipc::CollisionMesh mesh(start, edges, faces);
+  for (const double distance : {0.0, 1e-3}) {
+    end = start;
+    end(3, 2) = distance + 5e-5;
+    ::ipc::LBVH lbvh;
+    impinge::ipc::BroadPhase exact;
+    CHECK(::ipc::compute_collision_free_stepsize(mesh, start, end, distance, &lbvh) == 1);
+    CHECK(::ipc::compute_collision_free_stepsize(mesh, start, end, distance, &exact) == 1);
+    CHECK(::ipc::compute_collision_free_stepsize(mesh, start, end, distance, &exact, impinge::ipc::NarrowPhaseCCD()) == 1);
+    // The whole step keeps 1e-4 of every pair.
+    CHECK(impinge::ipc::compute_collision_free_stepsize(mesh, start, end, distance) < 1);
+    end(3, 2) = distance - 5e-5;
+    const double theirs = ::ipc::compute_collision_free_stepsize(mesh, start, end, distance, &lbvh);
+    CHECK(theirs < 1 && ::ipc::compute_collision_free_stepsize(mesh, start, end, distance, &exact) == theirs);
+  }
 }
 
 template <class Call> bool refuses(Call call) {
@@ -213,6 +236,7 @@ int main() {
   CHECK(mesh.num_codim_edges() == 40 && mesh.num_codim_vertices() == 60);
   candidates(mesh, of);
   steps(mesh, of);
+  gap();
   // A filter: the second ball collides with nothing.
   mesh.can_collide = [](std::size_t a, std::size_t b) { return (a < VERTICES || a >= 2 * VERTICES) && (b < VERTICES || b >= 2 * VERTICES); };
   candidates(mesh, of);

@@ -26,9 +26,9 @@ namespace impinge {
 inline namespace IMPINGE_MODE {
 namespace ipc {
 
-/// What a `BroadPhase` finds. `boxes`: pairs whose inflated boxes overlap, as ipc-toolkit's own do. `exact`: only pairs that come within
-/// twice the inflation radius; in a step all that Tight Inclusion may stop for, which compares axis by axis: pairs that come within the
-/// square root of 3 times the sum of twice the radius and 1.1e-4. So step sizes of either narrow phase are those that `boxes` gives.
+/// What a `BroadPhase` finds. `boxes`: pairs whose inflated boxes overlap, as ipc-toolkit's own do. `exact`: of these only pairs that come
+/// within twice the inflation radius; in a step all that Tight Inclusion may stop for, which compares axis by axis: pairs that come within
+/// the square root of 3 times the sum of twice the radius and 1.1e-4. So step sizes of either narrow phase are those that `boxes` gives.
 enum class mode { boxes, exact };
 
 /// `conservative_rescaling` of ipc-toolkit's continuous detection.
@@ -327,6 +327,8 @@ public:
     if (vertices_t0.cols() == 2) return flat_with([&](::ipc::BroadPhase &flat) { flat.build(vertices_t0, vertices_t1, edges, faces, inflation_radius); });
     auto &of = start(vertices_t0.rows(), edges, faces, inflation_radius);
     of.place(vertices_t0, vertices_t1);
+    low_ = vertices_t0.cwiseMin(vertices_t1);
+    high_ = vertices_t0.cwiseMax(vertices_t1);
     bodies_ = &of;
   }
   /// Of boxes alone, candidates are pairs of boxes, whatever the mode.
@@ -397,25 +399,42 @@ private:
     return known_.of(n, edges, faces);
   }
 
+  /// Whether the inflated boxes of two elements overlap in a step.
+  bool boxes_meet(view<int> a, view<int> b) const {
+    const auto box = [&](view<int> of) {
+      std::array<Eigen::RowVector3d, 2> ends{low_.row(of[0]), high_.row(of[0])};
+      for (const int v : of) {
+        ends[0] = ends[0].cwiseMin(low_.row(v));
+        ends[1] = ends[1].cwiseMax(high_.row(v));
+      }
+      return ends;
+    };
+    const auto [low_a, high_a] = box(a);
+    const auto [low_b, high_b] = box(b);
+    return (low_a - high_b).cwiseMax(low_b - high_a).maxCoeff() <= 2 * inflation_ * slack;
+  }
+
   /// Hands out the pairs of one kind that share no vertex and pass the filter.
   template <class Found> void each(pair_kind kind, int part_a, int part_b, Found found) const {
     // Faces without edges of the caller's have some in the scene.
     if (bodies_ == nullptr || (!bodies_->has_edges() && (part_a == 1 || part_b == 1))) return;
+    const bool is_of_step = kind == pair_kind::vf || kind == pair_kind::ee || (!bodies_->has_faces() && kind != pair_kind::ef && kind != pair_kind::ff);
+    // Edges and faces, and faces and faces, are near where others are: their boxes are all that is asked for.
+    const bool asks_boxes = mode_ == mode::boxes || are_boxes_ || !is_of_step, tests_boxes = !asks_boxes && !is_still_;
     const auto hand_out = [&](const auto &row) {
       const auto &of = *bodies_;
       if (of.is_repeated(part_a, row.body_a, row.element_a) || of.is_repeated(part_b, row.body_b, row.element_b)) return;
       const auto a = of.number(part_a, row.body_a, row.element_a), b = of.number(part_b, row.body_b, row.element_b);
       std::array<int, 3> room_a{}, room_b{};
       const auto corners_a = of.corners(part_a, a, room_a), corners_b = of.corners(part_b, b, room_b);
-      if (detail::share_vertex(corners_a, corners_b) || !detail::may_collide(corners_a, corners_b, can_vertices_collide)) return;
+      if (detail::share_vertex(corners_a, corners_b) || (tests_boxes && !boxes_meet(corners_a, corners_b))) return;
+      if (!detail::may_collide(corners_a, corners_b, can_vertices_collide)) return;
       found(static_cast<::ipc::index_t>(a), static_cast<::ipc::index_t>(b));
     };
     const auto all = [&](const auto &rows) { std::for_each(rows.begin(), rows.end(), hand_out); };
-    const bool is_of_step = kind == pair_kind::vf || kind == pair_kind::ee || (!bodies_->has_faces() && kind != pair_kind::ef && kind != pair_kind::ff);
     auto &on = bodies_->detector();
     std::unique_lock<std::mutex> asks(bodies_->asked);
-    // Edges and faces, and faces and faces, are near where others are: their boxes are all that is asked for.
-    if (mode_ == mode::boxes || are_boxes_ || !is_of_step) {
+    if (asks_boxes) {
       const auto found = on.candidates(bodies_->scene(), inflation_, query::all().kinds({kind}));
       asks.unlock();
       return all(found);
@@ -434,6 +453,7 @@ private:
   mutable detail::known_bodies known_;
   mutable detail::bodies *bodies_ = nullptr;
   std::unique_ptr<::ipc::BroadPhase> flat_;
+  Eigen::MatrixXd low_, high_;
   double inflation_ = 0;
   bool is_still_ = false, are_boxes_ = false;
   mutable std::optional<near_pairs> near_;
