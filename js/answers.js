@@ -59,8 +59,8 @@ function inOrder(a, b) {
 }
 
 // What both lists have, and what only the newer or the older one has.
-function changesOf(list, old) {
-  if (!(old instanceof list.constructor)) refuse(`old: ${list.constructor.name} are needed, as these are`);
+function changesOf(list, old, type) {
+  if (!(old instanceof type)) refuse(`old: ${list.constructor.name} are needed, as these are`);
   const [before, after] = [ordered(old), ordered(list)];
   const [kept, added, gone] = [[], [], []];
   for (let was = 0, is = 0; was < before.length || is < after.length; ) {
@@ -90,7 +90,7 @@ export class Pairs extends List {
   }
 
   changes(old) {
-    return changesOf(this, old);
+    return changesOf(this, old, Pairs);
   }
 
   between(a, b) {
@@ -184,7 +184,7 @@ class ImpactList extends OfKinds {
   }
 
   changes(old) {
-    return changesOf(this, old);
+    return changesOf(this, old, ImpactList);
   }
 
   entry(ix) {
@@ -220,7 +220,7 @@ class NearList extends OfKinds {
   }
 
   changes(old) {
-    return changesOf(this, old);
+    return changesOf(this, old, NearList);
   }
 
   entry(ix) {
@@ -320,23 +320,28 @@ function regionsOf(numbers, parts) {
 
 // By which the module knows contacts.
 export let numberOf;
+// How often the bodies had been moved when they were found.
+export let movesOf;
 
 export class Contacts extends List {
   #number;
+  #moves;
   #curves;
   #regions;
 
   static {
     numberOf = (contacts) => contacts.#number;
+    movesOf = (contacts) => contacts.#moves;
   }
 
-  constructor([, bytes, numbers, words], stats, { pairs, number }) {
+  constructor([, bytes, numbers, words], stats, { pairs, number, moves }) {
     super(pairs.rows);
     const [starts, corners, curveStarts, curvePoints, ...parts] = sections(words);
     const [n, nCurves, nNumbers] = [this.length, Math.max(0, curveStarts.length - 1), 3 * numbers[0] + 1];
     this.hash = pairs.hash;
     this.stats = stats;
     this.#number = number;
+    this.#moves = moves;
     this.shapes = bytes.subarray(0, n);
     this.directed = bytes.subarray(n, 2 * n);
     Object.assign(this, { starts, corners, points: numbers.subarray(1, nNumbers) });

@@ -1,9 +1,12 @@
 // The classes that both builds have, made of the functions of either module.
 
-import { Advance, Candidates, Contacts, Impacts, NearPairs, Pairs, Penetration, earliest, nearest, numberOf, statsOf } from "./answers.js";
+import { Advance, Candidates, Contacts, Impacts, NearPairs, Pairs, Penetration, earliest, movesOf, nearest, numberOf, statsOf } from "./answers.js";
 import { Closest, Hits, Neighbours, SafeDistances, Truncation, integers, places, signed } from "./probe.js";
 import { RestPairs, packed, plain, whole, withPoints } from "./query.js";
-import { TAKE_STEP, body, call, disposable, isSingle, kindOf, list, meshOf, mustBeNone, number, options, refuse, wide, word } from "./shared.js";
+import {
+  ImpingeError, MOVES, TAKE_STEP, body, call, disposable, isList, isSingle, kindOf, list, meshOf, mustBeNone, number, numbers, options,
+  refuse, wide, word,
+} from "./shared.js";
 
 const PARTS = ["vertices", "edges", "faces"];
 const BODY_KINDS = ["points", "edges", "triangles", "tetrahedra"];
@@ -22,7 +25,7 @@ function instance(given, type, needed) {
   return given;
 }
 
-// How each question is asked: its arguments but the scene, as `{ question, words, numbers, watch, shape }`.
+// How each question is asked: its arguments but the scene, which is `this`, as `{ question, words, numbers, watch, shape }`.
 export const QUESTIONS = {
   detect: (query) => ({ question: 0, ...packed(query), shape: (lists, stats) => new Pairs(lists, stats) }),
   count: (query) => ({ question: 1, ...packed(query), shape: first }),
@@ -46,12 +49,14 @@ export const QUESTIONS = {
     const { rows } = instance(pairs, Pairs, "pairs: what detect() returned");
     lastContacts = (lastContacts + 1) >>> 0;
     const number = lastContacts;
-    const shape = (lists, stats) => new Contacts(lists, stats, { pairs, number });
+    const moves = this[MOVES].now();
+    const shape = (lists, stats) => new Contacts(lists, stats, { pairs, number, moves });
     return { question: 10, ...plain(before([number], rows), control), shape };
   },
   penetration(contacts, a, b, control) {
     const { rows } = instance(contacts, Contacts, "contacts: what contacts() returned");
     const words = before([numberOf(contacts), body(a), body(b)], rows);
+    this[MOVES].mustBe(movesOf(contacts), [a, b]);
     return { question: 11, ...plain(words, control), shape: (lists, stats) => new Penetration(lists, stats) };
   },
   candidatesInRuns(inflation, each, query) {
@@ -120,9 +125,10 @@ function limit(name, given) {
 
 // A matrix, column by column.
 function columns(matrix) {
-  const numbers = Float64Array.from(matrix ?? []);
-  if (numbers.length === 16) return numbers;
-  return refuse(`transform: ${matrix?.elements ? kindOf(matrix) : `${numbers.length} numbers`} given, 16 numbers allowed, column by column, as elements of a Matrix4`);
+  const given = isList(matrix) ? numbers("transform", matrix) : null;
+  if (given?.length === 16) return given;
+  const what = given === null ? kindOf(matrix) : `${given.length} numbers`;
+  return refuse(`transform: ${what} given, 16 numbers allowed, column by column, as elements of a Matrix4`);
 }
 
 // 64 bits, of a number or a bigint. -1 has all of them.
@@ -149,10 +155,45 @@ function arrays(mesh) {
   return [kind, wide(index), positions];
 }
 
+// How often the bodies of a scene were moved: contacts are about positions that bodies may no longer have.
+class Moves {
+  #counts = new Map();
+
+  add(which) {
+    this.#counts.set(which, this.#of(which) + 1);
+  }
+
+  #of(which) {
+    return this.#counts.get(which) ?? 0;
+  }
+
+  now() {
+    return { of: this, counts: new Map(this.#counts) };
+  }
+
+  mustBe({ of, counts }, bodies) {
+    if (of !== this) refuse("contacts: contacts of another scene given, those of this scene allowed");
+    const moved = bodies.find((which) => this.#of(which) !== (counts.get(which) ?? 0));
+    if (moved !== undefined) refuse(`body ${moved}: ${OTHER_POSITIONS}, so nothing is known of it; ask again`);
+  }
+}
+
+// In the library's words.
+const OTHER_POSITIONS = "this was found for other positions than it has now";
+
+// What the module is answering a question with: freed meanwhile, it would be lost before the module could refuse.
+const busy = new Set();
+
+export function free(handle) {
+  if (busy.has(handle)) refuse("dispose: a scene or a detector is used while it answers a question");
+  call(() => handle?.free());
+}
+
 export function makeScene({ SceneHandle }, mustBeReady) {
   let handleOf;
   class Scene {
     #handle;
+    #moves = new Moves();
 
     static {
       handleOf = (scene) => instance(scene, Scene, "scene: a Scene of the same module").#held;
@@ -167,10 +208,16 @@ export function makeScene({ SceneHandle }, mustBeReady) {
       return this.#handle ?? refuse("this scene has been disposed of");
     }
 
+    get [MOVES]() {
+      return this.#moves;
+    }
+
     #put(use, which, kind, index, positions) {
       const handle = this.#held;
       const put = isSingle(positions) ? "put_f32" : "put_f64";
-      return call(() => handle[put](use, which, kind, index, positions));
+      const number = call(() => handle[put](use, which, kind, index, positions));
+      if (use !== END_POSITIONS) this.#moves.add(number);
+      return number;
     }
 
     add(mesh) {
@@ -211,11 +258,20 @@ export function makeScene({ SceneHandle }, mustBeReady) {
     }
 
     [TAKE_STEP](start, positions) {
-      call(() => this.#held.take_step(start, Uint32Array.from(positions.keys()), [...positions.values()]));
+      try {
+        call(() => this.#held.take_step(start, Uint32Array.from(positions.keys()), [...positions.values()]));
+      } catch (error) {
+        const [, moved] = new RegExp(`^body (\\d+): ${OTHER_POSITIONS}`).exec(error.message) ?? [];
+        // After the module four words for each body that there was.
+        const isNew = moved !== undefined && !start.some((word, ix) => ix % 4 === 1 && word === Number(moved));
+        throw isNew ? new ImpingeError("invalid", `body ${moved}: it was added after this was found, so nothing is known of it; ask again`) : error;
+      }
+      for (const which of positions.keys()) this.#moves.add(which);
     }
 
     setTransform(which, matrix) {
       call(() => this.#held.set_transform(body(which), columns(matrix)));
+      this.#moves.add(which);
     }
 
     setEndTransform(which, matrix) {
@@ -232,7 +288,7 @@ export function makeScene({ SceneHandle }, mustBeReady) {
       if (typeof thickness !== "object" || thickness === null) {
         call(() => this.#held.set_thickness(body(which), number("thickness", thickness)));
       } else {
-        call(() => this.#held.set_element_thickness(body(which), of, Float64Array.from(thickness)));
+        call(() => this.#held.set_element_thickness(body(which), of, numbers("thickness", thickness)));
       }
     }
 
@@ -252,7 +308,7 @@ export function makeScene({ SceneHandle }, mustBeReady) {
     restPairs(distance) {
       const next = RestPairs.next();
       const n = call(() => this.#held.rest_pairs(next, number("distance", distance)));
-      return new RestPairs(next, n, () => this.#handle?.forget_rest_pairs(next));
+      return new RestPairs(next, n, () => call(() => this.#handle?.forget_rest_pairs(next)));
     }
 
     #size(which) {
@@ -304,11 +360,11 @@ export function makeScene({ SceneHandle }, mustBeReady) {
     }
 
     get bodies() {
-      return Array.from(this.#held.bodies());
+      return call(() => Array.from(this.#held.bodies()));
     }
 
     dispose() {
-      call(() => this.#handle?.free());
+      free(this.#handle);
       this.#handle = null;
     }
   }
@@ -316,17 +372,25 @@ export function makeScene({ SceneHandle }, mustBeReady) {
   return { Scene, handleOf };
 }
 
-// Asks the module at once. `detector` and `scene` are the module's.
+// Asks the module at once: the answer and its stats. `detector` and `scene` are the module's.
 export function ask(detector, scene, { question, enter, words, numbers, watch, shape }) {
   const asked = enter ?? ((on, of, id) => on.ask(question, of, id, words, numbers));
-  const lists = watch.during((id) => call(() => asked(detector, scene, id, { words, numbers })));
-  return shape(lists, statsOf(detector.stats(false)));
+  // A callback may ask another detector about the same scene.
+  const taken = [detector, scene].filter((handle) => !busy.has(handle));
+  for (const handle of taken) busy.add(handle);
+  try {
+    const lists = watch.during((id) => call(() => asked(detector, scene, id, { words, numbers })));
+    const stats = statsOf(detector.stats(false));
+    return { answer: shape(lists, stats), stats };
+  } finally {
+    for (const handle of taken) busy.delete(handle);
+  }
 }
 
 // Gives a class a method per question. `answer(detector, question, scene, asked)` has the answer.
 export function answering(type, answer) {
   for (const question of Object.keys(QUESTIONS)) {
-    const value = { [question](scene, ...rest) { return answer(this, question, scene, () => QUESTIONS[question](...rest)); } }[question];
+    const value = { [question](scene, ...rest) { return answer(this, question, scene, () => QUESTIONS[question].apply(scene, rest)); } }[question];
     Object.defineProperty(type.prototype, question, { value, writable: true, configurable: true });
   }
 }

@@ -2,7 +2,7 @@
 
 import load, * as module from "./cpu/impinge.js";
 import { statsOf } from "./answers.js";
-import { answering, ask, makeScene, settings } from "./classes.js";
+import { answering, ask, free, makeScene, settings } from "./classes.js";
 import { watch } from "./query.js";
 import { call, disposable, loader, refuse, welder } from "./shared.js";
 
@@ -20,15 +20,21 @@ export { Scene };
 
 export class Detector {
   #handle;
+  #stats;
 
   static {
-    answering(Detector, (detector, question, scene, asked) => ask(detector.#held, handleOf(scene), asked()));
+    answering(Detector, (detector, question, scene, asked) => {
+      const { answer, stats } = ask(detector.#held, handleOf(scene), asked());
+      detector.#stats = stats;
+      return answer;
+    });
     disposable(Detector);
   }
 
   constructor(given) {
     mustBeReady();
     this.#handle = call(() => new module.DetectorHandle(...settings(given)));
+    this.#stats = statsOf(this.#handle.stats(false));
   }
 
   get #held() {
@@ -36,11 +42,12 @@ export class Detector {
   }
 
   get stats() {
-    return statsOf(this.#held.stats(false));
+    void this.#held;
+    return this.#stats;
   }
 
   dispose() {
-    call(() => this.#handle?.free());
+    free(this.#handle);
     this.#handle = null;
   }
 }

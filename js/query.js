@@ -74,8 +74,8 @@ export class RestPairs {
   }
 
   dispose() {
-    lost.unregister(this);
     this.#forget();
+    lost.unregister(this);
   }
 }
 disposable(RestPairs);

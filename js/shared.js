@@ -16,6 +16,8 @@ export function disposable(type) {
 
 // The name under which scenes take steps that answers have found.
 export const TAKE_STEP = Symbol("take a step");
+// And that under which they count how often bodies were moved.
+export const MOVES = Symbol("moves");
 
 export function refuse(message) {
   throw new ImpingeError("invalid", message);
@@ -47,7 +49,11 @@ export function named(error) {
 
 // The module's errors begin with names of options as other languages write them.
 const OPTION = /^(clearance_share|closest_points|max_pairs|memory_budget|n_nearest|owned_by|reuse_margin|shared_vertex)(?=: )/;
-const camelized = (text) => text.replace(OPTION, (name) => name.replace(/_(.)/g, (_, letter) => letter.toUpperCase()));
+const camelized = (text) =>
+  text
+    .replace(OPTION, (name) => name.replace(/_(.)/g, (_, letter) => letter.toUpperCase()))
+    .replace("those that are named by `of` or `across`", "one by `of`")
+    .replace(/^(body \d+), in the library's words: body \d+: /, "$1: ");
 
 // Returns two functions: one loads the module, once; the other throws as long as it has not been loaded.
 export function loader(load, beside, begin) {
@@ -98,20 +104,40 @@ export function options(name, given) {
 
 // The list that was given.
 export function list(name, given) {
-  if (given !== null && typeof given === "object" && (Symbol.iterator in given || given.length >= 0)) return Array.from(given);
+  if (isList(given)) return Array.from(attached(name, given));
   return refuse(`${name}: ${kindOf(given)} given, an array is needed`);
+}
+
+export function isList(given) {
+  return given !== null && typeof given === "object" && (Symbol.iterator in given || given.length >= 0);
+}
+
+// The numbers of a list.
+export function numbers(name, given) {
+  if (given instanceof Float64Array || given instanceof Float32Array) return Float64Array.from(attached(name, given));
+  return Float64Array.from(list(name, given), (x) => number(name, x));
+}
+
+// An array whose memory was not given away, to a worker for example.
+function attached(name, given) {
+  if (!ArrayBuffer.isView(given) || given.length > 0) return given;
+  try {
+    void new Uint8Array(given.buffer);
+    return given;
+  } catch {
+    return refuse(`${name}: ${kindOf(given)} given whose memory was given away`);
+  }
 }
 
 // Vertex numbers with 32 bits. three.js uses 16 bits if they suffice.
 export function wide(index, name = "index") {
-  if (index instanceof Uint32Array) return index;
-  if (index instanceof Uint16Array || index instanceof Uint8Array) return Uint32Array.from(index);
+  if (index instanceof Uint32Array) return attached(name, index);
+  if (index instanceof Uint16Array || index instanceof Uint8Array) return Uint32Array.from(attached(name, index));
   return refuse(`${name}: ${kindOf(index)} given, a Uint32Array, a Uint16Array or a Uint8Array is needed`);
 }
 
 export function isSingle(positions) {
-  if (positions instanceof Float32Array) return true;
-  if (positions instanceof Float64Array) return false;
+  if (positions instanceof Float32Array || positions instanceof Float64Array) return attached("positions", positions) instanceof Float32Array;
   return refuse(`positions: ${kindOf(positions)} given, a Float32Array or a Float64Array is needed`);
 }
 

@@ -65,11 +65,17 @@ export class Detector {
     const about = asked();
     const now = call(() => held.snapshot());
     return this.#turn(async (handle) => {
+      if (take) {
+        const pairs = await detect(handle, now, about);
+        this.#stats = pairs.stats;
+        return take(pairs);
+      }
       try {
-        return take ? take(await detect(handle, now, about)) : ask(handle, now, about);
+        const { answer, stats } = ask(handle, now, about);
+        this.#stats = stats;
+        return answer;
       } finally {
-        this.#stats = statsOf(handle.stats(take !== undefined));
-        if (!take) now.free();
+        now.free();
       }
     });
   }

@@ -172,6 +172,63 @@ export async function refusals(module) {
     }
   });
   said.signal = await ask("detect", { signal: true });
+  said.closest = await ask("closest", triangle, { which: "self" });
+  said.text16 = await refusal(() => scene.setTransform(a, "1000010000100001"));
+  said.texts = await refusal(() => scene.setTransform(a, Array(16).fill("1")));
+  said.big = await refusal(() => scene.setTransform(a, new BigInt64Array(16)));
+  said.thick = await refusal(() => scene.setThickness(a, ["1", null, [2]]));
+  const away = new Float32Array(9);
+  structuredClone(away, { transfer: [away.buffer] });
+  said.away = [];
+  for (const call of ["setThickness", "setPositions", "setTransform", "setPinned"]) said.away.push(await refusal(() => scene[call](a, away)));
+  said.away.push(await refusal(() => scene.addPoints(away)), await ask("closest", away));
+  // What is freed while a question is answered.
+  const rest = scene.restPairs(1);
+  said.held = [];
+  const early = [() => scene.dispose(), () => detector.dispose(), () => rest.dispose(), () => scene.setPositions(a, triangle)];
+  const freed = (said) => {
+    for (const call of early) {
+      try {
+        said.push(call() ?? "nothing was refused");
+      } catch (error) {
+        said.push(`${error.constructor === ImpingeError}, ${error.code}`);
+      }
+    }
+    return false;
+  };
+  detector.near(scene, 1);
+  const { stats } = detector;
+  said.near = await ask("near", 1, { progress: () => (said.held.length > 0 ? undefined : freed(said.held)) });
+  const second = scene.addTriangles(index, triangle);
+  said.heldInRuns = [];
+  const within = [];
+  detector.candidatesInRuns(scene, 1, () => { within.push(detector.stats === stats); return freed(said.heldInRuns); });
+  said.usable = [scene.positions(a).length, detector.near(scene, 1, { of: a }).length > 0, rest.dispose() === undefined, String(within)];
+  // Stats are those of what was answered last.
+  const { stats: last } = detector;
+  said.failed = [await ask("near", -1), detector.stats === last, new Detector().stats.totalMs];
+  // Changes of all beside those of one kind; contacts, and a step, whose bodies are others now.
+  const all = detector.near(scene, 1);
+  scene.setEndPositions(second, triangle.map((x) => x + 1));
+  const impacts = detector.impacts(scene);
+  said.changes = [all, impacts].map((list) => [list.changes(list.of("vf")), list.of("vf").changes(list)].map(({ kept }) => kept.length / 2));
+  said.changes.push(all.of("vf").length, impacts.of("vf").length);
+  const corners = new Float32Array([0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1]);
+  const closed = [0, 0.125].map((by) => scene.addTriangles(new Uint8Array([0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3]), corners.map((x) => x + by)));
+  const older = detector.contacts(scene, detector.detect(scene, { between: closed }));
+  detector.contacts(scene, detector.detect(scene, { between: closed }));
+  const depth = () => refusal(() => detector.penetration(scene, older, ...closed));
+  said.older = [await depth()];
+  scene.setPositions(closed[1], corners.map((x) => x + 0.25));
+  said.older.push(await depth());
+  const other = new Scene();
+  const two = closed.map(() => other.addTriangles(index, triangle));
+  said.older.push(await refusal(() => detector.penetration(other, older, ...two)));
+  const step = detector.advance(scene);
+  for (const body of closed) scene.remove(body);
+  const added = scene.addTriangles(index, triangle);
+  said.added = await refusal(() => step.apply(scene));
+  for (const body of [second, added]) scene.remove(body);
   // The refused calls left it as it was.
   const b = scene.addTriangles(new Uint8Array([0, 1, 2]), Float32Array.from(triangle));
   said.found = [...detector.detect(scene, { between: [a, b] }).rows];
@@ -248,7 +305,25 @@ export const REFUSALS = {
   aborted: "cancelled: cancelled",
   reason: "Error: enough",
   signal: "invalid: signal: an AbortSignal is needed",
-  found: [0, 0, 1, 0],
+  closest: "invalid: query: pairs of two bodies, or self-collision given, all bodies, or one by `of` allowed",
+  text16: "invalid: transform: a string given, 16 numbers allowed, column by column, as elements of a Matrix4",
+  texts: "invalid: transform: 1 given, a number is needed",
+  big: "invalid: transform: 0 given, a number is needed",
+  thick: "invalid: thickness: 1 given, a number is needed",
+  away: ["thickness", "positions", "transform", "pinned", "positions", "positions"].map((name) => `invalid: ${name}: a Float32Array given whose memory was given away`),
+  held: Array(4).fill("true, invalid"),
+  near: "cancelled: cancelled",
+  heldInRuns: Array(4).fill("true, invalid"),
+  usable: [9, true, true, "true"],
+  failed: ["invalid: distance: -1 given, a finite number that is not below 0 allowed", true, 0],
+  changes: [[6, 6], [6, 6], 6, 6],
+  older: [
+    "nothing was refused",
+    "invalid: body 3: this was found for other positions than it has now, so nothing is known of it; ask again",
+    "invalid: contacts: contacts of another scene given, those of this scene allowed",
+  ],
+  added: "invalid: body 4: it was added after this was found, so nothing is known of it; ask again",
+  found: [0, 0, 5, 0],
   apart: false,
   budget: "budget: the memory budget is 1 bytes",
   most: "too_many_pairs: pairs and more were found, and at most 1 are allowed",

@@ -110,4 +110,5 @@ console.log(answer.hash, any, parts[0]?.name, frames, map, (await gpu.impacts(th
 await gpu.dispose();
 const changes: Changes = detector.detect(scene).changes(detector.detect(scene));
 const kept: Uint32Array = detector.near(scene, 1).of("vf").changes(detector.near(scene, 1)).kept;
-void [changes, kept];
+const ofKinds: Changes[] = [detector.near(scene, 1).changes(detector.near(scene, 1).of("vf")), detector.impacts(scene).changes(detector.impacts(scene).of("vf"))];
+void [changes, kept, ofKinds];
