@@ -82,9 +82,16 @@ export default function init(module?: Module | Promise<Module>): Promise<void>;
 
 /** What watches a question while it is answered. */
 export interface Control {
-  /** Looked at before the question and at least every 100 ms: once it is aborted, the question fails with the code `"cancelled"`. */
+  /**
+   * Looked at before the question, and whenever `progress` is or would be called: once it is aborted, the question fails with the code
+   * `"cancelled"`.
+   */
   signal?: AbortSignal;
-  /** Called from time to time with units of work, done and all; `false` stops the question. Units differ by stage. */
+  /**
+   * Called from time to time with units of work, done and all; `false` stops the question. Units differ by stage. While pairs are
+   * searched this is mostly every 100 ms or less, but no interval is promised: some stages, such as the last ones of `impacts`, `near`,
+   * `candidates` and `truncate`, run to their end without a call.
+   */
   progress?: (done: number, total: number) => boolean | void;
 }
 
@@ -102,19 +109,23 @@ export interface Query extends Control {
   /** All pairs of one body: with the others, whatever their filters say, and with itself. */
   of?: Body;
   /**
-   * Kinds of pairs; `detect`, `count` and `any` have their own. Otherwise `"vf"` and `"ee"`, and `"ev"` and `"vv"` where bodies have no
-   * faces; `near` has `"ef"`, too. Steps have no `"ef"` and `"ff"`.
+   * Kinds of pairs; `detect`, `count` and `any` have their own. Otherwise `"vf"` and `"ee"`; `"ev"` where neither of the two bodies has
+   * faces; `"vv"` where both are bodies of points; in `near` and `neighbours` also `"ef"`. Kinds that are named here count for all bodies.
+   * Steps have no `"ef"` and `"ff"`. Of tetrahedra, only the faces, edges and vertices of their border take part: what is inside is not
+   * near anything. `distance` and `detect` take them as solid.
    */
   kinds?: readonly PairKind[];
   /**
    * Pairs of one body that share a vertex: reported if they meet in more than what they share (`"resolve"`, the default), or not at
-   * all (`"skip"`). Vertices, edges and faces of `near`, `candidates` and steps that share a vertex never count.
+   * all (`"skip"`). For triangles and tetrahedra: edges and points of one body that share a vertex are not reported under either rule.
+   * Vertices, edges and faces of `near`, `candidates` and steps that share a vertex never count.
    */
   sharedVertex?: "resolve" | "skip";
   /**
    * Pairs that are left out: those of two bodies; with the same body twice, its self-collision; with `{ rings: n }` the pairs of one
    * body that are near in its surface: some vertex of one element is at most n edges, 0 to 16, away from some vertex of the other; with
-   * `{ groups: [g, h] }` those of two groups of vertices, or of one with itself, see `setGroups`; or those of `scene.restPairs()`.
+   * `{ groups: [g, h] }` those of two groups of vertices, or of one with itself, see `setGroups`: all vertices of one element must be in
+   * the one group, and all of the other in the other; or those of `scene.restPairs()`. Answers of `near` are not taken.
    */
   exclude?: readonly Exclusion[];
   /** Only pairs of the half-open box from a low to a high corner: that of the larger of the lower corners of both elements' boxes. */
@@ -135,7 +146,10 @@ export interface Query extends Control {
   clearance?: number;
   /** That share: from 0 to less than 1, 0.2 by default. */
   clearanceShare?: number;
-  /** The precision to which times are rounded down: `"f32"` by default. */
+  /**
+   * The precision to which the times of `impacts` and `earliest` are rounded down: `"f32"` by default. `advance` ignores it: the time of
+   * its first contact is rounded down to f64, and with a clearance to f32.
+   */
   precision?: "f32" | "f64";
   /** `near`: with the distance of each pair. */
   distances?: boolean;
@@ -163,7 +177,7 @@ declare class RestPairs {
   #number;
   /** How many there are. */
   readonly length: number;
-  /** Lets the scene forget them. So does it once they are collected as garbage, whenever that is. */
+  /** Lets the scene forget them; refused while a question about it is answered. So does it once they are collected as garbage, whenever that is. */
   dispose(): void;
   [Symbol.dispose](): void;
 }
@@ -188,6 +202,11 @@ export declare class Scene {
   /** Edges such as strands of hair. */
   addEdges(edges: Index, positions: GivenPositions): Body;
   addPoints(positions: GivenPositions): Body;
+  /**
+   * Removes a body. The next one that is added takes its place in the order of answers, of which hashes are made, and among those at the
+   * same distance or time, though its number is new. Where these types say that something is sorted by bodies, or that the lowest body
+   * counts, that is the order of these places: the order of numbers until a body is added after a removal.
+   */
   remove(body: Body): void;
   /** Gives a body new elements and positions. Its filter stays, and its thickness if it is one number. */
   remesh(body: Body, mesh: Mesh): void;
@@ -225,8 +244,10 @@ export declare class Scene {
    */
   setPinned(body: Body, pinned: ArrayLike<number | boolean>): void;
   /**
-   * The pairs of elements that are within a distance of each other now, mostly at rest, to be left out of later questions by `exclude`. The
-   * scene keeps them until either is disposed of, or the pairs are collected as garbage.
+   * The pairs of elements that are within a distance of each other now, mostly at rest, to be left out of later questions by `exclude`. They
+   * are of the kinds that `near` has if none are named: `"vf"`, `"ee"`, edges with faces that they meet (`"ef"`), and between bodies without
+   * faces `"ev"` and `"vv"` as said at `kinds`. Pairs of other kinds, which a query must name, are left out by bodies, rings or groups alone.
+   * The scene keeps them until either is disposed of, or the pairs are collected as garbage.
    */
   restPairs(distance: number): RestPairs;
   kind(body: Body): "points" | "edges" | "triangles" | "tetrahedra";
@@ -246,7 +267,7 @@ export declare class Scene {
   faces(body: Body): Uint32Array;
   /** The numbers of all bodies. */
   readonly bodies: Body[];
-  /** Frees the memory. */
+  /** Frees the memory. Refused while a question about this scene is answered. */
   dispose(): void;
   [Symbol.dispose](): void;
 }
@@ -256,7 +277,10 @@ export interface Settings {
   method?: "auto" | "clusters" | "cells" | "naive";
   /** Whether bodies are clustered again after they have flowed far: `"auto"` by default. */
   recluster?: "auto" | "never";
-  /** Bytes that the detector may hold, the answer included. */
+  /**
+   * Bytes that the detector may hold for a question, the answer included. It keeps memory for the next question of the same sort (pairs and
+   * steps, distances, points and rays, contacts), and the budget holds for each of these alone.
+   */
   memoryBudget?: number;
   /** The most pairs that an answer may have: with more, the question fails with the code `"too_many_pairs"`. */
   maxPairs?: number;
@@ -288,7 +312,7 @@ export interface Stats {
   nBatches: number;
   nPieces: number;
   nReruns: number;
-  /** Bytes that the detector holds. */
+  /** Bytes that the detector holds for questions of this sort, as said at `memoryBudget`; not what it keeps for others. */
   bytesHeld: number;
   /** Milliseconds per stage. */
   stages: Record<string, number>;
@@ -319,7 +343,7 @@ export interface Changes {
   readonly gone: Uint32Array;
 }
 
-/** Pairs that intersect, sorted by bodies and elements. */
+/** Pairs that intersect, sorted by bodies and elements; after a removal see `Scene.remove`. */
 export interface Pairs extends Answer, List<[Body, number, Body, number]> {
   /** `[i0, j0, i1, j1, …]`: element i of `a` and element j of `b`. */
   between(a: Body, b: Body): Uint32Array;
@@ -343,7 +367,7 @@ export interface Candidate {
   elementB: number;
 }
 
-/** Entries sorted by kind, bodies and elements. */
+/** Entries sorted by kind, bodies and elements; after a removal see `Scene.remove`. */
 export interface OfKinds<Entry> extends List<Entry> {
   /** One index into `KINDS` per entry. */
   readonly kinds: Uint8Array;
@@ -392,7 +416,10 @@ export interface Impacts extends Answer, ImpactList {
 export interface Advance {
   /** The part of the step that can be taken: 1 for all of it, 0 for none. */
   readonly fraction: number;
-  /** The first contact of the whole step, if any; with a clearance, the first time at which a pair is as near as it may come. */
+  /**
+   * The first contact of the whole step, if any, its time rounded down to f64; with a clearance, the first time at which a pair is as near
+   * as it may come, as an f32. `precision` has no part in it.
+   */
   readonly first: Impact | null;
   /** As in `Impacts`. If it is true, the fraction is 0. */
   readonly startIntersects: boolean | null;
@@ -428,6 +455,7 @@ export interface NearList extends OfKinds<NearPair> {
   readonly features: Uint8Array;
   /** 1 or 0 per pair. */
   readonly parallel: Uint8Array;
+  /** Each is the largest float that is not above the true distance. */
   readonly distances: Float64Array | null;
   /** Six numbers per pair. */
   readonly points: Float64Array | null;
@@ -455,7 +483,10 @@ export interface Nearest {
 /** The element that is nearest to a point. */
 export interface ClosestElement {
   body: Body;
-  /** Decided exactly; of several at the same distance the lowest by body and number. */
+  /**
+   * The number of a face, also of a body of tetrahedra (see `Scene.faces`); of bodies without faces that of an edge or a point. Decided
+   * exactly; of several at the same distance the lowest by body (after a removal see `Scene.remove`) and number.
+   */
   element: number;
   /** The feature that has the nearest point: 0 to 3 for a vertex of the element, 8 to 10 for an edge, 16 for the face. */
   feature: number;
@@ -488,6 +519,7 @@ export interface Closest extends Answer, Iterable<ClosestElement | null> {
 /** Where a ray meets an element. */
 export interface RayHit {
   body: Body;
+  /** As in `ClosestElement`; of several at the same `t` the lowest. */
   element: number;
   /** As in `ClosestElement`: the feature that has the point of entry. */
   feature: number;
@@ -520,7 +552,7 @@ export interface Hits extends Answer {
 
 /** How far each vertex may move, on any path, so that nothing touches. */
 export interface SafeDistances {
-  /** A length per vertex, rounded down, in the precision of the body's positions. */
+  /** A length per vertex, in the precision of the body's positions: below what is allowed by at most 2^-10 of it, and never above. */
   of(body: Body): Float32Array | Float64Array;
   /** The pairs at distance 0, whose vertices may not move at all. */
   readonly touching: NearPairs;
@@ -551,7 +583,7 @@ export interface Truncation {
 export interface Csr {
   readonly offsets: Uint32Array;
   readonly indices: Uint32Array;
-  /** How far away each is, rounded down. */
+  /** How far away each is: below the true distance by at most 2^-20 of it, where `near` has the nearest float below. 0 where they touch. */
   readonly distances: Float64Array;
 }
 
@@ -652,7 +684,7 @@ export interface Penetration {
  */
 export declare class Detector {
   constructor(settings?: Settings);
-  /** Of the last question. */
+  /** Of the last question that was answered; before the first, and after a first one that failed, all is 0. */
   readonly stats: Stats;
   /** All pairs of elements that intersect. */
   detect(scene: Scene, query?: Query): Pairs;
@@ -662,7 +694,7 @@ export declare class Detector {
   any(scene: Scene, query?: Query): boolean;
   /** Which elements touch during a step, and when first. */
   impacts(scene: Scene, query?: Query): Impacts;
-  /** The earliest impact of a step, or `null` if nothing touches. Faster than `impacts`. */
+  /** The earliest impact of a step, of several the first of `impacts`; `null` if nothing touches. Faster than `impacts`. */
   earliest(scene: Scene, query?: Query): Impact | null;
   /** Whether nothing touches during a step: free, if the start was. */
   isFree(scene: Scene, query?: Query): boolean;
@@ -695,9 +727,15 @@ export declare class Detector {
    * these where the surface overlaps itself; -(2 ** 31) on the surface. Decided exactly. Bodies of triangles, as for `contains`.
    */
   windingNumbers(scene: Scene, body: Body, points: GivenPositions, control?: Control): Int32Array;
-  /** The element nearest to each point, or with `nNearest` the nearest few: of all bodies, or of one with `of`. */
+  /**
+   * The element nearest to each point, or with `nNearest` the nearest few: of all bodies, or of one with `of`. Tetrahedra count with the faces
+   * of their border, so a point inside has a distance.
+   */
   closest(scene: Scene, points: GivenPositions, query?: Query): Closest;
-  /** What rays hit: the points origin + t direction, for t from 0 to `most`. Grazing an edge or a vertex is a hit. */
+  /**
+   * What rays hit: the points origin + t direction, for t from 0 to `most`. Grazing an edge or a vertex is a hit. Tetrahedra count with the
+   * faces of their border.
+   */
   cast(scene: Scene, origins: GivenPositions, directions: GivenPositions, query?: Query): Hits;
   /**
    * How far each vertex may move, at most `most`, so that nothing touches. The cost grows with `most`, since all pairs within twice `most` are
@@ -711,7 +749,7 @@ export declare class Detector {
   truncate(scene: Scene, query?: Query): Truncation;
   /** The pairs of `near` as lists per element. */
   neighbours(scene: Scene, distance: number, query?: Query): Neighbours;
-  /** The two bodies that are nearest to each other, and their nearest pair; `null` if there are no two. */
+  /** The two bodies that are nearest to each other, and their nearest pair; `null` if there are no two. Of several the first, see `Scene.remove`. */
   nearest(scene: Scene, query?: Query): Nearest | null;
   /** The smallest distance of two bodies; `null` if one of them has no elements. Tetrahedra are solid. */
   distance(scene: Scene, a: Body, b: Body, control?: Control): Nearest | null;
@@ -719,10 +757,10 @@ export declare class Detector {
   contacts(scene: Scene, pairs: Pairs, control?: Control): Contacts;
   /**
    * How deep two closed bodies are in each other, given contacts among which are all of theirs. Refuses bodies that have moved since these
-   * were found, if no others were asked for in between.
+   * were found.
    */
   penetration(scene: Scene, contacts: Contacts, a: Body, b: Body, control?: Control): Penetration;
-  /** Frees the memory. */
+  /** Frees the memory. Refused while a question is answered. */
   dispose(): void;
   [Symbol.dispose](): void;
 }

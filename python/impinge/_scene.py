@@ -421,7 +421,8 @@ class Scene(SceneBase):
 
     def rest_pairs(self, distance: SupportsFloat) -> Exclusion:
         """The pairs of elements that are within a distance of each other now, to be left out of later questions with ``exclude=``: in
-        a pose at rest, what is near is meant to be.
+        a pose at rest, what is near is meant to be. They are of the kinds that `Detector.near` has if none are named; those of other
+        kinds stay.
 
         Parameters
         ----------

@@ -268,7 +268,8 @@ impl NearPairs {
 }
 
 /// The pairs of an answer, to be left out of others: those that are near in a pose at rest, for
-/// one.
+/// one. Pairs of kinds that the answer was not asked about stay: ask with the same
+/// [`kinds`](crate::Query::kinds).
 impl From<&NearPairs> for Exclusion {
     fn from(near: &NearPairs) -> Self {
         let named = |of: Element| (of.body, of.element);
