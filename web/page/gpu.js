@@ -4,13 +4,28 @@ import { meshOf } from "./motion.js";
 
 let loading = null;
 
+export class NotLoaded extends Error {}
+
 // The build with WebGPU and the readers of files is loaded when it is first needed.
 export function withReaders() {
-  loading ??= import("impinge/webgpu").then(async (module) => {
-    await module.default();
-    return module;
+  loading ??= load().catch((error) => {
+    loading = null;
+    throw error;
   });
   return loading;
+}
+
+async function load() {
+  const what = "The part of the page that reads files could not be loaded, so you see what was here before.";
+  const why = `${what} Open again once you are online`;
+  // Some browsers remember that an import failed.
+  const module = await import("impinge/webgpu").catch((cause) => {
+    throw new NotLoaded(`${why}; if that is refused again, reload the page.`, { cause });
+  });
+  await module.default().catch((cause) => {
+    throw new NotLoaded(`${why}.`, { cause });
+  });
+  return module;
 }
 
 // The browser's adapter: `"hardware"`, `"software"`, or `null` if there is none.

@@ -2,7 +2,7 @@
 
 import init, { Detector, Scene } from "impinge";
 import { bodiesOf, hasParts, looksNumbered, mayBePoses, read } from "./files.js";
-import { Gpu, lookForAdapter, withReaders } from "./gpu.js";
+import { Gpu, NotLoaded, lookForAdapter, withReaders } from "./gpu.js";
 import { fromLink, toLink } from "./link.js";
 import { extentOf, meshOf, pose } from "./motion.js";
 import * as panel from "./panel.js";
@@ -21,6 +21,10 @@ const LIST_EVERY = 300;
 // A place fills this part of the picture, and is not seen from nearer than this part of the scene.
 const PLACE_SHARE = 0.4;
 const LEAST_PLACE = 0.02;
+// Bodies that are smaller parts of the picture are not seen.
+const LEAST_BODY = 0.002;
+// Longer names are shortened in the sentence about the answer.
+const MOST_LETTERS = 36;
 
 const [play, time, scene, size, as] = ["play", "time", "scene", "size", "as"].map(element);
 const [self, method, up] = ["self", "method", "up"].map(element);
@@ -34,6 +38,7 @@ let stage = { centre: [0, 0, 0], radius: 1, reach: 1 };
 // The last moment: 1 for a scene that changes steadily, the last frame's number for frames, 0 if nothing moves.
 let end = 0;
 let isFramed = false;
+let isFarApart = false;
 let now = 0;
 let direction = 1;
 let isPlaying = false;
@@ -130,6 +135,7 @@ function setBodies(given, { centre, radius, reach = radius, begin = 0 } = {}) {
   direction = 1;
   const ball = centre ? { centre, radius } : ballAround(extentOf(bodies));
   stage = { ...ball, reach: reach ?? ball.radius };
+  isFarApart = bodies.length > 1 && bodies.every((body) => ballAround(extentOf([body])).radius < LEAST_BODY * stage.radius);
   chosen = null;
   touching = [];
   step = null;
@@ -254,14 +260,18 @@ function showQuestion() {
   const what = bodies.some(({ corners }) => corners === 4) ? "primitives" : "triangles";
   say("verdict", rows.length === 4 ? `pair of ${what} intersects` : `pairs of ${what} intersect`);
   const n = bodies.reduce((sum, { index, corners }) => sum + index.length / corners, 0);
-  const names = bodies.map(({ name }) => name).join(", ");
+  const names = bodies.map(({ name }) => shortened(name)).join(", ");
   const whom = bodies.length === 1 ? "with itself" : self.checked ? "with each other and themselves" : "with each other";
   const notes = [`${names} ${whom}: ${grouped(n)} ${what}`];
   const nWelded = bodies.reduce((sum, { map, positions }) => sum + (map ? map.length - positions.length / 3 : 0), 0);
   if (nWelded > 0) notes.push(`${counted(nWelded, "vertex").replace(/vertexs$/, "vertices")} welded to others`);
   if (!element("back").hidden) notes.push("moved by hand");
+  if (isFarApart) notes.push("so far apart that they are too small to be seen in one picture");
   say("scene-note", notes.join("; "));
 }
+
+// A name with its beginning and its end.
+const shortened = (name) => (name.length > MOST_LETTERS ? `${name.slice(0, MOST_LETTERS / 2)}…${name.slice(-MOST_LETTERS / 2)}` : name);
 
 // Finds and lists the places of the last answer.
 function list() {
@@ -431,7 +441,7 @@ async function open(offered, folders = []) {
     }
     complain(given.refused.join("\n"));
   } catch (error) {
-    complain(String(error.message ?? error));
+    complain(error instanceof NotLoaded ? `Not opened: ${list.map(({ name }) => name).join(", ")}. ${error.message}` : String(error.message ?? error));
   } finally {
     say("status", "");
   }
@@ -474,10 +484,15 @@ async function share() {
   setTimeout(() => say("status", ""), 4000);
 }
 
+// A phone on its side, and one that is held upright.
+const isLow = () => matchMedia("(max-height: 480px) and (orientation: landscape)").matches;
+const isUpright = () => !isLow() && matchMedia("(max-width: 720px)").matches;
+
 // Keeps the bodies out of the panels.
 function leaveRoom() {
   const box = (id) => element(id).getBoundingClientRect();
-  const isNarrow = matchMedia("(max-width: 720px)").matches;
+  if (isLow()) return view.leaveRoom({ top: 0, right: window.innerWidth - box("answer").left, bottom: 0, left: 0 });
+  const isNarrow = isUpright();
   const bottom = window.innerHeight - box(isNarrow ? "bottom" : "controls").top;
   document.documentElement.style.setProperty("--foot", `${bottom}px`);
   const right = isNarrow ? 0 : window.innerWidth - box("side").left;
@@ -561,7 +576,7 @@ window.addEventListener("drop", (event) => {
   void open([...dropped], entries.filter((entry) => entry?.isDirectory).map(({ name }) => name));
 });
 window.addEventListener("hashchange", followLink);
-if (matchMedia("(max-width: 720px)").matches) {
+if (isLow() || isUpright()) {
   // All are closed, and of several with one name only one is open.
   for (const details of document.querySelectorAll("details")) Object.assign(details, { open: false, name: "side" });
 }

@@ -153,6 +153,7 @@ function pc2(frames) {
   return bytes;
 }
 
+const LONG = `${"a-scan-".repeat(30)}of-a-box.obj`;
 const ANGLES = [0, 0.35, 0.7, 0.88, 0.6];
 
 async function writeFiles() {
@@ -167,6 +168,8 @@ async function writeFiles() {
     "box.obj": box(1, 0),
     "tip.stl": tip,
     "far.obj": box(1, 0.5),
+    "away.obj": box(1, 1e6),
+    [LONG]: box(1, 0),
     "soup.stl": soup,
     "floor.obj": floor,
     "above.obj": above,
@@ -267,6 +270,13 @@ async function dropped(browser) {
   await settled(page);
   assert.match(await note(), /^low, high with each other: 3 triangles/);
   assert.ok((await sameAsProgram(page, "pairs", ["groups.obj"], "--bodies", "groups")) > 0);
+
+  // Long names are shortened, so that the sentence is seen whole; and bodies that are too small to be seen are no riddle.
+  await drop(page, LONG, "tip.stl");
+  assert.match(await note(), /^a-scan-a-scan-a-sc…[^]{18}, tip\.stl with each other: 13 triangles$/);
+  assert.ok(await page.evaluate(() => document.getElementById("scene-note").scrollHeight <= document.getElementById("scene-note").clientHeight));
+  await drop(page, "box.obj", "away.obj");
+  assert.match(await note(), /with each other: 24 triangles; so far apart that they are too small to be seen in one picture$/);
 
   // Files that cannot be read are named, and the others shown; the scene stays if none can.
   await drop(page, "broken.obj", "box.obj", "notes.txt");
@@ -666,6 +676,78 @@ async function phone(browser) {
   await page.context().close();
 }
 
+// A phone on its side: the picture is free, and every control is reached, if need be by scrolling.
+async function onItsSide(browser) {
+  for (const viewport of [{ width: 844, height: 390 }, { width: 667, height: 375 }]) {
+    const { page, problems } = await open(browser, { ...PHONE, viewport });
+    await page.locator("#play").tap();
+    await pauseAt(page, 1);
+    await page.screenshot({ path: join(shots, `phone-on-its-side-${viewport.width}.png`) });
+    // What is left of the panels has the bodies, and nothing lies over it.
+    const left = await page.evaluate(() => Math.min(...[...document.querySelectorAll("#answer, #bottom")].map((panel) => panel.getBoundingClientRect().left)));
+    assert.ok(left > 0.55 * viewport.width, `${left} pixels for the bodies`);
+    const covered = await page.evaluate((left) => {
+      const at = [];
+      for (let x = 8; x < left - 8; x += 20) for (let y = 8; y < innerHeight - 8; y += 20) at.push(document.elementFromPoint(x, y).id);
+      return at.filter((id) => id !== "view");
+    }, left);
+    assert.deepEqual(covered, []);
+    for (const ix of [0, 1, 2]) {
+      const [x, y] = await where(page, ix);
+      assert.ok(x > 0 && x < left && y > 0 && y < viewport.height, `body ${ix} is at ${x}, ${y}`);
+    }
+    const reach = async () => {
+      const ids = await page.evaluate(() => [...document.querySelectorAll("button[id], select, input[type=checkbox]")].filter((control) => control.checkVisibility()).map(({ id }) => id).filter((id) => id !== ""));
+      for (const id of ids) {
+        const isReached = await page.evaluate((id) => {
+          const control = document.getElementById(id);
+          control.scrollIntoView({ block: "nearest" });
+          const { left, top, width, height } = control.getBoundingClientRect();
+          const there = document.elementFromPoint(left + width / 2, top + height / 2);
+          return left >= 0 && left + width <= innerWidth && (there === control || control.contains(there));
+        }, id);
+        assert.ok(isReached, `#${id} can be reached`);
+      }
+      return ids;
+    };
+    await page.locator("#side summary").nth(2).tap();
+    const reached = await reach();
+    for (const id of ["play", "scene", "size", "share", "self", "all", "method"]) assert.ok(reached.includes(id), `#${id} is there`);
+    await drop(page, "bend.obj", "bend.pc2");
+    await pauseAt(page, 2);
+    assert.ok((await reach()).includes("step-show"));
+    assert.deepEqual(problems, []);
+    await page.context().close();
+  }
+  console.log("a phone on its side: the picture is free, and all controls are reached");
+}
+
+// Without the network the readers cannot be loaded: the page says so and what to do, and later opens files.
+async function offline(browser) {
+  const { page } = await open(browser, DESKTOP);
+  const note = await text(page, "#scene-note");
+  await page.route("**/impinge/gpu/*.js", (route) => route.abort());
+  await drop(page, "box.obj");
+  const said = await text(page, "#message");
+  assert.ok(said.startsWith("Not opened: box.obj. ") && said.includes("you see what was here before. Open again once you are online; if"), said);
+  assert.equal(await text(page, "#scene-note"), note);
+  await page.unrouteAll();
+  await drop(page, "box.obj");
+  assert.match(await text(page, "#scene-note"), /^box\.obj with itself: 12/);
+  // The module alone can be asked for again.
+  await page.route("**/impinge/gpu/*.wasm", (route) => route.abort());
+  await page.reload();
+  await page.waitForFunction(() => document.querySelector("#cpu .hash").textContent.length === 16);
+  await drop(page, "box.obj");
+  assert.match(await text(page, "#message"), /^Not opened: box\.obj\. .* Open again once you are online\.$/);
+  await page.unrouteAll();
+  await drop(page, "box.obj");
+  assert.match(await text(page, "#scene-note"), /^box\.obj with itself: 12/);
+  assert.equal(await page.locator("#message").isVisible(), false);
+  console.log("without the network: files are not opened, and the page says so");
+  await page.context().close();
+}
+
 async function withoutGpu(browser) {
   const { page, problems } = await open(browser, { viewport: { width: 900, height: 600 } });
   await page.waitForTimeout(300);
@@ -784,7 +866,7 @@ try {
   links();
   await latest();
   await writeFiles();
-  const visits = [dropped, frames, real, large, keyboard, phone, example, cursor];
+  const visits = [dropped, frames, real, large, keyboard, phone, onItsSide, offline, example, cursor];
   for (const [options, all] of [[{ gpu: true }, visits], [{ gpu: false }, [withoutGpu]]]) {
     const those = all.filter(({ name }) => only.length === 0 || only.includes(name));
     const browser = await launch(options);
