@@ -267,7 +267,7 @@ export declare class Scene {
   faces(body: Body): Uint32Array;
   /** The numbers of all bodies. */
   readonly bodies: Body[];
-  /** Frees the memory. Refused while a question about this scene is answered. */
+  /** Frees the memory. Refused while a question about this scene is answered; those of `impinge/webgpu` are about a copy. */
   dispose(): void;
   [Symbol.dispose](): void;
 }
@@ -760,7 +760,7 @@ export declare class Detector {
    * were found.
    */
   penetration(scene: Scene, contacts: Contacts, a: Body, b: Body, control?: Control): Penetration;
-  /** Frees the memory. Refused while a question is answered. */
+  /** Frees the memory. Refused while it answers a question. */
   dispose(): void;
   [Symbol.dispose](): void;
 }

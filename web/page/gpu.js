@@ -16,8 +16,7 @@ export function withReaders() {
 }
 
 async function load() {
-  const what = "The part of the page that reads files could not be loaded, so you see what was here before.";
-  const why = `${what} Open again once you are online`;
+  const why = "The part of the page that reads files and asks WebGPU could not be loaded. Try again once you are online";
   // Some browsers remember that an import failed.
   const module = await import("impinge/webgpu").catch((cause) => {
     throw new NotLoaded(`${why}; if that is refused again, reload the page.`, { cause });

@@ -441,7 +441,7 @@ async function open(offered, folders = []) {
     }
     complain(given.refused.join("\n"));
   } catch (error) {
-    complain(error instanceof NotLoaded ? `Not opened: ${list.map(({ name }) => name).join(", ")}. ${error.message}` : String(error.message ?? error));
+    complain(error instanceof NotLoaded ? `Not opened: ${list.map(({ name }) => name).join(", ")}; what you see was here before. ${error.message}` : String(error.message ?? error));
   } finally {
     say("status", "");
   }

@@ -71,6 +71,10 @@ export async function webgpu(module, scenes, method) {
     mustBe(stats.backend !== "cpu" && stats.method === method, `answered by ${stats.backend} with ${stats.method}`);
     mustFit(pairs, between, scene);
     mustBe(n === pairs.length && !isFree, "count and isFree");
+    // Questions that failed leave the stats of those that were answered.
+    const last = detector.stats;
+    const failed = [await refusal(() => detector.detect(scene, { between: [0, 99] })), await refusal(() => detector.near(scene, -1))];
+    mustBe(failed.every((text) => text.startsWith("invalid: ")) && detector.stats === last, `stats of a failed question, ${failed}`);
     await detector.dispose();
     answers.push({ name, pairs: pairs.length, hash: pairs.hash, impacts: impacts.length, impactsHash: impacts.hash });
   }

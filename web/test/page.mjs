@@ -729,7 +729,7 @@ async function offline(browser) {
   await page.route("**/impinge/gpu/*.js", (route) => route.abort());
   await drop(page, "box.obj");
   const said = await text(page, "#message");
-  assert.ok(said.startsWith("Not opened: box.obj. ") && said.includes("you see what was here before. Open again once you are online; if"), said);
+  assert.ok(said.startsWith("Not opened: box.obj; what you see was here before. ") && said.includes("Try again once you are online; if"), said);
   assert.equal(await text(page, "#scene-note"), note);
   await page.unrouteAll();
   await drop(page, "box.obj");
@@ -739,7 +739,7 @@ async function offline(browser) {
   await page.reload();
   await page.waitForFunction(() => document.querySelector("#cpu .hash").textContent.length === 16);
   await drop(page, "box.obj");
-  assert.match(await text(page, "#message"), /^Not opened: box\.obj\. .* Open again once you are online\.$/);
+  assert.match(await text(page, "#message"), /^Not opened: box\.obj; .* Try again once you are online\.$/);
   await page.unrouteAll();
   await drop(page, "box.obj");
   assert.match(await text(page, "#scene-note"), /^box\.obj with itself: 12/);
