@@ -75,12 +75,22 @@ function changesOf(list, old, type) {
   return { kept: Uint32Array.from(kept.sort(([a], [b]) => a - b).flat()), new: flat(added), gone: flat(gone) };
 }
 
+// What a scene knows of when pairs were found, and those of which contacts are.
+let movesOfPairs;
+export let movesOf;
+
 export class Pairs extends List {
+  #moves;
   // Where the rows of each first body are.
   #runs;
 
-  constructor([rows, , , , , hash], stats) {
+  static {
+    movesOfPairs = (pairs) => pairs.#moves;
+  }
+
+  constructor([rows, , , , , hash], stats, moves) {
     super(rows);
+    this.#moves = moves;
     this.hash = hex(hash);
     this.stats = stats;
   }
@@ -320,8 +330,6 @@ function regionsOf(numbers, parts) {
 
 // By which the module knows contacts.
 export let numberOf;
-// How often the bodies had been moved when they were found.
-export let movesOf;
 
 export class Contacts extends List {
   #number;
@@ -334,14 +342,14 @@ export class Contacts extends List {
     movesOf = (contacts) => contacts.#moves;
   }
 
-  constructor([, bytes, numbers, words], stats, { pairs, number, moves }) {
+  constructor([, bytes, numbers, words], stats, { pairs, number }) {
     super(pairs.rows);
     const [starts, corners, curveStarts, curvePoints, ...parts] = sections(words);
     const [n, nCurves, nNumbers] = [this.length, Math.max(0, curveStarts.length - 1), 3 * numbers[0] + 1];
     this.hash = pairs.hash;
     this.stats = stats;
     this.#number = number;
-    this.#moves = moves;
+    this.#moves = movesOfPairs(pairs);
     this.shapes = bytes.subarray(0, n);
     this.directed = bytes.subarray(n, 2 * n);
     Object.assign(this, { starts, corners, points: numbers.subarray(1, nNumbers) });

@@ -27,7 +27,10 @@ function instance(given, type, needed) {
 
 // How each question is asked: its arguments but the scene, which is `this`, as `{ question, words, numbers, watch, shape }`.
 export const QUESTIONS = {
-  detect: (query) => ({ question: 0, ...packed(query), shape: (lists, stats) => new Pairs(lists, stats) }),
+  detect(query) {
+    const moves = this[MOVES].now();
+    return { question: 0, ...packed(query), moves, shape: (lists, stats) => new Pairs(lists, stats, moves) };
+  },
   count: (query) => ({ question: 1, ...packed(query), shape: first }),
   any: (query) => ({ question: 2, ...packed(query), shape: yes }),
   impacts: (query) => ({ question: 3, ...packed(query), shape: (lists, stats) => new Impacts(lists, stats) }),
@@ -49,8 +52,7 @@ export const QUESTIONS = {
     const { rows } = instance(pairs, Pairs, "pairs: what detect() returned");
     lastContacts = (lastContacts + 1) >>> 0;
     const number = lastContacts;
-    const moves = this[MOVES].now();
-    const shape = (lists, stats) => new Contacts(lists, stats, { pairs, number, moves });
+    const shape = (lists, stats) => new Contacts(lists, stats, { pairs, number });
     return { question: 10, ...plain(before([number], rows), control), shape };
   },
   penetration(contacts, a, b, control) {
@@ -155,25 +157,23 @@ function arrays(mesh) {
   return [kind, wide(index), positions];
 }
 
-// How often the bodies of a scene were moved: contacts are about positions that bodies may no longer have.
+// When the bodies of a scene were moved last: contacts are about positions that bodies may no longer have.
 class Moves {
-  #counts = new Map();
+  #n = 0;
+  #last = new Map();
 
   add(which) {
-    this.#counts.set(which, this.#of(which) + 1);
-  }
-
-  #of(which) {
-    return this.#counts.get(which) ?? 0;
+    this.#n += 1;
+    this.#last.set(which, this.#n);
   }
 
   now() {
-    return { of: this, counts: new Map(this.#counts) };
+    return { of: this, n: this.#n };
   }
 
-  mustBe({ of, counts }, bodies) {
+  mustBe({ of, n }, bodies) {
     if (of !== this) refuse("contacts: contacts of another scene given, those of this scene allowed");
-    const moved = bodies.find((which) => this.#of(which) !== (counts.get(which) ?? 0));
+    const moved = bodies.find((which) => this.#last.get(which) > n);
     if (moved !== undefined) refuse(`body ${moved}: ${OTHER_POSITIONS}, so nothing is known of it; ask again`);
   }
 }

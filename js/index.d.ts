@@ -756,8 +756,8 @@ export declare class Detector {
   /** Where the triangles of pairs meet. The scene must not have changed since they were found. */
   contacts(scene: Scene, pairs: Pairs, control?: Control): Contacts;
   /**
-   * How deep two closed bodies are in each other, given contacts among which are all of theirs. Refuses bodies that have moved since these
-   * were found.
+   * How deep two closed bodies are in each other, given contacts among which are all of theirs. Refuses bodies that have moved since the
+   * pairs of these were found.
    */
   penetration(scene: Scene, contacts: Contacts, a: Body, b: Body, control?: Control): Penetration;
   /** Frees the memory. Refused while it answers a question. */

@@ -16,7 +16,7 @@ export function disposable(type) {
 
 // The name under which scenes take steps that answers have found.
 export const TAKE_STEP = Symbol("take a step");
-// And that under which they count how often bodies were moved.
+// And that under which they know when bodies were moved.
 export const MOVES = Symbol("moves");
 
 export function refuse(message) {

@@ -95,9 +95,9 @@ export class Detector {
 const awaited = (promise) => promise.catch((error) => Promise.reject(named(error)));
 
 // The module takes the scene over.
-async function detect(handle, scene, { words, numbers, watch }) {
+async function detect(handle, scene, { words, numbers, watch, moves }) {
   const lists = await watch.duringAsync((id) => awaited(handle.detect(scene, id, words, numbers)));
-  return new Pairs(lists, statsOf(handle.stats(true)));
+  return new Pairs(lists, statsOf(handle.stats(true)), moves);
 }
 
 function checkBytes(bytes) {

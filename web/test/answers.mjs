@@ -225,6 +225,10 @@ export async function refusals(module) {
   said.older = [await depth()];
   scene.setPositions(closed[1], corners.map((x) => x + 0.25));
   said.older.push(await depth());
+  const pairs = detector.detect(scene, { between: closed });
+  scene.setPositions(closed[0], corners);
+  const late = detector.contacts(scene, pairs);
+  said.older.push(await refusal(() => detector.penetration(scene, late, ...closed)));
   const other = new Scene();
   const two = closed.map(() => other.addTriangles(index, triangle));
   said.older.push(await refusal(() => detector.penetration(other, older, ...two)));
@@ -324,6 +328,7 @@ export const REFUSALS = {
   older: [
     "nothing was refused",
     "invalid: body 3: this was found for other positions than it has now, so nothing is known of it; ask again",
+    "invalid: body 2: this was found for other positions than it has now, so nothing is known of it; ask again",
     "invalid: contacts: contacts of another scene given, those of this scene allowed",
   ],
   added: "invalid: body 4: it was added after this was found, so nothing is known of it; ask again",
