@@ -193,7 +193,8 @@ impl Weld {
         }
     }
 
-    /// Two welded vertices that have different positions in `positions`; `None` if there are none.
+    /// Two welded vertices that have different positions in `positions`; `None` if there are none,
+    /// or if these are the positions of another number of vertices.
     ///
     /// In a frame of a sequence this means that the mesh comes apart at a welded vertex.
     pub fn torn(&self, positions: &Positions) -> Option<[u32; 2]> {

@@ -134,10 +134,14 @@ impl Weld {
             .collect())
     }
 
-    /// Two welded vertices that have different positions in `positions`; `None` if there are none.
+    /// Two welded vertices that have different positions in `positions`; `None` if there are none,
+    /// or if these are the positions of another number of vertices.
     ///
     /// In a later frame this means that the mesh comes apart at a welded vertex.
     pub fn torn<P: PartialEq>(&self, positions: &[P]) -> Option<[u32; 2]> {
+        if positions.len() != self.map.len() {
+            return None;
+        }
         (0u32..).zip(&self.map).find_map(|(ix, &welded)| {
             let first = *self.firsts.get(welded as usize)?;
             let (a, b) = (positions.get(first as usize)?, positions.get(ix as usize)?);
@@ -261,6 +265,9 @@ mod tests {
         let frame = [[5.0f64; 3], [6.0; 3], [7.0; 3]];
         assert_eq!(weld.positions(&frame), Ok(vec![[5.0; 3], [7.0; 3]]));
         assert_eq!(weld.torn(&frame), Some([0, 1]));
+        // Positions of another number of vertices say nothing of these.
+        let other = [&frame[..], &frame[..1]].concat();
+        assert_eq!(weld.torn(&other), None);
         let error = weld.positions(&frame[..2]).unwrap_err();
         assert_eq!(
             error.to_string(),
