@@ -71,6 +71,19 @@ fn objects_come_before_groups() {
 }
 
 #[test]
+fn objects_of_one_name_stay_apart() {
+    let bodies = obj(&format!(
+        "{VERTICES}o x\no x\nf 1 2 3\nf 1 3 4\no x\nf 1 2 6\no y\nf 2 3 6\no\no x\nf 3 4 6\n"
+    ));
+    let found: Vec<_> = bodies
+        .iter()
+        .map(|body| (body.name.as_deref().unwrap(), body.mesh.n_primitives()))
+        .collect();
+    // One without faces is none.
+    assert_eq!(found, [("x", 2), ("x (2)", 1), ("y", 1), ("x (3)", 1)]);
+}
+
+#[test]
 fn what_has_no_parts_is_one_body() {
     for text in ["f 1 2 3\nf 1 3 4\n", "g all\nf 1 2 3\nf 1 3 4\n"] {
         let bodies = obj(&format!("{VERTICES}{text}"));

@@ -94,7 +94,9 @@ fn statements<'a>(bytes: &[u8], name: Name<'a>) -> Result<Collector<'a>, Error> 
                 if (word == b"o") == has_objects {
                     let names: Vec<_> = words.map(String::from_utf8_lossy).collect();
                     let name = names.join(" ");
-                    parts.begin_part(if name.is_empty() { "default" } else { &name }, false);
+                    let name = if name.is_empty() { "default" } else { &name };
+                    // A group may go on later; each `o` begins another object.
+                    parts.begin_part(name, has_objects);
                 }
             }
             Some(b"l") => parts.n_lines += 1,
