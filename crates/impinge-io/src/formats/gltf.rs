@@ -4,8 +4,8 @@
 //! Source: Khronos, "glTF 2.0 Specification". Triangles, strips and fans are read; points and lines
 //! are counted. Within a node, primitives that use the same positions share their vertices.
 //! Positions stay f32 if no node moves them; otherwise they are computed in f64 (each sum and
-//! product rounded to nearest) and stay f64. Skins and morph targets are not applied: the mesh is
-//! in its rest pose.
+//! product rounded to nearest) and stay f64. Faces of a node that mirrors are turned, so that matter
+//! stays inside. Skins and morph targets are not applied: the mesh is in its rest pose.
 
 mod accessor;
 mod json;
@@ -234,8 +234,14 @@ impl<'a> Scene<'a, '_> {
                     self.parts.n_at_rest += 1;
                 }
                 let mut bases = HashMap::new();
+                let first = self.parts.triangles.len();
                 for primitive in &mesh.primitives {
                     self.add(primitive, transform, &mut bases)?;
+                }
+                if transform.is_some_and(|columns| determinant(&columns) < 0.0) {
+                    for face in &mut self.parts.triangles[first..] {
+                        face.swap(1, 2);
+                    }
                 }
             }
             stack.extend(node.children.iter().rev().map(|&child| (child, transform)));
@@ -417,6 +423,13 @@ fn apply(columns: &[[f64; 3]; 4], [x, y, z]: [f64; 3]) -> [f64; 3] {
     [0, 1, 2].map(|row| {
         columns[0][row] * x + columns[1][row] * y + columns[2][row] * z + columns[3][row]
     })
+}
+
+/// Negative if the transformation mirrors.
+fn determinant([a, b, c, _]: &[[f64; 3]; 4]) -> f64 {
+    a[0] * (b[1] * c[2] - b[2] * c[1])
+        + a[1] * (b[2] * c[0] - b[0] * c[2])
+        + a[2] * (b[0] * c[1] - b[1] * c[0])
 }
 
 /// First `local`, then `parent`.

@@ -244,3 +244,50 @@ fn what_moves_a_mesh_but_is_not_applied_is_counted() {
     // Targets without weight change nothing.
     assert_eq!(summary(&with(r#","weights":[0,0]"#)), 0);
 }
+
+#[test]
+fn faces_of_a_mirrored_node_are_turned() {
+    let faces = |nodes: &str, roots: &str, mode: &str| {
+        let json = gltf_json("", "")
+            .replace(r#"[{"mesh":0}]"#, nodes)
+            .replace(r#"[{"nodes":[0]}]"#, &format!(r#"[{{"nodes":{roots}}}]"#))
+            .replace(r#""indices":1}"#, &format!(r#""indices":1{mode}}}"#));
+        let glb = glb_of(&json, &gltf_buffer());
+        let mesh = read_bytes(&glb, Format::Gltf, "g", &ReadOptions::as_they_are()).or_show();
+        triangles(&mesh).to_vec()
+    };
+    let turned = |faces: &[[u32; 3]]| faces.iter().map(|&[a, b, c]| [a, c, b]).collect::<Vec<_>>();
+    // By a scale, by a matrix, and by a parent; two mirrors are none.
+    for (nodes, is_mirrored) in [
+        (r#"[{"mesh":0,"scale":[-1,1,1]}]"#, true),
+        (r#"[{"mesh":0,"scale":[-2,-3,1]}]"#, false),
+        (
+            r#"[{"mesh":0,"matrix":[0,1,0,0,1,0,0,0,0,0,1,0,5,0,0,1]}]"#,
+            true,
+        ),
+        (
+            r#"[{"children":[1],"scale":[1,-1,1]},{"mesh":0,"translation":[1,0,0]}]"#,
+            true,
+        ),
+        (
+            r#"[{"children":[1],"scale":[1,-1,1]},{"mesh":0,"scale":[1,1,-1]}]"#,
+            false,
+        ),
+    ] {
+        for mode in ["", r#","mode":5"#, r#","mode":6"#] {
+            let plain = faces(r#"[{"mesh":0}]"#, "[0]", mode);
+            let expected = if is_mirrored { turned(&plain) } else { plain };
+            assert_eq!(faces(nodes, "[0]", mode), expected, "{nodes} {mode}");
+        }
+    }
+    // One mesh, used as it is and mirrored: each node has its own faces.
+    let plain = faces(r#"[{"mesh":0}]"#, "[0]", "");
+    let three = faces(
+        r#"[{"mesh":0},{"mesh":0,"scale":[1,1,-1]},{"mesh":0}]"#,
+        "[0,1,2]",
+        "",
+    );
+    let moved = |faces: &[[u32; 3]], by| faces.iter().map(|face| face.map(|ix| ix + by)).collect();
+    let parts: [Vec<[u32; 3]>; 3] = [plain.clone(), moved(&turned(&plain), 5), moved(&plain, 10)];
+    assert_eq!(three, parts.concat());
+}
