@@ -100,6 +100,19 @@ fn one_that_runs_out_of_memory_says_so() {
 }
 
 #[test]
+fn a_trace_is_no_part_of_the_message() {
+    let said =
+        r"memory allocation of 9 bytes failed\nstack backtrace:\n   0: f\nnote: Some details";
+    let script = format!("read -r p; printf '{said}\\n' >&2; kill -ABRT $$");
+    let rows = run(&script, &["a"], 1, LONG).unwrap();
+    let message = &rows[0].result.as_ref().unwrap_err().message;
+    assert!(
+        message.ends_with(": memory allocation of 9 bytes failed"),
+        "{message}"
+    );
+}
+
+#[test]
 fn one_that_talks_nonsense_or_nothing_has_crashed() {
     let rows = run("read -r p; echo hello", &["a", "b"], 2, LONG).unwrap();
     assert_eq!(kinds(&rows), [ErrorKind::Crash; 2]);

@@ -132,7 +132,12 @@ impl Child {
             ErrorKind::Crash
         };
         let how = status.map_or_else(|error| error.to_string(), |status| status.to_string());
-        let message = match complaints.trim() {
+        // The message alone, without the trace that some programs print after it.
+        let said = complaints.lines().map(str::trim);
+        let said = said.take_while(|line| *line != "stack backtrace:");
+        let said = said.filter(|line| !line.starts_with("note: "));
+        let said = said.collect::<Vec<_>>().join("\n");
+        let message = match said.trim() {
             "" => format!("the child process ended: {how}"),
             said => format!("the child process ended: {how}: {said}"),
         };
