@@ -132,7 +132,8 @@ impl Sequence {
     /// of the first, or no faces at all.
     ///
     /// # Errors
-    /// As [`read`](crate::read); [`Error::Truncated`] if a cache is shorter than its header says.
+    /// As [`read`](crate::read); [`Error::Truncated`] if a cache is shorter than its header says,
+    /// [`Error::Count`] if it is longer.
     pub fn open(path: &Path) -> Result<Self, Error> {
         let extension = path.extension().unwrap_or_default().to_string_lossy();
         match SequenceFormat::from_extension(&extension) {
@@ -144,7 +145,7 @@ impl Sequence {
     /// Reads a point cache from bytes. Errors use `name` for the file.
     ///
     /// # Errors
-    /// [`Error::Syntax`] or [`Error::Truncated`].
+    /// [`Error::Syntax`], [`Error::Truncated`] or [`Error::Count`].
     pub fn from_bytes(bytes: Vec<u8>, format: SequenceFormat, name: &str) -> Result<Self, Error> {
         let header = Header::read(&bytes, bytes.len() as u64, format, Name(name))?;
         Ok(Self::cache(header, Source::Bytes(bytes), name.to_owned()))
@@ -419,6 +420,13 @@ impl Header {
                 header.n_frames, header.n_points
             );
             return Err(name.truncated(Place::File, what, needed, length));
+        }
+        if needed < length {
+            let what = format!(
+                "bytes, as the header says ({} frames of {} points)",
+                header.n_frames, header.n_points
+            );
+            return Err(name.count(Place::File, what, needed, length));
         }
         Ok(header)
     }

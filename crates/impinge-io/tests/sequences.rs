@@ -200,3 +200,22 @@ fn frames_of_another_size_are_refused() {
         "{message}"
     );
 }
+
+#[test]
+fn a_cache_with_more_than_its_header_says_is_refused() {
+    for (format, bytes, expected) in [
+        (
+            SequenceFormat::Pc2,
+            pc2(2, 1, &VALUES),
+            "cache: expected 56 bytes, as the header says (1 frames of 2 points), found 80",
+        ),
+        (
+            SequenceFormat::Mdd,
+            mdd(2, 1, &VALUES),
+            "cache: expected 36 bytes, as the header says (1 frames of 2 points), found 60",
+        ),
+    ] {
+        let error = Sequence::from_bytes(bytes, format, "cache").unwrap_err();
+        assert_eq!(error.to_string(), expected);
+    }
+}
