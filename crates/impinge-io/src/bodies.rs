@@ -42,6 +42,14 @@ impl Parts {
         self.runs.push((first, part));
     }
 
+    /// How many parts have begun, without those that ended before a triangle.
+    pub(crate) fn len(&self) -> usize {
+        let mut begun: Vec<usize> = self.runs.iter().map(|run| run.1).collect();
+        begun.sort_unstable();
+        begun.dedup();
+        begun.len()
+    }
+
     /// One mesh per part that has triangles, in the order of their first ones; the mesh itself if
     /// there are not several.
     pub(crate) fn split(self, mesh: Mesh) -> Vec<NamedMesh> {

@@ -23,6 +23,9 @@ pub(crate) struct Collector<'a> {
     pub n_points: u64,
     /// Meshes that are moved by what is not applied.
     pub n_at_rest: u64,
+    /// Nodes with a mesh outside the scene that is read.
+    pub n_out_of_scene: u64,
+    n_bytes_beyond: u64,
     pub unit: Option<&'static str>,
     /// The corners of the current polygon or strip; its memory is reused.
     pub corners: Vec<u32>,
@@ -41,6 +44,8 @@ impl<'a> Collector<'a> {
             n_lines: 0,
             n_points: 0,
             n_at_rest: 0,
+            n_out_of_scene: 0,
+            n_bytes_beyond: 0,
             unit: None,
             corners: Vec::new(),
             parts: Parts::default(),
@@ -109,6 +114,16 @@ impl<'a> Collector<'a> {
                     [t[1], t[0], t[2]]
                 }
             }));
+    }
+
+    /// Counts what follows the data that the header announces, but for white space and zeros,
+    /// with which some programs fill files up.
+    pub(crate) fn beyond(&mut self, rest: &[u8]) {
+        let fills = |byte: &u8| byte.is_ascii_whitespace() || *byte == 0;
+        if let Some(first) = rest.iter().position(|byte| !fills(byte)) {
+            let last = rest.iter().rposition(|byte| !fills(byte)).unwrap_or(first);
+            self.n_bytes_beyond = (last - first) as u64 + 1;
+        }
     }
 
     /// All triangles so far belong to no part.
@@ -183,6 +198,9 @@ impl<'a> Collector<'a> {
             n_tetrahedra_skipped: if tetrahedra { 0 } else { n_tetrahedra },
             n_welded: n_welded as u64,
             n_at_rest: self.n_at_rest,
+            n_out_of_scene: self.n_out_of_scene,
+            n_parts_joined: self.parts.len() as u64,
+            n_bytes_beyond: self.n_bytes_beyond,
             unit: self.unit,
         };
         Ok((mesh, summary))

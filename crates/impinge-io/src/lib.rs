@@ -71,7 +71,7 @@ pub use format::Format;
 pub use mesh::{Elements, Mesh, Positions, Weld, weld};
 pub use npy::{NpyHeader, npy_header};
 pub use numbers::{read_points, read_rows};
-pub use options::{Prefer, ReadOptions, Summary};
+pub use options::{Prefer, ReadOptions, Summary, grouped};
 pub use read::{
     read, read_bodies, read_bodies_bytes, read_bytes, read_bytes_with_summary, read_tetgen_bytes,
     read_with_summary,

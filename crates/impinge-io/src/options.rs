@@ -72,6 +72,70 @@ pub struct Summary {
     /// Meshes of a glTF file that a skin moves, or morph targets with weights: they are read at
     /// rest.
     pub n_at_rest: u64,
+    /// Nodes with a mesh of a glTF file that are not in the scene that was read: the one that the
+    /// file names, or the first.
+    pub n_out_of_scene: u64,
     /// The unit that a 3MF file names, unless it is a millimetre: numbers are read as they are.
     pub unit: Option<&'static str>,
+    /// Named nodes, items, objects or groups with triangles, where they became one mesh.
+    pub n_parts_joined: u64,
+    /// Bytes after the data that the header announces, without white space, zeros and comments
+    /// around them. They were not read.
+    pub n_bytes_beyond: u64,
+}
+
+impl Summary {
+    /// What readers of primitive numbers should know, or of answers that seem incomplete: a note
+    /// per kind. Points and welded vertices are not among them.
+    pub fn notes(&self) -> Vec<String> {
+        let unit = self.unit.map(|unit| {
+            format!("its unit is the {unit}; numbers are read as they are, whatever the unit of other files")
+        });
+        let counts = [
+            (
+                self.n_polygons_fanned,
+                "polygons split into triangles (primitive numbers count the triangles)",
+            ),
+            (
+                self.n_triangles_skipped,
+                "triangles skipped, because the file has tetrahedra",
+            ),
+            (
+                self.n_tetrahedra_skipped,
+                "tetrahedra skipped, because triangles were asked for",
+            ),
+            (
+                self.n_lines_skipped,
+                "lines skipped, which are edges or faces of two corners",
+            ),
+            (
+                self.n_at_rest,
+                "meshes with a skin or morph targets, which are not applied: they are read at rest",
+            ),
+            (
+                self.n_out_of_scene,
+                "nodes with a mesh left out, because they are not in the default scene",
+            ),
+            (
+                self.n_bytes_beyond,
+                "bytes left out, because they follow what the header announces",
+            ),
+        ];
+        let counts = counts.into_iter().filter(|&(n, _)| n > 0);
+        let counts = counts.map(|(n, what)| format!("{what}: {}", grouped(n)));
+        unit.into_iter().chain(counts).collect()
+    }
+}
+
+/// A number with a comma after every three digits.
+pub fn grouped(n: u64) -> String {
+    let digits = n.to_string();
+    let mut text = String::with_capacity(digits.len() * 4 / 3);
+    for (ix, digit) in digits.chars().enumerate() {
+        if ix > 0 && (digits.len() - ix).is_multiple_of(3) {
+            text.push(',');
+        }
+        text.push(digit);
+    }
+    text
 }

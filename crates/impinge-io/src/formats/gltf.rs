@@ -246,6 +246,9 @@ impl<'a> Scene<'a, '_> {
             }
             stack.extend(node.children.iter().rev().map(|&child| (child, transform)));
         }
+        let unseen = root.nodes.iter().zip(&is_visited);
+        let left_out = unseen.filter(|&(node, &is_visited)| node.mesh.is_some() && !is_visited);
+        self.parts.n_out_of_scene = left_out.count() as u64;
         self.parts.positions = if self.is_f64 {
             Positions::F64(self.f64s)
         } else {

@@ -67,6 +67,11 @@ pub(crate) fn read<'a>(bytes: &[u8], name: Name<'a>) -> Result<Collector<'a>, Er
         };
         face(&mut parts, line)?;
     }
+    let mut rest = text.rest();
+    while text.line().is_some_and(|line| line.before(b'#').is_blank()) {
+        rest = text.rest();
+    }
+    parts.beyond(rest);
     Ok(parts)
 }
 
@@ -143,6 +148,7 @@ fn read_binary<'a>(
         let n_colors = from.count(Scalar::I32, "the number of colour components")?;
         from.take(n_colors, 4, "a colour")?;
     }
+    parts.beyond(&bytes[from.offset()..]);
     Ok(parts)
 }
 

@@ -24,12 +24,14 @@ pub(crate) fn read<'a>(bytes: &[u8], name: Name<'a>) -> Result<Collector<'a>, Er
             for element in &header.elements {
                 read_ascii(&mut parts, &header, element, &mut text)?;
             }
+            parts.beyond(text.rest());
         }
         Storage::Binary(endian) => {
             let mut cursor = Cursor::new(name, bytes, text.offset(), endian);
             for element in &header.elements {
                 read_binary(&mut parts, &header, element, &mut cursor)?;
             }
+            parts.beyond(&bytes[cursor.offset()..]);
         }
     }
     Ok(parts)

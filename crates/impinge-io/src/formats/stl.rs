@@ -72,6 +72,7 @@ fn read_binary<'a>(bytes: &[u8], name: Name<'a>) -> Result<Collector<'a>, Error>
         }
     }
     let mut parts = Collector::new(name);
+    parts.beyond(&bytes[cursor.offset()..]);
     parts.triangles = soup(positions.len());
     parts.positions = Positions::F32(positions);
     Ok(parts)

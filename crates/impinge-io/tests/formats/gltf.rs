@@ -291,3 +291,28 @@ fn faces_of_a_mirrored_node_are_turned() {
     let parts: [Vec<[u32; 3]>; 3] = [plain.clone(), moved(&turned(&plain), 5), moved(&plain, 10)];
     assert_eq!(three, parts.concat());
 }
+
+#[test]
+fn meshes_outside_the_scene_are_counted() {
+    let read = |scene: &str, scenes: &str| {
+        let json = gltf_json("", "")
+            .replace(r#""scene":0,"#, scene)
+            .replace(r#"[{"nodes":[0]}]"#, scenes)
+            .replace(
+                r#"[{"mesh":0}]"#,
+                r#"[{"mesh":0},{"mesh":0},{"children":[3]},{"mesh":0}]"#,
+            );
+        let glb = glb_of(&json, &gltf_buffer());
+        let read = read_bytes_with_summary(&glb, Format::Gltf, "g", &ReadOptions::as_they_are());
+        let (mesh, summary) = read.or_show();
+        (mesh.n_primitives(), summary.n_out_of_scene)
+    };
+    // Without a choice, the first scene is read.
+    assert_eq!(read("", r#"[{"nodes":[0]},{"nodes":[1,2]}]"#), (3, 2));
+    let scene = r#""scene":1,"#;
+    assert_eq!(read(scene, r#"[{"nodes":[0]},{"nodes":[1,2]}]"#), (6, 1));
+    // Nodes of several scenes are not left out, nodes of none are.
+    assert_eq!(read(scene, r#"[{"nodes":[0]},{"nodes":[0,1,2]}]"#), (9, 0));
+    assert_eq!(read("", r#"[{"nodes":[0,2]}]"#), (6, 1));
+    assert_eq!(read("", "[]"), (9, 0));
+}

@@ -7,7 +7,7 @@ mod surfaces;
 mod threemf;
 mod volumes;
 
-use common::{TRIANGLES, VERTICES, glb_of, gltf_buffer, gltf_json, samples};
+use common::{Order, TRIANGLES, VERTICES, glb_of, gltf_buffer, gltf_json, samples};
 use impinge_io::{
     Elements, Error, Format, Mesh, Positions, Prefer, ReadOptions, read, read_bytes,
     read_bytes_with_summary, read_tetgen_bytes, read_with_summary,

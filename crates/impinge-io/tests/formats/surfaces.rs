@@ -438,3 +438,56 @@ fn bytes_that_are_no_obj_file_are_refused_as_such() {
         );
     }
 }
+
+#[test]
+fn what_follows_the_announced_data_is_counted() {
+    let beyond = |format, bytes: &[u8]| {
+        let read = read_bytes_with_summary(bytes, format, "f", &ReadOptions::as_they_are());
+        let (mesh, summary) = read.or_show();
+        assert_eq!(mesh.n_primitives(), 1);
+        summary.n_bytes_beyond
+    };
+    let off = "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+    let ply = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+        element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+    let binary_ply = [
+        ply.replace("ascii", "binary_little_endian")
+            .split_inclusive("end_header\n")
+            .next()
+            .unwrap()
+            .as_bytes(),
+        &[0; 36],
+        &[3, 0, 0, 0, 0, 1, 0, 0, 0, 2, 0, 0, 0],
+    ]
+    .concat();
+    let binary_off = [
+        &b"OFF BINARY\n"[..],
+        &Order::Big.i32s([3, 1, 0]),
+        &[0; 36],
+        &Order::Big.i32s([3, 0, 1, 2, 0]),
+    ]
+    .concat();
+    let stl = [&[0; 80][..], &[1, 0, 0, 0], &[0; 50]].concat();
+    for (format, bytes) in [
+        (Format::Off, off.as_bytes()),
+        (Format::Ply, ply.as_bytes()),
+        (Format::Ply, &binary_ply),
+        (Format::Off, &binary_off),
+        (Format::Stl, &stl),
+    ] {
+        assert_eq!(beyond(format, bytes), 0, "{format:?}");
+        assert_eq!(
+            beyond(format, &[bytes, b"\n \r\n\0"].concat()),
+            0,
+            "{format:?}"
+        );
+        let more = [bytes, b"\n3 0 1 2\n3 2 1 0\n"].concat();
+        assert_eq!(beyond(format, &more), 15, "{format:?}");
+    }
+    let ended = format!("{off}\n# the end\n");
+    assert_eq!(beyond(Format::Off, ended.as_bytes()), 0);
+    assert_eq!(
+        beyond(Format::Off, format!("{ended}3 2 1 0 # so").as_bytes()),
+        12
+    );
+}
