@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use impinge_io::{Error as FileError, ReadOptions, read, weld};
+use impinge_io::{Error as FileError, ReadOptions, read, read_with_summary, weld};
 
 use crate::analysis::{Checked, Options, check_mesh};
 use crate::marks::MarkRuns;
@@ -10,7 +10,8 @@ use crate::row::{ErrorKind, Failure, Row};
 
 /// Checks the mesh of one file. Errors are in the row.
 pub fn check_file(path: &Path, options: &Options) -> Row {
-    let (result, places, marks) = match checked(path, options) {
+    let mut notes = Vec::new();
+    let (result, places, marks) = match checked(path, options, &mut notes) {
         Ok(checked) => {
             let marks = options.marks.then(|| MarkRuns::new(&checked.marks));
             (Ok(checked.counts), checked.places, marks)
@@ -23,6 +24,7 @@ pub fn check_file(path: &Path, options: &Options) -> Row {
         result,
         places,
         marks,
+        notes,
     }
 }
 
@@ -54,8 +56,9 @@ impl Checked {
     }
 }
 
-fn checked(path: &Path, options: &Options) -> Result<Checked, Failure> {
-    let mesh = read(path, &ReadOptions::as_they_are()).map_err(|error| Failure {
+fn checked(path: &Path, options: &Options, notes: &mut Vec<String>) -> Result<Checked, Failure> {
+    let read = read_with_summary(path, &ReadOptions::as_they_are());
+    let (mesh, summary) = read.map_err(|error| Failure {
         kind: match error {
             FileError::NotFinite { .. } => ErrorKind::NotFinite,
             FileError::NoMemory { .. } => ErrorKind::Memory,
@@ -68,6 +71,7 @@ fn checked(path: &Path, options: &Options) -> Result<Checked, Failure> {
         },
         message: one_line(&error.to_string()),
     })?;
+    *notes = summary.notes();
     check_mesh(mesh, options).map_err(|error| Failure {
         kind: match error {
             impinge::Error::NonFinitePosition { .. } => ErrorKind::NotFinite,

@@ -137,6 +137,9 @@ pub struct Row {
     /// Which problems each primitive has: see [`Options::marks`](crate::Options::marks). Not part
     /// of the [object](Self::to_json).
     pub marks: Option<MarkRuns>,
+    /// What was left out of the file, or changed: see
+    /// [`Summary::notes`](impinge_io::Summary::notes). Not part of the [object](Self::to_json).
+    pub notes: Vec<String>,
 }
 
 impl Row {
@@ -155,6 +158,7 @@ impl Row {
             }),
             places: Vec::new(),
             marks: None,
+            notes: Vec::new(),
         }
     }
 
@@ -221,6 +225,7 @@ impl Row {
                 Some(places) => Deserialize::deserialize(places).ok()?,
             },
             marks: None,
+            notes: Vec::new(),
         })
     }
 }
@@ -294,6 +299,7 @@ mod tests {
                 elements: vec![1, 5],
             }],
             marks: None,
+            notes: Vec::new(),
         }
     }
 

@@ -1,17 +1,6 @@
 //! Numbers in sentences.
 
-/// A number with a comma after every three digits.
-pub fn grouped(n: u64) -> String {
-    let digits = n.to_string();
-    let mut text = String::with_capacity(digits.len() * 4 / 3);
-    for (ix, digit) in digits.chars().enumerate() {
-        if ix > 0 && (digits.len() - ix).is_multiple_of(3) {
-            text.push(',');
-        }
-        text.push(digit);
-    }
-    text
-}
+pub use impinge_io::grouped;
 
 /// `n` with a noun, in the plural unless `n` is 1.
 pub fn counted(n: u64, one: &str) -> String {

@@ -10,6 +10,8 @@ use crate::file::check_file;
 
 /// The key under which a child says the marks of a row, for its parent alone.
 pub const MARKS: &str = "marks";
+/// The same of its notes.
+pub const NOTES: &str = "notes";
 
 /// Answers each line of `input`, a path as a JSON string, with the row of its mesh on a line of
 /// `output`, until the input ends.
@@ -28,6 +30,9 @@ pub fn serve(input: impl BufRead, mut output: impl Write, options: &Options) -> 
         let mut object = row.to_json();
         if let Some(marks) = &row.marks {
             object[MARKS] = marks.to_json();
+        }
+        if !row.notes.is_empty() {
+            object[NOTES] = row.notes.into();
         }
         writeln!(output, "{object}")?;
         output.flush()?;

@@ -15,6 +15,7 @@ fn row(path: &Path) -> Row {
         result: Ok(Counts::default()),
         places: Vec::new(),
         marks: None,
+        notes: Vec::new(),
     }
 }
 

@@ -74,7 +74,8 @@ pub struct Loading<'a> {
     bodies: Option<BodiesArg>,
     /// Whether the parts of a file are bodies if it is the only one.
     splits_one: bool,
-    /// Whether to print on standard error what was fanned and skipped.
+    /// Whether to print on standard error what the object of `--json` says, too: which vertices
+    /// coincide, and which files were not read.
     notes: bool,
     cancel: &'a CancelToken,
 }
@@ -262,12 +263,12 @@ impl Bodies {
         several: bool,
     ) -> Result<String, Error> {
         let format = self.format(path, loading)?;
-        let (file, (meshes, mut summary)) = self.read_one(path, format, true, loading)?;
+        let (file, (meshes, summary)) = self.read_one(path, format, true, loading)?;
+        // Notes on the file name it, not one of its parts.
+        tell(&file, &summary.notes());
         for NamedMesh { name, mesh } in meshes {
             let name = part_name(&file, name, several);
-            self.add_mesh(name, format, mesh, &summary, loading)?;
-            // Notes on the file are printed once.
-            summary = Summary::default();
+            self.add_mesh(name, format, mesh, &Summary::default(), loading)?;
         }
         Ok(file)
     }
@@ -297,14 +298,12 @@ impl Bodies {
                 vertices.n_coincident = Some(weld.n_welded());
             }
         }
+        let mut told = Vertices::default();
         if loading.notes {
             // The last line of the answer says how many were welded.
-            let told = Vertices {
-                n_welded: 0,
-                ..vertices
-            };
-            note(&name, summary, told);
+            told.n_coincident = vertices.n_coincident;
         }
+        note(&name, summary, told);
         // No coordinate changes its value; this halves the memory if all coordinates fit in f32.
         mesh.positions.narrow_if_exact();
         let Mesh {
@@ -405,39 +404,24 @@ pub fn stdin_bytes(options: &ReadOptions) -> Result<Vec<u8>, Error> {
 
 /// Notes on a file for users who look at primitive numbers, or wonder about pairs.
 pub fn note(name: &str, summary: &Summary, vertices: Vertices) {
-    // A note that nobody can read does no harm.
-    let tell = |what: String| _ = writeln!(stderr(), "note: {}: {what}", printable(name));
-    if let Some(unit) = summary.unit {
-        tell(format!(
-            "its unit is the {unit}; numbers are read as they are, whatever the unit of other files"
-        ));
-    }
-    for (n, what) in [
-        (
-            summary.n_polygons_fanned,
-            "polygons split into triangles (primitive numbers count the triangles)",
-        ),
-        (
-            summary.n_triangles_skipped,
-            "triangles skipped, because the file has tetrahedra",
-        ),
-        (
-            summary.n_lines_skipped,
-            "lines skipped, which are edges or faces of two corners",
-        ),
-        (
-            summary.n_at_rest,
-            "meshes with a skin or morph targets, which are not applied: they are read at rest",
-        ),
+    let counts = [
         (vertices.n_welded as u64, "vertices welded to others"),
         (
             vertices.n_coincident.unwrap_or(0) as u64,
             "vertices at the position of another, not welded to it",
         ),
-    ] {
-        if n > 0 {
-            tell(format!("{what}: {}", grouped(n)));
-        }
+    ];
+    let counts = counts.into_iter().filter(|&(n, _)| n > 0);
+    let counts = counts.map(|(n, what)| format!("{what}: {}", grouped(n)));
+    let notes: Vec<String> = summary.notes().into_iter().chain(counts).collect();
+    tell(name, &notes);
+}
+
+/// Prints notes on a file on standard error.
+pub fn tell(name: &str, notes: &[String]) {
+    for note in notes {
+        // A note that nobody can read does no harm.
+        let _ = writeln!(stderr(), "note: {}: {note}", printable(name));
     }
 }
 

@@ -153,6 +153,7 @@ pub fn _fix<'py>(
             result: Ok(counts),
             places: places.to_vec(),
             marks: None,
+            notes: Vec::new(),
         };
         let mut row = row.to_json();
         row.as_object_mut().map(|row| row.remove("path"));

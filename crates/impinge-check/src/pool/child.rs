@@ -11,7 +11,7 @@ use serde_json::Value;
 
 use crate::marks::MarkRuns;
 use crate::row::{ErrorKind, Row};
-use crate::worker::MARKS;
+use crate::worker::{MARKS, NOTES};
 
 /// How often a waiting thread checks for cancellation.
 const GLANCE: Duration = Duration::from_millis(50);
@@ -164,11 +164,15 @@ impl Drop for Child {
     }
 }
 
-/// The row of a child's line, with the marks that were asked for.
+/// The row of a child's line, with its notes and the marks that were asked for.
 fn of_child(value: &Value) -> Option<Row> {
     let mut row = Row::from_json(value)?;
     if let Some(marks) = value.get(MARKS) {
         row.marks = Some(MarkRuns::from_json(marks)?);
+    }
+    if let Some(Value::Array(notes)) = value.get(NOTES) {
+        let notes = notes.iter().filter_map(Value::as_str);
+        row.notes = notes.map(str::to_owned).collect();
     }
     Some(row)
 }

@@ -24,6 +24,7 @@ pub use self::args::{CHECK_EXAMPLES, CheckArgs, CheckWorkerArgs, FailOn};
 pub use self::ending::fail;
 use crate::apart::Inputs;
 use crate::error::Error;
+use crate::load::tell;
 use crate::output;
 use crate::stop::Patience;
 use crate::watch::Watch;
@@ -83,6 +84,9 @@ pub fn check(args: &CheckArgs, cancel: &CancelToken) -> Result<(), Error> {
         }
     };
     drop(watch);
+    for row in &rows {
+        tell(&row.path, &row.notes);
+    }
     if args.shows() {
         mark(args, &mut rows, cancel)?;
     }

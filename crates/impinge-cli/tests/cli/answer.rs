@@ -279,9 +279,69 @@ fn polygons_are_fanned_with_a_note() {
     let run = folder.run(["self", "quad.obj"]);
     let expected = "note: quad.obj: polygons split into triangles (primitive numbers count the triangles): 1\n";
     assert_eq!(run.stderr, expected);
-    let object = folder.run(["self", "quad.obj", "--json"]).json();
+    let run = folder.run(["self", "quad.obj", "--json"]);
+    assert_eq!(run.stderr, expected);
+    let object: Value = serde_json::from_str(&run.printed()).unwrap();
     assert_eq!(object["bodies"][0]["elements"], json!(2));
     assert_eq!(object["stats"]["grid"], Value::Null);
+}
+
+#[test]
+fn what_was_left_out_is_told_by_all_commands() {
+    let folder = Folder::new();
+    folder.text(
+        "t2.vtk",
+        "# vtk DataFile Version 3.0\nt\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 4 double\n\
+         0 0 0 1 0 0 0 1 0 0 0 1\nCELLS 2 9\n4 0 1 2 3\n3 0 1 2\nCELL_TYPES 2\n10\n5\n",
+    );
+    let note = "note: t2.vtk: triangles skipped, because the file has tetrahedra: 1\n";
+    for args in [
+        &["self", "t2.vtk"][..],
+        &["self", "t2.vtk", "--json"],
+        &["check", "t2.vtk"],
+        &["check", "t2.vtk", "--json"],
+    ] {
+        assert_eq!(folder.run(args).stderr, note, "{args:?}");
+    }
+}
+
+#[test]
+fn notes_on_a_file_of_parts_name_the_file() {
+    let folder = Folder::new();
+    let bytes = "AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA";
+    let text = r#"{"asset":{"version":"2.0"},"scenes":[{"nodes":[0,1]},{"nodes":[2]}],
+        "nodes":[{"mesh":0,"name":"A"},{"mesh":0,"name":"B","skin":0},{"mesh":0,"name":"C"}],
+        "meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],
+        "accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"}],
+        "bufferViews":[{"buffer":0,"byteLength":36}],
+        "buffers":[{"byteLength":36,"uri":"data:application/octet-stream;base64,BYTES"}]}"#;
+    folder.text("abc.gltf", &text.replace("BYTES", bytes));
+    let notes = "note: abc.gltf: meshes with a skin or morph targets, which are not applied: they are read at rest: 1\n\
+                 note: abc.gltf: nodes with a mesh left out, because they are not in the default scene: 1\n";
+    for args in [
+        &["pairs", "abc.gltf"][..],
+        &["pairs", "abc.gltf", "--json"],
+        &["check", "--assembly", "abc.gltf"],
+    ] {
+        assert_eq!(folder.run(args).stderr, notes, "{args:?}");
+    }
+}
+
+#[test]
+fn objects_of_one_name_meet() {
+    let folder = Folder::new();
+    let one = "o x\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf -3 -2 -1\n";
+    let other = "o x\nv 0.2 0.2 -1\nv 0.2 0.2 1\nv 5 5 1\nf -3 -2 -1\n";
+    folder.text(
+        "f.obj",
+        &format!(
+            "{one}{other}{}",
+            one.replace("o x", "o y").replace(" 0\n", " 9\n")
+        ),
+    );
+    let object = folder.run(["pairs", "f.obj", "--json"]).json();
+    assert_eq!(object["bodies"][1]["name"], "x (2)", "{object}");
+    assert_eq!(object["pairs"], 1, "{object}");
 }
 
 /// Writes `n` triangles turned around one axis that passes through all of them: each meets each.

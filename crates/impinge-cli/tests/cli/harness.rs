@@ -45,10 +45,11 @@ impl Run {
         self.stdout
     }
 
-    /// Asserts exit code 0, nothing on standard error and one JSON object on one line.
+    /// Asserts exit code 0, nothing but notes on standard error and one JSON object on one line.
     #[track_caller]
     pub fn json(self) -> Value {
-        assert_eq!(self.stderr, "");
+        let is_note = |line: &str| line.starts_with("note: ");
+        assert!(self.stderr.lines().all(is_note), "{}", self.stderr);
         let text = self.printed();
         assert!(
             text.ends_with('\n') && text.trim_end().lines().count() == 1,

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use impinge::CancelToken;
 use impinge_check::{Assembly, AssemblyError, AssemblyOptions, Relation, check_assembly_with};
-use impinge_io::{Format, Mesh, ReadOptions, printable, read, read_bodies};
+use impinge_io::{Format, Mesh, ReadOptions, printable, read_bodies, read_with_summary};
 use serde_json::{Value, json};
 
 use super::args::{CheckArgs, FailOn, Touching};
@@ -13,7 +13,7 @@ use super::html::write_assembly;
 use super::relations::{matrix, said, summary};
 use super::say_wrote;
 use crate::error::Error;
-use crate::load::part_name;
+use crate::load::{part_name, tell};
 use crate::output::out;
 use crate::text::{counted, several};
 use crate::watch::{Watch, go_on};
@@ -107,9 +107,12 @@ fn parts(path: &Path, are_several: bool) -> Result<Vec<(String, Mesh)>, Error> {
         Format::Gltf | Format::ThreeMf | Format::Obj
     );
     if !has_parts {
-        return Ok(vec![(file, read(path, &options)?)]);
+        let (mesh, summary) = read_with_summary(path, &options)?;
+        tell(&file, &summary.notes());
+        return Ok(vec![(file, mesh)]);
     }
-    let (bodies, _) = read_bodies(path, &options)?;
+    let (bodies, summary) = read_bodies(path, &options)?;
+    tell(&file, &summary.notes());
     let named = bodies
         .into_iter()
         .map(|body| (part_name(&file, body.name, are_several), body.mesh));
