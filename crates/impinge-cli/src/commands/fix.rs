@@ -7,8 +7,8 @@ use std::path::Path;
 
 use impinge_check::{Counts, FixError, FixOptions, Fixed, Place, Repair, Report, Row, fix_mesh};
 use impinge_io::{
-    Cell, ColoredMesh, ELEMENTS, Elements, Mesh, ReadOptions, printable, read, read_bytes,
-    write_obj, write_ply, write_stl,
+    Cell, ColoredMesh, ELEMENTS, Elements, Mesh, ReadOptions, Summary, printable,
+    read_bytes_with_summary, read_with_summary, write_obj, write_ply, write_stl,
 };
 use serde_json::{Map, Value, json};
 
@@ -16,7 +16,7 @@ pub use self::args::{FIX_EXAMPLES, FixArgs};
 use crate::apart::Inputs;
 use crate::commands::check::{FailOn, fail};
 use crate::error::Error;
-use crate::load::{NAME_OF_STDIN, STDIN, format_of_stdin, stdin_bytes};
+use crate::load::{NAME_OF_STDIN, STDIN, format_of_stdin, stdin_bytes, tell};
 use crate::output;
 use crate::rows;
 use crate::text::{counted, several};
@@ -43,7 +43,9 @@ pub fn fix(args: &FixArgs) -> Result<(), Error> {
         close_holes: args.close_holes.unwrap_or(0),
         threads: args.threads.map_or(0, usize::from),
     };
-    let fixed = fix_mesh(read_mesh(args)?, &options).map_err(|error| match error {
+    let (mesh, summary) = read_mesh(args)?;
+    tell(&args.mesh.display().to_string(), &summary.notes());
+    let fixed = fix_mesh(mesh, &options).map_err(|error| match error {
         FixError::Refused(source) => Error::Refused {
             what: args.mesh.display().to_string(),
             source,
@@ -67,7 +69,10 @@ pub fn fix(args: &FixArgs) -> Result<(), Error> {
     if args.json {
         writeln!(output::out(), "{}", object(args, &options, &fixed))?;
     } else {
-        output::say(text(args, &options, &fixed).as_bytes(), rows_file.as_ref())?;
+        output::say(
+            text(args, &options, &fixed, &summary).as_bytes(),
+            rows_file.as_ref(),
+        )?;
     }
     fail(&Report {
         rows: &[row(&args.out.path, false, fixed.after, &fixed.places_after)],
@@ -75,14 +80,19 @@ pub fn fix(args: &FixArgs) -> Result<(), Error> {
     })
 }
 
-fn read_mesh(args: &FixArgs) -> Result<Mesh, Error> {
+fn read_mesh(args: &FixArgs) -> Result<(Mesh, Summary), Error> {
     let options = ReadOptions::as_they_are();
     if args.mesh != Path::new(STDIN) {
-        return Ok(read(&args.mesh, &options)?);
+        return Ok(read_with_summary(&args.mesh, &options)?);
     }
     let format = format_of_stdin(args.format)?;
     let bytes = stdin_bytes(&options)?;
-    Ok(read_bytes(&bytes, format, NAME_OF_STDIN, &options)?)
+    Ok(read_bytes_with_summary(
+        &bytes,
+        format,
+        NAME_OF_STDIN,
+        &options,
+    )?)
 }
 
 fn write(args: &FixArgs, mesh: &Mesh) -> Result<(), Error> {
@@ -114,6 +124,7 @@ fn row(path: &Path, is_welded: bool, counts: Counts, places: &[Place]) -> Row {
         is_welded,
         result: Ok(counts),
         marks: None,
+        notes: Vec::new(),
         places: places.to_vec(),
     }
 }
@@ -143,7 +154,7 @@ fn object(args: &FixArgs, options: &FixOptions, fixed: &Fixed) -> Value {
 }
 
 /// What was done, what is left, and what to do next.
-fn text(args: &FixArgs, options: &FixOptions, fixed: &Fixed) -> String {
+fn text(args: &FixArgs, options: &FixOptions, fixed: &Fixed, summary: &Summary) -> String {
     let done = &fixed.repairs;
     let size = |counts: &Counts| {
         let faces = counted(counts.n_triangles, "face");
@@ -199,6 +210,11 @@ fn text(args: &FixArgs, options: &FixOptions, fixed: &Fixed) -> String {
             "shells without volume",
         ),
         (
+            u64::from(after.volume.is_some_and(|volume| volume < 0.0)),
+            "closed surface inside out",
+            "",
+        ),
+        (
             after.unused_vertices,
             "vertex of no face",
             "vertices of no face",
@@ -213,6 +229,21 @@ fn text(args: &FixArgs, options: &FixOptions, fixed: &Fixed) -> String {
         false => left.join(", "),
     };
     text += &format!("left: {left}\n");
+    let not_kept = [
+        (summary.n_parts_joined, "name of a part", "names of parts"),
+        (
+            summary.n_polygons_fanned,
+            "polygon, now triangles",
+            "polygons, now triangles",
+        ),
+    ];
+    let not_kept = not_kept.into_iter().filter(|&(n, ..)| n > 0);
+    let not_kept: Vec<String> = not_kept
+        .map(|(n, one, many)| several(n, one, many))
+        .collect();
+    if !not_kept.is_empty() {
+        text += &format!("not kept: {}\n", not_kept.join("; "));
+    }
     let is_stl = args.out.format == MendedFormat::Stl;
     if is_stl && fixed.has_seams() {
         text += "note: STL has positions alone, so readers join again what was split; PLY and OBJ keep it apart\n";

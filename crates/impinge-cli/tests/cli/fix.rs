@@ -261,3 +261,27 @@ fn stl_keeps_the_bits_and_says_that_it_joins_what_was_split() {
         assert_eq!(count(&format!("{name}.stl")), count(&format!("{name}.obj")));
     }
 }
+
+#[test]
+fn what_stays_inside_out_and_what_is_not_kept_is_said() {
+    let folder = Folder::new();
+    let turned = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\no t\nf 1 2 3\nf 1 4 2\nf 2 4 3\nf 1 3 4\n";
+    folder.text("inv.obj", turned);
+    let args = ["fix", "inv.obj", "--out", "o.obj", "--skip", "outward"];
+    let text = folder.run(args).printed();
+    assert!(
+        text.contains("\nleft: 1 closed surface inside out\n"),
+        "{text}"
+    );
+    assert!(text.contains("\nnot kept: 1 name of a part\n"), "{text}");
+    let text = folder.run(["fix", "inv.obj", "--out", "p.obj"]).printed();
+    assert!(text.contains("\nleft: nothing\n"), "{text}");
+
+    let quad = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n";
+    folder.text("quad.obj", quad);
+    let text = folder.run(["fix", "quad.obj", "--out", "q.obj"]).printed();
+    assert!(
+        text.contains("\nnot kept: 1 polygon, now triangles\n"),
+        "{text}"
+    );
+}
