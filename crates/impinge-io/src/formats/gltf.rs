@@ -4,8 +4,8 @@
 //! Source: Khronos, "glTF 2.0 Specification". Triangles, strips and fans are read; points and lines
 //! are counted. Within a node, primitives that use the same positions share their vertices.
 //! Positions stay f32 if no node moves them; otherwise they are computed in f64 (each sum and
-//! product rounded to nearest) and stay f64. Faces of a node that mirrors are turned, so that matter
-//! stays inside. Skins and morph targets are not applied: the mesh is in its rest pose.
+//! product rounded to nearest) and stay f64. Faces of a node that mirrors are turned, so that
+//! matter stays inside. Skins and morph targets are not applied: the mesh is in its rest pose.
 
 mod accessor;
 mod json;
