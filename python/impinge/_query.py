@@ -103,8 +103,8 @@ class Query:
         All pairs of one body, self-collision included.
     kinds : sequence of {"vf", "ee", "ev", "vv", "ef", "ff"}
         Which kinds of pairs: of vertices, edges and faces. `Detector.detect`, `count` and `any` are about the elements that bodies were
-        given as, and take none. Steps and candidates: by default ``"vf"`` and ``"ee"``, and ``"ev"`` and ``"vv"`` where bodies have no
-        faces. `Detector.near`: these and ``"ef"``. Kinds that are named count for all bodies: ``"ev"`` also for those with faces.
+        given as, and take none. Steps and candidates: by default ``"vf"`` and ``"ee"``, ``"ev"`` where neither
+        body has faces, and ``"vv"`` where both are bodies of points. `Detector.near`: these and ``"ef"``. Kinds that are named count for all bodies: ``"ev"`` also for those with faces.
         Vertices of no element have no pairs.
     shared_vertex : {"resolve", "skip"}
         `Detector.detect`, `count` and `any`: elements of one body that share a vertex are reported when they meet in more than what they

@@ -288,7 +288,7 @@ typedef struct impinge_element {
  *                       pairs of `a` and any other, whatever filters say, its self-collision, or both, as between and self say.
  *   shared_vertex       Default: IMPINGE_RESOLVE.
  *   kinds               Bits of IMPINGE_VF ..., for steps (but EF and FF), candidates and near pairs. 0, the default: VF and EE; near pairs
- *                       also EF; EV and VV where bodies have no faces.
+ *                       also EF; EV where neither body has faces, VV where both are bodies of points.
  *   flags IMPINGE_CELL, cell_low, cell_high
  *                       Only the pairs of the half-open box [low, high): those for which it holds the larger of the lower
  *                       corners of the boxes of both elements, axis by axis. Cells that cover space have each pair once. Bounds may be

@@ -71,7 +71,10 @@ fn checked(path: &Path, options: &Options, notes: &mut Vec<String>) -> Result<Ch
         },
         message: one_line(&error.to_string()),
     })?;
-    *notes = summary.notes();
+    // What is left out: units of one file and polygons of any are as good as others.
+    let mut left_out = summary;
+    (left_out.unit, left_out.n_polygons_fanned) = (None, 0);
+    *notes = left_out.notes();
     check_mesh(mesh, options).map_err(|error| Failure {
         kind: match error {
             impinge::Error::NonFinitePosition { .. } => ErrorKind::NotFinite,

@@ -137,7 +137,7 @@ pub struct Row {
     /// Which problems each primitive has: see [`Options::marks`](crate::Options::marks). Not part
     /// of the [object](Self::to_json).
     pub marks: Option<MarkRuns>,
-    /// What was left out of the file, or changed: see
+    /// What was left out of the file: see
     /// [`Summary::notes`](impinge_io::Summary::notes). Not part of the [object](Self::to_json).
     pub notes: Vec<String>,
 }

@@ -162,10 +162,6 @@ mod tests {
         assert_eq!(Error::Usage(String::new()).exit_code(), 2);
         assert_eq!(Error::Detection(impinge::Error::Cancelled).exit_code(), 1);
         assert_eq!(
-            Error::Output(io::ErrorKind::BrokenPipe.into()).exit_code(),
-            0
-        );
-        assert_eq!(
             Error::Output(io::ErrorKind::StorageFull.into()).exit_code(),
             1
         );

@@ -303,6 +303,12 @@ fn what_was_left_out_is_told_by_all_commands() {
     ] {
         assert_eq!(folder.run(args).stderr, note, "{args:?}");
     }
+    // Nothing is left out of quads.
+    folder.text(
+        "quad.obj",
+        "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n",
+    );
+    assert_eq!(folder.run(["check", "quad.obj"]).stderr, "");
 }
 
 #[test]
