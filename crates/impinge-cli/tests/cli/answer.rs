@@ -298,6 +298,7 @@ fn what_was_left_out_is_told_by_all_commands() {
     for args in [
         &["self", "t2.vtk"][..],
         &["self", "t2.vtk", "--json"],
+        &["step", "t2.vtk", "t2.vtk", "--json"],
         &["check", "t2.vtk"],
         &["check", "t2.vtk", "--json"],
     ] {

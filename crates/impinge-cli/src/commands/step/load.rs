@@ -126,14 +126,15 @@ impl Moving {
                 vertices.n_coincident = Some(weld.n_welded());
             }
         }
-        if !args.json {
+        let told = match args.json {
+            true => Vertices::default(),
             // The last line of the answer says how many were welded.
-            let told = Vertices {
+            false => Vertices {
                 n_welded: 0,
                 ..vertices
-            };
-            note(&names[0], &summary, told);
-        }
+            },
+        };
+        note(&names[0], &summary, told);
         // No coordinate changes its value; this halves the memory if all coordinates fit in f32.
         at_start.positions.narrow_if_exact();
         at_end.positions.narrow_if_exact();
