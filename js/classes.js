@@ -167,6 +167,10 @@ class Moves {
     this.#last.set(which, this.#n);
   }
 
+  forget(which) {
+    this.#last.delete(which);
+  }
+
   now() {
     return { of: this, n: this.#n };
   }
@@ -242,6 +246,7 @@ export function makeScene({ SceneHandle }, mustBeReady) {
 
     remove(which) {
       call(() => this.#held.remove(body(which)));
+      this.#moves.forget(which);
     }
 
     remesh(which, mesh) {
