@@ -246,9 +246,10 @@ impl Bodies {
     ) -> Result<(BodyId, Option<Weld>), Error> {
         let format = self.format(path, loading)?;
         let (name, (meshes, summary)) = self.read_one(path, format, false, loading)?;
+        tell(&name, &summary.notes());
         let mut added = None;
         for NamedMesh { mesh, .. } in meshes {
-            added = Some(self.add_mesh(name.clone(), format, mesh, &summary, loading)?);
+            added = Some(self.add_mesh(name.clone(), format, mesh, loading)?);
         }
         // A file is one mesh, unless its parts are asked for.
         added.ok_or_else(|| Error::Usage(format!("{name}: no mesh")))
@@ -268,7 +269,7 @@ impl Bodies {
         tell(&file, &summary.notes());
         for NamedMesh { name, mesh } in meshes {
             let name = part_name(&file, name, several);
-            self.add_mesh(name, format, mesh, &Summary::default(), loading)?;
+            self.add_mesh(name, format, mesh, loading)?;
         }
         Ok(file)
     }
@@ -278,7 +279,6 @@ impl Bodies {
         name: String,
         format: Format,
         mut mesh: Mesh,
-        summary: &Summary,
         loading: Loading<'_>,
     ) -> Result<(BodyId, Option<Weld>), Error> {
         let welds = loading.welds(format);
@@ -298,12 +298,9 @@ impl Bodies {
                 vertices.n_coincident = Some(weld.n_welded());
             }
         }
-        let mut told = Vertices::default();
         if loading.notes {
-            // The last line of the answer says how many were welded.
-            told.n_coincident = vertices.n_coincident;
+            tell_coincident(&name, vertices);
         }
-        note(&name, summary, told);
         // No coordinate changes its value; this halves the memory if all coordinates fit in f32.
         mesh.positions.narrow_if_exact();
         let Mesh {
@@ -402,19 +399,12 @@ pub fn stdin_bytes(options: &ReadOptions) -> Result<Vec<u8>, Error> {
     Ok(bytes)
 }
 
-/// Notes on a file for users who look at primitive numbers, or wonder about pairs.
-pub fn note(name: &str, summary: &Summary, vertices: Vertices) {
-    let counts = [
-        (vertices.n_welded as u64, "vertices welded to others"),
-        (
-            vertices.n_coincident.unwrap_or(0) as u64,
-            "vertices at the position of another, not welded to it",
-        ),
-    ];
-    let counts = counts.into_iter().filter(|&(n, _)| n > 0);
-    let counts = counts.map(|(n, what)| format!("{what}: {}", grouped(n)));
-    let notes: Vec<String> = summary.notes().into_iter().chain(counts).collect();
-    tell(name, &notes);
+/// A note on vertices that are not welded. The last line of the answer says how many are.
+pub fn tell_coincident(name: &str, vertices: Vertices) {
+    if let Some(n @ 1..) = vertices.n_coincident {
+        let what = "vertices at the position of another, not welded to it";
+        tell(name, &[format!("{what}: {}", grouped(n as u64))]);
+    }
 }
 
 /// Prints notes on a file on standard error.

@@ -74,33 +74,38 @@ impl Faces {
 
     /// The first place where they differ from those of the mesh.
     fn mismatch(&self, mesh: &Faces, file: &Path) -> Error {
-        let counts = |of: &Faces| (of.0.len() + of.1.len()) as u64;
         let file = file.display().to_string();
-        if counts(self) != counts(mesh) {
-            return Error::Mismatch {
-                file,
-                what: "faces of a frame, as the mesh has".to_owned(),
-                expected: counts(mesh),
-                found: counts(self),
-            };
+        let counts = [(mesh.0.len(), self.0.len()), (mesh.1.len(), self.1.len())];
+        if let Some(&(expected, found)) = counts.iter().find(|(mesh, own)| mesh != own) {
+            return mismatch(&file, "faces of a frame, as the mesh has", expected, found);
         }
-        let all = |of: &Faces| -> Vec<Vec<u32>> {
-            let faces = of.0.iter().map(|face| face.to_vec());
-            faces.chain(of.1.iter().map(|cell| cell.to_vec())).collect()
-        };
-        let (own, others) = (all(self), all(mesh));
-        let pairs = own.iter().zip(&others).enumerate();
-        let differing = pairs.clone().find_map(|(face, (own, other))| {
-            let corner = own.iter().zip(other).find(|(own, other)| own != other)?;
-            Some((face, corner))
-        });
-        let (face, (found, expected)) = differing.unwrap_or((0, (&0, &0)));
-        Error::Mismatch {
-            file,
-            what: format!("as the vertex of face {face}, which the mesh has"),
-            expected: u64::from(*expected),
-            found: u64::from(*found),
-        }
+        let of_triangles = first_difference(&self.0, &mesh.0);
+        let differing = of_triangles.or_else(|| first_difference(&self.1, &mesh.1));
+        let (face, [expected, found]) = differing.unwrap_or_default();
+        let what = format!("as the vertex of face {face}, which the mesh has");
+        mismatch(&file, &what, expected as usize, found as usize)
+    }
+}
+
+/// The first face that differs from that of the mesh, and the first of its vertices that does: that
+/// of the mesh, and its own.
+fn first_difference<const N: usize>(
+    own: &[[u32; N]],
+    mesh: &[[u32; N]],
+) -> Option<(usize, [u32; 2])> {
+    let mut faces = mesh.iter().zip(own).enumerate();
+    faces.find_map(|(face, (mesh, own))| {
+        let (&mesh, &own) = mesh.iter().zip(own).find(|(mesh, own)| mesh != own)?;
+        Some((face, [mesh, own]))
+    })
+}
+
+fn mismatch(file: &str, what: &str, expected: usize, found: usize) -> Error {
+    Error::Mismatch {
+        file: file.to_owned(),
+        what: what.to_owned(),
+        expected: expected as u64,
+        found: found as u64,
     }
 }
 
@@ -234,12 +239,6 @@ impl Sequence {
     /// [`Error::Mismatch`] if there is no such frame, or a numbered file has another number of
     /// vertices or other faces; [`Error::NotFinite`]; as [`read`](crate::read) for numbered files.
     pub fn frame(&self, frame_ix: usize) -> Result<Positions, Error> {
-        let mismatch = |file: &str, what: &str, expected: usize, found: usize| Error::Mismatch {
-            file: file.to_owned(),
-            what: what.to_owned(),
-            expected: expected as u64,
-            found: found as u64,
-        };
         if frame_ix >= self.n_frames {
             return Err(mismatch(
                 &self.name,

@@ -41,14 +41,7 @@ pub fn check(args: &CheckArgs, cancel: &CancelToken) -> Result<(), Error> {
         rows::refuse(file)?;
         inputs.check("--rows", &file.path)?;
     }
-    let mesh = match &args.out {
-        Some(args::Out::Mesh(file)) => Some(("--out", file.path.as_path())),
-        _ => None,
-    };
-    let summary = args.summary.as_deref().map(|path| ("--summary", path));
-    let html = args.html.as_ref().map(|file| ("--html", file.0.as_path()));
-    let png = args.png.as_ref().map(|file| ("--png", file.0.as_path()));
-    for (option, path) in [mesh, summary, html, png].into_iter().flatten() {
+    for (option, path) in args.outputs() {
         inputs.check(option, path)?;
     }
     if args.keep_seams && matches!(args.out, Some(args::Out::Folder(_))) {

@@ -41,8 +41,7 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
     let loading = loading.asked(weld, asked.within, args.ask.read.format);
     let mut bodies = Bodies::default();
     let (moving, weld) = bodies.add(&args.mesh, loading)?;
-    let mut frames = Frames::open(&args.sequence, weld, args.ask.json)?;
-    frames.sequence.check_faces(&args.mesh)?;
+    let mut frames = Frames::open(&args.sequence, &args.mesh, weld, args.ask.json)?;
     for other in &args.others {
         bodies.add(other, loading)?;
     }
@@ -232,8 +231,15 @@ pub(super) struct Frames {
 }
 
 impl Frames {
-    pub(super) fn open(path: &Path, weld: Option<Weld>, json: bool) -> Result<Self, Error> {
+    /// Opens the frames of a mesh, which was welded so.
+    pub(super) fn open(
+        path: &Path,
+        mesh: &Path,
+        weld: Option<Weld>,
+        json: bool,
+    ) -> Result<Self, Error> {
         let sequence = Sequence::open(path)?;
+        sequence.check_faces(mesh)?;
         let mut after_gaps = Vec::new();
         for [before, after] in sequence.gaps() {
             after_gaps.extend(sequence.files().iter().position(|file| file == after));

@@ -164,7 +164,7 @@ fn content(args: &ViewArgs, cancel: &CancelToken) -> Result<(Content, Vec<Vertic
         FrameFiles::None => still.insert(0, files.mesh.to_owned()),
         FrameFiles::Sequence(path) => {
             let (body, weld) = bodies.add(files.mesh, loading)?;
-            let source = Source::Sequence(Frames::open(path, weld, false)?);
+            let source = Source::Sequence(Frames::open(path, files.mesh, weld, false)?);
             frames = Some(Arc::new(Moving { body, source }));
         }
         FrameFiles::Each(paths) => {

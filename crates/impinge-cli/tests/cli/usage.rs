@@ -317,14 +317,17 @@ fn two_outputs_are_two_files() {
 fn closed_pipes_are_no_panic() {
     let folder = Folder::new();
     folder.ply("a.ply", &ball(200));
+    let unread = |args: &[&str]| {
+        let (reader, writer) = std::io::pipe().unwrap();
+        drop(reader);
+        folder.command(args).stdout(writer).output().unwrap()
+    };
     for args in [
         &["pairs", "a.ply", "a.ply", "--json"][..],
         &["self", "a.ply"],
         &["--help"],
     ] {
-        let (reader, writer) = std::io::pipe().unwrap();
-        drop(reader);
-        let output = folder.command(args).stdout(writer).output().unwrap();
+        let output = unread(args);
         assert_eq!(String::from_utf8(output.stderr).unwrap(), "", "{args:?}");
         assert_eq!(output.status.code(), Some(0), "{args:?}");
     }
@@ -361,10 +364,7 @@ fn closed_pipes_are_no_panic() {
         ],
     ] {
         folder.ply("n_1.ply", &ball(200));
-        let (reader, writer) = std::io::pipe().unwrap();
-        drop(reader);
-        let output = folder.command(args).stdout(writer).output().unwrap();
-        assert_eq!(output.status.code(), Some(3), "{args:?}");
+        assert_eq!(unread(args).status.code(), Some(3), "{args:?}");
         std::fs::remove_file(folder.path("o.csv")).expect("rows");
     }
     // Standard error may be closed as well: the exit code is still right.

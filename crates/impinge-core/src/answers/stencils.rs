@@ -514,11 +514,7 @@ impl PartOfBody<'_> {
 
     #[inline(always)]
     fn corners<'b>(&'b self, element: &'b ElementIx) -> &'b [u32] {
-        match self.part {
-            // Vertices are numbered as positions are.
-            Part::Vertices => element.as_corners(),
-            _ => self.elements.corners(element.index()),
-        }
+        self.elements.corners_in(self.part, element)
     }
 }
 

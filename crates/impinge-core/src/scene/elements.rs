@@ -2,6 +2,7 @@
 
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
+use crate::scene::index::ElementIx;
 use crate::scene::words::words;
 
 /// The kind of elements of a body, or of one of its parts.
@@ -80,6 +81,16 @@ impl Elements {
     #[inline(always)]
     pub fn corners(&self, element: usize) -> &[u32] {
         with_corners!(self, |corners| &corners[element])
+    }
+
+    /// The same of an element of a part, whose elements these are; vertices are numbered as positions
+    /// are.
+    #[inline(always)]
+    pub(crate) fn corners_in<'a>(&'a self, part: Part, element: &'a ElementIx) -> &'a [u32] {
+        match part {
+            Part::Vertices => element.as_corners(),
+            _ => self.corners(element.index()),
+        }
     }
 
     /// The vertex indices of one element; one with fewer than four corners repeats its last.

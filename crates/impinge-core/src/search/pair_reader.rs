@@ -110,14 +110,9 @@ impl<'a> Held<'a> {
     where
         'a: 'b,
     {
-        let corners = match self.of {
-            // Vertices are numbered as positions are.
-            Part::Vertices => element.as_corners(),
-            _ => self.elements.corners(element.index()),
-        };
         Side {
             positions: self.positions,
-            corners,
+            corners: self.elements.corners_in(self.of, element),
         }
     }
 }

@@ -1,7 +1,7 @@
 //! The command line of `impinge check`.
 
 use std::num::NonZeroUsize;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use clap::builder::PossibleValue;
@@ -144,6 +144,18 @@ pub struct CheckArgs {
 }
 
 impl CheckArgs {
+    /// The files that are written besides rows, and the options that name them.
+    pub fn outputs(&self) -> impl Iterator<Item = (&'static str, &Path)> {
+        let mesh = match &self.out {
+            Some(Out::Mesh(file)) => Some(("--out", file.path.as_path())),
+            _ => None,
+        };
+        let summary = self.summary.as_deref().map(|path| ("--summary", path));
+        let html = self.html.as_ref().map(|file| ("--html", file.0.as_path()));
+        let png = self.png.as_ref().map(|file| ("--png", file.0.as_path()));
+        [mesh, summary, html, png].into_iter().flatten()
+    }
+
     /// Whether meshes are shown, for which their rows need marks.
     pub fn shows(&self) -> bool {
         let is_mesh = matches!(self.out, Some(Out::Mesh(_)));

@@ -48,8 +48,8 @@ pub trait Frames {
     fn read(&self, frame_ix: usize) -> Result<Positions, Error>;
     /// The error for a frame that the library refuses.
     fn refused(&self, frame_ix: usize, source: impinge::Error) -> Error;
-    /// Whether a frame is the one after the frame before it. If some are missing between, there is
-    /// no step: nobody knows how the mesh moved.
+    /// Whether a frame is the one after the frame before it. If some are missing between, which it
+    /// takes note of, there is no step: nobody knows how the mesh moved.
     fn follows(&mut self, frame_ix: usize) -> bool;
     /// Takes note of a frame that was not read or is refused.
     ///

@@ -8,7 +8,7 @@ use impinge_io::{Elements, Format, Mesh, ReadOptions, Weld, printable, read_with
 use crate::args::StepArgs;
 use crate::detection::set_positions;
 use crate::error::Error;
-use crate::load::{Vertices, note, to_elements, to_positions};
+use crate::load::{Vertices, tell, tell_coincident, to_elements, to_positions};
 use crate::watch::go_on;
 
 /// A body as its files have it, before vertices are welded.
@@ -126,15 +126,10 @@ impl Moving {
                 vertices.n_coincident = Some(weld.n_welded());
             }
         }
-        let told = match args.json {
-            true => Vertices::default(),
-            // The last line of the answer says how many were welded.
-            false => Vertices {
-                n_welded: 0,
-                ..vertices
-            },
-        };
-        note(&names[0], &summary, told);
+        tell(&names[0], &summary.notes());
+        if !args.json {
+            tell_coincident(&names[0], vertices);
+        }
         // No coordinate changes its value; this halves the memory if all coordinates fit in f32.
         at_start.positions.narrow_if_exact();
         at_end.positions.narrow_if_exact();
