@@ -4,7 +4,7 @@ import { Advance, Candidates, Contacts, Impacts, NearPairs, Pairs, Penetration, 
 import { Closest, Hits, Neighbours, SafeDistances, Truncation, integers, places, signed } from "./probe.js";
 import { RestPairs, packed, plain, whole, withPoints } from "./query.js";
 import {
-  ImpingeError, MOVES, TAKE_STEP, body, call, disposable, isList, isSingle, kindOf, list, meshOf, mustBeNone, number, numbers, options,
+  MOVES, TAKE_STEP, body, call, disposable, isList, isSingle, kindOf, list, meshOf, mustBeNone, number, numbers, options,
   refuse, wide, word,
 } from "./shared.js";
 
@@ -178,12 +178,9 @@ class Moves {
   mustBe({ of, n }, bodies) {
     if (of !== this) refuse("contacts: contacts of another scene given, those of this scene allowed");
     const moved = bodies.find((which) => this.#last.get(which) > n);
-    if (moved !== undefined) refuse(`body ${moved}: ${OTHER_POSITIONS}, so nothing is known of it; ask again`);
+    if (moved !== undefined) refuse(`body ${moved}: this was found for other positions than it has now, so nothing is known of it; ask again`);
   }
 }
-
-// In the library's words.
-const OTHER_POSITIONS = "this was found for other positions than it has now";
 
 // What the module is answering a question with: freed meanwhile, it would be lost before the module could refuse.
 const busy = new Set();
@@ -263,14 +260,7 @@ export function makeScene({ SceneHandle }, mustBeReady) {
     }
 
     [TAKE_STEP](start, positions) {
-      try {
-        call(() => this.#held.take_step(start, Uint32Array.from(positions.keys()), [...positions.values()]));
-      } catch (error) {
-        const [, moved] = new RegExp(`^body (\\d+): ${OTHER_POSITIONS}`).exec(error.message) ?? [];
-        // After the module four words for each body that there was.
-        const isNew = moved !== undefined && !start.some((word, ix) => ix % 4 === 1 && word === Number(moved));
-        throw isNew ? new ImpingeError("invalid", `body ${moved}: it was added after this was found, so nothing is known of it; ask again`) : error;
-      }
+      call(() => this.#held.take_step(start, Uint32Array.from(positions.keys()), [...positions.values()]));
       for (const which of positions.keys()) this.#moves.add(which);
     }
 

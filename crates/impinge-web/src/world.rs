@@ -256,7 +256,7 @@ impl World {
         let moving = moving.collect::<Result<Vec<_>, Error>>()?;
         let taken = start.take_step(&mut self.scene, &moving);
         match &taken {
-            Err(impinge::Error::Moved { body }) => {
+            Err(impinge::Error::Moved { body } | impinge::Error::Added { body }) => {
                 let number = self.numbers()(body.index() as u32);
                 self.renumbered(number, taken)
             }

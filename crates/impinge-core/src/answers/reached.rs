@@ -98,8 +98,8 @@ impl StepStart {
         positions: &[(BodyId, Positions)],
     ) -> Result<(), Error> {
         for (id, body) in scene.bodies() {
-            let start = self.of_body(id);
-            if start.is_none_or(|start| start.stamp != body.positions_stamp()) {
+            let start = self.of_body(id).ok_or(Error::Added { body: id })?;
+            if start.stamp != body.positions_stamp() {
                 return Err(Error::Moved { body: id });
             }
         }

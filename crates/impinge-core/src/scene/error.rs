@@ -151,12 +151,18 @@ pub enum Error {
         /// The body.
         body: BodyId,
     },
-    /// A step or contacts that were found before a body was moved, re-meshed or added: nothing is
-    /// known of it now. Ask again.
+    /// A step or contacts that were found before a body was moved or re-meshed: nothing is known of
+    /// it now. Ask again.
     #[error(
         "body {body}: this was found for other positions than it has now, so nothing is known of it; ask again"
     )]
     Moved {
+        /// The body.
+        body: BodyId,
+    },
+    /// A step that was found before a body was added: nothing is known of it. Ask again.
+    #[error("body {body}: it was added after this was found, so nothing is known of it; ask again")]
+    Added {
         /// The body.
         body: BodyId,
     },

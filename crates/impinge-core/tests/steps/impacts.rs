@@ -166,30 +166,30 @@ fn a_step_is_taken_from_where_it_was_found_only() {
         truncation.apply(scene)
     }];
     for take in takes {
-        let refused = |scene: &Scene, body: BodyId| {
+        let refused = |scene: &Scene, body: BodyId, text: &str| {
             let mut now = scene.clone();
             let positions = |scene: &Scene| scene.body(other).map(|body| body.positions().clone());
             let error = take(&mut now).expect_err("somewhere else").to_string();
-            let text = "this was found for other positions than it has now";
             assert!(
                 error.starts_with(&format!("body {body}: {text}")),
                 "{error}"
             );
             assert_eq!(positions(&now).ok(), positions(scene).ok());
         };
+        let elsewhere = "this was found for other positions than it has now";
         // A clone does as well, but only once; where it goes to next does not matter.
         let mut taken = scene.clone();
         taken.set_end_positions(other, &lifted(5.0)).expect("good");
         take(&mut taken).expect("the same positions");
-        refused(&taken, other);
+        refused(&taken, other, elsewhere);
         // A body that does not move.
         let mut moved = scene.clone();
         let positions = moved.body(ground).expect("known").positions().clone();
         moved.set_positions(ground, positions).expect("good");
-        refused(&moved, ground);
+        refused(&moved, ground, elsewhere);
         let mut more = scene.clone();
         let new = more.add_points(&[[9.0f32; 3]]).expect("good");
-        refused(&more, new);
+        refused(&more, new, "it was added after this was found");
         // What is gone is met by nothing.
         let mut fewer = scene.clone();
         fewer.remove(ground).expect("known");
