@@ -933,10 +933,9 @@ uint64_t impinge_hash_impacts(const impinge_impact *rows, size_t n);
 /* ---- One pair of elements ---- */
 
 /* The first time at which two elements touch that no scene holds. `kind` is IMPINGE_VF, IMPINGE_EE, IMPINGE_EV or IMPINGE_VV; `start` and
- * `end` have one row per vertex (3 columns of
- * F32 or F64), those of `a` first. separation and clearance are those of `query`, other fields of it are ignored. `found` gets 1 and
- * `toi` the first time, rounded down
- * to F64, or 0 if they do not touch. INVALID: a position that is not finite, another number of rows. */
+ * `end` have one row per vertex (3 columns of F32 or F64), those of `a` first. separation and clearance are those of `query`, other fields
+ * of it are ignored. `found` gets 1 and `toi` the first time, rounded down to F64, or 0 if they do not touch.
+ * INVALID: a position that is not finite, another number of rows. */
 impinge_status impinge_first_contact(uint32_t kind, impinge_array start, impinge_array end, const impinge_step *query, double *toi,
     int32_t *found);
 

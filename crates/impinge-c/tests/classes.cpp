@@ -222,6 +222,38 @@ void probes() {
   throws(IMPINGE_ERROR_INVALID, "no body 9", [&] { detector.contains(scene, 9, points); });
 }
 
+// What belongs to no scene, and rows as types.
+void alone() {
+  const std::array<double, 3> start[] = {{0.25, 0.25, 1}, {0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  double end[4][3] = {{0.25, 0.25, -1}, {0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  CHECK(impinge::first_contact(pair_kind::vf, start, end) == 0.5);
+  const auto kept = impinge::first_contact(pair_kind::vf, start, end, query().separation(0.5));
+  CHECK(kept && *kept <= 0.25 && *kept > 0.2499);
+  end[0][2] = 0.5;
+  CHECK(!impinge::first_contact(pair_kind::vf, start, end));
+  throws(IMPINGE_ERROR_INVALID, "start", [&] { (void)impinge::first_contact(pair_kind::ev, start, end); });
+
+  std::vector<std::array<std::array<double, 3>, 3>> matrices{{{{1, 0, 0}, {0, -2, 0}, {0, 0, 3}}}, {{{0, 1, 0}, {1, 0, 0}, {0, 0, 0}}}};
+  impinge::project_psd(matrices);
+  const auto near = [](double a, double b) { return a > b - 1e-12 && a < b + 1e-12; };
+  CHECK(matrices[0][1][1] == 0 && near(matrices[0][0][0], 1) && near(matrices[0][2][2], 3));
+  CHECK(near(matrices[1][0][0], 0.5) && near(matrices[1][0][1], 0.5) && near(matrices[1][1][0], 0.5));
+  CHECK(strcmp(impinge::version(), impinge_version()) == 0);
+
+  impinge::scene scene;
+  const float points[] = {0, 0, 0, 1, 2, 3};
+  const double moved[16] = {1, 0, 0, 5, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
+  const auto b = scene.add_points(points);
+  const auto at = impinge::as_rows<std::array<float, 3>>(scene.positions(b));
+  CHECK(at.size() == 2 && at[1][2] == 3);
+  scene.set_transform(b, moved);
+  CHECK((impinge::as_rows<std::array<float, 3>>(scene.positions(b))[1][0] == 6));
+  throws(IMPINGE_ERROR_INVALID, "as_rows", [&] { (void)impinge::as_rows<std::array<double, 3>>(scene.positions(b)); });
+  throws(IMPINGE_ERROR_INVALID, "as_rows", [&] { (void)impinge::as_rows<std::array<float, 2>>(scene.positions(b)); });
+  throws(IMPINGE_ERROR_INVALID, "as_rows", [&] { (void)impinge::as_rows<float>(scene.positions(b)); });
+  throws(IMPINGE_ERROR_INVALID, "stride", [&] { scene.set_transform(b, points); });
+}
+
 void callbacks() {
   impinge::scene scene;
   scene.add_triangles(faces(balls[0]), numbers(balls[0]));
@@ -284,12 +316,17 @@ int main() {
   const auto no_rows = scene.set_end_positions(*a, std::vector<double>());
   CHECK(!no_rows && no_rows.status() == IMPINGE_ERROR_INVALID && no_rows.message().find("clear_end_positions") != std::string::npos);
   CHECK(scene.clear_end_positions(*a));
+  const auto odd = impinge::as_rows<std::array<float, 3>>(*scene.positions(*a));
+  CHECK(!odd && odd.status() == IMPINGE_ERROR_INVALID && odd.message().find("as_rows") != std::string::npos);
+  const auto typed = impinge::as_rows<std::array<double, 3>>(*scene.positions(*a));
+  CHECK(typed && typed->size() == VERTICES);
   return finish("classes without exceptions");
 #else
   answers();
   steps();
   probes();
   callbacks();
+  alone();
   return finish("classes");
 #endif
 }

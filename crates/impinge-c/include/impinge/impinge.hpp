@@ -393,6 +393,26 @@ template <class P> result<weld_map> weld(const P &positions) {
   return detail::give(status, std::move(of));
 }
 
+/// The first time at which two elements touch that no scene holds, rounded down; nothing if they do not. One row per vertex, those of the element
+/// that `kind` names first come first. Of the query: separation and clearance.
+template <class S, class E> result<std::optional<double>> first_contact(pair_kind kind, const S &start, const E &end, const query &of = {}) {
+  const impinge_query raw = of.raw();
+  double toi = 0;
+  std::int32_t found = 0;
+  const auto status = impinge_first_contact(static_cast<std::uint32_t>(kind), detail::rows_of(start, 3), detail::rows_of(end, 3), &raw, &toi, &found);
+  return detail::give(status, found != 0 ? std::optional<double>(toi) : std::nullopt);
+}
+
+/// Replaces each symmetric matrix by the nearest one without negative eigenvalues: `stencils::hessians`, times a factor each. The same bits on every
+/// machine.
+template <std::size_t N> result<void> project_psd(std::vector<std::array<std::array<double, N>, N>> &matrices) {
+  static_assert(N == 3 || N == 6 || N == 9 || N == 12, "matrices have 3, 6, 9 or 12 rows");
+  return detail::give(impinge_project_psd(matrices.empty() ? nullptr : matrices.front().front().data(), matrices.size(), N));
+}
+
+/// The version of the library, such as "0.1.0".
+inline const char *version() noexcept { return impinge_version(); }
+
 } // namespace IMPINGE_MODE
 } // namespace impinge
 

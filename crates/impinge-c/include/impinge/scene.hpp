@@ -206,8 +206,14 @@ template <class T> array rows(const T *data, std::size_t n, std::ptrdiff_t row_s
   return {data, n, row_stride, column_stride, detail::type_of<T>()};
 }
 
+namespace detail {
+template <class T> struct is_known : std::false_type {};
+} // namespace detail
+
 /// How objects of a type are read as rows of `columns` numbers. Specialise it for types of your own, as impinge/eigen.hpp does.
-template <class T, class = void> struct as_array;
+template <class T, class = void> struct as_array {
+  static_assert(detail::is_known<T>::value, "no rows of numbers: give a container, an array of C, rows(pointer, n), or a matrix with impinge/eigen.hpp");
+};
 
 template <> struct as_array<array> {
   static array of(const array &given, std::size_t) { return given; }
@@ -221,32 +227,59 @@ struct is_container<T, std::void_t<decltype(std::declval<const T &>().data()), d
     : std::true_type {};
 template <class T, class = void> struct has_scalar : std::false_type {};
 template <class T> struct has_scalar<T, std::void_t<typename T::Scalar>> : std::true_type {};
+
+/// Numbers, each row after the other, or rows of `n` of them.
+template <class T> struct row_of {
+  using number = T;
+  static constexpr std::size_t n = 0;
+};
+template <class T, std::size_t N> struct row_of<std::array<T, N>> {
+  using number = T;
+  static constexpr std::size_t n = N;
+};
+template <class T, std::size_t N> struct row_of<T[N]> {
+  using number = std::remove_cv_t<T>;
+  static constexpr std::size_t n = N;
+};
+template <class Row> array packed_rows(const void *data, std::size_t size, std::size_t columns) {
+  constexpr auto n = row_of<Row>::n;
+  const bool fits = n > 0 ? n == columns : size % columns == 0;
+  // Rows of another length make an array that the library refuses.
+  const std::ptrdiff_t stride = fits ? 0 : 1;
+  return {data, n > 0 ? size : size / columns, stride, stride, type_of<typename row_of<Row>::number>()};
+}
 } // namespace detail
 
 /// Containers with `data()` and `size()`: of numbers (each row after the other), or of `std::array`.
 template <class T> struct as_array<T, std::enable_if_t<detail::is_container<T>::value && !detail::has_scalar<T>::value>> {
-  template <class V, class = void> struct row {
-    using number = V;
-    static constexpr std::size_t n = 0;
-  };
-  template <class V, std::size_t N> struct row<std::array<V, N>> {
-    using number = V;
-    static constexpr std::size_t n = N;
-  };
   static array of(const T &given, std::size_t columns) {
-    using of_row = row<std::remove_cv_t<typename T::value_type>>;
-    using number = typename of_row::number;
-    // Rows of another length make an array that the library refuses.
-    constexpr std::ptrdiff_t odd = 1;
-    const auto data = static_cast<const void *>(given.data());
-    if constexpr (of_row::n > 0) {
-      return {data, given.size(), of_row::n == columns ? 0 : odd, of_row::n == columns ? 0 : odd, detail::type_of<number>()};
-    } else {
-      const std::ptrdiff_t stride = given.size() % columns == 0 ? 0 : odd;
-      return {data, given.size() / columns, stride, stride, detail::type_of<number>()};
-    }
+    return detail::packed_rows<std::remove_cv_t<typename T::value_type>>(given.data(), given.size(), columns);
   }
 };
+
+/// Arrays of C: of numbers (each row after the other), or of rows.
+template <class T, std::size_t N> struct as_array<T[N]> {
+  static array of(const T (&given)[N], std::size_t columns) { return detail::packed_rows<std::remove_cv_t<T>>(given, N, columns); }
+};
+
+/// Rows that the library gives, as their type, which is numbers or `std::array`: `as_rows<std::array<float, 3>>(scene.positions(body))`. Without a
+/// copy. Other numbers, other columns and rows that are not packed are refused.
+template <class Row> result<view<Row>> as_rows(const array &of) {
+  using number = typename detail::row_of<Row>::number;
+  constexpr auto n = sizeof(Row) / sizeof(number), type = static_cast<std::size_t>(detail::type_of<number>());
+  const bool is_packed = of.row_stride == static_cast<std::ptrdiff_t>(sizeof(Row)) && (n == 1 || of.column_stride == static_cast<std::ptrdiff_t>(sizeof(number)));
+  if (of.rows > 0 && (of.type != type || !is_packed)) {
+    const std::string given = "as_rows: rows of type " + std::to_string(of.type) + " with strides " + std::to_string(of.row_stride) + " and ";
+    const std::string allowed = " given, packed rows of " + std::to_string(n) + " numbers of type " + std::to_string(type) + " asked for";
+    const std::string message = given + std::to_string(of.column_stride) + allowed;
+#ifndef IMPINGE_NO_EXCEPTIONS
+    detail::refuse(message.c_str());
+#else
+    return {IMPINGE_ERROR_INVALID, message.c_str()};
+#endif
+  }
+  return view<Row>(static_cast<const Row *>(of.data), of.rows);
+}
 
 namespace detail {
 template <class T> array rows_of(const T &given, std::size_t columns) { return as_array<T>::of(given, columns); }
