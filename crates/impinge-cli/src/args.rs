@@ -81,7 +81,7 @@ pub enum Command {
     /// Find the pairs of elements that intersect, within each mesh
     #[command(name = "self", after_help = SELF_EXAMPLES)]
     Within(WithinArgs),
-    /// Find the smallest distance between two meshes, and where it is
+    /// Find the smallest distance between meshes, and where it is
     #[command(after_help = DISTANCE_EXAMPLES)]
     Distance(DistanceArgs),
     /// Find the elements that are within a distance of each other, and which of their features are
@@ -207,7 +207,9 @@ Examples:
   impinge distance a.obj b.ply
   impinge distance a.obj b.ply --json
   impinge distance a.obj b.ply --below 0.5      a check: exit code 3 if it is less
+  impinge distance robot.glb --exclude 0,1      the two nearest of its nodes, but not 0 and 1
 
+Of more than two bodies, those that are nearest to each other are told.
 The distance is 0 if and only if the meshes touch, which is decided exactly; it is rounded down. Meshes
 of triangles are surfaces: a mesh that lies completely inside another one has a distance from it.";
 
@@ -426,12 +428,16 @@ pub struct PairsArgs {
 
 #[derive(Debug, Args)]
 pub struct DistanceArgs {
-    /// A mesh file
-    #[arg(value_name = "A")]
-    pub a: PathBuf,
-    /// Another mesh file
-    #[arg(value_name = "B")]
-    pub b: PathBuf,
+    /// Mesh files, one per body; of one file, its nodes or groups are the bodies
+    #[arg(value_name = "MESH", required = true)]
+    pub meshes: Vec<PathBuf>,
+    /// What becomes a body of its own [default: file; of one file: nodes or groups]
+    #[arg(long, value_enum, value_name = "WHAT")]
+    pub bodies: Option<BodiesArg>,
+    /// Leave out the pair of bodies A and B, numbered from 0 as given, such as neighbours in a
+    /// joint
+    #[arg(long, value_name = "A,B", value_parser = two_bodies)]
+    pub exclude: Vec<(usize, usize)>,
     /// End with exit code 3 if the distance is less than D, which is decided exactly
     #[arg(long, value_name = "D", allow_negative_numbers = true, value_parser = distance)]
     pub below: Option<f64>,

@@ -102,7 +102,6 @@ impl<'a> Loading<'a> {
     }
 
     /// With what becomes a body of its own, if the user says so.
-    #[cfg(feature = "view")]
     pub fn with_bodies(self, bodies: Option<BodiesArg>) -> Self {
         Loading { bodies, ..self }
     }

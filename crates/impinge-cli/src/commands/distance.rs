@@ -1,13 +1,14 @@
-//! `impinge distance`: the smallest distance between two meshes.
+//! `impinge distance`: the smallest distance between meshes.
 
 use std::io::Write;
 use std::time::Instant;
 
-use impinge::{CancelToken, Control, Detector};
+use impinge::{CancelToken, Control, Detector, Query};
 use impinge_io::printable;
 use serde_json::json;
 
 use crate::args::DistanceArgs;
+use crate::asked::body;
 use crate::detection::{hit, on_cpu};
 use crate::error::Error;
 use crate::load::{Bodies, Loading};
@@ -15,20 +16,40 @@ use crate::output::out;
 
 /// `impinge distance`.
 pub fn distance(args: &DistanceArgs, cancel: &CancelToken) -> Result<(), Error> {
-    let loading = Loading::as_they_are(!args.json, cancel);
-    let paths = [args.a.clone(), args.b.clone()];
+    let loading = Loading::as_they_are(!args.json, cancel)
+        .with_bodies(args.bodies)
+        .splitting_one();
     let Bodies {
         scene, ids, names, ..
-    } = Bodies::read(&paths, loading)?;
+    } = Bodies::read(&args.meshes, loading)?;
+    if ids.len() < 2 {
+        let text = format!(
+            "{}: one body, which has a distance from others only",
+            names[0]
+        );
+        return Err(Error::Usage(text));
+    }
+    let mut query = Query::between_all();
+    for &(a, b) in &args.exclude {
+        let body = |number| body("--exclude", &ids, number);
+        query = query.exclude((body(a)?, body(b)?));
+    }
     let start = Instant::now();
     let mut detector = Detector::new(on_cpu(args.threads))?;
     detector.set_control(Control::new().cancel(cancel));
-    let nearest = detector.distance(&scene, ids[0], ids[1])?;
+    let nearest = detector.nearest(&scene, &query)?;
     let ms = start.elapsed().as_secs_f64() * 1e3;
-    let nearest = nearest
-        .ok_or_else(|| Error::Usage("a mesh without elements has no distance".to_owned()))?;
+    let nearest = nearest.ok_or_else(|| {
+        let text = match args.exclude.is_empty() {
+            true => "a mesh without elements has no distance",
+            false => "no two meshes that have elements and are not excluded, so no distance",
+        };
+        Error::Usage(text.to_owned())
+    })?;
     let (distance, points) = (nearest.distance, nearest.points);
-    let [a, b] = [nearest.a.element, nearest.b.element];
+    let elements = [nearest.a.element, nearest.b.element];
+    let number = |body| ids.iter().position(|&id| id == body).unwrap_or(0);
+    let bodies = [nearest.a.body, nearest.b.body].map(number);
     // A distance that was rounded down is less than a number if and only if the true one is.
     let is_below = args.below.map(|limit| distance < limit);
     let mut to = out();
@@ -36,7 +57,9 @@ pub fn distance(args: &DistanceArgs, cancel: &CancelToken) -> Result<(), Error> 
         let object = json!({
             "distance": distance,
             "below": is_below,
-            "elements": [a, b],
+            "bodies": bodies,
+            "names": bodies.map(|body| names[body].as_str()),
+            "elements": elements,
             "points": points,
             "ms": ms,
         });
@@ -49,9 +72,8 @@ pub fn distance(args: &DistanceArgs, cancel: &CancelToken) -> Result<(), Error> 
         _ => String::new(),
     };
     writeln!(to, "distance {distance}{than}")?;
-    for (side, element) in [a, b].into_iter().enumerate() {
-        let name = printable(&names[side]);
-        let [x, y, z] = points[side];
+    for ((body, element), [x, y, z]) in bodies.into_iter().zip(elements).zip(points) {
+        let name = printable(&names[body]);
         writeln!(to, "element {element} of {name} at {x} {y} {z}")?;
     }
     hit(true, is_below == Some(true))

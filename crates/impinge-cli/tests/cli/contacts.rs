@@ -126,6 +126,41 @@ fn distances_are_told() {
     let run = folder.run(["distance", "a.ply", "c.ply", "--below", "1e-9", "--json"]);
     let object: Value = serde_json::from_str(&run.stdout).unwrap();
     assert_eq!((run.code, &object["below"]), (Some(3), &json!(true)));
+    // Of several, the nearest two; of one file, its nodes. a and c touch, b is 2 from c.
+    let all = ["distance", "a.ply", "b.ply", "c.ply", "--json"];
+    let told = |args: &[&str]| {
+        let object = folder.run(args).json();
+        (
+            object["distance"].clone(),
+            object["bodies"].clone(),
+            object["names"].clone(),
+        )
+    };
+    assert_eq!(
+        told(&all),
+        (json!(0.0), json!([0, 2]), json!(["a.ply", "c.ply"]))
+    );
+    let others = [&all[..], &["--exclude", "2,0"]].concat();
+    assert_eq!(
+        told(&others),
+        (json!(1.0), json!([1, 2]), json!(["b.ply", "c.ply"]))
+    );
+    let none = folder.run(["distance", "a.ply", "b.ply", "--exclude", "0,1"]);
+    assert!(none.misuse().contains("not excluded"));
+    let none = folder.run(["distance", "a.ply", "b.ply", "--exclude", "0,2"]);
+    assert!(none.misuse().contains("--exclude"));
+    folder.text(
+        "two.obj",
+        "o one\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\no two\nv 0 0 3\nv 1 0 3\nv 0 1 3\nf 4 5 6\n",
+    );
+    assert_eq!(
+        told(&["distance", "two.obj", "--json"]),
+        (json!(3.0), json!([0, 1]), json!(["one", "two"]))
+    );
+    let printed = folder.run(["distance", "two.obj"]).printed();
+    assert!(printed.contains("element 0 of two at 0 0 3"), "{printed}");
+    let alone = folder.run(["distance", "a.ply"]);
+    assert!(alone.misuse().contains("a.ply: one body"));
     let misuse = folder.run(["distance", "a.ply", "b.ply", "--below", "-1"]);
     assert!(misuse.misuse().contains("not below 0"));
 }
