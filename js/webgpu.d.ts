@@ -55,6 +55,8 @@ export interface FileMesh extends Mesh {
   positions: Positions;
   /** For each vertex of the file, its number in the mesh: they differ if vertices were welded. */
   map: Uint32Array;
+  /** What of the file was left out or changed: lines skipped, polygons split into triangles. */
+  notes: string[];
 }
 
 /**

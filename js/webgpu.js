@@ -110,8 +110,8 @@ function readers(name, bytes, given, inBodies) {
   mustBeNone("options", others, ["weld"]);
   checkBytes(bytes);
   const meshes = call(() => module.read(String(name), bytes, Boolean(weld), inBodies));
-  return meshes.map(([name, corners, index, positions, map]) => {
-    return { name, [corners === 4 ? "tetrahedra" : "faces"]: index, positions, map };
+  return meshes.map(([name, corners, index, positions, map, notes]) => {
+    return { name, [corners === 4 ? "tetrahedra" : "faces"]: index, positions, map, notes };
   });
 }
 

@@ -506,9 +506,12 @@ def test_changes_between_frames():
 @pytest.mark.parametrize("duplicate", [copy.copy, copy.deepcopy, lambda x: pickle.loads(pickle.dumps(x))])
 def test_meshes_pickle(duplicate, tmp_path):
     path = tmp_path / "a.obj"
-    path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 1 0\nf 1 2 3\n")
+    path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 1 0\nf 1 2 3\nl 1 2\n")
     mesh = impinge.read(path)
+    assert mesh.notes == ["lines skipped, which are edges or faces of two corners: 1"]
+    assert [body.notes for body in impinge.read_bodies(path)] == [mesh.notes]
     same = duplicate(mesh)
+    assert same.notes == mesh.notes
     assert np.array_equal(same.vertices, mesh.vertices) and same.vertices.dtype == mesh.vertices.dtype
     assert np.array_equal(same.faces, mesh.faces) and same.faces.dtype == np.uint32
     assert (same.kind, same.name, same.n_welded) == ("triangles", str(path), mesh.n_welded)

@@ -809,7 +809,7 @@ if (globalThis.process?.argv?.[1]?.endsWith("answers.mjs")) {
     const bodies = readBodies(name, bytes);
     if (bodies.length > 1) doors[name].bodies = bodies.map((body) => body.name);
   }
-  const text = "v 0 0 0\nv 1 0 0\nv 0 0 0\nv 0 1 0\nf 1 2 4\n";
+  const text = "v 0 0 0\nv 1 0 0\nv 0 0 0\nv 0 1 0\nf 1 2 4\nl 1 2\n";
   const mesh = read("triangle.obj", new TextEncoder().encode(text));
   // Two frames of one vertex.
   const mdd = new Uint8Array(40);
@@ -824,6 +824,6 @@ if (globalThis.process?.argv?.[1]?.endsWith("answers.mjs")) {
   const misspelt = [read, readBodies].map((read) => refusal(() => read("triangle.obj", new TextEncoder().encode(text), { wield: false })));
   const options = await Promise.all(misspelt);
   const { map: welded } = weld({ positions: new Float64Array([1, 2, 3, 1, 2, 3]) });
-  const files = { welded: [...welded], faces: [...mesh.faces], positions: [...mesh.positions], map: [...mesh.map], frames };
+  const files = { welded: [...welded], faces: [...mesh.faces], positions: [...mesh.positions], map: [...mesh.map], notes: mesh.notes, frames };
   process.stdout.write(JSON.stringify({ said, answers, taken, more, read: { ...files, noGpu, broken, buffers, cut, options }, doors }));
 }

@@ -87,6 +87,7 @@ try {
     faces: [0, 1, 2],
     positions: [0, 0, 0, 1, 0, 0, 0, 1, 0],
     map: [0, 1, 0, 2],
+    notes: ["lines skipped, which are edges or faces of two corners: 1"],
     frames: [[1, 2, 3], [4, 5, 6]],
     noGpu: "device: there is no WebGPU here",
     broken: read.broken,

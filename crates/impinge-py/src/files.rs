@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use impinge_io::{Elements, Error, NamedMesh, Positions, ReadOptions};
+use impinge_io::{Elements, Error, NamedMesh, Positions, ReadOptions, Summary};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::exceptions::PyOSError;
 use pyo3::prelude::*;
@@ -19,6 +19,7 @@ pub struct Mesh {
     kind: impinge::BodyKind,
     name: String,
     n_welded: usize,
+    notes: Vec<String>,
 }
 
 impl Mesh {
@@ -28,8 +29,8 @@ impl Mesh {
     }
 }
 
-/// Vertices, faces, name and how many vertices were welded.
-type Parts = (Py<PyAny>, Py<PyArray2<u32>>, String, usize);
+/// Vertices, faces, name, how many vertices were welded, and notes.
+type Parts = (Py<PyAny>, Py<PyArray2<u32>>, String, usize, Vec<String>);
 
 #[pymethods]
 impl Mesh {
@@ -65,12 +66,20 @@ impl Mesh {
         self.n_welded
     }
 
+    /// list of str : what of the file was left out or changed: lines skipped, polygons split into
+    /// triangles. Of bodies that were read apart, that of the whole file.
+    #[getter]
+    fn notes(&self) -> Vec<String> {
+        self.notes.clone()
+    }
+
     /// Pickles and copies hold the same arrays.
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Parts)> {
         let make = py.import("impinge._impinge")?.getattr("_mesh")?;
         let faces = self.faces(py);
-        let name = self.name.clone();
-        Ok((make, (self.vertices(py), faces, name, self.n_welded)))
+        let (name, notes) = (self.name.clone(), self.notes.clone());
+        let parts = (self.vertices(py), faces, name, self.n_welded, notes);
+        Ok((make, parts))
     }
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
@@ -93,6 +102,7 @@ pub fn _mesh(
     faces: Bound<'_, PyArray2<u32>>,
     name: String,
     n_welded: usize,
+    notes: Vec<String>,
 ) -> Mesh {
     let kind = match faces.dims()[1] {
         4 => impinge::BodyKind::Tetrahedra,
@@ -104,6 +114,7 @@ pub fn _mesh(
         kind,
         name,
         n_welded,
+        notes,
     }
 }
 
@@ -122,7 +133,7 @@ pub fn _mesh(
 /// Returns
 /// -------
 /// Mesh
-///     With ``vertices``, ``faces``, ``kind``, ``name`` and ``n_welded``.
+///     With ``vertices``, ``faces``, ``kind``, ``name``, ``n_welded`` and ``notes``.
 ///
 /// Raises
 /// ------
@@ -135,7 +146,8 @@ pub fn read(py: Python<'_>, path: PathBuf, weld: bool) -> PyResult<Mesh> {
     let (mesh, summary) = read.map_err(refuse)?;
     let name = path.display().to_string();
     let n_welded = usize::try_from(summary.n_welded).unwrap_or(usize::MAX);
-    to_python(py, NamedMesh { name: None, mesh }, &name, n_welded)
+    let mesh = NamedMesh { name: None, mesh };
+    to_python(py, mesh, &name, n_welded, &summary)
 }
 
 /// Reads the bodies of a file, each as a mesh of its own.
@@ -164,19 +176,19 @@ pub fn read(py: Python<'_>, path: PathBuf, weld: bool) -> PyResult<Mesh> {
 #[pyo3(signature = (path, *, weld=true))]
 pub fn read_bodies(py: Python<'_>, path: PathBuf, weld: bool) -> PyResult<Vec<Mesh>> {
     let read = py.detach(|| {
-        let (mut bodies, _) = impinge_io::read_bodies(&path, &options(false))?;
+        let (mut bodies, summary) = impinge_io::read_bodies(&path, &options(false))?;
         let n_welded = bodies.iter_mut().map(|body| match weld {
             true => impinge_io::weld(&mut body.mesh),
             false => 0,
         });
         let n_welded: Vec<usize> = n_welded.collect();
-        Ok((bodies, n_welded))
+        Ok((bodies, n_welded, summary))
     });
-    let (bodies, n_welded) = read.map_err(refuse)?;
+    let (bodies, n_welded, summary) = read.map_err(refuse)?;
     let name = path.display().to_string();
     let bodies = bodies.into_iter().zip(n_welded);
     bodies
-        .map(|(body, n_welded)| to_python(py, body, &name, n_welded))
+        .map(|(body, n_welded)| to_python(py, body, &name, n_welded, &summary))
         .collect()
 }
 
@@ -204,7 +216,13 @@ fn refuse(error: Error) -> PyErr {
     }
 }
 
-fn to_python(py: Python<'_>, body: NamedMesh, file: &str, n_welded: usize) -> PyResult<Mesh> {
+fn to_python(
+    py: Python<'_>,
+    body: NamedMesh,
+    file: &str,
+    n_welded: usize,
+    summary: &Summary,
+) -> PyResult<Mesh> {
     let NamedMesh { name, mesh } = body;
     let positions: impinge::Positions = match mesh.positions {
         Positions::F32(positions) => positions.into(),
@@ -222,5 +240,6 @@ fn to_python(py: Python<'_>, body: NamedMesh, file: &str, n_welded: usize) -> Py
         kind,
         name: name.unwrap_or_else(|| file.to_owned()),
         n_welded,
+        notes: summary.notes(),
     })
 }

@@ -438,7 +438,7 @@ pub fn weld_f64(positions: &[f64]) -> Thrown<Vec<u32>> {
 }
 
 /// The mesh of a file, or with `in_bodies` each body in it:
-/// `[name, corners, index, positions, map]`.
+/// `[name, corners, index, positions, map, notes]`.
 #[cfg(feature = "io")]
 #[wasm_bindgen]
 pub fn read(name: &str, bytes: &[u8], weld: bool, in_bodies: bool) -> Thrown<Array> {
@@ -448,13 +448,20 @@ pub fn read(name: &str, bytes: &[u8], weld: bool, in_bodies: bool) -> Thrown<Arr
     };
     let meshes = meshes.map_err(thrown)?;
     let lists = meshes.iter().map(|mesh| {
-        Array::of5(
-            &JsValue::from_str(&mesh.name),
-            &mesh.corners.into(),
-            &Uint32Array::from(&mesh.index[..]),
-            &read_coordinates(&mesh.positions),
-            &Uint32Array::from(&mesh.map[..]),
-        )
+        let notes: Array = mesh
+            .notes
+            .iter()
+            .map(|note| JsValue::from_str(note))
+            .collect();
+        let fields: [JsValue; 6] = [
+            JsValue::from_str(&mesh.name),
+            mesh.corners.into(),
+            Uint32Array::from(&mesh.index[..]).into(),
+            read_coordinates(&mesh.positions),
+            Uint32Array::from(&mesh.map[..]).into(),
+            notes.into(),
+        ];
+        fields.into_iter().collect::<Array>()
     });
     Ok(lists.collect())
 }

@@ -1,8 +1,8 @@
 //! Mesh files from the bytes that a page or a program has.
 
 use impinge_io::{
-    Elements, Format, Mesh, NamedMesh, Positions, ReadOptions, Sequence, SequenceFormat, Weld,
-    read_bodies_bytes, read_bytes,
+    Elements, Format, Mesh, NamedMesh, Positions, ReadOptions, Sequence, SequenceFormat, Summary,
+    Weld, read_bodies_bytes, read_bytes_with_summary,
 };
 
 use crate::error::Error;
@@ -23,6 +23,8 @@ pub struct FileMesh {
     pub corners: u32,
     /// For each vertex of the file, its number in the mesh: they differ if vertices were welded.
     pub map: Vec<u32>,
+    /// What of the file was left out or changed.
+    pub notes: Vec<String>,
 }
 
 /// Reads the bytes of a mesh file. The extension of its name is that of its format. With `weld`,
@@ -32,8 +34,8 @@ pub struct FileMesh {
 /// An unknown extension; files that the reader refuses.
 pub fn read(name: &str, bytes: &[u8], weld: bool) -> Result<FileMesh, Error> {
     let format = Format::from_path(name.as_ref())?;
-    let mesh = read_bytes(bytes, format, name, &options())?;
-    Ok(FileMesh::new(name, mesh, weld))
+    let (mesh, summary) = read_bytes_with_summary(bytes, format, name, &options())?;
+    Ok(FileMesh::new(name, mesh, &summary, weld))
 }
 
 /// Reads the bodies of a file, each as a mesh: the nodes of a glTF file, the objects or groups of
@@ -43,10 +45,10 @@ pub fn read(name: &str, bytes: &[u8], weld: bool) -> Result<FileMesh, Error> {
 /// As [`read`].
 pub fn read_bodies(name: &str, bytes: &[u8], weld: bool) -> Result<Vec<FileMesh>, Error> {
     let format = Format::from_path(name.as_ref())?;
-    let (bodies, _) = read_bodies_bytes(bytes, format, name, &options())?;
+    let (bodies, summary) = read_bodies_bytes(bytes, format, name, &options())?;
     let bodies = bodies.into_iter().map(|body| {
         let NamedMesh { name: own, mesh } = body;
-        FileMesh::new(own.as_deref().unwrap_or(name), mesh, weld)
+        FileMesh::new(own.as_deref().unwrap_or(name), mesh, &summary, weld)
     });
     Ok(bodies.collect())
 }
@@ -59,7 +61,7 @@ fn options() -> ReadOptions {
 }
 
 impl FileMesh {
-    fn new(name: &str, mut mesh: Mesh, weld: bool) -> Self {
+    fn new(name: &str, mut mesh: Mesh, summary: &Summary, weld: bool) -> Self {
         let map = if weld {
             let weld = Weld::by_position(&mesh.positions);
             weld.apply(&mut mesh);
@@ -77,6 +79,7 @@ impl FileMesh {
             },
             positions: mesh.positions,
             map,
+            notes: summary.notes(),
         }
     }
 }

@@ -9,7 +9,7 @@ use impinge_io::{Elements, Positions, ReadOptions};
 /// MEDIT, VTK, VTU or TetGen.
 ///
 /// Vertices at the same position become one, as in all that reads files: [`Mesh::n_welded`] says
-/// how many there were. A file with tetrahedra is a mesh of these, else of its triangles. The crate
+/// how many there were, and [`Mesh::notes`] what was left out. A file with tetrahedra is a mesh of these, else of its triangles. The crate
 /// `impinge-io` reads bodies apart, sequences of frames and bytes, and has other options.
 ///
 /// ```no_run
@@ -36,5 +36,6 @@ pub fn read(path: impl AsRef<Path>) -> Result<Mesh, Error> {
     };
     let mut mesh = Mesh::from((elements, positions));
     mesh.n_welded = usize::try_from(summary.n_welded).unwrap_or(usize::MAX);
+    mesh.notes = summary.notes();
     Ok(mesh)
 }

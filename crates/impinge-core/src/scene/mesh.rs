@@ -24,6 +24,9 @@ pub struct Mesh {
     pub positions: Positions,
     /// How many vertices were welded when it was read from a file.
     pub n_welded: usize,
+    /// What of the file it was read from was left out or changed, in words: lines skipped, polygons
+    /// split into triangles.
+    pub notes: Vec<String>,
 }
 
 impl<E: Into<Elements>, P: Into<Positions>> From<(E, P)> for Mesh {
@@ -32,6 +35,7 @@ impl<E: Into<Elements>, P: Into<Positions>> From<(E, P)> for Mesh {
             elements: elements.into(),
             positions: positions.into(),
             n_welded: 0,
+            notes: Vec::new(),
         }
     }
 }
