@@ -52,11 +52,11 @@ enum Frames {
         start: u64,
         endian: Endian,
     },
-    /// One mesh file per frame, in the folder of the path that named them, with the faces of the
-    /// first.
+    /// One mesh file per frame, with the faces of the first. If a path named them, they are in its
+    /// folder.
     Files {
         files: Vec<PathBuf>,
-        named: PathBuf,
+        named: Option<PathBuf>,
         faces: Faces,
     },
 }
@@ -143,8 +143,16 @@ impl Sequence {
         let extension = path.extension().unwrap_or_default().to_string_lossy();
         match SequenceFormat::from_extension(&extension) {
             Some(format) => Self::open_cache(path, format),
-            None => Self::open_files(path),
+            None => Self::of_named(numbered_files(path)?, Some(path.to_owned())),
         }
+    }
+
+    /// The frames of mesh files in the order given, with the faces of the first, or none.
+    ///
+    /// # Errors
+    /// As [`read`](crate::read), of the first file; there is none.
+    pub fn of_files(files: Vec<PathBuf>) -> Result<Self, Error> {
+        Self::of_named(files, None)
     }
 
     /// Reads a point cache from bytes. Errors use `name` for the file.
@@ -176,9 +184,14 @@ impl Sequence {
 
     /// Gaps in the numbers of numbered files: the files before and after each gap. A gap is a step
     /// that is larger than the smallest step between two files, so a sequence of every tenth number
-    /// has no gap.
+    /// has no gap. Files that were given one by one have none.
     pub fn gaps(&self) -> Vec<[&Path; 2]> {
-        let Frames::Files { files, .. } = &self.frames else {
+        let Frames::Files {
+            files,
+            named: Some(_),
+            ..
+        } = &self.frames
+        else {
             return Vec::new();
         };
         let number = |path: &PathBuf| {
@@ -259,7 +272,7 @@ impl Sequence {
                 faces,
             } => {
                 let path = &files[frame_ix];
-                let (positions, own) = read_frame(input(path, named))?;
+                let (positions, own) = read_frame(input(path, named.as_deref()))?;
                 if positions.len() != self.n_points {
                     return Err(mismatch(
                         &path.display().to_string(),
@@ -342,18 +355,19 @@ impl Sequence {
         Ok(Positions::F32(positions))
     }
 
-    fn open_files(path: &Path) -> Result<Self, Error> {
-        let files = numbered_files(path)?;
-        let first = input(&files[0], path);
-        let (positions, faces) = read_frame(first)?;
-        let n_points = positions.len();
+    fn of_named(files: Vec<PathBuf>, named: Option<PathBuf>) -> Result<Self, Error> {
+        let Some(first) = files.first() else {
+            return Err(mismatch("a sequence", "frames, or more", 1, 0));
+        };
+        let name = named.as_ref().unwrap_or(first).display().to_string();
+        let (positions, faces) = read_frame(input(first, named.as_deref()))?;
         Ok(Sequence {
-            name: path.display().to_string(),
+            name,
             n_frames: files.len(),
-            n_points,
+            n_points: positions.len(),
             frames: Frames::Files {
                 files,
-                named: path.to_owned(),
+                named,
                 faces,
             },
         })
@@ -432,11 +446,10 @@ impl Header {
 }
 
 /// A file of a sequence: the file that the caller named, or one found by a pattern.
-fn input<'p>(path: &'p Path, named: &'p Path) -> Input<'p> {
-    if path == named {
-        Input::Named(path)
-    } else {
-        Input::Beside(path, folder_of(path))
+fn input<'p>(path: &'p Path, named: Option<&'p Path>) -> Input<'p> {
+    match named {
+        Some(named) if path != named => Input::Beside(path, folder_of(path)),
+        _ => Input::Named(path),
     }
 }
 

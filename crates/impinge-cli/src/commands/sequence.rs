@@ -41,7 +41,8 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
     let loading = loading.asked(weld, asked.within, args.ask.read.format);
     let mut bodies = Bodies::default();
     let (moving, weld) = bodies.add(&args.mesh, loading)?;
-    let mut frames = Frames::open(&args.sequence, &args.mesh, weld, args.ask.json)?;
+    let (name, mesh) = (&args.sequence, &args.mesh);
+    let mut frames = Frames::of(Sequence::open(name)?, name, mesh, weld, args.ask.json)?;
     for other in &args.others {
         bodies.add(other, loading)?;
     }
@@ -231,14 +232,14 @@ pub(super) struct Frames {
 }
 
 impl Frames {
-    /// Opens the frames of a mesh, which was welded so.
-    pub(super) fn open(
-        path: &Path,
+    /// The frames of a mesh, which was welded so. Messages call them by the name.
+    pub(super) fn of(
+        sequence: Sequence,
+        name: &Path,
         mesh: &Path,
         weld: Option<Weld>,
         json: bool,
     ) -> Result<Self, Error> {
-        let sequence = Sequence::open(path)?;
         sequence.check_faces(mesh)?;
         let mut after_gaps = Vec::new();
         for [before, after] in sequence.gaps() {
@@ -255,7 +256,7 @@ impl Frames {
             sequence,
             after_gaps,
             weld,
-            name: path.display().to_string(),
+            name: name.display().to_string(),
             json,
             n_passed_over: 0,
         })

@@ -6,11 +6,11 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use clap::ValueEnum;
 use impinge::{BodyId, CancelToken, Pairs, Positions};
-use impinge_io::{ReadOptions, Weld, printable};
+use impinge_io::{Sequence, printable};
 use impinge_render::{Camera, Colors, Focus, Projection};
 use impinge_view::{Command, Content, Opener, Options, Shown, show, write_png};
 
-use super::sequence::{Frames, welded};
+use super::sequence::Frames;
 use super::step::Frames as _;
 use crate::apart::Inputs;
 use crate::args::ViewArgs;
@@ -160,18 +160,17 @@ fn content(args: &ViewArgs, cancel: &CancelToken) -> Result<(Content, Vec<Vertic
     let mut missing = Vec::new();
     let mut frames: Option<Arc<dyn impinge_view::Frames>> = None;
     let mut still = files.others.to_vec();
-    match files.frames {
-        FrameFiles::None => still.insert(0, files.mesh.to_owned()),
-        FrameFiles::Sequence(path) => {
-            let (body, weld) = bodies.add(files.mesh, loading)?;
-            let source = Source::Sequence(Frames::open(path, files.mesh, weld, false)?);
-            frames = Some(Arc::new(Moving { body, source }));
-        }
-        FrameFiles::Each(paths) => {
-            let (body, weld) = bodies.add(files.mesh, loading)?;
-            let source = Source::Files(paths.to_vec(), weld);
-            frames = Some(Arc::new(Moving { body, source }));
-        }
+    let opened = match files.frames {
+        FrameFiles::None => None,
+        FrameFiles::Sequence(path) => Some((Sequence::open(path)?, path)),
+        FrameFiles::Each(paths) => Some((Sequence::of_files(paths.to_vec())?, files.mesh)),
+    };
+    if let Some((sequence, name)) = opened {
+        let (body, weld) = bodies.add(files.mesh, loading)?;
+        let of_body = Frames::of(sequence, name, files.mesh, weld, false)?;
+        frames = Some(Arc::new(Moving { body, of_body }));
+    } else {
+        still.insert(0, files.mesh.to_owned());
     }
     let mut has_parts = false;
     for file in &still {
@@ -209,40 +208,18 @@ fn shown(ix: usize, id: BodyId, name: String) -> Shown {
 /// The body that moves, and its frames.
 struct Moving {
     body: BodyId,
-    source: Source,
-}
-
-enum Source {
-    Sequence(Frames),
-    Files(Vec<PathBuf>, Option<Weld>),
+    of_body: Frames,
 }
 
 impl impinge_view::Frames for Moving {
     fn n_frames(&self) -> usize {
-        match &self.source {
-            Source::Sequence(frames) => frames.n_frames(),
-            Source::Files(files, _) => files.len(),
-        }
+        self.of_body.n_frames()
     }
 
     fn read(&self, frame_ix: usize) -> Result<Vec<(BodyId, Positions)>, String> {
-        let positions = match &self.source {
-            Source::Sequence(frames) => frames.read(frame_ix),
-            Source::Files(files, weld) => read_file(files, weld.as_ref(), frame_ix),
-        };
-        let positions = positions.map_err(|error| error.line())?;
+        let positions = self.of_body.read(frame_ix).map_err(|error| error.line())?;
         Ok(vec![(self.body, positions)])
     }
-}
-
-fn read_file(files: &[PathBuf], weld: Option<&Weld>, frame_ix: usize) -> Result<Positions, Error> {
-    let Some(path) = files.get(frame_ix) else {
-        let text = format!("frame {frame_ix} of {} frames", files.len());
-        return Err(Error::Usage(text));
-    };
-    let mut mesh = impinge_io::read(path, &ReadOptions::as_they_are())?;
-    mesh.positions.narrow_if_exact();
-    welded(mesh.positions, weld, &path.display().to_string(), frame_ix)
 }
 
 /// The built-in scene. Frames are computed when they are asked for.
@@ -288,6 +265,8 @@ mod tests {
     use clap::Parser;
     use serde_json::{Value, json};
 
+    use impinge_io::ReadOptions;
+
     use super::*;
 
     #[derive(Parser)]
@@ -332,6 +311,29 @@ mod tests {
             .unwrap()
             .line();
         assert_eq!(refused, "--bodies groups: only OBJ files have groups");
+    }
+
+    #[test]
+    fn frames_have_the_faces_of_the_mesh() {
+        let folder = tempfile::tempdir().unwrap();
+        let write = |name: &str, faces: &str| {
+            let path = folder.path().join(name);
+            let text = format!("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 1\n{faces}");
+            std::fs::write(&path, text).unwrap();
+            path.display().to_string()
+        };
+        let [a, b] = ["r_1.obj", "r_2.obj"].map(|name| write(name, "f 1 2 3\nf 2 4 3\n"));
+        let c = write("r_3.obj", "f 1 2 4\nf 2 4 3\n");
+        let args = Line::try_parse_from(["view", &a, &b, &c]).unwrap().args;
+        let (content, _) = content(&args, &CancelToken::new()).unwrap();
+        let frames = content.frames.unwrap();
+        assert_eq!(frames.n_frames(), 3);
+        assert!(frames.read(1).is_ok());
+        let refused = frames.read(2).unwrap_err();
+        assert!(
+            refused.contains("r_3.obj") && refused.contains("of face 0, which the mesh has"),
+            "{refused}"
+        );
     }
 
     /// As every other door: `tests/cli/doors.rs`.
