@@ -108,8 +108,8 @@ class Query:
         Vertices of no element have no pairs.
     shared_vertex : {"resolve", "skip"}
         `Detector.detect`, `count` and `any`: elements of one body that share a vertex are reported when they meet in more than what they
-        share, or never; with the same vertices always, with some of the other's vertices and no others never. In all other questions
-        pairs that share a vertex never count.
+        share, or never; with the same vertices always, with some of the other's vertices and no others never; edges of
+        one body that share a vertex never. In all other questions pairs that share a vertex never count.
     exclude : (Body, Body), Exclusion, or sequence of these
         What is left out before it is decided. Bodies: their pairs; a body named twice leaves out its self-collision. ``rings(n)``: pairs
         that are near in the surface. ``groups(g, h)``: groups of vertices that do not meet. ``scene.rest_pairs(r)``: pairs that were

@@ -171,6 +171,9 @@ class CollisionMesh:
             (_add_points, self._points, self._points.astype(np.uint32)),
         ]
         self._parts = [part for part in parts if len(part[1])]
+        # One body of all of them: edges and points are degenerate triangles.
+        rows = [self._faces, self._loose[:, [0, 1, 1]], np.stack([self._points] * 3, axis=1)]
+        self._as_faces = np.concatenate(rows)
         # Elements of two bodies that name one vertex touch there at all times: they do not count.
         self._is_mixed = bool(np.isin(self._loose, self._faces).any())
 
@@ -315,6 +318,9 @@ class _Held:
         self.detector = Detector("cpu")
         self.scene = Scene()
         self._parts = mesh._parts
+        self._as_faces = mesh._as_faces
+        self._has_faces_only = len(mesh._as_faces) == len(mesh._faces)
+        self._whole = Scene()
         self._margin = 0.0
 
     def near(self, distance: float, **options: Any) -> Any:
@@ -340,6 +346,31 @@ class _Held:
             for body, (_, _, rows) in enumerate(self._parts):
                 scene.set_end_positions(body, end if rows is None else end[rows])
         return scene
+
+    def intersect(
+        self,
+        vertices: npt.NDArray[Any],
+        label_of: npt.NDArray[np.int64] | None,
+        may: Callable[[int, int], bool] | None,
+    ) -> bool:
+        """Whether any elements intersect that may collide, in more than the vertices that they share."""
+        if self._has_faces_only:
+            scene = self.place(vertices)
+        else:
+            scene = self._whole
+            if len(scene) == 0:
+                scene.add(vertices, self._as_faces)
+            else:
+                scene.set_positions(0, vertices)
+        if label_of is None and may is None:
+            return self.detector.any(scene)
+        rows = self.detector.detect(scene).rows
+        a, b = self._as_faces[rows[:, 1]], self._as_faces[rows[:, 3]]
+        if label_of is not None:
+            labels = label_of[np.concatenate([a, b], axis=1)]
+            keep = (labels != labels[:, :1]).any(axis=1)
+            a, b = a[keep], b[keep]
+        return len(a) > 0 and (may is None or bool(any_may(a, b, may).any()))
 
 
 def candidates(
@@ -479,10 +510,12 @@ def is_step_collision_free(
     ours = _served(mesh)
     start, end, distance = _step(ours, vertices_t0, vertices_t1, min_distance)
     held = ours._held()
+    allowed = _allowed(ours, mesh, labels)
+    if held.intersect(start, *allowed):
+        return False
     scene = held.place(start, end)
-    filtered = ours._filter(*_allowed(ours, mesh, labels))
     return held.detector._is_free(
-        scene, {"start": "verify", "separation": distance, "_filter": filtered}
+        scene, {"separation": distance, "_filter": ours._filter(*allowed)}
     )
 
 
@@ -575,9 +608,9 @@ def has_intersections(
     Returns
     -------
     bool
-        Exact, and touching counts. Faces that share a vertex count where they meet in more than
+        Exact, and touching counts. Elements that share a vertex count where they meet in more than
         what they share (``shared_vertex="resolve"``): ipc-toolkit does not look at these, and
-        misses a face that is folded through its neighbour.
+        misses a face that is folded through its neighbour, or a loose edge along another one.
 
     Raises
     ------
@@ -585,12 +618,8 @@ def has_intersections(
         As `is_step_collision_free`.
     """
     ours = _served(mesh)
-    held = ours._held()
-    scene = held.place(_positions(ours, vertices, "vertices"))
-    own_labels, may = _allowed(ours, mesh, labels)
-    if own_labels is None and may is None and not ours._is_mixed:
-        return held.detector.any(scene)
-    return _some_intersect(ours, held, own_labels, may)
+    at = _positions(ours, vertices, "vertices")
+    return ours._held().intersect(at, *_allowed(ours, mesh, labels))
 
 
 def _allowed(
@@ -600,33 +629,6 @@ def _allowed(
     if labels is not None:
         return ours._labels(labels), None
     return labels_of(mesh.can_collide, ours.num_vertices)
-
-
-def _some_intersect(
-    mesh: CollisionMesh,
-    held: _Held,
-    label_of: npt.NDArray[np.int64] | None,
-    may: Callable[[int, int], bool] | None,
-) -> bool:
-    """Whether any pairs intersect that may collide."""
-    rows = held.detector.detect(held.scene).rows
-    of_body = []
-    for body, (_, _, own) in enumerate(mesh._parts):
-        elements = held.scene.elements(body).astype(np.int64)
-        of_body.append(elements if own is None else own[elements].astype(np.int64))
-    bodies = rows[:, [0, 2]]
-    for body_a, body_b in np.unique(bodies, axis=0):
-        of_both = rows[(bodies == [body_a, body_b]).all(axis=1)]
-        a, b = of_body[body_a][of_both[:, 1]], of_body[body_b][of_both[:, 3]]
-        keep = np.ones(len(a), bool)
-        if body_a != body_b:
-            keep &= ~(a[:, :, None] == b[:, None, :]).any(axis=(1, 2))
-        if label_of is not None:
-            labels = label_of[np.concatenate([a, b], axis=1)]
-            keep &= (labels != labels[:, :1]).any(axis=1)
-        if keep.any() and (may is None or any_may(a[keep], b[keep], may).any()):
-            return True
-    return False
 
 
 def _step(

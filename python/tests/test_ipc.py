@@ -399,3 +399,27 @@ def test_side_by_side_with_ipc_toolkit(seed, distance):
     # Ours is never beyond the first contact, and close to theirs, which has tolerances besides.
     assert ours[0] <= true and theirs[0] <= ours[0] + 1e-6
     assert ours[0] - theirs[0] < 1e-3 + 0.25 * ours[0]
+
+
+def test_neighbours_count_at_the_start_with_labels_and_loose_edges():
+    # The second face pierces the first one, whose corner it shares.
+    at = np.array([[0, 0, 0], [2, 0, 0], [0, 2, 0], [1, 1, -1], [1, 0.5, 1], [9, 9, 9], [9, 8, 9]], float)
+    faces = np.array([[0, 1, 2], [0, 3, 4]])
+    for loose in ([], [(5, 6)], [(3, 5)]):
+        mesh = ipc.CollisionMesh(at, [*ipc.edges(faces).tolist(), *loose], faces)
+        for labels in (None, np.arange(len(at)), [0, 0, 0, 0, 1, 2, 3]):
+            assert ipc.has_intersections(mesh, at, labels=labels)
+            assert not ipc.is_step_collision_free(mesh, at, at + 1, labels=labels)
+        assert ipc.is_step_collision_free(mesh, at, at + 1, labels=[0, 0, 0, 0, 0, 1, 1])
+
+
+@pytest.mark.parametrize("tip, meets", [((1, 1, 0), True), ((2, 0, 0), True), ((1, 1, 1), False), ((-1, -1, 0), False)])
+def test_loose_edges_meet_what_they_share_a_vertex_with(tip, meets):
+    at = np.array([[0, 0, 0], [4, 0, 0], [0, 4, 0], tip], float)
+    faces = np.array([[0, 1, 2]])
+    mesh = ipc.CollisionMesh(at, [*ipc.edges(faces).tolist(), (0, 3)], faces)
+    assert ipc.has_intersections(mesh, at) is meets
+    assert ipc.is_step_collision_free(mesh, at, at + [0, 0, 1]) is not meets
+    # Two loose edges meet in more than their vertex where they lie along each other.
+    strands = ipc.CollisionMesh(at[[0, 1, 3]], [(0, 1), (0, 2)])
+    assert ipc.has_intersections(strands, at[[0, 1, 3]]) is (tip == (2, 0, 0))

@@ -251,7 +251,7 @@ inline bodies &of_mesh(const ::ipc::CollisionMesh &mesh, Eigen::Index n) {
 } // namespace detail
 
 /// Whether elements of a mesh intersect: faces with faces, loose edges and vertices with all. Exact, and touching counts. Faces that share a
-/// vertex count where they meet in more than that: ipc-toolkit does not look at these.
+/// vertex count where they meet in more than that: ipc-toolkit does not look at these. A loose edge and what has one of its vertices do not count.
 inline bool has_intersections(const ::ipc::CollisionMesh &mesh, Eigen::Ref<const Eigen::MatrixXd> vertices) {
   auto &of = detail::of_mesh(mesh, vertices.rows());
   of.place(vertices);
