@@ -521,7 +521,7 @@ typedef struct impinge_stats {
  *   CURVE_POINTS k x 1 U32     numbers of points, along each curve                      contacts
  *   CURVE_CLOSED c x 1 U8      1 if it is a loop, which does not repeat its first point  contacts
  *   CURVE_LENGTH c x 1 F64     its length                                               contacts
- *   INSIDE_A, INSIDE_B  U32    vertices of one body inside the other, sorted            penetrations
+ *   INSIDE_A, INSIDE_B  U32    vertices of the lower body inside the other, and of the other inside the lower, sorted  penetrations
  * Of the elements nearest to points, and of hits of rays, ROWS is n x 2 U32 (body, element), FEATURES n x 1 U32, and:
  *   DISTANCE, POINTS    n x 1, n x 3 F64                                                closest
  *   IS_HIT      r x 1 U8       of each ray: 1 if it hits anything                       hits
@@ -748,8 +748,9 @@ impinge_status impinge_find_contacts(impinge_detector *detector, const impinge_s
 typedef struct impinge_penetration impinge_penetration;
 
 /* How deep two closed bodies of triangles are in each other, from contacts among which are all of these two.
- * INVALID: also a surface that is not closed, contacts without these two though they intersect, a body of the two that has
- * moved or was re-meshed since its contacts were found. */
+ * INVALID: also a surface that is not closed, contacts without these two though they intersect, faces of both whose
+ * vertices are all pinned, because no pairs of these are found, a body of the two that has moved or was re-meshed since its contacts were
+ * found. */
 impinge_status impinge_find_penetration(impinge_detector *detector, const impinge_scene *scene, const impinge_contacts *contacts,
     uint32_t a, uint32_t b, impinge_penetration **penetration);
 

@@ -309,7 +309,7 @@ public:
   using answer::answer;
   /// NaN if unknown.
   double volume() const noexcept { return impinge_penetration_volume(raw()); }
-  /// Vertices of the first body inside the second, and of the second inside the first.
+  /// Vertices of the body with the lower number inside the other, and of the other inside that, whichever was named first.
   view<std::uint32_t> inside_a() const & { return packed<std::uint32_t>(IMPINGE_COLUMN_INSIDE_A); }
   view<std::uint32_t> inside_b() const & { return packed<std::uint32_t>(IMPINGE_COLUMN_INSIDE_B); }
   // A temporary ends before its views are read.

@@ -4,9 +4,9 @@ use super::Detector;
 use crate::answers::pairs::Pairs;
 use crate::contact::{Contacts, Penetration};
 use crate::query::Query;
-use crate::scene::Scene;
 use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
+use crate::scene::{Body, Scene};
 use crate::search::work::Work;
 
 impl Detector {
@@ -75,8 +75,9 @@ impl Detector {
     ///
     /// # Errors
     /// A body that is not in the scene, the same body twice, a body not made of triangles, a
-    /// surface that is not closed, contacts without these two though they intersect; a body that
-    /// was moved or re-meshed since the pairs were found ([`Error::Moved`]).
+    /// surface that is not closed, contacts without these two though they intersect, faces of both
+    /// whose vertices are all [pinned](Scene::set_pinned), because no pairs of these are found; a
+    /// body that was moved or re-meshed since the pairs were found ([`Error::Moved`]).
     pub fn penetration(
         &mut self,
         scene: &Scene,
@@ -113,6 +114,13 @@ impl Detector {
         if a == b {
             return Ok(());
         }
+        if has_pinned_element(scene.body(a)?) && has_pinned_element(scene.body(b)?) {
+            return Err(Error::Setting {
+                setting: "pinned",
+                given: format!("bodies {a} and {b}, of which pairs of pinned faces are left out,"),
+                allowed: "pinned faces of one of the two",
+            });
+        }
         if contacts.are_any_of([a.min(b), a.max(b)]) {
             contacts.refuse_moved(scene, a)?;
             return contacts.refuse_moved(scene, b);
@@ -127,4 +135,12 @@ impl Detector {
             }),
         }
     }
+}
+
+/// Whether all vertices of any of its elements are pinned.
+fn has_pinned_element(body: &Body) -> bool {
+    body.pinned().is_some_and(|pinned| {
+        let all = |corners: &[u32]| corners.iter().all(|&corner| pinned[corner as usize]);
+        (0..body.elements().len()).any(|element| all(body.elements().corners(element)))
+    })
 }

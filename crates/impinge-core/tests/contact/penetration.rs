@@ -366,6 +366,38 @@ fn contacts_of_before_are_refused() {
     assert!(matches!(error, Error::Moved { .. }), "{error}");
 }
 
+/// Pairs of pinned faces are never found, so contacts are not all of the two bodies.
+#[test]
+fn faces_that_are_pinned_in_both_bodies_are_refused() {
+    let ball = surfaces::bumpy_ball(300, 0.2);
+    let mut scene = Scene::new();
+    let [a, b] = [[0.0; 3], [0.7, 0.1, 0.0]].map(|place| {
+        let moved = ball.translated(place);
+        scene.add((moved.elements, moved.positions)).unwrap()
+    });
+    let n = scene.body(a).unwrap().n_vertices();
+    let mut detector = Detector::new(Backend::Cpu).unwrap();
+    let mut ask = |scene: &Scene| {
+        let pairs = detector.detect(scene, &Query::all()).unwrap().clone();
+        let contacts = detector.contacts(scene, &pairs).unwrap();
+        detector.penetration(scene, &contacts, b, a)
+    };
+    let free = ask(&scene).unwrap();
+    scene.set_pinned(a, &vec![true; n]).unwrap();
+    assert_eq!(ask(&scene).unwrap(), free);
+    // One vertex: no face has it alone.
+    let mut pinned: Vec<bool> = vec![false; n];
+    pinned[0] = true;
+    scene.set_pinned(b, &pinned).unwrap();
+    assert_eq!(ask(&scene).unwrap(), free);
+    scene.set_pinned(b, &vec![true; n]).unwrap();
+    let error = ask(&scene).unwrap_err().to_string();
+    assert_eq!(
+        error,
+        "pinned: bodies 1 and 0, of which pairs of pinned faces are left out, given, pinned faces of one of the two allowed"
+    );
+}
+
 /// Each pair of many bodies is as if it were alone in the scene, but for the numbers of its
 /// contacts.
 #[test]
