@@ -743,7 +743,7 @@ class Detector(DetectorBase):
         """Where points lie: inside a body, on its surface or outside. Decided exactly, also for points on faces, edges and vertices.
 
         Triangles must be a closed surface. A point is inside where the surface winds around it, whichever way, so an inner shell
-        of the opposite orientation makes a hollow. Of tetrahedra the surface consists of the faces that belong to one alone.
+        of the opposite orientation makes a hollow. Of tetrahedra the surface consists of `Scene.faces`.
 
         Parameters
         ----------

@@ -693,7 +693,7 @@ impinge_status impinge_find_nearest(impinge_detector *detector, const impinge_sc
 
 /* Where points lie (3 columns of F32 or F64): `places` gets one number per row, 1 inside a body, 0 on its surface, -1 outside, decided
  * exactly. Triangles must be a closed surface, around which points are inside if it winds around them any number of times but 0; the
- * surface of tetrahedra are the faces of one tetrahedron alone.
+ * surface of tetrahedra is what impinge_scene_faces gives.
  * INVALID: also a body of points or edges, a surface that is not closed (the message names an edge), a point that is not finite. */
 impinge_status impinge_contains(impinge_detector *detector, const impinge_scene *scene, uint32_t body, impinge_array points,
     int8_t *places);

@@ -27,8 +27,8 @@ impl Detector {
     /// the surface.
     ///
     /// Of tetrahedra, a point is inside if it is strictly inside one of them, or on faces of theirs
-    /// that are not the border of the body: faces that belong to one tetrahedron alone are the
-    /// border, and the surface.
+    /// that are not the border of the body. The border, which is the surface, are all faces but
+    /// those between two tetrahedra that have another vertex on either side.
     ///
     /// ```
     /// use impinge::{Backend, Detector, Scene};

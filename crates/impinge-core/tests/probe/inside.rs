@@ -420,6 +420,42 @@ fn tetrahedra() {
     assert_eq!(detector.contains(&scene, body, &points).unwrap(), expected);
 }
 
+/// What is on the surface is at the distance 0 from it, also of tetrahedra that are listed twice.
+#[test]
+fn repeated_tetrahedra_have_one_surface() {
+    let positions = [
+        [0.0f64; 3],
+        [4.0, 0.0, 0.0],
+        [0.0, 4.0, 0.0],
+        [0.0, 0.0, 4.0],
+        [0.0, 0.0, -4.0],
+        [4.0, 4.0, 4.0],
+    ];
+    // On the face of the first three corners, on another one, and inside the first.
+    let points = [[1.0, 1.0, 0.0], [1.0, 0.0, 1.0], [0.5, 1.0, 0.25]];
+    let (one, below, beyond) = ([0, 1, 2, 3], [0, 2, 1, 4], [0, 1, 2, 5]);
+    let bodies: [(&[[u32; 4]], [i8; 3]); 7] = [
+        (&[one], [0, 0, 1]),
+        (&[one, below], [1, 0, 1]),
+        (&[one, one], [0, 0, 1]),
+        (&[one, [1, 0, 2, 3]], [0, 0, 1]),
+        (&[one, one, below], [0, 0, 1]),
+        (&[one, below, one], [0, 0, 1]),
+        (&[one, below, beyond], [0, 0, 1]),
+    ];
+    let mut detector = Detector::new(Backend::Cpu).unwrap();
+    for (tetrahedra, expected) in bodies {
+        let mut scene = Scene::new();
+        let body = scene.add_tetrahedra(tetrahedra, &positions).unwrap();
+        let places = detector.contains(&scene, body, &points).unwrap();
+        assert_eq!(places, expected, "{tetrahedra:?}");
+        let distances = detector.signed_distance(&scene, body, &points).unwrap();
+        for (place, distance) in places.iter().zip(distances) {
+            assert_eq!(*place == 0, distance == 0.0, "{tetrahedra:?}: {distance}");
+        }
+    }
+}
+
 /// The border of a flat tetrahedron that lies on a face of another one, and tetrahedra that
 /// overlap, in either order.
 #[test]

@@ -1,4 +1,5 @@
-//! The border of a body of tetrahedra: the faces that belong to one tetrahedron alone.
+//! The border of a body of tetrahedra: its faces, which are all but those between two different
+//! tetrahedra.
 //!
 //! Cost: `O(n log n)` once per topology, one byte per tetrahedron.
 
@@ -50,8 +51,14 @@ impl Border {
             Ok(())
         })?;
         let faces = work.merged(runs, Equal::All, WHAT)?;
+        // As the faces of the body, which `Topology` finds: a face between two different tetrahedra
+        // is inside.
+        let opposite = |&(_, number, k): &(_, u32, u8)| tetrahedra[number as usize][usize::from(k)];
         for same in faces.chunk_by(|x, y| x.0 == y.0) {
-            if let [(_, number, k)] = same {
+            if same.len() == 2 && opposite(&same[0]) != opposite(&same[1]) {
+                continue;
+            }
+            for (_, number, k) in same {
                 masks[*number as usize] |= 1 << k;
             }
         }
