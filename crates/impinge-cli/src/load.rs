@@ -266,8 +266,9 @@ impl Bodies {
         let (file, (meshes, summary)) = self.read_one(path, format, true, loading)?;
         // Notes on the file name it, not one of its parts.
         tell(&file, &summary.notes());
+        let has_parts = meshes.len() > 1;
         for NamedMesh { name, mesh } in meshes {
-            let name = part_name(&file, name, several);
+            let name = part_name(&file, name.filter(|_| has_parts), several);
             self.add_mesh(name, format, mesh, loading)?;
         }
         Ok(file)
@@ -359,7 +360,8 @@ impl Bodies {
     }
 }
 
-/// The name of a part of a file; it begins with that of the file if there are `several` files.
+/// The name of a part of a file; it begins with that of the file if there are `several` files. A
+/// file of one part is called by its own name: give none.
 pub fn part_name(file: &str, part: Option<String>, several: bool) -> String {
     match part {
         None => file.to_owned(),

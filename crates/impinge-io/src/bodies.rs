@@ -7,16 +7,27 @@ use crate::mesh::{Elements, Mesh, Positions};
 /// A body of a file, and the name that the file gives it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NamedMesh {
-    /// The name of a node or a group; `None` if the mesh is all that the file has.
+    /// The name of a node, an object or a group. `None` if the mesh is all that the file has, and the
+    /// file gives it no name.
     pub name: Option<String>,
     /// Its primitives in the order of the file, and the vertices that they name.
     pub mesh: Mesh,
 }
 
+/// What a part is called.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum PartName<'a> {
+    /// By the file.
+    Given(&'a str),
+    /// By us, where the file does not say.
+    StandIn(&'a str),
+}
+
 /// Which triangles of a file belong to which part.
 #[derive(Debug, Default)]
 pub(crate) struct Parts {
-    names: Vec<String>,
+    /// The name of each part, and whether the file gave it.
+    names: Vec<(String, bool)>,
     /// The part of each name that a later triangle of this name belongs to.
     known: HashMap<String, usize>,
     /// The first triangle of a run, and the part that it belongs to; ascending.
@@ -26,11 +37,15 @@ pub(crate) struct Parts {
 impl Parts {
     /// From triangle `first` on, triangles belong to the part of this name: to a new one, or to the
     /// one that has it already.
-    pub(crate) fn begin(&mut self, name: &str, is_new: bool, first: usize) {
+    pub(crate) fn begin(&mut self, name: PartName<'_>, is_new: bool, first: usize) {
+        let (name, is_given) = match name {
+            PartName::Given(name) => (name, true),
+            PartName::StandIn(name) => (name, false),
+        };
         let part = match self.known.get(name) {
             Some(&part) if !is_new => part,
             _ => {
-                self.names.push(name.to_owned());
+                self.names.push((name.to_owned(), is_given));
                 self.known.insert(name.to_owned(), self.names.len() - 1);
                 self.names.len() - 1
             }
@@ -51,10 +66,10 @@ impl Parts {
     }
 
     /// One mesh per part that has triangles, in the order of their first ones; the mesh itself if
-    /// there are not several.
+    /// there are not several. Triangles before the first part are one, too.
     pub(crate) fn split(self, mesh: Mesh) -> Vec<NamedMesh> {
         let faces = match &mesh.elements {
-            Elements::Triangles(faces) if self.runs.len() > 1 => faces,
+            Elements::Triangles(faces) if !self.runs.is_empty() => faces,
             _ => return vec![NamedMesh { name: None, mesh }],
         };
         let mut of_parts: Vec<(usize, Vec<[u32; 3]>)> = Vec::new();
@@ -76,13 +91,15 @@ impl Parts {
             });
             of_parts[place].1.extend_from_slice(&faces[first..end]);
         }
-        if of_parts.len() < 2 {
-            return vec![NamedMesh { name: None, mesh }];
+        if let [(part, _)] = of_parts[..] {
+            let given = self.names.get(part).filter(|(_, is_given)| *is_given);
+            let name = given.map(|(name, _)| name.clone());
+            return vec![NamedMesh { name, mesh }];
         }
         let mut times: HashMap<&str, u32> = HashMap::new();
         let mut numbers = vec![0; mesh.positions.len()];
         let bodies = of_parts.into_iter().map(|(part, faces)| {
-            let name = self.names.get(part).map_or("default", String::as_str);
+            let name = self.names.get(part).map_or("default", |(name, _)| name);
             let time = times.entry(name).or_default();
             *time += 1;
             let name = match *time {

@@ -3,7 +3,7 @@
 
 use std::ops::Range;
 
-use crate::bodies::{NamedMesh, Parts};
+use crate::bodies::{NamedMesh, PartName, Parts};
 use crate::error::{Error, Name, Place};
 use crate::mesh::{Elements, Mesh, Positions};
 use crate::options::{Prefer, ReadOptions, Summary};
@@ -54,7 +54,7 @@ impl<'a> Collector<'a> {
 
     /// The triangles that are added from now on belong to the part of this name, until another one
     /// begins. With `is_new`, a part of the same name that began before is another one.
-    pub(crate) fn begin_part(&mut self, name: &str, is_new: bool) {
+    pub(crate) fn begin_part(&mut self, name: PartName<'_>, is_new: bool) {
         self.parts.begin(name, is_new, self.triangles.len());
     }
 

@@ -34,8 +34,9 @@ pub fn read_with_summary(path: &Path, options: &ReadOptions) -> Result<(Mesh, Su
 
 /// Reads the bodies of the file at `path`, each as a mesh of its own: the nodes of a glTF file that
 /// have a mesh; the items of a 3MF file; the objects (`o`) of an OBJ file, or its groups (`g`) if
-/// it has no objects. Other files, files with tetrahedra and files with only one such part are one
-/// body.
+/// it has no objects; faces before the first of them are a body named `default`. Other files, files
+/// with tetrahedra and files with only one such part are one body, which has the name of its part,
+/// if it has one.
 ///
 /// The primitives of a body are numbered from 0, in the order of the file. Vertices that bodies
 /// share are in each of them.

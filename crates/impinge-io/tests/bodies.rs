@@ -85,14 +85,32 @@ fn objects_of_one_name_stay_apart() {
 
 #[test]
 fn what_has_no_parts_is_one_body() {
-    for text in ["f 1 2 3\nf 1 3 4\n", "g all\nf 1 2 3\nf 1 3 4\n"] {
+    for (text, name) in [
+        ("f 1 2 3\nf 1 3 4\n", None),
+        ("g all\nf 1 2 3\nf 1 3 4\n", Some("all")),
+        ("o Y\nf 1 2 3\nf 1 3 4\n", Some("Y")),
+        ("g red\no Y\nf 1 2 3\ng blue\nf 1 3 4\no Z\n", Some("Y")),
+        // No name, and none of faces.
+        ("o\nf 1 2 3\nf 1 3 4\n", None),
+        ("f 1 2 3\nf 1 3 4\no Y\n", None),
+    ] {
         let bodies = obj(&format!("{VERTICES}{text}"));
-        assert_eq!(names(&bodies), [None]);
+        assert_eq!(names(&bodies), [name]);
         // As it is, with the vertices of no face.
         assert_eq!(
             (bodies[0].mesh.n_primitives(), bodies[0].mesh.n_vertices()),
             (2, 6)
         );
+    }
+}
+
+#[test]
+fn faces_before_the_first_name_are_a_body() {
+    for word in ["o", "g"] {
+        let bodies = obj(&format!("{VERTICES}f 1 2 3\n{word} Y\nf 3 2 4\nf 3 2 6\n"));
+        assert_eq!(names(&bodies), [Some("default"), Some("Y")]);
+        let n = bodies.iter().map(|body| body.mesh.n_primitives());
+        assert_eq!(n.collect::<Vec<_>>(), [1, 2]);
     }
 }
 
@@ -168,4 +186,12 @@ fn nodes_are_placed_and_named() {
     );
     assert_eq!(bodies[0].mesh.positions.get(1), Some([6.0, 0.0, 0.0]));
     assert_eq!(bodies[1].mesh.positions.get(1), Some([1.0, 0.0, 0.0]));
+    // The only node has its name, if it has one.
+    for (node, name) in [(1, Some("part")), (2, Some("right")), (3, None)] {
+        let one = json.replace("\"nodes\":[0]", &format!("\"nodes\":[{node}]"));
+        let options = ReadOptions::as_they_are();
+        let (bodies, _) =
+            read_bodies_bytes(one.as_bytes(), Format::Gltf, "a.gltf", &options).unwrap();
+        assert_eq!(names(&bodies), [name]);
+    }
 }

@@ -153,8 +153,8 @@ pub fn read(py: Python<'_>, path: PathBuf, weld: bool) -> PyResult<Mesh> {
 /// Reads the bodies of a file, each as a mesh of its own.
 ///
 /// The bodies of a glTF file are its nodes that have a mesh; those of an OBJ file its objects
-/// (``o``), or its groups (``g``) if it has no objects. A file of another format, or with one body,
-/// is a list of one mesh.
+/// (``o``), or its groups (``g``) if it has no objects; faces before the first of them are one named
+/// ``default``. A file of another format, or with one body, is a list of one mesh.
 ///
 /// Parameters
 /// ----------
@@ -166,7 +166,7 @@ pub fn read(py: Python<'_>, path: PathBuf, weld: bool) -> PyResult<Mesh> {
 /// Returns
 /// -------
 /// list of Mesh
-///     With the names of nodes or groups, in the order of the file. Rows of ``faces`` are numbered within each body.
+///     With the names of nodes or groups, or the path where the only body has no name, in the order of the file. Rows of ``faces`` are numbered within each body.
 ///
 /// Raises
 /// ------

@@ -16,6 +16,7 @@ use std::path::Path;
 use self::accessor::Data;
 use self::json::{Node, Primitive, Root, index_error};
 use crate::binary::{Cursor, Endian, Scalar};
+use crate::bodies::PartName;
 use crate::budget::Budget;
 use crate::collect::{Collector, check_n_vertices, finite, vertex_ix};
 use crate::error::{Error, Name, Place, printable, shown};
@@ -227,8 +228,9 @@ impl<'a> Scene<'a, '_> {
                     .ok_or_else(|| index_error(name, "meshes", mesh_ix, root.meshes.len()))?;
                 let named = node.name.as_deref().or(mesh.name.as_deref());
                 let named = named.filter(|name| !name.is_empty());
-                let named = named.map_or_else(|| format!("node {node_ix}"), str::to_owned);
-                self.parts.begin_part(&named, true);
+                let stand_in = format!("node {node_ix}");
+                let named = named.map_or(PartName::StandIn(&stand_in), PartName::Given);
+                self.parts.begin_part(named, true);
                 let weights = node.weights.as_ref().unwrap_or(&mesh.weights);
                 if node.skin.is_some() || weights.iter().any(|&weight| weight != 0.0) {
                     self.parts.n_at_rest += 1;

@@ -3,12 +3,13 @@
 //!
 //! Source: Wavefront, "Advanced Visualizer" manual, appendix B1. A file is read as one body, its
 //! groups in their order, or as a body per object; per group if there are no objects, which often
-//! have groups of one material each. A face may name vertices that come later (positive indices);
+//! have groups of one material each. Faces before the first of these are a body, too. A face may name vertices that come later (positive indices);
 //! negative ones count back from the last vertex so far. Faces of one or two corners, which some
 //! programs write for points and segments, are counted and skipped.
 
 use std::borrow::Cow;
 
+use crate::bodies::PartName;
 use crate::collect::{Collector, check_n_vertices, finite, vertex_ix};
 use crate::error::{Error, Name, Place};
 use crate::mesh::Positions;
@@ -94,7 +95,10 @@ fn statements<'a>(bytes: &[u8], name: Name<'a>) -> Result<Collector<'a>, Error> 
                 if (word == b"o") == has_objects {
                     let names: Vec<_> = words.map(String::from_utf8_lossy).collect();
                     let name = names.join(" ");
-                    let name = if name.is_empty() { "default" } else { &name };
+                    let name = match name.is_empty() {
+                        true => PartName::StandIn("default"),
+                        false => PartName::Given(&name),
+                    };
                     // A group may go on later; each `o` begins another object.
                     parts.begin_part(name, has_objects);
                 }

@@ -14,6 +14,7 @@ use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
 
 use self::zip::Archive;
+use crate::bodies::PartName;
 use crate::budget::{Budget, most_expanded};
 use crate::collect::{Collector, check_n_vertices, finite, vertex_ix};
 use crate::error::{Error, Name, Place, shown};
@@ -84,8 +85,10 @@ pub(crate) fn read<'a>(
             .get(&item.id)
             .map(|object| object.name.clone());
         let label = label.filter(|label| !label.is_empty());
+        let stand_in = format!("object {}", item.id);
+        let named = label.as_deref();
         out.begin_part(
-            &label.unwrap_or_else(|| format!("object {}", item.id)),
+            named.map_or(PartName::StandIn(&stand_in), PartName::Given),
             true,
         );
         package.place(&part, item, item.transform, 0, &mut points, &mut out)?;

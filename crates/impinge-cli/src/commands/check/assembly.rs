@@ -113,9 +113,11 @@ fn parts(path: &Path, are_several: bool) -> Result<Vec<(String, Mesh)>, Error> {
     }
     let (bodies, summary) = read_bodies(path, &options)?;
     tell(&file, &summary.notes());
-    let named = bodies
-        .into_iter()
-        .map(|body| (part_name(&file, body.name, are_several), body.mesh));
+    let has_parts = bodies.len() > 1;
+    let named = bodies.into_iter().map(|body| {
+        let name = body.name.filter(|_| has_parts);
+        (part_name(&file, name, are_several), body.mesh)
+    });
     Ok(named.collect())
 }
 
