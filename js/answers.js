@@ -58,9 +58,48 @@ function inOrder(a, b) {
   return 0;
 }
 
+// What a scene knew of the numbers of its elements when a list was found.
+const numbering = new WeakMap();
+
+function remember(list, moves) {
+  if (moves !== undefined) numbering.set(list, moves);
+  return list;
+}
+
+// Whether the elements of a kind, first those that it names first, are edges.
+const EDGES = KINDS.map((kind) => Array.from(kind, (letter) => letter === "e"));
+
+// The bodies that a list names whose elements of the kind have other numbers in one of two answers.
+function renumbered({ rows, kinds, length }, [then, now]) {
+  const bodies = new Set();
+  for (let ix = 0; ix < length; ix += 1) {
+    for (const side of [0, 1]) {
+      const of = rows[4 * ix + 2 * side];
+      const part = kinds !== undefined && EDGES[kinds[ix]][side] ? "edges" : "elements";
+      const [before, after] = [then, now].map(({ numbered }) => numbered.get(of)?.[part] ?? 0);
+      if (before !== after) bodies.add(`${of} ${part}`);
+    }
+  }
+  return bodies;
+}
+
+// Refuses two answers of which the numbers do not name the same elements.
+function mustCompare(list, old) {
+  const both = [old, list].map((of) => numbering.get(of));
+  const [then, now] = both;
+  if (then === undefined || now === undefined) return;
+  if (then.of !== now.of) refuse("old: an answer about another scene given, those about the same scene allowed");
+  if (then.numbered === now.numbered) return;
+  const named = renumbered(list, both);
+  const part = [...renumbered(old, both)].find((part) => named.has(part));
+  if (part === undefined) return;
+  refuse(`body ${part.split(" ")[0]}: the pairs were found before it was re-meshed or its edges were set, and name other elements`);
+}
+
 // What both lists have, and what only the newer or the older one has.
 function changesOf(list, old, type) {
   if (!(old instanceof type)) refuse(`old: ${list.constructor.name} are needed, as these are`);
+  mustCompare(list, old);
   const [before, after] = [ordered(old), ordered(list)];
   const [kept, added, gone] = [[], [], []];
   for (let was = 0, is = 0; was < before.length || is < after.length; ) {
@@ -90,6 +129,7 @@ export class Pairs extends List {
 
   constructor([rows, , , , , hash], stats, moves) {
     super(rows);
+    remember(this, moves);
     this.#moves = moves;
     this.hash = hex(hash);
     this.stats = stats;
@@ -190,7 +230,8 @@ class ImpactList extends OfKinds {
   of(kind) {
     const [from, to] = this.range(kind);
     const [toi, atStart] = [this.toi, this.atStart].map((column) => column.subarray(from, to));
-    return new ImpactList(this.rows.subarray(4 * from, 4 * to), this.kinds.subarray(from, to), { toi, atStart });
+    const part = new ImpactList(this.rows.subarray(4 * from, 4 * to), this.kinds.subarray(from, to), { toi, atStart });
+    return remember(part, numbering.get(this));
   }
 
   changes(old) {
@@ -211,8 +252,9 @@ function impacts([rows, bytes, numbers], more) {
 }
 
 export class Impacts extends ImpactList {
-  constructor(lists, stats) {
+  constructor(lists, stats, moves) {
     super(...impacts(lists, { hash: hex(lists[5]), stats }));
+    remember(this, moves);
   }
 }
 
@@ -221,12 +263,13 @@ export const earliest = (lists) => new ImpactList(...impacts(lists)).at(0) ?? nu
 class NearList extends OfKinds {
   of(kind) {
     const [from, to] = this.range(kind);
-    return new NearList(this.rows.subarray(4 * from, 4 * to), this.kinds.subarray(from, to), {
+    const part = new NearList(this.rows.subarray(4 * from, 4 * to), this.kinds.subarray(from, to), {
       features: this.features.subarray(2 * from, 2 * to),
       parallel: this.parallel.subarray(from, to),
       distances: this.distances?.subarray(from, to) ?? null,
       points: this.points?.subarray(6 * from, 6 * to) ?? null,
     });
+    return remember(part, numbering.get(this));
   }
 
   changes(old) {
@@ -246,7 +289,7 @@ const twoPoints = (numbers, at) => [at, at + 3].map((from) => Array.from(numbers
 
 export class NearPairs extends NearList {
   // Without pairs, columns that were asked for are there and empty.
-  constructor([rows, bytes, numbers, , , hash], stats, { hasDistances, hasPoints }) {
+  constructor([rows, bytes, numbers, , , hash], stats, { hasDistances, hasPoints }, moves) {
     const n = rows.length / 4;
     super(rows, bytes.subarray(0, n), {
       features: bytes.subarray(n, 3 * n),
@@ -256,6 +299,7 @@ export class NearPairs extends NearList {
       hash: hex(hash),
       stats,
     });
+    remember(this, moves);
   }
 }
 

@@ -33,7 +33,10 @@ export const QUESTIONS = {
   },
   count: (query) => ({ question: 1, ...packed(query), shape: first }),
   any: (query) => ({ question: 2, ...packed(query), shape: yes }),
-  impacts: (query) => ({ question: 3, ...packed(query), shape: (lists, stats) => new Impacts(lists, stats) }),
+  impacts(query) {
+    const moves = this[MOVES].now();
+    return { question: 3, ...packed(query), shape: (lists, stats) => new Impacts(lists, stats, moves) };
+  },
   earliest: (query) => ({ question: 4, ...packed(query), shape: earliest }),
   isFree: (query) => ({ question: 5, ...packed(query), shape: yes }),
   advance: (query) => ({ question: 6, ...packed(query), shape: (lists, stats) => new Advance(lists, stats) }),
@@ -44,7 +47,8 @@ export const QUESTIONS = {
   near(distance, query) {
     const hasPoints = Boolean(query?.closestPoints);
     const has = { hasPoints, hasDistances: hasPoints || Boolean(query?.distances) };
-    const shape = (lists, stats) => new NearPairs(lists, stats, has);
+    const moves = this[MOVES].now();
+    const shape = (lists, stats) => new NearPairs(lists, stats, has, moves);
     return { question: 8, ...packed(query, number("distance", distance)), shape };
   },
   distance: (a, b, control) => ({ question: 9, ...plain(Uint32Array.of(body(a), body(b)), control), shape: nearest }),
@@ -157,22 +161,34 @@ function arrays(mesh) {
   return [kind, wide(index), positions];
 }
 
-// When the bodies of a scene were moved last: contacts are about positions that bodies may no longer have.
+// When the bodies of a scene were moved last: contacts are about positions that bodies may no longer have. And when their elements, and
+// their edges alone, were given other numbers.
 class Moves {
   #n = 0;
   #last = new Map();
+  // Answers keep it: another one is made for each change.
+  #numbered = new Map();
 
   add(which) {
     this.#n += 1;
     this.#last.set(which, this.#n);
   }
 
+  renumber(which, edgesAlone) {
+    this.#n += 1;
+    const elements = edgesAlone ? (this.#numbered.get(which)?.elements ?? 0) : this.#n;
+    this.#numbered = new Map(this.#numbered).set(which, { elements, edges: this.#n });
+  }
+
   forget(which) {
     this.#last.delete(which);
+    if (!this.#numbered.has(which)) return;
+    this.#numbered = new Map(this.#numbered);
+    this.#numbered.delete(which);
   }
 
   now() {
-    return { of: this, n: this.#n };
+    return { of: this, n: this.#n, numbered: this.#numbered };
   }
 
   mustBe({ of, n }, bodies) {
@@ -248,6 +264,7 @@ export function makeScene({ SceneHandle }, mustBeReady) {
 
     remesh(which, mesh) {
       this.#put(REMESH, body(which), ...arrays(mesh));
+      this.#moves.renumber(which, false);
     }
 
     setPositions(which, positions) {
@@ -288,7 +305,9 @@ export function makeScene({ SceneHandle }, mustBeReady) {
     }
 
     setEdges(which, edges) {
+      const before = this.edges(which);
       call(() => this.#held.set_edges(body(which), edges === null ? new Uint32Array() : wide(edges, "edges")));
+      if (this.edges(which).some((vertex, ix) => vertex !== before[ix])) this.#moves.renumber(which, true);
     }
 
     setGroups(which, groups) {

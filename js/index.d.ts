@@ -351,7 +351,10 @@ export interface Pairs extends Answer, List<[Body, number, Body, number]> {
   selfOf(body: Body): Uint32Array;
   /** The elements of a body that are in any pair: sorted, each once. */
   colliding(body: Body): Uint32Array;
-  /** Which pairs an older answer also has, which are new, and which are gone. Pairs are the same if their bodies and elements are. */
+  /**
+   * Which pairs an older answer also has, which are new, and which are gone. Pairs are the same if their bodies and elements are. Refused
+   * of answers about another scene, and where both have pairs of a body that was re-meshed between them, or of edges of it that were set.
+   */
   changes(old: Pairs): Changes;
 }
 

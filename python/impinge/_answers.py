@@ -181,6 +181,13 @@ class Changes(NamedTuple):
     gone: npt.NDArray[np.int64]
 
 
+def _older(old: Any, needed: type) -> Any:
+    """What an older answer is made of; refuses one to another question."""
+    if isinstance(old, needed):
+        return old._inner
+    raise TypeError(f"old: {type(old).__name__} given, {needed.__name__} needed")
+
+
 class Pairs:
     """The pairs of elements that intersect: sorted.
 
@@ -223,6 +230,8 @@ class Pairs:
         ------
         TypeError
             An answer to another question.
+        ValueError
+            An answer about another scene; or both have pairs of a body that was re-meshed between them.
 
         Examples
         --------
@@ -238,7 +247,7 @@ class Pairs:
         >>> kept.tolist(), new.tolist(), gone.tolist()
         ([[0, 0]], [1], [])
         """
-        return Changes(*self._inner.changes(old._inner if isinstance(old, Pairs) else old))
+        return Changes(*self._inner.changes(_older(old, Pairs)))
 
     def between(self, a: _Body, b: _Body) -> npt.NDArray[np.uint32]:
         """The pairs of two bodies.
@@ -478,8 +487,16 @@ class Impacts(_OfKinds):
         Returns
         -------
         Changes
+
+        Raises
+        ------
+        TypeError
+            An answer to another question.
+        ValueError
+            An answer about another scene; or both have pairs of a body that was re-meshed between them, or of edges of
+            it that were set (`Scene.set_edges`).
         """
-        return Changes(*self._inner.changes(old._inner if isinstance(old, Impacts) else old))
+        return Changes(*self._inner.changes(_older(old, Impacts)))
 
     def of(self, kind: _PairKind) -> Impacts:
         """Those of one kind.
@@ -576,8 +593,16 @@ class NearPairs(_OfKinds):
         Returns
         -------
         Changes
+
+        Raises
+        ------
+        TypeError
+            An answer to another question.
+        ValueError
+            An answer about another scene; or both have pairs of a body that was re-meshed between them, or of edges of
+            it that were set (`Scene.set_edges`).
         """
-        return Changes(*self._inner.changes(old._inner if isinstance(old, NearPairs) else old))
+        return Changes(*self._inner.changes(_older(old, NearPairs)))
 
     def of(self, kind: _PairKind) -> NearPairs:
         """Those of one kind.

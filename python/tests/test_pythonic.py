@@ -497,10 +497,36 @@ def test_changes_between_frames():
             assert [old[i] for i in changes.gone] == [key for key in old if key not in set(new)]
             assert min(map(len, changes)) > 0 and all(of.dtype == np.int64 for of in changes) and changes.kept.shape[1] == 2
         before = after
-    with pytest.raises(TypeError):
+    with pytest.raises(TypeError, match="^old: Impacts given, Pairs needed$"):
         before[0].changes(before[1])
-    with pytest.raises(TypeError):
+    with pytest.raises(TypeError, match="^old: Impacts given, NearPairs needed$"):
+        before[2].changes(before[1])
+    with pytest.raises(TypeError, match="^old: NoneType given, Impacts needed$"):
         before[1].changes(None)
+    for answer, other in zip(ask(), (detector.detect(pickled := pickle.loads(pickle.dumps(scene))), detector.impacts(pickled), detector.near(pickled, 0.1))):
+        with pytest.raises(ValueError, match="^old: an answer about another scene given"):
+            answer.changes(other)
+    scene.remesh(body, at, np.arange(900).reshape(-1, 3))
+    for answer, old in zip(ask(), before):
+        with pytest.raises(ValueError, match="^body 0: the pairs were found before it was re-meshed or its edges were set"):
+            answer.changes(old)
+
+
+def test_changes_of_edges_that_were_set_are_refused():
+    scene = impinge.Scene()
+    triangle = scene.add([[0, 0, 0], [4, 0, 0], [0, 4, 0]], [[0, 1, 2]])
+    scene.add_edges([[1, -0.1, -1], [1, -0.1, 1]], [[0, 1]])
+    scene.add_points([[1, 1, 0.1]])
+    detector = impinge.Detector("cpu")
+    before = detector.near(scene, 0.2, kinds=("ee", "vf"))
+    assert [len(before.of(kind)) for kind in ("vf", "ee")] == [1, 1]
+    scene.set_edges(triangle, [[0, 2], [0, 1], [1, 2]])
+    after = detector.near(scene, 0.2, kinds=("ee", "vf"))
+    for now, then in [(after, before), (after.of("ee"), before.of("ee")), (after.of("ee"), before)]:
+        with pytest.raises(ValueError, match="^body 0: "):
+            now.changes(then)
+    # Faces and vertices have the numbers that they had.
+    assert after.of("vf").changes(before.of("vf")).kept.tolist() == [[0, 0]]
 
 
 @pytest.mark.parametrize("duplicate", [copy.copy, copy.deepcopy, lambda x: pickle.loads(pickle.dumps(x))])

@@ -217,6 +217,23 @@ export async function refusals(module) {
   const impacts = detector.impacts(scene);
   said.changes = [all, impacts].map((list) => [list.changes(list.of("vf")), list.of("vf").changes(list)].map(({ kept }) => kept.length / 2));
   said.changes.push(all.of("vf").length, impacts.of("vf").length);
+  // After edges were set, unless they are the same, and of another scene.
+  const sameKept = (list, old) => list.changes(old).kept.length / 2 === old.length;
+  const ownEdges = scene.edges(second);
+  scene.setEdges(second, ownEdges.slice());
+  said.numbers = [sameKept(detector.near(scene, 1), all)];
+  scene.setEdges(second, Uint32Array.of(...ownEdges.slice(2), ...ownEdges.slice(0, 2)));
+  said.numbers.push(await refusal(() => detector.near(scene, 1).changes(all)), sameKept(detector.near(scene, 1).of("vf"), all.of("vf")));
+  scene.setEdges(second, null);
+  const detected = detector.detect(scene);
+  scene.remesh(second, { positions: triangle, faces: index });
+  said.numbers.push(await refusal(() => detector.near(scene, 1).of("vf").changes(all.of("vf"))), await refusal(() => detector.detect(scene).changes(detected)));
+  scene.setEndPositions(second, triangle.map((x) => x + 1));
+  said.numbers.push(await refusal(() => detector.impacts(scene).changes(impacts)));
+  const elsewhere = new Scene();
+  for (let n = 0; n < 2; n += 1) elsewhere.addTriangles(index, triangle);
+  said.numbers.push(await refusal(() => detector.near(elsewhere, 1).changes(all)));
+  elsewhere.dispose();
   const corners = new Float32Array([0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1]);
   const closed = [0, 0.125].map((by) => scene.addTriangles(new Uint8Array([0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3]), corners.map((x) => x + by)));
   const older = detector.contacts(scene, detector.detect(scene, { between: closed }));
@@ -325,6 +342,13 @@ export const REFUSALS = {
   usable: [9, true, true, "true"],
   failed: ["invalid: distance: -1 given, a finite number that is not below 0 allowed", true, 0],
   changes: [[6, 6], [6, 6], 6, 6],
+  numbers: [
+    true,
+    "invalid: body 1: the pairs were found before it was re-meshed or its edges were set, and name other elements",
+    true,
+    ...Array(3).fill("invalid: body 1: the pairs were found before it was re-meshed or its edges were set, and name other elements"),
+    "invalid: old: an answer about another scene given, those about the same scene allowed",
+  ],
   older: [
     "nothing was refused",
     "invalid: body 3: this was found for other positions than it has now, so nothing is known of it; ask again",

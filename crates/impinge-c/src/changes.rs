@@ -22,12 +22,17 @@ pub struct impinge_changes {
 /// The pairs of an answer.
 trait Compared {
     const NAME: &'static str;
+    /// Refuses an older answer with which it cannot be compared.
+    fn check_comparable(&self, old: &Self) -> Result<(), impinge::Error>;
     /// What makes each pair the same.
     fn keys(&self) -> impl Iterator<Item: Ord>;
 }
 
 impl Compared for impinge_pairs {
     const NAME: &'static str = "pairs";
+    fn check_comparable(&self, old: &Self) -> Result<(), impinge::Error> {
+        self.pairs.check_comparable(&old.pairs)
+    }
     fn keys(&self) -> impl Iterator<Item: Ord> {
         self.pairs.iter()
     }
@@ -35,6 +40,9 @@ impl Compared for impinge_pairs {
 
 impl Compared for impinge_impacts {
     const NAME: &'static str = "impacts";
+    fn check_comparable(&self, old: &Self) -> Result<(), impinge::Error> {
+        self.impacts.check_comparable(&old.impacts, None)
+    }
     fn keys(&self) -> impl Iterator<Item: Ord> {
         let impacts = self.impacts.iter();
         impacts.map(|impact| (impact.kind, impact.a, impact.b))
@@ -43,6 +51,9 @@ impl Compared for impinge_impacts {
 
 impl Compared for impinge_near {
     const NAME: &'static str = "near_pairs";
+    fn check_comparable(&self, old: &Self) -> Result<(), impinge::Error> {
+        self.near.check_comparable(&old.near, None)
+    }
     fn keys(&self) -> impl Iterator<Item: Ord> {
         let near = self.near.iter();
         near.map(|pair| (pair.kind, pair.a, pair.b))
@@ -60,6 +71,7 @@ fn push<T>(list: &mut Vec<T>, item: T) -> Result<(), Failure> {
 
 impl impinge_changes {
     fn new<A: Compared>(answer: &A, old: &A) -> Result<Self, Failure> {
+        answer.check_comparable(old)?;
         let mut changes = impinge_changes::default();
         Changes::each(old.keys(), answer.keys(), |order, [old, new]| match order {
             Ordering::Less => push(&mut changes.gone, old as u64),

@@ -83,6 +83,14 @@ void answers() {
     CHECK(changes.kept().size() + changes.gone().size() == pairs_of_parts.size());
     for (const auto &rows : changes.kept()) CHECK(memcmp(&pairs_of_parts[rows[0]], &second_pairs[rows[1]], sizeof(impinge::pair)) == 0);
     CHECK(kept.changes(kept).empty());
+    // Of another scene, and of a body that was re-meshed, numbers name other elements.
+    impinge::scene other;
+    for (const auto &ball : balls) other.add_triangles(faces(ball), numbers(ball));
+    const auto others = detector.detect(other);
+    CHECK(others.size() == kept.size());
+    throws(IMPINGE_ERROR_INVALID, "another scene", [&] { others.changes(kept); });
+    other.remesh(a, IMPINGE_TRIANGLES, faces(balls[0]), numbers(balls[0]));
+    throws(IMPINGE_ERROR_INVALID, "body 0: the pairs were found before it was re-meshed", [&] { detector.detect(other).changes(others); });
   }
   const auto candidates = detector.candidates(scene, 0.01, query::all().kinds({pair_kind::ee}));
   CHECK(candidates.of(pair_kind::ee).size() == candidates.size() && candidates.size() > 100);

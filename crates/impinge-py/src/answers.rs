@@ -167,7 +167,8 @@ impl Pairs {
         old: &Bound<'py, Pairs>,
     ) -> PyResult<ChangeArrays<'py>> {
         let old = old.get();
-        changes(py, &py.detach(|| self.inner.changes(&old.inner)))
+        let found = py.detach(|| self.inner.changes(&old.inner));
+        changes(py, &found.map_err(raise)?)
     }
 
     fn retain(&self, py: Python<'_>, keep: &Bound<'_, PyAny>) -> PyResult<Pairs> {
@@ -291,7 +292,12 @@ impl Impacts {
         py: Python<'py>,
         old: &Bound<'py, Impacts>,
     ) -> PyResult<ChangeArrays<'py>> {
-        let [old, new] = [old.get(), self].map(|impacts| {
+        let old = old.get();
+        (self
+            .inner
+            .check_comparable(&old.inner, self.kind.or(old.kind)))
+        .map_err(raise)?;
+        let [old, new] = [old, self].map(|impacts| {
             let all = impacts.slice().iter();
             all.map(|impact| (impact.kind, impact.a, impact.b))
         });

@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::answers::{ChangeArrays, changes, collect, kind_numbers, to_array};
-use crate::errors::invalid;
+use crate::errors::{invalid, raise};
 use crate::exclusion::Exclusion;
 use crate::options::pair_kind;
 use crate::scene::Scene;
@@ -109,6 +109,10 @@ impl Near {
 
     fn changes<'py>(&self, py: Python<'py>, old: &Bound<'py, Near>) -> PyResult<ChangeArrays<'py>> {
         let old = old.get();
+        (self
+            .inner
+            .check_comparable(&old.inner, self.kind.or(old.kind)))
+        .map_err(raise)?;
         let found = py.detach(|| {
             let [old, new] = [old, self].map(|near| {
                 let all = near.iter();

@@ -1,7 +1,13 @@
 //! What has changed from one answer to the next: which pairs are kept, new and gone.
 
 use std::cmp::Ordering;
+use std::collections::BTreeSet;
 use std::convert::Infallible;
+
+use crate::scene::bodies::NumberedPart;
+use crate::scene::elements::Part;
+use crate::scene::error::Error;
+use crate::scene::ids::BodyId;
 
 /// The pairs of an answer beside those of an older one: [`Pairs::changes`](crate::Pairs::changes),
 /// [`Impacts::changes`](crate::Impacts::changes),
@@ -21,7 +27,7 @@ use std::convert::Infallible;
 ///
 /// scene.set_positions(points, &[[1.0f32, 1.0, 9.0], [3.0, 1.0, 0.5], [1.0, 2.0, 0.5]])?;
 /// let next = detector.near(&scene, 1.0, &Query::all())?;
-/// let changes = next.changes(&near);
+/// let changes = next.changes(&near)?;
 /// let mut moved = vec![0.0; next.len()];
 /// for &[old, new] in &changes.kept {
 ///     moved[new] = multipliers[old];
@@ -107,5 +113,45 @@ impl Changes {
                 after = new.next();
             }
         }
+    }
+}
+
+/// Refuses to compare two answers, the old one and the new one, each with the
+/// [family](crate::Scene::family) of its scene and with its parts: if their scenes differ, or if
+/// both have pairs with elements of a part that has other numbers in the new one. `named` are the
+/// parts of each pair, of the old one and of the new one.
+pub(crate) fn check_comparable<P: Iterator<Item = NumberedPart> + Clone>(
+    [(old_family, old), (new_family, new)]: [(u64, P); 2],
+    named: [impl Iterator<Item = [(BodyId, Part); 2]>; 2],
+) -> Result<(), Error> {
+    // Answers about no body are of any scene.
+    if old_family != new_family && old_family.min(new_family) > 0 {
+        return Err(Error::Setting {
+            setting: "old",
+            given: "an answer about another scene".to_owned(),
+            allowed: "those about the same scene or its clones",
+        });
+    }
+    // As nearly always.
+    if old.clone().eq(new.clone()) {
+        return Ok(());
+    }
+    let new: BTreeSet<NumberedPart> = new.collect();
+    let is_renumbered = |&(id, part, stamp): &NumberedPart| {
+        let mut of_part = new.range((id, part, 0)..=(id, part, u64::MAX));
+        of_part.next().is_some_and(|now| now.2 != stamp)
+    };
+    let renumbered = old.filter(is_renumbered).map(|(id, part, _)| (id, part));
+    let mut renumbered: BTreeSet<(BodyId, Part)> = renumbered.collect();
+    for named in named {
+        if renumbered.is_empty() {
+            return Ok(());
+        }
+        let parts = named.flatten().filter(|part| renumbered.contains(part));
+        renumbered = parts.collect();
+    }
+    match renumbered.first() {
+        Some(&(body, _)) => Err(Error::Remeshed { body }),
+        None => Ok(()),
     }
 }

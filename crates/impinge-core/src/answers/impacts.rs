@@ -219,10 +219,26 @@ impl Impacts {
 
     /// Which pairs an older answer also has, which are new, and which are gone: two pairs are the
     /// same if their kinds, bodies and elements are, whatever their times. Pairs of a body that was
-    /// removed and of one in its slot differ; those of a body that was re-meshed are named by their
-    /// numbers alone.
-    pub fn changes(&self, old: &Impacts) -> Changes {
-        Changes::between(old.iter().map(Impact::key), self.iter().map(Impact::key))
+    /// removed and of one in its slot differ.
+    ///
+    /// # Errors
+    /// The older answer is about another scene, which is no clone. Or both answers have pairs with
+    /// elements of which the numbers have changed: those of a body that was re-meshed, or edges that
+    /// were [set](crate::Scene::set_edges).
+    pub fn changes(&self, old: &Impacts) -> Result<Changes, Error> {
+        self.check_comparable(old, None)?;
+        let [old, new] = [old, self].map(|impacts| impacts.iter().map(Impact::key));
+        Ok(Changes::between(old, new))
+    }
+
+    /// Refuses what [`changes`](Impacts::changes) refuses, of all pairs or of one kind.
+    #[doc(hidden)]
+    pub fn check_comparable(&self, old: &Impacts, kind: Option<PairKind>) -> Result<(), Error> {
+        let keys = [old, self].map(|impacts| {
+            let of_kind = kind.map_or(&impacts.impacts[..], |kind| impacts.of(kind));
+            of_kind.iter().map(Impact::key)
+        });
+        self.numbering.check_comparable(&old.numbering, keys)
     }
 
     /// A hash of the set of impacts, times included, that does not depend on their order: the

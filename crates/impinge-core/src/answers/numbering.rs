@@ -1,20 +1,26 @@
 //! Names of the elements of an answer: the body and the element of each global number.
 
+use crate::answers::changes::check_comparable;
 use crate::answers::pairs::Element;
 use crate::plan::{Plan, owner_by_first};
+use crate::query::pair_kind::PairKind;
 use crate::scene::bodies::NumberedPart;
+use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
 use crate::scene::index::{Number, pair_numbers};
 
 /// Maps global numbers to elements of bodies.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Numbering {
+    /// Of the scene.
+    family: u64,
     /// The first number of each part.
     parts: Vec<(Number, NumberedPart)>,
 }
 
 impl Numbering {
     pub fn begin(&mut self, plan: &Plan) {
+        self.family = plan.family;
         self.parts.clear();
         let parts = plan.parts.iter();
         (self.parts).extend(parts.map(|of| (of.first, (of.id, of.part, of.numbers_stamp))));
@@ -22,8 +28,27 @@ impl Numbering {
 
     /// The parts that were asked about: their elements have these numbers as long as their stamps
     /// are the same.
-    pub fn numbered(&self) -> impl Iterator<Item = NumberedPart> + '_ {
+    pub fn numbered(&self) -> impl Iterator<Item = NumberedPart> + Clone + '_ {
         self.parts.iter().map(|&(_, part)| part)
+    }
+
+    /// Refuses to compare an answer with an older one, given the pairs of the old one and of the new.
+    ///
+    /// # Errors
+    /// The older one is about another scene, or both name elements whose numbers have changed.
+    pub fn check_comparable(
+        &self,
+        old: &Numbering,
+        pairs: [impl Iterator<Item = (PairKind, Element, Element)>; 2],
+    ) -> Result<(), Error> {
+        let answers = [old, self].map(|of| (of.family, of.numbered()));
+        let named = pairs.map(|pairs| {
+            pairs.map(|(kind, a, b)| {
+                let [part_a, part_b] = kind.parts();
+                [(a.body, part_a), (b.body, part_b)]
+            })
+        });
+        check_comparable(answers, named)
     }
 
     /// The part that has the element with this number, and the first and the last of its numbers.

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::answers::changes::Changes;
+use crate::answers::changes::{Changes, check_comparable};
 use crate::answers::home::{Home, gives_back};
 use crate::plan::{Plan, owner_by_first};
 use crate::scene::Scene;
@@ -45,6 +45,8 @@ const NONE: Range<Number> = Number::new(0)..Number::new(0);
 pub struct Pairs {
     keys: Vec<u64>,
     bodies: Vec<PairBody>,
+    /// Of the scene.
+    family: u64,
     stats: Stats,
     /// Where its buffers go when it is dropped.
     home: Home<Pairs>,
@@ -70,6 +72,7 @@ impl Pairs {
     #[doc(hidden)]
     pub fn of_rows(scene: &Scene, rows: &[[u32; 4]]) -> Result<Self, Error> {
         let mut pairs = Pairs::default();
+        pairs.family = scene.family();
         let mut end: u32 = 0;
         for (id, body) in scene.bodies() {
             pairs.bodies.push(PairBody {
@@ -270,10 +273,30 @@ impl Pairs {
     }
 
     /// Which pairs an older answer also has, which are new, and which are gone: two pairs are the
-    /// same if their bodies and elements are. Pairs of a body that was removed and of one in
-    /// its slot differ; those of a body that was re-meshed are named by their numbers alone.
-    pub fn changes(&self, old: &Pairs) -> Changes {
-        Changes::between(old.iter(), self.iter())
+    /// same if their bodies and elements are. Pairs of a body that was removed and of one in its
+    /// slot differ.
+    ///
+    /// # Errors
+    /// The older answer is about another scene, which is no clone. Or a body was re-meshed since, and
+    /// both answers have pairs of it.
+    pub fn changes(&self, old: &Pairs) -> Result<Changes, Error> {
+        self.check_comparable(old)?;
+        Ok(Changes::between(old.iter(), self.iter()))
+    }
+
+    /// Refuses what [`changes`](Pairs::changes) refuses.
+    #[doc(hidden)]
+    pub fn check_comparable(&self, old: &Pairs) -> Result<(), Error> {
+        let answers = [old, self].map(|pairs| {
+            let bodies = pairs.bodies.iter();
+            let parts = bodies.map(|body| (body.id, Part::Given, body.numbers_stamp));
+            (pairs.family, parts)
+        });
+        let named = [old, self].map(|pairs| {
+            let all = pairs.iter();
+            all.map(|(a, b)| [a, b].map(|of| (of.body, Part::Given)))
+        });
+        check_comparable(answers, named)
     }
 
     /// A hash of the set of pairs that does not depend on their order: the wrapping sum of a
@@ -291,6 +314,7 @@ impl Pairs {
 impl Outcome<u64, 1> for Pairs {
     fn begin(&mut self, plan: &Plan) {
         self.keys.clear();
+        self.family = plan.family;
         self.bodies.clear();
         self.bodies.extend(plan.parts.iter().map(|part| PairBody {
             id: part.id,

@@ -150,6 +150,8 @@ pub enum TestId {
 pub struct Plan {
     /// Part after part, in slot order.
     pub parts: Vec<QueryPart>,
+    /// Of the [scene](Scene::family).
+    pub(crate) family: u64,
     /// The question about pairs.
     pub question: Question,
     /// The kinds of pairs, if the query names them.
@@ -383,6 +385,7 @@ impl Plan {
         limits: Limits,
     ) -> Result<Self, Error> {
         let mut plan = Plan {
+            family: scene.family(),
             parts: Vec::with_capacity({
                 let n_bodies = match query.scope {
                     Scope::Between(..) | Scope::SelfOf(_) => 2,

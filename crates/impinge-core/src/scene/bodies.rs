@@ -33,6 +33,8 @@ pub struct Scene {
     stamp: u64,
     /// Changes whenever anything but positions may have changed.
     arrangement: u64,
+    /// Of the scene and its clones alone; 0 before its first body.
+    family: u64,
 }
 
 impl Scene {
@@ -104,6 +106,9 @@ impl Scene {
         };
         let id = BodyId::new(slot);
         let body = Body::new(id, mesh.into(), Filter::default())?;
+        if self.family == 0 {
+            self.family = new_stamp();
+        }
         let held = Slot(Some((id, body)));
         match self.free.pop() {
             Some(_) => self.slots[id.index()] = held,
@@ -303,6 +308,11 @@ impl Scene {
     /// Changes whenever anything but positions may have changed; equal stamps mean the same bodies.
     pub(crate) fn arrangement(&self) -> u64 {
         self.arrangement
+    }
+
+    /// The same for a scene and its clones, and for no other; 0 of one that never had a body.
+    pub(crate) fn family(&self) -> u64 {
+        self.family
     }
 
     fn rearranged(&mut self) {

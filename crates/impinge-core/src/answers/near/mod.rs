@@ -75,6 +75,11 @@ impl NearPair {
         row(self.a, self.b)
     }
 
+    /// What makes it the same pair in another answer, in the order of answers.
+    fn key(self) -> (PairKind, Element, Element) {
+        (self.kind, self.a, self.b)
+    }
+
     /// ipc-toolkit's name of the distance type: `P_T`, `P_E0`, `P_T0` of a vertex and a face;
     /// `EA_EB`, `EA_EB0`, `EA0_EB1` of edges; `P_E`, `P_E0`, `P_E1` of an edge and a vertex; `P_P`
     /// of vertices. Of an edge and a face, or of faces, the kinds of the features: `P_P`, `P_E`,
@@ -248,11 +253,26 @@ impl NearPairs {
 
     /// Which pairs an older answer also has, which are new, and which are gone: two pairs are the
     /// same if their kinds, bodies and elements are, whatever their features and distances. Pairs
-    /// of a body that was removed and of one in its slot differ; those of a body that was re-meshed
-    /// are named by their numbers alone.
-    pub fn changes(&self, old: &NearPairs) -> Changes {
-        let key = |pair: NearPair| (pair.kind, pair.a, pair.b);
-        Changes::between(old.iter().map(key), self.iter().map(key))
+    /// of a body that was removed and of one in its slot differ.
+    ///
+    /// # Errors
+    /// The older answer is about another scene, which is no clone. Or both answers have pairs with
+    /// elements of which the numbers have changed: those of a body that was re-meshed, or edges that
+    /// were [set](crate::Scene::set_edges).
+    pub fn changes(&self, old: &NearPairs) -> Result<Changes, Error> {
+        self.check_comparable(old, None)?;
+        let [old, new] = [old, self].map(|near| near.iter().map(NearPair::key));
+        Ok(Changes::between(old, new))
+    }
+
+    /// Refuses what [`changes`](NearPairs::changes) refuses, of all pairs or of one kind.
+    #[doc(hidden)]
+    pub fn check_comparable(&self, old: &NearPairs, kind: Option<PairKind>) -> Result<(), Error> {
+        let keys = [old, self].map(|near| {
+            let of_kind = kind.map_or_else(|| near.iter(), |kind| near.of(kind));
+            of_kind.map(NearPair::key)
+        });
+        self.numbering.check_comparable(&old.numbering, keys)
     }
 
     /// A hash of the set of pairs and their features that does not depend on their order: the
