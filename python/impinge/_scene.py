@@ -494,13 +494,14 @@ class Scene(SceneBase):
             In the unit of the scene, 0 or more: one number for all elements, which `remesh` keeps; or one per vertex, edge or face,
             which it forgets.
         part : {"vertices", "edges", "faces"}, optional
-            Of which elements an array is; of vertices by default. An edge or a face is then as thick as the thickest of its vertices.
+            Of which elements an array is; of vertices by default. One number has none. An edge or a face is then as thick as the thickest of its vertices.
             If it is of edges or of faces, other elements are as thick as the thickest one of these that they have or are part of.
 
         Raises
         ------
         ValueError, TypeError
-            A thickness that is negative or not finite; more or fewer than the body has vertices, edges or faces.
+            A thickness that is negative or not finite; more or fewer than the body has vertices, edges or faces; one
+            number with a `part`.
 
         Examples
         --------

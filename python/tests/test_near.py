@@ -140,6 +140,9 @@ def test_refusals(detector, two):
         two.set_thickness(0, [1, 2, -0.5])
     with pytest.raises(ValueError, match='^part: "corners" given'):
         two.set_thickness(0, [1, 2, 3], part="corners")
+    for number in (1.0, 1, np.float32(1), np.array(1.0)):
+        with pytest.raises(ValueError, match="^thickness: one number given with part=\"faces\": one number is of the whole body"):
+            two.set_thickness(0, number, "faces")
     with pytest.raises(ValueError, match="a row of numbers expected"):
         two.set_thickness(0, np.ones((3, 1)))
     with pytest.raises(ValueError, match='^kinds\\[0\\]: "xy" given'):

@@ -692,6 +692,14 @@ fn thickness(given: &Bound<'_, PyAny>, part: &Bound<'_, PyAny>) -> PyResult<Thic
     if part.is_none() && !is_array && given.extract::<f64>().is_ok() {
         return Ok(number(given, "thickness")?.into());
     }
+    if let (Some(part), false) = (&part, is_array)
+        && given.extract::<f64>().is_ok()
+    {
+        return Err(invalid(format!(
+            "thickness: one number given with part={part:?}: one number is of the whole body, without a part; with one, give a row of \
+             numbers, one for each of its {part}"
+        )));
+    }
     let each = arrays::numbers(given, "thickness")?;
     match part.as_deref() {
         None | Some("vertices") => Ok(Thickness::vertices(each)),
