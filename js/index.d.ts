@@ -124,8 +124,8 @@ export interface Query extends Control {
   /**
    * Pairs that are left out: those of two bodies; with the same body twice, its self-collision; with `{ rings: n }` the pairs of one
    * body that are near in its surface: some vertex of one element is at most n edges, 0 to 16, away from some vertex of the other; with
-   * `{ groups: [g, h] }` those of two groups of vertices, or of one with itself, see `setGroups`: all vertices of one element must be in
-   * the one group, and all of the other in the other; or those of `scene.restPairs()`. Answers of `near` are not taken.
+   * `{ groups: [g, h] }` those of two groups of vertices, or of one with itself, see `setGroups`: each vertex of one element and each
+   * vertex of the other must be in such groups, where several exclusions of groups are one rule, not each its own; or those of `scene.restPairs()`. Answers of `near` are not taken.
    */
   exclude?: readonly Exclusion[];
   /** Only pairs of the half-open box from a low to a high corner: that of the larger of the lower corners of both elements' boxes. */
@@ -421,7 +421,8 @@ export interface Advance {
   readonly fraction: number;
   /**
    * The first contact of the whole step, if any, its time rounded down to f64; with a clearance, the first time at which a pair is as near
-   * as it may come, as an f32. `precision` has no part in it.
+   * as it may come, rounding included, as an f32: the pair that limits the step, also where nothing touches and `impacts` is empty.
+   * `precision` has no part in it.
    */
   readonly first: Impact | null;
   /** As in `Impacts`. If it is true, the fraction is 0. */
@@ -566,7 +567,7 @@ export interface SafeDistances {
 export interface Truncation {
   /** How many vertices were stopped before the end of their way. */
   readonly nCut: number;
-  /** How many pairs touch at the start, or are nearer than they are to keep: their vertices stay. */
+  /** How many pairs touch at the start, or are nearer than they are to keep: their vertices stay. Pairs of which no vertex moves are not counted. */
   readonly nTouching: number;
   /** How often pairs were looked at again. */
   readonly rounds: number;

@@ -1169,7 +1169,8 @@ class Advance(_Motion):
     @property
     def first(self) -> Impact | None:
         """Impact or None : the first contact of the whole step, its time rounded down to float64; ``None`` where
-        nothing touches.
+        nothing touches. With a clearance, the first time at which a pair is as near as it may come, rounding included, as a
+        float32: the pair that limits the step, also where nothing touches and `Detector.impacts` finds none.
         """
         first = self._inner.first()
         return None if first is None else Impact(*first)
@@ -1199,7 +1200,9 @@ class Truncation(_Motion):
 
     @property
     def n_touching(self) -> int:
-        """int : how many pairs already touch at the start, or are nearer than they are to keep: their vertices were not moved."""
+        """int : how many pairs already touch at the start, or are nearer than they are to keep: their vertices were not moved.
+        Pairs of which no vertex moves are not counted.
+        """
         return self._inner.n_touching
 
     @property

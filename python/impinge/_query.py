@@ -114,7 +114,7 @@ class Query:
         What is left out before it is decided. Bodies: their pairs; a body named twice leaves out its self-collision. ``rings(n)``: pairs
         that are near in the surface. ``groups(g, h)``: groups of vertices that do not meet. ``scene.rest_pairs(r)``: pairs that were
         near at rest, which `Detector.detect`, `count` and `any` refuse, for they are about other elements; these three find all pairs
-        first, so that limits count what is left out, too. `Detector.nearest` takes bodies alone.
+        first, so that limits count what is left out, too. Several `groups` are one rule: see there. `Detector.nearest` takes bodies alone.
     owned_by : (low, high)
         Only the pairs that belong to the half-open box between these two corners, three numbers each: a pair belongs
         to the cell that holds the larger of the lower corners of its two bounding boxes, axis by axis; in a step, of boxes that hold
@@ -274,6 +274,10 @@ def rings(n: SupportsIndex) -> Exclusion:
 def groups(g: SupportsIndex, h: SupportsIndex) -> Exclusion:
     """Leaves out pairs of elements of two groups of vertices (`Scene.set_groups`), or of one with itself: where each vertex of one element
     and each vertex of the other are in such groups. For ``exclude=``.
+
+    Several are one rule: a pair is left out where each vertex of one element and each vertex of the other are in the two groups of one
+    of them, not always the same one. So ``[groups(0, 1), groups(1, 2)]`` leaves out a vertex of group 1 with an edge of a vertex of
+    group 0 and one of group 2, which neither leaves out alone.
 
     Parameters
     ----------

@@ -382,7 +382,7 @@ def candidates(
     mode: Literal["exact", "boxes"] = "exact",
     labels: _Array | None = None,
 ) -> Candidates:
-    """The pairs of elements that ``ipctk.Candidates.build`` finds, or fewer: as arrays, and for ipctk.
+    """Pairs of elements that may touch, as ``ipctk.Candidates.build`` finds them, mostly fewer: as arrays, and for ipctk.
 
     Parameters
     ----------

@@ -256,7 +256,9 @@ impinge_status impinge_weld(impinge_array positions, uint32_t *map, uint32_t *fi
  *   EXCLUDE_RINGS       pairs of one body that are near each other in its surface: some vertex of one element is at most `n` edges, 0 to
  *                       16, away from some vertex of the other
  *   EXCLUDE_GROUPS      pairs of elements of the groups `a` and `b` of vertices, which impinge_scene_set_groups sets, or of one with
- *                       itself: each vertex of one element and each of the other must be in such groups
+ *                       itself: each vertex of one element and each of the other must be in such groups. Several are one rule
+ *                       about pairs of vertices: 0, 1 and 1, 2 leave out a vertex of group 1 with an edge of a vertex of group 0
+ *                       and one of group 2, which neither leaves out alone
  *   EXCLUDE_VERTICES    pairs of an element of body `a` and one of body `b` of which some vertices are listed together: the list of vertex v
  *                       of `a` has the rows offsets[v] to offsets[v + 1] - 1 of `vertices`, vertices of `b`. Both have 1 column of any integer
  *                       type; `offsets` has one row more than `a` has vertices. With a == b these are pairs of that body, in either order.
@@ -907,12 +909,13 @@ void impinge_penetration_destroy(impinge_penetration *penetration);
 /* The part of the step that can be taken: 1 for all of it, 0 for none, and for NULL. NaN of impinge_truncate, where each vertex has its
  * own. */
 double impinge_motion_fraction(const impinge_motion *motion);
-/* The first contact of the whole step: `found` gets 1 and `impact` the impact, or 0 if nothing touches. INVALID: of impinge_truncate. */
+/* The first contact of the whole step: `found` gets 1 and `impact` the impact, or 0 if nothing touches. With a clearance, the pair that limits
+ * the step: the first that is as near as it may come, rounding included, also where nothing touches. INVALID: of impinge_truncate. */
 impinge_status impinge_motion_first(const impinge_motion *motion, impinge_impact *impact, int32_t *found);
 /* Whether elements intersect at the start: 1 or 0, or -1 if nobody asked. */
 int32_t impinge_motion_start_intersects(const impinge_motion *motion);
 /* Of impinge_truncate: how many vertices were stopped before the end of their way; how many pairs touch at the start, or are nearer than
- * they are to keep; how often pairs were looked at again. 0 of impinge_advance, and for NULL. */
+ * they are to keep, without pairs of which no vertex moves; how often pairs were looked at again. 0 of impinge_advance, and for NULL. */
 uint64_t impinge_motion_n_cut(const impinge_motion *motion);
 uint64_t impinge_motion_n_touching(const impinge_motion *motion);
 uint32_t impinge_motion_rounds(const impinge_motion *motion);

@@ -463,7 +463,7 @@ public:
   using motion::motion;
   /// 1 for the whole step, 0 for none.
   double fraction() const noexcept { return impinge_motion_fraction(raw()); }
-  /// The first contact of the whole step.
+  /// The first contact of the whole step; with a clearance the pair that limits it, also where nothing touches.
   std::optional<impact> first() const {
     impact contact{};
     std::int32_t found = 0;
@@ -478,7 +478,8 @@ public:
   using motion::motion;
   /// How many vertices were stopped before the end of their way.
   std::uint64_t n_cut() const noexcept { return impinge_motion_n_cut(raw()); }
-  /// How many pairs touch at the start, or are nearer than they are to keep: their vertices were not moved.
+  /// How many pairs touch at the start, or are nearer than they are to keep: their vertices were not moved. Pairs of
+  /// which no vertex moves are not counted.
   std::uint64_t n_touching() const noexcept { return impinge_motion_n_touching(raw()); }
   /// How often pairs were looked at again, because vertices had been stopped.
   std::uint32_t rounds() const noexcept { return impinge_motion_rounds(raw()); }

@@ -37,7 +37,7 @@ impl Truncation {
     }
 
     /// How many pairs already touch at the start, or are nearer than they are to keep: their
-    /// vertices were not moved.
+    /// vertices were not moved. Pairs of which no vertex moves are not counted.
     pub fn n_touching(&self) -> u64 {
         self.n_touching
     }

@@ -87,7 +87,10 @@ impl Exclusion {
     }
 
     /// Pairs of elements of two [groups](crate::Scene::set_groups), or of one with itself: each
-    /// vertex of one element and each vertex of the other must be in such groups.
+    /// vertex of one element and each vertex of the other must be in such groups. Several such
+    /// exclusions of one query are one rule about pairs of vertices: with (0, 1) and (1, 2), a
+    /// vertex of group 1 and an edge of a vertex of group 0 and one of group 2 are left out, though
+    /// neither leaves them out alone.
     pub fn groups(g: u32, h: u32) -> Self {
         Exclusion(Excluded::Groups(g.min(h), g.max(h)))
     }
