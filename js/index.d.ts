@@ -155,7 +155,10 @@ export interface Query extends Control {
   distances?: boolean;
   /** `near`: with distances and nearest points. */
   closestPoints?: boolean;
-  /** `safeDistances`: bodies that do not move, and leave the whole distance to what is near them. */
+  /**
+   * `safeDistances`: bodies that do not move, and leave the whole distance to what is near them. Steps (`truncate`, `advance`) ignore it:
+   * what stands still there is a body without end positions.
+   */
   fixed?: readonly Body[];
   /** `cast`: the first hit of each ray (the default), whether there is any, or all. */
   hits?: "first" | "any" | "all";

@@ -68,7 +68,8 @@ export function read(name: string, bytes: Uint8Array, options?: { weld?: boolean
 
 /**
  * Reads the bodies of a mesh file, each as a mesh of its own: the nodes of a glTF file that have a mesh, the objects of an OBJ
- * file, or its groups if it has no objects. Any other file is one body.
+ * file, or its groups if it has no objects; faces before the first of them are one named `default`. Any other file is one body. The only
+ * body has the name that the file gives it, or else that of the file.
  */
 export function readBodies(name: string, bytes: Uint8Array, options?: { weld?: boolean }): FileMesh[];
 

@@ -146,7 +146,8 @@ class Query:
     n_nearest : int
         `Detector.closest`: how many of the nearest elements to find for each point.
     fixed : sequence of Body
-        `Detector.safe_distances`: bodies that do not move, and leave the whole distance to what is near them.
+        `Detector.safe_distances`: bodies that do not move, and leave the whole distance to what is near them. Steps
+        (`Detector.truncate`, `Detector.advance`) ignore it: what stands still there is a body without end positions.
 
     Raises
     ------

@@ -313,7 +313,8 @@ typedef struct impinge_element {
  *   flags IMPINGE_DISTANCES, IMPINGE_CLOSEST_POINTS
  *                       Columns that near pairs come with.
  *   hits                IMPINGE_HITS_FIRST (default), IMPINGE_HITS_ANY or IMPINGE_HITS_ALL, of rays.
- *   fixed, n_fixed      Bodies that do not move, of safe distances: they leave the whole distance to what is near them.
+ *   fixed, n_fixed      Bodies that do not move, of safe distances: they leave the whole distance to what is near them. Steps
+ *                       ignore it: what stands still there is a body without end positions.
  *   n_nearest           How many nearest elements of each point impinge_find_closest gives: at least 1. Default: 1. */
 typedef struct impinge_query {
   uint32_t size; /* sizeof(impinge_query) of the caller */

@@ -417,7 +417,8 @@ impl Query {
     }
 
     /// Says which bodies do not move, for [`safe_distances`](crate::Detector::safe_distances): they
-    /// leave the whole distance to what is near them.
+    /// leave the whole distance to what is near them. Steps ignore it: what stands still there is a
+    /// body without end positions.
     pub fn fixed(mut self, bodies: impl IntoIterator<Item = BodyId>) -> Self {
         self.fixed = bodies.into_iter().collect();
         self
