@@ -250,7 +250,8 @@ public:
   view<double> distances() const & { return packed<double>(IMPINGE_COLUMN_DISTANCE); }
   /// With `query::closest_points`: a point of `a`, and one of `b`.
   view<std::array<std::array<double, 3>, 2>> closest_points() const & { return packed<std::array<std::array<double, 3>, 2>>(IMPINGE_COLUMN_POINTS); }
-  /// What a potential needs to know about each pair, at the positions that the scene has now.
+  /// What a potential needs to know about each pair, at the positions that the scene has now. Ask for near pairs of the kinds {vf, ee}: by
+  /// default there are also pairs of an edge and a face that meet, which have no stencil and are refused.
   result<impinge::stencils> stencils(const scene &in) const { return stencils_of(in, nullptr); }
   /// With the mollifier of nearly parallel edges, from positions at rest: of all vertices of all bodies of the scene, one body after another,
   /// whatever bodies the pairs are of. If rows are missing, the message names the first body without enough of them.
