@@ -211,7 +211,10 @@ export declare class Scene {
    * counts, that is the order of these places: the order of numbers until a body is added after a removal.
    */
   remove(body: Body): void;
-  /** Gives a body new elements and positions. Its filter stays, and its thickness if it is one number. */
+  /**
+   * Gives a body new elements and positions. Its filter stays, and its thickness if it is one number. The end of its step, its transform, the
+   * thickness, groups and pins of its parts and your numbers of edges are forgotten.
+   */
   remesh(body: Body, mesh: Mesh): void;
   /** Moves the vertices of a body: as many positions as it has vertices. It stands still until it gets end positions. */
   setPositions(body: Body, positions: GivenPositions): void;

@@ -170,7 +170,8 @@ class Scene(SceneBase):
     def remesh(
         self, body: _Body, vertices: _Array, faces: _Array, kind: _RowKind | None = None
     ) -> None:
-        """Gives a body new topology and positions under its old handle.
+        """Gives a body new topology and positions under its old handle. Its filter stays, and its thickness if it is one number. The
+        end of its step, its transform, the thickness, groups and pins of its parts and your numbers of edges are forgotten.
 
         Parameters
         ----------

@@ -123,7 +123,8 @@ impinge_status impinge_scene_add_points(impinge_scene *scene, impinge_array posi
 impinge_status impinge_scene_remove(impinge_scene *scene, uint32_t body);
 
 /* Gives a body new elements and positions under its number. `kind` is IMPINGE_TRIANGLES ...; for IMPINGE_POINTS `elements` has no rows.
- * Its filter stays, and its thickness if it is one number; the end of its step, its transform and the caller's numbers of edges are forgotten.
+ * Its filter stays, and its thickness if it is one number; the end of its step, its transform, the thickness, groups and pins of its parts
+ * and the caller's numbers of edges are forgotten.
  * INVALID: as impinge_scene_add_triangles, and no such body. */
 impinge_status impinge_scene_remesh(impinge_scene *scene, uint32_t body, uint32_t kind, impinge_array elements, impinge_array positions);
 

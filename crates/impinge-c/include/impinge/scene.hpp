@@ -463,7 +463,7 @@ public:
     return detail::give(impinge_scene_add_points(raw(), detail::rows_of(positions, 3), &added), std::move(added));
   }
   result<void> remove(body of) { return detail::give(impinge_scene_remove(raw(), of)); }
-  /// New elements (`kind` is IMPINGE_TRIANGLES and so on) and positions under the old number.
+  /// New elements (`kind` is IMPINGE_TRIANGLES and so on) and positions under the old number. What is kept is said in impinge.h.
   template <class F, class P> result<void> remesh(body of, std::uint32_t kind, const F &elements, const P &positions) {
     return detail::give(impinge_scene_remesh(raw(), of, kind, detail::rows_of(elements, kind), detail::rows_of(positions, 3)));
   }

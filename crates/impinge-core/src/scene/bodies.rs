@@ -186,7 +186,9 @@ impl Scene {
         Ok(())
     }
 
-    /// Gives a body new topology and positions under its old id.
+    /// Gives a body new topology and positions under its old id. Its filter stays, and its
+    /// thickness if it is one number. The end of its step, its transform, the thickness, groups and
+    /// pins of its parts and the caller's numbers of edges are forgotten.
     ///
     /// # Errors
     /// As [`add`](Scene::add); the body is unchanged then.
