@@ -246,7 +246,8 @@ export declare class Scene {
   /** Puts each vertex of a body into a group, for `exclude: [{ groups: [g, h] }]`. A body whose groups were never set is in none. */
   setGroups(body: Body, groups: Index): void;
   /**
-   * Which vertices of a body never move, 1 or true. Pairs of elements all of whose vertices are pinned are left out of every question.
+   * Which vertices of a body never move, 1 or true. Pairs of elements all of whose vertices are pinned are left out of every question, but for
+   * `distance` and `nearest`, which look at all elements. `remesh` forgets it.
    */
   setPinned(body: Body, pinned: ArrayLike<number | boolean>): void;
   /**

@@ -407,6 +407,7 @@ class Scene(SceneBase):
     def set_pinned(self, body: _Body, pinned: _Array) -> None:
         """Says which vertices of a body never move. Pairs of elements all of whose vertices are pinned are left out of every
         question, whatever it asks: do not pin vertices that you move by a script, as two such bodies would pass through each other.
+        `Detector.distance` and `Detector.nearest` look at all elements, whatever is pinned. `remesh` forgets it.
 
         Parameters
         ----------

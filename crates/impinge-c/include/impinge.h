@@ -196,7 +196,8 @@ impinge_status impinge_scene_set_groups(impinge_scene *scene, uint32_t body, imp
 
 /* Says which vertices of a body are pinned, where they never move: as many rows as it has vertices, 1 column of U8 or any integer type,
  * 1 or 0. Pairs of elements all of whose vertices are pinned are left out of every query, so pin no vertices that you move by a script:
- * two such bodies would pass through each other.
+ * two such bodies would pass through each other. impinge_find_distance and impinge_find_nearest look at all elements, whatever is pinned.
+ * impinge_scene_remesh forgets it.
  * INVALID: no such body, another number of rows, another number than 0 or 1. */
 impinge_status impinge_scene_set_pinned(impinge_scene *scene, uint32_t body, impinge_array pinned);
 

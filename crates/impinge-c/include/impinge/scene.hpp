@@ -495,7 +495,8 @@ public:
   result<void> set_filter(body of, std::uint64_t category, std::uint64_t mask) { return detail::give(impinge_scene_set_filter(raw(), of, category, mask)); }
   /// The group of each vertex, for `query::exclude_groups`.
   template <class G> result<void> set_groups(body of, const G &groups) { return detail::give(impinge_scene_set_groups(raw(), of, detail::rows_of(groups, 1))); }
-  /// Which vertices never move: 1 or 0 for each, as bytes or integers. Not for vertices that you move yourself: see impinge.h.
+  /// Which vertices never move: 1 or 0 for each, as bytes or integers. Not for vertices that you move yourself: see impinge.h,
+  /// also for what looks at them all the same.
   template <class G> result<void> set_pinned(body of, const G &pinned) { return detail::give(impinge_scene_set_pinned(raw(), of, detail::rows_of(pinned, 1))); }
   /// How thick all elements of a body are: see impinge.h. Steps keep it, too.
   result<void> set_thickness(body of, double thickness) { return detail::give(impinge_scene_set_thickness(raw(), of, thickness)); }

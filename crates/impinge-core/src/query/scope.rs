@@ -278,7 +278,8 @@ impl Query {
     /// rest. Each call leaves out more.
     ///
     /// Besides, pairs of elements all of whose vertices are [pinned](crate::Scene::set_pinned) are
-    /// left out of every query.
+    /// left out of every query, but for [`distance`](crate::Detector::distance) and
+    /// [`nearest`](crate::Detector::nearest).
     ///
     /// [`detect`](crate::Detector::detect), [`count`](crate::Detector::count) and
     /// [`any`](crate::Detector::any) find all pairs first and leave out rings, groups, lists and

@@ -234,7 +234,9 @@ impl Scene {
 
     /// Says which vertices of a body are pinned, where they never move: one flag per vertex. Pairs
     /// of elements all of whose vertices are pinned are left out of every query, so pin no vertices
-    /// that move by a script: two such bodies would pass through each other. [`remesh`](Scene::remesh) forgets it.
+    /// that move by a script: two such bodies would pass through each other.
+    /// [`distance`](crate::Detector::distance) and [`nearest`](crate::Detector::nearest) look at
+    /// all elements, whatever is pinned. [`remesh`](Scene::remesh) forgets it.
     ///
     /// # Errors
     /// The id names no body; more or fewer flags than vertices.
