@@ -429,7 +429,7 @@ export interface Advance {
   /**
    * The first contact of the whole step, if any, its time rounded down to f64; with a clearance, the first time at which a pair is as near
    * as it may come, rounding included, as an f32: the pair that limits the step, also where nothing touches and `impacts` is empty.
-   * `precision` has no part in it.
+   * `precision` has no part in it: the time may be later than that of `earliest`.
    */
   readonly first: Impact | null;
   /** As in `Impacts`. If it is true, the fraction is 0. */

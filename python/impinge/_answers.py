@@ -1168,9 +1168,10 @@ class Advance(_Motion):
 
     @property
     def first(self) -> Impact | None:
-        """Impact or None : the first contact of the whole step, its time rounded down to float64; ``None`` where
-        nothing touches. With a clearance, the first time at which a pair is as near as it may come, rounding included, as a
-        float32: the pair that limits the step, also where nothing touches and `Detector.impacts` finds none.
+        """Impact or None : the first contact of the whole step; ``None`` where nothing touches. Whatever ``precision`` says, its time is
+        rounded down to float64, so it may be later than that of `Detector.earliest`. With a clearance: the first time at which a pair is
+        as near as it may come, rounding included, as a float32: the pair that limits the step, also where nothing touches and
+        `Detector.impacts` finds none.
         """
         first = self._inner.first()
         return None if first is None else Impact(*first)

@@ -912,8 +912,10 @@ void impinge_penetration_destroy(impinge_penetration *penetration);
 /* The part of the step that can be taken: 1 for all of it, 0 for none, and for NULL. NaN of impinge_truncate, where each vertex has its
  * own. */
 double impinge_motion_fraction(const impinge_motion *motion);
-/* The first contact of the whole step: `found` gets 1 and `impact` the impact, or 0 if nothing touches. With a clearance, the pair that limits
- * the step: the first that is as near as it may come, rounding included, also where nothing touches. INVALID: of impinge_truncate. */
+/* The first contact of the whole step: `found` gets 1 and `impact` the impact, or 0 if nothing touches. Whatever `precision` of the query
+ * says, its time is rounded down to F64, so it may be later than that of impinge_find_earliest in F32. With a clearance it is the first time
+ * at which a pair is as near as it may come, rounding included, as an F32: the pair that limits the step, also where nothing touches.
+ * INVALID: of impinge_truncate. */
 impinge_status impinge_motion_first(const impinge_motion *motion, impinge_impact *impact, int32_t *found);
 /* Whether elements intersect at the start: 1 or 0, or -1 if nobody asked. */
 int32_t impinge_motion_start_intersects(const impinge_motion *motion);

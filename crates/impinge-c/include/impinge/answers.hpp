@@ -464,7 +464,8 @@ public:
   using motion::motion;
   /// 1 for the whole step, 0 for none.
   double fraction() const noexcept { return impinge_motion_fraction(raw()); }
-  /// The first contact of the whole step; with a clearance the pair that limits it, also where nothing touches.
+  /// The first contact of the whole step. Its time is rounded down to double, whatever `query::precision` says: it may be later than that of
+  /// `detector::earliest`. With a clearance: the first time at which a pair is as near as it may come, as a float, also where nothing touches.
   std::optional<impact> first() const {
     impact contact{};
     std::int32_t found = 0;

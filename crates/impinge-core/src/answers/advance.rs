@@ -15,10 +15,12 @@ pub struct Advance {
     /// [clearance](crate::Query::clearance) it holds for positions that solvers compute, and for
     /// all smaller parts: see [`Detector::advance`](crate::Detector::advance).
     pub fraction: f64,
-    /// The first contact of the whole step, its time rounded down to `f64`. `None` if nothing
-    /// touches. With a clearance: the first time at which a pair is as near as it may come,
-    /// rounding included, as an `f32`. This pair limits the step, also where nothing touches:
-    /// [`impacts`](crate::Detector::impacts), without rounding, may be empty then.
+    /// The first contact of the whole step, its time rounded down to `f64`, whatever
+    /// [`Query::precision`](crate::Query::precision) says: it may be later than that of
+    /// [`earliest`](crate::Detector::earliest). `None` if nothing touches. With a clearance: the
+    /// first time at which a pair is as near as it may come, rounding included, as an `f32`. This
+    /// pair limits the step, also where nothing touches: [`impacts`](crate::Detector::impacts),
+    /// without rounding, may be empty then.
     pub first: Option<Impact>,
     /// Whether elements intersect at the start; the fraction is then 0, whether or not there is a
     /// first contact. `None` if nobody asked: only [`Start::Verify`](crate::Start::Verify) does.
