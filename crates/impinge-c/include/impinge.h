@@ -144,7 +144,8 @@ impinge_status impinge_scene_set_positions(impinge_scene *scene, uint32_t body, 
 
 /* Sets where the vertices are at the end of the step, to which they move on straight lines at constant speed. As
  * impinge_scene_set_positions
- * otherwise. No rows: the body stands still. If start and end differ in type, the F32 one is widened. */
+ * otherwise. No rows: the body stands still. If start and end differ in type, the F32 one is widened: a body of F32 whose end is given in
+ * F64 has F64 positions from then on, also when it stands still again or has taken the step, until impinge_scene_set_positions. */
 impinge_status impinge_scene_set_end_positions(impinge_scene *scene, uint32_t body, impinge_array positions);
 
 /* Moves the vertices without a copy: the scene reads `positions` where they lie. They are checked in this call and not again, so they must
@@ -204,10 +205,10 @@ impinge_status impinge_scene_set_pinned(impinge_scene *scene, uint32_t body, imp
 /* The number of bodies; 0 for NULL, while another call changes the scene, and of a broken one. */
 size_t impinge_scene_n_bodies(const impinge_scene *scene);
 
-/* Views of a body. Valid until the scene is changed: its positions (3 columns of F32 or F64, as they were given) and its end positions
- * (no rows if it stands still). Valid until it is re-meshed or removed, or its edges are set: its elements as they were given (U32), its
- * edges (U32, 2 columns) and its faces (U32, 3 columns): those of tetrahedra are its boundary, by tetrahedron and then by the opposite
- * corner. INVALID: no such body, a scene that another call is changing. */
+/* Views of a body. Valid until the scene is changed: its positions (3 columns of F32 or F64, as they were given; F64 also of a body whose
+ * F32 positions got an end in F64) and its end positions (no rows if it stands still). Valid until it is re-meshed or removed, or its edges
+ * are set: its elements as they were given (U32), its edges (U32, 2 columns) and its faces (U32, 3 columns): those of tetrahedra are its
+ * boundary, by tetrahedron and then by the opposite corner. INVALID: no such body, a scene that another call is changing. */
 impinge_status impinge_scene_positions(const impinge_scene *scene, uint32_t body, impinge_array *view);
 impinge_status impinge_scene_end_positions(const impinge_scene *scene, uint32_t body, impinge_array *view);
 impinge_status impinge_scene_elements(const impinge_scene *scene, uint32_t body, impinge_array *view);
