@@ -254,10 +254,10 @@ impinge_status impinge_weld(impinge_array positions, uint32_t *map, uint32_t *fi
 #define IMPINGE_HITS_ANY 1
 #define IMPINGE_HITS_ALL 2
 
-/* Pairs to leave out, before they are decided. Fields that are not named are 0.
+/* Pairs to leave out, before they are decided. Fields that a kind does not name are ignored.
  *   EXCLUDE_BODIES      the pairs of bodies `a` and `b`, or with a == b the self-collision of `a`
- *   EXCLUDE_RINGS       pairs of one body that are near each other in its surface: some vertex of one element is at most `n` edges, 0 to
- *                       16, away from some vertex of the other
+ *   EXCLUDE_RINGS       pairs of one body, whichever, that are near each other in its surface: some vertex of one element is at most `n`
+ *                       edges, 0 to 16, away from some vertex of the other
  *   EXCLUDE_GROUPS      pairs of elements of the groups `a` and `b` of vertices, which impinge_scene_set_groups sets, or of one with
  *                       itself: each vertex of one element and each of the other must be in such groups. Several are one rule
  *                       about pairs of vertices: 0, 1 and 1, 2 leave out a vertex of group 1 with an edge of a vertex of group 0
