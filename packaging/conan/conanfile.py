@@ -85,4 +85,4 @@ class ImpingeConan(ConanFile):
         if is_static:
             # As IMPINGE_SYSTEM_LIBRARIES of CMakeLists.txt.
             system = {"Windows": ["kernel32", "ntdll", "userenv", "ws2_32", "dbghelp"], "Macos": ["iconv", "m"]}
-            self.cpp_info.system_libs = system.get(str(self.settings.os), ["gcc_s", "util", "rt", "pthread", "m", "dl"])
+            self.cpp_info.system_libs = system.get(str(self.settings.os), ["util", "rt", "pthread", "m", "dl"])
