@@ -143,6 +143,29 @@ void steps() {
   throws(IMPINGE_ERROR_INVALID, "no body 9", [&] { scene.set_positions(9, numbers(balls[0])); });
   throws(IMPINGE_ERROR_INVALID, "row_stride", [&] { scene.set_positions(a, std::vector<double>(3 * VERTICES + 1)); });
   throws(IMPINGE_ERROR_INVALID, "row_stride", [&] { scene.set_positions(a, std::vector<std::array<float, 4>>(VERTICES)); });
+  // Less than one row is not no row.
+  const char *no_row = "rows are not of 3 numbers each";
+  const std::vector<double> two{0.1, 0.1};
+  const float pair[] = {1, 2};
+  const auto n_bodies = scene.n_bodies();
+  throws(IMPINGE_ERROR_INVALID, no_row, [&] { detector.contains(scene, a, two); });
+  throws(IMPINGE_ERROR_INVALID, no_row, [&] { detector.signed_distance(scene, a, two); });
+  throws(IMPINGE_ERROR_INVALID, no_row, [&] { detector.winding_numbers(scene, a, two); });
+  throws(IMPINGE_ERROR_INVALID, no_row, [&] { detector.closest(scene, two); });
+  throws(IMPINGE_ERROR_INVALID, no_row, [&] { detector.cast(scene, two, two); });
+  throws(IMPINGE_ERROR_INVALID, no_row, [&] { scene.add_points(pair); });
+  throws(IMPINGE_ERROR_INVALID, no_row, [&] { scene.add_triangles(std::vector<std::int32_t>{0}, std::vector<double>()); });
+  throws(IMPINGE_ERROR_INVALID, "rows are not of 2 numbers each", [&] { scene.add_edges(std::vector<std::uint64_t>{0}, std::vector<double>(3)); });
+  throws(IMPINGE_ERROR_INVALID, no_row, [&] { scene.set_end_positions(a, two); });
+  throws(IMPINGE_ERROR_INVALID, no_row, [&] { scene.lend_end_positions(a, std::make_shared<std::vector<double>>(two)); });
+  throws(IMPINGE_ERROR_INVALID, no_row, [&] { (void)impinge::weld(two); });
+  throws(IMPINGE_ERROR_INVALID, "rows are not of 4 numbers each", [&] { scene.set_transform(a, std::vector<double>{1}); });
+  CHECK(scene.n_bodies() == n_bodies && scene.end_positions(b).rows == 0 && detector.contains(scene, a, std::vector<double>()).empty());
+  // Numbers that are rows of their own.
+  const auto lone = scene.add_points(std::vector<float>{1, 2, 3});
+  scene.set_groups(lone, std::vector<std::uint32_t>{7});
+  scene.set_pinned(lone, std::vector<std::uint8_t>{1});
+  scene.set_pinned(lone, std::vector<std::array<std::uint8_t, 1>>{{0}});
 }
 
 void probes() {

@@ -67,6 +67,15 @@ int main() {
     CHECK(error.status() == IMPINGE_ERROR_INVALID);
     CHECK(std::strstr(error.what(), "rows are not of 3 numbers each") != nullptr);
   }
+  // Flags are one column, also of bytes, which any stride fits.
+  using bytes = Eigen::Matrix<std::uint8_t, Eigen::Dynamic, Eigen::Dynamic>;
+  scene.set_pinned(body, bytes::Zero(VERTICES, 1).eval());
+  try {
+    scene.set_pinned(body, bytes::Zero(VERTICES, 2).eval());
+    CHECK(!"it has thrown");
+  } catch (const impinge::error &error) {
+    CHECK(error.status() == IMPINGE_ERROR_INVALID && std::strstr(error.what(), "pinned") != nullptr);
+  }
   // Views of the library, each as what it is.
   const auto triangles = impinge::as_indices(scene.faces(body));
   CHECK(triangles.cols() == 3 && triangles(0, 1) == static_cast<const std::uint32_t *>(scene.faces(body).data)[1]);

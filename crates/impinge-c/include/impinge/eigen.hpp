@@ -21,7 +21,9 @@ struct as_array<T, std::enable_if_t<std::is_base_of_v<Eigen::MatrixBase<T>, T> |
     // An empty matrix, such as one without edges, may have any number of columns. Rows of another length are refused: strides of 1 byte
     // fit no number.
     const bool fits = n == 0 || static_cast<std::size_t>(matrix.cols()) == columns;
-    return {matrix.data(), n, fits ? matrix.rowStride() * size : 1, fits ? matrix.colStride() * size : 1, detail::type_of<number>()};
+    // Bytes it fits: these pass for larger numbers then.
+    const auto type = fits || size > 1 ? detail::type_of<number>() : static_cast<std::uint32_t>(IMPINGE_U32);
+    return {matrix.data(), n, fits ? matrix.rowStride() * size : 1, fits ? matrix.colStride() * size : 1, type};
   }
 };
 

@@ -243,10 +243,13 @@ template <class T, std::size_t N> struct row_of<T[N]> {
 };
 template <class Row> array packed_rows(const void *data, std::size_t size, std::size_t columns) {
   constexpr auto n = row_of<Row>::n;
+  using number = typename row_of<Row>::number;
+  // A stride of one byte fits them.
+  static_assert(n <= 1 || sizeof(number) > 1, "bytes are flags, one of each vertex, and no rows of several numbers");
   const bool fits = n > 0 ? n == columns : size % columns == 0;
-  // Rows of another length make an array that the library refuses.
+  // Rows of another length make an array that the library refuses, so a row that has only begun counts: no rows at all are accepted.
   const std::ptrdiff_t stride = fits ? 0 : 1;
-  return {data, n > 0 ? size : size / columns, stride, stride, type_of<typename row_of<Row>::number>()};
+  return {data, n > 0 ? size : size / columns + (fits ? 0 : 1), stride, stride, type_of<number>()};
 }
 } // namespace detail
 
