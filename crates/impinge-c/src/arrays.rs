@@ -273,6 +273,9 @@ pub unsafe fn indices<const N: usize>(
             I32 => narrow::<i32, N>(array, what),
             U64 => narrow::<u64, N>(array, what),
             I64 => narrow::<i64, N>(array, what),
+            U8 => Err(Failure::invalid(format!(
+                "{what}: its type is IMPINGE_U8, where integers of 32 or 64 bits are needed"
+            ))),
             other => Err(Failure::invalid(format!(
                 "{what}: its type is {}, where an integer is needed: are {what} and positions swapped?",
                 name(other)

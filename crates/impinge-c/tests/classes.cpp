@@ -166,6 +166,9 @@ void steps() {
   scene.set_groups(lone, std::vector<std::uint32_t>{7});
   scene.set_pinned(lone, std::vector<std::uint8_t>{1});
   scene.set_pinned(lone, std::vector<std::array<std::uint8_t, 1>>{{0}});
+  throws(IMPINGE_ERROR_INVALID, "integers of 32 or 64 bits", [&] { scene.set_groups(lone, std::vector<std::uint8_t>{7}); });
+  throws(IMPINGE_ERROR_INVALID, "integers of 32 or 64 bits", [&] { scene.add_edges(std::vector<std::int8_t>{0, 1}, std::vector<float>(6)); });
+  throws(IMPINGE_ERROR_INVALID, "groups and positions swapped?", [&] { scene.set_groups(lone, std::vector<float>{7}); });
 }
 
 void probes() {
