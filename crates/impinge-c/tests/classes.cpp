@@ -223,6 +223,9 @@ void probes() {
   scene.set_pinned(a, std::vector<std::uint8_t>(VERTICES, 1));
   scene.set_pinned(b, std::vector<std::int32_t>(VERTICES, 1));
   CHECK(detector.near(scene, 0.2, query::between_all()).empty());
+  // What is pinned has a distance, all the same.
+  const auto of_pinned = detector.distance(scene, a, b);
+  CHECK(of_pinned && of_pinned->distance == nearest->distance && detector.nearest(scene)->distance == nearest->distance);
   scene.set_pinned(b, std::vector<std::uint8_t>(VERTICES, 0));
 
   {
