@@ -371,12 +371,14 @@ typedef struct impinge_detector impinge_detector;
  *   max_pairs           The most pairs that an answer may have; 0, the default, for any number.
  *   cancelled           Called now and then during a question: anything but 0 stops it with IMPINGE_ERROR_CANCELLED. May be NULL.
  *   progress            Called now and then with units of work done and of all, which differ by stage. May be NULL.
- *   log                 Called with the message of every question that fails, and how a detector was opened; but not with that of a question
- *                       that is refused because the detector is in use, as another thread may be in these callbacks then. The text is valid
- *                       during the call. May be NULL.
+ *   log                 Called with the message of every question that fails, and when a detector is opened: on which GPU, or on the CPU
+ *                       and why, where IMPINGE_BACKEND_AUTO has chosen it. Not called with the message of a question that is refused because
+ *                       the detector is in use, as another thread may be in these callbacks then. The text is valid during the call. May be
+ *                       NULL.
  *   user                The first argument of these callbacks. They are called by the thread that asks. The detector is in use then, and so is
  *                       the scene: calls that would use the one, or change the other, are refused.
- *   device              Part of a GPU's name, to choose among several; NULL for any. It is copied.
+ *   device              Part of a GPU's name, to choose among several; NULL for any. It is copied. IMPINGE_BACKEND_AUTO of a library without
+ *                       the GPU backend ignores it, which the log says.
  *   reuse_margin        For solvers that ask again and again while little moves. If it is above 0, questions about near pairs, neighbours and
  *                       safe distances list the pairs within their distance and this margin, and look at no others until some vertex has
  *                       moved farther than half of it, or anything but positions has changed. The answers are the same. After a list that

@@ -195,6 +195,37 @@ unsafe fn settings(given: &impinge_settings) -> Result<Settings, Failure> {
         .device(device))
 }
 
+/// Where a detector works, and why not on a GPU, for the log.
+#[cfg(feature = "gpu")]
+fn place(of: &Detector, given: &impinge_settings) -> String {
+    if let Some(name) = of.gpu_name() {
+        return format!("on the GPU {name}");
+    }
+    let why = match (given.backend, Method::ALL.get(given.method as usize)) {
+        (1, _) => return "on the CPU".into(),
+        (_, Some(Method::Naive)) => "no GPU is looked for with IMPINGE_METHOD_NAIVE",
+        _ if of.waits_for_gpu() => "a GPU is looked for when one first pays",
+        _ => "no GPU could be opened",
+    };
+    format!("on the CPU: {why}")
+}
+
+/// The same without a GPU backend. A device may have been named all the same: its name says which
+/// one, if any.
+#[cfg(not(feature = "gpu"))]
+fn place(_: &Detector, given: &impinge_settings) -> String {
+    const WHY: &str = "on the CPU: this library was built without the GPU backend";
+    match (given.backend, given.device.is_null()) {
+        (1, _) => "on the CPU".into(),
+        (_, true) => WHY.into(),
+        (_, false) => {
+            // SAFETY: `impinge.h` says that it is a C string.
+            let name = unsafe { CStr::from_ptr(given.device) }.to_string_lossy();
+            format!("{WHY}, so the device {name:?} plays no part")
+        }
+    }
+}
+
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn impinge_settings_default(settings: *mut impinge_settings) {
     // SAFETY: `impinge.h` says what pointers are, here and in all functions below. Without room for
@@ -224,8 +255,9 @@ pub unsafe extern "C" fn impinge_detector_create(
         callbacks.log(
             LOG_INFO,
             &format!(
-                "impinge {}: a detector was opened",
-                env!("CARGO_PKG_VERSION")
+                "impinge {}: a detector was opened {}",
+                env!("CARGO_PKG_VERSION"),
+                place(&made, &given)
             ),
         );
         let made = Handle::new(Opened {

@@ -312,6 +312,20 @@ void callbacks() {
     CHECK(strcmp(error.what(), "from a callback") == 0);
   }
   throws(IMPINGE_ERROR_DEVICE, "no GPU adapter", [] { impinge::detector none(impinge::backend::gpu); });
+  // The log says where a detector works, and why not on the GPU that was named.
+  std::string said;
+  const auto heard = [&](std::uint32_t level, const char *message) { said = (level == IMPINGE_LOG_INFO ? "info: " : "error: ") + std::string(message); };
+  const auto opened = "info: impinge " + std::string(impinge::version()) + ": a detector was opened on the CPU";
+  impinge::detector on_cpu(impinge::settings(impinge::backend::cpu).log(heard));
+  CHECK(said == opened);
+  impinge::detector anywhere(impinge::settings().log(heard));
+  CHECK(said.rfind(opened + ": ", 0) == 0 && said.find("GPU") != std::string::npos);
+  try {
+    impinge::detector named(impinge::settings().device("RTX").log(heard));
+    CHECK(said == opened + ": this library was built without the GPU backend, so the device \"RTX\" plays no part");
+  } catch (const impinge::error &error) {
+    CHECK(error.status() == IMPINGE_ERROR_DEVICE && said == "error: " + std::string(error.what()) && said.find("RTX") != std::string::npos);
+  }
   const std::vector<std::array<float, 3>> seam = {{0, 0, 0}, {1, 0, 0}, {0, 0, 0}};
   const auto weld = impinge::weld(seam);
   CHECK(weld.map == (std::vector<std::uint32_t>{0, 1, 0}) && weld.firsts == (std::vector<std::uint32_t>{0, 1}));

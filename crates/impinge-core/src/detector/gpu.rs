@@ -256,6 +256,18 @@ impl Detector {
         }
     }
 
+    /// The name of the GPU that is open.
+    #[doc(hidden)]
+    pub fn gpu_name(&self) -> Option<&str> {
+        self.gpu.as_ref().map(|engine| engine.gpu().name())
+    }
+
+    /// Whether a GPU is still to be looked for, when one first pays.
+    #[doc(hidden)]
+    pub fn waits_for_gpu(&self) -> bool {
+        self.gpu_waits
+    }
+
     pub(super) fn gpu_in_use(&self) -> Option<Arc<GpuContext>> {
         self.gpu.as_ref().map(|engine| Arc::clone(engine.gpu()))
     }
