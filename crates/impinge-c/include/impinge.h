@@ -145,7 +145,8 @@ impinge_status impinge_scene_set_positions(impinge_scene *scene, uint32_t body, 
 /* Sets where the vertices are at the end of the step, to which they move on straight lines at constant speed. As
  * impinge_scene_set_positions
  * otherwise. No rows: the body stands still. If start and end differ in type, the F32 one is widened: a body of F32 whose end is given in
- * F64 has F64 positions from then on, also when it stands still again or has taken the step, until impinge_scene_set_positions. */
+ * F64 has F64 positions from then on, also when it stands still again or has taken the step, until impinge_scene_set_positions; one that
+ * impinge_scene_set_transform had moved before, until that moves it again. */
 impinge_status impinge_scene_set_end_positions(impinge_scene *scene, uint32_t body, impinge_array positions);
 
 /* Moves the vertices without a copy: the scene reads `positions` where they lie. They are checked in this call and not again, so they must

@@ -289,6 +289,18 @@ void alone() {
   throws(IMPINGE_ERROR_INVALID, "as_rows", [&] { (void)impinge::as_rows<std::array<float, 2>>(scene.positions(b)); });
   throws(IMPINGE_ERROR_INVALID, "as_rows", [&] { (void)impinge::as_rows<float>(scene.positions(b)); });
   throws(IMPINGE_ERROR_INVALID, "stride", [&] { scene.set_transform(b, points); });
+  // An end in double makes positions in float double, and so they stay until others are set.
+  const auto never_moved = scene.add_points(points);
+  for (const auto of : {b, never_moved}) {
+    CHECK(scene.positions(of).type == IMPINGE_F32);
+    scene.set_end_positions(of, std::vector<double>{0, 0, 0, 1, 2, 4});
+    scene.clear_end_positions(of);
+    CHECK(scene.positions(of).type == IMPINGE_F64);
+    scene.set_transform(of, moved);
+    CHECK(scene.positions(of).type == (of == b ? IMPINGE_F32 : IMPINGE_F64));
+    scene.set_positions(of, points);
+    CHECK(scene.positions(of).type == IMPINGE_F32);
+  }
 }
 
 void callbacks() {
