@@ -125,6 +125,10 @@ void steps() {
   const auto advance = detector.advance(scene, with);
   CHECK(advance.fraction() > 0.5 && advance.fraction() == detector.advance_fraction(scene, with) && advance.first()->toi >= advance.fraction());
   CHECK(advance.positions(a).rows == 0 && advance.positions(b).rows == VERTICES && advance.start_intersects() == false);
+  // Whatever the precision of times is, that of the first contact is rounded to double, and to float with a clearance.
+  const auto exact = detector.earliest(scene, query::all().precision(impinge::precision::f64)), rounded = detector.earliest(scene);
+  CHECK(exact && rounded && exact->toi > rounded->toi && detector.advance(scene).first()->toi == exact->toi);
+  CHECK(static_cast<double>(static_cast<float>(advance.first()->toi)) == advance.first()->toi);
   advance.apply(scene);
   CHECK(far_away.use_count() == 1);
   // No rows are a mistake, and not the wish to stand still.
