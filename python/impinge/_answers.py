@@ -828,8 +828,9 @@ class SafeDistances:
 class Csr(NamedTuple):
     """Compressed sparse rows: the neighbours of element ``i`` are ``indices[offsets[i]:offsets[i + 1]]``, ascending.
 
-    `distances` are in the unit of the scene and rounded down: below the distance by at most 2**-20 of it, and 0 if and only if
-    the elements touch. With SciPy, ``csr_array((csr.distances, csr.indices, csr.offsets), shape=(n, m))`` is a matrix.
+    `distances` are in the unit of the scene, minus the thickness of both elements, and rounded down: by at most 2**-20 of it, and 0 if
+    and only if the elements touch, or are at most as far apart as they are thick. With SciPy,
+    ``csr_array((csr.distances, csr.indices, csr.offsets), shape=(n, m))`` is a matrix.
     """
 
     offsets: npt.NDArray[np.uint64]

@@ -867,8 +867,9 @@ size_t impinge_neighbours_count(const impinge_neighbours *neighbours);
 impinge_status impinge_neighbours_first(const impinge_neighbours *neighbours, uint32_t body, uint32_t (*first)[3]);
 /* The lists of the elements that a kind (IMPINGE_VF ...) names first, or, if `reversed` is 1, of those that it names second: of IMPINGE_VF
  * the faces near each vertex, or the vertices near each face. The neighbours of element i are those from offsets[i] (U64) to
- * offsets[i + 1] of `indices` (U32), ascending; `distances` (F64) has how far each is, rounded down: by at most 2^-20 of it, and 0 if they
- * touch. Views, valid as long as the answer; each may be NULL. A kind that was not asked for has no offsets, or lists without entries. */
+ * offsets[i + 1] of `indices` (U32), ascending; `distances` (F64) has how far each is, minus the thickness of both, rounded down: by at
+ * most 2^-20 of it, and 0 if and only if they touch or are at most as far apart as they are thick. Views, valid as long as the answer; each
+ * may be NULL. A kind that was not asked for has no offsets, or lists without entries. */
 impinge_status impinge_neighbours_lists(const impinge_neighbours *neighbours, uint32_t kind, uint32_t reversed, impinge_array *offsets,
     impinge_array *indices, impinge_array *distances);
 impinge_status impinge_neighbours_stats(const impinge_neighbours *neighbours, impinge_stats *stats);

@@ -83,8 +83,8 @@ pub mod internal {
     pub use crate::algebra::{Integer, unit_of};
     pub use crate::distance::{
         Approach, Keep, NearestOfElements, PairAtPart, Reach, approach, are_within_certainly,
-        below_by_bounds, closest_by_part, closest_of_elements, compare_point_distances,
-        distance_below, distance_under, elements_are_within, elements_meet, nearest_of_elements,
+        closest_by_part, closest_of_elements, compare_point_distances, distance_under,
+        elements_are_within, elements_meet, gap_below, gap_by_bounds, nearest_of_elements,
         nearest_part_of_element, paired, point_distance_bounds, shares_apart, unsure_are_within,
     };
     pub use crate::orientation::{Projection, collinear};

@@ -156,8 +156,8 @@ impl SafeDistances {
         })
     }
 
-    /// The pairs at distance 0, or nearer than their bodies are thick, whose vertices may not move
-    /// at all. Unless the query names kinds, an edge that pierces a face is among them.
+    /// The pairs at distance 0, or at most as far apart as they are thick, whose vertices may not
+    /// move at all. Unless the query names kinds, an edge that pierces a face is among them.
     pub fn touching(&self) -> &NearPairs {
         &self.touching
     }

@@ -27,7 +27,7 @@ use crate::search::found::KeysByKind;
 use crate::search::narrow::{Corners, exact_kind};
 use crate::search::pair_reader::{Located, PairReader, Side};
 use crate::search::runner::{Job, Outcome};
-use crate::search::shares::{Shares, without};
+use crate::search::shares::Shares;
 use crate::search::sink::reserve;
 use crate::search::stats::Stats;
 use crate::search::work::Work;
@@ -35,7 +35,7 @@ use crate::simd::{Isa, Simd, with_isa};
 use crate::workers::clock::Instant;
 use impinge_exact::ElementPair;
 use impinge_exact::internal::filter::{LANES, Points8, Spans8, distance_bounds, put_point};
-use impinge_exact::internal::{below_by_bounds, distance_below};
+use impinge_exact::internal::{gap_below, gap_by_bounds};
 
 /// Pairs that a task measures.
 const TASK: usize = 1024;
@@ -123,7 +123,9 @@ impl Detector {
 
     /// The pairs of [`near`](Detector::near) as lists: of each vertex the faces near it, of each
     /// face the vertices, of each edge the edges, and so on for the kinds that the query asks for.
-    /// Each neighbour comes with its distance, rounded down.
+    /// Each neighbour comes with its distance, minus the [thickness](Scene::set_thickness) of both,
+    /// rounded down: by at most 2^-20 of it. It is 0 if and only if the elements touch, or are at
+    /// most as far apart as they are thick.
     ///
     /// ```
     /// use impinge::{Backend, Detector, Query, Scene};
@@ -164,8 +166,8 @@ impl Detector {
 struct Measured<'a> {
     key: u64,
     located: &'a [Located; 2],
-    /// A number that is at most its distance minus the thickness of both; 0 if and only if that is
-    /// not above 0.
+    /// A number that is at most its distance minus the thickness of both, by little; 0 if and only
+    /// if that is not above 0.
     distance: f64,
 }
 
@@ -219,15 +221,15 @@ impl SolverMemory {
                 let bounds = pair.map(|pair| bounds_by_lane(isa, pair, &points));
                 let pairs = keys.iter_mut().zip(&located).enumerate();
                 for ((lane, (key, located)), to) in pairs.zip(distances) {
-                    let known = bounds
-                        .as_ref()
-                        .and_then(|bounds| below_by_bounds([bounds.low[lane], bounds.high[lane]]));
-                    let distance = known.unwrap_or_else(|| match kind {
+                    let thickness = plan.thickness_of_both(*located);
+                    let known = bounds.as_ref().and_then(|bounds| {
+                        gap_by_bounds([bounds.low[lane], bounds.high[lane]], thickness)
+                    });
+                    *to = known.unwrap_or_else(|| match kind {
                         // They meet.
                         PairKind::EdgeFace => 0.0,
-                        _ => distance_of((scene, plan), located),
+                        _ => gap_of((scene, plan), located, thickness),
                     });
-                    *to = without(plan.thickness(*located), distance);
                     *key = each(Measured {
                         key: *key,
                         located,
@@ -249,15 +251,15 @@ impl SolverMemory {
     }
 }
 
-/// A number that is at most the distance of a pair, by its exact value.
+/// A number that is at most the distance of a pair minus its thickness, by its exact value.
 #[inline(never)]
-fn distance_of((scene, plan): (&Scene, &Plan), located: &[Located; 2]) -> f64 {
+fn gap_of((scene, plan): (&Scene, &Plan), located: &[Located; 2], thickness: [f64; 2]) -> f64 {
     let [a, b] = located.each_ref().map(|(part, element)| {
         let body = plan.body(scene, *part);
         let corners = body.corners(plan.part(*part).part, element);
         Corners::new(body.positions(), corners)
     });
-    distance_below(a.points(), b.points())
+    gap_below(a.points(), b.points(), thickness)
 }
 
 /// Writes the points of a pair into a lane, in the order of the exact test.

@@ -96,8 +96,7 @@ impl Plan {
 
     /// What two elements keep.
     fn keep_of(&self, pair: [(PartIx, ElementIx); 2]) -> Keep {
-        let thickness = pair.map(|(part, element)| self.thickness_of(part, element));
-        self.keep.with_thickness(thickness)
+        self.keep.with_thickness(self.thickness_of_both(pair))
     }
 
     /// The separation of two elements, with their thickness.
@@ -186,13 +185,19 @@ impl Plan {
 
     /// Within which distance two elements are near.
     pub(crate) fn reach_of(&self, pair: [(PartIx, ElementIx); 2]) -> Reach {
-        let [a, b] = pair.map(|(part, element)| self.thickness_of(part, element));
+        let [a, b] = self.thickness_of_both(pair);
         Reach::of_sum([self.distance, a, b])
     }
 
-    /// How thick two elements are together, rounded up.
+    /// How thick each of two elements is.
+    #[inline(always)]
+    pub(crate) fn thickness_of_both(&self, pair: [(PartIx, ElementIx); 2]) -> [f64; 2] {
+        pair.map(|(part, element)| self.thickness_of(part, element))
+    }
+
+    /// How thick two elements are together, rounded up: the float after their rounded sum.
     pub(crate) fn thickness(&self, pair: [(PartIx, ElementIx); 2]) -> f64 {
-        let [a, b] = pair.map(|(part, element)| self.thickness_of(part, element));
+        let [a, b] = self.thickness_of_both(pair);
         match a + b {
             0.0 => 0.0,
             sum => sum.next_up(),

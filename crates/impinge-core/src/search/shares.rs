@@ -85,7 +85,7 @@ pub(crate) struct SharesBetween<'a> {
 }
 
 impl SharesBetween<'_> {
-    /// Takes a pair, by a number that is at most its distance [`without`] the thickness, and both
+    /// Takes a pair, by a number that is at most its distance without the thickness, and both
     /// elements' corners.
     pub fn take(&self, corners: [&[u32]; 2], distance: f64) {
         let shares = self.divided(distance);
@@ -108,7 +108,7 @@ impl SharesBetween<'_> {
         thickness: f64,
     ) -> bool {
         let low = without(thickness, low * BELOW);
-        let high = without(thickness, high);
+        let high = at_most_without(thickness, high);
         // As those of the distance itself: no number here is larger for a smaller distance.
         let (low_shares, high_shares) = (self.divided(low), self.divided(high));
         let mut is_less = low <= 0.0;
@@ -150,10 +150,23 @@ fn below(number: f64) -> f64 {
 /// A number that is at most the distance of two elements minus their thickness, from one that is at
 /// most their distance: 0 if that is not certainly above 0.
 #[inline(always)]
-pub(crate) fn without(thickness: f64, distance: f64) -> f64 {
+fn without(thickness: f64, distance: f64) -> f64 {
     match thickness {
         0.0 => distance,
         _ => (distance - thickness).next_down().max(0.0),
+    }
+}
+
+/// A number that is at least the distance of two elements minus their thickness, from one that is
+/// at least their distance. A thickness above 0 is the float after a sum that was rounded.
+#[inline(always)]
+fn at_most_without(thickness: f64, distance: f64) -> f64 {
+    match thickness {
+        0.0 => distance,
+        _ => {
+            let least = thickness.next_down().next_down();
+            (distance - least).next_up().max(0.0)
+        }
     }
 }
 

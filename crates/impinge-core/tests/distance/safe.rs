@@ -659,3 +659,111 @@ fn bad_lengths_and_bodies_are_refused_by_name() {
     // A vertex of no element may go as far as any.
     assert_eq!(safe.of(bodies[0]).expect("held").get(8), 1.0);
 }
+
+/// Points on spheres around others, as far as both are thick together or a few units in the last
+/// place farther or nearer.
+#[test]
+fn distances_of_thick_elements_are_as_exact_as_of_others() {
+    let mut random = Random::new(19);
+    let mut detectors = detectors();
+    let (mut n_touching, mut n_apart) = (0, 0);
+    for round in 0..40 {
+        let thick = [[0.75, 0.25], [0.1, 0.2], [1.0, 1e-17], [0.3, 0.0]][round % 4];
+        let sum = thick[0] + thick[1];
+        let mut scene = Scene::new();
+        let (mut centres, mut points) = (Vec::new(), Vec::new());
+        for ix in 0..40_u32 {
+            // Far from each other.
+            let centre = [f64::from(ix) * 8.0, 0.0, 0.0];
+            let way = match ix % 3 {
+                0 => [0.0, 0.0, 1.0],
+                1 => [0.0, 0.6, 0.8],
+                _ => random.point(-1.0, 1.0).map(f64::from),
+            };
+            let length = way.iter().map(|x| x * x).sum::<f64>().sqrt();
+            let steps = [0.0, 1.0, 2.0, 8.0, 1000.0, 1e6, -1.0, -3.0, 1e10][ix as usize % 9];
+            let far = sum * (1.0 + steps * f64::EPSILON);
+            points.push([0, 1, 2].map(|k: usize| centre[k] + way[k] * far / length));
+            centres.push(centre);
+        }
+        let a = scene.add_points(&centres).expect("good");
+        let b = match round / 4 % 2 {
+            0 => scene.add_points(&points),
+            _ => scene.add_edges(
+                &(0..40).map(|ix| [2 * ix, 2 * ix + 1]).collect::<Vec<_>>(),
+                &(points.iter())
+                    .flat_map(|&[x, y, z]| [[x, y, z], [x, y + 2.0 * y.signum(), z]])
+                    .collect::<Vec<_>>(),
+            ),
+        };
+        let b = b.expect("good");
+        scene.set_thickness(a, thick[0]).expect("good");
+        scene.set_thickness(b, thick[1]).expect("good");
+        let kind = match round / 4 % 2 {
+            0 => PairKind::VertexVertex,
+            _ => PairKind::EdgeVertex,
+        };
+        let query = Query::between(a, b).kinds([kind]);
+        let lists = detectors.each_mut().map(|detector| {
+            let found = detector.neighbours(&scene, 1.0, &query).expect("good");
+            let lists = found.of(kind);
+            (0..lists.offsets.len() - 1)
+                .flat_map(|row| {
+                    lists
+                        .of(row)
+                        .map(move |(ix, far)| (row, ix, far.to_bits()))
+                        .collect::<Vec<_>>()
+                })
+                .collect::<Vec<_>>()
+        });
+        assert!(lists.iter().all(|list| *list == lists[0]));
+        let touching = detectors[0].near(&scene, 0.0, &query).expect("good").len();
+        let zeros = lists[0].iter().filter(|(_, _, far)| *far == 0).count();
+        // Lists of two vertices name each pair twice.
+        let n_each = if kind == PairKind::VertexVertex { 2 } else { 1 };
+        assert_eq!(zeros, n_each * touching, "{round}");
+        n_touching += touching;
+        // Within a distance plus the thickness is decided exactly.
+        for &(_, _, bits) in &lists[0] {
+            let far = f64::from_bits(bits);
+            if far == 0.0 {
+                continue;
+            }
+            n_apart += 1;
+            let mut n_within = |far: f64| {
+                let found = detectors[0].near(&scene, far, &query).expect("good");
+                found.len()
+            };
+            let n_nearer = lists[0].iter().filter(|(.., other)| *other < bits).count() / n_each;
+            assert!(n_within(far.next_down()) <= n_nearer, "{far:e}");
+            assert!(n_within(far * (1.0 + 2f64.powi(-20))) > n_nearer, "{far:e}");
+        }
+        let safe = detectors.each_mut().map(|detector| {
+            let safe = detector.safe_distances(&scene, 0.5, &query).expect("good");
+            let rows = safe.touching().iter().collect::<Vec<_>>();
+            assert_eq!(rows.len(), touching);
+            let all = [a, b].map(|body| match safe.of(body) {
+                Some(Bounds::F64(bounds)) => bounds.to_vec(),
+                _ => panic!("double precision"),
+            });
+            (rows, all)
+        });
+        assert!(safe.iter().all(|other| *other == safe[0]));
+        for &(row, column, bits) in &lists[0] {
+            // Of each centre, which is near one element.
+            let centre = if kind == PairKind::VertexVertex {
+                row
+            } else {
+                column as usize
+            };
+            if let Some(&bound) = safe[0].1[0].get(centre) {
+                let half = f64::from_bits(bits) / 2.0;
+                assert!(
+                    bound <= half && bound >= half * (1.0 - 1.0 / 1024.0),
+                    "{bound:e} {half:e}"
+                );
+            }
+        }
+    }
+    assert!(n_touching > 100 && n_apart > 500, "{n_touching} {n_apart}");
+}

@@ -8,6 +8,7 @@ use alloc::vec::Vec;
 use core::cmp::Ordering;
 
 use super::features::PolygonPart;
+use super::keep::below_excess;
 use super::nearest::ExactPolygon;
 use super::reach::Reach;
 use super::rounded::{self, between, quotient};
@@ -212,6 +213,26 @@ pub fn distance_below(a: &[Point], b: &[Point]) -> f64 {
     }
 }
 
+/// A number that is at most the distance of two elements of one to three corners minus the
+/// thickness of both, and below that by at most 2^-20 of it, or by 2^-1045; 0 if and only if they
+/// touch, or are at most as far apart as they are thick, or farther by less than that.
+///
+/// The thickness is an exact sum of two numbers. As in [`distance_below`], a bound in `f64` does
+/// for most pairs, and the distance rounded down for others; exact comparisons for those that are
+/// left.
+pub fn gap_below(a: &[Point], b: &[Point], thickness: [f64; 2]) -> f64 {
+    if thickness == [0.0; 2] {
+        return distance_below(a, b);
+    }
+    match Simple::new(a, b) {
+        Some(simple) => simple.gap_below(thickness),
+        None if elements_meet(a, b) => 0.0,
+        None => parts(a, b)
+            .map(|part| part.simple.gap_below(thickness))
+            .fold(f64::INFINITY, f64::min),
+    }
+}
+
 /// The distance of two elements of one to three corners that share no point, rounded down as in
 /// [`closest_points`](super::closest_points), if that is below a limit.
 pub fn distance_under(a: &[Point], b: &[Point], limit: f64) -> Option<f64> {
@@ -231,6 +252,29 @@ pub fn distance_under(a: &[Point], b: &[Point], limit: f64) -> Option<f64> {
 #[inline]
 pub fn below_by_bounds([low, high]: [f64; 2]) -> Option<f64> {
     (low > high * (1.0 - POWER_20)).then_some(low)
+}
+
+/// [`gap_below`] by bounds of the distance in `f64`, where these do.
+#[inline]
+pub fn gap_by_bounds(bounds: [f64; 2], thickness: [f64; 2]) -> Option<f64> {
+    if thickness == [0.0; 2] {
+        return below_by_bounds(bounds);
+    }
+    let [low, high] = gap_between(bounds, thickness);
+    if high <= 0.0 {
+        return Some(0.0);
+    }
+    below_by_bounds([low, high]).filter(|&low| low > 0.0)
+}
+
+/// Numbers between which a distance minus a thickness is, by such numbers of the distance.
+#[inline]
+fn gap_between([low, high]: [f64; 2], [a, b]: [f64; 2]) -> [f64; 2] {
+    let sum = a + b;
+    [
+        (low - sum.next_up()).next_down(),
+        (high - sum.next_down()).next_up(),
+    ]
 }
 
 /// Two elements that one [`ElementPair`] stands for.
@@ -270,6 +314,19 @@ impl Simple {
         bounds
             .and_then(below_by_bounds)
             .unwrap_or_else(|| rounded::distance(self.pair, &self.points))
+    }
+
+    fn gap_below(&self, thickness: [f64; 2]) -> f64 {
+        let bounds = filter::bounds(self.pair, &self.points);
+        if let Some(gap) = bounds.and_then(|bounds| gap_by_bounds(bounds, thickness)) {
+            return gap;
+        }
+        let distance = rounded::distance(self.pair, &self.points);
+        let bounds = [distance, distance.next_up()];
+        gap_by_bounds(bounds, thickness).unwrap_or_else(|| {
+            let between = gap_between(bounds, thickness);
+            below_excess(thickness, (self.pair, &self.points), between)
+        })
     }
 
     fn distance_under(&self, limit: f64) -> Option<f64> {

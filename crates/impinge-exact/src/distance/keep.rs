@@ -128,50 +128,74 @@ impl Keep {
         bounds: Option<[f64; 2]>,
     ) -> Option<Short> {
         let [low, high] = bounds.unwrap_or([0.0, 0.0]);
-        let [low, high] = [
+        let between = [
             (low - self.separation).next_down(),
             (high - self.separation).next_up(),
         ];
-        if low > 0.0 && Short::not_below(low) == Short::not_below(high) {
-            return Some(Short::not_below(low));
-        }
-        let reaches = |excess: Short| {
-            let reach = Reach::of_sum([self.separation, excess.value(), 0.0]);
-            are_within_reach(pair, start, &reach)
-        };
-        if reaches(Short::ZERO) {
-            return None;
-        }
-        // Between the last number that is known not to reach and the first that does: away from a
-        // guess in growing strides, then by halves.
-        let (mut below, mut above) = (Short::ZERO, Short::not_below(high.max(0.0)));
-        let mut stride = 1;
-        while !reaches(above) {
-            if above == Short::LARGEST {
-                return Some(above);
-            }
-            below = above;
-            above = above.later(stride);
-            stride *= 2;
-        }
-        let mut stride = 1;
-        while below.0 + stride < above.0 && reaches(Short(above.0 - stride)) {
-            above = Short(above.0 - stride);
-            stride *= 2;
-        }
-        if below.0 + stride < above.0 {
-            below = Short(above.0 - stride);
-        }
-        while below.0 + 1 < above.0 {
-            let middle = Short(below.0 + (above.0 - below.0) / 2);
-            if reaches(middle) {
-                above = middle;
-            } else {
-                below = middle;
-            }
-        }
-        Some(above)
+        excess_over([self.separation, 0.0], (pair, start), between)
     }
+}
+
+/// What the distance of two elements is beyond the exact sum of two numbers, rounded up to 24 bits,
+/// or the largest such number if it is larger; `None` if it is not above 0. It should be between
+/// two numbers, and is if the first one is above 0.
+fn excess_over(
+    [first, second]: [f64; 2],
+    (pair, points): (ElementPair, &[Point; 4]),
+    [low, high]: [f64; 2],
+) -> Option<Short> {
+    if low > 0.0 && Short::not_below(low) == Short::not_below(high) {
+        return Some(Short::not_below(low));
+    }
+    let reaches = |excess: Short| {
+        let reach = Reach::of_sum([first, second, excess.value()]);
+        are_within_reach(pair, points, &reach)
+    };
+    if reaches(Short::ZERO) {
+        return None;
+    }
+    // Between the last number that is known not to reach and the first that does: away from a guess
+    // in growing strides, then by halves.
+    let (mut below, mut above) = (Short::ZERO, Short::not_below(high.max(0.0)));
+    let mut stride = 1;
+    while !reaches(above) {
+        if above == Short::LARGEST {
+            return Some(above);
+        }
+        below = above;
+        above = above.later(stride);
+        stride *= 2;
+    }
+    let mut stride = 1;
+    while below.0 + stride < above.0 && reaches(Short(above.0 - stride)) {
+        above = Short(above.0 - stride);
+        stride *= 2;
+    }
+    if below.0 + stride < above.0 {
+        below = Short(above.0 - stride);
+    }
+    while below.0 + 1 < above.0 {
+        let middle = Short(below.0 + (above.0 - below.0) / 2);
+        if reaches(middle) {
+            above = middle;
+        } else {
+            below = middle;
+        }
+    }
+    Some(above)
+}
+
+/// A number below what the distance of two elements is beyond the exact sum of two numbers, by at
+/// most 2^-23 of it, or by 2^-1045; 0 if and only if they are within that sum, or farther by at most
+/// 2^-1045.
+/// The excess should be between two numbers, and is if the first one is above 0.
+pub(super) fn below_excess(
+    sum: [f64; 2],
+    pair: (ElementPair, &[Point; 4]),
+    between: [f64; 2],
+) -> f64 {
+    let excess = excess_over(sum, pair, between);
+    excess.map_or(0.0, |excess| excess.before().value())
 }
 
 /// A number of at most 24 bits, 0 or more, as its place among all of them.

@@ -38,7 +38,7 @@ pub use apart::shares_apart;
 pub use by_part::{PairAtPart, closest_by_part};
 pub use elements::{NearestOfElements, are_within_certainly, elements_are_within};
 pub use elements::{
-    below_by_bounds, closest_of_elements, distance_below, distance_under, elements_meet,
+    closest_of_elements, distance_under, elements_meet, gap_below, gap_by_bounds,
     nearest_of_elements, unsure_are_within,
 };
 pub use features::{Feature, NearestFeatures};

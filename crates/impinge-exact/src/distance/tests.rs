@@ -4,7 +4,7 @@
 use super::features::PolygonPart;
 use super::filter::{self, Approach};
 use super::moving::first_within_by_roots;
-use super::{Reach, closest_points, nearest};
+use super::{Reach, closest_points, gap_below, nearest};
 use crate::filter::{
     BATCH, Bounded16, Moving64, Near16, SWAPPED_PARTS, TABLE, are_within_in_tables,
     bounded_in_tables, nearest_in_tables, number, stay_beyond_in_tables, time_between,
@@ -435,4 +435,55 @@ fn numbers_that_are_none_are_unsure() {
             }
         }
     }
+}
+
+/// Gaps of thick elements against exact comparisons, also where the thickness is nearly the
+/// distance.
+#[test]
+fn gaps_are_below_by_little_and_zero_where_elements_are_within() {
+    let pairs = [
+        ElementPair::VertexVertex,
+        ElementPair::VertexEdge,
+        ElementPair::VertexFace,
+        ElementPair::EdgeEdge,
+    ];
+    let mut random = Random(5);
+    let (mut n_within, mut n_small) = (0, 0);
+    for round in 0..4000 {
+        let pair = pairs[round % 4];
+        let scale = [1.0, 0.1, 1e-7][round / 4 % 3];
+        let points = [(); 4].map(|()| [(); 3].map(|()| scale * (random.unit() - 0.5)));
+        let distance = closest_points(pair, &points).distance;
+        let near = [0.0, 1.0, -1.0, 3.0, -900.0, 1e6, -1e9, -1e14][round / 12 % 8];
+        let sum = distance * (1.0 + near * f64::EPSILON);
+        let first = sum * random.unit().abs();
+        let thickness = match round % 3 {
+            0 => [first, sum - first],
+            1 => [sum, 0.0],
+            // A sum that is no float.
+            _ => [sum, sum * 2f64.powi(-60)],
+        };
+        let (a, b) = points[..pair.n_points()].split_at(pair.n_first());
+        let gap = gap_below(a, b, thickness);
+        let is_within = |gap: f64| {
+            let [a, b] = thickness;
+            nearest::are_within(pair, &points, &Reach::of_sum([a, b, gap]))
+        };
+        if pair != ElementPair::EdgeEdge {
+            assert_eq!(gap, gap_below(b, a, thickness));
+        }
+        if gap == 0.0 {
+            assert!(is_within(0.0), "{pair:?} {points:?} {thickness:?}");
+            n_within += 1;
+            continue;
+        }
+        assert!(
+            !is_within(gap.next_down()),
+            "{pair:?} {points:?} {thickness:?}"
+        );
+        let above = gap * (1.0 + 2f64.powi(-19) * 0.5001);
+        assert!(is_within(above), "{pair:?} {points:?} {thickness:?}");
+        n_small += usize::from(gap < 1e-14 * distance);
+    }
+    assert!(n_within > 500 && n_small > 100, "{n_within} {n_small}");
 }
