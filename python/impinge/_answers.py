@@ -1202,8 +1202,8 @@ class Truncation(_Motion):
 
     @property
     def n_touching(self) -> int:
-        """int : how many pairs already touch at the start, or are nearer than they are to keep: their vertices were not moved.
-        Pairs of which no vertex moves are not counted.
+        """int : how many pairs already touch at the start, or are at most as far apart as they are to keep: their vertices were not
+        moved. Pairs of which no vertex moves are not counted.
         """
         return self._inner.n_touching
 

@@ -924,8 +924,9 @@ double impinge_motion_fraction(const impinge_motion *motion);
 impinge_status impinge_motion_first(const impinge_motion *motion, impinge_impact *impact, int32_t *found);
 /* Whether elements intersect at the start: 1 or 0, or -1 if nobody asked. */
 int32_t impinge_motion_start_intersects(const impinge_motion *motion);
-/* Of impinge_truncate: how many vertices were stopped before the end of their way; how many pairs touch at the start, or are nearer than
- * they are to keep, without pairs of which no vertex moves; how often pairs were looked at again. 0 of impinge_advance, and for NULL. */
+/* Of impinge_truncate: how many vertices were stopped before the end of their way; how many pairs touch at the start, or are at most as
+ * far apart as they are to keep, without pairs of which no vertex moves; how often pairs were looked at again. 0 of impinge_advance, and
+ * for NULL. */
 uint64_t impinge_motion_n_cut(const impinge_motion *motion);
 uint64_t impinge_motion_n_touching(const impinge_motion *motion);
 uint32_t impinge_motion_rounds(const impinge_motion *motion);

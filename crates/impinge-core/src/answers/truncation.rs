@@ -36,8 +36,8 @@ impl Truncation {
         self.n_cut
     }
 
-    /// How many pairs already touch at the start, or are nearer than they are to keep: their
-    /// vertices were not moved. Pairs of which no vertex moves are not counted.
+    /// How many pairs already touch at the start, or are at most as far apart as they are to keep:
+    /// their vertices were not moved. Pairs of which no vertex moves are not counted.
     pub fn n_touching(&self) -> u64 {
         self.n_touching
     }

@@ -29,7 +29,7 @@ use crate::search::sink::{filled, reserve};
 use crate::search::stats::Stats;
 use crate::search::work::Work;
 use crate::workers::clock::Instant;
-use impinge_exact::internal::shares_apart;
+use impinge_exact::internal::{shares_apart, shares_without_room};
 use impinge_exact::{ElementPair, Point};
 
 /// Pairs that a task looks at.
@@ -54,10 +54,12 @@ impl Detector {
     /// [transform](Scene::set_end_transform) made stops as a whole: all of its vertices go the least
     /// share of their ways that one of them may go.
     ///
-    /// The vertices of pairs that touch at the start, or are nearer than they are to keep, stay
-    /// where they are, and [are counted](Truncation::n_touching); under
-    /// [`Start::Skip`](crate::Start::Skip) they go as far as other pairs let them. The seams of a
-    /// mesh that was not welded are refused by name. Found on the CPU.
+    /// The vertices of pairs that touch at the start, or are at most as far apart as they are to
+    /// keep, stay where they are, and [are counted](Truncation::n_touching); under
+    /// [`Start::Skip`](crate::Start::Skip) they go as far as other pairs let them. Whether a pair
+    /// does is decided exactly. Where two elements are farther apart by less than floats can
+    /// divide, only the vertices that go towards the other stay, or follow it if it goes away. The
+    /// seams of a mesh that was not welded are refused by name. Found on the CPU.
     ///
     /// ```
     /// use impinge::{Backend, Detector, Positions, Query, Scene};
@@ -154,9 +156,11 @@ impl Detector {
             control: &self.control,
         };
         work.each(&mut tasks, |_, (kind, pair, found, touching)| {
-            let keys = found.iter().map(|found| found.key);
-            let stay = keys.filter(|&key| vertices.stop(*pair, key, (scene, plan)));
-            touching.extend(stay.map(|key| (*kind, key)));
+            let stay = found.iter().filter(|found| {
+                let is_touching = found.value.at_start;
+                vertices.stop(*pair, (found.key, is_touching), (scene, plan))
+            });
+            touching.extend(stay.map(|found| (*kind, found.key)));
             Ok(())
         })?;
         Ok(tasks
@@ -321,9 +325,14 @@ fn n_ways((_, start, end): (BodyId, &Positions, &Positions)) -> u64 {
 const WHOLE: u64 = 1.0_f64.to_bits();
 
 impl Vertices {
-    /// Stops the vertices of a pair that go towards the other element. Returns whether the pair
-    /// touches at the start, so that none may move.
-    fn stop(&self, pair: ElementPair, key: u64, (scene, plan): (&Scene, &Plan)) -> bool {
+    /// Stops the vertices of a pair that go towards the other element, or all of them if it touches
+    /// at the start. Returns whether there are any of a pair that does.
+    fn stop(
+        &self,
+        pair: ElementPair,
+        (key, is_touching): (u64, bool),
+        (scene, plan): (&Scene, &Plan),
+    ) -> bool {
         let mut located = plan.located(key);
         if pair == ElementPair::VertexEdge {
             // Such pairs are named edge first, but tested vertex first.
@@ -349,17 +358,21 @@ impl Vertices {
             // They touch at the start, and stay there.
             return false;
         }
-        let kept = plan.kept(scene, located, pair, [&start, &end]);
-        let Some(shares) = shares_apart(pair, [&start, &now, &end], kept) else {
+        if is_touching {
             moving.for_each(|ix| self.stop_at(own[ix], 0.0));
             return true;
-        };
-        // Where no share is less, the planes are too close for that: each goes back a little.
-        let is_any_less = shares.iter().any(|&share| share < 1.0);
+        }
+        let kept = plan.kept(scene, located, pair, [&start, &end]);
+        let ways = [&start, &now, &end];
+        let is_any_less =
+            |shares: &[f64; 4]| (0..n).any(|ix| now[ix] != start[ix] && shares[ix] < 1.0);
+        // Where no share is less, the planes are too close for that.
+        let shares = shares_apart(pair, ways, kept)
+            .filter(is_any_less)
+            .unwrap_or_else(|| shares_without_room(pair, ways, kept));
         for ix in moving {
-            let share = shares[ix];
-            if share < 1.0 || !is_any_less {
-                self.stop_at(own[ix], share.min(1.0 - f64::EPSILON));
+            if shares[ix] < 1.0 {
+                self.stop_at(own[ix], shares[ix]);
             }
         }
         false

@@ -353,3 +353,179 @@ fn what_is_left_out_is_not_kept_apart() {
     assert_eq!(n_cut(&Query::all().exclude((floor, point))), 0);
     assert_eq!(n_cut(&Query::all().filter(PairFilter::new(|_| false))), 0);
 }
+
+/// A point over a floor, at a height; both go to other heights.
+fn over_a_floor<R: Real>(
+    height: f64,
+    [floor_to, point_to]: [f64; 2],
+    round: impl Fn(f64) -> R + Copy,
+) -> (Scene, [BodyId; 2]) {
+    let mut scene = Scene::new();
+    let floor = |z: f64| held(&[[0.0, 0.0, z], [4.0, 0.0, z], [0.0, 4.0, z]], round);
+    let point = |z: f64| held(&[[1.0, 1.0, z]], round);
+    let below = scene
+        .add_triangles(&[[0, 1, 2]], &floor(0.0))
+        .expect("a floor");
+    let above = scene.add_points(&point(height)).expect("a point");
+    scene
+        .set_end_positions(below, floor(floor_to))
+        .expect("as many");
+    scene
+        .set_end_positions(above, point(point_to))
+        .expect("as many");
+    (scene, [below, above])
+}
+
+/// Heights of the floor's corners and of the point where they were stopped.
+fn heights(truncation: &Truncation, bodies: [BodyId; 2]) -> ([f64; 3], f64) {
+    let [floor, point] = bodies.map(|body| truncation.positions(body).expect("it moves"));
+    ([0, 1, 2].map(|ix| floor.point(ix)[2]), point.point(0)[2])
+}
+
+/// A pair touches if it is exactly as near as it is to keep. Where there is no room that floats can
+/// divide, who goes towards the other stays or follows, and who goes away goes on.
+#[test]
+fn without_room_only_who_goes_towards_the_other_stops() {
+    for kept in [0.1, 0.125, 1.0] {
+        for (n_ulps, is_thick, is_double) in
+            (0..24).flat_map(|n| [(n, true, true), (n, false, true), (n, true, false)])
+        {
+            let single = (0..n_ulps).fold(kept as f32, |z, _| z.next_up());
+            let height = match is_double {
+                true => (0..n_ulps).fold(kept, |z: f64, _| z.next_up()),
+                false => f64::from(single),
+            };
+            let with = |ends: [f64; 2]| {
+                let (mut scene, bodies) = match is_double {
+                    true => over_a_floor(height, ends, |x| x),
+                    false => over_a_floor(height, ends, |x| x as f32),
+                };
+                let query = match is_thick {
+                    true => {
+                        scene.set_thickness(bodies[0], kept).expect("good");
+                        Query::all()
+                    }
+                    false => Query::all().separation(kept),
+                };
+                (scene, bodies, query)
+            };
+            let touches = u64::from(height <= kept);
+            // The floor sinks by less than the point: that follows, or stays.
+            let (scene, bodies, query) = with([-0.05, -1.0]);
+            let truncation = checked(&scene, &query);
+            assert_eq!(truncation.n_touching(), touches, "{kept} {n_ulps}");
+            let sunk = f64::from(-0.05_f32);
+            let (floor, point) = heights(&truncation, bodies);
+            if touches == 1 {
+                assert_eq!((floor, point), ([0.0; 3], height));
+            } else {
+                assert_eq!(truncation.n_cut(), 1, "{kept} {n_ulps}");
+                assert!(floor.iter().all(|z| (z - sunk).abs() < 1e-8), "{floor:?}");
+                let least = floor[0] + kept;
+                assert!(point > least && point < least + 1e-3, "{point} {least}");
+                assert!(truncation.rounds() < 6, "{truncation:?}");
+            }
+            let skipping = checked(&scene, &query.start(Start::Skip));
+            assert_eq!(skipping.n_touching(), 0);
+            // The point goes away, and the floor follows by more than there is room for.
+            let (scene, bodies, query) = with([1.0, height + 0.5]);
+            let truncation = checked(&scene, &query);
+            assert_eq!(truncation.n_touching(), touches);
+            let (floor, point) = heights(&truncation, bodies);
+            if touches == 0 {
+                assert_eq!(truncation.n_cut(), 3);
+                assert!((point - height - 0.5).abs() < 1e-6);
+                assert!(
+                    floor.iter().all(|&z| z > 0.49 && z < 0.5 + 1e-5),
+                    "{floor:?}"
+                );
+            }
+            // Both go towards the other.
+            let (scene, bodies, query) = with([0.5, 0.0]);
+            let truncation = checked(&scene, &query);
+            assert_eq!(truncation.n_touching(), touches);
+            let (floor, point) = heights(&truncation, bodies);
+            assert!(floor.iter().all(|&z| z < 0.001) && point > kept - 1e-12);
+        }
+    }
+}
+
+/// A point that is pushed onto a thick floor until there is no room left goes on when the floor
+/// sinks.
+#[test]
+fn what_was_pushed_until_no_room_was_left_follows_a_sinking_floor() {
+    let (mut scene, [floor, point]) = over_a_floor(0.5, [0.0, 0.5], |x| x);
+    scene.clear_end_positions(floor).expect("known");
+    scene.set_thickness(floor, 0.1).expect("good");
+    let move_by = |scene: &mut Scene, body, by: f64| {
+        let at = scene.body(body).expect("known").positions();
+        let ends = Vec::from_iter((0..at.len()).map(|ix| {
+            let [x, y, z] = at.point(ix);
+            [x, y, z + by]
+        }));
+        scene.set_end_positions(body, &ends).expect("as many");
+    };
+    let height = |scene: &Scene, body| scene.body(body).expect("known").positions().point(0)[2];
+    for _ in 0..12 {
+        move_by(&mut scene, point, -0.3);
+        let truncation = checked(&scene, &Query::all());
+        assert_eq!(truncation.n_touching(), 0);
+        truncation.apply(&mut scene).expect("the same scene");
+    }
+    assert!(height(&scene, point) < 0.1 + 1e-15);
+    for round in 1..5 {
+        move_by(&mut scene, point, -0.3);
+        move_by(&mut scene, floor, -0.1);
+        let truncation = checked(&scene, &Query::all());
+        assert_eq!((truncation.n_touching(), truncation.n_cut()), (0, 1));
+        truncation.apply(&mut scene).expect("the same scene");
+        let [floor, point] = [floor, point].map(|body| height(&scene, body));
+        assert!((floor + 0.1 * f64::from(round)).abs() < 1e-12, "{floor}");
+        assert!(point - floor < 0.1002, "{point} {floor}");
+    }
+}
+
+/// Slanted elements a few units in the last place beyond what they keep, that go anywhere.
+#[test]
+fn slanted_elements_without_room_stay_apart() {
+    let mut random = Random::new(77);
+    let (mut n_touching, mut n_moved, mut n_rounds) = (0, 0, 0);
+    for round in 0..120 {
+        let mut number = |size: f64| (f64::from(random.unit()) - 0.5) * size;
+        let mut scene = Scene::new();
+        let face = [(); 3].map(|()| [(); 3].map(|()| number(2.0)));
+        let middle: [f64; 3] =
+            core::array::from_fn(|k| (face[0][k] + face[1][k] + face[2][k]) / 3.0);
+        let [u, v] = [1, 2].map(|ix: usize| [0, 1, 2].map(|k: usize| face[ix][k] - face[0][k]));
+        let normal = [
+            u[1] * v[2] - u[2] * v[1],
+            u[2] * v[0] - u[0] * v[2],
+            u[0] * v[1] - u[1] * v[0],
+        ];
+        let length = normal.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let kept = [0.1, 1e-4, 1e-9, 0.0][round % 4];
+        // A few units in the last place more or less.
+        let far = kept * (1.0 + 4e-16) + number(2e-16);
+        let point: [f64; 3] = core::array::from_fn(|k| middle[k] + far * normal[k] / length);
+        let way = [(); 3].map(|()| number(0.2));
+        let floor = scene.add_triangles(&[[0, 1, 2]], &face).expect("a face");
+        let body = scene.add_points(&[point]).expect("a point");
+        let ends = face.map(|p| [0, 1, 2].map(|k: usize| p[k] + way[k] + number(0.1)));
+        scene.set_end_positions(floor, &ends).expect("as many");
+        let end = [0, 1, 2].map(|k: usize| point[k] + number(0.4));
+        scene.set_end_positions(body, &[end]).expect("as many");
+        let query = Query::all().separation(kept);
+        let truncation = checked(&scene, &query);
+        let near = detector(Method::Clusters, 1)
+            .near(&scene, kept, &Query::all())
+            .expect("an answer");
+        assert_eq!(truncation.n_touching(), near.len() as u64, "{round}");
+        n_touching += truncation.n_touching();
+        n_rounds = n_rounds.max(truncation.rounds());
+        if truncation.n_touching() == 0 {
+            n_moved += u64::from(truncation.n_cut() < 4);
+        }
+    }
+    assert!(n_touching > 10 && n_moved > 50, "{n_touching} {n_moved}");
+    assert!(n_rounds < 60, "{n_rounds}");
+}

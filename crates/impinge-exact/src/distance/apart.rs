@@ -6,8 +6,10 @@
 //!
 //! How: the planes lie across the shortest way between the elements, at the start or at the end.
 //! The points that go towards the other element are stopped: where both come nearer, each gets a
-//! share of the room, by how far it wants to go. Heights over a plane are computed in `f64`, so
-//! this is where points should stop; that elements then stay apart is decided by the exact test.
+//! share of the room, by how far it wants to go. Where floats see no room, the points that go
+//! towards the other element stay where they are, and the others go on. Heights over a plane are
+//! computed in `f64`, so this is where points should stop; that elements then stay apart is decided
+//! by the exact test.
 //!
 //! Source: A. Chen et al., "Divide and Truncate", SIGGRAPH 2026, for planes that divide the room
 //! between elements. There they rest.
@@ -52,6 +54,44 @@ pub fn shares_apart(
     let shares = possible.map(|across| across.shares([start, now, end], distance));
     let least = |shares: &[f64; 4]| shares.iter().fold(1.0, |least: f64, &x| least.min(x));
     shares.max_by(|a, b| least(a).total_cmp(&least(b)))
+}
+
+/// The same for elements that are farther apart at the start, but by so little that heights in
+/// `f64` do not tell where to stop. Points that go towards the other element stay at their start,
+/// or follow it if it goes away as a whole. If there are none, those stay that do not certainly go
+/// away; if there are none of these either, all that move. So some point that is not at its start
+/// now has less than 1, if there is one.
+#[must_use]
+pub fn shares_without_room(
+    pair: ElementPair,
+    [start, now, end]: [&[Point; 4]; 3],
+    distance: f64,
+) -> [f64; 4] {
+    // Where elements are large beside their distance, their common normal may be a better way.
+    let normal = Polygon::of_pair(pair, start).normal();
+    let across_both = [normal, normal.map(|x| -x)].map(|way| Across::new(way, pair));
+    let tried = ways(pair, [start, end]).chain(across_both.into_iter().flatten());
+    let with_room = tried.filter_map(|across| {
+        let room = across.room(start, distance)? / across.length();
+        (!room.is_nan()).then_some((room, across))
+    });
+    let best = with_room.max_by(|(a, _), (b, _)| a.total_cmp(b));
+    let Some((room, across)) = best else {
+        return stays_if(|ix| now[ix] != start[ix]);
+    };
+    let noise = across.noise([start, now], distance);
+    if LEAST_SHARE * room > noise {
+        let shares = across.shares([start, now, end], distance);
+        if (0..pair.n_points()).any(|ix| now[ix] != start[ix] && shares[ix] < 1.0) {
+            return shares;
+        }
+    }
+    across.shares_without_room([start, now, end], distance, noise)
+}
+
+/// 0 for some points, and 1 for all others.
+fn stays_if(stays: impl Fn(usize) -> bool) -> [f64; 4] {
+    core::array::from_fn(|ix| if stays(ix) { 0.0 } else { 1.0 })
 }
 
 /// About the shortest ways between two elements, at some times.
@@ -102,8 +142,12 @@ impl Across {
 
     /// How far apart planes are, as heights: rounded up, by more than the roundings here.
     fn thick(&self, distance: f64) -> f64 {
-        let square: f64 = self.normal.iter().map(|x| x * x).sum();
-        distance * root(square) * (1.0 + 4.0 * ERROR)
+        distance * self.length() * (1.0 + 4.0 * ERROR)
+    }
+
+    /// The length of the normal.
+    fn length(&self) -> f64 {
+        root(self.normal.iter().map(|x| x * x).sum())
     }
 
     /// The lowest of the first element's heights, and the highest of the second's; `signs` of the
@@ -160,13 +204,86 @@ impl Across {
                 _ => at > levels[1],
             };
             if is_beyond {
-                let share = (levels[side] - from) / (to - from);
-                // Also if that is not a number.
-                shares[ix] = if share > 0.0 { share.min(1.0) } else { 0.0 };
+                shares[ix] = share_to(levels[side], from, to);
             }
         }
         shares
     }
+
+    /// More than all errors of heights, and of what planes are apart, together.
+    fn noise(&self, times: [&[Point; 4]; 2], distance: f64) -> f64 {
+        let of_heights = times.into_iter().flat_map(|points| {
+            let sides = self.sides();
+            sides.map(|(ix, _)| self.height(&points[ix], &times[0][0])[1])
+        });
+        4.0 * (of_heights.fold(0.0, f64::max) + 4.0 * ERROR * self.thick(distance))
+    }
+
+    /// See [`shares_without_room`].
+    fn shares_without_room(
+        &self,
+        [start, now, end]: [&[Point; 4]; 3],
+        distance: f64,
+        noise: f64,
+    ) -> [f64; 4] {
+        let origin = &start[0];
+        let thick = self.thick(distance);
+        let bounds = [start, now].map(|points| self.bounds(points, origin, 0.0));
+        // As heights over the other element, or depths below it: upwards is away.
+        let heights = |side: usize, ix: usize| {
+            let heights = [start, now, end].map(|points| self.height(&points[ix], origin)[0]);
+            if side == 0 {
+                heights
+            } else {
+                heights.map(|x| -x)
+            }
+        };
+        let lowest = |side: usize| bounds.map(|[low, high]| if side == 0 { low } else { -high });
+        let mut shares = [1.0; 4];
+        for (ix, side) in self.sides() {
+            let [from, at, to] = heights(side, ix);
+            let [lowest_from, _] = lowest(side);
+            let [other_from, other_now] = lowest(1 - side);
+            let followed = LEAST_SHARE * (other_now - other_from);
+            let own = LEAST_SHARE * (from - lowest_from);
+            let (is_beyond, level) = if followed > noise {
+                let level = thick + followed - other_now;
+                (at < level, level)
+            } else if own > noise {
+                (at < lowest_from, lowest_from + own)
+            } else {
+                (at < lowest_from, from)
+            };
+            if is_beyond && at < from {
+                shares[ix] = share_to(level, from, to);
+            }
+        }
+        if shares.iter().any(|&share| share < 1.0) {
+            return shares;
+        }
+        // Also if a height is not a number.
+        let is_unsure = |side: usize, ix: usize| {
+            let [from, at, _] = heights(side, ix);
+            let is_away = at - from > noise;
+            now[ix] != start[ix] && !is_away
+        };
+        let unsure = |ix: usize| {
+            self.sides()
+                .any(|(of, side)| of == ix && is_unsure(side, ix))
+        };
+        let shares = stays_if(unsure);
+        if shares.iter().any(|&share| share < 1.0) {
+            return shares;
+        }
+        stays_if(|ix| now[ix] != start[ix])
+    }
+}
+
+/// The share of a way between two heights up to a level that is between them; 0 if that is not a
+/// number.
+fn share_to(level: f64, from: f64, to: f64) -> f64 {
+    let share = (level - from) / (to - from);
+    if share > 0.0 { share.min(1.0) } else { 0.0 }
 }
 
 #[cfg(test)]
@@ -267,5 +384,50 @@ mod tests {
         assert!(of(&start, 0.999).is_some());
         let huge = [[0.0, 0.0, 1e308], [0.0, 0.0, -1e308], ORIGIN, ORIGIN];
         assert_eq!(of(&huge, 0.0), None);
+    }
+
+    /// Without room some point that is not at its start goes back each time, and only those that go
+    /// towards the other element if there are any.
+    #[test]
+    fn without_room_points_go_back_until_the_elements_are_apart() {
+        let mut numbers = Numbers(3);
+        let (mut n_contacts, mut n_left) = (0, 0);
+        for round in 0..4000 {
+            let pair = PAIRS[round % 4];
+            let scale = [1.0, 0.1, 1e-3][round / 4 % 3];
+            let [start, end] = [(); 2].map(|()| [(); 4].map(|()| numbers.point(40, scale)));
+            // The elements are farther apart than their rounded distance less a bit.
+            let distance = crate::closest_points(pair, &start).distance.next_down();
+            if distance <= 0.0 || shares_apart(pair, [&start, &end, &end], distance).is_some() {
+                continue;
+            }
+            let n = pair.n_points();
+            let mut now = end;
+            let mut n_rounds = 0;
+            while first_within(pair, &start, &now, distance).is_some() {
+                n_contacts += 1;
+                n_rounds += 1;
+                assert!(n_rounds < 6, "{pair:?} {start:?} {end:?}");
+                let shares = shares_without_room(pair, [&start, &now, &end], distance);
+                let before = now;
+                let is_back = |ix: usize| before[ix] != start[ix] && shares[ix] < 1.0;
+                assert!((0..n).any(is_back), "{shares:?}");
+                for ix in 0..n {
+                    if is_back(ix) {
+                        now[ix] = core::array::from_fn(|k| {
+                            start[ix][k] + shares[ix] * (end[ix][k] - start[ix][k])
+                        });
+                    }
+                }
+            }
+            n_left += usize::from((0..n).any(|ix| now[ix] != start[ix]));
+        }
+        assert!(n_contacts > 1000 && n_left > 1000, "{n_contacts} {n_left}");
+        // Numbers without heights.
+        let huge = [[0.0, 0.0, 1e308], [0.0, 0.0, -1e308], ORIGIN, ORIGIN];
+        let moved = [ORIGIN, huge[1], ORIGIN, ORIGIN];
+        let pair = ElementPair::VertexVertex;
+        let shares = shares_without_room(pair, [&huge, &moved, &moved], 0.0);
+        assert_eq!(shares[..2], [0.0, 1.0]);
     }
 }
