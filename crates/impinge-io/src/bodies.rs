@@ -7,8 +7,8 @@ use crate::mesh::{Elements, Mesh, Positions};
 /// A body of a file, and the name that the file gives it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NamedMesh {
-    /// The name of a node, an object or a group. `None` if the mesh is all that the file has, and the
-    /// file gives it no name.
+    /// The name of a node, an object or a group. `None` if the mesh is all that the file has, and
+    /// the file gives it no name.
     pub name: Option<String>,
     /// Its primitives in the order of the file, and the vertices that they name.
     pub mesh: Mesh,

@@ -166,7 +166,8 @@ pub fn read(py: Python<'_>, path: PathBuf, weld: bool) -> PyResult<Mesh> {
 /// Returns
 /// -------
 /// list of Mesh
-///     With the names of nodes or groups, or the path where the only body has no name, in the order of the file. Rows of ``faces`` are numbered within each body.
+///     With the names of nodes or groups, or the path where the only body has no name, in the order of the file.
+///     Rows of ``faces`` are numbered within each body.
 ///
 /// Raises
 /// ------

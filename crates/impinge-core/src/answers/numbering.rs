@@ -32,7 +32,8 @@ impl Numbering {
         self.parts.iter().map(|&(_, part)| part)
     }
 
-    /// Refuses to compare an answer with an older one, given the pairs of the old one and of the new.
+    /// Refuses to compare an answer with an older one, given the pairs of the old one and of the
+    /// new.
     ///
     /// # Errors
     /// The older one is about another scene, or both name elements whose numbers have changed.

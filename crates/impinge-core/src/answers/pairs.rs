@@ -277,8 +277,8 @@ impl Pairs {
     /// slot differ.
     ///
     /// # Errors
-    /// The older answer is about another scene, which is no clone. Or a body was re-meshed since, and
-    /// both answers have pairs of it.
+    /// The older answer is about another scene, which is no clone. Or a body was re-meshed since,
+    /// and both answers have pairs of it.
     pub fn changes(&self, old: &Pairs) -> Result<Changes, Error> {
         self.check_comparable(old)?;
         Ok(Changes::between(old.iter(), self.iter()))

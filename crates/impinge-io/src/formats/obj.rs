@@ -3,9 +3,10 @@
 //!
 //! Source: Wavefront, "Advanced Visualizer" manual, appendix B1. A file is read as one body, its
 //! groups in their order, or as a body per object; per group if there are no objects, which often
-//! have groups of one material each. Faces before the first of these are a body, too. A face may name vertices that come later (positive indices);
-//! negative ones count back from the last vertex so far. Faces of one or two corners, which some
-//! programs write for points and segments, are counted and skipped.
+//! have groups of one material each. Faces before the first of these are a body, too. A face may
+//! name vertices that come later (positive indices); negative ones count back from the last vertex
+//! so far. Faces of one or two corners, which some programs write for points and segments, are
+//! counted and skipped.
 
 use std::borrow::Cow;
 
