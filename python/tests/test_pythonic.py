@@ -503,7 +503,9 @@ def test_changes_between_frames():
         before[2].changes(before[1])
     with pytest.raises(TypeError, match="^old: NoneType given, Impacts needed$"):
         before[1].changes(None)
-    for answer, other in zip(ask(), (detector.detect(pickled := pickle.loads(pickle.dumps(scene))), detector.impacts(pickled), detector.near(pickled, 0.1))):
+    pickled = pickle.loads(pickle.dumps(scene))
+    others = detector.detect(pickled), detector.impacts(pickled), detector.near(pickled, 0.1)
+    for answer, other in zip(ask(), others):
         with pytest.raises(ValueError, match="^old: an answer about another scene given"):
             answer.changes(other)
     scene.remesh(body, at, np.arange(900).reshape(-1, 3))
