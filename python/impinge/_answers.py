@@ -181,7 +181,7 @@ class Changes(NamedTuple):
     gone: npt.NDArray[np.int64]
 
 
-def _older(old: Any, needed: type) -> Any:
+def _older(old: Any, needed: type[Any]) -> Any:
     """What an older answer is made of; refuses one to another question."""
     if isinstance(old, needed):
         return old._inner

@@ -172,8 +172,8 @@ class CollisionMesh:
         ]
         self._parts = [part for part in parts if len(part[1])]
         # One body of all of them: edges and points are degenerate triangles.
-        rows = [self._faces, self._loose[:, [0, 1, 1]], np.stack([self._points] * 3, axis=1)]
-        self._as_faces = np.concatenate(rows)
+        loose, points = self._loose[:, [0, 1, 1]], np.stack([self._points] * 3, axis=1)
+        self._as_faces = np.concatenate([self._faces, loose, points])
         # Elements of two bodies that name one vertex touch there at all times: they do not count.
         self._is_mixed = bool(np.isin(self._loose, self._faces).any())
 
