@@ -353,10 +353,9 @@ class _Held:
         label_of: npt.NDArray[np.int64] | None,
         may: Callable[[int, int], bool] | None,
     ) -> bool:
-        """Whether any elements intersect that may collide, in more than the vertices that they share."""
-        if self._has_faces_only:
-            scene = self.place(vertices)
-        else:
+        """Whether any elements intersect that may collide, in more than the vertices that they share. They are placed there."""
+        scene = self.scene
+        if not self._has_faces_only:
             scene = self._whole
             if len(scene) == 0:
                 scene.add(vertices, self._as_faces)
@@ -511,9 +510,9 @@ def is_step_collision_free(
     start, end, distance = _step(ours, vertices_t0, vertices_t1, min_distance)
     held = ours._held()
     allowed = _allowed(ours, mesh, labels)
+    scene = held.place(start, end)
     if held.intersect(start, *allowed):
         return False
-    scene = held.place(start, end)
     return held.detector._is_free(
         scene, {"separation": distance, "_filter": ours._filter(*allowed)}
     )
@@ -618,8 +617,10 @@ def has_intersections(
         As `is_step_collision_free`.
     """
     ours = _served(mesh)
+    held = ours._held()
     at = _positions(ours, vertices, "vertices")
-    return ours._held().intersect(at, *_allowed(ours, mesh, labels))
+    held.place(at)
+    return held.intersect(at, *_allowed(ours, mesh, labels))
 
 
 def _allowed(
