@@ -217,7 +217,7 @@ pub fn distance_below(a: &[Point], b: &[Point]) -> f64 {
 /// thickness of both, and below that by at most 2^-20 of it, or by 2^-1045; 0 if and only if they
 /// touch, or are at most as far apart as they are thick, or farther by less than that.
 ///
-/// The thickness is an exact sum of two numbers. As in [`distance_below`], a bound in `f64` does
+/// The thickness is an exact sum of two numbers. As in `distance_below`, a bound in `f64` does
 /// for most pairs, and the distance rounded down for others; exact comparisons for those that are
 /// left.
 pub fn gap_below(a: &[Point], b: &[Point], thickness: [f64; 2]) -> f64 {
