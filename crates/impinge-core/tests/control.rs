@@ -219,7 +219,7 @@ const ALL: [(&str, Ask); 25] = [
 ];
 
 /// Methods of the detector that ask nothing, or what is asked above in another way.
-const NO_QUESTIONS: [&str; 14] = [
+const NO_QUESTIONS: [&str; 16] = [
     "new",
     "open",
     "with_damage",
@@ -231,6 +231,8 @@ const NO_QUESTIONS: [&str; 14] = [
     "set_control",
     // On a device.
     "gpu",
+    "gpu_name",
+    "waits_for_gpu",
     "bytes_on_device",
     "trace",
     "recording",
