@@ -87,13 +87,22 @@ pub fn asked((between, within): (bool, bool), args: &AskArgs) -> Asked {
 
 /// The query without the pairs of bodies that `--exclude` names, and those of `--exclude-rings`.
 pub fn query(asked: Asked, excluded: &ExcludeArgs, bodies: &[BodyId]) -> Result<Query, Error> {
-    let body = |number| body("--exclude", bodies, number);
     let query = asked.query(bodies)?;
     let query = match excluded.rings {
         Some(n) => query.exclude(Exclusion::rings(n)),
         None => query,
     };
-    excluded.bodies.iter().try_fold(query, |query, &(a, b)| {
+    without(query, &excluded.bodies, bodies)
+}
+
+/// The query without the pairs of bodies that `--exclude` names.
+pub fn without(
+    query: Query,
+    excluded: &[(usize, usize)],
+    bodies: &[BodyId],
+) -> Result<Query, Error> {
+    let body = |number| body("--exclude", bodies, number);
+    excluded.iter().try_fold(query, |query, &(a, b)| {
         Ok(query.exclude((body(a)?, body(b)?)))
     })
 }

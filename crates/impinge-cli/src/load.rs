@@ -266,9 +266,7 @@ impl Bodies {
         let (file, (meshes, summary)) = self.read_one(path, format, true, loading)?;
         // Notes on the file name it, not one of its parts.
         tell(&file, &summary.notes());
-        let has_parts = meshes.len() > 1;
-        for NamedMesh { name, mesh } in meshes {
-            let name = part_name(&file, name.filter(|_| has_parts), several);
+        for (name, mesh) in named_parts(&file, meshes, several) {
             self.add_mesh(name, format, mesh, loading)?;
         }
         Ok(file)
@@ -360,14 +358,22 @@ impl Bodies {
     }
 }
 
-/// The name of a part of a file; it begins with that of the file if there are `several` files. A
-/// file of one part is called by its own name: give none.
-pub fn part_name(file: &str, part: Option<String>, several: bool) -> String {
-    match part {
-        None => file.to_owned(),
-        Some(part) if several => format!("{file}#{part}"),
-        Some(part) => part,
-    }
+/// The parts of a file with their names, which begin with that of the file if there are `several`
+/// files. A file of one part is called by its own name.
+pub fn named_parts(
+    file: &str,
+    parts: Vec<NamedMesh>,
+    several: bool,
+) -> impl Iterator<Item = (String, Mesh)> {
+    let has_parts = parts.len() > 1;
+    parts.into_iter().map(move |NamedMesh { name, mesh }| {
+        let name = match name.filter(|_| has_parts) {
+            None => file.to_owned(),
+            Some(part) if several => format!("{file}#{part}"),
+            Some(part) => part,
+        };
+        (name, mesh)
+    })
 }
 
 /// What standard input is called in messages.

@@ -8,8 +8,7 @@ use impinge_io::printable;
 use serde_json::json;
 
 use crate::args::DistanceArgs;
-use crate::asked::body;
-use crate::detection::{hit, on_cpu};
+use crate::detection::{hit, on_cpu, without};
 use crate::error::Error;
 use crate::load::{Bodies, Loading};
 use crate::output::out;
@@ -29,11 +28,7 @@ pub fn distance(args: &DistanceArgs, cancel: &CancelToken) -> Result<(), Error> 
         );
         return Err(Error::Usage(text));
     }
-    let mut query = Query::between_all();
-    for &(a, b) in &args.exclude {
-        let body = |number| body("--exclude", &ids, number);
-        query = query.exclude((body(a)?, body(b)?));
-    }
+    let query = without(Query::between_all(), &args.exclude, &ids)?;
     let start = Instant::now();
     let mut detector = Detector::new(on_cpu(args.threads))?;
     detector.set_control(Control::new().cancel(cancel));
@@ -48,8 +43,7 @@ pub fn distance(args: &DistanceArgs, cancel: &CancelToken) -> Result<(), Error> 
     })?;
     let (distance, points) = (nearest.distance, nearest.points);
     let elements = [nearest.a.element, nearest.b.element];
-    let number = |body| ids.iter().position(|&id| id == body).unwrap_or(0);
-    let bodies = [nearest.a.body, nearest.b.body].map(number);
+    let bodies = [nearest.a.body, nearest.b.body].map(|body| body.index());
     // A distance that was rounded down is less than a number if and only if the true one is.
     let is_below = args.below.map(|limit| distance < limit);
     let mut to = out();

@@ -4,6 +4,7 @@ use super::Detector;
 use crate::answers::pairs::Pairs;
 use crate::contact::{Contacts, Penetration};
 use crate::query::Query;
+use crate::scene::body::are_all_pinned;
 use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
 use crate::scene::{Body, Scene};
@@ -140,7 +141,7 @@ impl Detector {
 /// Whether all vertices of any of its elements are pinned.
 fn has_pinned_element(body: &Body) -> bool {
     body.pinned().is_some_and(|pinned| {
-        let all = |corners: &[u32]| corners.iter().all(|&corner| pinned[corner as usize]);
-        (0..body.elements().len()).any(|element| all(body.elements().corners(element)))
+        let mut elements = 0..body.elements().len();
+        elements.any(|element| are_all_pinned(pinned, body.elements().corners(element)))
     })
 }

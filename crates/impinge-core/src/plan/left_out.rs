@@ -8,6 +8,7 @@ use crate::query::pair_kind::PairKind;
 use crate::query::pair_set::{PairSet, SortedKeys};
 use crate::query::{Exclusion, Query};
 use crate::scene::Scene;
+use crate::scene::body::are_all_pinned;
 use crate::scene::elements::{Part, VertexRings};
 use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
@@ -85,13 +86,11 @@ impl LeftOut {
     #[inline]
     fn has_marked(&self, [a, b]: [Cornered<'_>; 2]) -> bool {
         let of = [&self.parts[a.0.index()], &self.parts[b.0.index()]];
-        if let [Some(of_a), Some(of_b)] = of.map(|of| of.pinned.as_ref()) {
-            let is_pinned = |pinned: &[bool], corners: &[u32]| {
-                corners.iter().all(|&corner| pinned[corner as usize])
-            };
-            if is_pinned(of_a, a.1) && is_pinned(of_b, b.1) {
-                return true;
-            }
+        if let [Some(of_a), Some(of_b)] = of.map(|of| of.pinned.as_ref())
+            && are_all_pinned(of_a, a.1)
+            && are_all_pinned(of_b, b.1)
+        {
+            return true;
         }
         if let (false, [Some(of_a), Some(of_b)]) =
             (self.groups.is_empty(), of.map(|of| of.groups.as_ref()))

@@ -327,3 +327,8 @@ impl Body {
         self.checked = checked;
     }
 }
+
+/// Whether all of these vertices of a body are [pinned](Body::pinned).
+pub(crate) fn are_all_pinned(pinned: &[bool], corners: &[u32]) -> bool {
+    corners.iter().all(|&corner| pinned[corner as usize])
+}

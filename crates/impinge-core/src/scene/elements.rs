@@ -382,7 +382,7 @@ impl Topology {
         sides.sort_unstable();
         let shared = sides.chunk_by(|a, b| a.0 == b.0).filter(|shared| {
             let opposite = |ix: usize| tets[shared[ix].1 / 4][shared[ix].1 % 4];
-            shared.len() != 2 || opposite(0) == opposite(1)
+            is_boundary(shared.len(), opposite)
         });
         let mut firsts: Vec<usize> = shared.map(|shared| shared[0].1).collect();
         firsts.sort_unstable();
@@ -395,6 +395,12 @@ impl Topology {
         let found = found.into_iter().filter_map(OnceLock::get);
         self.given.bytes() + found.map(Elements::bytes).sum::<usize>()
     }
+}
+
+/// Whether a face that `n` tetrahedra have is on their boundary, by the corner opposite it of each:
+/// it is not if it lies between two different ones.
+pub(crate) fn is_boundary(n: usize, opposite: impl Fn(usize) -> u32) -> bool {
+    n != 2 || opposite(0) == opposite(1)
 }
 
 /// The elements of a body by part: as found, or with edges as the caller numbers them.

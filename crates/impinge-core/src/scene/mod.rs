@@ -1,7 +1,7 @@
 //! Bodies: topology once, positions every frame; and the numbers that name them and their elements.
 
 pub(crate) mod bodies;
-mod body;
+pub(crate) mod body;
 pub(crate) mod by_body;
 mod edges;
 pub(crate) mod elements;

@@ -13,7 +13,7 @@ use super::html::write_assembly;
 use super::relations::{matrix, said, summary};
 use super::say_wrote;
 use crate::error::Error;
-use crate::load::{part_name, tell};
+use crate::load::{named_parts, tell};
 use crate::output::out;
 use crate::text::{counted, several};
 use crate::watch::{Watch, go_on};
@@ -113,12 +113,7 @@ fn parts(path: &Path, are_several: bool) -> Result<Vec<(String, Mesh)>, Error> {
     }
     let (bodies, summary) = read_bodies(path, &options)?;
     tell(&file, &summary.notes());
-    let has_parts = bodies.len() > 1;
-    let named = bodies.into_iter().map(|body| {
-        let name = body.name.filter(|_| has_parts);
-        (part_name(&file, name, are_several), body.mesh)
-    });
-    Ok(named.collect())
+    Ok(named_parts(&file, bodies, are_several).collect())
 }
 
 /// The object that `docs/assembly.schema.json` describes.

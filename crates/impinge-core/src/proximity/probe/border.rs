@@ -4,7 +4,7 @@
 //! Cost: `O(n log n)` once per topology, one byte per tetrahedron.
 
 use crate::scene::Body;
-use crate::scene::elements::Elements;
+use crate::scene::elements::{Elements, is_boundary};
 use crate::scene::error::Error;
 use crate::search::sink::{filled, reserve};
 use crate::search::work::{Equal, Work};
@@ -51,15 +51,12 @@ impl Border {
             Ok(())
         })?;
         let faces = work.merged(runs, Equal::All, WHAT)?;
-        // As the faces of the body, which `Topology` finds: a face between two different tetrahedra
-        // is inside.
-        let opposite = |&(_, number, k): &(_, u32, u8)| tetrahedra[number as usize][usize::from(k)];
         for same in faces.chunk_by(|x, y| x.0 == y.0) {
-            if same.len() == 2 && opposite(&same[0]) != opposite(&same[1]) {
-                continue;
-            }
-            for (_, number, k) in same {
-                masks[*number as usize] |= 1 << k;
+            let opposite = |ix: usize| tetrahedra[same[ix].1 as usize][usize::from(same[ix].2)];
+            if is_boundary(same.len(), opposite) {
+                for (_, number, k) in same {
+                    masks[*number as usize] |= 1 << k;
+                }
             }
         }
         Ok(Border {
