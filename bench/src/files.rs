@@ -4,7 +4,8 @@ use std::path::Path;
 
 use impinge::Elements;
 use impinge_io::ReadOptions;
-use impinge_scenes::{Model, adversarial, data, solids, surfaces};
+use impinge_scenes::{Model, adversarial, solids, surfaces};
+use impinge_testing::data;
 
 use crate::Failure;
 use crate::problem::{Ask, Problem, models};

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use impinge_io::{Elements, Positions, ReadOptions};
-use impinge_scenes::data;
+use impinge_testing::data;
 
 use crate::{Failure, Options};
 

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use impinge::{Backend, Detector, Method, Query, Scene, Settings, SharedVertex};
 use impinge_check::{Counts, ErrorKind, Options, Problem, check_file, check_mesh};
 use impinge_io::{Elements, Mesh, Positions};
-use impinge_scenes::data::test_file;
+use impinge_testing::data::test_file;
 
 fn triangles(positions: Vec<[f64; 3]>, faces: Vec<[u32; 3]>) -> Mesh {
     Mesh {

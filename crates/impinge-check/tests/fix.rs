@@ -553,7 +553,7 @@ fn real_meshes_come_out_as_promised_and_no_border_opens() {
         "cow.off",
         "dragon.ply",
     ] {
-        let Some(path) = impinge_scenes::data::test_file(&format!("meshes/{name}")) else {
+        let Some(path) = impinge_testing::data::test_file(&format!("meshes/{name}")) else {
             continue;
         };
         let whole = impinge_io::read(&path, &impinge_io::ReadOptions::as_they_are()).unwrap();

@@ -1,7 +1,6 @@
 //! What an answer is about: its last line, and an object in JSON.
 
 use impinge::{BodyId, Query, Scene, SharedVertex};
-use serde_json::{Value, json};
 
 use crate::args::ThicknessArgs;
 use crate::error::Error;
@@ -119,18 +118,6 @@ impl Asked {
             }
             _ => "neighbours left out",
         }
-    }
-
-    /// The same as an object.
-    pub fn json(self) -> Value {
-        let mut object = json!({ "between": self.between, "self": self.within });
-        if matches!(self.question, Question::Pairs | Question::Near) {
-            object["shared_vertex"] = match self.shared_vertex {
-                SharedVertex::Resolve => "resolve".into(),
-                SharedVertex::Skip => "skip".into(),
-            };
-        }
-        object
     }
 }
 

@@ -8,9 +8,9 @@ use impinge_io::{
     Cell, Column, ELEMENTS, Holds, Polylines, write_polylines_obj, write_polylines_ply,
     write_polylines_vtu,
 };
-use serde_json::{Value, json};
 
 use crate::error::Error;
+use crate::report;
 use crate::rows;
 use crate::text::{counted, grouped};
 use crate::values::{CurvesFile, CurvesFormat, RowsFile};
@@ -191,8 +191,8 @@ pub fn summary(contacts: &Contacts, curves: &Curves) -> String {
     )
 }
 
-/// The summary as a JSON object.
-pub fn object(contacts: &Contacts, curves: &Curves) -> Value {
+/// The summary for a report.
+pub fn report(contacts: &Contacts, curves: &Curves) -> report::Contacts {
     let n = |shape: Shape| {
         contacts
             .shapes()
@@ -200,16 +200,16 @@ pub fn object(contacts: &Contacts, curves: &Curves) -> Value {
             .filter(|&&held| held == shape)
             .count()
     };
-    json!({
-        "points": contacts.points().len(),
-        "shapes": {
-            "point": n(Shape::Point),
-            "segment": n(Shape::Segment),
-            "polygon": n(Shape::Polygon),
+    report::Contacts {
+        points: contacts.points().len(),
+        shapes: report::Shapes {
+            point: n(Shape::Point),
+            segment: n(Shape::Segment),
+            polygon: n(Shape::Polygon),
         },
-        "curves": curves.len(),
-        "closed": curves.n_closed(),
-        "length": curves.total_length(),
-        "isolated": curves.isolated().len(),
-    })
+        curves: curves.len(),
+        closed: curves.n_closed(),
+        length: curves.total_length(),
+        isolated: curves.isolated().len(),
+    }
 }

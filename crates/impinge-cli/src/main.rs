@@ -11,7 +11,6 @@ mod error;
 #[cfg(any(feature = "view", test))]
 mod files;
 mod headline;
-mod json;
 mod load;
 mod meshes;
 mod one_mesh;
@@ -19,6 +18,7 @@ mod output;
 mod palette;
 mod picture;
 mod regions;
+mod report;
 mod rows;
 mod stop;
 mod text;

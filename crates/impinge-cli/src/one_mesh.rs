@@ -4,14 +4,13 @@ use std::path::Path;
 
 use impinge::{BodyId, CancelToken, Control, Detector, Scene};
 use impinge_io::Weld;
-use serde_json::Value;
 
 use crate::args::OneMeshArgs;
 use crate::asked;
 use crate::detection::on_cpu;
 use crate::error::Error;
-use crate::json;
 use crate::load::{Bodies, Loading};
+use crate::report;
 
 /// A scene of one mesh.
 pub struct OneMesh {
@@ -73,12 +72,8 @@ impl OneMesh {
     }
 
     /// What every answer says of a body.
-    pub fn json(&self) -> Result<Value, Error> {
-        Ok(json::body(
-            self.scene(),
-            self.id,
-            &self.name,
-            &self.bodies.vertices[0],
-        )?)
+    pub fn report(&self) -> Result<report::Body, Error> {
+        let (name, vertices) = (&self.name, &self.bodies.vertices[0]);
+        Ok(report::Body::new(self.scene(), self.id, name, vertices)?)
     }
 }

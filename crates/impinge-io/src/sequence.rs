@@ -1,5 +1,6 @@
 //! Sequences of positions: point caches, and meshes in numbered files.
 
+use std::ffi::OsStr;
 use std::fs::{self, File};
 use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
@@ -147,11 +148,16 @@ impl Sequence {
         }
     }
 
-    /// The frames of mesh files in the order given, with the faces of the first, or none.
+    /// The frames of mesh files, with the faces of the first, or none: in the order of their
+    /// numbers if their names differ in nothing else, as a shell gives them in another one; else in
+    /// the order given.
     ///
     /// # Errors
     /// As [`read`](crate::read), of the first file; there is none.
-    pub fn of_files(files: Vec<PathBuf>) -> Result<Self, Error> {
+    pub fn of_files(mut files: Vec<PathBuf>) -> Result<Self, Error> {
+        if are_numbered(&files) {
+            files.sort_by_cached_key(|file| file.file_name().map(key_of));
+        }
         Self::of_named(files, None)
     }
 
@@ -184,16 +190,14 @@ impl Sequence {
 
     /// Gaps in the numbers of numbered files: the files before and after each gap. A gap is a step
     /// that is larger than the smallest step between two files, so a sequence of every tenth number
-    /// has no gap. Files that were given one by one have none.
+    /// has no gap.
     pub fn gaps(&self) -> Vec<[&Path; 2]> {
-        let Frames::Files {
-            files,
-            named: Some(_),
-            ..
-        } = &self.frames
-        else {
+        let Frames::Files { files, named, .. } = &self.frames else {
             return Vec::new();
         };
+        if named.is_none() && !are_numbered(files) {
+            return Vec::new();
+        }
         let number = |path: &PathBuf| {
             let name = path.file_name()?.to_str()?;
             // The last number of the name without its extension, as in `Matcher`.
@@ -616,6 +620,22 @@ fn key_of_file(name: &str) -> Vec<(i128, String)> {
     // Less than any text that goes on.
     key.push((i128::MIN, extension.to_owned()));
     key
+}
+
+/// Whether files are in one folder, and their names differ in numbers and in nothing else.
+fn are_numbered(files: &[PathBuf]) -> bool {
+    let words = |file: &Path| -> Option<Vec<String>> {
+        let key = key_of(file.file_name()?);
+        Some(key.into_iter().map(|(_, text)| text).collect())
+    };
+    files.windows(2).all(|two| {
+        let [a, b] = [&two[0], &two[1]];
+        a != b && a.parent() == b.parent() && words(a) == words(b)
+    })
+}
+
+fn key_of(name: &OsStr) -> Vec<(i128, String)> {
+    natural_key(&name.to_string_lossy())
 }
 
 /// Splits a name into texts and numbers, so that 9 comes before 10, and -2 before -1; each entry is

@@ -155,6 +155,31 @@ fn first_coordinates(sequence: &Sequence) -> Vec<f64> {
         .collect()
 }
 
+/// A shell gives `run_100` before `run_8`.
+#[test]
+fn files_that_differ_in_numbers_are_in_their_order() {
+    let folder = tempfile::tempdir().unwrap();
+    write_frames(folder.path());
+    let of_files = |names: &[&str]| {
+        let files = names.iter().map(|name| folder.path().join(name));
+        Sequence::of_files(files.collect()).unwrap()
+    };
+    let sequence = of_files(&["run_10.obj", "run_100.obj", "run_08.obj", "run_09.obj"]);
+    assert_eq!(first_coordinates(&sequence), [8.0, 9.0, 10.0, 100.0]);
+    let names = |file: &Path| file.file_name().unwrap().to_str().unwrap().to_owned();
+    let gaps: Vec<_> = sequence.gaps().iter().map(|two| two.map(names)).collect();
+    assert_eq!(gaps, [["run_10.obj", "run_100.obj"]]);
+    // Others are in the order that was given.
+    std::fs::copy(
+        folder.path().join("run_09.obj"),
+        folder.path().join("b.obj"),
+    )
+    .unwrap();
+    let sequence = of_files(&["run_10.obj", "b.obj", "run_08.obj"]);
+    assert_eq!(first_coordinates(&sequence), [10.0, 9.0, 8.0]);
+    assert!(sequence.gaps().is_empty());
+}
+
 #[test]
 fn numbered_files_from_the_first_one_on() {
     let folder = tempfile::tempdir().unwrap();

@@ -6,7 +6,6 @@
 //! * [`deform`]: positions as functions of the rest pose and of time, written into a buffer.
 //! * [`BuiltScene`]: bodies and a query about them, ready for a detector.
 //! * [`adversarial`]: scenes that break methods which are only fast on average.
-//! * [`data`]: locations of real meshes and published answers.
 //!
 //! Everything is deterministic: random generators take a seed, and nothing reads the clock.
 //! Generators that use trigonometry may differ in the last bit between operating systems.
@@ -22,7 +21,6 @@
 
 pub mod adversarial;
 mod built;
-pub mod data;
 pub mod deform;
 mod model;
 mod random;

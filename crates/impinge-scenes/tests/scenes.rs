@@ -1,7 +1,7 @@
 //! Scenes have the structure that they promise, checked with the oracle.
 
 use impinge::{Detector, Method, Settings};
-use impinge_scenes::{BuiltScene, adversarial, data, solids, surfaces};
+use impinge_scenes::{BuiltScene, adversarial, solids, surfaces};
 
 fn n_pairs(built: &BuiltScene) -> usize {
     let mut detector =
@@ -95,12 +95,4 @@ fn tetrahedra_of_two_overlapping_balls_meet() {
     assert!(n_pairs(&built) > 500);
     let built = BuiltScene::two_body("apart", &ball, [1.1, 0.0, 0.0]).expect("valid");
     assert_eq!(n_pairs(&built), 0);
-}
-
-#[test]
-fn data_is_found_or_waived() {
-    if let Some(path) = data::test_file("expected/two_body.json") {
-        assert!(path.is_file());
-    }
-    assert_eq!(data::data_file("no/such/file"), None);
 }

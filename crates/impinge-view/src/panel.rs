@@ -442,9 +442,9 @@ pub(crate) fn bottom(ui: &mut Ui, session: &mut Session) {
                     session.play_or_pause();
                 }
                 ui.label(format!(
-                    "frame {} of {}",
+                    "frame {} (0 to {})",
                     session.stage.frame_ix(),
-                    session.n_frames()
+                    session.n_frames() - 1
                 ));
                 ui.label(format!("{} per second", session.player.speed));
                 let first = ui.button("First collision");

@@ -182,9 +182,10 @@ pub fn draw_png(
     let n_frames = content.n_frames();
     let frame = options.frame.unwrap_or(0);
     if frame >= n_frames {
-        return Err(format!(
-            "frame {frame} was requested, there are {n_frames} frames, counted from 0"
-        ));
+        return Err(match n_frames {
+            1 => format!("frame {frame} was requested, but there is one, number 0"),
+            n => format!("frame {frame} was requested, but there are {n}, counted from 0"),
+        });
     }
     let mut stage = Stage::new(content);
     stage.pose(frame)?;

@@ -65,10 +65,10 @@ impl Stage {
     /// where it was.
     pub fn place(&mut self, body: usize, matrix: Matrix) -> Result<(), String> {
         let Some(id) = self.id(body) else {
-            let n_bodies = self.content.bodies.len();
-            return Err(format!(
-                "body {body} is moved, but there are {n_bodies} bodies"
-            ));
+            return Err(match self.content.bodies.len() {
+                1 => format!("body {body} is moved, but there is one, number 0"),
+                n => format!("body {body} is moved, but there are {n}, counted from 0"),
+            });
         };
         self.content
             .scene

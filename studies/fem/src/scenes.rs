@@ -2,14 +2,15 @@
 //!
 //! The bodies are those of the paper's table 2, with other meshes of about the same size. The files
 //! are not part of the repository (`tets/*.msh` in the folder of shared data, see
-//! [`impinge_scenes::data`]). If a file is absent, a ball of about the same number of tetrahedra
+//! [`impinge_testing::data`]). If a file is absent, a ball of about the same number of tetrahedra
 //! stands in, and the scene's label says so.
 
 use std::path::Path;
 
 use impinge::Elements;
 use impinge_io::{ReadOptions, read};
-use impinge_scenes::{data, solids};
+use impinge_scenes::solids;
+use impinge_testing::data;
 
 use crate::error::Error;
 use crate::settings::{Damping, Ground, Settings};

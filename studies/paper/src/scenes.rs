@@ -5,7 +5,8 @@ use std::path::Path;
 use impinge::{BodyId, Elements, Scene};
 use impinge_io::ReadOptions;
 use impinge_scenes::deform::{Deform, Drift, Wave};
-use impinge_scenes::{Model, data, surfaces};
+use impinge_scenes::{Model, surfaces};
+use impinge_testing::data;
 
 use crate::course::Course;
 use crate::error::Error;

@@ -5,7 +5,6 @@ use std::path::PathBuf;
 
 use impinge::{BodyId, CancelToken, Control, Detector};
 use impinge_io::{Cell, ELEMENTS, printable};
-use serde_json::Value;
 
 use crate::apart::Inputs;
 use crate::args::{AnswerArgs, AskArgs, DetectorArgs, PairsArgs, WithinArgs};
@@ -17,7 +16,7 @@ use crate::picture::Drawer;
 use crate::text::counted;
 use crate::values::RowsFile;
 use crate::watch::Watch;
-use crate::{contacts, headline, json, meshes, output, regions, rows};
+use crate::{contacts, headline, meshes, output, regions, report, rows};
 
 /// `impinge pairs`.
 pub fn pairs(args: &PairsArgs, cancel: &CancelToken) -> Result<(), Error> {
@@ -113,30 +112,36 @@ fn answer(
     let named = ids.iter().copied().zip(names.iter().map(String::as_str));
     let bodies: Vec<(BodyId, &str)> = named.collect();
     if holds_no_pairs {
-        let (n_pairs, text, found) = if answer.count {
+        let (found, text) = if answer.count {
             let n = detector.count(&scene, &query)?;
             let text = match n {
                 0 => "no pairs".to_owned(),
                 n => counted(n, "pair"),
             };
-            (n, text, ("pairs", Value::from(n)))
+            ((Some(n), None), text)
         } else {
             let any = detector.any(&scene, &query)?;
             let text = if any { "at least one pair" } else { "no pairs" };
-            (u64::from(any), text.to_owned(), ("any", Value::from(any)))
+            ((None, Some(any)), text.to_owned())
         };
         drop(watch);
         if ask.json {
-            let mut object = json::without_pairs(asked, found, detector.stats());
-            json::add_unread(&mut object, &unread, &names);
-            writeln!(output::out(), "{}", Value::Object(object))?;
+            let stats = detector.stats();
+            report::print(&report::Count {
+                pairs: found.0,
+                any: found.1,
+                asked: report::Asked::new(asked),
+                how: report::How::new(stats, report::Total::new(stats.total_ms)),
+                unread: report::Unread::all(&unread, &names),
+            })?;
         } else {
             let mut line = Vec::new();
             headline::write_count(&mut line, (&scene, &nouns), &bodies, &text)?;
             writeln!(line, "{}", asked.line(&read, &nouns))?;
             output::out().write_all(&line)?;
         }
-        return end(ask, n_pairs > 0, &unread, paths.len());
+        let is_found = found.0 > Some(0) || found.1 == Some(true);
+        return end(ask, is_found, &unread, paths.len());
     }
     let n_frames = answer.repeat.get();
     let (pairs, times) = repeat(&mut detector, &mut scene, &query, n_frames)?;
@@ -179,12 +184,14 @@ fn answer(
     let regions = regions::regions(&scene, &bodies, pairs)?;
     let regions = regions.as_deref();
     if ask.json {
-        let mut object = json::answer((asked, &scene), &bodies, &vertices, pairs, regions, &times)?;
-        if let Some((found, curves)) = &met {
-            object.insert("contacts".into(), contacts::object(found, curves));
-        }
-        json::add_unread(&mut object, &unread, &names);
-        writeln!(output::out(), "{}", Value::Object(object))?;
+        let asked = (asked, &scene);
+        let found = report::Pairs::new(asked, &bodies, &vertices, pairs, regions, &times)?;
+        let met = met.as_ref();
+        report::print(&report::Pairs {
+            contacts: met.map(|(found, curves)| contacts::report(found, curves)),
+            unread: report::Unread::all(&unread, &names),
+            ..found
+        })?;
     } else {
         let mut text = Vec::new();
         headline::write(&mut text, (&scene, &nouns), &bodies, pairs, regions)?;

@@ -4,18 +4,17 @@ use std::io::Write;
 
 use impinge::{CancelToken, Hit, Hits, Query, RayHit};
 use impinge_io::{Cell, Column, Holds, ReadOptions, printable, read_rows};
-use serde_json::{Map, Value, json};
 
 use crate::apart::Inputs;
 use crate::args::CastArgs;
 use crate::detection::hit;
 use crate::error::Error;
 use crate::one_mesh::OneMesh;
-use crate::output::{how_alone, out, say};
+use crate::output::{how_alone, say};
 use crate::text::{counted, grouped, hex};
 use crate::values::RowsFile;
 use crate::watch::go_on;
-use crate::{json, rows};
+use crate::{report, rows};
 
 /// `impinge cast`.
 pub fn cast(args: &CastArgs, cancel: &CancelToken) -> Result<(), Error> {
@@ -44,8 +43,7 @@ pub fn cast(args: &CastArgs, cancel: &CancelToken) -> Result<(), Error> {
         answer.write_rows(file)?;
     }
     if args.how.json {
-        let object = Value::Object(answer.object()?);
-        writeln!(out(), "{object}")?;
+        report::print(&answer.report()?)?;
     } else {
         let mut text = Vec::new();
         answer.print(&mut text)?;
@@ -106,25 +104,26 @@ impl Answer<'_> {
         rows::write(file, columns, self.hits.iter().len(), found)
     }
 
-    /// The object that `docs/cast.schema.json` describes.
-    fn object(&self) -> Result<Map<String, Value>, Error> {
-        let n_hits = (self.args.hits != Hit::Any).then(|| self.hits.iter().len());
-        let nearest = self
-            .nearest()
-            .map(|(ray, hit)| json!({ "ray": ray, "element": hit.element.element, "t": hit.t }));
-        let asked = json!({ "hits": self.args.hits.name(), "most": self.args.most });
-        let mut object = Map::new();
-        object.insert("asked".into(), asked);
-        object.insert("rays".into(), self.hits.len().into());
-        object.insert("hit".into(), self.n_hit().into());
-        object.insert("hits".into(), n_hits.into());
-        object.insert("nearest".into(), nearest.into());
-        object.insert("hash".into(), hex(self.hits.hash()).into());
-        object.insert("bodies".into(), json!([self.mesh.json()?]));
+    fn report(&self) -> Result<report::Cast, Error> {
+        let nearest = self.nearest().map(|(ray, hit)| report::NearestHit {
+            ray,
+            element: hit.element.element,
+            t: hit.t,
+        });
         let stats = self.hits.stats();
-        let ms = json!({ "total": json::rounded(stats.total_ms) });
-        json::add_how(&mut object, stats, ms);
-        Ok(object)
+        Ok(report::Cast {
+            asked: report::AskedOfRays {
+                hits: self.args.hits.name(),
+                most: self.args.most,
+            },
+            rays: self.hits.len(),
+            hit: self.n_hit(),
+            hits: (self.args.hits != Hit::Any).then(|| self.hits.iter().len()),
+            nearest,
+            hash: hex(self.hits.hash()),
+            bodies: [self.mesh.report()?],
+            how: report::How::new(stats, report::Total::new(stats.total_ms)),
+        })
     }
 
     /// The answer in the first line, then the nearest hit.

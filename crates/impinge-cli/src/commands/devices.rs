@@ -2,31 +2,24 @@
 
 use std::io::Write;
 
-use serde_json::json;
-
 use crate::args::DevicesArgs;
 use crate::error::Error;
 use crate::output::{out, table};
+use crate::report;
 use crate::text::shown_bytes;
 
 /// Lists adapters, hardware first.
 pub fn devices(args: &DevicesArgs) -> Result<(), Error> {
     let devices = impinge::devices();
     if args.json {
-        let list: Vec<_> = devices
-            .iter()
-            .map(|device| {
-                json!({
-                    "name": device.name,
-                    "interface": device.interface,
-                    "driver": device.driver,
-                    "is_software": device.is_software,
-                    "max_binding": device.max_binding,
-                })
-            })
-            .collect();
-        writeln!(out(), "{}", serde_json::Value::from(list)).map_err(Error::Output)?;
-        return Ok(());
+        let list = devices.into_iter().map(|device| report::Device {
+            name: device.name,
+            interface: device.interface,
+            driver: device.driver,
+            is_software: device.is_software,
+            max_binding: device.max_binding,
+        });
+        return report::print(&report::Devices(list.collect())).map_err(Error::Output);
     }
     if devices.is_empty() {
         writeln!(out(), "no GPU and no software driver").map_err(Error::Output)?;

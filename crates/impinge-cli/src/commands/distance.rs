@@ -5,13 +5,13 @@ use std::time::Instant;
 
 use impinge::{CancelToken, Control, Detector, Query};
 use impinge_io::printable;
-use serde_json::json;
 
 use crate::args::DistanceArgs;
 use crate::detection::{hit, on_cpu, without};
 use crate::error::Error;
 use crate::load::{Bodies, Loading};
 use crate::output::out;
+use crate::report;
 
 /// `impinge distance`.
 pub fn distance(args: &DistanceArgs, cancel: &CancelToken) -> Result<(), Error> {
@@ -46,20 +46,19 @@ pub fn distance(args: &DistanceArgs, cancel: &CancelToken) -> Result<(), Error> 
     let bodies = [nearest.a.body, nearest.b.body].map(|body| body.index());
     // A distance that was rounded down is less than a number if and only if the true one is.
     let is_below = args.below.map(|limit| distance < limit);
-    let mut to = out();
     if args.json {
-        let object = json!({
-            "distance": distance,
-            "below": is_below,
-            "bodies": bodies,
-            "names": bodies.map(|body| names[body].as_str()),
-            "elements": elements,
-            "points": points,
-            "ms": ms,
-        });
-        writeln!(to, "{object}")?;
+        report::print(&report::Distance {
+            distance,
+            below: is_below,
+            bodies,
+            names: bodies.map(|body| names[body].clone()),
+            elements,
+            points,
+            ms,
+        })?;
         return hit(true, is_below == Some(true));
     }
+    let mut to = out();
     let than = match (args.below, is_below) {
         (Some(limit), Some(true)) => format!(", less than {limit}"),
         (Some(limit), _) => format!(", not less than {limit}"),

@@ -3,7 +3,6 @@
 use std::io::Write;
 
 use impinge::{BodyId, CancelToken, NearPair, NearPairs, PairKind};
-use serde_json::{Map, Value};
 
 use crate::apart::Inputs;
 use crate::args::NearArgs;
@@ -12,11 +11,11 @@ use crate::colors::{self, Ramp};
 use crate::detection::{Times, asked, detector, hit, of_kinds, query};
 use crate::error::Error;
 use crate::load::{Bodies, Loading};
-use crate::output::{out, say, stage_table};
+use crate::output::{say, stage_table};
 use crate::picture::Drawer;
 use crate::text::{self, counted, hex};
 use crate::watch::Watch;
-use crate::{headline, json, output, rows};
+use crate::{headline, output, report, rows};
 
 /// `impinge near`.
 pub fn near(args: &NearArgs, cancel: &CancelToken) -> Result<(), Error> {
@@ -68,8 +67,7 @@ pub fn near(args: &NearArgs, cancel: &CancelToken) -> Result<(), Error> {
         colors::write(file, &bodies.scene, &named, color)?;
     }
     if ask.json {
-        let object = Value::Object(answer(args, asked, &bodies, near, intersects)?);
-        writeln!(out(), "{object}")?;
+        report::print(&answer(args, asked, &bodies, near, intersects)?)?;
     } else {
         let mut text = Vec::new();
         print(&mut text, args, &bodies, near, intersects)?;
@@ -95,14 +93,13 @@ fn numbered(pair: &NearPair, most: f64) -> colors::Found {
     (pair.kind, [pair.a, pair.b], share)
 }
 
-/// The object that `docs/near.schema.json` describes.
 fn answer(
     args: &NearArgs,
     asked: Asked,
     bodies: &Bodies,
     near: &NearPairs,
     intersects: bool,
-) -> Result<Map<String, Value>, Error> {
+) -> Result<report::Near, Error> {
     let Bodies {
         scene,
         ids,
@@ -110,20 +107,19 @@ fn answer(
         vertices,
         ..
     } = bodies;
-    let described: Vec<Value> = (0..ids.len())
-        .map(|ix| json::body(scene, ids[ix], &names[ix], &vertices[ix]))
-        .collect::<Result<_, _>>()?;
+    let described =
+        (0..ids.len()).map(|ix| report::Body::new(scene, ids[ix], &names[ix], &vertices[ix]));
     let times = Times::default().and(near.stats());
-    let mut object = Map::new();
-    object.insert("distance".into(), args.distance.into());
-    object.insert("asked".into(), asked.json());
-    object.insert("pairs".into(), near.len().into());
-    object.insert("kinds".into(), json::kinds(counts(near)));
-    object.insert("intersects".into(), intersects.into());
-    object.insert("hash".into(), hex(near.hash()).into());
-    object.insert("bodies".into(), described.into());
-    json::add_how(&mut object, near.stats(), json::ms(&times));
-    Ok(object)
+    Ok(report::Near {
+        distance: args.distance,
+        asked: report::Asked::new(asked),
+        pairs: near.len(),
+        kinds: report::Kinds::new(|kind| near.of(kind).len() as u64),
+        intersects,
+        hash: hex(near.hash()),
+        bodies: described.collect::<Result<_, _>>()?,
+        how: report::How::new(near.stats(), report::Stages::new(&times)),
+    })
 }
 
 fn counts(near: &NearPairs) -> [(PairKind, u64); PairKind::ALL.len()] {

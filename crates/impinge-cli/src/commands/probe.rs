@@ -5,18 +5,17 @@ use std::io::Write;
 
 use impinge::{CancelToken, Closest, ClosestElement, Query};
 use impinge_io::{Cell, Column, Holds, ReadOptions, printable, read_points};
-use serde_json::{Map, Value, json};
 
 use crate::apart::Inputs;
 use crate::args::ProbeArgs;
 use crate::detection::Times;
 use crate::error::Error;
 use crate::one_mesh::OneMesh;
-use crate::output::{how_alone, out, say};
+use crate::output::{how_alone, say};
 use crate::text::{counted, grouped, hex};
 use crate::values::RowsFile;
 use crate::watch::go_on;
-use crate::{json, rows};
+use crate::{report, rows};
 
 /// `impinge probe`.
 pub fn probe(args: &ProbeArgs, cancel: &CancelToken) -> Result<(), Error> {
@@ -66,8 +65,7 @@ pub fn probe(args: &ProbeArgs, cancel: &CancelToken) -> Result<(), Error> {
         answer.write_rows(file)?;
     }
     if args.how.json {
-        let object = Value::Object(answer.object()?);
-        writeln!(out(), "{object}")?;
+        report::print(&answer.report()?)?;
         return Ok(());
     }
     let mut text = Vec::new();
@@ -172,43 +170,41 @@ impl Answer<'_> {
         rows::write(file, columns, n, self.all_found().map(row))
     }
 
-    /// The object that `docs/probe.schema.json` describes.
-    fn object(&self) -> Result<Map<String, Value>, Error> {
-        let at = |(point, found): (usize, ClosestElement)| {
-            json!({
-                "point": point,
-                "element": found.element.element,
-                "distance": found.distance,
-                "nearest": found.point,
-            })
+    fn report(&self) -> Result<report::Probe, Error> {
+        let at = |(point, found): (usize, ClosestElement)| report::NearestPoint {
+            point,
+            element: found.element.element,
+            distance: found.distance,
+            nearest: found.point,
         };
-        let [nearest, farthest] = match self.extremes() {
-            Some(both) => both.map(at),
-            None => [Value::Null, Value::Null],
-        };
-        let places = self
-            .counts()
-            .map(|[inside, on, outside]| json!({ "inside": inside, "on": on, "outside": outside }));
-        let mut object = Map::new();
-        let asked = json!({
-            "signed": self.args.signed,
-            "locate": self.args.locate,
-            "nearest": self.args.nearest.get(),
-            "most": self.args.most,
-        });
-        object.insert("asked".into(), asked);
-        object.insert("points".into(), self.closest.len().into());
-        object.insert("near".into(), self.found().count().into());
-        object.insert("found".into(), self.all_found().count().into());
-        object.insert("places".into(), places.into());
-        object.insert("located".into(), self.n_located().into());
-        object.insert("nearest".into(), nearest);
-        object.insert("farthest".into(), farthest);
-        object.insert("hash".into(), hex(self.closest.hash()).into());
-        object.insert("bodies".into(), json!([self.mesh.json()?]));
-        let ms = json!({ "total": json::rounded(self.ms) });
-        json::add_how(&mut object, self.closest.stats(), ms);
-        Ok(object)
+        let (nearest, farthest) = self
+            .extremes()
+            .map(|both| both.map(at))
+            .map_or((None, None), |[nearest, farthest]| {
+                (Some(nearest), Some(farthest))
+            });
+        Ok(report::Probe {
+            asked: report::AskedOfPoints {
+                signed: self.args.signed,
+                locate: self.args.locate,
+                nearest: self.args.nearest.get(),
+                most: self.args.most,
+            },
+            points: self.closest.len(),
+            near: self.found().count(),
+            found: self.all_found().count(),
+            places: self.counts().map(|[inside, on, outside]| report::Places {
+                inside,
+                on,
+                outside,
+            }),
+            located: self.n_located(),
+            nearest,
+            farthest,
+            hash: hex(self.closest.hash()),
+            bodies: [self.mesh.report()?],
+            how: report::How::new(self.closest.stats(), report::Total::new(self.ms)),
+        })
     }
 
     /// The answer in the first line, then where points lie.

@@ -4,7 +4,6 @@ use std::io::Write;
 
 use impinge::{BodyId, CancelToken};
 use impinge_io::printable;
-use serde_json::Value;
 
 use crate::apart::Inputs;
 use crate::args::RenderArgs;
@@ -14,7 +13,7 @@ use crate::load::{Bodies, Loading};
 use crate::output::{out, print_details};
 use crate::picture::Drawer;
 use crate::watch::Watch;
-use crate::{headline, json, regions};
+use crate::{headline, regions, report};
 
 /// Draws meshes, and prints what collides.
 pub fn render(args: &RenderArgs, cancel: &CancelToken) -> Result<(), Error> {
@@ -51,8 +50,9 @@ pub fn render(args: &RenderArgs, cancel: &CancelToken) -> Result<(), Error> {
     let regions = regions::regions(&scene, &bodies, pairs)?;
     let regions = regions.as_deref();
     if args.ask.json {
-        let answer = json::answer((asked, &scene), &bodies, &vertices, pairs, regions, &times)?;
-        writeln!(out(), "{}", Value::Object(answer))?;
+        let asked = (asked, &scene);
+        let found = report::Pairs::new(asked, &bodies, &vertices, pairs, regions, &times)?;
+        report::print(&found)?;
     } else {
         let mut to = out();
         headline::write(&mut to, (&scene, &nouns), &bodies, pairs, regions)?;

@@ -4,7 +4,6 @@ use std::io::Write;
 
 use impinge::{BodyId, Bounds, CancelToken, SafeDistances};
 use impinge_io::{Cell, Column, Holds, printable};
-use serde_json::{Map, Value, json};
 
 use crate::apart::Inputs;
 use crate::args::SafeArgs;
@@ -12,11 +11,11 @@ use crate::asked::{Asked, Question, body, thicken};
 use crate::detection::{Times, asked, detector, hit, query};
 use crate::error::Error;
 use crate::load::{Bodies, Loading};
-use crate::output::{out, say, stage_table};
+use crate::output::{say, stage_table};
 use crate::picture::Drawer;
 use crate::text::{counted, grouped};
 use crate::watch::Watch;
-use crate::{colors, headline, json, output, palette, rows};
+use crate::{colors, headline, output, palette, report, rows};
 
 /// `impinge safe`.
 pub fn safe(args: &SafeArgs, cancel: &CancelToken) -> Result<(), Error> {
@@ -86,7 +85,7 @@ pub fn safe(args: &SafeArgs, cancel: &CancelToken) -> Result<(), Error> {
         Drawer::new(&args.shown.picture, device, 1)?.draw(&png.0, surfaces)?;
     }
     if ask.json {
-        writeln!(out(), "{}", Value::Object(answer.object()?))?;
+        report::print(&answer.report()?)?;
     } else {
         let mut text = Vec::new();
         answer.print(&mut text)?;
@@ -151,8 +150,7 @@ impl Answer<'_> {
             .count()
     }
 
-    /// The object that `docs/safe.schema.json` describes.
-    fn object(&self) -> Result<Map<String, Value>, Error> {
+    fn report(&self) -> Result<report::Safe, Error> {
         let Bodies {
             scene,
             ids,
@@ -161,29 +159,28 @@ impl Answer<'_> {
             ..
         } = self.bodies;
         let described = |ix: usize| {
-            let mut object = json::body(scene, ids[ix], &names[ix], &vertices[ix])?;
-            object["fixed"] = self.args.fixed.contains(&ix).into();
-            Ok(object)
+            Ok(report::FixedBody {
+                body: report::Body::new(scene, ids[ix], &names[ix], &vertices[ix])?,
+                fixed: self.args.fixed.contains(&ix),
+            })
         };
-        let described: Vec<Value> = (0..ids.len())
-            .map(described)
-            .collect::<Result<_, Error>>()?;
+        let described = (0..ids.len()).map(described);
         let smallest = self.smallest();
-        let smallest = smallest
-            .map(|(body, vertex, safe)| json!({ "body": body, "vertex": vertex, "safe": safe }));
+        let smallest =
+            smallest.map(|(body, vertex, safe)| report::SafeVertex { body, vertex, safe });
         let stats = self.safe.stats();
         let times = Times::default().and(stats);
-        let mut object = Map::new();
-        object.insert("most".into(), self.args.most.into());
-        object.insert("asked".into(), self.asked.json());
-        object.insert("vertices".into(), self.moving().count().into());
-        object.insert("bounded".into(), self.n_bounded().into());
-        object.insert("smallest".into(), json!(smallest));
-        object.insert("touching".into(), self.safe.touching().len().into());
-        object.insert("intersects".into(), self.intersects.into());
-        object.insert("bodies".into(), described.into());
-        json::add_how(&mut object, stats, json::ms(&times));
-        Ok(object)
+        Ok(report::Safe {
+            most: self.args.most,
+            asked: report::Asked::new(self.asked),
+            vertices: self.moving().count(),
+            bounded: self.n_bounded(),
+            smallest,
+            touching: self.safe.touching().len(),
+            intersects: self.intersects,
+            bodies: described.collect::<Result<_, Error>>()?,
+            how: report::How::new(stats, report::Stages::new(&times)),
+        })
     }
 
     /// The answer in the first line, then what touches.

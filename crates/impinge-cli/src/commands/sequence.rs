@@ -5,7 +5,6 @@ use std::path::Path;
 
 use impinge::{BodyId, CancelToken, Control, Pairs, Precision, Scene};
 use impinge_io::{Cell, ELEMENTS, Sequence, Weld, impact_columns, printable};
-use serde_json::{Map, Value};
 
 use super::step::{self, Frames as _, Shown, steps_of_sequence};
 use crate::apart::Inputs;
@@ -20,7 +19,7 @@ use crate::rows::{self, Rows};
 use crate::text::{counted, grouped, hash};
 use crate::values::RowsFile;
 use crate::watch::{Watch, go_on};
-use crate::{json, meshes, output, regions};
+use crate::{meshes, output, regions, report};
 
 /// `impinge sequence`.
 pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> {
@@ -137,13 +136,12 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
             times.add(pairs.stats());
             let regions = regions::regions(&scene, &bodies, pairs)?;
             let regions = regions.as_deref();
-            let mut line = Map::new();
-            frames.name_in(&mut line, frame_ix);
-            let answer = json::answer((asked, &scene), &bodies, &vertices, pairs, regions, &times)?;
-            line.extend(answer);
-            let mut to = out();
-            writeln!(to, "{}", Value::Object(line))?;
-            to.flush()?;
+            let asked = (asked, &scene);
+            let found = report::Pairs::new(asked, &bodies, &vertices, pairs, regions, &times)?;
+            report::print(&report::Pairs {
+                frame: Some(frames.named(frame_ix)),
+                ..found
+            })?;
         } else if prints {
             lines.frame(frame_ix, &bodies, pairs)?;
         }
@@ -358,10 +356,10 @@ impl step::Frames for Frames {
         }
         self.n_passed_over += 1;
         if self.json {
-            let mut line = Map::new();
-            self.name_in(&mut line, frame_ix);
-            line.insert("error".into(), error.line().into());
-            writeln!(out(), "{}", Value::Object(line))?;
+            report::print(&report::FrameError {
+                frame: self.named(frame_ix),
+                error: error.line(),
+            })?;
         } else {
             // A line that nobody can read does no harm.
             let _ = writeln!(
@@ -373,11 +371,11 @@ impl step::Frames for Frames {
         Ok(())
     }
 
-    fn name_in(&self, line: &mut Map<String, Value>, frame_ix: usize) {
-        line.insert("frame".into(), frame_ix.into());
-        if self.has_files() {
-            let file = self.sequence.files()[frame_ix].display().to_string();
-            line.insert("file".into(), file.into());
+    fn named(&self, frame_ix: usize) -> report::Frame {
+        let file = || self.sequence.files()[frame_ix].display().to_string();
+        report::Frame {
+            frame: frame_ix,
+            file: self.has_files().then(file),
         }
     }
 }

@@ -10,7 +10,6 @@ use std::io::Write;
 
 use impinge::{BodyId, CancelToken, Precision, SharedVertex};
 use impinge_io::impact_columns;
-use serde_json::Value;
 
 use crate::apart::Inputs;
 use crate::args::StepArgs;
@@ -19,14 +18,13 @@ use crate::colors::{self, Ramp};
 use crate::detection::{Times, detector, query};
 use crate::error::Error;
 use crate::load::Nouns;
-use crate::output::{out, say};
+use crate::output::say;
 use crate::picture::Drawer;
-use crate::rows;
 use crate::values::RowsFile;
 use crate::watch::Watch;
+use crate::{report, rows};
 
 use answer::Found;
-pub use answer::impact_row;
 pub use frames::{Frames, Shown, steps_of_sequence};
 use load::Moving;
 
@@ -54,8 +52,7 @@ pub fn step(args: &StepArgs, cancel: &CancelToken) -> Result<(), Error> {
         let written = candidates::write(file, (&mut detector, &bodies), of_boxes)?;
         drop(watch);
         if args.json {
-            let object = written.json(&bodies, args.inflation, asked)?;
-            writeln!(out(), "{object}")?;
+            report::print(&written.report(&bodies, args.inflation, asked)?)?;
             return Ok(());
         }
         let mut text = Vec::new();
@@ -164,9 +161,7 @@ fn print(
     rows: Option<&RowsFile>,
 ) -> Result<(), Error> {
     if args.json {
-        let mut object = found.json(bodies, &args.how)?;
-        object.insert("asked".into(), asked.json());
-        writeln!(out(), "{}", Value::Object(object))?;
+        report::print(&found.report(bodies, &args.how, asked)?)?;
         return Ok(());
     }
     let mut text = Vec::new();

@@ -7,15 +7,16 @@ use std::io::Write;
 use impinge::{Backend, CancelToken, Control, Settings};
 use impinge_io::printable;
 use impinge_tiles::{Ask, MergedStep, Plan, PlanOptions, RunOptions, ScatterOptions, TileResult};
-use serde_json::{Value, json};
+use serde::Serialize;
 
 use self::args::{MergeArgs, PlanArgs, RunArgs, ScatterArgs, TilesCommand};
 pub use self::args::{TILES_EXAMPLES, TilesArgs};
-use super::step::impact_row;
 use crate::error::Error;
-use crate::json;
 use crate::output::out;
-use crate::text::{counted, grouped, several};
+use crate::report::{
+    self, Impact, KindsOfTiles, TilesMerge, TilesPlan, TilesRun, TilesScatter, TilesStep,
+};
+use crate::text::{counted, grouped, hex, several};
 use crate::watch::Watch;
 
 /// `impinge tiles`.
@@ -28,17 +29,13 @@ pub fn tiles(args: &TilesArgs, cancel: &CancelToken) -> Result<(), Error> {
     }
 }
 
-fn print(json: bool, object: &Value, text: &str) -> Result<(), Error> {
+fn print(json: bool, report: &impl Serialize, text: &str) -> Result<(), Error> {
     if json {
-        writeln!(out(), "{object}")?;
+        report::print(report)?;
     } else {
         writeln!(out(), "{text}")?;
     }
     Ok(())
-}
-
-fn hex(hash: u64) -> String {
-    format!("{hash:016x}")
 }
 
 fn plan(args: &PlanArgs, cancel: &CancelToken) -> Result<(), Error> {
@@ -63,14 +60,14 @@ fn plan(args: &PlanArgs, cancel: &CancelToken) -> Result<(), Error> {
     )?;
     drop(watch);
     let n: u64 = plan.files().iter().map(|file| file.n_primitives).sum();
-    let object = json!({
-        "plan": hex(plan.id()),
-        "files": plan.files().len(),
-        "step": plan.is_step(),
-        "primitives": n,
-        "tiles": plan.n_tiles(),
-        "units": plan.n_units(),
-    });
+    let report = TilesPlan {
+        plan: hex(plan.id()),
+        files: plan.files().len(),
+        step: plan.is_step(),
+        primitives: n,
+        tiles: plan.n_tiles(),
+        units: plan.n_units(),
+    };
     let text = format!(
         "{} of {} in {}; {} to scatter",
         counted(n, "primitive"),
@@ -81,7 +78,7 @@ fn plan(args: &PlanArgs, cancel: &CancelToken) -> Result<(), Error> {
         counted(u64::from(plan.n_tiles()), "tile"),
         counted(plan.n_units() as u64, "unit"),
     );
-    print(args.json, &object, &text)
+    print(args.json, &report, &text)
 }
 
 fn scatter(args: &ScatterArgs, cancel: &CancelToken) -> Result<(), Error> {
@@ -96,12 +93,12 @@ fn scatter(args: &ScatterArgs, cancel: &CancelToken) -> Result<(), Error> {
         watch.report(impinge::Progress { done, total });
     })?;
     drop(watch);
-    let object = json!({
-        "written": scattered.n_written,
-        "kept": scattered.n_kept,
-        "primitives": scattered.n_primitives,
-        "records": scattered.n_records,
-    });
+    let report = TilesScatter {
+        written: scattered.n_written,
+        kept: scattered.n_kept,
+        primitives: scattered.n_primitives,
+        records: scattered.n_records,
+    };
     let text = format!(
         "{} written, {} kept; {} as {}",
         counted(scattered.n_written, "part"),
@@ -109,7 +106,7 @@ fn scatter(args: &ScatterArgs, cancel: &CancelToken) -> Result<(), Error> {
         counted(scattered.n_primitives, "primitive"),
         counted(scattered.n_records, "record"),
     );
-    print(args.json, &object, &text)
+    print(args.json, &report, &text)
 }
 
 fn run(args: &RunArgs, cancel: &CancelToken) -> Result<(), Error> {
@@ -150,7 +147,7 @@ fn run(args: &RunArgs, cancel: &CancelToken) -> Result<(), Error> {
     plan.run(tiles, &options, control, &mut |result| {
         watch.frame_done();
         if args.json && printed.is_ok() {
-            printed = print(true, &row(result), "");
+            printed = report::print(&of_tile(result));
         }
         results.push(result.clone());
     })?;
@@ -162,16 +159,16 @@ fn run(args: &RunArgs, cancel: &CancelToken) -> Result<(), Error> {
     Ok(())
 }
 
-fn row(result: &TileResult) -> Value {
-    json!({
-        "tile": result.tile,
-        "primitives": result.n_primitives,
-        "pairs": result.n_pairs,
-        "hash": hex(result.hash),
-        "elsewhere": result.n_elsewhere,
-        "pieces": result.n_pieces,
-        "kept": result.was_kept,
-    })
+fn of_tile(result: &TileResult) -> TilesRun {
+    TilesRun {
+        tile: result.tile,
+        primitives: result.n_primitives,
+        pairs: result.n_pairs,
+        hash: hex(result.hash),
+        elsewhere: result.n_elsewhere,
+        pieces: result.n_pieces,
+        kept: result.was_kept,
+    }
 }
 
 fn summarise(results: &[TileResult]) -> Result<(), Error> {
@@ -203,22 +200,24 @@ fn merge(args: &MergeArgs) -> Result<(), Error> {
     // As `plan` takes them: in a step, the start and the end of each body.
     let files = plan.files().iter();
     let paths = files.flat_map(|file| std::iter::once(&file.path).chain(&file.end));
-    let files: Vec<String> = paths.map(|path| path.display().to_string()).collect();
-    let mut object = json!({
-        "pairs": merged.n_pairs,
-        "hash": hex(merged.hash),
-        "asked": merged.asked,
-        "welded": plan.welds(),
-        "tiles": plan.n_tiles(),
-        "records": merged.n_records,
-        "uncut_tiles": merged.n_uncut,
-        "rows": merged.rows.display().to_string(),
-        "files": files,
-    });
+    let files = paths.map(|path| path.display().to_string());
+    let report = TilesMerge {
+        pairs: merged.n_pairs,
+        hash: hex(merged.hash),
+        asked: merged.asked.clone(),
+        welded: plan.welds(),
+        tiles: plan.n_tiles(),
+        records: merged.n_records,
+        uncut_tiles: merged.n_uncut,
+        rows: merged.rows.display().to_string(),
+        files: files.collect(),
+        step: merged
+            .step
+            .as_ref()
+            .map(|step| of_step(step, plan.separation())),
+    };
     let mut found = counted(merged.n_pairs, "pair");
     if let Some(step) = &merged.step {
-        object["step"] = of_step(step);
-        object["step"]["separation"] = json!(plan.separation());
         let kinds = step
             .kinds
             .map(|(kind, n)| format!("{} {}", grouped(n), kind.name()));
@@ -245,19 +244,19 @@ fn merge(args: &MergeArgs) -> Result<(), Error> {
         },
         printable(&merged.rows),
     );
-    print(args.json, &object, &text)
+    print(args.json, &report, &text)
 }
 
 /// What `impinge step --json` says too, under the same keys.
-fn of_step(step: &MergedStep) -> Value {
-    let earliest = step
-        .earliest
-        .map(|(kind, row, toi)| impact_row(kind, row, toi));
-    json!({
-        "free": earliest.is_none(),
-        "start_intersects": Value::Null,
-        "earliest": earliest,
-        "kinds": json::kinds(step.kinds),
-        "touching_at_start": step.touching_at_start,
-    })
+fn of_step(step: &MergedStep, separation: f64) -> TilesStep {
+    let earliest = step.earliest;
+    let [(_, vf), (_, ee)] = step.kinds;
+    TilesStep {
+        free: earliest.is_none(),
+        start_intersects: (),
+        earliest: earliest.map(|(kind, row, toi)| Impact::new(kind, row, toi)),
+        kinds: KindsOfTiles { vf, ee },
+        touching_at_start: step.touching_at_start,
+        separation,
+    }
 }

@@ -275,7 +275,7 @@ fn real_meshes_have_one_answer() {
         ("meshes/camelhead.off", 5),
         ("meshes/dragon.ply", 463),
     ] {
-        let Some(path) = impinge_scenes::data::test_file(name) else {
+        let Some(path) = impinge_testing::data::test_file(name) else {
             return;
         };
         let path = path.to_str().unwrap();

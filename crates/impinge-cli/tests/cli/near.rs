@@ -3,7 +3,6 @@
 use impinge::{Backend, Detector, NearPair, PairKind, Query, Scene};
 use impinge_scenes::Model;
 use impinge_scenes::surfaces::{ball, cube};
-use serde_json::json;
 
 use crate::harness::{Folder, rod_and_plate};
 use crate::schema::{schema, wrong};
@@ -67,17 +66,6 @@ fn the_json_holds_what_the_library_says() {
             let n = pairs.iter().filter(|pair| pair.kind == kind).count();
             assert_eq!(answer["kinds"][kind.name()], n);
         }
-    }
-    let right = folder.run(near).json();
-    for (key, value) in [
-        ("pairs", json!("12")),
-        ("kinds", json!({"vf": 1})),
-        ("distance", json!(-1.0)),
-        ("new", json!(1)),
-    ] {
-        let mut object = right.clone();
-        object[key] = value;
-        assert!(!wrong(&schema, &object, "$").is_empty(), "{key}");
     }
 }
 

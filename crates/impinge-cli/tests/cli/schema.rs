@@ -1,4 +1,5 @@
-//! `docs/*.schema.json` describe what `--json` prints, and nothing else.
+//! `docs/*.schema.json` describe what every `--json` prints. Most are made from the types, by the
+//! tests of the program.
 
 use impinge_io::Pc2Writer;
 use impinge_scenes::solids::solid_ball;
@@ -14,157 +15,24 @@ pub fn schema(name: &str) -> Value {
     serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
 }
 
-/// The errors in `value`, by the part of JSON Schema that the file uses; an unknown keyword is an
-/// error too.
+/// Keys in `value` that are not described, and keys that it lacks.
 pub fn wrong(schema: &Value, value: &Value, at: &str) -> Vec<String> {
     let mut found = Vec::new();
-    let mut say = |is_right: bool, what: String| {
-        if !is_right {
-            found.push(format!("{at}: {what}"));
+    if let (Some(known), Some(object)) = (schema["properties"].as_object(), value.as_object()) {
+        for (key, part) in object {
+            match known.get(key) {
+                Some(of) => found.extend(wrong(of, part, &format!("{at}.{key}"))),
+                None => found.push(format!("{at}: {key} is not described")),
+            }
         }
-    };
-    let mut below = Vec::new();
-    for (keyword, told) in schema.as_object().unwrap() {
-        match keyword.as_str() {
-            "$schema" | "$id" | "title" | "description" => {}
-            "type" => {
-                let is = |name: &Value| match name.as_str().unwrap() {
-                    "null" => value.is_null(),
-                    "object" => value.is_object(),
-                    "array" => value.is_array(),
-                    "string" => value.is_string(),
-                    "boolean" => value.is_boolean(),
-                    "number" => value.is_number(),
-                    "integer" => value.is_u64() || value.is_i64(),
-                    other => panic!("type {other}"),
-                };
-                let fits = match told {
-                    Value::Array(names) => names.iter().any(is),
-                    name => is(name),
-                };
-                say(fits, format!("{value} is no {told}"));
-            }
-            "enum" => say(
-                told.as_array().unwrap().contains(value),
-                format!("{value} is none of {told}"),
-            ),
-            "minimum" => {
-                if let Some(number) = value.as_f64() {
-                    say(
-                        number >= told.as_f64().unwrap(),
-                        format!("{number} is below {told}"),
-                    );
-                }
-            }
-            "required" => {
-                for key in told.as_array().unwrap() {
-                    let has = value.get(key.as_str().unwrap()).is_some();
-                    say(has || !value.is_object(), format!("{key} is missing"));
-                }
-            }
-            "properties" => {
-                for (key, of) in told.as_object().unwrap() {
-                    if let Some(part) = value.get(key) {
-                        below.extend(wrong(of, part, &format!("{at}.{key}")));
-                    }
-                }
-            }
-            "additionalProperties" => {
-                let known = schema.get("properties").and_then(Value::as_object);
-                for (key, part) in value.as_object().into_iter().flatten() {
-                    if known.is_some_and(|known| known.contains_key(key)) {
-                        continue;
-                    }
-                    match told {
-                        Value::Bool(true) => panic!("{at}: anything goes"),
-                        Value::Bool(false) => say(false, format!("{key} is not described")),
-                        of => below.extend(wrong(of, part, &format!("{at}.{key}"))),
-                    }
-                }
-            }
-            "items" => {
-                for (ix, part) in value.as_array().into_iter().flatten().enumerate() {
-                    below.extend(wrong(told, part, &format!("{at}[{ix}]")));
-                }
-            }
-            "minItems" | "maxItems" => {
-                if let Some(list) = value.as_array() {
-                    let n = told.as_u64().unwrap() as usize;
-                    let fits = if keyword == "minItems" {
-                        list.len() >= n
-                    } else {
-                        list.len() <= n
-                    };
-                    say(fits, format!("{} items, {keyword} {n}", list.len()));
-                }
-            }
-            other => panic!("{at}: keyword {other}"),
-        }
+        let required = schema["required"].as_array().into_iter().flatten();
+        let missing = required.filter(|key| !object.contains_key(key.as_str().unwrap()));
+        found.extend(missing.map(|key| format!("{at}: {key} is missing")));
     }
-    found.extend(below);
+    for (ix, part) in value.as_array().into_iter().flatten().enumerate() {
+        found.extend(wrong(&schema["items"], part, &format!("{at}[{ix}]")));
+    }
     found
-}
-
-#[test]
-fn every_answer_is_as_described() {
-    let schema = schema("answer");
-    let folder = Folder::new();
-    let (a, b) = (ball(320), ball(500).translated([0.7, 0.1, 0.0]));
-    folder.ply("a.ply", &a);
-    folder.ply("b.ply", &b);
-    folder.medit("c.mesh", &solid_ball(100));
-    let mut cache = Pc2Writer::create(&folder.path("run.pc2"), a.n_vertices(), 0.0, 1.0).unwrap();
-    cache.append(&a.positions).unwrap();
-    cache.finish().unwrap();
-    for args in [
-        &["pairs", "a.ply", "b.ply"][..],
-        &[
-            "pairs", "a.ply", "b.ply", "c.mesh", "--self", "--repeat", "3",
-        ],
-        &["pairs", "a.ply", "b.ply", "--contacts", "rows.csv"],
-        &["self", "a.ply"],
-        &[
-            "self",
-            "a.ply",
-            "--no-weld",
-            "--method",
-            "cells",
-            "--backend",
-            "cpu",
-        ],
-        &["self", "a.ply", "--method", "naive"],
-        &["sequence", "a.ply", "run.pc2"],
-        &["sequence", "a.ply", "run.pc2", "--other", "b.ply"],
-    ] {
-        let object = folder.run(args.iter().chain(&["--json"])).json();
-        assert_eq!(wrong(&schema, &object, "$"), [""; 0], "{args:?}");
-    }
-}
-
-#[test]
-fn the_description_refuses_what_is_not_an_answer() {
-    let schema = schema("answer");
-    let folder = Folder::new();
-    folder.ply("a.ply", &ball(320));
-    let right = folder.run(["self", "a.ply", "--json"]).json();
-    for (key, value) in [
-        ("pairs", json!(-1)),
-        ("pairs", json!("12")),
-        ("method", json!("magic")),
-        ("bodies", json!([{}])),
-        ("regions", json!([{"pairs": 1}])),
-        ("new", json!(1)),
-        ("ms", json!({"total": "1", "stages": {}})),
-    ] {
-        let mut object = right.clone();
-        object[key] = value;
-        assert!(!wrong(&schema, &object, "$").is_empty(), "{key}");
-    }
-    for key in ["pairs", "hash", "stats", "n_regions"] {
-        let mut object = right.clone();
-        object.as_object_mut().unwrap().remove(key);
-        assert!(!wrong(&schema, &object, "$").is_empty(), "{key}");
-    }
 }
 
 /// All commands in a help text.
@@ -314,12 +182,8 @@ fn every_command_that_prints_json_has_a_schema() {
             assert_eq!(help.contains("--json"), is_here, "{command}");
         }
     }
-    let docs = std::fs::read_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs")).unwrap();
-    for entry in docs {
-        let file = entry.unwrap().file_name().into_string().unwrap();
-        if let Some(name) = file.strip_suffix(".schema.json") {
-            let is_known = cases.iter().any(|(known, _)| *known == name);
-            assert!(is_known || name == "devices", "{file}");
-        }
+    for name in impinge_testing::schema::names() {
+        let is_known = cases.iter().any(|(known, _)| *known == name);
+        assert!(is_known || name == "devices", "{name}");
     }
 }

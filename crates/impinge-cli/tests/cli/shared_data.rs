@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use impinge_io::{Positions, ReadOptions, read};
 use impinge_scenes::Model;
-use impinge_scenes::data::test_file;
+use impinge_testing::data::test_file;
 use serde_json::{Value, json};
 
 use crate::harness::{Folder, npy_rows};

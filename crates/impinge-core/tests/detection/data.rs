@@ -6,15 +6,12 @@ use std::collections::HashSet;
 use std::path::PathBuf;
 
 use crate::common::{Case, agree, naive, rows};
-use crate::published::{self, Published};
 use impinge_core::{
     Backend, BodyId, Detector, Filter, Method, Query, Scene, Settings, SharedVertex, hash_rows,
 };
 use impinge_io::{Mesh, ReadOptions, Sequence};
-
-pub fn file(path: &str) -> Option<PathBuf> {
-    impinge_scenes::data::test_file(path)
-}
+use impinge_testing::data::test_file;
+use impinge_testing::published::{self, Published};
 
 /// One detector per method and backend. Without a GPU adapter this fails.
 fn detectors() -> Vec<Detector> {
@@ -36,7 +33,7 @@ fn read(path: &str, weld: bool) -> Option<Mesh> {
         weld,
         ..ReadOptions::default()
     };
-    file(path).map(|path| impinge_io::read(&path, &options).unwrap())
+    test_file(path).map(|path| impinge_io::read(&path, &options).unwrap())
 }
 
 fn positions_f32(positions: &impinge_io::Positions) -> Vec<[f32; 3]> {
@@ -82,7 +79,7 @@ fn read_npy_pairs(path: &PathBuf) -> Vec<[u32; 4]> {
 
 #[test]
 fn two_bodies_meet_as_the_exact_kernel_says() {
-    let Some(answers) = file("expected/two_body.json") else {
+    let Some(answers) = test_file("expected/two_body.json") else {
         return;
     };
     let answers: serde_json::Value =
@@ -97,7 +94,7 @@ fn two_bodies_meet_as_the_exact_kernel_says() {
         let Some(mesh) = read(answer["mesh"].as_str().unwrap(), false) else {
             return;
         };
-        let Some(list) = file(answer["file"].as_str().unwrap()) else {
+        let Some(list) = test_file(answer["file"].as_str().unwrap()) else {
             return;
         };
         let expected = read_npy_pairs(&list);
@@ -150,7 +147,7 @@ fn welded_meshes_intersect_themselves_as_published() {
 fn a_dancer_is_answered_as_the_oracle_says() {
     let (Some(mesh), Some(frames)) = (
         read("sequences/rumba.ply", false),
-        file("sequences/rumba.pc2"),
+        test_file("sequences/rumba.pc2"),
     ) else {
         return;
     };

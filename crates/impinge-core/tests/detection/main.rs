@@ -14,12 +14,7 @@ mod left_out;
 mod limits;
 mod many;
 mod methods;
-#[path = "../../../impinge-exact/tests/common/published.rs"]
-mod published;
 mod regular;
 mod short;
 mod transform;
 mod tuning;
-
-// `published` reads its files by it.
-use data::file;

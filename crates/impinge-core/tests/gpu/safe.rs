@@ -9,8 +9,8 @@ use impinge_core::exact::{ElementPair, Point, are_within};
 use impinge_core::{
     Backend, BodyId, Detector, Element, Error, PairKind, Query, Scene, Settings, Thickness, wgpu,
 };
-use impinge_scenes::data::test_file;
 use impinge_scenes::{Model, Random, soup, surfaces};
+use impinge_testing::data::test_file;
 
 /// The bounds of each body.
 type Safe = BTreeMap<BodyId, Vec<f32>>;

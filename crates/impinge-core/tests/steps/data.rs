@@ -7,7 +7,7 @@ use std::ops::ControlFlow;
 use impinge_core::{
     Backend, Detector, Impact, InstructionSet, PairKind, Precision, Query, Scene, Settings, Start,
 };
-use impinge_scenes::data::test_file;
+use impinge_testing::data::test_file;
 
 /// The numbers of an array in NumPy's format, little-endian and in C order.
 fn npy<T, const N: usize>(path: &str, kind: &str, read: impl Fn([u8; N]) -> T) -> Vec<T> {

@@ -1,17 +1,9 @@
 //! The exact predicates against an oracle in integer arithmetic, on every kind of trouble, and
 //! against published cases.
 
-#[path = "../../../impinge-scenes/src/data.rs"]
-#[allow(dead_code, reason = "made for another crate")]
-mod data;
 mod generators;
 mod oracle;
 mod published;
-
-/// A file of the shared data.
-fn file(path: &str) -> Option<std::path::PathBuf> {
-    data::test_file(path)
-}
 
 use generators::{Kind, Random};
 use impinge_exact::{

@@ -1,11 +1,8 @@
 //! Published cases. The data is not part of the repository: without it the tests fail, unless
 //! `IMPINGE_NO_DATA=1` is set.
 
-#[path = "../common/published.rs"]
-mod files;
-
-use files::Published;
 use impinge_exact::triangles_intersect;
+use impinge_testing::published::{self as files, Published};
 
 fn check(case: &Published) {
     let Published {

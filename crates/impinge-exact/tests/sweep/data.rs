@@ -2,23 +2,18 @@
 //! data is not part of the repository: without it the tests fail, unless `IMPINGE_NO_DATA=1` is
 //! set.
 
-use std::path::PathBuf;
-
 use impinge_exact::{ElementPair, first_contact};
 use impinge_io::{Elements, Positions, ReadOptions};
+use impinge_testing::data::test_file;
 
 type Point = [f64; 3];
 
 /// Points of a pair at the start and at the end.
 type Step = [[Point; 4]; 2];
 
-fn file(path: &str) -> Option<PathBuf> {
-    crate::shared_data::test_file(path)
-}
-
 /// Queries of Wang et al. 2021 with exact booleans: eight rows of three fractions, then the truth.
 fn queries(kind: &str) -> Option<Vec<(Step, bool, String)>> {
-    let folder = file("ccd/queries")?;
+    let folder = test_file("ccd/queries")?;
     let mut queries = Vec::new();
     for scene in std::fs::read_dir(folder).unwrap() {
         for file in std::fs::read_dir(scene.unwrap().path().join(kind)).unwrap() {
@@ -92,7 +87,7 @@ impl Recorded {
         let mut faces = Vec::new();
         let mut ends = Vec::new();
         for frame in frames {
-            let path = file(&format!("ccd/{name}/frames/{frame}.ply"))?;
+            let path = test_file(&format!("ccd/{name}/frames/{frame}.ply"))?;
             let mesh = impinge_io::read(&path, &ReadOptions::as_they_are()).unwrap();
             let Elements::Triangles(found) = mesh.elements else {
                 panic!("a surface");
@@ -183,7 +178,7 @@ impl Recorded {
     /// not.
     fn check_published(&self, kind: &str, pair: ElementPair, number: &str) {
         let json = |what: &str| -> Option<serde_json::Value> {
-            let path = file(&format!("ccd/{}/{what}.json", self.name))?;
+            let path = test_file(&format!("ccd/{}/{what}.json", self.name))?;
             Some(serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap())
         };
         let (Some(boxes), Some(answers)) = (
@@ -211,7 +206,7 @@ impl Recorded {
 
 /// The data of a NumPy file.
 fn npy(path: &str) -> Option<Vec<u8>> {
-    let bytes = std::fs::read(file(path)?).unwrap();
+    let bytes = std::fs::read(test_file(path)?).unwrap();
     assert_eq!(&bytes[..8], b"\x93NUMPY\x01\x00", "NumPy format 1.0");
     let header_end = 10 + usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
     Some(bytes[header_end..].to_vec())

@@ -9,6 +9,3 @@ mod generators;
 mod grid;
 mod moving;
 mod oracle;
-#[path = "../../../impinge-scenes/src/data.rs"]
-#[allow(dead_code, reason = "made for another crate")]
-mod shared_data;

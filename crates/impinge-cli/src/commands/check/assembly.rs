@@ -6,7 +6,6 @@ use std::path::Path;
 use impinge::CancelToken;
 use impinge_check::{Assembly, AssemblyError, AssemblyOptions, Relation, check_assembly_with};
 use impinge_io::{Format, Mesh, ReadOptions, printable, read_bodies, read_with_summary};
-use serde_json::{Value, json};
 
 use super::args::{CheckArgs, FailOn, Touching};
 use super::html::write_assembly;
@@ -15,6 +14,7 @@ use super::say_wrote;
 use crate::error::Error;
 use crate::load::{named_parts, tell};
 use crate::output::out;
+use crate::report;
 use crate::text::{counted, several};
 use crate::watch::{Watch, go_on};
 
@@ -91,7 +91,7 @@ pub fn check(args: &CheckArgs, cancel: &CancelToken) -> Result<(), Error> {
         say_wrote(&file.0, args)?;
     }
     if args.json {
-        writeln!(out(), "{}", object(args, &names, &answer))?;
+        report::print(&report(args, &names, &answer))?;
     } else {
         write!(out(), "{}", text(args, &names, &answer))?;
     }
@@ -116,29 +116,31 @@ fn parts(path: &Path, are_several: bool) -> Result<Vec<(String, Mesh)>, Error> {
     Ok(named_parts(&file, bodies, are_several).collect())
 }
 
-/// The object that `docs/assembly.schema.json` describes.
-fn object(args: &CheckArgs, names: &[String], answer: &Assembly) -> Value {
-    let parts = names
-        .iter()
-        .zip(&answer.parts)
-        .map(|(name, part)| json!({ "name": name, "faces": part.n_faces, "solid": part.is_solid }));
-    let pairs = answer.pairs.iter().map(|pair| {
-        json!({
-            "parts": pair.parts,
-            "relation": pair.relation.name(),
-            "pairs": pair.n_pairs,
-            "distance": pair.distance,
-            "point": pair.point,
-        })
+fn report(args: &CheckArgs, names: &[String], answer: &Assembly) -> report::Assembly {
+    let parts = names.iter().zip(&answer.parts);
+    let parts = parts.map(|(name, part)| report::Part {
+        name: name.clone(),
+        faces: part.n_faces,
+        solid: part.is_solid,
+    });
+    let pairs = answer.pairs.iter().map(|pair| report::Parts {
+        parts: pair.parts,
+        relation: pair.relation.name(),
+        pairs: pair.n_pairs,
+        distance: pair.distance,
+        point: pair.point,
     });
     let rows = matrix(answer).into_iter().map(String::from_iter);
-    json!({
-        "clearance": args.clearance,
-        "touching": if args.touching == Touching::Ignore { "ignore" } else { "report" },
-        "parts": parts.collect::<Vec<_>>(),
-        "pairs": pairs.collect::<Vec<_>>(),
-        "matrix": rows.collect::<Vec<_>>(),
-    })
+    report::Assembly {
+        clearance: args.clearance,
+        touching: match args.touching {
+            Touching::Report => "report",
+            Touching::Ignore => "ignore",
+        },
+        parts: parts.collect(),
+        pairs: pairs.collect(),
+        matrix: rows.collect(),
+    }
 }
 
 fn text(args: &CheckArgs, names: &[String], answer: &Assembly) -> String {

@@ -4,13 +4,12 @@ use std::io::{self, Write};
 
 use impinge::{Advance, Error, Impact, Impacts, PairKind, Stats, Truncation};
 use impinge_io::printable;
-use serde_json::{Map, Value, json};
 
 use crate::args::StepHow;
+use crate::asked::Asked;
 use crate::detection::{Times, hit};
-use crate::json::counters;
 use crate::text::{self, counted, grouped, hex};
-use crate::{json, output};
+use crate::{output, report};
 
 use super::load::Moving;
 
@@ -102,47 +101,47 @@ impl<'a> Found<'a> {
         }
     }
 
-    /// `free`, `earliest`, `impacts`, `kinds`, `touching_at_start`, `start_intersects`, `hash`,
-    /// `backend`, `bodies`, `ms`, `stats`, `separation`, `clearance`, with `--advance` `fraction`,
-    /// with `--truncate` `cut`, `touching` and `rounds`; counts and the hash are null with these
-    /// and with `--earliest`.
-    pub fn json(&self, bodies: &Moving, how: &StepHow) -> Result<Map<String, Value>, Error> {
-        let mut object = self.numbers();
-        if let Some(fraction) = self.fraction {
-            object.insert("fraction".into(), fraction.into());
-        }
-        if let Some((n_cut, n_touching, rounds)) = self.truncated {
-            object.insert("cut".into(), n_cut.into());
-            object.insert("touching".into(), n_touching.into());
-            object.insert("rounds".into(), rounds.into());
-        }
-        object.insert("bodies".into(), described(bodies)?);
-        object.insert("ms".into(), self.ms());
-        object.insert("stats".into(), counters(self.stats));
-        object.insert("separation".into(), how.separation.into());
-        object.insert("clearance".into(), how.clearance.into());
-        Ok(object)
+    pub fn report(
+        &self,
+        bodies: &Moving,
+        how: &StepHow,
+        asked: Asked,
+    ) -> Result<report::Step, Error> {
+        let truncated = self.truncated;
+        Ok(report::Step {
+            found: self.found(),
+            fraction: self.fraction,
+            cut: truncated.map(|(n_cut, ..)| n_cut),
+            touching: truncated.map(|(_, n_touching, _)| n_touching),
+            rounds: truncated.map(|(.., rounds)| rounds),
+            bodies: described(bodies)?,
+            ms: self.ms(),
+            stats: report::Counters::new(self.stats),
+            separation: how.separation,
+            clearance: how.clearance,
+            asked: report::AskedOfStep::new(asked),
+        })
     }
 
-    /// The keys that the lines of a sequence also have.
-    pub fn numbers(&self) -> Map<String, Value> {
-        let kinds = |all| json::kinds(counts(all));
-        let mut object = Map::new();
-        object.insert("free".into(), self.is_free().into());
-        object.insert("earliest".into(), self.earliest.map_or(Value::Null, impact));
-        object.insert("impacts".into(), json!(self.all.map(Impacts::len)));
-        object.insert("kinds".into(), self.all.map_or(Value::Null, kinds));
-        object.insert("touching_at_start".into(), json!(self.all.map(n_at_start)));
-        object.insert("start_intersects".into(), json!(self.start_intersects));
-        object.insert("hash".into(), json!(self.all.map(|all| hex(all.hash()))));
-        object.insert("backend".into(), self.stats.backend.as_str().into());
-        object.insert("method".into(), self.stats.method.into());
-        object
+    /// What the lines of a sequence say too.
+    pub fn found(&self) -> report::Found {
+        let n = |all: &Impacts| report::KindsOfStep::new(|kind| all.of(kind).len() as u64);
+        report::Found {
+            free: self.is_free(),
+            earliest: self.earliest.map(impact),
+            impacts: self.all.map(Impacts::len),
+            kinds: self.all.map(n),
+            touching_at_start: self.all.map(n_at_start),
+            start_intersects: self.start_intersects,
+            hash: self.all.map(|all| hex(all.hash())),
+            backend: self.stats.backend.as_str().to_owned(),
+            method: self.stats.method,
+        }
     }
 
     /// Times of the stages, and the total time.
-    pub fn ms(&self) -> Value {
-        json::ms(&self.times)
+    pub fn ms(&self) -> report::Stages {
+        report::Stages::new(&self.times)
     }
 
     /// Prints the answer in the first line, then counts.
@@ -251,13 +250,14 @@ fn n_at_start(impacts: &Impacts) -> usize {
     impacts.iter().filter(|impact| impact.at_start).count()
 }
 
-/// The bodies as JSON objects.
-pub fn described(bodies: &Moving) -> Result<Value, Error> {
+/// The bodies of a report.
+pub fn described(bodies: &Moving) -> Result<Vec<report::MovingBody>, Error> {
     let all = bodies.ids.iter().zip(&bodies.names).zip(&bodies.vertices);
     all.map(|((&id, [start, end]), vertices)| {
-        let mut object = json::body(&bodies.scene, id, start, vertices)?;
-        object["end"] = end.as_str().into();
-        Ok(object)
+        Ok(report::MovingBody {
+            body: report::Body::new(&bodies.scene, id, start, vertices)?,
+            end: end.clone(),
+        })
     })
     .collect()
 }
@@ -274,19 +274,6 @@ fn element(kind: PairKind, number: u32, is_first: bool) -> String {
     format!("{name} {number}")
 }
 
-/// An impact as a JSON object.
-pub fn impact(impact: Impact) -> Value {
-    impact_row(impact.kind, impact.row(), impact.toi)
-}
-
-/// The same of an impact given by its row.
-pub fn impact_row(kind: PairKind, [body_a, a, body_b, b]: [u32; 4], toi: f64) -> Value {
-    json!({
-        "toi": toi,
-        "kind": kind.name(),
-        "body_a": body_a,
-        "element_a": a,
-        "body_b": body_b,
-        "element_b": b,
-    })
+fn impact(impact: Impact) -> report::Impact {
+    report::Impact::new(impact.kind, impact.row(), impact.toi)
 }

@@ -7,11 +7,10 @@ use std::time::Instant;
 
 use impinge::{Candidates, Detector, PairKind, Query, Stats};
 use impinge_io::{Cell, ELEMENTS, KIND};
-use serde_json::{Value, json};
 
 use crate::asked::Asked;
 use crate::error::Error;
-use crate::json::{self, counters, rounded};
+use crate::report;
 use crate::rows::Rows;
 use crate::text::{self, counted, hex};
 use crate::values::RowsFile;
@@ -88,25 +87,23 @@ impl Written {
         self.counts.iter().sum()
     }
 
-    /// `candidates`, `kinds`, `hash`, `runs`, `inflation`, `asked`, `bodies`, `ms`, `stats`; `ms`
-    /// holds the time of finding and writing all runs, `stats` the counters of the last one.
-    pub fn json(
+    pub fn report(
         &self,
         bodies: &Moving,
         inflation: f64,
         asked: Asked,
-    ) -> Result<Value, impinge::Error> {
-        Ok(json!({
-            "candidates": self.n(),
-            "kinds": json::kinds(self.kinds()),
-            "hash": hex(self.hash),
-            "runs": self.n_runs,
-            "inflation": inflation,
-            "asked": asked.json(),
-            "bodies": answer::described(bodies)?,
-            "ms": { "total": rounded(self.ms) },
-            "stats": counters(&self.stats),
-        }))
+    ) -> Result<report::Candidates, impinge::Error> {
+        Ok(report::Candidates {
+            candidates: self.n(),
+            kinds: report::Kinds::new(|kind| self.counts[kind as usize]),
+            hash: hex(self.hash),
+            runs: self.n_runs,
+            inflation,
+            asked: report::AskedOfStep::new(asked),
+            bodies: answer::described(bodies)?,
+            ms: report::Total::new(self.ms),
+            stats: report::Counters::new(&self.stats),
+        })
     }
 
     /// Prints counts in one line, and how they were found in another.

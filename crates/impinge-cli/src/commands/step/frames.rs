@@ -4,11 +4,11 @@ use std::io::Write;
 use std::ops::Range;
 
 use impinge::{BodyId, Detector, Positions, Query, Scene};
-use serde_json::{Map, Value};
 
 use crate::detection::{Times, hit, set_positions};
 use crate::error::Error;
 use crate::output::out;
+use crate::report;
 use crate::rows::{self, Rows};
 use crate::text::{counted, grouped};
 
@@ -73,7 +73,7 @@ pub trait Frames {
     }
 
     /// Says in a line of JSON which frame it is about, and in which file that is, if each has one.
-    fn name_in(&self, line: &mut Map<String, Value>, frame_ix: usize);
+    fn named(&self, frame_ix: usize) -> report::Frame;
 }
 
 /// Steps from each frame of a range to the next, the body `moving` in motion and all others at
@@ -128,11 +128,11 @@ pub fn steps_of_sequence(
             }))?;
         }
         if shown.json {
-            let mut line = Map::new();
-            frames.name_in(&mut line, frame_ix);
-            line.extend(found.numbers());
-            line.insert("ms".into(), found.ms());
-            writeln!(out(), "{}", Value::Object(line))?;
+            report::print(&report::SequenceStep {
+                frame: frames.named(frame_ix),
+                found: found.found(),
+                ms: found.ms(),
+            })?;
         } else if shown.text {
             let first = impacts.earliest();
             writeln!(

@@ -37,3 +37,16 @@ pub fn data_file(path: &str) -> Option<PathBuf> {
         .map(|folder| folder.join(path))
         .filter(|path| path.is_file())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn data_is_found_or_waived() {
+        if let Some(path) = test_file("expected/two_body.json") {
+            assert!(path.is_file());
+        }
+        assert_eq!(data_file("no/such/file"), None);
+    }
+}

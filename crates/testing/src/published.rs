@@ -1,19 +1,23 @@
 //! Published triangle pairs, from the shared data. `None` if the data is absent and
-//! `IMPINGE_NO_DATA=1` allows that. A test that includes this file says where a file of the data
-//! is: `crate::file`.
+//! `IMPINGE_NO_DATA=1` allows that.
+
+use crate::data::test_file;
 
 /// A triangle as three corners.
 pub type Triangle = [[f64; 3]; 3];
 
 /// Two triangles, whether they intersect, and the source of the answer.
 pub struct Published {
+    /// Corners of both.
     pub triangles: [Triangle; 2],
+    /// Whether they share a point.
     pub intersect: bool,
+    /// Where the case is from.
     pub name: String,
 }
 
 fn bytes(path: &str) -> Option<Vec<u8>> {
-    crate::file(path).map(|file| std::fs::read(file).unwrap())
+    test_file(path).map(|file| std::fs::read(file).unwrap())
 }
 
 /// The 2,500 + 2,500 random pairs of Shen, Heng and Tang (2003).
