@@ -7,10 +7,13 @@
 //! objects*, 2001). Faces that do not have the origin beneath them count as nearer than all others,
 //! so the polyhedron need not hold the origin at first.
 //!
-//! Everything is rounded, in one fixed order. Cost: `O(n)` per vertex that the polyhedron takes.
+//! Differences are rounded, and so are normals and heights, in one fixed order. Which faces a new
+//! vertex sees is decided exactly, so the polyhedron stays convex, whatever was rounded. The height
+//! of the answer is that of the two bodies along its normal, so that way takes them apart. Cost:
+//! `O(n)` per vertex that the polyhedron takes.
 
 use crate::scene::vector::{cross, dot, scaled, sub};
-use impinge_exact::Point;
+use impinge_exact::{Point, Sign, orient3d};
 
 /// The shortest way that takes two convex bodies apart.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -33,7 +36,7 @@ struct Face {
 }
 
 /// Polyhedra with more vertices are not grown further: the way found so far is at most a little too
-/// short.
+/// long.
 const MOST: usize = 400;
 /// Differences of heights below this part of the size are rounding.
 const ROUNDING: f64 = 1e-12;
@@ -51,9 +54,10 @@ pub fn convex_overlap(a: &[[f64; 3]], b: &[[f64; 3]]) -> Option<ConvexOverlap> {
         }
         best
     };
+    let scale = scale_of(a, b);
     let support = |way: Point| -> Option<Point> {
         let (i, j) = (farthest(a, way)?, farthest(b, scaled(way, -1.0))?);
-        Some(sub(a[i], b[j]))
+        Some(scaled(sub(a[i], b[j]), scale))
     };
     let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     let mut ends = [[0.0; 3]; 6];
@@ -69,7 +73,7 @@ pub fn convex_overlap(a: &[[f64; 3]], b: &[[f64; 3]]) -> Option<ConvexOverlap> {
     let mut points = first_corners(&ends, support, size)?;
     let mut faces: Vec<Face> = Vec::new();
     for corners in [[0, 1, 2], [0, 3, 1], [1, 3, 2], [2, 3, 0]] {
-        faces.push(face(&points, corners)?);
+        faces.push(face(&points, corners));
     }
     let mut best: Option<(f64, Point)> = None;
     // Faces that were found to be faces of the whole.
@@ -86,20 +90,25 @@ pub fn convex_overlap(a: &[[f64; 3]], b: &[[f64; 3]]) -> Option<ConvexOverlap> {
             break;
         }
         let point = support(nearest.normal)?;
-        if dot(point, nearest.normal) - nearest.height <= noise || points.len() >= MOST {
+        let reached = dot(point, nearest.normal);
+        let sees = |face: &Face| {
+            let [p, q, r] = face.corners.map(|ix| points[ix]);
+            orient3d(&p, &q, &r, &point) == Sign::Negative
+        };
+        // The normal of a narrow face may be so wrong that it does not see its own farthest point.
+        let is_near = reached - nearest.height <= noise;
+        if is_near || points.len() >= MOST || !sees(&nearest) {
             let is_lower = |(height, normal): (f64, Point)| {
-                nearest.height < height - noise || rounded(nearest.normal) < rounded(normal)
+                reached < height - noise
+                    || (reached <= height + noise && rounded(nearest.normal) < rounded(normal))
             };
             if best.is_none_or(is_lower) {
-                best = Some((nearest.height, nearest.normal));
+                best = Some((reached, nearest.normal));
             }
             is_final.push(nearest.corners);
             continue;
         }
-        let new = points.len();
-        points.push(point);
         // The border of what the new point sees: sides whose other face stays.
-        let sees = |face: &Face| dot(point, face.normal) - face.height > 0.0;
         let seen: Vec<Face> = faces.iter().copied().filter(sees).collect();
         let sides = |face: &Face| {
             let [p, q, r] = face.corners;
@@ -107,18 +116,19 @@ pub fn convex_overlap(a: &[[f64; 3]], b: &[[f64; 3]]) -> Option<ConvexOverlap> {
         };
         let inner: Vec<[usize; 2]> = seen.iter().flat_map(sides).collect();
         faces.retain(|face| !sees(face));
+        let new = points.len();
+        points.push(point);
         for &[p, q] in &inner {
             if !inner.contains(&[q, p]) {
-                // A face without area belongs to a neighbour.
-                faces.extend(face(&points, [p, q, new]));
+                faces.push(face(&points, [p, q, new]));
             }
         }
     }
     let (height, normal) = best?;
     Some(ConvexOverlap {
-        depth: height.max(0.0),
+        depth: (height / scale).max(0.0),
         normal,
-        vertex: farthest_of_tied(a, normal, noise)?,
+        vertex: farthest_of_tied(a, normal, noise / scale)?,
     })
 }
 
@@ -159,26 +169,47 @@ fn first_corners(
     if height.abs() <= 1e-9 * size * length(normal) {
         return None;
     }
-    Some(if height > 0.0 {
-        vec![p, r, q, s]
-    } else {
-        vec![p, q, r, s]
-    })
+    match orient3d(&p, &q, &r, &s) {
+        Sign::Positive => Some(vec![p, q, r, s]),
+        Sign::Negative => Some(vec![p, r, q, s]),
+        Sign::Zero => None,
+    }
 }
 
-fn face(points: &[Point], corners: [usize; 3]) -> Option<Face> {
+/// A power of two that makes differences of about 1 of those of two sets of points: products
+/// neither overflow nor underflow.
+fn scale_of(a: &[Point], b: &[Point]) -> f64 {
+    let Some(first) = b.first() else {
+        return 1.0;
+    };
+    let differences = a.iter().chain(b).map(|&point| sub(point, *first));
+    let largest = differences
+        .flatten()
+        .fold(0.0f64, |most, x| most.max(x.abs()));
+    match largest > 0.0 && largest.is_finite() {
+        true => 2f64.powi(-(largest.log2().round() as i32).clamp(-1000, 1000)),
+        false => 1.0,
+    }
+}
+
+/// A face without a normal, being too narrow, is at no height, but there: the polyhedron is closed.
+fn face(points: &[Point], corners: [usize; 3]) -> Face {
     let [p, q, r] = corners.map(|ix| points[ix]);
     let normal = cross(sub(q, p), sub(r, p));
     let length = dot(normal, normal).sqrt();
     if length.is_nan() || length <= 0.0 {
-        return None;
+        return Face {
+            corners,
+            normal: [0.0; 3],
+            height: f64::INFINITY,
+        };
     }
     let normal = scaled(normal, 1.0 / length);
-    Some(Face {
+    Face {
         corners,
         normal,
         height: dot(normal, p),
-    })
+    }
 }
 
 #[cfg(test)]
@@ -249,5 +280,91 @@ mod tests {
                 assert!(apart(scaled(way, 1.0 / length)) > found.depth - 1e-9);
             }
         }
+    }
+
+    /// Regular bodies in regular and in any poses: many differences in one plane, on one line, at
+    /// one point. The shortest way is across a face of one body, or across an edge of each.
+    #[test]
+    fn regular_bodies_have_the_depth_of_their_faces_and_edges() {
+        let mut random = Random::new(7);
+        let models = [
+            surfaces::cube([0.0; 3], 1.0),
+            surfaces::icosphere(0),
+            surfaces::icosphere(1),
+        ];
+        let edges = |model: &impinge_scenes::Model, at: &[Point]| -> Vec<Point> {
+            let impinge::Elements::Triangles(triangles) = &model.elements else {
+                unreachable!()
+            };
+            let sides = triangles
+                .iter()
+                .flat_map(|&[p, q, r]| [[p, q], [q, r], [r, p]]);
+            let sides = sides.filter(|[p, q]| p < q);
+            sides
+                .map(|side| side.map(|ix| at[ix as usize]))
+                .map(|[p, q]| sub(q, p))
+                .collect()
+        };
+        for case in 0..120 {
+            let [one, two] = [case % 3, case / 3 % 3].map(|ix| &models[ix]);
+            let quarter = |x: f32| f64::from((4.0 * x).round() / 4.0);
+            // Those of the first nine are at one place.
+            let by = random
+                .point(-1.0, 1.0)
+                .map(|x| if case < 9 { 0.0 } else { quarter(x) });
+            let turn = random.point(-1.0, 1.0).map(f64::from);
+            let a = points(one, [0.0; 3]);
+            let mut b = points(two, [0.0; 3]);
+            if case % 2 == 1 {
+                b = b.into_iter().map(|p| turned(p, turn)).collect();
+            }
+            // Far larger and far smaller than 1, too.
+            let scale = [1.0, 1e-120, 1e120][case / 9 % 3];
+            let put = |p: Point, by: Point| [0, 1, 2].map(|k| scale * (p[k] + by[k]));
+            let a: Vec<Point> = a.into_iter().map(|p| put(p, [0.0; 3])).collect();
+            let b: Vec<Point> = b.into_iter().map(|p| put(p, by)).collect();
+            let unscaled = |points: &[Point]| -> Vec<Point> {
+                points.iter().map(|&p| scaled(p, 1.0 / scale)).collect()
+            };
+            let (plain_a, plain_b) = (unscaled(&a), unscaled(&b));
+            let apart = |way: Point| {
+                let of = |points: &[Point], way: Point| {
+                    points.iter().map(|&p| dot(p, way)).fold(f64::MIN, f64::max)
+                };
+                of(&plain_a, way) + of(&plain_b, scaled(way, -1.0))
+            };
+            let (of_a, of_b) = (edges(one, &plain_a), edges(two, &plain_b));
+            let both = [&of_a[..], &of_b[..]].concat();
+            let mut least = f64::INFINITY;
+            for (ix, &x) in both.iter().enumerate() {
+                for &y in &both[..ix] {
+                    let way = cross(x, y);
+                    let length = dot(way, way).sqrt();
+                    if length > 1e-9 {
+                        for sign in [1.0, -1.0] {
+                            least = least.min(apart(scaled(way, sign / length)));
+                        }
+                    }
+                }
+            }
+            let found = convex_overlap(&a, &b).unwrap();
+            let depth = found.depth / scale;
+            assert!(
+                (depth - least.max(0.0)).abs() < 1e-9,
+                "case {case}: {depth} for {least}"
+            );
+            if depth > 0.0 {
+                assert!((apart(found.normal) - depth).abs() < 1e-9, "case {case}");
+            }
+        }
+    }
+
+    /// Turned about an axis by its length.
+    fn turned(p: Point, axis: Point) -> Point {
+        let angle = dot(axis, axis).sqrt();
+        let axis = scaled(axis, 1.0 / angle);
+        let (sin, cos) = angle.sin_cos();
+        let (across, along) = (cross(axis, p), dot(axis, p));
+        [0, 1, 2].map(|k| p[k] * cos + across[k] * sin + axis[k] * along * (1.0 - cos))
     }
 }
