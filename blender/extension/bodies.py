@@ -66,7 +66,7 @@ class World:
                 if is_new:
                     self._scene.add(vertices, triangles)
                     self._triangles.append(triangles)
-                elif np.array_equal(triangles, self._triangles[ix]):
+                elif len(vertices) == self._scene.n_vertices(ix) and np.array_equal(triangles, self._triangles[ix]):
                     self._scene.set_positions(ix, vertices)
                 else:
                     self._scene.remesh(ix, vertices, triangles)

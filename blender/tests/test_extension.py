@@ -706,6 +706,23 @@ def test_scan_of_topology_that_changes(cube, grid, scene):
     assert (scene.impinge.first_frame, scene.impinge.n_hits) == (4, 3)
 
 
+def test_scan_where_loose_vertices_come_and_go(add, cube, scene):
+    made = add("loose", [[0, 0, 0], [1, 0, 0], [0, 1, 0], [5, 5, 5], [5, 5, 5]], [(0, 1, 2)])
+    cube("cube", half=0.3)
+    made.shape_key_add(name="Basis")
+    # Welding makes one of the two loose vertices, in the first frame only.
+    key = made.shape_key_add(name="apart")
+    key.data[4].co.x = 7
+    for frame in (1, 2):
+        key.value = frame - 1
+        key.keyframe_insert("value", frame=frame)
+    scene.frame_set(1)
+    scene.frame_end = 3
+    scene.impinge.which = "BETWEEN"
+    assert bpy.ops.impinge.scan() == {"FINISHED"}
+    assert (scene.impinge.n_frames, scene.impinge.n_hits) == (3, 3)
+
+
 def test_runs():
     from bl_ext.user_default.impinge.frames import Frames
 
