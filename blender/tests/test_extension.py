@@ -453,6 +453,59 @@ def test_steps_of_a_scan_go_through_what_is_simulated(cube, grid, scene):
     assert list(scan.visited(scene, range(11, 22, 5))) == [11, 16, 21]
 
 
+def node_group(inner):
+    """A group of geometry nodes: what goes in goes through the node that `inner` adds, or the pair of nodes."""
+    group = bpy.data.node_groups.new("group", "GeometryNodeTree")
+    for in_out in ("INPUT", "OUTPUT"):
+        group.interface.new_socket("Geometry", in_out=in_out, socket_type="NodeSocketGeometry")
+    enter, leave = inner(group)
+    group.links.new(group.nodes.new("NodeGroupInput").outputs[0], enter)
+    group.links.new(leave, group.nodes.new("NodeGroupOutput").inputs[0])
+    return group
+
+
+def drift(group):
+    """A simulation that moves along x, by 0.3 per frame."""
+    enter, leave = group.nodes.new("GeometryNodeSimulationInput"), group.nodes.new("GeometryNodeSimulationOutput")
+    enter.pair_with_output(leave)
+    move = group.nodes.new("GeometryNodeSetPosition")
+    move.inputs["Offset"].default_value = (0.3, 0, 0)
+    group.links.new(enter.outputs["Geometry"], move.inputs["Geometry"])
+    group.links.new(move.outputs["Geometry"], leave.inputs["Geometry"])
+    return enter.inputs["Geometry"], leave.outputs["Geometry"]
+
+
+def within(inner_group):
+    """A node that is the group."""
+
+    def inner(group):
+        node = group.nodes.new("GeometryNodeGroup")
+        node.node_tree = inner_group
+        return node.inputs[0], node.outputs[0]
+
+    return inner
+
+
+def test_simulations_in_nested_node_groups(cube, scene):
+    cube("wall", (4, 0, 0))
+    drifting = cube("drifting", half=0.5)
+    modifier = drifting.modifiers.new("nodes", "NODES")
+    # At frame f at 0.3 (f - 1): it touches from 2.5 on.
+    scene.impinge.which, scene.impinge.step = "BETWEEN", 5
+    scene.use_preview_range, scene.frame_preview_start, scene.frame_preview_end = True, 6, 16
+    simulated = node_group(drift)
+    for group in (simulated, node_group(within(simulated)), node_group(within(node_group(within(simulated))))):
+        modifier.node_group = group
+        scene.frame_set(1)
+        assert bpy.ops.impinge.scan() == {"FINISHED"}
+        assert (scene.impinge.n_frames, scene.impinge.first_frame) == (3, 11)
+    # Neither a modifier without a group nor a node without one simulates.
+    modifier.node_group = bpy.data.node_groups.new("empty", "GeometryNodeTree")
+    modifier.node_group.nodes.new("GeometryNodeGroup")
+    drifting.modifiers.new("none", "NODES")
+    assert not scan.simulates(scene)
+
+
 def test_select_of_objects_that_share_a_mesh(cube):
     a, b = cube("a"), cube("b", (1.5, 1.5, 1.5))
     b.data = a.data

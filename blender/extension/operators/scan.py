@@ -68,10 +68,20 @@ def simulates(scene):
         for modifier in object.modifiers:
             if modifier.type in SIMULATIONS:
                 return True
-            group = modifier.node_group if modifier.type == "NODES" else None
-            if group is not None and any(node.bl_idname == "GeometryNodeSimulationOutput" for node in group.nodes):
+            if modifier.type == "NODES" and any(node.bl_idname == "GeometryNodeSimulationOutput" for node in nodes(modifier.node_group)):
                 return True
     return False
+
+
+def nodes(group):
+    """The nodes of a group, or of None, with those of the groups in it, each group once."""
+    seen, rest = set(), [group]
+    while rest:
+        group = rest.pop()
+        if group is not None and group not in seen:
+            seen.add(group)
+            yield from group.nodes
+            rest += [node.node_tree for node in group.nodes if node.bl_idname == "GeometryNodeGroup"]
 
 
 def span(scene):
