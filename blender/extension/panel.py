@@ -111,7 +111,7 @@ class IMPINGE_PT_scan(Part, bpy.types.Panel):
         draw_work(layout, "impinge.scan", "Scan")
         if not settings.n_frames:
             return
-        layout.label(text=f"{settings.n_hits:,} of {text.counted(settings.n_frames, 'frame')} intersect")
+        layout.label(text=text.hits(settings.n_hits, settings.n_frames))
         if settings.is_hit:
             row = layout.row(align=True)
             row.prop(settings, "first_frame")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-__all__ = ["are", "counted", "gone", "lines_of_answer", "lines_of_place", "of_answer", "of_frames", "pairs", "whom"]
+__all__ = ["are", "counted", "gone", "hits", "lines_of_answer", "lines_of_place", "of_answer", "of_frames", "pairs", "whom"]
 
 
 #: As the option is called.
@@ -74,8 +74,15 @@ def lines_of_place(place, length):
 
 def of_frames(seen):
     """What a scan has found."""
-    n = len(seen.counts)
     only = f", {ONLY}" if seen.is_selected else ""
+    if len(seen.counts) == 1:
+        [frame] = seen.counts
+        return f"frame {frame} {'intersects' if seen.n_hits else 'does not intersect'}{only}"
     if seen.first is None:
-        return f"none of {counted(n, 'frame')} intersects{only}"
-    return f"{seen.n_hits:,} of {counted(n, 'frame')} intersect, the first is {seen.first}{only}"
+        return f"none of {counted(len(seen.counts), 'frame')} intersects{only}"
+    return f"{hits(seen.n_hits, len(seen.counts))}, the first is {seen.first}{only}"
+
+
+def hits(n_hits, n_frames):
+    """`1 of 20 frames intersects`."""
+    return f"{n_hits:,} of {counted(n_frames, 'frame')} {'intersects' if n_hits == 1 else 'intersect'}"

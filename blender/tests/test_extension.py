@@ -776,6 +776,28 @@ def test_scan_where_loose_vertices_come_and_go(add, cube, scene):
     assert (scene.impinge.n_frames, scene.impinge.n_hits) == (3, 3)
 
 
+def test_a_scan_goes_back_to_the_frame_and_its_part(cube, scene):
+    cube("a")
+    scene.frame_set(7, subframe=0.5)
+    assert bpy.ops.impinge.scan() == {"FINISHED"}
+    assert scene.frame_current_final == 7.5
+
+
+def test_what_a_scan_says():
+    from bl_ext.user_default.impinge.frames import Frames
+
+    def said(*counts):
+        seen = Frames(3, 2 + len(counts))
+        for frame, n_pairs in zip(seen.wanted, counts):
+            seen.add(frame, n_pairs)
+        return text.of_frames(seen)
+
+    assert said(0, 0) == "none of 2 frames intersects"
+    assert said(0, 5) == "1 of 2 frames intersects, the first is 4"
+    assert said(4, 5) == "2 of 2 frames intersect, the first is 3"
+    assert said(0) == "frame 3 does not intersect" and said(9) == "frame 3 intersects"
+
+
 def test_runs():
     from bl_ext.user_default.impinge.frames import Frames
 
@@ -901,6 +923,23 @@ def test_an_object_that_goes_away_ends_a_scan(cube, scene, monkeypatch):
         pass
     assert context.reports == [({"ERROR"}, "Scan: gone is no longer in the scene")]
     assert state.running is None and scene.frame_current == 1
+
+
+def test_a_scan_goes_on_where_its_scene_is_renamed(cube, scene, monkeypatch):
+    cube("a")
+    cube("b")
+    scene.impinge.which = "BETWEEN"
+    scene.frame_set(5)
+    scene.frame_end = 300
+    context = Fake()
+    operator = invoke(Scan, context, monkeypatch)
+    while not state.running.frames:
+        assert tick(operator, context) == {"PASS_THROUGH"}
+    scene.name = "renamed"
+    while tick(operator, context) == {"PASS_THROUGH"}:
+        pass
+    assert context.reports == [({"INFO"}, "300 of 300 frames intersect, the first is 1")]
+    assert (scene.impinge.n_frames, scene.frame_current) == (300, 5)
 
 
 class Broken(waiting.Waiting):

@@ -30,11 +30,14 @@ class IMPINGE_OT_scan(Waiting, bpy.types.Operator):
         names = wanted(context)
         asker = Asker(question(settings))
         selected_only = settings.selected_only
-        scene_name, before = context.scene.name, context.scene.frame_current
+        scene_uid, before, subframe = context.scene.session_uid, context.scene.frame_current, context.scene.frame_subframe
         seen = Frames(*span(context.scene), settings.step)
         try:
             for frame in visited(context.scene, seen.wanted):
-                bpy.data.scenes[scene_name].frame_set(frame)
+                scene = scene_of(scene_uid)
+                if scene is None:
+                    raise ValueError("the scene is no longer there")
+                scene.frame_set(frame)
                 if frame not in seen.wanted:
                     continue
                 bodies = meshes.read(context, names, selected_only)
@@ -42,12 +45,17 @@ class IMPINGE_OT_scan(Waiting, bpy.types.Operator):
                 seen.add(frame, (yield Job(lambda cancel, progress, bodies=bodies: asker.count(bodies, cancel, progress))))
                 state.running.frames = (len(seen.counts), len(seen.wanted))
         finally:
-            scene = bpy.data.scenes.get(scene_name)
+            scene = scene_of(scene_uid)
             if scene is not None:
-                scene.frame_set(before)
+                scene.frame_set(before, subframe=subframe)
                 # A scan that was stopped shows how far it has come.
                 show(scene, seen)
         self.report({"INFO"}, text.of_frames(seen))
+
+
+def scene_of(uid):
+    """The scene of this `session_uid`, which outlives an undo and a new name; None if it is no longer there."""
+    return next((scene for scene in bpy.data.scenes if scene.session_uid == uid), None)
 
 
 #: Modifiers whose state in a frame follows from the frames before.
