@@ -14,7 +14,7 @@ __all__ = ["KINDS", "chosen", "instancers", "named", "read", "topology"]
 
 #: Kinds of objects that have faces.
 KINDS = ("MESH", "CURVE", "SURFACE", "FONT", "META")
-#: A layer of the objects' own meshes that lives while a question is read: the number of each face, from 1.
+#: Begins the names of layers of the objects' own meshes that live while a question is read: the number of each face, from 1.
 NUMBER = "impinge_number"
 
 
@@ -65,10 +65,10 @@ def read(context, names, selected_only=False):
             object.update_from_editmode()
     read = [_read(context, object) for object in objects]
     unknown = [object for object, (body, _) in zip(objects, read) if body.polygons is None]
-    with _numbered(context, unknown):
+    with _numbered(context, unknown) as layers:
         for ix, object in enumerate(objects):
             if object in unknown:
-                read[ix] = _read(context, object, is_numbered=True)
+                read[ix] = _read(context, object, layers)
     bodies = [body for body, _ in read]
     if selected_only:
         selections = [selected & (object.mode == "EDIT") for object, (_, selected) in zip(objects, read)]
@@ -78,8 +78,8 @@ def read(context, names, selected_only=False):
     return bodies
 
 
-def _read(context, object, is_numbered=False):
-    """The body, and which of its triangles are selected. Its polygons are None if only numbers could tell them."""
+def _read(context, object, layers=None):
+    """The body, and which of its triangles are selected. Its polygons are None if only numbers could tell them: those in `layers`."""
     evaluated = object.evaluated_get(context.evaluated_depsgraph_get())
     mesh = evaluated.to_mesh()
     if mesh is None:
@@ -90,8 +90,8 @@ def _read(context, object, is_numbered=False):
         triangles = _corners(mesh)[_get(mesh.loop_triangles, "loops", np.int32, 3)]
         polygon = _get(mesh.loop_triangle_polygons, "value", np.int32)
         selected = _get(mesh.polygons, "select", bool)[polygon]
-        if is_numbered:
-            numbers = mesh.attributes.get(NUMBER)
+        if layers is not None:
+            numbers = mesh.attributes.get(layers.get(object.data, ""))
             is_known = numbers is not None and numbers.domain == "FACE" and len(numbers.data) == len(mesh.polygons)
             origin = _get(numbers.data, "value", np.int32) - 1 if is_known else np.full(len(mesh.polygons), -1, np.int32)
             origin = origin[polygon]
@@ -131,31 +131,39 @@ def _is_same(object, mesh):
 
 @contextmanager
 def _numbered(context, objects):
-    """Numbers the faces of the objects' own meshes meanwhile: modifiers hand the numbers on to the faces that they make of them."""
+    """Numbers the faces of the objects' own meshes meanwhile: modifiers hand the numbers on to the faces that they make of them.
+
+    Gives the names of the layers by mesh. Each mesh has its own, because a modifier may take in the faces of another one.
+    """
     # Of objects that share a mesh in Edit Mode only one is in that mode.
     meshes = {object.data: object.data.is_editmode for object in objects if object.type == "MESH" and object.data.is_editable}
-    for mesh, is_edited in meshes.items():
+    layers = {}
+    for ix_mesh, (mesh, is_edited) in enumerate(meshes.items()):
+        # Blender gives the layer another name if the mesh has one of this name.
+        name = f"{NUMBER}_{ix_mesh}"
         if is_edited:
             edited = bmesh.from_edit_mesh(mesh)
-            layer = edited.faces.layers.int.new(NUMBER)
+            layer = edited.faces.layers.int.new(name)
+            layers[mesh] = layer.name
             for ix, face in enumerate(edited.faces):
                 face[layer] = ix + 1
             bmesh.update_edit_mesh(mesh, loop_triangles=False, destructive=False)
         else:
-            numbers = mesh.attributes.new(NUMBER, "INT", "FACE")
+            numbers = mesh.attributes.new(name, "INT", "FACE")
+            layers[mesh] = numbers.name
             numbers.data.foreach_set("value", np.arange(1, len(mesh.polygons) + 1, dtype=np.int32))
             mesh.update_tag()
     try:
         if meshes:
             context.view_layer.update()
-        yield
+        yield layers
     finally:
         for mesh, is_edited in meshes.items():
             if is_edited:
                 edited = bmesh.from_edit_mesh(mesh)
-                edited.faces.layers.int.remove(edited.faces.layers.int[NUMBER])
+                edited.faces.layers.int.remove(edited.faces.layers.int[layers[mesh]])
                 bmesh.update_edit_mesh(mesh, loop_triangles=False, destructive=False)
-            elif NUMBER in mesh.attributes:
-                mesh.attributes.remove(mesh.attributes[NUMBER])
+            elif layers[mesh] in mesh.attributes:
+                mesh.attributes.remove(mesh.attributes[layers[mesh]])
         if meshes:
             context.view_layer.update()

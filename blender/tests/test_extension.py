@@ -242,16 +242,39 @@ def test_faces_that_modifiers_make_lead_back_to_their_own(grid, cube, mode):
     assert answer.n_made == 0
     # Nothing is left in the user's mesh.
     bpy.ops.object.mode_set(mode="OBJECT")
-    assert meshes.NUMBER not in sheet.data.attributes
-    assert not bmesh_layers(sheet)
+    assert numbers_of(sheet) == []
 
 
-def bmesh_layers(object):
-    made = bmesh.new()
-    made.from_mesh(object.data)
-    names = [name for name in made.faces.layers.int.keys() if name == meshes.NUMBER]
-    made.free()
-    return names
+def numbers_of(object):
+    """The layers of an object's own mesh that are, or could be, ours."""
+    return [attribute.name for attribute in object.data.attributes if attribute.name.startswith(meshes.NUMBER)]
+
+
+@pytest.mark.parametrize("mode", ["OBJECT", "EDIT"])
+def test_a_layer_of_the_user_s_own_may_have_the_name_of_ours(grid, cube, mode):
+    cube("cube", (0.05, 0.05, 0), 0.02)
+    sheet = grid("sheet", 8)
+    for name in (meshes.NUMBER, f"{meshes.NUMBER}_0"):
+        sheet.data.attributes.new(name, "INT", "FACE").data.foreach_set("value", np.arange(64, 0, -1, dtype=np.int32))
+    sheet.modifiers.new("finer", "SUBSURF").levels = 2
+    bpy.ops.object.mode_set(mode=mode)
+    assert check("BETWEEN").faces["sheet"].tolist() == [0]
+    assert bpy.ops.impinge.select() == {"FINISHED"}
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert numbers_of(sheet) == [meshes.NUMBER, f"{meshes.NUMBER}_0"]
+    assert [row.value for row in sheet.data.attributes[numbers_of(sheet)[1]].data] == list(range(64, 0, -1))
+
+
+def test_faces_that_a_modifier_takes_from_another_object_are_of_no_face(cube):
+    other = cube("other", (0.5, 0.5, 0.5))
+    a = cube("a")
+    # Both meshes are numbered.
+    other.modifiers.new("finer", "SUBSURF").levels = 1
+    union = a.modifiers.new("union", "BOOLEAN")
+    union.object, union.operation = other, "UNION"
+    answer = check("BETWEEN")
+    # The corner of the other one sticks out of three faces of this one.
+    assert answer.faces["a"].tolist() == [1, 3, 5] and answer.n_made > 0
 
 
 def test_faces_of_nothing_are_counted(cube):
@@ -534,7 +557,7 @@ def test_objects_that_share_a_mesh_in_edit_mode(grid):
         answer = check("BETWEEN", selected_only=False)
         assert answer.n_pairs > 0 and answer.n_made == 0 and all(len(answer.faces[name]) for name in "ab")
         bpy.ops.object.mode_set(mode="OBJECT")
-        assert meshes.NUMBER not in a.data.attributes
+        assert numbers_of(a) == []
         for made in (a, b):
             bpy.data.objects.remove(made)
 
