@@ -14,6 +14,8 @@ __all__ = ["KINDS", "chosen", "instancers", "named", "read", "topology"]
 
 #: Kinds of objects that have faces.
 KINDS = ("MESH", "CURVE", "SURFACE", "FONT", "META")
+#: Fills up the numbers of an instance: its own, then those of the instances in which it is.
+NO_ID = 2**31 - 1
 #: Begins the names of layers of the objects' own meshes that live while a question is read: the number of each face, from 1.
 NUMBER = "impinge_number"
 
@@ -38,8 +40,16 @@ def named(scene, names):
 def instancers(context, which):
     """Full names of the objects that a question is about whose instances are seen, but are no faces of theirs."""
     depsgraph = context.evaluated_depsgraph_get()
-    parents = {instance.parent.original for instance in depsgraph.object_instances if instance.is_instance and instance.parent}
+    parents = {instance.parent.original for instance in depsgraph.object_instances if _is_of_another(instance)}
     return [object.name_full for object in _meant(context, which) if object in parents]
+
+
+def _is_of_another(instance):
+    """Whether it shows anything but an object's own faces: of a curve, a text, a metaball these are an instance, too, which is in none."""
+    if not instance.is_instance or instance.parent is None:
+        return False
+    is_own = instance.object.original == instance.parent.original and instance.persistent_id[1] == NO_ID
+    return not is_own
 
 
 def topology(object):

@@ -436,6 +436,61 @@ def test_instances_are_not_looked_at_and_that_is_said(cube):
     assert answer.instancers == [] and text.besides(answer, asked) == []
 
 
+def text_object(name, body="impinge"):
+    """Adds a text of some thickness, selected and active."""
+    curve = bpy.data.curves.new(name, "FONT")
+    curve.body, curve.extrude = body, 0.3
+    return added(name, curve)
+
+
+def ball(name, location=(0, 0, 0)):
+    """Adds a metaball, selected and active."""
+    data = bpy.data.metaballs.new(name)
+    data.elements.new()
+    made = added(name, data)
+    made.location = location
+    return made
+
+
+def added(name, data):
+    made = bpy.data.objects.new(name, data)
+    bpy.context.scene.collection.objects.link(made)
+    made.select_set(True)
+    bpy.context.view_layer.objects.active = made
+    return made
+
+
+def copies(kind):
+    """What instances come from nodes: of another object, or of a mesh that is no object."""
+
+    def inner(group):
+        source = group.nodes.new("GeometryNodeObjectInfo" if kind == "object" else "GeometryNodeMeshCube")
+        if kind == "object":
+            source.inputs[0].default_value = bpy.data.objects["part"]
+        points, instances, join = (group.nodes.new(f"GeometryNode{name}") for name in ("Points", "InstanceOnPoints", "JoinGeometry"))
+        group.links.new(points.outputs[0], instances.inputs["Points"])
+        group.links.new(source.outputs["Geometry" if kind == "object" else "Mesh"], instances.inputs["Instance"])
+        group.links.new(instances.outputs[0], join.inputs[0])
+        return join.inputs[0], join.outputs[0]
+
+    return inner
+
+
+def test_an_object_s_own_faces_are_no_instances_of_it(cube):
+    cube("part", (9, 0, 0)).select_set(False)
+    for object in (text_object("text"), ball("ball")):
+        bpy.context.view_layer.objects.active = object
+        answer = check("ACTIVE")
+        assert answer.names == [object.name] and answer.n_triangles > 0 and answer.instancers == []
+    # Real ones are still said, of any kind of object.
+    for object in (cube("cube"), text_object("other")):
+        bpy.context.view_layer.objects.active = object
+        modifier = object.modifiers.new("nodes", "NODES")
+        for kind in ("object", "mesh"):
+            modifier.node_group = node_group(copies(kind))
+            assert check("ACTIVE").instancers == [object.name]
+
+
 def test_whom_was_asked_about(cube):
     cube("a")
     cube("b", (1.5, 1.5, 1.5))
