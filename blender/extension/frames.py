@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import NamedTuple
 
 __all__ = ["Frames", "Run"]
@@ -24,6 +25,8 @@ class Frames:
     def __init__(self, first, last, step=1):
         self.wanted = range(first, last + 1, step)
         self.counts = {}
+        #: In how many frames objects, by name, were disabled, and so left out.
+        self.n_disabled = Counter()
         #: Whether only selected faces count.
         self.is_selected = False
 

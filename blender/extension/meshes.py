@@ -10,7 +10,7 @@ import numpy as np
 
 from .bodies import Body
 
-__all__ = ["KINDS", "chosen", "instancers", "named", "read", "topology"]
+__all__ = ["KINDS", "chosen", "disabled", "instancers", "named", "read", "topology"]
 
 #: Kinds of objects that have faces.
 KINDS = ("MESH", "CURVE", "SURFACE", "FONT", "META")
@@ -35,6 +35,24 @@ def named(scene, names):
     """Objects by their full names, in which a linked object has its library; None for those that are no longer there."""
     objects = {object.name_full: object for object in scene.objects}
     return [objects.get(name) for name in names]
+
+
+def disabled(context, names):
+    """Those of these full names whose objects are disabled in the viewport in this frame, or all collections that they are in: Blender does
+    not evaluate their modifiers. Objects that are hidden in the view only (`H`) are evaluated.
+    """
+    enabled = {object.name_full for layer in _layers(context.view_layer.layer_collection) for object in layer.collection.objects if not object.hide_viewport}
+    return [name for name in names if name not in enabled]
+
+
+def _layers(layer):
+    """The collections of a view layer that are not disabled in the viewport. One that is excluded may have one in it that is not."""
+    if layer.collection.hide_viewport:
+        return
+    if not layer.exclude:
+        yield layer
+    for child in layer.children:
+        yield from _layers(child)
 
 
 def instancers(context, which):
@@ -63,13 +81,15 @@ def topology(object):
 
 
 def read(context, names, selected_only=False):
-    """The bodies in this frame.
+    """The bodies in this frame, without those of objects that are disabled.
 
     Where `selected_only`, triangles count that come from selected faces of objects in Edit Mode; if none is selected, all count.
     """
     objects = named(context.scene, names)
     if None in objects:
         raise ValueError(f"{names[objects.index(None)]} is no longer in the scene")
+    absent = disabled(context, names)
+    objects = [object for name, object in zip(names, objects) if name not in absent]
     for object in objects:
         if object.mode == "EDIT":
             object.update_from_editmode()

@@ -39,7 +39,7 @@ class Answer:
     """`faces` has, by name of the object, faces of its own mesh. `n_made`: triangles without one, because a modifier made them.
     `is_placed` is false where there were too many pairs for finding places. Of `n_places`, the first are described. `is_selected`: only
     pairs with a selected face count. `names` are those of the objects that were asked about. Whoever asks adds, by name, the `topology`
-    of their own meshes, and the `instancers`: those whose instances were not looked at.
+    of their own meshes, the `instancers`: those whose instances were not looked at, and the `disabled`: those that were not looked at.
     """
 
     n_pairs: int = 0
@@ -48,6 +48,7 @@ class Answer:
     names: list = field(default_factory=list)
     topology: dict = field(default_factory=dict)
     instancers: list = field(default_factory=list)
+    disabled: list = field(default_factory=list)
     n_made: int = 0
     n_triangles: int = 0
     is_placed: bool = True

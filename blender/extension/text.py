@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-__all__ = ["are", "counted", "gone", "hits", "lines_of_answer", "lines_of_place", "of_answer", "of_frames", "pairs", "whom"]
+__all__ = [
+    "are", "besides", "counted", "disabled", "gone", "hits", "lines_of_answer", "lines_of_place", "of_answer", "of_frames", "pairs", "unseen", "whom"
+]
 
 
 #: As the option is called.
@@ -32,11 +34,23 @@ def whom(answer, question):
     return f"{counted(len(answer.names), 'object')} with each other{' and themselves' if question.itself else ''}"
 
 
-def besides(answer, question):
+def disabled(names):
+    return f"{', '.join(names)} {are(len(names))} disabled in the viewport"
+
+
+def unseen(answer):
     """What was not looked at."""
     said = []
     if answer.instancers:
         said.append(f"instances of {', '.join(answer.instancers)} were not looked at")
+    if answer.disabled:
+        said.append(f"{disabled(answer.disabled)}, and {'was' if len(answer.disabled) == 1 else 'were'} not looked at")
+    return said
+
+
+def besides(answer, question):
+    """What was not looked at, and what is left out."""
+    said = unseen(answer)
     if question.distance is not None and question.itself and question.rings:
         said.append(f"within an object, what is at most {counted(question.rings, 'edge')} away along the surface is left out")
     return said
@@ -61,8 +75,14 @@ def lines_of_answer(answer, question):
     else:
         found = counted(answer.n_pairs, "near pair" if is_near else "pair")
         first = [f"{found} in {counted(answer.n_places, 'place')}"] if answer.is_placed else [found, "too many to find their places"]
-    instances = ["instances not looked at"] if answer.instancers else []
-    return [*first, f"of {counted(answer.n_triangles, 'triangle')}", *([ONLY] if answer.is_selected else []), *instances]
+    lines = [*first, f"of {counted(answer.n_triangles, 'triangle')}"]
+    if answer.is_selected:
+        lines.append(ONLY)
+    if answer.instancers:
+        lines.append("instances not looked at")
+    if answer.disabled:
+        lines.append(f"{counted(len(answer.disabled), 'object')} disabled")
+    return lines
 
 
 def lines_of_place(place, length):
@@ -73,7 +93,18 @@ def lines_of_place(place, length):
 
 
 def of_frames(seen):
-    """What a scan has found."""
+    """What a scan has found, and what it has not looked at."""
+    return "; ".join([_of_frames(seen), *unseen_of_frames(seen)])
+
+
+def unseen_of_frames(seen):
+    if not seen.n_disabled:
+        return []
+    where = ", ".join(f"{name} in {counted(n, 'frame')}" for name, n in seen.n_disabled.items())
+    return [f"left out where disabled in the viewport: {where}"]
+
+
+def _of_frames(seen):
     only = f", {ONLY}" if seen.is_selected else ""
     if len(seen.counts) == 1:
         [frame] = seen.counts

@@ -491,6 +491,64 @@ def test_an_object_s_own_faces_are_no_instances_of_it(cube):
             assert check("ACTIVE").instancers == [object.name]
 
 
+def solid(grid, name="solid"):
+    """A wave that cuts through itself only because a modifier makes it thick."""
+    made = grid(name, 6, lambda x, y: np.sin(7 * x) * 0.3)
+    made.modifiers.new("solid", "SOLIDIFY").thickness = 0.6
+    return made
+
+
+def test_a_disabled_active_object_is_refused(grid, scene):
+    made = solid(grid)
+    assert check("ACTIVE").n_pairs > 0
+    inner = bpy.data.collections.new("inner")
+    outer = bpy.data.collections.new("outer")
+    scene.collection.children.link(outer)
+    outer.children.link(inner)
+    inner.objects.link(made)
+    # Another object needs it, so that Blender keeps it evaluated, as it was.
+    child = bpy.data.objects.new("child", None)
+    scene.collection.objects.link(child)
+    child.parent = made
+    refused = "solid is disabled in the viewport, so that its modifiers are not evaluated"
+    for press in (bpy.ops.impinge.check, bpy.ops.impinge.clearance, bpy.ops.impinge.scan):
+        made.hide_viewport = True
+        with pytest.raises(RuntimeError, match=refused):
+            press()
+        made.hide_viewport = False
+    # It is in another collection that is not disabled.
+    outer.hide_viewport = True
+    assert check("ACTIVE").n_pairs > 0
+    scene.collection.objects.unlink(made)
+    with pytest.raises(RuntimeError, match=refused):
+        bpy.ops.impinge.check()
+    outer.hide_viewport, inner.hide_viewport = False, True
+    with pytest.raises(RuntimeError, match=refused):
+        bpy.ops.impinge.check()
+    inner.hide_viewport = False
+    # One of an excluded collection is not, and one that is only hidden in the view is evaluated.
+    bpy.context.view_layer.layer_collection.children["outer"].exclude = True
+    bpy.context.view_layer.layer_collection.children["outer"].children["inner"].exclude = False
+    bpy.context.view_layer.objects.active = made
+    made.hide_set(True)
+    assert check("ACTIVE").n_pairs > 0
+
+
+def test_disabled_objects_are_named(cube):
+    objects = [cube(name, (x, 0, 0)) for name, x in (("a", 0), ("b", 1.5), ("c", 1.6))]
+    objects[2].hide_viewport = True
+    # Blender deselects it; a script can still ask about it.
+    assert check("BETWEEN").names == ["a", "b"] and text.besides(state.found.answer, state.found.question) == []
+    with bpy.context.temp_override(selected_objects=objects):
+        answer = check("BETWEEN")
+    assert answer.names == ["a", "b"] and set(answer.topology) == {"a", "b"} and answer.disabled == ["c"]
+    assert text.besides(answer, state.found.question) == ["c is disabled in the viewport, and was not looked at"]
+    assert text.lines_of_answer(answer, state.found.question)[-1] == "1 object disabled"
+    objects[1].hide_viewport = True
+    with bpy.context.temp_override(selected_objects=objects), pytest.raises(RuntimeError, match="select 2 or more objects .* 1 object"):
+        bpy.ops.impinge.check()
+
+
 def test_whom_was_asked_about(cube):
     cube("a")
     cube("b", (1.5, 1.5, 1.5))
@@ -835,6 +893,26 @@ def test_scan_of_topology_that_changes(cube, grid, scene):
     scene.impinge.which = "BETWEEN"
     bpy.ops.impinge.scan()
     assert (scene.impinge.first_frame, scene.impinge.n_hits) == (4, 3)
+
+
+def test_a_scan_leaves_out_what_is_disabled_in_a_frame(cube, grid, scene, capfd):
+    made = solid(grid)
+    cube("cube", (0.5, 0.5, 0), 0.4)
+    for frame, is_disabled in ((1, False), (10, True), (15, False)):
+        made.hide_viewport = is_disabled
+        made.keyframe_insert("hide_viewport", frame=frame)
+    scene.frame_set(1)
+    made.select_set(True)
+    bpy.context.view_layer.objects.active = made
+    for which in ("ACTIVE", "BETWEEN"):
+        scene.impinge.which = which
+        assert bpy.ops.impinge.scan() == {"FINISHED"}
+        assert (scene.impinge.n_frames, scene.impinge.n_hits) == (20, 15)
+        assert sorted(marker.frame for marker in scene.timeline_markers) == [1, 10, 15]
+        said = "15 of 20 frames intersect, the first is 1; left out where disabled in the viewport: solid in 5 frames"
+        assert said in capfd.readouterr().out
+        # Blender deselects it on the way.
+        assert {object.name for object in bpy.context.selected_objects} == {"cube", "solid"}
 
 
 def test_scan_where_loose_vertices_come_and_go(add, cube, scene):

@@ -27,13 +27,20 @@ def wanted(context):
     """Names of the objects. Raises ValueError where there are too few."""
     which = context.scene.impinge.which
     names = meshes.chosen(context, which)
+    if which == "ACTIVE" and meshes.disabled(context, names):
+        raise ValueError(f"{text.disabled(names)}, so that its modifiers are not evaluated")
+    expect_enough(which, names)
+    return names
+
+
+def expect_enough(which, names):
+    """Raises ValueError where these objects are too few."""
     if which == "ACTIVE" and not names:
         raise ValueError("there is no active object with faces")
     least = 2 if which == "BETWEEN" else 1
     if len(names) < least:
         selected = f"{text.counted(len(names), 'object')} {text.are(len(names))} selected"
         raise ValueError(f"select {least} or more objects that have faces; {selected}")
-    return names
 
 
 class Asking(Waiting):
@@ -44,14 +51,17 @@ class Asking(Waiting):
         names = wanted(context)
         asked = question(settings, self.distance(settings))
         frame = context.scene.frame_current
+        disabled = meshes.disabled(context, names)
         bodies = meshes.read(context, names, settings.selected_only)
+        names = [body.name for body in bodies]
+        expect_enough(settings.which, names)
         topology = {name: meshes.topology(object) for name, object in zip(names, meshes.named(context.scene, names))}
         instancers = meshes.instancers(context, settings.which)
         answer = yield Job(lambda cancel, progress: Asker(asked).find(bodies, cancel, progress))
-        answer.topology, answer.instancers = topology, instancers
+        answer.topology, answer.instancers, answer.disabled = topology, instancers, disabled
         state.show(answer, asked, frame)
         said = "; ".join([f"{text.whom(answer, asked)}: {text.of_answer(answer, asked)}", *text.besides(answer, asked)])
-        self.report({"WARNING"} if instancers else {"INFO"}, said)
+        self.report({"WARNING"} if text.unseen(answer) else {"INFO"}, said)
 
 
 class IMPINGE_OT_check(Asking, bpy.types.Operator):

@@ -28,6 +28,7 @@ class IMPINGE_OT_scan(Waiting, bpy.types.Operator):
     def steps(self, context):
         settings = context.scene.impinge
         names = wanted(context)
+        selected = {object.name_full for object in context.selected_objects}
         asker = Asker(question(settings))
         selected_only = settings.selected_only
         scene_uid, before, subframe = context.scene.session_uid, context.scene.frame_current, context.scene.frame_subframe
@@ -40,6 +41,7 @@ class IMPINGE_OT_scan(Waiting, bpy.types.Operator):
                 scene.frame_set(frame)
                 if frame not in seen.wanted:
                     continue
+                seen.n_disabled.update(meshes.disabled(context, names))
                 bodies = meshes.read(context, names, selected_only)
                 seen.is_selected |= is_selected(bodies)
                 seen.add(frame, (yield Job(lambda cancel, progress, bodies=bodies: asker.count(bodies, cancel, progress))))
@@ -48,9 +50,17 @@ class IMPINGE_OT_scan(Waiting, bpy.types.Operator):
             scene = scene_of(scene_uid)
             if scene is not None:
                 scene.frame_set(before, subframe=subframe)
+                # Blender deselects what is disabled in a frame.
+                select(context, scene, selected & set(seen.n_disabled))
                 # A scan that was stopped shows how far it has come.
                 show(scene, seen)
-        self.report({"INFO"}, text.of_frames(seen))
+        self.report({"WARNING"} if text.unseen_of_frames(seen) else {"INFO"}, text.of_frames(seen))
+
+
+def select(context, scene, names):
+    """Selects the objects of these full names that can be."""
+    for object in meshes.named(scene, names - set(meshes.disabled(context, names))):
+        object.select_set(True)
 
 
 def scene_of(uid):
