@@ -26,6 +26,10 @@ class Body:
     matrix: np.ndarray
     selected: np.ndarray | None = None
 
+    @property
+    def has_faces(self):
+        return len(self.triangles) > 0
+
 
 def to_world(matrix, points):
     """Points in the world, float64. Equal points stay equal, which a matrix product by BLAS would not promise."""

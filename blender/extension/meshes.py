@@ -10,7 +10,7 @@ import numpy as np
 
 from .bodies import Body
 
-__all__ = ["KINDS", "chosen", "disabled", "instancers", "named", "read", "topology"]
+__all__ = ["KINDS", "chosen", "disabled", "faceless", "instancers", "named", "read", "topology"]
 
 #: Kinds of objects that have faces.
 KINDS = ("MESH", "CURVE", "SURFACE", "FONT", "META")
@@ -41,7 +41,8 @@ def disabled(context, names):
     """Those of these full names whose objects are disabled in the viewport in this frame, or all collections that they are in: Blender does
     not evaluate their modifiers. Objects that are hidden in the view only (`H`) are evaluated.
     """
-    enabled = {object.name_full for layer in _layers(context.view_layer.layer_collection) for object in layer.collection.objects if not object.hide_viewport}
+    layers = _layers(context.view_layer.layer_collection)
+    enabled = {object.name_full for layer in layers for object in layer.collection.objects if not object.hide_viewport}
     return [name for name in names if name not in enabled]
 
 
@@ -53,6 +54,12 @@ def _layers(layer):
         yield layer
     for child in layer.children:
         yield from _layers(child)
+
+
+def faceless(scene, names):
+    """These full names of objects without faces, as messages call them."""
+    family = " (the first metaball of its family has the faces of all)"
+    return [name + family if object.type == "META" else name for name, object in zip(names, named(scene, names))]
 
 
 def instancers(context, which):

@@ -38,8 +38,9 @@ class Question:
 class Answer:
     """`faces` has, by name of the object, faces of its own mesh. `n_made`: triangles without one, because a modifier made them.
     `is_placed` is false where there were too many pairs for finding places. Of `n_places`, the first are described. `is_selected`: only
-    pairs with a selected face count. `names` are those of the objects that were asked about. Whoever asks adds, by name, the `topology`
-    of their own meshes, the `instancers`: those whose instances were not looked at, and the `disabled`: those that were not looked at.
+    pairs with a selected face count. `names` are those of the objects that were asked about and have faces. Whoever asks adds, by name, the
+    `topology` of their own meshes, the `instancers`: those whose instances were not looked at, the `disabled`: those that were not looked at,
+    and the `faceless`: those without faces, as messages call them.
     """
 
     n_pairs: int = 0
@@ -49,6 +50,7 @@ class Answer:
     topology: dict = field(default_factory=dict)
     instancers: list = field(default_factory=list)
     disabled: list = field(default_factory=list)
+    faceless: list = field(default_factory=list)
     n_made: int = 0
     n_triangles: int = 0
     is_placed: bool = True
@@ -83,7 +85,7 @@ class Asker:
         Raises ValueError for positions that cannot be used, `impinge.Cancelled` and the other errors of impinge.
         """
         began = time.perf_counter()
-        answer = Answer(names=[body.name for body in bodies])
+        answer = Answer(names=[body.name for body in bodies if body.has_faces])
         answer.n_triangles = sum(len(body.triangles) for body in bodies)
         answer.is_selected = is_selected(bodies)
         if self.question.distance is not None:
@@ -112,7 +114,7 @@ class Asker:
 
         A body meets itself in its own space: a transform changes no intersection, but rounds. Different bodies meet in the world.
         """
-        bodies = [body for body in bodies if len(body.triangles)]
+        bodies = [body for body in bodies if body.has_faces]
         asked = [([body], True) for body in bodies] if self.question.itself else []
         if self.question.between and len(bodies) > 1:
             asked.append((bodies, False))
@@ -134,7 +136,7 @@ class Asker:
 
     def _near(self, answer, bodies, cancel, progress):
         question = self.question
-        bodies = [body for body in bodies if len(body.triangles)]
+        bodies = [body for body in bodies if body.has_faces]
         if not bodies:
             return
         which = {(True, True): "all", (True, False): "self", (False, True): "between"}[question.itself, question.between]

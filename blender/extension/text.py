@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 __all__ = [
-    "are", "besides", "counted", "disabled", "gone", "hits", "lines_of_answer", "lines_of_place", "of_answer", "of_frames", "pairs", "unseen", "whom"
+    "are", "besides", "counted", "disabled", "faceless", "gone", "hits", "lines_of_answer", "lines_of_place", "of_answer", "of_frames", "pairs", "unseen", "whom"
 ]
 
 
@@ -38,6 +38,10 @@ def disabled(names):
     return f"{', '.join(names)} {are(len(names))} disabled in the viewport"
 
 
+def faceless(names):
+    return f"{', '.join(names)} {'has' if len(names) == 1 else 'have'} no faces"
+
+
 def unseen(answer):
     """What was not looked at."""
     said = []
@@ -45,6 +49,8 @@ def unseen(answer):
         said.append(f"instances of {', '.join(answer.instancers)} were not looked at")
     if answer.disabled:
         said.append(f"{disabled(answer.disabled)}, and {'was' if len(answer.disabled) == 1 else 'were'} not looked at")
+    if answer.faceless:
+        said.append(faceless(answer.faceless))
     return said
 
 
@@ -82,6 +88,8 @@ def lines_of_answer(answer, question):
         lines.append("instances not looked at")
     if answer.disabled:
         lines.append(f"{counted(len(answer.disabled), 'object')} disabled")
+    if answer.faceless:
+        lines.append(f"{counted(len(answer.faceless), 'object')} without faces")
     return lines
 
 
@@ -98,10 +106,13 @@ def of_frames(seen):
 
 
 def unseen_of_frames(seen):
-    if not seen.n_disabled:
-        return []
-    where = ", ".join(f"{name} in {counted(n, 'frame')}" for name, n in seen.n_disabled.items())
-    return [f"left out where disabled in the viewport: {where}"]
+    said = []
+    if seen.n_disabled:
+        where = ", ".join(f"{name} in {counted(n, 'frame')}" for name, n in seen.n_disabled.items())
+        said.append(f"left out where disabled in the viewport: {where}")
+    if seen.faceless:
+        said.append(faceless(seen.faceless))
+    return said
 
 
 def _of_frames(seen):

@@ -549,6 +549,47 @@ def test_disabled_objects_are_named(cube):
         bpy.ops.impinge.check()
 
 
+def test_objects_without_faces_are_named(add, cube, scene, capfd):
+    loose = add("loose", [[0, 0, 0], [1, 0, 0]], [])
+    refused = "there is no active object with faces; loose has no faces"
+    for press in (bpy.ops.impinge.check, bpy.ops.impinge.clearance):
+        with pytest.raises(RuntimeError, match=refused):
+            press()
+    cube("a")
+    scene.impinge.which = "BETWEEN"
+    with pytest.raises(RuntimeError, match="1 object with faces is selected; loose has no faces"):
+        bpy.ops.impinge.check()
+    answer = check("ALL")
+    asked = state.found.question
+    assert text.whom(answer, asked) == "a with itself" and text.besides(answer, asked) == ["loose has no faces"]
+    assert text.lines_of_answer(answer, asked)[-1] == "1 object without faces"
+    cube("b", (1.5, 0, 0))
+    answer = check("BETWEEN")
+    assert text.whom(answer, asked) == "2 objects with each other and themselves" and answer.faceless == ["loose"]
+    capfd.readouterr()
+    assert bpy.ops.impinge.scan() == {"FINISHED"}
+    assert "20 of 20 frames intersect, the first is 1; loose has no faces" in capfd.readouterr().out
+    # One that has faces in some frames is not without.
+    loose.data = bpy.data.objects["a"].data
+    build = loose.modifiers.new("build", "BUILD")
+    build.frame_start, build.frame_duration = 5, 10
+    assert bpy.ops.impinge.scan() == {"FINISHED"}
+    assert "no faces" not in capfd.readouterr().out
+
+
+def test_the_first_metaball_has_the_faces_of_its_family(cube):
+    cube("cube", (2.5, 0, 0)).select_set(False)
+    ball("ball")
+    ball("ball.001", (2.0, 0, 0))
+    said = r"ball\.001 \(the first metaball of its family has the faces of all\) has no faces"
+    with pytest.raises(RuntimeError, match=said):
+        check("ACTIVE")
+    bpy.data.objects["cube"].select_set(True)
+    answer = check("BETWEEN")
+    assert answer.names == ["cube", "ball"] and answer.n_pairs > 0
+    assert len(answer.faceless) == 1 and answer.faceless[0].startswith("ball.001 (")
+
+
 def test_whom_was_asked_about(cube):
     cube("a")
     cube("b", (1.5, 1.5, 1.5))
@@ -980,10 +1021,10 @@ def test_errors_name_the_object(cube):
 
 def test_nothing_to_ask(cube):
     bpy.context.scene.impinge.which = "BETWEEN"
-    with pytest.raises(RuntimeError, match="Check: select 2 or more objects that have faces; 0 objects are selected"):
+    with pytest.raises(RuntimeError, match="Check: select 2 or more objects that have faces; 0 objects with faces are selected"):
         bpy.ops.impinge.check()
     cube("a")
-    with pytest.raises(RuntimeError, match="1 object is selected"):
+    with pytest.raises(RuntimeError, match="1 object with faces is selected"):
         bpy.ops.impinge.check()
 
 

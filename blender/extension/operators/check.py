@@ -33,14 +33,17 @@ def wanted(context):
     return names
 
 
-def expect_enough(which, names):
-    """Raises ValueError where these objects are too few."""
-    if which == "ACTIVE" and not names:
-        raise ValueError("there is no active object with faces")
+def expect_enough(which, names, faceless=()):
+    """Raises ValueError where these objects are too few. The error names those without faces."""
     least = 2 if which == "BETWEEN" else 1
-    if len(names) < least:
-        selected = f"{text.counted(len(names), 'object')} {text.are(len(names))} selected"
-        raise ValueError(f"select {least} or more objects that have faces; {selected}")
+    if len(names) >= least:
+        return
+    if which == "ACTIVE":
+        said = "there is no active object with faces"
+    else:
+        selected = f"{text.counted(len(names), 'object')} with faces {text.are(len(names))} selected"
+        said = f"select {least} or more objects that have faces; {selected}"
+    raise ValueError("; ".join([said, text.faceless(faceless)] if faceless else [said]))
 
 
 class Asking(Waiting):
@@ -53,12 +56,13 @@ class Asking(Waiting):
         frame = context.scene.frame_current
         disabled = meshes.disabled(context, names)
         bodies = meshes.read(context, names, settings.selected_only)
-        names = [body.name for body in bodies]
-        expect_enough(settings.which, names)
+        names = [body.name for body in bodies if body.has_faces]
+        faceless = meshes.faceless(context.scene, [body.name for body in bodies if not body.has_faces])
+        expect_enough(settings.which, names, faceless)
         topology = {name: meshes.topology(object) for name, object in zip(names, meshes.named(context.scene, names))}
         instancers = meshes.instancers(context, settings.which)
         answer = yield Job(lambda cancel, progress: Asker(asked).find(bodies, cancel, progress))
-        answer.topology, answer.instancers, answer.disabled = topology, instancers, disabled
+        answer.topology, answer.instancers, answer.disabled, answer.faceless = topology, instancers, disabled, faceless
         state.show(answer, asked, frame)
         said = "; ".join([f"{text.whom(answer, asked)}: {text.of_answer(answer, asked)}", *text.besides(answer, asked)])
         self.report({"WARNING"} if text.unseen(answer) else {"INFO"}, said)

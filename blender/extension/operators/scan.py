@@ -32,6 +32,7 @@ class IMPINGE_OT_scan(Waiting, bpy.types.Operator):
         asker = Asker(question(settings))
         selected_only = settings.selected_only
         scene_uid, before, subframe = context.scene.session_uid, context.scene.frame_current, context.scene.frame_subframe
+        with_faces, labels = set(), dict(zip(names, meshes.faceless(context.scene, names)))
         seen = Frames(*span(context.scene), settings.step)
         try:
             for frame in visited(context.scene, seen.wanted):
@@ -43,6 +44,7 @@ class IMPINGE_OT_scan(Waiting, bpy.types.Operator):
                     continue
                 seen.n_disabled.update(meshes.disabled(context, names))
                 bodies = meshes.read(context, names, selected_only)
+                with_faces.update(body.name for body in bodies if body.has_faces)
                 seen.is_selected |= is_selected(bodies)
                 seen.add(frame, (yield Job(lambda cancel, progress, bodies=bodies: asker.count(bodies, cancel, progress))))
                 state.running.frames = (len(seen.counts), len(seen.wanted))
@@ -54,6 +56,8 @@ class IMPINGE_OT_scan(Waiting, bpy.types.Operator):
                 select(context, scene, selected & set(seen.n_disabled))
                 # A scan that was stopped shows how far it has come.
                 show(scene, seen)
+        # Those that were disabled in all frames may have faces.
+        seen.faceless = [labels[name] for name in names if name not in with_faces and seen.n_disabled[name] < len(seen.counts)]
         self.report({"WARNING"} if text.unseen_of_frames(seen) else {"INFO"}, text.of_frames(seen))
 
 
