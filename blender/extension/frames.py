@@ -27,6 +27,8 @@ class Frames:
         self.counts = {}
         #: In how many frames objects, by name, were disabled, and so left out.
         self.n_disabled = Counter()
+        #: The objects, by name, whose instances were not looked at.
+        self.instancers = []
         #: The objects without faces in all of these frames, as messages call them.
         self.faceless = []
         #: Whether only selected faces count.

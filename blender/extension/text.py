@@ -42,11 +42,15 @@ def faceless(names):
     return f"{', '.join(names)} {'has' if len(names) == 1 else 'have'} no faces"
 
 
+def instances(names):
+    return f"instances of {', '.join(names)} were not looked at"
+
+
 def unseen(answer):
     """What was not looked at."""
     said = []
     if answer.instancers:
-        said.append(f"instances of {', '.join(answer.instancers)} were not looked at")
+        said.append(instances(answer.instancers))
     if answer.disabled:
         said.append(f"{disabled(answer.disabled)}, and {'was' if len(answer.disabled) == 1 else 'were'} not looked at")
     if answer.faceless:
@@ -107,6 +111,8 @@ def of_frames(seen):
 
 def unseen_of_frames(seen):
     said = []
+    if seen.instancers:
+        said.append(instances(seen.instancers))
     if seen.n_disabled:
         where = ", ".join(f"{name} in {counted(n, 'frame')}" for name, n in seen.n_disabled.items())
         said.append(f"left out where disabled in the viewport: {where}")

@@ -936,6 +936,27 @@ def test_scan_of_topology_that_changes(cube, grid, scene):
     assert (scene.impinge.first_frame, scene.impinge.n_hits) == (4, 3)
 
 
+def test_a_scan_says_whose_instances_were_not_looked_at(cube, scene, capfd):
+    cube("part", (9, 0, 0)).select_set(False)
+    empty = added("empty", None)
+    empty.instance_type = "COLLECTION"
+    empty.instance_collection = bpy.data.collections.new("parts")
+    empty.instance_collection.objects.link(bpy.data.objects["part"])
+    cube("b", (9, 0, 0))
+    a = cube("a")
+    # Copies, from frame 10 on.
+    modifier = a.modifiers.new("nodes", "NODES")
+    modifier.node_group = node_group(copies("object"))
+    for frame in (1, 10):
+        modifier.show_viewport = frame == 10
+        modifier.keyframe_insert("show_viewport", frame=frame)
+    scene.frame_set(1)
+    for which, names in (("ACTIVE", "a"), ("BETWEEN", "empty, a")):
+        scene.impinge.which = which
+        assert bpy.ops.impinge.scan() == {"FINISHED"}
+        assert f"none of 20 frames intersects; instances of {names} were not looked at" in capfd.readouterr().out
+
+
 def test_a_scan_leaves_out_what_is_disabled_in_a_frame(cube, grid, scene, capfd):
     made = solid(grid)
     cube("cube", (0.5, 0.5, 0), 0.4)

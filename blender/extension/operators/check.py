@@ -60,7 +60,7 @@ class Asking(Waiting):
         faceless = meshes.faceless(context.scene, [body.name for body in bodies if not body.has_faces])
         expect_enough(settings.which, names, faceless)
         topology = {name: meshes.topology(object) for name, object in zip(names, meshes.named(context.scene, names))}
-        instancers = meshes.instancers(context, settings.which)
+        instancers = meshes.instancers(context, meshes.meant(context, settings.which))
         answer = yield Job(lambda cancel, progress: Asker(asked).find(bodies, cancel, progress))
         answer.topology, answer.instancers, answer.disabled, answer.faceless = topology, instancers, disabled, faceless
         state.show(answer, asked, frame)

@@ -27,7 +27,7 @@ class IMPINGE_OT_scan(Waiting, bpy.types.Operator):
 
     def steps(self, context):
         settings = context.scene.impinge
-        names = wanted(context)
+        names, meant = wanted(context), meshes.meant(context, settings.which)
         selected = {object.name_full for object in context.selected_objects}
         asker = Asker(question(settings))
         selected_only = settings.selected_only
@@ -43,6 +43,7 @@ class IMPINGE_OT_scan(Waiting, bpy.types.Operator):
                 if frame not in seen.wanted:
                     continue
                 seen.n_disabled.update(meshes.disabled(context, names))
+                seen.instancers += meshes.instancers(context, [name for name in meant if name not in seen.instancers])
                 bodies = meshes.read(context, names, selected_only)
                 with_faces.update(body.name for body in bodies if body.has_faces)
                 seen.is_selected |= is_selected(bodies)
@@ -64,7 +65,8 @@ class IMPINGE_OT_scan(Waiting, bpy.types.Operator):
 def select(context, scene, names):
     """Selects the objects of these full names that can be."""
     for object in meshes.named(scene, names - set(meshes.disabled(context, names))):
-        object.select_set(True)
+        if object is not None:
+            object.select_set(True)
 
 
 def scene_of(uid):
