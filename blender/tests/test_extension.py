@@ -716,7 +716,7 @@ def test_objects_that_share_a_mesh_in_edit_mode(grid):
             bpy.data.objects.remove(made)
 
 
-def test_a_mesh_of_another_file_cannot_be_selected(cube, tmp_path):
+def test_a_mesh_of_another_file_cannot_be_selected(cube, tmp_path, capfd):
     a = cube("a")
     a.data.name = "theirs"
     bpy.data.libraries.write(str(tmp_path / "library.blend"), {a.data})
@@ -727,10 +727,25 @@ def test_a_mesh_of_another_file_cannot_be_selected(cube, tmp_path):
     answer = check("BETWEEN")
     assert answer.n_pairs > 0 and len(answer.faces["a"])
     bpy.context.view_layer.objects.active = a
+    capfd.readouterr()
     bpy.ops.impinge.select()
+    assert "Warning: 3 faces selected, not those of a (of another file)" in capfd.readouterr().out
     assert {made.name for made in bpy.context.objects_in_mode} == {"b"}
     bpy.ops.object.mode_set(mode="OBJECT")
     assert selected(b) == answer.faces["b"].tolist()
+
+
+def test_faces_of_a_hidden_object_are_not_selected_and_that_is_said(cube, capfd):
+    a, b = cube("a"), cube("b", (1.5, 1.5, 1.5))
+    check("BETWEEN")
+    b.hide_set(True)
+    capfd.readouterr()
+    assert bpy.ops.impinge.select() == {"FINISHED"}
+    assert "Warning: 3 faces selected, not those of b (hidden)" in capfd.readouterr().out
+    bpy.ops.object.mode_set(mode="OBJECT")
+    a.hide_viewport = True
+    assert bpy.ops.impinge.select() == {"CANCELLED"}
+    assert "Warning: Select: no face selected, not those of a (hidden), b (hidden)" in capfd.readouterr().out
 
 
 def test_select_one_place(cube):

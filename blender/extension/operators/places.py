@@ -81,7 +81,7 @@ class IMPINGE_OT_select(bpy.types.Operator):
                 self.report({"ERROR"}, "Select: go to a place first")
                 return {"CANCELLED"}
             faces = found.answer.places[found.place].faces
-        objects, gone = {}, []
+        objects, gone, left = {}, [], []
         for object, (name, polygons) in zip(meshes.named(context.scene, faces), faces.items()):
             if not len(polygons):
                 continue
@@ -95,11 +95,13 @@ class IMPINGE_OT_select(bpy.types.Operator):
                 return {"CANCELLED"}
             if object.visible_get() and object.data.is_editable:
                 objects[object] = polygons
-        if not objects and gone:
-            self.report({"WARNING"}, f"Select: {text.gone(gone)}")
-            return {"CANCELLED"}
+            else:
+                left.append(f"{name} ({'of another file' if object.visible_get() else 'hidden'})")
+        missing = [f"not those of {', '.join(left)}"] if left else []
+        if gone:
+            missing.append(text.gone(gone))
         if not objects:
-            self.report({"WARNING"}, "Select: no face that was found belongs to a visible mesh of this file")
+            self.report({"WARNING"}, f"Select: {', '.join(['no face selected', *missing])}")
             return {"CANCELLED"}
         if context.mode != "OBJECT":
             bpy.ops.object.mode_set(mode="OBJECT")
@@ -122,9 +124,8 @@ class IMPINGE_OT_select(bpy.types.Operator):
         if found.answer.n_made and not self.place_only:
             made = text.counted(found.answer.n_made, "triangle")
             said.append(f"{made} {'belongs' if found.answer.n_made == 1 else 'belong'} to no face of a mesh")
-        if gone:
-            said.append(text.gone(gone))
-        self.report({"WARNING"} if gone or n_hidden else {"INFO"}, ", ".join(said))
+        said += missing
+        self.report({"WARNING"} if missing or n_hidden else {"INFO"}, ", ".join(said))
         return {"FINISHED"}
 
 
