@@ -66,7 +66,7 @@ class IMPINGE_PT_found(Part, bpy.types.Panel):
 
     @classmethod
     def poll(cls, context):
-        return state.found is not None
+        return state.found_in(context.scene) is not None
 
     def draw(self, context):
         found = state.found

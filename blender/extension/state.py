@@ -6,15 +6,16 @@ from dataclasses import dataclass
 
 from bpy.app.handlers import persistent
 
-__all__ = ["Found", "Running", "forget", "found", "run", "running", "show"]
+__all__ = ["Found", "Running", "forget", "found", "found_in", "run", "running", "show"]
 
 
 @dataclass
 class Found:
-    """An answer, and the frame that it is about."""
+    """An answer, and the scene and the frame that it is about. The scene is named by its `session_uid`, which outlives an undo."""
 
     answer: object
     question: object
+    scene_uid: int
     frame: int
     #: Which place the view was taken to.
     place: int = -1
@@ -34,10 +35,15 @@ found: Found | None = None
 running: Running | None = None
 
 
-def show(answer, question, frame):
+def show(answer, question, scene_uid, frame):
     """Makes this the answer that the panel shows."""
     global found
-    found = Found(answer, question, frame)
+    found = Found(answer, question, scene_uid, frame)
+
+
+def found_in(scene):
+    """The last answer, if it is about this scene, or None."""
+    return found if found is not None and found.scene_uid == scene.session_uid else None
 
 
 @persistent

@@ -783,6 +783,31 @@ def test_step_takes_the_view_there(cube, scene):
     assert view.view_perspective == "PERSP" and scene.frame_current == 3
 
 
+def test_an_answer_belongs_to_its_scene(cube, scene):
+    from bl_ext.user_default.impinge import panel
+
+    cube("a")
+    cube("b", (1.5, 1.5, 1.5))
+    scene.frame_set(9)
+    check("BETWEEN")
+    buttons = (panel.IMPINGE_PT_found, bpy.ops.impinge.step, bpy.ops.impinge.select)
+
+    def can_be_pressed():
+        return [button.poll(bpy.context) if button is panel.IMPINGE_PT_found else button.poll() for button in buttons]
+
+    bpy.context.window.scene = bpy.data.scenes.new("other")
+    assert can_be_pressed() == [False] * 3
+    bpy.context.window.scene = scene
+    scene.name = "renamed"
+    assert can_be_pressed() == [True] * 3
+    bpy.ops.ed.undo_push(message="before")
+    bpy.context.scene.frame_set(3)
+    bpy.ops.ed.undo_push(message="after")
+    bpy.ops.ed.undo()
+    assert can_be_pressed() == [True] * 3 and bpy.ops.impinge.step(by=1) == {"FINISHED"}
+    assert bpy.context.scene.frame_current == 9
+
+
 def test_the_view_stays_far_enough_from_a_small_place_to_draw_it(add, scene):
     add("floor", [[-2, -2, 0], [2, -2, 0], [2, 2, 0], [-2, 2, 0]], [(0, 1, 2, 3)])
     add("tip", [[0.1, 0.2, 1e-5], [-0.5, 0, -1], [0.5, 0, -1]], [(0, 1, 2)])

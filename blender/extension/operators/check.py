@@ -53,7 +53,7 @@ class Asking(Waiting):
         settings = context.scene.impinge
         names = wanted(context)
         asked = question(settings, self.distance(settings))
-        frame = context.scene.frame_current
+        scene_uid, frame = context.scene.session_uid, context.scene.frame_current
         disabled = meshes.disabled(context, names)
         bodies = meshes.read(context, names, settings.selected_only)
         names = [body.name for body in bodies if body.has_faces]
@@ -63,7 +63,7 @@ class Asking(Waiting):
         instancers = meshes.instancers(context, meshes.meant(context, settings.which))
         answer = yield Job(lambda cancel, progress: Asker(asked).find(bodies, cancel, progress))
         answer.topology, answer.instancers, answer.disabled, answer.faceless = topology, instancers, disabled, faceless
-        state.show(answer, asked, frame)
+        state.show(answer, asked, scene_uid, frame)
         said = "; ".join([f"{text.whom(answer, asked)}: {text.of_answer(answer, asked)}", *text.besides(answer, asked)])
         self.report({"WARNING"} if text.unseen(answer) else {"INFO"}, said)
 

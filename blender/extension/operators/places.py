@@ -12,10 +12,6 @@ from .. import meshes, state, text
 __all__ = ["CLASSES"]
 
 
-def has_places():
-    return state.found is not None and bool(state.found.answer.places)
-
-
 class IMPINGE_OT_step(bpy.types.Operator):
     """Take the view to the next place, or to the one before"""
 
@@ -26,7 +22,8 @@ class IMPINGE_OT_step(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return has_places()
+        found = state.found_in(context.scene)
+        return found is not None and bool(found.answer.places)
 
     def execute(self, context):
         found = state.found
@@ -71,7 +68,8 @@ class IMPINGE_OT_select(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return state.found is not None and state.found.answer.has_faces
+        found = state.found_in(context.scene)
+        return found is not None and found.answer.has_faces
 
     def execute(self, context):
         found = state.found
