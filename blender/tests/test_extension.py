@@ -1,7 +1,9 @@
 """The extension as it was packed and installed: known scenes, transforms, modifiers, modes, animations, and stopping."""
 
+import re
 import threading
 import time
+from pathlib import Path
 from types import SimpleNamespace
 
 import bmesh
@@ -588,6 +590,21 @@ def test_the_first_metaball_has_the_faces_of_its_family(cube):
     answer = check("BETWEEN")
     assert answer.names == ["cube", "ball"] and answer.n_pairs > 0
     assert len(answer.faceless) == 1 and answer.faceless[0].startswith("ball.001 (")
+
+
+def test_the_scripts_of_the_guide(cube, capsys):
+    guide = Path(__file__).resolve().parents[2] / "book/src/guides/blender.md"
+    scan_all, read_answer = re.findall(r"```python\n(.*?)```", guide.read_text(), flags=re.S)
+    a, b = cube("a"), cube("b", (1.5, 1.5, 1.5))
+    a.select_set(False)
+    exec(scan_all, {})
+    assert capsys.readouterr().out.endswith("20 of 20 frames, the first is 1\n")
+    exec(read_answer, {})
+    out = capsys.readouterr().out
+    assert "places: 1\n" in out and "a [1, 3, 5]\nb [0, 2, 4]\n('a', 'b') " in out
+    b.location.x = 9
+    exec(scan_all, {})
+    assert capsys.readouterr().out.endswith("nothing intersects\n")
 
 
 def test_whom_was_asked_about(cube):

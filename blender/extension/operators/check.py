@@ -80,7 +80,7 @@ class IMPINGE_OT_check(Asking, bpy.types.Operator):
 
 
 class IMPINGE_OT_clearance(Asking, bpy.types.Operator):
-    """Find what is nearer than the distance, in this frame, modifiers included"""
+    """Find what is at most the distance apart, in this frame, modifiers included"""
 
     bl_idname = "impinge.clearance"
     bl_label = "Find Clearance"
