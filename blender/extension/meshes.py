@@ -14,7 +14,7 @@ __all__ = ["KINDS", "chosen", "disabled", "faceless", "instancers", "meant", "na
 
 #: Kinds of objects that have faces.
 KINDS = ("MESH", "CURVE", "SURFACE", "FONT", "META")
-#: Fills up the numbers of an instance: its own, then those of the instances in which it is.
+#: What follows the numbers in `persistent_id` of an instance: its own, then those of the instances in which it is.
 NO_ID = 2**31 - 1
 #: Begins the names of layers of the objects' own meshes that live while a question is read: the number of each face, from 1.
 NUMBER = "impinge_number"
@@ -87,8 +87,7 @@ def _is_of_another(instance):
     """Whether it shows anything but an object's own faces: of a curve, a text, a metaball these are an instance, too, which is in none."""
     if not instance.is_instance or instance.parent is None:
         return False
-    is_own = instance.object.original == instance.parent.original and instance.persistent_id[1] == NO_ID
-    return not is_own
+    return instance.object.original != instance.parent.original or instance.persistent_id[1] != NO_ID
 
 
 def topology(object):
@@ -109,7 +108,7 @@ def read(context, names, selected_only=False):
     objects = named(context.scene, names)
     if None in objects:
         raise ValueError(f"{names[objects.index(None)]} is no longer in the scene")
-    absent = disabled(context, names)
+    absent = set(disabled(context, names))
     objects = [object for name, object in zip(names, objects) if name not in absent]
     for object in objects:
         if object.mode == "EDIT":

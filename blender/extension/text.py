@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 __all__ = [
-    "are", "besides", "counted", "disabled", "faceless", "gone", "hits", "lines_of_answer", "lines_of_place", "of_answer", "of_frames", "pairs", "unseen", "whom"
+    "are", "besides", "counted", "disabled", "faceless", "gone", "hits", "lines_of_answer", "lines_of_place", "of_answer", "of_frames", "pairs",
+    "unseen", "unseen_of_frames", "whom",
 ]
 
 
@@ -110,6 +111,7 @@ def of_frames(seen):
 
 
 def unseen_of_frames(seen):
+    """What a scan has not looked at."""
     said = []
     if seen.instancers:
         said.append(instances(seen.instancers))

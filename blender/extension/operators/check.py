@@ -54,8 +54,9 @@ class Asking(Waiting):
         names = wanted(context)
         asked = question(settings, self.distance(settings))
         scene_uid, frame = context.scene.session_uid, context.scene.frame_current
-        disabled = meshes.disabled(context, names)
         bodies = meshes.read(context, names, settings.selected_only)
+        there = {body.name for body in bodies}
+        disabled = [name for name in names if name not in there]
         names = [body.name for body in bodies if body.has_faces]
         faceless = meshes.faceless(context.scene, [body.name for body in bodies if not body.has_faces])
         expect_enough(settings.which, names, faceless)

@@ -42,9 +42,10 @@ class IMPINGE_OT_scan(Waiting, bpy.types.Operator):
                 scene.frame_set(frame)
                 if frame not in seen.wanted:
                     continue
-                seen.n_disabled.update(meshes.disabled(context, names))
                 seen.instancers += meshes.instancers(context, [name for name in meant if name not in seen.instancers])
                 bodies = meshes.read(context, names, selected_only)
+                there = {body.name for body in bodies}
+                seen.n_disabled.update(name for name in names if name not in there)
                 with_faces.update(body.name for body in bodies if body.has_faces)
                 seen.is_selected |= is_selected(bodies)
                 seen.add(frame, (yield Job(lambda cancel, progress, bodies=bodies: asker.count(bodies, cancel, progress))))
