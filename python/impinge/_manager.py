@@ -535,8 +535,9 @@ class _Asked:
         known = self._convex.get(number)
         if known is None:
             scene = self.scene
+            # At rest: far from the origin moved positions are rounded so much that faces are flat no longer.
             known = scene.kind(number) == "triangles" and _is_convex(
-                scene.positions(number), scene.elements(number)
+                scene.rest_positions(number), scene.elements(number)
             )
             self._convex[number] = known
         return known

@@ -1,5 +1,6 @@
 """`CollisionManager`: beside trimesh's, whose collisions FCL decides, where both are installed."""
 
+
 import numpy as np
 import pytest
 
@@ -51,7 +52,6 @@ def test_objects_come_move_and_go():
     with pytest.raises(ValueError, match="^matrix: shape"):
         balls.add_object("d", (vertices, faces), np.eye(3))
     assert balls.names == ["b", "a"] and not balls.in_collision_single((vertices, faces), shift(50))
-
 
 
 def test_guests_are_kept_and_followed():
@@ -204,6 +204,39 @@ def test_how_deep_convex_objects_overlap():
     assert made.min_distance_single(cube(), shift(6)) == 0
     [touching] = made.in_collision_single(cube(), shift(6), return_data=True)[1]
     assert touching.depth == 0 and touching.normal.tolist() == [1, 0, 0]
+
+
+def turned():
+    """A cube with more vertices than it needs, turned, in float32: flat but for rounding, which grows with coordinates."""
+    side = np.linspace(-0.5, 0.5, 3)
+    corners, faces = [], []
+    for axis in range(3):
+        for sign in (-1, 1):
+            u, v = np.meshgrid(side, side, indexing="ij")
+            at = np.stack([np.full(9, 0.5 * sign), u.ravel(), v.ravel()], 1)[:, np.roll(np.arange(3), axis)]
+            for i in range(2):
+                for j in range(2):
+                    a, b, c, d = (9 * len(corners) + 3 * i + j + k for k in (0, 1, 3, 4))
+                    faces += [[a, c, d], [a, d, b]] if sign > 0 else [[a, d, c], [a, b, d]]
+            corners.append(at)
+    axis = np.array([1.0, 2, 3]) / np.sqrt(14)
+    cross = np.cross(np.eye(3), axis)
+    turn = np.eye(3) + np.sin(0.3) * cross + (1 - np.cos(0.3)) * cross @ cross
+    vertices, faces, _ = impinge.weld(np.concatenate(corners), faces)
+    return (vertices @ turn.T).astype(np.float32), faces
+
+
+def test_a_depth_does_not_depend_on_where_objects_are():
+    """Far from the origin the moved vertices are rounded so that they are convex no longer: the object still is."""
+    near, far = impinge.CollisionManager(**SETTINGS), impinge.CollisionManager(**SETTINGS)
+    mesh = turned()
+    for made, at in [(near, np.zeros(3)), (far, np.array([20, 6.7, 2.9]))]:
+        made.add_object("a", mesh, shift(*at))
+        made.add_object("b", mesh, shift(*at + [0.5, 0.1, 0]))
+    expected = near.min_distance_internal()
+    assert expected == pytest.approx(-0.4964, abs=1e-3)
+    assert far.min_distance_internal() == pytest.approx(expected, abs=1e-4)
+    assert len(far.in_collision_internal(return_data=True)[1]) == 1
 
 
 def bowl():
