@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from ._answers import Pairs
 from ._detector import Detector
+from ._functions import Settings
 from ._impinge import Body, Contacts
 from ._scene import Scene
 
@@ -138,6 +139,10 @@ class CollisionManager:
     """
 
     def __init__(self, **settings: Any) -> None:
+        for name in settings:
+            if name not in Settings.__annotations__:
+                allowed = ", ".join(Settings.__annotations__)
+                raise TypeError(f"CollisionManager: {name!r} is no setting of a Detector: {allowed} are")
         self._settings = settings
         self._objects: dict[_Name, _Object] = {}
         #: Changes with any object.
@@ -175,8 +180,12 @@ class CollisionManager:
         Raises
         ------
         ValueError, TypeError
-            As `Scene.add` and `Scene.set_transform`; nothing is changed then.
+            As `Scene.add` and `Scene.set_transform`, or a name that is not hashable; nothing is changed then.
         """
+        try:
+            hash(name)
+        except TypeError:
+            raise TypeError(f"name: something hashable expected, {type(name).__name__} given") from None
         # It is kept, and the caller may go on to write to it.
         matrix = None if transform is None else np.array(transform)
         body = self._own.add(name, mesh, matrix)
@@ -369,6 +378,10 @@ class CollisionManager:
 
     def _with(self, other: CollisionManager) -> _Asked:
         """The objects of both managers, of which pairs of one of each are asked about."""
+        if not isinstance(other, CollisionManager):
+            given = type(other)
+            name = given.__name__ if given.__module__ == "builtins" else f"{given.__module__}.{given.__name__}"
+            raise TypeError(f"other_manager: an impinge.CollisionManager expected, {name} given")
         joint = self._joint
         if joint is None or joint.other() is not other:
             joint = self._joint = _Joint(self._settings, other)

@@ -1,6 +1,5 @@
 """`CollisionManager`: beside trimesh's, whose collisions FCL decides, where both are installed."""
 
-
 import numpy as np
 import pytest
 
@@ -52,6 +51,21 @@ def test_objects_come_move_and_go():
     with pytest.raises(ValueError, match="^matrix: shape"):
         balls.add_object("d", (vertices, faces), np.eye(3))
     assert balls.names == ["b", "a"] and not balls.in_collision_single((vertices, faces), shift(50))
+
+
+def test_what_is_no_name_and_no_manager_is_refused():
+    balls = manager(0, 9)
+    vertices, faces = ball(8, 12, np.float64)
+    with pytest.raises(TypeError, match="^name: something hashable expected, list given"):
+        balls.add_object(["c"], (vertices, faces))
+    # Nothing has been left behind that would collide.
+    assert len(balls) == 2 and balls.in_collision_internal(return_names=True) == (False, set())
+    for ask in [balls.in_collision_other, balls.min_distance_other]:
+        for other in [None, object(), [balls]]:
+            with pytest.raises(TypeError, match="^other_manager: an impinge.CollisionManager expected, .* given"):
+                ask(other)
+    with pytest.raises(TypeError, match="^CollisionManager: 'thread' is no setting of a Detector"):
+        impinge.CollisionManager(thread=1)
 
 
 def test_guests_are_kept_and_followed():
