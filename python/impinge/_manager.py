@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterator
+from copy import copy
 from functools import cached_property
 from itertools import count
 from typing import Any, NamedTuple
@@ -111,7 +112,12 @@ class CollisionManager:
     """Rigid objects by name, and which of them collide. The methods are those of ``trimesh.collision.CollisionManager``.
 
     Two objects collide if and only if two of their faces share a point where their moved vertices are, touching
-    included; an object inside another one without touching it does not collide with it, as faces are surfaces.
+    included. Faces are surfaces: an object that lies wholly inside another one, without touching it, does not collide with it, and its
+    distance is that to the other's faces. trimesh 5.2 hands convex meshes to FCL as solids, so that whatever lies within one collides
+    with it. `impinge.contains`, asked about a vertex of the inner object, tells.
+
+    Managers copy and pickle with their settings and all objects, and copies are independent of each other: each process, or each
+    thread, may have one.
 
     How deep objects overlap: of two convex ones the shortest way that takes them apart, as FCL has it; of other closed ones how
     far their deepest region of contact extends along its normal.
@@ -161,6 +167,28 @@ class CollisionManager:
 
     def __contains__(self, name: object) -> bool:
         return name in self._objects
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What copies and pickles are made of: the settings, a scene of their own, and the number and transform of each object."""
+        state = dict(vars(self))
+        for of_this_one in ("_own", "_joint", "_stamp"):
+            del state[of_this_one]
+        state["_settings"] = dict(self._settings)
+        state["_scene"] = copy(self._own.scene)
+        state["_objects"] = [(name, int(held.body), held.transform) for name, held in self._objects.items()]
+        return state
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        state = dict(state)
+        scene, objects = state.pop("_scene"), state.pop("_objects")
+        CollisionManager.__init__(self, **state["_settings"])
+        vars(self).update(state)
+        self._own.scene = scene
+        bodies = {int(body): body for body in scene.bodies}
+        for name, number, matrix in objects:
+            self._own.name(name, bodies[number])
+            stamp = _new_stamp()
+            self._objects[name] = _Object(bodies[number], matrix, stamp, stamp)
 
     def __repr__(self) -> str:
         return f"CollisionManager({len(self)} objects)"
@@ -410,9 +438,13 @@ class _Asked:
             except BaseException:
                 scene.remove(body)
                 raise
+        self.name(name, body, after)
+        return body
+
+    def name(self, name: _Name, body: Body, after: int = 0) -> None:
+        """Names a body of the scene; it comes after those that are named, and by `after` later."""
         self._names[int(body)] = name
         self._order[int(body)] = after + _new_stamp()
-        return body
 
     def remove(self, body: Body) -> None:
         self.scene.remove(body)

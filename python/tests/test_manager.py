@@ -1,5 +1,9 @@
 """`CollisionManager`: beside trimesh's, whose collisions FCL decides, where both are installed."""
 
+import copy
+import multiprocessing
+import pickle
+
 import numpy as np
 import pytest
 
@@ -66,6 +70,65 @@ def test_what_is_no_name_and_no_manager_is_refused():
                 ask(other)
     with pytest.raises(TypeError, match="^CollisionManager: 'thread' is no setting of a Detector"):
         impinge.CollisionManager(thread=1)
+
+
+def pickled(thing):
+    return pickle.loads(pickle.dumps(thing))
+
+
+@pytest.mark.parametrize("duplicate", [copy.copy, copy.deepcopy, pickled])
+def test_managers_pickle_and_copy(duplicate):
+    balls = manager(0, 1.5, 9)
+    vertices, faces = ball(6, 8, np.float32)
+    # Replaced, so it comes last; tetrahedra; without a transform.
+    balls.add_object("a", (vertices, faces), shift(0.25))
+    balls.add_object(("tip", 1), (5 * np.eye(4, 3), [[0, 1, 2, 3]], "tetrahedra"))
+    far = manager(0.5, radius=0.5)
+    assert balls.in_collision_other(far)
+    other = duplicate(balls)
+    assert other.names == balls.names == ["b", "c", "a", ("tip", 1)]
+
+    def answers(made):
+        hit, names, data = made.in_collision_internal(True, True)
+        told = sorted((sorted(map(repr, each.names)), each.depth, each.point.tolist(), each.normal.tolist()) for each in data)
+        return hit, names, told, made.in_collision_other(far, True), made.min_distance_internal("c", True)
+
+    assert answers(other) == answers(balls)
+    # Neither knows what becomes of the other.
+    before = answers(balls)
+    other.set_transform("c", shift(0.5))
+    other.remove_object("b")
+    other.add_object("d", (vertices, faces))
+    assert answers(balls) == before and len(balls) == len(other) == 4
+    assert ("a", "c") in other.in_collision_internal(True)[1]
+    balls.set_transform("a", shift(30))
+    balls.remove_object("c")
+    assert ("a", "c") in other.in_collision_internal(True)[1]
+    assert duplicate(impinge.CollisionManager(**SETTINGS)).min_distance_internal() == np.inf
+
+
+class Planner(impinge.CollisionManager):
+    """A manager with something of its own."""
+
+    margin = 0.0
+
+
+def test_subclasses_pickle_what_they_have():
+    made = Planner(**SETTINGS)
+    made.margin = 0.25
+    made.add_object("cube", cube())
+    for other in (pickled(made), copy.copy(made)):
+        assert type(other) is Planner and other.margin == 0.25 and other.names == ["cube"]
+
+
+def in_process(balls):
+    return balls.in_collision_internal(True), balls.min_distance_internal("c")
+
+
+def test_each_process_has_its_copy():
+    balls = manager(0, 1.5, 9)
+    with multiprocessing.get_context("spawn").Pool(1) as pool:
+        assert pool.apply(in_process, (balls,)) == in_process(balls)
 
 
 def test_guests_are_kept_and_followed():
