@@ -80,7 +80,7 @@ from ._impinge import (
     read,
     read_bodies,
 )
-from ._manager import CollisionManager
+from ._manager import CollisionManager, scene_to_collision
 from ._query import Query, groups, rings
 from ._scene import Scene
 
@@ -143,6 +143,7 @@ __all__ = [
     "read",
     "read_bodies",
     "rings",
+    "scene_to_collision",
     "self_pairs",
     "signed_distance",
     "tiles",

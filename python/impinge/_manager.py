@@ -18,7 +18,7 @@ from ._functions import Settings
 from ._impinge import Body, Contacts
 from ._scene import Scene
 
-__all__ = ["CollisionManager", "ContactData", "DistanceData"]
+__all__ = ["CollisionManager", "ContactData", "DistanceData", "scene_to_collision"]
 
 _Array = Any
 _Name = Hashable
@@ -415,6 +415,49 @@ class CollisionManager:
             joint = self._joint = _Joint(self._settings, other)
         joint.update(self, other)
         return joint
+
+
+def scene_to_collision(scene: Any, **settings: Any) -> tuple[CollisionManager, dict[str, str]]:
+    """A manager of all meshes of a ``trimesh.Scene``, each where its node puts it, as ``trimesh.collision.scene_to_collision``.
+
+    Parameters
+    ----------
+    scene : trimesh.Scene
+    **settings
+        As for `Detector`.
+
+    Returns
+    -------
+    manager : CollisionManager
+        One object per node that has a geometry, by the name of the node.
+    objects : dict
+        For each of these names that of its geometry: ``scene.geometry[objects[name]]`` is the mesh. trimesh has objects of FCL there.
+
+    Raises
+    ------
+    ValueError, TypeError
+        As `CollisionManager.add_object`, and what is no scene of trimesh.
+
+    Examples
+    --------
+    >>> import impinge
+    >>> try:
+    ...     impinge.scene_to_collision([])
+    ... except TypeError as error:
+    ...     print(error)
+    scene: a trimesh.Scene expected, list given
+    """
+    try:
+        nodes, geometry = scene.graph.nodes_geometry, scene.geometry
+    except AttributeError:
+        raise TypeError(f"scene: a trimesh.Scene expected, {type(scene).__name__} given") from None
+    manager = CollisionManager(**settings)
+    objects: dict[str, str] = {}
+    for node in nodes:
+        transform, name = scene.graph[node]
+        manager.add_object(node, geometry[name], transform)
+        objects[node] = name
+    return manager, objects
 
 
 class _Asked:

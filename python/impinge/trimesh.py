@@ -1,4 +1,4 @@
-"""Questions about points and rays under the names of trimesh: change the import, and the answers are exact.
+"""Questions about points, rays and collisions under the names of trimesh: change the import, and the answers are exact.
 
 >>> import numpy as np
 >>> from impinge.trimesh import ProximityQuery, contains
@@ -28,12 +28,21 @@ import numpy as np
 import numpy.typing as npt
 
 from ._detector import Detector
+from ._manager import CollisionManager, scene_to_collision
 from ._scene import Scene
 
 if TYPE_CHECKING:
     from ._query import _Array
 
-__all__ = ["ProximityQuery", "RayMeshIntersector", "closest_point", "contains", "signed_distance"]
+__all__ = [
+    "CollisionManager",
+    "ProximityQuery",
+    "RayMeshIntersector",
+    "closest_point",
+    "contains",
+    "scene_to_collision",
+    "signed_distance",
+]
 
 _Floats = npt.NDArray[np.float64]
 _Numbers = npt.NDArray[np.int64]

@@ -389,6 +389,31 @@ def test_many_objects():
         places[names[0]] = places[names[0]] + 0.5
 
 
+def scene_of(trimesh):
+    """Two boxes and a ball, each in its place."""
+    scene = trimesh.Scene()
+    box = trimesh.creation.box()
+    scene.add_geometry(box, node_name="left", geom_name="box")
+    scene.add_geometry(box, node_name="right", transform=shift(0.75))
+    scene.add_geometry(trimesh.creation.icosphere(), node_name="ball", geom_name="ball", transform=shift(5))
+    return scene
+
+
+def test_scenes_of_trimesh():
+    trimesh = pytest.importorskip("trimesh", reason="trimesh is not installed")
+    scene = scene_of(trimesh)
+    made, objects = impinge.scene_to_collision(scene, **SETTINGS)
+    assert set(made.names) == set(objects) == {"left", "right", "ball"}
+    assert objects["left"] == "box" and len(scene.geometry[objects["ball"]].faces) == 1280
+    assert made.in_collision_internal(return_names=True) == (True, {("left", "right")})
+    assert made.min_distance_internal("ball", True)[1] == ("ball", "right")
+    assert made.min_distance_internal("ball") == pytest.approx(2.75, abs=0.01)
+    assert impinge.trimesh.scene_to_collision is impinge.scene_to_collision
+    assert impinge.trimesh.CollisionManager is impinge.CollisionManager
+    with pytest.raises(TypeError, match="^scene: a trimesh.Scene expected, list given"):
+        impinge.scene_to_collision([])
+
+
 def test_the_same_as_trimesh():
     trimesh = pytest.importorskip("trimesh", reason="trimesh is not installed")
     pytest.importorskip("fcl", reason="python-fcl is not installed: no comparison with trimesh")
