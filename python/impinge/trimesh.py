@@ -27,6 +27,7 @@ from typing import TYPE_CHECKING, Any, Literal, SupportsIndex
 import numpy as np
 import numpy.typing as npt
 
+from ._answers import Closest
 from ._detector import Detector
 from ._manager import CollisionManager, scene_to_collision
 from ._scene import Scene
@@ -77,6 +78,13 @@ class _OfMesh:
         return self._detector.contains(self._surface(), 0, points) > 0
 
 
+def _numbers(closest: Closest) -> _Numbers:
+    """The nearest elements; -1 where there is none."""
+    numbers = closest.elements.astype(np.int64)
+    numbers[np.isinf(closest.distances)] = -1
+    return numbers
+
+
 class ProximityQuery(_OfMesh):
     """Nearest points, distances and sides of one mesh, as ``trimesh.proximity.ProximityQuery``.
 
@@ -101,10 +109,10 @@ class ProximityQuery(_OfMesh):
         distance : numpy.ndarray of float64, shape (n,)
             Rounded down.
         triangle_id : numpy.ndarray of int64, shape (n,)
-            The face with that point; of several the lowest.
+            The face with that point; of several the lowest. -1 if the mesh has no faces; the point is then NaN, the distance infinite.
         """
         closest = self._detector.closest(self._surface(), points)
-        return closest.points, closest.distances, closest.elements.astype(np.int64)
+        return closest.points, closest.distances, _numbers(closest)
 
     def vertex(self, points: _Array) -> tuple[_Floats, _Numbers]:
         """The nearest vertices.
@@ -118,14 +126,14 @@ class ProximityQuery(_OfMesh):
         distance : numpy.ndarray of float64, shape (n,)
             Rounded down.
         vertex_id : numpy.ndarray of int64, shape (n,)
-            Of several the lowest.
+            Of several the lowest. -1 if the mesh has no vertices; the distance is then infinite.
         """
         surface = self._surface()
         if self._vertices is None or self._vertices[0] is not surface:
             self._vertices = surface, Scene()
             self._vertices[1].add_points(np.asarray(self._mesh.vertices))
         closest = self._detector.closest(self._vertices[1], points)
-        return closest.distances, closest.elements.astype(np.int64)
+        return closest.distances, _numbers(closest)
 
     def signed_distance(self, points: _Array) -> _Floats:
         """How far points are from the surface: positive inside, negative outside, 0 on it.
@@ -189,11 +197,12 @@ class RayMeshIntersector(_OfMesh):
         self,
         ray_origins: _Array,
         ray_directions: _Array,
+        *,
         multiple_hits: bool = True,
         max_hits: SupportsIndex | None = None,
         return_locations: bool = False,
     ) -> tuple[_Numbers, _Numbers] | tuple[_Numbers, _Numbers, _Floats]:
-        """The faces that rays hit.
+        """The faces that rays hit. Options are named: their order differs between trimesh's two classes.
 
         Parameters
         ----------
@@ -250,7 +259,7 @@ class RayMeshIntersector(_OfMesh):
         index_ray, index_tri : numpy.ndarray of int64, shape (m,)
         """
         face, ray, locations = self.intersects_id(  # type: ignore[misc]
-            ray_origins, ray_directions, multiple_hits, return_locations=True
+            ray_origins, ray_directions, multiple_hits=multiple_hits, return_locations=True
         )
         return locations, ray, face
 

@@ -1,5 +1,8 @@
 """`impinge.trimesh`: the questions of trimesh, beside trimesh itself."""
 
+import importlib
+import inspect
+
 import numpy as np
 import pytest
 
@@ -118,3 +121,38 @@ def test_rays_through_edges_and_vertices():
     assert np.bincount(ray).tolist() == [2, 2, 2]
     nothing = rays.intersects_id(np.empty((0, 3)), np.empty((0, 3)), return_locations=True)
     assert [column.shape for column in nothing] == [(0,), (0,), (0, 3)]
+
+
+class Nothing:
+    """A mesh without faces."""
+
+    vertices, faces = np.empty((0, 3)), np.empty((0, 3), int)
+
+
+def test_an_empty_mesh_has_no_nearest_face():
+    points = [[0, 0, 0], [1, 2, 3]]
+    query = ProximityQuery(Nothing)
+    _, distance, face = query.on_surface(points)
+    assert face.tolist() == [-1, -1] and (distance == np.inf).all() and face.dtype == np.int64
+    distance, vertex = query.vertex(points)
+    assert vertex.tolist() == [-1, -1] and (distance == np.inf).all()
+    assert closest_point(Nothing, points)[2].tolist() == [-1, -1]
+    assert RayMeshIntersector(Nothing).intersects_first(points, points).tolist() == [-1, -1]
+
+
+def test_options_of_rays_are_named():
+    """Third comes return_locations in ray_triangle, and multiple_hits in ray_pyembree: neither is taken for the other."""
+    rays = RayMeshIntersector(trimesh.creation.box((2, 2, 2)))
+    down = [[0.5, 0.25, 3]], [[0, 0, -1]]
+    with pytest.raises(TypeError, match="positional"):
+        rays.intersects_id(*down, True)
+    ours = set(inspect.signature(rays.intersects_id).parameters)
+    for name in ["ray_triangle", "ray_pyembree"]:
+        try:
+            theirs = importlib.import_module(f"trimesh.ray.{name}").RayMeshIntersector
+        except ImportError:
+            continue
+        named = inspect.signature(theirs.intersects_id).parameters
+        assert {key for key, given in named.items() if given.kind == given.POSITIONAL_OR_KEYWORD} - {"self"} <= ours
+    face, ray, places = rays.intersects_id(*down, return_locations=True, multiple_hits=False)
+    assert ray.tolist() == [0] and places.tolist() == [[0.5, 0.25, 1]] and rays.intersects_first(*down) == face
