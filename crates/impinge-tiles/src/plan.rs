@@ -216,6 +216,20 @@ impl Plan {
                 _ => {}
             }
         }
+        if replace {
+            // The merged answer names no plan that a reader of `rows.npy` could compare. It goes
+            // first: a process that is killed here leaves the old plan without an answer, never
+            // the new plan with an old answer.
+            for name in ["rows.npy", "answer.json"] {
+                let old = self.folder.join(name);
+                match fs::remove_file(&old) {
+                    Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+                        return Err(Error::io(&old, "remove", error));
+                    }
+                    _ => {}
+                }
+            }
+        }
         let mut object = self.to_json();
         object.insert("id".to_owned(), json!(format!("{:016x}", self.id)));
         let text = serde_json::to_string_pretty(&object)

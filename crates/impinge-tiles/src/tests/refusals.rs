@@ -48,6 +48,27 @@ impl Case {
     }
 }
 
+#[test]
+fn another_plan_takes_the_merged_answer_with_it() {
+    let case = Case::new(7);
+    let old = case.plan(20).unwrap();
+    scatter(&old).unwrap();
+    run(&old, Ask::default()).unwrap();
+    old.merge().unwrap();
+    let merged = ["rows.npy", "answer.json"].map(|name| case.tiles().join(name));
+    let replaced = |cap| PlanOptions {
+        cap,
+        chunk: 16,
+        replace: true,
+        ..PlanOptions::default()
+    };
+    // The very same plan is left as it is, and so is its answer.
+    plan(&case.tiles(), &case.files, &replaced(20)).unwrap();
+    assert!(merged.iter().all(|path| path.exists()));
+    plan(&case.tiles(), &case.files, &replaced(30)).unwrap();
+    assert!(!merged.iter().any(|path| path.exists()));
+}
+
 fn flip_last_byte(path: &Path) {
     let mut bytes = std::fs::read(path).unwrap();
     *bytes.last_mut().unwrap() ^= 1;
