@@ -188,11 +188,16 @@ def _older(old: Any, needed: type[Any]) -> Any:
     raise TypeError(f"old: {type(old).__name__} given, {needed.__name__} needed")
 
 
+def _no_index(given: str) -> TypeError:
+    return TypeError(f"index: a whole number, a slice or an array of whole numbers or booleans expected, {given} given")
+
+
 class Pairs:
     """The pairs of elements that intersect: sorted.
 
     ``len(pairs)`` is their number; no pairs are false. Pairs are a sequence of rows, each a tuple of four int: number of a body, its
-    element, number of the other body, its element. A slice is an array, and so is ``numpy.asarray(pairs)``, which has shape (n, 4).
+    element, number of the other body, its element. A slice is an array, and so are the rows that an array of whole numbers or of
+    booleans chooses, and ``numpy.asarray(pairs)``, which has shape (n, 4).
     """
 
     __slots__ = ("_hash", "_inner", "_rows")
@@ -356,16 +361,26 @@ class Pairs:
     def __len__(self) -> int:
         return len(self._inner)
 
+    # An array of one element is a SupportsIndex to type checkers, too.
+    @overload
+    def __getitem__(  # type: ignore[overload-overlap]
+        self, index: slice | npt.NDArray[Any] | list[int] | list[bool], /
+    ) -> npt.NDArray[np.uint32]: ...
     @overload
     def __getitem__(self, index: SupportsIndex, /) -> tuple[int, int, int, int]: ...
-    @overload
-    def __getitem__(self, index: slice, /) -> npt.NDArray[np.uint32]: ...
     def __getitem__(self, index: Any, /) -> Any:
         if isinstance(index, slice):
             return self.rows[index]
-        if not hasattr(index, "__index__"):
-            given = type(index).__name__
-            raise TypeError(f"index: a whole number or a slice expected, {given} given")
+        if isinstance(index, list):
+            index = np.array(index, None if index else np.intp)
+        if hasattr(index, "__array__"):
+            index = np.asarray(index)
+            if index.ndim == 1 and index.dtype.kind in "biu":
+                return self.rows[index]
+            if index.ndim or index.dtype.kind not in "iu":
+                raise _no_index(f"an array of {index.dtype} and shape {index.shape}")
+        elif not hasattr(index, "__index__"):
+            raise _no_index(type(index).__name__)
         if not -len(self) <= index < len(self):
             raise IndexError(f"index {index} given, but there are {len(self)} pairs")
         return tuple(self.rows[index].tolist())
@@ -1001,6 +1016,9 @@ class Closest:
     def __len__(self) -> int:
         return len(self._inner)
 
+    def __reduce__(self) -> NoReturn:
+        raise TypeError("a Closest names bodies of a live scene: pickle its arrays")
+
     def __repr__(self) -> str:
         return f"Closest({len(self)} points)"
 
@@ -1083,6 +1101,9 @@ class Hits:
 
     def __len__(self) -> int:
         return len(self._inner)
+
+    def __reduce__(self) -> NoReturn:
+        raise TypeError("Hits name bodies of a live scene: pickle their arrays")
 
     def __repr__(self) -> str:
         return f"Hits({len(self)} rays)"

@@ -41,8 +41,34 @@ def test_a_result_is_a_sequence_of_rows(result):
     for index in [len(rows), -len(rows) - 1]:
         with pytest.raises(IndexError, match=f"^index {index} given, but there are {len(rows)} pairs"):
             result[index]
-    with pytest.raises(TypeError, match="^index: a whole number or a slice expected, str given"):
+    with pytest.raises(TypeError, match="^index: a whole number, a slice or an array of whole numbers or booleans expected, str given"):
         result["a"]
+
+
+def test_a_result_is_indexed_by_arrays(result):
+    rows = result.rows
+    for index in [np.array([0, 1]), [4, 0, 4], np.array([-1], np.int8), [], np.array([], np.int64)]:
+        assert np.array_equal(result[index], rows[np.asarray(index, np.int64)])
+    mask = rows[:, 0] == 0
+    assert 0 < len(result[mask]) < len(result) and np.array_equal(result[mask], rows[mask])
+    assert np.array_equal(result[mask.tolist()], rows[mask]) and np.array_equal(result[mask], result.retain(mask).rows)
+    # As a number is, an array of no dimension.
+    assert result[np.array(3)] == result[3]
+    for index, given in [
+        (np.array([0.5]), r"an array of float64 and shape \(1,\)"),
+        (np.array(["a"]), r"an array of <U1 and shape \(1,\)"),
+        (np.array([[0, 1]], np.int8), r"an array of int8 and shape \(1, 2\)"),
+        ((0, 1), "tuple"),
+        (1.0, "float"),
+        (np.array(0.5), r"an array of float64 and shape \(\)"),
+        (None, "NoneType"),
+    ]:
+        with pytest.raises(TypeError, match=f"^index: a whole number, a slice or an array .* expected, {given} given"):
+            result[index]
+    with pytest.raises(IndexError, match="boolean index"):
+        result[mask[:-1]]
+    with pytest.raises(IndexError, match="out of bounds"):
+        result[[len(rows)]]
 
 
 def test_a_result_is_an_array(result):
@@ -215,6 +241,8 @@ def test_what_does_not_pickle_says_why(result):
         (detector.impacts(scene), "pickle their arrays"),
         (detector.candidates(scene), "pickle their arrays"),
         (detector.advance(scene), "pickle its arrays"),
+        (detector.closest(scene, [[0, 0, 0]]), "^a Closest names bodies of a live scene: pickle its arrays"),
+        (detector.cast(scene, [[0, 0, 0]], [[0, 0, 1]]), "^Hits name bodies of a live scene: pickle their arrays"),
     ]:
         with pytest.raises(TypeError, match=words):
             pickle.dumps(thing)
