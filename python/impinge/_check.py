@@ -14,6 +14,9 @@ __all__ = ["check"]
 
 _Path = Union[str, "os.PathLike[str]"]
 
+#: A child process. It finds impinge and NumPy where this process does, also in folders that the program has added to its path.
+_CHILD = "import json, sys; sys.path[:] = json.loads(sys.argv.pop(1)); from impinge._check_worker import main; main()"
+
 
 def check(
     paths: Iterable[_Path] | _Path,
@@ -88,7 +91,7 @@ def check(
         raise RuntimeError("sys.executable names no Python that could run child processes")
     jobs = min(jobs, max(len(names), 1))
     options = [str(int(weld)), str(max(n_cores // jobs, 1)), str(memory or 0), repr(float(min_thickness or 0))]
-    command = [sys.executable, "-m", "impinge._check_worker", *options]
+    command = [sys.executable, "-c", _CHILD, json.dumps([path for path in sys.path if isinstance(path, str)]), *options]
     rows: list[Any] = [None] * len(names)
     n_done = 0
 

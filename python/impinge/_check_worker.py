@@ -1,4 +1,4 @@
-"""A child process of `impinge.check`: paths in, rows out, one line of JSON each."""
+"""A child process of `impinge.check`: paths in, rows out, one line of JSON each. `impinge._check` starts it."""
 
 import signal
 import sys
@@ -13,7 +13,3 @@ def main() -> None:
     weld, threads, memory = (int(argument) for argument in sys.argv[1:4])
     min_thickness = float(sys.argv[4])
     _impinge._serve_check(bool(weld), threads, memory or None, min_thickness or None)
-
-
-if __name__ == "__main__":
-    main()

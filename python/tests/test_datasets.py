@@ -1,6 +1,7 @@
 """Many meshes, tiles, and both on Ray."""
 
 import os
+import pathlib
 import signal
 import subprocess
 import sys
@@ -57,6 +58,30 @@ def test_check_refuses_by_name(meshes):
         impinge.check(meshes, jobs=1, progress=lambda *_: 1 // 0)
     [row] = impinge.check(meshes[:1], timeout=1e-9)
     assert row["error"] is not None and "self_intersections" in row
+
+
+VENDORED = """
+import sys
+sys.path[:0] = sys.argv[1:3]
+import impinge
+print(impinge.__file__)
+print(impinge.check(sys.argv[3])[0]["error"])
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="links to folders need a privilege there")
+def test_check_where_the_program_has_found_impinge(meshes, tmp_path):
+    """By a folder that the program has added to its path, as add-ons do."""
+    package, numpy = (pathlib.Path(module.__file__).parents[1] for module in (impinge, np))
+    moved = tmp_path / "add-on"
+    moved.mkdir()
+    (moved / "impinge").symlink_to(package / "impinge")
+    environment = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
+    # The Python of the virtual environment would find the one that is installed.
+    python = getattr(sys, "_base_executable", sys.executable)
+    command = [python, "-c", VENDORED, str(moved), str(numpy), str(meshes[0])]
+    done = subprocess.run(command, capture_output=True, text=True, env=environment)
+    assert done.stdout.splitlines() == [str(moved / "impinge" / "__init__.py"), "None"], done
 
 
 INTERRUPTED = """
