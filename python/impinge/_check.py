@@ -74,8 +74,7 @@ def check(
     >>> row["path"], row["error"] is None
     ('no such file.ply', False)
     """
-    paths = [paths] if isinstance(paths, (str, os.PathLike)) else list(paths)
-    names = [os.fspath(path) for path in paths]
+    names = _names(paths)
     n_cores = os.cpu_count() or 1
     if jobs is None:
         jobs = n_cores
@@ -83,8 +82,7 @@ def check(
         raise ValueError(f"jobs: {jobs} given, 1 or more allowed")
     if timeout is not None and not timeout > 0:
         raise ValueError(f"timeout: {timeout} given, more than 0 allowed")
-    if min_thickness is not None and not 0 < min_thickness < float("inf"):
-        raise ValueError(f"min_thickness: {min_thickness} given, a length above 0 allowed")
+    _check_thickness(min_thickness)
     if memory is not None and memory < 1:
         raise ValueError(f"memory: {memory} given, 1 or more allowed")
     if not sys.executable:
@@ -104,3 +102,15 @@ def check(
 
     _impinge._check(names, command, jobs, weld, timeout, put)
     return rows
+
+
+def _names(paths: Iterable[_Path] | _Path) -> list[str]:
+    """The names of one path, or of many."""
+    if isinstance(paths, (str, os.PathLike)):
+        paths = [paths]
+    return [os.fspath(path) for path in paths]
+
+
+def _check_thickness(min_thickness: float | None) -> None:
+    if min_thickness is not None and not 0 < min_thickness < float("inf"):
+        raise ValueError(f"min_thickness: {min_thickness} given, a length above 0 allowed")

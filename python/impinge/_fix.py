@@ -50,8 +50,8 @@ def fix(
     vertices: npt.ArrayLike,
     faces: npt.ArrayLike,
     *,
-    only: Iterable[str] | None = None,
-    skip: Iterable[str] = (),
+    only: Iterable[str] | str | None = None,
+    skip: Iterable[str] | str = (),
     close_holes: int = 0,
     threads: int = 0,
 ) -> Fixed:
@@ -63,7 +63,7 @@ def fix(
         Positions, float32 or float64.
     faces : array_like of int, shape (n, 3)
         Triangles as vertex indices.
-    only, skip : iterable of str, optional
+    only, skip : str, or iterable of str, optional
         The repairs that run, or those that do not, of ``weld``, ``duplicates``, ``degenerate``, ``orient``,
         ``split-edges``, ``split-vertices``, ``close-holes``, ``outward`` and ``unused``; by default all run.
     close_holes : int
@@ -93,8 +93,8 @@ def fix(
     >>> fixed.after["watertight"], fixed.repairs["duplicates"]["faces_removed"]
     (True, 1)
     """
-    chosen = set(_REPAIRS if only is None else only)
-    left_out = set(skip)
+    chosen = _set(_REPAIRS if only is None else only)
+    left_out = _set(skip)
     for name in chosen | left_out:
         if name not in _REPAIRS:
             raise ValueError(f"{name!r} is no repair: {', '.join(_REPAIRS)} are")
@@ -110,3 +110,8 @@ def fix(
     positions, triangles, said = _impinge._fix(vertices, faces, wanted, close_holes, threads)
     done = json.loads(said)
     return Fixed(positions, triangles, done["repairs"], done["before"], done["after"], done["seams"])
+
+
+def _set(names: Iterable[str] | str) -> set[str]:
+    """One name, or many, as a set."""
+    return {names} if isinstance(names, str) else set(names)

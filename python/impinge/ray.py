@@ -15,6 +15,7 @@ from collections.abc import Callable, Iterable, Iterator
 from typing import Any, Literal, Union
 
 from . import tiles as _tiles
+from ._check import _check_thickness, _names
 from ._check import check as _check
 
 __all__ = ["check", "tiles"]
@@ -27,9 +28,10 @@ _BATCH_SECONDS = 1.0
 
 
 def check(
-    paths: Iterable[_Path],
+    paths: Iterable[_Path] | _Path,
     *,
     weld: bool = True,
+    min_thickness: float | None = None,
     timeout: float | None = None,
     memory: int | None = None,
     max_in_flight: int | None = None,
@@ -42,7 +44,7 @@ def check(
 
     Parameters
     ----------
-    paths, weld, timeout, memory
+    paths, weld, min_thickness, timeout, memory
         As for `impinge.check`. Each mesh is checked in a child process of its worker.
     max_in_flight : int, optional
         The most tasks that are submitted and not done; by default twice as many as the cluster has CPUs.
@@ -66,12 +68,13 @@ def check(
         A batch that failed more often than it may.
     """
     ray = _ray()
-    names = [os.fspath(path) for path in paths]
+    names = _names(paths)
+    _check_thickness(min_thickness)
     most = _most(ray, max_in_flight)
 
     def batch(chosen: list[str]) -> tuple[list[dict[str, Any]], float]:
         start = time.perf_counter()
-        rows = _check(chosen, weld=weld, jobs=1, timeout=timeout, memory=memory)
+        rows = _check(chosen, weld=weld, min_thickness=min_thickness, jobs=1, timeout=timeout, memory=memory)
         return rows, time.perf_counter() - start
 
     task = ray.remote(num_cpus=1, max_retries=max_retries)(batch)

@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _impinge
+from ._check import _names
 
 __all__ = ["describe", "merge", "plan", "rows", "run", "scatter"]
 
@@ -25,7 +26,7 @@ _Progress = Callable[[int, int], object]
 
 def plan(
     folder: _Path,
-    files: Iterable[_Path],
+    files: Iterable[_Path] | _Path,
     *,
     cap: int = 2_000_000,
     chunk: int = 500_000,
@@ -41,7 +42,7 @@ def plan(
     ----------
     folder : path
         Made if it is not there. One with the very same plan is left as it is.
-    files : iterable of paths
+    files : path, or iterable of paths
         Mesh files, a body each, numbered in this order. With `step`, two files per body: its start and its end.
     cap : int
         About how many primitives a tile may hold; one tile is in memory at a time.
@@ -69,9 +70,8 @@ def plan(
     OSError, ValueError
         Files that cannot be read, coordinates that are refused, another plan in the folder.
     """
-    names = [os.fspath(file) for file in files]
     options = (cap, chunk, weld, step, separation, replace, progress)
-    return _impinge._tiles_plan(os.fspath(folder), names, *options)
+    return _impinge._tiles_plan(os.fspath(folder), _names(files), *options)
 
 
 def describe(folder: _Path) -> dict[str, Any]:

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+import types
 
 import numpy as np
 import pytest
@@ -220,6 +221,46 @@ def test_tiles_refuse_by_name(bodies, tmp_path):
         impinge.tiles.merge(tmp_path / "b")
     with pytest.raises((OSError, ValueError)):
         impinge.tiles.describe(tmp_path / "nowhere")
+
+
+def test_one_path_is_one_file(bodies, tmp_path):
+    paths, _ = bodies
+    one = impinge.tiles.plan(tmp_path / "one", [paths[0]])
+    for ix, path in enumerate([paths[0], str(paths[0])]):
+        assert impinge.tiles.plan(tmp_path / str(ix), path)["plan"] == one["plan"]
+
+
+class Ray:
+    """As much of Ray as `impinge.ray.check` asks for, in this process."""
+
+    def is_initialized(self):
+        return True
+
+    def cluster_resources(self):
+        return {"CPU": 2.0}
+
+    def remote(self, **_):
+        return lambda work: types.SimpleNamespace(remote=lambda names: (work, tuple(names)))
+
+    def wait(self, flying, num_returns):
+        return flying[:num_returns], flying[num_returns:]
+
+    def get(self, task):
+        work, names = task
+        return work(list(names))
+
+    def cancel(self, task):
+        raise AssertionError(f"{task} is left")
+
+
+def test_ray_checks_one_path_and_thin_walls(monkeypatch, meshes):
+    monkeypatch.setitem(sys.modules, "ray", Ray())
+    ball = meshes[0]
+    assert impinge.ray.check(str(ball)) == impinge.ray.check([ball]) == impinge.check(ball)
+    thin = impinge.ray.check(meshes, min_thickness=3.0)
+    assert thin == impinge.check(meshes, min_thickness=3.0) and thin[0]["thin_faces"] > 0
+    with pytest.raises(ValueError, match="^min_thickness: -1 given, a length above 0 allowed"):
+        impinge.ray.check([], min_thickness=-1)
 
 
 @pytest.fixture(scope="module")

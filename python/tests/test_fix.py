@@ -25,6 +25,9 @@ def test_repairs_are_chosen_by_name():
     only = impinge.fix(VERTICES, FACES, only=["duplicates"])
     assert list(only.repairs) == ["duplicates"] and only.after["inconsistent_edges"] > 0
     assert "duplicates" not in impinge.fix(VERTICES, FACES, skip=["duplicates"]).repairs
+    # One name alone is no iterable of letters.
+    assert list(impinge.fix(VERTICES, FACES, only="duplicates").repairs) == ["duplicates"]
+    assert "duplicates" not in impinge.fix(VERTICES, FACES, skip="duplicates").repairs
     closed = impinge.fix(VERTICES, FACES[:3], close_holes=3)
     assert closed.after["watertight"] is True and closed.repairs["close-holes"]["holes_closed"] == 1
 
