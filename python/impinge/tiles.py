@@ -8,15 +8,17 @@ steps on a Ray cluster.
 
 from __future__ import annotations
 
+import operator
 import os
 from collections.abc import Callable, Iterable
-from typing import Any, Literal, Union
+from typing import Any, Literal, SupportsIndex, Union
 
 import numpy as np
 import numpy.typing as npt
 
 from . import _impinge
 from ._check import _names
+from ._errors import InvalidError
 
 __all__ = ["describe", "merge", "plan", "rows", "run", "scatter"]
 
@@ -70,7 +72,7 @@ def plan(
     OSError, ValueError
         Files that cannot be read, coordinates that are refused, another plan in the folder.
     """
-    options = (cap, chunk, weld, step, separation, replace, progress)
+    options = (_whole("cap", cap, 1), _whole("chunk", chunk, 1), weld, step, separation, replace, progress)
     return _impinge._tiles_plan(os.fspath(folder), _names(files), *options)
 
 
@@ -116,7 +118,8 @@ def scatter(
     OSError, ValueError
         Files that have changed or cannot be read, a full disk, a rank out of its range.
     """
-    return _impinge._tiles_scatter(os.fspath(folder), rank, world_size, threads, progress)
+    share = (_whole("rank", rank, 0), _whole("world_size", world_size, 1))
+    return _impinge._tiles_scatter(os.fspath(folder), *share, _whole("threads", threads, 0), progress)
 
 
 def run(
@@ -165,8 +168,14 @@ def run(
     OSError, ValueError, RuntimeError
         No such tile; parts that are missing, stale or damaged; a detection that fails.
     """
-    chosen = range(describe(folder)["tiles"]) if tiles is None else tiles
-    numbers = list(chosen)
+    n_tiles = describe(folder)["tiles"]
+    try:
+        chosen = iter(range(n_tiles) if tiles is None else tiles)
+    except TypeError:
+        given = type(tiles).__name__
+        raise TypeError(f"tiles: an iterable of whole numbers expected, {given} given") from None
+    numbers = [_whole("tiles", tile, 0, n_tiles - 1) for tile in chosen]
+    budget = None if memory_budget is None else _whole("memory_budget", memory_budget, 0)
     n_done = 0
 
     def done() -> None:
@@ -175,7 +184,7 @@ def run(
         if progress is not None:
             progress(n_done, len(numbers))
 
-    arguments = (which, shared_vertex, start, precision, threads, memory_budget, again, done)
+    arguments = (which, shared_vertex, start, precision, _whole("threads", threads, 0), budget, again, done)
     return _impinge._tiles_run(os.fspath(folder), numbers, *arguments)
 
 
@@ -208,3 +217,18 @@ def rows(folder: _Path) -> npt.NDArray[Any]:
     """
     mapped: npt.NDArray[Any] = np.load(os.path.join(folder, "rows.npy"), mmap_mode="r")
     return mapped
+
+
+def _whole(name: str, given: SupportsIndex, least: int, most: int = 2**64 - 1) -> int:
+    """An argument that is a whole number in a range."""
+    try:
+        number = operator.index(given)
+    except TypeError:
+        raise TypeError(f"{name}: a whole number expected, {type(given).__name__} given") from None
+    if least <= number <= most:
+        return number
+    if most < 2**64 - 1:
+        allowed = f"{least} to {most}"
+    else:
+        allowed = f"{least} or more" if number < least else f"{most} or less"
+    raise InvalidError(f"{name}: {number} given, {allowed} allowed")

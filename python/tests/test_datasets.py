@@ -223,6 +223,37 @@ def test_tiles_refuse_by_name(bodies, tmp_path):
         impinge.tiles.describe(tmp_path / "nowhere")
 
 
+def test_tiles_refuse_numbers_by_name(bodies, tmp_path):
+    paths, _ = bodies
+    tiles, folder = impinge.tiles, tmp_path / "tiles"
+    n = tiles.plan(folder, paths, cap=700)["tiles"]
+    for words, call in [
+        ("cap: -1 given, 1 or more allowed", lambda: tiles.plan(folder, paths, cap=-1)),
+        ("chunk: 0 given, 1 or more allowed", lambda: tiles.plan(folder, paths, chunk=0)),
+        (f"cap: {2**70} given, 18446744073709551615 or less allowed", lambda: tiles.plan(folder, paths, cap=2**70)),
+        ("threads: -1 given, 0 or more allowed", lambda: tiles.scatter(folder, threads=-1)),
+        ("rank: -1 given, 0 or more allowed", lambda: tiles.scatter(folder, rank=-1)),
+        ("world_size: 0 given, 1 or more allowed", lambda: tiles.scatter(folder, world_size=0)),
+        ("threads: -2 given, 0 or more allowed", lambda: tiles.run(folder, threads=-2)),
+        ("memory_budget: -1 given, 0 or more allowed", lambda: tiles.run(folder, memory_budget=-1)),
+        (f"tiles: -1 given, 0 to {n - 1} allowed", lambda: tiles.run(folder, [0, -1])),
+        (f"tiles: {n} given, 0 to {n - 1} allowed", lambda: tiles.run(folder, [n])),
+        (f"tiles: {2**40} given, 0 to {n - 1} allowed", lambda: tiles.run(folder, [2**40])),
+    ]:
+        with pytest.raises(impinge.InvalidError, match=f"^{words}$"):
+            call()
+    for words, call in [
+        ("cap: a whole number expected, float given", lambda: tiles.plan(folder, paths, cap=2e6)),
+        ("tiles: a whole number expected, str given", lambda: tiles.run(folder, ["0"])),
+        ("tiles: an iterable of whole numbers expected, int given", lambda: tiles.run(folder, 0)),
+        ("threads: a whole number expected, NoneType given", lambda: tiles.scatter(folder, threads=None)),
+    ]:
+        with pytest.raises(TypeError, match=f"^{words}$"):
+            call()
+    tiles.scatter(folder)
+    assert [row["tile"] for row in tiles.run(folder, np.array([0]), threads=1)] == [0]
+
+
 def test_one_path_is_one_file(bodies, tmp_path):
     paths, _ = bodies
     one = impinge.tiles.plan(tmp_path / "one", [paths[0]])
