@@ -114,7 +114,7 @@ class CollisionManager:
     Two objects collide if and only if two of their faces share a point where their moved vertices are, touching
     included. Faces are surfaces: an object that lies wholly inside another one, without touching it, does not collide with it, and its
     distance is that to the other's faces. trimesh 5.2 hands convex meshes to FCL as solids, so that whatever lies within one collides
-    with it. `impinge.contains`, asked about a vertex of the inner object, tells.
+    with it. `impinge.contains`, asked about a vertex of the inner object, tells; so does `Detector.penetration`.
 
     Managers copy and pickle with their settings and all objects, and copies are independent of each other: each process, or each
     thread, may have one.
