@@ -165,8 +165,8 @@ def run(
 
     Raises
     ------
-    OSError, ValueError, RuntimeError
-        No such tile; parts that are missing, stale or damaged; a detection that fails.
+    OSError, ValueError, Error
+        No such tile; parts that are missing, stale or damaged; a detection that fails, such as `Budget`.
     """
     n_tiles = describe(folder)["tiles"]
     try:

@@ -204,6 +204,16 @@ def test_tiles_of_a_step_keep_a_separation_and_weld(tmp_path):
         impinge.tiles.plan(tmp_path / "still", paths, separation=0.01)
 
 
+def test_tiles_that_do_not_fit_a_budget_say_so(bodies, tmp_path):
+    paths, _ = bodies
+    folder = tmp_path / "tiles"
+    impinge.tiles.plan(folder, paths, cap=500)
+    impinge.tiles.scatter(folder)
+    with pytest.raises(impinge.Budget, match="^tile 0: ") as refused:
+        impinge.tiles.run(folder, [0], memory_budget=1000)
+    assert refused.value.code
+
+
 def test_tiles_refuse_by_name(bodies, tmp_path):
     paths, _ = bodies
     with pytest.raises((OSError, ValueError), match="missing"):

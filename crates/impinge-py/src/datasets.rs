@@ -20,7 +20,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
 use crate::arrays::{PositionArray, Rows, index_rows, positions_array};
-use crate::errors::{Cancelled, invalid, raise};
+use crate::errors::{Cancelled, invalid, raise, raise_as};
 use crate::settings::{WHICH, choose_one, words};
 
 /// How often Python gets a look while work goes on in another thread.
@@ -268,7 +268,10 @@ fn refuse(error: Error) -> PyErr {
         Error::Io { .. } => PyOSError::new_err(error.to_string()),
         Error::Detection { tile, source } => match source {
             impinge::Error::Cancelled => raise(impinge::Error::Cancelled),
-            source => PyRuntimeError::new_err(format!("tile {tile}: {source}")),
+            source => {
+                let message = format!("tile {tile}: {source}");
+                raise_as(source, message)
+            }
         },
         error => invalid(error.to_string()),
     }

@@ -30,6 +30,11 @@ pub struct Names<'a> {
 /// An error of a call that took no arrays.
 pub fn raise(error: Error) -> PyErr {
     let message = error.to_string();
+    raise_as(error, message)
+}
+
+/// The same with another message.
+pub fn raise_as(error: Error, message: String) -> PyErr {
     match error {
         Error::MemoryBudget { .. } => Budget::new_err(message),
         Error::OutOfMemory { .. } => OutOfMemory::new_err(message),
