@@ -178,6 +178,33 @@ impl<T: Pod> Storage<T> {
         }
     }
 
+    /// [`write_with`](Storage::write_with) by a command: after those that the encoder has already,
+    /// where the queue would write before them.
+    pub fn encode_with(
+        &self,
+        gpu: &Device,
+        (first, len): (u64, u64),
+        encoder: &mut wgpu::CommandEncoder,
+        fill: impl FnOnce(wgpu::WriteOnly<'_, [u8]>),
+    ) {
+        let size = len * Self::SIZE;
+        if size == 0 {
+            return;
+        }
+        let staging = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some(self.label),
+            size,
+            usage: wgpu::BufferUsages::COPY_SRC,
+            mapped_at_creation: true,
+        });
+        // What the device refuses goes to its owner.
+        if let Ok(mut view) = staging.get_mapped_range_mut(..) {
+            fill(view.slice(..));
+        }
+        staging.unmap();
+        encoder.copy_buffer_to_buffer(&staging, 0, self.buffer(), first * Self::SIZE, size);
+    }
+
     /// The underlying buffer; it exists from the first `resize` on.
     pub fn buffer(&self) -> &wgpu::Buffer {
         self.buffer.as_ref().expect("resized before it is used")

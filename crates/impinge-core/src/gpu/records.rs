@@ -60,7 +60,7 @@ impl DeviceWorld {
             let of_ends = [Some(body.positions()), body.end_positions()];
             let mut ends = of_ends
                 .into_iter()
-                .zip(&resident.0)
+                .zip(&resident.buffers)
                 .take(motion.n_ends() as usize);
             ends.any(|(end, held)| {
                 matches!(end, Some(Positions::F64(_))) && !held.contains_key(&id)

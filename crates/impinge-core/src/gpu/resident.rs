@@ -171,7 +171,7 @@ impl Engine {
         let ids: Vec<BodyId> = positions.iter().map(|&(body, _)| body).collect();
         let clusterings = self.cluster(job, &ids, &mut Stats::default())?;
         let starts = positions.iter().copied().collect();
-        let resident = ResidentEnds([starts, BTreeMap::new()]);
+        let resident = encoded([starts, BTreeMap::new()]);
         self.encode_whole(job, &clusterings, &resident, encoder)?;
         let pass_buffers = &self.lane.pass_buffers;
         let capacities = pass_buffers.capacities();
@@ -213,7 +213,7 @@ impl Engine {
                 ends.entry(body).or_insert(buffer);
             }
         }
-        let resident = ResidentEnds([starts, ends]);
+        let resident = encoded([starts, ends]);
         self.turn_to(Motion::Moving);
         if !self.is_held(job, clusterings) {
             return Err(self.too_small("the step at once", Capacities::LEAST));
@@ -260,7 +260,7 @@ impl Engine {
             return Err(self.too_small("the bodies at once", Capacities::LEAST));
         }
         let positions: BTreeMap<_, _> = positions.iter().copied().collect();
-        let resident = ResidentEnds([positions.clone(), positions]);
+        let resident = encoded([positions.clone(), positions]);
         self.update(job, clusterings, &resident, &mut Stats::default())?;
         let (mut limits, mut bodies) = (Vec::new(), Vec::new());
         let (mut n, mut thickest) = (0, 0.0f64);
@@ -296,7 +296,7 @@ impl Engine {
         self.safe = Some(reach.to_bits());
         // Boxes that were widened by another length do not fit, nor do these fit a step.
         self.world.is_moved();
-        self.encode_work(job.plan, &resident, encoder)?;
+        self.encode_work(job, &resident, encoder)?;
         Ok(ResidentSafe {
             distances: self.lane.pass_buffers.shares.buffer().clone(),
             bodies,
@@ -383,17 +383,20 @@ impl Engine {
         encoder: &mut wgpu::CommandEncoder,
     ) -> Result<(), Error> {
         self.update(job, clusterings, resident, &mut Stats::default())?;
-        self.encode_work(job.plan, resident, encoder)
+        self.encode_work(job, resident, encoder)
     }
 
     /// Encodes all work of what was sent.
     fn encode_work(
         &mut self,
-        plan: &Plan,
+        job: Job<'_>,
         resident: &ResidentEnds<'_>,
         encoder: &mut wgpu::CommandEncoder,
     ) -> Result<(), Error> {
-        self.world.copy_positions(resident, encoder);
+        let Job { scene, plan, .. } = job;
+        let of = (scene, job.workers);
+        self.world
+            .encode_positions(&self.gpu, of, self.lane.motion, resident, encoder);
         let cells = self.cells_wanted(plan);
         let capacities = self.first_capacities(cells)?;
         let work = self.whole(plan);
@@ -442,6 +445,14 @@ impl Engine {
             }
             NextPass::Split => Err(self.too_small("the plan at once", counts.needed)),
         }
+    }
+}
+
+/// Positions in buffers of the caller's, of a question that is encoded.
+fn encoded(buffers: [BTreeMap<BodyId, &wgpu::Buffer>; 2]) -> ResidentEnds<'_> {
+    ResidentEnds {
+        buffers,
+        is_encoded: true,
     }
 }
 

@@ -25,11 +25,14 @@
 //! height 0        clusters of part 0 | of part 1 | …
 //! ```
 //!
-//! Parts are sent once; each frame sends the positions that have changed.
+//! Parts are sent once; each frame sends the positions that have changed. What the queue is given
+//! to write runs before all commands of the next submission. So where commands that may not have
+//! run yet write positions of a body, the scene's positions go there by a command too, and later
+//! questions do not take them for what the device holds: see `LastWrite` and `Encoded`.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError, Weak};
 
 use crate::bvh::clusters::Clustering;
 use crate::bvh::tree::TreeShape;
@@ -68,8 +71,51 @@ struct Resident {
     /// Index of its first vertex among those of one end.
     first_vertex: u64,
     n_vertices: u64,
-    /// The stamps of the positions that were sent: at the start, and of the step at the end.
-    sent: [u64; 2],
+    /// Its positions at the start, and at the end.
+    written: [LastWrite; 2],
+}
+
+/// What was written last where a body's positions are, at one end.
+#[derive(Debug, Clone, Copy, Default)]
+struct LastWrite {
+    /// The stamp of the scene's positions; 0 for those of a buffer of the caller's.
+    stamp: u64,
+    /// The last encoding that writes here, if there was one since the queue certainly wrote last.
+    encoding: Option<u64>,
+    /// Whether that encoding has written last, and not the queue.
+    is_encoded: bool,
+}
+
+/// Encodings for the caller, who may submit them later, or never. While the commands of one may
+/// still run, they may write positions and boxes after whatever the queue has been given.
+#[derive(Debug, Default)]
+struct Encoded {
+    n: u64,
+    /// The number of each, and what its commands hold until they have run or are dropped.
+    pending: Vec<(u64, Weak<()>)>,
+}
+
+impl Encoded {
+    /// The number of a new encoding.
+    fn begin(&mut self, encoder: &wgpu::CommandEncoder) -> u64 {
+        let held = Arc::new(());
+        self.n += 1;
+        self.pending.push((self.n, Arc::downgrade(&held)));
+        encoder.on_submitted_work_done(move || drop(held));
+        self.n
+    }
+
+    /// The least number of those that may still run.
+    fn oldest(&mut self) -> Option<u64> {
+        self.pending.retain(|(_, held)| held.strong_count() > 0);
+        self.pending.first().map(|&(number, _)| number)
+    }
+
+    /// Whether one may still run.
+    fn may_run(&self, number: u64) -> bool {
+        let pending = &mut self.pending.iter();
+        pending.any(|(own, held)| *own == number && held.strong_count() > 0)
+    }
 }
 
 impl Resident {
@@ -86,9 +132,15 @@ pub(super) struct HeldPart {
     pub clustering: Arc<Clustering>,
 }
 
-/// Positions that are on the device already, by body: at the start, and at the end.
+/// Positions that are on the device already.
 #[derive(Debug, Default)]
-pub struct ResidentEnds<'a>(pub [BTreeMap<BodyId, &'a wgpu::Buffer>; 2]);
+pub struct ResidentEnds<'a> {
+    /// By body: at the start, and at the end.
+    pub buffers: [BTreeMap<BodyId, &'a wgpu::Buffer>; 2],
+    /// Whether the question is encoded for the caller, so that
+    /// `DeviceWorld::encode_positions` follows.
+    pub is_encoded: bool,
+}
 
 /// The data on parts that the kernels read.
 #[derive(Debug)]
@@ -98,6 +150,7 @@ pub struct DeviceWorld {
     /// The vertices of all bodies.
     n_vertices: u64,
     n_ends: u64,
+    encoded: Encoded,
     /// The nodes on the device, without their boxes.
     pub(super) trees: Trees,
     pub(super) views: [Option<View>; 2],
@@ -167,6 +220,7 @@ impl DeviceWorld {
             parts: Vec::new(),
             n_vertices: 0,
             n_ends: 1,
+            encoded: Encoded::default(),
             trees: Trees::default(),
             views: [None, None],
             has_solids: false,
@@ -208,9 +262,10 @@ impl DeviceWorld {
         *self = DeviceWorld::new();
     }
 
-    /// Says that the boxes that a view sees fit the positions.
+    /// Says that the boxes that a view sees fit the positions, unless commands of the caller's may
+    /// still change them.
     pub fn is_refitted(&mut self, motion: Motion) {
-        self.view_mut(motion).is_moved = false;
+        self.view_mut(motion).is_moved = self.encoded.oldest().is_some();
     }
 
     /// Says that the boxes do not fit the positions.
@@ -339,7 +394,7 @@ impl DeviceWorld {
                 topology_stamp: body.topology_stamp(),
                 first_vertex: n_vertices,
                 n_vertices: count(body.n_vertices()),
-                sent: [0; 2],
+                written: [LastWrite::default(); 2],
             });
             n_vertices += count(body.n_vertices());
         }
@@ -430,7 +485,8 @@ impl DeviceWorld {
     }
 
     /// Sends the positions of bodies that have moved, at one end or at both; runs of consecutive
-    /// bodies in one write, which all threads fill.
+    /// bodies in one write, which all threads fill. Those that have to be encoded are left to
+    /// [`encode_positions`](DeviceWorld::encode_positions).
     fn send_positions(
         &mut self,
         gpu: &GpuContext,
@@ -438,35 +494,30 @@ impl DeviceWorld {
         motion: Motion,
         resident: &ResidentEnds<'_>,
     ) {
+        let oldest = self.encoded.oldest();
         let mut has_moved = false;
-        for (end, resident) in (0..motion.n_ends()).zip(&resident.0) {
-            let stamp = |body: &Resident| {
-                let body = scene.body_in(body.id.slot());
-                [body.positions_stamp(), body.step_stamp()][end as usize]
-            };
+        for (end, buffers) in (0..motion.n_ends()).zip(&resident.buffers) {
             let is_new = |body: &Resident| {
-                body.sent[end as usize] != stamp(body) && !resident.contains_key(&body.id)
+                let written = body.written[end as usize];
+                let is_held =
+                    written.encoding.is_none() && written.stamp == stamp(scene, body, end);
+                let is_encoded = buffers.contains_key(&body.id)
+                    || (resident.is_encoded && written.may_be_overwritten(oldest));
+                !is_held && !is_encoded
             };
             for run in self.bodies.chunk_by_mut(|a, b| is_new(a) == is_new(b)) {
                 if !is_new(&run[0]) {
                     continue;
                 }
                 has_moved = true;
-                let positions = |body: &Resident| {
-                    let body = scene.body_in(body.id.slot());
-                    let start = body.positions();
-                    match end {
-                        0 => start,
-                        _ => body.end_positions().unwrap_or(start),
-                    }
-                };
                 let at = end * self.n_vertices + run[0].first_vertex;
                 let len = run[run.len() - 1].vertices().end - run[0].first_vertex;
                 self.positions.write_with(gpu, (3 * at, 3 * len), |to| {
-                    fill(to, run, positions, workers)
+                    fill(to, run, |body| positions(scene, body, end), workers)
                 });
                 for body in run {
-                    body.sent[end as usize] = stamp(body);
+                    let stamp = stamp(scene, body, end);
+                    body.written[end as usize].by_queue(stamp, oldest);
                 }
             }
         }
@@ -475,25 +526,55 @@ impl DeviceWorld {
         }
     }
 
-    /// Encodes the copies of positions from buffers on the device, of the bodies that take part.
-    pub fn copy_positions(
+    /// Begins an encoding for the caller: encodes the copies of positions from buffers on the
+    /// device, of the bodies that take part, and of the scene's positions where commands that may
+    /// not have run yet write others.
+    pub(crate) fn encode_positions(
         &mut self,
+        gpu: &GpuContext,
+        (scene, workers): (&Scene, &Workers),
+        motion: Motion,
         resident: &ResidentEnds<'_>,
         encoder: &mut wgpu::CommandEncoder,
     ) {
+        let number = self.encoded.begin(encoder);
         let mut has_moved = false;
-        for (end, buffers) in (0..self.n_ends).zip(&resident.0) {
+        for (end, buffers) in (0..self.n_ends).zip(&resident.buffers) {
             for (&id, buffer) in buffers {
                 let Some(ix) = self.number(id) else { continue };
                 let body = &mut self.bodies[ix];
-                // The device no longer has the scene's positions.
-                body.sent[end as usize] = 0;
+                body.written[end as usize].by_encoding(0, number);
                 has_moved = true;
                 let to = VERTEX * (end * self.n_vertices + body.first_vertex);
                 let size = VERTEX * body.n_vertices;
                 if size > 0 {
                     encoder.copy_buffer_to_buffer(buffer, 0, self.positions.buffer(), to, size);
                 }
+            }
+        }
+        for (end, buffers) in (0..motion.n_ends()).zip(&resident.buffers) {
+            for body in &mut self.bodies {
+                let written = body.written[end as usize];
+                let Some(last) = written.encoding else {
+                    continue;
+                };
+                if buffers.contains_key(&body.id) {
+                    continue;
+                }
+                has_moved = true;
+                let stamp = stamp(scene, body, end);
+                // Unless the commands that write the same have been dropped.
+                if written.is_encoded && written.stamp == stamp && self.encoded.may_run(last) {
+                    continue;
+                }
+                let at = end * self.n_vertices + body.first_vertex;
+                let len = body.n_vertices;
+                let run = std::slice::from_ref(body);
+                self.positions
+                    .encode_with(gpu, (3 * at, 3 * len), encoder, |to| {
+                        fill(to, run, |body| positions(scene, body, end), workers)
+                    });
+                body.written[end as usize].by_encoding(stamp, number);
             }
         }
         if has_moved {
@@ -510,8 +591,51 @@ impl DeviceWorld {
     /// stamp: the buffer and the first byte.
     pub fn positions_of(&self, body: BodyId, stamp: u64) -> Option<(&wgpu::Buffer, u64)> {
         let held = &self.bodies[self.number(body)?];
-        let is_there = held.sent[0] == stamp;
+        let is_there = held.written[0].stamp == stamp;
         is_there.then(|| (self.positions.buffer(), held.first_vertex * VERTEX))
+    }
+}
+
+impl LastWrite {
+    /// Whether commands that were encoded, the oldest of those that may still run being this one,
+    /// may write here.
+    fn may_be_overwritten(&self, oldest: Option<u64>) -> bool {
+        (self.encoding.zip(oldest)).is_some_and(|(encoding, oldest)| oldest <= encoding)
+    }
+
+    /// Says that the queue writes positions of the scene.
+    fn by_queue(&mut self, stamp: u64, oldest: Option<u64>) {
+        let encoding = self.encoding.filter(|_| self.may_be_overwritten(oldest));
+        *self = LastWrite {
+            stamp,
+            encoding,
+            is_encoded: false,
+        };
+    }
+
+    /// Says that commands write positions.
+    fn by_encoding(&mut self, stamp: u64, number: u64) {
+        *self = LastWrite {
+            stamp,
+            encoding: Some(number),
+            is_encoded: true,
+        };
+    }
+}
+
+/// The stamp of a body's positions at one end.
+fn stamp(scene: &Scene, body: &Resident, end: u64) -> u64 {
+    let body = scene.body_in(body.id.slot());
+    [body.positions_stamp(), body.step_stamp()][end as usize]
+}
+
+/// A body's positions at one end. Without positions at the end, it stays where it is.
+fn positions<'a>(scene: &'a Scene, body: &Resident, end: u64) -> &'a Positions {
+    let body = scene.body_in(body.id.slot());
+    let start = body.positions();
+    match end {
+        0 => start,
+        _ => body.end_positions().unwrap_or(start),
     }
 }
 

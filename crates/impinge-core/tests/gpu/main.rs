@@ -19,3 +19,5 @@ mod resident_steps;
 mod safe;
 #[cfg(feature = "gpu")]
 mod steps;
+#[cfg(feature = "gpu")]
+mod submissions;
