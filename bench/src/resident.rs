@@ -265,7 +265,7 @@ fn cloth(options: &Options, caller: &Caller, report: &mut Report) -> Result<(), 
     let truncated = |_: usize, gpu: &mut Gpu<'_>, encoder: &mut wgpu::CommandEncoder| {
         encoder.copy_buffer_to_buffer(&wished, 0, &ends, 0, wished.size());
         let safe = gpu.encode_safe_distances(&scene, most, &query, &[(body, &starts)], encoder)?;
-        gpu.encode_truncate(&safe, &[(body, &starts)], &[(body, &ends)], encoder)
+        gpu.encode_truncate(&scene, &safe, &[(body, &starts)], &[(body, &ends)], encoder)
     };
     let times = caller.measure(n_frames, truncated)?;
     let cpu = on_cpu(n_frames, |_, detector| {

@@ -18,6 +18,30 @@ use crate::search::runner::Job;
 use crate::search::stats::Stats;
 
 /// The device of a detector, for frames whose positions and pairs stay there: [`Detector::gpu`].
+///
+/// # What is encoded, and when it is submitted
+///
+/// What is encoded for the caller reads and writes buffers of the detector when its commands run.
+/// So submit it, or drop it, before the detector is asked anything else or encodes into another
+/// encoder. Otherwise what it leaves may belong to other positions or to another question, and
+/// nothing says so. Later answers are right even then.
+///
+/// One submission may have one frame ([`encode`](Gpu::encode)), one step
+/// ([`encode_step`](Gpu::encode_step)) or question about safe distances
+/// ([`encode_safe_distances`](Gpu::encode_safe_distances)), and one truncation
+/// ([`encode_truncate`](Gpu::encode_truncate)), in one encoder. Each has the buffers that it was
+/// given. Do not change the scene between these calls: all may get its positions as they are at the
+/// last one.
+///
+/// # Buffers that are given, and buffers that are returned
+///
+/// A body that is named twice in one list is refused. Buffers of bodies that do not take part in
+/// the query are ignored.
+///
+/// Returned buffers have the usages `STORAGE`, `COPY_SRC` and `COPY_DST`, but are to be read only.
+/// They are the detector's: the next question of the same kind, also one of the host, writes into
+/// them or replaces them. So encode what reads them before that, in the same submission or a later
+/// one.
 pub struct Gpu<'a> {
     detector: &'a mut Detector,
 }
@@ -30,6 +54,11 @@ impl std::fmt::Debug for Gpu<'_> {
 
 impl Detector {
     /// The device, if the detector works on one: for frames whose positions and pairs stay there.
+    ///
+    /// Nothing can be encoded for a detector that opened a device of its own, because nobody else
+    /// can make encoders and buffers on that: give it one of yours with
+    /// [`Settings::on_device`](crate::Settings::on_device). Nor can anybody else poll that device,
+    /// so its frames can be [awaited](Gpu::detect_async) in a browser alone.
     pub fn gpu(&mut self) -> Option<Gpu<'_>> {
         self.open_gpu();
         self.gpu.is_some().then_some(Gpu { detector: self })
@@ -38,7 +67,8 @@ impl Detector {
 
 impl Gpu<'_> {
     /// [`detect`](Detector::detect) without blocking: the future waits for the device, which must
-    /// be polled meanwhile (a browser does that; natively call `wgpu::Device::poll`).
+    /// be polled meanwhile (a browser does that; natively call `wgpu::Device::poll`, in the loop
+    /// that polls the future or on another thread).
     ///
     /// # Errors
     /// As `detect`.
@@ -60,14 +90,18 @@ impl Gpu<'_> {
     /// find clusters, once. Positions on the device are not checked: if one is not finite, the
     /// pairs of its primitives are unspecified.
     ///
-    /// At most one frame of a detector may be encoded per submission. Pairs of which the filter on
-    /// the device is unsure come in a separate list. If there is not enough room, the lists are
-    /// incomplete and their counts say so, see [`ResidentPairs`]; [`grow`](Gpu::grow) then grows
-    /// them.
+    /// At most one frame of a detector may be encoded per submission, and it must be submitted
+    /// before the detector is asked anything else or encodes into another encoder: see [`Gpu`].
+    /// Pairs of which the filter on the device is unsure come in a separate list. If there is not
+    /// enough room, the lists are incomplete and their counts say so, see [`ResidentPairs`];
+    /// [`grow`](Gpu::grow) then grows them.
     ///
     /// # Errors
-    /// A stale id, a buffer that is too small or lacks its usage, a detector without a GPU. Device
-    /// errors go to the device's owner, and so do those of kernels, which the first frame compiles.
+    /// A stale id, a body with two buffers, a buffer that is too small or lacks its usage; a query
+    /// for [one cell](Query::owned_by), or with an [`exclude`](Query::exclude) of anything but
+    /// bodies; a body of the scene with [pinned](Scene::set_pinned) vertices; a detector without a
+    /// GPU; a frame larger than the device or the memory budget can hold. Device errors go to the
+    /// device's owner, and so do those of kernels, which the first frame compiles.
     pub fn encode(
         &mut self,
         scene: &Scene,
@@ -83,7 +117,7 @@ impl Gpu<'_> {
             });
         }
         let plan = Plan::intersections(scene, query, Goal::All, self.detector.settings.limits())?;
-        refuse_left_out(&plan)?;
+        refuse_left_out(scene, query, &plan)?;
         let control = Control::new();
         let job = self.detector.runner.job(scene, &plan, &control)?;
         on_device(&mut self.detector.gpu)?.encode(job, positions, encoder)
@@ -106,14 +140,14 @@ impl Gpu<'_> {
     /// finite, the pairs of its elements are unspecified.
     ///
     /// At most one step of a detector may be encoded per submission, besides one frame of
-    /// [`encode`](Gpu::encode). If there is not enough room, the list is incomplete and its count
-    /// says so, see [`ResidentStep`]; [`grow`](Gpu::grow) then grows it.
+    /// [`encode`](Gpu::encode), and it must be submitted before the detector is asked anything else
+    /// or encodes into another encoder: see [`Gpu`]. If there is not enough room, the list is
+    /// incomplete and its count says so, see [`ResidentStep`]; [`grow`](Gpu::grow) then grows it.
     ///
     /// # Errors
-    /// A stale id, a buffer that is too small or lacks its usage, a step with a separation, a
-    /// clearance or a filter, bodies with a [thickness](Scene::set_thickness), or for one cell, a step larger than the device or the memory budget
-    /// can hold, a detector without a GPU. Device errors go to the device's owner, and so do those
-    /// of kernels, which the first step compiles.
+    /// Those of [`encode`](Gpu::encode), for positions at both ends; a query with a separation, a
+    /// clearance, a filter or kinds of pairs; a body of the scene with a
+    /// [thickness](Scene::set_thickness).
     pub fn encode_step(
         &mut self,
         scene: &Scene,
@@ -131,8 +165,9 @@ impl Gpu<'_> {
 
     /// Encodes [`safe_distances`](Detector::safe_distances) into the caller's encoder: positions
     /// come from buffers on the device, and how far each vertex may move stays there. Nothing is
-    /// read back, so a solver on the device needs no answer from the host between its steps;
-    /// [`encode_truncate`](Gpu::encode_truncate) moves its vertices by at most these numbers.
+    /// read back: once there is [room](Gpu::grow), a solver on the device needs no answer from the
+    /// host between its steps. [`encode_truncate`](Gpu::encode_truncate) moves its vertices by at
+    /// most these numbers.
     ///
     /// The numbers are `f32`, proven under any rounding that WGSL allows: if every vertex moves by
     /// at most its number, on any path, no pair of elements touches that the device looks at: those
@@ -150,12 +185,15 @@ impl Gpu<'_> {
     /// own, a vertex is as thick as the thickest of its own.
     ///
     /// At most one step, or one question about safe distances, may be encoded per submission,
-    /// besides one frame of [`encode`](Gpu::encode). If there is not enough room, all numbers are
-    /// 0, which is safe; [`grow`](Gpu::grow) then makes more.
+    /// besides one frame of [`encode`](Gpu::encode), and it must be submitted before the detector
+    /// is asked anything else or encodes into another encoder: see [`Gpu`]. If there is not enough
+    /// room, all numbers are 0, which is safe, and nothing moves until [`grow`](Gpu::grow) has made
+    /// more: call it at least once, after the first submission, and again where vertices come
+    /// nearer to each other.
     ///
     /// # Errors
-    /// As `encode_step`, with a `most` that is negative or above 2^100, for fixed bodies that are
-    /// not in the scene, and for a thickness above 2^100.
+    /// As `encode_step`, but for bodies with a thickness, which may be up to 2^100; a `most` that is
+    /// negative or above 2^100; fixed bodies that are not in the scene.
     pub fn encode_safe_distances(
         &mut self,
         scene: &Scene,
@@ -186,9 +224,13 @@ impl Gpu<'_> {
         })
     }
 
-    /// Encodes [`truncate`](Detector::truncate) into the caller's encoder, after safe distances:
-    /// each vertex moves towards its wished position as far as these allow. The wished position is
-    /// reached where it is certainly near enough; else the vertex ends on the way to it, or stays.
+    /// Encodes how vertices move towards wished positions, after safe distances: each as far as
+    /// these allow. The wished position is reached where it is certainly near enough; else the
+    /// vertex ends on the way to it, or stays.
+    ///
+    /// These numbers hold for every direction. So a vertex stops at its number even where it goes
+    /// away from all others; [`truncate`](Detector::truncate), which the host answers, looks at the
+    /// directions too, and leaves alone what goes apart.
     ///
     /// `starts` has the positions of which `safe` was found, as they were given to
     /// [`encode_safe_distances`](Gpu::encode_safe_distances), or a copy. `ends` has the wished ones,
@@ -197,21 +239,29 @@ impl Gpu<'_> {
     /// if all bodies that move are given, bodies that are not fixed move no other way, and others
     /// do not move. A wished position may be any number, infinite too.
     ///
+    /// `safe` must come from the last call of `encode_safe_distances` of this detector, because the
+    /// next one writes into the same buffer, and `scene` is the scene that it was asked for: if a
+    /// body was [re-meshed](Scene::remesh) since, or its [edges](Scene::set_edges) were set, encode
+    /// safe distances again. Whether a body has moved since is not checked: that is a matter of
+    /// `starts`.
+    ///
     /// Buffers hold `(v, 3)` f32 coordinates, and need the usage `STORAGE`. At most one truncation
     /// may be encoded per submission.
     ///
     /// # Errors
-    /// A body without safe distances or with `ends` alone, a buffer that is too small, lacks a
-    /// usage, is larger than a binding may be, or is that of both ends; a lost device, a detector
-    /// that works on the CPU.
+    /// Safe distances that are not the last ones of this detector, or of a body that is no longer
+    /// the same; a body without safe distances, with `ends` alone or with two buffers, a buffer that
+    /// is too small, lacks a usage, is larger than a binding may be, or is that of both ends; a lost
+    /// device, a detector that works on the CPU.
     pub fn encode_truncate(
         &mut self,
+        scene: &Scene,
         safe: &ResidentSafe,
         starts: &[(BodyId, &wgpu::Buffer)],
         ends: &[(BodyId, &wgpu::Buffer)],
         encoder: &mut wgpu::CommandEncoder,
     ) -> Result<(), Error> {
-        on_device(&mut self.detector.gpu)?.encode_truncate(safe, starts, ends, encoder)
+        on_device(&mut self.detector.gpu)?.encode_truncate(scene, safe, [starts, ends], encoder)
     }
 
     /// Encodes a question about contacts, with the clusters of its parts: those of bodies whose
@@ -225,7 +275,7 @@ impl Gpu<'_> {
     ) -> Result<T, Error> {
         let engine = on_device(&mut self.detector.gpu)?;
         let plan = Plan::contacts(scene, query, Goal::All, self.detector.settings.limits())?;
-        refuse_left_out(&plan)?;
+        refuse_left_out(scene, query, &plan)?;
         let control = Control::new();
         let job = self.detector.runner.job(scene, &plan, &control)?;
         let resident: BTreeSet<BodyId> = resident.iter().map(|&(body, _)| body).collect();
@@ -248,10 +298,12 @@ impl Gpu<'_> {
         Some((buffer.clone(), offset))
     }
 
-    /// Reads the counts of the last encoded frame, and of the last encoded step, whose commands
-    /// must have been submitted, and grows the lists that were too small. Returns whether both were
-    /// complete; if not, encode them again. To be called before the detector answers another
-    /// question.
+    /// Reads the counts of the last encoded frame, and of the last encoded step or safe distances,
+    /// whose commands must have been submitted, and grows the lists that were too small. Returns
+    /// whether these were complete; if not, encode them again. It says nothing of those before, and
+    /// nothing of a kind of which the host has asked since: then it is `true`.
+    ///
+    /// Waits until the device has done all that was submitted to the queue so far.
     ///
     /// # Errors
     /// A lost device; lists larger than it can bind; a memory budget that does not allow them.
@@ -262,7 +314,9 @@ impl Gpu<'_> {
         }
     }
 
-    /// [`grow`](Gpu::grow) without blocking.
+    /// [`grow`](Gpu::grow) without blocking: the future waits for the device, which must be polled
+    /// meanwhile, as for [`detect_async`](Gpu::detect_async). Without a thread that polls it,
+    /// `block_on` waits forever.
     ///
     /// # Errors
     /// As `grow`.
@@ -274,15 +328,24 @@ impl Gpu<'_> {
     }
 }
 
-/// Frames that stay on a device leave out bodies only.
-fn refuse_left_out(plan: &Plan) -> Result<(), Error> {
-    match plan.leaves_out() {
-        false => Ok(()),
-        true => Err(Error::Setting {
+/// Frames that stay on a device leave out bodies only: refuses what else is left out, by its name.
+fn refuse_left_out(scene: &Scene, query: &Query, plan: &Plan) -> Result<(), Error> {
+    if !plan.leaves_out() {
+        return Ok(());
+    }
+    if let Some(what) = query.leaves_out_elements() {
+        return Err(Error::Setting {
             setting: "exclude",
-            given: "rings, groups, pairs or pinned vertices in a plan that stays on a device"
-                .to_owned(),
+            given: format!("{what} in a plan that stays on a device"),
             allowed: "bodies",
+        });
+    }
+    match scene.bodies().find(|(_, body)| body.pinned().is_some()) {
+        None => Ok(()),
+        Some((id, _)) => Err(Error::Setting {
+            setting: "pinned",
+            given: format!("pinned vertices of body {id} in a plan that stays on a device"),
+            allowed: "only bodies without any",
         }),
     }
 }

@@ -67,6 +67,8 @@ pub struct Engine {
     pub(super) touches_by: Option<f32>,
     /// By how much boxes are widened, the bits of an f32, where safe distances are asked.
     pub(super) safe: Option<u32>,
+    /// The stamp of the safe distances that were encoded last; 0 if there are none.
+    pub(super) safe_stamp: u64,
     /// Runs truncations, whose parameters are apart from those of safe distances: one submission
     /// has both.
     pub(super) truncations: Launcher,
@@ -176,6 +178,7 @@ impl Engine {
             sought: Goal::All,
             touches_by: None,
             safe: None,
+            safe_stamp: 0,
             truncations: Launcher::default(),
             is_traced: false,
         }

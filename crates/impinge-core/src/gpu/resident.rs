@@ -19,7 +19,7 @@ use crate::bvh::clusters::Clustering;
 use crate::plan::Plan;
 use crate::scene::elements::Part;
 use crate::scene::error::Error;
-use crate::scene::ids::BodyId;
+use crate::scene::ids::{BodyId, new_stamp};
 use crate::scene::positions::Positions;
 use crate::scene::{Body, Scene};
 use crate::search::runner::Job;
@@ -33,7 +33,7 @@ use crate::search::stats::Stats;
 /// before it. The order of pairs is not specified.
 ///
 /// A count may be larger than its list: the list then holds as many pairs as fit, and
-/// [`GpuContext::grow`](crate::Gpu::grow) makes it larger.
+/// [`Gpu::grow`](crate::Gpu::grow) makes it larger.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct ResidentPairs {
@@ -81,7 +81,7 @@ pub struct ResidentPairs {
 /// [`Body::part`](crate::Body::part) lists them. The order of pairs is not specified.
 ///
 /// The count may be larger than the list: the list then holds as many pairs as fit, and
-/// [`GpuContext::grow`](crate::Gpu::grow) makes it larger.
+/// [`Gpu::grow`](crate::Gpu::grow) makes it larger.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct ResidentStep {
@@ -127,16 +127,22 @@ pub struct ResidentPart {
 /// have run.
 ///
 /// ```text
-/// distances   vertices of the first body | of the second | …
+/// distances   vertices of the first body | of the second | …    unused
 ///             first                        first
 /// ```
+///
+/// Good for [`Gpu::encode_truncate`](crate::Gpu::encode_truncate) until the same detector encodes
+/// safe distances again, into the same buffer, and for bodies of which topology is the same.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct ResidentSafe {
-    /// Holds an `f32` per vertex, which is not below 0: it may move as far, on any path.
+    /// Holds an `f32` per vertex, which is not below 0: it may move as far, on any path. The buffer
+    /// may be longer than all vertices take.
     pub distances: wgpu::Buffer,
     /// Where the vertices of each body that takes part are, in the order of their ids.
     pub bodies: Vec<ResidentVertices>,
+    /// What tells them from all others.
+    stamp: u64,
 }
 
 /// Where the vertices of a body are in a buffer that has one number for each.
@@ -149,6 +155,7 @@ pub struct ResidentVertices {
     pub first: u32,
     /// How many vertices it has.
     pub len: u32,
+    topology_stamp: u64,
 }
 
 const COUNTER: u64 = size_of::<Counter>() as u64;
@@ -157,20 +164,17 @@ impl Engine {
     /// Encodes all work of a frame as one pass.
     ///
     /// # Errors
-    /// Those of [`Detector::encode`](crate::Detector::encode).
+    /// Those of [`Gpu::encode`](crate::Gpu::encode).
     pub fn encode(
         &mut self,
         job: Job<'_>,
         positions: &[(BodyId, &wgpu::Buffer)],
         encoder: &mut wgpu::CommandEncoder,
     ) -> Result<ResidentPairs, Error> {
-        for &(body, buffer) in positions {
-            check_buffer(job.scene, body, buffer, "positions")?;
-        }
+        let starts = checked(job.scene, positions, "positions")?;
         self.turn_to(Motion::Still);
         let ids: Vec<BodyId> = positions.iter().map(|&(body, _)| body).collect();
         let clusterings = self.cluster(job, &ids, &mut Stats::default())?;
-        let starts = positions.iter().copied().collect();
         let resident = encoded([starts, BTreeMap::new()]);
         self.encode_whole(job, &clusterings, &resident, encoder)?;
         let pass_buffers = &self.lane.pass_buffers;
@@ -190,7 +194,7 @@ impl Engine {
     /// start, and at the end.
     ///
     /// # Errors
-    /// Those of [`Detector::encode_step`](crate::Detector::encode_step).
+    /// Those of [`Gpu::encode_step`](crate::Gpu::encode_step).
     pub fn encode_step(
         &mut self,
         job: Job<'_>,
@@ -200,13 +204,8 @@ impl Engine {
     ) -> Result<ResidentStep, Error> {
         let Job { scene, plan, .. } = job;
         self.gpu.check_lost()?;
-        for (buffers, what) in [(starts, "positions"), (ends, "end positions")] {
-            for &(body, buffer) in buffers {
-                check_buffer(scene, body, buffer, what)?;
-            }
-        }
-        let [starts, mut ends] =
-            [starts, ends].map(|end| end.iter().copied().collect::<BTreeMap<_, _>>());
+        let starts = checked(scene, starts, "positions")?;
+        let mut ends = checked(scene, ends, "end positions")?;
         for (&body, &buffer) in &starts {
             // A body without end positions does not move.
             if scene.body(body)?.end_positions().is_none() {
@@ -252,14 +251,11 @@ impl Engine {
         encoder: &mut wgpu::CommandEncoder,
     ) -> Result<ResidentSafe, Error> {
         self.gpu.check_lost()?;
-        for &(body, buffer) in positions {
-            check_buffer(job.scene, body, buffer, "positions")?;
-        }
+        let positions = checked(job.scene, positions, "positions")?;
         self.turn_to(Motion::Moving);
         if !self.is_held(job, clusterings) {
             return Err(self.too_small("the bodies at once", Capacities::LEAST));
         }
-        let positions: BTreeMap<_, _> = positions.iter().copied().collect();
         let resident = encoded([positions.clone(), positions]);
         self.update(job, clusterings, &resident, &mut Stats::default())?;
         let (mut limits, mut bodies) = (Vec::new(), Vec::new());
@@ -268,8 +264,13 @@ impl Engine {
             let own = if fixed.contains(&body) { 0.0 } else { most };
             // Vertices fit 32 bits, or the bodies would not be held.
             let (first, len) = (n, n_vertices as u32);
-            bodies.push(ResidentVertices { body, first, len });
             let held = job.scene.body(body)?;
+            bodies.push(ResidentVertices {
+                body,
+                first,
+                len,
+                topology_stamp: held.topology_stamp(),
+            });
             thickest = thickest.max(held.thickness());
             limits.push(LimitsOf {
                 body,
@@ -296,10 +297,13 @@ impl Engine {
         self.safe = Some(reach.to_bits());
         // Boxes that were widened by another length do not fit, nor do these fit a step.
         self.world.is_moved();
+        // Those before are overwritten.
+        self.safe_stamp = new_stamp();
         self.encode_work(job, &resident, encoder)?;
         Ok(ResidentSafe {
             distances: self.lane.pass_buffers.shares.buffer().clone(),
             bodies,
+            stamp: self.safe_stamp,
         })
     }
 
@@ -309,12 +313,21 @@ impl Engine {
     /// Those of [`Gpu::encode_truncate`](crate::Gpu::encode_truncate).
     pub fn encode_truncate(
         &mut self,
+        scene: &Scene,
         safe: &ResidentSafe,
-        starts: &[(BodyId, &wgpu::Buffer)],
-        ends: &[(BodyId, &wgpu::Buffer)],
+        [starts, ends]: [&[(BodyId, &wgpu::Buffer)]; 2],
         encoder: &mut wgpu::CommandEncoder,
     ) -> Result<(), Error> {
         self.gpu.check_lost()?;
+        if safe.stamp != self.safe_stamp {
+            return Err(Error::Gpu {
+                what: "these safe distances are not the last ones that were encoded by this \
+                       detector: encode them again"
+                    .to_owned(),
+            });
+        }
+        by_body(starts, "positions")?;
+        by_body(ends, "end positions")?;
         let mut recording = Recording::default();
         recording.stage("truncate");
         for &(body, end) in ends {
@@ -324,6 +337,12 @@ impl Engine {
             let of_body = |&&(id, _): &&(BodyId, &wgpu::Buffer)| id == body;
             let vertices = safe.bodies.iter().find(|vertices| vertices.body == body);
             let vertices = vertices.ok_or_else(|| refused("it has no safe distances"))?;
+            if scene.body(body)?.topology_stamp() != vertices.topology_stamp {
+                return Err(refused(
+                    "it was re-meshed, or its edges were set, after its safe distances were \
+                     encoded: encode them again",
+                ));
+            }
             let start = starts.iter().find(of_body);
             let &(_, start) = start.ok_or_else(|| refused("it has end positions alone"))?;
             if start == end {
@@ -406,8 +425,7 @@ impl Engine {
         launcher.encode(&self.gpu, &recording, None, encoder)
     }
 
-    /// The positions of a body on the device, see
-    /// [`Detector::positions_on_device`](crate::Detector::positions_on_device).
+    /// The positions of a body on the device, see [`Gpu::positions`](crate::Gpu::positions).
     pub fn positions_of(&self, id: BodyId, body: &Body) -> Option<(&wgpu::Buffer, u64)> {
         match body.positions() {
             Positions::F32(_) => self.world.positions_of(id, body.positions_stamp()),
@@ -419,7 +437,7 @@ impl Engine {
     /// Returns whether none was.
     ///
     /// # Errors
-    /// Those of [`GpuContext::grow`](crate::Gpu::grow).
+    /// Those of [`Gpu::grow`](crate::Gpu::grow).
     pub async fn make_room(&mut self) -> Result<bool, Error> {
         self.gpu().check_lost()?;
         let mut is_complete = true;
@@ -475,16 +493,35 @@ fn thickness(scene: &Scene, limits: &[LimitsOf]) -> Result<Vec<Share>, Error> {
     Ok(all)
 }
 
-/// Refuses a buffer that does not hold a body's positions, or cannot be copied from.
-fn check_buffer(
-    scene: &Scene,
-    body: BodyId,
-    buffer: &wgpu::Buffer,
+/// Buffers by their bodies. Refuses a body that has two.
+fn by_body<'a>(
+    buffers: &[(BodyId, &'a wgpu::Buffer)],
     what: &str,
-) -> Result<(), Error> {
-    let n_vertices = count(scene.body(body)?.n_vertices());
+) -> Result<BTreeMap<BodyId, &'a wgpu::Buffer>, Error> {
+    let mut held = BTreeMap::new();
+    for &(body, buffer) in buffers {
+        if held.insert(body, buffer).is_some() {
+            return Err(Error::Gpu {
+                what: format!("body {body}: its {what} are given twice"),
+            });
+        }
+    }
+    Ok(held)
+}
+
+/// Buffers by their bodies. Refuses those that do not hold a body's positions, or cannot be copied
+/// from.
+fn checked<'a>(
+    scene: &Scene,
+    buffers: &[(BodyId, &'a wgpu::Buffer)],
+    what: &str,
+) -> Result<BTreeMap<BodyId, &'a wgpu::Buffer>, Error> {
     let copied = (wgpu::BufferUsages::COPY_SRC, "COPY_SRC");
-    check_holds(body, buffer, what, n_vertices, copied)
+    for &(body, buffer) in buffers {
+        let n_vertices = count(scene.body(body)?.n_vertices());
+        check_holds(body, buffer, what, n_vertices, copied)?;
+    }
+    by_body(buffers, what)
 }
 
 /// Refuses a buffer without room for positions, or without a usage.

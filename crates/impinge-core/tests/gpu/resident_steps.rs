@@ -7,7 +7,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use crate::caller::Caller;
 
 use impinge_core::{
-    Backend, BodyId, Detector, Error, PairKind, Part, Query, ResidentStep, Scene, Settings, wgpu,
+    Backend, BodyId, Detector, Error, Exclusion, PairKind, Part, Query, ResidentStep, Scene,
+    Settings, wgpu,
 };
 use impinge_scenes::{Random, surfaces};
 
@@ -437,6 +438,20 @@ fn what_does_not_fit_is_refused_by_name() {
         let error = refused(&step, &starts, &ends);
         assert!(texts.iter().all(|text| error.contains(text)), "{error}");
     }
+    let twice = [(body, &good), (body, &good)];
+    for (starts, ends, words) in [
+        (&twice[..], &[][..], "its positions are given twice"),
+        (&[], &twice, "its end positions are given twice"),
+    ] {
+        let error = refused(&step, starts, ends);
+        assert!(
+            error.contains(words) && error.contains(&body.to_string()),
+            "{error}"
+        );
+    }
+    let rings = step.clone().exclude(Exclusion::rings(1));
+    let error = refused(&rings, &[], &[]);
+    assert!(error.contains("exclude: rings"), "{error}");
     let apart = step.clone().separation(0.5);
     let error = refused(&apart, &[], &[]);
     assert!(
@@ -453,6 +468,38 @@ fn what_does_not_fit_is_refused_by_name() {
     let refused = device.encode_step(&thick, &step, &[], &[], &mut encoder);
     let error = refused.expect_err("refused").to_string();
     assert!(error.contains("thickness: 0.5 of body"), "{error}");
+    let mut pinned = scene.clone();
+    pinned
+        .set_pinned(body, &[true, false, false])
+        .expect("good");
+    let none = &mut encoder;
+    let refused = [
+        device.encode(&pinned, &step, &[], none).map(|_| ()),
+        device
+            .encode_step(&pinned, &step, &[], &[], none)
+            .map(|_| ()),
+        device
+            .encode_safe_distances(&pinned, 0.5, &step, &[], none)
+            .map(|_| ()),
+    ];
+    for refused in refused {
+        let error = refused.expect_err("refused").to_string();
+        let words = format!("pinned vertices of body {body}");
+        assert!(error.contains(&words), "{error}");
+        assert!(!error.contains("exclude"), "{error}");
+    }
+    let twice = [(body, &good), (body, &good)];
+    let refused = [
+        device.encode(&scene, &step, &twice, none).map(|_| ()),
+        device
+            .encode_safe_distances(&scene, 0.5, &step, &twice, none)
+            .map(|_| ()),
+    ];
+    for refused in refused {
+        let error = refused.expect_err("refused").to_string();
+        let words = format!("body {body}: its positions are given twice");
+        assert!(error.contains(&words), "{error}");
+    }
     let mut cpu = Detector::new(Backend::Cpu).expect("settings");
     assert!(cpu.gpu().is_none());
 }

@@ -598,7 +598,7 @@ fn truncated(
     let mut gpu = detector.gpu().expect("a device");
     let found = gpu.encode_safe_distances(scene, most, query, &positions, &mut encoder);
     let found = found.expect("good buffers");
-    gpu.encode_truncate(&found, &positions, &ends, &mut encoder)
+    gpu.encode_truncate(scene, &found, &positions, &ends, &mut encoder)
         .expect("good buffers");
     caller.queue.submit([encoder.finish()]);
     let words = caller.read(&found.distances);
@@ -807,16 +807,77 @@ fn buffers_of_a_truncation_are_refused_by_name() {
         (*a, &start, &start, "in the buffer of its positions"),
     ] {
         let (starts, ends) = ([(body, start)], [(body, end)]);
-        let refused = gpu.encode_truncate(&safe, &starts, &ends, &mut encoder);
+        let refused = gpu.encode_truncate(&scene, &safe, &starts, &ends, &mut encoder);
         let text = refused.expect_err("refused").to_string();
         assert!(
             text.contains(words) && text.contains(&body.to_string()),
             "{text}"
         );
     }
-    let refused = gpu.encode_truncate(&safe, &[], &[(*a, &end)], &mut encoder);
+    let refused = gpu.encode_truncate(&scene, &safe, &[], &[(*a, &end)], &mut encoder);
     let text = refused.expect_err("refused").to_string();
     assert!(text.contains("end positions alone"), "{text}");
+}
+
+#[test]
+fn safe_distances_that_are_no_longer_good_are_refused() {
+    let caller = Caller::new();
+    let mut detector = caller.detector(Settings::default());
+    let (mut scene, starts, wished) = meeting();
+    let (a, at) = &starts[0];
+    let (start, end) = (caller.upload(at), caller.upload(&wished[0]));
+    let (from, to) = ([(*a, &start)], [(*a, &end)]);
+    let mut encoder = caller.encoder();
+    let mut gpu = detector.gpu().expect("a device");
+    let mut encode = |gpu: &mut impinge_core::Gpu<'_>, scene: &Scene, query: &Query| {
+        let safe = gpu.encode_safe_distances(scene, 0.1, query, &[], &mut encoder);
+        safe.expect("good")
+    };
+    let old = encode(&mut gpu, &scene, &Query::all());
+    let other = encode(&mut gpu, &scene, &Query::self_of(starts[1].0));
+    let last = encode(&mut gpu, &scene, &Query::all());
+    let mut second = caller.detector(Settings::default());
+    let mut of_second = second.gpu().expect("a device");
+    let foreign = encode(&mut of_second, &scene, &Query::all());
+    let mut encoder = caller.encoder();
+    for safe in [&old, &other, &foreign] {
+        let refused = gpu.encode_truncate(&scene, safe, &from, &to, &mut encoder);
+        let text = refused.expect_err("refused").to_string();
+        assert!(text.contains("not the last ones"), "{text}");
+    }
+    gpu.encode_truncate(&scene, &last.clone(), &from, &to, &mut encoder)
+        .expect("the last ones");
+    for (starts, ends, words) in [
+        (
+            &[from[0], from[0]][..],
+            &to[..],
+            "its positions are given twice",
+        ),
+        (&from, &[to[0], to[0]], "its end positions are given twice"),
+    ] {
+        let refused = gpu.encode_truncate(&scene, &last, starts, ends, &mut encoder);
+        let text = refused.expect_err("refused").to_string();
+        assert!(
+            text.contains(words) && text.contains(&a.to_string()),
+            "{text}"
+        );
+    }
+    // It may move, but neither be another mesh nor be gone.
+    scene.set_positions(*a, &wished[0]).expect("good");
+    gpu.encode_truncate(&scene, &last, &from, &to, &mut encoder)
+        .expect("the same mesh");
+    let faces = vec![[0, 1, 2]];
+    scene.remesh(*a, (faces, at.clone())).expect("good");
+    let refused = gpu.encode_truncate(&scene, &last, &from, &to, &mut encoder);
+    let text = refused.expect_err("refused").to_string();
+    assert!(
+        text.contains("re-meshed") && text.contains(&a.to_string()),
+        "{text}"
+    );
+    scene.remove(*a).expect("held");
+    let refused = gpu.encode_truncate(&scene, &last, &from, &to, &mut encoder);
+    let text = refused.expect_err("refused").to_string();
+    assert!(text.contains(&a.to_string()), "{text}");
 }
 
 #[test]
