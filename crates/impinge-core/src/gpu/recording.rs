@@ -5,6 +5,7 @@
 //! it runs launch by launch and reads back what each one has written, so that a wrong launch is
 //! found by comparing with another device, or with kernels known to be good.
 
+use std::collections::HashMap;
 use std::fmt;
 use std::sync::Arc;
 
@@ -241,14 +242,22 @@ pub struct Written {
 pub struct Launcher {
     params: Storage<Step>,
     sent: Vec<Step>,
-    groups: Vec<BoundGroup>,
+    groups: HashMap<MadeOf, BoundGroup>,
 }
 
-/// A bind group, and what it was made of.
+/// What a bind group was made of.
+#[derive(Debug, PartialEq, Eq, Hash)]
+struct MadeOf {
+    /// The address of the program.
+    program: usize,
+    buffers: Vec<(wgpu::Buffer, u64)>,
+}
+
+/// A bind group.
 #[derive(Debug)]
 struct BoundGroup {
-    program: Arc<Program>,
-    buffers: Vec<(wgpu::Buffer, u64)>,
+    /// Its program, which keeps its address for as long as the bind group is there.
+    _program: Arc<Program>,
     group: wgpu::BindGroup,
 }
 
@@ -257,15 +266,14 @@ impl Default for Launcher {
         Launcher {
             params: Storage::new("parameters", wgpu::BufferUsages::UNIFORM),
             sent: Vec::new(),
-            groups: Vec::new(),
+            groups: HashMap::new(),
         }
     }
 }
 
-/// A launch that is ready: its bind group among those of the launcher, and the offset of its
-/// parameters.
+/// A launch that is ready: its bind group, and the offset of its parameters.
 struct Ready {
-    group: usize,
+    group: wgpu::BindGroup,
     offset: Option<u32>,
 }
 
@@ -297,7 +305,7 @@ impl Launcher {
             while let Some(launch) = recording.launches.get(next)
                 && launch.stage == ix as usize
             {
-                self.dispatch(launch, &ready[next], &mut pass);
+                Launcher::dispatch(launch, &ready[next], &mut pass);
                 next += 1;
             }
         }
@@ -328,7 +336,7 @@ impl Launcher {
                 }
             }
             let mut pass = encoder.begin_compute_pass(&Default::default());
-            self.dispatch(launch, ready, &mut pass);
+            Launcher::dispatch(launch, ready, &mut pass);
             drop(pass);
             gpu.queue.submit([encoder.finish()]);
             let mut written = Vec::new();
@@ -351,6 +359,10 @@ impl Launcher {
     }
 
     /// Sends the parameters, if they differ from those on the device, and binds all buffers.
+    #[expect(
+        clippy::mutable_key_type,
+        reason = "wgpu hashes a buffer by its identity, which stays"
+    )]
     fn prepare(&mut self, gpu: &GpuContext, recording: &Recording) -> Result<Vec<Ready>, Error> {
         let params = recording.launches.iter().filter_map(Launch::params);
         let planned: Vec<Step> = params.map(Step::from).collect();
@@ -364,7 +376,7 @@ impl Launcher {
         let ready = launches.map(|launch| {
             let offset = launch.params().map(|_| {
                 next += 1;
-                // A pass has a few dozen launches.
+                // A pass has a few dozen launches; truncations have one per body.
                 (next - 1) * size_of::<Step>() as u32
             });
             let group = self.group(gpu, &mut before, launch);
@@ -373,36 +385,41 @@ impl Launcher {
         Ok(ready.collect())
     }
 
-    /// The number of the bind group of a launch: one of this recording, one of the recording
-    /// before, or a new one.
-    fn group(&mut self, gpu: &GpuContext, before: &mut Vec<BoundGroup>, launch: &Launch) -> usize {
+    /// The bind group of a launch: one of this recording, one of the recording before, or a new
+    /// one.
+    #[expect(
+        clippy::mutable_key_type,
+        reason = "wgpu hashes a buffer by its identity, which stays"
+    )]
+    fn group(
+        &mut self,
+        gpu: &GpuContext,
+        before: &mut HashMap<MadeOf, BoundGroup>,
+        launch: &Launch,
+    ) -> wgpu::BindGroup {
         let buffer = |bound: &Bound| match bound {
             Bound::Buffer(slice) => (slice.buffer.clone(), slice.bytes),
             Bound::Params(_) => (self.params.buffer().clone(), count(size_of::<Params>())),
         };
-        let buffers: Vec<_> = launch.bound.iter().map(buffer).collect();
-        let is_it = |held: &BoundGroup| {
-            Arc::ptr_eq(&held.program, &launch.program) && held.buffers == buffers
+        let made_of = MadeOf {
+            program: Arc::as_ptr(&launch.program).addr(),
+            buffers: launch.bound.iter().map(buffer).collect(),
         };
-        if let Some(ix) = self.groups.iter().position(is_it) {
-            return ix;
+        if let Some(held) = self.groups.get(&made_of) {
+            return held.group.clone();
         }
-        let held = match before.iter().position(is_it) {
-            Some(ix) => before.swap_remove(ix),
-            None => BoundGroup {
-                program: Arc::clone(&launch.program),
-                group: launch.program.bind(gpu, &buffers),
-                buffers,
-            },
-        };
-        self.groups.push(held);
-        self.groups.len() - 1
+        let held = before.remove(&made_of).unwrap_or_else(|| BoundGroup {
+            _program: Arc::clone(&launch.program),
+            group: launch.program.bind(gpu, &made_of.buffers),
+        });
+        let group = held.group.clone();
+        self.groups.insert(made_of, held);
+        group
     }
 
-    fn dispatch(&self, launch: &Launch, ready: &Ready, pass: &mut wgpu::ComputePass<'_>) {
-        let held = &self.groups[ready.group];
-        pass.set_pipeline(held.program.pipeline());
-        pass.set_bind_group(0, &held.group, ready.offset.as_slice());
+    fn dispatch(launch: &Launch, ready: &Ready, pass: &mut wgpu::ComputePass<'_>) {
+        pass.set_pipeline(launch.program.pipeline());
+        pass.set_bind_group(0, &ready.group, ready.offset.as_slice());
         match &launch.groups {
             &Workgroups::Known(n) => {
                 // Both fit: counts are below 2^32.

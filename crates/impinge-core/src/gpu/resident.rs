@@ -326,16 +326,17 @@ impl Engine {
                     .to_owned(),
             });
         }
-        by_body(starts, "positions")?;
+        let starts = by_body(starts, "positions")?;
         by_body(ends, "end positions")?;
+        let held = safe.bodies.iter();
+        let held: BTreeMap<_, _> = held.map(|vertices| (vertices.body, vertices)).collect();
         let mut recording = Recording::default();
         recording.stage("truncate");
         for &(body, end) in ends {
             let refused = |why: &str| Error::Gpu {
                 what: format!("body {body}: {why}"),
             };
-            let of_body = |&&(id, _): &&(BodyId, &wgpu::Buffer)| id == body;
-            let vertices = safe.bodies.iter().find(|vertices| vertices.body == body);
+            let vertices = held.get(&body);
             let vertices = vertices.ok_or_else(|| refused("it has no safe distances"))?;
             if scene.body(body)?.topology_stamp() != vertices.topology_stamp {
                 return Err(refused(
@@ -343,8 +344,8 @@ impl Engine {
                      encoded: encode them again",
                 ));
             }
-            let start = starts.iter().find(of_body);
-            let &(_, start) = start.ok_or_else(|| refused("it has end positions alone"))?;
+            let start = starts.get(&body);
+            let &start = start.ok_or_else(|| refused("it has end positions alone"))?;
             if start == end {
                 return Err(refused(
                     "its end positions are in the buffer of its positions",

@@ -881,6 +881,33 @@ fn safe_distances_that_are_no_longer_good_are_refused() {
 }
 
 #[test]
+fn many_bodies_are_truncated_each_by_its_own_distances() {
+    let caller = Caller::new();
+    let mut detector = caller.detector(Settings::default());
+    let (mut scene, mut bodies) = (Scene::new(), Vec::new());
+    // Points in pairs, each pair farther apart than the one before.
+    for ix in 0..300u32 {
+        let x = 100.0 * (ix / 2) as f32;
+        let apart = (ix % 2) as f32 * (1.0 + (ix / 2) as f32 / 256.0);
+        let at = vec![[x, apart, 0.0]];
+        bodies.push((scene.add_points(&at).expect("good"), at));
+    }
+    let wished = bodies
+        .iter()
+        .map(|(_, at)| vec![[at[0][0], at[0][1], 50.0]]);
+    let wished = Vec::from_iter(wished);
+    let all = (&scene, bodies.clone());
+    let query = Query::all();
+    let found = truncated(&caller, &mut detector, all, 5.0, &query, wished.clone());
+    assert_eq!(check_reached(&found), [0, 300, 0]);
+    for (ix, (body, _)) in bodies.iter().enumerate() {
+        let half = 0.5 + (ix / 2) as f32 / 512.0;
+        let room = found.safe[body][0];
+        assert!(room <= half && room > 0.98 * half, "{ix}: {room} {half}");
+    }
+}
+
+#[test]
 fn damaged_truncations_are_noticed() {
     let caller = Caller::new();
     let (scene, bodies) = small(3, false);
