@@ -12,7 +12,7 @@ use std::task::{Context, Poll, Waker};
 
 use bytemuck::Pod;
 
-use super::device::Device;
+use super::device::{Device, Scopes};
 use super::layout::Params;
 use crate::scene::error::Error;
 
@@ -310,6 +310,7 @@ impl Binding for Uniform<Params> {
 /// # Errors
 /// Device errors.
 pub async fn read(gpu: &Device, slice: &Slice) -> Result<Vec<u8>, Error> {
+    let scopes = Scopes::open(&gpu.device);
     let staging = gpu.device.create_buffer(&wgpu::BufferDescriptor {
         label: Some(slice.label),
         size: slice.bytes,
@@ -319,12 +320,22 @@ pub async fn read(gpu: &Device, slice: &Slice) -> Result<Vec<u8>, Error> {
     let mut encoder = gpu.device.create_command_encoder(&Default::default());
     encoder.copy_buffer_to_buffer(&slice.buffer, 0, &staging, 0, slice.bytes);
     gpu.queue.submit([encoder.finish()]);
-    let view = map(&staging, slice.bytes).await?;
+    scopes.close().await?;
+    let view = map(gpu, &staging, slice.bytes).await?;
     Ok(view.to_vec())
 }
 
 /// Maps the first bytes of a buffer for reading.
-pub async fn map(buffer: &wgpu::Buffer, bytes: u64) -> Result<wgpu::BufferView, Error> {
+///
+/// # Errors
+/// Device errors.
+pub async fn map(
+    gpu: &Device,
+    buffer: &wgpu::Buffer,
+    bytes: u64,
+) -> Result<wgpu::BufferView, Error> {
+    // What a lost device refuses goes to the scopes, and would end the program without them.
+    let scopes = Scopes::open(&gpu.device);
     let mapping = Mapping::default();
     let shared = Arc::clone(&mapping.0);
     buffer.map_async(wgpu::MapMode::Read, 0..bytes, move |result| {
@@ -334,6 +345,7 @@ pub async fn map(buffer: &wgpu::Buffer, bytes: u64) -> Result<wgpu::BufferView, 
             waker.wake();
         }
     });
+    scopes.close().await?;
     let failed = |what: String| Error::Gpu { what };
     mapping.await.map_err(|error| failed(error.to_string()))?;
     buffer

@@ -8,6 +8,7 @@
 //! If there are more than were copied, the rest follows in a second copy; no kernel runs again.
 
 use super::buffers::map;
+use super::device::Scopes;
 use super::layout::{Counter, Grid, N_COUNTERS, NEVER, PairKey, PairTimes, UnsureKey, time_by};
 use super::open::GpuContext;
 use super::pass_buffers::{PassBuffers, PassCounts};
@@ -181,7 +182,7 @@ impl Collector {
         let staging = self.staging.take().expect("encoded before");
         let mut keys = ReadKeys::default();
         let first = {
-            let view = map(&staging, guess.bytes() + TIMES).await?;
+            let view = map(gpu, &staging, guess.bytes() + TIMES).await?;
             FirstCopy::new(&view, pass_buffers, guess, &mut keys)?
         };
         staging.unmap();
@@ -226,6 +227,7 @@ impl Collector {
         }
         let size_of_keys = KEY * (more_pairs + more_unsure);
         let bytes = size_of_keys + TIMES_OF_PAIR * more_times;
+        let scopes = Scopes::open(&gpu.device);
         let staging = self.reserve(gpu, bytes);
         let mut encoder = gpu
             .device
@@ -240,8 +242,9 @@ impl Collector {
         let (first, size) = (TIMES_OF_PAIR * guess.times, TIMES_OF_PAIR * more_times);
         copy(pass_buffers.times.buffer(), first, size_of_keys, size);
         gpu.queue.submit([encoder.finish()]);
+        scopes.close().await?;
         {
-            let view = map(&staging, bytes).await?;
+            let view = map(gpu, &staging, bytes).await?;
             let (of_keys, of_times) = view[..bytes as usize].split_at(size_of_keys as usize);
             let (of_pairs, of_unsure) = of_keys.split_at(of_pairs as usize);
             append(&mut keys.pairs, of_pairs);

@@ -2,7 +2,9 @@
 
 use std::fmt;
 use std::future::Future;
+use std::pin::pin;
 use std::sync::{Arc, Mutex, PoisonError};
+use std::task::{Context, Poll, Waker};
 
 use super::waiting::drive;
 use crate::scene::error::Error;
@@ -73,6 +75,8 @@ pub struct Device {
     pub has_timestamps: bool,
     info: DeviceInfo,
     lost: Arc<Mutex<Option<String>>>,
+    /// Whether a callback records the loss.
+    listens: bool,
 }
 
 impl fmt::Debug for Device {
@@ -90,11 +94,14 @@ impl Device {
             queue,
             info,
             lost: Arc::default(),
+            listens: false,
         }
     }
 
-    /// Registers a callback that records the loss of the device.
-    pub(super) fn listen(&self) {
+    /// Registers a callback that records the loss of the device. A device has only one, so that of
+    /// a device of the caller's is the caller's.
+    pub(super) fn listen(&mut self) {
+        self.listens = true;
         let of_pass = Arc::clone(&self.lost);
         self.device
             .set_device_lost_callback(move |reason, message| {
@@ -123,11 +130,38 @@ impl Device {
 
     /// An error once the device is lost.
     pub fn check_lost(&self) -> Result<(), Error> {
-        let lost = self.lost.lock().unwrap_or_else(PoisonError::into_inner);
-        match &*lost {
-            Some(what) => Err(Error::Gpu { what: what.clone() }),
-            None => Ok(()),
+        let known = || {
+            let lost = self.lost.lock().unwrap_or_else(PoisonError::into_inner);
+            lost.clone()
+        };
+        if let Some(what) = known() {
+            return Err(Error::Gpu { what });
         }
+        if !self.listens && !self.takes_work() {
+            let what = "device lost".to_owned();
+            let mut lost = self.lost.lock().unwrap_or_else(PoisonError::into_inner);
+            *lost = Some(what.clone());
+            return Err(Error::Gpu { what });
+        }
+        Ok(())
+    }
+
+    /// Whether the device makes buffers: those of a lost one are not valid, and nothing can be
+    /// written to them. In a browser, lost devices say nothing.
+    fn takes_work(&self) -> bool {
+        if cfg!(target_family = "wasm") {
+            return true;
+        }
+        let scope = self.device.push_error_scope(wgpu::ErrorFilter::Validation);
+        let buffer = self.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("is the device lost"),
+            size: 4,
+            usage: wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        self.queue.write_buffer(&buffer, 0, &[]);
+        let error = pin!(scope.pop()).poll(&mut Context::from_waker(Waker::noop()));
+        !matches!(error, Poll::Ready(Some(_)))
     }
 }
 

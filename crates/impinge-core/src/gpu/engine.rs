@@ -334,13 +334,7 @@ impl Engine {
         clusterings: &[Arc<Clustering>],
         stats: &mut Stats,
     ) -> Result<(), Error> {
-        let none = ResidentEnds::default();
-        let gpu = Arc::clone(&self.gpu);
-        let scopes = Scopes::open(&gpu.device);
-        let updated = self.update(job, clusterings, &none, stats);
-        let closed = scopes.close();
-        updated?;
-        closed.await?;
+        self.update_caught(job, clusterings, stats).await?;
         if self.first_capacities(self.cells_wanted(job.plan)).is_err() {
             // What is held for the other kind of question, or the buffers' spare room, exceeds the
             // budget.
@@ -348,9 +342,24 @@ impl Engine {
             if !self.other.is_encoded {
                 self.other.pass_buffers = PassBuffers::new();
             }
-            self.update(job, clusterings, &none, stats)?;
+            self.update_caught(job, clusterings, stats).await?;
         }
         Ok(())
+    }
+
+    /// Sends what has changed, and catches device errors.
+    async fn update_caught(
+        &mut self,
+        job: Job<'_>,
+        clusterings: &[Arc<Clustering>],
+        stats: &mut Stats,
+    ) -> Result<(), Error> {
+        let gpu = Arc::clone(&self.gpu);
+        let scopes = Scopes::open(&gpu.device);
+        let updated = self.update(job, clusterings, &ResidentEnds::default(), stats);
+        let closed = scopes.close();
+        updated?;
+        closed.await
     }
 
     /// Sends what has changed since the last question, except positions that are on the device.

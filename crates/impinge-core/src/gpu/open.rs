@@ -184,7 +184,7 @@ impl GpuContext {
         let (device, queue) = request.await.map_err(|error| Error::Gpu {
             what: format!("{info}: {error}"),
         })?;
-        let opened = Device::new(device, queue, info);
+        let mut opened = Device::new(device, queue, info);
         opened.listen();
         Ok(GpuContext {
             opened,

@@ -171,6 +171,7 @@ impl Engine {
         positions: &[(BodyId, &wgpu::Buffer)],
         encoder: &mut wgpu::CommandEncoder,
     ) -> Result<ResidentPairs, Error> {
+        self.gpu.check_lost()?;
         let starts = checked(job.scene, positions, "positions")?;
         self.turn_to(Motion::Still);
         let ids: Vec<BodyId> = positions.iter().map(|&(body, _)| body).collect();
