@@ -31,7 +31,8 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
 }
 ";
 
-/// Marks the primitives that take part in a pair. Unsure pairs count as pairs, which is safe.
+/// Marks the primitives that take part in a pair. Unsure pairs count as pairs, which is safe. A
+/// count above the room of its list says that pairs are missing: that frame marks nothing.
 const MARK: &str = "
 struct Pair { low: u32, high: u32 }
 @group(0) @binding(0) var<storage, read> pairs: array<Pair>;
@@ -45,8 +46,11 @@ fn main(
     @builtin(global_invocation_id) id: vec3<u32>,
     @builtin(num_workgroups) n_groups: vec3<u32>,
 ) {
-    let n_pairs = min(counts[offsets.x], arrayLength(&pairs));
-    let n_unsure = min(counts[offsets.y], arrayLength(&unsure));
+    let n_pairs = counts[offsets.x];
+    let n_unsure = counts[offsets.y];
+    if n_pairs > arrayLength(&pairs) || n_unsure > arrayLength(&unsure) {
+        return;
+    }
     for (var ix = id.x; ix < n_pairs + n_unsure; ix += 64u * n_groups.x) {
         var pair: Pair;
         if ix < n_pairs {
@@ -62,7 +66,8 @@ fn main(
 
 /// Counts the pairs of a step that may touch, by kind: vertices with faces, and edges with edges.
 /// The third number becomes the time until which nothing touches, as bits; those of numbers from 0
-/// to 1 are ordered as the numbers are. The fourth becomes the time by which something touches.
+/// to 1 are ordered as the numbers are. The fourth becomes the time by which something touches. If
+/// pairs are missing, the count is above the room of the list, and the first times of all are 0.
 const COUNT: &str = "
 struct Pair { low: u32, high: u32 }
 @group(0) @binding(0) var<storage, read> pairs: array<Pair>;

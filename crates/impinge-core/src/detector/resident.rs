@@ -93,8 +93,8 @@ impl Gpu<'_> {
     /// At most one frame of a detector may be encoded per submission, and it must be submitted
     /// before the detector is asked anything else or encodes into another encoder: see [`Gpu`].
     /// Pairs of which the filter on the device is unsure come in a separate list. If there is not
-    /// enough room, the lists are incomplete and their counts say so, see [`ResidentPairs`];
-    /// [`grow`](Gpu::grow) then grows them.
+    /// enough room, here or in an earlier stage, the lists are incomplete and their counts are
+    /// larger than their capacities, see [`ResidentPairs`]; [`grow`](Gpu::grow) then makes room.
     ///
     /// # Errors
     /// A stale id, a body with two buffers, a buffer that is too small or lacks its usage; a query
@@ -141,8 +141,9 @@ impl Gpu<'_> {
     ///
     /// At most one step of a detector may be encoded per submission, besides one frame of
     /// [`encode`](Gpu::encode), and it must be submitted before the detector is asked anything else
-    /// or encodes into another encoder: see [`Gpu`]. If there is not enough room, the list is
-    /// incomplete and its count says so, see [`ResidentStep`]; [`grow`](Gpu::grow) then grows it.
+    /// or encodes into another encoder: see [`Gpu`]. If there is not enough room, here or in an
+    /// earlier stage, the list is incomplete, its count is larger than its capacity and its first
+    /// times are 0, see [`ResidentStep`]; [`grow`](Gpu::grow) then makes room.
     ///
     /// # Errors
     /// Those of [`encode`](Gpu::encode), for positions at both ends; a query with a separation, a

@@ -6,12 +6,13 @@
 //! traversal   round 0 · (prepare · round r) for r = 1 …
 //! pairing    prepare · pairing
 //! narrow     prepare · narrow;    in a step: · prepare · search
+//!            if the lists stay on the device: · lists_end
 //! ```
 
 use super::buffers::Uniform;
 use super::kernels::{
-    BoundsClusters, BoundsLevel, BoundsTop, Narrow, NarrowMoving, NarrowSafe, NarrowSearch,
-    Pairing, Prepare, SafeEnd, Traversal,
+    BoundsClusters, BoundsLevel, BoundsTop, ListsEnd, Narrow, NarrowMoving, NarrowSafe,
+    NarrowSearch, Pairing, Prepare, SafeEnd, Traversal,
 };
 use super::layout::{
     N_CANDIDATES, N_ITEMS, N_PAIRS, Params, ROUNDS, SEEK_ALL, SEEK_ANY, SEEK_EARLIEST,
@@ -317,7 +318,6 @@ impl Recorder<'_> {
     /// Stage `narrow` of safe distances.
     fn narrow_safe(&mut self) {
         let (gpu, world, pass_buffers) = (self.gpu, self.world, self.pass_buffers);
-        let capacities = pass_buffers.capacities();
         let groups = self.counted_candidates();
         let bindings = NarrowSafe {
             candidates: pass_buffers.candidates.read(),
@@ -333,17 +333,51 @@ impl Recorder<'_> {
         let bindings = SafeEnd {
             counters: pass_buffers.counters.write_to(),
             shares: pass_buffers.shares.write_to(),
-            // Capacities fit 32 bits.
-            params: Uniform(Params {
-                queue_room: capacities.queue as u32,
-                items_room: capacities.items as u32,
-                capacity: capacities.candidates as u32,
-                ..Params::default()
-            }),
+            params: Uniform(self.rooms()),
         };
         let groups = pass_buffers.shares.len().div_ceil(u64::from(GROUP));
         let groups = Workgroups::Known(groups);
         self.recording
             .launch(&gpu.kernels.safe_end, &bindings, groups);
+    }
+
+    /// The end of stage `narrow` where the lists stay on the device: their numbers, which say
+    /// whether they are complete.
+    pub fn lists_end(&mut self) {
+        let pass_buffers = self.pass_buffers;
+        let bindings = ListsEnd {
+            counters: pass_buffers.counters.write_to(),
+            times: pass_buffers.times.write_to(),
+            params: Uniform(self.rooms()),
+        };
+        // Frames have no times: one workgroup writes the numbers.
+        let groups = match self.motion {
+            Motion::Moving => pass_buffers.times.len().div_ceil(u64::from(GROUP)),
+            Motion::Still => 1,
+        };
+        self.recording.launch(
+            &self.gpu.kernels.lists_end,
+            &bindings,
+            Workgroups::Known(groups),
+        );
+    }
+
+    /// The room of all buffers, for the last kernel.
+    fn rooms(&self) -> Params {
+        let capacities = self.pass_buffers.capacities();
+        // Capacities fit 32 bits.
+        Params {
+            capacity: capacities.candidates as u32,
+            queue_room: capacities.queue as u32,
+            items_room: capacities.items as u32,
+            kept_room: capacities.kept as u32,
+            entries_room: capacities.entries as u32,
+            pairs_room: capacities.pairs as u32,
+            searched_room: match self.motion {
+                Motion::Moving => capacities.pairs as u32,
+                Motion::Still => 0,
+            },
+            ..Params::default()
+        }
     }
 }

@@ -139,6 +139,15 @@ bindings! {
 }
 
 bindings! {
+    /// `lists_end.wgsl`
+    ListsEnd {
+        counters: Write<Counter>,
+        times: Write<PairTimes>,
+        params: Uniform<Params>,
+    }
+}
+
+bindings! {
     /// `truncate.wgsl`
     Truncate {
         shares: Read<Share>,
@@ -322,7 +331,8 @@ kernels! {
     narrow_search: NarrowSearch = NARROW_SEARCH []
         from "narrow_search" ("filter", "lengths", "polygon", "pair", "numbers", "reserve", "slots", "groups");
     narrow_safe: NarrowSafe = NARROW_SAFE [] from "narrow_safe" ("filter", "lengths", "groups");
-    safe_end: SafeEnd = SAFE_END [] from "safe_end" ("groups");
+    safe_end: SafeEnd = SAFE_END [] from "safe_end" ("lost", "groups");
+    lists_end: ListsEnd = LISTS_END [] from "lists_end" ("lost", "groups");
     truncate: Truncate = TRUNCATE [] from "truncate" ("filter", "lengths", "groups");
     narrow: Narrow = NARROW [("WITH_SOLIDS", 0.0)]
         from "narrow" ("filter", "projections", "triangles", "neighbours", "solids", "numbers", "reserve", "groups");

@@ -65,6 +65,7 @@ words! {
         lists_only: u32, n_entries: u32, tile_row: u32, tile_column: u32, tile_side: u32,
         by_number: u32, sought: u32,
         reach: u32, queue_room: u32, items_room: u32,
+        kept_room: u32, entries_room: u32, pairs_room: u32, searched_room: u32,
     }
     /// A primitive within its body's reach.
     Kept { low: [u32; 3], slot: u32, high: [u32; 3], body: u32, range: [u32; 3], unused: u32 }
@@ -155,8 +156,12 @@ pub const BODY_SHIFT: u32 = 5;
 pub const NO_ROOT: u32 = u32::MAX;
 /// The least time by which some pair of a step certainly touches, the bits of an f32.
 pub const TOUCHES_BY: u32 = 42;
+/// The number of pairs for shaders of the caller's: above the room of the list if any is missing.
+pub const N_PAIRS_LISTED: u32 = 43;
+/// The number of unsure pairs, likewise.
+pub const N_UNSURE_LISTED: u32 = 44;
 /// The number of counters.
-pub const N_COUNTERS: u32 = 43;
+pub const N_COUNTERS: u32 = 45;
 /// Says that contact is not certain.
 pub const NEVER: f32 = 2.0;
 /// Flags of candidates.
@@ -214,14 +219,14 @@ impl fmt::Display for Params {
 pub struct Step {
     /// The parameters.
     pub params: Params,
-    padding: [u32; 42],
+    padding: [u32; 38],
 }
 
 impl From<Params> for Step {
     fn from(params: Params) -> Self {
         Step {
             params,
-            padding: [0; 42],
+            padding: [0; 38],
         }
     }
 }

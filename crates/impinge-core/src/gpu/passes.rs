@@ -323,6 +323,7 @@ impl Engine {
             recording,
         };
         let (lambda, group_size) = (self.settings.density, self.settings.group_size);
+        let has_lists = self.lane.is_encoded && self.safe.is_none();
         let resolve = plan.shared_vertex == SharedVertex::Resolve;
         match (work, &mut self.guest) {
             (None, _) => {}
@@ -342,6 +343,10 @@ impl Engine {
                 resolve,
                 work,
             }),
+        }
+        // Without work, all counters are 0.
+        if has_lists && work.is_some() {
+            recorder.lists_end();
         }
         Ok(recorder.recording)
     }

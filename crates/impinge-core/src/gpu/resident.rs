@@ -9,7 +9,7 @@ use super::buffers::{Read, Slice, Uniform, Write, count, read};
 use super::clusters::GROUP;
 use super::engine::Engine;
 use super::kernels::Truncate;
-use super::layout::{Counter, N_PAIRS, N_UNSURE, Params, Share, TOUCHES_BY};
+use super::layout::{Counter, N_PAIRS_LISTED, N_UNSURE_LISTED, Params, Share, TOUCHES_BY};
 use super::pass_buffers::{Capacities, LimitsOf, NextPass, PassCounts};
 use super::recording::{Recording, Workgroups};
 use super::view::Motion;
@@ -32,8 +32,10 @@ use crate::search::stats::Stats;
 /// of a body has the number `first + i`, where `first` is the number of primitives of all parts
 /// before it. The order of pairs is not specified.
 ///
-/// A count may be larger than its list: the list then holds as many pairs as fit, and
-/// [`Gpu::grow`](crate::Gpu::grow) makes it larger.
+/// If a count is at most the capacity of its list, the list holds all pairs. If it is larger, pairs
+/// are missing: the list had no room for all, or the device had none for an earlier stage, which
+/// makes both counts larger. Which of its entries are pairs of this frame is then not specified.
+/// [`Gpu::grow`](crate::Gpu::grow) makes room for the next frame.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct ResidentPairs {
@@ -42,7 +44,7 @@ pub struct ResidentPairs {
     /// Pairs that may or may not intersect, within the rounding error of the device. To be
     /// conservative, count them as pairs.
     pub unsure: wgpu::Buffer,
-    /// Holds the two counts as `u32`.
+    /// Holds the two counts as `u32`, each larger than its list if pairs are missing.
     pub counts: wgpu::Buffer,
     /// Byte offset of the number of pairs in `counts`.
     pub n_pairs_offset: u64,
@@ -80,18 +82,23 @@ pub struct ResidentPairs {
 /// are numbered as positions are, whether an element uses them or not; edges and faces as
 /// [`Body::part`](crate::Body::part) lists them. The order of pairs is not specified.
 ///
-/// The count may be larger than the list: the list then holds as many pairs as fit, and
-/// [`Gpu::grow`](crate::Gpu::grow) makes it larger.
+/// If the count is at most the capacity of the list, the list holds all pairs that may touch. If it
+/// is larger, pairs are missing: the list had no room for all, or the device had none for an
+/// earlier stage. Which of its entries are pairs of this step is then not specified, and all first
+/// times are 0, so that nothing moves. [`Gpu::grow`](crate::Gpu::grow) makes room for the next
+/// step.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct ResidentStep {
-    /// Pairs that may touch. All others certainly do not.
+    /// Pairs that may touch. If the list is complete, all others certainly do not.
     pub pairs: wgpu::Buffer,
     /// Holds two `f32` per pair of the list, in the same order, times of the step from 0 to 1.
     /// Until the first one the pair certainly does not touch: so up to the least of them nothing
-    /// does. By the second one it certainly touches, after the start; 2 if that is not certain.
+    /// does. It is 0 for all if the list is incomplete. By the second one it certainly touches,
+    /// after the start; 2 if that is not certain.
     pub times: wgpu::Buffer,
-    /// Holds the count as a `u32`, and a time as an `f32`.
+    /// Holds the count as a `u32`, larger than the list if pairs are missing, and a time as an
+    /// `f32`.
     pub counts: wgpu::Buffer,
     /// Byte offset of the number of pairs in `counts`.
     pub n_pairs_offset: u64,
@@ -184,8 +191,8 @@ impl Engine {
             pairs: pass_buffers.pairs.buffer().clone(),
             unsure: pass_buffers.unsure.buffer().clone(),
             counts: pass_buffers.counters.buffer().clone(),
-            n_pairs_offset: u64::from(N_PAIRS) * COUNTER,
-            n_unsure_offset: u64::from(N_UNSURE) * COUNTER,
+            n_pairs_offset: u64::from(N_PAIRS_LISTED) * COUNTER,
+            n_unsure_offset: u64::from(N_UNSURE_LISTED) * COUNTER,
             pairs_capacity: capacities.pairs,
             unsure_capacity: capacities.unsure,
         })
@@ -230,7 +237,7 @@ impl Engine {
             times: pass_buffers.times.buffer().clone(),
             touches_by_offset: u64::from(TOUCHES_BY) * COUNTER,
             counts: pass_buffers.counters.buffer().clone(),
-            n_pairs_offset: u64::from(N_UNSURE) * COUNTER,
+            n_pairs_offset: u64::from(N_UNSURE_LISTED) * COUNTER,
             pairs_capacity: pass_buffers.capacities().unsure,
             first_vertex: of_kinds(&[Part::Edges]),
             first_face: of_kinds(&[Part::Edges, Part::Vertices]),

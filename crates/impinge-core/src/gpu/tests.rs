@@ -131,7 +131,8 @@ fn structs_are_laid_out_as_on_the_host() {
         Params {
             first, count, counter, per_group, capacity, slot, n_ignored, resolve, group_size,
             lambda, most_cells, owner_rule, lists_only, n_entries, tile_row, tile_column, tile_side,
-            by_number, sought, reach, queue_room, items_room
+            by_number, sought, reach, queue_room, items_room, kept_room, entries_room, pairs_room,
+            searched_room
         }
         Kept { low, slot, high, body, range, unused }
         Grid { origin, shift, scale, n_cells, finest, unused, resolution, unused_too }
@@ -177,6 +178,8 @@ fn constants_are_those_of_the_host() {
         ("N_BOX_TESTS", N_BOX_TESTS),
         ("N_BOX_TESTS_HIGH", N_BOX_TESTS_HIGH),
         ("TOUCHES_BY", TOUCHES_BY),
+        ("N_PAIRS_LISTED", N_PAIRS_LISTED),
+        ("N_UNSURE_LISTED", N_UNSURE_LISTED),
         ("N_COUNTERS", N_COUNTERS),
         ("SEEK_ALL", SEEK_ALL),
         ("SEEK_EARLIEST", SEEK_EARLIEST),

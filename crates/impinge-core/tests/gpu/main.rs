@@ -10,6 +10,8 @@ mod filters;
 #[cfg(feature = "gpu")]
 mod liars;
 #[cfg(feature = "gpu")]
+mod lists;
+#[cfg(feature = "gpu")]
 mod lost;
 #[cfg(feature = "gpu")]
 mod pairs;

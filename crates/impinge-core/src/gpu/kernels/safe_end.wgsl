@@ -7,17 +7,6 @@
 @group(0) @binding(1) var<storage, read_write> shares: array<u32>;
 @group(0) @binding(2) var<uniform> params: Params;
 
-fn are_lost() -> bool {
-    var most = 0u;
-    for (var round = 0u; round < ROUNDS; round++) {
-        most = max(most, atomicLoad(&counters[round]));
-    }
-    return most > params.queue_room
-        || atomicLoad(&counters[N_ITEMS]) > params.items_room
-        || atomicLoad(&counters[N_CANDIDATES]) > params.capacity
-        || atomicLoad(&counters[TOO_MUCH]) != 0u;
-}
-
 @compute @workgroup_size(64)
 fn main(
     @builtin(workgroup_id) group: vec3<u32>,

@@ -114,10 +114,16 @@ struct Params {
     by_number: u32,
     // Steps: which contacts are sought.
     sought: u32,
-    // Safe distances: how far boxes are widened (bits of an f32), and the room of queues and of work items.
+    // Safe distances: how far boxes are widened (bits of an f32).
     reach: u32,
+    // Last kernels of what stays on the device: the room of all buffers before the lists (that of candidates is `capacity`), of pairs,
+    // and of pairs that a step searches (0 in a frame).
     queue_room: u32,
     items_room: u32,
+    kept_room: u32,
+    entries_room: u32,
+    pairs_room: u32,
+    searched_room: u32,
 }
 
 const SEEK_ALL: u32 = 0u;
@@ -197,7 +203,10 @@ const N_BOX_TESTS: u32 = 40u;
 const N_BOX_TESTS_HIGH: u32 = 41u;
 // Steps: the least time by which some pair certainly touches, the bits of an f32; 2 if that is certain of none.
 const TOUCHES_BY: u32 = 42u;
-const N_COUNTERS: u32 = 43u;
+// What stays on the device: the numbers of pairs and of unsure pairs, above the room of the list if any may be missing.
+const N_PAIRS_LISTED: u32 = 43u;
+const N_UNSURE_LISTED: u32 = 44u;
+const N_COUNTERS: u32 = 45u;
 
 // Tallies: the region (three complements of its low end, then its high end), then the entries of the cell lists
 // for every shift, two words each, then a bit for each shift that is too fine.

@@ -1,0 +1,267 @@
+//! Lists that stay on the device say whether they are complete, whichever buffer before them was
+//! too small.
+//!
+//! These tests fail where no adapter is found; a software driver is enough.
+
+use std::collections::BTreeMap;
+
+use crate::caller::Caller;
+
+use impinge_core::{Capacities, Detector, Method, Query, Scene, Settings, wgpu};
+use impinge_scenes::Random;
+
+/// A list as a shader of the caller's finds it: the numbers of its pairs, or none if its count is
+/// above its room.
+type Listed = Option<Vec<[u32; 2]>>;
+
+fn listed(caller: &Caller, list: &wgpu::Buffer, n: u32, room: u64) -> Listed {
+    if u64::from(n) > room {
+        return None;
+    }
+    let words = caller.read(list);
+    let mut pairs = words.as_chunks::<2>().0[..n as usize].to_vec();
+    pairs.sort_unstable();
+    Some(pairs)
+}
+
+/// Encodes a frame once: its pairs and its unsure pairs, and whether the host finds them complete.
+fn frame(
+    caller: &Caller,
+    detector: &mut Detector,
+    scene: &Scene,
+    query: &Query,
+) -> ([Listed; 2], bool) {
+    let mut gpu = detector.gpu().expect("a device");
+    let mut encoder = caller.encoder();
+    let found = gpu.encode(scene, query, &[], &mut encoder).expect("good");
+    caller.queue.submit([encoder.finish()]);
+    let counts = caller.read(&found.counts);
+    let n = |offset: u64| counts[offset as usize / 4];
+    let lists = [
+        (&found.pairs, n(found.n_pairs_offset), found.pairs_capacity),
+        (
+            &found.unsure,
+            n(found.n_unsure_offset),
+            found.unsure_capacity,
+        ),
+    ];
+    let lists = lists.map(|(list, n, room)| listed(caller, list, n, room));
+    (lists, gpu.grow().expect("room"))
+}
+
+/// The pairs of a step, each with the time until which it certainly does not touch.
+type Times = BTreeMap<[u32; 2], u32>;
+
+/// Encodes a step once: its pairs, or none if the count is above the room, where all first times
+/// must be 0; and whether the host finds them complete.
+fn step(caller: &Caller, detector: &mut Detector, scene: &Scene) -> (Option<Times>, bool) {
+    let mut gpu = detector.gpu().expect("a device");
+    let mut encoder = caller.encoder();
+    let found = gpu.encode_step(scene, &Query::all(), &[], &[], &mut encoder);
+    let found = found.expect("good");
+    caller.queue.submit([encoder.finish()]);
+    let n = caller.read(&found.counts)[found.n_pairs_offset as usize / 4];
+    let (pairs, times) = (caller.read(&found.pairs), caller.read(&found.times));
+    let first = times.as_chunks::<2>().0.iter().map(|times| times[0]);
+    let pairs = if u64::from(n) > found.pairs_capacity {
+        let room = found.pairs_capacity as usize;
+        assert!(first.take(room).all(|time| time == 0), "nothing may move");
+        None
+    } else {
+        let pairs = pairs.as_chunks::<2>().0[..n as usize].iter().copied();
+        Some(Times::from_iter(pairs.zip(first)))
+    };
+    (pairs, gpu.grow().expect("room"))
+}
+
+fn with_room(caller: &Caller, settings: &Settings, room: Capacities) -> Detector {
+    let (device, queue) = (caller.device.clone(), caller.queue.clone());
+    let settings = settings.clone().on_device(device, queue);
+    Detector::with_capacities(settings, room).expect("settings")
+}
+
+fn ample() -> Capacities {
+    let mut room = Capacities::default();
+    (room.queue, room.items) = (1 << 17, 1 << 17);
+    (room.candidates, room.pairs, room.unsure) = (1 << 20, 1 << 18, 1 << 17);
+    room
+}
+
+/// Triangles of a lattice, each a body: the traversal has far more pairs than it begins with.
+/// Between the two ends of a step every third one moves.
+fn many(n_bodies: usize) -> Scene {
+    let mut random = Random::new(5);
+    let mut scene = Scene::new();
+    for ix in 0..n_bodies {
+        let [start, end] = [(); 2].map(|()| {
+            let mut at = || [(); 3].map(|()| random.below(10) as f32);
+            [at(), at(), at()]
+        });
+        let body = scene.add_triangles(&[[0, 1, 2]], &start).expect("good");
+        if ix % 3 == 0 {
+            scene.set_end_positions(body, &end).expect("good");
+        }
+    }
+    scene
+}
+
+/// Two bodies of slivers whose boxes all meet, though few slivers do: of the buffers with the room
+/// that they have at first, only that of candidates is too small.
+fn slivers() -> (Scene, Query) {
+    let mut random = Random::new(1);
+    let n = 700;
+    let mut body = |shift: f32| {
+        Vec::from_iter((0..n).flat_map(|_| {
+            let [u, v, _] = random.point(0.0, 0.2);
+            let u = u + shift;
+            [[u, v, 0.0], [u + 1.0, v + 1.0, 1.0], [u + 1e-4, v, 0.0]]
+        }))
+    };
+    let a = body(0.0);
+    let mut b = body(0.3);
+    for ix in 0..40 {
+        for corner in 0..3 {
+            b[3 * 17 * ix + corner] = a[3 * 13 * ix + corner];
+        }
+    }
+    let faces = Vec::from_iter((0..n).map(|ix| [3 * ix, 3 * ix + 1, 3 * ix + 2]));
+    let mut scene = Scene::new();
+    let [a, b] = [a, b].map(|at| scene.add_triangles(&faces, &at).expect("good"));
+    (scene, Query::between(a, b))
+}
+
+type Shrink = fn(&mut Capacities);
+
+const STAGES: [(&str, Shrink); 7] = [
+    ("queue", |room| room.queue = 3),
+    ("items", |room| room.items = 2),
+    ("kept", |room| room.kept = 9),
+    ("entries", |room| room.entries = 7),
+    ("candidates", |room| room.candidates = 5),
+    ("pairs", |room| room.pairs = 1),
+    ("unsure", |room| room.unsure = 1),
+];
+
+#[test]
+fn counts_of_frames_say_what_is_missing() {
+    let caller = Caller::new();
+    let (scene, query) = (many(300), Query::all());
+    for method in [Method::Clusters, Method::Cells] {
+        let settings = Settings::new().method(method);
+        let mut detector = with_room(&caller, &settings, ample());
+        let (truth, is_complete) = frame(&caller, &mut detector, &scene, &query);
+        assert!(is_complete);
+        let n = truth
+            .each_ref()
+            .map(|list| list.as_ref().map_or(0, Vec::len));
+        assert!(n[0] > 1000 && n[1] > 10, "{n:?}");
+        for (stage, shrink) in STAGES {
+            let mut room = ample();
+            shrink(&mut room);
+            let mut detector = with_room(&caller, &settings, room);
+            let (lists, is_complete) = frame(&caller, &mut detector, &scene, &query);
+            // Whether the method has this stage, and which lists it is before.
+            let are_short = match (stage, method) {
+                ("queue", Method::Cells) | ("kept" | "entries", Method::Clusters) => [false; 2],
+                ("pairs", _) => [true, false],
+                ("unsure", _) => [false, true],
+                _ => [true; 2],
+            };
+            let name = format!("{method:?} {stage}");
+            assert_eq!(is_complete, are_short == [false; 2], "{name}");
+            for ((list, truth), is_short) in lists.iter().zip(&truth).zip(are_short) {
+                assert_eq!(list.is_none(), is_short, "{name}");
+                assert!(is_short || list == truth, "{name}");
+            }
+        }
+    }
+}
+
+#[test]
+fn counts_of_steps_say_what_is_missing() {
+    let caller = Caller::new();
+    let scene = many(120);
+    let settings = Settings::default();
+    let mut detector = with_room(&caller, &settings, ample());
+    let (truth, is_complete) = step(&caller, &mut detector, &scene);
+    assert!(is_complete && truth.as_ref().is_some_and(|pairs| pairs.len() > 100));
+    for (stage, shrink) in STAGES {
+        let mut room = ample();
+        shrink(&mut room);
+        let mut detector = with_room(&caller, &settings, room);
+        let (pairs, is_complete) = step(&caller, &mut detector, &scene);
+        let is_there = !matches!(stage, "kept" | "entries");
+        assert_eq!(is_complete, !is_there, "{stage}");
+        assert_eq!(pairs.is_none(), is_there, "{stage}");
+        assert!(is_there || pairs == truth, "{stage}");
+    }
+}
+
+/// Many points fall through triangles that all lie on each other: more candidates than there is
+/// room for at first, of which those that are left may be any.
+#[test]
+fn points_that_fall_onto_triangles_are_not_lost_silently() {
+    let caller = Caller::new();
+    let mut scene = Scene::new();
+    let n = 900;
+    let faces = Vec::from_iter((0..n).map(|ix| [3 * ix, 3 * ix + 1, 3 * ix + 2]));
+    let corners = [[0.0f32; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    let corners = Vec::from_iter((0..n).flat_map(|_| corners));
+    scene.add_triangles(&faces, &corners).expect("good");
+    let at = |ix: u32, z: f32| [0.25 + 0.0001 * ix as f32, 0.25, z];
+    let above = Vec::from_iter((0..n).map(|ix| at(ix, 0.5)));
+    let below = Vec::from_iter((0..n).map(|ix| at(ix, -0.5)));
+    let points = scene.add_points(&above).expect("good");
+    scene.set_end_positions(points, &below).expect("good");
+    let mut detector = caller.detector(Settings::default());
+    let (pairs, is_complete) = step(&caller, &mut detector, &scene);
+    assert!(pairs.is_none() && !is_complete);
+}
+
+#[test]
+fn damaged_ends_are_noticed() {
+    let caller = Caller::new();
+    let (scene, query) = slivers();
+    let mut detector = with_room(&caller, &Settings::default(), ample());
+    let (truth, _) = frame(&caller, &mut detector, &scene, &query);
+    // A web of which the default room does not hold all pairs.
+    let mut random = Random::new(5);
+    let n: u32 = 600;
+    let mut at = || [(); 3].map(|()| random.below(10) as f32);
+    let [start, end] = [(); 2].map(|()| Vec::from_iter((0..n).map(|_| at())));
+    let faces = (0..n / 3).map(|f| [3 * f, 3 * f + 1, (3 * f + 5) % n]);
+    let mut web = Scene::new();
+    let body = web.add_triangles(&Vec::from_iter(faces), &start);
+    web.set_end_positions(body.expect("good"), &end)
+        .expect("good");
+    let holds = |mut detector: Detector| {
+        let asks = || {
+            let (lists, _) = frame(&caller, &mut detector, &scene, &query);
+            for (list, truth) in lists.iter().zip(&truth) {
+                assert!(list.is_none() || list == truth);
+            }
+            let (pairs, is_complete) = step(&caller, &mut detector, &web);
+            assert_eq!(pairs.is_some(), is_complete);
+        };
+        std::panic::catch_unwind(std::panic::AssertUnwindSafe(asks)).is_ok()
+    };
+    assert!(holds(caller.detector(Settings::default())));
+    let mut unnoticed = Vec::new();
+    for (line, damaged) in [
+        ("select(n, max(n, room + 1u), are_missing)", "n"),
+        (
+            "atomicLoad(&counters[N_CANDIDATES]) > params.capacity",
+            "false",
+        ),
+        ("times[ix].free_until = 0.0;", ""),
+        ("if n_unsure > room {", "if n_unsure > room + room {"),
+    ] {
+        let (device, queue) = (caller.device.clone(), caller.queue.clone());
+        let damage = ("lists_end", line, damaged);
+        let detector = Detector::with_damage(device, queue, Settings::default(), damage);
+        if holds(detector.expect("a line")) {
+            unnoticed.push(damage);
+        }
+    }
+    assert!(unnoticed.is_empty(), "{unnoticed:#?}");
+}
