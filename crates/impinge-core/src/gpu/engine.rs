@@ -162,6 +162,8 @@ impl Engine {
         first: Capacities,
         guest: Option<Guest>,
     ) -> Self {
+        // Counters are compared with the room that there is.
+        let first = first.within(&gpu);
         Engine {
             gpu,
             lane: Lane::new(Motion::Still, settings.method, first),

@@ -127,6 +127,11 @@ impl Capacities {
         self.fits(Capacities::limit(gpu))
     }
 
+    /// As much of it as the device can bind.
+    pub(super) fn within(self, gpu: &GpuContext) -> Self {
+        self.zip(Capacities::limit(gpu), u64::min)
+    }
+
     /// The most that one binding of the device may hold.
     fn limit(gpu: &GpuContext) -> Self {
         Capacities {

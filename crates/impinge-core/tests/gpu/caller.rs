@@ -10,10 +10,18 @@ pub struct Caller {
 
 impl Caller {
     pub fn new() -> Self {
+        Caller::with(wgpu::Limits::default())
+    }
+
+    /// A device with these limits.
+    pub fn with(required_limits: wgpu::Limits) -> Self {
         let instance = wgpu::Instance::default();
         let adapter = pollster::block_on(instance.request_adapter(&Default::default()));
         let adapter = adapter.expect("these tests need a GPU or a software driver");
-        let device = pollster::block_on(adapter.request_device(&Default::default()));
+        let device = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
+            required_limits,
+            ..Default::default()
+        }));
         let (device, queue) = device.expect("a device");
         Caller { device, queue }
     }

@@ -219,6 +219,32 @@ fn points_that_fall_onto_triangles_are_not_lost_silently() {
 }
 
 #[test]
+fn small_bindings_are_no_room() {
+    let mut caller = Caller::new();
+    let (scene, query) = (many(300), Query::all());
+    let mut detector = with_room(&caller, &Settings::default(), ample());
+    let (truth, is_complete) = frame(&caller, &mut detector, &scene, &query);
+    assert!(is_complete);
+    caller = Caller::with(wgpu::Limits {
+        max_storage_buffer_binding_size: 1 << 18,
+        ..wgpu::Limits::default()
+    });
+    let mut detector = caller.detector(Settings::default());
+    let mut gpu = detector.gpu().expect("a device");
+    let mut encoder = caller.encoder();
+    let found = gpu.encode(&scene, &query, &[], &mut encoder);
+    let found = found.expect("good");
+    caller.queue.submit([encoder.finish()]);
+    let n = caller.read(&found.counts)[found.n_pairs_offset as usize / 4];
+    let pairs = listed(&caller, &found.pairs, n, found.pairs_capacity);
+    assert!(pairs.is_none() || pairs == truth[0]);
+    assert!(
+        pairs.is_some() || gpu.grow().is_err(),
+        "no room can be made"
+    );
+}
+
+#[test]
 fn damaged_ends_are_noticed() {
     let caller = Caller::new();
     let (scene, query) = slivers();
