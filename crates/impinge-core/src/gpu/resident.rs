@@ -28,9 +28,11 @@ use crate::search::stats::Stats;
 /// The buffers that hold the pairs of an encoded frame once its commands have run.
 ///
 /// Both lists hold two `u32` per pair: the numbers of its primitives, the lower one first.
-/// Primitives are numbered consecutively, body after body in the order of their ids: primitive `i`
-/// of a body has the number `first + i`, where `first` is the number of primitives of all parts
-/// before it. The order of pairs is not specified.
+/// Primitives are numbered consecutively, body after body in the order of their ids. Which bodies
+/// take part depends on the query, also on its scope: of
+/// [`Query::between`](crate::Query::between) only two do, and the first of them is numbered from 0.
+/// So the numbers of a body are those of its [part](ResidentPart) in [`parts`](Self::parts):
+/// primitive `i` of the body has the number `first + i`. The order of pairs is not specified.
 ///
 /// If a count is at most the capacity of its list, the list holds all pairs. If it is larger, pairs
 /// are missing: the list had no room for all, or the device had none for an earlier stage, which
@@ -54,6 +56,8 @@ pub struct ResidentPairs {
     pub pairs_capacity: u64,
     /// The number of unsure pairs that the list has room for.
     pub unsure_capacity: u64,
+    /// The numbers of the primitives of each body that takes part, in their order.
+    pub parts: Vec<ResidentPart>,
 }
 
 /// The buffers that hold the pairs of an encoded step which may touch, once its commands have run.
@@ -116,13 +120,14 @@ pub struct ResidentStep {
     pub parts: Vec<ResidentPart>,
 }
 
-/// The numbers of one part of one body in an encoded step.
+/// The numbers of one part of one body in an encoded frame or step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct ResidentPart {
     /// The body.
     pub body: BodyId,
-    /// Edges, vertices or faces. Tetrahedra have those of their surface.
+    /// In a frame [`Part::Given`], the primitives of the body. In a step edges, vertices or faces;
+    /// tetrahedra have those of their surface.
     pub part: Part,
     /// The number of its first element.
     pub first: u32,
@@ -195,6 +200,7 @@ impl Engine {
             n_unsure_offset: u64::from(N_UNSURE_LISTED) * COUNTER,
             pairs_capacity: capacities.pairs,
             unsure_capacity: capacities.unsure,
+            parts: parts(job.plan),
         })
     }
 

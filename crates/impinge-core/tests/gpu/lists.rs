@@ -3,12 +3,12 @@
 //!
 //! These tests fail where no adapter is found; a software driver is enough.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::caller::Caller;
 
-use impinge_core::{Capacities, Detector, Method, Query, Scene, Settings, wgpu};
-use impinge_scenes::Random;
+use impinge_core::{Backend, Capacities, Detector, Method, Part, Query, Scene, Settings, wgpu};
+use impinge_scenes::{Random, surfaces};
 
 /// A list as a shader of the caller's finds it: the numbers of its pairs, or none if its count is
 /// above its room.
@@ -290,4 +290,69 @@ fn damaged_ends_are_noticed() {
         }
     }
     assert!(unnoticed.is_empty(), "{unnoticed:#?}");
+}
+
+#[test]
+fn parts_of_a_frame_tell_bodies_apart() {
+    let caller = Caller::new();
+    let mut scene = Scene::new();
+    // Bodies of different sizes that all overlap.
+    let bodies = [300, 500, 400, 600].map(|n| {
+        let ball = surfaces::bumpy_ball(n, 0.3);
+        let ball = ball.translated([0.0007 * n as f32, 0.0, 0.1]);
+        ball.add_to(&mut scene).expect("good")
+    });
+    scene.remove(bodies[0]).expect("known");
+    let [_, a, b, c] = bodies;
+    let mut cpu = Detector::new(Backend::Cpu).expect("settings");
+    for (query, n_parts) in [
+        (Query::all(), 3),
+        (Query::between(b, c), 2),
+        (Query::between(c, a), 2),
+        (Query::across([b]), 3),
+        (Query::between_all().exclude((a, b)), 3),
+        (Query::self_of(c), 1),
+    ] {
+        let mut detector = caller.detector(Settings::default());
+        let mut gpu = detector.gpu().expect("a device");
+        let mut encoder = caller.encoder();
+        let found = gpu.encode(&scene, &query, &[], &mut encoder);
+        let found = found.expect("good");
+        caller.queue.submit([encoder.finish()]);
+        assert!(gpu.grow().expect("room"));
+        assert_eq!(found.parts.len(), n_parts, "{query:?}");
+        let mut next = 0;
+        for part in &found.parts {
+            assert_eq!((part.part, part.first), (Part::Given, next));
+            let n = scene.body(part.body).expect("takes part").n_primitives();
+            assert_eq!(part.len as usize, n);
+            next += part.len;
+        }
+        let named = |number: u32| {
+            let mut parts = found.parts.iter();
+            let part = parts.find(|part| (part.first..part.first + part.len).contains(&number));
+            let part = part.expect("a part has each number");
+            (part.body, number - part.first)
+        };
+        let counts = caller.read(&found.counts);
+        let pairs = |list, offset: u64, room| {
+            let listed = listed(&caller, list, counts[offset as usize / 4], room);
+            let pairs = listed.expect("complete").into_iter();
+            BTreeSet::from_iter(pairs.map(|pair| pair.map(named)))
+        };
+        let certain = pairs(&found.pairs, found.n_pairs_offset, found.pairs_capacity);
+        let unsure = pairs(&found.unsure, found.n_unsure_offset, found.unsure_capacity);
+        let truth = cpu.detect(&scene, &query).expect("good");
+        let truth = truth
+            .iter()
+            .map(|(a, b)| [(a.body, a.element), (b.body, b.element)]);
+        let truth = BTreeSet::from_iter(truth);
+        assert!(certain.is_subset(&truth), "{query:?}");
+        assert!(
+            truth
+                .iter()
+                .all(|pair| certain.contains(pair) || unsure.contains(pair))
+        );
+        assert!(n_parts == 1 || truth.len() > 20, "{query:?}");
+    }
 }
