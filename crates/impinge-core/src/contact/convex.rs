@@ -186,10 +186,9 @@ fn scale_of(a: &[Point], b: &[Point]) -> f64 {
     let largest = differences
         .flatten()
         .fold(0.0f64, |most, x| most.max(x.abs()));
-    match largest > 0.0 && largest.is_finite() {
-        true => 2f64.powi(-(largest.log2().round() as i32).clamp(-1000, 1000)),
-        false => 1.0,
-    }
+    // The biased exponent of an infinite difference, or of one that is NaN, is clamped too.
+    let exponent = (largest.to_bits() >> 52).clamp(23, 2023);
+    f64::from_bits((2046 - exponent) << 52)
 }
 
 /// A face without a normal, being too narrow, is at no height, but there: the polyhedron is closed.

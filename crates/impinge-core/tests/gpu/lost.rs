@@ -65,7 +65,7 @@ fn every_question_about_a_lost_device_is_an_error() {
             is_refused("encode_step", step);
             let distances = gpu.encode_safe_distances(&scene, 1.0, &query, &[], &mut encoder);
             is_refused("encode_safe_distances", distances);
-            let truncated = gpu.encode_truncate(&safe, &starts, &ends, &mut encoder);
+            let truncated = gpu.encode_truncate(&scene, &safe, &starts, &ends, &mut encoder);
             is_refused("encode_truncate", truncated);
             let [x, y, z] = at[0];
             scene
@@ -144,7 +144,7 @@ fn a_lost_device_is_found_out_by_any_question() {
     let mut encoder = caller.encoder();
     caller.device.destroy();
     let (starts, ends) = ([(body, &start)], [(body, &end)]);
-    let truncated = gpu.encode_truncate(&safe.expect("good"), &starts, &ends, &mut encoder);
+    let truncated = gpu.encode_truncate(&scene, &safe.expect("good"), &starts, &ends, &mut encoder);
     is_refused("encode_truncate", truncated);
 }
 
