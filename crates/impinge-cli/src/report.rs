@@ -685,11 +685,13 @@ pub struct Parts {
 }
 
 /// What `impinge devices` prints with --json: one array
+#[cfg(any(test, feature = "gpu"))]
 #[derive(Serialize)]
 #[serde(transparent)]
 #[cfg_attr(test, derive(JsonSchema))]
 pub struct Devices(pub Vec<Device>);
 
+#[cfg(any(test, feature = "gpu"))]
 #[derive(Serialize)]
 #[cfg_attr(test, derive(JsonSchema))]
 pub struct Device {
