@@ -574,7 +574,7 @@ export interface SafeDistances {
 export interface Truncation {
   /** How many vertices were stopped before the end of their way. */
   readonly nCut: number;
-  /** How many pairs touch at the start, or are nearer than they are to keep: their vertices stay. Pairs of which no vertex moves are not counted. */
+  /** How many pairs touch at the start, or are at most as far apart as they are to keep: their vertices stay. Pairs of which no vertex moves are not counted. */
   readonly nTouching: number;
   /** How often pairs were looked at again. */
   readonly rounds: number;

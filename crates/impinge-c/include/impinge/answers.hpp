@@ -370,7 +370,7 @@ public:
     array view{};
     return detail::give(impinge_safe_distances_of(raw(), of, &view), std::move(view));
   }
-  /// The pairs at distance 0, or nearer than their bodies are thick, whose vertices may not move at all.
+  /// The pairs at distance 0, or at most as far apart as their bodies are thick, whose vertices may not move at all.
   view<pair> touching() const & noexcept {
     const auto *touching = impinge_safe_distances_touching(raw());
     return {impinge_near_data(touching), impinge_near_count(touching)};
@@ -480,7 +480,7 @@ public:
   using motion::motion;
   /// How many vertices were stopped before the end of their way.
   std::uint64_t n_cut() const noexcept { return impinge_motion_n_cut(raw()); }
-  /// How many pairs touch at the start, or are nearer than they are to keep: their vertices were not moved. Pairs of
+  /// How many pairs touch at the start, or are at most as far apart as they are to keep: their vertices were not moved. Pairs of
   /// which no vertex moves are not counted.
   std::uint64_t n_touching() const noexcept { return impinge_motion_n_touching(raw()); }
   /// How often pairs were looked at again, because vertices had been stopped.
