@@ -358,6 +358,68 @@ mod tests {
         }
     }
 
+    /// Where rounded planes said what is seen, these did not end, or had depths of 0.5 and 0.
+    #[test]
+    fn poses_that_turned_polyhedra_inside_out() {
+        let cube = |sides: Point| -> Vec<Point> {
+            let signs = [0, 1, 2, 3, 4, 5, 6, 7]
+                .map(|corner| [0, 1, 2].map(|k| if corner >> k & 1 == 0 { -0.5 } else { 0.5 }));
+            signs
+                .map(|sign| [0, 1, 2].map(|k| sign[k] * sides[k]))
+                .to_vec()
+        };
+        let posed = |points: &[Point], rows: [[f64; 4]; 3]| -> Vec<Point> {
+            let along = |p: &Point| rows.map(|[x, y, z, by]| x * p[0] + y * p[1] + z * p[2] + by);
+            points.iter().map(along).collect()
+        };
+        let at = |[x, y, z]: Point| [[1.0, 0.0, 0.0, x], [0.0, 1.0, 0.0, y], [0.0, 0.0, 1.0, z]];
+        let turned_cube = [
+            [
+                0.6737497886926791,
+                0.7236843343499139,
+                -0.1494730960845206,
+                -0.4363406068237569,
+            ],
+            [
+                -0.5004069712977178,
+                0.5956550786450805,
+                0.6283214864708735,
+                0.4412280581417906,
+            ],
+            [
+                0.5437408254979712,
+                -0.3485340894386735,
+                0.7634591692984894,
+                -0.6615455383634828,
+            ],
+        ];
+        // Eight sides, 1 high.
+        let turns =
+            [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0].map(|k| k * std::f64::consts::FRAC_PI_4);
+        let rim = |z: f64| turns.map(|turn: f64| [0.5 * turn.cos(), 0.5 * turn.sin(), z]);
+        let cylinder = [rim(-0.5), rim(0.5)].concat();
+        let ball = points(&surfaces::icosphere(1), [0.0; 3]);
+        let unit = cube([1.0; 3]);
+        let slab = posed(&cube([4.0, 1.0, 0.2]), at([0.25, -0.25, 0.0]));
+        let width = |points: &[Point]| {
+            let found = convex_overlap(points, points).unwrap();
+            let most = points
+                .iter()
+                .map(|&p| dot(p, found.normal))
+                .fold(f64::MIN, f64::max);
+            (found.depth, 2.0 * most)
+        };
+        let found = convex_overlap(&unit, &posed(&unit, turned_cube)).unwrap();
+        assert!((found.depth - DEPTH_OF_CUBES).abs() < 1e-9, "{found:?}");
+        let found = convex_overlap(&cylinder, &slab).unwrap();
+        assert!((found.depth - 0.6).abs() < 1e-9, "{found:?}");
+        let (depth, most) = width(&ball);
+        assert!((depth - most).abs() < 1e-9, "{depth} {most}");
+    }
+
+    /// From the hull of all differences, by Qhull.
+    const DEPTH_OF_CUBES: f64 = 0.48446148773807574;
+
     /// Turned about an axis by its length.
     fn turned(p: Point, axis: Point) -> Point {
         let angle = dot(axis, axis).sqrt();

@@ -320,7 +320,9 @@ fn bounds_of_larger_scenes_hold() {
     for (name, scene, most) in [
         ("balls", near.clone(), 0.06),
         // The same boxes were widened by another length, and then by none.
-        ("balls", near, 0.15),
+        ("balls", near.clone(), 0.15),
+        // Now there is room, so nothing else sends them again.
+        ("balls again", near, 0.15),
         ("soup", alone(&soup::triangles(300, 0.1, 4)), 0.03),
         ("lattice", alone(&soup::lattice_triangles(120, 9, 4)), 0.8),
         ("web", alone(&soup::lattice_web(150, 6, 4)), 0.8),
