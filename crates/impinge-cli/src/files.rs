@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use impinge_io::are_numbered;
+
 use crate::error::Error;
 
 /// A mesh, its frames, and other meshes.
@@ -38,8 +40,8 @@ impl<'a> Files<'a> {
             [second, ..] if !are_bodies && names_sequence(second) => FrameFiles::Sequence(second),
             [second] if is_sequence => FrameFiles::Sequence(second),
             _ if is_sequence => FrameFiles::Each(rest),
-            [second, _, ..] if !are_bodies && rest.iter().all(|file| is_alike(second, file)) => {
-                match is_alike(mesh, second) {
+            [_, _, ..] if !are_bodies && are_numbered(rest) => {
+                match are_numbered(&all[..2]) {
                     true => FrameFiles::Each(all),
                     // Two numbered files beside another mesh may be bodies.
                     false if rest.len() > 2 => FrameFiles::Each(rest),
@@ -67,18 +69,6 @@ fn names_sequence(path: &Path) -> bool {
     let extension = path.extension().unwrap_or_default().to_string_lossy();
     impinge_io::SequenceFormat::from_extension(&extension).is_some()
         || (!path.exists() && name.contains(['%', '*', '?']))
-}
-
-/// Whether two paths are different only in numbers in the name of the file.
-fn is_alike(a: &Path, b: &Path) -> bool {
-    let words = |path: &Path| -> Vec<String> {
-        let name = path.file_name().unwrap_or_default().to_string_lossy();
-        name.split(|c: char| c.is_ascii_digit())
-            .filter(|part| !part.is_empty())
-            .map(str::to_owned)
-            .collect()
-    };
-    a.parent() == b.parent() && words(a) == words(b)
 }
 
 #[cfg(test)]
@@ -118,6 +108,11 @@ mod tests {
             (
                 "r_08.obj r_9.obj r_10.obj",
                 "r_08.obj, frames: 3 files, others: 0",
+            ),
+            // As in `impinge sequence`.
+            (
+                "r_-2.obj r_-1.obj r_0.obj",
+                "r_-2.obj, frames: 3 files, others: 0",
             ),
             (
                 "a.obj r_1.obj r_2.obj r_3.obj",

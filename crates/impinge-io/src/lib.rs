@@ -76,7 +76,7 @@ pub use read::{
     read, read_bodies, read_bodies_bytes, read_bytes, read_bytes_with_summary, read_tetgen_bytes,
     read_with_summary,
 };
-pub use sequence::{Sequence, SequenceFormat};
+pub use sequence::{Sequence, SequenceFormat, are_numbered};
 pub use table::{Cell, Column, ELEMENTS, Holds, KIND, Table, TableFormat, impact_columns};
 pub use write::{
     AtomicFile, ColoredMesh, Pc2Writer, Polylines, remove_temporary_files, write_glb, write_obj,

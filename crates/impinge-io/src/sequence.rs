@@ -623,14 +623,14 @@ fn key_of_file(name: &str) -> Vec<(i128, String)> {
 }
 
 /// Whether files are in one folder, and their names differ in numbers and in nothing else.
-fn are_numbered(files: &[PathBuf]) -> bool {
+pub fn are_numbered(files: &[PathBuf]) -> bool {
     let words = |file: &Path| -> Option<Vec<String>> {
         let key = key_of(file.file_name()?);
         Some(key.into_iter().map(|(_, text)| text).collect())
     };
     files.windows(2).all(|two| {
         let [a, b] = [&two[0], &two[1]];
-        a != b && a.parent() == b.parent() && words(a) == words(b)
+        a.parent() == b.parent() && words(a) == words(b)
     })
 }
 

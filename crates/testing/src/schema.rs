@@ -41,7 +41,7 @@ fn of<T: JsonSchema>(name: &str) -> Value {
 /// # Panics
 /// If the file says something else.
 pub fn hold<T: JsonSchema>(name: &str) {
-    let path = folder().join(format!("{name}.schema.json"));
+    let path = path(name);
     let text = format!("{:#}\n", of::<T>(name));
     if env::var_os(WRITE).is_some() {
         fs::write(&path, text).unwrap();
@@ -52,6 +52,14 @@ pub fn hold<T: JsonSchema>(name: &str) {
         text,
         "docs/{name}.schema.json is not what is printed: set {WRITE}=1 to write it"
     );
+}
+
+/// `docs/NAME.schema.json`.
+///
+/// # Panics
+/// If there is no such file, or it holds no JSON.
+pub fn read(name: &str) -> Value {
+    serde_json::from_str(&fs::read_to_string(path(name)).unwrap()).unwrap()
 }
 
 /// The names of all descriptions.
@@ -65,6 +73,10 @@ pub fn names() -> BTreeSet<String> {
         Some(name.strip_suffix(".schema.json")?.to_owned())
     });
     names.collect()
+}
+
+fn path(name: &str) -> PathBuf {
+    folder().join(format!("{name}.schema.json"))
 }
 
 fn folder() -> PathBuf {

@@ -112,24 +112,24 @@ fn answer(
     let named = ids.iter().copied().zip(names.iter().map(String::as_str));
     let bodies: Vec<(BodyId, &str)> = named.collect();
     if holds_no_pairs {
-        let (found, text) = if answer.count {
+        let (pairs, any, text) = if answer.count {
             let n = detector.count(&scene, &query)?;
             let text = match n {
                 0 => "no pairs".to_owned(),
                 n => counted(n, "pair"),
             };
-            ((Some(n), None), text)
+            (Some(n), None, text)
         } else {
             let any = detector.any(&scene, &query)?;
             let text = if any { "at least one pair" } else { "no pairs" };
-            ((None, Some(any)), text.to_owned())
+            (None, Some(any), text.to_owned())
         };
         drop(watch);
         if ask.json {
             let stats = detector.stats();
             report::print(&report::Count {
-                pairs: found.0,
-                any: found.1,
+                pairs,
+                any,
                 asked: report::Asked::new(asked),
                 how: report::How::new(stats, report::Total::new(stats.total_ms)),
                 unread: report::Unread::all(&unread, &names),
@@ -140,7 +140,7 @@ fn answer(
             writeln!(line, "{}", asked.line(&read, &nouns))?;
             output::out().write_all(&line)?;
         }
-        let is_found = found.0 > Some(0) || found.1 == Some(true);
+        let is_found = pairs > Some(0) || any == Some(true);
         return end(ask, is_found, &unread, paths.len());
     }
     let n_frames = answer.repeat.get();

@@ -177,12 +177,8 @@ impl Answer<'_> {
             distance: found.distance,
             nearest: found.point,
         };
-        let (nearest, farthest) = self
-            .extremes()
-            .map(|both| both.map(at))
-            .map_or((None, None), |[nearest, farthest]| {
-                (Some(nearest), Some(farthest))
-            });
+        let both = self.extremes().map(|both| both.map(at).into());
+        let (nearest, farthest) = both.unzip();
         Ok(report::Probe {
             asked: report::AskedOfPoints {
                 signed: self.args.signed,

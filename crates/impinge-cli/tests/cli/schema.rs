@@ -8,12 +8,7 @@ use serde_json::{Value, json};
 
 use crate::harness::Folder;
 
-/// `docs/NAME.schema.json`.
-pub fn schema(name: &str) -> Value {
-    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs");
-    let path = format!("{folder}/{name}.schema.json");
-    serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
-}
+pub use impinge_testing::schema::read as schema;
 
 /// Keys in `value` that are not described, and keys that it lacks.
 pub fn wrong(schema: &Value, value: &Value, at: &str) -> Vec<String> {

@@ -29,6 +29,7 @@ macro_rules! sse2 {
 pub(crate) use sse2;
 
 mod extent;
+pub(crate) mod scale;
 mod sweep;
 mod vec4;
 mod vec64;

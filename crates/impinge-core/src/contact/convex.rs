@@ -12,6 +12,7 @@
 //! of the answer is that of the two bodies along its normal, so that way takes them apart. Cost:
 //! `O(n)` per vertex that the polyhedron takes.
 
+use crate::boxes::scale::Scale;
 use crate::scene::vector::{cross, dot, scaled, sub};
 use impinge_exact::{Point, Sign, orient3d};
 
@@ -44,6 +45,14 @@ const ROUNDING: f64 = 1e-12;
 /// The shortest way that takes the convex hulls of two sets of points apart; `None` if these are
 /// flat in sum, or empty.
 pub fn convex_overlap(a: &[[f64; 3]], b: &[[f64; 3]]) -> Option<ConvexOverlap> {
+    let origin = *b.first()?;
+    let differences = a.iter().chain(b).map(|&point| sub(point, origin));
+    let largest = differences
+        .flatten()
+        .fold(0.0f64, |most, x| most.max(x.abs()));
+    let scale = Scale::of(largest, || largest);
+    let read = |points: &[Point]| points.iter().map(|&point| scale.point(point)).collect();
+    let [a, b]: [Vec<Point>; 2] = [read(a), read(b)];
     let farthest = |points: &[Point], way: Point| {
         let (mut best, mut most) = (None, f64::NEG_INFINITY);
         for (ix, &point) in points.iter().enumerate() {
@@ -54,10 +63,9 @@ pub fn convex_overlap(a: &[[f64; 3]], b: &[[f64; 3]]) -> Option<ConvexOverlap> {
         }
         best
     };
-    let scale = scale_of(a, b);
     let support = |way: Point| -> Option<Point> {
-        let (i, j) = (farthest(a, way)?, farthest(b, scaled(way, -1.0))?);
-        Some(scaled(sub(a[i], b[j]), scale))
+        let (i, j) = (farthest(&a, way)?, farthest(&b, scaled(way, -1.0))?);
+        Some(sub(a[i], b[j]))
     };
     let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     let mut ends = [[0.0; 3]; 6];
@@ -126,9 +134,9 @@ pub fn convex_overlap(a: &[[f64; 3]], b: &[[f64; 3]]) -> Option<ConvexOverlap> {
     }
     let (height, normal) = best?;
     Some(ConvexOverlap {
-        depth: (height / scale).max(0.0),
+        depth: scale.length_back(height).max(0.0),
         normal,
-        vertex: farthest_of_tied(a, normal, noise / scale)?,
+        vertex: farthest_of_tied(&a, normal, noise)?,
     })
 }
 
@@ -174,21 +182,6 @@ fn first_corners(
         Sign::Negative => Some(vec![p, r, q, s]),
         Sign::Zero => None,
     }
-}
-
-/// A power of two that makes differences of about 1 of those of two sets of points: products
-/// neither overflow nor underflow.
-fn scale_of(a: &[Point], b: &[Point]) -> f64 {
-    let Some(first) = b.first() else {
-        return 1.0;
-    };
-    let differences = a.iter().chain(b).map(|&point| sub(point, *first));
-    let largest = differences
-        .flatten()
-        .fold(0.0f64, |most, x| most.max(x.abs()));
-    // The biased exponent of an infinite difference, or of one that is NaN, is clamped too.
-    let exponent = (largest.to_bits() >> 52).clamp(23, 2023);
-    f64::from_bits((2046 - exponent) << 52)
 }
 
 /// A face without a normal, being too narrow, is at no height, but there: the polyhedron is closed.
@@ -318,7 +311,7 @@ mod tests {
                 b = b.into_iter().map(|p| turned(p, turn)).collect();
             }
             // Far larger and far smaller than 1, too.
-            let scale = [1.0, 1e-120, 1e120][case / 9 % 3];
+            let scale = [1.0, 1e-120, 1e120, 2f64.powi(1022)][case / 9 % 4];
             let put = |p: Point, by: Point| [0, 1, 2].map(|k| scale * (p[k] + by[k]));
             let a: Vec<Point> = a.into_iter().map(|p| put(p, [0.0; 3])).collect();
             let b: Vec<Point> = b.into_iter().map(|p| put(p, by)).collect();

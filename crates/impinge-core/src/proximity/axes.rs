@@ -14,8 +14,8 @@
 use crate::boxes::Extent;
 use crate::scene::vector::dot;
 
-use super::scale::Scale;
 use super::tree::{Node, Tree};
+use crate::boxes::scale::Scale;
 use crate::scene::Body;
 use crate::scene::index::ClusterIx;
 use impinge_exact::Point;

@@ -8,7 +8,6 @@ mod many;
 mod nearest;
 mod of_two;
 pub(crate) mod probe;
-mod scale;
 mod shared;
 mod tree;
 

@@ -7,8 +7,8 @@ use std::sync::Arc;
 
 use super::best_first::{DistanceSearch, FoundNearest, where_they_touch};
 use super::nearest::Nearest;
-use super::scale::Scale;
 use super::tree::Tree;
+use crate::boxes::scale::Scale;
 use crate::clusterings::{BodyPart, Clusterings};
 use crate::query::progress::Control;
 use crate::scene::elements::Part;

@@ -6,6 +6,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::caller::Caller;
+use crate::stages::STAGES;
 
 use impinge_core::{Backend, Capacities, Detector, Method, Part, Query, Scene, Settings, wgpu};
 use impinge_scenes::{Random, surfaces};
@@ -129,18 +130,6 @@ fn slivers() -> (Scene, Query) {
     let [a, b] = [a, b].map(|at| scene.add_triangles(&faces, &at).expect("good"));
     (scene, Query::between(a, b))
 }
-
-type Shrink = fn(&mut Capacities);
-
-const STAGES: [(&str, Shrink); 7] = [
-    ("queue", |room| room.queue = 3),
-    ("items", |room| room.items = 2),
-    ("kept", |room| room.kept = 9),
-    ("entries", |room| room.entries = 7),
-    ("candidates", |room| room.candidates = 5),
-    ("pairs", |room| room.pairs = 1),
-    ("unsure", |room| room.unsure = 1),
-];
 
 #[test]
 fn counts_of_frames_say_what_is_missing() {

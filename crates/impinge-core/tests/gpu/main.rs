@@ -22,6 +22,7 @@ mod resident_steps;
 #[cfg(feature = "gpu")]
 mod safe;
 #[cfg(feature = "gpu")]
+mod stages;
 mod steps;
 #[cfg(feature = "gpu")]
 mod submissions;

@@ -6,6 +6,7 @@ use std::future::Future;
 use std::sync::{Mutex, OnceLock};
 
 use crate::common::{Case, agree, cases, check, naive, rows};
+use crate::stages::{STAGES, Shrink};
 use impinge_core::{
     Backend, Capacities, Detector, Error, Method, Query, Recluster, Scene, Settings, SharedVertex,
     Stats, devices, wgpu,
@@ -198,18 +199,8 @@ fn buffers_that_overflow_grow_and_nothing_is_lost() {
     };
     for method in [Method::Clusters, Method::Cells] {
         let settings = gpu(method);
-        type Shrink = fn(&mut Capacities);
-        let stages: [(&str, Shrink); 8] = [
-            ("none", |_| ()),
-            ("queue", |room| room.queue = 3),
-            ("items", |room| room.items = 2),
-            ("kept", |room| room.kept = 9),
-            ("entries", |room| room.entries = 7),
-            ("candidates", |room| room.candidates = 5),
-            ("pairs", |room| room.pairs = 1),
-            ("unsure", |room| room.unsure = 1),
-        ];
-        for (stage, shrink) in stages {
+        let none: (&str, Shrink) = ("none", |_| ());
+        for (stage, shrink) in [none].into_iter().chain(STAGES) {
             let mut capacities = ample();
             shrink(&mut capacities);
             let mut detector = Detector::with_capacities(settings.clone(), capacities).unwrap();

@@ -1,16 +1,16 @@
-//! The power of two in which a search for the smallest distance reads coordinates.
+//! The power of two in which searches for distances and depths read coordinates.
 //!
 //! Squares of very small or very large lengths underflow or overflow. There all coordinates are
 //! multiplied by one power of two, with which the largest is between 2^-80 and 2^30. That is exact
 //! but for coordinates that are very much smaller than the largest; what those lose is far below
 //! the error that the search allows for. Anywhere else the factor is 1.
 
-use crate::boxes::Extent;
+use super::Extent;
 use impinge_exact::Point;
 
 /// A power of two.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Scale(f64);
+pub(crate) struct Scale(f64);
 
 /// Where coordinates are read as they are. Every square of a difference that matters is then a
 /// normal number.
