@@ -467,9 +467,10 @@ pub struct SequenceArgs {
     /// The mesh that deforms: body 0
     #[arg(value_name = "MESH")]
     pub mesh: PathBuf,
-    /// Its positions, frame by frame
-    #[arg(value_name = "FRAMES")]
-    pub sequence: PathBuf,
+    /// Its positions, frame by frame: a point cache, the first of numbered files, a pattern
+    /// ('run_%04d.obj', 'run_*.obj'), or a file for each frame (run/*.obj)
+    #[arg(value_name = "FRAMES", required = true)]
+    pub sequence: Vec<PathBuf>,
     /// A mesh that does not move: body 1, 2, …
     #[arg(long = "other", value_name = "MESH")]
     pub others: Vec<PathBuf>,

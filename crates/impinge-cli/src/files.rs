@@ -39,7 +39,10 @@ impl<'a> Files<'a> {
             }
             [second, ..] if !are_bodies && names_sequence(second) => FrameFiles::Sequence(second),
             [second] if is_sequence => FrameFiles::Sequence(second),
-            _ if is_sequence => FrameFiles::Each(rest),
+            _ if is_sequence => FrameFiles::Each(match are_numbered(all) {
+                true => all,
+                false => rest,
+            }),
             [_, _, ..] if !are_bodies && are_numbered(rest) => {
                 match are_numbered(&all[..2]) {
                     true => FrameFiles::Each(all),
@@ -123,6 +126,10 @@ mod tests {
             (
                 "--sequence a.obj b.obj c.obj",
                 "a.obj, frames: 2 files, others: 0",
+            ),
+            (
+                "--sequence r_1.obj r_2.obj r_3.obj",
+                "r_1.obj, frames: 3 files, others: 0",
             ),
             (
                 "--bodies r_1.obj r_2.obj r_3.obj",

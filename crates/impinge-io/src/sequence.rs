@@ -462,6 +462,13 @@ fn input<'p>(path: &'p Path, named: Option<&'p Path>) -> Input<'p> {
 fn numbered_files(path: &Path) -> Result<Vec<PathBuf>, Error> {
     let shown_path = path.display().to_string();
     let name = Name(&shown_path);
+    if path.is_dir() {
+        let expected = format!(
+            "frames, as in '{shown}/*.obj'",
+            shown = shown_path.trim_end_matches(std::path::is_separator)
+        );
+        return Err(name.syntax(Place::File, &expected, "a folder"));
+    }
     let wrong = |found: &str| {
         name.syntax(
             Place::File,

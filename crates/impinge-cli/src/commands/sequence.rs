@@ -1,7 +1,7 @@
 //! `impinge sequence`: every frame of a sequence.
 
 use std::io::{Write, stderr};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use impinge::{BodyId, CancelToken, Control, Pairs, Precision, Scene};
 use impinge_io::{Cell, ELEMENTS, Sequence, Weld, impact_columns, printable};
@@ -12,6 +12,7 @@ use crate::args::{BodiesArg, SequenceArgs};
 use crate::asked::{Asked, thicken};
 use crate::detection::{Times, asked, detector, hit, query, set_positions, settings};
 use crate::error::Error;
+use crate::files::{Files, FrameFiles};
 use crate::load::{Bodies, Loading, to_positions};
 use crate::output::out;
 use crate::picture::Drawer;
@@ -40,8 +41,8 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
     let loading = loading.asked(weld, asked.within, args.ask.read.format);
     let mut bodies = Bodies::default();
     let (moving, weld) = bodies.add(&args.mesh, loading)?;
-    let (name, mesh) = (&args.sequence, &args.mesh);
-    let mut frames = Frames::of(Sequence::open(name)?, name, mesh, weld, args.ask.json)?;
+    let (opened, name) = opened(&args.mesh, &args.sequence)?;
+    let mut frames = Frames::of(opened, name, &args.mesh, weld, args.ask.json)?;
     for other in &args.others {
         bodies.add(other, loading)?;
     }
@@ -131,6 +132,7 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
         let pairs = &detector.detect(&scene, &query)?;
         n_pairs += pairs.len();
         outputs.frame(frame_ix, &scene, &bodies, pairs)?;
+        let named = frames.named(frame_ix);
         if args.ask.json {
             let mut times = Times::default();
             times.add(pairs.stats());
@@ -139,11 +141,11 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
             let asked = (asked, &scene);
             let found = report::Pairs::new(asked, &bodies, &vertices, pairs, regions, &times)?;
             report::print(&report::Pairs {
-                frame: Some(frames.named(frame_ix)),
+                frame: Some(named),
                 ..found
             })?;
         } else if prints {
-            lines.frame(frame_ix, &bodies, pairs)?;
+            lines.frame(&named, &bodies, pairs)?;
         }
         watch.frame_done();
     }
@@ -157,6 +159,24 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
         output::say(line.as_bytes(), file.as_ref())?;
     }
     frames.end(hit(args.ask.fail_on_hit, n_pairs > 0))
+}
+
+/// The frames of a mesh, and the file that names them.
+fn opened<'a>(mesh: &'a Path, given: &'a [PathBuf]) -> Result<(Sequence, &'a Path), Error> {
+    if let [path] = given {
+        return Ok((Sequence::open(path)?, path));
+    }
+    let all: Vec<PathBuf> = std::iter::once(mesh)
+        .chain(given.iter().map(PathBuf::as_path))
+        .map(Path::to_owned)
+        .collect();
+    match Files::of(&all, true, true)?.frames {
+        FrameFiles::Each(files) => Ok((Sequence::of_files(files.to_vec())?, mesh)),
+        _ => Err(Error::Usage(format!(
+            "{}: a mesh and one file with frames, or a file for each frame",
+            printable(&given[0])
+        ))),
+    }
 }
 
 /// The output files of each frame.
@@ -401,7 +421,7 @@ impl Lines {
 
     fn frame(
         &mut self,
-        frame_ix: usize,
+        named: &report::Frame,
         bodies: &[(BodyId, &str)],
         pairs: &Pairs,
     ) -> Result<(), Error> {
@@ -409,16 +429,21 @@ impl Lines {
             .iter()
             .map(|&(id, _)| pairs.colliding(id).len())
             .sum();
+        let hash = match pairs.is_empty() {
+            true => "-".to_owned(),
+            false => hash(pairs),
+        };
         let mut to = out();
         writeln!(
             to,
-            "{frame_ix:>7} {:>11} {:>11} {:>11.3}  {}",
+            "{:>7} {:>11} {:>11} {:>11.3}  {}",
+            named.frame,
             grouped(pairs.len() as u64),
             grouped(colliding as u64),
             pairs.stats().total_ms,
-            match pairs.is_empty() {
-                true => "-".to_owned(),
-                false => hash(pairs),
+            match &named.file {
+                Some(file) => format!("{hash:16}  {}", printable(file)),
+                None => hash,
             }
         )?;
         to.flush()?;

@@ -107,6 +107,50 @@ fn every_frame_is_the_oracle_s() {
     }
 }
 
+/// What a shell makes of `run_*.ply`, also where the mesh is one of them, and a folder.
+#[test]
+fn frames_may_be_files_each() {
+    let folder = Folder::new();
+    write(&folder, 8);
+    let told = |args: &[&str]| -> Vec<(Value, Value)> {
+        let args = ["sequence"].iter().chain(args).chain(&["--json"]);
+        let text = folder.run(args).printed();
+        let told = lines(&text).into_iter();
+        told.map(|line| (line["file"].clone(), line["hash"].clone()))
+            .collect()
+    };
+    let whole = told(&["ball.ply", "run_%03d.ply"]);
+    let files: Vec<String> = (0..8).map(|ix| format!("run_{ix:03}.ply")).collect();
+    let mut files: Vec<&str> = files.iter().map(String::as_str).collect();
+    // Frame 0 is the ball as it is.
+    assert_eq!(told(&files), whole);
+    files.swap(2, 5);
+    files.insert(0, "ball.ply");
+    assert_eq!(told(&files), whole);
+    assert_eq!(
+        told(&["ball.ply", "run_003.ply", "run_006.ply"]),
+        [whole[3].clone(), whole[6].clone()]
+    );
+    let text = folder
+        .run(["sequence", "ball.ply", "run_000.ply"])
+        .printed();
+    let line = text.lines().nth(6).unwrap();
+    assert!(line.ends_with("  run_005.ply"), "{line}");
+
+    let said = folder.run(["sequence", "ball.ply", "."]).misuse();
+    assert!(
+        said.contains(".: expected frames, as in './*.obj', found a folder"),
+        "{said}"
+    );
+    let said = folder
+        .run(["sequence", "ball.ply", "run.pc2", "ring.ply"])
+        .misuse();
+    assert!(
+        said.contains("run.pc2: a mesh and one file with frames, or a file for each frame"),
+        "{said}"
+    );
+}
+
 #[test]
 fn ranges_of_frames() {
     let folder = Folder::new();
