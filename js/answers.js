@@ -114,23 +114,26 @@ function changesOf(list, old, type) {
   return { kept: Uint32Array.from(kept.sort(([a], [b]) => a - b).flat()), new: flat(added), gone: flat(gone) };
 }
 
-// What a scene knows of when pairs were found, and those of which contacts are.
-let movesOfPairs;
+// What a scene knows of when pairs were found, and the words and numbers of their query.
 export let movesOf;
+export let queryOf;
 
 export class Pairs extends List {
   #moves;
+  #query;
   // Where the rows of each first body are.
   #runs;
 
   static {
-    movesOfPairs = (pairs) => pairs.#moves;
+    movesOf = (pairs) => pairs.#moves;
+    queryOf = (pairs) => pairs.#query;
   }
 
-  constructor([rows, , , , , hash], stats, moves) {
+  constructor([rows, , , , , hash], stats, moves, { words, numbers }) {
     super(rows);
     remember(this, moves);
     this.#moves = moves;
+    this.#query = { words, numbers };
     this.hash = hex(hash);
     this.stats = stats;
   }
@@ -372,18 +375,19 @@ function regionsOf(numbers, parts) {
   });
 }
 
-// By which the module knows contacts.
+// By which the module knows contacts, and the pairs of which they are.
 export let numberOf;
+export let pairsOf;
 
 export class Contacts extends List {
   #number;
-  #moves;
+  #pairs;
   #curves;
   #regions;
 
   static {
     numberOf = (contacts) => contacts.#number;
-    movesOf = (contacts) => contacts.#moves;
+    pairsOf = (contacts) => contacts.#pairs;
   }
 
   constructor([, bytes, numbers, words], stats, { pairs, number }) {
@@ -393,7 +397,7 @@ export class Contacts extends List {
     this.hash = pairs.hash;
     this.stats = stats;
     this.#number = number;
-    this.#moves = movesOfPairs(pairs);
+    this.#pairs = pairs;
     this.shapes = bytes.subarray(0, n);
     this.directed = bytes.subarray(n, 2 * n);
     Object.assign(this, { starts, corners, points: numbers.subarray(1, nNumbers) });

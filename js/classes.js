@@ -1,6 +1,6 @@
 // The classes that both builds have, made of the functions of either module.
 
-import { Advance, Candidates, Contacts, Impacts, NearPairs, Pairs, Penetration, earliest, movesOf, nearest, numberOf, statsOf } from "./answers.js";
+import { Advance, Candidates, Contacts, Impacts, NearPairs, Pairs, Penetration, earliest, movesOf, nearest, numberOf, pairsOf, queryOf, statsOf } from "./answers.js";
 import { Closest, Hits, Neighbours, SafeDistances, Truncation, integers, places, signed } from "./probe.js";
 import { RestPairs, packed, plain, whole, withPoints } from "./query.js";
 import {
@@ -28,8 +28,8 @@ function instance(given, type, needed) {
 // How each question is asked: its arguments but the scene, which is `this`, as `{ question, words, numbers, watch, shape }`.
 export const QUESTIONS = {
   detect(query) {
-    const moves = this[MOVES].now();
-    return { question: 0, ...packed(query), moves, shape: (lists, stats) => new Pairs(lists, stats, moves) };
+    const [moves, asked] = [this[MOVES].now(), packed(query)];
+    return { question: 0, ...asked, moves, shape: (lists, stats) => new Pairs(lists, stats, moves, asked) };
   },
   count: (query) => ({ question: 1, ...packed(query), shape: first }),
   any: (query) => ({ question: 2, ...packed(query), shape: yes }),
@@ -53,17 +53,17 @@ export const QUESTIONS = {
   },
   distance: (a, b, control) => ({ question: 9, ...plain(Uint32Array.of(body(a), body(b)), control), shape: nearest }),
   contacts(pairs, control) {
-    const { rows } = instance(pairs, Pairs, "pairs: what detect() returned");
+    instance(pairs, Pairs, "pairs: what detect() returned");
     lastContacts = (lastContacts + 1) >>> 0;
     const number = lastContacts;
     const shape = (lists, stats) => new Contacts(lists, stats, { pairs, number });
-    return { question: 10, ...plain(before([number], rows), control), shape };
+    return { question: 10, ...aboutPairs(pairs, [number], control), shape };
   },
   penetration(contacts, a, b, control) {
-    const { rows } = instance(contacts, Contacts, "contacts: what contacts() returned");
-    const words = before([numberOf(contacts), body(a), body(b)], rows);
-    this[MOVES].mustBe(movesOf(contacts), [a, b]);
-    return { question: 11, ...plain(words, control), shape: (lists, stats) => new Penetration(lists, stats) };
+    const pairs = pairsOf(instance(contacts, Contacts, "contacts: what contacts() returned"));
+    const asked = aboutPairs(pairs, [numberOf(contacts), body(a), body(b)], control);
+    this[MOVES].mustBe(movesOf(pairs), [a, b]);
+    return { question: 11, ...asked, shape: (lists, stats) => new Penetration(lists, stats) };
   },
   candidatesInRuns(inflation, each, query) {
     if (typeof each !== "function") refuse("each: a function is needed");
@@ -144,12 +144,13 @@ function bitsOf(name, given) {
   return refuse(`${name}: ${String(given)} given, a whole number of 64 bits is needed`);
 }
 
-// Numbers, then rows.
-function before(numbers, rows) {
-  const words = new Uint32Array(numbers.length + rows.length);
-  words.set(numbers);
-  words.set(rows, numbers.length);
-  return words;
+// The query that found pairs, with its length, then numbers, then the rows of the pairs.
+function aboutPairs(pairs, given, control) {
+  const { words: query, numbers } = queryOf(pairs);
+  const words = new Uint32Array(1 + query.length + given.length + pairs.rows.length);
+  words.set([query.length, ...query, ...given]);
+  words.set(pairs.rows, words.length - pairs.rows.length);
+  return { ...plain(words, control), numbers };
 }
 
 // The kind of a mesh's elements by the number of their corners, its index and its positions.

@@ -97,7 +97,7 @@ const awaited = (promise) => promise.catch((error) => Promise.reject(named(error
 // The module takes the scene over.
 async function detect(handle, scene, { words, numbers, watch, moves }) {
   const lists = await watch.duringAsync((id) => awaited(handle.detect(scene, id, words, numbers)));
-  return new Pairs(lists, statsOf(handle.stats(true)), moves);
+  return new Pairs(lists, statsOf(handle.stats(true)), moves, { words, numbers });
 }
 
 function checkBytes(bytes) {

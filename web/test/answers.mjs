@@ -249,6 +249,9 @@ export async function refusals(module) {
   const other = new Scene();
   const two = closed.map(() => other.addTriangles(index, triangle));
   said.older.push(await refusal(() => detector.penetration(other, older, ...two)));
+  scene.setPositions(closed[1], corners.map((x) => x + 0.125));
+  const inCell = detector.contacts(scene, detector.detect(scene, { between: closed, ownedBy: [[-1, -1, -1], [1, 1, 1]] }));
+  said.older.push(await refusal(() => detector.penetration(scene, inCell, ...closed)));
   const step = detector.advance(scene);
   for (const body of closed) scene.remove(body);
   const added = scene.addTriangles(index, triangle);
@@ -354,6 +357,7 @@ export const REFUSALS = {
     "invalid: body 3: this was found for other positions than it has now, so nothing is known of it; ask again",
     "invalid: body 2: this was found for other positions than it has now, so nothing is known of it; ask again",
     "invalid: contacts: contacts of another scene given, those of this scene allowed",
+    "invalid: contacts: without some of the two, because of a cell, given, those of all pairs of the two allowed",
   ],
   added: "invalid: body 4: it was added after this was found, so nothing is known of it; ask again",
   found: [0, 0, 5, 0],

@@ -757,9 +757,9 @@ impinge_status impinge_find_contacts(impinge_detector *detector, const impinge_s
 typedef struct impinge_penetration impinge_penetration;
 
 /* How deep two closed bodies of triangles are in each other, from contacts among which are all of these two.
- * INVALID: also a surface that is not closed, contacts without these two though they intersect, faces of both whose
- * vertices are all pinned, because no pairs of these are found, a body of the two that has moved or was re-meshed since its contacts were
- * found. */
+ * INVALID: also a surface that is not closed, contacts without these two though they intersect, contacts of a query that left out pairs
+ * of the two (in a cell, by groups or lists of vertices, or because faces of both were pinned), a body of the two that has moved or was
+ * re-meshed since its contacts were found. */
 impinge_status impinge_find_penetration(impinge_detector *detector, const impinge_scene *scene, const impinge_contacts *contacts,
     uint32_t a, uint32_t b, impinge_penetration **penetration);
 

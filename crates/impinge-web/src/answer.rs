@@ -5,7 +5,9 @@ use std::ops::ControlFlow;
 use impinge::contact::{Contacts, Curves, Penetration, Region, Shape};
 use impinge::exact::Feature;
 use impinge::proximity::Nearest;
-use impinge::{BodyId, Candidates, Impact, NearPairs, PairKind, Pairs, Positions, StepStart};
+use impinge::{
+    BodyId, Candidates, Impact, NearPairs, PairKind, Pairs, Positions, Query, StepStart,
+};
 
 use crate::ask::{Asker, Question, query};
 use crate::error::Error;
@@ -230,8 +232,8 @@ impl Asker {
     /// [`Question::Distance`]: two bodies; [`Question::Contains`], [`Question::Locate`],
     /// [`Question::SignedDistance`] and [`Question::WindingNumbers`]: one. Points, or origins and
     /// then directions, come after these numbers.
-    /// [`Question::Contacts`]: a number of the caller's for the answer, then rows of pairs; [`Question::Penetration`]: that number, two
-    /// bodies, and the rows again; its rows are the two bodies, in the order of what is inside.
+    /// [`Question::Contacts`]: the length and the words of the query that found the pairs, whose numbers are given, a number of the
+    /// caller's for the answer, then rows of pairs; [`Question::Penetration`]: the same with two bodies before the rows; its rows are the two bodies, in the order of what is inside.
     ///
     /// # Errors
     /// No such body; those of the question.
@@ -252,7 +254,7 @@ impl Asker {
             }
             Question::Distance => return self.distance(world, words),
             Question::Contacts | Question::Penetration => {
-                return self.about_contacts(question, world, words);
+                return self.about_contacts(question, world, (words, numbers));
             }
             _ => {}
         }
@@ -345,9 +347,12 @@ impl Asker {
         &mut self,
         question: Question,
         world: &World,
-        words: &[u32],
+        (words, numbers): (&[u32], &[f64; 10]),
     ) -> Result<Answer, Error> {
-        let (&number, rest) = words.split_first().ok_or(Error::Foreign)?;
+        let split = words.split_first();
+        let split = split.and_then(|(&n, rest)| rest.split_at_checked(n as usize));
+        let (asked, rest) = split.ok_or(Error::Foreign)?;
+        let (&number, rest) = rest.split_first().ok_or(Error::Foreign)?;
         let (bodies, rows) = match (question, rest) {
             (Question::Penetration, [a, b, rows @ ..]) => {
                 (Some([world.id(*a)?, world.id(*b)?]), rows)
@@ -356,7 +361,8 @@ impl Asker {
         };
         let is_known = self.known.as_ref().is_some_and(|(of, _)| *of == number);
         if bodies.is_none() || !is_known {
-            self.find_contacts(number, world, rows)?;
+            let query = query(world, asked, numbers)?;
+            self.find_contacts(number, world, (&query, rows))?;
         }
         let Some((_, contacts)) = &self.known else {
             return Err(Error::Foreign);
@@ -373,8 +379,13 @@ impl Asker {
         })
     }
 
-    /// Finds the contacts of rows, and keeps them under a number.
-    fn find_contacts(&mut self, number: u32, world: &World, rows: &[u32]) -> Result<(), Error> {
+    /// Finds the contacts of rows of a query, and keeps them under a number.
+    fn find_contacts(
+        &mut self,
+        number: u32,
+        world: &World,
+        (query, rows): (&Query, &[u32]),
+    ) -> Result<(), Error> {
         self.known = None;
         let row = |&[a, i, b, j]: &[u32; 4]| {
             let [a, b] = [world.id(a)?, world.id(b)?];
@@ -382,7 +393,7 @@ impl Asker {
         };
         let rows = rows.as_chunks().0.iter().map(row);
         let rows = rows.collect::<Result<Vec<_>, Error>>()?;
-        let pairs = Pairs::of_rows(&world.scene, &rows)?;
+        let pairs = Pairs::of_rows(&world.scene, query, &rows)?;
         let contacts = self.detector.contacts(&world.scene, &pairs)?;
         self.known = Some((number, contacts));
         Ok(())

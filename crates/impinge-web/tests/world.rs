@@ -278,7 +278,14 @@ fn answers_about_distances_and_contacts() -> Result<(), Error> {
     // It is the first for the library.
     let tip = world.put(Put::Add, 0, BodyKind::Triangles, &faces, &moved)?;
     let pairs = rows(&mut asker, &world, ALL)?;
-    let about = |number, bodies: &[u32], rows: &[u32]| [&[number], bodies, rows].concat();
+    let asked = |flags: u32| {
+        let mut words = words(ALL);
+        words[7] = flags;
+        words
+    };
+    let about = |number: u32, bodies: &[u32], rows: &[u32]| {
+        [&[9], &asked(0)[..], &[number], bodies, rows].concat()
+    };
     let contacts = asker.ask(Question::Contacts, &world, &about(7, &[], &pairs), &NUMBERS)?;
     let n = pairs.len() / 4;
     assert_eq!(contacts.bytes[..n], vec![3; n], "segments");
@@ -294,7 +301,17 @@ fn answers_about_distances_and_contacts() -> Result<(), Error> {
     assert!(known.numbers.len() == 22 && known.numbers[0] > 0.0);
     // Contacts that are not the last ones are found again.
     assert_eq!(ask(&mut asker, 8)?, known);
-    let foreign = asker.ask(Question::Contacts, &world, &[9, tip, 0, low, 4], &NUMBERS);
+    // What the pairs of a cell have in common is not what the bodies have.
+    let words = [&[9], &asked(4)[..], &[9, low, tip], &pairs].concat();
+    let mut numbers = NUMBERS;
+    numbers[6..9].fill(10.0);
+    let of_cell = asker.ask(Question::Penetration, &world, &words, &numbers);
+    assert_eq!(
+        of_cell.expect_err("a cell").to_string(),
+        "contacts: without some of the two, because of a cell, given, those of all pairs of the two allowed"
+    );
+    let words = about(9, &[], &[tip, 0, low, 4]);
+    let foreign = asker.ask(Question::Contacts, &world, &words, &NUMBERS);
     assert_eq!(
         foreign.expect_err("no face 4").to_string(),
         "pairs: row 0: 0, 0, 1, 4 given, sorted rows of elements of the scene allowed"

@@ -301,7 +301,8 @@ impl Asker {
             // Where nearly all of two parts meets, one place is enough.
             let is_certain = is_inside[0] || is_inside[1];
             let rows = if is_certain { &rows[..1] } else { rows };
-            let pairs = Pairs::of_rows(&self.scene, rows)?;
+            let query = Query::between_all();
+            let pairs = Pairs::of_rows(&self.scene, &query, rows)?;
             let contacts = self.detector.contacts(&self.scene, &pairs)?;
             let both = parts.map(|part| &self.parts[part]);
             let relation = match is_certain || interpenetrate(both, &contacts) {

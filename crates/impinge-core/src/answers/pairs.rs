@@ -4,7 +4,8 @@ use std::ops::Range;
 
 use crate::answers::changes::{Changes, check_comparable};
 use crate::answers::home::{Home, gives_back};
-use crate::plan::{Plan, owner_by_first};
+use crate::plan::{Gaps, Plan, owner_by_first};
+use crate::query::Query;
 use crate::scene::Scene;
 use crate::scene::elements::{BodyKind, Part};
 use crate::scene::error::Error;
@@ -47,6 +48,7 @@ pub struct Pairs {
     bodies: Vec<PairBody>,
     /// Of the scene.
     family: u64,
+    gaps: Gaps,
     stats: Stats,
     /// Where its buffers go when it is dropped.
     home: Home<Pairs>,
@@ -65,13 +67,15 @@ impl Pairs {
         self.keys.is_empty()
     }
 
-    /// Pairs from [rows](Pairs::rows), sorted and of this scene: for callers that keep rows alone.
+    /// Pairs from [rows](Pairs::rows), sorted, that this query finds in this scene: for callers that
+    /// keep rows alone.
     ///
     /// # Errors
     /// A row names a body or an element that is not there; rows are not sorted.
     #[doc(hidden)]
-    pub fn of_rows(scene: &Scene, rows: &[[u32; 4]]) -> Result<Self, Error> {
+    pub fn of_rows(scene: &Scene, query: &Query, rows: &[[u32; 4]]) -> Result<Self, Error> {
         let mut pairs = Pairs::default();
+        pairs.gaps = Gaps::new(scene, query)?;
         pairs.family = scene.family();
         let mut end: u32 = 0;
         for (id, body) in scene.bodies() {
@@ -272,6 +276,11 @@ impl Pairs {
         bodies.map(|body| (body.id, [body.numbers_stamp, body.positions_stamp]))
     }
 
+    /// Why pairs of two bodies may not be here.
+    pub(crate) fn gaps(&self) -> &Gaps {
+        &self.gaps
+    }
+
     /// Which pairs an older answer also has, which are new, and which are gone: two pairs are the
     /// same if their bodies and elements are. Pairs of a body that was removed and of one in its
     /// slot differ.
@@ -315,6 +324,7 @@ impl Outcome<u64, 1> for Pairs {
     fn begin(&mut self, plan: &Plan) {
         self.keys.clear();
         self.family = plan.family;
+        self.gaps = plan.gaps();
         self.bodies.clear();
         self.bodies.extend(plan.parts.iter().map(|part| PairBody {
             id: part.id,

@@ -64,6 +64,7 @@ pub(super) fn contacts(scene: &Scene, pairs: &Pairs, work: Work<'_>) -> Result<C
         names,
         points,
         stamps: bodies.stamps(),
+        gaps: pairs.gaps().clone(),
         doubles: bodies.doubles().into(),
         by_bodies: ByBodies::default(),
     };

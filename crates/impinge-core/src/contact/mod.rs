@@ -41,6 +41,7 @@ mod depths;
 mod double;
 mod inside;
 mod meet;
+mod orientation;
 mod parts;
 mod penetration;
 mod regions;
@@ -59,6 +60,7 @@ pub use solids::SolidOverlap;
 use std::sync::Arc;
 
 use crate::answers::pairs::Pairs;
+use crate::plan::Gaps;
 use crate::scene::Scene;
 use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
@@ -129,6 +131,7 @@ pub struct Contacts {
     doubles: Arc<[(u32, Doubles)]>,
     /// The stamps of the positions of the bodies for which the pairs were found.
     stamps: Vec<(BodyId, u64)>,
+    gaps: Gaps,
     by_bodies: parts::ByBodies,
 }
 
@@ -159,6 +162,12 @@ impl Contacts {
             true => Ok(()),
             false => Err(Error::Moved { body: id }),
         }
+    }
+
+    /// What of the question left out pairs of two bodies, which have not moved since, if anything did.
+    pub(crate) fn gap_between(&self, scene: &Scene, ids: [BodyId; 2]) -> Option<&'static str> {
+        let are_there = ids.iter().all(|&id| self.refuse_moved(scene, id).is_ok());
+        are_there.then(|| self.gaps.between(scene, ids)).flatten()
     }
 
     /// Bytes of the lists with an entry per contact, corner or point.

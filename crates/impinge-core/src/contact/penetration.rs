@@ -16,6 +16,7 @@
 
 use super::curves::Curves;
 use super::inside::{Asked, ConnectedParts};
+use super::orientation::orientations;
 use super::regions::{NO_REGION, Region, WHAT, join_contacts, regions};
 use super::topology::EdgesAround;
 use super::{Contacts, Feature, PointName, Shape};
@@ -108,10 +109,12 @@ impl Topologies {
             ConnectedParts::new(&asked, bodies[1 - side], work)
         };
         let parts = [parts(0)?, parts(1)?];
-        work.step()?;
+        let orientations = |side: usize| orientations(bodies[side], topologies[side], work);
         let overlap = OverlapWork {
             contacts,
             bodies,
+            topologies,
+            orientations: [orientations(0)?, orientations(1)?],
             crossings,
             parts,
         };
@@ -260,6 +263,9 @@ struct Piece {
 struct OverlapWork<'a> {
     contacts: &'a Contacts,
     bodies: [&'a Body; 2],
+    topologies: [&'a EdgesAround; 2],
+    /// See [`orientations`].
+    orientations: [Vec<f64>; 2],
     crossings: [Crossings<'a>; 2],
     parts: [ConnectedParts; 2],
 }
@@ -275,6 +281,7 @@ impl OverlapWork<'_> {
         let curves = Curves::new(self.contacts)?;
         work.step()?;
         let (mut regions, mut region_of) = regions(self.contacts, &curves, &mut sets)?;
+        regions.iter_mut().for_each(|region| self.turn(region));
         let numbers = [0, 1].map(|side| self.crossings[side].body);
         let mut inside = [Vec::new(), Vec::new()];
         for (side, inside) in inside.iter_mut().enumerate() {
@@ -308,6 +315,44 @@ impl OverlapWork<'_> {
         }
         regions.retain(is_asked);
         Ok(Penetration { inside, regions })
+    }
+
+    /// -1 if a face is turned inwards, else 1.
+    fn orientation(&self, side: usize, face: u32) -> f64 {
+        let corner = self.bodies[side].elements().corners(face as usize)[0];
+        let piece = self.topologies[side].piece(VertexIx::new(corner));
+        self.orientations[side][piece]
+    }
+
+    /// The same of the faces of a contact.
+    fn orientations_of(&self, contact: u32) -> [f64; 2] {
+        let [_, a, _, b] = self.contacts.rows()[contact as usize];
+        [self.orientation(0, a), self.orientation(1, b)]
+    }
+
+    /// Turns a region's area and normal, which take faces as they are, to where they belong if
+    /// faces are turned inwards.
+    fn turn(&self, region: &mut Region) {
+        if region.bodies != [0, 1].map(|side| self.crossings[side].body) {
+            return;
+        }
+        let mut all = region
+            .contacts
+            .iter()
+            .map(|&contact| self.orientations_of(contact));
+        let Some([a, b]) = all.next() else { return };
+        if all.any(|other| other != [a, b]) {
+            // Some faces of one body are turned, and some are not.
+            region.normal = None;
+            return;
+        }
+        // Curves follow the normals of both, patches that of the first.
+        let is_of_curves = region
+            .normal
+            .is_some_and(|normal| dot(normal, region.area) < 0.0);
+        let turns = if is_of_curves { a * b } else { a };
+        region.normal = region.normal.map(|normal| scaled(normal, turns));
+        region.area = scaled(region.area, a * b);
     }
 
     /// The number, among the members of the sets, of a vertex that is inside.
@@ -477,9 +522,9 @@ impl OverlapWork<'_> {
             .map(|region| scaled(add(region.bounds[0], region.bounds[1]), 0.5))
             .collect();
         let mut volumes = vec![0.0; regions.len()];
-        let mut add_side = |at: usize, on: Point, from: Point, to: Point| {
+        let mut add_side = |at: usize, on: Point, [from, to]: [Point; 2], weight: f64| {
             let [x, p, q] = [on, from, to].map(|point| sub(point, origins[at]));
-            volumes[at] += dot(x, cross(p, q)) / 6.0;
+            volumes[at] += weight * dot(x, cross(p, q)) / 6.0;
         };
         for (number, held) in regions.iter().enumerate() {
             for &contact in &held.contacts {
@@ -497,9 +542,10 @@ impl OverlapWork<'_> {
                     self.position(side, VertexIx::new(corners[0]))
                 };
                 // The part inside lies to the left as seen from outside a, to the right as seen
-                // from outside b.
-                add_side(number, on(0, a), from, to);
-                add_side(number, on(1, b), to, from);
+                // from outside b. Where faces of one are turned inwards, so is the segment.
+                let [of_a, of_b] = self.orientations_of(contact as u32);
+                add_side(number, on(0, a), [from, to], of_a * of_b);
+                add_side(number, on(1, b), [to, from], of_a * of_b);
             }
         }
         for (side, pieces) in pieces.iter().enumerate() {
@@ -515,13 +561,14 @@ impl OverlapWork<'_> {
                     continue;
                 }
                 let on = self.position(side, face[0]);
+                let weight = self.orientations[side][self.topologies[side].piece(face[0])];
                 for k in 0..3 {
                     let (from, to) = (face[k], face[(k + 1) % 3]);
                     if !crossings.is_crossed([from, to]) {
                         if let (Some(node), Some(_)) = (self.node(side, from), self.node(side, to))
                         {
                             let (p, q) = (self.position(side, from), self.position(side, to));
-                            add_side(region(node), on, p, q);
+                            add_side(region(node), on, [p, q], weight);
                         }
                         continue;
                     }
@@ -537,7 +584,7 @@ impl OverlapWork<'_> {
                         } else {
                             (piece.to, piece.from)
                         };
-                        add_side(region(piece.node), on, p, q);
+                        add_side(region(piece.node), on, [p, q], weight);
                     }
                 }
             }

@@ -21,12 +21,57 @@ const WHAT: &str = "edges of a closed surface";
 pub(super) struct EdgesAround {
     starts: Vec<u32>,
     neighbours: Vec<VertexIx>,
+    /// For each vertex, the number of its connected piece; 0 for a vertex of no face.
+    pieces: Vec<u32>,
+    n_pieces: usize,
 }
 
 impl EdgesAround {
     /// Bytes held.
     pub fn bytes(&self) -> usize {
-        size_of_val(&self.starts[..]) + size_of_val(&self.neighbours[..])
+        size_of_val(&self.starts[..])
+            + size_of_val(&self.neighbours[..])
+            + size_of_val(&self.pieces[..])
+    }
+
+    /// How many pieces there are that no edge connects.
+    pub fn n_pieces(&self) -> usize {
+        self.n_pieces
+    }
+
+    /// The number of the piece of a vertex that some face has.
+    pub fn piece(&self, vertex: VertexIx) -> usize {
+        self.pieces[vertex.index()] as usize
+    }
+
+    /// Numbers the connected pieces.
+    fn find_pieces(&mut self, n_vertices: usize) {
+        const NONE: u32 = u32::MAX;
+        self.pieces = vec![NONE; n_vertices];
+        let mut members = Vec::new();
+        for seed in VertexIx::up_to(n_vertices) {
+            if self.pieces[seed.index()] != NONE {
+                continue;
+            }
+            if self.neighbours(seed).is_empty() {
+                self.pieces[seed.index()] = 0;
+                continue;
+            }
+            let piece = self.n_pieces as u32;
+            self.n_pieces += 1;
+            self.pieces[seed.index()] = piece;
+            members.push(seed);
+            while let Some(vertex) = members.pop() {
+                let at = vertex.index();
+                let own = self.starts[at] as usize..self.starts[at + 1] as usize;
+                for other in &self.neighbours[own] {
+                    if self.pieces[other.index()] == NONE {
+                        self.pieces[other.index()] = piece;
+                        members.push(*other);
+                    }
+                }
+            }
+        }
     }
 
     /// # Errors
@@ -85,7 +130,16 @@ impl EdgesAround {
                 *place += 1;
             }
         }
-        Ok(EdgesAround { starts, neighbours })
+        let mut topology = EdgesAround {
+            starts,
+            neighbours,
+            pieces: Vec::new(),
+            n_pieces: 0,
+        };
+        topology.find_pieces(n_vertices);
+        // Faces that name a vertex twice may have no edges at all.
+        topology.n_pieces = topology.n_pieces.max(1);
+        Ok(topology)
     }
 
     /// The vertices that share an edge with this one; none for a vertex of no face.

@@ -4,10 +4,9 @@ use super::Detector;
 use crate::answers::pairs::Pairs;
 use crate::contact::{Contacts, Penetration};
 use crate::query::Query;
-use crate::scene::body::are_all_pinned;
+use crate::scene::Scene;
 use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
-use crate::scene::{Body, Scene};
 use crate::search::work::Work;
 
 impl Detector {
@@ -76,9 +75,10 @@ impl Detector {
     ///
     /// # Errors
     /// A body that is not in the scene, the same body twice, a body not made of triangles, a
-    /// surface that is not closed, contacts without these two though they intersect, faces of both
-    /// whose vertices are all [pinned](Scene::set_pinned), because no pairs of these are found; a
-    /// body that was moved or re-meshed since the pairs were found ([`Error::Moved`]).
+    /// surface that is not closed, contacts without these two though they intersect; contacts of a
+    /// query that left out pairs of the two: in a cell, by groups or lists of vertices, or because
+    /// faces of both were [pinned](Scene::set_pinned); a body that was moved or re-meshed since the
+    /// pairs were found ([`Error::Moved`]).
     pub fn penetration(
         &mut self,
         scene: &Scene,
@@ -115,33 +115,24 @@ impl Detector {
         if a == b {
             return Ok(());
         }
-        if has_pinned_element(scene.body(a)?) && has_pinned_element(scene.body(b)?) {
-            return Err(Error::Setting {
-                setting: "pinned",
-                given: format!("bodies {a} and {b}, of which pairs of pinned faces are left out,"),
-                allowed: "pinned faces of one of the two",
-            });
-        }
-        if contacts.are_any_of([a.min(b), a.max(b)]) {
+        let are_there = contacts.are_any_of([a.min(b), a.max(b)]);
+        if are_there {
             contacts.refuse_moved(scene, a)?;
-            return contacts.refuse_moved(scene, b);
+            contacts.refuse_moved(scene, b)?;
         }
-        let intersect = self.any(scene, &Query::between(a, b))?;
-        match intersect {
-            false => Ok(()),
-            true => Err(Error::Setting {
+        let refuse = |given: String| {
+            Err(Error::Setting {
                 setting: "contacts",
-                given: format!("none of bodies {a} and {b}, which intersect,"),
+                given,
                 allowed: "those of all pairs of the two",
-            }),
+            })
+        };
+        if let Some(what) = contacts.gap_between(scene, [a, b]) {
+            return refuse(format!("without some of the two, because of {what},"));
         }
+        if !are_there && self.any(scene, &Query::between(a, b))? {
+            return refuse(format!("none of bodies {a} and {b}, which intersect,"));
+        }
+        Ok(())
     }
-}
-
-/// Whether all vertices of any of its elements are pinned.
-fn has_pinned_element(body: &Body) -> bool {
-    body.pinned().is_some_and(|pinned| {
-        let mut elements = 0..body.elements().len();
-        elements.any(|element| are_all_pinned(pinned, body.elements().corners(element)))
-    })
 }

@@ -4,12 +4,13 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
+use crate::query::goal::{Goal, Limits};
 use crate::query::pair_kind::PairKind;
 use crate::query::pair_set::{PairSet, SortedKeys};
 use crate::query::{Exclusion, Query};
 use crate::scene::Scene;
 use crate::scene::body::are_all_pinned;
-use crate::scene::elements::{Part, VertexRings};
+use crate::scene::elements::{Elements, Part, VertexRings};
 use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
 use crate::scene::index::PartIx;
@@ -43,6 +44,48 @@ impl VertexList {
         // Lists of one body are both ways.
         (self.bodies == bodies && reaches(a, b))
             || (self.bodies == [bodies[1], bodies[0]] && reaches(b, a))
+    }
+}
+
+/// Why an answer may lack pairs of two bodies that intersect.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Gaps {
+    has_cell: bool,
+    /// Of elements, with the body of each part.
+    left_out: Option<(Arc<LeftOut>, Vec<BodyId>)>,
+}
+
+impl Gaps {
+    /// Those of the question which elements of bodies intersect.
+    pub fn new(scene: &Scene, query: &Query) -> Result<Self, Error> {
+        let plan = Plan::intersections(scene, query, Goal::All, Limits::default())?;
+        Ok(plan.gaps())
+    }
+
+    /// What of the question leaves out pairs of two bodies, whose elements have not changed since.
+    pub fn between(&self, scene: &Scene, [a, b]: [BodyId; 2]) -> Option<&'static str> {
+        if self.has_cell {
+            return Some("a cell");
+        }
+        let (left_out, bodies) = self.left_out.as_ref()?;
+        let of = |id| {
+            let part = bodies.binary_search(&id).ok()?;
+            Some((&left_out.parts[part], scene.body(id).ok()?.elements()))
+        };
+        let of = [of(a)?, of(b)?];
+        let is_listed = |of: &VertexList| of.bodies == [a, b] || of.bodies == [b, a];
+        let has_pinned = |(of, elements): &(&OfPart, &Elements)| {
+            of.pinned.as_ref().is_some_and(|pinned| {
+                (0..elements.len()).any(|ix| are_all_pinned(pinned, elements.corners(ix)))
+            })
+        };
+        if !left_out.groups.is_empty() && of.iter().all(|(of, _)| of.groups.is_some()) {
+            Some("groups")
+        } else if left_out.vertices.iter().any(is_listed) {
+            Some("lists of vertices")
+        } else {
+            of.iter().all(has_pinned).then_some("pinned faces of both")
+        }
     }
 }
 
@@ -190,6 +233,17 @@ impl Plan {
             pairs: query.pairs.iter().map(keys).collect(),
         }));
         Ok(())
+    }
+
+    /// Why the answer may lack pairs of two bodies.
+    pub(crate) fn gaps(&self) -> Gaps {
+        Gaps {
+            has_cell: self.cell.is_some(),
+            left_out: self.left_out.as_ref().map(|left_out| {
+                let bodies = self.parts.iter().map(|part| part.id);
+                (Arc::clone(left_out), bodies.collect())
+            }),
+        }
     }
 
     /// Whether some pairs are left out because of their elements.

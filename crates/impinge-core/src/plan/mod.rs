@@ -42,7 +42,7 @@ use crate::scene::index::{ElementIx, Number, PartIx, pair_numbers};
 use crate::scene::{Body, Each, Filter, Scene};
 use crate::workers::clock::Instant;
 use impinge_exact::internal::Keep;
-pub(crate) use left_out::OwnRule;
+pub(crate) use left_out::{Gaps, OwnRule};
 
 /// One part of one body that takes part in a frame.
 #[derive(Debug, Clone, Copy)]

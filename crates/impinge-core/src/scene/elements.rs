@@ -206,23 +206,20 @@ impl VertexRings {
         }
         ends.sort_unstable();
         ends.dedup();
-        let next = |vertex: u32| {
-            let first = ends.partition_point(|&[from, _]| from < vertex);
-            let own = ends[first..]
-                .iter()
-                .take_while(move |&&[from, _]| from == vertex);
-            own.map(|&[_, to]| to)
-        };
+        let next = VertexRings::of_pairs(n_vertices, &ends);
         let (mut starts, mut vertices) = (vec![0], Vec::new());
+        // The last vertex from which each was reached.
+        let mut reached = vec![u32::MAX; n_vertices];
         for vertex in 0..n_vertices as u32 {
             let first = vertices.len();
             vertices.push(vertex);
+            reached[vertex as usize] = vertex;
             let mut ring = first;
             for _ in 0..n_rings {
                 let end = vertices.len();
                 for ix in ring..end {
-                    for to in next(vertices[ix]) {
-                        if !vertices[first..].contains(&to) {
+                    for &to in next.of(vertices[ix]) {
+                        if std::mem::replace(&mut reached[to as usize], vertex) != vertex {
                             vertices.push(to);
                         }
                     }

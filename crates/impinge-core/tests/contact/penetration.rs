@@ -1,7 +1,7 @@
 //! What lies inside, and the regions' normals, depths and volumes.
 
 use impinge_core::contact::{Penetration, Region};
-use impinge_core::{Backend, Detector, Elements, Error, Query, Scene};
+use impinge_core::{Backend, Detector, Elements, Error, Exclusion, Query, Scene};
 use impinge_scenes::{Model, surfaces};
 
 use super::detect;
@@ -366,6 +366,48 @@ fn contacts_of_before_are_refused() {
     assert!(matches!(error, Error::Moved { .. }), "{error}");
 }
 
+/// Pairs that a query leaves out are not among its contacts.
+#[test]
+fn contacts_of_a_query_that_left_out_pairs_of_the_two_are_refused() {
+    let ball = surfaces::bumpy_ball(300, 0.2);
+    let mut scene = Scene::new();
+    let [a, b, c] = [[0.0; 3], [0.7, 0.1, 0.0], [0.3, 0.2, 0.6]].map(|place| {
+        let moved = ball.translated(place);
+        scene.add((moved.elements, moved.positions)).unwrap()
+    });
+    let n = scene.body(a).unwrap().n_vertices();
+    let halves: Vec<u32> = (0..n).map(|vertex| u32::from(vertex < n / 2)).collect();
+    scene.set_groups(a, &halves).unwrap();
+    scene.set_groups(b, &halves).unwrap();
+    let mut detector = Detector::new(Backend::Cpu).unwrap();
+    let mut ask = |query: &Query, [a, b]: [_; 2]| {
+        let pairs = detector.detect(&scene, query).unwrap().clone();
+        let contacts = detector.contacts(&scene, &pairs).unwrap();
+        detector.penetration(&scene, &contacts, a, b)
+    };
+    let whole = ask(&Query::all(), [a, b]).unwrap();
+    let of_c = ask(&Query::all(), [a, c]).unwrap();
+    let offsets: Vec<u64> = (0..=n as u64).collect();
+    let lists = Exclusion::vertices(a, b, offsets, vec![0; n]);
+    for (query, why) in [
+        (Query::all().exclude(Exclusion::groups(0, 1)), "groups"),
+        (Query::all().exclude(lists), "lists of vertices"),
+    ] {
+        // Nothing is left out of the pairs with the third body, nor by rings.
+        assert_eq!(ask(&query, [a, c]).unwrap(), of_c);
+        let error = ask(&query, [a, b]).unwrap_err().to_string();
+        let told = format!(
+            "contacts: without some of the two, because of {why}, given, those of all pairs of the two allowed"
+        );
+        assert_eq!(error, told);
+    }
+    let rings = Query::all().exclude(Exclusion::rings(2));
+    assert_eq!(ask(&rings, [a, b]).unwrap(), whole);
+    let cell = Query::all().owned_by([-10.0; 3], [0.5, 10.0, 10.0]);
+    let error = ask(&cell, [b, c]).unwrap_err().to_string();
+    assert!(error.contains("because of a cell"), "{error}");
+}
+
 /// Pairs of pinned faces are never found, so contacts are not all of the two bodies.
 #[test]
 fn faces_that_are_pinned_in_both_bodies_are_refused() {
@@ -394,7 +436,7 @@ fn faces_that_are_pinned_in_both_bodies_are_refused() {
     let error = ask(&scene).unwrap_err().to_string();
     assert_eq!(
         error,
-        "pinned: bodies 1 and 0, of which pairs of pinned faces are left out, given, pinned faces of one of the two allowed"
+        "contacts: without some of the two, because of pinned faces of both, given, those of all pairs of the two allowed"
     );
 }
 
@@ -432,5 +474,71 @@ fn pairs_of_bodies_among_many_are_as_if_alone() {
         }
         assert_eq!(found, expected, "{a} and {b}");
         assert_eq!(found.regions.is_empty(), b == 3);
+    }
+}
+
+/// Faces may be turned inwards: what two bodies have in common, and which way is out, do not depend on it.
+#[test]
+fn bodies_that_are_inside_out_overlap_as_they_are() {
+    let turned = |model: &Model| -> Model {
+        let Elements::Triangles(faces) = &model.elements else {
+            panic!("a surface");
+        };
+        let faces: Vec<[u32; 3]> = faces.iter().map(|&[a, b, c]| [a, c, b]).collect();
+        Model {
+            elements: faces.into(),
+            positions: model.positions.clone(),
+        }
+    };
+    let joined = |models: &[Model]| -> Model {
+        let (mut all, mut positions) = (Vec::new(), Vec::new());
+        for model in models {
+            let Elements::Triangles(faces) = &model.elements else {
+                panic!("a surface");
+            };
+            let first = positions.len() as u32;
+            all.extend(faces.iter().map(|face| face.map(|vertex| vertex + first)));
+            positions.extend(&model.positions);
+        }
+        Model {
+            elements: all.into(),
+            positions,
+        }
+    };
+    let ball = surfaces::bumpy_ball(400, 0.2);
+    let shell = |model: &Model, size: f32| model.mapped(|at| at.map(|x| size * x));
+    // A ball with a cavity, and another one inside that.
+    let hollow = joined(&[ball.clone(), turned(&shell(&ball, 0.7)), shell(&ball, 0.4)]);
+    for (a, b) in [
+        (ball.clone(), ball.translated([0.713, 0.117, 0.053])),
+        (hollow.clone(), ball.translated([0.913, 0.119, 0.057])),
+        (hollow.translated([0.011, 0.307, 0.113]), hollow.clone()),
+        // A small part of a large one.
+        (
+            shell(&ball, 9.0),
+            shell(&ball, 0.5).translated(ball.positions[17].map(|x| 9.18 * x)),
+        ),
+    ] {
+        let right = overlap(&a, &b);
+        let volume = right.volume().expect("right");
+        assert!(volume > 0.0, "{volume}");
+        let [turned_a, turned_b] = [turned(&a), turned(&b)];
+        for (a, b) in [(&turned_a, &b), (&a, &turned_b), (&turned_a, &turned_b)] {
+            let found = overlap(a, b);
+            assert_eq!(found.inside, right.inside);
+            assert_eq!(found.regions.len(), right.regions.len());
+            let own = found.volume().expect("generic");
+            assert!((own - volume).abs() < 1e-9 * volume, "{own} for {volume}");
+            for (found, right) in found.regions.iter().zip(&right.regions) {
+                let (n, m) = (found.normal, right.normal);
+                assert_eq!(n.is_some(), m.is_some());
+                let along = |(n, m): ([f64; 3], [f64; 3])| (0..3).map(|k| n[k] * m[k]).sum::<f64>();
+                assert!(
+                    n.zip(m).is_none_or(|both| along(both) > 0.999),
+                    "{n:?} {m:?}"
+                );
+                assert!((found.depth.unwrap_or(0.0) - right.depth.unwrap_or(0.0)).abs() < 1e-6);
+            }
+        }
     }
 }
