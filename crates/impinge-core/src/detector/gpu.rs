@@ -98,11 +98,7 @@ pub(super) fn find_in_step(
     answer: StepAnswer<'_>,
     stats: &mut Stats,
 ) -> Result<ByDevice, Error> {
-    if cfg!(target_family = "wasm")
-        || job.plan.keeps_distance()
-        || job.plan.has_filter()
-        || job.plan.leaves_out()
-    {
+    if cfg!(target_family = "wasm") || job.plan.keeps_distance() || job.plan.has_filter() {
         return Ok(ByDevice::Not);
     }
     let Some(on_device) = engine else {

@@ -97,11 +97,10 @@ impl Gpu<'_> {
     /// larger than their capacities, see [`ResidentPairs`]; [`grow`](Gpu::grow) then makes room.
     ///
     /// # Errors
-    /// A stale id, a body with two buffers, a buffer that is too small or lacks its usage; a query
-    /// for [one cell](Query::owned_by), or with an [`exclude`](Query::exclude) of anything but
-    /// bodies; a body of the scene with [pinned](Scene::set_pinned) vertices; a detector without a
-    /// GPU; a frame larger than the device or the memory budget can hold. Device errors go to the
-    /// device's owner, and so do those of kernels, which the first frame compiles.
+    /// Those of [`detect`](Detector::detect) about the query; a body with two buffers, a buffer that
+    /// is too small or lacks its usage; a query for [one cell](Query::owned_by); a detector without
+    /// a GPU, a lost device; a frame larger than the device or the memory budget can hold. Device
+    /// errors go to the device's owner, and so do those of kernels, which the first frame compiles.
     pub fn encode(
         &mut self,
         scene: &Scene,
@@ -117,7 +116,6 @@ impl Gpu<'_> {
             });
         }
         let plan = Plan::intersections(scene, query, Goal::All, self.detector.settings.limits())?;
-        refuse_left_out(scene, query, &plan)?;
         let control = Control::new();
         let job = self.detector.runner.job(scene, &plan, &control)?;
         on_device(&mut self.detector.gpu)?.encode(job, positions, encoder)
@@ -276,7 +274,6 @@ impl Gpu<'_> {
     ) -> Result<T, Error> {
         let engine = on_device(&mut self.detector.gpu)?;
         let plan = Plan::contacts(scene, query, Goal::All, self.detector.settings.limits())?;
-        refuse_left_out(scene, query, &plan)?;
         let control = Control::new();
         let job = self.detector.runner.job(scene, &plan, &control)?;
         let resident: BTreeSet<BodyId> = resident.iter().map(|&(body, _)| body).collect();
@@ -326,28 +323,6 @@ impl Gpu<'_> {
             Some(engine) => engine.make_room().await,
             None => Ok(true),
         }
-    }
-}
-
-/// Frames that stay on a device leave out bodies only: refuses what else is left out, by its name.
-fn refuse_left_out(scene: &Scene, query: &Query, plan: &Plan) -> Result<(), Error> {
-    if !plan.leaves_out() {
-        return Ok(());
-    }
-    if let Some(what) = query.leaves_out_elements() {
-        return Err(Error::Setting {
-            setting: "exclude",
-            given: format!("{what} in a plan that stays on a device"),
-            allowed: "bodies",
-        });
-    }
-    match scene.bodies().find(|(_, body)| body.pinned().is_some()) {
-        None => Ok(()),
-        Some((id, _)) => Err(Error::Setting {
-            setting: "pinned",
-            given: format!("pinned vertices of body {id} in a plan that stays on a device"),
-            allowed: "only bodies without any",
-        }),
     }
 }
 

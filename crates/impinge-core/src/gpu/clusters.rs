@@ -6,12 +6,13 @@
 //! traversal   round 0 · (prepare · round r) for r = 1 …
 //! pairing    prepare · pairing
 //! narrow     prepare · narrow;    in a step: · prepare · search
+//!            before it, if elements are left out: · leave_out
 //!            if the lists stay on the device: · lists_end
 //! ```
 
 use super::buffers::Uniform;
 use super::kernels::{
-    BoundsClusters, BoundsLevel, BoundsTop, ListsEnd, Narrow, NarrowMoving, NarrowSafe,
+    BoundsClusters, BoundsLevel, BoundsTop, LeaveOut, ListsEnd, Narrow, NarrowMoving, NarrowSafe,
     NarrowSearch, Pairing, Prepare, SafeEnd, Traversal,
 };
 use super::layout::{
@@ -239,13 +240,28 @@ impl Recorder<'_> {
         })
     }
 
+    /// The workgroups of stage `narrow`. Those candidates that the question leaves out are marked.
     fn counted_candidates(&mut self) -> Workgroups {
-        self.counted(Counted {
+        let groups = self.counted(Counted {
             counter: N_CANDIDATES,
             per_group: GROUP,
             capacity: self.pass_buffers.capacities().candidates,
             slot: NARROW,
-        })
+        });
+        if self.leaves_out {
+            let (world, pass_buffers) = (self.world, self.pass_buffers);
+            let bindings = LeaveOut {
+                candidates: pass_buffers.candidates.write_to(),
+                corners: world.corners.read(),
+                order: world.order.read(),
+                rules: pass_buffers.rules.read(),
+                counters: pass_buffers.counters.write_to(),
+                bodies: self.view.bodies.read(),
+            };
+            let leave_out = &self.gpu.kernels.leave_out;
+            self.recording.launch(leave_out, &bindings, groups.clone());
+        }
+        groups
     }
 
     /// Stage `narrow`: the filter over all candidates.

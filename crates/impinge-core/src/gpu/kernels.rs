@@ -3,7 +3,7 @@
 use super::layout::{
     Arguments, Body, Candidate, Cell, CellItem, Cluster, ClusterVertex, Coordinate, Corners,
     Counter, Grid, Kept, Level, ListEntry, Node, NodePair, Order, PairKey, PairTimes, Params,
-    Reach, Share, Start, Tally, UnsureKey, WorkItem,
+    Reach, Rule, Share, Start, Tally, UnsureKey, WorkItem,
 };
 use super::pipeline::{Kernel, Source, bindings, source};
 
@@ -73,6 +73,18 @@ bindings! {
         candidates: Write<Candidate>,
         counters: Write<Counter>,
         params: Uniform<Params>,
+    }
+}
+
+bindings! {
+    /// `left_out.wgsl`
+    LeaveOut {
+        candidates: Write<Candidate>,
+        corners: Read<Corners>,
+        order: Read<Order>,
+        rules: Read<Rule>,
+        counters: Write<Counter>,
+        bodies: Read<Body>,
     }
 }
 
@@ -326,6 +338,7 @@ kernels! {
     pairing_moving: Pairing = PAIRING_MOVING []
         from "pairing" as "pairing_moving"
         ("boxes", "moving", "moving_groups", "vertices", "ids", "reserve", "groups");
+    leave_out: LeaveOut = LEAVE_OUT [] from "left_out" ("numbers", "groups");
     narrow_moving: NarrowMoving = NARROW_MOVING []
         from "narrow_moving" ("filter", "lengths", "polygon", "pair", "reserve", "slots", "groups");
     narrow_search: NarrowSearch = NARROW_SEARCH []

@@ -100,6 +100,8 @@ words! {
     Order { number: u32 }
     /// How much of something was needed.
     Counter { n: u32 }
+    /// A word of the rules about what is left out.
+    Rule { word: u32 }
 }
 
 /// All contacts of a step, in `Params::sought`.
@@ -152,6 +154,10 @@ pub const POINTS: u32 = 8;
 pub const OWN_PARTS: u32 = 16;
 /// Where the number of the body is, in `Body::part`.
 pub const BODY_SHIFT: u32 = 5;
+/// Where marks of vertices begin in the rules about what is left out.
+pub const RULES_MARKS: u32 = 5;
+/// Marks vertices that never move, in these rules.
+pub const PINNED: u32 = 0x8000_0000;
 /// The root of a body without primitives, and the top if there is no tree over bodies.
 pub const NO_ROOT: u32 = u32::MAX;
 /// The least time by which some pair of a step certainly touches, the bits of an f32.

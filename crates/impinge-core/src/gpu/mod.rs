@@ -16,6 +16,7 @@ mod device;
 pub(crate) mod engine;
 mod kernels;
 pub mod layout;
+mod left_out;
 mod open;
 pub mod pass_buffers;
 mod passes;

@@ -4,14 +4,17 @@
 //! Buffers that were too small grow, and the pass runs again. If the device or the memory budget
 //! allows no more, the engine splits the pass instead.
 
+use std::sync::Arc;
+
 use super::buffers::{Slice, Storage, count};
 use super::layout::{
     Arguments, Candidate, Cell, CellItem, Counter, Grid, Kept, ListEntry, N_BOX_TESTS,
     N_BOX_TESTS_HIGH, N_CANDIDATES, N_COUNTERS, N_ENTRIES, N_ITEMS, N_KEPT, N_PAIRS, N_SUBDIVIDED,
-    N_TALLIES, N_UNSURE, NEVER, NodePair, PairKey, PairTimes, ROUNDS, Reach, Share, Start,
+    N_TALLIES, N_UNSURE, NEVER, NodePair, PairKey, PairTimes, ROUNDS, Reach, Rule, Share, Start,
     TOO_MUCH, TOUCHES_BY, Tally, UnsureKey, WorkItem, time_by,
 };
 use super::open::GpuContext;
+use crate::plan::LeftOut;
 use crate::query::goal::Goal;
 use crate::query::settings::Method;
 use crate::scene::error::Error;
@@ -169,6 +172,10 @@ pub struct PassBuffers {
     pub limits_of: Vec<LimitsOf>,
     /// Safe distances: how far each vertex may move.
     pub shares: Storage<Share>,
+    /// What the question leaves out, see `left_out`.
+    pub rules: Storage<Rule>,
+    /// Of which question these are.
+    pub rules_of: Option<RulesOf>,
     /// What stages counted, at the indices of `layout`.
     pub counters: Storage<Counter>,
     /// Workgroups of indirect launches: of each round, then of the stages after them.
@@ -215,6 +222,15 @@ impl CellsWanted {
     }
 }
 
+/// What the rules about what is left out belong to.
+#[derive(Debug)]
+pub struct RulesOf {
+    /// What is left out.
+    pub(super) left_out: Arc<LeftOut>,
+    /// The bodies in the order of the device, with the number of vertices of each.
+    pub(super) bodies: Vec<(BodyId, u64)>,
+}
+
 /// What the limits of a body's vertices, and their thickness, belong to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LimitsOf {
@@ -244,6 +260,8 @@ impl PassBuffers {
             thickness: Storage::plain("thickness"),
             limits_of: Vec::new(),
             shares: Storage::plain("safe distances"),
+            rules: Storage::plain("rules"),
+            rules_of: None,
             counters: Storage::plain("counters"),
             arguments: Storage::new("arguments", indirect),
             cell_items: Storage::plain("work items of cells"),
@@ -340,6 +358,7 @@ impl PassBuffers {
             + self.limits.bytes()
             + self.thickness.bytes()
             + self.shares.bytes()
+            + self.rules.bytes()
     }
 }
 

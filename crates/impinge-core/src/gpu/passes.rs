@@ -302,6 +302,7 @@ impl Engine {
         // Buffers that are replaced should be free.
         self.lane.recording = Recording::default();
         self.lane.pass_buffers.resize(&self.gpu, &capacities, cells);
+        let leaves_out = self.send_rules(plan)?;
         let mut recording = Recording::default();
         // The caller's step begins with nothing known.
         let sought = (!self.lane.is_encoded).then_some(self.sought);
@@ -320,6 +321,7 @@ impl Engine {
             view: self.world.view(self.lane.motion),
             motion: self.lane.motion,
             pass_buffers: &self.lane.pass_buffers,
+            leaves_out,
             recording,
         };
         let (lambda, group_size) = (self.settings.density, self.settings.group_size);

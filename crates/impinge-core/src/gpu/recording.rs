@@ -204,6 +204,8 @@ pub struct Recorder<'a> {
     pub motion: Motion,
     /// The buffers for results.
     pub pass_buffers: &'a PassBuffers,
+    /// Whether rules say which candidates are left out.
+    pub leaves_out: bool,
     /// What has been recorded so far.
     pub recording: Recording,
 }

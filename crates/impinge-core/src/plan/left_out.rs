@@ -1,6 +1,8 @@
 //! Pairs that are left out because of their vertices, or by name: rings, groups, lists of vertices,
 //! pinned vertices, pairs of an answer.
 
+#[cfg(feature = "gpu")]
+use std::collections::BTreeMap;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
@@ -175,7 +177,82 @@ impl LeftOut {
     }
 }
 
+/// What of it a device is told.
+#[cfg(feature = "gpu")]
+impl LeftOut {
+    /// Whether it is the same, of the same parts.
+    pub fn is(&self, other: &LeftOut) -> bool {
+        fn are_same<T: ?Sized>(a: Option<&Arc<T>>, b: Option<&Arc<T>>) -> bool {
+            a.map(Arc::as_ptr) == b.map(Arc::as_ptr)
+        }
+        let is_part = |(a, b): (&OfPart, &OfPart)| {
+            are_same(a.rings.as_ref(), b.rings.as_ref())
+                && are_same(a.groups.as_ref(), b.groups.as_ref())
+                && are_same(a.pinned.as_ref(), b.pinned.as_ref())
+        };
+        let is_list = |(a, b): (&VertexList, &VertexList)| {
+            a.bodies == b.bodies && Arc::ptr_eq(&a.lists, &b.lists)
+        };
+        let is_set = |(a, b): (&SortedKeys, &SortedKeys)| Arc::ptr_eq(a, b);
+        self.groups == other.groups
+            && self.parts.len() == other.parts.len()
+            && self.parts.iter().zip(&other.parts).all(is_part)
+            && self.vertices.len() == other.vertices.len()
+            && self.vertices.iter().zip(&other.vertices).all(is_list)
+            && self.pairs.len() == other.pairs.len()
+            && self.pairs.iter().zip(&other.pairs).all(is_set)
+    }
+
+    /// Pairs of groups that do not meet.
+    pub fn groups(&self) -> &BTreeSet<(u32, u32)> {
+        &self.groups
+    }
+
+    /// The groups of the vertices of a part's body, and which are pinned.
+    pub fn marks(&self, part: PartIx) -> (Option<&[u32]>, Option<&[bool]>) {
+        let of = &self.parts[part.index()];
+        (of.groups.as_deref(), of.pinned.as_deref())
+    }
+
+    /// The lists of vertices, of the vertices of the first body: rings are lists of a body with
+    /// itself.
+    pub fn lists<'a>(
+        &'a self,
+        plan: &'a Plan,
+    ) -> impl Iterator<Item = ([BodyId; 2], &'a VertexRings)> {
+        let bodies = plan.first_parts().into_iter();
+        let rings = bodies.filter_map(|(body, part)| {
+            let rings = self.parts[part.index()].rings.as_deref()?;
+            Some(([body; 2], rings))
+        });
+        rings.chain(self.vertices.iter().map(|of| (of.bodies, &*of.lists)))
+    }
+
+    /// The keys of pairs, of each kind and set.
+    pub fn keys(&self) -> impl Iterator<Item = &[u64]> {
+        self.pairs
+            .iter()
+            .flat_map(|set| set.iter().map(Vec::as_slice))
+    }
+}
+
 impl Plan {
+    /// What is left out because of its elements.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn left_out(&self) -> Option<&Arc<LeftOut>> {
+        self.left_out.as_ref()
+    }
+
+    /// The first part of each body that takes part.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn first_parts(&self) -> BTreeMap<BodyId, PartIx> {
+        let mut first = BTreeMap::new();
+        for (ix, part) in self.numbered_parts() {
+            first.entry(part.id).or_insert(ix);
+        }
+        first
+    }
+
     /// Resolves what the query and the scene leave out.
     pub(super) fn leave_out(&mut self, scene: &Scene, query: &Query) -> Result<(), Error> {
         if let Some(n) = query.rings

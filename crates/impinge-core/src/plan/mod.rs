@@ -42,6 +42,8 @@ use crate::scene::index::{ElementIx, Number, PartIx, pair_numbers};
 use crate::scene::{Body, Each, Filter, Scene};
 use crate::workers::clock::Instant;
 use impinge_exact::internal::Keep;
+#[cfg(feature = "gpu")]
+pub(crate) use left_out::LeftOut;
 pub(crate) use left_out::{Gaps, OwnRule};
 
 /// One part of one body that takes part in a frame.

@@ -13,7 +13,7 @@ use impinge_scenes::{Random, surfaces};
 
 /// A list as a shader of the caller's finds it: the numbers of its pairs, or none if its count is
 /// above its room.
-type Listed = Option<Vec<[u32; 2]>>;
+pub type Listed = Option<Vec<[u32; 2]>>;
 
 fn listed(caller: &Caller, list: &wgpu::Buffer, n: u32, room: u64) -> Listed {
     if u64::from(n) > room {
@@ -26,7 +26,7 @@ fn listed(caller: &Caller, list: &wgpu::Buffer, n: u32, room: u64) -> Listed {
 }
 
 /// Encodes a frame once: its pairs and its unsure pairs, and whether the host finds them complete.
-fn frame(
+pub fn frame(
     caller: &Caller,
     detector: &mut Detector,
     scene: &Scene,

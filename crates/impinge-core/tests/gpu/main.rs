@@ -8,6 +8,8 @@ mod caller;
 mod common;
 mod filters;
 #[cfg(feature = "gpu")]
+mod left_out;
+#[cfg(feature = "gpu")]
 mod liars;
 #[cfg(feature = "gpu")]
 mod lists;

@@ -13,7 +13,7 @@ use impinge_scenes::{Model, Random, soup, surfaces};
 use impinge_testing::data::test_file;
 
 /// The bounds of each body.
-type Safe = BTreeMap<BodyId, Vec<f32>>;
+pub type Safe = BTreeMap<BodyId, Vec<f32>>;
 
 /// Encodes safe distances, and reads them. Also returns whether there was room.
 fn encoded(
@@ -40,7 +40,7 @@ fn encoded(
 }
 
 /// Encodes them until there is room.
-fn safe_of(
+pub fn safe_of(
     caller: &Caller,
     detector: &mut Detector,
     scene: &Scene,
@@ -86,8 +86,19 @@ fn thickness_of(scene: &Scene, body: BodyId, corners: &[u32]) -> f64 {
 /// than they are apart, and how thick they are, and no bound is much smaller than it must be. Returns how many pairs
 /// touch, and how many vertices have a bound that is neither 0 nor `most`.
 fn check(name: &str, scene: &Scene, safe: &Safe, most: f64, fixed: &[BodyId]) -> [usize; 2] {
+    check_asked(name, scene, safe, (most, fixed), Query::all())
+}
+
+/// [`check`] of a query.
+pub fn check_asked(
+    name: &str,
+    scene: &Scene,
+    safe: &Safe,
+    (most, fixed): (f64, &[BodyId]),
+    query: Query,
+) -> [usize; 2] {
     let mut cpu = Detector::new(Backend::Cpu).expect("settings");
-    let near = cpu.near(scene, 2.0 * most, &Query::all().distances());
+    let near = cpu.near(scene, 2.0 * most, &query.distances());
     let near = near.expect("good");
     let mut least: BTreeMap<(BodyId, u32), f64> = BTreeMap::new();
     let mut width = 0.0f64;

@@ -95,7 +95,9 @@ fn main(
     var slot = 0u;
     if ix < n {
         let candidate = candidates[ix];
-        answer = decide(candidate);
+        if candidate.a != NOTHING {
+            answer = decide(candidate);
+        }
         if answer != NO {
             let a = number_at(candidate.a & ~FLAG);
             let b = number_at(candidate.b & ~FLAG);

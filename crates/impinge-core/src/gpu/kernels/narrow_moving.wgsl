@@ -31,7 +31,9 @@ fn main(
     var candidate = Candidate(0u, 0u);
     if ix < n {
         candidate = candidates[ix];
-        is_left = may_touch(candidate);
+        if candidate.a != NOTHING {
+            is_left = may_touch(candidate);
+        }
     }
     let slot = slot_in(N_PAIRS, is_left, lane);
     if is_left && slot < arrayLength(&pairs) {

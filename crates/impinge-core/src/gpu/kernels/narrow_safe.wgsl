@@ -186,8 +186,12 @@ fn main(
     let n = min(atomicLoad(&counters[N_CANDIDATES]), arrayLength(&candidates));
     var candidate = Candidate(0u, 0u);
     var polygon = Polygon();
+    var is_asked = false;
     if ix < n {
         candidate = candidates[ix];
+        is_asked = candidate.a != NOTHING;
+    }
+    if is_asked {
         polygon = load(candidate);
     }
     for (var k = 0u; k < 4u; k++) {
@@ -199,7 +203,7 @@ fn main(
         heights[lane * N_DIRECTIONS + k] = height(directions[lane * N_DIRECTIONS + k], &polygon);
     }
     workgroupBarrier();
-    if ix >= n {
+    if !is_asked {
         return;
     }
     var distance = 0.0;

@@ -217,4 +217,18 @@ const N_TALLIES: u32 = 37u;
 
 const NO_ROOT: u32 = 0xffffffffu;
 
+// A candidate that the question leaves out.
+const NOTHING: u32 = 0xffffffffu;
+
+// Words of the rules about what is left out: the number of groups, where their rows begin, where the lists of vertices begin (0: there
+// are none), where pairs begin, how many; then a mark per vertex.
+const RULES_N_GROUPS: u32 = 0u;
+const RULES_GROUPS: u32 = 1u;
+const RULES_LISTS: u32 = 2u;
+const RULES_PAIRS: u32 = 3u;
+const RULES_N_PAIRS: u32 = 4u;
+const RULES_MARKS: u32 = 5u;
+// Marks vertices that never move.
+const PINNED: u32 = 0x80000000u;
+
 const FLAG: u32 = 0x80000000u;

@@ -1,0 +1,181 @@
+//! What a question leaves out because of its elements is left out on the device, too: pinned
+//! vertices, groups, rings, lists of vertices, pairs of a rest pose.
+//!
+//! These tests fail where no adapter is found; a software driver is enough.
+
+use std::collections::BTreeSet;
+
+use crate::caller::Caller;
+use crate::lists::frame;
+use crate::resident_steps::{assert_between, listed};
+use crate::safe::{check_asked, safe_of};
+
+use impinge_core::{Backend, BodyId, Detector, Exclusion, Query, Scene, Settings};
+use impinge_scenes::{Random, solids, surfaces};
+
+/// Two balls that run into each other, one of them folded so that it meets itself, and a solid of
+/// tetrahedra; some vertices are pinned, all are in groups.
+fn scene() -> (Scene, Vec<BodyId>) {
+    let ball = surfaces::ball(300);
+    let folded = ball.mapped(|[x, y, z]| [x.abs() - 0.02 * x, y, z]);
+    let solid = solids::block(3, 3, 3, 0.3).mapped(|[x, y, z]| [x - 0.2, y, z]);
+    let mut scene = Scene::new();
+    let mut bodies = Vec::new();
+    for model in [&ball.translated([0.9, 0.0, 0.1]), &folded, &solid] {
+        let body = model.add_to(&mut scene).expect("good");
+        let end = model.mapped(|[x, y, z]| [0.3 * x, y + 0.1 * z, 0.2 * y - 0.5 * z]);
+        scene.set_end_positions(body, &end.positions).expect("good");
+        let sides = model.positions.iter();
+        let side = |[x, y, _]: &[f32; 3]| 7 + u32::from(*x > 0.1) + 2 * u32::from(*y > 0.0);
+        let groups: Vec<u32> = sides.map(side).collect();
+        scene.set_groups(body, &groups).expect("good");
+        bodies.push(body);
+    }
+    (scene, bodies)
+}
+
+/// Lists of vertices of one body, for each vertex of another.
+fn lists(random: &mut Random, scene: &Scene, a: BodyId, b: BodyId) -> Exclusion {
+    let [of_a, of_b] = [a, b].map(|body| scene.body(body).expect("held").n_vertices() as u32);
+    let (mut offsets, mut vertices) = (vec![0], Vec::new());
+    for _ in 0..of_a {
+        vertices.extend((0..random.below(9)).map(|_| random.below(of_b)));
+        offsets.push(vertices.len() as u64);
+    }
+    Exclusion::vertices(a, b, offsets, vertices)
+}
+
+/// Queries that leave out pairs of elements, each with whether it may be asked about intersections.
+fn queries(
+    random: &mut Random,
+    scene: &Scene,
+    bodies: &[BodyId],
+) -> Vec<(&'static str, Query, bool)> {
+    let all = Query::all;
+    let groups = all()
+        .exclude(Exclusion::groups(7, 8))
+        .exclude(Exclusion::groups(8, 8))
+        .exclude(Exclusion::groups(9, 7));
+    let mut cpu = Detector::new(Backend::Cpu).expect("settings");
+    let near = cpu.near(scene, 0.01, &all()).expect("good");
+    let between = lists(random, scene, bodies[1], bodies[0]);
+    let own = lists(random, scene, bodies[1], bodies[1]);
+    let everything = groups
+        .clone()
+        .exclude(Exclusion::rings(2))
+        .exclude(between.clone())
+        .exclude(own.clone());
+    vec![
+        ("groups", groups, true),
+        ("rings", all().exclude(Exclusion::rings(0)), true),
+        ("more rings", all().exclude(Exclusion::rings(3)), true),
+        ("lists", all().exclude(between).exclude(own), true),
+        ("pairs at rest", all().exclude(&near), false),
+        ("everything", everything.clone(), true),
+        ("everything by name", everything.exclude(&near), false),
+    ]
+}
+
+#[test]
+fn steps_and_safe_distances_on_the_device_leave_out_what_the_question_does() {
+    let caller = Caller::new();
+    let mut detector = caller.detector(Settings::default());
+    let mut cpu = Detector::new(Backend::Cpu).expect("settings");
+    let mut random = Random::new(91);
+    let (mut scene, bodies) = scene();
+    let mut n_some = 0;
+    for is_pinned in [false, true] {
+        if is_pinned {
+            for &body in &bodies {
+                let n = scene.body(body).expect("held").n_vertices();
+                let pinned: Vec<bool> = (0..n).map(|_| random.below(4) > 0).collect();
+                scene.set_pinned(body, &pinned).expect("good");
+            }
+        }
+        let mut asked = queries(&mut random, &scene, &bodies);
+        if is_pinned {
+            asked.push(("pins alone", Query::all(), true));
+        }
+        let whole = cpu.impacts(&scene, &Query::all()).expect("good").len();
+        for (name, query, _) in asked {
+            let name = &format!("{name}, pinned {is_pinned}");
+            let (found, pairs, _) = listed(&caller, &mut detector, &scene, &query, [&[], &[]]);
+            let n = assert_between(name, &found, &pairs, &scene, &query, &query);
+            assert!(n <= whole, "{name}: {n} of {whole}");
+            n_some += usize::from(0 < n && n < whole);
+            // The host hands over what the device has found, and left out.
+            let by_device = detector.impacts(&scene, &query).expect("good").clone();
+            assert_ne!(by_device.stats().backend, "cpu", "{name}");
+            assert_eq!(by_device.stats().n_unsure, pairs.len() as u64, "{name}");
+            let by_host = cpu.impacts(&scene, &query).expect("good");
+            assert_eq!(
+                (by_device.len(), by_device.hash()),
+                (by_host.len(), by_host.hash()),
+                "{name}"
+            );
+            let first = cpu.earliest(&scene, &query).expect("good");
+            assert_eq!(
+                detector.earliest(&scene, &query).expect("good"),
+                first,
+                "{name}"
+            );
+
+            let safe = safe_of(&caller, &mut detector, &scene, 0.1, &query, &[]);
+            let [_, n_bounded] = check_asked(name, &scene, &safe, (0.1, &[]), query.clone());
+            assert!(n_bounded > 0, "{name}");
+        }
+    }
+    assert!(n_some >= 12, "{n_some}");
+}
+
+#[test]
+fn frames_on_the_device_leave_out_what_the_question_does() {
+    let caller = Caller::new();
+    let mut random = Random::new(92);
+    let (mut scene, bodies) = scene();
+    let pinned = vec![true; scene.body(bodies[0]).expect("held").n_vertices()];
+    scene.set_pinned(bodies[0], &pinned).expect("good");
+    for method in [impinge_core::Method::Auto, impinge_core::Method::Cells] {
+        let mut detector = caller.detector(Settings::default().method(method));
+        let mut cpu = Detector::new(Backend::Cpu).expect("settings");
+        for (name, query, has_intersections) in queries(&mut random, &scene, &bodies) {
+            if !has_intersections {
+                continue;
+            }
+            let ([certain, unsure], _) = loop {
+                let (lists, is_complete) = frame(&caller, &mut detector, &scene, &query);
+                if is_complete {
+                    break (
+                        lists.map(|list| BTreeSet::from_iter(list.expect("complete"))),
+                        (),
+                    );
+                }
+            };
+            // Numbers of primitives, body after body.
+            let mut first = 0;
+            let firsts: Vec<u32> = scene
+                .bodies()
+                .map(|(_, body)| {
+                    let own = first;
+                    first += body.elements().len() as u32;
+                    own
+                })
+                .collect();
+            let mut numbers = |query: &Query| -> BTreeSet<[u32; 2]> {
+                let pairs = cpu.detect(&scene, query).expect("good");
+                let rows = pairs.rows();
+                rows.map(|[a, i, b, j]| [firsts[a as usize] + i, firsts[b as usize] + j])
+                    .collect()
+            };
+            let (held, all) = (numbers(&query), numbers(&Query::all()));
+            assert!(!held.is_empty() && held.len() < all.len(), "{name}");
+            assert!(certain.is_subset(&held), "{name}");
+            let listed: BTreeSet<[u32; 2]> = certain.union(&unsure).copied().collect();
+            assert!(held.is_subset(&listed), "{name}");
+            assert!(
+                all.difference(&held).all(|pair| !listed.contains(pair)),
+                "{name}"
+            );
+        }
+    }
+}
