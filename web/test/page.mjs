@@ -616,8 +616,17 @@ async function phone(browser) {
   const room = await fits(page, "play", "time", "files", "scene", "size", "self", "share", "answer");
   assert.ok(room > 350, `${room} pixels for the bodies`);
   await page.screenshot({ path: join(shots, "phone.png") });
+  // Taps right at the edges of a closed panel open it.
   for (const [ix, ids] of [["bodies"], ["place-list"], ["method", "use-gpu"]].entries()) {
+    const panel = () => page.locator("#side details").nth(ix).boundingBox();
+    const { x, y, width } = await panel();
+    const { height } = await page.locator("#side summary").nth(ix).boundingBox();
+    assert.ok(height >= 24, `summary ${ix} is ${height} high`);
+    await page.touchscreen.tap(x + width / 2, y + 3);
+    await fits(page, "play", "files", "share", ...ids);
     await page.locator("#side summary").nth(ix).tap();
+    const closed = await panel();
+    await page.touchscreen.tap(closed.x + 4, closed.y + closed.height - 3);
     await fits(page, "play", "files", "share", ...ids);
     await page.locator("#side summary").nth(ix).tap();
   }
@@ -676,16 +685,26 @@ async function phone(browser) {
   await page.context().close();
 }
 
+// The controls are not wider than their panel.
+async function isWithin(page, panel, ...ids) {
+  const beyond = await page.evaluate(([panel, ids]) => {
+    const [{ left, right }, ...own] = [panel, ...ids].map((id) => document.getElementById(id).getBoundingClientRect());
+    return ids.filter((_, ix) => own[ix].left < left || own[ix].right > right);
+  }, [panel, ids]);
+  assert.deepEqual(beyond, [], `wider than #${panel}`);
+}
+
 // A phone on its side: the picture is free, and every control is reached, if need be by scrolling.
 async function onItsSide(browser) {
-  for (const viewport of [{ width: 844, height: 390 }, { width: 667, height: 375 }]) {
+  for (const viewport of [{ width: 844, height: 390 }, { width: 667, height: 375 }, { width: 568, height: 320 }]) {
     const { page, problems } = await open(browser, { ...PHONE, viewport });
     await page.locator("#play").tap();
     await pauseAt(page, 1);
+    await isWithin(page, "controls", "play", "time", "time-text");
     await page.screenshot({ path: join(shots, `phone-on-its-side-${viewport.width}.png`) });
     // What is left of the panels has the bodies, and nothing lies over it.
     const left = await page.evaluate(() => Math.min(...[...document.querySelectorAll("#answer, #bottom")].map((panel) => panel.getBoundingClientRect().left)));
-    assert.ok(left > 0.55 * viewport.width, `${left} pixels for the bodies`);
+    assert.ok(left > 0.53 * viewport.width, `${left} pixels for the bodies`);
     const covered = await page.evaluate((left) => {
       const at = [];
       for (let x = 8; x < left - 8; x += 20) for (let y = 8; y < innerHeight - 8; y += 20) at.push(document.elementFromPoint(x, y).id);
@@ -716,6 +735,7 @@ async function onItsSide(browser) {
     await drop(page, "bend.obj", "bend.pc2");
     await pauseAt(page, 2);
     assert.ok((await reach()).includes("step-show"));
+    await isWithin(page, "controls", "play", "previous", "time", "next", "time-text");
     assert.deepEqual(problems, []);
     await page.context().close();
   }
