@@ -5,7 +5,7 @@ import { Closest, Hits, Neighbours, SafeDistances, Truncation, integers, places,
 import { RestPairs, packed, plain, whole, withPoints } from "./query.js";
 import {
   MOVES, TAKE_STEP, body, call, disposable, isList, isSingle, kindOf, list, meshOf, mustBeNone, number, numbers, options,
-  refuse, wide, word,
+  refuse, shown, wide, word,
 } from "./shared.js";
 
 const PARTS = ["vertices", "edges", "faces"];
@@ -141,7 +141,7 @@ function columns(matrix) {
 function bitsOf(name, given) {
   const bits = typeof given === "bigint" ? given : Number.isInteger(given) ? BigInt(given) : null;
   if (bits !== null && bits >= -(2n ** 63n) && bits < 2n ** 64n) return BigInt.asUintN(64, bits);
-  return refuse(`${name}: ${String(given)} given, a whole number of 64 bits is needed`);
+  return refuse(`${name}: ${shown(given)} given, a whole number of 64 bits is needed`);
 }
 
 // The query that found pairs, with its length, then numbers, then the rows of the pairs.
@@ -316,7 +316,7 @@ export function makeScene({ SceneHandle }, mustBeReady) {
     }
 
     setPinned(which, pinned) {
-      const flags = list("pinned", pinned).map((of) => (/^(boolean|number)$/.test(typeof of) ? Number(Boolean(of)) : refuse(`pinned: ${String(of)} given, true or false is needed`)));
+      const flags = list("pinned", pinned).map((of) => (/^(boolean|number)$/.test(typeof of) ? Number(Boolean(of)) : refuse(`pinned: ${shown(of)} given, true or false is needed`)));
       call(() => this.#held.set_pinned(body(which), Uint8Array.from(flags)));
     }
 

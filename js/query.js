@@ -1,6 +1,6 @@
 // Questions as the lists of numbers that the module takes, and what watches them.
 
-import { ImpingeError, body, disposable, kindOf, list, mustBeNone, number, options, refuse, word } from "./shared.js";
+import { ImpingeError, body, disposable, kindOf, list, mustBeNone, number, options, refuse, shown, word } from "./shared.js";
 
 export const KINDS = ["vf", "ee", "ev", "vv", "ef", "ff"];
 
@@ -89,14 +89,14 @@ function excluded(given) {
   mustBeNone("exclude", others, ["rings", "groups"]);
   if (rings === undefined && groups === undefined) refuse("exclude: an empty object given, rings or groups are needed");
   if (groups === undefined) return [1, whole("rings", rings, 0, 16), 0];
-  if (rings !== undefined || groups?.length !== 2) refuse(`groups: ${String(groups)} given, two groups are needed, without rings`);
+  if (rings !== undefined || groups?.length !== 2) refuse(`groups: ${shown(groups)} given, two groups are needed, without rings`);
   return [2, ...Array.from(groups, (group) => whole("groups", group, 0, 2 ** 32 - 1))];
 }
 
 // A whole number in a range.
 export function whole(name, given, least, most) {
   if (Number.isInteger(given) && given >= least && given <= most) return given;
-  return refuse(`${name}: ${String(given)} given, ${least} to ${most} allowed`);
+  return refuse(`${name}: ${shown(given)} given, ${least} to ${most} allowed`);
 }
 
 // The numbers of a question, followed by those of points.
@@ -134,7 +134,7 @@ function apart([a, b]) {
 }
 
 function two(name, given) {
-  if (given?.length !== 2) refuse(`${name}: ${String(given)} given, two bodies are needed`);
+  if (given?.length !== 2) refuse(`${name}: ${shown(given)} given, two bodies are needed`);
   return Array.from(given, body);
 }
 

@@ -89,6 +89,12 @@ async function source(given, beside) {
   return readFile(url ?? wanted);
 }
 
+// What was given, as it is written in a program.
+export function shown(given) {
+  if (typeof given === "string") return `"${given}"`;
+  return typeof given === "bigint" ? `${given}n` : String(given);
+}
+
 // What was given, in a word or two.
 export function kindOf(given) {
   if (/^(function|string|symbol)$/.test(typeof given)) return `a ${typeof given}`;
@@ -144,12 +150,12 @@ export function isSingle(positions) {
 // The number of a body. The module would cut it to 32 bits without an error.
 export function body(given) {
   if (Number.isInteger(given) && given >= 0 && given < 2 ** 32) return given;
-  return refuse(`body: ${String(given)} given, a number that a scene returned is needed`);
+  return refuse(`body: ${shown(given)} given, a number that a scene returned is needed`);
 }
 
 export function number(name, given) {
   if (typeof given === "number") return given;
-  return refuse(`${name}: ${String(given)} given, a number is needed`);
+  return refuse(`${name}: ${shown(given)} given, a number is needed`);
 }
 
 const listed = (words) => (words.length === 1 ? words[0] : `${words.slice(0, -1).join(", ")} or ${words.at(-1)}`);

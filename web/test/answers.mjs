@@ -125,6 +125,7 @@ export async function refusals(module) {
   said.thickness = await refusal(() => scene.setThickness(a, -1));
   said.unknown = await ask("detect", { selfOf: 4 });
   said.wrong = await ask("detect", { between: [a, "b"] });
+  said.few = await ask("detect", { between: "b" });
   said.two = await ask("detect", { between: [a] });
   said.self = await ask("detect", { between: [a, a] });
   said.method = await refusal(() => new Detector({ method: "octree" }));
@@ -287,7 +288,8 @@ export const REFUSALS = {
   matrix: "invalid: transform: 3 numbers given, 16 numbers allowed, column by column, as elements of a Matrix4",
   thickness: "invalid: thickness: -1 given, a finite number that is not below 0 allowed",
   unknown: "invalid: there is no body 4: 1 have been added, and 0 of them removed",
-  wrong: "invalid: body: b given, a number that a scene returned is needed",
+  wrong: 'invalid: body: "b" given, a number that a scene returned is needed',
+  few: 'invalid: between: "b" given, two bodies are needed',
   two: "invalid: between: 0 given, two bodies are needed",
   self: "invalid: between: body 0 given twice, selfOf: 0 asks for its self-collision",
   method: 'invalid: method: "octree" given, "auto", "clusters", "cells" or "naive" allowed',
@@ -299,8 +301,8 @@ export const REFUSALS = {
   ring: 'invalid: exclude: "ring" given, rings or groups allowed',
   rings: "invalid: exclude: an Object given, an array is needed",
   matrix4: "invalid: transform: an Object given, 16 numbers allowed, column by column, as elements of a Matrix4",
-  filter: "invalid: category: 18446744073709551616 given, a whole number of 64 bits is needed",
-  pinned: "invalid: pinned: no given, true or false is needed",
+  filter: "invalid: category: 18446744073709551616n given, a whole number of 64 bits is needed",
+  pinned: 'invalid: pinned: "no" given, true or false is needed',
   nothing: "invalid: mesh: undefined given, an object with positions is needed",
   forgotten: "invalid: faces: undefined given; a geometry without an index has the faces 0, 1, 2, 3, …, and points have no faces",
   welded: "invalid: faces: undefined given; a geometry without an index has the faces 0, 1, 2, 3, …, and points have no faces",
@@ -314,7 +316,7 @@ export const REFUSALS = {
   which: 'invalid: which: "none" given, "all", "between" or "self" allowed',
   both: 'invalid: query: "which" and "of" given, one of them allowed',
   separation: "invalid: separation: NaN given, a finite number that is not below 0 allowed",
-  text: "invalid: distance: 1 given, a number is needed",
+  text: 'invalid: distance: "1" given, a number is needed',
   inflation: "invalid: inflation: -1 given, a finite number that is not below 0 allowed",
   control: 'invalid: control: "start" given, signal or progress allowed',
   scene: "invalid: scene: a Scene of the same module is needed",
@@ -335,9 +337,9 @@ export const REFUSALS = {
   signal: "invalid: signal: an AbortSignal is needed",
   closest: "invalid: query: pairs of two bodies, or self-collision given, all bodies, or one by `of` allowed",
   text16: "invalid: transform: a string given, 16 numbers allowed, column by column, as elements of a Matrix4",
-  texts: "invalid: transform: 1 given, a number is needed",
-  big: "invalid: transform: 0 given, a number is needed",
-  thick: "invalid: thickness: 1 given, a number is needed",
+  texts: 'invalid: transform: "1" given, a number is needed',
+  big: "invalid: transform: 0n given, a number is needed",
+  thick: 'invalid: thickness: "1" given, a number is needed',
   away: ["thickness", "positions", "transform", "pinned", "positions", "positions"].map((name) => `invalid: ${name}: a Float32Array given whose memory was given away`),
   held: Array(4).fill("true, invalid"),
   near: "cancelled: cancelled",
