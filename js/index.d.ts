@@ -3,7 +3,10 @@
 /** Any typed array: what `array` of an attribute of three.js is declared as. Those that are not taken are refused by name. */
 export type TypedArray = ArrayBufferView & ArrayLike<number>;
 
-/** Vertex numbers, two per edge, three per triangle, four per tetrahedron: a `Uint32Array`, a `Uint16Array` or a `Uint8Array`. */
+/**
+ * Vertex numbers, two per edge, three per triangle, four per tetrahedron: a `Uint32Array`, a `Uint16Array` or a `Uint8Array`. Typed arrays may
+ * be those of another window.
+ */
 export type Index = TypedArray;
 
 /** x, y, z per vertex, in the unit of the scene, read as the real numbers that they are. */

@@ -108,6 +108,10 @@ export function options(name, given) {
   return refuse(`${name}: ${kindOf(given)} given, an object is needed`);
 }
 
+// "Float32Array" of an array of that type, of another window's as well; undefined of what is no typed array.
+const { get: tag } = Object.getOwnPropertyDescriptor(Object.getPrototypeOf(Uint8Array.prototype), Symbol.toStringTag);
+export const typeOf = (given) => tag.call(given);
+
 // The list that was given.
 export function list(name, given) {
   if (isList(given)) return Array.from(attached(name, given));
@@ -120,7 +124,7 @@ export function isList(given) {
 
 // The numbers of a list.
 export function numbers(name, given) {
-  if (given instanceof Float64Array || given instanceof Float32Array) return Float64Array.from(attached(name, given));
+  if (/^Float(32|64)Array$/.test(typeOf(given))) return Float64Array.from(attached(name, given));
   return Float64Array.from(list(name, given), (x) => number(name, x));
 }
 
@@ -137,13 +141,15 @@ function attached(name, given) {
 
 // Vertex numbers with 32 bits. three.js uses 16 bits if they suffice.
 export function wide(index, name = "index") {
-  if (index instanceof Uint32Array) return attached(name, index);
-  if (index instanceof Uint16Array || index instanceof Uint8Array) return Uint32Array.from(attached(name, index));
+  const type = typeOf(index);
+  if (type === "Uint32Array") return attached(name, index);
+  if (type === "Uint16Array" || type === "Uint8Array") return Uint32Array.from(attached(name, index));
   return refuse(`${name}: ${kindOf(index)} given, a Uint32Array, a Uint16Array or a Uint8Array is needed`);
 }
 
 export function isSingle(positions) {
-  if (positions instanceof Float32Array || positions instanceof Float64Array) return attached("positions", positions) instanceof Float32Array;
+  const type = typeOf(positions);
+  if (type === "Float32Array" || type === "Float64Array") return attached("positions", positions) && type === "Float32Array";
   return refuse(`positions: ${kindOf(positions)} given, a Float32Array or a Float64Array is needed`);
 }
 

@@ -4,7 +4,7 @@ import load, * as module from "./gpu/impinge.js";
 import { Pairs, statsOf } from "./answers.js";
 import { answering, ask, makeScene, settings } from "./classes.js";
 import { watch } from "./query.js";
-import { ImpingeError, call, disposable, kindOf, loader, mustBeNone, named, options, refuse, welder } from "./shared.js";
+import { ImpingeError, call, disposable, kindOf, loader, mustBeNone, named, options, refuse, typeOf, welder } from "./shared.js";
 
 export { KINDS, SHAPES } from "./answers.js";
 export { ImpingeError } from "./shared.js";
@@ -101,7 +101,7 @@ async function detect(handle, scene, { words, numbers, watch, moves }) {
 }
 
 function checkBytes(bytes) {
-  if (!(bytes instanceof Uint8Array)) refuse(`bytes: ${kindOf(bytes)} given, a Uint8Array is needed`);
+  if (typeOf(bytes) !== "Uint8Array") refuse(`bytes: ${kindOf(bytes)} given, a Uint8Array is needed`);
 }
 
 function readers(name, bytes, given, inBodies) {

@@ -101,6 +101,13 @@ async function refusal(call) {
   return "nothing was refused";
 }
 
+// What another window has, in Node another context.
+async function otherWindow() {
+  if (globalThis.document) return document.body.appendChild(document.createElement("iframe")).contentWindow;
+  const { runInNewContext } = await import("node:vm");
+  return runInNewContext("globalThis");
+}
+
 const TRIANGLE = [0, 0, 0, 1, 0, 0, 0, 1, 0];
 
 // Calls that must be refused, and what they say.
@@ -445,7 +452,7 @@ export const STEPS = {
 // A strand and points above a triangle, and two tetrahedra as closed surfaces of which one's tip is in the other. The scene is that of
 // either module, and so is the detector: each answer is awaited.
 export async function others(module) {
-  const { default: init, Detector, Scene } = await import(module);
+  const { default: init, Detector, Scene, weld } = await import(module);
   await init();
   const detector = Detector.open ? await Detector.open() : new Detector();
   let scene = new Scene();
@@ -686,7 +693,19 @@ export async function others(module) {
   const aborted = await refusal(() => detector.impacts(scene, { signal: controller.signal, progress: () => controller.abort() }));
   const thrown = await refusal(() => detector.impacts(scene, { progress: () => { throw new Error("mine"); } }));
   const { backend, totalMs } = contacts.stats;
+  // Arrays of another window.
+  const { Float32Array: F32, Float64Array: F64, Int32Array: I32, Uint8Array: U8, Uint16Array: U16, Uint32Array: U32 } = await otherWindow();
+  const foreign = new Scene();
+  for (const index of [new U8([0, 1, 2]), new U16([0, 1, 2]), new U32([0, 1, 2])]) foreign.add({ faces: index, positions: new F32(TRIANGLE) });
+  foreign.addPoints(new F64([0, 0, 0]));
+  foreign.setTransform(1, new F32([1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 9, 1]));
+  const window = [
+    index instanceof U8, (await detector.detect(foreign)).length, foreign.bodies.map((body) => foreign.positions(body).constructor.name),
+    (await detector.closest(foreign, new F64([0, 0, 1]))).at(0).distance, weld({ positions: new F32(6), edges: new U16([0, 1]) }).mesh.positions.length,
+    await refusal(() => foreign.addPoints(new I32(3))), await refusal(() => foreign.addTriangles(new I32([0, 1, 2]), new F32(TRIANGLE))),
+  ];
   return {
+    window,
     near: [near.length, pair.kind, pair.bodyA, pair.elementA, pair.bodyB, pair.distance, pair.points, pair.features],
     columns: [near.distances.length, near.points.length / 6, near.kinds.length, near.of("ee").length, near.of("vf").at(-1).distance],
     noColumns: [thick.length, thick.distances, thick.points],
@@ -718,6 +737,11 @@ export async function others(module) {
 }
 
 export const OTHERS = {
+  window: [
+    false, 3, ["Float32Array", "Float32Array", "Float32Array", "Float64Array"], 1, 3,
+    "invalid: positions: an Int32Array given, a Float32Array or a Float64Array is needed",
+    "invalid: index: an Int32Array given, a Uint32Array, a Uint16Array or a Uint8Array is needed",
+  ],
   near: [1, "vf", 1, 0, 0, 1, [[0.25, 0.25, 1], [0.25, 0.25, 0]], [0, 16]],
   columns: [1, 1, 1, 0, 1],
   noColumns: [1, null, null],
@@ -846,7 +870,8 @@ if (globalThis.process?.argv?.[1]?.endsWith("answers.mjs")) {
   const view = new DataView(mdd.buffer);
   for (const [at, n] of [[0, 2], [4, 1]]) view.setInt32(at, n);
   for (const [ix, x] of [1, 2, 3, 4, 5, 6].entries()) view.setFloat32(16 + 4 * ix, x);
-  const frames = readFrames("run.mdd", mdd).map((frame) => [...frame]);
+  const { Uint8Array: Bytes } = await otherWindow();
+  const frames = readFrames("run.mdd", new Bytes(mdd)).map((frame) => [...frame]);
   const noGpu = await refusal(() => Detector.open());
   const broken = await refusal(() => read("a.txt", new Uint8Array()));
   const buffers = await Promise.all([read, readFrames].map((read) => refusal(() => read("a.pc2", new ArrayBuffer(8)))));
