@@ -698,7 +698,7 @@ export interface Penetration {
  */
 export declare class Detector {
   constructor(settings?: Settings);
-  /** Of the last question that was answered; before the first, and after a first one that failed, all is 0. */
+  /** Of the last question that was answered, also after `dispose`; before the first, and after a first one that failed, all is 0. */
   readonly stats: Stats;
   /** All pairs of elements that intersect. */
   detect(scene: Scene, query?: Query): Pairs;
@@ -774,7 +774,7 @@ export declare class Detector {
    * pairs of these were found, and contacts of a query that left out pairs of the two: in a cell, by groups, or pinned in both.
    */
   penetration(scene: Scene, contacts: Contacts, a: Body, b: Body, control?: Control): Penetration;
-  /** Frees the memory. Refused while it answers a question. */
+  /** Frees the memory. Refused while it answers a question. Called again, it does nothing. */
   dispose(): void;
   [Symbol.dispose](): void;
 }

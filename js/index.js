@@ -42,7 +42,6 @@ export class Detector {
   }
 
   get stats() {
-    void this.#held;
     return this.#stats;
   }
 

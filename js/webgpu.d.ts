@@ -15,7 +15,7 @@ export declare class Detector {
   private constructor();
   /** Opens the device. Rejected with the code `"device"` if the browser offers none. */
   static open(settings?: Settings): Promise<Detector>;
-  /** Of the last question that was answered; `null` before the first. */
+  /** Of the last question that was answered, also after `dispose`; `null` before the first. */
   readonly stats: Stats | null;
   detect(scene: Scene, query?: Query): Promise<Pairs>;
   count(scene: Scene, query?: Query): Promise<number>;
@@ -41,7 +41,7 @@ export declare class Detector {
   distance(scene: Scene, a: Body, b: Body, control?: Control): Promise<Nearest | null>;
   contacts(scene: Scene, pairs: Pairs, control?: Control): Promise<Contacts>;
   penetration(scene: Scene, contacts: Contacts, a: Body, b: Body, control?: Control): Promise<Penetration>;
-  /** Frees the memory once all earlier questions are answered. */
+  /** Frees the memory once all earlier questions are answered. Called again, it does nothing. */
   dispose(): Promise<void>;
   [Symbol.dispose](): void;
 }

@@ -53,7 +53,7 @@ export class Detector {
   }
 
   #turn(work) {
-    const turn = this.#last.then(() => work(this.#handle ?? refuse("this detector has been disposed of")));
+    const turn = this.#last.then(() => work(this.#handle));
     this.#last = turn.catch(() => undefined);
     return turn;
   }
@@ -65,6 +65,7 @@ export class Detector {
     const about = asked();
     const now = call(() => held.snapshot());
     return this.#turn(async (handle) => {
+      if (handle === null) refuse("this detector has been disposed of");
       if (take) {
         const pairs = await detect(handle, now, about);
         this.#stats = pairs.stats;
@@ -86,7 +87,7 @@ export class Detector {
 
   dispose() {
     return this.#turn((handle) => {
-      handle.free();
+      handle?.free();
       this.#handle = null;
     });
   }

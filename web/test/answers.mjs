@@ -704,8 +704,13 @@ export async function others(module) {
     (await detector.closest(foreign, new F64([0, 0, 1]))).at(0).distance, weld({ positions: new F32(6), edges: new U16([0, 1]) }).mesh.positions.length,
     await refusal(() => foreign.addPoints(new I32(3))), await refusal(() => foreign.addTriangles(new I32([0, 1, 2]), new F32(TRIANGLE))),
   ];
+  // Disposed of twice.
+  const { stats: last } = detector;
+  await detector.dispose();
+  const disposed = [await refusal(() => detector.dispose()), detector.stats === last, await refusal(() => detector.count(foreign))];
   return {
     window,
+    disposed,
     near: [near.length, pair.kind, pair.bodyA, pair.elementA, pair.bodyB, pair.distance, pair.points, pair.features],
     columns: [near.distances.length, near.points.length / 6, near.kinds.length, near.of("ee").length, near.of("vf").at(-1).distance],
     noColumns: [thick.length, thick.distances, thick.points],
@@ -742,6 +747,7 @@ export const OTHERS = {
     "invalid: positions: an Int32Array given, a Float32Array or a Float64Array is needed",
     "invalid: index: an Int32Array given, a Uint32Array, a Uint16Array or a Uint8Array is needed",
   ],
+  disposed: ["nothing was refused", true, "invalid: this detector has been disposed of"],
   near: [1, "vf", 1, 0, 0, 1, [[0.25, 0.25, 1], [0.25, 0.25, 0]], [0, 16]],
   columns: [1, 1, 1, 0, 1],
   noColumns: [1, null, null],
