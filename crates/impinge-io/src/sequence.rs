@@ -119,6 +119,8 @@ enum Source {
 /// The content of a point cache's header.
 struct Header {
     n_points: u64,
+    /// Where the number of points is.
+    points_at: u64,
     n_frames: u64,
     start: u64,
     endian: Endian,
@@ -139,7 +141,7 @@ impl Sequence {
     ///
     /// # Errors
     /// As [`read`](crate::read); [`Error::Truncated`] if a cache is shorter than its header says,
-    /// [`Error::Count`] if it is longer.
+    /// [`Error::Count`] if it is longer, [`Error::Syntax`] if its frames have no points.
     pub fn open(path: &Path) -> Result<Self, Error> {
         let extension = path.extension().unwrap_or_default().to_string_lossy();
         match SequenceFormat::from_extension(&extension) {
@@ -411,6 +413,7 @@ impl Header {
                 cursor.take(2, 4, "start and rate")?;
                 Header {
                     n_points,
+                    points_at: 16,
                     n_frames: cursor.count(Scalar::I32, "the number of frames")?,
                     start: 32,
                     endian,
@@ -421,6 +424,7 @@ impl Header {
                 let n_points = cursor.count(Scalar::I32, "the number of points")?;
                 Header {
                     n_points,
+                    points_at: 4,
                     n_frames,
                     start: 8 + 4 * n_frames,
                     endian,
@@ -444,6 +448,11 @@ impl Header {
                 header.n_frames, header.n_points
             );
             return Err(name.count(Place::File, what, needed, length));
+        }
+        // Such frames take no bytes, so the length of the file would not limit their number.
+        if header.n_points == 0 && header.n_frames > 0 {
+            let expected = format!("points in {} frames, at least 1", header.n_frames);
+            return Err(name.syntax(Place::Byte(header.points_at), expected, "0"));
         }
         Ok(header)
     }

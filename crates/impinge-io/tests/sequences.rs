@@ -244,3 +244,28 @@ fn a_cache_with_more_than_its_header_says_is_refused() {
         assert_eq!(error.to_string(), expected);
     }
 }
+
+/// Frames without points take no bytes: a small file could have 2^31 of them.
+#[test]
+fn frames_without_points_are_refused() {
+    use SequenceFormat::{Mdd, Pc2};
+    for (format, bytes, expected) in [
+        (
+            Pc2,
+            pc2(0, i32::MAX, &[]),
+            "cache: byte 16: expected points in 2147483647 frames, at least 1, found 0",
+        ),
+        (
+            Mdd,
+            mdd(0, 3, &[]),
+            "cache: byte 4: expected points in 3 frames, at least 1, found 0",
+        ),
+    ] {
+        let error = Sequence::from_bytes(bytes, format, "cache").unwrap_err();
+        assert_eq!(error.to_string(), expected);
+    }
+    for (format, bytes) in [(Pc2, pc2(0, 0, &[])), (Mdd, mdd(0, 0, &[]))] {
+        let sequence = Sequence::from_bytes(bytes, format, "cache").unwrap();
+        assert_eq!((sequence.n_frames(), sequence.n_points()), (0, 0));
+    }
+}
