@@ -34,8 +34,11 @@ pub enum Format {
 }
 
 /// The extensions of [`Format::from_extension`], for messages.
-pub(crate) const KNOWN: &str =
+const KNOWN: &str =
     "obj, ply, stl, off, coff, noff, gltf, glb, msh, vtk, vtu, mesh, 3mf, node, ele, face";
+
+/// The last of them: a TetGen mesh is two files, so it is not read from the bytes of one.
+const OF_TWO_FILES: &str = ", node, ele, face";
 
 impl Format {
     /// The format of files with this extension (without the dot; case does not matter).
@@ -67,17 +70,37 @@ impl Format {
     /// # Errors
     /// [`Error::UnknownFormat`] if the extension is not known; [`Error::NotAFile`] of a folder.
     pub fn from_path(path: &Path) -> Result<Self, Error> {
-        let extension = path.extension().unwrap_or_default().to_string_lossy();
-        Self::from_extension(&extension).ok_or_else(|| match path.is_dir() {
+        Self::of_extension(path).map_err(|extension| match path.is_dir() {
             true => Error::NotAFile {
                 path: path.to_owned(),
                 what: "a folder",
             },
-            false => Error::UnknownFormat {
-                path: path.to_owned(),
-                extension: extension.into_owned(),
-                known: KNOWN,
-            },
+            false => unknown(path, extension, KNOWN),
         })
+    }
+
+    /// The format of bytes that have the name of a file, by its extension: for
+    /// [`read_bytes`](crate::read_bytes). No file is looked at.
+    ///
+    /// # Errors
+    /// [`Error::UnknownFormat`] if the extension is not known.
+    pub fn from_name(name: &str) -> Result<Self, Error> {
+        let path = Path::new(name);
+        let known = KNOWN.trim_end_matches(OF_TWO_FILES);
+        Self::of_extension(path).map_err(|extension| unknown(path, extension, known))
+    }
+
+    /// The format of the path's extension, or this extension.
+    fn of_extension(path: &Path) -> Result<Self, String> {
+        let extension = path.extension().unwrap_or_default().to_string_lossy();
+        Self::from_extension(&extension).ok_or_else(|| extension.into_owned())
+    }
+}
+
+fn unknown(path: &Path, extension: String, known: &'static str) -> Error {
+    Error::UnknownFormat {
+        path: path.to_owned(),
+        extension,
+        known,
     }
 }

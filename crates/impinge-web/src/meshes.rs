@@ -33,7 +33,7 @@ pub struct FileMesh {
 /// # Errors
 /// An unknown extension; files that the reader refuses.
 pub fn read(name: &str, bytes: &[u8], weld: bool) -> Result<FileMesh, Error> {
-    let format = Format::from_path(name.as_ref())?;
+    let format = Format::from_name(name)?;
     let (mesh, summary) = read_bytes_with_summary(bytes, format, name, &options())?;
     Ok(FileMesh::new(name, mesh, &summary, weld))
 }
@@ -44,7 +44,7 @@ pub fn read(name: &str, bytes: &[u8], weld: bool) -> Result<FileMesh, Error> {
 /// # Errors
 /// As [`read`].
 pub fn read_bodies(name: &str, bytes: &[u8], weld: bool) -> Result<Vec<FileMesh>, Error> {
-    let format = Format::from_path(name.as_ref())?;
+    let format = Format::from_name(name)?;
     let (bodies, summary) = read_bodies_bytes(bytes, format, name, &options())?;
     let bodies = bodies.into_iter().map(|body| {
         let NamedMesh { name: own, mesh } = body;

@@ -63,3 +63,21 @@ fn files_have_the_answers_of_the_program() {
     }
     assert_eq!(n_files, 8);
 }
+
+/// TetGen's two files are not offered for the bytes of one.
+#[test]
+fn an_unknown_extension_is_refused_with_those_that_bytes_may_have() {
+    let said = |name| {
+        [
+            read(name, &[], true).unwrap_err().to_string(),
+            read_bodies(name, &[], true).unwrap_err().to_string(),
+        ]
+    };
+    for text in said("a.txt") {
+        assert!(text.starts_with("a.txt: no mesh format has the extension 'txt' (known: obj, "));
+        assert!(text.ends_with(", mesh, 3mf)"), "{text}");
+    }
+    for text in said("a.node") {
+        assert!(text.contains("two files, .node and .ele"), "{text}");
+    }
+}

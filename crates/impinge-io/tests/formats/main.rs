@@ -118,6 +118,21 @@ fn unknown_extension_and_missing_file() {
     }
 }
 
+/// Formats of two files are not offered for bytes.
+#[test]
+fn unknown_extension_of_bytes() {
+    let known = "obj, ply, stl, off, coff, noff, gltf, glb, msh, vtk, vtu, mesh, 3mf";
+    assert_eq!(
+        Format::from_name("a.xyz").unwrap_err().to_string(),
+        format!("a.xyz: no mesh format has the extension 'xyz' (known: {known})")
+    );
+    for extension in known.split(", ") {
+        let format = Format::from_name(&format!("a.{extension}")).or_show();
+        assert_ne!(format, Format::Tetgen, "{extension}");
+    }
+    assert_eq!(Format::from_name("a.ele").or_show(), Format::Tetgen);
+}
+
 #[test]
 fn readers_weld_unless_told_not_to() {
     let text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nf 1 2 3\nf 4 6 5\n";
