@@ -115,12 +115,13 @@ export interface Query extends Control {
    * Kinds of pairs; `detect`, `count` and `any` have their own. Otherwise `"vf"` and `"ee"`; `"ev"` where neither of the two bodies has
    * faces; `"vv"` where both are bodies of points; in `near` and `neighbours` also `"ef"`. Kinds that are named here count for all bodies.
    * Steps have no `"ef"` and `"ff"`. Of tetrahedra, only the faces, edges and vertices of their border take part: what is inside is not
-   * near anything. `distance` and `detect` take them as solid.
+   * near anything. `distance` and `detect` take them as solid. Vertices of a mesh that no element has take no part.
    */
   kinds?: readonly PairKind[];
   /**
    * Pairs of one body that share a vertex: reported if they meet in more than what they share (`"resolve"`, the default), or not at
-   * all (`"skip"`). For triangles and tetrahedra: edges and points of one body that share a vertex are not reported under either rule.
+   * all (`"skip"`). `"resolve"` always reports two with the same vertices, such as a face that is there twice.
+   * For triangles and tetrahedra: edges and points of one body that share a vertex are not reported under either rule.
    * Vertices, edges and faces of `near`, `candidates` and steps that share a vertex never count.
    */
   sharedVertex?: "resolve" | "skip";
@@ -675,7 +676,7 @@ export interface Contacts extends Answer, List<Contact> {
   readonly starts: Uint32Array;
   /** Numbers of points. */
   readonly corners: Uint32Array;
-  /** x, y, z per point, rounded to nearest. */
+  /** x, y, z per point, rounded to nearest: to an f32 where both bodies hold f32, else to an f64. */
   readonly points: Float64Array;
   curves(): Curves;
   regions(): Region[];
@@ -714,7 +715,10 @@ export declare class Detector {
   isFree(scene: Scene, query?: Query): boolean;
   /** How far a step can be taken. */
   advance(scene: Scene, query?: Query): Advance;
-  /** Pairs of elements whose boxes overlap during a step, inflated by a length, and by how thick elements are, on all sides. */
+  /**
+   * Pairs of elements whose boxes overlap during a step, inflated by a length, and by how thick elements are, on all sides. Vertices of no
+   * element take no part.
+   */
   candidates(scene: Scene, inflation: number, query?: Query): Candidates;
   /**
    * All `candidates` in sorted runs, so that memory need not hold all of them: `each` gets one run after the other, and stops the search with
@@ -722,7 +726,11 @@ export declare class Detector {
    * changed and the detector not asked.
    */
   candidatesInRuns(scene: Scene, inflation: number, each: (run: CandidateRun) => boolean | void, query?: Query): number;
-  /** Pairs of elements at most a length apart, thickness besides; decided exactly. */
+  /**
+   * Pairs of elements at most a length apart, thickness besides; decided exactly. An edge and a face (`"ef"`) are a pair only if they meet,
+   * whatever the length: if they are near without meeting, pairs of their parts (`"vf"`, `"ee"`) say so. Vertices of no element, such as those
+   * of no face of a body of triangles, take no part.
+   */
   near(scene: Scene, distance: number, query?: Query): NearPairs;
   /**
    * Where points lie: 1 inside a body, 0 on its surface, -1 outside, decided exactly. Triangles must be a closed surface, so weld the
@@ -761,7 +769,7 @@ export declare class Detector {
    * `setEndTransform` made stops as a whole: all of its vertices go the least share of their ways that one of them may go.
    */
   truncate(scene: Scene, query?: Query): Truncation;
-  /** The pairs of `near` as lists per element. */
+  /** The pairs of `near` as lists per element: `"ef"` and vertices of no element are as said there. */
   neighbours(scene: Scene, distance: number, query?: Query): Neighbours;
   /** The two bodies that are nearest to each other, and their nearest pair; `null` if there are no two. Of several the first, see `Scene.remove`. */
   nearest(scene: Scene, query?: Query): Nearest | null;

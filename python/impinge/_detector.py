@@ -365,7 +365,7 @@ class Detector(DetectorBase):
     ) -> Candidates:
         """Finds the pairs of elements whose boxes over the whole step, each inflated on all sides,
         overlap: for those who bring a test of their own. Sorted and complete; decided exactly. Pairs of one
-        body that share a vertex are left out.
+        body that share a vertex are left out. Vertices of no element take no part.
 
         Parameters
         ----------
@@ -440,6 +440,7 @@ class Detector(DetectorBase):
         are left out.
 
         An edge and a face (``"ef"``) are reported if they meet, whatever the distance: else pairs of their parts say that they are near.
+        Vertices of no element, such as those of no face of a body of triangles, take no part.
 
         Parameters
         ----------

@@ -122,8 +122,8 @@ def self_pairs(
         Triangles or tetrahedra as vertex indices.
     shared_vertex : {"resolve", "skip"}
         Elements that share a vertex index are reported when they share more points than the vertices
-        they have in common, or never. Vertices at one position with different indices are not
-        shared, unless they are welded.
+        they have in common, as two with the same vertices always do, or never. Vertices at one position
+        with different indices are not shared, unless they are welded.
     weld : bool
         Whether vertices at the same position become one first, as `weld` does. Rows of the answer stay those of
         `faces`; with it, the answer about the arrays of a file is that of the program ``impinge self``.

@@ -42,7 +42,7 @@ struct RunSearch<'a> {
 impl Detector {
     /// Pairs of elements whose boxes overlap during a step, each box inflated by a distance and by
     /// how [thick](Scene::set_thickness) its element is: for callers with their own test. Sorted
-    /// and complete. Always found on the CPU.
+    /// and complete. Vertices of no element take no part. Always found on the CPU.
     /// [`candidates_in_runs`](Detector::candidates_in_runs) gives them piece by piece, for answers
     /// larger than memory.
     ///

@@ -40,7 +40,8 @@ impl Detector {
     /// An edge and a face ([`PairKind::EdgeFace`]) are reported if and only if they meet, whatever
     /// the distance: their distance is 0. If they do not meet but are near, then so are the edge
     /// and an edge of the face, or an end of the edge and the face, and these pairs say it: with
-    /// each of them repeated, answers would have three times as many pairs.
+    /// each of them repeated, answers would have three times as many pairs. Vertices of no element,
+    /// such as those of no face of a body of triangles, take no part.
     ///
     /// ```
     /// use impinge::{Backend, Detector, PairKind, Query, Scene};

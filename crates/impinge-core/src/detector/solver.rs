@@ -123,6 +123,7 @@ impl Detector {
 
     /// The pairs of [`near`](Detector::near) as lists: of each vertex the faces near it, of each
     /// face the vertices, of each edge the edges, and so on for the kinds that the query asks for.
+    /// Edges with faces that they do not meet, and vertices of no element, have none, as there.
     /// Each neighbour comes with its distance, minus the [thickness](Scene::set_thickness) of both,
     /// rounded down: by at most 2^-20 of it. It is 0 if and only if the elements touch, or are at
     /// most as far apart as they are thick.
