@@ -170,7 +170,7 @@ fn opened<'a>(mesh: &'a Path, given: &'a [PathBuf]) -> Result<(Sequence, &'a Pat
         .chain(given.iter().map(PathBuf::as_path))
         .map(Path::to_owned)
         .collect();
-    match Files::of(&all, true, true)?.frames {
+    match Files::of(&all, true, false)?.frames {
         FrameFiles::Each(files) => Ok((Sequence::of_files(files.to_vec())?, mesh)),
         _ => Err(Error::Usage(format!(
             "{}: a mesh and one file with frames, or a file for each frame",

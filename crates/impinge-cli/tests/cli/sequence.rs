@@ -137,7 +137,7 @@ fn frames_may_be_files_each() {
     let line = text.lines().nth(6).unwrap();
     assert!(line.ends_with("  run_005.ply"), "{line}");
 
-    let said = folder.run(["sequence", "ball.ply", "."]).misuse();
+    let said = folder.run(["sequence", "ball.ply", "."]).error();
     assert!(
         said.contains(".: expected frames, as in './*.obj', found a folder"),
         "{said}"
