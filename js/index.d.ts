@@ -258,7 +258,7 @@ export declare class Scene {
    * The pairs of elements that are within a distance of each other now, mostly at rest, to be left out of later questions by `exclude`. They
    * are of the kinds that `near` has if none are named: `"vf"`, `"ee"`, edges with faces that they meet (`"ef"`), and between bodies without
    * faces `"ev"` and `"vv"` as said at `kinds`. Pairs of other kinds, which a query must name, are left out by bodies, rings or groups alone.
-   * The scene keeps them until either is disposed of, or the pairs are collected as garbage.
+   * The scene keeps them until either is disposed of, or the pairs are collected as garbage. Questions about another scene refuse them.
    */
   restPairs(distance: number): RestPairs;
   kind(body: Body): "points" | "edges" | "triangles" | "tetrahedra";

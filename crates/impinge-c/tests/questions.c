@@ -667,7 +667,7 @@ static void other_bodies(impinge_detector *detector) {
 /* Each vertex stops for itself; bounds and lists about the same pair of balls, 0.1 apart at first. */
 static void solvers(impinge_detector *detector) {
   static ball far_away;
-  impinge_scene *scene = two_balls();
+  impinge_scene *scene = two_balls(), *other_scene = two_balls();
   impinge_query query;
   impinge_safe_distances *safe = NULL, *moving = NULL;
   impinge_neighbours *lists = NULL;
@@ -743,6 +743,7 @@ static void solvers(impinge_detector *detector) {
   GOOD(impinge_find_near(detector, scene, 0.2, &query, &again));
   CHECK(impinge_near_count(again) == 0);
   impinge_near_destroy(again);
+  REFUSED(impinge_find_near(detector, other_scene, 0.2, &query, &again), "another scene's");
   query.n_rest_pairs = 0;
   memset(&exclusion, 0, sizeof exclusion);
   exclusion.kind = IMPINGE_EXCLUDE_GROUPS;
@@ -848,6 +849,7 @@ static void solvers(impinge_detector *detector) {
   GOOD(impinge_motion_apply(motion, scene));
   CHECK(hash_of(detector, scene, NULL) == 0);
   impinge_motion_destroy(motion);
+  impinge_scene_destroy(other_scene);
   impinge_scene_destroy(scene);
 }
 

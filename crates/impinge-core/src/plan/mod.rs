@@ -424,6 +424,9 @@ impl Plan {
         for &id in &query.across {
             scene.body(id)?;
         }
+        for id in query.excluded_bodies() {
+            scene.check_known(id)?;
+        }
         if let Scope::Between(a, b) = query.scope {
             scene.body(a)?;
             scene.body(b)?;

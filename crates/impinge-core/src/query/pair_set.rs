@@ -27,6 +27,8 @@ pub(crate) struct PairSet(Arc<HeldPairs>);
 #[derive(Debug)]
 struct HeldPairs {
     pairs: [Vec<Named>; PairKind::ALL.len()],
+    /// A body that the answer was about, whether pairs name it or not: it tells the scene.
+    body: Option<BodyId>,
     /// The parts that they name.
     parts: Vec<NumberedPart>,
     /// Their keys in the numbers of the last plan.
@@ -50,12 +52,20 @@ impl PairSet {
             of_kinds[kind as usize].push(pair);
             named.extend(pair.map(|(body, _)| body).into_iter().zip(kind.parts()));
         }
+        let mut parts = parts.peekable();
+        let body = parts.peek().map(|&(body, ..)| body);
         let parts = parts.filter(|&(body, part, _)| named.contains(&(body, part)));
         PairSet(Arc::new(HeldPairs {
             pairs: of_kinds,
+            body,
             parts: parts.collect(),
             keys: Mutex::default(),
         }))
+    }
+
+    /// A body of the scene of the answer, if it had any.
+    pub fn body(&self) -> Option<BodyId> {
+        self.0.body
     }
 
     /// Refuses a body whose elements have other numbers now, if they take part. Pairs of a body that

@@ -98,8 +98,8 @@ impl Exclusion {
     /// Pairs of an element of body `a` and one of body `b` of which some vertices are listed
     /// together, as compressed sparse rows: the list of vertex `v` of `a` is
     /// `vertices[offsets[v]..offsets[v + 1]]`, vertices of `b`. With `a == b` these are pairs of
-    /// that body, in either order. Lists need not be sorted. Whether they fit both bodies is
-    /// checked when something is asked.
+    /// that body, in either order. Lists need not be sorted. Whether they fit both bodies, and these
+    /// the scene, is checked when something is asked.
     ///
     /// For what only the caller knows: vertices that are sewn or glued together, or that a solver
     /// handles in another way.
@@ -276,6 +276,10 @@ impl Query {
     /// [`Exclusion::groups`], groups of vertices that do not meet; [`Exclusion::vertices`], what
     /// the caller lists; the pairs of [`near`](crate::Detector::near), those that were near at
     /// rest. Each call leaves out more.
+    ///
+    /// All of them are about bodies of the scene that is asked about. Ids are the same in a scene
+    /// and its clones, so make a scene at rest by `clone`: bodies of any other scene are refused as
+    /// [unknown](Error::UnknownBody). Those that were removed have no pairs.
     ///
     /// Besides, pairs of elements all of whose vertices are [pinned](crate::Scene::set_pinned) are
     /// left out of every query, but for [`distance`](crate::Detector::distance) and
@@ -499,6 +503,15 @@ impl Query {
                 allowed: "a filter only in questions about the contacts of a step",
             }),
         }
+    }
+
+    /// Bodies of the scenes that exclusions are about: those that are named, and one for each set of
+    /// pairs.
+    pub(crate) fn excluded_bodies(&self) -> impl Iterator<Item = BodyId> + '_ {
+        let named = self.excluded.iter().flat_map(|&(a, b)| [a, b]);
+        let listed = self.vertices.iter().flat_map(VertexLists::bodies);
+        let of_sets = self.pairs.iter().filter_map(PairSet::body);
+        named.chain(listed).chain(of_sets)
     }
 
     /// What is left out besides pairs of bodies, for questions that are about whole bodies.

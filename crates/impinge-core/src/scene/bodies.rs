@@ -104,11 +104,13 @@ impl Scene {
                 limit: u64::from(u32::MAX),
             })?,
         };
-        let id = BodyId::new(slot);
+        let family = match self.family {
+            0 => new_stamp(),
+            own => own,
+        };
+        let id = BodyId::new(slot, family);
         let body = Body::new(id, mesh.into(), Filter::default())?;
-        if self.family == 0 {
-            self.family = new_stamp();
-        }
+        self.family = family;
         let held = Slot(Some((id, body)));
         match self.free.pop() {
             Some(_) => self.slots[id.index()] = held,
@@ -317,6 +319,15 @@ impl Scene {
     /// The same for a scene and its clones, and for no other; 0 of one that never had a body.
     pub(crate) fn family(&self) -> u64 {
         self.family
+    }
+
+    /// Refuses a body that was never in this scene, nor in one of its family: not one that was
+    /// removed.
+    pub(crate) fn check_known(&self, body: BodyId) -> Result<(), Error> {
+        match body.may_be_of(self.family) {
+            true => Ok(()),
+            false => Err(self.unknown(body)),
+        }
     }
 
     fn rearranged(&mut self) {

@@ -238,7 +238,7 @@ mod tests {
         let parts = Parts::new(Elements::from(vec![[0, 1, 2], [1, 3, 2]]));
         // 0-1, 0-2, 1-2, 1-3, 2-3.
         let each = |thickness: Thickness<'_>| {
-            let held = thickness.held(BodyId::new(0), &parts, 5);
+            let held = thickness.held(BodyId::new(0, 1), &parts, 5);
             let held = held.expect("good");
             let each = held.each.expect("of each element");
             let of = |part| each.of(part).to_vec();

@@ -521,6 +521,78 @@ fn bad_exclusions_are_refused_by_name() {
     ));
 }
 
+/// Exclusions that name bodies of another scene are refused by every question that takes them; those
+/// of a clone, and of bodies that were removed, are not.
+#[test]
+fn exclusions_of_another_scene_are_refused() {
+    let (mut scene, bodies) = scene(1);
+    let (rest, others) = self::scene(1);
+    let mut detector = detectors().into_iter().next().expect("some");
+    let [at_rest, own] =
+        [&rest, &scene.clone()].map(|of| detector.near(of, 0.05, &Query::all()).expect("good"));
+    let corners = Query::all().kinds([PairKind::VertexVertex]);
+    let far = detector.near(&rest, 0.0, &corners).expect("good");
+    assert!(!own.is_empty() && far.is_empty());
+    let lists = |[a, b]: [BodyId; 2]| {
+        let n = rest.body(others[0]).expect("held").n_vertices();
+        Exclusion::vertices(a, b, vec![0; n + 1], [])
+    };
+    let none = detector.near(&Scene::new(), 1.0, &Query::all());
+    let none = Exclusion::from(&none.expect("good"));
+    let foreign: [(Exclusion, BodyId); 6] = [
+        ((others[0], others[1]).into(), others[0]),
+        ((bodies[0], others[1]).into(), others[1]),
+        (lists(others), others[0]),
+        (lists([bodies[0], others[1]]), others[1]),
+        ((&at_rest).into(), others[0]),
+        // Also where nothing was near.
+        ((&far).into(), others[0]),
+    ];
+    for (exclusion, named) in foreign {
+        let query = Query::all().exclude(exclusion);
+        let answers = [
+            detector.near(&scene, 0.1, &query).err(),
+            detector.neighbours(&scene, 0.1, &query).err(),
+            detector.safe_distances(&scene, 0.1, &query).err(),
+            detector.candidates(&scene, 0.1, &query).err(),
+            detector.impacts(&scene, &query).err(),
+            detector.is_free(&scene, &query).err(),
+            detector.advance(&scene, &query).err(),
+            detector.truncate(&scene, &query).err(),
+        ];
+        for error in answers {
+            let error = error.expect("refused");
+            let Error::UnknownBody { body, n_bodies: 2 } = error else {
+                panic!("{error}");
+            };
+            assert_eq!(body, named);
+            assert!(error.to_string().contains("another scene"), "{error}");
+        }
+    }
+    let error = detector.near(&Scene::new(), 0.1, &Query::all().exclude(&at_rest));
+    assert!(matches!(error, Err(Error::UnknownBody { .. })));
+    // About elements as they were given, and about whole bodies.
+    let query = Query::between_all().exclude((others[0], others[1]));
+    assert!(detector.detect(&scene, &query).is_err());
+    assert!(detector.count(&scene, &query).is_err());
+    assert!(detector.any(&scene, &query).is_err());
+    assert!(detector.nearest(&scene, &query).is_err());
+    let query = Query::all().exclude(lists(others));
+    assert!(detector.detect(&scene, &query).is_err());
+    // What is known of this scene.
+    let query = Query::all().exclude(&own).exclude(lists(bodies));
+    let query = query.exclude((bodies[1], bodies[1])).exclude(none);
+    let late = scene.add_points(&[[9.0f32; 3]]).expect("good");
+    let query = query.exclude((late, late));
+    detector.near(&scene, 0.1, &query).expect("good");
+    let mut clone = scene.clone();
+    clone.remove(bodies[1]).expect("held");
+    detector.near(&clone, 0.1, &query).expect("good");
+    clone.remove(late).expect("held");
+    clone.add_points(&[[9.0f32; 3]]).expect("good");
+    detector.near(&clone, 0.1, &query).expect("good");
+}
+
 /// A detector with a memory budget compares the vertices of every candidate; one without knows the
 /// excluded pairs of a body as bits.
 #[test]
