@@ -390,8 +390,8 @@ def test_refusals():
     detector = impinge.Detector("cpu")
     near = detector.near(scene, 1.0)
     for rest, message in [
-        (np.zeros((5, 3)), "^rest: body 1: 2 positions given, but it has 3 vertices"),
-        (np.zeros((7, 3)), "^rest: body 1: 4 positions given, but it has 3 vertices"),
+        (np.zeros((5, 3)), "^rest: 5 positions for 6 vertices given, as many as all bodies have"),
+        (np.zeros((7, 3)), "^rest: 7 positions for 6 vertices given, as many as all bodies have"),
         (np.zeros((6, 2)), "^rest: "),
         (np.full((6, 3), np.nan), "^rest\\[0, 0\\] = nan"),
     ]:

@@ -566,7 +566,7 @@ static void stencils(impinge_detector *detector) {
   REFUSED(impinge_near_stencils_by_area(near_pairs, scene, NULL, &of), "rest: NULL");
   CHECK(of == NULL);
   rest.rows -= 1;
-  REFUSED(impinge_near_stencils(near_pairs, scene, &rest, &of), "positions given, but it has");
+  REFUSED(impinge_near_stencils(near_pairs, scene, &rest, &of), "as many as all bodies have vertices");
   GOOD(impinge_project_psd(matrices[0], 2, 3));
   CHECK(matrices[0][0] == 2 && matrices[0][4] == 0 && matrices[0][8] == 0.5 && matrices[1][0] == 0 && matrices[1][8] == 0);
   /* Many at once, which threads share, as each of them. */

@@ -1,6 +1,6 @@
 //! What `impinge.Stencils` is made of: derivatives of distances, as arrays.
 
-use impinge::{Error, Stencil, project_psd_all};
+use impinge::{Stencil, project_psd_all};
 use numpy::{
     Element, IxDyn, PyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArrayDyn,
     PyUntypedArrayMethods,
@@ -56,10 +56,7 @@ impl Stencils {
                 _ => near.iter().stencils(bodies, rest.as_deref()),
             }
         });
-        let inner = inner.map_err(|error| match error {
-            Error::WrongNumberOfPositions { .. } => invalid(format!("rest: {error}")),
-            error => raise(error),
-        })?;
+        let inner = inner.map_err(raise)?;
         Ok(Stencils { inner })
     }
 

@@ -296,7 +296,7 @@ impl NearIter<'_> {
     ) -> Result<Stencils, Error> {
         let offsets = offsets(scene)?;
         if let Some(rest) = rest {
-            check_rest(scene, &offsets, rest)?;
+            check_rest(scene, rest)?;
         }
         for (id, body) in scene.bodies() {
             if !body.is_checked() {
@@ -707,18 +707,14 @@ fn offsets(scene: &Scene) -> Result<Vec<u32>, Error> {
 }
 
 /// Refuses positions at rest that are not as many as the scene has, and those that are not finite.
-fn check_rest(scene: &Scene, offsets: &[u32], rest: &[Point]) -> Result<(), Error> {
-    let last = scene.bodies().last().map(|(id, _)| id);
-    for (body, of) in scene.bodies() {
-        let given = rest.len().saturating_sub(offsets[body.index()] as usize);
-        let expected = of.n_vertices();
-        if given < expected || Some(body) == last && given > expected {
-            return Err(Error::WrongNumberOfPositions {
-                body,
-                given,
-                expected,
-            });
-        }
+fn check_rest(scene: &Scene, rest: &[Point]) -> Result<(), Error> {
+    let n_vertices: usize = scene.bodies().map(|(_, body)| body.n_vertices()).sum();
+    if rest.len() != n_vertices {
+        return Err(Error::Setting {
+            setting: "rest",
+            given: format!("{} positions for {n_vertices} vertices", rest.len()),
+            allowed: "as many as all bodies have vertices, one body after another,",
+        });
     }
     let bad = |(_, value): &(usize, &Point)| !value.iter().all(|x| x.is_finite());
     match rest.iter().enumerate().find(bad) {

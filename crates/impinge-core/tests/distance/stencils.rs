@@ -656,11 +656,11 @@ fn refusals_name_what_is_wrong() {
     };
     assert_eq!(
         refused(&pairs, &scene, Some(&[[0.0; 3]; 100])),
-        "body 1: 19 positions given, but it has 81 vertices"
+        "rest: 100 positions for 162 vertices given, as many as all bodies have vertices, one body after another, allowed"
     );
     assert_eq!(
         refused(&pairs, &scene, Some(&[[0.0; 3]; 163])),
-        "body 1: 82 positions given, but it has 81 vertices"
+        "rest: 163 positions for 162 vertices given, as many as all bodies have vertices, one body after another, allowed"
     );
     let mut rest = positions(&scene);
     rest[3][1] = f64::NAN;
