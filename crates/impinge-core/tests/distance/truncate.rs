@@ -529,3 +529,34 @@ fn slanted_elements_without_room_stay_apart() {
     assert!(n_touching > 10 && n_moved > 50, "{n_touching} {n_moved}");
     assert!(n_rounds < 60, "{n_rounds}");
 }
+
+/// Squares of such coordinates overflow or underflow in `f64`.
+#[test]
+fn very_large_and_very_small_scenes_move_alike() {
+    let triangle = [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]];
+    let heights = |exponent: i32| {
+        let size = 2f64.powi(exponent);
+        let mut scene = Scene::new();
+        let sized = triangle.map(|p: [f64; 3]| p.map(|x| x * size));
+        scene.add_triangles(&[[0, 1, 2]], &sized).expect("good");
+        let point = scene.add_points(&[[size, size, size]]).expect("good");
+        let mut detector = detector(Method::Clusters, 1);
+        let end = [[size, size, -size]];
+        let chain = [(); 3].map(|()| {
+            scene.set_end_positions(point, &end).expect("good");
+            checked(&scene, &Query::all());
+            let truncation = detector.truncate(&scene, &Query::all()).expect("good");
+            truncation.apply(&mut scene).expect("good");
+            scene.body(point).expect("held").positions().point(0)[2] / size
+        });
+        assert!(chain[0] < 1.0 && chain.is_sorted_by(|a, b| a > b) && chain[2] > 0.0);
+        chain
+    };
+    let usual = heights(0);
+    for exponent in [-960, -600, -300, 300, 600, 1000, 1021] {
+        let those = heights(exponent);
+        for (a, b) in usual.iter().zip(those) {
+            assert!((b / a - 1.0).abs() < 1e-9, "{exponent}: {those:?}");
+        }
+    }
+}

@@ -17,7 +17,7 @@
 use crate::Point;
 use crate::element_pair::ElementPair;
 use crate::filter::nearness::Polygon;
-use crate::rounding::root;
+use crate::rounding::{power_of_two, root};
 
 /// The share of the room that stays free, so that elements are certainly apart when their points
 /// have stopped.
@@ -44,11 +44,9 @@ fn shortest_way(pair: ElementPair, points: &[Point; 4]) -> Point {
 ///
 /// `None` if the elements are not certainly farther apart at the start.
 #[must_use]
-pub fn shares_apart(
-    pair: ElementPair,
-    [start, now, end]: [&[Point; 4]; 3],
-    distance: f64,
-) -> Option<[f64; 4]> {
+pub fn shares_apart(pair: ElementPair, times: [&[Point; 4]; 3], distance: f64) -> Option<[f64; 4]> {
+    let ([start, now, end], distance) = &scaled(times, distance);
+    let distance = *distance;
     let is_possible = |across: &Across| across.room(start, distance).is_some_and(|room| room > 0.0);
     let possible = ways(pair, [start, end]).filter(is_possible);
     let shares = possible.map(|across| across.shares([start, now, end], distance));
@@ -62,7 +60,41 @@ pub fn shares_apart(
 /// away; if there are none of these either, all that move. So some point that is not at its start
 /// now has less than 1, if there is one.
 #[must_use]
-pub fn shares_without_room(
+pub fn shares_without_room(pair: ElementPair, times: [&[Point; 4]; 3], distance: f64) -> [f64; 4] {
+    let (scaled, distance) = scaled(times, distance);
+    let shares = scaled_without_room(pair, scaled.each_ref(), distance);
+    let [start, now, _] = times;
+    match (0..pair.n_points()).any(|ix| now[ix] != start[ix] && shares[ix] < 1.0) {
+        true => shares,
+        // Scaling lost small motions beside large numbers.
+        false => stays_if(|ix| now[ix] != start[ix]),
+    }
+}
+
+/// Sizes that are used as they are: no product overflows or underflows.
+const USUAL: core::ops::Range<f64> = power_of_two(-90)..power_of_two(90);
+
+/// Points and a distance; very small or very large ones times a power of two, with which the
+/// largest coordinate is usual. Shares are the same.
+#[allow(clippy::cast_possible_truncation, reason = "eleven bits")]
+fn scaled(times: [&[Point; 4]; 3], distance: f64) -> ([[Point; 4]; 3], f64) {
+    let numbers = times.into_iter().flatten().flatten();
+    let largest = numbers.fold(0.0, |largest: f64, x| largest.max(x.abs()));
+    let times = times.map(|points| *points);
+    if largest == 0.0 || USUAL.contains(&largest) {
+        return (times, distance);
+    }
+    // The exponent and its negative are those of normal numbers.
+    let exponent = (largest.to_bits() >> 52) as i32 - 1023;
+    let scale = power_of_two((-exponent).clamp(-1000, 1000));
+    (
+        times.map(|points| points.map(|point| point.map(|x| x * scale))),
+        distance * scale,
+    )
+}
+
+/// [`shares_without_room`] of usual sizes.
+fn scaled_without_room(
     pair: ElementPair,
     [start, now, end]: [&[Point; 4]; 3],
     distance: f64,
@@ -349,6 +381,42 @@ mod tests {
         assert!(n_free > 2000 && n_stopped > 2000, "{n_free} {n_stopped}");
     }
 
+    /// Squares of such sizes overflow or underflow, and shares are the same.
+    #[test]
+    fn shares_do_not_depend_on_the_size() {
+        let mut numbers = Numbers(11);
+        for round in 0..400 {
+            let pair = PAIRS[round % 4];
+            let [start, now, end] = [(); 3].map(|()| [(); 4].map(|()| numbers.point(4, 1.0)));
+            let distance = [0.0, 0.25][round / 4 % 2];
+            let both = |exponent: i32| {
+                let size = power_of_two(exponent);
+                let sized = [start, now, end].map(|at| at.map(|p| p.map(|x| x * size)));
+                let times = sized.each_ref();
+                let distance = distance * size;
+                (
+                    shares_apart(pair, times, distance),
+                    shares_without_room(pair, times, distance),
+                )
+            };
+            let usual = both(0);
+            for exponent in [-1060, -996, -600, -300, 80, 300, 600, 1000, 1020] {
+                assert_eq!(both(exponent), usual, "{exponent} {pair:?} {start:?}");
+            }
+        }
+    }
+
+    /// Scaled down, small numbers beside large ones are 0: points that move stay for all that.
+    #[test]
+    fn small_motions_beside_large_numbers_end() {
+        let face = [[0.0; 3], [1e300, 0.0, 0.0], [0.0, 1e300, 0.0]];
+        let [start, now] = [1e-30, -1e-30].map(|z| [[0.0, 0.0, z], face[0], face[1], face[2]]);
+        let times = [&start, &now, &now];
+        let shares = shares_apart(ElementPair::VertexFace, times, 0.0)
+            .unwrap_or_else(|| shares_without_room(ElementPair::VertexFace, times, 0.0));
+        assert!(shares[0] < 1.0, "{shares:?}");
+    }
+
     const ORIGIN: Point = [0.0; 3];
 
     /// Two points over each other at first.
@@ -383,7 +451,7 @@ mod tests {
         assert_eq!(of(&start, 1.0), None);
         assert!(of(&start, 0.999).is_some());
         let huge = [[0.0, 0.0, 1e308], [0.0, 0.0, -1e308], ORIGIN, ORIGIN];
-        assert_eq!(of(&huge, 0.0), None);
+        assert_eq!(of(&huge, 0.0), Some([1.0; 4]));
     }
 
     /// Without room some point that is not at its start goes back each time, and only those that go
@@ -423,7 +491,7 @@ mod tests {
             n_left += usize::from((0..n).any(|ix| now[ix] != start[ix]));
         }
         assert!(n_contacts > 1000 && n_left > 1000, "{n_contacts} {n_left}");
-        // Numbers without heights.
+        // Farther apart than any number.
         let huge = [[0.0, 0.0, 1e308], [0.0, 0.0, -1e308], ORIGIN, ORIGIN];
         let moved = [ORIGIN, huge[1], ORIGIN, ORIGIN];
         let pair = ElementPair::VertexVertex;
