@@ -569,7 +569,7 @@ export interface Hits extends Answer {
 export interface SafeDistances {
   /** A length per vertex, in the precision of the body's positions: below what is allowed by at most 2^-10 of it, and never above. */
   of(body: Body): Float32Array | Float64Array;
-  /** The pairs at distance 0, whose vertices may not move at all. */
+  /** The pairs at distance 0, whose vertices may not move at all; also those of two fixed bodies. */
   readonly touching: NearPairs;
   readonly stats: Stats;
 }

@@ -825,7 +825,10 @@ class SafeDistances:
 
     @property
     def touching(self) -> NearPairs:
-        """NearPairs : the pairs at distance 0, or at most as far apart as their bodies are thick, whose vertices may not move at all."""
+        """NearPairs : the pairs at distance 0, or at most as far apart as their bodies are thick, whose vertices may not move at all.
+
+        Pairs of two `fixed` bodies are among them.
+        """
         return NearPairs(self._inner.touching())
 
     @property

@@ -855,7 +855,7 @@ impinge_status impinge_project_psd(double *matrices, size_t n, size_t size);
 /* How far each vertex of a body may move: a view, n x 1 F32 or F64 as its positions, valid as long as the answer. A vertex that belongs to
  * no element has `most`, as has each vertex of a body that the query is not about. INVALID: no such body when it was asked. */
 impinge_status impinge_safe_distances_of(const impinge_safe_distances *safe_distances, uint32_t body, impinge_array *view);
-/* The pairs at distance 0, or at most as far apart as their bodies are thick. They belong to the answer: do not destroy them. NULL for NULL. */
+/* The pairs at distance 0, or at most as far apart as their bodies are thick, also those of two fixed bodies. They belong to the answer: do not destroy them. NULL for NULL. */
 const impinge_near *impinge_safe_distances_touching(const impinge_safe_distances *safe_distances);
 impinge_status impinge_safe_distances_stats(const impinge_safe_distances *safe_distances, impinge_stats *stats);
 void impinge_safe_distances_destroy(impinge_safe_distances *safe_distances);

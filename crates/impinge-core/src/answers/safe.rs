@@ -157,7 +157,8 @@ impl SafeDistances {
     }
 
     /// The pairs at distance 0, or at most as far apart as they are thick, whose vertices may not
-    /// move at all. Unless the query names kinds, an edge that pierces a face is among them.
+    /// move at all. Pairs of two [fixed](crate::Query::fixed) bodies are among them, and unless the
+    /// query names kinds, an edge that pierces a face.
     pub fn touching(&self) -> &NearPairs {
         &self.touching
     }
