@@ -8,7 +8,6 @@ mod commands;
 mod contacts;
 mod detection;
 mod error;
-#[cfg(any(feature = "view", test))]
 mod files;
 mod headline;
 mod load;

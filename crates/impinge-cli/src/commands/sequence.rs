@@ -41,7 +41,9 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
     let loading = loading.asked(weld, asked.within, args.ask.read.format);
     let mut bodies = Bodies::default();
     let (moving, weld) = bodies.add(&args.mesh, loading)?;
-    let (opened, name) = opened(&args.mesh, &args.sequence)?;
+    let all = std::iter::once(&args.mesh).chain(&args.sequence);
+    let all: Vec<PathBuf> = all.cloned().collect();
+    let (opened, name) = opened(&all)?;
     let mut frames = Frames::of(opened, name, &args.mesh, weld, args.ask.json)?;
     for other in &args.others {
         bodies.add(other, loading)?;
@@ -161,21 +163,27 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
     frames.end(hit(args.ask.fail_on_hit, n_pairs > 0))
 }
 
-/// The frames of a mesh, and the file that names them.
-fn opened<'a>(mesh: &'a Path, given: &'a [PathBuf]) -> Result<(Sequence, &'a Path), Error> {
-    if let [path] = given {
+/// The frames of a mesh, which is the first file, and the file that names them.
+fn opened(all: &[PathBuf]) -> Result<(Sequence, &Path), Error> {
+    if let [_, path] = all {
         return Ok((Sequence::open(path)?, path));
     }
-    let all: Vec<PathBuf> = std::iter::once(mesh)
-        .chain(given.iter().map(PathBuf::as_path))
-        .map(Path::to_owned)
-        .collect();
-    match Files::of(&all, true, false)?.frames {
-        FrameFiles::Each(files) => Ok((Sequence::of_files(files.to_vec())?, mesh)),
-        _ => Err(Error::Usage(format!(
-            "{}: a mesh and one file with frames, or a file for each frame",
-            printable(&given[0])
-        ))),
+    let refused = |path: &Path| {
+        let path = printable(path);
+        let needed = "a mesh and one file with frames, or a file for each frame";
+        Err(Error::Usage(format!("{path}: {needed}")))
+    };
+    match Files::of(all, true, false)? {
+        Files {
+            mesh,
+            frames: FrameFiles::Each(files),
+            others: [],
+        } => Ok((Sequence::of_files(files.to_vec())?, mesh)),
+        Files {
+            frames: FrameFiles::Sequence(path),
+            ..
+        } => refused(path),
+        Files { mesh, .. } => refused(mesh),
     }
 }
 
