@@ -40,6 +40,14 @@ impl Surface {
         fresh
     }
 
+    /// Takes back copies of vertices.
+    pub fn truncate_vertices(&mut self, n: usize) {
+        match &mut self.positions {
+            Positions::F32(held) => held.truncate(n),
+            Positions::F64(held) => held.truncate(n),
+        }
+    }
+
     pub fn mesh(&self) -> Mesh {
         Mesh {
             positions: self.positions.clone(),

@@ -567,3 +567,203 @@ fn real_meshes_come_out_as_promised_and_no_border_opens() {
         }
     }
 }
+
+/// A mesh with one more vertex, and one more face.
+fn with_face(mesh_of: &Mesh, at: [f64; 3], face: [u32; 3]) -> Mesh {
+    let mut points = mesh_of.positions.to_f64();
+    points.push(at);
+    mesh(
+        points,
+        faces(mesh_of).iter().copied().chain([face]).collect(),
+    )
+}
+
+/// The faces by their corners, from the lowest one on, sorted.
+fn surface(mesh: &Mesh) -> Vec<[[u64; 3]; 3]> {
+    let points = bits(mesh);
+    let face = |face: &[u32; 3]| {
+        let mut face = face.map(|v| points[v as usize]);
+        let first = (0..3).min_by_key(|&ix| face[ix]).unwrap_or_default();
+        face.rotate_left(first);
+        face
+    };
+    let mut all: Vec<_> = faces(mesh).iter().map(face).collect();
+    all.sort_unstable();
+    all
+}
+
+#[test]
+fn a_stray_face_opens_no_solid() {
+    let solid = cube([0.0; 3], 2.0);
+    let mut fins = vec![
+        ([4.0, 0.0, 0.0], [4, 5, 8]),
+        ([1.0, 1.0, 1.0], [4, 5, 8]),
+        ([1.0, 0.5, 1.5], [4, 7, 8]),
+    ];
+    // Faces through the cube between its corners; the sides of the cube have others.
+    for a in 0..8u32 {
+        for b in 0..a {
+            for c in 0..b {
+                let mut sides = BOX.map(|mut face| {
+                    face.sort_unstable();
+                    face
+                });
+                sides.sort_unstable();
+                if sides.binary_search(&[c, b, a]).is_err() {
+                    fins.push(([1.0; 3], [c, b, a]));
+                }
+            }
+        }
+    }
+    assert_eq!(fins.len(), 3 + 56 - 12);
+    for (at, [a, b, c]) in fins {
+        for fin in [[a, b, c], [a, c, b]] {
+            let with_fin = with_face(&solid, at, fin);
+            let outward = fix(&with_fin, 0);
+            let inward = fix(&turned(&with_fin, |ix| ix < 12), 0);
+            let again = fix(&outward.mesh, 0);
+            for fixed in [&outward, &inward, &again] {
+                let after = &fixed.after;
+                assert_eq!(
+                    (
+                        fixed.repairs.shells,
+                        after.components,
+                        after.boundary_facets
+                    ),
+                    (1, 2, 3),
+                    "{fin:?}"
+                );
+                assert_eq!(surface(&fixed.mesh), surface(&with_fin), "{fin:?}");
+            }
+            assert_eq!(outward.mesh, inward.mesh);
+            assert_eq!(outward.mesh.n_vertices(), again.mesh.n_vertices());
+            let n_turned = [&outward, &inward, &again].map(|it| it.repairs.turned_shells);
+            assert_eq!(n_turned, [0, 1, 0]);
+        }
+    }
+}
+
+#[test]
+fn a_collar_or_a_lid_opens_no_solid() {
+    // A collar around a waist parts the solid into two pieces, and is itself a ring.
+    let waist = |size: f64, z: f64| {
+        [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]].map(|[x, y]| [size * x, size * y, z])
+    };
+    let mut points = [
+        waist(1.0, -1.0),
+        waist(1.0, 0.0),
+        waist(1.0, 1.0),
+        waist(2.0, 0.0),
+    ]
+    .concat();
+    let ring = |low: u32, high: u32| {
+        (0..4).flat_map(move |ix| {
+            let next = (ix + 1) % 4;
+            [
+                [low + ix, low + next, high + ix],
+                [low + next, high + next, high + ix],
+            ]
+        })
+    };
+    let mut solid = vec![[0, 2, 1], [0, 3, 2], [8, 9, 10], [8, 10, 11]];
+    solid.extend(ring(0, 4).chain(ring(4, 8)));
+    let n_solid = solid.len();
+    let mut collared = solid.clone();
+    collared.extend(ring(4, 12));
+    let collared = mesh(points.clone(), collared);
+    for flipped in [|_, _| false, |ix, n| ix < n, |ix, n| ix >= n, |_, _| true] {
+        let fixed = fix(&turned(&collared, |ix| flipped(ix, n_solid)), 0);
+        assert_eq!((fixed.repairs.shells, fixed.after.components), (1, 2));
+        assert_eq!(fixed.after.boundary_facets, 8);
+    }
+    // A wall through a cube parts it into two prisms of which either could stay closed.
+    let box_with_wall = with_face(
+        &with_face(&cube([0.0; 3], 2.0), [1.0; 3], [0, 4, 7]),
+        [1.0; 3],
+        [0, 7, 3],
+    );
+    for flips in 0..4u32 {
+        let mixed = turned(&box_with_wall, |ix| flips >> u32::from(ix >= 12) & 1 == 1);
+        let fixed = fix(&mixed, 0);
+        assert_eq!((fixed.repairs.shells, fixed.after.components), (1, 2));
+        assert_eq!(fixed.after.boundary_facets, 4);
+        assert_eq!(fixed.repairs.turned_shells, u64::from(flips & 1));
+    }
+    // A lid over the hole of a ring of matter has no border of its own.
+    points = [
+        waist(1.0, 0.0),
+        waist(2.0, 0.0),
+        waist(2.0, 1.0),
+        waist(1.0, 1.0),
+    ]
+    .concat();
+    let mut lidded: Vec<[u32; 3]> = ring(0, 4).chain(ring(4, 8)).collect();
+    lidded.extend(ring(8, 12).chain(ring(12, 0).map(|face| face.map(|v| v % 16))));
+    let n_solid = lidded.len();
+    lidded.extend([[0, 1, 2], [0, 2, 3]]);
+    let lidded = mesh(points, lidded);
+    for flipped in [|_, _| false, |ix, n| ix < n, |ix, n| ix >= n, |_, _| true] {
+        let fixed = fix(&turned(&lidded, |ix| flipped(ix, n_solid)), 0);
+        assert_eq!((fixed.repairs.shells, fixed.after.components), (1, 2));
+        assert_eq!(fixed.after.boundary_facets, 4);
+    }
+}
+
+/// Boxes and tetrahedra that share corners, edges and walls or lie in each other, some of them
+/// inside out, with fins between their vertices; open ones too if asked for.
+fn random_scene(generator: &mut Random, opens: bool) -> Mesh {
+    let mut random = |n: u32| generator.below(n);
+    let parts = (0..1 + random(4)).map(|_| {
+        let low = [0; 3].map(|_| f64::from(random(4)));
+        let size = f64::from(1 + random(3));
+        let mut part = cube(low, size);
+        if random(3) == 0 {
+            part = mesh(
+                corners(low, low.map(|x| x + size))[..].to_vec(),
+                vec![[0, 2, 1], [0, 1, 4], [1, 2, 4], [2, 0, 4]],
+            );
+        }
+        let is_turned = random(2) == 0;
+        let gone = if opens { random(80) as usize } else { 99 };
+        let part = turned(&part, |_| is_turned);
+        let left = faces(&part).iter().enumerate().filter(|it| it.0 != gone);
+        mesh(part.positions.to_f64(), left.map(|it| *it.1).collect())
+    });
+    let mut scene = together(&parts.collect::<Vec<_>>());
+    let n = scene.n_vertices() as u32;
+    for _ in 0..random(4) {
+        let fin = [0; 3].map(|_| random(n));
+        scene = with_face(&scene, [0; 3].map(|_| f64::from(random(6))), fin);
+    }
+    scene
+}
+
+#[test]
+fn what_is_mended_stays_as_it_is_and_does_not_depend_on_what_was_inside_out() {
+    let mut generator = Random::new(11);
+    let (mut n_split, mut n_turned, mut n_open) = (0, 0, 0);
+    for round in 0..500 {
+        let opens = round % 2 == 1;
+        let scene = random_scene(&mut generator, opens);
+        let fixed = fix(&scene, 0);
+        if faces(&fixed.mesh).is_empty() {
+            continue;
+        }
+        n_split += u32::from(fixed.repairs.split_edges > 0);
+        n_turned += u32::from(fixed.repairs.turned_shells > 0);
+        n_open += u32::from(fixed.after.boundary_facets > 0);
+        let again = fix(&fixed.mesh, 0);
+        assert_eq!(surface(&again.mesh), surface(&fixed.mesh), "{round}");
+        assert_eq!(again.after, fixed.after, "{round}");
+        assert_eq!(again.repairs.shells, fixed.repairs.shells, "{round}");
+        assert_eq!(again.repairs.turned_shells, 0, "{round}");
+        if !opens {
+            let other = fix(&turned(&scene, |_| true), 0);
+            assert_eq!(other.after, fixed.after, "{round}");
+        }
+    }
+    assert!(
+        n_split > 100 && n_turned > 100 && n_open > 100,
+        "{n_split} {n_turned} {n_open}"
+    );
+}

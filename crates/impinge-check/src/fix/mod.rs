@@ -6,6 +6,9 @@
 //! comparison of coordinates, so it is exact. Only the choice among several triangulations of a
 //! hole is by rounded areas, and every triangle that is chosen passes exact tests.
 //!
+//! Edges are split by where matter is, which is known for certain only when closed shells are
+//! turned. So where both happen, the split is made again with the faces turned.
+//!
 //! Positions are never computed: a vertex of the result has the bits of a vertex of the input.
 
 mod faces;
@@ -24,6 +27,9 @@ use crate::surface::Surface;
 pub(crate) use faces::remove_degenerate;
 pub use holes::MOST_HOLE_EDGES;
 
+/// Splits after which shells are turned for the last time.
+const MOST_SPLITS: u32 = 8;
+
 /// One kind of repair.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Repair {
@@ -37,7 +43,8 @@ pub enum Repair {
     Degenerate,
     /// Neighbours get the same orientation. In each piece the fewest faces are turned.
     Orient,
-    /// Edges of more than two faces come apart: faces that bound the same matter stay together.
+    /// Edges of more than two faces come apart: faces that bound the same matter stay together. What
+    /// hangs on a closed surface, as a fin or a single wall, gets a border and opens no solid.
     SplitEdges,
     /// Vertices of several fans come apart: each fan gets a vertex of its own at the same position.
     SplitVertices,
@@ -138,7 +145,7 @@ pub struct Repairs {
     pub shells: u64,
     /// Shells inside an odd number of others: their normals point into the hollow.
     pub cavities: u64,
-    /// Shells that were inside out.
+    /// Shells that were inside out, whole or in part.
     pub turned_shells: u64,
     /// Shells of exactly zero volume, which have no inside and stay as they are.
     pub flat_shells: u64,
@@ -282,16 +289,30 @@ pub fn fix_mesh(mesh: Mesh, options: &FixOptions) -> Result<Fixed, FixError> {
     if does(Repair::Orient) {
         (repairs.turned_faces, repairs.non_orientable) = orient::orient(&mut surface);
     }
-    split::split(
-        &mut surface,
-        (does(Repair::SplitEdges), does(Repair::SplitVertices)),
-        &mut repairs,
-    );
-    if does(Repair::CloseHoles) && options.close_holes > 0 {
-        holes::close(&mut surface, options, &mut repairs)?;
-    }
-    if does(Repair::Outward) {
-        shells::turn(&mut surface, options.threads, &mut repairs)?;
+    let (oriented, n_vertices, so_far) = (surface.faces.clone(), surface.n_vertices(), repairs);
+    let mut turned = Vec::new();
+    for splits in 1..=MOST_SPLITS {
+        split::split(
+            &mut surface,
+            (does(Repair::SplitEdges), does(Repair::SplitVertices)),
+            &mut repairs,
+        );
+        if does(Repair::CloseHoles) && options.close_holes > 0 {
+            holes::close(&mut surface, options, &mut repairs)?;
+        }
+        let again = does(Repair::Outward)
+            && shells::turn(&mut surface, options.threads, &mut turned, &mut repairs)?
+            && repairs.split_edges > 0;
+        if !again || splits == MOST_SPLITS {
+            break;
+        }
+        repairs = so_far;
+        surface.truncate_vertices(n_vertices);
+        surface.faces.clone_from(&oriented);
+        turned.truncate(oriented.len());
+        for (face, _) in surface.faces.iter_mut().zip(&turned).filter(|it| *it.1) {
+            face.swap(1, 2);
+        }
     }
     if does(Repair::Unused) {
         repairs.unused_vertices = faces::remove_unused(&mut surface);

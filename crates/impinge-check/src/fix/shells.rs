@@ -17,11 +17,21 @@ use impinge::{Backend, Detector, Error, Scene, Settings};
 use super::Repairs;
 use crate::surface::{Shell, Surface, shells};
 
-/// Turns the shells that are inside out.
-pub fn turn(surface: &mut Surface, threads: usize, repairs: &mut Repairs) -> Result<(), Error> {
+/// Turns the shells that are inside out. Returns whether there were any.
+///
+/// `turned` says of each face whether it is turned already, and is kept up: a shell counts as
+/// turned if faces of it are.
+pub fn turn(
+    surface: &mut Surface,
+    threads: usize,
+    turned: &mut Vec<bool>,
+    repairs: &mut Repairs,
+) -> Result<bool, Error> {
     let mut shells = shells(surface);
     repairs.shells = shells.len() as u64;
     nest(surface, &mut shells, threads)?;
+    turned.resize(surface.faces.len(), false);
+    let mut any = false;
     for shell in &shells {
         let is_cavity = shell.depth % 2 == 1;
         repairs.cavities += u64::from(is_cavity);
@@ -33,13 +43,16 @@ pub fn turn(surface: &mut Surface, threads: usize, repairs: &mut Repairs) -> Res
         if shell.sign.is_zero() {
             repairs.flat_shells += 1;
         } else if shell.sign != wanted {
-            repairs.turned_shells += 1;
+            any = true;
             for &face in &shell.faces {
                 surface.faces[face as usize].swap(1, 2);
+                turned[face as usize] ^= true;
             }
         }
+        let is_turned = shell.faces.iter().any(|&face| turned[face as usize]);
+        repairs.turned_shells += u64::from(is_turned && !shell.sign.is_zero());
     }
-    Ok(())
+    Ok(any)
 }
 
 /// Counts for each shell the shells that it is inside.

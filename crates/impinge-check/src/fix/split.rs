@@ -6,6 +6,9 @@
 //! front matter begins with the one where it ends. So two boxes that share an edge become two
 //! boxes. The order around the edge is decided by signs of `orient3d`. Faces without a partner get
 //! a border there.
+//!
+//! Faces that cannot bound matter, or need not, are set aside first ([`Pieces`]), so that a fin takes
+//! no partner from the solid on which it hangs. They are paired among themselves.
 
 use std::cmp::Ordering;
 use std::collections::HashMap;
@@ -43,6 +46,7 @@ pub fn split(surface: &mut Surface, (edges, vertices): (bool, bool), repairs: &m
     for vertex in crowded.iter().flat_map(|group| group[0].vertices) {
         on_crowded[vertex as usize] = true;
     }
+    let pieces = Pieces::new(surface.faces.len(), &sorted, &crowded);
     let mut pairings = vec![Pairing::AroundMatter; crowded.len()];
     let mut round = 0;
     let mut corners = loop {
@@ -52,7 +56,7 @@ pub fn split(surface: &mut Surface, (edges, vertices): (bool, bool), repairs: &m
         }
         for (group, &pairing) in crowded.iter().zip(&pairings) {
             if edges {
-                for [a, b] in pairs(surface, group, pairing) {
+                for [a, b] in pairs(surface, &pieces, group, pairing) {
                     join(surface, &mut corners, &group[a], &group[b]);
                 }
             } else {
@@ -125,6 +129,148 @@ pub fn split(surface: &mut Surface, (edges, vertices): (bool, bool), repairs: &m
     }
 }
 
+/// The pieces that edges of two faces hold together, and which of them are set aside.
+///
+/// A piece is loose if it has a border, or is left alone at an edge when other loose pieces are gone:
+/// it bounds no matter, whatever the orientations. No closed surface loses a face by this, because
+/// at each of its edges are two of its faces or more.
+///
+/// A piece is a wall if, at each edge where it meets others, more faces pass the edge in its
+/// direction than in the other one: some face stays alone there, and the others are paired better
+/// without the wall. Of pieces that could be the wall, the one of the fewest faces is.
+struct Pieces {
+    /// The piece of each face, named by one of its faces.
+    of_face: Vec<u32>,
+    /// By piece; faces of one rank are paired.
+    ranks: Vec<Rank>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Rank {
+    Bounds,
+    Wall,
+    Loose,
+    LooseWall,
+}
+
+impl Pieces {
+    fn new(n_faces: usize, sorted: &[Facet], crowded: &[&[Facet]]) -> Self {
+        if crowded.is_empty() {
+            return Pieces {
+                of_face: Vec::new(),
+                ranks: Vec::new(),
+            };
+        }
+        let mut joined = UnionFind::new(n_faces as u32);
+        let mut on_border = Vec::new();
+        for group in groups(sorted) {
+            match group {
+                [only] => on_border.push(only.element),
+                [a, b] => joined.join(a.element, b.element),
+                _ => {}
+            }
+        }
+        let of_face: Vec<u32> = (0..n_faces as u32).map(|face| joined.root(face)).collect();
+        let mut meetings: Vec<Meeting> = Vec::new();
+        for (edge, group) in crowded.iter().enumerate() {
+            meetings.extend(group.iter().map(|facet| Meeting {
+                piece: of_face[facet.element as usize],
+                edge,
+                n_faces: 1,
+                excess: if facet.is_even { 1 } else { -1 },
+            }));
+        }
+        meetings.sort_unstable_by_key(|it| (it.piece, it.edge));
+        meetings.dedup_by(|next, held| {
+            let is_same = (next.piece, next.edge) == (held.piece, held.edge);
+            if is_same {
+                held.n_faces += next.n_faces;
+                held.excess += next.excess;
+            }
+            is_same
+        });
+        let mut pieces = Pieces {
+            of_face,
+            ranks: vec![Rank::Bounds; n_faces],
+        };
+        pieces.set_loose(&on_border, crowded, &meetings);
+        for (rank, wall) in [(Rank::Bounds, Rank::Wall), (Rank::Loose, Rank::LooseWall)] {
+            pieces.set_walls((rank, wall), crowded.len(), &meetings);
+        }
+        pieces
+    }
+
+    fn rank(&self, facet: &Facet) -> Rank {
+        self.ranks[self.of_face[facet.element as usize] as usize]
+    }
+
+    fn set_loose(&mut self, on_border: &[u32], crowded: &[&[Facet]], meetings: &[Meeting]) {
+        let mut n_left: Vec<usize> = crowded.iter().map(|group| group.len()).collect();
+        let mut next: Vec<u32> = on_border
+            .iter()
+            .map(|&face| self.of_face[face as usize])
+            .collect();
+        while let Some(piece) = next.pop() {
+            let rank = &mut self.ranks[piece as usize];
+            if std::mem::replace(rank, Rank::Loose) == Rank::Loose {
+                continue;
+            }
+            let first = meetings.partition_point(|it| it.piece < piece);
+            for meeting in meetings[first..].iter().take_while(|it| it.piece == piece) {
+                let edge = meeting.edge;
+                n_left[edge] -= meeting.n_faces;
+                if n_left[edge] == 1 {
+                    let mut facets = crowded[edge].iter();
+                    let left = facets.find(|facet| self.rank(facet) == Rank::Bounds);
+                    next.extend(left.map(|facet| self.of_face[facet.element as usize]));
+                }
+            }
+        }
+    }
+
+    fn set_walls(&mut self, (rank, wall): (Rank, Rank), n_edges: usize, meetings: &[Meeting]) {
+        let mut excess = vec![0i64; n_edges];
+        let mut n_faces = vec![0u32; self.ranks.len()];
+        for meeting in meetings {
+            if self.ranks[meeting.piece as usize] == rank {
+                excess[meeting.edge] += meeting.excess;
+            }
+        }
+        for &piece in &self.of_face {
+            n_faces[piece as usize] += 1;
+        }
+        let mut all: Vec<&[Meeting]> = meetings
+            .chunk_by(|a, b| a.piece == b.piece)
+            .filter(|of_piece| self.ranks[of_piece[0].piece as usize] == rank)
+            .collect();
+        all.sort_by_key(|of_piece| {
+            let piece = of_piece[0].piece;
+            (n_faces[piece as usize], std::cmp::Reverse(piece))
+        });
+        for of_piece in all {
+            let is_wall = of_piece.iter().all(|it| {
+                let excess = excess[it.edge];
+                (excess - it.excess).abs() < excess.abs()
+            });
+            if is_wall {
+                self.ranks[of_piece[0].piece as usize] = wall;
+                for it in of_piece {
+                    excess[it.edge] -= it.excess;
+                }
+            }
+        }
+    }
+}
+
+/// The faces of one piece at one edge.
+struct Meeting {
+    piece: u32,
+    edge: usize,
+    n_faces: usize,
+    /// How many more pass the edge in one direction than in the other.
+    excess: i64,
+}
+
 fn corner(surface: &Surface, face: u32, vertex: u32) -> u32 {
     let held = surface.faces[face as usize];
     let ix = held.iter().position(|&held| held == vertex);
@@ -152,7 +298,7 @@ fn is_crowded(surface: &Surface, group: &[Facet], corners: &mut UnionFind) -> bo
 }
 
 /// Pairs of the faces at an edge, by their places in the group.
-fn pairs(surface: &Surface, group: &[Facet], pairing: Pairing) -> Vec<[usize; 2]> {
+fn pairs(surface: &Surface, pieces: &Pieces, group: &[Facet], pairing: Pairing) -> Vec<[usize; 2]> {
     if pairing == Pairing::Cut {
         return Vec::new();
     }
@@ -170,6 +316,7 @@ fn pairs(surface: &Surface, group: &[Facet], pairing: Pairing) -> Vec<[usize; 2]
             let third = surface.at(third);
             (!is_flat_triangle(&[ends[0], ends[1], third])).then_some(Side {
                 place,
+                rank: pieces.rank(&group[place]),
                 third,
                 opens: is_forward == (pairing == Pairing::AroundMatter),
             })
@@ -196,9 +343,16 @@ fn pairs(surface: &Surface, group: &[Facet], pairing: Pairing) -> Vec<[usize; 2]
             .then(a.opens.cmp(&b.opens))
             .then(a.place.cmp(&b.place))
     });
-    // As parentheses around a circle.
+    [Rank::Bounds, Rank::Wall, Rank::Loose, Rank::LooseWall]
+        .into_iter()
+        .flat_map(|rank| matched(around.iter().filter(move |side| side.rank == rank)))
+        .collect()
+}
+
+/// Matches sides in their order around an edge, as parentheses around a circle.
+fn matched<'a>(sides: impl Iterator<Item = &'a Side>) -> Vec<[usize; 2]> {
     let (mut open, mut early, mut found) = (Vec::new(), Vec::new(), Vec::new());
-    for side in &around {
+    for side in sides {
         if side.opens {
             open.push(side.place);
         } else if let Some(opened) = open.pop() {
@@ -219,6 +373,7 @@ fn pairs(surface: &Surface, group: &[Facet], pairing: Pairing) -> Vec<[usize; 2]
 /// One face at an edge.
 struct Side {
     place: usize,
+    rank: Rank,
     third: Point,
     /// Whether what the pairing goes around begins behind the face.
     opens: bool,
