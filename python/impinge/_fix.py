@@ -74,7 +74,8 @@ def fix(
     Returns
     -------
     Fixed
-        The mesh, what each repair did, and what is left: self-intersections stay, for example.
+        The mesh, what each repair did, and what is left: self-intersections stay, for example. Where all faces have
+        zero area, it has none.
 
     Raises
     ------

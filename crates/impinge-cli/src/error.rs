@@ -56,6 +56,9 @@ pub enum Error {
     /// Rows of pairs, or the folder of an output file, could not be written.
     #[error("{}: cannot write: {source}", printable(.path))]
     Write { path: PathBuf, source: io::Error },
+    /// A mesh all of whose faces have zero area: mending leaves none.
+    #[error("{}: no face is left, so nothing is written: {n_flat} of zero area", printable(.path))]
+    NoFaceLeft { path: PathBuf, n_flat: String },
     /// Pairs were found, and `--fail-on-hit` was given.
     #[error("pairs were found")]
     Hit,

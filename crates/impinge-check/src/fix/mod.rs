@@ -156,7 +156,7 @@ pub struct Repairs {
 /// A mended mesh.
 #[derive(Debug, Clone)]
 pub struct Fixed {
-    /// The mesh.
+    /// The mesh. It has no face if all faces had zero area.
     pub mesh: Mesh,
     /// What each repair did.
     pub repairs: Repairs,

@@ -24,13 +24,17 @@ pub use self::args::{CHECK_EXAMPLES, CheckArgs, CheckWorkerArgs, FailOn};
 pub use self::ending::fail;
 use crate::apart::Inputs;
 use crate::error::Error;
-use crate::load::tell;
+use crate::load::{STDIN, tell};
 use crate::output;
 use crate::stop::Patience;
 use crate::watch::Watch;
 
 /// `impinge check`.
 pub fn check(args: &CheckArgs, cancel: &CancelToken) -> Result<(), Error> {
+    if args.meshes.iter().any(|path| path == Path::new(STDIN)) {
+        let text = "-: check reads meshes from files only, not from standard input";
+        return Err(Error::Usage(text.to_owned()));
+    }
     if args.assembly || args.clearance.is_some() {
         return assembly::check(args, cancel);
     }

@@ -52,6 +52,12 @@ pub fn fix(args: &FixArgs) -> Result<(), Error> {
         },
         other => Error::Usage(format!("{}: {other}", printable(&args.mesh))),
     })?;
+    if matches!(&fixed.mesh.elements, Elements::Triangles(faces) if faces.is_empty()) {
+        return Err(Error::NoFaceLeft {
+            path: args.mesh.clone(),
+            n_flat: counted(fixed.repairs.degenerate_faces, "face"),
+        });
+    }
     // Files are written first: if one can't be written, no answer is printed that looks like
     // success.
     write(args, &fixed.mesh)?;

@@ -1001,3 +1001,15 @@ fn a_closed_mesh_that_is_inside_out_is_not_clean() {
     let check = ["check", "mended.ply", "--fail-on", "any"];
     assert_eq!(folder.run(check).code, Some(0));
 }
+
+#[test]
+fn meshes_on_standard_input_are_refused_by_that_name() {
+    let folder = Folder::new();
+    let only_files = "check reads meshes from files only, not from standard input";
+    let message = folder.run(["check", "-"]).misuse();
+    assert_eq!(message, format!("impinge: -: {only_files}\n"));
+    let message = folder.run(["check", "-", "--format", "obj"]).misuse();
+    assert!(message.contains("text, sarif, junit or github") && message.contains(only_files));
+    let message = folder.run(["check", "-", "--format", "pdf"]).misuse();
+    assert!(message.contains("[possible values: text, sarif, junit, github]"));
+}

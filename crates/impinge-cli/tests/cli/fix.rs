@@ -285,3 +285,22 @@ fn what_stays_inside_out_and_what_is_not_kept_is_said() {
         "{text}"
     );
 }
+
+#[test]
+fn nothing_is_written_where_no_face_is_left() {
+    let folder = Folder::new();
+    folder.text("flat.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n");
+    folder.text("out.ply", "as it was");
+    for more in [&["--json"][..], &[]] {
+        let args = ["fix", "flat.obj", "--out", "out.ply", "--force"];
+        let run = folder.run(args.iter().chain(more).copied());
+        assert_eq!(
+            run.error(),
+            "flat.obj: no face is left, so nothing is written: 1 face of zero area"
+        );
+    }
+    assert_eq!(
+        std::fs::read_to_string(folder.path("out.ply")).unwrap(),
+        "as it was"
+    );
+}

@@ -1,15 +1,17 @@
 //! The command line of `impinge check`.
 
+use std::ffi::OsStr;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use clap::builder::PossibleValue;
-use clap::{Args, ValueEnum};
+use clap::builder::{EnumValueParser, PossibleValue, TypedValueParser};
+use clap::error::ErrorKind;
+use clap::{Arg, Args, Command, ValueEnum};
 use impinge_check::Finding;
 
 use crate::args::PictureArgs;
-use crate::values::{HtmlFile, MeshFile, PngFile, RowsFile, bytes};
+use crate::values::{HtmlFile, MeshFile, PngFile, RowsFile, bytes, mesh_format};
 
 /// Shown below the help.
 pub const CHECK_EXAMPLES: &str = "\
@@ -38,7 +40,7 @@ again to continue an interrupted run in --out.";
 
 #[derive(Debug, Args)]
 pub struct CheckArgs {
-    /// Mesh files
+    /// Mesh files; standard input is not read
     #[arg(value_name = "MESH", required_unless_present = "list")]
     pub meshes: Vec<PathBuf>,
     /// A file with one path per line (- for standard input); empty lines and lines that start with
@@ -49,7 +51,7 @@ pub struct CheckArgs {
     #[arg(long)]
     pub json: bool,
     /// What is printed
-    #[arg(long, value_enum, value_name = "FORMAT", conflicts_with = "json", default_value_t = Format::Text)]
+    #[arg(long, value_parser = PrintedFormat, value_name = "FORMAT", conflicts_with = "json", default_value = "text")]
     pub format: Format,
     /// A folder for rows, in which an interrupted run can continue; or a mesh file that shows the
     /// problems (.glb, .ply, .vtu)
@@ -226,6 +228,36 @@ pub enum Format {
     Junit,
     /// Commands that annotate a GitHub workflow
     Github,
+}
+
+/// Parses [`Format`], and tells apart the formats of meshes, which `--format` of other commands
+/// takes.
+#[derive(Clone)]
+struct PrintedFormat;
+
+impl TypedValueParser for PrintedFormat {
+    type Value = Format;
+
+    fn parse_ref(
+        &self,
+        command: &Command,
+        arg: Option<&Arg>,
+        value: &OsStr,
+    ) -> Result<Format, clap::Error> {
+        if let Some(text) = value.to_str().filter(|text| mesh_format(text).is_ok()) {
+            let text = format!(
+                "--format {text}: says what is printed: text, sarif, junit or github; check reads meshes from files only, \
+                 not from standard input"
+            );
+            return Err(command.clone().error(ErrorKind::InvalidValue, text));
+        }
+        EnumValueParser::<Format>::new().parse_ref(command, arg, value)
+    }
+
+    fn possible_values(&self) -> Option<Box<dyn Iterator<Item = PossibleValue> + '_>> {
+        let all = Format::value_variants().iter();
+        Some(Box::new(all.filter_map(ValueEnum::to_possible_value)))
+    }
 }
 
 /// What becomes of parts that only touch.
