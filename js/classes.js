@@ -167,12 +167,19 @@ function arrays(mesh) {
 class Moves {
   #n = 0;
   #last = new Map();
+  // When its groups, or which vertices are pinned, were set.
+  #marked = new Map();
   // Answers keep it: another one is made for each change.
   #numbered = new Map();
 
   add(which) {
     this.#n += 1;
     this.#last.set(which, this.#n);
+  }
+
+  mark(which) {
+    this.#n += 1;
+    this.#marked.set(which, this.#n);
   }
 
   renumber(which, edgesAlone) {
@@ -183,6 +190,7 @@ class Moves {
 
   forget(which) {
     this.#last.delete(which);
+    this.#marked.delete(which);
     if (!this.#numbered.has(which)) return;
     this.#numbered = new Map(this.#numbered);
     this.#numbered.delete(which);
@@ -196,6 +204,8 @@ class Moves {
     if (of !== this) refuse("contacts: contacts of another scene given, those of this scene allowed");
     const moved = bodies.find((which) => this.#last.get(which) > n);
     if (moved !== undefined) refuse(`body ${moved}: this was found for other positions than it has now, so nothing is known of it; ask again`);
+    const marked = bodies.find((which) => this.#marked.get(which) > n);
+    if (marked !== undefined) refuse(`body ${marked}: its groups or pinned vertices were set after the pairs were found; ask again`);
   }
 }
 
@@ -313,11 +323,13 @@ export function makeScene({ SceneHandle }, mustBeReady) {
 
     setGroups(which, groups) {
       call(() => this.#held.set_groups(body(which), wide(groups, "groups")));
+      this.#moves.mark(which);
     }
 
     setPinned(which, pinned) {
       const flags = list("pinned", pinned).map((of) => (/^(boolean|number)$/.test(typeof of) ? Number(Boolean(of)) : refuse(`pinned: ${shown(of)} given, true or false is needed`)));
       call(() => this.#held.set_pinned(body(which), Uint8Array.from(flags)));
+      this.#moves.mark(which);
     }
 
     restPairs(distance) {

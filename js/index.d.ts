@@ -779,7 +779,8 @@ export declare class Detector {
   contacts(scene: Scene, pairs: Pairs, control?: Control): Contacts;
   /**
    * How deep two closed bodies are in each other, given contacts among which are all of theirs. Refuses bodies that have moved since the
-   * pairs of these were found, and contacts of a query that left out pairs of the two: in a cell, by groups, or pinned in both.
+   * pairs of these were found, or whose groups or pinned vertices were set since, and contacts of a query that left out pairs of the two: in
+   * a cell, by groups, or pinned in both.
    */
   penetration(scene: Scene, contacts: Contacts, a: Body, b: Body, control?: Control): Penetration;
   /** Frees the memory. Refused while it answers a question. Called again, it does nothing. */

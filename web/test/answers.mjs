@@ -260,6 +260,10 @@ export async function refusals(module) {
   scene.setPositions(closed[1], corners.map((x) => x + 0.125));
   const inCell = detector.contacts(scene, detector.detect(scene, { between: closed, ownedBy: [[-1, -1, -1], [1, 1, 1]] }));
   said.older.push(await refusal(() => detector.penetration(scene, inCell, ...closed)));
+  const whole = detector.contacts(scene, detector.detect(scene, { between: closed }));
+  scene.setPinned(closed[0], Array(4).fill(true));
+  said.older.push(await refusal(() => detector.penetration(scene, whole, ...closed)));
+  scene.setPinned(closed[0], Array(4).fill(false));
   const step = detector.advance(scene);
   for (const body of closed) scene.remove(body);
   const added = scene.addTriangles(index, triangle);
@@ -367,6 +371,7 @@ export const REFUSALS = {
     "invalid: body 2: this was found for other positions than it has now, so nothing is known of it; ask again",
     "invalid: contacts: contacts of another scene given, those of this scene allowed",
     "invalid: contacts: without some of the two, because of a cell, given, those of all pairs of the two allowed",
+    "invalid: body 2: its groups or pinned vertices were set after the pairs were found; ask again",
   ],
   added: "invalid: body 4: it was added after this was found, so nothing is known of it; ask again",
   found: [0, 0, 5, 0],

@@ -227,6 +227,17 @@ pub(crate) fn of_pairs(pairs: &Pairs, world: &World) -> Answer {
     answer
 }
 
+/// The words of a query without bodies, which may have been removed since: what leaves out pairs of
+/// two bodies.
+fn of_elements(words: &[u32]) -> Result<Vec<u32>, Error> {
+    let (head, rest) = words.split_first_chunk::<9>().ok_or(Error::Foreign)?;
+    let (_, excluded) = (rest.split_at_checked((head[7] >> 5) as usize)).ok_or(Error::Foreign)?;
+    let excluded = excluded.as_chunks::<3>().0.iter();
+    let groups = excluded.filter(|[kind, ..]| *kind == 2).flatten();
+    let all = [0, 0, 0, 0, 0, 0, 0, head[7] & 4, 1];
+    Ok(all.iter().chain(groups).copied().collect())
+}
+
 impl Asker {
     /// Asks. For questions with a query, `words` and `numbers` are those of [`query`].
     /// [`Question::Distance`]: two bodies; [`Question::Contains`], [`Question::Locate`],
@@ -361,7 +372,7 @@ impl Asker {
         };
         let is_known = self.known.as_ref().is_some_and(|(of, _)| *of == number);
         if bodies.is_none() || !is_known {
-            let query = query(world, asked, numbers)?;
+            let query = query(world, &of_elements(asked)?, numbers)?;
             self.find_contacts(number, world, (&query, rows))?;
         }
         let Some((_, contacts)) = &self.known else {

@@ -310,6 +310,14 @@ fn answers_about_distances_and_contacts() -> Result<(), Error> {
         of_cell.expect_err("a cell").to_string(),
         "contacts: without some of the two, because of a cell, given, those of all pairs of the two allowed"
     );
+    // A query may name bodies that were removed since.
+    let extra = add(&mut world, &TRIANGLE.map(|x| x + 9.0))?;
+    let asked = [&asked(1 << 5)[..], &[extra, 0, extra, tip]].concat();
+    let pairs = asker.ask(Question::Detect, &world, &asked, &NUMBERS)?.rows;
+    world.remove(extra)?;
+    let words = [&[13], &asked[..], &[10], &pairs].concat();
+    let again = asker.ask(Question::Contacts, &world, &words, &NUMBERS)?;
+    assert_eq!(again.bytes, contacts.bytes);
     let words = about(9, &[], &[tip, 0, low, 4]);
     let foreign = asker.ask(Question::Contacts, &world, &words, &NUMBERS);
     assert_eq!(

@@ -6,7 +6,8 @@
 //! positive and the others do not wind around it the wrong way, or if it is negative and they wind
 //! around it.
 //!
-//! Cost: a sum over all faces; with several pieces also a ray for each.
+//! Cost: a sum over all faces; with several pieces, some of which face inwards or are cavities, also a
+//! ray for each.
 
 use super::inside::passes;
 use super::topology::EdgesAround;
@@ -16,10 +17,12 @@ use crate::scene::error::Error;
 use crate::scene::index::VertexIx;
 use crate::scene::vector::{cross, dot, sub};
 use crate::search::work::Work;
-use impinge_exact::Point;
+use impinge_exact::{Point, Sign, orient3d};
 
 /// Faces between two looks at the control.
 const LOOK: usize = 1 << 13;
+/// Vertices of a piece that are tried.
+const MOST_SEEDS: usize = 16;
 
 /// By piece: -1 if its faces are turned inwards, else 1.
 pub(super) fn orientations(
@@ -33,45 +36,100 @@ pub(super) fn orientations(
     let position = |vertex: u32| body.positions().point(vertex as usize);
     let n_pieces = topology.n_pieces();
     let mut volumes = vec![0.0; n_pieces];
-    let mut seeds: Vec<Option<Point>> = vec![None; n_pieces];
-    let origin = faces.first().map_or([0.0; 3], |face| position(face[0]));
+    let mut origins: Vec<Option<Point>> = vec![None; n_pieces];
     for some in faces.chunks(LOOK) {
         work.step()?;
-        for face in some {
+        for face in some.iter().filter(|face| has_corners(face)) {
             let piece = topology.piece(VertexIx::new(face[0]));
             let corners = face.map(position);
-            seeds[piece].get_or_insert(corners[0]);
+            // Of the piece itself: from afar, the sign of a small volume would be lost.
+            let origin = *origins[piece].get_or_insert(corners[0]);
             let [p, q, r] = corners.map(|corner| sub(corner, origin));
             volumes[piece] += dot(p, cross(q, r));
         }
     }
-    let mut around = vec![0; n_pieces];
-    if n_pieces > 1 && volumes.iter().any(|&volume| volume < 0.0) {
-        let mut by_y: Vec<(Point, usize)> = (seeds.iter().zip(0..))
-            .filter_map(|(seed, piece)| Some(((*seed)?, piece)))
-            .collect();
-        by_y.sort_unstable_by(|(p, i), (q, j)| p[1].total_cmp(&q[1]).then(i.cmp(j)));
-        for some in faces.chunks(LOOK) {
-            work.step()?;
-            for face in some {
-                let own = topology.piece(VertexIx::new(face[0]));
-                let corners = face.map(position);
-                let ys = corners.map(|corner| corner[1]);
-                let (low, high) = (ys[0].min(ys[1]).min(ys[2]), ys[0].max(ys[1]).max(ys[2]));
-                let first = by_y.partition_point(|(point, _)| point[1] < low);
-                let met = by_y[first..].iter();
-                for (point, piece) in met.take_while(|(point, _)| point[1] <= high) {
-                    if *piece != own {
-                        around[*piece] += passes(point, &corners);
-                    }
-                }
-            }
-        }
-    }
+    let around = match n_pieces > 1 && volumes.iter().any(|&volume| volume < 0.0) {
+        true => around(body, faces, topology, work)?,
+        false => vec![0; n_pieces],
+    };
     let sign = |(&volume, &around): (&f64, &i32)| match volume < 0.0 {
         true if around <= 0 => -1.0,
         false if around < 0 => -1.0,
         _ => 1.0,
     };
     Ok(volumes.iter().zip(&around).map(sign).collect())
+}
+
+/// Whether a face names three vertices.
+fn has_corners([a, b, c]: &[u32; 3]) -> bool {
+    a != b && b != c && c != a
+}
+
+/// How often the others wind around each piece: around a vertex of it that is on none of them, if
+/// one of a few is not.
+fn around(
+    body: &Body,
+    faces: &[[u32; 3]],
+    topology: &EdgesAround,
+    work: Work<'_>,
+) -> Result<Vec<i32>, Error> {
+    let position = |vertex: u32| body.positions().point(vertex as usize);
+    let n_pieces = topology.n_pieces();
+    let mut of_pieces: Vec<Vec<u32>> = vec![Vec::new(); n_pieces];
+    for (ix, face) in (0u32..).zip(faces).filter(|(_, face)| has_corners(face)) {
+        of_pieces[topology.piece(VertexIx::new(face[0]))].push(ix);
+    }
+    let mut found = vec![0; n_pieces];
+    let mut wanted: Vec<usize> = (0..n_pieces)
+        .filter(|&piece| !of_pieces[piece].is_empty())
+        .collect();
+    for attempt in 0..MOST_SEEDS {
+        // From all over the piece.
+        let seed = |piece: usize| {
+            let own = &of_pieces[piece];
+            let face = own[attempt * own.len() / MOST_SEEDS];
+            (position(faces[face as usize][attempt % 3]), piece)
+        };
+        let mut by_y: Vec<(Point, usize)> = wanted.iter().map(|&piece| seed(piece)).collect();
+        by_y.sort_unstable_by(|(p, i), (q, j)| p[1].total_cmp(&q[1]).then(i.cmp(j)));
+        let mut is_on = vec![false; n_pieces];
+        wanted.iter().for_each(|&piece| found[piece] = 0);
+        for some in faces.chunks(LOOK) {
+            work.step()?;
+            for face in some {
+                let own = topology.piece(VertexIx::new(face[0]));
+                let corners = face.map(position);
+                let [low, high] = span(&corners, 1);
+                let first = by_y.partition_point(|(point, _)| point[1] < low);
+                let met = by_y[first..]
+                    .iter()
+                    .take_while(|(point, _)| point[1] <= high);
+                for (point, piece) in met.filter(|(_, piece)| *piece != own) {
+                    found[*piece] += passes(point, &corners);
+                    is_on[*piece] |= may_be_on(point, &corners);
+                }
+            }
+        }
+        wanted.retain(|&piece| is_on[piece]);
+        if wanted.is_empty() {
+            break;
+        }
+    }
+    Ok(found)
+}
+
+/// The lowest and the highest coordinate along an axis.
+fn span(corners: &[Point; 3], axis: usize) -> [f64; 2] {
+    let [p, q, r] = corners.map(|corner| corner[axis]);
+    [p.min(q).min(r), p.max(q).max(r)]
+}
+
+/// Whether a point is in the box of a face and in its plane.
+fn may_be_on(point: &Point, corners: &[Point; 3]) -> bool {
+    let is_between = |axis: usize| {
+        let [low, high] = span(corners, axis);
+        low <= point[axis] && point[axis] <= high
+    };
+    let [a, b, c] = corners;
+    (0..3).all(is_between) && orient3d(a, b, c, point) == Sign::Zero
 }

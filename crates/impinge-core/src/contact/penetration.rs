@@ -347,9 +347,10 @@ impl OverlapWork<'_> {
             return;
         }
         // Curves follow the normals of both, patches that of the first.
+        let length = dot(region.area, region.area).sqrt();
         let is_of_curves = region
             .normal
-            .is_some_and(|normal| dot(normal, region.area) < 0.0);
+            .is_some_and(|normal| length > 0.0 && dot(normal, region.area) < -0.999 * length);
         let turns = if is_of_curves { a * b } else { a };
         region.normal = region.normal.map(|normal| scaled(normal, turns));
         region.area = scaled(region.area, a * b);

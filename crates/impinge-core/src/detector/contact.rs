@@ -3,6 +3,7 @@
 use super::Detector;
 use crate::answers::pairs::Pairs;
 use crate::contact::{Contacts, Penetration};
+use crate::plan::Gaps;
 use crate::query::Query;
 use crate::scene::Scene;
 use crate::scene::error::Error;
@@ -127,10 +128,15 @@ impl Detector {
                 allowed: "those of all pairs of the two",
             })
         };
-        if let Some(what) = contacts.gap_between(scene, [a, b]) {
+        let question = Query::between(a, b);
+        let gap = match are_there {
+            true => contacts.gap_between(scene, [a, b]),
+            false => Gaps::new(scene, &question)?.between(scene, [a, b]),
+        };
+        if let Some(what) = gap {
             return refuse(format!("without some of the two, because of {what},"));
         }
-        if !are_there && self.any(scene, &Query::between(a, b))? {
+        if !are_there && self.any(scene, &question)? {
             return refuse(format!("none of bodies {a} and {b}, which intersect,"));
         }
         Ok(())

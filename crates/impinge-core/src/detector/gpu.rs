@@ -98,7 +98,11 @@ pub(super) fn find_in_step(
     answer: StepAnswer<'_>,
     stats: &mut Stats,
 ) -> Result<ByDevice, Error> {
-    if cfg!(target_family = "wasm") || job.plan.keeps_distance() || job.plan.has_filter() {
+    if cfg!(target_family = "wasm")
+        || job.plan.keeps_distance()
+        || job.plan.has_filter()
+        || (job.plan.leaves_out() && settings.memory_budget.is_some())
+    {
         return Ok(ByDevice::Not);
     }
     let Some(on_device) = engine else {

@@ -303,6 +303,10 @@ impl Engine {
             return Ok(false);
         }
         self.send(job, clusterings, stats).await?;
+        if let Err(Error::Gpu { .. }) = self.send_rules(job.plan) {
+            // They are more than the device can bind.
+            return Ok(false);
+        }
         stats.add_ms("upload", start.elapsed().as_secs_f64() * 1e3);
         let work = Vec::from_iter(self.whole(job.plan));
         let outcome = self.work_off(job, PassSink::Undecided(take), work, stats);
@@ -523,7 +527,8 @@ impl Engine {
     /// The part of the budget that is left for buffers that grow.
     pub(super) fn budget_for_buffers(&self) -> Option<u64> {
         let other = self.other.pass_buffers.bytes();
-        let fixed = self.world.bytes() + other + self.lane.pass_buffers.bytes_of_cells();
+        let own = &self.lane.pass_buffers;
+        let fixed = self.world.bytes() + other + own.bytes_of_cells() + own.rules.bytes();
         let budget = self.settings.memory_budget;
         budget.map(|budget| budget.saturating_sub(fixed))
     }
@@ -558,7 +563,8 @@ impl Engine {
             return Ok(wanted);
         };
         let other = self.other.pass_buffers.bytes();
-        let fixed = self.world.bytes() + other + cells.map_or(0, |cells| cells.bytes());
+        let rules = self.lane.pass_buffers.rules.bytes();
+        let fixed = self.world.bytes() + other + rules + cells.map_or(0, |cells| cells.bytes());
         for wanted in [wanted, held.max(Capacities::LEAST)] {
             if fixed + wanted.bytes() <= budget {
                 return Ok(wanted);

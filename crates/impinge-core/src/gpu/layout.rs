@@ -154,7 +154,17 @@ pub const POINTS: u32 = 8;
 pub const OWN_PARTS: u32 = 16;
 /// Where the number of the body is, in `Body::part`.
 pub const BODY_SHIFT: u32 = 5;
-/// Where marks of vertices begin in the rules about what is left out.
+/// The word of the rules about what is left out that has the number of pairs of groups.
+pub const RULES_N_GROUPS: u32 = 0;
+/// Where these pairs begin.
+pub const RULES_GROUPS: u32 = 1;
+/// Where the lists of vertices begin.
+pub const RULES_LISTS: u32 = 2;
+/// Where the pairs of elements begin.
+pub const RULES_PAIRS: u32 = 3;
+/// The number of these pairs.
+pub const RULES_N_PAIRS: u32 = 4;
+/// Where marks of vertices begin.
 pub const RULES_MARKS: u32 = 5;
 /// Marks vertices that never move, in these rules.
 pub const PINNED: u32 = 0x8000_0000;

@@ -7,7 +7,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use super::engine::Engine;
-use super::layout::{PINNED, RULES_MARKS, Rule};
+use super::layout::{
+    PINNED, RULES_GROUPS, RULES_LISTS, RULES_MARKS, RULES_N_GROUPS, RULES_N_PAIRS, RULES_PAIRS,
+    Rule,
+};
 use super::pass_buffers::RulesOf;
 use super::view::Motion;
 use crate::plan::{LeftOut, Plan};
@@ -70,21 +73,16 @@ fn rules(plan: &Plan, left_out: &LeftOut, bodies: &[(BodyId, u64)]) -> Result<Ve
             group | pinned.map_or(0, |pinned| u32::from(pinned[vertex]) * PINNED)
         }));
     }
-    if !numbers.is_empty() {
-        let n = numbers.len() as u32 + 1;
-        (words[0], words[1]) = (n, words.len() as u32);
-        let mut rows = vec![0u32; (n as usize * n as usize).div_ceil(32)];
-        for (g, h) in left_out.groups() {
-            let [g, h] = [g, h].map(|group| number(group) as usize);
-            for bit in [g * n as usize + h, h * n as usize + g] {
-                rows[bit / 32] |= 1 << (bit % 32);
-            }
-        }
-        words.extend(rows);
-    }
+    let both = left_out
+        .groups()
+        .iter()
+        .flat_map(|&(g, h)| [[g, h], [h, g]]);
+    let both: BTreeSet<[u32; 2]> = both.map(|pair| pair.map(|group| number(&group))).collect();
+    put(&mut words, RULES_GROUPS, both.len() as u32, RULES_N_GROUPS);
+    words.extend(both.into_iter().flatten());
     let lists: Vec<([BodyId; 2], &VertexRings)> = left_out.lists(plan).collect();
     if !lists.is_empty() {
-        words[2] = words.len() as u32;
+        words[RULES_LISTS as usize] = words.len() as u32;
         put_lists(&mut words, bodies, &firsts, &lists)?;
     }
     let mut keys: Vec<u64> = Vec::new();
@@ -92,13 +90,19 @@ fn rules(plan: &Plan, left_out: &LeftOut, bodies: &[(BodyId, u64)]) -> Result<Ve
     reserve(&mut keys, n_keys, WHAT)?;
     keys.extend(left_out.keys().flatten());
     keys.sort_unstable();
-    (words[3], words[4]) = (words.len() as u32, keys.len() as u32);
+    put(&mut words, RULES_PAIRS, keys.len() as u32, RULES_N_PAIRS);
     reserve(&mut words, 2 * keys.len(), WHAT)?;
     words.extend(
         keys.iter()
             .flat_map(|&key| [(key >> 32) as u32, key as u32]),
     );
     Ok(words.into_iter().map(|word| Rule { word }).collect())
+}
+
+/// Says that so many pairs begin here.
+fn put(words: &mut [u32], at: u32, n: u32, n_at: u32) {
+    words[at as usize] = words.len() as u32;
+    words[n_at as usize] = n;
 }
 
 /// Appends where the list of each vertex begins, and all lists.

@@ -196,6 +196,13 @@ fn constants_are_those_of_the_host() {
         ("POINTS", POINTS),
         ("OWN_PARTS", OWN_PARTS),
         ("BODY_SHIFT", BODY_SHIFT),
+        ("RULES_N_GROUPS", RULES_N_GROUPS),
+        ("RULES_GROUPS", RULES_GROUPS),
+        ("RULES_LISTS", RULES_LISTS),
+        ("RULES_PAIRS", RULES_PAIRS),
+        ("RULES_N_PAIRS", RULES_N_PAIRS),
+        ("RULES_MARKS", RULES_MARKS),
+        ("PINNED", PINNED),
     ] {
         assert_eq!(constant(&module, name), f64::from(host), "{name}");
     }

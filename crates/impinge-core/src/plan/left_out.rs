@@ -75,13 +75,18 @@ impl Gaps {
             Some((&left_out.parts[part], scene.body(id).ok()?.elements()))
         };
         let of = [of(a)?, of(b)?];
-        let is_listed = |of: &VertexList| of.bodies == [a, b] || of.bodies == [b, a];
+        let is_listed =
+            |of: &VertexList| (of.bodies == [a, b] || of.bodies == [b, a]) && !of.lists.is_empty();
+        let [of_a, of_b] = of.map(|(of, _)| of.groups.as_deref().unwrap_or_default());
+        let meet_not = |&(g, h): &(u32, u32)| {
+            (of_a.contains(&g) && of_b.contains(&h)) || (of_a.contains(&h) && of_b.contains(&g))
+        };
         let has_pinned = |(of, elements): &(&OfPart, &Elements)| {
             of.pinned.as_ref().is_some_and(|pinned| {
                 (0..elements.len()).any(|ix| are_all_pinned(pinned, elements.corners(ix)))
             })
         };
-        if !left_out.groups.is_empty() && of.iter().all(|(of, _)| of.groups.is_some()) {
+        if left_out.groups.iter().any(meet_not) {
             Some("groups")
         } else if left_out.vertices.iter().any(is_listed) {
             Some("lists of vertices")

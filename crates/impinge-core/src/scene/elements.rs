@@ -246,6 +246,11 @@ impl VertexRings {
         VertexRings { starts, vertices }
     }
 
+    /// Whether nothing is listed.
+    pub fn is_empty(&self) -> bool {
+        self.vertices.is_empty()
+    }
+
     /// Whether any of some vertices is in the rings of a vertex.
     #[inline]
     pub fn reaches_any(&self, from: u32, to: &[u32]) -> bool {

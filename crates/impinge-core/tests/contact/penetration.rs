@@ -401,11 +401,49 @@ fn contacts_of_a_query_that_left_out_pairs_of_the_two_are_refused() {
         );
         assert_eq!(error, told);
     }
-    let rings = Query::all().exclude(Exclusion::rings(2));
-    assert_eq!(ask(&rings, [a, b]).unwrap(), whole);
+    let none = Exclusion::vertices(a, b, vec![0; n + 1], [0u32; 0]);
+    for query in [
+        Query::all().exclude(Exclusion::rings(2)),
+        Query::all().exclude(Exclusion::groups(1, 5)),
+        Query::all().exclude(none),
+    ] {
+        assert_eq!(ask(&query, [a, b]).unwrap(), whole);
+    }
     let cell = Query::all().owned_by([-10.0; 3], [0.5, 10.0, 10.0]);
     let error = ask(&cell, [b, c]).unwrap_err().to_string();
     assert!(error.contains("because of a cell"), "{error}");
+}
+
+/// Contacts of other bodies, or of before, say nothing of two that are pinned.
+#[test]
+fn pinned_bodies_are_refused_whatever_the_contacts_are_of() {
+    let ball = surfaces::bumpy_ball(300, 0.2);
+    let mut scene = Scene::new();
+    let [a, b, c] = [[0.0; 3], [9.0, 0.1, 0.0], [0.3, 0.2, 0.6]].map(|place| {
+        let moved = ball.translated(place);
+        scene.add((moved.elements, moved.positions)).unwrap()
+    });
+    let n = scene.body(a).unwrap().n_vertices();
+    let mut detector = Detector::new(Backend::Cpu).unwrap();
+    let mut contacts = |scene: &Scene, query: &Query| {
+        let pairs = detector.detect(scene, query).unwrap().clone();
+        detector.contacts(scene, &pairs).unwrap()
+    };
+    let before = contacts(&scene, &Query::all());
+    scene
+        .set_positions(b, &ball.translated([0.7, 0.1, 0.0]).positions)
+        .unwrap();
+    for body in [a, b] {
+        scene.set_pinned(body, &vec![true; n]).unwrap();
+    }
+    let of_others = contacts(&scene, &Query::between(a, c));
+    for contacts in [&before, &of_others] {
+        let error = detector
+            .penetration(&scene, contacts, a, b)
+            .unwrap_err()
+            .to_string();
+        assert!(error.contains("pinned faces of both"), "{error}");
+    }
 }
 
 /// Pairs of pinned faces are never found, so contacts are not all of the two bodies.
@@ -477,34 +515,121 @@ fn pairs_of_bodies_among_many_are_as_if_alone() {
     }
 }
 
+/// The faces of a surface.
+fn faces(model: &Model) -> &[[u32; 3]] {
+    match &model.elements {
+        Elements::Triangles(faces) => faces,
+        _ => panic!("a surface"),
+    }
+}
+
+/// With the faces turned.
+fn inside_out(model: &Model) -> Model {
+    let turned: Vec<[u32; 3]> = faces(model).iter().map(|&[a, b, c]| [a, c, b]).collect();
+    Model {
+        elements: turned.into(),
+        positions: model.positions.clone(),
+    }
+}
+
+fn joined(models: &[Model]) -> Model {
+    let (mut all, mut positions) = (Vec::new(), Vec::new());
+    for model in models {
+        let first = positions.len() as u32;
+        all.extend((faces(model).iter()).map(|face| face.map(|vertex| vertex + first)));
+        positions.extend(&model.positions);
+    }
+    Model {
+        elements: all.into(),
+        positions,
+    }
+}
+
+/// The wall of a cavity may touch the surface around it, with the first of its vertices.
+#[test]
+fn cavities_that_touch_are_cavities_inside_out_or_not() {
+    let cube = surfaces::cuboid([0.0; 3], [2.0; 3]);
+    let other = surfaces::cuboid([0.91, -0.53, 0.47], [1.23, 3.1, 1.49]);
+    for touches in [
+        [2.0, 1.0, 1.0],
+        [0.0, 1.0, 1.0],
+        [1.0, 2.0, 1.0],
+        [1.0, 1.0, 0.0],
+    ] {
+        let solid = Model {
+            elements: vec![[0u32, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]].into(),
+            positions: vec![
+                touches,
+                [1.4, 0.61, 0.7],
+                [0.6, 1.3, 0.62],
+                [1.03, 1.07, 1.6],
+            ],
+        };
+        let volume = |model: &Model| overlap(model, &other).volume().expect("generic");
+        let solid_volume = volume(&solid).abs();
+        let is_outward = {
+            let [a, b, c, d] = [0, 1, 2, 3].map(|k| solid.positions[k].map(f64::from));
+            let [u, v, w] = [b, c, d].map(|p| [0, 1, 2].map(|k| p[k] - a[k]));
+            let det = u[0] * (v[1] * w[2] - v[2] * w[1]) - u[1] * (v[0] * w[2] - v[2] * w[0])
+                + u[2] * (v[0] * w[1] - v[1] * w[0]);
+            det > 0.0
+        };
+        let wall = if is_outward {
+            inside_out(&solid)
+        } else {
+            solid.clone()
+        };
+        let hollow = joined(&[cube.clone(), wall]);
+        let expected = volume(&cube) - solid_volume;
+        assert!(solid_volume > 0.01, "{solid_volume}");
+        for model in [&hollow, &inside_out(&hollow)] {
+            let found = volume(model);
+            assert!(
+                (found - expected).abs() < 1e-6,
+                "{touches:?}: {found} for {expected}"
+            );
+        }
+    }
+}
+
+/// The volume of a small piece is lost in sums from afar.
+#[test]
+fn small_pieces_far_apart_face_as_they_do() {
+    let ball = surfaces::bumpy_ball(100, 0.2);
+    let at = |x: f64| -> Vec<[f64; 3]> {
+        let points = ball
+            .positions
+            .iter()
+            .map(|p| p.map(|x| 1e-4 * f64::from(x)));
+        points.map(|[px, y, z]| [px + x, y + x, z]).collect()
+    };
+    let n = ball.positions.len() as u32;
+    let other = faces(&ball)
+        .iter()
+        .map(|face| face.map(|vertex| vertex + n));
+    let both: Vec<[u32; 3]> = faces(&ball).iter().copied().chain(other).collect();
+    for place in [1e4, 2.3e4, 3.1e4, 4.7e4, 5.9e4] {
+        let mut scene = Scene::new();
+        let ends = [at(0.0), at(place)].concat();
+        let a = scene.add_triangles(&both, &ends).unwrap();
+        let b = scene
+            .add_triangles(faces(&ball), &at(place + 2e-5))
+            .unwrap();
+        let mut detector = Detector::new(Backend::Cpu).unwrap();
+        let pairs = detector.detect(&scene, &Query::between(a, b)).unwrap();
+        let pairs = pairs.clone();
+        let contacts = detector.contacts(&scene, &pairs).unwrap();
+        let found = detector.penetration(&scene, &contacts, a, b).unwrap();
+        assert!(found.volume().unwrap() > 0.0, "{:?}", found.regions);
+        let normal = found.regions[0].normal.unwrap();
+        assert!(normal[0] < 0.0, "the first is pushed back: {normal:?}");
+    }
+}
+
 /// Faces may be turned inwards: what two bodies have in common, and which way is out, do not depend on it.
 #[test]
 fn bodies_that_are_inside_out_overlap_as_they_are() {
-    let turned = |model: &Model| -> Model {
-        let Elements::Triangles(faces) = &model.elements else {
-            panic!("a surface");
-        };
-        let faces: Vec<[u32; 3]> = faces.iter().map(|&[a, b, c]| [a, c, b]).collect();
-        Model {
-            elements: faces.into(),
-            positions: model.positions.clone(),
-        }
-    };
-    let joined = |models: &[Model]| -> Model {
-        let (mut all, mut positions) = (Vec::new(), Vec::new());
-        for model in models {
-            let Elements::Triangles(faces) = &model.elements else {
-                panic!("a surface");
-            };
-            let first = positions.len() as u32;
-            all.extend(faces.iter().map(|face| face.map(|vertex| vertex + first)));
-            positions.extend(&model.positions);
-        }
-        Model {
-            elements: all.into(),
-            positions,
-        }
-    };
+    let turned = inside_out;
     let ball = surfaces::bumpy_ball(400, 0.2);
     let shell = |model: &Model, size: f32| model.mapped(|at| at.map(|x| size * x));
     // A ball with a cavity, and another one inside that.

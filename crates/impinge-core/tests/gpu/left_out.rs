@@ -10,7 +10,9 @@ use crate::lists::frame;
 use crate::resident_steps::{assert_between, listed};
 use crate::safe::{check_asked, safe_of};
 
-use impinge_core::{Backend, BodyId, Detector, Exclusion, Query, Scene, Settings};
+use impinge_core::{
+    Backend, BodyId, Detector, Elements, Exclusion, Positions, Query, Scene, Settings,
+};
 use impinge_scenes::{Random, solids, surfaces};
 
 /// Two balls that run into each other, one of them folded so that it meets itself, and a solid of
@@ -126,6 +128,28 @@ fn steps_and_safe_distances_on_the_device_leave_out_what_the_question_does() {
         }
     }
     assert!(n_some >= 12, "{n_some}");
+
+    // The same query after a body was re-meshed: rings are of other elements.
+    let query = Query::all().exclude(Exclusion::rings(1));
+    for step in 0..2 {
+        let (found, pairs, _) = listed(&caller, &mut detector, &scene, &query, [&[], &[]]);
+        assert_between("re-meshed", &found, &pairs, &scene, &query, &query);
+        let body = scene.body(bodies[0]).expect("held");
+        let ends = body.end_positions().expect("it moves").clone();
+        let Elements::Triangles(faces) = body.elements() else {
+            panic!("a surface");
+        };
+        let faces: Vec<[u32; 3]> = faces.iter().copied().step_by(2 + step).collect();
+        let mesh = (Elements::from(faces), body.positions().clone());
+        scene.remesh(bodies[0], mesh).expect("good");
+        match ends {
+            Positions::F32(ends) => scene.set_end_positions(bodies[0], &ends),
+            Positions::F64(ends) => scene.set_end_positions(bodies[0], &ends),
+        }
+        .expect("good");
+    }
+    let (found, pairs, _) = listed(&caller, &mut detector, &scene, &query, [&[], &[]]);
+    assert_between("re-meshed", &found, &pairs, &scene, &query, &query);
 }
 
 #[test]
@@ -133,8 +157,11 @@ fn frames_on_the_device_leave_out_what_the_question_does() {
     let caller = Caller::new();
     let mut random = Random::new(92);
     let (mut scene, bodies) = scene();
-    let pinned = vec![true; scene.body(bodies[0]).expect("held").n_vertices()];
-    scene.set_pinned(bodies[0], &pinned).expect("good");
+    let free = scene.clone();
+    for &body in &bodies[..2] {
+        let pinned = vec![true; scene.body(body).expect("held").n_vertices()];
+        scene.set_pinned(body, &pinned).expect("good");
+    }
     for method in [impinge_core::Method::Auto, impinge_core::Method::Cells] {
         let mut detector = caller.detector(Settings::default().method(method));
         let mut cpu = Detector::new(Backend::Cpu).expect("settings");
@@ -142,13 +169,10 @@ fn frames_on_the_device_leave_out_what_the_question_does() {
             if !has_intersections {
                 continue;
             }
-            let ([certain, unsure], _) = loop {
+            let [certain, unsure] = loop {
                 let (lists, is_complete) = frame(&caller, &mut detector, &scene, &query);
                 if is_complete {
-                    break (
-                        lists.map(|list| BTreeSet::from_iter(list.expect("complete"))),
-                        (),
-                    );
+                    break lists.map(|list| BTreeSet::from_iter(list.expect("complete")));
                 }
             };
             // Numbers of primitives, body after body.
@@ -161,13 +185,13 @@ fn frames_on_the_device_leave_out_what_the_question_does() {
                     own
                 })
                 .collect();
-            let mut numbers = |query: &Query| -> BTreeSet<[u32; 2]> {
-                let pairs = cpu.detect(&scene, query).expect("good");
+            let mut numbers = |scene: &Scene, query: &Query| -> BTreeSet<[u32; 2]> {
+                let pairs = cpu.detect(scene, query).expect("good");
                 let rows = pairs.rows();
                 rows.map(|[a, i, b, j]| [firsts[a as usize] + i, firsts[b as usize] + j])
                     .collect()
             };
-            let (held, all) = (numbers(&query), numbers(&Query::all()));
+            let (held, all) = (numbers(&scene, &query), numbers(&free, &Query::all()));
             assert!(!held.is_empty() && held.len() < all.len(), "{name}");
             assert!(certain.is_subset(&held), "{name}");
             let listed: BTreeSet<[u32; 2]> = certain.union(&unsure).copied().collect();

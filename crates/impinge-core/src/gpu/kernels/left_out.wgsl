@@ -5,7 +5,7 @@
 //
 //   rules  [..5]: where each of the following begins, see RULES in layout.wgsl
 //          of each vertex: bit 31 pinned, below the number of its group; 0: none that is named
-//          a row of bits per group: with which groups its vertices do not meet
+//          pairs of groups that do not meet, both ways, sorted
 //          of each vertex: where its list begins, and where the last one ends; the lists, each sorted
 //          pairs of element numbers, sorted
 
@@ -24,20 +24,41 @@ fn are_pinned(corner: vec4<u32>) -> bool {
     return (mark(corner.x) & mark(corner.y) & mark(corner.z) & mark(corner.w) & PINNED) != 0u;
 }
 
+// Whether a pair is among n sorted ones.
+fn has_pair(first: u32, n: u32, pair: vec2<u32>) -> bool {
+    var low = 0u;
+    var high = n;
+    while low < high {
+        let middle = low + (high - low) / 2u;
+        let held = vec2<u32>(rules[first + 2u * middle], rules[first + 2u * middle + 1u]);
+        if all(held == pair) {
+            return true;
+        }
+        if held.x < pair.x || (held.x == pair.x && held.y < pair.y) {
+            low = middle + 1u;
+        } else {
+            high = middle;
+        }
+    }
+    return false;
+}
+
 // Whether each vertex of one is in a group that does not meet that of each vertex of the other.
 fn are_apart(a: vec4<u32>, b: vec4<u32>) -> bool {
     let n = rules[RULES_N_GROUPS];
     if n == 0u {
         return false;
     }
-    let rows = rules[RULES_GROUPS];
+    let groups = rules[RULES_GROUPS];
     var of_a = array<u32, 4>(a.x, a.y, a.z, a.w);
     var of_b = array<u32, 4>(b.x, b.y, b.z, b.w);
     for (var i = 0u; i < 4u; i++) {
-        let row = (mark(of_a[i]) & ~PINNED) * n;
+        if i > 0u && of_a[i] == of_a[i - 1u] {
+            continue;
+        }
         for (var j = 0u; j < 4u; j++) {
-            let bit = row + (mark(of_b[j]) & ~PINNED);
-            if ((rules[rows + bit / 32u] >> (bit % 32u)) & 1u) == 0u {
+            let pair = vec2<u32>(mark(of_a[i]) & ~PINNED, mark(of_b[j]) & ~PINNED);
+            if !has_pair(groups, n, pair) {
                 return false;
             }
         }
@@ -93,25 +114,8 @@ fn are_named(candidate: Candidate) -> bool {
         return false;
     }
     let numbers = vec2<u32>(number_at(candidate.a & ~FLAG), number_at(candidate.b & ~FLAG));
-    let first = min(numbers.x, numbers.y);
-    let second = max(numbers.x, numbers.y);
-    let pairs = rules[RULES_PAIRS];
-    var low = 0u;
-    var high = n;
-    while low < high {
-        let middle = low + (high - low) / 2u;
-        let held_first = rules[pairs + 2u * middle];
-        let held_second = rules[pairs + 2u * middle + 1u];
-        if held_first == first && held_second == second {
-            return true;
-        }
-        if held_first < first || (held_first == first && held_second < second) {
-            low = middle + 1u;
-        } else {
-            high = middle;
-        }
-    }
-    return false;
+    let pair = vec2<u32>(min(numbers.x, numbers.y), max(numbers.x, numbers.y));
+    return has_pair(rules[RULES_PAIRS], n, pair);
 }
 
 @compute @workgroup_size(64)

@@ -220,7 +220,7 @@ const NO_ROOT: u32 = 0xffffffffu;
 // A candidate that the question leaves out.
 const NOTHING: u32 = 0xffffffffu;
 
-// Words of the rules about what is left out: the number of groups, where their rows begin, where the lists of vertices begin (0: there
+// Words of the rules about what is left out: the number of pairs of groups, where they begin, where the lists of vertices begin (0: there
 // are none), where pairs begin, how many; then a mark per vertex.
 const RULES_N_GROUPS: u32 = 0u;
 const RULES_GROUPS: u32 = 1u;
