@@ -152,8 +152,29 @@ fn bounds(body: &Body) -> Option<[Point; 2]> {
         })
 }
 
+/// Numbered points, sorted by y: rays are met by few of the faces.
+pub(super) struct ByY(Vec<(Point, u32)>);
+
+impl ByY {
+    pub fn new(mut points: Vec<(Point, u32)>) -> Self {
+        points.sort_unstable_by(|(p, i), (q, j)| p[1].total_cmp(&q[1]).then(i.cmp(j)));
+        ByY(points)
+    }
+
+    /// The points whose ray may pass a face, and their numbers.
+    #[inline]
+    pub fn near(&self, corners: &[Point; 3]) -> impl Iterator<Item = (&Point, usize)> {
+        let ys = corners.map(|corner| corner[1]);
+        let (low, high) = (ys[0].min(ys[1]).min(ys[2]), ys[0].max(ys[1]).max(ys[2]));
+        let first = self.0.partition_point(|(point, _)| point[1] < low);
+        let near = self.0[first..].iter();
+        near.take_while(move |(point, _)| point[1] <= high)
+            .map(|(point, number)| (point, *number as usize))
+    }
+}
+
 /// How often a closed surface winds around each point, none of which lies on it.
-fn windings(mut seeds: Vec<(Point, u32)>, body: &Body, work: Work<'_>) -> Result<Vec<i32>, Error> {
+fn windings(seeds: Vec<(Point, u32)>, body: &Body, work: Work<'_>) -> Result<Vec<i32>, Error> {
     let n = seeds.len();
     let Elements::Triangles(faces) = body.elements() else {
         return Ok(vec![0; n]);
@@ -161,17 +182,11 @@ fn windings(mut seeds: Vec<(Point, u32)>, body: &Body, work: Work<'_>) -> Result
     if n == 0 {
         return Ok(Vec::new());
     }
-    seeds.sort_unstable_by(|(p, i), (q, j)| p[1].total_cmp(&q[1]).then(i.cmp(j)));
+    let seeds = ByY::new(seeds);
     let add = |sums: &mut [i32], face: &[u32; 3]| {
         let corners = face.map(|vertex| body.positions().point(vertex as usize));
-        let ys = corners.map(|corner| corner[1]);
-        let (low, high) = (ys[0].min(ys[1]).min(ys[2]), ys[0].max(ys[1]).max(ys[2]));
-        let first = seeds.partition_point(|(point, _)| point[1] < low);
-        for (point, number) in &seeds[first..] {
-            if point[1] > high {
-                break;
-            }
-            sums[*number as usize] += passes(point, &corners);
+        for (point, number) in seeds.near(&corners) {
+            sums[number] += passes(point, &corners);
         }
     };
     // A task of few faces takes less than its list of sums if there are many seeds.

@@ -164,9 +164,9 @@ impl Contacts {
         }
     }
 
-    /// What of the question left out pairs of two bodies, which have not moved since, if anything did.
-    pub(crate) fn gap_between(&self, scene: &Scene, ids: [BodyId; 2]) -> Option<&'static str> {
-        self.gaps.between(scene, ids)
+    /// Why pairs of two bodies may not be among these.
+    pub(crate) fn gaps(&self) -> &Gaps {
+        &self.gaps
     }
 
     /// Bytes of the lists with an entry per contact, corner or point.
@@ -254,7 +254,7 @@ impl Contacts {
     pub fn regions(&self) -> Result<Vec<Region>, Error> {
         let mut sets = Sets::new(self.points.len(), regions::WHAT)?;
         regions::join_contacts(self, &mut sets);
-        let (regions, _) = regions::regions(self, &self.curves()?, &mut sets)?;
+        let (regions, _) = regions::regions(self, &self.curves()?, &mut sets, |_| [1.0; 2])?;
         Ok(regions)
     }
 

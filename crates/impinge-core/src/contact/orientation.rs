@@ -9,7 +9,7 @@
 //! Cost: a sum over all faces; with several pieces, some of which face inwards or are cavities, also a
 //! ray for each.
 
-use super::inside::passes;
+use super::inside::{ByY, passes};
 use super::topology::EdgesAround;
 use crate::scene::Body;
 use crate::scene::elements::Elements;
@@ -52,10 +52,9 @@ pub(super) fn orientations(
         true => around(body, faces, topology, work)?,
         false => vec![0; n_pieces],
     };
-    let sign = |(&volume, &around): (&f64, &i32)| match volume < 0.0 {
-        true if around <= 0 => -1.0,
-        false if around < 0 => -1.0,
-        _ => 1.0,
+    let sign = |(&volume, &around): (&f64, &i32)| {
+        let is_inward = around < 0 || (volume < 0.0 && around == 0);
+        if is_inward { -1.0 } else { 1.0 }
     };
     Ok(volumes.iter().zip(&around).map(sign).collect())
 }
@@ -88,10 +87,10 @@ fn around(
         let seed = |piece: usize| {
             let own = &of_pieces[piece];
             let face = own[attempt * own.len() / MOST_SEEDS];
-            (position(faces[face as usize][attempt % 3]), piece)
+            // There are no more pieces than vertices.
+            (position(faces[face as usize][attempt % 3]), piece as u32)
         };
-        let mut by_y: Vec<(Point, usize)> = wanted.iter().map(|&piece| seed(piece)).collect();
-        by_y.sort_unstable_by(|(p, i), (q, j)| p[1].total_cmp(&q[1]).then(i.cmp(j)));
+        let seeds = ByY::new(wanted.iter().map(|&piece| seed(piece)).collect());
         let mut is_on = vec![false; n_pieces];
         wanted.iter().for_each(|&piece| found[piece] = 0);
         for some in faces.chunks(LOOK) {
@@ -99,14 +98,9 @@ fn around(
             for face in some {
                 let own = topology.piece(VertexIx::new(face[0]));
                 let corners = face.map(position);
-                let [low, high] = span(&corners, 1);
-                let first = by_y.partition_point(|(point, _)| point[1] < low);
-                let met = by_y[first..]
-                    .iter()
-                    .take_while(|(point, _)| point[1] <= high);
-                for (point, piece) in met.filter(|(_, piece)| *piece != own) {
-                    found[*piece] += passes(point, &corners);
-                    is_on[*piece] |= may_be_on(point, &corners);
+                for (point, piece) in seeds.near(&corners).filter(|(_, piece)| *piece != own) {
+                    found[piece] += passes(point, &corners);
+                    is_on[piece] |= may_be_on(point, &corners);
                 }
             }
         }
@@ -118,17 +112,11 @@ fn around(
     Ok(found)
 }
 
-/// The lowest and the highest coordinate along an axis.
-fn span(corners: &[Point; 3], axis: usize) -> [f64; 2] {
-    let [p, q, r] = corners.map(|corner| corner[axis]);
-    [p.min(q).min(r), p.max(q).max(r)]
-}
-
 /// Whether a point is in the box of a face and in its plane.
 fn may_be_on(point: &Point, corners: &[Point; 3]) -> bool {
     let is_between = |axis: usize| {
-        let [low, high] = span(corners, axis);
-        low <= point[axis] && point[axis] <= high
+        let [p, q, r] = corners.map(|corner| corner[axis]);
+        p.min(q).min(r) <= point[axis] && point[axis] <= p.max(q).max(r)
     };
     let [a, b, c] = corners;
     (0..3).all(is_between) && orient3d(a, b, c, point) == Sign::Zero

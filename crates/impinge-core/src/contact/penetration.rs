@@ -280,8 +280,9 @@ impl OverlapWork<'_> {
         work.step()?;
         let curves = Curves::new(self.contacts)?;
         work.step()?;
-        let (mut regions, mut region_of) = regions(self.contacts, &curves, &mut sets)?;
-        regions.iter_mut().for_each(|region| self.turn(region));
+        let orientations = |contact| self.orientations_of(contact);
+        let (mut regions, mut region_of) =
+            regions(self.contacts, &curves, &mut sets, orientations)?;
         let numbers = [0, 1].map(|side| self.crossings[side].body);
         let mut inside = [Vec::new(), Vec::new()];
         for (side, inside) in inside.iter_mut().enumerate() {
@@ -328,32 +329,6 @@ impl OverlapWork<'_> {
     fn orientations_of(&self, contact: u32) -> [f64; 2] {
         let [_, a, _, b] = self.contacts.rows()[contact as usize];
         [self.orientation(0, a), self.orientation(1, b)]
-    }
-
-    /// Turns a region's area and normal, which take faces as they are, to where they belong if
-    /// faces are turned inwards.
-    fn turn(&self, region: &mut Region) {
-        if region.bodies != [0, 1].map(|side| self.crossings[side].body) {
-            return;
-        }
-        let mut all = region
-            .contacts
-            .iter()
-            .map(|&contact| self.orientations_of(contact));
-        let Some([a, b]) = all.next() else { return };
-        if all.any(|other| other != [a, b]) {
-            // Some faces of one body are turned, and some are not.
-            region.normal = None;
-            return;
-        }
-        // Curves follow the normals of both, patches that of the first.
-        let length = dot(region.area, region.area).sqrt();
-        let is_of_curves = region
-            .normal
-            .is_some_and(|normal| length > 0.0 && dot(normal, region.area) < -0.999 * length);
-        let turns = if is_of_curves { a * b } else { a };
-        region.normal = region.normal.map(|normal| scaled(normal, turns));
-        region.area = scaled(region.area, a * b);
     }
 
     /// The number, among the members of the sets, of a vertex that is inside.

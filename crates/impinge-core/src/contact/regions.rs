@@ -84,11 +84,13 @@ pub(super) fn join_contacts(contacts: &Contacts, sets: &mut Sets) {
 }
 
 /// The regions of sets of points, in the order of their first contacts, and the region of each
-/// point that stands for its set ([`NO_REGION`] for other points).
+/// point that stands for its set ([`NO_REGION`] for other points). `orientations`: of the two faces
+/// of a contact, -1 if it is turned inwards, else 1.
 pub(super) fn regions(
     contacts: &Contacts,
     curves: &Curves,
     sets: &mut Sets,
+    orientations: impl Fn(u32) -> [f64; 2],
 ) -> Result<(Vec<Region>, Vec<u32>), Error> {
     let mut region_of = filled(NO_REGION, sets.len(), WHAT)?;
     let mut regions: Vec<Region> = Vec::new();
@@ -111,6 +113,8 @@ pub(super) fn regions(
         let (region, middle) = (&mut regions[at], &mut middles[at]);
         grow(&mut region.contacts, 1, WHAT)?;
         region.contacts.push(contact as u32);
+        let faces = orientations(contact as u32);
+        middle.is_mixed |= *middle.faces.get_or_insert(faces) != faces;
         let points: Vec<Point> = corners
             .iter()
             .map(|&point| contacts.points()[point as usize])
@@ -126,7 +130,7 @@ pub(super) fn regions(
                 let area = scaled(cross(sub(q, p), sub(r, p)), 0.5);
                 let size = dot(area, area).sqrt();
                 region.patch_area += size;
-                middle.patch = add(middle.patch, area);
+                middle.patch = add(middle.patch, scaled(area, faces[0]));
                 middle
                     .patches
                     .take(scaled(add(add(p, q), r), 1.0 / 3.0), size);
@@ -183,6 +187,9 @@ struct Middles {
     points: Sum,
     /// The area of all patches as a vector.
     patch: Point,
+    /// The orientations of the faces of the first contact, and whether others differ.
+    faces: Option<[f64; 2]>,
+    is_mixed: bool,
 }
 
 impl Default for Middles {
@@ -193,6 +200,8 @@ impl Default for Middles {
             patches: Sum::default(),
             points: Sum::default(),
             patch: [0.0; 3],
+            faces: None,
+            is_mixed: false,
         }
     }
 }
@@ -245,6 +254,14 @@ impl Region {
         self.position = found
             .or_else(|| middles.points.middle())
             .unwrap_or(self.position);
+        if middles.is_mixed {
+            // Some faces of one body are turned inwards, and some are not.
+            return;
+        }
+        // Curves follow the normals of both.
+        if let Some([a, b]) = middles.faces {
+            self.area = scaled(self.area, a * b);
+        }
         let noise = self.noise(is_single);
         let normal = |area: Point| {
             let length = dot(area, area).sqrt();

@@ -130,7 +130,7 @@ impl Detector {
         };
         let question = Query::between(a, b);
         let gap = match are_there {
-            true => contacts.gap_between(scene, [a, b]),
+            true => contacts.gaps().between(scene, [a, b]),
             false => Gaps::new(scene, &question)?.between(scene, [a, b]),
         };
         if let Some(what) = gap {

@@ -23,16 +23,20 @@ use crate::search::sink::reserve;
 const WHAT: &str = "what is left out on the device";
 
 impl Engine {
-    /// Sends the rules of a question, if it leaves out pairs and they are not there. Returns whether
-    /// there are any. Frames that the host reads leave out pairs on the host, also where they are
-    /// split.
+    /// Whether the device leaves out candidates of a question, by the rules that were sent. Of
+    /// frames that the host reads, the host leaves them out, also where they are split.
+    pub(super) fn has_rules(&self, plan: &Plan) -> bool {
+        let is_of_host = self.lane.motion == Motion::Still && !self.lane.is_encoded;
+        plan.leaves_out() && !is_of_host
+    }
+
+    /// Sends the rules of a question, if it has any and they are not there.
     ///
     /// # Errors
     /// More than the device can bind at once; no memory.
-    pub(super) fn send_rules(&mut self, plan: &Plan) -> Result<bool, Error> {
-        let is_of_host = self.lane.motion == Motion::Still && !self.lane.is_encoded;
-        let Some(left_out) = plan.left_out().filter(|_| !is_of_host) else {
-            return Ok(false);
+    pub(super) fn send_rules(&mut self, plan: &Plan) -> Result<(), Error> {
+        let Some(left_out) = plan.left_out() else {
+            return Ok(());
         };
         let bodies: Vec<(BodyId, u64)> = self.world.bodies().collect();
         let pass_buffers = &mut self.lane.pass_buffers;
@@ -44,7 +48,7 @@ impl Engine {
             let left_out = Arc::clone(left_out);
             pass_buffers.rules_of = Some(RulesOf { left_out, bodies });
         }
-        Ok(true)
+        Ok(())
     }
 }
 

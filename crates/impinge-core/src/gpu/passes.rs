@@ -302,7 +302,7 @@ impl Engine {
         // Buffers that are replaced should be free.
         self.lane.recording = Recording::default();
         self.lane.pass_buffers.resize(&self.gpu, &capacities, cells);
-        let leaves_out = self.send_rules(plan)?;
+        let leaves_out = self.has_rules(plan);
         let mut recording = Recording::default();
         // The caller's step begins with nothing known.
         let sought = (!self.lane.is_encoded).then_some(self.sought);

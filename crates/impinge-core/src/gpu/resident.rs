@@ -431,6 +431,7 @@ impl Engine {
         let of = (scene, job.workers);
         self.world
             .encode_positions(&self.gpu, of, self.lane.motion, resident, encoder);
+        self.send_rules(plan)?;
         let cells = self.cells_wanted(plan);
         let capacities = self.first_capacities(cells)?;
         let work = self.whole(plan);

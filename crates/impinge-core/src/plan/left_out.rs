@@ -116,6 +116,11 @@ pub(crate) struct OwnRule {
     pub pairs: Vec<SortedKeys>,
 }
 
+/// Whether both hold the same, not only equals.
+fn are_same<T: ?Sized>(a: &[Arc<T>], b: &[Arc<T>]) -> bool {
+    a.len() == b.len() && a.iter().zip(b).all(|(a, b)| Arc::ptr_eq(a, b))
+}
+
 impl OwnRule {
     /// Whether nothing is left out.
     pub fn is_empty(&self) -> bool {
@@ -124,9 +129,6 @@ impl OwnRule {
 
     /// Whether two rules are of the same lists.
     pub fn is(&self, other: &OwnRule) -> bool {
-        fn are_same<T: ?Sized>(a: &[Arc<T>], b: &[Arc<T>]) -> bool {
-            a.len() == b.len() && a.iter().zip(b).all(|(a, b)| Arc::ptr_eq(a, b))
-        }
         are_same(&self.lists, &other.lists) && are_same(&self.pairs, &other.pairs)
     }
 }
@@ -187,25 +189,20 @@ impl LeftOut {
 impl LeftOut {
     /// Whether it is the same, of the same parts.
     pub fn is(&self, other: &LeftOut) -> bool {
-        fn are_same<T: ?Sized>(a: Option<&Arc<T>>, b: Option<&Arc<T>>) -> bool {
-            a.map(Arc::as_ptr) == b.map(Arc::as_ptr)
-        }
         let is_part = |(a, b): (&OfPart, &OfPart)| {
-            are_same(a.rings.as_ref(), b.rings.as_ref())
-                && are_same(a.groups.as_ref(), b.groups.as_ref())
-                && are_same(a.pinned.as_ref(), b.pinned.as_ref())
+            are_same(a.rings.as_slice(), b.rings.as_slice())
+                && are_same(a.groups.as_slice(), b.groups.as_slice())
+                && are_same(a.pinned.as_slice(), b.pinned.as_slice())
         };
         let is_list = |(a, b): (&VertexList, &VertexList)| {
             a.bodies == b.bodies && Arc::ptr_eq(&a.lists, &b.lists)
         };
-        let is_set = |(a, b): (&SortedKeys, &SortedKeys)| Arc::ptr_eq(a, b);
         self.groups == other.groups
             && self.parts.len() == other.parts.len()
             && self.parts.iter().zip(&other.parts).all(is_part)
             && self.vertices.len() == other.vertices.len()
             && self.vertices.iter().zip(&other.vertices).all(is_list)
-            && self.pairs.len() == other.pairs.len()
-            && self.pairs.iter().zip(&other.pairs).all(is_set)
+            && are_same(&self.pairs, &other.pairs)
     }
 
     /// Pairs of groups that do not meet.

@@ -629,11 +629,14 @@ fn small_pieces_far_apart_face_as_they_do() {
 /// Faces may be turned inwards: what two bodies have in common, and which way is out, do not depend on it.
 #[test]
 fn bodies_that_are_inside_out_overlap_as_they_are() {
-    let turned = inside_out;
     let ball = surfaces::bumpy_ball(400, 0.2);
     let shell = |model: &Model, size: f32| model.mapped(|at| at.map(|x| size * x));
     // A ball with a cavity, and another one inside that.
-    let hollow = joined(&[ball.clone(), turned(&shell(&ball, 0.7)), shell(&ball, 0.4)]);
+    let hollow = joined(&[
+        ball.clone(),
+        inside_out(&shell(&ball, 0.7)),
+        shell(&ball, 0.4),
+    ]);
     for (a, b) in [
         (ball.clone(), ball.translated([0.713, 0.117, 0.053])),
         (hollow.clone(), ball.translated([0.913, 0.119, 0.057])),
@@ -647,7 +650,7 @@ fn bodies_that_are_inside_out_overlap_as_they_are() {
         let right = overlap(&a, &b);
         let volume = right.volume().expect("right");
         assert!(volume > 0.0, "{volume}");
-        let [turned_a, turned_b] = [turned(&a), turned(&b)];
+        let [turned_a, turned_b] = [&a, &b].map(inside_out);
         for (a, b) in [(&turned_a, &b), (&a, &turned_b), (&turned_a, &turned_b)] {
             let found = overlap(a, b);
             assert_eq!(found.inside, right.inside);
