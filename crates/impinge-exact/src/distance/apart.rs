@@ -45,8 +45,17 @@ fn shortest_way(pair: ElementPair, points: &[Point; 4]) -> Point {
 /// `None` if the elements are not certainly farther apart at the start.
 #[must_use]
 pub fn shares_apart(pair: ElementPair, times: [&[Point; 4]; 3], distance: f64) -> Option<[f64; 4]> {
-    let ([start, now, end], distance) = &scaled(times, distance);
-    let distance = *distance;
+    at_usual_size(times, distance, |times, distance| {
+        usual_apart(pair, times, distance)
+    })
+}
+
+/// [`shares_apart`] of usual sizes.
+fn usual_apart(
+    pair: ElementPair,
+    [start, now, end]: [&[Point; 4]; 3],
+    distance: f64,
+) -> Option<[f64; 4]> {
     let is_possible = |across: &Across| across.room(start, distance).is_some_and(|room| room > 0.0);
     let possible = ways(pair, [start, end]).filter(is_possible);
     let shares = possible.map(|across| across.shares([start, now, end], distance));
@@ -61,8 +70,9 @@ pub fn shares_apart(pair: ElementPair, times: [&[Point; 4]; 3], distance: f64) -
 /// now has less than 1, if there is one.
 #[must_use]
 pub fn shares_without_room(pair: ElementPair, times: [&[Point; 4]; 3], distance: f64) -> [f64; 4] {
-    let (scaled, distance) = scaled(times, distance);
-    let shares = scaled_without_room(pair, scaled.each_ref(), distance);
+    let shares = at_usual_size(times, distance, |times, distance| {
+        usual_without_room(pair, times, distance)
+    });
     let [start, now, _] = times;
     match (0..pair.n_points()).any(|ix| now[ix] != start[ix] && shares[ix] < 1.0) {
         true => shares,
@@ -74,27 +84,28 @@ pub fn shares_without_room(pair: ElementPair, times: [&[Point; 4]; 3], distance:
 /// Sizes that are used as they are: no product overflows or underflows.
 const USUAL: core::ops::Range<f64> = power_of_two(-90)..power_of_two(90);
 
-/// Points and a distance; very small or very large ones times a power of two, with which the
-/// largest coordinate is usual. Shares are the same.
+/// Shares of points and a distance; very small or very large ones are multiplied by a power of two,
+/// with which the largest coordinate is usual. Shares are the same.
 #[allow(clippy::cast_possible_truncation, reason = "eleven bits")]
-fn scaled(times: [&[Point; 4]; 3], distance: f64) -> ([[Point; 4]; 3], f64) {
+fn at_usual_size<R>(
+    times: [&[Point; 4]; 3],
+    distance: f64,
+    shares: impl FnOnce([&[Point; 4]; 3], f64) -> R,
+) -> R {
     let numbers = times.into_iter().flatten().flatten();
     let largest = numbers.fold(0.0, |largest: f64, x| largest.max(x.abs()));
-    let times = times.map(|points| *points);
     if largest == 0.0 || USUAL.contains(&largest) {
-        return (times, distance);
+        return shares(times, distance);
     }
     // The exponent and its negative are those of normal numbers.
     let exponent = (largest.to_bits() >> 52) as i32 - 1023;
     let scale = power_of_two((-exponent).clamp(-1000, 1000));
-    (
-        times.map(|points| points.map(|point| point.map(|x| x * scale))),
-        distance * scale,
-    )
+    let scaled = times.map(|points| points.map(|point| point.map(|x| x * scale)));
+    shares(scaled.each_ref(), distance * scale)
 }
 
 /// [`shares_without_room`] of usual sizes.
-fn scaled_without_room(
+fn usual_without_room(
     pair: ElementPair,
     [start, now, end]: [&[Point; 4]; 3],
     distance: f64,
