@@ -88,8 +88,8 @@ fn engine_of(
 }
 
 /// Has the device find the pairs of a step that may touch, and decides them on the CPU. Returns
-/// [`ByDevice::Not`] if there is no device, or if the CPU has to answer: steps with a separation, a
-/// thickness, a clearance or a filter, steps that the device cannot hold, any step in a browser, which cannot
+/// [`ByDevice::Not`] if there is no device, or if the CPU has to answer: steps with a clearance
+/// or a filter, steps that the device cannot hold, any step in a browser, which cannot
 /// wait for a device here. With `Backend::Auto` the CPU takes over for good if the device fails.
 pub(super) fn find_in_step(
     engine: &mut Option<Engine>,
@@ -99,9 +99,10 @@ pub(super) fn find_in_step(
     stats: &mut Stats,
 ) -> Result<ByDevice, Error> {
     if cfg!(target_family = "wasm")
-        || job.plan.keeps_distance()
+        || job.plan.has_clearance()
         || job.plan.has_filter()
-        || (job.plan.leaves_out() && settings.memory_budget.is_some())
+        || (settings.memory_budget.is_some()
+            && (job.plan.leaves_out() || job.plan.keeps_distance()))
     {
         return Ok(ByDevice::Not);
     }

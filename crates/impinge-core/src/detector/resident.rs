@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::Detector;
 use crate::answers::pairs::Pairs;
 use crate::bvh::clusters::Clustering;
-use crate::gpu::{Engine, ResidentPairs, ResidentSafe, ResidentStep};
+use crate::gpu::{Engine, MOST_KEPT, ResidentPairs, ResidentSafe, ResidentStep};
 use crate::plan::Plan;
 use crate::query::Query;
 use crate::query::goal::Goal;
@@ -128,7 +128,10 @@ impl Gpu<'_> {
     /// The pairs are those of [`impacts`](Detector::impacts), and others that the filter on the
     /// device does not prove free: a superset of the impacts, for a solver that treats every pair
     /// of the list as one that may touch. Whether pairs touch at the start makes no difference, nor
-    /// does the precision of times that is asked for.
+    /// does the precision of times that is asked for. Elements that keep a
+    /// [separation](Query::separation) or their [thickness](Scene::set_thickness) touch when they
+    /// come as near as that: an edge or a face is as thick as its thickest vertex here, and no
+    /// contact is certain.
     ///
     /// `starts` and `ends` name bodies whose positions at that end are taken from a buffer:
     /// `(v, 3)` f32 tightly packed, with the usage `COPY_SRC`, copied when the encoder's commands
@@ -144,9 +147,8 @@ impl Gpu<'_> {
     /// times are 0, see [`ResidentStep`]; [`grow`](Gpu::grow) then makes room.
     ///
     /// # Errors
-    /// Those of [`encode`](Gpu::encode), for positions at both ends; a query with a separation, a
-    /// clearance, a filter or kinds of pairs; a body of the scene with a
-    /// [thickness](Scene::set_thickness).
+    /// Those of [`encode`](Gpu::encode), for positions at both ends; a query with a clearance, a
+    /// filter or kinds of pairs; a separation above 2^100, or a body that is thicker.
     pub fn encode_step(
         &mut self,
         scene: &Scene,
@@ -155,8 +157,11 @@ impl Gpu<'_> {
         ends: &[(BodyId, &wgpu::Buffer)],
         encoder: &mut wgpu::CommandEncoder,
     ) -> Result<ResidentStep, Error> {
-        refuse_unknown(query)?;
-        refuse_thickness(scene, 0.0, "0 for a step that stays on a device")?;
+        refuse_unknown(
+            query,
+            (MOST_KEPT, "from 0 to 2^100 where it stays on a device"),
+        )?;
+        refuse_thickness(scene)?;
         self.with_contacts(scene, query, starts, |engine, job, clusterings| {
             engine.encode_step(job, clusterings, [starts, ends], encoder)
         })
@@ -191,8 +196,8 @@ impl Gpu<'_> {
     /// nearer to each other.
     ///
     /// # Errors
-    /// As `encode_step`, but for bodies with a thickness, which may be up to 2^100; a `most` that is
-    /// negative or above 2^100; fixed bodies that are not in the scene.
+    /// As `encode_step`; a separation; a `most` that is negative or above 2^100; fixed bodies that
+    /// are not in the scene.
     pub fn encode_safe_distances(
         &mut self,
         scene: &Scene,
@@ -201,19 +206,15 @@ impl Gpu<'_> {
         positions: &[(BodyId, &wgpu::Buffer)],
         encoder: &mut wgpu::CommandEncoder,
     ) -> Result<ResidentSafe, Error> {
-        if !(0.0..=2f64.powi(100)).contains(&most) {
+        if !(0.0..=MOST_KEPT).contains(&most) {
             return Err(Error::Setting {
                 setting: "most",
                 given: most.to_string(),
                 allowed: "from 0 to 2^100 where it stays on a device",
             });
         }
-        refuse_unknown(query)?;
-        refuse_thickness(
-            scene,
-            2f64.powi(100),
-            "from 0 to 2^100 where it stays on a device",
-        )?;
+        refuse_unknown(query, (0.0, "0 for safe distances"))?;
+        refuse_thickness(scene)?;
         for &body in &query.fixed {
             scene.body(body)?;
         }
@@ -333,26 +334,26 @@ fn on_device(gpu: &mut Option<Engine>) -> Result<&mut Engine, Error> {
     })
 }
 
-/// Refuses bodies that are thicker than so much.
-fn refuse_thickness(scene: &Scene, most: f64, allowed: &'static str) -> Result<(), Error> {
-    match scene.bodies().find(|(_, body)| body.thickness() > most) {
+/// Refuses bodies that are thicker than a device can take.
+fn refuse_thickness(scene: &Scene) -> Result<(), Error> {
+    match (scene.bodies()).find(|(_, body)| body.thickness() > MOST_KEPT) {
         None => Ok(()),
         Some((id, body)) => Err(Error::Setting {
             setting: "thickness",
             given: format!("{} of body {id}", body.thickness()),
-            allowed,
+            allowed: "from 0 to 2^100 where it stays on a device",
         }),
     }
 }
 
 /// Refuses what kernels of steps do not know.
-fn refuse_unknown(query: &Query) -> Result<(), Error> {
+fn refuse_unknown(query: &Query, (most, allowed): (f64, &'static str)) -> Result<(), Error> {
     query.check_step()?;
-    if query.separation > 0.0 {
+    if query.separation > most {
         return Err(Error::Setting {
             setting: "separation",
             given: query.separation.to_string(),
-            allowed: "0 for a step that stays on a device",
+            allowed,
         });
     }
     if query.clearance.distance > 0.0 {

@@ -141,7 +141,7 @@ impl Detector {
     ///
     /// On a GPU the device finds the pairs that may touch, and the CPU finds their times, on all
     /// threads: the answer is the same to the last bit. The CPU answers alone if there is a
-    /// separation, a thickness, a clearance or a filter, or if the device or the memory budget cannot hold the
+    /// clearance or a filter, or if the device or the memory budget cannot hold the
     /// step; in a browser it always does. [`Stats::backend`](crate::Stats::backend) says who
     /// answered.
     ///

@@ -5,21 +5,21 @@
 //! bounds     clusters · wide levels, one launch each · all narrow levels in one
 //! traversal   round 0 · (prepare · round r) for r = 1 …
 //! pairing    prepare · pairing
-//! narrow     prepare · narrow;    in a step: · prepare · search
+//! narrow     prepare · narrow;    in a step: · prepare · search, or names
 //!            before it, if elements are left out: · leave_out
 //!            if the lists stay on the device: · lists_end
 //! ```
 
 use super::buffers::Uniform;
 use super::kernels::{
-    BoundsClusters, BoundsLevel, BoundsTop, LeaveOut, ListsEnd, Narrow, NarrowMoving, NarrowSafe,
-    NarrowSearch, Pairing, Prepare, SafeEnd, Traversal,
+    BoundsClusters, BoundsLevel, BoundsTop, LeaveOut, ListsEnd, Narrow, NarrowKeep, NarrowMoving,
+    NarrowNames, NarrowSafe, NarrowSearch, Pairing, Prepare, SafeEnd, Traversal,
 };
 use super::layout::{
     N_CANDIDATES, N_ITEMS, N_PAIRS, Params, ROUNDS, SEEK_ALL, SEEK_ANY, SEEK_EARLIEST,
 };
 use super::recording::{Recorder, Workgroups};
-use super::view::Motion;
+use super::view::{Asks, Motion, StepTest};
 use crate::query::goal::Goal;
 
 /// Levels of up to this many nodes are refitted by one workgroup, in one launch with the levels
@@ -40,9 +40,8 @@ pub(super) struct ClusterPass {
     pub n_rounds: u32,
     /// Whether pairs that share a vertex are resolved.
     pub resolve: bool,
-    /// Whether how far vertices may move is asked, instead of contacts, and by how much boxes are
-    /// widened then: the bits of an f32.
-    pub safe: Option<u32>,
+    /// What is asked of elements that may move.
+    pub asks: Asks,
     /// In a step: which contacts the host seeks; none if results stay on the device.
     pub sought: Option<Goal>,
 }
@@ -63,15 +62,16 @@ pub struct Counted {
 impl Recorder<'_> {
     /// All stages.
     pub(super) fn clusters(&mut self, of_pass: ClusterPass) {
-        self.bounds_widened(of_pass.safe.unwrap_or(0));
+        self.bounds_widened(of_pass.asks.reach);
         self.traversal(of_pass);
         self.recording.stage("pairing");
         self.pairing(of_pass);
         self.recording.stage("narrow");
-        match self.motion {
-            Motion::Moving if of_pass.safe.is_some() => self.narrow_safe(),
-            Motion::Moving => self.narrow_step(of_pass.sought),
-            Motion::Still => self.narrow(),
+        match (self.motion, of_pass.asks.test) {
+            (Motion::Still, _) => self.narrow(),
+            (Motion::Moving, StepTest::Touch) => self.narrow_step(of_pass.sought),
+            (Motion::Moving, StepTest::Keep) => self.narrow_keep(of_pass.sought.is_none()),
+            (Motion::Moving, StepTest::Safe) => self.narrow_safe(),
         }
     }
 
@@ -203,7 +203,7 @@ impl Recorder<'_> {
             counters: pass_buffers.counters.write_to(),
             params: Uniform(Params {
                 resolve: u32::from(of_pass.resolve),
-                reach: of_pass.safe.unwrap_or(0),
+                reach: of_pass.asks.reach,
                 ..Params::default()
             }),
         };
@@ -302,12 +302,7 @@ impl Recorder<'_> {
         };
         self.recording
             .launch(&gpu.kernels.narrow_moving, &bindings, groups);
-        let groups = self.counted(Counted {
-            counter: N_PAIRS,
-            per_group: GROUP,
-            capacity: pass_buffers.capacities().pairs,
-            slot: SEARCH,
-        });
+        let groups = self.counted_pairs();
         let bindings = NarrowSearch {
             pairs: pass_buffers.pairs.read(),
             corners: world.corners.read(),
@@ -329,6 +324,48 @@ impl Recorder<'_> {
         };
         self.recording
             .launch(&gpu.kernels.narrow_search, &bindings, groups);
+    }
+
+    /// The workgroups of a kernel over all pairs that stage `narrow` has left.
+    fn counted_pairs(&mut self) -> Workgroups {
+        self.counted(Counted {
+            counter: N_PAIRS,
+            per_group: GROUP,
+            capacity: self.pass_buffers.capacities().pairs,
+            slot: SEARCH,
+        })
+    }
+
+    /// Stage `narrow` of a step whose elements keep a distance, in which times are found at once.
+    /// `by_number`: whether pairs are named by global numbers.
+    fn narrow_keep(&mut self, by_number: bool) {
+        let (gpu, world, view, pass_buffers) = (self.gpu, self.world, self.view, self.pass_buffers);
+        let groups = self.counted_candidates();
+        let bindings = NarrowKeep {
+            candidates: pass_buffers.candidates.read(),
+            corners: world.corners.read(),
+            positions: world.positions.read(),
+            thickness: pass_buffers.thickness.read(),
+            pairs: pass_buffers.pairs.write_to(),
+            times: pass_buffers.times.write_to(),
+            counters: pass_buffers.counters.write_to(),
+        };
+        self.recording
+            .launch(&gpu.kernels.narrow_keep, &bindings, groups);
+        let groups = self.counted_pairs();
+        let bindings = NarrowNames {
+            pairs: pass_buffers.pairs.read(),
+            order: world.order.read(),
+            unsure: pass_buffers.unsure.write_to(),
+            counters: pass_buffers.counters.write_to(),
+            params: Uniform(Params {
+                by_number: u32::from(by_number),
+                ..Params::default()
+            }),
+            bodies: view.bodies.read(),
+        };
+        self.recording
+            .launch(&gpu.kernels.narrow_names, &bindings, groups);
     }
 
     /// Stage `narrow` of safe distances.

@@ -15,7 +15,7 @@ use super::pass_buffers::{Capacities, CellsWanted, PassBuffers, PassCounts};
 use super::pieces;
 use super::recording::{Launcher, Ran, Recording};
 use super::topology::Most;
-use super::view::Motion;
+use super::view::{Asks, Motion};
 use super::world::{DeviceWorld, ResidentEnds, weigh};
 use crate::bvh::clusters::Clustering;
 use crate::clusterings::Clusterings;
@@ -65,8 +65,8 @@ pub struct Engine {
     /// touches, as far as passes have said.
     pub(super) sought: Goal,
     pub(super) touches_by: Option<f32>,
-    /// By how much boxes are widened, the bits of an f32, where safe distances are asked.
-    pub(super) safe: Option<u32>,
+    /// What is asked of elements that may move.
+    pub(super) asks: Asks,
     /// The stamp of the safe distances that were encoded last; 0 if there are none.
     pub(super) safe_stamp: u64,
     /// Runs truncations, whose parameters are apart from those of safe distances: one submission
@@ -87,6 +87,8 @@ pub struct Lane {
     pub(super) pass_buffers: PassBuffers,
     pub(super) launcher: Launcher,
     pub(super) collector: Collector,
+    /// By how much the boxes of its last pass are widened, the bits of an f32.
+    pub(super) reach: u32,
     /// Whether the last pass was encoded for the caller, who has its results on the device.
     pub(super) is_encoded: bool,
     /// The last pass.
@@ -104,6 +106,7 @@ impl Lane {
             pass_buffers: PassBuffers::new(),
             launcher: Launcher::default(),
             collector: Collector::default(),
+            reach: 0,
             is_encoded: false,
             recording: Recording::default(),
             ran: Vec::new(),
@@ -179,7 +182,7 @@ impl Engine {
             decided: Vec::new(),
             sought: Goal::All,
             touches_by: None,
-            safe: None,
+            asks: Asks::default(),
             safe_stamp: 0,
             truncations: Launcher::default(),
             is_traced: false,
@@ -192,7 +195,7 @@ impl Engine {
             std::mem::swap(&mut self.lane, &mut self.other);
         }
         self.complete.clear();
-        (self.sought, self.touches_by, self.safe) = (Goal::All, None, None);
+        (self.sought, self.touches_by, self.asks) = (Goal::All, None, Asks::default());
     }
 
     pub fn gpu(&self) -> &Arc<GpuContext> {
@@ -303,7 +306,9 @@ impl Engine {
             return Ok(false);
         }
         self.send(job, clusterings, stats).await?;
-        if let Err(Error::Gpu { .. }) = self.send_rules(job.plan) {
+        let sent = self.send_rules(job.plan);
+        let sent = sent.and_then(|()| self.ask_kept(job.scene, job.plan));
+        if let Err(Error::Gpu { .. }) = sent {
             // They are more than the device can bind.
             return Ok(false);
         }

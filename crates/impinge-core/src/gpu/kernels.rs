@@ -129,6 +129,31 @@ bindings! {
 }
 
 bindings! {
+    /// `narrow_keep.wgsl`
+    NarrowKeep {
+        candidates: Read<Candidate>,
+        corners: Read<Corners>,
+        positions: Read<Coordinate>,
+        thickness: Read<Share>,
+        pairs: Write<PairKey>,
+        times: Write<PairTimes>,
+        counters: Write<Counter>,
+    }
+}
+
+bindings! {
+    /// `narrow_names.wgsl`
+    NarrowNames {
+        pairs: Read<PairKey>,
+        order: Read<Order>,
+        unsure: Write<UnsureKey>,
+        counters: Write<Counter>,
+        params: Uniform<Params>,
+        bodies: Read<Body>,
+    }
+}
+
+bindings! {
     /// `narrow_safe.wgsl`
     NarrowSafe {
         candidates: Read<Candidate>,
@@ -342,8 +367,14 @@ kernels! {
     narrow_moving: NarrowMoving = NARROW_MOVING []
         from "narrow_moving" ("filter", "lengths", "polygon", "pair", "reserve", "slots", "groups");
     narrow_search: NarrowSearch = NARROW_SEARCH []
-        from "narrow_search" ("filter", "lengths", "polygon", "pair", "numbers", "reserve", "slots", "groups");
-    narrow_safe: NarrowSafe = NARROW_SAFE [] from "narrow_safe" ("filter", "lengths", "groups");
+        from "narrow_search"
+        ("filter", "lengths", "polygon", "times", "pair", "numbers", "names", "reserve", "slots", "groups");
+    narrow_keep: NarrowKeep = NARROW_KEEP []
+        from "narrow_keep"
+        ("filter", "lengths", "distances", "polygon", "times", "pair", "reserve", "slots", "groups");
+    narrow_names: NarrowNames = NARROW_NAMES []
+        from "narrow_names" ("numbers", "names", "groups");
+    narrow_safe: NarrowSafe = NARROW_SAFE [] from "narrow_safe" ("filter", "lengths", "distances", "groups");
     safe_end: SafeEnd = SAFE_END [] from "safe_end" ("lost", "groups");
     lists_end: ListsEnd = LISTS_END [] from "lists_end" ("lost", "groups");
     truncate: Truncate = TRUNCATE [] from "truncate" ("filter", "lengths", "groups");

@@ -17,6 +17,7 @@ pub(crate) mod engine;
 mod kernels;
 pub mod layout;
 mod left_out;
+mod limits;
 mod open;
 pub mod pass_buffers;
 mod passes;
@@ -38,6 +39,7 @@ pub use resident::{ResidentPairs, ResidentPart, ResidentSafe, ResidentStep, Resi
 
 pub(crate) use engine::Engine;
 pub use kernels::shaders;
+pub(crate) use limits::MOST_KEPT;
 pub use open::{GpuContext, WantedAdapter, devices, devices_async};
 
 /// The texts from which kernels are assembled. `LAYOUT`, with the structs of all kernels, comes

@@ -166,10 +166,12 @@ pub struct PassBuffers {
     pub times: Storage<PairTimes>,
     /// Safe distances: the most that each vertex may move, 0 if it is fixed.
     pub limits: Storage<Share>,
-    /// Safe distances: how thick each vertex is; one 0 if none is.
-    pub thickness: Storage<Share>,
-    /// Of which bodies these are: see [`LimitsOf`].
+    /// Of which bodies these are.
     pub limits_of: Vec<LimitsOf>,
+    /// How thick each vertex is, with half of the separation of a step; one 0 if none is.
+    pub thickness: Storage<Share>,
+    /// Of which separation and bodies these are.
+    pub thickness_of: Option<(u64, Vec<ThicknessOf>)>,
     /// Safe distances: how far each vertex may move.
     pub shares: Storage<Share>,
     /// What the question leaves out, see `left_out`.
@@ -231,7 +233,7 @@ pub struct RulesOf {
     pub(super) bodies: Vec<(BodyId, u64)>,
 }
 
-/// What the limits of a body's vertices, and their thickness, belong to.
+/// What the limits of a body's vertices belong to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LimitsOf {
     /// The body.
@@ -240,7 +242,16 @@ pub struct LimitsOf {
     pub len: u32,
     /// The bits of the most that they may move.
     pub most: u32,
-    /// The bits of how thick the body is.
+}
+
+/// What the thickness of a body's vertices belongs to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ThicknessOf {
+    /// The body.
+    pub body: BodyId,
+    /// How many vertices it has.
+    pub len: u64,
+    /// The bits of how thick the body is, with what each vertex keeps besides.
     pub thickness: u64,
     /// The stamp of the thickness of its elements, where they have their own.
     pub each: Option<u64>,
@@ -257,8 +268,9 @@ impl PassBuffers {
             unsure: Storage::plain("unsure"),
             times: Storage::plain("times of pairs"),
             limits: Storage::plain("limits"),
-            thickness: Storage::plain("thickness"),
             limits_of: Vec::new(),
+            thickness: Storage::plain("thickness"),
+            thickness_of: None,
             shares: Storage::plain("safe distances"),
             rules: Storage::plain("rules"),
             rules_of: None,

@@ -22,7 +22,7 @@ use super::engine::{Engine, PassSink, PassesEnd};
 use super::layout::NodePair;
 use super::pass_buffers::{Capacities, CellsWanted, NextPass, PassBuffers};
 use super::recording::{Recorder, Recording};
-use super::view::Motion;
+use super::view::{Motion, StepTest};
 use crate::plan::{Plan, pair_key};
 use crate::query::SharedVertex;
 use crate::query::goal::Goal;
@@ -303,6 +303,12 @@ impl Engine {
         self.lane.recording = Recording::default();
         self.lane.pass_buffers.resize(&self.gpu, &capacities, cells);
         let leaves_out = self.has_rules(plan);
+        let asks = self.asks;
+        if self.lane.reach != asks.reach {
+            // Boxes that were widened by another length do not fit.
+            self.world.has_other_boxes(self.lane.motion);
+            self.lane.reach = asks.reach;
+        }
         let mut recording = Recording::default();
         // The caller's step begins with nothing known.
         let sought = (!self.lane.is_encoded).then_some(self.sought);
@@ -311,7 +317,7 @@ impl Engine {
         for (from, to) in start {
             recording.copy(from, to);
         }
-        if self.safe.is_some() {
+        if asks.test == StepTest::Safe {
             let PassBuffers { limits, shares, .. } = &self.lane.pass_buffers;
             recording.copy(limits.all(), shares.all());
         }
@@ -325,15 +331,15 @@ impl Engine {
             recording,
         };
         let (lambda, group_size) = (self.settings.density, self.settings.group_size);
-        let has_lists = self.lane.is_encoded && self.safe.is_none();
+        let has_lists = self.lane.is_encoded && asks.test != StepTest::Safe;
         let resolve = plan.shared_vertex == SharedVertex::Resolve;
         match (work, &mut self.guest) {
             (None, _) => {}
             (Some(PassWork::Seeds(seeds)), _) => recorder.clusters(clusters::ClusterPass {
                 n_seeds: count(seeds.len()),
                 n_rounds: self.world.rounds(seeds),
-                resolve: resolve && self.safe.is_none(),
-                safe: self.safe,
+                resolve: resolve && asks.test != StepTest::Safe,
+                asks,
                 sought,
             }),
             (Some(PassWork::Cells(work)), Some(guest)) => {

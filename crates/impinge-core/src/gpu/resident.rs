@@ -2,19 +2,17 @@
 //! ours.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::iter::repeat_n;
 use std::sync::Arc;
 
 use super::buffers::{Read, Slice, Uniform, Write, count, read};
 use super::clusters::GROUP;
 use super::engine::Engine;
 use super::kernels::Truncate;
-use super::layout::{Counter, N_PAIRS_LISTED, N_UNSURE_LISTED, Params, Share, TOUCHES_BY};
-use super::pass_buffers::{Capacities, LimitsOf, NextPass, PassCounts};
+use super::layout::{Counter, N_PAIRS_LISTED, N_UNSURE_LISTED, Params, TOUCHES_BY};
+use super::pass_buffers::{Capacities, NextPass, PassCounts};
 use super::recording::{Recording, Workgroups};
 use super::view::Motion;
 use super::world::ResidentEnds;
-use crate::bvh::bounds::{round_down, round_up};
 use crate::bvh::clusters::Clustering;
 use crate::plan::Plan;
 use crate::scene::elements::Part;
@@ -189,7 +187,8 @@ impl Engine {
         let ids: Vec<BodyId> = positions.iter().map(|&(body, _)| body).collect();
         let clusterings = self.cluster(job, &ids, &mut Stats::default())?;
         let resident = encoded([starts, BTreeMap::new()]);
-        self.encode_whole(job, &clusterings, &resident, encoder)?;
+        self.update(job, &clusterings, &resident, &mut Stats::default())?;
+        self.encode_work(job, &resident, encoder)?;
         let pass_buffers = &self.lane.pass_buffers;
         let capacities = pass_buffers.capacities();
         Ok(ResidentPairs {
@@ -231,7 +230,9 @@ impl Engine {
         if !self.is_held(job, clusterings) {
             return Err(self.too_small("the step at once", Capacities::LEAST));
         }
-        self.encode_whole(job, clusterings, &resident, encoder)?;
+        self.update(job, clusterings, &resident, &mut Stats::default())?;
+        self.ask_kept(scene, plan)?;
+        self.encode_work(job, &resident, encoder)?;
         let pass_buffers = &self.lane.pass_buffers;
         let of_kinds = |kinds: &[Part]| {
             let parts = plan.parts.iter();
@@ -272,45 +273,23 @@ impl Engine {
         }
         let resident = encoded([positions.clone(), positions]);
         self.update(job, clusterings, &resident, &mut Stats::default())?;
-        let (mut limits, mut bodies) = (Vec::new(), Vec::new());
-        let (mut n, mut thickest) = (0, 0.0f64);
-        for (body, n_vertices) in self.world.bodies() {
-            let own = if fixed.contains(&body) { 0.0 } else { most };
-            // Vertices fit 32 bits, or the bodies would not be held.
-            let (first, len) = (n, n_vertices as u32);
-            let held = job.scene.body(body)?;
+        self.ask_safe(job.scene, most, |body| match fixed.contains(&body) {
+            true => 0.0,
+            false => most,
+        })?;
+        let (mut bodies, mut n) = (Vec::new(), 0);
+        for (body, len) in self.world.bodies() {
             bodies.push(ResidentVertices {
                 body,
-                first,
-                len,
-                topology_stamp: held.topology_stamp(),
+                first: n,
+                // Vertices fit 32 bits, or the bodies would not be held.
+                len: len as u32,
+                topology_stamp: job.scene.body(body)?.topology_stamp(),
             });
-            thickest = thickest.max(held.thickness());
-            limits.push(LimitsOf {
-                body,
-                len,
-                most: round_down(own).to_bits(),
-                thickness: held.thickness().to_bits(),
-                each: held.thickness_of_each().map(|each| each.stamp()),
-            });
-            n += len;
+            n += len as u32;
         }
-        let pass_buffers = &mut self.lane.pass_buffers;
-        if pass_buffers.limits_of != limits {
-            pass_buffers.limits_of.clear();
-            let of_body = |of: &LimitsOf| repeat_n(Share { bits: of.most }, of.len as usize);
-            let of_vertices: Vec<Share> = limits.iter().flat_map(of_body).collect();
-            pass_buffers.limits.upload(&self.gpu, &of_vertices)?;
-            let thickness = thickness(job.scene, &limits)?;
-            pass_buffers.thickness.upload(&self.gpu, &thickness)?;
-            pass_buffers.limits_of = limits;
-        }
-        pass_buffers.shares.resize(&self.gpu, u64::from(n))?;
-        // A little more than asked for, and more than what is flushed.
-        let reach = round_up((most + thickest) * (1.0 + 2f64.powi(-20)) + 2f64.powi(-100));
-        self.safe = Some(reach.to_bits());
-        // Boxes that were widened by another length do not fit, nor do these fit a step.
-        self.world.is_moved();
+        let shares = &mut self.lane.pass_buffers.shares;
+        shares.resize(&self.gpu, u64::from(n))?;
         // Those before are overwritten.
         self.safe_stamp = new_stamp();
         self.encode_work(job, &resident, encoder)?;
@@ -408,18 +387,6 @@ impl Engine {
             .encode(&self.gpu, &recording, None, encoder)
     }
 
-    /// Encodes all work of a frame or a step as one pass.
-    fn encode_whole(
-        &mut self,
-        job: Job<'_>,
-        clusterings: &[Arc<Clustering>],
-        resident: &ResidentEnds<'_>,
-        encoder: &mut wgpu::CommandEncoder,
-    ) -> Result<(), Error> {
-        self.update(job, clusterings, resident, &mut Stats::default())?;
-        self.encode_work(job, resident, encoder)
-    }
-
     /// Encodes all work of what was sent.
     fn encode_work(
         &mut self,
@@ -488,25 +455,6 @@ fn encoded(buffers: [BTreeMap<BodyId, &wgpu::Buffer>; 2]) -> ResidentEnds<'_> {
         buffers,
         is_encoded: true,
     }
-}
-
-/// How thick each vertex is, rounded up: as the thickest of its elements. One 0 if none is thick.
-fn thickness(scene: &Scene, limits: &[LimitsOf]) -> Result<Vec<Share>, Error> {
-    if limits.iter().all(|of| f64::from_bits(of.thickness) == 0.0) {
-        return Ok(vec![Share { bits: 0 }]);
-    }
-    let share = |of_vertex: f64| Share {
-        bits: round_up(of_vertex).to_bits(),
-    };
-    let mut all = Vec::new();
-    for of in limits {
-        let body = scene.body(of.body)?;
-        match body.thickness_of_each() {
-            Some(each) => all.extend(each.of(Part::Vertices).iter().map(|&own| share(own))),
-            None => all.extend(repeat_n(share(body.thickness()), of.len as usize)),
-        }
-    }
-    Ok(all)
 }
 
 /// Buffers by their bodies. Refuses a body that has two.

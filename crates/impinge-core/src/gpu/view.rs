@@ -39,6 +39,26 @@ impl Motion {
     }
 }
 
+/// What a pass asks of candidates, and by how much their boxes are widened for it: the bits of an
+/// f32.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Asks {
+    pub(super) test: StepTest,
+    pub(super) reach: u32,
+}
+
+/// What is asked of candidates.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) enum StepTest {
+    /// Whether they touch.
+    #[default]
+    Touch,
+    /// Whether they keep their distance during a step.
+    Keep,
+    /// How far vertices may move.
+    Safe,
+}
+
 /// What a frame, or a step, sees of the world.
 #[derive(Debug)]
 pub struct View {

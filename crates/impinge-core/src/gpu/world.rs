@@ -275,6 +275,11 @@ impl DeviceWorld {
         }
     }
 
+    /// Says that the boxes that a view sees do not fit what is asked.
+    pub(super) fn has_other_boxes(&mut self, motion: Motion) {
+        self.view_mut(motion).is_moved = true;
+    }
+
     /// How many parts are on the device.
     pub fn n_parts(&self) -> u64 {
         count(self.parts.len())

@@ -8,6 +8,7 @@ mod caller;
 mod common;
 mod filters;
 #[cfg(feature = "gpu")]
+mod kept;
 mod left_out;
 #[cfg(feature = "gpu")]
 mod liars;

@@ -5,8 +5,8 @@
 use std::sync::{Mutex, OnceLock};
 
 use impinge_core::{
-    Backend, BodyId, CancelToken, Capacities, Control, Detector, Error, Impact, Method, PairKind,
-    Precision, Query, Real, Recluster, Scene, Settings, Start, wgpu,
+    Backend, BodyId, CancelToken, Capacities, Clearance, Control, Detector, Error, Impact, Method,
+    PairKind, Precision, Query, Real, Recluster, Scene, Settings, Start, wgpu,
 };
 use impinge_scenes::{Random, solids, soup, surfaces};
 
@@ -29,7 +29,7 @@ fn on_cpu() -> Detector {
 
 /// Asserts that both answer a step alike, the first one on its device. Returns the number of
 /// impacts.
-fn assert_alike(name: &str, device: &mut Detector, scene: &Scene, step: &Query) -> usize {
+pub fn assert_alike(name: &str, device: &mut Detector, scene: &Scene, step: &Query) -> usize {
     let mut cpu = on_cpu();
     let expected = cpu.impacts(scene, step).expect(name).clone();
     let impacts = device.impacts(scene, step).expect(name);
@@ -65,7 +65,7 @@ fn faces(n_points: usize) -> Vec<[u32; 3]> {
 }
 
 /// Adds a body of random triangles on a lattice, which moves to other points of it.
-fn add_web<R: Real + From<f32>>(
+pub fn add_web<R: Real + From<f32>>(
     scene: &mut Scene,
     random: &mut Random,
     n: usize,
@@ -237,7 +237,7 @@ fn edges_and_points_are_answered_alike() {
 }
 
 /// Two balls that run into each other, of so many triangles together.
-fn balls(n: usize) -> Scene {
+pub fn balls(n: usize) -> Scene {
     let mut scene = Scene::new();
     let ball = surfaces::ball(n / 2);
     let (low, high) = ball.bounds().expect("not empty");
@@ -642,15 +642,19 @@ fn what_the_device_cannot_hold_or_answer_the_cpu_does() {
         (impacts.hash(), &*impacts.stats().backend),
         (expected, "cpu")
     );
-    let apart = Query::all().separation(0.001);
-    let expected = on_cpu().impacts(&scene, &apart).expect("good").hash();
     let mut thick = scene.clone();
     for (body, _) in scene.bodies() {
-        thick.set_thickness(body, 0.0005).expect("good");
+        thick.set_thickness(body, 2f64.powi(101)).expect("good");
     }
     let mut device = on_gpu();
-    for (scene, query) in [(&scene, &apart), (&thick, &Query::all())] {
-        let impacts = device.impacts(scene, query).expect("good");
+    let clearance = Clearance::new(0.001);
+    for (scene, query) in [
+        (&scene, Query::all().clearance(clearance)),
+        (&scene, Query::all().separation(2f64.powi(102))),
+        (&thick, Query::all()),
+    ] {
+        let expected = on_cpu().impacts(scene, &query).expect("good").hash();
+        let impacts = device.impacts(scene, &query).expect("good");
         assert_eq!(
             (impacts.hash(), &*impacts.stats().backend),
             (expected, "cpu")

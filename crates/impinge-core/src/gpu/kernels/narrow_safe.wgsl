@@ -17,14 +17,6 @@
 // Each step leaves its numbers in workgroup memory: a compiler that computed a direction twice might round it in two ways.
 
 const N_DIRECTIONS: u32 = 5u;
-// Of numbers that are flushed.
-const FLUSHED: f32 = 0x1p-76f;
-// The least height that is divided: its square is a normal number.
-const LOWEST: f32 = 0x1p-40f;
-// What is left of a quotient, so that it passes the check.
-const BELOW: f32 = 0x0.ffffcp0f; // 1 - 2^-18
-// Shorter distances, in the caller's unit, count as 0: nothing that is flushed is called a distance.
-const SHORTEST: f32 = 0x1p-100f;
 
 @group(0) @binding(0) var<storage, read> candidates: array<Candidate>;
 @group(0) @binding(1) var<storage, read> corners: array<vec4<u32>>;
@@ -40,19 +32,6 @@ var<workgroup> heights: array<f32, 64u * N_DIRECTIONS>;
 fn vertex_bits(vertex: u32) -> vec3<u32> {
     let word = 3u * vertex;
     return vec3<u32>(positions[word], positions[word + 1u], positions[word + 2u]);
-}
-
-fn cross3(d: vec3<f32>, e: vec3<f32>) -> vec3<f32> {
-    return vec3<f32>(d.y * e.z - d.z * e.y, d.z * e.x - d.x * e.z, d.x * e.y - d.y * e.x);
-}
-
-// A direction whose largest coordinate is in [1, 2), or none: 0.
-fn scaled(d: vec3<f32>) -> vec3<f32> {
-    let s = size(d);
-    if s < 0x1p-100f {
-        return vec3<f32>(0.0);
-    }
-    return d * scale_of(s);
 }
 
 // The corners of a difference polygon, and the edge after each; all brought into [1, 2).
@@ -109,25 +88,6 @@ fn load(candidate: Candidate) -> Polygon {
     return polygon;
 }
 
-// About the direction of the nearest point of the edge after a corner.
-fn towards(corner: vec3<f32>, edge: vec3<f32>) -> vec3<f32> {
-    let square = dot3(edge, edge);
-    // Nothing overflows below.
-    if square < 0x1p-60f {
-        return corner;
-    }
-    let along = -dot3(corner, edge) / square;
-    if along <= 0.0 {
-        return corner;
-    }
-    if along >= 1.0 {
-        return corner + edge;
-    }
-    let nearest = corner + along * edge;
-    // Once more, so that it is across the edge to the last bits.
-    return nearest - (dot3(nearest, edge) / square) * edge;
-}
-
 // A number below the least of n . V, or of -n . V, over all corners: by how much they are certainly on one side.
 fn height(n: vec3<f32>, polygon: ptr<function, Polygon>) -> f32 {
     var low = 0x1p100f;
@@ -140,17 +100,6 @@ fn height(n: vec3<f32>, polygon: ptr<function, Polygon>) -> f32 {
         opposite = min(opposite, -product - error);
     }
     return max(low, opposite);
-}
-
-// A number below a height divided by the length of a direction: checked by products.
-fn quotient(height: f32, n: vec3<f32>) -> f32 {
-    if height < LOWEST {
-        return 0.0;
-    }
-    let square = dot3(n, n);
-    let found = height * inverseSqrt(square) * BELOW;
-    let is_below = found * found * (square * (1.0 + OF_PRODUCT)) <= height * height * (1.0 - OF_PRODUCT);
-    return select(0.0, found * BELOW, is_below);
 }
 
 fn lower(vertex: u32, share: f32) {
@@ -170,11 +119,6 @@ fn lower_all(corner: vec4<u32>, share: f32) {
     if corner.z != corner.y {
         lower(corner.z, share);
     }
-}
-
-// How thick an element is: as its thickest vertex.
-fn thickness_of(corner: vec4<u32>) -> f32 {
-    return max(max(thickness[corner.x], thickness[corner.y]), thickness[corner.z]);
 }
 
 @compute @workgroup_size(64)
@@ -216,13 +160,7 @@ fn main(
     }
     let a = corners[candidate.a & ~FLAG];
     let b = corners[candidate.b & ~FLAG];
-    if arrayLength(&thickness) > 1u {
-        let both = (thickness_of(a) + thickness_of(b)) * (1.0 + OF_PRODUCT);
-        distance = max(0.0, distance - both) * BELOW;
-    }
-    if distance < SHORTEST {
-        distance = 0.0;
-    }
+    distance = besides_thickness(distance, a, b);
     let a_moves = limits[a.x] != 0u;
     let b_moves = limits[b.x] != 0u;
     let share = select(distance, 0.5 * distance, a_moves && b_moves);

@@ -14,11 +14,6 @@
 // Where the earliest contact is sought, the end is the least time by which any pair touches. So most pairs are dropped after one
 // interval. Where any contact is sought, all threads end once there is one.
 
-// Times are whole numbers of ticks, so a time and its difference to 1 are exact.
-const TICKS: u32 = 0x1000000u;
-const TICK: f32 = 0x1p-24f;
-// Twice the whole step: no time.
-const NONE: u32 = 2u * TICKS;
 // The shortest interval: a 1024th of the step.
 const SHORTEST: u32 = 0x4000u;
 // The most intervals of a pair.
@@ -34,18 +29,9 @@ const N_INTERVALS: u32 = 32u;
 @group(0) @binding(7) var<uniform> params: Params;
 @group(0) @binding(8) var<storage, read> bodies: array<Body>;
 
-// A time as a part of the step, and the other way round; both are exact.
-fn time_of(ticks: u32) -> f32 {
-    return f32(ticks) * TICK;
-}
-
+// The ticks of a time.
 fn ticks_of(bits: u32) -> u32 {
     return u32(bitcast<f32>(bits) * f32(TICKS));
-}
-
-// Not `mix`, which a device may compute in other ways.
-fn at(d: MovingFour, time: u32) -> Four {
-    return sum_four(scaled_four(d.start, time_of(TICKS - time)), scaled_four(d.end, time_of(time)));
 }
 
 fn over(d: MovingFour, low: u32, high: u32) -> MovingFour {
@@ -107,17 +93,6 @@ fn bracket_of(candidate: Candidate) -> Bracket {
         length = (high - low) / 2u;
     }
     return found;
-}
-
-fn name_of(pair: PairKey) -> UnsureKey {
-    let a = pair.low & ~FLAG;
-    let b = pair.high & ~FLAG;
-    if params.by_number == 0u {
-        return UnsureKey(a, b);
-    }
-    let number_a = number_at(a);
-    let number_b = number_at(b);
-    return UnsureKey(min(number_a, number_b), max(number_a, number_b));
 }
 
 @compute @workgroup_size(64)

@@ -159,6 +159,15 @@ impl FirstContacts {
         pairs: impl Iterator<Item = (Slots, f64, Option<f64>)>,
     ) {
         self.go_to(isa, world, between);
+        let (most_kept, _) = world.plan.most_kept(between.a, between.b);
+        if most_kept > 0.0 {
+            for (slots, free_until, _) in pairs {
+                if free_until <= self.until(world) {
+                    self.decide_kept(world, between, slots);
+                }
+            }
+            return self.decide_if_full(isa, world);
+        }
         if !matches!(between.kind, PairKind::VertexFace | PairKind::EdgeEdge) {
             if let Some(pair) = exact_pair(between.kind) {
                 pairs.for_each(|(slots, ..)| self.decide_exactly(world, between, pair, slots));

@@ -27,10 +27,6 @@ fn between(p: Moving, q: Moving) -> Moving {
     return Moving(p.start - q.start, p.end - q.end);
 }
 
-fn cross3(d: vec3<f32>, e: vec3<f32>) -> vec3<f32> {
-    return vec3<f32>(d.y * e.z - d.z * e.y, d.z * e.x - d.x * e.z, d.x * e.y - d.y * e.x);
-}
-
 // Bernstein coefficients of a cross product: the first, twice the middle one, the last.
 struct Crossed {
     first: vec3<f32>,
@@ -173,6 +169,8 @@ struct Sizes {
     // The largest of a corner.
     wide: f32,
     slack: f32,
+    // What they were multiplied by.
+    scale: f32,
     // Whether bounds hold for differences of these sizes.
     are_in_range: bool,
 }
@@ -190,7 +188,7 @@ fn scale_all(polygon: ptr<function, Polygon>, narrowing: f32) -> Sizes {
     let slack = narrowing * scale;
     (*polygon).corners = scaled_moving((*polygon).corners, scale);
     (*polygon).edges = scaled_moving((*polygon).edges, scale);
-    return Sizes(corners * scale + slack, edges * scale + slack, widest * scale + slack, slack, true);
+    return Sizes(corners * scale + slack, edges * scale + slack, widest * scale + slack, slack, scale, true);
 }
 
 // What is certain of two elements between the two ends of their polygon: nothing, that they do not touch, or that they do, at one time
