@@ -168,7 +168,7 @@ class Watch {
   #failure = null;
 
   constructor(signal, progress) {
-    if (signal !== undefined && !(signal instanceof AbortSignal)) refuse("signal: an AbortSignal is needed");
+    if (signal !== undefined && typeof signal?.aborted !== "boolean") refuse("signal: an AbortSignal is needed");
     if (progress !== undefined && typeof progress !== "function") refuse("progress: a function is needed");
     this.#signal = signal;
     this.#progress = progress;

@@ -698,8 +698,9 @@ export async function others(module) {
   const aborted = await refusal(() => detector.impacts(scene, { signal: controller.signal, progress: () => controller.abort() }));
   const thrown = await refusal(() => detector.impacts(scene, { progress: () => { throw new Error("mine"); } }));
   const { backend, totalMs } = contacts.stats;
-  // Arrays of another window.
-  const { Float32Array: F32, Float64Array: F64, Int32Array: I32, Uint8Array: U8, Uint16Array: U16, Uint32Array: U32 } = await otherWindow();
+  // Arrays and signals of another window. Contexts of Node have no signals.
+  const { Float32Array: F32, Float64Array: F64, Int32Array: I32, Uint8Array: U8, Uint16Array: U16, Uint32Array: U32, AbortSignal: Signal } = await otherWindow();
+  const signal = Signal?.abort() ?? { aborted: true };
   const foreign = new Scene();
   for (const index of [new U8([0, 1, 2]), new U16([0, 1, 2]), new U32([0, 1, 2])]) foreign.add({ faces: index, positions: new F32(TRIANGLE) });
   foreign.addPoints(new F64([0, 0, 0]));
@@ -708,6 +709,7 @@ export async function others(module) {
     index instanceof U8, (await detector.detect(foreign)).length, foreign.bodies.map((body) => foreign.positions(body).constructor.name),
     (await detector.closest(foreign, new F64([0, 0, 1]))).at(0).distance, weld({ positions: new F32(6), edges: new U16([0, 1]) }).mesh.positions.length,
     await refusal(() => foreign.addPoints(new I32(3))), await refusal(() => foreign.addTriangles(new I32([0, 1, 2]), new F32(TRIANGLE))),
+    await refusal(() => detector.count(foreign, { signal })),
   ];
   // Disposed of twice.
   const { stats: last } = detector;
@@ -751,6 +753,7 @@ export const OTHERS = {
     false, 3, ["Float32Array", "Float32Array", "Float32Array", "Float64Array"], 1, 3,
     "invalid: positions: an Int32Array given, a Float32Array or a Float64Array is needed",
     "invalid: index: an Int32Array given, a Uint32Array, a Uint16Array or a Uint8Array is needed",
+    "cancelled: cancelled",
   ],
   disposed: ["nothing was refused", true, "invalid: this detector has been disposed of"],
   near: [1, "vf", 1, 0, 0, 1, [[0.25, 0.25, 1], [0.25, 0.25, 0]], [0, 16]],
