@@ -100,10 +100,6 @@ impl InStep<'_> {
         answer: StepAnswer<'_>,
         stats: &mut Stats,
     ) -> Result<ByDevice, Error> {
-        // The kernels know the kinds that are asked for where none are named.
-        if job.plan.names_kinds() {
-            return Ok(ByDevice::Not);
-        }
         super::gpu::find_in_step(self.gpu, self.clusters, (job, self.settings), answer, stats)
     }
 

@@ -147,8 +147,8 @@ impl Gpu<'_> {
     /// times are 0, see [`ResidentStep`]; [`grow`](Gpu::grow) then makes room.
     ///
     /// # Errors
-    /// Those of [`encode`](Gpu::encode), for positions at both ends; a query with a clearance, a
-    /// filter or kinds of pairs; a separation above 2^100, or a body that is thicker.
+    /// Those of [`encode`](Gpu::encode), for positions at both ends; a query with a clearance or a
+    /// filter; a separation above 2^100, or a body that is thicker.
     pub fn encode_step(
         &mut self,
         scene: &Scene,
@@ -367,13 +367,6 @@ fn refuse_unknown(query: &Query, (most, allowed): (f64, &'static str)) -> Result
         return Err(Error::Setting {
             setting: "filter",
             given: "a filter of pairs in a step that stays on a device".to_owned(),
-            allowed: "only steps that are read back",
-        });
-    }
-    if query.kinds.is_some() {
-        return Err(Error::Setting {
-            setting: "kinds",
-            given: "kinds of pairs in a step that stays on a device".to_owned(),
             allowed: "only steps that are read back",
         });
     }

@@ -42,6 +42,8 @@ pub(super) struct ClusterPass {
     pub resolve: bool,
     /// What is asked of elements that may move.
     pub asks: Asks,
+    /// In a step: the kinds of pairs, as `Params::kinds` has them.
+    pub kinds: u32,
     /// In a step: which contacts the host seeks; none if results stay on the device.
     pub sought: Option<Goal>,
 }
@@ -177,6 +179,7 @@ impl Recorder<'_> {
                 params: Uniform(Params {
                     first: round,
                     n_ignored: view.n_ignored(),
+                    kinds: of_pass.kinds,
                     ..Params::default()
                 }),
             };

@@ -63,7 +63,7 @@ words! {
         n_ignored: u32, resolve: u32,
         group_size: u32, lambda: u32, most_cells: u32, owner_rule: u32,
         lists_only: u32, n_entries: u32, tile_row: u32, tile_column: u32, tile_side: u32,
-        by_number: u32, sought: u32,
+        by_number: u32, sought: u32, kinds: u32,
         reach: u32, queue_room: u32, items_room: u32,
         kept_room: u32, entries_room: u32, pairs_room: u32, searched_room: u32,
     }
@@ -104,6 +104,18 @@ words! {
     Rule { word: u32 }
 }
 
+/// That kinds are named, in `Params::kinds`.
+pub const KINDS_NAMED: u32 = 0x8000_0000;
+/// Vertices and faces, in `Params::kinds`; likewise below. The bits of [`PairKinds`].
+///
+/// [`PairKinds`]: crate::query::pair_kind::PairKinds
+pub const KIND_VERTEX_FACE: u32 = 1;
+/// Two edges.
+pub const KIND_EDGE_EDGE: u32 = 2;
+/// Edges and vertices.
+pub const KIND_EDGE_VERTEX: u32 = 4;
+/// Two vertices.
+pub const KIND_VERTEX_VERTEX: u32 = 8;
 /// All contacts of a step, in `Params::sought`.
 pub const SEEK_ALL: u32 = 0;
 /// Only the first contact, in `Params::sought`.
@@ -229,20 +241,23 @@ impl fmt::Display for Params {
     }
 }
 
+/// Words behind parameters.
+const PADDING: usize = 64 - size_of::<Params>() / 4;
+
 /// The parameters of one dispatch, padded to the alignment of uniform offsets.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Step {
     /// The parameters.
     pub params: Params,
-    padding: [u32; 38],
+    padding: [u32; PADDING],
 }
 
 impl From<Params> for Step {
     fn from(params: Params) -> Self {
         Step {
             params,
-            padding: [0; 38],
+            padding: [0; PADDING],
         }
     }
 }

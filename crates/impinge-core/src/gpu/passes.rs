@@ -19,7 +19,7 @@ use super::clusters;
 use super::collect::{Collected, Guess};
 use super::device::Scopes;
 use super::engine::{Engine, PassSink, PassesEnd};
-use super::layout::NodePair;
+use super::layout::{KINDS_NAMED, NodePair};
 use super::pass_buffers::{Capacities, CellsWanted, NextPass, PassBuffers};
 use super::recording::{Recorder, Recording};
 use super::view::{Motion, StepTest};
@@ -340,6 +340,7 @@ impl Engine {
                 n_rounds: self.world.rounds(seeds),
                 resolve: resolve && asks.test != StepTest::Safe,
                 asks,
+                kinds: (plan.kinds_named()).map_or(0, |kinds| KINDS_NAMED | kinds.bits()),
                 sought,
             }),
             (Some(PassWork::Cells(work)), Some(guest)) => {

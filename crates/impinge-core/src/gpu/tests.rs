@@ -131,7 +131,7 @@ fn structs_are_laid_out_as_on_the_host() {
         Params {
             first, count, counter, per_group, capacity, slot, n_ignored, resolve, group_size,
             lambda, most_cells, owner_rule, lists_only, n_entries, tile_row, tile_column, tile_side,
-            by_number, sought, reach, queue_room, items_room, kept_room, entries_room, pairs_room,
+            by_number, sought, kinds, reach, queue_room, items_room, kept_room, entries_room, pairs_room,
             searched_room
         }
         Kept { low, slot, high, body, range, unused }
@@ -181,6 +181,10 @@ fn constants_are_those_of_the_host() {
         ("N_PAIRS_LISTED", N_PAIRS_LISTED),
         ("N_UNSURE_LISTED", N_UNSURE_LISTED),
         ("N_COUNTERS", N_COUNTERS),
+        ("KIND_VERTEX_FACE", KIND_VERTEX_FACE),
+        ("KIND_EDGE_EDGE", KIND_EDGE_EDGE),
+        ("KIND_EDGE_VERTEX", KIND_EDGE_VERTEX),
+        ("KIND_VERTEX_VERTEX", KIND_VERTEX_VERTEX),
         ("SEEK_ALL", SEEK_ALL),
         ("SEEK_EARLIEST", SEEK_EARLIEST),
         ("SEEK_ANY", SEEK_ANY),

@@ -342,10 +342,10 @@ impl Plan {
         Ok(plan)
     }
 
-    /// Whether the query names the kinds of pairs.
+    /// The kinds of pairs, if the query names them.
     #[cfg(feature = "gpu")]
-    pub(crate) fn names_kinds(&self) -> bool {
-        self.kinds.is_some()
+    pub(crate) fn kinds_named(&self) -> Option<PairKinds> {
+        self.kinds
     }
 
     /// The kinds of pairs that are asked for, as far as some parts may have them.

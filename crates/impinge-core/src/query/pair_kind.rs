@@ -67,6 +67,12 @@ impl PairKinds {
     /// All six kinds.
     pub const ALL: PairKinds = PairKinds(0b11_1111);
 
+    /// A bit per kind, in the order of [`PairKind::ALL`].
+    #[cfg(feature = "gpu")]
+    pub(crate) fn bits(self) -> u32 {
+        self.0.into()
+    }
+
     /// Whether the set contains a kind.
     pub fn contains(self, kind: PairKind) -> bool {
         self.0 >> kind as u8 & 1 == 1

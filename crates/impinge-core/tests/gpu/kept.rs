@@ -128,7 +128,7 @@ fn steps_whose_elements_keep_a_distance_are_answered_alike() {
         n_steps += 1;
         own
     };
-    for seed in 0..24 {
+    for seed in 0..12 {
         let mut random = Random::new(seed + 100);
         let mut scene = small(seed);
         let separation = [0.0, 0.25, 1.0][seed as usize % 3];
@@ -160,7 +160,7 @@ fn steps_whose_elements_keep_a_distance_are_answered_alike() {
         "{n_left} of {n_impacts}"
     );
     assert!(n_near > n_impacts * 3 / 4, "{n_near} of {n_impacts}");
-    assert!(totals[0] > 5000, "{totals:?}");
+    assert!(totals[0] > 3000, "{totals:?}");
 }
 
 #[test]
@@ -181,7 +181,7 @@ fn distances_near_the_limits_of_numbers_are_kept() {
         (2f64.powi(60), 0.0, 2f64.powi(57)),
         (2f64.powi(110), 0.0, 2f64.powi(90)),
     ] {
-        for seed in 0..6 {
+        for seed in 0..3 {
             let mut scene = small(seed);
             let bodies = Vec::from_iter(scene.bodies().map(|(body, _)| body));
             for body in bodies {
@@ -205,26 +205,26 @@ fn distances_near_the_limits_of_numbers_are_kept() {
             assert_alike(&name, &mut device, &scene, &query);
         }
     }
-    assert!(n_impacts > 1000, "{n_impacts}");
+    assert!(n_impacts > 800, "{n_impacts}");
 }
 
 #[test]
 fn damaged_kernels_of_distances_that_are_kept_are_noticed() {
     let caller = Caller::new();
     let mut cases = Vec::new();
-    for seed in 0..8 {
+    for seed in 0..4 {
         let mut random = Random::new(seed);
         let mut scene = small(seed);
         thicken(&mut scene, &mut random, 0.3);
         cases.push((scene, [0.0, 0.5][seed as usize % 2]));
     }
     let mut cloth = Scene::new();
-    let at = surfaces::cloth(20, 20, 1.0);
+    let at = surfaces::cloth(14, 14, 1.0);
     let body = at.add_to(&mut cloth).expect("good");
     let end = at.mapped(|[x, y, z]| [x, if x > 0.0 { -y } else { y }, z + 0.2 * x]);
     cloth.set_end_positions(body, &end.positions).expect("good");
     cases.push((cloth, 0.02));
-    cases.push((balls(400), 0.02));
+    cases.push((balls(200), 0.02));
     // Boxes of plates that come near never meet.
     let mut plates = Scene::new();
     let fixed = surfaces::cloth(12, 12, 1.0);

@@ -11,7 +11,7 @@ use crate::resident_steps::{assert_between, listed};
 use crate::safe::{check_asked, safe_of};
 
 use impinge_core::{
-    Backend, BodyId, Detector, Elements, Exclusion, Positions, Query, Scene, Settings,
+    Backend, BodyId, Detector, Elements, Exclusion, PairKind, Positions, Query, Scene, Settings,
 };
 use impinge_scenes::{Random, solids, surfaces};
 
@@ -202,4 +202,65 @@ fn frames_on_the_device_leave_out_what_the_question_does() {
             );
         }
     }
+}
+
+#[test]
+fn steps_and_safe_distances_on_the_device_are_about_the_kinds_that_are_named() {
+    use PairKind::{EdgeEdge, EdgeVertex, VertexFace, VertexVertex};
+    let caller = Caller::new();
+    let mut detector = caller.detector(Settings::default());
+    let mut cpu = Detector::new(Backend::Cpu).expect("settings");
+    let (mut scene, _) = scene();
+    let mut random = Random::new(5);
+    let mut points = |n: usize| Vec::from_iter((0..n).map(|_| random.point(-1.0, 1.0)));
+    let edges = Vec::from_iter((0..60).map(|edge| [edge, edge + 1]));
+    let bodies = [
+        scene.add_edges(&edges, &points(61)).expect("good"),
+        scene.add_points(&points(50)).expect("good"),
+    ];
+    for body in bodies {
+        let n = scene.body(body).expect("held").n_vertices();
+        scene.set_end_positions(body, points(n)).expect("good");
+    }
+    let mut counts = Vec::new();
+    for kinds in [
+        &[VertexFace][..],
+        &[EdgeEdge],
+        &[EdgeVertex],
+        &[VertexVertex],
+        &[VertexFace, EdgeEdge],
+        &[EdgeVertex, VertexVertex],
+        &[VertexFace, EdgeEdge, EdgeVertex, VertexVertex],
+    ] {
+        let name = &format!("{kinds:?}");
+        // Points seldom meet points, but come near.
+        let query = Query::all().kinds(kinds.iter().copied()).separation(0.02);
+        let by_host = cpu.impacts(&scene, &query).expect("good").clone();
+        let by_device = detector.impacts(&scene, &query).expect("good");
+        assert_ne!(by_device.stats().backend, "cpu", "{name}");
+        assert_eq!(
+            (by_device.len(), by_device.hash()),
+            (by_host.len(), by_host.hash()),
+            "{name}"
+        );
+        counts.push(by_host.len());
+        let query = query.separation(0.0);
+        let (found, pairs, _) = listed(&caller, &mut detector, &scene, &query, [&[], &[]]);
+        assert_between(name, &found, &pairs, &scene, &query, &query);
+        let candidates = cpu.candidates(&scene, 0.0, &query).expect("good").len();
+        assert!(pairs.len() <= candidates, "{name}: of another kind");
+        let safe = safe_of(&caller, &mut detector, &scene, 0.1, &query, &[]);
+        let [_, n_bounded] = check_asked(name, &scene, &safe, (0.1, &[]), query);
+        assert!(n_bounded > 0, "{name}");
+    }
+    assert!(counts.iter().all(|&n| n > 0), "{counts:?}");
+    let [vf, ee, ev, vv, both, bare, all] = counts[..] else {
+        panic!("seven");
+    };
+    assert_eq!((vf + ee, ev + vv), (both, bare));
+    assert_eq!(both + bare, all);
+    let none = Query::all().kinds([]);
+    let [by_host, by_device] = [&mut cpu, &mut detector]
+        .map(|detector| detector.impacts(&scene, &none).map(|impacts| impacts.len()));
+    assert_eq!(by_host.ok(), by_device.ok());
 }

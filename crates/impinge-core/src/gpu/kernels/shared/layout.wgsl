@@ -112,8 +112,9 @@ struct Params {
     tile_side: u32,
     // Steps: 1 when pairs are named by global numbers, 0 when by slots.
     by_number: u32,
-    // Steps: which contacts are sought.
+    // Steps: which contacts are sought; and which kinds of pairs, as bits (bit 31: they are named), or 0 for those that cover every body.
     sought: u32,
+    kinds: u32,
     // Safe distances: how far boxes are widened (bits of an f32).
     reach: u32,
     // Last kernels of what stays on the device: the room of all buffers before the lists (that of candidates is `capacity`), of pairs,
@@ -125,6 +126,11 @@ struct Params {
     pairs_room: u32,
     searched_room: u32,
 }
+
+const KIND_VERTEX_FACE: u32 = 1u;
+const KIND_EDGE_EDGE: u32 = 2u;
+const KIND_EDGE_VERTEX: u32 = 4u;
+const KIND_VERTEX_VERTEX: u32 = 8u;
 
 const SEEK_ALL: u32 = 0u;
 const SEEK_EARLIEST: u32 = 1u;

@@ -1,3 +1,7 @@
+fn is_kind_asked(kind: u32, covers: bool) -> bool {
+    return select((params.kinds & kind) != 0u, covers, params.kinds == 0u);
+}
+
 // Whether elements of two different parts of a step meet: pairs of their bodies are asked for, and so is this kind of
 // pair. The same as `Plan::test` on the host.
 fn meets(a: u32, b: u32) -> bool {
@@ -16,10 +20,11 @@ fn meets(a: u32, b: u32) -> bool {
     let part_b = of_b.part & PART;
     let both = of_a.part & of_b.part;
     if part_a == part_b {
-        return part_a == EDGES || (part_a == VERTICES && (both & POINTS) != 0u);
+        return (part_a == EDGES && is_kind_asked(KIND_EDGE_EDGE, true))
+            || (part_a == VERTICES && is_kind_asked(KIND_VERTEX_VERTEX, (both & POINTS) != 0u));
     }
     if max(part_a, part_b) == FACES {
-        return min(part_a, part_b) == VERTICES;
+        return min(part_a, part_b) == VERTICES && is_kind_asked(KIND_VERTEX_FACE, true);
     }
-    return (both & BARE) != 0u;
+    return is_kind_asked(KIND_EDGE_VERTEX, (both & BARE) != 0u);
 }
