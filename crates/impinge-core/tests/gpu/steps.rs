@@ -689,14 +689,17 @@ fn a_body_that_flows_away_from_its_clusters_is_clustered_again() {
 #[test]
 fn steps_advance_as_on_the_cpu() {
     let scene = balls(400);
-    let step = Query::all().start(Start::Skip);
-    let expected = on_cpu().advance(&scene, &step).expect("good");
-    let found = on_gpu().advance(&scene, &step).expect("good");
-    assert_eq!(
-        (found.fraction, found.first),
-        (expected.fraction, expected.first)
-    );
-    assert!(found.iter().eq(expected.iter()));
+    for separation in [0.0, 0.003] {
+        let step = Query::all().start(Start::Skip).separation(separation);
+        let expected = on_cpu().advance(&scene, &step).expect("good");
+        let found = on_gpu().advance(&scene, &step).expect("good");
+        assert_eq!(
+            (found.fraction, found.first),
+            (expected.fraction, expected.first)
+        );
+        assert!(found.fraction < 1.0);
+        assert!(found.iter().eq(expected.iter()));
+    }
 }
 
 #[test]
