@@ -248,9 +248,12 @@ impl Plan {
         with_close: bool,
         limits: Limits,
     ) -> Result<Self, Error> {
+        let keep = query.keep();
         let keep = Keep {
             is_rounded: true,
-            ..query.keep()
+            // Who names a clearance computes positions, also with a share of 0.
+            share: keep.share.max(f64::from_bits(1)),
+            ..keep
         };
         let has_clearance = !keep.is_plain();
         let keep = if has_clearance { keep } else { query.keep() };

@@ -92,7 +92,7 @@ impl Clearance {
     }
 
     /// Sets the share of its distance at the start that a pair keeps at most: from 0, which keeps
-    /// nothing, to less than 1.
+    /// nothing (in [`advance`](crate::Detector::advance) what rounding takes), to less than 1.
     pub fn share(mut self, share: f64) -> Self {
         self.share = share;
         self

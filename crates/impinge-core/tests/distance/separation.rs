@@ -534,6 +534,44 @@ fn a_step_that_is_advanced_keeps_the_distance() {
     }
 }
 
+/// A point beside a plane, on a way beside it: where it is computed in floats on the way it may
+/// lie on the plane.
+#[test]
+fn rounding_is_kept_with_a_share_of_nothing_too() {
+    let mut scene = Scene::new();
+    let plane = [
+        [0.0, -9.0, 0.0],
+        [4.0, -9.0, 4.0],
+        [0.0, 9.0, 0.0],
+        [4.0, 9.0, 4.0],
+    ];
+    scene
+        .add_triangles(&[[0, 1, 2], [1, 3, 2]], &plane)
+        .expect("good");
+    let start = [1.630_592_070_448_239_7, 0.5, 1.630_592_070_448_24];
+    let end = [1.267_088_846_626_231_6, 0.7, 1.267_088_846_626_231_8];
+    let point = scene.add_points(&[start]).expect("good");
+    scene.set_end_positions(point, &[end]).expect("good");
+    let a = 0.485_835_358_831_789_1;
+    let at: [f64; 3] = std::array::from_fn(|k| start[k] + a * (end[k] - start[k]));
+    assert_eq!(at[0], at[2], "on the plane");
+    let fraction = |clearance: f64, share| {
+        let step = Query::all().clearance(Clearance::new(clearance).share(share));
+        let advance = detector(Method::Clusters).advance(&scene, &step);
+        advance.expect("good").fraction
+    };
+    for share in [0.0, 5e-324, 1e-9, 0.2] {
+        assert!(fraction(1e-4, share) < a, "{share}");
+    }
+    // The way itself is free, and this is a question about the way.
+    let step = Query::all().clearance(Clearance::new(1e-4).share(0.0));
+    assert!(
+        detector(Method::Clusters)
+            .is_free(&scene, &step)
+            .expect("good")
+    );
+}
+
 #[test]
 fn the_answer_depends_on_the_input_alone() {
     let mut scene = lattice(20);
