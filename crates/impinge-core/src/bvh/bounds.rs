@@ -22,6 +22,15 @@ impl Aabb {
         max: [f32::NEG_INFINITY; 3],
     };
 
+    /// The box that reaches less far, as [`LaneBounds::deflated`].
+    #[inline(always)]
+    pub fn deflated(&self, by: f32) -> Aabb {
+        Aabb {
+            min: self.min.map(|low| low + by),
+            max: self.max.map(|high| high - by),
+        }
+    }
+
     /// Whether the two share a point.
     #[inline(always)]
     pub fn overlaps(&self, other: &Aabb) -> bool {
@@ -124,6 +133,16 @@ pub struct LaneBounds {
 }
 
 impl LaneBounds {
+    /// Boxes that reach less far, on all sides, which may be beyond each other afterwards. Against
+    /// others: what is at most the other end is so with both rounded.
+    #[inline(always)]
+    pub fn deflated(&self, by: f32) -> LaneBounds {
+        LaneBounds {
+            min: self.min.map(|ends| ends.map(|low| low + by)),
+            max: self.max.map(|ends| ends.map(|high| high - by)),
+        }
+    }
+
     /// Empty boxes in all lanes.
     pub const EMPTY: LaneBounds = LaneBounds {
         min: [[f32::INFINITY; GROUP]; 3],

@@ -13,18 +13,20 @@ use std::time::Duration;
 
 use crate::boxes::Sweep;
 use crate::bvh::GROUP;
-use crate::bvh::bounds::Aabb;
+use crate::bvh::bounds::{Aabb, round_down};
 use crate::cpu::batches::{BatchStages, Counts};
 use crate::cpu::directions::Directions;
 use crate::cpu::group_cache::GroupCache;
 use crate::cpu::lane_pairs::{LanePairs, RowSide, WorkItem};
 use crate::cpu::pairing::full;
 use crate::plan::{Plan, Question, TestId};
+use crate::query::pair_kind::PairKind;
 use crate::query::settings::Settings;
 use crate::scene::index::{ClusterIx, Number, PartIx};
 use crate::search::found::StepAnswer;
 use crate::simd::{Isa, LaneBounds, Lanes, Masks, Simd};
 use crate::workers::clock::Instant;
+use impinge_exact::internal::Reach;
 
 use super::group::StepGroup;
 use super::narrow::{Batch, Between, Listing, NarrowCounts, StepDecider, key_in};
@@ -166,17 +168,17 @@ pub(super) fn run<S: Simd>(
                 lower => lower,
             },
         };
-        let Some(slots) = pair(simd, world, item, lower, worker) else {
-            continue;
-        };
-        worker.n_decided += 1;
-        let is_sample = worker.n_decided.is_multiple_of(SAMPLED);
-        let start = is_sample.then(Instant::now);
         let between = Between {
             a: item.a,
             b: item.b,
             kind,
         };
+        let Some(slots) = pair(simd, world, (item, between), lower, worker) else {
+            continue;
+        };
+        worker.n_decided += 1;
+        let is_sample = worker.n_decided.is_multiple_of(SAMPLED);
+        let start = is_sample.then(Instant::now);
         let StepWorker {
             decider,
             lane_pairs,
@@ -240,7 +242,7 @@ pub(super) fn decide_listed<S: Simd>(
 fn pair<S: Simd>(
     simd: S,
     world: StepWorld<'_>,
-    item: &WorkItem,
+    (item, between): (&WorkItem, Between),
     lower: Option<[Number; 2]>,
     worker: &mut StepWorker,
 ) -> Option<[usize; 2]> {
@@ -255,7 +257,8 @@ fn pair<S: Simd>(
         ..
     } = worker;
     lane_pairs.clear();
-    let (slots, [lanes_a, lanes_b]) = cull(simd, world, item, lower, groups)?;
+    let farther = farther_than_meeting(world, item, between);
+    let (slots, [lanes_a, lanes_b]) = cull(simd, world, (item, farther), lower, groups)?;
     let [a, b] = slots.map(|slot| groups.at(slot));
     let is_of_body = world.plan.part(item.a).id == world.plan.part(item.b).id;
     let known = match is_of_body {
@@ -278,12 +281,17 @@ fn pair<S: Simd>(
     let is_own = (item.a, item.cluster_a) == (item.b, item.cluster_b);
     let kinds = (is_single, is_own);
     let listed = if is_whole { None } else { Some(n) };
-    overlap(simd, kinds, (groups, rows, lanes), listed, survivors, masks);
+    let sides = (groups, rows, lanes);
+    overlap(simd, kinds, sides, (listed, farther), survivors, masks);
     if let Some(excluded) = excluded {
         excluded.take_from(masks);
     }
     if may_part {
-        let reach = world.plan.reach(item.a, item.b).enclosing_f32();
+        let reach = match between.kind {
+            PairKind::EdgeFace => Reach::from(margin(world)),
+            _ => world.plan.reach(item.a, item.b),
+        };
+        let reach = reach.enclosing_f32();
         decider.n_candidates += directions.thin(
             simd,
             world,
@@ -317,13 +325,41 @@ fn pair<S: Simd>(
     (lane_pairs.len() > 0).then_some(slots)
 }
 
+/// By how much farther the boxes of two parts reach together than elements are apart that count: of
+/// near pairs an edge and a face count where they meet, whatever the distance. 0 of all others.
+#[inline(always)]
+fn farther_than_meeting(world: StepWorld<'_>, item: &WorkItem, between: Between) -> f32 {
+    let plan = world.plan;
+    if between.kind != PairKind::EdgeFace || plan.question != Question::Nearness {
+        return 0.0;
+    }
+    let inflation = plan.inflation(between.a) + plan.inflation(between.b);
+    let farther = round_down((inflation.next_down() - margin(world)).next_down());
+    let [Aabb { min, max }, _] = world.cache(item.a).ends(item.cluster_a);
+    let widest = (0..3).fold(0.0, |widest: f32, axis| widest.max(max[axis] - min[axis]));
+    // Little beside the elements is not worth the work.
+    match farther * 32.0 > widest {
+        true => farther,
+        false => 0.0,
+    }
+}
+
+/// How far elements that are listed may be from counting.
+#[inline(always)]
+fn margin(world: StepWorld<'_>) -> f64 {
+    match world.answer {
+        StepAnswer::Listed { margin } => margin,
+        _ => 0.0,
+    }
+}
+
 /// The slots of a work item's groups, and the lanes of each that meet the other's box and that have
 /// wanted keys; `None` if there are none.
 #[inline(always)]
 fn cull<S: Simd>(
     simd: S,
     world: StepWorld<'_>,
-    item: &WorkItem,
+    (item, farther): (&WorkItem, f32),
     lower: Option<[Number; 2]>,
     groups: &mut GroupCache<StepGroup>,
 ) -> Option<([usize; 2], [u64; 2])> {
@@ -334,7 +370,12 @@ fn cull<S: Simd>(
     let sides = [(item.a, item.cluster_a), (item.b, item.cluster_b)];
     let is_own = sides[0] == sides[1];
     let boxes = sides.map(|(part, cluster)| world.cache(part).ends(cluster));
+    let is_deflated = farther > 0.0;
+    let deflated = |ends: &[Aabb; 2]| ends.each_ref().map(|held| held.deflated(farther));
     if !is_own && !meet(&boxes[0], &boxes[1]) {
+        return None;
+    }
+    if is_deflated && !meet(&deflated(&boxes[0]), &boxes[1]) {
         return None;
     }
     let wanted = match lower {
@@ -344,7 +385,10 @@ fn cull<S: Simd>(
     let slot_a = groups.slot(simd, world, sides[0], usize::MAX);
     let slot_b = groups.slot(simd, world, sides[1], slot_a);
     let (a, b) = (groups.at(slot_a), groups.at(slot_b));
-    let ends = [&a.ends, &b.ends];
+    let mut ends = [a.ends, b.ends];
+    if is_deflated {
+        ends = ends.each_ref().map(deflated);
+    }
     let (mut lanes_a, mut lanes_b) = (full(a.size), full(b.size));
     if !is_own {
         let is_single = world.sweep.is_single();
@@ -352,7 +396,7 @@ fn cull<S: Simd>(
         lanes_a = if is_single {
             simd.overlaps_64(&a.start, &ends[1][0], lanes_a)
         } else {
-            simd.meets_64([&a.start, &a.end], ends[1], lanes_a)
+            simd.meets_64([&a.start, &a.end], &ends[1], lanes_a)
         };
         if lanes_a == 0 {
             return None;
@@ -360,7 +404,7 @@ fn cull<S: Simd>(
         lanes_b = if is_single {
             simd.overlaps_64(&b.start, &ends[0][0], lanes_b)
         } else {
-            simd.meets_64([&b.start, &b.end], ends[0], lanes_b)
+            simd.meets_64([&b.start, &b.end], &ends[0], lanes_b)
         };
         if lanes_b == 0 {
             return None;
@@ -386,13 +430,14 @@ fn cull<S: Simd>(
 }
 
 /// Masks of the lanes of one group whose boxes meet those of each row of the other. `listed`: how
-/// many lanes are put side by side first, which is in whose places the masks then are.
+/// many lanes are put side by side first, which is in whose places the masks then are. `farther`:
+/// by how much boxes reach too far, where they are single.
 #[inline(always)]
 fn overlap<S: Simd>(
     simd: S,
     (is_single, is_own): (bool, bool),
     ([own, other], rows, lanes): ([&StepGroup; 2], u64, u64),
-    listed: Option<usize>,
+    (listed, farther): (Option<usize>, f32),
     survivors: &mut [LaneBounds; 2],
     masks: &mut Masks,
 ) {
@@ -410,6 +455,10 @@ fn overlap<S: Simd>(
     // All lanes of a cluster that meets itself survive, each in its place.
     match (is_single, is_own) {
         (true, true) => simd.overlaps_within(boxes[0], among, masks),
+        (true, false) if farther > 0.0 => {
+            let own = own.start.deflated(farther);
+            simd.overlaps_rows(boxes[0], among, &own, rows, masks);
+        }
         (true, false) => simd.overlaps_rows(boxes[0], among, &own.start, rows, masks),
         (false, true) => simd.meets_within(boxes, among, masks),
         (false, false) => simd.meets_rows(boxes, among, [&own.start, &own.end], rows, masks),
