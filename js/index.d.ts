@@ -485,7 +485,7 @@ export interface NearPairs extends Answer, NearList {}
 
 /** The nearest elements of two bodies. */
 export interface Nearest {
-  /** A length, rounded down: never above the true one, and 0 if and only if they touch. */
+  /** A length, rounded down: never above the true one, and 0 if and only if they touch, or are nearer than the smallest number. */
   distance: number;
   bodyA: Body;
   elementA: number;
@@ -507,7 +507,7 @@ export interface ClosestElement {
   feature: number;
   /** A length, rounded down: never above the true one, and 0 if they touch. */
   distance: number;
-  /** Rounded to nearest. */
+  /** Rounded: off by a few last bits of the largest coordinate of the element. */
   point: [number, number, number];
 }
 
@@ -569,7 +569,10 @@ export interface Hits extends Answer {
 export interface SafeDistances {
   /** A length per vertex, in the precision of the body's positions: below what is allowed by at most 2^-10 of it, and never above. */
   of(body: Body): Float32Array | Float64Array;
-  /** The pairs at distance 0, whose vertices may not move at all; also those of two fixed bodies. */
+  /**
+   * The pairs at distance 0 (also those nearer than the smallest number), or at most as far apart as they are thick, whose vertices may not
+   * move at all; also those of two fixed bodies.
+   */
   readonly touching: NearPairs;
   readonly stats: Stats;
 }
@@ -598,7 +601,10 @@ export interface Truncation {
 export interface Csr {
   readonly offsets: Uint32Array;
   readonly indices: Uint32Array;
-  /** How far away each is: below the true distance by at most 2^-20 of it, where `near` has the nearest float below. 0 where they touch. */
+  /**
+   * How far away each is, minus the thickness of both: below that by at most 2^-20 of it (or by 2^-1045), where `near` has the nearest float
+   * below. 0 where they touch.
+   */
   readonly distances: Float64Array;
 }
 

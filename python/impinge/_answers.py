@@ -827,7 +827,7 @@ class SafeDistances:
     def touching(self) -> NearPairs:
         """NearPairs : the pairs at distance 0, or at most as far apart as their bodies are thick, whose vertices may not move at all.
 
-        Pairs of two `fixed` bodies are among them.
+        Pairs of two `fixed` bodies are among them, and pairs that do not touch but are nearer than the smallest float.
         """
         return NearPairs(self._inner.touching())
 
@@ -846,9 +846,9 @@ class SafeDistances:
 class Csr(NamedTuple):
     """Compressed sparse rows: the neighbours of element ``i`` are ``indices[offsets[i]:offsets[i + 1]]``, ascending.
 
-    `distances` are in the unit of the scene, minus the thickness of both elements, and rounded down: by at most 2**-20 of it, and 0 if
-    and only if the elements touch, or are at most as far apart as they are thick. With SciPy,
-    ``csr_array((csr.distances, csr.indices, csr.offsets), shape=(n, m))`` is a matrix.
+    `distances` are in the unit of the scene, minus the thickness of both elements, and rounded down: by at most 2**-20 of it, or by
+    2**-1045, and 0 if and only if the elements touch, or are at most as far apart as they are thick, or farther by no more than
+    2**-1045. With SciPy, ``csr_array((csr.distances, csr.indices, csr.offsets), shape=(n, m))`` is a matrix.
     """
 
     offsets: npt.NDArray[np.uint64]

@@ -560,8 +560,8 @@ class Detector(DetectorBase):
         Returns
         -------
         Nearest or None
-            ``None`` where one of them has no element. Its distance is 0 if and only if they share a point. Of several pairs at
-            one distance the lowest, by the element of `a`, then of `b`.
+            ``None`` where one of them has no element. Its distance is 0 if and only if they share a point, or are nearer than the
+            smallest float. Of several pairs at one distance the lowest, by the element of `a`, then of `b`.
 
         Raises
         ------
@@ -791,7 +791,8 @@ class Detector(DetectorBase):
         Returns
         -------
         numpy.ndarray of float64, shape (n,)
-            0 on the surface. The sign is exact, and the magnitude is rounded down: never above the true distance.
+            0 on the surface. The sign is exact, and the magnitude is rounded down: never above the true distance, and 0 or -0 below
+            the smallest float.
 
         Raises
         ------

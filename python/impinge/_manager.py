@@ -69,7 +69,8 @@ class DistanceData:
     names : set
         The names of the two objects.
     distance : float
-        0 or less if and only if they share a point; less where they overlap and it is known by how much.
+        0 or less if and only if they share a point, or are nearer than the smallest float; less where they overlap and it is known by
+        how much.
     """
 
     def __init__(

@@ -77,6 +77,19 @@ def test_fixed_bodies_leave_all_of_a_distance(scene, detector):
     assert np.allclose(one.of(1)[near], expected, rtol=1e-9)
 
 
+def test_pairs_nearer_than_the_smallest_float(detector):
+    """They do not touch, and their distance is rounded down to 0: they stand still, too."""
+    tiny = 5e-324
+    scene = impinge.Scene()
+    slope = scene.add([[0, 0, 0], [4, 4, 0], [0, 0, 4]], [[0, 1, 2]])
+    beside = scene.add([[tiny, 0, 1], [tiny, 0, 2], [tiny, 0, 2]], [[0, 1, 2]])
+    assert not detector.any(scene) and detector.distance(scene, slope, beside).distance == 0
+    assert detector.closest(scene, [[tiny, 0, 1]], of=slope).distances.tolist() == [0]
+    assert len(detector.near(scene, 0.0)) == 0
+    safe = detector.safe_distances(scene, 1.0)
+    assert safe.of(beside).tolist() == [0, 0, 0] and len(safe.touching) > 0
+
+
 def test_touching_pairs_stand_still_and_are_named(detector):
     scene = impinge.Scene()
     scene.add([[0, 0, 0], [4, 0, 0], [0, 4, 0]], [[0, 1, 2]])

@@ -443,7 +443,8 @@ typedef struct impinge_impact {
   uint32_t kind, body_a, element_a, body_b, element_b, at_start;
 } impinge_impact;
 
-/* The nearest two elements of two bodies. `distance` is rounded down, and 0 if and only if they touch. `points`: one of each element, rounded to nearest. */
+/* The nearest two elements of two bodies. `distance` is rounded down, and 0 if and only if they touch, or are nearer than the smallest
+ * double. `points`: one of each element, rounded. */
 typedef struct impinge_nearest {
   double distance, points[2][3];
   uint32_t body_a, element_a, body_b, element_b;
@@ -464,7 +465,7 @@ typedef struct impinge_nearest {
  * and `point` NaN. */
 typedef struct impinge_closest_element {
   double distance; /* rounded down: never above the true one, and 0 if they touch */
-  double point[3]; /* the nearest point of the element, rounded to nearest */
+  double point[3]; /* the nearest point of the element, rounded: off by a few last bits of its largest coordinate */
   uint32_t body, element;
   uint32_t feature; /* which feature of the element has that point in its inside */
   uint32_t found;   /* 1, or 0 if nothing is near enough */
@@ -855,7 +856,8 @@ impinge_status impinge_project_psd(double *matrices, size_t n, size_t size);
 /* How far each vertex of a body may move: a view, n x 1 F32 or F64 as its positions, valid as long as the answer. A vertex that belongs to
  * no element has `most`, as has each vertex of a body that the query is not about. INVALID: no such body when it was asked. */
 impinge_status impinge_safe_distances_of(const impinge_safe_distances *safe_distances, uint32_t body, impinge_array *view);
-/* The pairs at distance 0, or at most as far apart as their bodies are thick, also those of two fixed bodies. They belong to the answer: do not destroy them. NULL for NULL. */
+/* The pairs at distance 0, or at most as far apart as their bodies are thick, also those of two fixed bodies, and those that are nearer
+ * than the smallest double without touching. They belong to the answer: do not destroy them. NULL for NULL. */
 const impinge_near *impinge_safe_distances_touching(const impinge_safe_distances *safe_distances);
 impinge_status impinge_safe_distances_stats(const impinge_safe_distances *safe_distances, impinge_stats *stats);
 void impinge_safe_distances_destroy(impinge_safe_distances *safe_distances);
@@ -869,8 +871,8 @@ impinge_status impinge_neighbours_first(const impinge_neighbours *neighbours, ui
 /* The lists of the elements that a kind (IMPINGE_VF ...) names first, or, if `reversed` is 1, of those that it names second: of IMPINGE_VF
  * the faces near each vertex, or the vertices near each face. The neighbours of element i are those from offsets[i] (U64) to
  * offsets[i + 1] of `indices` (U32), ascending; `distances` (F64) has how far each is, minus the thickness of both, rounded down: by at
- * most 2^-20 of it, and 0 if and only if they touch or are at most as far apart as they are thick. Views, valid as long as the answer; each
- * may be NULL. A kind that was not asked for has no offsets, or lists without entries. */
+ * most 2^-20 of it, or by 2^-1045, and 0 if and only if they touch, or are at most as far apart as they are thick, or farther by no more
+ * than 2^-1045. Views, valid as long as the answer; each may be NULL. A kind that was not asked for has no offsets, or lists without entries. */
 impinge_status impinge_neighbours_lists(const impinge_neighbours *neighbours, uint32_t kind, uint32_t reversed, impinge_array *offsets,
     impinge_array *indices, impinge_array *distances);
 impinge_status impinge_neighbours_stats(const impinge_neighbours *neighbours, impinge_stats *stats);

@@ -210,8 +210,9 @@ Examples:
   impinge distance robot.glb --exclude 0,1      the two nearest of its nodes, but not 0 and 1
 
 Of more than two bodies, those that are nearest to each other are told.
-The distance is 0 if and only if the meshes touch, which is decided exactly; it is rounded down. Meshes
-of triangles are surfaces: a mesh that lies completely inside another one has a distance from it.";
+The distance is rounded down, and 0 if and only if the meshes touch, which is decided exactly, or are
+nearer than the smallest 64-bit float. Meshes of triangles are surfaces: a mesh that lies completely
+inside another one has a distance from it.";
 
 const SELF_EXAMPLES: &str = "\
 Examples:

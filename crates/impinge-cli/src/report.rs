@@ -469,8 +469,8 @@ pub struct Safe {
     pub bounded: usize,
     /// The least bound of them, and the first vertex that has it; null if there is no vertex
     pub smallest: Option<SafeVertex>,
-    /// How many pairs of a vertex and a face, or of two edges, touch, or are at most as far apart
-    /// as their bodies are thick
+    /// How many pairs of a vertex and a face, or of two edges, touch or are nearer than the
+    /// smallest 64-bit float, or are at most as far apart as their bodies are thick
     pub touching: usize,
     /// Whether any elements asked about intersect, neighbours resolved
     pub intersects: bool,
@@ -504,8 +504,8 @@ pub struct FixedBody {
 #[derive(Serialize)]
 #[cfg_attr(test, derive(JsonSchema))]
 pub struct Distance {
-    /// The smallest distance; 0 if and only if the meshes touch, which is decided exactly; rounded
-    /// down
+    /// The smallest distance, rounded down; 0 if and only if the meshes touch, which is decided
+    /// exactly, or are nearer than the smallest 64-bit float
     #[cfg_attr(test, schemars(range(min = 0)))]
     pub distance: f64,
     /// Whether it is less than --below; null without that

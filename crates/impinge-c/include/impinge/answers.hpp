@@ -370,7 +370,8 @@ public:
     array view{};
     return detail::give(impinge_safe_distances_of(raw(), of, &view), std::move(view));
   }
-  /// The pairs at distance 0, or at most as far apart as their bodies are thick, whose vertices may not move at all.
+  /// The pairs at distance 0 (also those nearer than the smallest double), or at most as far apart as their bodies are thick, whose vertices
+  /// may not move at all.
   view<pair> touching() const & noexcept {
     const auto *touching = impinge_safe_distances_touching(raw());
     return {impinge_near_data(touching), impinge_near_count(touching)};

@@ -15,7 +15,8 @@ pub struct ClosestElement {
     pub element: Element,
     /// The feature of the element that has the nearest point in its inside. Exact.
     pub feature: Feature,
-    /// The largest float that is at most the distance, in the unit of the scene: 0 if they touch.
+    /// The largest float that is at most the distance, in the unit of the scene: 0 if they touch,
+    /// or are nearer than the smallest `f64`.
     pub distance: f64,
     /// The point of the element that is nearest, rounded.
     pub point: [f64; 3],

@@ -29,9 +29,9 @@ pub struct Csr {
     pub offsets: Vec<u64>,
     /// The neighbours.
     pub indices: Vec<u32>,
-    /// How far away each is, in the unit of the scene, rounded down: below the distance by at most
-    /// 2^-20 of it, or a few times the smallest `f64`; and 0 if and only if they touch or are as
-    /// near as that.
+    /// How far away each is, minus the thickness of both, in the unit of the scene, rounded down:
+    /// by at most 2^-20 of it, or by 2^-1045; 0 if and only if they touch, or are at most as far
+    /// apart as they are thick, or farther by no more than 2^-1045.
     pub distances: Vec<f64>,
 }
 

@@ -61,7 +61,8 @@ impl Detector {
 
     /// How far each point is from the surface of a body: positive inside, negative outside, 0 on
     /// the surface. The sign is that of [`contains`](Detector::contains) and exact; the magnitude
-    /// is the distance of [`closest`](Detector::closest), rounded down: never above the true one.
+    /// is the distance of [`closest`](Detector::closest), rounded down: never above the true one,
+    /// and 0 or -0 below the smallest `f64`.
     ///
     /// ```
     /// use impinge::{Backend, Detector, Scene};
@@ -180,7 +181,7 @@ impl Detector {
     ///
     /// Which element is nearest is decided exactly; of several at the same distance it is the
     /// lowest by body and then by number. Distances are rounded down: never above the true one.
-    /// Points are rounded to nearest.
+    /// Points take a few roundings: a few last bits of the largest coordinate of the element.
     ///
     /// A query for all bodies, the default, or [`Query::of`] one or [`Query::across`] several,
     /// which then are those that are looked at. Cost: per point a way down the tree of each body

@@ -125,8 +125,8 @@ impl Detector {
     /// face the vertices, of each edge the edges, and so on for the kinds that the query asks for.
     /// Edges with faces that they do not meet, and vertices of no element, have none, as there.
     /// Each neighbour comes with its distance, minus the [thickness](Scene::set_thickness) of both,
-    /// rounded down: by at most 2^-20 of it. It is 0 if and only if the elements touch, or are at
-    /// most as far apart as they are thick.
+    /// rounded down: by at most 2^-20 of it, or by 2^-1045. It is 0 if and only if the elements
+    /// touch, or are at most as far apart as they are thick, or farther by no more than 2^-1045.
     ///
     /// ```
     /// use impinge::{Backend, Detector, Query, Scene};
@@ -168,7 +168,7 @@ struct Measured<'a> {
     key: u64,
     located: &'a [Located; 2],
     /// A number that is at most its distance minus the thickness of both, by little; 0 if and only
-    /// if that is not above 0.
+    /// if that is not above 0, or by no more than 2^-1045.
     distance: f64,
 }
 

@@ -469,7 +469,7 @@ impl DistanceSearch<'_> {
         }
     }
 
-    /// The distance of two primitives: 0 if and only if they meet.
+    /// The distance of two primitives: 0 if they meet.
     fn gap(&self, a: ElementIx, b: ElementIx, apart: f64) -> Gap {
         let [body_a, body_b] = self.bodies;
         let (a, b) = (corners(body_a, a), corners(body_b, b));
