@@ -10,6 +10,7 @@ import numpy.typing as npt
 from . import _impinge
 from ._answers import Closest, Hits
 from ._detector import Detector
+from ._errors import InvalidError
 from ._scene import Scene
 
 if TYPE_CHECKING:
@@ -508,7 +509,7 @@ def project_psd(matrices: _Array, *, threads: int = 0) -> npt.NDArray[np.float64
     Raises
     ------
     ValueError, TypeError
-        Another shape, or no numbers.
+        Another shape, or no numbers; a number that is not finite; threads below 0.
 
     Examples
     --------
@@ -521,7 +522,9 @@ def project_psd(matrices: _Array, *, threads: int = 0) -> npt.NDArray[np.float64
     if given.dtype.kind not in "biuf":
         raise TypeError(f"matrices: numbers expected, {given.dtype} given")
     if given.ndim < 2 or given.shape[-1] != given.shape[-2] or given.shape[-1] not in (3, 6, 9, 12):
-        raise ValueError(f"matrices: shape (..., k, k) with k of 3, 6, 9 or 12 expected, {given.shape} given")
+        raise InvalidError(f"matrices: shape (..., k, k) with k of 3, 6, 9 or 12 expected, {given.shape} given")
+    if threads < 0:
+        raise InvalidError(f"threads: {threads} given, 0 or more allowed")
     return _impinge._project_psd(given.astype(np.float64, copy=False), threads)
 
 

@@ -850,7 +850,8 @@ size_t impinge_stencils_count(const impinge_stencils *stencils);
 impinge_status impinge_stencils_column(const impinge_stencils *stencils, uint32_t column, impinge_array *view);
 void impinge_stencils_destroy(impinge_stencils *stencils);
 /* Replaces each of `n` symmetric matrices of `size` x `size` numbers (3, 6, 9 or 12), one after another, by the nearest one without
- * negative eigenvalues. Many are shared by as many threads as there are cores. The same bits on every machine and by any number of threads. */
+ * negative eigenvalues. Many are shared by as many threads as there are cores. The same bits on every machine and by any number of threads.
+ * INVALID: another size, a number that is not finite; the matrices are as they were then. */
 impinge_status impinge_project_psd(double *matrices, size_t n, size_t size);
 
 /* How far each vertex of a body may move: a view, n x 1 F32 or F64 as its positions, valid as long as the answer. A vertex that belongs to

@@ -580,6 +580,8 @@ static void stencils(impinge_detector *detector) {
   GOOD(impinge_project_psd(NULL, 0, 12));
   REFUSED(impinge_project_psd(NULL, 1, 12), "NULL");
   REFUSED(impinge_project_psd(matrices[0], 2, 4), "size: 4 given");
+  matrices[1][3] = HUGE_VAL;
+  REFUSED(impinge_project_psd(matrices[0], 2, 3), "matrices: inf in row 1, column 0 of matrix 1 given");
   impinge_stencils_destroy(merged);
   impinge_stencils_destroy(plain);
   impinge_near_destroy(near_pairs);

@@ -811,6 +811,20 @@ fn threads_change_no_bit() {
     };
     assert!(refused(16, 4).starts_with("size: 4 given, 3, 6, 9 or 12"));
     assert!(refused(19, 3).starts_with("matrices: 19 numbers given"));
+    // What is not finite is named, and nothing is changed.
+    for strange in [f64::NAN, f64::NEG_INFINITY] {
+        let mut given = vec![-1.0; 3 * 36];
+        given[2 * 36 + 7] = strange;
+        let before = given.clone();
+        let error = project_psd_all(&mut given, 6, 0).unwrap_err().to_string();
+        assert_eq!(
+            error,
+            format!(
+                "matrices: {strange} in row 1, column 1 of matrix 2 given, finite numbers allowed"
+            )
+        );
+        assert_eq!(given[..2 * 36 + 7], before[..2 * 36 + 7]);
+    }
 }
 
 /// The same bits on every machine: a hash of all numbers.

@@ -79,7 +79,8 @@ fn project<const N: usize>(matrix: &mut Square<N>) {
 /// ```
 ///
 /// # Errors
-/// A size that is not 3, 6, 9 or 12; numbers that are no whole matrices.
+/// A size that is not 3, 6, 9 or 12; numbers that are no whole matrices; a number that is not
+/// finite. The matrices are as they were then.
 pub fn project_psd_all(matrices: &mut [f64], size: usize, threads: usize) -> Result<(), Error> {
     if !matches!(size, 3 | 6 | 9 | 12) {
         return Err(Error::Setting {
@@ -93,6 +94,19 @@ pub fn project_psd_all(matrices: &mut [f64], size: usize, threads: usize) -> Res
             setting: "matrices",
             given: format!("{} numbers", matrices.len()),
             allowed: "size x size numbers of each",
+        });
+    }
+    if let Some(at) = matrices.iter().position(|x| !x.is_finite()) {
+        let (matrix, entry) = (at / (size * size), at % (size * size));
+        return Err(Error::Setting {
+            setting: "matrices",
+            given: format!(
+                "{} in row {}, column {} of matrix {matrix}",
+                matrices[at],
+                entry / size,
+                entry % size
+            ),
+            allowed: "finite numbers",
         });
     }
     let isa = Isa::detect(InstructionSet::default());
