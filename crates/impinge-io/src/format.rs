@@ -1,6 +1,7 @@
 //! The supported formats, and how to find the format of a file.
 
-use std::path::Path;
+use std::fs;
+use std::path::{Path, is_separator};
 
 use crate::error::Error;
 
@@ -68,14 +69,18 @@ impl Format {
     /// The format of the file at `path`, by its extension.
     ///
     /// # Errors
-    /// [`Error::UnknownFormat`] if the extension is not known; [`Error::NotAFile`] of a folder.
+    /// [`Error::UnknownFormat`] if the extension is not known; [`Error::NotAFile`] of a folder;
+    /// [`Error::Io`] of the name of a folder that is not there.
     pub fn from_path(path: &Path) -> Result<Self, Error> {
-        Self::of_extension(path).map_err(|extension| match path.is_dir() {
-            true => Error::NotAFile {
+        let name = path.as_os_str().as_encoded_bytes();
+        let is_of_folder = name.last().is_some_and(|&end| is_separator(end.into()));
+        Self::of_extension(path).map_err(|extension| match fs::metadata(path) {
+            Ok(found) if found.is_dir() => Error::NotAFile {
                 path: path.to_owned(),
                 what: "a folder",
             },
-            false => unknown(path, extension, KNOWN),
+            Err(source) if is_of_folder => Error::io(path, "open", source),
+            _ => unknown(path, extension, KNOWN),
         })
     }
 

@@ -111,6 +111,7 @@ fn unknown_extension_and_missing_file() {
             "its name has no extension, which tells the format (known: obj",
         ),
         ("no/such/file.ply", "cannot read: "),
+        ("no/such/folder/", "cannot open: "),
     ] {
         let error = read(name.as_ref(), &ReadOptions::as_they_are()).unwrap_err();
         let message = error.to_string();
