@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _impinge
+from ._errors import InvalidError
 
 if TYPE_CHECKING:
     from ._impinge import Body
@@ -395,7 +396,7 @@ class Pairs:
         rows = self.rows
         if dtype is not None and rows.dtype != dtype:
             if copy is False:
-                raise ValueError(f"copy=False: rows are uint32, {np.dtype(dtype)} asked for")
+                raise InvalidError(f"copy=False: rows are uint32, {np.dtype(dtype)} asked for")
             return rows.astype(dtype)
         return rows.copy() if copy else rows
 

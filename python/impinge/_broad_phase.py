@@ -8,6 +8,7 @@ import ipctk  # type: ignore[import-not-found, import-untyped, unused-ignore]
 import numpy as np
 
 from ._candidates import Question, objects
+from ._errors import InvalidError
 from ._filters import labels_of
 
 if TYPE_CHECKING:
@@ -46,7 +47,7 @@ class BroadPhase(ipctk.BroadPhase):  # type: ignore[misc, unused-ignore]
 
     def __init__(self, mode: _Mode = "exact") -> None:
         if mode not in ("exact", "boxes"):
-            raise ValueError(f"mode: {mode!r} given, 'exact' or 'boxes' allowed")
+            raise InvalidError(f"mode: {mode!r} given, 'exact' or 'boxes' allowed")
         super().__init__()
         self._mode: _Mode = mode
         #: The last ones first, with their edges and faces as ipctk gave them.

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable
 from typing import Any, Union
 
 from . import _impinge
+from ._errors import InvalidError
 
 __all__ = ["check"]
 
@@ -79,12 +80,12 @@ def check(
     if jobs is None:
         jobs = n_cores
     if jobs < 1:
-        raise ValueError(f"jobs: {jobs} given, 1 or more allowed")
+        raise InvalidError(f"jobs: {jobs} given, 1 or more allowed")
     if timeout is not None and not timeout > 0:
-        raise ValueError(f"timeout: {timeout} given, more than 0 allowed")
+        raise InvalidError(f"timeout: {timeout} given, more than 0 allowed")
     _check_thickness(min_thickness)
     if memory is not None and memory < 1:
-        raise ValueError(f"memory: {memory} given, 1 or more allowed")
+        raise InvalidError(f"memory: {memory} given, 1 or more allowed")
     if not sys.executable:
         raise RuntimeError("sys.executable names no Python that could run child processes")
     jobs = min(jobs, max(len(names), 1))
@@ -112,5 +113,5 @@ def _names(paths: Iterable[_Path] | _Path) -> list[str]:
 
 
 def _check_thickness(min_thickness: float | None) -> None:
-    if min_thickness is not None and not 0 < min_thickness < float("inf"):
-        raise ValueError(f"min_thickness: {min_thickness} given, a length above 0 allowed")
+    if min_thickness is not None and not 0 < _impinge._length(min_thickness, "min_thickness") < float("inf"):
+        raise InvalidError(f"min_thickness: {min_thickness} given, a length above 0 allowed")

@@ -18,8 +18,9 @@ __all__ = [
 
 
 class Error(Exception):
-    """All errors of this library but arguments of a wrong type, which are a `TypeError`, and what threads and forks must not share,
-    which is a `RuntimeError`. After every error but `InternalError` a detector stays usable.
+    """All errors of this library but those that are Python's own: `TypeError` for arguments of a wrong type, `IndexError` for a row that
+    is not there, `OSError` for files, `RuntimeError` for what threads and forks must not share and for child processes. After every
+    error but `InternalError` a detector stays usable.
     """
 
     code: ClassVar[str] = "internal"

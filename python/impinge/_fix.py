@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _impinge
+from ._errors import InvalidError
 
 __all__ = ["Fixed", "fix"]
 
@@ -96,17 +97,17 @@ def fix(
     """
     chosen = _set(_REPAIRS if only is None else only)
     left_out = _set(skip)
-    for name in chosen | left_out:
-        if name not in _REPAIRS:
-            raise ValueError(f"{name!r} is no repair: {', '.join(_REPAIRS)} are")
+    for argument, names in (("only", chosen), ("skip", left_out)):
+        for name in names - set(_REPAIRS):
+            raise InvalidError(f"{argument}: {name!r} is no repair: {', '.join(_REPAIRS)} are")
     if only is not None and left_out:
-        raise ValueError("only and skip: one of them can be given")
-    if close_holes != 0 and close_holes < 3:
-        raise ValueError(f"close_holes: {close_holes} given, 0 or 3 to 256 allowed")
+        raise InvalidError("only and skip: one of them can be given")
+    if close_holes != 0 and not 3 <= close_holes <= 256:
+        raise InvalidError(f"close_holes: {close_holes} given, 0 or 3 to 256 allowed")
     if only is not None and "close-holes" in chosen and not close_holes:
-        raise ValueError("close-holes is asked for, and close_holes does not say of how many edges")
+        raise InvalidError("only: close-holes is asked for, and close_holes does not say of how many edges")
     if threads < 0:
-        raise ValueError(f"threads: {threads} given, 0 or more allowed")
+        raise InvalidError(f"threads: {threads} given, 0 or more allowed")
     wanted = [name for name in _REPAIRS if name in chosen - left_out and (name != "close-holes" or close_holes)]
     positions, triangles, said = _impinge._fix(vertices, faces, wanted, close_holes, threads)
     done = json.loads(said)

@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from ._answers import Pairs
 from ._detector import Detector
+from ._errors import InvalidError
 from ._functions import Settings
 from ._impinge import Body, Contacts
 from ._scene import Scene
@@ -403,7 +404,7 @@ class CollisionManager:
         try:
             return self._objects[name].body
         except KeyError:
-            raise ValueError(f"name: there is no object {name!r}") from None
+            raise InvalidError(f"name: there is no object {name!r}") from None
 
     def _with(self, other: CollisionManager) -> _Asked:
         """The objects of both managers, of which pairs of one of each are asked about."""

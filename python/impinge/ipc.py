@@ -47,7 +47,7 @@ import numpy.typing as npt
 from . import _impinge
 from ._candidates import Candidates, Question, any_may
 from ._detector import Detector
-from ._errors import Seam
+from ._errors import InvalidError, Seam
 from ._filters import labels_of
 from ._scene import Scene
 
@@ -140,7 +140,7 @@ class CollisionMesh:
     def __init__(self, rest_positions: _Array, edges: _Array = (), faces: _Array = ()) -> None:
         rest = np.asarray(rest_positions)
         if rest.ndim != 2 or rest.shape[1] != 3:
-            raise ValueError(f"rest_positions: shape (n, 3) expected, {rest.shape} given")
+            raise InvalidError(f"rest_positions: shape (n, 3) expected, {rest.shape} given")
         self._rest = rest
         self._faces = _indices(faces, "faces", 3)
         self._edges = _indices(edges, "edges", 2)
@@ -151,7 +151,7 @@ class CollisionMesh:
                 row, column = (int(ix) for ix in bad[0])
                 value = int(rows[row, column])
                 place = f"{name}[{row}, {column}]"
-                raise ValueError(f"{place} = {value}: there are {n_vertices} vertices")
+                raise InvalidError(f"{place} = {value}: there are {n_vertices} vertices")
         self.can_collide = None
         self._local = threading.local()
         self._edge_table: tuple[npt.NDArray[np.int64], ...] | None = None
@@ -238,7 +238,7 @@ class CollisionMesh:
             if len(twice):
                 first, second = (int(row) for row in order[twice[0] : twice[0] + 2])
                 pair = tuple(np.sort(self._edges[first]).tolist())
-                raise ValueError(f"edges[{first}] and edges[{second}]: both are the edge {pair}")
+                raise InvalidError(f"edges[{first}] and edges[{second}]: both are the edge {pair}")
             # No key is beyond the last one, so that every search ends at a row.
             keys = np.append(keys, np.iinfo(np.int64).max)
             self._edge_table = keys, np.append(order, -1)
@@ -255,7 +255,7 @@ class CollisionMesh:
         absent = self._edge_numbers(sides) < 0
         if absent.any():
             edge = tuple(sides[np.argmax(absent)].tolist())
-            raise ValueError(f"edges: a face has the edge {edge}, which is not among them")
+            raise InvalidError(f"edges: a face has the edge {edge}, which is not among them")
         self._edges_are_checked = True
 
     def _edges_of_body(self, body: int) -> npt.NDArray[np.int64]:
@@ -302,7 +302,7 @@ class CollisionMesh:
         if given.dtype.kind not in "iu" or given.shape != (self.num_vertices,):
             shape = f"({self.num_vertices},)"
             what = f"integers of shape {shape} expected, as the mesh has vertices"
-            raise ValueError(f"labels: {what}, {given.dtype} of shape {given.shape} given")
+            raise InvalidError(f"labels: {what}, {given.dtype} of shape {given.shape} given")
         return np.ascontiguousarray(given, np.int64)
 
     def __repr__(self) -> str:
@@ -408,11 +408,11 @@ def candidates(
         As `is_step_collision_free`; an edge of a face that the mesh's `edges` lack, or one that they have twice.
     """
     ours = _served(mesh)
-    radius = float(inflation_radius)
+    radius = _impinge._length(inflation_radius, "inflation_radius")
     if not (math.isfinite(radius) and radius >= 0):
-        raise ValueError(f"inflation_radius: {radius} given, a finite number of 0 or more allowed")
+        raise InvalidError(f"inflation_radius: {radius} given, a finite number of 0 or more allowed")
     if mode not in ("exact", "boxes"):
-        raise ValueError(f"mode: {mode!r} given, 'exact' or 'boxes' allowed")
+        raise InvalidError(f"mode: {mode!r} given, 'exact' or 'boxes' allowed")
     ends: tuple[npt.NDArray[Any], ...]
     if vertices_t1 is None:
         ends = (_positions(ours, vertices, "vertices"),)
@@ -449,7 +449,7 @@ def _served(mesh: Any) -> CollisionMesh:
     if not all(hasattr(mesh, name) for name in needed):
         raise TypeError(f"mesh: a CollisionMesh expected, {type(mesh).__name__} given")
     if len(getattr(mesh, "planes", ())):
-        raise ValueError("mesh: planes are not served; give the mesh faces in their place")
+        raise InvalidError("mesh: planes are not served; give the mesh faces in their place")
     ours = _SERVED.get(mesh)
     if ours is None:
         # A copy: arrays that view its positions keep the mesh alive.
@@ -569,7 +569,7 @@ def compute_collision_free_stepsize(
     start, end, distance = _step(ours, vertices_t0, vertices_t1, min_distance)
     rescaling = float(getattr(narrow_phase_ccd, "conservative_rescaling", _RESCALING))
     if not 0 < rescaling <= 1:
-        raise ValueError(
+        raise InvalidError(
             f"conservative_rescaling: {rescaling} given, above 0 and at most 1 allowed"
         )
     held = ours._held()
@@ -635,9 +635,9 @@ def _allowed(
 def _step(
     mesh: CollisionMesh, vertices_t0: _Array, vertices_t1: _Array, min_distance: float
 ) -> tuple[npt.NDArray[Any], npt.NDArray[Any], float]:
-    distance = float(min_distance)
+    distance = _impinge._length(min_distance, "min_distance")
     if not (math.isfinite(distance) and distance >= 0):
-        raise ValueError(f"min_distance: {distance} given, a finite number of 0 or more allowed")
+        raise InvalidError(f"min_distance: {distance} given, a finite number of 0 or more allowed")
     return *_ends(mesh, vertices_t0, vertices_t1, "vertices_t0"), distance
 
 
@@ -657,10 +657,10 @@ def _positions(mesh: CollisionMesh, vertices: _Array, name: str) -> npt.NDArray[
         positions = positions.astype(np.float64)
     if positions.shape != (mesh.num_vertices, 3):
         expected = f"shape ({mesh.num_vertices}, 3) expected, as the mesh has"
-        raise ValueError(f"{name}: {expected}, {positions.shape} given")
+        raise InvalidError(f"{name}: {expected}, {positions.shape} given")
     if not np.isfinite(positions).all():
         row, column = (int(ix) for ix in np.argwhere(~np.isfinite(positions))[0])
-        raise ValueError(
+        raise InvalidError(
             f"{name}[{row}, {column}] = {positions[row, column]}: a position must be finite"
         )
     return np.ascontiguousarray(positions)
@@ -673,5 +673,5 @@ def _indices(rows: _Array, name: str, n_columns: int) -> npt.NDArray[np.int64]:
     if array.dtype.kind not in "iu":
         raise TypeError(f"{name}: an array of integers expected, dtype {array.dtype} given")
     if array.ndim != 2 or array.shape[1] != n_columns:
-        raise ValueError(f"{name}: shape (n, {n_columns}) expected, {array.shape} given")
+        raise InvalidError(f"{name}: shape (n, {n_columns}) expected, {array.shape} given")
     return array.astype(np.int64)

@@ -24,6 +24,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ._answers import Closest, Hits
+from ._errors import InvalidError
 from .trimesh import _OfMesh
 
 if TYPE_CHECKING:
@@ -45,7 +46,7 @@ class PolyDataAccessor(_OfMesh):
 
     def _arrays(self) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
         if not self._mesh.is_all_triangles:
-            raise ValueError("mesh: not all of its cells are triangles: take mesh.triangulate()")
+            raise InvalidError("mesh: not all of its cells are triangles: take mesh.triangulate()")
         return np.asarray(self._mesh.points), np.asarray(self._mesh.regular_faces).reshape(-1, 3)
 
     def closest(

@@ -17,6 +17,7 @@ from typing import Any, Literal, Union
 from . import tiles as _tiles
 from ._check import _check_thickness, _names
 from ._check import check as _check
+from ._errors import InvalidError
 
 __all__ = ["check", "tiles"]
 
@@ -221,5 +222,5 @@ def _most(ray: Any, max_in_flight: int | None) -> int:
     if max_in_flight is None:
         return 2 * max(int(ray.cluster_resources().get("CPU", 1)), 1)
     if max_in_flight < 1:
-        raise ValueError(f"max_in_flight: {max_in_flight} given, 1 or more allowed")
+        raise InvalidError(f"max_in_flight: {max_in_flight} given, 1 or more allowed")
     return max_in_flight

@@ -2,6 +2,8 @@
 
 import array
 import tracemalloc
+from decimal import Decimal
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -266,6 +268,90 @@ def test_extended_precision_is_refused_only_where_it_counts():
     inexact = vertices_with(1, "g") / 3
     with pytest.raises(ValueError, match=r"^vertices\[21, 1\] = 0.3333.*without loss"):
         impinge.self_pairs(inexact, FACE)
+
+
+LENGTHS = [
+    (np.longdouble(1) + np.longdouble(2) ** -54, "1.0000"),
+    (1 + Fraction(1, 2**54), "18014398509481985/18014398509481984"),
+    (Decimal("0.1"), "0.1"),
+    (2**53 + 1, "9007199254740993"),
+    (np.int64(2**53 + 1), "9007199254740993"),
+    (np.array(2**53 + 1), "9007199254740993"),
+]
+
+
+@pytest.mark.parametrize("bad, shown", LENGTHS, ids=[type(bad).__name__ for bad, _ in LENGTHS])
+def test_lengths_that_are_no_floats(bad, shown):
+    if float(bad) == bad and isinstance(bad, np.longdouble):
+        pytest.skip("longdouble is float64 here")
+    scene = impinge.Scene()
+    body, _ = scene.add(TRIANGLE, FACE), scene.add_points([[0, 0, 1]])
+    detector = impinge.Detector("cpu")
+    for name, ask in [
+        ("distance", lambda: detector.near(scene, bad)),
+        ("distance", lambda: detector.neighbours(scene, bad)),
+        ("most", lambda: detector.safe_distances(scene, bad)),
+        ("most", lambda: detector.closest(scene, TRIANGLE, most=bad)),
+        ("inflation", lambda: detector.candidates(scene, bad)),
+        ("separation", lambda: detector.impacts(scene, separation=bad)),
+        ("thickness", lambda: scene.set_thickness(body, bad)),
+    ]:
+        with pytest.raises(impinge.InvalidError, match=f"^{name}: {shown}.* given, which float64 cannot hold without loss$"):
+            ask()
+
+
+@pytest.mark.parametrize("bad", [10**400, 10**5000, Fraction(10**400)], ids=["long", "longer", "Fraction"])
+def test_lengths_beyond_all_floats(bad):
+    scene = impinge.Scene()
+    scene.add(TRIANGLE, FACE)
+    with pytest.raises(impinge.InvalidError, match="^distance: a number of very many digits given, which float64 cannot hold$"):
+        impinge.Detector("cpu").near(scene, bad)
+
+
+class Length:
+    """What is a number, but knows no order."""
+
+    def __float__(self):
+        return 0.5
+
+
+def test_lengths_that_are_floats():
+    scene = impinge.Scene()
+    scene.add_points([[0, 0, 0]]), scene.add_points([[0, 0, 0.5]])
+    near = impinge.Detector("cpu").near
+    half = [0.5, np.float64(0.5), np.float32(0.5), np.float16(0.5), np.longdouble(0.5), np.array(0.5), Fraction(1, 2), Decimal("0.5"), Length()]
+    for distance in [*half, 1, True, np.int8(1), np.uint64(2**63), 2**1000]:
+        assert len(near(scene, distance)) == 1
+    for bad in [float("nan"), np.float32("nan"), np.longdouble("nan"), float("inf"), np.float32("inf"), -1, np.int8(-1)]:
+        with pytest.raises(ValueError, match="^distance: "):
+            near(scene, bad)
+
+
+@pytest.mark.skipif(np.finfo("g").nmant <= 52, reason="longdouble is float64 here")
+def test_thickness_of_rows_that_is_no_float():
+    scene = impinge.Scene()
+    body = scene.add(TRIANGLE, FACE)
+    for row in [np.array([1, 2, 2**53 + 1]), np.array([1, 2, 1], "g") / 3]:
+        with pytest.raises(ValueError, match=r"^thickness\[[02], 0\] = .*: not representable in float64 without loss"):
+            scene.set_thickness(body, row)
+
+
+def test_flags_are_refused_by_name(tmp_path):
+    scene = impinge.Scene()
+    body = scene.add(TRIANGLE, FACE)
+    near = impinge.Detector("cpu").near(scene, 1)
+    for name, ask in [
+        ("weld", lambda: impinge.self_pairs(TRIANGLE, FACE, weld=1)),
+        ("weld", lambda: impinge.read("a.obj", weld="yes")),
+        ("weld", lambda: impinge.read_bodies("a.obj", weld=None)),
+        ("weld", lambda: impinge.tiles.plan(tmp_path, ["a.obj"], weld=1)),
+        ("copy", lambda: scene.set_positions(body, TRIANGLE, copy=0)),
+        ("copy", lambda: scene.set_end_positions(body, TRIANGLE, copy=0)),
+        ("by_area", lambda: near.stencils(scene, by_area=1)),
+    ]:
+        with pytest.raises(TypeError, match=f"^{name}: True or False expected, "):
+            ask()
+    assert len(impinge.self_pairs(TRIANGLE, FACE, weld=np.True_)) == 0
 
 
 def test_large_integers_that_fit_are_taken():

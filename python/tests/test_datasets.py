@@ -52,8 +52,10 @@ def test_check_refuses_by_name(meshes):
         ("^jobs: 0 given, 1 or more", {"jobs": 0}),
         ("^timeout: -1 given, more than 0", {"timeout": -1}),
         ("^memory: 0 given, 1 or more", {"memory": 0}),
+        ("^timeout: a number of very many digits given, which float64 cannot hold", {"timeout": 10**400}),
+        ("^min_thickness: .*, which float64 cannot hold", {"min_thickness": 10**5000}),
     ]:
-        with pytest.raises(ValueError, match=words):
+        with pytest.raises(impinge.InvalidError, match=words):
             impinge.check(meshes, **options)
     with pytest.raises(ZeroDivisionError):
         impinge.check(meshes, jobs=1, progress=lambda *_: 1 // 0)

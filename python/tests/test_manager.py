@@ -50,7 +50,7 @@ def test_objects_come_move_and_go():
     assert balls.names == ["b", "a"]
     assert balls.in_collision_internal(return_names=True) == (True, {("a", "b")})
     for call in [balls.remove_object, lambda name: balls.set_transform(name, np.eye(4))]:
-        with pytest.raises(ValueError, match="^name: there is no object 'c'"):
+        with pytest.raises(impinge.InvalidError, match="^name: there is no object 'c'"):
             call("c")
     with pytest.raises(ValueError, match="^matrix: shape"):
         balls.add_object("d", (vertices, faces), np.eye(3))

@@ -158,7 +158,7 @@ def test_several_closest(dtype):
     assert sorted(faces.elements[0, :12]) == list(range(12))
     assert (np.diff(faces.distances[0, :12]) >= 0).all() and np.isinf(faces.distances[0, 12:]).all()
     for wrong in (0, -1, 2**32):
-        with pytest.raises(ValueError, match=f"n_nearest: {wrong} given"):
+        with pytest.raises(ValueError, match=f"n_nearest: {wrong} given, 1 to 4294967295 allowed"):
             detector.closest(scene, points, n_nearest=wrong)
     with pytest.raises(TypeError, match="n_nearest: a whole number"):
         detector.closest(scene, points, n_nearest=1.5)

@@ -30,25 +30,9 @@ impl<'py> PositionArray<'py> {
         let kind = NumberKind::of(&array, name)?;
         check_columns(&array, name, &[3])?;
         match kind {
-            NumberKind::Float(4) => Ok(PositionArray::F32(in_c_order(&array, "=f4")?)),
-            NumberKind::Float(8) => Ok(PositionArray::F64(in_c_order(&array, "=f8")?)),
             // Half precision widens to single without loss.
-            NumberKind::Float(2) => Ok(PositionArray::F32(in_c_order(&array, "=f4")?)),
-            NumberKind::Float(_) => extended_to_double(&array, name).map(PositionArray::F64),
-            NumberKind::Signed(8) => {
-                let native = in_c_order::<i64>(&array, "=i8")?;
-                check_exact(&native, name, |&x: &i64| fits_double(x.unsigned_abs()))?;
-                Ok(PositionArray::F64(in_c_order(&array, "=f8")?))
-            }
-            NumberKind::Unsigned(8) => {
-                let native = in_c_order::<u64>(&array, "=u8")?;
-                check_exact(&native, name, |&x: &u64| fits_double(x))?;
-                Ok(PositionArray::F64(in_c_order(&array, "=f8")?))
-            }
-            // Integers of at most 32 bits are doubles.
-            NumberKind::Signed(_) | NumberKind::Unsigned(_) => {
-                Ok(PositionArray::F64(in_c_order(&array, "=f8")?))
-            }
+            NumberKind::Float(2 | 4) => Ok(PositionArray::F32(in_c_order(&array, "=f4")?)),
+            _ => doubles(&array, kind, name).map(PositionArray::F64),
         }
     }
 
@@ -172,10 +156,7 @@ pub fn matrix<const ROWS: usize, const COLUMNS: usize>(
             "{name}: shape ({ROWS}, {COLUMNS}) expected, {given} given"
         )));
     }
-    let doubles = match kind {
-        NumberKind::Float(size) if size > 8 => extended_to_double(&array, name)?,
-        _ => in_c_order::<f64>(&array, "=f8")?,
-    };
+    let doubles = doubles(&array, kind, name)?;
     Ok(slice_rows(&doubles)?.try_into()?)
 }
 
@@ -256,7 +237,7 @@ pub fn whole_numbers(argument: &Bound<'_, PyAny>, name: &str) -> PyResult<Vec<u3
 /// Numbers, `(n,)`, of any type.
 pub fn numbers(argument: &Bound<'_, PyAny>, name: &str) -> PyResult<Vec<f64>> {
     let array = as_array(argument, name)?;
-    NumberKind::of(&array, name)?;
+    let kind = NumberKind::of(&array, name)?;
     let shape = array.shape();
     if shape.len() != 1 {
         return Err(invalid(format!(
@@ -266,7 +247,7 @@ pub fn numbers(argument: &Bound<'_, PyAny>, name: &str) -> PyResult<Vec<f64>> {
     }
     let column = array.call_method1("reshape", ((shape[0], 1),))?;
     let column = column.cast_into::<PyUntypedArray>()?;
-    let numbers = in_c_order::<f64>(&column, "=f8")?;
+    let numbers = doubles(&column, kind, name)?;
     Ok(numbers.as_slice()?.to_vec())
 }
 
@@ -414,6 +395,28 @@ fn in_c_order<'py, T: Element>(
     let numpy = array.py().import("numpy")?;
     let converted = numpy.call_method1("require", (array, dtype, ["C", "A"]))?;
     Ok(converted.cast_into::<PyArray2<T>>()?.try_readonly()?)
+}
+
+/// In double precision, which every number survives.
+fn doubles<'py>(
+    array: &Bound<'py, PyUntypedArray>,
+    kind: NumberKind,
+    name: &str,
+) -> PyResult<PyReadonlyArray2<'py, f64>> {
+    match kind {
+        NumberKind::Float(size) if size > 8 => return extended_to_double(array, name),
+        NumberKind::Signed(8) => {
+            let native = in_c_order::<i64>(array, "=i8")?;
+            check_exact(&native, name, |&x: &i64| fits_double(x.unsigned_abs()))?;
+        }
+        NumberKind::Unsigned(8) => {
+            let native = in_c_order::<u64>(array, "=u8")?;
+            check_exact(&native, name, |&x: &u64| fits_double(x))?;
+        }
+        // Integers of at most 32 bits are doubles.
+        _ => {}
+    }
+    in_c_order(array, "=f8")
 }
 
 /// Whether a magnitude survives the way to double precision: at most 53 bits from its highest to

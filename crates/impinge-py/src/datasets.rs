@@ -21,7 +21,7 @@ use pyo3::types::{PyDict, PyList};
 
 use crate::arrays::{PositionArray, Rows, index_rows, positions_array};
 use crate::errors::{Cancelled, invalid, raise, raise_as};
-use crate::settings::{WHICH, choose_one, words};
+use crate::settings::{Argument, WHICH, choose_one, flags, length, number, words};
 
 /// How often Python gets a look while work goes on in another thread.
 const INTERVAL: Duration = Duration::from_millis(50);
@@ -83,12 +83,15 @@ pub fn _check(
     paths: Vec<PathBuf>,
     command: Vec<OsString>,
     jobs: usize,
-    weld: bool,
-    timeout: Option<f64>,
+    #[pyo3(from_py_with = flags::weld)] weld: bool,
+    timeout: Argument<'_, '_>,
     row: Py<PyAny>,
 ) -> PyResult<()> {
-    let timeout = timeout.map(Duration::try_from_secs_f64).transpose();
-    let timeout = timeout.map_err(|error| invalid(format!("timeout: {error}")))?;
+    let timeout = timeout.map(|given| {
+        Duration::try_from_secs_f64(number(given, "timeout")?)
+            .map_err(|error| invalid(format!("timeout: {error}")))
+    });
+    let timeout = timeout.transpose()?;
     let start = || {
         let mut child = Command::new(&command[0]);
         child.args(&command[1..]);
@@ -293,10 +296,10 @@ pub fn _tiles_plan<'py>(
     files: Vec<PathBuf>,
     cap: u64,
     chunk: u64,
-    weld: bool,
-    step: bool,
-    separation: f64,
-    replace: bool,
+    #[pyo3(from_py_with = flags::weld)] weld: bool,
+    #[pyo3(from_py_with = flags::step)] step: bool,
+    separation: &Bound<'py, PyAny>,
+    #[pyo3(from_py_with = flags::replace)] replace: bool,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let options = PlanOptions {
@@ -304,7 +307,7 @@ pub fn _tiles_plan<'py>(
         chunk,
         weld,
         step,
-        separation,
+        separation: length(separation, "separation")?,
         cells: None,
         replace,
     };
@@ -380,7 +383,7 @@ pub fn _tiles_run<'py>(
     precision: &Bound<'_, PyAny>,
     threads: usize,
     memory_budget: Option<u64>,
-    again: bool,
+    #[pyo3(from_py_with = flags::again)] again: bool,
     done: Option<Py<PyAny>>,
 ) -> PyResult<Bound<'py, PyList>> {
     let [between, within] = choose_one(which, "which", &WHICH)?;

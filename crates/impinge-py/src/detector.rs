@@ -19,7 +19,7 @@ use crate::hits::Hits;
 use crate::near::Near;
 use crate::options::Options;
 use crate::scene::Scene;
-use crate::settings::{self, number, unexpected, unsigned};
+use crate::settings::{self, length, unexpected, unsigned};
 use crate::solver::{Neighbours, SafeDistances};
 use crate::statistics;
 use crate::watch::Watch;
@@ -168,7 +168,7 @@ impl DetectorBase {
         inflation: &Bound<'_, PyAny>,
         keywords: Keywords<'_, '_>,
     ) -> PyResult<Candidates> {
-        let inflation = number(inflation, "inflation")?;
+        let inflation = length(inflation, "inflation")?;
         let asked = ask(
             slf,
             scene,
@@ -186,7 +186,7 @@ impl DetectorBase {
         most: &Bound<'_, PyAny>,
         keywords: Keywords<'_, '_>,
     ) -> PyResult<u64> {
-        let inflation = number(inflation, "inflation")?;
+        let inflation = length(inflation, "inflation")?;
         let most = unsigned(most, "most", u64::MAX)?;
         if !each.is_callable() {
             return Err(unexpected(each, "each", "a callable"));
@@ -220,7 +220,7 @@ impl DetectorBase {
         distance: &Bound<'_, PyAny>,
         keywords: Keywords<'_, '_>,
     ) -> PyResult<Near> {
-        let distance = number(distance, "distance")?;
+        let distance = length(distance, "distance")?;
         let options = Options::new(keywords)?;
         let has = options.has_measures();
         let asked = ask(slf, scene, options, |detector, scene, query| {
@@ -235,7 +235,7 @@ impl DetectorBase {
         most: &Bound<'_, PyAny>,
         keywords: Keywords<'_, '_>,
     ) -> PyResult<SafeDistances> {
-        let most = number(most, "most")?;
+        let most = length(most, "most")?;
         let options = Options::new(keywords)?;
         let has = options.has_measures();
         let asked = ask(slf, scene, options, |detector, scene, query| {
@@ -250,7 +250,7 @@ impl DetectorBase {
         distance: &Bound<'_, PyAny>,
         keywords: Keywords<'_, '_>,
     ) -> PyResult<Neighbours> {
-        let distance = number(distance, "distance")?;
+        let distance = length(distance, "distance")?;
         let options = Options::new(keywords)?;
         let asked = ask(slf, scene, options, |detector, scene, query| {
             detector.neighbours(scene, distance, query)
@@ -374,7 +374,7 @@ impl DetectorBase {
     ) -> PyResult<Closest> {
         let points = PositionArray::new(points, "points")?;
         let points = points.rows()?;
-        let most = number(most, "most")?;
+        let most = length(most, "most")?;
         let options = Options::new(keywords)?;
         let asked = ask(slf, scene, options, |detector, scene, query| {
             with_rows!(points, |points| detector
@@ -396,7 +396,7 @@ impl DetectorBase {
         let origins = PositionArray::new(origins, "origins")?;
         let directions = PositionArray::new(directions, "directions")?;
         let rays = [origins.rows()?, directions.rows()?];
-        let most = number(most, "most")?;
+        let most = length(most, "most")?;
         let options = Options::new(keywords)?;
         let hits = options.hits;
         let asked = ask(slf, scene, options, |detector, scene, query| match rays {

@@ -10,6 +10,7 @@ use pyo3::prelude::*;
 use crate::errors::invalid;
 
 use crate::arrays::{RowKind, positions_array};
+use crate::settings::flags;
 
 /// A mesh that was read from a file. `Scene.add` takes it as it is.
 #[pyclass(module = "impinge", frozen)]
@@ -141,7 +142,11 @@ pub fn _mesh(
 ///     A file that cannot be read, or is refused: the message names the file, the line or byte, and both numbers.
 #[pyfunction]
 #[pyo3(signature = (path, *, weld=true))]
-pub fn read(py: Python<'_>, path: PathBuf, weld: bool) -> PyResult<Mesh> {
+pub fn read(
+    py: Python<'_>,
+    path: PathBuf,
+    #[pyo3(from_py_with = flags::weld)] weld: bool,
+) -> PyResult<Mesh> {
     let read = py.detach(|| impinge_io::read_with_summary(&path, &options(weld)));
     let (mesh, summary) = read.map_err(refuse)?;
     let name = path.display().to_string();
@@ -175,7 +180,11 @@ pub fn read(py: Python<'_>, path: PathBuf, weld: bool) -> PyResult<Mesh> {
 ///     As `read`.
 #[pyfunction]
 #[pyo3(signature = (path, *, weld=true))]
-pub fn read_bodies(py: Python<'_>, path: PathBuf, weld: bool) -> PyResult<Vec<Mesh>> {
+pub fn read_bodies(
+    py: Python<'_>,
+    path: PathBuf,
+    #[pyo3(from_py_with = flags::weld)] weld: bool,
+) -> PyResult<Vec<Mesh>> {
     let read = py.detach(|| {
         let (mut bodies, summary) = impinge_io::read_bodies(&path, &options(false))?;
         let n_welded = bodies.iter_mut().map(|body| match weld {

@@ -72,6 +72,8 @@ mod _impinge {
     #[pymodule_export]
     use super::scene::Scene;
     #[pymodule_export]
+    use super::settings::_length;
+    #[pymodule_export]
     use super::solver::{Neighbours, SafeDistances};
     #[pymodule_export]
     use super::stencils::{_project_psd, _stencils, Stencils};

@@ -4,13 +4,13 @@ use impinge::{BodyId, Clearance, Hit, PairKind, Precision, Query, SharedVertex, 
 use pyo3::exceptions::PyTypeError;
 use pyo3::intern;
 use pyo3::prelude::*;
-use pyo3::types::{PyBool, PyDict, PyString};
+use pyo3::types::{PyDict, PyString};
 
 use crate::arrays;
 use crate::errors::invalid;
 use crate::exclusion::Exclusion;
 use crate::scene::Scene;
-use crate::settings::{WHICH, choose_one, number, unexpected, unsigned, words};
+use crate::settings::{WHICH, choose_one, flag, length, number, unexpected, whole, words};
 use crate::vertex_filter::VertexFilter;
 use crate::watch::CancelToken;
 
@@ -143,15 +143,15 @@ impl<'py> Options<'py> {
             "exclude" => self.exclude = exclusions(&value)?,
             "owned_by" => self.cell = Some(arrays::matrix(&value, name)?),
             "start" => self.start = choose_one(&value, name, words!(Start))?,
-            "separation" => self.separation = number(&value, name)?,
-            "clearance" => self.clearance = number(&value, name)?,
+            "separation" => self.separation = length(&value, name)?,
+            "clearance" => self.clearance = length(&value, name)?,
             "clearance_share" => self.share = Some(number(&value, name)?),
             "precision" => self.precision = choose_one(&value, name, words!(Precision))?,
             "distances" => self.distances = flag(&value, name)?,
             "closest_points" => self.closest_points = flag(&value, name)?,
             "hits" => self.hits = choose_one(&value, name, words!(Hit))?,
             "n_nearest" => {
-                let n = unsigned(&value, name, u64::from(u32::MAX))?;
+                let n = whole(&value, name, 1..=u64::from(u32::MAX))?;
                 self.n_nearest = Some(n as u32);
             }
             "fixed" => {
@@ -324,13 +324,6 @@ fn kinds(value: &Bound<'_, PyAny>) -> PyResult<Vec<PairKind>> {
     names
         .map(|(ix, kind)| choose_one(kind, &format!("kinds[{ix}]"), &choices))
         .collect()
-}
-
-fn flag(value: &Bound<'_, PyAny>, name: &str) -> PyResult<bool> {
-    match value.cast::<PyBool>() {
-        Ok(flag) => Ok(flag.is_true()),
-        Err(_) => Err(unexpected(value, name, "True or False")),
-    }
 }
 
 /// An argument that is one of the names of kinds of pairs.

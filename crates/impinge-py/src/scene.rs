@@ -12,7 +12,7 @@ use crate::errors::{Names, invalid, raise, refuse};
 use crate::exclusion::Exclusion;
 use crate::lent;
 use crate::meshes;
-use crate::settings::{self, Argument, number, unsigned};
+use crate::settings::{self, Argument, flags, length, unsigned};
 
 const ARGUMENTS: Names<'static> = Names {
     vertices: "vertices",
@@ -197,7 +197,7 @@ impl Scene {
         elements: &Bound<'_, PyAny>,
         kind: Argument<'_, '_>,
         names: (String, String),
-        weld: bool,
+        #[pyo3(from_py_with = flags::weld)] weld: bool,
     ) -> PyResult<()> {
         let names = Names {
             vertices: &names.0,
@@ -279,7 +279,7 @@ impl Scene {
         slf: &Bound<'_, Self>,
         body: &Bound<'_, PyAny>,
         vertices: &Bound<'_, PyAny>,
-        copy: bool,
+        #[pyo3(from_py_with = flags::copy)] copy: bool,
     ) -> PyResult<()> {
         let mut scene = change(slf)?;
         let id = scene.id(body, "body")?;
@@ -300,7 +300,7 @@ impl Scene {
         slf: &Bound<'_, Self>,
         body: &Bound<'_, PyAny>,
         vertices: Argument<'_, '_>,
-        copy: bool,
+        #[pyo3(from_py_with = flags::copy)] copy: bool,
     ) -> PyResult<()> {
         let mut scene = change(slf)?;
         let id = scene.id(body, "body")?;
@@ -690,7 +690,7 @@ fn thickness(given: &Bound<'_, PyAny>, part: &Bound<'_, PyAny>) -> PyResult<Thic
     // An array of one number would be read as that number.
     let is_array = given.getattr("ndim").is_ok_and(|n| n.ne(0).unwrap_or(true));
     if part.is_none() && !is_array && given.extract::<f64>().is_ok() {
-        return Ok(number(given, "thickness")?.into());
+        return Ok(length(given, "thickness")?.into());
     }
     if let (Some(part), false) = (&part, is_array)
         && given.extract::<f64>().is_ok()

@@ -1,9 +1,11 @@
 //! Keyword arguments as the library's settings.
 
+use std::ops::RangeInclusive;
+
 use impinge::{Affinity, Backend, BodyKind, InstructionSet, Method, Recluster, Settings};
-use pyo3::exceptions::PyTypeError;
+use pyo3::exceptions::{PyOverflowError, PyTypeError};
 use pyo3::prelude::*;
-use pyo3::types::{PyBool, PyDict};
+use pyo3::types::{PyBool, PyDict, PyFloat};
 
 use crate::arrays::RowKind;
 use crate::errors::invalid;
@@ -47,14 +49,73 @@ pub fn unexpected(argument: &Bound<'_, PyAny>, name: &str, expected: &str) -> Py
     }
 }
 
-/// A number; the library refuses those that are out of range.
+/// A number, rounded to `f64`; the library refuses those that are out of range.
 pub fn number(value: &Bound<'_, PyAny>, name: &str) -> PyResult<f64> {
-    value.extract().map_err(
-        |error: PyErr| match error.is_instance_of::<PyTypeError>(value.py()) {
-            true => unexpected(value, name, "a number"),
-            false => error,
-        },
-    )
+    let py = value.py();
+    value.extract().map_err(|error: PyErr| {
+        if error.is_instance_of::<PyTypeError>(py) {
+            unexpected(value, name, "a number")
+        } else if error.is_instance_of::<PyOverflowError>(py) {
+            let given = shown(value);
+            invalid(format!("{name}: {given} given, which float64 cannot hold"))
+        } else {
+            error
+        }
+    })
+}
+
+/// A number that `f64` holds as it is.
+pub fn length(value: &Bound<'_, PyAny>, name: &str) -> PyResult<f64> {
+    if let Ok(float) = value.cast::<PyFloat>() {
+        return Ok(float.value());
+    }
+    let rounded = number(value, name)?;
+    // NumPy compares its integers with floats as floats.
+    let integer = value.call_method0("__index__");
+    let given = integer.as_ref().unwrap_or(value);
+    // What cannot be compared is taken as it says that it is.
+    if given.lt(rounded).unwrap_or(false) || given.gt(rounded).unwrap_or(false) {
+        let given = shown(given);
+        return Err(invalid(format!(
+            "{name}: {given} given, which float64 cannot hold without loss"
+        )));
+    }
+    Ok(rounded)
+}
+
+/// [`length`] for Python's side.
+#[pyfunction]
+pub fn _length(value: &Bound<'_, PyAny>, name: &str) -> PyResult<f64> {
+    length(value, name)
+}
+
+/// A number as Python writes it; whole numbers of many digits are not written.
+fn shown(number: &Bound<'_, PyAny>) -> String {
+    match number.str().map(|text| text.to_string()) {
+        Ok(text) if text.len() <= 64 => text,
+        _ => "a number of very many digits".into(),
+    }
+}
+
+/// A truth value.
+pub fn flag(value: &Bound<'_, PyAny>, name: &str) -> PyResult<bool> {
+    value
+        .extract()
+        .map_err(|_| unexpected(value, name, "True or False"))
+}
+
+/// [`flag`] by the name of the argument, for `from_py_with`.
+pub mod flags {
+    use pyo3::prelude::*;
+
+    macro_rules! named {
+        ($($name:ident)*) => {$(
+            pub fn $name(given: &Bound<'_, PyAny>) -> PyResult<bool> {
+                super::flag(given, stringify!($name))
+            }
+        )*};
+    }
+    named!(again by_area copy replace step weld);
 }
 
 /// What the rows of an index array are; `None` leaves it to their length.
@@ -71,6 +132,15 @@ pub fn kind(argument: Argument<'_, '_>) -> PyResult<Option<RowKind>> {
 
 /// A whole number from 0 to `most`.
 pub fn unsigned(argument: &Bound<'_, PyAny>, name: &str, most: u64) -> PyResult<u64> {
+    whole(argument, name, 0..=most)
+}
+
+/// A whole number in a range.
+pub fn whole(
+    argument: &Bound<'_, PyAny>,
+    name: &str,
+    allowed: RangeInclusive<u64>,
+) -> PyResult<u64> {
     let integer = if argument.is_instance_of::<PyBool>() {
         None
     } else {
@@ -80,10 +150,12 @@ pub fn unsigned(argument: &Bound<'_, PyAny>, name: &str, most: u64) -> PyResult<
         return Err(unexpected(argument, name, "a whole number"));
     };
     match integer.extract::<u64>() {
-        Ok(number) if number <= most => Ok(number),
+        Ok(number) if allowed.contains(&number) => Ok(number),
         _ => Err(invalid(format!(
-            "{name}: {} given, 0 to {most} allowed",
-            integer.str()?
+            "{name}: {} given, {} to {} allowed",
+            shown(&integer),
+            allowed.start(),
+            allowed.end()
         ))),
     }
 }

@@ -13,7 +13,7 @@ use crate::arrays::{PositionArray, Rows};
 use crate::errors::{invalid, raise};
 use crate::near::{Near, type_numbers};
 use crate::scene::Scene;
-use crate::settings::unexpected;
+use crate::settings::{flags, unexpected};
 
 /// Numbers of rows of any shape.
 type Numbers<'py> = Bound<'py, PyArray<f64, IxDyn>>;
@@ -159,7 +159,7 @@ pub fn _stencils(
     near: &Bound<'_, Near>,
     scene: &Bound<'_, PyAny>,
     rest: &Bound<'_, PyAny>,
-    by_area: bool,
+    #[pyo3(from_py_with = flags::by_area)] by_area: bool,
 ) -> PyResult<Stencils> {
     Stencils::new(near.get(), scene, rest, by_area)
 }
