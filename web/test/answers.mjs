@@ -290,7 +290,7 @@ export async function refusals(module) {
 export const REFUSALS = {
   early: "invalid: impinge is not loaded yet: await init() first",
   number: "invalid: body 0: vertex 0 has a non-finite position (0, 0, NaN)",
-  index: "invalid: body 1: primitive 0 names vertex 7, but there are 3 vertices",
+  index: "invalid: body 1: element 0 names vertex 7, but there are 3 vertices",
   ragged: "invalid: positions: 8 numbers given, not a multiple of 3",
   plain: "invalid: index: an Array given, a Uint32Array, a Uint16Array or a Uint8Array is needed",
   list: "invalid: positions: an Array given, a Float32Array or a Float64Array is needed",

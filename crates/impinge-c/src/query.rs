@@ -251,7 +251,11 @@ fn pair_filter(passes: PassesCallback, user: *mut c_void) -> PairFilter {
 pub fn check_length(name: &str, length: f64) -> Result<(), Failure> {
     match length.is_finite() && length >= 0.0 {
         true => Ok(()),
-        false => refuse(name, length, "a finite number that is not below 0 allowed"),
+        false => refuse(
+            name,
+            format_args!("{length:?}"),
+            "a finite number that is not below 0 allowed",
+        ),
     }
 }
 

@@ -90,7 +90,7 @@ int main(void) {
   wide[2] = INT64_C(1) << 32;
   REFUSED(impinge_scene_add_triangles(scene, bad, at, NULL), "row 0 has 4294967296");
   bad = packed(beyond, 1, IMPINGE_U32);
-  REFUSED(impinge_scene_add_triangles(scene, bad, at, NULL), "1154");
+  REFUSED(impinge_scene_add_triangles(scene, bad, at, NULL), "element 0 names vertex 1154");
   CHECK(strstr(impinge_error_message(), "body 1") != NULL);
   number = one.positions[7][1];
   one.positions[7][1] = NAN;
@@ -106,7 +106,8 @@ int main(void) {
   /* Bodies and numbers. */
   REFUSED(impinge_scene_set_positions(scene, 1, at), "no body 1 among the 1");
   REFUSED(impinge_scene_set_filter(scene, IMPINGE_ANY_BODY, 1, 1), "no body");
-  REFUSED(impinge_scene_set_thickness(scene, 0, -1), "thickness: -1");
+  REFUSED(impinge_scene_set_thickness(scene, 0, -1), "thickness: -1 given");
+  REFUSED(impinge_scene_set_thickness(scene, 0, -1e-300), "thickness: -1e-300 given");
   REFUSED(impinge_scene_set_edges(scene, 0, packed(beyond, 1, IMPINGE_U32)), "1 rows of edges given, but there are");
   {
     static const uint32_t twice[2][2] = {{0, 1}, {1, 0}};
@@ -306,6 +307,9 @@ int main(void) {
     CHECK(found == 1 && number == 0.5);
     GOOD(impinge_first_contact(IMPINGE_VF, packed(start, 4, IMPINGE_F32), packed(start, 4, IMPINGE_F32), NULL, &number, &found));
     CHECK(found == 0);
+    impinge_query_default(&query);
+    query.separation = -1e-300;
+    REFUSED(impinge_first_contact(IMPINGE_VF, packed(start, 4, IMPINGE_F32), packed(end, 4, IMPINGE_F32), &query, &number, &found), "separation: -1e-300 given");
     /* The edge comes first: here the edge from (0, 0, 0) to (1, 0, 0), and a vertex that crosses it. */
     {
       static const float from[3][3] = {{0, 0, 0}, {1, 0, 0}, {0.5f, 0, 1}}, to[3][3] = {{0, 0, 0}, {1, 0, 0}, {0.5f, 0, -3}};

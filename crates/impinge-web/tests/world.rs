@@ -131,7 +131,7 @@ fn numbers_of_bodies_are_not_used_again() -> Result<(), Error> {
     let wrong = world.put(Put::Add, 0, BodyKind::Triangles, &[0, 1, 9], &TRIANGLE);
     assert_eq!(
         said(wrong),
-        "body 3, in the library's words: body 2: primitive 0 names vertex 9, but there are 3 vertices"
+        "body 3, in the library's words: body 2: element 0 names vertex 9, but there are 3 vertices"
     );
     Ok(())
 }

@@ -12,7 +12,7 @@ use crate::query::Query;
 use crate::query::goal::Goal;
 use crate::query::progress::Control;
 use crate::scene::Scene;
-use crate::scene::error::Error;
+use crate::scene::error::{Error, shown};
 use crate::scene::ids::BodyId;
 use crate::search::runner::Job;
 use crate::search::stats::Stats;
@@ -209,7 +209,7 @@ impl Gpu<'_> {
         if !(0.0..=MOST_KEPT).contains(&most) {
             return Err(Error::Setting {
                 setting: "most",
-                given: most.to_string(),
+                given: shown(most),
                 allowed: "from 0 to 2^100 where it stays on a device",
             });
         }
@@ -352,14 +352,14 @@ fn refuse_unknown(query: &Query, (most, allowed): (f64, &'static str)) -> Result
     if query.separation > most {
         return Err(Error::Setting {
             setting: "separation",
-            given: query.separation.to_string(),
+            given: shown(query.separation),
             allowed,
         });
     }
     if query.clearance.distance > 0.0 {
         return Err(Error::Setting {
             setting: "clearance",
-            given: query.clearance.distance.to_string(),
+            given: shown(query.clearance.distance),
             allowed: "0 for a step that stays on a device",
         });
     }

@@ -6,7 +6,7 @@ use crate::query::pair_kind::{PairKind, PairKinds};
 use crate::query::pair_set::PairSet;
 use crate::query::step::{Clearance, Hit, PairFilter, Precision, Start, check_distance};
 use crate::query::vertex_lists::VertexLists;
-use crate::scene::error::Error;
+use crate::scene::error::{Error, shown};
 use crate::scene::ids::BodyId;
 use crate::scene::words::words;
 use impinge_exact::internal::Keep;
@@ -487,7 +487,7 @@ impl Query {
             true => Ok(()),
             false => Err(Error::Setting {
                 setting: "clearance_share",
-                given: self.clearance.share.to_string(),
+                given: shown(self.clearance.share),
                 allowed: "a number from 0 to less than 1",
             }),
         }

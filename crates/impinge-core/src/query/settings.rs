@@ -2,7 +2,7 @@
 
 use crate::query::goal::Limits;
 use crate::query::tuning::Tuning;
-use crate::scene::error::Error;
+use crate::scene::error::{Error, shown};
 use crate::scene::words::words;
 
 /// How candidates are found. All methods give the same pairs.
@@ -319,10 +319,10 @@ impl Settings {
             })
         };
         if !(self.density.is_finite() && self.density > 0.0) {
-            return refuse("density", self.density.to_string(), "a number above 0");
+            return refuse("density", shown(self.density), "a number above 0");
         }
         if !(self.reuse_margin.is_finite() && self.reuse_margin >= 0.0) {
-            let given = self.reuse_margin.to_string();
+            let given = shown(self.reuse_margin);
             return refuse("reuse_margin", given, "a number that is not below 0");
         }
         if !(1..=64).contains(&self.group_size) {

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 #[cfg(doc)]
 use crate::query::pair_kind::PairKind;
-use crate::scene::error::Error;
+use crate::scene::error::{Error, shown};
 use crate::scene::ids::BodyId;
 use crate::scene::words::words;
 
@@ -166,7 +166,7 @@ pub(crate) fn check_distance(setting: &'static str, distance: f64) -> Result<(),
     }
     Err(Error::Setting {
         setting,
-        given: distance.to_string(),
+        given: shown(distance),
         allowed: "a finite number that is not below 0",
     })
 }

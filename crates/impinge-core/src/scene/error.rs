@@ -2,12 +2,20 @@
 
 use crate::scene::ids::BodyId;
 
+/// A number as messages show it: with an exponent where it would have many digits without.
+pub(crate) fn shown(x: f64) -> String {
+    match x == 0.0 || (1e-5..1e16).contains(&x.abs()) {
+        true => x.to_string(),
+        false => format!("{x:e}"),
+    }
+}
+
 /// All errors. Each names the body, the index, and both numbers where it has them.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
     /// A position holds NaN or an infinity. Check the step that produced this vertex.
-    #[error("body {body}: vertex {vertex} has a non-finite position ({}, {}, {})", value[0], value[1], value[2])]
+    #[error("body {body}: vertex {vertex} has a non-finite position ({}, {}, {})", shown(value[0]), shown(value[1]), shown(value[2]))]
     NonFinitePosition {
         /// The body, or the one that was about to be added.
         body: BodyId,
@@ -18,7 +26,7 @@ pub enum Error {
     },
     /// A point or direction that was asked about holds NaN or an infinity. Check where it comes
     /// from.
-    #[error("{what}: row {row} is not finite ({}, {}, {})", value[0], value[1], value[2])]
+    #[error("{what}: row {row} is not finite ({}, {}, {})", shown(value[0]), shown(value[1]), shown(value[2]))]
     NonFinitePoint {
         /// Which array: `"points"`, `"origins"`, `"directions"` or `"rest"`.
         what: &'static str,
@@ -29,7 +37,7 @@ pub enum Error {
     },
     /// A primitive names a vertex that does not exist. Check the index buffer's base.
     #[error(
-        "body {body}: primitive {primitive} names vertex {index}, but there are {n_vertices} vertices"
+        "body {body}: element {primitive} names vertex {index}, but there are {n_vertices} vertices"
     )]
     VertexIndexOutOfRange {
         /// The body, or the one that was about to be added.
@@ -103,7 +111,8 @@ pub enum Error {
     },
     /// An element is to have a thickness that is negative or not finite.
     #[error(
-        "body {body}: a thickness of {given} is given as number {element} of its {elements}, where a finite number that is not below 0 is allowed"
+        "body {body}: a thickness of {} is given as number {element} of its {elements}, where a finite number that is not below 0 is allowed",
+        shown(*given)
     )]
     Thickness {
         /// The body.

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::sync::Arc;
 
 use crate::scene::elements::{EdgeFinder, Part, Parts};
-use crate::scene::error::Error;
+use crate::scene::error::{Error, shown};
 use crate::scene::ids::{BodyId, new_stamp};
 
 /// How thick a body is, in the unit of the scene: one number, or one per vertex, edge or face. See
@@ -60,7 +60,7 @@ impl<'a> Thickness<'a> {
             }),
             GivenThickness::One(one) => Err(Error::Setting {
                 setting: "thickness",
-                given: one.to_string(),
+                given: shown(one),
                 allowed: "a finite number that is not below 0",
             }),
             GivenThickness::Each(part, given) => {

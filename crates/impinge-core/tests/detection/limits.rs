@@ -36,7 +36,7 @@ fn bad_bodies_are_refused_by_name() {
     ));
     assert_eq!(
         error.to_string(),
-        "body 1: primitive 1 names vertex 7, but there are 3 vertices"
+        "body 1: element 1 names vertex 7, but there are 3 vertices"
     );
     for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
         let mut positions = TRIANGLE;

@@ -32,7 +32,7 @@ use crate::proximity::Distances;
 use crate::query::{Query, Scope, SharedVertex};
 use crate::scene::by_body::ByBody;
 use crate::scene::elements::{BodyKind, Part};
-use crate::scene::error::Error;
+use crate::scene::error::{Error, shown};
 use crate::scene::ids::BodyId;
 use crate::scene::positions::Real;
 use crate::scene::{Body, Scene};
@@ -431,7 +431,7 @@ fn check_most(most: f64, allowed: &'static str) -> Result<(), Error> {
     }
     Err(Error::Setting {
         setting: "most",
-        given: most.to_string(),
+        given: shown(most),
         allowed,
     })
 }
