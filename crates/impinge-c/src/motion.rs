@@ -107,7 +107,7 @@ pub unsafe extern "C" fn impinge_motion_first(
     })
 }
 
-/// Writes what was found, if anything was.
+/// Writes what was found, if anything was. Whether a pointer is refused does not depend on it.
 ///
 /// # Safety
 /// `to` and `found` are NULL or can be written.
@@ -118,6 +118,9 @@ pub unsafe fn put_found<T>(
 ) -> Result<(), Failure> {
     if found.is_null() {
         return Err(Failure::null("found"));
+    }
+    if to.is_null() {
+        return Err(Failure::null(what));
     }
     let is_found = value.is_some();
     if let Some(value) = value {

@@ -307,6 +307,7 @@ int main(void) {
     CHECK(found == 1 && number == 0.5);
     GOOD(impinge_first_contact(IMPINGE_VF, packed(start, 4, IMPINGE_F32), packed(start, 4, IMPINGE_F32), NULL, &number, &found));
     CHECK(found == 0);
+    REFUSED(impinge_first_contact(IMPINGE_VF, packed(start, 4, IMPINGE_F32), packed(start, 4, IMPINGE_F32), NULL, NULL, &found), "toi is NULL");
     impinge_query_default(&query);
     query.separation = -1e-300;
     REFUSED(impinge_first_contact(IMPINGE_VF, packed(start, 4, IMPINGE_F32), packed(end, 4, IMPINGE_F32), &query, &number, &found), "separation: -1e-300 given");
@@ -320,6 +321,21 @@ int main(void) {
       GOOD(impinge_first_contact(IMPINGE_EV, packed(from, 3, IMPINGE_F32), packed(to, 3, IMPINGE_F32), &query, &number, &found));
       CHECK(found == 1 && number == 0.125);
     }
+  }
+  {
+    /* NULL is refused also where nothing would be written. */
+    impinge_array none = at;
+    none.rows = 0;
+    REFUSED(impinge_find_earliest(detector, scene, NULL, NULL, &found), "impact is NULL");
+    GOOD(impinge_advance(detector, scene, NULL, NULL, &motion));
+    REFUSED(impinge_motion_first(motion, NULL, &found), "impact is NULL");
+    impinge_motion_destroy(motion);
+    GOOD(impinge_scene_add_points(scene, none, NULL));
+    REFUSED(impinge_find_distance(detector, scene, 0, 1, NULL, &found), "nearest is NULL");
+    impinge_query_default(&query);
+    query.self = 0;
+    REFUSED(impinge_find_nearest(detector, scene, &query, NULL, &found), "nearest is NULL");
+    CHECK(found == 1);
   }
   impinge_detector_destroy(detector);
   impinge_scene_destroy(scene);

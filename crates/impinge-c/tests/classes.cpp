@@ -135,6 +135,8 @@ void steps() {
   scene.set_end_positions(b, numbers(balls[1]));
   throws(IMPINGE_ERROR_INVALID, "body 1: 0 end positions given, but it has 1154 vertices; clear_end_positions", [&] { scene.set_end_positions(b, std::vector<double>()); });
   throws(IMPINGE_ERROR_INVALID, "clear_end_positions", [&] { scene.lend_end_positions(b, std::make_shared<std::vector<double>>()); });
+  throws(IMPINGE_ERROR_INVALID, "owner is NULL", [&] { scene.lend_positions(b, std::shared_ptr<std::vector<double>>()); });
+  throws(IMPINGE_ERROR_INVALID, "owner is NULL", [&] { scene.lend_end_positions(b, std::shared_ptr<std::vector<double>>()); });
   throws(IMPINGE_ERROR_INVALID, "no body 9", [&] { scene.set_end_positions(9, std::vector<double>()); });
   CHECK(scene.end_positions(b).rows == VERTICES);
   scene.clear_end_positions(b);

@@ -486,6 +486,7 @@ public:
   /// Positions that the scene reads where they lie, and shares the owner of. They are checked in this call, and must not change afterwards.
   template <class P> result<void> lend_positions(body of, std::shared_ptr<P> owner) { return lend(impinge_scene_lend_positions, of, std::move(owner)); }
   template <class P> result<void> lend_end_positions(body of, std::shared_ptr<P> owner) {
+    if (!owner) return refuse_no_owner();
     if (const auto n = vertices_without_rows(of, detail::rows_of<std::remove_const_t<P>>(*owner, 3))) return refuse_no_rows(of, n);
     return lend(impinge_scene_lend_end_positions, of, std::move(owner));
   }
@@ -536,7 +537,9 @@ private:
     const std::string given = "body " + std::to_string(of) + ": 0 end positions given, but it has " + std::to_string(n);
     return detail::refuse((given + " vertices; clear_end_positions lets it stand still").c_str());
   }
+  static result<void> refuse_no_owner() { return detail::refuse("owner is NULL"); }
   template <class Lend, class P> result<void> lend(Lend call, body of, std::shared_ptr<P> owner) {
+    if (!owner) return refuse_no_owner();
     const array at = detail::rows_of<std::remove_const_t<P>>(*owner, 3);
     auto kept = std::make_unique<std::shared_ptr<P>>(std::move(owner));
     const auto status = call(raw(), of, at, [](void *user) { delete static_cast<std::shared_ptr<P> *>(user); }, kept.get());
