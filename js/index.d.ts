@@ -245,6 +245,7 @@ export declare class Scene {
   /**
    * Numbers the edges of a body as its caller does: edge i of answers, of `edges` and of `setThickness` is row i, two vertices. Every edge of the surface must be there
    * once, in any order. `null`: the library's own numbers again. Set them before the first question: afterwards `RestPairs` of edges from before are refused.
+   * Hashes of answers are of these numbers, too.
    */
   setEdges(body: Body, edges: Index | null): void;
   /** Puts each vertex of a body into a group, for `exclude: [{ groups: [g, h] }]`. A body whose groups were never set is in none. */
@@ -666,7 +667,7 @@ export interface Region {
   normal: [number, number, number] | null;
   /** Of `penetration`: how far the region extends along the normal. */
   depth: number | null;
-  /** Of `penetration`: what both bodies have in common, if that is known. */
+  /** Of `penetration`: what both bodies have in common; `null` where they meet other than by edges that cross faces, as in one plane. */
   volume: number | null;
   /** Of `penetration`: vertices of the first body inside the second, and of the second inside the first. */
   inside: [Uint32Array, Uint32Array];
@@ -777,9 +778,9 @@ export declare class Detector {
   truncate(scene: Scene, query?: Query): Truncation;
   /** The pairs of `near` as lists per element: `"ef"` and vertices of no element are as said there. */
   neighbours(scene: Scene, distance: number, query?: Query): Neighbours;
-  /** The two bodies that are nearest to each other, and their nearest pair; `null` if there are no two. Of several the first, see `Scene.remove`. */
+  /** The two bodies that are nearest to each other, and their nearest pair; `null` if there are no two. Of several at one distance, rounded down, the first, see `Scene.remove`: not always the nearest of them. */
   nearest(scene: Scene, query?: Query): Nearest | null;
-  /** The smallest distance of two bodies; `null` if one of them has no elements. Tetrahedra are solid. */
+  /** The smallest distance of two bodies; `null` if one of them has no elements. Tetrahedra are solid. Of several pairs at one distance, rounded down, the lowest: not always the nearest of them. */
   distance(scene: Scene, a: Body, b: Body, control?: Control): Nearest | null;
   /** Where the triangles of pairs meet. The scene must not have changed since they were found. */
   contacts(scene: Scene, pairs: Pairs, control?: Control): Contacts;

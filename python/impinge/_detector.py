@@ -561,7 +561,8 @@ class Detector(DetectorBase):
         -------
         Nearest or None
             ``None`` where one of them has no element. Its distance is 0 if and only if they share a point, or are nearer than the
-            smallest float. Of several pairs at one distance the lowest, by the element of `a`, then of `b`.
+            smallest float. Of several pairs at one distance, rounded down, the lowest, by the element of `a`, then of `b`: not
+            always the nearest of them.
 
         Raises
         ------
@@ -598,7 +599,8 @@ class Detector(DetectorBase):
         Returns
         -------
         Nearest or None
-            ``None`` where there are no two bodies that have elements. Of several pairs at one distance the lowest: by bodies, then by elements.
+            ``None`` where there are no two bodies that have elements. Of several pairs at one distance, rounded down, the
+            lowest, by bodies, then by elements: not always the nearest of them.
 
         Examples
         --------

@@ -358,7 +358,7 @@ class Scene(SceneBase):
         """Numbers the edges of a body as its caller does: edge i of answers, of `edges` and of `set_thickness` is row i.
 
         Set them before the first question: afterwards answers from before name other edges, and are refused by `exclude` and
-        `stencils`. `remesh` forgets them.
+        `stencils`. `remesh` forgets them. Hashes of answers are of these numbers, too.
 
         Parameters
         ----------

@@ -106,7 +106,8 @@ void impinge_scene_destroy(impinge_scene *scene);
 
 /* Adds a body of triangles. `faces` has 3 columns of vertex indices of any integer type, `positions` 3 columns of F32 or F64; both are
  * copied. `body` gets the number of the body and may be NULL.
- * INVALID: an index out of range, a position that is not finite, a type that does not fit, strides that do not fit the type. */
+ * INVALID: an index out of range, a position that is not finite, a type that does not fit, strides that do not fit the type. Messages
+ * name the number that the body would have got. */
 impinge_status impinge_scene_add_triangles(impinge_scene *scene, impinge_array faces, impinge_array positions, uint32_t *body);
 
 /* Adds a body of tetrahedra, as impinge_scene_add_triangles. `tetrahedra` has 4 columns. Orientation does not matter; a flat one is the
@@ -405,7 +406,8 @@ void impinge_settings_default(impinge_settings *settings);
  * INVALID: a setting out of its range. DEVICE: no such GPU, or a library without the GPU backend. */
 impinge_status impinge_detector_create(const impinge_settings *settings, impinge_detector **detector);
 
-/* Ends a detector and its threads, but none that a call is using. */
+/* Ends a detector, but none that a call is using. Its own threads are told to end: some may run for a moment after this returns.
+ * With `threads` 0 some are shared by all detectors of the process, and stay. */
 void impinge_detector_destroy(impinge_detector *detector);
 
 /* A GPU that can run the kernels of the library. Strings live as long as the list. */
@@ -444,7 +446,8 @@ typedef struct impinge_impact {
 } impinge_impact;
 
 /* The nearest two elements of two bodies. `distance` is rounded down, and 0 if and only if they touch, or are nearer than the smallest
- * double. `points`: one of each element, rounded. */
+ * double. Of several pairs whose distance is the same, rounded down, it is the lowest, by bodies and then by elements: not always the
+ * nearest of them. `points`: one of each element, rounded. */
 typedef struct impinge_nearest {
   double distance, points[2][3];
   uint32_t body_a, element_a, body_b, element_b;
@@ -491,7 +494,7 @@ typedef struct impinge_region {
   double area[3];       /* the area that the curves span, as a vector */
   double normal[3];     /* unit direction in which to push body_a so that the overlap shrinks fastest; zero if there is none */
   double depth;         /* how far the region extends along the normal; NaN if unknown */
-  double volume;        /* of what the bodies have in common; NaN if unknown */
+  double volume;        /* of what the bodies have in common; NaN if they meet other than by edges that cross faces, as in one plane */
   uint32_t body_a, body_b;
   uint64_t n_contacts;  /* pairs in the region */
   uint64_t n_inside[2]; /* vertices of body_a inside body_b, and of body_b inside body_a */
@@ -774,8 +777,8 @@ int32_t impinge_detector_start_intersects(const impinge_detector *detector);
 
 /* ---- Answers ----
  * count: the number of rows; 0 for NULL. data: the rows, sorted; NULL if there are none. hash: a hash of the set, the same in every
- * language, which does
- * not depend on order, and is that of the library's own numbers of edges. column: a view, see IMPINGE_COLUMN_...; INVALID: no such column.
+ * language, which does not depend on order. It is of the numbers that rows and features have: of edges those of impinge_scene_set_edges,
+ * where they were set. column: a view, see IMPINGE_COLUMN_...; INVALID: no such column.
  * stats: what the answer cost. */
 
 size_t impinge_pairs_count(const impinge_pairs *pairs);

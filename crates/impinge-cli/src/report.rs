@@ -514,7 +514,7 @@ pub struct Distance {
     pub bodies: [usize; 2],
     /// Their files, nodes or groups
     pub names: [String; 2],
-    /// An element of each mesh at this distance
+    /// An element of each mesh at this distance; of several pairs at it, rounded down, the lowest
     pub elements: [u32; 2],
     /// Nearest points of these elements, rounded; if they touch, twice a point that they share
     pub points: [[f64; 3]; 2],

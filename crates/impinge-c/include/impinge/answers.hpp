@@ -308,7 +308,7 @@ public:
 class penetration : public detail::penetration_answer {
 public:
   using answer::answer;
-  /// NaN if unknown.
+  /// NaN if that of any region is unknown: see `impinge_region`.
   double volume() const noexcept { return impinge_penetration_volume(raw()); }
   /// Vertices of the body with the lower number inside the other, and of the other inside that, whichever was named first.
   view<std::uint32_t> inside_a() const & { return packed<std::uint32_t>(IMPINGE_COLUMN_INSIDE_A); }

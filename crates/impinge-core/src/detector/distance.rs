@@ -28,8 +28,9 @@ use crate::search::work::Work;
 impl Detector {
     /// The two bodies that are nearest to each other of all that the query lets meet, and the pair
     /// of elements that has their [`distance`](Detector::distance); `None` if there are no two that
-    /// have elements. Of several pairs at the same distance, rounded down, the lowest. Pairs of
-    /// bodies whose boxes are farther apart than the nearest two are never looked at.
+    /// have elements. Of several pairs at the same distance, rounded down, the lowest, which is not
+    /// always the nearest of them. Pairs of bodies whose boxes are farther apart than the nearest
+    /// two are never looked at.
     ///
     /// ```
     /// use impinge::{Backend, Detector, Query, Scene};
@@ -61,7 +62,8 @@ impl Detector {
     /// elements that has it; `None` if one body has no elements. The distance is rounded down: the
     /// largest `f64` that is not above the true one. It is 0 if and only if they share a point,
     /// which is decided exactly, or are nearer than the smallest `f64`. Tetrahedra are solid: a
-    /// body inside one has distance 0.
+    /// body inside one has distance 0. Of several pairs at the same distance, rounded down, the
+    /// lowest, which is not always the nearest of them.
     ///
     /// The detector keeps a tree per body and the nearest pair of each call. So repeated calls for
     /// bodies that move cost little more than to read their positions. The answer does not depend

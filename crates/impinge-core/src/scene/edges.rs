@@ -16,7 +16,7 @@ impl Scene {
     ///
     /// Set them before the first question: afterwards answers from before name other edges, and are
     /// refused where they are left out or made stencils of, unless the rows are those that the body
-    /// has.
+    /// has. Hashes of answers are of these numbers, too.
     ///
     /// ```
     /// use impinge::{Backend, Detector, Elements, PairKind, Query, Scene};
