@@ -1,5 +1,6 @@
 //! Rows of numbers, such as points and rays: from text and from NumPy arrays.
 
+use std::collections::HashSet;
 use std::path::Path;
 
 use crate::binary::{Endian, Scalar};
@@ -14,8 +15,8 @@ use crate::text::{Text, number};
 
 /// Reads rows of `N` finite numbers: a NumPy array of shape `(n, N)` of `float32` or `float64`
 /// (`.npy`), or text (`.csv`, `.txt`, `.xyz`) with a row per line. Numbers in text are separated by
-/// commas or blanks; what follows `#` is a comment, and a first line without any number holds names
-/// of columns.
+/// commas or blanks; what follows `#` is a comment, and the first line may have a name for each
+/// column instead: all different, each of which begins with a letter or `_`, perhaps in quotes.
 ///
 /// ```no_run
 /// use impinge_io::{ReadOptions, read_rows};
@@ -27,8 +28,8 @@ use crate::text::{Text, number};
 ///
 /// # Errors
 /// [`Error::UnknownRows`] for another extension; [`Error::Syntax`], which names the line or the
-/// byte, for a row of another length and for what is no finite number; [`Error::Truncated`] for an
-/// array that ends early.
+/// byte, for a row of another length, for what is no finite number, and for text without a row;
+/// [`Error::Truncated`] for an array that ends early, [`Error::Count`] for bytes after it.
 pub fn read_rows<const N: usize>(
     path: &Path,
     options: &ReadOptions,
@@ -73,7 +74,11 @@ fn lines<const N: usize>(bytes: &[u8], name: Name<'_>) -> Result<Vec<[f64; N]>, 
         let words = || line.bytes.split(is_between).filter(|word| !word.is_empty());
         let is_number = |word: &[u8]| number::<f64>(name, line.place(), word, "").is_ok();
         if std::mem::take(&mut is_first) && !words().any(is_number) {
-            continue;
+            if are_names::<N>(line.bytes) {
+                continue;
+            }
+            let expected = format!("{N} numbers, or a name for each of {N} columns");
+            return Err(name.syntax(line.place(), expected, shown(line.bytes)));
         }
         let n = words().count();
         if n != N {
@@ -94,7 +99,27 @@ fn lines<const N: usize>(bytes: &[u8], name: Name<'_>) -> Result<Vec<[f64; N]>, 
         }
         rows.push(row);
     }
+    if rows.is_empty() {
+        let expected = format!("a row of {N} numbers");
+        return Err(name.syntax(text.place(), expected, "the end of the file"));
+    }
     Ok(rows)
+}
+
+/// Whether a line has a name for each of `N` columns. Names may have blanks if commas separate them.
+/// Words that repeat stand for values, such as `NA,NA,NA`.
+fn are_names<const N: usize>(line: &[u8]) -> bool {
+    let line = String::from_utf8_lossy(line);
+    let fields = match line.contains(',') {
+        true => line.split(',').map(str::trim).collect::<Vec<_>>(),
+        false => line.split_whitespace().collect(),
+    };
+    let is_name = |field: &&str| {
+        let field = field.strip_prefix(['"', '\'']).unwrap_or(field);
+        field.starts_with(|c: char| c.is_alphabetic() || c == '_')
+    };
+    let different: HashSet<_> = fields.iter().filter(|field| is_name(field)).collect();
+    fields.len() == N && different.len() == N
 }
 
 /// A NumPy array.
@@ -117,6 +142,9 @@ fn array<const N: usize>(bytes: &[u8], name: Name<'_>) -> Result<Vec<[f64; N]>, 
     let needed = n.saturating_mul((N * size) as u64);
     if (data.len() as u64) < needed {
         return Err(name.truncated(start, "rows of numbers", needed, data.len() as u64));
+    }
+    if (data.len() as u64) > needed {
+        return Err(name.count(start, "bytes of rows", needed, data.len() as u64));
     }
     let mut rows: Vec<[f64; N]> = Vec::new();
     reserve(name, start, &mut rows, n)?;
@@ -154,7 +182,48 @@ mod tests {
         ] {
             assert_eq!(lines::<3>(text.as_bytes(), NAME).unwrap(), expected);
         }
-        assert_eq!(lines::<3>(b"x,y,z\n", NAME).unwrap().len(), 0);
+        for names in [
+            "x, y, z",
+            "x y\tz",
+            "\"x\",\"y\",\"z\"",
+            "'x' 'y' 'z'",
+            "px [m], py [m], pz [m]",
+            "_a,\u{3b8},C1",
+        ] {
+            let text = format!("{names}\n1,-2.5,.1\n3,4,1e-300\n");
+            assert_eq!(lines::<3>(text.as_bytes(), NAME).unwrap(), expected);
+        }
+    }
+
+    /// A line that is taken for names loses a row, and later rows get other numbers.
+    #[test]
+    fn a_first_row_in_another_syntax_is_not_taken_for_names() {
+        for line in [
+            "1;1;5",
+            "NA,NA,NA",
+            "\"1\",\"1\",\"5\"",
+            "1/1/5",
+            "1:1:5",
+            "x,y",
+            "x y z w",
+            "--,y,z",
+            "\u{ff}",
+        ] {
+            let error = lines::<3>(format!("{line}\n1,2,3\n").as_bytes(), NAME).unwrap_err();
+            let expected = "p.csv:1: expected 3 numbers, or a name for each of 3 columns";
+            assert_eq!(error.to_string(), format!("{expected}, found '{line}'"));
+        }
+        let error = lines::<3>(b"1D0 1D0 5D0\n1 2 3\n", NAME).unwrap_err();
+        assert!(error.to_string().starts_with("p.csv:1: "), "{error}");
+    }
+
+    #[test]
+    fn text_without_a_row_is_an_error() {
+        for text in ["", "x,y,z", "x,y,z\n", "# nothing\n\n"] {
+            let error = lines::<3>(text.as_bytes(), NAME).unwrap_err().to_string();
+            let said = "expected a row of 3 numbers, found the end of the file";
+            assert!(error.ends_with(said), "{error}");
+        }
     }
 
     #[test]
@@ -165,14 +234,17 @@ mod tests {
                 "p.csv:2: expected 3 numbers in a row, found 2",
             ),
             (
-                "x,y\n1,2,3,4",
+                "x,y,z\n1,2,3,4",
                 "p.csv:2: expected 3 numbers in a row, found 4",
             ),
             (
                 "1,2,3\n\n1,two,3\n",
                 "p.csv:3: expected a finite number, found 'two'",
             ),
-            ("x\ny,z,x\n", "p.csv:2: expected a finite number, found 'y'"),
+            (
+                "x,y,z\ny,z,x\n",
+                "p.csv:2: expected a finite number, found 'y'",
+            ),
             ("1,nan,3", "p.csv:1: expected a finite number, found 'nan'"),
             (
                 "1,2,1e999",
@@ -210,6 +282,7 @@ mod tests {
             ("'<i8'", "(2, 3)", "found type '<i8'"),
             ("'<f8'", "(2, 2)", "found shape [2, 2]"),
             ("'<f8'", "(6,)", "found shape [6]"),
+            ("'<f8'", "(1, 3)", "expected 24 bytes of rows, found 48"),
             ("'<f8'", "(3, 3)", "72 bytes are needed, but 48 are left"),
             ("'<f8'", "(18446744073709551615, 3)", "bytes are needed"),
         ] {

@@ -259,8 +259,8 @@ fn points_may_be_vertices_of_a_mesh_or_an_array() {
         assert_eq!(answer["places"], of_vertices["places"]);
     }
 
-    folder.text("none.csv", "x,y,z\n");
-    let none = folder.run(probe.iter().chain(&["none.csv"])).json();
+    std::fs::write(folder.path("none.npy"), npy_header("'<f4'", "(0, 3)")).unwrap();
+    let none = folder.run(probe.iter().chain(&["none.npy"])).json();
     assert_eq!(
         (&none["points"], &none["nearest"]),
         (&0.into(), &Value::Null)
@@ -378,6 +378,11 @@ fn bad_files_are_named_with_their_line() {
     folder.text("word.txt", "1 2 3\n1 two 3\n");
     folder.text("long.csv", "0,0,0,0,0,1\n0,0,0,0,0,1,7\n");
     folder.text("nan.csv", "0,0,0,0,0,nan\n");
+    folder.text("semicolons.csv", "1;1;5;0;0;-1\n0,0,5,0,0,-1\n");
+    folder.text("none.csv", "x,y,z\n");
+    let mut two = npy_header("'<f4'", "(0, 3)");
+    two.extend([0; 12]);
+    std::fs::write(folder.path("long.npy"), two).unwrap();
     std::fs::write(folder.path("pairs.npy"), npy_header("'<u4'", "(0, 4)")).unwrap();
     let points = |file| folder.run(["probe", "a.ply", "--points", file]);
     let rays = |file| folder.run(["cast", "a.ply", "--rays", file]);
@@ -393,6 +398,18 @@ fn bad_files_are_named_with_their_line() {
         (
             points("pairs.npy"),
             "pairs.npy: byte 0: expected an array of '<f4' or '<f8' of shape (n, 3), found type '<u4'",
+        ),
+        (
+            points("none.csv"),
+            "none.csv:2: expected a row of 3 numbers, found the end of the file",
+        ),
+        (
+            points("long.npy"),
+            "long.npy: byte 128: expected 0 bytes of rows, found 12",
+        ),
+        (
+            rays("semicolons.csv"),
+            "semicolons.csv:1: expected 6 numbers, or a name for each of 6 columns, found '1;1;5;0;0;-1'",
         ),
         (
             rays("long.csv"),
