@@ -31,6 +31,11 @@ impl<'a> Files<'a> {
         let Some((mesh, rest)) = all.split_first() else {
             return Err(Error::Usage("no mesh is given".to_owned()));
         };
+        // A pattern that the shell expands repeats a mesh that it matches.
+        let numbered = match rest.contains(mesh) {
+            true => rest,
+            false => all,
+        };
         let frames = match rest {
             [] if is_sequence => {
                 return Err(Error::Usage(
@@ -40,12 +45,12 @@ impl<'a> Files<'a> {
             [second, ..] if !are_bodies && names_sequence(second) => FrameFiles::Sequence(second),
             [second] if is_sequence => FrameFiles::Sequence(second),
             _ if is_sequence => FrameFiles::Each(match are_numbered(all) {
-                true => all,
+                true => numbered,
                 false => rest,
             }),
             [_, _, ..] if !are_bodies && are_numbered(rest) => {
                 match are_numbered(&all[..2]) {
-                    true => FrameFiles::Each(all),
+                    true => FrameFiles::Each(numbered),
                     // Two numbered files beside another mesh may be bodies.
                     false if rest.len() > 2 => FrameFiles::Each(rest),
                     false => FrameFiles::None,
@@ -130,6 +135,15 @@ mod tests {
             (
                 "--sequence r_1.obj r_2.obj r_3.obj",
                 "r_1.obj, frames: 3 files, others: 0",
+            ),
+            // `r_1.obj r_*.obj`, and a mesh that is another of the frames.
+            (
+                "--sequence r_1.obj r_1.obj r_2.obj r_3.obj",
+                "r_1.obj, frames: 3 files, others: 0",
+            ),
+            (
+                "r_2.obj r_1.obj r_2.obj r_3.obj",
+                "r_2.obj, frames: 3 files, others: 0",
             ),
             (
                 "--bodies r_1.obj r_2.obj r_3.obj",

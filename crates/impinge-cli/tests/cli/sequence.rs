@@ -124,6 +124,11 @@ fn frames_may_be_files_each() {
     let mut files: Vec<&str> = files.iter().map(String::as_str).collect();
     // Frame 0 is the ball as it is.
     assert_eq!(told(&files), whole);
+    // `run_000.ply run_*.ply`: the mesh is there twice, and one frame.
+    for mesh in ["run_000.ply", "run_003.ply"] {
+        let quoted = told(&[mesh, "run_*.ply"]);
+        assert_eq!(told(&[&[mesh][..], &files].concat()), quoted);
+    }
     files.swap(2, 5);
     files.insert(0, "ball.ply");
     assert_eq!(told(&files), whole);
