@@ -27,7 +27,7 @@ use crate::values::{
 };
 
 pub use choices::{
-    BodiesArg, backend, hits, kind, method, precision, repair, shared_vertex, start,
+    BodiesArg, backend, hits, kind, method, precision, repair, shared_vertex, start, start_of_tiles,
 };
 pub use help::parse;
 pub use near::NearArgs;

@@ -1,7 +1,7 @@
 //! Values of options: files by their extension, sizes with a suffix, ranges.
 
 use std::marker::PhantomData;
-use std::num::NonZeroUsize;
+use std::num::{IntErrorKind, NonZeroUsize, ParseIntError};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -234,10 +234,18 @@ pub fn mesh_format(text: &str) -> Result<impinge_io::Format, String> {
         .ok_or_else(|| "expected the extension of a mesh file, such as ply, obj or stl".to_owned())
 }
 
-/// A number of at least 1.
-pub fn at_least_one<N: FromStr>(text: &str) -> Result<N, String> {
-    text.parse()
-        .map_err(|_| "expected a whole number of at least 1".to_owned())
+/// A number of at least 1: one of the `NonZero` types.
+pub fn at_least_one<N: FromStr<Err = ParseIntError>>(text: &str) -> Result<N, String> {
+    text.parse().map_err(|error: ParseIntError| {
+        let expected = "expected a whole number of at least 1";
+        match error.kind() {
+            IntErrorKind::PosOverflow => {
+                let largest = u64::MAX >> (64 - 8 * size_of::<N>());
+                format!("{expected} and at most {largest}")
+            }
+            _ => expected.to_owned(),
+        }
+    })
 }
 
 /// A number of threads.
@@ -353,11 +361,15 @@ pub fn lambda(text: &str) -> Result<f64, String> {
     }
 }
 
-/// A distance: a number that is not below 0.
+/// A distance: a finite number that is not below 0. One that is not 0 as it is written stays so.
 pub fn distance(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(value) if value.is_finite() && value >= 0.0 => Ok(value),
-        _ => Err("expected a number that is not below 0".to_owned()),
+    let value = text.parse::<f64>().ok();
+    let value = value.filter(|value| value.is_finite() && *value >= 0.0);
+    let value = value.ok_or("expected a finite number that is not below 0")?;
+    let digits = text.split(['e', 'E']).next().unwrap_or_default();
+    match value == 0.0 && digits.contains(|c: char| ('1'..='9').contains(&c)) {
+        true => Err("so near to 0 that it would be read as 0".to_owned()),
+        false => Ok(value),
     }
 }
 
@@ -488,6 +500,8 @@ pub fn body_matrix(text: &str) -> Result<(usize, [[f64; 4]; 4]), String> {
 
 #[cfg(test)]
 mod tests {
+    use std::num::NonZeroU32;
+
     use super::*;
 
     #[test]
@@ -531,6 +545,41 @@ mod tests {
             "1bb",
         ] {
             assert!(bytes(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn distances_are_finite_and_0_only_if_they_say_so() {
+        for (text, value) in [
+            ("0", 0.0),
+            ("-0", 0.0),
+            ("0.00e7", 0.0),
+            ("5e-324", f64::from_bits(1)),
+            ("1e308", 1e308),
+        ] {
+            assert_eq!(distance(text), Ok(value), "{text}");
+        }
+        for text in ["-1", "inf", "nan", "1e309", "x", ""] {
+            let said = "expected a finite number that is not below 0";
+            assert_eq!(distance(text), Err(said.to_owned()), "{text}");
+        }
+        for text in ["1e-400", "0.001E-330", "-1e-400"] {
+            assert!(distance(text).unwrap_err().contains("read as 0"), "{text}");
+        }
+        assert!(body_length("0,1e-400").unwrap_err().contains("read as 0"));
+    }
+
+    #[test]
+    fn whole_numbers_have_a_largest_one() {
+        let one = at_least_one::<NonZeroU32>;
+        assert_eq!(one("4294967295"), Ok(NonZeroU32::MAX));
+        for text in ["4294967296", "99999999999999999999"] {
+            let said = "expected a whole number of at least 1 and at most 4294967295";
+            assert_eq!(one(text), Err(said.to_owned()));
+        }
+        for text in ["0", "-1", "1.5", "x"] {
+            let said = "expected a whole number of at least 1";
+            assert_eq!(one(text), Err(said.to_owned()));
         }
     }
 

@@ -43,7 +43,7 @@ words! {
         Auto: "The grid for large meshes that are asked about for the first time, clusters as \
             soon as they come back",
         Clusters: "Groups fixed by topology; the fastest method for meshes that move",
-        Cells: "The two-level grid",
+        Cells: "The two-level grid; for `near`, `safe` and `step`, which do not use it, clusters",
         Naive: "Every box against every box; slow, the reference for the other methods",
     }
     backend: Backend {
@@ -90,6 +90,20 @@ words! {
         Outward: "Closed shells are turned outward, cavities inward",
         Unused: "Vertices of no face go",
     }
+}
+
+/// As [`start`] for tiles, without help for the word that they refuse: the error says why.
+pub fn start_of_tiles() -> impl TypedValueParser<Value = Start> {
+    let words = start();
+    let values = words.possible_values().into_iter().flatten();
+    let values = values.map(|value| {
+        let is_refused = value.get_name() == Start::Verify.name();
+        value.hide(is_refused)
+    });
+    PossibleValuesParser::new(values.collect::<Vec<_>>()).try_map(|word| {
+        let found = Start::ALL.into_iter().find(|start| start.name() == word);
+        found.ok_or("no such word")
+    })
 }
 
 /// What becomes a body of its own.

@@ -304,3 +304,19 @@ fn killed_while_writing_and_run_again_the_answer_is_the_same() {
         serde_json::from_slice(&std::fs::read(folder.path("big/answer.json")).unwrap()).unwrap();
     assert_eq!(answer["hash"], expected["hash"]);
 }
+
+/// What is always refused is not among the words that help lists, and the error says why.
+#[test]
+fn a_start_that_no_tile_can_verify_is_not_listed() {
+    let folder = bodies();
+    let help = folder.run(["help", "tiles", "run"]).printed();
+    assert!(
+        help.contains("- report:") && help.contains("- skip:"),
+        "{help}"
+    );
+    assert!(!help.contains("verify"), "{help}");
+    plan(&folder);
+    let run = folder.run(["tiles", "run", "big", "--start", "verify"]);
+    let said = run.misuse();
+    assert!(said.contains("no tile sees all of the start"), "{said}");
+}

@@ -7,7 +7,7 @@ use clap::{Args, Subcommand};
 
 use impinge::{Method, Precision, SharedVertex, Start};
 
-use crate::args::{method, precision, shared_vertex, start};
+use crate::args::{method, precision, shared_vertex, start_of_tiles};
 use crate::values::{bytes, count, distance, threads};
 
 /// Shown below the help.
@@ -137,7 +137,7 @@ pub struct RunArgs {
     #[arg(long, value_parser = precision(), value_name = "P", default_value_t = Precision::F32, alias = "toi")]
     pub precision: Precision,
     /// Of a step: pairs that touch at the start are reported with the time 0, or ignored
-    #[arg(long, value_parser = start(), value_name = "RULE", default_value_t = Start::Report)]
+    #[arg(long, value_parser = start_of_tiles(), value_name = "RULE", default_value_t = Start::Report)]
     pub start: Start,
     /// The method that finds candidates; all methods give the same pairs
     #[arg(long, value_parser = method(), default_value_t = Method::Auto)]
