@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use impinge::{BodyId, CancelToken, Control, Detector, Scene};
+use impinge::{BodyId, BodyKind, CancelToken, Control, Detector, Scene};
 use impinge_io::Weld;
 
 use crate::args::OneMeshArgs;
@@ -39,6 +39,17 @@ impl OneMesh {
 
     pub fn scene(&self) -> &Scene {
         &self.bodies.scene
+    }
+
+    /// As many faces as it may have, at least 1: those of tetrahedra are their surface.
+    pub fn most_faces(&self) -> Result<u32, Error> {
+        let body = self.scene().body(self.id)?;
+        let of_each = match body.kind() {
+            BodyKind::Tetrahedra => 4,
+            _ => 1,
+        };
+        let n = body.n_primitives().saturating_mul(of_each);
+        Ok(u32::try_from(n).unwrap_or(u32::MAX).max(1))
     }
 
     /// A detector for it.

@@ -48,7 +48,7 @@ pub fn probe(args: &ProbeArgs, cancel: &CancelToken) -> Result<(), Error> {
         false => None,
     };
     let most = args.most.unwrap_or(f64::INFINITY);
-    let query = Query::all().n_nearest(args.nearest.get());
+    let query = Query::all().n_nearest(args.nearest.get().min(mesh.most_faces()?));
     let closest = detector.closest(scene, &points, most, &query)?;
     times.add(closest.stats());
     let answer = Answer {

@@ -212,17 +212,25 @@ fn the_nearest_few_and_the_tetrahedra_of_points_are_those_of_the_library() {
     let error = folder.run(args.iter().chain(&["--locate"])).error();
     let said = "surface.ply: body 0 is made of triangles, where tetrahedra are needed";
     assert!(error.starts_with(said), "{error}");
-    for wrong in ["0", "-1", "1.5", "4294967296"] {
+    for wrong in ["0", "-1", "1.5"] {
         let misuse = folder
             .run(args.iter().chain(&["--nearest", wrong]))
             .misuse();
         assert!(misuse.contains("a whole number of at least 1"), "{misuse}");
     }
-    // More elements than there are: all of them.
-    let few = folder
-        .run(args.iter().chain(&["--nearest", "400", "--json"]))
-        .json();
-    assert_eq!(few["found"], points.len() * 320);
+    let misuse = folder
+        .run(args.iter().chain(&["--nearest", "4294967296"]))
+        .misuse();
+    assert!(misuse.contains("and at most 4294967295"), "{misuse}");
+    // More elements than there are: all of them, and no memory for more.
+    for more in ["400", "4294967295"] {
+        let all = folder.run(args.iter().chain(&["--nearest", more, "--json"]));
+        assert_eq!(all.json()["found"], points.len() * 320);
+    }
+    let args = ["probe", "solid.mesh", "--points", "points.csv", "--json"];
+    let all = |more| folder.run(args.iter().chain(&["--nearest", more])).json();
+    assert!(all("400")["found"].as_u64() > Some(points.len() as u64));
+    assert_eq!(all("400")["found"], all("4294967295")["found"]);
 }
 
 #[test]

@@ -451,7 +451,8 @@ impl Query {
     }
 
     /// Sets how many of the nearest elements [`closest`](crate::Detector::closest) finds for each
-    /// point: 1, unless it is said.
+    /// point: 1, unless it is said. An answer has memory for as many entries per point, 64 bytes
+    /// each, however few elements there are.
     pub fn n_nearest(mut self, n: u32) -> Self {
         self.n_nearest = n;
         self

@@ -228,6 +228,11 @@ impl Probes {
         reserve(found, n_rows, WHAT)?;
         found.resize(n_rows, None);
         let block = BLOCK.saturating_mul(n_nearest);
+        // While they are found, no more are held than there are.
+        let n_elements = bodies
+            .iter()
+            .map(|(_, target)| target.boxes.clustering.order.len());
+        let n_held = n_nearest.min(n_elements.sum()).max(1);
         for (points, found) in points.chunks(BLOCK).zip(found.chunks_mut(block)) {
             // Neighbours one after the other: the element found last is a good first bound, and
             // memory is in the caches.
@@ -239,12 +244,12 @@ impl Probes {
                 let mut some_points = with_capacity(some.len(), WHAT)?;
                 some_points.extend(some.iter().map(|&ix| points[ix as usize]));
                 let points: &[[R; 3]] = &some_points;
-                *found = filled(None, points.len() * n_nearest, WHAT)?;
-                closest::closest(self.isa, &bodies, points, (most, n_nearest), found, work)
+                *found = filled(None, points.len() * n_held, WHAT)?;
+                closest::closest(self.isa, &bodies, points, (most, n_held), found, work)
             })?;
             for (some, of_some) in tasks {
-                for (&ix, rows) in some.iter().zip(of_some.chunks_exact(n_nearest)) {
-                    found[ix as usize * n_nearest..][..n_nearest].copy_from_slice(rows);
+                for (&ix, rows) in some.iter().zip(of_some.chunks_exact(n_held)) {
+                    found[ix as usize * n_nearest..][..n_held].copy_from_slice(rows);
                 }
             }
         }
