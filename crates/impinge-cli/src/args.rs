@@ -336,7 +336,7 @@ pub struct ExcludeArgs {
 }
 
 /// How thick bodies are.
-#[derive(Debug, Clone, Args)]
+#[derive(Debug, Clone, Default, Args)]
 pub struct ThicknessArgs {
     /// The thickness T of body N, a length that adds to what its pairs are asked for or keep, and is
     /// taken from how far its vertices may move (twice within it) [default: 0]

@@ -57,6 +57,17 @@ impl Asked {
 
     /// `between 2 meshes, 12 vertices welded, neighbours resolved; not asked: self-collision (--self)`
     pub fn line(self, vertices: &[Vertices], nouns: &Nouns) -> String {
+        self.line_of_thick(vertices, nouns, &ThicknessArgs::default())
+    }
+
+    /// The same, of bodies that may be thick:
+    /// `between 2 meshes, thickness 0.5 of body 0, 12 vertices welded, …`
+    pub fn line_of_thick(
+        self,
+        vertices: &[Vertices],
+        nouns: &Nouns,
+        thickness: &ThicknessArgs,
+    ) -> String {
         let Nouns { one, many, file } = nouns;
         let n = grouped(vertices.len() as u64);
         let of = file.as_ref().map_or(String::new(), |file| {
@@ -103,7 +114,14 @@ impl Asked {
             true => String::new(),
             false => format!("; not asked: {}", not_asked.join(", ")),
         };
-        format!("{whom}, {}, {}{rest}", welded(vertices), self.neighbours())
+        let thick = thickness.of_bodies.iter().filter(|(_, of)| *of > 0.0);
+        let thick = thick.map(|(body, of)| format!("{of} of body {body}"));
+        let thick = match thick.collect::<Vec<_>>().join(", ") {
+            none if none.is_empty() => none,
+            each => format!(", thickness {each}"),
+        };
+        let (welded, neighbours) = (welded(vertices), self.neighbours());
+        format!("{whom}{thick}, {welded}, {neighbours}{rest}")
     }
 
     /// Which pairs of one body that share a vertex are in the answer.
@@ -138,11 +156,28 @@ pub fn thicken(
     bodies: &[BodyId],
     thickness: &ThicknessArgs,
 ) -> Result<(), Error> {
-    for &(number, thickness) in &thickness.of_bodies {
+    let all = &thickness.of_bodies;
+    for (ix, &(number, thickness)) in all.iter().enumerate() {
         let id = body("--thickness", bodies, number)?;
+        if all[..ix].iter().any(|&(before, _)| before == number) {
+            let text = format!("--thickness names body {number} twice");
+            return Err(Error::Usage(text));
+        }
         scene.set_thickness(id, thickness)?;
     }
     Ok(())
+}
+
+/// A distance that pairs keep or are within, besides the thickness of their bodies; `None` if there
+/// is neither.
+pub fn kept(scene: &Scene, distance: f64) -> Option<String> {
+    let is_thick = scene.bodies().any(|(_, body)| body.thickness() > 0.0);
+    match (distance > 0.0, is_thick) {
+        (false, false) => None,
+        (true, false) => Some(distance.to_string()),
+        (true, true) => Some(format!("{distance} and the thickness")),
+        (false, true) => Some("the thickness".to_owned()),
+    }
 }
 
 /// How many vertices were welded, and how many were not though they coincide with another one.

@@ -67,6 +67,16 @@ pub struct Body {
     pub coincident: Option<usize>,
 }
 
+#[derive(Serialize)]
+#[cfg_attr(test, derive(JsonSchema))]
+pub struct ThickBody {
+    #[serde(flatten)]
+    pub body: Body,
+    /// What --thickness gives it, else 0
+    #[cfg_attr(test, schemars(range(min = 0)))]
+    pub thickness: f64,
+}
+
 /// How an answer was found.
 #[derive(Serialize)]
 #[cfg_attr(test, derive(JsonSchema))]
@@ -394,7 +404,7 @@ impl Impact {
 pub struct MovingBody {
     /// Its `name` is the file of the start
     #[serde(flatten)]
-    pub body: Body,
+    pub body: ThickBody,
     /// The file of the end as given
     pub end: String,
 }
@@ -437,7 +447,7 @@ pub struct Candidates {
 #[derive(Serialize)]
 #[cfg_attr(test, derive(JsonSchema))]
 pub struct Near {
-    /// The distance asked for
+    /// The distance asked for, to which the thickness of both bodies adds
     #[cfg_attr(test, schemars(range(min = 0)))]
     pub distance: f64,
     pub asked: Asked,
@@ -450,7 +460,7 @@ pub struct Near {
     /// method and thread count
     pub hash: String,
     /// One object per mesh, in the order given
-    pub bodies: Vec<Body>,
+    pub bodies: Vec<ThickBody>,
     #[serde(flatten)]
     pub how: How<Stages>,
 }
@@ -495,7 +505,7 @@ pub struct SafeVertex {
 #[cfg_attr(test, derive(JsonSchema))]
 pub struct FixedBody {
     #[serde(flatten)]
-    pub body: Body,
+    pub body: ThickBody,
     /// Whether --fixed names it
     pub fixed: bool,
 }

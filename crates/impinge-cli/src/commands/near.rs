@@ -6,7 +6,7 @@ use impinge::{BodyId, CancelToken, NearPair, NearPairs, PairKind};
 
 use crate::apart::Inputs;
 use crate::args::NearArgs;
-use crate::asked::{Asked, Question, thicken};
+use crate::asked::{Asked, Question, kept, thicken};
 use crate::colors::{self, Ramp};
 use crate::detection::{Times, asked, detector, hit, of_kinds, query};
 use crate::error::Error;
@@ -71,7 +71,11 @@ pub fn near(args: &NearArgs, cancel: &CancelToken) -> Result<(), Error> {
     } else {
         let mut text = Vec::new();
         print(&mut text, args, &bodies, near, intersects)?;
-        writeln!(text, "{}", asked.line(&bodies.vertices, &bodies.nouns))?;
+        writeln!(
+            text,
+            "{}",
+            asked.line_of_thick(&bodies.vertices, &bodies.nouns, &args.thickness)
+        )?;
         say(&text, rows_file.as_ref())?;
     }
     if let Some(png) = &args.shown.png {
@@ -108,7 +112,7 @@ fn answer(
         ..
     } = bodies;
     let described =
-        (0..ids.len()).map(|ix| report::Body::new(scene, ids[ix], &names[ix], &vertices[ix]));
+        (0..ids.len()).map(|ix| report::ThickBody::new(scene, ids[ix], &names[ix], &vertices[ix]));
     let times = Times::default().and(near.stats());
     Ok(report::Near {
         distance: args.distance,
@@ -135,7 +139,7 @@ fn print(
     intersects: bool,
 ) -> Result<(), Error> {
     let subject = headline::subject(&bodies.nouns, &bodies.names);
-    let distance = args.distance;
+    let distance = kept(&bodies.scene, args.distance).unwrap_or_else(|| "0".to_owned());
     if near.is_empty() {
         writeln!(to, "{subject}: no pairs of elements within {distance}")?;
     } else {

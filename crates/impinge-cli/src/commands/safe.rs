@@ -89,7 +89,11 @@ pub fn safe(args: &SafeArgs, cancel: &CancelToken) -> Result<(), Error> {
     } else {
         let mut text = Vec::new();
         answer.print(&mut text)?;
-        writeln!(text, "{}", asked.line(&bodies.vertices, &bodies.nouns))?;
+        writeln!(
+            text,
+            "{}",
+            asked.line_of_thick(&bodies.vertices, &bodies.nouns, &args.thickness)
+        )?;
         say(&text, rows_file.as_ref())?;
     }
     hit(ask.fail_on_hit, intersects)
@@ -160,7 +164,7 @@ impl Answer<'_> {
         } = self.bodies;
         let described = |ix: usize| {
             Ok(report::FixedBody {
-                body: report::Body::new(scene, ids[ix], &names[ix], &vertices[ix])?,
+                body: report::ThickBody::new(scene, ids[ix], &names[ix], &vertices[ix])?,
                 fixed: self.args.fixed.contains(&ix),
             })
         };

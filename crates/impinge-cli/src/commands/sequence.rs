@@ -114,7 +114,7 @@ pub fn sequence(args: &SequenceArgs, cancel: &CancelToken) -> Result<(), Error> 
                 has_kinds: !args.step.kinds.is_empty(),
                 ..asked
             };
-            let line = asked.line(&vertices, &nouns) + "\n";
+            let line = asked.line_of_thick(&vertices, &nouns, &args.step.thickness) + "\n";
             output::say(line.as_bytes(), file.as_ref())?;
         }
         return frames.end(steps.end(args.ask.fail_on_hit));

@@ -57,7 +57,11 @@ pub fn step(args: &StepArgs, cancel: &CancelToken) -> Result<(), Error> {
         }
         let mut text = Vec::new();
         written.print(&mut text)?;
-        writeln!(text, "{}", asked.line(&bodies.vertices, &Nouns::default()))?;
+        writeln!(
+            text,
+            "{}",
+            asked.line_of_thick(&bodies.vertices, &Nouns::default(), &args.how.thickness)
+        )?;
         return say(&text, Some(file));
     }
     if !args.reached().1.is_empty() {
@@ -166,6 +170,10 @@ fn print(
     }
     let mut text = Vec::new();
     found.print(&mut text, bodies, &args.how)?;
-    writeln!(text, "{}", asked.line(&bodies.vertices, &Nouns::default()))?;
+    writeln!(
+        text,
+        "{}",
+        asked.line_of_thick(&bodies.vertices, &Nouns::default(), &args.how.thickness)
+    )?;
     say(&text, rows)
 }

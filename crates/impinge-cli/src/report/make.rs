@@ -3,7 +3,9 @@
 use impinge::{BodyId, Error, Pairs, Scene, Stats};
 use serde_json::{Map, Value, json};
 
-use super::{AskedOfStep, Body, CollidingBody, Counters, How, Region, Stages, Total, Unread};
+use super::{
+    AskedOfStep, Body, CollidingBody, Counters, How, Region, Stages, ThickBody, Total, Unread,
+};
 use crate::asked::Asked;
 use crate::detection::Times;
 use crate::load::Vertices;
@@ -87,6 +89,15 @@ impl Body {
             vertices: body.n_vertices(),
             welded: vertices.n_welded,
             coincident: vertices.n_coincident,
+        })
+    }
+}
+
+impl ThickBody {
+    pub fn new(scene: &Scene, id: BodyId, name: &str, vertices: &Vertices) -> Result<Self, Error> {
+        Ok(ThickBody {
+            body: Body::new(scene, id, name, vertices)?,
+            thickness: scene.body(id)?.thickness(),
         })
     }
 }

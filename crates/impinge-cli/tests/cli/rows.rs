@@ -336,6 +336,36 @@ fn thickness_adds_to_the_distance() {
         ];
         folder.run(args).misuse()
     };
+    // The answer says how thick the bodies are.
+    let args = ["near", "low.ply", "high.ply", "--thickness", "1,0.5"];
+    let near = |more: &[&str]| folder.run(args.iter().chain(more));
+    let answer = near(&["--distance", "0.5", "--json"]).json();
+    assert_eq!(answer["bodies"][0]["thickness"], 0.0);
+    assert_eq!(answer["bodies"][1]["thickness"], 0.5);
+    let text = near(&["--distance", "0.5"]).printed();
+    assert!(text.contains(" within 0.5 and the thickness ("), "{text}");
+    let last = "\nbetween 2 meshes, thickness 0.5 of body 1, 0 vertices welded, ";
+    assert!(text.contains(last), "{text}");
+    let text = near(&["--distance", "0"]).printed();
+    assert!(
+        text.contains(": no pairs of elements within the thickness\n"),
+        "{text}"
+    );
+    let twice = near(&["--distance", "1", "--thickness", "1,0"]).misuse();
+    assert!(twice.contains("--thickness names body 1 twice"), "{twice}");
+    let safe = [
+        "safe",
+        "low.ply",
+        "high.ply",
+        "--most",
+        "1",
+        "--thickness",
+        "1,0.5",
+    ];
+    let answer = folder.run(safe.iter().chain(&["--json"])).json();
+    assert_eq!(answer["bodies"][1]["thickness"], 0.5);
+    let text = folder.run(safe).printed();
+    assert!(text.contains(", thickness 0.5 of body 1, "), "{text}");
     assert!(misuse("2,1").contains("--thickness names body 2"));
     assert!(misuse("0,-1").contains("not below 0"));
     assert!(misuse("1").contains("a body's number and a length"));

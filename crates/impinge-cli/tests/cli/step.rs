@@ -596,7 +596,9 @@ fn a_thickness_is_kept() {
         for key in ["hash", "earliest", "impacts", "start_intersects"] {
             assert_eq!(answer[key], kept[key], "{more:?}");
         }
+        assert_eq!(answer["bodies"][0]["thickness"], 0.03125);
     }
+    assert_eq!(kept["bodies"][0]["thickness"], 0.0);
     let printed = |more: &[&str]| step(more).printed().to_owned();
     let said = printed(&["--thickness", "0,0.0625"]);
     assert!(
@@ -608,6 +610,7 @@ fn a_thickness_is_kept() {
         said.contains(" come within 0.5 and the thickness "),
         "{said}"
     );
+    assert!(said.contains(", thickness 0.0625 of body 0, "), "{said}");
     let boxes = |more: &[&str]| {
         let args = ["--no-self", "--json", "--candidates", "boxes.csv"];
         step(&[&args[..], more].concat()).json()["hash"].clone()

@@ -6,7 +6,7 @@ use impinge::{Advance, Error, Impact, Impacts, PairKind, Stats, Truncation};
 use impinge_io::printable;
 
 use crate::args::StepHow;
-use crate::asked::Asked;
+use crate::asked::{Asked, kept};
 use crate::detection::{Times, hit};
 use crate::text::{self, counted, grouped, hex};
 use crate::{output, report};
@@ -151,16 +151,7 @@ impl<'a> Found<'a> {
             clearance,
             ..
         } = *how;
-        let is_thick = bodies
-            .scene
-            .bodies()
-            .any(|(_, body)| body.thickness() > 0.0);
-        let kept = match (separation > 0.0, is_thick) {
-            (false, false) => None,
-            (true, false) => Some(separation.to_string()),
-            (true, true) => Some(format!("{separation} and the thickness")),
-            (false, true) => Some("the thickness".to_owned()),
-        };
+        let kept = kept(&bodies.scene, separation);
         let besides = kept.as_ref().map(|kept| format!(" besides {kept}"));
         let besides = besides.unwrap_or_default();
         let name = |body: impinge::BodyId| printable(&bodies.names[body.index()][0]);
@@ -255,7 +246,7 @@ pub fn described(bodies: &Moving) -> Result<Vec<report::MovingBody>, Error> {
     let all = bodies.ids.iter().zip(&bodies.names).zip(&bodies.vertices);
     all.map(|((&id, [start, end]), vertices)| {
         Ok(report::MovingBody {
-            body: report::Body::new(&bodies.scene, id, start, vertices)?,
+            body: report::ThickBody::new(&bodies.scene, id, start, vertices)?,
             end: end.clone(),
         })
     })
