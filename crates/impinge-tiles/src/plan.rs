@@ -410,6 +410,16 @@ impl File {
         self.n_primitives.div_ceil(chunk) as usize
     }
 
+    /// The first of its files that is there and has changed since the plan was made.
+    pub(crate) fn changed(&self) -> Option<&Path> {
+        let paths = std::iter::once(&self.path).chain(&self.end);
+        let mut paths = paths.zip(&self.fingerprints);
+        let (path, _) = paths.find(|(path, expected)| {
+            source::fingerprint(path).is_ok_and(|found| found != **expected)
+        })?;
+        Some(path)
+    }
+
     /// Opens the file, if it has not changed since the plan was made. `weld` welds the vertices of
     /// a body of a step.
     pub(crate) fn open(&self, weld: bool) -> Result<Box<dyn Source>, Error> {

@@ -83,6 +83,11 @@ impl Plan {
             scattered.n_kept += n_kept;
             done.fetch_add(n_kept, Ordering::Relaxed);
             let Some(&(_, Unit { file, .. })) = todo.first() else {
+                // Parts may outlive their file, but are not those of another one.
+                if let Some(path) = self.files[units[0].1.file].changed() {
+                    let path = path.to_owned();
+                    return Err(Error::Changed { path });
+                }
                 continue;
             };
             let source = self.files[file].open(self.weld)?;

@@ -230,6 +230,14 @@ fn a_mesh_that_changes_is_noticed() {
     let plan = case.plan(20).unwrap();
     flip_last_byte(&case.files[0]);
     assert!(matches!(scatter(&plan), Err(Error::Changed { .. })));
+    // Parts that are there are those of the file as it was.
+    flip_last_byte(&case.files[0]);
+    scatter(&plan).unwrap();
+    flip_last_byte(&case.files[0]);
+    assert!(matches!(scatter(&plan), Err(Error::Changed { .. })));
+    // They may outlive it.
+    std::fs::remove_file(&case.files[0]).unwrap();
+    scatter(&plan).unwrap();
 }
 
 /// Returns NaN although the plan saw numbers.
