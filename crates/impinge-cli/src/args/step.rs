@@ -139,11 +139,11 @@ pub struct StepHow {
     #[arg(long, value_parser = start(), value_name = "RULE", default_value_t = Start::Verify)]
     pub start: Start,
     /// The distance that elements must keep: report the first time at which they are as near as
-    /// that
+    /// that; with a thickness the sum of both is rounded up
     #[arg(long, value_name = "D", default_value = "0", allow_negative_numbers = true, value_parser = distance)]
     pub separation: f64,
     /// What the step leaves: every pair keeps C, but of pairs that are near at the start a fifth of
-    /// their distance; report the first time at which one is as near as that
+    /// their distance, rounded up to 24 bits; report the first time at which one is as near as that
     #[arg(long, value_name = "C", default_value = "0", allow_negative_numbers = true, value_parser = distance)]
     pub clearance: f64,
     #[command(flatten)]
