@@ -9,6 +9,7 @@ mod common;
 mod filters;
 #[cfg(feature = "gpu")]
 mod kept;
+#[cfg(feature = "gpu")]
 mod left_out;
 #[cfg(feature = "gpu")]
 mod liars;
@@ -26,6 +27,7 @@ mod resident_steps;
 mod safe;
 #[cfg(feature = "gpu")]
 mod stages;
+#[cfg(feature = "gpu")]
 mod steps;
 #[cfg(feature = "gpu")]
 mod submissions;
