@@ -133,8 +133,8 @@ pub struct LaneBounds {
 }
 
 impl LaneBounds {
-    /// Boxes that reach less far, on all sides, which may be beyond each other afterwards. Against
-    /// others: what is at most the other end is so with both rounded.
+    /// Boxes that reach less far, on all sides. Low ends may pass high ends. Where `low + by` is at
+    /// most another end, it is so rounded, too: that end is a float.
     #[inline(always)]
     pub fn deflated(&self, by: f32) -> LaneBounds {
         LaneBounds {

@@ -340,7 +340,7 @@ fn refuse_thickness(scene: &Scene) -> Result<(), Error> {
         None => Ok(()),
         Some((id, body)) => Err(Error::Setting {
             setting: "thickness",
-            given: format!("{} of body {id}", body.thickness()),
+            given: format!("{} of body {id}", shown(body.thickness())),
             allowed: "from 0 to 2^100 where it stays on a device",
         }),
     }

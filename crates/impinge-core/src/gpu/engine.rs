@@ -87,8 +87,6 @@ pub struct Lane {
     pub(super) pass_buffers: PassBuffers,
     pub(super) launcher: Launcher,
     pub(super) collector: Collector,
-    /// By how much the boxes of its last pass are widened, the bits of an f32.
-    pub(super) reach: u32,
     /// Whether the last pass was encoded for the caller, who has its results on the device.
     pub(super) is_encoded: bool,
     /// The last pass.
@@ -106,7 +104,6 @@ impl Lane {
             pass_buffers: PassBuffers::new(),
             launcher: Launcher::default(),
             collector: Collector::default(),
-            reach: 0,
             is_encoded: false,
             recording: Recording::default(),
             ran: Vec::new(),
@@ -306,11 +303,16 @@ impl Engine {
             return Ok(false);
         }
         self.send(job, clusterings, stats).await?;
+        let gpu = Arc::clone(&self.gpu);
+        let scopes = Scopes::open(&gpu.device);
         let sent = self.send_rules(job.plan);
         let sent = sent.and_then(|()| self.ask_kept(job.scene, job.plan));
-        if let Err(Error::Gpu { .. }) = sent {
+        let closed = scopes.close();
+        closed.await?;
+        match sent {
             // They are more than the device can bind.
-            return Ok(false);
+            Err(Error::Gpu { .. }) => return Ok(false),
+            sent => sent?,
         }
         stats.add_ms("upload", start.elapsed().as_secs_f64() * 1e3);
         let work = Vec::from_iter(self.whole(job.plan));
@@ -533,7 +535,7 @@ impl Engine {
     pub(super) fn budget_for_buffers(&self) -> Option<u64> {
         let other = self.other.pass_buffers.bytes();
         let own = &self.lane.pass_buffers;
-        let fixed = self.world.bytes() + other + own.bytes_of_cells() + own.rules.bytes();
+        let fixed = self.world.bytes() + other + own.bytes_of_cells() + own.bytes_of_elements();
         let budget = self.settings.memory_budget;
         budget.map(|budget| budget.saturating_sub(fixed))
     }
@@ -568,8 +570,9 @@ impl Engine {
             return Ok(wanted);
         };
         let other = self.other.pass_buffers.bytes();
-        let rules = self.lane.pass_buffers.rules.bytes();
-        let fixed = self.world.bytes() + other + rules + cells.map_or(0, |cells| cells.bytes());
+        let of_elements = self.lane.pass_buffers.bytes_of_elements();
+        let cells = cells.map_or(0, |cells| cells.bytes());
+        let fixed = self.world.bytes() + other + of_elements + cells;
         for wanted in [wanted, held.max(Capacities::LEAST)] {
             if fixed + wanted.bytes() <= budget {
                 return Ok(wanted);

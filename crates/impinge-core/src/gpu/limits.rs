@@ -18,7 +18,7 @@ use crate::scene::ids::BodyId;
 pub(crate) const MOST_KEPT: f64 = (1u128 << 100) as f64;
 
 impl Engine {
-    /// Asks whether elements keep what a step says, if it says anything.
+    /// Asks whether elements keep the separation of a step and their thickness, if there is either.
     ///
     /// # Errors
     /// More than the device can bind at once.

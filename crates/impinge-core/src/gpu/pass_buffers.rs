@@ -367,10 +367,13 @@ impl PassBuffers {
     pub fn bytes(&self) -> u64 {
         self.sizes
             .map_or(0, |(wanted, cells)| wanted.bytes() + cells.bytes())
-            + self.limits.bytes()
-            + self.thickness.bytes()
-            + self.shares.bytes()
-            + self.rules.bytes()
+            + self.bytes_of_elements()
+    }
+
+    /// Bytes of what is known of each vertex, and of what is left out.
+    pub fn bytes_of_elements(&self) -> u64 {
+        let of_vertices = self.limits.bytes() + self.thickness.bytes() + self.shares.bytes();
+        of_vertices + self.rules.bytes()
     }
 }
 

@@ -304,11 +304,7 @@ impl Engine {
         self.lane.pass_buffers.resize(&self.gpu, &capacities, cells);
         let leaves_out = self.has_rules(plan);
         let asks = self.asks;
-        if self.lane.reach != asks.reach {
-            // Boxes that were widened by another length do not fit.
-            self.world.has_other_boxes(self.lane.motion);
-            self.lane.reach = asks.reach;
-        }
+        self.world.widen(asks.reach);
         let mut recording = Recording::default();
         // The caller's step begins with nothing known.
         let sought = (!self.lane.is_encoded).then_some(self.sought);

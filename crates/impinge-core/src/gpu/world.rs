@@ -151,6 +151,8 @@ pub struct DeviceWorld {
     n_vertices: u64,
     n_ends: u64,
     encoded: Encoded,
+    /// By how much boxes are widened, the bits of an f32.
+    reach: u32,
     /// The nodes on the device, without their boxes.
     pub(super) trees: Trees,
     pub(super) views: [Option<View>; 2],
@@ -221,6 +223,7 @@ impl DeviceWorld {
             n_vertices: 0,
             n_ends: 1,
             encoded: Encoded::default(),
+            reach: 0,
             trees: Trees::default(),
             views: [None, None],
             has_solids: false,
@@ -275,9 +278,13 @@ impl DeviceWorld {
         }
     }
 
-    /// Says that the boxes that a view sees do not fit what is asked.
-    pub(super) fn has_other_boxes(&mut self, motion: Motion) {
-        self.view_mut(motion).is_moved = true;
+    /// Says by how much boxes are to be widened, the bits of an f32. Views share nodes, so those that
+    /// another question has widened otherwise fit none of them.
+    pub(super) fn widen(&mut self, reach: u32) {
+        if self.reach != reach {
+            self.is_moved();
+            self.reach = reach;
+        }
     }
 
     /// How many parts are on the device.

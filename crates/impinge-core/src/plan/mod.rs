@@ -192,6 +192,9 @@ pub struct Plan {
     pub since: Instant,
 }
 
+/// The least share that is not 0.
+const LEAST_SHARE: f64 = f64::from_bits(1);
+
 impl Plan {
     /// The question which elements intersect. Positions that were written in place are not checked
     /// yet.
@@ -248,15 +251,13 @@ impl Plan {
         with_close: bool,
         limits: Limits,
     ) -> Result<Self, Error> {
-        let keep = query.keep();
-        let keep = Keep {
-            is_rounded: true,
-            // Who names a clearance computes positions, also with a share of 0.
-            share: keep.share.max(f64::from_bits(1)),
-            ..keep
-        };
-        let has_clearance = !keep.is_plain();
-        let keep = if has_clearance { keep } else { query.keep() };
+        let mut keep = query.keep();
+        let has_clearance = keep.clearance > 0.0;
+        if has_clearance {
+            keep.is_rounded = true;
+            // What rounding takes is kept with a share of 0, too.
+            keep.share = keep.share.max(LEAST_SHARE);
+        }
         let mut plan = Plan::of_step(scene, query, keep, Goal::Earliest, limits)?;
         // With a clearance, a time in single precision is as good, and decided by filters.
         plan.precision = if has_clearance {

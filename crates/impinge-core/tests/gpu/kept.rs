@@ -163,6 +163,43 @@ fn steps_whose_elements_keep_a_distance_are_answered_alike() {
     assert!(totals[0] > 3000, "{totals:?}");
 }
 
+/// Frames and steps share nodes: boxes that one has widened are not those of the other.
+#[test]
+fn frames_between_steps_that_keep_a_distance_change_nothing() {
+    let caller = Caller::new();
+    let mut device = caller.detector(Settings::default());
+    let mut scene = Scene::new();
+    let low = surfaces::cloth(20, 20, 1.0);
+    low.add_to(&mut scene).expect("good");
+    let high = low.mapped(|[x, y, z]| [x, y, z + 0.1]);
+    let body = high.add_to(&mut scene).expect("good");
+    let end = high.mapped(|[x, y, z]| [x, y, z + 1.0]);
+    scene.set_end_positions(body, &end.positions).expect("good");
+    let kept = Query::all().separation(0.15);
+    let mut cpu = Detector::new(Backend::Cpu).expect("settings");
+    let mut expected = |query: &Query| cpu.impacts(&scene, query).expect("good").hash();
+    let of_kept = (expected(&kept), expected(&Query::all()));
+    for round in 0..3 {
+        assert!(!device.any(&scene, &Query::all()).expect("good"));
+        let (found, pairs, _) = listed(&caller, &mut device, &scene, &kept, [&[], &[]]);
+        assert_kept("after a frame", (&scene, &kept, 0.15), (&found, &pairs));
+        assert!(!device.any(&scene, &Query::all()).expect("good"));
+        for query in [&kept, &Query::all(), &kept] {
+            let impacts = device.impacts(&scene, query).expect("good");
+            assert_ne!(impacts.stats().backend, "cpu");
+            let is_kept = *query == kept;
+            let expected = if is_kept { of_kept.0 } else { of_kept.1 };
+            assert_eq!(impacts.hash(), expected, "{round} {is_kept}");
+        }
+        assert!(!device.any(&scene, &Query::all()).expect("good"));
+        assert_eq!(
+            device.impacts(&scene, &kept).expect("good").hash(),
+            of_kept.0
+        );
+        assert!(!device.is_free(&scene, &kept).expect("good"));
+    }
+}
+
 #[test]
 fn distances_near_the_limits_of_numbers_are_kept() {
     let caller = Caller::new();

@@ -454,7 +454,7 @@ fn what_does_not_fit_is_refused_by_name() {
     assert!(error.contains("rings: 17"), "{error}");
     let apart = step.clone().separation(1e31);
     let error = refused(&apart, &[], &[]);
-    assert!(error.contains(&format!("separation: {}", 1e31)), "{error}");
+    assert!(error.contains("separation: 1e31"), "{error}");
     let cell = Query::all().owned_by([0.0; 3], [1.0; 3]);
     let error = refused(&cell, &[], &[]);
     assert!(error.contains("owned_by"), "{error}");
@@ -464,10 +464,7 @@ fn what_does_not_fit_is_refused_by_name() {
     let mut device = detector.gpu().expect("a device");
     let refused = device.encode_step(&thick, &step, &[], &[], &mut encoder);
     let error = refused.expect_err("refused").to_string();
-    assert!(
-        error.contains(&format!("thickness: {} of body", 1e31)),
-        "{error}"
-    );
+    assert!(error.contains("thickness: 1e31 of body"), "{error}");
     let none = &mut encoder;
     let twice = [(body, &good), (body, &good)];
     let refused = [

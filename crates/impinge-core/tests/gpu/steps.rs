@@ -826,7 +826,11 @@ fn damaged_kernels_are_noticed() {
             "return !any(a_first | b_first);",
             "return !any(a_first | b_first | (a.start.high < b.start.low));",
         ),
-        ("traversal_moving", "return part_a == EDGES ||", "return"),
+        (
+            "traversal_moving",
+            "(part_a == EDGES && is_kind_asked(KIND_EDGE_EDGE, true))",
+            "false",
+        ),
         (
             "traversal_moving",
             "|| is_ignored(min(body_a, body_b), max(body_a, body_b))",

@@ -333,6 +333,7 @@ fn farther_than_meeting(world: StepWorld<'_>, item: &WorkItem, between: Between)
     if between.kind != PairKind::EdgeFace || plan.question != Question::Nearness {
         return 0.0;
     }
+    // Not above the exact difference: two operations, each corrected by a step down.
     let inflation = plan.inflation(between.a) + plan.inflation(between.b);
     let farther = round_down((inflation.next_down() - margin(world)).next_down());
     let [Aabb { min, max }, _] = world.cache(item.a).ends(item.cluster_a);
@@ -372,10 +373,11 @@ fn cull<S: Simd>(
     let boxes = sides.map(|(part, cluster)| world.cache(part).ends(cluster));
     let is_deflated = farther > 0.0;
     let deflated = |ends: &[Aabb; 2]| ends.each_ref().map(|held| held.deflated(farther));
-    if !is_own && !meet(&boxes[0], &boxes[1]) {
-        return None;
-    }
-    if is_deflated && !meet(&deflated(&boxes[0]), &boxes[1]) {
+    let mine = match is_deflated {
+        true => deflated(&boxes[0]),
+        false => boxes[0],
+    };
+    if !is_own && !meet(&mine, &boxes[1]) {
         return None;
     }
     let wanted = match lower {

@@ -11,7 +11,8 @@
 // direction, is so at any time between:
 //
 //   find   directions across which the elements are apart now, as for safe distances
-//   go on  for each: to about the time when the first corner comes too near along it, if a bound holds for it now and then
+//   guess  for each along which a bound holds now: about the time when the first corner comes too near
+//   check  whether a bound holds then, too, or at a time between
 //   again  from the latest of these times; until nothing is gained, or to the end: dropped
 
 const N_DIRECTIONS: u32 = 5u;
@@ -31,23 +32,30 @@ const GOES: f32 = 0.998;
 @group(0) @binding(5) var<storage, read_write> times: array<PairTimes>;
 @group(0) @binding(6) var<storage, read_write> counters: array<atomic<u32>>;
 
-// Left in memory: a compiler that computed a direction twice might round it in two ways.
+// Left in memory: a compiler that computed a direction or a guess twice might round it in two ways.
 var<workgroup> directions: array<vec3<f32>, 64u * N_DIRECTIONS>;
-
-fn corner(d: Four, k: u32) -> vec3<f32> {
-    return vec3<f32>(d.x[k], d.y[k], d.z[k]);
-}
+var<workgroup> guesses: array<u32, 64u * N_DIRECTIONS>;
 
 // Directions across which the elements may be apart at a time, towards the polygon. However wrong they are, bounds hold.
 fn find(pair: ptr<function, Pair>, time: u32, lane: u32) {
     let points = at((*pair).polygon.corners, time);
     let edges = at((*pair).polygon.edges, time);
     let first = lane * N_DIRECTIONS;
-    for (var k = 0u; k < 4u; k++) {
-        directions[first + k] = scaled(towards(corner(points, k), corner(edges, k)));
-    }
-    let across = scaled(cross3(corner(edges, 0u), corner(edges, 1u)));
-    directions[first + 4u] = select(across, -across, dot3(across, corner(points, 0u)) < 0.0);
+    let p = vec3<f32>(points.x.x, points.y.x, points.z.x);
+    let d = vec3<f32>(edges.x.x, edges.y.x, edges.z.x);
+    let e = vec3<f32>(edges.x.y, edges.y.y, edges.z.y);
+    directions[first] = scaled(towards(p, d));
+    directions[first + 1u] = scaled(towards(vec3<f32>(points.x.y, points.y.y, points.z.y), e));
+    directions[first + 2u] = scaled(towards(
+        vec3<f32>(points.x.z, points.y.z, points.z.z),
+        vec3<f32>(edges.x.z, edges.y.z, edges.z.z),
+    ));
+    directions[first + 3u] = scaled(towards(
+        vec3<f32>(points.x.w, points.y.w, points.z.w),
+        vec3<f32>(edges.x.w, edges.y.w, edges.z.w),
+    ));
+    let across = scaled(cross3(d, e));
+    directions[first + 4u] = select(across, -across, dot3(across, p) < 0.0);
 }
 
 // A number below the least of n . V over all corners at a time.
@@ -76,14 +84,19 @@ fn ticks_until(n: vec3<f32>, pair: ptr<function, Pair>, time: u32, gone: f32) ->
     return select(min(u32(f32(rest) * clamp(share, 0.0, 1.0)), rest), rest, share >= 1.0);
 }
 
-// Until when two elements certainly keep their distance along a direction, from a time on.
-fn free_until(n: vec3<f32>, pair: ptr<function, Pair>, time: u32, a: vec4<u32>, b: vec4<u32>) -> u32 {
+// A guess until when two elements keep their distance along a direction: later than a time only if they certainly do at that time.
+fn guess(n: vec3<f32>, pair: ptr<function, Pair>, time: u32, a: vec4<u32>, b: vec4<u32>) -> u32 {
     let left = left_at(n, pair, time, a, b);
     if left == 0.0 {
         return time;
     }
-    var length = ticks_until(n, pair, time, GOES * left * (*pair).sizes.scale * sqrt(dot3(n, n)));
-    for (var n_tries = 0u; n_tries < N_TRIES; n_tries++) {
+    return time + ticks_until(n, pair, time, GOES * left * (*pair).sizes.scale * sqrt(dot3(n, n)));
+}
+
+// Until when two elements certainly keep their distance along a direction, from a time on, by a guess.
+fn free_until(n: vec3<f32>, pair: ptr<function, Pair>, time: u32, guessed: u32, a: vec4<u32>, b: vec4<u32>) -> u32 {
+    var length = guessed - time;
+    for (var n_tries = 0u; n_tries < N_TRIES && length > 0u; n_tries++) {
         if left_at(n, pair, time + length, a, b) > 0.0 {
             return time + length;
         }
@@ -113,15 +126,22 @@ fn main(
     let b = corners[candidate.b & ~FLAG];
     var goes_on = is_left && pair.sizes.are_in_range;
     var time = 0u;
+    let first = lane * N_DIRECTIONS;
     for (var round = 0u; round < N_ROUNDS; round++) {
         if goes_on {
             find(&pair, time, lane);
         }
         workgroupBarrier();
         if goes_on {
+            for (var k = first; k < first + N_DIRECTIONS; k++) {
+                guesses[k] = guess(directions[k], &pair, time, a, b);
+            }
+        }
+        workgroupBarrier();
+        if goes_on {
             var latest = time;
-            for (var k = 0u; k < N_DIRECTIONS; k++) {
-                latest = max(latest, free_until(directions[lane * N_DIRECTIONS + k], &pair, time, a, b));
+            for (var k = first; k < first + N_DIRECTIONS; k++) {
+                latest = max(latest, free_until(directions[k], &pair, time, guesses[k], a, b));
             }
             is_left = latest < TICKS;
             goes_on = is_left && latest - time > SHORTEST_GAIN;

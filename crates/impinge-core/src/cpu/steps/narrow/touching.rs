@@ -162,11 +162,15 @@ impl FirstContacts {
         let (most_kept, _) = world.plan.most_kept(between.a, between.b);
         if most_kept > 0.0 {
             for (slots, free_until, _) in pairs {
+                if world.known.is_cancelled() {
+                    return;
+                }
                 if free_until <= self.until(world) {
                     self.decide_kept(world, between, slots);
+                    self.decide_if_full(isa, world);
                 }
             }
-            return self.decide_if_full(isa, world);
+            return;
         }
         if !matches!(between.kind, PairKind::VertexFace | PairKind::EdgeEdge) {
             if let Some(pair) = exact_pair(between.kind) {

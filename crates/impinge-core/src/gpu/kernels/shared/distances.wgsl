@@ -38,8 +38,10 @@ fn towards(corner: vec3<f32>, edge: vec3<f32>) -> vec3<f32> {
     return nearest - (dot3(nearest, edge) / square) * edge;
 }
 
-// A number below a height divided by the length of a direction: checked by products.
-fn quotient(height: f32, n: vec3<f32>) -> f32 {
+// A number below a height divided by the length of a direction: checked by products. If the height is computed once more, it may be another
+// one: also a number below, but perhaps negative.
+fn quotient(low: f32, n: vec3<f32>) -> f32 {
+    let height = max(low, 0.0);
     if height < LOWEST {
         return 0.0;
     }

@@ -112,10 +112,11 @@ struct Params {
     tile_side: u32,
     // Steps: 1 when pairs are named by global numbers, 0 when by slots.
     by_number: u32,
-    // Steps: which contacts are sought; and which kinds of pairs, as bits (bit 31: they are named), or 0 for those that cover every body.
+    // Steps: which contacts are sought.
     sought: u32,
+    // Steps: the kinds of pairs that the query names, as bits, with bit 31; 0 if it names none.
     kinds: u32,
-    // Safe distances: how far boxes are widened (bits of an f32).
+    // Steps that keep a distance, and safe distances: how far boxes are widened (bits of an f32).
     reach: u32,
     // Last kernels of what stays on the device: the room of all buffers before the lists (that of candidates is `capacity`), of pairs,
     // and of pairs that a step searches (0 in a frame).
