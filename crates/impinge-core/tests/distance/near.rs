@@ -800,14 +800,19 @@ fn bad_distances_are_refused_by_name() {
     assert!(scene.set_thickness(gone, 1.0).is_err());
     let query = Query::all();
     for mut detector in detectors() {
-        for bad in [-1.0, f64::NAN, f64::INFINITY, -f64::MIN_POSITIVE] {
+        for (bad, shown) in [
+            (-1.0, "-1"),
+            (f64::NAN, "NaN"),
+            (f64::INFINITY, "inf"),
+            (-f64::MIN_POSITIVE, "-2.2250738585072014e-308"),
+        ] {
             let near = detector.near(&scene, bad, &query).map(|_| ());
             let thick = scene.set_thickness(body, bad);
             for (refused, name) in [(near, "distance"), (thick, "thickness")] {
                 let Err(Error::Setting { setting, given, .. }) = refused else {
                     panic!("{bad} was accepted");
                 };
-                assert_eq!((setting, given), (name, bad.to_string()));
+                assert_eq!((setting, &*given), (name, shown));
             }
         }
         let token = impinge_core::CancelToken::new();
