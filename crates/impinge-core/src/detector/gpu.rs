@@ -88,8 +88,8 @@ fn engine_of(
 }
 
 /// Has the device find the pairs of a step that may touch, and decides them on the CPU. Returns
-/// [`ByDevice::Not`] if there is no device, or if the CPU has to answer: steps with a clearance
-/// or a filter, steps that the device cannot hold, any step in a browser, which cannot
+/// [`ByDevice::Not`] if there is no device, or if the CPU has to answer: steps with a
+/// clearance or a filter, steps that the device cannot hold, any step in a browser, which cannot
 /// wait for a device here. With `Backend::Auto` the CPU takes over for good if the device fails.
 pub(super) fn find_in_step(
     engine: &mut Option<Engine>,

@@ -157,10 +157,7 @@ impl Gpu<'_> {
         ends: &[(BodyId, &wgpu::Buffer)],
         encoder: &mut wgpu::CommandEncoder,
     ) -> Result<ResidentStep, Error> {
-        refuse_unknown(
-            query,
-            (MOST_KEPT, "from 0 to 2^100 where it stays on a device"),
-        )?;
+        refuse_unknown(query, (MOST_KEPT, KEPT))?;
         refuse_thickness(scene)?;
         self.with_contacts(scene, query, starts, |engine, job, clusterings| {
             engine.encode_step(job, clusterings, [starts, ends], encoder)
@@ -210,7 +207,7 @@ impl Gpu<'_> {
             return Err(Error::Setting {
                 setting: "most",
                 given: shown(most),
-                allowed: "from 0 to 2^100 where it stays on a device",
+                allowed: KEPT,
             });
         }
         refuse_unknown(query, (0.0, "0 for safe distances"))?;
@@ -334,6 +331,9 @@ fn on_device(gpu: &mut Option<Engine>) -> Result<&mut Engine, Error> {
     })
 }
 
+/// What a device can take of lengths: up to [`MOST_KEPT`].
+const KEPT: &str = "from 0 to 2^100 where it stays on a device";
+
 /// Refuses bodies that are thicker than a device can take.
 fn refuse_thickness(scene: &Scene) -> Result<(), Error> {
     match (scene.bodies()).find(|(_, body)| body.thickness() > MOST_KEPT) {
@@ -341,7 +341,7 @@ fn refuse_thickness(scene: &Scene) -> Result<(), Error> {
         Some((id, body)) => Err(Error::Setting {
             setting: "thickness",
             given: format!("{} of body {id}", shown(body.thickness())),
-            allowed: "from 0 to 2^100 where it stays on a device",
+            allowed: KEPT,
         }),
     }
 }

@@ -141,8 +141,8 @@ impl Detector {
     ///
     /// On a GPU the device finds the pairs that may touch, and the CPU finds their times, on all
     /// threads: the answer is the same to the last bit. The CPU answers alone if there is a
-    /// clearance or a filter, or if the device or the memory budget cannot hold the
-    /// step; in a browser it always does. [`Stats::backend`](crate::Stats::backend) says who
+    /// clearance or a filter, or if the device or the memory budget cannot hold the step; in a
+    /// browser it always does. [`Stats::backend`](crate::Stats::backend) says who
     /// answered.
     ///
     /// ```

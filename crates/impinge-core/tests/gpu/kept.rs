@@ -2,10 +2,8 @@
 //!
 //! These tests fail where no adapter is found; a software driver is enough.
 
-use std::collections::BTreeSet;
-
 use crate::caller::Caller;
-use crate::resident_steps::{Listed, listed, numbers};
+use crate::resident_steps::{Listed, listed, numbers, numbers_of};
 use crate::steps::{add_web, assert_alike, balls};
 
 use impinge_core::{
@@ -49,12 +47,8 @@ fn assert_kept(
     let largest = coordinates.fold(0.0f64, |most, x| most.max(x.abs()));
     let inflation =
         1.001 * inflation(scene, separation) + largest * 2f64.powi(-20) + 2f64.powi(-99);
-    let candidates = cpu.candidates(scene, inflation, &thin);
-    let candidates = candidates.expect(name);
-    let candidates = candidates
-        .iter()
-        .map(|(kind, a, b)| numbers(found, kind, [a, b].map(|at| (at.body, at.element))));
-    let candidates = BTreeSet::from_iter(candidates);
+    let candidates = cpu.candidates(scene, inflation, &thin).expect(name);
+    let candidates = numbers_of(found, &candidates);
     let are_candidates = pairs.keys().all(|pair| candidates.contains(pair));
     assert!(are_candidates, "{name}");
     [impacts.len(), pairs.len(), n_near]

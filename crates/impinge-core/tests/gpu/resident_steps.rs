@@ -7,8 +7,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use crate::caller::Caller;
 
 use impinge_core::{
-    Backend, BodyId, Detector, Error, Exclusion, PairKind, Part, Query, ResidentStep, Scene,
-    Settings, wgpu,
+    Backend, BodyId, Candidates, Detector, Element, Error, Exclusion, PairKind, Part, Query,
+    ResidentStep, Scene, Settings, wgpu,
 };
 use impinge_scenes::{Random, surfaces};
 
@@ -66,6 +66,14 @@ pub fn numbers(found: &ResidentStep, kind: PairKind, elements: [(BodyId, u32); 2
         *number = part.first + element;
     }
     numbers
+}
+
+/// The numbers of candidates in the list.
+pub fn numbers_of(found: &ResidentStep, candidates: &Candidates) -> BTreeSet<[u32; 2]> {
+    let of = |(kind, a, b): (PairKind, Element, Element)| {
+        numbers(found, kind, [a, b].map(|at| (at.body, at.element)))
+    };
+    candidates.iter().map(of).collect()
 }
 
 /// The kind of a pair in the list, as a shader finds it.
@@ -126,10 +134,7 @@ pub fn assert_between(
     );
     let asked = query.clone().kinds(KINDS);
     let candidates = cpu.candidates(truth, 0.0, &asked).expect(name);
-    let candidates = candidates
-        .iter()
-        .map(|(kind, a, b)| numbers(found, kind, [a, b].map(|at| (at.body, at.element))));
-    let candidates = BTreeSet::from_iter(candidates);
+    let candidates = numbers_of(found, &candidates);
     let are_candidates = pairs.keys().all(|pair| candidates.contains(pair));
     assert!(are_candidates, "{name}");
     let (n, n_candidates) = (pairs.len(), candidates.len());

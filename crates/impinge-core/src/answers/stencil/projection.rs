@@ -9,6 +9,7 @@ use std::array::from_fn;
 
 use crate::query::settings::InstructionSet;
 use crate::scene::error::Error;
+use crate::scene::positions::Real;
 use crate::simd::{Isa, Simd, with_isa};
 use crate::workers::in_parts::in_parts;
 
@@ -96,7 +97,9 @@ pub fn project_psd_all(matrices: &mut [f64], size: usize, threads: usize) -> Res
             allowed: "size x size numbers of each",
         });
     }
-    if let Some(at) = matrices.iter().position(|x| !x.is_finite()) {
+    if !f64::all_finite(matrices)
+        && let Some(at) = matrices.iter().position(|x| !x.is_finite())
+    {
         let (matrix, entry) = (at / (size * size), at % (size * size));
         return Err(Error::Setting {
             setting: "matrices",

@@ -68,9 +68,9 @@ fn height(n: vec3<f32>, pair: ptr<function, Pair>, time: u32) -> f32 {
 }
 
 // A number below what is left of the distance of two elements at a time, besides the one that they keep: 0 if nothing is certain.
-fn left_at(n: vec3<f32>, pair: ptr<function, Pair>, time: u32, a: vec4<u32>, b: vec4<u32>) -> f32 {
+fn left_at(n: vec3<f32>, pair: ptr<function, Pair>, time: u32, both: f32) -> f32 {
     let apart = max(0.0, quotient(height(n, pair, time), n) - (*pair).sizes.slack) * BELOW;
-    return besides_thickness(apart * scale_of((*pair).sizes.scale), a, b);
+    return besides_thickness(apart * scale_of((*pair).sizes.scale), both);
 }
 
 // About how long it takes from a time on until so much is gone along a direction, in ticks.
@@ -85,8 +85,8 @@ fn ticks_until(n: vec3<f32>, pair: ptr<function, Pair>, time: u32, gone: f32) ->
 }
 
 // A guess until when two elements keep their distance along a direction: later than a time only if they certainly do at that time.
-fn guess(n: vec3<f32>, pair: ptr<function, Pair>, time: u32, a: vec4<u32>, b: vec4<u32>) -> u32 {
-    let left = left_at(n, pair, time, a, b);
+fn guess(n: vec3<f32>, pair: ptr<function, Pair>, time: u32, both: f32) -> u32 {
+    let left = left_at(n, pair, time, both);
     if left == 0.0 {
         return time;
     }
@@ -94,10 +94,10 @@ fn guess(n: vec3<f32>, pair: ptr<function, Pair>, time: u32, a: vec4<u32>, b: ve
 }
 
 // Until when two elements certainly keep their distance along a direction, from a time on, by a guess.
-fn free_until(n: vec3<f32>, pair: ptr<function, Pair>, time: u32, guessed: u32, a: vec4<u32>, b: vec4<u32>) -> u32 {
+fn free_until(n: vec3<f32>, pair: ptr<function, Pair>, time: u32, guessed: u32, both: f32) -> u32 {
     var length = guessed - time;
     for (var n_tries = 0u; n_tries < N_TRIES && length > 0u; n_tries++) {
-        if left_at(n, pair, time + length, a, b) > 0.0 {
+        if left_at(n, pair, time + length, both) > 0.0 {
             return time + length;
         }
         length /= 2u;
@@ -122,8 +122,7 @@ fn main(
     if is_left {
         load_pair(candidate, &pair);
     }
-    let a = corners[candidate.a & ~FLAG];
-    let b = corners[candidate.b & ~FLAG];
+    let both = thickness_of_both(corners[candidate.a & ~FLAG], corners[candidate.b & ~FLAG]);
     var goes_on = is_left && pair.sizes.are_in_range;
     var time = 0u;
     let first = lane * N_DIRECTIONS;
@@ -134,14 +133,14 @@ fn main(
         workgroupBarrier();
         if goes_on {
             for (var k = first; k < first + N_DIRECTIONS; k++) {
-                guesses[k] = guess(directions[k], &pair, time, a, b);
+                guesses[k] = guess(directions[k], &pair, time, both);
             }
         }
         workgroupBarrier();
         if goes_on {
             var latest = time;
             for (var k = first; k < first + N_DIRECTIONS; k++) {
-                latest = max(latest, free_until(directions[k], &pair, time, guesses[k], a, b));
+                latest = max(latest, free_until(directions[k], &pair, time, guesses[k], both));
             }
             is_left = latest < TICKS;
             goes_on = is_left && latest - time > SHORTEST_GAIN;

@@ -160,7 +160,7 @@ fn main(
     }
     let a = corners[candidate.a & ~FLAG];
     let b = corners[candidate.b & ~FLAG];
-    distance = besides_thickness(distance, a, b);
+    distance = besides_thickness(distance, thickness_of_both(a, b));
     let a_moves = limits[a.x] != 0u;
     let b_moves = limits[b.x] != 0u;
     let share = select(distance, 0.5 * distance, a_moves && b_moves);

@@ -56,11 +56,18 @@ fn thickness_of(corner: vec4<u32>) -> f32 {
     return max(max(thickness[corner.x], thickness[corner.y]), thickness[corner.z]);
 }
 
+// A number that is at least how thick two elements are together; 0 where nothing is.
+fn thickness_of_both(a: vec4<u32>, b: vec4<u32>) -> f32 {
+    if arrayLength(&thickness) > 1u {
+        return (thickness_of(a) + thickness_of(b)) * (1.0 + OF_PRODUCT);
+    }
+    return 0.0;
+}
+
 // What is left of a distance besides the thickness of both elements, if there is any.
-fn besides_thickness(distance: f32, a: vec4<u32>, b: vec4<u32>) -> f32 {
+fn besides_thickness(distance: f32, both: f32) -> f32 {
     var besides = distance;
     if arrayLength(&thickness) > 1u {
-        let both = (thickness_of(a) + thickness_of(b)) * (1.0 + OF_PRODUCT);
         besides = max(0.0, distance - both) * BELOW;
     }
     return select(besides, 0.0, besides < SHORTEST);
