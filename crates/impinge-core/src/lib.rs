@@ -39,7 +39,7 @@ pub use answers::places::Place;
 pub use answers::reached::{StartOfBody, StepStart};
 pub use answers::safe::{Bounds, SafeDistances};
 pub use answers::stencil::{Gradient, Hessian, project_psd, project_psd_all};
-pub use answers::stencils::{Stencil, Stencils};
+pub use answers::stencils::{Stencil, StencilIter, Stencils};
 pub use answers::truncation::Truncation;
 #[cfg(feature = "gpu")]
 pub use detector::Gpu;

@@ -149,8 +149,8 @@ pub use impinge_core::{
     Impacts, InstructionSet, Mesh, Method, NearIter, NearPair, NearPairs, Neighbours, NewPositions,
     PairFilter, PairKind, PairKinds, Pairs, Part, Place, Positions, Precision, Progress, Query,
     RayHit, Real, Recluster, SafeDistances, Scene, Settings, SharedVertex, Stage, Start, Stats,
-    Stencil, Stencils, Thickness, Truncation, Weld, WrongNumber, hash_impact_rows, hash_rows,
-    project_psd, project_psd_all,
+    Stencil, StencilIter, Stencils, Thickness, Truncation, Weld, WrongNumber, hash_impact_rows,
+    hash_rows, project_psd, project_psd_all,
 };
 #[cfg(feature = "gpu")]
 pub use impinge_core::{

@@ -2,6 +2,8 @@
 
 use crate::scene::elements::Part;
 use crate::scene::words::words;
+use impinge_exact::internal::NearestOfElements;
+use impinge_exact::{ElementPair, Feature};
 
 /// The kinds of a pair's elements. A pair's `a` is the element that the kind names first. So a
 /// vertex and a face are always in this order, whatever their bodies.
@@ -42,6 +44,23 @@ impl PairKind {
             PairKind::EdgeFace => [Edges, Faces],
             PairKind::FaceFace => [Faces, Faces],
         }
+    }
+
+    /// ipc-toolkit's name of a pair of this kind with these features.
+    pub(crate) fn named(self, features: [Feature; 2]) -> &'static str {
+        let pair = match self {
+            PairKind::VertexFace => Some((ElementPair::VertexFace, false)),
+            PairKind::EdgeEdge => Some((ElementPair::EdgeEdge, false)),
+            // The edge is named first.
+            PairKind::EdgeVertex => Some((ElementPair::VertexEdge, true)),
+            PairKind::VertexVertex => Some((ElementPair::VertexVertex, false)),
+            PairKind::EdgeFace | PairKind::FaceFace => None,
+        };
+        let nearest = NearestOfElements {
+            features,
+            is_parallel: false,
+        };
+        nearest.name(pair)
     }
 
     /// The kind of a pair of elements of two parts.

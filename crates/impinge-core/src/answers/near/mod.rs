@@ -1,6 +1,7 @@
 //! The answer about pairs within a distance.
 
 mod labels;
+mod stencils;
 
 use std::iter;
 
@@ -85,24 +86,7 @@ impl NearPair {
     /// of vertices. Of an edge and a face, or of faces, the kinds of the features: `P_P`, `P_E`,
     /// `P_T`, `E_E`, and `E_T` where an edge passes through a face.
     pub fn name(&self) -> &'static str {
-        Self::named(self.kind, self.features)
-    }
-
-    /// The name of a pair of this kind with these features.
-    pub(crate) fn named(kind: PairKind, features: [Feature; 2]) -> &'static str {
-        let pair = match kind {
-            PairKind::VertexFace => Some((ElementPair::VertexFace, false)),
-            PairKind::EdgeEdge => Some((ElementPair::EdgeEdge, false)),
-            // The edge is named first.
-            PairKind::EdgeVertex => Some((ElementPair::VertexEdge, true)),
-            PairKind::VertexVertex => Some((ElementPair::VertexVertex, false)),
-            PairKind::EdgeFace | PairKind::FaceFace => None,
-        };
-        let nearest = NearestOfElements {
-            features,
-            is_parallel: false,
-        };
-        nearest.name(pair)
+        self.kind.named(self.features)
     }
 }
 
