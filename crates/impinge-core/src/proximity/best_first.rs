@@ -268,7 +268,8 @@ impl DistanceSearch<'_> {
             }
             let [a, b] = [0, 1].map(|side| corners(self.bodies[side], primitives[side]));
             let [n_a, n_b] = kinds.map(BodyKind::n_corners);
-            if apart_along_axes(&a[..n_a], &b[..n_b]) >= limit {
+            // Beyond the largest float, all are as far apart.
+            if limit < f64::INFINITY && apart_along_axes(&a[..n_a], &b[..n_b]) >= limit {
                 continue;
             }
             if let Some(distance) = exact_distance(kinds, [&a, &b], limit) {

@@ -510,3 +510,32 @@ fn touching_bodies_have_their_lowest_pair() {
         }
     }
 }
+
+/// A distance above the largest float is that, rounded down; of several, the lowest pair's.
+#[test]
+fn distances_above_the_largest_float() {
+    for x in [8e307, 9e307, 1e308, f64::MAX] {
+        let mut scene = Scene::new();
+        let points = [[x, 0.0, 0.0], [x, x, 0.0]];
+        let a = scene.add_points(&points).unwrap();
+        let b = scene
+            .add_points(&points.map(|point| point.map(|x| -x)))
+            .unwrap();
+        let mut detector = Detector::new(Backend::Cpu).unwrap();
+        let found = detector
+            .distance(&scene, a, b)
+            .unwrap()
+            .expect("a distance");
+        let (distance, pair) = match x {
+            8e307 => (1.6e308, [0, 0]),
+            _ => (f64::MAX, [0, 0]),
+        };
+        assert_eq!(
+            (found.distance, elements_of(&found)),
+            (distance, pair),
+            "{x}"
+        );
+        let nearest = detector.nearest(&scene, &Query::between_all()).unwrap();
+        assert_eq!(nearest, Some(found), "{x}");
+    }
+}

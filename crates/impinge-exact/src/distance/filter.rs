@@ -7,22 +7,93 @@ use crate::element_pair::ElementPair;
 use crate::filter::motion::{difference, dot};
 use crate::filter::nearness::{Polygon, are_beyond, beyond, most, stay_beyond};
 use crate::filter::number::Number;
-use crate::rounding::root;
+use crate::rounding::{power_of_two, root};
 
 /// Whether two elements are within a distance; `None` when unsure.
 ///
 /// No, if the whole difference polygon lies beyond a plane that is farther from the origin than the
 /// reach. Yes, if some point of the polygon is nearer than the reach.
 pub(super) fn answer(pair: ElementPair, points: &[Point; 4], reach: &Reach) -> Option<bool> {
-    let (yes, no) = Polygon::of_pair(pair, points).verdict(reach.low, reach.high);
+    let between = [reach.low, reach.high];
+    answer_in_range(pair, points, between).or_else(|| {
+        let scaled = Scaled::of([points])?;
+        answer_in_range(pair, &scaled.ends[0], scaled.lengths(between)?)
+    })
+}
+
+fn answer_in_range(pair: ElementPair, points: &[Point; 4], [low, high]: [f64; 2]) -> Option<bool> {
+    let (yes, no) = Polygon::of_pair(pair, points).verdict(low, high);
     if yes { Some(true) } else { no.then_some(false) }
 }
 
 /// Two numbers between which the distance of two elements certainly is; none where sizes are out of
 /// range.
 pub(super) fn bounds(pair: ElementPair, points: &[Point; 4]) -> Option<[f64; 2]> {
+    let bounds = bounds_in_range(pair, points);
+    if bounds.is_some_and(|[low, _]| low > 0.0) {
+        return bounds;
+    }
+    let of_scaled = || {
+        let scaled = Scaled::of([points])?;
+        scaled.lengths_back(bounds_in_range(pair, &scaled.ends[0])?)
+    };
+    of_scaled().or(bounds)
+}
+
+fn bounds_in_range(pair: ElementPair, points: &[Point; 4]) -> Option<[f64; 2]> {
     let (is_small, bounds) = Polygon::of_pair(pair, points).bounds();
     is_small.then_some(bounds)
+}
+
+/// Points of sizes that are out of range, all multiplied by one power of two, with which the
+/// largest coordinate is about 1: distances are multiplied by it too, and times are the same.
+struct Scaled<const N: usize> {
+    ends: [[Point; 4]; N],
+    factor: f64,
+}
+
+impl<const N: usize> Scaled<N> {
+    /// Sizes at which products of a few lengths are normal numbers.
+    const IN_RANGE: [f64; 2] = [power_of_two(-90), power_of_two(90)];
+
+    /// None where sizes are in range, or where a coordinate would lose bits.
+    fn of(ends: [&[Point; 4]; N]) -> Option<Self> {
+        let all = ends.iter().flat_map(|points| points.as_flattened());
+        let largest = all.fold(0.0, |most: f64, x| most.max(x.abs()));
+        let [least, most] = Self::IN_RANGE;
+        if largest == 0.0 || (least..=most).contains(&largest) {
+            return None;
+        }
+        let exponent = (largest.to_bits() >> 52) as i32 - 1023;
+        let factor = power_of_two((-exponent).clamp(-1022, 1022));
+        let mut scaled = Scaled {
+            ends: ends.map(|points| *points),
+            factor,
+        };
+        let mut all = scaled.ends.as_flattened_mut().as_flattened_mut().iter_mut();
+        all.all(|x| Self::multiply(x, factor)).then_some(scaled)
+    }
+
+    /// Whether the product is exact.
+    fn multiply(x: &mut f64, factor: f64) -> bool {
+        let before = *x;
+        *x *= factor;
+        *x / factor == before
+    }
+
+    /// Distances; none if one would lose bits.
+    fn lengths(&self, mut lengths: [f64; 2]) -> Option<[f64; 2]> {
+        let mut all = lengths.iter_mut();
+        all.all(|x| Self::multiply(x, self.factor))
+            .then_some(lengths)
+    }
+
+    /// The distances of points before they were multiplied.
+    fn lengths_back(&self, mut lengths: [f64; 2]) -> Option<[f64; 2]> {
+        let mut all = lengths.iter_mut();
+        all.all(|x| Self::multiply(x, 1.0 / self.factor))
+            .then_some(lengths)
+    }
 }
 
 /// When two moving elements are first within a distance, as far as plain floats can decide it.
@@ -60,6 +131,25 @@ pub fn approach(
     pair: ElementPair,
     start: &[Point; 4],
     end: &[Point; 4],
+    distance: f64,
+    until: f64,
+) -> Approach {
+    let found = approach_in_range(pair, [start, end], distance, until);
+    if found != Approach::Unsure {
+        return found;
+    }
+    let of_scaled = || {
+        let scaled = Scaled::of([start, end])?;
+        let [start, end] = &scaled.ends;
+        let [distance, _] = scaled.lengths([distance; 2])?;
+        Some(approach_in_range(pair, [start, end], distance, until))
+    };
+    of_scaled().unwrap_or(found)
+}
+
+fn approach_in_range(
+    pair: ElementPair,
+    [start, end]: [&[Point; 4]; 2],
     distance: f64,
     until: f64,
 ) -> Approach {

@@ -9,6 +9,7 @@ use crate::filter::{
     BATCH, Bounded16, Moving64, Near16, SWAPPED_PARTS, TABLE, are_within_in_tables,
     bounded_in_tables, nearest_in_tables, number, stay_beyond_in_tables, time_between,
 };
+use crate::rounding::power_of_two;
 use crate::sweep::tests::{KINDS, Kind, PAIRS, Random, step};
 use crate::{Contact, ElementPair, Point};
 
@@ -486,4 +487,36 @@ fn gaps_are_below_by_little_and_zero_where_elements_are_within() {
         n_small += usize::from(gap < 1e-14 * distance);
     }
     assert!(n_within > 500 && n_small > 100, "{n_within} {n_small}");
+}
+
+/// Sizes of which products over- or underflow are decided like others: in floats, not by exact
+/// arithmetic, which takes a thousand times as long.
+#[test]
+fn sizes_out_of_range_are_decided_in_floats() {
+    let mut random = Random(11);
+    let mut n_decided = 0;
+    for round in 0..400 {
+        let pair = PAIRS[round % PAIRS.len()];
+        let [start, end] =
+            [(); 2].map(|()| [(); 4].map(|()| [(); 3].map(|()| random.unit() - 0.5)));
+        let decided = |exponent: i32| {
+            let size = power_of_two(exponent);
+            let of = |points: &[Point; 4]| points.map(|point| point.map(|x| x * size));
+            let (start, end) = (of(&start), of(&end));
+            let approach = filter::approach(pair, &start, &end, 0.1 * size, 1.0);
+            let reach = Reach::from(0.3 * size);
+            let [low, high] = filter::bounds(pair, &start).unwrap_or([0.0; 2]);
+            (
+                std::mem::discriminant(&approach),
+                filter::answer(pair, &start, &reach),
+                low > 0.0 && high < low * (1.0 + 1e-9),
+            )
+        };
+        let expected = decided(0);
+        for exponent in [-1000, -800, -500, -230, 99, 101, 200, 340, 900, 1015] {
+            assert_eq!(decided(exponent), expected, "{pair:?} 2^{exponent}");
+        }
+        n_decided += usize::from(expected.1.is_some() && expected.2);
+    }
+    assert!(n_decided > 350, "{n_decided}");
 }
