@@ -214,14 +214,15 @@ pub(crate) struct StencilRow {
 
 impl StencilRow {
     /// With the points of its vertices, of all of a scene.
-    #[inline]
+    #[inline(always)]
     fn at(&self, points: &[Point]) -> Stencil {
+        let [a, b, c, d] = self.vertices.map(|vertex| vertex as usize);
         Stencil {
             kind: self.kind,
             features: self.features,
             vertices: self.vertices,
             weight: self.weight,
-            points: self.vertices.map(|vertex| points[vertex as usize]),
+            points: [points[a], points[b], points[c], points[d]],
             threshold: self.threshold,
         }
     }

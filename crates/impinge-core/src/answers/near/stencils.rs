@@ -275,7 +275,9 @@ impl Reader<'_> {
         let (a, b) = (parts.hold(a, numbers[0])?, parts.hold(b, numbers[1])?);
         let elements = [a.element(numbers[0]), b.element(numbers[1])];
         let corners = [a.corners(&elements[0]), b.corners(&elements[1])];
-        let vertices = slots.map(|(side, ix)| [a, b][side].offset + corners[side][ix]);
+        let vertex = |(side, ix): (usize, usize)| [a, b][side].offset + corners[side][ix];
+        let [i, j, k, l] = slots;
+        let vertices = [vertex(i), vertex(j), vertex(k), vertex(l)];
         let threshold = match (self.rest, kind) {
             (Some(rest), PairKind::EdgeEdge) => {
                 Mollifier::threshold(&vertices.map(|vertex| rest[vertex as usize]))
