@@ -53,7 +53,7 @@ export const QUESTIONS = {
   },
   distance: (a, b, control) => ({ question: 9, ...plain(Uint32Array.of(body(a), body(b)), control), shape: nearest }),
   contacts(pairs, control) {
-    instance(pairs, Pairs, "pairs: what detect() returned");
+    this[MOVES].mustHave("pairs", movesOf(instance(pairs, Pairs, "pairs: what detect() returned")));
     lastContacts = (lastContacts + 1) >>> 0;
     const number = lastContacts;
     const shape = (lists, stats) => new Contacts(lists, stats, { pairs, number });
@@ -98,7 +98,7 @@ export const QUESTIONS = {
   locate: (which, points, control) => ({ question: 19, ...aboutPoints(which, points, control), shape: integers }),
   signedDistance: (which, points, control) => ({ question: 20, ...aboutPoints(which, points, control), shape: signed }),
   windingNumbers: (which, points, control) => ({ question: 21, ...aboutPoints(which, points, control), shape: integers }),
-  nearest: (query) => ({ question: 18, ...packed({ which: "between", ...query }), shape: nearest }),
+  nearest: (query) => ({ question: 18, ...packed(query, 0, "between"), shape: nearest }),
 };
 
 // A question about a body and points.
@@ -119,14 +119,16 @@ export function settings(given) {
     word("method", method, ["auto", "clusters", "cells", "naive"]),
     word("recluster", recluster, ["auto", "never"]),
   ];
-  return [...words, limit("memoryBudget", memoryBudget), limit("maxPairs", maxPairs), limit("reuseMargin", reuseMargin)];
+  if (!(number("reuseMargin", reuseMargin) >= 0 && reuseMargin < Infinity)) {
+    refuse(`reuseMargin: ${reuseMargin} given, a finite number that is not below 0 allowed`);
+  }
+  return [...words, limit("memoryBudget", memoryBudget), limit("maxPairs", maxPairs), reuseMargin];
 }
 
 // A limit, or -1 for none.
 function limit(name, given) {
   if (given === undefined) return -1;
-  if (number(name, given) >= 0) return given;
-  return refuse(`${name}: ${given} given, a number that is not below 0 is needed`);
+  return given === Infinity ? given : whole(name, given, 0, Number.MAX_SAFE_INTEGER);
 }
 
 // A matrix, column by column.
@@ -200,8 +202,14 @@ class Moves {
     return { of: this, n: this.#n, numbered: this.#numbered };
   }
 
-  mustBe({ of, n }, bodies) {
-    if (of !== this) refuse("contacts: contacts of another scene given, those of this scene allowed");
+  // What was found in another scene says nothing about this one.
+  mustHave(what, { of }) {
+    if (of !== this) refuse(`${what}: ${what} of another scene given, those of this scene allowed`);
+  }
+
+  mustBe(then, bodies) {
+    this.mustHave("contacts", then);
+    const { n } = then;
     const moved = bodies.find((which) => this.#last.get(which) > n);
     if (moved !== undefined) refuse(`body ${moved}: this was found for other positions than it has now, so nothing is known of it; ask again`);
     const marked = bodies.find((which) => this.#marked.get(which) > n);

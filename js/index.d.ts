@@ -290,14 +290,14 @@ export interface Settings {
   /** Whether bodies are clustered again after they have flowed far: `"auto"` by default. */
   recluster?: "auto" | "never";
   /**
-   * Bytes that the detector may hold for a question, the answer included. It keeps memory for the next question of the same sort (pairs and
+   * Bytes that the detector may hold for a question, a whole number, the answer included. It keeps memory for the next question of the same sort (pairs and
    * steps, distances, points and rays, contacts), and the budget holds for each of these alone.
    */
   memoryBudget?: number;
-  /** The most pairs that an answer may have: with more, the question fails with the code `"too_many_pairs"`. */
+  /** The most pairs that an answer may have, a whole number: with more, the question fails with the code `"too_many_pairs"`. */
   maxPairs?: number;
   /**
-   * A distance, for solvers that ask again and again while little moves. If it is above 0, questions about near pairs list those within their
+   * A finite distance, for solvers that ask again and again while little moves. If it is above 0, questions about near pairs list those within their
    * distance and this margin, and look at no others until some vertex has moved farther than half of it, or anything but positions has
    * changed. The answers are the same.
    */
@@ -778,11 +778,11 @@ export declare class Detector {
   truncate(scene: Scene, query?: Query): Truncation;
   /** The pairs of `near` as lists per element: `"ef"` and vertices of no element are as said there. */
   neighbours(scene: Scene, distance: number, query?: Query): Neighbours;
-  /** The two bodies that are nearest to each other, and their nearest pair; `null` if there are no two. Of several at one distance, rounded down, the first, see `Scene.remove`: not always the nearest of them. */
+  /** The two bodies that are nearest to each other, and their nearest pair: of different bodies (`which: "between"`) unless the query names others, and self-collision, such as `of` has, is refused; `null` if there are no two. Of several at one distance, rounded down, the first, see `Scene.remove`: not always the nearest of them. */
   nearest(scene: Scene, query?: Query): Nearest | null;
   /** The smallest distance of two bodies; `null` if one of them has no elements. Tetrahedra are solid. Of several pairs at one distance, rounded down, the lowest: not always the nearest of them. */
   distance(scene: Scene, a: Body, b: Body, control?: Control): Nearest | null;
-  /** Where the triangles of pairs meet. The scene must not have changed since they were found. */
+  /** Where the triangles of pairs meet. The scene must be that of the pairs, others are refused, and must not have changed since they were found. */
   contacts(scene: Scene, pairs: Pairs, control?: Control): Contacts;
   /**
    * How deep two closed bodies are in each other, given contacts among which are all of theirs. Refuses bodies that have moved since the

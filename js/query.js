@@ -9,8 +9,9 @@ const FIELDS = [
   ...["clearanceShare", "precision", "distances", "closestPoints", "fixed", "hits", "nNearest", "most", "signal", "progress"],
 ];
 
-// The words and numbers of a query, and what watches the question. `length` is the question's own: a distance, an inflation.
-export function packed(query, length = 0) {
+// The words and numbers of a query, and what watches the question. `length` is the question's own: a distance, an inflation. `unsaid` is which
+// pairs are meant where the query names none.
+export function packed(query, length = 0, unsaid = "all") {
   const {
     which,
     between,
@@ -44,7 +45,7 @@ export function packed(query, length = 0) {
   const flags = (distances ? 1 : 0) | (closestPoints ? 2 : 0) | (ownedBy === undefined ? 0 : 4) | (word("hits", hits, ["first", "any", "all"]) << 3);
   const still = list("fixed", fixed);
   const n = whole("nNearest", nNearest, 1, 2 ** 32 - 1);
-  const words = [...bodies({ which, between, selfOf, of }), ...rules, bits(kinds), flags | (still.length << 5), n, ...still.map(body)];
+  const words = [...bodies({ which, between, selfOf, of }, unsaid), ...rules, bits(kinds), flags | (still.length << 5), n, ...still.map(body)];
   for (const of of list("exclude", exclude)) words.push(...excluded(of));
   number("most", most);
   const lengths = Object.entries({ separation, clearance, clearanceShare }).map((entry) => number(...entry));
@@ -118,10 +119,10 @@ export function plain(words, control) {
   return { words, numbers: new Float64Array(10), watch: new Watch(signal, progress) };
 }
 
-function bodies(given) {
+function bodies(given, unsaid) {
   const names = Object.keys(given).filter((name) => given[name] !== undefined);
   if (names.length > 1) refuse(`query: "${names[0]}" and "${names[1]}" given, one of them allowed`);
-  const { which = "all", between, selfOf, of } = given;
+  const { which = unsaid, between, selfOf, of } = given;
   if (between !== undefined) return [3, ...apart(two("between", between))];
   if (selfOf !== undefined) return [4, body(selfOf), 0];
   if (of !== undefined) return [5, body(of), 0];
@@ -187,6 +188,17 @@ class Watch {
     return this.#isStopped;
   }
 
+  // Calls `stopped` if the signal is aborted before the question's turn. Returns what says that its turn has come.
+  whileItWaits(stopped) {
+    const stop = () => {
+      this.#isStopped = true;
+      stopped();
+    };
+    if (this.#signal?.aborted) stop();
+    this.#signal?.addEventListener?.("abort", stop);
+    return () => this.#signal?.removeEventListener?.("abort", stop);
+  }
+
   // Watches a question, which gets a number for the module; 0 if nobody looks.
   during(ask) {
     const id = this.#begin();
@@ -207,7 +219,7 @@ class Watch {
   }
 
   #begin() {
-    if (this.#signal?.aborted) this.#stop();
+    if (this.#isStopped || this.#signal?.aborted) this.#stop();
     if (this.#signal === undefined && this.#progress === undefined) return 0;
     lastWatch = (lastWatch % 0xffff_ffff) + 1;
     watches.set(lastWatch, this);

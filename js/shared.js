@@ -179,10 +179,10 @@ export function mustBeNone(what, others, allowed) {
   if (unknown !== undefined) refuse(`${what}: "${unknown}" given, ${listed(allowed)} allowed`);
 }
 
-// The arrays of a mesh. One that was read has a name and a map.
+// The arrays of a mesh. One that was read has a name, a map and notes.
 export function meshOf(given) {
   if (given === null || typeof given !== "object") refuse(`mesh: ${kindOf(given)} given, an object with positions is needed`);
-  const { positions, faces, tetrahedra, edges, name: _name, map: _map, ...others } = given;
+  const { positions, faces, tetrahedra, edges, name: _name, map: _map, notes: _notes, ...others } = given;
   mustBeNone("mesh", others, ["positions", "faces", "tetrahedra", "edges"]);
   // Without elements, vertices are points: whoever names elements has forgotten them.
   const named = ["faces", "tetrahedra", "edges"].filter((name) => name in given);

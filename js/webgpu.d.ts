@@ -6,6 +6,11 @@ export default function init(module?: Module | Promise<Module>): Promise<void>;
 export { ImpingeError, KINDS, SHAPES, Scene, weld } from "./index.js";
 export type * from "./index.js";
 
+/** As those of `impinge`. The device has no `"naive"` method. */
+export interface DeviceSettings extends Settings {
+  method?: "auto" | "clusters" | "cells";
+}
+
 /**
  * A detector on the browser's WebGPU device. Nothing blocks: every question returns a promise, is about the scene as it is when it is
  * asked, and is answered in the order in which questions were asked. The device finds the pairs that intersect; all other
@@ -14,7 +19,7 @@ export type * from "./index.js";
 export declare class Detector {
   private constructor();
   /** Opens the device. Rejected with the code `"device"` if the browser offers none. */
-  static open(settings?: Settings): Promise<Detector>;
+  static open(settings?: DeviceSettings): Promise<Detector>;
   /** Of the last question that was answered, also after `dispose`; `null` before the first. */
   readonly stats: Stats | null;
   detect(scene: Scene, query?: Query): Promise<Pairs>;

@@ -25,6 +25,25 @@ const ON_DEVICE = {
   any: (pairs) => pairs.length > 0,
 };
 
+// A scene as it was when a question was asked. It is freed as soon as nothing needs it: questions that are given up may be many, and garbage is
+// collected late.
+class Copy {
+  constructor(held) {
+    this.held = held;
+  }
+
+  // The module's, which is freed by whoever takes it.
+  take() {
+    const { held } = this;
+    this.held = null;
+    return held;
+  }
+
+  free() {
+    this.take()?.free();
+  }
+}
+
 // The module cannot be entered while it awaits an answer, so later questions wait for their turn.
 export class Detector {
   #handle;
@@ -63,20 +82,22 @@ export class Detector {
     const held = handleOf(scene);
     const take = ON_DEVICE[question];
     const about = asked();
-    const now = call(() => held.snapshot());
+    const copy = new Copy(call(() => held.snapshot()));
+    const begins = about.watch.whileItWaits(() => copy.free());
     return this.#turn(async (handle) => {
-      if (handle === null) refuse("this detector has been disposed of");
-      if (take) {
-        const pairs = await detect(handle, now, about);
-        this.#stats = pairs.stats;
-        return take(pairs);
-      }
+      begins();
       try {
-        const { answer, stats } = ask(handle, now, about);
+        if (handle === null) refuse("this detector has been disposed of");
+        if (take) {
+          const pairs = await detect(handle, copy, about);
+          this.#stats = pairs.stats;
+          return take(pairs);
+        }
+        const { answer, stats } = ask(handle, copy.held, about);
         this.#stats = stats;
         return answer;
       } finally {
-        now.free();
+        copy.free();
       }
     });
   }
@@ -95,9 +116,9 @@ export class Detector {
 
 const awaited = (promise) => promise.catch((error) => Promise.reject(named(error)));
 
-// The module takes the scene over.
-async function detect(handle, scene, { words, numbers, watch, moves }) {
-  const lists = await watch.duringAsync((id) => awaited(handle.detect(scene, id, words, numbers)));
+// The module takes the copy over.
+async function detect(handle, copy, { words, numbers, watch, moves }) {
+  const lists = await watch.duringAsync((id) => awaited(handle.detect(copy.take(), id, words, numbers)));
   return new Pairs(lists, statsOf(handle.stats(true)), moves, { words, numbers });
 }
 

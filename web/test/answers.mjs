@@ -81,6 +81,49 @@ export async function webgpu(module, scenes, method) {
   return answers;
 }
 
+// How many copies of scenes the module holds: after a question is asked while another one is answered, once its signal is aborted, and after it was
+// refused.
+export async function copies() {
+  const { default: init, Detector, Scene } = await import("./node_modules/impinge/webgpu.js");
+  const { SceneHandle: { prototype } } = await import("./node_modules/impinge/gpu/impinge.js");
+  await init();
+  const held = new Set();
+  const { snapshot, __destroy_into_raw: destroy } = prototype;
+  prototype.snapshot = function () {
+    const copy = snapshot.call(this);
+    held.add(copy);
+    return copy;
+  };
+  prototype.__destroy_into_raw = function () {
+    held.delete(this);
+    return destroy.call(this);
+  };
+  const sizes = [];
+  const [detector, scene] = [await Detector.open(), new Scene()];
+  scene.addTriangles(new Uint8Array([0, 1, 2]), new Float32Array(TRIANGLE));
+  for (const question of ["count", "isFree"]) {
+    const first = detector.count(scene);
+    const controller = new AbortController();
+    const { signal } = controller;
+    const asked = [refusal(() => detector[question](scene, { signal })), refusal(() => detector[question](scene, { signal: AbortSignal.abort() }))];
+    sizes.push(held.size);
+    controller.abort();
+    sizes.push(held.size, await first, ...(await Promise.all(asked)), held.size);
+    sizes.push(await refusal(() => detector[question](scene, { between: [0, 9] })), held.size);
+  }
+  const last = detector.dispose();
+  for (const question of ["count", "isFree"]) sizes.push(await refusal(() => detector[question](scene)), held.size);
+  await last;
+  Object.assign(prototype, { snapshot, __destroy_into_raw: destroy });
+  return sizes;
+}
+
+const CANCELLED = ["cancelled: cancelled", "cancelled: cancelled", 0];
+const GONE = ["invalid: this detector has been disposed of", 0];
+const UNKNOWN = ["invalid: there is no body 9: 1 have been added, and 0 of them removed", 0];
+
+export const COPIES = [2, 1, 0, ...CANCELLED, ...UNKNOWN, 2, 1, 0, ...CANCELLED, ...UNKNOWN, ...GONE, ...GONE];
+
 // Where a mesh from a file meets itself.
 function found({ Detector, Scene }, { faces, tetrahedra, positions }) {
   const [detector, scene] = [new Detector(), new Scene()];
@@ -151,6 +194,9 @@ export async function refusals(module) {
   said.welded = await refusal(() => weld({ faces: undefined, positions: triangle }));
   said.within = await ask("detect", { progress: () => detector.count(scene) });
   said.margin = await refusal(() => new Detector({ reuseMargin: -1 }));
+  said.limits = [];
+  for (const of of [{ reuseMargin: Infinity }, { maxPairs: 0.5 }, { memoryBudget: -1 }]) said.limits.push(await refusal(() => new Detector(of)));
+  new Detector({ maxPairs: Infinity, memoryBudget: Infinity }).dispose();
   said.clearance = await ask("impacts", { clearance: -1 });
   said.start = await ask("isFree", { start: "never" });
   said.field = await ask("earliest", { selfOf: a, seperation: 5 });
@@ -256,7 +302,7 @@ export async function refusals(module) {
   said.older.push(await refusal(() => detector.penetration(scene, late, ...closed)));
   const other = new Scene();
   const two = closed.map(() => other.addTriangles(index, triangle));
-  said.older.push(await refusal(() => detector.penetration(other, older, ...two)));
+  said.older.push(await refusal(() => detector.penetration(other, older, ...two)), await refusal(() => detector.contacts(other, pairs)));
   scene.setPositions(closed[1], corners.map((x) => x + 0.125));
   const inCell = detector.contacts(scene, detector.detect(scene, { between: closed, ownedBy: [[-1, -1, -1], [1, 1, 1]] }));
   said.older.push(await refusal(() => detector.penetration(scene, inCell, ...closed)));
@@ -318,7 +364,12 @@ export const REFUSALS = {
   forgotten: "invalid: faces: undefined given; a geometry without an index has the faces 0, 1, 2, 3, …, and points have no faces",
   welded: "invalid: faces: undefined given; a geometry without an index has the faces 0, 1, 2, 3, …, and points have no faces",
   within: "invalid: a scene or a detector is used while it answers a question, or after the module has stopped",
-  margin: "invalid: reuseMargin: -1 given, a number that is not below 0 is needed",
+  margin: "invalid: reuseMargin: -1 given, a finite number that is not below 0 allowed",
+  limits: [
+    "invalid: reuseMargin: Infinity given, a finite number that is not below 0 allowed",
+    "invalid: maxPairs: 0.5 given, 0 to 9007199254740991 allowed",
+    "invalid: memoryBudget: -1 given, 0 to 9007199254740991 allowed",
+  ],
   clearance: "invalid: clearance: -1 given, a finite number that is not below 0 allowed",
   start: 'invalid: start: "never" given, "report", "skip" or "verify" allowed',
   field:
@@ -370,6 +421,7 @@ export const REFUSALS = {
     "invalid: body 3: this was found for other positions than it has now, so nothing is known of it; ask again",
     "invalid: body 2: this was found for other positions than it has now, so nothing is known of it; ask again",
     "invalid: contacts: contacts of another scene given, those of this scene allowed",
+    "invalid: pairs: pairs of another scene given, those of this scene allowed",
     "invalid: contacts: without some of the two, because of a cell, given, those of all pairs of the two allowed",
     "invalid: body 2: its groups or pinned vertices were set after the pairs were found; ask again",
   ],
@@ -528,6 +580,9 @@ export async function others(module) {
   const step = new Scene();
   const [lower, upper] = [0, 1].map((z) => step.addTriangles(index, new (z ? Float64Array : Float32Array)(TRIANGLE.map((x, ix) => (ix % 3 === 2 ? z : x)))));
   const near2 = await detector.nearest(step);
+  const nearest3 = [];
+  for (const query of [{ which: undefined }, { between: [upper, lower] }]) nearest3.push((await detector.nearest(step, query)).distance);
+  for (const query of [{ of: upper }, { which: "self", of: upper }]) nearest3.push(await refusal(() => detector.nearest(step, query)));
   const safe = await detector.safeDistances(step, 9, { which: "between" });
   const held = await detector.safeDistances(step, 9, { which: "between", fixed: [lower] });
   const lists = await detector.neighbours(step, 1.5, { which: "between" });
@@ -552,7 +607,7 @@ export async function others(module) {
   const still2 = rigid.positions(flying)[2];
   rigid.dispose();
   const solver = {
-    nearest: [near2.distance, near2.bodyA, near2.bodyB],
+    nearest: [near2.distance, near2.bodyA, near2.bodyB, ...nearest3],
     safe: [safe.of(lower).constructor.name, safe.of(upper).constructor.name, safe.of(lower)[0] < 0.5 && safe.of(lower)[0] > 0.4995, safe.touching.length],
     held: [[...held.of(lower)], held.of(upper)[0] < 1 && held.of(upper)[0] > 0.999],
     lists: [lists.length, lists.first(upper), [...lists.vf.offsets], [...lists.vf.indices], [...lists.fv.indices], lists.ee.distances.every((x) => x > 0.999)],
@@ -794,7 +849,10 @@ export const OTHERS = {
     open: "invalid: there is no body 7: 2 have been added, and 0 of them removed",
   },
   solver: {
-    nearest: [1, 0, 1],
+    nearest: [
+      1, 0, 1, 1, 1, "invalid: query: self-collision given, pairs of different bodies, and all of space allowed",
+      'invalid: query: "which" and "of" given, one of them allowed',
+    ],
     safe: ["Float32Array", "Float64Array", true, 0],
     held: [[0, 0, 0], true],
     lists: [15, { vertex: 3, edge: 3, face: 1 }, [0, 1, 2, 3, 4, 5, 6], [1, 1, 1, 0, 0, 0], [3, 4, 5, 0, 1, 2], true],
@@ -866,7 +924,8 @@ if (globalThis.process?.argv?.[1]?.endsWith("answers.mjs")) {
   const answers = await cpu("impinge", scenes);
   const taken = await steps("impinge");
   const more = await others("impinge");
-  const { default: init, Detector, read, readBodies, readFrames, weld } = await import("impinge/webgpu");
+  const onDevice = await import("impinge/webgpu");
+  const { default: init, Detector, read, readBodies, readFrames, weld } = onDevice;
   const onCpu = await import("impinge");
   await init();
   const doors = {};
@@ -884,6 +943,14 @@ if (globalThis.process?.argv?.[1]?.endsWith("answers.mjs")) {
   const view = new DataView(mdd.buffer);
   for (const [at, n] of [[0, 2], [4, 1]]) view.setInt32(at, n);
   for (const [ix, x] of [1, 2, 3, 4, 5, 6].entries()) view.setFloat32(16 + 4 * ix, x);
+  // As they were read, they are bodies of either build.
+  const added = [];
+  for (const { Scene, weld } of [onDevice, onCpu]) {
+    const scene = new Scene();
+    const body = scene.add(mesh);
+    for (const part of readBodies("triangle.obj", new TextEncoder().encode(text))) scene.remesh(body, part);
+    added.push(scene.nElements(body), scene.nVertices(scene.add(weld(mesh).mesh)));
+  }
   const { Uint8Array: Bytes } = await otherWindow();
   const frames = readFrames("run.mdd", new Bytes(mdd)).map((frame) => [...frame]);
   const noGpu = await refusal(() => Detector.open());
@@ -893,6 +960,6 @@ if (globalThis.process?.argv?.[1]?.endsWith("answers.mjs")) {
   const misspelt = [read, readBodies].map((read) => refusal(() => read("triangle.obj", new TextEncoder().encode(text), { wield: false })));
   const options = await Promise.all(misspelt);
   const { map: welded } = weld({ positions: new Float64Array([1, 2, 3, 1, 2, 3]) });
-  const files = { welded: [...welded], faces: [...mesh.faces], positions: [...mesh.positions], map: [...mesh.map], notes: mesh.notes, frames };
+  const files = { welded: [...welded], faces: [...mesh.faces], positions: [...mesh.positions], map: [...mesh.map], notes: mesh.notes, added, frames };
   process.stdout.write(JSON.stringify({ said, answers, taken, more, read: { ...files, noGpu, broken, buffers, cut, options }, doors }));
 }

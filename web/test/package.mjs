@@ -13,7 +13,7 @@ import { setFlagsFromString } from "node:v8";
 import { runInNewContext } from "node:vm";
 import { brotliCompressSync } from "node:zlib";
 import { buildSync } from "esbuild";
-import { OTHERS, REFUSALS, STEPS } from "./answers.mjs";
+import { COPIES, OTHERS, REFUSALS, STEPS } from "./answers.mjs";
 import { launch, serve } from "./browser.mjs";
 
 // Without them, it is smaller by: near pairs 6 kB, distance 13, contacts 42 (16 of these penetration), candidates 2, points and rays 25 (5 of
@@ -89,6 +89,7 @@ try {
     positions: [0, 0, 0, 1, 0, 0, 0, 1, 0],
     map: [0, 1, 0, 2],
     notes: ["lines skipped, which are edges or faces of two corners: 1"],
+    added: [1, 3, 1, 3],
     frames: [[1, 2, 3], [4, 5, 6]],
     noGpu: "device: there is no WebGPU here",
     broken: read.broken,
@@ -136,6 +137,9 @@ try {
       assert.deepEqual(onGpu.more, OTHERS);
       compare(`Chromium, WebGPU, ${method}`, onGpu.answers, expected);
     }
+    const held = await page.evaluate(async () => (await import("./answers.mjs")).copies());
+    assert.deepEqual(held, COPIES);
+    console.log("Chromium, WebGPU: copies of scenes are freed at once");
     assert.deepEqual(problems, []);
   } finally {
     await browser.close();

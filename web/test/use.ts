@@ -87,6 +87,8 @@ scene.setPositions(a, [0, 0, 0]);
 detector.near(scene, 1, { exclude: [[1, 2, 3]] });
 // @ts-expect-error: not a method
 new Detector({ method: "octree" });
+// @ts-expect-error: the device has no such method
+void GpuDetector.open({ method: "naive" });
 // @ts-expect-error: pairs are between two bodies
 detector.impacts(scene, { between: [0, 1, 2] });
 // @ts-expect-error: no such field
