@@ -25,7 +25,7 @@ export async function serve(folder, port = 0) {
       const file = join(folder, path.endsWith("/") ? `${path}index.html` : path);
       const bytes = await readFile(file);
       const type = TYPES[extname(file)] ?? "application/octet-stream";
-      response.writeHead(200, { "content-type": type, "cache-control": "no-store" }).end(bytes);
+      response.writeHead(200, { "content-type": type, "content-length": bytes.length, "cache-control": "no-store" }).end(bytes);
     } catch {
       response.writeHead(404).end("not found");
     }

@@ -1,5 +1,7 @@
 // Dropped files as bodies: meshes as they are, and the frames of bodies that move.
 
+import { counted } from "./text.js";
+
 // Three files are frames of one body if their names differ in numbers alone; two only if the visitor says so.
 const LEAST_NUMBERED = 3;
 
@@ -8,7 +10,7 @@ const isCache = ({ name }) => /\.(pc2|mdd)$/i.test(name);
 const mayHaveParts = ({ name }) => /\.(obj|gltf|glb)$/i.test(name);
 const byName = new Intl.Collator("en", { numeric: true }).compare;
 
-// A buffer of a glTF file among the others: the error about that says how to give it.
+// A buffer of a glTF file among the others.
 const isBeside = ({ name }, list) => /\.bin$/i.test(name) && list.some((file) => /\.gltf$/i.test(file.name));
 
 // Reads files. Those that cannot be read are left out, and `refused` says why.
@@ -16,7 +18,7 @@ export async function read({ read: readMesh, readBodies, readFrames }, list) {
   const [meshes, caches, refused] = [[], [], []];
   for (const file of list) {
     try {
-      if (isBeside(file, list)) continue;
+      if (isBeside(file, list)) throw new Error(`${file.name} is left out: files beside a glTF file are not read. Save that as .glb, which holds its buffers`);
       const bytes = new Uint8Array(await file.arrayBuffer());
       if (isCache(file)) {
         caches.push({ name: file.name, frames: readFrames(file.name, bytes) });
@@ -75,7 +77,7 @@ export function bodiesOf({ meshes, caches }, how) {
     const n = (frames[0]?.length ?? 0) / 3;
     const at = bodies.findIndex((body) => body.frames === undefined && body.map.length === n);
     if (at < 0) {
-      refused.push(`${name} has frames of ${n} vertices, but no mesh that does not move yet has as many`);
+      refused.push(`${name} has frames of ${counted(n, "vertex", "vertices")}, but no mesh that does not move yet has as many`);
       continue;
     }
     const still = bodies[at];

@@ -1,6 +1,6 @@
 // The page: bodies of a scene or of dropped files, and the exact answer about them as they are.
 
-import init, { Detector, Scene } from "impinge";
+import { Detector, Scene } from "impinge";
 import { bodiesOf, hasParts, looksNumbered, mayBePoses, read } from "./files.js";
 import { Gpu, NotLoaded, lookForAdapter, withReaders } from "./gpu.js";
 import { fromLink, toLink } from "./link.js";
@@ -9,9 +9,8 @@ import * as panel from "./panel.js";
 import { ballAround, places as placesOf } from "./places.js";
 import { SCENES } from "./shapes.js";
 import { askStep, contactAt } from "./steps.js";
+import { counted, element, grouped, say } from "./text.js";
 import { View } from "./view.js";
-
-const { element, counted, grouped } = panel;
 
 // Seconds from the first pose of a scene to its last, and frames per second.
 const SECONDS = 7;
@@ -59,6 +58,8 @@ let before = null;
 let listed = 0;
 // Counts the frames that the CPU has answered.
 let nAnswers = 0;
+// Counts what visitors have opened: what was opened last is shown, however long an earlier file takes.
+let nOpened = 0;
 
 const view = new View(element("view"), {
   change: () => (mustDraw = true),
@@ -99,14 +100,10 @@ function gpuNote(text, className) {
 
 function show(id, n, ms, hash) {
   const row = element(id);
+  row.hidden = false;
   row.querySelector(".pairs").textContent = grouped(n);
   row.querySelector(".ms").textContent = ms.toFixed(ms < 10 ? 2 : 0);
   row.querySelector(".hash").textContent = hash;
-}
-
-function say(id, text) {
-  element(id).textContent = text;
-  element(id).hidden = text === "";
 }
 
 const complain = (text) => say("message", text);
@@ -257,14 +254,14 @@ function answer() {
 
 // What is asked, in words.
 function showQuestion() {
-  const what = bodies.some(({ corners }) => corners === 4) ? "primitives" : "triangles";
-  say("verdict", rows.length === 4 ? `pair of ${what} intersects` : `pairs of ${what} intersect`);
+  const what = bodies.some(({ corners }) => corners === 4) ? "primitive" : "triangle";
+  say("verdict", rows.length === 4 ? `pair of ${what}s intersects` : `pairs of ${what}s intersect`);
   const n = bodies.reduce((sum, { index, corners }) => sum + index.length / corners, 0);
   const names = bodies.map(({ name }) => shortened(name)).join(", ");
   const whom = bodies.length === 1 ? "with itself" : self.checked ? "with each other and themselves" : "with each other";
-  const notes = [`${names} ${whom}: ${grouped(n)} ${what}`];
+  const notes = [`${names} ${whom}: ${counted(n, what)}`];
   const nWelded = bodies.reduce((sum, { map, positions }) => sum + (map ? map.length - positions.length / 3 : 0), 0);
-  if (nWelded > 0) notes.push(`${counted(nWelded, "vertex").replace(/vertexs$/, "vertices")} welded to others`);
+  if (nWelded > 0) notes.push(`${counted(nWelded, "vertex", "vertices")} welded to others`);
   if (!element("back").hidden) notes.push("moved by hand");
   if (isFarApart) notes.push("so far apart that they are too small to be seen in one picture");
   say("scene-note", notes.join("; "));
@@ -377,7 +374,10 @@ function frame(clock) {
 
 // Shows a scene of the page.
 function showScene(name, { triangles = Number(size.value), withSelf = SCENES[name].self, plays = true } = {}) {
+  nOpened += 1;
   complain("");
+  say("status", "");
+  panel.showNotes([]);
   files = null;
   showFileControls();
   scene.value = name;
@@ -408,23 +408,27 @@ function showFiles(given, how) {
   setPlaying(false);
   if (made.length > 1) self.checked = false;
   files = given;
+  panel.showNotes(given.meshes);
   as.value = how;
   showFileControls();
   history.replaceState(null, "", location.pathname + location.search);
   return refused;
 }
 
-async function open(offered, folders = []) {
+export async function open(offered, folders = []) {
   const list = offered.filter(({ name }) => !folders.includes(name));
   const refusals = folders.map((name) => `${name} is a folder: open the files in it`);
   complain(refusals.join("\n"));
   if (list.length === 0) return;
+  nOpened += 1;
+  const number = nOpened;
   say("status", `Reading ${list.map(({ name }) => name).join(", ")} …`);
   try {
     const readers = await withReaders();
     // Lets the browser show the line above.
     await new Promise((done) => setTimeout(done));
     const given = await read(readers, list);
+    if (number !== nOpened) return;
     given.refused.unshift(...refusals);
     // A point cache alone moves the meshes that are there.
     if (given.meshes.length === 0 && given.caches.length > 0) given.meshes = files?.meshes ?? [];
@@ -441,9 +445,10 @@ async function open(offered, folders = []) {
     }
     complain(given.refused.join("\n"));
   } catch (error) {
+    if (number !== nOpened) return;
     complain(error instanceof NotLoaded ? `Not opened: ${list.map(({ name }) => name).join(", ")}; what you see was here before. ${error.message}` : String(error.message ?? error));
   } finally {
-    say("status", "");
+    if (number === nOpened) say("status", "");
   }
 }
 
@@ -529,10 +534,6 @@ method.addEventListener("change", () => {
   void openGpu();
 });
 useGpu.addEventListener("change", () => void openGpu());
-element("files").addEventListener("change", ({ target }) => {
-  void open([...target.files]);
-  target.value = "";
-});
 
 const KEYS = {
   " ": () => end > 0 && setPlaying(!isPlaying),
@@ -562,38 +563,27 @@ window.addEventListener("keydown", (event) => {
   event.preventDefault();
   act();
 });
-window.addEventListener("dragover", (event) => {
-  event.preventDefault();
-  document.body.classList.add("dropping");
-});
-for (const done of ["dragleave", "drop"]) {
-  window.addEventListener(done, () => document.body.classList.remove("dropping"));
-}
-window.addEventListener("drop", (event) => {
-  event.preventDefault();
-  const { files: dropped, items } = event.dataTransfer;
-  const entries = [...items].filter(({ kind }) => kind === "file").map((item) => item.webkitGetAsEntry?.());
-  void open([...dropped], entries.filter((entry) => entry?.isDirectory).map(({ name }) => name));
-});
-window.addEventListener("hashchange", followLink);
 if (isLow() || isUpright()) {
   // All are closed, and of several with one name only one is open.
   for (const details of document.querySelectorAll("details")) Object.assign(details, { open: false, name: "side" });
 }
 
-try {
-  await init();
+// Once the module is loaded.
+export function begin() {
   followLink();
+  window.addEventListener("hashchange", followLink);
   const panels = new ResizeObserver(leaveRoom);
   for (const id of ["answer", "side", "controls"]) panels.observe(element(id));
   requestAnimationFrame(frame);
-  // WebGPU starts by itself on hardware. A software adapter is slower than the CPU build, so it waits for its switch.
+  void useAdapter();
+}
+
+// WebGPU starts by itself on hardware. A software adapter is slower than the CPU build, so it waits for its switch.
+async function useAdapter() {
   const adapter = await lookForAdapter();
   element("gpu-label").hidden = adapter === null;
   useGpu.checked = adapter === "hardware";
   if (useGpu.checked) void openGpu();
-} catch (error) {
-  complain(String(error.message ?? error));
 }
 
 // For tests, and for the console.

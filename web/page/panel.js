@@ -1,23 +1,18 @@
 // What the panels say: the bodies, the places where they collide, and the primitive that was chosen.
 
+import { counted, element, grouped } from "./text.js";
 import { colors } from "./view.js";
 
 // Longer lists are no help, and slow.
 const MOST_PLACES = 200;
 const MOST_PARTNERS = 12;
-
-export const element = (id) => document.getElementById(id);
-export const grouped = (n) => n.toLocaleString("en");
+const MOST_NOTES = 12;
 
 // Named elements in one line: make("li", { className: "x" }, "text", child).
 export function make(name, properties, ...children) {
   const made = Object.assign(document.createElement(name), properties);
   made.append(...children);
   return made;
-}
-
-export function counted(n, word) {
-  return `${grouped(n)} ${word}${n === 1 ? "" : "s"}`;
 }
 
 function swatch(color) {
@@ -29,6 +24,15 @@ function swatch(color) {
 const kindOf = ({ corners }) => (corners === 4 ? "tetrahedron" : "triangle");
 const plural = (body) => (body.corners === 4 ? "tetrahedra" : "triangles");
 
+// What of the files was left out or changed, as the program says it.
+export function showNotes(meshes) {
+  const notes = meshes.flatMap(({ name, notes }) => notes.map((note) => `${name}: ${note}`));
+  const items = notes.slice(0, MOST_NOTES);
+  if (notes.length > items.length) items.push(`and ${counted(notes.length - items.length, "more note")}`);
+  element("notes").replaceChildren(...items.map((text) => make("li", {}, text)));
+  element("notes").hidden = items.length === 0;
+}
+
 // The legend: a row per body, with its colours and a switch that hides it.
 export function showBodies(bodies, hide) {
   element("bodies").replaceChildren(
@@ -38,7 +42,7 @@ export function showBodies(bodies, hide) {
       shown.addEventListener("change", () => hide(ix, !shown.checked));
       const name = make("span", { className: "name", title: body.name }, body.name);
       const label = make("label", { title: "Show this body" }, shown, swatch(own), name);
-      const text = `${grouped(body.index.length / body.corners)} ${plural(body)}, `;
+      const text = `${counted(body.index.length / body.corners, kindOf(body), plural(body))}, `;
       return make("li", {}, label, make("small", {}, text, swatch(colliding), make("b", {}, "0"), " collide"));
     }),
   );

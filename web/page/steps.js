@@ -1,7 +1,7 @@
 // What touches on the way from a frame to the next, and when first.
 
 import { pose } from "./motion.js";
-import { counted, grouped } from "./panel.js";
+import { counted, grouped } from "./text.js";
 import { cornersOf, emptyBox, extend } from "./places.js";
 
 // Asks a detector about the step of a scene from frame `from` on. Returns the number of contacts, their hash, the first one or `null`, and

@@ -73,6 +73,12 @@ async function sameHash(page) {
 
 // Drops files as a file manager does, and waits until they are read.
 async function drop(page, ...names) {
+  await offer(page, ...names);
+  await page.waitForFunction(() => document.getElementById("status").hidden, null, { timeout: 60_000 });
+  await settled(page);
+}
+
+async function offer(page, ...names) {
   const given = [];
   for (const name of names) {
     const path = name.includes("/") ? name : join(files, name);
@@ -86,9 +92,8 @@ async function drop(page, ...names) {
     }
     return transfer;
   }, given);
-  await page.dispatchEvent("#view", "drop", { dataTransfer: dropped });
-  await page.waitForFunction(() => document.getElementById("status").hidden, null, { timeout: 60_000 });
-  await settled(page);
+  const isTaken = (dataTransfer) => !document.getElementById("view").dispatchEvent(new DragEvent("drop", { dataTransfer, bubbles: true, cancelable: true }));
+  assert.ok(await page.evaluate(isTaken, dropped), "a drop does not leave the page");
 }
 
 // What the program prints about files. A step whose start intersects has an exit code of its own.
@@ -125,6 +130,21 @@ function stl(...triangles) {
   const facet = (corners) => corners.map((corner) => `vertex ${corner.join(" ")}`).join("\n");
   const facets = triangles.map((corners) => `facet normal 0 0 1\nouter loop\n${facet(corners)}\nendloop\nendfacet`);
   return ["solid made", ...facets, "endsolid made"].join("\n");
+}
+
+// A triangle in a buffer, in a scene that has one of its two nodes.
+function gltf(uri) {
+  const primitives = [{ attributes: { POSITION: 0 } }];
+  return JSON.stringify({
+    asset: { version: "2.0" },
+    scene: 0,
+    scenes: [{ nodes: [0] }],
+    nodes: [{ mesh: 0 }, { mesh: 0 }],
+    meshes: [{ primitives }],
+    accessors: [{ bufferView: 0, componentType: 5126, count: 3, type: "VEC3", min: [0, 0, 0], max: [1, 1, 0] }],
+    bufferViews: [{ buffer: 0, byteLength: 36 }],
+    buffers: [{ uri, byteLength: 36 }],
+  });
 }
 
 // A strip of eight triangles, bent by an angle per quad: it meets itself when bent far enough.
@@ -181,6 +201,11 @@ async function writeFiles() {
     "bend.obj": stripObj(0),
     "bend.pc2": pc2(ANGLES.map(strip)),
     "short.pc2": pc2([[[0, 0, 0]]]),
+    "one.obj": "v 0 0 0\nv 1 0 0\nv 0 1 0\nl 1 2\nf 1 2 3",
+    "<i>.obj": "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\nl 1 2",
+    "beside.gltf": gltf("b.bin"),
+    "b.bin": Buffer.from(new Float32Array([0, 0, 0, 1, 0, 0, 0, 1, 0]).buffer),
+    "whole.gltf": gltf(`data:application/octet-stream;base64,${Buffer.from(new Float32Array([0, 0, 0, 1, 0, 0, 0, 1, 0]).buffer).toString("base64")}`),
     "start.obj": stripObj(0.6),
     "finish.obj": stripObj(1),
   };
@@ -286,7 +311,50 @@ async function dropped(browser) {
   assert.match(await note(), /^box\.obj with itself: 12/);
   await page.screenshot({ path: join(shots, "refused.png") });
   await drop(page, "box.obj", "short.pc2");
-  assert.match(await text(page, "#message"), /short\.pc2 has frames of 1 vertices/);
+  assert.match(await text(page, "#message"), /short\.pc2 has frames of 1 vertex,/);
+
+  // What was left out of files is listed, as the program says it; and files that nothing reads are named.
+  const notes = () => page.locator("#notes li").allTextContents();
+  for (const names of [["one.obj", "<i>.obj"], ["whole.gltf"]]) {
+    await drop(page, ...names);
+    const { stderr } = spawnSync(resolve(program), [names.length > 1 ? "pairs" : "self", ...names.map((name) => join(files, name))], { encoding: "utf8" });
+    const said = stderr.split("\n").filter((line) => line.startsWith("note: ")).map((line) => line.slice(6).replace(`${files}/`, ""));
+    assert.ok(said.length >= names.length);
+    assert.deepEqual(await notes(), said);
+  }
+  assert.match(await note(), /^whole\.gltf with itself: 1 triangle$/);
+  assert.match((await page.locator("#bodies li").allTextContents())[0], /1 triangle, /);
+  await drop(page, "whole.gltf", "b.bin");
+  assert.match(await text(page, "#message"), /^b\.bin is left out: .*\.glb/);
+  assert.match(await note(), /^whole\.gltf with itself/);
+  await drop(page, "beside.gltf", "b.bin");
+  assert.match(await text(page, "#message"), /^beside\.gltf: [^]*b\.bin is left out: .*\.glb/);
+  await drop(page, "soup.stl");
+  assert.deepEqual([await notes(), await page.locator("#notes").isVisible()], [[], false]);
+
+  // The files that were opened last are shown, also if earlier ones take longer.
+  await page.evaluate(() => {
+    const drop = (name, bytes) => {
+      const file = Object.assign(new File([], name), { arrayBuffer: () => bytes });
+      window.dispatchEvent(Object.assign(new Event("drop"), { dataTransfer: { files: [file], items: [] } }));
+    };
+    drop("slow.obj", new Promise((done) => (window.finish = done)));
+    drop("new.obj", new TextEncoder().encode("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3").buffer);
+  });
+  await page.waitForFunction(() => document.getElementById("scene-note").textContent.startsWith("new.obj"));
+  await page.waitForFunction(() => document.getElementById("status").hidden);
+  await page.evaluate(() => window.finish(new TextEncoder().encode("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3").buffer));
+  await page.waitForTimeout(100);
+  assert.match(await note(), /^new\.obj with itself/);
+  await page.evaluate(() => {
+    const file = Object.assign(new File([], "late.obj"), { arrayBuffer: () => new Promise((done) => (window.finish = done)) });
+    window.dispatchEvent(Object.assign(new Event("drop"), { dataTransfer: { files: [file], items: [] } }));
+  });
+  await page.locator("#scene").selectOption("ring");
+  await page.evaluate(() => window.finish(new TextEncoder().encode("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3").buffer));
+  await page.waitForTimeout(100);
+  assert.match(await note(), /^worm/);
+  assert.equal(await page.locator("#status").isVisible(), false);
   // The button for files takes the same way.
   await page.locator("#files").setInputFiles(["box.obj", "far.obj"].map((name) => join(files, name)));
   await page.waitForFunction(() => document.getElementById("scene-note").textContent.startsWith("box.obj, far.obj"));
@@ -768,6 +836,68 @@ async function offline(browser) {
   await page.context().close();
 }
 
+// While the page loads it says so, nothing can be pressed, and files wait. What fails is said, and can be tried again.
+async function loading(browser) {
+  const context = await browser.newContext(DESKTOP);
+  const page = await context.newPage();
+  let release;
+  const held = new Promise((done) => (release = done));
+  await page.route("**/impinge/cpu/*.wasm", async (route) => {
+    await held;
+    await route.continue();
+  });
+  await page.goto(server.url);
+  const shown = (id) => page.locator(`#${id}`).isVisible();
+  await page.waitForFunction(() => document.getElementById("play").disabled);
+  assert.match(await text(page, "#status"), /^Loading …/);
+  assert.deepEqual([await shown("cpu"), await shown("retry"), await page.locator("#files").isDisabled()], [false, false, false]);
+  assert.equal(await page.locator("button:enabled:visible, select:enabled:visible").count(), 0);
+  await page.locator("#files").setInputFiles(join(files, "tip.stl"));
+  assert.match(await text(page, "#status"), /Then tip\.stl is opened\.$/);
+  await offer(page, "box.obj");
+  assert.match(await text(page, "#status"), /Then box\.obj is opened\.$/);
+  await page.screenshot({ path: join(shots, "loading.png") });
+  release();
+  await page.waitForFunction(() => /^box\.obj with itself: 12/.test(document.getElementById("scene-note").textContent));
+  assert.deepEqual([await shown("cpu"), await page.locator("#play").isDisabled(), await page.locator("#scene").isDisabled()], [true, false, false]);
+  await page.unrouteAll();
+
+  // The share that has come.
+  const network = await context.newCDPSession(page);
+  const throttle = (downloadThroughput) => network.send("Network.emulateNetworkConditions", { offline: false, latency: 0, downloadThroughput, uploadThroughput: -1 });
+  await network.send("Network.enable");
+  await throttle(1_000_000);
+  await page.goto(`${server.url}?slow`, { waitUntil: "commit" });
+  await page.waitForFunction(() => /^Loading … [1-9]\d? %$/.test(document.getElementById("status")?.textContent));
+  await throttle(-1);
+
+  const failing = [
+    ["**/three/three.core.js", (route) => route.abort()],
+    ["**/impinge/cpu/*.wasm", (route) => route.abort()],
+    ["**/impinge/cpu/*.wasm", (route) => route.fulfill({ status: 503 })],
+    ["**/impinge/cpu/*.wasm", async (route) => route.fulfill({ contentType: "application/wasm", body: (await (await route.fetch()).body()).subarray(0, 200_000) })],
+  ];
+  for (const [ix, [pattern, fail]] of failing.entries()) {
+    await page.route(pattern, fail);
+    await page.goto(`${server.url}?${ix}`);
+    await page.locator("#retry").waitFor();
+    assert.match(await text(page, "#message"), /^The page could not be loaded\. Try again once you are online\. \(/);
+    assert.deepEqual([await shown("status"), await shown("cpu")], [false, false]);
+    await offer(page, "box.obj");
+    await page.screenshot({ path: join(shots, "not-loaded.png") });
+    await page.unrouteAll();
+    await page.locator("#retry").click();
+    await page.waitForFunction(() => /^box\.obj with itself: 12/.test(document.getElementById("scene-note").textContent));
+    assert.deepEqual([await shown("message"), await shown("retry"), await page.locator("#play").isDisabled()], [false, false, false]);
+  }
+  // Where not even that part comes which says so.
+  await page.route("**/text.js", (route) => route.abort());
+  await page.goto(`${server.url}?start`);
+  await page.waitForFunction(() => document.getElementById("status").textContent === "The page could not be loaded. Reload it once you are online.");
+  console.log("while the page loads: it says so, files wait, and what failed is tried again");
+  await context.close();
+}
+
 async function withoutGpu(browser) {
   const { page, problems } = await open(browser, { viewport: { width: 900, height: 600 } });
   await page.waitForTimeout(300);
@@ -886,7 +1016,7 @@ try {
   links();
   await latest();
   await writeFiles();
-  const visits = [dropped, frames, real, large, keyboard, phone, onItsSide, offline, example, cursor];
+  const visits = [dropped, frames, real, large, keyboard, phone, onItsSide, offline, loading, example, cursor];
   for (const [options, all] of [[{ gpu: true }, visits], [{ gpu: false }, [withoutGpu]]]) {
     const those = all.filter(({ name }) => only.length === 0 || only.includes(name));
     const browser = await launch(options);
