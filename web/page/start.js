@@ -30,6 +30,11 @@ async function compiled(signal) {
       if (!signal.aborted) tell();
       to.enqueue(chunk);
     },
+    // The scripts may take longer.
+    flush() {
+      share = "";
+      if (!signal.aborted) tell();
+    },
   });
   return WebAssembly.compileStreaming(new Response(body.pipeThrough(counted), { headers: { "content-type": "application/wasm" } }));
 }

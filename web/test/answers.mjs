@@ -84,7 +84,7 @@ export async function webgpu(module, scenes, method) {
 // How many copies of scenes the module holds: after a question is asked while another one is answered, once its signal is aborted, and after it was
 // refused.
 export async function copies() {
-  const { default: init, Detector, Scene } = await import("./node_modules/impinge/webgpu.js");
+  const { default: init, Detector, Scene, read } = await import("./node_modules/impinge/webgpu.js");
   const { SceneHandle: { prototype } } = await import("./node_modules/impinge/gpu/impinge.js");
   await init();
   const held = new Set();
@@ -100,7 +100,7 @@ export async function copies() {
   };
   const sizes = [];
   const [detector, scene] = [await Detector.open(), new Scene()];
-  scene.addTriangles(new Uint8Array([0, 1, 2]), new Float32Array(TRIANGLE));
+  scene.add(read("triangle.obj", new TextEncoder().encode("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")));
   for (const question of ["count", "isFree"]) {
     const first = detector.count(scene);
     const controller = new AbortController();
