@@ -84,7 +84,7 @@ fn gltf_modes_shared_positions_and_external_buffers() {
     let message = load(Format::Gltf, &json).unwrap_err().to_string();
     assert_eq!(
         message,
-        "file: buffer 0 at 'my%20data.bin' (files beside a mesh in memory are not read) is not supported"
+        "file: buffer 0 at 'my%20data.bin' (files beside a mesh in memory are not read; a .glb file has its buffers in it) is not supported"
     );
     for outside in ["/etc/passwd", "file:///etc/passwd", "http://a/b"] {
         std::fs::write(&path, json.replace("my%20data.bin", outside)).unwrap();

@@ -278,9 +278,9 @@ impl<'a, 'r> Data<'a, 'r> {
                 format!("buffer {buffer_ix} at {} ({why})", shown(uri.as_bytes())),
             )
         };
-        let folder = self
-            .folder
-            .ok_or_else(|| refused("files beside a mesh in memory are not read"))?;
+        let folder = self.folder.ok_or_else(|| {
+            refused("files beside a mesh in memory are not read; a .glb file has its buffers in it")
+        })?;
         let relative = unescaped(uri).ok_or_else(|| refused("not a path in UTF-8"))?;
         let relative = Path::new(&relative);
         // A colon ends a scheme, such as `http:`, or a drive's letter.
