@@ -90,6 +90,7 @@ pub mod internal {
     };
     pub use crate::orientation::{Projection, collinear};
     pub use crate::ray::{Meeting, Parameter, Ray, meet, meet_inside};
+    pub use crate::rounding::power_of_two;
     pub use crate::segment::strictly_between;
     pub use crate::twice::{two_product, two_sum};
 

@@ -2,7 +2,7 @@
 
 /// 2^`exponent`: infinity above the largest `f64`, 0 below the smallest.
 #[inline]
-pub(crate) const fn power_of_two(exponent: i32) -> f64 {
+pub const fn power_of_two(exponent: i32) -> f64 {
     match exponent {
         1024.. => f64::INFINITY,
         -1022..1024 => f64::from_bits(((exponent + 1023) as u64) << 52),

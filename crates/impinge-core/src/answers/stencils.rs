@@ -3,7 +3,7 @@
 use std::slice;
 use std::sync::Arc;
 
-use crate::answers::stencil::{Gradient, Hessian, Mollifier, NearestWay};
+use crate::answers::stencil::{Gradient, Hessian, Mollifier, NearestWay, Threshold};
 use crate::query::pair_kind::PairKind;
 use crate::scene::error::Error;
 use crate::search::sink;
@@ -45,7 +45,7 @@ pub struct Stencil {
     /// The positions of the vertices.
     pub points: [Point; 4],
     /// What the mollifier compares with; 0 for none.
-    threshold: f64,
+    threshold: Threshold,
 }
 
 impl Stencil {
@@ -155,7 +155,7 @@ impl Stencil {
             },
             vertices: slots.map(|slot| self.vertices[slot]),
             weight: self.weight,
-            threshold: 0.0,
+            threshold: Threshold::default(),
         }
     }
 
@@ -209,7 +209,7 @@ pub(crate) struct StencilRow {
     pub features: [Feature; 2],
     pub vertices: [u32; 4],
     pub weight: f64,
-    pub threshold: f64,
+    pub threshold: Threshold,
 }
 
 impl StencilRow {

@@ -527,6 +527,66 @@ fn nearly_parallel_edges_are_mollified() {
     );
 }
 
+/// Lengths to the fourth power would underflow or overflow: all numbers are those of a scene of
+/// ordinary size, bit by bit, but for the power of two.
+#[test]
+fn sizes_change_no_bit() {
+    let at_size = |size: f64| {
+        let mut scene = folded();
+        let ids: Vec<_> = scene.bodies().map(|(id, _)| id).collect();
+        let scaled = |of: Vec<Point>| -> Vec<Point> {
+            let scaled = of.into_iter().map(|point| point.map(|x| x * size));
+            scaled.collect()
+        };
+        for (ix, id) in ids.into_iter().enumerate() {
+            let own = positions(&scene)[81 * ix..81 * (ix + 1)].to_vec();
+            scene.set_positions(id, scaled(own)).unwrap();
+        }
+        let rest = positions(&scene);
+        let near = near(&scene, 0.1 * size);
+        near.stencils(&scene, Some(&rest)).unwrap()
+    };
+    let usual = at_size(1.0).merged().unwrap();
+    assert!(usual.iter().filter(Stencil::is_mollified).count() > 20);
+    for exponent in [-300, -250, -1, 40, 250, 300] {
+        let size = 2.0_f64.powi(exponent);
+        let sized = at_size(size).merged().unwrap();
+        assert_eq!(sized.len(), usual.len(), "2^{exponent}");
+        for (of, usual) in sized.iter().zip(&usual) {
+            assert_eq!(of.vertices, usual.vertices);
+            assert_eq!(of.is_mollified(), usual.is_mollified());
+            assert_eq!(of.mollifier().to_bits(), usual.mollifier().to_bits());
+            let gradient = of.mollifier_gradient().map(|x| x * size);
+            assert_eq!(gradient, usual.mollifier_gradient());
+            let hessian = of.mollifier_hessian();
+            let hessian = hessian.map(|row| row.map(|x| x * size * size));
+            assert_eq!(hessian, usual.mollifier_hessian());
+        }
+    }
+    // One edge is very long, the other very short.
+    let mut scene = Scene::new();
+    let [long, short] = [2.0_f64.powi(280), 2.0_f64.powi(-280)];
+    for (length, height) in [(long, 0.0), (short, short)] {
+        let corners = [[-length, 0.0, height], [length, 0.0, height]];
+        scene.add_edges(&[[0, 1]], &corners).unwrap();
+    }
+    let rest = positions(&scene);
+    let stencils = near(&scene, short).stencils(&scene, Some(&rest)).unwrap();
+    assert!(stencils.iter().any(|of| of.is_mollified()));
+    // An edge without a length has no mollifier, also beside one whose square is barely finite.
+    for length in [1.0, 2.0_f64.powi(500), 2.0_f64.powi(-700)] {
+        let mut scene = Scene::new();
+        let along = [[0.0; 3], [length, 0.0, 0.0]];
+        scene.add_edges(&[[0, 1]], &along).unwrap();
+        scene.add_edges(&[[0, 1]], &[[0.0; 3]; 2]).unwrap();
+        let rest = positions(&scene);
+        let stencils = near(&scene, 0.0).stencils(&scene, Some(&rest)).unwrap();
+        assert!(!stencils.is_empty());
+        assert!(stencils.iter().all(|of| !of.is_mollified()));
+        assert!(stencils.iter().eq(&stencils), "no threshold is NaN");
+    }
+}
+
 /// An orthogonal matrix as a product of reflections, and eigenvalues.
 fn spectral<const N: usize>(
     random: &mut Random,
@@ -601,6 +661,31 @@ fn negative_eigenvalues_become_zero() {
     for (row, expected) in small.iter().zip(&expected) {
         assert_near(row, expected, 2e-16, "small");
     }
+    // The smallest numbers: halves and quotients of them would be rounded.
+    let mut tiny = [[1e-308, 0.0, 0.0], [0.0, -1e-308, 0.0], [0.0, 0.0, 2e-308]];
+    project_psd(&mut tiny);
+    assert_eq!(tiny, [[1e-308, 0.0, 0.0], [0.0; 3], [0.0, 0.0, 2e-308]]);
+    let least = f64::from_bits(1);
+    let mut turned = [[0.0, 64.0 * least], [64.0 * least, 0.0]];
+    project_psd(&mut turned);
+    assert_eq!(turned, [[32.0 * least; 2]; 2]);
+    let mut kept = [[least, 0.0], [0.0, 3.0 * least]];
+    project_psd(&mut kept);
+    assert_eq!(kept, [[least, 0.0], [0.0, 3.0 * least]]);
+    let mut dropped = [[-least, 0.0], [0.0, -3.0 * least]];
+    project_psd(&mut dropped);
+    assert_eq!(dropped, [[0.0; 2]; 2]);
+    // A power of two changes no bit while all numbers are normal.
+    let [usual, small, large] = [1.0, 2.0_f64.powi(-900), 2.0_f64.powi(1000)].map(|size| {
+        let mut matrix = [[0.3, 1.7, -0.9], [1.7, -2.3, 0.4], [-0.9, 0.4, 0.7]];
+        matrix
+            .as_flattened_mut()
+            .iter_mut()
+            .for_each(|x| *x *= size);
+        project_psd(&mut matrix);
+        matrix.map(|row| row.map(|x| x / size))
+    });
+    assert!(usual == small && usual == large);
     let mut negative = [[-1.0, 0.0], [0.0, -1.0]];
     project_psd(&mut negative);
     assert_eq!(negative, [[0.0; 2]; 2]);

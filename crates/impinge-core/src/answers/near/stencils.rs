@@ -6,7 +6,7 @@ use super::{NearIter, NearPair, NearPairs};
 use crate::answers::areas::Areas;
 use crate::answers::numbering::Numbering;
 use crate::answers::pairs::Element;
-use crate::answers::stencil::Mollifier;
+use crate::answers::stencil::Threshold;
 use crate::answers::stencils::{PART, StencilRow, Stencils, WHAT};
 use crate::query::pair_kind::PairKind;
 use crate::scene::Scene;
@@ -280,9 +280,9 @@ impl Reader<'_> {
         let vertices = [vertex(i), vertex(j), vertex(k), vertex(l)];
         let threshold = match (self.rest, kind) {
             (Some(rest), PairKind::EdgeEdge) => {
-                Mollifier::threshold(&vertices.map(|vertex| rest[vertex as usize]))
+                Threshold::at_rest(&vertices.map(|vertex| rest[vertex as usize]))
             }
-            _ => 0.0,
+            _ => Threshold::default(),
         };
         to.put(StencilRow {
             kind,

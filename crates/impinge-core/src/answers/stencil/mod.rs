@@ -13,7 +13,7 @@ use crate::scene::vector::{cross, dot, sub};
 use impinge_exact::Point;
 
 pub(crate) use distance::NearestWay;
-pub(crate) use mollifier::Mollifier;
+pub(crate) use mollifier::{Mollifier, Threshold};
 pub use projection::{project_psd, project_psd_all};
 
 /// Derivatives by the coordinates of four points.

@@ -5,30 +5,75 @@
 //! below the threshold and 1 from there on. The threshold is 1e-3 of the product of the squared
 //! lengths at rest.
 
+//!
+//! Lengths to the fourth power would soon overflow or underflow, so lengths are measured in a power
+//! of two near those at rest. That is exact: a scene that is 2^300 times as large has the same
+//! mollifiers, bit by bit.
+
 use std::array::from_fn;
 
 use super::{Gradient, Hessian, Point, cross, dot, sub};
+use crate::scene::vector::scaled;
+use impinge_exact::internal::power_of_two;
+
+/// What the squared length of the cross product is compared with; 0 by default, which none is below.
+///
+/// Packed for the sake of stencils, of which there are many.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[repr(C, packed(2))]
+pub(crate) struct Threshold {
+    /// Where lengths are measured in `2^exponent`.
+    value: f64,
+    exponent: i16,
+}
+
+impl Threshold {
+    /// Of edges 0-1 and 2-3 of four points at rest.
+    pub fn at_rest(rest: &[Point; 4]) -> Self {
+        let edges = edges(rest);
+        let [a, b] = edges.map(exponent_of);
+        // Halfway between both edges, so that the product is near 1 and each square finite.
+        let halfway = ((a + b) >> 1).max(a.max(b) - 500);
+        let exponent = halfway.clamp(-1000, 1000);
+        let unit = power_of_two(-i32::from(exponent));
+        let [u, v] = edges.map(|edge| scaled(edge, unit));
+        Threshold {
+            value: 1e-3 * dot(u, u) * dot(v, v),
+            exponent,
+        }
+    }
+}
+
+/// Edges 0-1 and 2-3.
+fn edges(points: &[Point; 4]) -> [Point; 2] {
+    [sub(points[1], points[0]), sub(points[3], points[2])]
+}
+
+/// Of the largest coordinate; that of the smallest normal numbers, or one less, below them.
+fn exponent_of(edge: Point) -> i16 {
+    let largest = edge.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+    (largest.to_bits() >> 52) as i16 - 1023
+}
 
 /// The mollifier of edges 0-1 and 2-3 of four points, below its threshold.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Mollifier {
+    /// Lengths are multiplied by this power of two here.
+    unit: f64,
     edges: [Point; 2],
     normal: Point,
     threshold: f64,
 }
 
 impl Mollifier {
-    /// What the squared length of the cross product is compared with, from the points at rest.
-    pub fn threshold(rest: &[Point; 4]) -> f64 {
-        let [u, v] = [sub(rest[1], rest[0]), sub(rest[3], rest[2])];
-        1e-3 * dot(u, u) * dot(v, v)
-    }
-
     /// None at the threshold and above.
-    pub fn below(points: &[Point; 4], threshold: f64) -> Option<Self> {
-        let edges = [sub(points[1], points[0]), sub(points[3], points[2])];
+    pub fn below(points: &[Point; 4], threshold: Threshold) -> Option<Self> {
+        let unit = power_of_two(-i32::from(threshold.exponent));
+        let edges = edges(points).map(|edge| scaled(edge, unit));
         let normal = cross(edges[0], edges[1]);
+        let threshold = threshold.value;
         (dot(normal, normal) < threshold).then_some(Mollifier {
+            unit,
             edges,
             normal,
             threshold,
@@ -60,7 +105,7 @@ impl Mollifier {
 
     pub fn gradient(&self) -> Gradient {
         let slope = self.slope();
-        self.gradient_of_square().map(|x| slope * x)
+        self.gradient_of_square().map(|x| slope * x * self.unit)
     }
 
     pub fn hessian(&self) -> Hessian {
@@ -82,7 +127,8 @@ impl Mollifier {
         from_fn(|i| {
             from_fn(|j| {
                 let signs = sign(i) * sign(j);
-                slope * signs * second(i, j) + curvature * (square[i] * square[j])
+                let sum = slope * signs * second(i, j) + curvature * (square[i] * square[j]);
+                sum * self.unit * self.unit
             })
         })
     }

@@ -43,24 +43,29 @@ pub fn project_psd<const N: usize>(matrix: &mut Square<N>) {
 /// Inlined, as all that it calls, so that it is compiled for each instruction set.
 #[inline(always)]
 fn project<const N: usize>(matrix: &mut Square<N>) {
-    let mean = |i: usize, j: usize| 0.5 * matrix[i][j] + 0.5 * matrix[j][i];
+    // Halves of the smallest numbers would be rounded.
+    let mean = |i: usize, j: usize| {
+        let sum = matrix[i][j] + matrix[j][i];
+        let halves = 0.5 * matrix[i][j] + 0.5 * matrix[j][i];
+        if sum.is_finite() { 0.5 * sum } else { halves }
+    };
     let symmetric: Square<N> = from_fn(|i| from_fn(|j| mean(i, j)));
     let largest = symmetric.as_flattened().iter();
     let largest = largest.fold(0.0_f64, |most, x| most.max(x.abs()));
     *matrix = symmetric;
-    // A power of two, so that squares neither overflow nor vanish and nothing is rounded.
-    let scale = f64::from_bits(largest.to_bits() & f64::INFINITY.to_bits());
-    if scale == 0.0 {
+    if largest == 0.0 {
         return;
     }
+    // The power of two below, so that squares neither overflow nor vanish and nothing is rounded.
+    let exponents = largest.to_bits() & f64::INFINITY.to_bits();
+    let scale = f64::from_bits(exponents.max(1 << largest.to_bits().ilog2()));
     let (values, vectors) = eigen(symmetric.map(|row| row.map(|x| x / scale)));
     for (value, vector) in values.into_iter().zip(vectors) {
         // What is negative by rounding alone is left: taking it off would be no more accurate.
         if value < -f64::EPSILON {
-            let value = value * scale;
             for (row, x) in matrix.iter_mut().zip(vector) {
                 for (entry, y) in row.iter_mut().zip(vector) {
-                    *entry -= value * (x * y);
+                    *entry -= value * (x * y) * scale;
                 }
             }
         }
