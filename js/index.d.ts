@@ -365,7 +365,8 @@ export interface Pairs extends Answer, List<[Body, number, Body, number]> {
   colliding(body: Body): Uint32Array;
   /**
    * Which pairs an older answer also has, which are new, and which are gone. Pairs are the same if their bodies and elements are. Refused
-   * of answers about another scene, and where both have pairs of a body that was re-meshed between them, or of edges of it that were set.
+   * of answers about another scene, and where both have pairs with elements of the same sort (vertices, edges or faces) of a body that was re-meshed
+   * between them, or with edges of it that were set.
    */
   changes(old: Pairs): Changes;
 }

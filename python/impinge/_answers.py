@@ -221,12 +221,12 @@ class Pairs:
         """Which pairs an older answer also has, which are new, and which are gone.
 
         Two pairs are the same if their bodies and elements are. Pairs of a body that was removed and of one that has its number now
-        differ; those of a body that was re-meshed are named by their numbers alone.
+        differ.
 
         Parameters
         ----------
         old : Pairs
-            Of the same scene.
+            Of the same scene or a copy of it.
 
         Returns
         -------
@@ -498,7 +498,8 @@ class Impacts(_OfKinds):
         Parameters
         ----------
         old : Impacts
-            Of the same scene; of a part (`of`), the same part.
+            Of the same scene or a copy of it. Parts (`of`) are compared as they are: beside another part, or beside all, pairs of
+            other kinds are new or gone.
 
         Returns
         -------
@@ -509,8 +510,8 @@ class Impacts(_OfKinds):
         TypeError
             An answer to another question.
         ValueError
-            An answer about another scene; or both have pairs of a body that was re-meshed between them, or of edges of
-            it that were set (`Scene.set_edges`).
+            An answer about another scene; or both have pairs with elements of the same sort (vertices, edges or faces) of a body
+            that was re-meshed between them, or with edges of it that were set (`Scene.set_edges`).
         """
         return Changes(*self._inner.changes(_older(old, Impacts)))
 
@@ -604,7 +605,8 @@ class NearPairs(_OfKinds):
         Parameters
         ----------
         old : NearPairs
-            Of the same scene; of a part (`of`), the same part.
+            Of the same scene or a copy of it. Parts (`of`) are compared as they are: beside another part, or beside all, pairs of
+            other kinds are new or gone.
 
         Returns
         -------
@@ -615,8 +617,8 @@ class NearPairs(_OfKinds):
         TypeError
             An answer to another question.
         ValueError
-            An answer about another scene; or both have pairs of a body that was re-meshed between them, or of edges of
-            it that were set (`Scene.set_edges`).
+            An answer about another scene; or both have pairs with elements of the same sort (vertices, edges or faces) of a body
+            that was re-meshed between them, or with edges of it that were set (`Scene.set_edges`).
         """
         return Changes(*self._inner.changes(_older(old, NearPairs)))
 

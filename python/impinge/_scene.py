@@ -25,8 +25,9 @@ __all__ = ["Scene"]
 class Scene(SceneBase):
     """Bodies with fixed topology, and where their vertices are now.
 
-    ``len(scene)`` is the number of bodies, ``body in scene`` says whether a handle is one of it. Scenes pickle and copy, with all
-    bodies under their numbers.
+    ``len(scene)`` is the number of bodies, ``body in scene`` says whether a handle is one of it. Scenes pickle, with all bodies under
+    their numbers. ``copy.copy`` and ``copy.deepcopy`` make a clone, which changes on its own: its bodies have the same handles, and
+    answers about the one can be compared (``changes``) with those about the other.
 
     Examples
     --------

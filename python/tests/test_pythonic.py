@@ -144,7 +144,15 @@ def test_scenes_pickle(duplicate):
     for question in [{}, {"which": "self"}]:
         assert detector.detect(other, **question).hash == detector.detect(scene, **question).hash
     assert detector.impacts(other).hash == detector.impacts(scene).hash
-    # They are two scenes from now on.
+    # They are two scenes from now on, also where positions were lent.
+    lent = TRIANGLE + np.float32(3)
+    lent.flags.writeable = False
+    scene.set_positions(0, lent, copy=False)
+    again = duplicate(scene)
+    scene.set_positions(0, TRIANGLE)
+    lent.flags.writeable = True
+    lent += 1
+    assert np.array_equal(again.positions(0), TRIANGLE + np.float32(3))
     other.set_positions(0, TRIANGLE + np.float32(9))
     assert np.array_equal(scene.positions(0), TRIANGLE)
     assert int(other.add(TRIANGLE, FACE)) == 1
@@ -517,6 +525,9 @@ def test_changes_between_frames():
         scene.set_positions(body, at)
         after = ask()
         parts = [(now.of("ee"), then.of("ee")) for now, then in zip(after[1:], before[1:])]
+        # A part beside all: pairs of other kinds are new or gone.
+        parts += [(now.of("ee"), then) for now, then in zip(after[1:], before[1:])]
+        parts += [(now, then.of("ee")) for now, then in zip(after[1:], before[1:])]
         for now, then in [*zip(after, before), *parts]:
             changes = now.changes(then)
             old, new = keys(then), keys(now)
@@ -531,6 +542,15 @@ def test_changes_between_frames():
         before[2].changes(before[1])
     with pytest.raises(TypeError, match="^old: NoneType given, Impacts needed$"):
         before[1].changes(None)
+    # A copy is a clone, with the same handles.
+    answers = ask()
+    for copied in (copy.copy(scene), copy.deepcopy(scene)):
+        again = detector.detect(copied), detector.impacts(copied), detector.near(copied, 0.1)
+        for answer, other in zip(again, answers):
+            kept, new, gone = answer.changes(other)
+            assert len(kept) == len(other) > 0 and len(new) == len(gone) == 0
+        copied.remove(body)
+        assert body in scene and body not in copied
     pickled = pickle.loads(pickle.dumps(scene))
     others = detector.detect(pickled), detector.impacts(pickled), detector.near(pickled, 0.1)
     for answer, other in zip(ask(), others):

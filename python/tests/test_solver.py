@@ -214,7 +214,8 @@ def test_what_is_left_out(detector):
     # Its pairs would be none in another scene.
     for foreign in [rest, sewn]:
         with pytest.raises(ValueError, match=r"^exclude\[1\]: of another scene"):
-            detector.near(copy.copy(scene), 0.3, exclude=[impinge.rings(1), foreign])
+            detector.near(pickle.loads(pickle.dumps(scene)), 0.3, exclude=[impinge.rings(1), foreign])
+    assert detector.near(copy.copy(scene), 0.3, exclude=sewn).hash == detector.near(scene, 0.3, exclude=sewn).hash
     with pytest.raises(ValueError, match=r"^groups\[2\]: -1 given, 0 or more allowed"):
         scene.set_groups(cloth, [0, 0, -1] + 45 * [0])
     with pytest.raises(ValueError, match=r"^pinned: shape \(48,\) of bool expected, "):

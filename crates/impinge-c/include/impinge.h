@@ -819,8 +819,8 @@ typedef struct impinge_changes impinge_changes;
 
 /* Which pairs of an older answer the first one also has, which are new in it, and which are gone: what a solver keeps per pair moves with
  * it. Two pairs are the same if their kinds, bodies and elements are, whatever their times, features and distances. Pairs of a body that
- * was removed and of one that has its number now differ. INVALID: an older answer about another scene; both answers have pairs of
- * a body that was re-meshed between them, or of edges of it that were set. */
+ * was removed and of one that has its number now differ. INVALID: an older answer about another scene; both answers have pairs with
+ * elements of the same sort (vertices, edges or faces) of a body that was re-meshed between them, or with edges of it that were set. */
 impinge_status impinge_pairs_changes(const impinge_pairs *pairs, const impinge_pairs *old, impinge_changes **changes);
 impinge_status impinge_impacts_changes(const impinge_impacts *impacts, const impinge_impacts *old, impinge_changes **changes);
 impinge_status impinge_near_changes(const impinge_near *near_pairs, const impinge_near *old, impinge_changes **changes);

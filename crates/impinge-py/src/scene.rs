@@ -573,6 +573,27 @@ impl Scene {
         )
     }
 
+    /// A clone: handles, answers and exclusions of the scene are also those of its copies.
+    fn __copy__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        let other = slf.get_type().call0()?;
+        let scene = slf.try_borrow()?;
+        let mut copied = change(other.cast::<Scene>()?)?;
+        // What is added to two scenes without bodies has nothing in common.
+        if scene.inner.n_bodies() > 0 {
+            copied.number = scene.number;
+        }
+        copied.inner = scene.inner.deep_clone();
+        drop(copied);
+        Ok(other)
+    }
+
+    fn __deepcopy__<'py>(
+        slf: &Bound<'py, Self>,
+        _memo: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        Scene::__copy__(slf)
+    }
+
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
         let py = slf.py();
         let scene = slf.try_borrow()?;

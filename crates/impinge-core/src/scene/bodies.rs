@@ -295,6 +295,20 @@ impl Scene {
         Ok(())
     }
 
+    /// A clone that shares no positions with their owners.
+    #[doc(hidden)]
+    pub fn deep_clone(&self) -> Self {
+        let mut clone = self.clone();
+        clone.each_body(Body::own_positions);
+        clone
+    }
+
+    fn each_body(&mut self, change: impl Fn(&mut Body)) {
+        let held = self.slots.iter_mut();
+        held.filter_map(|slot| slot.0.as_mut())
+            .for_each(|(_, body)| change(body));
+    }
+
     /// A body by its id.
     ///
     /// # Errors

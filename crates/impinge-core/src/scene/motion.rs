@@ -268,6 +268,17 @@ impl Scene {
 }
 
 impl Body {
+    /// Copies positions that are shared with their owners.
+    pub(super) fn own_positions(&mut self) {
+        self.positions.own();
+        if let Some(end) = &mut self.end {
+            end.own();
+        }
+        if let Some(motion) = &mut self.motion {
+            Arc::make_mut(&mut motion.rest).own();
+        }
+    }
+
     /// From where transforms start, taken out of the body.
     fn rest_pose(&mut self) -> RestPose {
         match self.motion.take() {

@@ -56,6 +56,18 @@ impl Positions {
         }
     }
 
+    /// Copies rows that are shared with their owner.
+    pub(crate) fn own(&mut self) {
+        match self {
+            Positions::F32(positions) => {
+                positions.own();
+            }
+            Positions::F64(positions) => {
+                positions.own();
+            }
+        }
+    }
+
     /// Refuses the first that is not finite.
     pub(crate) fn check(&self, body: BodyId) -> Result<(), Error> {
         match self {

@@ -241,8 +241,8 @@ impl NearPairs {
     ///
     /// # Errors
     /// The older answer is about another scene, which is no clone. Or both answers have pairs with
-    /// elements of which the numbers have changed: those of a body that was re-meshed, or edges
-    /// that were [set](crate::Scene::set_edges).
+    /// elements of the same sort (vertices, edges or faces) of a body that was re-meshed between
+    /// them, or with edges of it that were [set](crate::Scene::set_edges).
     pub fn changes(&self, old: &NearPairs) -> Result<Changes, Error> {
         self.check_comparable(old, None)?;
         let [old, new] = [old, self].map(|near| near.iter().map(NearPair::key));
