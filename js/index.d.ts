@@ -130,6 +130,8 @@ export interface Query extends Control {
    * body that are near in its surface: some vertex of one element is at most n edges, 0 to 16, away from some vertex of the other; with
    * `{ groups: [g, h] }` those of two groups of vertices, or of one with itself, see `setGroups`: each vertex of one element and each
    * vertex of the other must be in such groups, where several exclusions of groups are one rule, not each its own; or those of `scene.restPairs()`. Answers of `near` are not taken.
+   * Nothing is proven of pairs that are left out: a step that is free, or that `truncate`, `advance` or `safeDistances` allow, may take them
+   * through each other.
    */
   exclude?: readonly Exclusion[];
   /** Only pairs of the half-open box from a low to a high corner: that of the larger of the lower corners of both elements' boxes. */
@@ -259,6 +261,8 @@ export declare class Scene {
    * The pairs of elements that are within a distance of each other now, mostly at rest, to be left out of later questions by `exclude`. They
    * are of the kinds that `near` has if none are named: `"vf"`, `"ee"`, edges with faces that they meet (`"ef"`), and between bodies without
    * faces `"ev"` and `"vv"` as said at `kinds`. Pairs of other kinds, which a query must name, are left out by bodies, rings or groups alone.
+   * Positions and thickness alone count: neither pinned vertices nor filters nor groups. Nothing is proven of pairs that are left out: they
+   * may pass through each other.
    * The scene keeps them until either is disposed of, or the pairs are collected as garbage. Questions about another scene refuse them.
    */
   restPairs(distance: number): RestPairs;

@@ -115,6 +115,8 @@ class Query:
         that are near in the surface. ``groups(g, h)``: groups of vertices that do not meet. ``scene.rest_pairs(r)``: pairs that were
         near at rest, which `Detector.detect`, `count` and `any` refuse, for they are about other elements; these three find all pairs
         first, so that limits count what is left out, too. Several `groups` are one rule: see there. `Detector.nearest` takes bodies alone.
+        Nothing is proven of pairs that are left out: a step that is free (`Detector.is_free`), or that `Detector.truncate`, `advance` or
+        `safe_distances` allow, may take them through each other.
     owned_by : (low, high)
         Only the pairs that belong to the half-open box between these two corners, three numbers each: a pair belongs
         to the cell that holds the larger of the lower corners of its two bounding boxes, axis by axis; in a step, of boxes that hold
@@ -252,7 +254,7 @@ class Query:
 
 def rings(n: SupportsIndex) -> Exclusion:
     """Leaves out pairs of one body that are near each other in its surface: some vertex of one element is at most `n` edges away from
-    some vertex of the other. For ``exclude=``.
+    some vertex of the other. For ``exclude=``. Nothing is proven of pairs that are left out: they may pass through each other.
 
     Parameters
     ----------

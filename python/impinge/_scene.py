@@ -425,7 +425,9 @@ class Scene(SceneBase):
     def rest_pairs(self, distance: SupportsFloat) -> Exclusion:
         """The pairs of elements that are within a distance of each other now, to be left out of later questions with ``exclude=``: in
         a pose at rest, what is near is meant to be. They are of the kinds that `Detector.near` has if none are named; those of other
-        kinds stay.
+        kinds stay. Positions and thickness alone count: neither pinned vertices nor filters nor groups. All cores are used.
+
+        Nothing is proven of pairs that are left out: they may pass through each other.
 
         Parameters
         ----------
@@ -446,7 +448,7 @@ class Scene(SceneBase):
         >>> len(detector.near(scene, 1.0)) > 0, len(detector.near(scene, 1.0, exclude=scene.rest_pairs(1.0)))
         (True, 0)
         """
-        return _rest_pairs(Detector("cpu").near(self, distance)._inner, self)
+        return _rest_pairs(Detector("cpu")._near(self._at_rest(), distance, {}), self)
 
     def vertex_pairs(self, body: _Body, offsets: _Array, vertices: _Array, other: _Body | None = None) -> Exclusion:
         """Pairs of vertices, to be left out of questions with ``exclude=``: what is left out are the pairs of an element of one body and

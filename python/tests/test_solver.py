@@ -199,6 +199,13 @@ def test_what_is_left_out(detector):
     scene.set_pinned(points, np.ones(len(grid), bool))
     assert len(detector.near(scene, 0.3)) == 0
     scene.set_pinned(points, np.zeros(len(grid), bool))
+    # What is near at rest is so whatever is pinned or filtered.
+    hidden = copy.copy(scene)
+    for body in (cloth, points):
+        hidden.set_pinned(body, np.ones(len(grid), bool))
+        hidden.set_filter(body, mask=0)
+    assert len(detector.near(hidden, 1.0)) == 0 and repr(hidden.rest_pairs(1.0)) == repr(rest)
+    assert len(detector.near(scene, 1.0, exclude=hidden.rest_pairs(1.0))) == 0
     # A point and what is below it, as compressed sparse rows.
     offsets, listed = np.arange(len(grid) + 1), np.arange(len(grid))
     sewn = scene.vertex_pairs(points, offsets, listed, cloth)

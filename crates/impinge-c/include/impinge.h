@@ -301,11 +301,13 @@ typedef struct impinge_element {
  *                       corners of the boxes of both elements, axis by axis. Cells that cover space have each pair once. Bounds may be
  * infinite.
  *   exclusions, n_exclusions
- *                       Pairs to leave out. They are read during the call.
+ *                       Pairs to leave out. They are read during the call. Nothing is proven of pairs that are left out: a step that is
+ *                       free, or that impinge_truncate, impinge_advance or impinge_find_safe_distances allow, may take them through
+ *                       each other.
  *   rest_pairs, n_rest_pairs
  *                       Answers of impinge_find_near whose pairs are left out: of the same scene, mostly at rest, with the kinds of
- *                       pairs that are to be left out. Those of another scene are refused. Refused by questions about the elements
- *                       that bodies were given as.
+ *                       pairs that are to be left out, and found without pins and filters that would hide some. Those of another
+ *                       scene are refused. Refused by questions about the elements that bodies were given as.
  *   passes, passes_user Which pairs of elements may collide, of steps: 0 for those to leave out. It is asked about pairs that are in
  *                       contact, or might be, by several threads at the same time, and must always say the same of one pair. The first
  *                       element is the one that the kind of the pair names first. NULL, the default: all.

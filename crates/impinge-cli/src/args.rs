@@ -330,7 +330,8 @@ pub struct ExcludeArgs {
     #[arg(id = "exclude", long = "exclude", value_name = "A,B", value_parser = body_numbers, alias = "ignore")]
     pub bodies: Vec<(usize, usize)>,
     /// Leave out pairs of one body that are near each other in its surface: some vertices of the
-    /// two are at most N edges apart, 0 to 16
+    /// two are at most N edges apart, 0 to 16. Nothing is proven of them: they may pass through each
+    /// other
     #[arg(id = "exclude_rings", long = "exclude-rings", value_name = "N", value_parser = clap::value_parser!(u32).range(..=16))]
     pub rings: Option<u32>,
 }

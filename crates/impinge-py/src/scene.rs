@@ -464,6 +464,14 @@ impl Scene {
         Ok(Exclusion::vertices([a, b], offsets, vertices, self.number))
     }
 
+    /// Without filters and pinned vertices, for pairs at rest.
+    fn _at_rest(&self) -> Self {
+        Scene {
+            inner: self.inner.at_rest(),
+            number: self.number,
+        }
+    }
+
     fn _positions<'py>(
         &self,
         py: Python<'py>,

@@ -178,14 +178,14 @@ impl World {
         self.renumbered(body, set)
     }
 
-    /// Keeps the pairs that are within a distance now under a number, until they are
-    /// [forgotten](Self::forget_at_rest). Returns how many there are.
+    /// Keeps the pairs that are within a distance now, by positions and thickness alone, under a
+    /// number, until they are [forgotten](Self::forget_at_rest). Returns how many there are.
     ///
     /// # Errors
     /// Those of [`Detector::near`].
     pub fn keep_at_rest(&mut self, number: u32, distance: f64) -> Result<u32, Error> {
         let mut detector = Detector::new(Backend::Cpu)?;
-        let near = detector.near(&self.scene, distance, &Query::all())?;
+        let near = detector.near(&self.scene.at_rest(), distance, &Query::all())?;
         self.at_rest.push((number, Exclusion::from(&near)));
         // A module of 32 bits holds no more.
         Ok(near.len() as u32)

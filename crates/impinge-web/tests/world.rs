@@ -391,7 +391,13 @@ fn what_is_left_out_is_what_the_library_leaves_out() -> Result<(), Error> {
     assert_eq!(near(&mut asker, &world, &[])?, all);
     world.set_pinned(above, &[1, 1, 1])?;
     assert_eq!(near(&mut asker, &world, &[])?, 0);
+    // Pairs at rest are those of positions, whatever is pinned or filtered.
+    world.set_filter(above, 1, 0)?;
+    assert_eq!(world.keep_at_rest(7, 1.0)?, n);
+    world.set_filter(above, 1, u64::MAX)?;
     world.set_pinned(above, &[0, 0, 0])?;
+    assert_eq!(near(&mut asker, &world, &[])?, all);
+    assert_eq!(near(&mut asker, &world, &[3, 7, 0])?, 0);
     let said = |result: Result<(), Error>| result.expect_err("refused").to_string();
     // In the library the second one added is body 0.
     let text = said(world.set_groups(above, &[1, 2]));

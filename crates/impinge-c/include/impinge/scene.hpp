@@ -335,7 +335,8 @@ public:
   query &shared_vertex(impinge::shared_vertex rule) { return set(raw_.shared_vertex, static_cast<std::uint32_t>(rule)); }
   /// Leaves out the pairs of two bodies, or the self-collision of one.
   query &exclude(body a, body b) { return leave_out(IMPINGE_EXCLUDE_BODIES, a, b, 0); }
-  /// Leaves out pairs of one body that are at most `n` edges apart in its surface.
+  /// Leaves out pairs of one body that are at most `n` edges apart in its surface. Nothing is proven of pairs that are left out: they may
+  /// pass through each other.
   query &exclude_rings(std::uint32_t n) { return leave_out(IMPINGE_EXCLUDE_RINGS, 0, 0, n); }
   /// Leaves out pairs of elements of two groups of vertices: see `scene::set_groups`.
   query &exclude_groups(std::uint32_t g, std::uint32_t h) { return leave_out(IMPINGE_EXCLUDE_GROUPS, g, h, 0); }

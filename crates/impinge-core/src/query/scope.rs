@@ -81,7 +81,8 @@ impl Exclusion {
 
     /// Pairs of one body that are near each other in its surface: some vertex of one element is at
     /// most so many edges away from some vertex of the other. 0 leaves out what shares a vertex, 1
-    /// also what an edge joins.
+    /// also what an edge joins. Nothing is proven of pairs that are left out: they may pass through
+    /// each other.
     pub fn rings(n: u32) -> Self {
         Exclusion(Excluded::Rings(n))
     }
@@ -276,6 +277,14 @@ impl Query {
     /// [`Exclusion::groups`], groups of vertices that do not meet; [`Exclusion::vertices`], what
     /// the caller lists; the pairs of [`near`](crate::Detector::near), those that were near at
     /// rest. Each call leaves out more.
+    ///
+    /// Nothing is proven of pairs that are left out: a step that is
+    /// [free](crate::Detector::is_free), or that [`truncate`](crate::Detector::truncate),
+    /// [`advance`](crate::Detector::advance) or
+    /// [`safe_distances`](crate::Detector::safe_distances) allow, may take them through each other.
+    ///
+    /// Pairs of an answer are those that it has: without pairs that pinned vertices, filters or
+    /// its query left out at the time.
     ///
     /// All of them are about bodies of the scene that is asked about. Ids are the same in a scene
     /// and its clones, so make a scene at rest by `clone`: bodies of any other scene are refused as

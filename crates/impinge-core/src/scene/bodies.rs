@@ -303,6 +303,16 @@ impl Scene {
         clone
     }
 
+    /// A clone without filters and pinned vertices: near in it is what is near by positions and
+    /// thickness alone, for pairs at rest.
+    #[doc(hidden)]
+    pub fn at_rest(&self) -> Self {
+        let mut clone = self.clone();
+        clone.rearranged();
+        clone.each_body(|body| (body.filter, body.pinned) = (Filter::default(), None));
+        clone
+    }
+
     fn each_body(&mut self, change: impl Fn(&mut Body)) {
         let held = self.slots.iter_mut();
         held.filter_map(|slot| slot.0.as_mut())
