@@ -253,7 +253,7 @@ def test_vertices_refused(vertices, message):
     with pytest.raises(ValueError, match="^" + message):
         scene.add(vertices, FACE)
     body = scene.add(GOOD, FACE)
-    with pytest.raises(ValueError, match="^" + message):
+    with pytest.raises(ValueError, match="^body 0: " + message):
         scene.set_positions(body, vertices)
     assert np.array_equal(scene.positions(body), GOOD)
     with pytest.raises(ValueError, match="^" + message):

@@ -158,18 +158,18 @@ def test_views_of_read_only_arrays_are_lent(scene):
 
 def test_arrays_that_can_be_written_are_not_lent(scene):
     writable = np.ascontiguousarray(ACROSS, np.float32)
-    as_is = "^vertices: not an array that can be read as it is"
+    as_is = "^body 1: vertices: not an array that can be read as it is"
     for array, words in [
-        (writable, "^vertices: the array can be written.* set array.flags.writeable = False"),
-        (locked(writable[:]), "^vertices: the array is a view of one that can be written: set array.base.flags"),
+        (writable, "^body 1: vertices: the array can be written.* set array.flags.writeable = False"),
+        (locked(writable[:]), "^body 1: vertices: the array is a view of one that can be written: set array.base.flags"),
         (locked(np.frombuffer(bytearray(36), np.float32)).reshape(-1, 3), "belongs to a (bytearray|memoryview), which may change"),
         (locked(np.asfortranarray(ACROSS)), as_is),
         (locked(ACROSS.astype(np.int32)), as_is),
         (locked(ACROSS.astype(">f4")), as_is),
         (ACROSS.tolist(), as_is),
         (locked(writable[:2].copy()), "^vertices: 2 positions given, but body 1 has 3 vertices"),
-        (locked(np.full((3, 3), np.nan)), r"^vertices\[0, 0\] = nan: a position must be finite"),
-        (locked(np.zeros((3, 2))), r"^vertices: shape \(n, 3\) expected"),
+        (locked(np.full((3, 3), np.nan)), r"^body 1: vertices\[0, 0\] = nan: a position must be finite"),
+        (locked(np.zeros((3, 2))), r"^body 1: vertices: shape \(n, 3\) expected"),
     ]:
         for lend in (scene.set_positions, scene.set_end_positions):
             with pytest.raises(ValueError, match=words):

@@ -228,7 +228,7 @@ def test_end_positions(detector, falling):
     assert np.array_equal(falling.end_positions(1), lifted(-3)) and falling.end_positions(0) is None
     with pytest.raises(ValueError, match="^vertices: 2 positions given, but body 1 has 3 vertices"):
         falling.set_end_positions(1, FLOOR[:2])
-    with pytest.raises(ValueError, match=r"^vertices\[2, 0\] = inf: a position must be finite"):
+    with pytest.raises(ValueError, match=r"^body 1: vertices\[2, 0\] = inf: a position must be finite"):
         falling.set_end_positions(1, np.where([[0], [0], [1]], np.inf, FLOOR))
     with pytest.raises(ValueError, match="no body 7"):
         falling.set_end_positions(7, None)

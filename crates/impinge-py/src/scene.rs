@@ -147,6 +147,26 @@ fn change<'py>(scene: &Bound<'py, Scene>) -> PyResult<PyRefMut<'py, Scene>> {
     })
 }
 
+/// An argument about a body, as errors name it.
+fn named(id: BodyId, argument: &str) -> String {
+    format!("body {id}: {argument}")
+}
+
+/// An error of positions that a body is given.
+fn refuse_of(id: BodyId, error: impinge::Error) -> PyErr {
+    match error {
+        // Names the body.
+        impinge::Error::WrongNumberOfPositions { .. } => refuse(error, ARGUMENTS),
+        error => refuse(
+            error,
+            Names {
+                vertices: &named(id, "vertices"),
+                ..ARGUMENTS
+            },
+        ),
+    }
+}
+
 /// Moves a body, or the end of its step, by a matrix.
 fn move_by(
     scene: &Bound<'_, Scene>,
@@ -283,16 +303,15 @@ impl Scene {
     ) -> PyResult<()> {
         let mut scene = change(slf)?;
         let id = scene.id(body, "body")?;
-        let positions = PositionArray::new(vertices, "vertices")?;
+        let name = named(id, "vertices");
+        let positions = PositionArray::new(vertices, &name)?;
         let inner = &mut scene.inner;
         match &positions {
-            _ if !copy => {
-                inner.set_positions(id, lent::positions(vertices, &positions, "vertices")?)
-            }
+            _ if !copy => inner.set_positions(id, lent::positions(vertices, &positions, &name)?),
             PositionArray::F32(array) => inner.set_positions(id, slice_rows::<f32, 3>(array)?),
             PositionArray::F64(array) => inner.set_positions(id, slice_rows::<f64, 3>(array)?),
         }
-        .map_err(|error| refuse(error, ARGUMENTS))
+        .map_err(|error| refuse_of(id, error))
     }
 
     /// As `_set_positions`; `None` forgets them.
@@ -308,15 +327,16 @@ impl Scene {
         let Some(vertices) = vertices else {
             return inner.clear_end_positions(id).map_err(raise);
         };
-        let positions = PositionArray::new(vertices, "vertices")?;
+        let name = named(id, "vertices");
+        let positions = PositionArray::new(vertices, &name)?;
         match &positions {
             _ if !copy => {
-                inner.set_end_positions(id, lent::positions(vertices, &positions, "vertices")?)
+                inner.set_end_positions(id, lent::positions(vertices, &positions, &name)?)
             }
             PositionArray::F32(array) => inner.set_end_positions(id, slice_rows::<f32, 3>(array)?),
             PositionArray::F64(array) => inner.set_end_positions(id, slice_rows::<f64, 3>(array)?),
         }
-        .map_err(|error| refuse(error, ARGUMENTS))
+        .map_err(|error| refuse_of(id, error))
     }
 
     fn _remesh(
@@ -416,9 +436,9 @@ impl Scene {
         body: &Bound<'_, PyAny>,
         groups: &Bound<'_, PyAny>,
     ) -> PyResult<()> {
-        let groups = arrays::whole_numbers(groups, "groups")?;
         let mut scene = change(slf)?;
         let id = scene.id(body, "body")?;
+        let groups = arrays::whole_numbers(groups, &named(id, "groups"))?;
         scene.inner.set_groups(id, &groups).map_err(raise)
     }
 
@@ -430,7 +450,7 @@ impl Scene {
         let mut scene = change(slf)?;
         let id = scene.id(body, "body")?;
         let n_vertices = scene.inner.body(id).map_err(raise)?.n_vertices();
-        let pinned = arrays::mask(pinned, "pinned", n_vertices)?;
+        let pinned = arrays::mask(pinned, &named(id, "pinned"), n_vertices)?;
         scene.inner.set_pinned(id, &pinned).map_err(raise)
     }
 
