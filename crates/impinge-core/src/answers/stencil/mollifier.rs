@@ -4,7 +4,6 @@
 //! length of the cross product of the edges, and a threshold `e`, the factor is `s/e (2 - s/e)`
 //! below the threshold and 1 from there on. The threshold is 1e-3 of the product of the squared
 //! lengths at rest.
-
 //!
 //! Lengths to the fourth power would soon overflow or underflow, so lengths are measured in a power
 //! of two near those at rest. That is exact: a scene that is 2^300 times as large has the same
