@@ -670,15 +670,19 @@ export interface Region {
   area: [number, number, number];
   /** The direction in which to push the first body; `null` if the curves span no area. */
   normal: [number, number, number] | null;
-  /** Of `penetration`: how far the region extends along the normal. */
+  /** Of `penetration`: the extent of the region along the normal. Bodies that are pushed that far may still overlap. */
   depth: number | null;
-  /** Of `penetration`: what both bodies have in common; `null` where they meet other than by edges that cross faces, as in one plane. */
+  /** Of `penetration`: what both bodies have in common; `null` where they meet other than by edges that cross faces, as in one plane. Means nothing if a body crosses itself. */
   volume: number | null;
   /** Of `penetration`: vertices of the first body inside the second, and of the second inside the first. */
   inside: [Uint32Array, Uint32Array];
 }
 
-/** Where the triangles of pairs meet: contact i is that of row i. The hash is that of the pairs. */
+/**
+ * Where the triangles of pairs meet: contact i is that of row i. The hash is that of the pairs. Points are one if they have one name, by
+ * features: where a face is there twice, or faces of one body overlap in a plane, points and curves double, and what they would connect can
+ * be several regions.
+ */
 export interface Contacts extends Answer, List<Contact> {
   /** One index into `SHAPES` per contact. */
   readonly shapes: Uint8Array;

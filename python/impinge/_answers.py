@@ -323,7 +323,8 @@ class Pairs:
         Returns
         -------
         Pairs
-            New ones; these stay as they are.
+            New ones; these stay as they are. `Detector.penetration` refuses contacts of two bodies without some of their
+            pairs.
 
         Raises
         ------

@@ -921,8 +921,8 @@ class Detector(DetectorBase):
         ValueError, TypeError
             A body that the scene does not have or that is not made of triangles, twice the same body, a surface that is not
             closed, contacts of another scene, or without these two though they intersect; contacts of a query that left out pairs of
-            the two: in a cell, by groups or lists of vertices, or because faces of both were pinned. A body that has moved or was
-            re-meshed since the pairs were found.
+            the two: in a cell, by groups or lists of vertices, or because faces of both were pinned; contacts of pairs some of
+            which `Pairs.retain` dropped. A body that has moved or was re-meshed since the pairs were found.
         """
         return self._penetration(scene, contacts, a, b, control)
 

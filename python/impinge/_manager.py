@@ -39,7 +39,8 @@ class ContactData:
         The unit direction from the object that was added first (or is of this manager) to the other: pushed apart along it,
         they overlap less.
     depth : float
-        How far they must be pushed; 0 if that is unknown.
+        Of two convex objects, how far they must be pushed. Of others, the extent of a region of the overlap along the normal:
+        pushed that far, they may still overlap. 0 if it is unknown.
     """
 
     def __init__(

@@ -495,8 +495,9 @@ typedef struct impinge_region {
   double patch_area;    /* of faces of both bodies in one plane */
   double area[3];       /* the area that the curves span, as a vector */
   double normal[3];     /* unit direction in which to push body_a so that the overlap shrinks fastest; zero if there is none */
-  double depth;         /* how far the region extends along the normal; NaN if unknown */
-  double volume;        /* of what the bodies have in common; NaN if they meet other than by edges that cross faces, as in one plane */
+  double depth;         /* the extent of the region along the normal: bodies pushed that far may still overlap; NaN if unknown */
+  double volume;        /* of what the bodies have in common; NaN if they meet other than by edges that cross faces, as in one plane;
+                         * means nothing if a body crosses itself */
   uint32_t body_a, body_b;
   uint64_t n_contacts;  /* pairs in the region */
   uint64_t n_inside[2]; /* vertices of body_a inside body_b, and of body_b inside body_a */

@@ -13,8 +13,10 @@ use crate::errors::raise;
 /// Where the triangles of each pair of `Pairs` meet: points, segments, and polygons where both lie
 /// in one plane; and the curves in which surfaces cross. `Detector.contacts` finds them.
 ///
-/// Which features meet where, and which points are one, is exact. Coordinates are the exact numbers
-/// rounded: to float32 where both bodies hold float32, else to float64. Each access makes new
+/// Which features meet where, and which points are one, is exact. Points are one if they have one name,
+/// by features: where a face is there twice, or faces of one body overlap in a plane, points and
+/// curves double, and what they would connect can be several regions. Coordinates are the exact
+/// numbers rounded: to float32 where both bodies hold float32, else to float64. Each access makes new
 /// arrays.
 #[pyclass(module = "impinge", frozen)]
 pub struct Contacts {
@@ -67,7 +69,7 @@ impl Contacts {
         strings::<7>(py, names)
     }
 
-    /// numpy.ndarray of float64, shape (p, 3) : the points of contact, each once.
+    /// numpy.ndarray of float64, shape (p, 3) : the points of contact, each name once.
     #[getter]
     fn points<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let flat = self.inner.points().as_flattened().to_vec();
@@ -192,7 +194,8 @@ impl Penetration {
     }
 
     /// float or None : the volume that both bodies have in common, in cubic units; ``None`` where
-    /// it is unknown because they meet other than by edges that cross faces.
+    /// it is unknown because they meet other than by edges that cross faces. A body that crosses
+    /// itself has no defined volume: the number means nothing.
     #[getter]
     fn volume(&self) -> Option<f64> {
         self.inner.volume()
@@ -203,8 +206,9 @@ impl Penetration {
     /// Returns
     /// -------
     /// list of dict
-    ///     As of `Contacts.regions`, and ``inside`` (vertices of either body inside the other), ``depth`` (how far the region
-    ///     extends along its normal) and ``volume``; each may be ``None``.
+    ///     As of `Contacts.regions`, and ``inside`` (vertices of either body inside the other), ``depth`` (the extent of the
+    ///     region along its normal; bodies that are pushed that far may still overlap) and ``volume``; depth and volume may be
+    ///     ``None``.
     fn regions<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
         let of_region = |region: &Region| {
             let dict = to_dict(py, region)?;

@@ -68,9 +68,10 @@ Columns of numbers alone are a plain array in .npy files, others a structured on
 --regions of `pairs` and `self`: body_a, body_b, contacts, x, y, z, low_x, …, high_z, length, patch_area, area_x, area_y,
   area_z, nx, ny, nz, depth, volume, inside_a, inside_b. A region is connected contacts of two bodies: how many, its
   middle, its box, the length of its curves, the area in common planes, the area that the curves span. Push body a along
-  (nx, ny, nz), and the overlap shrinks fastest; by depth, and it is gone. Of two closed surfaces also the volume in
-  common, and how many vertices of each are inside the other; no volume where vertices or edges meet exactly what they
-  meet, as of aligned boxes. What is not known is empty, in .npy files NaN.",
+  (nx, ny, nz), and the overlap shrinks fastest. Of two closed surfaces also depth, the extent of the region along
+  (nx, ny, nz) (pushed that far, they may still overlap), the volume in common, and how many vertices of each are
+  inside the other; no volume where vertices or edges meet exactly what they meet, as of aligned boxes, and none that
+  means anything where a surface crosses itself. What is not known is empty, in .npy files NaN.",
     },
 ];
 

@@ -242,6 +242,8 @@ impl Pairs {
     /// by face or by vertex. `keep` is called once per pair, in order, after all pairs were found.
     /// So the answer is the same for every method, backend and thread count, provided that `keep`
     /// depends on the pair alone. The statistics do not change.
+    /// [`Detector::penetration`](crate::Detector::penetration) refuses contacts of two bodies without
+    /// some of their pairs.
     ///
     /// ```
     /// use impinge_core::{Backend, Detector, Query, Scene};
@@ -258,9 +260,15 @@ impl Pairs {
     /// ```
     pub fn retain(&mut self, mut keep: impl FnMut(Element, Element) -> bool) {
         let mut keys = std::mem::take(&mut self.keys);
+        let mut last_dropped = None;
         keys.retain(|&key| {
             let (a, b) = self.pair(key);
-            keep(a, b)
+            let is_kept = keep(a, b);
+            let bodies = [a.body, b.body];
+            if !is_kept && last_dropped.replace(bodies) != Some(bodies) {
+                self.gaps.drop_pair(bodies);
+            }
+            is_kept
         });
         self.keys = keys;
     }

@@ -31,6 +31,13 @@ impl Scale {
         Scale(power((-exponent).clamp(-MOST, MOST)))
     }
 
+    /// For some points.
+    pub fn of_points(points: &[Point]) -> Self {
+        let coordinates = points.as_flattened().iter();
+        let largest = coordinates.fold(0.0f64, |largest, x| largest.max(x.abs()));
+        Scale::of(largest, || largest)
+    }
+
     /// Whether coordinates are read as they are.
     pub fn is_one(self) -> bool {
         self.0 == 1.0
@@ -56,6 +63,16 @@ impl Scale {
     /// The length that a scaled length is.
     pub fn length_back(self, length: f64) -> f64 {
         length * (1.0 / self.0)
+    }
+
+    /// The area, or the component of one, that a scaled area is.
+    pub fn area_back(self, area: f64) -> f64 {
+        self.length_back(self.length_back(area))
+    }
+
+    /// The volume that a scaled volume is.
+    pub fn volume_back(self, volume: f64) -> f64 {
+        self.length_back(self.area_back(volume))
     }
 
     /// The point that a scaled point is.

@@ -10,7 +10,9 @@
 //! `O(n log n)`.
 
 use super::{Contacts, Shape};
+use crate::boxes::scale::Scale;
 use crate::scene::error::Error;
+use crate::scene::vector::dot;
 use crate::search::sink::{filled, grow, with_capacity};
 
 /// What memory is for.
@@ -185,8 +187,14 @@ impl Curves {
 }
 
 pub(super) fn distance(p: [f64; 3], q: [f64; 3]) -> f64 {
-    let [x, y, z] = [0, 1, 2].map(|k| q[k] - p[k]);
-    (x * x + y * y + z * z).sqrt()
+    length([0, 1, 2].map(|k| q[k] - p[k]))
+}
+
+/// The length of a vector, also where squares overflow or underflow.
+pub(super) fn length(vector: [f64; 3]) -> f64 {
+    let scale = Scale::of_points(&[vector]);
+    let vector = scale.point(vector);
+    scale.length_back(dot(vector, vector).sqrt())
 }
 
 /// All segments, each once, sorted.

@@ -1,16 +1,16 @@
-//! Which connected pieces of a closed surface have their faces turned inwards.
+//! Which connected pieces of a closed surface have their faces turned inwards, and which bound
+//! nothing.
 //!
-//! The signed volume of a piece says on which side of its faces the space lies that it encloses.
-//! That space is empty where the piece is the wall of a cavity: where the other pieces wind around
-//! it once more than the piece itself takes away. So a piece faces outwards if its volume is
-//! positive and the others do not wind around it the wrong way, or if it is negative and they wind
-//! around it.
+//! A body is where its surface winds around points: where the winding number is not 0. A piece that
+//! the others do not wind around faces outwards if its signed volume is positive. One that they wind
+//! around is the wall of a cavity if it takes back their winding number: its space is empty. Else
+//! there is solid on both of its sides, so it bounds nothing. Pieces are taken not to cross.
 //!
-//! Cost: a sum over all faces; with several pieces, some of which face inwards or are cavities, also a
-//! ray for each.
+//! Cost: a sum over all faces; where the box of a piece is within another's, also a ray for it.
 
 use super::inside::{ByY, passes};
 use super::topology::EdgesAround;
+use crate::boxes::scale::Scale;
 use crate::scene::Body;
 use crate::scene::elements::Elements;
 use crate::scene::error::Error;
@@ -24,7 +24,7 @@ const LOOK: usize = 1 << 13;
 /// Vertices of a piece that are tried.
 const MOST_SEEDS: usize = 16;
 
-/// By piece: -1 if its faces are turned inwards, else 1.
+/// By piece: 1 if its faces are turned outwards, -1 if inwards, 0 if it bounds nothing.
 pub(super) fn orientations(
     body: &Body,
     topology: &EdgesAround,
@@ -35,28 +35,73 @@ pub(super) fn orientations(
     };
     let position = |vertex: u32| body.positions().point(vertex as usize);
     let n_pieces = topology.n_pieces();
+    let boxes = boxes(body, topology);
+    let scales: Vec<Scale> = boxes.iter().map(|ends| Scale::of_points(ends)).collect();
     let mut volumes = vec![0.0; n_pieces];
     let mut origins: Vec<Option<Point>> = vec![None; n_pieces];
     for some in faces.chunks(LOOK) {
         work.step()?;
         for face in some.iter().filter(|face| has_corners(face)) {
             let piece = topology.piece(VertexIx::new(face[0]));
-            let corners = face.map(position);
+            let corners = face.map(|vertex| scales[piece].point(position(vertex)));
             // Of the piece itself: from afar, the sign of a small volume would be lost.
             let origin = *origins[piece].get_or_insert(corners[0]);
             let [p, q, r] = corners.map(|corner| sub(corner, origin));
             volumes[piece] += dot(p, cross(q, r));
         }
     }
-    let around = match n_pieces > 1 && volumes.iter().any(|&volume| volume < 0.0) {
-        true => around(body, faces, topology, work)?,
-        false => vec![0; n_pieces],
+    let nested = nested(&boxes);
+    let around = match nested.is_empty() {
+        true => vec![0; n_pieces],
+        false => around(body, faces, topology, nested, work)?,
     };
-    let sign = |(&volume, &around): (&f64, &i32)| {
-        let is_inward = around < 0 || (volume < 0.0 && around == 0);
-        if is_inward { -1.0 } else { 1.0 }
+    let orientation = |(&volume, &around): (&f64, &i32)| {
+        let own = if volume < 0.0 { -1 } else { 1 };
+        match (around, around + own) {
+            (0, _) => f64::from(own),
+            (_, 0) => f64::from(-own),
+            _ => 0.0,
+        }
     };
-    Ok(volumes.iter().zip(&around).map(sign).collect())
+    Ok(volumes.iter().zip(&around).map(orientation).collect())
+}
+
+/// The box of each piece.
+fn boxes(body: &Body, topology: &EdgesAround) -> Vec<[Point; 2]> {
+    let nowhere = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
+    let mut boxes = vec![nowhere; topology.n_pieces()];
+    for vertex in VertexIx::up_to(body.n_vertices()) {
+        if topology.neighbours(vertex).is_empty() {
+            continue;
+        }
+        let [low, high] = &mut boxes[topology.piece(vertex)];
+        let point = body.positions().point(vertex.index());
+        for k in 0..3 {
+            low[k] = low[k].min(point[k]);
+            high[k] = high[k].max(point[k]);
+        }
+    }
+    boxes
+}
+
+/// The pieces whose boxes are within the box of another piece.
+fn nested(boxes: &[[Point; 2]]) -> Vec<usize> {
+    let mut from_left: Vec<usize> = (0..boxes.len()).collect();
+    from_left.sort_by(|&p, &q| boxes[p][0][0].total_cmp(&boxes[q][0][0]));
+    let is_within = |piece: usize, other: usize| {
+        let ([low, high], [other_low, other_high]) = (boxes[piece], boxes[other]);
+        piece != other && (0..3).all(|k| other_low[k] <= low[k] && high[k] <= other_high[k])
+    };
+    let mut nested = Vec::new();
+    // Those that begin further left, or at the same place, and do not end before.
+    let mut open: Vec<usize> = Vec::new();
+    for at_one in from_left.chunk_by(|&p, &q| boxes[p][0][0] == boxes[q][0][0]) {
+        open.retain(|&other| boxes[other][1][0] >= boxes[at_one[0]][0][0]);
+        open.extend(at_one);
+        let is_nested = |piece: &usize| open.iter().any(|&other| is_within(*piece, other));
+        nested.extend(at_one.iter().copied().filter(is_nested));
+    }
+    nested
 }
 
 /// Whether a face names three vertices.
@@ -64,12 +109,13 @@ fn has_corners([a, b, c]: &[u32; 3]) -> bool {
     a != b && b != c && c != a
 }
 
-/// How often the others wind around each piece: around a vertex of it that is on none of them, if
-/// one of a few is not.
+/// How often the others wind around each of the wanted pieces: around a vertex of it that is on none
+/// of them, if one of a few is not.
 fn around(
     body: &Body,
     faces: &[[u32; 3]],
     topology: &EdgesAround,
+    mut wanted: Vec<usize>,
     work: Work<'_>,
 ) -> Result<Vec<i32>, Error> {
     let position = |vertex: u32| body.positions().point(vertex as usize);
@@ -79,9 +125,7 @@ fn around(
         of_pieces[topology.piece(VertexIx::new(face[0]))].push(ix);
     }
     let mut found = vec![0; n_pieces];
-    let mut wanted: Vec<usize> = (0..n_pieces)
-        .filter(|&piece| !of_pieces[piece].is_empty())
-        .collect();
+    wanted.retain(|&piece| !of_pieces[piece].is_empty());
     for attempt in 0..MOST_SEEDS {
         // From all over the piece.
         let seed = |piece: usize| {

@@ -4,7 +4,9 @@
 //! 1. Vertices inside: exact winding numbers (see `inside`).
 //! 2. Each edge that crosses the other surface is cut at its crossings. The signs of the crossed
 //!    faces say which pieces are inside. The two ends of a piece inside belong to one region,
-//!    whether they are crossings or vertices.
+//!    whether they are crossings, vertices inside or vertices on the other surface. Where an edge
+//!    meets the other surface in its edges or vertices, or has both ends on it, the pieces are not
+//!    known: all its points and ends count as one region.
 //! 3. The border of the overlap consists of the parts of faces that lie inside. Each part is a
 //!    polygon whose sides are segments of contact and pieces of edges. So the volume is a sum over
 //!    these sides, and no polygon is ever assembled (divergence theorem, then Stokes' theorem on
@@ -20,12 +22,13 @@ use super::orientation::orientations;
 use super::regions::{NO_REGION, Region, WHAT, join_contacts, regions};
 use super::topology::EdgesAround;
 use super::{Contacts, Feature, PointName, Shape};
+use crate::boxes::scale::Scale;
 use crate::scene::by_body::ByBody;
 use crate::scene::elements::{BodyKind, Elements};
 use crate::scene::error::Error;
 use crate::scene::ids::BodyId;
 use crate::scene::index::VertexIx;
-use crate::scene::vector::{add, cross, dot, scaled, sub};
+use crate::scene::vector::{cross, dot, sub};
 use crate::scene::{Body, Scene};
 use crate::search::sets::Sets;
 use crate::search::sink::grow;
@@ -64,7 +67,8 @@ impl std::fmt::Debug for Penetration {
 }
 
 impl Penetration {
-    /// The volume of all regions together; `None` if the volume of any region is unknown.
+    /// The volume of all regions together; `None` if the volume of any region is unknown. A body
+    /// that crosses itself has no defined volume: the number means nothing.
     pub fn volume(&self) -> Option<f64> {
         let volumes = self.regions.iter().map(|region| region.volume);
         // The sum of nothing is -0.
@@ -168,8 +172,8 @@ struct Crossings<'a> {
     body: u32,
     /// Edges with the points on them, sorted.
     on_edges: Vec<(EdgeVertices, u32)>,
-    /// Vertices on the other surface, sorted.
-    on_vertices: Vec<VertexIx>,
+    /// Vertices on the other surface with the points there, sorted.
+    on_vertices: Vec<(VertexIx, u32)>,
     /// Whether any edge at a vertex is crossed.
     is_touched: Vec<bool>,
 }
@@ -194,14 +198,13 @@ impl<'a> Crossings<'a> {
                 }
                 Feature::Vertex(vertex) => {
                     grow(&mut crossings.on_vertices, 1, WHAT)?;
-                    crossings.on_vertices.push(VertexIx::new(vertex));
+                    crossings.on_vertices.push((VertexIx::new(vertex), point));
                 }
                 Feature::Face(_) => {}
             }
         }
         crossings.on_edges.sort_unstable();
         crossings.on_vertices.sort_unstable();
-        crossings.on_vertices.dedup();
         for (edge, _) in &crossings.on_edges {
             let n = edge[1].index() + 1;
             if crossings.is_touched.len() < n {
@@ -219,7 +222,18 @@ impl<'a> Crossings<'a> {
     }
 
     fn is_on(&self, vertex: VertexIx) -> bool {
-        !self.on_vertices.is_empty() && self.on_vertices.binary_search(&self.lowest(vertex)).is_ok()
+        self.point_on(vertex).is_some()
+    }
+
+    /// The first of the points at a vertex on the other surface.
+    fn point_on(&self, vertex: VertexIx) -> Option<u32> {
+        if self.on_vertices.is_empty() {
+            return None;
+        }
+        let lowest = self.lowest(vertex);
+        let first = self.on_vertices.partition_point(|held| held.0 < lowest);
+        let found = self.on_vertices.get(first).filter(|held| held.0 == lowest);
+        found.map(|held| held.1)
     }
 
     fn is_touched(&self, vertex: VertexIx) -> bool {
@@ -277,6 +291,8 @@ impl OverlapWork<'_> {
         let mut sets = Sets::new(n_points + n_parts[0] + n_parts[1], WHAT)?;
         join_contacts(self.contacts, &mut sets);
         let pieces = [self.pieces(0, &mut sets)?, self.pieces(1, &mut sets)?];
+        self.join_at_vertices(0, &mut sets);
+        self.join_at_vertices(1, &mut sets);
         work.step()?;
         let curves = Curves::new(self.contacts)?;
         work.step()?;
@@ -295,6 +311,9 @@ impl OverlapWork<'_> {
                 let region = &mut region_of[sets.find(node) as usize];
                 if *region == NO_REGION {
                     // A shell of one body that has no contact with the other.
+                    if self.orientation_at(side, vertex) == 0.0 {
+                        continue;
+                    }
                     *region = regions.len() as u32;
                     regions.push(Region::at(numbers, at));
                 }
@@ -311,18 +330,22 @@ impl OverlapWork<'_> {
             region.volume = self.is_generic(region).then_some(volume);
             region.depth = region.normal.map(|normal| self.extent(region, normal));
             if region.contacts.is_empty() {
-                region.position = scaled(add(region.bounds[0], region.bounds[1]), 0.5);
+                let scale = region.scale();
+                region.position = scale.point_back(region.origin(scale));
             }
         }
         regions.retain(is_asked);
         Ok(Penetration { inside, regions })
     }
 
-    /// -1 if a face is turned inwards, else 1.
+    /// Of the faces at a vertex: see [`orientations`].
+    fn orientation_at(&self, side: usize, vertex: VertexIx) -> f64 {
+        self.orientations[side][self.topologies[side].piece(vertex)]
+    }
+
     fn orientation(&self, side: usize, face: u32) -> f64 {
         let corner = self.bodies[side].elements().corners(face as usize)[0];
-        let piece = self.topologies[side].piece(VertexIx::new(corner));
-        self.orientations[side][piece]
+        self.orientation_at(side, VertexIx::new(corner))
     }
 
     /// The same of the faces of a contact.
@@ -339,6 +362,12 @@ impl OverlapWork<'_> {
         };
         let part = self.parts[side].inside(vertex)?;
         Some((self.contacts.points().len() + n_before) as u32 + part)
+    }
+
+    /// The same of a vertex that is inside or on the other surface.
+    fn member(&self, side: usize, vertex: VertexIx) -> Option<u32> {
+        let on = || self.crossings[side].point_on(vertex);
+        self.node(side, vertex).or_else(on)
     }
 
     fn position(&self, side: usize, vertex: VertexIx) -> Point {
@@ -362,7 +391,7 @@ impl OverlapWork<'_> {
                     }
                 }
                 None => {
-                    let ends = edge.map(|vertex| self.node(side, vertex));
+                    let ends = edge.map(|vertex| self.member(side, vertex));
                     let nodes: Vec<u32> = points
                         .into_iter()
                         .chain(ends.into_iter().flatten())
@@ -374,6 +403,56 @@ impl OverlapWork<'_> {
             }
         }
         Ok(pieces)
+    }
+
+    /// Joins each point at a vertex on the other surface with other points there, and with the far
+    /// ends of edges that lead inside and are not crossed.
+    fn join_at_vertices(&self, side: usize, sets: &mut Sets) {
+        let crossings = &self.crossings[side];
+        if crossings.on_vertices.is_empty() {
+            return;
+        }
+        for at_one in crossings.on_vertices.chunk_by(|x, y| x.0 == y.0) {
+            for pair in at_one.windows(2) {
+                sets.join(pair[0].1, pair[1].1);
+            }
+        }
+        for (contact, row) in self.contacts.rows().iter().enumerate() {
+            let face = self.bodies[side]
+                .elements()
+                .corners(row[1 + 2 * side] as usize);
+            let face = || face.iter().map(|&corner| VertexIx::new(corner));
+            for from in face() {
+                let Some(point) = crossings.point_on(from) else {
+                    continue;
+                };
+                if !self.contacts.corners(contact).contains(&point) {
+                    continue;
+                }
+                for to in face().filter(|&to| !crossings.is_crossed([from, to])) {
+                    let end = self.node(side, to).or_else(|| {
+                        let end = crossings.point_on(to)?;
+                        let leads_in = self.may_lead_inside(side, point, to)
+                            && self.may_lead_inside(side, end, from);
+                        leads_in.then_some(end)
+                    });
+                    if let Some(end) = end {
+                        sets.join(point, end);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Whether an edge from the point of a vertex towards another vertex may begin inside. It is
+    /// known where the point lies within a face.
+    fn may_lead_inside(&self, side: usize, point: u32, towards: VertexIx) -> bool {
+        let Feature::Face(face) = self.contacts.names()[point as usize].features[1 - side] else {
+            return true;
+        };
+        let turned = self.orientation(1 - side, face);
+        let below = -self.step(side, towards, face);
+        turned == 0.0 && below != 0 || f64::from(below) * turned > 0.0
     }
 
     /// Puts points in their order along an edge.
@@ -401,18 +480,30 @@ impl OverlapWork<'_> {
         points: &[u32],
     ) -> Option<Vec<(Piece, [u32; 2])>> {
         let [low, high] = edge;
-        let crossings = &self.crossings[side];
-        if crossings.is_on(low) || crossings.is_on(high) {
+        let step = |point: u32| match self.contacts.names()[point as usize].features[1 - side] {
+            Feature::Face(face) => Some(self.step(side, low, face)),
+            _ => None,
+        };
+        let total: i32 = points
+            .iter()
+            .map(|&point| step(point))
+            .sum::<Option<i32>>()?;
+        // Next to each end; unknown next to one that is on the other surface.
+        let [first, end] = edge.map(|vertex| {
+            let is_on = self.crossings[side].is_on(vertex);
+            (!is_on).then(|| self.parts[side].winding(vertex))
+        });
+        let mut winding = first.or(end.map(|end| end - total))?;
+        if end.is_some_and(|end| end != winding + total) {
             return None;
         }
         let mut pieces = Vec::new();
-        let mut winding = self.parts[side].winding(low);
-        let mut last = (self.node(side, low), self.position(side, low));
+        let mut last = (self.member(side, low), self.position(side, low));
         let ends = points.iter().map(|&point| Some(point)).chain([None]);
         for end in ends {
             let next = match end {
                 Some(point) => (Some(point), self.contacts.points()[point as usize]),
-                None => (self.node(side, high), self.position(side, high)),
+                None => (self.member(side, high), self.position(side, high)),
             };
             if winding != 0 {
                 let (from, to) = (last.0?, next.0?);
@@ -425,15 +516,11 @@ impl OverlapWork<'_> {
                 pieces.push((piece, [from, to]));
             }
             if let Some(point) = end {
-                let Feature::Face(face) = self.contacts.names()[point as usize].features[1 - side]
-                else {
-                    return None;
-                };
-                winding += self.step(side, low, face);
+                winding += step(point)?;
             }
             last = next;
         }
-        (winding == self.parts[side].winding(high)).then_some(pieces)
+        Some(pieces)
     }
 
     /// By how much the winding number grows where an edge, coming from vertex `from`, crosses a
@@ -476,30 +563,37 @@ impl OverlapWork<'_> {
             let vertices = region.inside[side].iter();
             vertices.map(move |&vertex| self.position(side, VertexIx::new(vertex)))
         });
-        let heights = corners.chain(inside).map(|point| dot(point, normal));
+        let scale = region.scale();
+        let heights = corners
+            .chain(inside)
+            .map(|point| dot(scale.point(point), normal));
         let (low, high) = heights
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), height| {
                 (low.min(height), high.max(height))
             });
-        (high - low).max(0.0)
+        scale.length_back((high - low).max(0.0))
     }
 
     /// The volume of each region: a sixth of the sum of `(x - o) · ((p - o) × (q - o))` over the
     /// sides pq of the parts of faces that lie inside, where x is any point of the face and o is
-    /// one point for all.
+    /// one point for all. Coordinates are scaled, with one power of two per region.
     fn volumes(
         &self,
         regions: &[Region],
         pieces: &[Vec<Piece>; 2],
         region: &mut dyn FnMut(u32) -> usize,
     ) -> Vec<f64> {
-        let origins: Vec<Point> = regions
+        let origins: Vec<(Scale, Point)> = regions
             .iter()
-            .map(|region| scaled(add(region.bounds[0], region.bounds[1]), 0.5))
+            .map(|region| {
+                let scale = region.scale();
+                (scale, region.origin(scale))
+            })
             .collect();
         let mut volumes = vec![0.0; regions.len()];
         let mut add_side = |at: usize, on: Point, [from, to]: [Point; 2], weight: f64| {
-            let [x, p, q] = [on, from, to].map(|point| sub(point, origins[at]));
+            let (scale, origin) = origins[at];
+            let [x, p, q] = [on, from, to].map(|point| sub(scale.point(point), origin));
             volumes[at] += weight * dot(x, cross(p, q)) / 6.0;
         };
         for (number, held) in regions.iter().enumerate() {
@@ -537,7 +631,10 @@ impl OverlapWork<'_> {
                     continue;
                 }
                 let on = self.position(side, face[0]);
-                let weight = self.orientations[side][self.topologies[side].piece(face[0])];
+                let weight = self.orientation_at(side, face[0]);
+                if weight == 0.0 {
+                    continue;
+                }
                 for k in 0..3 {
                     let (from, to) = (face[k], face[(k + 1) % 3]);
                     if !crossings.is_crossed([from, to]) {
@@ -565,6 +662,8 @@ impl OverlapWork<'_> {
                 }
             }
         }
-        volumes
+        let scaled = volumes.into_iter().zip(origins);
+        let volumes = scaled.map(|(volume, (scale, _))| scale.volume_back(volume));
+        volumes.collect()
     }
 }

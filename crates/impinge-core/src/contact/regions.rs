@@ -1,7 +1,7 @@
 //! Regions: connected contacts, each region with a position, a size, a normal and a depth.
 //!
-//! Two contacts are connected when they have a point in common. In closed bodies, edges and
-//! vertices inside connect contacts too ([`Penetration`](super::Penetration)).
+//! Two contacts are connected when they have a named point in common ([`Contacts`]). In closed
+//! bodies, edges and vertices inside connect contacts too ([`Penetration`](super::Penetration)).
 //!
 //! **Normal.** Let L be the directed curves of a region, and `a = ½ ∮ x × dx` the area that they
 //! span. By Stokes' theorem `a` is the integral of the first body's normals over its part inside
@@ -10,12 +10,13 @@
 //! *Volume contact constraints at arbitrary resolution*, 2010): push the first body that way. Where
 //! bodies touch only in a patch, `a` is the area of the patch.
 
-use super::curves::{Curves, distance};
+use super::curves::{Curves, distance, length};
 use super::{Contacts, Shape};
+use crate::boxes::scale::Scale;
 use crate::scene::error::Error;
-use crate::scene::vector::{add, cross, dot, scaled, sub};
+use crate::scene::vector::{add, cross, scaled, sub};
 use crate::search::sets::Sets;
-use crate::search::sink::{filled, grow};
+use crate::search::sink::{filled, grow, with_capacity};
 use impinge_exact::Point;
 
 /// What memory is for.
@@ -48,14 +49,15 @@ pub struct Region {
     /// Vertices of the first body inside the second, and of the second inside the first; sorted.
     /// Empty unless [`Penetration`](super::Penetration) found the region.
     pub inside: [Vec<u32>; 2],
-    /// How far the region extends along the normal: pushed that far, the bodies no longer overlap
-    /// in this region. `None` without a normal, or unless [`Penetration`](super::Penetration) found
-    /// the region.
+    /// The extent of the region along the normal. Bodies that are pushed that far may still overlap.
+    /// `None` without a normal, or unless [`Penetration`](super::Penetration) found the region.
     pub depth: Option<f64>,
     /// The volume that the bodies have in common, in cubic units. A cavity that no edge joins to
     /// its surroundings is a region of negative volume. `None` unless
-    /// [`Penetration`](super::Penetration) found the region. Also `None` if the bodies meet other
-    /// than by edges that cross faces (vertices on faces, edges on edges, common planes).
+    /// [`Penetration`](super::Penetration) found the region. Also `None` if the bodies meet in this
+    /// region other than by edges that cross faces (vertices on faces, edges on edges, common
+    /// planes). Infinite if it is larger than all `f64`. A body that crosses itself has no defined
+    /// volume: the number means nothing.
     pub volume: Option<f64>,
 }
 
@@ -85,7 +87,9 @@ pub(super) fn join_contacts(contacts: &Contacts, sets: &mut Sets) {
 
 /// The regions of sets of points, in the order of their first contacts, and the region of each
 /// point that stands for its set ([`NO_REGION`] for other points). `orientations`: of the two faces
-/// of a contact, -1 if it is turned inwards, else 1.
+/// of a contact, 1 if it faces outwards, -1 if it is turned inwards, 0 if it bounds nothing.
+///
+/// Areas and sums are of scaled coordinates, with one power of two per region.
 pub(super) fn regions(
     contacts: &Contacts,
     curves: &Curves,
@@ -94,7 +98,6 @@ pub(super) fn regions(
 ) -> Result<(Vec<Region>, Vec<u32>), Error> {
     let mut region_of = filled(NO_REGION, sets.len(), WHAT)?;
     let mut regions: Vec<Region> = Vec::new();
-    let mut middles: Vec<Middles> = Vec::new();
     for contact in 0..contacts.len() {
         let corners = contacts.corners(contact);
         let Some(&first) = corners.first() else {
@@ -104,33 +107,42 @@ pub(super) fn regions(
         if *region == NO_REGION {
             *region = regions.len() as u32;
             grow(&mut regions, 1, WHAT)?;
-            grow(&mut middles, 1, WHAT)?;
             let at = contacts.points()[first as usize];
             regions.push(Region::at(contacts.names()[first as usize].bodies, at));
-            middles.push(Middles::default());
         }
-        let at = *region as usize;
-        let (region, middle) = (&mut regions[at], &mut middles[at]);
+        let region = &mut regions[*region as usize];
         grow(&mut region.contacts, 1, WHAT)?;
         region.contacts.push(contact as u32);
-        let faces = orientations(contact as u32);
-        middle.is_mixed |= *middle.faces.get_or_insert(faces) != faces;
-        let points: Vec<Point> = corners
-            .iter()
-            .map(|&point| contacts.points()[point as usize])
-            .collect();
-        for &point in &points {
-            region.cover(point);
-            middle.points.take(point, 1.0);
+        for &point in corners {
+            region.cover(contacts.points()[point as usize]);
+        }
+    }
+    let mut middles = with_capacity(regions.len(), WHAT)?;
+    middles.extend(regions.iter().map(|region| Middles::of(region.scale())));
+    // Of the faces at each point: curves follow the normals of both.
+    let mut turns = filled(1.0, contacts.points().len(), WHAT)?;
+    for contact in 0..contacts.len() {
+        let corners = contacts.corners(contact);
+        let Some(&first) = corners.first() else {
+            continue;
+        };
+        let middle = &mut middles[region_of[sets.find(first) as usize] as usize];
+        let [of_a, of_b] = orientations(contact as u32);
+        let mut points = with_capacity(corners.len(), WHAT)?;
+        for &corner in corners {
+            let point = contacts.points()[corner as usize];
             middle.is_single &= point.iter().all(|&x| f64::from(x as f32) == x);
+            middle.points.take(middle.scale.point(point), 1.0);
+            points.push(middle.scale.point(point));
+            turns[corner as usize] = of_a * of_b;
         }
         if contacts.shape(contact) == Shape::Polygon {
             for k in 2..points.len() {
                 let (p, q, r) = (points[0], points[k - 1], points[k]);
                 let area = scaled(cross(sub(q, p), sub(r, p)), 0.5);
-                let size = dot(area, area).sqrt();
-                region.patch_area += size;
-                middle.patch = add(middle.patch, scaled(area, faces[0]));
+                let size = length(area);
+                middle.patch_area += size;
+                middle.patch = add(middle.patch, scaled(area, of_a * of_b.abs()));
                 middle
                     .patches
                     .take(scaled(add(add(p, q), r), 1.0 / 3.0), size);
@@ -138,22 +150,24 @@ pub(super) fn regions(
         }
     }
     for curve in 0..curves.len() {
-        let at = region_of[sets.find(curves.points(curve)[0]) as usize] as usize;
-        let (region, middle) = (&mut regions[at], &mut middles[at]);
-        let origin = scaled(add(region.bounds[0], region.bounds[1]), 0.5);
+        let first = curves.points(curve)[0];
+        let at = region_of[sets.find(first) as usize] as usize;
+        let middle = &mut middles[at];
+        let scale = middle.scale;
+        let origin = regions[at].origin(scale);
         for ends in curves.segments(curve) {
-            let [p, q] = ends.map(|point| contacts.points()[point as usize]);
+            let [p, q] = ends.map(|point| scale.point(contacts.points()[point as usize]));
             let length = distance(p, q);
-            region.length += length;
+            middle.length += length;
             middle.curves.take(scaled(add(p, q), 0.5), length);
             if curves.is_closed(curve) && curves.is_directed(curve) {
                 let area = scaled(cross(sub(p, origin), sub(q, origin)), 0.5);
-                region.area = add(region.area, area);
+                middle.area = add(middle.area, scaled(area, turns[first as usize]));
             }
         }
     }
     for (region, middle) in regions.iter_mut().zip(middles) {
-        region.finish(middle);
+        region.finish(&middle);
     }
     Ok((regions, region_of))
 }
@@ -179,30 +193,47 @@ impl Sum {
     }
 }
 
+/// Sums over a region, of scaled coordinates.
 struct Middles {
+    scale: Scale,
     /// Whether all coordinates are representable in `f32`.
     is_single: bool,
     curves: Sum,
     patches: Sum,
     points: Sum,
+    length: f64,
+    patch_area: f64,
+    area: Point,
     /// The area of all patches as a vector.
     patch: Point,
-    /// The orientations of the faces of the first contact, and whether others differ.
-    faces: Option<[f64; 2]>,
-    is_mixed: bool,
 }
 
-impl Default for Middles {
-    fn default() -> Self {
+impl Middles {
+    fn of(scale: Scale) -> Self {
         Middles {
+            scale,
             is_single: true,
             curves: Sum::default(),
             patches: Sum::default(),
             points: Sum::default(),
+            length: 0.0,
+            patch_area: 0.0,
+            area: [0.0; 3],
             patch: [0.0; 3],
-            faces: None,
-            is_mixed: false,
         }
+    }
+
+    /// The area that may come from rounding alone: the error of the coordinates along all curves
+    /// within a box.
+    fn noise(&self, bounds: [Point; 2]) -> f64 {
+        let epsilon = if self.is_single {
+            f64::from(f32::EPSILON)
+        } else {
+            f64::EPSILON
+        };
+        let coordinates = bounds.as_flattened().iter();
+        let size = coordinates.fold(0.0f64, |size, x| size.max(x.abs()));
+        4.0 * epsilon * size * (self.length + distance(bounds[0], bounds[1]))
     }
 }
 
@@ -232,41 +263,31 @@ impl Region {
         }
     }
 
-    /// The area that may come from rounding alone: the error of the coordinates along all curves.
-    fn noise(&self, is_single: bool) -> f64 {
-        let epsilon = if is_single {
-            f64::from(f32::EPSILON)
-        } else {
-            f64::EPSILON
-        };
-        let size = self
-            .bounds
-            .as_flattened()
-            .iter()
-            .fold(0.0f64, |size, x| size.max(x.abs()));
-        4.0 * epsilon * size * (self.length + distance(self.bounds[0], self.bounds[1]))
+    /// With which its areas and volumes neither overflow nor underflow.
+    pub(super) fn scale(&self) -> Scale {
+        Scale::of_points(&self.bounds)
     }
 
-    fn finish(&mut self, middles: Middles) {
-        let is_single = middles.is_single;
+    /// The middle of its box in scaled coordinates.
+    pub(super) fn origin(&self, scale: Scale) -> Point {
+        let [low, high] = self.bounds.map(|end| scale.point(end));
+        scaled(add(low, high), 0.5)
+    }
+
+    fn finish(&mut self, middles: &Middles) {
+        let scale = middles.scale;
         let found = middles.curves.middle();
         let found = found.or_else(|| middles.patches.middle());
-        self.position = found
-            .or_else(|| middles.points.middle())
-            .unwrap_or(self.position);
-        if middles.is_mixed {
-            // Some faces of one body are turned inwards, and some are not.
-            return;
-        }
-        // Curves follow the normals of both.
-        if let Some([a, b]) = middles.faces {
-            self.area = scaled(self.area, a * b);
-        }
-        let noise = self.noise(is_single);
+        let found = found.or_else(|| middles.points.middle());
+        self.position = found.map_or(self.position, |middle| scale.point_back(middle));
+        self.length = scale.length_back(middles.length);
+        self.patch_area = scale.area_back(middles.patch_area);
+        self.area = middles.area.map(|part| scale.area_back(part));
+        let noise = middles.noise(self.bounds.map(|end| scale.point(end)));
         let normal = |area: Point| {
-            let length = dot(area, area).sqrt();
+            let length = length(area);
             (length > noise).then(|| scaled(area, -1.0 / length))
         };
-        self.normal = normal(self.area).or_else(|| normal(middles.patch));
+        self.normal = normal(middles.area).or_else(|| normal(middles.patch));
     }
 }

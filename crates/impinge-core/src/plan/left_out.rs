@@ -53,6 +53,8 @@ impl VertexList {
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Gaps {
     has_cell: bool,
+    /// Bodies some of whose pairs the caller dropped, the lower first.
+    dropped: BTreeSet<[BodyId; 2]>,
     /// Of elements, with the body of each part.
     left_out: Option<(Arc<LeftOut>, Vec<BodyId>)>,
 }
@@ -64,10 +66,18 @@ impl Gaps {
         Ok(plan.gaps())
     }
 
-    /// What of the question leaves out pairs of two bodies, whose elements have not changed since.
+    /// Notes that the caller dropped a pair of two bodies.
+    pub fn drop_pair(&mut self, [a, b]: [BodyId; 2]) {
+        self.dropped.insert([a.min(b), a.max(b)]);
+    }
+
+    /// Why pairs of two bodies, whose elements have not changed since, are left out.
     pub fn between(&self, scene: &Scene, [a, b]: [BodyId; 2]) -> Option<&'static str> {
         if self.has_cell {
             return Some("a cell");
+        }
+        if self.dropped.contains(&[a.min(b), a.max(b)]) {
+            return Some("`retain`");
         }
         let (left_out, bodies) = self.left_out.as_ref()?;
         let of = |id| {
@@ -318,6 +328,7 @@ impl Plan {
     pub(crate) fn gaps(&self) -> Gaps {
         Gaps {
             has_cell: self.cell.is_some(),
+            dropped: BTreeSet::new(),
             left_out: self.left_out.as_ref().map(|left_out| {
                 let bodies = self.parts.iter().map(|part| part.id);
                 (Arc::clone(left_out), bodies.collect())

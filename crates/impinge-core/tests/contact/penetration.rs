@@ -670,3 +670,242 @@ fn bodies_that_are_inside_out_overlap_as_they_are() {
         }
     }
 }
+
+/// A box in `f64`, as a surface.
+fn cuboid(low: [f64; 3], high: [f64; 3]) -> (Vec<[u32; 3]>, Vec<[f64; 3]>) {
+    let model = surfaces::cuboid([0.0; 3], [1.0; 3]);
+    let at = |p: &[f32; 3]| [0, 1, 2].map(|k| if p[k] == 0.0 { low[k] } else { high[k] });
+    (
+        faces(&model).to_vec(),
+        model.positions.iter().map(at).collect(),
+    )
+}
+
+fn overlap_of(
+    a: &(Vec<[u32; 3]>, Vec<[f64; 3]>),
+    b: &(Vec<[u32; 3]>, Vec<[f64; 3]>),
+) -> Penetration {
+    let mut scene = Scene::new();
+    let [a, b] = [a, b].map(|(faces, positions)| scene.add_triangles(faces, positions).unwrap());
+    let mut detector = Detector::new(Backend::Cpu).unwrap();
+    let pairs = detector.detect(&scene, &Query::between(a, b)).unwrap();
+    let pairs = pairs.clone();
+    let contacts = detector.contacts(&scene, &pairs).unwrap();
+    detector.penetration(&scene, &contacts, a, b).unwrap()
+}
+
+/// Contacts without some of the pairs of two bodies would give other volumes.
+#[test]
+fn contacts_of_filtered_pairs_are_refused() {
+    let ball = surfaces::bumpy_ball(300, 0.2);
+    let mut scene = Scene::new();
+    let [a, b, c] = [[0.0; 3], [0.7, 0.1, 0.0], [0.3, 0.2, 0.6]]
+        .map(|place| ball.translated(place).add_to(&mut scene).unwrap());
+    let mut detector = Detector::new(Backend::Cpu).unwrap();
+    let all = detector.detect(&scene, &Query::all()).unwrap().clone();
+    let mut ask = |pairs: &impinge_core::Pairs, [a, b]: [_; 2]| {
+        let contacts = detector.contacts(&scene, pairs).unwrap();
+        detector.penetration(&scene, &contacts, a, b)
+    };
+    let whole = ask(&all, [a, b]).unwrap();
+    let mut kept = all.clone();
+    kept.retain(|_, _| true);
+    assert_eq!(ask(&kept, [a, b]).unwrap(), whole);
+    // One pair of the two others.
+    let mut is_first = true;
+    kept.retain(|p, q| [p.body, q.body] != [b, c] || !std::mem::take(&mut is_first));
+    assert_eq!(kept.len(), all.len() - 1);
+    assert_eq!(ask(&kept, [a, b]).unwrap().volume(), whole.volume());
+    let error = ask(&kept, [c, b]).unwrap_err().to_string();
+    assert_eq!(
+        error,
+        "contacts: without some of the two, because of `retain`, given, those of all pairs of the two allowed"
+    );
+}
+
+/// A shell around which the others wind anyway bounds nothing.
+#[test]
+fn shells_within_a_solid_that_face_as_it_does_are_solid() {
+    let outer = surfaces::cuboid([0.0; 3], [8.0; 3]);
+    let inner = surfaces::cuboid([2.0; 3], [6.0; 3]);
+    let cavity = inside_out(&surfaces::cuboid([2.5; 3], [5.5; 3]));
+    let peg = surfaces::cuboid([3.1, 3.2, 1.0], [4.1, 4.2, 3.0]);
+    let through = surfaces::cuboid([3.1, 3.2, 1.0], [4.1, 4.2, 9.0]);
+    let around = surfaces::cuboid([1.0, 1.1, 1.2], [9.0, 9.1, 9.2]);
+    let bodies = [
+        joined(&[outer.clone(), inner.clone()]),
+        joined(&[inner, outer.clone()]),
+        joined(&[outer, surfaces::cuboid([2.0; 3], [6.0; 3]), cavity]),
+    ];
+    for body in &bodies {
+        for turned in [body.clone(), inside_out(body)] {
+            let found = overlap(&turned, &peg);
+            assert_eq!(found.inside[1].len(), 8);
+            assert_eq!(found.regions.len(), 1);
+            assert!((found.volume().unwrap() - 2.0).abs() < 1e-6, "{found:?}");
+            let found = overlap(&turned, &through);
+            assert_eq!(found.regions.len(), 1);
+            assert!((found.volume().unwrap() - 7.0).abs() < 1e-5, "{found:?}");
+            let region = &found.regions[0];
+            assert!(normal(region)[2] < -0.999, "{region:?}");
+            assert!((region.depth.unwrap() - 7.0).abs() < 1e-6, "{region:?}");
+            // The inner shells are wholly in the other body.
+            let found = overlap(&turned, &around);
+            assert_eq!(found.regions.len(), 1);
+            assert_eq!(found.inside[0].len(), turned.positions.len() - 7);
+            let expected = 7.0 * 6.9 * 6.8;
+            assert!(
+                (found.volume().unwrap() - expected).abs() < 1e-3,
+                "{found:?}"
+            );
+        }
+    }
+}
+
+/// Squares and cubes of lengths overflow and underflow long before lengths do.
+#[test]
+fn normals_and_depths_are_right_at_any_size() {
+    for exponent in [-1000, -600, -300, -260, 0, 255, 260, 350, 600, 1000] {
+        let e = 2f64.powi(exponent);
+        let sized = |(faces, positions): (Vec<[u32; 3]>, Vec<[f64; 3]>)| {
+            let positions: Vec<[f64; 3]> = positions.iter().map(|p| p.map(|x| x * e)).collect();
+            (faces, positions)
+        };
+        let a = sized(cuboid([0.0; 3], [4.0; 3]));
+        let b = sized(cuboid([1.25, 1.125, 3.0], [2.25, 2.125, 5.0]));
+        let (turned_faces, positions) = b.clone();
+        let turned_faces: Vec<[u32; 3]> = turned_faces.iter().map(|&[a, b, c]| [a, c, b]).collect();
+        for b in [b, (turned_faces, positions)] {
+            let found = overlap_of(&a, &b);
+            assert_eq!(found.regions.len(), 1);
+            let region = &found.regions[0];
+            assert_eq!(
+                normal(region).map(|x| x + 0.0),
+                [0.0, 0.0, -1.0],
+                "{exponent}"
+            );
+            assert_eq!(region.depth, Some(e), "{exponent}");
+            assert_eq!(region.length, 4.0 * e, "{exponent}");
+            let (volume, expected) = (found.volume().unwrap(), e * e * e);
+            assert!(
+                volume == expected || (volume / expected - 1.0).abs() < 1e-12,
+                "{exponent}: {volume} for {expected}"
+            );
+            assert_eq!(region.area[2], e * e, "{exponent}");
+            assert_eq!(
+                region.position,
+                [1.75 * e, 1.625 * e, 4.0 * e],
+                "{exponent}"
+            );
+        }
+        // Touching in a patch.
+        let b = sized(cuboid([1.25, 1.125, 4.0], [2.25, 2.125, 5.0]));
+        let found = overlap_of(&a, &b);
+        let region = &found.regions[0];
+        assert_eq!(
+            normal(region).map(|x| x + 0.0),
+            [0.0, 0.0, -1.0],
+            "{exponent}"
+        );
+        assert_eq!((region.patch_area, region.depth), (e * e, Some(0.0)));
+    }
+}
+
+/// Where a vertex lies on the other surface, what hangs together is one region, whose volume is
+/// unknown: no part of it has a wrong number.
+#[test]
+fn vertices_on_the_other_surface_belong_to_the_region_around_them() {
+    let cube = cuboid([0.0; 3], [1.0; 3]);
+    let tetrahedron = |corners: [[f64; 3]; 4]| {
+        let faces = vec![[0u32, 1, 2], [0, 3, 1], [1, 3, 2], [2, 3, 0]];
+        (faces, corners.to_vec())
+    };
+    let spike = tetrahedron([
+        [0.25, 0.25, 2.0],
+        [0.75, 0.375, 2.0],
+        [0.4375, 0.75, 2.0],
+        [0.5, 0.4375, 0.0],
+    ]);
+    let corner_on_wall = [
+        [0.5, 0.25, 0.0],
+        [0.25, 0.625, 0.5],
+        [0.75, 0.6875, 0.5],
+        [0.5, 0.25, 0.75],
+    ];
+    let peg = cuboid([0.375, 0.25, 0.0], [0.625, 0.4375, 2.0]);
+    for (b, depth) in [
+        (spike, Some(1.0)),
+        (cuboid([0.25, 0.375, 0.0], [0.625, 0.75, 0.75]), Some(0.75)),
+        (tetrahedron(corner_on_wall), None),
+        (tetrahedron([1, 0, 3, 2].map(|k| corner_on_wall[k])), None),
+        (tetrahedron([3, 2, 1, 0].map(|k| corner_on_wall[k])), None),
+        (peg, Some(1.0)),
+    ] {
+        for swapped in [false, true] {
+            let found = match swapped {
+                false => overlap_of(&cube, &b),
+                true => overlap_of(&b, &cube),
+            };
+            assert_eq!(found.regions.len(), 1, "{:?}", found.regions);
+            let region = &found.regions[0];
+            assert_eq!((region.volume, found.volume()), (None, None));
+            let deep = region.depth.map(|depth| (depth * 64.0).round() / 64.0);
+            assert_eq!(deep, depth, "{region:?}");
+        }
+    }
+    // A corner that is flush with the other's: its tip inside belongs to it.
+    let (four, flush) = (cuboid([0.0; 3], [4.0; 3]), cuboid([2.0; 3], [4.0; 3]));
+    let found = overlap_of(&four, &flush);
+    assert_eq!(found.regions.len(), 1);
+    assert_eq!((found.volume(), found.inside[1].len()), (None, 1));
+    assert_eq!(found.regions[0].inside, found.inside);
+}
+
+/// Two vertices that touch are in one region if the edge between them is inside, and in two if it
+/// is outside.
+#[test]
+fn edges_between_vertices_that_touch_join_what_they_run_through() {
+    let two = {
+        let (faces, mut positions) = cuboid([-1.0, 0.0, 0.0], [0.0, 4.0, 4.0]);
+        let (other_faces, other) = cuboid([4.0, 0.0, 0.0], [5.0, 4.0, 4.0]);
+        let n = positions.len() as u32;
+        positions.extend(other);
+        let moved = other_faces.iter().map(|face| face.map(|vertex| vertex + n));
+        (faces.iter().copied().chain(moved).collect(), positions)
+    };
+    let between = (
+        vec![[0u32, 1, 2], [0, 3, 1], [1, 3, 2], [2, 3, 0]],
+        vec![
+            [0.0, 1.0, 1.25],
+            [4.0, 2.25, 2.0],
+            [2.0, 0.5, 3.0],
+            [2.0, 3.0, 3.5],
+        ],
+    );
+    let one = cuboid([0.0; 3], [4.0; 3]);
+    let turned = |(faces, positions): &(Vec<[u32; 3]>, Vec<[f64; 3]>)| {
+        let faces = faces.iter().map(|&[a, b, c]| [a, c, b]).collect();
+        (faces, positions.clone())
+    };
+    for (body, n) in [(&two, 2), (&one, 1)] {
+        for body in [body, &turned(body)] {
+            assert_eq!(overlap_of(body, &between).regions.len(), n);
+            let found = overlap_of(&between, body);
+            assert_eq!((found.regions.len(), found.volume()), (n, None));
+        }
+    }
+}
+
+/// Pieces of one body may face differently.
+#[test]
+fn pieces_that_face_differently_have_one_normal() {
+    let cube = surfaces::cuboid([0.0; 3], [4.0; 3]);
+    let prong = surfaces::cuboid([1.0, 1.0, 3.0], [2.0, 2.0, 5.0]);
+    // An edge of the cube passes edges of both, so they count as connected.
+    let small = surfaces::cuboid([2.5, 2.5, 3.5], [3.0, 3.0, 5.0]);
+    for other in [small.clone(), inside_out(&small)] {
+        let found = overlap(&cube, &joined(&[prong.clone(), other]));
+        assert_eq!(found.regions.len(), 1);
+        assert_eq!(normal(&found.regions[0]).map(|x| x + 0.0), [0.0, 0.0, -1.0]);
+    }
+}
