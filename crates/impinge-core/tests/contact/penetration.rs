@@ -1,8 +1,8 @@
 //! What lies inside, and the regions' normals, depths and volumes.
 
-use impinge_core::contact::{Penetration, Region};
+use impinge_core::contact::{Penetration, Region, SolidOverlap};
 use impinge_core::{Backend, Detector, Elements, Error, Exclusion, Query, Scene};
-use impinge_scenes::{Model, surfaces};
+use impinge_scenes::{Model, Random, surfaces};
 
 use super::detect;
 
@@ -908,4 +908,46 @@ fn pieces_that_face_differently_have_one_normal() {
         assert_eq!(found.regions.len(), 1);
         assert_eq!(normal(&found.regions[0]).map(|x| x + 0.0), [0.0, 0.0, -1.0]);
     }
+}
+
+/// What two tetrahedra on a small lattice have in common is one region, which has the extent and the
+/// volume of what cutting one by the other leaves. Many of them touch by vertices, edges and planes.
+#[test]
+fn tetrahedra_on_a_lattice_have_what_cutting_leaves() {
+    let mut random = Random::new(23);
+    let faces = vec![[0u32, 1, 2], [0, 3, 1], [1, 3, 2], [2, 3, 0]];
+    let (mut n_generic, mut n_other, mut n_deep) = (0, 0, 0);
+    let mut cut = SolidOverlap::new();
+    for _ in 0..3_000 {
+        let mut tetrahedron = || -> [[f64; 3]; 4] {
+            std::array::from_fn(|_| std::array::from_fn(|_| f64::from(random.below(5))))
+        };
+        let (a, b) = (tetrahedron(), tetrahedron());
+        cut.cut(&a, &b);
+        let Some((volume, _)) = cut.volume().filter(|found| found.0 > 1e-6) else {
+            continue;
+        };
+        let found = overlap_of(&(faces.clone(), a.to_vec()), &(faces.clone(), b.to_vec()));
+        assert_eq!(found.regions.len(), 1, "{a:?} {b:?} {:?}", found.regions);
+        let region = &found.regions[0];
+        match region.volume {
+            Some(own) => {
+                n_generic += 1;
+                assert!((own - volume).abs() < 1e-9, "{a:?} {b:?}: {own} {volume}");
+            }
+            None => n_other += 1,
+        }
+        if let Some((normal, depth)) = region.normal.zip(region.depth) {
+            n_deep += 1;
+            let extent = cut.extent(&normal);
+            assert!(
+                (depth - extent).abs() < 1e-9,
+                "{a:?} {b:?}: {depth} {extent}"
+            );
+        }
+    }
+    assert!(
+        n_generic > 100 && n_other > 100 && n_deep > 200,
+        "{n_generic} {n_other} {n_deep}"
+    );
 }
