@@ -112,9 +112,11 @@ pub struct PointName {
 /// Contact `i` belongs to row `i` of the pairs. Its corners are numbers of points; a point that
 /// belongs to several contacts is held once. Points are one if they have one name, by features:
 /// where a face is there twice, or faces of one body overlap in a plane, points and curves double,
-/// and what they would connect can be several regions. A segment of two triangles with different planes
-/// points along `n_a × n_b`, the product of their normals (counter-clockwise rule): seen from
-/// outside body `a`, the part of `a` beneath `b`'s surface lies to its left.
+/// and what they would connect can be several regions.
+///
+/// A segment of two triangles with different planes points along `n_a × n_b`, the product of their
+/// normals (counter-clockwise rule): seen from outside body `a`, the part of `a` beneath `b`'s
+/// surface lies to its left.
 ///
 /// Degenerate triangles are the segments or points that they are.
 #[derive(Clone, Default)]
