@@ -254,6 +254,53 @@ fn a_hole_holds_its_pin() {
     assert!(ask(vec![frame, pin(5, 7)], Some(1f64.next_down())).is_empty());
 }
 
+/// Surfaces that are apart, of parts in several pieces: as the intervals of the pieces say.
+#[test]
+fn pieces_inside_and_pieces_outside_are_partly_inside() {
+    let joined = |boxes: &[(i64, i64)]| {
+        let (mut points, mut faces): (Vec<Point>, Faces) = (Vec::new(), Vec::new());
+        for &(low, high) in boxes {
+            let first = points.len() as u32;
+            let (own, of_box) = cuboid([low.min(high); 3], [low.max(high); 3]);
+            // A cavity is inside out.
+            let turned = |[a, b, c]: [u32; 3]| if low < high { [a, b, c] } else { [a, c, b] };
+            points.extend(own);
+            faces.extend(of_box.iter().map(|&face| turned(face).map(|v| first + v)));
+        }
+        mesh(&points, &faces)
+    };
+    let block = joined(&[(0, 9)]);
+    for (boxes, [as_first, as_second]) in [
+        (&[(1, 2), (3, 4)][..], [Relation::Inside, Relation::Around]),
+        (
+            &[(1, 2), (11, 12)],
+            [Relation::PartlyInside, Relation::PartlyAround],
+        ),
+        (
+            &[(11, 12), (-2, -1), (1, 2)],
+            [Relation::PartlyInside, Relation::PartlyAround],
+        ),
+        (&[(-1, 10), (20, 21)], [Relation::Around, Relation::Inside]),
+        // The block is in the matter, and holds a cavity.
+        (
+            &[(-1, 10), (5, 4)],
+            [Relation::PartlyAround, Relation::PartlyInside],
+        ),
+        // A piece of each is inside the other.
+        (&[(1, 2), (20, 29)], [Relation::PartlyInside; 2]),
+    ] {
+        let part = joined(boxes);
+        let other = match boxes {
+            [(1, 2), (20, 29)] => joined(&[(0, 9), (21, 22)]),
+            _ => block.clone(),
+        };
+        assert_eq!(relation(&part, &other), Some(as_first), "{boxes:?}");
+        assert_eq!(relation(&other, &part), Some(as_second), "{boxes:?}");
+        assert!(as_first.shares_space());
+    }
+    assert_eq!(relation(&joined(&[(10, 11), (12, 13)]), &block), None);
+}
+
 #[test]
 fn sheets_pass_through_each_other_or_lie_on_each_other() {
     let sheet = |points: [Point; 4]| mesh(&points, &vec![[0, 1, 2], [0, 2, 3]]);

@@ -656,8 +656,8 @@ pub struct Assembly {
     pub parts: Vec<Part>,
     /// Pairs of parts that are not apart, by their numbers
     pub pairs: Vec<Parts>,
-    /// A row per part, a letter per part: X share space, I inside, O around, t touching, n near,
-    /// . apart, - the part itself
+    /// A row per part, a letter per part: X share space, I inside, O around, i partly inside, o
+    /// partly around, t touching, n near, . apart, - the part itself
     pub matrix: Vec<String>,
 }
 
@@ -678,11 +678,12 @@ pub struct Parts {
     /// Numbers of two parts, from 0, the lower one first
     pub parts: [usize; 2],
     /// interpenetrating: they share space, and their surfaces meet. inside, around: the first is
-    /// inside the second, or the other way, and their surfaces do not meet. touching: they share
-    /// points and no space. near: they are apart, and within the clearance. Decided exactly
+    /// wholly inside the second, or the other way, and their surfaces do not meet. partly-inside,
+    /// partly-around: some of it is, and some is not. touching: they share points and no space. near:
+    /// they are apart, and within the clearance. Decided exactly
     #[cfg_attr(
         test,
-        schemars(extend("enum" = ["interpenetrating", "inside", "around", "touching", "near"]))
+        schemars(extend("enum" = ["interpenetrating", "inside", "around", "partly-inside", "partly-around", "touching", "near"]))
     )]
     pub relation: &'static str,
     /// Pairs of faces that share a point

@@ -39,10 +39,15 @@ pub struct AssemblyOptions {
 pub enum Relation {
     /// They share space, and their surfaces meet.
     Interpenetrating,
-    /// The first is inside the second, and their surfaces do not meet.
+    /// The first is wholly inside the second, and their surfaces do not meet.
     Inside,
-    /// The second is inside the first, and their surfaces do not meet.
+    /// The second is wholly inside the first, and their surfaces do not meet.
     Around,
+    /// Some of the first is inside the second, and some is not. Their surfaces do not meet. Of both,
+    /// some may be inside the other.
+    PartlyInside,
+    /// Some of the second is inside the first, and some is not. Their surfaces do not meet.
+    PartlyAround,
     /// They share points, but no space.
     Touching,
     /// They share no point, and are not farther apart than the clearance.
@@ -56,6 +61,8 @@ impl Relation {
             Relation::Interpenetrating => "interpenetrating",
             Relation::Inside => "inside",
             Relation::Around => "around",
+            Relation::PartlyInside => "partly-inside",
+            Relation::PartlyAround => "partly-around",
             Relation::Touching => "touching",
             Relation::Near => "near",
         }
@@ -63,10 +70,7 @@ impl Relation {
 
     /// Whether the parts share space.
     pub fn shares_space(self) -> bool {
-        matches!(
-            self,
-            Relation::Interpenetrating | Relation::Inside | Relation::Around
-        )
+        !matches!(self, Relation::Touching | Relation::Near)
     }
 }
 
@@ -249,6 +253,26 @@ fn close(parts: &[Part], distance: f64) -> Vec<[usize; 2]> {
     found
 }
 
+/// How much of the surface of a part is inside another, of those that do not meet.
+#[derive(Clone, Copy, PartialEq)]
+enum Share {
+    None,
+    Some,
+    All,
+}
+
+/// How two parts whose surfaces do not meet share space; `None` if they do not. `shares`: of each in
+/// the other. A part of which all is inside is not wholly inside if the other has a cavity in it.
+fn nested(shares: [Share; 2]) -> Option<Relation> {
+    match shares {
+        [Share::None, Share::None] => None,
+        [Share::All, Share::None] => Some(Relation::Inside),
+        [Share::None, Share::All] => Some(Relation::Around),
+        [Share::None, Share::Some] | [Share::Some, Share::All] => Some(Relation::PartlyAround),
+        _ => Some(Relation::PartlyInside),
+    }
+}
+
 /// What is asked of the detector.
 struct Asker {
     scene: Scene,
@@ -283,9 +307,9 @@ impl Asker {
         rows: &[[u32; 4]],
         clearance: Option<f64>,
     ) -> Result<Option<PartPair>, Error> {
-        let is_inside = [
-            self.is_inside(parts)?,
-            self.is_inside([parts[1], parts[0]])?,
+        let shares = [
+            self.share_inside(parts)?,
+            self.share_inside([parts[1], parts[0]])?,
         ];
         let [a, b] = parts.map(|part| self.ids[part]);
         let said = |relation, distance, point| {
@@ -299,7 +323,7 @@ impl Asker {
         };
         if !rows.is_empty() {
             // Where nearly all of two parts meets, one place is enough.
-            let is_certain = is_inside[0] || is_inside[1];
+            let is_certain = shares != [Share::None; 2];
             let rows = if is_certain { &rows[..1] } else { rows };
             let query = Query::between_all();
             let pairs = Pairs::of_rows(&self.scene, &query, rows)?;
@@ -312,11 +336,7 @@ impl Asker {
             let point = contacts.points().first().copied().unwrap_or_default();
             return Ok(said(relation, 0.0, point));
         }
-        let inside = match is_inside {
-            [true, _] => Some(Relation::Inside),
-            [_, true] => Some(Relation::Around),
-            _ => None,
-        };
+        let inside = nested(shares);
         if inside.is_none() && clearance.is_none() {
             return Ok(None);
         }
@@ -336,20 +356,25 @@ impl Asker {
         Ok(said(Relation::Near, nearest.distance, point).filter(|_| is_near))
     }
 
-    /// Whether any vertex of the first part is strictly inside the second.
-    fn is_inside(&mut self, [inner, outer]: [usize; 2]) -> Result<bool, Error> {
+    /// How many vertices of the first part are strictly inside the second.
+    fn share_inside(&mut self, [inner, outer]: [usize; 2]) -> Result<Share, Error> {
         let [part, around] = [inner, outer].map(|part| &self.parts[part]);
         if !around.is_solid() {
-            return Ok(false);
+            return Ok(Share::None);
         }
         let within = |at: &Point| (0..3).all(|k| around.low[k] < at[k] && at[k] < around.high[k]);
         let points: Vec<Point> = part.vertices().filter(within).collect();
         if points.is_empty() {
-            return Ok(false);
+            return Ok(Share::None);
         }
         let places = self
             .detector
             .contains(&self.scene, self.ids[outer], &points)?;
-        Ok(places.contains(&1))
+        let n_inside = places.iter().filter(|&&place| place == 1).count();
+        Ok(match n_inside {
+            0 => Share::None,
+            n if n == part.vertices().count() => Share::All,
+            _ => Share::Some,
+        })
     }
 }

@@ -954,6 +954,26 @@ fn parts_of_an_assembly_are_compared() {
         );
         assert_eq!(page.matches(&place).count(), 1, "{place}");
     }
+    // Of two boxes of a part one is inside another part.
+    let two = [
+        cube("two", [1.0; 3], 1.0, 0),
+        cube("", [9.0; 3], 1.0, 8).replace("g \n", ""),
+        cube("block", [0.0; 3], 4.0, 16),
+    ];
+    folder.text("two.obj", &two.concat());
+    let arguments = ["check", "--assembly", "two.obj"];
+    let text = folder.run(arguments).printed();
+    assert!(
+        text.contains("two is partly inside block, 1 from the surface"),
+        "{text}"
+    );
+    let run = folder.run([&arguments[..], &["--json"]].concat());
+    let answer: Value = serde_json::from_str(&run.printed()).unwrap();
+    assert_eq!(wrong(&schema, &answer, "answer"), Vec::<String>::new());
+    assert_eq!(answer["pairs"][0]["relation"], "partly-inside");
+    assert_eq!(answer["matrix"], serde_json::json!(["-i", "o-"]));
+    let failing = folder.run([&arguments[..], &["--fail-on", "interpenetrating"]].concat());
+    assert_eq!(failing.code, Some(3));
     // Several files are parts, too; --clearance alone says so.
     folder.text("left.obj", &cube("one", [0.0; 3], 1.0, 0));
     folder.text("right.obj", &cube("one", [1.0, 0.0, 0.0], 1.0, 0));

@@ -9,7 +9,7 @@ use impinge_io::{Format, Mesh, ReadOptions, printable, read_bodies, read_with_su
 
 use super::args::{CheckArgs, FailOn, Touching};
 use super::html::write_assembly;
-use super::relations::{matrix, said, summary};
+use super::relations::{LEGEND, matrix, said, summary};
 use super::say_wrote;
 use crate::error::Error;
 use crate::load::{named_parts, tell};
@@ -164,7 +164,7 @@ fn text(args: &CheckArgs, names: &[String], answer: &Assembly) -> String {
             }
             text += "\n";
         }
-        text += "X share space, I inside, O around, t touch, n near\n\n";
+        text += &format!("{}\n\n", LEGEND.join(", "));
     }
     for pair in answer.pairs.iter().take(MOST_LISTED) {
         let [a, b] = pair.parts.map(|part| printable(&names[part]));

@@ -5,12 +5,25 @@ use impinge_check::{Assembly, PartPair, Relation};
 use super::args::{CheckArgs, Touching};
 use crate::text::{counted, several};
 
+/// The letters of pairs that are not apart, with their meaning.
+pub const LEGEND: [&str; 7] = [
+    "X share space",
+    "I inside",
+    "O around",
+    "i partly inside",
+    "o partly around",
+    "t touch",
+    "n near",
+];
+
 /// What a pair is, seen from one of its parts, as a letter of the matrix.
 fn letter(relation: Relation) -> char {
     match relation {
         Relation::Interpenetrating => 'X',
         Relation::Inside => 'I',
         Relation::Around => 'O',
+        Relation::PartlyInside => 'i',
+        Relation::PartlyAround => 'o',
         Relation::Touching => 't',
         Relation::Near => 'n',
     }
@@ -32,6 +45,8 @@ pub fn matrix(answer: &Assembly) -> Vec<Vec<char>> {
         rows[b][a] = letter(match relation {
             Relation::Inside => Relation::Around,
             Relation::Around => Relation::Inside,
+            Relation::PartlyInside => Relation::PartlyAround,
+            Relation::PartlyAround => Relation::PartlyInside,
             same => *same,
         });
     }
@@ -48,6 +63,12 @@ pub fn said([a, b]: [&str; 2], pair: &PartPair) -> String {
         Relation::Interpenetrating => format!("{a} and {b} interpenetrate: {faces}, {at}"),
         Relation::Inside => format!("{a} is inside {b}, {apart} from the surface, {at}"),
         Relation::Around => format!("{b} is inside {a}, {apart} from the surface, {at}"),
+        Relation::PartlyInside => {
+            format!("{a} is partly inside {b}, {apart} from the surface, {at}")
+        }
+        Relation::PartlyAround => {
+            format!("{b} is partly inside {a}, {apart} from the surface, {at}")
+        }
         Relation::Touching => format!("{a} and {b} touch: {faces}, {at}"),
         Relation::Near => format!("{a} and {b} are {apart} apart, {at}"),
     }

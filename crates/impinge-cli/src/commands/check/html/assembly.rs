@@ -11,7 +11,7 @@ use impinge_io::{AtomicFile, Elements, Mesh, printable};
 use impinge_render::{Camera, Face, Focus, Normals, Picture, Surface};
 
 use super::super::args::CheckArgs;
-use super::super::relations::{matrix, said, summary};
+use super::super::relations::{LEGEND, matrix, said, summary};
 use super::{MOST_PICTURES, SIZE, end, image, see, start, view};
 use crate::error::Error;
 use crate::palette;
@@ -43,10 +43,11 @@ pub fn write(
 
 /// The matrix. A cell of two parts that are not apart opens the view at their place.
 fn table(names: &[String], answer: &Assembly) -> String {
-    let mut text = String::from(
-        "<p class=\"legend\"><span>X share space</span> <span>I inside</span> <span>O around</span> \
-         <span>t touch</span> <span>n near</span></p>\n\
+    let legend = LEGEND.map(|letter| format!("<span>{letter}</span>"));
+    let mut text = format!(
+        "<p class=\"legend\">{}</p>\n\
          <div class=\"scroll\"><table class=\"matrix\"><thead><tr><th scope=\"col\"></th>",
+        legend.join(" ")
     );
     for (number, name) in names.iter().enumerate() {
         let name = escaped(name);
@@ -57,7 +58,7 @@ fn table(names: &[String], answer: &Assembly) -> String {
         text += &format!("<tr><th scope=\"row\">{number} {}</th>", escaped(name));
         for (other, letter) in row.into_iter().enumerate() {
             let class = match letter {
-                'X' | 'I' | 'O' => " class=\"bad\"",
+                'X' | 'I' | 'O' | 'i' | 'o' => " class=\"bad\"",
                 'n' => " class=\"near\"",
                 _ => "",
             };
