@@ -219,6 +219,26 @@ fn flat_faces_divide_their_neighbours_and_leave_no_gap() {
         );
         assert!((volume(&fixed.mesh) - 512.0 / 6.0).abs() < 1e-9);
     }
+    // Two boxes that touch along an edge, which one of the four faces there has in two parts.
+    let boxes = together(&[cube([-2.0, -2.0, 0.0], 2.0), cube([0.0; 3], 2.0)]);
+    let (mut points, mut all) = (boxes.positions.to_f64(), faces(&boxes).to_vec());
+    let is_on = |v: u32| points[v as usize][..2] == [0.0; 2];
+    let at = all
+        .iter()
+        .position(|&[x, y, z]| !is_on(x) && is_on(y) && is_on(z));
+    let [x, y, z] = all.swap_remove(at.unwrap());
+    points.push([0.0, 0.0, 1.0]);
+    all.extend([[x, y, 16], [x, 16, z], [y, z, 16]]);
+    let fixed = fix(&mesh(points, all), 0);
+    assert_eq!(
+        (fixed.repairs.degenerate_faces, fixed.repairs.divided_faces),
+        (0, 1)
+    );
+    assert_eq!(
+        (fixed.after.boundary_facets, fixed.after.self_intersections),
+        (0, 0)
+    );
+    assert!((volume(&fixed.mesh) - 16.0).abs() < 1e-9);
     // Faces that name a vertex twice have no place at all.
     let mut collapsed = round(100);
     let Elements::Triangles(faces) = &mut collapsed.elements else {
@@ -441,7 +461,8 @@ fn only_what_is_asked_is_done() {
     let fixed = fix_mesh(bad.clone(), &options(&[Repair::Duplicates])).unwrap();
     assert_eq!((fixed.after.duplicates, fixed.after.degenerate), (0, 1));
     let fixed = fix_mesh(bad, &options(&[Repair::Degenerate, Repair::Orient])).unwrap();
-    assert_eq!((fixed.after.duplicates, fixed.after.degenerate), (1, 0));
+    // Both copies are divided.
+    assert_eq!((fixed.after.duplicates, fixed.after.degenerate), (2, 0));
 }
 
 #[test]

@@ -84,13 +84,13 @@ fn hanging<'a>(surface: &Surface, copies: &'a Copies, is_copy: &[bool]) -> Vec<&
     going.into_iter().map(|ix| sets[ix as usize]).collect()
 }
 
-/// Removes faces of zero area. Returns how many were removed, and how many have divided a neighbour
+/// Removes faces of zero area. Returns how many were removed, and how many have divided neighbours
 /// instead.
 ///
 /// A face of zero area whose vertices are three different points is a segment. If it just went, its
-/// long side and its two short ones would be borders, although the surface has no gap there. So the
-/// neighbour at the long side is divided at the middle vertex, which lies exactly on it: the two
-/// halves take the places of the face and of its neighbour.
+/// long side and its two short ones would be borders, although the surface has no gap there. So all
+/// neighbours at the long side are divided at the middle vertex, which lies exactly on it: the
+/// halves take the places of the face and of its neighbours, and further ones come last.
 pub fn remove_degenerate(surface: &mut Surface) -> (u64, u64) {
     let collapsed: Vec<bool> = surface.faces.iter().map(|face| !is_simplex(face)).collect();
     let n_collapsed = remove(surface, &collapsed);
@@ -118,11 +118,15 @@ pub fn remove_degenerate(surface: &mut Surface) -> (u64, u64) {
         let Some(divided) = divide(surface, &edges, &flat, face) else {
             continue;
         };
-        let pair = [face, divided.neighbour];
-        for face in pair {
+        for &face in &divided.faces {
             edges.remove(face, surface.faces[face as usize]);
         }
-        for (face, corners) in pair.into_iter().zip(divided.halves) {
+        let n_faces = surface.faces.len() as u32;
+        let n_more = (divided.halves.len() - divided.faces.len()) as u32;
+        surface.faces.resize((n_faces + n_more) as usize, [0; 3]);
+        flat.resize((n_faces + n_more) as usize, false);
+        let places = divided.faces.into_iter().chain(n_faces..);
+        for (face, &corners) in places.zip(&divided.halves) {
             surface.faces[face as usize] = corners;
             flat[face as usize] = is_flat(surface, corners);
             edges.add(face, corners);
@@ -139,43 +143,48 @@ pub fn remove_degenerate(surface: &mut Surface) -> (u64, u64) {
     (n_collapsed + n_removed, n_flat - n_removed)
 }
 
-/// A neighbour of a flat face, and the two halves that take the places of the flat face and of the
-/// neighbour.
+/// A flat face and its neighbours, and the halves of the neighbours that take their places.
 struct Divided {
-    neighbour: u32,
-    halves: [[u32; 3]; 2],
+    faces: Vec<u32>,
+    halves: Vec<[u32; 3]>,
 }
 
-/// How the neighbour at the long side of a flat face is divided; `None` if there is no single one,
-/// or if the halves would make an edge that exists already.
+/// How the neighbours at the long side of a flat face are divided; `None` if there are none, if
+/// several are flat, or if the halves would make an edge that exists already.
 fn divide(surface: &Surface, edges: &Edges, flat: &[bool], face: u32) -> Option<Divided> {
     let corners = surface.faces[face as usize];
     let points = surface.corners(corners);
     let middle =
         (0..3).find(|&ix| is_between(&points[ix], &points[(ix + 1) % 3], &points[(ix + 2) % 3]))?;
     let [b, c, a] = [0, 1, 2].map(|step| corners[(middle + step) % 3]);
-    let [first, second] = edges.of([a, c]) else {
-        return None;
+    let neighbours = edges.of([a, c]).iter().filter(|&&other| other != face);
+    let mut divided = Divided {
+        faces: vec![face],
+        halves: Vec::new(),
     };
-    let neighbour = if *first == face { *second } else { *first };
-    let held = surface.faces[neighbour as usize];
-    let d = held
-        .into_iter()
-        .find(|&vertex| vertex != a && vertex != c)?;
-    if d == b || !edges.of([b, d]).is_empty() {
-        return None;
+    let mut n_flat = 0;
+    for &neighbour in neighbours {
+        let held = surface.faces[neighbour as usize];
+        let d = held
+            .into_iter()
+            .find(|&vertex| vertex != a && vertex != c)?;
+        if d == b || !edges.of([b, d]).is_empty() {
+            return None;
+        }
+        // A flat neighbour is only divided if its own long side is the same; else it is its
+        // neighbours' turn first.
+        if flat[neighbour as usize] {
+            let [at_a, at_c, at_d] = surface.corners([a, c, d]);
+            if !is_between(&at_d, &at_a, &at_c) {
+                return None;
+            }
+            n_flat += 1;
+        }
+        let replaced = |old: u32| held.map(|vertex| if vertex == old { b } else { vertex });
+        divided.faces.push(neighbour);
+        divided.halves.extend([replaced(c), replaced(a)]);
     }
-    // A flat neighbour is only divided if its own long side is the same; else it is its neighbour's
-    // turn first.
-    let [at_a, at_c, at_d] = surface.corners([a, c, d]);
-    if flat[neighbour as usize] && !is_between(&at_d, &at_a, &at_c) {
-        return None;
-    }
-    let replaced = |old: u32| held.map(|vertex| if vertex == old { b } else { vertex });
-    Some(Divided {
-        neighbour,
-        halves: [replaced(c), replaced(a)],
-    })
+    (divided.faces.len() > 1 && n_flat < 2).then_some(divided)
 }
 
 /// Whether a point of the line through a and c lies strictly between them.

@@ -38,8 +38,8 @@ pub enum Repair {
     /// Of faces with the same vertices, in any order, the first one stays; none where two of
     /// opposite orientations hang on a closed surface, as an inner wall or a fin.
     Duplicates,
-    /// Faces of zero area go. Where one lies along an edge of a neighbour, the neighbour is divided
-    /// there, so that no gap opens.
+    /// Faces of zero area go. Where one lies along an edge of neighbours, these are divided there,
+    /// so that no gap opens.
     Degenerate,
     /// Neighbours get the same orientation. In each piece the fewest faces are turned.
     Orient,
@@ -120,7 +120,7 @@ pub struct Repairs {
     pub opposite_faces: u64,
     /// Faces of zero area that were removed.
     pub degenerate_faces: u64,
-    /// Faces of zero area that were used to divide a neighbour; the number of faces stays.
+    /// Faces of zero area that were used to divide their neighbours at one side.
     pub divided_faces: u64,
     /// Faces turned to agree with their neighbours.
     pub turned_faces: u64,

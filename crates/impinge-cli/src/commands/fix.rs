@@ -293,7 +293,7 @@ fn said(repair: Repair, fixed: &Fixed) -> Vec<String> {
             ),
             of(
                 done.divided_faces,
-                faces(done.divided_faces) + " used to divide a neighbour",
+                faces(done.divided_faces) + " used to divide neighbours",
             ),
         ],
         Repair::Orient => vec![
