@@ -750,10 +750,14 @@ export declare class Detector {
   near(scene: Scene, distance: number, query?: Query): NearPairs;
   /**
    * Where points lie: 1 inside a body, 0 on its surface, -1 outside, decided exactly. Triangles must be a closed surface, so weld the
-   * seams of a geometry first; the error names an edge of one that is not.
+   * seams of a geometry first; the error names an edge of one that is not. The surface of tetrahedra is made of `Scene.faces`; where they
+   * overlap, a point strictly inside one of them is inside, also on a face of another.
    */
   contains(scene: Scene, body: Body, points: GivenPositions, control?: Control): Int8Array;
-  /** How far points are from the surface of a body: above 0 inside, below 0 outside; the sign is exact. Bodies as for `contains`. */
+  /**
+   * How far points are from the surface of a body: above 0 inside, below 0 outside; the sign is exact. Bodies as for `contains`. Where
+   * tetrahedra overlap, 0 also on a face that is strictly inside another one, where `contains` says 1.
+   */
   signedDistance(scene: Scene, body: Body, points: GivenPositions, control?: Control): Float64Array;
   /**
    * Which tetrahedron of a body contains each point: the lowest of several that share the face, edge or vertex on which it is; -1 outside.
@@ -772,7 +776,7 @@ export declare class Detector {
   closest(scene: Scene, points: GivenPositions, query?: Query): Closest;
   /**
    * What rays hit: the points origin + t direction, for t from 0 to `most`. Grazing an edge or a vertex is a hit. Tetrahedra count with the
-   * faces of their border.
+   * faces of their border. A direction of zero is the origin alone.
    */
   cast(scene: Scene, origins: GivenPositions, directions: GivenPositions, query?: Query): Hits;
   /**

@@ -746,7 +746,8 @@ class Detector(DetectorBase):
         """Where points lie: inside a body, on its surface or outside. Decided exactly, also for points on faces, edges and vertices.
 
         Triangles must be a closed surface. A point is inside where the surface winds around it, whichever way, so an inner shell
-        of the opposite orientation makes a hollow. Of tetrahedra the surface consists of `Scene.faces`.
+        of the opposite orientation makes a hollow. Of tetrahedra the surface consists of `Scene.faces`; where they overlap, a point
+        strictly inside one of them is inside, also on a face of another.
 
         Parameters
         ----------
@@ -794,7 +795,7 @@ class Detector(DetectorBase):
         -------
         numpy.ndarray of float64, shape (n,)
             0 on the surface. The sign is exact, and the magnitude is rounded down: never above the true distance, and 0 or -0 below
-            the smallest float.
+            the smallest float. Where tetrahedra overlap, 0 also on a face that is strictly inside another one, where `contains` says 1.
 
         Raises
         ------

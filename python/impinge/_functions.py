@@ -206,7 +206,8 @@ def cast(
     kind: _RowKind | None = None,
     **settings: Unpack[Settings],
 ) -> Hits:
-    """What rays hit of a mesh: the points ``origin + t * direction``, for t from 0 to `most`. Decided exactly.
+    """What rays hit of a mesh: the points ``origin + t * direction``, for t from 0 to `most`. Decided exactly. A direction
+    of zero is the origin alone.
 
     Parameters
     ----------
@@ -264,7 +265,8 @@ def signed_distance(
     Returns
     -------
     numpy.ndarray of float64, shape (n,)
-        0 on the surface. The sign is exact, and the magnitude is rounded down: never above the true distance.
+        0 on the surface. The sign is exact, and the magnitude is rounded down: never above the true distance. Of tetrahedra that
+        overlap as `Detector.signed_distance`.
 
     Raises
     ------

@@ -710,13 +710,15 @@ impinge_status impinge_find_nearest(impinge_detector *detector, const impinge_sc
 
 /* Where points lie (3 columns of F32 or F64): `places` gets one number per row, 1 inside a body, 0 on its surface, -1 outside, decided
  * exactly. Triangles must be a closed surface, around which points are inside if it winds around them any number of times but 0; the
- * surface of tetrahedra is what impinge_scene_faces gives.
+ * surface of tetrahedra is what impinge_scene_faces gives. Where tetrahedra overlap, a point strictly inside one of them is inside, also
+ * on a face of another.
  * INVALID: also a body of points or edges, a surface that is not closed (the message names an edge), a point that is not finite. */
 impinge_status impinge_contains(impinge_detector *detector, const impinge_scene *scene, uint32_t body, impinge_array points,
     int8_t *places);
 
 /* How far points are from the surface of a body: `distances` gets one number per row, above 0 inside and below 0 outside. The sign is
- * exact, and the magnitude rounded down. INVALID: as impinge_contains. */
+ * exact, and the magnitude rounded down. Where tetrahedra overlap it is 0 also on a face that is strictly inside another one, where
+ * impinge_contains says 1. INVALID: as impinge_contains. */
 impinge_status impinge_signed_distance(impinge_detector *detector, const impinge_scene *scene, uint32_t body, impinge_array points,
     double *distances);
 
@@ -750,7 +752,7 @@ typedef struct impinge_hits impinge_hits;
  * directions have 3 columns of F32 or F64 and as many rows. Elements and the query are as for impinge_find_closest; its field `hits` asks
  * for the first hit, for any, or for all. A ray that grazes an edge or a vertex hits all elements there, and one in the plane of a face
  * hits it from an entry to an exit, decided exactly. The first hit is the one with the smallest t, of several the lowest by body and
- * number. INVALID: also another number of directions than of origins, a number that is not finite. */
+ * number. A direction of zero is the origin alone. INVALID: also another number of directions than of origins, a number that is not finite. */
 impinge_status impinge_cast(impinge_detector *detector, const impinge_scene *scene, impinge_array origins, impinge_array directions,
     double most, const impinge_query *query, impinge_hits **hits);
 

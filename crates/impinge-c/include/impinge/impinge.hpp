@@ -220,7 +220,7 @@ public:
     const auto status = impinge_find_closest(this->raw(), in.raw(), detail::rows_of(points, 3), most, &raw, made.out());
     return give(status, impinge::closest(made.take()));
   }
-  /// What each ray hits, origin + t direction for t from 0 to `most`: 1 for segments.
+  /// What each ray hits, origin + t direction for t from 0 to `most`: 1 for segments. A direction of zero is the origin alone.
   template <class O, class D>
   result<impinge::hits> cast(const scene &in, const O &origins, const D &directions, double most = std::numeric_limits<double>::infinity(),
                              const query &of = {}) {

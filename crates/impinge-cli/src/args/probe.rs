@@ -29,7 +29,7 @@ Examples:
   impinge cast part.stl --rays rays.csv --most 1         segments from the origin to origin + direction
 
 A ray is six numbers: its origin and its direction, which need not have length 1. What it hits is decided exactly: a ray that
-grazes an edge or a vertex hits. t counts in lengths of the direction and is rounded down.";
+grazes an edge or a vertex hits. t counts in lengths of the direction and is rounded down. A direction of zero is the origin alone.";
 
 #[derive(Debug, Args)]
 pub struct ProbeArgs {

@@ -28,7 +28,8 @@ impl Detector {
     ///
     /// Of tetrahedra, a point is inside if it is strictly inside one of them, or on faces of theirs
     /// that are not the border of the body. The border, which is the surface, are all faces but
-    /// those between two tetrahedra that have another vertex on either side.
+    /// those between two tetrahedra that have another vertex on either side. So where tetrahedra
+    /// overlap, a point strictly inside one of them is inside, also on the border of another.
     ///
     /// ```
     /// use impinge::{Backend, Detector, Scene};
@@ -62,7 +63,8 @@ impl Detector {
     /// How far each point is from the surface of a body: positive inside, negative outside, 0 on
     /// the surface. The sign is that of [`contains`](Detector::contains) and exact; the magnitude
     /// is the distance of [`closest`](Detector::closest), rounded down: never above the true one,
-    /// and 0 or -0 below the smallest `f64`.
+    /// and 0 or -0 below the smallest `f64`. So it is 0 on every face of the surface, also on one
+    /// that is strictly inside another tetrahedron, where `contains` says inside.
     ///
     /// ```
     /// use impinge::{Backend, Detector, Scene};

@@ -132,10 +132,10 @@ pub enum Error {
         /// What does not fit, with both numbers.
         given: String,
     },
-    /// The id names no body of this scene: the body was removed, or belongs to another scene. Only a
-    /// scene and its clones share ids.
+    /// The id names no body of this scene: the body was removed, and a later one may have its slot,
+    /// or it belongs to another scene. Only a scene and its clones share ids.
     #[error(
-        "there is no such body {body} among the {n_bodies} of this scene: it was removed, or is another scene's (clones keep ids)"
+        "there is no such body {body} among the {n_bodies} of this scene: it was removed (a later body may have its number), or is another scene's (clones keep ids)"
     )]
     UnknownBody {
         /// The id as given.
