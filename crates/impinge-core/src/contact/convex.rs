@@ -14,6 +14,7 @@
 
 use crate::boxes::scale::Scale;
 use crate::scene::vector::{cross, dot, scaled, sub};
+use impinge_exact::internal::collinear;
 use impinge_exact::{Point, Sign, orient3d};
 
 /// The shortest way that takes two convex bodies apart.
@@ -43,7 +44,7 @@ const MOST: usize = 400;
 const ROUNDING: f64 = 1e-12;
 
 /// The shortest way that takes the convex hulls of two sets of points apart; `None` if these are
-/// flat in sum, or empty.
+/// flat in sum, so that their differences, as rounded, lie in one plane, or if one is empty.
 pub fn convex_overlap(a: &[[f64; 3]], b: &[[f64; 3]]) -> Option<ConvexOverlap> {
     let origin = *b.first()?;
     let differences = a.iter().chain(b).map(|&point| sub(point, origin));
@@ -78,7 +79,7 @@ pub fn convex_overlap(a: &[[f64; 3]], b: &[[f64; 3]]) -> Option<ConvexOverlap> {
         .iter()
         .fold(0.0f64, |most, x| most.max(x.abs()));
     let noise = ROUNDING * size;
-    let mut points = first_corners(&ends, support, size)?;
+    let mut points = first_corners(&a, &b, &ends)?.to_vec();
     let mut faces: Vec<Face> = Vec::new();
     for corners in [[0, 1, 2], [0, 3, 1], [1, 3, 2], [2, 3, 0]] {
         faces.push(face(&points, corners));
@@ -152,35 +153,35 @@ fn rounded(normal: Point) -> [i64; 3] {
     normal.map(|x| (x * 1e9).round() as i64)
 }
 
-/// A tetrahedron of far points that turns outwards.
-fn first_corners(
-    ends: &[Point; 6],
-    support: impl Fn(Point) -> Option<Point>,
-    size: f64,
-) -> Option<Vec<Point>> {
-    let length = |p: Point| dot(p, p).sqrt();
-    let farther = |x: Point, y: Point, of: &dyn Fn(Point) -> f64| if of(y) > of(x) { y } else { x };
+/// A tetrahedron of far differences that turns outwards; `None` if all differences lie in one plane.
+///
+/// Between all differences from one point of a body, and all from one of the other, lies what is
+/// between any two differences. So if these are in one plane, then all are. Which are farthest is
+/// rounded; that they are off the line and off the plane is decided exactly.
+fn first_corners(a: &[Point], b: &[Point], ends: &[Point; 6]) -> Option<[Point; 4]> {
+    let (first_a, first_b) = (*a.first()?, *b.first()?);
+    let spread = || {
+        let of_a = a.iter().map(|&point| sub(point, first_b));
+        let of_b = b.iter().map(|&point| sub(first_a, point));
+        ends.iter().copied().chain(of_a).chain(of_b)
+    };
+    let farthest = |far: &dyn Fn(Point) -> f64, is_off: &dyn Fn(&Point) -> bool| {
+        let all = spread().filter(is_off).map(|point| (far(point), point));
+        all.reduce(|most, next| if next.0 > most.0 { next } else { most })
+            .map(|(_, point)| point)
+    };
+    let squared = |p: Point| dot(p, p);
     let p = ends[0];
-    let q = ends
-        .iter()
-        .fold(p, |far, &end| farther(far, end, &|x| length(sub(x, p))));
+    let q = farthest(&|x| squared(sub(x, p)), &|&x| x != p)?;
     let along = sub(q, p);
-    let away = |x: Point| length(cross(along, sub(x, p)));
-    let r = ends.iter().fold(p, |far, &end| farther(far, end, &away));
+    let away = |x| squared(cross(along, sub(x, p)));
+    let r = farthest(&away, &|x| !collinear(&p, &q, x))?;
     let normal = cross(along, sub(r, p));
-    if length(normal) <= 1e-9 * size * size {
-        return None;
-    }
-    let above = |x: Point| dot(normal, sub(x, p)).abs();
-    let s = farther(support(normal)?, support(scaled(normal, -1.0))?, &above);
-    let height = dot(normal, sub(s, p));
-    if height.abs() <= 1e-9 * size * length(normal) {
-        return None;
-    }
+    let above = |x| dot(normal, sub(x, p)).abs();
+    let s = farthest(&above, &|x| !orient3d(&p, &q, &r, x).is_zero())?;
     match orient3d(&p, &q, &r, &s) {
-        Sign::Positive => Some(vec![p, q, r, s]),
-        Sign::Negative => Some(vec![p, r, q, s]),
-        Sign::Zero => None,
+        Sign::Negative => Some([p, r, q, s]),
+        _ => Some([p, q, r, s]),
     }
 }
 
@@ -408,6 +409,97 @@ mod tests {
         assert!((found.depth - 0.6).abs() < 1e-9, "{found:?}");
         let (depth, most) = width(&ball);
         assert!((depth - most).abs() < 1e-9, "{depth} {most}");
+    }
+
+    /// Whose differences have ends on one line along the axes, or are nearly flat, or both: their
+    /// shortest way is that of all normals of faces and all products of edges.
+    #[test]
+    fn slender_bodies_and_tetrahedra_of_a_lattice() {
+        let mut random = Random::new(11);
+        let spindle = [[-4, -4, -4], [4, 4, 4], [1, -1, 0], [0, 1, -1], [-1, 0, 1]];
+        let spindle = spindle.map(|p| p.map(f64::from)).to_vec();
+        let fixed = [[0.0; 3], [0.25; 3], [1.0; 3], [0.5, 0.25, 0.0]];
+        let mut n_equal = 0;
+        for case in 0..3000 {
+            let mut whole =
+                |most: u32| [0; 3].map(|_| f64::from(random.below(2 * most + 1)) - f64::from(most));
+            // Tetrahedra about a diagonal, with some whole numbers off it.
+            let mut some = |(long, wide): (u32, u32)| -> Vec<Point> {
+                let way = if case % 3 == 0 { [1.0; 3] } else { whole(1) };
+                (0..4)
+                    .map(|_| {
+                        let (far, by) = (whole(long)[0], whole(wide));
+                        [0, 1, 2].map(|k| far * way[k] + by[k])
+                    })
+                    .collect()
+            };
+            let sizes = [(0, 2), (4, 1), (40, 1), (1_000_000, 2)][case / 3 % 4];
+            let (a, b) = match fixed.get(case) {
+                Some(by) => {
+                    let moved = |p: &Point| [0, 1, 2].map(|k| p[k] + by[k]);
+                    (spindle.clone(), spindle.iter().map(moved).collect())
+                }
+                None if case % 5 < 2 => {
+                    let a = some(sizes);
+                    (a.clone(), a)
+                }
+                None => (some(sizes), some(sizes)),
+            };
+            let Some(least) = shortest(&a, &b) else {
+                continue;
+            };
+            n_equal += usize::from(a == b);
+            let found = convex_overlap(&a, &b);
+            let depth = found.map(|found| found.depth);
+            let size = f64::from(sizes.0 + sizes.1);
+            assert!(
+                depth.is_some_and(|depth| (depth - least.max(0.0)).abs() < 1e-11 * size.max(4.0)),
+                "case {case}: {found:?} for {least}: {a:?} {b:?}"
+            );
+        }
+        assert!(n_equal > 500, "{n_equal}");
+    }
+
+    /// The shortest way apart, from all differences of two points as edges, and their products; in
+    /// whole numbers and quarters. `None` where the two bodies are flat in sum.
+    fn shortest(a: &[Point], b: &[Point]) -> Option<f64> {
+        let whole = |points: &[Point]| -> Vec<[i128; 3]> {
+            points
+                .iter()
+                .map(|p| p.map(|x| (4.0 * x) as i128))
+                .collect()
+        };
+        let (a, b) = (whole(a), whole(b));
+        let minus = |p: [i128; 3], q: [i128; 3]| [0, 1, 2].map(|k| p[k] - q[k]);
+        let height = |p: [i128; 3], q: [i128; 3]| p[0] * q[0] + p[1] * q[1] + p[2] * q[2];
+        let edges = [&a, &b].map(|points| {
+            let all = points.iter().enumerate();
+            all.flat_map(|(ix, &p)| points[..ix].iter().map(move |&q| minus(p, q)))
+                .collect::<Vec<_>>()
+        });
+        let edges = edges.concat();
+        let (mut least, mut is_flat) = (f64::INFINITY, true);
+        for (ix, p) in edges.iter().enumerate() {
+            for q in &edges[..ix] {
+                let way = [0, 1, 2].map(|k| {
+                    let (i, j) = ((k + 1) % 3, (k + 2) % 3);
+                    p[i] * q[j] - p[j] * q[i]
+                });
+                if way == [0; 3] {
+                    continue;
+                }
+                is_flat &= edges.iter().all(|&edge| height(way, edge) == 0);
+                let length = (height(way, way) as f64).sqrt();
+                let ends = |points: &[[i128; 3]]| {
+                    let heights = || points.iter().map(|&p| height(way, p));
+                    (heights().min().unwrap(), heights().max().unwrap())
+                };
+                let (of_a, of_b) = (ends(&a), ends(&b));
+                let over = (of_a.1 - of_b.0).min(of_b.1 - of_a.0);
+                least = least.min(over as f64 / length / 4.0);
+            }
+        }
+        (!is_flat).then_some(least)
     }
 
     /// From the hull of all differences, by Qhull.
