@@ -278,3 +278,20 @@ fn what_does_not_meet_has_length_and_volume_0() {
     let volume = impinge_core::contact::Penetration::default().volume();
     assert_eq!(volume.map(f64::to_bits), Some(0));
 }
+
+/// Points are one if their names are: a face that is there twice has points of its own.
+#[test]
+fn a_face_that_is_there_twice_doubles_points_and_curves() {
+    let mut scene = Scene::new();
+    let floor = [[0.0f32, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]];
+    let blade = [[1.0f32, 1.0, -1.0], [2.0, 1.0, -1.0], [1.0, 1.0, 1.0]];
+    let a = scene
+        .add_triangles(&[[0, 1, 2], [2, 1, 0]], &floor)
+        .unwrap();
+    let b = scene.add_triangles(&[[0, 1, 2]], &blade).unwrap();
+    let contacts = contacts_of(&scene, &detect(&scene, &Query::between(a, b)));
+    assert_eq!(contacts.points().len(), 4);
+    assert_eq!(contacts.points()[..2], contacts.points()[2..]);
+    assert_eq!(contacts.curves().unwrap().len(), 2);
+    assert_eq!(contacts.regions().unwrap().len(), 2);
+}

@@ -456,6 +456,30 @@ fn repeated_tetrahedra_have_one_surface() {
     }
 }
 
+/// A corner of the second is strictly inside the first: inside, and on the surface of `closest`.
+#[test]
+fn surfaces_inside_other_tetrahedra_are_inside_and_at_distance_0() {
+    let positions = [
+        [0.0f64; 3],
+        [4.0, 0.0, 0.0],
+        [0.0, 4.0, 0.0],
+        [0.0, 0.0, 4.0],
+        [0.5, 0.5, 0.5],
+        [9.0, 1.0, 1.0],
+        [1.0, 9.0, 1.0],
+        [1.0, 1.0, 9.0],
+    ];
+    let mut scene = Scene::new();
+    let body = scene
+        .add_tetrahedra(&[[0, 1, 2, 3], [4, 5, 6, 7]], &positions)
+        .unwrap();
+    let mut detector = Detector::new(Backend::Cpu).unwrap();
+    let points = [[0.5, 0.5, 0.5]];
+    assert_eq!(detector.contains(&scene, body, &points).unwrap(), [1]);
+    let distances = detector.signed_distance(&scene, body, &points).unwrap();
+    assert_eq!(distances, [0.0]);
+}
+
 /// The border of a flat tetrahedron that lies on a face of another one, and tetrahedra that
 /// overlap, in either order.
 #[test]
