@@ -2,6 +2,7 @@
 #include "common.h"
 #include <impinge/ipc.hpp>
 
+#include <ipc/broad_phase/brute_force.hpp>
 #include <ipc/broad_phase/lbvh.hpp>
 #include <ipc/candidates/candidates.hpp>
 #include <ipc/ccd/tight_inclusion_ccd.hpp>
@@ -9,6 +10,7 @@
 
 #include <limits>
 #include <set>
+#include <string>
 #include <thread>
 
 namespace {
@@ -165,6 +167,16 @@ template <class Call> bool refuses(Call call) {
   return false;
 }
 
+// What a call is refused with; nothing if it is not.
+template <class Call> std::string said_by(Call call) {
+  try {
+    call();
+  } catch (const impinge::error &error) {
+    return error.what();
+  }
+  return {};
+}
+
 template <class Candidate, class Detect> std::size_t count(Detect detect) {
   std::vector<Candidate> found;
   detect(found);
@@ -178,6 +190,91 @@ std::size_t n_fv(const ::ipc::BroadPhase &of) {
 }
 std::size_t n_ev(const ::ipc::BroadPhase &of) {
   return count<::ipc::EdgeVertexCandidate>([&](auto &found) { of.detect_edge_vertex_candidates(found); });
+}
+
+std::vector<std::array<long, 2>> pairs_of_edges(const ::ipc::BroadPhase &of) {
+  std::vector<::ipc::EdgeEdgeCandidate> found;
+  of.detect_edge_edge_candidates(found);
+  std::vector<std::array<long, 2>> rows;
+  for (const auto &c : found) rows.push_back({c.edge0_id, c.edge1_id});
+  std::sort(rows.begin(), rows.end());
+  return rows;
+}
+std::size_t n_vv(const ::ipc::BroadPhase &of) {
+  return count<::ipc::VertexVertexCandidate>([&](auto &found) { of.detect_vertex_vertex_candidates(found); });
+}
+std::size_t n_ef(const ::ipc::BroadPhase &of) {
+  return count<::ipc::EdgeFaceCandidate>([&](auto &found) { of.detect_edge_face_candidates(found); });
+}
+
+// A loose edge between two faces, whose sides are no edges of the caller's, or are.
+void loose_edges(impinge::ipc::mode mode) {
+  Eigen::MatrixXd at(8, 3);
+  at << 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 0.05, 1, 0, 0.05, 0, 1, 0.05, -1, 0.2, 0.02, 2, 0.2, 0.02;
+  Eigen::MatrixXi faces(2, 3), alone(1, 2), all(7, 2);
+  faces << 0, 1, 2, 3, 4, 5;
+  alone << 6, 7;
+  all << 6, 7, 0, 1, 1, 2, 2, 0, 3, 4, 4, 5, 5, 3;
+  impinge::ipc::BroadPhase ours(mode);
+  ::ipc::BruteForce theirs;
+  for (const Eigen::MatrixXi &edges : {alone, all})
+    for (const bool moves : {false, true}) {
+      for (::ipc::BroadPhase *with : {static_cast<::ipc::BroadPhase *>(&ours), static_cast<::ipc::BroadPhase *>(&theirs)})
+        moves ? with->build(at, at, edges, faces, 0.3) : with->build(at, edges, faces, 0.3);
+      // The lower edge comes first, whichever of them is a side.
+      CHECK(pairs_of_edges(ours) == pairs_of_edges(theirs) && n_ef(ours) == n_ef(theirs) && n_ef(ours) > 0);
+    }
+}
+
+// Two edges that approach: of steps, too, all kinds of pairs are found.
+void vertices_of_edges(impinge::ipc::mode mode) {
+  Eigen::MatrixXd start(4, 3);
+  start << 0, 0, 0, 1, 0, 0, 0, 0, 0.3, 1, 0, 0.3;
+  Eigen::MatrixXd end = start;
+  end(2, 2) = end(3, 2) = 0.1;
+  Eigen::MatrixXi edges(2, 2);
+  edges << 0, 1, 2, 3;
+  impinge::ipc::BroadPhase ours(mode);
+  ours.build(start, end, edges, Eigen::MatrixXi(), 0.1);
+  CHECK(n_vv(ours) == 2 && n_ev(ours) == 4 && n_ee(ours) == 1);
+}
+
+// Refusals name the argument, the caller's vertices, and both numbers.
+void refusals() {
+  Eigen::MatrixXd at(6, 3);
+  at << 0, 0, 0, 1, 0, 0, 0, 1, 0, 5, 5, 5, 7, 7, 7, 5, 5, 5;
+  Eigen::MatrixXi edges(3, 2), faces(1, 3);
+  edges << 0, 1, 1, 2, 2, 0;
+  faces << 0, 1, 2;
+  ::ipc::CollisionMesh mesh(at, edges, faces);
+  // Two loose vertices at one position, with those of a face before them.
+  const std::string seam = said_by([&] { impinge::ipc::compute_collision_free_stepsize(mesh, at, at); });
+  CHECK(seam.rfind("vertices 3 and 5 are at one position but not shared", 0) == 0 && seam.find("(1 of its vertices") != seam.npos);
+  // The filter leaves them out.
+  mesh.can_collide = [](std::size_t a, std::size_t b) { return a != 5 && b != 5; };
+  CHECK(impinge::ipc::compute_collision_free_stepsize(mesh, at, at) == 1);
+  mesh.can_collide = ::ipc::CollisionMesh(at, edges, faces).can_collide;
+
+  Eigen::MatrixXd bad = at;
+  bad(4, 1) = std::numeric_limits<double>::quiet_NaN();
+  const Eigen::MatrixXd few = at.topRows(4), flat = at.leftCols(2);
+  CHECK(said_by([&] { impinge::ipc::has_intersections(mesh, bad); }) == "vertices[4, 1] = nan: a position must be finite");
+  CHECK(said_by([&] { impinge::ipc::is_step_collision_free(mesh, at, bad); }) == "vertices_t1[4, 1] = nan: a position must be finite");
+  CHECK(said_by([&] { impinge::ipc::has_intersections(mesh, few); }) == "vertices: shape (6, 3) expected, as the mesh has, (4, 3) given");
+  CHECK(said_by([&] { impinge::ipc::is_step_collision_free(mesh, few, at); }) == "vertices_t0: shape (6, 3) expected, as the mesh has, (4, 3) given");
+  CHECK(said_by([&] { impinge::ipc::is_step_collision_free(mesh, at, few); }) == "vertices_t1: shape (6, 3) expected, as the mesh has, (4, 3) given");
+  ::ipc::CollisionMesh of_plane(flat, edges, Eigen::MatrixXi());
+  CHECK(said_by([&] { impinge::ipc::has_intersections(of_plane, flat); }) == "mesh: two dimensions are not served");
+
+  impinge::ipc::BroadPhase ours;
+  CHECK(said_by([&] { ours.build(at, few, edges, faces); }) == "vertices_t1: shape (6, 3) expected, as the mesh has, (4, 3) given");
+  CHECK(said_by([&] { ours.build(at, edges, faces, -0.01); }) == "inflation_radius: -0.01 given, a finite number of 0 or more allowed");
+  CHECK(said_by([&] { ours.build(at, at, edges, faces, std::nan("")); }) == "inflation_radius: nan given, a finite number of 0 or more allowed");
+  const Eigen::MatrixXi some = edges.topRows(1);
+  CHECK(said_by([&] { ours.build(at, some, faces); }) == "edges: a face has the edge (0, 2), which is not among them: list all edges of faces, or none");
+  Eigen::MatrixXi twice(4, 2);
+  twice << edges, 1, 0;
+  CHECK(said_by([&] { ours.build(at, twice, faces); }) == "edges[0] and edges[3]: both are the edge (0, 1)");
 }
 
 // What ipc-toolkit's functions do not ask in this way, but a solver may ask a broad phase.
@@ -250,7 +347,11 @@ int main() {
   } catch (const std::runtime_error &error) {
     CHECK(strcmp(error.what(), "from a filter") == 0);
   }
-  asked_alone(impinge::ipc::mode::boxes, of);
-  asked_alone(impinge::ipc::mode::exact, of);
+  for (const auto mode : {impinge::ipc::mode::boxes, impinge::ipc::mode::exact}) {
+    asked_alone(mode, of);
+    loose_edges(mode);
+    vertices_of_edges(mode);
+  }
+  refusals();
   return finish("ipc");
 }

@@ -20,7 +20,9 @@
 #include <cmath>
 #include <exception>
 #include <list>
+#include <map>
 #include <mutex>
+#include <sstream>
 
 namespace impinge {
 inline namespace IMPINGE_MODE {
@@ -47,6 +49,22 @@ namespace detail {
 
 using ids = std::vector<std::uint32_t>;
 
+/// Throws a message that is made of texts and numbers.
+template <class... Part> [[noreturn]] void refuse(const Part &...parts) {
+  std::ostringstream message;
+  (message << ... << parts);
+  impinge::detail::refuse(message.str().c_str());
+}
+
+/// Refuses positions that are not those of `n` vertices, or not finite.
+inline void check_positions(const char *name, Eigen::Ref<const Eigen::MatrixXd> at, Eigen::Index n) {
+  if (at.rows() != n || at.cols() != 3) refuse(name, ": shape (", n, ", 3) expected, as the mesh has, (", at.rows(), ", ", at.cols(), ") given");
+  if (at.allFinite()) return;
+  for (Eigen::Index v = 0; v < n; ++v)
+    for (Eigen::Index k = 0; k < 3; ++k)
+      if (!std::isfinite(at(v, k))) refuse(name, "[", v, ", ", k, "] = ", at(v, k), ": a position must be finite");
+}
+
 /// Vertices, edges and faces of ipc-toolkit as up to three bodies of a scene: faces, with the edges of the caller; edges of no face; vertices of
 /// neither. The edges of a body are those of the caller that it has, in the caller's order.
 class bodies {
@@ -56,7 +74,7 @@ public:
     const auto are_there = [n](const Eigen::MatrixXi &of, Eigen::Index corners) {
       return of.rows() == 0 || (of.cols() == corners && of.minCoeff() >= 0 && of.maxCoeff() < n);
     };
-    if (!are_there(edges, 2) || !are_there(faces, 3)) impinge::detail::refuse("edges or faces: not 2 or 3 vertices in a row, or a vertex that is not there");
+    if (!are_there(edges, 2) || !are_there(faces, 3)) refuse("edges or faces: not 2 or 3 vertices in a row, or a vertex that is not there");
     std::vector<char> is_used(static_cast<std::size_t>(n));
     std::vector<std::array<int, 2>> sides;
     for (Eigen::Index f = 0; f < faces.rows(); ++f)
@@ -66,12 +84,25 @@ public:
         sides.push_back({a, b});
       }
     std::sort(sides.begin(), sides.end());
+    sides.erase(std::unique(sides.begin(), sides.end()), sides.end());
+    std::vector<Eigen::Index> row_of(sides.size(), -1);
     for (Eigen::Index e = 0; e < edges.rows(); ++e) {
       const auto [a, b] = std::minmax(edges(e, 0), edges(e, 1));
-      const bool is_side = std::binary_search(sides.begin(), sides.end(), std::array<int, 2>{a, b});
+      const std::array<int, 2> ends{a, b};
+      const auto at = std::lower_bound(sides.begin(), sides.end(), ends);
+      const bool is_side = at != sides.end() && *at == ends;
       (is_side ? sides_ : loose_edges_).push_back(static_cast<std::uint32_t>(e));
-      if (is_side) continue;
+      if (is_side) {
+        auto &row = row_of[static_cast<std::size_t>(at - sides.begin())];
+        if (row >= 0) refuse("edges[", row, "] and edges[", e, "]: both are the edge (", a, ", ", b, ")");
+        row = e;
+        continue;
+      }
       is_used[static_cast<std::size_t>(a)] = is_used[static_cast<std::size_t>(b)] = 1;
+    }
+    for (std::size_t ix = 0; !sides_.empty() && ix < sides.size(); ++ix) {
+      const auto [a, b] = sides[ix];
+      if (row_of[ix] < 0 && a != b) refuse("edges: a face has the edge (", a, ", ", b, "), which is not among them: list all edges of faces, or none");
     }
     for (std::size_t v = 0; v < is_used.size(); ++v)
       if (!is_used[v]) points_.push_back(static_cast<std::uint32_t>(v));
@@ -83,13 +114,16 @@ public:
   }
 
   /// All vertices stand still.
-  void place(Eigen::Ref<const Eigen::MatrixXd> at) {
+  void place(Eigen::Ref<const Eigen::MatrixXd> at, const char *name = "vertices") {
+    check_positions(name, at, n_);
     if (scene_.n_bodies() == 0) return add(at);
     for_parts(at, [&](body of, const auto &part) { scene_.set_positions(of, part); });
   }
   /// They move.
-  void place(Eigen::Ref<const Eigen::MatrixXd> start, Eigen::Ref<const Eigen::MatrixXd> end) {
-    place(start);
+  void place(Eigen::Ref<const Eigen::MatrixXd> start, Eigen::Ref<const Eigen::MatrixXd> end, const char *name_t0 = "vertices_t0",
+             const char *name_t1 = "vertices_t1") {
+    place(start, name_t0);
+    check_positions(name_t1, end, n_);
     for_parts(end, [&](body of, const auto &part) { scene_.set_end_positions(of, part); });
   }
 
@@ -97,11 +131,14 @@ public:
   std::uint32_t number(int part, body of, std::uint32_t element) const {
     if (part == 0 && of == of_points_) return points_[element];
     if (part == 1 && of == of_loose_edges_) return loose_edges_[element];
-    if (part == 1 && !sides_.empty()) return sides_[element];
+    if (part == 1) return sides_[element];
     return element;
   }
-  /// Whether an element is a vertex that another body has too, with all that it meets.
-  bool is_repeated(int part, body of, std::uint32_t element) const { return part == 0 && of == of_loose_edges_ && on_faces_[element] != 0; }
+  /// Whether the caller has an element by this body: an edge of a face may be none of the caller's, and a vertex of a face and of a loose edge
+  /// meets all that it meets as one of the face.
+  bool is_asked(int part, body of, std::uint32_t element) const {
+    return part == 0 ? of != of_loose_edges_ || on_faces_[element] == 0 : part != 1 || of != of_faces_ || !sides_.empty();
+  }
   /// The vertices of an element by the caller's number.
   view<int> corners(int part, std::uint32_t number, std::array<int, 3> &room) const {
     if (part == 0) room[0] = static_cast<int>(number);
@@ -109,6 +146,7 @@ public:
     for (int k = 0; part > 0 && k <= part; ++k) room[static_cast<std::size_t>(k)] = of(static_cast<Eigen::Index>(number), k);
     return {room.data(), static_cast<std::size_t>(part) + 1};
   }
+  view<int> corners(int part, body of, std::uint32_t element, std::array<int, 3> &room) const { return corners(part, number(part, of, element), room); }
   /// The caller's number of a vertex of an element that a filter is asked about.
   int vertex(const impinge_element &of, std::uint32_t k) const {
     return static_cast<int>(of.body == of_points_ ? points_[of.vertices[k]] : of.vertices[k]);
@@ -130,13 +168,11 @@ public:
     return detector_.near(scene_, distance, of);
   }
   bool has_faces() const { return faces_.rows() > 0; }
-  bool has_edges() const { return edges_.rows() > 0; }
   /// Held while a thread asks the detector, and not while a filter is called.
   std::mutex asked;
 
 private:
   template <class Set> void for_parts(Eigen::Ref<const Eigen::MatrixXd> at, Set set) {
-    if (at.rows() != n_ || at.cols() != 3) impinge::detail::refuse("vertices: another number of rows than before, or not 3 columns");
     if (of_faces_ != IMPINGE_ANY_BODY) set(of_faces_, at);
     if (of_loose_edges_ != IMPINGE_ANY_BODY) set(of_loose_edges_, at);
     if (of_points_ != IMPINGE_ANY_BODY) set(of_points_, points(at));
@@ -152,7 +188,6 @@ private:
     return rows;
   }
   void add(Eigen::Ref<const Eigen::MatrixXd> at) {
-    if (at.rows() != n_ || at.cols() != 3) impinge::detail::refuse("vertices: not 3 columns");
     impinge::scene made;
     if (has_faces()) {
       of_faces_ = made.add_triangles(faces_, at);
@@ -241,11 +276,36 @@ private:
 };
 
 /// The bodies of this thread's meshes, for the functions below.
-inline bodies &of_mesh(const ::ipc::CollisionMesh &mesh, Eigen::Index n) {
-  if (!mesh.planes.empty()) impinge::detail::refuse("mesh: planes are not served; give the mesh faces in their place");
-  if (n != static_cast<Eigen::Index>(mesh.num_vertices())) impinge::detail::refuse("vertices: another number of rows than the mesh has");
+inline bodies &of_mesh(const ::ipc::CollisionMesh &mesh) {
+  if (mesh.dim() != 3) refuse("mesh: two dimensions are not served");
+  if (!mesh.planes.empty()) refuse("mesh: planes are not served; give the mesh faces in their place");
   static thread_local known_bodies known;
-  return known.of(n, mesh.edges(), mesh.faces());
+  return known.of(static_cast<Eigen::Index>(mesh.num_vertices()), mesh.edges(), mesh.faces());
+}
+
+/// Refuses, by the mesh's numbers, vertices of one body that are at one position but not shared, if what they belong to touches at the start.
+inline void refuse_seams(bodies &of, Eigen::Ref<const Eigen::MatrixXd> start, const query &step) {
+  const auto found = of.detector().impacts(of.scene(), step);
+  std::optional<std::array<int, 2>> first;
+  std::array<int, 3> room_a{}, room_b{};
+  struct parts {
+    pair_kind kind;
+    int a, b;
+  };
+  for (const auto &[kind, part_a, part_b] : std::array<parts, 4>{{{pair_kind::vf, 0, 2}, {pair_kind::ee, 1, 1}, {pair_kind::ev, 1, 0}, {pair_kind::vv, 0, 0}}})
+    for (const auto &row : found.of(kind)) {
+      if (row.body_a != row.body_b || !of.is_asked(part_a, row.body_a, row.element_a) || !of.is_asked(part_b, row.body_b, row.element_b)) continue;
+      for (const int a : of.corners(part_a, row.body_a, row.element_a, room_a))
+        for (const int b : of.corners(part_b, row.body_b, row.element_b, room_b)) {
+          const std::array<int, 2> both{std::min(a, b), std::max(a, b)};
+          if (a != b && start.row(a) == start.row(b) && (!first || both < *first)) first = both;
+        }
+    }
+  if (!first) return;
+  const auto n_coincident = static_cast<std::size_t>(start.rows()) - weld(start).firsts.size();
+  refuse("vertices ", (*first)[0], " and ", (*first)[1],
+         " are at one position but not shared, so what they belong to touches at the start, and no step can be taken: weld the mesh (", n_coincident,
+         " of its vertices lie at positions of others)");
 }
 
 } // namespace detail
@@ -253,7 +313,7 @@ inline bodies &of_mesh(const ::ipc::CollisionMesh &mesh, Eigen::Index n) {
 /// Whether elements of a mesh intersect: faces with faces, loose edges and vertices with all. Exact, and touching counts. Faces that share a
 /// vertex count where they meet in more than that: ipc-toolkit does not look at these. A loose edge and what has one of its vertices do not count.
 inline bool has_intersections(const ::ipc::CollisionMesh &mesh, Eigen::Ref<const Eigen::MatrixXd> vertices) {
-  auto &of = detail::of_mesh(mesh, vertices.rows());
+  auto &of = detail::of_mesh(mesh);
   of.place(vertices);
   const auto pairs = of.detector().detect(of.scene());
   std::array<int, 3> room_a{}, room_b{};
@@ -269,7 +329,7 @@ inline bool has_intersections(const ::ipc::CollisionMesh &mesh, Eigen::Ref<const
 /// takes it that the start is free.
 inline bool is_step_collision_free(const ::ipc::CollisionMesh &mesh, Eigen::Ref<const Eigen::MatrixXd> vertices_t0, Eigen::Ref<const Eigen::MatrixXd> vertices_t1,
                                    double min_distance = 0) {
-  auto &of = detail::of_mesh(mesh, vertices_t0.rows());
+  auto &of = detail::of_mesh(mesh);
   of.place(vertices_t0, vertices_t1);
   detail::step_filter filter(of, mesh.can_collide);
   const bool is_free =
@@ -287,7 +347,7 @@ inline bool is_step_collision_free(const ::ipc::CollisionMesh &mesh, Eigen::Ref<
 inline double compute_collision_free_stepsize(const ::ipc::CollisionMesh &mesh, Eigen::Ref<const Eigen::MatrixXd> vertices_t0,
                                               Eigen::Ref<const Eigen::MatrixXd> vertices_t1, double min_distance = 0,
                                               double conservative_rescaling = default_rescaling) {
-  auto &of = detail::of_mesh(mesh, vertices_t0.rows());
+  auto &of = detail::of_mesh(mesh);
   of.place(vertices_t0, vertices_t1);
   detail::step_filter filter(of, mesh.can_collide);
   // With all of its distance to lose, a pair still keeps what rounding moves.
@@ -298,7 +358,10 @@ inline double compute_collision_free_stepsize(const ::ipc::CollisionMesh &mesh, 
     fraction = of.detector().advance_fraction(of.scene(), step);
   } catch (const error &) {
     // Parts that have come to touch at a vertex are no seam of the mesh: there is no step, as for all that touches.
-    if (!of.detector().is_free(of.scene(), step) && weld(mesh.rest_positions()).firsts.size() == mesh.num_vertices()) return 0;
+    if (!of.detector().is_free(of.scene(), step)) {
+      if (weld(mesh.rest_positions()).firsts.size() == mesh.num_vertices()) return 0;
+      detail::refuse_seams(of, vertices_t0, step);
+    }
     throw;
   }
   filter.rethrow();
@@ -342,7 +405,7 @@ public:
       low.row(v) = boxes[static_cast<std::size_t>(v)].min.transpose();
       high.row(v) = boxes[static_cast<std::size_t>(v)].max.transpose();
     }
-    of.place(low, high);
+    of.place(low, high, "boxes", "boxes");
     bodies_ = &of;
     are_boxes_ = true;
   }
@@ -352,7 +415,7 @@ public:
     bodies_ = nullptr;
     flat_.reset();
     near_ = {};
-    impacts_ = {};
+    impacts_.clear();
     is_still_ = are_boxes_ = false;
   }
 
@@ -394,6 +457,8 @@ private:
   }
   detail::bodies &start(Eigen::Index n, Eigen::ConstRef<Eigen::MatrixXi> edges, Eigen::ConstRef<Eigen::MatrixXi> faces, double inflation_radius) {
     clear();
+    if (!(std::isfinite(inflation_radius) && inflation_radius >= 0))
+      detail::refuse("inflation_radius: ", inflation_radius, " given, a finite number of 0 or more allowed");
     inflation_ = inflation_radius;
     dim = 3;
     return known_.of(n, edges, faces);
@@ -416,15 +481,16 @@ private:
 
   /// Hands out the pairs of one kind that share no vertex and pass the filter.
   template <class Found> void each(pair_kind kind, int part_a, int part_b, Found found) const {
-    // Faces without edges of the caller's have some in the scene.
-    if (bodies_ == nullptr || (!bodies_->has_edges() && (part_a == 1 || part_b == 1))) return;
+    if (bodies_ == nullptr) return;
     const bool is_of_step = kind == pair_kind::vf || kind == pair_kind::ee || (!bodies_->has_faces() && kind != pair_kind::ef && kind != pair_kind::ff);
     // Edges and faces, and faces and faces, are near where others are: their boxes are all that is asked for.
     const bool asks_boxes = mode_ == mode::boxes || are_boxes_ || !is_of_step, tests_boxes = !asks_boxes && !is_still_;
     const auto hand_out = [&](const auto &row) {
       const auto &of = *bodies_;
-      if (of.is_repeated(part_a, row.body_a, row.element_a) || of.is_repeated(part_b, row.body_b, row.element_b)) return;
-      const auto a = of.number(part_a, row.body_a, row.element_a), b = of.number(part_b, row.body_b, row.element_b);
+      if (!of.is_asked(part_a, row.body_a, row.element_a) || !of.is_asked(part_b, row.body_b, row.element_b)) return;
+      auto a = of.number(part_a, row.body_a, row.element_a), b = of.number(part_b, row.body_b, row.element_b);
+      // Pairs come in the order of bodies.
+      if (part_a == part_b && b < a) std::swap(a, b);
       std::array<int, 3> room_a{}, room_b{};
       const auto corners_a = of.corners(part_a, a, room_a), corners_b = of.corners(part_b, b, room_b);
       if (detail::share_vertex(corners_a, corners_b) || (tests_boxes && !boxes_meet(corners_a, corners_b))) return;
@@ -444,9 +510,15 @@ private:
       asks.unlock();
       return all(near_->of(kind));
     }
-    if (!impacts_) impacts_ = on.impacts(bodies_->scene(), query::all().separation(by_axes * (2 * inflation_ + kept_in_steps)));
+    // Of faces and vertices and of edges and edges there is one search.
+    const bool is_both = kind == pair_kind::vf || kind == pair_kind::ee;
+    auto &step = impacts_[is_both ? pair_kind::vf : kind];
+    if (!step) {
+      const auto kinds = is_both ? query::all().kinds({pair_kind::vf, pair_kind::ee}) : query::all().kinds({kind});
+      step = on.impacts(bodies_->scene(), query(kinds).separation(by_axes * (2 * inflation_ + kept_in_steps)));
+    }
     asks.unlock();
-    all(impacts_->of(kind));
+    all(step->of(kind));
   }
 
   ipc::mode mode_;
@@ -457,7 +529,7 @@ private:
   double inflation_ = 0;
   bool is_still_ = false, are_boxes_ = false;
   mutable std::optional<near_pairs> near_;
-  mutable std::optional<impacts> impacts_;
+  mutable std::map<pair_kind, std::optional<impacts>> impacts_;
 };
 
 /// The exact first contact of one pair. What a pair keeps is as in `compute_collision_free_stepsize`.
