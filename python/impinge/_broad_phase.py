@@ -67,7 +67,7 @@ class BroadPhase(ipctk.BroadPhase):  # type: ignore[misc, unused-ignore]
         self.clear()
         n_arrays = sum(np.ndim(array) == 2 for array in given)
         *ends, edges, faces = given[:n_arrays]
-        radius = float(given[n_arrays]) if len(given) > n_arrays else 0.0
+        radius = given[n_arrays] if len(given) > n_arrays else 0.0
         dimension = ends[0].shape[1]
         # ipctk's part must know the dimension. It clears this object.
         edge, face = np.empty((0, 2), np.int32), np.empty((0, 3), np.int32)
@@ -77,8 +77,14 @@ class BroadPhase(ipctk.BroadPhase):  # type: ignore[misc, unused-ignore]
             self._flat.can_vertices_collide = self.can_vertices_collide
             self._flat.build(*given)
             return
+        from .ipc import _positions
+
         mesh = self._mesh_of(ends[0], edges, faces)
-        ends = [np.ascontiguousarray(end, np.float64) for end in ends]
+        of_step = ["vertices_t0", "vertices_t1"]
+        ends = [
+            _positions(mesh, np.asarray(end, np.float64), name)
+            for end, name in zip(ends, of_step if len(ends) == 2 else ["vertices"])
+        ]
         self._question = Question(mesh, ends, radius, self._mode)
 
     def clear(self) -> None:

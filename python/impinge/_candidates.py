@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, Literal, Optional
 
 import numpy as np
 import numpy.typing as npt
+
+from . import _impinge
+from ._errors import InvalidError
 
 if TYPE_CHECKING:
     from typing_extensions import TypeAlias
@@ -112,12 +116,16 @@ class Question:
     """
 
     def __init__(
-        self, mesh: CollisionMesh, ends: Sequence[npt.NDArray[Any]], radius: float, mode: _Mode
+        self, mesh: CollisionMesh, ends: Sequence[npt.NDArray[Any]], radius: object, mode: _Mode
     ) -> None:
+        self._radius = radius = _impinge._length(radius, "inflation_radius")
+        if not (math.isfinite(radius) and radius >= 0):
+            raise InvalidError(
+                f"inflation_radius: {radius} given, a finite number of 0 or more allowed"
+            )
         self._mesh = mesh
         self._held = held = mesh._held()
         self._ends = ends
-        self._radius = radius
         self._mode = mode
         self._moves = len(ends) == 2
         held.place(*ends)

@@ -140,7 +140,9 @@ class CollisionMesh:
     def __init__(self, rest_positions: _Array, edges: _Array = (), faces: _Array = ()) -> None:
         rest = np.asarray(rest_positions)
         if rest.ndim != 2 or rest.shape[1] != 3:
-            raise InvalidError(f"rest_positions: shape (n, 3) expected, {rest.shape} given")
+            flat = rest.ndim == 2 and rest.shape[1] == 2
+            hint = "; two dimensions are not served" if flat else ""
+            raise InvalidError(f"rest_positions: shape (n, 3) expected, {rest.shape} given{hint}")
         self._rest = rest
         self._faces = _indices(faces, "faces", 3)
         self._edges = _indices(edges, "edges", 2)
@@ -285,9 +287,13 @@ class CollisionMesh:
         before = np.cumsum(n_rows) - n_rows
         return which, rows[(first - before)[which] + np.arange(len(which))]
 
-    def _collector(self) -> Any:
+    def _collector(
+        self,
+        labels: npt.NDArray[np.int64] | None = None,
+        may: Callable[[int, int], bool] | None = None,
+    ) -> Any:
         """A filter that remembers pairs."""
-        return _impinge._VertexFilter([rows for _, _, rows in self._parts], None, None, True)
+        return _impinge._VertexFilter([rows for _, _, rows in self._parts], labels, may, True)
 
     def _filter(self, labels: npt.NDArray[np.int64] | None, may: Callable[[int, int], bool] | None) -> Any:
         """Which pairs of elements collide; `None` if all do that share no vertex of a body."""
@@ -408,9 +414,6 @@ def candidates(
         As `is_step_collision_free`; an edge of a face that the mesh's `edges` lack, or one that they have twice.
     """
     ours = _served(mesh)
-    radius = _impinge._length(inflation_radius, "inflation_radius")
-    if not (math.isfinite(radius) and radius >= 0):
-        raise InvalidError(f"inflation_radius: {radius} given, a finite number of 0 or more allowed")
     if mode not in ("exact", "boxes"):
         raise InvalidError(f"mode: {mode!r} given, 'exact' or 'boxes' allowed")
     ends: tuple[npt.NDArray[Any], ...]
@@ -419,7 +422,7 @@ def candidates(
     else:
         ends = _ends(ours, vertices, vertices_t1, "vertices")
     ours._check_edges()
-    question = Question(ours, ends, radius, mode)
+    question = Question(ours, ends, inflation_radius, mode)
     return Candidates(question.all_found(*_allowed(ours, mesh, labels)))
 
 
@@ -575,21 +578,41 @@ def compute_collision_free_stepsize(
     held = ours._held()
     scene = held.place(start, end)
     try:
+        allowed = _allowed(ours, mesh, labels)
         options = {
             "separation": distance,
             "clearance": _CLEARANCE,
             # With all of its distance to lose, a pair still keeps what rounding moves.
             "clearance_share": max(1 - rescaling, 1e-9),
-            "_filter": ours._filter(*_allowed(ours, mesh, labels)),
+            "_filter": ours._filter(*allowed),
         }
         advance = held.detector._advance(scene, options)
     except Seam:
         # Parts that have come to touch at a vertex are no seam: there is no step, as for all that
         # touches.
         if len(np.unique(ours._rest, axis=0)) < len(ours._rest):
-            raise
+            collector = ours._collector(*allowed)
+            held.detector._impacts(scene, {"separation": distance, "_filter": collector})
+            raise _seam(start, collector) from None
         return 0.0
     return advance.fraction
+
+
+def _seam(start: npt.NDArray[Any], collector: Any) -> Seam:
+    """The error that names, by the mesh's numbers, the lowest two vertices at one position of pairs that touch."""
+    found = []
+    for n_a, n_b in [(1, 3), (2, 2), (2, 1), (1, 1)]:
+        corners = collector.collected(n_a, n_b).astype(np.int64)
+        a, b = np.broadcast_arrays(corners[:, :n_a, None], corners[:, None, n_a:])
+        coincide = (start[a] == start[b]).all(axis=3) & (a != b)
+        both = np.stack([a[coincide], b[coincide]], axis=1)
+        found += np.sort(both, axis=1).tolist()
+    first, second = min(found)
+    n_coincident = len(start) - len(np.unique(start, axis=0))
+    return Seam(
+        f"vertices {first} and {second} are at one position but not shared, so what they belong to touches at the start, "
+        f"and no step can be taken: weld the mesh ({n_coincident} of its vertices lie at positions of others)"
+    )
 
 
 def has_intersections(
@@ -652,6 +675,7 @@ def _ends(
 
 
 def _positions(mesh: CollisionMesh, vertices: _Array, name: str) -> npt.NDArray[Any]:
+    """Positions of the vertices of a mesh, which are checked."""
     positions = np.asarray(vertices)
     if positions.dtype != np.float32:
         positions = positions.astype(np.float64)

@@ -316,12 +316,25 @@ def test_refusals():
         ValueError, match=r"^rest_positions: shape \(n, 3\) expected, \(3, 2\) given"
     ):
         ipc.CollisionMesh(FLOOR[:, :2], [], [[0, 1, 2]])
+    with pytest.raises(ValueError, match="two dimensions are not served$"):
+        ipc.CollisionMesh(FLOOR[:, :2], [], [[0, 1, 2]])
     with pytest.raises(ValueError, match=r"^faces\[0, 2\] = 3: there are 3 vertices"):
         ipc.CollisionMesh(FLOOR, [], [[0, 1, 3]])
     with pytest.raises(ValueError, match=r"^edges\[0, 0\] = -1: there are 3 vertices"):
         ipc.CollisionMesh(FLOOR, [[-1, 2]])
     with pytest.raises(TypeError, match="^faces: an array of integers expected"):
         ipc.CollisionMesh(FLOOR, [], [[0.0, 1.0, 2.0]])
+
+
+def test_seams_are_named_by_the_vertices_of_the_mesh():
+    # Two loose vertices at one position, with those of a face before them.
+    at = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [5, 5, 5], [7, 7, 7], [5, 5, 5]], float)
+    faces = np.array([[0, 1, 2]])
+    mesh = ipc.CollisionMesh(at, ipc.edges(faces), faces)
+    text = r"^vertices 3 and 5 are at one position but not shared, so .*: weld the mesh \(1 of its vertices"
+    with pytest.raises(impinge.Seam, match=text):
+        ipc.compute_collision_free_stepsize(mesh, at, at)
+    assert ipc.compute_collision_free_stepsize(mesh, at, at, labels=[0, 0, 0, 1, 2, 1]) == 1
 
 
 def signature(function):

@@ -406,6 +406,41 @@ def test_filters_are_called_where_ipctk_makes_none(monkeypatch):
     assert _filters.labels_of(may, 9) == (None, may)
 
 
+def test_loose_edges_beside_sides_and_alone():
+    at = np.array(
+        [
+            [0, 0, 0],
+            [1, 0, 0],
+            [0, 1, 0],
+            [0, 0, 0.05],
+            [1, 0, 0.05],
+            [0, 1, 0.05],
+            [-1, 0.2, 0.02],
+            [2, 0.2, 0.02],
+        ]
+    )
+    faces = np.array([[0, 1, 2], [3, 4, 5]], np.int32)
+    both = np.array([[6, 7], [0, 1], [1, 2], [2, 0], [3, 4], [4, 5], [5, 3]], np.int32)
+    for mode in ["exact", "boxes"]:
+        # The sides of faces need not be edges of a program that asks by itself.
+        for edges in [both, both[:1]]:
+            for ends in [(at,), (at, at)]:
+                found = []
+                for broad_phase in [ipc.BroadPhase(mode), ipctk.BruteForce()]:
+                    broad_phase.build(*ends, edges, faces, 0.3)
+                    pairs = broad_phase.detect_edge_edge_candidates()
+                    found.append(sorted((pair.edge0_id, pair.edge1_id) for pair in pairs))
+                assert found[0] == found[1]
+        # Two edges that approach: of steps, too, all kinds of pairs are found.
+        start = np.array([[0, 0, 0], [1, 0, 0], [0, 0, 0.3], [1, 0, 0.3]])
+        end = start - [[0, 0, 0], [0, 0, 0], [0, 0, 0.2], [0, 0, 0.2]]
+        broad_phase = ipc.BroadPhase(mode)
+        broad_phase.build(start, end, np.array([[0, 1], [2, 3]], np.int32), faces[:0], 0.1)
+        assert len(broad_phase.detect_vertex_vertex_candidates()) == 2
+        assert len(broad_phase.detect_edge_vertex_candidates()) == 4
+        assert len(broad_phase.detect_edge_edge_candidates()) == 1
+
+
 def test_candidates_as_arrays():
     mesh, start, end = scene(0)
     found = ipc.candidates(mesh, start, end, 0.05)
@@ -445,8 +480,20 @@ def test_refusals():
     with pytest.raises(ValueError, match=r"^edges\[0\] and edges\[3\]: both are the edge \(0, 1\)"):
         ipc.candidates(twice, start[:3])
     broad_phase = ipc.BroadPhase()
+    for radius in [-0.01, np.nan, np.inf]:
+        with pytest.raises(
+            ValueError, match=f"^inflation_radius: {radius} given, a finite number of 0 or more"
+        ):
+            broad_phase.build(start, mesh.edges, mesh.faces, radius)
+    with pytest.raises(
+        ValueError, match=r"^vertices_t1: shape \(28, 3\) expected, as the mesh has, \(4, 3\) given"
+    ):
+        broad_phase.build(start, start[:4], mesh.edges, mesh.faces, 0.1)
     bad = start.copy()
-    bad[3, 1] = np.nan
+    # A vertex of no edge.
+    bad[27, 1] = np.nan
+    with pytest.raises(ValueError, match=r"^vertices\[27, 1\] = nan: a position must be finite"):
+        broad_phase.build(bad, mesh.edges, mesh.faces, 0.1)
     with pytest.raises(ValueError, match="finite"):
         built(mesh, bad, radius=0.1, by=broad_phase)
     # It goes on.

@@ -283,7 +283,7 @@ inline bodies &of_mesh(const ::ipc::CollisionMesh &mesh) {
   return known.of(static_cast<Eigen::Index>(mesh.num_vertices()), mesh.edges(), mesh.faces());
 }
 
-/// Refuses, by the mesh's numbers, vertices of one body that are at one position but not shared, if what they belong to touches at the start.
+/// Refuses, by the mesh's numbers, the lowest two vertices at one position of pairs that touch.
 inline void refuse_seams(bodies &of, Eigen::Ref<const Eigen::MatrixXd> start, const query &step) {
   const auto found = of.detector().impacts(of.scene(), step);
   std::optional<std::array<int, 2>> first;
@@ -294,7 +294,7 @@ inline void refuse_seams(bodies &of, Eigen::Ref<const Eigen::MatrixXd> start, co
   };
   for (const auto &[kind, part_a, part_b] : std::array<parts, 4>{{{pair_kind::vf, 0, 2}, {pair_kind::ee, 1, 1}, {pair_kind::ev, 1, 0}, {pair_kind::vv, 0, 0}}})
     for (const auto &row : found.of(kind)) {
-      if (row.body_a != row.body_b || !of.is_asked(part_a, row.body_a, row.element_a) || !of.is_asked(part_b, row.body_b, row.element_b)) continue;
+      if (!of.is_asked(part_a, row.body_a, row.element_a) || !of.is_asked(part_b, row.body_b, row.element_b)) continue;
       for (const int a : of.corners(part_a, row.body_a, row.element_a, room_a))
         for (const int b : of.corners(part_b, row.body_b, row.element_b, room_b)) {
           const std::array<int, 2> both{std::min(a, b), std::max(a, b)};
