@@ -487,7 +487,8 @@ def is_step_collision_free(
         float64.
     min_distance : float
         The distance that elements must keep, 0 or more: Euclidean, and decided exactly. ipc-toolkit
-        compares it axis by axis, so its steps are shorter.
+        compares it axis by axis, so its steps are mostly shorter, and where hardly more than
+        `min_distance` is left they may end below it.
     broad_phase, narrow_phase_ccd : object
         Taken so that calls of ipc-toolkit work. There is one method, and it is exact, so neither
         changes this answer.
@@ -547,7 +548,8 @@ def compute_collision_free_stepsize(
     Returns
     -------
     float
-        The largest step in [0, 1], rounded down to 24 bits, for which every pair keeps
+        The largest step in [0, 1], rounded down to 24 bits, for which every pair (also an edge of no
+        face and a vertex of another one, which ipc-toolkit does not ask) keeps
         ``min_distance + min((1 - conservative_rescaling) * (d - min_distance), 1e-4)``, where d is
         its distance at the start. 1 if it keeps that to the end. So a step never ends at contact,
         and the next one is never 0 for that reason.

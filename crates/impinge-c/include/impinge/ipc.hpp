@@ -1,10 +1,11 @@
-/// impinge/ipc.hpp: impinge in the place of ipc-toolkit's collision stage, for programs that have ipc-toolkit 1.6 and Eigen 3.4.
+/// impinge/ipc.hpp: impinge in the place of ipc-toolkit's collision stage, for programs that have ipc-toolkit 1.6 and its Eigen (5.0.1 and 3.4 were tried).
 ///
 ///     impinge::ipc::BroadPhase broad_phase;
 ///     collisions.build(mesh, vertices, dhat, 0, &broad_phase);                                      // and everything else that takes one
 ///     step = impinge::ipc::compute_collision_free_stepsize(mesh, vertices_t0, vertices_t1, dmin);   // the whole step at once
 ///
-/// docs/from-ipc-toolkit.md says what differs. Everything here throws `impinge::error`.
+/// docs/from-ipc-toolkit.md says what differs, and how to build. Everything here throws `impinge::error`. All edges of faces are among the edges,
+/// each once: an edge that is there twice, which `CollisionMesh` takes, is refused. A `BroadPhase` also takes faces without any of their edges.
 #ifndef IMPINGE_IPC_HPP
 #define IMPINGE_IPC_HPP
 
@@ -30,7 +31,8 @@ namespace ipc {
 
 /// What a `BroadPhase` finds. `boxes`: pairs whose inflated boxes overlap, as ipc-toolkit's own do. `exact`: of these only pairs that come
 /// within twice the inflation radius; in a step all that Tight Inclusion may stop for, which compares axis by axis: pairs that come within
-/// the square root of 3 times the sum of twice the radius and 1.1e-4. So step sizes of either narrow phase are those that `boxes` gives.
+/// the square root of 3 times the sum of twice the radius and 1.1e-4. So step sizes of either narrow phase are those that `boxes` gives, but where
+/// Tight Inclusion ends its search of a pair early: where it does depends on the pairs asked before.
 enum class mode { boxes, exact };
 
 /// `conservative_rescaling` of ipc-toolkit's continuous detection.
@@ -339,7 +341,8 @@ inline bool is_step_collision_free(const ::ipc::CollisionMesh &mesh, Eigen::Ref<
 }
 
 /// How far all vertices can move on straight lines from one pose towards another: the largest step in [0, 1] for which every pair keeps
-/// min_distance + min((1 - conservative_rescaling) * (d - min_distance), 1e-4), where d is its distance at the start. This holds for positions that
+/// min_distance + min((1 - conservative_rescaling) * (d - min_distance), 1e-4), where d is its distance at the start: vertices and faces, edges and
+/// edges, and, which ipc-toolkit does not ask, a loose edge and a vertex of another one. This holds for positions that
 /// the caller computes, rounding included, and for every smaller step. 0 if elements touch at the start.
 ///
 /// As in ipc-toolkit, the start must be free of intersections, and is not asked. Throws for a mesh whose vertices at one position are not
