@@ -156,22 +156,29 @@ fn rounded(normal: Point) -> [i64; 3] {
 /// A tetrahedron of far differences that turns outwards; `None` if all differences lie in one plane.
 ///
 /// Between all differences from one point of a body, and all from one of the other, lies what is
-/// between any two differences. So if these are in one plane, then all are. Which are farthest is
-/// rounded; that they are off the line and off the plane is decided exactly.
+/// between any two differences. So if these are in one plane, then all are. They are looked at only
+/// where the ends along the axes are in one plane.
 fn first_corners(a: &[Point], b: &[Point], ends: &[Point; 6]) -> Option<[Point; 4]> {
     let (first_a, first_b) = (*a.first()?, *b.first()?);
-    let spread = || {
-        let of_a = a.iter().map(|&point| sub(point, first_b));
-        let of_b = b.iter().map(|&point| sub(first_a, point));
-        ends.iter().copied().chain(of_a).chain(of_b)
-    };
+    corners_among(|| ends.iter().copied()).or_else(|| {
+        corners_among(|| {
+            let of_a = a.iter().map(|&point| sub(point, first_b));
+            let of_b = b.iter().map(|&point| sub(first_a, point));
+            ends.iter().copied().chain(of_a).chain(of_b)
+        })
+    })
+}
+
+/// A tetrahedron of far points that turns outwards; `None` if all lie in one plane. Which are
+/// farthest is rounded; that they are off the line and off the plane is decided exactly.
+fn corners_among<I: Iterator<Item = Point>>(points: impl Fn() -> I) -> Option<[Point; 4]> {
     let farthest = |far: &dyn Fn(Point) -> f64, is_off: &dyn Fn(&Point) -> bool| {
-        let all = spread().filter(is_off).map(|point| (far(point), point));
+        let all = points().filter(is_off).map(|point| (far(point), point));
         all.reduce(|most, next| if next.0 > most.0 { next } else { most })
             .map(|(_, point)| point)
     };
     let squared = |p: Point| dot(p, p);
-    let p = ends[0];
+    let p = points().next()?;
     let q = farthest(&|x| squared(sub(x, p)), &|&x| x != p)?;
     let along = sub(q, p);
     let away = |x| squared(cross(along, sub(x, p)));
