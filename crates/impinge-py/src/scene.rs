@@ -436,10 +436,10 @@ impl Scene {
         body: &Bound<'_, PyAny>,
         groups: &Bound<'_, PyAny>,
     ) -> PyResult<()> {
-        let mut scene = change(slf)?;
-        let id = scene.id(body, "body")?;
+        let id = change(slf)?.id(body, "body")?;
+        // An array of the caller's own kind may ask the scene while it is read.
         let groups = arrays::whole_numbers(groups, &named(id, "groups"))?;
-        scene.inner.set_groups(id, &groups).map_err(raise)
+        change(slf)?.inner.set_groups(id, &groups).map_err(raise)
     }
 
     fn _set_pinned(

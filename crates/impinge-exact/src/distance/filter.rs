@@ -15,13 +15,13 @@ use crate::rounding::{power_of_two, root};
 /// reach. Yes, if some point of the polygon is nearer than the reach.
 pub(super) fn answer(pair: ElementPair, points: &[Point; 4], reach: &Reach) -> Option<bool> {
     let between = [reach.low, reach.high];
-    answer_in_range(pair, points, between).or_else(|| {
+    answer_as_given(pair, points, between).or_else(|| {
         let scaled = Scaled::of([points])?;
-        answer_in_range(pair, &scaled.ends[0], scaled.lengths(between)?)
+        answer_as_given(pair, &scaled.ends[0], scaled.lengths(between)?)
     })
 }
 
-fn answer_in_range(pair: ElementPair, points: &[Point; 4], [low, high]: [f64; 2]) -> Option<bool> {
+fn answer_as_given(pair: ElementPair, points: &[Point; 4], [low, high]: [f64; 2]) -> Option<bool> {
     let (yes, no) = Polygon::of_pair(pair, points).verdict(low, high);
     if yes { Some(true) } else { no.then_some(false) }
 }
@@ -29,18 +29,18 @@ fn answer_in_range(pair: ElementPair, points: &[Point; 4], [low, high]: [f64; 2]
 /// Two numbers between which the distance of two elements certainly is; none where sizes are out of
 /// range.
 pub(super) fn bounds(pair: ElementPair, points: &[Point; 4]) -> Option<[f64; 2]> {
-    let bounds = bounds_in_range(pair, points);
+    let bounds = bounds_as_given(pair, points);
     if bounds.is_some_and(|[low, _]| low > 0.0) {
         return bounds;
     }
     let of_scaled = || {
         let scaled = Scaled::of([points])?;
-        scaled.lengths_back(bounds_in_range(pair, &scaled.ends[0])?)
+        scaled.lengths_back(bounds_as_given(pair, &scaled.ends[0])?)
     };
     of_scaled().or(bounds)
 }
 
-fn bounds_in_range(pair: ElementPair, points: &[Point; 4]) -> Option<[f64; 2]> {
+fn bounds_as_given(pair: ElementPair, points: &[Point; 4]) -> Option<[f64; 2]> {
     let (is_small, bounds) = Polygon::of_pair(pair, points).bounds();
     is_small.then_some(bounds)
 }
@@ -134,7 +134,7 @@ pub fn approach(
     distance: f64,
     until: f64,
 ) -> Approach {
-    let found = approach_in_range(pair, [start, end], distance, until);
+    let found = approach_as_given(pair, [start, end], distance, until);
     if found != Approach::Unsure {
         return found;
     }
@@ -142,12 +142,12 @@ pub fn approach(
         let scaled = Scaled::of([start, end])?;
         let [start, end] = &scaled.ends;
         let [distance, _] = scaled.lengths([distance; 2])?;
-        Some(approach_in_range(pair, [start, end], distance, until))
+        Some(approach_as_given(pair, [start, end], distance, until))
     };
     of_scaled().unwrap_or(found)
 }
 
-fn approach_in_range(
+fn approach_as_given(
     pair: ElementPair,
     [start, end]: [&[Point; 4]; 2],
     distance: f64,

@@ -519,4 +519,17 @@ fn sizes_out_of_range_are_decided_in_floats() {
         n_decided += usize::from(expected.1.is_some() && expected.2);
     }
     assert!(n_decided > 350, "{n_decided}");
+    // A coordinate that would lose bits: not decided, rather than wrongly.
+    let [tiny, huge] = [-1000, 1000].map(power_of_two);
+    let points = [[huge, 0.0, tiny], [huge, huge, 0.0], [0.0; 3], [0.0; 3]];
+    for (of, found) in [
+        (points, None),
+        (points.map(|[x, y, _]| [x, y, 0.0]), Some(true)),
+    ] {
+        let reach = Reach::from(2.0 * huge);
+        assert_eq!(
+            filter::answer(ElementPair::VertexVertex, &of, &reach),
+            found
+        );
+    }
 }

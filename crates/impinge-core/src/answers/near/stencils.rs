@@ -148,7 +148,7 @@ impl NearIter<'_> {
         }
         Ok(Stencils {
             rows,
-            points: Arc::new(points(scene)?),
+            points: Arc::new(if n == 0 { Vec::new() } else { points(scene)? }),
             offsets,
             threads,
         })
