@@ -20,7 +20,7 @@ use impinge_exact::Point;
 use impinge_exact::internal::NearestOfElements;
 
 impl NearPairs {
-    /// A [`Stencil`] per pair, in the same order, at the positions that the scene has now: with
+    /// A [`Stencil`](crate::Stencil) per pair, in the same order, at the positions that the scene has now: with
     /// distances, gradients and Hessians for a potential. Features are those that were nearest when
     /// the pairs were found.
     ///
