@@ -58,10 +58,16 @@ let before = null;
 let listed = 0;
 // Counts the frames that the CPU has answered.
 let nAnswers = 0;
-// Counts what visitors have opened: what was opened last is shown, however long an earlier file takes.
-let nOpened = 0;
+// The openings whose files are read, in order: what was opened last is shown, however long an earlier file takes. What is shown takes those
+// from here that were opened before; one that shows nothing leaves them.
+const reading = new Set();
+// What was wrong with files that were read at the same time.
+let complaints = [];
 
-const view = new View(element("view"), {
+// Made by `begin`.
+let view = null;
+
+const onView = {
   change: () => (mustDraw = true),
   drag(ix, x, y, z) {
     const { offset } = bodies[ix];
@@ -80,7 +86,7 @@ const view = new View(element("view"), {
     tip.style.left = `${Math.min(clientX + 14, window.innerWidth - tip.offsetWidth - 4)}px`;
     tip.style.top = `${clientY + 14}px`;
   },
-});
+};
 
 const gpu = new Gpu({
   answer(n, ms, hash, asked) {
@@ -374,9 +380,10 @@ function frame(clock) {
 
 // Shows a scene of the page.
 function showScene(name, { triangles = Number(size.value), withSelf = SCENES[name].self, plays = true } = {}) {
-  nOpened += 1;
+  reading.clear();
+  complaints = [];
   complain("");
-  say("status", "");
+  tellReading();
   panel.showNotes([]);
   files = null;
   showFileControls();
@@ -417,24 +424,28 @@ function showFiles(given, how) {
 
 export async function open(offered, folders = []) {
   const list = offered.filter(({ name }) => !folders.includes(name));
-  const refusals = folders.map((name) => `${name} is a folder: open the files in it`);
-  complain(refusals.join("\n"));
+  if (reading.size === 0) complaints = [];
+  complainToo(folders.map((name) => `${name} is a folder: open the files in it`));
   if (list.length === 0) return;
-  nOpened += 1;
-  const number = nOpened;
-  say("status", `Reading ${list.map(({ name }) => name).join(", ")} …`);
+  const names = list.map(({ name }) => name).join(", ");
+  const opening = { names };
+  opening.ended = new Promise((done) => (opening.end = done));
+  reading.add(opening);
+  tellReading();
   try {
     const readers = await withReaders();
     // Lets the browser show the line above.
     await new Promise((done) => setTimeout(done));
     const given = await read(readers, list);
-    if (number !== nOpened) return;
-    given.refused.unshift(...refusals);
-    // A point cache alone moves the meshes that are there.
-    if (given.meshes.length === 0 && given.caches.length > 0) given.meshes = files?.meshes ?? [];
+    // A point cache alone moves the meshes that are there, once those are read that were opened before.
+    if (given.meshes.length === 0 && given.caches.length > 0) {
+      while (earlierThan(opening).length > 0) await Promise.race(earlierThan(opening).map(({ ended }) => ended));
+      given.meshes = files?.meshes ?? [];
+    }
+    if (!reading.has(opening)) return;
     if (given.meshes.length === 0) {
       given.refused.push(...given.caches.map(({ name }) => `${name} moves a mesh: drop the mesh, too`));
-      return complain(given.refused.join("\n"));
+      return complainToo(given.refused);
     }
     const how = looksNumbered(given) ? "poses" : "bodies";
     try {
@@ -443,13 +454,30 @@ export async function open(offered, folders = []) {
       if (how === "bodies") throw error;
       given.refused.push(error.message, ...showFiles(given, "bodies"));
     }
-    complain(given.refused.join("\n"));
+    for (const earlier of earlierThan(opening)) reading.delete(earlier);
+    complainToo(given.refused);
   } catch (error) {
-    if (number !== nOpened) return;
-    complain(error instanceof NotLoaded ? `Not opened: ${list.map(({ name }) => name).join(", ")}; what you see was here before. ${error.message}` : String(error.message ?? error));
+    if (!reading.has(opening)) return;
+    complainToo([error instanceof NotLoaded ? `Not opened: ${names}; what you see was here before. ${error.message}` : String(error.message ?? error)]);
   } finally {
-    if (number === nOpened) say("status", "");
+    if (reading.delete(opening)) tellReading();
+    opening.end();
   }
+}
+
+// The openings before one; none if something that was opened later is shown.
+function earlierThan(opening) {
+  const all = [...reading];
+  return all.slice(0, Math.max(0, all.indexOf(opening)));
+}
+
+function tellReading() {
+  say("status", reading.size === 0 ? "" : `Reading ${[...reading].map(({ names }) => names).join(", ")} …`);
+}
+
+function complainToo(texts) {
+  complaints.push(...texts);
+  complain(complaints.join("\n"));
 }
 
 // The link of what is seen.
@@ -486,7 +514,7 @@ async function share() {
   } catch {
     say("status", "Copy the address of this page: it shows this scene as you see it.");
   }
-  setTimeout(() => say("status", ""), 4000);
+  setTimeout(tellReading, 4000);
 }
 
 // A phone on its side, and one that is held upright.
@@ -553,7 +581,7 @@ const VIEW_KEYS = {
   "=": () => view.turn(0, 0, 0.9),
   "-": () => view.turn(0, 0, 1 / 0.9),
 };
-window.addEventListener("keydown", (event) => {
+function press(event) {
   if (event.ctrlKey || event.metaKey || event.altKey) return;
   const { target, key } = event;
   // Buttons, lists and switches take these keys themselves.
@@ -562,15 +590,17 @@ window.addEventListener("keydown", (event) => {
   if (isTaken || !act) return;
   event.preventDefault();
   act();
-});
+}
 if (isLow() || isUpright()) {
   // All are closed, and of several with one name only one is open.
   for (const details of document.querySelectorAll("details")) Object.assign(details, { open: false, name: "side" });
 }
 
-// Once the module is loaded.
+// Once the module is loaded. Throws where there is no WebGL.
 export function begin() {
+  view = new View(element("view"), onView);
   followLink();
+  window.addEventListener("keydown", press);
   window.addEventListener("hashchange", followLink);
   const panels = new ResizeObserver(leaveRoom);
   for (const id of ["answer", "side", "controls"]) panels.observe(element(id));
@@ -588,7 +618,7 @@ async function useAdapter() {
 
 // For tests, and for the console.
 window.page = {
-  view,
+  get view() { return view; },
   goTo,
   get bodies() { return bodies; },
   get rows() { return rows; },

@@ -4,16 +4,23 @@ import { element, say } from "./text.js";
 
 const MODULE = "impinge/cpu/impinge_bg.wasm";
 
+// They are disabled until the page is loaded.
 const controls = [...document.querySelectorAll("button:not(#retry), select, input:not(#files)")];
-// What opens files, once it is there, and the files that wait for it: the last that were offered.
+// What opens files, once it is there, and what waits for it: files and names of folders.
 let open = null;
-let waiting = null;
+const waiting = [];
 let share = "";
+// Why the page is not there; nothing while it loads. Files wait on unless they are lost.
+let problem = "";
+let isLost = false;
 let nFailed = 0;
+let nFailedImports = 0;
 
 function tell() {
-  const then = waiting === null ? "" : ` Then ${waiting[0].map(({ name }) => name).join(", ")} is opened.`;
-  say("status", `Loading …${share}${then}`);
+  const names = waiting.flatMap(([files]) => files.map(({ name }) => name)).join(", ");
+  const next = names === "" ? "" : ` ${isLost ? "Not opened" : "Next"}: ${names}.`;
+  say("status", problem === "" ? `Loading …${share}${next}` : "");
+  say("message", problem === "" ? "" : `${problem}${next}`);
 }
 
 // The module is compiled while it comes. How large it is, is not known if it is compressed on its way.
@@ -39,53 +46,81 @@ async function compiled(signal) {
   return WebAssembly.compileStreaming(new Response(body.pipeThrough(counted), { headers: { "content-type": "application/wasm" } }));
 }
 
-async function start() {
-  for (const control of controls) control.disabled = true;
-  element("retry").hidden = true;
-  say("message", "");
-  share = "";
-  tell();
-  const loading = new AbortController();
+async function imported() {
   try {
-    const [{ default: init }, main, module] = await Promise.all([import("impinge"), import("./main.js"), compiled(loading.signal)]);
-    await init(module);
-    for (const control of controls) control.disabled = false;
-    main.begin();
-    say("status", "");
-    open = main.open;
-    if (waiting !== null) void open(...waiting);
+    return await Promise.all([import("impinge"), import("./main.js")]);
   } catch (error) {
-    nFailed += 1;
-    loading.abort();
-    say("status", "");
-    say("message", `The page could not be loaded. Try again once you are online. (${error.message ?? error})`);
-    element("retry").hidden = false;
+    nFailedImports += 1;
+    throw error;
   }
 }
 
-function offer(...files) {
-  if (open !== null) return void open(...files);
-  waiting = files;
-  if (element("retry").hidden) tell();
+async function load() {
+  const loading = new AbortController();
+  try {
+    return await Promise.all([imported(), compiled(loading.signal)]);
+  } catch (error) {
+    nFailed += 1;
+    loading.abort();
+    // Some browsers remember that an import failed.
+    isLost = nFailedImports > 1;
+    const advice = isLost ? "Reload it once you are online, and open files then." : "Try again once you are online.";
+    problem = `The page could not be loaded. ${advice} (${error.message ?? error})`;
+    element("retry").textContent = isLost ? "Reload" : "Try again";
+    element("retry").hidden = false;
+    return null;
+  }
 }
 
-element("files").addEventListener("change", ({ target }) => {
-  offer([...target.files]);
-  target.value = "";
-});
-window.addEventListener("dragover", (event) => {
-  event.preventDefault();
-  document.body.classList.add("dropping");
-});
+async function start() {
+  element("retry").hidden = true;
+  problem = "";
+  share = "";
+  tell();
+  const loaded = await load();
+  if (loaded === null) return tell();
+  const [[{ default: init }, main], module] = loaded;
+  try {
+    await init(module);
+    for (const control of controls) control.disabled = false;
+    main.begin();
+  } catch (error) {
+    for (const control of controls) control.disabled = true;
+    isLost = true;
+    problem = String(error.message ?? error);
+    return tell();
+  }
+  say("status", "");
+  open = main.open;
+  for (const given of waiting.splice(0)) void open(...given);
+}
+
+function offer(files, folders = []) {
+  // Text may be dropped, too.
+  if (files.length + folders.length === 0) return;
+  if (open !== null) return void open(files, folders);
+  waiting.push([files, folders]);
+  tell();
+}
+
+function offerChosen() {
+  const chosen = [...element("files").files];
+  element("files").value = "";
+  offer(chosen);
+}
+
+element("files").addEventListener("change", offerChosen);
+window.addEventListener("dragover", () => document.body.classList.add("dropping"));
 for (const done of ["dragleave", "drop"]) {
   window.addEventListener(done, () => document.body.classList.remove("dropping"));
 }
-window.addEventListener("drop", (event) => {
-  event.preventDefault();
-  const { files: dropped, items } = event.dataTransfer;
+window.addEventListener("drop", ({ dataTransfer: { files: dropped, items } }) => {
   const entries = [...items].filter(({ kind }) => kind === "file").map((item) => item.webkitGetAsEntry?.());
   offer([...dropped], entries.filter((entry) => entry?.isDirectory).map(({ name }) => name));
 });
-// Some browsers remember that an import failed.
-element("retry").addEventListener("click", () => (nFailed > 1 ? location.reload() : void start()));
+element("retry").addEventListener("click", () => (isLost ? location.reload() : void start()));
+// What was offered before this script was there.
+for (const files of window.early) offer(files);
+delete window.early;
+offerChosen();
 void start();

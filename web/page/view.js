@@ -106,7 +106,11 @@ export class View {
   constructor(canvas, on) {
     this.canvas = canvas;
     this.on = on;
-    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, alpha: true });
+    try {
+      this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, alpha: true });
+    } catch (cause) {
+      throw new Error("The page needs WebGL, which this browser does not offer.", { cause });
+    }
     this.scene = new THREE.Scene();
     this.camera = new THREE.PerspectiveCamera(35, 1, 0.01, 100);
     this.camera.up.set(0, 0, 1);

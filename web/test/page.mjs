@@ -312,15 +312,27 @@ async function dropped(browser) {
   await page.screenshot({ path: join(shots, "refused.png") });
   await drop(page, "box.obj", "short.pc2");
   assert.match(await text(page, "#message"), /short\.pc2 has frames of 1 vertex,/);
+  // The button for files takes the same way.
+  await page.locator("#files").setInputFiles(["box.obj", "far.obj"].map((name) => join(files, name)));
+  await page.waitForFunction(() => document.getElementById("scene-note").textContent.startsWith("box.obj, far.obj"));
+  await settled(page);
+  await sameAsProgram(page, "pairs", ["box.obj", "far.obj"]);
+  assert.deepEqual(problems, []);
+  console.log("dropped files: the program's pairs and hashes; bad files are named");
+  await page.context().close();
+}
 
-  // What was left out of files is listed, as the program says it; and files that nothing reads are named.
-  const notes = () => page.locator("#notes li").allTextContents();
+// What was left out of files is listed, as the program says it; and files that nothing reads are named.
+async function notes(browser) {
+  const { page, problems } = await open(browser, DESKTOP);
+  const note = () => text(page, "#scene-note");
+  const listed = () => page.locator("#notes li").allTextContents();
   for (const names of [["one.obj", "<i>.obj"], ["whole.gltf"]]) {
     await drop(page, ...names);
     const { stderr } = spawnSync(resolve(program), [names.length > 1 ? "pairs" : "self", ...names.map((name) => join(files, name))], { encoding: "utf8" });
     const said = stderr.split("\n").filter((line) => line.startsWith("note: ")).map((line) => line.slice(6).replace(`${files}/`, ""));
     assert.ok(said.length >= names.length);
-    assert.deepEqual(await notes(), said);
+    assert.deepEqual(await listed(), said);
   }
   assert.match(await note(), /^whole\.gltf with itself: 1 triangle$/);
   assert.match((await page.locator("#bodies li").allTextContents())[0], /1 triangle, /);
@@ -330,38 +342,73 @@ async function dropped(browser) {
   await drop(page, "beside.gltf", "b.bin");
   assert.match(await text(page, "#message"), /^beside\.gltf: [^]*b\.bin is left out: .*\.glb/);
   await drop(page, "soup.stl");
-  assert.deepEqual([await notes(), await page.locator("#notes").isVisible()], [[], false]);
+  assert.deepEqual([await listed(), await page.locator("#notes").isVisible()], [[], false]);
+  assert.deepEqual(problems, []);
+  console.log("notes on files: those of the program; files that nothing reads are named");
+  await page.context().close();
+}
 
-  // The files that were opened last are shown, also if earlier ones take longer.
-  await page.evaluate(() => {
-    const drop = (name, bytes) => {
+// The files that were opened last are shown, also if earlier ones take longer. What shows nothing cancels nothing.
+async function order(browser) {
+  const { page, problems } = await open(browser, DESKTOP);
+  const note = () => text(page, "#scene-note");
+  const message = () => text(page, "#message");
+  const triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3";
+  // A file that takes until it is released.
+  const dropSlow = (name) =>
+    page.evaluate((name) => {
+      const bytes = new Promise((done) => (window.release = (text) => done(new TextEncoder().encode(text).buffer)));
       const file = Object.assign(new File([], name), { arrayBuffer: () => bytes });
       window.dispatchEvent(Object.assign(new Event("drop"), { dataTransfer: { files: [file], items: [] } }));
-    };
-    drop("slow.obj", new Promise((done) => (window.finish = done)));
-    drop("new.obj", new TextEncoder().encode("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3").buffer);
-  });
-  await page.waitForFunction(() => document.getElementById("scene-note").textContent.startsWith("new.obj"));
-  await page.waitForFunction(() => document.getElementById("status").hidden);
-  await page.evaluate(() => window.finish(new TextEncoder().encode("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3").buffer));
-  await page.waitForTimeout(100);
-  assert.match(await note(), /^new\.obj with itself/);
-  await page.evaluate(() => {
-    const file = Object.assign(new File([], "late.obj"), { arrayBuffer: () => new Promise((done) => (window.finish = done)) });
-    window.dispatchEvent(Object.assign(new Event("drop"), { dataTransfer: { files: [file], items: [] } }));
-  });
+    }, name);
+  const release = async (content) => {
+    await page.evaluate((content) => window.release(content), content);
+    await page.waitForTimeout(100);
+    await settled(page);
+  };
+  const shows = (pattern) => page.waitForFunction((pattern) => new RegExp(pattern).test(document.getElementById("scene-note").textContent), pattern);
+  const says = (id, pattern) => page.waitForFunction(([id, pattern]) => new RegExp(pattern).test(document.getElementById(id).textContent), [id, pattern]);
+
+  await dropSlow("slow.obj");
+  await offer(page, "box.obj");
+  await shows("^box\\.obj with itself");
+  assert.equal(await page.locator("#status").isVisible(), false);
+  await release(triangle);
+  assert.match(await note(), /^box\.obj with itself/);
+  await dropSlow("late.obj");
   await page.locator("#scene").selectOption("ring");
-  await page.evaluate(() => window.finish(new TextEncoder().encode("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3").buffer));
-  await page.waitForTimeout(100);
+  await release(triangle);
   assert.match(await note(), /^worm/);
   assert.equal(await page.locator("#status").isVisible(), false);
-  // The button for files takes the same way.
-  await page.locator("#files").setInputFiles(["box.obj", "far.obj"].map((name) => join(files, name)));
-  await page.waitForFunction(() => document.getElementById("scene-note").textContent.startsWith("box.obj, far.obj"));
-  await settled(page);
-  await sameAsProgram(page, "pairs", ["box.obj", "far.obj"]);
+
+  // A file that cannot be read, and one that nothing opens: both are named, and the earlier one is shown.
+  await dropSlow("slow.obj");
+  await offer(page, "notes.txt");
+  await says("message", "notes\\.txt");
+  assert.equal(await text(page, "#status"), "Reading slow.obj …");
+  await release(triangle);
+  assert.match(await note(), /^slow\.obj with itself: 1 triangle/);
+  assert.match(await message(), /notes\.txt/);
+  await dropSlow("slow.obj");
+  await offer(page, "broken.obj");
+  await says("message", "broken\\.obj");
+  await release("v 0 0");
+  assert.match(await message(), /broken\.obj[^]*slow\.obj/);
+  assert.equal(await page.locator("#status").isVisible(), false);
+  // Dropped text is no file, and changes nothing.
+  await page.evaluate(() => window.dispatchEvent(Object.assign(new Event("drop"), { dataTransfer: { files: [], items: [] } })));
+  assert.match(await message(), /broken\.obj[^]*slow\.obj/);
+  // A point cache waits for the mesh that was opened before.
+  await drop(page, "box.obj");
+  assert.equal(await page.locator("#message").isVisible(), false);
+  await dropSlow("bend.obj");
+  await offer(page, "bend.pc2");
+  await says("status", "^Reading bend\\.obj, bend\\.pc2 …$");
+  await release(stripObj(0));
+  await shows("^bend\\.obj with bend\\.pc2 with itself: 16 triangles");
+  assert.deepEqual([await page.locator("#message").isVisible(), await page.locator("#status").isVisible()], [false, false]);
   assert.deepEqual(problems, []);
-  console.log("dropped files: the program's pairs and hashes; bad files are named");
+  console.log("the order of opening: the last is shown, and nothing is lost");
   await page.context().close();
 }
 
@@ -853,9 +900,9 @@ async function loading(browser) {
   assert.deepEqual([await shown("cpu"), await shown("retry"), await page.locator("#files").isDisabled()], [false, false, false]);
   assert.equal(await page.locator("button:enabled:visible, select:enabled:visible").count(), 0);
   await page.locator("#files").setInputFiles(join(files, "tip.stl"));
-  assert.match(await text(page, "#status"), /Then tip\.stl is opened\.$/);
+  assert.match(await text(page, "#status"), /Next: tip\.stl\.$/);
   await offer(page, "box.obj");
-  assert.match(await text(page, "#status"), /Then box\.obj is opened\.$/);
+  assert.match(await text(page, "#status"), /Next: tip\.stl, box\.obj\.$/);
   await page.screenshot({ path: join(shots, "loading.png") });
   release();
   await page.waitForFunction(() => /^box\.obj with itself: 12/.test(document.getElementById("scene-note").textContent));
@@ -890,11 +937,81 @@ async function loading(browser) {
     await page.waitForFunction(() => /^box\.obj with itself: 12/.test(document.getElementById("scene-note").textContent));
     assert.deepEqual([await shown("message"), await shown("retry"), await page.locator("#play").isDisabled()], [false, false, false]);
   }
+  await early(page);
+  await failsTwice(page);
   // Where not even that part comes which says so.
   await page.route("**/text.js", (route) => route.abort());
   await page.goto(`${server.url}?start`);
-  await page.waitForFunction(() => document.getElementById("status").textContent === "The page could not be loaded. Reload it once you are online.");
+  await page.waitForFunction(() => document.getElementById("status").textContent === "The page could not be loaded. Reload it once you are online, and open files then.");
   console.log("while the page loads: it says so, files wait, and what failed is tried again");
+  await context.close();
+}
+
+// Before the first script is there, nothing can be pressed, a drop does not leave the page, and files wait.
+async function early(page) {
+  let release;
+  const held = new Promise((done) => (release = done));
+  await page.route("**/text.js", async (route) => {
+    await held;
+    await route.continue();
+  });
+  await page.goto(`${server.url}?early`, { waitUntil: "commit" });
+  await page.locator("#back").waitFor({ state: "attached" });
+  assert.equal(await page.locator("button:enabled:not(#retry), select:enabled, input:enabled:not(#files)").count(), 0);
+  await offer(page, "bend.obj");
+  await page.locator("#files").setInputFiles(join(files, "bend.pc2"));
+  release();
+  await page.waitForFunction(() => /^bend\.obj with bend\.pc2 with itself/.test(document.getElementById("scene-note").textContent));
+  await page.unrouteAll();
+}
+
+// Files wait through failures as long as the page need not be reloaded; before it is, they are named as not opened.
+async function failsTwice(page) {
+  const fails = async (pattern, times) => {
+    await page.route(pattern, (route) => route.abort());
+    await page.goto(`${server.url}?${times}`);
+    await page.locator("#retry").waitFor();
+    await offer(page, "box.obj");
+    for (let n = 1; n < times; n += 1) {
+      await page.locator("#retry").click();
+      await page.locator("#retry").waitFor();
+    }
+    await page.unrouteAll();
+  };
+  await fails("**/impinge/cpu/*.wasm", 3);
+  assert.match(await text(page, "#message"), /Try again once you are online\. \([^]*\) Next: box\.obj\.$/);
+  await page.locator("#retry").click();
+  await page.waitForFunction(() => /^box\.obj with itself/.test(document.getElementById("scene-note").textContent));
+  await fails("**/three/three.core.js", 2);
+  assert.match(await text(page, "#message"), /Reload it once you are online, and open files then\. \([^]*\) Not opened: box\.obj\.$/);
+  assert.equal(await text(page, "#retry"), "Reload");
+  await page.locator("#retry").click();
+  await page.waitForFunction(() => /^worm/.test(document.getElementById("scene-note").textContent));
+}
+
+// Without WebGL the page says so, and does not advise to load it again.
+async function withoutWebGl(browser) {
+  const context = await browser.newContext(DESKTOP);
+  const page = await context.newPage();
+  await page.addInitScript(() => {
+    const { prototype } = HTMLCanvasElement;
+    const { getContext } = prototype;
+    prototype.getContext = function (kind, ...more) {
+      return kind.startsWith("webgl") ? null : getContext.call(this, kind, ...more);
+    };
+  });
+  const problems = [];
+  page.on("pageerror", (error) => problems.push(String(error)));
+  await page.goto(server.url);
+  const said = "The page needs WebGL, which this browser does not offer.";
+  await page.waitForFunction((said) => document.getElementById("message").textContent === said, said);
+  assert.deepEqual([await page.locator("#retry").isVisible(), await page.locator("#status").isVisible()], [false, false]);
+  assert.equal(await page.locator("button:enabled:visible, select:enabled:visible").count(), 0);
+  await offer(page, "box.obj");
+  assert.equal(await text(page, "#message"), `${said} Not opened: box.obj.`);
+  await page.keyboard.press("f");
+  assert.deepEqual(problems, []);
+  console.log("without WebGL: the page says so");
   await context.close();
 }
 
@@ -1016,7 +1133,7 @@ try {
   links();
   await latest();
   await writeFiles();
-  const visits = [dropped, frames, real, large, keyboard, phone, onItsSide, offline, loading, example, cursor];
+  const visits = [dropped, notes, order, frames, real, large, keyboard, phone, onItsSide, offline, loading, withoutWebGl, example, cursor];
   for (const [options, all] of [[{ gpu: true }, visits], [{ gpu: false }, [withoutGpu]]]) {
     const those = all.filter(({ name }) => only.length === 0 || only.includes(name));
     const browser = await launch(options);
