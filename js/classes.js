@@ -128,7 +128,8 @@ export function settings(given) {
 // A limit, or -1 for none.
 function limit(name, given) {
   if (given === undefined) return -1;
-  return given === Infinity ? given : whole(name, given, 0, Number.MAX_SAFE_INTEGER);
+  if (given === Infinity) return given;
+  return whole(name, given, 0, Number.MAX_SAFE_INTEGER, " or Infinity");
 }
 
 // A matrix, column by column.

@@ -294,11 +294,11 @@ export interface Settings {
   /** Whether bodies are clustered again after they have flowed far: `"auto"` by default. */
   recluster?: "auto" | "never";
   /**
-   * Bytes that the detector may hold for a question, a whole number, the answer included. It keeps memory for the next question of the same sort (pairs and
+   * Bytes that the detector may hold for a question, the answer included: a whole number up to 2^53 - 1, or `Infinity`. It keeps memory for the next question of the same sort (pairs and
    * steps, distances, points and rays, contacts), and the budget holds for each of these alone.
    */
   memoryBudget?: number;
-  /** The most pairs that an answer may have, a whole number: with more, the question fails with the code `"too_many_pairs"`. */
+  /** The most pairs that an answer may have, a whole number up to 2^53 - 1, or `Infinity`: with more, the question fails with the code `"too_many_pairs"`. */
   maxPairs?: number;
   /**
    * A finite distance, for solvers that ask again and again while little moves. If it is above 0, questions about near pairs list those within their
@@ -672,7 +672,7 @@ export interface Region {
   normal: [number, number, number] | null;
   /** Of `penetration`: the extent of the region along the normal. Bodies that are pushed that far may still overlap. */
   depth: number | null;
-  /** Of `penetration`: what both bodies have in common; `null` where they meet other than by edges that cross faces, as in one plane. Means nothing if a body crosses itself. */
+  /** Of `penetration`: what both bodies have in common; `null` where they meet other than by edges that cross faces, as in one plane. `Infinity` if it is larger than all floats. Means nothing if a body crosses itself. */
   volume: number | null;
   /** Of `penetration`: vertices of the first body inside the second, and of the second inside the first. */
   inside: [Uint32Array, Uint32Array];
@@ -704,7 +704,7 @@ export interface Penetration {
   /** Vertices of the first of `bodies` strictly inside the second, and of the second inside the first: sorted. */
   readonly inside: [Uint32Array, Uint32Array];
   readonly regions: Region[];
-  /** Of all regions together, if it is known. */
+  /** Of all regions together, if it is known. `Infinity` if it is larger than all floats. Means nothing if a body crosses itself. */
   readonly volume: number | null;
   readonly stats: Stats;
 }

@@ -94,10 +94,10 @@ function excluded(given) {
   return [2, ...Array.from(groups, (group) => whole("groups", group, 0, 2 ** 32 - 1))];
 }
 
-// A whole number in a range.
-export function whole(name, given, least, most) {
+// A whole number in a range; `more` names what else the caller allows.
+export function whole(name, given, least, most, more = "") {
   if (Number.isInteger(given) && given >= least && given <= most) return given;
-  return refuse(`${name}: ${shown(given)} given, ${least} to ${most} allowed`);
+  return refuse(`${name}: ${shown(given)} given, ${least} to ${most}${more} allowed`);
 }
 
 // The numbers of a question, followed by those of points.

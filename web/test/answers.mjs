@@ -367,8 +367,8 @@ export const REFUSALS = {
   margin: "invalid: reuseMargin: -1 given, a finite number that is not below 0 allowed",
   limits: [
     "invalid: reuseMargin: Infinity given, a finite number that is not below 0 allowed",
-    "invalid: maxPairs: 0.5 given, 0 to 9007199254740991 allowed",
-    "invalid: memoryBudget: -1 given, 0 to 9007199254740991 allowed",
+    "invalid: maxPairs: 0.5 given, 0 to 9007199254740991 or Infinity allowed",
+    "invalid: memoryBudget: -1 given, 0 to 9007199254740991 or Infinity allowed",
   ],
   clearance: "invalid: clearance: -1 given, a finite number that is not below 0 allowed",
   start: 'invalid: start: "never" given, "report", "skip" or "verify" allowed',
