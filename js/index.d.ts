@@ -672,7 +672,7 @@ export interface Region {
   normal: [number, number, number] | null;
   /** Of `penetration`: the extent of the region along the normal. Bodies that are pushed that far may still overlap. */
   depth: number | null;
-  /** Of `penetration`: what both bodies have in common; `null` where they meet other than by edges that cross faces, as in one plane. `Infinity` if it is larger than all floats. Means nothing if a body crosses itself. */
+  /** Of `penetration`: what both bodies have in common; `null` where they meet other than by edges that cross faces, as in one plane. `Infinity` if it is larger than all floats. Of a body that crosses itself, volume, area, normal, depth and regions mean nothing. */
   volume: number | null;
   /** Of `penetration`: vertices of the first body inside the second, and of the second inside the first. */
   inside: [Uint32Array, Uint32Array];
@@ -704,7 +704,7 @@ export interface Penetration {
   /** Vertices of the first of `bodies` strictly inside the second, and of the second inside the first: sorted. */
   readonly inside: [Uint32Array, Uint32Array];
   readonly regions: Region[];
-  /** Of all regions together, if it is known. `Infinity` if it is larger than all floats. Means nothing if a body crosses itself. */
+  /** Of all regions together, if it is known: `Infinity` if larger than all floats, `null` if infinite regions cancel. Means nothing if a body crosses itself. */
   readonly volume: number | null;
   readonly stats: Stats;
 }

@@ -487,7 +487,8 @@ typedef struct impinge_ray_hit {
   uint32_t reserved;      /* 0 */
 } impinge_ray_hit;
 
-/* A connected region in which two bodies overlap: see impinge_find_penetration. */
+/* A connected region in which two bodies overlap: see impinge_find_penetration. Of a body that crosses itself, volume, area, normal, depth
+ * and regions mean nothing. */
 typedef struct impinge_region {
   double position[3];   /* the middle */
   double bounds[2][3];  /* the lowest and the highest coordinates */
@@ -496,8 +497,7 @@ typedef struct impinge_region {
   double area[3];       /* the area that the curves span, as a vector */
   double normal[3];     /* unit direction in which to push body_a so that the overlap shrinks fastest; zero if there is none */
   double depth;         /* the extent of the region along the normal: bodies pushed that far may still overlap; NaN if unknown */
-  double volume;        /* of what the bodies have in common; NaN if they meet other than by edges that cross faces, as in one plane;
-                         * means nothing if a body crosses itself */
+  double volume;        /* of what the bodies have in common; NaN if they meet other than by edges that cross faces, as in one plane */
   uint32_t body_a, body_b;
   uint64_t n_contacts;  /* pairs in the region */
   uint64_t n_inside[2]; /* vertices of body_a inside body_b, and of body_b inside body_a */
@@ -759,7 +759,9 @@ impinge_status impinge_cast(impinge_detector *detector, const impinge_scene *sce
 /* Where the triangles of each pair meet. */
 typedef struct impinge_contacts impinge_contacts;
 
-/* Where the triangles of each pair meet, and the curves in which surfaces cross. `pairs` are those of this scene at its positions. */
+/* Where the triangles of each pair meet, and the curves in which surfaces cross. `pairs` are those of this scene at its positions.
+ * Points are one if they have one name, by features: where a face is there twice, or faces of one body overlap in a plane, points and
+ * curves double, and what they would connect can be several regions. */
 impinge_status impinge_find_contacts(impinge_detector *detector, const impinge_scene *scene, const impinge_pairs *pairs,
     impinge_contacts **contacts);
 
@@ -922,7 +924,7 @@ size_t impinge_penetration_count(const impinge_penetration *penetration);
 const impinge_region *impinge_penetration_data(const impinge_penetration *penetration);
 impinge_status impinge_penetration_column(const impinge_penetration *penetration, uint32_t column, impinge_array *view);
 impinge_status impinge_penetration_stats(const impinge_penetration *penetration, impinge_stats *stats);
-/* The volume of all regions together; NaN if that of any is unknown. */
+/* The volume of all regions together; NaN if that of any is unknown. Infinite if larger than all floats, unknown if infinite regions cancel. */
 double impinge_penetration_volume(const impinge_penetration *penetration);
 void impinge_penetration_destroy(impinge_penetration *penetration);
 

@@ -194,8 +194,9 @@ impl Penetration {
     }
 
     /// float or None : the volume that both bodies have in common, in cubic units; ``None`` where
-    /// it is unknown because they meet other than by edges that cross faces. A body that crosses
-    /// itself has no defined volume: the number means nothing.
+    /// it is unknown because they meet other than by edges that cross faces. Infinite if larger than
+    /// all floats, unknown if infinite regions cancel. Of a body that crosses itself, volume, area,
+    /// normal, depth and regions mean nothing.
     #[getter]
     fn volume(&self) -> Option<f64> {
         self.inner.volume()

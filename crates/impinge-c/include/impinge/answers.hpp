@@ -279,7 +279,8 @@ private:
   }
 };
 
-/// Where the triangles of each pair meet.
+/// Where the triangles of each pair meet. Points are one if they have one name, by features: where a face is there twice, or faces of one
+/// body overlap in a plane, points and curves double, and what they would connect can be several regions.
 class contacts : public detail::contacts_answer {
 public:
   using answer::answer;
@@ -308,7 +309,7 @@ public:
 class penetration : public detail::penetration_answer {
 public:
   using answer::answer;
-  /// NaN if that of any region is unknown: see `impinge_region`.
+  /// NaN if that of any region is unknown: see `impinge_region`. Infinite if larger than all floats, unknown if infinite regions cancel.
   double volume() const noexcept { return impinge_penetration_volume(raw()); }
   /// Vertices of the body with the lower number inside the other, and of the other inside that, whichever was named first.
   view<std::uint32_t> inside_a() const & { return packed<std::uint32_t>(IMPINGE_COLUMN_INSIDE_A); }

@@ -70,8 +70,8 @@ Columns of numbers alone are a plain array in .npy files, others a structured on
   middle, its box, the length of its curves, the area in common planes, the area that the curves span. Push body a along
   (nx, ny, nz), and the overlap shrinks fastest. Of two closed surfaces also depth, the extent of the region along
   (nx, ny, nz) (pushed that far, they may still overlap), the volume in common, and how many vertices of each are
-  inside the other; no volume where vertices or edges meet exactly what they meet, as of aligned boxes, and none that
-  means anything where a surface crosses itself. What is not known is empty, in .npy files NaN.",
+  inside the other; no volume where vertices or edges meet exactly what they meet, as of aligned boxes. Where a surface
+  crosses itself, volume, area, normal, depth and regions mean nothing. What is not known is empty, in .npy files NaN.",
     },
 ];
 

@@ -67,12 +67,14 @@ impl std::fmt::Debug for Penetration {
 }
 
 impl Penetration {
-    /// The volume of all regions together; `None` if the volume of any region is unknown. A body
-    /// that crosses itself has no defined volume: the number means nothing.
+    /// The volume of all regions together; `None` if the volume of any region is unknown. Infinite
+    /// if larger than all `f64`, unknown if infinite regions cancel. Of a body that crosses itself,
+    /// volume, area, normal, depth and regions mean nothing.
     pub fn volume(&self) -> Option<f64> {
         let volumes = self.regions.iter().map(|region| region.volume);
+        let sum = volumes.sum::<Option<f64>>().filter(|sum| !sum.is_nan());
         // The sum of nothing is -0.
-        volumes.sum::<Option<f64>>().map(|volume| volume + 0.0)
+        sum.map(|volume| volume + 0.0)
     }
 }
 
@@ -574,95 +576,126 @@ impl OverlapWork<'_> {
         scale.length_back((high - low).max(0.0))
     }
 
-    /// The volume of each region: a sixth of the sum of `(x - o) · ((p - o) × (q - o))` over the
-    /// sides pq of the parts of faces that lie inside, where x is any point of the face and o is
-    /// one point for all. Coordinates are scaled, with one power of two per region.
+    /// The volume of each region: see [`VolumeSums`].
     fn volumes(
         &self,
         regions: &[Region],
         pieces: &[Vec<Piece>; 2],
         region: &mut dyn FnMut(u32) -> usize,
     ) -> Vec<f64> {
-        let origins: Vec<(Scale, Point)> = regions
-            .iter()
-            .map(|region| {
-                let scale = region.scale();
-                (scale, region.origin(scale))
-            })
-            .collect();
-        let mut volumes = vec![0.0; regions.len()];
-        let mut add_side = |at: usize, on: Point, [from, to]: [Point; 2], weight: f64| {
-            let (scale, origin) = origins[at];
-            let [x, p, q] = [on, from, to].map(|point| sub(scale.point(point), origin));
-            volumes[at] += weight * dot(x, cross(p, q)) / 6.0;
-        };
+        let mut sums = VolumeSums::new(regions);
         for (number, held) in regions.iter().enumerate() {
-            for &contact in &held.contacts {
-                let contact = contact as usize;
-                let &[from, to] = self.contacts.corners(contact) else {
-                    continue;
-                };
-                let [from, to] = [from, to].map(|point| self.contacts.points()[point as usize]);
-                let [_, a, _, b] = self.contacts.rows()[contact];
-                if held.bodies != [0, 1].map(|side| self.crossings[side].body) {
-                    continue;
+            if held.bodies == [0, 1].map(|side| self.crossings[side].body) {
+                for &contact in &held.contacts {
+                    self.add_contact(contact, number, &mut sums);
                 }
-                let on = |side: usize, face: u32| {
-                    let corners = self.bodies[side].elements().corners(face as usize);
-                    self.position(side, VertexIx::new(corners[0]))
-                };
-                // The part inside lies to the left as seen from outside a, to the right as seen
-                // from outside b. Where faces of one are turned inwards, so is the segment.
-                let [of_a, of_b] = self.orientations_of(contact as u32);
-                add_side(number, on(0, a), [from, to], of_a * of_b);
-                add_side(number, on(1, b), [to, from], of_a * of_b);
             }
         }
         for (side, pieces) in pieces.iter().enumerate() {
-            let Elements::Triangles(faces) = self.bodies[side].elements() else {
-                continue;
+            self.add_edges(side, pieces, region, &mut sums);
+        }
+        sums.volumes()
+    }
+
+    /// Adds the segment of a contact as a side of the parts of both faces.
+    fn add_contact(&self, contact: u32, region: usize, sums: &mut VolumeSums) {
+        let &[from, to] = self.contacts.corners(contact as usize) else {
+            return;
+        };
+        let [from, to] = [from, to].map(|point| self.contacts.points()[point as usize]);
+        let [_, a, _, b] = self.contacts.rows()[contact as usize];
+        let on = |side: usize, face: u32| {
+            let corners = self.bodies[side].elements().corners(face as usize);
+            self.position(side, VertexIx::new(corners[0]))
+        };
+        // The part inside lies to the left as seen from outside a, to the right as seen from
+        // outside b. Where faces of one are turned inwards, so is the segment.
+        let [of_a, of_b] = self.orientations_of(contact);
+        sums.add_side(region, on(0, a), [from, to], of_a * of_b);
+        sums.add_side(region, on(1, b), [to, from], of_a * of_b);
+    }
+
+    /// Adds the edges and pieces of edges inside as sides of the parts of faces.
+    fn add_edges(
+        &self,
+        side: usize,
+        pieces: &[Piece],
+        region: &mut dyn FnMut(u32) -> usize,
+        sums: &mut VolumeSums,
+    ) {
+        let Elements::Triangles(faces) = self.bodies[side].elements() else {
+            return;
+        };
+        let crossings = &self.crossings[side];
+        for face in faces.iter().map(|face| face.map(VertexIx::new)) {
+            let is_touched = |vertex: &VertexIx| {
+                self.parts[side].inside(*vertex).is_some() || crossings.is_touched(*vertex)
             };
-            let crossings = &self.crossings[side];
-            for face in faces.iter().map(|face| face.map(VertexIx::new)) {
-                let is_touched = |vertex: &VertexIx| {
-                    self.parts[side].inside(*vertex).is_some() || crossings.is_touched(*vertex)
-                };
-                if !face.iter().any(is_touched) {
+            if !face.iter().any(is_touched) {
+                continue;
+            }
+            let on = self.position(side, face[0]);
+            let weight = self.orientation_at(side, face[0]);
+            if weight == 0.0 {
+                continue;
+            }
+            for k in 0..3 {
+                let (from, to) = (face[k], face[(k + 1) % 3]);
+                if !crossings.is_crossed([from, to]) {
+                    if let (Some(node), Some(_)) = (self.node(side, from), self.node(side, to)) {
+                        let (p, q) = (self.position(side, from), self.position(side, to));
+                        sums.add_side(region(node), on, [p, q], weight);
+                    }
                     continue;
                 }
-                let on = self.position(side, face[0]);
-                let weight = self.orientation_at(side, face[0]);
-                if weight == 0.0 {
-                    continue;
-                }
-                for k in 0..3 {
-                    let (from, to) = (face[k], face[(k + 1) % 3]);
-                    if !crossings.is_crossed([from, to]) {
-                        if let (Some(node), Some(_)) = (self.node(side, from), self.node(side, to))
-                        {
-                            let (p, q) = (self.position(side, from), self.position(side, to));
-                            add_side(region(node), on, [p, q], weight);
-                        }
-                        continue;
-                    }
-                    let name = crossings.name([from, to]);
-                    let is_forward = crossings.lowest(from) == name[0];
-                    let first = pieces.partition_point(|piece| piece.edge < name);
-                    for piece in pieces[first..]
-                        .iter()
-                        .take_while(|piece| piece.edge == name)
-                    {
-                        let (p, q) = if is_forward {
-                            (piece.from, piece.to)
-                        } else {
-                            (piece.to, piece.from)
-                        };
-                        add_side(region(piece.node), on, [p, q], weight);
-                    }
+                let name = crossings.name([from, to]);
+                let is_forward = crossings.lowest(from) == name[0];
+                let first = pieces.partition_point(|piece| piece.edge < name);
+                for piece in pieces[first..]
+                    .iter()
+                    .take_while(|piece| piece.edge == name)
+                {
+                    let (p, q) = if is_forward {
+                        (piece.from, piece.to)
+                    } else {
+                        (piece.to, piece.from)
+                    };
+                    sums.add_side(region(piece.node), on, [p, q], weight);
                 }
             }
         }
-        let scaled = volumes.into_iter().zip(origins);
+    }
+}
+
+/// The volume of each region: a sixth of the sum of `(x - o) · ((p - o) × (q - o))` over the sides
+/// pq of the parts of faces that lie inside, where x is any point of the face and o is one point for
+/// all. Coordinates are scaled, with one power of two per region.
+struct VolumeSums {
+    origins: Vec<(Scale, Point)>,
+    sums: Vec<f64>,
+}
+
+impl VolumeSums {
+    fn new(regions: &[Region]) -> Self {
+        let origin = |region: &Region| {
+            let scale = region.scale();
+            (scale, region.origin(scale))
+        };
+        VolumeSums {
+            origins: regions.iter().map(origin).collect(),
+            sums: vec![0.0; regions.len()],
+        }
+    }
+
+    /// Adds a side of a part of a face, of which one point is given.
+    fn add_side(&mut self, region: usize, on: Point, [from, to]: [Point; 2], weight: f64) {
+        let (scale, origin) = self.origins[region];
+        let [x, p, q] = [on, from, to].map(|point| sub(scale.point(point), origin));
+        self.sums[region] += weight * dot(x, cross(p, q)) / 6.0;
+    }
+
+    fn volumes(self) -> Vec<f64> {
+        let scaled = self.sums.into_iter().zip(self.origins);
         let volumes = scaled.map(|(volume, (scale, _))| scale.volume_back(volume));
         volumes.collect()
     }

@@ -56,8 +56,8 @@ pub struct Region {
     /// its surroundings is a region of negative volume. `None` unless
     /// [`Penetration`](super::Penetration) found the region. Also `None` if the bodies meet in this
     /// region other than by edges that cross faces (vertices on faces, edges on edges, common
-    /// planes). Infinite if it is larger than all `f64`. A body that crosses itself has no defined
-    /// volume: the number means nothing.
+    /// planes). Infinite if it is larger than all `f64`. Of a body that crosses itself, volume,
+    /// area, normal, depth and regions mean nothing.
     pub volume: Option<f64>,
 }
 
@@ -96,6 +96,50 @@ pub(super) fn regions(
     sets: &mut Sets,
     orientations: impl Fn(u32) -> [f64; 2],
 ) -> Result<(Vec<Region>, Vec<u32>), Error> {
+    let (mut regions, region_of) = connected(contacts, sets)?;
+    let mut middles = with_capacity(regions.len(), WHAT)?;
+    middles.extend(regions.iter().map(|region| Middles::of(region.scale())));
+    let mut turns = Turns::default();
+    for contact in 0..contacts.len() {
+        let corners = contacts.corners(contact);
+        let Some(&first) = corners.first() else {
+            continue;
+        };
+        let middle = &mut middles[region_of[sets.find(first) as usize] as usize];
+        let orientations = orientations(contact as u32);
+        middle.take_contact(contacts, contact, orientations)?;
+        if let (&[from, to], true) = (corners, contacts.is_directed(contact)) {
+            turns.take([from, to], orientations[0] * orientations[1])?;
+        }
+    }
+    turns.sort();
+    for curve in 0..curves.len() {
+        let first = curves.points(curve)[0];
+        let at = region_of[sets.find(first) as usize] as usize;
+        let middle = &mut middles[at];
+        let scale = middle.scale;
+        let origin = regions[at].origin(scale);
+        let turn = turns.of_curve(curves, curve);
+        for ends in curves.segments(curve) {
+            let [p, q] = ends.map(|point| scale.point(contacts.points()[point as usize]));
+            let length = distance(p, q);
+            middle.length += length;
+            middle.curves.take(scaled(add(p, q), 0.5), length);
+            if curves.is_closed(curve) && curves.is_directed(curve) {
+                let area = scaled(cross(sub(p, origin), sub(q, origin)), 0.5);
+                middle.area = add(middle.area, scaled(area, turn));
+            }
+        }
+    }
+    for (region, middle) in regions.iter_mut().zip(middles) {
+        region.finish(&middle);
+    }
+    Ok((regions, region_of))
+}
+
+/// The regions with their contacts and bounds alone, and the region of each point as of
+/// [`regions`].
+fn connected(contacts: &Contacts, sets: &mut Sets) -> Result<(Vec<Region>, Vec<u32>), Error> {
     let mut region_of = filled(NO_REGION, sets.len(), WHAT)?;
     let mut regions: Vec<Region> = Vec::new();
     for contact in 0..contacts.len() {
@@ -117,59 +161,48 @@ pub(super) fn regions(
             region.cover(contacts.points()[point as usize]);
         }
     }
-    let mut middles = with_capacity(regions.len(), WHAT)?;
-    middles.extend(regions.iter().map(|region| Middles::of(region.scale())));
-    // Of the faces at each point: curves follow the normals of both.
-    let mut turns = filled(1.0, contacts.points().len(), WHAT)?;
-    for contact in 0..contacts.len() {
-        let corners = contacts.corners(contact);
-        let Some(&first) = corners.first() else {
-            continue;
-        };
-        let middle = &mut middles[region_of[sets.find(first) as usize] as usize];
-        let [of_a, of_b] = orientations(contact as u32);
-        let mut points = with_capacity(corners.len(), WHAT)?;
-        for &corner in corners {
-            let point = contacts.points()[corner as usize];
-            middle.is_single &= point.iter().all(|&x| f64::from(x as f32) == x);
-            middle.points.take(middle.scale.point(point), 1.0);
-            points.push(middle.scale.point(point));
-            turns[corner as usize] = of_a * of_b;
-        }
-        if contacts.shape(contact) == Shape::Polygon {
-            for k in 2..points.len() {
-                let (p, q, r) = (points[0], points[k - 1], points[k]);
-                let area = scaled(cross(sub(q, p), sub(r, p)), 0.5);
-                let size = length(area);
-                middle.patch_area += size;
-                middle.patch = add(middle.patch, scaled(area, of_a * of_b.abs()));
-                middle
-                    .patches
-                    .take(scaled(add(add(p, q), r), 1.0 / 3.0), size);
-            }
-        }
-    }
-    for curve in 0..curves.len() {
-        let first = curves.points(curve)[0];
-        let at = region_of[sets.find(first) as usize] as usize;
-        let middle = &mut middles[at];
-        let scale = middle.scale;
-        let origin = regions[at].origin(scale);
-        for ends in curves.segments(curve) {
-            let [p, q] = ends.map(|point| scale.point(contacts.points()[point as usize]));
-            let length = distance(p, q);
-            middle.length += length;
-            middle.curves.take(scaled(add(p, q), 0.5), length);
-            if curves.is_closed(curve) && curves.is_directed(curve) {
-                let area = scaled(cross(sub(p, origin), sub(q, origin)), 0.5);
-                middle.area = add(middle.area, scaled(area, turns[first as usize]));
-            }
-        }
-    }
-    for (region, middle) in regions.iter_mut().zip(middles) {
-        region.finish(&middle);
-    }
     Ok((regions, region_of))
+}
+
+/// The turns of segments, which follow the normals of two faces: the product of both faces'
+/// orientations. Only those that are not 1 are held.
+#[derive(Default)]
+struct Turns(Vec<([u32; 2], f64)>);
+
+impl Turns {
+    /// Takes a segment by its two points.
+    fn take(&mut self, mut ends: [u32; 2], turn: f64) -> Result<(), Error> {
+        if turn != 1.0 {
+            ends.sort_unstable();
+            grow(&mut self.0, 1, WHAT)?;
+            self.0.push((ends, turn));
+        }
+        Ok(())
+    }
+
+    /// To be called once all are taken.
+    fn sort(&mut self) {
+        self.0
+            .sort_unstable_by(|(p, turn), (q, other)| p.cmp(q).then(turn.total_cmp(other)));
+    }
+
+    fn of(&self, mut ends: [u32; 2]) -> f64 {
+        ends.sort_unstable();
+        let first = self.0.partition_point(|(held, _)| *held < ends);
+        let found = self.0.get(first).filter(|(held, _)| *held == ends);
+        found.map_or(1.0, |(_, turn)| *turn)
+    }
+
+    /// The turn of all segments of a curve; 0 if they disagree, as it then has no direction.
+    fn of_curve(&self, curves: &Curves, curve: usize) -> f64 {
+        if self.0.is_empty() {
+            return 1.0;
+        }
+        let mut turns = curves.segments(curve).map(|ends| self.of(ends));
+        let first = turns.next().unwrap_or(1.0);
+        let is_one = turns.all(|turn| turn == first);
+        if is_one { first } else { 0.0 }
+    }
 }
 
 /// No region has this number.
@@ -223,6 +256,35 @@ impl Middles {
         }
     }
 
+    /// Adds a contact, given the orientations of its two faces.
+    fn take_contact(
+        &mut self,
+        contacts: &Contacts,
+        contact: usize,
+        [of_a, of_b]: [f64; 2],
+    ) -> Result<(), Error> {
+        let corners = contacts.corners(contact);
+        let mut points = with_capacity(corners.len(), WHAT)?;
+        for &corner in corners {
+            let point = contacts.points()[corner as usize];
+            self.is_single &= point.iter().all(|&x| f64::from(x as f32) == x);
+            self.points.take(self.scale.point(point), 1.0);
+            points.push(self.scale.point(point));
+        }
+        if contacts.shape(contact) == Shape::Polygon {
+            for k in 2..points.len() {
+                let (p, q, r) = (points[0], points[k - 1], points[k]);
+                let area = scaled(cross(sub(q, p), sub(r, p)), 0.5);
+                let size = length(area);
+                self.patch_area += size;
+                self.patch = add(self.patch, scaled(area, of_a * of_b.abs()));
+                let middle = scaled(add(add(p, q), r), 1.0 / 3.0);
+                self.patches.take(middle, size);
+            }
+        }
+        Ok(())
+    }
+
     /// The area that may come from rounding alone: the error of the coordinates along all curves
     /// within a box.
     fn noise(&self, bounds: [Point; 2]) -> f64 {
@@ -263,7 +325,8 @@ impl Region {
         }
     }
 
-    /// With which its areas and volumes neither overflow nor underflow.
+    /// With which its areas and volumes do not overflow, nor underflow where its extents differ by
+    /// less than 2^300.
     pub(super) fn scale(&self) -> Scale {
         Scale::of_points(&self.bounds)
     }

@@ -910,6 +910,109 @@ fn pieces_that_face_differently_have_one_normal() {
     }
 }
 
+/// Two pieces that face differently may touch in an edge, where their curves meet.
+#[test]
+fn pieces_that_touch_in_an_edge_and_face_differently_have_one_normal() {
+    let large = surfaces::cuboid([1.0, 1.0, 0.0], [3.0, 3.0, 4.0]);
+    let small = surfaces::cuboid([0.0; 3], [1.0, 1.0, 4.0]);
+    let lid = surfaces::cuboid([-2.0, -1.5, 3.0], [5.0, 4.0, 5.0]);
+    for (large, small) in [
+        (large.clone(), small.clone()),
+        (inside_out(&large), small.clone()),
+        (large.clone(), inside_out(&small)),
+        (inside_out(&large), inside_out(&small)),
+    ] {
+        for pieces in [[large.clone(), small.clone()], [small.clone(), large]] {
+            let found = overlap(&joined(&pieces), &lid);
+            assert_eq!(found.regions.len(), 1);
+            let region = &found.regions[0];
+            assert!((region.area[2] - 5.0).abs() < 1e-6, "{region:?}");
+            assert_eq!(normal(region).map(|x| x + 0.0), [0.0, 0.0, -1.0]);
+        }
+    }
+}
+
+/// Parts that overlap and face outwards, as in CAD: where one is out of the others it counts.
+#[test]
+fn pieces_that_cross_face_as_they_do() {
+    // An L of two arms.
+    let corners = [
+        [0.0f32, 0.0],
+        [10.0, 0.0],
+        [10.0, 1.0],
+        [1.0, 1.0],
+        [1.0, 10.0],
+        [0.0, 10.0],
+    ];
+    let cap = [[0u32, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 5]];
+    let sides = (0..6u32).flat_map(|k| {
+        let next = (k + 1) % 6;
+        [[k, next, next + 6], [k, next + 6, k + 6]]
+    });
+    let caps = cap
+        .iter()
+        .flat_map(|&[a, b, c]| [[a, c, b], [a + 6, b + 6, c + 6]]);
+    let bent = Model {
+        elements: caps.chain(sides).collect::<Vec<_>>().into(),
+        positions: [0.0, 1.0]
+            .iter()
+            .flat_map(|&z| corners.map(|[x, y]| [x, y, z]))
+            .collect(),
+    };
+    assert!((volume(&bent) - 19.0).abs() < 1e-9);
+    let block = surfaces::cuboid([0.5, 0.5, 0.25], [5.0, 5.0, 0.75]);
+    let part = surfaces::cuboid([4.5, 4.25, 0.1], [6.0, 6.0, 0.9]);
+    let around = surfaces::cuboid([0.25, 0.3, 0.1], [6.0, 6.1, 0.9]);
+    for pieces in [[bent.clone(), block.clone()], [block, bent]] {
+        let body = joined(&pieces);
+        for body in [body.clone(), inside_out(&body)] {
+            let found = overlap(&body, &part);
+            assert_eq!(found.regions.len(), 1);
+            let region = &found.regions[0];
+            let own = normal(region);
+            assert!(own[0] < -0.83 && own[1] < -0.55, "{own:?}");
+            assert!(
+                (region.depth.unwrap() - 0.375 / 0.375f64.hypot(0.25)).abs() < 1e-6,
+                "{region:?}"
+            );
+            assert!((region.volume.unwrap() - 0.1875).abs() < 1e-6, "{region:?}");
+            // The block is wholly inside, without contact.
+            let found = overlap(&body, &around);
+            let n_whole = found
+                .regions
+                .iter()
+                .filter(|region| region.contacts.is_empty());
+            assert_eq!(n_whole.count(), 1, "{:?}", found.regions);
+        }
+    }
+}
+
+/// Infinite volumes of two signs have no sum.
+#[test]
+fn infinite_volumes_that_cancel_are_unknown() {
+    let hollow = joined(&[
+        surfaces::cuboid([0.0; 3], [8.0; 3]),
+        inside_out(&surfaces::cuboid([2.0; 3], [6.0; 3])),
+    ]);
+    let around = surfaces::cuboid([1.0, 1.1, 1.2], [9.0, 9.1, 9.2]);
+    let ask = |exponent: i32| {
+        let [hollow, around] = [&hollow, &around].map(|model| {
+            let e = 2f64.powi(exponent);
+            let positions = model.positions.iter().map(|p| p.map(|x| f64::from(x) * e));
+            (faces(model).to_vec(), positions.collect())
+        });
+        let found = overlap_of(&hollow, &around);
+        let volumes: Vec<f64> = (found.regions.iter())
+            .map(|region| region.volume.unwrap())
+            .collect();
+        (volumes, found.volume())
+    };
+    let (volumes, sum) = ask(0);
+    assert!(volumes[0] > 0.0 && (volumes[1] + 64.0).abs() < 1e-9);
+    assert_eq!(sum, Some(volumes[0] + volumes[1]));
+    assert_eq!(ask(350), (vec![f64::INFINITY, f64::NEG_INFINITY], None));
+}
+
 /// What two tetrahedra on a small lattice have in common is one region, which has the extent and the
 /// volume of what cutting one by the other leaves. Many of them touch by vertices, edges and planes.
 #[test]
