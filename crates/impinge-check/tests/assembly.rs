@@ -1,11 +1,13 @@
 //! Parts that pass into each other, touch or are near, against separating axes of convex solids.
 
 mod common;
+mod stitched;
 
 use common::{BOX, corners};
 use impinge_check::{AssemblyError, AssemblyOptions, PartPair, Relation, check_assembly};
 use impinge_io::{Elements, Mesh, Positions};
 use impinge_scenes::Random;
+use stitched::stitched_boxes;
 
 type Point = [i64; 3];
 type Faces = Vec<[u32; 3]>;
@@ -299,6 +301,19 @@ fn pieces_inside_and_pieces_outside_are_partly_inside() {
         assert!(as_first.shares_space());
     }
     assert_eq!(relation(&joined(&[(10, 11), (12, 13)]), &block), None);
+}
+
+/// A part with faces of zero area is the solid that it is without them, although they are
+/// neighbours of one another: two boxes at an edge, three of whose four faces are split.
+#[test]
+fn faces_of_zero_area_at_one_edge_leave_a_part_solid() {
+    let (points, faces) = stitched_boxes();
+    let (inner, of_inner) = cuboid([1, 1, 1], [2, 2, 2]);
+    let parts = vec![mesh(&points, &faces), mesh(&inner, &of_inner)];
+    let answer = check_assembly(parts, &AssemblyOptions::default()).unwrap();
+    assert!(answer.parts[0].is_solid);
+    let said = answer.pairs.iter().map(|pair| pair.relation);
+    assert_eq!(said.collect::<Vec<_>>(), [Relation::Around]);
 }
 
 #[test]

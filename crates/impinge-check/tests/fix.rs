@@ -2,6 +2,7 @@
 //! vertices that keep their bits.
 
 mod common;
+mod stitched;
 
 use std::collections::HashSet;
 
@@ -10,6 +11,7 @@ use impinge_check::{Checked, FixOptions, Fixed, Options, Repair, check_mesh, fix
 use impinge_io::{Elements, Mesh, Positions};
 use impinge_scenes::Random;
 use impinge_scenes::surfaces::ball;
+use stitched::stitched_boxes;
 
 fn mesh(points: Vec<[f64; 3]>, faces: Vec<[u32; 3]>) -> Mesh {
     Mesh {
@@ -251,6 +253,60 @@ fn flat_faces_divide_their_neighbours_and_leave_no_gap() {
         (1, 0)
     );
     assert_eq!(fixed.mesh, round(100));
+}
+
+#[test]
+fn flat_faces_that_are_neighbours_divide_one_another() {
+    let (points, faces) = stitched_boxes();
+    let points = points.iter().map(|at| at.map(|x| x as f64)).collect();
+    let stitched = mesh(points, faces);
+    assert_eq!(kept(stitched.clone()).counts.degenerate, 3);
+    let fixed = fix(&stitched, 0);
+    assert_eq!(
+        (fixed.repairs.degenerate_faces, fixed.repairs.divided_faces),
+        (0, 3)
+    );
+    assert_eq!(
+        (fixed.after.boundary_facets, fixed.after.self_intersections),
+        (0, 0)
+    );
+    assert_eq!((fixed.after.components, fixed.repairs.shells), (2, 2));
+    assert!((volume(&fixed.mesh) - 128.0).abs() < 1e-9);
+}
+
+/// `k` faces at one edge, which a chain of `m` faces of zero area divides.
+fn fan_and_chain(k: u32, m: u32) -> Mesh {
+    let end = f64::from(m) + 1.0;
+    let mut points = vec![[0.0; 3], [end, 0.0, 0.0]];
+    points.extend((0..k).map(|i| [0.0, 1.0, f64::from(i)]));
+    points.extend((1..=m).map(|i| [f64::from(i), 0.0, 0.0]));
+    let mut faces: Vec<[u32; 3]> = (2..2 + k).map(|apex| [0, 1, apex]).collect();
+    let chain: Vec<u32> = (2 + k..2 + k + m).chain([1]).collect();
+    faces.extend(chain.windows(2).map(|part| [0, part[1], part[0]]));
+    mesh(points, faces)
+}
+
+#[test]
+fn faces_do_not_multiply_where_many_share_the_long_side_of_a_flat_one() {
+    let divided = |k, m| {
+        let options = FixOptions {
+            repairs: vec![Repair::Degenerate],
+            ..FixOptions::default()
+        };
+        let fixed = fix_mesh(fan_and_chain(k, m), &options).unwrap();
+        assert_eq!(
+            fixed.repairs.degenerate_faces + fixed.repairs.divided_faces,
+            u64::from(m)
+        );
+        (fixed.repairs.divided_faces, fixed.after.n_triangles)
+    };
+    assert_eq!(divided(2, 3), (3, 8));
+    assert_eq!(divided(16, 1), (1, 32));
+    assert_eq!(divided(17, 1), (0, 17));
+    // Each adds one face, or 15, and no more are added than the mesh had.
+    assert_eq!(divided(2, 100), (100, 202));
+    assert_eq!(divided(16, 100), (7, 128));
+    assert_eq!(divided(2000, 2000), (0, 2000));
 }
 
 #[test]

@@ -657,7 +657,8 @@ pub struct Assembly {
     /// Pairs of parts that are not apart, by their numbers
     pub pairs: Vec<Parts>,
     /// A row per part, a letter per part: X share space, I inside, O around, i partly inside, o
-    /// partly around, t touching, n near, . apart, - the part itself
+    /// partly around, t touching, n near, . apart, - the part itself. Where two parts are
+    /// partly inside each other, i is in the row of the lower number, o in that of the higher one
     pub matrix: Vec<String>,
 }
 
@@ -666,7 +667,7 @@ pub struct Assembly {
 pub struct Part {
     /// The node, the item or the group, after FILE# if there are several files; or the file
     pub name: String,
-    /// Without those of zero area
+    /// Their number after faces of zero area divided their neighbours
     pub faces: u64,
     /// Whether it is closed, of one orientation and encloses a volume; else it has no inside
     pub solid: bool,
@@ -679,8 +680,9 @@ pub struct Parts {
     pub parts: [usize; 2],
     /// interpenetrating: they share space, and their surfaces meet. inside, around: the first is
     /// wholly inside the second, or the other way, and their surfaces do not meet. partly-inside,
-    /// partly-around: some of it is, and some is not. touching: they share points and no space. near:
-    /// they are apart, and within the clearance. Decided exactly
+    /// partly-around: some of it is, and some is not; partly-inside where that holds of both.
+    /// touching: they share points and no space. near: they are apart, and within the clearance.
+    /// Decided exactly
     #[cfg_attr(
         test,
         schemars(extend("enum" = ["interpenetrating", "inside", "around", "partly-inside", "partly-around", "touching", "near"]))

@@ -43,8 +43,8 @@ pub enum Relation {
     Inside,
     /// The second is wholly inside the first, and their surfaces do not meet.
     Around,
-    /// Some of the first is inside the second, and some is not. Their surfaces do not meet. Of both,
-    /// some may be inside the other.
+    /// Some of the first is inside the second, and some is not. Their surfaces do not meet. Where
+    /// that holds of both, this is the answer, too: it depends on their order.
     PartlyInside,
     /// Some of the second is inside the first, and some is not. Their surfaces do not meet.
     PartlyAround,
@@ -92,7 +92,7 @@ pub struct PartPair {
 /// A part of an assembly.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PartKind {
-    /// How many faces it has; collapsed ones and ones of zero area are left out.
+    /// How many faces it has, after faces of zero area divided their neighbours.
     pub n_faces: u64,
     /// Whether it has an inside.
     pub is_solid: bool,
@@ -219,7 +219,7 @@ fn add(scene: &mut Scene, number: usize, mut mesh: Mesh) -> Result<(BodyId, Part
     let Elements::Triangles(faces) = mesh.elements else {
         return Err(AssemblyError::Tetrahedra(number, 0));
     };
-    // Faces without an area have no sides.
+    // Faces without an area have no sides. A part where they leave a gap is no solid.
     let mut surface = Surface::new(mesh.positions, faces);
     remove_degenerate(&mut surface);
     let (faces, positions) = (surface.faces.clone(), held(&surface.positions));

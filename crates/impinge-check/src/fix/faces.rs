@@ -1,6 +1,6 @@
 //! Faces that go: duplicates, faces of zero area, and vertices that no face is left to use.
 
-use std::collections::{HashMap, VecDeque};
+use std::collections::{BTreeSet, HashMap, HashSet, VecDeque};
 
 use impinge::exact::Point;
 use impinge_io::Positions;
@@ -84,13 +84,20 @@ fn hanging<'a>(surface: &Surface, copies: &'a Copies, is_copy: &[bool]) -> Vec<&
     going.into_iter().map(|ix| sets[ix as usize]).collect()
 }
 
-/// Removes faces of zero area. Returns how many were removed, and how many have divided neighbours
-/// instead.
+/// The most neighbours at the long side of a flat face that it divides.
+const MOST_NEIGHBOURS: usize = 16;
+
+/// Removes faces of zero area. Returns how many were removed, whole or in part, and how many have
+/// divided neighbours instead.
 ///
 /// A face of zero area whose vertices are three different points is a segment. If it just went, its
 /// long side and its two short ones would be borders, although the surface has no gap there. So all
 /// neighbours at the long side are divided at the middle vertex, which lies exactly on it: the
 /// halves take the places of the face and of its neighbours, and further ones come last.
+///
+/// Neighbours may have zero area, too: their halves are shorter, and divide in their turn. A face
+/// just goes where [`divide`] says `None`, and where more faces would be added than there were. So
+/// the surface at most doubles.
 pub fn remove_degenerate(surface: &mut Surface) -> (u64, u64) {
     let collapsed: Vec<bool> = surface.faces.iter().map(|face| !is_simplex(face)).collect();
     let n_collapsed = remove(surface, &collapsed);
@@ -110,7 +117,10 @@ pub fn remove_degenerate(surface: &mut Surface) -> (u64, u64) {
         .map(|(face, _)| face)
         .collect();
     let n_flat = queue.len() as u64;
-    // Each division leaves fewer flat faces, or as many with shorter long sides: it ends.
+    let most_faces = surface.faces.len().saturating_mul(2).min(u32::MAX as usize);
+    // The face that each is a part of, as they were.
+    let mut whole: Vec<u32> = (0u32..).zip(&flat).map(|(face, _)| face).collect();
+    // Each division takes flat faces of one length, and those that it leaves are shorter: it ends.
     while let Some(face) = queue.pop_front() {
         if !flat[face as usize] {
             continue;
@@ -118,57 +128,72 @@ pub fn remove_degenerate(surface: &mut Surface) -> (u64, u64) {
         let Some(divided) = divide(surface, &edges, &flat, face) else {
             continue;
         };
+        let n_faces = surface.faces.len();
+        let n_with_halves = n_faces + divided.halves.len() - divided.faces.len();
+        if n_with_halves > most_faces {
+            continue;
+        }
         for &face in &divided.faces {
             edges.remove(face, surface.faces[face as usize]);
         }
-        let n_faces = surface.faces.len() as u32;
-        let n_more = (divided.halves.len() - divided.faces.len()) as u32;
-        surface.faces.resize((n_faces + n_more) as usize, [0; 3]);
-        flat.resize((n_faces + n_more) as usize, false);
-        let places = divided.faces.into_iter().chain(n_faces..);
-        for (face, &corners) in places.zip(&divided.halves) {
+        surface.faces.resize(n_with_halves, [0; 3]);
+        flat.resize(n_with_halves, false);
+        whole.resize(n_with_halves, 0);
+        let parents: Vec<u32> = divided.faces[1..]
+            .iter()
+            .map(|&face| whole[face as usize])
+            .collect();
+        let places = divided.faces.into_iter().chain(n_faces as u32..);
+        for (ix, (face, &corners)) in places.zip(&divided.halves).enumerate() {
             surface.faces[face as usize] = corners;
             flat[face as usize] = is_flat(surface, corners);
+            whole[face as usize] = parents[ix / 2];
             edges.add(face, corners);
         }
         // What could not be divided before may be now.
         for corners in divided.halves {
             for edge in sides(corners) {
-                let around = edges.of(edge).iter();
-                queue.extend(around.filter(|&&face| flat[face as usize]));
+                if edges.n_of(edge) <= MOST_NEIGHBOURS + 1 {
+                    queue.extend(edges.of(edge).filter(|&face| flat[face as usize]));
+                }
             }
         }
     }
-    let n_removed = remove(surface, &flat);
+    let left = whole.iter().zip(&flat).filter(|(_, is_flat)| **is_flat);
+    let n_removed = left.map(|(face, _)| face).collect::<HashSet<_>>().len() as u64;
+    remove(surface, &flat);
     (n_collapsed + n_removed, n_flat - n_removed)
 }
 
-/// A flat face and its neighbours, and the halves of the neighbours that take their places.
+/// A flat face and its neighbours, and the halves of the neighbours that take their places: two of
+/// each, in the order of the neighbours.
 struct Divided {
     faces: Vec<u32>,
     halves: Vec<[u32; 3]>,
 }
 
 /// How the neighbours at the long side of a flat face are divided; `None` if there are none, if
-/// several are flat, or if the halves would make an edge that exists already.
+/// there are more than [`MOST_NEIGHBOURS`], if one is flat with another long side or has the same
+/// vertices, or if the halves would make an edge that exists already.
 fn divide(surface: &Surface, edges: &Edges, flat: &[bool], face: u32) -> Option<Divided> {
     let corners = surface.faces[face as usize];
     let points = surface.corners(corners);
     let middle =
         (0..3).find(|&ix| is_between(&points[ix], &points[(ix + 1) % 3], &points[(ix + 2) % 3]))?;
     let [b, c, a] = [0, 1, 2].map(|step| corners[(middle + step) % 3]);
-    let neighbours = edges.of([a, c]).iter().filter(|&&other| other != face);
+    if edges.n_of([a, c]) > MOST_NEIGHBOURS + 1 {
+        return None;
+    }
     let mut divided = Divided {
         faces: vec![face],
         halves: Vec::new(),
     };
-    let mut n_flat = 0;
-    for &neighbour in neighbours {
+    for neighbour in edges.of([a, c]).filter(|&other| other != face) {
         let held = surface.faces[neighbour as usize];
         let d = held
             .into_iter()
             .find(|&vertex| vertex != a && vertex != c)?;
-        if d == b || !edges.of([b, d]).is_empty() {
+        if d == b || edges.n_of([b, d]) > 0 {
             return None;
         }
         // A flat neighbour is only divided if its own long side is the same; else it is its
@@ -178,13 +203,12 @@ fn divide(surface: &Surface, edges: &Edges, flat: &[bool], face: u32) -> Option<
             if !is_between(&at_d, &at_a, &at_c) {
                 return None;
             }
-            n_flat += 1;
         }
         let replaced = |old: u32| held.map(|vertex| if vertex == old { b } else { vertex });
         divided.faces.push(neighbour);
         divided.halves.extend([replaced(c), replaced(a)]);
     }
-    (divided.faces.len() > 1 && n_flat < 2).then_some(divided)
+    (divided.faces.len() > 1).then_some(divided)
 }
 
 /// Whether a point of the line through a and c lies strictly between them.
@@ -199,8 +223,8 @@ fn sides([a, b, c]: [u32; 3]) -> [[u32; 2]; 3] {
     [[a, b], [b, c], [c, a]]
 }
 
-/// The faces at each edge, while faces change.
-struct Edges(HashMap<[u32; 2], Vec<u32>>);
+/// The faces at each edge, while faces change. Sets, as many faces may share an edge.
+struct Edges(HashMap<[u32; 2], BTreeSet<u32>>);
 
 impl Edges {
     fn new(faces: &[[u32; 3]]) -> Self {
@@ -215,20 +239,24 @@ impl Edges {
         [a.min(b), a.max(b)]
     }
 
-    fn of(&self, edge: [u32; 2]) -> &[u32] {
-        self.0.get(&Self::key(edge)).map_or(&[], Vec::as_slice)
+    fn n_of(&self, edge: [u32; 2]) -> usize {
+        self.0.get(&Self::key(edge)).map_or(0, BTreeSet::len)
+    }
+
+    fn of(&self, edge: [u32; 2]) -> impl Iterator<Item = u32> {
+        self.0.get(&Self::key(edge)).into_iter().flatten().copied()
     }
 
     fn add(&mut self, face: u32, corners: [u32; 3]) {
         for edge in sides(corners) {
-            self.0.entry(Self::key(edge)).or_default().push(face);
+            self.0.entry(Self::key(edge)).or_default().insert(face);
         }
     }
 
     fn remove(&mut self, face: u32, corners: [u32; 3]) {
         for edge in sides(corners) {
             if let Some(faces) = self.0.get_mut(&Self::key(edge)) {
-                faces.retain(|&held| held != face);
+                faces.remove(&face);
             }
         }
     }

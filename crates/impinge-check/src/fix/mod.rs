@@ -39,7 +39,9 @@ pub enum Repair {
     /// opposite orientations hang on a closed surface, as an inner wall or a fin.
     Duplicates,
     /// Faces of zero area go. Where one lies along an edge of neighbours, these are divided there,
-    /// so that no gap opens.
+    /// so that no gap opens; not where a half would have an edge that is there already, where more
+    /// than 16 neighbours share the edge, or where one of zero area stays. The divisions add at most
+    /// as many faces as there were.
     Degenerate,
     /// Neighbours get the same orientation. In each piece the fewest faces are turned.
     Orient,
@@ -118,7 +120,7 @@ pub struct Repairs {
     /// Faces of sets with the same vertices and both orientations, of which none stays: they
     /// enclosed nothing, and one of them would leave a border.
     pub opposite_faces: u64,
-    /// Faces of zero area that were removed.
+    /// Faces of zero area that were removed, whole or in part.
     pub degenerate_faces: u64,
     /// Faces of zero area that were used to divide their neighbours at one side.
     pub divided_faces: u64,

@@ -81,8 +81,8 @@ words! {
         Weld: "Vertices at exactly the same position become one",
         Duplicates: "Of faces with the same vertices the first stays; none where two of opposite \
             orientations are an inner wall or a fin of a closed surface",
-        Degenerate: "Faces of zero area go; one along an edge divides its neighbours there, so \
-            that no gap opens",
+        Degenerate: "Faces of zero area go; one along an edge divides its neighbours there, at most \
+            16, so that no gap opens",
         Orient: "Neighbours get the same orientation, by turning the fewest faces of each piece",
         SplitEdges: "Edges of more than two faces come apart",
         SplitVertices: "Vertices of several fans come apart",
