@@ -680,7 +680,7 @@ def _positions(mesh: CollisionMesh, vertices: _Array, name: str) -> npt.NDArray[
     """Positions of the vertices of a mesh, which are checked."""
     positions = np.asarray(vertices)
     if positions.dtype != np.float32:
-        positions = positions.astype(np.float64)
+        positions = positions.astype(np.float64, copy=False)
     if positions.shape != (mesh.num_vertices, 3):
         expected = f"shape ({mesh.num_vertices}, 3) expected, as the mesh has"
         raise InvalidError(f"{name}: {expected}, {positions.shape} given")

@@ -1,4 +1,6 @@
-//! Exact numbers rounded to floats.
+//! Exact numbers rounded to floats, and powers of two.
+
+use crate::Point;
 
 /// 2^`exponent`: infinity above the largest `f64`, 0 below the smallest.
 #[inline]
@@ -9,6 +11,23 @@ pub const fn power_of_two(exponent: i32) -> f64 {
         -1074..-1022 => f64::from_bits(1 << (exponent + 1074)),
         _ => 0.0,
     }
+}
+
+/// Sizes that are used as they are: no product of a few lengths overflows or underflows.
+const USUAL: core::ops::Range<f64> = power_of_two(-90)..power_of_two(90);
+
+/// A power of two that gives points a usual size: the largest coordinate is about 1, or at least
+/// usual. `None` where it is usual, or all are 0.
+#[allow(clippy::cast_possible_truncation, reason = "eleven bits")]
+pub(crate) fn to_usual_size(points: &[&[Point; 4]]) -> Option<f64> {
+    let numbers = points.iter().copied().flatten().flatten();
+    let largest = numbers.fold(0.0, |largest: f64, x| largest.max(x.abs()));
+    if largest == 0.0 || USUAL.contains(&largest) {
+        return None;
+    }
+    // The exponent and its negative are those of normal numbers.
+    let exponent = (largest.to_bits() >> 52) as i32 - 1023;
+    Some(power_of_two((-exponent).clamp(-1000, 1000)))
 }
 
 /// The square root, rounded once. The standard library has it, `core` does not.

@@ -32,8 +32,8 @@ impl Scale {
     }
 
     /// For some points.
-    pub fn of_points(points: &[Point]) -> Self {
-        let coordinates = points.as_flattened().iter();
+    pub fn of_points(points: impl IntoIterator<Item = Point>) -> Self {
+        let coordinates = points.into_iter().flatten();
         let largest = coordinates.fold(0.0f64, |largest, x| largest.max(x.abs()));
         Scale::of(largest, || largest)
     }

@@ -12,9 +12,10 @@
 //! of the answer is that of the two bodies along its normal, so that way takes them apart. Cost:
 //! `O(n)` per vertex that the polyhedron takes.
 
+use super::double;
 use crate::boxes::scale::Scale;
 use crate::scene::vector::{cross, dot, scaled, sub};
-use impinge_exact::internal::{collinear, two_product, two_sum};
+use impinge_exact::internal::collinear;
 use impinge_exact::{Point, Sign, orient3d};
 
 /// The shortest way that takes two convex bodies apart.
@@ -50,11 +51,7 @@ const ROUNDING: f64 = 1e-12;
 /// are long are too thin for it.
 pub fn convex_overlap(a: &[[f64; 3]], b: &[[f64; 3]]) -> Option<ConvexOverlap> {
     let origin = *b.first()?;
-    let differences = a.iter().chain(b).map(|&point| sub(point, origin));
-    let largest = differences
-        .flatten()
-        .fold(0.0f64, |most, x| most.max(x.abs()));
-    let scale = Scale::of(largest, || largest);
+    let scale = Scale::of_points(a.iter().chain(b).map(|&point| sub(point, origin)));
     let read = |points: &[Point]| points.iter().map(|&point| scale.point(point)).collect();
     let [a, b]: [Vec<Point>; 2] = [read(a), read(b)];
     let farthest = |points: &[Point], way: Point| {
@@ -200,7 +197,7 @@ fn face(points: &[Point], corners: [usize; 3]) -> Face {
     let [p, q, r] = corners.map(|ix| points[ix]);
     let normal = product(sub(q, p), sub(r, p));
     // Squares of a short one would underflow.
-    let normal = Scale::of_points(&[normal]).point(normal);
+    let normal = Scale::of_points([normal]).point(normal);
     let length = dot(normal, normal).sqrt();
     if length.is_nan() || length <= 0.0 {
         return Face {
@@ -220,12 +217,8 @@ fn face(points: &[Point], corners: [usize; 3]) -> Face {
 /// The product of two vectors, which may be nearly parallel: in twice the precision, rounded in the
 /// end. Of long narrow faces one rounding of each product would turn the normal.
 fn product(u: Point, v: Point) -> Point {
-    [(1, 2), (2, 0), (0, 1)].map(|(i, j)| {
-        let [x, of_x] = two_product(u[i], v[j]);
-        let [y, of_y] = two_product(u[j], v[i]);
-        let [z, of_z] = two_sum(x, -y);
-        z + (of_z + (of_x - of_y))
-    })
+    [(1, 2), (2, 0), (0, 1)]
+        .map(|(i, j)| (double::product(u[i], v[j]) - double::product(u[j], v[i])).high)
 }
 
 #[cfg(test)]

@@ -192,7 +192,7 @@ pub(super) fn distance(p: [f64; 3], q: [f64; 3]) -> f64 {
 
 /// The length of a vector, also where squares overflow or underflow.
 pub(super) fn length(vector: [f64; 3]) -> f64 {
-    let scale = Scale::of_points(&[vector]);
+    let scale = Scale::of_points([vector]);
     let vector = scale.point(vector);
     scale.length_back(dot(vector, vector).sqrt())
 }

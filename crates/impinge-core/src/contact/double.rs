@@ -33,7 +33,7 @@ fn quick_sum(a: f64, b: f64) -> Double {
 }
 
 /// `a * b`, without error.
-fn product(a: f64, b: f64) -> Double {
+pub(super) fn product(a: f64, b: f64) -> Double {
     let [high, low] = two_product(a, b);
     Double { high, low }
 }

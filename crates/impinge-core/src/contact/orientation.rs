@@ -40,7 +40,7 @@ pub(super) fn orientations(
     let position = |vertex: u32| body.positions().point(vertex as usize);
     let n_pieces = topology.n_pieces();
     let boxes = boxes(body, topology);
-    let scales: Vec<Scale> = boxes.iter().map(|ends| Scale::of_points(ends)).collect();
+    let scales: Vec<Scale> = boxes.iter().copied().map(Scale::of_points).collect();
     let mut volumes = vec![0.0; n_pieces];
     let mut origins: Vec<Option<Point>> = vec![None; n_pieces];
     for some in faces.chunks(LOOK) {

@@ -486,19 +486,19 @@ impl OverlapWork<'_> {
             Feature::Face(face) => Some(self.step(side, low, face)),
             _ => None,
         };
-        let total: i32 = points
-            .iter()
-            .map(|&point| step(point))
-            .sum::<Option<i32>>()?;
         // Next to each end; unknown next to one that is on the other surface.
         let [first, end] = edge.map(|vertex| {
             let is_on = self.crossings[side].is_on(vertex);
             (!is_on).then(|| self.parts[side].winding(vertex))
         });
-        let mut winding = first.or(end.map(|end| end - total))?;
-        if end.is_some_and(|end| end != winding + total) {
-            return None;
-        }
+        let mut winding = match (first, end) {
+            (Some(first), _) => first,
+            (None, Some(end)) => {
+                let steps = points.iter().map(|&point| step(point));
+                end - steps.sum::<Option<i32>>()?
+            }
+            (None, None) => return None,
+        };
         let mut pieces = Vec::new();
         let mut last = (self.member(side, low), self.position(side, low));
         let ends = points.iter().map(|&point| Some(point)).chain([None]);
@@ -522,7 +522,7 @@ impl OverlapWork<'_> {
             }
             last = next;
         }
-        Some(pieces)
+        end.is_none_or(|end| end == winding).then_some(pieces)
     }
 
     /// By how much the winding number grows where an edge, coming from vertex `from`, crosses a

@@ -107,7 +107,7 @@ pub(super) fn regions(
         };
         let middle = &mut middles[region_of[sets.find(first) as usize] as usize];
         let orientations = orientations(contact as u32);
-        middle.take_contact(contacts, contact, orientations)?;
+        middle.take_contact(contacts, contact, orientations);
         if let (&[from, to], true) = (corners, contacts.is_directed(contact)) {
             turns.take([from, to], orientations[0] * orientations[1])?;
         }
@@ -257,23 +257,18 @@ impl Middles {
     }
 
     /// Adds a contact, given the orientations of its two faces.
-    fn take_contact(
-        &mut self,
-        contacts: &Contacts,
-        contact: usize,
-        [of_a, of_b]: [f64; 2],
-    ) -> Result<(), Error> {
+    fn take_contact(&mut self, contacts: &Contacts, contact: usize, [of_a, of_b]: [f64; 2]) {
         let corners = contacts.corners(contact);
-        let mut points = with_capacity(corners.len(), WHAT)?;
+        let scale = self.scale;
+        let point = |corner: u32| scale.point(contacts.points()[corner as usize]);
         for &corner in corners {
-            let point = contacts.points()[corner as usize];
-            self.is_single &= point.iter().all(|&x| f64::from(x as f32) == x);
-            self.points.take(self.scale.point(point), 1.0);
-            points.push(self.scale.point(point));
+            let exact = contacts.points()[corner as usize];
+            self.is_single &= exact.iter().all(|&x| f64::from(x as f32) == x);
+            self.points.take(point(corner), 1.0);
         }
         if contacts.shape(contact) == Shape::Polygon {
-            for k in 2..points.len() {
-                let (p, q, r) = (points[0], points[k - 1], points[k]);
+            for k in 2..corners.len() {
+                let [p, q, r] = [corners[0], corners[k - 1], corners[k]].map(point);
                 let area = scaled(cross(sub(q, p), sub(r, p)), 0.5);
                 let size = length(area);
                 self.patch_area += size;
@@ -282,7 +277,6 @@ impl Middles {
                 self.patches.take(middle, size);
             }
         }
-        Ok(())
     }
 
     /// The area that may come from rounding alone: the error of the coordinates along all curves
@@ -328,7 +322,7 @@ impl Region {
     /// With which its areas and volumes do not overflow, nor underflow where its extents differ by
     /// less than 2^300.
     pub(super) fn scale(&self) -> Scale {
-        Scale::of_points(&self.bounds)
+        Scale::of_points(self.bounds)
     }
 
     /// The middle of its box in scaled coordinates.

@@ -17,7 +17,7 @@
 use crate::Point;
 use crate::element_pair::ElementPair;
 use crate::filter::nearness::Polygon;
-use crate::rounding::{power_of_two, root};
+use crate::rounding::{root, to_usual_size};
 
 /// The share of the room that stays free, so that elements are certainly apart when their points
 /// have stopped.
@@ -81,25 +81,16 @@ pub fn shares_without_room(pair: ElementPair, times: [&[Point; 4]; 3], distance:
     }
 }
 
-/// Sizes that are used as they are: no product overflows or underflows.
-const USUAL: core::ops::Range<f64> = power_of_two(-90)..power_of_two(90);
-
 /// Shares of points and a distance; very small or very large ones are multiplied by a power of two,
 /// with which the largest coordinate is usual. Shares are the same.
-#[allow(clippy::cast_possible_truncation, reason = "eleven bits")]
 fn at_usual_size<R>(
     times: [&[Point; 4]; 3],
     distance: f64,
     shares: impl FnOnce([&[Point; 4]; 3], f64) -> R,
 ) -> R {
-    let numbers = times.into_iter().flatten().flatten();
-    let largest = numbers.fold(0.0, |largest: f64, x| largest.max(x.abs()));
-    if largest == 0.0 || USUAL.contains(&largest) {
+    let Some(scale) = to_usual_size(&times) else {
         return shares(times, distance);
-    }
-    // The exponent and its negative are those of normal numbers.
-    let exponent = (largest.to_bits() >> 52) as i32 - 1023;
-    let scale = power_of_two((-exponent).clamp(-1000, 1000));
+    };
     let scaled = times.map(|points| points.map(|point| point.map(|x| x * scale)));
     shares(scaled.each_ref(), distance * scale)
 }
@@ -333,6 +324,7 @@ fn share_to(level: f64, from: f64, to: f64) -> f64 {
 mod tests {
     use super::*;
     use crate::distance::{are_within, first_within};
+    use crate::rounding::power_of_two;
 
     /// Numbers that look random.
     struct Numbers(u64);

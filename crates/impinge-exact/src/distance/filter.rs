@@ -7,7 +7,7 @@ use crate::element_pair::ElementPair;
 use crate::filter::motion::{difference, dot};
 use crate::filter::nearness::{Polygon, are_beyond, beyond, most, stay_beyond};
 use crate::filter::number::Number;
-use crate::rounding::{power_of_two, root};
+use crate::rounding::{root, to_usual_size};
 
 /// Whether two elements are within a distance; `None` when unsure.
 ///
@@ -53,19 +53,9 @@ struct Scaled<const N: usize> {
 }
 
 impl<const N: usize> Scaled<N> {
-    /// Sizes at which products of a few lengths are normal numbers.
-    const IN_RANGE: [f64; 2] = [power_of_two(-90), power_of_two(90)];
-
     /// None where sizes are in range, or where a coordinate would lose bits.
     fn of(ends: [&[Point; 4]; N]) -> Option<Self> {
-        let all = ends.iter().flat_map(|points| points.as_flattened());
-        let largest = all.fold(0.0, |most: f64, x| most.max(x.abs()));
-        let [least, most] = Self::IN_RANGE;
-        if largest == 0.0 || (least..=most).contains(&largest) {
-            return None;
-        }
-        let exponent = (largest.to_bits() >> 52) as i32 - 1023;
-        let factor = power_of_two((-exponent).clamp(-1022, 1022));
+        let factor = to_usual_size(&ends)?;
         let mut scaled = Scaled {
             ends: ends.map(|points| *points),
             factor,
@@ -82,17 +72,18 @@ impl<const N: usize> Scaled<N> {
     }
 
     /// Distances; none if one would lose bits.
-    fn lengths(&self, mut lengths: [f64; 2]) -> Option<[f64; 2]> {
-        let mut all = lengths.iter_mut();
-        all.all(|x| Self::multiply(x, self.factor))
-            .then_some(lengths)
+    fn lengths(&self, lengths: [f64; 2]) -> Option<[f64; 2]> {
+        Self::products(lengths, self.factor)
     }
 
     /// The distances of points before they were multiplied.
-    fn lengths_back(&self, mut lengths: [f64; 2]) -> Option<[f64; 2]> {
+    fn lengths_back(&self, lengths: [f64; 2]) -> Option<[f64; 2]> {
+        Self::products(lengths, 1.0 / self.factor)
+    }
+
+    fn products(mut lengths: [f64; 2], factor: f64) -> Option<[f64; 2]> {
         let mut all = lengths.iter_mut();
-        all.all(|x| Self::multiply(x, 1.0 / self.factor))
-            .then_some(lengths)
+        all.all(|x| Self::multiply(x, factor)).then_some(lengths)
     }
 }
 
