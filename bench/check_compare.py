@@ -319,7 +319,7 @@ def check_ours(rows, files, truths, pairs):
             if row[key] != value:
                 wrong.append(f"{file.path.name}: {key} is {row[key]}, not {value}")
         found = pairs[file.path]
-        held = [row["triangles"], row["self_intersections"], row["intersecting_primitives"]]
+        held = [row["triangles"], row["self_intersections"], row["intersecting_elements"]]
         if held != [len(file.faces), len(found), len(np.unique(found))]:
             wrong.append(f"{file.path.name}: `check` and `self` differ: {held}, {len(found)} pairs")
     return wrong

@@ -112,9 +112,9 @@ fn contest(
     variants: bool,
 ) -> Result<Table, Failure> {
     eprintln!(
-        "{}: {} primitives …",
+        "{}: {} elements …",
         problem.name,
-        grouped(problem.n_primitives() as u64)
+        grouped(problem.n_elements() as u64)
     );
     let mut runners = ours(problem, options, variants)?;
     if options.peers {
@@ -238,10 +238,10 @@ fn sizes(options: &Options, report: &mut Report) -> Result<(), Failure> {
     text += &"---:|---:|".repeat(first.rows.len() + 1);
     text.push('\n');
     for table in &tables {
-        let n = table.n_primitives as f64;
+        let n = table.n_elements as f64;
         text += &format!(
             "| {} | {} |",
-            grouped(table.n_primitives as u64),
+            grouped(table.n_elements as u64),
             grouped(table.rows[0].n_pairs)
         );
         for row in &table.rows {
@@ -269,9 +269,9 @@ fn adversarial_scenes(options: &Options, report: &mut Report) -> Result<(), Fail
     } else {
         vec![Method::Clusters]
     };
-    let mut text = "Each scene beside a plain one (two bodies that meet) of as many primitives. `per item` is time over \
-                    primitives plus pairs.\n\n\
-                    | scene | method | primitives | pairs | candidates | ms | plain ms | ratio | ns per item | plain | bytes per primitive |\n\
+    let mut text = "Each scene beside a plain one (two bodies that meet) of as many elements. `per item` is time over \
+                    elements plus pairs.\n\n\
+                    | scene | method | elements | pairs | candidates | ms | plain ms | ratio | ns per item | plain | bytes per element |\n\
                     |---|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|\n"
         .to_owned();
     for entry in adversarial::SCENES {
@@ -285,7 +285,7 @@ fn adversarial_scenes(options: &Options, report: &mut Report) -> Result<(), Fail
         let n = size.min(entry.max_n);
         let problem = posed((entry.build)(n)?, entry.probes)?;
         let plain = posed(
-            adversarial::plain(problem.n_primitives())?,
+            adversarial::plain(problem.n_elements())?,
             "two bodies that meet",
         )?;
         for &method in &methods {
@@ -302,14 +302,14 @@ fn adversarial_scenes(options: &Options, report: &mut Report) -> Result<(), Fail
             let (row, base_row) = (&table.rows[0], &base.rows[0]);
             let per_item = |table: &Table| {
                 let row = &table.rows[0];
-                row.median_ms * 1e6 / (table.n_primitives as f64 + row.n_pairs as f64)
+                row.median_ms * 1e6 / (table.n_elements as f64 + row.n_pairs as f64)
             };
             let count = |key: &str| row.details[key].as_u64().unwrap_or(0);
             text += &format!(
                 "| {} | {} | {} | {} | {} | {} | {} | {:.1} | {:.1} | {:.1} | {:.0} |\n",
                 entry.name,
                 method.name(),
-                grouped(table.n_primitives as u64),
+                grouped(table.n_elements as u64),
                 grouped(row.n_pairs),
                 grouped(count("candidates")),
                 figures(row.median_ms),
@@ -317,7 +317,7 @@ fn adversarial_scenes(options: &Options, report: &mut Report) -> Result<(), Fail
                 row.median_ms / base_row.median_ms,
                 per_item(&table),
                 per_item(&base),
-                count("bytes_held") as f64 / table.n_primitives as f64,
+                count("bytes_held") as f64 / table.n_elements as f64,
             );
             report.keep(&table);
             report.keep(&base);
@@ -350,7 +350,7 @@ fn regular_surfaces(options: &Options, report: &mut Report) -> Result<(), Failur
             text += &format!(
                 "| {} | {rule} | {} | {} | {} | {} | {:.1} |\n",
                 surface.name,
-                grouped(table.n_primitives as u64),
+                grouped(table.n_elements as u64),
                 count("candidates"),
                 count("unsure"),
                 figures(row.median_ms),

@@ -40,8 +40,8 @@ fn mesh(file: &str, stand_in: impl FnOnce() -> Model) -> Result<(Model, String),
         None => {
             let model = stand_in();
             let about = format!(
-                "a generated stand-in of {} primitives, because `{file}` is not here",
-                model.n_primitives()
+                "a generated stand-in of {} elements, because `{file}` is not here",
+                model.n_elements()
             );
             Ok((model, about))
         }

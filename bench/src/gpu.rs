@@ -161,7 +161,7 @@ fn row(
         "name": name,
         "about": problem.about,
         "method": method.name(),
-        "primitives": problem.n_primitives(),
+        "elements": problem.n_elements(),
         "pairs": n_pairs,
         "candidates": last.n_candidates,
         "unsure": last.n_unsure,
@@ -215,7 +215,7 @@ impl Rates {
                 .iter()
                 .map(|body| body.poses[0].len() as u64 * 12)
                 .sum();
-            let corners = problem.n_primitives() as u64 * 16;
+            let corners = problem.n_elements() as u64 * 16;
             positions + corners + stats.n_entries * (KEPT + ENTRY) + stats.n_candidates * CANDIDATE
         } else {
             stats.n_clusters * (CLUSTER + BOX)

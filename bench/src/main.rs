@@ -72,7 +72,7 @@ options:
   --scene NAME       one scene only (two-body, motion, self, adversarial)
   --frames N         timed frames of each contestant (default 40; fewer for large scenes)
   --turn N           frames of one contestant in a row (default 10); with 1 all caches are cold
-  --size N           adversarial, regular: primitives (default 1,000,000 and 80,000); sizes, step-sizes, bodies:
+  --size N           adversarial, regular: elements (default 1,000,000 and 80,000); sizes, step-sizes, bodies:
                      the largest size
   --threads N        threads of impinge (default: all)
   --affinity NAME   where its helper threads run: auto (default), inherited; in a contest also both, which take turns

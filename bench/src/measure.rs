@@ -47,8 +47,8 @@ pub struct Table {
     pub name: String,
     /// A description.
     pub about: String,
-    /// The number of primitives in all bodies.
-    pub n_primitives: usize,
+    /// The number of elements in all bodies.
+    pub n_elements: usize,
     /// The number of bodies.
     pub n_bodies: usize,
     /// The number of timed frames.
@@ -82,7 +82,7 @@ impl Table {
         json!({
             "name": self.name,
             "about": self.about,
-            "primitives": self.n_primitives,
+            "elements": self.n_elements,
             "bodies": self.n_bodies,
             "frames": self.n_frames,
             "turn": self.turn,
@@ -153,7 +153,7 @@ pub fn run(
     Ok(Table {
         name: problem.name.clone(),
         about: problem.about.clone(),
-        n_primitives: problem.n_primitives(),
+        n_elements: problem.n_elements(),
         n_bodies: problem.bodies.len(),
         n_frames,
         turn,

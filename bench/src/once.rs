@@ -24,7 +24,7 @@ pub fn run(options: &Options, report: &mut Report) -> Result<(), Failure> {
     };
     report.say(
         "Medians of first frames: each is of a new detector.\n\n\
-         | scene | primitives | pairs | auto ms | answered by | clusters ms | cells ms | clusters / auto |\n\
+         | scene | elements | pairs | auto ms | answered by | clusters ms | cells ms | clusters / auto |\n\
          |---|---:|---:|---:|---|---:|---:|---:|",
     );
     for scene in &meshes {
@@ -90,7 +90,7 @@ fn measure(problem: &Problem, options: &Options, report: &mut Report) -> Result<
     report.say(&format!(
         "| {} | {} | {} | {} | {answered_by} | {} | {} | {:.1} |",
         problem.name,
-        grouped(problem.n_primitives() as u64),
+        grouped(problem.n_elements() as u64),
         grouped(n_pairs),
         figures(auto),
         figures(clusters),
@@ -99,7 +99,7 @@ fn measure(problem: &Problem, options: &Options, report: &mut Report) -> Result<
     ));
     report.keep_json(json!({
         "scene": problem.name,
-        "primitives": problem.n_primitives(),
+        "elements": problem.n_elements(),
         "pairs": n_pairs,
         "frames": n_frames,
         "answered_by": answered_by,

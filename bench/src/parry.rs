@@ -1,4 +1,4 @@
-//! parry3d as a peer: its `Bvh` over primitives, refitted each frame, its traversals, and the plain
+//! parry3d as a peer: its `Bvh` over elements, refitted each frame, its traversals, and the plain
 //! pair test. parry has no self-collision and no triangle-pair query for meshes, but it offers
 //! these parts; [`tuned`] tries several ways to combine them.
 
@@ -25,7 +25,7 @@ pub struct Setting {
     /// Whether candidates are collected and tested in parallel, or tested one by one as they come.
     parallel_test: bool,
     /// For many bodies: whether to use a tree over bodies, with all box pairs of two bodies that
-    /// meet, or a tree over primitives.
+    /// meet, or a tree over elements.
     over_bodies: bool,
 }
 
@@ -97,13 +97,13 @@ pub fn tuned(
     tune::fastest(problem, &settings, build)
 }
 
-/// The primitives of one tree: a body, or all bodies.
+/// The elements of one tree: a body, or all bodies.
 struct Side {
     positions: Vec<[f32; 3]>,
-    /// Corner indices, `P::N` per primitive.
+    /// Corner indices, `P::N` per element.
     corners: Vec<u32>,
     owners: Vec<u32>,
-    /// The first primitive of each body, and one past the last.
+    /// The first element of each body, and one past the last.
     starts: Vec<usize>,
     /// The first vertex of each body, and one past the last.
     vertex_starts: Vec<usize>,
@@ -149,8 +149,8 @@ impl Side {
             let body = &problem.bodies[body_ix];
             let first = u32::try_from(side.positions.len())?;
             side.positions.extend(&body.poses[0]);
-            for primitive in 0..body.elements.len() {
-                let corners = body.elements.corners(primitive);
+            for element in 0..body.elements.len() {
+                let corners = body.elements.corners(element);
                 if corners.len() != P::N {
                     return Err("bodies of different kinds in one problem".into());
                 }
@@ -178,8 +178,8 @@ impl Side {
     }
 
     #[inline]
-    fn primitive_box<P: Corners>(&self, primitive: usize) -> Aabb {
-        let indices = self.indices::<P>(primitive);
+    fn element_box<P: Corners>(&self, element: usize) -> Aabb {
+        let indices = self.indices::<P>(element);
         aabb(indices.iter().map(|&index| self.positions[index as usize]))
     }
 
@@ -189,18 +189,18 @@ impl Side {
             let vertices = self.vertex_starts[leaf]..self.vertex_starts[leaf + 1];
             aabb(self.positions[vertices].iter().copied())
         } else {
-            self.primitive_box::<P>(leaf)
+            self.element_box::<P>(leaf)
         }
     }
 
     #[inline(always)]
-    fn indices<P: Corners>(&self, primitive: usize) -> &[u32] {
-        &self.corners[primitive * P::N..][..P::N]
+    fn indices<P: Corners>(&self, element: usize) -> &[u32] {
+        &self.corners[element * P::N..][..P::N]
     }
 
     #[inline(always)]
-    fn corners<P: Corners>(&self, primitive: usize) -> P {
-        let indices = self.indices::<P>(primitive);
+    fn corners<P: Corners>(&self, element: usize) -> P {
+        let indices = self.indices::<P>(element);
         P::from_fn(|k| self.positions[indices[k] as usize].map(f64::from))
     }
 
@@ -246,7 +246,7 @@ impl Side {
     }
 }
 
-/// parry set up for a problem of primitives `P`.
+/// parry set up for a problem of elements `P`.
 struct Parry<P> {
     sides: Vec<Side>,
     layout: Vec<Vec<(usize, usize)>>,
@@ -254,7 +254,7 @@ struct Parry<P> {
     setting: Setting,
     candidates: Vec<(u32, u32)>,
     hits: Vec<(u32, u32)>,
-    primitives: std::marker::PhantomData<P>,
+    elements: std::marker::PhantomData<P>,
 }
 
 impl<P: Corners> Parry<P> {
@@ -286,7 +286,7 @@ impl<P: Corners> Parry<P> {
             setting,
             candidates: Vec::new(),
             hits: Vec::new(),
-            primitives: std::marker::PhantomData,
+            elements: std::marker::PhantomData,
         })
     }
 
@@ -356,7 +356,7 @@ impl<P: Corners> Parry<P> {
     }
 }
 
-/// Tests one pair of leaves, which are primitives or bodies.
+/// Tests one pair of leaves, which are elements or bodies.
 #[inline]
 fn test<P: Corners>(
     a: &Side,
@@ -367,15 +367,15 @@ fn test<P: Corners>(
     hits: &mut Vec<(u32, u32)>,
 ) {
     if over_bodies {
-        let primitives =
+        let elements =
             |side: &Side, body: u32| side.starts[body as usize]..side.starts[body as usize + 1];
-        for p in primitives(a, i) {
-            let of_p = a.primitive_box::<P>(p);
+        for p in elements(a, i) {
+            let of_p = a.element_box::<P>(p);
             if !of_p.intersects(&b.body_boxes[j as usize]) {
                 continue;
             }
-            for q in primitives(b, j) {
-                if of_p.intersects(&b.primitive_box::<P>(q))
+            for q in elements(b, j) {
+                if of_p.intersects(&b.element_box::<P>(q))
                     && a.corners::<P>(p).meet(&b.corners::<P>(q))
                 {
                     hits.push((p as u32, q as u32));

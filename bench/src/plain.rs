@@ -1,17 +1,17 @@
 //! The pair tests of the peers: plain double precision, without error bounds, written to be fast.
-//! They may be wrong for primitives that touch or nearly touch, which shows as a difference in
+//! They may be wrong for elements that touch or nearly touch, which shows as a difference in
 //! counts.
 
 /// A point in double precision.
 pub type Point = [f64; 3];
 
-/// The corners of a primitive: three or four points.
+/// The corners of an element: three or four points.
 pub trait Corners: Copy + Send + Sync + 'static {
     /// The number of corners.
     const N: usize;
     /// Builds the corners one by one.
     fn from_fn(corner: impl FnMut(usize) -> Point) -> Self;
-    /// Whether two primitives meet, by the plain test.
+    /// Whether two elements meet, by the plain test.
     fn meet(&self, other: &Self) -> bool;
 }
 
@@ -267,15 +267,15 @@ mod tests {
     use impinge_scenes::soup;
 
     fn corners<const K: usize>(model: &impinge_scenes::Model) -> Vec<[Point; K]> {
-        (0..model.n_primitives())
-            .map(|primitive| {
-                let corners = model.elements.corners(primitive);
+        (0..model.n_elements())
+            .map(|element| {
+                let corners = model.elements.corners(element);
                 std::array::from_fn(|k| model.positions[corners[k] as usize].map(f64::from))
             })
             .collect()
     }
 
-    /// Random primitives nearly never touch without crossing: the plain tests agree with the
+    /// Random elements nearly never touch without crossing: the plain tests agree with the
     /// exact ones on all of them.
     #[test]
     fn plain_tests_agree_with_exact_ones_in_general_position() {

@@ -24,7 +24,7 @@ pub enum Ask {
 /// One body.
 #[derive(Debug, Clone)]
 pub struct Body {
-    /// Its primitives.
+    /// Its elements.
     pub elements: Arc<Elements>,
     /// Its positions in each pose; all bodies have equally many poses.
     pub poses: Vec<Vec<[f32; 3]>>,
@@ -129,8 +129,8 @@ impl Problem {
     /// Counts the pairs by the oracle, if their number is not known and the problem is small
     /// enough.
     pub fn by_oracle(self) -> Result<Problem, Failure> {
-        const MAX_PRIMITIVES: usize = 60_000;
-        if self.expected.is_some() || self.n_primitives() > MAX_PRIMITIVES {
+        const MAX_ELEMENTS: usize = 60_000;
+        if self.expected.is_some() || self.n_elements() > MAX_ELEMENTS {
             return Ok(self);
         }
         let (scene, _, query) = self.scene()?;
@@ -146,8 +146,8 @@ impl Problem {
         self.bodies.first().map_or(1, |body| body.poses.len())
     }
 
-    /// The number of primitives in all bodies.
-    pub fn n_primitives(&self) -> usize {
+    /// The number of elements in all bodies.
+    pub fn n_elements(&self) -> usize {
         self.bodies.iter().map(|body| body.elements.len()).sum()
     }
 

@@ -38,9 +38,9 @@ impl Report {
     /// Prints the table of one problem.
     pub fn contest(&mut self, table: &Table) {
         let mut text = format!(
-            "### {}: {} primitives in {}, {} pairs\n\n{}. {} frames each, {} in a row.\n\n",
+            "### {}: {} elements in {}, {} pairs\n\n{}. {} frames each, {} in a row.\n\n",
             table.name,
-            grouped(table.n_primitives as u64),
+            grouped(table.n_elements as u64),
             match table.n_bodies {
                 1 => "1 body".to_owned(),
                 n => format!("{} bodies", grouped(n as u64)),

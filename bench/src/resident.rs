@@ -129,7 +129,7 @@ pub fn run(options: &Options, report: &mut Report) -> Result<(), Failure> {
     ));
     report.keep_json(json!({ "open_ms": opened, "first_frame_ms": first }));
     report.say(
-        "| scene | question | primitives | alone | in a row | CPU |\n|---|---|---:|---:|---:|---:|",
+        "| scene | question | elements | alone | in a row | CPU |\n|---|---|---:|---:|---:|---:|",
     );
     let caller = Caller::new(options)?;
     for scene in ["ball", "bunny", "buddha", "dragon"] {
@@ -167,7 +167,7 @@ fn row(
         figures(cpu)
     ));
     report.keep_json(json!({
-        "scene": scene, "question": question, "primitives": n,
+        "scene": scene, "question": question, "elements": n,
         "alone_ms": alone, "in_a_row_ms": in_a_row, "cpu_ms": cpu,
     }));
 }
@@ -210,7 +210,7 @@ fn frames(
         detector.detect(&scene, &query)?;
         Ok(())
     })?;
-    row(report, name, "pairs", problem.n_primitives(), times, cpu);
+    row(report, name, "pairs", problem.n_elements(), times, cpu);
     Ok(())
 }
 

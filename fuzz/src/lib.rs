@@ -47,7 +47,7 @@ fn check(result: Result<Mesh, Error>) {
     }
 }
 
-/// Reads a mesh, for either kind of primitive.
+/// Reads a mesh, for either kind of element.
 pub fn mesh(bytes: &[u8], format: Format) {
     check(read_bytes(bytes, format, "file", &options(Prefer::Volume)));
     check(read_bytes(

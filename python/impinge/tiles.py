@@ -38,7 +38,7 @@ def plan(
     replace: bool = False,
     progress: _Progress | None = None,
 ) -> dict[str, Any]:
-    """Looks at every primitive of the files once, cuts space into tiles and writes ``plan.json``.
+    """Looks at every element of the files once, cuts space into tiles and writes ``plan.json``.
 
     Parameters
     ----------
@@ -47,9 +47,9 @@ def plan(
     files : path, or iterable of paths
         Mesh files, a body each, numbered in this order. With `step`, two files per body: its start and its end.
     cap : int
-        About how many primitives a tile may hold; one tile is in memory at a time.
+        About how many elements a tile may hold; one tile is in memory at a time.
     chunk : int
-        Primitives per unit of scattering.
+        Elements per unit of scattering.
     weld : bool
         Whether vertices of one file at exactly the same position become one; with `step`, those at one position both at the start
         and at the end, and scattering such a body holds all its vertices in memory.
@@ -60,7 +60,7 @@ def plan(
     replace : bool
         Whether another plan in the folder, and all that was made by it, is removed.
     progress : callable, optional
-        Called as ``progress(done, total)`` with primitives.
+        Called as ``progress(done, total)`` with elements.
 
     Returns
     -------
@@ -82,7 +82,7 @@ def describe(folder: _Path) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``plan`` (its name), ``files``, ``step`` (whether bodies move), ``separation``, ``primitives``, ``tiles``, ``units``.
+        ``plan`` (its name), ``files``, ``step`` (whether bodies move), ``separation``, ``elements``, ``tiles``, ``units``.
     """
     return _impinge._tiles_describe(os.fspath(folder))
 
@@ -95,7 +95,7 @@ def scatter(
     threads: int = 0,
     progress: _Progress | None = None,
 ) -> dict[str, int]:
-    """Writes the parts that are not there yet: primitives by tile, one part per unit of work.
+    """Writes the parts that are not there yet: elements by tile, one part per unit of work.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ def scatter(
     Returns
     -------
     dict
-        ``written`` and ``kept`` (parts), ``primitives`` and ``records`` of the parts that were written.
+        ``written`` and ``kept`` (parts), ``elements`` and ``records`` of the parts that were written.
 
     Raises
     ------
@@ -161,7 +161,7 @@ def run(
     Returns
     -------
     list of dict
-        One per tile: ``tile``, ``primitives``, ``pairs``, ``hash``, ``elsewhere``, ``pieces``, ``kept``.
+        One per tile: ``tile``, ``elements``, ``pairs``, ``hash``, ``elsewhere``, ``pieces``, ``kept``.
 
     Raises
     ------

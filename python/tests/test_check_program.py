@@ -127,7 +127,7 @@ def test_annotations_and_a_summary(folder):
     assert not any("clean.obj" in line for line in said)
     text = pathlib.Path("summary.md").read_text()
     rows = [line for line in text.splitlines() if line.startswith("| ")]
-    assert rows[0].startswith("| mesh | primitives |") and len({len(re.findall(r"(?<!\\)\|", row)) for row in rows}) == 1
+    assert rows[0].startswith("| mesh | elements |") and len({len(re.findall(r"(?<!\\)\|", row)) for row in rows}) == 1
     assert "| bad.obj | 6 | 4 | 0 | 1 | 3 | 0 | 3 | 2 |" in rows and r"| a\|b,c:d%&lt;i>.obj | 6 |" in text
     # What fails comes before what is only told.
     assert rows[-1].startswith("| open.obj") and "- absent.obj" in text and "5 of 7 meshes failed" in text

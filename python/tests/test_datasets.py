@@ -134,7 +134,7 @@ def test_tiles_have_the_answer_of_the_whole(bodies, tmp_path):
     folder = tmp_path / "tiles"
     seen = []
     plan = impinge.tiles.plan(folder, paths, cap=400, chunk=256, progress=lambda *at: seen.append(at))
-    assert plan["primitives"] == 2100 and plan["tiles"] > 3 and plan == impinge.tiles.describe(folder)
+    assert plan["elements"] == 2100 and plan["tiles"] > 3 and plan == impinge.tiles.describe(folder)
     assert plan["files"] == list(map(str, paths)) or [str(path) for path in plan["files"]] == list(map(str, paths))
     assert seen and seen[-1] == (2100, 2100)
     halves = [impinge.tiles.scatter(folder, rank=rank, world_size=2, threads=1) for rank in range(2)]
@@ -162,7 +162,7 @@ def test_tiles_of_a_step_have_the_impacts_of_the_whole(tmp_path, precision):
     truth = impinge.Detector("cpu").impacts(scene, precision=precision, start="skip")
     folder = tmp_path / "tiles"
     plan = impinge.tiles.plan(folder, paths, cap=300, chunk=128, step=True)
-    assert plan["step"] and plan["tiles"] > 2 and plan["primitives"] == 1000
+    assert plan["step"] and plan["tiles"] > 2 and plan["elements"] == 1000
     impinge.tiles.scatter(folder)
     impinge.tiles.run(folder, threads=1, start="skip", precision=precision)
     # Neighbours never count in a step, so the rule for them is the same question.

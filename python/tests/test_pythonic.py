@@ -83,12 +83,12 @@ def test_a_result_is_an_array(result):
             np.array(result, np.int64, copy=False)
 
 
-def test_all_colliding_primitives_in_one_pass(result):
+def test_all_colliding_elements_in_one_pass(result):
     everything = result.colliding()
     assert [int(body) for body in everything] == [0, 1, 2]
-    for body, primitives in everything.items():
-        assert primitives.dtype == np.uint32
-        assert np.array_equal(primitives, result.colliding(body))
+    for body, elements in everything.items():
+        assert elements.dtype == np.uint32
+        assert np.array_equal(elements, result.colliding(body))
     assert np.array_equal(everything[1], result.colliding(1)) and 3 not in everything
     assert result.colliding(3).shape == (0,)
 

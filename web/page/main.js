@@ -49,7 +49,7 @@ let rows = new Uint32Array();
 let places = [];
 let place = -1;
 let chosen = null;
-// The primitives of the contact that was gone to.
+// The elements of the contact that was gone to.
 let touching = [];
 let step = null;
 let isMoved = true;
@@ -82,7 +82,7 @@ const onView = {
     const tip = element("tip");
     tip.hidden = hit === null || isPlaying;
     if (tip.hidden) return;
-    tip.textContent = panel.nameOf(bodies, hit.body, hit.primitive);
+    tip.textContent = panel.nameOf(bodies, hit.body, hit.element);
     tip.style.left = `${Math.min(clientX + 14, window.innerWidth - tip.offsetWidth - 4)}px`;
     tip.style.top = `${clientY + 14}px`;
   },
@@ -260,7 +260,7 @@ function answer() {
 
 // What is asked, in words.
 function showQuestion() {
-  const what = bodies.some(({ corners }) => corners === 4) ? "primitive" : "triangle";
+  const what = bodies.some(({ corners }) => corners === 4) ? "element" : "triangle";
   say("verdict", rows.length === 4 ? `pair of ${what}s intersects` : `pairs of ${what}s intersect`);
   const n = bodies.reduce((sum, { index, corners }) => sum + index.length / corners, 0);
   const names = bodies.map(({ name }) => shortened(name)).join(", ");
@@ -284,11 +284,11 @@ function list() {
   mark();
 }
 
-// Marks the place and the primitive that were chosen, with its partners.
+// Marks the place and the element that were chosen, with its partners.
 function mark() {
   panel.markPlace(place);
   const partners = panel.showChosen(chosen, rows, bodies, choose);
-  view.choose(chosen ? [[chosen.body, chosen.primitive], ...partners] : touching);
+  view.choose(chosen ? [[chosen.body, chosen.element], ...partners] : touching);
 }
 
 const seeAll = () => view.frame([0, 0, 0], 1, stage.reach / stage.radius);
@@ -302,8 +302,8 @@ function goTo(ix) {
   setPlaying(false);
   place = ix;
   flyTo(ballAround(places[ix]));
-  const [body, primitive] = places[ix].first;
-  choose({ body, primitive });
+  const [body, element] = places[ix].first;
+  choose({ body, element });
 }
 
 function nextPlace(by) {
@@ -311,7 +311,7 @@ function nextPlace(by) {
   if (places.length > 0) goTo((place + by + places.length + (place < 0 && by < 0 ? 1 : 0)) % places.length);
 }
 
-// Marks a primitive and its partners; `null` marks none.
+// Marks an element and its partners; `null` marks none.
 function choose(hit) {
   chosen = hit;
   touching = [];

@@ -1,4 +1,4 @@
-// What the panels say: the bodies, the places where they collide, and the primitive that was chosen.
+// What the panels say: the bodies, the places where they collide, and the element that was chosen.
 
 import { counted, element, grouped } from "./text.js";
 import { colors } from "./view.js";
@@ -58,7 +58,7 @@ export function showPlaces(places, bodies, go) {
   element("n-places").textContent = grouped(places.length);
   const items = places.slice(0, MOST_PLACES).map(({ n, bodies: which }, ix) => {
     const names = [...which].map((body) => bodies[body].name);
-    const word = [...which].some((body) => bodies[body].corners === 4) ? "primitive" : "triangle";
+    const word = [...which].some((body) => bodies[body].corners === 4) ? "element" : "triangle";
     const where = bodies.length > 1 ? ` of ${names.join(" and ")}` : "";
     const button = make("button", { type: "button" }, `${counted(n, word)}${where}`);
     button.addEventListener("click", () => go(ix));
@@ -78,18 +78,18 @@ export function markPlace(chosen) {
   }
 }
 
-// The chosen primitive and its partners in `rows`; a button per partner goes there.
+// The chosen element and its partners in `rows`; a button per partner goes there.
 export function showChosen(hit, rows, bodies, go) {
   const box = element("chosen");
   box.hidden = hit === null;
   if (hit === null) return [];
   const partners = partnersOf(hit, rows);
-  const { body, primitive } = hit;
-  const title = make("b", {}, nameOf(bodies, body, primitive));
+  const { body, element } = hit;
+  const title = make("b", {}, nameOf(bodies, body, element));
   const links = partners.slice(0, MOST_PARTNERS).map(([other, number]) => {
     const text = other === body ? grouped(number) : nameOf(bodies, other, number);
     const button = make("button", { type: "button" }, text);
-    button.addEventListener("click", () => go({ body: other, primitive: number }));
+    button.addEventListener("click", () => go({ body: other, element: number }));
     return button;
   });
   const more = partners.length - links.length;
@@ -98,16 +98,16 @@ export function showChosen(hit, rows, bodies, go) {
   return partners;
 }
 
-export function nameOf(bodies, body, primitive) {
+export function nameOf(bodies, body, element) {
   const of = bodies.length > 1 ? ` of ${bodies[body].name}` : "";
-  return `${kindOf(bodies[body])} ${grouped(primitive)}${of}`;
+  return `${kindOf(bodies[body])} ${grouped(element)}${of}`;
 }
 
-function partnersOf({ body, primitive }, rows) {
+function partnersOf({ body, element }, rows) {
   const partners = [];
   for (let at = 0; at < rows.length; at += 4) {
-    if (rows[at] === body && rows[at + 1] === primitive) partners.push([rows[at + 2], rows[at + 3]]);
-    else if (rows[at + 2] === body && rows[at + 3] === primitive) partners.push([rows[at], rows[at + 1]]);
+    if (rows[at] === body && rows[at + 1] === element) partners.push([rows[at + 2], rows[at + 3]]);
+    else if (rows[at + 2] === body && rows[at + 3] === element) partners.push([rows[at], rows[at + 1]]);
   }
   return partners;
 }

@@ -1,7 +1,7 @@
-// Where bodies collide: connected groups of colliding primitives, as the program's window lists them.
+// Where bodies collide: connected groups of colliding elements, as the program's window lists them.
 
 // The places of an answer, the largest first. `rows` are `[bodyA, i, bodyB, j]` per pair; a body has `index`, `corners` and the
-// positions `now`. Two primitives are connected if they are a pair, or share a vertex.
+// positions `now`. Two elements are connected if they are a pair, or share a vertex.
 export function places(rows, bodies) {
   const numbers = bodies.map(() => new Map());
   const colliding = [];
@@ -17,40 +17,40 @@ export function places(rows, bodies) {
     const [x, y] = [find(a), find(b)];
     parents[Math.max(x, y)] = Math.min(x, y);
   };
-  const numberOf = (body, primitive) => {
-    const known = numbers[body].get(primitive);
+  const numberOf = (body, element) => {
+    const known = numbers[body].get(element);
     if (known !== undefined) return known;
     const number = parents.length;
-    numbers[body].set(primitive, number);
+    numbers[body].set(element, number);
     parents.push(number);
-    colliding.push([body, primitive]);
+    colliding.push([body, element]);
     return number;
   };
   for (let at = 0; at < rows.length; at += 4) {
     join(numberOf(rows[at], rows[at + 1]), numberOf(rows[at + 2], rows[at + 3]));
   }
   const firstAt = bodies.map(() => new Map());
-  for (const [number, [body, primitive]] of colliding.entries()) {
-    for (const vertex of cornersOf(bodies[body], primitive)) {
+  for (const [number, [body, element]] of colliding.entries()) {
+    for (const vertex of cornersOf(bodies[body], element)) {
       const first = firstAt[body].get(vertex);
       if (first === undefined) firstAt[body].set(vertex, number);
       else join(first, number);
     }
   }
   const found = new Map();
-  for (const [number, [body, primitive]] of colliding.entries()) {
+  for (const [number, [body, element]] of colliding.entries()) {
     const root = find(number);
-    const place = found.get(root) ?? { n: 0, first: [body, primitive], bodies: new Set(), ...emptyBox() };
+    const place = found.get(root) ?? { n: 0, first: [body, element], bodies: new Set(), ...emptyBox() };
     found.set(root, place);
     place.n += 1;
     place.bodies.add(body);
-    for (const vertex of cornersOf(bodies[body], primitive)) extend(place, bodies[body].now, 3 * vertex);
+    for (const vertex of cornersOf(bodies[body], element)) extend(place, bodies[body].now, 3 * vertex);
   }
   return [...found.values()].sort((a, b) => b.n - a.n);
 }
 
-export function cornersOf({ index, corners }, primitive) {
-  return index.subarray(primitive * corners, (primitive + 1) * corners);
+export function cornersOf({ index, corners }, element) {
+  return index.subarray(element * corners, (element + 1) * corners);
 }
 
 export function emptyBox() {

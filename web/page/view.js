@@ -16,7 +16,7 @@ export function colors(ix) {
   return [BODY[ix % BODY.length], COLLIDING[ix % COLLIDING.length]];
 }
 
-// The corners of the triangles that show a primitive: itself, or the faces of a tetrahedron.
+// The corners of the triangles that show an element: itself, or the faces of a tetrahedron.
 const CORNERS = { 3: [0, 1, 2], 4: [0, 2, 1, 0, 1, 3, 1, 2, 3, 2, 0, 3] };
 
 function material(color, more) {
@@ -30,8 +30,8 @@ class Figure {
     const pattern = CORNERS[corners];
     this.index = new Uint32Array((index.length / corners) * pattern.length);
     for (let to = 0; to < this.index.length; to += 1) {
-      const primitive = Math.floor(to / pattern.length);
-      this.index[to] = index[primitive * corners + pattern[to % pattern.length]];
+      const element = Math.floor(to / pattern.length);
+      this.index[to] = index[element * corners + pattern[to % pattern.length]];
     }
     this.positions = new THREE.BufferAttribute(new Float32Array(positions.length), 3);
     this.positions.setUsage(THREE.DynamicDrawUsage);
@@ -69,14 +69,14 @@ class Figure {
     for (const mesh of this.meshes) mesh.frustumCulled = false;
   }
 
-  // Shows the primitives with a mark as colliding. Returns how many there are.
+  // Shows the elements with a mark as colliding. Returns how many there are.
   show() {
     const n = CORNERS[this.corners].length;
     let end = 0;
-    for (let primitive = 0; primitive < this.marks.length; primitive += 1) {
-      if (this.marks[primitive] === 0) continue;
+    for (let element = 0; element < this.marks.length; element += 1) {
+      if (this.marks[element] === 0) continue;
       for (let corner = 0; corner < n; corner += 1) {
-        this.colliding[end] = this.index[primitive * n + corner];
+        this.colliding[end] = this.index[element * n + corner];
         end += 1;
       }
     }
@@ -102,7 +102,7 @@ export class View {
   #chosen = [];
 
   // What the pointer does is told to `on`: `press()`, `drag(body, dx, dy, dz)` moves a body, `click(hit)` and `hover(hit, event)` name the
-  // primitive there or `null`, `change()` says that the picture must be drawn again.
+  // element there or `null`, `change()` says that the picture must be drawn again.
   constructor(canvas, on) {
     this.canvas = canvas;
     this.on = on;
@@ -254,7 +254,7 @@ export class View {
     return figure.positions.array;
   }
 
-  // Draws the bodies; `rows` are `[bodyA, i, bodyB, j]` per pair. Returns how many primitives of each body collide.
+  // Draws the bodies; `rows` are `[bodyA, i, bodyB, j]` per pair. Returns how many elements of each body collide.
   draw(rows) {
     for (const figure of this.#figures) figure.marks.fill(0);
     for (let at = 0; at < rows.length; at += 2) this.#figures[rows[at]].marks[rows[at + 1]] = 1;
@@ -264,9 +264,9 @@ export class View {
     return counts;
   }
 
-  // Outlines these primitives, `[body, primitive]` each.
-  choose(primitives) {
-    this.#chosen = primitives;
+  // Outlines these elements, `[body, element]` each.
+  choose(elements) {
+    this.#chosen = elements;
     this.#outline();
     this.on.change();
   }
@@ -275,10 +275,10 @@ export class View {
     this.outline.visible = this.#chosen.length > 0;
     if (!this.outline.visible) return;
     const points = [];
-    for (const [ix, primitive] of this.#chosen) {
+    for (const [ix, element] of this.#chosen) {
       const { corners, index, positions } = this.#figures[ix];
       const n = CORNERS[corners].length;
-      for (let face = primitive * n; face < (primitive + 1) * n; face += 3) {
+      for (let face = element * n; face < (element + 1) * n; face += 3) {
         for (const corner of [0, 1, 1, 2, 2, 0]) {
           const at = 3 * index[face + corner];
           points.push(...positions.array.subarray(at, at + 3));
@@ -323,7 +323,7 @@ export class View {
     return ray;
   }
 
-  // The primitive under the pointer, and where it is hit.
+  // The element under the pointer, and where it is hit.
   #hit(event) {
     const figures = this.#figures.filter(({ body }) => body.visible);
     for (const figure of figures) {
@@ -334,7 +334,7 @@ export class View {
     if (!hit) return null;
     const body = this.#figures.findIndex((figure) => figure.body === hit.object);
     const faces = CORNERS[this.#figures[body].corners].length / 3;
-    return { body, primitive: Math.floor(hit.faceIndex / faces), point: hit.point };
+    return { body, element: Math.floor(hit.faceIndex / faces), point: hit.point };
   }
 
   #press(event) {

@@ -377,8 +377,8 @@ impl<P: Corners> Embree<P> {
                 let geometry = ffi::rtcNewGeometry(handles.device, ffi::GEOMETRY_USER);
                 handles.geometries.push(geometry);
                 ffi::rtcSetGeometryBuildQuality(geometry, setting.geometry_quality);
-                let n_primitives = u32::try_from(side.owners.len())?;
-                ffi::rtcSetGeometryUserPrimitiveCount(geometry, n_primitives);
+                let n_elements = u32::try_from(side.owners.len())?;
+                ffi::rtcSetGeometryUserPrimitiveCount(geometry, n_elements);
                 ffi::rtcAttachGeometry(scene, geometry);
             }
         }

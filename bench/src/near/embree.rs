@@ -97,10 +97,7 @@ unsafe extern "C" fn meets(arguments: *mut ffi::PointQueryArguments) -> bool {
     // nowhere else meanwhile.
     let (query, face) = unsafe {
         let arguments = &*arguments;
-        (
-            &mut *arguments.user.cast::<Query<'_>>(),
-            arguments.primitive,
-        )
+        (&mut *arguments.user.cast::<Query<'_>>(), arguments.element)
     };
     let corners = query.faces[face as usize];
     if !corners.contains(&query.vertex) {

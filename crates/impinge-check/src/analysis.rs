@@ -1,6 +1,6 @@
 //! The check of one mesh in memory.
 //!
-//! In: a mesh with indices in range. Out: [`Counts`], and the [`Marks`] of each primitive. The
+//! In: a mesh with indices in range. Out: [`Counts`], and the [`Marks`] of each element. The
 //! steps are welding, self-intersections, facets, union of neighbours and zero areas; each is
 //! exact.
 
@@ -39,7 +39,7 @@ pub struct Options {
     /// faces that turn their backs to each other, with matter between them. None by default. Meshes
     /// of tetrahedra have none.
     pub min_thickness: Option<f64>,
-    /// Whether a [`Row`](crate::Row) holds the problems of each primitive, with which
+    /// Whether a [`Row`](crate::Row) holds the problems of each element, with which
     /// [`Checked::of_row`] shows the mesh without another check. Off by default.
     pub marks: bool,
     /// CPU threads of the self-intersection search; 0 means one per core. No count depends on it.
@@ -65,7 +65,7 @@ impl Default for Options {
 pub struct Checked {
     /// The counts of problems.
     pub counts: Counts,
-    /// The problems of each primitive, in the order of the mesh.
+    /// The problems of each element, in the order of the mesh.
     pub marks: Vec<Marks>,
     /// Where the problems are.
     pub places: Vec<Place>,
@@ -90,9 +90,9 @@ pub fn check_listed(mesh: Mesh, options: &Options) -> Result<(Checked, Vec<[u32;
     Ok((checked, if is_whole { pairs } else { Vec::new() }))
 }
 
-/// Whether each primitive intersects another one, vertices at one position welded.
+/// Whether each element intersects another one, vertices at one position welded.
 pub fn intersecting_with_seams(mesh: &Mesh, options: &Options) -> Result<Vec<bool>, Error> {
-    let mut marks = vec![Marks::default(); mesh.n_primitives()];
+    let mut marks = vec![Marks::default(); mesh.n_elements()];
     intersections(&welded(mesh), options, &mut Counts::default(), &mut marks)?;
     let is_marked = |marks: &Marks| marks.has(Problem::SelfIntersection);
     Ok(marks.iter().map(is_marked).collect())
@@ -115,7 +115,7 @@ fn check(mut mesh: Mesh, options: &Options) -> Result<(Checked, Vec<[u32; 2]>), 
         n_welded: n_welded as u64,
         ..Counts::default()
     };
-    let mut marks = vec![Marks::default(); mesh.n_primitives()];
+    let mut marks = vec![Marks::default(); mesh.n_elements()];
     // This comes first because it refuses indices out of range and coordinates that are not finite,
     // on which the steps below rely.
     let (pairs, copies) = if options.keep_seams {
@@ -177,14 +177,14 @@ fn check(mut mesh: Mesh, options: &Options) -> Result<(Checked, Vec<[u32; 2]>), 
     Ok((checked, pairs))
 }
 
-/// The mesh with vertices at one position as one. Its primitives keep their numbers.
+/// The mesh with vertices at one position as one. Its elements keep their numbers.
 fn welded(mesh: &Mesh) -> Mesh {
     let mut welded = mesh.clone();
     weld(&mut welded);
     welded
 }
 
-/// The primitives with the same vertices. Indices must be in range.
+/// The elements with the same vertices. Indices must be in range.
 fn copies(mesh: &Mesh) -> Copies {
     match &mesh.elements {
         Elements::Triangles(triangles) => Copies::new(triangles, mesh.n_vertices()),
@@ -192,7 +192,7 @@ fn copies(mesh: &Mesh) -> Copies {
     }
 }
 
-/// Counts and marks primitives with the vertices of an earlier one.
+/// Counts and marks elements with the vertices of an earlier one.
 fn duplicates(copies: &Copies, counts: &mut Counts, marks: &mut [Marks]) {
     for &element in copies.sets().flat_map(|set| &set[1..]) {
         counts.duplicates += 1;
@@ -201,7 +201,7 @@ fn duplicates(copies: &Copies, counts: &mut Counts, marks: &mut [Marks]) {
 }
 
 /// Counts and marks pairs that share more points than their common vertices, edge or face. Returns
-/// the pairs that were found, sorted, and the primitives with the same vertices.
+/// the pairs that were found, sorted, and the elements with the same vertices.
 fn intersections(
     mesh: &Mesh,
     options: &Options,
@@ -216,7 +216,7 @@ fn intersections(
     let body = scene.add((elements, held(&mesh.positions)))?;
     // The scene has refused indices out of range.
     let copies = copies(mesh);
-    let few = copies.few(mesh.n_primitives());
+    let few = copies.few(mesh.n_elements());
     if let Some(few) = &few {
         let at = |kept: &u32| *kept as usize;
         let elements: impinge::Elements = match &mesh.elements {
@@ -239,8 +239,8 @@ fn intersections(
         None => {
             counts.self_intersections = pairs.len() as u64;
             counts.hash = Some(pairs.hash());
-            for &primitive in found.as_flattened() {
-                marks[primitive as usize].add(Problem::SelfIntersection);
+            for &element in found.as_flattened() {
+                marks[element as usize].add(Problem::SelfIntersection);
             }
         }
         Some(few) => {
@@ -249,8 +249,8 @@ fn intersections(
                 // Either all of a side are marked or none.
                 let is_new = |first: &u32| !marks[*first as usize].has(Problem::SelfIntersection);
                 if side.first().is_some_and(is_new) {
-                    for &primitive in side {
-                        marks[primitive as usize].add(Problem::SelfIntersection);
+                    for &element in side {
+                        marks[element as usize].add(Problem::SelfIntersection);
                     }
                 }
             }
@@ -273,7 +273,7 @@ fn topology<const K: usize>(
     marks: &mut [Marks],
 ) -> Result<Vec<u32>, Error> {
     let n_corners = u32::try_from(elements.len() * K).map_err(|_| Error::TooMany {
-        what: "corners of primitives",
+        what: "corners of elements",
         given: (elements.len() * K) as u64,
         limit: u64::from(u32::MAX),
     })?;
@@ -326,7 +326,7 @@ fn topology<const K: usize>(
     Ok(fans)
 }
 
-/// Two primitives with a common facet belong to one piece, and to one fan around each vertex of the
+/// Two elements with a common facet belong to one piece, and to one fan around each vertex of the
 /// facet.
 fn join_neighbours<const K: usize>(
     elements: &[[u32; K]],
@@ -353,8 +353,8 @@ fn n_roots(sets: &mut UnionFind, counts: impl Fn(u32) -> bool) -> u64 {
     (0..n).filter(|&x| counts(x) && sets.root(x) == x).count() as u64
 }
 
-/// Counts vertices of no primitive, and vertices around which primitives form several fans. Returns
-/// how many vertices belong to primitives that name no vertex twice, and those of several fans.
+/// Counts vertices of no element, and vertices around which elements form several fans. Returns
+/// how many vertices belong to elements that name no vertex twice, and those of several fans.
 fn count_vertices<const K: usize>(
     elements: &[[u32; K]],
     n_vertices: usize,

@@ -1,8 +1,8 @@
-//! Primitives with the same vertices, and what pairs of a few of them say about all of them.
+//! Elements with the same vertices, and what pairs of a few of them say about all of them.
 //!
-//! Whether a pair of primitives counts depends on their vertices alone, not on the order in which
-//! they name them. So of primitives with the same vertices only two are tested: their pair speaks
-//! for every pair of them, and the first one's pairs with other primitives for those of all. A
+//! Whether a pair of elements counts depends on their vertices alone, not on the order in which
+//! they name them. So of elements with the same vertices only two are tested: their pair speaks
+//! for every pair of them, and the first one's pairs with other elements for those of all. A
 //! million equal triangles are 5 · 10^11 pairs, which no memory holds.
 
 use std::ops::Range;
@@ -12,10 +12,10 @@ use crate::by_vertex::ByVertex;
 /// More pairs than this are counted without their hash, which takes a nanosecond or two per pair.
 const MOST_HASHED: u64 = 1 << 32;
 
-/// The sets of primitives with the same vertices, in any order.
+/// The sets of elements with the same vertices, in any order.
 #[derive(Debug, Default)]
 pub struct Copies {
-    /// The primitives of each set of several, ascending, set after set.
+    /// The elements of each set of several, ascending, set after set.
     members: Vec<u32>,
     sets: Vec<Range<usize>>,
 }
@@ -53,12 +53,12 @@ impl Copies {
         copies
     }
 
-    /// The sets of at least two primitives, which are ascending in each.
+    /// The sets of at least two elements, which are ascending in each.
     pub fn sets(&self) -> impl Iterator<Item = &[u32]> {
         self.sets.iter().map(|set| &self.members[set.clone()])
     }
 
-    /// The tests of a mesh of `n` primitives; `None` if no test can be left out.
+    /// The tests of a mesh of `n` elements; `None` if no test can be left out.
     pub fn few(&self, n: usize) -> Option<Few<'_>> {
         let large = || (0u32..).zip(self.sets()).filter(|(_, set)| set.len() > 2);
         large().next()?;
@@ -75,28 +75,28 @@ impl Copies {
         let kept = (0u32..).zip(is_kept).filter(|(_, kept)| *kept);
         Some(Few {
             copies: self,
-            kept: kept.map(|(primitive, _)| primitive).collect(),
+            kept: kept.map(|(element, _)| element).collect(),
             set_of,
         })
     }
 }
 
-/// The set of a primitive that speaks for itself.
+/// The set of an element that speaks for itself.
 const ALONE: u32 = u32::MAX;
 
-/// A mesh without the third and later primitives of each set.
+/// A mesh without the third and later elements of each set.
 pub struct Few<'a> {
     copies: &'a Copies,
-    /// The numbers of the primitives that are left, ascending.
+    /// The numbers of the elements that are left, ascending.
     pub kept: Vec<u32>,
     set_of: Vec<u32>,
 }
 
 /// The pairs for which one pair speaks.
 pub enum Pairs<'a> {
-    /// Every two primitives of a set.
+    /// Every two elements of a set.
     Within(&'a [u32]),
-    /// Every primitive of the one with every primitive of the other.
+    /// Every element of the one with every element of the other.
     Between(&'a [u32], &'a [u32]),
 }
 
@@ -104,14 +104,14 @@ impl Few<'_> {
     /// The pairs for which a pair of [`kept`](Few::kept) places speaks.
     pub fn pairs(&self, pair: [u32; 2]) -> Pairs<'_> {
         let [a, b] = pair.map(|place| &self.kept[place as usize]);
-        let [set_a, set_b] = [a, b].map(|primitive| self.set_of[*primitive as usize]);
+        let [set_a, set_b] = [a, b].map(|element| self.set_of[*element as usize]);
         let set = |ix: u32| &self.copies.members[self.copies.sets[ix as usize].clone()];
         if set_a == set_b && set_a != ALONE {
             return Pairs::Within(set(set_a));
         }
-        let side = |primitive, ix: u32| match ix {
-            ALONE => std::slice::from_ref(primitive),
-            _ if set(ix)[0] == *primitive => set(ix),
+        let side = |element, ix: u32| match ix {
+            ALONE => std::slice::from_ref(element),
+            _ if set(ix)[0] == *element => set(ix),
             // The first one speaks for all.
             _ => &[],
         };
@@ -147,7 +147,7 @@ impl<'a> Pairs<'a> {
         }
     }
 
-    /// The two sides whose primitives are in a pair: each wholly, or none.
+    /// The two sides whose elements are in a pair: each wholly, or none.
     pub fn sides(&self) -> [&'a [u32]; 2] {
         match *self {
             Pairs::Within(set) => [set, &[]],

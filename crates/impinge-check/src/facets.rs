@@ -1,27 +1,27 @@
-//! Facets: the edges of triangles, the faces of tetrahedra, and which primitives meet at each.
+//! Facets: the edges of triangles, the faces of tetrahedra, and which elements meet at each.
 //!
-//! All facets of all primitives are listed with their vertices in ascending order, and sorted, so
+//! All facets of all elements are listed with their vertices in ascending order, and sorted, so
 //! that equal facets are neighbours. One counting pass sorts by the smallest vertex; only short
-//! runs remain to be sorted. Cost: linear in primitives for meshes whose vertices have few
+//! runs remain to be sorted. Cost: linear in elements for meshes whose vertices have few
 //! neighbours. Scratch: 20 bytes per facet, twice.
 
-/// One facet of one primitive.
+/// One facet of one element.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Facet {
     /// Its vertices, ascending; an edge repeats its second vertex.
     pub vertices: [u32; 3],
-    /// The primitive.
+    /// The element.
     pub element: u32,
-    /// Whether the primitive passes through the ascending vertices in an even permutation.
+    /// Whether the element passes through the ascending vertices in an even permutation.
     pub is_even: bool,
 }
 
-/// Whether no vertex is named twice. Primitives that name a vertex twice have no facets here.
+/// Whether no vertex is named twice. Elements that name a vertex twice have no facets here.
 pub fn is_simplex<const K: usize>(corners: &[u32; K]) -> bool {
     (1..K).all(|ix| !corners[..ix].contains(&corners[ix]))
 }
 
-/// All facets of all primitives that name K different vertices, sorted.
+/// All facets of all elements that name K different vertices, sorted.
 pub fn facets<const K: usize>(elements: &[[u32; K]], n_vertices: usize) -> Vec<Facet> {
     let mut list = Vec::with_capacity(elements.len() * K);
     for (element, corners) in (0u32..).zip(elements) {
@@ -125,7 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn collapsed_primitives_have_no_facets() {
+    fn collapsed_elements_have_no_facets() {
         assert!(facets(&[[0, 1, 1]], 2).is_empty());
     }
 }

@@ -40,16 +40,16 @@ impl Checked {
         } else {
             0
         };
-        let n_primitives = (counts.n_triangles + counts.n_tetrahedra) as usize;
+        let n_elements = (counts.n_triangles + counts.n_tetrahedra) as usize;
         let is_same = [n_vertices, n_welded]
             == [counts.n_vertices, counts.n_welded].map(|n| n as usize)
-            && mesh.n_primitives() == n_primitives;
+            && mesh.n_elements() == n_elements;
         if !is_same {
             return None;
         }
         Some(Checked {
             counts,
-            marks: runs.marks(n_primitives)?,
+            marks: runs.marks(n_elements)?,
             places: row.places.clone(),
             mesh,
         })

@@ -1,4 +1,4 @@
-//! Checks meshes for self-intersections, degenerate and duplicate primitives, non-manifold places,
+//! Checks meshes for self-intersections, degenerate and duplicate elements, non-manifold places,
 //! open borders and inconsistent orientation, and counts their pieces. Every count is exact: there
 //! is no tolerance anywhere.
 //!

@@ -1,21 +1,21 @@
-//! The problems of each primitive, for pictures.
+//! The problems of each element, for pictures.
 
 use serde_json::{Value, json};
 
-/// One kind of problem of a primitive, in the order in which pictures show them: the first that
+/// One kind of problem of an element, in the order in which pictures show them: the first that
 /// applies gives the colour.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Problem {
-    /// Shares more points with another primitive than their common vertices, edge or face.
+    /// Shares more points with another element than their common vertices, edge or face.
     #[serde(rename = "self-intersections")]
     SelfIntersection,
-    /// Has the same vertices as an earlier primitive.
+    /// Has the same vertices as an earlier element.
     #[serde(rename = "duplicates")]
     Duplicate,
-    /// Has an edge (a tetrahedron: a face) of more than two primitives.
+    /// Has an edge (a tetrahedron: a face) of more than two elements.
     NonManifold,
-    /// Has an edge (a tetrahedron: a face) whose other primitive has the opposite orientation.
+    /// Has an edge (a tetrahedron: a face) whose other element has the opposite orientation.
     #[serde(rename = "orientation")]
     Inconsistent,
     /// Has zero area (a tetrahedron: zero volume).
@@ -95,7 +95,7 @@ impl Problem {
     }
 }
 
-/// The problems of one primitive.
+/// The problems of one element.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Marks(u8);
 
@@ -104,7 +104,7 @@ impl Marks {
         self.0 |= problem.bit();
     }
 
-    /// Whether the primitive has the problem.
+    /// Whether the element has the problem.
     pub fn has(self, problem: Problem) -> bool {
         self.0 & problem.bit() != 0
     }
@@ -115,8 +115,8 @@ impl Marks {
     }
 }
 
-/// The marks of all primitives of a mesh, as runs of primitives with the same problems; most
-/// primitives have none and are left out.
+/// The marks of all elements of a mesh, as runs of elements with the same problems; most
+/// elements have none and are left out.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct MarkRuns(Vec<(u32, u32, Marks)>);
 
@@ -131,7 +131,7 @@ impl MarkRuns {
         MarkRuns(runs.filter(|run| run.2 != Marks::default()).collect())
     }
 
-    /// The marks of `n` primitives; `None` if there are marks of later ones.
+    /// The marks of `n` elements; `None` if there are marks of later ones.
     pub(crate) fn marks(&self, n: usize) -> Option<Vec<Marks>> {
         let mut marks = vec![Marks::default(); n];
         for &(first, n, run) in &self.0 {

@@ -103,7 +103,7 @@ fn around(mesh: &Mesh, vertices: &[u32]) -> Vec<(u32, Vec<u32>)> {
     if found.is_empty() {
         return found;
     }
-    for element in 0..mesh.n_primitives() as u32 {
+    for element in 0..mesh.n_elements() as u32 {
         for vertex in corners(mesh, element) {
             if let Ok(place) = vertices.binary_search(vertex) {
                 found[place].1.push(element);

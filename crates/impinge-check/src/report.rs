@@ -18,7 +18,7 @@ const LISTED: usize = 50;
 
 /// The columns of a table after the mesh's name. Those that a finding counts name it.
 pub const COLUMNS: [(&str, Option<Finding>); 8] = [
-    ("primitives", None),
+    ("elements", None),
     ("self-int.", Some(Finding::SelfIntersections)),
     ("degenerate", Some(Finding::Degenerate)),
     ("duplicate", Some(Finding::Duplicates)),

@@ -21,38 +21,38 @@ pub struct Counts {
     /// Tetrahedra; 0 for a mesh of triangles.
     #[serde(rename = "tetrahedra")]
     pub n_tetrahedra: u64,
-    /// Pairs of primitives that share more points than their common vertices, edge or face
+    /// Pairs of elements that share more points than their common vertices, edge or face
     /// ([`SharedVertex::Resolve`](impinge::SharedVertex::Resolve)).
     pub self_intersections: u64,
-    /// Primitives in any such pair.
-    #[serde(rename = "intersecting_primitives")]
+    /// Elements in any such pair.
+    #[serde(rename = "intersecting_elements")]
     pub n_intersecting: u64,
     /// [`Pairs::hash`](impinge::Pairs::hash) of these pairs. `None` if they are more than 2^32, and
-    /// many of them of primitives with the same vertices: such pairs are counted without being
+    /// many of them of elements with the same vertices: such pairs are counted without being
     /// listed.
     #[serde(with = "hex")]
     pub hash: Option<u64>,
-    /// Primitives of exactly zero area, or volume.
+    /// Elements of exactly zero area, or volume.
     pub degenerate: u64,
-    /// Primitives with the vertices of an earlier one, in any order.
+    /// Elements with the vertices of an earlier one, in any order.
     #[serde(rename = "duplicate_faces")]
     pub duplicates: u64,
-    /// Facets of more than two primitives.
+    /// Facets of more than two elements.
     #[serde(rename = "non_manifold_edges")]
     pub non_manifold_facets: u64,
-    /// Vertices around which the primitives form more than one fan.
+    /// Vertices around which the elements form more than one fan.
     pub non_manifold_vertices: u64,
-    /// Facets of only one primitive.
+    /// Facets of only one element.
     #[serde(rename = "boundary_edges")]
     pub boundary_facets: u64,
     /// Connected pieces of the border: holes, for most surfaces.
     pub boundaries: u64,
-    /// Facets of two primitives with opposite orientations.
+    /// Facets of two elements with opposite orientations.
     #[serde(rename = "inconsistent_edges")]
     pub inconsistent_facets: u64,
-    /// Pieces connected through facets. Primitives that name a vertex twice belong to none.
+    /// Pieces connected through facets. Elements that name a vertex twice belong to none.
     pub components: u64,
-    /// Vertices of no primitive, counted after welding.
+    /// Vertices of no element, counted after welding.
     pub unused_vertices: u64,
     /// Whether every edge belongs to exactly two triangles; `None` for tetrahedra.
     #[serde(rename = "watertight")]
@@ -78,7 +78,7 @@ pub struct Counts {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ErrorKind {
-    /// The file can't be read: missing, damaged, of an unknown format, without primitives.
+    /// The file can't be read: missing, damaged, of an unknown format, without elements.
     File,
     /// A coordinate is NaN or infinite.
     NotFinite,
@@ -134,7 +134,7 @@ pub struct Row {
     pub result: Result<Counts, Failure>,
     /// Where the problems are: see [`Options::places`](crate::Options::places).
     pub places: Vec<Place>,
-    /// Which problems each primitive has: see [`Options::marks`](crate::Options::marks). Not part
+    /// Which problems each element has: see [`Options::marks`](crate::Options::marks). Not part
     /// of the [object](Self::to_json).
     pub marks: Option<MarkRuns>,
     /// What was left out of the file: see

@@ -352,7 +352,7 @@ fn files_that_cannot_be_read_are_rows() {
     assert_eq!(missing.result.unwrap_err().kind, ErrorKind::File);
 }
 
-/// Corners on a lattice of so few points that most primitives have copies, with corners in another
+/// Corners on a lattice of so few points that most elements have copies, with corners in another
 /// order.
 fn crowd<const K: usize>(seed: &mut u64, n: usize, n_vertices: u32) -> Vec<[u32; K]> {
     let mut below = |n: u32| {

@@ -92,7 +92,7 @@ impl Least {
         }
     }
 
-    /// The least number of a primitive and its edges and vertices, if any of them was found.
+    /// The least number of an element and its edges and vertices, if any of them was found.
     fn among(&self, corners: &[u32]) -> Option<f64> {
         let vertices = corners
             .iter()

@@ -73,16 +73,16 @@ pub fn subject(nouns: &Nouns, names: &[impl AsRef<str>]) -> String {
     }
 }
 
-/// Who was asked about, and how many primitives of each kind they have.
+/// Who was asked about, and how many elements of each kind they have.
 fn of_whom(
     scene: &Scene,
     nouns: &Nouns,
     bodies: &[(BodyId, &str)],
 ) -> Result<(String, String), Error> {
-    // A file that could not be read is a body without primitives.
+    // A file that could not be read is a body without elements.
     let mut read = Vec::with_capacity(bodies.len());
     for &(id, name) in bodies {
-        if scene.body(id)?.n_primitives() > 0 {
+        if scene.body(id)?.n_elements() > 0 {
             read.push((id, name));
         }
     }
@@ -93,8 +93,8 @@ fn of_whom(
         let body = scene.body(id)?;
         let kind = body.kind().name();
         match kinds.iter_mut().find(|(name, _)| *name == kind) {
-            Some((_, n)) => *n += body.n_primitives(),
-            None => kinds.push((kind, body.n_primitives())),
+            Some((_, n)) => *n += body.n_elements(),
+            None => kinds.push((kind, body.n_elements())),
         }
     }
     let of: Vec<String> = kinds

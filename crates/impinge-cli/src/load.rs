@@ -26,7 +26,7 @@ pub struct Bodies {
     pub vertices: Vec<Vertices>,
     pub nouns: Nouns,
     /// Files that could not be read: the number of the body, and why. Such a body has no
-    /// primitives.
+    /// elements.
     pub unread: Vec<(usize, String)>,
 }
 
@@ -171,7 +171,7 @@ impl Bodies {
         Bodies::read_all(paths, loading, false)
     }
 
-    /// Like [`read`](Self::read), but a file that can't be read becomes a body without primitives,
+    /// Like [`read`](Self::read), but a file that can't be read becomes a body without elements,
     /// so that all others keep their numbers. Fails if no file can be read.
     pub fn read_readable(paths: &[PathBuf], loading: Loading<'_>) -> Result<Self, Error> {
         Bodies::read_all(paths, loading, paths.len() > 1)

@@ -9,7 +9,7 @@ use crate::error::Error;
 use crate::palette::{self, BodyColors};
 use crate::values::{MeshFile, MeshFormat};
 
-/// Writes bodies in their current pose; primitives that take part in a pair are coloured.
+/// Writes bodies in their current pose; elements that take part in a pair are coloured.
 pub fn write(
     file: &MeshFile,
     scene: &Scene,
@@ -20,11 +20,11 @@ pub fn write(
     for (ix, &(id, name)) in bodies.iter().enumerate() {
         let body = scene.body(id)?;
         let BodyColors { colliding, other } = palette::body(ix);
-        let mut collides = vec![false; body.n_primitives()];
-        for primitive in pairs.colliding(id) {
-            collides[primitive as usize] = true;
+        let mut collides = vec![false; body.n_elements()];
+        for element in pairs.colliding(id) {
+            collides[element as usize] = true;
         }
-        let color = |primitive: usize, _: &[u32]| match collides[primitive] {
+        let color = |element: usize, _: &[u32]| match collides[element] {
             true => (colliding, true),
             false => (other, false),
         };
@@ -33,7 +33,7 @@ pub fn write(
     write_all(file, &colored)
 }
 
-/// Writes bodies with a colour per primitive.
+/// Writes bodies with a colour per element.
 pub fn write_all(file: &MeshFile, bodies: &[Colored<'_>]) -> Result<(), Error> {
     let meshes: Vec<ColoredMesh> = bodies.iter().map(Colored::mesh).collect();
     write_colored(file, &meshes)
@@ -78,7 +78,7 @@ pub fn from_elements(elements: &Elements) -> impinge_io::Elements {
     }
 }
 
-/// A body with a colour per primitive.
+/// A body with a colour per element.
 pub struct Colored<'a> {
     positions: impinge_io::Positions,
     elements: impinge_io::Elements,
@@ -88,7 +88,7 @@ pub struct Colored<'a> {
 }
 
 impl<'a> Colored<'a> {
-    /// A body in its current pose. `color`: of a primitive, by its number and corners, and whether
+    /// A body in its current pose. `color`: of an element, by its number and corners, and whether
     /// it counts as colliding.
     pub fn new(
         body: &Body,
@@ -112,7 +112,7 @@ impl<'a> Colored<'a> {
         ColoredMesh {
             positions: &self.positions,
             elements: &self.elements,
-            primitive_colors: Some(&self.colors),
+            element_colors: Some(&self.colors),
             colliding: Some(&self.colliding),
             name: self.name,
         }

@@ -48,7 +48,7 @@ impl OneMesh {
             BodyKind::Tetrahedra => 4,
             _ => 1,
         };
-        let n = body.n_primitives().saturating_mul(of_each);
+        let n = body.n_elements().saturating_mul(of_each);
         Ok(u32::try_from(n).unwrap_or(u32::MAX).max(1))
     }
 

@@ -120,7 +120,7 @@ pub fn body_table(
             ix.to_string(),
             printable(name),
             body.kind().name().to_owned(),
-            grouped(body.n_primitives() as u64),
+            grouped(body.n_elements() as u64),
             grouped(body.n_vertices() as u64),
             grouped(pairs.colliding(id).len() as u64),
         ]);

@@ -3,9 +3,9 @@
 /// sRGB.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct BodyColors {
-    /// The colour of primitives that take part in a pair.
+    /// The colour of elements that take part in a pair.
     pub colliding: [u8; 3],
-    /// The colour of all other primitives.
+    /// The colour of all other elements.
     pub other: [u8; 3],
 }
 

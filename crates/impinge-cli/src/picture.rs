@@ -52,7 +52,7 @@ impl<'a> Drawer<'a> {
         })
     }
 
-    /// Draws bodies in their current pose, with colliding primitives coloured.
+    /// Draws bodies in their current pose, with colliding elements coloured.
     pub fn write(
         &mut self,
         path: &Path,

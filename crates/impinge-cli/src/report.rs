@@ -730,7 +730,7 @@ pub struct TilesPlan {
     /// Whether bodies move
     pub step: bool,
     /// In all files
-    pub primitives: u64,
+    pub elements: u64,
     pub tiles: u32,
     /// Pieces of work for `scatter`
     pub units: usize,
@@ -744,9 +744,9 @@ pub struct TilesScatter {
     pub written: u64,
     /// Parts that were there
     pub kept: u64,
-    /// Primitives that were read
-    pub primitives: u64,
-    /// Records of them: one per tile that a primitive reaches
+    /// Elements that were read
+    pub elements: u64,
+    /// Records of them: one per tile that an element reaches
     pub records: u64,
 }
 
@@ -756,8 +756,8 @@ pub struct TilesScatter {
 pub struct TilesRun {
     /// Counted from 0
     pub tile: u32,
-    /// Primitives that reach into the tile
-    pub primitives: u64,
+    /// Elements that reach into the tile
+    pub elements: u64,
     /// Pairs that belong to the tile
     pub pairs: u64,
     /// Hash of these pairs, 16 hexadecimal digits
@@ -783,7 +783,7 @@ pub struct TilesMerge {
     /// Whether vertices at one position were welded
     pub welded: bool,
     pub tiles: u32,
-    /// Primitives, each counted once per tile that it reaches
+    /// Elements, each counted once per tile that it reaches
     pub records: u64,
     /// Tiles that no cut of space separates
     pub uncut_tiles: u64,

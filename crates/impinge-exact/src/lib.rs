@@ -5,10 +5,10 @@
 //! triangle and a tetrahedron share at least one point when their coordinates are read as real
 //! numbers ([`triangles_intersect`]); whether vertices, edges and faces are within a distance
 //! ([`are_within`]); and when two of them first touch while their points move ([`first_contact`]).
-//! Primitives are *closed*: touching counts, coplanar overlap counts, and a degenerate primitive is
+//! Elements are *closed*: touching counts, coplanar overlap counts, and a degenerate element is
 //! the segment, the point or the flat polygon that it is.
 //!
-//! How: answers about primitives at rest are combinations of signs of two determinants,
+//! How: answers about elements at rest are combinations of signs of two determinants,
 //! [`orient2d`] and [`orient3d`], and of comparisons of single coordinates. The signs are exact
 //! (adaptive arithmetic after Shewchuk, *Adaptive Precision Floating-Point Arithmetic and Fast
 //! Robust Geometric Predicates*, 1997), so the answers are. Answers about motion and distances are

@@ -2,10 +2,10 @@
 //!
 //! Neighbours always meet in the simplex that they share: a vertex, an edge, a face. The
 //! question is whether they meet *anywhere else*: a pair is reported if and only if the
-//! intersection is larger than the convex hull of the shared vertices. Two primitives with the
+//! intersection is larger than the convex hull of the shared vertices. Two elements with the
 //! same vertices are always reported.
 //!
-//! Vertices are shared when their ids are equal, wherever they lie. For primitives that are not
+//! Vertices are shared when their ids are equal, wherever they lie. For elements that are not
 //! degenerate this is the usual rule (`docs/exactness.md`, "Shared vertices", has the proofs):
 //!
 //! | shared | triangles | tetrahedra |
@@ -173,7 +173,7 @@ impl Points {
     }
 }
 
-/// Two primitives split into the vertices that they share and the rest of each.
+/// Two elements split into the vertices that they share and the rest of each.
 struct SplitCorners {
     shared: Points,
     rest_a: Points,
@@ -254,9 +254,9 @@ fn padded<const N: usize>(points: &[Point]) -> [Point; N] {
 
 /// Whether conv(v, a) and conv(v, b) share a point other than v.
 ///
-/// Follow the ray from v through a common point until it leaves one of the two primitives. If v is
-/// in neither conv(a) nor conv(b), the ray leaves each primitive through its face opposite v. So
-/// one of these faces must meet the other primitive. As v is in neither face, that is also
+/// Follow the ray from v through a common point until it leaves one of the two elements. If v is
+/// in neither conv(a) nor conv(b), the ray leaves each element through its face opposite v. So
+/// one of these faces must meet the other element. As v is in neither face, that is also
 /// sufficient.
 fn beyond_vertex(v: &Point, a: Points, b: Points) -> bool {
     if let ([a0, a1], [b0, b1]) = (a.as_slice(), b.as_slice())
@@ -328,7 +328,7 @@ fn beyond_edge(u: &Point, v: &Point, a: &[Point], b: &[Point]) -> bool {
     if same(u, v) {
         return beyond_vertex(u, Points::from_slice(a), Points::from_slice(b));
     }
-    // Off the line uv: seen along the line, each primitive is a wedge, the cone of the directions
+    // Off the line uv: seen along the line, each element is a wedge, the cone of the directions
     // towards its other vertices. Vertices on the line add no direction. Two cones in a plane
     // share a direction if and only if one contains an edge of the other.
     let off_line = |points: &[Point]| {

@@ -61,7 +61,7 @@ pub(super) fn tetrahedra_intersect_by_signs(a: &[Point; 4], b: &[Point; 4]) -> b
 
 /// Whether a closed triangle and a closed tetrahedron (with its inside) share a point.
 ///
-/// Touching counts; degenerate primitives are what they are. Exact for finite coordinates;
+/// Touching counts; degenerate elements are what they are. Exact for finite coordinates;
 /// never panics.
 ///
 /// ```

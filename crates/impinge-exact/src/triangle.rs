@@ -31,7 +31,7 @@ pub fn triangles_intersect(a: &[Point; 3], b: &[Point; 3]) -> bool {
     })
 }
 
-/// Whether both primitives have a vertex with the same coordinates: then they touch. Most pairs
+/// Whether both elements have a vertex with the same coordinates: then they touch. Most pairs
 /// that no filter can settle are such neighbours in a mesh that repeats its vertices.
 pub(super) fn have_common_point(a: &[Point], b: &[Point]) -> bool {
     a.iter().any(|point| b.contains(point))

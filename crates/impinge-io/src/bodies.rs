@@ -10,7 +10,7 @@ pub struct NamedMesh {
     /// The name of a node, an object or a group. `None` if the mesh is all that the file has, and
     /// the file gives it no name.
     pub name: Option<String>,
-    /// Its primitives in the order of the file, and the vertices that they name.
+    /// Its elements in the order of the file, and the vertices that they name.
     pub mesh: Mesh,
 }
 

@@ -150,7 +150,7 @@ impl<'a> Collector<'a> {
         Ok((bodies, summary))
     }
 
-    /// Chooses the primitives that the options ask for, checks that there are some, and welds if
+    /// Chooses the elements that the options ask for, checks that there are some, and welds if
     /// the options say so.
     pub(crate) fn finish(mut self, options: &ReadOptions) -> Result<(Mesh, Summary), Error> {
         let n_polygons_fanned = self.fans.len() as u64;
@@ -171,7 +171,7 @@ impl<'a> Collector<'a> {
             Elements::Triangles(self.triangles)
         };
         if elements.is_empty() {
-            return Err(Error::NoPrimitives {
+            return Err(Error::NoElements {
                 file: self.name.0.to_owned(),
                 wanted,
                 n_vertices: self.positions.len() as u64,

@@ -142,7 +142,7 @@ pub enum Error {
         /// How many there are.
         found: u64,
     },
-    /// A primitive names a vertex that does not exist. Check the index; the message says how the
+    /// An element names a vertex that does not exist. Check the index; the message says how the
     /// format counts.
     #[error(
         "{at}: vertex index {index} is out of range; vertices: {n_vertices}, numbered from {first}"
@@ -177,13 +177,13 @@ pub enum Error {
         /// What is not supported, and the supported alternatives.
         what: String,
     },
-    /// The file has no primitive of the wanted kind. Check that it is a surface or a volume, not
+    /// The file has no element of the wanted kind. Check that it is a surface or a volume, not
     /// points or curves.
     #[error(
         "{}: no {wanted} in this file (vertices: {n_vertices}, triangles: {n_triangles}, tetrahedra: {n_tetrahedra}, lines: {n_lines}, points: {n_points})",
         crate::printable(.file)
     )]
-    NoPrimitives {
+    NoElements {
         /// The file.
         file: String,
         /// What was looked for.

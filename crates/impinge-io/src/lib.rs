@@ -5,11 +5,11 @@
 //! use impinge_io::{ColoredMesh, ReadOptions, read, write_ply};
 //! # fn main() -> Result<(), impinge_io::Error> {
 //! let bunny = read("bunny.ply".as_ref(), &ReadOptions::default())?;
-//! let red = vec![[220, 40, 30]; bunny.n_primitives()];
+//! let red = vec![[220, 40, 30]; bunny.n_elements()];
 //! write_ply("red.ply".as_ref(), &[ColoredMesh {
 //!     positions: &bunny.positions,
 //!     elements: &bunny.elements,
-//!     primitive_colors: Some(&red),
+//!     element_colors: Some(&red),
 //!     colliding: None,
 //!     name: "bunny",
 //! }])?;
@@ -21,7 +21,7 @@
 //! - **Values.** Binary `float` coordinates stay f32. Coordinates in text are read as f64,
 //!   correctly rounded, whatever type a header declares; [`Positions::narrow_if_exact`] converts
 //!   them to f32 if nothing is lost.
-//! - **Order.** Vertices and primitives keep the order of the file. A polygon of n corners becomes
+//! - **Order.** Vertices and elements keep the order of the file. A polygon of n corners becomes
 //!   n - 2 triangles in its place: the fan around its first corner, which covers a convex polygon
 //!   exactly. If the polygon is concave and its fan overlaps itself, as seen along its normal, or
 //!   if it has more than 256 corners, its ears are clipped instead, in `O(n log n)`. A strip

@@ -73,7 +73,7 @@ fn nearest_f32(value: f64) -> f32 {
     value as f32
 }
 
-/// The primitives of a mesh: vertex indices counted from 0, in the order of the file.
+/// The elements of a mesh: vertex indices counted from 0, in the order of the file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Elements {
     /// Three vertices per triangle.
@@ -83,7 +83,7 @@ pub enum Elements {
 }
 
 impl Elements {
-    /// How many primitives there are.
+    /// How many elements there are.
     pub fn len(&self) -> usize {
         match self {
             Elements::Triangles(t) => t.len(),
@@ -91,12 +91,12 @@ impl Elements {
         }
     }
 
-    /// Whether there are no primitives.
+    /// Whether there are no elements.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// All vertex indices, primitive by primitive.
+    /// All vertex indices, element by element.
     pub fn indices(&self) -> &[u32] {
         match self {
             Elements::Triangles(t) => t.as_flattened(),
@@ -112,13 +112,13 @@ impl Elements {
     }
 }
 
-/// One body: vertices and primitives. Readers guarantee that every index is in range and every
+/// One body: vertices and elements. Readers guarantee that every index is in range and every
 /// coordinate is finite.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mesh {
     /// The positions of the vertices.
     pub positions: Positions,
-    /// The vertices of each primitive.
+    /// The vertices of each element.
     pub elements: Elements,
 }
 
@@ -128,8 +128,8 @@ impl Mesh {
         self.positions.len()
     }
 
-    /// How many primitives there are.
-    pub fn n_primitives(&self) -> usize {
+    /// How many elements there are.
+    pub fn n_elements(&self) -> usize {
         self.elements.len()
     }
 }
@@ -180,7 +180,7 @@ impl Weld {
     }
 
     /// Welds the mesh that this welding was computed from: its vertices, and the indices of its
-    /// primitives.
+    /// elements.
     pub fn apply(&self, mesh: &mut Mesh) {
         if self.n_welded() == 0 {
             return;
@@ -217,7 +217,7 @@ impl Weld {
 /// Welds the vertices of `mesh` that are at the same position (compared as numbers, exactly) and
 /// returns how many it removed.
 ///
-/// Primitives keep their number and order, so their ids do not change; primitives whose corners are
+/// Elements keep their number and order, so their ids do not change; elements whose corners are
 /// welded become degenerate and stay. To weld the frames of a sequence in the same way, see
 /// [`Weld`].
 pub fn weld(mesh: &mut Mesh) -> usize {
@@ -231,7 +231,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn weld_keeps_first_occurrences_and_primitive_order() {
+    fn weld_keeps_first_occurrences_and_element_order() {
         let mut mesh = Mesh {
             positions: Positions::F64(vec![
                 [1.0, 0.0, 0.0],

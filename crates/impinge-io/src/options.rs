@@ -1,6 +1,6 @@
 //! Options of reading a mesh, and a summary of what was read.
 
-/// Which primitives to take from a file that has triangles and tetrahedra.
+/// Which elements to take from a file that has triangles and tetrahedra.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Prefer {
     /// The tetrahedra if there are any, else the triangles: files of volumes often repeat the
@@ -20,7 +20,7 @@ pub struct ReadOptions {
     /// here and in all that reads files: files repeat vertices along seams, whose faces would touch
     /// for ever. Arrays are taken as they are.
     pub weld: bool,
-    /// Which primitives to take if the file has both kinds.
+    /// Which elements to take if the file has both kinds.
     pub prefer: Prefer,
     /// The most bytes in memory for data that is smaller in the file: compressed arrays, and glTF
     /// meshes placed many times. 4 GiB by default. In addition, compressed arrays may take at most
@@ -57,7 +57,7 @@ impl ReadOptions {
 #[non_exhaustive]
 pub struct Summary {
     /// Polygons of four corners or more, each of which became several triangles. If it is 0,
-    /// primitive ids are those of the file.
+    /// element ids are those of the file.
     pub n_polygons_fanned: u64,
     /// Lines skipped.
     pub n_lines_skipped: u64,
@@ -85,7 +85,7 @@ pub struct Summary {
 }
 
 impl Summary {
-    /// What readers of primitive numbers should know, or of answers that seem incomplete: a note
+    /// What readers of element numbers should know, or of answers that seem incomplete: a note
     /// per kind. Points and welded vertices are not among them.
     pub fn notes(&self) -> Vec<String> {
         let unit = self.unit.map(|unit| {
@@ -94,7 +94,7 @@ impl Summary {
         let counts = [
             (
                 self.n_polygons_fanned,
-                "polygons split into triangles (primitive numbers count the triangles)",
+                "polygons split into triangles (element numbers count the triangles)",
             ),
             (
                 self.n_triangles_skipped,

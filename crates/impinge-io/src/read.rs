@@ -38,7 +38,7 @@ pub fn read_with_summary(path: &Path, options: &ReadOptions) -> Result<(Mesh, Su
 /// with tetrahedra and files with only one such part are one body, which has the name of its part,
 /// if it has one.
 ///
-/// The primitives of a body are numbered from 0, in the order of the file. Vertices that bodies
+/// The elements of a body are numbered from 0, in the order of the file. Vertices that bodies
 /// share are in each of them.
 ///
 /// # Errors
@@ -107,7 +107,7 @@ pub fn read_tetgen_bytes(
 }
 
 /// Gives all parts of the file at `path` to `then`, before any of them is chosen. A file without
-/// primitives is not an error here.
+/// elements is not an error here.
 pub(crate) fn collect_file<T>(
     path: &Path,
     options: &ReadOptions,

@@ -42,7 +42,7 @@ fn groups_of_an_obj_are_bodies() {
     // are left out.
     let n: Vec<_> = bodies
         .iter()
-        .map(|body| (body.mesh.n_primitives(), body.mesh.n_vertices()))
+        .map(|body| (body.mesh.n_elements(), body.mesh.n_vertices()))
         .collect();
     assert_eq!(n, [(3, 5), (1, 3), (1, 3)]);
     let whole = read_bytes(
@@ -67,7 +67,7 @@ fn objects_come_before_groups() {
         names(&bodies),
         [Some("default"), Some("door"), Some("handle")]
     );
-    assert_eq!(bodies[1].mesh.n_primitives(), 2);
+    assert_eq!(bodies[1].mesh.n_elements(), 2);
 }
 
 #[test]
@@ -77,7 +77,7 @@ fn objects_of_one_name_stay_apart() {
     ));
     let found: Vec<_> = bodies
         .iter()
-        .map(|body| (body.name.as_deref().unwrap(), body.mesh.n_primitives()))
+        .map(|body| (body.name.as_deref().unwrap(), body.mesh.n_elements()))
         .collect();
     // One without faces is none.
     assert_eq!(found, [("x", 2), ("x (2)", 1), ("y", 1), ("x (3)", 1)]);
@@ -98,7 +98,7 @@ fn what_has_no_parts_is_one_body() {
         assert_eq!(names(&bodies), [name]);
         // As it is, with the vertices of no face.
         assert_eq!(
-            (bodies[0].mesh.n_primitives(), bodies[0].mesh.n_vertices()),
+            (bodies[0].mesh.n_elements(), bodies[0].mesh.n_vertices()),
             (2, 6)
         );
     }
@@ -109,7 +109,7 @@ fn faces_before_the_first_name_are_a_body() {
     for word in ["o", "g"] {
         let bodies = obj(&format!("{VERTICES}f 1 2 3\n{word} Y\nf 3 2 4\nf 3 2 6\n"));
         assert_eq!(names(&bodies), [Some("default"), Some("Y")]);
-        let n = bodies.iter().map(|body| body.mesh.n_primitives());
+        let n = bodies.iter().map(|body| body.mesh.n_elements());
         assert_eq!(n.collect::<Vec<_>>(), [1, 2]);
     }
 }
@@ -145,7 +145,7 @@ fn nodes_of_a_glb_are_bodies() {
         .map(|(positions, name)| ColoredMesh {
             positions,
             elements: &elements,
-            primitive_colors: None,
+            element_colors: None,
             colliding: None,
             name,
         })
@@ -161,7 +161,7 @@ fn nodes_of_a_glb_are_bodies() {
         assert_eq!(&body.mesh.positions, positions);
     }
     let whole = read(&path, &ReadOptions::as_they_are()).unwrap();
-    assert_eq!(whole.n_primitives(), 3);
+    assert_eq!(whole.n_elements(), 3);
 }
 
 #[test]

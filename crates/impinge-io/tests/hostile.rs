@@ -435,7 +435,7 @@ fn a_polygon_of_many_corners_is_read_at_once() {
     ] {
         let read = move || read_bytes(text.as_bytes(), format, "file", &ReadOptions::as_they_are());
         let mesh = soon("a polygon", read).unwrap();
-        assert_eq!(mesh.n_primitives(), N - 2, "{format:?}");
+        assert_eq!(mesh.n_elements(), N - 2, "{format:?}");
     }
 }
 

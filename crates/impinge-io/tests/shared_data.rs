@@ -1,4 +1,4 @@
-//! Every mesh of the shared data is read with the numbers of vertices and primitives that its
+//! Every mesh of the shared data is read with the numbers of vertices and elements that its
 //! README states.
 
 use std::path::{Path, PathBuf};
@@ -60,7 +60,7 @@ fn surfaces() {
             start.elapsed().as_secs_f64() * 1e3
         );
         assert_eq!(
-            (mesh.n_vertices(), mesh.n_primitives()),
+            (mesh.n_vertices(), mesh.n_elements()),
             (n_vertices, n_triangles),
             "{file}"
         );
@@ -76,7 +76,7 @@ fn surfaces() {
             "{file}: {n_welded} vertices welded in {:.1} ms",
             start.elapsed().as_secs_f64() * 1e3
         );
-        assert_eq!(mesh.n_primitives(), n_triangles, "{file}");
+        assert_eq!(mesh.n_elements(), n_triangles, "{file}");
     }
 }
 
@@ -92,7 +92,7 @@ fn tetrahedra() {
     ] {
         let mesh = load(&data.join(file));
         assert_eq!(
-            (mesh.n_vertices(), mesh.n_primitives()),
+            (mesh.n_vertices(), mesh.n_elements()),
             (n_vertices, n_tetrahedra),
             "{file}"
         );

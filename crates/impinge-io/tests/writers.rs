@@ -19,7 +19,7 @@ fn colored<'a>(mesh: &'a Mesh, colors: Option<&'a [[u8; 3]]>) -> ColoredMesh<'a>
     ColoredMesh {
         positions: &mesh.positions,
         elements: &mesh.elements,
-        primitive_colors: colors,
+        element_colors: colors,
         colliding: None,
         name: "a \"body\" <1>",
     }
@@ -46,7 +46,7 @@ fn ply_keeps_vertices_ids_and_precision() {
     let path = folder.path().join("a.ply");
     for wide in [false, true] {
         for mesh in [surface(wide), volume(wide)] {
-            let colors = &COLORS[..mesh.n_primitives()];
+            let colors = &COLORS[..mesh.n_elements()];
             write_ply(&path, &[colored(&mesh, Some(colors))]).unwrap();
             assert_eq!(load(&path), mesh);
         }
@@ -158,7 +158,7 @@ fn glb_splits_vertices_where_colors_meet() {
         corners(&read_back)[..18],
         [corners(&mesh), corners(&mesh)].concat()
     );
-    assert_eq!(read_back.n_primitives(), 3 + 3 + 6);
+    assert_eq!(read_back.n_elements(), 3 + 3 + 6);
 
     let bytes = std::fs::read(&path).unwrap();
     let length = u32::from_le_bytes(bytes[12..16].try_into().unwrap()) as usize;
@@ -199,7 +199,7 @@ fn glb_without_bodies_is_a_valid_file_without_meshes() {
     let path = folder.path().join("a.glb");
     write_glb(&path, &[]).unwrap();
     let error = read(&path, &ReadOptions::as_they_are()).unwrap_err();
-    assert!(matches!(error, Error::NoPrimitives { .. }), "{error}");
+    assert!(matches!(error, Error::NoElements { .. }), "{error}");
 }
 
 #[test]
@@ -224,7 +224,7 @@ fn vtu_keeps_vertices_ids_and_precision() {
     let path = folder.path().join("a.vtu");
     for wide in [false, true] {
         for mesh in [surface(wide), volume(wide)] {
-            let flags = vec![true; mesh.n_primitives()];
+            let flags = vec![true; mesh.n_elements()];
             let mesh_out = ColoredMesh {
                 colliding: Some(&flags),
                 ..colored(&mesh, None)
@@ -324,9 +324,8 @@ fn what_does_not_fit_together_is_refused_and_nothing_is_written() {
             .unwrap_err()
             .to_string();
         assert!(
-            message.ends_with(
-                "colours of the primitives of body 'a \"body\" <1>': expected 3, found 2"
-            ),
+            message
+                .ends_with("colours of the elements of body 'a \"body\" <1>': expected 3, found 2"),
             "{message}"
         );
         let flagged = ColoredMesh {

@@ -329,13 +329,13 @@ pub fn _tiles_describe(py: Python<'_>, folder: PathBuf) -> PyResult<Bound<'_, Py
 
 fn describe<'py>(py: Python<'py>, plan: &Plan) -> PyResult<Bound<'py, PyDict>> {
     let files = plan.files().iter().map(|file| file.path.clone());
-    let n: u64 = plan.files().iter().map(|file| file.n_primitives).sum();
+    let n: u64 = plan.files().iter().map(|file| file.n_elements).sum();
     let all = PyDict::new(py);
     all.set_item("plan", format!("{:016x}", plan.id()))?;
     all.set_item("files", PyList::new(py, files)?)?;
     all.set_item("step", plan.is_step())?;
     all.set_item("separation", plan.separation())?;
-    all.set_item("primitives", n)?;
+    all.set_item("elements", n)?;
     all.set_item("tiles", plan.n_tiles())?;
     all.set_item("units", plan.n_units())?;
     Ok(all)
@@ -365,7 +365,7 @@ pub fn _tiles_scatter(
     let all = PyDict::new(py);
     all.set_item("written", scattered.n_written)?;
     all.set_item("kept", scattered.n_kept)?;
-    all.set_item("primitives", scattered.n_primitives)?;
+    all.set_item("elements", scattered.n_elements)?;
     all.set_item("records", scattered.n_records)?;
     Ok(all)
 }
@@ -418,7 +418,7 @@ pub fn _tiles_run<'py>(
     let rows = results.iter().map(|result: &impinge_tiles::TileResult| {
         let row = PyDict::new(py);
         row.set_item("tile", result.tile)?;
-        row.set_item("primitives", result.n_primitives)?;
+        row.set_item("elements", result.n_elements)?;
         row.set_item("pairs", result.n_pairs)?;
         row.set_item("hash", format!("{:016x}", result.hash))?;
         row.set_item("elsewhere", result.n_elsewhere)?;

@@ -69,12 +69,12 @@ pub fn refuse(error: Error, names: Names<'_>) -> PyErr {
             format!("{vertices}: {given} positions given, but body {body} has {expected} vertices")
         }
         Error::VertexIndexOutOfRange {
-            primitive,
+            element,
             index,
             n_vertices,
             ..
         } => format!(
-            "{elements}[{primitive}] names vertex {index}, but {vertices} has {n_vertices} rows"
+            "{elements}[{element}] names vertex {index}, but {vertices} has {n_vertices} rows"
         ),
         _ => return raise(error),
     };

@@ -538,7 +538,7 @@ impl Scene {
     }
 
     fn _n_elements(&self, body: &Bound<'_, PyAny>) -> PyResult<usize> {
-        Ok(self.body(body)?.n_primitives())
+        Ok(self.body(body)?.n_elements())
     }
 
     fn _convex_overlap(
@@ -581,7 +581,7 @@ impl Scene {
     fn __repr__(&self) -> String {
         const SHOWN: usize = 6;
         let bodies = self.inner.bodies();
-        let counts = bodies.map(|(id, body)| (id, body.n_primitives(), body.kind().name()));
+        let counts = bodies.map(|(id, body)| (id, body.n_elements(), body.kind().name()));
         if self.inner.n_bodies() <= SHOWN {
             let each = counts.map(|(id, n, kind)| format!("{id}: {n} {kind}"));
             return format!("Scene({})", each.collect::<Vec<_>>().join(", "));

@@ -8,14 +8,14 @@ use crate::picture::{Face, Normals, Surface};
 /// The two colours of a body, sRGB.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Colors {
-    /// The colour of primitives that collide.
+    /// The colour of elements that collide.
     pub colliding: [u8; 3],
-    /// The colour of all other primitives.
+    /// The colour of all other elements.
     pub other: [u8; 3],
 }
 
 impl Surface {
-    /// A body in its current pose; its `colliding` primitives are coloured and show through.
+    /// A body in its current pose; its `colliding` elements are coloured and show through.
     ///
     /// Triangles are drawn with smooth normals. Tetrahedra are drawn with flat faces: the faces of
     /// only one tetrahedron, and all faces of colliding tetrahedra.
@@ -23,15 +23,15 @@ impl Surface {
     /// # Errors
     /// A number in `colliding` that the body does not have.
     pub fn of_body(body: &Body, colliding: &[u32], colors: Colors) -> Result<Self, Error> {
-        let n_primitives = body.n_primitives();
-        let mut collides = vec![false; n_primitives];
-        for &primitive in colliding {
-            match collides.get_mut(primitive as usize) {
+        let n_elements = body.n_elements();
+        let mut collides = vec![false; n_elements];
+        for &element in colliding {
+            match collides.get_mut(element as usize) {
                 Some(collides) => *collides = true,
                 None => {
-                    return Err(Error::PrimitiveOutOfRange {
-                        primitive,
-                        n_primitives,
+                    return Err(Error::ElementOutOfRange {
+                        element,
+                        n_elements,
                     });
                 }
             }

@@ -29,13 +29,13 @@ pub enum Error {
         /// How many vertices the surface has.
         n_vertices: usize,
     },
-    /// A colliding primitive that the body does not have: the pairs belong to another body.
-    #[error("primitive {primitive} collides, but the body has {n_primitives} primitives")]
-    PrimitiveOutOfRange {
-        /// The primitive as given.
-        primitive: u32,
-        /// How many primitives the body has.
-        n_primitives: usize,
+    /// A colliding element that the body does not have: the pairs belong to another body.
+    #[error("element {element} collides, but the body has {n_elements} elements")]
+    ElementOutOfRange {
+        /// The element as given.
+        element: u32,
+        /// How many elements the body has.
+        n_elements: usize,
     },
     /// A number that no body of a [`Live`](crate::Live) has.
     #[error("body {body} was named, but there are {n_bodies} bodies")]

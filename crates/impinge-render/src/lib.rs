@@ -1,4 +1,4 @@
-//! Pictures of meshes and their colliding primitives, drawn off screen: on the CPU, or with `wgpu`
+//! Pictures of meshes and their colliding elements, drawn off screen: on the CPU, or with `wgpu`
 //! on any GPU.
 //!
 //! A [`Picture`] is plain data: [`Surface`]s with one colour per face, a [`Camera`] and a size.

@@ -378,17 +378,17 @@ impl Live {
         Ok(())
     }
 
-    /// Marks the faces of these primitives and of no others: they get the colliding colour, and
+    /// Marks the faces of these elements and of no others: they get the colliding colour, and
     /// show through.
     ///
     /// # Errors
-    /// No such body; a primitive that it does not have.
-    pub fn mark(&mut self, body: usize, primitives: &[u32]) -> Result<(), Error> {
+    /// No such body; an element that it does not have.
+    pub fn mark(&mut self, body: usize, elements: &[u32]) -> Result<(), Error> {
         let faces = &self.body(body)?.faces;
         let mut words = vec![0u32; faces.len().div_ceil(32)];
-        for &primitive in primitives {
-            check_primitive(faces, primitive)?;
-            for face in faces.of_primitive(primitive) {
+        for &element in elements {
+            check_element(faces, element)?;
+            for face in faces.of_element(element) {
                 words[face / 32] |= 1 << (face % 32);
             }
         }
@@ -401,20 +401,20 @@ impl Live {
         Ok(())
     }
 
-    /// Gives the faces of these primitives colours of their own (sRGB), and takes those of all
+    /// Gives the faces of these elements colours of their own (sRGB), and takes those of all
     /// others away.
     ///
     /// # Errors
-    /// No such body; a primitive that it does not have.
+    /// No such body; an element that it does not have.
     pub fn color(&mut self, body: usize, colors: &[(u32, [u8; 3])]) -> Result<(), Error> {
         let faces = &self.body(body)?.faces;
         let mut words = Vec::new();
         if !colors.is_empty() {
             words.resize(faces.len(), 0u32);
         }
-        for &(primitive, [r, g, b]) in colors {
-            check_primitive(faces, primitive)?;
-            for face in faces.of_primitive(primitive) {
+        for &(element, [r, g, b]) in colors {
+            check_element(faces, element)?;
+            for face in faces.of_element(element) {
                 words[face] = u32::from_le_bytes([r, g, b, 255]);
             }
         }
@@ -683,13 +683,13 @@ impl Targets {
     }
 }
 
-fn check_primitive(faces: &Faces, primitive: u32) -> Result<(), Error> {
-    let n_primitives = faces.n_primitives();
-    match (primitive as usize) < n_primitives {
+fn check_element(faces: &Faces, element: u32) -> Result<(), Error> {
+    let n_elements = faces.n_elements();
+    match (element as usize) < n_elements {
         true => Ok(()),
-        false => Err(Error::PrimitiveOutOfRange {
-            primitive,
-            n_primitives,
+        false => Err(Error::ElementOutOfRange {
+            element,
+            n_elements,
         }),
     }
 }

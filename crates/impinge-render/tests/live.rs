@@ -281,7 +281,7 @@ fn positions_may_come_from_a_buffer_on_the_device() {
 }
 
 #[test]
-fn primitives_may_have_colors_of_their_own() {
+fn elements_may_have_colors_of_their_own() {
     let mut stage = Stage::new(1);
     let body = stage.add(&[triangle(0.0)]);
     stage
@@ -350,7 +350,7 @@ fn bad_requests_name_the_body_and_the_numbers() {
     let text = |error: Result<(), Error>| error.expect_err("refused").to_string();
     assert_eq!(
         text(live.mark(body, &[1])),
-        "primitive 1 collides, but the body has 1 primitives"
+        "element 1 collides, but the body has 1 elements"
     );
     assert_eq!(
         text(live.set_positions(body, &vec![[0.0f32; 3]; 4].into())),

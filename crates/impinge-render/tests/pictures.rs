@@ -499,7 +499,7 @@ fn bad_input_is_refused_by_name() {
         other: GREY,
     };
     let error = Surface::of_body(scene.body(id).unwrap(), &[20], colors).unwrap_err();
-    let text = "primitive 20 collides, but the body has 20 primitives";
+    let text = "element 20 collides, but the body has 20 elements";
     assert_eq!(error.to_string(), text);
 }
 

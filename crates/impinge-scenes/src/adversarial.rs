@@ -1,14 +1,14 @@
 //! Scenes that break methods which are only fast on average.
 //!
 //! Work should be bounded by input plus output. Each scene here violates one hidden assumption of a
-//! method: that primitives have about the same size, that they are spread out, that the scene has a
+//! method: that elements have about the same size, that they are spread out, that the scene has a
 //! volume, that there are few bodies. [`SCENES`] lists them all, to be compared with [`plain`] of
 //! the same size.
 
 use impinge::Error;
 
 use crate::built::BuiltScene;
-use crate::model::{MAX_PRIMITIVES, Mesh, Model, add, count, index, real, to_f32};
+use crate::model::{MAX_ELEMENTS, Mesh, Model, add, count, index, real, to_f32};
 use crate::random::Random;
 use crate::surfaces::{cloth, cube, stand_in};
 
@@ -19,10 +19,10 @@ pub struct Adversarial {
     pub name: &'static str,
     /// The bound that it probes.
     pub probes: &'static str,
-    /// The largest useful number of primitives: beyond it the answer, or the number of overlapping
+    /// The largest useful number of elements: beyond it the answer, or the number of overlapping
     /// boxes, gets too large, or coordinates are no longer exact.
     pub max_n: usize,
-    /// Builds the scene with about this many primitives.
+    /// Builds the scene with about this many elements.
     pub build: fn(usize) -> Result<BuiltScene, Error>,
 }
 
@@ -30,7 +30,7 @@ pub struct Adversarial {
 pub const SCENES: &[Adversarial] = &[
     Adversarial {
         name: "huge-over-small",
-        probes: "one primitive that meets every group costs no more than looking at each once",
+        probes: "one element that meets every group costs no more than looking at each once",
         max_n: 1 << 24,
         build: huge_over_small,
     },
@@ -42,7 +42,7 @@ pub const SCENES: &[Adversarial] = &[
     },
     Adversarial {
         name: "one-cell",
-        probes: "primitives in one grid cell whose boxes are apart do not meet pair by pair",
+        probes: "elements in one grid cell whose boxes are apart do not meet pair by pair",
         max_n: 1 << 22,
         build: one_cell,
     },
@@ -72,7 +72,7 @@ pub const SCENES: &[Adversarial] = &[
     },
     Adversarial {
         name: "outliers",
-        probes: "a few primitives far away do not enlarge the region for all others",
+        probes: "a few elements far away do not enlarge the region for all others",
         max_n: 1 << 24,
         build: outliers,
     },
@@ -123,7 +123,7 @@ pub fn plain(n: usize) -> Result<BuiltScene, Error> {
     BuiltScene::two_body("plain", &stand_in(n / 2), [0.4, 0.01, 0.01])
 }
 
-/// One huge triangle through a body of `n` small ones. Probes that a primitive which meets every
+/// One huge triangle through a body of `n` small ones. Probes that an element which meets every
 /// group costs one look at each group.
 ///
 /// # Errors
@@ -140,7 +140,7 @@ pub fn huge_over_small(n: usize) -> Result<BuiltScene, Error> {
 
 /// A teapot in a stadium: a floor of two triangles 8,192 wide, and on it two bodies of `n / 2`
 /// triangles with a box diagonal of 1 that meet each other and the floor. Probes that a scale set
-/// by the largest primitive, or by the box of the whole scene, is not imposed on small ones.
+/// by the largest element, or by the box of the whole scene, is not imposed on small ones.
 ///
 /// # Errors
 /// As [`plain`].
@@ -187,7 +187,7 @@ pub fn one_cell(n: usize) -> Result<BuiltScene, Error> {
 /// As [`plain`].
 pub fn one_point(n: usize) -> Result<BuiltScene, Error> {
     let mut books = [Mesh::default(), Mesh::default()];
-    let n_pages = 2 * (n.min(MAX_PRIMITIVES) / 2);
+    let n_pages = 2 * (n.min(MAX_ELEMENTS) / 2);
     for page in 0..n_pages {
         let angle = std::f64::consts::TAU * real(page) / real(n_pages);
         let edge = to_f32([angle.cos(), angle.sin(), 0.0]);
@@ -214,7 +214,7 @@ pub fn flat_cloth(n: usize) -> Result<BuiltScene, Error> {
 /// As [`plain`].
 pub fn needle_row(n: usize) -> Result<BuiltScene, Error> {
     let (mut row, mut needles) = (Mesh::default(), Mesh::default());
-    for place in 0..(n / 2).min(MAX_PRIMITIVES) {
+    for place in 0..(n / 2).min(MAX_ELEMENTS) {
         let x = (4.0 * real(place)) as f32;
         row.push([[x, 0.0, 0.0], [x + 2.0, 0.0, 0.0], [x + 1.0, 0.0, 1.0]]);
         let x = x + 1.0;
@@ -315,7 +315,7 @@ fn tumbled_cube(random: &mut Random, centre: [f32; 3], size: f32) -> Model {
 /// As [`plain`].
 pub fn boxes(n_bodies: usize, seed: u64) -> Result<BuiltScene, Error> {
     let mut random = Random::new(seed);
-    let n_bodies = n_bodies.min(MAX_PRIMITIVES / 12);
+    let n_bodies = n_bodies.min(MAX_ELEMENTS / 12);
     let side = real(n_bodies).cbrt() as f32;
     let cubes = (0..n_bodies).map(|_| {
         let centre = random.point(0.0, side);
@@ -327,7 +327,7 @@ pub fn boxes(n_bodies: usize, seed: u64) -> Result<BuiltScene, Error> {
 
 /// Two bodies of `n / 4` triangles and `n / 24` cubes of 12 triangles around and inside them, with
 /// edges from 1/2 down to 1/1024, each size half as likely as the next smaller one. Probes that the
-/// unit of work is neither a body nor the largest primitive.
+/// unit of work is neither a body nor the largest element.
 ///
 /// # Errors
 /// As [`plain`].
@@ -335,7 +335,7 @@ pub fn mixed_sizes(n: usize) -> Result<BuiltScene, Error> {
     let mut random = Random::new(7);
     let large = stand_in(n / 4).scaled(8.0);
     let neighbour = large.translated([3.2, 0.1, 0.1]);
-    let cubes: Vec<Model> = (0..n.min(MAX_PRIMITIVES) / 24)
+    let cubes: Vec<Model> = (0..n.min(MAX_ELEMENTS) / 24)
         .map(|_| {
             // Trailing zeros of random bits: 0 half the time, 1 a quarter of it, and so on.
             let halvings = 10 - random.bits().trailing_zeros().min(9);
@@ -360,7 +360,7 @@ pub fn mixed_sizes(n: usize) -> Result<BuiltScene, Error> {
 pub fn slivers(n: usize) -> Result<BuiltScene, Error> {
     let mut random = Random::new(3);
     let mut bodies = [Mesh::default(), Mesh::default()];
-    for _ in 0..(n / 2).min(MAX_PRIMITIVES) {
+    for _ in 0..(n / 2).min(MAX_ELEMENTS) {
         // Middles are multiples of 2^-12 and half lengths are 2^-2, so ends are exact, and the two
         // slivers with a common middle really share that point.
         let middle: [f32; 3] = std::array::from_fn(|_| (random.unit() * 4096.0).floor() / 4096.0);
@@ -389,7 +389,7 @@ const RINGS: usize = 8;
 /// As [`plain`].
 pub fn machine_parts(n: usize) -> Result<BuiltScene, Error> {
     let per_tube = 2 * AROUND + 2 * (AROUND - 2) + 4 * AROUND * RINGS;
-    let n_tubes = (n / 2).min(MAX_PRIMITIVES).div_ceil(per_tube);
+    let n_tubes = (n / 2).min(MAX_ELEMENTS).div_ceil(per_tube);
     let width = (0.1 * real(n_tubes)) as f32;
     let mut random = Random::new(11);
     let mut parts = [Mesh::default(), Mesh::default()];

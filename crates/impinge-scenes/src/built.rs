@@ -72,11 +72,8 @@ impl BuiltScene {
         Ok(built)
     }
 
-    /// The number of primitives of all bodies together.
-    pub fn n_primitives(&self) -> usize {
-        self.scene
-            .bodies()
-            .map(|(_, body)| body.n_primitives())
-            .sum()
+    /// The number of elements of all bodies together.
+    pub fn n_elements(&self) -> usize {
+        self.scene.bodies().map(|(_, body)| body.n_elements()).sum()
     }
 }

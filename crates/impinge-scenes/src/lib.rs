@@ -1,7 +1,7 @@
 //! Scenes with known structure, shared by tests, benches, demo and viewer.
 //!
 //! * Generators: [`surfaces`] (balls, tori, knots, cloth, boxes), [`solids`] (tetrahedra) and
-//!   [`soup`] (random primitives, on an integer lattice too, where everything is degenerate).
+//!   [`soup`] (random elements, on an integer lattice too, where everything is degenerate).
 //! * [`regular`]: flat and regular surfaces, hard for filters.
 //! * [`deform`]: positions as functions of the rest pose and of time, written into a buffer.
 //! * [`BuiltScene`]: bodies and a query about them, ready for a detector.
@@ -15,7 +15,7 @@
 //! # fn main() -> Result<(), impinge::Error> {
 //! let ball = surfaces::ball(1_000);
 //! let built = BuiltScene::two_body("balls", &ball, [0.9, 0.0, 0.0])?;
-//! assert_eq!(built.n_primitives(), 2_000);
+//! assert_eq!(built.n_elements(), 2_000);
 //! # Ok(()) }
 //! ```
 
@@ -30,5 +30,5 @@ pub mod soup;
 pub mod surfaces;
 
 pub use built::BuiltScene;
-pub use model::{MAX_PRIMITIVES, Model};
+pub use model::{MAX_ELEMENTS, Model};
 pub use random::Random;

@@ -2,9 +2,9 @@
 
 use impinge::{BodyId, Elements, Error, Scene};
 
-/// The most primitives that a generator makes; larger requests are reduced to it, so that vertex
+/// The most elements that a generator makes; larger requests are reduced to it, so that vertex
 /// indices fit in 32 bits.
-pub const MAX_PRIMITIVES: usize = 1 << 30;
+pub const MAX_ELEMENTS: usize = 1 << 30;
 
 /// A mesh: positions and elements.
 #[derive(Debug, Clone, PartialEq)]
@@ -16,8 +16,8 @@ pub struct Model {
 }
 
 impl Model {
-    /// How many primitives it has.
-    pub fn n_primitives(&self) -> usize {
+    /// How many elements it has.
+    pub fn n_elements(&self) -> usize {
         self.elements.len()
     }
 
@@ -126,9 +126,9 @@ impl Mesh {
     }
 }
 
-/// A vertex index. Generators stay below [`MAX_PRIMITIVES`], which needs fewer than 2^32 vertices.
+/// A vertex index. Generators stay below [`MAX_ELEMENTS`], which needs fewer than 2^32 vertices.
 pub(crate) fn index(vertex: usize) -> u32 {
-    u32::try_from(vertex).expect("generators are limited to MAX_PRIMITIVES")
+    u32::try_from(vertex).expect("generators are limited to MAX_ELEMENTS")
 }
 
 /// Rounds a position to nearest in f32. Generators leave double precision only here.

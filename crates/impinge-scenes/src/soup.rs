@@ -1,23 +1,23 @@
-//! Unconnected primitives: random ones, and ones on an integer lattice, where many vertices
+//! Unconnected elements: random ones, and ones on an integer lattice, where many vertices
 //! coincide and many points are collinear or coplanar.
 
 use impinge::Elements;
 
-use crate::model::{MAX_PRIMITIVES, Model, add, index};
+use crate::model::{MAX_ELEMENTS, Model, add, index};
 use crate::random::Random;
 
-/// `n` primitives of `K` vertices each, none of them shared.
+/// `n` elements of `K` vertices each, none of them shared.
 fn separate<const K: usize>(
     n: usize,
     mut corners: impl FnMut() -> [[f32; 3]; K],
 ) -> (Vec<[f32; 3]>, Vec<[u32; K]>) {
-    let n = n.min(MAX_PRIMITIVES);
+    let n = n.min(MAX_ELEMENTS);
     let mut positions = Vec::with_capacity(n * K);
     for _ in 0..n {
         positions.extend(corners());
     }
     let elements = (0..n)
-        .map(|primitive| std::array::from_fn(|corner| index(primitive * K + corner)))
+        .map(|element| std::array::from_fn(|corner| index(element * K + corner)))
         .collect();
     (positions, elements)
 }
@@ -88,7 +88,7 @@ fn lattice_points(k: u32) -> Vec<[f32; 3]> {
 fn web<const K: usize>(n: usize, n_vertices: usize, seed: u64) -> Vec<[u32; K]> {
     let mut random = Random::new(seed);
     let n_vertices = index(n_vertices);
-    (0..n.min(MAX_PRIMITIVES))
+    (0..n.min(MAX_ELEMENTS))
         .map(|_| std::array::from_fn(|_| random.below(n_vertices)))
         .collect()
 }

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::f64::consts::{PI, TAU};
 
-use crate::model::{MAX_PRIMITIVES, Mesh, Model, count, cross, index, normalised, real, to_f32};
+use crate::model::{MAX_ELEMENTS, Mesh, Model, count, cross, index, normalised, real, to_f32};
 
 /// A sphere of radius 0.5 about the origin: the icosahedron, every triangle split in four
 /// `subdivisions` times (at most 12). It has `20 * 4^subdivisions` triangles.
@@ -63,7 +63,7 @@ pub fn bumpy_ball(n_triangles: usize, height: f32) -> Model {
 }
 
 fn ball_mesh(n_triangles: usize) -> Mesh {
-    let n_triangles = n_triangles.clamp(20, MAX_PRIMITIVES);
+    let n_triangles = n_triangles.clamp(20, MAX_ELEMENTS);
     let mut mesh = geodesic((n_triangles / 20).isqrt());
     mesh.split_to(n_triangles, |p| on_sphere(p.map(f64::from)));
     mesh
@@ -236,7 +236,7 @@ impl Default for Knot {
 /// A tube along a torus knot, scaled to a box diagonal of 1 about the origin, with `n_triangles`
 /// triangles: exactly this many for an even number from 96 on, one less for an odd number.
 pub fn torus_knot(n_triangles: usize, knot: Knot) -> Model {
-    let n_triangles = n_triangles.clamp(96, MAX_PRIMITIVES);
+    let n_triangles = n_triangles.clamp(96, MAX_ELEMENTS);
     let (p, q) = (f64::from(knot.p), f64::from(knot.q));
     // Quads are about square if their numbers have the ratio of length to girth.
     let slenderness = p.hypot(q * knot.winding_radius) / knot.tube_radius;

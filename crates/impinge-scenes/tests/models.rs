@@ -44,7 +44,7 @@ fn is_closed(faces: &[[u32; 3]]) -> bool {
 fn euler_number(model: &Model) -> i64 {
     let n_edges = directed_edges(faces(model)).len() / 2;
     let count = |n: usize| i64::try_from(n).expect("small");
-    count(model.n_vertices()) - count(n_edges) + count(model.n_primitives())
+    count(model.n_vertices()) - count(n_edges) + count(model.n_elements())
 }
 
 fn corners<const K: usize>(model: &Model, element: [u32; K]) -> [[f64; 3]; K] {
@@ -118,7 +118,7 @@ fn closed_surfaces_are_closed_face_outward_and_have_their_euler_number() {
         ("cube", surfaces::cube([1.0, 2.0, 3.0], 0.5), 12, 2, 0.125),
     ];
     for (name, model, n_triangles, euler, volume) in cases {
-        assert_eq!(model.n_primitives(), n_triangles, "{name}");
+        assert_eq!(model.n_elements(), n_triangles, "{name}");
         assert!(is_closed(faces(&model)), "{name}");
         assert_eq!(euler_number(&model), euler, "{name}");
         let relative = enclosed_volume(&model) / volume;
@@ -130,14 +130,14 @@ fn closed_surfaces_are_closed_face_outward_and_have_their_euler_number() {
 fn stand_ins_have_exactly_the_triangles_asked_for() {
     for n in [96, 98, 1_000, 69_450, 100_000] {
         let model = surfaces::stand_in(n);
-        assert_eq!(model.n_primitives(), n);
+        assert_eq!(model.n_elements(), n);
         assert!(is_closed(faces(&model)), "{n}");
         assert_eq!(euler_number(&model), 0, "{n}");
         assert!(enclosed_volume(&model) > 0.0, "{n}");
     }
-    assert_eq!(surfaces::stand_in(69_451).n_primitives(), 69_450);
-    assert_eq!(surfaces::ball(15_001).n_primitives(), 15_000);
-    assert_eq!(surfaces::ball(0).n_primitives(), 20);
+    assert_eq!(surfaces::stand_in(69_451).n_elements(), 69_450);
+    assert_eq!(surfaces::ball(15_001).n_elements(), 15_000);
+    assert_eq!(surfaces::ball(0).n_elements(), 20);
 }
 
 #[test]
@@ -173,7 +173,7 @@ fn a_knot_of_another_kind_closes_too() {
 #[test]
 fn a_cloth_has_a_border_and_exact_coordinates() {
     let model = surfaces::cloth(7, 5, 0.25);
-    assert_eq!(model.n_primitives(), 70);
+    assert_eq!(model.n_elements(), 70);
     assert_eq!(model.n_vertices(), 48);
     let edges = directed_edges(faces(&model));
     let n_border = edges
@@ -199,7 +199,7 @@ fn solids_fill_their_volume_with_positive_tetrahedra() {
         ),
     ];
     for (name, model, n_tets, volume, tolerance) in cases {
-        assert_eq!(model.n_primitives(), n_tets, "{name}");
+        assert_eq!(model.n_elements(), n_tets, "{name}");
         let volumes: Vec<f64> = tets(&model)
             .iter()
             .map(|&tet| tet_volume(&model, tet))
@@ -239,7 +239,7 @@ fn soups_repeat_and_lattice_points_are_integers() {
         (soup::lattice_web(500, 3, 3), 3.0),
         (soup::lattice_web_tetrahedra(500, 1, 4), 1.0),
     ] {
-        assert_eq!(model.n_primitives(), 500);
+        assert_eq!(model.n_elements(), 500);
         let coordinates: Vec<f32> = model.positions.iter().flatten().copied().collect();
         assert!(
             coordinates
@@ -248,7 +248,7 @@ fn soups_repeat_and_lattice_points_are_integers() {
         );
         assert!(coordinates.contains(&0.0) && coordinates.contains(&k));
     }
-    // A lattice exists to produce degenerate primitives: there must be some.
+    // A lattice exists to produce degenerate elements: there must be some.
     let web = soup::lattice_web(500, 1, 3);
     assert!(
         faces(&web)

@@ -17,7 +17,7 @@ fn every_adversarial_scene_has_about_its_size() {
     for entry in adversarial::SCENES {
         for n in [600, 6_000] {
             let built = (entry.build)(n).expect(entry.name);
-            let n_built = built.n_primitives();
+            let n_built = built.n_elements();
             assert_eq!(built.name, entry.name);
             assert!(
                 (n / 2..=n + n / 4).contains(&n_built),
@@ -67,14 +67,14 @@ fn scenes_that_should_meet_do() {
         let n = n_pairs(&built);
         assert!(n >= least, "{}: {n}", built.name);
         // The answer is proportional to the input: none of these grows quadratically.
-        assert!(n <= 40 * built.n_primitives(), "{}: {n}", built.name);
+        assert!(n <= 40 * built.n_elements(), "{}: {n}", built.name);
     }
 }
 
 #[test]
 fn boxes_meet_about_one_other_each() {
     let built = adversarial::boxes(300, 1).expect("valid");
-    assert_eq!(built.n_primitives(), 3_600);
+    assert_eq!(built.n_elements(), 3_600);
     assert_eq!(built.bodies.len(), 300);
     let n = n_pairs(&built);
     assert!((300..6_000).contains(&n), "{n}");

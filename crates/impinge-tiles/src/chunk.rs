@@ -1,14 +1,14 @@
-//! Primitives with all the data that a tile needs.
+//! Elements with all the data that a tile needs.
 
 use std::path::Path;
 
 use crate::cells::Bounds;
 use crate::error::Error;
 
-/// The kind of a file's primitives, and the width of their coordinates.
+/// The kind of a file's elements, and the width of their coordinates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Shape {
-    /// Corners per primitive: 3 or 4.
+    /// Corners per element: 3 or 4.
     pub corners: usize,
     /// Bytes per coordinate: 4 or 8.
     pub width: usize,
@@ -17,31 +17,31 @@ pub struct Shape {
 }
 
 impl Shape {
-    /// Positions per primitive: those of its corners in each pose.
+    /// Positions per element: those of its corners in each pose.
     pub fn points(self) -> usize {
         self.corners * self.poses
     }
 
-    /// Bytes per record: the primitive's number, its vertices' numbers, their coordinates.
+    /// Bytes per record: the element's number, its vertices' numbers, their coordinates.
     pub fn stride(self) -> usize {
         4 + 4 * self.corners + 3 * self.width * self.points()
     }
 }
 
-/// Consecutive primitives of one file.
+/// Consecutive elements of one file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Chunk {
-    /// The number of the first primitive.
+    /// The number of the first element.
     pub first: u64,
-    /// Vertex numbers, `corners` per primitive.
+    /// Vertex numbers, `corners` per element.
     pub vertices: Vec<u32>,
-    /// Positions of these vertices: `corners` per primitive; in a step, `corners` at the start and
+    /// Positions of these vertices: `corners` per element; in a step, `corners` at the start and
     /// then as many at the end.
     pub positions: Vec<[f64; 3]>,
 }
 
 impl Chunk {
-    /// The box of each primitive, in a step over both ends.
+    /// The box of each element, in a step over both ends.
     pub fn bounds(&self, shape: Shape) -> impl Iterator<Item = Bounds> {
         self.positions.chunks_exact(shape.points()).map(bounds)
     }
@@ -56,14 +56,14 @@ impl Chunk {
                 let value = self.positions[ix].into_iter().find(bad).unwrap_or_default();
                 Err(Error::Coordinate {
                     path: paths[ix % shape.points() / shape.corners].to_owned(),
-                    primitive: self.first + (ix / shape.points()) as u64,
+                    element: self.first + (ix / shape.points()) as u64,
                     value,
                 })
             }
         }
     }
 
-    /// Appends the record of a primitive of this chunk.
+    /// Appends the record of an element of this chunk.
     pub fn encode(&self, shape: Shape, ix: usize, to: &mut Vec<u8>) {
         let corners = ix * shape.corners..(ix + 1) * shape.corners;
         to.extend(((self.first + ix as u64) as u32).to_le_bytes());
@@ -116,8 +116,8 @@ impl<'a> Record<'a> {
         u32::from_le_bytes(std::array::from_fn(|ix| self.bytes[at + ix]))
     }
 
-    /// The number of the primitive in its file.
-    pub fn primitive(&self) -> u32 {
+    /// The number of the element in its file.
+    pub fn element(&self) -> u32 {
         self.word(0)
     }
 
@@ -140,7 +140,7 @@ impl<'a> Record<'a> {
         })
     }
 
-    /// The box of the primitive, by the same comparisons of the same numbers as in scattering.
+    /// The box of the element, by the same comparisons of the same numbers as in scattering.
     pub fn bounds(&self) -> Bounds {
         let points: [[f64; 3]; 8] =
             std::array::from_fn(|point| self.position(point.min(self.shape.points() - 1)));

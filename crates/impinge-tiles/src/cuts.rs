@@ -1,19 +1,19 @@
-//! The choice of cuts: at medians of a sample of boxes, until a cell holds few enough primitives.
+//! The choice of cuts: at medians of a sample of boxes, until a cell holds few enough elements.
 
 use crate::cells::{Bounds, Cells};
 
 /// A cell is not cut if the two sides together would hold more than this multiple of its
-/// primitives.
+/// elements.
 const MAX_GROWTH: f64 = 1.5;
 
-/// A cell is not cut if the larger side would keep more than this share of its primitives.
+/// A cell is not cut if the larger side would keep more than this share of its elements.
 const MAX_KEPT: f64 = 0.9;
 
 /// The most cuts on the way to a cell.
 const MAX_DEPTH: usize = 64;
 
-/// Cells of about `cap` primitives each, from a sample in which each box stands for `weight`
-/// primitives. The result depends on the sample alone.
+/// Cells of about `cap` elements each, from a sample in which each box stands for `weight`
+/// elements. The result depends on the sample alone.
 pub fn cells(sample: &[Bounds], weight: f64, cap: u64) -> Cells {
     let mut cells = Cells::whole();
     let all: Vec<u32> = (0..sample.len() as u32).collect();

@@ -31,22 +31,22 @@ pub enum Error {
     #[error("cancelled")]
     Cancelled,
     /// A coordinate that is not finite. Its box would lie in no tile.
-    #[error("{}: primitive {primitive} has the coordinate {value:e}: not a finite number", impinge_io::printable(.path))]
+    #[error("{}: element {element} has the coordinate {value:e}: not a finite number", impinge_io::printable(.path))]
     Coordinate {
         /// The mesh file.
         path: PathBuf,
-        /// The primitive, counted from 0.
-        primitive: u64,
+        /// The element, counted from 0.
+        element: u64,
         /// The coordinate.
         value: f64,
     },
-    /// A primitive names a vertex that the file does not have.
-    #[error("{}: primitive {primitive} names vertex {index}, but there are {n_vertices} vertices", impinge_io::printable(.path))]
+    /// An element names a vertex that the file does not have.
+    #[error("{}: element {element} names vertex {index}, but there are {n_vertices} vertices", impinge_io::printable(.path))]
     VertexIndex {
         /// The mesh file.
         path: PathBuf,
-        /// The primitive, counted from 0.
-        primitive: u64,
+        /// The element, counted from 0.
+        element: u64,
         /// The vertex it names.
         index: i64,
         /// How many vertices there are.

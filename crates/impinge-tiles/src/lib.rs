@@ -1,6 +1,6 @@
 //! Scenes larger than memory, or than one machine: exact collision detection tile by tile.
 //!
-//! Space is cut by a kd-tree into half-open cells that fill it. A primitive goes to each cell that
+//! Space is cut by a kd-tree into half-open cells that fill it. An element goes to each cell that
 //! its box touches; a pair belongs to the cell that holds the larger of the two lower corners, axis
 //! by axis. So every pair is found, and no pair twice (the proof is in `cells.rs`). The hash of the
 //! whole answer is the sum of the tiles' hashes.
@@ -12,7 +12,7 @@
 //! | step | reads | writes |
 //! |---|---|---|
 //! | [`Plan::make`] | the meshes | `plan.json`: files, cuts, units of work |
-//! | [`Plan::scatter`] | the meshes, unit by unit | `parts/unit-*.bin`: primitives by tile |
+//! | [`Plan::scatter`] | the meshes, unit by unit | `parts/unit-*.bin`: elements by tile |
 //! | [`Plan::run`] | one tile of every part | `results/tile-*.npy` (rows) and `results/tile-*.json` |
 //! | [`Plan::merge`] | all results | `rows.npy` (sorted) and `answer.json` |
 //!

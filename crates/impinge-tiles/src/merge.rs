@@ -28,13 +28,13 @@ pub struct Merged {
     /// one process, with bodies in the order of files; in a step, to
     /// [`Impacts::hash`](impinge::Impacts::hash).
     pub hash: u64,
-    /// Records of all tiles together: primitives, counted once per tile that they touch.
+    /// Records of all tiles together: elements, counted once per tile that they touch.
     pub n_records: u64,
     /// Tiles that had to be split into pieces.
     pub n_uncut: u64,
     /// The query that all tiles answered, in words.
     pub asked: String,
-    /// The rows `file_a, primitive_a, file_b, primitive_b` (u32, sorted); in a step, a structured
+    /// The rows `file_a, element_a, file_b, element_b` (u32, sorted); in a step, a structured
     /// array of `kind`, `body_a`, `element_a`, `body_b`, `element_b` and `toi`, as
     /// `impinge step --rows` writes it.
     pub rows: PathBuf,
@@ -74,7 +74,7 @@ impl Plan {
         let merged = Merged {
             n_pairs: results.iter().map(|result| result.n_pairs).sum(),
             hash,
-            n_records: results.iter().map(|result| result.n_primitives).sum(),
+            n_records: results.iter().map(|result| result.n_elements).sum(),
             n_uncut: results.iter().filter(|result| result.n_pieces > 1).count() as u64,
             asked: results[0].ask.clone(),
             rows: path,

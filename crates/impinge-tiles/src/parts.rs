@@ -1,13 +1,13 @@
-//! Part files: the primitives of one unit, sorted by tile.
+//! Part files: the elements of one unit, sorted by tile.
 //!
 //! ```text
 //! 0   8 bytes  "IMPTILE1"
 //! 8   u64      the plan's id
 //! 16  u32      number of the unit          20  u32  number of its file
-//! 24  u32      corners per primitive       28  u32  bytes per coordinate
+//! 24  u32      corners per element       28  u32  bytes per coordinate
 //! 32  u32      tiles                       36  u32  1 in a step, else 0
 //! 40  per tile: u64 where its records start, u64 how many there are, u64 checksum
-//!     records: u32 primitive, u32 vertex per corner, 3 coordinates per corner, in a step 3 more per corner at the end
+//!     records: u32 element, u32 vertex per corner, 3 coordinates per corner, in a step 3 more per corner at the end
 //! ```
 //!
 //! All numbers are little-endian. A checksum covers the tile's number, the place and number of its
@@ -83,7 +83,7 @@ impl Plan {
             self.cells
                 .route::<HalfOpen>(&bounds, self.separation, |tile| places.push((tile, ix)));
         }
-        // Sorted by tile, then by primitive.
+        // Sorted by tile, then by element.
         places.sort_unstable();
         let mut table = Vec::with_capacity(n_tiles * ENTRY);
         let mut records = Vec::with_capacity(places.len() * shape.stride());
@@ -140,7 +140,7 @@ impl Plan {
         let shape = self.files[unit.file].shape;
         if n > unit.n as u64 {
             return Err(damaged(&format!(
-                "tile {tile} has {n} records of {} primitives",
+                "tile {tile} has {n} records of {} elements",
                 unit.n
             )));
         }

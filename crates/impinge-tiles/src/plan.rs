@@ -16,7 +16,7 @@ use crate::hash::checksum;
 use crate::source::{self, Source};
 
 /// The version of all files of a folder.
-const VERSION: u64 = 1;
+const VERSION: u64 = 2;
 
 /// The approximate number of boxes in the sample for cuts.
 const SAMPLE: u64 = 500_000;
@@ -30,10 +30,10 @@ type Fingerprint = (u64, u64);
 /// How a plan is made.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlanOptions {
-    /// About how many primitives a tile may hold; one tile is in memory at a time. 2 million by
+    /// About how many elements a tile may hold; one tile is in memory at a time. 2 million by
     /// default: about 600 MB.
     pub cap: u64,
-    /// Primitives per unit of scattering; a thread reads, sorts and writes one unit at a time.
+    /// Elements per unit of scattering; a thread reads, sorts and writes one unit at a time.
     /// 500,000 by default.
     pub chunk: u64,
     /// Whether vertices of one file at exactly the same position are welded, as the program does.
@@ -72,8 +72,8 @@ pub struct File {
     pub path: PathBuf,
     /// In a step, the path of the body's end.
     pub end: Option<PathBuf>,
-    /// How many primitives it has.
-    pub n_primitives: u64,
+    /// How many elements it has.
+    pub n_elements: u64,
     /// How many vertices.
     pub n_vertices: u64,
     pub(crate) reader: String,
@@ -94,7 +94,7 @@ pub struct Plan {
     pub(crate) cells: Cells,
 }
 
-/// A run of primitives of one file: the content of one part file.
+/// A run of elements of one file: the content of one part file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Unit {
     pub file: usize,
@@ -103,10 +103,10 @@ pub(crate) struct Unit {
 }
 
 impl Plan {
-    /// Reads every primitive of `files` once (coordinates must be finite), takes a sample, cuts
+    /// Reads every element of `files` once (coordinates must be finite), takes a sample, cuts
     /// space and writes `plan.json`. With [`step`](PlanOptions::step), files are start, end, start,
     /// end and so on. A folder with exactly the same plan is left as it is. `progress` gets the
-    /// number of primitives done and the total.
+    /// number of elements done and the total.
     ///
     /// # Errors
     /// Files that can't be read, refused coordinates, another plan in the folder, cancellation.
@@ -145,7 +145,7 @@ impl Plan {
             .iter()
             .map(|body| body.open(source::open))
             .collect::<Result<Vec<_>, _>>()?;
-        let total: u64 = sources.iter().map(|source| source.n_primitives()).sum();
+        let total: u64 = sources.iter().map(|source| source.n_elements()).sum();
         let step = (total / SAMPLE).max(1);
         let mut sample = Vec::new();
         let mut done = 0;
@@ -300,7 +300,7 @@ impl Plan {
             (0..file.n_units(chunk) as u64).map(move |unit| Unit {
                 file: ix,
                 first: unit * chunk,
-                n: chunk.min(file.n_primitives - unit * chunk) as usize,
+                n: chunk.min(file.n_elements - unit * chunk) as usize,
             })
         })
     }
@@ -318,7 +318,7 @@ impl Plan {
                 "reader": file.reader,
                 "corners": file.shape.corners,
                 "coordinate_bytes": file.shape.width,
-                "primitives": file.n_primitives,
+                "elements": file.n_elements,
                 "vertices": file.n_vertices,
             });
             for (print, [bytes, checksum]) in file.fingerprints.iter().zip(FINGERPRINTS) {
@@ -372,7 +372,7 @@ impl Plan {
                 end,
                 reader: value.get("reader")?.as_str()?.to_owned(),
                 shape,
-                n_primitives: number(value, "primitives")?,
+                n_elements: number(value, "elements")?,
                 n_vertices: number(value, "vertices")?,
                 fingerprints: fingerprints.collect::<Option<_>>()?,
             })
@@ -407,7 +407,7 @@ impl File {
     }
 
     fn n_units(&self, chunk: u64) -> usize {
-        self.n_primitives.div_ceil(chunk) as usize
+        self.n_elements.div_ceil(chunk) as usize
     }
 
     /// The first of its files that is there and has changed since the plan was made.
@@ -438,8 +438,8 @@ impl File {
             }
         }
         let source = body.open(&mut opened)?;
-        let is_same = (source.shape(), source.n_primitives(), source.n_vertices())
-            == (self.shape, self.n_primitives, self.n_vertices);
+        let is_same = (source.shape(), source.n_elements(), source.n_vertices())
+            == (self.shape, self.n_elements, self.n_vertices);
         match is_same {
             false => Err(changed(&self.path)),
             true if weld && self.end.is_some() => source::weld(source),
@@ -512,7 +512,7 @@ fn file(body: &Paths<'_>, source: &dyn Source) -> Result<File, Error> {
         end: body.end.map(absolute).transpose()?,
         reader: source.reader(),
         shape: source.shape(),
-        n_primitives: source.n_primitives(),
+        n_elements: source.n_elements(),
         n_vertices: source.n_vertices(),
         fingerprints: body
             .all()
@@ -521,7 +521,7 @@ fn file(body: &Paths<'_>, source: &dyn Source) -> Result<File, Error> {
     })
 }
 
-/// Checks all primitives of a file and samples every `step`th of them. If the file turns out to
+/// Checks all elements of a file and samples every `step`th of them. If the file turns out to
 /// hold polygons other than triangles, its source is replaced by one that reads the whole file.
 fn look_at(
     body: &Paths<'_>,
@@ -534,11 +534,11 @@ fn look_at(
 ) -> Result<(), Error> {
     let n_before = sample.len();
     let mut first = 0;
-    while first < source.n_primitives() {
+    while first < source.n_elements() {
         if cancel.is_cancelled() {
             return Err(Error::Cancelled);
         }
-        let n = chunk.min(source.n_primitives() - first);
+        let n = chunk.min(source.n_elements() - first);
         let Some(held) = source.read(first, n as usize)? else {
             *source = body.open(source::open_whole)?;
             sample.truncate(n_before);

@@ -1,4 +1,4 @@
-//! Runs one tile: reads its primitives from all parts, finds the pairs among them, and keeps those
+//! Runs one tile: reads its elements from all parts, finds the pairs among them, and keeps those
 //! that the tile owns.
 
 mod ranges;
@@ -96,8 +96,8 @@ pub struct RunOptions {
 pub struct TileResult {
     /// The tile.
     pub tile: u32,
-    /// Primitives in it.
-    pub n_primitives: u64,
+    /// Elements in it.
+    pub n_elements: u64,
     /// Pairs that belong to it; in a step, first contacts.
     pub n_pairs: u64,
     /// The sum of the hashes of these pairs; see [`hash_rows`]. In a step, a checksum of the rows
@@ -108,7 +108,7 @@ pub struct TileResult {
     /// Pairs that were found here but belong to another tile.
     pub n_elsewhere: u64,
     /// The number of pieces into which the tile was split, every piece tested against every other.
-    /// It is above 1 if its primitives overlap so much that no cut of space separates them.
+    /// It is above 1 if its elements overlap so much that no cut of space separates them.
     pub n_pieces: u64,
     /// Whether the result already existed.
     pub was_kept: bool,
@@ -275,7 +275,7 @@ impl Plan {
         }
         let result = TileResult {
             tile,
-            n_primitives: n as u64,
+            n_elements: n as u64,
             n_pairs: rows.len() as u64,
             hash: hash_rows(rows.iter().copied()),
             step: None,
@@ -290,7 +290,7 @@ impl Plan {
         Ok(result)
     }
 
-    /// Cuts the numbers of a tile's primitives into pieces. The plan aims at `cap` primitives per
+    /// Cuts the numbers of a tile's elements into pieces. The plan aims at `cap` elements per
     /// tile; a tile has more than twice that only if no cut was worth its copies.
     fn pieces(&self, n: usize) -> Vec<Range<usize>> {
         let piece = if n as u64 > 2 * self.cap {
@@ -319,7 +319,7 @@ impl Plan {
             "plan": format!("{:016x}", self.id()),
             "tile": result.tile,
             "asked": result.ask,
-            "primitives": result.n_primitives,
+            "elements": result.n_elements,
             "pairs": result.n_pairs,
             "hash": format!("{:016x}", result.hash),
             "elsewhere": result.n_elsewhere,
@@ -346,7 +346,7 @@ impl Plan {
             let hex = |key: &str| u64::from_str_radix(value.get(key)?.as_str()?, 16).ok();
             let result = TileResult {
                 tile,
-                n_primitives: number("primitives")?,
+                n_elements: number("elements")?,
                 n_pairs: number("pairs")?,
                 hash: hex("hash")?,
                 step: match value.get("names") {

@@ -38,9 +38,9 @@ pub struct Scattered {
     pub n_written: u64,
     /// Parts that already existed.
     pub n_kept: u64,
-    /// Primitives in the parts written.
-    pub n_primitives: u64,
-    /// Records in the parts written: a primitive has one in each tile that its box touches.
+    /// Elements in the parts written.
+    pub n_elements: u64,
+    /// Records in the parts written: an element has one in each tile that its box touches.
     pub n_records: u64,
 }
 
@@ -95,7 +95,7 @@ impl Plan {
                 progress(done.fetch_add(1, Ordering::Relaxed) + 1, mine.len() as u64);
             })?;
             scattered.n_written += todo.len() as u64;
-            scattered.n_primitives += todo.iter().map(|(_, unit)| unit.n as u64).sum::<u64>();
+            scattered.n_elements += todo.iter().map(|(_, unit)| unit.n as u64).sum::<u64>();
             scattered.n_records += n_records;
         }
         Ok(scattered)

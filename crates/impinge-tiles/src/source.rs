@@ -1,6 +1,6 @@
-//! Mesh files as chunks of primitives.
+//! Mesh files as chunks of elements.
 //!
-//! Binary PLY of triangles, binary STL and `.npy` arrays have primitives of equal length on disk,
+//! Binary PLY of triangles, binary STL and `.npy` arrays have elements of equal length on disk,
 //! so any run of them can be read separately. All other formats of `impinge-io` are held in memory
 //! as a whole.
 
@@ -21,27 +21,27 @@ use crate::chunk::{Chunk, Shape, back_to_f32};
 use crate::error::Error;
 use crate::hash::checksum;
 
-/// A mesh file that several threads can read at a time, in runs of primitives.
+/// A mesh file that several threads can read at a time, in runs of elements.
 pub trait Source: Send + Sync {
     /// `ply`, `stl`, `npy` or `whole`; of a step, those of its start and its end with a comma
     /// between them.
     fn reader(&self) -> String;
-    /// The kind of its primitives.
+    /// The kind of its elements.
     fn shape(&self) -> Shape;
-    /// How many primitives there are.
-    fn n_primitives(&self) -> u64;
+    /// How many elements there are.
+    fn n_elements(&self) -> u64;
     /// How many vertices there are.
     fn n_vertices(&self) -> u64;
-    /// Primitives `first..first + n`, which must be in range; `None` if they are not triangles, so
+    /// Elements `first..first + n`, which must be in range; `None` if they are not triangles, so
     /// that the file must be read whole.
     fn read(&self, first: u64, n: usize) -> Result<Option<Chunk>, Error>;
     /// Which vertices have the position of an earlier one. Unless overridden, vertices are the
-    /// corners of primitives in order.
+    /// corners of elements in order.
     fn weld(&self) -> Result<Weld, Error> {
         const BLOCK: u64 = 1 << 18;
         let (mut narrow, mut wide) = (Vec::new(), Vec::new());
-        for first in (0..self.n_primitives()).step_by(BLOCK as usize) {
-            let n = BLOCK.min(self.n_primitives() - first) as usize;
+        for first in (0..self.n_elements()).step_by(BLOCK as usize) {
+            let n = BLOCK.min(self.n_elements() - first) as usize;
             let points = self.read(first, n)?.into_iter().flat_map(|c| c.positions);
             match self.shape().width {
                 4 => narrow.extend(points.map(|point| point.map(back_to_f32))),

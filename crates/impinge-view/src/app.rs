@@ -239,7 +239,7 @@ impl Viewer {
         self.session().map(|session| session.orbit)
     }
 
-    /// The selected body and primitive.
+    /// The selected body and element.
     pub fn selected(&self) -> Option<(usize, u32)> {
         self.session()?.selected
     }

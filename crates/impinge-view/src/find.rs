@@ -11,14 +11,14 @@ use crate::stage::Stage;
 /// More pairs than this are an error, not an answer: no window can show them.
 const MAX_PAIRS: u64 = 20_000_000;
 
-/// The oracle compares every box with every box: beyond this number of primitives it would stop the
+/// The oracle compares every box with every box: beyond this number of elements it would stop the
 /// window.
 pub(crate) const MAX_NAIVE: usize = 40_000;
 
 /// The answer for one frame.
 pub(crate) struct Answer {
     pub pairs: Pairs,
-    /// The colliding primitives of each body.
+    /// The colliding elements of each body.
     pub colliding: Vec<Vec<u32>>,
     pub ms: f64,
     /// Method, backend and threads, for the user.
@@ -60,10 +60,10 @@ impl Finder {
         device: Option<&(wgpu::Device, wgpu::Queue)>,
     ) -> Result<Answer, String> {
         let scene = stage.scene();
-        let n_primitives: usize = scene.bodies().map(|(_, body)| body.n_primitives()).sum();
-        if question.method == Method::Naive && n_primitives > MAX_NAIVE {
+        let n_elements: usize = scene.bodies().map(|(_, body)| body.n_elements()).sum();
+        if question.method == Method::Naive && n_elements > MAX_NAIVE {
             return Err(format!(
-                "the method naive is for at most {MAX_NAIVE} primitives, there are {n_primitives}"
+                "the method naive is for at most {MAX_NAIVE} elements, there are {n_elements}"
             ));
         }
         let started = Instant::now();
@@ -160,7 +160,7 @@ pub(crate) fn nearest(
     }))
 }
 
-/// The faces of each body that are within a distance of another one's, as primitives of triangle
+/// The faces of each body that are within a distance of another one's, as elements of triangle
 /// bodies; pairs of faces that intersect are among them. Also the number of pairs.
 pub(crate) fn near(
     stage: &Stage,

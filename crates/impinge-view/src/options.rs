@@ -24,7 +24,7 @@ pub enum Shows {
     /// All faces.
     #[default]
     Everything,
-    /// The faces of primitives that collide.
+    /// The faces of elements that collide.
     Colliding,
     /// Intersection curves, and no faces.
     Curves,

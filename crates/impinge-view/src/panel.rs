@@ -69,7 +69,7 @@ fn bodies(ui: &mut Ui, session: &mut Session) {
         let shown = &session.stage.content.bodies[ix];
         let [r, g, b] = shown.colors.colliding;
         let held = session.stage.scene().body(shown.id);
-        let n = held.map_or(0, |body| body.n_primitives());
+        let n = held.map_or(0, |body| body.n_elements());
         let n_colliding = match &session.answer {
             Some(answer) => answer.colliding.get(ix).map_or(0, Vec::len),
             None => 0,
@@ -297,7 +297,7 @@ fn shown(ui: &mut Ui, session: &mut Session) {
 }
 
 fn selection(ui: &mut Ui, session: &mut Session) {
-    let Some((body, primitive)) = session.selected else {
+    let Some((body, element)) = session.selected else {
         ui.weak("Click a triangle for its number.");
         return;
     };
@@ -310,9 +310,9 @@ fn selection(ui: &mut Ui, session: &mut Session) {
     let Some(held) = held else {
         return;
     };
-    let corners = held.elements().corners(primitive as usize);
+    let corners = held.elements().corners(element as usize);
     let mut text = format!(
-        "{} {primitive} of {} (body {body})\nvertices {}",
+        "{} {element} of {} (body {body})\nvertices {}",
         kind(held.kind()),
         name(body),
         corners
@@ -324,9 +324,9 @@ fn selection(ui: &mut Ui, session: &mut Session) {
     match partners.len() {
         0 => text.push_str("\ncollides with nothing"),
         n => {
-            text.push_str(&format!("\ncollides with {}:", counted(n, "primitive")));
-            for &(other, primitive) in partners.iter().take(MAX_PARTNERS) {
-                text.push_str(&format!("\n  {primitive} of {}", name(other)));
+            text.push_str(&format!("\ncollides with {}:", counted(n, "element")));
+            for &(other, element) in partners.iter().take(MAX_PARTNERS) {
+                text.push_str(&format!("\n  {element} of {}", name(other)));
             }
             if n > MAX_PARTNERS {
                 text.push_str(&format!("\n  and {} more", n - MAX_PARTNERS));

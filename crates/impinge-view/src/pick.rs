@@ -4,16 +4,16 @@ use impinge_render::Faces;
 
 use crate::stage::Stage;
 
-/// A primitive that a ray meets.
+/// An element that a ray meets.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Hit {
     pub body: usize,
-    pub primitive: u32,
+    pub element: u32,
     /// How far along the ray, in lengths of its direction.
     pub t: f64,
 }
 
-/// The first visible face that a ray meets. With `only`, faces of other primitives are ignored.
+/// The first visible face that a ray meets. With `only`, faces of other elements are ignored.
 pub(crate) fn pick<'a>(
     stage: &Stage,
     faces: impl Fn(usize) -> Option<&'a Faces>,
@@ -27,8 +27,7 @@ pub(crate) fn pick<'a>(
         };
         let positions = body.positions();
         for face in 0..faces.len() {
-            let (Some(corners), Some(primitive)) = (faces.corners(face), faces.primitive(face))
-            else {
+            let (Some(corners), Some(element)) = (faces.corners(face), faces.element(face)) else {
                 continue;
             };
             if faces.is_inner(face) {
@@ -36,7 +35,7 @@ pub(crate) fn pick<'a>(
             }
             let is_shown = only.is_none_or(|only| {
                 only.get(ix)
-                    .is_some_and(|shown| shown.binary_search(&primitive).is_ok())
+                    .is_some_and(|shown| shown.binary_search(&element).is_ok())
             });
             if !is_shown {
                 continue;
@@ -47,7 +46,7 @@ pub(crate) fn pick<'a>(
             {
                 nearest = Some(Hit {
                     body: ix,
-                    primitive,
+                    element,
                     t,
                 });
             }

@@ -7,7 +7,7 @@ use impinge::BodyId;
 use crate::find::Answer;
 use crate::stage::{Stage, include};
 
-/// A group of pairs that are connected by shared primitives or vertices.
+/// A group of pairs that are connected by shared elements or vertices.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Place {
     /// Its bodies, by their numbers.
@@ -27,8 +27,8 @@ pub(crate) fn places(stage: &Stage, answer: &Answer) -> Result<Vec<Place>, Strin
     let places = found.map(|place| {
         let mut bounds = [place.low, place.high];
         let bodies = place.bodies.map(number);
-        for (body, primitive) in bodies.into_iter().zip(place.first) {
-            let corners = stage.primitive_bounds(body, primitive);
+        for (body, element) in bodies.into_iter().zip(place.first) {
+            let corners = stage.element_bounds(body, element);
             for point in corners.into_iter().flatten() {
                 include(&mut bounds, point);
             }

@@ -22,7 +22,7 @@ use crate::stage::{IDENTITY, Matrix, Stage};
 use crate::timeline::{NEWS, Timeline};
 use crate::times::{color, first_times};
 
-/// The colour of primitives within the distance, of the one that is selected, and of its partners.
+/// The colour of elements within the distance, of the one that is selected, and of its partners.
 pub(crate) const NEAR: [u8; 3] = [255, 165, 60];
 pub(crate) const SELECTED: [u8; 3] = [255, 225, 0];
 pub(crate) const PARTNER: [u8; 3] = [0, 170, 120];
@@ -111,12 +111,12 @@ impl Session {
         }
         let mut screen = Screen::new(render)?;
         screen.show(&stage)?;
-        let n_primitives: usize = stage
+        let n_elements: usize = stage
             .scene()
             .bodies()
-            .map(|(_, body)| body.n_primitives())
+            .map(|(_, body)| body.n_elements())
             .sum();
-        if n_primitives == 0 {
+        if n_elements == 0 {
             message
                 .get_or_insert_with(|| "there is nothing to see: no body has elements".to_owned());
         }
@@ -344,7 +344,7 @@ impl Session {
     pub fn under(&mut self, aspect: f64, at: [f64; 2]) -> Option<String> {
         let hit = self.hit(aspect, at)?;
         let name = |body: usize| self.stage.content.bodies[body].name.as_str();
-        let mut text = format!("{}, triangle {}", name(hit.body), hit.primitive);
+        let mut text = format!("{}, triangle {}", name(hit.body), hit.element);
         if self.prober.is_none() {
             self.prober = quiet_detector().ok();
         }
@@ -366,18 +366,15 @@ impl Session {
         self.changed.marks = true;
     }
 
-    /// The partners of the selected primitive.
+    /// The partners of the selected element.
     pub fn partners(&self) -> Vec<(usize, u32)> {
-        let (Some((body, primitive)), Some(answer)) = (self.selected, &self.answer) else {
+        let (Some((body, element)), Some(answer)) = (self.selected, &self.answer) else {
             return Vec::new();
         };
         let Some(id) = self.stage.id(body) else {
             return Vec::new();
         };
-        let own = Element {
-            body: id,
-            element: primitive,
-        };
+        let own = Element { body: id, element };
         let number = |other: Element| {
             let bodies = &self.stage.content.bodies;
             let body = bodies.iter().position(|shown| shown.id == other.body)?;
@@ -450,12 +447,12 @@ impl Session {
         }
     }
 
-    /// Flies to the selected primitive.
+    /// Flies to the selected element.
     pub fn frame_selected(&mut self) {
-        let Some((body, primitive)) = self.selected else {
+        let Some((body, element)) = self.selected else {
             return;
         };
-        if let Some(bounds) = self.stage.primitive_bounds(body, primitive) {
+        if let Some(bounds) = self.stage.element_bounds(body, element) {
             self.fly(bounds, 6.0);
         }
     }
@@ -606,11 +603,11 @@ impl Session {
         if self.shows_impacts {
             self.note = Some(self.color_impacts(&mut marks, &mut colors)?);
         }
-        for (body, primitive) in self.partners() {
-            colors[body].push((primitive, PARTNER));
+        for (body, element) in self.partners() {
+            colors[body].push((element, PARTNER));
         }
-        if let Some((body, primitive)) = self.selected {
-            colors[body].push((primitive, SELECTED));
+        if let Some((body, element)) = self.selected {
+            colors[body].push((element, SELECTED));
         }
         for body in 0..n_bodies {
             let live = &mut self.screen.live;
@@ -652,12 +649,8 @@ impl Session {
                 .body(shown.id)
                 .map_err(|error| error.to_string())?;
             let times = first_times(body, shown.id, &impacts);
-            marks[ix] = times.iter().map(|&(primitive, _)| primitive).collect();
-            colors[ix].extend(
-                times
-                    .iter()
-                    .map(|&(primitive, toi)| (primitive, color(toi))),
-            );
+            marks[ix] = times.iter().map(|&(element, _)| element).collect();
+            colors[ix].extend(times.iter().map(|&(element, toi)| (element, color(toi))));
         }
         Ok(match impacts.earliest() {
             None => "nothing touches before the next frame".to_owned(),

@@ -109,12 +109,12 @@ impl Stage {
         Ok(true)
     }
 
-    /// The lowest and highest coordinates of the corners of a primitive; `None` without such a
+    /// The lowest and highest coordinates of the corners of an element; `None` without such a
     /// body.
-    pub fn primitive_bounds(&self, body: usize, primitive: u32) -> Option<[[f64; 3]; 2]> {
+    pub fn element_bounds(&self, body: usize, element: u32) -> Option<[[f64; 3]; 2]> {
         let body = self.scene().body(self.id(body)?).ok()?;
         let mut bounds = NOTHING;
-        for &vertex in body.elements().corners(primitive as usize) {
+        for &vertex in body.elements().corners(element as usize) {
             include(&mut bounds, body.positions().point(vertex as usize));
         }
         Some(bounds)

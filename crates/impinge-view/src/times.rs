@@ -1,10 +1,10 @@
-//! Times of impact as colours of primitives.
+//! Times of impact as colours of elements.
 
 use std::collections::HashMap;
 
 use impinge::{Body, BodyId, Impacts, Part};
 
-/// The first time of contact of each primitive that touches anything, by itself or by an edge, a
+/// The first time of contact of each element that touches anything, by itself or by an edge, a
 /// vertex or a face of it.
 pub(crate) fn first_times(body: &Body, id: BodyId, impacts: &Impacts) -> Vec<(u32, f64)> {
     let (edges, faces) = (body.part(Part::Edges), body.part(Part::Faces));
@@ -28,8 +28,8 @@ pub(crate) fn first_times(body: &Body, id: BodyId, impacts: &Impacts) -> Vec<(u3
     if times.is_empty() {
         return Vec::new();
     }
-    let first = |primitive: u32| {
-        let corners = body.elements().corners(primitive as usize);
+    let first = |element: u32| {
+        let corners = body.elements().corners(element as usize);
         let n = corners.len();
         let subsets = (1..1usize << n).filter(|set| set.count_ones() <= 3);
         let time = |set: usize| {
@@ -44,12 +44,9 @@ pub(crate) fn first_times(body: &Body, id: BodyId, impacts: &Impacts) -> Vec<(u3
             times.get(&key(&chosen[..count])).copied()
         };
         let earliest = subsets.filter_map(time).reduce(f64::min)?;
-        Some((primitive, earliest))
+        Some((element, earliest))
     };
-    (0u32..)
-        .take(body.n_primitives())
-        .filter_map(first)
-        .collect()
+    (0u32..).take(body.n_elements()).filter_map(first).collect()
 }
 
 fn key(corners: &[u32]) -> [u32; 3] {
@@ -83,7 +80,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_primitive_that_is_hit_first_has_the_earlier_time() {
+    fn the_element_that_is_hit_first_has_the_earlier_time() {
         let mut scene = Scene::new();
         let floor = [[0.0f32, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]];
         let low = scene.add_triangles(&[[0, 1, 2]], &floor).expect("a body");

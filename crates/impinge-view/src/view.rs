@@ -80,7 +80,7 @@ fn pointer(response: &Response, rect: Rect, session: &mut Session) {
         && let Some(at) = response.interact_pointer_pos()
     {
         let hit = session.hit(aspect(rect), in_view(rect, at));
-        session.select(hit.map(|hit| (hit.body, hit.primitive)));
+        session.select(hit.map(|hit| (hit.body, hit.element)));
     }
     if let Some(at) = response.hover_pos() {
         let scrolled = ctx.input(|input| f64::from(input.smooth_scroll_delta().y));

@@ -281,9 +281,9 @@ fn a_click_names_a_triangle_and_its_partners() {
         });
     }
     harness.run_steps(2);
-    let (body, primitive) = harness.state().selected().expect("a triangle is there");
+    let (body, element) = harness.state().selected().expect("a triangle is there");
     let name = ["first", "second"][body];
-    let text = format!("triangle {primitive} of {name} (body {body})");
+    let text = format!("triangle {element} of {name} (body {body})");
     let found = harness.query_all_by_label_contains(&text).count();
     assert_eq!(found, 1, "{text}");
     look(&mut harness, "selected");

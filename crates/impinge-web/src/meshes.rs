@@ -15,7 +15,7 @@ const MAX_EXPANDED_BYTES: u64 = 1 << 30;
 pub struct FileMesh {
     /// The name of the file, or of a node or a group in it.
     pub name: String,
-    /// Vertex numbers, `corners` per primitive.
+    /// Vertex numbers, `corners` per element.
     pub index: Vec<u32>,
     /// One position per vertex, in the file's precision.
     pub positions: Positions,
@@ -39,7 +39,7 @@ pub fn read(name: &str, bytes: &[u8], weld: bool) -> Result<FileMesh, Error> {
 }
 
 /// Reads the bodies of a file, each as a mesh: the nodes of a glTF file, the objects or groups of
-/// an OBJ file. Their maps are of the vertices that their own primitives name.
+/// an OBJ file. Their maps are of the vertices that their own elements name.
 ///
 /// # Errors
 /// As [`read`].

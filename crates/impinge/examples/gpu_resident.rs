@@ -31,7 +31,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
 }
 ";
 
-/// Marks the primitives that take part in a pair. Unsure pairs count as pairs, which is safe. A
+/// Marks the elements that take part in a pair. Unsure pairs count as pairs, which is safe. A
 /// count above the room of its list says that pairs are missing: that frame marks nothing.
 const MARK: &str = "
 struct Pair { low: u32, high: u32 }
@@ -139,10 +139,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         Usage::STORAGE | Usage::COPY_SRC | Usage::COPY_DST,
     );
     let time = buffer("time", &[0; 16], Usage::UNIFORM | Usage::COPY_DST);
-    let n_primitives = 2 * ball.n_primitives();
+    let n_elements = 2 * ball.n_elements();
     let is_hit = buffer(
         "is hit",
-        &vec![0; 4 * n_primitives],
+        &vec![0; 4 * n_elements],
         Usage::STORAGE | Usage::COPY_SRC | Usage::COPY_DST,
     );
     let deform = pipeline(&device, DEFORM);
@@ -203,7 +203,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         queue.submit([encoder.finish()]);
     }
 
-    // The only read-back: did everything fit, how many primitives were hit in the last frame, and
+    // The only read-back: did everything fit, how many elements were hit in the last frame, and
     // how many pairs may have touched on the way to it?
     let is_complete = gpu.grow()?;
     let staging = device.create_buffer(&wgpu::BufferDescriptor {
@@ -225,11 +225,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         .iter()
         .map(|word| u32::from_le_bytes(*word));
     let words: Vec<u32> = words.collect();
-    let (hit, may_touch) = words.split_at(n_primitives);
+    let (hit, may_touch) = words.split_at(n_elements);
     let n_hit: u32 = hit.iter().sum();
     let ms = start.elapsed().as_secs_f64() * 1e3 / f64::from(FRAMES - WARM);
     println!(
-        "{n_hit} of {n_primitives} triangles hit, complete: {is_complete}, {ms:.2} ms per frame"
+        "{n_hit} of {n_elements} triangles hit, complete: {is_complete}, {ms:.2} ms per frame"
     );
     println!(
         "on the way there {} pairs of a vertex and a face and {} pairs of edges may touch, none before t = {}, and one certainly before t = {}",

@@ -35,7 +35,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut scene = Scene::new();
     let a = scene.add((elements.clone(), positions))?;
     let b = scene.add((elements, moved))?;
-    let n = scene.bodies().map(|(_, body)| body.n_primitives()).sum();
+    let n = scene.bodies().map(|(_, body)| body.n_elements()).sum();
     for method in [Method::Clusters, Method::Cells] {
         let mut detector = Detector::new(
             impinge_core::Settings::new()
@@ -77,7 +77,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             let found = two_levels.detect_djb2(&scene, a, b, factor * n)?;
             let missing = Missing::of(&all, found, a, b);
             println!(
-                "    {factor} n slots: {:.4} of primitives missing, {:.4} of pairs",
+                "    {factor} n slots: {:.4} of elements missing, {:.4} of pairs",
                 missing.rate(),
                 missing.pair_rate()
             );

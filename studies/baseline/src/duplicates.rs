@@ -1,9 +1,9 @@
 //! The paper's two levels without impinge's owner rule.
 //!
-//! Two primitives often share several cells, and the pair is then found in each of them. The paper
+//! Two elements often share several cells, and the pair is then found in each of them. The paper
 //! counts how often (section 4.2, table 3: 62 to 83 % of the pairs are checked more than once, 2.11
 //! to 3.72 times on average). It tries a hash table to avoid this, which loses 2.7 to 4.3 % of the
-//! colliding primitives. In impinge only one cell tests each pair, the cell that holds the lower
+//! colliding elements. In impinge only one cell tests each pair, the cell that holds the lower
 //! corner of the pair's common range: nothing is lost, and no table is needed.
 //!
 //! ```
@@ -17,7 +17,7 @@
 //! let checks = two_levels.count(scene, a, b)?;
 //! assert!(checks.average() >= 1.0);
 //! let all = two_levels.detect(scene, a, b)?.clone();
-//! let found = two_levels.detect_djb2(scene, a, b, balls.n_primitives())?;
+//! let found = two_levels.detect_djb2(scene, a, b, balls.n_elements())?;
 //! assert!(Missing::of(&all, found, a, b).rate() < 1.0);
 //! # Ok(()) }
 //! ```
@@ -52,7 +52,7 @@ pub enum Possible {
 pub struct Settings {
     /// The density coefficient λ of the paper's equation (1), above 0.
     pub lambda: f64,
-    /// Primitives per group, 1 to 64.
+    /// Elements per group, 1 to 64.
     pub group_size: u32,
     /// Which pairs are tested.
     pub possible: Possible,
@@ -100,9 +100,9 @@ impl Checks {
 /// The losses of an incomplete answer.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Missing {
-    /// Primitives of both bodies that take part in any pair.
+    /// Elements of both bodies that take part in any pair.
     pub n_colliding: u64,
-    /// Of those, the primitives that the incomplete answer does not name.
+    /// Of those, the elements that the incomplete answer does not name.
     pub n_missing: u64,
     /// Pairs of the complete answer.
     pub n_pairs: u64,
@@ -126,7 +126,7 @@ impl Missing {
         }
     }
 
-    /// Missing primitives divided by colliding primitives, 0 to 1: the paper's missing rate.
+    /// Missing elements divided by colliding elements, 0 to 1: the paper's missing rate.
     pub fn rate(&self) -> f64 {
         self.n_missing as f64 / self.n_colliding.max(1) as f64
     }
@@ -194,7 +194,7 @@ impl TwoLevels {
 
     /// Like [`detect`](TwoLevels::detect), but pairs go through a table of `table_size` slots
     /// before the tests (table 3, "with hash"; the paper has as many slots as there are
-    /// primitives). DJB2 maps each pair to a slot. Of all pairs in a slot only the lowest is
+    /// elements). DJB2 maps each pair to a slot. Of all pairs in a slot only the lowest is
     /// tested, so that the answer does not depend on threads; the others are lost.
     ///
     /// # Errors

@@ -103,7 +103,7 @@ impl UniformGrid {
         &self.settings
     }
 
-    /// Finds all intersecting pairs of primitives of two different bodies, in the current state of
+    /// Finds all intersecting pairs of elements of two different bodies, in the current state of
     /// the scene.
     ///
     /// The device times its stages if it has a clock; `upload`, `decide` and `collect` are stages

@@ -2,7 +2,7 @@
 //!
 //! * [`UniformGrid`]: the parallel spatial hashing of `FWZS11`, as section 2 and section 4.1 of the
 //!   paper ("Real-time Collision Detection with Two-level Spatial Hashing on GPU") describe it: one
-//!   uniform grid with λ = 5, cell-primitive pairs sorted by a radix sort, compaction, all pairs of
+//!   uniform grid with λ = 5, cell-element pairs sorted by a radix sort, compaction, all pairs of
 //!   a cell tested.
 //! * [`duplicates`]: the paper's two levels without impinge's owner rule: pairs are tested in every
 //!   cell where they meet (table 3), or go through a table hashed by DJB2 that loses some of them

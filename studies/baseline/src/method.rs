@@ -1,11 +1,11 @@
 //! Parallel spatial hashing on the CPU: one uniform grid, sorted.
 //!
 //! ```text
-//! bounds    boxes of the bodies, the region where they overlap, primitives that reach it, and their boxes
+//! bounds    boxes of the bodies, the region where they overlap, elements that reach it, and their boxes
 //! grid      resolution by eq. (1) with λ = 5, ranges of cells by eq. (3), entries counted
-//! fill      exclusive sum of the counts; one entry (cell, primitive) for every cell that a box touches
+//! fill      exclusive sum of the counts; one entry (cell, element) for every cell that a box touches
 //! sort      radix sort by cell
-//! compact   cells that have primitives of both bodies, and the slots of their entries
+//! compact   cells that have elements of both bodies, and the slots of their entries
 //! pairing   box tests of all pairs of a cell
 //! narrow    the exact test
 //! collect   sorted, repetitions dropped
@@ -28,11 +28,11 @@ use crate::pairing::{Lists, Run, Scratch};
 use crate::radix::Radix;
 use crate::{Counts, Error, Settings};
 
-/// Primitives, entries and runs per task.
-const PRIMITIVES: usize = 4096;
+/// Elements, entries and runs per task.
+const ELEMENTS: usize = 4096;
 const ENTRIES: usize = 1 << 14;
 const RUNS: usize = 64;
-/// Primitives of body `a` in one run.
+/// Elements of body `a` in one run.
 const GROUP: u32 = impinge_core::bvh::GROUP as u32;
 
 /// The stages and their memory.
@@ -128,7 +128,7 @@ impl Method {
         Ok(())
     }
 
-    /// The grid, the cells that each primitive touches, and how many entries each task makes.
+    /// The grid, the cells that each element touches, and how many entries each task makes.
     fn grid(
         &mut self,
         job: Job<'_>,
@@ -138,10 +138,10 @@ impl Method {
         stats: &mut Stats,
     ) -> Result<Grid, Error> {
         let kept = &mut self.reaching.kept;
-        let n_tasks = kept.len().div_ceil(PRIMITIVES);
+        let n_tasks = kept.len().div_ceil(ELEMENTS);
         self.firsts
             .resize_with(n_tasks.max(self.firsts.len()), Mutex::default);
-        // As in `Cells`, the number of entries is bounded: a huge primitive would touch every cell
+        // As in `Cells`, the number of entries is bounded: a huge element would touch every cell
         // of a fine grid.
         let most = (kept.len() as u64)
             .saturating_mul(MOST_ENTRIES_EACH)
@@ -149,7 +149,7 @@ impl Method {
         let mut grid = Grid::new(region, n_near as u64, settings.lambda);
         loop {
             let parts: Vec<Mutex<&mut [InRegion]>> =
-                kept.chunks_mut(PRIMITIVES).map(Mutex::new).collect();
+                kept.chunks_mut(ELEMENTS).map(Mutex::new).collect();
             let firsts = &self.firsts;
             job.workers.for_each(&mut self.scratches, n_tasks, |_, ix| {
                 let mut n_entries = 0;
@@ -169,9 +169,9 @@ impl Method {
                 return Ok(grid);
             }
             let Some(coarser) = grid.coarser() else {
-                // Even one cell, where every primitive has one entry, has too many entries.
+                // Even one cell, where every element has one entry, has too many entries.
                 return Err(Error::TooMany {
-                    what: "cell-primitive pairs",
+                    what: "cell-element pairs",
                     given: n_entries,
                     limit: most,
                 });
@@ -181,10 +181,10 @@ impl Method {
         }
     }
 
-    /// The entries, in the order of primitives.
+    /// The entries, in the order of elements.
     fn fill(&mut self, job: Job<'_>, grid: &Grid) {
         let kept = &self.reaching.kept;
-        let n_tasks = kept.len().div_ceil(PRIMITIVES);
+        let n_tasks = kept.len().div_ceil(ELEMENTS);
         // The count was checked to fit in 32 bits.
         self.entries.clear();
         self.entries.resize(self.counts.n_entries as usize, 0);
@@ -202,8 +202,8 @@ impl Method {
         job.workers.for_each(&mut self.scratches, n_tasks, |_, ix| {
             let mut slots = slots[ix + 1].lock().expect("no task panics");
             let mut slots = slots.iter_mut();
-            let first = ix * PRIMITIVES;
-            for (slot, kept) in (first as u64..).zip(kept[first..].iter().take(PRIMITIVES)) {
+            let first = ix * ELEMENTS;
+            for (slot, kept) in (first as u64..).zip(kept[first..].iter().take(ELEMENTS)) {
                 for_cells(&kept.range, |cell| {
                     let entry = slots.next().expect("counted before");
                     *entry = (grid.index(cell) as u64) << 32 | slot;
@@ -212,13 +212,13 @@ impl Method {
         });
     }
 
-    /// Cells with primitives of both bodies, as runs of the sorted entries.
+    /// Cells with elements of both bodies, as runs of the sorted entries.
     fn compact(&mut self, job: Job<'_>) {
         let entries = &self.entries[..];
         let n_tasks = entries.len().div_ceil(ENTRIES);
         self.parts
             .resize_with(n_tasks.max(self.parts.len()), Mutex::default);
-        // Kept primitives of the first body come first.
+        // Kept elements of the first body come first.
         let kept = &self.reaching.kept;
         let first_of_b = kept.partition_point(|kept| kept.part.index() == 0) as u64;
         let parts = &self.parts;

@@ -1,8 +1,8 @@
-//! All pairs of a cell: every primitive of one body against every primitive of the other.
+//! All pairs of a cell: every element of one body against every element of the other.
 //!
 //! In: runs of the sorted entries. Out: candidates, which the exact test decides in runs of about a
 //! thousand, while they are in the cache. A small cell is two loops of box tests. In a larger one
-//! the boxes of 64 primitives of `b` are laid out in lanes, and a primitive of `a` is tested
+//! the boxes of 64 elements of `b` are laid out in lanes, and an element of `a` is tested
 //! against 8 or 16 of them at a time. Cost: `n_a n_b` box tests per cell. The method culls nothing
 //! before them.
 
@@ -20,7 +20,7 @@ use impinge_core::simd::{Isa, LaneBounds, masks};
 /// Up to this many box tests, laying out lanes does not pay.
 const FEW: usize = 24;
 
-/// The entries of one cell with primitives of both bodies, with at most one group of `a`.
+/// The entries of one cell with elements of both bodies, with at most one group of `a`.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Run {
     pub cell: u32,

@@ -1,13 +1,13 @@
-//! A radix sort of cell-primitive pairs: least significant digit first, stable, on all threads.
+//! A radix sort of cell-element pairs: least significant digit first, stable, on all threads.
 //!
-//! In: entries `cell << 32 | primitive`. Out: the same entries, sorted by cell, and within a cell
+//! In: entries `cell << 32 | element`. Out: the same entries, sorted by cell, and within a cell
 //! in the original order. The sort uses only as many bits as cells have, in as few digits as
 //! possible:
 //!
 //! ```text
 //!  63        48 47    41 40    32 31                0
 //! +------------+--------+--------+-------------------+
-//! |     0      | digit 1| digit 0|     primitive     |     2^16 … 2^18 cells: two digits of 8 or 9 bits
+//! |     0      | digit 1| digit 0|     element     |     2^16 … 2^18 cells: two digits of 8 or 9 bits
 //! +------------+--------+--------+-------------------+
 //! ```
 //!

@@ -15,7 +15,7 @@ pub struct Settings {
     /// Whether a pair is tested in only one of its common cells, as in impinge. The method as
     /// described has no such rule: a pair is tested in every common cell.
     pub owner_rule: bool,
-    /// Whether impinge's coarse map drops primitives that the other body comes nowhere near, before
+    /// Whether impinge's coarse map drops elements that the other body comes nowhere near, before
     /// the grid. The method as described has no such map.
     pub coarse_map: bool,
     /// CPU threads; 0 means one per core.
@@ -42,15 +42,15 @@ impl Default for Settings {
 pub struct Counts {
     /// Cells along x, y, z; 0 if the bodies' boxes do not overlap.
     pub resolution: [u32; 3],
-    /// Primitives that reach the region where the bodies' boxes overlap.
+    /// Elements that reach the region where the bodies' boxes overlap.
     pub n_reaching: u64,
-    /// Cell-primitive pairs: a primitive is counted once per cell.
+    /// Cell-element pairs: an element is counted once per cell.
     pub n_entries: u64,
-    /// Cells with primitives of both bodies.
+    /// Cells with elements of both bodies.
     pub n_mixed_cells: u64,
     /// Pairs of boxes tested: `n_a n_b` summed over cells.
     pub n_box_tests: u64,
-    /// Pairs of primitives tested exactly, including repetitions.
+    /// Pairs of elements tested exactly, including repetitions.
     pub n_tests: u64,
     /// Of those, the pairs that floating-point filters left to exact arithmetic.
     pub n_unsure: u64,
@@ -70,7 +70,7 @@ impl Counts {
 #[derive(Debug, Clone, Copy)]
 pub struct Outcome<'a> {
     /// The pairs, sorted, each once; stages in milliseconds are in its statistics, and
-    /// [`Pairs::colliding`] has the colliding primitives of a body.
+    /// [`Pairs::colliding`] has the colliding elements of a body.
     pub pairs: &'a Pairs,
     /// The counts.
     pub counts: Counts,
@@ -103,11 +103,11 @@ impl UniformGrid {
         &self.settings
     }
 
-    /// Finds all intersecting pairs of primitives of two different bodies, in the current state of
+    /// Finds all intersecting pairs of elements of two different bodies, in the current state of
     /// the scene.
     ///
     /// # Errors
-    /// A stale id, one body named twice, refused positions; 2^32 cell-primitive pairs or more.
+    /// A stale id, one body named twice, refused positions; 2^32 cell-element pairs or more.
     pub fn detect(&mut self, scene: &Scene, a: BodyId, b: BodyId) -> Result<Outcome<'_>, Error> {
         let UniformGrid {
             settings,

@@ -189,7 +189,7 @@ fn a_huge_table_loses_nothing() {
 }
 
 #[test]
-fn missing_is_counted_in_primitives_and_in_pairs() {
+fn missing_is_counted_in_elements_and_in_pairs() {
     let ball = surfaces::ball(500);
     let balls = BuiltScene::two_body("balls", &ball, [0.5, 0.0, 0.0]).unwrap();
     let (a, b) = (balls.bodies[0], balls.bodies[1]);

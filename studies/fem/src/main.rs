@@ -129,7 +129,7 @@ fn files(folder: &Path, name: &str, simulation: &Simulation) -> Result<Pc2Writer
     let mesh = ColoredMesh {
         positions: &impinge_io::Positions::F32(positions(simulation)?),
         elements: &impinge_io::Elements::Tetrahedra(tets),
-        primitive_colors: None,
+        element_colors: None,
         colliding: None,
         name,
     };

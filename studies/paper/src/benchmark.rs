@@ -13,7 +13,7 @@ use crate::report::{Moment, Scene};
 use crate::samples::Samples;
 use crate::sweep::{contestants, sweep};
 
-/// The most primitives for which the oracle runs: its quadratic cost is then about a second.
+/// The most elements for which the oracle runs: its quadratic cost is then about a second.
 const MOST_FOR_ORACLE: usize = 40_000;
 
 /// Runs all frames of a course with all contestants.
@@ -49,8 +49,8 @@ pub(crate) fn run(
     };
     let (frame, rows) = fullest;
     course.pose(frame)?;
-    let n_primitives = course.n_primitives();
-    let is_small = n_primitives.iter().sum::<usize>() <= MOST_FOR_ORACLE;
+    let n_elements = course.n_elements();
+    let is_small = n_elements.iter().sum::<usize>() <= MOST_FOR_ORACLE;
     let mut runs = contest.runs();
     if is_small && find(course, Method::Naive, control)? != rows {
         // The first contestant is wrong, and so are all that agree with it.
@@ -68,7 +68,7 @@ pub(crate) fn run(
             true => "tetrahedron".to_owned(),
             false => "triangle".to_owned(),
         },
-        n_primitives,
+        n_elements,
         n_frames: moments.len(),
         n_pairs: counts(|moment| moment.n_pairs),
         n_colliding: counts(|moment| moment.n_colliding),

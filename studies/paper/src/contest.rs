@@ -197,15 +197,15 @@ pub(crate) fn papers_lambda(method: Method) -> Option<f64> {
     }
 }
 
-/// The number of primitives in all bodies together that take part in a pair.
+/// The number of elements in all bodies together that take part in a pair.
 pub(crate) fn n_colliding(rows: &[[u32; 4]]) -> usize {
     let ends = rows
         .iter()
         .flat_map(|&[body_a, a, body_b, b]| [(body_a, a), (body_b, b)]);
-    let mut primitives: Vec<(u32, u32)> = ends.collect();
-    primitives.sort_unstable();
-    primitives.dedup();
-    primitives.len()
+    let mut elements: Vec<(u32, u32)> = ends.collect();
+    elements.sort_unstable();
+    elements.dedup();
+    elements.len()
 }
 
 #[cfg(test)]
@@ -280,7 +280,7 @@ mod tests {
     }
 
     #[test]
-    fn colliding_primitives_are_counted_once() {
+    fn colliding_elements_are_counted_once() {
         assert_eq!(n_colliding(&[[0, 1, 1, 1], [0, 1, 1, 2], [0, 3, 1, 2]]), 4);
     }
 }

@@ -38,10 +38,10 @@ pub(crate) trait Course {
         Query::between(a, b)
     }
 
-    /// Primitives of each body.
-    fn n_primitives(&self) -> Vec<usize> {
+    /// Elements of each body.
+    fn n_elements(&self) -> Vec<usize> {
         let bodies = self.scene().bodies();
-        bodies.map(|(_, body)| body.n_primitives()).collect()
+        bodies.map(|(_, body)| body.n_elements()).collect()
     }
 }
 

@@ -165,10 +165,10 @@ pub(crate) fn range(values: &[f64]) -> String {
     }
 }
 
-/// A primitive count as "15,000 x2".
-pub(crate) fn twice(n_primitives: &[usize]) -> String {
-    match n_primitives {
-        // Meshes have far fewer than 2^53 primitives.
+/// An element count as "15,000 x2".
+pub(crate) fn twice(n_elements: &[usize]) -> String {
+    match n_elements {
+        // Meshes have far fewer than 2^53 elements.
         [a, b] if a == b => format!("{} x2", count(*a as f64)),
         all => all
             .iter()

@@ -24,7 +24,7 @@ const N_FRAMES: usize = 40;
 const N_FRAMES_OF_SIZES: usize = 8;
 const N_FRAMES_QUICK: usize = 2;
 
-/// Sizes of the table in figure 7, as powers of two times the number of primitives.
+/// Sizes of the table in figure 7, as powers of two times the number of elements.
 const SIZES: std::ops::RangeInclusive<i32> = -3..=5;
 
 /// The two ways to read the paper: which pairs of a cell are tested.
@@ -53,7 +53,7 @@ pub(crate) fn table(
 ) -> Result<Vec<Duplicates>, Error> {
     let frames = frames(course, options, N_FRAMES);
     let [a, b] = course.bodies();
-    let n_primitives: usize = course.n_primitives().iter().sum();
+    let n_elements: usize = course.n_elements().iter().sum();
     let mut rows = Vec::new();
     for possible in WAYS {
         let mut two_levels = two_levels(options, possible)?;
@@ -68,7 +68,7 @@ pub(crate) fn table(
             if ix == 0 {
                 // An untimed run first, so that the timed ones do not grow memory.
                 two_levels.detect(scene, a, b)?;
-                two_levels.detect_djb2(scene, a, b, n_primitives)?;
+                two_levels.detect_djb2(scene, a, b, n_elements)?;
                 owner.detect(scene, &query)?;
             }
             // Another way starts each time, because the first one finds the least data in the
@@ -80,7 +80,7 @@ pub(crate) fn table(
                     0 => timed(&mut answers[way], || owner.detect(scene, &query)),
                     1 => timed(&mut answers[way], || two_levels.detect(scene, a, b)),
                     _ => timed(&mut answers[way], || {
-                        two_levels.detect_djb2(scene, a, b, n_primitives)
+                        two_levels.detect_djb2(scene, a, b, n_elements)
                     }),
                 }?;
                 columns[way].add(ms, &answers[way], [a, b]);
@@ -101,7 +101,7 @@ pub(crate) fn table(
             scene: course.name().name().to_owned(),
             has_box_test: possible == Possible::Boxes,
             n_frames: frames.len(),
-            table_size: n_primitives as u64,
+            table_size: n_elements as u64,
             n_candidates: checks.n_pairs as f64 / frames.len().max(1) as f64,
             share_repeated: checks.repeated_share(),
             times_checked: checks.average(),
@@ -128,11 +128,11 @@ pub(crate) fn table_sizes(
 ) -> Result<TableSizes, Error> {
     let frames = frames(course, options, N_FRAMES_OF_SIZES);
     let [a, b] = course.bodies();
-    let n_primitives: usize = course.n_primitives().iter().sum();
+    let n_elements: usize = course.n_elements().iter().sum();
     let sizes: Vec<usize> = SIZES
         .map(|power| match power {
-            ..0 => n_primitives >> -power,
-            _ => n_primitives << power,
+            ..0 => n_elements >> -power,
+            _ => n_elements << power,
         })
         .map(|size| size.max(1))
         .collect();
@@ -154,7 +154,7 @@ pub(crate) fn table_sizes(
     Ok(TableSizes {
         scene: course.name().name().to_owned(),
         n_frames: frames.len(),
-        n_primitives: n_primitives as u64,
+        n_elements: n_elements as u64,
         points: sizes
             .into_iter()
             .zip(missing)

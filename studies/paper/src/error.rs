@@ -19,9 +19,9 @@ pub enum Error {
         path: PathBuf,
         /// The scene for which it was given.
         scene: &'static str,
-        /// The needed kind of primitives.
+        /// The needed kind of elements.
         needed: &'static str,
-        /// The kind of primitives in the file.
+        /// The kind of elements in the file.
         found: &'static str,
     },
     /// A detection failed, or was cancelled.

@@ -160,7 +160,7 @@ fn lambda(report: &Report, method: Method, is_gpu: bool) -> Option<Curves> {
 
 fn table_sizes(report: &Report) -> Option<Curves> {
     let sizes = report.table_sizes.as_ref()?;
-    let whole = sizes.n_primitives as f64;
+    let whole = sizes.n_elements as f64;
     let curve = |name: &str, color, rate: &dyn Fn(&crate::report::TableSize) -> f64| Curve {
         name: name.to_owned(),
         color,
@@ -173,7 +173,7 @@ fn table_sizes(report: &Report) -> Option<Curves> {
     };
     let most = sizes.points.iter().map(|point| point.missing_rate);
     let papers = published::duplicates(&sizes.scene);
-    // Sizes are the number of primitives times powers of two.
+    // Sizes are the number of elements times powers of two.
     let tick = |power: i32| {
         let label = match power {
             ..0 => format!("1/{}", 1 << -power),
@@ -184,7 +184,7 @@ fn table_sizes(report: &Report) -> Option<Curves> {
     Some(Curves {
         title: format!("Hash table, {}: losses against its size", sizes.scene),
         x: Axis {
-            name: "slots of the table / primitives of both bodies".to_owned(),
+            name: "slots of the table / elements of both bodies".to_owned(),
             is_log: true,
             ticks: (-3..=5).map(tick).collect(),
         },

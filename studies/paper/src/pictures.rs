@@ -1,4 +1,4 @@
-//! Figures 4 and 6: one frame of each benchmark with colliding primitives in red and blue.
+//! Figures 4 and 6: one frame of each benchmark with colliding elements in red and blue.
 
 use crate::course::Course;
 use crate::error::Error;
@@ -53,14 +53,14 @@ impl Painter {
         false
     }
 
-    /// Draws the bodies in their current pose, with the primitives of these pairs coloured. Returns
+    /// Draws the bodies in their current pose, with the elements of these pairs coloured. Returns
     /// the file's name.
     #[cfg(not(feature = "gpu"))]
     pub fn paint(&mut self, _: &dyn Course, _: &[[u32; 4]]) -> Result<Option<String>, Error> {
         Ok(None)
     }
 
-    /// Draws the bodies in their current pose, with the primitives of these pairs coloured. Returns
+    /// Draws the bodies in their current pose, with the elements of these pairs coloured. Returns
     /// the file's name.
     #[cfg(feature = "gpu")]
     pub fn paint(

@@ -61,7 +61,7 @@ pub struct Duplicates {
     pub n_colliding_without: u64,
     /// "#CT (with hash)".
     pub n_colliding_with: u64,
-    /// "#Missing rate": missing collisions divided by colliding primitives.
+    /// "#Missing rate": missing collisions divided by colliding elements.
     pub missing_rate: f64,
     /// "#MCT": share of pairs that are checked more than once.
     pub share_repeated: f64,

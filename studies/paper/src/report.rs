@@ -46,13 +46,13 @@ pub struct Scene {
     pub motion: String,
     /// `"triangle"` or `"tetrahedron"`.
     pub kind: String,
-    /// Primitives of each body.
-    pub n_primitives: Vec<usize>,
+    /// Elements of each body.
+    pub n_elements: Vec<usize>,
     /// Frames, or steps, that were run.
     pub n_frames: usize,
     /// Pairs per frame.
     pub n_pairs: Samples,
-    /// Primitives of both bodies that take part in a pair, per frame.
+    /// Elements of both bodies that take part in a pair, per frame.
     pub n_colliding: Samples,
     /// The sum of the frames' hashes: 16 hexadecimal digits.
     pub hash: String,
@@ -77,7 +77,7 @@ pub struct Moment {
     pub frame: usize,
     /// Pairs.
     pub n_pairs: usize,
-    /// Colliding primitives of both bodies.
+    /// Colliding elements of both bodies.
     pub n_colliding: usize,
 }
 
@@ -118,9 +118,9 @@ pub struct Run {
     pub n_cells: Samples,
     /// Cells that went through the second level.
     pub n_subdivided: Samples,
-    /// Entries of the cell lists; a primitive is counted once per cell.
+    /// Entries of the cell lists; an element is counted once per cell.
     pub n_entries: Samples,
-    /// Pairs of primitives that are tested exactly, including repetitions.
+    /// Pairs of elements that are tested exactly, including repetitions.
     pub n_candidates: Samples,
     /// Candidates that the floating-point filter left to exact arithmetic.
     pub n_unsure: Samples,
@@ -177,13 +177,13 @@ pub struct Duplicates {
     pub ms_with: Samples,
     /// Milliseconds per frame with the owner rule.
     pub ms_owner: Samples,
-    /// Colliding primitives per frame if every cell tests its pairs.
+    /// Colliding elements per frame if every cell tests its pairs.
     pub n_colliding_without: f64,
-    /// Colliding primitives per frame with the table.
+    /// Colliding elements per frame with the table.
     pub n_colliding_with: f64,
-    /// Colliding primitives per frame with the owner rule.
+    /// Colliding elements per frame with the owner rule.
     pub n_colliding_owner: f64,
-    /// Share of the colliding primitives that the table loses.
+    /// Share of the colliding elements that the table loses.
     pub missing_rate: f64,
     /// Share of the pairs that the table loses.
     pub missing_rate_of_pairs: f64,
@@ -200,8 +200,8 @@ pub struct TableSizes {
     pub scene: String,
     /// The number of measured frames.
     pub n_frames: usize,
-    /// Primitives of both bodies: the paper's size of the table.
-    pub n_primitives: u64,
+    /// Elements of both bodies: the paper's size of the table.
+    pub n_elements: u64,
     /// Sizes with their losses.
     pub points: Vec<TableSize>,
 }
@@ -211,11 +211,11 @@ pub struct TableSizes {
 pub struct TableSize {
     /// Slots.
     pub table_size: u64,
-    /// Share of the colliding primitives that is lost.
+    /// Share of the colliding elements that is lost.
     pub missing_rate: f64,
     /// Share of the pairs that is lost.
     pub missing_rate_of_pairs: f64,
-    /// Share of the colliding primitives that is lost if boxes are tested before the table.
+    /// Share of the colliding elements that is lost if boxes are tested before the table.
     pub missing_rate_with_box_test: f64,
 }
 

@@ -39,7 +39,7 @@ impl Folder {
         let mesh = ColoredMesh {
             positions: &Positions::F32(model.positions.clone()),
             elements: &impinge_io::Elements::Triangles(faces.clone()),
-            primitive_colors: None,
+            element_colors: None,
             colliding: None,
             name,
         };
@@ -141,7 +141,7 @@ fn the_quick_report_agrees_with_itself() {
         assert!(list(&sweep["points"]).len() > 3);
     }
     let ball = &surfaces[0];
-    assert_eq!(ball["n_primitives"], serde_json::json!([15_000, 15_000]));
+    assert_eq!(ball["n_elements"], serde_json::json!([15_000, 15_000]));
     assert_eq!(ball["n_frames_of_oracle"], 1);
 
     let rows = list(&report["duplicates"]);
@@ -217,7 +217,7 @@ fn a_stand_in_says_so_and_a_mesh_given_is_taken() {
     };
     let stand_in = scene(&[], "stand-in");
     assert_eq!(stand_in["is_stand_in"], true);
-    assert_eq!(stand_in["n_primitives"][0], 69_450);
+    assert_eq!(stand_in["n_elements"][0], 69_450);
     let text = std::fs::read_to_string(folder.path("stand-in/report.md")).unwrap();
     assert!(text.contains("**a generated stand-in**") && text.contains("**Stand-ins.**"));
     assert!(text.contains("only the CPU was requested"));
@@ -226,7 +226,7 @@ fn a_stand_in_says_so_and_a_mesh_given_is_taken() {
     for given in ["mine.ply", "bunny=mine.ply"] {
         let mine = scene(&["--mesh", given, "--lambda", "3"], "mine");
         assert_eq!(
-            (&mine["is_stand_in"], &mine["n_primitives"][0]),
+            (&mine["is_stand_in"], &mine["n_elements"][0]),
             (&Value::Bool(false), &Value::from(3_000))
         );
         let lambdas = numbers(&mine["runs"], "lambda");

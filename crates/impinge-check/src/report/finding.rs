@@ -13,9 +13,9 @@ use crate::text::several;
 pub enum Finding {
     /// Pairs that also meet outside their common vertices, edge or face.
     SelfIntersections,
-    /// Primitives of zero area or volume.
+    /// Elements of zero area or volume.
     Degenerate,
-    /// Primitives with the vertices of an earlier one.
+    /// Elements with the vertices of an earlier one.
     Duplicates,
     /// Edges of more than two triangles, vertices of several fans.
     NonManifold,
@@ -62,8 +62,8 @@ impl Finding {
     pub fn words(self) -> &'static str {
         match self {
             Finding::SelfIntersections => "self-intersections",
-            Finding::Degenerate => "degenerate primitives",
-            Finding::Duplicates => "duplicate primitives",
+            Finding::Degenerate => "degenerate elements",
+            Finding::Duplicates => "duplicate elements",
             Finding::NonManifold => "non-manifold edges or vertices",
             Finding::Boundary => "an open border",
             Finding::Orientation => "inconsistent orientation",
@@ -74,7 +74,7 @@ impl Finding {
         }
     }
 
-    /// The problem of primitives that it counts; `None` where it is one of the whole mesh.
+    /// The problem of elements that it counts; `None` where it is one of the whole mesh.
     pub fn problem(self) -> Option<Problem> {
         match self {
             Finding::SelfIntersections => Some(Problem::SelfIntersection),

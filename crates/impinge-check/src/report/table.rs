@@ -33,7 +33,7 @@ impl Row {
         count("triangles"),
         count("tetrahedra"),
         count("self_intersections"),
-        count("intersecting_primitives"),
+        count("intersecting_elements"),
         text("hash"),
         count("degenerate"),
         count("duplicate_faces"),

@@ -159,7 +159,7 @@ impl Sample {
         let mut numbers: Vec<Vec<Option<u32>>> = Vec::new();
         for (id, _) in demo.bodies() {
             let body = demo.scene().body(id)?;
-            let n = body.n_primitives();
+            let n = body.n_elements();
             let mut is_in = vec![n_all <= SAMPLE; n];
             if n_all > SAMPLE {
                 // Half of this body's share are colliding triangles, half are any triangles, both
@@ -185,7 +185,7 @@ impl Sample {
             n_triangles += faces.len();
             scene.add((faces, body.positions().clone()))?;
         }
-        let in_sample = |body: u32, primitive: u32| numbers[body as usize][primitive as usize];
+        let in_sample = |body: u32, element: u32| numbers[body as usize][element as usize];
         let rows = pairs.rows().filter_map(|[body_a, a, body_b, b]| {
             Some([body_a, in_sample(body_a, a)?, body_b, in_sample(body_b, b)?])
         });

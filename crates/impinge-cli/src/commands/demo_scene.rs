@@ -113,10 +113,7 @@ impl DemoScene {
 
     /// The number of triangles in all bodies.
     pub fn n_triangles(&self) -> usize {
-        self.scene
-            .bodies()
-            .map(|(_, body)| body.n_primitives())
-            .sum()
+        self.scene.bodies().map(|(_, body)| body.n_elements()).sum()
     }
 }
 

@@ -114,7 +114,7 @@ fn write(args: &FixArgs, mesh: &Mesh) -> Result<(), Error> {
             let body = ColoredMesh {
                 positions: &mesh.positions,
                 elements,
-                primitive_colors: None,
+                element_colors: None,
                 colliding: None,
                 name: "mended",
             };

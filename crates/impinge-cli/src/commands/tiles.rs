@@ -48,7 +48,7 @@ fn plan(args: &PlanArgs, cancel: &CancelToken) -> Result<(), Error> {
         cells: None,
         replace: args.replace,
     };
-    let watch = Watch::detection(!args.no_progress, "reading primitives");
+    let watch = Watch::detection(!args.no_progress, "reading elements");
     let plan = Plan::make(
         &args.folder,
         &args.meshes,
@@ -59,18 +59,18 @@ fn plan(args: &PlanArgs, cancel: &CancelToken) -> Result<(), Error> {
         },
     )?;
     drop(watch);
-    let n: u64 = plan.files().iter().map(|file| file.n_primitives).sum();
+    let n: u64 = plan.files().iter().map(|file| file.n_elements).sum();
     let report = TilesPlan {
         plan: hex(plan.id()),
         files: plan.files().len(),
         step: plan.is_step(),
-        primitives: n,
+        elements: n,
         tiles: plan.n_tiles(),
         units: plan.n_units(),
     };
     let text = format!(
         "{} of {} in {}; {} to scatter",
-        counted(n, "primitive"),
+        counted(n, "element"),
         match (plan.files().len() as u64, plan.is_step()) {
             (n, true) => several(n, "moving body", "moving bodies"),
             (n, false) => counted(n, "file"),
@@ -96,14 +96,14 @@ fn scatter(args: &ScatterArgs, cancel: &CancelToken) -> Result<(), Error> {
     let report = TilesScatter {
         written: scattered.n_written,
         kept: scattered.n_kept,
-        primitives: scattered.n_primitives,
+        elements: scattered.n_elements,
         records: scattered.n_records,
     };
     let text = format!(
         "{} written, {} kept; {} as {}",
         counted(scattered.n_written, "part"),
         grouped(scattered.n_kept),
-        counted(scattered.n_primitives, "primitive"),
+        counted(scattered.n_elements, "element"),
         counted(scattered.n_records, "record"),
     );
     print(args.json, &report, &text)
@@ -162,7 +162,7 @@ fn run(args: &RunArgs, cancel: &CancelToken) -> Result<(), Error> {
 fn of_tile(result: &TileResult) -> TilesRun {
     TilesRun {
         tile: result.tile,
-        primitives: result.n_primitives,
+        elements: result.n_elements,
         pairs: result.n_pairs,
         hash: hex(result.hash),
         elsewhere: result.n_elsewhere,
@@ -178,7 +178,7 @@ fn summarise(results: &[TileResult]) -> Result<(), Error> {
             to,
             "tile {}: {} that no cut of space separates; run in {} pieces, every piece against every other",
             result.tile,
-            counted(result.n_primitives, "primitive"),
+            counted(result.n_elements, "element"),
             grouped(result.n_pieces),
         )?;
     }

@@ -85,7 +85,7 @@ impl Body {
         Ok(Body {
             name: name.to_owned(),
             kind: body.kind().name(),
-            elements: body.n_primitives(),
+            elements: body.n_elements(),
             vertices: body.n_vertices(),
             welded: vertices.n_welded,
             coincident: vertices.n_coincident,

@@ -45,7 +45,7 @@ fn json_has_the_shape_that_is_promised() {
             .iter()
             .flat_map(|&[body_a, a, body_b, b]| [(body_a, a), (body_b, b)])
             .filter(|&(of, _)| of == body)
-            .map(|(_, primitive)| primitive)
+            .map(|(_, element)| element)
             .collect();
         found.sort_unstable();
         found.dedup();
@@ -252,7 +252,7 @@ fn coloured_meshes_hold_every_body() {
             .run(["pairs", "a.ply", "b.ply", "--out", out])
             .printed();
         let mesh = read(&folder.path(out), &ReadOptions::as_they_are()).unwrap();
-        assert_eq!(mesh.n_primitives(), 24, "{out}");
+        assert_eq!(mesh.n_elements(), 24, "{out}");
         let bytes = std::fs::read(folder.path(out)).unwrap();
         if is_red {
             let has = |color: [u8; 3]| bytes.windows(3).any(|window| window == color);
@@ -277,7 +277,8 @@ fn polygons_are_fanned_with_a_note() {
         "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n",
     );
     let run = folder.run(["self", "quad.obj"]);
-    let expected = "note: quad.obj: polygons split into triangles (primitive numbers count the triangles): 1\n";
+    let expected =
+        "note: quad.obj: polygons split into triangles (element numbers count the triangles): 1\n";
     assert_eq!(run.stderr, expected);
     let run = folder.run(["self", "quad.obj", "--json"]);
     assert_eq!(run.stderr, expected);

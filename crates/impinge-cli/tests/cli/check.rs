@@ -529,7 +529,7 @@ fn a_summary_is_appended_in_markdown() {
     failed(folder.run(args), 1, 3);
     let text = std::fs::read_to_string(folder.path("s.md")).unwrap();
     assert!(text.starts_with(
-        "### impinge check\n\n1 of 3 meshes could not be checked\n\n| mesh | primitives |"
+        "### impinge check\n\n1 of 3 meshes could not be checked\n\n| mesh | elements |"
     ));
     assert!(
         text.contains("\n| pierced.obj | 5 | 2 | 0 | 0 | 0 | 0 | 3 | 2 |\n\n- nan.obj:4: "),

@@ -28,7 +28,7 @@ fn a_small_demo_finds_checks_and_writes() {
     let [red, blue] = red_and_blue(&pixels);
     assert!(red > 1_000 && blue > 1_000, "{red} {blue}");
     let mesh = read(&folder.path("out/demo.glb"), &ReadOptions::as_they_are()).unwrap();
-    assert_eq!(mesh.n_primitives(), 3_000);
+    assert_eq!(mesh.n_elements(), 3_000);
     // All bodies meet, and the worm meets itself: otherwise the demo would show nothing.
     for what in [
         "worm with itself",

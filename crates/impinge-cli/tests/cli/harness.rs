@@ -129,7 +129,7 @@ impl Folder {
         let mesh = ColoredMesh {
             positions: &Positions::F32(model.positions.clone()),
             elements: &impinge_io::Elements::Triangles(faces.clone()),
-            primitive_colors: None,
+            element_colors: None,
             colliding: None,
             name,
         };

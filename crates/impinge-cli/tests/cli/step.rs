@@ -374,11 +374,11 @@ fn a_free_step_says_so() {
 #[test]
 fn meshes_are_coloured_by_time() {
     let folder = folder();
-    for (file, primitives) in [("seen.ply", 80 + 12), ("seen.vtu", 80 + 12)] {
+    for (file, elements) in [("seen.ply", 80 + 12), ("seen.vtu", 80 + 12)] {
         let run = folder.run(["step"].iter().chain(&FILES).chain(&["--out", file]));
         run.printed();
         let mesh = impinge_io::read(&folder.path(file), &impinge_io::ReadOptions::as_they_are());
-        assert_eq!(mesh.unwrap().n_primitives(), primitives);
+        assert_eq!(mesh.unwrap().n_elements(), elements);
     }
     let bytes = std::fs::read(folder.path("seen.vtu")).unwrap();
     assert!(String::from_utf8_lossy(&bytes).contains("colliding"));
@@ -397,7 +397,7 @@ fn ends_of_another_body_are_refused() {
     folder.text("turned.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 3 2\n");
     let error = folder.run(["step", "one.obj", "turned.obj"]).error();
     assert!(
-        error.contains("primitive 0 has the vertices [0, 2, 1]"),
+        error.contains("element 0 has the vertices [0, 2, 1]"),
         "{error}"
     );
     folder.text("nan.obj", "v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");

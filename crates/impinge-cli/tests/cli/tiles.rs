@@ -89,7 +89,7 @@ fn a_step_gives_the_impacts_of_the_whole() {
     let mut files = Vec::new();
     for (ix, model) in models.iter().enumerate() {
         // Each vertex moves a little towards a vertex of another soup.
-        let other = soup::triangles(model.n_primitives(), 0.08, 20 + ix as u64);
+        let other = soup::triangles(model.n_elements(), 0.08, 20 + ix as u64);
         let mut end = model.clone();
         for (at, to) in end.positions.iter_mut().zip(&other.positions) {
             *at = std::array::from_fn(|axis| at[axis] + (to[axis] - at[axis]) / 16.0);

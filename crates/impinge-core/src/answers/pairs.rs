@@ -1,4 +1,4 @@
-//! The answer: sorted pairs, colliding primitives, a hash, statistics.
+//! The answer: sorted pairs, colliding elements, a hash, statistics.
 
 use std::ops::Range;
 
@@ -15,31 +15,31 @@ use crate::search::runner::{Job, Outcome};
 use crate::search::sink::reserve;
 use crate::search::stats::Stats;
 
-/// One primitive of one body.
+/// One element of one body.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Element {
     /// The body.
     pub body: BodyId,
-    /// Index of the primitive within the body.
+    /// Index of the element within the body.
     pub element: u32,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct PairBody {
     id: BodyId,
-    /// The global number of its first primitive.
+    /// The global number of its first element.
     first: Number,
     kind: BodyKind,
     numbers_stamp: u64,
     positions_stamp: u64,
 }
 
-/// The numbers of no primitives.
+/// The numbers of no elements.
 const NONE: Range<Number> = Number::new(0)..Number::new(0);
 
-/// Every pair that intersects, sorted by `(body_a, primitive_a, body_b, primitive_b)`, where
-/// `body_a < body_b`, or within one body `primitive_a < primitive_b`.
+/// Every pair that intersects, sorted by `(body_a, element_a, body_b, element_b)`, where
+/// `body_a < body_b`, or within one body `element_a < element_b`.
 ///
 /// The same input gives the same bytes on every method, backend, thread count and budget.
 #[derive(Clone, Default)]
@@ -148,18 +148,18 @@ impl Pairs {
             .bodies
             .binary_search_by_key(&body, |held| held.id)
             .ok()?;
-        // No primitive has the highest number: there are fewer than 2^32.
+        // No element has the highest number: there are fewer than 2^32.
         let end = self.bodies.get(ix + 1).map(|next| next.first);
         Some(self.bodies[ix].first..end.unwrap_or(Number::new(u32::MAX)))
     }
 
-    /// The keys whose lower primitive belongs to the range.
+    /// The keys whose lower element belongs to the range.
     fn run(&self, numbers: &Range<Number>) -> &[u64] {
         let below = |end: Number| self.keys.partition_point(|&key| lower_number(key) < end);
         &self.keys[below(numbers.start)..below(numbers.end)]
     }
 
-    /// Pairs `(i, j)` of primitive `i` of `a` and primitive `j` of `b`, in the order in which they
+    /// Pairs `(i, j)` of element `i` of `a` and element `j` of `b`, in the order in which they
     /// are held. Empty when either did not take part.
     pub fn between(&self, a: BodyId, b: BodyId) -> impl Iterator<Item = [u32; 2]> + '_ {
         let swapped = b < a;
@@ -177,7 +177,7 @@ impl Pairs {
         })
     }
 
-    /// Pairs `(i, j)`, `i < j`, of primitives of one body.
+    /// Pairs `(i, j)`, `i < j`, of elements of one body.
     pub fn self_of(&self, body: BodyId) -> impl Iterator<Item = [u32; 2]> + '_ {
         let numbers = self.numbers(body).unwrap_or(NONE);
         self.run(&numbers).iter().filter_map(move |&key| {
@@ -187,7 +187,7 @@ impl Pairs {
         })
     }
 
-    /// Rows `[body_a, primitive_a, body_b, primitive_b]` with bodies by their
+    /// Rows `[body_a, element_a, body_b, element_b]` with bodies by their
     /// [`index`](BodyId::index), sorted.
     pub fn rows(&self) -> impl ExactSizeIterator<Item = [u32; 4]> + '_ {
         self.keys.iter().map(|&key| self.row_of(key))
@@ -208,7 +208,7 @@ impl Pairs {
         ]
     }
 
-    /// The primitives of a body that take part in any pair: sorted, each once.
+    /// The elements of a body that take part in any pair: sorted, each once.
     pub fn colliding(&self, body: BodyId) -> Vec<u32> {
         let numbers = self.numbers(body).unwrap_or(NONE);
         let mut bits = Bits::default();
@@ -220,8 +220,8 @@ impl Pairs {
         bits.into_numbers()
     }
 
-    /// The primitives of each body that take part in any pair, found in one pass: sorted, each
-    /// once. Bodies come in order; bodies without such a primitive are left out.
+    /// The elements of each body that take part in any pair, found in one pass: sorted, each
+    /// once. Bodies come in order; bodies without such an element are left out.
     pub fn all_colliding(&self) -> Vec<(BodyId, Vec<u32>)> {
         let mut bits = Bits::default();
         for number in self.keys.iter().flat_map(|&key| pair_numbers(key)) {
@@ -273,7 +273,7 @@ impl Pairs {
         self.keys = keys;
     }
 
-    /// The bodies that took part, in order, and the kind of their primitives.
+    /// The bodies that took part, in order, and the kind of their elements.
     pub fn bodies(&self) -> impl ExactSizeIterator<Item = (BodyId, BodyKind)> + '_ {
         self.bodies.iter().map(|body| (body.id, body.kind))
     }
@@ -372,7 +372,7 @@ impl std::fmt::Debug for Pairs {
     }
 }
 
-/// A set of numbers, one bit each: pairs may be many more than primitives.
+/// A set of numbers, one bit each: pairs may be many more than elements.
 #[derive(Default)]
 struct Bits(Vec<u64>);
 
@@ -399,8 +399,8 @@ impl Bits {
     }
 }
 
-/// [`Pairs::hash`] of rows `[body_a, primitive_a, body_b, primitive_b]` that come from elsewhere.
-/// The order of rows does not matter. In each row the lower `(body, primitive)` comes first: the
+/// [`Pairs::hash`] of rows `[body_a, element_a, body_b, element_b]` that come from elsewhere.
+/// The order of rows does not matter. In each row the lower `(body, element)` comes first: the
 /// other way round gives another hash.
 pub fn hash_rows(rows: impl IntoIterator<Item = [u32; 4]>) -> u64 {
     let hashes = rows.into_iter().map(hash_row);

@@ -11,7 +11,7 @@ use crate::scene::ids::BodyId;
 use crate::scene::{Body, Scene};
 use crate::search::sets::Sets;
 
-/// Pairs of two bodies, or of one body with itself, that are connected by shared primitives or
+/// Pairs of two bodies, or of one body with itself, that are connected by shared elements or
 /// vertices.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
@@ -21,9 +21,9 @@ pub struct Place {
     pub bodies: [BodyId; 2],
     /// How many pairs it has.
     pub n_pairs: usize,
-    /// The first pair: one primitive of each body.
+    /// The first pair: one element of each body.
     pub first: [u32; 2],
-    /// The box around the overlaps of the two primitives' boxes, over all pairs: its low ends.
+    /// The box around the overlaps of the two elements' boxes, over all pairs: its low ends.
     pub low: [f64; 3],
     /// Its high ends.
     pub high: [f64; 3],
@@ -53,7 +53,7 @@ impl Pairs {
     /// # Errors
     /// A body is no longer in the scene.
     pub fn places(&self, scene: &Scene) -> Result<Vec<Place>, Error> {
-        // One node per vertex of a colliding primitive, separately for each pair of bodies: (body,
+        // One node per vertex of a colliding element, separately for each pair of bodies: (body,
         // other body, vertex).
         let mut sets = Sets::default();
         let mut nodes: HashMap<(usize, usize, u32), u32> = HashMap::new();
@@ -104,8 +104,8 @@ impl Pairs {
     }
 }
 
-/// The box of a primitive.
-fn extent(body: &Body, primitive: u32) -> Extent {
-    let corners = body.elements().corners(primitive as usize).iter();
+/// The box of an element.
+fn extent(body: &Body, element: u32) -> Extent {
+    let corners = body.elements().corners(element as usize).iter();
     Extent::of(corners.map(|&vertex| body.positions().point(vertex as usize)))
 }

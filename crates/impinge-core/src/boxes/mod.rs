@@ -228,7 +228,7 @@ impl<'a> BoxSource<'a> {
         let sweep = match self.each {
             None => self.sweep,
             Some(each) => {
-                let elements = clustering.primitives(cluster).iter();
+                let elements = clustering.elements(cluster).iter();
                 let own = elements.map(|element| each[element.index()]);
                 let most = own.fold(0.0, f64::max);
                 self.sweep.inflated_by(most.next_up())
@@ -284,7 +284,7 @@ impl<'a> BoxSource<'a> {
     ) {
         let size = clustering.size(cluster);
         if let Some(each) = self.each {
-            let elements = clustering.primitives(cluster);
+            let elements = clustering.elements(cluster);
             let mut by = [0.0; GROUP];
             for (by, element) in by.iter_mut().zip(elements) {
                 *by = round_up(each[element.index()]);

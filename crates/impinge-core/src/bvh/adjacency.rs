@@ -1,8 +1,8 @@
-//! Which primitives share vertices, as 64-bit masks fixed by topology.
+//! Which elements share vertices, as 64-bit masks fixed by topology.
 //!
 //! In self-collision nearly all box overlaps are between neighbours on one surface, which the
-//! adjacency rule excludes. Since a clustering never changes, the rule is one mask per primitive,
-//! made once: bit `j` of the mask of primitive `i` says that `i` and lane `j` of the other cluster
+//! adjacency rule excludes. Since a clustering never changes, the rule is one mask per element,
+//! made once: bit `j` of the mask of element `i` says that `i` and lane `j` of the other cluster
 //! name a common vertex. A frame then clears neighbours from its candidate masks with one `and`.
 //!
 //! ```text
@@ -10,10 +10,10 @@
 //!                     neighbour B > A, entry (5, mask)  0b…0000_0011   lanes of B that share a vertex
 //! ```
 //!
-//! A vertex with very many primitives (the hub of a fan) would make these masks quadratic. Hubs are
+//! A vertex with very many elements (the hub of a fan) would make these masks quadratic. Hubs are
 //! left out: [`hubs`](super::hubs) has separate masks for them.
 //!
-//! Cost: `O(n · valence)` once per topology; about 8 bytes per primitive for the own masks and
+//! Cost: `O(n · valence)` once per topology; about 8 bytes per element for the own masks and
 //! about as much for those of neighbours, at most `HUB` entries per corner.
 
 use crate::scene::index::{ClusterIx, Slot};
@@ -90,7 +90,7 @@ impl Adjacency {
         adjacency
     }
 
-    /// The own masks of a cluster's primitives, one per lane.
+    /// The own masks of a cluster's elements, one per lane.
     #[inline(always)]
     pub fn own(&self, cluster: ClusterIx) -> &[u64] {
         &self.own[cluster.slots(self.own.len())]
@@ -123,7 +123,7 @@ impl Adjacency {
     }
 }
 
-/// For each vertex, the slots of the primitives that name it.
+/// For each vertex, the slots of the elements that name it.
 struct ElementsAtVertices {
     starts: Vec<u32>,
     slots: Vec<Slot>,
@@ -169,9 +169,9 @@ fn part<const N: usize>(
     let group = &corners[cluster.slots(corners.len())];
     let mut own = vec![0u64; group.len()];
     let mut entries: Vec<(ClusterIx, u8, u64)> = Vec::new();
-    for (lane, primitive) in group.iter().enumerate() {
+    for (lane, element) in group.iter().enumerate() {
         own[lane] |= 1 << lane;
-        for &vertex in primitive {
+        for &vertex in element {
             for &slot in incidence.of(vertex) {
                 let (other, bit) = (slot.cluster(), 1u64 << slot.lane());
                 if other == cluster {

@@ -1,12 +1,12 @@
 //! Clusters: groups fixed by topology, found once in the current pose.
 //!
-//! In: the primitives' corners and one pose. Out: an order of the primitives in which cluster `c`
+//! In: the elements' corners and one pose. Out: an order of the elements in which cluster `c`
 //! is the run `64 c .. 64 c + 64` (the last one may be shorter), the tree over clusters, the
 //! corners in that order, and each cluster's unique vertices. A frame computes a cluster's box from
 //! these, each read once (64 triangles of a closed mesh have about 45 unique vertices, not 192).
 //!
-//! Cost: `O(n log n)` time once per topology; 8 to 12 bytes per primitive for order and vertices,
-//! and a copy of the corners. Inside a cluster, the order of the primitives does not matter: frames
+//! Cost: `O(n log n)` time once per topology; 8 to 12 bytes per element for order and vertices,
+//! and a copy of the corners. Inside a cluster, the order of the elements does not matter: frames
 //! were not faster when runs of eight lay close together, and half of this work went into that.
 
 use std::ops::Range;
@@ -24,7 +24,7 @@ use crate::scene::index::{ClusterIx, ElementIx, Slot};
 /// The clusters of one body.
 #[derive(Debug)]
 pub(crate) struct Clustering {
-    /// The primitive at each slot of the order.
+    /// The element at each slot of the order.
     pub order: Vec<ElementIx>,
     /// The corners at each slot of the order.
     pub corners: Elements,
@@ -33,7 +33,7 @@ pub(crate) struct Clustering {
     pub vertices: Vec<u32>,
     /// Where each cluster's run starts, and one past the last.
     pub vertex_starts: Vec<u32>,
-    /// The number of vertices, if every vertex up to the highest index belongs to some primitive;
+    /// The number of vertices, if every vertex up to the highest index belongs to some element;
     /// else `None`.
     pub n_vertices_covered: Option<usize>,
     /// The tree over the clusters.
@@ -57,8 +57,8 @@ pub(crate) struct ToOrder {
 pub(crate) type LocalFaces = LocalCorners<3>;
 
 impl Clustering {
-    /// Clusters primitives by the centres of their boxes in the current pose, which are given in
-    /// the order of the primitives. Those of one class of sizes follow each other. Their [local
+    /// Clusters elements by the centres of their boxes in the current pose, which are given in
+    /// the order of the elements. Those of one class of sizes follow each other. Their [local
     /// faces](Self::local_faces) are found at the same time if they are needed. `None` if `go_on`
     /// says no: it is asked between pieces of work that take a few milliseconds.
     pub fn new(
@@ -124,34 +124,34 @@ impl Clustering {
         ClusterIx::up_to(self.n_clusters())
     }
 
-    /// How many primitives a cluster holds.
+    /// How many elements a cluster holds.
     #[inline(always)]
     pub fn size(&self, cluster: ClusterIx) -> usize {
         self.slots(cluster).len()
     }
 
-    /// The slots of a cluster's primitives.
+    /// The slots of a cluster's elements.
     #[inline(always)]
     pub fn slots(&self, cluster: ClusterIx) -> Range<usize> {
         cluster.slots(self.order.len())
     }
 
-    /// The slots of the primitives of a run of clusters.
+    /// The slots of the elements of a run of clusters.
     #[cfg(feature = "gpu")]
     pub fn slots_of_run(&self, run: &Range<usize>) -> Range<usize> {
         let n = self.order.len();
         n.min(run.start * GROUP)..n.min(run.end * GROUP)
     }
 
-    /// The primitives of a cluster.
+    /// The elements of a cluster.
     #[inline(always)]
-    pub fn primitives(&self, cluster: ClusterIx) -> &[ElementIx] {
+    pub fn elements(&self, cluster: ClusterIx) -> &[ElementIx] {
         &self.order[self.slots(cluster)]
     }
 
-    /// The primitive at a slot.
+    /// The element at a slot.
     #[inline(always)]
-    pub fn primitive(&self, slot: Slot) -> ElementIx {
+    pub fn element(&self, slot: Slot) -> ElementIx {
         self.order[slot.index()]
     }
 
@@ -163,19 +163,19 @@ impl Clustering {
         &self.vertices[starts[ix] as usize..starts[ix + 1] as usize]
     }
 
-    /// Vertices that very many primitives name, if there are any.
+    /// Vertices that very many elements name, if there are any.
     #[inline(always)]
     pub fn hubs(&self) -> Option<&Hubs> {
         self.hubs.as_ref()
     }
 
-    /// Which primitives share vertices that are not hubs; found at the first self-collision query.
+    /// Which elements share vertices that are not hubs; found at the first self-collision query.
     pub fn adjacency(&self) -> &Adjacency {
         self.adjacency
             .get_or_init(|| with_corners!(&self.corners, |corners| Adjacency::new(corners)))
     }
 
-    /// Finds the local faces of all clusters, if the primitives are triangles: for kernels that
+    /// Finds the local faces of all clusters, if the elements are triangles: for kernels that
     /// look corners up in a table of a cluster's vertices.
     pub fn find_local_faces(&self) {
         if let Elements::Triangles(faces) = &self.corners {
@@ -200,7 +200,7 @@ impl Clustering {
         self.local_faces.get()?.get(cluster.index())
     }
 
-    /// Finds the rings of the vertices, if the primitives are triangles.
+    /// Finds the rings of the vertices, if the elements are triangles.
     pub fn find_rings(&self) {
         if let Elements::Triangles(faces) = &self.corners {
             self.rings.get_or_init(|| Rings::new(faces));
@@ -234,7 +234,7 @@ impl Clustering {
     }
 }
 
-/// The classes of primitives: by their hubs, if they have any, and else by their sizes. Vertices
+/// The classes of elements: by their hubs, if they have any, and else by their sizes. Vertices
 /// have lower numbers than sizes.
 fn with_sizes(
     of_hubs: Option<Vec<Option<u32>>>,

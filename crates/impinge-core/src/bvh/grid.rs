@@ -17,7 +17,7 @@ use super::bounds::Aabb;
 
 /// The most cells along one axis, so that fine coordinates fit 16 bits.
 pub(crate) const MOST_ALONG: u32 = 1 << 14;
-/// The most entries of the cell lists per primitive, on average.
+/// The most entries of the cell lists per element, on average.
 pub const MOST_ENTRIES_EACH: u64 = 16;
 /// The most cells of the first level, for any lambda: 4 bytes each.
 const MOST_CELLS: u64 = 1 << 25;
@@ -53,11 +53,11 @@ impl Grid {
         clippy::disallowed_methods,
         reason = "how large cells are changes no answer"
     )]
-    pub fn new(region: &Aabb, n_primitives: u64, lambda: f64) -> Self {
+    pub fn new(region: &Aabb, n_elements: u64, lambda: f64) -> Self {
         let extent: [f64; 3] = std::array::from_fn(|axis| {
             (f64::from(region.max[axis]) - f64::from(region.min[axis])).clamp(0.0, 2f64.powi(129))
         });
-        let wanted = (lambda * n_primitives as f64).clamp(1.0, MOST_CELLS as f64);
+        let wanted = (lambda * n_elements as f64).clamp(1.0, MOST_CELLS as f64);
         let mut resolution = [1u32; 3];
         let mut wide = extent.map(|extent| extent > 0.0);
         loop {

@@ -1,17 +1,17 @@
-//! Hubs: vertices that very many primitives name, such as the middle of a fan.
+//! Hubs: vertices that very many elements name, such as the middle of a fan.
 //!
-//! All primitives around a hub have boxes that overlap there, so pairs that share a hub would be
+//! All elements around a hub have boxes that overlap there, so pairs that share a hub would be
 //! quadratic in number. They are never examined one by one:
 //!
-//! - Primitives of one hub follow each other in the order of the clusters (`classes`).
-//! - A node of the tree records the hubs that *all* of its primitives name. `traversal` skips a
-//!   pair of nodes with a common hub: each pair of their primitives shares a vertex.
-//! - In clusters of which only some primitives name a hub, lane masks exclude such pairs.
+//! - Elements of one hub follow each other in the order of the clusters (`classes`).
+//! - A node of the tree records the hubs that *all* of its elements name. `traversal` skips a
+//!   pair of nodes with a common hub: each pair of their elements shares a vertex.
+//! - In clusters of which only some elements name a hub, lane masks exclude such pairs.
 //!
 //! Under `SharedVertex::Skip` that is all. Under `SharedVertex::Resolve`, `cpu::hubs` decides the
-//! pairs of each hub by the directions of the primitives as seen from it.
+//! pairs of each hub by the directions of the elements as seen from it.
 //!
-//! Two hubs that very many primitives name together are an *axis*, such as the spine of a book.
+//! Two hubs that very many elements name together are an *axis*, such as the spine of a book.
 //!
 //! Cost: one count per corner per topology. Bodies without hubs keep nothing.
 
@@ -23,10 +23,10 @@ use crate::scene::index::{ClusterIx, Slot};
 pub(crate) const HUB: u32 = 96;
 /// No vertex has this number.
 const NONE: u32 = u32::MAX;
-/// The most hubs of one primitive: a tetrahedron has four vertices.
+/// The most hubs of one element: a tetrahedron has four vertices.
 const MOST: usize = 4;
 
-/// The hubs of one primitive, or those common to all primitives of a node: ascending, then
+/// The hubs of one element, or those common to all elements of a node: ascending, then
 /// [`NONE`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct HubSet([u32; MOST]);
@@ -60,7 +60,7 @@ impl HubSet {
     }
 }
 
-/// Two hubs and the slots of the primitives that name both.
+/// Two hubs and the slots of the elements that name both.
 #[derive(Debug)]
 struct Axis {
     /// The two vertices, lower first.
@@ -68,7 +68,7 @@ struct Axis {
     slots: Vec<Slot>,
 }
 
-/// One hub and the slots of the primitives that name it.
+/// One hub and the slots of the elements that name it.
 #[derive(Debug)]
 struct Hub {
     vertex: u32,
@@ -82,7 +82,7 @@ pub(crate) struct Hubs {
     hubs: Vec<Hub>,
     /// Sorted by the two vertices.
     axes: Vec<Axis>,
-    /// `common[level][node]`: the hubs that all primitives of the node name.
+    /// `common[level][node]`: the hubs that all elements of the node name.
     common: Vec<Vec<HubSet>>,
     /// For each cluster, where its entries in `lanes` start; and one past the last.
     lane_starts: Vec<u32>,
@@ -101,7 +101,7 @@ pub(super) fn counts<const N: usize>(corners: &[[u32; N]]) -> Vec<u32> {
     counts
 }
 
-/// For each primitive, the one of its hubs that is named most often, if it has any; `None` if the
+/// For each element, the one of its hubs that is named most often, if it has any; `None` if the
 /// body has no hub. `counts` says how often each vertex is named.
 pub(super) fn classes<const N: usize>(
     corners: &[[u32; N]],
@@ -110,8 +110,8 @@ pub(super) fn classes<const N: usize>(
     if counts.iter().all(|&count| count <= HUB) {
         return None;
     }
-    let class = |primitive: &[u32; N]| {
-        let hubs = primitive
+    let class = |element: &[u32; N]| {
+        let hubs = element
             .iter()
             .filter(|&&vertex| counts[vertex as usize] > HUB);
         // Of two named equally often, the lower one.
@@ -127,9 +127,9 @@ impl Hubs {
     pub fn new<const N: usize>(corners: &[[u32; N]], counts: &[u32], shape: &TreeShape) -> Self {
         let sets: Vec<HubSet> = corners
             .iter()
-            .map(|primitive| {
+            .map(|element| {
                 let mut set = HubSet::EMPTY;
-                for &vertex in primitive {
+                for &vertex in element {
                     if counts[vertex as usize] > HUB {
                         set.insert(vertex);
                     }
@@ -162,7 +162,7 @@ impl Hubs {
         }
     }
 
-    /// Whether one hub is named by all primitives of both nodes, which may be the same node.
+    /// Whether one hub is named by all elements of both nodes, which may be the same node.
     #[inline(always)]
     pub fn hold_all(&self, (level_a, a): (u32, u32), (level_b, b): (u32, u32)) -> bool {
         let a = &self.common[level_a as usize][a as usize];
@@ -193,7 +193,7 @@ impl Hubs {
         self.hubs.len() + self.axes.len()
     }
 
-    /// The vertices of each hub and axis, and the slots of the primitives that name them.
+    /// The vertices of each hub and axis, and the slots of the elements that name them.
     pub fn to_decide(&self) -> impl Iterator<Item = (&[u32], &[Slot])> {
         let hubs = self.hubs.iter();
         let hubs = hubs.map(|hub| (std::slice::from_ref(&hub.vertex), &hub.slots[..]));
@@ -204,7 +204,7 @@ impl Hubs {
         )
     }
 
-    /// The hubs among a primitive's corners that form an axis with `hub`.
+    /// The hubs among an element's corners that form an axis with `hub`.
     pub fn partners(&self, hub: u32, corners: &[u32]) -> HubSet {
         let mut partners = HubSet::EMPTY;
         for &other in corners {
@@ -215,7 +215,7 @@ impl Hubs {
         partners
     }
 
-    /// Whether two primitives are decided at `shared`, a hub or an axis. Each pair is decided once:
+    /// Whether two elements are decided at `shared`, a hub or an axis. Each pair is decided once:
     /// at the first axis that both name, or if there is none at the first hub.
     pub fn owns(&self, shared: &[u32], a: &[u32], b: &[u32]) -> bool {
         let mut common = HubSet::EMPTY;

@@ -1,4 +1,4 @@
-//! Groups of at most 64 primitives, and the structures over them that both backends share: boxes,
+//! Groups of at most 64 elements, and the structures over them that both backends share: boxes,
 //! clusters, trees, adjacency masks, the grid. Imports only `elements` and `index`.
 
 mod adjacency;

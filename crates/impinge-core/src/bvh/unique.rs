@@ -1,4 +1,4 @@
-//! The vertices of each cluster, each once, and the corners of its primitives as numbers of those.
+//! The vertices of each cluster, each once, and the corners of its elements as numbers of those.
 //!
 //! A sparse set finds what is new: of 192 corners of 64 triangles about 45 are. These are put in
 //! ascending order by counting for each how many are lower, which needs no branch and is a few
@@ -15,11 +15,11 @@ use super::{CHUNK, GROUP, parallel};
 /// Clusters that one of several threads takes at a time.
 const BLOCK: usize = 64;
 
-/// The corners of a cluster's primitives as numbers of its vertices: `[corner][slot]`. Slots past
+/// The corners of a cluster's elements as numbers of its vertices: `[corner][slot]`. Slots past
 /// its size hold 0.
 pub(crate) type LocalCorners<const N: usize> = [[u8; GROUP]; N];
 
-/// With four corners per primitive, the numbers fit a byte.
+/// With four corners per element, the numbers fit a byte.
 const _: () = assert!(4 * GROUP <= 256);
 
 /// The vertices of clusters.
@@ -140,8 +140,8 @@ impl VertexSet {
     fn number<const N: usize>(&mut self, group: &[[u32; N]], local: &mut LocalCorners<N>) {
         self.found.fill(VertexSet::NONE);
         let mut n = 0;
-        for (slot, primitive) in group.iter().enumerate() {
-            for (of_corner, &vertex) in local.iter_mut().zip(primitive) {
+        for (slot, element) in group.iter().enumerate() {
+            for (of_corner, &vertex) in local.iter_mut().zip(element) {
                 let entry = &mut self.numbers[vertex as usize];
                 let signed = vertex as i32 ^ i32::MIN;
                 let is_new = self.found[usize::from(*entry)] != signed;

@@ -195,7 +195,7 @@ impl Contacts {
         self.shapes.is_empty()
     }
 
-    /// The rows of the pairs: `[body_a, primitive_a, body_b, primitive_b]`.
+    /// The rows of the pairs: `[body_a, element_a, body_b, element_b]`.
     pub fn rows(&self) -> &[[u32; 4]] {
         &self.rows
     }

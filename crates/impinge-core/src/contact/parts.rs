@@ -1,6 +1,6 @@
 //! The contacts of two bodies out of those of all bodies.
 //!
-//! Contacts are sorted by the first body and its primitive, so those of one pair of bodies are
+//! Contacts are sorted by the first body and its element, so those of one pair of bodies are
 //! scattered. Their numbers are grouped by pairs of bodies once. Cost: `O(n log n)` for all pairs
 //! together, and then `O(n)` in the contacts of one pair.
 

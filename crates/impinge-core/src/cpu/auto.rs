@@ -1,9 +1,9 @@
 //! The method `Auto`: which of the others answers a frame.
 //!
 //! Clusters are made once for each body, and that costs several times as much as the frame itself
-//! does in the grid of `Cells`. It pays as soon as the body comes back. So a frame whose primitives
+//! does in the grid of `Cells`. It pays as soon as the body comes back. So a frame whose elements
 //! are mostly of new bodies goes through the grid, except: bodies that another question has
-//! clustered already; so few primitives that neither takes long; small bodies, which are few
+//! clustered already; so few elements that neither takes long; small bodies, which are few
 //! clusters each; cells that turn out crowded (the grid is uniform, so small details in a large
 //! scene can all be in one cell); neighbours that must be resolved, which `Clusters` decides per
 //! vertex; and memory budgets, which the grid would need more of.
@@ -39,13 +39,11 @@ impl Acquaintances {
             let body = plan.body(scene, ix);
             let stamp = body.topology_stamp();
             let is_new = std::mem::replace(&mut self.stamps[slot], stamp) != stamp;
-            if is_new
-                && part.n_primitives >= tuning.auto_body_from
-                && !clusterings.has(part.id, body)
+            if is_new && part.n_elements >= tuning.auto_body_from && !clusterings.has(part.id, body)
             {
-                n_new += u64::from(part.n_primitives);
+                n_new += u64::from(part.n_elements);
             }
         }
-        n_new >= tuning.auto_from && n_new > plan.n_primitives() / 2 && !plan.resolves()
+        n_new >= tuning.auto_from && n_new > plan.n_elements() / 2 && !plan.resolves()
     }
 }

@@ -1,10 +1,10 @@
 //! The method `Cells` on the CPU: the paper's two levels.
 //!
 //! ```text
-//! bounds      box of each body; where bodies overlap; primitives that reach there and have primitives of
+//! bounds      box of each body; where bodies overlap; elements that reach there and have elements of
 //!             another body near them, and their boxes
 //! grid        eq. (1) resolution, eq. (3) ranges; count, prefix sum, scatter into cell lists
-//! traversal    cells with primitives of bodies that meet; lists cut into groups of at most 64;
+//! traversal    cells with elements of bodies that meet; lists cut into groups of at most 64;
 //!             Cartesian product of groups, eq. (4): work items
 //! pairing     4x4x4 sub-cells, axis by axis; owner rule; boxes
 //! narrow      filters, then exact arithmetic
@@ -12,8 +12,8 @@
 //!
 //! Source: "Real-time Collision Detection with Two-level Spatial Hashing on GPU", section 3. Where
 //! we deviate: the owner rule replaces the hash table (nothing is lost or tested twice), and cell
-//! lists are bounded by the number of primitives: a huge primitive would touch every cell, so the
-//! grid is made coarser until the lists hold at most [`MOST_ENTRIES_EACH`] entries per primitive.
+//! lists are bounded by the number of elements: a huge element would touch every cell, so the
+//! grid is made coarser until the lists hold at most [`MOST_ENTRIES_EACH`] entries per element.
 //! That keeps memory bounded; the price is more pairs per cell, which `n_reruns` and `grid` in the
 //! statistics show.
 
@@ -45,7 +45,7 @@ use crate::simd::Lanes;
 const BATCH_ITEMS: usize = 1 << 18;
 const PAIRING_TASK: usize = 32;
 
-/// Decides about two primitives of one cell that touch a common sub-cell.
+/// Decides about two elements of one cell that touch a common sub-cell.
 ///
 /// The method is compiled once per rule. Every detector uses [`Owner`]; other rules are for studies
 /// of what the owner rule replaces.
@@ -135,7 +135,7 @@ impl Cells {
         }
     }
 
-    /// Sorts the primitives into the cells of a grid; `None` if no body reaches another, and the
+    /// Sorts the elements into the cells of a grid; `None` if no body reaches another, and the
     /// answer is complete.
     pub(super) fn divide(
         &mut self,
@@ -176,14 +176,14 @@ impl Cells {
         Ok(Some(grid))
     }
 
-    /// The number of primitives in the cell of an entry, on average over all entries of the lists.
+    /// The number of elements in the cell of an entry, on average over all entries of the lists.
     pub(super) fn crowding(&self) -> u64 {
         let pairs = |ends: &[u32]| u64::from(ends[1] - ends[0]).pow(2);
         let n_pairs: u64 = self.starts.windows(2).map(pairs).sum();
         n_pairs / self.entries.len().max(1) as u64
     }
 
-    /// Pairs the primitives of each cell, and hands over the keys.
+    /// Pairs the elements of each cell, and hands over the keys.
     pub(super) fn decide<R: Rule>(
         &mut self,
         job: Job<'_>,
@@ -223,7 +223,7 @@ impl Cells {
         bytes as u64
     }
 
-    /// Finds the grid, counts, and scatters primitives into cell lists.
+    /// Finds the grid, counts, and scatters elements into cell lists.
     fn scatter(
         &mut self,
         region: &Aabb,
@@ -237,7 +237,7 @@ impl Cells {
         let mut most_entries = n.saturating_mul(MOST_ENTRIES_EACH).min(u64::from(u32::MAX));
         let mut most_cells = u64::MAX;
         if let Some(budget) = settings.memory_budget {
-            // Bytes held by now, mainly the boxes of primitives, without the lists that are sized
+            // Bytes held by now, mainly the boxes of elements, without the lists that are sized
             // below.
             let sized_later = size_of::<u32>() * (self.starts.capacity() + self.entries.capacity())
                 + size_of::<CellItem>() * self.items.capacity();
@@ -245,7 +245,7 @@ impl Cells {
             let needed = fixed + 4 * n + 12;
             if needed > budget {
                 return Err(Error::MemoryBudget {
-                    what: "primitives' boxes, cell lists and a batch of work items",
+                    what: "elements' boxes, cell lists and a batch of work items",
                     needed,
                     budget,
                 });
@@ -424,7 +424,7 @@ fn for_indices(grid: &Grid, range: &FineRange, mut call: impl FnMut(usize)) {
     }
 }
 
-/// The cell lists and the primitives that they name.
+/// The cell lists and the elements that they name.
 #[derive(Clone, Copy)]
 struct Lists<'a> {
     world: World<'a>,
@@ -552,7 +552,7 @@ fn pair_item<R: Rule>(
     let kept = |entry: u32| &lists.kept[entry as usize];
     let group_a = &lists.entries[first_a..first_a + usize::from(item.n_a)];
     let group_b = &lists.entries[first_b..first_b + usize::from(item.n_b)];
-    // A group's primitives are of one body.
+    // A group's elements are of one body.
     let owner = kept(group_a[0]).part;
     let one_body = owner == kept(group_b[0]).part;
     let groups = GroupPair {

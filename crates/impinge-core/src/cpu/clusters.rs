@@ -4,7 +4,7 @@
 //! bounds      boxes of the clusters of bodies that moved, and of the trees above them
 //! traversal    bodies whose boxes meet (more than two: a tree over bodies), then tree against tree
 //! creases       under `SharedVertex::Resolve`: triangles that may meet a neighbour
-//! pairing     boxes of the primitives of clusters that take part; candidates per work item
+//! pairing     boxes of the elements of clusters that take part; candidates per work item
 //! narrow      filters, then exact arithmetic
 //! ```
 //!
@@ -72,7 +72,7 @@ impl Clusters {
         stats.time("clustering", |stats| {
             self.cluster(job, &settings.tuning, stats)
         })?;
-        if job.plan.n_primitives() >= settings.tuning.call_from {
+        if job.plan.n_elements() >= settings.tuning.call_from {
             job.workers.call_all();
         }
         stats.time("bounds", |stats| {
@@ -179,22 +179,22 @@ impl BodyCache {
             bounds,
             whole: Aabb::EMPTY,
             creases: None,
-            culled: (body.n_primitives() >= tuning.culled_from)
+            culled: (body.n_elements() >= tuning.culled_from)
                 .then(|| Box::new(Culled::new(tuning))),
             surface: 0.0,
             fit: Fit::UNKNOWN,
         }
     }
 
-    /// Finds which primitives share vertices, before workers need it. Going to the pool costs 0.1
+    /// Finds which elements share vertices, before workers need it. Going to the pool costs 0.1
     /// ms, so it is avoided when the adjacency is known.
     pub(super) fn find_adjacency(&self, workers: &Workers) -> Result<(), Error> {
         if !self.clustering.knows_adjacency() {
-            let n_primitives = self.clustering.order.len();
+            let n_elements = self.clustering.order.len();
             let find = || {
                 self.clustering.adjacency();
             };
-            workers.install(n_primitives, find)?;
+            workers.install(n_elements, find)?;
         }
         Ok(())
     }
@@ -235,7 +235,7 @@ impl BodyCache {
     }
 
     /// Whether the positions can be read in memory order: they are in single precision, and the
-    /// primitives name every vertex.
+    /// elements name every vertex.
     pub(super) fn can_be_read(&self, body: &Body) -> bool {
         let is_single = matches!(body.positions(), Positions::F32(_));
         is_single && self.clustering.n_vertices_covered == Some(body.n_vertices())

@@ -427,7 +427,7 @@ mod tests {
             creases.find(isa, &Workers::new(1), &clustering, (&positions, 1));
             let mut folded: Vec<u32> = Slot::up_to(faces.len())
                 .filter(|slot| creases.of(slot.cluster()) >> slot.lane() & 1 == 1)
-                .map(|slot| clustering.primitive(slot).raw())
+                .map(|slot| clustering.element(slot).raw())
                 .collect();
             folded.sort_unstable();
             answers.push(folded);

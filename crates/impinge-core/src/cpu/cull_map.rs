@@ -1,8 +1,8 @@
-//! Stage `bounds` of methods that work in a grid: the primitives that reach another body.
+//! Stage `bounds` of methods that work in a grid: the elements that reach another body.
 //!
-//! In: positions. Out: where bodies may meet, and the primitives that reach there with their boxes,
-//! ordered by body and primitive. Cost: every vertex once for the boxes of bodies, every
-//! primitive's corners once. Invariant: no pair that intersects has a primitive that is not kept.
+//! In: positions. Out: where bodies may meet, and the elements that reach there with their boxes,
+//! ordered by body and element. Cost: every vertex once for the boxes of bodies, every
+//! element's corners once. Invariant: no pair that intersects has an element that is not kept.
 
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -22,12 +22,12 @@ use crate::query::tuning::{Tuning, Ways};
 use crate::simd::{Isa, Simd, with_isa};
 use crate::workers::Workers;
 
-/// Primitives per task.
-const PRIMITIVES: usize = 4096;
+/// Elements per task.
+const ELEMENTS: usize = 4096;
 /// Vertices per task.
 const VERTICES: usize = 1 << 15;
 
-/// A primitive that reaches the region.
+/// An element that reaches the region.
 #[derive(Debug, Clone, Copy)]
 pub struct InRegion {
     /// Its box.
@@ -37,25 +37,25 @@ pub struct InRegion {
     /// Its part.
     pub part: PartIx,
     /// Its index within the body.
-    pub primitive: ElementIx,
+    pub element: ElementIx,
 }
 
 impl InRegion {
     /// Its slot, where there are no clusters.
     #[inline(always)]
     pub fn slot(&self) -> Slot {
-        unclustered(self.primitive)
+        unclustered(self.element)
     }
 
-    /// A primitive, if its box meets `reach`.
+    /// An element, if its box meets `reach`.
     #[inline(always)]
     fn reaching(
         body: &BodyRef<'_>,
         part: PartIx,
-        primitive: ElementIx,
+        element: ElementIx,
         reach: &Aabb,
     ) -> Option<InRegion> {
-        let bounds = boxes::of_vertices(body.positions, body.corners(unclustered(primitive)));
+        let bounds = boxes::of_vertices(body.positions, body.corners(unclustered(element)));
         bounds.overlaps(reach).then_some(InRegion {
             bounds,
             range: FineRange {
@@ -63,20 +63,20 @@ impl InRegion {
                 hi: [0; 3],
             },
             part,
-            primitive,
+            element,
         })
     }
 }
 
-/// The slot of a primitive, where there are no clusters.
+/// The slot of an element, where there are no clusters.
 #[inline(always)]
-fn unclustered(primitive: ElementIx) -> Slot {
-    Slot::new(primitive.raw())
+fn unclustered(element: ElementIx) -> Slot {
+    Slot::new(element.raw())
 }
 
 debug_by_name!(KeptList => "KeptList");
 
-/// The kept primitives of a frame, and the memory for them.
+/// The kept elements of a frame, and the memory for them.
 pub struct KeptList {
     isa: Isa,
     tuning: Tuning,
@@ -85,16 +85,16 @@ pub struct KeptList {
     reach: Vec<Aabb>,
     top: TopLevel,
     stack: Vec<NodePair>,
-    /// Runs of primitives.
+    /// Runs of elements.
     runs: Vec<BoundsTask>,
-    /// The kept primitives of each run.
+    /// The kept elements of each run.
     parts: Vec<Mutex<Vec<InRegion>>>,
     /// Runs of vertices, with their boxes.
     vertices: Vec<(BoundsTask, Mutex<Aabb>)>,
     cull: Cull,
     /// The bodies in the map; 0 if none was made.
     n_mapped: u64,
-    /// The kept primitives.
+    /// The kept elements.
     pub kept: Vec<InRegion>,
 }
 
@@ -133,7 +133,7 @@ impl KeptList {
 
     /// The scratches of as many workers as are worth waking.
     fn few<'a, S>(&self, world: World<'_>, scratches: &'a mut [S]) -> &'a mut [S] {
-        let n = match world.plan.n_primitives() < self.tuning.cull_parallel_from {
+        let n = match world.plan.n_elements() < self.tuning.cull_parallel_from {
             true => 1,
             false => scratches.len(),
         };
@@ -148,7 +148,7 @@ impl KeptList {
         }
     }
 
-    /// Finds the boxes of bodies, where bodies reach each other, and the primitives that reach
+    /// Finds the boxes of bodies, where bodies reach each other, and the elements that reach
     /// there. `scratches` has one entry per worker; only their number matters.
     pub fn find<S: Send>(&mut self, world: World<'_>, workers: &Workers, scratches: &mut [S]) {
         let scratches = self.few(world, scratches);
@@ -160,15 +160,15 @@ impl KeptList {
             let reach = &reach[run.part.index()];
             let mut part = parts[ix].lock().expect("no task panics");
             part.clear();
-            for primitive in (run.first..run.end).map(ElementIx::new) {
-                part.extend(InRegion::reaching(&body, run.part, primitive, reach));
+            for element in (run.first..run.end).map(ElementIx::new) {
+                part.extend(InRegion::reaching(&body, run.part, element, reach));
             }
         });
         self.gather();
     }
 
-    /// [`find`](KeptList::find), without the primitives that no other body comes near.
-    /// Returns how many primitives were near where bodies meet.
+    /// [`find`](KeptList::find), without the elements that no other body comes near.
+    /// Returns how many elements were near where bodies meet.
     pub fn find_sharing<S: Send>(
         &mut self,
         world: World<'_>,
@@ -176,7 +176,7 @@ impl KeptList {
         scratches: &mut [S],
     ) -> usize {
         let scratches = self.few(world, scratches);
-        // Bodies queried for self-collision keep every primitive, and with many bodies the map
+        // Bodies queried for self-collision keep every element, and with many bodies the map
         // rejects almost nothing; skip it in both cases.
         let parts = &world.plan.parts;
         if !world.plan.between()
@@ -218,8 +218,8 @@ impl KeptList {
             let reach = &reach[run.part.index()];
             let mut part = parts[ix].lock().expect("no task panics");
             part.clear();
-            let n = cull.for_live(ix, |primitive| {
-                part.extend(InRegion::reaching(&body, run.part, primitive, reach));
+            let n = cull.for_live(ix, |element| {
+                part.extend(InRegion::reaching(&body, run.part, element, reach));
             });
             n_near.fetch_add(n, Ordering::Relaxed);
         });
@@ -230,17 +230,17 @@ impl KeptList {
     /// Makes the tasks, and finds the boxes of bodies and where they reach each other.
     fn begin<S: Send>(&mut self, world: World<'_>, workers: &Workers, scratches: &mut [S]) {
         self.n_mapped = 0;
-        let n_primitives = workers.task(PRIMITIVES) as u32;
+        let n_elements = workers.task(ELEMENTS) as u32;
         let n_vertices_each = workers.task(VERTICES) as u32;
         self.runs.clear();
         self.vertices.clear();
         for (ix, part) in world.plan.numbered_parts() {
-            let n_vertices = match part.n_primitives {
+            let n_vertices = match part.n_elements {
                 0 => 0,
                 _ => world.body(ix).positions.len() as u32,
             };
             self.runs
-                .extend(BoundsTask::cut(ix, part.n_primitives, n_primitives));
+                .extend(BoundsTask::cut(ix, part.n_elements, n_elements));
             self.vertices.extend(
                 BoundsTask::cut(ix, n_vertices, n_vertices_each)
                     .map(|run| (run, Mutex::new(Aabb::EMPTY))),
@@ -264,7 +264,7 @@ impl KeptList {
         self.find_reach(world);
     }
 
-    /// Concatenates the kept primitives of all runs.
+    /// Concatenates the kept elements of all runs.
     fn gather(&mut self) {
         let parts = &mut self.parts[..self.runs.len()];
         self.kept.clear();
@@ -280,7 +280,7 @@ impl KeptList {
     }
 
     /// Finds the box in which each part may meet others. Reason for the discard that follows: the
-    /// boxes of a pair share a point. It lies in both bodies' boxes, so each primitive meets the
+    /// boxes of a pair share a point. It lies in both bodies' boxes, so each element meets the
     /// intersection of the two.
     fn find_reach(&mut self, world: World<'_>) {
         let plan = world.plan;
@@ -316,7 +316,7 @@ impl KeptList {
         }
     }
 
-    /// The box of all reaches; `None` if no primitives were kept.
+    /// The box of all reaches; `None` if no elements were kept.
     pub fn region(&self) -> Option<Aabb> {
         self.joined_reach().filter(|_| !self.kept.is_empty())
     }

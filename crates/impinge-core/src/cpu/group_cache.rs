@@ -1,7 +1,7 @@
-//! A worker's own copy of the clusters it saw last, for `pairing` and `narrow`: one primitive per
+//! A worker's own copy of the clusters it saw last, for `pairing` and `narrow`: one element per
 //! lane.
 //!
-//! In: positions and corners of a cluster. Out: the boxes of its primitives and, for triangles in
+//! In: positions and corners of a cluster. Out: the boxes of its elements and, for triangles in
 //! f32, their corners as tables, so that the filter reads them from the first-level cache and not
 //! from all over the body. Cost: each corner of a cluster once, when it is first needed; 3.8 KB per
 //! cluster.
@@ -18,15 +18,15 @@ use impinge_exact::internal::filter::{LARGEST_F32, Triangles64};
 use super::world::World;
 use crate::simd::{ClusterFaces, LaneBounds, Simd};
 
-/// One cluster's primitives.
+/// One cluster's elements.
 #[derive(Debug, Clone)]
 #[repr(C, align(64))]
 pub(super) struct Group {
-    /// The primitives' boxes.
+    /// The elements' boxes.
     pub boxes: LaneBounds,
-    /// The primitives' corners, if `in_tables`.
+    /// The elements' corners, if `in_tables`.
     pub corners: Triangles64,
-    /// Whether the primitives are triangles in f32 that are small enough for the filter in f32.
+    /// Whether the elements are triangles in f32 that are small enough for the filter in f32.
     pub in_tables: bool,
 }
 

@@ -1,10 +1,10 @@
 //! Pairs that share a hub, under `SharedVertex::Resolve`: found by the directions of their
-//! primitives.
+//! elements.
 //!
 //! In: the hubs and axes of a body, and its positions. Out: pairs for the exact test.
 //!
-//! The boxes of all primitives around a hub v overlap there, so boxes in space separate nothing.
-//! Seen from v, each primitive is a cone of directions, and two primitives that meet in a point
+//! The boxes of all elements around a hub v overlap there, so boxes in space separate nothing.
+//! Seen from v, each element is a cone of directions, and two elements that meet in a point
 //! other than v share the direction of that point. So each cone gets a box on the surface of the
 //! cube of all directions, and a tree over these boxes finds those that overlap:
 //!
@@ -17,13 +17,13 @@
 //!    +--------------+
 //! ```
 //!
-//! Primitives that share an axis uv also share the direction of its other vertex. They are found by
+//! Elements that share an axis uv also share the direction of its other vertex. They are found by
 //! half-planes around the axis: the half-plane of a point p is given by the direction of (v - u) x
 //! (p - u).
 //!
-//! Primitives with the same vertices have the same answers, so one test speaks for all of them.
+//! Elements with the same vertices have the same answers, so one test speaks for all of them.
 //!
-//! Cost: `O(n log n)` per hub for n primitives, and one exact test per pair whose cones' boxes
+//! Cost: `O(n log n)` per hub for n elements, and one exact test per pair whose cones' boxes
 //! overlap. Reason for each discard: cones without a common direction. `docs/exactness.md`, "Hubs",
 //! has the proof and the bound.
 
@@ -54,7 +54,7 @@ const EVERYWHERE: Aabb = Aabb {
 /// Scratch; kept from frame to frame.
 #[derive(Debug, Default)]
 pub(super) struct HubScratch {
-    /// Slots of primitives; those with the same vertices follow each other.
+    /// Slots of elements; those with the same vertices follow each other.
     slots: Vec<Slot>,
     entries: Vec<ConeEntry>,
     nodes: Vec<ConeNode>,
@@ -63,7 +63,7 @@ pub(super) struct HubScratch {
     beyond: [Vec<Alike>; 2],
 }
 
-/// Primitives with the same vertices: the range of their places in `HubScratch::slots`.
+/// Elements with the same vertices: the range of their places in `HubScratch::slots`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 struct Alike {
     start: u32,
@@ -80,7 +80,7 @@ impl Alike {
 struct ConeEntry {
     cone: Aabb,
     alike: Alike,
-    /// The hubs of the primitive with which the current hub forms an axis.
+    /// The hubs of the element with which the current hub forms an axis.
     partners: HubSet,
 }
 
@@ -98,7 +98,7 @@ struct ConePair {
     b: usize,
 }
 
-/// Where a primitive lies as seen from the shared hub or axis.
+/// Where an element lies as seen from the shared hub or axis.
 enum SeenFrom {
     Cone(Aabb),
     Nowhere,
@@ -140,7 +140,7 @@ impl HubScratch {
                 decider.decide_alike(body, slots);
             }
             match seen(body, shared, slots[0]) {
-                // By the rule, such a primitive meets only primitives with the same vertices.
+                // By the rule, such an element meets only elements with the same vertices.
                 SeenFrom::Nowhere => {}
                 SeenFrom::Beyond(end) => self.beyond[end].push(alike),
                 SeenFrom::Cone(cone) => self.entries.push(ConeEntry {
@@ -283,7 +283,7 @@ impl ConeTree<'_> {
     }
 }
 
-/// A primitive's vertices, each once, ascending, filled up with the largest number.
+/// An element's vertices, each once, ascending, filled up with the largest number.
 fn sorted_ids(corners: &[u32]) -> [u32; 4] {
     let mut ids = [u32::MAX; 4];
     for (ix, &id) in corners.iter().enumerate() {
@@ -295,7 +295,7 @@ fn sorted_ids(corners: &[u32]) -> [u32; 4] {
     ids
 }
 
-/// Where a primitive lies as seen from a hub or from an axis.
+/// Where an element lies as seen from a hub or from an axis.
 fn seen(body: &BodyRef<'_>, shared: &[u32], slot: Slot) -> SeenFrom {
     let corners = body.corners(slot);
     let point = |id: u32| body.positions.point(id as usize);

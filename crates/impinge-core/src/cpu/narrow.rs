@@ -28,16 +28,16 @@ use super::lane_pairs::{LanePairs, RowSide, WorkItem};
 use super::world::{BodyRef, World};
 use crate::simd::{Isa, Lanes, Simd, with_isa};
 
-/// Two primitives whose boxes overlap: parts, and slots in their clusters' orders.
+/// Two elements whose boxes overlap: parts, and slots in their clusters' orders.
 #[derive(Debug, Clone, Copy)]
 pub struct Candidate {
     /// The first part.
     pub a: PartIx,
     /// The second part.
     pub b: PartIx,
-    /// Slot of the primitive of `a`.
+    /// Slot of the element of `a`.
     pub slot_a: Slot,
-    /// Slot of the primitive of `b`.
+    /// Slot of the element of `b`.
     pub slot_b: Slot,
 }
 
@@ -210,8 +210,8 @@ impl Decider {
         self.decide_shared_by_all(body, &[slot_a], &[slot_b]);
     }
 
-    /// Decides all pairs of a primitive of the one list with one of the other, under
-    /// `SharedVertex::Resolve`. Primitives of one list have the same vertices, and a vertex is in
+    /// Decides all pairs of an element of the one list with one of the other, under
+    /// `SharedVertex::Resolve`. Elements of one list have the same vertices, and a vertex is in
     /// both.
     pub fn decide_shared_by_all(&mut self, body: &BodyRef<'_>, a: &[Slot], b: &[Slot]) {
         let n_pairs = a.len() as u64 * b.len() as u64;
@@ -219,7 +219,7 @@ impl Decider {
         self.decide_as_one(body, [a[0], b[0]], n_pairs, pairs);
     }
 
-    /// Decides all pairs of a list, under `SharedVertex::Resolve`. Its primitives have the same
+    /// Decides all pairs of a list, under `SharedVertex::Resolve`. Its elements have the same
     /// vertices.
     pub fn decide_alike(&mut self, body: &BodyRef<'_>, list: &[Slot]) {
         let &[first, second, ..] = list else {
@@ -471,7 +471,7 @@ impl<'a> BodyLookup<'a> {
         })
     }
 
-    /// Gathers a batch; false if any primitive does not have N corners.
+    /// Gathers a batch; false if any element does not have N corners.
     #[inline(always)]
     fn fill<S: Simd, const N: usize>(
         &mut self,
@@ -516,7 +516,7 @@ fn slots_in_common(chunk: &[Candidate]) -> Option<([Slot; LANES], [Slot; LANES])
     same.then_some(slots)
 }
 
-/// Puts primitives of one body into all lanes.
+/// Puts elements of one body into all lanes.
 #[inline(always)]
 fn put_all<S: Simd, const N: usize>(
     simd: S,
@@ -550,7 +550,7 @@ fn put_all<S: Simd, const N: usize>(
     }
 }
 
-/// Puts a primitive into a lane.
+/// Puts an element into a lane.
 #[inline(always)]
 fn put<const N: usize>(
     side: &mut [[[f64; LANES]; 3]; N],
@@ -558,7 +558,7 @@ fn put<const N: usize>(
     positions: &Positions,
     corners: &[u32; N],
 ) {
-    // The match is outside the loop: one predictable branch per primitive, not one per vertex.
+    // The match is outside the loop: one predictable branch per element, not one per vertex.
     match positions {
         Positions::F32(positions) => {
             let positions = &positions[..];

@@ -1,21 +1,21 @@
-//! Stage `pairing`: which primitives of two clusters have boxes that meet.
+//! Stage `pairing`: which elements of two clusters have boxes that meet.
 //!
 //! In: work items (two clusters). Out: candidates, which `narrow` decides item by item, while both
 //! groups are in the cache.
 //!
-//! 0. The boxes of a cluster's primitives, and their corners, are computed when first needed; a
+//! 0. The boxes of a cluster's elements, and their corners, are computed when first needed; a
 //!    worker caches those of the clusters it saw last. Work items come in the order of the tree, so
 //!    most clusters are cached.
-//! 1. The two clusters' boxes intersect in a box; primitives of either side that do not meet it
+//! 1. The two clusters' boxes intersect in a box; elements of either side that do not meet it
 //!    drop out, for a partner's box lies in its cluster's box.
 //! 2. Each survivor of the smaller side is tested against the survivors of the other, 16 (or 8)
-//!    lanes at a time: one 64-bit mask per primitive.
+//!    lanes at a time: one 64-bit mask per element.
 //!    Where these are very many, `directions` clears most of them.
 //! 3. Within one body the adjacency masks clear the lanes that share a vertex, or set apart those
 //!    that `creases` leaves open. Pairs that share a hub are cleared under any rule: `hubs` decides
 //!    them.
 //!
-//! Invariant: a pair of primitives lies in one work item only, so no candidate comes twice. On a
+//! Invariant: a pair of elements lies in one work item only, so no candidate comes twice. On a
 //! CPU these box tests beat the 4x4x4 sub-cell masks of the paper, see `docs/lab/intersections.md`.
 
 use crate::workers::clock::Instant;
@@ -92,7 +92,7 @@ pub(crate) fn full(size: usize) -> u64 {
     u64::MAX >> (GROUP - size)
 }
 
-/// Pairs the primitives of some work items and decides the candidates.
+/// Pairs the elements of some work items and decides the candidates.
 #[inline(always)]
 pub(crate) fn run<S: Simd>(
     simd: S,
@@ -181,7 +181,7 @@ struct CulledItem {
 /// The lanes of a cluster whose elements have numbers up to one.
 #[inline(never)]
 fn lanes_up_to(world: World<'_>, part: PartIx, cluster: ClusterIx, to: Number) -> u64 {
-    let elements = world.cache(part).clustering.primitives(cluster);
+    let elements = world.cache(part).clustering.elements(cluster);
     let part = world.plan.part(part);
     (0..).zip(elements).fold(0, |lanes, (lane, &element)| {
         lanes | u64::from(part.number(element) <= to) << lane
@@ -333,7 +333,7 @@ fn clear_hubs(hubs: &Hubs, item: &WorkItem, rows: RowSide, masks: &mut Masks) {
     }
 }
 
-/// Treats the primitives of one body that share a vertex.
+/// Treats the elements of one body that share a vertex.
 struct VertexRule<'a> {
     body: BodyRef<'a>,
     cluster_a: ClusterIx,

@@ -292,7 +292,7 @@ impl Refit {
 
 /// The scratches of the workers that compute boxes.
 fn for_boxes<'a>(job: Job<'_>, tuning: &Tuning, scratches: &'a mut [Worker]) -> &'a mut [Worker] {
-    let parallel = job.plan.n_primitives() >= tuning.bounds_parallel_from;
+    let parallel = job.plan.n_elements() >= tuning.bounds_parallel_from;
     let n_workers = if parallel { job.workers.n() } else { 1 };
     &mut scratches[..n_workers]
 }

@@ -1,4 +1,4 @@
-//! The second level: which primitives of two groups of one cell touch a common sub-cell.
+//! The second level: which elements of two groups of one cell touch a common sub-cell.
 //!
 //! A box touches a product of ranges of the 4 x 4 x 4 sub-cells. Two products share a sub-cell if
 //! and only if their ranges overlap along x, along y and along z. So the 64 x 64 occupancy bits of
@@ -20,7 +20,7 @@ use super::pairing::full;
 use super::world::BodyRef;
 use crate::simd::{Isa, LaneBounds, Lanes32, Simd, with_isa};
 
-/// Which pairs of primitives that share a sub-cell are wanted.
+/// Which pairs of elements that share a sub-cell are wanted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SubcellQuery {
     /// Only pairs whose boxes overlap.
@@ -48,9 +48,9 @@ pub(crate) struct GroupPair<'a> {
 pub(crate) struct Lanes64 {
     boxes: LaneBounds,
     corners: [Lanes32; 4],
-    /// For each primitive of the other group, the lanes that it meets.
+    /// For each element of the other group, the lanes that it meets.
     pub partners: [u64; GROUP],
-    /// For each primitive of the other group, those of its partners that share a vertex with it.
+    /// For each element of the other group, those of its partners that share a vertex with it.
     pub adjacent: [u64; GROUP],
 }
 
@@ -66,7 +66,7 @@ impl Default for Lanes64 {
 }
 
 impl Lanes64 {
-    /// Finds the partners in b of each primitive of a.
+    /// Finds the partners in b of each element of a.
     pub fn find(&mut self, isa: Isa, groups: GroupPair<'_>, query: SubcellQuery) {
         with_isa!(isa, find, (
             lanes: &mut Lanes64 = self,
@@ -179,7 +179,7 @@ mod tests {
             (state >> 33) % n
         };
         let kept: Vec<InRegion> = ElementIx::up_to(400)
-            .map(|primitive| {
+            .map(|element| {
                 let min: [f32; 3] = std::array::from_fn(|_| random(30) as f32 / 10.0);
                 let bounds = Aabb {
                     min,
@@ -189,7 +189,7 @@ mod tests {
                     bounds,
                     range: grid.range(&bounds),
                     part: PartIx::new(0),
-                    primitive,
+                    element,
                 }
             })
             .collect();

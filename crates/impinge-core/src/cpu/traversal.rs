@@ -3,7 +3,7 @@
 //!
 //! In: two trees of boxes. Out: pairs of leaves, each once. Eight boxes are tested at a time; the
 //! stack holds pairs of nodes whose boxes are known to overlap. Cost: proportional to the node
-//! pairs that overlap. Reason for each discard: boxes that do not overlap hold primitives that
+//! pairs that overlap. Reason for each discard: boxes that do not overlap hold elements that
 //! cannot meet.
 
 use crate::bvh::bounds::Aabb;
@@ -144,7 +144,7 @@ pub(crate) fn meeting<S: Simd, E>(
 }
 
 /// Calls `emit(leaf, other)`, `leaf <= other`, for every leaf with itself and every pair of
-/// different leaves of one tree whose boxes overlap, except below pairs of nodes whose primitives
+/// different leaves of one tree whose boxes overlap, except below pairs of nodes whose elements
 /// all name a common hub.
 #[inline(always)]
 pub(crate) fn within<S: Simd, E>(

@@ -27,7 +27,7 @@ pub(crate) struct BodyCache {
     pub positions_stamp: u64,
     pub clustering: Arc<Clustering>,
     pub bounds: TreeBounds,
-    /// The box of all primitives.
+    /// The box of all elements.
     pub whole: Aabb,
     /// The clusters that lie beside all bodies that this one could meet; only for bodies that are
     /// large enough.
@@ -62,11 +62,11 @@ pub struct World<'a> {
     pub scene: &'a Scene,
     /// The parts.
     pub plan: &'a Plan,
-    /// `Clusters` only: slots of primitives are slots in the clusters' orders.
+    /// `Clusters` only: slots of elements are slots in the clusters' orders.
     pub(crate) caches: Option<&'a Caches>,
 }
 
-/// One part's data. A *slot* names a primitive: in the order of the clusters if there
+/// One part's data. A *slot* names an element: in the order of the clusters if there
 /// are any, else as the body numbers it.
 #[derive(Clone, Copy)]
 pub struct BodyRef<'a> {
@@ -80,7 +80,7 @@ pub struct BodyRef<'a> {
 }
 
 impl<'a> World<'a> {
-    /// A view in which slots are the bodies' own numbers of primitives.
+    /// A view in which slots are the bodies' own numbers of elements.
     pub fn new(scene: &'a Scene, plan: &'a Plan) -> Self {
         World {
             scene,
@@ -123,7 +123,7 @@ impl BodyCache {
 }
 
 impl<'a> BodyRef<'a> {
-    /// The global number of the primitive at a slot.
+    /// The global number of the element at a slot.
     #[inline(always)]
     pub fn global(&self, slot: Slot) -> Number {
         self.part.number(match self.order {
@@ -132,7 +132,7 @@ impl<'a> BodyRef<'a> {
         })
     }
 
-    /// The vertex ids of the primitive at a slot.
+    /// The vertex ids of the element at a slot.
     #[inline(always)]
     pub fn corners(&self, slot: Slot) -> &'a [u32] {
         self.elements.corners(slot.index())

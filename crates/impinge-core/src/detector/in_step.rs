@@ -151,7 +151,7 @@ impl InStep<'_> {
         if job.plan.question == Question::Overlap {
             return run_naive(&BoxOverlap, job, stats, |kind, key, ()| emit(kind, key));
         }
-        let labels = Labels::new(job.plan.n_primitives());
+        let labels = Labels::new(job.plan.n_elements());
         run_naive(&Within, job, stats, |kind, key, ()| {
             emit(kind, labels.put(key, Labels::UNKNOWN))
         })

@@ -197,7 +197,7 @@ pub(super) fn name_features(
         workers,
         control,
     } = job;
-    let labels = Labels::new(plan.n_primitives());
+    let labels = Labels::new(plan.n_elements());
     near.set_threads(workers.n());
     let mut unnamed = near.fill(keys, query, workers.task(TASK))?;
     let n_tasks = unnamed.len() as u64;

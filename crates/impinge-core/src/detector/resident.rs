@@ -88,7 +88,7 @@ impl Gpu<'_> {
     /// packed, with the usage `COPY_SRC`, copied when the encoder's commands run; other bodies'
     /// positions come from the scene. For the named bodies, the scene's positions only serve to
     /// find clusters, once. Positions on the device are not checked: if one is not finite, the
-    /// pairs of its primitives are unspecified.
+    /// pairs of its elements are unspecified.
     ///
     /// At most one frame of a detector may be encoded per submission, and it must be submitted
     /// before the detector is asked anything else or encodes into another encoder: see [`Gpu`].

@@ -194,7 +194,7 @@ impl SolverMemory {
             control,
         } = job;
         self.keys = keys;
-        let labels = Labels::new(plan.n_primitives());
+        let labels = Labels::new(plan.n_elements());
         let n_each = workers.task(TASK);
         let mut tasks = Vec::new();
         let lists = self.keys.iter_mut().zip(&mut self.distances);
@@ -335,7 +335,7 @@ impl Outcome<u64, { PairKind::ALL.len() }> for Safe<'_> {
         })?;
         self.safe.fill(scene, shares.iter())?;
         // The keys of the pairs that touch, which have no labels now.
-        let labels = Labels::new(plan.n_primitives());
+        let labels = Labels::new(plan.n_elements());
         let lists = self.memory.keys.iter().zip(&self.memory.distances);
         let mut touching = KeysByKind::default();
         for (touching, (keys, distances)) in touching.iter_mut().zip(lists) {

@@ -1,7 +1,7 @@
 //! The method `Cells`, the paper's two levels, as a recording.
 //!
 //! ```text
-//! bounds     as in Clusters, for the boxes of bodies · reach · primitives within reach
+//! bounds     as in Clusters, for the boxes of bodies · reach · elements within reach
 //! grid       resolution, eq. (1) · ranges, eq. (3) · shift · count
 //! traversal   room for lists and work items, eq. (4) · scatter
 //! pairing    prepare · level 2
@@ -24,14 +24,14 @@ use super::pass_buffers::Capacities;
 use super::recording::{Recorder, Workgroups};
 use crate::scene::error::Error;
 
-/// Slot of the arguments for launches over kept primitives, 64 per workgroup.
+/// Slot of the arguments for launches over kept elements, 64 per workgroup.
 const KEPT: u32 = 0;
 /// Slot of the arguments for launches over cells, 64 per workgroup.
 const CELLS: u32 = 1;
 
 /// The work of a pass in cells. To split a single cell over several passes takes tiles: every pass
 /// that fills lists does so in the order in which threads happen to come, so tiles would not hold
-/// the same primitives from pass to pass.
+/// the same elements from pass to pass.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum CellWork {
     /// All of some cells.
@@ -64,11 +64,11 @@ impl CellWork {
         }
     }
 
-    /// Smaller parts; `None` if splitting does not help. `kept`: for how many kept primitives there
+    /// Smaller parts; `None` if splitting does not help. `kept`: for how many kept elements there
     /// was room.
     pub fn split(self, collected: &Collected, kept: u64) -> Option<Vec<CellWork>> {
         match self {
-            // The kept primitives do not depend on the cells.
+            // The kept elements do not depend on the cells.
             CellWork::All(_) if collected.counts.needed.kept > kept => None,
             CellWork::All(cells) => Some(match cells.split(collected.grid.n_cells) {
                 Some(halves) => halves.map(CellWork::All).into(),
@@ -361,13 +361,13 @@ impl Recorder<'_> {
             .launch(&kernels.traversal_scatter, &scatter, kept);
     }
 
-    /// The workgroups of launches over kept primitives.
+    /// The workgroups of launches over kept elements.
     pub fn over_kept(&self) -> Workgroups {
         self.indirect(KEPT)
     }
 
     /// Stage `bounds` of methods that work in a grid: the boxes of bodies, their reach, and the
-    /// primitives within reach.
+    /// elements within reach.
     pub fn bounds_within_reach(&mut self) {
         let (gpu, world, view, pass_buffers) = (self.gpu, self.world, self.view, self.pass_buffers);
         self.recording.clear(pass_buffers.tallies.all());
@@ -404,7 +404,7 @@ impl Recorder<'_> {
             .launch(&gpu.kernels.bounds_keep, &keep, groups);
     }
 
-    /// Stage `grid`, up to the ranges of kept primitives and their shift, with cells as dense as
+    /// Stage `grid`, up to the ranges of kept elements and their shift, with cells as dense as
     /// `lambda`.
     pub fn grid(&mut self, lambda: f64) {
         self.recording.stage("grid");

@@ -43,7 +43,7 @@ const WIDEST: u64 = 1 << 34;
 pub struct Engine {
     pub(super) gpu: Arc<GpuContext>,
     pub(super) settings: Settings,
-    /// The number of primitives of the frame that was too large for `Cells`.
+    /// The number of elements of the frame that was too large for `Cells`.
     too_much: Option<u64>,
     /// The most bytes of one buffer of topology or positions, if less than the device allows.
     pub most_bound: u64,
@@ -223,7 +223,7 @@ impl Engine {
         self.turn_to(Motion::Still);
         // The engine's own bytes are on the device.
         answer.share(0);
-        if self.too_much.is_some_and(|n| plan.n_primitives() < n) {
+        if self.too_much.is_some_and(|n| plan.n_elements() < n) {
             self.too_much = None;
             self.take(self.settings.method);
         }
@@ -334,7 +334,7 @@ impl Engine {
         resident: &[BodyId],
         stats: &mut Stats,
     ) -> Result<Vec<Arc<Clustering>>, Error> {
-        // Not judged in `Cells`, where clusters only show which primitives are out of reach.
+        // Not judged in `Cells`, where clusters only show which elements are out of reach.
         let is_judged = self.lane.method == Method::Clusters;
         let judges = |id| is_judged && !resident.contains(&id);
         self.clusterings.of_frame(job, judges, stats)
@@ -519,9 +519,9 @@ impl Engine {
         self.lane.method == Method::Cells && self.guest.is_none()
     }
 
-    /// Answers this frame, and later ones with at least as many primitives, by `Clusters`.
+    /// Answers this frame, and later ones with at least as many elements, by `Clusters`.
     fn take_clusters(&mut self, plan: &Plan) {
-        self.too_much = Some(plan.n_primitives());
+        self.too_much = Some(plan.n_elements());
         self.take(Method::Clusters);
     }
 
@@ -555,7 +555,7 @@ impl Engine {
             most.min(budget / SHARE_OF_CELLS / CellsWanted::CELL)
         });
         // Below 2^25, so the cast back is exact enough.
-        let asked = (plan.n_primitives() as f64 * self.settings.density).min(MOST_CELLS as f64);
+        let asked = (plan.n_elements() as f64 * self.settings.density).min(MOST_CELLS as f64);
         Some(CellsWanted {
             n_cells: (asked.ceil() as u64).min(most).max(1),
             n_bodies: count(plan.parts.len()).max(self.world.n_parts()),

@@ -37,7 +37,7 @@ words! {
         category: [u32; 2], mask: [u32; 2],
         first_slot: u32, first_number: u32,
     }
-    /// A run of primitives and its unique vertices.
+    /// A run of elements and its unique vertices.
     Cluster { first_slot: u32, first_vertex: u32, sizes: u32, body: u32 }
     /// The nodes of one height.
     Level { first: u32, count: u32 }
@@ -47,10 +47,10 @@ words! {
     WorkItem { a: u32, b: u32 }
     /// Two slots, with flags.
     Candidate { a: u32, b: u32 }
-    /// Two global primitive numbers that certainly intersect; in a step, two slots of a pair that
+    /// Two global element numbers that certainly intersect; in a step, two slots of a pair that
     /// is searched, with flags.
     PairKey { low: u32, high: u32 }
-    /// Two global primitive numbers left to exact arithmetic; in a step that the host decides, two
+    /// Two global element numbers left to exact arithmetic; in a step that the host decides, two
     /// slots.
     UnsureKey { low: u32, high: u32 }
     /// Until when a pair of a step certainly does not touch, and by when it certainly does: the
@@ -67,7 +67,7 @@ words! {
         reach: u32, queue_room: u32, items_room: u32,
         kept_room: u32, entries_room: u32, pairs_room: u32, searched_room: u32,
     }
-    /// A primitive within its body's reach.
+    /// An element within its body's reach.
     Kept { low: [u32; 3], slot: u32, high: [u32; 3], body: u32, range: [u32; 3], unused: u32 }
     /// The box in which a body may meet others.
     Reach { low: [u32; 3], gap: u32, high: [u32; 3], gap_too: u32 }
@@ -92,11 +92,11 @@ words! {
     Coordinate { bits: u32 }
     /// How far a vertex may move: the bits of an f32.
     Share { bits: u32 }
-    /// The corners of a primitive; a triangle repeats its last corner.
+    /// The corners of an element; a triangle repeats its last corner.
     Corners { vertices: [u32; 4] }
     /// A vertex of a cluster.
     ClusterVertex { vertex: u32 }
-    /// The number of the primitive at a slot, within its part; in a piece the global one.
+    /// The number of the element at a slot, within its part; in a piece the global one.
     Order { number: u32 }
     /// How much of something was needed.
     Counter { n: u32 }
@@ -140,7 +140,7 @@ pub const N_PAIRS: u32 = 34;
 pub const N_UNSURE: u32 = 35;
 /// Not 0 if a counter has passed 2^32, or one invocation had too much work.
 pub const TOO_MUCH: u32 = 36;
-/// Counter of kept primitives.
+/// Counter of kept elements.
 pub const N_KEPT: u32 = 37;
 /// Counter of entries of the cell lists.
 pub const N_ENTRIES: u32 = 38;
@@ -180,7 +180,7 @@ pub const RULES_N_PAIRS: u32 = 4;
 pub const RULES_MARKS: u32 = 5;
 /// Marks vertices that never move, in these rules.
 pub const PINNED: u32 = 0x8000_0000;
-/// The root of a body without primitives, and the top if there is no tree over bodies.
+/// The root of a body without elements, and the top if there is no tree over bodies.
 pub const NO_ROOT: u32 = u32::MAX;
 /// The least time by which some pair of a step certainly touches, the bits of an f32.
 pub const TOUCHES_BY: u32 = 42;

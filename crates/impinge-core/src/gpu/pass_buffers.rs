@@ -28,7 +28,7 @@ pub struct Capacities {
     pub queue: u64,
     /// Work items.
     pub items: u64,
-    /// `Cells`: primitives within reach of another body.
+    /// `Cells`: elements within reach of another body.
     pub kept: u64,
     /// `Cells`: entries of the cell lists.
     pub entries: u64,
@@ -156,7 +156,7 @@ pub struct PassBuffers {
     pub queues: [Storage<NodePair>; 2],
     /// Pairs of clusters; only `Clusters`.
     pub items: Storage<WorkItem>,
-    /// Pairs of primitives whose boxes overlap.
+    /// Pairs of elements whose boxes overlap.
     pub candidates: Storage<Candidate>,
     /// Pairs that certainly intersect.
     pub pairs: Storage<PairKey>,
@@ -184,7 +184,7 @@ pub struct PassBuffers {
     pub arguments: Storage<Arguments>,
     /// Pairs of groups of one cell; only `Cells`, as all below.
     pub cell_items: Storage<CellItem>,
-    /// Primitives within reach of another body.
+    /// Elements within reach of another body.
     pub kept: Storage<Kept>,
     /// The lists of all cells, one after the other.
     pub entries: Storage<ListEntry>,

@@ -221,7 +221,7 @@ impl Engine {
         };
         let is_allowed = pass_buffers.is_none_or(|pass_buffers| lean.bytes() <= pass_buffers);
         if lean == now || !is_allowed || !lean.fit(&self.gpu) {
-            return Err(self.too_small("the primitives of one cell", lean));
+            return Err(self.too_small("the elements of one cell", lean));
         }
         Ok(lean)
     }

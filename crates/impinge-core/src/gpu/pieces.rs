@@ -12,7 +12,7 @@
 //! ```
 //!
 //! Two runs of one body count as one body on the device, with one numbering of their vertices: so
-//! primitives share a vertex there if and only if they do in the whole body. The host decides which
+//! elements share a vertex there if and only if they do in the whole body. The host decides which
 //! runs meet, so the device has no tree over bodies.
 //!
 //! Cost: quadratic in the number of chunks, but chunks are compact and most of their boxes do
@@ -102,17 +102,17 @@ pub fn cut<'a>(
             chunk.bounds.join(&run.bounds);
         }
     };
-    let n_primitives = plan.n_primitives() as usize;
-    workers.install(n_primitives, || {
+    let n_elements = plan.n_elements() as usize;
+    workers.install(n_elements, || {
         for_each(chunks.iter_mut().collect(), find_boxes);
     })?;
     Ok(chunks)
 }
 
-/// The pairs of runs of a piece that may hold pairs of primitives, lower number first: runs of the
+/// The pairs of runs of a piece that may hold pairs of elements, lower number first: runs of the
 /// first chunk come before those of the second. For a single chunk, the pairs within it.
 ///
-/// Two primitives can only meet if the boxes of their runs do. Cost: a sweep along x.
+/// Two elements can only meet if the boxes of their runs do. Cost: a sweep along x.
 pub fn meeting(plan: &Plan, chunks: &[&Chunk]) -> Vec<[u32; 2]> {
     let mut pairs = Vec::new();
     if let [a, b] = chunks

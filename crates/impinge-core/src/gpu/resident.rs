@@ -25,12 +25,12 @@ use crate::search::stats::Stats;
 
 /// The buffers that hold the pairs of an encoded frame once its commands have run.
 ///
-/// Both lists hold two `u32` per pair: the numbers of its primitives, the lower one first.
-/// Primitives are numbered consecutively, body after body in the order of their ids. Which bodies
+/// Both lists hold two `u32` per pair: the numbers of its elements, the lower one first.
+/// Elements are numbered consecutively, body after body in the order of their ids. Which bodies
 /// take part depends on the query, also on its scope: of
 /// [`Query::between`](crate::Query::between) only two do, and the first of them is numbered from 0.
 /// So the numbers of a body are those of its [part](ResidentPart) in [`parts`](Self::parts):
-/// primitive `i` of the body has the number `first + i`. The order of pairs is not specified.
+/// element `i` of the body has the number `first + i`. The order of pairs is not specified.
 ///
 /// If a count is at most the capacity of its list, the list holds all pairs. If it is larger, pairs
 /// are missing: the list had no room for all, or the device had none for an earlier stage, which
@@ -54,7 +54,7 @@ pub struct ResidentPairs {
     pub pairs_capacity: u64,
     /// The number of unsure pairs that the list has room for.
     pub unsure_capacity: u64,
-    /// The numbers of the primitives of each body that takes part, in their order.
+    /// The numbers of the elements of each body that takes part, in their order.
     pub parts: Vec<ResidentPart>,
 }
 
@@ -124,7 +124,7 @@ pub struct ResidentStep {
 pub struct ResidentPart {
     /// The body.
     pub body: BodyId,
-    /// In a frame [`Part::Given`], the primitives of the body. In a step edges, vertices or faces;
+    /// In a frame [`Part::Given`], the elements of the body. In a step edges, vertices or faces;
     /// tetrahedra have those of their surface.
     pub part: Part,
     /// The number of its first element.
@@ -237,7 +237,7 @@ impl Engine {
         let of_kinds = |kinds: &[Part]| {
             let parts = plan.parts.iter();
             let numbers = parts.filter(|part| kinds.contains(&part.part));
-            numbers.map(|part| part.n_primitives).sum()
+            numbers.map(|part| part.n_elements).sum()
         };
         Ok(ResidentStep {
             pairs: pass_buffers.unsure.buffer().clone(),
@@ -519,7 +519,7 @@ fn parts(plan: &Plan) -> Vec<ResidentPart> {
         body: part.id,
         part: part.part,
         first: part.first.raw(),
-        len: part.n_primitives,
+        len: part.n_elements,
     });
     parts.collect()
 }

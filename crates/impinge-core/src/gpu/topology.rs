@@ -1,4 +1,4 @@
-//! The clusters as they are sent to the device once per topology: primitives, corners and vertices.
+//! The clusters as they are sent to the device once per topology: elements, corners and vertices.
 
 use std::ops::Range;
 
@@ -13,13 +13,13 @@ pub struct DeviceClusters {
     pub clusters: Vec<Cluster>,
     pub cluster_vertices: Vec<ClusterVertex>,
     pub corners: Vec<Corners>,
-    /// The global number of each primitive.
+    /// The global number of each element.
     pub numbers: Vec<Order>,
     pub has_solids: bool,
 }
 
 impl DeviceClusters {
-    /// Appends a run of clusters of a body whose first primitive has the global number `first`.
+    /// Appends a run of clusters of a body whose first element has the global number `first`.
     /// `body`: its number on the device; `on_device`: where each of its vertices is there.
     pub fn push(
         &mut self,
@@ -53,8 +53,8 @@ impl DeviceClusters {
         });
         self.corners.extend(corners);
         let order = clustering.order[slots].iter();
-        self.numbers.extend(order.map(|&primitive| Order {
-            number: first.plus(primitive).raw(),
+        self.numbers.extend(order.map(|&element| Order {
+            number: first.plus(element).raw(),
         }));
     }
 }
@@ -62,7 +62,7 @@ impl DeviceClusters {
 /// The size of the data to send.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Weight {
-    pub n_primitives: u64,
+    pub n_elements: u64,
     pub n_vertices: u64,
     pub n_cluster_vertices: u64,
     pub n_clusters: u64,
@@ -77,8 +77,8 @@ const fn bytes<T>(n: u64) -> u64 {
 impl Weight {
     /// Adds a cluster of a piece, with nodes and a body of its own, as if no other cluster shared
     /// them.
-    pub fn add_cluster(&mut self, n_primitives: u64, n_vertices: u64) {
-        self.n_primitives += n_primitives;
+    pub fn add_cluster(&mut self, n_elements: u64, n_vertices: u64) {
+        self.n_elements += n_elements;
         self.n_vertices += n_vertices;
         self.n_cluster_vertices += n_vertices;
         self.n_clusters += 1;
@@ -89,7 +89,7 @@ impl Weight {
     /// Bytes of the largest buffer.
     pub fn binding(&self) -> u64 {
         let sizes = [
-            bytes::<Corners>(self.n_primitives),
+            bytes::<Corners>(self.n_elements),
             bytes::<[Coordinate; 3]>(self.n_vertices),
             bytes::<ClusterVertex>(self.n_cluster_vertices),
             bytes::<Node>(self.n_nodes),
@@ -100,8 +100,8 @@ impl Weight {
 
     /// Bytes of all buffers.
     pub fn bytes(&self) -> u64 {
-        bytes::<Corners>(self.n_primitives)
-            + bytes::<Order>(self.n_primitives)
+        bytes::<Corners>(self.n_elements)
+            + bytes::<Order>(self.n_elements)
             + bytes::<[Coordinate; 3]>(self.n_vertices)
             + bytes::<ClusterVertex>(self.n_cluster_vertices)
             + bytes::<Cluster>(self.n_clusters)

@@ -57,7 +57,7 @@ use super::topology::{DeviceClusters, Most, Weight, narrowed};
 use super::view::{Motion, SLACK, View};
 
 /// Bit 31 of a slot is a flag.
-pub const MOST_PRIMITIVES: u64 = 1 << 31;
+pub const MOST_ELEMENTS: u64 = 1 << 31;
 /// Vertices whose positions a task sends.
 const SENT_BY_A_TASK: u64 = 1 << 14;
 /// Bytes of a vertex.
@@ -164,16 +164,16 @@ pub struct DeviceWorld {
     pub clusters: Storage<Cluster>,
     /// The vertices of each cluster, each once.
     pub cluster_vertices: Storage<ClusterVertex>,
-    /// The corners of the primitive at each slot.
+    /// The corners of the element at each slot.
     pub corners: Storage<Corners>,
-    /// The number of the primitive at each slot.
+    /// The number of the element at each slot.
     pub order: Storage<Order>,
     /// The coordinates of all bodies, of each end in turn.
     pub positions: Storage<Coordinate>,
 }
 
 /// The size of the query_parts of a frame on the device; `None` if 32 bits do not number its
-/// vertices, primitives or bodies.
+/// vertices, elements or bodies.
 pub(crate) fn weigh(
     job: Job<'_>,
     motion: Motion,
@@ -192,7 +192,7 @@ fn weigh_parts<'a>(
     let mut ids = Vec::new();
     for (id, clustering) in parts {
         ids.push(id);
-        weight.n_primitives += count(clustering.order.len());
+        weight.n_elements += count(clustering.order.len());
         weight.n_cluster_vertices += count(clustering.vertices.len());
         weight.n_clusters += count(clustering.n_clusters());
         let shape = &clustering.shape;
@@ -210,7 +210,7 @@ fn weigh_parts<'a>(
     let vertices = ids.iter().map(|id| scene.body_in(id.slot()).n_vertices());
     weight.n_vertices = motion.n_ends() * vertices.map(count).sum::<u64>();
     let is_numbered = 3 * weight.n_vertices <= u64::from(u32::MAX)
-        && weight.n_primitives < MOST_PRIMITIVES
+        && weight.n_elements < MOST_ELEMENTS
         && count(ids.len()) < 1 << (32 - BODY_SHIFT);
     is_numbered.then_some(weight)
 }
@@ -733,7 +733,7 @@ fn put(positions: &Positions, vertices: Range<usize>, mut to: wgpu::WriteOnly<'_
     }
 }
 
-/// A point of a body: the first corner of its first primitive. The tree over parts is built from
+/// A point of a body: the first corner of its first element. The tree over parts is built from
 /// these points.
 pub(super) fn sample(scene: &Scene, id: BodyId) -> [f32; 3] {
     let body = scene.body_in(id.slot());

@@ -57,7 +57,7 @@ pub struct QueryPart {
     pub first: Number,
     /// How many numbers its elements take up. Vertices are numbered as positions are, whether they
     /// take part or not.
-    pub n_primitives: u32,
+    pub n_elements: u32,
     /// The kind of its elements.
     pub kind: BodyKind,
     /// Whether its self-collision is queried.
@@ -93,7 +93,7 @@ impl QueryPart {
 
     /// The global numbers of its elements.
     pub fn numbers(&self) -> Range<Number> {
-        self.first..self.number(ElementIx::new(self.n_primitives))
+        self.first..self.number(ElementIx::new(self.n_elements))
     }
 }
 
@@ -465,7 +465,7 @@ impl Plan {
     }
 
     /// The number of elements of all parts together.
-    pub fn n_primitives(&self) -> u64 {
+    pub fn n_elements(&self) -> u64 {
         self.parts
             .last()
             .map_or(0, |last| u64::from(last.numbers().end.raw()))

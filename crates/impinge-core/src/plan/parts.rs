@@ -115,7 +115,7 @@ impl Plan {
         if part != Part::Given && elements.is_empty() {
             return Ok(());
         }
-        let first = self.n_primitives();
+        let first = self.n_elements();
         let n = match part {
             Part::Vertices => body.n_vertices() as u64,
             _ => elements.len() as u64,
@@ -123,7 +123,7 @@ impl Plan {
         let limit = u64::from(u32::MAX);
         if first + n > limit {
             return Err(Error::TooMany {
-                what: "primitives in one query",
+                what: "elements in one query",
                 given: first + n,
                 limit,
             });
@@ -132,7 +132,7 @@ impl Plan {
             id,
             part,
             first: Number::new(first as u32),
-            n_primitives: n as u32,
+            n_elements: n as u32,
             kind: elements.kind(),
             numbers_stamp: body.numbers_stamp(part),
             positions_stamp: body.positions_stamp(),

@@ -1,14 +1,14 @@
 //! The nearest elements of two bodies, by branch and bound over their clusters' trees.
 //!
 //! A queue holds pairs of nodes, nearest boxes first. The nearest pair is taken: if both are
-//! clusters, their primitives are compared, else one node is replaced by its children. When the
+//! clusters, their elements are compared, else one node is replaced by its children. When the
 //! next pair is farther than the best distance found so far, that distance is the answer.
 //!
 //! A pair of nodes is skipped only if its boxes are farther apart than the best distance by more
 //! than the rounding error: those along the coordinate axes, or those along the best pair's
 //! shortest way and across it. Distances in `f64` lead the search. Pairs that bounds in `f64`
 //! cannot tell from the nearest are settled at the end by their exact distances, rounded down. So
-//! no pair of primitives is lost whose distance is as small or smaller, and the answer does not
+//! no pair of elements is lost whose distance is as small or smaller, and the answer does not
 //! depend on the order of the search.
 
 use std::cmp::{Ordering, Reverse};
@@ -44,7 +44,7 @@ const DIRECTIONS_FROM: usize = 256;
 /// Stands for no element.
 const NONE: ElementIx = ElementIx::new(u32::MAX);
 /// Pairs of nodes between two looks at the control: a few milliseconds, if all are clusters whose
-/// primitives are compared.
+/// elements are compared.
 const LOOK: u64 = 8;
 /// By how much, relative to the largest coordinate, rounding may make a computed distance smaller
 /// than the distance of the boxes.
@@ -74,10 +74,10 @@ impl PartialOrd for WaitingNodes {
     }
 }
 
-/// A primitive of a cluster that is compared.
+/// An element of a cluster that is compared.
 #[derive(Debug, Clone, Copy)]
-struct ComparedPrimitive {
-    primitive: ElementIx,
+struct ComparedElement {
+    element: ElementIx,
     bounds: Extent,
     /// Along the axes of the view; as `bounds` before there is one.
     turned: Extent,
@@ -99,7 +99,7 @@ const MOST_CLOSE: usize = 4096;
 /// A pair that may be nearest.
 #[derive(Debug, Clone, Copy)]
 struct ClosePair {
-    primitives: [ElementIx; 2],
+    elements: [ElementIx; 2],
     /// Its distance is certainly not below this; in the search's scale.
     low: f64,
 }
@@ -107,7 +107,7 @@ struct ClosePair {
 /// The best pair so far.
 struct Best {
     squared: f64,
-    primitives: [ElementIx; 2],
+    elements: [ElementIx; 2],
     points: Option<[Point; 2]>,
 }
 
@@ -125,7 +125,7 @@ struct FoundDistance {
     is_newer: bool,
     /// What rounding may do to distances of boxes: along coordinate axes, and along others.
     errors: [f64; 2],
-    lists: [Vec<ComparedPrimitive>; 2],
+    lists: [Vec<ComparedElement>; 2],
     directions: Box<[Directions64; 2]>,
 }
 
@@ -168,7 +168,7 @@ impl DistanceSearch<'_> {
         let mut found = FoundDistance {
             best: Best {
                 squared: most,
-                primitives: [NONE; 2],
+                elements: [NONE; 2],
                 points: None,
             },
             close: Vec::new(),
@@ -233,18 +233,18 @@ impl DistanceSearch<'_> {
     }
 
     fn answer(&self, found: &mut FoundDistance) -> FoundNearest {
-        let touching = found.best.primitives;
+        let touching = found.best.elements;
         if found.best.squared == 0.0 && touching != [NONE; 2] {
             let points = [where_they_touch(self.bodies, touching); 2];
             return Some((0.0, Nearest::new(0.0, self.ids, touching, points)));
         }
         self.settle(found);
-        let (distance, primitives) = found.nearest?;
-        let [a, b] = primitives;
-        let boxes = [0, 1].map(|side| self.box_of(side, primitives[side]));
+        let (distance, elements) = found.nearest?;
+        let [a, b] = elements;
+        let boxes = [0, 1].map(|side| self.box_of(side, elements[side]));
         let gap = self.gap(a, b, boxes[0].squared_distance(&boxes[1]));
         let points = gap.points.map(|point| self.scale.point_back(point));
-        let nearest = Nearest::new(distance, self.ids, primitives, points);
+        let nearest = Nearest::new(distance, self.ids, elements, points);
         Some((gap.squared, nearest))
     }
 
@@ -253,27 +253,27 @@ impl DistanceSearch<'_> {
     fn settle(&self, found: &mut FoundDistance) {
         let high = found.high();
         found.close.retain(|pair| pair.low <= high);
-        found.close.sort_unstable_by_key(|pair| pair.primitives);
-        found.close.dedup_by_key(|pair| pair.primitives);
+        found.close.sort_unstable_by_key(|pair| pair.elements);
+        found.close.dedup_by_key(|pair| pair.elements);
         let kinds = self.bodies.map(Body::kind);
-        for ClosePair { primitives, low } in found.close.drain(..) {
+        for ClosePair { elements, low } in found.close.drain(..) {
             // Floats from here on are too far away.
             let limit = match found.nearest {
                 None => f64::INFINITY,
-                Some((distance, best)) if best <= primitives => distance,
+                Some((distance, best)) if best <= elements => distance,
                 Some((distance, _)) => distance.next_up(),
             };
             if self.scale.is_one() && low >= limit {
                 continue;
             }
-            let [a, b] = [0, 1].map(|side| corners(self.bodies[side], primitives[side]));
+            let [a, b] = [0, 1].map(|side| corners(self.bodies[side], elements[side]));
             let [n_a, n_b] = kinds.map(BodyKind::n_corners);
             // Beyond the largest float, all are as far apart.
             if limit < f64::INFINITY && apart_along_axes(&a[..n_a], &b[..n_b]) >= limit {
                 continue;
             }
             if let Some(distance) = exact_distance(kinds, [&a, &b], limit) {
-                found.nearest = Some((distance, primitives));
+                found.nearest = Some((distance, elements));
             }
         }
     }
@@ -283,9 +283,9 @@ impl DistanceSearch<'_> {
         self.scale.extent(&self.trees[side].bounds(node))
     }
 
-    fn box_of(&self, side: usize, primitive: ElementIx) -> Extent {
+    fn box_of(&self, side: usize, element: ElementIx) -> Extent {
         let body = self.bodies[side];
-        box_along(body, primitive.index(), |point| self.scale.point(point))
+        box_along(body, element.index(), |point| self.scale.point(point))
     }
 
     fn waiting(&self, nodes: [Node; 2]) -> WaitingNodes {
@@ -330,7 +330,7 @@ impl DistanceSearch<'_> {
         }
     }
 
-    /// Compares all primitives of two clusters.
+    /// Compares all elements of two clusters.
     fn compare(&self, nodes: [Node; 2], found: &mut FoundDistance) {
         if found.best.squared == f64::INFINITY {
             self.guess(nodes, found);
@@ -343,15 +343,15 @@ impl DistanceSearch<'_> {
         let axes = found.view.as_ref().map(|view| view.axes);
         for side in 0..2 {
             lists[side].clear();
-            for &primitive in self.trees[side].primitives(nodes[side]) {
-                let bounds = self.box_of(side, primitive);
+            for &element in self.trees[side].elements(nodes[side]) {
+                let bounds = self.box_of(side, element);
                 if bounds.squared_distance(&whole[1 - side]) > limits[0] {
                     continue;
                 }
                 let turned = match (&axes, &turned) {
                     (Some(axes), Some(others)) => {
                         let body = self.bodies[side];
-                        let turned = box_along(body, primitive.index(), |point| {
+                        let turned = box_along(body, element.index(), |point| {
                             axes.turn(self.scale.point(point))
                         });
                         if turned.squared_distance(&others[1 - side]) > limits[1] {
@@ -361,8 +361,8 @@ impl DistanceSearch<'_> {
                     }
                     _ => bounds,
                 };
-                lists[side].push(ComparedPrimitive {
-                    primitive,
+                lists[side].push(ComparedElement {
+                    element,
                     bounds,
                     turned,
                 });
@@ -392,8 +392,8 @@ impl DistanceSearch<'_> {
                 {
                     continue;
                 }
-                let pair = [a.primitive, b.primitive];
-                if found.best.squared == 0.0 && pair > found.best.primitives {
+                let pair = [a.element, b.element];
+                if found.best.squared == 0.0 && pair > found.best.elements {
                     continue;
                 }
                 self.improve(found, pair, [a.bounds, b.bounds]);
@@ -407,7 +407,7 @@ impl DistanceSearch<'_> {
     /// normals, if they are many: boxes of long ones overlap although they are far from each other.
     fn put_directions(
         &self,
-        lists: &[Vec<ComparedPrimitive>; 2],
+        lists: &[Vec<ComparedElement>; 2],
         directions: &mut [Directions64; 2],
     ) -> bool {
         let are_triangles = self
@@ -420,7 +420,7 @@ impl DistanceSearch<'_> {
         for side in 0..2 {
             directions[side].begin(3);
             for (lane, compared) in lists[side].iter().enumerate() {
-                let [p, q, r, _] = corners(self.bodies[side], compared.primitive);
+                let [p, q, r, _] = corners(self.bodies[side], compared.element);
                 directions[side].put(lane, &[p, q, r]);
             }
         }
@@ -433,14 +433,14 @@ impl DistanceSearch<'_> {
         let mut boxes = [0, 1].map(|side| self.bounds(side, nodes[side]));
         let mut pair = [ElementIx::new(0); 2];
         for side in [0, 1, 0] {
-            let near = |&primitive: &ElementIx| {
-                let bounds = self.box_of(side, primitive);
-                (bounds.squared_distance(&boxes[1 - side]), primitive, bounds)
+            let near = |&element: &ElementIx| {
+                let bounds = self.box_of(side, element);
+                (bounds.squared_distance(&boxes[1 - side]), element, bounds)
             };
-            let all = self.trees[side].primitives(nodes[side]).iter().map(near);
+            let all = self.trees[side].elements(nodes[side]).iter().map(near);
             let nearest = all.min_by(|x, y| x.0.total_cmp(&y.0));
-            if let Some((_, primitive, bounds)) = nearest {
-                (pair[side], boxes[side]) = (primitive, bounds);
+            if let Some((_, element, bounds)) = nearest {
+                (pair[side], boxes[side]) = (element, bounds);
             }
         }
         self.improve(found, pair, boxes);
@@ -451,17 +451,17 @@ impl DistanceSearch<'_> {
         let best = &found.best;
         let gap = self.gap(a, b, boxes[0].squared_distance(&boxes[1]));
         let is_less =
-            gap.squared < best.squared || (gap.squared == best.squared && [a, b] < best.primitives);
+            gap.squared < best.squared || (gap.squared == best.squared && [a, b] < best.elements);
         if is_less {
             found.take(Best {
                 squared: gap.squared,
-                primitives: [a, b],
+                elements: [a, b],
                 points: (gap.squared > 0.0).then_some(gap.points),
             });
         }
         if gap.squared > 0.0 && gap.low <= found.high() {
             found.close.push(ClosePair {
-                primitives: [a, b],
+                elements: [a, b],
                 low: gap.low,
             });
             if found.close.len() >= MOST_CLOSE {
@@ -470,11 +470,11 @@ impl DistanceSearch<'_> {
         }
     }
 
-    /// The distance of two primitives: 0 if they meet.
+    /// The distance of two elements: 0 if they meet.
     fn gap(&self, a: ElementIx, b: ElementIx, apart: f64) -> Gap {
         let [body_a, body_b] = self.bodies;
         let (a, b) = (corners(body_a, a), corners(body_b, b));
-        // Primitives in boxes that are apart do not meet. But the distance of such boxes may
+        // Elements in boxes that are apart do not meet. But the distance of such boxes may
         // underflow to 0.
         if apart == 0.0 && intersect(body_a.kind(), &a, body_b.kind(), &b) {
             return Gap {
@@ -496,7 +496,7 @@ impl DistanceSearch<'_> {
     }
 }
 
-/// The largest float that is at most the gap of two primitives along some coordinate axis.
+/// The largest float that is at most the gap of two elements along some coordinate axis.
 fn apart_along_axes(a: &[Point], b: &[Point]) -> f64 {
     let [a, b] = [a, b].map(|corners| Extent::of(corners.iter().copied()));
     let gap = |high: f64, low: f64| match two_sum(high, -low) {

@@ -46,8 +46,8 @@ impl Distances {
         self.of_two.begin(scene);
     }
 
-    /// The smallest distance of two bodies and the pair of primitives that has it; `None` if one
-    /// body has no primitives.
+    /// The smallest distance of two bodies and the pair of elements that has it; `None` if one
+    /// body has no elements.
     ///
     /// # Errors
     /// A body that is not in the scene, the same body twice, bad positions that were written in

@@ -1,8 +1,8 @@
-//! The distance of two primitives that do not meet, in `f64`.
+//! The distance of two elements that do not meet, in `f64`.
 //!
 //! It is the least distance of a corner of one to a face of the other, and of an edge of one to an
 //! edge of the other (Ericson, *Real-Time Collision Detection*, 2005, 5.1.5 and 5.1.9). Each case
-//! finds one point on each primitive, and the distance is that of the two points. So it is never
+//! finds one point on each element, and the distance is that of the two points. So it is never
 //! less than the true distance by more than the rounding of these points, however inaccurate the
 //! parameters that led to them. One fixed order of operations, no fused multiply-add: the same bits
 //! everywhere.
@@ -15,12 +15,12 @@ fn along(p: Point, t: f64, d: Point) -> Point {
     [p[0] + t * d[0], p[1] + t * d[1], p[2] + t * d[2]]
 }
 
-/// Two points, one on each primitive, and the square of their distance.
+/// Two points, one on each element, and the square of their distance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Gap {
     pub squared: f64,
     pub points: [Point; 2],
-    /// A number that is certainly not above the distance of the primitives; 0 until that is asked
+    /// A number that is certainly not above the distance of the elements; 0 until that is asked
     /// for ([`Gap::at_least`]).
     pub low: f64,
 }
@@ -43,7 +43,7 @@ impl Gap {
         }
     }
 
-    /// A number that is certainly not above the distance of two primitives: how far apart they are
+    /// A number that is certainly not above the distance of two elements: how far apart they are
     /// along the way between these points, less what rounding may do (`docs/exactness.md`, "The
     /// smallest distance of two bodies").
     pub fn at_least(&self, a: &[Point], b: &[Point]) -> f64 {
@@ -153,7 +153,7 @@ fn features(n_corners: usize) -> Features {
     }
 }
 
-/// The nearest points of two primitives of three or four corners each that do not meet.
+/// The nearest points of two elements of three or four corners each that do not meet.
 pub(super) fn gap(a: &[Point], b: &[Point]) -> Gap {
     let (of_a, of_b) = (features(a.len()), features(b.len()));
     let mut least = Gap {

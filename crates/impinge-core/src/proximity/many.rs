@@ -290,7 +290,7 @@ fn compare(
 ) -> Option<bool> {
     let common = Extent::from(&common);
     let within = |side: usize| {
-        let elements = trees[side].primitives(nodes[side]).iter();
+        let elements = trees[side].elements(nodes[side]).iter();
         let boxed = elements.map(move |&element| (element, box_of(bodies[side], element.index())));
         boxed.filter(move |(_, bounds)| bounds.overlaps(&common))
     };

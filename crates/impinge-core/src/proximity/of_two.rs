@@ -89,12 +89,12 @@ impl OfTwo {
         if let Some(found) = self.search(scene, ids, most, MOST_OVERLAPPING, control)? {
             return Ok(found);
         }
-        let Some(primitives) = touching()? else {
+        let Some(elements) = touching()? else {
             let found = self.search(scene, ids, most, u64::MAX, control)?;
             return Ok(found.flatten());
         };
         let bodies = [scene.body(ids[0])?, scene.body(ids[1])?];
-        let elements = primitives.map(ElementIx::new);
+        let elements = elements.map(ElementIx::new);
         let points = [where_they_touch(bodies, elements); 2];
         let found = Some((0.0, Nearest::new(0.0, ids, elements, points)));
         note(&mut self.known, bodies, f64::INFINITY, (ids, found));

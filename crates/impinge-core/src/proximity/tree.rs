@@ -1,7 +1,7 @@
 //! The boxes of a body's clusters, and of the tree nodes above them.
 //!
 //! The clusters are those that all questions share. Their boxes are found once per pose, from each
-//! cluster's vertices; boxes of primitives only when a cluster is compared. Cost: `O(n)`.
+//! cluster's vertices; boxes of elements only when a cluster is compared. Cost: `O(n)`.
 
 use std::sync::Arc;
 
@@ -93,7 +93,7 @@ impl Tree {
         boxes.sum()
     }
 
-    /// The root; `None` without primitives.
+    /// The root; `None` without elements.
     pub fn root(&self) -> Option<Node> {
         let n_levels = self.clustering.shape.n_levels();
         (n_levels > 0).then(|| Node {
@@ -115,25 +115,25 @@ impl Tree {
         self.clustering.shape.children_of(node)
     }
 
-    /// The primitives of a cluster.
-    pub fn primitives(&self, node: Node) -> &[ElementIx] {
-        self.clustering.primitives(ClusterIx::new(node.number))
+    /// The elements of a cluster.
+    pub fn elements(&self, node: Node) -> &[ElementIx] {
+        self.clustering.elements(ClusterIx::new(node.number))
     }
 }
 
-/// The box of a primitive, in `f64`.
-pub(super) fn box_of(body: &Body, primitive: usize) -> Extent {
-    box_along(body, primitive, |point| point)
+/// The box of an element, in `f64`.
+pub(super) fn box_of(body: &Body, element: usize) -> Extent {
+    box_along(body, element, |point| point)
 }
 
-/// The box of a primitive whose corners are mapped.
-pub(super) fn box_along(body: &Body, primitive: usize, map: impl Fn(Point) -> Point) -> Extent {
-    let corners = body.elements().corners(primitive).iter();
+/// The box of an element whose corners are mapped.
+pub(super) fn box_along(body: &Body, element: usize, map: impl Fn(Point) -> Point) -> Extent {
+    let corners = body.elements().corners(element).iter();
     Extent::of(corners.map(|&vertex| map(body.positions().point(vertex as usize))))
 }
 
-/// The corners of a primitive; one with fewer than four repeats its last.
-pub(super) fn corners(body: &Body, primitive: ElementIx) -> [Point; 4] {
-    let vertices = body.elements().four_corners(primitive.index());
+/// The corners of an element; one with fewer than four repeats its last.
+pub(super) fn corners(body: &Body, element: ElementIx) -> [Point; 4] {
+    let vertices = body.elements().four_corners(element.index());
     vertices.map(|vertex| body.positions().point(vertex as usize))
 }

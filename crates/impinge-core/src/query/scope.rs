@@ -22,7 +22,7 @@ pub enum SharedVertex {
     /// For triangles that are not degenerate: sharing one vertex, when the edge opposite it in one
     /// meets the other triangle; sharing an edge, when they are coplanar and fold to the same side.
     /// For tetrahedra: when the intersection is larger than the common vertex, edge or face. If the
-    /// indices of one primitive are some of those of the other, but not all, the intersection is
+    /// indices of one element are some of those of the other, but not all, the intersection is
     /// the hull, and the pair is not reported: a triangle with a repeated index, for example.
     ///
     /// Edges and points of one body that share a vertex are not reported under either rule.
@@ -350,7 +350,7 @@ impl Query {
     /// Only the pairs that belong to the half-open box `[low, high)`: for programs that cut space
     /// into cells themselves, such as MPI codes. A pair belongs to the cell that holds the larger
     /// of the lower corners of its two bounding boxes, axis by axis. So if each process has all
-    /// primitives whose boxes touch its cell, and the cells cover space without overlap, each pair
+    /// elements whose boxes touch its cell, and the cells cover space without overlap, each pair
     /// of the whole is found by exactly one process. Bounds may be infinite.
     ///
     /// For a step, boxes hold their elements from the start to the end. If pairs at a distance

@@ -18,9 +18,9 @@ pub enum Method {
     /// Groups are fixed by topology; in each frame only their boxes move. The fastest method for
     /// bodies that are asked about more than once: the first frame pays for the groups.
     Clusters,
-    /// The two-level grid of the paper: the primitives of a cell form groups, made anew each frame.
+    /// The two-level grid of the paper: the elements of a cell form groups, made anew each frame.
     Cells,
-    /// Every box against every box: the oracle, quadratic in primitives.
+    /// Every box against every box: the oracle, quadratic in elements.
     Naive,
 }
 

@@ -66,18 +66,18 @@ macro_rules! thresholds {
 }
 
 thresholds! {
-    /// From this many primitives of all bodies on, helpers are woken at the beginning of a frame of
+    /// From this many elements of all bodies on, helpers are woken at the beginning of a frame of
     /// `Clusters`.
     call_from: u64 = 30_000,
-    /// From this many primitives on, a frame is expected to take so long that sleeping helpers are
+    /// From this many elements on, a frame is expected to take so long that sleeping helpers are
     /// woken, whatever the last frame took.
     wake_from: u64 = 300_000,
-    /// From this many primitives on, a body is clustered on several threads.
+    /// From this many elements on, a body is clustered on several threads.
     pool_from: usize = 4096,
     /// The most units of work per task, whatever a stage's units are: the stages' own limits are
     /// lower. At least one.
     most_per_task: usize = usize::MAX,
-    /// Stage `bounds` of `Clusters`: with fewer primitives of all bodies, one thread computes the
+    /// Stage `bounds` of `Clusters`: with fewer elements of all bodies, one thread computes the
     /// boxes. Positions have just been written, mostly by one thread. If they fit in its cache,
     /// this thread reads them faster than another could fetch them.
     bounds_parallel_from: u64 = 120_000,
@@ -87,7 +87,7 @@ thresholds! {
     /// again.
     stale_from: f64 = 1.5,
     /// The clusters of a body are sorted (see `cpu::culled`) if it has at least this many
-    /// primitives.
+    /// elements.
     culled_from: usize = 2_048,
     /// Clusters stay sorted if at least one in this many lies beside the other bodies.
     culled_one_in: usize = 4,
@@ -96,13 +96,13 @@ thresholds! {
     /// Frames after which all boxes are found again, to see which clusters are culled by now and
     /// how well clusters fit.
     culled_lasts: u32 = 64,
-    /// Stage `bounds` of `Cells`: with fewer primitives, waking a thread costs more than it saves.
+    /// Stage `bounds` of `Cells`: with fewer elements, waking a thread costs more than it saves.
     cull_parallel_from: u64 = 100_000,
     /// The most bodies for which a coarse map is made (see `cpu::cull`); never more than 32.
     most_maps: usize = 8,
-    /// Primitives of all bodies per cell of the map. At least one.
+    /// Elements of all bodies per cell of the map. At least one.
     map_cell: u64 = 8,
-    /// The most rows of the map that one primitive marks; a larger primitive counts as being
+    /// The most rows of the map that one element marks; a larger element counts as being
     /// everywhere.
     most_marked: u32 = 256,
     /// The most work items per batch: the methods' own limits are lower. At least one.
@@ -123,12 +123,12 @@ thresholds! {
     /// With fewer keys, or with fewer keys than half the numbers of elements, one thread sorts them
     /// in place as fast.
     sort_from: usize = 1 << 15,
-    /// `Auto`: from this many primitives of new bodies on, the grid is worth a try. With fewer,
+    /// `Auto`: from this many elements of new bodies on, the grid is worth a try. With fewer,
     /// clusters are made in about a millisecond.
     auto_from: u64 = 10_000,
-    /// `Auto`: bodies with fewer primitives than this do not count as new.
+    /// `Auto`: bodies with fewer elements than this do not count as new.
     auto_body_from: u32 = 1_000,
-    /// `Auto`: with more primitives in a cell than this (see `Cells::crowding`), making clusters
+    /// `Auto`: with more elements in a cell than this (see `Cells::crowding`), making clusters
     /// costs less than pairing all of a cell.
     auto_most_crowded: u64 = 64,
 }
@@ -150,7 +150,7 @@ pub struct Ways {
     pub n_came_back: u64,
     /// Bodies that were entered in a coarse map.
     pub n_mapped: u64,
-    /// Bodies with primitives too large for the map.
+    /// Bodies with elements too large for the map.
     pub n_everywhere: u64,
     /// Clusters that took the place of others in a worker's cache.
     pub n_evicted: u64,

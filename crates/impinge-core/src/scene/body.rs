@@ -71,7 +71,7 @@ impl Body {
     /// A body of a mesh.
     ///
     /// # Errors
-    /// More primitives or vertices than 32 bits number, a position or an index that is refused.
+    /// More elements or vertices than 32 bits number, a position or an index that is refused.
     pub(super) fn new(id: BodyId, mesh: Mesh, filter: Filter) -> Result<Body, Error> {
         let Mesh {
             elements,
@@ -80,7 +80,7 @@ impl Body {
         } = mesh;
         let limit = u64::from(u32::MAX);
         for (what, given) in [
-            ("primitives of one body", elements.len() as u64),
+            ("elements of one body", elements.len() as u64),
             ("vertices of one body", positions.len() as u64),
         ] {
             if given > limit {
@@ -90,10 +90,10 @@ impl Body {
         positions.check(id)?;
         let n_vertices = positions.len();
         let bad_index = elements.first_bad_index(n_vertices);
-        if let Some((primitive, index)) = bad_index {
+        if let Some((element, index)) = bad_index {
             return Err(Error::VertexIndexOutOfRange {
                 body: id,
-                primitive,
+                element,
                 index,
                 n_vertices,
             });
@@ -196,8 +196,8 @@ impl Body {
         self.elements().kind()
     }
 
-    /// The number of primitives.
-    pub fn n_primitives(&self) -> usize {
+    /// The number of elements.
+    pub fn n_elements(&self) -> usize {
         self.elements().len()
     }
 

@@ -35,15 +35,15 @@ pub enum Error {
         /// The row as given.
         value: [f64; 3],
     },
-    /// A primitive names a vertex that does not exist. Check the index buffer's base.
+    /// An element names a vertex that does not exist. Check the index buffer's base.
     #[error(
-        "body {body}: element {primitive} names vertex {index}, but there are {n_vertices} vertices"
+        "body {body}: element {element} names vertex {index}, but there are {n_vertices} vertices"
     )]
     VertexIndexOutOfRange {
         /// The body, or the one that was about to be added.
         body: BodyId,
-        /// Index of the primitive within the body.
-        primitive: usize,
+        /// Index of the element within the body.
+        element: usize,
         /// The vertex index it names.
         index: u32,
         /// How many vertices the body has.
@@ -216,12 +216,12 @@ pub enum Error {
     WrongKind {
         /// The body.
         body: BodyId,
-        /// The kind of its primitives.
+        /// The kind of its elements.
         kind: &'static str,
         /// The kind that is needed.
         expected: &'static str,
     },
-    /// More primitives or vertices than 32-bit indices can name.
+    /// More elements or vertices than 32-bit indices can name.
     #[error("{what}: {given} given, at most {limit} can be held")]
     TooMany {
         /// What there are too many of.

@@ -184,7 +184,7 @@ impl Runner {
         outcome: &mut impl Outcome<T, LISTS>,
     ) -> Result<u64, Error> {
         let workers = &self.workers;
-        let _shift = workers.shift(plan.n_primitives());
+        let _shift = workers.shift(plan.n_elements());
         outcome.begin(plan);
         if !finder.checks_positions() {
             plan.check(scene, &self.workers)?;

@@ -39,7 +39,7 @@ pub struct Stats {
     pub grid: Option<[u32; 3]>,
     /// `Cells`: cells that went through the second level.
     pub n_subdivided: u64,
-    /// `Cells`: entries of the cell lists, where a primitive counts once per cell. Primitives that
+    /// `Cells`: entries of the cell lists, where an element counts once per cell. Elements that
     /// no other body comes near may have none.
     pub n_entries: u64,
     /// `Clusters`: clusters of all bodies that take part.
@@ -47,7 +47,7 @@ pub struct Stats {
     /// `Clusters` on the CPU: clusters that were proven to lie beside all other bodies, so that
     /// their boxes were not needed.
     pub n_culled: u64,
-    /// Work items: pairs of groups whose primitives were paired.
+    /// Work items: pairs of groups whose elements were paired.
     pub n_work_items: u64,
     /// Pairs whose boxes overlap and that the adjacency rule admits.
     pub n_candidates: u64,

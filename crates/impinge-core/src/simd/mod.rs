@@ -56,7 +56,7 @@ pub(crate) struct ClusterFaces<'a> {
     pub local: Option<&'a LocalFaces>,
 }
 
-/// One mask per primitive of a group.
+/// One mask per element of a group.
 #[derive(Debug, Clone)]
 #[repr(C, align(64))]
 pub struct Masks(pub [u64; GROUP]);
@@ -73,7 +73,7 @@ pub(crate) fn up_to(lane: usize) -> u64 {
     u64::MAX >> (GROUP - 1 - lane)
 }
 
-/// One number per primitive of a group.
+/// One number per element of a group.
 #[derive(Debug, Clone)]
 #[repr(C, align(64))]
 pub(crate) struct Lanes32(pub [u32; GROUP]);

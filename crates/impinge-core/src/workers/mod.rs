@@ -140,11 +140,11 @@ impl Workers {
     /// Keeps helpers awake between regions until the returned shift is dropped.
     ///
     /// Sleeping helpers are woken unless the frame will probably be over before they come. They are
-    /// woken if it has very many primitives; if the last frame took long, for so will this one; and
+    /// woken if it has very many elements; if the last frame took long, for so will this one; and
     /// if it follows the last one closely, for then they stay awake for the next one.
-    pub fn shift(&self, n_primitives: u64) -> Shift<'_> {
+    pub fn shift(&self, n_elements: u64) -> Shift<'_> {
         let start = Instant::now();
-        let wakes = n_primitives >= self.tuning.wake_from
+        let wakes = n_elements >= self.tuning.wake_from
             || self
                 .last()
                 .is_none_or(|(end, took)| took >= WORTH || start - end <= LINGER);
@@ -194,7 +194,7 @@ impl Workers {
     }
 
     /// Runs work that rayon parallelises, on as many threads as there are workers. With one worker,
-    /// or few primitives, it runs on this thread, for going to a pool takes 70 µs. Such work must
+    /// or few elements, it runs on this thread, for going to a pool takes 70 µs. Such work must
     /// ask `alone::is_alone` before it shares.
     ///
     /// Why a second pool beside the helpers: clustering splits a body recursively, which takes a
@@ -206,12 +206,12 @@ impl Workers {
     /// The pool's threads do not start.
     pub fn install<T: Send>(
         &self,
-        n_primitives: usize,
+        n_elements: usize,
         work: impl FnOnce() -> T + Send,
     ) -> Result<T, Error> {
         // One worker is this thread; in a fork, the pools of the process that created the workers
         // have no threads.
-        if self.n == 1 || n_primitives < self.tuning.pool_from || self.process != process() {
+        if self.n == 1 || n_elements < self.tuning.pool_from || self.process != process() {
             return Ok(alone(work));
         }
         let pool = match self.pool.get() {

@@ -114,7 +114,7 @@ fn two(name: &str, a: &Model, b: &Model, double: bool) -> Case {
     }
 }
 
-/// Bodies of every kind and precision, some with huge primitives.
+/// Bodies of every kind and precision, some with huge elements.
 fn many(n: u64, scale: f32) -> Case {
     let mut scene = Scene::new();
     for k in 0..n {
@@ -170,7 +170,7 @@ fn one_meets_itself(rule: SharedVertex) -> Case {
     }
 }
 
-/// Cases of up to a few thousand primitives: every kind, every query, lattice troublemakers, and
+/// Cases of up to a few thousand elements: every kind, every query, lattice troublemakers, and
 /// the adversarial scenes in small.
 pub fn cases() -> Vec<Case> {
     let mut cases = Vec::new();

@@ -182,7 +182,7 @@ fn steady_frames_leave_clusters_out_until_they_are_renewed() {
     }
     assert!((130..139).contains(&contest.n_frames_with));
     assert!(contest.n_frames_without >= 4);
-    let n_clusters = 2 * ball.n_primitives().div_ceil(64) as u64;
+    let n_clusters = 2 * ball.n_elements().div_ceil(64) as u64;
     assert!(contest.n_culled[0] > n_clusters / 3);
     // The same for every thread count and vector instruction set; the portable set leaves none out.
     assert_eq!(
@@ -385,7 +385,7 @@ fn from_low_to_high(model: Model) -> Model {
 
 #[test]
 fn bodies_that_several_tasks_read_lose_no_pair() {
-    // From 120,000 primitives on, two threads compute boxes; one task reads 4,096 vertices.
+    // From 120,000 elements on, two threads compute boxes; one task reads 4,096 vertices.
     let ball = from_low_to_high(surfaces::bumpy_ball(64_000, 0.2));
     let mut scene = Scene::new();
     let a = ball.add_to(&mut scene).unwrap();

@@ -1,4 +1,4 @@
-//! Hubs, vertices that very many primitives name: the oracle's answers, with work bounded by input
+//! Hubs, vertices that very many elements name: the oracle's answers, with work bounded by input
 //! plus output.
 
 use crate::common::{Case, check, naive};
@@ -63,7 +63,7 @@ fn fan(n: u32, turns: f64, height: impl Fn(f64) -> f64) -> (Vec<[u32; 3]>, Vec<[
     (faces, std::iter::once([0.0; 3]).chain(rim).collect())
 }
 
-/// Primitives over a few vertices on a small lattice; some vertices are named very often.
+/// Elements over a few vertices on a small lattice; some vertices are named very often.
 fn lattice<const N: usize>(
     n: usize,
     n_hubs: u64,
@@ -234,7 +234,7 @@ fn a_million_faces_with_the_same_vertices_cost_nothing() {
 }
 
 #[test]
-fn work_around_a_hub_is_bounded_by_its_primitives() {
+fn work_around_a_hub_is_bounded_by_its_elements() {
     let n = 50_000;
     let bound = |name: &str, elements: Elements, positions: &[[f64; 3]], expected: usize| {
         let (n_pairs, stats) = statistics(elements.clone(), positions, SharedVertex::Skip);

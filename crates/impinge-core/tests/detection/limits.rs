@@ -28,7 +28,7 @@ fn bad_bodies_are_refused_by_name() {
     assert!(matches!(
         error,
         Error::VertexIndexOutOfRange {
-            primitive: 1,
+            element: 1,
             index: 7,
             n_vertices: 3,
             ..
@@ -310,7 +310,7 @@ fn adversarial_scenes_hold_memory_in_proportion() {
         for (method, most_each) in [(Method::Clusters, 400), (Method::Cells, 400)] {
             let mut detector = Detector::new(cpu(method)).unwrap();
             let pairs = detector.detect(&built.scene, &built.query).unwrap();
-            let (n, n_bodies) = (built.n_primitives() as u64, built.bodies.len() as u64);
+            let (n, n_bodies) = (built.n_elements() as u64, built.bodies.len() as u64);
             let most = most_each * n + 2_000 * n_bodies + (16 << 20);
             let held = pairs.stats().bytes_held;
             assert!(

@@ -43,7 +43,7 @@ fn methods_agree_with_the_oracle() {
 
 /// A candidate is a pair that the adjacency rule admits and whose boxes overlap. The boxes of
 /// bodies in f64 are rounded to f32 outward, so there are a few more of them. Around a hub, a
-/// vertex of very many primitives, `Clusters` tells pairs apart by their directions, so there are
+/// vertex of very many elements, `Clusters` tells pairs apart by their directions, so there are
 /// fewer.
 #[test]
 fn methods_count_the_same_candidates() {
@@ -194,7 +194,7 @@ fn metamorphic_twins_agree() {
         assert_eq!(plain, swapped);
         // Scaling by a power of two is exact.
         assert_eq!(plain, pairs_of(&a.scaled(0.125), &b.scaled(0.125), method));
-        let n = a.n_primitives() as u32;
+        let n = a.n_elements() as u32;
         let mut reversed = a.clone();
         let impinge_core::Elements::Triangles(faces) = &mut reversed.elements else {
             unreachable!()
@@ -335,7 +335,7 @@ fn auto_asks_the_grid_once_and_clusters_from_then_on() {
     }
     assert_eq!(ask(&scene, &Query::between(e, f)), "cells");
     assert_eq!(ask(&scene, &Query::between(e, f)), "clusters");
-    // Small bodies do not count, however many they are; nor do few primitives.
+    // Small bodies do not count, however many they are; nor do few elements.
     let mut small = Scene::new();
     for ix in 0..40 {
         let at = [0.5 * ix as f32, 0.1, 0.0];

@@ -451,7 +451,7 @@ fn many_bodies_are_those_that_are_added_one_by_one() {
         .expect("good");
     let counts = ids
         .iter()
-        .map(|&id| many.body(id).expect("known").n_primitives());
+        .map(|&id| many.body(id).expect("known").n_elements());
     assert_eq!(counts.collect::<Vec<_>>(), [2, 0]);
 }
 
@@ -544,7 +544,7 @@ fn a_filter_of_the_callers_own_is_asked_once_per_pair_in_order() {
 }
 
 #[test]
-fn the_colliding_primitives_of_all_bodies_are_found_in_one_pass() {
+fn the_colliding_elements_of_all_bodies_are_found_in_one_pass() {
     let (elements, element_offsets, positions, vertex_offsets) = parts(250);
     let mut scene = Scene::new();
     let ids = scene

@@ -426,7 +426,7 @@ impl Watched {
             "culled_lasts" => new(clusters, &["culled_from"], n_culled, only_at_infinity),
             "cull_parallel_from" => new(cells, &[], n_shared, more_at_zero),
             "most_maps" => new(cells, &[], |stats| stats.ways.n_mapped, only_at_infinity),
-            // A finer map drops more primitives.
+            // A finer map drops more elements.
             "map_cell" => new(
                 cells,
                 &[],

@@ -1,4 +1,4 @@
-//! Distances of bodies: compared with every pair of primitives, and their properties.
+//! Distances of bodies: compared with every pair of elements, and their properties.
 
 use impinge_core::proximity::Nearest;
 use impinge_core::{Backend, BodyId, Detector, PairKind, Query, Scene, Settings};
@@ -23,9 +23,9 @@ fn nearest(a: &Model, b: &Model) -> Nearest {
     cpu().distance(&scene, a, b).unwrap().unwrap()
 }
 
-/// One primitive of a model as a model.
-fn alone(model: &Model, primitive: usize) -> Model {
-    let corners = model.elements.corners(primitive);
+/// One element of a model as a model.
+fn alone(model: &Model, element: usize) -> Model {
+    let corners = model.elements.corners(element);
     let positions = corners
         .iter()
         .map(|&v| model.positions[v as usize])
@@ -223,12 +223,12 @@ fn times_power(x: f64, exponent: i32) -> f64 {
     x * 2f64.powi(half) * 2f64.powi(exponent - half)
 }
 
-/// The box of each primitive.
+/// The box of each element.
 fn boxes(model: &Model) -> Vec<[[f32; 3]; 2]> {
     let elements = 0..model.elements.len();
     elements
-        .map(|primitive| {
-            let corners = model.elements.corners(primitive);
+        .map(|element| {
+            let corners = model.elements.corners(element);
             let along = |k: usize| corners.iter().map(move |&v| model.positions[v as usize][k]);
             [
                 [0, 1, 2].map(|k| along(k).fold(f32::INFINITY, f32::min)),
@@ -390,7 +390,7 @@ fn zero_means_that_they_touch() {
 }
 
 #[test]
-fn bodies_without_primitives_and_wrong_questions() {
+fn bodies_without_elements_and_wrong_questions() {
     let mut scene = Scene::new();
     let empty = scene.add_triangles::<f32>(&[], &[]).unwrap();
     let ball = surfaces::ball(20).add_to(&mut scene).unwrap();
@@ -468,7 +468,7 @@ fn far_from_the_origin_in_double_precision() {
     );
 }
 
-/// Bodies that touch have the lowest pair that does, by the first body's primitives and then by the
+/// Bodies that touch have the lowest pair that does, by the first body's elements and then by the
 /// second's, whichever body was added first and however many threads search.
 #[test]
 fn touching_bodies_have_their_lowest_pair() {

@@ -175,7 +175,7 @@ fn frames_on_the_device_leave_out_what_the_question_does() {
                     break lists.map(|list| BTreeSet::from_iter(list.expect("complete")));
                 }
             };
-            // Numbers of primitives, body after body.
+            // Numbers of elements, body after body.
             let mut first = 0;
             let firsts: Vec<u32> = scene
                 .bodies()

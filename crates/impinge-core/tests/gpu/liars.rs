@@ -28,7 +28,7 @@ fn answers_tampered_with_are_caught() {
         ("drops a pair", |rows| rows.truncate(rows.len() - 1)),
         ("repeats a pair", |rows| rows.insert(4, rows[4])),
         ("repeats one for another", |rows| rows[4] = rows[5]),
-        ("swaps primitives", |rows| rows[3].swap(1, 3)),
+        ("swaps elements", |rows| rows[3].swap(1, 3)),
     ];
     for (lie, tell) in lies {
         let mut told = answer.clone();

@@ -319,7 +319,7 @@ fn parts_of_a_frame_tell_bodies_apart() {
         let mut next = 0;
         for part in &found.parts {
             assert_eq!((part.part, part.first), (Part::Given, next));
-            let n = scene.body(part.body).expect("takes part").n_primitives();
+            let n = scene.body(part.body).expect("takes part").n_elements();
             assert_eq!(part.len as usize, n);
             next += part.len;
         }

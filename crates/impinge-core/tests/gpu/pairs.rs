@@ -82,7 +82,7 @@ fn one_cell(group_size: u32) -> Settings {
 
 #[test]
 fn a_crowded_cell_is_worked_in_tiles() {
-    // Groups of one primitive: more pairs of groups than one pass lists for one cell.
+    // Groups of one element: more pairs of groups than one pass lists for one cell.
     let soup = soup::triangles(300, 0.4, 11);
     let web = soup::lattice_web(60, 4, 9);
     let mut scene = Scene::new();
@@ -161,7 +161,7 @@ fn is_kept(budget: Option<u64>, stats: &Stats, n_pairs: usize) -> bool {
     budget.is_none_or(|budget| stats.bytes_held <= budget + answer)
 }
 
-/// 2,000 primitives per body, enough for several rounds and thousands of pairs.
+/// 2,000 elements per body, enough for several rounds and thousands of pairs.
 fn large() -> Case {
     let mut scene = Scene::new();
     let knot = surfaces::torus_knot(4000, Default::default());
@@ -584,7 +584,7 @@ fn topology_that_changes_within_its_room_is_bound_anew() {
             let shifted = model.translated([0.1, 0.03, 0.2]);
             scene.set_positions(b, &shifted.positions).unwrap();
             let case = Case {
-                name: format!("{method:?} of {}", model.n_primitives()),
+                name: format!("{method:?} of {}", model.n_elements()),
                 scene: scene.clone(),
                 query: Query::all(),
             };

@@ -199,7 +199,7 @@ fn mixed() -> (Scene, Vec<BodyId>) {
         .iter()
         .map(|at| at.map(|x| f64::from(x) + 1.0 / 3.0))
         .collect();
-    let faces: Vec<[u32; 3]> = (0..ball.n_primitives())
+    let faces: Vec<[u32; 3]> = (0..ball.n_elements())
         .map(|ix| {
             let corners = ball.elements.corners(ix);
             [corners[0], corners[1], corners[2]]

@@ -25,7 +25,7 @@ fn permuted<T: Copy, const N: usize>(values: &[T; N], random: &mut Random) -> [T
     random.permutation().map(|ix| values[ix])
 }
 
-/// Two primitives cut from one array of points.
+/// Two elements cut from one array of points.
 fn cut<const N: usize, const M: usize>(points: &[[f64; 3]]) -> ([[f64; 3]; N], [[f64; 3]; M]) {
     (
         points[..N].try_into().expect("N points"),
@@ -172,7 +172,7 @@ fn flat_tetrahedra_agree_with_the_oracle() {
     seen.assert_both(Kind::Lattice(3));
 }
 
-/// Ids of two primitives over a pool of `n_ids` points, often repeated within a primitive when
+/// Ids of two elements over a pool of `n_ids` points, often repeated within an element when
 /// `repeat` is set.
 fn random_ids<const N: usize>(random: &mut Random, n_ids: u64, repeat: bool) -> [u32; N] {
     loop {
@@ -184,7 +184,7 @@ fn random_ids<const N: usize>(random: &mut Random, n_ids: u64, repeat: bool) -> 
     }
 }
 
-/// Positions and ids of two primitives.
+/// Positions and ids of two elements.
 type SharedCase<const N: usize, const M: usize> =
     ([[f64; 3]; N], [u32; N], [[f64; 3]; M], [u32; M]);
 

@@ -82,7 +82,7 @@ pub fn intersect(a: &[[f64; 3]], b: &[[f64; 3]]) -> bool {
 }
 
 /// Whether the intersection of the two hulls is larger than the hull of the shared vertices.
-/// Also true for primitives with the same vertices.
+/// Also true for elements with the same vertices.
 pub fn intersect_beyond_shared(
     a: &[[f64; 3]],
     ids_a: &[u32],

@@ -101,7 +101,7 @@ fn minors(columns: &[[Polynomial; 4]]) -> HashSet<Polynomial> {
         for rows in subsets(4).filter(|rows| rows.len() == columns_in.len()) {
             let minor = determinant(columns, &columns_in, &rows);
             if minor.len() > 1 {
-                found.insert(primitive(minor));
+                found.insert(element(minor));
             }
         }
     }
@@ -258,7 +258,7 @@ fn chain(first: &Polynomial, second: &Polynomial) -> Vec<Polynomial> {
     let mut chain = vec![first.clone(), second.clone()];
     while chain[chain.len() - 1].len() > 1 {
         let rest = remainder(&chain[chain.len() - 2], &chain[chain.len() - 1]);
-        chain.push(primitive(rest.into_iter().map(|x| -x).collect()));
+        chain.push(element(rest.into_iter().map(|x| -x).collect()));
     }
     chain
 }
@@ -291,7 +291,7 @@ fn trimmed(mut polynomial: Polynomial) -> Polynomial {
 }
 
 /// Divided by the greatest common divisor of the coefficients.
-fn primitive(polynomial: Polynomial) -> Polynomial {
+fn element(polynomial: Polynomial) -> Polynomial {
     let mut divisor = IBig::ZERO;
     for coefficient in &polynomial {
         if *coefficient != IBig::ZERO {
@@ -358,11 +358,11 @@ fn divide(polynomial: &Polynomial, divisor: &Polynomial) -> (Polynomial, Polynom
 }
 
 fn remainder(polynomial: &Polynomial, divisor: &Polynomial) -> Polynomial {
-    primitive(divide(polynomial, divisor).1)
+    element(divide(polynomial, divisor).1)
 }
 
 fn quotient(polynomial: &Polynomial, divisor: &Polynomial) -> Polynomial {
-    primitive(divide(polynomial, divisor).0)
+    element(divide(polynomial, divisor).0)
 }
 
 fn common_divisor(a: &Polynomial, b: &Polynomial) -> Polynomial {
@@ -371,7 +371,7 @@ fn common_divisor(a: &Polynomial, b: &Polynomial) -> Polynomial {
         let rest = remainder(&a, &b);
         (a, b) = (b, rest);
     }
-    primitive(a)
+    element(a)
 }
 
 /// The oracle itself, on cases with obvious answers.

@@ -87,8 +87,8 @@ impl Glb {
         let mut written: HashMap<(u32, [u8; 3]), u32> = HashMap::new();
         let mut vertices: Vec<(u32, [u8; 3])> = Vec::new();
         let mut indices: Vec<u8> = Vec::with_capacity(12 * faces.len());
-        for (face, primitive_ix) in faces {
-            let color = mesh.color(primitive_ix);
+        for (face, element_ix) in faces {
+            let color = mesh.color(element_ix);
             for corner in face {
                 let ix = *written.entry((corner, color)).or_insert_with(|| {
                     vertices.push((corner, color));

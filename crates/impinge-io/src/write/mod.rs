@@ -29,38 +29,38 @@ use crate::mesh::{Elements, Positions};
 pub struct ColoredMesh<'a> {
     /// The positions of the vertices.
     pub positions: &'a Positions,
-    /// The primitives.
+    /// The elements.
     pub elements: &'a Elements,
-    /// Red, green and blue (sRGB, 0 to 255) of each primitive; `None` means light grey.
-    pub primitive_colors: Option<&'a [[u8; 3]]>,
-    /// Whether each primitive collides; only VTU stores this.
+    /// Red, green and blue (sRGB, 0 to 255) of each element; `None` means light grey.
+    pub element_colors: Option<&'a [[u8; 3]]>,
+    /// Whether each element collides; only VTU stores this.
     pub colliding: Option<&'a [bool]>,
     /// The name of the body, for formats that have names.
     pub name: &'a str,
 }
 
-/// The colour of primitives without a given colour.
+/// The colour of elements without a given colour.
 const GREY: [u8; 3] = [200, 200, 200];
 
 impl ColoredMesh<'_> {
-    fn color(&self, primitive_ix: usize) -> [u8; 3] {
-        self.primitive_colors
-            .map_or(GREY, |colors| colors[primitive_ix])
+    fn color(&self, element_ix: usize) -> [u8; 3] {
+        self.element_colors
+            .map_or(GREY, |colors| colors[element_ix])
     }
 
     /// Checks that numbers match and indices are in range, so that every written file can be read.
     fn check(&self, name: Name) -> Result<(), Error> {
-        let n_primitives = self.elements.len();
+        let n_elements = self.elements.len();
         for (what, given) in [
-            ("colours of", self.primitive_colors.map(<[_]>::len)),
+            ("colours of", self.element_colors.map(<[_]>::len)),
             ("colliding flags of", self.colliding.map(<[_]>::len)),
         ] {
-            if let Some(found) = given.filter(|&n| n != n_primitives) {
-                let what = format!("{what} the primitives of body '{}'", self.name);
+            if let Some(found) = given.filter(|&n| n != n_elements) {
+                let what = format!("{what} the elements of body '{}'", self.name);
                 return Err(Error::Mismatch {
                     file: name.0.to_owned(),
                     what,
-                    expected: n_primitives as u64,
+                    expected: n_elements as u64,
                     found: found as u64,
                 });
             }

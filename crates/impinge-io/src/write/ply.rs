@@ -73,27 +73,21 @@ pub fn write_ply(path: &Path, meshes: &[ColoredMesh]) -> Result<(), Error> {
         })
     };
     for ((mesh, body, first), faces) in bodies().zip(&surfaces) {
-        for &(face, primitive_ix) in faces {
-            put_primitive(&mut file, &face, first, mesh.color(primitive_ix), body)?;
+        for &(face, element_ix) in faces {
+            put_element(&mut file, &face, first, mesh.color(element_ix), body)?;
         }
     }
     for (mesh, body, first) in bodies() {
         if let Elements::Tetrahedra(tetrahedra) = mesh.elements {
-            for (primitive_ix, tetrahedron) in tetrahedra.iter().enumerate() {
-                put_primitive(
-                    &mut file,
-                    tetrahedron,
-                    first,
-                    mesh.color(primitive_ix),
-                    body,
-                )?;
+            for (element_ix, tetrahedron) in tetrahedra.iter().enumerate() {
+                put_element(&mut file, tetrahedron, first, mesh.color(element_ix), body)?;
             }
         }
     }
     file.finish()
 }
 
-fn put_primitive(
+fn put_element(
     file: &mut AtomicFile,
     corners: &[u32],
     first: u32,

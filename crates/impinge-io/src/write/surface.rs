@@ -2,7 +2,7 @@
 
 use crate::mesh::{Elements, Positions};
 
-/// Triangles to draw, each with its primitive: the triangles themselves, or the outward-oriented
+/// Triangles to draw, each with its element: the triangles themselves, or the outward-oriented
 /// faces of tetrahedra that no other tetrahedron shares.
 pub(super) fn surface(positions: &Positions, elements: &Elements) -> Vec<([u32; 3], usize)> {
     match elements {

@@ -15,7 +15,7 @@ const TETRA: u8 = 10;
 /// Writes bodies into one VTU file (VTK XML unstructured grid, raw appended data), for ParaView and
 /// the like.
 ///
-/// Cells are the primitives in their order, body by body. Cell data: `body`, the number of the body
+/// Cells are the elements in their order, body by body. Cell data: `body`, the number of the body
 /// (i32); `color`, red, green, blue (u8); and, if any body has
 /// [`colliding`](ColoredMesh::colliding), `colliding` (u8, 0 or 1; 0 for bodies without it).
 /// Positions are f32 if all bodies have f32, else f64: nothing is rounded.

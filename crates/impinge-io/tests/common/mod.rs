@@ -538,7 +538,7 @@ pub fn assert_valid(mesh: &Mesh) {
             .all(|c| c.is_finite()),
         "a coordinate that is not finite"
     );
-    assert!(!mesh.elements.is_empty(), "no primitives");
+    assert!(!mesh.elements.is_empty(), "no elements");
 }
 
 /// The part of a 3MF file that holds its model.

@@ -47,7 +47,7 @@ fn gltf_transforms_multiply_down_the_tree() {
         &ReadOptions::as_they_are(),
     )
     .or_show();
-    assert_eq!((mesh.n_vertices(), mesh.n_primitives()), (10, 6));
+    assert_eq!((mesh.n_vertices(), mesh.n_elements()), (10, 6));
     assert_eq!(mesh.positions.get(1), Some([2.0, 0.0, 0.0]));
     assert_eq!(mesh.positions.get(6), Some([2.0, 0.0, 5.0]));
     assert_eq!(triangles(&mesh)[3], TRIANGLES[0].map(|ix| ix + 5));
@@ -55,7 +55,7 @@ fn gltf_transforms_multiply_down_the_tree() {
 
 #[test]
 fn gltf_modes_shared_positions_and_external_buffers() {
-    // Two primitives of one mesh share their positions: a strip, and a fan without indices.
+    // Two elements of one mesh share their positions: a strip, and a fan without indices.
     let json = gltf_json(r#","uri":"my%20data.bin""#, "")
         .replace(r#""indices":1}"#, r#""indices":1,"mode":5},{"attributes":{"POSITION":0},"mode":6},{"attributes":{"POSITION":0},"mode":1}"#);
     let folder = tempfile::tempdir().unwrap();
@@ -216,7 +216,7 @@ fn gltf_instances_are_held_to_the_budget() {
     assert_eq!(
         read_bytes(&glb, Format::Gltf, "g", &options)
             .or_show()
-            .n_primitives(),
+            .n_elements(),
         3000
     );
     let options = ReadOptions {
@@ -305,7 +305,7 @@ fn meshes_outside_the_scene_are_counted() {
         let glb = glb_of(&json, &gltf_buffer());
         let read = read_bytes_with_summary(&glb, Format::Gltf, "g", &ReadOptions::as_they_are());
         let (mesh, summary) = read.or_show();
-        (mesh.n_primitives(), summary.n_out_of_scene)
+        (mesh.n_elements(), summary.n_out_of_scene)
     };
     // Without a choice, the first scene is read.
     assert_eq!(read("", r#"[{"nodes":[0]},{"nodes":[1,2]}]"#), (3, 2));

@@ -319,7 +319,7 @@ fn ply_strips_tetrahedra_and_other_elements() {
     assert!(
         matches!(
             error,
-            Error::NoPrimitives {
+            Error::NoElements {
                 wanted: "tetrahedra",
                 n_triangles: 3,
                 ..
@@ -444,7 +444,7 @@ fn what_follows_the_announced_data_is_counted() {
     let beyond = |format, bytes: &[u8]| {
         let read = read_bytes_with_summary(bytes, format, "f", &ReadOptions::as_they_are());
         let (mesh, summary) = read.or_show();
-        assert_eq!(mesh.n_primitives(), 1);
+        assert_eq!(mesh.n_elements(), 1);
         summary.n_bytes_beyond
     };
     let off = "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";

@@ -303,7 +303,7 @@ fn tetgen_files_find_each_other() {
     assert_eq!(
         read(&folder.path().join("a.face"), &options)
             .or_show()
-            .n_primitives(),
+            .n_elements(),
         1
     );
 

@@ -7,7 +7,7 @@ use impinge::{Body, Elements};
 /// No face has this number.
 const NONE: u32 = u32::MAX;
 
-/// The faces that stand for a body's primitives: its triangles, or the faces of its tetrahedra,
+/// The faces that stand for a body's elements: its triangles, or the faces of its tetrahedra,
 /// each once. Edges and points have none.
 ///
 /// A face between two tetrahedra is inside the body, so it is drawn only where one of the two is
@@ -16,11 +16,11 @@ const NONE: u32 = u32::MAX;
 pub struct Faces {
     /// Three vertices, and 1 for a face inside the body.
     corners: Vec<[u32; 4]>,
-    /// The primitive of each face; the first of two.
+    /// The element of each face; the first of two.
     owners: Vec<u32>,
     /// The faces of each tetrahedron; empty for triangles, which are their own faces.
     of_tetrahedra: Vec<[u32; 4]>,
-    n_primitives: usize,
+    n_elements: usize,
     n_vertices: usize,
 }
 
@@ -28,7 +28,7 @@ impl Faces {
     /// The faces of a body.
     pub fn of_body(body: &Body) -> Self {
         let mut faces = Faces {
-            n_primitives: body.n_primitives(),
+            n_elements: body.n_elements(),
             n_vertices: body.n_vertices(),
             ..Faces::default()
         };
@@ -45,7 +45,7 @@ impl Faces {
 
     fn add_tetrahedra(&mut self, tetrahedra: &[[u32; 4]]) {
         let mut numbers: HashMap<[u32; 3], u32> = HashMap::with_capacity(2 * tetrahedra.len());
-        for (primitive, &[a, b, c, d]) in (0u32..).zip(tetrahedra) {
+        for (element, &[a, b, c, d]) in (0u32..).zip(tetrahedra) {
             let own = [[a, c, b], [a, b, d], [b, c, d], [c, a, d]].map(|corners| {
                 let mut key = corners;
                 key.sort_unstable();
@@ -54,7 +54,7 @@ impl Faces {
                 if number == next {
                     let [a, b, c] = corners;
                     self.corners.push([a, b, c, 0]);
-                    self.owners.push(primitive);
+                    self.owners.push(element);
                 } else if let Some(shared) = self.corners.get_mut(number as usize) {
                     shared[3] = 1;
                 }
@@ -87,15 +87,15 @@ impl Faces {
             .is_some_and(|corners| corners[3] == 1)
     }
 
-    /// The primitive to which a face belongs; of two tetrahedra the first. `None` beyond the last
+    /// The element to which a face belongs; of two tetrahedra the first. `None` beyond the last
     /// face.
-    pub fn primitive(&self, face: usize) -> Option<u32> {
+    pub fn element(&self, face: usize) -> Option<u32> {
         self.owners.get(face).copied()
     }
 
-    /// The faces of a primitive; none beyond the last primitive.
-    pub fn of_primitive(&self, primitive: u32) -> impl Iterator<Item = usize> + '_ {
-        let ix = primitive as usize;
+    /// The faces of an element; none beyond the last element.
+    pub fn of_element(&self, element: u32) -> impl Iterator<Item = usize> + '_ {
+        let ix = element as usize;
         let of_tetrahedron = self.of_tetrahedra.get(ix).into_iter().flatten();
         let is_own = self.of_tetrahedra.is_empty() && ix < self.corners.len();
         let own = is_own.then_some(ix);
@@ -103,9 +103,9 @@ impl Faces {
             .chain(of_tetrahedron.map(|&face| face as usize))
     }
 
-    /// The number of primitives of the body.
-    pub fn n_primitives(&self) -> usize {
-        self.n_primitives
+    /// The number of elements of the body.
+    pub fn n_elements(&self) -> usize {
+        self.n_elements
     }
 
     /// The number of vertices of the body.
@@ -136,13 +136,13 @@ mod tests {
         assert_eq!(faces.len(), 7);
         let inner: Vec<usize> = (0..7).filter(|&face| faces.is_inner(face)).collect();
         assert_eq!(inner.len(), 1);
-        for primitive in 0..2 {
-            let own: Vec<usize> = faces.of_primitive(primitive).collect();
+        for element in 0..2 {
+            let own: Vec<usize> = faces.of_element(element).collect();
             assert_eq!(own.len(), 4);
             assert!(own.contains(&inner[0]));
         }
-        assert_eq!(faces.primitive(inner[0]), Some(0));
-        assert_eq!(faces.of_primitive(2).count(), 0);
+        assert_eq!(faces.element(inner[0]), Some(0));
+        assert_eq!(faces.of_element(2).count(), 0);
     }
 
     #[test]
@@ -154,8 +154,8 @@ mod tests {
             .expect("a body");
         let faces = Faces::of_body(scene.body(body).expect("there"));
         assert_eq!(faces.corners(1), Some([2, 1, 0]));
-        assert_eq!(faces.of_primitive(1).collect::<Vec<_>>(), [1]);
-        assert_eq!(faces.of_primitive(2).count(), 0);
+        assert_eq!(faces.of_element(1).collect::<Vec<_>>(), [1]);
+        assert_eq!(faces.of_element(2).count(), 0);
         assert_eq!(faces.corners(2), None);
     }
 }

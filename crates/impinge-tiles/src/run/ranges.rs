@@ -1,8 +1,8 @@
-//! Lists of ranges of primitives.
+//! Lists of ranges of elements.
 
 use std::ops::Range;
 
-/// The primitives of two pieces, which may be the same one.
+/// The elements of two pieces, which may be the same one.
 pub fn both(a: &Range<usize>, b: &Range<usize>) -> Vec<Range<usize>> {
     match a == b {
         true => vec![a.clone()],

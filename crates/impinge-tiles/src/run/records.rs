@@ -1,4 +1,4 @@
-//! The primitives of a tile as records, and scenes made of some of them.
+//! The elements of a tile as records, and scenes made of some of them.
 
 use std::ops::Range;
 
@@ -10,7 +10,7 @@ use crate::cells::owner_point;
 use crate::chunk::{Record, Shape};
 use crate::parts::Segment;
 
-/// All records of a tile, file by file, primitives ascending. They are numbered from 0.
+/// All records of a tile, file by file, elements ascending. They are numbered from 0.
 #[derive(Default)]
 pub struct Records {
     files: Vec<OfFile>,
@@ -43,21 +43,21 @@ pub struct Part {
 }
 
 impl Part {
-    /// The number of the record of a primitive of the scene.
-    pub fn record(&self, body: u32, primitive: u32) -> usize {
-        let mut left = primitive as usize;
+    /// The number of the record of an element of the scene.
+    pub fn record(&self, body: u32, element: u32) -> usize {
+        let mut left = element as usize;
         for run in &self.bodies[body as usize] {
             if left < run.len() {
                 return run.start + left;
             }
             left -= run.len();
         }
-        unreachable!("the detector reports primitives of the scene")
+        unreachable!("the detector reports elements of the scene")
     }
 }
 
 impl Records {
-    /// Appends the next segment; segments come in the order of files and primitives.
+    /// Appends the next segment; segments come in the order of files and elements.
     pub fn add(&mut self, segment: Segment) {
         if segment.bytes.is_empty() {
             return;
@@ -92,11 +92,11 @@ impl Records {
         owner_point(&lower(a), &lower(b))
     }
 
-    /// The pair as a row: file, primitive, file, primitive.
+    /// The pair as a row: file, element, file, element.
     pub fn row(&self, a: usize, b: usize) -> [u32; 4] {
         let named = |record: usize| {
             let (held, ix) = self.find(record);
-            (held.file as u32, held.record(ix).primitive())
+            (held.file as u32, held.record(ix).element())
         };
         let (a, b) = (named(a), named(b));
         [a.0, a.1, b.0, b.1]
@@ -105,7 +105,7 @@ impl Records {
     /// The surfaces of the files that have any record, for a step.
     ///
     /// # Errors
-    /// As adding these primitives to a scene.
+    /// As adding these elements to a scene.
     pub fn surfaces(&self) -> Result<Surfaces, impinge::Error> {
         let surfaces = self.files.iter().map(|held| {
             let Shape { corners, width, .. } = held.shape;
@@ -119,7 +119,7 @@ impl Records {
                 vertices().map(|(record, c)| [record.position(c), record.position(corners + c)]);
             let named = vertices().map(|(record, c)| record.vertex(c));
             let surface = Surface::new(held.file, width, named.collect(), positions.collect());
-            let names = records().map(|record| record.primitive());
+            let names = records().map(|record| record.element());
             match corners {
                 3 => Ok(surface.of_triangles(numbers.as_chunks().0, names)),
                 _ => surface.of_tetrahedra(numbers.as_chunks().0, names.collect()),

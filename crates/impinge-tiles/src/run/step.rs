@@ -70,7 +70,7 @@ impl Plan {
         }
         let result = TileResult {
             tile,
-            n_primitives: records.len() as u64,
+            n_elements: records.len() as u64,
             n_pairs: rows.len() as u64,
             hash: checksum(&rows),
             step: Some(OfStep {

@@ -1,10 +1,10 @@
 //! The surfaces of a tile of a step, scenes of some of their faces, and names for the elements of
 //! such a scene.
 //!
-//! A tile has only some of a body's primitives, so its surface may have faces, edges and vertices
+//! A tile has only some of a body's elements, so its surface may have faces, edges and vertices
 //! that the body's surface has not: the inner faces of tetrahedra whose other side is elsewhere.
 //! Their boxes, inflated by the separation as in `cells.rs`, do not touch the tile's cell, because
-//! a primitive that has such an element would touch it too and be here. So no pair that the tile
+//! an element that has such an element would touch it too and be here. So no pair that the tile
 //! owns has one of them.
 
 use std::ops::Range;

@@ -22,11 +22,11 @@ impl Moving {
             start,
             end,
         };
-        moving.same("corners per primitive", |source| {
+        moving.same("corners per element", |source| {
             source.shape().corners as u64
         })?;
         moving.same("vertices", |source| source.n_vertices())?;
-        moving.same("primitives", |source| source.n_primitives())?;
+        moving.same("elements", |source| source.n_elements())?;
         Ok(moving)
     }
 
@@ -60,8 +60,8 @@ impl Source for Moving {
         }
     }
 
-    fn n_primitives(&self) -> u64 {
-        self.start.n_primitives()
+    fn n_elements(&self) -> u64 {
+        self.start.n_elements()
     }
 
     fn n_vertices(&self) -> u64 {
@@ -74,14 +74,14 @@ impl Source for Moving {
             return Ok(None);
         };
         let corners = self.shape().corners;
-        let primitives = || {
+        let elements = || {
             let at_start = start.vertices.chunks_exact(corners);
             at_start.zip(end.vertices.chunks_exact(corners))
         };
-        if let Some(ix) = primitives().position(|(a, b)| a != b) {
-            let (a, b) = primitives().nth(ix).unwrap_or_default();
+        if let Some(ix) = elements().position(|(a, b)| a != b) {
+            let (a, b) = elements().nth(ix).unwrap_or_default();
             return Err(self.differ(format!(
-                "primitive {} has the vertices {b:?} at the end, {a:?} at the start",
+                "element {} has the vertices {b:?} at the end, {a:?} at the start",
                 first + ix as u64
             )));
         }

@@ -1,5 +1,5 @@
 //! NumPy arrays of corners: `(n, 3, 3)` triangles or `(n, 4, 3)` tetrahedra, `<f4` or `<f8`; each
-//! primitive has vertices of its own.
+//! element has vertices of its own.
 
 use std::path::{Path, PathBuf};
 
@@ -35,10 +35,7 @@ impl Npy {
         check_count(path, "corners", n.saturating_mul(corners as u64))?;
         let needed = header.start + n * (corners * 3 * width) as u64;
         if length(path)? < needed || n == 0 {
-            return Err(refuse(&format!(
-                "{} bytes for {n} primitives",
-                length(path)?
-            )));
+            return Err(refuse(&format!("{} bytes for {n} elements", length(path)?)));
         }
         Ok(Npy {
             path: path.to_owned(),
@@ -62,7 +59,7 @@ impl Source for Npy {
         self.shape
     }
 
-    fn n_primitives(&self) -> u64 {
+    fn n_elements(&self) -> u64 {
         self.n
     }
 

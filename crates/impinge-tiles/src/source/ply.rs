@@ -108,7 +108,7 @@ impl Source for Ply {
         }
     }
 
-    fn n_primitives(&self) -> u64 {
+    fn n_elements(&self) -> u64 {
         self.n_faces
     }
 
@@ -138,7 +138,7 @@ impl Source for Ply {
                 let position = self.positions.get(vertex as usize);
                 positions.push(position.ok_or_else(|| Error::VertexIndex {
                     path: self.path.clone(),
-                    primitive: ix,
+                    element: ix,
                     index: i64::from(vertex),
                     n_vertices: self.n_vertices(),
                 })?);

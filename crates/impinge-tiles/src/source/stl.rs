@@ -47,7 +47,7 @@ impl Source for Stl {
         }
     }
 
-    fn n_primitives(&self) -> u64 {
+    fn n_elements(&self) -> u64 {
         self.n
     }
 

@@ -30,8 +30,8 @@ impl Source for Welded {
         self.source.shape()
     }
 
-    fn n_primitives(&self) -> u64 {
-        self.source.n_primitives()
+    fn n_elements(&self) -> u64 {
+        self.source.n_elements()
     }
 
     fn n_vertices(&self) -> u64 {

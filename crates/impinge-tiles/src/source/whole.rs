@@ -15,7 +15,7 @@ pub struct Whole {
 impl Whole {
     pub fn open(path: &Path) -> Result<Self, Error> {
         let mut mesh = read(path, &ReadOptions::as_they_are())?;
-        check_count(path, "primitives", mesh.n_primitives() as u64)?;
+        check_count(path, "elements", mesh.n_elements() as u64)?;
         mesh.positions.narrow_if_exact();
         Ok(Whole { mesh })
     }
@@ -40,8 +40,8 @@ impl Source for Whole {
         }
     }
 
-    fn n_primitives(&self) -> u64 {
-        self.mesh.n_primitives() as u64
+    fn n_elements(&self) -> u64 {
+        self.mesh.n_elements() as u64
     }
 
     fn n_vertices(&self) -> u64 {

@@ -59,10 +59,10 @@ fn tiles_have_the_rows_of_the_whole() {
         );
         assert_eq!(merged.hash, hash);
         n_pairs += expected.len();
-        n_copies += merged.n_records as usize
-            - meshes.iter().map(|mesh| mesh.n_primitives()).sum::<usize>();
+        n_copies +=
+            merged.n_records as usize - meshes.iter().map(|mesh| mesh.n_elements()).sum::<usize>();
     }
-    // The test had pairs, and primitives in several tiles.
+    // The test had pairs, and elements in several tiles.
     assert!(
         n_pairs > 5_000 && n_copies > 1_000,
         "{n_pairs} pairs, {n_copies} copies"

@@ -24,7 +24,7 @@ impl Random {
     }
 }
 
-/// Primitives over few vertices of a lattice: many touch, lie on cuts, or are degenerate. One in
+/// Elements over few vertices of a lattice: many touch, lie on cuts, or are degenerate. One in
 /// eight is very large.
 pub fn lattice(random: &mut Random, n: usize, is_solid: bool, is_f64: bool) -> Mesh {
     let width = 4 + random.below(8);
@@ -34,7 +34,7 @@ pub fn lattice(random: &mut Random, n: usize, is_solid: bool, is_f64: bool) -> M
     let positions: Vec<[f64; 3]> = (0..n_vertices)
         .map(|_| std::array::from_fn(|_| f64::from(random.below(width)) * unit))
         .collect();
-    // Mostly near vertices, so that most primitives are small.
+    // Mostly near vertices, so that most elements are small.
     let near = |random: &mut Random, start: u32| {
         if random.chance(8) {
             return random.below(n_vertices);
@@ -109,7 +109,7 @@ pub fn write(folder: &Path, name: &str, mesh: &Mesh) -> PathBuf {
             let colored = ColoredMesh {
                 positions: &mesh.positions,
                 elements: &mesh.elements,
-                primitive_colors: None,
+                element_colors: None,
                 colliding: None,
                 name,
             };

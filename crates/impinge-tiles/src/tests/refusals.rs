@@ -254,7 +254,7 @@ impl Source for Liar {
             poses: 1,
         }
     }
-    fn n_primitives(&self) -> u64 {
+    fn n_elements(&self) -> u64 {
         60
     }
     fn n_vertices(&self) -> u64 {
@@ -278,7 +278,7 @@ fn a_nan_is_refused_by_plan_and_scatter() {
     let unit = plan.units().nth(1).unwrap();
     let error = plan.scatter_unit(1, unit, &Liar).unwrap_err();
     assert!(
-        matches!(error, Error::Coordinate { primitive: 18, .. }),
+        matches!(error, Error::Coordinate { element: 18, .. }),
         "{error}"
     );
     assert!(!plan.part_path(1).exists());
@@ -293,7 +293,7 @@ fn a_nan_is_refused_by_plan_and_scatter() {
         );
         let error = error.unwrap_err().to_string();
         assert!(
-            error.contains("bad.npy: primitive 0") && error.contains(why),
+            error.contains("bad.npy: element 0") && error.contains(why),
             "{error}"
         );
     }
@@ -413,10 +413,7 @@ fn faces_of_many_corners_are_read_whole() {
     )
     .unwrap();
     assert_eq!(
-        (
-            made.files()[0].reader.as_str(),
-            made.files()[0].n_primitives
-        ),
+        (made.files()[0].reader.as_str(), made.files()[0].n_elements),
         ("whole", 2)
     );
 }

@@ -132,13 +132,13 @@ fn tiles_have_the_impacts_of_the_whole() {
         let what = format!("scene {scene}: {ask:?}, {options:?}");
         let n = compare(&merged, &bodies, &options, ask, &what);
         found = [0, 1, 2].map(|ix| found[ix] + n[ix]);
-        let n_given: usize = bodies.iter().map(|[start, _]| start.n_primitives()).sum();
+        let n_given: usize = bodies.iter().map(|[start, _]| start.n_elements()).sum();
         n_copies += merged.n_records as usize - n_given;
         n_uncut += merged.n_uncut;
         n_separate += n[2] * usize::from(options.separation > 0.0);
         n_welded += usize::from(options.weld) * bodies.iter().map(n_coincident).sum::<usize>();
     }
-    // The test had both kinds, contacts at the start, primitives in several tiles, and pieces.
+    // The test had both kinds, contacts at the start, elements in several tiles, and pieces.
     assert!(found.iter().all(|&n| n > 1_000), "{found:?}");
     assert!(n_copies > 1_000 && n_uncut > 20, "{n_copies}, {n_uncut}");
     assert!(
@@ -285,9 +285,7 @@ fn what_is_no_step_is_refused_by_name() {
     let differ = refusal(&other, &step, Ask::default());
     assert!(matches!(differ, Error::Ends { .. }), "{differ}");
     assert!(
-        differ
-            .to_string()
-            .contains("primitive 0 has the vertices ["),
+        differ.to_string().contains("element 0 has the vertices ["),
         "{differ}"
     );
     for (separation, step, allowed) in [

@@ -22,7 +22,7 @@ use impinge_core::{Error, Stats};
 
 use super::Possible;
 
-/// A free slot. No pair has this value, because there are fewer than 2^32 primitives.
+/// A free slot. No pair has this value, because there are fewer than 2^32 elements.
 const FREE: u64 = u64::MAX;
 /// Slots per task.
 const TASK: usize = 4096;
@@ -30,7 +30,7 @@ const TASK: usize = 4096;
 /// The table, and scratch memory for its tests.
 pub(super) struct Table {
     isa: Isa,
-    /// `primitive of a << 32 | primitive of b`.
+    /// `element of a << 32 | element of b`.
     slots: Vec<AtomicU64>,
     deciders: Vec<Decider>,
 }
@@ -127,7 +127,7 @@ impl Rule for Insert<'_> {
 
     #[inline(always)]
     fn admits(&self, a: &InRegion, b: &InRegion, _: &mut Vec<u64>) -> bool {
-        let (a, b) = (a.primitive.raw(), b.primitive.raw());
+        let (a, b) = (a.element.raw(), b.element.raw());
         let pair = u64::from(a) << 32 | u64::from(b);
         let slot = &self.slots[djb2(a, b) as usize % self.slots.len()];
         // Repetitions are frequent: most of them find their pair in the slot and write nothing.

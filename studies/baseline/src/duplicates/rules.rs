@@ -45,7 +45,7 @@ impl Rule for Recorded<'_> {
 
     #[inline(always)]
     fn admits(&self, a: &InRegion, b: &InRegion, keys: &mut Vec<u64>) -> bool {
-        let [a, b] = [a, b].map(|kept| self.plan.part(kept.part).number(kept.primitive));
+        let [a, b] = [a, b].map(|kept| self.plan.part(kept.part).number(kept.element));
         keys.push(pair_key(a, b));
         false
     }

@@ -5,7 +5,7 @@ use impinge_core::gpu::layout::{Candidate, CellItem, Counter, Grid, Kept, Params
 use impinge_core::gpu::pipeline::bindings;
 use impinge_core::gpu::pipeline::{Kernel, Source};
 
-/// A cell-primitive pair; the bits are drawn in `kernels/entries.wgsl`.
+/// A cell-element pair; the bits are drawn in `kernels/entries.wgsl`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct Entry {
@@ -28,9 +28,9 @@ macro_rules! words {
 }
 
 words! {
-    /// Entries of the primitives before this one in its workgroup.
+    /// Entries of the elements before this one in its workgroup.
     First
-    /// The number of entries of each workgroup of primitives; after the scan, of all workgroups
+    /// The number of entries of each workgroup of elements; after the scan, of all workgroups
     /// before it.
     Sum
     /// How often a digit occurs in each block; after the scan, in all blocks before it.

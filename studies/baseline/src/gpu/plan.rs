@@ -1,11 +1,11 @@
 //! The launches of a pass, in order, as a recording.
 //!
 //! ```text
-//! bounds     boxes of bodies · reach · primitives within reach             impinge's own
+//! bounds     boxes of bodies · reach · elements within reach             impinge's own
 //! grid       resolution, eq. (1) · ranges, eq. (3) · shift                 impinge's own
 //! fill       count · exclusive sum · entries
 //! sort       for each digit of 8 bits: count · sums · scatter
-//! compact    cells with primitives of both bodies
+//! compact    cells with elements of both bodies
 //! pairing    all pairs of a cell: boxes
 //! narrow     the filter                                                    impinge's own
 //! ```
@@ -37,7 +37,7 @@ const BLOCK: u32 = 4096;
 /// The number of values, and of bits, of a digit.
 const DIGITS: u64 = 256;
 const DIGIT_BITS: u32 = 8;
-/// Primitives per sum, and entries per workgroup of `compact`.
+/// Elements per sum, and entries per workgroup of `compact`.
 const SUM: u64 = 64;
 const COMPACT: u32 = 256;
 

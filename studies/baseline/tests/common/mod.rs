@@ -49,7 +49,7 @@ pub fn oracle(case: &Case) -> Vec<[u32; 4]> {
     pairs.rows().collect()
 }
 
-/// Every kind of primitive, both precisions, lattices, and small adversarial scenes.
+/// Every kind of element, both precisions, lattices, and small adversarial scenes.
 pub fn cases() -> Vec<Case> {
     let mut cases = Vec::new();
     let ball = surfaces::bumpy_ball(1200, 0.2);
@@ -112,7 +112,7 @@ pub fn cases() -> Vec<Case> {
 /// cells (by the paper's equations 1 to 3) that hold a common sub-cell.
 pub fn brute_checks(case: &Case, lambda: f64, boxes: bool) -> Checks {
     type Box = [[f32; 3]; 2];
-    let primitives = |id: BodyId| -> Vec<Box> {
+    let elements = |id: BodyId| -> Vec<Box> {
         let body = case.scene.body(id).unwrap();
         let of = |ix: usize| {
             let points = body.elements().corners(ix).iter();
@@ -130,10 +130,10 @@ pub fn brute_checks(case: &Case, lambda: f64, boxes: bool) -> Checks {
             }
             found
         };
-        (0..body.n_primitives()).map(of).collect()
+        (0..body.n_elements()).map(of).collect()
     };
     let overlap = |a: &Box, b: &Box| (0..3).all(|k| a[0][k] <= b[1][k] && b[0][k] <= a[1][k]);
-    let (a, b) = (primitives(case.a), primitives(case.b));
+    let (a, b) = (elements(case.a), elements(case.b));
     let whole = |boxes: &[Box]| {
         boxes.iter().fold(boxes[0], |mut all, next| {
             for axis in 0..3 {

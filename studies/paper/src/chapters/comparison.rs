@@ -126,7 +126,7 @@ fn verdict(scenes: &[Scene], is_gpu: bool) -> String {
               entries than `Cells` with λ = 1 and has to sort them in several passes. Two levels count and scatter \
               instead, and the second level replaces the finer grid. That is the saving of the paper's method.";
     if !is_gpu {
-        words += " Not all of the gain comes from the two levels: on the CPU `Cells` first drops primitives that the other body comes nowhere \
+        words += " Not all of the gain comes from the two levels: on the CPU `Cells` first drops elements that the other body comes nowhere \
                   near, by a coarse map that the paper does not have, and so has far fewer entries. When each method runs with its best λ, \
                   both use the map.";
     }

@@ -36,18 +36,18 @@ pub(super) fn blocks(report: &Report) -> Vec<Block> {
          damping (0.5/s and 4 ms), a penalty proportional to the common volume, friction 0.3; the upper body is turned by 0.5 rad and thrown \
          down with 2 m/s. All of these are guesses. The paper's averages of colliding tetrahedra are those of bodies that stay pressed together."
             .to_owned(),
-        "**#CT** counts the colliding primitives of both bodies here; the paper does not say whether it does."
+        "**#CT** counts the colliding elements of both bodies here; the paper does not say whether it does."
             .to_owned(),
-        "**`Cells`** has the owner rule instead of the paper's hash table. On the CPU it drops primitives that the other body comes nowhere \
+        "**`Cells`** has the owner rule instead of the paper's hash table. On the CPU it drops elements that the other body comes nowhere \
          near before it fills the grid. It compares boxes in floats after the masks, gives an axis along which the \
-         region is thinner than a cell only one cell, and makes the grid coarser if lists would exceed 16 entries per primitive. \
+         region is thinner than a cell only one cell, and makes the grid coarser if lists would exceed 16 entries per element. \
          Its pairs are exact; the paper does not say which test of triangles or tetrahedra it uses, nor how exact it is."
             .to_owned(),
         "**[FWZS11]** follows the paper's description of it (one uniform grid with λ = 5, radix sort, compaction, all pairs of a \
          cell tested). It uses the boxes, threads, vector instructions and exact test of the library, so that methods are compared, not \
          programs. The original ran on several GPUs."
             .to_owned(),
-        "**DJB2.** The paper says neither which key it hashes nor which pair of a slot survives. Here the key is the pair of primitive \
+        "**DJB2.** The paper says neither which key it hashes nor which pair of a slot survives. Here the key is the pair of element \
          numbers, and the lowest pair of a slot survives, so that the answer does not depend on threads."
             .to_owned(),
         "**Clocks.** The paper does not say whether its times include transfers to and from the card. Ours include transfers and sorting \

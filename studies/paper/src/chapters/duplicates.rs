@@ -40,15 +40,15 @@ pub(super) fn blocks(report: &Report) -> Vec<Block> {
     if let Some(sizes) = &report.table_sizes {
         let mut table = Table::new(
             format!(
-                "Figure 7 in numbers: {}, {} primitives, {} frames.",
+                "Figure 7 in numbers: {}, {} elements, {} frames.",
                 sizes.scene,
-                count(sizes.n_primitives as f64),
+                count(sizes.n_elements as f64),
                 sizes.n_frames
             ),
             0,
             &[
                 "slots",
-                "slots / primitives",
+                "slots / elements",
                 "missing rate",
                 "missing pairs",
                 "missing rate after box tests",
@@ -60,7 +60,7 @@ pub(super) fn blocks(report: &Report) -> Vec<Block> {
                 count(point.table_size as f64),
                 format!(
                     "{:.3}",
-                    point.table_size as f64 / sizes.n_primitives.max(1) as f64
+                    point.table_size as f64 / sizes.n_elements.max(1) as f64
                 ),
                 percent(point.missing_rate),
                 percent(point.missing_rate_of_pairs),

@@ -70,7 +70,7 @@ fn how() -> Vec<String> {
          positions, reading pairs back and settling unsure pairs.",
         "Like the paper, the tables print averages, with medians beside them. Ratios are of medians for surfaces and of averages for solids.",
         "λ is 1 for `Cells` and 5 for [FWZS11] as in the paper. Both also run with the λ that was fastest on a few frames \
-         of the scene, for each method and machine. On the CPU, `Cells` first drops primitives that the other body comes nowhere near, \
+         of the scene, for each method and machine. On the CPU, `Cells` first drops elements that the other body comes nowhere near, \
          by a coarse map; [FWZS11] has the map too when it runs with its best λ, but follows the paper's description with λ = 5.",
         "A software driver imitates a GPU on the CPU: it runs at most ten frames of each scene, with the paper's λ, and \
          its times say nothing about GPUs.",

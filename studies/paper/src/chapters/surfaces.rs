@@ -111,7 +111,7 @@ fn table_1(scenes: &[Scene]) -> Table {
                     true => "here, GPU (software)".to_owned(),
                     false => format!("here, {}", short_place(is_gpu)),
                 },
-                twice(&scene.n_primitives),
+                twice(&scene.n_elements),
                 count(cells.n_cells.mean),
                 count(cells.n_subdivided.mean),
                 count(scene.n_colliding.mean),

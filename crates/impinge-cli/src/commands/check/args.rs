@@ -185,7 +185,7 @@ pub struct CheckWorkerArgs {
     /// The thickness of walls to be found
     #[arg(long, value_name = "T")]
     pub min_thickness: Option<f64>,
-    /// Say the problems of each primitive
+    /// Say the problems of each element
     #[arg(long)]
     pub marks: bool,
     /// Address space
@@ -309,8 +309,8 @@ impl FailOn {
             FailOn::Mesh(Finding::SelfIntersections) => {
                 "Pairs that also meet outside their common vertices, edge or face"
             }
-            FailOn::Mesh(Finding::Degenerate) => "Primitives of zero area or volume",
-            FailOn::Mesh(Finding::Duplicates) => "Primitives with the vertices of an earlier one",
+            FailOn::Mesh(Finding::Degenerate) => "Elements of zero area or volume",
+            FailOn::Mesh(Finding::Duplicates) => "Elements with the vertices of an earlier one",
             FailOn::Mesh(Finding::NonManifold) => {
                 "Edges of more than two triangles, vertices of several fans"
             }

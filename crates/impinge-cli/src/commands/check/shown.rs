@@ -1,6 +1,6 @@
 //! The problems of meshes in colours: mesh files and pictures.
 //!
-//! Rows say which primitives have which problem, so meshes are only read once more.
+//! Rows say which elements have which problem, so meshes are only read once more.
 
 use std::io::Write;
 use std::path::Path;
@@ -15,10 +15,10 @@ use crate::error::Error;
 use crate::output::out;
 use crate::values::{MeshFile, MeshFormat};
 
-/// The colour of primitives without a finding.
+/// The colour of elements without a finding.
 const FINE: [u8; 3] = [200, 200, 200];
 
-/// All meshes that could be checked, with the marks of their primitives.
+/// All meshes that could be checked, with the marks of their elements.
 fn marked(rows: &[Row]) -> Result<Vec<(String, Checked)>, Error> {
     let checked: Vec<(String, Checked)> = rows
         .iter()
@@ -32,13 +32,11 @@ fn marked(rows: &[Row]) -> Result<Vec<(String, Checked)>, Error> {
     Ok(checked)
 }
 
-fn color(checked: &Checked, primitive: usize) -> [u8; 3] {
-    checked.marks[primitive]
-        .first()
-        .map_or(FINE, Problem::color)
+fn color(checked: &Checked, element: usize) -> [u8; 3] {
+    checked.marks[element].first().map_or(FINE, Problem::color)
 }
 
-/// Writes the meshes, welded as in the check; each primitive has the colour of its most serious
+/// Writes the meshes, welded as in the check; each element has the colour of its most serious
 /// problem.
 pub fn write_mesh(file: &MeshFile, rows: &[Row]) -> Result<(), Error> {
     let checked = marked(rows)?;
@@ -67,7 +65,7 @@ pub fn write_mesh(file: &MeshFile, rows: &[Row]) -> Result<(), Error> {
         .map(|(((name, checked), colors), colliding)| ColoredMesh {
             positions: &checked.mesh.positions,
             elements: &checked.mesh.elements,
-            primitive_colors: Some(colors),
+            element_colors: Some(colors),
             colliding: Some(colliding),
             name,
         })
@@ -88,7 +86,7 @@ pub fn print_legend() -> Result<(), Error> {
     Ok(())
 }
 
-/// Draws the meshes in the same colours. Primitives with a problem show through faces that hide
+/// Draws the meshes in the same colours. Elements with a problem show through faces that hide
 /// them.
 pub fn draw(path: &Path, rows: &[Row], args: &CheckArgs) -> Result<(), Error> {
     let meshes = marked(rows)?;
@@ -99,10 +97,10 @@ pub fn draw(path: &Path, rows: &[Row], args: &CheckArgs) -> Result<(), Error> {
 /// A mesh in these colours.
 pub fn surface(checked: &Checked) -> Surface {
     const SIDES: [[usize; 3]; 4] = [[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]];
-    let face = |corners: [u32; 3], primitive: usize| Face {
+    let face = |corners: [u32; 3], element: usize| Face {
         corners,
-        color: color(checked, primitive),
-        shows_through: checked.marks[primitive].first().is_some(),
+        color: color(checked, element),
+        shows_through: checked.marks[element].first().is_some(),
     };
     let (faces, normals) = match &checked.mesh.elements {
         Elements::Triangles(triangles) => {

@@ -184,11 +184,11 @@ fn same_elements(names: &[String; 2], start: &Mesh, end: &Mesh) -> Result<(), Er
             start.n_vertices()
         ));
     }
-    if start.n_primitives() != end.n_primitives() {
+    if start.n_elements() != end.n_elements() {
         return differ(format!(
-            "{} primitives at the end, {} at the start",
-            end.n_primitives(),
-            start.n_primitives()
+            "{} elements at the end, {} at the start",
+            end.n_elements(),
+            start.n_elements()
         ));
     }
     if start.elements == end.elements {
@@ -198,7 +198,7 @@ fn same_elements(names: &[String; 2], start: &Mesh, end: &Mesh) -> Result<(), Er
     if a.len() != b.len() {
         return differ("triangles in one file, tetrahedra in the other".to_owned());
     }
-    let n_corners = (a.len() / start.n_primitives().max(1)).max(1);
+    let n_corners = (a.len() / start.n_elements().max(1)).max(1);
     match a
         .chunks(n_corners)
         .zip(b.chunks(n_corners))
@@ -207,7 +207,7 @@ fn same_elements(names: &[String; 2], start: &Mesh, end: &Mesh) -> Result<(), Er
         Some(ix) => {
             let of = |corners: &[u32]| format!("{:?}", &corners[ix * n_corners..][..n_corners]);
             differ(format!(
-                "primitive {ix} has the vertices {} at the end, {} at the start",
+                "element {ix} has the vertices {} at the end, {} at the start",
                 of(b),
                 of(a)
             ))

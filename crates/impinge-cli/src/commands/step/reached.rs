@@ -50,7 +50,7 @@ pub fn write<'a>(
                 let mesh = ColoredMesh {
                     positions: &positions,
                     elements,
-                    primitive_colors: None,
+                    element_colors: None,
                     colliding: None,
                     name: &bodies.names[ix][0],
                 };

@@ -20,7 +20,7 @@ Examples:
   impinge tiles run big --rank $SLURM_ARRAY_TASK_ID --world-size 64  one of 64 processes
   impinge tiles plan big a0.ply a1.ply b0.ply b1.ply --step          bodies that move: start, end, ...
 
-Space is cut into tiles of about --cap primitives each. Steps communicate only through the folder.
+Space is cut into tiles of about --cap elements each. Steps communicate only through the folder.
 Many processes, on any machine that sees the folder, may run a step. A killed step can be run again
 and gives the same bytes. The answer is the same as for the whole scene in one process.
 
@@ -37,7 +37,7 @@ pub struct TilesArgs {
 pub enum TilesCommand {
     /// Read the meshes once and decide where to cut
     Plan(PlanArgs),
-    /// Write the primitives of each tile
+    /// Write the elements of each tile
     Scatter(ScatterArgs),
     /// Find the pairs of tiles
     Run(RunArgs),
@@ -72,10 +72,10 @@ pub struct PlanArgs {
     /// as near as that
     #[arg(long, value_name = "D", default_value = "0", requires = "step", allow_negative_numbers = true, value_parser = distance)]
     pub separation: f64,
-    /// About how many primitives a tile may hold, such as 500k or 2M: about 300 bytes each
+    /// About how many elements a tile may hold, such as 500k or 2M: about 300 bytes each
     #[arg(long, value_name = "N", value_parser = count, default_value = "2M")]
     pub cap: u64,
-    /// The number of primitives that a thread scatters at a time: about 200 bytes each
+    /// The number of elements that a thread scatters at a time: about 200 bytes each
     #[arg(long, value_name = "N", value_parser = count, default_value = "500k")]
     pub chunk: u64,
     /// Weld vertices at the same position, within each file; with --step, both at the start and at
@@ -130,7 +130,7 @@ pub struct RunArgs {
     /// Find only pairs between files
     #[arg(long)]
     pub between: bool,
-    /// Which neighbours are reported: pairs of primitives of one body that share a vertex
+    /// Which neighbours are reported: pairs of elements of one body that share a vertex
     #[arg(long, value_parser = shared_vertex(), value_name = "RULE", default_value_t = SharedVertex::Resolve)]
     pub shared_vertex: SharedVertex,
     /// Of a step: the precision to which times are rounded down

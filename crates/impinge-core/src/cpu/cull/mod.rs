@@ -1,16 +1,16 @@
-//! A coarse map of where bodies are, used to drop primitives that no other body comes near.
+//! A coarse map of where bodies are, used to drop elements that no other body comes near.
 //!
 //! ```text
 //! quantise   each vertex once: the cell of the map that it lies in, one byte per axis
-//! mark       each primitive: the range of its vertices' cells, in the map of its body; a row of
+//! mark       each element: the range of its vertices' cells, in the map of its body; a row of
 //!            cells along x is a number of 64 bits
 //! compare    cells that two bodies mark
-//! look up    each primitive again: whether its range has such a cell
+//! look up    each element again: whether its range has such a cell
 //! ```
 //!
-//! In: positions and where each body may meet others. Out: whether a primitive may have a partner.
-//! Cost: four bytes per vertex, twelve per primitive near other bodies. Invariant: the function
-//! from coordinates to cells is monotone under any rounding, so a point of two primitives lies in a
+//! In: positions and where each body may meet others. Out: whether an element may have a partner.
+//! Cost: four bytes per vertex, twelve per element near other bodies. Invariant: the function
+//! from coordinates to cells is monotone under any rounding, so a point of two elements lies in a
 //! cell that both mark.
 
 mod codes;
@@ -30,14 +30,14 @@ use codes::{Codes, Function, greater_bytes, lesser_bytes};
 /// The most cells along each axis. Two more hold vertices outside the region. A row along x then
 /// has 64 cells; along y and z a byte numbers the cells.
 const MOST_ALONG: [u32; 3] = [62, 253, 253];
-/// Primitives that are examined together; then those among them that are near are marked.
+/// Elements that are examined together; then those among them that are near are marked.
 const TOGETHER: usize = 512;
 
-/// A primitive within its body's reach, and the first and last cell of its vertices along x, y, z,
+/// An element within its body's reach, and the first and last cell of its vertices along x, y, z,
 /// one byte per axis.
 #[derive(Debug, Clone, Copy)]
 struct WithinReach {
-    primitive: ElementIx,
+    element: ElementIx,
     low: u32,
     high: u32,
 }
@@ -52,7 +52,7 @@ impl WithinReach {
     }
 }
 
-/// A task of the bounds stage: a run of one part's primitives, or of its vertices.
+/// A task of the bounds stage: a run of one part's elements, or of its vertices.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct BoundsTask {
     pub part: PartIx,
@@ -61,7 +61,7 @@ pub(crate) struct BoundsTask {
 }
 
 impl BoundsTask {
-    /// Cuts `n` primitives or vertices of a part into runs.
+    /// Cuts `n` elements or vertices of a part into runs.
     pub fn cut(part: PartIx, n: u32, length: u32) -> impl Iterator<Item = BoundsTask> {
         (0..n)
             .step_by(length as usize)
@@ -80,7 +80,7 @@ pub(crate) struct Cull {
     function: Function,
     /// The number of cells along each axis, including those outside the region.
     along: [u32; 3],
-    /// The most rows of the map that one primitive marks; a larger primitive counts as being
+    /// The most rows of the map that one element marks; a larger element counts as being
     /// everywhere.
     most_marked: u32,
     /// The cell of each vertex, one byte per axis, body after body.
@@ -91,7 +91,7 @@ pub(crate) struct Cull {
     maps: Vec<AtomicU64>,
     /// Cells marked by two bodies, or by one body whose self-collision is queried.
     live: Vec<u64>,
-    /// Maps of bodies with primitives too large to be marked.
+    /// Maps of bodies with elements too large to be marked.
     everywhere: AtomicU32,
     /// Maps of bodies whose self-collision is queried.
     alone: u32,
@@ -103,11 +103,11 @@ impl Cull {
     pub const MOST_MAPS: usize = u32::BITS as usize;
 
     /// Prepares for a frame of at most [`MOST_MAPS`](Self::MOST_MAPS) parts, which meet within the
-    /// region; their primitives come in `n_runs` runs.
+    /// region; their elements come in `n_runs` runs.
     pub fn begin(&mut self, world: World<'_>, region: &Aabb, n_runs: usize, tuning: &Tuning) {
         self.most_marked = tuning.most_marked;
         let plan = world.plan;
-        let wanted = plan.n_primitives() / tuning.map_cell.max(1);
+        let wanted = plan.n_elements() / tuning.map_cell.max(1);
         let along = Grid::new(region, wanted, 1.0).resolution;
         let along: [u32; 3] = std::array::from_fn(|axis| along[axis].min(MOST_ALONG[axis]));
         self.along = along.map(|along| along + 2);
@@ -144,7 +144,7 @@ impl Cull {
             .resize_with(n_runs.max(self.near.len()), Mutex::default);
     }
 
-    /// How many bodies have primitives that count as being everywhere.
+    /// How many bodies have elements that count as being everywhere.
     pub fn n_everywhere(&self) -> u64 {
         self.everywhere.load(Ordering::Relaxed).count_ones().into()
     }
@@ -174,7 +174,7 @@ impl Cull {
         self.firsts[part.index()]
     }
 
-    /// Lists the primitives of a run that are near `reach`, and marks their cells.
+    /// Lists the elements of a run that are near `reach`, and marks their cells.
     pub fn mark(&self, world: World<'_>, run: BoundsTask, run_ix: usize, reach: &Aabb) {
         let mut near = self.near[run_ix].lock().expect("no task panics");
         near.clear();
@@ -200,7 +200,7 @@ impl Cull {
         let n_rows = self.n_rows();
         let map = &self.maps[map_ix * n_rows..][..n_rows];
         let mut together = [WithinReach {
-            primitive: ElementIx::new(0),
+            element: ElementIx::new(0),
             low: 0,
             high: 0,
         }; TOGETHER];
@@ -209,9 +209,9 @@ impl Cull {
             .step_by(TOGETHER)
             .zip(corners.chunks(TOGETHER))
         {
-            // No branch: whether a primitive is near is unpredictable.
+            // No branch: whether an element is near is unpredictable.
             let mut n = 0;
-            for (primitive, corners) in (first..).map(ElementIx::new).zip(corners) {
+            for (element, corners) in (first..).map(ElementIx::new).zip(corners) {
                 let vertex = codes[corners[0] as usize];
                 let (mut low, mut high) = (vertex, vertex);
                 for &corner in &corners[1..] {
@@ -222,11 +222,7 @@ impl Cull {
                 // Partners can only meet it within reach.
                 low = greater_bytes(low, reach.0);
                 high = lesser_bytes(high, reach.1);
-                together[n] = WithinReach {
-                    primitive,
-                    low,
-                    high,
-                };
+                together[n] = WithinReach { element, low, high };
                 n += usize::from(greater_bytes(low, high) == high);
             }
             near.extend_from_slice(&together[..n]);
@@ -245,7 +241,7 @@ impl Cull {
         }
     }
 
-    /// Finds the cells in which primitives may have partners, once all are marked.
+    /// Finds the cells in which elements may have partners, once all are marked.
     pub fn compare(&mut self) {
         let n_rows = self.n_rows();
         self.live.clear();
@@ -267,7 +263,7 @@ impl Cull {
         }
     }
 
-    /// Calls back for the primitives of a run that may have partners, in order. Returns how many
+    /// Calls back for the elements of a run that may have partners, in order. Returns how many
     /// were near.
     pub fn for_live(&self, run_ix: usize, mut call: impl FnMut(ElementIx)) -> usize {
         let near = self.near[run_ix].lock().expect("no task panics");
@@ -277,13 +273,13 @@ impl Cull {
                 self.for_rows(near, |row, cells| live |= self.live[row] & cells);
             }
             if live != 0 {
-                call(near.primitive);
+                call(near.element);
             }
         }
         near.len()
     }
 
-    /// Calls back for the rows of a primitive's range, each with its cells of that row.
+    /// Calls back for the rows of an element's range, each with its cells of that row.
     #[inline(always)]
     fn for_rows(&self, near: &WithinReach, mut call: impl FnMut(usize, u64)) {
         let ([x, y, z, _], [x_end, y_end, z_end, _]) =

@@ -14,7 +14,7 @@
 //!
 //! Each frame reads all positions in order and finds the interval that each group spans along its
 //! axis, and the box of the whole body. A group whose interval touches no other body's box is
-//! proven *culled*, however bodies have moved: none of its primitives can be in a pair, and its
+//! proven *culled*, however bodies have moved: none of its elements can be in a pair, and its
 //! clusters keep empty boxes. A group that touches another box has come back: its clusters are near
 //! in this frame and are sorted again at its end, with more slack between them and the others if
 //! the group came back soon.

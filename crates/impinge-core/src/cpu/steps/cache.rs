@@ -337,7 +337,7 @@ fn find_boxes<S: Send>(
             ..task
         }));
     }
-    let parallel = plan.n_primitives() >= settings.tuning.step_bounds_parallel_from;
+    let parallel = plan.n_elements() >= settings.tuning.step_bounds_parallel_from;
     let n_workers = if parallel { workers.n() } else { 1 };
     let caches = &*caches;
     workers.for_each(&mut scratches[..n_workers], tasks.len(), |_, ix| {

@@ -378,7 +378,7 @@ fn named(
     let of = clusterings.iter().zip([of_a, of_b]);
     for ((clustering, part), slots) in of.zip(&mut slots) {
         // Vertices of no element have numbers, too.
-        *slots = filled(Slot::default(), part.n_primitives as usize, WHAT)?;
+        *slots = filled(Slot::default(), part.n_elements as usize, WHAT)?;
         for (slot, element) in clustering.order.iter().enumerate() {
             slots[element.index()] = Slot::from_usize(slot);
         }

@@ -99,7 +99,7 @@ impl StepGroup {
             }
         });
         let first = world.plan.part(part).first;
-        let elements = clustering.primitives(cluster);
+        let elements = clustering.elements(cluster);
         for (number, &element) in group.numbers.0.iter_mut().zip(elements) {
             *number = first.plus(element).raw();
         }

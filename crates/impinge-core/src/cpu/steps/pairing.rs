@@ -501,7 +501,7 @@ fn lanes_with_lower(
 ) -> Option<[u64; 2]> {
     let lanes = |part: PartIx, cluster: ClusterIx, [low, high]: [Number; 2]| {
         let first = world.plan.part(part).first;
-        let elements = world.cache(part).clustering.primitives(cluster);
+        let elements = world.cache(part).clustering.elements(cluster);
         let mut are_in = [0u8; GROUP];
         for (is_in, &element) in are_in.iter_mut().zip(elements) {
             let number = first.plus(element);

@@ -1,7 +1,7 @@
-// Stage `bounds` of `Cells`: the primitives within their body's reach, with their boxes.
+// Stage `bounds` of `Cells`: the elements within their body's reach, with their boxes.
 //
-// In: clusters, corners, positions, reaches. Out: kept primitives, in any order; those that do not fit are
-// counted. One workgroup per cluster, one lane per primitive. Cost: every primitive once, unless its cluster
+// In: clusters, corners, positions, reaches. Out: kept elements, in any order; those that do not fit are
+// counted. One workgroup per cluster, one lane per element. Cost: every element once, unless its cluster
 // is out of reach.
 
 @group(0) @binding(0) var<storage, read> nodes: array<Node>;
@@ -29,7 +29,7 @@ fn main(
     var is_kept = false;
     let slack = bodies[cluster.body].slack;
     if is_near && lane < (cluster.sizes & 0xffffu) {
-        own = primitive_box(corners[cluster.first_slot + lane], slack);
+        own = element_box(corners[cluster.first_slot + lane], slack);
         is_kept = overlap(own, reach);
     }
     let slot = slot_in(N_KEPT, is_kept, lane);

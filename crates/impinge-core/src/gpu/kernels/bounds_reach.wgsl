@@ -5,7 +5,7 @@
 // One thread per body walks the tree over bodies. Cost: the nodes whose boxes meet the body's box. Beyond a limit
 // the whole box becomes the reach: that discards less, which is always right.
 // Reason for the discard in the next kernel: the boxes of a pair share a point. It lies in both bodies'
-// boxes, so each primitive meets the intersection of the two.
+// boxes, so each element meets the intersection of the two.
 
 @group(0) @binding(0) var<storage, read> nodes: array<Node>;
 @group(0) @binding(1) var<storage, read> bodies: array<Body>;

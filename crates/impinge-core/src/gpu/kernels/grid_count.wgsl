@@ -1,7 +1,7 @@
 // Stage `grid`, fourth kernel: the number of entries of each cell's list, and which bodies have any.
 //
-// In: kept primitives, the grid. Out: ranges after the shift; for each cell the number of entries,
-// the highest and the lowest body. One thread per kept primitive, one pass over the cells it touches.
+// In: kept elements, the grid. Out: ranges after the shift; for each cell the number of entries,
+// the highest and the lowest body. One thread per kept element, one pass over the cells it touches.
 
 @group(0) @binding(0) var<storage, read> grid: array<Grid>;
 @group(0) @binding(1) var<storage, read_write> kept: array<Kept>;

@@ -1,7 +1,7 @@
 // Stage `grid`, second kernel: fine cell ranges, equation (3) at four times the resolution.
 //
-// In: kept primitives, the grid. Out: their ranges; entries of the cell lists for every shift.
-// One thread per kept primitive.
+// In: kept elements, the grid. Out: their ranges; entries of the cell lists for every shift.
+// One thread per kept element.
 // Invariant: boxes that overlap have ranges that overlap. A coordinate in units of cells is
 // wrong by less than 2^-4 cells (65,536 cells, four roundings), however the compiler
 // arranges the operations; low ends move down and high ends up by a quarter of a cell before they are floored.

@@ -1,22 +1,22 @@
-// Stage `pairing`: which primitives of two clusters have boxes that meet. In a step, boxes at both ends.
+// Stage `pairing`: which elements of two clusters have boxes that meet. In a step, boxes at both ends.
 //
 // In: work items. Out: candidates. One workgroup of 64 per work item:
 //
-// 1. Each lane computes the box of one primitive of each cluster. Primitives that do not meet the other cluster's box
+// 1. Each lane computes the box of one element of each cluster. Elements that do not meet the other cluster's box
 //    drop out, for a partner's box lies in its cluster's box.
 // 2. Lanes take the side with more survivors and walk over the survivors of the other side: one 64-bit
-//    mask per primitive, bit j for partner j, as two words:
+//    mask per element, bit j for partner j, as two words:
 //
 //       mask.x  bits 0..31  partners  0..31
 //       mask.y  bits 0..31  partners 32..63
 //
 // 3. Within one body, partners that share a vertex id are cleared, or marked as neighbours if they are
 //    to be resolved. The ids are in workgroup memory; comparing them costs less
-//    than reading adjacency masks would, and needs no special case for vertices with many primitives.
+//    than reading adjacency masks would, and needs no special case for vertices with many elements.
 // 4. One atomic per workgroup reserves room; candidates that do not fit are counted.
 //
-// Cost: 128 primitives read, min(survivors) steps of one box test per lane.
-// Invariant: a pair of primitives lies in one work item only, so no candidate comes twice.
+// Cost: 128 elements read, min(survivors) steps of one box test per lane.
+// Invariant: a pair of elements lies in one work item only, so no candidate comes twice.
 
 @group(0) @binding(0) var<storage, read> nodes: array<Node>;
 @group(0) @binding(1) var<storage, read> clusters: array<Cluster>;
@@ -28,7 +28,7 @@
 @group(0) @binding(7) var<storage, read_write> counters: array<atomic<u32>>;
 @group(0) @binding(8) var<uniform> params: Params;
 
-// The primitives of a in entries 0..63, those of b in 64..127.
+// The elements of a in entries 0..63, those of b in 64..127.
 var<workgroup> lows: array<vec3<u32>, 128u * ENDS>;
 var<workgroup> highs: array<vec3<u32>, 128u * ENDS>;
 var<workgroup> ids: array<vec4<u32>, 128>;
@@ -36,19 +36,19 @@ var<workgroup> survivors: array<atomic<u32>, 4>;
 var<workgroup> n_found: atomic<u32>;
 var<workgroup> first_found: u32;
 
-// Stores a primitive's box in its entry; false if there is no primitive or its box misses the other cluster's.
+// Stores an element's box in its entry; false if there is no element or its box misses the other cluster's.
 fn load(cluster: Cluster, lane: u32, entry: u32, others: Extent) -> bool {
     if lane >= (cluster.sizes & 0xffffu) {
         return false;
     }
     let corner = corners[cluster.first_slot + lane];
-    let own = primitive_extent(corner, bodies[cluster.body].slack);
+    let own = element_extent(corner, bodies[cluster.body].slack);
     put_extent(entry, own);
     ids[entry] = corner;
     return extents_meet(own, others);
 }
 
-// Writes candidates: the lane's primitive with each partner in one word of its mask.
+// Writes candidates: the lane's element with each partner in one word of its mask.
 fn put(mask: u32, first_partner: u32, mine: u32, flags: vec2<u32>, swap: bool, pass_buffers: u32) -> u32 {
     var rest = mask;
     var at = pass_buffers;

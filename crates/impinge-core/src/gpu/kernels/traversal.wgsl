@@ -11,7 +11,7 @@
 //         7   …          lane 63
 //
 // Cost: proportional to the pairs of nodes that meet. Reason for each discard: boxes that do not
-// overlap hold primitives that cannot meet; a gate opens only where the bodies' filters agree.
+// overlap hold elements that cannot meet; a gate opens only where the bodies' filters agree.
 // Invariant: every pair of clusters comes at most once. Pairs that do not fit are counted.
 
 @group(0) @binding(0) var<storage, read> nodes: array<Node>;

@@ -76,7 +76,7 @@ fn triangle(corners: &[Point; 4]) -> &[Point; 3] {
     corners.first_chunk().expect("three of four")
 }
 
-/// Whether two primitives of different bodies, or of one body without a common vertex, share a
+/// Whether two elements of different bodies, or of one body without a common vertex, share a
 /// point. Points and edges are degenerate triangles.
 pub(crate) fn intersect(
     kind_a: BodyKind,

@@ -1,6 +1,6 @@
-// Stage `compact`: finds the cells with primitives of both bodies, and the slots of their entries.
+// Stage `compact`: finds the cells with elements of both bodies, and the slots of their entries.
 //
-// In: sorted entries. Out: work items of at most 64 primitives of each body: a large cell becomes all pairs of
+// In: sorted entries. Out: work items of at most 64 elements of each body: a large cell becomes all pairs of
 // such groups. One thread per entry; the thread of the first entry of the first body in a cell does
 // the work. Cost: a doubling search for the ends of its two runs.
 

@@ -1,6 +1,6 @@
 // Declarations shared by the kernels of the uniform grid. The Rust version of `Entry` is in `gpu/kernels.rs`.
 
-// A cell-primitive pair: a cell and a kept primitive. Sorted by key, the primitives of a cell are
+// A cell-element pair: a cell and a kept element. Sorted by key, the elements of a cell are
 // adjacent, those of the first body before those of the second:
 //
 //   key   31                    1   0

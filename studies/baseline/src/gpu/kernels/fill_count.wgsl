@@ -1,7 +1,7 @@
-// Stage `fill`, first kernel: how many cells each primitive touches, summed up within workgroups.
+// Stage `fill`, first kernel: how many cells each element touches, summed up within workgroups.
 //
-// In: kept primitives, the grid. Out: ranges after the shift; for each primitive the number of entries of the
-// primitives before it in its workgroup; for each workgroup its total. One thread per kept primitive.
+// In: kept elements, the grid. Out: ranges after the shift; for each element the number of entries of the
+// elements before it in its workgroup; for each workgroup its total. One thread per kept element.
 
 @group(0) @binding(0) var<storage, read> grid: array<Grid>;
 @group(0) @binding(1) var<storage, read_write> kept: array<Kept>;

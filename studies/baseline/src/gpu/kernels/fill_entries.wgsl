@@ -1,7 +1,7 @@
-// Stage `fill`, third kernel: one entry for every cell that a primitive's box touches.
+// Stage `fill`, third kernel: one entry for every cell that an element's box touches.
 //
-// In: kept primitives with their ranges, and the slots of their first entries. Out: entries; those that do not
-// fit have already been counted. One thread per kept primitive.
+// In: kept elements with their ranges, and the slots of their first entries. Out: entries; those that do not
+// fit have already been counted. One thread per kept element.
 
 @group(0) @binding(0) var<storage, read> grid: array<Grid>;
 @group(0) @binding(1) var<storage, read> kept: array<Kept>;

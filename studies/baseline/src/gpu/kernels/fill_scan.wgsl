@@ -1,7 +1,7 @@
 // Stage `fill`, second kernel: exclusive sum over the workgroups of the first.
 //
 // In: the number of entries of each workgroup. Out: the number of entries of all workgroups before it; in the
-// counters, the total. One workgroup; each lane takes a run of sums. Cost: the sums, one per 64 primitives, are
+// counters, the total. One workgroup; each lane takes a run of sums. Cost: the sums, one per 64 elements, are
 // read twice and written once.
 
 @group(0) @binding(0) var<storage, read_write> sums: array<u32>;

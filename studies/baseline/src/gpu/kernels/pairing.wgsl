@@ -3,7 +3,7 @@
 // In: work items. Out: candidates; those that do not fit are counted. One workgroup of 64 lanes per work item:
 // boxes go to workgroup memory, then the lanes test 64 pairs at a time.
 //
-//   test p       primitive p / n_b of the first body, p % n_b of the second
+//   test p       element p / n_b of the first body, p % n_b of the second
 //   hits         bit k: the lane's k-th test, p = 64 k + lane, found a candidate
 //
 // Cost: n_a n_b box tests. With the owner rule (`params.owner_rule`) a pair is a candidate only in the cell
@@ -17,7 +17,7 @@
 @group(0) @binding(5) var<storage, read_write> counters: array<atomic<u32>>;
 @group(0) @binding(6) var<uniform> params: Params;
 
-// The primitives of the first body in places 0..63, those of the second in 64..127.
+// The elements of the first body in places 0..63, those of the second in 64..127.
 var<workgroup> lows: array<vec3<u32>, 128>;
 var<workgroup> highs: array<vec3<u32>, 128>;
 // The first coarse cells that they touch.

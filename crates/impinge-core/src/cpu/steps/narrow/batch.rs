@@ -184,7 +184,7 @@ pub(super) fn located(
 ) -> [(PartIx, ElementIx); 2] {
     let [a, b] = slots;
     [(between.a, a), (between.b, b)]
-        .map(|(part, slot)| (part, world.cache(part).clustering.primitive(slot)))
+        .map(|(part, slot)| (part, world.cache(part).clustering.element(slot)))
 }
 
 /// The numbers of a pair's elements, by its lanes in two groups.

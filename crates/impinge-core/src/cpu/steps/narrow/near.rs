@@ -208,7 +208,7 @@ impl NearElements {
         };
         let key = pair_key(numbers[0], numbers[1]);
         if world.plan.is_owned(world.scene, key) {
-            let labels = Labels::new(world.plan.n_primitives());
+            let labels = Labels::new(world.plan.n_elements());
             self.keys.push(batch.between.kind, labels.put(key, part));
         }
     }

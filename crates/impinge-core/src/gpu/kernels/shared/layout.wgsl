@@ -35,7 +35,7 @@ struct Level { first: u32, count: u32 }
 //         +----------------+------------+--------+------+------+
 //
 // Own parts: pairs with other parts of the same body are asked for. Points, bare: the body has no edges, no faces.
-// `first_slot`, `first_number`: those of its first primitive; records are in the order of their places.
+// `first_slot`, `first_number`: those of its first element; records are in the order of their places.
 struct Body {
     root: u32,
     slack: u32,
@@ -56,11 +56,11 @@ const POINTS: u32 = 8u;
 const OWN_PARTS: u32 = 16u;
 const BODY_SHIFT: u32 = 5u;
 
-// A run of at most 64 primitives and the run of its unique vertices.
+// A run of at most 64 elements and the run of its unique vertices.
 //
 //   sizes  31         16 15          0
 //         +-------------+-------------+
-//         |  vertices   | primitives  |
+//         |  vertices   | elements  |
 //         +-------------+-------------+
 struct Cluster {
     first_slot: u32,
@@ -75,7 +75,7 @@ struct WorkItem { a: u32, b: u32 }
 // Two slots. Bit 31 of `a`: positions were rounded. Bit 31 of `b`: the two share a vertex; in a step, `a` is an edge.
 struct Candidate { a: u32, b: u32 }
 
-// Two global primitive numbers, the lower one first. In a step, a pair key is a candidate; and an unsure key has two slots, if the
+// Two global element numbers, the lower one first. In a step, a pair key is a candidate; and an unsure key has two slots, if the
 // host decides it.
 struct PairKey { low: u32, high: u32 }
 struct UnsureKey { low: u32, high: u32 }
@@ -97,7 +97,7 @@ struct Params {
     n_ignored: u32,
     // 1 when pairs that share a vertex are resolved, 0 when they are left out.
     resolve: u32,
-    // Cells: primitives per group, cells per primitive (bits of an f32), the most cells there is room for.
+    // Cells: elements per group, cells per element (bits of an f32), the most cells there is room for.
     group_size: u32,
     lambda: u32,
     most_cells: u32,
@@ -137,7 +137,7 @@ const SEEK_ALL: u32 = 0u;
 const SEEK_EARLIEST: u32 = 1u;
 const SEEK_ANY: u32 = 2u;
 
-// A primitive within its body's reach: its box, its place (bit 31: rounded), its body, and the
+// An element within its body's reach: its box, its place (bit 31: rounded), its body, and the
 // fine cells that it touches:
 //
 //   range.x  31       16 15        0

@@ -1,10 +1,10 @@
 // The elements of two clusters in workgroup memory, where they move: the boxes at the end follow all those at the start.
 
-fn primitive_extent(corner: vec4<u32>, slack: u32) -> Extent {
+fn element_extent(corner: vec4<u32>, slack: u32) -> Extent {
     let n_vertices = arrayLength(&positions) / (3u * ENDS);
     return Extent(
-        widened(primitive_box(corner, slack), params.reach),
-        widened(primitive_box(corner + n_vertices, slack), params.reach),
+        widened(element_box(corner, slack), params.reach),
+        widened(element_box(corner + n_vertices, slack), params.reach),
     );
 }
 

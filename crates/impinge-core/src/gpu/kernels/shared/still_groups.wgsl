@@ -1,7 +1,7 @@
-// The primitives of two clusters in workgroup memory, where they stand still.
+// The elements of two clusters in workgroup memory, where they stand still.
 
-fn primitive_extent(corner: vec4<u32>, slack: u32) -> Extent {
-    return primitive_box(corner, slack);
+fn element_extent(corner: vec4<u32>, slack: u32) -> Extent {
+    return element_box(corner, slack);
 }
 
 fn put_extent(entry: u32, extent: Extent) {

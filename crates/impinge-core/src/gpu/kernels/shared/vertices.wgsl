@@ -5,8 +5,8 @@ fn vertex_key(vertex: u32) -> vec3<u32> {
     return vec3<u32>(key(positions[word]), key(positions[word + 1u]), key(positions[word + 2u]));
 }
 
-// The box of a primitive, widened by `slack` keys. A triangle repeats its last corner.
-fn primitive_box(corner: vec4<u32>, slack: u32) -> Box {
+// The box of an element, widened by `slack` keys. A triangle repeats its last corner.
+fn element_box(corner: vec4<u32>, slack: u32) -> Box {
     let p = vertex_key(corner.x);
     let q = vertex_key(corner.y);
     let r = vertex_key(corner.z);
