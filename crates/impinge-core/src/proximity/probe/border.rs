@@ -29,7 +29,7 @@ impl Border {
     /// # Errors
     /// Cancellation, no memory.
     pub fn new(body: &Body, work: Work<'_>) -> Result<Self, Error> {
-        let mut masks = filled(0u8, body.n_primitives(), WHAT)?;
+        let mut masks = filled(0u8, body.n_elements(), WHAT)?;
         let Elements::Tetrahedra(tetrahedra) = body.elements() else {
             unreachable!("asked for bodies of tetrahedra alone")
         };
