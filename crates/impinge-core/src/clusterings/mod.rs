@@ -21,6 +21,7 @@
 //! No answer depends on the pose in which a body was clustered. So questions of several scenes may
 //! take turns.
 
+mod bytes_held;
 mod fit;
 mod store;
 #[cfg(test)]
@@ -45,6 +46,7 @@ use crate::search::work::Work;
 use crate::workers::Workers;
 use crate::workers::clock::Instant;
 
+use bytes_held::BytesHeld;
 #[cfg(feature = "gpu")]
 use fit::sampled_spread;
 pub(crate) use fit::{Fit, spread};
@@ -68,6 +70,7 @@ pub(crate) struct Clusterings(Arc<Mutex<Entries>>);
 #[derive(Debug)]
 pub(crate) struct Entries {
     slots: Vec<BodyClusterings>,
+    bytes_held: BytesHeld,
     recluster: Recluster,
     tuning: Tuning,
 }
@@ -81,6 +84,13 @@ struct BodyClusterings {
     /// For devices.
     #[cfg(feature = "gpu")]
     samples: [Sampled; PARTS],
+}
+
+impl BodyClusterings {
+    fn bytes(&self) -> usize {
+        let parts = self.parts.iter().flatten();
+        parts.map(|clustering| clustering.bytes()).sum()
+    }
 }
 
 /// How well a sample of the clusters has fitted, and the stamp of the positions that were judged
@@ -154,6 +164,7 @@ impl Clusterings {
     pub fn new(settings: &Settings) -> Self {
         Clusterings(Arc::new(Mutex::new(Entries {
             slots: Vec::new(),
+            bytes_held: BytesHeld::default(),
             recluster: settings.recluster,
             tuning: settings.tuning,
         })))
@@ -168,6 +179,7 @@ impl Clusterings {
     /// outdated is dropped.
     pub fn open(&self, scene: &Scene) -> MutexGuard<'_, Entries> {
         let mut known = self.lock();
+        known.settle();
         if known.slots.len() > scene.n_bodies() {
             known.forget_outdated(scene);
         }
@@ -256,8 +268,7 @@ impl Clusterings {
     /// Bytes held.
     pub fn bytes(&self) -> usize {
         let known = self.lock();
-        let parts = known.slots.iter().flat_map(|of_body| &of_body.parts);
-        let of_clusterings: usize = parts.flatten().map(|one| one.bytes()).sum();
+        let of_clusterings = known.bytes_held.total(|slot| known.slots[slot].bytes());
         size_of_val(&known.slots[..]) + of_clusterings
     }
 }
@@ -269,8 +280,14 @@ impl Entries {
             let body = scene.holds(slot).then(|| scene.body_in(slot as u32));
             if of_body.topology_stamp != body.map_or(0, Body::topology_stamp) {
                 *of_body = BodyClusterings::default();
+                self.bytes_held.touch(slot);
             }
         }
+    }
+
+    /// The questions so far are over.
+    fn settle(&mut self) {
+        self.bytes_held.settle(|slot| self.slots[slot].bytes());
     }
 
     /// The clusters of a part of a body. Those that only the asker has are shared from now on:
@@ -289,6 +306,7 @@ impl Entries {
             self.put(body_part, Arc::clone(own));
         }
         let of_body = self.slots.get(body_part.id.index())?;
+        self.bytes_held.touch(body_part.id.index());
         let part = of_body.parts[body_part.ix()].as_ref();
         part.filter(|_| of_body.topology_stamp == stamp)
     }
@@ -315,6 +333,7 @@ impl Entries {
         if self.slots.len() <= slot {
             self.slots.resize_with(slot + 1, BodyClusterings::default);
         }
+        self.bytes_held.touch(slot);
         let of_body = &mut self.slots[slot];
         if of_body.topology_stamp != stamp {
             *of_body = BodyClusterings {

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::bytes_held::BytesHeld;
 use super::{BodyPart, Clusterings};
 use crate::bvh::clusters::Clustering;
 use crate::plan::QueryPart;
@@ -20,17 +21,24 @@ pub(crate) trait Clustered: Send {
 
     /// What it belongs to.
     fn clustering(&self) -> &Arc<Clustering>;
+
+    /// Bytes held, without those of the clustering.
+    fn bytes(&self) -> usize;
 }
 
 /// What is kept, by slot of the body: one per body, or one per part (vertices, edges, faces).
 #[derive(Debug)]
 pub(crate) struct Store<T, const PARTS: usize = 1> {
     slots: Vec<[Option<Box<T>>; PARTS]>,
+    bytes_held: BytesHeld,
 }
 
 impl<T, const PARTS: usize> Default for Store<T, PARTS> {
     fn default() -> Self {
-        Store { slots: Vec::new() }
+        Store {
+            slots: Vec::new(),
+            bytes_held: BytesHeld::default(),
+        }
     }
 }
 
@@ -65,11 +73,6 @@ impl<T, const PARTS: usize> Store<T, PARTS> {
             .expect("every part was clustered")
     }
 
-    /// All that is kept.
-    pub fn iter(&self) -> impl Iterator<Item = &T> {
-        self.slots.iter().flatten().filter_map(Option::as_deref)
-    }
-
     /// What is kept of bodies as a whole, each with its slot, in the order of slots.
     pub fn iter_mut(&mut self) -> impl Iterator<Item = (usize, &mut T)> {
         let parts = self.slots.iter_mut().enumerate();
@@ -89,9 +92,15 @@ impl<T: Clustered, const PARTS: usize> Store<T, PARTS> {
             for kept in parts {
                 if kept.as_ref().map(|kept| kept.topology_stamp()) != stamp {
                     *kept = None;
+                    self.bytes_held.touch(slot);
                 }
             }
         }
+    }
+
+    /// Bytes held, without those of the clusterings.
+    pub fn bytes(&self) -> usize {
+        self.bytes_held.total(|slot| bytes_of(&self.slots[slot]))
     }
 
     /// Brings the store up to a frame: drops what belongs to bodies that are gone, and makes what
@@ -121,13 +130,16 @@ impl<T: Clustered, const PARTS: usize> Store<T, PARTS> {
         }
         if self.slots.len() > scene.n_bodies() {
             for (slot, parts) in self.slots.iter_mut().enumerate() {
-                if !scene.holds(slot) {
+                if !scene.holds(slot) && parts.iter().any(Option::is_some) {
                     *parts = [const { None }; PARTS];
+                    self.bytes_held.touch(slot);
                 }
             }
         }
+        self.bytes_held.settle(|slot| bytes_of(&self.slots[slot]));
         let mut known = clusterings.open(scene);
         for (ix, part) in plan.numbered_parts() {
+            self.bytes_held.touch(part.id.index());
             let body = plan.body(scene, ix);
             let body_part = BodyPart::new(part.id, body, part.part).with_local_faces(local_faces);
             let kept = &mut self.slots[part.id.index()][Self::ix(part.part)];
@@ -149,4 +161,9 @@ impl<T: Clustered, const PARTS: usize> Store<T, PARTS> {
         }
         Ok(())
     }
+}
+
+fn bytes_of<T: Clustered, const PARTS: usize>(parts: &[Option<Box<T>>; PARTS]) -> usize {
+    let parts = parts.iter().flatten();
+    parts.map(|kept| kept.bytes()).sum()
 }

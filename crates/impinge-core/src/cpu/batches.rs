@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use crate::bvh::hubs::Hubs;
+use crate::plan::Plan;
 use crate::query::SharedVertex;
 use crate::query::progress::Pieces;
 use crate::query::settings::Settings;
@@ -54,15 +55,21 @@ fn most_items(settings: &Settings, held: u64) -> Result<usize, Error> {
     Ok((FEWEST_ITEMS as u64 + more).min(most as u64) as usize)
 }
 
-/// Provides the trees from which work items come, and decides the work items.
-pub(crate) trait BatchStages: Copy + Sync {
+/// Where work items come from.
+pub(crate) trait Traversed {
+    /// The tree over the clusters of a part.
+    fn tree(&self, part: PartIx) -> BodyTree<'_>;
+
+    /// The hubs of a part: vertices that very many elements name.
+    fn hubs(&self, part: PartIx) -> Option<&Hubs>;
+}
+
+/// Decides the work items that its trees give.
+pub(crate) trait BatchStages: Traversed + Copy + Sync {
     /// The state of one worker.
     type Worker: Send;
     /// Where workers hand over the keys that they find.
     type Answer: Ending;
-
-    /// The tree over the clusters of a part.
-    fn tree(&self, part: PartIx) -> BodyTree<'_>;
 
     /// Pairs the elements of some work items, and decides the candidates.
     fn pair<S: Simd>(self, simd: S, isa: Isa, items: &[WorkItem], worker: &mut Self::Worker);
@@ -72,9 +79,6 @@ pub(crate) trait BatchStages: Copy + Sync {
 
     /// The counts of a worker.
     fn counts(worker: &Self::Worker) -> Counts;
-
-    /// The hubs of a part: vertices that very many elements name.
-    fn hubs(&self, part: PartIx) -> Option<&Hubs>;
 
     /// Called when all work items are decided, for the rest of the work.
     fn finish(
@@ -121,23 +125,23 @@ impl Counts {
     }
 }
 
+impl Traversed for World<'_> {
+    fn tree(&self, part: PartIx) -> BodyTree<'_> {
+        self.cache(part).tree()
+    }
+
+    fn hubs(&self, part: PartIx) -> Option<&Hubs> {
+        self.cache(part).clustering.hubs()
+    }
+}
+
 impl<'a> BatchStages for World<'a> {
     type Worker = Worker;
     type Answer = &'a Arc<Answer>;
 
     #[inline(always)]
-    fn tree(&self, part: PartIx) -> BodyTree<'_> {
-        self.cache(part).tree()
-    }
-
-    #[inline(always)]
     fn pair<S: Simd>(self, simd: S, isa: Isa, items: &[WorkItem], worker: &mut Worker) {
         pairing::run(simd, isa, self, items, worker);
-    }
-
-    #[inline(always)]
-    fn hubs(&self, part: PartIx) -> Option<&Hubs> {
-        self.cache(part).clustering.hubs()
     }
 
     /// Decides the pairs that share a hub, which `traversal` and `pairing` have skipped.
@@ -152,7 +156,7 @@ impl<'a> BatchStages for World<'a> {
             return Ok(());
         }
         for (ix, part) in job.plan.numbered_parts() {
-            let Some(hubs) = BatchStages::hubs(self, ix).filter(|_| part.within) else {
+            let Some(hubs) = self.hubs(ix).filter(|_| part.within) else {
                 continue;
             };
             let start = Instant::now();
@@ -280,11 +284,20 @@ impl<W: BatchStages> Batches<'_, W> {
         body_stack: &mut Vec<NodePair>,
     ) -> Result<(), Error> {
         let start = Instant::now();
-        with_isa!(self.isa, all, <W: BatchStages> (
-            batches: &mut Batches<'_, W> = self,
+        let world = self.world;
+        let frame = Frame {
+            isa: self.isa,
+            plan: self.job.plan,
+            trees: &world,
+            tuning: self.tuning,
+        };
+        let mut put = |item| self.put(item);
+        with_isa!(frame.isa, all, (
+            frame: Frame<'_> = frame,
             top: &mut TopLevel = top,
             stack: &mut Vec<NodePair> = stack,
             body_stack: &mut Vec<NodePair> = body_stack,
+            put: Put<'_> = &mut put,
         ) -> Result<(), Error>)?;
         self.flush()?;
         let stats = &mut *self.stats;
@@ -305,7 +318,6 @@ impl<W: BatchStages> Batches<'_, W> {
         Ok(())
     }
 
-    #[inline(always)]
     fn put(&mut self, item: WorkItem) -> Result<(), Error> {
         if self.items.len() == self.most_items {
             self.flush()?;
@@ -370,38 +382,54 @@ fn pair<S: Simd, W: BatchStages>(
     world.pair(simd, isa, items, worker);
 }
 
+/// What traversal reads. Nothing here knows who pairs, so that it is compiled once for all.
+#[derive(Clone, Copy)]
+struct Frame<'a> {
+    isa: Isa,
+    plan: &'a Plan,
+    trees: &'a dyn Traversed,
+    tuning: &'a Tuning,
+}
+
+/// Takes a work item.
+type Put<'a> = &'a mut dyn FnMut(WorkItem) -> Result<(), Error>;
+
 /// Runs traversal for every pair of parts and every single part that the frame asks for.
 #[inline(always)]
-fn all<S: Simd, W: BatchStages>(
+fn all<S: Simd>(
     simd: S,
-    batches: &mut Batches<'_, W>,
+    frame: Frame<'_>,
     top: &mut TopLevel,
     stack: &mut Vec<NodePair>,
     body_stack: &mut Vec<NodePair>,
+    put: Put<'_>,
 ) -> Result<(), Error> {
-    let (world, plan) = (batches.world, batches.job.plan);
+    let Frame {
+        plan,
+        trees,
+        tuning,
+        ..
+    } = frame;
     if plan.between() && plan.parts.len() == 2 {
         let [a, b] = [0, 1].map(PartIx::new);
         if plan.test(a, b).is_some() {
-            between_parts(batches, a, b, stack)?;
+            between_parts(frame, a, b, stack, put)?;
         }
     } else if plan.between() {
-        top.refit(plan.parts.len(), batches.tuning, |ix| {
-            world.tree(ix).bounds.root()
-        });
+        top.refit(plan.parts.len(), tuning, |ix| trees.tree(ix).bounds.root());
         top.pairs(simd, body_stack, |a, b| {
             if plan.test(a, b).is_none() {
                 return Ok(());
             }
-            between_parts(batches, a, b, stack)
+            between_parts(frame, a, b, stack, put)
         })?;
     }
     for ix in plan.part_ixs() {
         if plan.test(ix, ix).is_some() {
-            let (tree, hubs) = (world.tree(ix), world.hubs(ix));
+            let (tree, hubs) = (trees.tree(ix), trees.hubs(ix));
             traversal::within(simd, tree, hubs, stack, |leaf_a, leaf_b| {
                 // Adjacency masks are stored with the lower cluster.
-                batches.put(WorkItem {
+                put(WorkItem {
                     a: ix,
                     b: ix,
                     cluster_a: ClusterIx::new(leaf_a.min(leaf_b)),
@@ -415,32 +443,34 @@ fn all<S: Simd, W: BatchStages>(
 
 /// Compiled once, and separately: inside of closures the instruction set would be lost.
 #[inline(never)]
-fn between_parts<W: BatchStages>(
-    batches: &mut Batches<'_, W>,
+fn between_parts(
+    frame: Frame<'_>,
     a: PartIx,
     b: PartIx,
     stack: &mut Vec<NodePair>,
+    put: Put<'_>,
 ) -> Result<(), Error> {
-    with_isa!(batches.isa, between, <W: BatchStages> (
+    with_isa!(frame.isa, between, (
+        trees: &dyn Traversed = frame.trees,
         a: PartIx = a,
         b: PartIx = b,
         stack: &mut Vec<NodePair> = stack,
-        batches: &mut Batches<'_, W> = batches,
+        put: Put<'_> = put,
     ) -> Result<(), Error>)
 }
 
 #[inline(always)]
-fn between<S: Simd, W: BatchStages>(
+fn between<S: Simd>(
     simd: S,
+    trees: &dyn Traversed,
     a: PartIx,
     b: PartIx,
     stack: &mut Vec<NodePair>,
-    batches: &mut Batches<'_, W>,
+    put: Put<'_>,
 ) -> Result<(), Error> {
-    let world = batches.world;
-    let (tree_a, tree_b) = (world.tree(a), world.tree(b));
+    let (tree_a, tree_b) = (trees.tree(a), trees.tree(b));
     traversal::between(simd, tree_a, tree_b, stack, |leaf_a, leaf_b| {
-        batches.put(WorkItem {
+        put(WorkItem {
             a,
             b,
             cluster_a: ClusterIx::new(leaf_a),

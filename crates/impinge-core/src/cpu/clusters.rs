@@ -118,17 +118,8 @@ impl Clusters {
     }
 
     fn bytes_besides_scratch(&self) -> usize {
-        let caches: usize = self
-            .caches
-            .iter()
-            .map(|cache| {
-                let culled = cache.culled.as_ref().map_or(0, |culled| culled.bytes());
-                let creases = cache.creases.as_ref().map_or(0, |creases| creases.bytes());
-                size_of::<BodyCache>() + cache.bounds.bytes() + culled + creases
-            })
-            .sum();
         let scratches: usize = self.scratches.iter().map(Worker::bytes).sum();
-        self.clusterings.bytes() + caches + scratches
+        self.clusterings.bytes() + self.caches.bytes() + scratches
     }
 
     /// Forgets bodies that are gone or were re-meshed.

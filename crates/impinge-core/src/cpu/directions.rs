@@ -23,7 +23,7 @@ use impinge_exact::internal::filter::Directions64;
 use super::group_cache::{GroupCache, PerCluster};
 use super::lane_pairs::{RowSide, WorkItem};
 use super::world::World;
-use crate::simd::{Lanes, Masks, Simd};
+use crate::simd::{Isa, Lanes, Masks, Simd, with_isa};
 
 /// Which work items are asked about: all, as long as directions tell many of their pairs apart.
 #[derive(Debug, Default)]
@@ -147,6 +147,7 @@ impl Directions {
     pub fn thin<S: Simd, W: Placed>(
         &mut self,
         simd: S,
+        isa: Isa,
         world: W,
         item: &WorkItem,
         (side, rows): (RowSide, u64),
@@ -180,26 +181,47 @@ impl Directions {
         if !of_rows.can_part(of_lanes) {
             return 0;
         }
-        let mut n_parted = 0;
-        let near = match slot_a == slot_b {
-            true => [rows, lanes],
-            false => of_rows.near::<S::F32>(of_lanes, [rows, lanes], distance),
-        };
-        for row in Lanes(rows) {
-            let open = masks.0[row] & !aside[row];
-            let lane_pairs = match near[0] >> row & 1 {
-                1 => open & near[1],
-                _ => 0,
-            };
-            let beyond = of_lanes.beyond::<S::F32>(lane_pairs, (of_rows, row), distance)
-                | open & !lane_pairs;
-            masks.0[row] &= !beyond;
-            n_parted += u64::from(beyond.count_ones());
-        }
+        // Compiled once per instruction set, not once more per caller.
+        let n_parted = with_isa!(isa, part, (
+            groups: [&Directions64; 2] = [of_rows, of_lanes],
+            lanes: [u64; 2] = [rows, lanes],
+            distance: f32 = distance,
+            aside: &[u64; GROUP] = aside,
+            masks: &mut Masks = masks,
+        ) -> u64);
         self.n_parted += n_parted;
         self.pause.told(n_parted as usize, n_pairs);
         n_parted
     }
+}
+
+/// Clears pairs of rows and lanes that are certainly farther apart than a distance.
+#[inline(always)]
+fn part<S: Simd>(
+    _: S,
+    [of_rows, of_lanes]: [&Directions64; 2],
+    [rows, lanes]: [u64; 2],
+    distance: f32,
+    aside: &[u64; GROUP],
+    masks: &mut Masks,
+) -> u64 {
+    let mut n_parted = 0;
+    let near = match std::ptr::eq(of_rows, of_lanes) {
+        true => [rows, lanes],
+        false => of_rows.near::<S::F32>(of_lanes, [rows, lanes], distance),
+    };
+    for row in Lanes(rows) {
+        let open = masks.0[row] & !aside[row];
+        let lane_pairs = match near[0] >> row & 1 {
+            1 => open & near[1],
+            _ => 0,
+        };
+        let beyond =
+            of_lanes.beyond::<S::F32>(lane_pairs, (of_rows, row), distance) | open & !lane_pairs;
+        masks.0[row] &= !beyond;
+        n_parted += u64::from(beyond.count_ones());
+    }
+    n_parted
 }
 
 #[cfg(test)]

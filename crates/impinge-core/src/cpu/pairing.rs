@@ -140,7 +140,8 @@ pub(crate) fn run<S: Simd>(
             let aside = if is_same_body { &shared.0 } else { &[0; GROUP] };
             let rows = (side, rows);
             // Their boxes overlap: they count as candidates.
-            decider.n_candidates += directions.thin(simd, world, item, rows, 0.0, aside, masks);
+            decider.n_candidates +=
+                directions.thin(simd, isa, world, item, rows, 0.0, aside, masks);
         }
         if is_same_body {
             within_body(

@@ -48,6 +48,12 @@ impl Clustered for BodyCache {
     fn clustering(&self) -> &Arc<Clustering> {
         &self.clustering
     }
+
+    fn bytes(&self) -> usize {
+        let culled = self.culled.as_ref().map_or(0, |culled| culled.bytes());
+        let creases = self.creases.as_ref().map_or(0, |creases| creases.bytes());
+        size_of::<BodyCache>() + self.bounds.bytes() + culled + creases
+    }
 }
 
 /// Caches by slot of the body.

@@ -276,7 +276,8 @@ impl Plan {
                 allowed: "at most 16",
             });
         }
-        let has_pinned = scene.bodies().any(|(_, body)| body.pinned().is_some());
+        let mut parts = self.part_ixs();
+        let has_pinned = parts.any(|part| self.body(scene, part).pinned().is_some());
         if !has_pinned && query.leaves_out_elements().is_none() {
             return Ok(());
         }

@@ -32,6 +32,8 @@ pub(super) struct OfTwo {
     stats: Stats,
     /// By the number of the body and the part of it.
     trees: HashMap<(usize, Part), Tree>,
+    /// Those of the trees.
+    bytes: usize,
     /// By the numbers of the bodies.
     known: HashMap<[usize; 2], Known>,
 }
@@ -60,6 +62,7 @@ impl OfTwo {
             clusterings,
             stats: Stats::default(),
             trees: HashMap::new(),
+            bytes: 0,
             known: HashMap::new(),
         }
     }
@@ -68,6 +71,7 @@ impl OfTwo {
     pub(super) fn begin(&mut self, scene: &Scene) {
         if self.trees.len() > scene.n_bodies() {
             self.trees.retain(|&(slot, _), _| scene.holds(slot));
+            self.bytes = self.trees.values().map(Tree::bytes).sum();
         }
         if self.known.len() > MOST_KNOWN * scene.n_bodies().max(MOST_KNOWN) {
             self.known.clear();
@@ -151,8 +155,7 @@ impl OfTwo {
     pub(super) fn report(&self, stats: &mut Stats) {
         (stats.n_clustered, stats.n_reclustered) =
             (self.stats.n_clustered, self.stats.n_reclustered);
-        let beside: usize = self.trees.values().map(Tree::bytes).sum();
-        stats.bytes_held = (self.clusterings.bytes() + beside) as u64;
+        stats.bytes_held = (self.clusterings.bytes() + self.bytes) as u64;
     }
 
     /// Brings the tree of a part of a body to its current pose.
@@ -175,10 +178,9 @@ impl OfTwo {
         }
         let body_part = BodyPart::new(id, body, part);
         let (slot, stats) = (id.index(), &mut self.stats);
-        let known = self
-            .trees
-            .remove(&(slot, part))
-            .filter(|tree| tree.fits(body));
+        let known = self.trees.remove(&(slot, part));
+        self.bytes -= known.as_ref().map_or(0, Tree::bytes);
+        let known = known.filter(|tree| tree.fits(body));
         if known.is_none() && part == Part::Given {
             self.known.retain(|numbers, _| !numbers.contains(&slot));
         }
@@ -195,6 +197,7 @@ impl OfTwo {
                 tree.fit.note(tree.spread());
             }
         }
+        self.bytes += tree.bytes();
         self.trees.insert((slot, part), tree);
         Ok(())
     }

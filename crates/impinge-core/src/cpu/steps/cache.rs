@@ -110,14 +110,6 @@ impl PartCache {
         self.ends.each_ref().map(|end| end.at(cluster.index()))
     }
 
-    /// Bytes held beside the clusters.
-    pub fn bytes(&self) -> usize {
-        let ends: usize = self.ends.iter().map(BoundsArray::bytes).sum();
-        let kept = self.kept.iter().filter_map(|kept| kept.lanes.as_ref());
-        let kept: usize = kept.map(|lanes| lanes.bytes()).sum();
-        size_of::<PartCache>() + self.bounds.bytes() + ends + kept
-    }
-
     /// How well the clusters fit the current pose: the clusters' summed surface divided by the
     /// part's. Of boxes at the start without their inflation: where bodies move to, and how far
     /// boxes reach, differs from question to question.
@@ -220,6 +212,13 @@ impl Clustered for PartCache {
 
     fn clustering(&self) -> &Arc<Clustering> {
         &self.clustering
+    }
+
+    fn bytes(&self) -> usize {
+        let ends: usize = self.ends.iter().map(BoundsArray::bytes).sum();
+        let kept = self.kept.iter().filter_map(|kept| kept.lanes.as_ref());
+        let kept: usize = kept.map(|lanes| lanes.bytes()).sum();
+        size_of::<PartCache>() + self.bounds.bytes() + ends + kept
     }
 }
 

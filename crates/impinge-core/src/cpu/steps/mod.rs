@@ -41,7 +41,7 @@ use crate::search::stats::Stats;
 #[cfg(feature = "gpu")]
 use crate::search::undecided::Undecided;
 
-use super::batches::{self, BatchScratch, BatchStages, Counts};
+use super::batches::{self, BatchScratch, BatchStages, Counts, Traversed};
 use super::lane_pairs::WorkItem;
 use super::traversal::BodyTree;
 use crate::query::settings::Settings;
@@ -55,23 +55,23 @@ use pairing::StepWorker;
 pub(crate) use verlet::VerletList;
 use world::{MovedLanes, SharedBound, StepWorld};
 
+impl Traversed for StepWorld<'_> {
+    fn tree(&self, part: PartIx) -> BodyTree<'_> {
+        self.cache(part).tree()
+    }
+
+    fn hubs(&self, part: PartIx) -> Option<&Hubs> {
+        self.cache(part).clustering.hubs()
+    }
+}
+
 impl<'a> BatchStages for StepWorld<'a> {
     type Worker = StepWorker;
     type Answer = StepAnswer<'a>;
 
     #[inline(always)]
-    fn tree(&self, part: PartIx) -> BodyTree<'_> {
-        self.cache(part).tree()
-    }
-
-    #[inline(always)]
     fn pair<S: Simd>(self, simd: S, isa: Isa, items: &[WorkItem], worker: &mut StepWorker) {
         pairing::run(simd, isa, self, items, worker);
-    }
-
-    #[inline(always)]
-    fn hubs(&self, part: PartIx) -> Option<&Hubs> {
-        self.cache(part).clustering.hubs()
     }
 
     fn finish(
@@ -266,9 +266,8 @@ impl StepClusters {
     }
 
     fn bytes_besides_scratch(&self) -> usize {
-        let caches: usize = self.caches.iter().map(PartCache::bytes).sum();
         let scratches: usize = self.scratches.iter().map(StepWorker::bytes).sum();
-        self.clusterings.bytes() + caches + scratches
+        self.clusterings.bytes() + self.caches.bytes() + scratches
     }
 
     /// Clusters parts that are new or were re-meshed; forgets parts of removed bodies.

@@ -294,6 +294,7 @@ fn pair<S: Simd>(
         let reach = reach.enclosing_f32();
         decider.n_candidates += directions.thin(
             simd,
+            world.isa,
             world,
             item,
             (side, rows),

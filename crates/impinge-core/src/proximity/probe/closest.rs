@@ -56,18 +56,18 @@ const FIRST_DROP: usize = 64;
 ///
 /// # Errors
 /// Cancellation.
-pub(super) fn closest<R: Real>(
+pub(super) fn closest(
     isa: Isa,
     bodies: &[(BodyId, Target<'_>)],
-    points: &[[R; 3]],
+    points: &[Point],
     asked: (f64, usize),
     found: &mut [Option<ClosestElement>],
     work: Work<'_>,
 ) -> Result<(), Error> {
-    with_isa!(isa, all_closest, <R: Real>(
+    with_isa!(isa, all_closest, (
         isa: Isa = isa,
         bodies: &[(BodyId, Target<'_>)] = bodies,
-        points: &[[R; 3]] = points,
+        points: &[Point] = points,
         asked: (f64, usize) = asked,
         found: &mut [Option<ClosestElement>] = found,
         work: Work<'_> = work,
@@ -75,11 +75,11 @@ pub(super) fn closest<R: Real>(
 }
 
 #[inline(always)]
-fn all_closest<S: Simd, R: Real>(
+fn all_closest<S: Simd>(
     simd: S,
     isa: Isa,
     bodies: &[(BodyId, Target<'_>)],
-    points: &[[R; 3]],
+    points: &[Point],
     (most, n_nearest): (f64, usize),
     found: &mut [Option<ClosestElement>],
     work: Work<'_>,
@@ -88,11 +88,10 @@ fn all_closest<S: Simd, R: Real>(
     let mut order: Vec<(f32, usize)> = Vec::new();
     let mut n_answered = 0;
     for (ix, point) in points.iter().enumerate() {
-        let point = point.map(R::widen);
         search.begin(most);
-        search.expect(bodies, &point)?;
+        search.expect(bodies, point)?;
         order.clear();
-        let rounded = RoundedPoint::<S::F32>::new(&point);
+        let rounded = RoundedPoint::<S::F32>::new(point);
         let mut squares = [0.0; GROUP];
         for (number, (_, target)) in bodies.iter().enumerate() {
             let (top, _) = target.boxes.top();
@@ -104,9 +103,9 @@ fn all_closest<S: Simd, R: Real>(
             if low > search.limit {
                 break;
             }
-            search.visit(simd, (body, bodies[body].1), &point, &rounded)?;
+            search.visit(simd, (body, bodies[body].1), point, &rounded)?;
         }
-        search.end(&point)?;
+        search.end(point)?;
         let n_waiting = search.candidates.len().max(search.of_points.len());
         if n_waiting >= MANY || ix + 1 == points.len() {
             let n = search.of_points.len();

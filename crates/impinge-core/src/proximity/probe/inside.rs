@@ -20,7 +20,6 @@ use crate::bvh::bounds::{Aabb, round_down, round_up};
 use crate::contact::passes;
 use crate::scene::elements::Elements;
 use crate::scene::error::Error;
-use crate::scene::positions::Real;
 use crate::search::work::Work;
 use crate::simd::{Isa, Lanes, Simd, up_to, with_isa};
 use impinge_exact::internal::{Reach, elements_are_within};
@@ -47,29 +46,29 @@ pub(super) trait PointTest: Copy + Sync {
 ///
 /// # Errors
 /// Cancellation.
-pub(super) fn ask<R: Real, Q: PointTest>(
+pub(super) fn ask<Q: PointTest>(
     isa: Isa,
     question: Q,
     target: Target<'_>,
-    points: &[[R; 3]],
+    points: &[Point],
     answers: &mut [Q::Answer],
     work: Work<'_>,
 ) -> Result<(), Error> {
-    with_isa!(isa, ask_all, <R: Real, Q: PointTest>(
+    with_isa!(isa, ask_all, <Q: PointTest>(
         question: Q = question,
         target: Target<'_> = target,
-        points: &[[R; 3]] = points,
+        points: &[Point] = points,
         answers: &mut [Q::Answer] = answers,
         work: Work<'_> = work,
     ) -> Result<(), Error>)
 }
 
 #[inline(always)]
-fn ask_all<S: Simd, R: Real, Q: PointTest>(
+fn ask_all<S: Simd, Q: PointTest>(
     simd: S,
     question: Q,
     target: Target<'_>,
-    points: &[[R; 3]],
+    points: &[Point],
     answers: &mut [Q::Answer],
     work: Work<'_>,
 ) -> Result<(), Error> {
@@ -77,7 +76,6 @@ fn ask_all<S: Simd, R: Real, Q: PointTest>(
     let mut descent = Descent::default();
     let mut looks = Looks::new(work);
     for (point, answer) in points.iter().zip(answers) {
-        let point = point.map(R::widen);
         let at = Aabb {
             min: point.map(round_down),
             max: point.map(round_up),
@@ -95,7 +93,7 @@ fn ask_all<S: Simd, R: Real, Q: PointTest>(
             let mask = simd.overlaps_64(lanes, &query, up_to(slots.len() - 1));
             let mut is_settled = false;
             for lane in Lanes(mask) {
-                is_settled |= question.add(&mut found, target, slots.start + lane, &point);
+                is_settled |= question.add(&mut found, target, slots.start + lane, point);
             }
             if is_settled {
                 break;

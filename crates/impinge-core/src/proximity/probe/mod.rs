@@ -42,6 +42,7 @@ use crate::simd::Isa;
 
 use border::Border;
 use boxes::Boxes;
+use impinge_exact::Point;
 use impinge_exact::internal::Ray;
 
 /// What is kept of the bodies that were probed, from call to call.
@@ -190,7 +191,9 @@ impl Probes {
         let size = work.workers.task(TASK);
         let mut tasks: Vec<_> = points.chunks(size).zip(answers.chunks_mut(size)).collect();
         work.each(&mut tasks, |_, (points, answers)| {
-            inside::ask(self.isa, question, target, points, answers, work)
+            let mut widened: Vec<Point> = with_capacity(points.len(), "points")?;
+            widened.extend(points.iter().map(|point| point.map(R::widen)));
+            inside::ask(self.isa, question, target, &widened, answers, work)
         })?;
         Ok(answers)
     }
@@ -242,10 +245,9 @@ impl Probes {
                 order.chunks(size).map(|some| (some, Vec::new())).collect();
             work.each(&mut tasks, |_, (some, found)| {
                 let mut some_points = with_capacity(some.len(), WHAT)?;
-                some_points.extend(some.iter().map(|&ix| points[ix as usize]));
-                let points: &[[R; 3]] = &some_points;
-                *found = filled(None, points.len() * n_held, WHAT)?;
-                closest::closest(self.isa, &bodies, points, (most, n_held), found, work)
+                some_points.extend(some.iter().map(|&ix| points[ix as usize].map(R::widen)));
+                *found = filled(None, some_points.len() * n_held, WHAT)?;
+                closest::closest(self.isa, &bodies, &some_points, (most, n_held), found, work)
             })?;
             for (some, of_some) in tasks {
                 for (&ix, rows) in some.iter().zip(of_some.chunks_exact(n_held)) {

@@ -17,7 +17,21 @@ use super::super::world::StepWorld;
 use super::batch::{Between, Slots, exact_pair};
 use super::contacts::{FirstContacts, Open};
 
-/// Decides the open pairs of the current parts.
+/// What is done with all pairs of a list.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Pass {
+    /// Those that are certainly apart are dropped.
+    First,
+    /// Those that are farther apart than the margin are dropped.
+    Close,
+    /// Intervals of the open pairs are looked at.
+    Look,
+    /// Candidates are enclosed.
+    Enclose,
+}
+
+/// Decides the open pairs of the current parts. One loop for all passes, so that what fills the
+/// lanes and looks at them, tens of kilobytes per instruction set, is compiled once.
 #[inline(always)]
 pub(super) fn search<S: Simd>(simd: S, contacts: &mut FirstContacts, world: StepWorld<'_>) {
     let Some(between) = contacts.between else {
@@ -33,53 +47,78 @@ pub(super) fn search<S: Simd>(simd: S, contacts: &mut FirstContacts, world: Step
     let mut later = std::mem::take(&mut contacts.later);
     let mut single = std::mem::take(&mut contacts.single);
     let margin = contacts.margin(world, between);
-    if contacts.is_first {
-        let until = contacts.until(world);
-        for chunk in open.chunks(LANES) {
+    let after_first = if margin > 0.0 {
+        Pass::Close
+    } else {
+        Pass::Look
+    };
+    let mut pass = if contacts.is_first {
+        Pass::First
+    } else {
+        after_first
+    };
+    loop {
+        let waiting = if pass == Pass::Enclose {
+            &mut single
+        } else {
+            &mut open
+        };
+        let waiting = std::mem::take(waiting);
+        for chunk in waiting.chunks(LANES) {
             sides.fill(simd, chunk, &mut steps, &mut spans);
-            let no = filter::are_apart::<S::F64>(pair, &steps, until, margin);
             let among = u8::MAX >> (LANES - chunk.len());
-            for lane in Lanes(u64::from(!no & among)) {
-                later.push(chunk[lane]);
+            match pass {
+                Pass::First => {
+                    let until = contacts.until(world);
+                    let no = filter::are_apart::<S::F64>(pair, &steps, until, margin);
+                    for lane in Lanes(u64::from(!no & among)) {
+                        later.push(chunk[lane]);
+                    }
+                }
+                Pass::Close | Pass::Look => {
+                    let is_close = pass == Pass::Close;
+                    let margin = if is_close { margin } else { 0.0 };
+                    let seen = filter::look::<S::F64>(pair, &steps, &spans, margin);
+                    let lists = (&mut later, &mut single);
+                    if is_close {
+                        contacts.keep_close(world, between, chunk, &seen, lists);
+                    } else {
+                        contacts.after_look(world, (between, pair), chunk, among, &seen, lists);
+                    }
+                }
+                Pass::Enclose => {
+                    let found = filter::enclose::<S::F64>(pair, &steps, &spans);
+                    contacts.after_enclosing(world, (between, pair), chunk, &found, &mut later);
+                }
             }
         }
-        open.clear();
-        std::mem::swap(&mut open, &mut later);
-    }
-    if margin > 0.0 {
-        while !open.is_empty() {
-            for chunk in open.chunks(LANES) {
-                sides.fill(simd, chunk, &mut steps, &mut spans);
-                let seen = filter::look::<S::F64>(pair, &steps, &spans, margin);
-                contacts.keep_close(world, between, chunk, &seen, (&mut later, &mut single));
+        let mut done = waiting;
+        done.clear();
+        match pass {
+            Pass::First => {
+                (open, later) = (later, done);
+                pass = after_first;
             }
-            open.clear();
-            std::mem::swap(&mut open, &mut later);
+            Pass::Close => {
+                (open, later) = (later, done);
+                if open.is_empty() {
+                    std::mem::swap(&mut open, &mut single);
+                    pass = Pass::Look;
+                }
+            }
+            Pass::Look => {
+                open = done;
+                pass = Pass::Enclose;
+            }
+            Pass::Enclose => {
+                single = done;
+                std::mem::swap(&mut open, &mut later);
+                if open.is_empty() {
+                    break;
+                }
+                pass = Pass::Look;
+            }
         }
-        std::mem::swap(&mut open, &mut single);
-    }
-    while !(open.is_empty() && single.is_empty()) {
-        for chunk in open.chunks(LANES) {
-            sides.fill(simd, chunk, &mut steps, &mut spans);
-            let seen = filter::look::<S::F64>(pair, &steps, &spans, 0.0);
-            let among = u8::MAX >> (LANES - chunk.len());
-            contacts.after_look(
-                world,
-                (between, pair),
-                chunk,
-                among,
-                &seen,
-                (&mut later, &mut single),
-            );
-        }
-        open.clear();
-        for chunk in single.chunks(LANES) {
-            sides.fill(simd, chunk, &mut steps, &mut spans);
-            let found = filter::enclose::<S::F64>(pair, &steps, &spans);
-            contacts.after_enclosing(world, (between, pair), chunk, &found, &mut later);
-        }
-        single.clear();
-        std::mem::swap(&mut open, &mut later);
     }
     (contacts.open, contacts.later, contacts.single) = (open, later, single);
 }
