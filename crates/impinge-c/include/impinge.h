@@ -161,7 +161,8 @@ impinge_status impinge_scene_set_end_positions(impinge_scene *scene, uint32_t bo
 impinge_status impinge_scene_lend_positions(impinge_scene *scene, uint32_t body, impinge_array positions, void (*release)(void *user),
     void *user);
 
-/* Sets where the vertices are at the end of the step, without a copy, as impinge_scene_lend_positions. */
+/* Sets where the vertices are at the end of the step, without a copy, as impinge_scene_lend_positions. `release` is also called when the
+ * end is cleared: by no rows of impinge_scene_set_end_positions, and when a new step starts. */
 impinge_status impinge_scene_lend_end_positions(impinge_scene *scene, uint32_t body, impinge_array positions,
     void (*release)(void *user), void *user);
 

@@ -27,7 +27,7 @@ static void release(void *user) {
 int main(void) {
   static ball one, other, far_away;
   static double columns[3][VERTICES];
-  int releases[3] = {0, 0, 0};
+  int releases[4] = {0, 0, 0, 0};
   impinge_scene *scene = NULL;
   impinge_detector *detector = open_detector(1);
   impinge_pairs *pairs = NULL;
@@ -59,7 +59,18 @@ int main(void) {
   /* The scene forgets both; the motion needs neither. */
   GOOD(impinge_motion_apply(motion, scene));
   impinge_motion_destroy(motion);
-  CHECK(releases[0] == 1);
+  CHECK(releases[0] == 1 && releases[1] == 1);
+  /* Ends are released when the body stands still. */
+  for (i = 0; i < 3; ++i) {
+    static const double unit[4][4] = {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, 1}};
+    GOOD(impinge_scene_lend_end_positions(scene, 1, positions_of(&other), release, &releases[3]));
+    CHECK(releases[3] == (int)i);
+    if (i == 0) GOOD(impinge_scene_set_end_positions(scene, 1, packed(NULL, 0, 0)));
+    if (i == 1) GOOD(impinge_scene_set_positions(scene, 1, positions_of(&far_away)));
+    if (i == 2) GOOD(impinge_scene_set_transform(scene, 1, packed(unit, 4, IMPINGE_F64)));
+    CHECK(releases[3] == (int)i + 1);
+  }
+  GOOD(impinge_scene_set_positions(scene, 1, positions_of(&far_away)));
   /* Rows that are not packed are copied, and released at once. */
   by_column = packed(columns, VERTICES, IMPINGE_F64);
   by_column.row_stride = sizeof(double);

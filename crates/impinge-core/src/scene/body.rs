@@ -48,7 +48,7 @@ pub struct Body {
     pub(super) positions: Positions,
     /// Where the vertices are at the end of a step; as many as `positions`, or `None` so far.
     pub(super) end: Option<Positions>,
-    /// Whether `end` counts. If not, only its memory is kept.
+    /// Whether `end` counts. If not, only memory of the body's own is kept.
     pub(super) moves: bool,
     /// Whether a transform made it, while it counts.
     pub(super) is_end_transformed: bool,
@@ -319,10 +319,17 @@ impl Body {
         self.step_stamp = new_stamp();
     }
 
-    pub(super) fn has_moved(&mut self, checked: bool) {
-        self.positions_stamp = new_stamp();
-        self.step_stamp = self.positions_stamp;
+    /// Clears the end. Memory of the body's own is kept for the next one, and rows of an owner are
+    /// dropped.
+    pub(super) fn clear_end(&mut self) {
         self.moves = false;
+        self.end.take_if(|end| end.is_shared());
+        self.step_stamp = new_stamp();
+    }
+
+    pub(super) fn has_moved(&mut self, checked: bool) {
+        self.clear_end();
+        self.positions_stamp = self.step_stamp;
         self.motion = None;
         self.checked = checked;
     }

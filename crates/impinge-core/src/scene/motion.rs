@@ -6,7 +6,7 @@ use std::sync::Arc;
 use crate::scene::Body;
 use crate::scene::bodies::Scene;
 use crate::scene::error::Error;
-use crate::scene::ids::{BodyId, new_stamp};
+use crate::scene::ids::BodyId;
 use crate::scene::position_rows::PositionRows;
 use crate::scene::positions::{Given, NewPositions, Positions, Real};
 use crate::scene::transform::{Affine, RestPose};
@@ -60,9 +60,9 @@ impl Scene {
     /// [`positions`](crate::Body::positions) to its end position on a straight line at constant
     /// speed. They hold until the next [`set_positions`](Scene::set_positions),
     /// [`positions_mut`](Scene::positions_mut), [`set_transform`](Scene::set_transform),
-    /// [`remesh`](Scene::remesh) or [`clear_end_positions`](Scene::clear_end_positions). A body
-    /// that has none stands still. For a rigid body, see
-    /// [`set_end_transform`](Scene::set_end_transform).
+    /// [`remesh`](Scene::remesh) or [`clear_end_positions`](Scene::clear_end_positions), or until
+    /// the step is [taken](crate::Advance::apply); a shared array is dropped then. A body that has
+    /// none stands still. For a rigid body, see [`set_end_transform`](Scene::set_end_transform).
     ///
     /// If start and end have different precisions, the single-precision one is widened, which is
     /// exact.
@@ -89,9 +89,7 @@ impl Scene {
     /// # Errors
     /// The id names no body.
     pub fn clear_end_positions(&mut self, body: BodyId) -> Result<(), Error> {
-        let target = self.moved_body(body)?;
-        target.moves = false;
-        target.step_stamp = new_stamp();
+        self.moved_body(body)?.clear_end();
         Ok(())
     }
 

@@ -43,9 +43,14 @@ impl<R: Copy> PositionRows<R> {
         PositionRows(HeldRows::Shared(SharedRows { rows, owner }))
     }
 
+    /// Whether the rows are those of an owner.
+    pub(crate) fn is_shared(&self) -> bool {
+        matches!(self.0, HeldRows::Shared(_))
+    }
+
     /// The rows to be changed; shared ones are copied first.
     pub(crate) fn own(&mut self) -> &mut Vec<[R; 3]> {
-        if let HeldRows::Shared(_) = self.0 {
+        if self.is_shared() {
             self.0 = HeldRows::Own(self.to_vec());
         }
         match &mut self.0 {

@@ -56,6 +56,14 @@ impl Positions {
         }
     }
 
+    /// Whether the rows are those of an owner.
+    pub(crate) fn is_shared(&self) -> bool {
+        match self {
+            Positions::F32(positions) => positions.is_shared(),
+            Positions::F64(positions) => positions.is_shared(),
+        }
+    }
+
     /// Copies rows that are shared with their owner.
     pub(crate) fn own(&mut self) {
         match self {

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use crate::common::{self, agree, cases, check, naive, rows};
 use impinge_core::{
-    Affinity, Backend, Detector, InstructionSet, Method, Positions, Query, Recluster, Scene,
-    Settings, SharedVertex, hash_rows,
+    Affinity, Backend, Detector, Error, InstructionSet, Method, Positions, Query, Recluster, Scene,
+    Settings, SharedVertex, Start, hash_rows,
 };
 use impinge_scenes::deform::{self, Deform};
 use impinge_scenes::{soup, surfaces};
@@ -665,4 +665,35 @@ fn lent_ends_of_a_step_are_those_that_would_have_been_copied() {
         let impacts = detector.impacts(&scene, &step).unwrap();
         assert!(!impacts.is_empty() && impacts.hash() == hash);
     }
+}
+
+#[test]
+fn lent_ends_are_dropped_when_the_body_stands_still() {
+    let mut scene = Scene::new();
+    let [_, b] = large_balls(&mut scene);
+    let mut detector = Detector::new(cpu(Method::Clusters, 1)).unwrap();
+    let start = scene.body(b).unwrap().positions().clone();
+    let lent = Arc::new(surfaces::ball(12_000).translated([9.0; 3]).positions);
+    let unit: [[f64; 4]; 4] =
+        std::array::from_fn(|i| std::array::from_fn(|j| f64::from(u8::from(i == j))));
+    type Stop<'a> = &'a dyn Fn(&mut Scene) -> Result<(), Error>;
+    let stops: [Stop<'_>; 4] = [
+        &|scene| scene.clear_end_positions(b),
+        &|scene| scene.set_positions(b, &start),
+        &|scene| scene.set_transform(b, &unit),
+        &|scene| scene.positions_mut::<f32>(b).map(drop),
+    ];
+    for stop in stops {
+        scene.set_end_positions(b, Arc::clone(&lent)).unwrap();
+        stop(&mut scene).unwrap();
+        assert_eq!(Arc::strong_count(&lent), 1);
+        assert_eq!(scene.body(b).unwrap().end_positions(), None);
+    }
+    // A step that is taken drops them, too.
+    let step = Query::between_all().start(Start::Skip);
+    scene.set_end_positions(b, Arc::clone(&lent)).unwrap();
+    let advance = detector.advance(&scene, &step).unwrap();
+    advance.apply(&mut scene).unwrap();
+    drop(advance);
+    assert_eq!(Arc::strong_count(&lent), 1);
 }
