@@ -73,8 +73,8 @@ uint32_t impinge_abi_version(void);
  *
  * The number in row i and column j lies at (char *)data + i * row_stride + j * column_stride. So rows may be parts of larger structures,
  * matrices may be row-major or column-major, and blocks of them need no copy. If both strides are 0, the rows are packed: each follows
- * the one before without a gap. Strides must be multiples of the size of a number, and data aligned to it. data may be NULL if there are
- * no rows. */
+ * the one before without a gap. Strides must be multiples of the size of a number, and data aligned to it. If there are no rows, nothing
+ * else counts: data may be NULL, and type and strides may be anything, as in impinge_array none = {0}. */
 typedef struct impinge_array {
   const void *data;
   size_t rows;

@@ -217,6 +217,8 @@ pub unsafe fn floats<'a, const N: usize>(
         }
     }
     match array.r#type {
+        // Of no rows the type does not count.
+        other if array.rows == 0 && other != F64 => Ok(Floats::F32(Cow::Borrowed(&[]))),
         // SAFETY: the caller's promise.
         F32 => Ok(Floats::F32(unsafe { rows(array, what) }?)),
         // SAFETY: the caller's promise.
@@ -263,6 +265,8 @@ pub unsafe fn indices<const N: usize>(
     // SAFETY: the caller's promise, in all cases.
     unsafe {
         match array.r#type {
+            // Of no rows the type does not count.
+            _ if array.rows == 0 => Ok(Vec::new()),
             U32 => {
                 let view = Strided::<u32, N>::new(array, what)?;
                 match view.packed() {

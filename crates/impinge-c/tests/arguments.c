@@ -290,6 +290,30 @@ int main(void) {
   REFUSED(impinge_first_contact(IMPINGE_FF, at, at, NULL, &number, &found), "kind: 32");
   REFUSED(impinge_first_contact(IMPINGE_VF, at, at, NULL, &number, &found), "start: 1154 rows given, 4 needed");
 
+  {
+    /* Of no rows the type does not count. */
+    static const float not_numbers[2][3] = {{NAN, 0, HUGE_VALF}, {NAN, 0, HUGE_VALF}}, inf[2][3] = {{0, 0, HUGE_VALF}, {-0.0f, 0, HUGE_VALF}};
+    const impinge_array none = {0};
+    uint32_t empty = 9, map[2];
+    GOOD(impinge_scene_add_triangles(scene, none, none, &empty));
+    GOOD(impinge_scene_set_edges(scene, 0, none));
+    GOOD(impinge_scene_set_positions(scene, empty, none));
+    GOOD(impinge_scene_set_groups(scene, empty, none));
+    GOOD(impinge_scene_set_pinned(scene, empty, none));
+    GOOD(impinge_scene_remesh(scene, empty, IMPINGE_POINTS, none, none));
+    GOOD(impinge_scene_remove(scene, empty));
+    GOOD(impinge_contains(detector, scene, 0, none, NULL));
+    GOOD(impinge_cast(detector, scene, none, none, 1, NULL, &hits));
+    impinge_hits_destroy(hits);
+    GOOD(impinge_weld(none, NULL, NULL, &size));
+    CHECK(size == 0);
+    REFUSED(impinge_scene_set_positions(scene, 0, none), "body 0: 0 positions given");
+    /* Welding compares numbers. */
+    GOOD(impinge_weld(packed(not_numbers, 2, IMPINGE_F32), map, NULL, &size));
+    CHECK(size == 2);
+    GOOD(impinge_weld(packed(inf, 2, IMPINGE_F32), map, NULL, &size));
+    CHECK(size == 1);
+  }
   /* Nothing has changed. */
   CHECK(n == 7 && impinge_scene_n_bodies(scene) == 1 && hash_of(detector, scene, NULL) == 0);
   {
