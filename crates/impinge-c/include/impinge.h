@@ -945,7 +945,8 @@ int32_t impinge_motion_start_intersects(const impinge_motion *motion);
 uint64_t impinge_motion_n_cut(const impinge_motion *motion);
 uint64_t impinge_motion_n_touching(const impinge_motion *motion);
 uint32_t impinge_motion_rounds(const impinge_motion *motion);
-/* Where the vertices of a body are then: a view, valid as long as the motion. No rows for a body that stands still. */
+/* Where the vertices of a body are then: a view, valid as long as the motion. No rows for a body that stands still. INVALID: no such body
+ * when the step was asked about. */
 impinge_status impinge_motion_positions(const impinge_motion *motion, uint32_t body, impinge_array *view);
 /* Takes the step: the bodies that move get these positions, and stand still until they get end positions again. Transforms of bodies whose
  * end impinge_scene_set_end_transform set go on from the same positions as before; those of others start from these.

@@ -26,16 +26,19 @@ enum Motion {
 }
 
 impl Motion {
-    fn positions(&self, body: u32) -> Option<&Positions> {
-        let is_of = |index: usize| index == body as usize;
-        match self {
-            Motion::Whole { advance, .. } => {
-                Some(advance.iter().find(|(id, _)| is_of(id.index()))?.1)
-            }
-            Motion::ByVertex(truncation) => {
-                Some(truncation.iter().find(|(id, _)| is_of(id.index()))?.1)
-            }
-        }
+    /// Where the vertices of a body are then; `None` for one that stands still.
+    fn positions(&self, body: u32) -> Result<Option<&Positions>, Failure> {
+        let start = match self {
+            Motion::Whole { advance, .. } => advance.start(),
+            Motion::ByVertex(truncation) => truncation.start(),
+        };
+        let mut ids = start.bodies().iter().map(|start| start.body);
+        let id = ids.find(|id| id.index() == body as usize);
+        let id = id.ok_or_else(|| Failure::no_body(body, start.bodies().len()))?;
+        Ok(match self {
+            Motion::Whole { advance, .. } => advance.positions(id),
+            Motion::ByVertex(truncation) => truncation.positions(id),
+        })
     }
 
     fn truncation(&self) -> Option<&Truncation> {
@@ -146,7 +149,7 @@ pub unsafe extern "C" fn impinge_motion_positions(
     guard(|| {
         // SAFETY: `impinge.h` says what pointers are.
         let motion = unsafe { held(motion, "motion") }?;
-        let shown = motion.of.positions(body).map(arrays::positions_view);
+        let shown = motion.of.positions(body)?.map(arrays::positions_view);
         // SAFETY: `impinge.h` says what pointers are.
         unsafe { put(view, "view", shown.unwrap_or(arrays::no_rows(F64))) }
     })

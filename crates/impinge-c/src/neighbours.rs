@@ -84,12 +84,7 @@ pub unsafe extern "C" fn impinge_neighbours_first(
         // SAFETY: see `impinge_find_neighbours`.
         let firsts = &unsafe { held(neighbours, "neighbours") }?.firsts;
         let found = firsts.iter().find(|(of, _)| *of == body);
-        let (_, found) = found.ok_or_else(|| {
-            Failure::invalid(format!(
-                "there was no body {body} among the {} of the scene",
-                firsts.len()
-            ))
-        })?;
+        let (_, found) = found.ok_or_else(|| Failure::no_body(body, firsts.len()))?;
         // SAFETY: see `impinge_find_neighbours`.
         unsafe { put(first, "first", *found) }
     })

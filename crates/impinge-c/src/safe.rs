@@ -51,12 +51,8 @@ pub unsafe extern "C" fn impinge_safe_distances_of(
         // SAFETY: see `impinge_find_safe_distances`.
         let safe = &unsafe { held(safe_distances, "safe_distances") }?.safe;
         let id = safe.bodies().find(|id| id.index() == body as usize);
-        let bounds = id.and_then(|id| safe.of(id)).ok_or_else(|| {
-            Failure::invalid(format!(
-                "there was no body {body} among the {} of the scene",
-                safe.bodies().count()
-            ))
-        })?;
+        let bounds = id.and_then(|id| safe.of(id));
+        let bounds = bounds.ok_or_else(|| Failure::no_body(body, safe.bodies().count()))?;
         let shown = match bounds {
             Bounds::F32([]) => no_rows(F32),
             Bounds::F64([]) => no_rows(F64),

@@ -32,6 +32,13 @@ impl Failure {
         Failure::invalid(format!("{what} is NULL"))
     }
 
+    /// That a body was not there when an answer was found.
+    pub fn no_body(body: u32, n_bodies: usize) -> Self {
+        Failure::invalid(format!(
+            "there was no body {body} among the {n_bodies} of the scene"
+        ))
+    }
+
     pub fn out_of_memory(what: &str, n: usize) -> Self {
         Failure {
             status: OUT_OF_MEMORY,

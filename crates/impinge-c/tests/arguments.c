@@ -314,6 +314,17 @@ int main(void) {
     GOOD(impinge_weld(packed(inf, 2, IMPINGE_F32), map, NULL, &size));
     CHECK(size == 1);
   }
+  {
+    /* A body that stands still has no rows, and one that was not there is refused. */
+    GOOD(impinge_truncate(detector, scene, NULL, &motion));
+    GOOD(impinge_motion_positions(motion, 0, &bad));
+    CHECK(bad.rows == 0);
+    REFUSED(impinge_motion_positions(motion, 77, &bad), "no body 77 among the 1");
+    impinge_motion_destroy(motion);
+    GOOD(impinge_advance(detector, scene, NULL, NULL, &motion));
+    REFUSED(impinge_motion_positions(motion, 77, &bad), "no body 77 among the 1");
+    impinge_motion_destroy(motion);
+  }
   /* Nothing has changed. */
   CHECK(n == 7 && impinge_scene_n_bodies(scene) == 1 && hash_of(detector, scene, NULL) == 0);
   {
