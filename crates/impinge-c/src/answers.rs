@@ -396,28 +396,26 @@ pub unsafe extern "C" fn impinge_impacts_start_intersects(impacts: *const imping
     asked(impacts.and_then(|held| held.impacts.start_intersects()))
 }
 
-/// Rows of a caller.
+/// Rows of a caller, aligned or not.
 ///
 /// # Safety
 /// `rows` has `n` rows, or is NULL.
-unsafe fn rows_of<'a, T>(rows: *const T, n: usize) -> &'a [T] {
-    match rows.is_null() || n == 0 {
-        true => &[],
-        // SAFETY: the caller's promise.
-        false => unsafe { std::slice::from_raw_parts(rows, n) },
-    }
+unsafe fn rows_of<T: Copy>(rows: *const T, n: usize) -> impl Iterator<Item = T> {
+    let n = if rows.is_null() { 0 } else { n };
+    // SAFETY: the caller's promise.
+    (0..n).map(move |ix| unsafe { rows.add(ix).read_unaligned() })
 }
 
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn impinge_hash_pairs(rows: *const impinge_pair, n: usize) -> u64 {
     // SAFETY: see `answer!`.
-    hash_rows(unsafe { rows_of(rows, n) }.iter().map(|row| row.row()))
+    hash_rows(unsafe { rows_of(rows, n) }.map(|row| row.row()))
 }
 
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn impinge_hash_impacts(rows: *const impinge_impact, n: usize) -> u64 {
     // SAFETY: see `answer!`.
-    let rows = unsafe { rows_of(rows, n) }.iter();
+    let rows = unsafe { rows_of(rows, n) };
     hash_impact_rows(rows.filter_map(|row| {
         let of = [row.body_a, row.element_a, row.body_b, row.element_b];
         Some((kind_of(row.kind)?, of, row.toi))

@@ -116,7 +116,7 @@ pub unsafe extern "C" fn impinge_neighbours_lists(
         for (to, view) in [offsets, indices, distances].into_iter().zip(views) {
             if !to.is_null() {
                 // SAFETY: see `impinge_find_neighbours`.
-                unsafe { to.write(view) };
+                unsafe { to.write_unaligned(view) };
             }
         }
         Ok(())

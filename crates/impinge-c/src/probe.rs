@@ -11,7 +11,7 @@ use crate::detector::impinge_detector;
 use crate::questions::{question, value};
 use crate::scene::impinge_scene;
 use crate::stats::Texts;
-use crate::status::Failure;
+use crate::status::{Failure, write_all};
 use crate::types::*;
 
 /// The elements nearest to points.
@@ -196,9 +196,7 @@ unsafe fn per_point<A, T>(
             if to.is_null() && !found.is_empty() {
                 return Err(Failure::null(what));
             }
-            for (ix, one) in found.into_iter().enumerate() {
-                to.add(ix).write(written(one));
-            }
+            write_all(to, found.into_iter().map(written));
             Ok(())
         })
     }

@@ -214,9 +214,7 @@ fn list<'a, T>(field: &str, items: *const T, n: usize) -> Result<&'a [T], Failur
     match n {
         0 => Ok(&[]),
         _ if items.is_null() => refuse(field, "NULL", &format!("{n} needed")),
-        _ if !items.is_aligned() => {
-            refuse(field, "a pointer that is not aligned", "an array needed")
-        }
+        _ if !items.is_aligned() => Err(Failure::misaligned(items, field)),
         // SAFETY: the caller says how many there are, and that they are there during the call.
         _ => Ok(unsafe { std::slice::from_raw_parts(items, n) }),
     }

@@ -43,7 +43,7 @@ pub unsafe fn question<A>(
     // SAFETY: the caller's promise, in all calls.
     unsafe {
         if !answer.is_null() {
-            answer.write(std::ptr::null_mut());
+            answer.write_unaligned(std::ptr::null_mut());
         }
         ask(detector, scene, |detector, scene| {
             clear(answer, what)?;
@@ -208,7 +208,7 @@ pub unsafe extern "C" fn impinge_advance(
     // SAFETY: see `impinge_query_default`.
     unsafe {
         if !motion.is_null() {
-            motion.write(std::ptr::null_mut());
+            motion.write_unaligned(std::ptr::null_mut());
         }
         value((detector, scene, step), |of| {
             if fraction.is_null() && motion.is_null() {
@@ -217,12 +217,12 @@ pub unsafe extern "C" fn impinge_advance(
             let step = of.asked.step()?;
             let found = of.detector.advance(&of.scene.scene, &step)?;
             if !fraction.is_null() {
-                fraction.write(found.fraction);
+                fraction.write_unaligned(found.fraction);
             }
             if !motion.is_null() {
                 let stats = of.detector.stats().clone();
                 let made = impinge_motion::new(found, stats);
-                motion.write(Box::into_raw(Box::new(made)));
+                motion.write_unaligned(Box::into_raw(Box::new(made)));
             }
             Ok(())
         })
@@ -310,7 +310,7 @@ pub unsafe extern "C" fn impinge_find_candidates_in_runs(
                 end?;
             }
             if !n.is_null() {
-                n.write(n_given);
+                n.write_unaligned(n_given);
             }
             Ok(())
         })

@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use impinge::{Body, BodyId, Filter, Positions, Scene, Thickness, Weld};
 
 use crate::arrays::{self, Floats, elements_view, no_rows, positions_view, with_rows};
-use crate::status::{Failure, Handle, Held, change, clear, end, guard, held, look, put};
+use crate::status::{Failure, Handle, Held, change, clear, end, guard, held, look, put, write_all};
 use crate::types::*;
 
 /// A scene, and the ids of its bodies.
@@ -66,7 +66,7 @@ impl Bodies {
         self.ids[number] = Some(id);
         if !body.is_null() {
             // SAFETY: the caller's promise.
-            unsafe { body.write(number as u32) };
+            unsafe { body.write_unaligned(number as u32) };
         }
         Ok(())
     }
@@ -555,11 +555,9 @@ pub unsafe extern "C" fn impinge_weld(
         // more vertices after welding.
         unsafe {
             put(n_vertices, "n_vertices", weld.firsts().len())?;
-            if positions.rows > 0 {
-                map.copy_from_nonoverlapping(weld.map().as_ptr(), weld.map().len());
-            }
+            write_all(map, weld.map().iter().copied());
             if !firsts.is_null() {
-                firsts.copy_from_nonoverlapping(weld.firsts().as_ptr(), weld.firsts().len());
+                write_all(firsts, weld.firsts().iter().copied());
             }
         }
         Ok(())

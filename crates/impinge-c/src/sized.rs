@@ -32,8 +32,11 @@ pub unsafe fn read_sized<T: Sized32>(given: *const T) -> Result<T, Failure> {
     if given.is_null() {
         return Ok(read);
     }
+    if !given.is_aligned() {
+        return Err(Failure::misaligned(given, T::NAME));
+    }
     // SAFETY: the first field is a `u32`, and the caller says that it is there.
-    let size = unsafe { given.cast::<u32>().read_unaligned() } as usize;
+    let size = unsafe { given.cast::<u32>().read() } as usize;
     let least = size_of::<u32>();
     if size <= least || size > size_of::<T>() {
         return Err(Failure::invalid(format!(

@@ -39,6 +39,12 @@ impl Failure {
         ))
     }
 
+    /// That a pointer to a `T` is not aligned.
+    pub fn misaligned<T>(at: *const T, what: &str) -> Self {
+        let needed = align_of::<T>();
+        Failure::invalid(format!("{what} at {at:p} is not aligned to {needed} bytes"))
+    }
+
     pub fn out_of_memory(what: &str, n: usize) -> Self {
         Failure {
             status: OUT_OF_MEMORY,
@@ -299,16 +305,19 @@ pub unsafe fn end<T: Held>(handle: *mut Handle<T>) {
     }
 }
 
-/// The handle, or that it is NULL.
+/// The handle, or that it is NULL or not aligned.
 ///
 /// # Safety
 /// `handle` is NULL or a handle of this library that nobody changes while the reference lives.
 pub unsafe fn held<'a, H>(handle: *const H, what: &str) -> Result<&'a H, Failure> {
+    if !handle.is_aligned() {
+        return Err(Failure::misaligned(handle, what));
+    }
     // SAFETY: the caller's promise.
     unsafe { handle.as_ref() }.ok_or_else(|| Failure::null(what))
 }
 
-/// Writes a result where the caller wants it.
+/// Writes a result where the caller wants it, aligned or not.
 ///
 /// # Safety
 /// `to` is NULL or can be written.
@@ -317,8 +326,19 @@ pub unsafe fn put<T>(to: *mut T, what: &str, value: T) -> Result<(), Failure> {
         return Err(Failure::null(what));
     }
     // SAFETY: the caller's promise.
-    unsafe { to.write(value) };
+    unsafe { to.write_unaligned(value) };
     Ok(())
+}
+
+/// Writes numbers where the caller wants them, aligned or not.
+///
+/// # Safety
+/// All of them can be written to `to`, which may be NULL if there are none.
+pub unsafe fn write_all<T>(to: *mut T, numbers: impl IntoIterator<Item = T>) {
+    for (ix, number) in numbers.into_iter().enumerate() {
+        // SAFETY: the caller's promise.
+        unsafe { to.add(ix).write_unaligned(number) };
+    }
 }
 
 /// Sets an out-pointer to NULL, so that it is NULL after a failure.

@@ -123,9 +123,9 @@ unsafe fn near_stencils(
             clear(stencils, "stencils")?;
             let near = held(near_pairs, "near_pairs")?;
             let scene = &held(scene, "scene")?.read()?.scene;
-            let rest = match rest.as_ref() {
-                None => None,
-                Some(rest) => Some(match arrays::floats::<3>(rest, "rest")? {
+            let rest = match rest.is_null() {
+                true => None,
+                false => Some(match arrays::floats::<3>(held(rest, "rest")?, "rest")? {
                     Floats::F64(rest) => rest,
                     Floats::F32(rest) => {
                         let widened = rest.iter().map(|point| point.map(f64::from));
@@ -218,6 +218,9 @@ pub unsafe extern "C" fn impinge_project_psd(matrices: *mut f64, n: usize, size:
             return Err(Failure::invalid(format!(
                 "matrices: NULL, but there are {n} matrices"
             )));
+        }
+        if n > 0 && !matrices.is_aligned() {
+            return Err(Failure::misaligned(matrices, "matrices"));
         }
         let n_numbers = size.checked_mul(size).and_then(|each| n.checked_mul(each));
         let n_numbers = n_numbers.filter(|&n| n <= isize::MAX as usize / size_of::<f64>());

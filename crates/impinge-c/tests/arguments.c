@@ -291,6 +291,39 @@ int main(void) {
   REFUSED(impinge_first_contact(IMPINGE_VF, at, at, NULL, &number, &found), "start: 1154 rows given, 4 needed");
 
   {
+    /* Pointers that are not aligned: input is refused, and results are written where they are to be. */
+    static double numbers[16];
+    static int64_t results[16];
+    char *off = (char *)numbers + 1, *to = (char *)results + 1;
+    const impinge_pair *rows = (const impinge_pair *)(const void *)(off + 1);
+    impinge_scene *made = NULL;
+    uint32_t map[2];
+    uint64_t count = 9;
+    double distance = 9, corner = 9;
+    memset(&exclusion, 0, sizeof exclusion);
+    REFUSED(impinge_detect(detector, scene, (const impinge_query *)(void *)off, &pairs), "impinge_query at 0x");
+    REFUSED(impinge_project_psd((double *)(void *)off, 1, 3), "is not aligned to 8 bytes");
+    REFUSED(impinge_scene_set_positions((impinge_scene *)(void *)off, 0, at), "scene at 0x");
+    GOOD(impinge_count(detector, scene, NULL, (uint64_t *)(void *)to));
+    memcpy(&count, to, sizeof count);
+    CHECK(count == 0);
+    GOOD(impinge_scene_create((impinge_scene **)(void *)to));
+    memcpy(&made, to, sizeof made);
+    CHECK(made != NULL && impinge_scene_n_bodies(made) == 0);
+    GOOD(impinge_scene_add_points(made, packed(NULL, 0, 0), (uint32_t *)(void *)to));
+    impinge_scene_destroy(made);
+    GOOD(impinge_weld(packed(numbers, 2, IMPINGE_F64), (uint32_t *)(void *)to, (uint32_t *)(void *)(to + 12), (size_t *)(void *)(to + 24)));
+    memcpy(map, to, sizeof map);
+    memcpy(&size, to + 24, sizeof size);
+    CHECK(map[0] == 0 && map[1] == 0 && size == 1);
+    GOOD(impinge_signed_distance(detector, scene, 0, packed(numbers, 1, IMPINGE_F64), (double *)(void *)to));
+    memcpy(&distance, to, sizeof distance);
+    GOOD(impinge_signed_distance(detector, scene, 0, packed(numbers, 1, IMPINGE_F64), &corner));
+    CHECK(distance == corner && distance > 0.9);
+    GOOD(impinge_winding_numbers(detector, scene, 0, packed(numbers, 1, IMPINGE_F64), (int32_t *)(void *)to));
+    CHECK(impinge_hash_pairs(rows, 1) == impinge_hash_pairs((const impinge_pair *)(void *)numbers, 1));
+  }
+  {
     /* Of no rows the type does not count. */
     static const float not_numbers[2][3] = {{NAN, 0, HUGE_VALF}, {NAN, 0, HUGE_VALF}}, inf[2][3] = {{0, 0, HUGE_VALF}, {-0.0f, 0, HUGE_VALF}};
     const impinge_array none = {0};
