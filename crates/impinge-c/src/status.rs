@@ -63,10 +63,19 @@ impl From<Error> for Failure {
             Error::NoAdapter { .. } | Error::Gpu { .. } => DEVICE,
             _ => INVALID,
         };
-        Failure {
-            status,
-            message: error.to_string(),
-        }
+        let message = match error {
+            // The settings that C names in other words.
+            Error::Setting {
+                setting: "owned_by",
+                given,
+                allowed,
+            } => format!("cell_low and cell_high: {given} given, {allowed} allowed"),
+            error => {
+                let named = "those that are named by `of` or `across`";
+                error.to_string().replace(named, "the one in the field a")
+            }
+        };
+        Failure { status, message }
     }
 }
 

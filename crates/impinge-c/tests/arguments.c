@@ -258,7 +258,7 @@ int main(void) {
   REFUSED(impinge_is_free(detector, scene, &query, &found), "kinds: ef");
   query.kinds = 0;
   query.flags = IMPINGE_CELL;
-  REFUSED(impinge_advance(detector, scene, &query, &number, NULL), "owned_by");
+  REFUSED(impinge_advance(detector, scene, &query, &number, NULL), "cell_low and cell_high: a cell");
 
   /* Settings. */
 #define SETTING(field, value, text)                                                                                     \
@@ -358,6 +358,17 @@ int main(void) {
     REFUSED(impinge_motion_positions(motion, 77, &bad), "no body 77 among the 1");
     impinge_motion_destroy(motion);
   }
+  {
+    /* Messages name the fields of C. */
+    impinge_query_default(&query);
+    query.flags = IMPINGE_CELL;
+    query.cell_low[0] = NAN;
+    REFUSED(impinge_detect(detector, scene, &query, &pairs), "cell_low and cell_high: [NaN");
+    impinge_query_default(&query);
+    query.kinds = IMPINGE_VF;
+    REFUSED(impinge_find_closest(detector, scene, at, 1, &query, &closest), "all bodies, or the one in the field a allowed");
+  }
+
   /* Nothing has changed. */
   CHECK(n == 7 && impinge_scene_n_bodies(scene) == 1 && hash_of(detector, scene, NULL) == 0);
   {
