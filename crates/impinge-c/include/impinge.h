@@ -220,7 +220,9 @@ impinge_status impinge_scene_faces(const impinge_scene *scene, uint32_t body, im
 
 /* Finds vertices whose positions are equal (3 columns of F32 or F64), as along the seams of a mesh for drawing. `map` gets one number
  * per row: the vertex after welding. `firsts` gets one number per vertex after welding: the first row at its position; it has room
- * for as many numbers as there are rows, and may be NULL. `n_vertices` gets the number of vertices after welding. */
+ * for as many numbers as there are rows, and may be NULL. `n_vertices` gets the number of vertices after welding.
+ * Coordinates are compared as numbers, without a tolerance: -0 equals 0, an infinity equals itself, and NaN equals nothing, so a row with
+ * NaN is never welded. Scenes refuse such positions; this does not. */
 impinge_status impinge_weld(impinge_array positions, uint32_t *map, uint32_t *firsts, size_t *n_vertices);
 
 /* ---- Queries ---- */
@@ -233,7 +235,8 @@ impinge_status impinge_weld(impinge_array positions, uint32_t *map, uint32_t *fi
 #define IMPINGE_EF 16
 #define IMPINGE_FF 32
 
-/* Pairs of one body that share vertices. RESOLVE: reported if they meet in more than the parts that they share. SKIP: not reported.
+/* Pairs of one body that share vertices. RESOLVE: reported if they meet in more than the parts that they share; two faces, or two
+ * tetrahedra, with the same vertices always, such as a face that is there twice. SKIP: not reported.
  * Pairs of edges or points, and all pairs of steps, candidates and near pairs, are not reported if they share a vertex. */
 #define IMPINGE_SKIP 0
 #define IMPINGE_RESOLVE 1
@@ -374,7 +377,8 @@ typedef struct impinge_detector impinge_detector;
  *   backend, method     As above. Default: AUTO.
  *   threads             Threads of the CPU, 0 for one per core. With 1, no other thread is started.
  *   memory_budget       Bytes that the detector may hold, the answer included; 0, the default, for as many as it takes.
- *   max_pairs           The most pairs that an answer may have; 0, the default, for any number.
+ *   max_pairs           The most pairs that an answer may have; 0, the default, for any number. More stop also impinge_count, and
+ *                       impinge_find_candidates_in_runs where all of its runs together have more.
  *   cancelled           Called now and then during a question: anything but 0 stops it with IMPINGE_ERROR_CANCELLED. May be NULL.
  *   progress            Called now and then with units of work done and of all, which differ by stage. May be NULL.
  *   log                 Called with the message of every question that fails, and when a detector is opened: on which GPU, or on the CPU

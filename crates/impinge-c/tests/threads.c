@@ -3,6 +3,8 @@
 #include "common.h"
 #include <pthread.h>
 #include <sched.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 static impinge_scene *scene = NULL;
 
@@ -150,6 +152,25 @@ static void changed_meanwhile(void) {
   impinge_detector_destroy(detector);
 }
 
+/* A forked process has no threads of its parent: a detector of the parent answers alone, and a new one starts threads. */
+static void forked(void) {
+  impinge_detector *detector = open_detector(2);
+  uint64_t hash = hash_of(detector, scene, NULL);
+  int ended = -1;
+  pid_t child = fork();
+  if (child == 0) {
+    alarm(60);
+    CHECK(hash_of(detector, scene, NULL) == hash);
+    impinge_detector_destroy(detector);
+    detector = open_detector(2);
+    CHECK(hash_of(detector, scene, NULL) == hash);
+    impinge_detector_destroy(detector);
+    _exit(n_failed != 0);
+  }
+  CHECK(waitpid(child, &ended, 0) == child && ended == 0);
+  impinge_detector_destroy(detector);
+}
+
 int main(void) {
   static ball one, other;
   pthread_t threads[2];
@@ -168,6 +189,9 @@ int main(void) {
   moved = &other;
   in_use();
   changed_meanwhile();
+#ifndef __SANITIZE_THREAD__ /* It allows no new threads in a fork. */
+  forked();
+#endif
   impinge_scene_destroy(scene);
   return finish("threads");
 }
