@@ -113,33 +113,48 @@ def read(context, names, selected_only=False):
     for object in objects:
         if object.mode == "EDIT":
             object.update_from_editmode()
-    read = [_read(context, object) for object in objects]
-    unknown = [object for object, (body, _) in zip(objects, read) if body.polygons is None]
+    selections = [_selection(object) for object in objects]
+    bodies = [_read(context, object) for object in objects]
+    unknown = [object for object, body in zip(objects, bodies) if body.polygons is None]
     with _numbered(context, unknown) as layers:
         for ix, object in enumerate(objects):
             if object in unknown:
-                read[ix] = _read(context, object, layers)
-    bodies = [body for body, _ in read]
-    if selected_only:
-        selections = [selected & (object.mode == "EDIT") for object, (_, selected) in zip(objects, read)]
-        if any(selected.any() for selected in selections):
-            for body, selected in zip(bodies, selections):
-                body.selected = selected
+                bodies[ix] = _read(context, object, layers)
+    if selected_only and any(map(np.any, selections)):
+        for body, selection in zip(bodies, selections):
+            body.selected = _selected(body, selection)
     return bodies
 
 
+def _selection(object):
+    """Which faces of the object's own mesh are selected in Edit Mode; empty in other modes, and of other kinds of objects."""
+    if object.type != "MESH" or object.mode != "EDIT":
+        return np.empty(0, bool)
+    return _get(object.data.polygons, "select", bool)
+
+
+def _selected(body, selection):
+    """Which triangles come from selected faces of the object's own mesh. Modifiers may drop the flags of the faces that they hand on."""
+    selected = np.zeros(len(body.polygons), bool)
+    if selection.any():
+        is_own = body.polygons >= 0
+        selected[is_own] = selection[body.polygons[is_own]]
+        if not selected.any() and not is_own.all():
+            raise ValueError(f"{body.name}: its modifiers make new faces, and none is known to come from a selected one: switch Selected Faces Only off")
+    return selected
+
+
 def _read(context, object, layers=None):
-    """The body, and which of its triangles are selected. Its polygons are None if only numbers could tell them: those in `layers`."""
+    """The body. Its polygons are None if only numbers could tell them: those in `layers`."""
     evaluated = object.evaluated_get(context.evaluated_depsgraph_get())
     mesh = evaluated.to_mesh()
     if mesh is None:
-        return _body(object, np.empty((0, 3)), np.empty((0, 3), int), np.empty(0, int), evaluated), np.empty(0, bool)
+        return _body(object, np.empty((0, 3)), np.empty((0, 3), int), np.empty(0, int), evaluated)
     try:
         mesh.calc_loop_triangles()
         vertices = _get(mesh.vertices, "co", np.float32, 3)
         triangles = _corners(mesh)[_get(mesh.loop_triangles, "loops", np.int32, 3)]
         polygon = _get(mesh.loop_triangle_polygons, "value", np.int32)
-        selected = _get(mesh.polygons, "select", bool)[polygon]
         if layers is not None:
             numbers = mesh.attributes.get(layers.get(object.data, ""))
             is_known = numbers is not None and numbers.domain == "FACE" and len(numbers.data) == len(mesh.polygons)
@@ -147,7 +162,7 @@ def _read(context, object, layers=None):
             origin = origin[polygon]
         else:
             origin = polygon if _is_same(object, mesh) else None
-        return _body(object, vertices, triangles, origin, evaluated), selected
+        return _body(object, vertices, triangles, origin, evaluated)
     finally:
         evaluated.to_mesh_clear()
 

@@ -80,21 +80,24 @@ class IMPINGE_OT_select(bpy.types.Operator):
                 return {"CANCELLED"}
             faces = found.answer.places[found.place].faces
         objects, gone, left = {}, [], []
-        for object, (name, polygons) in zip(meshes.named(context.scene, faces), faces.items()):
+        # An object may have another name by now.
+        by_uid = {object.session_uid: object for object in context.scene.objects}
+        for name, polygons in faces.items():
             if not len(polygons):
                 continue
+            object = by_uid.get(found.answer.topology[name][0])
             if object is None:
                 gone.append(name)
                 continue
             if object.mode == "EDIT":
                 object.update_from_editmode()
             if meshes.topology(object) != found.answer.topology[name]:
-                self.report({"ERROR"}, f"Select: {name} has changed since the check")
+                self.report({"ERROR"}, f"Select: {object.name_full} has changed since the check")
                 return {"CANCELLED"}
             if object.visible_get() and object.data.is_editable:
                 objects[object] = polygons
             else:
-                left.append(f"{name} ({'of another file' if object.visible_get() else 'hidden'})")
+                left.append(f"{object.name_full} ({'of another file' if object.visible_get() else 'hidden'})")
         missing = [f"not those of {', '.join(left)}"] if left else []
         if gone:
             missing.append(text.gone(gone))
