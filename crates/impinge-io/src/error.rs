@@ -71,7 +71,7 @@ pub enum Error {
     },
     /// The path is not a regular file but a pipe, a device, a socket or a folder. Check the name,
     /// or copy its content to a file.
-    #[error("{}: is {what}, not a regular file", crate::printable(.path))]
+    #[error("{}: is {what}, not a regular file{}", crate::printable(.path), files_of(.path, .what))]
     NotAFile {
         /// The path.
         path: PathBuf,
@@ -320,6 +320,21 @@ impl Name<'_> {
             limit,
             found,
         }
+    }
+}
+
+/// How the files of a folder are named, for messages: the folder's name in front of a pattern.
+pub(crate) fn in_folder(path: &Path) -> String {
+    let folder = printable(path);
+    let folder = folder.trim_end_matches(std::path::is_separator);
+    format!("{folder}/*.obj")
+}
+
+/// What helps where a folder was given.
+fn files_of(path: &Path, what: &str) -> String {
+    match what {
+        "a folder" => format!("; its files are named as in {}", in_folder(path)),
+        _ => String::new(),
     }
 }
 

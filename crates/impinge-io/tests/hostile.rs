@@ -453,5 +453,9 @@ fn pointers_and_folders_are_called_what_they_are() {
     }
     let folder = tempfile::tempdir().unwrap();
     let said = Format::from_path(folder.path()).unwrap_err().to_string();
-    assert!(said.ends_with("is a folder, not a regular file"), "{said}");
+    let expected = format!(
+        "{path}: is a folder, not a regular file; its files are named as in {path}/*.obj",
+        path = folder.path().display()
+    );
+    assert_eq!(said, expected);
 }

@@ -142,7 +142,8 @@ fn inputs_that_never_end_are_refused_at_once() {
     ] {
         let started = Instant::now();
         let line = folder.run(["pairs", "a.ply", file]).error();
-        assert_eq!(line, format!("{file}: is {what}, not a regular file"));
+        let said = format!("{file}: is {what}, not a regular file");
+        assert!(line.starts_with(&said), "{line}");
         assert!(started.elapsed() < Duration::from_secs(10));
     }
 }
