@@ -220,6 +220,15 @@ impl<'a> Scene<'a, '_> {
                     name.unsupported(Place::File, "the extension 'EXT_mesh_gpu_instancing'")
                 );
             }
+            if let Some(m) = node.matrix {
+                let row = [m[3], m[7], m[11], m[15]];
+                if row != [0.0, 0.0, 0.0, 1.0] {
+                    let expected =
+                        format!("0, 0, 0, 1 as the fourth row of the matrix of node {node_ix}");
+                    let [x, y, z, w] = row;
+                    return Err(name.syntax(Place::File, expected, format!("{x}, {y}, {z}, {w}")));
+                }
+            }
             let transform = compose(parent, local(node));
             if let Some(mesh_ix) = node.mesh {
                 let mesh = root

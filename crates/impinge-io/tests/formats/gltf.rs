@@ -245,6 +245,23 @@ fn what_moves_a_mesh_but_is_not_applied_is_counted() {
     assert_eq!(summary(&with(r#","weights":[0,0]"#)), 0);
 }
 
+/// Only a projection has another fourth row, and a matrix that was written row by row.
+#[test]
+fn a_matrix_with_another_fourth_row_is_refused() {
+    let read = |matrix: &str| {
+        let json = gltf_json("", &format!(r#","matrix":[{matrix}]"#));
+        let glb = glb_of(&json, &gltf_buffer());
+        read_bytes(&glb, Format::Gltf, "g", &ReadOptions::as_they_are())
+    };
+    assert!(read("1,0,0,0, 0,1,0,0, 0,0,1,0, 5,0,0,1").is_ok());
+    assert_eq!(
+        read("1,0,0,5, 0,1,0,0, 0,0,1,0, 0,0,0,1")
+            .unwrap_err()
+            .to_string(),
+        "g: expected 0, 0, 0, 1 as the fourth row of the matrix of node 0, found 5, 0, 0, 1"
+    );
+}
+
 #[test]
 fn faces_of_a_mirrored_node_are_turned() {
     let faces = |nodes: &str, roots: &str, mode: &str| {
