@@ -116,13 +116,12 @@ impl<'a> Collector<'a> {
             }));
     }
 
-    /// Counts what follows the data that the header announces, but for white space and zeros,
-    /// with which some programs fill files up.
+    /// Counts what follows the data that the header announces, unless it is white space and zeros
+    /// alone, with which some programs fill files up.
     pub(crate) fn beyond(&mut self, rest: &[u8]) {
         let fills = |byte: &u8| byte.is_ascii_whitespace() || *byte == 0;
-        if let Some(first) = rest.iter().position(|byte| !fills(byte)) {
-            let last = rest.iter().rposition(|byte| !fills(byte)).unwrap_or(first);
-            self.n_bytes_beyond = (last - first) as u64 + 1;
+        if !rest.iter().all(fills) {
+            self.n_bytes_beyond = rest.len() as u64;
         }
     }
 

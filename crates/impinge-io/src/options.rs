@@ -79,8 +79,8 @@ pub struct Summary {
     pub unit: Option<&'static str>,
     /// Named nodes, items, objects or groups with triangles, where they became one mesh.
     pub n_parts_joined: u64,
-    /// Bytes after the data that the header announces, without white space, zeros and comments
-    /// around them. They were not read.
+    /// Bytes after the data that the header announces, unless they are white space, zeros and
+    /// comments alone. They were not read.
     pub n_bytes_beyond: u64,
 }
 

@@ -481,8 +481,9 @@ fn what_follows_the_announced_data_is_counted() {
             0,
             "{format:?}"
         );
-        let more = [bytes, b"\n3 0 1 2\n3 2 1 0\n"].concat();
-        assert_eq!(beyond(format, &more), 15, "{format:?}");
+        // All that is there, also white space and zeros at its ends.
+        let more = [bytes, b"3 0 1 2\n3 2 1 0\n\0\0"].concat();
+        assert_eq!(beyond(format, &more), 18, "{format:?}");
     }
     let ended = format!("{off}\n# the end\n");
     assert_eq!(beyond(Format::Off, ended.as_bytes()), 0);
