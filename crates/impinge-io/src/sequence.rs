@@ -1,5 +1,6 @@
 //! Sequences of positions: point caches, and meshes in numbered files.
 
+use std::borrow::Cow;
 use std::ffi::OsStr;
 use std::fs::{self, File};
 use std::io::{Read, Seek, SeekFrom};
@@ -8,7 +9,7 @@ use std::sync::{Mutex, PoisonError};
 
 use crate::binary::{Cursor, Endian, Scalar, array};
 use crate::budget::reserve;
-use crate::error::{Error, Name, Place, shown};
+use crate::error::{Error, Name, Place, in_folder, printable, shown};
 use crate::files::{Source as Input, folder_of};
 use crate::mesh::Positions;
 use crate::options::ReadOptions;
@@ -43,6 +44,7 @@ pub struct Sequence {
     frames: Frames,
     n_frames: usize,
     n_points: usize,
+    notes: Vec<String>,
 }
 
 #[derive(Debug)]
@@ -78,15 +80,19 @@ impl Faces {
         let file = file.display().to_string();
         let counts = [(mesh.0.len(), self.0.len()), (mesh.1.len(), self.1.len())];
         if let Some(&(expected, found)) = counts.iter().find(|(mesh, own)| mesh != own) {
-            return mismatch(&file, "faces of a frame, as the mesh has", expected, found);
+            let what = format!("faces of a frame, as the mesh has ({FILE_BY_FILE})");
+            return mismatch(&file, &what, expected, found);
         }
         let of_triangles = first_difference(&self.0, &mesh.0);
         let differing = of_triangles.or_else(|| first_difference(&self.1, &mesh.1));
         let (face, [expected, found]) = differing.unwrap_or_default();
-        let what = format!("as the vertex of face {face}, which the mesh has");
+        let what = format!("a vertex of face {face}, which the mesh has ({FILE_BY_FILE})");
         mismatch(&file, &what, expected as usize, found as usize)
     }
 }
+
+/// What helps where frames have other faces, or another number of vertices.
+const FILE_BY_FILE: &str = "a mesh whose faces change is no sequence: ask about it file by file";
 
 /// The first face that differs from that of the mesh, and the first of its vertices that does: that
 /// of the mesh, and its own.
@@ -131,7 +137,8 @@ impl Sequence {
     /// - `run.pc2`, `run.mdd`: a point cache;
     /// - `run_0010.ply`: that file and all files with a greater number in this place (the last
     ///   number in the name), in the order of their numbers, gaps allowed;
-    /// - `run_%04d.ply`, `run_%d.ply`: all files of that pattern, in the order of their numbers;
+    /// - `run_%04d.ply`, `run_%d.ply`: all files of that pattern, in the order of their numbers,
+    ///   unless there is a file of this very name;
     /// - `run_*.ply`, `run_??.ply`: all files whose name matches, ordered by name with runs of
     ///   digits compared as numbers.
     ///
@@ -146,7 +153,11 @@ impl Sequence {
         let extension = path.extension().unwrap_or_default().to_string_lossy();
         match SequenceFormat::from_extension(&extension) {
             Some(format) => Self::open_cache(path, format),
-            None => Self::of_named(numbered_files(path)?, Some(path.to_owned())),
+            None => {
+                let (files, notes) = numbered_files(path)?;
+                let sequence = Self::of_named(files, Some(path.to_owned()))?;
+                Ok(Sequence { notes, ..sequence })
+            }
         }
     }
 
@@ -190,6 +201,17 @@ impl Sequence {
         }
     }
 
+    /// Whether each frame has a file of its own, also if there is one frame alone.
+    pub fn has_numbered_files(&self) -> bool {
+        matches!(self.frames, Frames::Files { .. })
+    }
+
+    /// What a path may have meant otherwise: which number of a name was taken where no other file
+    /// follows, and files of a `*` or `?` whose names differ from the next in more than a number.
+    pub fn notes(&self) -> &[String] {
+        &self.notes
+    }
+
     /// Gaps in the numbers of numbered files: the files before and after each gap. A gap is a step
     /// that is larger than the smallest step between two files, so a sequence of every tenth number
     /// has no gap.
@@ -201,9 +223,9 @@ impl Sequence {
             return Vec::new();
         }
         let number = |path: &PathBuf| {
-            let name = path.file_name()?.to_str()?;
+            let name = path.file_name()?.to_string_lossy();
             // The last number of the name without its extension, as in `Matcher`.
-            let key = natural_key(name.rsplit_once('.').map_or(name, |(stem, _)| stem));
+            let key = natural_key(name.rsplit_once('.').map_or(&name, |(stem, _)| stem));
             Some((key.len(), key.last()?.0))
         };
         let numbers: Option<Vec<(usize, i128)>> = files.iter().map(number).collect();
@@ -282,7 +304,7 @@ impl Sequence {
                 if positions.len() != self.n_points {
                     return Err(mismatch(
                         &path.display().to_string(),
-                        "vertices of a frame",
+                        &format!("vertices of a frame ({FILE_BY_FILE})"),
                         self.n_points,
                         positions.len(),
                     ));
@@ -317,6 +339,7 @@ impl Sequence {
             // Counts have 31 bits, so they fit.
             n_frames: header.n_frames as usize,
             n_points: header.n_points as usize,
+            notes: Vec::new(),
             frames: Frames::Cache {
                 source,
                 start: header.start,
@@ -371,6 +394,7 @@ impl Sequence {
             name,
             n_frames: files.len(),
             n_points: positions.len(),
+            notes: Vec::new(),
             frames: Frames::Files {
                 files,
                 named,
@@ -466,47 +490,53 @@ fn input<'p>(path: &'p Path, named: Option<&'p Path>) -> Input<'p> {
     }
 }
 
-/// The files that `path` stands for, in order, at least one. `path` is the first file, a printf
-/// pattern, or a glob pattern.
-fn numbered_files(path: &Path) -> Result<Vec<PathBuf>, Error> {
+/// The files that `path` stands for, in order, at least one, and notes on them. `path` is the first
+/// file, a printf pattern, or a glob pattern.
+fn numbered_files(path: &Path) -> Result<(Vec<PathBuf>, Vec<String>), Error> {
     let shown_path = path.display().to_string();
     let name = Name(&shown_path);
     if path.is_dir() {
-        let expected = format!(
-            "frames, as in '{shown}/*.obj'",
-            shown = shown_path.trim_end_matches(std::path::is_separator)
-        );
+        let expected = format!("frames, as in '{}'", in_folder(path));
         return Err(name.syntax(Place::File, &expected, "a folder"));
     }
-    let wrong = |found: &str| {
-        name.syntax(
-            Place::File,
-            "a file name with a number, a '%d' or a '*' in it",
-            found,
-        )
+    let pattern = path.file_name().map(OsStr::to_string_lossy);
+    // Other programs write patterns so.
+    let is_foreign = |pattern: &str| pattern.contains('#') || pattern.contains("$F");
+    let hint = match pattern.as_deref().is_some_and(is_foreign) {
+        true => " (in place of '####' or '$F4': '%04d')",
+        false => "",
     };
-    let pattern = path
-        .file_name()
-        .and_then(|n| n.to_str())
-        .ok_or_else(|| wrong("none"))?;
-    let matcher = Matcher::new(pattern).ok_or_else(|| wrong(&format!("'{pattern}'")))?;
+    let wrong = |found: &str| {
+        let expected = format!("a file name with a number, a '%d' or a '*' in it{hint}");
+        name.syntax(Place::File, expected, found)
+    };
+    let pattern = match &pattern {
+        None => return Err(wrong("none")),
+        Some(Cow::Owned(_)) => return Err(wrong("a name that is not UTF-8")),
+        Some(Cow::Borrowed(pattern)) => *pattern,
+    };
+    let matcher = match path.is_file() {
+        true => Matcher::of_first(pattern),
+        false => Matcher::new(pattern),
+    };
+    let matcher = matcher.ok_or_else(|| wrong(&format!("'{pattern}'")))?;
     let folder = folder_of(path);
     let mut found = Vec::new();
     let failed = |source| Error::io(folder, "list", source);
     for entry in fs::read_dir(folder).map_err(failed)? {
         let file_name = entry.map_err(failed)?.file_name();
-        if let Some(key) = file_name
-            .to_str()
-            .and_then(|candidate| matcher.key(candidate))
-        {
+        // Of a name that is not UTF-8, a pattern takes the rest for any character.
+        if let Some(key) = matcher.key(&file_name.to_string_lossy()) {
             found.push((key, path.with_file_name(file_name)));
         }
     }
     if found.is_empty() {
-        return Err(name.syntax(Place::File, "files of this name", "none"));
+        return Err(name.syntax(Place::File, format!("files of this name{hint}"), "none"));
     }
     found.sort();
-    Ok(found.into_iter().map(|(_, path)| path).collect())
+    let files: Vec<PathBuf> = found.into_iter().map(|(_, path)| path).collect();
+    let notes = matcher.notes(&files);
+    Ok((files, notes))
 }
 
 /// Decides which file names belong to a sequence.
@@ -526,24 +556,33 @@ enum Matcher<'p> {
 
 impl<'p> Matcher<'p> {
     fn new(pattern: &'p str) -> Option<Self> {
-        if let Some((prefix, rest)) = pattern.split_once('%') {
-            let (width, suffix) = rest.split_once('d')?;
-            let width = if width.is_empty() {
-                1
-            } else {
-                width.parse().ok()?
+        let printf = pattern.match_indices('%').find_map(|(at, _)| {
+            let (width, suffix) = pattern[at + 1..].split_once('d')?;
+            let width = match width {
+                "" => 1,
+                // Parsing alone would take a sign, too.
+                _ if width.starts_with(|c: char| c.is_ascii_digit()) => width.parse().ok()?,
+                _ => return None,
             };
-            return Some(Matcher::Number {
-                prefix,
+            Some(Matcher::Number {
+                prefix: &pattern[..at],
                 suffix,
                 widths: [width; 2],
                 negative_widths: [width, width.saturating_sub(1)],
                 least: i128::MIN,
-            });
+            })
+        });
+        if printf.is_some() {
+            return printf;
         }
         if pattern.contains(['*', '?']) {
             return Some(Matcher::Glob(pattern));
         }
+        Self::of_first(pattern)
+    }
+
+    /// That of a file with a number in its name, and all files with a greater one.
+    fn of_first(pattern: &'p str) -> Option<Self> {
         // Digits in the extension are not a frame number.
         let stem = pattern.rfind('.').map_or(pattern, |dot| &pattern[..dot]);
         let end = stem.rfind(|c: char| c.is_ascii_digit())? + 1;
@@ -564,6 +603,34 @@ impl<'p> Matcher<'p> {
             negative_widths: [width; 2],
             least: stem[start..end].parse().ok()?,
         })
+    }
+
+    /// What the name may have meant otherwise, of the files that were found, at least one.
+    fn notes(&self, files: &[PathBuf]) -> Vec<String> {
+        match *self {
+            // A pattern says where the number is.
+            Matcher::Number { least, .. } if files.len() == 1 && least > i128::MIN => {
+                vec![format!(
+                    "the only frame: no file has a greater number in place of {least}, the last number of the name"
+                )]
+            }
+            Matcher::Number { .. } => Vec::new(),
+            Matcher::Glob(_) => {
+                let differ = |two: &&[PathBuf]| differ_otherwise([&two[0], &two[1]]);
+                let mut others = files.windows(2).filter(differ);
+                let Some(first) = others.next() else {
+                    return Vec::new();
+                };
+                let more = match others.count() {
+                    0 => String::new(),
+                    n => format!(", as do {n} more files from the next"),
+                };
+                let [a, b] = [&first[0], &first[1]].map(printable);
+                vec![format!(
+                    "{a} and {b} are frames in a row, and differ in more than the value of one number{more}"
+                )]
+            }
+        }
     }
 
     /// The sort key of a file name; `None` if it does not belong to the sequence.
@@ -636,6 +703,29 @@ fn key_of_file(name: &str) -> Vec<(i128, String)> {
     // Less than any text that goes on.
     key.push((i128::MIN, extension.to_owned()));
     key
+}
+
+/// Whether the names of two files differ in anything but the value of one number, which may be
+/// negative or have a fraction.
+fn differ_otherwise(files: [&Path; 2]) -> bool {
+    let names = files.map(|file| file.file_name().unwrap_or_default().to_string_lossy());
+    let [a, b] = [names[0].as_bytes(), names[1].as_bytes()];
+    let is_part = |byte: &u8| byte.is_ascii_digit() || *byte == b'.';
+    // What is alike before and after, without the digits beside what is not.
+    let n_alike = a.iter().zip(b).take_while(|(a, b)| a == b).count();
+    let n_digits = a[..n_alike].iter().rev().take_while(|byte| is_part(byte));
+    let start = n_alike - n_digits.count();
+    let ends = a[n_alike..].iter().rev().zip(b[n_alike..].iter().rev());
+    let n_alike = ends.take_while(|(a, b)| a == b).count();
+    let after = &a[a.len() - n_alike..];
+    let end = n_alike - after.iter().take_while(|byte| is_part(byte)).count();
+    let is_number = |name: &[u8]| {
+        let number = &name[start..name.len() - end];
+        let digits = number.strip_prefix(b"-").unwrap_or(number);
+        digits.iter().all(is_part) && digits.iter().any(u8::is_ascii_digit)
+    };
+    let is_same = natural_key(&names[0]) == natural_key(&names[1]);
+    is_same || !is_number(a) || !is_number(b)
 }
 
 /// Whether files are in one folder, and their names differ in numbers and in nothing else.

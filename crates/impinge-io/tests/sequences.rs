@@ -221,9 +221,128 @@ fn frames_of_another_size_are_refused() {
     assert!(sequence.frame(0).is_ok());
     let message = sequence.frame(1).unwrap_err().to_string();
     assert!(
-        message.ends_with("run_09.obj: vertices of a frame: expected 2, found 1"),
+        message.ends_with(
+            "run_09.obj: vertices of a frame (a mesh whose faces change is no sequence: ask about it \
+             file by file): expected 2, found 1"
+        ),
         "{message}"
     );
+}
+
+/// A folder of files with a vertex at 0, 1, 2, … each.
+fn folder_of(names: &[&str]) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    for (x, name) in names.iter().enumerate() {
+        std::fs::write(folder.path().join(name), format!("v {x} 0 0\n")).unwrap();
+    }
+    folder
+}
+
+#[test]
+fn percent_signs_that_are_no_pattern() {
+    let folder = folder_of(&[
+        "50%_0001.obj",
+        "50%_0002.obj",
+        "a%b_7_1.obj",
+        "a%b_7_2.obj",
+        "a%d.obj",
+    ]);
+    let read = |name: &str| {
+        let sequence = Sequence::open(&folder.path().join(name));
+        sequence.map(|sequence| first_coordinates(&sequence))
+    };
+    for (name, expected) in [
+        ("50%_0001.obj", &[0.0, 1.0][..]),
+        ("50%_%04d.obj", &[0.0, 1.0]),
+        ("50%_*.obj", &[0.0, 1.0]),
+        ("a%b_%d_1.obj", &[2.0]),
+    ] {
+        assert_eq!(read(name).unwrap(), expected, "{name}");
+    }
+    // It has no number.
+    assert!(read("a%d.obj").is_err());
+}
+
+#[test]
+fn patterns_of_other_programs_are_answered_with_ours() {
+    let folder = folder_of(&["run_0001.obj"]);
+    for name in ["run_####.obj", "run_$F4.obj"] {
+        let said = Sequence::open(&folder.path().join(name)).unwrap_err();
+        assert!(said.to_string().contains("'%04d'"), "{said}");
+    }
+}
+
+#[test]
+fn what_a_name_may_have_meant_otherwise_is_said() {
+    let notes = |names: &[&str], name: &str| {
+        let folder = folder_of(names);
+        let sequence = Sequence::open(&folder.path().join(name)).unwrap();
+        let shown = format!("{}/", folder.path().display());
+        let notes = sequence.notes().iter();
+        notes
+            .map(|note| note.replace(&shown, ""))
+            .collect::<Vec<_>>()
+    };
+    let runs = ["run_0001_v2.obj", "run_0002_v2.obj"];
+    assert_eq!(
+        notes(&runs, "run_0001_v2.obj"),
+        ["the only frame: no file has a greater number in place of 2, the last number of the name"]
+    );
+    assert!(notes(&runs, "run_%04d_v2.obj").is_empty());
+    assert!(notes(&["run_1.obj"], "run_%d.obj").is_empty());
+    for (names, first, more) in [
+        (
+            &["f_1.obj", "f_1b.obj", "f_2.obj"][..],
+            Some(["f_1.obj", "f_1b.obj"]),
+            1,
+        ),
+        (
+            &["f_1_v1.obj", "f_1_v2.obj", "f_2_v1.obj"],
+            Some(["f_1_v2.obj", "f_2_v1.obj"]),
+            0,
+        ),
+        (&["f.obj", "f_1.obj"], Some(["f.obj", "f_1.obj"]), 0),
+        (&["f1.obj", "f1.off"], Some(["f1.obj", "f1.off"]), 0),
+        (&["f_01.obj", "f_1.obj"], Some(["f_01.obj", "f_1.obj"]), 0),
+        (
+            &["f_-2.obj", "f_-1.obj", "f_0.obj", "f_9.obj", "f_10.obj"],
+            None,
+            0,
+        ),
+        (&["f_2.obj", "f_12.obj", "f_112.obj"], None, 0),
+        // Fractions of frames.
+        (
+            &["f.1.obj", "f.1.25.obj", "f.1.50.obj", "f.2.obj", "f.10.obj"],
+            None,
+            0,
+        ),
+    ] {
+        let more = match more {
+            0 => String::new(),
+            n => format!(", as do {n} more files from the next"),
+        };
+        let expected = first.map(|[a, b]| {
+            format!("{a} and {b} are frames in a row, and differ in more than the value of one number{more}")
+        });
+        assert_eq!(notes(names, "f*"), Vec::from_iter(expected), "{names:?}");
+    }
+}
+
+/// Linux lets a name have any bytes; a file must not be left out because of them.
+#[cfg(target_os = "linux")]
+#[test]
+fn names_that_are_not_utf_8() {
+    use std::ffi::OsStr;
+    use std::os::unix::ffi::OsStrExt;
+    let folder = folder_of(&["run_1.obj", "run_3.obj", "run_4.obj"]);
+    let name = OsStr::from_bytes(b"run_\xff_2.obj");
+    std::fs::write(folder.path().join(name), "v 9 0 0\n").unwrap();
+    let sequence = Sequence::open(&folder.path().join("run_*.obj")).unwrap();
+    assert_eq!(sequence.n_frames(), 4);
+    assert!(first_coordinates(&sequence).contains(&9.0));
+    assert_eq!(sequence.notes().len(), 1);
+    let said = Sequence::open(&folder.path().join(name)).unwrap_err();
+    assert!(said.to_string().contains("not UTF-8"), "{said}");
 }
 
 #[test]

@@ -13,7 +13,7 @@ use crate::asked::{Asked, thicken};
 use crate::detection::{Times, asked, detector, hit, query, set_positions, settings};
 use crate::error::Error;
 use crate::files::{Files, FrameFiles};
-use crate::load::{Bodies, Loading, to_positions};
+use crate::load::{Bodies, Loading, tell, to_positions};
 use crate::output::out;
 use crate::picture::Drawer;
 use crate::rows::{self, Rows};
@@ -267,6 +267,7 @@ impl Frames {
         json: bool,
     ) -> Result<Self, Error> {
         sequence.check_faces(mesh)?;
+        tell(&name.display().to_string(), sequence.notes());
         let mut after_gaps = Vec::new();
         for [before, after] in sequence.gaps() {
             after_gaps.extend(sequence.files().iter().position(|file| file == after));
@@ -286,11 +287,6 @@ impl Frames {
             json,
             n_passed_over: 0,
         })
-    }
-
-    /// Whether each frame has a file of its own.
-    fn has_files(&self) -> bool {
-        self.sequence.files().len() == self.n_frames() && self.n_frames() > 1
     }
 
     /// What the program ends with.
@@ -376,7 +372,7 @@ impl step::Frames for Frames {
             | Error::Refused {
                 source: impinge::Error::WrongNumberOfPositions { .. },
                 ..
-            } => !self.has_files(),
+            } => !self.sequence.has_numbered_files(),
             _ => false,
         };
         if is_of_all {
@@ -403,7 +399,7 @@ impl step::Frames for Frames {
         let file = || self.sequence.files()[frame_ix].display().to_string();
         report::Frame {
             frame: frame_ix,
-            file: self.has_files().then(file),
+            file: self.sequence.has_numbered_files().then(file),
         }
     }
 }
