@@ -97,7 +97,10 @@ unsafe extern "C" fn meets(arguments: *mut ffi::PointQueryArguments) -> bool {
     // nowhere else meanwhile.
     let (query, face) = unsafe {
         let arguments = &*arguments;
-        (&mut *arguments.user.cast::<Query<'_>>(), arguments.element)
+        (
+            &mut *arguments.user.cast::<Query<'_>>(),
+            arguments.primitive,
+        )
     };
     let corners = query.faces[face as usize];
     if !corners.contains(&query.vertex) {

@@ -4,7 +4,7 @@
 //! 0   8 bytes  "IMPTILE1"
 //! 8   u64      the plan's id
 //! 16  u32      number of the unit          20  u32  number of its file
-//! 24  u32      corners per element       28  u32  bytes per coordinate
+//! 24  u32      corners per element         28  u32  bytes per coordinate
 //! 32  u32      tiles                       36  u32  1 in a step, else 0
 //! 40  per tile: u64 where its records start, u64 how many there are, u64 checksum
 //!     records: u32 element, u32 vertex per corner, 3 coordinates per corner, in a step 3 more per corner at the end

@@ -71,6 +71,8 @@ pub(crate) struct Clusterings(Arc<Mutex<Entries>>);
 pub(crate) struct Entries {
     slots: Vec<BodyClusterings>,
     bytes_held: BytesHeld,
+    /// The arrangement of the scene of which the outdated were dropped last.
+    seen: u64,
     recluster: Recluster,
     tuning: Tuning,
 }
@@ -165,6 +167,7 @@ impl Clusterings {
         Clusterings(Arc::new(Mutex::new(Entries {
             slots: Vec::new(),
             bytes_held: BytesHeld::default(),
+            seen: 0,
             recluster: settings.recluster,
             tuning: settings.tuning,
         })))
@@ -180,8 +183,9 @@ impl Clusterings {
     pub fn open(&self, scene: &Scene) -> MutexGuard<'_, Entries> {
         let mut known = self.lock();
         known.settle();
-        if known.slots.len() > scene.n_bodies() {
+        if known.slots.len() > scene.n_bodies() && known.seen != scene.arrangement() {
             known.forget_outdated(scene);
+            known.seen = scene.arrangement();
         }
         known
     }

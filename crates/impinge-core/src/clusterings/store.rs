@@ -31,6 +31,8 @@ pub(crate) trait Clustered: Send {
 pub(crate) struct Store<T, const PARTS: usize = 1> {
     slots: Vec<[Option<Box<T>>; PARTS]>,
     bytes_held: BytesHeld,
+    /// The arrangement of the scene whose removed bodies were dropped last.
+    seen: u64,
 }
 
 impl<T, const PARTS: usize> Default for Store<T, PARTS> {
@@ -38,6 +40,7 @@ impl<T, const PARTS: usize> Default for Store<T, PARTS> {
         Store {
             slots: Vec::new(),
             bytes_held: BytesHeld::default(),
+            seen: 0,
         }
     }
 }
@@ -90,7 +93,7 @@ impl<T: Clustered, const PARTS: usize> Store<T, PARTS> {
             let body = scene.holds(slot).then(|| scene.body_in(slot as u32));
             let stamp = body.map(Body::topology_stamp);
             for kept in parts {
-                if kept.as_ref().map(|kept| kept.topology_stamp()) != stamp {
+                if kept.is_some() && kept.as_ref().map(|kept| kept.topology_stamp()) != stamp {
                     *kept = None;
                     self.bytes_held.touch(slot);
                 }
@@ -128,7 +131,8 @@ impl<T: Clustered, const PARTS: usize> Store<T, PARTS> {
         if self.slots.len() < n_slots {
             self.slots.resize_with(n_slots, || [const { None }; PARTS]);
         }
-        if self.slots.len() > scene.n_bodies() {
+        if self.slots.len() > scene.n_bodies() && self.seen != scene.arrangement() {
+            self.seen = scene.arrangement();
             for (slot, parts) in self.slots.iter_mut().enumerate() {
                 if !scene.holds(slot) && parts.iter().any(Option::is_some) {
                     *parts = [const { None }; PARTS];

@@ -127,7 +127,7 @@ impl HubScratch {
         self.beyond.iter_mut().for_each(Vec::clear);
         self.slots.clear();
         self.slots.extend_from_slice(slots);
-        (self.slots).sort_by_cached_key(|&slot| (sorted_ids(body.corners(slot)), slot));
+        (self.slots).sort_unstable_by_key(|&slot| (sorted_ids(body.corners(slot)), slot));
         let same =
             |&a: &Slot, &b: &Slot| sorted_ids(body.corners(a)) == sorted_ids(body.corners(b));
         let mut start = 0;

@@ -34,6 +34,8 @@ pub(super) struct OfTwo {
     trees: HashMap<(usize, Part), Tree>,
     /// Those of the trees.
     bytes: usize,
+    /// The arrangement of the scene whose removed bodies were forgotten last.
+    seen: u64,
     /// By the numbers of the bodies.
     known: HashMap<[usize; 2], Known>,
 }
@@ -63,13 +65,15 @@ impl OfTwo {
             stats: Stats::default(),
             trees: HashMap::new(),
             bytes: 0,
+            seen: 0,
             known: HashMap::new(),
         }
     }
 
     /// Forgets removed bodies: to be called first in each question.
     pub(super) fn begin(&mut self, scene: &Scene) {
-        if self.trees.len() > scene.n_bodies() {
+        if self.trees.len() > scene.n_bodies() && self.seen != scene.arrangement() {
+            self.seen = scene.arrangement();
             self.trees.retain(|&(slot, _), _| scene.holds(slot));
             self.bytes = self.trees.values().map(Tree::bytes).sum();
         }
