@@ -2,11 +2,13 @@
 
 use crate::common;
 use std::ops::ControlFlow;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use impinge_core::exact::{ElementPair, first_contact};
 use impinge_core::{
     Backend, BodyId, CancelToken, Candidates, Control, Detector, Element, Elements, Error, Method,
-    PairKind, Part, Positions, Precision, Query, Scene, Settings, Start,
+    PairFilter, PairKind, Part, Positions, Precision, Query, Scene, Settings, Start,
 };
 
 const FACE: [[u32; 3]; 1] = [[0, 1, 2]];
@@ -970,6 +972,50 @@ fn a_cancelled_question_about_a_step_ends_and_the_detector_goes_on() {
         assert_eq!(candidates, Some(Error::Cancelled));
         detector.set_control(Control::new());
         assert_eq!(detector.is_free(&scene, &step), Ok(false));
+    }
+}
+
+/// Each pair of these takes exact arithmetic hundreds of milliseconds: the filter, which is asked
+/// before, counts them and lets none pass.
+#[test]
+fn no_pair_is_decided_exactly_after_a_cancellation() {
+    let start = [
+        [-8e-220, 3e-185, 3e41],
+        [2e-202, -3e260, -2e-36],
+        [-2e239, -2e109, -2e-23],
+        [2e107, 1e-212, -1e-296],
+    ];
+    let end = [
+        [-3e-152, -2e-220, -2e-160],
+        [4e-284, 4e39, -4e96],
+        [-2e66, 1e-9, 3e120],
+        [1e-80, 8e33, -5e-200],
+    ];
+    let mut scene = Scene::new();
+    for _ in 0..2 {
+        let body = scene.add_triangles(&[[0, 1, 2], [1, 2, 3]], &start);
+        (scene.set_end_positions(body.expect("good"), &end)).expect("good");
+    }
+    for separation in [0.0, 0.5] {
+        let asked = |token: Option<CancelToken>| {
+            let n_asked = Arc::new(AtomicU64::new(0));
+            let (counter, own) = (Arc::clone(&n_asked), token.clone());
+            let filter = PairFilter::new(move |_| {
+                counter.fetch_add(1, Ordering::Relaxed);
+                own.iter().for_each(CancelToken::cancel);
+                false
+            });
+            let settings = Settings::new().backend(Backend::Cpu).threads(1);
+            let mut detector = Detector::new(settings).expect("settings");
+            detector.set_control(token.iter().fold(Control::new(), Control::cancel));
+            let query = Query::between_all().separation(separation).filter(filter);
+            let n = detector.impacts(&scene, &query).map(|found| found.len());
+            (n, n_asked.load(Ordering::Relaxed))
+        };
+        let (n, n_asked) = asked(None);
+        assert!(n == Ok(0) && n_asked > 4, "{n:?}, {n_asked} pairs");
+        let token = Some(CancelToken::new());
+        assert_eq!(asked(token), (Err(Error::Cancelled), 1), "{separation}");
     }
 }
 

@@ -83,8 +83,7 @@ impl<'a> BatchStages for StepWorld<'a> {
     ) -> Result<(), Error> {
         // Stages are listed in the order of their first times.
         stats.add_ms("pairing", 0.0);
-        stats.time("narrow", |_| unsure::decide(job, *self, workers));
-        Ok(())
+        stats.time("narrow", |_| unsure::decide(job, *self, workers))
     }
 
     fn end(worker: &mut StepWorker, answer: StepAnswer<'a>) {

@@ -115,8 +115,11 @@ impl Deciding<'_, '_> {
     }
 
     /// Hands over the remaining contacts.
+    ///
+    /// # Errors
+    /// Cancellation, and those of the answer.
     pub fn end(self) -> Result<(), Error> {
-        unsure::decide(self.job, self.world, self.workers);
+        unsure::decide(self.job, self.world, self.workers)?;
         for worker in self.workers {
             worker.end(self.answer);
         }

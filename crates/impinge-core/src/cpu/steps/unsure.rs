@@ -5,6 +5,8 @@
 //! contact ends with an earlier time limit than it had when these pairs were found; up to that
 //! limit, the filter drops most of them. The search for any contact has usually found one by then.
 
+use crate::query::progress::Pieces;
+use crate::scene::error::Error;
 use crate::search::runner::Job;
 
 use super::pairing::StepWorker;
@@ -14,10 +16,17 @@ use super::world::StepWorld;
 const TASK: usize = 8;
 
 /// Decides the unsure pairs of all workers.
-pub(super) fn decide(job: Job<'_>, world: StepWorld<'_>, workers: &mut [StepWorker]) {
+///
+/// # Errors
+/// Cancellation.
+pub(super) fn decide(
+    job: Job<'_>,
+    world: StepWorld<'_>,
+    workers: &mut [StepWorker],
+) -> Result<(), Error> {
     let mut are_empty = workers.iter_mut();
     if are_empty.all(|worker| worker.contacts().unsure().is_empty()) {
-        return;
+        return Ok(());
     }
     let taken = workers.iter_mut();
     let mut lists: Vec<_> = taken
@@ -29,8 +38,9 @@ pub(super) fn decide(job: Job<'_>, world: StepWorld<'_>, workers: &mut [StepWork
         .flat_map(|list| list.chunk_by(|(between, _), (next, _)| between == next))
         .flat_map(|run| run.chunks(TASK))
         .collect();
+    let pieces = Pieces::new(job.control, tasks.len());
     job.workers.for_each(workers, tasks.len(), |worker, ix| {
-        if !world.known.is_over() {
+        if !world.known.is_over() && pieces.take().is_ok() {
             worker.contacts().decide_unsure(world.isa, world, tasks[ix]);
         }
     });
@@ -39,4 +49,5 @@ pub(super) fn decide(job: Job<'_>, world: StepWorld<'_>, workers: &mut [StepWork
         list.clear();
         std::mem::swap(worker.contacts().unsure(), list);
     }
+    pieces.end()
 }

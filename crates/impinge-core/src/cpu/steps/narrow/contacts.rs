@@ -189,6 +189,8 @@ impl FirstContacts {
         self.decide(isa, world);
     }
 
+    /// Decides a pair by exact arithmetic, unless the search was cancelled: whoever began the work
+    /// tells. One pair may take as long as a million in a filter.
     #[inline(never)]
     pub(super) fn decide_exactly(
         &mut self,
@@ -197,6 +199,9 @@ impl FirstContacts {
         pair: ElementPair,
         slots: Slots,
     ) {
+        if world.known.is_cancelled() {
+            return;
+        }
         if world.plan.has_filter() && !counts(world, between, slots) {
             return;
         }
