@@ -48,7 +48,7 @@ fn settings_come_back_and_unknown_ones_are_refused() -> Result<(), Failure> {
         .max_pairs(Some(7))
         .device(Some("a GPU".to_owned()));
     let read = again(&settings)?;
-    assert_eq!(format!("{read:?}"), format!("{settings:?}"));
+    assert_eq!(read, settings);
     let some: Settings = serde_json::from_str(r#"{ "threads": 3 }"#)?;
     assert_eq!((some.threads, some.method), (3, Method::Auto));
     assert!(serde_json::from_str::<Settings>(r#"{ "thread": 3 }"#).is_err());

@@ -64,6 +64,8 @@ impl Advance {
 
     /// Takes the step: sets these positions in the scene, or in a clone of it. Of bodies whose end
     /// a [transform](Scene::set_end_transform) set, the rest positions stay the same.
+    /// Thickness, filters and end positions that have changed since the step was found are not
+    /// noticed.
     ///
     /// # Errors
     /// A body that has other positions than when the step was found, also one that does not move:

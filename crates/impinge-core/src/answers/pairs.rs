@@ -246,8 +246,8 @@ impl Pairs {
     /// some of their pairs.
     ///
     /// ```
-    /// use impinge_core::{Backend, Detector, Query, Scene};
-    /// # fn main() -> Result<(), impinge_core::Error> {
+    /// use impinge::{Backend, Detector, Query, Scene};
+    /// # fn main() -> Result<(), impinge::Error> {
     /// let mut scene = Scene::new();
     /// let triangle = [[0.0f32, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
     /// for _ in 0..3 {

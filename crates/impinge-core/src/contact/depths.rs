@@ -42,7 +42,7 @@ impl PartialOrd for WaitingVertex {
 /// If a tetrahedron or a triangle names a vertex that has no position.
 ///
 /// ```
-/// use impinge_core::contact::solid_depths;
+/// use impinge::contact::solid_depths;
 /// let corners = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 /// assert_eq!(solid_depths(&corners, &[[0, 1, 2, 3]], &[[0, 1, 2]]), [0.0, 0.0, 0.0, 1.0]);
 /// ```

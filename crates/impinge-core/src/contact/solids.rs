@@ -20,7 +20,7 @@ const FACES: [([usize; 3], usize); 4] = [
 /// so there are never more than 81 pieces, and mostly about ten.
 ///
 /// ```
-/// use impinge_core::contact::SolidOverlap;
+/// use impinge::contact::SolidOverlap;
 /// let a = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 /// let b = a.map(|point| point.map(|x| x + 0.2));
 /// let mut overlap = SolidOverlap::new();

@@ -111,7 +111,7 @@ impl Gpu<'_> {
         if query.cell.is_some() {
             return Err(Error::Setting {
                 setting: "owned_by",
-                given: "a cell in a plan that stays on a device".to_owned(),
+                given: "a cell in a frame that stays on a device".to_owned(),
                 allowed: "only detect, count and any",
             });
         }

@@ -31,7 +31,7 @@ impl PairKind {
     /// The parts of bodies that the elements belong to, in the order of the name.
     ///
     /// ```
-    /// use impinge_core::{PairKind, Part};
+    /// use impinge::{PairKind, Part};
     /// assert_eq!(PairKind::VertexFace.parts(), [Part::Vertices, Part::Faces]);
     /// ```
     pub fn parts(self) -> [Part; 2] {

@@ -297,8 +297,8 @@ impl Query {
     /// [`detect`](crate::Detector::detect), [`count`](crate::Detector::count) and
     /// [`any`](crate::Detector::any) find all pairs first and leave out rings, groups, lists and
     /// pinned vertices then: limits count what is left out, too. They are about the elements that
-    /// bodies were given as, and refuse pairs of an answer. [`nearest`](crate::Detector::nearest)
-    /// and frames that stay on a device refuse all but bodies.
+    /// bodies were given as, and refuse pairs of an answer, also in frames that stay on a device.
+    /// [`nearest`](crate::Detector::nearest) refuses all but bodies.
     ///
     /// ```
     /// use impinge::{Backend, Detector, Exclusion, Query, Scene};

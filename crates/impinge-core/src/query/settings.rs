@@ -114,13 +114,13 @@ words!("affinity", "auto or inherited", Affinity: [Auto = "auto", Inherited = "i
 /// The settings of a detector: [`Settings::new`] and what differs from it, one call each.
 ///
 /// ```
-/// use impinge_core::{Backend, Detector, Settings};
-/// # fn main() -> Result<(), impinge_core::Error> {
+/// use impinge::{Backend, Detector, Settings};
+/// # fn main() -> Result<(), impinge::Error> {
 /// let settings = Settings::new().backend(Backend::Cpu).threads(2);
 /// let mut detector = Detector::new(settings)?;
 /// # Ok(()) }
 /// ```
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 #[must_use]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]

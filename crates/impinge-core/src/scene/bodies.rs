@@ -128,8 +128,8 @@ impl Scene {
     /// with the number of elements and of positions.
     ///
     /// ```
-    /// use impinge_core::{Elements, Scene};
-    /// # fn main() -> Result<(), impinge_core::Error> {
+    /// use impinge::{Elements, Scene};
+    /// # fn main() -> Result<(), impinge::Error> {
     /// let mut scene = Scene::new();
     /// let faces = Elements::Triangles(vec![[0, 1, 2]; 2]);
     /// let triangle = [[0.0f32, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];

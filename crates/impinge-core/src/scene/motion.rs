@@ -120,8 +120,8 @@ impl Scene {
     /// End positions are cleared, as by [`set_positions`](Scene::set_positions).
     ///
     /// ```
-    /// use impinge_core::{Positions, Scene};
-    /// # fn main() -> Result<(), impinge_core::Error> {
+    /// use impinge::{Positions, Scene};
+    /// # fn main() -> Result<(), impinge::Error> {
     /// let mut scene = Scene::new();
     /// let body = scene.add_triangles(&[[0, 1, 2]], &[[0.0f32, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])?;
     /// let up = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.5], [0.0, 0.0, 0.0, 1.0]];
@@ -182,8 +182,8 @@ impl Scene {
     /// them, too.
     ///
     /// ```
-    /// use impinge_core::Scene;
-    /// # fn main() -> Result<(), impinge_core::Error> {
+    /// use impinge::Scene;
+    /// # fn main() -> Result<(), impinge::Error> {
     /// let mut scene = Scene::new();
     /// let blade = scene.add_triangles(&[[0, 1, 2]], &[[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 0.0, 0.1]])?;
     /// let turned = |angle: f64| {

@@ -483,6 +483,9 @@ fn what_does_not_fit_is_refused_by_name() {
         let words = format!("body {body}: its positions are given twice");
         assert!(error.contains(&words), "{error}");
     }
+    let refused = device.encode(&scene, &cell, &[], none);
+    let error = refused.expect_err("refused").to_string();
+    assert!(error.contains("a cell in a frame"), "{error}");
     let mut cpu = Detector::new(Backend::Cpu).expect("settings");
     assert!(cpu.gpu().is_none());
 }
