@@ -65,12 +65,20 @@ mod tests {
                 n_measured.set(n_measured.get() + 1);
                 held[slot]
             };
-            assert_eq!(bytes_held.total(measure), held.iter().sum(), "{round}");
+            assert_eq!(
+                bytes_held.total(measure),
+                held.iter().sum::<usize>(),
+                "{round}"
+            );
             assert_eq!(n_measured.get(), if round == 3 { 2 } else { 3 });
             // What was touched may grow until it is settled.
             held[3] += 5;
             let measure = |slot: usize| held[slot];
-            assert_eq!(bytes_held.total(measure), held.iter().sum(), "{round}");
+            assert_eq!(
+                bytes_held.total(measure),
+                held.iter().sum::<usize>(),
+                "{round}"
+            );
             bytes_held.settle(measure);
         }
     }

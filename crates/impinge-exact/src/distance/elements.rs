@@ -5,6 +5,7 @@
 //! theirs, or some two edges: `docs/exactness.md`, "Distances".
 
 use alloc::vec::Vec;
+use core::cell::OnceCell;
 use core::cmp::Ordering;
 
 use super::features::PolygonPart;
@@ -390,6 +391,12 @@ fn parts<'a>(a: &'a [Point], b: &'a [Point]) -> impl Iterator<Item = PartOfPair>
 }
 
 impl PartOfPair {
+    /// The difference polygon in integers of any size.
+    fn polygon(&self) -> ExactPolygon<Integer> {
+        let Simple { pair, points, .. } = &self.simple;
+        ExactPolygon::of_any_size(*pair, points, &Reach::from(0.0))
+    }
+
     /// Features of the part as features of the elements, each with how many dimensions it has.
     fn features(&self, nearest: &NearestFeatures) -> [(u8, Feature); 2] {
         let number = |x: usize| u8::try_from(x).unwrap_or(0);
@@ -459,7 +466,7 @@ impl Nearby {
             }
         }
         let best = best.expect("some part has the least upper bound");
-        let crossing = if best.is_touching() {
+        let crossing = if best.is_touching {
             None
         } else {
             crossing(a, b)
@@ -484,27 +491,36 @@ impl Nearby {
     }
 }
 
-/// A part, its nearest features and its distance as an exact fraction.
+/// A part, its nearest features and whether their distance is 0.
 struct MeasuredPart<'a> {
     part: &'a PartOfPair,
     features: [(u8, Feature); 2],
     is_flat: bool,
-    polygon: ExactPolygon<Integer>,
+    is_touching: bool,
     nearest: PolygonPart,
+    /// For other distances, made when one is needed: most parts that are compared touch.
+    polygon: OnceCell<ExactPolygon<Integer>>,
 }
 
 impl<'a> MeasuredPart<'a> {
     fn new(part: &'a PartOfPair) -> Self {
         let Simple { pair, points, .. } = &part.simple;
-        let polygon = ExactPolygon::of_any_size(*pair, points, &Reach::from(0.0));
-        let nearest = polygon.nearest();
-        let is_flat = polygon.is_flat();
+        let polygon = OnceCell::new();
+        let ((nearest, is_touching), is_flat) =
+            match ExactPolygon::short(*pair, points, &Reach::from(0.0)) {
+                Some(short) => (short.nearest_and_touching(), short.is_flat()),
+                None => {
+                    let long = polygon.get_or_init(|| part.polygon());
+                    (long.nearest_and_touching(), long.is_flat())
+                }
+            };
         Self {
             features: part.features(&nearest.named(*pair, is_flat)),
             part,
             is_flat,
-            polygon,
+            is_touching,
             nearest,
+            polygon,
         }
     }
 
@@ -513,13 +529,16 @@ impl<'a> MeasuredPart<'a> {
         (self.features[0].0 + self.features[1].0, self.features)
     }
 
-    fn is_touching(&self) -> bool {
-        self.polygon.square_of_distance(self.nearest).0.is_zero()
+    fn polygon(&self) -> &ExactPolygon<Integer> {
+        self.polygon.get_or_init(|| self.part.polygon())
     }
 
     fn compare(&self, other: &Self) -> Ordering {
-        self.polygon
-            .compare_distances(self.nearest, (&other.polygon, other.nearest))
+        if self.is_touching || other.is_touching {
+            return other.is_touching.cmp(&self.is_touching);
+        }
+        let of_other = (other.polygon(), other.nearest);
+        self.polygon().compare_distances(self.nearest, of_other)
     }
 }
 

@@ -154,6 +154,13 @@ impl<T: Coordinate> ExactPolygon<T> {
         self.n_corners > 2 && self.normal.is_none()
     }
 
+    /// The nearest part, and whether its distance is 0.
+    pub(super) fn nearest_and_touching(&self) -> (PolygonPart, bool) {
+        let nearest = self.nearest();
+        let (over, _) = self.square_of_distance(nearest);
+        (nearest, over.sign().is_zero())
+    }
+
     fn nearest_features(&self, pair: ElementPair) -> NearestFeatures {
         self.nearest().named(pair, self.is_flat())
     }
