@@ -302,8 +302,8 @@ function goTo(ix) {
   setPlaying(false);
   place = ix;
   flyTo(ballAround(places[ix]));
-  const [body, element] = places[ix].first;
-  choose({ body, element });
+  const [body, number] = places[ix].first;
+  choose({ body, element: number });
 }
 
 function nextPlace(by) {

@@ -84,8 +84,8 @@ export function showChosen(hit, rows, bodies, go) {
   box.hidden = hit === null;
   if (hit === null) return [];
   const partners = partnersOf(hit, rows);
-  const { body, element } = hit;
-  const title = make("b", {}, nameOf(bodies, body, element));
+  const { body } = hit;
+  const title = make("b", {}, nameOf(bodies, body, hit.element));
   const links = partners.slice(0, MOST_PARTNERS).map(([other, number]) => {
     const text = other === body ? grouped(number) : nameOf(bodies, other, number);
     const button = make("button", { type: "button" }, text);
@@ -98,16 +98,16 @@ export function showChosen(hit, rows, bodies, go) {
   return partners;
 }
 
-export function nameOf(bodies, body, element) {
+export function nameOf(bodies, body, number) {
   const of = bodies.length > 1 ? ` of ${bodies[body].name}` : "";
-  return `${kindOf(bodies[body])} ${grouped(element)}${of}`;
+  return `${kindOf(bodies[body])} ${grouped(number)}${of}`;
 }
 
-function partnersOf({ body, element }, rows) {
+function partnersOf({ body, element: number }, rows) {
   const partners = [];
   for (let at = 0; at < rows.length; at += 4) {
-    if (rows[at] === body && rows[at + 1] === element) partners.push([rows[at + 2], rows[at + 3]]);
-    else if (rows[at + 2] === body && rows[at + 3] === element) partners.push([rows[at], rows[at + 1]]);
+    if (rows[at] === body && rows[at + 1] === number) partners.push([rows[at + 2], rows[at + 3]]);
+    else if (rows[at + 2] === body && rows[at + 3] === number) partners.push([rows[at], rows[at + 1]]);
   }
   return partners;
 }
