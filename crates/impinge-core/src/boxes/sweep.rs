@@ -190,7 +190,7 @@ impl Sweep {
 }
 
 /// Makes the boxes of a group's elements reach farther, each by its own number, before they are
-/// [closed](Sweep::close_all).
+/// [closed](Sweep::close_all). Few have such numbers: compiled once, not into all that fill groups.
 #[inline(never)]
 pub(super) fn inflate_each(boxes: &mut LaneBounds, by: &[f32; GROUP]) {
     for (ends, outward) in [(&mut boxes.min, -1.0), (&mut boxes.max, 1.0)] {

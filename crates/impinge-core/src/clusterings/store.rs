@@ -93,8 +93,8 @@ impl<T: Clustered, const PARTS: usize> Store<T, PARTS> {
             let body = scene.holds(slot).then(|| scene.body_in(slot as u32));
             let stamp = body.map(Body::topology_stamp);
             for kept in parts {
-                if kept.is_some() && kept.as_ref().map(|kept| kept.topology_stamp()) != stamp {
-                    *kept = None;
+                let outdated = kept.take_if(|kept| Some(kept.topology_stamp()) != stamp);
+                if outdated.is_some() {
                     self.bytes_held.touch(slot);
                 }
             }

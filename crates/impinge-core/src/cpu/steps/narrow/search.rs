@@ -58,12 +58,10 @@ pub(super) fn search<S: Simd>(simd: S, contacts: &mut FirstContacts, world: Step
         after_first
     };
     loop {
-        let waiting = if pass == Pass::Enclose {
-            &mut single
-        } else {
-            &mut open
-        };
-        let waiting = std::mem::take(waiting);
+        let mut waiting = std::mem::take(match pass {
+            Pass::Enclose => &mut single,
+            _ => &mut open,
+        });
         for chunk in waiting.chunks(LANES) {
             sides.fill(simd, chunk, &mut steps, &mut spans);
             let among = u8::MAX >> (LANES - chunk.len());
@@ -92,26 +90,25 @@ pub(super) fn search<S: Simd>(simd: S, contacts: &mut FirstContacts, world: Step
                 }
             }
         }
-        let mut done = waiting;
-        done.clear();
+        waiting.clear();
         match pass {
             Pass::First => {
-                (open, later) = (later, done);
+                (open, later) = (later, waiting);
                 pass = after_first;
             }
             Pass::Close => {
-                (open, later) = (later, done);
+                (open, later) = (later, waiting);
                 if open.is_empty() {
                     std::mem::swap(&mut open, &mut single);
                     pass = Pass::Look;
                 }
             }
             Pass::Look => {
-                open = done;
+                open = waiting;
                 pass = Pass::Enclose;
             }
             Pass::Enclose => {
-                single = done;
+                single = waiting;
                 std::mem::swap(&mut open, &mut later);
                 if open.is_empty() {
                     break;
