@@ -216,13 +216,18 @@ impl StencilRow {
     /// With the points of its vertices, of all of a scene.
     #[inline(always)]
     fn at(&self, points: &[Point]) -> Stencil {
-        let [a, b, c, d] = self.vertices.map(|vertex| vertex as usize);
+        let [a, b, c, d] = self.vertices;
         Stencil {
             kind: self.kind,
             features: self.features,
             vertices: self.vertices,
             weight: self.weight,
-            points: [points[a], points[b], points[c], points[d]],
+            points: [
+                points[a as usize],
+                points[b as usize],
+                points[c as usize],
+                points[d as usize],
+            ],
             threshold: self.threshold,
         }
     }

@@ -85,6 +85,13 @@ impl TopLevel {
         self.shape.children_of(node)
     }
 
+    /// The leaves of some parts, which are in order.
+    pub fn leaves(&self, parts: &[PartIx]) -> Vec<Node> {
+        let leaves = (0..).zip(&self.order);
+        let found = leaves.filter(|(_, part)| parts.binary_search(part).is_ok());
+        found.map(|(number, _)| Node { level: 0, number }).collect()
+    }
+
     /// The part of a leaf.
     pub fn part(&self, leaf: Node) -> PartIx {
         self.order[leaf.number as usize]

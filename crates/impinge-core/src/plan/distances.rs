@@ -128,6 +128,18 @@ impl Plan {
         self.keep_of(elements).first(pair, ends, unit)
     }
 
+    /// Whether they come so near at all: a bound of the first time.
+    pub(crate) fn whenever(
+        &self,
+        scene: &Scene,
+        elements: [(PartIx, ElementIx); 2],
+        pair: ElementPair,
+        ends: [&[Point; 4]; 2],
+    ) -> Option<Contact> {
+        let unit = self.unit_roundoff(scene, elements.map(|(part, _)| part));
+        self.keep_of(elements).whenever(pair, ends, unit)
+    }
+
     /// The contact of two elements that are as near as they may come from the start on.
     pub(crate) fn at_start(
         &self,

@@ -568,6 +568,40 @@ impl Plan {
         found.ok().map(PartIx::from_usize)
     }
 
+    /// The parts, in order, of which every wanted pair of two bodies has one, if they are at most so
+    /// many: those with one filter, where no others meet.
+    pub(crate) fn named_parts(&self, most: usize) -> Option<Vec<PartIx>> {
+        // Scenes with more filters than this are not looked at.
+        const MOST_FILTERS: usize = 8;
+        let mut filters: Vec<(Filter, usize)> = Vec::new();
+        for part in &self.parts {
+            if let Some((_, n)) = filters.iter_mut().find(|(known, _)| *known == part.filter) {
+                *n += 1;
+            } else if filters.len() < MOST_FILTERS {
+                filters.push((part.filter, 1));
+            } else {
+                return None;
+            }
+        }
+        let others_meet = |named: Filter| {
+            let others = || {
+                filters
+                    .iter()
+                    .map(|&(other, _)| other)
+                    .filter(|&x| x != named)
+            };
+            others().any(|x| others().any(|y| x.meets(y)))
+        };
+        let mut few = filters.iter().filter(|&&(_, n)| n <= most);
+        let &(named, _) = few.find(|&&(named, _)| !others_meet(named))?;
+        let parts = self.numbered_parts();
+        Some(
+            parts
+                .filter_map(|(ix, part)| (part.filter == named).then_some(ix))
+                .collect(),
+        )
+    }
+
     /// The elements of a part, and their numbers.
     pub(crate) fn elements<'a>(
         &self,

@@ -129,7 +129,8 @@ impl Distances {
         // If two touch, only lower ones that touch are left to be found.
         let least = nearest.touching_ones();
         let last = least.and_then(|[a, _]| plan.part_of(a));
-        many.overlapping(last, &mut |pair| {
+        let few = many.few(plan, last);
+        many.overlapping(few.as_deref(), &mut |pair| {
             let is_lower = |least: [BodyId; 2]| pair.map(|part| plan.part(part).id) < least;
             if least.is_none_or(is_lower) {
                 overlapping.push(pair);
@@ -142,7 +143,7 @@ impl Distances {
         }
         // Bodies whose boxes are apart do not touch.
         if nearest.touching_ones().is_none() {
-            let mut apart = many.apart();
+            let mut apart = many.apart(few.as_deref());
             while let Some(pair) = apart.next(nearest.most()) {
                 ask(&mut nearest, many, pair)?;
             }
@@ -199,7 +200,8 @@ impl Distances {
             _ => false,
         };
         if !is_over {
-            many.overlapping(None, &mut ask)?;
+            let few = many.few(plan, None);
+            many.overlapping(few.as_deref(), &mut ask)?;
         }
         Ok(any)
     }

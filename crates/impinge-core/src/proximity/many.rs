@@ -44,7 +44,8 @@ pub(super) struct Bodies {
     stack: Vec<NodePair>,
 }
 
-/// If pairs of fewer than one part in so many are wanted, the tree is asked about each of these.
+/// If only pairs with fewer than one part in so many are wanted, the tree is asked about each of
+/// these.
 const FEW: usize = 16;
 
 /// Takes a pair of parts, the lower one first; whether no more are wanted.
@@ -105,39 +106,63 @@ impl Bodies {
         }
     }
 
+    /// The parts of which every wanted pair has one, if they are few: those that a plan
+    /// [names](Plan::named_parts), or all up to `last`.
+    pub fn few(&self, plan: &Plan, last: Option<PartIx>) -> Option<Vec<PartIx>> {
+        let most = self.boxes.len() / FEW;
+        let last = last.filter(|last| last.index() < most);
+        plan.named_parts(most)
+            .or_else(|| Some(PartIx::up_to(last?.index() + 1).collect()))
+    }
+
     /// Calls `each` for the pairs of parts whose boxes have a point in common, until it returns
-    /// true. Pairs without any part up to `last` may be missing.
+    /// true; with `few` only for pairs with one of these, which are in order.
     ///
     /// # Errors
     /// Those of `each`.
-    pub fn overlapping(&mut self, last: Option<PartIx>, each: &mut Each<'_>) -> Result<(), Error> {
-        let few = last.filter(|last| last.index() < self.boxes.len() / FEW);
+    pub fn overlapping(
+        &mut self,
+        few: Option<&[PartIx]>,
+        each: &mut Each<'_>,
+    ) -> Result<(), Error> {
         let found = with_isa!(self.isa, overlapping, (
             tree: &TopLevel = &self.tree,
-            few: Option<&[Aabb]> = few.map(|last| &self.boxes[..=last.index()]),
+            boxes: &[Aabb] = &self.boxes,
+            few: Option<&[PartIx]> = few,
             stack: &mut Vec<NodePair> = &mut self.stack,
             each: &mut Each<'_> = each,
         ) -> Result<(), Option<Error>>);
         found.or_else(|stopped| stopped.map_or(Ok(()), Err))
     }
 
-    /// Pairs of parts whose boxes are apart, nearest boxes first.
-    pub fn apart(&self) -> Apart<'_> {
+    /// Pairs of parts whose boxes are apart, nearest boxes first; with `few` only pairs with one of
+    /// these, which are in order.
+    pub fn apart<'a>(&'a self, few: Option<&'a [PartIx]>) -> Apart<'a> {
+        let tree = &self.tree;
+        let root = tree.root_node();
+        let first = match few {
+            None => root.into_iter().collect(),
+            Some(few) => tree.leaves(few),
+        };
+        let pairs = first
+            .into_iter()
+            .zip(root.into_iter().cycle())
+            .map(|nodes| Reverse((0, <[Node; 2]>::from(nodes))));
         Apart {
-            tree: &self.tree,
-            waiting: BinaryHeap::from_iter(
-                self.tree.root_node().map(|root| Reverse((0, [root; 2]))),
-            ),
+            tree,
+            few,
+            waiting: pairs.collect(),
         }
     }
 }
 
-/// The pairs of all parts, or of the first few with all others.
+/// The pairs of all parts, or of a few with all others.
 #[inline(always)]
 fn overlapping<S: Simd>(
     simd: S,
     tree: &TopLevel,
-    few: Option<&[Aabb]>,
+    boxes: &[Aabb],
+    few: Option<&[PartIx]>,
     stack: &mut Vec<NodePair>,
     each: &mut Each<'_>,
 ) -> Result<(), Option<Error>> {
@@ -149,18 +174,27 @@ fn overlapping<S: Simd>(
     let Some(few) = few else {
         return tree.pairs(simd, stack, |a, b| each([a, b]));
     };
-    for (a, bounds) in PartIx::up_to(few.len()).zip(few) {
-        tree.meeting(simd, bounds, stack, |b| match a < b {
-            true => each([a, b]),
-            false => Ok(()),
+    for &a in few {
+        tree.meeting(simd, &boxes[a.index()], stack, |b| {
+            if is_second(a, b, few) {
+                return Ok(());
+            }
+            each([a.min(b), a.max(b)])
         })?;
     }
     Ok(())
 }
 
+/// Whether a pair of one of a few parts and another one is no pair, or was seen from the other one.
+fn is_second(a: PartIx, b: PartIx, few: &[PartIx]) -> bool {
+    a == b || (b < a && few.binary_search(&b).is_ok())
+}
+
 /// Pairs of nodes that wait, by the squared distances of their boxes.
 pub(super) struct Apart<'a> {
     tree: &'a TopLevel,
+    /// The parts of which the first one of each pair is, if not all are.
+    few: Option<&'a [PartIx]>,
     waiting: BinaryHeap<Reverse<(u64, [Node; 2])>>,
 }
 
@@ -172,17 +206,35 @@ impl Apart<'_> {
             if squared > most {
                 return None;
             }
-            if nodes[0].level > 0 {
-                self.open(nodes, most);
+            if nodes[1].level > 0 {
+                match self.few {
+                    None => self.open(nodes, most),
+                    Some(_) => self.open_second(nodes, most),
+                }
                 continue;
             }
             let [x, y] = nodes.map(|node| self.tree.bounds(node));
-            if nodes[0] != nodes[1] && !x.overlaps(&y) {
-                let [a, b] = nodes.map(|node| self.tree.part(node));
+            let [a, b] = nodes.map(|node| self.tree.part(node));
+            let is_seen = match self.few {
+                None => a == b,
+                Some(few) => is_second(a, b, few),
+            };
+            if !is_seen && !x.overlaps(&y) {
                 return Some([a.min(b), a.max(b)]);
             }
         }
         None
+    }
+
+    /// Puts the pairs of a leaf and the children of another node into the queue.
+    fn open_second(&mut self, [x, y]: [Node; 2], most: f64) {
+        let bounds = Extent::from(&self.tree.bounds(x));
+        for child in self.tree.children(y) {
+            let squared = Extent::from(&self.tree.bounds(child)).squared_distance(&bounds);
+            if squared <= most {
+                self.waiting.push(Reverse((squared.to_bits(), [x, child])));
+            }
+        }
     }
 
     /// Puts the pairs of children of two nodes of one level into the queue, each pair once.

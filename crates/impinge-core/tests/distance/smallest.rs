@@ -1,7 +1,7 @@
 //! Distances of bodies: compared with every pair of elements, and their properties.
 
 use impinge_core::proximity::Nearest;
-use impinge_core::{Backend, BodyId, Detector, PairKind, Query, Scene, Settings};
+use impinge_core::{Backend, BodyId, Detector, Filter, PairKind, Query, Scene, Settings};
 use impinge_scenes::{Model, adversarial, solids, soup, surfaces};
 
 fn scene(a: &Model, b: &Model) -> (Scene, [BodyId; 2]) {
@@ -537,5 +537,72 @@ fn distances_above_the_largest_float() {
         );
         let nearest = detector.nearest(&scene, &Query::between_all()).unwrap();
         assert_eq!(nearest, Some(found), "{x}");
+    }
+}
+
+/// Of a hundred bodies, where few are named or the filters of few say so: as asked one by one.
+#[test]
+fn nearest_of_few_named_bodies_as_asked_one_by_one() {
+    let mut state = 5u64;
+    let mut below = |n: u64| {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1);
+        (state >> 33) % n
+    };
+    let mut scene = Scene::new();
+    let face = [[0.0f32, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    let mut at = || [(); 3].map(|()| below(24) as f32 / 2.0);
+    let placed = |at: [f32; 3]| face.map(|point| [0, 1, 2].map(|k| point[k] + at[k]));
+    let ids: Vec<BodyId> = (0..100)
+        .map(|_| scene.add_triangles(&[[0, 1, 2]], &placed(at())).unwrap())
+        .collect();
+    let mut detector = cpu();
+    for round in 0..30 {
+        let named = [
+            vec![ids[3]],
+            vec![ids[50], ids[7]],
+            vec![ids[99], ids[0], ids[41]],
+        ];
+        let named = &named[round % 3];
+        let is_named = |id: BodyId| named.contains(&id);
+        for &id in named {
+            scene.set_positions(id, placed(at()).to_vec()).unwrap();
+        }
+        let (category, mask) = (2, 1);
+        for &id in &ids {
+            let filter = match is_named(id) {
+                true => Filter { category, mask },
+                false => Filter {
+                    category: 1,
+                    mask: 2,
+                },
+            };
+            scene.set_filter(id, filter).unwrap();
+        }
+        let pairs = ids.iter().enumerate().flat_map(|(ix, &a)| {
+            let later = ids[ix + 1..].iter();
+            later.map(move |&b| [a, b])
+        });
+        let wanted = pairs.filter(|pair| is_named(pair[0]) != is_named(pair[1]));
+        let (mut least, mut expected) = (f64::INFINITY, None);
+        for [a, b] in wanted {
+            let found = detector.distance(&scene, a, b).unwrap().unwrap();
+            if found.distance < least {
+                (least, expected) = (found.distance, Some(found));
+            }
+        }
+        for query in [Query::across(named.iter().copied()), Query::between_all()] {
+            assert_eq!(
+                detector.nearest(&scene, &query).unwrap(),
+                expected,
+                "{round}"
+            );
+            assert_eq!(
+                detector.any(&scene, &query).unwrap(),
+                least == 0.0,
+                "{round}"
+            );
+        }
     }
 }

@@ -71,13 +71,14 @@ impl NearestOfElements {
     /// From the byte that [`packed`](Self::packed) makes.
     #[inline]
     pub fn unpacked(byte: u8) -> Self {
-        let features = [byte & 7, byte >> 3 & 7].map(|number| match number {
+        let feature = |number: u8| match number {
             0..3 => Feature::Vertex(number),
             3 => Feature::Face,
             _ => Feature::Edge(number - 4),
-        });
+        };
         Self {
-            features,
+            // Maps of arrays are calls, which cost more than all of this.
+            features: [feature(byte & 7), feature(byte >> 3 & 7)],
             is_parallel: byte >> 6 == 1,
         }
     }

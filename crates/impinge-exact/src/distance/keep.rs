@@ -13,7 +13,7 @@
 
 use crate::element_pair::ElementPair;
 use crate::rounding::power_of_two;
-use crate::sweep::Contact;
+use crate::sweep::{Contact, touch};
 use crate::twice::two_sum;
 use crate::{Point, first_within};
 
@@ -91,6 +91,35 @@ impl Keep {
         Some(match contact.at_start {
             true => self.at_start(pair, ends[0]),
             false => contact,
+        })
+    }
+
+    /// [`Keep::first`] for those who do not ask when: the time is a bound, not above the first.
+    ///
+    /// Nearly all pairs that floats do not decide are as near at the end, just so: what comes to
+    /// rest on something ends on it. That is found out without roots.
+    pub fn whenever(
+        &self,
+        pair: ElementPair,
+        ends: [&[Point; 4]; 2],
+        unit: f64,
+    ) -> Option<Contact> {
+        let [start, end] = ends;
+        let distance = self.distance(pair, ends, unit);
+        let are_near = |points: &[Point; 4]| match distance == 0.0 {
+            true => touch(pair, points),
+            false => are_within(pair, points, distance),
+        };
+        if !are_near(end) {
+            return self.first(pair, ends, unit);
+        }
+        Some(match are_near(start) {
+            true => self.at_start(pair, start),
+            false => Contact {
+                at_start: false,
+                is_exact: false,
+                time: 0.0,
+            },
         })
     }
 
@@ -285,6 +314,7 @@ fn rounded_of(pair: ElementPair, [start, end]: [&[Point; 4]; 2], unit: f64) -> f
 mod tests {
     use super::*;
     use crate::closest_points;
+    use crate::sweep::tests::Random;
 
     fn keep(separation: f64, clearance: f64, share: f64) -> Keep {
         Keep {
@@ -379,6 +409,43 @@ mod tests {
         assert_eq!(of(0.0, [f64::MAX, f64::MAX]), f64::MAX);
         assert_eq!(of(f64::MAX, [5e-324, 0.0]), f64::MAX);
         assert_eq!(of(f64::INFINITY, [1.0, f64::MAX]), f64::INFINITY);
+    }
+
+    /// On a small lattice, where pairs begin and end in touch, or as far apart as they may come.
+    #[test]
+    fn whether_elements_come_near_does_not_depend_on_when_they_do() {
+        let mut random = Random(7);
+        let pairs = [
+            ElementPair::VertexVertex,
+            ElementPair::VertexEdge,
+            ElementPair::VertexFace,
+            ElementPair::EdgeEdge,
+        ];
+        let mut n_at_end_alone = 0;
+        for round in 0..20_000 {
+            let pair = pairs[round % 4];
+            let mut at = || [(); 4].map(|()| [(); 3].map(|()| random.below(4) as f64));
+            let ends = [at(), at()];
+            let keep = [
+                keep(0.0, 0.0, 0.0),
+                keep(1.0, 0.0, 0.0),
+                keep(0.5, 0.5, 0.5),
+                keep(0.0, 0.25, 0.5),
+            ][round / 4 % 4];
+            let ends = ends.each_ref();
+            let [first, whenever] =
+                [Keep::first, Keep::whenever].map(|ask| ask(&keep, pair, ends, f64::EPSILON));
+            assert_eq!(
+                whenever.map(|contact| contact.at_start),
+                first.map(|contact| contact.at_start),
+                "{pair:?} {keep:?} {ends:?}"
+            );
+            if let (Some(whenever), Some(first)) = (whenever, first) {
+                assert!(whenever.time <= first.time);
+                n_at_end_alone += usize::from(first.time == 1.0);
+            }
+        }
+        assert!(n_at_end_alone > 100, "{n_at_end_alone}");
     }
 
     /// No number of 24 bits reaches elements that are farther apart than the largest of them.

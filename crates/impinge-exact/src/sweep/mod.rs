@@ -132,7 +132,7 @@ pub fn touch_during(pair: ElementPair, start: &[Point; 4], end: &[Point; 4]) -> 
         return false;
     }
     contact_answer(pair, start, end)
-        .unwrap_or_else(|| first_contact_by_roots(pair, start, end).is_some())
+        .unwrap_or_else(|| touch(pair, end) || first_contact_by_roots(pair, start, end).is_some())
 }
 
 /// Whether two elements share a point at one moment.

@@ -208,7 +208,12 @@ impl FirstContacts {
         self.counts.n_unsure += 1;
         let ends = points(world, between, pair, slots);
         let elements = located(world, between, slots);
-        if let Some(contact) = (world.plan).first(world.scene, elements, pair, ends.each_ref()) {
+        let (plan, scene, ends) = (world.plan, world.scene, ends.each_ref());
+        let contact = match self.toi {
+            Some(_) => plan.first(scene, elements, pair, ends),
+            None => plan.whenever(scene, elements, pair, ends),
+        };
+        if let Some(contact) = contact {
             self.report(world, between, slots, contact);
         }
     }
