@@ -582,6 +582,9 @@ fn random_soups_come_out_as_promised_and_stay_so() {
                 (again.n_triangles, again.self_intersections),
                 (fixed.after.n_triangles, fixed.after.self_intersections)
             );
+            let again = fix(&fixed.mesh, holes);
+            assert_eq!(again.mesh, fixed.mesh, "{round}");
+            assert_eq!(again.repairs.closed_holes, 0, "{round}");
         }
     }
     // The soups are as bad as they are meant to be.
@@ -818,29 +821,31 @@ fn random_scene(generator: &mut Random, opens: bool) -> Mesh {
 #[test]
 fn what_is_mended_stays_as_it_is_and_does_not_depend_on_what_was_inside_out() {
     let mut generator = Random::new(11);
-    let (mut n_split, mut n_turned, mut n_open) = (0, 0, 0);
-    for round in 0..500 {
+    let (mut n_split, mut n_turned, mut n_open, mut n_closed) = (0, 0, 0, 0);
+    for round in 0..750 {
         let opens = round % 2 == 1;
+        let holes = if round % 3 == 2 { 8 } else { 0 };
         let scene = random_scene(&mut generator, opens);
-        let fixed = fix(&scene, 0);
+        let fixed = fix(&scene, holes);
         if faces(&fixed.mesh).is_empty() {
             continue;
         }
         n_split += u32::from(fixed.repairs.split_edges > 0);
         n_turned += u32::from(fixed.repairs.turned_shells > 0);
         n_open += u32::from(fixed.after.boundary_facets > 0);
-        let again = fix(&fixed.mesh, 0);
-        assert_eq!(surface(&again.mesh), surface(&fixed.mesh), "{round}");
+        n_closed += u32::from(fixed.repairs.split_edges > 0 && fixed.repairs.closed_holes > 0);
+        let again = fix(&fixed.mesh, holes);
+        assert_eq!(again.mesh, fixed.mesh, "{round}");
         assert_eq!(again.after, fixed.after, "{round}");
         assert_eq!(again.repairs.shells, fixed.repairs.shells, "{round}");
         assert_eq!(again.repairs.turned_shells, 0, "{round}");
         if !opens {
-            let other = fix(&turned(&scene, |_| true), 0);
+            let other = fix(&turned(&scene, |_| true), holes);
             assert_eq!(other.after, fixed.after, "{round}");
         }
     }
     assert!(
-        n_split > 100 && n_turned > 100 && n_open > 100,
-        "{n_split} {n_turned} {n_open}"
+        n_split > 100 && n_turned > 100 && n_open > 100 && n_closed > 10,
+        "{n_split} {n_turned} {n_open} {n_closed}"
     );
 }

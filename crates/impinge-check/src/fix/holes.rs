@@ -18,7 +18,7 @@ use crate::facets::{facets, groups};
 /// The most edges of a hole that can be closed.
 pub const MOST_HOLE_EDGES: usize = 256;
 
-/// Closes what can be closed.
+/// Closes what can be closed, and counts it in addition to what was closed before.
 pub fn close(
     surface: &mut Surface,
     options: &FixOptions,
@@ -83,11 +83,11 @@ pub fn close(
         let mut goes = vec![false; n_before];
         goes.extend(hole_of.iter().map(|&hole| is_bad[hole as usize]));
         let n_reopened = faces::remove(surface, &goes);
-        repairs.added_faces = hole_of.len() as u64 - n_reopened;
+        repairs.added_faces += hole_of.len() as u64 - n_reopened;
     }
     let n_bad = is_bad.iter().filter(|is_bad| **is_bad).count() as u64;
     repairs.refused_holes += n_bad;
-    repairs.closed_holes = u64::from(n_holes) - n_bad;
+    repairs.closed_holes += u64::from(n_holes) - n_bad;
     Ok(())
 }
 

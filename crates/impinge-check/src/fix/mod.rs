@@ -7,7 +7,8 @@
 //! hole is by rounded areas, and every triangle that is chosen passes exact tests.
 //!
 //! Edges are split by where matter is, which is known for certain only when closed shells are
-//! turned. So where both happen, the split is made again with the faces turned.
+//! turned and holes are filled. So where that happens, the split is made again with the faces turned
+//! and those of the fillings: see [`part`].
 //!
 //! Positions are never computed: a vertex of the result has the bits of a vertex of the input.
 
@@ -17,6 +18,7 @@ mod orient;
 mod shells;
 mod split;
 
+use impinge::Error;
 use impinge_io::{Elements, Mesh, weld};
 
 use crate::analysis::{self, Options, check_mesh};
@@ -29,6 +31,9 @@ pub use holes::MOST_HOLE_EDGES;
 
 /// Splits after which shells are turned for the last time.
 const MOST_SPLITS: u32 = 8;
+
+/// How often holes are closed at most.
+const MOST_CLOSINGS: u32 = 8;
 
 /// One kind of repair.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -288,34 +293,7 @@ pub fn fix_mesh(mesh: Mesh, options: &FixOptions) -> Result<Fixed, FixError> {
     if does(Repair::Degenerate) {
         (repairs.degenerate_faces, repairs.divided_faces) = faces::remove_degenerate(&mut surface);
     }
-    if does(Repair::Orient) {
-        (repairs.turned_faces, repairs.non_orientable) = orient::orient(&mut surface);
-    }
-    let (oriented, n_vertices, so_far) = (surface.faces.clone(), surface.n_vertices(), repairs);
-    let mut turned = Vec::new();
-    for splits in 1..=MOST_SPLITS {
-        split::split(
-            &mut surface,
-            (does(Repair::SplitEdges), does(Repair::SplitVertices)),
-            &mut repairs,
-        );
-        if does(Repair::CloseHoles) && options.close_holes > 0 {
-            holes::close(&mut surface, options, &mut repairs)?;
-        }
-        let again = does(Repair::Outward)
-            && shells::turn(&mut surface, options.threads, &mut turned, &mut repairs)?
-            && repairs.split_edges > 0;
-        if !again || splits == MOST_SPLITS {
-            break;
-        }
-        repairs = so_far;
-        surface.truncate_vertices(n_vertices);
-        surface.faces.clone_from(&oriented);
-        turned.truncate(oriented.len());
-        for (face, _) in surface.faces.iter_mut().zip(&turned).filter(|it| *it.1) {
-            face.swap(1, 2);
-        }
-    }
+    part(&mut surface, options, &mut repairs)?;
     if does(Repair::Unused) {
         repairs.unused_vertices = faces::remove_unused(&mut surface);
     }
@@ -347,4 +325,84 @@ pub fn fix_mesh(mesh: Mesh, options: &FixOptions) -> Result<Fixed, FixError> {
         places_after,
         self_intersections,
     })
+}
+
+/// Orients, splits, closes holes and turns shells.
+///
+/// A filling may meet other faces at edges where vertices were split, and its faces take part in
+/// what bounds matter there. So after holes were closed, the splits are taken back, and all is done
+/// once more with the fillings: as if the result were mended again.
+fn part(surface: &mut Surface, options: &FixOptions, repairs: &mut Repairs) -> Result<(), Error> {
+    let n_vertices = surface.n_vertices();
+    let mut turned = Vec::new();
+    for closings in 1..=MOST_CLOSINGS {
+        if options.repairs.contains(&Repair::Orient) {
+            let (n_turned, n_without) = orient::orient(surface);
+            repairs.turned_faces += n_turned;
+            repairs.non_orientable = n_without;
+        }
+        let before = *repairs;
+        let origins = split_and_turn(surface, options, &mut turned, repairs)?;
+        // Without a split, a filling meets nothing but its hole; what was refused may be sound
+        // beside it.
+        let may_change =
+            repairs.split_edges > 0 || !origins.is_empty() || repairs.refused_holes > 0;
+        let again = repairs.closed_holes > before.closed_holes && may_change;
+        if !again || closings == MOST_CLOSINGS {
+            break;
+        }
+        for vertex in surface.faces.as_flattened_mut() {
+            if let Some(copy) = (*vertex as usize).checked_sub(n_vertices) {
+                *vertex = origins[copy];
+            }
+        }
+        surface.truncate_vertices(n_vertices);
+        *repairs = Repairs {
+            closed_holes: repairs.closed_holes,
+            added_faces: repairs.added_faces,
+            ..before
+        };
+    }
+    Ok(())
+}
+
+/// Splits, closes holes and turns shells, again with the faces turned where that may change a split.
+/// `turned` says of each face whether it is turned. Returns the vertices of which those that the
+/// last splits added are copies.
+fn split_and_turn(
+    surface: &mut Surface,
+    options: &FixOptions,
+    turned: &mut Vec<bool>,
+    repairs: &mut Repairs,
+) -> Result<Vec<u32>, Error> {
+    let does = |repair: Repair| options.repairs.contains(&repair);
+    let (n_vertices, before) = (surface.n_vertices(), *repairs);
+    let (oriented, turned_before) = (surface.faces.clone(), turned.clone());
+    let mut splits = 0;
+    loop {
+        splits += 1;
+        let origins = split::split(
+            surface,
+            (does(Repair::SplitEdges), does(Repair::SplitVertices)),
+            repairs,
+        );
+        if does(Repair::CloseHoles) && options.close_holes > 0 {
+            holes::close(surface, options, repairs)?;
+        }
+        let again = does(Repair::Outward)
+            && shells::turn(surface, options.threads, turned, repairs)?
+            && (repairs.split_edges > 0 || !origins.is_empty());
+        if !again || splits == MOST_SPLITS {
+            return Ok(origins);
+        }
+        *repairs = before;
+        surface.truncate_vertices(n_vertices);
+        surface.faces.clone_from(&oriented);
+        turned.truncate(oriented.len());
+        for (ix, face) in surface.faces.iter_mut().enumerate() {
+            if turned[ix] != turned_before.get(ix).is_some_and(|held| *held) {
+                face.swap(1, 2);
+            }
+        }
+    }
 }

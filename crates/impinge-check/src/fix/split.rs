@@ -35,10 +35,14 @@ enum Pairing {
     Cut,
 }
 
-/// Splits edges, vertices, or both.
-pub fn split(surface: &mut Surface, (edges, vertices): (bool, bool), repairs: &mut Repairs) {
+/// Splits edges, vertices, or both. Returns the vertices of which the added ones are copies.
+pub fn split(
+    surface: &mut Surface,
+    (edges, vertices): (bool, bool),
+    repairs: &mut Repairs,
+) -> Vec<u32> {
     if !edges && !vertices {
-        return;
+        return Vec::new();
     }
     let sorted = facets(&surface.faces, surface.n_vertices());
     let crowded: Vec<&[Facet]> = groups(&sorted).filter(|group| group.len() > 2).collect();
@@ -91,6 +95,24 @@ pub fn split(surface: &mut Surface, (edges, vertices): (bool, bool), repairs: &m
     }
     drop(crowded);
     drop(sorted);
+    copy_vertices(
+        surface,
+        &mut corners,
+        |on_crowded| if on_crowded { edges } else { vertices },
+        &on_crowded,
+        repairs,
+    )
+}
+
+/// Gives each fan after the first at a vertex a copy of it. Returns the vertices of the copies.
+fn copy_vertices(
+    surface: &mut Surface,
+    corners: &mut UnionFind,
+    splits: impl Fn(bool) -> bool,
+    on_crowded: &[bool],
+    repairs: &mut Repairs,
+) -> Vec<u32> {
+    let mut origins = Vec::new();
     let n_vertices = surface.n_vertices();
     let mut first_fans = vec![u32::MAX; n_vertices];
     let mut was_split = vec![false; n_vertices];
@@ -103,7 +125,7 @@ pub fn split(surface: &mut Surface, (edges, vertices): (bool, bool), repairs: &m
         for corner in 0..3 {
             let vertex = surface.faces[face][corner];
             let is_on_crowded = on_crowded[vertex as usize];
-            if !(if is_on_crowded { edges } else { vertices }) {
+            if !splits(is_on_crowded) {
                 continue;
             }
             let fan = corners.root(3 * face as u32 + corner as u32);
@@ -122,11 +144,13 @@ pub fn split(surface: &mut Surface, (edges, vertices): (bool, bool), repairs: &m
                     repairs.split_vertices += u64::from(!was_split[vertex as usize]);
                     was_split[vertex as usize] = true;
                 }
+                origins.push(vertex);
                 surface.copy_vertex(vertex)
             });
             surface.faces[face][corner] = copy;
         }
     }
+    origins
 }
 
 /// The pieces that edges of two faces hold together, and which of them are set aside.
